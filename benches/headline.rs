@@ -1,7 +1,8 @@
-//! Headline figures: time of whole processes, including reading and writing files, on all threads.
+//! Headline figures: run times of whole processes on all threads, including file input and output.
 //!
-//! `cargo bench --bench headline` generates its meshes and scenes in a temporary folder, renders each three times and
-//! prints the fastest run: wall-clock and processor time, and the time spent on loading, building and rendering.
+//! `cargo bench --bench headline` generates meshes and scenes in a temporary folder, renders each scene three
+//! times and prints the fastest run: wall-clock and CPU time, and the time spent on loading, building and
+//! rendering.
 
 #![allow(clippy::print_stdout)]
 
@@ -16,7 +17,7 @@ use nix::sys::time::TimeValLike;
 
 const RUNS: usize = 3;
 
-/// A row of the table: title, scene, goal and options.
+/// A table row: title, scene, goal and options.
 struct HeadlineRow {
     name: &'static str,
     goal: &'static str,
@@ -27,7 +28,7 @@ struct HeadlineRow {
 fn main() -> Result<(), Box<dyn error::Error>> {
     let folder = tempfile::tempdir()?;
     let path = |name: &str| folder.path().join(name);
-    // Rings, columns and positions: 871,200 and 78,804 triangles, then 1,700,168.
+    // Rings, columns and positions. These meshes have 871,200 and 78,804 triangles, the third one 1,700,168.
     fs::write(path("large.off"), ball(660, 661, -1.1))?;
     fs::write(path("small.off"), ball(198, 200, 1.1))?;
     fs::write(path("largest.off"), ball(922, 923, 0.0))?;
@@ -40,7 +41,7 @@ fn main() -> Result<(), Box<dyn error::Error>> {
         },
         HeadlineRow {
             name: "Cornell box, 10 samples, 5 shadow rays",
-            goal: "< 0.5 s of processor time",
+            goal: "< 0.5 s CPU time",
             scene: fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell.toml"))?.replace(
                 "width = 512\nheight = 512\nsamples = 64",
                 "width = 480\nheight = 480\nsamples = 10\nshadow_samples = 5",
@@ -54,7 +55,7 @@ fn main() -> Result<(), Box<dyn error::Error>> {
             options: &[],
         },
         HeadlineRow {
-            name: "the same with the k-d tree",
+            name: "the same scene with the k-d tree",
             goal: "",
             scene: meshes(1, 1, &["largest.off"]),
             options: &["--accel", "kdtree"],
@@ -82,7 +83,7 @@ fn main() -> Result<(), Box<dyn error::Error>> {
     Ok(())
 }
 
-/// Renders once; returns wall-clock and processor seconds, and the seconds of the stages meshes, accel and render.
+/// Renders once. Returns wall-clock and CPU seconds, and the seconds of the meshes, accel and render stages.
 fn render(folder: &Path, options: &[&str]) -> Result<[f64; 5], Box<dyn error::Error>> {
     let processor = || -> nix::Result<f64> {
         let usage = getrusage(UsageWho::RUSAGE_CHILDREN)?;
@@ -104,7 +105,7 @@ fn render(folder: &Path, options: &[&str]) -> Result<[f64; 5], Box<dyn error::Er
     Ok([all, processor()? - before, stage("meshes"), stage("accel"), stage("render")])
 }
 
-/// A floor, a light, and the given meshes.
+/// A scene with a floor, a light and the given meshes.
 fn meshes(samples: u32, shadow_samples: u32, files: &[&str]) -> String {
     let mut scene = format!(
         r#"[render]
@@ -141,7 +142,8 @@ material = "lamp"
     scene
 }
 
-/// A bumpy ball on the ground at `x`, as an OFF file of 2·rings·columns triangles minus those at the poles.
+/// An OFF file of a bumpy ball on the ground at `x`, with 2·rings·columns triangles minus the degenerate
+/// triangles at the poles.
 fn ball(rings: u32, columns: u32, x: f64) -> String {
     use std::f64::consts::{PI, TAU};
     let mut text = format!("OFF\n{} {} 0\n", (rings + 1) * columns, 2 * rings * columns - 2 * columns);

@@ -1,11 +1,12 @@
-//! Time to the same error with increasing numbers of lights of constant total power.
+//! Time to reach the same error with an increasing number of lights and constant total power.
 //!
-//! `cargo bench --bench lamps` renders a room with 10, 100, 1000 and 10,000 small lights, with both integrators. It
-//! renders a reference with many samples, then four samples per pixel three times.
+//! `cargo bench --bench lamps` renders a room with 10, 100, 1000 and 10,000 small lights using both
+//! integrators: first a reference with many samples, then three images with four samples per pixel.
 //!
-//! The error is inversely proportional to the number of samples, so (seconds × relMSE) / 1e-2 is the time to a relMSE
-//! of 1e-2, if fractional samples were possible. The last columns give the actual wait: the smallest number of samples
-//! with a relMSE of at most 1e-2, and their seconds in the stages lights and render. `-- whitted 10 1000` selects rows.
+//! The error is inversely proportional to the number of samples, so seconds × relMSE / 1e-2 is the time to
+//! reach a relMSE of 1e-2 if fractional samples were possible. The last columns show the smallest whole
+//! number of samples with a relMSE of at most 1e-2, and the time of the lights and render stages with that
+//! many samples. `-- whitted 10 1000` selects rows.
 
 #![allow(clippy::print_stdout)]
 
@@ -17,7 +18,7 @@ use std::process::{Command, Stdio};
 
 const RUNS: usize = 3;
 
-/// The relMSE for which the table gives seconds.
+/// Target relMSE.
 const GOAL: f64 = 1e-2;
 
 /// Maximum number of samples to try.
@@ -55,18 +56,18 @@ fn main() -> Result<(), Box<dyn error::Error>> {
     Ok(())
 }
 
-/// Measurements of a render.
+/// Measurements of one render.
 struct RenderFigures {
-    /// Seconds of the stage lights.
+    /// Seconds of the lights stage.
     lights: f64,
-    /// Seconds of the stage render.
+    /// Seconds of the render stage.
     seconds: f64,
     /// Number of shadow rays.
     rays: f64,
     relmse: f64,
 }
 
-/// The fastest of several renders.
+/// Returns the fastest of several renders.
 fn fastest_render(folder: &Path, samples: u32) -> Result<RenderFigures, Box<dyn error::Error>> {
     let mut best: Option<[f64; 3]> = None;
     for _ in 0..RUNS {
@@ -79,7 +80,7 @@ fn fastest_render(folder: &Path, samples: u32) -> Result<RenderFigures, Box<dyn 
     Ok(RenderFigures { lights, seconds, rays, relmse: error_of(folder)? })
 }
 
-/// Renders once; returns the seconds of the stages lights and render, and the number of shadow rays.
+/// Renders once. Returns the seconds of the lights and render stages, and the number of shadow rays.
 fn render(folder: &Path, options: &[&str]) -> Result<[f64; 3], Box<dyn error::Error>> {
     let mut command = Command::new(env!("CARGO_BIN_EXE_glimt"));
     command.current_dir(folder).args(["scene.toml", "--once", "--report", "report.json"]).args(options);
@@ -103,7 +104,7 @@ fn error_of(folder: &Path) -> Result<f64, Box<dyn error::Error>> {
     errors["relmse"].as_f64().ok_or_else(|| "no relMSE".into())
 }
 
-/// A room with objects and `count` small sphere lights that the camera does not see.
+/// A room with objects and `count` small sphere lights outside the camera's view.
 fn scene(integrator: &str, count: u32) -> String {
     let mut scene = format!(
         r#"[render]
@@ -151,7 +152,7 @@ material = "clay"
 "#,
         emission = 12_000.0 / f64::from(count)
     );
-    // Multiples of powers of the plastic number and its analog in three dimensions: a low-discrepancy sequence.
+    // A low-discrepancy sequence: multiples of powers of the three-dimensional analog of the plastic number.
     let place = |i: u32, step: f64| (f64::from(i) * step).fract();
     for i in 0..count {
         let [x, y, z] = [0.819_172_51, 0.671_043_61, 0.549_700_48].map(|step| place(i, step));

@@ -1,5 +1,5 @@
-//! Processor time of `check` for large scene files: a million spheres, and files that repeat a valid or invalid element
-//! N and 4N times. A growth well above 4 reveals a quadratic algorithm.
+//! CPU time of `check` for large scene files: a million spheres, and files that repeat a valid or invalid
+//! element N and 4N times. A ratio well above 4 reveals a quadratic algorithm.
 //!
 //! `cargo bench --bench scenes [NAME…]`
 
@@ -13,7 +13,7 @@ use nix::sys::time::TimeValLike;
 
 const HEAD: &str = "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n[[light]]\n";
 
-/// Generates a scene file with a number of elements.
+/// Generates a scene file with the given number of elements.
 type Family = fn(usize) -> String;
 
 const FAMILIES: [(&str, Family); 14] = [
@@ -28,15 +28,15 @@ const FAMILIES: [(&str, Family); 14] = [
         each(n, |i| format!("[[mesh]]\nfile = \"m{i}.obj\"\nmaterial = \"a\"\n")) + "[materials.a]\n"
     }),
     ("picture files", |n| each(n, |i| format!("[textures.t{i}]\nfile = \"t{i}.png\"\n"))),
-    ("tables given twice", |n| each(n, |i| format!("[materials.m{i}]\n")).repeat(2)),
-    ("tables under tables", |n| {
+    ("duplicate tables", |n| each(n, |i| format!("[materials.m{i}]\n")).repeat(2)),
+    ("nested tables", |n| {
         each(n, |i| format!("[materials.m{i}.sub]\n")) + &each(n, |i| format!("[materials.m{i}]\n"))
     }),
-    ("keys given twice", |n| format!("[render]\n{}", each(n, |i| format!("k{i} = 1\n")).repeat(2))),
+    ("duplicate keys", |n| format!("[render]\n{}", each(n, |i| format!("k{i} = 1\n")).repeat(2))),
     ("unknown keys", |n| format!("[render]\n{}", each(n, |i| format!("width{i} = 1\n")))),
     ("dotted keys", |n| format!("[materials]\n{}", each(n, |i| format!("m{i}.diffuse = 0.5\n")))),
     ("broken lines", |n| format!("[render]\n{}", each(n, |i| format!("k{i} = = 3 4\n")))),
-    ("one broken line", |n| format!("sphere = [{}]\nx = tru\n", "{ a = 1, b = tru },".repeat(n))),
+    ("one long broken line", |n| format!("sphere = [{}]\nx = tru\n", "{ a = 1, b = tru },".repeat(n))),
     ("lights", |n| {
         each(n, |i| format!("[[light]]\nposition = [0, {i}, 0]\n")) + &sphere(0, "m") + "[materials.m0]\n"
     }),
@@ -50,7 +50,7 @@ fn sphere(number: usize, material: &str) -> String {
     format!("[[sphere]]\ncenter = [{number}, 0, 0]\nradius = 0.5\nmaterial = \"{material}{number}\"\n")
 }
 
-/// A million spheres of eight materials at pseudo-random positions.
+/// A million spheres with eight materials at pseudo-random positions.
 fn million() -> String {
     let place = |number: usize| (number.wrapping_mul(2_654_435_761) % 2_000_003) as f64 / 1e4 - 100.0;
     let sphere = |i: usize| {
@@ -63,7 +63,7 @@ fn million() -> String {
     each(8, |i| format!("[materials.m{i}]\ndiffuse = [0.5, 0.5, 0.3]\n")) + &each(1_000_000, sphere)
 }
 
-/// Processor seconds of `check` for a file.
+/// CPU seconds of `check` for a file.
 fn seconds(folder: &Path, text: &str) -> f64 {
     let scene = folder.join("scene.toml");
     std::fs::write(&scene, format!("{HEAD}{text}")).expect("written");

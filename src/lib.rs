@@ -1,7 +1,8 @@
 //! # glimt: a ray tracer that lives in the terminal
 //!
-//! glimt parses a scene file into a small description, builds the structures for tracing, renders in passes and writes the image. The
-//! terminal UI and `--once` use the same pipeline and communicate with it through messages.
+//! glimt parses a scene file into a small description, builds acceleration structures, renders in passes and
+//! writes the image. The terminal UI and `--once` use the same pipeline and communicate with it through
+//! messages.
 //!
 //! ## Modules
 //!
@@ -29,9 +30,9 @@
 //!
 //! ## Crates
 //!
-//! The modules are divided into member crates under `crates/`. Crates compile in parallel, and an edit recompiles only its crate and
-//! the crates that depend on it; this crate re-exports them all. Each crate re-exports the modules it depends on at its root, so
-//! `crate::math` has the same meaning everywhere.
+//! The modules are divided into member crates under `crates/`. Crates compile in parallel, and an edit only
+//! recompiles its crate and dependent crates. This crate re-exports all of them. Each crate re-exports the
+//! modules it depends on at its root, so `crate::math` has the same meaning everywhere.
 //!
 //! | crate | modules |
 //! | --- | --- |
@@ -44,57 +45,65 @@
 //! | `tui` | [`tui`] |
 //! | `cli` | [`cli`] |
 //!
-//! There is no cross-crate optimization: mark small functions that other crates call for each ray or sample `#[inline]`.
+//! There is no cross-crate optimization. Small functions that other crates call per ray or sample must be
+//! marked `#[inline]`.
 //!
 //! ## The life of a save
 //!
-//! From a file notification to the preview and the written image. Paths start with the module: `tui/run.rs` is
-//! `crates/tui/src/run.rs`; the table above lists the crate of each module.
+//! From a file notification to the preview and the written image. Paths start with the module: `tui/run.rs`
+//! is `crates/tui/src/run.rs`. The table above lists each module's crate.
 //!
-//! 1. `pipeline/watch/mod.rs`: the operating system reports a change; the watcher compares contents and forwards only real
-//!    differences, through `cli/live.rs`.
-//! 2. `tui/run.rs` receives it as an event (`tui/event.rs`); `tui/update/mod.rs` updates the state.
-//! 3. `tui/update/request.rs` creates a request and `tui/run.rs` sends it. The header (`tui/view/header.rs`) changes first: it
-//!    shows that a render is running, and is drawn as in step 9.
-//! 4. `pipeline/worker.rs` has a mailbox for one request; a newer request cancels the current render.
-//! 5. `pipeline/engine/mod.rs` runs the stages: `pipeline/stages/parse.rs`, `pipeline/plan.rs`, then meshes, glass, textures, accel,
-//!    lights and photons. A stage whose key in `pipeline/keys.rs` is unchanged reuses its result. A broken scene ends here, and the
-//!    last image stays on screen.
-//! 6. `pipeline/render/scheduler.rs` schedules passes, and `pipeline/trace.rs` renders their tiles on the thread pool. Large images
-//!    start with a coarse one, `pipeline/render/first_picture.rs`; with photons, `engine/mod.rs` shows one before it traces them.
-//! 7. `integrators/mod.rs` renders a tile: see below. `pipeline/render/film_state.rs` adds its samples to the film.
+//! 1. `pipeline/watch/mod.rs`: the operating system reports a change. The watcher compares contents and only
+//!    forwards actual changes, through `cli/live.rs`.
+//! 2. `tui/run.rs` receives the change as an event (`tui/event.rs`), and `tui/update/mod.rs` updates the
+//!    state.
+//! 3. `tui/update/request.rs` creates a request, and `tui/run.rs` sends it. The header (`tui/view/header.rs`)
+//!    changes first: it is redrawn as in step 9 and shows that a render is running.
+//! 4. `pipeline/worker.rs` has a mailbox for one request. A newer request cancels the current render.
+//! 5. `pipeline/engine/mod.rs` runs the stages: `pipeline/stages/parse.rs`, `pipeline/plan.rs`, then meshes,
+//!    glass, textures, accel, lights and photons. A stage reuses its result if its key in `pipeline/keys.rs`
+//!    is unchanged. If the scene has errors, the render ends here and the last image stays on the screen.
+//! 6. `pipeline/render/scheduler.rs` schedules passes, and `pipeline/trace.rs` renders their tiles on the
+//!    thread pool. For large images, `pipeline/render/first_picture.rs` renders a coarse image first. With
+//!    photons, `engine/mod.rs` shows a coarse image before tracing photons.
+//! 7. `integrators/mod.rs` renders a tile (see below). `pipeline/render/film_state.rs` adds the samples to
+//!    the film.
 //! 8. `pipeline/render/preview.rs` puts a preview into the slot, and `cli/live.rs` notifies the front end.
-//! 9. `tui/presenter.rs` takes it when a frame is due, `tui/view/preview.rs` turns it into cells, `tui/display.rs` limits the cells
-//!    per frame, `tui/paint/mod.rs` encodes them in the fewest bytes, and `tui/writer.rs` writes those.
-//! 10. `pipeline/stages/write.rs` encodes the finished image; `output/write.rs` writes a temporary file and renames it.
+//! 9. `tui/presenter.rs` takes the preview when a frame is due, `tui/view/preview.rs` converts it to cells,
+//!    `tui/display.rs` limits the cells per frame, `tui/paint/mod.rs` encodes them in the fewest bytes, and
+//!    `tui/writer.rs` writes the bytes.
+//! 10. `pipeline/stages/write.rs` encodes the finished image. `output/write.rs` writes it to a temporary file
+//!     and renames the file.
 //!
 //! ## The life of a ray
 //!
 //! From the camera to the film. Files are in `integrators/` unless the path starts with another module.
 //!
-//! 1. `mod.rs` receives the samples of a tile and the effective settings; `behavior.rs` derives the behavior of paths from them;
-//!    `transport/tile.rs` has the tile's state.
-//! 2. `transport/camera.rs` generates packets of sixteen rays; `camera_paths.rs` traces them bounce by bounce.
-//! 3. `transport/packet.rs` intersects a packet: `world/geometry.rs`, then the trees of `accel/wide_bvh/`, or
-//!    `geometry/triangle_list.rs` for few triangles.
-//! 4. `transport/packet.rs` puts hits on simple materials into packets of sixteen vertices, `transport/batch.rs`; all BSDFs in a
-//!    packet are of one kind, `materials/rough/mod.rs`.
-//! 5. Other hits are handled one at a time: `transport/walk.rs` passes the parts of one glass body (`transport/crossing.rs`), and
-//!    `transport/vertex.rs` evaluates the surface.
-//! 6. At mirrors and glass, `transport/interface.rs` generates the rays of the next round.
-//! 7. `direct/queue.rs` lights packets: `direct/all_lights.rs` or `direct/light_tree.rs` sample lights, `direct/mis.rs` computes
-//!    MIS weights, and `direct/shadow_rays.rs` traces shadow rays.
-//! 8. `direct/lobe_rays.rs` finds lights in narrow lobes; `photons/gather.rs` adds photons that `photons/emit.rs` has traced.
-//! 9. `transport/scatter.rs` samples the next direction of paths that continue.
-//! 10. `transport/accumulator.rs` sums the values of the view per sample; `film/sums.rs` adds samples to pixels.
+//! 1. `mod.rs` receives a tile's samples and the effective settings. `behavior.rs` determines how paths
+//!    behave with these settings. `transport/tile.rs` contains the tile's state.
+//! 2. `transport/camera.rs` generates packets of sixteen rays. `camera_paths.rs` traces them bounce by
+//!    bounce.
+//! 3. `transport/packet.rs` intersects a packet with the scene: `world/geometry.rs`, then the trees in
+//!    `accel/wide_bvh/`, or `geometry/triangle_list.rs` if there are few triangles.
+//! 4. `transport/packet.rs` collects hits on simple materials in packets of sixteen vertices
+//!    (`transport/batch.rs`). All BSDFs in a packet have the same kind (`materials/rough/mod.rs`).
+//! 5. Other hits are handled one at a time: `transport/walk.rs` skips boundaries between parts of one glass
+//!    body (`transport/crossing.rs`), and `transport/vertex.rs` evaluates the surface.
+//! 6. At mirrors and glass, `transport/interface.rs` generates the rays for the next round.
+//! 7. `direct/queue.rs` computes direct light for packets: `direct/all_lights.rs` or `direct/light_tree.rs`
+//!    samples lights, `direct/mis.rs` computes MIS weights, and `direct/shadow_rays.rs` traces shadow rays.
+//! 8. `direct/lobe_rays.rs` finds lights in narrow lobes. `photons/gather.rs` adds photons traced by
+//!    `photons/emit.rs`.
+//! 9. `transport/scatter.rs` samples the next direction of each continuing path.
+//! 10. `transport/accumulator.rs` sums the view's values per sample. `film/sums.rs` adds samples to pixels.
 //!
-//! CONTRIBUTING explains how to add a key, a shape, a light, a material or an integrator; `tests/README.md` where tests go and how to
-//! run one.
+//! CONTRIBUTING explains how to add a key, a shape, a light, a material or an integrator. `tests/README.md`
+//! explains where to put tests and how to run them.
 //!
 //! ## Dependencies
 //!
-//! Each module uses the modules on its right and no others; `tests/suite/architecture` compares the sources with this table. The files
-//! within a module have no import cycles, except the pairs listed there.
+//! Each module only uses the modules on its right. `tests/suite/architecture` compares the sources with this
+//! table. The files within a module have no import cycles, except for the pairs listed in that test.
 //!
 //! ```text
 //! system      ->
@@ -120,18 +129,21 @@
 //!
 //! ## Invariants
 //!
-//! - The same scene, settings and seed give the same bits for any number of threads, on every machine. Random numbers are a function
-//!   of pixel, sample and dimension, every sum has a fixed order, and images do not depend on the system's mathematical library.
-//! - Rays are traced in batches. A hit carries an error bound, from which the next ray starts: no epsilon is a constant. A threshold
-//!   for degenerate input is relative to the size of that input.
-//! - Scene coordinates are `f64`. Tracing uses `f32` relative to an origin near the camera's target (`world::origin`); each mesh has
-//!   its own origin.
-//! - Rendering cannot fail, only be cancelled. Errors are values that name the file and the place.
-//! - Only `assets`, `output`, `scene` (the scene file, and whether the files it names exist), `pipeline::watch`, `pipeline::identity`,
-//!   `pipeline::render::checkpointer` (checkpoints), `cli::bench::cache` and the commands `new`, `import` and `doctor` access files.
-//! - `unsafe` code is in `accel::wide_bvh::simd`, with a portable twin that gives the same bits, and in `system::abort`, which
-//!   restores the terminal when an allocation fails.
-//! - `tui` does not use `world`; `world` knows nothing of pixels or time.
+//! - The same scene, settings and seed produce the same bits with any number of threads on every machine.
+//!   Random numbers are a function of pixel, sample and dimension. Every sum has a fixed order. Images do not
+//!   depend on the system's math library.
+//! - Rays are traced in batches. Each hit has an error bound, which offsets the origin of the next ray. No
+//!   epsilon is a constant. Thresholds for degenerate input are relative to the size of the input.
+//! - Scene coordinates are `f64`. Tracing uses `f32` relative to an origin near the camera's target
+//!   (`world::origin`). Each mesh has its own origin.
+//! - Rendering cannot fail, but it can be cancelled. Errors are values that contain the file and the
+//!   position.
+//! - Only `assets`, `output`, `scene` (the scene file, and whether the files it references exist),
+//!   `pipeline::watch`, `pipeline::identity`, `pipeline::render::checkpointer` (checkpoints),
+//!   `cli::bench::cache` and the commands `new`, `import` and `doctor` access files.
+//! - `unsafe` code is only used in `accel::wide_bvh::simd`, which has a portable version with bitwise
+//!   identical results, and in `system::abort`, which restores the terminal if an allocation fails.
+//! - `tui` does not use `world`. `world` is independent of pixels and time.
 
 pub use glimt_base::{choice, control, film, math, sampling, system};
 pub use glimt_cli::{self as cli, bench};

@@ -1,4 +1,4 @@
-//! Camera keys: time from a press to the first changed cell, and images per second while a key is held.
+//! Camera keys: time from a key press to the first changed cell, and images per second while a key is held.
 
 use std::path::Path;
 use std::thread;
@@ -13,7 +13,7 @@ const HELD: Duration = Duration::from_secs(2);
 /// Key repeat interval.
 const REPEAT: Duration = Duration::from_millis(33);
 
-/// Measures one scene and returns a line of figures.
+/// Measures one scene and returns a line of results.
 pub fn row(folder: &Path, scene: &Path) -> BenchResult<String> {
     let path = scene.to_str().ok_or("a file name is not valid UTF-8")?;
     let arguments = [path, "--samples", "100000", "-o", "out.png"];
@@ -30,8 +30,8 @@ pub fn row(folder: &Path, scene: &Path) -> BenchResult<String> {
     Ok(format!("first {}  held {:5.1} images per second", figures(times), held(&mut terminal)?))
 }
 
-/// Holds a camera key with keyboard repeat, back and forth. Refined images of the same camera arrive only after the
-/// next press, so each burst of bytes is the image of another camera position.
+/// Holds camera keys with keyboard repeat, back and forth. Refined images arrive only after the next press,
+/// so each burst of bytes is an image from a new camera position.
 fn held(terminal: &mut TimedTerminal) -> BenchResult<f64> {
     terminal.cells();
     let begin = Instant::now();
@@ -44,7 +44,7 @@ fn held(terminal: &mut TimedTerminal) -> BenchResult<f64> {
     Ok(terminal.bursts() as f64 / begin.elapsed().as_secs_f64())
 }
 
-/// Whether a different image is shown; less noise does not count.
+/// Whether a different image is shown, ignoring changes in noise.
 fn is_other(before: &Cells, now: &Cells) -> bool {
     let pairs = before.iter().zip(now).filter_map(|(a, b)| Some(((*a)?, (*b)?)));
     let far = |(a, b): &([[u8; 3]; 2], [[u8; 3]; 2])| {

@@ -1,4 +1,4 @@
-//! Time until the worker starts a newer request, whatever it is doing.
+//! Time until the worker starts on a newer request, for every kind of work in progress.
 
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -11,8 +11,9 @@ use super::BenchResult;
 
 const LIMIT: Duration = Duration::from_secs(20);
 
-/// Measures cancellations after 0, 1, 2, … 60 ms, at first with nothing loaded: while the worker reads the scene,
-/// builds its acceleration structures, and traces the first image and passes; then late in the render.
+/// Measures cancellations after 0, 1, 2, … 60 ms, starting with nothing loaded. The first cancellations
+/// interrupt scene loading, acceleration-structure builds, the first image and the first passes. Then
+/// measures cancellations late in the render.
 pub fn times(scene: &Path) -> BenchResult<Vec<Duration>> {
     let mut times = Vec::new();
     for step in 0..12 {
@@ -44,7 +45,7 @@ fn cancel(worker: &Handle, scene: &Path, generation: &mut u64, after: Duration) 
     }
 }
 
-/// Sends a request for a different image each time.
+/// Requests a different image each time.
 fn send(worker: &Handle, scene: &Path, generation: &mut u64) {
     *generation += 1;
     let overrides =

@@ -1,14 +1,16 @@
-//! Latency: from a save or a key press to the first changed cell of the image, and until a render stops.
+//! Latency from a save or key press to the first changed image cell, and from a cancellation until the render
+//! stops.
 //!
-//! `cargo bench --bench latency [-- [settled] [busy] [cancel] [camera] [SCENE…]]` copies scenes and assets to a
-//! temporary folder, runs glimt on each in a pseudo-terminal of 120×40 cells, edits the file, presses keys, and prints
-//! medians and maxima in milliseconds. Times run from before the file is written or the key is pressed until the
-//! terminal has read the first bytes that change the image.
+//! `cargo bench --bench latency [-- [settled] [busy] [cancel] [camera] [SCENE…]]` copies scenes and assets to
+//! a temporary folder, runs glimt on each scene in a pseudo-terminal of 120×40 cells, edits the file, presses
+//! keys, and prints medians and maxima in milliseconds. The clock starts before the file is written or the
+//! key is pressed, and stops when the terminal has read the first bytes that change the image.
 //!
-//! `settled` saves the file while nothing is rendering, `busy` while the previous image still is. `GLIMT` may name
-//! another build of the program. `cancel` measures the time from a newer request until the worker starts it, whatever
-//! it was doing. `camera` presses camera keys on every bundled scene while the previous image is rendering, and reports
-//! the first changed cell and the images per second while a key is held.
+//! `settled` saves the file while nothing is rendering, `busy` while the previous image is still rendering.
+//! `cancel` measures the time until the worker starts on a newer request, for every kind of work in progress.
+//! `camera` presses camera keys in every bundled scene while the previous image is rendering, and prints the
+//! time to the first changed cell and the images per second while a key is held. Set `GLIMT` to measure a
+//! different build.
 
 #![allow(clippy::print_stdout)]
 
@@ -28,9 +30,9 @@ type BenchResult<T> = Result<T, Box<dyn Error>>;
 
 const COLUMNS: u16 = 120;
 const ROWS: u16 = 40;
-/// Number of measurements of each kind.
+/// Measurements of each kind.
 const ROUNDS: usize = 7;
-/// Pause after a save in which nothing else runs.
+/// Idle time after a save.
 const PAUSE: Duration = Duration::from_millis(300);
 
 fn main() -> BenchResult<()> {
@@ -44,20 +46,23 @@ fn main() -> BenchResult<()> {
     let scenes: Vec<&EditedScene> = scenes.collect();
     for mode in [Mode::Settled, Mode::Busy] {
         if is_wanted(mode.name()) {
-            println!("{}: from a save or a key to the first changed cell, ms, median (maximum)", mode.name());
+            println!(
+                "{}: from a save or key press to the first changed cell, ms, median (maximum)",
+                mode.name()
+            );
             for scene in &scenes {
                 row(&mut copies, scene, mode)?;
             }
         }
     }
     if is_wanted("cancel") {
-        println!("cancel: until the worker starts the next request, ms, median (maximum)");
+        println!("cancel: until the worker starts on the next request, ms, median (maximum)");
         for scene in &scenes {
             println!("{:<14} {}", scene.name, figures(cancel::times(&copies.scene(scene))?));
         }
     }
     if is_wanted("camera") {
-        println!("camera: from a key to the first changed cell, ms, median (maximum)");
+        println!("camera: from a key press to the first changed cell, ms, median (maximum)");
         for path in copies.all()? {
             let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
             if all_scenes || arguments.contains(&name) {
@@ -82,7 +87,7 @@ impl Mode {
         }
     }
 
-    /// Whether the image is a different one. While it is still rendering, less noise does not count.
+    /// Whether the image has changed, ignoring changes in noise while it is rendering.
     fn is_other(self, before: &Cells, now: &Cells) -> bool {
         let differ = |most: u8| {
             let pairs = before.iter().zip(now).filter_map(|(a, b)| Some(((*a)?, (*b)?)));
@@ -98,7 +103,7 @@ impl Mode {
     }
 }
 
-/// Measures one scene with every edit and every key.
+/// Measures every edit and key in one scene.
 fn row(copies: &mut SceneCopies, scene: &EditedScene, mode: Mode) -> BenchResult<()> {
     let path = copies.scene(scene);
     let path = path.to_str().ok_or("a file name is not valid UTF-8")?;
@@ -106,7 +111,7 @@ fn row(copies: &mut SceneCopies, scene: &EditedScene, mode: Mode) -> BenchResult
     let arguments = [path, "--samples", samples, "-o", "out.png"];
     let mut terminal = TimedTerminal::open(copies.folder(), &arguments, COLUMNS, ROWS)?;
     terminal.wait("a picture", |screen| screen.contents().contains('▀'))?;
-    // Wait until the files are old enough that their modification times identify them.
+    // Wait until the files are old enough for their modification times to identify their contents.
     std::thread::sleep(Duration::from_millis(2500));
     let mut words = Vec::new();
     for edit in scene.edits {
@@ -126,7 +131,8 @@ fn row(copies: &mut SceneCopies, scene: &EditedScene, mode: Mode) -> BenchResult
     for key in scene.keys {
         let mut times = Vec::new();
         for _ in 0..ROUNDS {
-            // Request a different image each time, so that none is cached. The camera changes every view.
+            // Request a different image each time, so that no image is cached. Camera edits change every
+            // view.
             ready(&mut terminal, mode)?;
             let (file, bytes) = copies.edit(scene, scene.camera())?;
             fs::write(&file, &bytes)?;
@@ -145,10 +151,10 @@ fn row(copies: &mut SceneCopies, scene: &EditedScene, mode: Mode) -> BenchResult
     Ok(())
 }
 
-/// Waits for the image before an edit or a key press.
+/// Waits until the image is ready for an edit or key press.
 fn ready(terminal: &mut TimedTerminal, mode: Mode) -> BenchResult<Cells> {
     if mode == Mode::Settled {
-        terminal.wait("the end of the render", |screen| {
+        terminal.wait("the render to finish", |screen| {
             screen.contents().lines().next().is_some_and(|line| line.contains("done"))
         })?;
         std::thread::sleep(PAUSE);

@@ -5,19 +5,20 @@ use std::path::{Path, PathBuf};
 
 use super::BenchResult;
 
-/// A bundled scene with edits: the kind, the text to replace and its replacement. `{}` is replaced with a number
-/// between 0.1 and 1 that differs each time. An edit without `{}` darkens the texture file of this name.
+/// A bundled scene and its edits. Each has a kind, the text to replace and the replacement, in which `{}`
+/// becomes a different number between 0.1 and 1 each time. An edit without `{}` darkens the texture file of
+/// that name.
 pub struct EditedScene {
     pub name: &'static str,
     pub edits: &'static [Edit],
     pub keys: &'static [&'static str],
 }
 
-/// The kind of an edit, the text to replace, and its replacement.
+/// Kind of edit, text to replace, and replacement.
 pub type Edit = (&'static str, &'static str, &'static str);
 
 impl EditedScene {
-    /// The camera edit, which is always the second one.
+    /// The camera edit, which is always the second edit.
     pub fn camera(&self) -> Edit {
         self.edits[1]
     }
@@ -107,10 +108,10 @@ pub const SCENES: &[EditedScene] = &[
     },
 ];
 
-/// Copies of scenes and assets, to be edited.
+/// Editable copies of the scenes and assets.
 pub struct SceneCopies {
     folder: tempfile::TempDir,
-    /// Number of edits so far.
+    /// Number of previous edits.
     edits: u32,
 }
 
@@ -131,7 +132,7 @@ impl SceneCopies {
         let mut make = std::process::Command::new(env!("CARGO_BIN_EXE_glimt-assets"));
         make.arg("million").current_dir(folder.path()).stdout(std::process::Stdio::null());
         if !make.status()?.success() {
-            return Err("the large mesh could not be generated".into());
+            return Err("failed to generate the large mesh".into());
         }
         Ok(Self { folder, edits: 0 })
     }
@@ -140,7 +141,7 @@ impl SceneCopies {
         self.folder.path()
     }
 
-    /// All bundled scenes, by name.
+    /// Names of all bundled scenes.
     pub fn all(&self) -> BenchResult<Vec<PathBuf>> {
         let entries = fs::read_dir(self.folder.path().join("scenes"))?.collect::<Result<Vec<_>, _>>()?;
         let mut paths: Vec<PathBuf> = entries.iter().map(fs::DirEntry::path).collect();
@@ -153,7 +154,7 @@ impl SceneCopies {
         self.folder.path().join("scenes").join(scene.name).with_extension("toml")
     }
 
-    /// Returns the file that an edit changes, and its new content.
+    /// Returns the file to edit and its new contents.
     pub fn edit(&mut self, scene: &EditedScene, (_, from, to): Edit) -> BenchResult<(PathBuf, Vec<u8>)> {
         self.edits += 1;
         let number = 0.1 + f64::from(self.edits) * 0.377 % 0.9;

@@ -1,4 +1,4 @@
-//! A terminal that timestamps bytes and parses them later, so that it takes no time from the program during a
+//! A terminal that timestamps incoming bytes and parses them later, so as not to slow the program during a
 //! measurement.
 
 use std::io::{Read, Write};
@@ -12,13 +12,13 @@ use portable_pty::{Child, CommandBuilder, MasterPty, PtySize, native_pty_system}
 
 use super::BenchResult;
 
-/// Maximum time to wait for anything.
+/// Timeout for all waits.
 const LIMIT: Duration = Duration::from_secs(20);
 
-/// Bytes written by the program, with a timestamp.
+/// Timestamped output of the program.
 type Chunk = (Instant, Vec<u8>);
 
-/// The program in a truecolor pseudo-terminal.
+/// glimt running in a true-color pseudo-terminal.
 pub struct TimedTerminal {
     // Keeps the terminal open.
     _master: Box<dyn MasterPty + Send>,
@@ -28,7 +28,7 @@ pub struct TimedTerminal {
     screen: vt100::Parser,
 }
 
-/// The colors of every image cell; `None` for text.
+/// The colors of every image cell. `None` for text.
 pub type Cells = Vec<Option<[[u8; 3]; 2]>>;
 
 impl TimedTerminal {
@@ -82,8 +82,7 @@ impl TimedTerminal {
         cells(self.screen.screen())
     }
 
-    /// Time at which the image first satisfies `differs`; the search begins after `pause` and continues until it is
-    /// found.
+    /// Time at which the image first satisfies `differs`. Starts checking after `pause`.
     pub fn when(&mut self, pause: Duration, differs: impl Fn(&Cells) -> bool) -> BenchResult<Instant> {
         let deadline = Instant::now() + LIMIT;
         thread::sleep(pause);
@@ -104,7 +103,7 @@ impl TimedTerminal {
         Err(format!("the image did not change\n{}", self.screen.screen().contents()).into())
     }
 
-    /// Number of bursts, separated by pauses, with enough bytes for an image.
+    /// Number of bursts that are large enough for an image. Bursts are separated by pauses.
     pub fn bursts(&mut self) -> usize {
         const LEAST: usize = 300;
         const GAP: Duration = Duration::from_millis(8);
@@ -129,7 +128,7 @@ impl TimedTerminal {
 
 impl Drop for TimedTerminal {
     fn drop(&mut self) {
-        // The measurement is complete; failing to stop the program does not matter.
+        // The measurement is complete, so ignore a failure to stop the program.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
@@ -139,7 +138,7 @@ fn lock<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
     of.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Timestamps incoming bytes, and answers the program's queries for the terminal's status and type.
+/// Timestamps incoming bytes, and answers queries for the terminal's status and type.
 fn read(
     mut output: Box<dyn Read + Send>,
     chunks: Arc<Mutex<Vec<Chunk>>>,
@@ -155,7 +154,7 @@ fn read(
             for (question, answer) in ANSWERS {
                 while let Some(at) = tail.windows(question.len()).position(|window| window == question) {
                     tail.drain(at..at + question.len());
-                    // A program that has exited needs no answer.
+                    // Ignore errors: the program may have exited.
                     let _ = lock(&keys).write_all(answer);
                 }
             }
@@ -176,7 +175,7 @@ fn cells(screen: &vt100::Screen) -> Cells {
     cells
 }
 
-/// The colors of the upper and lower half of an image cell.
+/// Colors of the upper and lower halves of an image cell.
 fn shades(cell: &vt100::Cell) -> Option<[[u8; 3]; 2]> {
     let rgb = |color| match color {
         vt100::Color::Rgb(r, g, b) => Some([r, g, b]),

@@ -1,9 +1,10 @@
-//! Time from the command line to the image of a model: `glimt MODEL --once` as a new process, including reading and
-//! writing files.
+//! Time to render a model from the command line: `glimt MODEL --once` as a new process, including file input
+//! and output.
 //!
-//! `cargo bench --bench models` generates a model of 100,352 triangles in a temporary folder, renders it twenty times
-//! to a 512 × 512 PNG at `--error 0.05`, and prints the seconds, how many runs reached the goal, and the load of the
-//! machine. `-- FILE` renders another model. `others.py` next to this file does the same with f3d and Blender.
+//! `cargo bench --bench models` generates a model with 100,352 triangles in a temporary folder, renders it
+//! twenty times to a 512 × 512 PNG at `--error 0.05`, and prints the seconds, how many runs reached the goal,
+//! and the machine's load. `-- FILE` renders a different model. `others.py` in this folder measures f3d and
+//! Blender the same way.
 
 #![allow(clippy::print_stdout)]
 
@@ -14,7 +15,7 @@ use std::time::Instant;
 use std::{error, fs};
 
 const RUNS: usize = 20;
-/// Goal for the seconds of a run.
+/// Target seconds per run.
 const GOAL: f64 = 1.0;
 
 fn main() -> Result<(), Box<dyn error::Error>> {

@@ -1,4 +1,4 @@
-//! Comparison of hits with expected hits from a file.
+//! Comparison of hits with the expected hits in a file.
 
 use std::path::Path;
 
@@ -9,13 +9,13 @@ use glimt::math::DVec3;
 
 use crate::meshes;
 
-/// Traces the rays of a file and counts differences from the expected results in another file: hits (`.hits`), or one
-/// byte per ray that is nonzero if the ray is occluded.
+/// Traces the rays in one file and counts differences from the expected results in another: hits (`.hits`),
+/// or one byte per ray, nonzero if the ray is occluded.
 pub fn compare(tree: &WideBvh, mesh: &TriangleMesh, rays: &Path, answers: &Path) -> std::io::Result<()> {
     let rays_read = meshes::ray_file(rays)?;
     let name =
         |path: &Path| path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
-    println!("  {} against {}: {} rays", name(rays), name(answers), rays_read.len());
+    println!("  {} vs. {}: {} rays", name(rays), name(answers), rays_read.len());
     if answers.extension().is_some_and(|ending| ending == "hits") {
         closest(tree, mesh, &rays_read, &meshes::hit_file(answers)?);
     } else {
@@ -38,19 +38,19 @@ fn closest(tree: &WideBvh, mesh: &TriangleMesh, rays: &[Ray], answers: &[Option<
     let ties = ids.clone().filter(|(own, other)| (own.t - other.0).abs() <= 1e-6 * other.0.abs()).count();
     let far = both().filter(|(own, other)| (own.t - other.0).abs() > 1e-4 * other.0.abs()).count();
     println!(
-        "    other primitive {} ({ties} of them equally close within 1e-6), t off by more than 1e-4 {far}",
+        "    different primitive {} ({ties} of them equally close within 1e-6), t off by more than 1e-4 {far}",
         ids.count()
     );
 }
 
-/// Reports how many rays differ, and how many of those pass within rounding error of an edge.
+/// Prints how many rays differ, and how many of them pass within rounding error of an edge.
 fn report<'a>(mesh: &TriangleMesh, differing: impl Iterator<Item = &'a Ray>) {
     let differing: Vec<_> = differing.collect();
     let on_edge = differing.iter().filter(|ray| passes_edge(mesh, ray)).count();
     println!("    hit or miss differs {}, {on_edge} of them within 4 ulp of an edge", differing.len());
 }
 
-/// Whether the ray passes an edge of any triangle within 4 ulp of the compared coordinates.
+/// Whether the ray passes within 4 ulp of a triangle edge, in the coordinates that the edge test compares.
 fn passes_edge(mesh: &TriangleMesh, ray: &Ray) -> bool {
     let (origin, direction) = (ray.origin.as_dvec3(), ray.direction.as_dvec3().normalize());
     (0..mesh.triangles.len() as u32).any(|id| {
@@ -68,7 +68,7 @@ fn passes_edge(mesh: &TriangleMesh, ray: &Ray) -> bool {
 
 /// Distance between a line and a segment.
 fn distance(origin: DVec3, direction: DVec3, a: DVec3, b: DVec3) -> f64 {
-    // Project along the line onto the plane perpendicular to it.
+    // Project onto the plane perpendicular to the line.
     let flat = |p: DVec3| (p - origin) - direction * (p - origin).dot(direction);
     let (a, b) = (flat(a), flat(b));
     let along = b - a;

@@ -1,6 +1,6 @@
-//! Embree 4 through its C API, loaded at run time from a path that the user gives, for comparison.
+//! Embree 4 for comparison, called through its C API and loaded at run time from a user-specified path.
 //!
-//! Names, numbers and layouts follow the headers `rtcore_common.h`, `rtcore_ray.h`, `rtcore_buffer.h` and
+//! Names, constants and layouts match the headers `rtcore_common.h`, `rtcore_ray.h`, `rtcore_buffer.h` and
 //! `rtcore_scene.h` of Embree 4.
 
 #![allow(unsafe_code, clippy::panic)]
@@ -81,7 +81,7 @@ struct Arguments {
 
 type Handle = *mut c_void;
 
-/// The functions called for every ray.
+/// Functions called for every ray.
 #[derive(Clone, Copy)]
 struct Queries {
     intersect1: unsafe extern "C" fn(Handle, *mut RayHit, *const Arguments),
@@ -91,18 +91,18 @@ struct Queries {
 
 /// A loaded library.
 pub struct Embree {
-    /// Never unloaded, as its threads outlive its devices.
+    /// Never unloaded, because Embree's threads outlive its devices.
     library: ManuallyDrop<Library>,
     queries: Queries,
 }
 
-/// A mesh in an Embree scene with the robust flag.
+/// An Embree scene with one mesh and the robust flag.
 pub struct EmbreeScene<'a> {
     embree: &'a Embree,
     _mesh: &'a TriangleMesh,
     device: Handle,
     scene: Handle,
-    /// Memory that the library reports for the scene, in bytes.
+    /// Scene memory in bytes, as reported by Embree.
     pub memory_bytes: usize,
 }
 
@@ -116,7 +116,7 @@ extern "C" fn count_memory(_user: *mut c_void, bytes: isize, _post: bool) -> boo
 impl Embree {
     /// Loads the library.
     pub fn load(path: &Path) -> Result<Self, libloading::Error> {
-        // SAFETY: the user names a library to run; Embree's initializers have no preconditions.
+        // SAFETY: the user chose the library, and Embree's initializers have no preconditions.
         let library = unsafe { Library::new(path)? };
         // SAFETY: the types match the C API.
         let queries = unsafe {
@@ -129,7 +129,7 @@ impl Embree {
         Ok(Self { library: ManuallyDrop::new(library), queries })
     }
 
-    /// Looks up a function of the API.
+    /// Looks up an API function.
     ///
     /// # Safety
     /// `F` must be its type.
@@ -138,7 +138,7 @@ impl Embree {
         unsafe { self.library.get(name.as_bytes()) }.unwrap_or_else(|error| panic!("{name}: {error}"))
     }
 
-    /// Prepares a scene for a mesh, to be built with `threads` threads.
+    /// Prepares a scene with one mesh, which will be built with `threads` threads.
     pub fn build<'a>(
         &'a self,
         mesh: &'a TriangleMesh,
@@ -154,7 +154,7 @@ impl Embree {
             let device = self.function::<unsafe extern "C" fn(*const c_char) -> Handle>("rtcNewDevice")(
                 options.as_ptr(),
             );
-            assert!(!device.is_null(), "Embree could not create a device");
+            assert!(!device.is_null(), "Embree failed to create a device");
             type Monitor = extern "C" fn(*mut c_void, isize, bool) -> bool;
             self.function::<unsafe extern "C" fn(Handle, Monitor, *mut c_void)>(
                 "rtcSetDeviceMemoryMonitorFunction",
@@ -218,7 +218,7 @@ impl Embree {
 }
 
 impl EmbreeScene<'_> {
-    /// Builds the acceleration structure; this call is timed as the build.
+    /// Builds the acceleration structure. This call is timed as the build.
     pub fn commit(&mut self) {
         // SAFETY: the scene is alive.
         unsafe { self.embree.function::<unsafe extern "C" fn(Handle)>("rtcCommitScene")(self.scene) };
@@ -243,7 +243,7 @@ impl EmbreeScene<'_> {
         query.t_far < 0.0
     }
 
-    /// Number of rays that hit a primitive, traced sixteen at a time; a remainder is ignored.
+    /// Number of rays that hit a primitive. Traces sixteen rays at a time and ignores the remainder.
     pub fn closest16(&self, rays: &[Ray], coherent: bool) -> usize {
         let arguments = Arguments {
             flags: if coherent { RAY_QUERY_FLAG_COHERENT } else { 0 },
@@ -309,7 +309,7 @@ fn query(ray: &Ray) -> RayHit {
 
 impl Drop for EmbreeScene<'_> {
     fn drop(&mut self) {
-        // SAFETY: `build` created both, and each is released once.
+        // SAFETY: `build` created both handles, and each is released once.
         unsafe {
             self.embree.function::<unsafe extern "C" fn(Handle)>("rtcReleaseScene")(self.scene);
             self.embree.function::<unsafe extern "C" fn(Handle)>("rtcReleaseDevice")(self.device);

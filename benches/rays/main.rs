@@ -1,19 +1,20 @@
-//! The ray kernel: build time and memory, and millions of rays per second, on one thread and on all. The rays are
-//! primary rays, one cosine-distributed bounce, and shadow rays (any hit) to a point light.
+//! Ray kernel: build time, memory, and millions of rays per second on one thread and on all threads. The rays
+//! are primary rays, one cosine-distributed bounce, and shadow rays (any hit) to a point light.
 //!
-//! - `cargo bench --bench rays` uses generated meshes, `-- a.ply b.obj c.mesh` files, and `-- ball` a generated mesh
-//!   with a million triangles.
-//! - `--embree LIB` compares with Embree 4, where `LIB` is a `libembree4.so`; its scene is robust and of medium
-//!   quality. `--embree-isa avx512` lets it use AVX-512, which its packets of 16 need; its single rays are faster with
-//!   AVX2.
-//! - `--instructions NAME` traverses only with this instruction set.
-//! - `--high` splits large triangles first (`Quality::High`), also in Embree.
-//! - `--build` only builds.
-//! - `--closest FILE` and `--any FILE` also time the rays of a file, for the closest or any hit.
-//! - `--rays FILE --hits FILE` (or `--occluded FILE`) counts differences from expected results; may be repeated.
+//! - `cargo bench --bench rays` uses generated meshes. `-- a.ply b.obj c.mesh` uses files, and `-- ball` a
+//!   generated mesh with a million triangles.
+//! - `--embree LIB` compares with Embree 4, where `LIB` is the path of `libembree4.so`. Embree builds a
+//!   robust scene at medium quality. `--embree-isa avx512` enables AVX-512, which Embree needs for packets of
+//!   16; its single rays are faster with AVX2.
+//! - `--instructions NAME` only uses this instruction set for traversal.
+//! - `--high` uses spatial splits (`Quality::High`), also in Embree.
+//! - `--build` measures only the build.
+//! - `--closest FILE` and `--any FILE` also time the rays in a file, for the closest or any hit.
+//! - `--rays FILE --hits FILE` (or `--occluded FILE`) counts differences from expected results. May be
+//!   repeated.
 //!
-//! Runs of glimt and Embree alternate chunk by chunk, and the fastest run of each chunk counts, so other load on the
-//! machine affects both or neither.
+//! glimt and Embree alternate chunk by chunk, and the fastest run of each chunk counts, so that other load
+//! affects both equally.
 
 #![allow(clippy::print_stdout)]
 
@@ -32,10 +33,10 @@ use glimt::geometry::Ray;
 use glimt::geometry::mesh::TriangleMesh;
 use rayon::prelude::*;
 
-/// Number of timed runs of each chunk.
+/// Timed runs per chunk.
 const RUNS: usize = 7;
 
-/// Number of rays per chunk.
+/// Rays per chunk.
 const CHUNK: usize = 1 << 15;
 
 #[derive(Default)]
@@ -45,9 +46,9 @@ struct BenchOptions {
     isa: Option<String>,
     build_only: bool,
     high: bool,
-    /// Ray files to time, and whether any hit suffices.
+    /// Ray files to time, and whether to find any hit instead of the closest.
     timed: Vec<(PathBuf, bool)>,
-    /// Ray files, each with its expected results.
+    /// Ray files and their expected results.
     given: Vec<(PathBuf, PathBuf)>,
     files: Vec<String>,
 }
@@ -184,8 +185,8 @@ fn measure(name: &str, mesh: &TriangleMesh, embree: Option<&Embree>, options: &B
     }
 }
 
-/// Times the rays of a file on one thread: one by one, and sixteen at a time in file order. For Embree, the fastest way
-/// counts.
+/// Times the rays in a file on one thread: one by one, and in file order sixteen at a time. Uses Embree's
+/// fastest mode.
 fn timed(tree: &WideBvh, scene: Option<&EmbreeScene<'_>>, rays: &[Ray], any_hit: bool) {
     let seconds = |rate: f64| rays.len() as f64 / 1e6 / rate;
     let mut single = |rays: &[Ray]| match any_hit {
@@ -211,7 +212,7 @@ fn timed(tree: &WideBvh, scene: Option<&EmbreeScene<'_>>, rays: &[Ray], any_hit:
         };
         let mut plain = |rays: &[Ray]| scene.closest16(rays, false);
         let mut coherent = |rays: &[Ray]| scene.closest16(rays, true);
-        // Packets only find closest hits.
+        // Packets support only closest hits.
         let ways: &mut [TraceFn<'_>] = &mut [&mut single, &mut plain, &mut coherent];
         let count = if any_hit { 1 } else { ways.len() };
         ways[..count].iter_mut().map(|way| rates(rays, [*way])[0]).fold(0.0, f64::max)
@@ -222,7 +223,7 @@ fn timed(tree: &WideBvh, scene: Option<&EmbreeScene<'_>>, rays: &[Ray], any_hit:
     line("packets", "s", seconds(own[1]), peer.map(seconds));
 }
 
-/// Prints the rates on all threads: packets of primary and shadow rays, single diffuse rays.
+/// Prints the rates on all threads for packets of primary and shadow rays, and for single diffuse rays.
 fn all_threads(tree: &WideBvh, rays: &meshes::Rays, threads: usize) {
     let chunks = |rays: &[Ray], way: &(dyn Fn(&[Ray]) -> usize + Sync)| {
         let mut best = f64::INFINITY;
@@ -234,7 +235,7 @@ fn all_threads(tree: &WideBvh, rays: &meshes::Rays, threads: usize) {
         }
         rays.len() as f64 / best / 1e6
     };
-    println!("  {:?}, {threads} threads: packets, but diffuse rays single", tree.instructions());
+    println!("  {:?}, {threads} threads: packets, single diffuse rays", tree.instructions());
     let closest = |rays: &[Ray]| {
         let mut hits = [None; PACKET_SIZE];
         let mut found = |some: &[Ray]| {
@@ -257,7 +258,7 @@ fn all_threads(tree: &WideBvh, rays: &meshes::Rays, threads: usize) {
     line("shadow", "Mrays/s", chunks(&rays.shadow, &any), None);
 }
 
-/// Prints the rates of the k-d tree.
+/// Prints k-d tree rates.
 fn kd_tree(mesh: &TriangleMesh, rays: &meshes::Rays) {
     let count = mesh.triangles.len() as u32;
     let build = || {
@@ -281,7 +282,7 @@ fn kd_tree(mesh: &TriangleMesh, rays: &meshes::Rays) {
     line("shadow", "Mrays/s", rates(&rays.shadow, [&mut any])[0], None);
 }
 
-/// Prints a figure, Embree's figure, and their ratio.
+/// Prints a measurement, Embree's measurement, and their ratio.
 fn line(name: &str, unit: &str, own: f64, peer: Option<f64>) {
     match peer {
         Some(peer) => println!("  {name:<10} {unit:>9} {own:>9.3} {peer:>9.3}  ratio {:.3}", own / peer),
@@ -313,7 +314,7 @@ fn any(name: &str, tree: &WideBvh, scene: Option<&EmbreeScene<'_>>, rays: &[Ray]
     }
 }
 
-/// Prints the rates for sixteen rays at a time, for Embree with and without the coherent flag.
+/// Prints the rates for packets of sixteen rays. Embree runs with and without the coherent flag.
 fn packets(tree: &WideBvh, scene: Option<&EmbreeScene<'_>>, rays: &meshes::Rays) {
     let mut closest = |rays: &[Ray]| {
         let mut found = 0;
@@ -342,10 +343,10 @@ fn packets(tree: &WideBvh, scene: Option<&EmbreeScene<'_>>, rays: &meshes::Rays)
     line("shadow", "Mrays/s", rates(&rays.shadow, [&mut any])[0], None);
 }
 
-/// A function that traces rays and counts hits.
+/// Function that traces rays and counts hits.
 type TraceFn<'a> = &'a mut dyn FnMut(&[Ray]) -> usize;
 
-/// Millions of rays per second for each function; the fastest run of every chunk counts.
+/// Millions of rays per second for each function, using the fastest run of every chunk.
 fn rates<const N: usize>(rays: &[Ray], mut ways: [TraceFn<'_>; N]) -> [f64; N] {
     let mut total = [0.0; N];
     for chunk in rays.chunks(CHUNK) {

@@ -1,4 +1,4 @@
-//! Test data: generated meshes, meshes and rays from files, and rays generated for a mesh.
+//! Test data: meshes and rays, generated or read from files.
 
 use std::io;
 use std::path::Path;
@@ -13,10 +13,11 @@ use glimt::math::frame::Frame;
 use glimt::math::{Vec2, Vec3};
 use glimt::sampling::{CAMERA_PATH, Dimension, PixelSampler, warp};
 
-/// Image width and height: a million rays.
+/// Image width and height, for a million rays.
 const SIDE: u32 = 1000;
 
-/// A closed bumpy ball: `rings` rings of twice as many quads, each of two triangles; those at the poles have one.
+/// A closed bumpy ball with `rings` rings of `2 * rings` quads. Each quad has two triangles, except at the
+/// poles, where it has one.
 pub fn rippled_ball(rings: u32) -> TriangleMesh {
     let columns = rings;
     let point = |ring: u32, column: u32| {
@@ -40,7 +41,7 @@ pub fn rippled_ball(rings: u32) -> TriangleMesh {
     mesh
 }
 
-/// Reads a mesh file in any supported format, or raw counts, positions and indices (`.mesh`).
+/// Reads a mesh file in any supported format, or a `.mesh` file of raw counts, positions and indices.
 pub fn load(path: &Path) -> Result<TriangleMesh, String> {
     if path.extension().is_some_and(|ending| ending == "mesh") {
         return raw_mesh(&std::fs::read(path).map_err(|error| error.to_string())?)
@@ -54,7 +55,7 @@ pub fn load(path: &Path) -> Result<TriangleMesh, String> {
 /// Little endian: `u32` vertex count, `u32` triangle count, `f32` positions, `u32` indices.
 fn raw_mesh(bytes: &[u8]) -> io::Result<TriangleMesh> {
     let words: Vec<[u8; 4]> = bytes.as_chunks().0.to_vec();
-    let short = || io::Error::new(io::ErrorKind::UnexpectedEof, "shorter than its counts require");
+    let short = || io::Error::new(io::ErrorKind::UnexpectedEof, "file too short for its counts");
     let count = |i: usize| words.get(i).map(|&word| u32::from_le_bytes(word) as usize).ok_or_else(short);
     let (vertices, triangles) = (count(0)?, count(1)?);
     let positions = words.get(2..2 + 3 * vertices).ok_or_else(short)?;
@@ -69,17 +70,17 @@ fn raw_mesh(bytes: &[u8]) -> io::Result<TriangleMesh> {
     })
 }
 
-/// Rays of three kinds.
+/// Three kinds of rays.
 pub struct Rays {
-    /// Rays from outside, in pixel order.
+    /// Primary rays from outside the mesh, in pixel order.
     pub primary: Vec<Ray>,
-    /// Cosine-distributed rays from their hits.
+    /// Cosine-distributed rays from the primary hits.
     pub diffuse: Vec<Ray>,
-    /// Rays from their hits to a point light.
+    /// Shadow rays from the primary hits to a point light.
     pub shadow: Vec<Ray>,
 }
 
-/// Generates primary rays in squares of 4 × 4 pixels, and from their hits a diffuse bounce and a segment to a light.
+/// Generates primary rays in blocks of 4 × 4 pixels, then a diffuse bounce and a shadow ray from each hit.
 pub fn rays(tree: &WideBvh, mesh: &TriangleMesh) -> Rays {
     let Aabb { min, max } = tree.bounds();
     let (center, size) = ((min + max) * 0.5, (max - min).length());
@@ -124,8 +125,8 @@ pub fn ray_file(path: &Path) -> io::Result<Vec<Ray>> {
     Ok(rows.collect())
 }
 
-/// Reads hits from a file: t (`f32`) and primitive (`u32`), then the barycentric weights of the second and third
-/// corner.
+/// Reads hits from a file: t (`f32`), primitive (`u32`), and the barycentric coordinates of the second and
+/// third vertices.
 pub fn hit_file(path: &Path) -> io::Result<Vec<Option<(f32, u32)>>> {
     let bytes = std::fs::read(path)?;
     let rows = bytes.as_chunks::<16>().0.iter().map(|row| {

@@ -1,10 +1,11 @@
-//! Unused features must cost nothing: compares interleaved renders with and without them.
+//! Measures the cost of unused features, which must be zero, by interleaving renders with and without them.
 //!
-//! `cargo bench --bench skips` prints for each pair the minimum seconds without the feature, the median ratio over all
-//! rounds with its standard error, the ratio of instructions that valgrind counts for smaller images, if it is
-//! installed, and whether the images have the same bits. It exits with 1 if the instructions (without valgrind, the
-//! seconds) differ by more than 1 % or the bits differ. Seconds include the load of other programs; instructions do
-//! not. `-- WORD` selects pairs, `-- rounds=N` sets the number of rounds.
+//! `cargo bench --bench skips` prints these columns for each pair: the minimum seconds without the feature,
+//! the median time ratio over all rounds and its standard error, the instruction ratio for smaller images if
+//! valgrind is installed, and whether the images are bit-identical. The exit code is 1 if the instruction
+//! counts (without valgrind, the times) differ by more than 1 % or the bits differ. Load from other programs
+//! affects times but not instruction counts. `-- WORD` selects pairs, `-- rounds=N` sets the number of
+//! rounds.
 
 #![allow(clippy::print_stdout)]
 
@@ -13,7 +14,7 @@ mod pairs;
 #[allow(dead_code, reason = "rows are only used by the stress table")]
 mod row;
 #[path = "../stress/run.rs"]
-#[allow(dead_code, reason = "the same")]
+#[allow(dead_code, reason = "results are only used by the stress table")]
 mod run;
 
 use std::process::{Command, ExitCode};
@@ -24,7 +25,7 @@ use row::SceneFiles;
 /// Maximum deviation of a ratio from 1.
 const BOUND: f64 = 0.01;
 
-/// Width, height and samples, for a render of a fifth of a second.
+/// Width, height and samples. A render takes a fifth of a second.
 const SIZE: [u32; 3] = [640, 480, 16];
 
 fn main() -> ExitCode {
@@ -59,20 +60,20 @@ fn main() -> ExitCode {
     ExitCode::from(u8::from(faulty))
 }
 
-/// Results for a pair.
+/// Results for one pair.
 struct PairResult {
     /// Minimum seconds without the feature.
     seconds: f64,
     /// Median ratio over all rounds.
     ratio: f64,
-    /// Its standard error.
+    /// Standard error of the ratio.
     error: f64,
     is_same: bool,
     /// The report's reason for skipping a stage.
     said: String,
 }
 
-/// Runs the rounds; the order within a round alternates.
+/// Runs all rounds, alternating the order within each round.
 fn ratios(pair: &FeaturePair, rounds: usize) -> Result<PairResult, String> {
     let (mut ratios, mut seconds, mut is_same, mut said) = (Vec::new(), f64::INFINITY, true, String::new());
     for round in 0..rounds.max(1) {
@@ -90,13 +91,14 @@ fn ratios(pair: &FeaturePair, rounds: usize) -> Result<PairResult, String> {
     }
     ratios.sort_by(f64::total_cmp);
     let at = |quarter: usize| ratios[(ratios.len() - 1) * quarter / 4];
-    // The quartiles of a normal distribution are 1.35 standard deviations apart, and its median has 1.25 times the
-    // error of its mean.
+    // The quartiles of a normal distribution are 1.35 standard deviations apart, and the standard error of
+    // the median is 1.25 times that of the mean.
     let error = 1.25 / 1.35 * (at(3) - at(1)) / (ratios.len() as f64).sqrt();
     Ok(PairResult { seconds, ratio: at(2), error, is_same, said })
 }
 
-/// Millions of instructions for a smaller image, counted by valgrind. `None` if valgrind is not installed or fails.
+/// Millions of instructions executed for a smaller image, counted by valgrind. `None` if valgrind is not
+/// installed or fails.
 fn instructions(picture: &SceneFiles) -> Option<f64> {
     let folder = tempfile::tempdir().ok()?;
     let mut program = Command::new("valgrind");
@@ -112,7 +114,7 @@ fn instructions(picture: &SceneFiles) -> Option<f64> {
     count.split_whitespace().next()?.parse::<f64>().ok().map(|count| count * 1e-6)
 }
 
-/// The report's reason for the status of a stage.
+/// The reason for a stage's status in the report.
 fn why(report: &serde_json::Value, stage: &str) -> String {
     let stages = report["stages"].as_array().into_iter().flatten();
     let said = stages.filter(|one| one["name"] == stage);

@@ -1,15 +1,15 @@
-//! Scenes with and without a feature that they do not use.
+//! Pairs of scenes with and without a feature that has no effect.
 
 use glimt::pipeline::protocol::reasons;
 
 use super::row::SceneFiles;
 
-/// An image without and with a feature that the scene does not use.
+/// A scene without and with a feature that has no effect.
 pub(crate) struct FeaturePair {
     pub(crate) name: &'static str,
     pub(crate) off: SceneFiles,
     pub(crate) on: SceneFiles,
-    /// A stage that must be skipped with `on`, and part of the reason in the report.
+    /// A stage that `on` must skip, and part of the reason in the report.
     pub(crate) skipped: Option<(&'static str, &'static str)>,
 }
 
@@ -49,7 +49,7 @@ const LAMP: &str = "[materials.lamp]\nemission = 5\n[[quad]]\ncorner = [-0.5, 3,
 
 const PICTURE: &str = "P3 2 2 255 90 120 200 20 30 40 255 250 200 70 70 80";
 
-/// All pairs, for images of this size.
+/// All pairs at this image size.
 pub(crate) fn pairs([width, height, samples]: [u32; 3]) -> Vec<FeaturePair> {
     let scene = |render: &str, camera: &str, ball: &str, rest: &str| {
         let size = [("WIDTH", width), ("HEIGHT", height), ("SAMPLES", samples)];
@@ -69,7 +69,7 @@ pub(crate) fn pairs([width, height, samples]: [u32; 3]) -> Vec<FeaturePair> {
     vec![
         FeaturePair {
             skipped: Some(("photons", reasons::NOT_USED_BY_PATH)),
-            ..pair("photons, with path", path(), path().by("--photons on"))
+            ..pair("photons with path", path(), path().by("--photons on"))
         },
         FeaturePair {
             skipped: Some(("photons", reasons::TOO_FEW_BOUNCES)),
@@ -81,36 +81,32 @@ pub(crate) fn pairs([width, height, samples]: [u32; 3]) -> Vec<FeaturePair> {
         },
         FeaturePair {
             skipped: Some(("photons", reasons::PHOTONS_OFF)),
-            ..pair(
-                "photons that are not enabled",
-                plain(),
-                with("[photons]\ncount = 4000000\nradius = 0.5\n"),
-            )
+            ..pair("photons not enabled", plain(), with("[photons]\ncount = 4000000\nradius = 0.5\n"))
         },
         pair("depth of field without an aperture", plain().by("--dof off"), plain().by("--dof on")),
-        pair("an aperture, switched off", plain(), lens("--dof off")),
+        pair("aperture with depth of field off", plain(), lens("--dof off")),
         pair("soft shadows of point lights", plain().by("--shadows hard"), plain().by("--shadows soft")),
         pair("shadow samples of point lights", plain(), scene("shadow_samples = 8", "", "", POINT)),
-        pair("shadows, with path", path().by("--shadows off"), path().by("--shadows soft")),
+        pair("shadows with path", path().by("--shadows off"), path().by("--shadows soft")),
         FeaturePair {
             skipped: Some(("textures", reasons::NO_TEXTURES)),
-            ..pair("a texture that nothing uses", plain(), with(texture))
+            ..pair("unused texture", plain(), with(texture))
         },
         FeaturePair {
             skipped: Some(("textures", reasons::NO_TEXTURES)),
-            ..pair("a textured material that no shape uses", plain(), with(unused))
+            ..pair("unused textured material", plain(), with(unused))
         },
         pair(
-            "glass and mirror that no shape uses",
+            "unused glass and mirror",
             plain(),
             with("[materials.g]\ntype = \"glass\"\ntint = 0.5\n[materials.r]\ntype = \"mirror\"\n"),
         ),
-        pair("a highlight of strength 0", plain(), scene("", "", ", specular = 0, shininess = 1e5", POINT)),
-        pair("an emission of 0", plain(), scene("", "", ", emission = 0", POINT)),
-        pair("adaptive sampling without a requested error", lit(), lit().by("--error 0")),
-        pair("a clamp of 0", lit(), scene("clamp = 0", "", "", LAMP)),
-        pair("ambient light, with path", path(), scene("integrator = \"path\"\nambient = 0.5", "", "", LAMP)),
-        pair("a light of intensity 0", plain(), with("[[light]]\nposition = [2, 3, 2]\nintensity = 0\n")),
+        pair("highlight strength 0", plain(), scene("", "", ", specular = 0, shininess = 1e5", POINT)),
+        pair("emission 0", plain(), scene("", "", ", emission = 0", POINT)),
+        pair("adaptive sampling without an error target", lit(), lit().by("--error 0")),
+        pair("clamp 0", lit(), scene("clamp = 0", "", "", LAMP)),
+        pair("ambient light with path", path(), scene("integrator = \"path\"\nambient = 0.5", "", "", LAMP)),
+        pair("light with intensity 0", plain(), with("[[light]]\nposition = [2, 3, 2]\nintensity = 0\n")),
         pair("a black sky", plain(), with("[environment]\ncolor = 0\n")),
     ]
 }

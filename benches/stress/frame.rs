@@ -1,4 +1,4 @@
-//! A scene's coordinate frame: its origin and its unit of length.
+//! A scene's coordinate frame: origin and unit of length.
 
 /// Origin and unit of length.
 #[derive(Clone, Copy)]
@@ -7,7 +7,7 @@ pub(crate) struct Frame {
     pub(crate) unit: f64,
 }
 
-/// Size of the moved scenes, in units.
+/// Scene size in units.
 const SIZE: f64 = 8.0;
 
 impl Frame {
@@ -24,7 +24,7 @@ impl Frame {
         Self { at: [SIZE * sizes, -0.5 * SIZE * sizes, 0.25 * SIZE * sizes], ..Self::PLAIN }
     }
 
-    /// A point. Coordinates are multiples of 1/1024, so that sums and products are exact.
+    /// A point. Coordinates are rounded to multiples of 1/1024 so that sums and products are exact.
     pub(crate) fn point(self, x: f64, y: f64, z: f64) -> String {
         let [x, y, z] = [x, y, z].map(|x| (x * 1024.0).round() / 1024.0 * self.unit);
         let [at_x, at_y, at_z] = self.at;
@@ -41,7 +41,7 @@ impl Frame {
         format!("{:?}", x * self.unit)
     }
 
-    /// An intensity that gives the same irradiance at this frame's distances.
+    /// A point light's intensity, scaled to keep the irradiance constant.
     pub(crate) fn intensity(self, x: f64) -> String {
         format!("{:?}", x * self.unit * self.unit)
     }

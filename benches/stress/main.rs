@@ -1,7 +1,8 @@
-//! Scenes at the limits: every case is compared with a plain reference scene whose result or cost is known.
+//! Stress tests: compares extreme scenes with plain reference scenes of known result or cost.
 //!
-//! `cargo bench --bench stress` renders all cases, prints the table and writes it to `benches/stress/table.md`; `--
-//! WORD` only prints the rows that contain the word. It exits with 1 if a row exceeds its bound.
+//! `cargo bench --bench stress` renders all cases, prints the table and writes it to
+//! `benches/stress/table.md`; `-- WORD` only prints the rows that contain the word. The exit code is 1 if a
+//! row exceeds its bound.
 
 #![allow(clippy::print_stdout)]
 
@@ -17,7 +18,7 @@ use std::process::ExitCode;
 
 use row::{CaseSet, RowMeasure, StressRow};
 
-/// Number of renders of a timed row.
+/// Number of renders per timed row.
 const ROUNDS: u32 = 3;
 
 fn main() -> ExitCode {
@@ -41,10 +42,10 @@ fn main() -> ExitCode {
 
 const HEAD: &str = "# Scenes at the limits
 
-`cargo bench --bench stress` writes this table. A difference is the relative RMS error against the reference scene, for the row's worst
-image; a mean is the deviation of the image's mean from the expected value. Seconds include all stages except reading and writing, on one
-thread, for the row's images and for their references; rows with a ratio may take at most three times as long as the reference. No row
-has non-finite samples, crashes or hangs except where noted.
+`cargo bench --bench stress` writes this table. A difference is the relative RMS error of the row's worst image against its reference.
+A mean is the relative deviation of the image's mean from the expected value. Seconds cover all stages except reading and writing, on one
+thread, for all images and references of the row. Rows with a ratio may take at most three times as long as the reference. No row has
+non-finite samples, crashes or hangs except where noted.
 
 | case | images | measure | value | bound | s | reference, s | ratio | |
 | --- | --- | --- | --- | --- | --- | --- | --- | --- |

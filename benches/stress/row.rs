@@ -1,6 +1,6 @@
-//! Rows of the table: images, reference images, and bounds.
+//! Table rows: scenes, reference scenes and bounds.
 
-/// A scene file and the files that it refers to.
+/// A scene file and the files it refers to.
 #[derive(Clone)]
 pub(crate) struct SceneFiles {
     pub(crate) scene: String,
@@ -25,32 +25,33 @@ impl SceneFiles {
     }
 }
 
-/// How a row is measured.
+/// How to compare a row's images.
 #[derive(Clone, Copy)]
 pub(crate) enum RowMeasure {
-    /// √(Σ(t·a − b)²/Σb²) of the image a and the reference b, for a given t.
+    /// √(Σ(t·a − b)²/Σb²), where a is the image, b the reference and t the given factor.
     Difference(f64),
     /// Relative deviation of the image's mean from the expected value.
     Mean(f64),
 }
 
-/// A row of the table: images with their references; the worst one counts.
+/// A table row: scenes with their references. The worst pair counts.
 pub(crate) struct StressRow {
     pub(crate) name: String,
     pub(crate) pairs: Vec<(SceneFiles, SceneFiles)>,
     pub(crate) figure: RowMeasure,
     pub(crate) bound: f64,
-    /// Whether the case is as much work as its reference, so that it may take at most three times as long.
+    /// Whether the case requires as much work as the reference, so that it may take at most three times as
+    /// long.
     pub(crate) is_timed: bool,
 }
 
 impl StressRow {
-    /// A row of images that must match their references.
+    /// A row whose images must match their references.
     pub(crate) fn alike(name: impl Into<String>, pairs: Vec<(SceneFiles, SceneFiles)>, bound: f64) -> Self {
         Self { name: name.into(), pairs, figure: RowMeasure::Difference(1.0), bound, is_timed: false }
     }
 
-    /// A row for an image whose mean is known.
+    /// A row for an image with a known mean.
     pub(crate) fn mean(
         name: impl Into<String>,
         pair: (SceneFiles, SceneFiles),
@@ -60,7 +61,7 @@ impl StressRow {
         Self { name: name.into(), pairs: vec![pair], figure: RowMeasure::Mean(mean), bound, is_timed: false }
     }
 
-    /// Also compares the time with the reference, which is as much work.
+    /// Also compares the times. The reference must require as much work.
     pub(crate) fn timed(self) -> Self {
         Self { is_timed: true, ..self }
     }
@@ -69,7 +70,7 @@ impl StressRow {
 /// Which cases to run.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum CaseSet {
-    /// The cases that run with the tests.
+    /// The cases that the test suite runs.
     Short,
     /// All cases.
     Long,

@@ -7,10 +7,10 @@ use std::time::{Duration, Instant};
 
 use super::row::{RowMeasure, SceneFiles, StressRow};
 
-/// Time limit of a render, after which it counts as hung.
+/// Time limit for a render, after which it is considered hung.
 const LONGEST: Duration = Duration::from_secs(120);
 
-/// Maximum time of a case relative to its reference.
+/// Maximum time relative to the reference.
 pub(crate) const MOST_SLOWER: f64 = 3.0;
 
 /// A rendered image.
@@ -24,9 +24,9 @@ pub(crate) struct Rendered {
     pub(crate) report: serde_json::Value,
 }
 
-/// Results of a row.
+/// Results for one row.
 pub(crate) struct RowResult {
-    /// The worst figure.
+    /// The worst value.
     pub(crate) figure: f64,
     pub(crate) non_finite: u64,
     /// Total seconds of the cases and of their references.
@@ -34,12 +34,12 @@ pub(crate) struct RowResult {
 }
 
 impl RowResult {
-    /// Whether the images are within their bound, regardless of time.
+    /// Whether the images are within their bounds, regardless of time.
     pub(crate) fn is_right(&self, row: &StressRow) -> bool {
         self.figure <= row.bound && self.non_finite == 0
     }
 
-    /// Faults of the row.
+    /// The row's faults.
     pub(crate) fn faults(&self, row: &StressRow) -> Vec<&'static str> {
         let slower = self.seconds[0] / self.seconds[1];
         let faults = [
@@ -51,7 +51,7 @@ impl RowResult {
     }
 }
 
-/// Renders all images of a row `rounds` times, interleaved; the shortest times count.
+/// Renders all images of a row `rounds` times, interleaved, and uses the shortest times.
 ///
 /// # Errors
 /// The program failed, crashed or took too long.
@@ -70,7 +70,7 @@ pub(crate) fn measure(row: &StressRow, rounds: u32) -> Result<RowResult, String>
             case_of.seconds = case_of.seconds.min(render(case)?.seconds);
             twin_of.seconds = twin_of.seconds.min(render(twin)?.seconds);
         }
-        // NaN counts as the worst figure.
+        // Treat NaN as the worst value.
         let figure = figure(row.figure, &case_of.pixels, &twin_of.pixels)?;
         measured.figure = if figure <= measured.figure { measured.figure } else { figure };
         measured.non_finite += case_of.non_finite + twin_of.non_finite;
@@ -107,7 +107,8 @@ pub(crate) fn render(picture: &SceneFiles) -> Result<Rendered, String> {
     render_in(folder.path(), picture)
 }
 
-/// A command that renders a scene in a folder on one thread, with the program itself or another one that runs it.
+/// Prepares a command that renders a scene in a folder on one thread. `program` is glimt or a wrapper that
+/// runs it.
 ///
 /// # Errors
 /// The files cannot be written.

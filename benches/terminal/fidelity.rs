@@ -1,8 +1,8 @@
-//! Fidelity of the terminal's output to the image.
+//! Fidelity of the terminal output to the image.
 //!
-//! Cells are converted to pixels and compared with the image in Oklab: directly, and blurred as by an eye that does not
-//! resolve single cells. Characters count as their mean. chafa is measured for comparison, with the same characters and
-//! its best dithering.
+//! Converts cells to pixels and compares them with the image in Oklab: directly, and blurred as if viewed by
+//! an eye that cannot resolve single cells. Characters other than blocks are replaced with their mean color.
+//! For comparison, also measures chafa with the same character set and its best dithering.
 
 use std::error::Error;
 use std::path::Path;
@@ -16,19 +16,20 @@ use ratatui::buffer::{Buffer, Cell};
 use ratatui::layout::Rect;
 use ratatui::style::Color;
 
-/// Pixels per cell: a common multiple of all its subdivisions.
+/// Pixels per cell: a common multiple of all subdivisions.
 const CELL: (usize, usize) = (12, 24);
 /// Standard deviation of the blur in pixels: a quarter of a cell's height.
 const BLUR: f32 = 6.0;
 const WINDOW: Rect = Rect { x: 0, y: 0, width: 80, height: 30 };
-/// The terminal's default colors.
+/// Default colors of the terminal.
 const INK: [u8; 3] = [229; 3];
 const GROUND: [u8; 3] = [0; 3];
-/// Ink coverage, of 255, of the ASCII characters from space to `~`: the means of DejaVu Sans Mono's bitmaps.
+/// Ink coverage of the ASCII characters from space to `~` on a scale of 0 to 255: the means of their DejaVu
+/// Sans Mono bitmaps.
 #[rustfmt::skip]
 const INK_OF_ASCII: [u8; 95] = [0, 21, 16, 61, 52, 45, 58, 8, 28, 28, 24, 27, 11, 7, 7, 27, 61, 38, 44, 46, 49, 48, 58, 36, 62, 58, 14, 17, 29, 28, 29, 31, 66, 54, 68, 40, 60, 53, 43, 53, 59, 43, 39, 57, 35, 68, 68, 58, 52, 63, 62, 49, 38, 55, 47, 67, 50, 39, 48, 35, 27, 35, 17, 17, 6, 48, 54, 32, 54, 48, 37, 60, 47, 34, 36, 47, 32, 54, 40, 45, 54, 54, 26, 38, 36, 40, 34, 47, 36, 42, 36, 39, 30, 38, 15];
 
-/// A way to show an image, for glimt and chafa.
+/// A way to display an image, in glimt and chafa.
 struct DisplayMode {
     name: &'static str,
     preview: PreviewChoice,
@@ -73,7 +74,7 @@ const fn mode(
     DisplayMode { name, preview, depth, symbols, colors }
 }
 
-/// Prints a table for images of the bundled scenes.
+/// Prints a table for the bundled scenes.
 pub(crate) fn print() -> Result<(), Box<dyn Error>> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/pictures");
     println!("\nerror in {}×{} cells, sharp and blurred; chafa in parentheses", WINDOW.width, WINDOW.height);
@@ -98,7 +99,7 @@ pub(crate) fn print() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// The errors of an image in the cells that `draw` produces, without a border.
+/// The errors of the cells that `draw` produces for an image, excluding a border.
 fn errors(
     file: &Path,
     draw: impl Fn(&Picture, Rect) -> Result<Option<Buffer>, Box<dyn Error>>,
@@ -114,7 +115,7 @@ fn errors(
     Ok(Some([seen.error(&truth), seen.blurred().error(&truth.blurred())]))
 }
 
-/// Position of the image.
+/// Position of the image in the window.
 fn place(buffer: &Buffer) -> Rect {
     let is_picture = |x: u16, y: u16| buffer[(x, y)].symbol() != " ";
     let columns: Vec<u16> =
@@ -125,7 +126,7 @@ fn place(buffer: &Buffer) -> Rect {
     Rect::new(*left, *top, columns.len() as u16, rows.len() as u16)
 }
 
-/// The image drawn by chafa in these cells. `None` without chafa, or if it lacks such characters.
+/// The image as drawn by chafa. `None` if chafa is not installed or does not support the character set.
 fn chafa(
     file: &Path,
     area: Rect,
@@ -216,7 +217,7 @@ impl LinearImage {
         Self { width, height, pixels }
     }
 
-    /// Blurs by a Gaussian, along the rows and then along the columns.
+    /// Gaussian blur, first along rows, then along columns.
     fn blurred(&self) -> Self {
         let reach = (3.0 * BLUR) as isize;
         let weights: Vec<f32> = (-reach..=reach).map(|i| (-(i as f32 / BLUR).powi(2) / 2.0).exp()).collect();
@@ -238,7 +239,7 @@ impl LinearImage {
         Self { pixels, ..*self }
     }
 
-    /// RMS distance in Oklab, in percent of the distance from black to white.
+    /// RMS distance in Oklab, as a percentage of the distance from black to white.
     fn error(&self, other: &Self) -> f32 {
         let squares = self
             .pixels

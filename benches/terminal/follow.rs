@@ -1,4 +1,4 @@
-//! Difference between the screen and the final image while glimt renders.
+//! Difference between the screen and the final image during a render.
 
 use std::error::Error;
 use std::fs;
@@ -8,7 +8,8 @@ use std::time::Duration;
 
 use crate::watched::{COLUMNS, Connection, ROWS, WatchedTerminal};
 
-/// Percentages of the render at which the screen is examined, and the maximum difference in codes of 255.
+/// Percentages of the render at which to compare the screen, and the maximum difference on a scale of 0 to
+/// 255.
 const LOOKS: [(u32, f64); 3] = [(10, 1.5), (25, 0.8), (50, 0.5)];
 
 const WAYS: [(&str, &[&str]); 5] = [
@@ -19,14 +20,16 @@ const WAYS: [(&str, &[&str]); 5] = [
     ("sixel", &["--preview", "sixel", "--color", "truecolor"]),
 ];
 
-/// Settings for tmux: 24-bit color on both sides.
+/// tmux settings: 24-bit color on both sides.
 const TMUX: &str =
     "set -g default-terminal tmux-256color\nset -as terminal-features ',*:RGB'\nset -g status off\n";
 
-/// Prints a line for each way to show an image.
+/// Prints a line for each display mode.
 pub(crate) fn print() -> Result<(), Box<dyn Error>> {
-    println!("mean absolute difference from the final screen, in codes of 255: cornell_glass, 256 samples,");
-    println!("{COLUMNS}×{ROWS} cells, a terminal that answers at once; bars {LOOKS:?}\n");
+    println!(
+        "mean absolute difference from the final screen on a scale of 0 to 255: cornell_glass, 256 samples,"
+    );
+    println!("{COLUMNS}×{ROWS} cells, a terminal that answers immediately; bars {LOOKS:?}\n");
     println!("{:<14} {:>7} {:>7} {:>7} {:>9} {:>9}", "", "10 %", "25 %", "50 %", "seconds", "kB/s");
     let program = std::env::var("GLIMT").unwrap_or(env!("CARGO_BIN_EXE_glimt").to_owned());
     let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell_glass.toml");
@@ -48,7 +51,7 @@ pub(crate) fn print() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Renders once, and reports the difference between the screen and its final state during the render.
+/// Renders once, and compares the screen during the render with its final state.
 fn follow(command: &[&str], folder: &Path) -> Result<String, Box<dyn Error>> {
     let terminal = WatchedTerminal::open(command, folder, Connection::NONE)?;
     let begin = std::time::Instant::now();
@@ -59,7 +62,7 @@ fn follow(command: &[&str], folder: &Path) -> Result<String, Box<dyn Error>> {
     }
     terminal.wait("the end", |far| far.percent() == Some(100))?;
     let (seconds, came) = (begin.elapsed().as_secs_f64(), terminal.far().came);
-    // Wait, as the last image may still be in transit.
+    // The last image may still be in transit.
     thread::sleep(Duration::from_secs(2));
     let last = terminal.far().seen();
     let figures: Vec<String> = screens
@@ -70,7 +73,7 @@ fn follow(command: &[&str], folder: &Path) -> Result<String, Box<dyn Error>> {
     Ok(format!("{:>7} {:>7} {:>7} {seconds:>9.1} {rate:>9.0}", figures[0], figures[1], figures[2]))
 }
 
-/// The mean absolute difference of pixels; `None` if the sizes differ.
+/// Mean absolute difference of pixels. `None` if the sizes differ.
 fn apart(a: &[[u8; 3]], b: &[[u8; 3]]) -> Option<f64> {
     let pairs = a.iter().zip(b).filter(|(a, b)| **a != [0; 3] || **b != [0; 3]);
     let (mut sum, mut count) = (0, 0);

@@ -1,10 +1,11 @@
-//! Number of bytes that glimt sends to the terminal.
+//! Number of bytes sent to the terminal.
 //!
-//! `cargo bench --bench terminal` renders bundled scenes and edits of them, replays their previews as the front end
-//! receives them, and prints the bytes sent by three programs: glimt's painter; plain ratatui on crossterm, which draws
-//! every preview; and chafa, if installed, which draws the last one. `-- fidelity` prints the fidelity of the output
-//! for each color depth and character set. `-- follow` prints the difference of a fast terminal's screen from the final
-//! one during a render. `-- orbit` prints how much of a slow connection is used while a key moves the camera.
+//! `cargo bench --bench terminal` renders bundled scenes and edited versions, replays their previews as the
+//! front end receives them, and prints the number of bytes sent by glimt's painter, by plain ratatui on
+//! crossterm, which draws every preview, and, if installed, by chafa, which draws only the last preview. `--
+//! fidelity` prints the fidelity of the output for each color depth and character set. `-- follow` prints the
+//! difference between a fast terminal's screen during a render and its final screen. `-- orbit` prints the
+//! utilization of a slow connection while a key moves the camera.
 
 #![allow(clippy::print_stdout)]
 
@@ -31,14 +32,14 @@ use ratatui::style::Color;
 use crate::others::{PlainRatatui, chafa};
 use crate::sequence::RecordedPreview;
 
-/// Columns and rows of the window; the image is a little smaller.
+/// Columns and rows of the window. The image is slightly smaller.
 const WINDOWS: [(u16, u16); 3] = [(80, 24), (120, 40), (200, 60)];
 const BESIDE: u16 = 30;
 const ABOVE_AND_BELOW: u16 = 4;
-/// Maximum difference in a channel that does not count as a change.
+/// Maximum channel difference that does not count as a change.
 const SAME: u8 = 1;
 
-/// An edit that is saved after the scene has been rendered.
+/// An edit to save after the scene has been rendered.
 struct Edit {
     scene: &'static str,
     name: &'static str,
@@ -87,7 +88,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         return orbit::print();
     }
     for (columns, rows) in WINDOWS {
-        println!("\n{columns}×{rows}: bytes per cell, in parentheses for ratatui and chafa");
+        println!("\n{columns}×{rows}: bytes per cell (ratatui and chafa in parentheses)");
         println!(
             "{:<18} {:>6} {:>6} {:>16} {:>6} {:>7} {:>7} {:>15}",
             "", "cells", "first", "exact", "ms", "pictures", "changed", "until still"
@@ -99,7 +100,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Renders a scene and an edit of it, and prints a line for each.
+/// Renders a scene and its edited version, and prints a line for each.
 fn replay(edit: &Edit, columns: u16, rows: u16) -> Result<(), Box<dyn Error>> {
     let size = PreviewSize {
         width: u32::from(columns - BESIDE),
@@ -109,9 +110,9 @@ fn replay(edit: &Edit, columns: u16, rows: u16) -> Result<(), Box<dyn Error>> {
     let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
     let text = fs::read_to_string(scenes.join(edit.scene).with_extension("toml"))?;
     if !text.contains(edit.from) {
-        return Err(format!("{} has no `{}`", edit.scene, edit.from).into());
+        return Err(format!("{} does not contain `{}`", edit.scene, edit.from).into());
     }
-    // Save next to the scenes, so that relative paths work.
+    // Write the file next to the scenes so that relative paths work.
     let scene = tempfile::Builder::new().prefix("bench").suffix(".toml").tempfile_in(&scenes)?;
     let handle = glimt::pipeline::start(0)?;
     let mut window = Window::new(columns, rows);
@@ -127,7 +128,7 @@ fn replay(edit: &Edit, columns: u16, rows: u16) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// A terminal, drawn by both glimt and ratatui.
+/// A terminal to which both glimt and ratatui draw.
 struct Window {
     area: Rect,
     painter: Painter,
@@ -147,7 +148,7 @@ impl Window {
         }
     }
 
-    /// Shows the previews of one render; only those worth drawing are drawn.
+    /// Shows the previews of one render, skipping those not worth drawing.
     fn show(&mut self, shots: &[RecordedPreview]) -> Result<String, Box<dyn Error>> {
         let (Some(first), Some(last)) = (shots.first(), shots.last()) else {
             return Err("no preview".into());
@@ -195,7 +196,7 @@ impl Window {
         ))
     }
 
-    /// Changes the colors of a rectangle of 5 % of the cells, then adds noise, then changes nothing.
+    /// Recolors a rectangle with 5 % of the cells, then adds noise, then changes nothing.
     fn settle(&mut self) {
         let Some(last) = self.last.take() else { return };
         let (width, height) = (last.width, last.height);
@@ -222,7 +223,7 @@ impl Window {
         );
     }
 
-    /// Bytes to draw an image on a screen with unknown content.
+    /// Bytes required to draw an image on a screen with unknown contents.
     fn exact(&self, picture: &Picture) -> usize {
         let mut painter = Painter::new(ColorDepth::TrueColor);
         let (buffer, place) = self.cells(picture);
@@ -240,7 +241,7 @@ impl Window {
         drain(&mut self.painter)
     }
 
-    /// The image in half blocks, and its position.
+    /// The image as half blocks, and its position.
     fn cells(&self, picture: &Picture) -> (Buffer, Rect) {
         let mut buffer = Buffer::empty(self.area);
         let place = Rect::new(0, 1, picture.width as u16, picture.height.div_ceil(2) as u16);
@@ -258,12 +259,12 @@ impl Window {
     }
 }
 
-/// Sends everything that the painter has pending; returns the number of bytes.
+/// Sends all pending output of the painter. Returns the number of bytes.
 fn drain(painter: &mut Painter) -> usize {
     std::iter::from_fn(|| Some(painter.slice(24_000).len()).filter(|bytes| *bytes > 0)).sum()
 }
 
-/// Number of cells that differ; all cells if nothing was shown before.
+/// Number of cells that differ, or all cells if nothing was shown before.
 fn changed(before: Option<&Picture>, after: &Picture) -> usize {
     let width = after.width as usize;
     let differs = |i: usize| match before.and_then(|before| before.pixels.get(i)) {

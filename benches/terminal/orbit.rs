@@ -7,17 +7,18 @@ use std::time::{Duration, Instant};
 
 use crate::watched::{Connection, WatchedTerminal};
 
-/// Key repeat interval. The key is held for `BEFORE`, then for `HELD` while the connection is measured.
+/// Key repeat interval. The key is held for `BEFORE`, then for another `HELD`, during which the connection is
+/// measured.
 const REPEAT: Duration = Duration::from_millis(33);
-/// Number of presses in one direction. The camera swings in front of the scene: behind the wall of a room everything is
-/// black, and there is nothing to send.
+/// Number of presses in one direction. The camera stays in front of the scene, because the image is black
+/// behind a room's wall and there is nothing to send.
 const SWING: u32 = 8;
 const BEFORE: Duration = Duration::from_secs(2);
 const HELD: Duration = Duration::from_secs(6);
 
-/// Prints a line per scene.
+/// Prints one line per scene.
 pub(crate) fn print() -> Result<(), Box<dyn Error>> {
-    println!("camera keys held for {} s over a connection with 1 Mbit/s and 150 ms", HELD.as_secs());
+    println!("camera keys held for {} s over a 1 Mbit/s, 150 ms connection", HELD.as_secs());
     println!("{:<16} {:>14} {:>22}", "", "used", "max. unacknowledged bytes");
     for scene in ["cornell", "cornell_glass", "textures", "spheres"] {
         let (share, most) = orbit(scene)?;
@@ -26,7 +27,7 @@ pub(crate) fn print() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Returns the utilization, and the maximum number of unacknowledged bytes.
+/// Returns the utilization and the maximum number of unacknowledged bytes.
 fn orbit(scene: &str) -> Result<(f64, usize), Box<dyn Error>> {
     let program = std::env::var("GLIMT").unwrap_or(env!("CARGO_BIN_EXE_glimt").to_owned());
     let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(scene).with_extension("toml");
@@ -44,12 +45,12 @@ fn orbit(scene: &str) -> Result<(f64, usize), Box<dyn Error>> {
     Ok(((far.came - before) as f64 / most, far.most_unanswered))
 }
 
-/// Alternately holds two opposite orbit keys, with keyboard repeat.
+/// Alternates between two opposite orbit keys, held with keyboard repeat.
 fn hold(terminal: &WatchedTerminal, time: Duration) -> Result<(), Box<dyn Error>> {
     let begin = Instant::now();
     let mut presses = 0;
     while begin.elapsed() < time {
-        // The first and the last swing are half as long, so that the scene's own camera is in the middle.
+        // The first and last swings are half as long, to center them on the scene's camera.
         let is_right = ((presses + SWING / 2) / SWING).is_multiple_of(2);
         terminal.press(if is_right { "l" } else { "h" })?;
         presses += 1;

@@ -1,4 +1,4 @@
-//! Other ways to draw the same cells.
+//! Other renderers of the same cells.
 
 use std::cell::Cell;
 use std::error::Error;
@@ -40,7 +40,7 @@ impl PlainRatatui {
         Self { backend, sent, shown: Buffer::empty(area) }
     }
 
-    /// Bytes needed to change the screen to this image.
+    /// Bytes required to update the screen to this image.
     pub(crate) fn draw(&mut self, wanted: &Buffer) -> usize {
         let before = self.sent.get();
         let difference = self.shown.diff(wanted);
@@ -51,7 +51,7 @@ impl PlainRatatui {
     }
 }
 
-/// Bytes that chafa writes for the image in 24-bit half blocks. `None` without chafa.
+/// Bytes that chafa writes for the image in 24-bit half blocks. `None` if chafa is not installed.
 pub(crate) fn chafa(picture: &Picture) -> Result<Option<usize>, Box<dyn Error>> {
     let file = tempfile::Builder::new().suffix(".png").tempfile()?;
     let pixels = picture.pixels.as_flattened();

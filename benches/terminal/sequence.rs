@@ -1,4 +1,4 @@
-//! The previews of a render, as the front end receives them.
+//! Previews of a render as the front end receives them.
 
 use std::error::Error;
 use std::path::Path;
@@ -10,7 +10,7 @@ use glimt::pipeline::Handle;
 use glimt::pipeline::protocol::{Command, Event, PreviewSize, Request, Writing};
 use glimt::pipeline::settings::Overrides;
 
-/// A preview of an unfinished or final image.
+/// A preview of an unfinished or finished image.
 pub(crate) struct RecordedPreview {
     /// Seconds since the request.
     pub(crate) seconds: f64,
@@ -20,7 +20,7 @@ pub(crate) struct RecordedPreview {
     pub(crate) is_final: bool,
 }
 
-/// Renders the scene and records every preview that the front end receives; the last one is final.
+/// Renders the scene and records every preview that the front end receives, including the final image.
 pub(crate) fn render(
     handle: &Handle,
     generation: u64,

@@ -1,4 +1,4 @@
-//! The program in a pseudo-terminal at one end of a connection, and the screen at the other end.
+//! glimt in a pseudo-terminal at one end of a connection, and a screen at the other end.
 
 use std::error::Error;
 use std::io::{Read, Write};
@@ -17,7 +17,7 @@ pub(crate) const COLUMNS: u16 = 120;
 pub(crate) const ROWS: u16 = 40;
 /// Width and height of a cell in pixels.
 const CELL: (u16, u16) = (8, 16);
-/// Maximum time to wait for anything.
+/// Timeout for all waits.
 const LIMIT: Duration = Duration::from_secs(600);
 /// Answers to terminal queries: status, device attributes, and synchronized output.
 const ANSWERS: [(&[u8], &[u8]); 3] =
@@ -32,26 +32,26 @@ pub(crate) struct Connection {
 }
 
 impl Connection {
-    /// The connection to a terminal on the same machine.
+    /// A connection to a terminal on the same machine.
     pub(crate) const NONE: Self = Self { bytes_per_second: f64::INFINITY, delay: Duration::ZERO };
     /// 1 Mbit/s with a round-trip time of 150 ms.
     pub(crate) const SLOW: Self = Self { bytes_per_second: 125e3, delay: Duration::from_millis(75) };
 }
 
-/// Byte counts and screen at the far end.
+/// Byte counts and the screen at the far end.
 pub(crate) struct FarEnd {
     pub(crate) cells: vt100::Parser,
     pub(crate) pixels: PixelScreen,
-    /// Number of bytes that have arrived.
+    /// Number of bytes received.
     pub(crate) came: usize,
-    /// Number of bytes sent, and sent before the last answered query.
+    /// Number of bytes sent in total, and before the last answered query.
     sent: usize,
     answered: usize,
     pub(crate) most_unanswered: usize,
 }
 
 impl FarEnd {
-    /// The colors of the subdivisions of the image's cells, or of its pixels.
+    /// Colors of the image's pixels, or of its cell subdivisions.
     pub(crate) fn seen(&self) -> Vec<[u8; 3]> {
         if let Some(picture) = self.pixels.shown() {
             return picture.pixels.clone();
@@ -62,7 +62,7 @@ impl FarEnd {
         cells.flat_map(parts).collect()
     }
 
-    /// Progress in percent that the screen shows; 100 at the end.
+    /// Displayed progress in percent, 100 at the end.
     pub(crate) fn percent(&self) -> Option<u32> {
         let row =
             self.cells.screen().rows(0, COLUMNS).find(|row| row.contains("glimt") || !row.is_empty())?;
@@ -75,8 +75,8 @@ impl FarEnd {
     }
 }
 
-/// The colors of a cell's subdivisions; black for characters other than blocks, so that all screens have the same
-/// number.
+/// Colors of a cell's subdivisions. Characters other than blocks count as black, so that all screens have the
+/// same number of colors.
 fn parts(cell: &vt100::Cell) -> [[u8; 3]; 24] {
     let color = |color| match color {
         vt100::Color::Default => None,
@@ -88,7 +88,7 @@ fn parts(cell: &vt100::Cell) -> [[u8; 3]; 24] {
     filled_squares.map(|is_ink| if is_ink { fg } else { bg }.unwrap_or_default())
 }
 
-/// A terminal that runs the program.
+/// A terminal running the program.
 pub(crate) struct WatchedTerminal {
     // Keeps the terminal open.
     _master: Box<dyn MasterPty + Send>,
@@ -152,7 +152,7 @@ impl WatchedTerminal {
 
 impl Drop for WatchedTerminal {
     fn drop(&mut self) {
-        // The measurement is complete; failing to stop the program does not matter.
+        // The measurement is complete, so ignore a failure to stop the program.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
@@ -165,7 +165,7 @@ fn lock<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
 /// Bytes with their arrival time.
 type Due = (Instant, Vec<u8>);
 
-/// Simulates the connection: carries output to the far end, and answers back.
+/// Simulates the connection: delays output on its way to the far end, and answers on the way back.
 fn carry(
     mut output: Box<dyn Read + Send>,
     far: Arc<Mutex<FarEnd>>,
@@ -220,7 +220,7 @@ fn arrive(
             far.came += 1;
             tail.push(byte);
             if let Some((_, answer)) = ANSWERS.iter().find(|(question, _)| tail.ends_with(question)) {
-                // A program that has exited needs no answer.
+                // Ignore errors: the program may have exited.
                 let _ = up.send((Instant::now() + delay, far.came, *answer));
             }
             if tail.len() > 64 {

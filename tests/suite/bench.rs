@@ -9,7 +9,7 @@ use serde_json::Value;
 
 use super::test_dir::{TestDir, assert_mentions, mentions, system_error};
 
-/// A ball on a floor under an area light: few pixels, some indirect light.
+/// A ball on a floor under an area light. The image is small, and some of the light is indirect.
 const SCENE: &str = r#"[render]
 width = 24
 height = 16
@@ -33,7 +33,7 @@ v = [0, 0, 1]
 material = "lamp"
 "#;
 
-/// Options for a measurement small enough for a test.
+/// Options for a measurement that is fast enough for a test.
 const SMALL: &str = "--samples 1,4 --reference-samples 64 --seeds 3 --progress none";
 
 fn box_dir() -> TestDir {
@@ -42,7 +42,7 @@ fn box_dir() -> TestDir {
     dir
 }
 
-/// Runs `glimt bench` with its own cache; returns stdout and stderr.
+/// Runs `glimt bench` with a separate cache. Returns stdout and stderr.
 #[track_caller]
 fn bench(dir: &TestDir, line: &str, code: i32) -> (String, String) {
     let mut process = dir.glimt(&format!("bench {line}"));
@@ -99,7 +99,7 @@ fn bench_measures_a_scene_end_to_end() {
 }
 
 #[test]
-fn errors_repeat_and_references_are_cached() {
+fn errors_are_reproducible_references_cached() {
     let dir = box_dir();
     let line = format!("box.toml {SMALL} --integrator path --json");
     bench(&dir, &format!("{line} a.json"), 0);
@@ -118,7 +118,7 @@ fn errors_repeat_and_references_are_cached() {
         fs::write(&file, "broken").expect("written");
     }
     bench(&dir, &format!("{line} c.json"), 0);
-    assert!(!is_cached(&json(&dir, "c.json")), "a damaged cache file is replaced");
+    assert!(!is_cached(&json(&dir, "c.json")), "expected a damaged cache file to be replaced");
     assert_eq!(errors(&json(&dir, "c.json")), errors(&a));
     dir.write("box.toml", SCENE.replace("0.6, 0.6, 0.5", "0.6, 0.6, 0.4"));
     bench(&dir, &format!("{line} d.json"), 0);
@@ -131,20 +131,23 @@ fn errors_repeat_and_references_are_cached() {
 }
 
 #[test]
-fn baseline_compares_with_an_older_run() {
+fn baseline_option_compares_with_a_previous_run() {
     let dir = box_dir();
     let line = format!("box.toml {SMALL} --integrator path");
     bench(&dir, &format!("{line} --json old.json"), 0);
     let (stdout, _) = bench(&dir, &format!("{line} --baseline old.json"), 0);
     assert_mentions(&stdout, &["old.json", "95 %", "box.toml, path", "× 1.000", "(1.000 to 1.000)"]);
     let (stdout, _) = bench(&dir, &format!("{line} --clamp 0.01 --baseline old.json"), 0);
-    assert!(mentions(&stdout, "old.json") && !mentions(&stdout, "error ×"), "another method: {stdout}");
+    assert!(
+        mentions(&stdout, "old.json") && !mentions(&stdout, "error ×"),
+        "expected no error ratio for a different method: {stdout}"
+    );
     let (stdout, _) = bench(
         &dir,
         &format!("{line} --set render.max_depth=1 --set render.shadow_samples=64 --baseline old.json"),
         0,
     );
-    assert!(stdout.contains(": error × 0."), "less light has less noise: {stdout}");
+    assert!(stdout.contains(": error × 0."), "expected a lower error with less light: {stdout}");
     dir.write("odd.json", "{}");
     let (_, stderr) = bench(&dir, &format!("{line} --baseline odd.json"), 2);
     assert_mentions(&stderr, &["error: odd.json", "bench --json FILE"]);
@@ -175,11 +178,11 @@ fn all_scenes_are_checked_before_measuring() {
     assert_eq!(stdout, "");
     assert!(
         stderr.contains("none.toml") && stderr.contains("broken.toml:13"),
-        "both errors are reported: {stderr}"
+        "expected two error messages: {stderr}"
     );
     assert!(!dir.path("a.csv").exists());
-    assert!(!dir.path("cache/glimt/references").exists(), "nothing was measured");
-    // This output is a file that the second scene reads.
+    assert!(!dir.path("cache/glimt/references").exists(), "expected no measurement");
+    // This output is an input of the second scene.
     dir.write("skin.ppm", "P6\n1 1\n255\nabc");
     let skin = "diffuse = { texture = \"skin\" }\n[textures.skin]\nfile = \"skin.ppm\"\n[materials.other]\ndiffuse = 0";
     dir.write(
@@ -196,7 +199,7 @@ fn all_scenes_are_checked_before_measuring() {
 }
 
 #[test]
-fn references_set_the_size_and_one_warns() {
+fn references_set_size_single_reference_warns() {
     let dir = box_dir();
     for seed in [8, 9] {
         let line =
@@ -239,7 +242,7 @@ fn outputs_never_replace_inputs_or_each_other() {
         assert_mentions(&stderr, facts);
     }
     assert_eq!(dir.bytes("skin.ppm"), b"P6\n1 1\n255\nabc");
-    // If a file name is missing, the option takes the next word.
+    // Without a file name, the option consumes the next argument.
     for (line, facts) in [
         ("--csv ball.toml", ["ball.toml", "table", "--csv FILE"]),
         ("--json ball.toml box.toml", ["ball.toml", "results", "--json FILE"]),
@@ -253,7 +256,7 @@ fn outputs_never_replace_inputs_or_each_other() {
 }
 
 #[test]
-fn one_write_failure_keeps_other_outputs() {
+fn failed_output_does_not_affect_others() {
     let dir = box_dir();
     symlink("/dev/full", dir.path("full.csv")).expect("a link");
     let line =
@@ -262,7 +265,7 @@ fn one_write_failure_keeps_other_outputs() {
     assert_mentions(&stderr, &["full.csv", &system_error(Errno::ENOSPC)]);
     assert!(stderr.lines().count() == 1 && errors(&json(&dir, "a.json")).len() == 1, "{stderr}");
     assert!(dir.path("a.svg").is_file());
-    // Results replace earlier results, whatever their names.
+    // Results overwrite previous results, regardless of file names.
     for _ in 0..2 {
         bench(&dir, &format!("{line} --json results --csv table"), 0);
     }
@@ -272,7 +275,7 @@ fn one_write_failure_keeps_other_outputs() {
 fn bench_ignores_the_scene_output() {
     let dir = box_dir();
     let textured = SCENE.replace("diffuse = [0.6, 0.6, 0.5]", "diffuse = { texture = \"skin\" }");
-    // A render would write its image over the scene's texture, by default and with `output`.
+    // A render would overwrite the scene's texture with its image, by default and with `output`.
     for (name, output) in [("skin.toml", ""), ("other.toml", "output = \"skin.png\"\n")] {
         let scene = textured.replace("[render]\n", &format!("[render]\n{output}"));
         dir.write(name, format!("{scene}\n[textures.skin]\nfile = \"skin.png\"\n"));
@@ -284,7 +287,7 @@ fn bench_ignores_the_scene_output() {
 }
 
 #[test]
-fn bench_reports_wrong_calls() {
+fn bench_reports_invalid_usage() {
     let dir = box_dir();
     dir.write("wrong.toml", SCENE.replace("radius = 0.5", "radius = -1"));
     let (_, stderr) = bench(&dir, "wrong.toml", 2);
@@ -344,7 +347,10 @@ fn interrupted_bench_writes_nothing() {
     let mut line = String::new();
     while !line.contains("reference 1 of 2") {
         line.clear();
-        assert!(std::io::BufRead::read_line(&mut said, &mut line).expect("a line") > 0, "it ended early");
+        assert!(
+            std::io::BufRead::read_line(&mut said, &mut line).expect("a line") > 0,
+            "exited before the interrupt"
+        );
     }
     let id = nix::unistd::Pid::from_raw(child.id() as i32);
     nix::sys::signal::kill(id, nix::sys::signal::Signal::SIGINT).expect("sent");

@@ -1,4 +1,4 @@
-//! Broken scene files: the exact diagnostics of each, with their positions.
+//! Exact diagnostics for invalid scene files, with their positions.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -11,7 +11,7 @@ use super::test_dir::assert_mentions;
 /// Line, column, and `message; label`.
 type ExpectedDiagnostic = (usize, usize, &'static str);
 
-/// Every file of `tests/broken` with all its diagnostics, in order.
+/// Every file in `tests/broken` with all its diagnostics, in order.
 const BROKEN: &[(&str, &[ExpectedDiagnostic])] = &[
     ("away", &[(15, 1, "warning: this light shines away from everything; all shapes are behind it")]),
     (
@@ -121,7 +121,7 @@ const BROKEN: &[(&str, &[ExpectedDiagnostic])] = &[
         &[
             (1, 1, "warning: nothing lights this scene"),
             (9, 2, "warning: [environment] replaces `background`, which has no effect"),
-            (10, 9, "warning: `color` is black, so the environment is black; a factor on `file`"),
+            (10, 9, "warning: `color` is black, so the environment is black; a scale factor for `file`"),
         ],
     ),
     (
@@ -474,7 +474,7 @@ fn said(diagnostic: &Diagnostic) -> (usize, usize, String) {
 }
 
 #[test]
-fn broken_scenes_get_exactly_their_diagnostics() {
+fn broken_scenes_have_expected_diagnostics() {
     for (name, expected) in BROKEN {
         let found: Vec<_> =
             diagnostics(&folder().join(name).with_extension("toml")).iter().map(said).collect();
@@ -485,7 +485,7 @@ fn broken_scenes_get_exactly_their_diagnostics() {
 }
 
 #[test]
-fn every_broken_scene_is_in_the_table() {
+fn every_broken_scene_is_listed() {
     let files = fs::read_dir(folder()).expect("the folder").map(|entry| entry.expect("an entry").path());
     let mut names: Vec<String> = files
         .filter(|path| path.is_file())
@@ -506,10 +506,10 @@ fn reports_show_positions_and_escape_controls() {
         let report = render(&diagnostics, 100, Style::Plain);
         for (line, column, _) in *expected {
             let place = format!("--> {}:{line}:{column}\n", path.display());
-            assert!(report.contains(&place), "{place} is not in\n{report}");
+            assert!(report.contains(&place), "{place} not found in\n{report}");
             let source = text.lines().nth(line - 1).unwrap_or_default().trim_start_matches('\u{feff}');
             let start: String = source.trim().chars().take_while(|c| !c.is_control()).take(20).collect();
-            assert!(report.contains(&start), "{start} is not in\n{report}");
+            assert!(report.contains(&start), "{start} not found in\n{report}");
         }
         assert!(report.ends_with(&format!("\n{}\n", summary(&diagnostics))), "{report}");
         let is_safe = |c: char| c == '\n' || !(c.is_control() || "\u{202e}\u{feff}".contains(c));
@@ -518,7 +518,7 @@ fn reports_show_positions_and_escape_controls() {
     }
 }
 
-/// The only diagnostic of a file with these bytes.
+/// The only diagnostic for a file with the given contents.
 fn of_bytes(bytes: &[u8]) -> Diagnostic {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("scene.toml");
@@ -529,7 +529,7 @@ fn of_bytes(bytes: &[u8]) -> Diagnostic {
 }
 
 #[test]
-fn files_that_are_not_text_are_rejected() {
+fn non_text_files_are_rejected() {
     let latin = said(&of_bytes(b"[camera]\n# caf\xe9\n"));
     assert_eq!((latin.0, latin.1), (2, 6));
     assert_mentions(&latin.2, &["line 2", "UTF-8", "0xe9", "offset 14"]);
@@ -549,7 +549,7 @@ fn files_that_are_not_text_are_rejected() {
 }
 
 #[test]
-fn deep_nesting_is_an_error_not_an_overflow() {
+fn deep_nesting_does_not_overflow_the_stack() {
     for (open, close) in [("[", "]"), ("{a=", "}"), ("a.", "a=1")] {
         let text = format!("x = {}{close}\n", open.repeat(200_000));
         assert_eq!(said(&of_bytes(text.as_bytes())).0, 1);
@@ -559,7 +559,7 @@ fn deep_nesting_is_an_error_not_an_overflow() {
 }
 
 #[test]
-fn colors_up_to_255_get_a_hex_suggestion() {
+fn eight_bit_colors_get_a_hex_suggestion() {
     let scene = |kind: &str, key: &str| {
         format!(
             "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n[[light]]\n[[sphere]]\ncenter = [0, 0, 0]\nradius = 1\nmaterial = \"a\"\n\
@@ -593,9 +593,9 @@ fn colors_up_to_255_get_a_hex_suggestion() {
     assert!(!said[0].place.as_ref().is_some_and(|place| place.label.contains("255")));
 }
 
-/// The message, column and help for each value of a key.
+/// The message, column and help for a value of a key.
 #[test]
-fn lists_in_foreign_syntax_get_a_suggestion() {
+fn lists_in_other_syntax_get_a_suggestion() {
     let open = "`[` opened here is not closed";
     let brackets = "lists use square brackets: write [0, 3, 3]";
     let write = Some("write [0, 3, 3]");
@@ -630,7 +630,7 @@ fn lists_in_foreign_syntax_get_a_suggestion() {
     }
 }
 
-/// All diagnostics of a text.
+/// All diagnostics for a scene.
 fn diagnostics_of(text: &str) -> Vec<Diagnostic> {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("scene.toml");

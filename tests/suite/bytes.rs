@@ -1,4 +1,5 @@
-//! Bytes sent to the terminal for real images: the first preview, and edits until they converge.
+//! Number of bytes sent to the terminal for bundled scenes: for the first preview, for whole renders, and for
+//! edits.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, PoisonError};
@@ -13,16 +14,16 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::Color;
 
-/// Window sizes, and the size of the preview next to the side panel.
+/// Window sizes, and the preview sizes next to the side panel.
 const SIZES: [(Rect, PreviewSize); 3] = [
     (Rect { x: 0, y: 0, width: 80, height: 24 }, PreviewSize { width: 60, height: 40, around: None }),
     (Rect { x: 0, y: 0, width: 120, height: 40 }, PreviewSize { width: 90, height: 72, around: None }),
     (Rect { x: 0, y: 0, width: 200, height: 60 }, PreviewSize { width: 170, height: 112, around: None }),
 ];
-/// Columns and rows of the film. Larger images have less noise in their previews.
+/// Width and height of the film. Larger images have less noise in their previews.
 const FILM: u32 = 320;
 
-/// Renders one scene after another.
+/// Renders scenes one after another.
 struct PreviewRenderer {
     handle: Handle,
     preview: PreviewSize,
@@ -33,10 +34,11 @@ struct PreviewRenderer {
 impl PreviewRenderer {
     fn new(preview: PreviewSize) -> Self {
         let handle = glimt::pipeline::start(0).expect("a worker");
-        Self { handle, preview, generation: 0, folder: tempfile::tempdir().expect("a scratch folder") }
+        Self { handle, preview, generation: 0, folder: tempfile::tempdir().expect("a temporary folder") }
     }
 
-    /// The last preview of a scene. If `samples` is `None`, the coarse preview with one sample for each of its pixels.
+    /// The last preview of a scene. If `samples` is `None`, the coarse preview with one sample per preview
+    /// pixel.
     fn preview(&mut self, scene: &str, samples: Option<u32>) -> Picture {
         let path: PathBuf = self.folder.path().join("scene.toml");
         std::fs::write(&path, scene).expect("written");
@@ -69,7 +71,7 @@ impl PreviewRenderer {
         Arc::unwrap_or_clone(latest.expect("a preview").picture)
     }
 
-    /// The previews of a render, up to the last one.
+    /// All previews of a render.
     fn pictures(&mut self, scene: &str) -> Vec<(Picture, Fidelity)> {
         let steps = [
             (None, Fidelity::First),
@@ -97,7 +99,7 @@ impl PaintedScreen {
         Self { window, painter: Painter::new(ColorDepth::TrueColor), terminal }
     }
 
-    /// Number of bytes until an image is shown.
+    /// Shows an image. Returns the number of bytes sent.
     fn show(&mut self, picture: &Picture, fidelity: Fidelity) -> usize {
         let mut buffer = Buffer::empty(self.window);
         let place = Rect::new(2, 1, picture.width as u16, picture.height.div_ceil(2) as u16);
@@ -124,7 +126,7 @@ impl PaintedScreen {
         }
     }
 
-    /// The largest difference of a channel between the screen and an image.
+    /// The largest channel difference between the screen and an image.
     fn difference(&self, picture: &Picture) -> u8 {
         let pixels = picture.pixels.iter().enumerate();
         let off = pixels.map(|(i, wanted)| {
@@ -144,7 +146,7 @@ impl PaintedScreen {
     }
 }
 
-/// RGB of a color in xterm's palette.
+/// RGB value of a color in xterm's palette.
 fn rgb(color: vt100::Color) -> [u8; 3] {
     match color {
         vt100::Color::Rgb(r, g, b) => [r, g, b],
@@ -162,7 +164,7 @@ fn scene(name: &str) -> String {
     std::fs::read_to_string(path).expect("a bundled scene")
 }
 
-/// Cells that differ by more than the last bit.
+/// Number of cells that differ by more than one.
 fn changed(a: &Picture, b: &Picture) -> usize {
     let width = a.width as usize;
     let is_off = |i: usize| (0..3).any(|k| a.pixels[i][k].abs_diff(b.pixels[i][k]) > 1);
@@ -170,14 +172,15 @@ fn changed(a: &Picture, b: &Picture) -> usize {
     tops.filter(|i| is_off(*i) || is_off(i + width)).count()
 }
 
-/// Shows a whole render on the screen; returns the number of bytes for its first preview and for all.
+/// Shows a whole render on the screen. Returns the number of bytes for the first preview and for all
+/// previews.
 fn through(screen: &mut PaintedScreen, pictures: &[(Picture, Fidelity)]) -> (usize, usize) {
     let sent: Vec<usize> =
         pictures.iter().map(|(picture, fidelity)| screen.show(picture, *fidelity)).collect();
     let (last, _) = pictures.last().expect("pictures");
     let off = screen.difference(last);
-    assert!(off <= 1, "the last image differs by {off}");
-    assert_eq!(screen.show(last, Fidelity::Still), 0, "an unchanged image sends nothing");
+    assert!(off <= 1, "the screen differs from the last image by {off}");
+    assert_eq!(screen.show(last, Fidelity::Still), 0, "an unchanged image must send nothing");
     (sent[0], sent.iter().sum())
 }
 
@@ -196,16 +199,16 @@ fn renders_and_edits_stay_within_byte_budgets() {
         let place = format!("{name}, {to}, at {}×{}", window.width, window.height);
         let (before, mut studio, mut screen) =
             (scene(name), PreviewRenderer::new(preview), PaintedScreen::new(window));
-        assert!(before.contains(from), "{name} has no `{from}`");
+        assert!(before.contains(from), "{name} does not contain `{from}`");
         let old = studio.pictures(&before);
         let new = studio.pictures(&before.replace(from, to));
         let [(old_last, _), (new_last, _)] = [&old, &new].map(|pictures| pictures.last().expect("pictures"));
         let cells = old_last.pixels.len() / 2;
         let (first, all) = through(&mut screen, &old);
-        assert!(first <= 12 * cells, "{place}: {first} bytes for a first preview of {cells} cells");
+        assert!(first <= 12 * cells, "{place}: {first} bytes for the first preview with {cells} cells");
         assert!(all <= 48 * cells, "{place}: {all} bytes for {cells} cells");
         let edited = changed(old_last, new_last);
         let (_, all) = through(&mut screen, &new);
-        assert!(edited > 0 && all <= 48 * edited, "{place}: {all} bytes for {edited} cells");
+        assert!(edited > 0 && all <= 48 * edited, "{place}: {all} bytes for {edited} changed cells");
     }
 }

@@ -1,4 +1,5 @@
-//! Checkpoints: however a render ends, --resume gives the same pixels as a render that was never interrupted.
+//! Checkpoints: a render resumed with --resume has the same pixels as an uninterrupted render, however it
+//! ended.
 
 use std::fs;
 
@@ -12,7 +13,7 @@ use nix::unistd::Pid;
 use crate::parts::{METHODS, ROOM, room_dir};
 use crate::test_dir::{TestDir, assert_mentions, mentions, system_error};
 
-/// Random numbers in [0, 1).
+/// Generator of random numbers in [0, 1).
 fn random(seed: u64) -> impl FnMut() -> f64 {
     let mut next = glimt::math::random::unit(seed);
     move || f64::from(next())
@@ -22,18 +23,19 @@ fn begin(dir: &TestDir, line: &str) -> Child {
     dir.glimt(line).stderr(Stdio::null()).spawn().expect("it runs")
 }
 
-/// Runs it and checks the exit code; returns stderr as one line, because messages are wrapped.
+/// Runs glimt and checks the exit code. Returns stderr with line breaks removed, because messages are
+/// wrapped.
 #[track_caller]
 fn said(dir: &TestDir, line: &str, code: i32) -> String {
     dir.expect(line, code).split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 fn end(mut child: Child, signal: Signal) -> Option<i32> {
-    kill(Pid::from_raw(child.id() as i32), signal).expect("the process exists");
+    kill(Pid::from_raw(child.id() as i32), signal).expect("failed to signal the process");
     child.wait().expect("a child").code()
 }
 
-/// Checks that a killed writer's temporary files are gone after the next write.
+/// Checks that no temporary files of killed processes remain after the next write.
 fn assert_no_leftovers(dir: &TestDir) {
     let names =
         fs::read_dir(dir.0.path()).expect("a folder").map(|entry| entry.expect("an entry").file_name());
@@ -41,7 +43,7 @@ fn assert_no_leftovers(dir: &TestDir) {
     assert!(left.is_empty(), "{left:?}");
 }
 
-/// Small renders that take a few seconds.
+/// Small images that take a few seconds to render.
 const LONG: [(&str, &str); 4] = [
     ("whitted", "--samples 4096"),
     ("path", "--integrator path --samples 1024"),
@@ -50,7 +52,7 @@ const LONG: [(&str, &str); 4] = [
 ];
 
 #[test]
-fn killed_render_resumes_to_the_same_pixels() {
+fn killed_render_resumes_with_same_pixels() {
     kill_at_any_time(4);
 }
 
@@ -78,20 +80,20 @@ fn kill_at_any_time(times: u32) {
                 kills += 1;
                 continue;
             }
-            // The render was finished: start over.
+            // The render finished before the kill, so start over.
             assert!(dir.bytes("out.exr") == dir.bytes("one.exr"), "{method}: neither");
             dir.write("out.exr", "the image before");
             let _ = fs::remove_file(dir.path("out.exr.checkpoint"));
         }
         dir.expect(&line, 0);
         assert!(dir.bytes("out.exr") == dir.bytes("one.exr"), "{method}");
-        assert!(!dir.path("out.exr.checkpoint").exists(), "{method}: the checkpoint is removed");
+        assert!(!dir.path("out.exr.checkpoint").exists(), "{method}: the checkpoint must be removed");
         assert_no_leftovers(&dir);
     }
 }
 
 #[test]
-fn kill_during_a_write_keeps_a_whole_checkpoint() {
+fn kill_during_write_keeps_valid_checkpoint() {
     kill_while_it_writes(50);
 }
 
@@ -101,7 +103,7 @@ fn killed_200_times_while_writing_a_checkpoint() {
     kill_while_it_writes(200);
 }
 
-/// Writes checkpoints continuously, so that each kill hits a write.
+/// Kills a render that writes checkpoints continuously.
 fn kill_while_it_writes(times: u32) {
     let dir = room_dir();
     let mut next = random(5);
@@ -111,7 +113,7 @@ fn kill_while_it_writes(times: u32) {
         std::thread::sleep(Duration::from_secs_f64(0.02 + 0.1 * next()));
         end(child, Signal::SIGKILL);
         if dir.path("out.exr.checkpoint").exists() {
-            // An intact checkpoint is rejected because of its seed, a damaged one because it is damaged.
+            // The error mentions the seed only if the checkpoint is intact.
             let said = self::said(&dir, "room.toml --once -o out.exr --seed 9 --resume", 2);
             assert_mentions(&said, &["seed", "0", "9"]);
         }
@@ -119,7 +121,7 @@ fn kill_while_it_writes(times: u32) {
     assert!(dir.path("out.exr.checkpoint").exists());
 }
 
-/// Ignored by default: the result depends on the speed of the machine.
+/// Ignored by default because the result depends on the machine's speed.
 #[test]
 #[ignore = "measures time, 84 s: cargo test --release --test suite hangup -- --ignored"]
 fn hangup_writes_a_checkpoint_within_two_seconds() {
@@ -144,9 +146,9 @@ fn hangup_writes_a_checkpoint_within_two_seconds() {
         assert_eq!(end(child, Signal::SIGHUP), Some(129));
         let seconds = sent.elapsed().as_secs_f64();
         let bytes = fs::metadata(dir.path("out.exr.checkpoint")).expect("a checkpoint").len();
-        eprintln!("{options:?}: ended after {seconds:.2} s with a checkpoint of {} MB", bytes / 1_000_000);
+        eprintln!("{options:?}: exited after {seconds:.2} s with a {} MB checkpoint", bytes / 1_000_000);
         assert!(seconds < 2.0, "{options}: {seconds} s");
-        // The checkpoint is intact: settings are compared after its digest.
+        // The error mentions the seed only if the checkpoint's digest is valid.
         let said = self::said(&dir, &format!("room.toml --once -o out.exr {size} --seed 9 --resume"), 2);
         assert_mentions(&said, &["seed", "0", "9"]);
         fs::remove_file(dir.path("out.exr.checkpoint")).expect("removed");
@@ -156,7 +158,7 @@ fn hangup_writes_a_checkpoint_within_two_seconds() {
 }
 
 #[test]
-fn signal_leaves_a_checkpoint_to_resume() {
+fn signal_leaves_a_resumable_checkpoint() {
     let dir = room_dir();
     for ((method, options), (signal, code)) in LONG.into_iter().zip([
         (Signal::SIGTERM, 143),
@@ -167,11 +169,11 @@ fn signal_leaves_a_checkpoint_to_resume() {
         dir.expect(&format!("room.toml --once --progress none -o one.exr --checkpoint 0 {options}"), 0);
         let line = format!("room.toml --once --progress none -o out.exr {options}");
         let child = begin(&dir, &line);
-        // Wait for samples to save: an earlier signal leaves nothing.
+        // Wait for samples to save. A signal before the first sample leaves no checkpoint.
         std::thread::sleep(Duration::from_millis(300));
         let ended = end(child, signal);
         if dir.path("out.exr").exists() {
-            // The machine was faster.
+            // The render finished first.
             assert_eq!(ended, Some(code).filter(|code| ended == Some(*code)).or(Some(0)));
         } else {
             assert_eq!(ended, Some(code), "{method}");
@@ -182,14 +184,14 @@ fn signal_leaves_a_checkpoint_to_resume() {
     }
 }
 
-/// Renders to the end and keeps the checkpoint.
+/// Completes a render and keeps its checkpoint.
 fn kept(dir: &TestDir, options: &str) {
     dir.expect(&format!("room.toml --once --progress none -o out.exr --keep-checkpoint {options}"), 0);
     assert!(dir.path("out.exr.checkpoint").exists());
 }
 
 #[test]
-fn finished_render_extends_to_a_longer_one() {
+fn finished_render_can_add_samples() {
     let dir = room_dir();
     for (method, options) in METHODS {
         let (head, samples) = options.split_once("--samples ").expect("samples");
@@ -237,7 +239,7 @@ fn checkpoint_of_another_image_is_rejected() {
         dir.write(name, before);
     }
     assert!(dir.bytes("out.exr.checkpoint") == checkpoint);
-    // Edits that do not affect the image do not invalidate the checkpoint.
+    // Edits that do not affect the image keep the checkpoint valid.
     dir.write("room.toml", format!("# a comment\n{ROOM}\n[materials.unused]\n"));
     dir.expect("room.toml --once --progress none -o out.exr --resume --threads 1 --keep-checkpoint", 0);
     assert!(dir.bytes("out.exr") == image);
@@ -276,7 +278,7 @@ fn checkpoints_are_used_only_with_resume() {
     kept(&dir, "");
     let said = self::said(&dir, "room.toml --once -o out.exr", 0);
     assert_mentions(&said, &["warning", "out.exr.checkpoint", "--resume"]);
-    assert!(!dir.path("out.exr.checkpoint").exists(), "the image is finished");
+    assert!(!dir.path("out.exr.checkpoint").exists(), "a finished image must remove its checkpoint");
     // A longer render's checkpoint survives a new render without --resume.
     let line = "room.toml --once --progress none -o out.exr --samples 100000";
     let child = begin(&dir, line);
@@ -287,17 +289,17 @@ fn checkpoints_are_used_only_with_resume() {
     std::thread::sleep(Duration::from_millis(300));
     assert_eq!(end(child, Signal::SIGTERM), Some(143));
     assert!(dir.bytes("out.exr.checkpoint.before") == longer);
-    // It also survives a render of another image, whose checkpoint is shorter.
+    // It also survives a render of another image with fewer samples in its checkpoint.
     let child = begin(&dir, &format!("{line} --seed 5"));
     std::thread::sleep(Duration::from_millis(300));
     assert_eq!(end(child, Signal::SIGTERM), Some(143));
     assert!(dir.bytes("out.exr.checkpoint.before") == longer);
     fs::rename(dir.path("out.exr.checkpoint.before"), dir.path("out.exr.checkpoint")).expect("moved");
-    // It also survives a finished draft.
+    // It also survives a finished draft render.
     dir.expect("room.toml --once --progress none -o out.exr --samples 1", 0);
     assert!(dir.bytes("out.exr.checkpoint") == longer);
     fs::remove_file(dir.path("out.exr.checkpoint")).expect("removed");
-    // A checkpoint of another image survives, as does a file that is not a checkpoint.
+    // A checkpoint of another image and a file that is not a checkpoint survive.
     kept(&dir, "");
     dir.expect("room.toml --once --progress none -o out.exr --seed 3", 0);
     assert!(dir.path("out.exr.checkpoint").exists());
@@ -316,7 +318,7 @@ fn checkpoints_are_used_only_with_resume() {
 fn await_file(dir: &TestDir, name: &str) {
     let deadline = Instant::now() + Duration::from_secs(60);
     while !dir.path(name).exists() {
-        assert!(Instant::now() < deadline, "{name} does not appear");
+        assert!(Instant::now() < deadline, "{name} was not written");
         std::thread::sleep(Duration::from_millis(5));
     }
 }
@@ -331,7 +333,8 @@ fn running_process_keeps_its_checkpoint() {
     };
     let first = begin(&dir, &format!("{line} --seed 1"));
     await_file(&dir, "out.exr.checkpoint");
-    // A second render to the same image, even with the same settings, writes no checkpoint and reports this once.
+    // A second process that renders to the same file, even with the same settings, writes no checkpoint and
+    // reports this once.
     for options in ["--seed 2", "--seed 1 --resume"] {
         let mut second = dir.glimt(&format!("{line} {options}"));
         let second = second.stderr(Stdio::piped()).spawn().expect("it runs");
@@ -345,11 +348,11 @@ fn running_process_keeps_its_checkpoint() {
         assert!(!dir.path("out.exr").exists(), "{said}");
         seed_is(1);
     }
-    // A finished image of the same render leaves the running one's checkpoint alone.
+    // Finishing another render to the same file does not remove the running process's checkpoint.
     dir.expect("room.toml --once --progress none -o out.exr --samples 1 --seed 1", 0);
     seed_is(1);
     assert!(!dir.path("out.exr.checkpoint.before").exists());
-    // Once its process has ended, a checkpoint can be replaced.
+    // After the process has ended, its checkpoint can be replaced.
     end(first, Signal::SIGKILL);
     let child = begin(&dir, &format!("{line} --seed 2"));
     await_file(&dir, "out.exr.checkpoint.before");
@@ -361,7 +364,7 @@ fn running_process_keeps_its_checkpoint() {
 #[test]
 fn full_disk_reports_the_checkpoint_once() {
     let dir = room_dir();
-    // In blocks of 512 bytes: a checkpoint has 150 kB, the image 8.
+    // In 512-byte blocks. A checkpoint takes 150 kB, the image 8 kB.
     let limited = |blocks: u32, line: &str| {
         let program = dir.glimt("").get_program().to_owned();
         let mut shell = std::process::Command::new("sh");
@@ -378,7 +381,7 @@ fn full_disk_reports_the_checkpoint_once() {
     assert_eq!(said.to_lowercase().matches(&too_large).count(), 1, "{said}");
     assert_mentions(&said, &["out.png.checkpoint", "out.png"]);
     assert!(dir.bytes("out.png").starts_with(b"\x89PNG"), "{said}");
-    // There is no room for the image either.
+    // The limit also prevents writing the image.
     dir.write("out.png", "the image before");
     let (code, said) = limited(2, &format!("{line} -o out.png"));
     assert_eq!(code, Some(1), "{said}");
@@ -400,7 +403,7 @@ fn render_without_checkpoints_can_resume() {
 }
 
 #[test]
-fn pipe_instead_of_a_checkpoint_never_blocks() {
+fn pipe_as_checkpoint_does_not_block() {
     let dir = room_dir();
     for name in ["out.exr.checkpoint", "a.part"] {
         nix::unistd::mkfifo(&dir.path(name), nix::sys::stat::Mode::S_IRWXU).expect("a pipe");
@@ -425,7 +428,7 @@ fn newer_checkpoint_is_moved_not_replaced() {
 }
 
 #[test]
-fn resume_keeps_finished_and_foreign_parts() {
+fn resume_keeps_finished_and_unrelated_parts() {
     let dir = room_dir();
     for options in
         ["--samples 5", "--photons on --samples 40 --set photons.count=500", "--samples 64 --error 0.2"]
@@ -435,7 +438,10 @@ fn resume_keeps_finished_and_foreign_parts() {
         let part = dir.bytes("a.part");
         let report = dir.report(&format!("{} --resume --progress none", line.replace(" --once", "")));
         assert!(dir.bytes("a.part") == part, "{options}");
-        assert_eq!(report["counters"]["camera_rays"], 0, "{options}: no ray is traced again");
+        assert_eq!(
+            report["counters"]["camera_rays"], 0,
+            "{options}: a finished part must not be rendered again"
+        );
         let said = self::said(&dir, &format!("{line} --resume"), 0);
         assert_mentions(&said, &["a.part", "finished"]);
         for (other, facts) in [
@@ -476,7 +482,7 @@ fn part_resumes_from_its_own_checkpoint() {
     }
     dir.expect("merge joined.exr 1.part 2.part --progress none", 0);
     assert!(dir.bytes("joined.exr") == dir.bytes("one.exr"));
-    // The checkpoint of one part is not used for another part.
+    // A part's checkpoint is not used for another part.
     let child = begin(&dir, "room.toml --once --progress none -o a.part --shard 1/2 --samples 100000");
     std::thread::sleep(Duration::from_millis(300));
     assert_eq!(end(child, Signal::SIGTERM), Some(143));

@@ -1,4 +1,4 @@
-//! `glimt compare` as a process: metrics, exit codes, messages, files.
+//! `glimt compare` as a process: metrics, exit codes, messages and files.
 
 use std::fs;
 use std::os::unix::fs::symlink;
@@ -27,7 +27,7 @@ fn floats(value: impl Fn(u32, u32, u32) -> f32) -> Rgb32FImage {
     ImageBuffer::from_fn(SIZE.0, SIZE.1, |x, y| Rgb([0, 1, 2].map(|c| value(x, y, c))))
 }
 
-/// A directory with the image and its reference in every lossless format, and as floats.
+/// A directory with an image and its reference in every lossless format, and as floats.
 fn dir() -> TestDir {
     let dir = TestDir::new();
     for ending in ["png", "ppm", "tga", "bmp", "webp"] {
@@ -39,25 +39,28 @@ fn dir() -> TestDir {
     dir
 }
 
-/// Runs `glimt compare`; returns the object on stdout, and stderr.
+/// Runs `glimt compare`. Returns the JSON object from stdout, and stderr.
 #[track_caller]
 fn json(dir: &TestDir, line: &str, code: i32) -> (Value, String) {
     let output = dir.run(&format!("compare --json {line}"));
     let stderr = String::from_utf8(output.stderr).expect("UTF-8");
     assert_eq!(output.status.code(), Some(code), "{line}: {stderr}");
     let stdout = String::from_utf8(output.stdout).expect("UTF-8");
-    assert_eq!(stdout.lines().count(), 1, "one object: {stdout}");
+    assert_eq!(stdout.lines().count(), 1, "expected one object: {stdout}");
     (serde_json::from_str(&stdout).expect("JSON"), stderr)
 }
 
 #[track_caller]
 fn assert_near(object: &Value, key: &str, expected: f64) {
     let value = object[key].as_f64().expect(key);
-    assert!((value - expected).abs() <= 1e-6 * expected.abs().max(1.0), "{key}: {value}, not {expected}");
+    assert!(
+        (value - expected).abs() <= 1e-6 * expected.abs().max(1.0),
+        "{key}: {value}, expected {expected}"
+    );
 }
 
-/// Checks metrics that numpy computed in double precision from the bytes, decoded from sRGB. SSIM is from scikit-image
-/// 0.26; FLIP 0.107067652 is from flip-evaluator 1.7, in single precision.
+/// Checks the metrics against values computed with numpy in double precision from the decoded sRGB bytes.
+/// SSIM is from scikit-image 0.26. For FLIP, flip-evaluator 1.7 computes 0.107067652 in single precision.
 #[track_caller]
 fn assert_figures_of_bytes(object: &Value) {
     for (key, expected) in [
@@ -77,7 +80,7 @@ fn assert_figures_of_bytes(object: &Value) {
 }
 
 #[test]
-fn every_format_gives_the_metrics_of_numpy() {
+fn every_format_matches_numpy_metrics() {
     let dir = dir();
     for (a, b) in [("png", "png"), ("ppm", "tga"), ("bmp", "webp"), ("webp", "png")] {
         let (object, stderr) = json(&dir, &format!("a.{a} b.{b}"), 0);
@@ -88,7 +91,7 @@ fn every_format_gives_the_metrics_of_numpy() {
 }
 
 #[test]
-fn sixteen_bits_and_floats_give_equal_metrics() {
+fn sixteen_bit_and_float_metrics_are_equal() {
     let dir = dir();
     let wide =
         ImageBuffer::from_fn(SIZE.0, SIZE.1, |x, y| Rgb([0, 1, 2].map(|c| u16::from(judged(x, y, c)) * 257)));
@@ -105,7 +108,7 @@ fn sixteen_bits_and_floats_give_equal_metrics() {
     assert_figures_of_bytes(&object);
     floats(|x, y, c| linear(judged(x, y, c))).save(dir.path("linear.hdr")).expect("written");
     let (object, _) = json(&dir, "linear.hdr linear.exr", 0);
-    assert!(object["relmse"].as_f64().expect("a number") < 1e-4, "8 bits of mantissa: {object}");
+    assert!(object["relmse"].as_f64().expect("a number") < 1e-4, "the mantissa has 8 bits: {object}");
     bytes(judged).save(dir.path("a.jpg")).expect("written");
     let (object, _) = json(&dir, "a.jpg a.png", 0);
     assert!(object["psnr_db"].as_f64().expect("a number") > 10.0, "{object}");
@@ -172,7 +175,7 @@ fn threshold_decides_the_exit_code() {
 }
 
 #[test]
-fn compare_reports_wrong_calls_and_files() {
+fn compare_reports_invalid_usage_and_files() {
     let dir = dir();
     dir.expect("compare a.png", 2);
     dir.expect("compare a.png b.png a.ppm", 2);
@@ -232,11 +235,11 @@ fn diff_writes_the_error_image() {
         assert_eq!((diff.width(), diff.height()), SIZE);
     }
     let diff = image::open(dir.path("d.png")).expect("a PNG").into_rgb8();
-    assert!(diff.pixels().any(|pixel| pixel.0.iter().any(|byte| *byte > 40)), "errors are seen");
+    assert!(diff.pixels().any(|pixel| pixel.0.iter().any(|byte| *byte > 40)), "errors must be visible");
     dir.write("copy.png", dir.bytes("b.png"));
     json(&dir, "copy.png b.png --diff d.png", 0);
     let black = image::open(dir.path("d.png")).expect("a PNG").into_rgb8();
-    assert!(black.pixels().all(|pixel| pixel.0 == [0; 3]), "zero error is black");
+    assert!(black.pixels().all(|pixel| pixel.0 == [0; 3]), "zero error must be black");
 }
 
 #[test]
@@ -270,5 +273,5 @@ fn renders_differ_only_by_format_and_noise() {
     dir.expect("ball.toml --once --progress none -o b.exr --seed 2", 0);
     let relmse = |line: &str| json(&dir, line, 0).0["relmse"].as_f64().expect("a number");
     assert!(relmse("a.png a.exr") < 1e-3 && relmse("a.hdr a.exr") < 1e-3);
-    assert!(relmse("b.exr a.exr") > relmse("a.hdr a.exr"), "a different seed gives different noise");
+    assert!(relmse("b.exr a.exr") > relmse("a.hdr a.exr"), "different seeds must have different noise");
 }

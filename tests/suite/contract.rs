@@ -1,4 +1,4 @@
-//! The contract of the scene file: every key with its default, and which keys are required.
+//! The scene file contract: every key with its default, and which keys are required.
 
 use std::fs;
 use std::path::PathBuf;
@@ -7,12 +7,12 @@ use glimt::scene::description::{Camera, Scene};
 use glimt::scene::diagnostic::{Diagnostic, Severity};
 use glimt::scene::{parse, starter};
 
-/// Promise about a key.
+/// Guarantee about a key.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Promise {
-    /// Optional; the default is the value in the example.
+    /// Optional. The default is the example value.
     Default,
-    /// Optional; the default differs from the example.
+    /// Optional. The default differs from the example value.
     Other,
     /// Required.
     Required,
@@ -20,10 +20,10 @@ enum Promise {
 
 use Promise::{Default, Other, Required};
 
-/// Name, example, promise.
+/// Key name, example value, and guarantee.
 type KeyContract = (&'static str, &'static str, Promise);
 
-/// The tables with all their keys and example values.
+/// All tables with their keys and example values.
 const TABLES: &[(&str, &[KeyContract])] = &[
     (
         "[render]",
@@ -293,10 +293,10 @@ const TABLES: &[(&str, &[KeyContract])] = &[
     ),
 ];
 
-/// The other elements that the materials refer to.
+/// Other elements that the materials refer to.
 const BUMPS: &str = "[textures.bumps]\nfile = \"textures/bumps.png\"\n";
 
-/// A directory with every file the example names, and the path of the scene in it.
+/// A directory with every file that the example refers to, and the path of the scene in it.
 fn folder() -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().expect("a folder");
     for name in ["scenes/textures", "assets"] {
@@ -315,7 +315,7 @@ fn folder() -> (tempfile::TempDir, PathBuf) {
     (folder, scene)
 }
 
-/// The whole example without the listed keys.
+/// The example without the keys for which `is_out` is true.
 fn example(is_out: impl Fn(usize, &str) -> bool) -> String {
     let mut text = String::from(BUMPS);
     for (table, (header, keys)) in TABLES.iter().enumerate() {
@@ -333,7 +333,7 @@ pub(crate) fn errors(diagnostics: &[Diagnostic]) -> Vec<&str> {
     errors.map(|one| one.message.as_str()).collect()
 }
 
-/// The scene without source positions, which change when a key is left out.
+/// Removes source positions from the scene, because they change when a key is omitted.
 pub(crate) fn placeless(mut scene: Scene) -> Scene {
     scene.objects.iter_mut().for_each(|object| object.span = 0..0);
     scene.textures.iter_mut().for_each(|texture| texture.file.span = 0..0);
@@ -363,7 +363,7 @@ fn unmarked_keys_are_optional() {
                 Default | Other => {
                     assert_eq!(said, [""; 0], "{header} {key}");
                     let scene = placeless(without.scene.expect("a scene"));
-                    assert_eq!(scene == whole, promise == Default, "{header} {key}: another default");
+                    assert_eq!(scene == whole, promise == Default, "{header} {key}: wrong default");
                 }
             }
         }
@@ -533,7 +533,7 @@ fn starter_has_every_key() {
             assert!(starter().lines().any(has), "starter: {header} {key}");
         }
     }
-    // Any shape may have a material.
+    // `name` is an optional key of every shape.
     assert!(starter().contains("# name = "), "name");
 }
 
@@ -549,7 +549,7 @@ fn starter_lines_can_be_uncommented() {
             || text.contains(" = ") && name.chars().all(|c| c.is_ascii_lowercase() || c == '_')
     };
     let uncommented = |line: &str| match line.strip_prefix("# ") {
-        // This table excludes other tables.
+        // These keys exclude other keys.
         Some(text) if is_key(text) && !["orbiter", "matrix"].iter().any(|key| text.starts_with(key)) => {
             format!("{text}\n")
         }

@@ -1,4 +1,4 @@
-//! Scenes at the limits: every sample is finite, in bounded time and memory. Also renders the bundled scenes.
+//! Extreme scenes: every sample is finite, and time and memory are bounded. Also renders the bundled scenes.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -10,7 +10,7 @@ const MIRROR: &str = "type = \"mirror\"\nreflectance = [1, 1, 1]";
 const GLASS: &str = "type = \"glass\"\nior = 1.5";
 const CAMERA: &str = "position = [0, 1, 4]\nlook_at = [0, 1, 0]";
 const LAMP: &str = "[[light]]\ntype = \"point\"\nposition = [1, 3, 2]\nintensity = [10, 10, 10]\n";
-/// Far more than any of these scenes takes.
+/// Much longer than any of these scenes takes.
 const MEMORY_BYTES: u64 = 400 << 20;
 
 fn sphere(center: &str, radius: &str) -> String {
@@ -33,7 +33,7 @@ fn lamp(position: &str, intensity: &str) -> String {
     format!("[[light]]\ntype = \"point\"\nposition = [{position}]\nintensity = [{intensity}]\n")
 }
 
-/// Renders a scene as an image and as a float file, and checks that every sample is finite.
+/// Renders a scene to an 8-bit and a float image, and checks that every sample is finite.
 #[track_caller]
 fn renders(name: &str, render: &str, camera: &str, material: &str, rest: &str) -> serde_json::Value {
     let dir = TestDir::new();
@@ -200,13 +200,13 @@ fn bundled() -> Vec<PathBuf> {
     scenes
 }
 
-/// Whether a file that the scene names is only generated on demand.
+/// Whether the scene refers to a file that is generated only on demand.
 fn is_made_on_demand(scene: &Path) -> bool {
     scene.file_stem().is_some_and(|stem| stem == "million" || stem == "figure")
 }
 
 #[test]
-fn bundled_scenes_ignore_the_thread_count() {
+fn bundled_scenes_ignore_thread_count() {
     for scene in bundled().iter().filter(|scene| !is_made_on_demand(scene)) {
         let dir = TestDir::new();
         let path = scene.display();
@@ -215,7 +215,7 @@ fn bundled_scenes_ignore_the_thread_count() {
                 let size = format!("--width 40 --height 30 --samples 3 --integrator {integrator}");
                 let outputs = format!("-o {threads}.png -o {threads}.exr");
                 let report = dir.report(&format!("{path} {size} {outputs} --threads {threads}"));
-                assert_eq!(report["counters"]["non_finite_samples"], 0, "{path} by {integrator}");
+                assert_eq!(report["counters"]["non_finite_samples"], 0, "{path} with {integrator}");
                 assert_eq!(report["settings"]["threads"], threads, "{path}");
             }
             for ending in ["png", "exr"] {

@@ -1,4 +1,4 @@
-//! Files that a write must preserve: files that glimt did not write, and a file's attributes.
+//! What writing files must preserve: files not written by glimt, and file attributes.
 
 use std::fs;
 use std::os::unix::fs::{MetadataExt, PermissionsExt};
@@ -6,20 +6,20 @@ use std::path::Path;
 
 use super::test_dir::{SCENE, TestDir, assert_mentions, mentions};
 
-/// A foreign file with the extension of a report.
+/// An unrelated file with a report's extension.
 const PACKAGE: &str = "{\n  \"name\": \"somebody\",\n  \"glimt\": \"0.1.0\"\n}\n";
-/// A file about a render, written by the user.
+/// A file about a render, written by hand.
 const BY_HAND: &str = "{\n  \"glimt\": \"0.1.0\",\n  \"scene\": \"a.toml\",\n  \"seconds\": 3.5\n}\n";
-/// A render that never ends.
+/// Options for a render that never ends.
 const ENDLESS: &str = "--once --samples 4000000 --width 4000";
-/// A measurement that never ends after its first messages.
+/// Options for a measurement that never ends.
 const LONG: &str = "--samples 4000000 --reference-samples 4000000 --progress none";
-/// A short one.
+/// Options for a short measurement.
 const SHORT: &str =
     "--samples 1 --reference-samples 8 --seeds 1 --integrator path --width 8 --no-cache --progress none";
 
 #[test]
-fn report_never_replaces_a_foreign_file() {
+fn report_never_replaces_unrelated_file() {
     let dir = TestDir::new();
     let refused = |foreign: &[u8]| {
         dir.write("package.json", foreign);
@@ -34,8 +34,8 @@ fn report_never_replaces_a_foreign_file() {
     refused(&dir.bytes("results.json"));
     dir.expect("ball.toml --once --report package.json --force", 0);
     let mut report: serde_json::Value = serde_json::from_slice(&dir.bytes("package.json")).expect("JSON");
-    // Glimt replaces its own reports without asking: unchanged; with only the keys of the contract, sorted, on one
-    // line; and an empty file.
+    // glimt replaces its own reports without `--force`: an unchanged report, a report from another version
+    // with only the guaranteed keys on one line, and an empty file.
     let as_it_is = report.to_string();
     let keys = report.as_object_mut().expect("an object");
     let fixed = ["glimt", "scene", "image", "settings", "stages", "counters", "seconds", "peak_memory_bytes"];
@@ -65,7 +65,7 @@ fn force_never_replaces_an_input() {
 }
 
 #[test]
-fn bench_never_replaces_a_foreign_file() {
+fn bench_never_replaces_unrelated_file() {
     let dir = TestDir::new();
     let bench = |line: &str, code: i32| {
         let output = dir.run(&format!("bench ball.toml {line}"));
@@ -77,7 +77,7 @@ fn bench_never_replaces_a_foreign_file() {
         dir.write(name, foreign);
         let stderr = bench(&format!("{LONG} {option} {name}"), 2);
         let what = match option {
-            "--json" => "a file of results",
+            "--json" => "a results file",
             "--csv" => "a table",
             _ => "a plot",
         };
@@ -100,16 +100,16 @@ fn bench_never_replaces_a_foreign_file() {
     }
     let all = "--json a.json --csv a.csv --plot a.svg";
     bench(&format!("{SHORT} {all} --force"), 0);
-    // The same with an extra column, or with other line endings.
+    // A table with an extra column or different line endings.
     let table = String::from_utf8(dir.bytes("a.csv")).expect("UTF-8");
     let (head, lines) = table.split_once("\r\n").expect("a first line");
     refused("--csv", "b.csv", &format!("{head},note\r\n{lines}"));
     refused("--csv", "b.csv", &format!("{head}\n{lines}"));
-    // The same with other words before glimt's.
+    // A plot with a different description before glimt's.
     let plot = String::from_utf8(dir.bytes("a.svg")).expect("UTF-8");
     refused("--plot", "b.svg", &plot.replacen("<desc>", "<desc>somebody, with </desc>\n<desc>", 1));
     bench(&format!("{SHORT} {all}"), 0);
-    // A plot from a version that did not sign it.
+    // A plot from a version that did not write a description.
     let plot = String::from_utf8(dir.bytes("a.svg")).expect("UTF-8");
     let (start, rest) = plot.split_once("<desc>").expect("a signature");
     let (_, end) = rest.split_once("</desc>").expect("its end");
@@ -118,13 +118,13 @@ fn bench_never_replaces_a_foreign_file() {
     bench(&format!("{SHORT} {all}"), 0);
 }
 
-/// Only root can run this test: the program runs as another user.
+/// Requires root, because the program runs as another user.
 #[test]
 fn lost_ownership_is_reported() {
     use std::os::unix::process::CommandExt;
     let dir = TestDir::new();
     if fs::metadata(dir.0.path()).expect("a folder").uid() != 0 {
-        return eprintln!("skipped: only root can become another user");
+        return eprintln!("skipped: requires root to run as another user");
     }
     let program = dir.program();
     fs::set_permissions(dir.0.path(), fs::Permissions::from_mode(0o777)).expect("permitted");
@@ -142,15 +142,18 @@ fn lost_ownership_is_reported() {
     let stderr = run("ball.toml --once -o a.png");
     assert_mentions(&stderr, &["warning: a.png", "owner", "group"]);
     assert_eq!(fs::metadata(dir.path("a.png")).expect("a file").uid(), 65534);
-    assert!(!mentions(&run("ball.toml --once -o a.png"), "warning"), "the user owns it now");
+    assert!(
+        !mentions(&run("ball.toml --once -o a.png"), "warning"),
+        "a file owned by the user must not cause a warning"
+    );
     let events = run("ball.toml --once -o b.png --progress json");
     let done = events.lines().last().expect("the end");
     let done: serde_json::Value = serde_json::from_str(done).expect("JSON");
     assert_mentions(done["diagnostics"][0]["message"].as_str().expect("text"), &["b.png", "owner", "group"]);
 }
 
-/// An access control list as the kernel stores it (posix_acl_xattr.h): rights of the owner, user 4321, the group, the
-/// mask, others.
+/// An access control list in the kernel's format (posix_acl_xattr.h), with permissions of the owner, user
+/// 4321, the group, the mask and others.
 fn access_list(named: u8, group: u8, mask: u8) -> Vec<u8> {
     const NOBODY: u32 = u32::MAX;
     let entries =
@@ -169,12 +172,12 @@ fn attribute(path: &Path, name: &str) -> Option<Vec<u8>> {
 }
 
 #[test]
-fn image_keeps_the_acl_and_attributes() {
+fn image_keeps_acl_and_attributes() {
     let dir = TestDir::new();
     dir.expect("ball.toml --once -o a.png --report a.json", 0);
     for name in ["a.png", "a.json"] {
         let path = dir.path(name);
-        // A file system without attributes has nothing to lose.
+        // Skip file systems without extended attributes.
         if xattr::set(&path, "user.note", b"mine").is_err() {
             return;
         }
@@ -186,13 +189,13 @@ fn image_keeps_the_acl_and_attributes() {
         let path = dir.path(name);
         assert_eq!(attribute(&path, "user.note").as_deref(), Some(b"mine".as_slice()), "{name}");
         assert_eq!(attribute(&path, ACCESS), Some(access_list(6, 0, 6)), "{name}");
-        // With an access control list, these bits are the mask; without it, they would be rights of the group.
+        // With an access control list, these bits are the mask. Without one, they would be group permissions.
         assert_eq!(fs::metadata(&path).expect("a file").mode() & 0o777, 0o660, "{name}");
     }
 }
 
 #[test]
-fn default_acl_never_widens_the_rights() {
+fn default_acl_never_widens_permissions() {
     let dir = TestDir::new();
     dir.expect("ball.toml --once -o a.png", 0);
     fs::set_permissions(dir.path("a.png"), fs::Permissions::from_mode(0o640)).expect("permitted");
@@ -207,7 +210,7 @@ fn default_acl_never_widens_the_rights() {
 }
 
 #[test]
-fn scenes_of_one_name_keep_separate_images() {
+fn scenes_with_equal_names_keep_their_images() {
     let dir = TestDir::new();
     for folder in ["a", "b"] {
         std::fs::create_dir(dir.path(folder)).expect("made");
@@ -218,7 +221,7 @@ fn scenes_of_one_name_keep_separate_images() {
     let said = dir.expect("b/scene.toml --once --samples 1", 2);
     assert_mentions(&said, &["scene.png", "a/scene.toml", "-o", "--force"]);
     assert_eq!(dir.bytes("scene.png"), first);
-    // The same scene through another path, and from another folder through the absolute path.
+    // The same scene through another relative path and through its absolute path.
     dir.expect("./b/../a/scene.toml --once --samples 2", 0);
     let absolute = dir.path("a/scene.toml");
     dir.expect(&format!("{} --once --samples 1", absolute.display()), 0);
@@ -226,11 +229,11 @@ fn scenes_of_one_name_keep_separate_images() {
     for way_out in ["-o b.png", "--force", "-o scene.png"] {
         dir.expect(&format!("b/scene.toml --once --samples 1 {way_out}"), 0);
     }
-    // The names of a turntable are checked as well.
+    // Turntable files are also checked.
     dir.expect("a/scene.toml --once --samples 1 --turntable 2", 0);
     let said = dir.expect("b/scene.toml --once --samples 1 --turntable 2", 2);
     assert_mentions(&said, &["a/scene.toml"]);
-    // Scene and image are moved together.
+    // The scene and its image are moved together.
     std::fs::create_dir(dir.path("moved")).expect("made");
     dir.expect("a/scene.toml --once --samples 1 --force", 0);
     for name in ["a", "scene.png"] {

@@ -1,8 +1,8 @@
-//! Small glTF files, as modeling programs write them.
+//! Small glTF files like those written by modeling programs.
 
 use serde_json::{Value, json};
 
-/// A GLB file under construction: buffer views and accessors over one buffer.
+/// A GLB file under construction, with buffer views and accessors for a single buffer.
 #[derive(Default)]
 pub(crate) struct Glb {
     bytes: Vec<u8>,
@@ -11,7 +11,7 @@ pub(crate) struct Glb {
 }
 
 impl Glb {
-    /// Adds bytes; returns the index of their buffer view.
+    /// Adds bytes. Returns the index of the buffer view.
     pub(crate) fn view(&mut self, bytes: &[u8]) -> usize {
         self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
         self.views.push(json!({"buffer": 0, "byteOffset": self.bytes.len(), "byteLength": bytes.len()}));
@@ -19,7 +19,7 @@ impl Glb {
         self.views.len() - 1
     }
 
-    /// Adds vectors; returns the index of their accessor.
+    /// Adds vectors. Returns the index of the accessor.
     pub(crate) fn vectors<const N: usize>(&mut self, vectors: &[[f32; N]]) -> usize {
         let bytes: Vec<u8> = vectors.as_flattened().iter().flat_map(|number| number.to_le_bytes()).collect();
         let view = self.view(&bytes);
@@ -29,7 +29,7 @@ impl Glb {
         self.accessors.len() - 1
     }
 
-    /// Adds indices; returns the index of their accessor.
+    /// Adds indices. Returns the index of the accessor.
     pub(crate) fn indices(&mut self, indices: &[u16]) -> usize {
         let bytes: Vec<u8> = indices.iter().flat_map(|number| number.to_le_bytes()).collect();
         let view = self.view(&bytes);
@@ -39,7 +39,7 @@ impl Glb {
         self.accessors.len() - 1
     }
 
-    /// The file as JSON, with a zeroed buffer of the same length in a data URI.
+    /// The glTF file as JSON, with a zeroed buffer of the same length in a data URI.
     pub(crate) fn finish_text(self, mut json: Value) -> String {
         let Self { bytes, views, accessors } = self;
         json["asset"] = json!({"version": "2.0"});
@@ -50,7 +50,7 @@ impl Glb {
         json.to_string()
     }
 
-    /// The GLB file with this JSON and the buffer.
+    /// The GLB file with the given JSON and the buffer.
     pub(crate) fn finish(self, mut json: Value) -> Vec<u8> {
         let Self { mut bytes, views, accessors } = self;
         json["asset"] = json!({"version": "2.0"});
@@ -71,7 +71,7 @@ impl Glb {
     }
 }
 
-/// A cube of side 2 with normals and texture coordinates, as a primitive.
+/// A cube primitive with side 2, normals and texture coordinates.
 pub(crate) fn cube(glb: &mut Glb) -> Value {
     let (mut positions, mut normals, mut uvs, mut indices) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for axis in 0..3 {
@@ -93,7 +93,7 @@ pub(crate) fn cube(glb: &mut Glb) -> Value {
     json!({"attributes": {"POSITION": position, "NORMAL": normal, "TEXCOORD_0": uv}, "indices": glb.indices(&indices)})
 }
 
-/// Two instances of one cube mesh, one of them rotated, with a texture.
+/// Two instances of a textured cube mesh, one of them rotated.
 pub(crate) fn cubes(image: &[u8]) -> Vec<u8> {
     let mut glb = Glb::default();
     let mut painted = cube(&mut glb);
@@ -113,7 +113,7 @@ pub(crate) fn cubes(image: &[u8]) -> Vec<u8> {
     }))
 }
 
-/// A sparse accessor of four vertices, as JSON.
+/// A sparse accessor with four vertices, as JSON.
 pub(crate) fn sparse() -> String {
     let mut glb = Glb::default();
     let position = glb.vectors(&[[0.0; 3], [0.0; 3], [0.0; 3], [0.0; 3]]);

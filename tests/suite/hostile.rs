@@ -1,5 +1,5 @@
-//! Malformed files: a clear error, exit code 2, nothing on stdout, the previous image unchanged, quickly and with
-//! little memory.
+//! Malformed files must be rejected quickly and with little memory: a clear error, exit code 2, no output on
+//! stdout, and the previous image unchanged.
 
 use std::fs::{self, File};
 use std::os::unix::ffi::OsStrExt;
@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use super::test_dir::{SCENE, TestDir, assert_mentions};
 
-/// Time limit for a rejection: it takes milliseconds, while reading on would take minutes.
+/// Time limit for a rejection. It takes milliseconds, but reading the whole file would take minutes.
 const AT_ONCE: Duration = Duration::from_secs(10);
 
 const MESH: &str = "\n[[mesh]]\nfile = \"FILE\"\nmaterial = \"ball\"\n";
@@ -33,7 +33,7 @@ fn scene(file: &str) -> (String, &'static str) {
     (text.replace("FILE", file), place)
 }
 
-/// Renders a scene, and checks that it is rejected with all of these words.
+/// Renders a scene, and checks that the error contains all of the given words.
 #[track_caller]
 fn refused(dir: &TestDir, scene: &str, words: &[&str]) -> String {
     dir.write("ball.png", "the old one");
@@ -41,14 +41,14 @@ fn refused(dir: &TestDir, scene: &str, words: &[&str]) -> String {
     let stderr = dir.expect(&format!("{scene} --once -o ball.png"), 2);
     assert!(start.elapsed() < AT_ONCE, "{scene}: {:?}", start.elapsed());
     for word in words {
-        assert!(stderr.contains(word), "{scene}: {word:?} is missing in\n{stderr}");
+        assert!(stderr.contains(word), "{scene}: {word:?} not found in\n{stderr}");
     }
     assert_eq!(dir.bytes("ball.png"), b"the old one", "{scene}");
     stderr
 }
 
-/// Creates something that is not a regular file; returns words of the expected error. `None` if it cannot be created
-/// here.
+/// Creates something that is not a regular file. Returns words of the expected error, or `None` if it cannot
+/// be created on this system.
 fn make(path: &Path, what: &str) -> Option<&'static [&'static str]> {
     Some(match what {
         "missing" => &["not found"],
@@ -65,7 +65,7 @@ fn make(path: &Path, what: &str) -> Option<&'static [&'static str]> {
             &["is a pipe, a socket or a device, not a"]
         }
         "kernel" => {
-            // On a machine without such a file, this link is dangling.
+            // Without this file, the link would be dangling.
             if !Path::new("/proc/kmsg").exists() {
                 return None;
             }
@@ -81,7 +81,7 @@ fn make(path: &Path, what: &str) -> Option<&'static [&'static str]> {
             &["is a symbolic link to a file that does not exist"]
         }
         "terabytes" => {
-            // Some file systems have no such files.
+            // Some file systems do not support such large files.
             File::create(path).and_then(|file| file.set_len(5 << 40)).ok()?;
             &[]
         }
@@ -129,7 +129,7 @@ fn asset_must_be_a_regular_file() {
 }
 
 #[test]
-fn assets_with_wrong_content_are_rejected() {
+fn assets_with_wrong_contents_are_rejected() {
     let noise: Vec<u8> = (0..5000_u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 13) as u8).collect();
     let zeros = vec![0; 5000];
     for (ending, empty, wrong) in [
@@ -154,7 +154,7 @@ fn assets_with_wrong_content_are_rejected() {
             dir.write(&file, bytes);
             refused(&dir, "scene.toml", &[wrong, &place]);
         }
-        // The start of a gigabyte of zeros is enough to reject it.
+        // Only the start of a gigabyte of zeros is read before rejection.
         let huge = File::create(dir.path(&file)).and_then(|file| file.set_len(1 << 30));
         huge.expect("a sparse file");
         refused(&dir, "scene.toml", &[&file, &place]);
@@ -177,7 +177,7 @@ fn huge_and_binary_scenes_are_rejected() {
     refused(&dir, "zeros.toml", &["zeros.toml", "binary file"]);
 }
 
-/// Checks that a mesh is rejected with these words, at its position in the scene.
+/// Checks that a mesh is rejected with the given words and its position in the scene.
 #[track_caller]
 fn mesh_refused(name: &str, content: &[u8], words: &[&str]) {
     let dir = TestDir::new();
@@ -217,7 +217,7 @@ fn unusable_meshes_are_rejected() {
 }
 
 #[test]
-fn unusable_faces_are_counted_and_left_out() {
+fn unusable_faces_are_counted_and_skipped() {
     let dir = TestDir::new();
     let vertices = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv nan 0 0\nv 1e999 1 1\n";
     dir.write("a.obj", format!("{vertices}f 1 2 3\nf 1 2 4\nf 1 2 5\nf 1 1 2\n"));
@@ -230,17 +230,17 @@ fn unusable_faces_are_counted_and_left_out() {
 }
 
 #[test]
-fn material_file_mistakes_warn() {
+fn material_file_errors_cause_warnings() {
     for what in KINDS {
         let dir = TestDir::new();
         let Some(_) = make(&dir.path("bad.mtl"), what) else { continue };
         dir.write("a.obj", format!("mtllib bad.mtl\n{TRIANGLE}"));
         let (text, _) = scene("a.obj");
-        // The scene has a material for the mesh: no warning.
+        // No warning if the scene sets the mesh's material.
         dir.write("scene.toml", &text);
         let stderr = dir.expect("scene.toml --once -o a.png", 0);
         assert!(!stderr.contains("warning"), "{what}: {stderr}");
-        // It has none.
+        // An error if it does not.
         dir.write("scene.toml", text.trim_end().trim_end_matches("material = \"ball\""));
         refused(
             &dir,
@@ -262,7 +262,7 @@ fn material_file_mistakes_warn() {
 }
 
 #[test]
-fn images_with_false_sizes_are_rejected() {
+fn images_with_wrong_sizes_are_rejected() {
     let png = {
         let mut bytes = Vec::new();
         let mut encoder = png::Encoder::new(&mut bytes, 60_000, 60_000);
@@ -285,7 +285,7 @@ fn images_with_false_sizes_are_rejected() {
 }
 
 #[test]
-fn image_metadata_takes_no_memory() {
+fn image_metadata_is_not_kept_in_memory() {
     const BOMB: usize = 256 << 20;
     type Add = fn(&mut png::Encoder<'_, &mut Vec<u8>>, String) -> Result<(), png::EncodingError>;
     let zeros = || "0".repeat(BOMB);
@@ -313,7 +313,7 @@ fn image_metadata_takes_no_memory() {
         let dir = TestDir::new();
         dir.write("a.png", file);
         dir.write("scene.toml", scene("a.png").0);
-        // Use a shell: the memory of the shell counts for the program that replaces it.
+        // Use a shell, so that peak memory does not include the test process.
         let program = dir.glimt("").get_program().to_owned();
         let mut shell = Process::new("sh");
         let line = "\"$0\" scene.toml --once -o out.png --report report.json; exit $?";
@@ -374,7 +374,7 @@ fn newline_in_a_name_is_escaped() {
     }
 }
 
-/// Characters that a terminal would interpret, or not show.
+/// Characters that a terminal would interpret or hide.
 const EVIL: &str = "\u{1b}]52;c;ZXZpbA==\u{7}\u{1b}[2J\u{9b}31m\r\u{202e}gnp\u{8}";
 
 #[track_caller]
@@ -385,7 +385,7 @@ fn assert_harmless(output: &std::process::Output, code: i32) {
     assert!(!text.chars().any(harmful), "{text:?}");
     assert!(output.stdout.iter().all(|byte| *byte == b'\n' || !byte.is_ascii_control()));
     let is_named = text.contains("31m") || text.contains("0000001b");
-    assert!(is_named || !output.stdout.is_empty(), "the name is missing: {text}");
+    assert!(is_named || !output.stdout.is_empty(), "name not found in: {text}");
 }
 
 #[test]
@@ -397,7 +397,7 @@ fn names_are_escaped_for_the_terminal() {
         process.args(arguments).output().expect("it runs")
     };
     let name = format!("{EVIL}.toml");
-    // The scene's own path: missing, wrong, right.
+    // The scene's path, for a missing, an invalid and a valid scene.
     assert_harmless(&run(&[&name, "--once"]), 2);
     dir.write(&name, "[render]\nwidth = 0\n");
     assert_harmless(&run(&[&name, "--once"]), 2);

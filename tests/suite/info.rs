@@ -1,4 +1,4 @@
-//! `glimt info`: how an image was made.
+//! `glimt info`: the metadata of images.
 
 use nix::errno::Errno;
 use serde_json::Value;
@@ -7,7 +7,7 @@ use super::test_dir::{TestDir, assert_mentions, system_error};
 
 const SMALL: &str = "--once --width 16 --height 12 --samples 2";
 
-/// The stdout of `glimt info`.
+/// Stdout of `glimt info`.
 fn info(dir: &TestDir, line: &str, code: i32) -> String {
     let output = dir.run(&format!("info {line}"));
     let stderr = String::from_utf8(output.stderr).expect("UTF-8");
@@ -16,7 +16,7 @@ fn info(dir: &TestDir, line: &str, code: i32) -> String {
 }
 
 #[test]
-fn every_format_records_how_it_was_made() {
+fn every_format_records_image_metadata() {
     let dir = TestDir::new();
     let outputs = ["a.png", "a.exr", "a.hdr", "a.jpg", "a.ppm"];
     let options: String = outputs.iter().map(|name| format!(" -o {name}")).collect();
@@ -57,7 +57,7 @@ fn info_lists_layers_and_parts() {
 }
 
 #[test]
-fn info_on_foreign_images_and_other_files() {
+fn info_handles_unrelated_files() {
     let dir = TestDir::new();
     let text = info(&dir, "ball.toml", 2);
     assert!(text.is_empty());
@@ -65,7 +65,7 @@ fn info_on_foreign_images_and_other_files() {
     assert_mentions(&stderr, &["none.png", &system_error(Errno::ENOENT)]);
     dir.write("d.png", foreign());
     assert_mentions(&info(&dir, "d.png", 1), &["unknown"]);
-    // Names and values may contain characters that a terminal interprets.
+    // Names and values may contain control characters.
     dir.write("e.ppm", b"P6\n# glimt:scene: a\x1b[31mred\n1 1\n255\nabc");
     assert!(!info(&dir, "e.ppm", 1).contains('\u{1b}'));
 }

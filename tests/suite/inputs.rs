@@ -1,4 +1,4 @@
-//! A render never overwrites an input of its image, whatever path leads to it.
+//! A render never overwrites its own inputs, regardless of the path used.
 
 use std::fs;
 use std::os::unix::fs::symlink;
@@ -9,14 +9,14 @@ use serde_json::json;
 use super::gltf::Glb;
 use super::test_dir::{SCENE, TestDir, assert_mentions, mentions};
 
-/// An image that glimt did not write: one red texel.
+/// An image not written by glimt, with one red texel.
 const PHOTOGRAPH: &[u8] = b"P6\n1 1\n255\n\xff\x20\x20";
 
-/// Options of an endless render, so that a late rejection would be noticed.
+/// Options for an endless render, so that the test detects late rejections.
 const ENDLESS: &str = "--once --samples 4000000000 --time 2";
 
-/// A ball with a texture, a mesh with a material file and its images, an orbiter camera, and a texture that no material
-/// uses.
+/// A scene with a textured ball, a mesh with a material file and images, an orbiter camera, and an unused
+/// texture.
 fn studio() -> TestDir {
     let dir = TestDir::new();
     fs::create_dir(dir.path("deep")).expect("a folder");
@@ -41,7 +41,7 @@ fn studio() -> TestDir {
 
 const TEXTURES: &str = "[textures.skin]\nfile = \"skin.ppm\"\n[textures.unused]\nfile = \"unused.ppm\"\n";
 
-/// Every file below the directory with its content, except links.
+/// All regular files in the directory tree with their contents.
 fn everything(dir: &TestDir) -> Vec<(std::path::PathBuf, Vec<u8>)> {
     let mut folders = vec![dir.0.path().to_owned()];
     let mut found = Vec::new();
@@ -60,8 +60,8 @@ fn everything(dir: &TestDir) -> Vec<(std::path::PathBuf, Vec<u8>)> {
     found
 }
 
-/// Runs it and checks that the exit code is 2, the message has these words, nothing is rendered and every file is
-/// unchanged. Returns the message.
+/// Runs glimt and checks that the exit code is 2, the message contains the given words, nothing is rendered
+/// and no file changes. Returns the message.
 #[track_caller]
 fn refused(dir: &TestDir, line: &str, words: &[&str]) -> String {
     let before = everything(dir);
@@ -81,7 +81,7 @@ fn default_output_never_replaces_an_input() {
     let scene =
         SCENE.replace("[materials.ball]", texture).replace("[0.8, 0.2, 0.1]", "{ texture = \"marble\" }");
     dir.write("marble.toml", scene);
-    // Glimt made this image: the default output could replace it if it were not an input.
+    // This image was written by glimt, so the default output could replace it if it were not an input.
     dir.expect("ball.toml --once -o marble.png", 0);
     let stderr = refused(&dir, &format!("marble.toml {ENDLESS}"), &["marble.png", "texture `marble`", "-o"]);
     assert!(stderr.contains("marble.toml:11:8") && stderr.contains("`output = "), "{stderr}");
@@ -100,7 +100,7 @@ fn scene_named_like_its_image_is_kept() {
 }
 
 #[test]
-fn no_path_to_an_input_is_an_output() {
+fn no_path_to_an_input_is_accepted_as_output() {
     let dir = studio();
     let skin = dir.path("skin.ppm");
     symlink("skin.ppm", dir.path("link.ppm")).expect("a link");
@@ -122,7 +122,7 @@ fn no_path_to_an_input_is_an_output() {
         refused(&dir, &format!("scene.toml {ENDLESS} -o {output}"), &[output, "skin.ppm", "texture `skin`"]);
         refused(&dir, &format!("scene.toml {ENDLESS} -o good.png -o {output}"), &[output]);
     }
-    // A folder with another name; `..` after a link is relative to the link's target, where there is no skin.ppm.
+    // A folder under another name. After a link, `..` refers to the parent of the link's target.
     refused(
         &dir,
         &format!("scene.toml {ENDLESS} -o elsewhere/wood.ppm"),
@@ -143,38 +143,38 @@ fn every_kind_of_input_is_kept() {
         ("unused.ppm", "texture `unused`"),
         ("deep/wood.ppm", "one.obj"),
         ("deep/bumps.ppm", "one.obj"),
-        // The material file names these, although nothing uses them.
+        // The material file refers to this image, but nothing uses it.
         ("deep/alpha.ppm", "one.obj"),
     ] {
         let stderr = refused(&dir, &format!("scene.toml {ENDLESS} -o {output}"), &[output, role]);
-        assert!(stderr.contains("--> scene.toml:"), "{output}: position in the scene: {stderr}");
+        assert!(stderr.contains("--> scene.toml:"), "{output}: expected a position in the scene: {stderr}");
     }
     for (report, role) in [
         ("scene.toml", "the scene file"),
         ("camera.txt", "orbiter"),
         ("deep/one.obj", "mesh"),
-        // Rejected as a report before the mesh is read.
+        // Existing files that are not reports are rejected before the mesh is read.
         ("deep/materials.json", "report"),
         ("deep/one.mtl", "report"),
         ("deep/wood.ppm", "report"),
-        // This file does not exist yet, and is read once it does.
+        // This file does not exist yet, but the mesh refers to it.
         ("deep/gone.mtl", "one.obj"),
     ] {
         refused(&dir, &format!("scene.toml {ENDLESS} --report {report}"), &[report, role, "--report"]);
         refused(&dir, &format!("scene.toml {ENDLESS} --report deep/../{report}"), &[report, role]);
     }
-    // Materials of the file that the scene overrides: their images are inputs all the same.
+    // Images of the mesh's own materials are inputs even if the scene overrides the materials.
     let text = fs::read_to_string(dir.path("scene.toml")).expect("the scene");
     dir.write("scene.toml", text.replace("one.obj\"", "one.obj\"\nmaterial = \"ball\""));
     refused(&dir, &format!("scene.toml {ENDLESS} -o deep/wood.ppm"), &["deep/wood.ppm", "one.obj"]);
 }
 
 #[test]
-fn images_named_by_a_gltf_file_are_kept() {
+fn gltf_images_are_never_replaced() {
     let dir = TestDir::new();
     let mut glb = Glb::default();
     let positions = glb.vectors(&[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);
-    // An occlusion map, the image of a material without faces, and one without a texture: none is used.
+    // Unused images: an occlusion map, an image of a material without faces, and an image without a texture.
     let json = json!({
         "scene": 0,
         "scenes": [{"nodes": [0]}],
@@ -213,7 +213,7 @@ fn images_named_by_a_gltf_file_are_kept() {
 }
 
 #[test]
-fn output_key_never_names_an_input() {
+fn output_key_must_not_name_an_input() {
     let dir = studio();
     let text = fs::read_to_string(dir.path("scene.toml")).expect("the scene");
     dir.write("scene.toml", text.replace("[render]", "[render]\noutput = \"deep/../skin.ppm\""));
@@ -259,7 +259,7 @@ fn default_output_replaces_only_glimt_images() {
     dir.expect("ball.toml --once", 0);
     let own = dir.bytes("ball.png");
     dir.expect("ball.toml --once --seed 3", 0);
-    assert_ne!(dir.bytes("ball.png"), own, "its own image is replaced");
+    assert_ne!(dir.bytes("ball.png"), own, "glimt must replace its own image");
     let ways = ["ball.png", "-o", "`output = "];
     let truncated = &own[..20];
     let mut other = own.clone();
@@ -269,20 +269,20 @@ fn default_output_replaces_only_glimt_images() {
         dir.write("ball.png", foreign);
         refused(&dir, &format!("ball.toml {ENDLESS}"), &ways);
     }
-    // As any encoder writes it, without glimt's text chunk.
+    // An image from another encoder, without glimt's text chunk.
     image::RgbImage::new(3, 2).save(dir.path("ball.png")).expect("a photograph");
     refused(&dir, &format!("ball.toml {ENDLESS}"), &ways);
     dir.write("photo.png", dir.bytes("ball.png"));
     fs::remove_file(dir.path("ball.png")).expect("removed");
     symlink("photo.png", dir.path("ball.png")).expect("a link");
     refused(&dir, &format!("ball.toml {ENDLESS}"), &ways);
-    // An explicit output is replaced.
+    // An explicitly named output is replaced.
     dir.expect("ball.toml --once -o ball.png", 0);
     assert_eq!(dir.bytes("photo.png").len(), own.len());
     dir.expect("ball.toml --once", 0);
     fs::remove_file(dir.path("photo.png")).expect("removed");
     dir.expect("ball.toml --once", 0);
-    assert_eq!(dir.bytes("photo.png"), own, "a dangling link");
+    assert_eq!(dir.bytes("photo.png"), own, "a dangling link must be followed");
     let scene = SCENE.replace("[render]", "[render]\noutput = \"own.png\"");
     dir.write("ball.toml", scene);
     dir.write("own.png", PHOTOGRAPH);
@@ -303,7 +303,7 @@ fn report_replaces_only_reports() {
         dir.write(name, content);
         refused(&dir, &format!("ball.toml {ENDLESS} --report {name}"), &[name, ".json"]);
     }
-    // A stream is appended to.
+    // A report on stdout is appended if the stream was opened for appending.
     dir.write("log", "before\n");
     let log = fs::OpenOptions::new().append(true).open(dir.path("log")).expect("a file");
     let status = dir.glimt("ball.toml --once --report /dev/stdout").stdout(log).status().expect("it runs");
@@ -328,7 +328,7 @@ fn input_named_like_a_temporary_file_is_kept() {
     dir.write(stale, "left behind");
     dir.expect(&format!("{scene} --once -o a.png --report r.json"), 0);
     assert!(dir.path(scene).exists() && dir.path(camera).exists());
-    assert!(!dir.path(stale).exists(), "others are removed");
+    assert!(!dir.path(stale).exists(), "stale temporary files must be removed");
 }
 
 #[test]
@@ -350,7 +350,7 @@ fn new_never_overwrites() {
 #[test]
 fn environment_map_is_never_an_output() {
     let dir = TestDir::new();
-    // One map is used, the other only named: a black factor needs no map.
+    // The map is an input even if a black factor makes it unused.
     for (name, color) in [("lit.toml", ""), ("dark.toml", "color = 0\n")] {
         dir.write(name, format!("{SCENE}\n[environment]\nfile = \"sky.ppm\"\n{color}"));
         dir.write("sky.ppm", PHOTOGRAPH);
@@ -390,7 +390,7 @@ fn overridden_files_are_kept() {
     ] {
         refused(&dir, &format!("scene.toml {ENDLESS} --set {set} --report {report}"), &[report, "--report"]);
     }
-    // By default, over a texture that glimt has made.
+    // The default output, with a texture written by glimt.
     dir.expect("scene.toml --once --samples 1 -o made.png", 0);
     let text = fs::read_to_string(dir.path("scene.toml")).expect("the scene");
     dir.write("made.toml", text.replace("unused.ppm", "made.png"));

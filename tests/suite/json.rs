@@ -1,10 +1,12 @@
-//! JSON and XML written by glimt: valid, and without characters that a terminal would interpret or not show.
+//! JSON and XML written by glimt are valid, and contain no characters that a terminal would interpret or
+//! hide.
 
 use serde_json::Value;
 
 use super::test_dir::{SCENE, TestDir, assert_mentions};
 
-/// C1, DEL, a bidirectional override, a joiner, a tag outside the basic plane, an umlaut.
+/// A C1 control, DEL, a bidirectional override, a joiner, a tag outside the basic multilingual plane, and an
+/// umlaut.
 const NAME: &str = "a\u{9b}31m\u{7f}\u{202e}b\u{200d}c\u{e0041}ä\u{1}.toml";
 
 #[track_caller]
@@ -28,13 +30,13 @@ fn run(dir: &TestDir, arguments: &[&str]) -> std::process::Output {
 }
 
 #[test]
-fn all_json_is_valid_and_harmless() {
+fn all_json_is_valid_and_escaped() {
     let dir = TestDir::new();
     dir.write(NAME, SCENE);
     let output = run(&dir, &[NAME, "--once", "--report", "-", "--progress", "json"]);
     let report = object(harmless(&output.stdout));
     assert_eq!(report["scene"], NAME);
-    assert!(harmless(&output.stdout).contains('ä'), "harmless characters are unchanged");
+    assert!(harmless(&output.stdout).contains('ä'), "harmless characters must be unchanged");
     let events: Vec<Value> = harmless(&output.stderr).lines().map(object).collect();
     let written = events.iter().find(|event| event["event"] == "written").expect("a picture");
     let picture = NAME.replace(".toml", ".png");
@@ -51,7 +53,7 @@ fn all_json_is_valid_and_harmless() {
 }
 
 #[test]
-fn bench_escapes_odd_names_in_json_and_xml() {
+fn bench_escapes_names_in_json_and_xml() {
     let dir = TestDir::new();
     dir.write(NAME, SCENE);
     let line = "--samples 1 --reference-samples 8 --seeds 1 --integrator path --width 8 --no-cache \
@@ -64,11 +66,11 @@ fn bench_escapes_odd_names_in_json_and_xml() {
     let document = roxmltree::Document::parse(harmless(&plot)).expect("XML");
     let is_named =
         |node: roxmltree::Node<'_, '_>| node.text().is_some_and(|text| text.contains("ä␁.toml, 8×"));
-    assert!(document.descendants().any(is_named), "the name appears, with replacements");
+    assert!(document.descendants().any(is_named), "the escaped name must appear");
 }
 
 #[test]
-fn check_json_has_the_same_diagnostics() {
+fn check_json_contains_all_diagnostics() {
     let dir = TestDir::new();
     let scene = SCENE.replace("width", "widht").replace("radius", "raduis");
     dir.write("ball.toml", format!("# ä\n{scene}"));

@@ -1,4 +1,5 @@
-//! The ray kernel: no leaks between triangles, no speckles on flat faces, the same bits with all instruction sets.
+//! Ray kernel: no leaks between triangles, no speckles on flat faces, and bit-identical results with all
+//! instruction sets.
 
 use std::collections::HashMap;
 
@@ -11,7 +12,7 @@ use glimt::math::Vec3;
 
 use crate::test_dir::TestDir;
 
-/// UnitRandom numbers in [0, 1).
+/// Generator of random numbers in [0, 1).
 struct UnitRandom(u64);
 
 impl UnitRandom {
@@ -29,7 +30,7 @@ impl UnitRandom {
     }
 }
 
-/// A closed ball of radius 2 with `rings` rings of as many squares; bumps make every quad non-planar.
+/// A closed ball with radius 2 and `rings` rings of `rings` quads. Bumps make the quads non-planar.
 fn ball(rings: u32, bumps: f32) -> TriangleMesh {
     let point = |ring: u32, column: u32| {
         let height = std::f32::consts::PI * ring as f32 / rings as f32;
@@ -58,7 +59,8 @@ fn ball(rings: u32, bumps: f32) -> TriangleMesh {
     mesh
 }
 
-/// The ball with every other ring almost on the previous one: half of the triangles are needles.
+/// The ball with every other ring moved very close to the previous ring, so that half of the triangles are
+/// needles.
 fn needles(rings: u32) -> TriangleMesh {
     let mut mesh = ball(rings, 0.0);
     for ring in (2..rings).step_by(2) {
@@ -70,7 +72,7 @@ fn needles(rings: u32) -> TriangleMesh {
     mesh
 }
 
-/// The mesh, first scaled and then moved.
+/// Scales and then moves the mesh.
 fn placed(mesh: &TriangleMesh, scale: f32, offset: Vec3) -> TriangleMesh {
     let positions = mesh.positions.iter().map(|&p| p * scale + offset).collect();
     TriangleMesh { positions, ..mesh.clone() }
@@ -81,7 +83,7 @@ fn tree(mesh: &TriangleMesh) -> WideBvh {
     tree.expect("nobody cancels")
 }
 
-/// Number of rays from inside a closed mesh that escape; each is aimed at a vertex or an edge.
+/// Number of rays that escape from a closed mesh. Each is aimed at a vertex or an edge from inside.
 fn leaks(mesh: &TriangleMesh, scale: f32, offset: Vec3, rays: usize, instructions: InstructionSet) -> usize {
     let tree = tree(mesh).with(instructions);
     let mut random = UnitRandom(rays as u64);
@@ -109,7 +111,7 @@ fn leaks(mesh: &TriangleMesh, scale: f32, offset: Vec3, rays: usize, instruction
     leaks
 }
 
-/// [`leaks`] for the other tree.
+/// [`leaks`] for the k-d tree.
 fn leaks_of_planes(mesh: &TriangleMesh, scale: f32, offset: Vec3, rays: usize) -> usize {
     let count = mesh.triangles.len() as u32;
     let tree = KdTree::build(count, |id| mesh.corners(id), &CancelToken::new()).expect("nobody cancels");
@@ -125,7 +127,7 @@ fn leaks_of_planes(mesh: &TriangleMesh, scale: f32, offset: Vec3, rays: usize) -
     leaks
 }
 
-/// Counts the leaks of `rays` rays at each position, with each tree and each instruction set.
+/// Checks that no ray leaks, with `rays` rays for each mesh, position, tree and instruction set.
 fn assert_watertight(rays: usize) {
     let far = Vec3::new(148_376.0, 1234.0, -223_423.0);
     let places =
@@ -137,7 +139,7 @@ fn assert_watertight(rays: usize) {
                 let leaks = leaks(&mesh, scale, offset, rays, instructions);
                 assert_eq!(leaks, 0, "{} triangles × {scale} + {offset}", mesh.triangles.len());
             }
-            assert_eq!(leaks_of_planes(&mesh, scale, offset, rays), 0, "kd-tree × {scale} + {offset}");
+            assert_eq!(leaks_of_planes(&mesh, scale, offset, rays), 0, "k-d tree × {scale} + {offset}");
         }
     }
 }
@@ -154,7 +156,7 @@ fn leaks_of_many_rays() {
     assert_watertight(100_000_000 / 48);
 }
 
-/// Boxes in a grid, 12 triangles each, all edges along the axes.
+/// A grid of axis-aligned boxes with 12 triangles each.
 fn boxes(side: u32) -> TriangleMesh {
     let mut mesh = TriangleMesh::default();
     for cell in 0..side * side * side {
@@ -172,7 +174,7 @@ fn boxes(side: u32) -> TriangleMesh {
     mesh
 }
 
-/// Distance at which a ray first enters a box of the grid, with slabs in double precision.
+/// Distance at which a ray first enters a box of the grid, using the slab method in double precision.
 fn first_box(ray: &Ray, side: u32) -> f64 {
     let (origin, direction) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
     let enter = |cell: u32| {
@@ -194,7 +196,7 @@ fn first_box(ray: &Ray, side: u32) -> f64 {
 }
 
 #[test]
-fn boxes_show_no_speckle_from_any_side() {
+fn boxes_do_not_speckle_from_any_direction() {
     for side in [1, 3] {
         let mesh = boxes(side);
         let middle = Vec3::splat((side - 1) as f32 * 0.75 + 0.5);
@@ -202,7 +204,7 @@ fn boxes_show_no_speckle_from_any_side() {
         for instructions in InstructionSet::ALL {
             let tree = tree(&mesh).with(instructions);
             for view in 0..1000 {
-                // The first views are along the axes and their diagonals, where every ray lies in face planes.
+                // The first views are along the axes and diagonals, where rays lie in face planes.
                 let away = match view {
                     0..26 => {
                         let code = if view < 13 { view } else { view + 1 };
@@ -213,7 +215,7 @@ fn boxes_show_no_speckle_from_any_side() {
                 let eye = middle + away.normalize() * 20.0;
                 for _ in 0..8 {
                     let target = match view % 3 {
-                        // Vertices and edges of boxes: grazing rays.
+                        // Grazing rays at box vertices and edges.
                         0 => mesh.positions[random.below(mesh.positions.len())],
                         1 => {
                             let [a, b, c] = mesh.corners(random.below(mesh.triangles.len()) as u32);
@@ -229,8 +231,8 @@ fn boxes_show_no_speckle_from_any_side() {
     }
 }
 
-/// Checks that a ray which enters a box by more than rounding hits it there, and that a ray which misses all boxes hits
-/// none.
+/// Checks that a ray hits the box that it enters, and that a ray which misses all boxes has no hit. Allows
+/// for rounding errors.
 fn assert_no_speck(tree: &WideBvh, ray: &Ray, side: u32) {
     let shifted = |by: f32| {
         let across = ray.direction.any_orthogonal_vector().normalize() * by;
@@ -243,14 +245,17 @@ fn assert_no_speck(tree: &WideBvh, ray: &Ray, side: u32) {
     match tree.closest(ray) {
         Some(hit) => {
             let t = f64::from(hit.t);
-            assert!(t >= least - 1e-5 && t <= greatest + 1e-5, "{ray:?} at {t}, not in {least}…{greatest}");
+            assert!(
+                t >= least - 1e-5 && t <= greatest + 1e-5,
+                "{ray:?} hit at {t}, expected {least}…{greatest}"
+            );
         }
         None => assert!(greatest.is_infinite(), "{ray:?} misses the box at {greatest}"),
     }
 }
 
-/// Distance at which a ray crosses a triangle's plane, in double precision, and the smallest barycentric weight there.
-/// `None` if it is parallel.
+/// Distance at which a ray crosses a triangle's plane, and the smallest barycentric coordinate at that point,
+/// in double precision. `None` if they are parallel.
 fn crossing(ray: &Ray, corners: &[Vec3; 3]) -> Option<(f64, f64)> {
     let [a, b, c] = corners.map(|corner| corner.as_dvec3() - ray.origin.as_dvec3());
     let (direction, normal) = (ray.direction.as_dvec3(), (b - a).cross(c - a));
@@ -260,10 +265,10 @@ fn crossing(ray: &Ray, corners: &[Vec3; 3]) -> Option<(f64, f64)> {
     (sum != 0.0).then(|| (normal.dot(a) / normal.dot(direction), least))
 }
 
-/// Slivers of all widths, and rays that start just in front of or behind one, well inside its edges: hits that single
-/// precision cannot separate from the origin are decided in double precision.
+/// Rays that start just in front of or behind slivers of various widths, away from their edges. Single
+/// precision cannot separate such hits from the origin, so the kernel resolves them in double precision.
 #[test]
-fn hits_next_to_the_ray_origin_are_found() {
+fn hits_close_to_the_ray_origin_are_found() {
     let mut random = UnitRandom(91);
     let slivers: Vec<[Vec3; 3]> = (0..2000)
         .map(|_| {
@@ -272,12 +277,12 @@ fn hits_next_to_the_ray_origin_are_found() {
             [at, at + along, at + along * random.next() + random.vector() * width]
         })
         .collect();
-    // Points farther away than this have no crossing with `least` ≥ −0.02 on a ray of length 0.03.
+    // A ray of length 0.03 from a point farther away than this has no crossing with `least` ≥ −0.02.
     let around = |corners: &[Vec3; 3]| {
         let middle = corners.iter().sum::<Vec3>() / 3.0;
         (middle, corners.iter().map(|corner| (*corner - middle).length()).fold(0.0, f32::max) * 1.2 + 0.03)
     };
-    // Each grid cell lists the slivers that may be this close to a point in it.
+    // Each grid cell lists the slivers that may be this close to a point in the cell.
     let cell = |at: Vec3| at.to_array().map(|x| x.floor() as i32);
     let mut grid: HashMap<[i32; 3], Vec<usize>> = HashMap::new();
     for (id, corners) in slivers.iter().enumerate() {
@@ -326,12 +331,12 @@ fn hits_next_to_the_ray_origin_are_found() {
         missed += u32::from(is_hit && answers.contains(&false));
         wrong += u32::from(is_free && answers.contains(&true));
     }
-    assert!(before > 10_000 && behind > 3_000, "{before} before, {behind} behind");
-    assert_eq!((missed, wrong), (0, 0), "missed, wrong, of {before} and {behind}");
+    assert!(before > 10_000 && behind > 3_000, "{before} rays in front, {behind} behind");
+    assert_eq!((missed, wrong), (0, 0), "missed and wrong hits of {before} and {behind} rays");
 }
 
 #[test]
-fn all_instruction_sets_give_the_same_image() {
+fn image_does_not_depend_on_instruction_set() {
     for scene in ["mesh", "textures", "orbiter", "dof"] {
         let dir = TestDir::new();
         let path = format!("{}/scenes/{scene}.toml", env!("CARGO_MANIFEST_DIR"));

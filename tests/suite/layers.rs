@@ -36,9 +36,9 @@ fn picture(dir: &TestDir, options: &str) -> Vec<f32> {
     image::open(dir.path("view.exr")).expect("a picture").to_rgb32f().into_raw()
 }
 
-/// The components add up to the beauty image, also where noise decides the number of samples, and with photons.
+/// The components add up to the beauty image, even with adaptive sampling and with photons.
 #[test]
-fn components_add_up_to_the_beauty_layer() {
+fn components_add_up_to_beauty_layer() {
     let dir = dir();
     for options in [
         "--integrator path --samples 64 --error 0.2",
@@ -96,7 +96,7 @@ fn layers_equal_the_views() {
     for (variance, error) in all["variance.X"].iter().zip(error.chunks(3)) {
         assert!((variance - error[0] * error[0]).abs() <= 1e-6 * variance, "{variance} {}", error[0]);
     }
-    // Normals are signed: the floor in front faces up, the sky has none.
+    // Normals are signed. The floor in front faces up, and the sky has no normal.
     let at = |name: &str, x: usize, y: usize| all[name][y * 32 + x];
     assert_eq!([at("normal.X", 2, 23), at("normal.Y", 2, 23), at("normal.Z", 2, 23)], [0.0, 1.0, 0.0]);
     assert_eq!([at("normal.X", 1, 0), at("normal.Y", 1, 0), at("normal.Z", 1, 0)], [0.0; 3]);
@@ -111,7 +111,7 @@ fn layers_need_an_exr_output() {
         ("--once -o a.exr -o b.hdr --layers all", "b.hdr"),
         ("--once --layers depth", "room.png"),
         ("--once -o a.exr --layers depth,colour", "unknown layer \"colour\"; expected all, albedo"),
-        ("--once -o a.exr --layers depth --view normal", "view beauty"),
+        ("--once -o a.exr --layers depth --view normal", "`beauty` view"),
         ("--once -o a.part --shard 1/2 --layers depth", "--shard"),
         ("-o a.exr --layers depth", "--layers needs --once"),
     ] {

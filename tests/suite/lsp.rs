@@ -1,4 +1,4 @@
-//! `glimt lsp` as an editor talks to it, over the process's stdin and stdout.
+//! `glimt lsp` used by an editor, over the process's stdin and stdout.
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::process::{Child, ChildStdin, ChildStdout, Stdio};
@@ -11,7 +11,7 @@ const TEXT: &str = "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n\n[text
                     [materials.wall]\ntype = \"metal\"\ncolor = [1, 0.5, 0]\nroughness = { texture = \"bricks\" }\n\n\
                     [[sphere]]\ncenter = [0, 1, 0]\nradius = 0.5\nmaterial = \"wall\"\n\n[[light]]\n";
 
-/// An editor with one open text.
+/// An editor with one open document.
 struct Editor {
     child: Child,
     keys: ChildStdin,
@@ -56,7 +56,7 @@ impl Editor {
         let mut length = 0;
         loop {
             let mut line = String::new();
-            assert!(self.screen.read_line(&mut line).expect("a line") > 0, "the server has ended");
+            assert!(self.screen.read_line(&mut line).expect("a line") > 0, "the server exited");
             match line.trim_end().split_once(": ") {
                 Some(("Content-Length", number)) => length = number.parse().expect("a number"),
                 Some(_) => {}
@@ -68,7 +68,7 @@ impl Editor {
         serde_json::from_slice(&bytes).expect("JSON")
     }
 
-    /// The result of a request.
+    /// Sends a request and returns its result.
     fn ask(&mut self, method: &str, params: &Value) -> Value {
         self.next += 1;
         let id = self.next;
@@ -82,7 +82,7 @@ impl Editor {
         }
     }
 
-    /// The next list of diagnostics for which `holds` is true.
+    /// The next diagnostics that satisfy `holds`.
     fn mistakes(&mut self, holds: impl Fn(&[Value]) -> bool) -> Vec<Value> {
         loop {
             let message = self.hear();
@@ -104,7 +104,7 @@ impl Editor {
         );
     }
 
-    /// Sends a request at the position of `|` in a text, which becomes the document.
+    /// Changes the document to `text`, and sends a request at the position of `|`.
     fn at(&mut self, method: &str, text: &str) -> Value {
         let offset = text.find('|').expect("a cursor");
         self.change(&text.replacen('|', "", 1));
@@ -114,7 +114,7 @@ impl Editor {
         self.ask(method, &json!({ "textDocument": { "uri": self.uri }, "position": position }))
     }
 
-    /// The labels of the completions at `|`, and the text that the first one inserts.
+    /// Labels of the completions at `|`, and the text inserted by the first completion.
     fn offered(&mut self, text: &str) -> (Vec<String>, String) {
         let answer = self.at("textDocument/completion", text);
         let items = answer.as_array().cloned().unwrap_or_default();
@@ -146,7 +146,7 @@ fn diagnostics_follow_edits_and_saves() {
     );
     assert_eq!((&unknown["severity"], &unknown["source"]), (&json!(1), &json!("glimt")));
     assert_mentions(unknown["message"].as_str().expect("text"), &["`radius`"]);
-    // A file that is not an image: only reading it shows that.
+    // This file is not an image, which is detected only when reading it.
     editor.dir.write("bricks.png", "no image");
     editor.change(TEXT);
     let uri = editor.uri.clone();
@@ -176,7 +176,7 @@ fn completions_offer_keys_choices_and_names() {
     assert_eq!(editor.offered(&TEXT.replace("\"bricks\" }", "| }")).1, "\"bricks\"");
     let (heads, _) = editor.offered(&format!("{TEXT}\n[ren|"));
     assert!(heads.contains(&"[render]".to_owned()) && !heads.contains(&"[camera]".to_owned()), "{heads:?}");
-    // A header completion replaces the typed part, including brackets that the editor has closed.
+    // A header completion replaces the typed text, including brackets closed by the editor.
     for (typed, label) in [("[ren|", "[render]"), ("[|]", "[render]"), ("[[sp|]]", "[[sphere]]")] {
         let items = editor.at("textDocument/completion", &format!("{TEXT}\n{typed}"));
         let items = items.as_array().expect("candidates");
@@ -187,7 +187,7 @@ fn completions_offer_keys_choices_and_names() {
         assert_eq!((&item["textEdit"]["newText"], &item["filterText"]), (&json!(label), &json!(label)));
     }
     assert_eq!(editor.offered(&TEXT.replace("0.5, 0]", "0.5, 0] # r|")).0, [""; 0]);
-    // Lines of an array hold numbers, not keys.
+    // Lines within an array contain numbers, not keys.
     for typed in ["|", "1, 0,\n|\n]"] {
         let text = TEXT.replace("[[light]]", &format!("[[mesh]]\nmatrix = [\n{typed}"));
         assert_eq!(editor.offered(&text).0, [""; 0], "{text}");
@@ -195,7 +195,7 @@ fn completions_offer_keys_choices_and_names() {
 }
 
 #[test]
-fn hover_explains_and_definitions_resolve() {
+fn hover_and_go_to_definition_work() {
     let mut editor = Editor::open(TEXT);
     let hover = editor.at("textDocument/hover", &TEXT.replace("roughness", "rough|ness"));
     let text = hover["contents"]["value"].as_str().expect("a text");
@@ -209,7 +209,7 @@ fn hover_explains_and_definitions_resolve() {
 }
 
 #[test]
-fn colors_are_shown_in_srgb_and_written_linear() {
+fn colors_are_shown_as_srgb_written_as_linear() {
     let text =
         TEXT.replace("[[light]]", "[[light]]\nintensity = \"tomato\"\n[[light]]\nintensity = \"#+12345\"");
     let mut editor = Editor::open(&text);
@@ -218,7 +218,7 @@ fn colors_are_shown_in_srgb_and_written_linear() {
     let [linear, named] = colors.as_array().expect("a list").as_slice() else { panic!("{colors}") };
     let parts =
         |color: &Value| ["red", "green", "blue"].map(|name| color["color"][name].as_f64().expect("a number"));
-    // 0.5 linear is 0.735 in sRGB (IEC 61966-2-1).
+    // Linear 0.5 is 0.735 in sRGB (IEC 61966-2-1).
     let [red, green, blue] = parts(linear);
     assert!((red - 1.0).abs() < 1e-6 && (green - 0.7354).abs() < 1e-3 && blue == 0.0);
     assert_eq!(parts(named).map(|part| (part * 255.0).round()), [255.0, 99.0, 71.0]);
@@ -231,7 +231,7 @@ fn colors_are_shown_in_srgb_and_written_linear() {
 }
 
 #[test]
-fn server_ends_on_exit_and_on_closed_stdin() {
+fn server_exits_and_rejects_unknown_methods() {
     let mut editor = Editor::open(TEXT);
     assert_eq!(editor.ask("shutdown", &Value::Null), Value::Null);
     editor.tell("exit", &Value::Null);
@@ -248,7 +248,7 @@ fn server_ends_on_exit_and_on_closed_stdin() {
     assert_eq!(unknown["error"]["code"], -32601);
 }
 
-/// Sends bytes to a new server; returns its exit code, its replies and its stderr.
+/// Sends frames to a new server. Returns the exit code, stdout and stderr.
 fn answers(frames: &[&str]) -> (Option<i32>, String, String) {
     let dir = TestDir::new();
     let mut process = dir.glimt("lsp");
@@ -258,7 +258,7 @@ fn answers(frames: &[&str]) -> (Option<i32>, String, String) {
     for frame in frames {
         let header = format!("Content-Length: {}\r\n\r\n", frame.len());
         let bytes = if frame.starts_with("Content-Length") { (*frame).to_owned() } else { header + frame };
-        // A server that has ended does not read the rest.
+        // The server may have exited before reading everything.
         let _ = keys.write_all(bytes.as_bytes());
     }
     drop(keys);
@@ -286,8 +286,8 @@ fn server_replies_to_malformed_messages() {
 fn server_exit_code_depends_on_shutdown() {
     let (code, said, _) = answers(&[INITIALIZE, SHUTDOWN, HOVER, EXIT]);
     assert!(code == Some(0) && said.contains("-32600") && said.contains(r#""id":3"#), "{said}");
-    assert_eq!(answers(&[INITIALIZE, EXIT]).0, Some(1), "exit without shutdown");
-    assert!(answers(&[HOVER, EXIT]).1.contains("-32002"), "nothing before initialize");
+    assert_eq!(answers(&[INITIALIZE, EXIT]).0, Some(1), "exit without shutdown must fail");
+    assert!(answers(&[HOVER, EXIT]).1.contains("-32002"), "requests before initialize must fail");
 }
 
 #[test]
@@ -297,9 +297,9 @@ fn excessive_content_length_is_an_error() {
 }
 
 #[test]
-fn partial_texts_and_range_edits_are_survived() {
+fn invalid_text_and_range_edits_are_handled() {
     let mut editor = Editor::open(TEXT);
-    // A surrogate without its partner stands for a character.
+    // An unpaired surrogate counts as one character.
     let document = json!({ "uri": editor.uri, "version": 2 });
     let change = json!({ "textDocument": document, "contentChanges": [{ "text": "# HALF\nx = 1\n" }] });
     let message =
@@ -309,13 +309,13 @@ fn partial_texts_and_range_edits_are_survived() {
     editor.mistakes(|list| {
         list.iter().any(|one| one["message"].as_str().is_some_and(|text| text.contains('x')))
     });
-    // A NUL makes it a binary file, as for `glimt check`, with no other error.
+    // A file with a NUL is binary, which is the only error, as in `glimt check`.
     editor.change("a\0b = = 1\n");
     let list = editor.mistakes(|list| {
         list.iter().any(|one| one["message"].as_str().is_some_and(|text| text.contains("binary")))
     });
     assert_eq!(list.len(), 1, "{list:?}");
-    // A range is not the whole text.
+    // Range edits are not supported.
     let start = json!({ "line": 0, "character": 0 });
     let change = json!({ "range": { "start": start, "end": start }, "text": "y" });
     editor.tell("textDocument/didChange", &json!({ "textDocument": document, "contentChanges": [change] }));

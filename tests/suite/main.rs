@@ -1,4 +1,4 @@
-//! Tests of the program as a whole, in one crate so that it links only once.
+//! Tests of the whole program, in a single crate that links only once.
 
 mod architecture;
 mod bench;

@@ -1,11 +1,11 @@
-//! Models in every file format, with their own materials.
+//! Models in every file format, with materials from the file.
 
 use super::test_dir::{TestDir, assert_mentions, mentions};
 
 const CAMERA: &str = "[render]\nwidth = 24\nheight = 18\nsamples = 4\n[camera]\nposition = [0.3, 0.4, 3]\nlook_at = [0.5, 0.4, 0]\n\
                       [[light]]\nposition = [1, 2, 3]\nintensity = [9, 9, 9]\n[environment]\ncolor = [0.3, 0.4, 0.5]\n";
 
-/// The linear values of a scene's image.
+/// Linear pixel values of a scene's image.
 fn picture(dir: &TestDir, scene: &str) -> Vec<f32> {
     dir.write("scene.toml", format!("{CAMERA}{scene}"));
     dir.expect("scene.toml --once -o scene.exr", 0);
@@ -60,7 +60,7 @@ fn tetrahedron_looks_the_same_in_every_format() {
 }
 
 #[test]
-fn physical_mtl_equals_the_principled_material() {
+fn physical_mtl_matches_principled_material() {
     let dir = TestDir::new();
     dir.write("dull.ppm", "P3 2 2 255 20 20 20 90 90 90 160 160 160 230 230 230\n");
     dir.write("skin.ppm", "P3 2 1 255 250 120 60 40 90 230\n");
@@ -87,7 +87,7 @@ fn physical_mtl_equals_the_principled_material() {
             "color = [0.8, 0.4, 0.2]\nroughness = 0.3\nemission = [2, 1, 0.5]\nopacity = 0.25\n",
         ),
         ("Kd 0.8 0.4 0.2\nPr 0.3\nTr 0.25\n", "color = [0.8, 0.4, 0.2]\nroughness = 0.3\nopacity = 0.75\n"),
-        // A mask is not glass.
+        // An opacity map overrides the glass illumination model.
         (
             "Kd 0.8 0.4 0.2\nPr 0.3\nKe 2 1 0.5\nillum 9\nd 0.5\nmap_d dull.ppm\n",
             "color = [0.8, 0.4, 0.2]\nroughness = 0.3\nemission = [2, 1, 0.5]\nopacity = { texture = \"dull\" }\n",
@@ -104,11 +104,11 @@ fn physical_mtl_equals_the_principled_material() {
         let expected = picture(&dir, &format!("[[mesh]]\nfile = \"a.obj\"\nmaterial = \"m\"\n{declared}"));
         assert!(own == expected, "{mtl}");
         dir.write("a.mtl", "newmtl m\nKd 0.8 0.4 0.2\n");
-        assert!(picture(&dir, "[[mesh]]\nfile = \"a.obj\"\n") != expected, "{mtl}: it matters");
+        assert!(picture(&dir, "[[mesh]]\nfile = \"a.obj\"\n") != expected, "{mtl}: must affect the image");
     }
 }
 
-/// MeshLab and others invert `Tr`: 1 is opaque for them, while 0 is opaque for all others.
+/// MeshLab and some other programs invert `Tr`, so that 1 instead of 0 is opaque.
 #[test]
 fn misused_mtl_statements_are_corrected() {
     let dir = TestDir::new();
@@ -136,7 +136,7 @@ fn misused_mtl_statements_are_corrected() {
         ("Ks 0.8 0.8 0.8\nTr 1\n", Some(opaque)),
         ("map_Ks shine.ppm\n", Some(dull)),
         ("Ks 0 0 0\nNs 0\n", None),
-        // Illumination model 1 has no highlight.
+        // Illumination model 1 has no specular highlight.
         ("Ks 0.8 0.8 0.8\nNs 0\nillum 1\n", None),
     ] {
         let (picture, said) = said(&format!("Kd 0.8 0.8 0.8\n{mtl}"));
@@ -146,7 +146,7 @@ fn misused_mtl_statements_are_corrected() {
             None => assert!(!said.contains("warning"), "{mtl}: {said}"),
         }
     }
-    assert!(said("Kd 0.8 0.8 0.8\nKs 0.5 0.5 0.5\nNs 20\n").0 != plain, "a highlight is visible");
+    assert!(said("Kd 0.8 0.8 0.8\nKs 0.5 0.5 0.5\nNs 20\n").0 != plain, "the highlight must be visible");
 }
 
 #[test]

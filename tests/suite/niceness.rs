@@ -1,4 +1,4 @@
-//! Nice values of render threads, as the system reports them (proc(5)).
+//! Nice values of render threads, as reported by the system (proc(5)).
 
 use std::fs;
 use std::io::{BufRead, BufReader};
@@ -7,28 +7,28 @@ use std::time::{Duration, Instant};
 
 use super::test_dir::{SCENE, TestDir};
 
-/// Time limit for any wait, however busy the machine is.
+/// Time limit for any wait, long enough for a busy machine.
 const LIMIT: Duration = Duration::from_secs(60);
 
-/// Name and nice value of a thread, from its line in /proc.
+/// Name and nice value of a thread, from its `stat` line in /proc.
 fn of_thread(stat: &str) -> Option<(String, i32)> {
     let (name, after) = stat.split_once('(')?.1.rsplit_once(')')?;
-    // The state, right after the name, is the third field; the nice value is the 19th.
+    // The state, which follows the name, is the third field. The nice value is the 19th.
     Some((name.to_owned(), after.split_whitespace().nth(16)?.parse().ok()?))
 }
 
-/// The nice value that programs inherit from this one.
+/// The nice value that child processes inherit.
 fn own() -> i32 {
-    let stat = fs::read_to_string("/proc/thread-self/stat").expect("of this thread");
+    let stat = fs::read_to_string("/proc/thread-self/stat").expect("the stat line of this thread");
     of_thread(&stat).expect("a nice value").1
 }
 
-/// `own` raised by this much, up to the system's limit.
+/// `own` plus `steps`, up to the system's limit.
 pub(crate) fn raised(steps: i32) -> i32 {
     (own() + steps).min(19)
 }
 
-/// The nice values of a program's render threads.
+/// Nice values of a process's render threads.
 pub(crate) fn of_render_threads(id: u32) -> Vec<i32> {
     let tasks = fs::read_dir(format!("/proc/{id}/task")).expect("its threads");
     let stats = tasks.filter_map(|task| fs::read_to_string(task.ok()?.path().join("stat")).ok());
@@ -40,15 +40,15 @@ pub(crate) fn of_render_threads(id: u32) -> Vec<i32> {
         .collect()
 }
 
-/// The distinct nice values of two or more active render threads, in a program that prints `sign` to stderr once it
-/// renders.
+/// The distinct nice values of two or more render threads. The program prints `sign` to stderr when it starts
+/// to render.
 fn of_program(mut process: Process, sign: &str) -> Vec<i32> {
     let mut child = process.stderr(Stdio::piped()).stdout(Stdio::null()).spawn().expect("it runs");
     let mut said = BufReader::new(child.stderr.take().expect("stderr"));
     let mut line = String::new();
     while !line.contains(sign) {
         line.clear();
-        assert!(said.read_line(&mut line).expect("a line") > 0, "it ended early");
+        assert!(said.read_line(&mut line).expect("a line") > 0, "exited early");
     }
     let deadline = Instant::now() + LIMIT;
     let mut found = of_render_threads(child.id());
@@ -65,9 +65,9 @@ fn of_program(mut process: Process, sign: &str) -> Vec<i32> {
 }
 
 #[test]
-fn once_and_bench_are_not_nice_by_default() {
+fn once_and_bench_keep_priority_by_default() {
     let dir = TestDir::new();
-    // More samples than it will ever render.
+    // More samples than the test can render.
     dir.write("long.toml", SCENE.replace("samples = 2", "samples = 4000000000"));
     let calls = [
         ("long.toml --once --threads 2 --progress json", "\"event\":\"progress\""),

@@ -1,4 +1,5 @@
-//! Noise: whether the reported, stored and requested error is the true one, from the spread over many seeds.
+//! Compares the reported, stored and requested noise with the actual noise, measured as the spread over many
+//! seeds.
 
 use std::fs;
 
@@ -8,7 +9,7 @@ use super::test_dir::TestDir;
 
 const LUMINANCE: [f64; 3] = [0.2126, 0.7152, 0.0722];
 
-/// Columns and rows of the images: whole tiles.
+/// Image width and height, in whole tiles.
 const SIZE: [usize; 2] = [64, 32];
 
 const HEAD: &str = r#"[render]
@@ -20,7 +21,7 @@ look_at = [0, 0.3, 0]
 fov = 35
 "#;
 
-/// Soft shadows and light from a wall.
+/// Soft shadows and indirect light from a wall.
 const PENUMBRA: &str = r#"
 [materials]
 wall = { diffuse = [0.7, 0.7, 0.7] }
@@ -42,7 +43,7 @@ radius = 0.4
 material = "lamp"
 "#;
 
-/// A caustic on the floor, which paths rarely find; ball and light are outside the image.
+/// A caustic on the floor, which paths rarely find. The ball and the light are outside the image.
 const CAUSTIC: &str = r#"
 [materials]
 wall = { diffuse = [0.7, 0.7, 0.7] }
@@ -60,7 +61,7 @@ radius = 0.2
 material = "lamp"
 "#;
 
-/// A ball of a material, with its surroundings.
+/// A ball with the given shininess and surroundings.
 fn ball(around: &str, shininess: u32) -> String {
     format!(
         r#"{HEAD}{around}
@@ -81,7 +82,7 @@ fn dir(scene: &str) -> TestDir {
     dir
 }
 
-/// The luminances of an image and the error in its report.
+/// Renders an image. Returns its luminances and the error from its report.
 fn render(dir: &TestDir, options: &str) -> (Vec<f64>, f64) {
     let output = dir.run(&format!("scene.toml --once --progress none -o a.exr --report a.json {options}"));
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
@@ -96,7 +97,7 @@ fn render(dir: &TestDir, options: &str) -> (Vec<f64>, f64) {
     )
 }
 
-/// Images for several seeds: the mean and the variance of each pixel, and the root mean square of the reported errors.
+/// Statistics over several seeds: mean and variance of each pixel, and RMS of the reported errors.
 struct Seeds {
     means: Vec<f64>,
     variances: Vec<f64>,
@@ -128,12 +129,12 @@ impl Seeds {
         self.variances.iter().sum::<f64>() / self.variances.len() as f64
     }
 
-    /// The true relative error of the image.
+    /// Actual relative error of the image.
     fn error(&self) -> f64 {
         self.variance().sqrt() / self.mean()
     }
 
-    /// The true relative error of each tile.
+    /// Actual relative error of each tile.
     fn tiles(&self) -> Vec<f64> {
         const TILE: usize = 32;
         let of = |values: &[f64], tile: usize| {
@@ -145,7 +146,7 @@ impl Seeds {
 }
 
 #[test]
-fn reported_error_is_the_true_error() {
+fn reported_error_matches_actual_error() {
     for (name, scene) in [("penumbra", PENUMBRA), ("caustic", CAUSTIC)] {
         let dir = dir(&format!("{HEAD}{scene}"));
         for samples in [16, 64] {
@@ -164,7 +165,7 @@ fn stopped_tiles_reach_the_noise_target() {
         let tiles = seeds.tiles();
         let parts =
             (tiles.iter().map(|tile| (tile / error).powi(2)).sum::<f64>() / tiles.len() as f64).sqrt();
-        assert!((0.5..1.1).contains(&parts), "{name}: {parts} of the target");
+        assert!((0.5..1.1).contains(&parts), "{name}: {parts} times the target");
     }
 }
 
@@ -188,7 +189,7 @@ fn whitted_glossy_noise_matches_path() {
 }
 
 #[test]
-fn negative_lobes_keep_the_mean_of_dark_noise() {
+fn negative_filter_lobes_preserve_the_mean() {
     let dir = dir(&format!("{HEAD}{CAUSTIC}"));
     let of = |filter: &str| {
         let scene =
@@ -202,5 +203,5 @@ fn negative_lobes_keep_the_mean_of_dark_noise() {
     let difference = mitchell.mean() - plain.mean();
     assert!(difference.abs() < 3.0 * error, "{difference} ± {error} of {}", plain.mean());
     let (picture, _) = render(&dir, "--integrator path --samples 8 --set render.filter=mitchell");
-    assert!(picture.iter().any(|luminance| *luminance < 0.0), "the file keeps negative values");
+    assert!(picture.iter().any(|luminance| *luminance < 0.0), "the file must keep negative values");
 }

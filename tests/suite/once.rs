@@ -1,4 +1,4 @@
-//! The program in scripts: exit codes, streams, files.
+//! Non-interactive use: exit codes, streams, files.
 
 use std::fs;
 use std::process::{Command as Process, Stdio};
@@ -9,7 +9,7 @@ use nix::errno::Errno;
 use super::test_dir::{SCENE, TestDir, assert_mentions, mentions, system_error};
 
 #[test]
-fn once_renders_and_names_the_image() {
+fn once_renders_and_reports_the_image() {
     let dir = TestDir::new();
     let stderr = dir.expect("ball.toml --once", 0);
     let last = stderr.lines().last().expect("a line");
@@ -37,7 +37,7 @@ fn outputs_resolve_to_scene_or_working_directory() {
 }
 
 #[test]
-fn once_writes_several_outputs_silently() {
+fn progress_none_writes_outputs_silently() {
     let dir = TestDir::new();
     let stderr = dir.expect("ball.toml --once -o a.png -o b.ppm --progress none", 0);
     assert_eq!(stderr, "");
@@ -65,7 +65,7 @@ fn json_progress_has_the_documented_keys() {
 }
 
 #[test]
-fn json_progress_contains_the_errors() {
+fn json_progress_contains_errors() {
     let dir = TestDir::new();
     dir.write("ball.toml", SCENE.replace("\"ball\"", "\"bal\""));
     let stderr = dir.expect("ball.toml --once --progress json", 2);
@@ -80,7 +80,7 @@ fn json_progress_contains_the_errors() {
 }
 
 #[test]
-fn report_values_match_the_call() {
+fn report_values_match_the_options() {
     let dir = TestDir::new();
     dir.expect("ball.toml --once --report r.json --seed 5 --threads 2 --samples 3", 0);
     let text = fs::read_to_string(dir.path("r.json")).expect("a report");
@@ -117,7 +117,7 @@ fn report_values_match_the_call() {
     assert!(report["peak_memory_bytes"].as_u64().expect("bytes") > 1 << 20);
 }
 
-/// The keys that scripts rely on, each with a value of its type.
+/// The keys that scripts may rely on, with values of the right types.
 const REPORT: &str = r#"{
   "glimt": "0.1.0",
   "scene": "scenes/cornell.toml",
@@ -131,7 +131,8 @@ const REPORT: &str = r#"{
   "peak_memory_bytes": 41943040
 }"#;
 
-/// Checks that `found` has every key of `example` with a value of its type; integers stay integers.
+/// Checks that `found` has every key of `example` with a value of the same type. Integers must remain
+/// integers.
 fn assert_like(example: &serde_json::Value, found: &serde_json::Value, place: &str) {
     use serde_json::Value as V;
     match (example, found) {
@@ -148,7 +149,7 @@ fn assert_like(example: &serde_json::Value, found: &serde_json::Value, place: &s
         }
         (V::Number(number), V::Number(_)) => assert!(!number.is_u64() || found.is_u64(), "{place}: {found}"),
         (V::Bool(_), V::Bool(_)) | (V::String(_), V::String(_)) => {}
-        _ => assert_eq!(found, example, "{place} is of another type"),
+        _ => assert_eq!(found, example, "{place} has the wrong type"),
     }
 }
 
@@ -160,7 +161,7 @@ fn report_has_every_key_with_its_type() {
     assert_like(&example, &report, "report");
     let error =
         |samples: u32| dir.report(&format!("ball.toml --samples {samples}"))["image"]["error"].clone();
-    assert!(error(1).is_null(), "one sample has no error estimate");
+    assert!(error(1).is_null(), "no error estimate for one sample");
     let [few, many] = [4, 256].map(|samples| error(samples).as_f64().expect("an estimate"));
     assert!(many > 0.0 && many < 0.25 * few && few < 1.0, "{few} {many}");
 }
@@ -187,7 +188,7 @@ fn missing_mesh_exits_2() {
 }
 
 #[test]
-fn call_errors_do_not_point_into_the_scene() {
+fn option_errors_do_not_point_into_the_scene() {
     let dir = TestDir::new();
     let stderr = dir.expect("ball.toml --once --crop 0,0,33,1 --progress none", 2);
     assert!(stderr.starts_with("error: `--crop 0,0,33,1`") && !stderr.contains("-->"), "{stderr}");
@@ -253,7 +254,7 @@ fn write_failure_exits_1() {
 }
 
 #[test]
-fn each_failed_output_has_a_line() {
+fn each_failed_output_is_reported_on_a_line() {
     let dir = TestDir::new();
     for name in ["a.png", "b.ppm"] {
         std::os::unix::fs::symlink("/dev/full", dir.path(name)).expect("a link");
@@ -343,7 +344,7 @@ fn new_scene_renders_and_never_overwrites() {
     assert_mentions(&stderr, &["error: ball.toml"]);
     assert_eq!(fs::read_to_string(dir.path("ball.toml")).expect("there"), SCENE);
     dir.expect("new nowhere/x.toml", 1);
-    // A folder with that name exists, however the path is written.
+    // A folder with that name exists.
     fs::create_dir(dir.path("sub")).expect("a folder");
     for name in ["sub", "sub/"] {
         assert_mentions(&dir.expect(&format!("new {name}"), 2), &[&format!("error: {name}")]);
@@ -369,7 +370,8 @@ fn unprintable_names_are_not_suggested() {
     }
 }
 
-/// Starts a render, sends it `signals` signals once it writes its image, and returns its exit code and stderr.
+/// Starts a render and sends it `signals` signals while it writes the image. Returns the exit code and
+/// stderr.
 fn ended_in_the_write(dir: &TestDir, line: &str, signals: usize) -> (Option<i32>, String) {
     let stderr = fs::File::create(dir.path("stderr")).expect("a file");
     let mut child = dir.glimt(line).stderr(stderr).spawn().expect("it runs");
@@ -377,11 +379,11 @@ fn ended_in_the_write(dir: &TestDir, line: &str, signals: usize) -> (Option<i32>
     let start = Instant::now();
     let is_writing = || said().lines().any(|line| line.contains("\"write\"") && line.contains("running"));
     while !is_writing() {
-        assert!(start.elapsed() < Duration::from_secs(60), "it does not start to write: {}", said());
+        assert!(start.elapsed() < Duration::from_secs(60), "did not start to write: {}", said());
         std::thread::sleep(Duration::from_millis(1));
     }
     for _ in 0..signals {
-        // The process may have ended.
+        // The process may have exited.
         let _ = Process::new("kill").arg("-TERM").arg(child.id().to_string()).stderr(Stdio::null()).status();
         std::thread::sleep(Duration::from_millis(30));
     }
@@ -391,8 +393,8 @@ fn ended_in_the_write(dir: &TestDir, line: &str, signals: usize) -> (Option<i32>
 
 #[test]
 fn signal_during_the_write_keeps_the_render() {
-    // One signal leaves time for an image that is almost written, a second one aborts the write. Either way the samples
-    // are saved.
+    // After one signal, an image that is almost written may be completed. A second signal aborts the write.
+    // In both cases, the samples are saved.
     for (size, signals) in [("--width 700 --height 500", 1), ("--width 1600 --height 1200", 2)] {
         let dir = TestDir::new();
         let render = format!("ball.toml --once -o out.png --samples 1 --progress json {size}");
@@ -427,7 +429,7 @@ fn signal_during_the_write_reports_the_image() {
     }
     let _ = Process::new("kill").arg("-TERM").arg(child.id().to_string()).stderr(Stdio::null()).status();
     let code = child.wait().expect("it ends").code();
-    // Without checkpoints nothing else saves the samples.
+    // Without checkpoints, only the image saves the samples.
     assert!(dir.path("out.png").exists(), "{code:?}: {}", said());
     assert_mentions(&said(), &["out.png"]);
     assert!(code == Some(0) || mentions(&said(), "SIGTERM"), "{}", said());
@@ -464,7 +466,7 @@ fn signals_set_the_exit_code_and_keep_the_image() {
             .stderr(Stdio::piped())
             .spawn()
             .expect("it runs");
-        // Without a sample there is nothing to save.
+        // Wait for the first sample, which makes a checkpoint possible.
         wait_for(&mut child, |line| line.contains("\"progress\"") && !line.contains("\"samples\":0,"));
         let killed = Process::new("kill").arg(format!("-{name}")).arg(child.id().to_string()).status();
         assert!(killed.expect("kill runs").success());
@@ -499,11 +501,11 @@ fn signal_is_reported() {
                 .spawn()
                 .expect("it runs");
             let said = || fs::read_to_string(dir.path("stderr")).expect("there");
-            // Silent progress does not show when the handlers are installed.
+            // Without progress output, there is no sign that the handlers are installed.
             let sign = if progress == "plain" { "photons" } else { "" };
             let start = Instant::now();
             while !said().contains(sign) || start.elapsed() < Duration::from_millis(500) {
-                assert!(start.elapsed() < Duration::from_secs(30), "it does not start");
+                assert!(start.elapsed() < Duration::from_secs(30), "did not start");
                 std::thread::sleep(Duration::from_millis(10));
             }
             let killed = Process::new("kill").arg(format!("-{name}")).arg(child.id().to_string()).status();
@@ -526,7 +528,7 @@ fn new_writes_to_stdout_for_a_dash() {
     assert!(!dir.path("-").exists());
     dir.expect("new ./-", 0);
     assert_eq!(dir.bytes("-"), glimt::scene::starter().as_bytes());
-    // A scene on stdout has no folder for a schema: the message says how to get it.
+    // A scene on stdout has no folder for the schema, so the message shows how to write it.
     let output = dir.run("new --schema -");
     assert_eq!(output.status.code(), Some(0));
     assert!(output.stdout.starts_with(b"#:schema glimt.schema.json\n"));
@@ -535,7 +537,7 @@ fn new_writes_to_stdout_for_a_dash() {
     assert_eq!(said, words);
 }
 
-/// Waits until the process prints such a line to stderr; later output is read and discarded.
+/// Waits until the process prints a matching line to stderr. Later output is discarded.
 fn wait_for(child: &mut std::process::Child, is_it: impl Fn(&str) -> bool + Send + 'static) {
     use std::io::{BufRead, BufReader};
     let stderr = BufReader::new(child.stderr.take().expect("piped"));

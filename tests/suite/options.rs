@@ -1,4 +1,4 @@
-//! Each option changes only its own part of the image, and the report says so.
+//! Each option changes the image as expected and appears in the report.
 
 use std::fs;
 use std::io::{Read, Write};
@@ -14,7 +14,7 @@ use nix::unistd::Pid;
 
 use super::test_dir::{SCENE, TestDir, assert_mentions, mentions, system_error};
 
-/// An area light, a mirror, a lens: something for every option to change.
+/// A scene with an area light, a mirror and a lens, so that every option has an effect.
 const ROOM: &str = r#"[render]
 width = 24
 height = 18
@@ -70,23 +70,23 @@ fn room() -> TestDir {
     dir
 }
 
-/// The bytes of the image with these options.
+/// Renders with the given options and returns the image file.
 #[track_caller]
 fn picture(dir: &TestDir, options: &str) -> Vec<u8> {
     dir.expect(&format!("room.toml --once -o picture.ppm --progress none {options}"), 0);
     dir.bytes("picture.ppm")
 }
 
-/// The pixels of an 8-bit PPM.
+/// Pixels of an 8-bit PPM.
 fn pixels(ppm: &[u8], count: usize) -> &[u8] {
     &ppm[ppm.len() - 3 * count..]
 }
 
 #[test]
-fn options_change_the_image_and_the_report() {
+fn options_change_the_image_and_report() {
     let dir = room();
     let plain = picture(&dir, "");
-    assert_eq!(plain, picture(&dir, ""), "twice the same");
+    assert_eq!(plain, picture(&dir, ""), "equal options must have equal images");
     let cases: [(&str, &str, serde_json::Value); 8] = [
         ("--shadows hard", "shadows", "hard".into()),
         ("--shadows off", "shadows", "off".into()),
@@ -124,7 +124,7 @@ fn options_change_the_image_and_the_report() {
 }
 
 #[test]
-fn set_equals_an_edit_of_the_file() {
+fn set_option_matches_editing_the_file() {
     let dir = room();
     let sets = "--set materials.ball.diffuse=[0.1,0.2,0.3] --set sphere.2.radius=.4 --set render.samples=3";
     let by_call = picture(&dir, sets);
@@ -134,7 +134,7 @@ fn set_equals_an_edit_of_the_file() {
     assert_eq!(by_call, picture(&dir, ""));
     dir.write("room.toml", ROOM);
     assert_ne!(by_call, picture(&dir, ""));
-    // Options take precedence.
+    // Dedicated options take precedence over `--set`.
     assert_eq!(picture(&dir, "--set render.samples=5 --samples 2"), picture(&dir, ""));
     let checked = dir.run("check room.toml --set materials.ball.diffuse=tomatoe");
     let words = String::from_utf8(checked.stderr).expect("UTF-8");
@@ -173,7 +173,7 @@ fn size_samples_and_time() {
 }
 
 #[test]
-fn crop_keeps_its_pixels_and_is_black_outside() {
+fn crop_keeps_pixels_and_is_black_outside() {
     let dir = room();
     let whole = picture(&dir, "");
     let cut = picture(&dir, "--crop 5,4,10,8");
@@ -209,7 +209,7 @@ fn formats_and_bit_depths_agree() {
 }
 
 #[test]
-fn wrong_values_report_the_expected_ones() {
+fn invalid_values_list_the_valid_values() {
     let dir = TestDir::new();
     for (option, facts) in [
         ("--samples abc", &["--samples", "1", "4294967295"][..]),
@@ -274,7 +274,7 @@ fn targets_are_checked_before_rendering() {
     assert_eq!(names(&dir), ["ball.toml", "full.png"]);
 }
 
-/// Names in the folder, sorted.
+/// File names in the folder, sorted.
 fn names(dir: &TestDir) -> Vec<String> {
     let entries = fs::read_dir(dir.0.path()).expect("a folder");
     let mut names: Vec<String> =
@@ -309,7 +309,7 @@ fn usage_errors_escape_line_breaks() {
 }
 
 #[test]
-fn unknown_word_is_taken_for_a_command() {
+fn unknown_word_is_reported_as_a_command() {
     let dir = TestDir::new();
     for (call, facts) in [
         ("paint", ["\"paint\"", "check, new, import, info, compare, bench"]),
@@ -322,11 +322,11 @@ fn unknown_word_is_taken_for_a_command() {
         assert_mentions(&stderr, &facts);
         assert_eq!(stderr.lines().count(), 1, "{call}: {stderr}");
     }
-    // A word that may be a file is reported as a missing file.
+    // A word that could be a file is reported as a missing file.
     for call in ["room.toml --once", "./schema --once", "scenes/schema --once"] {
         assert_mentions(&dir.expect(call, 2), &[SCENE_NOT_FOUND]);
     }
-    // The same before the screen opens.
+    // Also without `--once`, before the screen opens.
     let stderr = dir.expect("bal.toml", 2);
     assert_mentions(&stderr, &[SCENE_NOT_FOUND, "ball.toml"]);
     for (call, fact) in [
@@ -341,9 +341,9 @@ fn unknown_word_is_taken_for_a_command() {
     dir.expect("paint --once -o a.png", 0);
 }
 
-/// In a mode that does not wait for the file to become a scene.
+/// Tests only modes that do not wait for the file to become a scene.
 #[test]
-fn images_are_rejected_with_their_info() {
+fn images_as_scenes_are_rejected_with_info() {
     let dir = TestDir::new();
     dir.write("ball.toml", SCENE);
     dir.expect("ball.toml --once -o a.png -o b.exr -o c.hdr -o d.jpg -o e.webp -o f.ppm", 0);
@@ -373,7 +373,7 @@ fn images_are_rejected_with_their_info() {
         for call in [file.to_owned(), format!("{file} --once"), format!("check {file}")] {
             let stderr = dir.expect(&call, 2);
             assert_mentions(&stderr, &[content]);
-            // The output of `info` follows the error.
+            // The output of `info` follows the error message.
             let info = dir.glimt(&format!("info {file}")).output().expect("it runs");
             let info = [info.stdout, info.stderr].concat();
             let info = String::from_utf8_lossy(&info).replace("error: ", "");
@@ -389,10 +389,10 @@ fn images_are_rejected_with_their_info() {
     }
 }
 
-/// Checks the suggestion in the message: the stacks of so many threads exceed the limit.
+/// Checks the suggestion in the message if the stacks of too many threads exceed the memory limit.
 #[cfg(target_os = "linux")]
 #[test]
-fn failed_threads_suggest_a_remedy() {
+fn thread_failure_message_suggests_a_fix() {
     let dir = TestDir::new();
     let glimt = dir.glimt("");
     let mut shell = std::process::Command::new("sh");
@@ -415,7 +415,7 @@ fn dash_is_standard_output() {
     let (mut ours, theirs) = UnixStream::pair().expect("a socket");
     let mut command = dir.glimt("ball.toml --once --report - --progress none");
     let mut child = command.stdout(OwnedFd::from(theirs)).spawn().expect("it runs");
-    // Holds the other end open.
+    // The command holds the other end open.
     drop(command);
     let mut report = String::new();
     ours.read_to_string(&mut report).expect("a report");
@@ -431,13 +431,13 @@ fn dash_is_standard_output() {
         assert_mentions(&dir.expect(call, 2), &facts);
     }
     assert_eq!(names(&dir), ["ball.png", "ball.toml"]);
-    // With a path, it is treated like any other file.
+    // With a path, `-` is an ordinary file name.
     dir.expect("ball.toml --once --report ./-", 0);
     assert!(dir.bytes("-").starts_with(b"{"));
 }
 
 #[test]
-fn signal_ends_a_blocked_report() {
+fn signal_interrupts_a_blocked_report() {
     let dir = TestDir::new();
     let (reader, mut writer) = std::io::pipe().expect("a pipe");
     fcntl(&writer, FcntlArg::F_SETFL(OFlag::O_NONBLOCK)).expect("set");
@@ -445,7 +445,7 @@ fn signal_ends_a_blocked_report() {
     fcntl(&writer, FcntlArg::F_SETFL(OFlag::empty())).expect("set");
     let mut command = dir.glimt("ball.toml --once --report - --progress none");
     let child = command.stdout(writer).stderr(Stdio::piped()).spawn().expect("it runs");
-    // The image is written first.
+    // The image is written before the report.
     while !dir.path("ball.png").exists() {
         std::thread::yield_now();
     }
@@ -459,7 +459,7 @@ fn signal_ends_a_blocked_report() {
 }
 
 #[test]
-fn full_device_is_reported_closed_pipe_is_not() {
+fn full_device_is_an_error_closed_pipe_is_not() {
     let dir = TestDir::new();
     for seed in [1, 2] {
         dir.expect(&format!("ball.toml --once --progress none --seed {seed} -o {seed}.exr"), 0);
@@ -497,7 +497,7 @@ fn full_device_is_reported_closed_pipe_is_not() {
 }
 
 #[test]
-fn help_fits_and_names_every_option() {
+fn help_fits_and_lists_every_option() {
     let dir = TestDir::new();
     for line in ["--help", "-h", "check --help", "new --help"] {
         let output = dir.run(line);
@@ -508,8 +508,7 @@ fn help_fits_and_names_every_option() {
     }
     let text = String::from_utf8(dir.run("--help").stdout).expect("UTF-8");
     let words = text.split_whitespace().collect::<Vec<_>>().join(" ");
-    let formats =
-        "The extension chooses the format: png, exr, hdr, jpg, ppm, webp; with --turntable also gif, apng.";
+    let formats = "The extension determines the format: png, exr, hdr, jpg, ppm, webp; with --turntable also gif, apng.";
     assert!(words.contains(formats), "{text}");
     for option in [
         "--once",
@@ -551,7 +550,7 @@ fn progress_and_color_modes() {
     );
     assert_eq!(plain, plain.trim_start(), "{plain}");
     dir.write("room.toml", ROOM.replace("radius = 0.5", "radius = 0"));
-    assert!(!dir.expect("room.toml --once --progress none", 2).is_empty(), "errors are always printed");
+    assert!(!dir.expect("room.toml --once --progress none", 2).is_empty(), "only errors must be printed");
     let colored = dir.run("room.toml --once --color truecolor");
     assert!(String::from_utf8_lossy(&colored.stderr).contains("\u{1b}["));
     assert!(!dir.expect("room.toml --once --color none", 2).contains('\u{1b}'));
@@ -579,7 +578,7 @@ fn closed_streams_are_tolerated() {
         let expected = if ["missing.toml --once", "--nonsense"].contains(&line) { 2 } else { 0 };
         assert_eq!(code, Some(expected), "{line}");
     }
-    // A panic would appear on the remaining stream.
+    // A panic would be printed to the remaining stream.
     let mut child =
         dir.glimt("check ball.toml").stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("runs");
     drop(child.stdout.take());
@@ -590,7 +589,7 @@ fn closed_streams_are_tolerated() {
 }
 
 #[test]
-fn all_trees_give_the_same_image() {
+fn image_does_not_depend_on_acceleration() {
     let dir = TestDir::new();
     for scene in ["mesh", "textures", "orbiter"] {
         let path = format!("{}/scenes/{scene}.toml", env!("CARGO_MANIFEST_DIR"));
@@ -604,13 +603,13 @@ fn all_trees_give_the_same_image() {
             reader.next_frame(&mut pixels).expect("pixels");
             pixels
         });
-        assert!(boxes.iter().any(|&byte| byte != boxes[0]), "{scene}: the image is not black");
+        assert!(boxes.iter().any(|&byte| byte != boxes[0]), "{scene}: the image is uniform");
         assert!(boxes == planes && boxes == pieces, "{scene}");
     }
 }
 
 #[test]
-fn warnings_name_the_setting_that_caused_them() {
+fn warnings_name_the_responsible_setting() {
     let dir = room();
     let lit = format!("{ROOM}\n[[light]]\n");
     dir.write("room.toml", &lit);

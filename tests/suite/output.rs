@@ -1,4 +1,4 @@
-//! Files on disk: written completely or not at all, whatever happens.
+//! Output files are written completely or not at all.
 
 use std::fs;
 use std::io::ErrorKind;
@@ -13,14 +13,14 @@ use nix::errno::Errno;
 
 use super::test_dir::{assert_mentions, system_error};
 
-/// Environment variable with a path that makes a test run in a child process.
+/// Environment variable that contains a path and makes a test act as the child process.
 const CHILD: &str = "GLIMT_TEST_CHILD";
 
 fn child_path() -> Option<PathBuf> {
     std::env::var_os(CHILD).map(PathBuf::from)
 }
 
-/// A command that runs one test of this test binary in a child process.
+/// A command that runs one test from this binary in a child process.
 fn child(program: &Path, test: &str, path: &Path) -> Command {
     let mut command = Command::new(program);
     command.args(["--exact", test, "--nocapture"]).env(CHILD, path);
@@ -36,7 +36,7 @@ fn scratch() -> tempfile::TempDir {
     tempfile::tempdir().expect("a directory")
 }
 
-/// Names in a directory, sorted.
+/// File names in a directory, sorted.
 fn names(directory: &Path) -> Vec<String> {
     let entries = fs::read_dir(directory).expect("a directory");
     let mut names: Vec<_> =
@@ -46,7 +46,7 @@ fn names(directory: &Path) -> Vec<String> {
 }
 
 fn refused(path: &Path) -> String {
-    let before = check_target(path).expect_err("rejected before the work").to_string();
+    let before = check_target(path).expect_err("rejection before rendering").to_string();
     let after = atomic(path, b"new").expect_err("refused at the end").to_string();
     assert_eq!(before, after);
     after
@@ -76,16 +76,16 @@ fn permissions_are_kept() {
 }
 
 #[test]
-fn link_stays_and_its_target_is_replaced() {
+fn link_is_kept_and_its_target_replaced() {
     let directory = scratch();
     let elsewhere = scratch();
     let target = elsewhere.path().join("real.png");
-    // The first link is relative within the directory, the second absolute to a file that does not exist yet.
+    // The first link is relative, the second absolute. The target does not exist yet.
     symlink("middle.png", directory.path().join("out.png")).expect("a link");
     symlink(&target, directory.path().join("middle.png")).expect("a link");
     let path = directory.path().join("out.png");
     for bytes in [b"one", b"two"] {
-        check_target(&path).expect("a good target");
+        check_target(&path).expect("a valid target");
         atomic(&path, bytes).expect("written");
         assert_eq!(fs::read(&target).expect("a file"), bytes);
     }
@@ -108,10 +108,10 @@ fn full_disk_is_an_error() {
     let directory = scratch();
     let path = directory.path().join("x.png");
     symlink("/dev/full", &path).expect("a link");
-    check_target(&path).expect("only the write fails");
+    check_target(&path).expect("only the write must fail");
     let message = atomic(&path, b"picture").expect_err("nothing fits").to_string();
     assert_mentions(&message, &[&path.display().to_string(), &system_error(Errno::ENOSPC)]);
-    assert!(fs::symlink_metadata("/dev/full").is_ok(), "the device still exists");
+    assert!(fs::symlink_metadata("/dev/full").is_ok(), "the device must still exist");
 }
 
 #[test]
@@ -133,25 +133,25 @@ fn pipe_needs_a_reader() {
     let is_unconnected =
         matches!(&error, OutputError::File { source, .. } if source.kind() == ErrorKind::NotConnected);
     assert!(is_unconnected, "{error:?}");
-    // More bytes than a pipe holds; `cat` has started once the pipe can be opened for writing.
+    // More bytes than fit into a pipe. Once the pipe can be opened for writing, `cat` has started.
     let bytes: Vec<u8> = (0..1_000_000_u32).map(|i| (i * 7 % 251) as u8).collect();
     let reader = Command::new("cat").arg(&path).stdout(Stdio::piped()).spawn().expect("cat");
     let holder = fs::OpenOptions::new().write(true).open(&path).expect("a pipe with a reader");
-    let collector = std::thread::spawn(move || reader.wait_with_output().expect("what was read").stdout);
+    let collector = std::thread::spawn(move || reader.wait_with_output().expect("output of cat").stdout);
     atomic(&path, &bytes).expect("written");
     drop(holder);
     assert!(collector.join().expect("no panic") == bytes);
 }
 
 #[test]
-fn standard_output_is_written_in_place() {
+fn stdout_is_written_in_place() {
     if let Some(path) = child_path() {
         atomic(&path, b"report").expect("written");
         return;
     }
     let run = |stdout: Stdio| {
         let mut command =
-            child(&this_binary(), "output::standard_output_is_written_in_place", Path::new("/dev/stdout"));
+            child(&this_binary(), "output::stdout_is_written_in_place", Path::new("/dev/stdout"));
         command.stdout(stdout).output().expect("a child")
     };
     let piped = run(Stdio::piped());
@@ -192,7 +192,7 @@ fn longest_possible_name_is_written() {
     assert_eq!(fs::read(&path).expect("a file"), b"picture");
 }
 
-/// Root may write anything, so this runs as an unprivileged user.
+/// Runs as an unprivileged user, because root may write any file.
 #[test]
 fn missing_permission_is_an_error() {
     if let Some(directory) = child_path() {
@@ -212,7 +212,7 @@ fn missing_permission_is_an_error() {
         fs::create_dir(directory.path().join(name)).expect("a directory");
     }
     fs::write(directory.path().join("open/protected.png"), "old").expect("a file");
-    // A copy, because an unprivileged user may not reach this binary.
+    // Copy the binary, because an unprivileged user may not have access to this one.
     let program = directory.path().join("program");
     fs::copy(this_binary(), &program).expect("a copy");
     mode("open/protected.png", 0o444);
@@ -224,7 +224,7 @@ fn missing_permission_is_an_error() {
         command.uid(65534).gid(65534);
     }
     command.current_dir("/");
-    // Another test's child may hold the copy open briefly, between its fork and its exec.
+    // A child of another test may briefly hold the copy open between fork and exec.
     let output = loop {
         match command.output() {
             Err(error) if error.kind() == std::io::ErrorKind::ExecutableFileBusy => std::thread::yield_now(),
@@ -263,7 +263,7 @@ fn file_size_limit_is_an_error() {
 }
 
 #[test]
-fn concurrent_writers_leave_a_whole_file() {
+fn concurrent_writers_leave_a_complete_file() {
     let directory = scratch();
     let path = directory.path().join("out.png");
     let contents: Vec<Vec<u8>> = (0..4).map(|i| vec![i; 10_000 + usize::from(i)]).collect();
@@ -277,7 +277,7 @@ fn concurrent_writers_leave_a_whole_file() {
     assert_eq!(names(directory.path()), ["out.png"]);
 }
 
-/// Two images that a torn file would mix.
+/// Two images that a torn write would mix.
 fn two_pictures() -> [Vec<u8>; 2] {
     [vec![0xaa; 3_000_000], vec![0x55; 2_000_001]]
 }
@@ -297,7 +297,7 @@ fn kill_leaves_a_whole_file_and_cleans_up() {
     let mut left_behind = 0;
     for round in 0..50_u64 {
         let mut writer = child(&this_binary(), test, &path).spawn().expect("a child");
-        // A second file signals that the child is writing; then the round waits for its own delay.
+        // The child is writing once the file changes. Then wait for this round's delay.
         let state = || fs::metadata(&path).map(|file| (file.ino(), file.mtime(), file.mtime_nsec()));
         let before = state().expect("a file");
         while state().expect("a file") == before {
@@ -308,12 +308,12 @@ fn kill_leaves_a_whole_file_and_cleans_up() {
         writer.kill().expect("killed");
         assert_eq!(writer.wait().expect("a child").signal(), Some(9));
         let found = fs::read(&path).expect("a file");
-        assert!(pictures.contains(&found), "round {round}: a torn file of {} bytes", found.len());
+        assert!(pictures.contains(&found), "round {round}: torn file with {} bytes", found.len());
         left_behind = left_behind.max(names(directory.path()).len() - 1);
     }
     assert!(
         left_behind <= 1,
-        "each write removes the files of the previous one, {left_behind} files were left"
+        "each write must remove temporary files of previous writes, but {left_behind} were left"
     );
     atomic(&path, b"done").expect("written");
     assert_eq!(names(directory.path()), ["out.png"]);

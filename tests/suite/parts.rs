@@ -1,5 +1,5 @@
-//! Parts of an image: merged, they equal one render bit for bit. Parts that do not belong together are rejected and
-//! nothing is written.
+//! Parts of an image. Merged parts are bit-identical to a single render. Parts that do not belong together
+//! are rejected, and nothing is written.
 
 use std::fs;
 
@@ -7,7 +7,7 @@ use nix::errno::Errno;
 
 use crate::test_dir::{TestDir, assert_mentions, mentions, system_error};
 
-/// An area light, a mirror that reflects it, and a textured floor exercise every method.
+/// A scene that exercises every method: an area light, a mirror that reflects it, and a textured floor.
 pub(crate) const ROOM: &str = r#"[render]
 width = 70
 height = 50
@@ -50,7 +50,7 @@ material = "floor"
 const STEP: &str = "v -1.5 0 0\nv -0.6 0 0\nv -1 0.9 -0.2\nf 1 2 3\n";
 const TILES: &str = "P3\n2 2\n255\n200 200 200 40 40 60\n40 40 60 200 200 200\n";
 
-/// A directory with this scene.
+/// A directory with the scene.
 pub(crate) fn room_dir() -> TestDir {
     let dir = TestDir::new();
     dir.write("room.toml", ROOM);
@@ -60,7 +60,7 @@ pub(crate) fn room_dir() -> TestDir {
 }
 
 #[test]
-fn output_never_replaces_foreign_parts() {
+fn output_never_replaces_unrelated_parts() {
     let dir = room_dir();
     let first = "room.toml --once --progress none -o out.part --samples 2 --shard 1/2";
     dir.expect(first, 0);
@@ -68,10 +68,10 @@ fn output_never_replaces_foreign_parts() {
     let said = dir.expect("room.toml --once --progress none --samples 2 -o out.part --shard 2/2", 2);
     assert_mentions(&said, &["out.part", "1/2", "--force"]);
     assert!(dir.bytes("out.part") == part);
-    // The same part may be replaced, even by one of a different count.
+    // The same part may be replaced, even with a different number of parts.
     dir.expect("room.toml --once --progress none -o out.part --samples 2 --shard 1/3", 0);
     dir.expect(first, 0);
-    // An image replaces neither.
+    // An image replaces neither a part nor a checkpoint.
     fs::rename(dir.path("out.part"), dir.path("out.exr")).expect("moved");
     let said = dir.expect("room.toml --once --progress none -o out.exr --samples 2", 2);
     assert_mentions(&said, &["out.exr", "1/2", "--force"]);
@@ -83,7 +83,7 @@ fn output_never_replaces_foreign_parts() {
     dir.expect(&format!("{keep} --force"), 0);
 }
 
-/// Methods, with options for each.
+/// Methods with their options.
 pub(crate) const METHODS: [(&str, &str); 5] = [
     ("whitted", "--samples 3"),
     ("path", "--integrator path --samples 5"),
@@ -92,7 +92,7 @@ pub(crate) const METHODS: [(&str, &str); 5] = [
     ("negative lobes", "--photons on --samples 37 --set photons.count=100 --set render.filter=mitchell"),
 ];
 
-/// Renders all parts; returns their names, the last one first.
+/// Renders all parts. Returns their names in reverse order.
 fn parts(dir: &TestDir, count: u32, options: &str) -> Vec<String> {
     let name = |index: u32| format!("{index}.part");
     for index in 1..=count {
@@ -106,13 +106,13 @@ fn parts(dir: &TestDir, count: u32, options: &str) -> Vec<String> {
 }
 
 #[test]
-fn parts_in_any_order_equal_one_render() {
+fn parts_in_any_order_match_single_render() {
     let dir = room_dir();
     for (method, options) in METHODS {
         dir.expect(&format!("room.toml --once --progress none -o one.exr -o one.png {options}"), 0);
         for count in [2, 3, 8, 64] {
             let mut names = parts(&dir, count, options);
-            // Neither in order nor in reverse order.
+            // Shuffle the parts.
             names.rotate_left(count as usize / 3);
             names.swap(0, 1);
             for picture in ["exr", "png"] {
@@ -126,7 +126,7 @@ fn parts_in_any_order_equal_one_render() {
 }
 
 #[test]
-fn merged_images_name_the_scene_as_renders_do() {
+fn merged_image_metadata_matches_a_render() {
     let dir = room_dir();
     for folder in ["a", "b", "out"] {
         fs::create_dir(dir.path(folder)).expect("made");
@@ -144,7 +144,7 @@ fn merged_images_name_the_scene_as_renders_do() {
     }
 }
 
-/// Checks that tiles stop at different sample counts: otherwise the `error` case would test nothing.
+/// Checks that tiles stop at different sample counts. Otherwise, the `error` case would test nothing.
 #[test]
 fn noise_target_stops_some_tiles_early() {
     let dir = room_dir();
@@ -202,14 +202,14 @@ fn mismatched_parts_are_rejected() {
     dir.write("tiles.ppm", TILES.replace("200", "201"));
     other("--shard 2/3", &["tiles.ppm"]);
     dir.write("tiles.ppm", TILES);
-    // The same files in another folder give the same image.
+    // Parts rendered from the same files in another folder match.
     fs::create_dir(dir.path("away")).expect("a folder");
     for (name, text) in [("room.toml", ROOM), ("step.obj", STEP), ("tiles.ppm", TILES)] {
         dir.write(&format!("away/{name}"), text);
     }
     dir.expect("away/room.toml --once --progress none -o other.part --shard 2/3", 0);
     dir.expect("merge away.png 1.part other.part 3.part --progress none", 0);
-    // Several damaged parts are all reported.
+    // All damaged parts are reported.
     let whole = dir.bytes("2.part");
     let mut flipped = whole.clone();
     flipped[whole.len() / 2] ^= 4;
@@ -221,7 +221,7 @@ fn mismatched_parts_are_rejected() {
     newer[12] = 2;
     dir.write("newer.part", newer);
     refused("1.part newer.part 3.part", &["newer.part", "version 2"]);
-    // A part never becomes an image, whatever its name.
+    // A part is never overwritten with an image, regardless of its name.
     let said = dir.expect("merge 1.part 2.part 3.part --progress none", 2);
     assert!(said.contains("1.part"), "{said}");
     fs::copy(dir.path("1.part"), dir.path("1.png")).expect("copied");
@@ -229,10 +229,10 @@ fn mismatched_parts_are_rejected() {
     assert_mentions(&said, &["1.png", "part"]);
     assert_eq!(dir.bytes("1.png"), dir.bytes("1.part"));
     dir.expect("compare 1.png away.png", 2);
-    // The name of the image comes first.
+    // The image must be the first argument.
     let said = dir.expect("merge 1.part 2.part 3.part out.png --progress none", 2);
     assert!(mentions(&said, "1.part") && !dir.path("out.png").exists(), "{said}");
-    // If the image is named twice, the second name is taken for a part.
+    // If the image is named twice, the second argument counts as a part.
     fs::copy(dir.path("away.png"), dir.path("twice.png")).expect("copied");
     for name in ["twice.png", "nowhere.png"] {
         let said = dir.expect(&format!("merge {name} ./{name} 2.part 3.part --progress none"), 2);
@@ -245,7 +245,7 @@ fn mismatched_parts_are_rejected() {
 fn merge_never_replaces_a_source_file() {
     let dir = room_dir();
     parts(&dir, 2, "");
-    // A copy elsewhere, as when parts were rendered on other machines.
+    // A copy of a source file, as if the parts were rendered on another machine.
     fs::create_dir(dir.path("elsewhere")).expect("a folder");
     fs::copy(dir.path("tiles.ppm"), dir.path("elsewhere/copy.ppm")).expect("copied");
     for name in ["tiles.ppm", "elsewhere/copy.ppm"] {
@@ -255,7 +255,7 @@ fn merge_never_replaces_a_source_file() {
             assert_eq!(dir.bytes(name), TILES.as_bytes());
         }
     }
-    // A file that has changed since, or is missing.
+    // A source file that has changed or is missing.
     for content in [Some("P3 1 1 255 9 9 9\n"), None] {
         match content {
             Some(text) => dir.write("tiles.ppm", text),
@@ -272,7 +272,7 @@ fn merge_never_replaces_a_source_file() {
 }
 
 #[test]
-fn partial_merges_the_existing_parts() {
+fn partial_option_merges_existing_parts() {
     let dir = room_dir();
     dir.expect("room.toml --once --progress none -o one.exr", 0);
     parts(&dir, 4, "");
@@ -281,7 +281,7 @@ fn partial_merges_the_existing_parts() {
     let said = dir.expect("merge all.exr 4.part 3.part 2.part 1.part --partial", 0);
     assert!(!said.contains("missing"), "{said}");
     assert!(dir.bytes("all.exr") == dir.bytes("one.exr") && dir.bytes("some.exr") != dir.bytes("one.exr"));
-    // With photons: fewer passes, the same pixels.
+    // With photons, a partial merge has fewer passes.
     parts(&dir, 2, "--photons on --samples 32 --set photons.count=100");
     dir.expect("merge half.exr 1.part --partial --progress none", 0);
     dir.expect("merge half.exr 1.part --progress none", 2);
@@ -332,20 +332,20 @@ fn watching_merge_waits_for_incomplete_parts() {
         assert!(dir.bytes("joined.exr") == dir.bytes("one.exr"));
         fs::remove_file(dir.path("joined.exr")).expect("removed");
     }
-    // A damaged part never becomes complete.
+    // Waiting cannot repair a damaged part.
     let mut flipped = whole.clone();
     flipped[whole.len() / 2] ^= 4;
     dir.write("2.part", flipped);
     let said = dir.expect("merge joined.exr 1.part 2.part --watch --progress none", 2);
     assert_mentions(&said, &["2.part", "damaged"]);
-    // Without --watch an incomplete part is an error.
+    // Without --watch, an incomplete part is an error.
     dir.write("2.part", &whole[..whole.len() - 1]);
     let said = dir.expect("merge joined.exr 1.part 2.part --progress none", 2);
     assert_mentions(&said, &["2.part", "damaged", &format!("byte {}", whole.len() - 1)]);
     assert!(!dir.path("joined.exr").exists());
 }
 
-/// Only an unprivileged user can run this test: root may write everywhere.
+/// Runs the program as an unprivileged user, because root may write any file.
 #[test]
 fn merge_replaces_the_same_files_as_a_render() {
     use std::os::unix::fs::{MetadataExt, PermissionsExt, symlink};
@@ -373,13 +373,13 @@ fn merge_replaces_the_same_files_as_a_render() {
         }
         let _ = fs::remove_file(dir.path("link.png"));
         symlink("target.png", dir.path("link.png")).expect("a link");
-        // A protected file is kept.
+        // A write-protected file is kept.
         fs::set_permissions(&kept, fs::Permissions::from_mode(0o444)).expect("permitted");
         let (code, text) = said(&call.replace("NAME", "kept.png"));
         assert_eq!(code, Some(1), "{call}: {text}");
         assert_mentions(&text, &["kept.png", &system_error(Errno::EACCES)]);
         assert_eq!(fs::read(&kept).expect("a file"), b"the image before");
-        // A link is kept, and its target replaced.
+        // A link is kept, and its target is replaced.
         let (code, text) = said(&call.replace("NAME", "link.png"));
         assert_eq!(code, Some(0), "{call}: {text}");
         let link = dir.path("link.png").symlink_metadata().expect("a link");
@@ -391,7 +391,7 @@ fn merge_replaces_the_same_files_as_a_render() {
 }
 
 #[test]
-fn indivisible_renders_are_rejected() {
+fn renders_that_cannot_be_split_are_rejected() {
     let dir = room_dir();
     for (line, facts) in [
         ("--once --shard 1/2", &["-o"][..]),
@@ -437,7 +437,7 @@ fn memory_limit_rejects_large_renders() {
     let dir = room_dir();
     let said = dir.expect("room.toml --once -o a.png --width 9000 --height 9000 --memory 500MB", 1);
     assert_mentions(&said, &["GiB", "477 MiB", "--memory"]);
-    assert!(!said.contains("render   "), "nothing is rendered: {said}");
+    assert!(!said.contains("render   "), "nothing must be rendered: {said}");
     dir.expect("room.toml --once -o a.png --memory 500MB", 0);
     let photons = "--photons on --set photons.count=4000000";
     let said = dir.expect(&format!("room.toml --once -o a.png {photons} --memory 500MB"), 1);

@@ -1,17 +1,17 @@
-//! The same bits on every machine and with every instruction set: expected hashes of small images.
+//! Bit-identical images on every machine and with every instruction set: compares hashes of small images.
 
 use glimt::accel::InstructionSet;
 
 use super::test_dir::TestDir;
 
-/// FNV-1a of the bits of an image's numbers.
+/// FNV-1a hash of an image's float bits.
 fn hash(dir: &TestDir, name: &str) -> u64 {
     let picture = image::open(dir.path(name)).expect("a picture").to_rgb32f();
     let bytes = picture.as_raw().iter().flat_map(|x| x.to_bits().to_le_bytes());
     bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
 }
 
-/// Every kind of light and shape, mirror, glass, textures through the shapes' own coordinates, a lens, a filter.
+/// A scene with every kind of light and shape, a mirror, glass, textures on all shapes, a lens and a filter.
 const EVERYTHING: &str = r#"
 [render]
 width = 40
@@ -96,7 +96,7 @@ intensity = [9, 9, 9]
 "#;
 
 #[test]
-fn known_images_keep_their_bits() {
+fn known_images_are_bit_identical() {
     let dir = TestDir::new();
     dir.write("sky.ppm", "P3 4 3 255 90 120 200 20 30 40 255 250 200 70 70 80 60 80 90 0 0 0 9 9 9 200 90 60 30 20 10 8 9 7 6 5 4 1 2 3");
     let known: [(&str, &str, u64); 5] = [
@@ -148,7 +148,7 @@ fn known_images_keep_their_bits() {
     assert!(wrong.is_empty(), "other bits:\n{}", wrong.join("\n"));
 }
 
-/// Microfacet materials, bump and normal maps, opacity, panes.
+/// A scene with microfacet materials, bump and normal maps, opacity and panes.
 const MATERIALS: &str = r#"
 [render]
 width = 40
@@ -218,7 +218,7 @@ intensity = [9, 9, 9]
 "#;
 
 #[test]
-fn materials_keep_their_bits() {
+fn materials_are_bit_identical() {
     let dir = TestDir::new();
     dir.write(
         "waves.ppm",
@@ -240,7 +240,7 @@ fn materials_keep_their_bits() {
     }
 }
 
-/// A grid over a square at y = 0 with slightly raised centers, in `steps` steps.
+/// A grid of `steps` × `steps` squares at y = 0 with slightly raised centers.
 fn uneven_floor(steps: u32) -> String {
     let mut text = String::new();
     for i in 0..=steps {
@@ -260,7 +260,7 @@ fn uneven_floor(steps: u32) -> String {
 }
 
 #[test]
-fn photon_images_ignore_the_tree() {
+fn photon_image_does_not_depend_on_tree() {
     let dir = TestDir::new();
     dir.write("fine.obj", uneven_floor(40));
     dir.write("coarse.obj", uneven_floor(6));
@@ -286,7 +286,7 @@ fn photon_images_ignore_the_tree() {
 }
 
 #[test]
-fn known_photon_image_keeps_its_bits() {
+fn known_photon_image_is_bit_identical() {
     const KNOWN: u64 = 0x777f_28d8_83fa_7d9c;
     let dir = TestDir::new();
     let text = EVERYTHING.replace("FILTER", "box").replace("INTEGRATOR", "whitted");

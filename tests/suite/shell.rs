@@ -1,4 +1,4 @@
-//! The program in the user's shell: completions, the manual page, a call without arguments, the environment,
+//! glimt in the user's shell: completions, the manual page, running without arguments, environment variables,
 //! `glimt doctor`.
 
 use std::collections::BTreeSet;
@@ -10,9 +10,9 @@ use glimt::cli::environment::VARIABLES;
 use crate::terminal::pty::Folder;
 use crate::test_dir::{TestDir, assert_mentions, mentions};
 
-/// Bash's completions for a line, whose last word is being typed.
+/// Bash's completions for the last word of a line.
 fn in_bash(dir: &TestDir, line: &str) -> Vec<String> {
-    // As bash does when Tab is pressed; `=` ends a word there.
+    // Split words as bash does when Tab is pressed. `=` is a separate word.
     let script = r#"
         source <(glimt completions bash)
         COMP_LINE=$1 COMP_POINT=${#1} COMP_TYPE=9 COMP_WORDBREAKS=$' \t\n"\'><=;|&(:'
@@ -46,7 +46,7 @@ fn bash_completes_commands_files_and_keys() {
         assert!(first.iter().any(|word| word == wanted), "{wanted}: {first:?}");
     }
     assert!(!first.iter().any(|word| ["notes.txt", "view.png"].contains(&word.as_str())), "{first:?}");
-    assert_eq!(in_bash(&dir, "glimt check k"), [""; 0], "only scenes are checked");
+    assert_eq!(in_bash(&dir, "glimt check k"), [""; 0], "only scenes must be offered");
     assert_eq!(in_bash(&dir, "glimt compl"), ["completions"]);
     assert_eq!(in_bash(&dir, "glimt ball.toml --integrator "), ["whitted", "path"]);
     assert_eq!(in_bash(&dir, "glimt ball.toml --set materials.ball.d"), ["materials.ball.diffuse="]);
@@ -55,7 +55,7 @@ fn bash_completes_commands_files_and_keys() {
 }
 
 #[test]
-fn installed_shells_complete_lines() {
+fn completions_work_in_installed_shells() {
     let script = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(".ci/shells.py");
     let output = Command::new("python3").arg(script).arg(TestDir::new().glimt("").get_program()).output();
     let output = output.expect("python3");
@@ -83,7 +83,7 @@ fn every_shell_has_a_completion_script() {
 }
 
 #[test]
-fn manual_lists_commands_options_and_variables() {
+fn man_page_lists_commands_options_variables() {
     let dir = TestDir::new();
     let page = |line: &str| String::from_utf8(dir.run(line).stdout).expect("UTF-8").replace("\\-", "-");
     let whole = page("man");
@@ -107,17 +107,17 @@ fn manual_lists_commands_options_and_variables() {
 }
 
 #[test]
-fn call_without_arguments_suggests_a_scene() {
+fn no_arguments_suggests_a_scene() {
     let dir = TestDir::new();
     let said = dir.expect("", 2);
     assert_mentions(&said, &["glimt new ball.toml", "glimt -h"]);
     assert!(said.lines().count() < 10, "{said}");
-    // Only an option is a call without its scene.
+    // A command line with only options lacks a scene.
     assert!(dir.expect("--once", 2).contains("<SCENE>"));
 }
 
 #[test]
-fn only_long_help_lists_the_environment() {
+fn only_long_help_lists_environment_variables() {
     let dir = TestDir::new();
     let help = |option: &str| String::from_utf8(dir.run(option).stdout).expect("UTF-8");
     let (long, short) = (help("--help"), help("-h"));
@@ -127,7 +127,7 @@ fn only_long_help_lists_the_environment() {
     assert!(!short.contains("SSH_TTY") && short.contains("--help"), "{short}");
 }
 
-/// Names of environment variables that sources read, in each way that they read them.
+/// Names of environment variables read by the source code, in each way that it reads them.
 fn asked_in(text: &str) -> BTreeSet<String> {
     let code = text.split("#[cfg(test)]").next().unwrap_or_default();
     let is_name = |word: &&str| {
@@ -139,7 +139,7 @@ fn asked_in(text: &str) -> BTreeSet<String> {
 }
 
 #[test]
-fn variable_list_matches_the_sources() {
+fn variable_list_matches_source_code() {
     let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
     let listed: BTreeSet<String> =
         VARIABLES.iter().flat_map(|(names, _)| names.split(", ")).map(str::to_owned).collect();
@@ -164,10 +164,10 @@ fn variable_list_matches_the_sources() {
         }
     }
     asked.remove("CARGO_PKG_VERSION");
-    // Libraries for arguments, help and progress bars read these.
+    // These are read by libraries for arguments, help and progress bars.
     let of_libraries = ["CLICOLOR", "CLICOLOR_FORCE", "COLUMNS", "LANG"].map(str::to_owned);
     asked.extend(of_libraries);
-    // The only name that is not in capitals.
+    // The only lowercase name.
     asked.insert("ConEmuANSI".to_owned());
     assert_eq!(asked, listed);
 }

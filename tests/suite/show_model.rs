@@ -11,7 +11,7 @@ use super::test_dir::{PROGRAM, TestDir, assert_mentions, mentions, system_error}
 
 const SMALL: &str = "--once --force --width 48 --height 36 --samples 4 --error 0";
 
-/// An image's linear values.
+/// Renders an image and returns its linear pixel values.
 fn picture(dir: &TestDir, line: &str) -> Vec<f32> {
     dir.expect(&format!("{line} {SMALL} -o picture.exr"), 0);
     image::open(dir.path("picture.exr")).expect("a picture").to_rgb32f().into_raw()
@@ -21,7 +21,7 @@ fn checker() -> Vec<u8> {
     fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/textures/checker.png")).expect("an image")
 }
 
-/// An OBJ file of a box with these sizes.
+/// An OBJ file of a box with the given sizes.
 fn box_of([x, y, z]: [i32; 3]) -> String {
     let corner =
         |bits: i32| format!("v {} {} {}\n", (bits & 1) * x, (bits >> 1 & 1) * y, (bits >> 2 & 1) * z);
@@ -29,12 +29,12 @@ fn box_of([x, y, z]: [i32; 3]) -> String {
     corners + "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n"
 }
 
-/// Bounds of the columns and rows in which pixels differ from the ground and the sky, which look alike.
+/// Range of columns and rows with pixels that are neither ground nor sky.
 fn covered(pixels: &[f32]) -> [usize; 4] {
     let mut bounds = [48, 0, 36, 0];
     for (index, pixel) in pixels.chunks(3).enumerate() {
         let (x, y) = (index % 48, index / 48);
-        // The normal view is black where nothing is visible, and the ground's normal is (0, 1, 0).
+        // The normal view is black in the sky, and the ground's normal is (0, 1, 0).
         let is_ground =
             pixel.iter().zip([0.5, 1.0, 0.5]).all(|(value, ground)| (value - ground).abs() < 0.05);
         if !is_ground && pixel.iter().any(|value| *value > 0.0) {
@@ -54,9 +54,9 @@ fn model_is_framed_from_every_side() {
         let (width, height) = ((right - left + 1) as f32, (bottom - top + 1) as f32);
         assert!(left > 0 && top > 0 && right < 47 && bottom < 35, "{side}: {left} {right} {top} {bottom}");
         assert!((width / height / ratio - 1.0).abs() < 0.25, "{side}: {width} × {height}");
-        assert!(width > 36.0 || height > 26.0, "{side}: it fills the frame: {width} × {height}");
+        assert!(width > 36.0 || height > 26.0, "{side}: must fill the frame: {width} × {height}");
     }
-    // A tower along each axis is upright with --up; Blender's PLY files have z up.
+    // With --up, towers along every axis are upright. PLY files from Blender are z-up.
     for (up, sizes) in [("x", [4, 1, 1]), ("y", [1, 4, 1]), ("z", [1, 1, 4])] {
         dir.write("tower.obj", box_of(sizes));
         let [left, right, top, bottom] =
@@ -77,12 +77,12 @@ fn model_is_framed_from_every_side() {
     assert_mentions(&stderr, &["--from"]);
 }
 
-/// A shape in a z-up format looks the same as in a y-up format.
+/// A shape looks the same in z-up and y-up formats.
 #[test]
 fn stl_files_are_z_up() {
     let dir = TestDir::new();
     dir.write("box.obj", box_of([3, 2, 1]));
-    // In x, y and z: the width, the depth, the height.
+    // x is the width, y the depth, z the height.
     let facets = box_of([3, 1, 2]);
     let corners: Vec<&str> = facets.lines().filter_map(|line| line.strip_prefix("v ")).collect();
     let faces = facets.lines().filter_map(|line| line.strip_prefix("f "));
@@ -100,7 +100,7 @@ fn stl_files_are_z_up() {
 }
 
 #[test]
-fn import_renders_like_the_model() {
+fn imported_scene_renders_like_the_model() {
     let dir = TestDir::new();
     dir.write("cubes.glb", cubes(&checker()));
     let shown = picture(&dir, "cubes.glb");
@@ -116,7 +116,7 @@ fn import_renders_like_the_model() {
     ] {
         assert!(text.contains(words), "{words}\nin\n{text}");
     }
-    // The image in its folder is the one embedded in the model.
+    // The image file is identical to the image embedded in the model.
     assert_eq!(dir.bytes("scene_files/checks.png"), checker());
     // Import never overwrites an existing file or folder.
     let said = dir.expect("import cubes.glb -o scene.toml", 2);
@@ -128,7 +128,8 @@ fn import_renders_like_the_model() {
     assert_mentions(&dir.expect("import cubes.glb -o b.png", 2), &["b.png", ".toml"]);
 }
 
-/// The color uses the first set of coordinates, the emission the second, as in exports with light maps.
+/// As in exports with light maps, the color uses the first set of texture coordinates and the emission the
+/// second.
 #[test]
 fn both_uv_sets_are_imported() {
     let dir = TestDir::new();
@@ -159,14 +160,14 @@ fn both_uv_sets_are_imported() {
     let text = fs::read_to_string(dir.path("a.toml")).expect("a scene");
     let texture = "[textures.checks_2]\nfile = \"a_files/checks.png\"\nuv = 1\n";
     assert!(text.contains(texture), "{text}");
-    // A mesh without a second set warns, and uses the first.
+    // A mesh without a second set causes a warning.
     dir.write("b.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n");
     dir.write("b.toml", text.replace("a_files/cube.ply", "b.obj"));
     let said = dir.expect(&format!("b.toml {SMALL} -o b.exr"), 0);
     assert_mentions(&said, &["warning", "b.obj", "\"checks_2\"", "\"material\""]);
 }
 
-/// A cube with an image in a file of this name.
+/// A cube with an image at the given URI.
 fn with_image(uri: &str) -> Vec<u8> {
     let mut glb = Glb::default();
     let mut cube = cube(&mut glb);
@@ -178,7 +179,7 @@ fn with_image(uri: &str) -> Vec<u8> {
     }))
 }
 
-/// A model from somewhere else must not copy other files of this machine into a scene's folder.
+/// A model from an untrusted source must not copy arbitrary local files into the scene's folder.
 #[test]
 fn import_copies_only_images() {
     let dir = TestDir::new();
@@ -190,7 +191,7 @@ fn import_copies_only_images() {
         assert!(said.contains(name) && said.contains("images[0]"), "{said}");
         assert!(!dir.path("a.toml").exists() && !dir.path("a_files").exists());
     }
-    // An image without an extension gets the one of its content; no name leads out of the folder.
+    // An image without an extension gets the extension of its format. No name can escape from the folder.
     dir.write("picture", checker());
     dir.write("a.glb", with_image("picture"));
     dir.expect("import a.glb", 0);
@@ -198,16 +199,16 @@ fn import_copies_only_images() {
     assert!(dir.path("a_files/_cube.ply").exists());
 }
 
-/// Removes its files if one of them could not be written.
+/// If a file cannot be written, the import removes its other files.
 #[test]
-fn failed_import_leaves_nothing() {
+fn failed_import_leaves_no_files() {
     let dir = TestDir::new();
     dir.write("cubes.glb", cubes(&checker()));
-    // The scene's name is already taken by a dangling link.
+    // A dangling link has the scene's name.
     std::os::unix::fs::symlink("nowhere", dir.path("taken.toml")).expect("a link");
     assert_mentions(&dir.expect("import cubes.glb -o taken.toml", 2), &["taken.toml", "-o"]);
     assert!(!dir.path("taken_files").exists());
-    // No file may exceed a block of 512 bytes.
+    // Limit file sizes to one 512-byte block.
     let shell = std::process::Command::new("sh")
         .args(["-c", &format!("ulimit -f 1; exec {PROGRAM} import cubes.glb -o full.toml")])
         .current_dir(dir.path("."))
@@ -220,9 +221,9 @@ fn failed_import_leaves_nothing() {
     dir.expect("import cubes.glb -o full.toml", 0);
 }
 
-/// A scene with invalid numbers is not written, and the message names the number in the glTF file.
+/// No scene with invalid numbers is written, and the message locates the number in the glTF file.
 #[test]
-fn out_of_range_numbers_name_the_gltf_node() {
+fn out_of_range_number_errors_name_the_node() {
     let dir = TestDir::new();
     let light = |intensity: f64| {
         json!({"nodes": [{"mesh": 0}, {"extensions": {"KHR_lights_punctual": {"light": 0}}, "translation": [0, 5, 0]}],
@@ -248,7 +249,7 @@ fn out_of_range_numbers_name_the_gltf_node() {
         assert_mentions(&said, &facts);
         assert!(!said.contains("a.glb:"), "{said}");
     }
-    // A model that can be read is a scene that passes the check.
+    // The scene of an accepted model passes `check`.
     let mut glb = Glb::default();
     let mut model = light(9e14);
     model["meshes"] = json!([{"primitives": [cube(&mut glb)]}]);
@@ -268,19 +269,20 @@ fn impossible_counts_are_reported_exactly() {
     assert_mentions(&said, &["1000000000000"]);
 }
 
-/// Whenever it is killed, an import leaves either the whole scene or nothing visible, and the next one succeeds.
+/// An import killed at any time leaves either a complete scene or no visible file, and the next import
+/// succeeds.
 #[test]
-fn interrupted_import_leaves_nothing() {
+fn interrupted_import_is_all_or_nothing() {
     use nix::sys::signal::{Signal, kill};
     use nix::unistd::Pid;
-    /// Limit of imports that may end before the signal arrives.
+    /// Maximum number of imports that may finish before the signal.
     const TRIES: u32 = 20;
     let dir = TestDir::new();
-    // Many large parts, so that writing takes a while.
+    // Many large parts make writing slow.
     let mut glb = Glb::default();
     let positions: Vec<[f32; 3]> =
         (0..30_000).map(|i| [(i % 250) as f32, (i / 250) as f32, (i % 7) as f32]).collect();
-    // Each has its own numbers, because equal parts would be written only once.
+    // Parts must differ, because identical parts are written only once.
     let parts = (0..30).map(|_| json!({"attributes": {"POSITION": glb.vectors(&positions)}}));
     let primitives: Vec<_> = parts.collect();
     dir.write("big.glb", glb.finish(json!({"nodes": [{"mesh": 0}], "meshes": [{"primitives": primitives}]})));
@@ -297,7 +299,7 @@ fn interrupted_import_leaves_nothing() {
         let run = || {
             let mut import = dir.glimt("import big.glb -o o.toml");
             let mut child = import.stderr(std::process::Stdio::piped()).spawn().expect("it runs");
-            // Kill it while it writes.
+            // Kill the process while it writes.
             while hidden() == 0 && child.try_wait().expect("a state").is_none() {
                 std::thread::yield_now();
             }
@@ -305,13 +307,13 @@ fn interrupted_import_leaves_nothing() {
             child.wait_with_output().expect("its end")
         };
         let mut output = run();
-        // On a busy machine it may have ended before.
+        // On a busy machine, the import may have finished before the signal.
         for _ in 0..TRIES {
             if output.status.code() != Some(0) {
                 break;
             }
-            fs::remove_file(dir.path("o.toml")).expect("a whole scene");
-            fs::remove_dir_all(dir.path("o_files")).expect("and its files");
+            fs::remove_file(dir.path("o.toml")).expect("a complete scene");
+            fs::remove_dir_all(dir.path("o_files")).expect("the scene's files");
             output = run();
         }
         let said = String::from_utf8_lossy(&output.stderr);
@@ -327,7 +329,7 @@ fn interrupted_import_leaves_nothing() {
         assert_eq!(hidden(), usize::from(signal == Signal::SIGKILL && !is_whole), "{signal}");
     }
     dir.expect("import big.glb -o o.toml", 0);
-    assert_eq!(hidden(), 0, "leftovers of a killed import are removed");
+    assert_eq!(hidden(), 0, "leftovers of a killed import must be removed");
 }
 
 #[test]
@@ -377,7 +379,8 @@ fn model_cameras_and_lights_are_used() {
     assert!(!text.contains("directional"), "{text}");
 }
 
-/// Glimt clamps the light reflected by polished surfaces, and says so. Other models are unbiased.
+/// For models with polished surfaces, glimt clamps reflected light and reports it. Other models render
+/// without bias.
 #[test]
 fn only_polished_models_are_clamped() {
     let dir = TestDir::new();
@@ -510,11 +513,11 @@ fn unusable_models_are_rejected() {
 }
 
 #[test]
-fn model_errors_show_no_generated_line() {
+fn model_errors_do_not_quote_generated_scene() {
     let dir = TestDir::new();
     let triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl q\nf 1 2 3\n";
     dir.write("a.obj", format!("mtllib a.mtl\n{triangle}"));
-    // A material file that was not copied with the model.
+    // The material file is missing.
     for call in [format!("a.obj {SMALL} -o a.png"), "check a.obj".to_owned()] {
         let said = String::from_utf8(dir.run(&call).stderr).expect("UTF-8");
         assert_mentions(&said, &["a.mtl"]);
@@ -529,7 +532,7 @@ fn model_errors_show_no_generated_line() {
     assert!(mentions(&said, "nope.png") && !said.contains("a.obj:"), "{said}");
 }
 
-/// The image shows only the ground, which does not reveal the reason.
+/// The image shows only the ground, so an error or a warning must explain why.
 #[test]
 fn invisible_model_warns() {
     let dir = TestDir::new();
@@ -569,7 +572,7 @@ fn invisible_model_warns() {
         }
     }
     assert!(unseen.iter().all(|picture| *picture == unseen[0]), "only the ground");
-    // One visible face is enough.
+    // A single visible face is enough.
     let faces = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl p\nf 1 2 3\nusemtl q\nf 1 3 2\n";
     dir.write("a.obj", faces);
     for (mtl, count) in [
@@ -584,7 +587,7 @@ fn invisible_model_warns() {
     }
 }
 
-/// A model whose images were not copied with it is shown without them.
+/// A model is shown even if its images are missing.
 #[test]
 fn model_is_shown_without_missing_images() {
     let dir = TestDir::new();
@@ -597,7 +600,7 @@ fn model_is_shown_without_missing_images() {
         ("Kd 0.8 0.2 0.1\nKs 0.1 0.1 0.1\nNs 20\nKe 0.1 0 0\nd 0.7\n", maps, &names[..]),
         ("Kd 0.8 0.2 0.1\nPr 0.2\nPm 0.5\n", physical, &["kd.png", "pr.png", "pm.png"]),
     ] {
-        // An emission map is not replaced by emission everywhere.
+        // A missing emission map is not replaced with uniform emission.
         dir.write("a.mtl", format!("newmtl q\n{}", plain.replace("Ke 0.1 0 0\n", "")));
         let expected = picture(&dir, "a.obj");
         dir.write("a.mtl", format!("newmtl q\n{plain}{maps}"));
@@ -615,13 +618,13 @@ fn model_is_shown_without_missing_images() {
             assert_mentions(&said, &["warning", "\"q\"", "a.obj"]);
             assert!(picture(&dir, "a.obj") == expected, "{maps}{content:?}");
         }
-        // It stays an input, and commands that need the whole model fail.
+        // The missing image remains an input, and commands that need the complete model fail.
         let said = dir.expect(&format!("a.obj {SMALL} -o kd.png"), 2);
         assert_mentions(&said, &["kd.png"]);
         assert_eq!(dir.bytes("kd.png"), b"no picture");
         assert!(dir.expect("check a.obj", 2).contains("kd.png"));
     }
-    // The same for glTF: images in files, and embedded images.
+    // The same for glTF, with image files and embedded images.
     let plain = |glb: Vec<u8>| {
         dir.write("a.glb", glb);
         picture(&dir, "a.glb")

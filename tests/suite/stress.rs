@@ -1,6 +1,6 @@
-//! The short cases of `cargo bench --bench stress`, and the pairs of `cargo bench --bench skips`: images within the
-//! bounds of their plain references, only finite samples, the same bits and the same rays. Only the benchmarks measure
-//! times.
+//! The short cases of `cargo bench --bench stress`, and the pairs of `cargo bench --bench skips`. Checks that
+//! images are within bounds of their references, that samples are finite, and that unused features change no
+//! bits or rays. Only the benchmarks measure times.
 
 #[path = "../../benches/stress/cases/mod.rs"]
 mod cases;
@@ -9,10 +9,10 @@ mod frame;
 #[path = "../../benches/skips/pairs.rs"]
 mod pairs;
 #[path = "../../benches/stress/row.rs"]
-#[allow(dead_code, reason = "only the benchmark needs times")]
+#[allow(dead_code, reason = "only the benchmark uses times")]
 mod row;
 #[path = "../../benches/stress/run.rs"]
-#[allow(dead_code, reason = "only the benchmark needs times")]
+#[allow(dead_code, reason = "only the benchmark uses times")]
 mod run;
 
 use row::CaseSet;
@@ -27,7 +27,7 @@ fn extreme_scenes_match_their_references() {
             Ok(measured) if measured.is_right(&row) => {}
             Ok(run::RowResult { figure, non_finite, .. }) => {
                 wrong.push(format!(
-                    "{}: {figure:e}, more than {:e}, or not finite: {non_finite}",
+                    "{}: {figure:e}, bound {:e}, non-finite: {non_finite}",
                     row.name, row.bound
                 ));
             }
@@ -38,13 +38,13 @@ fn extreme_scenes_match_their_references() {
 }
 
 #[test]
-fn unused_features_change_no_bit() {
+fn unused_features_do_not_change_bits() {
     let mut wrong = Vec::new();
     for pair in pairs::pairs([32, 24, 4]) {
         let [off, on] = [&pair.off, &pair.on].map(|picture| run::render(picture).expect(pair.name));
         assert!(off.pixels.iter().any(|&x| x > 0.0), "{}: the image is black", pair.name);
         if !off.pixels.iter().map(|x| x.to_bits()).eq(on.pixels.iter().map(|x| x.to_bits())) {
-            wrong.push(format!("{}: other bits", pair.name));
+            wrong.push(format!("{}: bits differ", pair.name));
         }
         let done = |report: &serde_json::Value| [report["counters"].clone(), report["lights"].clone()];
         assert!(done(&off.report).iter().all(serde_json::Value::is_object), "{:?}", done(&off.report));

@@ -6,10 +6,10 @@ use std::process::{Command as Process, Output, Stdio};
 
 use nix::errno::Errno;
 
-/// The program built with these tests.
+/// Path of the program built with these tests.
 pub(crate) const PROGRAM: &str = env!("CARGO_BIN_EXE_glimt");
 
-/// A sphere under a point light.
+/// A scene with a sphere under a point light.
 pub(crate) const SCENE: &str = r#"[render]
 width = 32
 height = 24
@@ -39,7 +39,7 @@ pub(crate) struct TestDir(pub(crate) tempfile::TempDir);
 
 impl TestDir {
     pub(crate) fn new() -> Self {
-        let dir = Self(tempfile::tempdir().expect("a scratch folder"));
+        let dir = Self(tempfile::tempdir().expect("a temporary folder"));
         dir.write("ball.toml", SCENE);
         dir
     }
@@ -52,8 +52,9 @@ impl TestDir {
         fs::write(self.path(name), content).expect("written");
     }
 
-    /// Copies the program for another user who may not read the build directory. `cp` makes the copy: if this process
-    /// wrote it, a child that another test forks could hold the file open for writing, and executing it would fail.
+    /// Copies the program for another user without access to the build directory. Uses `cp`, because a copy
+    /// written by this process could still be open for writing in a child forked by another test, which would
+    /// prevent its execution.
     pub(crate) fn program(&self) -> PathBuf {
         let copy = self.path("program");
         let made = Process::new("cp").arg(PROGRAM).arg(&copy).status();
@@ -72,7 +73,7 @@ impl TestDir {
         self.glimt(line).output().expect("it runs")
     }
 
-    /// Runs `line`, checks the exit code and that stdout is empty, and returns stderr.
+    /// Runs `line` and checks that it has the given exit code and no output on stdout. Returns stderr.
     #[track_caller]
     pub(crate) fn expect(&self, line: &str, code: i32) -> String {
         let output = self.run(line);
@@ -83,7 +84,7 @@ impl TestDir {
         stderr
     }
 
-    /// Runs `line` as [`Self::expect`] does with exit code 0, and returns the report.
+    /// Runs `line` like [`Self::expect`] with exit code 0. Returns the report.
     #[track_caller]
     pub(crate) fn report(&self, line: &str) -> serde_json::Value {
         self.expect(&format!("{line} --once --report report.json"), 0);
@@ -97,7 +98,7 @@ impl TestDir {
     }
 }
 
-/// Whether a message contains a fact (a file, an option, a key, a number) as a separate word.
+/// Whether a message contains a fact (a file, option, key or number) as a separate word.
 pub(crate) fn mentions(message: &str, fact: &str) -> bool {
     let is_word = |c: char| c.is_alphanumeric() || c == '_';
     let is_inside = |c: char| fact.starts_with(is_word) && is_word(c);
@@ -107,15 +108,15 @@ pub(crate) fn mentions(message: &str, fact: &str) -> bool {
     })
 }
 
-/// Checks that a message contains these facts, whatever its wording.
+/// Checks that a message contains the given facts, regardless of its wording.
 #[track_caller]
 pub(crate) fn assert_mentions(message: &str, facts: &[&str]) {
     for fact in facts {
-        assert!(mentions(message, fact), "`{fact}` is missing in: {message}");
+        assert!(mentions(message, fact), "`{fact}` not found in: {message}");
     }
 }
 
-/// The words for an error of the operating system, as messages contain them.
+/// The text for an operating system error, as it appears in messages.
 pub(crate) fn system_error(error: Errno) -> String {
     glimt::system::describe_error(&std::io::Error::from_raw_os_error(error as i32))
 }

@@ -1,4 +1,4 @@
-//! Commands when the system has no thread left.
+//! Commands that run out of threads or file descriptors.
 
 use std::fs;
 use std::os::unix::fs::{MetadataExt, PermissionsExt};
@@ -13,10 +13,11 @@ const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
 const EMPTY: &str =
     r#"{"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"name": "a"}]}"#;
 
-/// Every command that starts threads fails with exit code 1 and a sentence. Root has no such limit, and becomes another user.
+/// Every command that starts threads fails with exit code 1 and a message. Root has no thread limit, so the
+/// commands run as another user.
 #[test]
 #[cfg(target_os = "linux")]
-fn commands_without_threads_fail_with_a_sentence() {
+fn commands_without_threads_fail_with_message() {
     let dir = TestDir::new();
     dir.write("a.obj", TRIANGLE);
     dir.write("a.gltf", EMPTY);
@@ -56,7 +57,7 @@ fn commands_without_threads_fail_with_a_sentence() {
     }
 }
 
-/// A part that cannot be opened twice at once is still one.
+/// A part is recognized even if it cannot be opened twice at the same time.
 #[test]
 fn info_reads_parts_with_one_descriptor() {
     let dir = TestDir::new();

@@ -1,4 +1,4 @@
-//! `--turntable`: frames all around a scene or a model.
+//! `--turntable`: frames with cameras all around a scene or model.
 
 use std::io::Cursor;
 use std::process::Stdio;
@@ -11,7 +11,7 @@ use super::test_dir::{TestDir, assert_mentions, mentions};
 
 const SMALL: &str = "--once --width 32 --height 24 --samples 2 --error 0";
 
-/// Four balls of different colors around a point, one on each side.
+/// Four balls with different colors around a point, one on each side.
 fn around() -> TestDir {
     let dir = TestDir::new();
     let ball = |name: &str, color: &str, center: &str| {
@@ -32,7 +32,7 @@ fn around() -> TestDir {
     dir
 }
 
-/// The pixel at the center of an image of 32 × 24.
+/// Center pixel of a 32 × 24 image.
 fn middle(rgb: &[u8]) -> [u8; 3] {
     let at = 3 * (12 * 32 + 16);
     [rgb[at], rgb[at + 1], rgb[at + 2]]
@@ -42,7 +42,7 @@ fn picture(dir: &TestDir, name: &str) -> Vec<u8> {
     image::open(dir.path(name)).expect("a picture").to_rgb8().into_raw()
 }
 
-/// The frames of an APNG.
+/// Frames of an APNG.
 fn frames(bytes: &[u8]) -> Vec<Vec<u8>> {
     let mut reader = png::Decoder::new(Cursor::new(bytes)).read_info().expect("PNG");
     let count = reader.info().animation_control().expect("it moves").num_frames;
@@ -71,7 +71,7 @@ fn turntable_writes_files_and_animations() {
     assert!(dir.bytes("a.gif").starts_with(b"GIF89a"));
     assert_eq!(stderr.matches("wrote a_0003.png").count(), 1, "{stderr}");
     assert_mentions(&stderr, &["a.gif", "32×24", "4 frames"]);
-    // The first frame equals the image without the option.
+    // The first frame equals the image rendered without `--turntable`.
     dir.expect(&format!("around.toml {SMALL} -o single.png"), 0);
     assert_eq!(picture(&dir, "single.png"), picture(&dir, "a_0001.png"));
 }
@@ -106,14 +106,14 @@ fn turntable_reuses_trees_and_photons() {
 #[test]
 fn model_stays_in_the_frame() {
     let dir = TestDir::new();
-    // A long plank, seen from its end first.
+    // A long plank. The first frame shows its end.
     dir.write("plank.obj", "v -1 0 -8\nv 1 0 -8\nv 1 2 8\nv -1 2 8\nv 0 3 0\nf 1 2 3 4\nf 1 2 5\nf 3 4 5\n");
     dir.expect(&format!("plank.obj {SMALL} --turntable 4 --from front --view albedo -o b.apng"), 0);
     for frame in frames(&dir.bytes("b.apng")) {
         let row = |y: usize| frame[3 * 32 * y..3 * 32 * (y + 1)].to_vec();
         let pixel = |y: usize, x: usize| row(y)[3 * x..3 * x + 3].to_vec();
-        // Both edges of every row show the ground.
-        assert!((4..20).all(|y| pixel(y, 0) == pixel(y, 31)), "the model is cut off");
+        // Both ends of every row show the ground.
+        assert!((4..20).all(|y| pixel(y, 0) == pixel(y, 31)), "the model is cropped");
     }
 }
 
@@ -133,7 +133,7 @@ fn impossible_turntables_are_rejected() {
     rejected("--once --turntable 4 -o a_#.gif -o a_#.xyz", &[".xyz", ".png"]);
     rejected("--once --turntable 4 -o a_#.png -o a_#.png", &["a_#.png", "twice"]);
     rejected("--once --turntable 11 -o a_#.png -o a_1#.png", &["a_11.png"]);
-    // A later frame would replace an input: nothing is rendered.
+    // A later frame would replace an input, so nothing is rendered.
     dir.write("a3.png", std::fs::read("assets/textures/checker.png").expect("an image"));
     let scene = format!("{}[textures.t]\nfile = \"a3.png\"\n", super::test_dir::SCENE);
     dir.write("uses.toml", scene);
@@ -157,9 +157,9 @@ fn frames_linked_to_one_file_are_rejected() {
     assert!(!dir.path("a_2.png").exists());
 }
 
-/// Default names come from the scene, and replace only files that glimt wrote.
+/// Default file names are derived from the scene's name. They replace only files written by glimt.
 #[test]
-fn default_frames_replace_no_foreign_image() {
+fn default_frames_keep_unrelated_images() {
     let dir = TestDir::new();
     dir.expect("ball.toml --once --turntable 2", 0);
     dir.expect("ball.toml --once --turntable 2 --seed 4", 0);
@@ -169,7 +169,7 @@ fn default_frames_replace_no_foreign_image() {
     let stderr = dir.expect("ball.toml --once --turntable 2 --seed 5", 2);
     assert_mentions(&stderr, &["ball_0002.png"]);
     assert_eq!(dir.bytes("ball_0002.png"), foreign);
-    // A name in the scene is for a single image.
+    // `output` in the scene applies only to single images.
     dir.write("named.toml", super::test_dir::SCENE.replace("samples = 2", "samples = 2\noutput = \"x.png\""));
     dir.expect("named.toml --once --turntable 2", 0);
     assert!(dir.path("x_0001.png").exists() && !dir.path("x.png").exists());
@@ -226,9 +226,9 @@ fn frames_of_a_longer_turntable_are_kept() {
     assert_eq!(dir.bytes("w_03.png"), third);
 }
 
-/// `output` in `[render]` does not name a turntable's frames, and a model has no such key.
+/// The hint must not suggest `output` in `[render]`, which does not apply to turntables or models.
 #[test]
-fn foreign_image_hint_is_a_valid_option() {
+fn unrelated_image_hint_is_a_valid_option() {
     let dir = TestDir::new();
     dir.write("plank.obj", "v -1 0 -8\nv 1 0 -8\nv 1 2 8\nf 1 2 3\n");
     let foreign = std::fs::read("assets/textures/checker.png").expect("an image");

@@ -1,8 +1,8 @@
-//! Contents of the views.
+//! Pixel values of the views.
 
 use super::test_dir::TestDir;
 
-/// Red, green and blue of each pixel of a float image.
+/// RGB pixels of a float image.
 fn floats(dir: &TestDir, name: &str) -> Vec<[f32; 3]> {
     let picture = image::open(dir.path(name)).expect("a float picture").into_rgb32f();
     picture.pixels().map(|pixel| pixel.0).collect()
@@ -11,7 +11,7 @@ fn floats(dir: &TestDir, name: &str) -> Vec<[f32; 3]> {
 #[test]
 fn bundled_scene_components_add_up() {
     let dir = TestDir::new();
-    // Except the million triangles, whose mesh is generated.
+    // Skip scenes with generated meshes.
     for scene in [
         "cornell",
         "cornell_glass",
@@ -46,11 +46,11 @@ fn bundled_scene_components_add_up() {
                 let whole = f64::from(beauty[channel]);
                 assert!(
                     (sum - whole).abs() <= 1e-5 * whole.max(1.0),
-                    "{scene}, {pixel}: {sum} is not {whole}"
+                    "{scene}, {pixel}: {sum}, expected {whole}"
                 );
             }
         }
-        assert!(beauty.iter().any(|pixel| pixel[0] > 0.01), "{scene}: the image is not black");
+        assert!(beauty.iter().any(|pixel| pixel[0] > 0.01), "{scene}: the image is black");
     }
 }
 
@@ -59,7 +59,7 @@ fn depth_is_metric_only_in_float_files() {
     let dir = TestDir::new();
     dir.expect("ball.toml --once --samples 16 --view depth -o depth.exr -o depth.png", 0);
     let depths: Vec<f32> = floats(&dir, "depth.exr").iter().map(|pixel| pixel[0]).collect();
-    // The ball's front is 3.5 in front of the camera, its rim a little nearer than its center at 4; there is nothing
+    // The ball's front is at a depth of 3.5, and its rim slightly closer than its center at 4. Nothing is
     // behind it.
     let middle = depths[12 * 32 + 16];
     assert!((middle - 3.505).abs() < 0.006, "{middle}");
@@ -68,7 +68,7 @@ fn depth_is_metric_only_in_float_files() {
     let shown = image::open(dir.path("depth.png")).expect("a picture").into_rgb8();
     let at = |x, y| shown.get_pixel(x, y).0[0];
     let brightest = shown.pixels().map(|pixel| pixel.0[0]).max();
-    assert_eq!((brightest, at(0, 0)), (Some(255), 0), "near is bright, nothing is black");
+    assert_eq!((brightest, at(0, 0)), (Some(255), 0), "near must be bright, empty space black");
     assert!(at(16, 12) > 200, "{}", at(16, 12));
 }
 
@@ -95,11 +95,11 @@ fn infinite_floor_keeps_near_depth_contrast() {
     let (near, far) = (range[0].as_f64().expect("near"), range[1].as_f64().expect("far"));
     let depths: Vec<f32> = floats(&dir, "depth.exr").iter().map(|pixel| pixel[0]).collect();
     assert!(near < 2.0 && far > 10.0, "{near} {far}");
-    // Pixels at the border of empty space are excluded, because farther ones exist.
+    // Exclude pixels at the horizon, which are arbitrarily far away.
     let end = far as f32;
     assert!(depths.iter().any(|&depth| depth > end) && depths.contains(&end));
     assert!(notes(&dir, "depth.png").contains(&("glimt:range".to_owned(), format!("{near} to {far}"))));
-    // The ball at 3.5 and the floor next to it at 5.7 would differ by 37 shades on a linear scale.
+    // On a linear scale, the ball at 3.5 and the floor beside it at 5.7 would differ by 37 shades.
     let shown = image::open(dir.path("depth.png")).expect("a picture").into_rgb8();
     let at = |x, y| i32::from(shown.get_pixel(x, y).0[0]);
     assert!(at(16, 13) - at(2, 15) > 42, "{} {}", at(16, 13), at(2, 15));
@@ -117,7 +117,7 @@ fn sample_and_error_views_are_per_pixel() {
     assert!(white.pixels().all(|pixel| pixel.0 == [255; 3]));
     dir.expect("ball.toml --once --samples 16 --view error -o error.exr", 0);
     let errors = floats(&dir, "error.exr");
-    assert_eq!(errors[0], [0.0; 3], "equal samples have no error");
-    assert!(errors.iter().any(|pixel| pixel[0] > 1e-3), "the ball's border has an error");
+    assert_eq!(errors[0], [0.0; 3], "equal samples must have no error");
+    assert!(errors.iter().any(|pixel| pixel[0] > 1e-3), "the ball's silhouette must have an error");
     assert!(errors.iter().all(|pixel| pixel[0].is_finite() && pixel[0] < 0.5));
 }

@@ -1,8 +1,8 @@
-//! Lenses, fields of view, cameras inside and on objects, images of extreme shape.
+//! Lenses, fields of view, cameras inside and on objects, extreme image sizes.
 
 use super::{CAMERA, CaseSet, SceneFiles, StressRow, furnace, head, signs};
 
-/// A white surface: under uniform light of radiance 1, its radiance is 1.
+/// A white surface. Under uniform light with radiance 1, its radiance is 1.
 const WHITE: &str =
     "[materials.w]\ndiffuse = 1\n[[sphere]]\ncenter = [0, 0, -5]\nradius = 1\nmaterial = \"w\"\n";
 
@@ -11,7 +11,7 @@ pub(super) fn rows(_: CaseSet) -> Vec<StressRow> {
     let plain = signs("", CAMERA, "");
     rows.push(
         StressRow::alike(
-            "an aperture of 0, as without a lens",
+            "aperture 0 vs. no lens",
             vec![(signs("", &with("aperture = 0\nfocus = 3"), ""), plain.clone())],
             0.0,
         )
@@ -19,7 +19,7 @@ pub(super) fn rows(_: CaseSet) -> Vec<StressRow> {
     );
     rows.push(
         StressRow::alike(
-            "an aperture of 1e-12, as without a lens",
+            "aperture 1e-12 vs. no lens",
             vec![(signs("", &with("aperture = 1e-12"), ""), plain.clone())],
             1e-3,
         )
@@ -28,7 +28,7 @@ pub(super) fn rows(_: CaseSet) -> Vec<StressRow> {
     let white = |camera: &str| (furnace(64, camera, WHITE), furnace(64, CAMERA, WHITE));
     rows.push(
         StressRow::mean(
-            "an aperture of the scene's size, a white ball",
+            "white ball, aperture as large as the scene",
             white(&with("aperture = 8")),
             1.0,
             1e-2,
@@ -36,21 +36,18 @@ pub(super) fn rows(_: CaseSet) -> Vec<StressRow> {
         .timed(),
     );
     rows.push(
-        StressRow::mean("a field of view of 179°, a white ball", white(&with("fov = 179")), 1.0, 1e-2)
-            .timed(),
+        StressRow::mean("white ball, field of view of 179°", white(&with("fov = 179")), 1.0, 1e-2).timed(),
     );
     rows.extend([1e-3, 179.0].map(angle_of_view));
-    for (name, place) in [("glass of ior 1", "1"), ("glass of ior 1.000001", "1.000001")] {
+    for (name, place) in [("glass with IOR 1", "1"), ("glass with IOR 1.000001", "1.000001")] {
         let ball = around_the_camera(place);
         let pairs = vec![(signs("", CAMERA, &ball), plain.clone())];
-        rows.push(StressRow::alike(format!("a camera in {name}, as in air"), pairs, 1e-3));
+        rows.push(StressRow::alike(format!("camera in {name} vs. air"), pairs, 1e-3));
         let white = (furnace(64, CAMERA, &ball), furnace(64, CAMERA, &around_the_camera("1.5")));
-        rows.push(
-            StressRow::mean(format!("a camera in {name} under uniform light"), white, 1.0, 1e-3).timed(),
-        );
+        rows.push(StressRow::mean(format!("camera in {name} under uniform light"), white, 1.0, 1e-3).timed());
     }
     let inside = (furnace(64, CAMERA, &around_the_camera("1.5")), furnace(64, CAMERA, WHITE));
-    rows.push(StressRow::mean("a camera in glass of ior 1.5 under uniform light", inside, 1.0, 1e-3));
+    rows.push(StressRow::mean("camera in glass with IOR 1.5 under uniform light", inside, 1.0, 1e-3));
     let black = "[materials.k]\ndiffuse = 0\n";
     for (name, thing) in [
         ("sphere", "[[sphere]]\ncenter = [0, 0, 1]\nradius = 1"),
@@ -68,14 +65,14 @@ pub(super) fn rows(_: CaseSet) -> Vec<StressRow> {
             signs("", &camera, &format!("{black}{thing}\nmaterial = \"k\"\n"))
         };
         rows.push(StressRow::alike(
-            format!("a camera on a {name}, as without"),
+            format!("camera on a {name} vs. no {name}"),
             vec![(picture(0.0), plain.clone())],
             0.0,
         ));
-        // The cost of an invisible object is not what is tested, so compare with a camera as far in front of it as
-        // single precision allows.
+        // The reference must also include the cost of the invisible object, so place its camera as close in
+        // front of the object as single precision allows.
         let beside = vec![(picture(0.0), picture(-2_f64.powi(-20)))];
-        rows.push(StressRow::alike(format!("a camera on a {name}, as in front of it"), beside, 1e-3).timed());
+        rows.push(StressRow::alike(format!("camera on a {name} vs. in front of it"), beside, 1e-3).timed());
     }
     rows.extend(images());
     rows
@@ -91,7 +88,8 @@ fn around_the_camera(ior: &str) -> String {
     )
 }
 
-/// A wall at distance d has height 2 d tan(fov / 2) in the image: compare with a field of view of 40°.
+/// The image of a wall at distance d covers a height of 2 d tan(fov / 2). Compares with a field of view of
+/// 40°.
 fn angle_of_view(fov: f64) -> StressRow {
     let distance = |fov: f64| 1.0 / (0.5 * fov.to_radians()).tan();
     let picture = |fov: f64| {
@@ -114,12 +112,12 @@ material = "blue"
 "#;
         SceneFiles::new(head(64, "") + &camera + wall)
     };
-    let name = format!("a wall with a field of view of {fov}°, as with 40°");
+    let name = format!("wall at a field of view of {fov}° vs. 40°");
     StressRow::alike(name, vec![(picture(fov), picture(40.0))], 1e-3).timed()
 }
 
-/// A sphere of reflectance ρ around the camera and a point light of intensity I: every pixel has the radiance ρ I / (π
-/// R²), here 1.
+/// A sphere with reflectance ρ around the camera and a point light with intensity I. Every pixel has radiance
+/// ρ I / (π R²), here 1.
 fn images() -> Vec<StressRow> {
     let around =
         "[materials.w]\ndiffuse = 0.5\n[[sphere]]\ncenter = [0, 0, 0]\nradius = 5\nmaterial = \"w\"\n";
@@ -129,7 +127,7 @@ fn images() -> Vec<StressRow> {
         SceneFiles::new(render + CAMERA + around + &light)
     };
     let row = |(width, height, samples)| {
-        let name = format!("an image of {width} × {height}, {samples} samples, as 256 × 256");
+        let name = format!("{width} × {height} image, samples per pixel: {samples}, vs. 256 × 256");
         StressRow::mean(name, (sized(width, height, samples), sized(256, 256, 1)), 1.0, 1e-5).timed()
     };
     [(1, 1, 65_536), (65_536, 1, 1), (1, 65_536, 1)].map(row).into()

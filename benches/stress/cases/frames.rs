@@ -1,4 +1,4 @@
-//! The whole scene scaled and moved: the image must stay the same.
+//! Scenes that are scaled and moved as a whole, which must not change the image.
 
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use super::super::frame::Frame;
 use super::{CaseSet, SceneFiles, StressRow};
 
-/// Bound on the difference of moved images.
+/// Bound on the difference between images of moved scenes.
 const MOVED: f64 = 1e-3;
 
 /// Samples per pixel.
@@ -27,8 +27,9 @@ pub(super) fn rows(extent: CaseSet) -> Vec<StressRow> {
         ("lens", "LENS"),
         ("64 lights", "LAMPS"),
     ];
-    // Rounding at another position occasionally picks another light of the tree or another photon of a kernel, which
-    // changes one sample of many. Scenes with lights therefore run only in the long variant, with more samples.
+    // At another position, rounding occasionally picks a different light from the tree or a different photon
+    // for a kernel, which changes one sample of many. Scenes with many lights therefore run only in the long
+    // variant, with more samples.
     let settings = settings.iter().filter(|(_, setting)| extent == CaseSet::Long || *setting != "LAMPS");
     for &(name, setting) in settings {
         let is_picking = setting == PHOTONS || setting == "LAMPS";
@@ -38,10 +39,14 @@ pub(super) fn rows(extent: CaseSet) -> Vec<StressRow> {
             frames.into_iter().map(move |frame| (scene(frame), scene(Frame::PLAIN)))
         };
         let scaled = twins(steps.iter().map(|&k| Frame::scaled(k)).collect(), SAMPLES);
-        rows.push(StressRow::alike(format!("everything × 2^−30 … 2^30, {name}"), scaled.collect(), 0.0));
+        rows.push(StressRow::alike(format!("scene scaled by 2^−30 … 2^30, {name}"), scaled.collect(), 0.0));
         for &sizes in distances {
             let moved = twins(vec![Frame::moved(sizes)], moved_samples).collect();
-            rows.push(StressRow::alike(format!("everything moved by {sizes:e} sizes, {name}"), moved, MOVED));
+            rows.push(StressRow::alike(
+                format!("scene moved by {sizes:e} times its size, {name}"),
+                moved,
+                MOVED,
+            ));
         }
     }
     rows.extend(of_shapes(extent));
@@ -50,14 +55,15 @@ pub(super) fn rows(extent: CaseSet) -> Vec<StressRow> {
     rows
 }
 
-/// Placeholder setting for photons.
+/// Placeholder for photon settings.
 const PHOTONS: &str = "PHOTONS";
 
-/// Every shape with every material and both acceleration structures, far away; in the long variant also scaled.
+/// Every shape with every material and both acceleration structures, far from the origin. The long variant
+/// also scales them.
 fn of_shapes(extent: CaseSet) -> Vec<StressRow> {
     let trees: &[&str] = if extent == CaseSet::Short { &["bvh"] } else { &["bvh", "kdtree"] };
     let one = |shape: &str| {
-        // A plane cannot be a light, and has one texture tile per unit of length at every scale.
+        // A plane cannot be a light, and its texture repeats once per unit of length at every scale.
         let materials = MATERIALS.iter().filter(|name| shape != "plane" || !["lamp", "tiles"].contains(name));
         let both = materials.flat_map(|name| trees.iter().map(move |tree| (*name, *tree)));
         both.collect::<Vec<_>>()
@@ -74,14 +80,14 @@ fn of_shapes(extent: CaseSet) -> Vec<StressRow> {
     let mut rows = Vec::new();
     for shape in SHAPES {
         rows.push(StressRow::alike(
-            format!("a {shape} with every material, moved by 1e8 sizes"),
+            format!("{shape} with every material, moved by 1e8 scene sizes"),
             pairs(shape, Frame::moved(1e8)),
             MOVED,
         ));
         if extent == CaseSet::Long {
             let scaled = [-30, -11, 7, 30].into_iter().flat_map(|k| pairs(shape, Frame::scaled(k)));
             rows.push(StressRow::alike(
-                format!("a {shape} with every material, × 2^−30 … 2^30"),
+                format!("{shape} with every material, scaled by 2^−30 … 2^30"),
                 scaled.collect(),
                 0.0,
             ));
@@ -90,7 +96,7 @@ fn of_shapes(extent: CaseSet) -> Vec<StressRow> {
     rows
 }
 
-/// Every light on its own.
+/// Each light alone.
 fn of_lights(extent: CaseSet) -> Vec<StressRow> {
     let integrators: &[&str] = if extent == CaseSet::Short { &["whitted"] } else { &["whitted", "path"] };
     let picture = |frame, light: &str, integrator: &str| {
@@ -105,14 +111,14 @@ fn of_lights(extent: CaseSet) -> Vec<StressRow> {
         let moved = pairs(&[Frame::moved(1e8)]);
         let scaled = pairs(&[Frame::scaled(-30), Frame::scaled(30)]);
         [
-            StressRow::alike(format!("light: {light}, moved by 1e8 sizes"), moved, MOVED),
-            StressRow::alike(format!("light: {light}, × 2^−30 and 2^30"), scaled, 0.0),
+            StressRow::alike(format!("light: {light}, moved by 1e8 scene sizes"), moved, MOVED),
+            StressRow::alike(format!("light: {light}, scaled by 2^−30 and 2^30"), scaled, 0.0),
         ]
     });
     rows.collect()
 }
 
-/// A mesh whose file has its vertices 1e8 scene sizes from the origin.
+/// A mesh file with vertices 1e8 scene sizes from the origin.
 fn georeferenced(ending: &'static str) -> StressRow {
     let name = match ending {
         "obj" => "far.obj",
@@ -126,7 +132,7 @@ fn georeferenced(ending: &'static str) -> StressRow {
         with_files(&scene).with(name, ball(ending, frame, [0.0, 0.0, -5.0], 0.75))
     };
     let pairs = vec![(picture(Frame::moved(1e8)), picture(Frame::PLAIN))];
-    StressRow::alike(format!("vertices of a .{ending} 1e8 sizes away"), pairs, MOVED)
+    StressRow::alike(format!(".{ending} mesh with vertices 1e8 scene sizes from the origin"), pairs, MOVED)
 }
 
 const SHAPES: [&str; 10] =
@@ -165,7 +171,7 @@ fn camera(frame: Frame, more: &str) -> String {
     format!("[camera]\nposition = {from}\nlook_at = {to}\nfov = 50\n{more}\n")
 }
 
-/// A shape over a floor.
+/// A shape above a floor.
 fn around(frame: Frame, shape: &str) -> String {
     let floor = (frame.point(-4.0, -1.0, 0.0), frame.way(8.0, 0.0, 0.0), frame.way(0.0, 0.0, -8.0));
     let (corner, u, v) = floor;
@@ -237,7 +243,7 @@ fn lights_of(frame: Frame, lights: &[&str]) -> String {
     lights.iter().map(|light| one(light)).collect()
 }
 
-/// All shapes next to each other, some of them emissive, and lights.
+/// All shapes side by side, some of them emissive, and lights.
 fn everything(frame: Frame, setting: &str, samples: u32) -> SceneFiles {
     let (render, more) = match setting {
         "LENS" => ("", format!("aperture = {}\nfocus = {}", frame.length(0.0625), frame.length(5.0))),
@@ -267,14 +273,14 @@ fn everything(frame: Frame, setting: &str, samples: u32) -> SceneFiles {
     with_files(&scene)
 }
 
-/// A scene with the files that it refers to.
+/// A scene and the files it refers to.
 fn with_files(scene: &str) -> SceneFiles {
     let tiles = "P3 4 3 255 90 120 200 20 30 40 255 250 200 70 70 80 60 80 90 0 0 0 9 9 9 200 90 60 30 20 10 8 9 7 6 5 4 1 2 3";
     let ball = ball("obj", Frame::PLAIN, [0.0; 3], 1.0);
     SceneFiles::new(scene.to_owned()).with("tiles.ppm", tiles.to_owned()).with("ball.obj", ball)
 }
 
-/// A faceted ball as the text of a mesh file.
+/// A mesh file of a faceted ball.
 fn ball(ending: &str, frame: Frame, center: [f64; 3], radius: f64) -> String {
     const RINGS: usize = 9;
     const STEPS: usize = 14;
@@ -303,7 +309,7 @@ fn ball(ending: &str, frame: Frame, center: [f64; 3], radius: f64) -> String {
     mesh(ending, &points, &faces)
 }
 
-/// The text of a mesh file with points and triangles.
+/// A mesh file with the given points and triangles.
 pub(super) fn mesh(ending: &str, points: &[String], faces: &[[usize; 3]]) -> String {
     let (from, mut text) = match ending {
         "obj" => (1, String::new()),

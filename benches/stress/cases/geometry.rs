@@ -35,8 +35,8 @@ fn point(x: f64, y: f64, z: f64) -> String {
     format!("{x:?} {y:?} {z:?}")
 }
 
-/// A wall of 2 × 1024 triangles: slivers of full height with an aspect ratio of 1 : 10⁴ · 2⁻¹⁰, compared with 32 × 32
-/// squares.
+/// A wall of 32,768 triangles: full-height slivers with an aspect ratio of 1 : 12,288, compared with 128 ×
+/// 128 squares.
 fn slivers() -> StressRow {
     let wall = |columns: usize, lines: usize| {
         let at = |column: usize, line: usize| {
@@ -51,10 +51,10 @@ fn slivers() -> StressRow {
         of_mesh(mesh("obj", &points, &faces.collect::<Vec<_>>()), "")
     };
     let pairs = vec![(wall(16_384, 1), wall(128, 128))];
-    StressRow::alike("a wall of 32,768 slivers, each 1 : 12,000", pairs, 1e-3).timed()
+    StressRow::alike("wall of 32,768 slivers with aspect ratio 1 : 12,000", pairs, 1e-3).timed()
 }
 
-/// Sixteen coplanar surfaces of one material, compared with a single one.
+/// Sixteen coplanar surfaces with the same material, compared with a single surface.
 fn coplanar(kind: &str) -> StressRow {
     let layers = |count: usize| match kind {
         "mesh" => {
@@ -68,12 +68,12 @@ fn coplanar(kind: &str) -> StressRow {
             )
         }
     };
-    let what = if kind == "mesh" { "of a mesh" } else { "of quads" };
-    StressRow::alike(format!("16 layers {what} in one plane, as one"), vec![(layers(16), layers(1))], 0.0)
+    let what = if kind == "mesh" { "mesh layers" } else { "quads" };
+    StressRow::alike(format!("16 coplanar {what} vs. one"), vec![(layers(16), layers(1))], 0.0)
 }
 
-/// Needles across the scene, as long as the scene and a thousandth as thick, in one acceleration structure compared
-/// with the other.
+/// Needles as long as the scene and a thousandth as thick. Compares one acceleration structure with the
+/// other.
 fn needles(accel: &str) -> StressRow {
     let mut random = RandomNumbers(5);
     let (mut points, mut faces) = (Vec::new(), Vec::new());
@@ -87,7 +87,7 @@ fn needles(accel: &str) -> StressRow {
     let by = |accel: &str| of_mesh(text.clone(), &format!("accel = \"{accel}\""));
     let other = if accel == "bvh" { "kdtree" } else { "bvh" };
     StressRow::alike(
-        format!("20,000 needles 1 : 1000, {accel} as {other}"),
+        format!("20,000 needles with aspect ratio 1 : 1000, {accel} vs. {other}"),
         vec![(by(accel), by(other))],
         0.0,
     )
@@ -108,13 +108,13 @@ fn overlapping(count: u32, accel: &str) -> StressRow {
         }
         SceneFiles::new(scene)
     };
-    // Twice the mean distance: every point is inside about 30 spheres.
+    // Twice the mean spacing, so that every point is inside about 30 spheres.
     let spacing = (8.0 * 6.0 * 6.0 / f64::from(count)).cbrt();
     let (wide, narrow) = (2.0 * spacing, 0.25 * spacing);
     StressRow {
         figure: super::super::row::RowMeasure::Difference(0.0),
         ..StressRow::alike(
-            format!("{count} overlapping spheres, as separate ones"),
+            format!("{count} overlapping spheres vs. mostly separate spheres"),
             vec![(spheres(wide, accel), spheres(narrow, accel))],
             1.0,
         )
@@ -122,7 +122,7 @@ fn overlapping(count: u32, accel: &str) -> StressRow {
     .timed()
 }
 
-/// Concentric spheres, compared with only the outermost.
+/// Concentric spheres, compared with only the outermost sphere.
 fn nested(count: u32, accel: &str) -> StressRow {
     let spheres = |count: u32| {
         let (width, height) = if count > 10_000 { (4, 3) } else { (64, 48) };
@@ -145,7 +145,7 @@ fn nested(count: u32, accel: &str) -> StressRow {
     };
     let all = spheres(count);
     let pairs = vec![(SceneFiles::new(all.clone()), SceneFiles::new(outermost(all)))];
-    StressRow::alike(format!("{count} nested spheres, {accel}, as the outermost"), pairs, 0.0)
+    StressRow::alike(format!("{count} nested spheres vs. only the outermost, {accel}"), pairs, 0.0)
 }
 
 /// A small random number generator.

@@ -1,4 +1,4 @@
-//! Lights of extreme size and power.
+//! Lights with extreme sizes and powers.
 
 use std::f64::consts::PI;
 
@@ -59,8 +59,8 @@ fn powered(light: &str, power: f64) -> SceneFiles {
     SceneFiles::new(head(64, "") + CAMERA + THINGS + &light.replace("POWER", &format!("{power:?}")))
 }
 
-/// A light of size 1e-9 above the scene, compared with a point light of its intensity, radiance × projected area. The
-/// lit area is directly below, so that the cosine of a flat light is nearly one.
+/// A light of size 1e-9 above the scene, compared with a point light with intensity radiance × projected
+/// area. The lit area is directly below the light, so that the cosine of a flat light is nearly 1.
 fn tiny(kind: &str) -> StressRow {
     let size = 1e-9;
     // The radiance must stay finite.
@@ -79,11 +79,10 @@ fn tiny(kind: &str) -> StressRow {
     let picture = |light: String| SceneFiles::new(head(64, "") + camera + receiver + &light);
     let case = picture(format!("[materials.lamp]\ndiffuse = 0\nemission = {radiance:?}\n{lamp}"));
     let twin = picture(format!("[[light]]\nposition = [0, 2, -5]\nintensity = {:?}\n", radiance * area));
-    StressRow::alike(format!("a {kind} light of size 1e-9, as a point light"), vec![(case, twin)], 1e-3)
-        .timed()
+    StressRow::alike(format!("{kind} light of size 1e-9 vs. point light"), vec![(case, twin)], 1e-3).timed()
 }
 
-/// Under a quad of size 2e9, light arrives from the whole hemisphere: E = πL, and a floor of reflectance 0.6 has
+/// A quad of size 2e9 fills the hemisphere above the floor, so E = πL, and a floor with reflectance 0.6 has
 /// radiance 0.6 L.
 fn vast() -> StressRow {
     let picture = |size: f64| {
@@ -96,5 +95,5 @@ fn vast() -> StressRow {
         let camera = "[camera]\nposition = [0, 0, 0]\nlook_at = [0, -1, -1]\n";
         SceneFiles::new(head(64, "") + camera + floor + &lamp)
     };
-    StressRow::mean("a floor under a quad light of size 2e9", (picture(2e9), picture(2e3)), 0.6, 1e-2).timed()
+    StressRow::mean("floor under a quad light of size 2e9", (picture(2e9), picture(2e3)), 0.6, 1e-2).timed()
 }

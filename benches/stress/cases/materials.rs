@@ -1,4 +1,4 @@
-//! Glass with weak or strong refraction, wide and narrow highlights.
+//! Glass with weak and strong refraction, wide and narrow highlights.
 
 use super::{CAMERA, CaseSet, SceneFiles, StressRow, furnace, head, signs};
 
@@ -11,19 +11,19 @@ pub(super) fn rows(_: CaseSet) -> Vec<StressRow> {
     let clear = |ior: &str| (signs("", CAMERA, &ball(ior)), signs("", CAMERA, ""));
     let white = |ior: &str| (furnace(64, CAMERA, &ball(ior)), furnace(64, CAMERA, &ball("1.5")));
     vec![
-        StressRow::alike("a ball of ior 1, as without it", vec![clear("1")], 1e-3),
-        StressRow::alike("a ball of ior 1.000001, as without it", vec![clear("1.000001")], 1e-3),
-        StressRow::mean("a ball of ior 3 under uniform light", white("3"), 1.0, 1e-3).timed(),
-        StressRow::mean("a ball of ior 1 under uniform light", white("1"), 1.0, 1e-3).timed(),
-        StressRow::mean("a ball of ior 1.000001 under uniform light", white("1.000001"), 1.0, 1e-3).timed(),
+        StressRow::alike("ball with IOR 1 vs. no ball", vec![clear("1")], 1e-3),
+        StressRow::alike("ball with IOR 1.000001 vs. no ball", vec![clear("1.000001")], 1e-3),
+        StressRow::mean("ball with IOR 3 under uniform light", white("3"), 1.0, 1e-3).timed(),
+        StressRow::mean("ball with IOR 1 under uniform light", white("1"), 1.0, 1e-3).timed(),
+        StressRow::mean("ball with IOR 1.000001 under uniform light", white("1.000001"), 1.0, 1e-3).timed(),
         wide_highlight(),
         narrow_highlight("whitted"),
         narrow_highlight("path"),
     ]
 }
 
-/// The exponent 0 gives 2/2π everywhere on the side of the reflected ray; compared with a diffuse surface, under a
-/// light at the camera.
+/// With exponent 0, the Phong lobe is 2/2π everywhere on the side of the reflected ray. Compared with a
+/// diffuse surface lit from the camera.
 fn wide_highlight() -> StressRow {
     let picture = |material: &str| {
         let floor = format!(
@@ -32,11 +32,11 @@ fn wide_highlight() -> StressRow {
         SceneFiles::new(head(64, "") + CAMERA + &floor + "[[light]]\nposition = [0, 0, 0]\nintensity = 9\n")
     };
     let pair = (picture("diffuse = 0\nspecular = 0.6\nshininess = 0"), picture("diffuse = 0.6"));
-    StressRow::alike("a highlight with exponent 0, as diffuse", vec![pair], 1e-5).timed()
+    StressRow::alike("Phong exponent 0 vs. diffuse", vec![pair], 1e-5).timed()
 }
 
-/// The exponent 1e5 reflects light within 0.3°; compared with a mirror, under uniform light. The factor is the cosine,
-/// here nearly 1.
+/// With exponent 1e5, reflection is within 0.3° of the mirror direction. Compared with a mirror under uniform
+/// light; the results differ by a cosine that is nearly 1 here.
 fn narrow_highlight(integrator: &str) -> StressRow {
     let picture = |material: &str| {
         let wall = format!(
@@ -49,6 +49,5 @@ fn narrow_highlight(integrator: &str) -> StressRow {
         picture("diffuse = 0\nspecular = 0.9\nshininess = 1e5"),
         picture("type = \"mirror\"\nreflectance = 0.9"),
     );
-    StressRow::mean(format!("a highlight with exponent 1e5 with {integrator}, as a mirror"), pair, 0.9, 1e-3)
-        .timed()
+    StressRow::mean(format!("Phong exponent 1e5 vs. mirror, {integrator}"), pair, 0.9, 1e-3).timed()
 }

@@ -14,15 +14,15 @@ pub(crate) fn rows(extent: CaseSet) -> Vec<StressRow> {
     groups.into_iter().flat_map(|group| group(extent)).collect()
 }
 
-/// The `[render]` table of a small scene, with additional keys.
+/// The `[render]` table of a small scene with additional keys.
 fn head(samples: u32, more: &str) -> String {
     format!("[render]\nwidth = 64\nheight = 48\nsamples = {samples}\n{more}\n")
 }
 
-/// A camera at the origin that looks along −z.
+/// A camera at the origin looking along −z.
 const CAMERA: &str = "[camera]\nposition = [0, 0, 0]\nlook_at = [0, 0, -5]\n";
 
-/// Emissive objects all around, which need no light samples.
+/// Emissive objects on all sides, visible without light samples.
 const SIGNS: &str = r#"
 [materials]
 red = { diffuse = 0, emission = [0.9, 0.2, 0.1] }
@@ -44,13 +44,13 @@ v = [0, 0, -40]
 material = "blue"
 "#;
 
-/// The emissive objects, path-traced, with keys of `[render]` and other elements.
+/// A path-traced scene of the emissive objects, with additional `[render]` keys and elements.
 fn signs(more: &str, camera: &str, rest: &str) -> SceneFiles {
     let render = head(16, &format!("integrator = \"path\"\nbackground = [0.3, 0.4, 0.5]\n{more}"));
     SceneFiles::new(format!("{render}{camera}{SIGNS}{rest}"))
 }
 
-/// A white furnace, path-traced: every pixel has the radiance 1 unless light is lost.
+/// A path-traced white furnace. Every pixel has radiance 1 unless energy is lost.
 fn furnace(samples: u32, camera: &str, rest: &str) -> SceneFiles {
     let render = head(samples, "integrator = \"path\"\nmax_depth = 64");
     SceneFiles::new(format!("{render}{camera}[environment]\ncolor = [1, 1, 1]\n{rest}"))

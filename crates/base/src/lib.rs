@@ -1,5 +1,5 @@
-//! Shared foundations of glimt: numbers, color, random samples, films, named choices and the operating
-//! system. See the crate `glimt` for an overview.
+//! Shared foundations of glimt: math, color, random sampling, films, named choices and operating system
+//! access. See the `glimt` crate for an overview.
 
 pub mod choice;
 pub mod control;

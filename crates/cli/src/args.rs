@@ -50,16 +50,16 @@ pub(super) const EXIT_CODES: &str = "\
 0 success; 1 failure; 2 invalid arguments or scene; \
 130, 143 or 129 terminated by SIGINT, SIGTERM or SIGHUP.";
 
-/// Width of the help in columns: `COLUMNS`, or the terminal's width, or 80.
+/// Help width in columns: `COLUMNS`, the terminal's width, or 80.
 fn help_columns() -> usize {
     let columns = std::env::var("COLUMNS").ok().and_then(|columns| columns.parse().ok());
     columns.filter(|columns| *columns > 0).unwrap_or_else(answer_columns)
 }
 
-/// Text after the options of `-h`.
+/// Text after the options in `-h`.
 const AFTER_HELP: &str = "Run `glimt --help` for details and examples.";
 
-/// Text after the options of `--help`.
+/// Text after the options in `--help`.
 fn after_long_help() -> String {
     format!("Examples:\n{EXAMPLES}\n\nExit codes: {EXIT_CODES}\n\n{}", environment::section())
 }
@@ -78,13 +78,13 @@ pub struct Args {
     /// A command other than rendering.
     #[command(subcommand)]
     pub command: Option<Subcommand>,
-    /// Scene and options of a render.
+    /// Scene and render options.
     #[command(flatten)]
     pub render: RenderArgs,
 }
 
 impl Args {
-    /// The color option of the command.
+    /// The command's color option.
     pub(super) fn color(&self) -> ColorChoice {
         match &self.command {
             Some(Subcommand::Check { color, .. }) => *color,
@@ -126,7 +126,7 @@ pub enum Subcommand {
         #[arg(long, value_parser = one_of::<ColorChoice>(), hide_possible_values = true, long_help = listed::<ColorChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW")]
         color: ColorChoice,
     },
-    /// Write a commented scene to start from; never overwrites a file
+    /// Write a commented starter scene; never overwrites a file
     New {
         /// The file to write, or - for stdout
         file: PathBuf,
@@ -145,7 +145,7 @@ pub enum Subcommand {
     /// Measure the error of an image against a reference
     #[command(after_long_help = COMPARE_HELP)]
     Compare(CompareArgs),
-    /// Measure the error of rendering methods against their time
+    /// Measure error against time for rendering methods
     #[command(after_long_help = bench::HELP)]
     Bench(Box<BenchArgs>),
     /// Merge the parts of an image rendered with --shard
@@ -177,7 +177,7 @@ pub enum Subcommand {
     /// Print the JSON Schema of scenes, for editors
     #[command(after_long_help = SCHEMA_HELP)]
     Schema {
-        /// Draft of JSON Schema
+        /// JSON Schema draft
         #[arg(long, value_parser = one_of::<Draft>(), default_value = "4", value_name = "DRAFT")]
         draft: Draft,
     },
@@ -224,7 +224,7 @@ uses the schema in its folder. `glimt new --schema` writes both. Names of materi
 only by `glimt check`.";
 
 choice! {
-    /// Drafts of JSON Schema.
+    /// JSON Schema drafts.
     pub enum Draft {
         /// Draft 4, which Taplo supports.
         Four = "4",
@@ -341,7 +341,7 @@ arguments or files, such as different sizes or values that are not finite.";
 pub struct CompareArgs {
     /// The image to measure: png, jpg, ppm, tga, bmp, webp, exr or hdr
     pub a: PathBuf,
-    /// The reference, of the same size
+    /// The reference image, with the same size
     pub b: PathBuf,
     /// Exit with 1 if relMSE is above X
     #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = error_bound)]
@@ -354,7 +354,7 @@ pub struct CompareArgs {
     pub diff: Option<PathBuf>,
     /// Print one JSON object on stdout
     ///
-    /// Unknown values are null, as is psnr_db for equal images.
+    /// Unknown values are null. psnr_db is null for equal images.
     #[arg(long)]
     pub json: bool,
     /// Show the images and their difference: auto, on, off
@@ -387,8 +387,8 @@ pub struct RenderArgs {
     pub outputs: Vec<PathBuf>,
     /// Extra channels (AOVs) in EXR files, with --once
     ///
-    /// Either all, or a comma-separated list of albedo, normal, depth, variance, samples, ambient, diffuse, specular and
-    /// emission.
+    /// All, or a comma-separated list of albedo, normal, depth, variance, samples, ambient, diffuse, specular
+    /// and emission.
     #[arg(long, value_name = "all|LIST", value_parser = layers, help_heading = "Output")]
     pub layers: Option<Layers>,
     /// Bits per channel of PNG files: 8 or 16
@@ -407,7 +407,7 @@ pub struct RenderArgs {
 
     /// Render part I of N, with --once
     ///
-    /// -o is the file of the part. `glimt merge` merges the parts.
+    /// -o names the file for this part. `glimt merge` merges the parts.
     #[arg(long, value_name = "I/N", allow_hyphen_values = true, value_parser = shard, help_heading = "Long renders")]
     pub shard: Option<(u32, u32)>,
     /// Interval between checkpoints; 0 disables them
@@ -420,7 +420,7 @@ pub struct RenderArgs {
     pub resume: bool,
     /// Keep the checkpoint of a finished render
     ///
-    /// --resume with more --samples continues from it.
+    /// Use --resume with more --samples to continue.
     #[arg(long, help_heading = "Long renders")]
     pub keep_checkpoint: bool,
     /// Refuse to use more memory, such as 8GiB or 500MB
@@ -436,12 +436,12 @@ pub struct RenderArgs {
     /// Maximum samples per pixel
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole_of("samples"), help_heading = "Image")]
     pub samples: Option<u32>,
-    /// Noise at which a tile is finished; 0 disables it
+    /// Noise threshold for finishing a tile; 0 disables it
     #[arg(long, value_name = "E", allow_negative_numbers = true, value_parser = number_of("error", ERROR), help_heading = "Image")]
     pub error: Option<f32>,
     /// Stop after this time
     ///
-    /// Until then, pixels are sampled where that lowers the error most.
+    /// Until then, glimt samples the pixels where this reduces the error most.
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = seconds, help_heading = "Image")]
     pub time: Option<f64>,
     /// Render only this rectangle: left, top, width, height
@@ -458,8 +458,8 @@ pub struct RenderArgs {
     pub up: Option<UpAxis>,
     /// Render N frames around look_at, with --once
     ///
-    /// -o is a file per frame, such as name_####.png, or an animation, .gif or .apng. --samples, --error and --time apply
-    /// to each frame.
+    /// -o is either a pattern for one file per frame, such as name_####.png, or an animation (.gif or .apng).
+    /// --samples, --error and --time apply to each frame.
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = turntable, help_heading = "Image")]
     pub turntable: Option<u32>,
     /// Random seed
@@ -505,9 +505,9 @@ pub struct RenderArgs {
     /// Colors: auto, truecolor, 256, 16, none
     #[arg(long, value_parser = one_of::<ColorChoice>(), hide_possible_values = true, long_help = listed::<ColorChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
     pub color: ColorChoice,
-    /// Notify after renders longer than this; 0 disables it
+    /// Minimum render time for notifications; 0 disables them
     ///
-    /// Shows a desktop notification through the terminal when a longer render ends while the window is not focused.
+    /// When a longer render ends while the window is not focused, the terminal shows a desktop notification.
     #[arg(long, allow_negative_numbers = true, value_parser = notification_time, default_value = "30", value_name = "SECONDS", help_heading = "Terminal")]
     pub notify_after: f64,
     /// Poll files instead of using system notifications
@@ -541,7 +541,7 @@ impl RenderArgs {
                 resume: match (self.resume, self.once) {
                     (true, true) => Resume::Asked,
                     (false, true) => Resume::No,
-                    // Continue after a dropped connection. After an edit there is no checkpoint of the new image.
+                    // Continue after a dropped connection. If the scene was edited, no checkpoint matches it.
                     (_, false) => Resume::IfSame,
                 },
                 are_kept: self.keep_checkpoint,
@@ -567,7 +567,8 @@ choice! {
         Auto = "auto",
         /// Occasional lines.
         Plain = "plain",
-        /// One JSON object per line. Its key "event" is stage, asset, progress, written, done, failed or cancelled.
+        /// One JSON object per line. The key "event" is stage, asset, progress, written, done, failed or
+        /// cancelled.
         Json = "json",
         /// Only errors and warnings.
         None = "none",
@@ -602,7 +603,7 @@ impl From<Switch> for bool {
     }
 }
 
-/// Parses a choice by its name.
+/// Parses a choice by name.
 fn one_of<C: Choice>() -> impl TypedValueParser<Value = C> {
     let known = C::ALL.iter().map(|one| PossibleValue::new(one.name()).help(one.meaning()));
     let other = C::UNAVAILABLE.iter().map(|&name| PossibleValue::new(name).help(UNAVAILABLE));
@@ -614,20 +615,20 @@ fn one_of<C: Choice>() -> impl TypedValueParser<Value = C> {
 
 const UNAVAILABLE: &str = "not available in this version";
 
-/// Long help of an option with the values of a choice, in the format of clap.
+/// Long help that lists the values of a choice, in clap's format.
 fn listed<C: Choice>(about: &str) -> String {
     let values: String = C::ALL.iter().map(|one| format!("\n- {}: {}", one.name(), one.meaning())).collect();
     format!("{about}\n\nPossible values:{values}")
 }
 
-/// Long help of `--output`, with the extensions of all formats that glimt writes.
+/// Long help for `--output`, with the extensions of all supported formats.
 fn outputs_help() -> String {
-    // Skip jpeg, the same format as jpg.
+    // Skip jpeg: it is the same format as jpg.
     let still: Vec<_> = Format::extensions().filter(|ending| *ending != "jpeg").collect();
     let moving: Vec<_> = AnimationFormat::extensions().collect();
     format!(
         "Output file; can be given several times\n\n\
-         The extension chooses the format: {}; with --turntable also {}. The default is the scene's `output`, relative to \
+         The extension determines the format: {}; with --turntable also {}. The default is the scene's `output`, relative to \
          the scene, or else the scene's name with .png, in the current folder.",
         still.join(", "),
         moving.join(", ")
@@ -690,7 +691,7 @@ fn seconds(text: &str) -> Result<f64, String> {
     }
 }
 
-/// Parses the checkpoint interval.
+/// Parses a checkpoint interval.
 fn checkpoint_interval(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(seconds) if seconds >= 0.0 && seconds.is_finite() => Ok(seconds),
@@ -698,7 +699,7 @@ fn checkpoint_interval(text: &str) -> Result<f64, String> {
     }
 }
 
-/// Parses the time for notifications.
+/// Parses the render time after which to notify.
 fn notification_time(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(seconds) if seconds >= 0.0 && seconds.is_finite() => Ok(seconds),
@@ -727,7 +728,7 @@ fn memory(text: &str) -> Result<u64, String> {
     if (1.0..1e18).contains(&bytes) { Ok(bytes as u64) } else { Err(expected()) }
 }
 
-/// Parses the number of a part and the number of parts.
+/// Parses `I/N`: a part's number and the number of parts.
 fn shard(text: &str) -> Result<(u32, u32), String> {
     let numbers =
         text.split_once('/').and_then(|(index, count)| Some((index.parse().ok()?, count.parse().ok()?)));

@@ -1,5 +1,5 @@
-//! Output to stderr and stdout outside of the terminal UI. Errors of stderr are ignored. Errors of stdout, such as a full disk,
-//! determine the exit code. All text is sanitized.
+//! Output to stderr and stdout outside of the terminal UI. Ignores errors when writing to stderr. Errors when
+//! writing to stdout, such as a full disk, determine the exit code. Sanitizes all text.
 
 use std::cell::RefCell;
 use std::io::{self, IsTerminal, Write};
@@ -17,7 +17,7 @@ use crate::tui::ColorChoice;
 pub(super) struct Console {
     style: Style,
     pub(super) is_terminal: bool,
-    /// The first error of stdout that is not a closed pipe.
+    /// The first error from stdout other than a closed pipe.
     stdout_error: Rc<RefCell<Option<io::Error>>>,
 }
 
@@ -46,7 +46,7 @@ impl Console {
         }
     }
 
-    /// Prints a line to stderr. Line ends within the text become visible.
+    /// Prints a line to stderr. Replaces line breaks within the text with visible characters.
     pub(super) fn say(&self, text: &str) {
         let line = format!("{}\n", visible(text));
         let _ = std::io::stderr().lock().write_all(line.as_bytes());
@@ -73,10 +73,10 @@ impl Console {
         self.note(stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()));
     }
 
-    /// Records an error of writing to stdout.
+    /// Records an error from writing to stdout.
     pub(super) fn note(&self, written: io::Result<()>) {
         match written {
-            // A closed pipe is not an error: the reader has seen enough.
+            // Ignore a closed pipe: the reader, such as `head`, does not want more output.
             Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
                 *self.stdout_error.borrow_mut() = Some(error);
             }
@@ -84,7 +84,7 @@ impl Console {
         }
     }
 
-    /// The exit code of the program: a failure if stdout could not be written.
+    /// The program's exit code: failure if writing to stdout failed.
     pub(super) fn end(&self, exit: Exit) -> Exit {
         match self.stdout_error.take() {
             Some(error) if exit == Exit::DONE => {
@@ -113,7 +113,7 @@ fn columns() -> usize {
     terminal_columns(io::stderr().is_terminal()).unwrap_or(DEFAULT_COLUMNS)
 }
 
-/// Width of text on stdout in columns: the terminal's, or 80.
+/// Text width on stdout in columns: the terminal's width, or 80.
 pub(super) fn answer_columns() -> usize {
     terminal_columns(io::stdout().is_terminal()).unwrap_or(80)
 }

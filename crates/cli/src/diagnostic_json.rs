@@ -5,8 +5,8 @@ use serde_json::{Value, json};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::report::Locator;
 
-/// Converts a diagnostic. Lines and columns start at 1, columns count characters, and the end is exclusive. Missing values are
-/// null.
+/// Converts a diagnostic. Lines and columns start at 1. Columns count characters. The end is exclusive.
+/// Missing values are null.
 pub(super) fn diagnostic(one: &Diagnostic, places: &mut Locator) -> Value {
     let severity = match one.severity {
         Severity::Error => "error",

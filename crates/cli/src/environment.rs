@@ -1,4 +1,5 @@
-//! Environment variables read by glimt, with descriptions for the help, the manual page and the documentation.
+//! Environment variables used by glimt, with descriptions for the help, the manual page and the
+//! documentation.
 
 /// Comma-separated names of related variables, and their effect.
 pub const VARIABLES: [(&str, &str); 14] = [
@@ -21,7 +22,7 @@ pub const VARIABLES: [(&str, &str); 14] = [
     ("GLIMT_COMPLETE", "set by shell completion scripts: print candidates and exit"),
 ];
 
-/// The section `Environment` of the help.
+/// The `Environment` section of the help.
 pub(super) fn section() -> String {
     let line = |(names, effect): &(&str, &str)| format!("\n  {names}\n          {}", effect.replace('`', ""));
     format!("Environment:{}", VARIABLES.iter().map(line).collect::<String>())

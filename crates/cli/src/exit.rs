@@ -9,7 +9,7 @@ pub struct Exit(pub u8);
 impl Exit {
     /// Success.
     pub const DONE: Self = Self(0);
-    /// The work failed.
+    /// Rendering or another task failed.
     pub const FAILED: Self = Self(1);
     /// The arguments or the scene are invalid.
     pub const WRONG: Self = Self(2);

@@ -1,4 +1,4 @@
-//! The command line: arguments, the headless front end, and the wiring of the terminal's.
+//! The command line: arguments, the headless front end, and the setup of the terminal UI.
 //!
 //! Arguments ([`args`]) are validated and lowered (`lower`) before any work starts.
 
@@ -16,7 +16,7 @@ mod once;
 mod progress;
 mod signals;
 
-// Modules of lower crates, under the names used throughout the workspace.
+// Modules of lower-level crates, under the names used throughout the workspace.
 use glimt_base::{choice, control, film, math, system};
 use glimt_files::{compare, output};
 use glimt_kernel::accel;
@@ -36,8 +36,8 @@ pub use self::exit::Exit;
 use crate::scene::nearest::nearest;
 use crate::scene::sanitize::visible;
 
-/// Makes work in rayon's global thread pool panic in tests: that pool ignores `--threads`, and panics if the system has no threads
-/// left. After a failed attempt, rayon does not start the pool again.
+/// Makes any use of rayon's global thread pool panic in debug builds, because that pool ignores `--threads`
+/// and panics if the system is out of threads. Rayon does not retry after the failed initialization here.
 #[cfg(debug_assertions)]
 fn forbid_global_pool() {
     let refuse = |_| Err(std::io::Error::other("the global pool is not used"));
@@ -49,7 +49,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> Exit {
     #[cfg(debug_assertions)]
     forbid_global_pool();
     crate::output::write::prepare_process();
-    // If the handler cannot be installed, an abort ends the process as usual.
+    // Without the handler, an abort ends the process as usual.
     let _ = crate::system::abort::catch();
     let arguments: Vec<OsString> = arguments.into_iter().collect();
     if let Some(exit) = commands::completions::answer(&arguments) {
@@ -99,7 +99,7 @@ fn render(order: lower::Order, console: &Console) -> Exit {
     }
 }
 
-/// Text for a call without arguments.
+/// Text printed without arguments.
 const GETTING_STARTED: &str = "\
 glimt renders a scene file in the terminal and updates it on every save.
 
@@ -109,7 +109,7 @@ glimt renders a scene file in the terminal and updates it on every save.
 
 Run `glimt -h` for all commands and options.";
 
-/// Handles a call without arguments.
+/// Runs glimt without arguments.
 fn run_without_arguments() -> Exit {
     Console::new(crate::tui::ColorChoice::Auto).say_lines(GETTING_STARTED);
     Exit::WRONG
@@ -129,7 +129,8 @@ fn report_parse_error(error: &clap::Error, arguments: &[OsString]) -> Exit {
         let message = format!("glimt takes one scene; got a second: {second:?}");
         return console.fail(Exit::WRONG, &message);
     }
-    // clap's message contains the arguments, so parse sanitized ones again to get a message that is safe to print.
+    // clap's message contains the arguments. Parse sanitized arguments to get a message that is safe to
+    // print.
     let shown = arguments.iter().map(|argument| visible(&argument.to_string_lossy()).into_owned());
     match Args::try_parse_from(shown) {
         Err(error) if error.use_stderr() => {
@@ -140,13 +141,13 @@ fn report_parse_error(error: &clap::Error, arguments: &[OsString]) -> Exit {
     Exit::WRONG
 }
 
-/// Message about a first argument that looks like a mistyped command.
+/// Error message if the first argument looks like a mistyped command.
 fn unknown_command(arguments: &[OsString]) -> Option<String> {
     // A later argument may be the value of an option.
     mistyped_command(Path::new(arguments.get(1)?))
 }
 
-/// Message about a scene argument that looks like a mistyped command.
+/// Error message if the scene argument looks like a mistyped command.
 fn mistyped_command(word: &Path) -> Option<String> {
     let first = word.to_string_lossy();
     if first.contains(['.', '/']) || first.starts_with('-') || word.symlink_metadata().is_ok() {
@@ -161,7 +162,7 @@ fn mistyped_command(word: &Path) -> Option<String> {
     Some(format!("no such command or scene: {:?}; {help}", visible(&first)))
 }
 
-/// The extra argument after a scene that is neither an option nor a command.
+/// An extra argument after the scene that is neither an option nor a command.
 fn second_scene(error: &clap::Error) -> Option<&str> {
     use clap::error::{ContextKind, ContextValue, ErrorKind};
     let word = match error.get(ContextKind::InvalidSubcommand).or(error.get(ContextKind::InvalidArg)) {

@@ -19,8 +19,8 @@ use crate::system::threads::start_failure;
 use crate::tui::messages::WAITING_FOR_FILE;
 use crate::tui::{self, ExitStatus, Options, TuiError, TuiOutcome};
 
-/// Time to wait at exit for an image that is being written: after a signal before giving up, after a key before telling the
-/// user.
+/// How long to wait at exit for an image to be written. After that, glimt exits if it received a signal. If
+/// the user pressed a key, glimt prints a message and keeps waiting.
 const EXIT_TIMEOUT: Duration = Duration::from_secs(2);
 
 /// Line printed if glimt exits before the image is written.
@@ -45,7 +45,7 @@ fn live(order: Order, console: &Console) -> Result<Exit, (Exit, String)> {
     let mut worker = start(order.nice).map_err(no_thread)?;
     let (sender, news) = channel();
     let watcher = Watcher::start(order.poll, worker.contents(), move |said| {
-        // Ignore a front end that has exited.
+        // Ignore the error if the front end has exited.
         let _ = sender.send(said);
     })
     .map_err(no_thread)?;
@@ -112,9 +112,9 @@ fn live(order: Order, console: &Console) -> Result<Exit, (Exit, String)> {
     })
 }
 
-/// Lines printed after the terminal UI: unreported results of writing, then after `q` the summary (if there are none, or if a
-/// write failed while earlier files exist), then the checkpoint and lost changes. `lost` are outputs changed by other programs,
-/// and `call` is this command line.
+/// Lines printed after the terminal UI exits: unreported writes, the summary, the checkpoint and lost
+/// changes. The summary is only printed after `q`, if there are no unreported writes or if a write failed and
+/// earlier files exist. `lost` contains the outputs changed by other programs. `call` is this command line.
 fn last_words(
     writes: &Writes,
     ended: &TuiOutcome,
@@ -152,7 +152,7 @@ fn call() -> String {
     format!("glimt {}", words.collect::<Vec<_>>().join(" "))
 }
 
-/// The error about a scene that does not exist at the start. glimt waits for a scene that disappears later.
+/// Error if the scene does not exist at startup. If the scene disappears later, glimt waits for it.
 fn absent(scene: &Path) -> Option<Diagnostic> {
     if scene.symlink_metadata().is_ok() {
         return None;
@@ -167,12 +167,13 @@ struct Writes(Arc<Mutex<WriteLog>>);
 /// Results of writing images.
 #[derive(Debug, Default)]
 struct WriteLog {
-    /// A line for each image since the last write command, and whether it came after the UI exited.
+    /// A line about each image since the last write command, and whether the image was written after the UI
+    /// exited.
     lines: Vec<(bool, String)>,
     /// Whether an image was written since the last write command.
     has_written: bool,
     has_left: bool,
-    /// The checkpoint written after the UI exited, or the reason why there is none.
+    /// The checkpoint written after the UI exited, or why there is none.
     checkpoint: Option<Result<PathBuf, String>>,
     /// Whether a request is in its last stage.
     is_last_stage: bool,
@@ -183,7 +184,7 @@ impl Writes {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Records a write command of the user.
+    /// Records that the user gave a write command.
     fn start(&self) {
         let mut log = self.state();
         log.lines.clear();
@@ -253,12 +254,13 @@ impl Writes {
         }
     }
 
-    /// The checkpoint written after the UI exited, or the reason why there is none.
+    /// The checkpoint written after the UI exited, or why there is none.
     fn checkpoint(&self) -> Option<Result<PathBuf, String>> {
         self.state().checkpoint.clone()
     }
 
-    /// Lines about images that the UI has not reported: those after it exited, or all since an unanswered write command.
+    /// Lines about images not reported by the UI: images written after it exited, or all images since an
+    /// unanswered write command.
     fn unreported(&self, is_unanswered: bool, has_ended: bool) -> Vec<String> {
         let log = self.state();
         let unknown = log.lines.iter().filter(|(has_left, _)| is_unanswered || *has_left);
@@ -298,7 +300,7 @@ fn forward_events(
     }
 }
 
-/// Replaces the help of the error about a missing scene: the UI waits for it to appear.
+/// Changes the help text for a missing scene to say that the UI waits for the scene to appear.
 fn await_scene(problem: &mut Diagnostic) {
     if is_absence(problem) {
         // Keep a suggestion for a typo or a renamed scene.
@@ -374,7 +376,7 @@ mod tests {
     }
 
     #[test]
-    fn missing_scenes_are_awaited() {
+    fn help_for_missing_scenes_mentions_waiting() {
         let folder = tempfile::tempdir().expect("a folder");
         let said = |name: &str| {
             let [mut problem] = crate::scene::load(&folder.path().join(name), &[])

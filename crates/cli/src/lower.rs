@@ -1,4 +1,4 @@
-//! Validates the arguments of a render and lowers them to an [`Order`].
+//! Validates render arguments and lowers them to an [`Order`].
 
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -28,7 +28,7 @@ pub(super) struct Order {
     pub(super) color: ColorChoice,
     pub(super) poll: bool,
     pub(super) notify_after: f64,
-    /// Niceness: of the process with `is_once`, otherwise of the render threads.
+    /// Niceness of the whole process if `is_once`, otherwise of the render threads only.
     pub(super) nice: u8,
 }
 
@@ -42,13 +42,13 @@ impl Order {
 /// Validates and lowers the arguments.
 ///
 /// # Errors
-/// A message with a hint.
+/// An error message with a hint.
 pub(super) fn lower(args: RenderArgs) -> Result<Order, String> {
     match args.shard {
         Some(_) if !args.once => {
             return Err("--shard needs --once: the terminal UI renders complete images".to_owned());
         }
-        // A part can have any file name.
+        // Parts can have any file name.
         Some(_) => {}
         None if args.turntable.is_some() => check_turntable(&args)?,
         None => check_outputs(&args.outputs)?,
@@ -70,7 +70,7 @@ pub(super) fn lower(args: RenderArgs) -> Result<Order, String> {
     }
     let mut overrides = args.overrides();
     if overrides.turn.is_some() {
-        // A single frame is quick to render again, and finished frames are files.
+        // Disable checkpoints: finished frames are saved, and a single frame renders quickly.
         overrides.checkpoints.seconds = 0.0;
     }
     if overrides.report.as_deref() == Some(Path::new(STDOUT_NAME)) {
@@ -94,7 +94,7 @@ pub(super) fn lower(args: RenderArgs) -> Result<Order, String> {
     })
 }
 
-/// Checks that every frame of a turntable has its own file, and that no single-image options are given.
+/// Checks that every frame of a turntable has its own file and that no options for single images are given.
 fn check_turntable(args: &RenderArgs) -> Result<(), String> {
     if !args.once {
         return Err("--turntable needs --once: the terminal UI shows one image".to_owned());
@@ -107,14 +107,15 @@ fn check_turntable(args: &RenderArgs) -> Result<(), String> {
     let mut known = HashSet::new();
     for path in &args.outputs {
         if AnimationFormat::from_path(path).is_none() {
-            Format::from_path(path).map_err(|error| format!("{error}, or for a turntable .gif, .apng"))?;
+            Format::from_path(path)
+                .map_err(|error| format!("{error}; a turntable also accepts .gif and .apng"))?;
         }
         turntable::check_name(path)?;
         check_once(path, &mut known)?;
     }
     if let Some(twin) = turntable::twin(&args.outputs, args.turntable.unwrap_or(1)) {
         let name = twin.display();
-        return Err(format!("{name} would be written twice: choose file names that differ more"));
+        return Err(format!("{name} would be written twice: choose distinct file names"));
     }
     match &args.report {
         Some(path) if path != Path::new(STDOUT_NAME) && !turntable::has_number(path) => {
@@ -125,7 +126,7 @@ fn check_turntable(args: &RenderArgs) -> Result<(), String> {
     }
 }
 
-/// Adds a path, or rejects it if it is already known.
+/// Adds a path to `known`. Rejects duplicates.
 fn check_once<'a>(path: &'a Path, known: &mut HashSet<&'a Path>) -> Result<(), String> {
     if !known.insert(path) {
         return Err(format!("-o {} is given twice", path.display()));
@@ -133,7 +134,7 @@ fn check_once<'a>(path: &'a Path, known: &mut HashSet<&'a Path>) -> Result<(), S
     Ok(())
 }
 
-/// Checks that all extensions are known and no output is given twice.
+/// Checks that all extensions are known and that no output is given twice.
 fn check_outputs(outputs: &[PathBuf]) -> Result<(), String> {
     let mut known = HashSet::new();
     for path in outputs {
@@ -171,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn defaults_override_nothing() {
+    fn default_arguments_override_no_settings() {
         let order = lowered("a.toml").expect("right");
         let checkpoints = Checkpoints { seconds: 60.0, resume: Resume::IfSame, are_kept: false };
         assert_eq!(order.overrides, Overrides { checkpoints, ..Overrides::default() });
@@ -260,16 +261,16 @@ mod tests {
         }
     }
 
-    /// Options accept and reject the same values as their keys of `[render]`.
+    /// Options accept and reject the same values as the corresponding keys of `[render]`.
     #[test]
-    fn options_have_the_ranges_of_their_keys() {
+    fn options_have_the_same_ranges_as_keys() {
         let command = Args::command();
         for key in description::Render::keys() {
             let name = key.name.replace('_', "-");
             let option = command.get_arguments().find(|option| option.get_long() == Some(&*name));
             assert_eq!(option.is_some(), key.has_option, "--{name}");
             let Some(option) = option else { continue };
-            assert!(option.get_help().is_some(), "--{name} has help");
+            assert!(option.get_help().is_some(), "--{name} has no help");
             let (accepted, refused) = match key.range {
                 KeyRange::Whole(range) => {
                     let (least, most) = (i64::from(*range.start()), i64::from(*range.end()));
@@ -280,12 +281,12 @@ mod tests {
                     (ends.map(|end| end.to_string()).to_vec(), vec![*range.start() as i64 - 1])
                 }
                 KeyRange::Names(names) => (names.into_iter().map(str::to_owned).collect(), Vec::new()),
-                KeyRange::Color => panic!("--{name} is a color"),
+                KeyRange::Color => panic!("--{name}: no option takes a color"),
             };
             let refused = refused.iter().map(i64::to_string).chain(["another".to_owned()]);
             for value in accepted {
                 let order = lowered(&format!("a.toml --{name} {value}")).expect(&name);
-                assert_ne!(order.overrides, Overrides::default(), "--{name} {value} arrives");
+                assert_ne!(order.overrides, Overrides::default(), "--{name} {value} has no effect");
             }
             for value in refused {
                 assert!(lowered(&format!("a.toml --{name} {value}")).is_err(), "--{name} {value}");

@@ -1,16 +1,16 @@
 //! Redraws the image of `merge --watch` in place.
 
-/// Lines at the bottom of the terminal that are replaced by the next version.
+/// Lines at the bottom of the terminal, replaced on every update.
 #[derive(Debug, Default)]
 pub(super) struct Block {
     rows: usize,
-    /// Columns of the terminal when the lines were printed.
+    /// Terminal width in columns when the lines were printed.
     columns: usize,
 }
 
 impl Block {
-    /// Returns the output that replaces the block by `lines`. After a change of the terminal's width, the old lines stay, as they
-    /// may have been rewrapped.
+    /// Returns the output that replaces the block with `lines`. If the terminal's width has changed, keeps
+    /// the old lines, which the terminal may have rewrapped.
     pub(super) fn redrawn(&mut self, lines: &str, columns: usize) -> String {
         let up = if self.rows > 0 && self.columns == columns {
             format!("\x1b[{}A\r\x1b[J", self.rows)

@@ -23,14 +23,14 @@ use crate::system::threads::start_failure;
 
 /// Time limit for exiting after a signal.
 const EXIT_TIMEOUT: Duration = Duration::from_secs(2);
-/// Time limit for finishing an image after a signal. After that a checkpoint is written instead.
+/// Time limit for finishing an image after a signal. After this time, a checkpoint is written instead.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(1);
 /// Interval for checking signals.
 const TICK: Duration = Duration::from_millis(50);
 
 /// Runs `--once`.
 pub(super) fn run(order: &Order, console: &Console) -> Exit {
-    // Lower the priority before starting threads, which inherit it.
+    // Lower the priority before starting threads, because threads inherit it.
     priority::lower_priority(order.nice);
     let worker = match start(0) {
         Ok(worker) => worker,
@@ -39,7 +39,8 @@ pub(super) fn run(order: &Order, console: &Console) -> Exit {
     let remote = worker.remote();
     let is_again = AtomicBool::new(false);
     let ended = match signals::catch(move || {
-        // Stop rendering and save a checkpoint. A file that is being written is finished, unless a second signal arrives.
+        // Stop rendering and save a checkpoint. Finish a file that is being written unless a second signal
+        // arrives.
         remote.send(Command::Suspend);
         if is_again.swap(true, Ordering::Relaxed) {
             remote.send(Command::Cancel);
@@ -61,7 +62,7 @@ pub(super) fn run(order: &Order, console: &Console) -> Exit {
         ended.by().is_some() && deadline.is_over(now)
     };
     let (mut exit, mut is_whole) = (Exit::DONE, false);
-    // Use one reporter per image, so that progress of the previous frame is cleared.
+    // Use one reporter per image to clear the progress of the previous frame.
     let reporter = || progress::reporter(order.progress, order.overrides.time_seconds, console);
     let mut image_reporter = reporter();
     for overrides in requests(&order.overrides) {
@@ -98,7 +99,7 @@ pub(super) fn run(order: &Order, console: &Console) -> Exit {
     ended.by().map_or(exit, Exit::signal)
 }
 
-/// The requests of a call: one, or one per frame of a turntable.
+/// The render requests: a single request, or one per frame of a turntable.
 fn requests(overrides: &Overrides) -> impl Iterator<Item = Overrides> {
     let count = overrides.turn.map_or(1, |turn| turn.of);
     (0..count).map(|number| {
@@ -107,7 +108,7 @@ fn requests(overrides: &Overrides) -> impl Iterator<Item = Overrides> {
     })
 }
 
-/// Describes the written images after a signal. `is_whole` means that all were written.
+/// Describes the images written before a signal. `is_whole` means that all images were written.
 fn outcome(is_whole: bool, written: &WrittenFiles) -> String {
     let names: Vec<_> = written.images.iter().map(|path| path.display().to_string()).collect();
     let kept = written
@@ -124,7 +125,7 @@ fn outcome(is_whole: bool, written: &WrittenFiles) -> String {
     [words].into_iter().chain(kept).collect::<Vec<_>>().join("; ")
 }
 
-/// Files that were written.
+/// The files written so far.
 #[derive(Debug, Default)]
 struct WrittenFiles {
     images: Vec<PathBuf>,
@@ -132,7 +133,7 @@ struct WrittenFiles {
     checkpoint: Option<PathBuf>,
 }
 
-/// When the program exits regardless of the worker: [`EXIT_TIMEOUT`] after it is first queried.
+/// When to exit without waiting for the worker: [`EXIT_TIMEOUT`] after the first query.
 #[derive(Debug, Default)]
 struct Deadline {
     end: Option<Instant>,
@@ -145,8 +146,8 @@ impl Deadline {
         now >= *self.end.get_or_insert(now + EXIT_TIMEOUT)
     }
 
-    /// Returns true once, when writing has taken too long. If an image was being written, this extends the deadline to write a
-    /// checkpoint.
+    /// Returns true the first time it is called after writing has taken too long. If an image was being
+    /// written, extends the deadline so that a checkpoint can be written.
     fn stops_writing(&mut self, now: Instant, is_image: bool) -> bool {
         let end = *self.end.get_or_insert(now + EXIT_TIMEOUT);
         if self.is_write_stopped || now + EXIT_TIMEOUT < end + WRITE_TIMEOUT {
@@ -165,7 +166,7 @@ impl Deadline {
     }
 }
 
-/// Handles events until the request is finished or a signal ends it.
+/// Handles events until the request is finished or aborted by a signal.
 fn follow(
     worker: &Handle,
     (order, turn): (&Order, Option<Turn>),
@@ -177,7 +178,7 @@ fn follow(
     let mut is_writing = false;
     let mut unwritten: Vec<String> = Vec::new();
     let mut call_warnings: Vec<Diagnostic> = Vec::new();
-    // Warnings about the first frame apply to all.
+    // Warnings about the first frame apply to all frames.
     let is_first = turn.is_none_or(|turn| turn.number == 0);
     let before = written.images.len();
     loop {
@@ -191,7 +192,7 @@ fn follow(
                 return console.fail(Exit::FAILED, "internal error: the worker thread has exited");
             }
         };
-        // Report warnings about the arguments with those about the scene.
+        // Report warnings about the arguments together with warnings about the scene.
         if let Event::Settings { settings, .. } = &event {
             call_warnings.extend(without_effect(&order.overrides, settings));
         } else if let Event::Stage { stage, .. } = &event
@@ -219,7 +220,8 @@ fn follow(
             Event::Checkpoint { news: CheckpointNews::Written { path }, .. } => {
                 written.checkpoint = Some(path);
             }
-            // The report or one of several images. If no image can be written, the request fails.
+            // The report or one of several images could not be written. If no image can be written, the
+            // request fails.
             Event::WriteFailed { message, .. } => unwritten.push(message),
             Event::Done { report, warnings, .. } => {
                 reporter.end();
@@ -260,12 +262,12 @@ fn follow(
     }
 }
 
-/// Whether a stage that reads files found changes since the previous frame.
+/// Whether a stage read a file that has changed since the previous frame.
 fn is_read_again(stage: &StageReport) -> bool {
     matches!(stage.name, Stage::Parse | Stage::Meshes | Stage::Textures) && stage.status == Status::Done
 }
 
-/// Reports checkpoint news immediately, including warnings, while the user can still react.
+/// Reports checkpoint news, including warnings, immediately, because the user can still react.
 fn report_checkpoint(
     news: &CheckpointNews,
     call_warnings: &mut Vec<Diagnostic>,
@@ -357,7 +359,7 @@ fn done(
     if unwritten.is_empty() { Exit::DONE } else { Exit::FAILED }
 }
 
-/// A warning about files left over from an earlier, longer turntable. `None` if there are none.
+/// A warning about files left over from an earlier, longer turntable. `None` if there are no such files.
 fn left_over_warning(last: &Path, turn: Turn) -> Option<String> {
     let left = left_over(last, turn);
     let (first, more) = (left.first()?.display(), left.len() - 1);
@@ -380,7 +382,7 @@ fn exit_of(failure: &Failure) -> Exit {
     }
 }
 
-/// Describes a written image: `wrote cornell.png (640×480, 64 samples, 1.93 s)`.
+/// Describes a written image, as in `wrote cornell.png (640×480, 64 samples, 1.93 s)`.
 fn wrote(path: &Path, report: &Report, turn: Option<Turn>) -> String {
     let image = &report.image;
     if let Some(turn) = turn.filter(|_| AnimationFormat::from_path(path).is_some()) {
@@ -412,7 +414,7 @@ mod tests {
     }
 
     #[test]
-    fn slow_writes_leave_time_for_a_checkpoint() {
+    fn slow_writes_are_stopped_for_a_checkpoint() {
         let signal = Instant::now();
         for (is_image, end) in [(true, WRITE_TIMEOUT + EXIT_TIMEOUT), (false, EXIT_TIMEOUT)] {
             let mut deadline = Deadline::default();

@@ -25,13 +25,13 @@ pub(super) trait Reporter {
         true
     }
 
-    /// Whether it reports errors and warnings itself, so nothing else may be printed.
+    /// Whether the reporter prints errors and warnings itself. If so, nothing else may print them.
     fn says_diagnostics(&self) -> bool {
         false
     }
 }
 
-/// Creates the reporter of a progress option. `time` is the time limit of the render.
+/// Creates the reporter for a progress option. `time` is the render's time limit in seconds.
 pub(super) fn reporter(progress: Progress, time: Option<f64>, console: &Console) -> Box<dyn Reporter> {
     match progress {
         Progress::Auto if console.is_terminal => Box::new(bars::Bars::new(time)),
@@ -41,7 +41,7 @@ pub(super) fn reporter(progress: Progress, time: Option<f64>, console: &Console)
     }
 }
 
-/// Describes the samples so far, with the total if it is known.
+/// Describes the samples so far, with the total if known.
 fn samples(progress: &RenderProgress) -> String {
     if progress.is_total_fixed {
         return format!("{} of {} samples", samples_so_far(progress), progress.total_samples);

@@ -18,7 +18,7 @@ impl ReceivedSignal {
     }
 }
 
-/// The name of a signal for messages. `None` for SIGHUP, after which there is no terminal.
+/// A signal's name for messages. `None` for SIGHUP, because the terminal is gone.
 pub(super) fn name(number: i32) -> Option<&'static str> {
     match number {
         SIGINT => Some("SIGINT"),
@@ -27,7 +27,7 @@ pub(super) fn name(number: i32) -> Option<&'static str> {
     }
 }
 
-/// Explains why [`catch`] failed, and what to do.
+/// Explains why [`catch`] failed and what to do.
 pub(super) fn failure(error: &std::io::Error) -> String {
     format!(
         "cannot listen to signals: {}; raise the limits on open files and on processes (ulimit -n, ulimit -u)",

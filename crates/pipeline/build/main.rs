@@ -1,6 +1,6 @@
 //! Sets `GLIMT_BUILD`, a hash of the sources that affect images.
 
-#![allow(clippy::print_stdout, reason = "a build script speaks to cargo on stdout")]
+#![allow(clippy::print_stdout, reason = "build scripts communicate with cargo over stdout")]
 
 mod sources;
 
@@ -12,7 +12,7 @@ const CRATES: [&str; 6] = ["base", "kernel", "scene", "files", "trace", "pipelin
 fn main() {
     let crates = Path::new("..");
     let mut roots: Vec<_> = CRATES.iter().map(|name| crates.join(name).join("src")).collect();
-    // Include the versions of dependencies.
+    // Dependency versions affect images too.
     roots.push(crates.join("../Cargo.lock"));
     for root in &roots {
         println!("cargo::rerun-if-changed={}", root.display());

@@ -1,10 +1,11 @@
-//! Hashing of source files, independent of the machine.
+//! Platform-independent hashing of source files.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Hashes all files in these folders and these files, by content and relative path. Ignores tests and line endings. A
-/// missing root is treated as empty, for a crate that is built alone.
+/// Hashes the content and relative path of every file in the given folders, plus the given files. Ignores
+/// tests and line endings. A missing root counts as empty, so that a crate can be built outside the
+/// workspace.
 pub fn identity(roots: &[PathBuf]) -> u64 {
     let mut hash = Hash::default();
     for root in roots {
@@ -17,7 +18,7 @@ pub fn identity(roots: &[PathBuf]) -> u64 {
     hash.0
 }
 
-/// Lists all files below a path except tests, in order.
+/// Recursively lists all files under a path in sorted order, skipping tests.
 fn files(path: &Path) -> Vec<PathBuf> {
     let name = path.file_name().unwrap_or_default();
     if name == "tests" || name == "tests.rs" {
@@ -42,7 +43,7 @@ impl Default for Hash {
 }
 
 impl Hash {
-    /// Adds bytes without carriage returns, and a terminator that text does not contain.
+    /// Adds the bytes, skipping carriage returns, followed by a terminator that never occurs in UTF-8 text.
     fn add(&mut self, bytes: &[u8]) {
         for byte in bytes.iter().filter(|byte| **byte != b'\r').chain(&[0xff]) {
             self.0 = (self.0 ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3);

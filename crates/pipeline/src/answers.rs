@@ -1,4 +1,4 @@
-//! Answers of the worker to questions about the current image.
+//! The worker's answers to queries about the current image.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -6,7 +6,7 @@ use std::sync::Arc;
 use crate::film::Rect;
 use crate::scene::description::Viewpoint;
 
-/// Position in an image, relative to its width and height.
+/// Position in an image, as fractions of its width and height.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ImagePosition {
     /// Distance from the left edge.
@@ -15,7 +15,7 @@ pub struct ImagePosition {
     pub y: f64,
 }
 
-/// Rectangle in an image, relative to its width and height.
+/// Rectangle in an image, as fractions of its width and height.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Section {
     /// Left edge.
@@ -29,13 +29,13 @@ pub struct Section {
 }
 
 impl Section {
-    /// Returns the smallest section that contains two positions.
+    /// Returns the smallest section containing both positions.
     pub fn between(a: ImagePosition, b: ImagePosition) -> Self {
         let (left, top) = (a.x.min(b.x), a.y.min(b.y));
         Self { left, top, width: (a.x - b.x).abs(), height: (a.y - b.y).abs() }
     }
 
-    /// Converts a pixel rectangle of an image with this many columns and rows.
+    /// Converts a pixel rectangle in an image with the given number of columns and rows.
     pub(super) fn of(rect: Rect, (columns, rows): (u32, u32)) -> Self {
         let share = |pixels: u32, side: u32| f64::from(pixels) / f64::from(side);
         Self {
@@ -46,7 +46,7 @@ impl Section {
         }
     }
 
-    /// Returns the pixels that the section touches in an image with this many columns and rows.
+    /// Returns the pixels that overlap the section, for an image with the given number of columns and rows.
     pub(super) fn pixels(self, (columns, rows): (u32, u32)) -> Rect {
         let along = |start: f64, length: f64, side: u32| {
             let at = |share: f64| share.clamp(0.0, 1.0) * f64::from(side);
@@ -58,20 +58,20 @@ impl Section {
         Rect { x, y, width, height }
     }
 
-    /// Converts a position in the section to a position in the image.
+    /// Maps a position in the section to a position in the image.
     pub fn place(self, position: ImagePosition) -> ImagePosition {
         ImagePosition { x: self.left + position.x * self.width, y: self.top + position.y * self.height }
     }
 }
 
-/// Object and color at a position of the image.
+/// Object and color at an image position.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picked {
     /// Column and row.
     pub pixel: [u32; 2],
-    /// First visible object. `None` if the ray hits nothing.
+    /// The visible object. `None` if the ray hits nothing.
     pub thing: Option<PickedObject>,
-    /// Linear color of the pixel so far. `None` if it has no sample yet.
+    /// Current linear color of the pixel. `None` before its first sample.
     pub color: Option<[f32; 3]>,
 }
 
@@ -84,15 +84,15 @@ pub struct PickedObject {
     pub name: Option<String>,
     /// The scene file.
     pub path: PathBuf,
-    /// Line in which the shape begins, from 1.
+    /// 1-based line number where the shape starts.
     pub line: usize,
     /// Type and name of the material.
     pub material: String,
     /// Hit point.
     pub position: [f64; 3],
-    /// Unit normal at the hit point, on the front.
+    /// Unit normal at the hit point, pointing to the front side.
     pub normal: [f32; 3],
-    /// Whether the front is visible.
+    /// Whether the front side faces the camera.
     pub is_front: bool,
     /// Distance from the camera.
     pub distance: f64,
@@ -100,7 +100,7 @@ pub struct PickedObject {
     pub depth: f64,
 }
 
-/// A camera that was moved with keys.
+/// A camera that the user moved with the keyboard.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MovedCamera {
     /// The current camera.
@@ -109,22 +109,22 @@ pub struct MovedCamera {
     pub own: Viewpoint,
 }
 
-/// Result of keeping the camera in the scene file.
+/// Result of saving the camera to the scene file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct KeptCamera {
     /// The scene file.
     pub path: PathBuf,
-    /// Whether the file was written; otherwise it already had this camera.
+    /// Whether the file was written. `false` if it already contained this camera.
     pub is_new: bool,
-    /// Whether the file, with the overrides of the command line, has exactly this camera.
+    /// Whether loading the file with the command-line overrides yields exactly this camera.
     pub is_own: bool,
-    /// Whether this is a new scene next to a model, while the model stays open.
+    /// Whether a new scene file was created next to a model. The model remains open.
     pub of_model: bool,
-    /// The edit, which the key `u` undoes. `None` if nothing was written or the file is new.
+    /// The edit, for undoing with the `u` key. `None` if nothing was written or the file is new.
     pub edit: Option<CameraEdit>,
 }
 
-/// A camera written into a scene file.
+/// An edit that saved a camera to a scene file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct CameraEdit {
     /// The scene file.
@@ -140,14 +140,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn section_covers_the_pixels_it_touches() {
+    fn section_covers_all_overlapping_pixels() {
         let size = (40, 30);
         for rect in [
             Rect { x: 0, y: 0, width: 40, height: 30 },
             Rect { x: 7, y: 11, width: 13, height: 1 },
             Rect { x: 39, y: 29, width: 1, height: 1 },
         ] {
-            // Rounding must not add pixels.
+            // Rounding errors must not add pixels.
             let Section { left, top, width, height } = Section::of(rect, size);
             let inside =
                 Section { left: left + 1e-9, top: top + 1e-9, width: width - 2e-9, height: height - 2e-9 };

@@ -1,4 +1,4 @@
-//! Assembly of the world from the results of earlier stages.
+//! Assembles the world from the results of earlier stages.
 
 use std::sync::Arc;
 
@@ -14,14 +14,14 @@ use crate::scene::description::{Camera, CameraChange, Scene, Viewpoint};
 use crate::scene::fingerprint::{Key, Referents};
 use crate::world::{self, GlassSolids, World, WorldInputs};
 
-/// A world with the key of everything that its images depend on.
+/// A world and its key, which covers everything that affects its images.
 pub(super) type KeyedWorld = (Key, Arc<World>);
 
-/// The camera of a request: the scene's, or as changed by the request.
+/// A request's camera: the scene camera, with any changes from the request.
 #[derive(Clone, Debug)]
 pub(super) struct RequestCamera {
     pub(super) camera: Camera,
-    /// Content of the orbiter file, if the camera uses one.
+    /// Contents of the orbiter file, if the camera uses one.
     pub(super) orbiter: Option<OrbiterCamera>,
 }
 
@@ -35,10 +35,10 @@ impl RequestCamera {
         }
     }
 
-    /// Returns the camera of a turntable frame. Without a turntable, returns it unchanged.
+    /// Rotates the camera for a turntable frame. Without a turntable, returns it unchanged.
     pub(super) fn turned(self, turn: Option<Turn>) -> Self {
         match turn {
-            // The first frame has exactly the scene's camera.
+            // The first frame uses the scene's camera unchanged.
             None | Some(Turn { number: 0, .. }) => self,
             Some(turn) => {
                 let view = self.viewpoint();
@@ -52,13 +52,13 @@ impl RequestCamera {
         world::Camera::viewpoint(&self.camera, self.orbiter.as_ref())
     }
 
-    /// Returns the coordinate origin that gives the camera the best precision.
+    /// Returns the coordinate origin that maximizes precision near the camera.
     pub(super) fn origin(&self) -> DVec3 {
         world::origin(&self.camera, self.orbiter.as_ref())
     }
 }
 
-/// Assembles the world, or reuses the last one if it has the same key.
+/// Assembles the world, or reuses the previous one if the key is unchanged.
 pub(super) fn world(
     scene: &Scene,
     (surfaces, of): (&Key, &Referents<'_>),

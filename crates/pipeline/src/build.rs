@@ -1,6 +1,7 @@
 //! Identity of this build.
 
-/// Version of glimt and a hash of the sources that affect images. Builds with equal text render the same bits.
+/// The glimt version and a hash of the sources that affect images. Builds with the same string render
+/// bit-identical images.
 pub const BUILD: &str = concat!(env!("CARGO_PKG_VERSION"), " (build ", env!("GLIMT_BUILD"), ")");
 
 #[cfg(test)]
@@ -14,7 +15,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn build_is_version_and_hash() {
+    fn build_consists_of_version_and_hash() {
         let hash =
             BUILD.strip_prefix(env!("CARGO_PKG_VERSION")).and_then(|rest| rest.strip_prefix(" (build "));
         let hash = hash.and_then(|rest| rest.strip_suffix(')')).expect("a hash");

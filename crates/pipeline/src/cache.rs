@@ -1,4 +1,4 @@
-//! Caches of values between requests.
+//! Caches for values that outlive a request.
 
 use std::collections::{BTreeMap, HashMap};
 use std::hash::Hash;
@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use crate::scene::fingerprint::Key;
 
-/// Cache of one value.
+/// Cache for a single value.
 #[derive(Debug)]
 pub(super) struct Memo<T> {
     last: Option<(Key, T)>,
@@ -19,12 +19,12 @@ impl<T> Default for Memo<T> {
 }
 
 impl<T> Memo<T> {
-    /// Returns the value if it has this key.
+    /// Returns the value if its key matches.
     pub(super) fn get(&self, key: Key) -> Option<&T> {
         self.last.as_ref().filter(|(of, _)| *of == key).map(|(_, value)| value)
     }
 
-    /// Returns the value regardless of its key.
+    /// Returns the value, whatever its key.
     pub(super) fn latest(&self) -> Option<&T> {
         self.last.as_ref().map(|(_, value)| value)
     }
@@ -35,8 +35,8 @@ impl<T> Memo<T> {
     }
 }
 
-/// Cache of named values, each valid for one key: loaded files and values built from them. Unused values are kept while
-/// there is room, so that switching back to a scene is fast.
+/// Cache for named values, such as loaded files and data built from them. Each value is valid for one key.
+/// Unused values are kept while there is room, which makes switching back to a scene fast.
 #[derive(Debug)]
 pub(super) struct Pool<N, T> {
     entries: HashMap<N, CacheEntry<T>>,
@@ -47,15 +47,15 @@ struct CacheEntry<T> {
     key: Key,
     value: Arc<T>,
     bytes: usize,
-    /// Used since the last sweep.
+    /// Whether the current request has used it.
     used: bool,
-    /// Used by the last successful request.
+    /// Whether the last successful request used it.
     proven: bool,
-    /// Number of the last request that used it.
+    /// Number of the most recent request that used it.
     request: u64,
 }
 
-/// An unused value: the number of the last request that used it, and its bytes.
+/// An unused value: the number of the most recent request that used it, and its size in bytes.
 pub(super) type EvictionCandidate = (u64, usize);
 
 impl<N, T> Default for Pool<N, T> {
@@ -65,25 +65,25 @@ impl<N, T> Default for Pool<N, T> {
 }
 
 impl<N: Hash + Eq, T> Pool<N, T> {
-    /// Returns the value of this name if it has this key.
+    /// Returns the value with this name if its key matches.
     pub(super) fn get(&mut self, name: &N, key: Key) -> Option<Arc<T>> {
         let entry = self.entries.get_mut(name).filter(|entry| entry.key == key)?;
         entry.used = true;
         Some(entry.value.clone())
     }
 
-    /// Returns the value of this name regardless of its key.
+    /// Returns the value with this name, whatever its key.
     pub(super) fn latest(&self, name: &N) -> Option<&Arc<T>> {
         self.entries.get(name).map(|entry| &entry.value)
     }
 
-    /// Replaces the value of this name. `bytes` is its size.
+    /// Inserts or replaces the value with this name. `bytes` is its size.
     pub(super) fn insert(&mut self, name: N, key: Key, (value, bytes): (Arc<T>, usize)) {
         self.entries.insert(name, CacheEntry { key, value, bytes, used: true, proven: false, request: 0 });
     }
 
-    /// Ends a request. After a failed one, values used by the last successful request remain protected, so that fixing
-    /// a typo loads nothing again.
+    /// Ends a request. If it failed, the values used by the last successful request remain protected, so
+    /// fixing a typo does not reload anything.
     pub(super) fn end(&mut self, success: bool, request: u64) {
         for entry in self.entries.values_mut() {
             entry.request = if entry.used { request } else { entry.request };
@@ -92,19 +92,20 @@ impl<N: Hash + Eq, T> Pool<N, T> {
         }
     }
 
-    /// Returns the values that the last successful request did not use.
+    /// Returns the values not used by the last successful request.
     pub(super) fn eviction_candidates(&self) -> impl Iterator<Item = EvictionCandidate> {
         self.entries.values().filter(|entry| !entry.proven).map(|entry| (entry.request, entry.bytes))
     }
 
-    /// Drops unused values that were last used before this request.
+    /// Drops unused values whose last use was before this request.
     pub(super) fn drop_before(&mut self, request: u64) {
         self.entries.retain(|_, entry| entry.proven || entry.request >= request);
     }
 }
 
-/// Returns the first request whose unused values, together with those of all later requests, fit into `most_bytes`. The
-/// values of a request are evicted together: half of a scene is of little use, and trees keep their meshes alive.
+/// Returns the earliest request such that its unused values and those of all later requests fit into
+/// `most_bytes`. The values of a request are evicted together because half a scene is of little use and trees
+/// keep their meshes alive.
 pub(super) fn first_with_room(
     eviction_candidates: impl Iterator<Item = EvictionCandidate>,
     most_bytes: usize,
@@ -141,14 +142,14 @@ mod tests {
 
     const NOTHING: usize = 0;
 
-    /// Ends a request and evicts unused values above `most_bytes`.
+    /// Ends a request and evicts unused values beyond a total of `most_bytes`.
     fn end(pool: &mut Pool<&str, i32>, success: bool, request: u64, most_bytes: usize) {
         pool.end(success, request);
         pool.drop_before(first_with_room(pool.eviction_candidates(), most_bytes));
     }
 
     #[test]
-    fn unused_values_are_evicted_without_room() {
+    fn unused_values_are_evicted_when_out_of_room() {
         let mut pool = Pool::default();
         pool.insert("x", key("1"), (Arc::new(1), 10));
         pool.insert("y", key("1"), (Arc::new(2), 10));
@@ -161,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn failed_request_protects_the_last_good_values() {
+    fn failed_request_keeps_last_valid_values() {
         let mut pool = Pool::default();
         pool.insert("good", key("1"), (Arc::new(1), 10));
         end(&mut pool, true, 1, NOTHING);
@@ -173,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn oldest_scene_is_evicted_as_a_whole() {
+    fn oldest_scene_is_evicted_entirely() {
         let mut pool = Pool::default();
         for (request, names) in [(1, ["a", "b"]), (2, ["c", "d"]), (3, ["e", "f"])] {
             for name in names {
@@ -184,7 +185,7 @@ mod tests {
         let mut is_kept = |name| pool.get(&name, key("1")).is_some();
         assert!(!is_kept("a") && !is_kept("b"), "newer values take 20 of 30 bytes");
         assert!(is_kept("c") && is_kept("d") && is_kept("e"));
-        // Use the second request's values again, so that the third request's unused value becomes the oldest.
+        // Reuse the second request's values, which makes the third request's unused value the oldest.
         end(&mut pool, true, 4, 30);
         pool.insert("g", key("1"), (Arc::new(1), 30));
         end(&mut pool, true, 5, 30);

@@ -1,4 +1,4 @@
-//! Validation of a scene and all files it references, without rendering.
+//! Validates a scene and all files it references, without rendering.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -19,16 +19,16 @@ use crate::scene::description::{Lowered, Object, Shape};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::world::file_emits;
 
-/// Contents of a valid scene.
+/// What a valid scene contains.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Checked {
     /// Shapes of all kinds. A mesh instance counts as one.
     pub objects: u64,
-    /// Triangles of all mesh instances, and single triangles.
+    /// Triangles in all mesh instances, plus standalone triangles.
     pub triangles: u64,
     /// Image files, counted once per encoding.
     pub textures: u64,
-    /// Point and directional lights, environments and emissive objects that are not black.
+    /// Non-black point lights, directional lights, environments and emissive objects.
     pub lights: u64,
     /// Likely mistakes.
     pub warnings: Vec<Diagnostic>,
@@ -37,12 +37,12 @@ pub struct Checked {
 /// Checks a scene and all files it references, used or not.
 ///
 /// # Errors
-/// All errors and warnings of the scene and its files.
+/// Returns all errors and warnings for the scene and its files.
 pub fn check(path: &Path, sets: &[String]) -> Result<Checked, Failure> {
     Checker::default().check(path, sets, &CancelToken::new())
 }
 
-/// Checks scenes repeatedly. Unchanged files are not read again.
+/// Checks scenes repeatedly without rereading unchanged files.
 pub struct Checker(Engine);
 
 impl Default for Checker {
@@ -51,10 +51,10 @@ impl Default for Checker {
     }
 }
 
-/// Returns a conservative estimate of the bytes of memory that a render needs. Reads all files of the scene.
+/// Returns a conservative estimate of a render's memory use in bytes. Reads all of the scene's files.
 ///
 /// # Errors
-/// All errors of the scene and its files.
+/// Returns all errors in the scene and its files.
 pub fn memory_needed(path: &Path, overrides: &Overrides) -> Result<u64, Failure> {
     let Checker(mut engine) = Checker::default();
     let token = CancelToken::new();
@@ -72,7 +72,8 @@ impl Checker {
     /// Checks a scene and all files it references, used or not.
     ///
     /// # Errors
-    /// All errors and warnings of the scene and its files, or [`Failure::Work`] if the token is cancelled.
+    /// Returns all errors and warnings for the scene and its files, or [`Failure::Work`] if the token is
+    /// cancelled.
     pub fn check(&mut self, path: &Path, sets: &[String], token: &CancelToken) -> Result<Checked, Failure> {
         let (parsed, meshes, textures, warnings) = self.0.read_all(path, sets, &silent_sink(), token)?;
         Ok(checked(&parsed, &meshes, &textures, warnings))
@@ -93,7 +94,7 @@ fn checked(parsed: &Parsed, meshes: &Meshes, textures: &Textures, mut warnings: 
     let lights = scene.lights.iter().filter(|light| light.sends()).count();
     let environment = scene.environment.iter().filter(|environment| environment.sends()).count();
     let count = lights + environment + scene.objects.iter().filter(emits).count();
-    // Lights of mesh files are known only now.
+    // Lights in mesh files are only known after loading.
     let has_own = scene.objects.iter().any(|object| object.material.is_none());
     if count == 0 && has_own && scene.render.ambient == Vec3::ZERO {
         let (severity, message) = (Severity::Warning, "nothing lights this scene".to_owned());

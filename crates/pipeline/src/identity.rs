@@ -1,5 +1,5 @@
-//! Identity of an image: names and values of everything it depends on, equal on every machine and in every folder.
-//! Unlike the keys of stages, which include paths and time stamps, it identifies files by content.
+//! Identity of an image: the names and values of everything that affects it, independent of machine and
+//! folder. Unlike stage keys, which include paths and timestamps, the identity refers to files by content.
 
 use std::path::{Path, PathBuf};
 
@@ -15,14 +15,15 @@ use crate::output::part::Dependency;
 use crate::scene::description::{CameraChange, Scene};
 use crate::scene::fingerprint::{Fingerprint, Key};
 
-/// Everything that an image depends on.
+/// Everything that affects an image.
 pub(super) struct ImageDependencies<'a> {
     pub(super) parsed: &'a Parsed,
     pub(super) plan: &'a Plan,
     pub(super) camera: &'a CameraChange,
     /// Files that were read, including the scene file.
     pub(super) files: &'a [FileRead],
-    /// Samples of the whole image if it is divided: its parts must agree on them and on the output settings.
+    /// Sample count of the whole image if it is rendered in parts. All parts must use the same sample count
+    /// and output settings.
     pub(super) divided: Option<u32>,
 }
 
@@ -54,7 +55,7 @@ impl ImageDependencies<'_> {
         add("filter", render.filter.name().to_owned());
         add("seed", render.seed.to_string());
         add("depth of field", if dof { "on" } else { "off" }.to_owned());
-        // Parts must agree on the view, checkpoints only on its samples.
+        // Parts must have the same view. Checkpoints only need the same samples.
         let sampled = if self.divided.is_some() { view } else { view.sampled() };
         add("view", sampled.name().to_owned());
         add(
@@ -105,7 +106,7 @@ impl ImageDependencies<'_> {
         scene
     }
 
-    /// Describes the content of a file. A file that was not read is identified by its name, because it does not affect
+    /// Describes a file's content. Uses the file name if the file was not read, since it then does not affect
     /// the image.
     fn content_of(&self, path: &Path) -> String {
         match self.files.iter().find(|file| file.path == path) {
@@ -124,7 +125,7 @@ fn key(content: &str, part: Option<u32>) -> Key {
     key.finish()
 }
 
-/// Returns a path relative to the scene's folder if it is inside, or the file name.
+/// Returns the path relative to the scene's folder, or just the file name if it is outside that folder.
 fn short(path: &Path, scene: &Path) -> String {
     let folder = scene.parent().unwrap_or(Path::new(""));
     let inside = path.strip_prefix(folder).ok().map(Path::to_owned);
@@ -132,7 +133,7 @@ fn short(path: &Path, scene: &Path) -> String {
     inside.unwrap_or_else(name).to_string_lossy().into_owned()
 }
 
-/// Returns the hash of a file in hexadecimal, or why it has none.
+/// Returns the file's hash in hexadecimal, or the reason it has none.
 fn content(file: &FileRead) -> String {
     match file.content {
         Content::Missing => "missing".to_owned(),

@@ -19,7 +19,7 @@ pub(super) struct Input {
     pub(super) path: PathBuf,
     /// Role of the file in the scene, for messages.
     pub(super) role: String,
-    /// The scene, and the span that references the file.
+    /// The scene and the span in it that references the file.
     pub(super) place: Option<(Arc<Loaded>, Range<usize>)>,
 }
 
@@ -55,13 +55,13 @@ impl Inputs {
             add(&mesh.value, &mesh.span, "a mesh file of the scene".to_owned());
         }
         for path in &parsed.named {
-            let role = "a file that the scene names without the overrides of this call".to_owned();
+            let role = "a file that the scene references without the current overrides".to_owned();
             inputs.0.push(Input { path: path.clone(), role, place: None });
         }
         inputs
     }
 
-    /// Adds the material libraries and images of mesh files, and the files that glTF files reference.
+    /// Adds the material libraries and images used by mesh files, and the files referenced by glTF files.
     pub(super) fn add_meshes(&mut self, loaded: &Arc<Loaded>, meshes: &Meshes) {
         for (file, kept) in loaded.scene.mesh_files.iter().zip(meshes) {
             let name = file.value.file_name().unwrap_or_default().to_string_lossy();
@@ -74,7 +74,7 @@ impl Inputs {
                 add(&companion.path, format!("a {kind} of {name}"));
             }
             for picture in &kept.mesh.pictures {
-                add(picture, format!("an image that {name} or its materials reference"));
+                add(picture, format!("an image referenced by {name} or its materials"));
             }
         }
     }
@@ -83,7 +83,7 @@ impl Inputs {
     pub(super) fn add_read(&mut self, files: &[FileRead]) {
         let known: HashSet<PathBuf> = self.0.iter().map(|input| input.path.clone()).collect();
         for file in files.iter().filter(|file| !known.contains(&file.path)) {
-            let role = "a file that the scene reads".to_owned();
+            let role = "a file read by the scene".to_owned();
             self.0.push(Input { path: file.path.clone(), role, place: None });
         }
     }
@@ -94,7 +94,7 @@ impl Inputs {
         self.0.extend(others.0.into_iter().filter(|other| !known.contains(&other.path)));
     }
 
-    /// Returns the files as they currently exist on disk.
+    /// Indexes the files by their current state on disk.
     pub(super) fn on_disk(&self) -> OnDisk<'_> {
         let mut on_disk = OnDisk { by_identity: HashMap::new(), alike: Vec::new() };
         for input in &self.0 {
@@ -106,7 +106,7 @@ impl Inputs {
         on_disk
     }
 
-    /// Whether a path currently leads to one of the files.
+    /// Whether a path currently refers to one of the files.
     pub(super) fn contain(&self, path: &Path) -> bool {
         FileIdentity::of(path).is_some_and(|_| self.on_disk().find(path).is_some())
     }
@@ -119,7 +119,7 @@ pub(super) struct OnDisk<'a> {
 }
 
 impl<'a> OnDisk<'a> {
-    /// Returns the input that a path leads to or cannot be distinguished from.
+    /// Returns the input that a path refers to or may refer to.
     pub(super) fn find(&self, path: &Path) -> Option<&'a Input> {
         if let Some(input) = self.by_identity.get(&FileIdentity::of(path)?) {
             return Some(input);
@@ -136,7 +136,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn input_is_recognized_in_another_case() {
+    fn input_is_recognized_despite_different_case() {
         let folder = tempfile::tempdir().expect("a folder");
         let at = |name: &str| folder.path().join(name);
         for (name, text) in [("t.png", "one"), ("T.PNG", "longer"), ("other.png", "two")] {

@@ -1,5 +1,5 @@
-//! Keys of the scene data that later stages depend on. They exclude file positions and names, so that comments, the
-//! order of keys and unused tables do not change them.
+//! Keys of the scene data used by later stages. They exclude names and positions in the file, so that
+//! comments, key order and unused tables do not affect them.
 
 use crate::film::Rect;
 use crate::integrators::{PhotonSettings, RenderSettings};
@@ -18,8 +18,8 @@ pub(crate) fn tree(mesh: &Key, accel: Accel) -> Key {
     Fingerprint::new("tree").key(mesh).choice(accel).finish()
 }
 
-/// Returns the key of all geometry in trees, with each object moved by its lift. `lifts` is empty if no object is
-/// moved.
+/// Returns the key of all trees, with each object offset by its lift. `lifts` is empty if no object is
+/// offset.
 pub(crate) fn geometry(scene: &Scene, of: &Referents<'_>, (origin, lifts): (DVec3, &[DVec3])) -> Key {
     let mut key = Fingerprint::new("lifted");
     key.key(&from(&shapes(scene, of), origin));
@@ -29,7 +29,8 @@ pub(crate) fn geometry(scene: &Scene, of: &Referents<'_>, (origin, lifts): (DVec
     in_trees(&key.finish(), scene.render.accel)
 }
 
-/// Returns the key of the shapes and which of them emit, which decides the lights that are moved off other surfaces.
+/// Returns the key of the shapes and their emitting sides, which determine the lights that are moved off
+/// coplanar surfaces.
 pub(crate) fn coplanar(scene: &Scene, of: &Referents<'_>) -> Key {
     let mut key = Fingerprint::new("coplanar");
     key.key(&shapes(scene, of));
@@ -45,12 +46,12 @@ pub(crate) fn coplanar(scene: &Scene, of: &Referents<'_>) -> Key {
     key.finish()
 }
 
-/// Returns the key of something in coordinates relative to `origin`.
+/// Combines a key with a coordinate origin.
 pub(crate) fn from(of: &Key, origin: DVec3) -> Key {
     Fingerprint::new("from").key(of).dvec3(origin).finish()
 }
 
-/// Returns the key of geometry in trees of this kind.
+/// Combines a geometry key with the kind of tree.
 pub(crate) fn in_trees(of: &Key, accel: Accel) -> Key {
     Fingerprint::new("in trees").key(of).choice(accel).finish()
 }
@@ -63,7 +64,7 @@ fn shapes(scene: &Scene, of: &Referents<'_>) -> Key {
     key.finish()
 }
 
-/// Returns the key of the shapes and the glass they are made of.
+/// Returns the key of the shapes and their glass materials.
 pub(crate) fn glass(scene: &Scene, of: &Referents<'_>) -> Key {
     let mut key = Fingerprint::new("glass");
     key.key(&shapes(scene, of));
@@ -77,8 +78,8 @@ pub(crate) fn glass(scene: &Scene, of: &Referents<'_>) -> Key {
     key.finish()
 }
 
-/// Returns the key of all lights: emission, position and object. `sky` is the key of the environment map, `patterns`
-/// are the keys of the textures on emitters.
+/// Returns the key of all lights: emission, position and object. `sky` is the environment map's key.
+/// `patterns` are the keys of emission textures.
 pub(crate) fn lights(
     scene: &Scene,
     of: &Referents<'_>,
@@ -117,7 +118,7 @@ fn described_lights(scene: &Scene, of: &Referents<'_>) -> Key {
                     key.add(number, of);
                 }
             }
-            // Materials of the mesh file may emit.
+            // Materials from the mesh file may emit.
             None => {
                 key.index(number).add(&object.shape, of).text("own");
             }
@@ -126,8 +127,8 @@ fn described_lights(scene: &Scene, of: &Referents<'_>) -> Key {
     key.finish()
 }
 
-/// Returns the key of a world, without the kind of its trees, because all kinds find the same hits. Views that show the
-/// trees add it.
+/// Returns the key of a world. It excludes the kind of tree, because all kinds find the same hits. Views that
+/// visualize trees add it to their keys.
 pub(crate) fn world(surfaces: &Key, camera: &Camera, of: &Referents<'_>) -> Key {
     Fingerprint::new("world").key(surfaces).add(camera, of).finish()
 }
@@ -157,7 +158,7 @@ pub(crate) fn surfaces(scene: &Scene, of: &Referents<'_>, textures: &[Key]) -> K
     key.finish()
 }
 
-/// Returns the key of everything that a film's sums depend on, apart from the number of samples.
+/// Returns the key of everything that affects a film's sums, except the number of samples.
 pub(crate) fn render(world: Key, settings: &RenderSettings, crop: Option<Rect>) -> Key {
     let mut key = Fingerprint::new("render");
     key.key(&world).add(settings, &Referents::default());
@@ -167,8 +168,8 @@ pub(crate) fn render(world: Key, settings: &RenderSettings, crop: Option<Rect>) 
     key.finish()
 }
 
-/// Returns the key of the image developed from a film. With a time limit, films have different noise, so `film_number`
-/// is included.
+/// Returns the key of the image developed from a film. With a time limit, noise varies between films, so the
+/// key includes `film_number`.
 pub(crate) fn image(film: Key, plan: &Plan, film_number: u64) -> Key {
     let Render { samples, error, .. } = plan.settings.render;
     let mut key = Fingerprint::new("image");
@@ -201,26 +202,26 @@ mod tests {
     }
 
     #[test]
-    fn comments_and_unused_tables_keep_keys() {
+    fn comments_and_unused_tables_do_not_change_keys() {
         assert_eq!(keys(BALL), keys(&format!("# hello\n[materials.a]\ntype = \"phong\"\n{BALL}")));
     }
 
     #[test]
-    fn color_changes_the_world_but_no_tree() {
+    fn color_change_affects_world_but_not_trees() {
         let (before, after) = (keys(BALL), keys(&BALL.replace("[1, 0, 0]", "[0, 1, 0]")));
         assert_eq!((before.0, before.1), (after.0, after.1));
         assert_ne!(before.2, after.2);
     }
 
     #[test]
-    fn tree_kind_changes_trees_but_no_image() {
+    fn tree_kind_affects_trees_but_not_images() {
         let (before, after) = (keys(BALL), keys(&format!("[render]\naccel = \"kdtree\"\n{BALL}")));
         assert_ne!(before.0, after.0);
         assert_eq!((before.1, before.2), (after.1, after.2));
     }
 
     #[test]
-    fn emission_changes_lights_position_trees() {
+    fn emission_affects_lights_and_position_trees() {
         let lit = keys(&BALL.replace("diffuse", "emission"));
         assert_eq!(lit.0, keys(BALL).0);
         assert_ne!(lit.1, keys(BALL).1);
@@ -233,7 +234,7 @@ mod tests {
     }
 
     #[test]
-    fn object_index_of_a_light_changes_the_lights() {
+    fn emitter_object_index_affects_lights() {
         let ball = "[[sphere]]\ncenter = [3, 0, 0]\nradius = 1\nmaterial = \"dark\"\n";
         let (dark, light) = ("[materials.dark]\n".to_owned(), BALL.replace("diffuse", "emission"));
         let [behind, before] = [dark.clone() + &light + ball, dark + ball + &light].map(|text| keys(&text).1);
@@ -241,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn environment_changes_lights_but_no_tree() {
+    fn environment_affects_lights_but_not_trees() {
         let around = |color: &str| keys(&format!("[environment]\ncolor = {color}\n{BALL}"));
         let (none, gray, red) = (keys(BALL), around("0.5"), around("\"red\""));
         assert_eq!((none.0, none.0), (gray.0, red.0));
@@ -266,7 +267,7 @@ mod tests {
         let settings = plan.expect("a plan").settings;
         let of = |settings: &RenderSettings| render(Fingerprint::new("w").finish(), settings, None);
         let render_settings = settings.render;
-        // Without `..`, so that an added field does not compile until it is tested below.
+        // No `..` here: adding a field must cause a compile error until it is tested below.
         let RenderSettings { render: _, dof, view, photons } = settings;
         let Render {
             width,
@@ -321,7 +322,7 @@ mod tests {
         let lit = Render { ambient: ambient + Vec3::ONE, ..render_settings };
         assert_eq!(of(&RenderSettings { render: lit, ..gathering }), of(&gathering));
         assert_eq!(of(&RenderSettings { render: path, ..gathering }), of(&with(path)));
-        // The same samples: more of them, displayed differently, or found with another tree.
+        // These settings do not change the samples taken: sample count, display settings and kind of tree.
         for same in [
             Render { samples: samples + 1, ..render_settings },
             Render { exposure: exposure + 1.0, ..render_settings },
@@ -330,12 +331,12 @@ mod tests {
         ] {
             assert_eq!(of(&with(same)), of(&settings), "{same:?}");
         }
-        // Views of the trees depend on the kind of tree.
+        // Views that visualize trees depend on the kind of tree.
         for view in [View::Bounds, View::Cost] {
             let by = |accel| RenderSettings { view, ..with(Render { accel, ..render_settings }) };
             assert_ne!(of(&by(Accel::Bvh)), of(&by(Accel::KdTree)), "{view:?}");
         }
-        // Settings that path or whitted ignores.
+        // Settings ignored by the `path` or `whitted` integrator.
         for same in
             [Render { shadows: Shadows::Hard, ..path }, Render { ambient: ambient + Vec3::ONE, ..path }]
         {

@@ -1,10 +1,10 @@
-//! The render pipeline: stages as functions of their inputs, caches, the worker that owns both, and the file watcher.
+//! The render pipeline: stages, caches, the worker that runs them, and the file watcher.
 //!
-//! [`start`] returns a [`Handle`], which takes commands and provides events and a slot with the latest preview.
-//! `engine` runs the stages of one request; `stages` has one file per stage, and `render` contains the render loop.
-//! Each stage compares a [fingerprint](crate::scene::fingerprint) of its inputs (`keys`) with the fingerprint of its
-//! cached value (`cache`), and reports whether it was done, reused or skipped. [`watch`] reports files whose content
-//! has changed.
+//! [`start`] returns a [`Handle`], which accepts commands and provides events and the latest preview.
+//! `engine` runs the stages of a request. `stages` contains one file per stage, and `render` the render loop.
+//! Stages are functions of their inputs. Each stage compares a [fingerprint](crate::scene::fingerprint) of
+//! its inputs (`keys`) with the fingerprint of its cached value (`cache`), and reports whether it was done,
+//! reused or skipped. [`watch`] reports files whose content has changed.
 
 mod answers;
 mod assembly;
@@ -40,7 +40,7 @@ mod worker;
 #[cfg(test)]
 mod tests;
 
-// Modules of lower crates, under the names used throughout the workspace.
+// Re-export modules of lower-level crates under the names used throughout the workspace.
 use glimt_base::{choice, control, film, math, system};
 use glimt_files::{assets, output};
 use glimt_kernel::{lights, materials};

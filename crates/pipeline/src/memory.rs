@@ -1,9 +1,7 @@
-//! Estimate of the memory that a render needs, before the work: a render that does not fit is rejected with the
-//! numbers.
+//! Estimates a render's memory use in advance. A render that does not fit is rejected with a breakdown.
 //!
-//! The sizes of film and image are exact, and those of meshes and textures are known once they are loaded. Trees and
-//! photons are conservative estimates, from the peak memory of builders per triangle and of photon maps per emitted
-//! photon.
+//! Film and image sizes are exact, and mesh and texture sizes are known once they are loaded. Tree and photon
+//! sizes are conservative estimates based on measured peak memory per triangle and per emitted photon.
 
 use super::plan::Plan;
 use super::render::share::Share;
@@ -14,40 +12,40 @@ use crate::integrators::PhotonSettings;
 use crate::scene::description::{Accel, Scene};
 use crate::system::memory::{Limit, limit};
 
-/// Bytes of the program itself.
+/// Bytes used by the program itself.
 const PROGRAM: u64 = 24 << 20;
-/// Bytes of a render thread: its stack and buffers. Rough glass needs the most.
+/// Bytes per render thread: stack and buffers. Rough glass needs the most.
 const THREAD: u64 = 640 << 10;
-/// Bytes of an object of any kind in its tree.
+/// Bytes used in trees per object.
 const OBJECT: u64 = 250;
-/// Bytes per emitted photon while the maps of a pass are built.
+/// Bytes per emitted photon while building the maps of a pass.
 const PHOTON: u64 = 220;
-/// Bytes of the cached maps.
+/// Maximum size of the cached maps in bytes.
 const KEPT_MAPS: u64 = 128 << 20;
 
-/// Maximum number of bytes of an animation's frames without `--memory`.
+/// Maximum size in bytes of an animation's frames without `--memory`.
 const MAX_FRAMES: u64 = 4 << 30;
-/// Name of the frames among the items.
+/// Item name of the animation frames.
 const FRAMES: &str = "the frames";
-/// Name of the own image's film among the items.
+/// Item name of the film of the scene's own image.
 const OWN_FILM: &str = "the unfinished film of the scene's own image";
 
-/// Remedy if the film or the image is the largest item.
+/// Suggested fix if the film or the image is the largest item.
 const SMALLER_IMAGE: &str = "render a smaller image, or parts of it with --crop";
-/// Remedy if the limit is below 1 MiB.
+/// Suggested fix if the limit is below 1 MiB.
 const MISSING_UNIT: &str = "sizes without a unit are in bytes; add a unit, for example 8GiB";
-/// Remedy if there is nothing to reduce.
+/// Suggested fix if nothing can be reduced.
 const ALLOW_MORE: &str = "allow more";
 
-/// Name and bytes of a part of the memory.
+/// Name and size in bytes of a memory item.
 type MemoryItem = (&'static str, u64);
 
-/// Estimated memory of a render.
+/// Estimated memory use of a render.
 #[derive(Clone)]
 pub(super) struct MemoryEstimate(Vec<MemoryItem>);
 
 impl MemoryEstimate {
-    /// Estimates the memory of the image, before any file is read.
+    /// Estimates the memory for the image before any files are read.
     pub(super) fn of_picture(plan: &Plan) -> Self {
         let render = &plan.settings.render;
         let whole = Rect { x: 0, y: 0, width: render.width, height: render.height };
@@ -61,7 +59,7 @@ impl MemoryEstimate {
             ("the threads", threads),
         ];
         if !plan.layers.is_empty() {
-            // One film at a time, and the image of each layer.
+            // Layers are rendered one film at a time, but all their images are kept.
             items.push(("the layers", film + picture * plan.layers.len() as u64));
         }
         if let Some(turn) = plan.turn.filter(|_| !plan.moving.is_empty()) {
@@ -71,7 +69,7 @@ impl MemoryEstimate {
         Self(items)
     }
 
-    /// Estimates the memory of the image and everything that the scene references.
+    /// Estimates the memory for the image and everything the scene references.
     pub(super) fn of_scene(plan: &Plan, scene: &Scene, meshes: &Meshes, texture_bytes: u64) -> Self {
         let Self(mut items) = Self::of_picture(plan);
         let triangle = match scene.render.accel {
@@ -92,7 +90,7 @@ impl MemoryEstimate {
         Self(items)
     }
 
-    /// Adds the film of the scene's own image, which is kept while keys show another one.
+    /// Adds the film of the scene's own image, which is kept while another image is shown.
     pub(super) fn with_own_film(mut self, bytes: u64) -> Self {
         self.0.push((OWN_FILM, bytes));
         self
@@ -107,15 +105,16 @@ impl MemoryEstimate {
         self.0.iter().filter(|(name, _)| *name == OWN_FILM).map(|(_, bytes)| bytes).sum()
     }
 
-    /// Rejects a render that needs more memory than the command line or the system allows. Returns the remaining bytes.
+    /// Rejects a render that exceeds the memory limit set on the command line or by the system. Returns the
+    /// number of bytes left.
     ///
     /// # Errors
-    /// The render would need more, with the numbers and a remedy.
+    /// Returns a breakdown and a suggested fix if the render needs more memory.
     pub(super) fn check(&self, plan: &Plan) -> Result<u64, Stop> {
         self.check_within(plan, limit)
     }
 
-    /// [`Self::check`] with the system's limit as a parameter.
+    /// Like [`Self::check`], with the system's limit as a parameter.
     fn check_within(&self, plan: &Plan, limit: impl FnOnce() -> Option<Limit>) -> Result<u64, Stop> {
         let all = self.bytes();
         let frames = self.0.iter().find(|(name, bytes)| *name == FRAMES && *bytes > MAX_FRAMES);
@@ -127,7 +126,7 @@ impl MemoryEstimate {
                 allowance(all)
             )));
         }
-        // A limit on the command line replaces the system's, because the estimate is conservative.
+        // A command-line limit replaces the system limit, because the estimate is conservative.
         let limit = plan.memory.map(|bytes| Limit { bytes, setting: "--memory".to_owned() }).or_else(limit);
         let Some(Limit { bytes: most, setting }) = limit else { return Ok(u64::MAX) };
         if all <= most {
@@ -165,7 +164,8 @@ impl MemoryEstimate {
     }
 }
 
-/// Returns the order in which samples are summed. Whether photons are emitted at all is only known later.
+/// Returns the order in which samples are summed. Assumes that photons are emitted if they are enabled,
+/// because this is not known yet.
 fn blocks(plan: &Plan) -> SumOrder {
     let gathers = plan.settings.gathers();
     match plan.shard {
@@ -175,7 +175,7 @@ fn blocks(plan: &Plan) -> SumOrder {
     }
 }
 
-/// Formats a `--memory` value of at least this many bytes.
+/// Formats a byte count as a `--memory` value, rounded up.
 fn allowance(bytes: u64) -> String {
     format!("{}GiB", bytes.div_ceil(1 << 30))
 }
@@ -217,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn too_large_render_is_rejected_with_numbers() {
+    fn oversized_render_is_rejected_with_breakdown() {
         let large = Overrides {
             width: Some(8000),
             height: Some(8000),
@@ -228,7 +228,7 @@ mod tests {
             Err(Stop::Failed(Failure::Work(said))) => said,
             other => panic!("{other:?}"),
         };
-        // 64 million pixels of 40 and 15 bytes.
+        // 64 million pixels at 40 bytes (film) and 15 bytes (image).
         for fact in [" 3.30 GiB ", " 2.38 GiB", " 1.00 GiB of --memory", SMALLER_IMAGE] {
             assert!(said.contains(fact), "{fact}: {said}");
         }
@@ -249,7 +249,7 @@ mod tests {
     }
 
     #[test]
-    fn system_limit_applies_without_a_memory_option() {
+    fn system_limit_applies_without_memory_option() {
         let limit = || Some(Limit { bytes: 8 << 20, setting: "the control group (x)".to_owned() });
         let check = |overrides: &Overrides| {
             let plan = planned(overrides);

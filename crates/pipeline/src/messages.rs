@@ -1,18 +1,18 @@
-//! Messages that tests recognize.
+//! Messages that tests look for.
 
-/// No image is written because of missing samples.
+/// No image is written because some pixels lack samples.
 pub const INCOMPLETE_IMAGE: &str = "the render stopped before every pixel had a sample";
 /// An older image is on disk.
 pub const NEWEST_IMAGE_NOT_WRITTEN: &str = "the newest image was not written";
-/// No image exists in memory.
+/// There is no image in memory.
 pub const NO_IMAGE: &str = "no image has been rendered yet";
-/// No image is written because the scene may reference the output.
+/// No image is written because the invalid scene may reference the output file.
 pub const SCENE_HAS_ERRORS: &str = "the scene has errors";
 /// The scene file was edited after it was read.
 pub const SCENE_FILE_CHANGED: &str = "the scene file has changed since it was read: camera not saved";
 /// The scene file was removed.
 pub const SCENE_FILE_MISSING: &str = "the scene file does not exist: camera not saved";
-/// The scene's camera was edited after keys moved it.
+/// The scene's camera was edited after the user moved it with the keyboard.
 pub const CAMERA_CHANGED: &str =
     "the scene's camera has changed since it was moved: press c again to save it";
 /// All faces of a model are fully transparent.
@@ -23,7 +23,7 @@ pub const CLAMP_EFFECT: &str =
 /// Effect of the default `clamp` of models.
 pub const CLAMP_EFFECT_ON_MODELS: &str = "limits light from shiny surfaces (fewer fireflies, slightly dark)";
 
-/// A file in place of a checkpoint has another format.
+/// The file at a checkpoint's path has another format.
 pub const NOT_A_CHECKPOINT: &str = "is not a checkpoint";
 /// A file is damaged.
 pub const DAMAGED: &str = "damaged";
@@ -34,7 +34,7 @@ pub const MODEL_MISSING: &str = "does not exist: its scene was not written";
 /// A new file would replace an existing one.
 pub const ALREADY_EXISTS: &str = "already exists";
 
-/// Returns why a checkpoint with more than `samples` samples per pixel is not used.
+/// Explains why a checkpoint with more than `samples` samples per pixel is not used.
 pub fn has_more_samples(samples: u32) -> String {
     format!("it already has more than {samples} samples")
 }

@@ -1,4 +1,4 @@
-//! Resolution of a scene and the overrides into the effective settings of a request.
+//! Merges a scene with its overrides into the effective settings of a request.
 
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
@@ -17,15 +17,14 @@ use crate::output::{BitDepth, Format, OutputError};
 use crate::scene::description::{Accel, Photons, Scene, Tonemap};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 
-/// Resolved settings of one request: scene, command line and keys merged.
+/// Resolved settings of a request, merged from the scene, the command line and the keyboard.
 #[derive(Clone, Debug)]
 pub(super) struct Plan {
     /// Path of the scene file or model.
     pub(super) path: PathBuf,
-    /// File name of the scene, which is stored in parts.
+    /// File name of the scene. It is stored in part files.
     pub(super) name: String,
-    /// The scene, with another acceleration structure if the overrides set one. All other overrides are in the
-    /// settings.
+    /// The scene, with the acceleration structure from the overrides. All other overrides are in `settings`.
     pub(super) scene: Arc<Scene>,
     pub(super) settings: RenderSettings,
     pub(super) threads: usize,
@@ -35,32 +34,32 @@ pub(super) struct Plan {
     pub(super) bit_depth: u8,
     /// Output files of this image.
     pub(super) outputs: Vec<PathBuf>,
-    /// Animations that this image is a frame of.
+    /// Animation files that contain this image as a frame.
     pub(super) moving: Vec<PathBuf>,
-    /// Turntable frame. `None` for a still image.
+    /// The turntable frame. `None` for a still image.
     pub(super) turn: Option<Turn>,
-    /// Layers in addition to the image in EXR files.
+    /// Additional layers for EXR files.
     pub(super) layers: Vec<OutputLayer>,
-    /// Side from which a model is seen and its up axis, if the command line sets them.
+    /// Side facing the camera and up axis of a model, if set on the command line.
     pub(super) from: Option<Side>,
     pub(super) up: Option<UpAxis>,
-    /// Output files of later turntable frames.
+    /// Output files for later turntable frames.
     pub(super) later_outputs: Vec<PathBuf>,
     pub(super) named_by: NamedBy,
-    /// Default file name of turntable frames, with `#` for the number. `None` if the user named the files or there is
-    /// no turntable.
+    /// Default file name pattern for turntable frames, with `#` for the number. `None` without a turntable or
+    /// if the user named the files.
     pub(super) default_names: Option<PathBuf>,
     pub(super) report: Option<PathBuf>,
     pub(super) replaces_foreign: bool,
-    /// Part of the image to render, from 1, and the number of parts.
+    /// 1-based number of the part to render, and the number of parts.
     pub(super) shard: Option<(u32, u32)>,
     pub(super) checkpoints: Checkpoints,
-    /// Maximum number of bytes that the render may need.
+    /// Maximum memory use of the render, in bytes.
     pub(super) memory: Option<u64>,
     pub(super) effective: Effective,
 }
 
-/// Where the output file names are from.
+/// Where the output file names come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum NamedBy {
     /// `-o`.
@@ -74,7 +73,7 @@ pub(super) enum NamedBy {
 /// Merges a scene and overrides.
 ///
 /// # Errors
-/// A crop outside of the image, or an output file that cannot hold the image.
+/// The crop is outside the image, or an output format cannot store the image.
 pub(super) fn plan(scene: &Arc<Scene>, path: &Path, overrides: &Overrides) -> Result<Plan, Box<Diagnostic>> {
     let mut render = overrides.applied(&scene.render);
     if scene.environment.is_some() {
@@ -98,7 +97,7 @@ pub(super) fn plan(scene: &Arc<Scene>, path: &Path, overrides: &Overrides) -> Re
     let OutputFiles { outputs, moving, later_outputs } = OutputFiles::of(outputs, overrides.turn);
     let bit_depth = overrides.bit_depth.unwrap_or(8);
     match overrides.shard {
-        // Parts are not in an image format.
+        // Part files do not use an image format.
         Some(_) => check_shard(&settings, overrides)?,
         None => {
             let check = |path: &PathBuf| check_format(path, (render.width, render.height), bit_depth);
@@ -137,14 +136,15 @@ pub(super) fn plan(scene: &Arc<Scene>, path: &Path, overrides: &Overrides) -> Re
     })
 }
 
-/// Maximum number of photons per pass, which must be stored.
+/// Maximum number of photons per pass, limited by memory.
 pub(super) const MAX_PHOTONS: u64 = 4_000_000;
 
-/// Bounds of the default photon count, which is the number of pixels. Fewer photons increase the error more than they
-/// save time; more take the time of further passes, and delay the first image.
+/// The default photon count is the number of pixels, clamped to this range. With fewer photons, the
+/// additional error outweighs the time saved. More photons take time from further passes and delay the first
+/// image.
 const PHOTONS_BY_PIXELS: RangeInclusive<u64> = 8192..=200_000;
 
-/// Returns the photon settings for an image of this size.
+/// Returns the photon settings for the given image size.
 fn photons(requested: &Photons, (width, height): (u32, u32)) -> PhotonSettings {
     let Photons { enabled: _, count, radius, bounces } = *requested;
     let by_pixels = || {
@@ -155,7 +155,8 @@ fn photons(requested: &Photons, (width, height): (u32, u32)) -> PhotonSettings {
     PhotonSettings { count: count as u32, radius: radius as f32, bounces }
 }
 
-/// Returns the scene with this acceleration structure. Copies it only if necessary, because it may be large.
+/// Returns the scene with the given acceleration structure. Scenes may be large, so copies it only if
+/// necessary.
 fn with_accel(scene: &Arc<Scene>, accel: Accel) -> Arc<Scene> {
     let mut scene = Arc::clone(scene);
     if scene.render.accel != accel {
@@ -164,8 +165,8 @@ fn with_accel(scene: &Arc<Scene>, accel: Accel) -> Arc<Scene> {
     scene
 }
 
-/// Returns the output files of the command line, of the scene, or the scene's name with `.png` in the working
-/// directory.
+/// Returns the output files from the command line or else from the scene. The default is the scene's name
+/// with `.png` in the working directory.
 fn outputs(of_scene: Option<&PathBuf>, path: &Path, overrides: &Overrides) -> (Vec<PathBuf>, NamedBy) {
     if !overrides.outputs.is_empty() {
         return (overrides.outputs.clone(), NamedBy::CommandLine);
@@ -173,7 +174,7 @@ fn outputs(of_scene: Option<&PathBuf>, path: &Path, overrides: &Overrides) -> (V
     if let Some(of_scene) = of_scene {
         return match overrides.turn {
             None => (vec![of_scene.clone()], NamedBy::Scene),
-            // The scene names only one file, so the turntable uses default names.
+            // The scene specifies only one file, so the turntable uses default names.
             Some(_) => (vec![turntable::suggested(of_scene)], NamedBy::Default),
         };
     }
@@ -183,14 +184,14 @@ fn outputs(of_scene: Option<&PathBuf>, path: &Path, overrides: &Overrides) -> (V
     (vec![if overrides.turn.is_some() { turntable::suggested(&name) } else { name }], NamedBy::Default)
 }
 
-/// Returns the report's file. In a turntable, it has the frame's number.
+/// Returns the report's path, which contains the frame number if this is a turntable.
 fn report(overrides: &Overrides) -> Option<PathBuf> {
     let path = overrides.report.as_ref()?;
     let numbered = overrides.turn.and_then(|turn| turntable::numbered(path, turn));
     Some(numbered.unwrap_or_else(|| path.clone()))
 }
 
-/// Output files of a request by kind.
+/// A request's output files by kind.
 struct OutputFiles {
     outputs: Vec<PathBuf>,
     moving: Vec<PathBuf>,
@@ -207,7 +208,8 @@ impl OutputFiles {
                 moving.push(path);
                 continue;
             }
-            // The first frame also lists later files, so that conflicts with them are found before hours of work.
+            // The first frame also lists later files so that conflicts are detected before hours of
+            // rendering.
             let others = (turn.number + 1..turn.of).filter(|_| turn.number == 0);
             let of = |number| turntable::numbered(&path, Turn { number, ..turn });
             later_outputs.extend(others.filter_map(of));
@@ -237,13 +239,13 @@ fn check_layers(
         return refused(message, "write an EXR file, for example -o layers.exr");
     }
     if view != View::Beauty {
-        let message = format!("`--layers` needs the view beauty, not {}", view.name());
+        let message = format!("`--layers` needs the `beauty` view, not `{}`", view.name());
         return refused(message, "remove --view, or request it as a layer");
     }
     Ok(())
 }
 
-/// Checks that an animation can hold such images.
+/// Checks that an animation format supports the image size and bit depth.
 fn check_moving(path: &Path, size: (u32, u32), bit_depth: u8) -> Result<(), Box<Diagnostic>> {
     let Some(format) = AnimationFormat::from_path(path) else { return Ok(()) };
     let message = match format.check_size(size.0, size.1) {
@@ -276,7 +278,7 @@ fn check_crop(crop: Option<Rect>, width: u32, height: u32) -> Result<(), Box<Dia
     }
 }
 
-/// Checks that an image with these settings can be divided, and that the part has an output file.
+/// Checks that an image with these settings can be rendered in parts and that there is one output file.
 fn check_shard(settings: &RenderSettings, overrides: &Overrides) -> Result<(), Box<Diagnostic>> {
     let refused = |message: &str, help: &str| {
         let (message, help) = (message.to_owned(), Some(help.to_owned()));
@@ -304,14 +306,14 @@ fn check_shard(settings: &RenderSettings, overrides: &Overrides) -> Result<(), B
     }
     if settings.gathers() && settings.view.source() == AovSource::Film(Quantity::Error) {
         return refused(
-            "`--shard` does not work with photons and the view `error`",
+            "`--shard` does not work with photons and the `error` view",
             "render it without --shard, or use --photons off",
         );
     }
     Ok(())
 }
 
-/// Checks that the file's format can hold such an image.
+/// Checks that the file format supports the image size and bit depth.
 fn check_format(path: &Path, size: (u32, u32), bit_depth: u8) -> Result<(), Box<Diagnostic>> {
     let check = || Format::from_path(path)?.check_image(size.0, size.1, BitDepth::try_from(bit_depth)?);
     check().map_err(|error: OutputError| {
@@ -320,7 +322,7 @@ fn check_format(path: &Path, size: (u32, u32), bit_depth: u8) -> Result<(), Box<
     })
 }
 
-/// Returns the tone mapping of a view. Exposure and tone curve apply to light; data are shown unchanged.
+/// Returns the tone mapping for a view. Exposure and tone curve only apply to light, not to data.
 fn tone(exposure: f32, curve: Tonemap, view: View) -> ToneMapping {
     match view.source() {
         AovSource::Light(LightAov::Radiance(_)) | AovSource::Bounds | AovSource::Film(Quantity::Radiance) => {
@@ -337,12 +339,12 @@ fn tone(exposure: f32, curve: Tonemap, view: View) -> ToneMapping {
         AovSource::FirstHit(FirstHit::Normal | FirstHit::Barycentric | FirstHit::Uv | FirstHit::Albedo) => {
             ToneMapping::DATA
         }
-        // The values are linear, but exposure must not exaggerate them.
+        // The values are linear, but exposure must not scale them.
         AovSource::Light(LightAov::LitFraction) => ToneMapping::default(),
     }
 }
 
-/// Number of render threads: as requested, or one per core.
+/// Returns the number of render threads: as requested, or one per core.
 pub(super) fn threads(overrides: &Overrides) -> usize {
     overrides.threads.filter(|count| *count > 0).unwrap_or_else(cores)
 }
@@ -364,7 +366,7 @@ mod tests {
     }
 
     #[test]
-    fn command_line_overrides_scene_and_defaults() {
+    fn command_line_takes_precedence_over_scene() {
         let text = "[render]\nwidth = 32\nheight = 24\nsamples = 4\n";
         let size = |plan: &Plan| {
             let render = &plan.settings.render;
@@ -402,7 +404,11 @@ mod tests {
             ("count = 9_000_000", 320, 240, MAX_PHOTONS as u32),
         ] {
             assert_eq!(count(table, width, height, None), photons, "{table} at {width}×{height}");
-            assert_eq!(count(table, width, height, part), photons, "independent of the crop");
+            assert_eq!(
+                count(table, width, height, part),
+                photons,
+                "the photon count should not depend on the crop"
+            );
         }
     }
 
@@ -424,9 +430,10 @@ mod tests {
         assert_eq!(planned(scene, &overrides).outputs, overrides.outputs);
     }
 
-    /// The crates `scene` and `files` do not depend on each other, so each has its own list.
+    /// The `scene` and `files` crates each have their own list of formats because neither depends on the
+    /// other.
     #[test]
-    fn scene_accepts_exactly_the_writable_formats() {
+    fn scene_accepts_exactly_the_supported_formats() {
         let folder = tempfile::tempdir().expect("a scratch folder");
         let path = folder.path().join("scene.toml");
         let load = |ending: &str| {

@@ -1,9 +1,9 @@
 //! Messages between the front ends and the worker.
 //!
-//! A front end sends [`Command`]s and receives [`Event`]s. Each event carries the generation of its request, and the
-//! receiver drops events of older generations. The queue holds one request: a newer one replaces it and cancels the
-//! current render. Preview images are not sent as events but stored in a slot that holds only the latest one, which
-//! [`Event::Preview`] announces.
+//! A front end sends [`Command`]s and receives [`Event`]s. Each event contains the generation of its request,
+//! and the receiver drops events of older generations. Only one request can be pending. A newer request
+//! replaces it and cancels the current render. Events do not contain preview images. Instead,
+//! [`Event::Preview`] announces a new image in a slot that stores only the latest preview.
 
 pub mod reasons;
 mod stage;
@@ -29,23 +29,23 @@ use crate::scene::fingerprint::Key;
 pub enum Command {
     /// Cancel the current request and start this one.
     Render(Box<Request>),
-    /// Write the current image to its files, as soon as every pixel has a sample.
+    /// Write the current image to its files as soon as every pixel has a sample.
     Write,
-    /// Change the size of previews and show the current image again. Rendering continues.
+    /// Change the preview size and show the current image again. Rendering continues.
     Preview(Option<PreviewSize>),
-    /// Write this camera into the scene file. [`Event::CameraKept`] reports the result. Rendering continues.
+    /// Write this camera to the scene file. [`Event::CameraKept`] reports the result. Rendering continues.
     KeepCamera(MovedCamera),
     /// Undo this edit of the scene file unless the file has changed since. [`Event::CameraUndone`] reports the result.
     /// Rendering continues.
     UndoCamera(CameraEdit),
-    /// Identify the object at a position of the image. [`Event::Picked`] reports it. Rendering continues.
+    /// Identify the object at an image position. [`Event::Picked`] reports the result. Rendering continues.
     Pick(ImagePosition),
     /// Stop the current render.
     Cancel,
-    /// Stop the current render and save a checkpoint. An image that is being written is completed, unless
-    /// [`Command::Cancel`] follows: then a checkpoint is saved instead.
+    /// Stop the current render and save a checkpoint. If an image is being written, finish writing it
+    /// instead, unless [`Command::Cancel`] follows.
     Suspend,
-    /// Pause or resume the newest request, whether or not it has begun. Later requests are not paused.
+    /// Pause or resume the newest request, even if it has not started. Later requests are not paused.
     Pause(bool),
     /// Stop the worker.
     Quit,
@@ -54,45 +54,45 @@ pub enum Command {
 /// A request to render an image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Request {
-    /// Larger than in all earlier requests.
+    /// Must be greater than in all earlier requests.
     pub generation: u64,
     /// The scene file.
     pub scene: PathBuf,
-    /// Overrides from the command line and from keys.
+    /// Overrides from the command line and the keyboard.
     pub overrides: Overrides,
     /// Maximum size of previews, which keep the image's aspect ratio. `None` disables previews.
     pub preview: Option<PreviewSize>,
     /// Whether to write the finished image.
     pub write: Writing,
-    /// Overrides of the scene's own image if this request shows another one; its film and checkpoint are then kept.
-    /// `None` if this request is for the scene's own image.
+    /// Overrides for the scene's own image if this request shows another one. The own image's film and
+    /// checkpoint are kept. `None` if this request is for the scene's own image.
     pub own: Option<Box<Overrides>>,
     /// Render again even if nothing has changed.
     pub force: bool,
-    /// Region whose samples are rendered first. The final image does not depend on it.
+    /// Region to render first. Does not affect the final image.
     pub first: Option<Section>,
 }
 
-/// Whether a finished image is written.
+/// Whether to write the finished image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Writing {
     /// Do not write the image.
     No,
-    /// Write the image. Failures are reported by [`Event::WriteFailed`] or [`Event::Refused`] at the beginning and at
-    /// the end, and the image is rendered and shown anyway.
+    /// Try to write the image. It is rendered and shown even if writing fails. [`Event::WriteFailed`] and
+    /// [`Event::Refused`] report failures at the start and end of the request.
     Try,
-    /// Write the image. A file that cannot be written fails the request, before the render if possible.
+    /// Write the image. If a file cannot be written, the request fails, before rendering if possible.
     Must,
 }
 
-/// Maximum size of a preview in square pixels.
+/// Maximum preview size, in square pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PreviewSize {
     /// Columns.
     pub width: u32,
     /// Rows.
     pub height: u32,
-    /// Center of a 1:1 section that shows as many image pixels as fit. `None` to fit the whole image.
+    /// Center of a section shown at 1:1, as large as fits. `None` fits the whole image.
     pub around: Option<ImagePosition>,
 }
 
@@ -104,26 +104,27 @@ pub enum Event {
         /// Request number.
         generation: u64,
     },
-    /// A stage began or ended.
+    /// A stage started or ended.
     Stage {
         /// Request number.
         generation: u64,
         /// The stage and its status.
         stage: StageReport,
     },
-    /// Files that were read or tried, which the request depends on. Each such event contains all files known so far,
-    /// and the front end watches the files of the latest event.
+    /// Files that the request depends on, including files it failed to read. Each event contains all files
+    /// known so far, and the front end watches those of the latest event.
     Files {
         /// Request number.
         generation: u64,
         /// The scene and all files it references.
         files: Vec<FileRead>,
-        /// Number of files at the head of the list that this request read. Earlier requests read the others.
+        /// Number of files at the start of the list that this request read. The others were read by earlier
+        /// requests.
         read: usize,
-        /// Time before the first read.
+        /// Point in time before the first read.
         since: Instant,
     },
-    /// All warnings are known, before the image is rendered.
+    /// All warnings, which are known before the image is rendered.
     Warnings {
         /// Request number.
         generation: u64,
@@ -134,7 +135,7 @@ pub enum Event {
     Asset {
         /// Request number.
         generation: u64,
-        /// Progress of the asset.
+        /// Loading progress.
         progress: AssetProgress,
     },
     /// The scene is valid and has these effective settings.
@@ -147,7 +148,7 @@ pub enum Event {
         camera: Viewpoint,
         /// Exposure of the scene, in stops.
         exposure: f32,
-        /// The scene's values of other settings that keys change.
+        /// The scene's values for other settings that can be changed with keys.
         own: OwnSettings,
     },
     /// The scene file was read.
@@ -164,7 +165,7 @@ pub enum Event {
         /// Progress of the render.
         progress: RenderProgress,
     },
-    /// The slot contains a newer preview.
+    /// A newer preview is in the slot.
     Preview {
         /// Request number.
         generation: u64,
@@ -177,7 +178,7 @@ pub enum Event {
         path: PathBuf,
         /// Size of the file.
         bytes: u64,
-        /// Whether it is the scene's own image, without changes made by keys.
+        /// Whether it is the scene's own image, without changes made with keys.
         is_own: bool,
     },
     /// State of the scene's own image, for a request that shows another one.
@@ -191,27 +192,27 @@ pub enum Event {
     WriteFailed {
         /// Request number.
         generation: u64,
-        /// The file, if only one failed. Its content is unknown.
+        /// The file, if only one failed. Its contents are unknown.
         path: Option<PathBuf>,
         /// The file and the reason.
         message: String,
     },
-    /// A file was replaced, and some metadata of the old file could not be preserved.
+    /// A file was replaced, but some of its metadata could not be preserved.
     NotKept {
         /// Request number.
         generation: u64,
         /// The file and the lost metadata.
         message: String,
     },
-    /// No file is written, because at least one must not be: it is an input, is named twice, or contains something that
-    /// glimt did not write. Rendering continues.
+    /// No files are written because at least one must not be overwritten: it is an input, is listed twice, or
+    /// was not written by glimt. Rendering continues.
     Refused {
         /// Request number.
         generation: u64,
-        /// One diagnostic per such file, with a solution.
+        /// One diagnostic per conflicting file, with a suggested fix.
         conflicts: Vec<Diagnostic>,
     },
-    /// News about the checkpoint of the render.
+    /// An update about the render's checkpoint.
     Checkpoint {
         /// Request number.
         generation: u64,
@@ -234,14 +235,14 @@ pub enum Event {
     CameraKept {
         /// Request number.
         generation: u64,
-        /// The file with the camera, or why glimt did not write it.
+        /// The file with the camera, or why it was not written.
         outcome: Result<KeptCamera, String>,
     },
     /// Answer to [`Command::UndoCamera`].
     CameraUndone {
         /// Request number.
         generation: u64,
-        /// The restored file, or why glimt did not write it.
+        /// The restored file, or why it was not restored.
         outcome: Result<PathBuf, String>,
     },
     /// Answer to [`Command::Pick`].
@@ -257,9 +258,9 @@ pub enum Event {
         generation: u64,
         /// Report of the request.
         report: Box<Report>,
-        /// Warnings, and the conflicts of [`Event::Refused`] that remain.
+        /// Warnings, and any remaining conflicts from [`Event::Refused`].
         warnings: Vec<Diagnostic>,
-        /// Whether nothing had changed, so that the request rendered nothing and shows the same image.
+        /// Whether nothing changed, in which case nothing was rendered and the image is the same.
         unchanged: bool,
     },
     /// The request failed. The previous image remains.
@@ -269,8 +270,8 @@ pub enum Event {
         /// Why.
         failure: Failure,
     },
-    /// The render of the last good scene ended. It replaced the request's own scene, which could not be read, as
-    /// [`Event::Failed`] reported.
+    /// The render of the last valid scene ended. It was rendered because the request's own scene could not be
+    /// read, as reported by [`Event::Failed`].
     LastGoodEnded {
         /// Request number.
         generation: u64,
@@ -284,21 +285,21 @@ pub enum Event {
     },
 }
 
-/// State of the scene's own image: the saved scene with the overrides of the command line.
+/// State of the scene's own image, which is rendered from the saved scene with the command-line overrides.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OwnState {
-    /// All its files contain it.
+    /// It has been written to all its output files.
     Written,
-    /// Some of its samples are rendered.
+    /// Some of its samples have been rendered.
     Begun {
-        /// Whether the request adds samples to it, because it shows the same film in another way.
+        /// Whether the current request adds samples to it, because both images share a film.
         is_rendering: bool,
     },
-    /// None of its samples are rendered.
+    /// None of its samples have been rendered.
     NotBegun,
 }
 
-/// News about a checkpoint.
+/// An update about a checkpoint.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum CheckpointNews {
     /// The checkpoint was written.
@@ -315,24 +316,24 @@ pub enum CheckpointNews {
     Resumed {
         /// The file.
         path: PathBuf,
-        /// Samples of every pixel that needs more.
+        /// Number of samples in each pixel that needs more.
         samples: u32,
     },
-    /// The checkpoint to resume from does not exist, so the render starts from zero.
+    /// The checkpoint to resume from does not exist, so the render starts from scratch.
     Absent {
         /// The file.
         path: PathBuf,
     },
-    /// A checkpoint of this image exists, but the command line does not ask to resume.
+    /// A checkpoint of this image exists, but resuming was not requested.
     Ignored {
         /// The file.
         path: PathBuf,
     },
-    /// The render ignores a checkpoint or an incomplete part and starts from zero.
+    /// The render ignores a checkpoint or an incomplete part and starts from scratch.
     Unused {
         /// The file.
         path: PathBuf,
-        /// The reason: another image, more samples than requested, or damage.
+        /// The reason: it belongs to another image, has more samples than requested, or is damaged.
         why: String,
     },
     /// The output file already contains this part.
@@ -350,71 +351,71 @@ pub enum CheckpointNews {
 /// Why a request failed.
 #[derive(Clone, Debug)]
 pub enum Failure {
-    /// The scene or a file it references is invalid (exit code 2): errors and warnings.
+    /// Errors and warnings for an invalid scene or referenced file (exit code 2).
     Scene(Vec<Diagnostic>),
-    /// The work failed (exit code 1), for example because a file could not be written or the worker died.
+    /// Another failure (exit code 1), for example because a file could not be written or the worker crashed.
     Work(String),
 }
 
-/// How the render of the last good scene ended.
+/// How the render of the last valid scene ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LastGoodEnd {
     /// The image is finished.
     Finished {
-        /// Whether it was finished before, so that nothing was rendered or written.
+        /// Whether the image had already been finished, so nothing was rendered or written.
         unchanged: bool,
     },
-    /// The image is not finished: the render was stopped, or no scene has been read yet.
+    /// The image is unfinished because the render was stopped or no valid scene has been read yet.
     Stopped,
 }
 
 /// Loading progress of an asset.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AssetProgress {
-    /// Name of a texture in the scene, or a mesh's file name.
+    /// Texture name from the scene, or the file name of a mesh.
     pub name: String,
     /// Work units done.
     pub done: u64,
-    /// Total work units. Loading has ended when `done == total`.
+    /// Total work units. Loading is finished when `done == total`.
     pub total: u64,
 }
 
 /// Progress of a render.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RenderProgress {
-    /// From 0 to 1. Never decreases within a generation, and is 1 when the render is over.
+    /// Fraction done, from 0 to 1. Never decreases within a generation and is 1 once rendering ends.
     pub fraction: f64,
-    /// Seconds since the render stage began.
+    /// Seconds since the render stage started.
     pub elapsed_seconds: f64,
-    /// Seconds that earlier requests spent on the samples this one continues from.
+    /// Seconds spent by earlier requests on samples that this render reuses.
     pub earlier_seconds: f64,
-    /// Expected remaining seconds. `None` until the rate is known.
+    /// Estimated remaining seconds. `None` until the rate is known.
     pub eta_seconds: Option<f64>,
-    /// Average samples per pixel so far, rounded down.
+    /// Current average samples per pixel, rounded down.
     pub samples: u32,
-    /// Exact average of the samples per pixel.
+    /// Exact average samples per pixel.
     pub mean_samples: f64,
-    /// Expected final average of the samples per pixel.
+    /// Expected final average samples per pixel.
     pub total_samples: u32,
-    /// Whether every pixel gets `total_samples`, because neither noise nor time ends the render.
+    /// Whether every pixel will have `total_samples` samples, because there is no noise target or time limit.
     pub is_total_fixed: bool,
-    /// Noise so far. `None` during the first half second and the first 16 samples.
+    /// Current noise. `None` during the first half second and the first 16 samples.
     pub noise: Option<NoiseProgress>,
 }
 
 /// Current and predicted noise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NoiseProgress {
-    /// Last measured [`Film::relative_error`](crate::film::Film::relative_error).
+    /// Most recently measured [`Film::relative_error`](crate::film::Film::relative_error).
     pub now: f64,
     /// Seconds from the start of the render stage to the measurement.
     pub seconds: f64,
-    /// The next lower round level, and the seconds until then. `None` if the render ends earlier or the noise cannot be
-    /// predicted: with photons and with `error`.
+    /// The next lower round noise level and the seconds until it is reached. `None` if the render ends before
+    /// that, or if photons or a noise target (`error`) make the noise unpredictable.
     pub next: Option<(f64, f64)>,
 }
 
-/// Slot that holds the latest preview.
+/// Slot for the latest preview.
 pub type PreviewSlot = Arc<std::sync::Mutex<Option<LatestPreview>>>;
 
 /// A preview and the image it shows.
@@ -422,22 +423,22 @@ pub type PreviewSlot = Arc<std::sync::Mutex<Option<LatestPreview>>>;
 pub struct LatestPreview {
     /// Request number.
     pub generation: u64,
-    /// The preview, within the requested size.
+    /// The preview image, no larger than the requested size.
     pub picture: Arc<Picture>,
-    /// Range of values mapped to black and white: the nearest and farthest distance, or 0 and the maximum.
+    /// Values mapped to black and white: the smallest and largest distance, or 0 and the maximum.
     pub range: Option<[f32; 2]>,
-    /// Section of the image that is shown at 1:1. `None` for the whole image.
+    /// Section of the image shown at 1:1. `None` for the whole image.
     pub section: Option<Section>,
-    /// Whether the preview lacks the photons' light, because they are still being traced.
+    /// Whether the preview lacks the light from photons because they are still being traced.
     pub lacks_photons: bool,
-    /// The image that the preview shows. `None` if it lacks the photons' light.
+    /// The image that the preview shows. `None` if it lacks the light from photons.
     pub source: Option<PreviewSource>,
 }
 
 /// The image that a preview shows, and whether it is finished.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PreviewSource {
-    /// Previews with the same key show the same image, at any size and number of samples.
+    /// Previews with the same key show the same image, possibly with different sizes and sample counts.
     pub image: Key,
     /// Whether the image has all its samples.
     pub is_finished: bool,

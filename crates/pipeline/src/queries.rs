@@ -1,4 +1,5 @@
-//! Queries about the current image, and edits of the camera in the scene file. They run during and between requests.
+//! Queries about the current image, and edits of the scene file's camera. Both can run during and between
+//! requests.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -31,7 +32,7 @@ pub(super) enum Query {
 }
 
 impl Query {
-    /// Reports that the query cannot be answered, and why.
+    /// Reports why the query cannot be answered.
     pub(super) fn fail(&self, why: &str, sink: &Sink) {
         let generation = sink.generation;
         match self {
@@ -50,7 +51,7 @@ impl Query {
 #[derive(Clone)]
 pub(super) struct QueryContext {
     pub(super) parsed: Arc<Parsed>,
-    /// Overrides of scene keys.
+    /// Overrides of scene keys from the command line.
     pub(super) sets: Vec<String>,
     pub(super) world: Arc<World>,
     pub(super) settings: RenderSettings,
@@ -109,7 +110,8 @@ impl QueryContext {
         })
     }
 
-    /// Writes this camera into the scene file, unless the file or the scene's camera has changed since it was read.
+    /// Writes a camera to the scene file, unless the file or the scene's camera has changed since it was
+    /// read.
     fn keep_camera(
         &self,
         MovedCamera { camera, own }: &MovedCamera,
@@ -131,7 +133,7 @@ impl QueryContext {
         if !has_text(&path, read) {
             return Err(changed.to_owned());
         }
-        // Values that keys did not change are of the previous camera and would overwrite newer ones.
+        // Values that were not changed with keys are from the old camera and would overwrite newer ones.
         if *own != self.own {
             return Err(CAMERA_CHANGED.to_owned());
         }
@@ -147,7 +149,7 @@ impl QueryContext {
     }
 }
 
-/// Restores the text from before the camera was written, if the file has not changed since.
+/// Restores the text from before the camera edit, unless the file has changed since.
 fn undo(edit: &CameraEdit, inputs: &Inputs) -> Result<PathBuf, String> {
     let CameraEdit { path, before, after } = edit;
     let changed = format!("{} {NOT_UNDONE}", path.display());
@@ -166,13 +168,13 @@ fn is_gone(path: &Path) -> bool {
     path.metadata().is_err_and(|error| error.kind() == std::io::ErrorKind::NotFound)
 }
 
-/// Whether the file has exactly this text.
+/// Whether the file contains exactly this text.
 fn has_text(path: &Path, text: &str) -> bool {
     text_now(path).is_ok_and(|now| *now == *text)
 }
 
-/// Replaces the text of a scene file. `changed` is the error if the file has another text, `outcome` the result if
-/// metadata of the file would be lost.
+/// Replaces the text of a scene file. `changed` is the error message if the file's text is not `old`.
+/// `outcome` ends the error message if file metadata would be lost.
 fn replace(
     path: &Path,
     (old, new): (&str, &str),
@@ -195,7 +197,7 @@ fn replace(
         .map_err(|error| error.to_string())
 }
 
-/// Writes the scene of a model with this camera next to the model, without replacing a file.
+/// Writes a model's scene, with the given camera, next to the model. Never replaces a file.
 fn write_scene_of_model(loaded: &Loaded, camera: &Viewpoint) -> Result<KeptCamera, String> {
     let path = loaded.path.with_extension("toml");
     let shown = path.display();

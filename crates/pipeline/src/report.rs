@@ -10,9 +10,9 @@ use super::settings::Effective;
 /// Report of a finished request, written as JSON with `--report`.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Report {
-    /// Version of glimt.
+    /// The glimt version.
     pub glimt: &'static str,
-    /// Scene file as named by the caller.
+    /// Scene file, as specified by the caller.
     pub scene: String,
     /// The image.
     pub image: ImageReport,
@@ -20,7 +20,7 @@ pub struct Report {
     pub settings: Effective,
     /// The lights and how they are sampled.
     pub lights: LightsReport,
-    /// The traced photons. `None` if the image does not use photons.
+    /// Photon statistics. `None` if the image does not use photons.
     pub photons: Option<PhotonsReport>,
     /// All eight stages, in order.
     pub stages: Vec<StageReport>,
@@ -28,7 +28,7 @@ pub struct Report {
     pub counters: Counters,
     /// Wall-clock time of the request.
     pub seconds: f64,
-    /// Highest resident memory of the process so far.
+    /// Peak resident memory of the process so far.
     pub peak_memory_bytes: u64,
 }
 
@@ -45,15 +45,16 @@ pub struct ImageReport {
     pub height: u32,
     /// Samples per pixel.
     pub samples: SampleCounts,
-    /// Expected error, relative to the mean luminance of the image: see
-    /// [`Film::relative_error`](crate::film::Film::relative_error). `None` below two samples per pixel.
+    /// Expected error relative to the image's mean luminance. See
+    /// [`Film::relative_error`](crate::film::Film::relative_error). `None` with fewer than two samples per
+    /// pixel.
     pub error: Option<f64>,
-    /// Render time in seconds, including earlier requests that this one continued.
+    /// Render time in seconds, including earlier requests continued by this one.
     pub render_seconds: f64,
-    /// Whether every pixel has the requested samples.
+    /// Whether every pixel has the requested number of samples.
     pub complete: bool,
-    /// Range of values mapped to black and white. `depth`: the minimum distance (white) and the maximum. Other data: 0
-    /// and the maximum (white).
+    /// Range of values shown from black to white: the minimum distance (white) and the maximum for `depth`,
+    /// and 0 and the maximum (white) for other data.
     pub range: Option<[f32; 2]>,
 }
 
@@ -73,13 +74,14 @@ pub struct SampleCounts {
 pub struct LightsReport {
     /// Number of lights. A mesh counts once per emissive material.
     pub count: u64,
-    /// Which lights each vertex samples.
+    /// Which lights are sampled at each vertex.
     pub sampled: LightsSampled,
-    /// Lights that a vertex samples from the tree: 32 × `shadow_samples` in whitted, 4 × in path; 0 without a tree.
+    /// Number of lights sampled from the tree per vertex: 32 × `shadow_samples` for `whitted`, 4 × for
+    /// `path`. 0 without a tree.
     pub picks: u64,
-    /// Nodes of the light tree.
+    /// Number of nodes in the light tree.
     pub tree_nodes: u64,
-    /// Bytes of the trees over lights and over the triangles of lights.
+    /// Bytes used by the trees over lights and over emissive triangles.
     pub memory_bytes: u64,
 }
 
@@ -88,7 +90,7 @@ pub struct LightsReport {
 pub struct PhotonsReport {
     /// Photons per pass.
     pub count: u64,
-    /// Passes traced by this request; others were cached.
+    /// Passes traced by this request. Others were cached.
     pub passes: u64,
     /// Photons emitted.
     pub emitted: u64,
@@ -101,30 +103,30 @@ pub struct PhotonsReport {
     pub seconds: f64,
     /// Photons emitted per second.
     pub per_second: f64,
-    /// Kernel radius of the first pass for caustics.
+    /// Kernel radius for caustics in the first pass.
     pub caustic_radius: f32,
-    /// Kernel radius of the first pass for light reflected from caustics.
+    /// Kernel radius for light reflected from caustics in the first pass.
     pub bounced_radius: f32,
-    /// Bytes of the cached maps.
+    /// Bytes used by cached maps.
     pub kept_memory_bytes: u64,
-    /// Maximum number of bytes of maps in use at once.
+    /// Peak number of bytes used by maps at the same time.
     pub used_memory_bytes: u64,
 }
 
-/// Which lights a vertex samples.
+/// Which lights are sampled at a vertex.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum LightsSampled {
     /// All lights.
     All,
-    /// A subset sampled by expected contribution.
+    /// A subset, sampled according to expected contribution.
     Picked,
 }
 
 /// Work counters of a request.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct Counters {
-    /// Triangles of all mesh instances, and single triangles.
+    /// Triangles in all mesh instances, plus standalone triangles.
     pub triangles: u64,
     /// Shapes of all kinds. A mesh instance counts as one.
     pub objects: u64,
@@ -144,16 +146,16 @@ pub struct Counters {
     pub photons_stored: u64,
     /// Texels read from files.
     pub texels_loaded: u64,
-    /// Bytes of images and their mipmaps.
+    /// Bytes used by images and their mipmaps.
     pub texture_memory_bytes: u64,
     /// Texture lookups.
     pub texture_lookups: u64,
-    /// Non-finite samples, which count as 0.
+    /// Non-finite samples, which are treated as 0.
     pub non_finite_samples: u64,
-    /// Bytes of acceleration structures.
+    /// Bytes used by acceleration structures.
     pub accel_memory_bytes: u64,
-    /// Films in memory: the image's, and others that a toggle can return to.
+    /// Number of films in memory: the current image's and those cached for earlier settings.
     pub films: u64,
-    /// Bytes of these films.
+    /// Bytes used by these films.
     pub film_memory_bytes: u64,
 }

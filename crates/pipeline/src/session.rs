@@ -1,4 +1,4 @@
-//! Synchronous rendering of images in memory, for programs that measure.
+//! Synchronous in-memory rendering, for measurement programs.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -25,10 +25,10 @@ impl Default for Session {
 }
 
 impl Session {
-    /// Renders from an empty film without writing files.
+    /// Renders an image, starting with an empty film. Does not write any files.
     ///
     /// # Errors
-    /// Why no image was rendered.
+    /// Returns the reason if no image was rendered.
     pub fn render(
         &mut self,
         scene: &Path,
@@ -46,7 +46,7 @@ impl Session {
             own: None,
             force: true,
         };
-        // The result is returned, so the events have no receiver.
+        // The result is returned, so no one receives the events.
         let (events, _) = mpsc::channel();
         let sink =
             Sink { generation: self.generation, events, previews: PreviewSlot::default(), within: None };
@@ -54,13 +54,13 @@ impl Session {
         self.engine.rendered(&request, &sink, &context)
     }
 
-    /// Whether a path leads to a file that the last image depends on.
+    /// Whether a path refers to a file that the last image depends on.
     pub fn reads(&self, path: &Path) -> bool {
         self.engine.reads(path)
     }
 }
 
-/// Orders of a request that has no front end.
+/// Orders for a request without a front end.
 pub(super) struct NoOrders;
 
 impl Orders for NoOrders {
@@ -94,7 +94,7 @@ mod tests {
         [materials.m]\n[[sphere]]\ncenter = [0, 1, 0]\nradius = 0.5\nmaterial = \"m\"\n[[light]]\n";
 
     #[test]
-    fn images_have_keys_and_reports() {
+    fn image_includes_key_and_report() {
         let folder = tempfile::tempdir().expect("a folder");
         let scene = folder.path().join("a.toml");
         std::fs::write(&scene, SCENE).expect("written");
@@ -114,7 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn failed_or_cancelled_render_has_no_image() {
+    fn failed_or_cancelled_render_returns_no_image() {
         let token = CancelToken::new();
         let missing = Session::default().render(Path::new("none.toml"), &Overrides::default(), &token);
         assert!(matches!(missing, Err(Unrendered::Failed(Failure::Scene(_)))));

@@ -1,4 +1,4 @@
-//! Overrides of a scene's settings by the command line and keys, and the effective settings.
+//! Scene setting overrides from the command line and the keyboard, and the effective settings.
 
 use std::path::PathBuf;
 
@@ -14,18 +14,18 @@ macro_rules! overrides {
     ($(
         $(#[doc = $doc:literal])* $name:ident: $type:ty = $default:expr, $range:ident $(($($limit:expr),*))?, $unit:literal, $change:ident;
     )*) => {
-        /// Overrides of a scene's settings for this run. `None` keeps the scene's value.
+        /// Scene setting overrides for this run. `None` keeps the scene's value.
         #[derive(Clone, Debug, Default, PartialEq)]
         pub struct Overrides {
-            /// Overrides of scene keys as `TABLE.KEY=VALUE`, applied before the other overrides.
+            /// Overrides of scene keys in the form `TABLE.KEY=VALUE`, applied before all other overrides.
             pub sets: Vec<String>,
-            /// Output files. Empty for the scene's own.
+            /// Output files. If empty, the scene's output file is used.
             pub outputs: Vec<PathBuf>,
             /// JSON file for the report of each finished request.
             pub report: Option<PathBuf>,
-            /// Whether the report and the default image may replace files that glimt did not write.
+            /// Whether the report and default-named images may replace files not written by glimt.
             pub replaces_foreign: bool,
-            /// Time limit in seconds, after which the render stops with the samples it has.
+            /// Time limit in seconds. When it is reached, the render stops and keeps its current samples.
             pub time_seconds: Option<f64>,
             /// Photon maps.
             pub photons: Option<bool>,
@@ -33,33 +33,33 @@ macro_rules! overrides {
             pub dof: Option<bool>,
             /// The view: beauty or an AOV.
             pub view: Option<View>,
-            /// Side from which a model is seen, instead of its own camera.
+            /// Side of a model that faces the camera. Replaces the model's own camera.
             pub from: Option<Side>,
-            /// Up axis of a model, instead of its format's default.
+            /// Up axis of a model. Replaces the format's default.
             pub up: Option<UpAxis>,
-            /// Movement of the camera.
+            /// Camera changes.
             pub camera: CameraChange,
-            /// Layers in addition to the image in EXR files.
+            /// Additional layers for EXR files.
             pub layers: Vec<OutputLayer>,
-            /// Frame of a turntable. `None` for a still image.
+            /// Turntable frame. `None` for a still image.
             pub turn: Option<Turn>,
             /// Pixels to render. The rest of the image stays black.
             pub crop: Option<Rect>,
-            /// Number of threads. `None` or 0 for one per core.
+            /// Number of threads. `None` or 0 means one per core.
             pub threads: Option<usize>,
-            /// Bits per channel of PNG files: 8 or 16.
+            /// Bits per channel for PNG files: 8 or 16.
             pub bit_depth: Option<u8>,
-            /// Part of the image that this process renders, from 1, and the number of parts.
+            /// 1-based number of the part that this process renders, and the number of parts.
             pub shard: Option<(u32, u32)>,
-            /// Checkpoints of the render.
+            /// Checkpoint settings.
             pub checkpoints: Checkpoints,
-            /// Maximum number of bytes that the render may need.
+            /// Maximum memory use of the render, in bytes.
             pub memory: Option<u64>,
             $($(#[doc = $doc])* pub $name: Option<$type>,)*
         }
 
         impl Overrides {
-            /// Returns a scene's settings with these overrides.
+            /// Applies the overrides to a scene's settings.
             pub(super) fn applied(&self, to: &Render) -> Render {
                 Render { $($name: self.$name.unwrap_or(to.$name),)* ..*to }
             }
@@ -70,21 +70,21 @@ macro_rules! overrides {
 render_keys!(overrides, changed);
 
 choice! {
-    /// Sides from which a model is seen.
+    /// Sides from which to view a model.
     pub enum Side {
         /// The front: +z, or −y in STL files.
         Front = "front",
         /// The back.
         Back = "back",
-        /// The left as seen in the front view.
+        /// The left side in the front view.
         Left = "left",
-        /// The right as seen in the front view.
+        /// The right side in the front view.
         Right = "right",
         /// From above.
         Top = "top",
-        /// From below, without the ground.
+        /// From below, without a ground plane.
         Bottom = "bottom",
-        /// From the front, above and right.
+        /// From the front, top and right.
         Iso = "iso",
     }
 }
@@ -94,9 +94,9 @@ choice! {
     pub enum OutputLayer {
         /// Diffuse reflectance.
         Albedo = "albedo",
-        /// Shading normal in world space, from -1 to 1; 0 for no hit.
+        /// World-space shading normal, from -1 to 1. 0 if nothing is hit.
         Normal = "normal",
-        /// Distance along the view axis; 0 for no hit.
+        /// Distance along the view axis. 0 if nothing is hit.
         Depth = "depth",
         /// Variance of the pixel's luminance.
         Variance = "variance",
@@ -104,9 +104,9 @@ choice! {
         Samples = "samples",
         /// Ambient component of Phong materials.
         Ambient = "ambient",
-        /// Diffuse component of the light.
+        /// Diffuse light component.
         Diffuse = "diffuse",
-        /// Specular component of the light.
+        /// Specular light component.
         Specular = "specular",
         /// Light emitted by surfaces and the background.
         Emission = "emission",
@@ -116,16 +116,16 @@ choice! {
 choice! {
     /// Up axis of a mesh file.
     pub enum UpAxis {
-        /// x axis points up.
+        /// The x axis points up.
         X = "x",
-        /// y axis points up, as in glTF and most OBJ and PLY files.
+        /// The y axis points up, as in glTF and most OBJ and PLY files.
         Y = "y",
-        /// z axis points up, as in CAD and 3D printing.
+        /// The z axis points up, as in CAD and 3D printing.
         Z = "z",
     }
 }
 
-/// When a render saves checkpoints next to its output, and whether it resumes from them.
+/// When a render saves checkpoints next to its output file, and whether it resumes from them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Checkpoints {
     /// Seconds between checkpoints. 0 disables them.
@@ -139,16 +139,16 @@ pub struct Checkpoints {
 /// Whether a render resumes from a checkpoint.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Resume {
-    /// Start from zero.
+    /// Start from scratch.
     #[default]
     No,
-    /// Resume from the existing checkpoint. A checkpoint of another image is an error.
+    /// Resume from an existing checkpoint. Fail if it belongs to another image.
     Asked,
-    /// Resume from a checkpoint of the same image, and ignore others.
+    /// Resume if the checkpoint belongs to the same image. Otherwise, ignore it.
     IfSame,
 }
 
-/// Settings of the scene that keys override.
+/// Scene settings that can be overridden with keys.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct OwnSettings {
     /// Method.
@@ -168,7 +168,7 @@ pub struct Effective {
     pub height: u32,
     /// Maximum samples per pixel.
     pub samples: u32,
-    /// Noise target of a tile, relative to its brightness. 0 for none.
+    /// Noise target per tile, relative to its brightness. 0 means no target.
     pub error: f32,
     /// Method.
     #[serde(serialize_with = "choice::serialize")]
@@ -176,7 +176,7 @@ pub struct Effective {
     /// Shadows.
     #[serde(serialize_with = "choice::serialize")]
     pub shadows: Shadows,
-    /// Limit on indirect radiance per bounce, which causes bias. 0 for none.
+    /// Limit on indirect radiance per bounce, which introduces bias. 0 means no limit.
     pub clamp: f32,
     /// Whether photons are on.
     pub photons: bool,
@@ -222,7 +222,7 @@ impl Effective {
     }
 }
 
-/// Serializes paths lossily, because a report must be written even if a name is not UTF-8.
+/// Serializes paths lossily, so that a report can be written even if a name is not UTF-8.
 fn lossy_paths<S: serde::Serializer>(paths: &[PathBuf], serializer: S) -> Result<S::Ok, S::Error> {
     serializer.collect_seq(paths.iter().map(|path| path.to_string_lossy()))
 }

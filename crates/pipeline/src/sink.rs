@@ -1,4 +1,4 @@
-//! Sender of a request's events, each of which carries the request's generation.
+//! Sends a request's events, tagged with the request's generation.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -14,13 +14,13 @@ use super::watch::content::FileRead;
 use crate::film::Picture;
 use crate::scene::diagnostic::Diagnostic;
 
-/// Sends the events of one request. Ignores a front end that has gone.
+/// Sends the events of one request. Ignores a disconnected front end.
 #[derive(Clone, Debug)]
 pub(super) struct Sink {
     pub(super) generation: u64,
     pub(super) events: Sender<Event>,
     pub(super) previews: PreviewSlot,
-    /// Progress fractions at the start and end of the render if it is only a part of the work.
+    /// Progress fractions at the start and end of the render, if it is only one part of the work.
     pub(super) within: Option<[f64; 2]>,
 }
 
@@ -33,7 +33,7 @@ impl Sink {
         self.send(Event::Stage { generation: self.generation, stage });
     }
 
-    /// Returns a sink for a part of the work that spans these progress fractions.
+    /// Returns a sink for one part of the work, given the progress fractions at its start and end.
     pub(super) fn within(&self, ends: [f64; 2]) -> Self {
         Self { within: Some(ends), ..self.clone() }
     }
@@ -41,7 +41,7 @@ impl Sink {
     pub(super) fn progress(&self, mut progress: RenderProgress) {
         if let Some([begin, end]) = self.within {
             progress.fraction = begin + progress.fraction * (end - begin);
-            // The duration of the following work is unknown.
+            // The duration of any later parts is unknown.
             progress.eta_seconds = progress.eta_seconds.filter(|_| end == 1.0);
         }
         self.send(Event::Progress { generation: self.generation, progress });
@@ -91,7 +91,7 @@ impl Sink {
         self.put(LatestPreview { generation, picture, range, section, lacks_photons: false, source });
     }
 
-    /// Sends a preview that lacks the photons' light, before any are traced.
+    /// Sends a preview that lacks the light from photons, before they are traced.
     pub(super) fn preview_without_photons(&self, picture: Picture) {
         let (generation, picture) = (self.generation, Arc::new(picture));
         let (range, section, source) = (None, None, None);
@@ -103,8 +103,8 @@ impl Sink {
         self.send(Event::Preview { generation: self.generation });
     }
 
-    /// Reports the loading of an asset. `load` gets a progress callback. After a success, completion is reported even
-    /// if `load` did not.
+    /// Loads an asset and reports the progress, which `load` passes to a callback. Always reports completion
+    /// after a success.
     pub(super) fn asset<T, E>(
         &self,
         name: &str,
@@ -139,7 +139,7 @@ mod tests {
     use std::sync::mpsc;
 
     #[test]
-    fn asset_progress_is_limited_and_ends() {
+    fn asset_progress_is_throttled_and_completes() {
         let (events, received) = mpsc::channel();
         let sink = Sink { generation: 3, events, previews: PreviewSlot::default(), within: None };
         let load = |progress: &(dyn Fn(u64, u64) + Sync)| -> Result<(), ()> {
@@ -165,7 +165,7 @@ mod tests {
     }
 
     #[test]
-    fn failed_asset_does_not_end() {
+    fn failed_asset_does_not_report_completion() {
         let (events, received) = mpsc::channel();
         let sink = Sink { generation: 3, events, previews: PreviewSlot::default(), within: None };
         sink.asset("bricks", |_| -> Result<(), ()> { Err(()) }).expect_err("failed");

@@ -16,7 +16,8 @@ impl Clock {
         Self { last: Instant::now(), active: Duration::ZERO }
     }
 
-    /// Returns the seconds of active work. The time since the last call counts unless work was `held`.
+    /// Returns the seconds of active work. Includes the time since the last call unless work was paused
+    /// (`held`).
     pub(super) fn seconds(&mut self, held: bool) -> f64 {
         let now = Instant::now();
         if !held {
@@ -27,7 +28,7 @@ impl Clock {
     }
 }
 
-/// Seconds since the start without pauses.
+/// Measures the seconds since the start, excluding pauses.
 #[derive(Debug)]
 pub(super) struct Stopwatch<'a> {
     begin: Instant,
@@ -57,7 +58,7 @@ mod tests {
         let watch = Stopwatch::start(&token);
         token.set_paused(true);
         std::thread::sleep(HOLD);
-        // However slow the machine is, the pause must not be included.
+        // The pause must not be included, no matter how slow the machine is.
         let most = || begin.elapsed().saturating_sub(HOLD).as_secs_f64();
         let during = watch.seconds();
         assert!(during <= most(), "{during}");

@@ -1,4 +1,4 @@
-//! The table of stages: times each stage and reports its start and end.
+//! The stage table, which times each stage and reports its start and end.
 
 use super::protocol::{Stage, StageReport, Status};
 use super::sink::Sink;
@@ -10,7 +10,7 @@ use crate::system::cpu_time::process_cpu_seconds;
 /// Stages of one request.
 pub(super) struct StageTable<'a> {
     pub(super) sink: &'a Sink,
-    /// Token that pauses work. Pauses do not count.
+    /// Token used to pause work. Pauses do not count toward stage times.
     pub(super) token: &'a CancelToken,
     pub(super) stages: Vec<StageReport>,
     /// Whether events are suppressed.
@@ -21,7 +21,7 @@ impl StageTable<'_> {
     /// Runs a stage.
     ///
     /// # Errors
-    /// Errors of the work.
+    /// Returns the error from `work`.
     pub(super) fn run<T>(
         &mut self,
         name: Stage,

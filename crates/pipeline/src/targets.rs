@@ -1,4 +1,4 @@
-//! Checks of output files against the inputs, against each other, and against files that the user did not mean to lose.
+//! Checks output files against the inputs, each other, and existing files that the user may not want to lose.
 
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
@@ -42,10 +42,11 @@ enum TargetKind {
     Report,
 }
 
-/// Returns one diagnostic for each file of the plan that must not be written now. Links and files may change later.
+/// Returns one diagnostic for each of the plan's files that currently must not be written. Symbolic links and
+/// files may change later.
 pub(super) fn conflicts(plan: &Plan, inputs: &Inputs) -> Vec<Diagnostic> {
     let inputs = inputs.on_disk();
-    // The numbers of later frames keep their files apart.
+    // Later frames have distinct files because of their numbers.
     let mut first = HashMap::new();
     for target in current_targets(plan) {
         if let Some(identity) = FileIdentity::of(target.path) {
@@ -58,8 +59,8 @@ pub(super) fn conflicts(plan: &Plan, inputs: &Inputs) -> Vec<Diagnostic> {
     each.chain(linked_frames(plan)).collect()
 }
 
-/// Returns diagnostics for turntable frames that links make the same file, so that a later frame would replace an
-/// earlier one.
+/// Returns diagnostics for turntable frames that are the same file because of symbolic links, so that a later
+/// frame would replace an earlier one.
 fn linked_frames(plan: &Plan) -> Vec<Diagnostic> {
     let (mut seen, mut found) = (HashMap::new(), Vec::new());
     for path in plan.outputs.iter().chain(&plan.later_outputs).filter(|_| !plan.later_outputs.is_empty()) {
@@ -76,11 +77,11 @@ fn linked_frames(plan: &Plan) -> Vec<Diagnostic> {
     found
 }
 
-/// Writes a file of the plan and reports lost metadata of the replaced file. Checks for conflicts again at the last
-/// moment.
+/// Writes one of the plan's files and reports any metadata lost from the replaced file. Checks for conflicts
+/// again at the last moment.
 ///
 /// # Errors
-/// Errors of writing, and [`OutputError::Refused`].
+/// The file cannot be written, or [`OutputError::Refused`].
 pub(super) fn guarded<'a, T>(
     plan: &'a Plan,
     inputs: &Inputs,
@@ -90,7 +91,8 @@ pub(super) fn guarded<'a, T>(
 ) -> Result<T, OutputError> {
     let may_replace = |real: &Path| {
         let inputs = inputs.on_disk();
-        // Targets were compared when the write stage began. Since then, only links can have changed.
+        // Targets were compared when the write stage started. Since then, only symbolic links can have
+        // changed.
         let twin = |target: OutputTarget<'_>, at: &FileIdentity| {
             if real == target.path {
                 return None;
@@ -111,7 +113,7 @@ pub(super) fn guarded<'a, T>(
     })
 }
 
-/// Formats a conflict for one-line messages.
+/// Formats a conflict as a single line.
 fn one_line(conflict: &Diagnostic) -> String {
     let help = conflict.help.as_ref().map_or(String::new(), |help| format!("; {help}"));
     format!("{}{help}", conflict.message)
@@ -131,7 +133,8 @@ fn current_targets(plan: &Plan) -> impl Iterator<Item = OutputTarget<'_>> {
     pictures.map(PathBuf::as_path).map(picture).chain(report)
 }
 
-/// Returns why a target that leads to `at` must not be written. `twin` finds another target with the same file.
+/// Returns why a target that resolves to `at` must not be written. `twin` finds another target with the same
+/// file.
 fn conflict<'a>(
     plan: &'a Plan,
     target: OutputTarget<'a>,
@@ -155,7 +158,7 @@ fn conflict<'a>(
     if plan.replaces_foreign { None } else { foreign_file_error(plan, target, at) }
 }
 
-/// Whether the checkpoint of an output is this file.
+/// Whether a file is the checkpoint of an output.
 fn has_checkpoint_at(output: &Path, identity: &FileIdentity) -> bool {
     FileIdentity::of(&checkpoint_of(output)).as_ref() == Some(identity)
 }
@@ -180,7 +183,7 @@ fn same_file_error(plan: &Plan, target: OutputTarget<'_>, twin: &Path) -> Diagno
     call_error(message, Some(format!("use separate files: {}", remedy(plan, target.kind))))
 }
 
-/// Returns an error if an existing file was not written by glimt.
+/// Returns an error if the target is an existing file not written by glimt.
 fn foreign_file_error(plan: &Plan, target: OutputTarget<'_>, at: &Path) -> Option<Diagnostic> {
     let (name, remedy) = (target.path.display(), remedy(plan, target.kind));
     let (replaced, help) = match target.kind {
@@ -208,13 +211,13 @@ fn foreign_file_error(plan: &Plan, target: OutputTarget<'_>, at: &Path) -> Optio
     Some(call_error(format!("cannot write {name}: {}", replaced.reason_to_keep()?), Some(help)))
 }
 
-/// Returns the scene of an image that glimt wrote, unless it is this scene.
+/// Returns the scene of an image written by glimt, unless it is the plan's scene.
 fn other_scene(plan: &Plan, at: &Path) -> Option<String> {
     scene_of_image(at).filter(|named| !scene_path::is_same(named, &plan.path, at))
 }
 
-/// Returns an error if the file is a checkpoint or another part of the same render, which may contain hours of work.
-/// Parts of a different total are of an earlier render and may be replaced.
+/// Returns an error if the file is a checkpoint or another part of the same render, which may contain hours
+/// of work. Parts with a different total belong to an earlier render and may be replaced.
 fn other_part_error(plan: &Plan, target: OutputTarget<'_>, at: &Path) -> Option<Diagnostic> {
     if !part::is_part(at) {
         return None;
@@ -226,7 +229,7 @@ fn other_part_error(plan: &Plan, target: OutputTarget<'_>, at: &Path) -> Option<
             Some(_) | None => format!("part {index}/{count} of a render"),
         },
         Some((part::PartKind::Checkpoint, ..)) => "a checkpoint".to_owned(),
-        None => "a part or a checkpoint of another version of glimt".to_owned(),
+        None => "a part or checkpoint from another version of glimt".to_owned(),
     };
     let message = format!("cannot write {}: it is {what}", target.path.display());
     Some(call_error(message, Some(format!("{}; --force replaces it", remedy(plan, target.kind)))))

@@ -1,4 +1,4 @@
-//! Renders tiles on a thread pool. Threads claim jobs in order, store the samples themselves and report to the calling
+//! Renders tiles on a thread pool. Threads claim jobs in order, store their samples and report to the calling
 //! thread.
 
 use std::ops::Range;
@@ -14,7 +14,7 @@ use crate::integrators::{PhotonMaps, RayCounters, RenderSettings};
 use crate::system::cpu_time::thread_cpu_seconds;
 use crate::world::World;
 
-/// Renders a tile, with or without photon maps: see [`crate::integrators::render_tile_with_photons`].
+/// Renders a tile, with or without photon maps. See [`crate::integrators::render_tile_with_photons`].
 pub(super) type Kernel = fn(
     Option<&PhotonMaps>,
     &World,
@@ -24,10 +24,10 @@ pub(super) type Kernel = fn(
     &CancelToken,
 ) -> Result<(TileSamples, RayCounters), Cancelled>;
 
-/// Maximum time between two calls of the callback.
+/// Maximum time between calls of the callback.
 pub(super) const TICK: Duration = Duration::from_millis(20);
 
-/// Minimum time between two reports of a thread: waking the calling thread takes longer than the smallest jobs.
+/// Minimum time between reports from a thread. Waking the calling thread takes longer than the smallest jobs.
 const AT_ONCE: Duration = Duration::from_micros(300);
 
 /// State shared by all jobs.
@@ -38,13 +38,13 @@ pub(super) struct Tracer<'a> {
     pub(super) world: &'a World,
     pub(super) settings: &'a RenderSettings,
     pub(super) token: &'a CancelToken,
-    /// Photon maps for the samples of all jobs, if photons are gathered.
+    /// Photon maps for all jobs' samples, if photons are gathered.
     pub(super) photons: Option<&'a PhotonMaps>,
-    /// Index in the whole image of the jobs' sample 0.
+    /// Sample index in the whole image that corresponds to the jobs' sample 0.
     pub(super) first: u32,
 }
 
-/// Samples of one tile to render.
+/// Samples to render in one tile.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Job {
     pub(super) tile: usize,
@@ -56,7 +56,7 @@ pub(super) struct Job {
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Cost {
     pub(super) rays: RayCounters,
-    /// CPU seconds. They do not influence the image.
+    /// CPU seconds. Does not affect the image.
     pub(super) seconds: f64,
 }
 
@@ -76,9 +76,10 @@ impl Tracer<'_> {
         Ok((samples, Cost { rays, seconds: thread_cpu_seconds() - begin }))
     }
 
-    /// Renders the jobs. `keep` stores the samples of each finished job, on the thread that rendered it and has them in
-    /// its cache. `each` is called on this thread for finished jobs, in the order in which they end, and with `None` at
-    /// least once per [`TICK`]; it returns whether to continue. Jobs that have begun are finished.
+    /// Renders the jobs. `keep` stores the samples of each finished job, on the thread that rendered it
+    /// because they are in that thread's cache. `each` is called on the current thread for each finished job,
+    /// in order of completion, and with `None` at least once per [`TICK`]. It returns whether to continue.
+    /// Jobs that have already started are always finished.
     ///
     /// # Errors
     /// [`Cancelled`].
@@ -90,7 +91,7 @@ impl Tracer<'_> {
     ) -> Result<(), Cancelled> {
         let (next, stopped) = (AtomicUsize::new(0), AtomicBool::new(false));
         let threads = self.pool.current_num_threads();
-        // Bound the channel so that results do not pile up while a preview is made.
+        // Bound the channel so that results do not pile up while a preview is being created.
         let (sender, results) = mpsc::sync_channel(2 * threads);
         let (next, stopped, keep) = (&next, &stopped, &keep);
         self.pool.in_place_scope(move |scope| {
@@ -111,7 +112,7 @@ impl Tracer<'_> {
                             since = Instant::now();
                         }
                     }
-                    // The send fails only if the receiver is gone.
+                    // Sending only fails if the receiver has been dropped.
                     let _ = sender.send(done);
                 });
             }
@@ -130,12 +131,12 @@ impl Tracer<'_> {
                 stopped.fetch_or(!go_on, Ordering::Relaxed);
             }
         });
-        // Do not call `check`, which blocks while work is paused and would delay orders.
+        // Do not call `check`, which blocks while work is paused. This would delay orders.
         if self.token.is_cancelled() { Err(Cancelled) } else { Ok(()) }
     }
 }
 
-/// Stops the other threads on a panic, which discards their work anyway.
+/// Stops the other threads on a panic, because their work will be discarded.
 struct StopOnPanic<'a>(&'a AtomicBool);
 
 impl Drop for StopOnPanic<'_> {
@@ -146,23 +147,24 @@ impl Drop for StopOnPanic<'_> {
     }
 }
 
-/// Returns the samples per pixel after the next pass: 1, 2, 4, … for early images, then in steps that keep the time per
-/// tile short. `pixels` is the size of the image. Every power of two ends a pass, because noise is judged there.
+/// Returns the number of samples per pixel after the next pass: 1, 2, 4, … at first, to show an image early,
+/// then increasing in steps that keep the time per tile short. `pixels` is the image size. A pass ends at
+/// every power of two, because noise is judged there.
 pub(super) fn next_pass(done: u32, total: u32, pixels: usize) -> u32 {
     let longest = longest_pass(pixels);
     let power = done.saturating_add(1).checked_next_power_of_two().unwrap_or(u32::MAX);
     done.saturating_add(done.clamp(1, longest)).min(power).min(total)
 }
 
-/// Samples of the longest pass.
+/// Number of samples in the longest pass.
 fn longest_pass(pixels: usize) -> u32 {
     const LONGEST: usize = 32;
     const TILE: usize = (TILE_SIZE * TILE_SIZE) as usize;
     (LONGEST * (TILE / pixels.clamp(1, TILE))) as u32
 }
 
-/// Estimates the number of jobs of at most `at_once` samples in which [`next_pass`] gets a pixel from `done` to `total`
-/// samples.
+/// Estimates the number of jobs needed to get a pixel from `done` to `total` samples with [`next_pass`]. Each
+/// job has at most `at_once` samples.
 pub(super) fn remaining_jobs(done: u32, total: u32, pixels: usize, at_once: u32) -> u32 {
     let longest = longest_pass(pixels);
     let (mut reached, mut jobs) = (done, 0);
@@ -179,7 +181,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn remaining_jobs_match_the_passes() {
+    fn remaining_jobs_match_passes() {
         for (done, total, pixels, at_once) in [
             (0, 1, 5000, 99),
             (0, 100, 5000, 99),
@@ -204,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn passes_double_then_stay_short() {
+    fn pass_length_doubles_up_to_a_limit() {
         let passes = |total, pixels| {
             let mut ends = vec![0];
             while let Some(&last) = ends.last()
@@ -216,7 +218,7 @@ mod tests {
         };
         assert_eq!(passes(1, 5000), [0, 1]);
         assert_eq!(passes(100, 5000), [0, 1, 2, 4, 8, 16, 32, 64, 96, 100]);
-        // An image of half a tile takes twice as many samples per pass.
+        // An image half the size of a tile has twice as many samples per pass.
         assert_eq!(passes(200, 512), [0, 1, 2, 4, 8, 16, 32, 64, 128, 192, 200]);
         assert_eq!(next_pass(100, 1000, 5000), 128);
         assert_eq!(next_pass(u32::MAX - 1, u32::MAX, 0), u32::MAX);

@@ -1,4 +1,4 @@
-//! Turntables: frames around `look_at`, as numbered files or as an animation.
+//! Turntables: frames that orbit `look_at`, written as numbered files or as an animation.
 
 use std::collections::HashSet;
 use std::ffi::OsString;
@@ -14,13 +14,13 @@ use crate::scene::description::Pose;
 /// Maximum number of frames.
 pub const MAX_FRAMES: u32 = 10_000;
 
-/// Placeholder of a digit in a file name.
+/// Placeholder for a digit in a file name.
 const DIGIT: u8 = b'#';
 
 /// One frame of a turntable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Turn {
-    /// Index of the frame, from 0.
+    /// 0-based frame index.
     pub number: u32,
     /// Number of frames, at least 1.
     pub of: u32,
@@ -32,8 +32,8 @@ impl Turn {
         self.number + 1 == self.of
     }
 
-    /// Returns the camera of this frame: the first camera rotated about the axis `up` through `look_at`,
-    /// counterclockwise as seen from above.
+    /// Returns the camera for this frame: the first camera rotated counterclockwise, as seen from above,
+    /// about the axis through `look_at` in direction `up`.
     pub(super) fn pose(self, first: &Pose) -> Pose {
         if self.number == 0 {
             return *first;
@@ -46,17 +46,17 @@ impl Turn {
         Pose { position: first.look_at + turned, ..*first }
     }
 
-    /// Returns the vectors from `look_at` to the camera for all frames.
+    /// Returns the vector from `look_at` to the camera for each frame.
     pub(super) fn camera_offsets(of: u32, arm: DVec3, up: DVec3) -> impl Iterator<Item = DVec3> {
         let first = Pose { position: arm, look_at: DVec3::ZERO, up };
         (0..of.max(1)).map(move |number| Self { number, of: of.max(1) }.pose(&first).position)
     }
 }
 
-/// Checks that an output can hold all frames.
+/// Checks that all frames can be written to an output.
 ///
 /// # Errors
-/// A message with a suggestion.
+/// Returns a message with a suggestion.
 pub fn check_name(path: &Path) -> Result<(), String> {
     if AnimationFormat::from_path(path).is_some() || split_placeholder(path).is_some() {
         return Ok(());
@@ -65,16 +65,16 @@ pub fn check_name(path: &Path) -> Result<(), String> {
     let example = suggested(path);
     let example = example.display();
     Err(format!(
-        "{name} can hold only one frame of the turntable; use {example} for numbered files, or a .gif or .apng file"
+        "{name} can store only one frame of the turntable; use {example} for numbered files, or a .gif or .apng file"
     ))
 }
 
-/// Whether a file name has a placeholder for the frame number.
+/// Whether a file name contains a placeholder for the frame number.
 pub fn has_number(path: &Path) -> bool {
     split_placeholder(path).is_some()
 }
 
-/// Returns the numbered file name for a still image's: `a.png` becomes `a_####.png`.
+/// Adds a frame number placeholder to a still image's file name: `a.png` becomes `a_####.png`.
 pub fn suggested(path: &Path) -> PathBuf {
     let mut name = path.file_stem().unwrap_or_default().to_owned();
     name.push("_####");
@@ -85,31 +85,32 @@ pub fn suggested(path: &Path) -> PathBuf {
     path.with_file_name(name)
 }
 
-/// Returns the file of a frame, with its number, from 1, in place of the last run of `#`. Returns `None` if there is
-/// none.
+/// Returns the file name for a frame. Replaces the last run of `#` with the 1-based frame number. Returns
+/// `None` if there is no `#`.
 pub(super) fn numbered(path: &Path, turn: Turn) -> Option<PathBuf> {
     let (before, digits, after) = split_placeholder(path)?;
     Some(path.with_file_name(with_number(before, (turn.number + 1, digits), after)))
 }
 
-/// Inserts a number with at least this many digits. Format strings do not support widths above 65,535.
+/// Inserts a number, zero-padded to `digits` digits. Does not use format strings, because they do not support
+/// widths above 65,535.
 fn with_number(before: &[u8], (number, digits): (u32, usize), after: &[u8]) -> OsString {
     let number = number.to_string();
     let zeros = vec![b'0'; digits.saturating_sub(number.len())];
     OsString::from_vec([before, &zeros, number.as_bytes(), after].concat())
 }
 
-/// Returns the first file that would hold two frames. `None` if all frames have separate files.
+/// Returns the first file that two frames would be written to. `None` if all frames have separate files.
 pub fn twin(outputs: &[PathBuf], of: u32) -> Option<PathBuf> {
     let mut seen = HashSet::new();
     let all = |number| outputs.iter().filter_map(move |path| numbered(path, Turn { number, of }));
     (0..of).flat_map(all).find(|path| !seen.insert(path.clone()))
 }
 
-/// Returns existing files numbered after the last frame, which are left over from a longer turntable.
+/// Returns existing files with numbers after the last frame, which are left over from a longer turntable.
 pub fn left_over(last: &Path, turn: Turn) -> Vec<PathBuf> {
     let name = last.file_name().unwrap_or_default().as_bytes();
-    // Find the frame number: the last run of digits with its value.
+    // Find the frame number, which is the last run of digits with this value.
     let ends_run = |at: usize| at + 1 == name.len() || !name[at + 1].is_ascii_digit();
     let is_end = |at: &usize| name[*at].is_ascii_digit() && ends_run(*at);
     let run = |end: usize| name[..end].iter().rposition(|byte| !byte.is_ascii_digit()).map_or(0, |at| at + 1);
@@ -136,7 +137,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn left_over_frames_are_found() {
+    fn leftover_frames_are_found() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = |name: &str| folder.path().join(name);
         for name in ["w_3.png", "a2_003.png", "a2_004.png", "a2_006.png", "v1_2_2.png", "v1_3_2.png"] {
@@ -172,7 +173,11 @@ mod tests {
     fn files_are_numbered_by_frame() {
         let name = |path: &str, number| numbered(Path::new(path), Turn { number, of: 100 });
         assert_eq!(name("out/a_####.png", 6), Some("out/a_0007.png".into()));
-        assert_eq!(name("a#.exr", 99), Some("a100.exr".into()), "numbers may be longer");
+        assert_eq!(
+            name("a#.exr", 99),
+            Some("a100.exr".into()),
+            "numbers may exceed the placeholder's length"
+        );
         assert_eq!(name("#1_##_b.png", 0), Some("#1_01_b.png".into()));
         assert_eq!(name("##/a.png", 0), None, "folders are ignored");
         assert_eq!(name("##a##_###", 4), Some("##a##_005".into()));
@@ -181,7 +186,7 @@ mod tests {
         assert!(endless.len() == 65_536 && endless.ends_with("007"));
         let raw = |bytes: &[u8]| PathBuf::from(OsString::from_vec(bytes.to_vec()));
         let of_raw = numbered(&raw(b"\xff_##\xfe.png"), Turn { number: 6, of: 9 });
-        assert_eq!(of_raw, Some(raw(b"\xff_07\xfe.png")), "a name that is not UTF-8");
+        assert_eq!(of_raw, Some(raw(b"\xff_07\xfe.png")), "non-UTF-8 names should be supported");
         assert_eq!(check_name(&raw(b"\xff_##\xfe.png")), Ok(()));
         assert_eq!(suggested(Path::new("x/a.b.png")), Path::new("x/a.b_####.png"));
     }
@@ -197,7 +202,7 @@ mod tests {
     }
 
     #[test]
-    fn still_image_file_is_rejected_with_advice() {
+    fn still_image_file_is_rejected_with_suggestion() {
         let message = check_name(Path::new("x/a.png")).expect_err("one file");
         assert!(message.contains("x/a_####.png"), "{message}");
         for right in ["a_####.png", "a.gif", "a.APNG", "a#.exr"] {

@@ -1,4 +1,4 @@
-//! Warnings about the effective settings, each with the option or key that caused it.
+//! Warnings about the effective settings, each with the command-line option or scene key that caused it.
 
 use std::path::PathBuf;
 
@@ -11,7 +11,7 @@ use crate::scene::description::{MaterialKind, Scene};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::{Loaded, is_model};
 
-/// The setting that causes a warning.
+/// The setting that caused a warning.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Cause {
     Integrator,
@@ -21,7 +21,7 @@ enum Cause {
     View,
 }
 
-/// Returns the warnings about the effective settings of a scene, which include `overrides`.
+/// Returns warnings about a scene's effective settings, which include `overrides`.
 pub(super) fn settings_warnings(
     loaded: &Loaded,
     scene: &Scene,
@@ -32,7 +32,7 @@ pub(super) fn settings_warnings(
     found(scene, settings).into_iter().map(place).collect()
 }
 
-/// Adds the location of the setting that causes a warning.
+/// Adds the location of the setting that caused a warning.
 fn placed(cause: Cause, message: String, loaded: &Loaded, overrides: &Overrides) -> Diagnostic {
     let severity = Severity::Warning;
     if let Some(option) = cause.option(overrides) {
@@ -51,7 +51,7 @@ fn placed(cause: Cause, message: String, loaded: &Loaded, overrides: &Overrides)
 }
 
 impl Cause {
-    /// Returns the command line option, if it overrides the scene.
+    /// Returns the command-line option if it overrides the scene.
     fn option(self, overrides: &Overrides) -> Option<String> {
         match self {
             Self::Integrator => overrides.integrator.map(|one| format!("--integrator {}", one.name())),
@@ -64,7 +64,7 @@ impl Cause {
         }
     }
 
-    /// Returns the table and key in the scene.
+    /// Returns the setting's table and key in the scene file.
     fn key(self) -> Option<(&'static str, &'static str)> {
         match self {
             Self::Integrator => Some(("render", "integrator")),
@@ -80,7 +80,8 @@ fn found(scene: &Scene, settings: &RenderSettings) -> Vec<(Cause, String)> {
     let RenderSettings { render, photons, .. } = &settings.effective();
     let finds_all_light = render.integrator.method().scatters;
     let is_specular = |kind: &MaterialKind| kind.has_delta();
-    // Shadow rays end at such surfaces, and light that passes them in a straight line is not found in another way.
+    // These surfaces block shadow rays, and path tracing has no other way to find light that passes through
+    // them in a straight line.
     let keeps_direction = |kind: &MaterialKind| kind.has_delta() || kind.is_like_air();
     let has = |is_one: &dyn Fn(&MaterialKind) -> bool| {
         let used = scene.objects.iter().filter_map(|object| object.material);
@@ -101,13 +102,12 @@ fn found(scene: &Scene, settings: &RenderSettings) -> Vec<(Cause, String)> {
         warnings.push((Cause::Photons, message.to_owned()));
     }
     if photons.is_none() && settings.view == View::Photons {
-        let message = "the view `photons` is empty: photons are off or the integrator is `path`";
+        let message = "the `photons` view is empty: photons are off or the integrator is `path`";
         warnings.push((Cause::View, message.to_owned()));
     }
     if photons.is_some() && scene.photons.count > MAX_PHOTONS {
-        let message = format!(
-            "`count` exceeds the maximum of {MAX_PHOTONS} photons per pass, which limits their memory"
-        );
+        let message =
+            format!("`count` exceeds the maximum of {MAX_PHOTONS} photons per pass, which limits memory use");
         warnings.push((Cause::PhotonCount, message));
     }
     if render.clamp > 0.0 {

@@ -1,4 +1,4 @@
-//! Formatting of durations and sample counts, shared by all front ends.
+//! Formats durations and sample counts for all front ends.
 
 use super::protocol::RenderProgress;
 
@@ -12,7 +12,7 @@ pub enum Eta {
 }
 
 impl Eta {
-    /// Returns `None` while an estimate is mostly noise: below 1 % of the render or during its first half second.
+    /// Returns `None` while an estimate would be unreliable: in the first 1 % or half second of the render.
     pub fn of(progress: &RenderProgress) -> Option<Self> {
         const DAY: f64 = 24.0 * 3600.0;
         let is_early = progress.fraction < 0.01 || progress.elapsed_seconds < 0.5;
@@ -20,7 +20,7 @@ impl Eta {
         Some(if seconds > DAY { Self::OverADay } else { Self::Seconds(seconds) })
     }
 
-    /// Formats the time for a line that is rarely redrawn.
+    /// Formats the time for display in a line that is rarely redrawn.
     pub fn words(self) -> String {
         match self {
             Self::Seconds(time) => seconds(time),
@@ -29,17 +29,17 @@ impl Eta {
     }
 }
 
-/// Formats the average samples per pixel, rounded down. Uses tenths where an integer would contradict the displayed
-/// percentage.
+/// Formats the average samples per pixel, rounded down. Uses tenths if an integer would contradict the
+/// displayed percentage.
 pub fn samples_so_far(progress: &RenderProgress) -> String {
-    /// For totals from here on, one sample is at most one percent.
+    /// With totals of at least this many samples, one sample is at most one percent.
     const FINE: u32 = 100;
     let tenths = (progress.mean_samples * 10.0).floor();
     let has_tenths = progress.total_samples < FINE && tenths % 10.0 != 0.0;
     if has_tenths { format!("{:.1}", tenths / 10.0) } else { format!("{:.0}", progress.mean_samples.floor()) }
 }
 
-/// Formats a time in a few characters.
+/// Formats a duration in a few characters.
 pub fn seconds(seconds: f64) -> String {
     match seconds {
         s if !s.is_finite() || s < 0.0 => "?".to_owned(),
@@ -79,7 +79,7 @@ mod tests {
     }
 
     #[test]
-    fn eta_is_neither_early_nor_absurd() {
+    fn unreliable_or_huge_eta_is_not_shown() {
         let eta = |fraction, elapsed, eta| Eta::of(&progress(fraction, elapsed, Some(eta))).map(Eta::words);
         assert_eq!(eta(0.009, 60.0, 6e3), None);
         assert_eq!(eta(0.4, 0.49, 0.7), None);
@@ -92,7 +92,7 @@ mod tests {
     }
 
     #[test]
-    fn samples_agree_with_the_percentage() {
+    fn sample_count_is_consistent_with_percentage() {
         for (mean, total, words) in [
             (1.72, 4, "1.7"),
             (0.97, 1, "0.9"),

@@ -1,7 +1,7 @@
 //! The worker thread, which owns the engine, and its handle for front ends.
 //!
-//! The mailbox holds one request: a newer one replaces it and cancels the current one. Token and mailbox change under
-//! one lock, so that no cancellation is lost between two requests.
+//! The mailbox has room for one pending request. A newer request replaces it and cancels the current request.
+//! A single lock protects the token and the mailbox, so that no cancellation is lost between requests.
 
 use std::any::Any;
 use std::collections::VecDeque;
@@ -19,8 +19,8 @@ use super::sink::Sink;
 use super::watch::content::Contents;
 use crate::control::CancelToken;
 
-/// Starts a worker thread. On Linux the niceness of its render threads is `nice` above this thread's, so that the front
-/// end and other programs take precedence.
+/// Starts a worker thread. On Linux, its render threads have a niceness `nice` higher than the current
+/// thread's, so that the front end and other programs have priority.
 ///
 /// # Errors
 /// The system cannot start a thread.
@@ -28,7 +28,7 @@ pub fn start(nice: u8) -> std::io::Result<Handle> {
     start_with(EngineConfig { nice, ..EngineConfig::default() })
 }
 
-/// Starts a worker with this configuration.
+/// Starts a worker with the given configuration.
 pub(super) fn start_with(config: EngineConfig) -> std::io::Result<Handle> {
     let (sender, events) = mpsc::channel();
     let remote = Remote { mailbox: Arc::default(), events: sender };
@@ -43,7 +43,7 @@ pub(super) fn start_with(config: EngineConfig) -> std::io::Result<Handle> {
 /// A running worker. Dropping it stops the worker, which may take as long as writing a file.
 #[derive(Debug)]
 pub struct Handle {
-    /// Events of the worker.
+    /// Events from the worker.
     pub events: Receiver<Event>,
     /// Slot for previews.
     pub previews: PreviewSlot,
@@ -63,13 +63,13 @@ impl Handle {
         self.remote.clone()
     }
 
-    /// Returns the worker's file contents, for a watcher of the same files.
+    /// Returns the worker's file contents, to be shared with a watcher of the same files.
     pub fn contents(&self) -> Arc<Contents> {
         Arc::clone(&self.contents)
     }
 
-    /// Stops the worker and waits for at most `patience`. Returns whether it has stopped. An image that is being
-    /// written is completed.
+    /// Stops the worker and waits for at most `patience`. Returns whether it has stopped. If an image is
+    /// being written, the worker finishes writing it.
     pub fn end_within(&self, patience: Duration) -> bool {
         self.send(Command::Quit);
         let deadline = Instant::now().checked_add(patience);
@@ -97,7 +97,7 @@ impl Drop for Handle {
     fn drop(&mut self) {
         self.send(Command::Quit);
         if let Some(thread) = self.thread.take() {
-            // If the thread panicked, an event has reported it.
+            // If the thread panicked, an event has already reported it.
             let _ = thread.join();
         }
     }
@@ -114,38 +114,38 @@ pub struct Remote {
 struct Mailbox {
     request: Option<Box<Request>>,
     write: bool,
-    /// The write order came too early and is meant for the pending request.
+    /// Whether the write order is postponed until the pending request.
     is_write_postponed: bool,
-    /// The write order came after the pending request and is meant for it.
+    /// Whether the write order came after the pending request and applies to it.
     is_write_of_waiting: bool,
-    /// Settings of the current request that keys change.
+    /// The current request's settings that the user can change with keys.
     shown: Overrides,
-    /// New size of previews.
+    /// Pending change of the preview size.
     preview: Option<Option<PreviewSize>>,
     queries: VecDeque<Query>,
     /// Whether the newest request is paused.
     paused: bool,
-    /// Whether the current render is stopped to be resumed later.
+    /// Whether the current render is being stopped so that it can be resumed later.
     suspended: bool,
     quit: bool,
-    /// Token of the current request.
+    /// Cancels or pauses the current request.
     token: CancelToken,
-    /// Token of the write stage: a pause, the end of the program or a request without output must not interrupt the
-    /// writing of a finished image.
+    /// Cancels the write stage. It is separate because a pause, quitting, or a request without output must
+    /// not interrupt writing a finished image.
     writing: CancelToken,
     /// Generation of the newest request.
     newest: u64,
 }
 
-/// Returns the settings of a request that keys change.
+/// Returns a request's settings that the user can change with keys.
 fn shown(request: &Request) -> Overrides {
     let Overrides { shadows, integrator, dof, photons, view, camera, exposure, .. } = request.overrides;
     Overrides { shadows, integrator, dof, photons, view, camera, exposure, ..Overrides::default() }
 }
 
-/// Next task of the worker.
+/// The worker's next task.
 enum Task {
-    /// A request, with the tokens of the render and of the write stage.
+    /// A request, with the tokens for the render and the write stage.
     Render(Box<Request>, CancelToken, CancelToken),
     Write,
     Preview(Option<PreviewSize>, CancelToken),
@@ -196,7 +196,7 @@ impl Remote {
         self.mailbox.1.notify_all();
     }
 
-    /// Replaces the pending request unless it is newer. Requests may arrive in any order.
+    /// Replaces the pending request unless that is newer. Requests may arrive in any order.
     fn replace(&self, mailbox: &mut Mailbox, request: Box<Request>) {
         if request.generation < mailbox.newest {
             return self.say_cancelled(Some(request));
@@ -213,7 +213,7 @@ impl Remote {
 
     fn say_cancelled(&self, request: Option<Box<Request>>) {
         if let Some(request) = request {
-            // Ignore a front end that has gone.
+            // Ignore a disconnected front end.
             let _ = self.events.send(Event::Cancelled { generation: request.generation });
         }
     }
@@ -222,8 +222,9 @@ impl Remote {
         self.mailbox.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Keeps a write order for the pending request, if it was meant for it, or if it has the settings of the current
-    /// image and that is incomplete. Returns whether the order is kept.
+    /// Postpones a write order until the pending request. Does so if the order was meant for that request, or
+    /// if the current image is incomplete and the request has the same settings. Returns whether the order
+    /// was postponed.
     fn postpone_write(&self, can_write: bool) -> bool {
         let mut mailbox = self.lock();
         let is_meant = mailbox.is_write_of_waiting;
@@ -238,7 +239,7 @@ impl Remote {
     fn next(&self) -> Task {
         let mut mailbox = self.lock();
         loop {
-            // Carry out a write order that came before the end.
+            // Carry out a write order that came before quitting.
             if mailbox.write && !(mailbox.is_write_postponed && mailbox.request.is_some()) {
                 mailbox.write = false;
                 return Task::Write;
@@ -333,7 +334,7 @@ impl Worker {
                 }
             };
             if let Err(payload) = outcome {
-                // Do not trust the state left by a panic.
+                // Do not trust the state after a panic.
                 engine = Engine::new(self.config, self.contents.clone());
                 let failure = Failure::Work(format!("internal error: {}", reason(payload.as_ref())));
                 sink.send(Event::Failed { generation: sink.generation, failure });
@@ -342,7 +343,8 @@ impl Worker {
     }
 }
 
-/// Reports the newest request as failed if the thread itself panics, because the front end waits for its end.
+/// If the thread itself panics, reports the newest request as failed, because the front end is waiting for it
+/// to end.
 struct LastWords<'a>(&'a Remote);
 
 impl Drop for LastWords<'_> {
@@ -350,7 +352,7 @@ impl Drop for LastWords<'_> {
         if std::thread::panicking() {
             let generation = self.0.lock().newest;
             let failure = Failure::Work("internal error: the worker thread panicked".to_owned());
-            // Ignore a front end that has gone.
+            // Ignore a disconnected front end.
             let _ = self.0.events.send(Event::Failed { generation, failure });
         }
     }
@@ -382,12 +384,12 @@ mod tests {
     fn token(remote: &Remote) -> CancelToken {
         match remote.next() {
             Task::Render(_, token, _) => token,
-            _ => panic!("a request waits"),
+            _ => panic!("expected a pending request"),
         }
     }
 
     #[test]
-    fn panicking_worker_ends_its_request() {
+    fn panicking_worker_reports_failure() {
         let (events, received) = mpsc::channel();
         let remote = Remote { mailbox: Arc::default(), events };
         remote.send(render(7));
@@ -401,12 +403,12 @@ mod tests {
     }
 
     #[test]
-    fn pause_applies_to_the_newest_request() {
+    fn pause_applies_to_newest_request() {
         let remote = Remote { mailbox: Arc::default(), events: mpsc::channel().0 };
         remote.send(render(1));
         let ending = token(&remote);
         remote.send(render(2));
-        // The first request is still ending when the user presses the key.
+        // The user presses the key while the first request is still ending.
         remote.send(Command::Pause(true));
         assert!(ending.is_cancelled());
         let second = token(&remote);
@@ -415,7 +417,7 @@ mod tests {
         assert!(!second.is_paused());
         remote.send(Command::Pause(true));
         remote.send(render(3));
-        assert!(!token(&remote).is_paused(), "a later request is not paused");
+        assert!(!token(&remote).is_paused(), "a later request should not be paused");
     }
 
     #[test]
@@ -428,25 +430,28 @@ mod tests {
         remote.send(Command::Quit);
         assert!(token.is_cancelled());
         assert!(matches!(remote.next(), Task::Write));
-        assert!(!remote.postpone_write(false), "no request is pending");
+        assert!(!remote.postpone_write(false), "no request should be pending");
         assert!(matches!(remote.next(), Task::Quit));
     }
 
     #[test]
-    fn only_a_newer_image_cancels_the_write_stage() {
+    fn write_stage_is_cancelled_only_by_newer_image() {
         let remote = Remote { mailbox: Arc::default(), events: mpsc::channel().0 };
         let begin = |number| {
             remote.send(render(number));
             match remote.next() {
                 Task::Render(_, token, writing) => (token, writing),
-                _ => panic!("a request waits"),
+                _ => panic!("expected a pending request"),
             }
         };
         let (token, writing) = begin(1);
         remote.send(Command::Pause(true));
         assert!(token.is_paused() && !writing.is_paused());
         remote.send(render(2));
-        assert!(token.is_cancelled() && !writing.is_cancelled(), "the second request does not write");
+        assert!(
+            token.is_cancelled() && !writing.is_cancelled(),
+            "a request without output should not cancel writing"
+        );
         let Command::Render(request) = render(3) else { panic!("a request") };
         remote.send(Command::Render(Box::new(Request { write: Writing::Try, ..*request })));
         assert!(writing.is_cancelled());
@@ -456,7 +461,7 @@ mod tests {
     }
 
     #[test]
-    fn write_order_is_not_moved_to_another_view() {
+    fn write_order_does_not_apply_to_another_view() {
         let remote = Remote { mailbox: Arc::default(), events: mpsc::channel().0 };
         remote.send(render(1));
         let _ = token(&remote);
@@ -465,26 +470,30 @@ mod tests {
         let overrides = Overrides { view: Some(View::Normal), ..view.overrides.clone() };
         remote.send(Command::Render(Box::new(Request { overrides, ..*view })));
         assert!(matches!(remote.next(), Task::Write));
-        assert!(!remote.postpone_write(false), "the first image is lost, and an error is reported");
-        // After the view is requested, the order is meant for it, even if the first image is complete.
+        assert!(
+            !remote.postpone_write(false),
+            "the order should not be postponed, so that an error is reported"
+        );
+        // An order sent after the view was requested applies to the view, even if the first image is
+        // complete.
         remote.send(Command::Write);
-        assert!(!remote.wants_write() && !remote.take_write(), "the ending request ignores the order");
+        assert!(!remote.wants_write() && !remote.take_write(), "the ending request should ignore the order");
         assert!(matches!(remote.next(), Task::Write));
         assert!(remote.postpone_write(true));
     }
 
     #[test]
-    fn pending_orders_keep_their_order() {
+    fn pending_orders_are_handled_in_sequence() {
         let remote = Remote { mailbox: Arc::default(), events: mpsc::channel().0 };
         remote.send(render(1));
         remote.send(Command::Write);
         remote.send(Command::Preview(None));
-        assert!(matches!(remote.next(), Task::Write), "the image on the screen");
-        assert!(remote.postpone_write(false), "the image is incomplete");
+        assert!(matches!(remote.next(), Task::Write), "the order should apply to the shown image first");
+        assert!(remote.postpone_write(false), "the order should be postponed for an incomplete image");
         assert!(matches!(remote.next(), Task::Render(..)));
-        assert!(remote.take_write(), "the request takes it");
+        assert!(remote.take_write(), "the request should take the order");
         assert!(!remote.take_write());
         assert!(matches!(remote.next(), Task::Preview(None, _)));
-        assert!(!remote.postpone_write(false), "no request is pending");
+        assert!(!remote.postpone_write(false), "no request should be pending");
     }
 }

@@ -4,14 +4,15 @@ mod keys;
 
 use super::sanitize::shortened;
 
-/// Longest text that is compared, in bytes. Longer texts are not edited by hand.
+/// Maximum number of bytes to compare. Larger scenes are not edited by hand.
 pub const MOST_COMPARED_BYTES: usize = 4 << 20;
 
 /// Maximum number of characters shown per line.
 const MAX_LINE_CHARS: usize = 40;
 
-/// Lists the changes between two texts, such as `sphere.ball.radius 0.5 → 0.7`, with keys in the form that `--set` takes. If
-/// no key differs, or a text is not TOML, lists changed lines. Empty if the texts are equal or too long.
+/// Lists the changes between two versions of a scene, such as `sphere.ball.radius 0.5 → 0.7`, with keys as in
+/// `--set`. Lists changed lines if no key differs or if a version is not valid TOML. Empty if the versions
+/// are equal or too large.
 pub fn changes(before: &str, after: &str) -> Vec<String> {
     if before == after || before.len().max(after.len()) > MOST_COMPARED_BYTES {
         return Vec::new();
@@ -45,7 +46,7 @@ fn lines(before: &str, after: &str) -> Option<String> {
     }
 }
 
-/// Describes the change of one line. Shows a key only once if both lines assign to it.
+/// Describes a change to one line. If both lines assign to the same key, shows the key only once.
 fn line_change(old: &str, new: &str) -> String {
     let parts = |line: &'_ str| {
         line.split_once('=').map(|(key, value)| (key.trim().to_owned(), value.trim().to_owned()))
@@ -68,7 +69,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn edits_outside_of_keys_are_listed_by_line() {
+    fn changes_outside_of_keys_are_listed_by_line() {
         let text = "[sphere]\nradius = 0.5 # half\n# one\ncolor = 1\nlast = 2\n";
         let changed = |from: &str, to: &str| changes(text, &text.replace(from, to)).pop();
         assert_eq!(changed("x", "y"), None);

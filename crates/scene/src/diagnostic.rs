@@ -13,14 +13,14 @@ pub enum Severity {
     Warning,
 }
 
-/// An error or warning about a scene or a file that it references.
+/// An error or warning about a scene or a file referenced by a scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Diagnostic {
     /// Error or warning.
     pub severity: Severity,
-    /// One line, starting in lower case.
+    /// One line, starting with a lowercase letter.
     pub message: String,
-    /// The file; empty for the command line.
+    /// The file. Empty for the command line.
     pub path: PathBuf,
     /// The span in that file, if known.
     pub place: Option<SourceSpan>,
@@ -40,13 +40,13 @@ impl Diagnostic {
     }
 }
 
-/// A labeled span of a text.
+/// A labeled span in a source text.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SourceSpan {
-    /// The whole text.
+    /// The whole source text.
     pub source: Arc<str>,
     /// Byte range in [`Self::source`].
     pub span: Range<usize>,
-    /// Label of the underline; may be empty.
+    /// Text next to the underline. May be empty.
     pub label: String,
 }

@@ -1,4 +1,4 @@
-//! Writes a camera into the text of a scene, keeping comments and formatting.
+//! Writes a camera to a scene's source text, keeping comments and formatting.
 
 use std::ops::Range;
 
@@ -8,10 +8,10 @@ use super::source::SceneText;
 use super::toml::{self, Entries, KeyValue, TomlValue, Value};
 use crate::math::DVec3;
 
-/// Returns the text of a scene file with its camera replaced by `wanted`.
+/// Returns a scene's source text with the camera replaced by `wanted`.
 ///
 /// # Errors
-/// The reason that the table `[camera]` cannot be edited.
+/// The reason why the `[camera]` table cannot be edited.
 pub(super) fn with_camera(text: &str, wanted: &Viewpoint) -> Result<String, String> {
     let (document, errors) = toml::parse(text);
     let found = document.root().get("camera").filter(|_| errors.is_empty());
@@ -25,12 +25,12 @@ pub(super) fn with_camera(text: &str, wanted: &Viewpoint) -> Result<String, Stri
     is_right.then_some(new).ok_or_else(|| "glimt cannot edit the [camera] table in this form".to_owned())
 }
 
-/// Pending edits of a table.
+/// Pending edits to a table.
 struct Edits<'t> {
     text: &'t str,
     table: Entries<'t>,
     replaced: Vec<(Range<usize>, String)>,
-    /// New lines `key = value`.
+    /// New `key = value` lines.
     added: Vec<String>,
 }
 
@@ -53,7 +53,7 @@ impl Edits<'_> {
         self.number("fov", fov, FOV_DEGREES);
         self.number("aperture", aperture, 0.0);
         match self.table.get("focus") {
-            // Ignore rounding of the distance when the camera orbits.
+            // Ignore rounding of the distance while orbiting.
             Some(given) if wanted.is_focused_on_look_at() && is_near(&given.value, focus) => {}
             Some(_) | None => self.number("focus", focus, wanted.pose.distance()),
         }
@@ -82,7 +82,7 @@ impl Edits<'_> {
         }
     }
 
-    /// Replaces a number, unless it already has the value `wanted`.
+    /// Replaces a number unless it already equals `wanted`.
     fn replace(&mut self, found: &Value<'_>, wanted: f64) {
         let is_same = match found.item() {
             TomlValue::Integer { digits, radix: 10 } | TomlValue::Float(digits) => {
@@ -106,13 +106,13 @@ impl Edits<'_> {
         &self.text[line..key.span.start]
     }
 
-    /// Whether a key starts its line, possibly as `camera.key`.
+    /// Whether a key is the first on its line, possibly as `camera.key`.
     fn has_line(&self, key: &KeyValue<'_>) -> bool {
         let indent = self.indent(key).trim();
         indent.is_empty() || indent.ends_with('.')
     }
 
-    /// The separator between this entry and the next.
+    /// The separator between this entry and the next entry.
     fn between(&self, key: &KeyValue<'_>) -> String {
         if self.has_line(key) {
             format!("{}{}", self.line_end(key), self.indent(key))
@@ -121,7 +121,8 @@ impl Edits<'_> {
         }
     }
 
-    /// The line ending after this entry, or of the previous line if this one is last and unterminated.
+    /// The line ending after this entry. If this is the last line and it is unterminated, the line ending of
+    /// the previous line.
     fn line_end(&self, key: &KeyValue<'_>) -> &'static str {
         let (before, after) = self.text.split_at(key.value.span().end);
         let (line, _) = after.split_once('\n').or_else(|| before.rsplit_once('\n')).unwrap_or_default();
@@ -169,7 +170,7 @@ fn array(vector: DVec3) -> String {
     format!("[{}]", vector.to_array().map(number).join(", "))
 }
 
-/// Formats a number as TOML: decimal digits without exponent, and 0 instead of -0.
+/// Formats a number as TOML: decimal digits without an exponent, and 0 instead of -0.
 fn number(number: f64) -> String {
     (number + 0.0).to_string()
 }
@@ -192,11 +193,11 @@ mod tests {
         let text = "# a\n[camera] # eye\n\tposition = [ 0.0, 1, # up\n 4_0.0 ] # far\n\n  look_at=[0,1,0]\n[render]\nwidth=4\n";
         let expected = text.replace("0.0, 1,", "0.5, 1,").replace("4_0.0", "-3.25");
         assert_eq!(written(text, &view([0.5, 1.0, -3.25])), expected);
-        assert_eq!(written(&expected, &view([0.5, 1.0, -3.25])), expected, "nothing to change");
+        assert_eq!(written(&expected, &view([0.5, 1.0, -3.25])), expected, "camera unchanged");
     }
 
     #[test]
-    fn missing_keys_are_added_after_the_last_one() {
+    fn missing_keys_are_added_after_the_last_key() {
         let wanted = Viewpoint { fov: 35.5, focus: 2.5, ..view([0.0, 1.0, 4.0]) };
         let camera = "position = [0, 1, 4]\nlook_at = [0, 1, 0]";
         for (text, expected) in [
@@ -224,9 +225,9 @@ mod tests {
     }
 
     #[test]
-    fn added_keys_keep_the_line_ending() {
+    fn added_keys_use_the_same_line_ending() {
         let wanted = Viewpoint { fov: 35.5, ..view([0.0, 1.0, 4.0]) };
-        // The first line has a different ending from the camera's lines.
+        // The first line's ending differs from the endings of the camera's lines.
         for (first, end) in [("\r\n", "\n"), ("\n", "\r\n")] {
             let text = format!("# a{first}[camera]{end}position = [0, 1, 4]{end}look_at = [0, 1, 0]");
             assert_eq!(written(&text, &wanted), format!("{text}{end}fov = 35.5"), "at the end of the file");
@@ -237,17 +238,17 @@ mod tests {
     }
 
     #[test]
-    fn rounding_leaves_the_focus_unchanged() {
+    fn orbiting_does_not_change_the_focus() {
         let text = "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\nfocus = 4\n";
         let orbited = view([2.8283, 1.0, 2.8285]);
         assert!(orbited.focus != 4.0 && (orbited.focus - 4.0).abs() < 1e-3);
         assert_eq!(written(text, &orbited), text.replace("[0, 1, 4]", "[2.8283, 1, 2.8285]"));
         let nearer = view([0.0, 1.0, 3.8]);
-        assert!(written(text, &nearer).contains("focus = 3.8"), "moving closer is more than rounding");
+        assert!(written(text, &nearer).contains("focus = 3.8"), "moving closer changes the focus");
     }
 
     #[test]
-    fn an_orbiter_becomes_vectors() {
+    fn orbiter_is_replaced_by_vectors() {
         let wanted = Viewpoint { aperture: 0.1, focus: 3.0, ..view([0.0, 1.0, 4.0]) };
         let text = "[camera]\n  aperture = 0.1\n  orbiter = \"a.txt\" # from gKit\n  focus = 3.0\n";
         let expected = text.replace("orbiter = \"a.txt\"", "position = [0, 1, 4]\n  look_at = [0, 1, 0]");
@@ -267,7 +268,7 @@ mod tests {
         }
     }
 
-    /// Comments, with an empty string for each blank line.
+    /// The comments in a text, with an empty string for each blank line.
     fn comments(text: &str) -> Vec<String> {
         let comment = |line: &str| line.split_once('#').map(|(_, words)| words.to_owned());
         text.lines()
@@ -277,7 +278,7 @@ mod tests {
     }
 
     #[test]
-    fn every_bundled_scene_keeps_its_comments() {
+    fn bundled_scenes_keep_their_comments() {
         let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
         let paths: Vec<_> =
             std::fs::read_dir(folder).expect("scenes").map(|entry| entry.expect("a file").path()).collect();
@@ -294,7 +295,7 @@ mod tests {
             let others = |text: &str| -> Vec<String> {
                 text.lines().filter(|line| !is_camera(line)).map(str::to_owned).collect()
             };
-            // Lights and shapes have keys of the same names; only the camera's may differ.
+            // Only camera lines may differ. Keys of lights and shapes with the same names are not compared.
             assert_eq!(others(&new), others(&text), "{}", path.display());
             let changed = text.lines().filter(|line| !new.lines().any(|other| other == *line)).count();
             assert!(changed <= 6, "{}: {changed} lines", path.display());

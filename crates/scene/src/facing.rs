@@ -10,15 +10,15 @@ pub(super) const MESSAGE: &str = "this light shines away from everything";
 pub(super) const LABEL: &str = "all shapes are behind it";
 pub(super) const HELP: &str = "swap `u` and `v`: the front faces along u × v";
 
-/// The minimum and maximum corner of a mesh file's bounding box. `None` if it has no vertices.
+/// Minimum and maximum corner of a mesh file's bounding box. `None` for a mesh without vertices.
 pub type MeshBounds = Option<[DVec3; 2]>;
 
-/// Smallest ratio of the scene's extent in front of a light to the extent behind it that counts as lit: a ceiling just
-/// above the light does not count.
+/// Minimum ratio of the scene's extent in front of a light to the extent behind the light. Below this ratio,
+/// the light counts as facing away, even if it shines on a ceiling just above it.
 const MIN_FRONT_RATIO: f64 = 0.02;
 
-/// Spans of one-sided quad lights with nothing in front of them and shapes behind them. Calls `bounds` only if the scene has
-/// one-sided quad lights.
+/// Spans of one-sided quad lights with shapes behind them and nothing in front of them. Only calls `bounds`
+/// if the scene has one-sided quad lights.
 pub(super) fn away(scene: &Scene, bounds: impl FnOnce() -> Vec<MeshBounds>) -> Vec<Range<usize>> {
     let emits = |object: &Object| {
         let material = object.material.map(|index| &scene.materials[index]);
@@ -52,7 +52,8 @@ pub(super) fn away(scene: &Scene, bounds: impl FnOnce() -> Vec<MeshBounds>) -> V
     away.map(|(number, _)| scene.objects[number].span.clone()).collect()
 }
 
-/// Whether the camera is in front of a light. An orbiter camera counts, as its file is not read here.
+/// Whether the camera is in front of a light. Always true for an orbiter camera, because its file is not read
+/// here.
 fn sees(camera: &Camera, corner: DVec3, front: DVec3) -> bool {
     match camera {
         Camera::LookAt { position, .. } => front.dot(*position - corner) > 0.0,
@@ -60,7 +61,7 @@ fn sees(camera: &Camera, corner: DVec3, front: DVec3) -> bool {
     }
 }
 
-/// Upper bound of the projections of a shape's points onto a unit direction.
+/// Upper bound on the projection of a shape's points onto a unit direction.
 fn furthest(shape: &Shape, bounds: &[MeshBounds], direction: DVec3) -> f64 {
     shape.reach(direction).unwrap_or_else(|| {
         let of = |mesh: &Mesh| Some(corners(mesh, bounds.get(mesh.file).copied().flatten()?));

@@ -1,17 +1,17 @@
-//! Fingerprints of a stage's inputs: equal fingerprints mean equal inputs.
+//! Fingerprints of stage inputs. Equal fingerprints mean equal inputs.
 
 use super::description::Texture;
 use crate::choice::Choice;
 use crate::math::{DVec3, Vec3};
 
-/// Values that affect the image. Implementations destructure all fields without `..`, so a new field does not compile until
-/// it is added or ignored explicitly.
+/// Values that affect the image. Implementations destructure all fields without `..`, so code with a new
+/// field does not compile until the field is added or explicitly ignored.
 pub trait Fingerprinted {
-    /// Adds everything that later stages read.
+    /// Adds everything read by later stages.
     fn add_to(&self, key: &mut Fingerprint, of: &Referents<'_>);
 }
 
-/// Values that descriptions refer to by index.
+/// Values referenced by index.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Referents<'a> {
     /// The scene's textures.
@@ -36,13 +36,13 @@ impl<T: Fingerprinted> Fingerprinted for Option<T> {
 pub struct Key([u8; 32]);
 
 impl std::fmt::Display for Key {
-    /// Lower-case hexadecimal digits.
+    /// Lowercase hexadecimal digits.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         self.0.iter().try_for_each(|byte| write!(f, "{byte:02x}"))
     }
 }
 
-/// Builder of a fingerprint. Inputs are hashed in order, numbers by their bits.
+/// Fingerprint builder. Hashes inputs in order, and numbers by their bits.
 #[derive(Debug)]
 pub struct Fingerprint(blake3::Hasher);
 
@@ -54,7 +54,7 @@ impl Fingerprint {
         new
     }
 
-    /// Adds bytes with their length.
+    /// Adds bytes and their length.
     pub fn bytes(&mut self, bytes: &[u8]) -> &mut Self {
         self.u64(bytes.len() as u64);
         self.0.update(bytes);
@@ -77,7 +77,7 @@ impl Fingerprint {
         self
     }
 
-    /// Adds a value with everything that it refers to.
+    /// Adds a value and everything it refers to.
     pub fn add(&mut self, part: &impl Fingerprinted, of: &Referents<'_>) -> &mut Self {
         part.add_to(self, of);
         self

@@ -1,17 +1,17 @@
-//! Dotted keys as `--set` takes them: `materials."copper ball".roughness`.
+//! Dotted keys as in `--set`: `materials."copper ball".roughness`.
 
 use unicode_width::UnicodeWidthStr;
 
 use super::sanitize::{shortened, visible};
 use super::source::quoted;
 
-/// Formats one part of a dotted key, quoted if it is not a bare key.
+/// Formats one part of a dotted key. Quotes the part if it is not a bare key.
 pub(super) fn part(name: &str) -> String {
     let is_bare = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
     if !name.is_empty() && name.chars().all(is_bare) { name.to_owned() } else { quoted(name) }
 }
 
-/// Splits a dotted key into its parts, with their quotes. Dots inside quotes do not separate.
+/// Splits a dotted key into parts, including their quotes. Ignores dots inside quotes.
 pub fn key_parts(key: &str) -> Vec<&str> {
     let mut rest = key;
     let mut parts = Vec::new();
@@ -23,12 +23,13 @@ pub fn key_parts(key: &str) -> Vec<&str> {
     parts
 }
 
-/// Splits a text that starts with a dotted key at the first space outside quotes.
+/// Splits text that starts with a dotted key at the first space outside quotes.
 pub fn split_key(text: &str) -> Option<(&str, &str)> {
     find_unquoted(text, ' ').map(|end| (&text[..end], &text[end + 1..]))
 }
 
-/// Shortens a dotted key to `columns`. Drops leading tables first, and cuts the last part only if it does not fit.
+/// Shortens a dotted key to `columns`. Drops leading tables first. Cuts the last part only if it does not
+/// fit.
 pub fn shortened_key(key: &str, columns: usize) -> String {
     let key = visible(key);
     if key.width() <= columns {
@@ -36,7 +37,7 @@ pub fn shortened_key(key: &str, columns: usize) -> String {
     }
     let parts = key_parts(&key);
     let last = parts.len() - 1;
-    // Do not start with an index: it is meaningless without its list.
+    // Do not start with an index, which is meaningless without its list.
     let begins_with_number = |skipped: &usize| parts[*skipped].parse::<u64>().is_ok();
     let tails =
         (1..=last).filter(|skipped| !begins_with_number(skipped)).map(|skipped| parts[skipped..].join("."));
@@ -44,7 +45,7 @@ pub fn shortened_key(key: &str, columns: usize) -> String {
     fitting.unwrap_or_else(|| shortened(parts[last], columns))
 }
 
-/// Byte index of the first `end` outside quotes.
+/// Byte index of the first character `end` outside quotes.
 fn find_unquoted(text: &str, end: char) -> Option<usize> {
     let (mut is_quoted, mut is_escaped) = (false, false);
     for (at, c) in text.char_indices() {
@@ -88,6 +89,6 @@ mod tests {
         ] {
             assert_eq!(shortened_key(key, columns), shown, "{columns}");
         }
-        assert_eq!(shortened_key("light.1.direction", 16), "…direction", "a number without its list");
+        assert_eq!(shortened_key("light.1.direction", 16), "…direction", "must not start with an index");
     }
 }

@@ -1,7 +1,8 @@
 //! The scene file format: TOML syntax, validation and the resulting scene description.
 //!
-//! [`load`] reads a file with size and type checks, [`parse`] turns its text into a [`description::Scene`] and a list of
-//! [`diagnostic::Diagnostic`]s, and [`report`] formats diagnostics for the terminal.
+//! [`load`] checks a file's size and type and reads it. [`parse`] converts its text to a
+//! [`description::Scene`] and a list of [`diagnostic::Diagnostic`]s. [`report`] formats diagnostics for the
+//! terminal.
 
 mod changes;
 pub mod description;
@@ -21,7 +22,7 @@ pub mod sanitize;
 mod source;
 mod toml;
 
-// Modules of lower crates, under the names used throughout the workspace.
+// Modules of lower-level crates, under the names used throughout the workspace.
 use glimt_base::{choice, film, math, sampling, system};
 use glimt_kernel::{geometry, lights, materials};
 
@@ -38,15 +39,15 @@ pub use other_content::other_content;
 pub use read::same_text_beside;
 pub use source::{SceneText, quoted};
 
-/// Largest accepted scene file, in bytes.
+/// Maximum size of a scene file in bytes.
 pub const MAX_FILE_BYTES: u64 = 128 << 20;
 
-/// Message for a missing scene file.
+/// Error message for a missing scene file.
 pub const SCENE_NOT_FOUND: &str = "scene file not found";
-/// Message for a missing file with the extension of a model.
+/// Error message for a missing file with a model's extension.
 pub const MODEL_NOT_FOUND: &str = "file not found";
 
-/// Phrase that names a renamed copy in the help of the error about a missing scene.
+/// Phrase in the help text for a missing scene that points to a renamed copy.
 pub const SAME_TEXT: &str = "has the same text";
 
 /// Whether a diagnostic reports that the scene or model file does not exist.
@@ -54,11 +55,11 @@ pub fn is_absence(diagnostic: &Diagnostic) -> bool {
     [SCENE_NOT_FOUND, MODEL_NOT_FOUND].contains(&diagnostic.message.as_str())
 }
 
-/// Maximum number of syntax elements (brackets, `=`, `,` and lines) in a scene file: each takes many times its size in memory. A scene
-/// of a million spheres has half as many.
+/// Maximum number of syntax elements (brackets, `=`, `,` and lines) in a scene file. In memory, each takes
+/// many times its size in the file. A scene with a million spheres has half as many.
 const MAX_PARTS: usize = 32 << 20;
 
-/// A valid scene, with its text and warnings.
+/// A valid scene, its text and warnings.
 #[derive(Clone, Debug)]
 pub struct Loaded {
     /// The scene description.
@@ -69,48 +70,49 @@ pub struct Loaded {
     pub path: PathBuf,
     /// Likely mistakes, in file order.
     pub warnings: Vec<Diagnostic>,
-    /// Files referenced by the scene file itself; filled only with `--set`, which may replace them.
+    /// Files referenced by the scene file itself. Only filled if there are `--set` values, which may replace
+    /// these files.
     pub named: Vec<PathBuf>,
     /// Spans of the settings' values.
     pub settings: Vec<Setting>,
 }
 
-/// The span of a value in `[render]` or `[photons]`.
+/// A value in `[render]` or `[photons]` and its span.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Setting {
     /// The name of the table: `render` or `photons`.
     pub table: &'static str,
     /// The key.
     pub key: String,
-    /// Byte range in the text with the `--set` values.
+    /// Byte range in the text that includes the `--set` values.
     pub span: Range<usize>,
 }
 
 /// Reads the current text of a scene file.
 ///
 /// # Errors
-/// The reason that the file cannot be read.
+/// The reason why the file cannot be read.
 pub fn text_now(path: &Path) -> Result<Arc<str>, Box<Diagnostic>> {
     read::text(path)
 }
 
 impl Loaded {
-    /// Returns the file's text with `camera` written into `[camera]`. Replaces numbers in place and adds missing keys;
-    /// comments and formatting stay unchanged.
+    /// Returns the file's text with `camera` written to `[camera]`. Replaces numbers in place and adds
+    /// missing keys. Comments and formatting stay unchanged.
     ///
     /// # Errors
-    /// The reason that the table cannot be edited.
+    /// The reason why the table cannot be edited.
     pub fn text_with_camera(&self, camera: &Viewpoint) -> Result<String, String> {
         edit::with_camera(self.source.text(), camera)
     }
 
-    /// The camera of a scene text with `--set` values applied. `None` if either has errors.
+    /// The camera in a scene's text with `--set` values applied. `None` if the text or a value has errors.
     pub fn camera_of(text: &str, sets: &[String]) -> Option<Camera> {
         document::camera_of(&SceneText::with_sets(text.into(), sets).ok()?)
     }
 
-    /// Warnings for lights that shine away from everything, in scenes with mesh files. Calls `bounds` only if there are
-    /// candidates; it returns one item per entry of [`Scene::mesh_files`].
+    /// Warnings about lights that shine away from everything, in scenes with mesh files. Only calls `bounds`
+    /// if there are candidates. `bounds` returns one item per entry of [`Scene::mesh_files`].
     pub fn lights_facing_away(&self, bounds: impl FnOnce() -> Vec<MeshBounds>) -> Vec<Diagnostic> {
         if self.scene.mesh_files.is_empty() {
             return Vec::new();
@@ -126,7 +128,7 @@ impl Loaded {
         facing::away(&self.scene, bounds).into_iter().map(warning).collect()
     }
 
-    /// The line number in the file, from 1, where `span` starts.
+    /// The 1-based line number in the file where `span` starts.
     pub fn line(&self, span: &Range<usize>) -> usize {
         let before = self.source.text().get(..span.start).unwrap_or_default();
         before.bytes().filter(|byte| *byte == b'\n').count() + 1
@@ -138,8 +140,8 @@ impl Loaded {
         self.settings.iter().find(is_it).map(|setting| setting.span.clone())
     }
 
-    /// Creates a diagnostic at `span`, for problems found after parsing, such as a mesh without usable faces or a texture
-    /// that does not decode.
+    /// Creates a diagnostic at `span`, for problems found after parsing, such as a mesh without usable faces
+    /// or a texture that cannot be decoded.
     pub fn diagnostic_at(
         &self,
         span: Range<usize>,
@@ -152,7 +154,7 @@ impl Loaded {
     }
 }
 
-/// Result of parsing a scene text.
+/// Result of parsing a scene's text.
 #[derive(Clone, Debug)]
 pub struct Outcome {
     /// The scene. `None` if there is an error.
@@ -173,10 +175,11 @@ pub fn load(path: &Path, sets: &[String]) -> Result<Loaded, Vec<Diagnostic>> {
     load_source(SceneText::with_sets(text, sets)?, path, sets)
 }
 
-/// Like [`load`], for the generated scene of the model at `path`. Diagnostics have no line, as the text is in no file.
+/// Like [`load`], for a scene generated for the model at `path`. Diagnostics have no line numbers because the
+/// text is not in a file.
 ///
 /// # Errors
-/// As for [`load`].
+/// Same as [`load`].
 pub fn load_generated(text: Arc<str>, path: &Path, sets: &[String]) -> Result<Loaded, Vec<Diagnostic>> {
     load_source(SceneText::with_sets(text, sets)?.generated(), path, sets)
 }
@@ -193,8 +196,8 @@ fn load_source(source: SceneText, path: &Path, sets: &[String]) -> Result<Loaded
     }
 }
 
-/// Validates the text of a scene file. `path` is not read: it is used in diagnostics, and relative paths are resolved
-/// against its folder. Of referenced files only the metadata is read.
+/// Validates the text of a scene file. `path` is used in diagnostics and to resolve relative paths, but the
+/// file is not read. Only the metadata of referenced files is read.
 pub fn parse(text: Arc<str>, path: &Path) -> Outcome {
     if text.contains('\0') {
         return Outcome { scene: None, diagnostics: vec![*read::binary(path)], settings: Vec::new() };
@@ -202,7 +205,7 @@ pub fn parse(text: Arc<str>, path: &Path) -> Outcome {
     document::lower(&SceneText::file(text), path)
 }
 
-/// Whether a file is a model: it has a mesh extension and does not contain a scene.
+/// Whether a file is a model, with a mesh extension and without a scene.
 pub fn is_model(path: &Path) -> bool {
     read::is_model(path)
 }
@@ -212,7 +215,7 @@ pub fn is_mesh(path: &Path) -> bool {
     document::is_mesh(path)
 }
 
-/// The commented scene that `glimt new` writes.
+/// The commented scene written by `glimt new`.
 pub fn starter() -> &'static str {
     include_str!("starter.toml")
 }

@@ -1,9 +1,9 @@
-//! Suggestions for misspelled and foreign names.
+//! Suggestions for misspelled names and names from other renderers.
 
 use strsim::osa_distance;
 
-/// The candidate with the smallest edit distance (optimal string alignment) to `written`, if at most one third of the
-/// characters differ. Ignores case and treats `-` as `_`.
+/// The candidate with the smallest edit distance (optimal string alignment) to `written`. `None` if more than
+/// one third of the characters differ. Ignores case and treats `-` as `_`.
 pub fn nearest<'a>(written: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     const LONGEST: usize = 64;
     if written.len() > LONGEST {
@@ -20,7 +20,7 @@ pub fn nearest<'a>(written: &str, candidates: impl IntoIterator<Item = &'a str>)
         .map(|(_, candidate)| candidate)
 }
 
-/// Names used by other renderers, each with glimt's names for the same thing.
+/// Names used by other renderers and the corresponding names in glimt.
 const FOREIGN_NAMES: [(&[&str], &[&str]); 17] = [
     (
         &["color", "colour", "albedo", "base_color", "kd"],
@@ -47,7 +47,7 @@ const FOREIGN_NAMES: [(&[&str], &[&str]); 17] = [
     (&["sun", "distant", "infinite", "parallel"], &["directional"]),
 ];
 
-/// The candidate that `written` means in another renderer, or else the nearest one.
+/// The candidate that corresponds to the name `written` in another renderer, or else the nearest candidate.
 pub fn meant<'a>(written: &str, candidates: &[&'a str]) -> Option<&'a str> {
     let plain = written.to_lowercase().replace('-', "_");
     let named = FOREIGN_NAMES.iter().find(|(names, _)| names.contains(&plain.as_str()));
@@ -61,7 +61,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_of_other_renderers_are_known() {
+    fn names_from_other_renderers_are_known() {
         let phong = ["type", "diffuse", "specular", "shininess", "emission", "normal_strength"];
         assert_eq!(meant("color", &phong), Some("diffuse"));
         assert_eq!(meant("Roughness", &phong), Some("shininess"));
@@ -75,7 +75,7 @@ mod tests {
     }
 
     #[test]
-    fn typos_match_but_unrelated_names_do_not() {
+    fn only_typos_match() {
         let keys = ["center", "radius", "material", "u", "v"];
         assert_eq!(nearest("raduis", keys), Some("radius"));
         assert_eq!(nearest("centre", keys), Some("center"));

@@ -1,4 +1,4 @@
-//! Recognizes models, images, parts and checkpoints given in place of a scene, by their first bytes.
+//! Recognizes models, images, parts and checkpoints passed instead of a scene, from their first bytes.
 
 use std::io::Read;
 use std::path::Path;
@@ -7,27 +7,27 @@ use super::diagnostic::Diagnostic;
 use super::sanitize::visible;
 use crate::system::file::{self, PART_MARK};
 
-/// Hint after errors about files that are not scenes.
+/// Hint for errors about files that are not scenes.
 pub(super) const NEW_SCENE_HELP: &str = "`glimt new FILE` writes a scene to start from";
 
-/// Whether a file has the extension of a scene.
+/// Whether a file has a scene's extension.
 pub(super) fn may_be_scene(found: &Path) -> bool {
     found.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml"))
 }
 
-/// Content other than a scene.
+/// Contents of a file that is not a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum OtherContent {
-    /// A model, with its format and usual extension.
+    /// A model, with its format and its usual extension.
     Model { format: &'static str, ending: &'static str },
     /// An image of this format.
     Image(&'static str),
-    /// A part of an image, or a checkpoint.
+    /// A part or a checkpoint.
     Part,
 }
 
-/// If a file is an image, a part or a checkpoint, whatever its name, returns its format and an error about it. `None` for other or
-/// unreadable files.
+/// Checks whether a file is an image, a part or a checkpoint, regardless of its name, and returns its format
+/// and an error. `None` for other or unreadable files.
 pub fn other_content(path: &Path) -> Option<(&'static str, Box<Diagnostic>)> {
     const START: u64 = 1 << 10;
     let (opened, _) = file::open(path).ok()?.ok()?;
@@ -41,7 +41,7 @@ pub fn other_content(path: &Path) -> Option<(&'static str, Box<Diagnostic>)> {
 }
 
 impl OtherContent {
-    /// Detects the content from the first bytes. `None` if it may be a scene.
+    /// Detects the type of contents from the first bytes. `None` if the file may be a scene.
     pub(super) fn of(bytes: &[u8]) -> Option<Self> {
         if bytes.starts_with(&PART_MARK) {
             return Some(Self::Part);
@@ -49,9 +49,9 @@ impl OtherContent {
         image_format(bytes).map(Self::Image).or_else(|| model(bytes))
     }
 
-    /// The error about this content in place of a scene.
+    /// Error for a file with these contents instead of a scene.
     pub(super) fn problem(self, path: &Path) -> Box<Diagnostic> {
-        // Drop the extension `.toml`.
+        // Remove the extension `.toml`.
         let name = if may_be_scene(path) { path.file_stem() } else { path.file_name() };
         let name = name.unwrap_or(path.as_os_str()).to_string_lossy();
         let (message, help) = match self {
@@ -89,23 +89,23 @@ fn image_format(bytes: &[u8]) -> Option<&'static str> {
     match bytes {
         _ if known.is_some() => known,
         [b'R', b'I', b'F', b'F', _, _, _, _, b'W', b'E', b'B', b'P', ..] => Some("WebP"),
-        // Not a PPM if `=` follows: `P6` is then a TOML key.
+        // If `=` follows, this is not a PPM file: `P6` is a TOML key.
         [b'P', b'1'..=b'7', b' ' | b'\t' | b'\r' | b'\n', rest @ ..] if !begins_with(rest, b'=') => {
             Some("PPM")
         }
-        // The reserved bytes are 0, which does not occur in text.
+        // The reserved bytes are 0. Text does not contain 0.
         [b'B', b'M', _, _, _, _, 0, 0, 0, 0, ..] => Some("BMP"),
         _ => is_tga(bytes).then_some("TGA"),
     }
 }
 
-/// Whether the first byte after white space is `byte`.
+/// Whether the first byte after whitespace is `byte`.
 fn begins_with(bytes: &[u8], byte: u8) -> bool {
     bytes.trim_ascii_start().first() == Some(&byte)
 }
 
-/// Whether `bytes` start with a TGA header. TGA has no magic number, so all fields must be valid; one of them is a byte that
-/// does not occur in text.
+/// Whether `bytes` start with a TGA header. TGA has no magic number, so all fields must be valid. At least
+/// one of these bytes never occurs in text.
 fn is_tga(bytes: &[u8]) -> bool {
     let &[_, map, kind, first0, first1, count0, count1, depth, _, _, _, _, w0, w1, h0, h1, bits, ..] = bytes
     else {
@@ -118,7 +118,7 @@ fn is_tga(bytes: &[u8]) -> bool {
     is_kind && [w0, w1] != [0; 2] && [h0, h1] != [0; 2] && matches!(bits, 8 | 15 | 16 | 24 | 32)
 }
 
-/// Detects a model by its first line that is not a comment.
+/// Detects a model from the first line that is not a comment.
 fn model(bytes: &[u8]) -> Option<OtherContent> {
     if bytes.starts_with(b"glTF") {
         return Some(OtherContent::Model { format: "glTF", ending: "glb" });
@@ -127,7 +127,7 @@ fn model(bytes: &[u8]) -> Option<OtherContent> {
     let line = lines.find(|line| !line.is_empty() && !line.starts_with(b"#"))?;
     let mut words = line.split(u8::is_ascii_whitespace);
     let (word, next) = (words.next()?, words.next());
-    // In TOML a key is followed by an equals sign.
+    // This is TOML if there is an equals sign.
     if line.contains(&b'=') {
         return None;
     }

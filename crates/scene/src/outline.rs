@@ -1,5 +1,5 @@
-//! Tables of a scene text with the spans of their keys, values and names, for completions and editors. Works on texts with
-//! errors.
+//! Tables in a scene's text, with the spans of keys, values and names, for completions and editors. The text
+//! may contain errors.
 
 use std::ops::Range;
 
@@ -8,20 +8,21 @@ use super::keys::key::{Form, KeyInfo, TableInfo, TypeInfo};
 use super::keys::tables;
 use super::toml::{self, Entries, KeyValue, TomlValue, Value};
 
-/// A table of the text with a known definition.
+/// A table with a known definition.
 #[derive(Clone, Debug)]
 pub struct OutlineTable {
-    /// Its definition.
+    /// The table's definition.
     pub info: &'static TableInfo,
-    /// The type given by its key `type`, or the default. `None` if the definition has no types or the type is unknown.
+    /// The type from the key `type`, or the default type. `None` if the definition has no types or if the
+    /// type is unknown.
     pub kind: Option<&'static TypeInfo>,
-    /// `NAME` of `[materials.NAME]`, or the `name` of a shape.
+    /// `NAME` in `[materials.NAME]`, or a shape's `name`.
     pub name: Option<SpannedName>,
-    /// Position in a list of tables, from 1. Otherwise 1.
+    /// 1-based position in a list of tables. 1 for other tables.
     pub number: usize,
-    /// Byte range of its header or braces.
+    /// Byte range of the header or the braces.
     pub span: Range<usize>,
-    /// Its keys.
+    /// The table's keys.
     pub keys: Vec<OutlineKey>,
 }
 
@@ -34,7 +35,7 @@ pub struct SpannedName {
     pub span: Range<usize>,
 }
 
-/// A key with its value.
+/// A key and its value.
 #[derive(Clone, Debug)]
 pub struct OutlineKey {
     /// The key.
@@ -47,7 +48,7 @@ pub struct OutlineKey {
     pub inner: Vec<OutlineKey>,
 }
 
-/// The tables of a text, in the order of their definitions.
+/// The tables in a text, in the order of their definitions.
 pub fn outline(text: &str) -> Vec<OutlineTable> {
     let (document, _) = toml::parse(text);
     let of = |info: &'static TableInfo| {
@@ -138,7 +139,7 @@ fn entries(value: Value<'_>) -> Option<Entries<'_>> {
 }
 
 impl OutlineTable {
-    /// The allowed keys of the table's type, or of all types if it is unknown.
+    /// The keys allowed for the table's type, or for any type if the type is unknown.
     pub fn known(&self) -> Vec<&'static KeyInfo> {
         match self.kind {
             None if !self.info.types.is_empty() => {

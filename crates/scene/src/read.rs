@@ -1,4 +1,4 @@
-//! Reads scene files without blocking and with bounded memory.
+//! Reads scene files without blocking and with a limit on memory.
 
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
@@ -15,14 +15,14 @@ use crate::system::describe_error;
 use crate::system::file::{self, FileKind};
 use crate::system::folder;
 
-/// Message for binary files.
+/// Error message for binary files.
 const NOT_TEXT: &str = "this is a binary file, not a scene";
-/// Message for meshes given in place of a scene.
+/// Error message for meshes passed instead of a scene.
 const MESH_NOT_SCENE: &str = "this is a mesh, not a scene";
-/// Message for dangling symbolic links.
+/// Error message for dangling symbolic links.
 const DANGLING_LINK: &str = "this is a symbolic link to a file that does not exist";
-/// Message and hint for files that Git LFS has not downloaded.
-const LFS_POINTER: &str = "this is a Git LFS pointer, not the file's content";
+/// Error message and hint for files not downloaded by Git LFS.
+const LFS_POINTER: &str = "this is a Git LFS pointer, not the file's contents";
 const LFS_HELP: &str = "run `git lfs pull`";
 
 /// Reads the text of a scene file.
@@ -37,7 +37,7 @@ pub(super) fn text(path: &Path) -> Result<Arc<str>, Box<Diagnostic>> {
         return Err(Diagnostic::error(path, message, Some(help), None));
     }
     let bytes = bytes(path).map_err(|(message, help)| {
-        // Report a large image as an image, not as a large scene.
+        // Report a large image as an image rather than as a large scene.
         other_content(path)
             .map_or_else(|| Diagnostic::error(path, message, help, None), |(_, problem)| problem)
     })?;
@@ -56,7 +56,7 @@ pub(super) fn text(path: &Path) -> Result<Arc<str>, Box<Diagnostic>> {
     }
 }
 
-/// The error about a binary file.
+/// Error for a binary file.
 pub(super) fn binary(path: &Path) -> Box<Diagnostic> {
     Diagnostic::error(
         path,
@@ -66,7 +66,7 @@ pub(super) fn binary(path: &Path) -> Box<Diagnostic> {
     )
 }
 
-/// The error about a mesh given in place of a scene.
+/// Error for a mesh passed instead of a scene.
 fn mesh(path: &Path) -> Box<Diagnostic> {
     let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
     let help = format!(
@@ -76,7 +76,7 @@ fn mesh(path: &Path) -> Box<Diagnostic> {
     Diagnostic::error(path, MESH_NOT_SCENE.to_owned(), Some(help), None)
 }
 
-/// The key `file` of `[[mesh]]`, as shown in help texts.
+/// The key `file` of a `[[mesh]]` as shown in help texts.
 fn mesh_file_key(name: &str) -> String {
     format!("`file = \"{name}\"`")
 }
@@ -92,13 +92,13 @@ const UNSUPPORTED_MODELS: [&str; 22] = [
     "step", "stp", "usd", "usda", "usdc", "usdz", "wrl", "x3d",
 ];
 
-/// Whether a readable file has the extension of an unsupported model and does not contain a scene.
+/// Whether a readable file has an unsupported model format's extension and does not contain a scene.
 fn is_unsupported_model(path: &Path) -> bool {
     let ending = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
     UNSUPPORTED_MODELS.contains(&ending.as_str()) && lacks_camera(path)
 }
 
-/// Whether the start of a file has no `[camera]` header. False for unreadable files.
+/// Whether there is no `[camera]` header near the start of a file. False for unreadable files.
 fn lacks_camera(path: &Path) -> bool {
     const START: u64 = 1 << 16;
     let start = || {
@@ -142,7 +142,7 @@ fn bytes(path: &Path) -> Result<Vec<u8>, Refusal> {
     Ok(bytes)
 }
 
-/// Number of syntax elements, which determine the memory of the parsed document.
+/// Number of syntax elements, which determines the memory used by the parsed document.
 fn parts(text: &[u8]) -> usize {
     text.iter().filter(|byte| b"[]{}=,\n".contains(byte)).count()
 }
@@ -180,7 +180,7 @@ fn unreadable(path: &Path, error: &io::Error) -> Refusal {
         let help = match (missing, near) {
             (Some(folder), _) => Some(format!("the folder {} does not exist", shown(folder))),
             (None, Some(near)) => Some(format!("did you mean {}?", shown(&near))),
-            // `glimt new` writes no models.
+            // `glimt new` does not write models.
             (None, None) if is_model => None,
             (None, None) => Some(NEW_SCENE_HELP.to_owned()),
         };
@@ -190,10 +190,10 @@ fn unreadable(path: &Path, error: &io::Error) -> Refusal {
     (format!("cannot read the scene file: {}", describe_error(error)), None)
 }
 
-/// Maximum number of files examined per folder.
+/// Maximum number of files to examine per folder.
 pub(super) const MAX_FOLDER_FILES: usize = 2_000;
 
-/// The file with the most similar name in the folder of a missing file, among those that `may_be_meant` accepts.
+/// The file with the most similar name in a missing file's folder, among files accepted by `may_be_meant`.
 pub(super) fn neighbor(path: &Path, may_be_meant: impl Fn(&Path) -> bool) -> Option<PathBuf> {
     let parent = path.parent()?;
     let listed = if parent.as_os_str().is_empty() { Path::new(".") } else { parent };
@@ -208,7 +208,7 @@ pub(super) fn neighbor(path: &Path, may_be_meant: impl Fn(&Path) -> bool) -> Opt
     Some(parent.join(near))
 }
 
-/// Another file with the same text in the folder of a missing scene file, which was probably renamed.
+/// A file with the same text in a missing scene's folder. The scene was probably renamed.
 pub fn same_text_beside(path: &Path, text: &str) -> Option<PathBuf> {
     let parent = path.parent()?;
     let listed = if parent.as_os_str().is_empty() { Path::new(".") } else { parent };
@@ -219,7 +219,7 @@ pub fn same_text_beside(path: &Path, text: &str) -> Option<PathBuf> {
     };
     let names = folder::names(listed).ok()?.take(MAX_FOLDER_FILES);
     let named = |name| parent.join::<std::ffi::OsString>(name);
-    // Folder order depends on the file system, so take the first by name.
+    // The order of files depends on the file system. Take the first by name.
     names.map(named).filter(|file| file != path && has_text(file)).min()
 }
 
@@ -257,7 +257,7 @@ mod tests {
         write("third", "a = 1\n");
         assert_eq!(found(), Some(file("third")));
         write("second.toml", "a = 1\n");
-        assert_eq!(found(), Some(file("second.toml")), "the first by name");
+        assert_eq!(found(), Some(file("second.toml")), "expected the first file by name");
     }
 
     #[test]

@@ -1,7 +1,8 @@
-//! Formats diagnostics as text: `file:line:column`, the source line with the span underlined, and the help.
+//! Formats diagnostics as text: `file:line:column`, the source line with the span underlined, and the help
+//! text.
 //!
-//! Text from files passes through [`visible`], so the only control characters in the output are the report's own line ends
-//! and, with [`Style::Ansi`], its own colors.
+//! Text from files is sanitized with [`visible`]. The only control characters in the output are line breaks
+//! and, with [`Style::Ansi`], color escape sequences.
 
 mod lines;
 
@@ -17,7 +18,7 @@ use super::sanitize::visible;
 
 pub use lines::{Piece, ReportLine, Role, lines};
 
-/// Whether a report is colored.
+/// Report style.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Style {
     /// Plain text.
@@ -26,8 +27,8 @@ pub enum Style {
     Ansi,
 }
 
-/// Formats diagnostics in order of file and position, with a summary line. Empty if there are none. Messages are wrapped at
-/// `width` columns, and source lines are cut.
+/// Formats diagnostics, sorted by file and position, with a summary line. Empty if there are no diagnostics.
+/// Wraps messages at `width` columns and cuts source lines.
 pub fn render(diagnostics: &[Diagnostic], width: usize, style: Style) -> String {
     let renderer = match style {
         Style::Plain => Renderer::plain(),
@@ -48,7 +49,7 @@ pub fn summary(diagnostics: &[Diagnostic]) -> String {
     parts.into_iter().flatten().collect::<Vec<_>>().join(", ")
 }
 
-/// Converts offsets to lines and columns, caching the line index of the last text.
+/// Converts offsets to lines and columns. Caches the line index of the last text.
 #[derive(Default)]
 pub struct Locator(Option<(Arc<str>, LineIndex)>);
 
@@ -65,7 +66,7 @@ impl Locator {
     }
 }
 
-/// Line and column of a byte offset, both from 1. Columns count characters.
+/// 1-based line and column of a byte offset. Columns count characters.
 pub fn line_and_column(source: &str, offset: usize) -> (usize, usize) {
     LineIndex::new(source).locate(source, offset)
 }
@@ -88,7 +89,7 @@ fn render_with(diagnostics: &[Diagnostic], width: usize, renderer: &Renderer) ->
     text
 }
 
-/// Minimum width of a report, even in narrower terminals.
+/// Minimum report width, even if the terminal is narrower.
 const MIN_WIDTH: usize = 30;
 
 fn render_one(diagnostic: &Diagnostic, width: usize, renderer: &Renderer, index: &mut Locator) -> String {
@@ -108,14 +109,14 @@ fn render_one(diagnostic: &Diagnostic, width: usize, renderer: &Renderer, index:
         let excerpt = Excerpt::new(source, whole, &place.span);
         let label = visible(&place.label);
         let fits = excerpt.label_column(line) + columns(&label) <= width;
-        // The renderer does not wrap labels, so show a long one as a note.
+        // The renderer does not wrap labels, so show a long label as a note.
         note = (!fits && !label.is_empty()).then_some(place.label.as_str());
         let label = (fits && !label.is_empty()).then(|| label.into_owned());
         let annotation = AnnotationKind::Primary.span(excerpt.span).label(label);
         snippet = Some(Snippet::source(excerpt.text).line_start(line).annotation(annotation));
     }
     let title = level.primary_title(wrapped(&diagnostic.message, width.saturating_sub("warning: ".len())));
-    // Errors in the command line have no file.
+    // Errors in command-line arguments have no file.
     let has_origin = !path.is_empty();
     let mut group: Group<'_> = if has_origin { title.element(origin) } else { Group::with_title(title) };
     if let Some(snippet) = snippet {
@@ -131,7 +132,7 @@ fn render_one(diagnostic: &Diagnostic, width: usize, renderer: &Renderer, index:
     if has_origin { rendered } else { without_lines(&rendered, "|") }
 }
 
-/// A rendered line without colors and surrounding white space.
+/// A rendered line without colors and surrounding whitespace.
 fn bare(line: &str) -> String {
     let parts = line.split("\u{1b}[").enumerate().map(|(number, part)| match part.split_once('m') {
         Some((_, text)) if number > 0 => text,
@@ -145,20 +146,20 @@ fn without_lines(rendered: &str, text: &str) -> String {
     rendered.split_inclusive('\n').filter(|line| bare(line) != text).collect()
 }
 
-/// Removes the line `:::`, which the renderer adds before a snippet whose origin it has already shown.
+/// Removes the line `:::`, which the renderer inserts before a snippet if the origin is shown above.
 fn without_second_origin(rendered: &str) -> String {
     let Some(second) = rendered.lines().find(|line| bare(line) == ":::") else { return rendered.to_owned() };
     rendered.replacen(&format!("{second}\n"), "", 1)
 }
 
-/// A source line that is safe to display, with the underlined span.
+/// A source line that is safe to display, and the underlined span.
 struct Excerpt {
     text: String,
     span: Range<usize>,
 }
 
 impl Excerpt {
-    /// Bytes of a long line kept on each side of the span.
+    /// Number of bytes of a long line to keep on each side of the span.
     const NEAR_BYTES: usize = 1_000;
 
     fn new(source: &str, line: Range<usize>, place: &Range<usize>) -> Self {
@@ -173,14 +174,15 @@ impl Excerpt {
         Self { span: from..from + inside.len(), text: format!("{before}{inside}{after}") }
     }
 
-    /// The column where the label starts: after the line number, ` | `, the text before the span, the carets and a space.
+    /// The column where the label starts, after the line number, ` | `, the text before the span, the carets
+    /// and a space.
     fn label_column(&self, line: usize) -> usize {
         let frame = line.to_string().len() + " | ".len();
         frame + columns(&self.text[..self.span.start]) + columns(&self.text[self.span.clone()]).max(1) + 1
     }
 }
 
-/// Display width of a text.
+/// Display width of a string.
 fn columns(text: &str) -> usize {
     unicode_width::UnicodeWidthStr::width(text)
 }
@@ -193,7 +195,7 @@ fn floor_char(source: &str, offset: usize) -> usize {
     offset
 }
 
-/// Byte offsets of the line starts of a text.
+/// Byte offsets of the start of each line.
 pub(crate) struct LineIndex {
     starts: Vec<usize>,
 }
@@ -204,12 +206,12 @@ impl LineIndex {
         Self { starts: std::iter::once(0).chain(after).collect() }
     }
 
-    /// The line of a byte offset, from 1.
+    /// The 1-based line of a byte offset.
     pub(super) fn line(&self, offset: usize) -> usize {
         self.starts.partition_point(|start| *start <= offset)
     }
 
-    /// Line and column, from 1. A byte order mark is not counted.
+    /// 1-based line and column. Does not count a byte order mark.
     pub(super) fn locate(&self, source: &str, offset: usize) -> (usize, usize) {
         let offset = floor_char(source, offset);
         let line = self.line(offset);
@@ -218,7 +220,7 @@ impl LineIndex {
         (line, before.chars().count() + 1)
     }
 
-    /// Byte range of line `line` (from 0), without its line end and byte order mark.
+    /// Byte range of line `line` (0-based), without line ending and byte order mark.
     pub(super) fn span(&self, line: usize, source: &str) -> Option<Range<usize>> {
         let start = *self.starts.get(line)?;
         let end = self.starts.get(line + 1).map_or(source.len(), |next| next - 1);
@@ -228,7 +230,7 @@ impl LineIndex {
     }
 }
 
-/// Makes a text safe to display and wraps it between words at `width` characters.
+/// Makes text safe to display, and wraps it between words at `width` characters.
 fn wrapped(text: &str, width: usize) -> Cow<'static, str> {
     let text = visible(text);
     let mut lines = String::with_capacity(text.len());

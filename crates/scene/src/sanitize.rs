@@ -1,12 +1,13 @@
-//! Makes text from files safe to display: no control characters, invisible characters or bidirectional overrides.
+//! Makes text from files safe to display: replaces control characters, invisible characters and bidirectional
+//! overrides.
 
 use std::borrow::Cow;
 
 use crate::system::text::is_plain;
 
-/// Replaces control and invisible characters by visible ones: control pictures such as `␛` for ESC and `␊` for a line feed,
-/// four spaces for a tab, and escapes such as `\u{202e}` for C1 controls, directional marks and zero-width characters. The
-/// result is one line.
+/// Replaces control and invisible characters with visible characters: control pictures such as `␛` for ESC
+/// and `␊` for a line feed, four spaces for a tab, and escapes such as `\u{202e}` for C1 controls,
+/// directional marks and zero-width characters. The result is a single line.
 pub fn visible(text: &str) -> Cow<'_, str> {
     if text.chars().all(is_plain) {
         return Cow::Borrowed(text);
@@ -24,7 +25,7 @@ pub fn visible(text: &str) -> Cow<'_, str> {
     Cow::Owned(shown)
 }
 
-/// [`visible`] text truncated to `limit` characters, with a final `…` if something was cut.
+/// [`visible`] text truncated to `limit` characters, ending with `…` if truncated.
 pub fn shortened(text: &str, limit: usize) -> String {
     let shown = visible(text);
     if shown.chars().count() <= limit {

@@ -1,4 +1,4 @@
-//! Tests of `--set`.
+//! Tests for `--set`.
 
 use std::path::Path;
 
@@ -23,7 +23,7 @@ const BALLS: &str = "[render]\nsamples = 4
 [[sphere]]\ncenter=[2,0,0]\nradius=3\nmaterial='wall'\nname='big ball'";
 
 #[test]
-fn set_equals_the_same_value_in_the_file() {
+fn set_is_equivalent_to_a_value_in_the_file() {
     let cases: [(&[&str], &str, &str); 11] = [
         (&["render.samples=3"], "samples = 4", "samples = 3"),
         (&["render.width=7"], "samples = 4", "samples = 4\nwidth = 7"),
@@ -88,7 +88,7 @@ fn mistakes_in_set_are_reported() {
 }
 
 #[test]
-fn unclosed_brackets_in_the_file_spare_set() {
+fn unclosed_brackets_do_not_affect_set() {
     let source = SceneText::with_sets("[render]\nsamples = [1,".into(), &["render.width=3".to_owned()])
         .expect("a text");
     let outcome = document::lower(&source, Path::new("scene.toml"));
@@ -100,7 +100,7 @@ fn unclosed_brackets_in_the_file_spare_set() {
 }
 
 #[test]
-fn a_set_position_replaces_the_orbiter_file() {
+fn position_and_look_at_override_the_orbiter() {
     let camera = |sets: &[&str]| {
         let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
         let source =
@@ -110,7 +110,7 @@ fn a_set_position_replaces_the_orbiter_file() {
     let place = ["camera.position=[1,2,3]", "camera.look_at=[0,0,0]"];
     let Some(Camera::LookAt { position, fov, focus, .. }) = camera(&[place[0], place[1], "camera.fov=30"])
     else {
-        panic!("the call says where the camera is")
+        panic!("expected a camera defined by vectors")
     };
     assert_eq!((position, fov, focus), (crate::math::DVec3::new(1.0, 2.0, 3.0), 30.0, 2.0));
     let orbiter = "camera.orbiter=b.txt";

@@ -1,4 +1,4 @@
-//! The text of a scene: the file followed by the `--set` values, so that every span indexes one text.
+//! Source text of a scene: the file followed by the `--set` values. All spans index into this text.
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -10,18 +10,18 @@ use super::toml::is_key_value;
 /// File name shown in diagnostics about `--set` values.
 const SET_OPTION: &str = "--set";
 
-/// The text of a scene file and the `--set` values.
+/// The text of a scene file, and the `--set` values.
 #[derive(Clone, Debug)]
 pub struct SceneText {
     all: Arc<str>,
-    /// Length of the file's text in `all`.
+    /// Length of the file's text, the first part of `all`.
     file: usize,
     sets: Vec<Set>,
-    /// Whether the text was generated for a model, so its lines are in no file.
+    /// Whether the text was generated for a model and therefore is not in a file.
     is_generated: bool,
 }
 
-/// A `--set` value: its span in the whole text, and its own text for diagnostics.
+/// A `--set` value: its span in the whole text, and the value alone for diagnostics.
 #[derive(Clone, Debug)]
 struct Set {
     span: Range<usize>,
@@ -34,11 +34,11 @@ impl SceneText {
         Self { file: text.len(), all: text, sets: Vec::new(), is_generated: false }
     }
 
-    /// The text of a file with `--set` values of the form `TABLE.KEY=VALUE`. A value that is neither TOML nor a number becomes
-    /// a string.
+    /// The text of a file with `--set` values of the form `TABLE.KEY=VALUE`. Values that are neither TOML nor
+    /// numbers become strings.
     ///
     /// # Errors
-    /// One error for each malformed value.
+    /// One error per malformed value.
     pub fn with_sets(file: Arc<str>, sets: &[String]) -> Result<Self, Vec<Diagnostic>> {
         if sets.is_empty() {
             return Ok(Self::file(file));
@@ -61,17 +61,17 @@ impl SceneText {
         }
     }
 
-    /// The text of the file and the `--set` values.
+    /// The file's text followed by the `--set` values.
     pub(super) fn all(&self) -> &Arc<str> {
         &self.all
     }
 
-    /// The text of the file.
+    /// The file's text.
     pub fn text(&self) -> &str {
         self.all.get(..self.file).unwrap_or_default()
     }
 
-    /// [`Self::text`] as an `Arc`. Copied only if there are `--set` values.
+    /// [`Self::text`] as an `Arc`. Only copies the text if there are `--set` values.
     pub fn shared_text(&self) -> Arc<str> {
         if self.sets.is_empty() { Arc::clone(&self.all) } else { self.text().into() }
     }
@@ -81,7 +81,7 @@ impl SceneText {
         self.sets.iter().map(|set| set.span.start)
     }
 
-    /// Whether a span is in a `--set` value instead of the file.
+    /// Whether a span is in a `--set` value rather than in the file.
     pub(super) fn is_set(&self, span: &Range<usize>) -> bool {
         span.start >= self.file
     }
@@ -91,7 +91,7 @@ impl SceneText {
         Self { is_generated: true, ..self }
     }
 
-    /// Resolves a span to the file at `path` or to a `--set` value. The span is `None` in a generated text.
+    /// Resolves a span to the file at `path` or to a `--set` value. Returns no span for generated text.
     pub(super) fn place(
         &self,
         path: &Path,
@@ -112,9 +112,10 @@ impl SceneText {
     }
 }
 
-/// Converts `TABLE.KEY=VALUE` to TOML, quoting the value if necessary. `None` without `=` or a key in a table.
+/// Converts `TABLE.KEY=VALUE` to TOML, and quotes the value if necessary. `None` if the `=`, the table or the
+/// key is missing.
 fn key_value(set: &str) -> Option<String> {
-    // Quoted keys may contain `=`, so try each one.
+    // Quoted keys may contain `=`, so try each `=`.
     const MAX_EQUALS_SIGNS: usize = 8;
     set.match_indices('=').take(MAX_EQUALS_SIGNS).find_map(|(at, _)| {
         let (key, value) = (set[..at].trim(), set[at + 1..].trim());
@@ -124,7 +125,7 @@ fn key_value(set: &str) -> Option<String> {
     })
 }
 
-/// Completes numbers such as `.5` and `5.`, which TOML does not accept.
+/// Completes numbers such as `.5` and `5.`, which are invalid in TOML.
 fn number(text: &str) -> Option<String> {
     let number: f64 = text.parse().ok().filter(|number: &f64| number.is_finite())?;
     text.contains('.').then(|| format!("{number:?}"))
@@ -144,7 +145,7 @@ pub fn quoted(text: &str) -> String {
     quoted
 }
 
-/// Message for a malformed `--set` value.
+/// Error message for a malformed `--set` value.
 pub(super) const MALFORMED_SET: &str = "malformed value";
 /// Hint for a `--set` value without `=`.
 pub(super) const MISSING_EQUALS_HELP: &str = "add `=` between the key and its value, as in render.samples=3";

@@ -10,14 +10,14 @@ fn outcome(text: &str) -> Outcome {
     parse(text.into(), Path::new("scene.toml"))
 }
 
-/// Parses a text without errors after adding a camera.
+/// Adds a camera to `text` and parses it. Panics on errors.
 fn scene(text: &str) -> Scene {
     let outcome = outcome(&format!("{text}\n{CAMERA}"));
     let messages: Vec<&str> = outcome.diagnostics.iter().map(|one| one.message.as_str()).collect();
     outcome.scene.unwrap_or_else(|| panic!("{messages:?}"))
 }
 
-/// Messages for a text after adding a camera.
+/// Adds a camera to `text` and returns the messages.
 fn messages(text: &str) -> Vec<String> {
     outcome(&format!("{text}\n{CAMERA}")).diagnostics.into_iter().map(|one| one.message).collect()
 }
@@ -183,7 +183,7 @@ fn orbiter_replaces_position_and_look_at() {
 }
 
 #[test]
-fn warns_only_of_dark_scenes_and_energy_gain() {
+fn warnings_are_only_about_darkness_and_energy_gain() {
     let sphere = "[[sphere]]\ncenter=[0,0,0]\nradius=1\nmaterial='m'\n";
     let dark = UNLIT_SCENE;
     assert_eq!(messages(&format!("[materials.m]\n{sphere}")), [dark]);
@@ -215,7 +215,7 @@ fn finite_shapes_may_be_area_lights() {
 }
 
 #[test]
-fn degenerate_edges_are_reported_in_place() {
+fn degenerate_edges_are_reported_at_their_value() {
     let place = |text: &str| {
         let outcome = outcome(&format!("[materials.m]\n{text}\nmaterial='m'\n{CAMERA}"));
         let [error] = outcome.diagnostics.try_into().expect("one error");
@@ -273,7 +273,7 @@ mod properties {
     use super::*;
     use proptest::prelude::*;
 
-    /// Checks that every span is inside its text and every report is safe to print.
+    /// Checks that every span is within its text and that every report is safe to print.
     fn check(diagnostics: &[Diagnostic]) {
         for place in diagnostics.iter().filter_map(|one| one.place.as_ref()) {
             assert!(place.source.get(place.span.clone()).is_some(), "{:?}", place.span);
@@ -285,7 +285,7 @@ mod properties {
         assert!(pieces.iter().flatten().all(|piece| !piece.text.contains(char::is_control)));
     }
 
-    /// Fragments of broken TOML.
+    /// Fragments of invalid TOML.
     fn fragment() -> impl Strategy<Value = String> {
         prop_oneof![
             "[\\[\\]{}=,.#\"'\\\\\n\t 0-9a-z_-]{0,6}",
@@ -375,7 +375,7 @@ fn objects_of_all_shapes_keep_file_order() {
     let disk = |n| format!("[[disk]]\nradius = {n}\nmaterial = 'a'\n");
     let mixed = [disk(1), cube(2), sphere(3), cube(4), sphere(5), disk(6)].concat();
     assert_eq!(radii(&format!("[materials.a]\n{mixed}")), [1, 2, 3, 4, 5, 6]);
-    // Inline tables are ordered by their braces.
+    // Inline tables are sorted by the position of their braces.
     let inline = |kind: &str, a: u32, b: u32| {
         let [a, b] = [a, b].map(|n| format!("{{ center = [0, 0, 0], radius = {n}, material = 'a' }}"));
         format!("{kind} = [{a},\n{b}]\n")
@@ -412,7 +412,7 @@ fn colors_are_arrays_numbers_or_strings() {
         messages("[materials.a]\ntype = 'mirror'\nreflectance = 2"),
         ["`reflectance` must be between 0 and 1"]
     );
-    // A color name takes precedence over a texture of the same name.
+    // A color name takes precedence over a texture with the same name.
     assert!(
         messages("[textures.red]\nfile = 'none.png'\n[materials.a]\ndiffuse = 'red'")
             .iter()

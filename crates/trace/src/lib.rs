@@ -1,4 +1,4 @@
-//! The world that rays are traced against, and the integrators. See the crate `glimt` for an overview.
+//! The world against which rays are traced, and the integrators. See the `glimt` crate for an overview.
 //!
 //! | module | contents |
 //! | --- | --- |
@@ -8,12 +8,13 @@
 //! | `integrators/direct/` | light samples, shadow rays, lobe rays, MIS weights |
 //! | `integrators/photons/` | photon emission, maps, gathering |
 //!
-//! `world` depends on neither pixels nor render settings. The table in [`integrators`] lists the dependencies between its submodules.
+//! `world` does not depend on pixels or render settings. The table in [`integrators`] lists the dependencies
+//! between its submodules.
 
 pub mod integrators;
 pub mod world;
 
-// Modules of lower crates, under the names used throughout the workspace.
+// Modules from lower-level crates, under the names used throughout the workspace.
 use glimt_base::{choice, control, film, math, sampling};
 use glimt_files::assets;
 use glimt_kernel::{accel, geometry, lights, materials};

@@ -1,4 +1,4 @@
-//! Actions of keys.
+//! Key actions.
 
 /// An action that the user can trigger.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,5 +1,5 @@
-//! Camera movement with keys and the mouse. Coordinates are rounded to few digits, so the camera can be
-//! written into a scene exactly as shown.
+//! Camera movement with the keyboard and mouse. Coordinates are rounded to a few digits so that the displayed
+//! camera can be written to a scene file exactly.
 
 use crate::math::DVec3;
 use crate::math::decimal::{decimal_step, rounded};
@@ -10,7 +10,7 @@ use crate::scene::description::Pose;
 const POLE: f64 = 1.0;
 /// Range of the field of view, in degrees.
 const FIELD: (f64, f64) = (1.0, 160.0);
-/// Maximum ratio between the distance and the scene camera's distance, in both directions.
+/// Maximum factor by which the distance may be larger or smaller than the scene camera's.
 pub(super) const REACH: f64 = 1000.0;
 
 /// Orbits around `look_at` by `right` and `up` degrees.
@@ -19,7 +19,7 @@ pub(super) fn orbited(pose: &Pose, right: f64, up: f64) -> Pose {
     let arm = pose.position - pose.look_at;
     let distance = arm.length();
     let polar = libm::acos((arm.dot(axis) / distance).clamp(-1.0, 1.0)).to_degrees();
-    // A camera that starts near a pole may stay there.
+    // A camera that starts closer to a pole may stay there.
     let (least, most) = (POLE.min(polar), (180.0 - POLE).max(polar));
     let lifted = (polar - up).clamp(least, most);
     let level = (arm - axis * arm.dot(axis)).normalize_or(axis.any_orthonormal_vector());
@@ -29,8 +29,8 @@ pub(super) fn orbited(pose: &Pose, right: f64, up: f64) -> Pose {
     with_eye_at(pose, (level * sine + axis * cosine) * distance)
 }
 
-/// Moves the camera towards `look_at` or away from it, multiplying the distance by `factor` within [`REACH`]
-/// of the scene camera's distance `own`.
+/// Multiplies the distance to `look_at` by `factor`, limited to within a factor of [`REACH`] of `own`, the
+/// scene camera's distance.
 pub(super) fn dollied(pose: &Pose, factor: f64, own: f64) -> Pose {
     let arm = pose.position - pose.look_at;
     let distance = arm.length();
@@ -96,10 +96,10 @@ mod tests {
             assert_eq!(dollied(&pose, factor, 4.0), pose, "no further movement");
         }
         let far = Pose { position: DVec3::new(0.0, 1.0, 1e6), ..POSE };
-        assert_eq!(dollied(&far, 2.0, 4.0), far, "a farther camera is kept");
+        assert_eq!(dollied(&far, 2.0, 4.0), far, "a camera that starts farther away stays there");
         let view = Viewpoint { pose: POSE, fov: 40.0, aperture: 0.0, focus: 4.0 };
         assert_eq!(zoomed(&view, 1.1), 44.0);
         assert_eq!(zoomed(&view, 100.0), 160.0);
-        assert_eq!(zoomed(&Viewpoint { fov: 170.0, ..view }, 1.1), 170.0, "a wider field is kept");
+        assert_eq!(zoomed(&Viewpoint { fov: 170.0, ..view }, 1.1), 170.0, "a wider field of view is kept");
     }
 }

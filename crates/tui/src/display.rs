@@ -1,4 +1,4 @@
-//! Sends the target cells to the terminal, slice by slice as bandwidth permits.
+//! Sends the target cells to the terminal in slices, as bandwidth permits.
 
 use std::time::{Duration, Instant};
 
@@ -18,44 +18,45 @@ use super::window_title::WindowTitle;
 
 /// Query for synchronized output (mode 2026).
 pub(super) const SYNCHRONIZED: &[u8] = b"\x1b[?2026$p";
-/// Query for the primary device attributes (DA1), the last one of the first batch.
+/// Query for the primary device attributes (DA1), sent last in the first batch.
 pub(super) const ATTRIBUTES: &[u8] = b"\x1b[c";
 /// Request for a status report (DSR).
 pub(super) const STATUS: &[u8] = b"\x1b[5n";
 const BEGIN: &[u8] = b"\x1b[?2026h";
 const END: &[u8] = b"\x1b[?2026l";
-/// Smaller slices do not flicker.
+/// Slices smaller than this do not flicker.
 const LARGE: usize = 2_000;
 
-/// Properties of the terminal and the connection to it, from the environment.
+/// Properties of the terminal and its connection, from the environment.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct TerminalLink {
-    /// Runs inside tmux or screen, which answer queries themselves and delay drawing.
+    /// Whether glimt runs inside tmux or screen, which reply to queries themselves and delay drawing.
     pub(super) is_multiplexed: bool,
-    /// Runs inside tmux.
+    /// Whether glimt runs inside tmux.
     pub(super) is_in_tmux: bool,
-    /// Runs over a network connection.
+    /// Whether the terminal is reached over a network.
     pub(super) is_remote: bool,
-    /// Whether the terminal supports REP.
+    /// Whether the terminal supports REP (repeat character).
     pub(super) can_repeat: bool,
     /// Queries to send.
     pub(super) ask: TerminalQueries,
 }
 
 impl TerminalLink {
-    /// A connection of unknown speed. Replies of a local multiplexer say nothing about a network behind it.
+    /// Creates a connection of unknown speed. A local multiplexer's replies do not reflect the network behind
+    /// it.
     fn connection(self, now: Instant) -> Connection {
         Connection::new(self.is_multiplexed && self.is_remote, now)
     }
 }
 
-/// A nonblocking writer to the terminal.
+/// A nonblocking writer for terminal output.
 pub(super) type TerminalWriter = Box<dyn FnMut(Vec<u8>)>;
 
 /// The terminal's screen as the event loop sees it.
 pub(super) struct Display {
     painter: Painter,
-    /// The preview, if it is drawn as pixels.
+    /// The preview, if drawn as pixels.
     images: Option<Images>,
     connection: Connection,
     link: TerminalLink,
@@ -67,20 +68,20 @@ pub(super) struct Display {
     is_complete: bool,
     /// The current window title and the one sent last.
     window_titles: [WindowTitle; 2],
-    /// Notifications and clipboard texts to send.
+    /// Notifications and clipboard text to send.
     asides: Vec<u8>,
-    /// Bytes sent since the render of the newest preview began.
+    /// Bytes sent since the newest preview's render began.
     sent: usize,
     /// Whether a preview is being sent.
     is_picture_due: bool,
-    /// Cost of the last preview.
+    /// Cost of sending the last preview.
     report: Option<FrameReport>,
-    /// Whether `report` has been returned.
+    /// Whether the report on the last preview has been returned.
     is_reported: bool,
 }
 
 impl Display {
-    /// A display whose content is unknown.
+    /// Creates a display whose content is unknown.
     pub(super) fn new(
         depth: ColorDepth,
         link: TerminalLink,
@@ -107,7 +108,7 @@ impl Display {
         display
     }
 
-    /// Resets screen and connection after another program has used the terminal.
+    /// Resets the screen and connection after another program has used the terminal.
     pub(super) fn restart(&mut self, now: Instant) {
         self.invalidate();
         self.window_titles[1] = WindowTitle::default();
@@ -116,7 +117,7 @@ impl Display {
         self.send(questions, Some(QueryKind::Attributes), now);
     }
 
-    /// Marks the content of the screen as unknown.
+    /// Marks the screen content as unknown.
     pub(super) fn invalidate(&mut self) {
         self.painter.invalidate();
         if let Some(images) = &mut self.images {
@@ -138,14 +139,14 @@ impl Display {
         self.images.is_some()
     }
 
-    /// Places the preview in pixels. `None` if it is drawn with cells.
+    /// Places the preview in pixels. `None` if it is drawn using cells.
     pub(super) fn place(&mut self, wanted: Option<PixelPlacement>, is_still: bool) {
         if let Some(uncovered) = self.images.as_mut().and_then(|images| images.set_target(wanted, is_still)) {
             self.painter.damage(uncovered);
         }
     }
 
-    /// Sets a new target. `is_new` if it contains a new preview.
+    /// Sets a new target. `is_new` if the preview in it is new.
     pub(super) fn set_target(
         &mut self,
         wanted: &Buffer,
@@ -216,8 +217,8 @@ impl Display {
             self.send_slice(self.synchronized(cells), now);
             return true;
         }
-        // Not as synchronized output: kitty 0.26 loses chunks of an image there. The last chunk shows the
-        // image.
+        // Do not use synchronized output: kitty 0.26 loses image chunks in it. It is not needed, since an
+        // image appears only with its last chunk.
         let rate = self.connection.bytes_per_second();
         let pixels = self.images.as_mut().and_then(|images| images.slice(room, rate));
         match pixels {
@@ -227,7 +228,7 @@ impl Display {
         !self.is_complete
     }
 
-    /// Wraps a slice as synchronized output if it is large enough to flicker and the terminal supports it.
+    /// Wraps a slice in synchronized output if it is large enough to flicker and the terminal supports it.
     fn synchronized(&self, mut cells: Vec<u8>) -> Vec<u8> {
         if self.is_synchronized && !self.link.is_multiplexed && cells.len() >= LARGE {
             cells.splice(0..0, BEGIN.iter().copied());
@@ -258,7 +259,7 @@ impl Display {
         (self.out)(bytes);
     }
 
-    /// Handles a reply of the terminal.
+    /// Handles a terminal reply.
     pub(super) fn answered(&mut self, answer: TerminalReply, now: Instant) {
         match answer {
             TerminalReply::Ready => self.connection.answered(QueryKind::Status, now),
@@ -274,7 +275,7 @@ impl Display {
         }
     }
 
-    /// Records bytes that the system has accepted.
+    /// Records that the operating system has accepted bytes.
     pub(super) fn written(&mut self, bytes: usize) {
         self.connection.written(bytes);
     }
@@ -294,7 +295,7 @@ impl Display {
         self.is_complete && !self.connection.awaits_reply()
     }
 
-    /// Estimated bandwidth in bytes per second. `None` if it is too high to matter.
+    /// Estimated bandwidth in bytes per second. `None` if unknown or too high to matter.
     pub(super) fn bytes_per_second(&self) -> Option<f64> {
         self.connection.bytes_per_second()
     }
@@ -308,7 +309,8 @@ impl Display {
         }
     }
 
-    /// Returns the report on the last preview once, and again when the first round trip has been measured.
+    /// Returns the report on the last preview once, and a second time when the first round-trip time is
+    /// known.
     pub(super) fn take_report(&mut self) -> Option<FrameReport> {
         let report = self.report.as_mut()?;
         if report.round_trip.is_none() && self.connection.round_trip().is_some() {
@@ -318,7 +320,8 @@ impl Display {
         (!std::mem::replace(&mut self.is_reported, true)).then_some(*report)
     }
 
-    /// Time to wait for replies that would otherwise end up in the shell. `None` if none is due.
+    /// How long to wait for pending replies before exiting. Without waiting, they would end up in the shell.
+    /// `None` if no replies are pending.
     pub(super) fn reply_timeout(&self) -> Option<Duration> {
         const MIN: Duration = Duration::from_millis(200);
         const MAX: Duration = Duration::from_secs(1);
@@ -336,7 +339,7 @@ mod tests {
 
     use super::*;
 
-    /// A small update of a preview does not count as its size.
+    /// The size of a small update is added to the preview's size and does not replace it.
     #[test]
     fn report_counts_bytes_since_the_render_began() {
         let now = Instant::now();
@@ -373,6 +376,6 @@ mod tests {
         display.begin_count();
         buffer.content[9].set_fg(Color::Rgb(255, 255, 255));
         let (told, difference) = show(&mut display, &buffer);
-        assert_eq!(told, difference, "the next render");
+        assert_eq!(told, difference, "only the next render is counted");
     }
 }

@@ -13,7 +13,7 @@ use nix::unistd::Pid;
 use super::event::FilePosition;
 use super::signals;
 
-/// Editor to use if the environment names none.
+/// Editor used if the environment does not specify one.
 const DEFAULT: &str = "vi";
 
 /// The editor from the environment, as a shell command.
@@ -21,7 +21,7 @@ pub(super) fn name(variable: impl Fn(&str) -> Option<String>) -> String {
     editor(variable).0
 }
 
-/// The editor from the environment, as a shell command, and the variable that names it. `None` for the
+/// The editor from the environment, as a shell command, and the variable that specifies it. `None` for the
 /// default editor.
 pub fn editor(variable: impl Fn(&str) -> Option<String>) -> (String, Option<&'static str>) {
     let set = |name: &'static str| {
@@ -31,8 +31,8 @@ pub fn editor(variable: impl Fn(&str) -> Option<String>) -> (String, Option<&'st
     set("VISUAL").or_else(|| set("EDITOR")).unwrap_or_else(|| (DEFAULT.to_owned(), None))
 }
 
-/// Runs the editor at a position in a file until it exits. If the editor is stopped, this process stops as
-/// well until both are continued. Terminating signals are forwarded.
+/// Opens a file in the editor at the given position and waits for the editor to exit. If the editor is
+/// stopped, this process stops with it until both are continued. Terminating signals are forwarded.
 ///
 /// # Errors
 /// The editor could not be started or failed.
@@ -47,7 +47,7 @@ pub(super) fn run(editor: &str, place: &FilePosition) -> Result<(), String> {
     let end = wait(id);
     signals::set_child(None);
     match end {
-        // Signals from the keyboard are a normal way to end an editor.
+        // Signals from the keyboard are a normal way to quit an editor.
         Ok(WaitStatus::Exited(_, 0) | WaitStatus::Signaled(_, Signal::SIGINT | Signal::SIGQUIT, _)) => Ok(()),
         Ok(WaitStatus::Exited(_, 127)) => Err(format!("there is no editor `{editor}`: set VISUAL or EDITOR")),
         Ok(WaitStatus::Exited(_, code)) => Err(format!("the editor `{editor}` ended with code {code}")),
@@ -69,8 +69,8 @@ fn wait(id: Pid) -> Result<WaitStatus, Errno> {
     }
 }
 
-/// Command line for the shell. Simple commands replace the shell with `exec`, because a shell in between
-/// would intercept signals.
+/// Command line for the shell. Simple commands are run using `exec`, because a shell in between would
+/// intercept signals.
 fn line(editor: &str) -> String {
     let is_plain = |character: char| character.is_alphanumeric() || " -_./+,:@%".contains(character);
     let is_of_shell = ["command", "eval", "exec", "time", "."].contains(&program(editor));
@@ -78,10 +78,10 @@ fn line(editor: &str) -> String {
     format!("{exec}{editor} \"$@\"")
 }
 
-/// Arguments that open a position in a file.
+/// Arguments that open the file at a position.
 fn arguments(editor: &str, place: &FilePosition) -> Vec<OsString> {
     let FilePosition { path, line, column } = place;
-    // A name that starts with a dash is not an option.
+    // Prevents a file name with a leading dash from being parsed as an option.
     let path = if path.as_os_str().as_encoded_bytes().starts_with(b"-") {
         Path::new(".").join(path)
     } else {
@@ -107,7 +107,7 @@ fn arguments(editor: &str, place: &FilePosition) -> Vec<OsString> {
     }
 }
 
-/// File name of the editor's program.
+/// File name of the editor's executable.
 fn program(editor: &str) -> &str {
     let first = editor.split_whitespace().next().unwrap_or_default();
     Path::new(first).file_name().and_then(OsStr::to_str).unwrap_or(first)
@@ -118,7 +118,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn visual_is_preferred_to_editor() {
+    fn visual_takes_precedence_over_editor() {
         let of = |pairs: &[(&str, &str)]| {
             name(|name| pairs.iter().find(|(key, _)| *key == name).map(|(_, value)| (*value).to_owned()))
         };
@@ -133,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn only_simple_commands_replace_the_shell() {
+    fn only_simple_commands_use_exec() {
         assert_eq!(line("/usr/bin/nvim -u NONE"), "exec /usr/bin/nvim -u NONE \"$@\"");
         for editor in ["TERM=vt100 vi", "cd /; vi", "'my editor'", "vi #", "$HOME/vi", "command vi"] {
             assert_eq!(line(editor), format!("{editor} \"$@\""));

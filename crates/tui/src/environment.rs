@@ -1,4 +1,4 @@
-//! Detects the terminal and the connection to it from environment variables.
+//! Detects the terminal and its connection from environment variables.
 
 use super::color::{ColorChoice, ColorDepth};
 use super::display::TerminalLink;
@@ -9,7 +9,7 @@ use super::pixel_request::PixelRequest;
 use super::preview_kind::PreviewKind;
 use super::terminal_replies::TerminalQueries;
 
-/// The terminal and its connection, from environment variables.
+/// The terminal and its connection, as detected from environment variables.
 pub(super) fn terminal_link(variable: impl Fn(&str) -> Option<String>) -> TerminalLink {
     let is_set = |name: &str| variable(name).is_some_and(|value| !value.is_empty());
     let term = variable("TERM").unwrap_or_default();
@@ -25,14 +25,15 @@ pub(super) fn terminal_link(variable: impl Fn(&str) -> Option<String>) -> Termin
     }
 }
 
-/// Whether the terminal may print unknown sequences, as the Linux console and Apple's Terminal do.
+/// Whether the terminal may print escape sequences it does not know, like the Linux console and Apple's
+/// Terminal do.
 pub(super) fn is_plain(variable: impl Fn(&str) -> Option<String>) -> bool {
     let term = variable("TERM").unwrap_or_default();
     ["linux", "dumb", "vt"].iter().any(|name| term.starts_with(name))
         || variable("TERM_PROGRAM").is_some_and(|program| program == "Apple_Terminal")
 }
 
-/// The image protocol of a preview choice.
+/// The image protocol for a preview choice.
 fn protocol(preview: PreviewChoice) -> Option<Protocol> {
     match preview {
         PreviewChoice::Kitty => Some(Protocol::Kitty),
@@ -48,7 +49,8 @@ fn protocol(preview: PreviewChoice) -> Option<Protocol> {
     }
 }
 
-/// Queries to send. Multiplexers answer for themselves or not at all, and plain terminals may print queries.
+/// Queries to send. Most are not sent to multiplexers, which reply on their own behalf or not at all, or to
+/// plain terminals, which may print them as text.
 pub(super) fn ask(
     preview: PreviewChoice,
     color: ColorChoice,
@@ -92,7 +94,7 @@ mod tests {
     }
 
     #[test]
-    fn only_unknown_facts_are_queried() {
+    fn only_unknown_properties_are_queried() {
         let ask = |preview, color, depth, pairs: &[(&str, &str)]| {
             ask(preview, color, depth, |name| {
                 pairs.iter().find(|(key, _)| *key == name).map(|(_, value)| (*value).to_owned())

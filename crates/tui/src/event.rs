@@ -1,4 +1,4 @@
-//! Events and effects of the front end.
+//! Front-end events and effects.
 
 use std::io::ErrorKind;
 use std::path::PathBuf;
@@ -12,18 +12,18 @@ use super::terminal_replies::TerminalReply;
 use crate::film::Picture;
 use crate::pipeline::protocol::{self, PreviewSource, Section};
 
-/// An input of the front end.
+/// An input to the front end.
 #[derive(Clone, Debug)]
 pub(super) enum Event {
     /// A key press.
     Key(KeyPress),
     /// A mouse action.
     Mouse(Mouse),
-    /// Pasted text, whose content is ignored.
+    /// Pasted text. Its content is ignored.
     Paste,
     /// A reply or report from the terminal.
     TerminalReply(TerminalReply),
-    /// The system has accepted bytes for the terminal.
+    /// The operating system has accepted bytes for the terminal.
     Written { bytes: usize },
     /// Writing to the terminal failed.
     Unwritable(ErrorKind),
@@ -33,8 +33,8 @@ pub(super) enum Event {
     Resize(Window),
     /// A message from the worker. Previews arrive as [`Event::Picture`].
     Worker(protocol::Event),
-    /// A new preview. `range` is the range of values that it shows, if it was mapped to a range. `section` is
-    /// the part of the image that it shows pixel by pixel.
+    /// A new preview. `range` is the range of values it shows, if values were mapped to colors. `section` is
+    /// the part of the image it shows pixel by pixel.
     Picture {
         generation: u64,
         picture: Arc<Picture>,
@@ -45,13 +45,13 @@ pub(super) enum Event {
     },
     /// A file that the scene depends on was written.
     Changed(Changed),
-    /// Writing of the changed files has ended.
+    /// The changed files have been fully written.
     Settled,
-    /// An output file was changed by another program, or restored.
+    /// An output file was modified or restored by another program.
     Output(OutputChange),
     /// A signal or an equivalent event.
     Signal(Signal),
-    /// The first bytes of a preview of this request have been sent.
+    /// The first bytes of a preview for this request have been sent.
     Shown { generation: u64 },
     /// Time has passed.
     Tick,
@@ -59,14 +59,14 @@ pub(super) enum Event {
     NoShell,
     /// The editor has exited.
     Back,
-    /// The editor could not be run, with the reason.
+    /// The editor could not be run, for this reason.
     NoEditor(String),
     /// A source of events has ended.
     Lost(EventSource),
 }
 
 impl Event {
-    /// Wraps an event of the file watcher.
+    /// Wraps a file watcher event.
     pub(super) fn from_watcher(news: News) -> Self {
         match news {
             News::Changed(changed) => Self::Changed(changed),
@@ -110,25 +110,25 @@ pub(super) struct Mouse {
     pub row: u16,
 }
 
-/// Kinds of mouse events: the left button and the wheel.
+/// Kinds of mouse events, for the left button and the wheel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum MouseKind {
     Press,
-    /// Moved while the button is down.
+    /// Moved while the button was down.
     Drag,
     Release,
     WheelUp,
     WheelDown,
 }
 
-/// Size of the terminal's window.
+/// Terminal window size.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Window {
     pub columns: u16,
     pub rows: u16,
     /// Height of a cell divided by its width.
     pub cell_aspect: f32,
-    /// Size of a cell in pixels; a typical one if the terminal does not report it.
+    /// Cell size in pixels. A typical size if the terminal does not report it.
     pub cell_pixels: (u16, u16),
 }
 
@@ -139,7 +139,7 @@ pub(super) enum Signal {
     Terminate,
     /// SIGQUIT.
     Quit,
-    /// SIGHUP, or the terminal is gone.
+    /// SIGHUP, or the terminal was closed.
     Hangup,
     /// Another terminating signal, by number.
     Other(i32),
@@ -151,7 +151,7 @@ pub(super) enum Signal {
     Resize,
 }
 
-/// Sources of events that must not end.
+/// Event sources that must not end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum EventSource {
     Worker,
@@ -166,17 +166,17 @@ pub(super) enum Effect {
     Send(protocol::Command),
     /// Restore the terminal and exit.
     Quit(super::ExitStatus),
-    /// The worker has ended: restore the terminal and exit with an error.
+    /// The worker has ended. Restore the terminal and exit with an error.
     GiveUp,
-    /// Ctrl-z: stop the whole job.
+    /// Ctrl-z was pressed. Stop the whole job.
     StopJob,
-    /// SIGTSTP: restore the terminal and stop.
+    /// SIGTSTP was received. Restore the terminal and stop.
     Suspend,
-    /// SIGCONT: set up the terminal again and redraw everything.
+    /// SIGCONT was received. Set up the terminal again and redraw everything.
     Redraw,
     /// Enable or disable mouse reports.
     Mouse(bool),
-    /// Run the editor at this position.
+    /// Open the editor at this position.
     Edit(FilePosition),
     /// Query the window size.
     Measure,
@@ -205,12 +205,12 @@ pub(super) struct FrameReport {
     pub round_trip: Option<Duration>,
 }
 
-/// Why an image that should be on disk is not.
+/// Why an image was not written to disk.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct WriteFailure {
     pub why: String,
-    /// Generation of the request.
+    /// Generation of the request that failed.
     pub generation: u64,
-    /// Whether writing was refused for a reason listed among the errors and warnings.
+    /// Whether glimt refused to write the image, for a reason listed among the errors and warnings.
     pub is_refused: bool,
 }

@@ -8,7 +8,7 @@ use crate::pipeline::settings::{CameraChange, View};
 use crate::pipeline::words::seconds;
 use crate::scene::sanitize::visible;
 
-/// The written files with samples and times, and what happened afterwards.
+/// The written files with their samples and times, and what happened after they were written.
 pub(super) fn words(state: &State) -> String {
     match &state.saving.write_failed {
         Some(failed) => unwritten(state, failed),
@@ -17,7 +17,7 @@ pub(super) fn words(state: &State) -> String {
     }
 }
 
-/// Changes made with keys that are neither in the scene nor in an image, as command-line options.
+/// Changes made with keys that are saved in neither the scene nor an image, as command-line options.
 pub(super) fn not_kept(state: &State) -> Option<String> {
     let shown = state.request.toggles;
     let is_in_file = state.saving.written.iter().any(|written| written.shows == Some(shown));
@@ -29,7 +29,7 @@ pub(super) fn not_kept(state: &State) -> Option<String> {
     (!options.is_empty() && !is_in_file).then(|| format!("not kept: {}", options.join(" ")))
 }
 
-/// Names of the image's files. `None` until the scene has been read.
+/// File names of the image. `None` until the scene has been read.
 pub(super) fn image_name(state: &State) -> Option<String> {
     let outputs = &state.request.effective.as_ref()?.outputs;
     let names: Vec<_> = outputs.iter().map(|path| visible(&path.to_string_lossy()).into_owned()).collect();
@@ -51,10 +51,10 @@ fn unfinished(state: &State) -> String {
     }
 }
 
-/// Follows the written files if they do not show the last edit.
+/// Appended to the written files if the scene has been edited since.
 const OLDER_THAN_EDIT: &str = " (older than your last edit)";
-/// The render that followed the written files.
-const NEXT_RENDER: &str = "the render after it";
+/// The render started after the files were written.
+const NEXT_RENDER: &str = "the next render";
 
 /// What happened after the files were written.
 fn since(state: &State) -> String {
@@ -114,7 +114,7 @@ fn files(written: &[WrittenFile]) -> String {
     said.join("; ")
 }
 
-/// The image that is not on disk and why, then the other files of this and earlier images.
+/// The image that could not be written and why, followed by other files of this and earlier images.
 fn unwritten(state: &State, failed: &WriteFailure) -> String {
     let mut words = format!("not written: {}", visible(&failed.why));
     for written in &state.saving.written {
@@ -130,8 +130,8 @@ fn unwritten(state: &State, failed: &WriteFailure) -> String {
     words
 }
 
-/// Describes an image and its render time. If its samples were reused, this is the time when they were
-/// rendered.
+/// Describes an image and its render time. If its samples were reused, the time is that of the original
+/// render.
 pub(super) fn describe_image(report: &Report, shown: View) -> String {
     let image = &report.image;
     let time = seconds(report.seconds.max(image.render_seconds));
@@ -145,7 +145,7 @@ pub(super) fn describe_image(report: &Report, shown: View) -> String {
     format!("{view}{comma}{}×{}, {samples} samples, {time}", image.width, image.height)
 }
 
-/// The view, unless it is beauty.
+/// The name of the view, or nothing for the beauty view.
 pub(super) fn view(view: View) -> String {
     if view == View::Beauty { String::new() } else { format!("view {}", view.name()) }
 }
@@ -160,7 +160,7 @@ mod tests {
     use crate::scene::description::Camera;
     use crate::scene::diagnostic::Severity;
 
-    /// A modified report of a finished request.
+    /// Event for a finished request, with a modified report.
     fn done_with(generation: u64, change: impl FnOnce(&mut Report)) -> Event {
         let Event::Done { mut report, warnings, unchanged, .. } = done(generation, Vec::new(), false) else {
             panic!("a finished request")
@@ -170,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn write_during_a_newer_request_is_listed() {
+    fn file_written_during_newer_request_is_listed() {
         let mut ui = TestUi::new();
         ui.finish([200, 30, 30]);
         ui.press('r');
@@ -188,11 +188,11 @@ mod tests {
         ui.finish([30, 30, 200]);
         let made = "wrote big.png: 640×480, 64 samples, 1.93 s";
         assert_eq!(words(&ui.state), format!("{made}; {NEXT_RENDER} is not finished (50 %)"));
-        assert!(ui.text().contains(messages::NOT_SAVED), "the newest image: {}", ui.text());
+        assert!(ui.text().contains(messages::NOT_SAVED), "the newest image is not saved: {}", ui.text());
     }
 
     #[test]
-    fn time_is_that_of_the_written_image() {
+    fn time_is_the_written_images_render_time() {
         let mut ui = TestUi::new();
         let write = |ui: &mut TestUi, seconds: f64, rendered: f64| {
             let generation = ui.state.request.generation;
@@ -224,14 +224,14 @@ mod tests {
             report.stages[Stage::Render as usize].seconds = 0.4;
             (report.image.path, report.image.paths) = (None, Vec::new());
         }));
-        assert_eq!(words(&ui.state), own, "the file is unchanged");
+        assert_eq!(words(&ui.state), own, "the file was not written again");
         ui.press('w');
         ui.worker(Event::Written { generation, path: "a.png".into(), bytes: 1, is_own: false });
         assert_eq!(words(&ui.state), "wrote a.png: view normal, 640×480, 64 samples, 500 ms");
     }
 
     #[test]
-    fn shown_save_is_not_claimed_to_be_written() {
+    fn unwritten_edit_is_not_reported_as_written() {
         let made = "wrote a.png: 640×480, 64 samples, 1.93 s";
         for key in ['v', 'l'] {
             let mut ui = TestUi::new();
@@ -246,7 +246,7 @@ mod tests {
             let after = words(&ui.state);
             assert_eq!(after, format!("{made}{OLDER_THAN_EDIT}"), "{key}");
             assert_eq!(not_kept(&ui.state).is_some_and(|it| it.contains("camera.position")), key == 'l');
-            // A save without effect does not make it newer.
+            // Saving the file without changing the image does not make the image newer.
             ui.event(crate::event::Event::Changed(Changed { noticed: ui.now }));
             let generation = ui.state.request.generation;
             ui.worker(Event::Started { generation });
@@ -278,7 +278,7 @@ mod tests {
             ui.worker(finished(generation, Status::Skipped));
             assert!(words(&ui.state).starts_with(failed), "{key}");
         }
-        // Back at the scene's own image, once the disk has space or the image exists.
+        // Return to the scene's own image when the disk has space again or the image exists.
         ui.press('0');
         for status in [Status::Done, Status::Reused] {
             fail(&mut ui);
@@ -317,7 +317,7 @@ mod tests {
         ui.press('r');
         ui.worker(Event::Started { generation: 2 });
         ui.worker(done(2, Vec::new(), true));
-        assert_eq!(words(&ui.state), made, "nothing was rendered");
+        assert_eq!(words(&ui.state), made, "no new render was started");
         ui.press('r');
         ui.worker(Event::Started { generation: 3 });
         ui.worker(Event::Progress { generation: 3, progress: progress(0.5, None) });
@@ -357,7 +357,7 @@ mod tests {
         ui.press('w');
         let generation = ui.state.request.generation;
         ui.worker(Event::Written { generation, path: "a.png".into(), bytes: 1, is_own: false });
-        assert_eq!(not_kept(&ui.state), None, "the image shows them");
+        assert_eq!(not_kept(&ui.state), None, "the written image includes the changes");
         ui.key(crate::event::KeyPress::special(crossterm::event::KeyCode::Esc));
         ui.press('l');
         ui.finish([200, 30, 30]);
@@ -368,7 +368,7 @@ mod tests {
     }
 
     #[test]
-    fn options_replace_an_orbiter_camera() {
+    fn orbited_camera_is_listed_as_options() {
         let text = "[camera]\norbiter = 'a.txt'\naperture = 0.1\n";
         let mut ui = TestUi::new();
         ui.finish([200, 30, 30]);
@@ -386,7 +386,7 @@ mod tests {
     }
 
     #[test]
-    fn passing_the_own_image_keeps_it_finished() {
+    fn revisiting_own_image_keeps_it_finished() {
         let made = "wrote cornell.png: 640×480, 64 samples, 1.93 s";
         let mut ui = TestUi::new();
         ui.worker(Event::Started { generation: 1 });
@@ -394,13 +394,13 @@ mod tests {
         ui.finish([200, 30, 30]);
         ui.press('s');
         ui.finish([30, 200, 30]);
-        // The next key is pressed before the request ends.
+        // The next key is pressed before the request is done.
         ui.press('0');
         ui.worker(Event::Started { generation: ui.state.request.generation });
         assert_eq!(words(&ui.state), made);
         ui.press(']');
         assert_eq!(words(&ui.state), made);
-        // Samples of a new version of the image.
+        // Samples for a new version of the image.
         ui.press('0');
         let generation = ui.state.request.generation;
         ui.worker(Event::Started { generation });
@@ -411,7 +411,7 @@ mod tests {
     }
 
     #[test]
-    fn own_image_is_tracked_while_keys_change_it() {
+    fn own_image_state_survives_key_changes() {
         let mut ui = TestUi::new();
         let own = |ui: &mut TestUi, state| {
             let generation = ui.state.request.generation;
@@ -429,14 +429,14 @@ mod tests {
         let said = crate::view::status_line::not_saved(&ui.state);
         assert_eq!(said, [messages::NOT_SAVED.to_owned(), messages::own_unfinished("cornell.png", 10)]);
         assert!(ui.text().contains(messages::NOT_SAVED), "{}", ui.text());
-        // `w` writes the image that is shown.
+        // `w` writes the displayed image.
         ui.press('w');
         let generation = ui.state.request.generation;
         ui.worker(Event::Written { generation, path: "cornell.png".into(), bytes: 1, is_own: false });
         let made = "wrote cornell.png: 640×480, 64 samples, 1.93 s, with shadows hard";
         assert_eq!(words(&ui.state), made);
         assert!(ui.text().contains("→ cornell.png"), "{}", ui.text());
-        // Back at the scene's own image, the file does not show it yet.
+        // Back at the scene's own image, which has not been written yet.
         ui.press('0');
         ui.worker(Event::Started { generation: ui.state.request.generation });
         assert!(words(&ui.state).starts_with(&format!("{made}; {NEXT_RENDER}")));

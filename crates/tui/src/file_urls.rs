@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
 
-/// The base of relative paths, and the host name, since the terminal may run on another machine.
+/// The base directory for relative paths, and the host name, since the terminal may run on another machine.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct FileUrls {
     folder: PathBuf,
@@ -14,7 +14,7 @@ pub(super) struct FileUrls {
 impl FileUrls {
     /// URLs of files on this machine.
     pub(super) fn local() -> Self {
-        // Linux only: elsewhere the host name is left out.
+        // Linux only. On other systems the host name is omitted.
         let host = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
         Self { folder: std::env::current_dir().unwrap_or_default(), host: host.trim().to_owned() }
     }
@@ -36,7 +36,7 @@ fn percent_encode(bytes: &[u8]) -> String {
                 text.push(char::from(*byte));
             }
             other => {
-                // Writing to memory does not fail.
+                // Writing to a string cannot fail.
                 let _ = write!(text, "%{other:02X}");
             }
         }

@@ -1,4 +1,4 @@
-//! Scripted worker and UI without a terminal, for tests.
+//! A scripted worker and a UI without a terminal, for tests.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -57,14 +57,14 @@ pub(super) fn state_with(
     State::new(setup, Instant::now())
 }
 
-/// A user interface driven by a test instead of the event loop.
+/// A user interface driven by a test rather than the event loop.
 pub(super) struct TestUi {
     pub state: State,
     pub now: Instant,
 }
 
 impl TestUi {
-    /// A UI of 80×24 cells that has sent its first request.
+    /// An 80×24 UI that has sent its first request.
     pub(super) fn new() -> Self {
         Self::with(state(80, 24))
     }
@@ -134,7 +134,7 @@ impl TestUi {
         buffer
     }
 
-    /// The text on the screen, without half blocks and with single spaces.
+    /// The text on the screen, without half blocks and with runs of spaces collapsed.
     pub(super) fn words(&mut self) -> String {
         self.text().replace('▀', " ").split_whitespace().collect::<Vec<_>>().join(" ")
     }
@@ -144,14 +144,14 @@ impl TestUi {
     }
 }
 
-/// The rows of a buffer as text.
+/// A buffer's rows as text.
 pub(super) fn text(buffer: &Buffer) -> String {
     let width = usize::from(buffer.area.width).max(1);
     let rows = buffer.content.chunks(width);
     rows.map(|row| row.iter().map(|cell| cell.symbol()).collect::<String>() + "\n").collect()
 }
 
-/// The render request among the effects.
+/// The render request in a list of effects.
 pub(super) fn request(effects: &[Effect]) -> Option<&Request> {
     effects.iter().find_map(|effect| match effect {
         Effect::Send(Command::Render(request)) => Some(&**request),
@@ -183,12 +183,12 @@ pub(super) fn settings() -> Effective {
     }
 }
 
-/// Settings of the scene file.
+/// The scene file's settings.
 pub(super) fn own() -> OwnSettings {
     OwnSettings { integrator: Integrator::Whitted, shadows: Shadows::Soft, photons: false }
 }
 
-/// A camera at (0, 1, 4) that looks along −z at a point at distance 4.
+/// A camera at (0, 1, 4) that looks along −z at a point 4 units away.
 pub(super) fn camera() -> Viewpoint {
     let pose = Pose { position: DVec3::new(0.0, 1.0, 4.0), look_at: DVec3::Y, up: DVec3::Y };
     Viewpoint { pose, fov: 40.0, aperture: 0.1, focus: 4.0 }
@@ -250,7 +250,7 @@ pub(super) fn done(generation: u64, warnings: Vec<Diagnostic>, unchanged: bool) 
     protocol::Event::Done { generation, report: Box::new(report), warnings, unchanged }
 }
 
-/// A diagnostic on the third line of a scene.
+/// A diagnostic for the third line of a scene.
 pub(super) fn diagnostic(severity: Severity, message: &str) -> Diagnostic {
     let source: Arc<str> = Arc::from("[render]\nwidth = 4\nheigth = 4\n");
     Diagnostic {

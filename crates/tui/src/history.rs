@@ -1,4 +1,4 @@
-//! History of recent renders, bounded in memory.
+//! History of recent renders, with bounded memory.
 
 use std::cell::OnceCell;
 use std::collections::{HashMap, VecDeque};
@@ -11,92 +11,93 @@ use crate::pipeline::protocol::{PreviewSource, Section};
 use crate::rescale::resized;
 use crate::state::ImageOrigin;
 
-/// Maximum memory of all images and scene texts.
+/// Memory limit for all images and scene texts, in bytes.
 const MAX_BYTES: usize = 16 << 20;
-/// Maximum width and height of a thumbnail, as fine as octants can show.
+/// Maximum width and height of a thumbnail: the finest resolution that octants can show.
 const SMALL: f32 = 32.0;
 
-/// An image and the request that it shows.
+/// An image and the request it shows.
 #[derive(Clone, Debug)]
 pub(crate) struct ShownImage {
     pub generation: u64,
     pub picture: Arc<Picture>,
-    /// Range of values of the view, if the image was mapped to a range.
+    /// Range of values shown, if the view maps values to colors.
     pub range: Option<[f32; 2]>,
-    /// The section of the image that is shown pixel by pixel. `None` if the whole image is shown.
+    /// The image section shown pixel by pixel. `None` if the whole image is shown.
     pub section: Option<Section>,
-    /// Whether it lacks light from photons that are still being traced.
+    /// Whether light from photons that are still being traced is missing.
     pub lacks_photons: bool,
     /// The image that the preview belongs to. `None` if unknown.
     pub source: Option<PreviewSource>,
 }
 
 impl ShownImage {
-    /// Whether both show the same image, regardless of their samples and size.
+    /// Whether both show the same image, regardless of sample count and size.
     pub(crate) fn shows_same_image(&self, other: &Self) -> bool {
         let images = self.source.zip(other.source);
         images.is_some_and(|(own, other)| own.image == other.image)
     }
 
-    /// Whether it is known to have all samples of its image.
+    /// Whether the image is known to have all its samples.
     pub(crate) fn is_finished(&self) -> bool {
         self.source.is_some_and(|source| source.is_finished)
     }
 }
 
-/// The recent renders, and the one being looked at.
+/// Recent renders, and the one being viewed.
 #[derive(Debug, Default)]
 pub(super) struct History {
     /// Oldest first.
     past: VecDeque<HistoryEntry>,
-    /// Number of edits of the scene.
+    /// Number of scene edits.
     edits: u64,
-    /// The last edit whose scene was valid and may have changed the image.
+    /// The last edit that left the scene valid and may have changed the image.
     read_edits: u64,
-    /// Index of the older render being looked at, and the newest image.
+    /// Index of the older render being viewed, and the newest image.
     open: Option<(usize, ShownImage)>,
 }
 
 #[derive(Debug)]
 struct HistoryEntry {
     shown: ShownImage,
-    /// Time at which its render last improved it.
+    /// Time when the render last improved the image.
     time: Instant,
-    /// The last edit that it includes.
+    /// The last edit included in the image.
     edits: u64,
     origin: ImageOrigin,
-    /// Number of the completed render that finished it. `None` if none did.
+    /// Number of the render that finished the image. `None` if the image is unfinished.
     run: Option<u64>,
-    /// Changes since the previous entry: in files, then with keys. `None` for the first entry.
+    /// Changes since the previous entry: changes in files, then changes made with keys. `None` for the first
+    /// entry.
     changes: Option<[Vec<String>; 2]>,
-    /// Thumbnail for the history strip, made at first use.
+    /// Thumbnail for the history strip, created on first use.
     small: OnceCell<Picture>,
 }
 
 impl History {
-    /// Records an edit of the scene. New entries include it once the scene has been read.
+    /// Records a scene edit. New entries include the edit once the scene has been read.
     pub(super) fn edited(&mut self) {
         self.edits += 1;
     }
 
-    /// Records that the scene was read, so new entries include the last edit.
+    /// Records that the scene was read. New entries include the last edit.
     pub(super) fn read(&mut self) {
         self.read_edits = self.edits;
     }
 
-    /// Records that the scene is invalid after all: new entries still show the previous one.
+    /// Records that the scene turned out to be invalid. New entries still show the previous version.
     pub(super) fn broken(&mut self) {
         self.read_edits = self.past.back().map_or(self.read_edits, |newest| newest.edits);
     }
 
-    /// Changes in files between the render being looked at and the newest one.
+    /// Changes in files between the render being viewed and the newest one.
     pub(super) fn edits_since_open(&self) -> String {
         let open = self.open.as_ref().and_then(|(at, _)| self.past.get(*at));
         let edits = open.zip(self.past.back()).map(|(open, newest)| newest.origin.edits(&open.origin));
         edits.unwrap_or_default().join("; ")
     }
 
-    /// Why the render being looked at differs from the previous one, in one line.
+    /// Why the render being viewed differs from the previous one, in one line.
     pub(super) fn reason_of_open(&self) -> String {
         let Some((at, _)) = &self.open else { return String::new() };
         let Some(past) = self.past.get(*at) else { return String::new() };
@@ -108,8 +109,8 @@ impl History {
         past.marked(words)
     }
 
-    /// Records that the camera moved with keys since request `since` was written into the scene. This counts
-    /// as an edit that the entries since then include.
+    /// Records that the camera moved with keys since request `since` has been written to the scene. This
+    /// counts as an edit that is included in all entries since then.
     pub(super) fn kept_camera(&mut self, since: u64) {
         self.edits += 1;
         self.read_edits = self.edits;
@@ -118,15 +119,15 @@ impl History {
         }
     }
 
-    /// Transfers the entry of a request to the next one, which shows the same image differently.
+    /// Moves a request's entry to the next request, which shows the same image differently.
     pub(super) fn transfer_to_next(&mut self, generation: u64) {
         for past in self.past.iter_mut().filter(|past| past.shown.generation == generation) {
             past.shown.generation = generation + 1;
         }
     }
 
-    /// Adds an image. It replaces an earlier one of the same request, or the last entry if both show the same
-    /// image.
+    /// Adds an image. It replaces an earlier image of the same request, or the last entry if both show the
+    /// same image.
     pub(super) fn record(&mut self, shown: ShownImage, time: Instant, origin: ImageOrigin) {
         let known = self.past.iter().position(|past| past.shown.generation == shown.generation);
         let last = self.past.len().checked_sub(1);
@@ -135,10 +136,10 @@ impl History {
             Some(at) => {
                 let past = &self.past[at];
                 if known.is_none() {
-                    // The edits since then changed nothing visible.
+                    // Edits since then had no visible effect.
                     self.read_edits = past.edits;
                 }
-                // An image keeps its original origin.
+                // An image keeps its origin.
                 let is_same = known.is_none() || past.shown.shows_same_image(&shown);
                 let origin = if is_same { past.origin.for_same_image(origin) } else { origin };
                 self.replace(at, (shown, time), origin);
@@ -156,7 +157,7 @@ impl History {
         }
     }
 
-    /// Replaces the image of an entry with another one of its request or image.
+    /// Replaces an entry's image with a newer version.
     fn replace(&mut self, at: usize, (shown, time): (ShownImage, Instant), origin: ImageOrigin) {
         let Some(past) = self.past.get_mut(at) else { return };
         let is_other_picture = past.shown.picture != shown.picture;
@@ -189,7 +190,7 @@ impl History {
             (past.edits, past.run, past.origin) = (edits, run, origin);
         }
         self.read_edits = edits;
-        // The first entry stays the first.
+        // The first entry has no changes.
         if before == 0
             && let Some(past) = self.past.get_mut(0)
         {
@@ -207,7 +208,7 @@ impl History {
         }
     }
 
-    /// Drops the entry of a request unless it was finished.
+    /// Drops a request's unfinished entry.
     pub(super) fn drop_unfinished(&mut self, generation: u64) {
         let is_it = |past: &HistoryEntry| past.shown.generation == generation && past.run.is_none();
         if let Some(at) = self.past.iter().position(is_it) {
@@ -227,17 +228,17 @@ impl History {
         self.past.back().is_some_and(|newest| newest.shown.generation == generation)
     }
 
-    /// Whether the newest entry is not finished.
+    /// Whether the newest entry is unfinished.
     pub(super) fn awaits_run(&self) -> bool {
         self.past.back().is_some_and(|newest| newest.run.is_none())
     }
 
-    /// Number of the render that finished an entry. `None` if none did.
+    /// Number of the render that finished an entry. `None` if the entry is unfinished.
     pub(super) fn run(&self, at: usize) -> Option<u64> {
         self.past.get(at)?.run
     }
 
-    /// Memory of the images and scene texts. Entries of the same scene share its text.
+    /// Memory used by images and scene texts, in bytes. Entries with the same scene share its text.
     fn bytes(&self) -> usize {
         let pictures: usize = self.past.iter().map(HistoryEntry::bytes).sum();
         let texts = self.past.iter().filter_map(|past| past.origin.text.as_ref());
@@ -245,12 +246,12 @@ impl History {
         pictures + texts.values().sum::<usize>()
     }
 
-    /// Compares scene and settings of an entry with the previous one.
+    /// Compares an entry's scene and settings with those of the previous entry.
     fn compare(&mut self, at: usize) {
         let before = at.checked_sub(1).and_then(|before| self.past.get(before));
         let Some((before, past)) = before.zip(self.past.get(at)) else { return };
         let edits = past.origin.edits(&before.origin);
-        // If `c` wrote the camera, the change is listed as one of the scene's keys.
+        // If `c` wrote the camera to the scene, the change is listed as an edit, not as a camera movement.
         let is_written = edits.iter().any(|edit| edit.contains("camera."));
         let keys = past.origin.toggles.differences(&before.origin.toggles, is_written);
         if let Some(past) = self.past.get_mut(at) {
@@ -258,28 +259,28 @@ impl History {
         }
     }
 
-    /// Scene and settings of the older render being looked at. `None` for the newest one.
+    /// Scene and settings of the older render being viewed. `None` for the newest one.
     pub(super) fn origin_of_open(&self) -> Option<&ImageOrigin> {
         let (at, _) = self.open.as_ref()?;
         self.past.get(*at).map(|past| &past.origin)
     }
 
-    /// Whether the oldest render is being looked at.
+    /// Whether the oldest render is being viewed.
     pub(super) fn is_oldest_open(&self) -> bool {
         self.open.as_ref().is_some_and(|(at, _)| *at == 0)
     }
 
-    /// Whether an older render is being looked at.
+    /// Whether an older render is being viewed.
     pub(super) fn is_open(&self) -> bool {
         self.open.is_some()
     }
 
-    /// The newest image while an older one is being looked at.
+    /// The newest image, if an older one is being viewed.
     pub(super) fn newest(&self) -> Option<ShownImage> {
         self.open.as_ref().map(|(_, newest)| newest.clone())
     }
 
-    /// Stores a new image. Returns whether it stays hidden because an older one is being looked at.
+    /// Stores a new image. Returns whether it stays hidden because an older one is being viewed.
     pub(super) fn hides_newer(&mut self, shown: &ShownImage) -> bool {
         if let Some((_, newest)) = &mut self.open {
             *newest = shown.clone();
@@ -287,20 +288,20 @@ impl History {
         self.is_open()
     }
 
-    /// Moves back by `back` entries, or forward if negative.
+    /// Moves back by `back` entries, or forward if `back` is negative.
     pub(super) fn step(&mut self, back: isize, newest: ShownImage) -> Option<ShownImage> {
         let at = self.open.as_ref().map_or(self.past.len().checked_sub(1)?, |(at, _)| *at);
         let next = at.checked_add_signed(-back).filter(|next| *next < self.past.len())?;
         self.show_entry(next, newest)
     }
 
-    /// Whether moving back by `back` entries, or forward if negative, returns to the newest one.
+    /// Whether moving back by `back` entries, or forward if `back` is negative, reaches the newest one.
     pub(super) fn returns_to_newest(&self, back: isize) -> bool {
         let place = self.open.as_ref().and_then(|(at, _)| at.checked_add_signed(-back));
         place.is_some_and(|place| place + 1 >= self.past.len())
     }
 
-    /// Opens the last render before the last edit that changed the image.
+    /// Opens the last render that precedes the last edit to change the image.
     pub(super) fn open_before_edit(&mut self, newest: ShownImage) -> Option<ShownImage> {
         let last = self.past.back()?.edits;
         let at = self.past.iter().rposition(|past| past.edits < last)?;
@@ -317,12 +318,12 @@ impl History {
         self.past.back().map(|newest| &newest.shown.picture)
     }
 
-    /// Index of the entry being looked at: the newest one unless an older one is open.
+    /// Index of the entry being viewed, which is the newest one unless an older one is open.
     pub(super) fn shown_index(&self) -> Option<usize> {
         self.open.as_ref().map(|(at, _)| *at).or_else(|| self.past.len().checked_sub(1))
     }
 
-    /// Thumbnail of an entry.
+    /// An entry's thumbnail.
     pub(super) fn thumbnail(&self, at: usize) -> Option<&Picture> {
         let past = self.past.get(at)?;
         Some(past.small.get_or_init(|| thumbnail(&past.shown.picture)))
@@ -333,8 +334,8 @@ impl History {
         self.past.get(at).is_some_and(|past| past.shown.generation == generation)
     }
 
-    /// Changes from the previous entry in words: edits first, then keys. An entry whose render is running is
-    /// not marked as unfinished.
+    /// Describes the changes since the previous entry: edits first, then keys. An entry still being rendered
+    /// is not marked as stopped.
     pub(super) fn changes(&self, at: usize, is_under_way: bool) -> Vec<String> {
         let Some(past) = self.past.get(at) else { return Vec::new() };
         let words = match past.changes.as_ref().map(|changes| changes.concat()) {
@@ -362,7 +363,7 @@ impl History {
         self.open.take().map(|(_, newest)| newest)
     }
 
-    /// Render number of the older entry being looked at, and the time at which its image last improved.
+    /// Render number of the older entry being viewed, and the time when its image last improved.
     pub(super) fn place(&self) -> Option<(Option<u64>, Instant)> {
         let (at, _) = self.open.as_ref()?;
         self.past.get(*at).map(|past| (past.run, past.time))
@@ -370,16 +371,16 @@ impl History {
 }
 
 impl HistoryEntry {
-    /// Whether another image is the same one. An image in progress differs from the finished one.
+    /// Whether the other image is the same. An image in progress differs from its finished version.
     fn is_same(&self, shown: &ShownImage, origin: &ImageOrigin) -> bool {
         let is_of_image =
             self.shown.shows_same_image(shown) && (self.origin.is_unfinished || !origin.is_unfinished);
-        // An unfinished image may look the same at first and then change.
+        // An unfinished image may look the same at first and change later.
         let may_change = origin.is_unfinished && !self.origin.is_unfinished;
         is_of_image || self.shown.picture == shown.picture && !may_change
     }
 
-    /// Adds a mark to `words` if the render was stopped.
+    /// Marks `words` if the render was stopped.
     fn marked(&self, words: String) -> String {
         if self.origin.is_unfinished { format!("{}: {words}", messages::STOPPED) } else { words }
     }
@@ -396,7 +397,7 @@ fn thumbnail(picture: &Picture) -> Picture {
     resized(picture, side(picture.width), side(picture.height))
 }
 
-/// Age in words.
+/// Formats an age.
 pub(super) fn age_in_words(time: Duration) -> String {
     match time.as_secs() {
         seconds @ ..120 => format!("{seconds} s ago"),
@@ -436,13 +437,13 @@ mod tests {
                 ImageOrigin::default(),
             );
         }
-        assert_eq!(history.past.len(), 5, "3 MB per image");
+        assert_eq!(history.past.len(), 5, "each image takes 3 MB");
         history.record(shown_image(10, 10_000), Instant::now(), ImageOrigin::default());
-        assert_eq!(history.past.len(), 1, "the last one is always kept");
+        assert_eq!(history.past.len(), 1, "the last image is always kept");
     }
 
     #[test]
-    fn shared_scene_texts_count_once() {
+    fn shared_scene_texts_are_counted_once() {
         let mut history = History::default();
         let shared: Arc<str> = "x".repeat(3 << 20).into();
         let mut record = |generation: u64, text: Arc<str>| {
@@ -467,7 +468,7 @@ mod tests {
         assert_eq!((history.past.len(), history.past[0].shown.generation), (1, 2));
     }
 
-    /// A render that continues an image starts with that image.
+    /// A render that resumes from an image initially shows the same image.
     #[test]
     fn unfinished_image_is_a_separate_entry() {
         let unfinished = ImageOrigin { is_unfinished: true, ..ImageOrigin::default() };
@@ -481,25 +482,25 @@ mod tests {
         let better = ShownImage { picture: plain_picture(10, 10, [1, 2, 4]), ..shown_image(2, 10) };
         history.record(better, Instant::now(), unfinished);
         assert_eq!(generations(&history), [1, 2]);
-        // The finished image may still be equal.
+        // The finished image may be identical.
         history.record(shown_image(2, 10), Instant::now(), ImageOrigin::default());
         assert_eq!(generations(&history), [2]);
     }
 
     #[test]
-    fn edits_without_effect_are_skipped() {
+    fn edits_without_visible_effect_are_skipped() {
         let mut history = History::default();
         history.record(shown_image(1, 10), Instant::now(), ImageOrigin::default());
         edit(&mut history);
         history.record(shown_image(2, 20), Instant::now(), ImageOrigin::default());
-        // The scene is broken, then fixed.
+        // The scene is broken and then fixed.
         edit(&mut history);
         history.broken();
         edit(&mut history);
         history.record(shown_image(4, 20), Instant::now(), ImageOrigin::default());
         let before = history.open_before_edit(shown_image(4, 20)).expect("a picture");
         assert_eq!(before.generation, 1);
-        // Images changed with keys include the same edit.
+        // Images changed with keys include the last edit.
         history.close();
         history.record(shown_image(5, 30), Instant::now(), ImageOrigin::default());
         let before = history.open_before_edit(shown_image(5, 30)).expect("a picture");
@@ -507,7 +508,7 @@ mod tests {
     }
 
     #[test]
-    fn broken_edits_are_not_looked_back_over() {
+    fn before_edit_ignores_broken_edits() {
         let mut history = History::default();
         history.record(shown_image(1, 10), Instant::now(), ImageOrigin::default());
         edit(&mut history);
@@ -518,17 +519,17 @@ mod tests {
         assert_eq!(history.open_before_edit(shown_image(3, 30)).expect("a picture").generation, 1);
     }
 
-    /// An image of which some or all samples are rendered.
+    /// An image with all or some of its samples.
     fn of_image(generation: u64, name: &str, is_finished: bool) -> (ShownImage, ImageOrigin) {
         let source = Some(PreviewSource { image: Fingerprint::new(name).finish(), is_finished });
-        // No two previews are identical.
+        // Make every preview different.
         let picture = plain_picture(10, 10, [generation as u8, u8::from(is_finished), 0]);
         let origin = ImageOrigin { is_unfinished: !is_finished, ..ImageOrigin::default() };
         (ShownImage { source, picture, ..shown_image(generation, 10) }, origin)
     }
 
     #[test]
-    fn interrupted_renders_share_an_entry() {
+    fn interrupted_renders_share_one_entry() {
         let mut history = History::default();
         let record = |history: &mut History, generation, name, is_finished| {
             let (shown, origin) = of_image(generation, name, is_finished);
@@ -536,15 +537,15 @@ mod tests {
             history.len()
         };
         assert_eq!(record(&mut history, 1, "first", true), 1);
-        // Edit a comment: same image.
+        // Editing a comment does not change the image.
         edit(&mut history);
         assert_eq!(record(&mut history, 2, "first", true), 1);
-        // Render again, interrupt with a typo, then finish with the existing samples.
+        // Render again, interrupt by introducing a typo, then finish with the existing samples.
         assert_eq!(record(&mut history, 3, "first", false), 2);
         assert_eq!(record(&mut history, 4, "first", false), 2);
         assert_eq!(record(&mut history, 5, "first", true), 1);
         assert_eq!(changes(&history), [messages::OPENED]);
-        // An edit discards the samples; the unfinished image is kept once.
+        // An edit discards the samples. The unfinished image is listed once.
         edit(&mut history);
         assert_eq!(record(&mut history, 6, "second", false), 2);
         assert_eq!(record(&mut history, 7, "second", false), 2);
@@ -555,7 +556,7 @@ mod tests {
     }
 
     #[test]
-    fn entries_have_the_number_of_their_render() {
+    fn entries_have_their_render_numbers() {
         let mut history = History::default();
         for (generation, run) in [(1, Some(1)), (2, None), (3, Some(2))] {
             let (shown, origin) = of_image(generation, &generation.to_string(), run.is_some());
@@ -564,7 +565,7 @@ mod tests {
             run.into_iter().for_each(|run| history.finish(run));
         }
         assert_eq!([0, 1, 2].map(|at| history.run(at)), [Some(1), None, Some(2)]);
-        // A later request finds the same image.
+        // A later request produces the same image.
         let (shown, origin) = of_image(4, "3", true);
         history.record(shown, Instant::now(), origin);
         assert!(!history.awaits_run());
@@ -578,18 +579,18 @@ mod tests {
     }
 
     #[test]
-    fn keeping_the_camera_counts_as_an_edit() {
+    fn saving_the_camera_counts_as_an_edit() {
         let mut history = History::default();
         history.record(shown_image(1, 10), Instant::now(), ImageOrigin::default());
         history.record(shown_image(2, 20), Instant::now(), ImageOrigin::default());
         history.record(shown_image(3, 30), Instant::now(), ImageOrigin::default());
         history.kept_camera(2);
         let before = history.open_before_edit(shown_image(3, 30)).expect("a picture");
-        assert_eq!(before.generation, 1, "the previous camera");
+        assert_eq!(before.generation, 1, "the image before the camera moved");
     }
 
     #[test]
-    fn one_request_has_one_entry() {
+    fn each_request_has_one_entry() {
         let mut history = History::default();
         history.record(shown_image(1, 10), Instant::now(), ImageOrigin::default());
         history.record(shown_image(1, 20), Instant::now(), ImageOrigin::default());
@@ -607,12 +608,12 @@ mod tests {
     }
 
     #[test]
-    fn entries_list_the_changes_since_the_previous() {
+    fn entries_list_changes_since_the_previous_one() {
         let mut history = History::default();
         let (wide, narrow) = ("camera.fov = 40", "camera.fov = 30");
         let seed = "camera.fov = 30\nseed = 1";
         history.record(shown_image(1, 10), Instant::now(), origin(wide, None));
-        // Two saves, only one of which could be read.
+        // Two saves. Only the second could be read.
         history.edited();
         history.edited();
         history.record(shown_image(2, 20), Instant::now(), origin(narrow, None));
@@ -634,7 +635,7 @@ mod tests {
     }
 
     #[test]
-    fn kept_camera_is_listed_once() {
+    fn saved_camera_is_listed_once() {
         let mut history = History::default();
         let camera = CameraChange { fov: Some(30.0), ..CameraChange::default() };
         let moved = Toggles { camera, ..Toggles::default() };
@@ -655,7 +656,7 @@ mod tests {
     }
 
     #[test]
-    fn saves_without_effect_are_not_listed() {
+    fn ineffective_saves_are_not_listed() {
         let mut history = History::default();
         let record = |history: &mut History, generation, name, is_finished, text: &str, photons| {
             let (shown, origin) = of_image(generation, name, is_finished);
@@ -668,7 +669,7 @@ mod tests {
         record(&mut history, 3, "on", true, first, Some(true));
         let words = [messages::OPENED, "photons off", "photons on"];
         assert_eq!(changes(&history), words);
-        // The number of samples is overridden by the command line, so the image is the same.
+        // The command line overrides the number of samples, so the image stays the same.
         edit(&mut history);
         record(&mut history, 4, "on", true, second, Some(true));
         assert_eq!(changes(&history), words);
@@ -679,7 +680,7 @@ mod tests {
         edit(&mut history);
         record(&mut history, 6, "radius", true, "render.samples = 8\nradius = 1", Some(true));
         assert_eq!(changes(&history)[3], "render.samples 64 → 8; + radius = 1");
-        // If `c` wrote the camera, the change is listed as one of the scene's keys.
+        // If `c` wrote the camera to the scene, the change is listed as an edit, not as a camera movement.
         let camera = CameraChange { fov: Some(30.0), ..CameraChange::default() };
         let text = "render.samples = 8\nradius = 1\ncamera.fov = 30";
         let (shown, origin) = of_image(7, "fov", true);
@@ -701,7 +702,7 @@ mod tests {
         let mut generation = 0;
         let mut record = |history: &mut History, name: &str, toggles: Toggles, text: &str| {
             generation += 1;
-            // In progress, at the end, and once more.
+            // Record the image in progress, when it is finished, and once more.
             for _ in 0..3 {
                 let (shown, origin) = of_image(generation, name, true);
                 history.record(
@@ -721,7 +722,7 @@ mod tests {
         assert_eq!(record(&mut history, "wide", keys, output), words);
         let named = format!("{output}\nname = \"globe\"");
         assert_eq!(record(&mut history, "wide", keys, &named), words);
-        // A camera moved with keys is not the saved one, unless the scene has it by now.
+        // A camera moved with keys is listed as such unless it has been saved to the scene.
         let mut history = History::default();
         let camera = CameraChange { fov: Some(30.0), ..CameraChange::default() };
         let moved = Toggles { camera, ..Toggles::default() };
@@ -752,7 +753,7 @@ mod tests {
     }
 
     #[test]
-    fn thumbnails_follow_their_images() {
+    fn thumbnail_is_updated_with_its_image() {
         let mut history = History::default();
         history.record(shown_image(1, 1000), Instant::now(), ImageOrigin::default());
         let size = |history: &History| history.thumbnail(0).map(|small| (small.width, small.pixels[0]));

@@ -6,16 +6,16 @@ use super::action::Action;
 use super::event::KeyPress;
 use super::messages;
 
-/// One row of a key table.
+/// A row of a key table.
 pub(super) struct Binding<A = Action> {
     /// Keys with this binding.
     pub keys: &'static [KeyPress],
-    /// Label in the help; empty if the previous row covers it.
+    /// Label in the help. Empty if the previous row covers the key.
     pub label: &'static str,
     pub action: A,
-    /// Description in the help; empty if the previous row covers it.
+    /// Description in the help. Empty if the previous row covers the key.
     pub help: &'static str,
-    /// One word for the line of keys; empty to leave the key out.
+    /// A word for the key line. Empty if the line omits the key.
     pub hint: &'static str,
 }
 
@@ -34,7 +34,7 @@ const RIGHT: KeyPress = KeyPress::special(KeyCode::Right);
 const UP: KeyPress = KeyPress::special(KeyCode::Up);
 const DOWN: KeyPress = KeyPress::special(KeyCode::Down);
 
-/// All keys, in the order of the help.
+/// All key bindings, in the order of the help.
 pub(super) const KEYMAP: &[Binding] = &[
     binding(&[KeyPress::plain('?')], "?", Action::ToggleHelp, messages::HELP_TOGGLE, "help"),
     binding(&[KeyPress::plain('q')], "q", Action::Quit, "quit", "quit"),
@@ -125,8 +125,8 @@ pub(super) const KEYMAP: &[Binding] = &[
     binding(&[KeyPress::ctrl('c')], "ctrl-c", Action::Interrupt, "interrupt, exit code 130", ""),
 ];
 
-/// Actions of keys while the help, the errors or the list of views are open. They take precedence over other
-/// actions.
+/// Key actions available while the help, the diagnostics or the view list is open. They take precedence over
+/// other actions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum OverlayAction {
     LineUp,
@@ -140,7 +140,7 @@ pub(super) enum OverlayAction {
     Close,
 }
 
-/// Keys of the overlays.
+/// Key bindings of the overlays.
 pub(super) const OVERLAY: &[Binding<OverlayAction>] = &[
     binding(
         &[KeyPress::plain('j'), KeyPress::special(KeyCode::Down)],
@@ -177,13 +177,13 @@ pub(super) const OVERLAY: &[Binding<OverlayAction>] = &[
     ),
 ];
 
-/// The overlay action of a key.
+/// The overlay action for a key.
 pub(super) fn overlay(key: KeyPress) -> Option<OverlayAction> {
     OVERLAY.iter().find(|binding| binding.keys.contains(&key)).map(|binding| binding.action)
 }
 
-/// The action of a key. Terminals disagree on whether they report shift with a capital letter or `?`, so
-/// shift is ignored for characters.
+/// The action for a key. Terminals differ in whether they report shift with a capital letter or `?`, so shift
+/// is ignored for characters.
 pub(super) fn action(key: KeyPress) -> Option<Action> {
     let modifiers = match key.code {
         KeyCode::Char(_) => key.modifiers - KeyModifiers::SHIFT,
@@ -193,7 +193,7 @@ pub(super) fn action(key: KeyPress) -> Option<Action> {
     KEYMAP.iter().find(|binding| binding.keys.contains(&key)).map(|binding| binding.action)
 }
 
-/// The row of an action; every action has one.
+/// The table row for an action. Every action has one.
 pub(super) fn of(action: Action) -> Option<&'static Binding> {
     KEYMAP.iter().find(|binding| binding.action == action)
 }

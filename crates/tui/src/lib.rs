@@ -1,8 +1,8 @@
 //! The terminal front end.
 //!
-//! Events go in; `update` turns state and event into effects and `view` draws the state. The event loop in
-//! [`run`](fn@run) owns the terminal and is the only place with side effects. Nothing is drawn unless
-//! something changed. The help and the line of keys are generated from the tables in `keymap`.
+//! `update` handles an event by modifying the state and returning effects. `view` draws the state. Side
+//! effects happen only in the event loop in [`run`](fn@run), which owns the terminal. The screen is redrawn
+//! only when something changed. The help and the key line are generated from the tables in `keymap`.
 
 mod action;
 mod camera;
@@ -48,7 +48,7 @@ mod manual_test;
 #[cfg(test)]
 mod tests;
 
-// Modules of lower crates, under the names used throughout the workspace.
+// Modules of lower-level crates, under the names used throughout the workspace.
 use glimt_base::{choice, film, math, system};
 use glimt_pipeline as pipeline;
 use glimt_scene as scene;

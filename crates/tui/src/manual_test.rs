@@ -1,6 +1,6 @@
-//! Runs the front end in a real terminal with a simulated worker. `GLIMT_MANUAL_SCENE` names the scene file:
-//! if it contains `broken`, reading fails; if it contains `panic`, the worker panics. The key `w` makes the
-//! front end panic.
+//! Runs the front end in a real terminal with a simulated worker. `GLIMT_MANUAL_SCENE` is the path of the
+//! scene file. If the file contains `broken`, reading it fails; if it contains `panic`, the worker panics.
+//! Pressing `w` makes the front end panic.
 
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -37,7 +37,7 @@ fn interactive_session() {
         cell_aspect: None,
         notify_after: None,
         commands: Box::new(move |command| {
-            assert!(!matches!(command, Command::Write), "w panics in the front end's thread");
+            assert!(!matches!(command, Command::Write), "pressing w panics in the front-end thread");
             commands.send(command).unwrap_or_default();
         }),
         events,
@@ -79,7 +79,7 @@ fn work(orders: &Receiver<Command>, events: &Sender<Event>, slot: &Mutex<Option<
     }
 }
 
-/// Simulates a render of two seconds, stopped by the next command.
+/// Simulates a two-second render that the next command can stop.
 fn simulate_render(
     request: &Request,
     orders: &Receiver<Command>,

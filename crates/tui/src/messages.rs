@@ -1,27 +1,27 @@
-//! Messages and labels of the front end. Tests refer to them by name, so that rewording one breaks no test.
+//! Front-end messages and labels. Tests refer to them by name, so rewording a message does not break a test.
 
 use std::fmt::Display;
 
-/// Shown when a key needs a valid scene.
+/// Shown when a key requires a scene but none has been loaded.
 pub const NO_SCENE: &str = "no scene loaded";
 
 /// Shown when the camera was moved with keys.
 pub const CAMERA_MOVED: &str = "camera moved (preview only). w: save image · c: keep in scene · 0: reset";
-/// Shown when the camera is back at the scene's own position.
+/// Shown when the camera has returned to the scene's own position.
 pub const CAMERA_RESET: &str = "camera reset";
 /// Shown when the camera cannot be moved closer.
 pub const CLOSEST: &str = "closest zoom reached";
 /// Shown when the camera cannot be moved farther away.
 pub const FARTHEST: &str = "farthest zoom reached";
-/// Shown when `c` was pressed, but the camera is the scene's own.
+/// Shown when `c` was pressed but the camera has not been moved.
 pub const NOTHING_TO_KEEP: &str = "camera unchanged: nothing to keep";
-/// Why `c` has to be pressed again; follows the keys that were saved.
+/// Explains why `c` has to be pressed again. Follows the names of the saved keys.
 pub const CAMERA_CONFLICT: &str = "was saved since you moved the camera: press c again to overwrite it";
-/// Shown when `u` was pressed without a kept camera.
+/// Shown when `u` was pressed but no camera has been saved.
 pub const NOTHING_TO_UNDO: &str = "nothing to undo";
-/// Shown when `u` was pressed, but `c` only wrote a new scene.
+/// Shown when `u` was pressed but `c` only created a new scene file.
 pub const NEW_SCENE_STAYS: &str = "nothing to undo: c wrote a new scene for the model";
-/// Shown when `0` was pressed, but keys have changed nothing.
+/// Shown when `0` was pressed but no keys have changed anything.
 pub const NOTHING_TO_RESET: &str = "nothing to reset";
 /// Shown when `0` was pressed.
 pub const RESET: &str = "reset to the scene's settings";
@@ -51,17 +51,17 @@ pub fn camera_saved(file: &str) -> String {
     format!("camera saved to {file} · u: undo")
 }
 
-/// Shown when `c` wrote the camera into the scene file, but the command line sets another one.
+/// Shown when `c` wrote the camera into the scene file but the command line overrides it.
 pub fn camera_overridden(file: &str) -> String {
     format!("camera saved to {file}, but --set overrides it in this run")
 }
 
-/// Shown when `c` found the same camera in the scene file.
+/// Shown when `c` was pressed but the scene file already contains this camera.
 pub fn camera_known(file: &str) -> String {
     format!("{file} already has this camera")
 }
 
-/// Shown when `c` wrote a scene for a model.
+/// Shown when `c` wrote a scene file for a model.
 pub fn model_scene(file: &str) -> String {
     format!("wrote {file}, a scene of this model with this camera")
 }
@@ -71,10 +71,10 @@ pub fn undone(file: &str) -> String {
     format!("undone: {file} restored")
 }
 
-/// Shown when the camera of the newest render was kept while an older one was shown.
+/// Shown when the newest render's camera was saved while an older render was displayed.
 pub const OF_NEWEST_RENDER: &str = " (camera of the newest render, not the one shown)";
 
-/// Shown when there is no image in the history.
+/// Shown when the history contains no image.
 pub const NO_IMAGE: &str = "no image yet";
 /// Shown when `N` was pressed at the newest render.
 pub const NEWEST_RENDER: &str = "this is the newest render";
@@ -82,58 +82,58 @@ pub const NEWEST_RENDER: &str = "this is the newest render";
 pub const OLDEST_RENDER: &str = "this is the oldest render";
 /// Shown when `b` returned to the newest render.
 pub const AFTER_EDIT: &str = "after the last edit (newest render)";
-/// Shown when `b` returned to the render before the last edit; the edits follow.
+/// Shown when `b` returned to the render before the last edit. Followed by the edits.
 pub const BEFORE_EDIT: &str = "before the last edit";
-/// Shown when `b` was pressed before the first edit.
+/// Shown when `b` was pressed before any edit.
 pub const NO_EARLIER_RENDER: &str = "no earlier render to compare with";
-/// Shown when a key or click inspects an older render.
+/// Shown when the user tries to inspect an older render.
 pub const OLDER_RENDER: &str = "can't inspect an older render. b: back to the newest";
-/// Keys that leave an older render; the first is left out at the oldest one.
+/// Keys for moving through the history. The first is omitted at the oldest render.
 pub const HISTORY_KEYS: [&str; 2] = ["n older", "N newer"];
-/// Title of the history.
+/// Title of the history panel.
 pub const HISTORY: &str = "History";
-/// Describes a render that has no number.
+/// Describes a render without a number.
 pub fn unnumbered_render(state: &str) -> String {
     format!("{state} render")
 }
 
-/// State of a render that was finished before the newest one.
+/// State of a render that finished before the newest one.
 pub const OLDER: &str = "older";
 
-/// Which of the finished renders is shown.
+/// Position of the displayed render among the finished ones.
 pub fn render_of(number: u64, count: u64) -> String {
     format!("render {number} of {count}")
 }
 
-/// Marks the number of stages that were not run again.
+/// Label for the number of stages that were not run again.
 pub const CACHED: &str = "cached";
-/// Number of stages that were not run again.
+/// Number of stages that were not run again, in words.
 pub fn cached(stages: &str) -> String {
     format!("{stages} {CACHED}")
 }
 
-/// Time from a save to its first changed cell.
+/// Time between saving the file and drawing the first changed cell.
 pub fn on_screen(time: &str) -> String {
     format!("on screen after {time}")
 }
 
-/// Number of the finished render that is shown.
+/// Number of the finished render being shown.
 pub fn render(number: impl Display) -> String {
     format!("render {number}")
 }
 
-/// Mark of a render that was stopped.
+/// Label for a render that was stopped.
 pub const STOPPED: &str = "stopped";
-/// Change of the first render.
+/// Listed as the change of the first render.
 pub const OPENED: &str = "opened";
-/// Change of a render that differs from the previous one only in its noise.
+/// Listed as the change of a render that differs from the previous one only in noise.
 pub const AGAIN: &str = "rendered again";
 
-/// Shown when depth of field needs a lens.
+/// Shown when depth of field was requested for a camera without a lens.
 pub const PINHOLE: &str = "no depth of field: aperture is 0";
-/// Shown when `f` waits for a click.
+/// Shown when `f` was pressed and a click is expected.
 pub const CLICK_TO_FOCUS: &str = "click to focus there · f: at the crosshair";
-/// Shown when the background cannot be in focus.
+/// Shown when the background was chosen as focus.
 pub const NOTHING_TO_FOCUS: &str = "nothing to focus on there";
 /// Shown when `y` was pressed before any click.
 pub const NOTHING_TO_COPY: &str = "nothing to copy: click or press Enter first";
@@ -143,57 +143,57 @@ pub const MOUSE_ON: &str = "mouse on: drag to orbit, wheel to zoom, click to ins
 pub const MOUSE_OFF: &str = "mouse off: drag to select text · m: on";
 /// Precedes inspected values that were copied.
 pub const COPIED: &str = "copied:";
-/// Precedes inspected values if the terminal has no clipboard.
+/// Precedes inspected values if the terminal does not support the clipboard.
 pub const SELECT_TO_COPY: &str = "shift-drag to select and copy:";
 
-/// Shown when `z` waits for a drag.
+/// Shown when `z` was pressed and a drag is expected.
 pub const DRAG_REGION: &str = "drag a region to render first (z: around the crosshair)";
-/// Shown when a region of the running render was marked.
+/// Shown when a region of the running render was selected.
 pub const REGION_FIRST: &str = "region renders first · z: clear";
-/// Shown when a region was marked without a running render.
+/// Shown when a region was selected while nothing was rendering.
 pub const REGION_NEXT: &str = "region renders first from the next render · z: clear";
 /// Shown when `z` cleared the region.
 pub const REGION_CLEARED: &str = "region cleared";
 
-/// Shown when a digit was pressed while the list of views is closed.
+/// Shown when a digit was pressed while the view list was closed.
 pub const VIEWS_FIRST: &str = "press v first: digits choose from the list of views";
 /// Shown when `o` was pressed for a model.
-pub const NO_EDITOR_FOR_MODELS: &str = "models cannot be edited; c writes a scene of this one";
-/// Shown when a key needs a preview.
+pub const NO_EDITOR_FOR_MODELS: &str = "models cannot be edited; c writes a scene file for this one";
+/// Shown when a key requires a preview but none is displayed.
 pub const NO_PREVIEW: &str = "no preview is shown (see --preview)";
 /// Shown when `x` shows actual pixels.
 pub const ACTUAL_PIXELS: &str = "actual pixels (1:1) · x: fit";
-/// Shown when space was pressed without a running render.
+/// Shown when space was pressed while nothing was rendering.
 pub const NOT_RENDERING: &str = "nothing is rendering";
-/// Shown when a request ended the pause.
+/// Shown when a new request ended a pause.
 pub const RESUMED: &str = "resumed";
 /// Shown when `w` was pressed.
 pub const WRITING: &str = "writing the current image";
-/// Shown when `w` was pressed while an older render is shown.
+/// Shown when `w` was pressed while an older render was displayed.
 pub const WRITING_NEWEST: &str = "writing the newest image, not the one shown";
 /// Shown when `w` has written these files.
 pub fn wrote(files: &str) -> String {
     format!("wrote {files}")
 }
 
-/// Follows the written files if an older render is shown.
+/// Follows the names of the written files if an older render is displayed.
 pub const WROTE_NEWEST: &str = " (the newest image, not the one shown)";
-/// Shown when `e` was pressed without diagnostics.
+/// Shown when `e` was pressed but there are no diagnostics.
 pub const NO_DIAGNOSTICS: &str = "no errors or warnings";
-/// Shown when `e` was pressed before the scene was read.
+/// Shown when `e` was pressed before the scene had been read.
 pub const STILL_READING: &str = "still reading the files";
-/// Shown when Ctrl-z was pressed without a shell.
+/// Shown when Ctrl-z was pressed but there is no shell.
 pub const NO_SHELL: &str = "no shell to return to";
-/// Shown when the file watcher has ended.
+/// Shown when the file watcher has stopped.
 pub const NOT_WATCHING: &str = "file watching stopped; press r to re-render";
 /// Shown when the image could not be written.
 pub const NOT_WRITTEN: &str = "not written (e: why)";
-/// Shown when the image will be written later.
+/// Shown when writing the image was postponed.
 pub const WRITE_POSTPONED: &str = "the image will be written when every pixel has a sample";
 /// Shown when a render continues from a checkpoint.
 pub const RESUMING: &str = "resuming from";
 
-/// Shown when the integrator always renders soft shadows.
+/// Shown when the integrator supports only soft shadows.
 pub fn soft_shadows(integrator: &str, other: &str) -> String {
     format!("{integrator} always has soft shadows (i: {other})")
 }
@@ -208,54 +208,54 @@ pub fn view(name: &str) -> String {
     format!("view {name} (preview only). w: save image · 0: reset")
 }
 
-/// Shown when the photon view was chosen while photons are off.
+/// Shown when the photon view was chosen while photons were off.
 pub const VIEW_WITHOUT_PHOTONS: &str = "view photons: photons are off (p: on)";
 
-/// Shown when the checkpoint of another render was renamed.
+/// Shown when another render's checkpoint was renamed.
 pub fn checkpoint_kept(file: &str) -> String {
     format!("kept the checkpoint of another render as {file}")
 }
 
-/// Shown when a checkpoint cannot be continued.
+/// Shown when a checkpoint cannot be resumed.
 pub fn checkpoint_ignored(file: &str, why: &str) -> String {
     format!("ignoring {file}: {why}")
 }
 
-/// Shown when another program changed a written file.
+/// Shown when another program modified an output file.
 pub fn output_changed(file: &str, how: &str) -> String {
     format!("{file} {how} · w writes it again")
 }
 
-/// Shown when the image shown is not in a file.
+/// Shown when the displayed image is not saved in a file.
 pub const NOT_SAVED: &str = "not saved · w saves it";
 /// Shown when the scene is invalid, so the last valid render is shown.
 pub const LAST_GOOD_RENDER: &str = "showing the last good render";
-/// Shown when the preview lacks the light of photons.
+/// Shown when photon light is missing from the preview.
 pub const WITHOUT_PHOTONS: &str = "preview without photons";
 /// Shown when the scene file may be incomplete.
 pub const INCOMPLETE_FILE: &str = "for a complete file";
 /// Shown when the scene file does not exist.
 pub const WAITING_FOR_FILE: &str = "waiting for it to appear";
 
-/// Shown when the scene's own image was interrupted.
+/// Shown when rendering the scene's own image was interrupted.
 pub fn own_unfinished(file: &str, percent: u32) -> String {
     format!("{file} at {percent} %: 0 continues it")
 }
 
-/// Shown when the scene's own image does not show the last edit.
+/// Shown when the scene was edited after its own image was rendered.
 pub fn own_outdated(file: &str) -> String {
     format!("{file} is older than your last edit: 0 renders it")
 }
 
-/// Shown when the last valid scene is rendering while the file is broken; its progress follows.
+/// Shown when the last valid scene is rendering while the scene file is invalid. Followed by the progress.
 pub const LAST_GOOD_SCENE: &str = "rendering the last good scene";
 
-/// A hint to edit the scene.
+/// A hint that saving the scene file starts a render.
 pub fn save_to_render(file: &str, is_again: bool) -> String {
     format!("save {file} to render{}", if is_again { " again" } else { "" })
 }
 
-/// A hint for models.
+/// A hint that changing the model file starts a render.
 pub fn renders_on_changes(file: &str) -> String {
     format!("re-renders when {file} changes")
 }
@@ -269,14 +269,14 @@ pub fn preview_cost(kilobytes: usize, round_trip_ms: Option<u128>) -> String {
 /// Title of the noise curve.
 pub const NOISE_OVER_TIME: &str = "Noise over time";
 
-/// The line in the noise curve.
+/// Label for the target line in the noise curve.
 pub fn noise_target(share: &str) -> String {
     format!("── target: {share} per tile")
 }
 
 /// Help for `?`.
 pub const HELP_TOGGLE: &str = "show or hide this help";
-/// Help for the time of a stage.
+/// Help for stage times.
 pub const HELP_STAGE_TIME: &str = "stage time (difference to the last render)";
 /// Help for the cost of sending a preview.
 pub const HELP_BYTES: &str = "bytes of this render; round trip to the terminal";

@@ -1,11 +1,11 @@
 //! Noise over render time.
 
-/// Maximum number of points; when it is exceeded, every second point is dropped.
+/// Maximum number of points. When it is exceeded, every second point is dropped.
 const MAX: usize = 256;
-/// Minimum ratio between the times of two points, since the time axis is logarithmic.
+/// Minimum ratio between the times of successive points, since the time axis is logarithmic.
 const STEP: f64 = 1.02;
 
-/// Render times in seconds with the noise measured at each, in order.
+/// Render times in seconds and the noise measured at each time, in chronological order.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct NoiseCurve(Vec<(f64, f64)>);
 
@@ -42,7 +42,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn curve_is_bounded_and_ends_at_the_result() {
+    fn curve_is_bounded_and_ends_at_final_noise() {
         let mut curve = NoiseCurve::default();
         for (seconds, noise) in
             [(0.0, 0.1), (0.5, f64::NAN), (0.5, 0.1), (0.505, 0.09), (1.0, 0.0), (2.0, 0.05)]

@@ -1,4 +1,4 @@
-//! Inputs and results of the front end.
+//! Front-end options and results.
 
 use std::path::PathBuf;
 use std::sync::mpsc::Receiver;
@@ -11,64 +11,64 @@ use crate::pipeline::settings::Overrides;
 pub use crate::pipeline::watch::{Changed, ExternalChange, News, OutputChange};
 
 choice! {
-    /// Choice of how the preview is drawn.
+    /// How to draw the preview.
     pub enum PreviewChoice {
-        /// The finest blocks that the terminal is known to have if it has colors, else characters.
+        /// The finest blocks the terminal is known to support, or ASCII characters without color support.
         Auto = "auto",
-        /// Two pixels a cell.
+        /// Two pixels per cell.
         HalfBlock = "halfblock",
-        /// Two colors a cell, in quarters.
+        /// Two colors per cell, divided into quarters.
         Quadrant = "quadrant",
-        /// The same in sixths: what Unicode 13 has.
+        /// Two colors per cell, divided into sixths (requires Unicode 13).
         Sextant = "sextant",
-        /// The same in eighths: what Unicode 16 has.
+        /// Two colors per cell, divided into eighths (requires Unicode 16).
         Octant = "octant",
-        /// Characters by brightness.
+        /// ASCII characters of different brightness.
         Ascii = "ascii",
-        /// In pixels, by kitty's protocol.
+        /// Pixels, using kitty's graphics protocol.
         Kitty = "kitty",
-        /// In pixels, by DEC's sixels.
+        /// Pixels, using DEC's Sixel format.
         Sixel = "sixel",
-        /// In pixels, by iTerm2's inline images.
+        /// Pixels, using iTerm2's inline images.
         Iterm2 = "iterm2",
-        /// None; the stages get the room.
+        /// No preview, leaving more space for the stages.
         None = "none",
     }
 }
 
-/// Inputs of the front end.
+/// Options for the front end.
 pub struct Options {
     /// The scene file.
     pub scene: PathBuf,
-    /// Overrides from the command line; keys can change more.
+    /// Overrides from the command line. Keys can make further changes.
     pub overrides: Overrides,
     /// Choice of colors.
     pub color: ColorChoice,
-    /// Choice of how the preview is drawn.
+    /// How to draw the preview.
     pub preview: PreviewChoice,
-    /// Height of a cell divided by its width. `None` to ask the terminal, with 2 as the fallback.
+    /// Height of a cell divided by its width. If `None`, the terminal is queried, with 2 as the fallback.
     pub cell_aspect: Option<f32>,
-    /// Minimum duration of a render whose end is reported by a notification if the terminal does not have the
-    /// focus. `None` to disable notifications.
+    /// Renders that take longer than this send a notification when they end, unless the terminal is focused.
+    /// `None` disables notifications.
     pub notify_after: Option<Duration>,
     /// Sends commands to the worker. Must not block.
     pub commands: Box<dyn FnMut(Command)>,
-    /// Events from the worker. The front end ends with an error when the channel closes.
+    /// Events from the worker. If the channel closes, the front end exits with an error.
     pub events: Receiver<Event>,
-    /// Slot of the worker's previews.
+    /// Slot for previews from the worker.
     pub previews: PreviewSlot,
-    /// Events from the file watcher. A message reports when the channel closes.
+    /// Events from the file watcher. If the channel closes, a message is shown.
     pub news: Receiver<News>,
 }
 
-/// Exit code of the program.
+/// The program's exit code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ExitStatus(pub u8);
 
 impl ExitStatus {
     /// The user quit.
     pub const QUIT: Self = Self(0);
-    /// SIGHUP: the terminal is gone.
+    /// SIGHUP: the terminal was closed.
     pub const HANGUP: Self = Self(129);
     /// SIGQUIT.
     pub const ABORTED: Self = Self(131);
@@ -77,7 +77,7 @@ impl ExitStatus {
     /// SIGTERM.
     pub const TERMINATED: Self = Self(143);
 
-    /// Terminated by the signal of this number.
+    /// Terminated by the signal with this number.
     pub fn signal(number: i32) -> Self {
         Self(u8::try_from(128 + number).unwrap_or(1))
     }
@@ -86,17 +86,17 @@ impl ExitStatus {
 /// Result of the front end.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TuiOutcome {
-    /// Exit code of the program.
+    /// The program's exit code.
     pub status: ExitStatus,
-    /// Whether the user requested an image whose outcome is not known yet.
+    /// Whether the user requested an image and the result is not known yet.
     pub is_write_unanswered: bool,
     /// The written files with their samples and render times, in one line.
     pub summary: String,
     /// Whether a file was written.
     pub has_written: bool,
-    /// Whether the last image that should have been written is not on disk.
+    /// Whether the last attempt to write an image failed or was refused.
     pub is_unwritten: bool,
-    /// Changes made with keys that are neither in the scene nor in an image, as command-line options.
+    /// Changes made with keys that are saved in neither the scene nor an image, as command-line options.
     pub not_kept: Option<String>,
 }
 
@@ -112,7 +112,7 @@ pub enum TuiError {
     /// The terminal could not be set up or written to.
     #[error("cannot {action} the terminal: {source}; `--once` renders without one")]
     Terminal {
-        /// The action that failed.
+        /// The operation that failed.
         action: &'static str,
         /// Why not.
         source: std::io::Error,
@@ -120,7 +120,7 @@ pub enum TuiError {
     /// The worker ended unexpectedly.
     #[error("the renderer stopped{}", .reason.as_ref().map(|text| format!(": {text}")).unwrap_or_default())]
     WorkerGone {
-        /// The message of its panic, if there was one.
+        /// The panic message, if the worker panicked.
         reason: Option<String>,
     },
 }

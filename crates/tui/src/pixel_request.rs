@@ -1,37 +1,37 @@
-//! Detects whether the terminal supports the image protocol chosen with `--preview`. Half blocks are drawn
-//! until it does.
+//! Detects whether the terminal supports the image protocol selected with `--preview`. Until this is known,
+//! the preview is drawn with half blocks.
 
 use std::time::{Duration, Instant};
 
 use super::graphics::{Protocol, wrapped};
 use super::terminals::TerminalId;
 
-/// Image ID in the query for kitty's protocol.
+/// Image ID used in the query for kitty's protocol.
 pub(super) const QUERY_ID: u32 = 4211;
 /// Query for kitty's protocol: a one-pixel image that is not stored.
 pub(super) const KITTY_QUERY: &[u8] = b"\x1b_Gi=4211,s=1,v=1,a=q,t=d,f=24;AAAA\x1b\\";
 /// Query for the terminal's name and version (XTVERSION).
 const NAME_QUERY: &[u8] = b"\x1b[>q";
-/// Time after which a missing reply is reported to the user.
+/// Time after which the user is told that a reply is missing.
 const REPLY_TIMEOUT: Duration = Duration::from_secs(1);
 
-/// The path from glimt to the terminal, as it concerns images.
+/// The path from glimt to the terminal, as far as it affects images.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum ImageRoute {
-    /// Nothing in between.
+    /// Nothing.
     Direct,
-    /// tmux, which passes on wrapped sequences if `allow-passthrough` is on.
+    /// tmux, which passes on wrapped escape sequences if `allow-passthrough` is on.
     Tmux,
-    /// screen, or a console that prints unknown sequences: no queries are sent.
+    /// GNU screen, or a console that prints unknown escape sequences. No queries are sent.
     Closed,
 }
 
-/// A request for pixels that is not confirmed yet.
+/// A request to draw pixels that the terminal has not confirmed yet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct PixelRequest {
     pub(super) protocol: Protocol,
     pub(super) route: ImageRoute,
-    /// Whether the environment names a terminal that supports the protocol.
+    /// Whether environment variables identify a terminal that supports the protocol.
     pub(super) is_known: bool,
 }
 
@@ -49,25 +49,25 @@ impl PixelRequest {
         Self { protocol, route, is_known: protocol == Protocol::Iterm && has_iterm }
     }
 
-    /// The query, unless it is sent anyway.
+    /// The query to send. Empty if it is part of the other queries or not supported.
     pub(super) fn query(self) -> Vec<u8> {
         match (self.protocol, self.route) {
             (Protocol::Kitty, ImageRoute::Direct) => KITTY_QUERY.to_vec(),
             (Protocol::Kitty, ImageRoute::Tmux) => wrapped(KITTY_QUERY),
             (Protocol::Iterm, ImageRoute::Tmux) => wrapped(NAME_QUERY),
             (Protocol::Iterm, ImageRoute::Direct) => NAME_QUERY.to_vec(),
-            // Device attributes are always queried, and tmux draws sixels itself.
+            // Device attributes are always queried, and tmux draws Sixel images itself.
             (Protocol::Sixel, _) | (_, ImageRoute::Closed) => Vec::new(),
         }
     }
 
-    /// Time at which a missing reply is reported to the user.
+    /// Time at which the user is told that a reply is missing.
     pub(super) fn deadline(self, now: Instant) -> Instant {
         if self.route == ImageRoute::Closed { now } else { now + REPLY_TIMEOUT }
     }
 
-    /// Whether the device attributes come after all other replies. tmux answers that query before it passes
-    /// on others.
+    /// Whether the device attributes arrive after all other replies. tmux answers that query itself before
+    /// passing on other queries.
     pub(super) fn ends_with_attributes(self) -> bool {
         match (self.protocol, self.route) {
             (Protocol::Sixel, _) | (_, ImageRoute::Direct) => true,
@@ -75,7 +75,7 @@ impl PixelRequest {
         }
     }
 
-    /// Message that the terminal does not support the protocol, listing terminals that do.
+    /// Explains that the terminal does not support the protocol, and lists terminals that do.
     pub(super) fn refusal(self) -> String {
         let (name, terminals) = match self.protocol {
             Protocol::Kitty => ("kitty", "kitty, Ghostty, WezTerm or Konsole"),
@@ -105,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn environment_decides_how_to_query() {
+    fn environment_determines_the_query() {
         let xterm = ("TERM", "xterm-256color");
         let direct = request(Protocol::Kitty, &[xterm], false);
         assert_eq!((direct.route, direct.query()), (ImageRoute::Direct, KITTY_QUERY.to_vec()));
@@ -119,7 +119,7 @@ mod tests {
         assert!(!request(Protocol::Iterm, &[xterm], false).is_known);
         assert!(!request(Protocol::Kitty, &[xterm, ("TERM_PROGRAM", "iTerm.app")], false).is_known);
         let number = String::from_utf8_lossy(KITTY_QUERY).contains(&format!("i={QUERY_ID},"));
-        assert!(number, "the reply repeats the ID of the query");
+        assert!(number, "the reply should contain the query's ID");
     }
 
     #[test]

@@ -1,6 +1,6 @@
-//! Decides which previews are drawn, when, and with which precision.
+//! Decides which previews to draw, when, and with what precision.
 //!
-//! Each call is passed the current time, so tests can choose it.
+//! The current time is passed to each call so that tests can control it.
 
 use std::path::PathBuf;
 use std::sync::{Arc, PoisonError};
@@ -21,38 +21,38 @@ use super::window_title::WindowTitle;
 use crate::film::Picture;
 use crate::pipeline::protocol::{LatestPreview, PreviewSlot};
 
-/// Frame interval: at most 20 frames per second, except after keys.
+/// Frame interval. Limits output to 20 frames per second, except for responses to keys.
 const FRAME: Duration = Duration::from_millis(50);
 
-/// Draws the state on the terminal.
+/// Draws the state to the terminal.
 pub(super) struct Presenter {
     pub(super) display: Display,
     drawn: DrawnPreview,
     previews: PreviewSlot,
-    /// URLs of written files.
+    /// Creates URLs for written files.
     files: FileUrls,
-    /// Time of the next frame, unless it is urgent.
+    /// Earliest time for the next frame, unless it is urgent.
     next_frame: Instant,
-    /// The newest request with a drawn preview.
+    /// The newest request for which a preview has been drawn.
     newest: u64,
 }
 
-/// The preview drawn last.
+/// The last drawn preview.
 #[derive(Default)]
 struct DrawnPreview {
     picture: Option<Arc<Picture>>,
     generation: u64,
     /// Mean samples per pixel.
     samples: f64,
-    /// Time at which it became the target.
+    /// Time when it became the target.
     at: Option<Instant>,
-    /// Whether the slot holds a newer preview of the same request that was not yet worth its bytes.
+    /// Whether the slot contains a newer preview of the same request that was not worth sending yet.
     is_old: bool,
     /// Whether it is the first preview of its request.
     is_first: bool,
-    /// Whether any of its bytes may have been sent.
+    /// Whether any of it may have been sent.
     is_shown: bool,
-    /// Whether idle bandwidth is used to draw it exactly.
+    /// Whether idle bandwidth is being used to draw it with exact colors.
     is_refined: bool,
 }
 
@@ -68,8 +68,8 @@ impl Presenter {
         }
     }
 
-    /// Handles a new preview in the slot, and takes it if it should be drawn. Otherwise it stays in the slot
-    /// and a newer one may replace it, so previews never queue up.
+    /// Handles a new preview in the slot. If it should be drawn, takes it out of the slot. Otherwise it stays
+    /// there until a newer one replaces it, so previews never queue up.
     pub(super) fn preview(&mut self, generation: u64, state: &State, now: Instant) -> Option<Event> {
         let is_same_request = generation == self.drawn.generation && !self.is_other(state);
         if is_same_request && self.advice(state, now) == PacingAdvice::Wait {
@@ -79,7 +79,7 @@ impl Presenter {
         self.take_preview()
     }
 
-    /// Whether the newest preview differs from the drawn one in size, section, or the presence of photons.
+    /// Whether the newest preview differs from the drawn one in size, section or missing photons.
     fn is_other(&self, state: &State) -> bool {
         let latest = self.previews.lock().unwrap_or_else(PoisonError::into_inner);
         let what = |picture: &Picture| (picture.width, picture.height);
@@ -89,7 +89,7 @@ impl Presenter {
         })
     }
 
-    /// What to do with a newer preview of the drawn request.
+    /// Whether to draw a newer preview of the same request.
     fn advice(&self, state: &State, now: Instant) -> PacingAdvice {
         advise(&self.frame_timing(state, now))
     }
@@ -115,7 +115,7 @@ impl Presenter {
         }
     }
 
-    /// Number of cells of a preview, or the equivalent number for a preview in pixels.
+    /// Number of cells in a preview, or an equivalent number for a preview drawn as pixels.
     fn cells(&self, state: &State, picture: &Picture) -> u32 {
         if self.display.draws_pixels() {
             return picture.width * picture.height / 4;
@@ -132,13 +132,13 @@ impl Presenter {
         Some(Event::Picture { generation, picture, range, section, lacks_photons, source })
     }
 
-    /// Delays the next frame, because another program uses the screen.
+    /// Delays the next frame because another program is using the screen.
     pub(super) fn postpone(&mut self, state: &mut State, now: Instant) {
         state.urgent = false;
         self.next_frame = now + FRAME;
     }
 
-    /// Updates the target of the display if a frame is due.
+    /// Updates the display's target if a frame is due.
     pub(super) fn draw_if_due(&mut self, state: &mut State, now: Instant) {
         let is_due = state.dirty && (state.urgent || now >= self.next_frame);
         let is_refined = self.has_room_to_refine(state);
@@ -156,7 +156,7 @@ impl Presenter {
             self.display.set_title(title);
         }
         let is_new = self.record_preview(state, now);
-        // The first preview stays the first until it is complete on the screen or a newer one is drawn.
+        // It remains the first preview until it is complete on the screen or a newer one is drawn.
         self.drawn.is_first &= is_new || !self.display.is_complete();
         let area = Layout::of(state).preview;
         self.display.place(view::preview::placement(state, area), is_final_preview(state));
@@ -171,14 +171,14 @@ impl Presenter {
         FrameExtras { later: drawn.later, links: files.map(link).collect() }
     }
 
-    /// Whether the connection is idle while a key moves the camera: the last preview is on the screen with
-    /// the precision of a moving one, and the next one has not arrived.
+    /// Whether the connection is idle while a key moves the camera, meaning that the last preview is on the
+    /// screen at reduced precision and the next one has not arrived.
     fn has_room_to_refine(&self, state: &State) -> bool {
         let is_step = state.request.camera_step.generation == Some(self.drawn.generation);
         is_step && self.drawn.is_first && !self.drawn.is_refined && self.display.is_complete()
     }
 
-    /// Records the preview being drawn. Returns whether it is a new one.
+    /// Records the preview being drawn. Returns whether it is new.
     fn record_preview(&mut self, state: &State, now: Instant) -> bool {
         let Some(shown) = &state.picture.shown else { return false };
         if self.drawn.picture.as_ref().is_some_and(|drawn| Arc::ptr_eq(drawn, &shown.picture)) {
@@ -205,8 +205,8 @@ impl Presenter {
         }
     }
 
-    /// Sends as much as the connection allows, but stops once `is_late` returns true. Returns events for the
-    /// state.
+    /// Sends as much as the connection allows, stopping early once `is_late` returns true. Returns events for
+    /// the state.
     pub(super) fn pump(&mut self, state: &State, now: Instant, is_late: impl Fn() -> bool) -> Vec<Event> {
         let has_sent = self.display.pump(now, is_late);
         let mut events: Vec<Event> = self.display.take_report().map(Event::Frame).into_iter().collect();
@@ -220,7 +220,7 @@ impl Presenter {
         events
     }
 
-    /// Time of the next action if no event arrives. `None` if there is none.
+    /// When to act next if no event arrives. `None` if there is nothing to do.
     pub(super) fn wake(&mut self, state: &State, now: Instant) -> Option<Instant> {
         let due =
             self.drawn.at.filter(|_| self.drawn.is_old).and_then(|at| self.frame_timing(state, now).due(at));
@@ -230,7 +230,7 @@ impl Presenter {
     }
 }
 
-/// Mean samples per pixel so far.
+/// Mean samples per pixel rendered so far.
 fn samples(state: &State) -> f64 {
     state.work.progress.as_ref().map_or(0.0, |progress| progress.fraction * f64::from(progress.total_samples))
 }
@@ -240,7 +240,7 @@ fn is_final_preview(state: &State) -> bool {
     state.work.paused || !state.work.is_running() && view::status_line::last_good_progress(state).is_none()
 }
 
-/// Time at which the state needs a frame or a tick.
+/// When the state next needs a frame or a tick.
 fn next_wake(state: &State, next_frame: Instant) -> Option<Instant> {
     let frame = state.dirty.then_some(if state.urgent { state.now } else { next_frame });
     [frame, state.next_tick()].into_iter().flatten().min()
@@ -258,7 +258,7 @@ mod tests {
         state.dirty = true;
         assert_eq!(next_wake(&state, now), Some(now));
         state.dirty = false;
-        assert!(next_wake(&state, now).is_some(), "the elapsed time changes");
+        assert!(next_wake(&state, now).is_some(), "expected a wakeup to update the elapsed time");
         state.work.activity = crate::state::Activity::Done;
         assert_eq!(next_wake(&state, now), None);
     }

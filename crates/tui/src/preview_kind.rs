@@ -1,4 +1,4 @@
-//! Kinds of previews, depending on the user's choice and the terminal.
+//! Ways of drawing the preview, depending on the user's choice and the terminal.
 
 use super::color::ColorDepth;
 use super::graphics::Protocol;
@@ -14,17 +14,17 @@ pub(super) enum PreviewKind {
     Sextant,
     Octant,
     Ascii,
-    /// Pixels, or half blocks while text covers it.
+    /// Pixels, or half blocks while the preview is covered by text.
     Pixels(Protocol),
     None,
 }
 
 impl PreviewKind {
-    /// The kind for a choice and color depth.
+    /// Determines the kind for the user's choice and the color depth.
     pub(super) fn of(choice: PreviewChoice, depth: ColorDepth) -> Self {
         match choice {
             PreviewChoice::None => Self::None,
-            // Half blocks need colors.
+            // All blocks need colors.
             PreviewChoice::Ascii => Self::Ascii,
             PreviewChoice::Kitty => Self::Pixels(Protocol::Kitty),
             PreviewChoice::Sixel => Self::Pixels(Protocol::Sixel),
@@ -37,7 +37,7 @@ impl PreviewKind {
         }
     }
 
-    /// The kind to start with: pixels only if support is known.
+    /// The initial kind. Pixels are used only if support is known.
     pub(super) fn initial(choice: PreviewChoice, depth: ColorDepth, pixels: Option<PixelRequest>) -> Self {
         match (Self::of(choice, depth), pixels) {
             (Self::Pixels(_), Some(request)) if !request.is_known => {
@@ -47,7 +47,7 @@ impl PreviewKind {
         }
     }
 
-    /// The grid of parts of a cell. `None` if cells have no parts.
+    /// The grid that divides a cell into parts. `None` if cells are not divided.
     pub(super) fn grid(self) -> Option<Grid> {
         match self {
             Self::HalfBlock => Some(Grid::Halves),

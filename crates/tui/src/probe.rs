@@ -1,4 +1,4 @@
-//! Queries the terminal outside of the front end, for a report on its capabilities.
+//! Queries the terminal when the front end is not running, to report the terminal's capabilities.
 
 use std::io::{self, IsTerminal, Write};
 use std::os::fd::AsFd;
@@ -16,46 +16,46 @@ use super::terminal;
 use super::terminal_replies::{BlockGlyphs, TerminalQueries, TerminalReply};
 use super::terminals::{Brand, TerminalId};
 
-/// Properties of the terminal, from its replies and the environment.
+/// Terminal properties from replies and environment variables.
 #[derive(Clone, Debug)]
 pub struct Probe {
-    /// Columns and rows.
+    /// Number of columns and rows.
     pub cells: (u16, u16),
-    /// Size of a cell in pixels, if the terminal reports it.
+    /// Cell size in pixels, if the terminal reports it.
     pub cell_pixels: (u16, u16),
-    /// Color depth according to the environment.
+    /// Color depth according to environment variables.
     pub depth: ColorDepth,
-    /// Runs inside tmux or screen.
+    /// Whether glimt runs inside tmux or screen.
     pub is_multiplexed: bool,
-    /// Runs over a network connection.
+    /// Whether the terminal is reached over a network.
     pub is_remote: bool,
-    /// Whether the environment names a terminal with iTerm2's inline images.
+    /// Whether environment variables identify a terminal that supports iTerm2's inline images.
     pub has_iterm: bool,
-    /// Replies of the terminal. `None` if it does not reply.
+    /// The terminal's replies. `None` if it does not reply.
     pub answers: Option<ProbeReplies>,
 }
 
-/// Replies of the terminal.
+/// Data from the terminal's replies.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ProbeReplies {
-    /// Round-trip time of a status report.
+    /// Round-trip time for a status report.
     pub round_trip: Duration,
-    /// Name and version (XTVERSION).
+    /// Terminal name and version (XTVERSION).
     pub name: Option<String>,
-    /// Support for 24-bit color (XTGETTCAP).
+    /// Whether 24-bit color is supported (XTGETTCAP).
     pub has_true_color: bool,
-    /// Support for kitty's graphics protocol.
+    /// Whether kitty's graphics protocol is supported.
     pub has_kitty: bool,
-    /// Support for sixels (DA1).
+    /// Whether Sixel is supported (DA1).
     pub has_sixel: bool,
-    /// Support for synchronized output (DECRQM 2026).
+    /// Whether synchronized output is supported (DECRQM 2026).
     pub is_synchronized: bool,
     /// Background color in sRGB (OSC 11).
     pub background: Option<[u8; 3]>,
 }
 
 impl Probe {
-    /// Name of the characters that an automatic preview is drawn with.
+    /// Name of the characters used to draw an automatic preview.
     pub fn preview(&self) -> &'static str {
         let name = self.answers.as_ref().and_then(|answers| answers.name.as_deref());
         let terminal = name.filter(|_| !self.is_multiplexed).and_then(TerminalId::from_report);
@@ -68,12 +68,13 @@ impl Probe {
     }
 }
 
-/// Timeout of the replies.
+/// Timeout for the replies.
 const PATIENCE: Duration = Duration::from_secs(1);
 
 /// Queries the terminal. `None` if stdin or stdout is not a terminal.
 ///
-/// Multiplexers and consoles are only asked for device attributes because they may print other queries.
+/// Multiplexers and consoles are queried only for device attributes because they may print other queries as
+/// text.
 pub fn probe() -> Option<Probe> {
     if !(io::stdin().is_terminal() && io::stdout().is_terminal()) {
         return None;
@@ -107,7 +108,7 @@ pub fn probe() -> Option<Probe> {
     })
 }
 
-/// Sends the queries in raw mode, then restores the previous modes.
+/// Sends the queries in raw mode, then restores the terminal modes.
 fn ask(questions: &[u8]) -> io::Result<Option<ProbeReplies>> {
     let stdin = io::stdin();
     let before = tcgetattr(&stdin)?;
@@ -115,7 +116,7 @@ fn ask(questions: &[u8]) -> io::Result<Option<ProbeReplies>> {
     cfmakeraw(&mut raw);
     tcsetattr(&stdin, SetArg::TCSANOW, &raw)?;
     let answers = converse(questions);
-    // Late replies must not reach the shell.
+    // Prevent late replies from reaching the shell.
     let _ = nix::sys::termios::tcflush(&stdin, FlushArg::TCIFLUSH);
     tcsetattr(&stdin, SetArg::TCSANOW, &before)?;
     answers
@@ -139,7 +140,7 @@ fn send(bytes: &[u8]) -> io::Result<()> {
     stdout.flush()
 }
 
-/// Reads replies until `is_all` holds. Returns false on timeout.
+/// Reads replies until `is_all` returns true. Returns false on timeout.
 fn read_replies(
     heard: &mut ReceivedReplies,
     begin: Instant,
@@ -167,7 +168,7 @@ fn read_replies(
 struct ReceivedReplies {
     decoder: Decoder,
     answers: Vec<TerminalReply>,
-    /// All bytes, for replies that the front end does not use.
+    /// All received bytes, for replies that the front end does not parse.
     bytes: Vec<u8>,
 }
 
@@ -211,7 +212,7 @@ impl ReceivedReplies {
         }
     }
 
-    /// The first text between `begin` and `end` without an escape character.
+    /// The first text between `begin` and `end` that does not contain an escape character.
     fn text_between(&self, begin: &[u8], end: u8) -> Option<String> {
         let starts = self.bytes.windows(begin.len()).enumerate().filter(|(_, window)| *window == begin);
         starts.into_iter().find_map(|(at, _)| {
@@ -245,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn refusals_are_not_capabilities() {
+    fn negative_replies_are_not_capabilities() {
         let refused =
             replies_in(b"\x1bP0+r524742\x1b\\\x1b[?2026;0$y\x1b_Gi=4211;ENOTSUPPORTED\x1b\\\x1b[?1;42c");
         assert_eq!(refused.answers(), ProbeReplies::default());

@@ -6,13 +6,13 @@ use crate::film::Picture;
 use crate::math::Vec3;
 use crate::math::color::{linear_to_srgb8, srgb8_to_linear};
 
-/// The image resized to `width` × `height`.
+/// Resizes an image to `width` × `height`.
 pub(super) fn resized(picture: &Picture, width: u32, height: u32) -> Picture {
     Picture { width, height, pixels: rescaled(picture, width, height).into_owned() }
 }
 
-/// The pixels of the resized image. Shrinking averages the covered pixels in linear light, weighted by area;
-/// enlarging repeats the nearest pixel.
+/// The pixels of the resized image. Downscaling averages the covered pixels in linear light, weighted by
+/// area. Upscaling repeats the nearest pixel.
 pub(super) fn rescaled(picture: &Picture, width: u32, height: u32) -> Cow<'_, [[u8; 3]]> {
     if (picture.width, picture.height) == (width, height) {
         return Cow::Borrowed(&picture.pixels);
@@ -28,7 +28,7 @@ pub(super) fn rescaled(picture: &Picture, width: u32, height: u32) -> Cow<'_, [[
     Cow::Owned(pixels)
 }
 
-/// The source pixels that a target pixel covers along one axis, with the covered lengths.
+/// The source pixels covered by a target pixel along one axis, with the covered lengths.
 fn covered(target: u32, targets: u32, sources: u32) -> Vec<(u32, f32)> {
     if targets >= sources {
         let middle = (u64::from(target) * 2 + 1) * u64::from(sources) / (2 * u64::from(targets.max(1)));
@@ -74,12 +74,12 @@ mod tests {
     }
 
     #[test]
-    fn shrinking_averages_in_linear_light() {
+    fn downscaling_averages_in_linear_light() {
         let checks = picture(8, 8, |x, y| if (x + y) % 2 == 0 { [255; 3] } else { [0; 3] });
         let half = linear_to_srgb8(0.5);
         assert_eq!(rescaled(&checks, 4, 4).as_ref(), [[half; 3]; 16]);
         let thirds = picture(3, 1, |x, _| if x == 0 { [255; 3] } else { [0; 3] });
-        // The first of two covers one white pixel and half a black one.
+        // The first of the two pixels covers one white pixel and half of a black one.
         assert_eq!(rescaled(&thirds, 2, 1).as_ref(), [[linear_to_srgb8(2.0 / 3.0); 3], [0; 3]]);
     }
 

@@ -1,4 +1,4 @@
-//! The event loop: sole owner of the terminal, and the only place with side effects.
+//! The event loop. It owns the terminal, and all side effects happen here.
 
 use std::collections::VecDeque;
 use std::io;
@@ -25,18 +25,18 @@ use super::update::{start, update};
 use super::writer;
 use crate::pipeline::protocol::{self, Command};
 
-/// Maximum time to plan a slice before it is sent and keys are handled.
+/// Maximum time to spend planning a slice before it is sent and keys are handled.
 const TURN: Duration = Duration::from_millis(3);
 
-/// Runs the front end until a key or a signal ends it, then restores the terminal and sends [`Command::Quit`]
-/// to the worker. Must be called only once per process.
+/// Runs the front end until it is ended by a key or signal, then restores the terminal and sends
+/// [`Command::Quit`] to the worker. Must not be called more than once per process.
 ///
 /// # Errors
-/// [`TuiError`] if there is no terminal, if it cannot be written to, or if the worker has ended.
+/// Returns a [`TuiError`] if there is no terminal, if writing to it fails, or if the worker has ended.
 pub fn run(options: Options) -> Result<TuiOutcome, TuiError> {
     terminal::require()?;
     let depth = color::depth(options.color, |name| std::env::var(name).ok());
-    // Otherwise crossterm drops named colors when NO_COLOR is set.
+    // Prevents crossterm from dropping named colors when NO_COLOR is set.
     crossterm::style::force_color_output(depth != ColorDepth::None);
 
     let (sender, events) = mpsc::channel();
@@ -87,7 +87,7 @@ fn failed(action: &'static str) -> impl Fn(io::Error) -> TuiError {
     move |source| TuiError::Terminal { action, source }
 }
 
-/// Forwards a channel to the event loop and reports its end.
+/// Forwards messages from a channel to the event loop and reports when the channel closes.
 fn forward<T: Send + 'static>(
     name: &str,
     from: Receiver<T>,
@@ -112,14 +112,14 @@ struct Ui {
     screen: TerminalSession,
     presenter: Presenter,
     events: Receiver<Event>,
-    /// Events that arrived while the loop waited for replies.
+    /// Events that arrived while waiting for replies.
     postponed: VecDeque<Event>,
     state: State,
     commands: Box<dyn FnMut(Command)>,
     cell_aspect: Option<f32>,
 }
 
-/// Reasons to leave the event loop.
+/// Reasons for leaving the event loop.
 enum LoopEnd {
     Quit(ExitStatus),
     Error(TuiError),
@@ -132,13 +132,13 @@ impl Ui {
         while end.is_none() {
             end = self.present().or_else(|| self.wait());
         }
-        // Unless the user quit, keep the checkpoint: a signal arrived, or the terminal is gone or broken.
+        // Keep the checkpoint unless the user quit: a signal arrived, or the terminal was closed or failed.
         if !matches!(&end, Some(LoopEnd::Quit(ExitStatus::QUIT))) {
             (self.commands)(Command::Suspend);
         }
         (self.commands)(Command::Quit);
         let status = match end {
-            // If SIGHUP was sent by hand, the terminal still exists and must be restored.
+            // If the user sent SIGHUP, the terminal still exists and must be restored.
             Some(LoopEnd::Quit(ExitStatus::HANGUP)) => {
                 if !terminal::is_there() {
                     self.screen.abandon();
@@ -163,7 +163,7 @@ impl Ui {
         })
     }
 
-    /// Leaves the screen and waits briefly for outstanding replies, which a shell would take for typed text.
+    /// Leaves the screen and waits briefly for pending replies, which a shell would interpret as typed text.
     fn leave(&mut self) {
         self.screen.leave();
         let deadline = self.presenter.display.reply_timeout().map(|patience| Instant::now() + patience);
@@ -214,8 +214,8 @@ impl Ui {
             Event::Unwritable(kind) => return Some(unwritable(kind.into())),
             Event::Key(_) | Event::Mouse(_) => {
                 let end = self.apply(event);
-                // A camera step is drawn with its first preview, which arrives at once and needs the
-                // processor.
+                // A camera step is drawn together with its first preview, which arrives immediately and needs
+                // the CPU.
                 self.state.urgent |= self.state.dirty && !self.state.awaits_step();
                 return end;
             }
@@ -247,7 +247,7 @@ impl Ui {
             Effect::Suspend if signals::has_shell() => {
                 self.leave();
                 self.screen.suspend();
-                // The process stops here; SIGCONT then requests a redraw.
+                // The process stops here. After it continues, SIGCONT requests a redraw.
                 signals::stop();
             }
             Effect::Suspend => {}
@@ -257,7 +257,7 @@ impl Ui {
             Effect::ReportFocus => self.screen.report_focus(),
             Effect::Redraw => return self.redraw(),
             Effect::Measure => {
-                // The window may have shrunk and grown again, which cuts off its content.
+                // The window may have shrunk and grown again, cutting off its content.
                 self.presenter.display.invalidate();
                 return self.measure();
             }
@@ -265,12 +265,12 @@ impl Ui {
         None
     }
 
-    /// Leaves the terminal to the editor until it exits.
+    /// Lets the editor use the terminal until it exits.
     fn edit(&mut self, place: &FilePosition) -> Option<LoopEnd> {
         self.leave();
         input::set_held(true);
         self.screen.suspend();
-        // While the terminal is not in raw mode, keys send signals.
+        // Outside raw mode, keys send signals.
         let child_signals = signals::leave_signals_to_child();
         terminal::save_modes();
         let outcome = editor::run(&editor::name(|name| std::env::var(name).ok()), place);
@@ -293,7 +293,7 @@ impl Ui {
         self.apply(Event::Resize(terminal::window(self.cell_aspect)))
     }
 
-    /// Draws a frame if one is due, and sends as much as the connection allows.
+    /// Draws a frame if one is due and sends as much as the connection allows.
     fn present(&mut self) -> Option<LoopEnd> {
         if !self.screen.is_taken() {
             self.presenter.postpone(&mut self.state, Instant::now());
@@ -306,7 +306,7 @@ impl Ui {
     }
 }
 
-/// Treats a vanished terminal as a hangup even if SIGHUP has not arrived.
+/// Treats a terminal that no longer exists as a hangup even if SIGHUP has not arrived.
 fn unwritable(error: io::Error) -> LoopEnd {
     if terminal::is_there() {
         LoopEnd::Error(TuiError::Terminal { action: "write to", source: error })

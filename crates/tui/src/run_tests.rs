@@ -1,7 +1,7 @@
 use super::*;
 
 #[test]
-fn end_of_a_channel_is_reported_last() {
+fn channel_close_is_reported_last() {
     let (from, receiver) = mpsc::channel();
     let (sender, events) = mpsc::channel();
     forward("test", receiver, &sender, Event::from_watcher, EventSource::Watcher).expect("a thread");

@@ -1,8 +1,8 @@
-//! Signal handling, and detection of a terminal that disappears without a signal.
+//! Signal handling, and detection of terminals that disappear without sending a signal.
 //!
-//! Signals are handled on separate threads because the event loop may be blocked by a terminal that accepts
-//! no output or by endless input. If the loop does not react to a terminating signal, the process is ended
-//! from here.
+//! Signals are handled on separate threads because the event loop may be blocked by a terminal that does not
+//! accept output, or by endless input. If the event loop does not react to a terminating signal, these
+//! threads end the process.
 
 use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -26,20 +26,20 @@ use super::ExitStatus;
 use super::event::{Event, Signal};
 use super::terminal;
 
-/// Time for the event loop to end after a signal.
+/// Grace period for the event loop to exit after a signal.
 const GRACE: Duration = Duration::from_millis(1500);
-/// Time for a stalled terminal to accept the bytes that restore it.
+/// Time allowed for a stalled terminal to accept the bytes that restore it.
 const RESCUE: Duration = Duration::from_millis(100);
-/// Poll interval for the existence of the terminal.
+/// How often to check that the terminal still exists.
 const WATCH: Duration = Duration::from_millis(500);
 
-/// Signals that the event loop handles.
+/// Signals handled by the event loop.
 const HANDLED_SIGNALS: [i32; 7] = [SIGINT, SIGTERM, SIGQUIT, SIGHUP, SIGTSTP, SIGCONT, SIGWINCH];
-/// Other signals that terminate a program: the terminal is restored first.
+/// Other signals that terminate the program after the terminal has been restored.
 const OTHER_SIGNALS: [i32; 9] =
     [SIGUSR1, SIGUSR2, SIGALRM, SIGVTALRM, SIGPROF, SIGXCPU, SIGIO, SIGSYS, SIGTRAP];
 
-/// The same for signals that only Linux has, including real-time signals.
+/// Linux-specific signals that terminate the program, including real-time signals.
 #[cfg(target_os = "linux")]
 fn linux_signals() -> impl Iterator<Item = i32> {
     [libc::SIGPWR, libc::SIGSTKFLT].into_iter().chain(libc::SIGRTMIN()..=libc::SIGRTMAX())
@@ -50,16 +50,16 @@ fn linux_signals() -> impl Iterator<Item = i32> {
     std::iter::empty()
 }
 
-/// A signal that only wakes the signal thread: no one else sends it, and it is ignored by default.
+/// A signal used to wake the signal thread. No other program sends it, and it is ignored by default.
 const MARK: i32 = SIGURG;
 
-/// Handles signals until it is dropped; then they have their default effects again.
+/// Handles signals. When it is dropped, signals have their default effects again.
 pub(super) struct Listener {
     over: Arc<AtomicBool>,
 }
 
 impl Listener {
-    /// Starts the signal threads, which send to `events`.
+    /// Starts the signal threads, which send events to `events`.
     pub(super) fn start(events: &Sender<Event>) -> io::Result<Self> {
         let over = Arc::new(AtomicBool::new(false));
         let mut signals = Signals::new(
@@ -85,24 +85,25 @@ impl Drop for Listener {
     }
 }
 
-/// Whether the terminal has hung up. The program then ends within [`GRACE`].
+/// Whether the terminal has hung up. If so, the program ends within [`GRACE`].
 static HUNG_UP: AtomicBool = AtomicBool::new(false);
 
-/// Whether a child process handles signals from the keyboard.
+/// Whether signals from the keyboard are handled by a child process.
 static CHILD_HANDLES_SIGNALS: AtomicBool = AtomicBool::new(false);
 
-/// Number of rounds in which all pending signals were handled.
+/// Number of times that all pending signals have been handled.
 static ROUNDS: (Mutex<u64>, Condvar) = (Mutex::new(0), Condvar::new());
 
 fn rounds() -> MutexGuard<'static, u64> {
     ROUNDS.0.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Timeout for the signal thread. Handling takes microseconds, so it only expires if the thread is gone.
+/// How long to wait for the signal thread. Handling takes microseconds, so the timeout expires only if the
+/// thread is gone.
 const SIGNAL_TIMEOUT: Duration = Duration::from_secs(10);
 
-/// Returns when all signals sent before have been handled. The first round may have started before the call,
-/// the second one has not.
+/// Waits until all signals sent before the call have been handled. Waits for two rounds, because the first
+/// may have started before the call.
 fn wait_for_pending_signals() {
     for _ in 0..2 {
         let before = rounds();
@@ -113,7 +114,7 @@ fn wait_for_pending_signals() {
     }
 }
 
-/// The foreground child process, and the signal that is ending this process.
+/// The foreground child process, and the signal that is terminating this process.
 struct ForegroundChild {
     id: Option<Pid>,
     ending: Option<Number>,
@@ -125,7 +126,7 @@ fn child() -> MutexGuard<'static, ForegroundChild> {
     CHILD.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Sets the child to which terminating signals are forwarded. `None` if it has exited.
+/// Sets the child process to which terminating signals are forwarded. `None` if it has exited.
 pub(super) fn set_child(id: Option<Pid>) {
     let mut child = child();
     child.id = id;
@@ -134,8 +135,8 @@ pub(super) fn set_child(id: Option<Pid>) {
     }
 }
 
-/// Forwards a terminating signal to the child, but only once, since the signal may come back with the rest of
-/// the job.
+/// Forwards a terminating signal to the child. Only the first one is forwarded, because this process also
+/// receives the signals that it sends to its job.
 fn end_child(number: Number) {
     let mut child = child();
     if child.ending.replace(number).is_none()
@@ -145,15 +146,15 @@ fn end_child(number: Number) {
     }
 }
 
-/// Forwards to the child or, if this process leads the job, to the whole job, since a shell does not forward
-/// signals to its children.
+/// Forwards the signal to the whole job if this process leads it, since a shell does not forward signals to
+/// its children. Otherwise forwards it to the child only.
 fn forward_to_child(id: Pid, number: Number) {
     let whole_job = Pid::from_raw(0);
-    // Ignore errors: the process may have exited.
+    // Ignore errors because the process may have exited.
     let _ = kill(if getpgrp() == getpid() { whole_job } else { id }, number);
 }
 
-/// Leaves keyboard signals to the child until the result is dropped.
+/// Lets the child handle keyboard signals until the returned guard is dropped.
 pub(super) fn leave_signals_to_child() -> ChildSignalGuard {
     CHILD_HANDLES_SIGNALS.store(true, Ordering::Release);
     ChildSignalGuard(())
@@ -164,7 +165,7 @@ pub(super) struct ChildSignalGuard(());
 
 impl Drop for ChildSignalGuard {
     fn drop(&mut self) {
-        // A key that ended the child also sent its signal to this process, which may not have been handled
+        // If a key press ended the child, this process also received its signal but may not have handled it
         // yet.
         wait_for_pending_signals();
         CHILD_HANDLES_SIGNALS.store(false, Ordering::Release);
@@ -182,8 +183,8 @@ impl SignalThread {
             return;
         }
         if self.over.load(Ordering::Acquire) {
-            // After a hangup, a SIGHUP must not interrupt the final checkpoint. It may arrive after the loop
-            // has noticed the hangup itself, or a second time from the shell.
+            // SIGHUP must not interrupt the final checkpoint after a hangup. It may arrive after the event
+            // loop has detected the hangup, or a second time from the shell.
             if number == SIGHUP {
                 if HUNG_UP.load(Ordering::Acquire) {
                     return;
@@ -192,7 +193,7 @@ impl SignalThread {
                     return self.notify(Signal::Hangup);
                 }
             }
-            // Signals that only exist on Linux are not known to signal-hook.
+            // signal-hook does not support signals that exist only on Linux.
             if low_level::emulate_default_handler(number).is_err() {
                 low_level::exit(128 + number);
             }
@@ -236,7 +237,7 @@ impl SignalThread {
             let over = Arc::clone(&self.over);
             thread::spawn(move || end_after_grace(signal, status, &over));
         }
-        // Without a receiver, the event loop has ended and needs no signal.
+        // If the channel is closed, the event loop has ended and does not need the signal.
         let _ = self.events.send(Event::Signal(signal));
     }
 }
@@ -266,8 +267,8 @@ fn ends(signal: Signal) -> Option<ExitStatus> {
     }
 }
 
-/// Ends the process if the event loop did not. After a hangup there is no terminal to restore. A running
-/// child may have left the terminal in any mode.
+/// Ends the process if the event loop has not ended. After a hangup, there is no terminal to restore. A
+/// running child may have changed the terminal modes.
 fn end_after_grace(signal: Signal, status: ExitStatus, over: &AtomicBool) {
     thread::sleep(GRACE);
     if signal != Signal::Hangup {
@@ -281,8 +282,8 @@ fn end_after_grace(signal: Signal, status: ExitStatus, over: &AtomicBool) {
     low_level::exit(i32::from(status.0));
 }
 
-/// Whether a stopped process could be continued, that is, whether a shell runs in the same session. The first
-/// process of a session has none.
+/// Whether a stopped process could be continued, meaning that a shell runs in the same session. If this is
+/// the first process in its session, there is no shell.
 pub(super) fn has_shell() -> bool {
     match (getsid(None), getsid(Some(getppid()))) {
         (Ok(own), Ok(parents)) => own == parents && own != getpid(),
@@ -290,14 +291,15 @@ pub(super) fn has_shell() -> bool {
     }
 }
 
-/// Stops the whole job with SIGTSTP, including a wrapper around glimt, as ctrl-z does outside raw mode.
+/// Stops the whole job with SIGTSTP, including any process that wraps glimt, just like ctrl-z outside raw
+/// mode.
 pub(super) fn stop_job() -> io::Result<()> {
     kill(Pid::from_raw(0), Number::SIGTSTP).map_err(io::Error::from)
 }
 
-/// Stops this process as SIGTSTP does by default. Returns when it is continued.
+/// Performs the default action of SIGTSTP, which stops this process. Returns when it is continued.
 pub(super) fn stop() {
-    // If the process cannot be stopped, it continues to run.
+    // If the process cannot be stopped, it keeps running.
     let _ = low_level::emulate_default_handler(SIGTSTP);
 }
 

@@ -1,4 +1,4 @@
-//! Images printed as lines of text, without a full-screen UI and without terminal queries.
+//! Prints images as lines of text, without a full-screen UI or terminal queries.
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
@@ -13,15 +13,15 @@ use super::view::preview::{PreviewColors, draw_image, size_in_cells};
 use super::view::text::{columns, shortened};
 use crate::film::Picture;
 
-/// Minimum width of a terminal that shows images.
+/// Minimum terminal width for showing images.
 const MIN_COLUMNS: u16 = 30;
-/// Minimum width of images that are side by side.
+/// Minimum width of images shown side by side.
 const MIN_BESIDE: u16 = 20;
-/// Columns between images.
+/// Number of columns between images.
 const GAP: u16 = 2;
-/// Rows of the terminal reserved for text.
+/// Terminal rows reserved for text.
 const WORDS: u16 = 17;
-/// Height of an image in a terminal with fewer rows.
+/// Minimum height of an image.
 const MIN_ROWS: u16 = 7;
 
 /// An image and its caption.
@@ -29,13 +29,13 @@ const MIN_ROWS: u16 = 7;
 pub struct NamedImage {
     /// Must not contain control characters.
     pub name: String,
-    /// Images printed together have the same size.
+    /// Images printed together must have the same size.
     pub picture: Picture,
 }
 
-/// Lines that show images side by side, or below each other in a narrow terminal. They use the terminal's
-/// colors, or characters if it has none. Empty if the terminal has fewer than 30 columns. Without a terminal,
-/// the size is 80×24.
+/// Draws images as text lines, side by side or, in a narrow terminal, below each other. Uses the terminal's
+/// colors, or ASCII characters without color support. Returns an empty string if the terminal has fewer than
+/// 30 columns. If the output is not a terminal, its size is assumed to be 80×24.
 pub fn images_as_text(pictures: &[NamedImage], color: ColorChoice, is_terminal: bool) -> String {
     let variable = |name: &str| std::env::var(name).ok();
     let depth = color::depth(color, variable);
@@ -46,14 +46,14 @@ pub fn images_as_text(pictures: &[NamedImage], color: ColorChoice, is_terminal: 
     buffers.iter().map(|buffer| as_text_lines(buffer, depth != ColorDepth::None)).collect()
 }
 
-/// Window size and cell aspect; some terminals report a size of 0.
+/// Window size and cell aspect ratio. Some terminals report a size of 0.
 fn window_size(window: &Window) -> ((u16, u16), f32) {
     let size = (window.columns, window.rows);
     let aspect = Some(window.cell_aspect).filter(|aspect| aspect.is_finite());
     (if size.0 == 0 || size.1 == 0 { (80, 24) } else { size }, aspect.unwrap_or(2.0))
 }
 
-/// The images in one or more rows of text cells.
+/// Arranges the images in one or more rows.
 fn lay_out(
     pictures: &[NamedImage],
     inks: PreviewColors<'_>,
@@ -72,7 +72,7 @@ fn lay_out(
     }
 }
 
-/// Images side by side below their captions, each at most as large as `room`.
+/// Draws images side by side below their captions. Each fits into `room`.
 fn row(pictures: &[NamedImage], inks: PreviewColors<'_>, room: (u16, u16), aspect: f32) -> Buffer {
     let sizes = pictures.iter().map(|one| size_in_cells(&one.picture, inks.depth, room, aspect));
     let (width, height) = sizes.fold((0, 0), |most, size| (most.0.max(size.0), most.1.max(size.1)));
@@ -124,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn images_without_colors_are_characters() {
+    fn images_without_color_use_ascii_characters() {
         let lines = laid_out_lines((100, 60), ColorDepth::None);
         assert!(lines.len() > 8 && lines[1..].iter().all(|line| line.is_ascii()), "{lines:?}");
     }

@@ -1,8 +1,8 @@
 //! Terminal setup and restoration.
 //!
-//! A [`TerminalSession`] owns the terminal. It is restored when the session is dropped, when the front end's
-//! thread panics (with a hook that is installed once), before the process stops, and with [`restore_from_other_thread`] when the
-//! front end is blocked.
+//! A [`TerminalSession`] owns the terminal. The terminal is restored when the session is dropped, when the
+//! front-end thread panics (using a hook that is installed once), before the process stops, and by
+//! [`restore_from_other_thread`] if the front end is blocked.
 
 use std::cell::Cell;
 use std::io::{self, IsTerminal, Write};
@@ -39,20 +39,20 @@ static MOUSE: AtomicBool = AtomicBool::new(true);
 static RAW: AtomicBool = AtomicBool::new(false);
 /// Whether focus reports are enabled.
 static FOCUS: AtomicBool = AtomicBool::new(false);
-/// Whether the window title was changed.
+/// Whether the window title has been changed.
 static HAS_TITLE: AtomicBool = AtomicBool::new(false);
 /// Whether a progress bar may be shown.
 static HAS_PROGRESS: AtomicBool = AtomicBool::new(false);
-/// Whether a hyperlink may be open.
+/// Whether a hyperlink may still be open.
 static HAS_LINKS: AtomicBool = AtomicBool::new(false);
 /// Whether the terminal stores images that must be deleted.
 static HAS_IMAGES: AtomicBool = AtomicBool::new(false);
-/// The thread whose panic restores the terminal. Panics of other threads are stored in [`PANIC`].
+/// The thread whose panics restore the terminal. Panic messages from other threads are stored in [`PANIC`].
 static OWNER: Mutex<Option<ThreadId>> = Mutex::new(None);
 /// Message of the last panic in another thread.
 static PANIC: Mutex<Option<String>> = Mutex::new(None);
 
-/// Button events and drags, in SGR format. (crossterm's own command enables all movements.)
+/// Button events and drags, in SGR format. (crossterm's command would enable all mouse movements.)
 const MOUSE_ON: &str = "\x1b[?1000h\x1b[?1002h\x1b[?1006h";
 const MOUSE_OFF: &str = "\x1b[?1006l\x1b[?1002l\x1b[?1000l";
 
@@ -60,29 +60,29 @@ const MOUSE_OFF: &str = "\x1b[?1006l\x1b[?1002l\x1b[?1000l";
 const FOCUS_ON: &str = "\x1b[?1004h";
 const FOCUS_OFF: &str = "\x1b[?1004l";
 
-/// Other changes that glimt may have made, with the bytes that undo them.
+/// Other terminal changes that glimt may have made, and the bytes that undo each of them.
 static CHANGES: [(&AtomicBool, &[u8]); 4] = [
     (&HAS_LINKS, LINK_OFF),
     (&HAS_TITLE, TITLE_BACK),
     (&HAS_PROGRESS, PROGRESS_OFF),
     (&FOCUS, FOCUS_OFF.as_bytes()),
 ];
-/// Terminates a control string that may have been cut off; otherwise the terminal would treat the following
-/// text as part of it.
+/// Terminates a control string that may have been cut off. Otherwise, the terminal would treat the following
+/// text as part of the string.
 const STRING_END: &[u8] = b"\x1b\\";
 
-/// With this height-to-width ratio of cells, half blocks are square.
+/// Height-to-width ratio of cells for which half blocks are square.
 const DEFAULT_CELL_ASPECT: f32 = 2.0;
-/// Typical size of a cell.
+/// Typical cell size in pixels.
 const DEFAULT_CELL_PIXELS: (u16, u16) = (8, 16);
-/// Timeout of each restoration step when the terminal accepts no output.
+/// Timeout for each restoration step if the terminal does not accept output.
 const STUCK: Duration = Duration::from_millis(60);
 
-/// The terminal in use by the front end.
+/// The terminal, while used by the front end.
 pub(super) struct TerminalSession(());
 
 impl TerminalSession {
-    /// Sets up the terminal: raw mode, alternate screen, no cursor.
+    /// Sets up the terminal: raw mode, alternate screen, hidden cursor.
     pub(super) fn open() -> Result<Self, TuiError> {
         chain_panic_hook();
         prepare_abort();
@@ -90,18 +90,18 @@ impl TerminalSession {
         Ok(Self(()))
     }
 
-    /// Whether the screen may be drawn on.
+    /// Whether drawing on the screen is allowed.
     pub(super) fn is_taken(&self) -> bool {
         TAKEN.load(Ordering::Acquire)
     }
 
-    /// Restores the screen but keeps raw mode until [`TerminalSession::resume`] or the end, so that late
-    /// replies are not echoed.
+    /// Restores the screen but keeps raw mode until [`TerminalSession::resume`] is called or the session
+    /// ends, so that late replies are not echoed.
     pub(super) fn leave(&mut self) {
         leave_screen();
     }
 
-    /// Restores the terminal until [`TerminalSession::resume`].
+    /// Restores the terminal until [`TerminalSession::resume`] is called.
     pub(super) fn suspend(&mut self) {
         restore();
     }
@@ -140,7 +140,7 @@ impl Drop for TerminalSession {
     }
 }
 
-/// Terminal modes before another program got the terminal. `None` at other times.
+/// Terminal modes saved while another program uses the terminal. `None` at other times.
 static LENT: Mutex<Option<Termios>> = Mutex::new(None);
 
 /// Saves the terminal modes for [`restore_modes`] before another program uses the terminal.
@@ -148,8 +148,8 @@ pub(super) fn save_modes() {
     *LENT.lock().unwrap_or_else(PoisonError::into_inner) = tcgetattr(io::stdin()).ok();
 }
 
-/// Restores the modes saved by [`save_modes`], since a killed program may leave its own. Errors are ignored because
-/// nothing can be done about them.
+/// Restores the modes saved by [`save_modes`], because a killed program may leave the terminal in a different
+/// mode. Errors are ignored because nothing can be done about them.
 pub(super) fn restore_modes() {
     if let Some(modes) = LENT.lock().unwrap_or_else(PoisonError::into_inner).take() {
         let _ = tcsetattr(io::stdin(), SetArg::TCSANOW, &modes);
@@ -172,8 +172,8 @@ fn restore() {
     }
 }
 
-/// Restores the screen if it is in use. Unsent output is dropped. If the terminal accepts nothing, output
-/// buffered by the system is dropped as well, and this returns within three times [`STUCK`].
+/// Restores the screen if it is in use, dropping unsent output. If the terminal does not accept output, data
+/// buffered by the operating system is also dropped. Returns within three times [`STUCK`].
 fn leave_screen() {
     if !TAKEN.swap(false, Ordering::AcqRel) {
         return;
@@ -184,15 +184,15 @@ fn leave_screen() {
     }
     let mut bytes = Vec::new();
     let (deadline, dropped) = (Instant::now() + STUCK, Cell::new(false));
-    // Nothing else writes, so dropping the system's buffer makes room.
+    // Nothing else is writing, so dropping the system's buffered output makes room.
     let is_late = || Instant::now() >= deadline && (dropped.replace(true) || drop_kept().is_err());
     let _ = leave(&mut bytes)
         .and_then(|()| writer::open_output())
         .and_then(|mut out| writer::write_all(&mut out, &bytes, is_late));
 }
 
-/// Restores the terminal from another thread while its owner may be blocked. Returns soon; if the terminal
-/// accepts nothing, only the spawned thread waits.
+/// Restores the terminal from another thread in case its owner is blocked. Returns quickly: if the terminal
+/// does not accept output, only a spawned thread waits.
 pub(super) fn restore_from_other_thread() {
     if RAW.swap(false, Ordering::AcqRel) {
         let _ = disable_raw_mode();
@@ -206,7 +206,7 @@ pub(super) fn restore_from_other_thread() {
     }
 }
 
-/// Data for restoring the terminal on abort without allocating.
+/// Data needed to restore the terminal on abort without allocating memory.
 static LAST_WORDS: OnceLock<RestoreData> = OnceLock::new();
 
 struct RestoreData {
@@ -218,19 +218,19 @@ struct RestoreData {
     leave: Vec<u8>,
 }
 
-/// Prepares for restoring the terminal on abort, for example after a failed allocation.
+/// Prepares for restoring the terminal on abort, such as after a failed allocation.
 fn prepare_abort() {
     LAST_WORDS.get_or_init(|| {
         let (mut delete_images, mut leave) = (Vec::new(), Vec::new());
-        // Writing to a vector does not fail.
+        // Writing to a vector cannot fail.
         let _ = leave_images(&mut delete_images).and_then(|()| leave_text(&mut leave));
         RestoreData { modes: tcgetattr(io::stdin()).ok().map(Into::into), delete_images, leave }
     });
     abort::set_terminal_restore(restore_on_abort);
 }
 
-/// Restores the terminal using only async-signal-safe calls: no locks, no allocations. Waits at most
-/// [`STUCK`] for a terminal that accepts nothing.
+/// Restores the terminal using only async-signal-safe calls, without locks or allocations. If the terminal
+/// does not accept output, waits no longer than [`STUCK`].
 fn restore_on_abort() {
     let Some(words) = LAST_WORDS.get() else { return };
     if TAKEN.swap(false, Ordering::AcqRel) {
@@ -261,12 +261,13 @@ pub(super) fn record_images() {
     HAS_IMAGES.store(true, Ordering::Release);
 }
 
-/// Enables focus reports whenever the terminal is set up.
+/// Enables focus reports each time the terminal is set up.
 pub(super) fn enable_focus_reports() {
     FOCUS.store(true, Ordering::Release);
 }
 
-/// Bytes to send before setting a window title: they save the original one, the first time.
+/// Bytes to send before setting a window title. The first time, they save the original title. After that,
+/// they are empty.
 pub(super) fn title_saving_bytes() -> &'static [u8] {
     if HAS_TITLE.swap(true, Ordering::AcqRel) { b"" } else { KEEP_TITLE }
 }
@@ -281,8 +282,8 @@ pub(super) fn record_links() {
     HAS_LINKS.store(true, Ordering::Release);
 }
 
-/// Bytes that undo the other changes. Each is returned once, except for modes, which are set again whenever
-/// the terminal is set up.
+/// Bytes that undo the other changes. Each change is undone only once, except for modes, which are enabled
+/// again when the terminal is set up.
 fn undo_bytes() -> impl Iterator<Item = &'static [u8]> {
     let mut is_first = true;
     CHANGES.iter().flat_map(move |(flag, bytes)| {
@@ -308,7 +309,7 @@ fn enter(out: &mut impl Write) -> io::Result<()> {
     )
 }
 
-/// Writes the bytes that restore the screen, from any state in which a frame may have been cut off.
+/// Writes the bytes that restore the screen, even if a frame was cut off at any point.
 fn leave(out: &mut impl Write) -> io::Result<()> {
     if HAS_IMAGES.load(Ordering::Acquire) {
         leave_images(out)?;
@@ -323,7 +324,7 @@ fn leave_images(out: &mut impl Write) -> io::Result<()> {
     out.write_all(&graphics::delete_all())
 }
 
-/// Writes the bytes that end an unfinished frame and return to the shell's screen.
+/// Writes the bytes that end an unfinished frame and switch back to the shell's screen.
 fn leave_text(out: &mut impl Write) -> io::Result<()> {
     execute!(
         out,
@@ -336,9 +337,9 @@ fn leave_text(out: &mut impl Write) -> io::Result<()> {
     )
 }
 
-/// Installs the panic hook. While the terminal is in use, a panic of its owner restores it before it is
-/// reported. A panic of another thread would be lost on the alternate screen, so it is stored for
-/// [`last_panic`].
+/// Installs the panic hook. If the terminal's owner panics while using it, the terminal is restored before
+/// the panic is reported. A panic message from another thread would be lost on the alternate screen, so it is
+/// stored for [`last_panic`].
 fn chain_panic_hook() {
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {
@@ -360,7 +361,7 @@ pub(super) fn last_panic() -> Option<String> {
     PANIC.lock().unwrap_or_else(PoisonError::into_inner).clone()
 }
 
-/// Fails if stdin or stdout is not a terminal.
+/// Returns an error if stdin or stdout is not a terminal.
 pub(super) fn require() -> Result<(), TuiError> {
     if !io::stdin().is_terminal() {
         return Err(TuiError::NotATerminal { stream: "standard input" });
@@ -376,8 +377,8 @@ pub(super) fn is_there() -> bool {
     require().is_ok()
 }
 
-/// Window size and cell aspect. The aspect is `cell_aspect` if given, else derived from the window's size in
-/// pixels, else 2.
+/// Window size and cell aspect ratio. The aspect ratio is `cell_aspect` if given. Otherwise it is derived
+/// from the window size in pixels, or 2 if that is unknown.
 pub(super) fn window(cell_aspect: Option<f32>) -> Window {
     match terminal::window_size() {
         Ok(size) => limit_window(Window {
@@ -399,13 +400,13 @@ pub(super) fn window(cell_aspect: Option<f32>) -> Window {
     }
 }
 
-/// Maximum number of columns drawn, more than any wall of screens has.
+/// Maximum number of columns drawn, which is more than even a video wall has.
 const MAX_COLUMNS: u16 = 4096;
-/// Maximum number of cells drawn. Each takes hundreds of bytes, and terminals may report 65,535 columns and
-/// rows.
+/// Maximum number of cells drawn. A cell takes hundreds of bytes of memory, and terminals may report up to
+/// 65,535 columns and rows.
 const MAX_CELLS: u32 = 1 << 20;
 
-/// Limits a window to the part that is drawn.
+/// Limits a window to the size that is drawn.
 fn limit_window(window: Window) -> Window {
     let columns = window.columns.min(MAX_COLUMNS);
     let most_rows = MAX_CELLS / u32::from(columns.max(1));
@@ -413,8 +414,8 @@ fn limit_window(window: Window) -> Window {
     Window { columns, rows, ..window }
 }
 
-/// Height-to-width ratio of a cell. Sizes in pixels are often zero or nonsense. Values within 3% of 2 are
-/// rounded to 2 so that previews need no scaling.
+/// Height-to-width ratio of a cell. Reported pixel sizes are often zero or implausible. Values within 3% of 2
+/// are rounded to 2 so that previews need no scaling.
 fn aspect(cells: (u16, u16), pixels: (u16, u16)) -> f32 {
     let width = f32::from(pixels.0) / f32::from(cells.0);
     let height = f32::from(pixels.1) / f32::from(cells.1);
@@ -423,7 +424,7 @@ fn aspect(cells: (u16, u16), pixels: (u16, u16)) -> f32 {
     if sane && (aspect - DEFAULT_CELL_ASPECT).abs() > 0.06 { aspect } else { DEFAULT_CELL_ASPECT }
 }
 
-/// Size of a cell in pixels, if it is plausible.
+/// Cell size in pixels, if plausible.
 fn cell_pixels(cells: (u16, u16), pixels: (u16, u16)) -> (u16, u16) {
     let side = |pixels: u16, cells: u16| pixels.checked_div(cells).filter(|side| (2..=100).contains(side));
     side(pixels.0, cells.0).zip(side(pixels.1, cells.1)).unwrap_or(DEFAULT_CELL_PIXELS)
@@ -433,7 +434,7 @@ fn cell_pixels(cells: (u16, u16), pixels: (u16, u16)) -> (u16, u16) {
 mod tests {
     use super::*;
 
-    /// Serializes the tests, which share process-wide state.
+    /// Serializes tests because they share process-wide state.
     static ALONE: Mutex<()> = Mutex::new(());
 
     fn exclusive_access() -> std::sync::MutexGuard<'static, ()> {
@@ -469,7 +470,7 @@ mod tests {
         record_links();
         assert_eq!(all(), [STRING_END, LINK_OFF, TITLE_BACK, PROGRESS_OFF]);
         assert!(all().is_empty());
-        assert_eq!(title_saving_bytes(), KEEP_TITLE, "saved again when set again");
+        assert_eq!(title_saving_bytes(), KEEP_TITLE, "the new title is saved again");
         assert_eq!(all(), [STRING_END, TITLE_BACK]);
     }
 
@@ -497,7 +498,7 @@ mod tests {
     }
 
     #[test]
-    fn number_of_cells_is_bounded() {
+    fn number_of_cells_is_limited() {
         let of = |columns, rows| {
             let cell_pixels = DEFAULT_CELL_PIXELS;
             let drawn = limit_window(Window { columns, rows, cell_aspect: DEFAULT_CELL_ASPECT, cell_pixels });
@@ -521,7 +522,7 @@ mod tests {
     }
 
     #[test]
-    fn restoring_an_unused_terminal_does_nothing() {
+    fn restoring_unused_terminal_does_nothing() {
         let _alone = exclusive_access();
         assert!(!TAKEN.load(Ordering::Acquire));
         restore();

@@ -1,10 +1,10 @@
-//! Queries to terminals and their replies.
+//! Terminal queries and replies.
 
 use super::graphics::Protocol;
 use super::pixel_request::PixelRequest;
 use super::terminals::{Brand, TerminalId};
 
-/// The finest block characters that a terminal draws itself, independently of its font.
+/// The finest block characters that a terminal draws without using a font.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum BlockGlyphs {
     /// Not known.
@@ -16,7 +16,8 @@ pub(super) enum BlockGlyphs {
 }
 
 impl BlockGlyphs {
-    /// Block characters of a terminal version. All terminals listed here have long drawn sextants.
+    /// Block characters supported by a terminal version. All terminals listed here have supported sextants
+    /// for a long time.
     pub(super) fn of(terminal: TerminalId) -> Self {
         let octants_since = match terminal.brand {
             Brand::Kitty => [0, 40],
@@ -38,7 +39,7 @@ impl BlockGlyphs {
     }
 }
 
-/// A report from the terminal, solicited or not.
+/// A terminal report, solicited or not.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum TerminalReply {
     /// Status report (DSR 5): everything sent before it has been processed.
@@ -47,15 +48,15 @@ pub(super) enum TerminalReply {
     Attributes,
     /// Whether mode 2026, synchronized output, is supported.
     Synchronized { is_known: bool },
-    /// Name and version (XTVERSION), if glimt knows the terminal.
+    /// Name and version (XTVERSION), if glimt recognizes the terminal.
     Name(TerminalId),
-    /// Whether the window has the focus (mode 1004).
+    /// Whether the window is focused (mode 1004).
     Focus { is_here: bool },
     /// 24-bit color is supported (XTGETTCAP).
     TrueColor,
     /// Background color in sRGB (OSC 11).
     Background([u8; 3]),
-    /// Images are supported with this protocol.
+    /// Images can be drawn with this protocol.
     Images(Protocol),
     /// A palette color in sRGB (OSC 4).
     Ink { index: u8, rgb: [u8; 3] },
@@ -63,13 +64,13 @@ pub(super) enum TerminalReply {
     Other,
 }
 
-/// Queries to send, only if they are useful and the terminal itself will answer. Replies to other queries are
-/// ignored.
+/// Which queries to send. A query is sent only if it is useful and answered by the terminal itself. Replies
+/// to other queries are ignored.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct TerminalQueries {
-    /// Block characters, from the terminal's name.
+    /// Block characters, deduced from the terminal's name.
     pub(super) blocks: bool,
-    /// Other capabilities, from the terminal's name.
+    /// Other capabilities, deduced from the terminal's name.
     pub(super) name: bool,
     /// Support for 24-bit color.
     pub(super) true_color: bool,
@@ -77,12 +78,12 @@ pub(super) struct TerminalQueries {
     pub(super) background: bool,
     /// The 16 ANSI colors.
     pub(super) palette: bool,
-    /// Support for images.
+    /// Image support.
     pub(super) pixels: Option<PixelRequest>,
 }
 
 impl TerminalQueries {
-    /// The bytes of the queries.
+    /// The query bytes to send.
     pub(super) fn query_bytes(self) -> Vec<u8> {
         let mut queries = Vec::new();
         let mut ask = |is_asked: bool, bytes: &[u8]| {
@@ -93,7 +94,7 @@ impl TerminalQueries {
         let pixels = self.pixels.map(PixelRequest::query).unwrap_or_default();
         ask(self.blocks || self.name, b"\x1b[>q");
         ask(true, &pixels);
-        // `RGB` and `Tc` in hexadecimal.
+        // `RGB` and `Tc`, hex-encoded.
         ask(self.true_color, b"\x1bP+q524742\x1b\\\x1bP+q5463\x1b\\");
         ask(self.background, b"\x1b]11;?\x1b\\");
         for index in 0..16 {
@@ -121,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn octants_depend_on_the_version() {
+    fn octant_support_depends_on_version() {
         for (report, blocks) in [
             ("kitty(0.40.1)", BlockGlyphs::Octants),
             ("kitty(0.35.2)", BlockGlyphs::Sextants),

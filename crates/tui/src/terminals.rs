@@ -1,5 +1,5 @@
-//! Known terminals and their capabilities beyond text. Unknown terminals get none of the sequences listed
-//! here.
+//! Known terminals and their capabilities beyond text. None of the escape sequences listed here are sent to
+//! unknown terminals.
 
 /// Terminals that glimt recognizes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,27 +22,27 @@ pub(super) enum Brand {
     Xterm,
 }
 
-/// A terminal and its version, `[0, 0]` if unknown.
+/// A terminal and its version. `[0, 0]` if unknown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct TerminalId {
     pub(super) brand: Brand,
     pub(super) version: [u32; 2],
 }
 
-/// Protocols for desktop notifications.
+/// Desktop notification protocols.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum NotificationProtocol {
     /// iTerm2's protocol.
     Osc9,
     /// kitty's protocol.
     Osc99,
-    /// The protocol of rxvt-unicode, with a title.
+    /// rxvt-unicode's protocol, with a title.
     Osc777,
-    /// The bell, which makes a window ask for attention.
+    /// The bell, which highlights the window in most environments.
     Bell,
 }
 
-/// Capabilities of a terminal beyond text.
+/// Terminal capabilities beyond text.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Capabilities {
     /// Window titles (OSC 2).
@@ -54,12 +54,12 @@ pub(super) struct Capabilities {
     pub(super) focus: bool,
     /// Hyperlinks (OSC 8).
     pub(super) links: bool,
-    /// Clipboard access (OSC 52), possibly after asking the user.
+    /// Clipboard access (OSC 52). The terminal may ask the user for permission.
     pub(super) clipboard: bool,
 }
 
 impl Brand {
-    /// The terminal with this `TERM_PROGRAM`. `None` if unknown.
+    /// The terminal that sets `TERM_PROGRAM` to this value. `None` if unknown.
     pub(super) fn from_program(name: &str) -> Option<Self> {
         const PROGRAMS: [(&str, Brand); 6] = [
             ("ghostty", Brand::Ghostty),
@@ -72,7 +72,7 @@ impl Brand {
         PROGRAMS.iter().find(|(known, _)| *known == name).map(|(_, brand)| *brand)
     }
 
-    /// Whether a terminal identified by `TERM_PROGRAM` supports 24-bit color and REP.
+    /// Whether this terminal, identified by `TERM_PROGRAM`, supports 24-bit color and REP.
     pub(super) fn has_colors_and_repeats(self) -> bool {
         match self {
             Self::Ghostty | Self::WezTerm | Self::Iterm2 | Self::VsCode => true,
@@ -90,7 +90,7 @@ impl Brand {
         }
     }
 
-    /// Whether it supports iTerm2's inline images.
+    /// Whether the terminal supports iTerm2's inline images.
     pub(super) fn has_iterm_images(self) -> bool {
         match self {
             Self::WezTerm | Self::Iterm2 | Self::VsCode => true,
@@ -111,7 +111,7 @@ impl Brand {
 }
 
 impl TerminalId {
-    /// Parses an XTVERSION report such as `foot(1.20.2)` or `ghostty 1.2.0`.
+    /// Parses an XTVERSION report, such as `foot(1.20.2)` or `ghostty 1.2.0`.
     pub(super) fn from_report(report: &str) -> Option<Self> {
         const NAMES: [(&str, Brand); 10] = [
             ("kitty", Brand::Kitty),
@@ -130,8 +130,8 @@ impl TerminalId {
         Some(Self { brand: *brand, version: version(rest.get(1..).unwrap_or_default()) })
     }
 
-    /// Detects the terminal from environment variables. `None` if unknown, and inside tmux and screen, which
-    /// do not pass on the sequences.
+    /// Detects the terminal from environment variables. `None` if unknown, or inside tmux or screen, which do
+    /// not pass on the escape sequences.
     pub(super) fn from_environment(variable: impl Fn(&str) -> Option<String>) -> Option<Self> {
         const TERMS: [(&str, Brand); 6] = [
             ("xterm-kitty", Brand::Kitty),
@@ -148,7 +148,7 @@ impl TerminalId {
             return None;
         }
         let known = |brand: Brand, number: &str| Some(Self { brand, version: version(&get(number)) });
-        // Terminals that run inside another one overwrite these two variables.
+        // These two variables are overwritten by terminals that run inside other terminals.
         if let Some(brand) = Brand::from_program(&get("TERM_PROGRAM")) {
             return known(brand, "TERM_PROGRAM_VERSION");
         }
@@ -160,12 +160,12 @@ impl TerminalId {
             () if get("ConEmuANSI") == "ON" => known(Brand::ConEmu, ""),
             () if is_set("VTE_VERSION") => known(Brand::Vte, "VTE_VERSION"),
             () if is_set("KONSOLE_VERSION") => {
-                // 250402 is version 25.04.2.
+                // 250402 means version 25.04.2.
                 let number: u32 = get("KONSOLE_VERSION").parse().unwrap_or(0);
                 Some(Self { brand: Brand::Konsole, version: [number / 10_000, number / 100 % 100] })
             }
             () if is_set("XTERM_VERSION") => known(Brand::Xterm, ""),
-            // Over SSH, only iTerm2 has its name forwarded by default.
+            // iTerm2 is the only terminal whose name is forwarded over SSH by default.
             () if get("LC_TERMINAL") == "iTerm2" => known(Brand::Iterm2, "LC_TERMINAL_VERSION"),
             () => None,
         }
@@ -191,7 +191,7 @@ impl TerminalId {
             Brand::Ghostty => {
                 Capabilities { notice: Some(NotificationProtocol::Osc777), progress: since([1, 2]), ..all }
             }
-            // Older versions showed the sequence as a notification.
+            // Older versions displayed the sequence as a notification.
             Brand::WezTerm => Capabilities {
                 notice: Some(NotificationProtocol::Osc777),
                 progress: since([20_250_301, 0]),
@@ -208,7 +208,7 @@ impl TerminalId {
             Brand::Vte => {
                 Capabilities { progress: since([8000, 0]), links: since([5000, 0]), clipboard: false, ..all }
             }
-            // xterm rejects clipboard access by default.
+            // xterm denies clipboard access by default.
             Brand::Xterm => Capabilities { links: false, clipboard: false, ..all },
             Brand::ConEmu => Capabilities { title: true, progress: true, ..Capabilities::default() },
             Brand::AppleTerminal => {
@@ -218,7 +218,7 @@ impl TerminalId {
     }
 }
 
-/// Whether a terminal with this name supports only text and colors, or intercepts other sequences.
+/// Whether a terminal with this `TERM` supports only text and colors, or intercepts other escape sequences.
 fn is_without_extras(term: &str) -> bool {
     term.is_empty() || ["linux", "dumb", "vt", "screen", "tmux"].iter().any(|name| term.starts_with(name))
 }
@@ -241,7 +241,7 @@ mod tests {
     }
 
     #[test]
-    fn terminals_are_detected_from_variables() {
+    fn terminals_are_detected_from_environment() {
         let xterm = ("TERM", "xterm-256color");
         for (pairs, brand, version) in [
             (&[("TERM", "xterm-kitty")][..], Brand::Kitty, [0, 0]),
@@ -260,7 +260,7 @@ mod tests {
                 Brand::WezTerm,
                 [20_240_203, 110_809],
             ),
-            // VS Code started from kitty.
+            // VS Code, started from kitty.
             (&[xterm, ("TERM_PROGRAM", "vscode"), ("KITTY_WINDOW_ID", "1")], Brand::VsCode, [0, 0]),
         ] {
             assert_eq!(identify(pairs), Some(TerminalId { brand, version }), "{pairs:?}");
@@ -286,7 +286,7 @@ mod tests {
     }
 
     #[test]
-    fn progress_bar_depends_on_the_version() {
+    fn progress_bar_support_depends_on_version() {
         for (report, has_progress) in [
             ("ghostty 1.2.0", true),
             ("ghostty 1.1.3-arch2", false),

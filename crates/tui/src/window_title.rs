@@ -1,6 +1,6 @@
-//! Window title, progress bar, desktop notifications and clipboard of the terminal.
+//! The terminal's window title, progress bar, desktop notifications and clipboard.
 //!
-//! Each is sent after the preview and only to terminals known to support it (see `terminals`).
+//! They are sent after the preview, and only to terminals known to support them (see `terminals`).
 
 use std::time::Duration;
 
@@ -10,14 +10,15 @@ use super::terminals::NotificationProtocol;
 use super::view;
 use crate::scene::sanitize::visible;
 
-/// Time after which title and progress bar show a render, so that camera movement does not change them.
+/// How long a render must have been running to be shown in the title and progress bar, so that they are not
+/// affected by camera movement.
 const SHORT: Duration = Duration::from_millis(500);
-/// Percentage step on a slow connection.
+/// Step between percentages on a slow connection.
 const COARSE: u32 = 10;
 
 /// Saves the window title for [`TITLE_BACK`].
 pub(super) const KEEP_TITLE: &[u8] = b"\x1b[22;2t";
-/// Restores the window title, or the default one if none was saved.
+/// Restores the saved window title, or the default title if none was saved.
 pub(super) const TITLE_BACK: &[u8] = b"\x1b]2;\x1b\\\x1b[23;2t";
 /// Removes the progress bar.
 pub(super) const PROGRESS_OFF: &[u8] = b"\x1b]9;4;0;0\x1b\\";
@@ -27,7 +28,7 @@ pub(super) const PROGRESS_OFF: &[u8] = b"\x1b]9;4;0;0\x1b\\";
 pub(super) enum ProgressBar {
     #[default]
     None,
-    /// Working for an unknown time.
+    /// Working, with unknown progress.
     Busy,
     Percent(u32),
     Paused(u32),
@@ -47,7 +48,7 @@ impl ProgressBar {
     }
 }
 
-/// Window title and progress bar, where the terminal supports them.
+/// Window title and progress bar, if supported by the terminal.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct WindowTitle {
     pub(super) title: Option<String>,
@@ -55,8 +56,8 @@ pub(super) struct WindowTitle {
 }
 
 impl WindowTitle {
-    /// Title and progress of the state, in coarser steps if the connection `is_slow`. `None` if they should
-    /// not change.
+    /// Title and progress bar for the state, with larger percentage steps if the connection `is_slow`. `None`
+    /// if they should stay as they are.
     pub(super) fn of(state: &State, is_slow: bool) -> Option<Self> {
         let capabilities = state.display.capabilities;
         if state.work.running_time(state.now).is_some_and(|time| time < SHORT) && !state.work.paused {
@@ -71,7 +72,7 @@ impl WindowTitle {
         })
     }
 
-    /// Bytes that change the title and progress bar to those of `to`.
+    /// Bytes that change the title and progress bar from `self` to `to`.
     pub(super) fn changes(&self, to: &Self) -> Vec<u8> {
         let mut bytes = Vec::new();
         if let Some(title) = to.title.as_ref().filter(|_| self.title != to.title) {
@@ -91,7 +92,7 @@ fn title(state: &State, percent: Option<u32>) -> String {
     format!("{}: {word}{percent} · glimt", name(state))
 }
 
-/// File name of the scene.
+/// The scene's file name.
 fn name(state: &State) -> String {
     let name = state.request.scene.file_name().unwrap_or(state.request.scene.as_os_str());
     visible(&name.to_string_lossy()).into_owned()
@@ -106,7 +107,7 @@ fn bar(state: &State, percent: Option<u32>) -> ProgressBar {
     }
 }
 
-/// Bytes of a notification that a render has ended after `time`.
+/// Bytes that send a notification that a render has ended after `time`.
 pub(super) fn notice(state: &State, notice: NotificationProtocol, time: Duration) -> Vec<u8> {
     let words = format!("{}: {} after {}", name(state), view::state_word(state), view::text::duration(time));
     match notice {
@@ -143,9 +144,9 @@ mod tests {
     }
 
     #[test]
-    fn title_and_progress_bar_follow_the_render() {
+    fn title_and_progress_bar_show_the_render() {
         let (mut ui, mut shown_title) = (ui(), WindowTitle::default());
-        assert_eq!(sent(&mut shown_title, &ui, false), "", "short renders are not shown");
+        assert_eq!(sent(&mut shown_title, &ui, false), "", "short renders should not be shown");
         ui.wait(600);
         let busy = "\x1b]2;cornell.toml: rendering · glimt\x1b\\\x1b]9;4;3;0\x1b\\";
         assert_eq!(sent(&mut shown_title, &ui, false), busy);
@@ -161,7 +162,7 @@ mod tests {
         ui.finish([200, 30, 30]);
         let done = "\x1b]2;cornell.toml: done · glimt\x1b\\\x1b]9;4;0;0\x1b\\";
         assert_eq!(sent(&mut shown_title, &ui, false), done);
-        assert_eq!(sent(&mut shown_title, &ui, false), "", "no bytes without a change");
+        assert_eq!(sent(&mut shown_title, &ui, false), "", "unchanged state should send no bytes");
         ui.fail(Vec::new());
         ui.event(crate::event::Event::Settled);
         assert!(sent(&mut shown_title, &ui, false).contains("\x1b]9;4;2;100\x1b\\"));

@@ -1,4 +1,4 @@
-//! Writes to the terminal on a separate thread, so a stalled terminal never blocks the event loop.
+//! Writes to the terminal on a separate thread so that a stalled terminal never blocks the event loop.
 
 use std::collections::VecDeque;
 use std::fs::{File, OpenOptions};
@@ -16,7 +16,7 @@ use nix::unistd::ttyname;
 
 use super::event::Event;
 
-/// Slices to be written. There is only one standard output, so there is one queue.
+/// Slices to be written. There is a single queue because there is only one standard output.
 static QUEUE: WriteQueue = WriteQueue {
     waiting: Mutex::new(PendingWrites { slices: VecDeque::new(), is_writing: false, is_given_up: false }),
     changed: Condvar::new(),
@@ -57,10 +57,10 @@ impl WriteQueue {
     }
 }
 
-/// Starts the writer thread. It reports each written slice and ends after the first error.
+/// Starts the writer thread, which reports each written slice and ends after the first error.
 ///
 /// # Errors
-/// The system has no thread or file descriptor left.
+/// The thread or file descriptor could not be created.
 pub(super) fn start(events: &Sender<Event>) -> io::Result<()> {
     let events = events.clone();
     let mut out = open_output()?;
@@ -82,15 +82,15 @@ pub(super) fn start(events: &Sender<Event>) -> io::Result<()> {
     Ok(())
 }
 
-/// Opens the terminal of standard output without a buffer and without a lock that a stalled writer could
-/// hold. It is nonblocking, which does not affect other users of the terminal.
+/// Opens the terminal connected to standard output, without buffering and without a lock that a stalled
+/// writer could hold. It is opened as nonblocking, which does not affect other users of the terminal.
 pub(super) fn open_output() -> io::Result<File> {
     let stdout = io::stdout();
     let terminal = ttyname(stdout.as_fd()).map_err(io::Error::from).and_then(|name| {
         let flags = OFlag::O_NONBLOCK | OFlag::O_NOCTTY;
         OpenOptions::new().write(true).custom_flags(flags.bits()).open(name)
     });
-    // A terminal without a name is used as is.
+    // If the terminal has no name, standard output is used directly.
     terminal.or_else(|_| Ok(File::from(stdout.as_fd().try_clone_to_owned()?)))
 }
 
@@ -103,8 +103,8 @@ pub(super) fn send(slice: Vec<u8>) {
     QUEUE.changed.notify_all();
 }
 
-/// Drops queued slices and waits for the one being written. After `patience`, drops its rest as well and
-/// returns false.
+/// Drops queued slices and waits for the slice being written. If this takes longer than `patience`, also
+/// drops the rest of that slice and returns false.
 pub(super) fn discard(patience: Duration) -> bool {
     let mut waiting = QUEUE.lock();
     waiting.slices.clear();
@@ -120,7 +120,7 @@ pub(super) fn discard(patience: Duration) -> bool {
     is_whole
 }
 
-/// Poll interval while the terminal accepts nothing.
+/// Poll interval while the terminal does not accept output.
 const POLL_INTERVAL: Duration = Duration::from_millis(20);
 
 /// Writes all bytes unless `is_given_up` returns true.
@@ -136,7 +136,7 @@ pub(super) fn write_all(out: &mut File, mut bytes: &[u8], is_given_up: impl Fn()
                 }
                 let mut ends = [PollFd::new(out.as_fd(), PollFlags::POLLOUT)];
                 let look = PollTimeout::try_from(POLL_INTERVAL).unwrap_or(PollTimeout::ZERO);
-                // The next write reports any error.
+                // Errors are reported by the next write.
                 let _ = poll(&mut ends, look);
             }
             Err(error) => return Err(error),

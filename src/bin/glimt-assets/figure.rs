@@ -1,5 +1,5 @@
-//! A bear made of balls and round cones with smooth joints, for `scenes/figure.toml`: 0.33 high, with its seat at the
-//! origin.
+//! A bear made of balls and round cones with smooth joints, for `scenes/figure.toml`. It is 0.33 high and
+//! sits at the origin.
 
 use super::surface::Surface;
 use super::vector::{Vector, add, dot, mix, scale, subtract, unit};
@@ -12,7 +12,7 @@ const CELLS: [usize; 3] = [91, 124, 91];
 /// Distance below which two parts blend.
 const BLEND: f64 = 0.022;
 
-/// Both ends of each part, with their radii; parts off the center exist on both sides.
+/// Both ends and radii of each part. Parts off the center exist on both sides.
 const PARTS: [[(Vector, f64); 2]; 8] = [
     // Trunk, head, snout.
     [([0.0, 0.068, 0.0], 0.076), ([0.0, 0.165, -0.004], 0.058)],
@@ -26,8 +26,9 @@ const PARTS: [[(Vector, f64); 2]; 8] = [
     [([0.0, 0.04, -0.07], 0.022), ([0.0, 0.042, -0.076], 0.022)],
 ];
 
-/// The zero level set of the distance, extracted with surface nets (Gibson, *Constrained Elastic Surface Nets*, MICCAI
-/// 1998): a vertex, moved onto the surface, in each cell that it crosses, and a quad around each edge that it crosses.
+/// The zero level set of the distance, extracted with surface nets (Gibson, *Constrained Elastic Surface
+/// Nets*, MICCAI 1998): a vertex, moved onto the surface, in each cell crossed by the surface, and a quad
+/// around each edge crossed by the surface.
 pub(crate) fn bear() -> Surface {
     let inside = lattice();
     let [nx, ny, nz] = CELLS;

@@ -1,4 +1,4 @@
-//! A shrub whose leaves are squares with an alpha-textured leaf.
+//! A shrub whose leaves are alpha-textured squares.
 
 use std::f64::consts::SQRT_2;
 
@@ -12,7 +12,7 @@ const SIDE: u32 = 256;
 /// Number of leaves.
 const LEAVES: i64 = 700;
 
-/// A leaf that points up, with alpha, as an sRGB PNG.
+/// An upright leaf with alpha, as an sRGB PNG.
 pub(crate) fn leaf() -> Vec<u8> {
     let mut pixels = Vec::new();
     for row in 0..SIDE {
@@ -33,7 +33,7 @@ pub(crate) fn leaf() -> Vec<u8> {
     file
 }
 
-/// Half the width of the leaf at a height.
+/// Half the width of the leaf at a given height.
 fn width(v: f64) -> f64 {
     let t = ((v - 0.1) / 0.88).clamp(0.0, 1.0);
     0.62 * t.sqrt() * (1.0 - t)
@@ -48,7 +48,7 @@ fn shape(u: f64, v: f64) -> f64 {
     stalk.max(if is_inside { blade } else { 0.0 })
 }
 
-/// Green between light veins. The color extends beyond the border, so that no other color bleeds in.
+/// Green between light veins. The color extends past the border, so that no other color bleeds in.
 fn color(u: f64, v: f64) -> Vector {
     let side = (u - 0.5).abs();
     let along = (v * 9.0 - side * 7.0).rem_euclid(1.0);
@@ -59,7 +59,7 @@ fn color(u: f64, v: f64) -> Vector {
     mix(green, [0.60, 0.72, 0.38], 0.6 * vein)
 }
 
-/// Leaves around a ball, each a square whose stalk starts at the ball.
+/// Leaves around a ball. Each is a square whose stalk starts at the ball.
 pub(crate) fn shrub() -> Surface {
     let mut surface = Surface::default();
     for number in 0..LEAVES {

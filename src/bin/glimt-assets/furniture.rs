@@ -1,11 +1,11 @@
-//! Furniture for `scenes/furnished.toml` and `scenes/ajar.toml`. Units are meters; each piece stands on the origin and
-//! faces +z.
+//! Furniture for `scenes/furnished.toml` and `scenes/ajar.toml`. Units are meters. Each piece stands on the
+//! origin and faces +z.
 
 use super::parts::{ball, bar, block, join, moved, turned_body};
 use super::surface::Surface;
 use super::vector::{Vector, turn};
 
-/// All pieces with their files.
+/// All pieces and their file names.
 pub(crate) fn parts() -> Vec<(&'static str, Surface)> {
     vec![
         ("furniture/cushion.ply", cushion()),
@@ -78,7 +78,7 @@ fn foot() -> Surface {
     turned_body(&[[0.0, 0.0], [0.018, 0.0], [0.018, 0.0], [0.03, 0.1], [0.0, 0.1]], 10)
 }
 
-/// A table leg of height 1, to be scaled.
+/// A table leg of height 1, scaled by the scene.
 fn leg() -> Surface {
     turned_body(&[[0.0, 0.0], [0.016, 0.0], [0.016, 0.0], [0.026, 1.0], [0.026, 1.0], [0.0, 1.0]], 12)
 }
@@ -90,7 +90,7 @@ fn plate() -> Surface {
     turned_body(&outline, 64)
 }
 
-/// A shelf of 1.2 by 2.0, 0.3 deep, with four boards between its sides.
+/// A 1.2 by 2.0 shelf, 0.3 deep, with four boards between its sides.
 fn shelf() -> Surface {
     let side = |x: f64| block([x, 0.0, -0.15], [x + 0.03, 2.0, 0.15], 0.003);
     let boards = (0..5).map(|index| {
@@ -104,7 +104,7 @@ fn shelf() -> Surface {
     )
 }
 
-/// The cover of a 1 by 1 by 1 book, to be scaled; its spine is at +z.
+/// The cover of a 1 by 1 by 1 book, scaled by the scene. The spine is at +z.
 fn cover() -> Surface {
     join([
         block([-0.5, 0.0, -0.5], [-0.42, 1.0, 0.5], 0.01),
@@ -113,12 +113,12 @@ fn cover() -> Surface {
     ])
 }
 
-/// The pages inside that cover.
+/// The pages inside the book cover.
 fn pages() -> Surface {
     block([-0.425, 0.01, -0.48], [0.425, 0.985, 0.445], 0.005)
 }
 
-/// A wooden chair of 0.44 by 0.92 by 0.46.
+/// A 0.44 by 0.92 by 0.46 wooden chair.
 fn chair() -> Surface {
     let post = |x: f64| bar(&[[x, 0.0, -0.26], [x, 0.45, -0.2], [x, 0.92, -0.26]], 0.018, 8);
     let rung = |from: Vector, to: Vector| bar(&[from, to], 0.01, 6);
@@ -275,7 +275,7 @@ fn curtain() -> Surface {
     surface
 }
 
-/// A window frame of 1.8 by 1.6 with two bars, centered on its sill.
+/// A 1.8 by 1.6 window frame with two bars, centered on its sill.
 fn window() -> Surface {
     let upright = |x: f64, half: f64| block([x - half, 0.0, -0.04], [x + half, 1.6, 0.04], 0.006);
     join([
@@ -300,7 +300,7 @@ fn frame() -> Surface {
     ])
 }
 
-/// A door of 0.9 by 2.05 with panels on both sides; its hinges are at the origin.
+/// A 0.9 by 2.05 door with panels on both sides. The hinges are at the origin.
 fn door() -> Surface {
     let panel = |x: f64, y: f64, height: f64| block([x, y, -0.005], [x + 0.3, y + height, 0.045], 0.012);
     let knob = |z: f64| ball(2, [0.83, 1.02, z], 0.028);
@@ -316,7 +316,7 @@ fn door() -> Surface {
     ])
 }
 
-/// The frame of that door, in a wall 0.12 thick behind the origin.
+/// The door frame, in a wall 0.12 thick behind the origin.
 fn jamb() -> Surface {
     join([
         block([-0.09, 0.0, -0.14], [0.0, 2.06, 0.02], 0.006),
@@ -325,7 +325,7 @@ fn jamb() -> Surface {
     ])
 }
 
-/// A bed of 1.0 by 2.0 without cushions; its head is at −z.
+/// A 1.0 by 2.0 bed without cushions. The head is at −z.
 fn bed() -> Surface {
     let post =
         |x: f64, z: f64, height: f64| block([x - 0.03, 0.0, z - 0.03], [x + 0.03, height, z + 0.03], 0.008);

@@ -1,6 +1,6 @@
-//! Generates the assets of the bundled scenes. `glimt-assets` writes the files of `assets/` that are stored in the
-//! repository, with the same bits on every machine. `glimt-assets million` writes `assets/million.ply` and
-//! `glimt-assets figure` writes `assets/figure.ply`, which are too large to store.
+//! Generates the assets for the bundled scenes. `glimt-assets` writes the `assets/` files that are stored in
+//! the repository, with identical bytes on every machine. `glimt-assets million` writes `assets/million.ply`
+//! and `glimt-assets figure` writes `assets/figure.ply`, which are too large to store.
 
 mod figure;
 mod foliage;
@@ -23,7 +23,7 @@ use std::process::ExitCode;
 const USAGE: &str =
     "usage: glimt-assets [million | figure]   (run in the repository root; writes to assets/)";
 
-/// Path below `assets/` and content of a file.
+/// A file's path relative to `assets/`, and its contents.
 type AssetFile = (&'static str, Vec<u8>);
 
 fn main() -> ExitCode {
@@ -103,9 +103,9 @@ mod tests {
         assert!(total < 5_000_000, "{total} bytes are too many to store");
     }
 
-    /// In a closed surface, each edge occurs once in each direction.
+    /// In a closed surface, every edge occurs once in each direction.
     #[test]
-    fn meshes_load_and_closed_ones_are_watertight() {
+    fn meshes_load_and_solids_are_watertight() {
         let mut together = 0;
         for (name, closed) in [
             ("coral.ply", true),
@@ -123,7 +123,7 @@ mod tests {
             );
             let mesh = loaded.mesh;
             together += if name.ends_with("ply") { mesh.triangles.len() } else { 0 };
-            // Compare positions, not indices: seams of texture coordinates have two vertices at one position.
+            // Compare positions, not indices. At texture seams, two vertices have the same position.
             let mut edges = HashMap::new();
             for corners in (0..mesh.triangles.len() as u32).map(|triangle| mesh.corners(triangle)) {
                 let place = corners.map(|corner| (corner + 0.0).to_array().map(f32::to_bits));
@@ -143,7 +143,7 @@ mod tests {
         assert!(together >= 100_000, "{together}");
     }
 
-    /// In a closed surface, each edge occurs equally often in both directions; cloth and leaves are open.
+    /// In a closed surface, every edge occurs equally often in both directions. Cloth and leaves are open.
     #[test]
     fn furniture_is_closed_and_faces_outward() {
         let parts =
@@ -171,7 +171,7 @@ mod tests {
         }
     }
 
-    /// The bits of a vertex's position.
+    /// A vertex position as bits.
     fn place(surface: &surface::Surface, vertex: u32) -> [u64; 3] {
         surface.positions[vertex as usize].map(|coordinate| (coordinate + 0.0).to_bits())
     }
@@ -200,11 +200,11 @@ mod tests {
         }
     }
 
-    /// Files that scenes refer to but that are not stored in the repository.
+    /// Files used by scenes but not stored in the repository.
     const MADE_ON_DEMAND: [&str; 2] = ["../assets/million.ply", "../assets/figure.ply"];
 
     #[test]
-    fn scenes_refer_only_to_generated_files() {
+    fn scenes_only_use_generated_files() {
         let scenes = folder().with_file_name("scenes");
         let mut named = 0;
         for entry in fs::read_dir(&scenes).expect("the scenes") {

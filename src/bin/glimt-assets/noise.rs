@@ -1,8 +1,8 @@
-//! Value noise: random numbers on a lattice, interpolated smoothly. It uses only integers and products.
+//! Value noise: random numbers on a lattice, interpolated smoothly. Only uses integers and products.
 
 use super::vector::{Vector, scale};
 
-/// A pseudo-random number in [0, 1) for a lattice point (a finalizer after Stafford's variant 13).
+/// A pseudorandom number in [0, 1) for a lattice point (a finalizer based on Stafford's variant 13).
 pub(crate) fn random(point: [i64; 3], seed: u64) -> f64 {
     let mixed = point.iter().fold(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15), |state, coordinate| {
         let mut word = (state ^ *coordinate as u64).wrapping_add(0x9e37_79b9_7f4a_7c15);
@@ -13,7 +13,8 @@ pub(crate) fn random(point: [i64; 3], seed: u64) -> f64 {
     (mixed >> 11) as f64 / (1_u64 << 53) as f64
 }
 
-/// Smooth noise in [0, 1]. If `period` is above 0, it repeats after `period` lattice points in x and y.
+/// Smooth noise in [0, 1]. If `period` is above 0, the noise repeats after `period` lattice points in x and
+/// y.
 pub(crate) fn value(at: Vector, period: i64, seed: u64) -> f64 {
     let base = at.map(f64::floor);
     let fade = |axis: usize| {
@@ -31,7 +32,7 @@ pub(crate) fn value(at: Vector, period: i64, seed: u64) -> f64 {
     mix(face(0), face(1), tz)
 }
 
-/// Octaves of [`value`], each twice as fine and half as strong; in [0, 1].
+/// Sum of octaves of [`value`], each twice as fine and half as strong as the previous. In [0, 1].
 pub(crate) fn fractal(at: Vector, octaves: u32, period: i64, seed: u64) -> f64 {
     let (mut sum, mut weight, mut total) = (0.0, 1.0, 0.0);
     for octave in 0..octaves {

@@ -1,4 +1,5 @@
-//! Building blocks of furniture: boxes, solids of revolution, tubes and balls. All of them are closed and face outward.
+//! Building blocks for furniture: boxes, solids of revolution, tubes and balls. All are closed and face
+//! outward.
 
 use super::shapes::displaced_sphere;
 use super::surface::Surface;
@@ -58,11 +59,11 @@ pub(crate) fn block(from: Vector, to: Vector, edge: f64) -> Surface {
     outward(positions, faces, middle)
 }
 
-/// A hexahedron, given the corners of its lower side in order, then those above them.
+/// A hexahedron, given by the corners of its lower side in order, followed by the corners above.
 pub(crate) fn hexahedron(corners: [Vector; 8]) -> Surface {
     let middle = scale(corners.iter().fold([0.0; 3], |sum, &corner| add(sum, corner)), 0.125);
     let sides = [[0, 1, 2, 3], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]];
-    // Each side has its own vertices, as the edges are sharp.
+    // Each side has its own vertices because the edges are sharp.
     let positions = sides.iter().flat_map(|side| side.map(|corner: usize| corners[corner])).collect();
     let faces = (0..6).map(|side| (4 * side..4 * side + 4).collect()).collect();
     outward(positions, faces, middle)
@@ -79,8 +80,8 @@ fn outward(positions: Vec<Vector>, mut faces: Vec<Vec<u32>>, middle: Vector) -> 
     Surface { positions, faces, ..Surface::default() }
 }
 
-/// A solid of revolution about y, given its outline of radii and heights from its foot over the outside to its top.
-/// Radius 0 is on the axis; two equal points form a sharp edge.
+/// A solid of revolution about y. `outline` contains radii and heights, from the foot along the outside to
+/// the top. Radius 0 is on the axis. Two equal points form a sharp edge.
 pub(crate) fn turned_body(outline: &[[f64; 2]], sides: u32) -> Surface {
     let mut surface = Surface::default();
     let mut below: Option<(u32, [f64; 2])> = None;
@@ -106,7 +107,7 @@ pub(crate) fn turned_body(outline: &[[f64; 2]], sides: u32) -> Surface {
     surface
 }
 
-/// A round bar along a path, closed at both ends.
+/// A round bar that follows a path, closed at both ends.
 pub(crate) fn bar(path: &[Vector], radius: f64, sides: u32) -> Surface {
     let mut surface = Surface::default();
     let last = path.len() - 1;
@@ -128,7 +129,7 @@ pub(crate) fn bar(path: &[Vector], radius: f64, sides: u32) -> Surface {
         let (here, next) = (ring * sides + side, ring * sides + (side + 1) % sides);
         surface.faces.push(vec![here, next, next + sides, here + sides]);
     }
-    // The ends have their own vertices, as their edges are sharp.
+    // The ends have their own vertices because their edges are sharp.
     for ring in [0, last as u32] {
         let base = surface.positions.len() as u32;
         let end = (ring * sides) as usize;

@@ -1,4 +1,4 @@
-//! The textures, all of which tile seamlessly. Coordinates are u to the right and v up, in [0, 1).
+//! The textures, which all tile seamlessly. u points right and v points up, both in [0, 1).
 
 use super::noise::{fractal, random, value};
 use super::vector::{Vector, mix, scale, smooth_step, turn, unit};
@@ -6,7 +6,7 @@ use super::vector::{Vector, mix, scale, smooth_step, turn, unit};
 /// Width and height of the larger textures.
 const SIDE: u32 = 512;
 
-/// Rows of bricks, and bricks per row.
+/// Number of brick rows, and bricks per row.
 const COURSES: f64 = 8.0;
 const BRICKS: f64 = 4.0;
 
@@ -30,13 +30,13 @@ fn png(side: u32, pixels: &[u8]) -> Vec<u8> {
     file
 }
 
-/// Quantized noise, as invisible detail costs bytes.
+/// Quantized noise, because invisible detail costs bytes.
 fn grain(u: f64, v: f64, seed: u64) -> f64 {
     let fine = fractal([u * 32.0, v * 32.0, 0.5], 3, 32, seed);
     (fine * 24.0).round() / 24.0
 }
 
-/// The brick at (u, v): its index, and the distance from its mortar (0 in the joint, 1 on the brick).
+/// Index of the brick at (u, v), and a measure of distance from the mortar (0 in the joint, 1 on the brick).
 fn brick(u: f64, v: f64) -> ([i64; 2], f64) {
     let course = (v * COURSES).floor();
     let shift = if course % 2.0 == 0.0 { 0.0 } else { 0.5 };
@@ -82,7 +82,7 @@ pub(crate) fn bumps() -> Vec<u8> {
     png(SIDE, &pixels)
 }
 
-/// An eight by eight checkerboard whose lower left square is dark.
+/// An eight by eight checkerboard with a dark lower left square.
 pub(crate) fn checker() -> Vec<u8> {
     let pixels = render(64, |u, v| {
         let dark = ((u * 8.0).floor() + (v * 8.0).floor()) % 2.0 == 0.0;
@@ -100,7 +100,7 @@ pub(crate) fn planks() -> Vec<u8> {
         let tint = random([board as i64, 2, 0], 3);
         let stretched = value([u * 6.0, v * 96.0, board + 0.5], 0, 9);
         let edge = value([0.0, v * 96.0, board + 0.5], 0, 9);
-        // Fade to the value at the left edge, so that the grain tiles.
+        // Blend towards the value at the left edge so that the grain tiles.
         let blend = smooth_step(0.9, 1.0, u);
         let grain = ((stretched * (1.0 - blend) + edge * blend) * 24.0).round() / 24.0;
         let wood = mix([0.46, 0.30, 0.17], [0.70, 0.50, 0.31], 0.6 * tint + 0.4 * grain);
@@ -124,7 +124,7 @@ pub(crate) fn marble() -> Vec<u8> {
     png(SIDE, &pixels)
 }
 
-/// Four by four glazed tiles, as a PPM with a comment, like those that paint programs write.
+/// Four by four glazed tiles, as a PPM file with a comment, like files written by paint programs.
 pub(crate) fn tiles() -> Vec<u8> {
     let side = 64;
     let mut file = format!("P6\n# made by glimt-assets\n{side} {side}\n255\n").into_bytes();

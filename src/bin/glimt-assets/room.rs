@@ -1,4 +1,4 @@
-//! A room with its materials, and the orbiter camera that looks into it.
+//! A room, its materials and an orbiter camera that looks into the room.
 
 use std::fmt::Write;
 
@@ -14,7 +14,7 @@ struct ObjWriter {
 }
 
 impl ObjWriter {
-    /// Adds a quad that faces u × v; `repeat` is the number of texture repeats along both edges.
+    /// Adds a quad that faces u × v. `repeat` is the number of texture repeats along each edge.
     fn quad(&mut self, corner: Vector, u: Vector, v: Vector, repeat: [f64; 2]) {
         let points = [corner, add(corner, u), add(add(corner, u), v), add(corner, v)];
         for [x, y, z] in points {
@@ -121,7 +121,7 @@ Ke 9.0 8.4 7.4
     text.as_bytes().to_vec()
 }
 
-/// A camera that looks into the open front, from slightly above and to the left.
+/// A camera that looks through the open front from slightly above and to the left.
 pub(crate) fn orbiter() -> Vec<u8> {
     "c 0.0 0.95 0.0\np 0.05 0.02\nr 5.0 11.0\ns 4.6 2.0\nf 38.0 640.0 480.0\n".as_bytes().to_vec()
 }

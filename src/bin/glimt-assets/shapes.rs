@@ -6,7 +6,7 @@ use super::noise::{fractal, value};
 use super::surface::{Surface, between, icosahedron};
 use super::vector::{Vector, add, cross, dot, scale, smooth_step, subtract, turn, unit};
 
-/// A coral: a round lump with branching ridges and 81,920 triangles.
+/// A coral, a round lump with branching ridges, with 81,920 triangles.
 pub(crate) fn coral() -> Surface {
     displaced_sphere(6, |direction| {
         let ridge = 1.0 - (2.0 * fractal(scale(direction, 2.6), 3, 0, 7) - 1.0).abs();
@@ -41,7 +41,7 @@ pub(crate) fn rope() -> Surface {
     whole
 }
 
-/// A tube along a trefoil knot; its texture repeats 24 times along it and twice around it.
+/// A tube along a trefoil knot. The texture repeats 24 times along the tube and twice around it.
 pub(crate) fn knot() -> Surface {
     Surface::grid(224, 24, [24.0, 2.0], |s, t| around(s, t, 0.24, trefoil))
 }
@@ -55,8 +55,8 @@ pub(crate) fn vase() -> Surface {
     })
 }
 
-/// Radius and height along the profile of the vase, from the center of its foot over the lip to the center of its
-/// inside, as a Catmull–Rom spline.
+/// Radius and height along the vase's profile, a Catmull–Rom spline from the center of the foot past the lip
+/// to the center of the inside.
 fn profile(t: f64) -> [f64; 2] {
     const KNOTS: [[f64; 2]; 16] = [
         [0.0, 0.0],
@@ -90,7 +90,7 @@ fn profile(t: f64) -> [f64; 2] {
     [radius, blend(1)]
 }
 
-/// The dual of the icosahedron: a pentagon around each of its vertices.
+/// The dual of the icosahedron, with a pentagon around each vertex.
 pub(crate) fn dodecahedron() -> Surface {
     let (corners, triangles) = icosahedron();
     let center = |face: &[u32; 3]| {
@@ -102,7 +102,7 @@ pub(crate) fn dodecahedron() -> Surface {
     Surface { positions, faces, ..Surface::default() }
 }
 
-/// The triangles around a corner in order: each shares its last edge with the first edge of the next.
+/// The triangles around a corner, in order. The last edge of each triangle is the first edge of the next.
 fn pentagon(corner: u32, triangles: &[[u32; 3]]) -> Vec<u32> {
     let mut next = HashMap::new();
     for (index, triangle) in triangles.iter().enumerate() {
@@ -123,7 +123,7 @@ fn pentagon(corner: u32, triangles: &[[u32; 3]]) -> Vec<u32> {
     ring
 }
 
-/// An icosahedron subdivided `times` times, with each vertex at the distance that `radius` gives for its direction.
+/// An icosahedron subdivided `times` times. `radius` returns the distance of a vertex for its direction.
 pub(crate) fn displaced_sphere(times: u32, radius: impl Fn(Vector) -> f64) -> Surface {
     let (mut corners, mut triangles) = icosahedron();
     for _ in 0..times {
@@ -148,7 +148,8 @@ pub(crate) fn displaced_sphere(times: u32, radius: impl Fn(Vector) -> f64) -> Su
     }
 }
 
-/// A trefoil knot within about 1 of the origin, winding in the plane y = 0: twice around, three times through the hole.
+/// A trefoil knot within a radius of about 1. It winds twice around the y axis and three times around the
+/// circle of radius 0.66 in the plane y = 0.
 fn trefoil(s: f64) -> Vector {
     let (sin2, cos2) = turn(2.0 * s);
     let (sin3, cos3) = turn(3.0 * s);
@@ -156,8 +157,8 @@ fn trefoil(s: f64) -> Vector {
     [radius * cos2, 0.36 * sin3, radius * sin2]
 }
 
-/// A point on a closed curve and two directions across it that are the same after a full turn: away from the circle
-/// around which the knot winds.
+/// A point on a closed curve, and two directions perpendicular to the curve that are periodic along it. The
+/// first points away from the circle that the knot winds around.
 fn frame(s: f64, curve: impl Fn(f64) -> Vector) -> (Vector, Vector, Vector) {
     let center = curve(s);
     let tangent = unit(subtract(curve(s + 1e-4), curve(s - 1e-4)));
@@ -167,7 +168,7 @@ fn frame(s: f64, curve: impl Fn(f64) -> Vector) -> (Vector, Vector, Vector) {
     (center, normal, cross(tangent, normal))
 }
 
-/// A point on the tube of this radius around a closed curve.
+/// A point on a tube with this radius around a closed curve.
 fn around(s: f64, t: f64, radius: f64, curve: impl Fn(f64) -> Vector) -> Vector {
     let (center, normal, binormal) = frame(s, curve);
     let (sin, cos) = turn(t);

@@ -6,7 +6,7 @@ use super::vector::{Vector, add, dot, mix, scale, smooth_step, turn, unit};
 const WIDTH: u32 = 256;
 const HEIGHT: u32 = 128;
 
-/// Uncompressed Radiance HDR, as noise has no runs.
+/// Uncompressed Radiance HDR, because noise does not compress.
 pub(crate) fn evening() -> Vec<u8> {
     let mut file =
         format!("#?RADIANCE\nSOFTWARE=glimt-assets\nFORMAT=32-bit_rle_rgbe\n\n-Y {HEIGHT} +X {WIDTH}\n")
@@ -35,7 +35,7 @@ fn radiance(d: Vector) -> Vector {
     let height = 1.0 - (1.0 - d[1]).powi(4);
     let low = mix([0.62, 0.62, 0.66], [1.7, 1.05, 0.55], haze);
     let sky = mix(low, [0.09, 0.19, 0.46], height);
-    // Clouds are on a plane far above, and thin out toward the horizon.
+    // Clouds are on a plane high above and thin out toward the horizon.
     let reach = 1.0 / (d[1] + 0.12);
     let cover = fractal([d[0] * reach * 1.6 + 9.0, d[2] * reach * 1.6 + 5.0, 0.5], 5, 0, 23);
     let thick = smooth_step(0.50, 0.68, cover) * smooth_step(0.02, 0.2, d[1]);

@@ -1,16 +1,16 @@
-//! Parts of the stair hall in `scenes/stairs.toml`. Units are meters. Treads and balusters are at the origin, and the
-//! scene places them; flights and rails are in their final positions.
+//! Parts of the stair hall in `scenes/stairs.toml`. Units are meters. Treads and balusters are at the origin
+//! and placed by the scene. Flights and rails are at their final positions.
 
 use super::parts::{ball, bar, block, hexahedron, join, moved, turned_body};
 use super::surface::Surface;
 use super::vector::{Vector, add, turn};
 
-/// Height and depth of a step, and the width of a flight.
+/// Height and depth of a step, and width of a flight.
 const RISE: f64 = 0.17;
 const GO: f64 = 0.28;
 const WIDTH: f64 = 1.1;
 
-/// The open corner at the foot of the first flight, and its corner at the landing.
+/// The open corner at the foot of the first flight, and the corner at the landing.
 const FOOT: Vector = [-1.9, 0.0, 1.14];
 const LANDING: Vector = [-1.9, 1.53, -1.1];
 /// End of the second flight.
@@ -20,7 +20,7 @@ const RIGHT_WALL: f64 = 3.0;
 const BACK_WALL: f64 = -2.2;
 const TREAD: f64 = 0.035;
 
-/// All parts with their files.
+/// All parts and their file names.
 pub(crate) fn parts() -> Vec<(&'static str, Surface)> {
     vec![
         ("stairs/tread.ply", tread()),
@@ -43,12 +43,12 @@ pub(crate) fn parts() -> Vec<(&'static str, Surface)> {
     ]
 }
 
-/// A board whose nosing faces +z and whose end extends over the open side of the flight.
+/// A board whose nosing faces +z. One end extends past the open side of the flight.
 fn tread() -> Surface {
     block([0.0, -TREAD, -GO], [WIDTH + 0.03, 0.0, 0.03], 0.008)
 }
 
-/// The steps up to the landing and the landing itself, closed down to the floor.
+/// The steps up to the landing and the landing, solid down to the floor.
 fn first_flight() -> Surface {
     let step = |index: u32| {
         let (front, top) = (FOOT[2] - f64::from(index) * GO, f64::from(index + 1) * RISE - TREAD);
@@ -99,7 +99,7 @@ fn upright_block(from: Vector, to: Vector) -> Surface {
     hexahedron([a, b, c, d, e, f, g, h])
 }
 
-/// A turned post of height 1.05, whose foot is sunk into the tread.
+/// A turned post of height 1.05, with its foot sunk into the tread.
 fn baluster() -> Surface {
     let outline = [
         [0.0, 0.0],
@@ -205,7 +205,7 @@ fn chandelier() -> Surface {
     join([rod, hub].into_iter().chain((0..5).map(arm)))
 }
 
-/// A door of 0.9 by 2.05 with four panels, in its frame, on a wall that faces +z.
+/// A 0.9 by 2.05 door with four panels and a frame, on a wall that faces +z.
 fn door() -> Surface {
     let panel = |x: f64, y: f64, height: f64| block([x, y, 0.0], [x + 0.3, y + height, 0.035], 0.015);
     join([
@@ -231,7 +231,7 @@ fn frame() -> Surface {
     ])
 }
 
-/// A narrow table of 1.1 by 0.36, 0.78 high.
+/// A narrow 1.1 by 0.36 table, 0.78 high.
 fn console() -> Surface {
     let leg = |x: f64, z: f64| {
         let outline = [[0.0, 0.0], [0.015, 0.0], [0.02, 0.3], [0.024, 0.6], [0.024, 0.7], [0.0, 0.7]];

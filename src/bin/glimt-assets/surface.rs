@@ -1,4 +1,4 @@
-//! Polygon meshes with vertex attributes, and writers of mesh files.
+//! Polygon meshes with vertex attributes, and mesh file writers.
 
 use std::fmt::Write;
 
@@ -13,7 +13,7 @@ pub(crate) struct Surface {
     pub(crate) faces: Vec<Vec<u32>>,
 }
 
-/// Step of the finite differences for normals.
+/// Finite-difference step for normals.
 const STEP: f64 = 1e-4;
 
 impl Surface {
@@ -118,7 +118,7 @@ impl Surface {
 }
 
 fn line(file: &mut String, keyword: &str, numbers: &[f64], digits: usize) {
-    // Adding 0 after rounding keeps `-0.00000` out of the file.
+    // Add 0 after rounding to avoid `-0.00000`.
     let unit = 10_f64.powi(digits as i32);
     let words: Vec<String> =
         numbers.iter().map(|number| format!("{:.digits$}", (number * unit).round() / unit + 0.0)).collect();

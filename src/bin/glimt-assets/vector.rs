@@ -1,4 +1,5 @@
-//! Vectors as arrays; trigonometric functions come from the `libm` crate, whose bits do not depend on the machine.
+//! Vectors as arrays. Trigonometric functions are from the `libm` crate, whose results are identical on every
+//! machine.
 
 pub(crate) type Vector = [f64; 3];
 

@@ -1,4 +1,4 @@
-//! Import cycles between the files of a module. Without cycles, a module can be read in one order.
+//! Import cycles between the files of a module. A module without cycles can be read from top to bottom.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -6,40 +6,36 @@ use std::fs;
 use super::imports::{Module, Modules};
 use super::{all_sources, root};
 
-/// Pairs of files that import from each other, and why.
+/// Pairs of files that may import each other, with the reason.
 const PAIRS: [(&str, &str, &str); 9] = [
     (
         "accel/bvh/build",
         "accel/bvh/top_node",
-        "the upper levels are built from the references that the builder sorts",
+        "the upper levels are built from the builder's sorted references",
     ),
     (
         "accel/wide_bvh/build/split",
         "accel/wide_bvh/simd/binning",
-        "the bins of a split are counted with vector instructions",
+        "split bins are counted with vector instructions",
     ),
-    (
-        "cli/bench/measure",
-        "cli/bench/run",
-        "a run measures methods, each of which reads the options of the run",
-    ),
+    ("cli/bench/measure", "cli/bench/run", "a run measures methods, and each method reads the run's options"),
     ("output/error", "output/format", "an error lists the formats; an unknown format is an error"),
     (
         "scene/description/material",
         "scene/fingerprint",
-        "a fingerprint looks up the textures that materials name",
+        "a fingerprint includes the textures that materials refer to",
     ),
     ("scene/document/key", "scene/document/table", "a key may contain a table, and a table contains keys"),
     (
         "pipeline/watch/content",
         "pipeline/watch/outputs",
-        "outputs share the stored contents, which show whether an output was replaced",
+        "outputs use the stored contents to detect whether they were replaced",
     ),
-    ("world/geometry", "world/isolated", "the geometry stores the isolated surfaces found in it"),
-    ("world/mesh_instance", "world/mesh_packet", "packets and single hits are interpolated identically"),
+    ("world/geometry", "world/isolated", "the geometry stores its isolated surfaces"),
+    ("world/mesh_instance", "world/mesh_packet", "packets and single hits share their interpolation"),
 ];
 
-/// All files with their imports.
+/// All source files with their imports.
 fn all_modules() -> Modules {
     Modules::new(all_sources().into_iter().map(|(file, path)| {
         let path = path.to_str().expect("UTF-8").to_owned();
@@ -47,7 +43,7 @@ fn all_modules() -> Modules {
     }))
 }
 
-/// Groups of files of one module that reach each other through imports.
+/// Import cycles within a module: groups of files that reach each other through imports.
 fn cycles() -> Vec<Vec<String>> {
     let modules = all_modules();
     let used: BTreeMap<&Module, BTreeSet<Module>> = modules
@@ -80,19 +76,19 @@ fn reached_from<'a>(start: &Module, used: &'a BTreeMap<&Module, BTreeSet<Module>
 }
 
 #[test]
-fn only_listed_pairs_of_files_import_each_other() {
+fn only_listed_pairs_import_each_other() {
     let mut pairs = BTreeSet::new();
     for cycle in cycles() {
         match &cycle[..] {
             [one, other] => drop(pairs.insert((one.clone(), other.clone()))),
-            larger => panic!("{} files import each other in a cycle: {larger:?}", larger.len()),
+            larger => panic!("import cycle of {} files: {larger:?}", larger.len()),
         }
     }
     let listed = PAIRS.map(|(one, other, _)| (one.to_owned(), other.to_owned()));
-    assert_eq!(pairs, BTreeSet::from(listed), "pairs that exist, and pairs that are listed");
+    assert_eq!(pairs, BTreeSet::from(listed), "existing pairs and listed pairs differ");
 }
 
-/// The rank of each submodule of the integrators, from the `text` block of their documentation: one line per rank.
+/// The rank of each integrator submodule: its line in the `text` block of the module documentation.
 fn ranks() -> BTreeMap<String, usize> {
     let map = fs::read_to_string(root().join("crates/trace/src/integrators/mod.rs")).expect("the map");
     let block = map.split("```").nth(1).and_then(|block| block.strip_prefix("text\n")).expect("a table");
@@ -104,7 +100,7 @@ fn ranks() -> BTreeMap<String, usize> {
 }
 
 #[test]
-fn integrators_use_only_modules_above_them() {
+fn integrators_use_only_higher_ranks() {
     let (modules, ranks) = (all_modules(), ranks());
     let mut found = BTreeSet::new();
     for module in modules.all().filter(|module| module[0] == "integrators" && module.len() > 1) {
@@ -115,5 +111,5 @@ fn integrators_use_only_modules_above_them() {
             assert!(!is_other || ranks[&used[1]] < *rank, "{module:?} uses {used:?}");
         }
     }
-    assert_eq!(found, ranks.into_keys().collect(), "submodules that exist, and submodules in the table");
+    assert_eq!(found, ranks.into_keys().collect(), "existing submodules and submodules in the table differ");
 }

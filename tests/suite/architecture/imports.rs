@@ -1,27 +1,27 @@
-//! The imports of each source file.
+//! Imports of each source file.
 //!
 //! Each import is resolved to the file that defines the item, through `pub use`. Tests are skipped.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::slice;
 
-/// The path of a module: `["tui", "view", "layout"]`.
+/// A module path: `["tui", "view", "layout"]`.
 pub(super) type Module = Vec<String>;
 
-/// One imported item: its path, and its name in the importing file.
+/// An imported item: its path, and its name in the importing file.
 struct Import {
     path: Vec<String>,
     name: String,
 }
 
-/// Modules with their code, without tests.
+/// Modules and their code, without tests.
 pub(super) struct Modules {
     texts: BTreeMap<Module, String>,
     imports: BTreeMap<Module, Vec<Import>>,
 }
 
 impl Modules {
-    /// Parses `(path, source)` pairs, with paths such as `tui/view/layout.rs` or `tui/view/mod.rs`.
+    /// Parses `(path, source)` pairs. Paths look like `tui/view/layout.rs` or `tui/view/mod.rs`.
     pub(super) fn new(sources: impl Iterator<Item = (String, String)>) -> Self {
         let mut tests = BTreeSet::new();
         let mut texts = BTreeMap::new();
@@ -43,7 +43,8 @@ impl Modules {
         self.texts.keys()
     }
 
-    /// Modules that a module imports from or names in its code, except its parents, whose items a child may use.
+    /// Modules that a module imports or names in its code, except its ancestors, whose items it may always
+    /// use.
     pub(super) fn used_by(&self, module: &Module) -> BTreeSet<Module> {
         let mut paths: Vec<Vec<String>> = self.imports[module].iter().map(|one| one.path.clone()).collect();
         paths.extend(paths_in(&self.texts[module]).into_iter().map(|path| self.unabbreviated(module, path)));
@@ -51,7 +52,7 @@ impl Modules {
         files.filter(|file| !module.starts_with(file)).collect()
     }
 
-    /// A path in the code of `module`, with its first name replaced by the path that was imported under it.
+    /// Expands the first name of a path in `module` if it is an imported name.
     fn unabbreviated(&self, module: &Module, path: Vec<String>) -> Vec<String> {
         match self.imports[module].iter().find(|one| one.name == path[0]) {
             Some(import) => [import.path.clone(), path[1..].to_vec()].concat(),
@@ -59,9 +60,9 @@ impl Modules {
         }
     }
 
-    /// The module that defines the item named by a path in `module`. `None` for paths into other packages.
+    /// The module that defines the item at a path used in `module`. `None` for paths into other packages.
     fn defining(&self, module: &Module, path: &[String], depth: u32) -> Option<Module> {
-        assert!(depth < 20, "{module:?} re-exports {path:?} in a cycle");
+        assert!(depth < 20, "cyclic re-export of {path:?} in {module:?}");
         let whole = self.absolute(module, path)?;
         let length = (1..=whole.len()).take_while(|end| self.texts.contains_key(&whole[..*end])).last()?;
         let (file, rest) = (whole[..length].to_vec(), &whole[length..]);
@@ -71,11 +72,11 @@ impl Modules {
         further.and_then(|path| self.defining(&file, &path, depth + 1)).or(Some(file))
     }
 
-    /// A path in `module`, made absolute.
+    /// Makes a path in `module` absolute.
     fn absolute(&self, module: &Module, path: &[String]) -> Option<Vec<String>> {
         let supers = path.iter().take_while(|name| *name == "super").count();
         match path[0].as_str() {
-            // In a crate that is one module, `crate::` also names that module's children.
+            // In a single-module crate, `crate::` also refers to the module's children.
             "crate" if path.get(1).is_some_and(|name| self.texts.contains_key(slice::from_ref(name))) => {
                 Some(path[1..].to_vec())
             }
@@ -96,13 +97,13 @@ fn module(path: &str) -> Module {
     path.split('/').map(str::to_owned).collect()
 }
 
-/// A source without comments and tests, and the names of its test modules.
+/// The source without comments and tests, and the names of its test modules.
 fn production(source: &str) -> (String, Vec<String>) {
     let (mut text, mut tests) = (String::new(), Vec::new());
     let mut lines = source.lines();
     while let Some(line) = lines.next() {
         if line.trim() != "#[cfg(test)]" {
-            // A visibility does not use the module it names.
+            // A visibility such as `pub(in path)` is not a use of the module.
             let code = line.split("//").next().unwrap_or_default();
             let code = code.split("(in crate::").enumerate().map(|(index, part)| match index {
                 0 => part,
@@ -139,7 +140,7 @@ fn expanded(prefix: &[String], tree: &str) -> Vec<Import> {
     let tree = tree.trim();
     if let Some((head, rest)) = tree.split_once('{') {
         let prefix = [prefix.to_vec(), names(head)].concat();
-        let inside = &rest[..rest.rfind('}').expect("a brace that closes")];
+        let inside = &rest[..rest.rfind('}').expect("a closing brace")];
         return branches(inside).into_iter().flat_map(|branch| expanded(&prefix, branch)).collect();
     }
     let (path, alias) = tree.split_once(" as ").map_or((tree, None), |(path, alias)| (path, Some(alias)));
@@ -151,7 +152,7 @@ fn expanded(prefix: &[String], tree: &str) -> Vec<Import> {
     name.map(|name| Import { path, name }).into_iter().collect()
 }
 
-/// Splits a text at the commas outside braces.
+/// Splits a string at commas outside braces.
 fn branches(text: &str) -> Vec<&str> {
     let mut depth = 0;
     let parts = text.split(|c: char| {
@@ -165,7 +166,7 @@ fn names(path: &str) -> Vec<String> {
     path.split("::").map(str::trim).filter(|name| !name.is_empty()).map(str::to_owned).collect()
 }
 
-/// Paths of at least two names in code.
+/// Paths with at least two components in the code.
 fn paths_in(text: &str) -> Vec<Vec<String>> {
     let words = text.split(|c: char| !(c.is_alphanumeric() || c == '_' || c == ':'));
     words
@@ -203,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn crate_names_single_module_children() {
+    fn crate_path_reaches_single_module_children() {
         let modules = modules(&[
             ("a/lib.rs", "mod b;\nmod c;\n"),
             ("a/b.rs", "use crate::c::Thing;\n"),

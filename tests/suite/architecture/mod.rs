@@ -1,4 +1,4 @@
-//! Dependencies between modules: the sources use exactly those that the table in `src/lib.rs` lists.
+//! Module dependencies: must match the table in `src/lib.rs` exactly.
 
 mod cycles;
 mod imports;
@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// The modules that each top-level module may use, read from the `text` block in `src/lib.rs`.
+/// The modules that each top-level module may use, from the `text` block in `src/lib.rs`.
 fn dependencies() -> BTreeMap<String, BTreeSet<String>> {
     let lib = fs::read_to_string(root().join("src/lib.rs")).expect("src/lib.rs");
     lib.lines()
@@ -20,11 +20,12 @@ fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).to_owned()
 }
 
-/// Every source file with its module path: `module/file.rs`. A crate that is one module is the first component of its paths.
+/// Every source file with its module path: `module/file.rs`. In a single-module crate, the crate name is the
+/// first component.
 fn all_sources() -> Vec<(PathBuf, PathBuf)> {
     let modules = dependencies();
     let mut found = Vec::new();
-    let crates = fs::read_dir(root().join("crates")).expect("the folder of crates");
+    let crates = fs::read_dir(root().join("crates")).expect("the crates folder");
     let crates = crates.map(|entry| entry.expect("an entry").path()).chain([root()]);
     for folder in crates {
         let src = folder.join("src");
@@ -41,7 +42,7 @@ fn all_sources() -> Vec<(PathBuf, PathBuf)> {
 }
 
 fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
-    for entry in fs::read_dir(folder).expect("a folder of sources") {
+    for entry in fs::read_dir(folder).expect("a source folder") {
         let path = entry.expect("an entry").path();
         if path.is_dir() {
             sources(&path, found);
@@ -51,7 +52,7 @@ fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
     }
 }
 
-/// Every module that the code names as `crate::module`, outside comments.
+/// Every module that the code, excluding comments, refers to as `crate::module`.
 fn used(text: &str) -> BTreeSet<String> {
     text.lines()
         .filter(|line| !line.trim_start().starts_with("//"))
@@ -61,7 +62,7 @@ fn used(text: &str) -> BTreeSet<String> {
 }
 
 #[test]
-fn dependencies_are_those_in_the_table() {
+fn dependencies_match_the_table() {
     let table = dependencies();
     let mut seen: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
     for (file, path) in all_sources() {
@@ -73,7 +74,7 @@ fn dependencies_are_those_in_the_table() {
         let allowed = table.get(&module).unwrap_or_else(|| panic!("{module} is not in the table"));
         let seen = seen.entry(module.clone()).or_default();
         for other in used(&fs::read_to_string(&file).expect("a source file")) {
-            // In a crate that is one module, `crate::` also names that module's children.
+            // In a single-module crate, `crate::` also refers to the module's children.
             if other == module || !table.contains_key(&other) {
                 continue;
             }
@@ -101,8 +102,8 @@ fn dependencies_have_no_cycle() {
     }
 }
 
-/// Functions of the system's mathematical library, whose results differ between machines. `sqrt` is correctly rounded everywhere, and
-/// so is `mul_add`, which is slow on processors without it.
+/// Functions of the system's math library, whose results differ between machines. `sqrt` and `mul_add` are
+/// correctly rounded everywhere, but `mul_add` is slow on processors without an FMA instruction.
 const LIBM: [&str; 34] = [
     "sin",
     "cos",
@@ -140,14 +141,15 @@ const LIBM: [&str; 34] = [
     "angle_to",
 ];
 
-/// Modules that do not affect an image: the screen, progress, and the asset generator, which uses the crate `libm`.
+/// Modules that do not affect images: the terminal interface, progress, and the asset generator, which uses
+/// the `libm` crate.
 const EXEMPT: [&str; 3] = ["tui", "bin", "pipeline/render/forecast/work_rate.rs"];
 
-/// The module whose functions are compiled for named instruction sets, some of which have `mul_add`.
+/// Module compiled for specific instruction sets, some of which have FMA instructions.
 const SIMD: &str = "accel/wide_bvh/simd";
 
-/// Functions of the standard library that panic if the system fails to close a folder, in all but the asset generator and the build
-/// scripts.
+/// Standard library functions that panic if the system fails to close a folder. The asset generator and build
+/// scripts may use them.
 const PANICKING: [&str; 2] = ["fs::read_dir(", "fs::remove_dir_all("];
 
 #[test]

@@ -1,9 +1,9 @@
 //! Malformed mesh and material files.
 
-/// The fault, the file, and the message; without a message, the valid part of the file is read.
+/// The fault, the file, and the error message, empty if the valid part of the file is read.
 pub(super) type Case = (&'static str, Vec<u8>, &'static str);
 
-/// A facet of a binary STL file.
+/// A facet in a binary STL file.
 const FACET: [u8; 50] = {
     let mut facet = [0; 50];
     // The second vertex is at (1, 0, 0), the third at (0, 1, 0).
@@ -12,12 +12,12 @@ const FACET: [u8; 50] = {
     facet
 };
 
-/// Repeats every byte four times.
+/// Every byte value, repeated four times.
 pub(super) fn every_byte() -> Vec<u8> {
     (0..1024_u32).map(|index| index as u8).collect()
 }
 
-/// A binary STL file that claims `claimed` facets.
+/// A binary STL file that claims to have `claimed` facets.
 fn stl_of(claimed: u32, facets: &[u8]) -> Vec<u8> {
     [&[0; 80][..], &claimed.to_le_bytes(), facets].concat()
 }
@@ -25,7 +25,7 @@ fn stl_of(claimed: u32, facets: &[u8]) -> Vec<u8> {
 pub(super) fn obj() -> Vec<Case> {
     vec![
         (
-            "a face with a missing vertex",
+            "a face with a nonexistent vertex",
             b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n".to_vec(),
             "a.obj:4: vertex 4 is out of range: there are 3, numbered from 1",
         ),
@@ -35,7 +35,7 @@ pub(super) fn obj() -> Vec<Case> {
             "a.obj:4: vertex 0 is out of range: there are 3, numbered from 1",
         ),
         (
-            "a vertex index before the first",
+            "a negative index out of range",
             b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf -4 1 2\n".to_vec(),
             "a.obj:4: vertex -4 is out of range: there are 3, numbered from 1",
         ),
@@ -46,7 +46,7 @@ pub(super) fn obj() -> Vec<Case> {
         ),
         ("no faces", b"v 0 0 0\nv 1 0 0\nv 0 1 0\n".to_vec(), "a.obj: no usable face: the file has no faces"),
         (
-            "vertices with words",
+            "text instead of coordinates",
             b"v 0 0 zero\nv 1 0 0\nv 0 1 0\nf 1 2 3\n".to_vec(),
             "a.obj:1: expected 3 coordinates, found \"zero\"",
         ),
@@ -56,7 +56,7 @@ pub(super) fn obj() -> Vec<Case> {
             "a.obj:1: expected 3 coordinates, found 2",
         ),
         (
-            "vertices that are not finite",
+            "non-finite vertices",
             b"v nan 0 0\nv inf 0 0\nv 0 1e999 0\nf 1 2 3\n".to_vec(),
             "a.obj: no usable face: 1 of 1 have a non-finite corner, 0 have zero area",
         ),
@@ -78,7 +78,7 @@ pub(super) fn obj() -> Vec<Case> {
         ("missing texture coordinates", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1/1 2/2 3/3\n".to_vec(), ""),
         ("missing normals", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1//1 2//2 3//9\n".to_vec(), ""),
         (
-            "words in a face",
+            "text in a face",
             b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf one two three\n".to_vec(),
             "a.obj:4: expected a corner like 1/2/3, found \"one\"",
         ),
@@ -98,17 +98,17 @@ pub(super) fn obj() -> Vec<Case> {
             "a.obj:4: expected a corner like 1/2/3, found \"1.5\"",
         ),
         (
-            "coordinates with words",
+            "text in texture coordinates",
             b"v 0 0 0\nv 1 0 0\nv 0 1 0\nvt a b\nf 1/1 2/1 3/1\n".to_vec(),
             "a.obj:4: expected 2 texture coordinates, found \"a\"",
         ),
         (
-            "normals with words",
+            "text in a normal",
             b"v 0 0 0\nv 1 0 0\nv 0 1 0\nvn a b c\nf 1//1 2//1 3//1\n".to_vec(),
             "a.obj:4: expected 3 normal coordinates, found \"a\"",
         ),
         (
-            "another format",
+            "a different format",
             b"ply\nformat ascii 1.0\nend_header\n".to_vec(),
             "a.obj: no usable face: the file has no faces",
         ),
@@ -120,7 +120,7 @@ pub(super) fn off() -> Vec<Case> {
     vec![
         ("only the keyword", b"OFF\n".to_vec(), "a.off:1: the file ends before the number of vertices"),
         (
-            "a word instead of a count",
+            "text instead of a count",
             b"OFF\nmany 1 0\n".to_vec(),
             "a.off:2: expected the number of vertices, found \"many\"",
         ),
@@ -146,12 +146,12 @@ pub(super) fn off() -> Vec<Case> {
             "a.off:7: the file ends after 1 of 2 faces",
         ),
         (
-            "a missing vertex",
+            "a nonexistent vertex",
             b"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n".to_vec(),
             "a.off:6: vertex 3 is out of range: there are 3, numbered from 0",
         ),
         (
-            "a vertex index before the first",
+            "a negative index out of range",
             b"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 -1\n".to_vec(),
             "a.off:6: vertex -1 is out of range: there are 3, numbered from 0",
         ),
@@ -171,7 +171,7 @@ pub(super) fn off() -> Vec<Case> {
             "a.off: no usable face: 0 of 1 have a non-finite corner, 1 have zero area",
         ),
         (
-            "words in a vertex",
+            "text in a vertex",
             b"OFF\n3 1 0\n0 0 x\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(),
             "a.off:3: expected a coordinate, found \"x\"",
         ),
@@ -181,7 +181,7 @@ pub(super) fn off() -> Vec<Case> {
             "a.off:3: expected a coordinate, found the end of the line",
         ),
         (
-            "words in a face",
+            "text in a face",
             b"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\nthree 0 1 2\n".to_vec(),
             "a.off:6: expected the number of corners, found \"three\"",
         ),
@@ -201,11 +201,11 @@ pub(super) fn off() -> Vec<Case> {
             "a.off:3: expected a coordinate, found the end of the line",
         ),
         (
-            "not finite",
+            "non-finite values",
             b"OFF\n3 1 0\nnan nan nan\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(),
             "a.off: no usable face: 1 of 1 have a non-finite corner, 0 have zero area",
         ),
-        ("another format", b"solid a\nendsolid a\n".to_vec(), "a.off:1: expected OFF, found \"solid\""),
+        ("a different format", b"solid a\nendsolid a\n".to_vec(), "a.off:1: expected OFF, found \"solid\""),
         ("bytes", every_byte(), "a.off:1: this is a binary file in another format"),
     ]
 }
@@ -213,26 +213,26 @@ pub(super) fn off() -> Vec<Case> {
 pub(super) fn ply() -> Vec<Case> {
     vec![
         ("only the magic line", b"ply\n".to_vec(), "a.ply: the header has no end_header"),
-        ("a header without an end", b"ply\nformat ascii 1.0\nelement vertex 3\n".to_vec(), "a.ply: the header has no end_header"),
+        ("a header without end_header", b"ply\nformat ascii 1.0\nelement vertex 3\n".to_vec(), "a.ply: the header has no end_header"),
         ("an unknown format", b"ply\nformat morse 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(), "a.ply:2: the format must be ascii, binary_little_endian or binary_big_endian, not \"morse\""),
         ("version 2", b"ply\nformat ascii 2.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(), ""),
         ("an unknown type", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty quad x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(), "a.ply:4: \"quad\" is not a PLY type"),
-        ("no x", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(), "a.ply: the vertices need properties x, y and z"),
+        ("no x coordinate", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(), "a.ply: the vertices need properties x, y and z"),
         ("a negative count", b"ply\nformat ascii 1.0\nelement vertex -3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(), "a.ply:3: \"-3\" is not a valid number of vertex"),
         ("four billion vertices", b"ply\nformat binary_little_endian 1.0\nelement vertex 4000000000\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(), "a.ply: the header claims 4000000000 of element `vertex`, but only 26 bytes follow"),
         ("four billion faces", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 4000000000\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(), "a.ply: the header claims 4000000000 of element `face`, but only 9 bytes follow"),
         ("the file ends within the vertices", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n".to_vec(), "a.ply: the header claims 3 of element `vertex`, but only 12 bytes follow"),
         ("the file ends within the faces", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 2\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(), "a.ply:14: face 2: unexpected end of file"),
-        ("a missing vertex", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n".to_vec(), "a.ply:13: face 1: vertex 3 is out of range: there are 3, numbered from 0"),
-        ("a vertex index before the first", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 -1\n".to_vec(), "a.ply:13: face 1: vertex -1 is out of range: there are 3, numbered from 0"),
+        ("a nonexistent vertex", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n".to_vec(), "a.ply:13: face 1: vertex 3 is out of range: there are 3, numbered from 0"),
+        ("a negative index out of range", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 -1\n".to_vec(), "a.ply:13: face 1: vertex -1 is out of range: there are 3, numbered from 0"),
         ("a list with a negative length", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n-1\n".to_vec(), "a.ply:13: face 1: negative list length -1"),
-        ("a list of four billion", [&b"ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uint int vertex_indices\nend_header\n"[..], &[0; 36], &[0xff; 4]].concat(), "a.ply: face 1: a list claims 4294967295 items, more than the file can hold"),
+        ("a list with four billion entries", [&b"ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uint int vertex_indices\nend_header\n"[..], &[0; 36], &[0xff; 4]].concat(), "a.ply: face 1: a list claims 4294967295 items, more than the file can hold"),
         ("faces without vertex indices", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty float q\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(), "a.ply: the element `face` needs an integer list `vertex_indices`"),
-        ("words in a vertex", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 x\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(), "a.ply:10: vertex 1: expected a number, found \"x\""),
+        ("text in a vertex", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 x\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(), "a.ply:10: vertex 1: expected a number, found \"x\""),
         ("no faces", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 0\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n".to_vec(), "a.ply: no usable face: the file has no faces"),
         ("a property before any element", b"ply\nformat ascii 1.0\nproperty float x\nend_header\n".to_vec(), "a.ply:3: a property before the first element"),
         ("an element without a count", b"ply\nformat ascii 1.0\nelement vertex\nend_header\n".to_vec(), "a.ply:3: incomplete or unknown statement \"element\""),
-        ("a list with a fractional length", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list float int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(), "a.ply:8: the length of a list must have an integer type"),
+        ("a list length of type float", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list float int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(), "a.ply:8: the length of a list must have an integer type"),
         ("bytes", every_byte(), "a.ply:1: this is a binary file in another format"),
     ]
 }
@@ -247,15 +247,15 @@ pub(super) fn stl() -> Vec<Case> {
         ("the file ends within a facet", stl_of(1, &FACET[..30]), "a.stl: the header claims 1 facets, but the file ends after 0"),
         ("one facet fewer than declared", stl_of(2, &FACET), "a.stl: the header claims 2 facets, but the file ends after 1"),
         ("a facet with three equal vertices", stl_of(1, &[0; 50]), "a.stl: no usable face: 0 of 1 have a non-finite corner, 1 have zero area"),
-        ("not finite", stl_of(1, &[0xff; 50]), "a.stl: no usable face: 1 of 1 have a non-finite corner, 0 have zero area"),
-        ("words in a vertex", b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 zero 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n".to_vec(), "a.stl:5: expected a coordinate, found \"zero\""),
+        ("non-finite values", stl_of(1, &[0xff; 50]), "a.stl: no usable face: 1 of 1 have a non-finite corner, 0 have zero area"),
+        ("text in a vertex", b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 zero 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n".to_vec(), "a.stl:5: expected a coordinate, found \"zero\""),
         ("a vertex with two coordinates", b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n".to_vec(), "a.stl:6: expected a coordinate, found \"vertex\""),
         ("two corners", b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n".to_vec(), "a.stl:6: a loop with only 2 corners"),
         ("four corners", b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 1 1 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n".to_vec(), ""),
         ("no loop", b"solid a\nfacet normal 0 0 1\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n".to_vec(), "a.stl:3: a vertex outside of \"outer loop\" and \"endloop\""),
         ("the file ends within a loop", b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\n".to_vec(), "a.stl:6: the file ends inside a facet"),
         ("the file ends within a vertex", b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0".to_vec(), "a.stl:4: the file ends inside a vertex"),
-        ("an unknown word", b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendlop\nendfacet\nendsolid a\n".to_vec(), "a.stl:7: expected an STL keyword, found \"endlop\""),
+        ("an unknown keyword", b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendlop\nendfacet\nendsolid a\n".to_vec(), "a.stl:7: expected an STL keyword, found \"endlop\""),
         ("a vertex outside a facet", b"solid a\nvertex 0 0 0\nendsolid a\n".to_vec(), "a.stl:2: a vertex outside of \"outer loop\" and \"endloop\""),
         ("a facet within a facet", b"solid a\nfacet normal 0 0 1\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n".to_vec(), ""),
         ("a coordinate that overflows", b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1e999 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n".to_vec(), "a.stl: no usable face: 1 of 1 have a non-finite corner, 0 have zero area"),
@@ -272,7 +272,7 @@ pub(super) fn mtl() -> Vec<Case> {
             "a.mtl:1: expected a name after `newmtl`",
         ),
         (
-            "words in a color",
+            "text in a color",
             b"newmtl m\nKd red green blue\n".to_vec(),
             "a.mtl:2: expected three finite numbers after `Kd`",
         ),
@@ -287,21 +287,21 @@ pub(super) fn mtl() -> Vec<Case> {
             "a.mtl:2: expected three finite numbers after `Kd`",
         ),
         (
-            "not finite",
+            "non-finite values",
             b"newmtl m\nKd nan 1 1\n".to_vec(),
             "a.mtl:2: expected three finite numbers after `Kd`",
         ),
         ("a negative color", b"newmtl m\nKd -1 1 1\n".to_vec(), ""),
         (
-            "a word as an exponent",
+            "text as an exponent",
             b"newmtl m\nNs shiny\n".to_vec(),
             "a.mtl:2: expected a finite number after `Ns`",
         ),
         ("a negative exponent", b"newmtl m\nKd 1 1 1\nNs -5\n".to_vec(), ""),
         ("index of refraction 0", b"newmtl m\nNi 0\nillum 7\n".to_vec(), ""),
-        ("an unknown model", b"newmtl m\nillum 99\n".to_vec(), ""),
+        ("an unknown illumination model", b"newmtl m\nillum 99\n".to_vec(), ""),
         (
-            "a word as an illumination model",
+            "text as an illumination model",
             b"newmtl m\nillum glass\n".to_vec(),
             "a.mtl:2: expected an integer after `illum`",
         ),
@@ -310,14 +310,14 @@ pub(super) fn mtl() -> Vec<Case> {
             b"newmtl m\nmap_Kd\n".to_vec(),
             "a.mtl:2: expected a file name after `map_Kd`",
         ),
-        ("a missing material", b"newmtl other\nKd 1 1 1\n".to_vec(), ""),
+        ("a nonexistent material", b"newmtl other\nKd 1 1 1\n".to_vec(), ""),
         (
-            "a word as an opacity",
+            "text as an opacity",
             b"newmtl m\nd opaque\n".to_vec(),
             "a.mtl:2: expected a finite number after `d`",
         ),
         (
-            "a word as a roughness",
+            "text as a roughness",
             b"newmtl m\nPr smooth\n".to_vec(),
             "a.mtl:2: expected a finite number after `Pr`",
         ),

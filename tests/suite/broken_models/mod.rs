@@ -1,5 +1,5 @@
-//! Malformed and hostile models, about twenty per format: each is either read or rejected with an error that names the
-//! file and the position. None uses more memory than its size justifies.
+//! About twenty malformed and hostile models per format. Each is either read or rejected with an error that
+//! names the file and position. Memory use must stay proportional to the file size.
 
 mod cases;
 
@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 
 use self::cases::{every_byte, mtl, obj, off, ply, stl};
 
-/// A JSON pointer, the value to put there, and text of the expected message.
+/// A JSON pointer, the value to set, and part of the expected message.
 const EDITS: &[(&str, &str, &str)] = &[
     ("/asset/version", r#""1.0""#, r#"glTF 1.0 is not supported; version 2 is required"#),
     ("/nodes/0/mesh", r#"7"#, r#"nodes[0]: meshes[7] does not exist: there are 1"#),
@@ -42,18 +42,18 @@ const EDITS: &[(&str, &str, &str)] = &[
     ),
     ("/accessors/0/componentType", r#"5124"#, r#"accessors[0]: unknown component type 5124"#),
     ("/accessors/0/type", r#""VEC9""#, r#"accessors[0]: unknown type "VEC9""#),
-    ("/accessors/0/count", r#"4000000000"#, r#"accessors[0]: 4000000000 elements from byte 0 need"#),
+    ("/accessors/0/count", r#"4000000000"#, r#"accessors[0]: 4000000000 elements at byte 0 need"#),
     ("/accessors/0/bufferView", r#"9"#, r#"accessors[0]: bufferViews[9] does not exist: there are 2"#),
     (
         "/accessors/0/byteOffset",
         r#"1000000000000"#,
-        r#"accessors[0]: 3 elements from byte 1000000000000 need 36 bytes of bufferViews[0], which has 36"#,
+        r#"accessors[0]: 3 elements at byte 1000000000000 need 36 bytes, but bufferViews[0] has 36"#,
     ),
     ("/bufferViews/0/buffer", r#"9"#, r#"bufferViews[0]: buffers[9] does not exist: there are 1"#),
     (
         "/bufferViews/0/byteLength",
         r#"4000000000"#,
-        r#"bufferViews[0]: bytes 0 + 4000000000 exceed buffers[0], which has 44"#,
+        r#"bufferViews[0]: bytes 0 + 4000000000 exceed buffers[0], which has 44 bytes"#,
     ),
     (
         "/bufferViews/0/byteStride",
@@ -72,7 +72,7 @@ const EDITS: &[(&str, &str, &str)] = &[
     ),
 ];
 
-/// A triangle as glTF.
+/// A glTF file with one triangle.
 fn triangle() -> Value {
     let numbers = "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAAABAAIAAAA=";
     json!({
@@ -88,7 +88,7 @@ fn triangle() -> Value {
     })
 }
 
-/// The error for a file in a folder, with only the file's name; empty if the file is read.
+/// The error when reading a file, with its folder removed. Empty if the file is read.
 fn said(folder: &Path, name: &str, content: &[u8]) -> String {
     let (path, token) = (folder.join(name), CancelToken::new());
     fs::write(&path, content).expect("written");
@@ -159,7 +159,7 @@ fn gltf_files() {
     }
 }
 
-/// The chunks of a GLB file, each with the length it claims.
+/// GLB files with invalid headers and chunks.
 #[test]
 fn glb_files() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -182,7 +182,7 @@ fn glb_files() {
     let all = file(head, &[own.clone(), rest.clone()]);
     let has = text.len() + 44 + 8;
     let claims = |at: usize, has: usize| {
-        format!("a.glb: the chunk at byte {at} claims 2147483648 bytes, but {has} are left")
+        format!("a.glb: the chunk at byte {at} claims 2147483648 bytes, but only {has} remain")
     };
     let place = 12 + own.len();
     let cases: Vec<(&str, Vec<u8>, String)> = vec![
@@ -194,7 +194,7 @@ fn glb_files() {
         ),
         ("two of each", file(head, &[own.clone(), rest.clone(), own.clone(), rest.clone()]), String::new()),
         ("only the magic number", b"glTF".to_vec(), "a.glb: the file ends inside the header".to_owned()),
-        ("half a version", b"glTF\x02\0".to_vec(), "a.glb: the file ends inside the header".to_owned()),
+        ("truncated version", b"glTF\x02\0".to_vec(), "a.glb: the file ends inside the header".to_owned()),
         (
             "version 1",
             file(b"glTF\x01\0\0\0\0\0\0\0", std::slice::from_ref(&own)),
@@ -207,7 +207,7 @@ fn glb_files() {
         ),
         ("no chunk", head.to_vec(), "a.glb: the JSON chunk is missing".to_owned()),
         (
-            "half a chunk header",
+            "truncated chunk header",
             file(head, &[own[..6].to_vec()]),
             "a.glb: the JSON chunk is missing".to_owned(),
         ),
@@ -217,17 +217,17 @@ fn glb_files() {
             file(head, &[chunk(b"MINE", 4, b"abcd")]),
             "a.glb: the JSON chunk is missing".to_owned(),
         ),
-        ("a claim of 2 GiB of JSON", file(head, &[long_text, rest.clone()]), claims(12, has)),
-        ("a claim of 2 GiB of binary data", file(head, &[own.clone(), long_rest]), claims(place, 44)),
+        ("2 GiB of JSON claimed", file(head, &[long_text, rest.clone()]), claims(12, has)),
+        ("2 GiB of binary data claimed", file(head, &[own.clone(), long_rest]), claims(place, 44)),
         (
             "truncated binary data",
             file(head, &[own.clone(), short]),
-            format!("a.glb: the chunk at byte {place} claims 44 bytes, but 40 are left"),
+            format!("a.glb: the chunk at byte {place} claims 44 bytes, but only 40 remain"),
         ),
         (
             "truncated JSON",
             all[..200].to_vec(),
-            format!("a.glb: the chunk at byte 12 claims {} bytes, but 180 are left", text.len()),
+            format!("a.glb: the chunk at byte 12 claims {} bytes, but only 180 remain", text.len()),
         ),
         (
             "no numbers",

@@ -1,5 +1,5 @@
-//! Glass assembled from several open parts. Parts that close together form one solid; anything that stays open is
-//! reported, and looks the same path-traced and with photons.
+//! Glass assembled from several open parts. Parts that together form a closed surface are one solid. Open
+//! surfaces are reported, and render identically with path tracing and photons.
 
 use glimt::assets::LoadedMesh;
 use glimt::control::CancelToken;
@@ -12,13 +12,14 @@ use super::photons::{assert_same_light, both};
 use super::scenes::{AS_IT_IS, Build, emitter, glass, lat_long_sphere, matte, scene, tinted};
 use super::{Random, v};
 
-/// The glass solids of the world that is built.
+/// The glass solids in a built scene.
 fn bodies(build: &Build) -> GlassSolids {
     let meshes: Vec<&LoadedMesh> = build.parts.meshes.iter().map(|mesh| mesh.loaded()).collect();
     GlassSolids::find(&build.scene, &meshes, &CancelToken::new()).expect("nobody cancels")
 }
 
-/// A prism over a polygon in the plane z = 0, counterclockwise seen from +z, with each side divided into squares.
+/// A prism over a polygon in the plane z = 0, counterclockwise when viewed from +z. Each side is divided into
+/// rectangles.
 fn prism(polygon: &[DVec3], caps: &[[usize; 3]], height: f64, steps: usize) -> TriangleMesh {
     let mut mesh = TriangleMesh::default();
     let mut put = |corners: [DVec3; 3]| {
@@ -47,7 +48,7 @@ fn prism(polygon: &[DVec3], caps: &[[usize; 3]], height: f64, steps: usize) -> T
     mesh
 }
 
-/// Closed solids, about 1 in size and above z = 0.
+/// A closed solid above z = 0 with a size of about 1.
 fn closed(round: usize) -> TriangleMesh {
     let corner = |x: f64, y: f64| v(x, y, 0.0);
     match round % 4 {
@@ -76,13 +77,13 @@ fn closed(round: usize) -> TriangleMesh {
     }
 }
 
-/// The triangles of a mesh for which `holds` is true.
+/// The triangles of a mesh that satisfy `holds`.
 fn part(mesh: &TriangleMesh, holds: impl Fn(usize) -> bool) -> TriangleMesh {
     let own = mesh.triangles.iter().enumerate().filter(|&(i, _)| holds(i));
     TriangleMesh { triangles: own.map(|(_, &own)| own).collect(), ..mesh.clone() }
 }
 
-/// Divides a mesh around random points: each triangle belongs to the nearest.
+/// Divides a mesh around random points by assigning each triangle to the nearest point.
 fn cut(mesh: &TriangleMesh, count: usize, random: &mut Random) -> Vec<TriangleMesh> {
     let middle = |i: usize| mesh.corners(i as u32).iter().sum::<Vec3>() / 3.0;
     let seeds: Vec<Vec3> =
@@ -99,7 +100,7 @@ fn turned(mesh: &TriangleMesh) -> TriangleMesh {
     TriangleMesh { triangles: mesh.triangles.iter().map(|&[a, b, c]| [a, c, b]).collect(), ..mesh.clone() }
 }
 
-/// A floor with a large area light above it, and the parts in between.
+/// A floor, a large area light above it, and the parts in between.
 fn room(parts: &[TriangleMesh], material: &Material) -> Build {
     let build = scene().quad(v(-6.0, -6.0, -0.1), v(12.0, 0.0, 0.0), v(0.0, 12.0, 0.0), matte(0.7)).quad(
         v(-3.0, 3.0, 4.0),
@@ -116,7 +117,7 @@ fn by_path(build: Build) -> Build {
 }
 
 #[test]
-fn solid_in_parts_equals_the_whole() {
+fn solid_split_into_parts_renders_the_same() {
     let mut random = Random(11);
     for round in 0..12 {
         let whole = closed(round);
@@ -132,11 +133,11 @@ fn solid_in_parts_equals_the_whole() {
             assert!(!found.is_inside_out(part), "round {round}");
         }
         let [one_path, several_path] = [&one, &several].map(|build| by_path(build.clone()).picture(8, 5));
-        assert!(one_path == several_path, "round {round}: {} parts, path-traced", parts.len());
-        // Photons are aimed at objects, so different objects get different photons.
+        assert!(one_path == several_path, "round {round}: {} parts, path tracing", parts.len());
+        // Photons are aimed at objects, so splitting an object changes the photons.
         if round < 4 {
             let [one, several] = [one, several].map(|build| build.photons(4000, 0.1));
-            assert_same(&format!("photons, round {round}"), &one, &several, 4, 3.5, 0.0);
+            assert_same(&format!("round {round}: photons"), &one, &several, 4, 3.5, 0.0);
         }
     }
 }
@@ -159,16 +160,16 @@ fn reversed_part_is_flipped() {
         for (object, flip) in (2..).zip(&flips) {
             assert_eq!(found.is_inside_out(object), *flip, "round {round}");
         }
-        // Reversing the corners rounds differently, so few paths differ.
+        // Reversed triangles round differently, which changes a few paths.
         let sum = |picture: &[DVec3]| picture.iter().map(|pixel| pixel.y).sum::<f64>();
         let (own, right) = (sum(&by_path(build).picture(8, 3)), sum(&right));
-        assert!((own - right).abs() < 1e-3 * right, "round {round}: {flips:?}: {own}, not {right}");
+        assert!((own - right).abs() < 1e-3 * right, "round {round}: {flips:?}: {own}, expected {right}");
     }
 }
 
 #[test]
-fn long_edge_closes_with_many_short_ones() {
-    // A box whose sides are divided into squares and whose lids are not, at an oblique angle to the axes.
+fn long_edge_matches_several_short_edges() {
+    // A box at an oblique angle to the axes. Its sides are divided into strips, but its lids are not divided.
     let corners = [v(-0.7, -0.6, 0.0), v(0.7, -0.6, 0.0), v(0.7, 0.6, 0.0), v(-0.7, 0.6, 0.0)];
     let side = |step: f64| v(0.0, 0.0, 0.9 * step);
     let mut sides = TriangleMesh::default();
@@ -201,7 +202,7 @@ fn long_edge_closes_with_many_short_ones() {
     assert!((open.missing - 1.68 / (1.68 + 0.9 * 5.2)).abs() < 1e-5, "{}", open.missing);
 }
 
-/// The six quads of a box between two corners; `flips` selects those that face inwards.
+/// The six quads of a box between two corners. `flips` is a bit mask of inward-facing quads.
 fn quads(low: DVec3, high: DVec3, flips: u32) -> Vec<Shape> {
     let size = high - low;
     let mut quads = Vec::new();
@@ -232,16 +233,16 @@ fn quads_and_disks_close_solids() {
             assert_eq!((own.place(quad), own.is_inside_out(quad)), (5, flips >> quad & 1 == 1), "{flips}");
         }
     }
-    // One is missing.
+    // One quad is missing.
     let five = bodies(&of(quads(v(0.0, 0.0, 0.0), v(1.0, 1.0, 1.0), 0)[1..].to_vec()));
     assert!(five.has_open() && five.open().len() == 4, "{:?}", five.open());
-    // Two boxes share a face, and four quads meet at each edge of it: these are two solids.
+    // Two boxes that share a face are two solids, although four quads meet at each shared edge.
     let (one, other) =
         (quads(v(0.0, 0.0, 0.0), v(1.0, 1.0, 1.0), 0), quads(v(1.0, 0.0, 0.0), v(2.0, 1.0, 1.0), 0));
     let two = bodies(&of([one, other].concat()));
     assert!(two.open().is_empty(), "{:?}", two.open());
     assert_eq!((0..12).map(|quad| two.place(quad)).collect::<Vec<_>>(), [[5; 6], [11; 6]].concat());
-    // A tube with lids, one of which faces inwards; a cone on its base.
+    // A tube with lids, one of them facing inward. A cone with a separate base.
     let (a, b) = (v(0.3, -0.2, 0.1), v(1.0, 0.5, -0.4));
     let tube = Shape::Cylinder { a, b, radius: 0.4, caps: false };
     let lid = |center: DVec3, normal: DVec3| Shape::Disk { center, normal, radius: 0.4 };
@@ -268,8 +269,9 @@ fn quads_of_glass_are_a_box() {
 }
 
 #[test]
-fn camera_inside_a_solid_in_parts_is_in_glass() {
-    // A light in the glass, seen by the camera through 0.8 of glass with no surface in between.
+fn camera_inside_split_solid_is_in_glass() {
+    // A light inside the glass, visible to the camera through 0.8 units of glass without a surface in
+    // between.
     let (low, high) = (v(-1.0, -1.0, 0.0), v(1.0, 1.0, 2.0));
     let material = tinted(1.33, v(0.5, 0.5, 0.5));
     let lit = |build: Build| {
@@ -290,23 +292,26 @@ fn camera_inside_a_solid_in_parts_is_in_glass() {
         3,
     );
     let mesh = |mesh: &TriangleMesh| scene().mesh(mesh.clone(), AS_IT_IS, material.clone());
-    // The last quad is the top: the surface of a pool.
+    // The last quad is the top, which is the surface of the pool.
     let bodies = [
         ("a box", whole),
         ("quads", of(&quads(low, high, 0), &none)),
-        ("quads that face inwards", of(&quads(low, high, 0b10_0110), &none)),
+        ("inward-facing quads", of(&quads(low, high, 0b10_0110), &none)),
         ("a pool", of(&quads(low, high, 0), &|number| number != 5)),
         ("a mesh", mesh(&cube)),
-        ("a mesh that faces inwards", mesh(&turned(&cube))),
+        ("an inward-facing mesh", mesh(&turned(&cube))),
     ];
     for (what, build) in bodies {
         for integrator in [Integrator::Whitted, Integrator::Path] {
             let value = lit(build.clone()).with(|scene| scene.render.integrator = integrator).value();
             let expected = 2.0 * 0.5_f64.powf(0.8);
-            assert!((value - expected).abs() < 1e-3, "{what} with {integrator:?}: {value} is not {expected}");
+            assert!(
+                (value - expected).abs() < 1e-3,
+                "{what} with {integrator:?}: {value}, expected {expected}"
+            );
         }
     }
-    // Above the pool, outside of it, the ray passes no glass.
+    // Above the pool, the ray passes through no glass.
     let above = of(&quads(low, high, 0), &|number| number != 5)
         .sphere(v(0.3, 0.9, 3.0), 0.1, emitter(2.0))
         .seen(v(0.3, 0.0, 3.0), v(0.3, 0.9, 3.0));
@@ -314,7 +319,7 @@ fn camera_inside_a_solid_in_parts_is_in_glass() {
 }
 
 #[test]
-fn light_inside_a_solid_in_parts_emits_photons() {
+fn light_inside_split_solid_emits_photons() {
     let cube = |low: f64, high: f64, z: f64| {
         let at = |x: f64, y: f64| v(x, y, z);
         prism(
@@ -324,7 +329,7 @@ fn light_inside_a_solid_in_parts_emits_photons() {
             2,
         )
     };
-    // A light in a hollow glass cube, both meshes. The room is seen from above, where it is open.
+    // A light in a hollow glass cube made of two meshes. The camera looks into the room through its open top.
     let walls = quads(v(-1.0, -1.0, 0.0), v(1.0, 1.0, 2.0), 0).into_iter().take(5);
     let hollow = walls
         .fold(scene(), |build, wall| build.shape(wall, matte(0.6)))
@@ -333,7 +338,7 @@ fn light_inside_a_solid_in_parts_emits_photons() {
         .sphere(v(0.0, 0.0, 1.0), 0.2, emitter(5.0))
         .pictured(v(0.0, 0.0, 6.0), v(0.0, 0.0, 0.0), 24.0, 12, 12)
         .depth(5);
-    // A light in a bubble under the surface of a pool with opaque walls.
+    // A light in an air bubble in a pool with opaque walls.
     let water = tinted(1.33, v(0.5, 0.5, 0.5));
     let pool = quads(v(-1.0, -1.0, 0.0), v(1.0, 1.0, 1.0), 0).into_iter().enumerate();
     let pool = pool
@@ -350,8 +355,8 @@ fn light_inside_a_solid_in_parts_emits_photons() {
     }
 }
 
-/// Checks that two scenes give the same image mean and quarter means, within `errors` standard errors and a fraction of the
-/// value.
+/// Checks that two scenes have equal means over the image and each quarter, within `errors` standard errors
+/// plus a fraction of the value.
 #[track_caller]
 fn assert_same(what: &str, one: &Build, other: &Build, samples: u32, errors: f64, part: f64) {
     let means = |build: &Build, first: u32| -> Vec<[f64; 5]> {
@@ -376,14 +381,14 @@ fn assert_same(what: &str, one: &Build, other: &Build, samples: u32, errors: f64
         };
         let ((a, a_error), (b, b_error)) = (of(&one), of(&other));
         let allowed = errors * a_error.hypot(b_error) + part * a;
-        assert!(a > 0.0 && a_error < 0.02 * a, "{what}, {quarter}: {a} ± {a_error} is too noisy");
-        assert!((a - b).abs() <= allowed, "{what}, {quarter}: {a} ± {a_error}, {b} ± {b_error}");
+        assert!(a > 0.0 && a_error < 0.02 * a, "{what}, {quarter}: too noisy: {a} ± {a_error}");
+        assert!((a - b).abs() <= allowed, "{what}, {quarter}: {a} ± {a_error} vs. {b} ± {b_error}");
     }
 }
 
 #[test]
 fn texture_seams_are_not_holes() {
-    // No triangles share vertices.
+    // Triangles do not share vertices.
     let whole = lat_long_sphere(12, 20, 0.7, v(0.1, 0.2, 0.9));
     let positions: Vec<Vec3> =
         whole.triangles.iter().flatten().map(|&i| whole.positions[i as usize]).collect();
@@ -392,7 +397,7 @@ fn texture_seams_are_not_holes() {
     let of = |mesh: TriangleMesh| bodies(&scene().mesh(mesh, AS_IT_IS, glass(1.5)));
     assert_eq!(of(loose), GlassSolids::default());
     assert_eq!(of(whole.clone()), GlassSolids::default());
-    // Its front faces inwards.
+    // An inside-out mesh.
     assert!(of(turned(&whole)).is_inside_out(0) && of(turned(&whole)).open().is_empty());
     // A mirrored instance.
     let mirrored =
@@ -405,7 +410,7 @@ fn glass_with_a_hole_is_reported() {
     let mut random = Random(3);
     for round in 0..40 {
         let whole = closed(round);
-        // Remove a triangle, or reverse one.
+        // Remove a triangle.
         let lost = (random.unit() * whole.triangles.len() as f64) as usize;
         let mut parts = cut(&part(&whole, |i| i != lost), 3, &mut random);
         let open = bodies(&room(&parts, &glass(1.5)));
@@ -420,12 +425,12 @@ fn glass_with_a_hole_is_reported() {
         for one in open.open() {
             assert!(
                 (one.missing - expected).abs() < 1e-4 * expected,
-                "round {round}: {one:?}, not {expected}"
+                "round {round}: {one:?}, expected {expected}"
             );
             assert!(!one.disagrees && !one.is_covered, "round {round}: {one:?}");
             assert_eq!(open.is_open(open.place(one.object)), expected > 1e-3, "round {round}");
         }
-        // Put it back in the wrong orientation.
+        // Put the triangle back with reversed orientation.
         parts[0].triangles.push({
             let [a, b, c] = whole.triangles[lost];
             [a, c, b]
@@ -437,7 +442,7 @@ fn glass_with_a_hole_is_reported() {
 
 #[test]
 fn sheet_between_opaque_walls_is_closed() {
-    // The surface of a pool: up to the walls, and through them.
+    // A pool surface that touches the walls or extends through them.
     let wall = |build: Build, corner: DVec3, u: DVec3, w: DVec3| build.quad(corner, u, w, matte(0.5));
     let pool = |reach: f64| {
         let (x, y, z) = (v(2.0, 0.0, 0.0), v(0.0, 2.0, 0.0), v(0.0, 0.0, 1.0));
@@ -465,8 +470,8 @@ fn sheet_between_opaque_walls_is_closed() {
 }
 
 #[test]
-fn curved_opaque_surface_closes_a_sheet() {
-    // A label on a glass ball; the ball has no triangles under it.
+fn curved_opaque_surface_closes_open_glass() {
+    // A label on a glass ball. The ball has no triangles under the label.
     let ball = lat_long_sphere(12, 20, 0.7, v(0.0, 0.0, 0.9));
     let middle = |i: usize| ball.corners(i as u32).iter().sum::<Vec3>() / 3.0;
     let is_label = |i: usize| middle(i).x > 0.4;
@@ -476,11 +481,11 @@ fn curved_opaque_surface_closes_a_sheet() {
     };
     let fits = bodies(&with(label.clone()));
     assert!(!fits.has_open() && fits.open().iter().all(|open| open.is_covered), "{:?}", fits.open());
-    // The label does not touch the bottle.
+    // The label does not touch the ball.
     let off =
         TriangleMesh { positions: label.positions.iter().map(|p| p + Vec3::X * 0.02).collect(), ..label };
     assert!(bodies(&with(off)).has_open());
-    // Two panes close a tube that is not glass. The chords of their rims deviate by 2 % of its radius.
+    // Two glass panes in an opaque tube. The chords of their rims deviate from it by 2 % of the radius.
     let pane = |radius: f64, height: f64, faces_up: bool| {
         let mut mesh =
             TriangleMesh { positions: vec![v(0.0, 0.0, height).as_vec3()], ..TriangleMesh::default() };
@@ -503,8 +508,8 @@ fn curved_opaque_surface_closes_a_sheet() {
 }
 
 #[test]
-fn each_hole_is_covered_independently() {
-    // Five sides of a box: on a table, next to it in the air, with the hole upwards, and on a mesh.
+fn each_hole_is_tested_separately() {
+    // Boxes with five sides: on a table, above the table, with the open side up, and on a mesh.
     let (low, high) = (v(0.0, 0.0, 0.0), v(1.0, 1.0, 0.5));
     let five = |at: DVec3, lost: usize| {
         let all = quads(low + at, high + at, 0).into_iter().enumerate();
@@ -543,9 +548,9 @@ fn each_hole_is_covered_independently() {
 }
 
 #[test]
-fn inward_mesh_inside_glass_is_a_cavity() {
+fn inward_facing_mesh_in_glass_is_a_cavity() {
     let tint = v(0.5, 0.9, 0.25);
-    // Without reflection and refraction, light is tinted by the distance it travels in glass.
+    // With an IOR of 1, the color depends only on the distance through glass.
     let material = tinted(1.0, tint);
     let seen = |parts: &[TriangleMesh], x: f64| {
         let build = scene().background(1.0).depth(20).seen(v(x, 0.013, 5.0), v(x, 0.013, 0.0));
@@ -557,22 +562,22 @@ fn inward_mesh_inside_glass_is_a_cavity() {
         let color = seen(parts, x);
         for channel in 0..3 {
             let exact = tint[channel].powf(way);
-            assert!((color[channel] - exact).abs() < 2e-3, "{what}, {x}: {color} for a distance of {way}");
+            assert!((color[channel] - exact).abs() < 2e-3, "{what}, {x}: {color} at distance {way}");
         }
     };
     let (outer, inner) = (ball(1.0), ball(0.8));
     for x in [0.0, 0.3, 0.7, 0.9] {
         let shell = chord(1.0, x) - chord(0.8, x);
         check("hollow", &[outer.clone(), turned(&inner)], x, shell);
-        check("in any order", &[turned(&inner), outer.clone()], x, shell);
+        check("reverse order", &[turned(&inner), outer.clone()], x, shell);
         check("solid", &[outer.clone(), inner.clone()], x, chord(1.0, x));
         check("alone", &[turned(&inner)], x, chord(0.8, x));
         let onion = [outer.clone(), turned(&ball(0.2)), turned(&inner), ball(0.5)];
-        check("a ball in it", &onion, x, shell + chord(0.5, x) - chord(0.2, x));
+        check("hollow ball inside", &onion, x, shell + chord(0.5, x) - chord(0.2, x));
         let lost = [outer.clone(), turned(&inner), turned(&ball(0.5))];
-        check("an inside-out ball in it", &lost, x, shell + chord(0.5, x));
+        check("inside-out ball inside", &lost, x, shell + chord(0.5, x));
     }
-    // Two cavities, each in its place; one that is partly outside is not a cavity.
+    // Two separate cavities. A mesh that is partly outside or has a different material is not a cavity.
     let at = |radius: f64, x: f64| lat_long_sphere(24, 48, radius, v(x, 0.0, 0.0));
     let two = scene().mesh(at(1.0, 0.0), AS_IT_IS, material.clone());
     let two = two.mesh(turned(&at(0.3, -0.5)), AS_IT_IS, material.clone());
@@ -589,12 +594,12 @@ fn inward_mesh_inside_glass_is_a_cavity() {
 }
 
 #[test]
-fn open_glass_matches_paths_and_photons() {
+fn open_glass_matches_with_path_and_photons() {
     let material = tinted(1.8, v(0.5, 0.9, 0.7));
     let sphere = lat_long_sphere(12, 20, 0.7, v(0.0, 0.0, 0.9));
     let middle = |i: usize| sphere.corners(i as u32).iter().sum::<Vec3>() / 3.0;
     let (bowl, dome) = (part(&sphere, |i| middle(i).z < 0.9), part(&sphere, |i| middle(i).z > 0.95));
-    // Two parts of one solid that do not meet: both are open.
+    // Two parts of a solid that do not touch. Both are open.
     let block = closed(2);
     let height = |i: usize| block.corners(i as u32).iter().map(|corner| corner.z).sum::<f32>() / 3.0;
     let apart = [part(&block, |i| height(i) > 0.89), part(&block, |i| height(i) < 0.6)];

@@ -1,4 +1,4 @@
-//! Height textures: a ramp equals a tilted plane, and waves have the normals given by their derivatives.
+//! Bump maps: a ramp equals a tilted plane, and the normals of waves match their analytic derivatives.
 
 use std::f64::consts::{PI, TAU};
 
@@ -14,7 +14,7 @@ use super::scenes::{
 };
 use super::v;
 
-/// A texture of heights as a function of the position in the image, from (0, 0) at the bottom left to (1, 1).
+/// A height texture from a function of the image position, from (0, 0) at the bottom left to (1, 1).
 fn heights(build: &mut Build, size: usize, height: impl Fn(DVec2) -> f64) -> usize {
     let place = |i: usize| (i as f64 + 0.5) / size as f64;
     let row =
@@ -28,7 +28,7 @@ fn bumped(texture: usize, scale: f64, material: Material) -> Material {
     Material { bump: Some(Bump { texture, channel: None, scale: scale as f32 }), ..material }
 }
 
-/// Materials of every kind that shows its shading normal.
+/// One material of each kind affected by the shading normal.
 fn materials() -> Vec<(&'static str, Material)> {
     vec![
         ("phong", phong(0.3, 0.5, 20.0, 0.0)),
@@ -43,8 +43,8 @@ fn materials() -> Vec<(&'static str, Material)> {
 
 #[test]
 fn ramp_is_shaded_like_a_tilted_plane() {
-    // Heights of 0.3·u over edges of length 2 have slope 0.15; the tilted plane contains the visible point. The light
-    // is placed where the shading normal faces it less than the surface does, so that nothing fades.
+    // Heights of 0.3·u over edges of length 2 have slope 0.15. The tilted plane contains the visible point.
+    // The light is closer to the surface normal than to the shading normal, so no fading applies.
     let slope = 0.15;
     let up = v(-slope, 1.0, 0.0).normalize();
     let eye = v(1.0, 1.5, 0.4);
@@ -53,7 +53,7 @@ fn ramp_is_shaded_like_a_tilted_plane() {
         .shadows(Shadows::Off, 1)
         .seen(eye, DVec3::ZERO);
     for (name, material) in materials().into_iter().filter(|(name, _)| *name != "glass") {
-        // A mirror does not show a point light, but its surroundings.
+        // A mirror reflects the background, but not a point light.
         let lit = lit.clone().background(if name == "mirror" { 0.25 } else { 0.0 });
         let mut relief = lit.clone();
         let texture = heights(&mut relief, 8, |at| at.x);
@@ -63,14 +63,17 @@ fn ramp_is_shaded_like_a_tilted_plane() {
         let tilted = lit.clone().quad(-(along + w) / 2.0, along, w, material);
         assert!(up.dot(along).abs() < 1e-12);
         let [relief, tilted] = [relief, tilted].map(|build| build.depth(1).value());
-        assert!((relief - tilted).abs() < 2e-5 * tilted && tilted > 0.0, "{name}: {relief} is not {tilted}");
+        assert!(
+            (relief - tilted).abs() < 2e-5 * tilted && tilted > 0.0,
+            "{name}: {relief}, expected {tilted}"
+        );
     }
 }
 
 #[test]
-fn ramp_equals_a_constant_normal_map() {
-    // On a cube with edges of length 1, the slopes equal those of the map. Its faces show the middle half of the image,
-    // which is a ramp everywhere.
+fn ramp_equals_constant_normal_map() {
+    // On a cube with edges of length 1, the ramp's slope equals the normal map's slope. The faces show the
+    // middle half of the image, which has no wrap-around step.
     let slope = 0.25;
     for (name, material) in materials() {
         for integrator in [Integrator::Whitted, Integrator::Path] {
@@ -94,32 +97,32 @@ fn ramp_equals_a_constant_normal_map() {
                 let off = (relief - mapped).abs().max_element();
                 assert!(
                     off < 2e-4 * mapped.max_element(),
-                    "{name} with {integrator:?}: {relief} is not {mapped}"
+                    "{name} with {integrator:?}: {relief}, expected {mapped}"
                 );
             }
         }
     }
 }
 
-/// The visible shading normal.
+/// Shading normal seen by the camera.
 fn normal(build: &Build) -> DVec3 {
     build.clone().viewed(View::Normal).color() * 2.0 - 1.0
 }
 
-/// The waves' height over an image, and its gradient.
+/// Height and gradient of the waves at an image position.
 fn waves(at: DVec2) -> (f64, DVec2) {
     let phase = TAU * at;
     let slopes = DVec2::new(phase.x.cos() * phase.y.cos(), -phase.x.sin() * phase.y.sin());
     (phase.x.sin() * phase.y.cos(), slopes * TAU)
 }
 
-/// Number of columns in the image of the waves. Interpolating between texels reduces the slope by 2·10⁻⁴ of the
-/// steepest.
+/// Number of columns in the wave image. Interpolation between texels reduces slopes by 2·10⁻⁴ of the maximum
+/// slope.
 const COLUMNS: usize = 256;
 
 #[test]
-fn tiled_waves_give_their_analytic_normals() {
-    // The image's coordinates are s = R(r·(u, v)) + o, so that the gradient ∇h by (u, v) is r·Rᵀ∇h by s.
+fn tiled_waves_have_analytic_normals() {
+    // Image coordinates are s = R(r·(u, v)) + o, so the gradient of h with respect to (u, v) is r·Rᵀ∇ₛh.
     let (u, w) = (v(2.0, 0.0, 0.0), v(0.5, 0.0, -1.5));
     for (repeat, degrees, offset) in [
         (DVec2::ONE, 0.0_f64, DVec2::ZERO),
@@ -136,21 +139,22 @@ fn tiled_waves_give_their_analytic_normals() {
             let slopes = repeat
                 * DVec2::from_angle(-degrees.to_radians()).rotate(waves(turn.rotate(repeat * at) + offset).1)
                 * 0.05;
-            // The tangents of the graph are u and w, raised by the slopes.
+            // The tangents of the height field are u and w, each raised by its slope.
             let expected = (u + DVec3::Y * slopes.x).cross(w + DVec3::Y * slopes.y).normalize();
             let point = u * at.x + w * at.y;
             let found = normal(&build.clone().seen(point + v(0.3, 2.0, 0.2), point));
             assert!(
                 (found - expected).length() < 5e-4,
-                "{at} of {repeat}, {degrees}°: {found}, not {expected}"
+                "{at} of {repeat}, {degrees}°: {found}, expected {expected}"
             );
         }
     }
 }
 
 #[test]
-fn waves_on_a_sphere_give_displaced_normals() {
-    // The point is (R + h)·n; its derivatives by longitude and latitude span the tangent plane, to first order in h/R.
+fn waves_on_a_sphere_have_displaced_normals() {
+    // The displaced point is (R + h)·n. Its derivatives with respect to longitude and latitude span the
+    // tangent plane, to first order in h/R.
     let (radius, scale) = (2.0, 1e-2);
     let direction = |uv: DVec2| {
         let (longitude, latitude) = ((uv.x - 0.5) * TAU, (uv.y - 0.5) * PI);
@@ -170,14 +174,14 @@ fn waves_on_a_sphere_give_displaced_normals() {
         let across = tangent(DVec2::X, slopes.x).cross(tangent(DVec2::Y, slopes.y)).normalize();
         let expected = across * across.dot(n).signum();
         let found = normal(&ball.clone().seen(n * 5.0, DVec3::ZERO));
-        assert!((found - expected).length() < 5e-4, "{uv}: {found}, not {expected}");
+        assert!((found - expected).length() < 5e-4, "{uv}: {found}, expected {expected}");
     }
 }
 
 #[test]
-fn waves_follow_mesh_coordinates_and_transform() {
-    // Its vertices have the texture coordinates 2·(x, z) + (0.1, 0.2) in the file; the instance is scaled by three and
-    // mirrored. Heights are lengths in the scene, so they do not scale with the instance.
+fn waves_follow_mesh_uvs_and_transform() {
+    // Texture coordinates are 2·(x, z) + (0.1, 0.2) in object space. The instance is scaled by three and
+    // mirrored. Heights are in scene units, so they do not scale with the instance.
     let corners = [v(0.0, 0.0, 0.0), v(1.0, 0.0, 0.0), v(1.0, 0.0, 1.0), v(0.0, 0.0, 1.0)];
     let coordinates = |at: DVec3| DVec2::new(at.x, at.z) * 2.0 + DVec2::new(0.1, 0.2);
     for mirrored in [1.0, -1.0] {
@@ -196,14 +200,17 @@ fn waves_follow_mesh_coordinates_and_transform() {
             let expected = v(-slopes.x * mirrored, 1.0, -slopes.y).normalize();
             let point = v(3.0 * mirrored * at.x, 0.5, 3.0 * at.z);
             let found = normal(&build.clone().seen(point + v(0.3, 2.0, 0.2), point));
-            assert!((found - expected).length() < 5e-4, "{at}, mirrored {mirrored}: {found}, not {expected}");
+            assert!(
+                (found - expected).length() < 5e-4,
+                "{at}, mirrored {mirrored}: {found}, expected {expected}"
+            );
         }
     }
 }
 
 #[test]
 fn distant_mipmapped_waves_are_flat() {
-    // From 400 units away, a pixel of 1° is 7 units wide, and a wave 1 unit.
+    // At a distance of 400 units, a 1° pixel is 7 units wide. A wave is 1 unit wide.
     let mut build = scene();
     let texture = heights(&mut build, 32, |at| waves(at).0);
     build.scene.textures[texture].repeat = Vec2::splat(200.0);
@@ -223,8 +230,8 @@ fn distant_mipmapped_waves_are_flat() {
 
 #[test]
 fn bumpy_balls_have_no_black_edge() {
-    // Where shading normals face away from the viewer, the reflection still shows the sky. The waves run from pole to
-    // pole.
+    // Reflections still show the sky where shading normals face away from the viewer. The waves run from pole
+    // to pole.
     let mut darkest = Vec::new();
     for (name, material) in materials().into_iter().filter(|(name, _)| *name != "glass") {
         let mut build = scene().environment(1.0);
@@ -247,7 +254,7 @@ fn bumpy_balls_have_no_black_edge() {
 
 #[test]
 fn no_light_from_behind_the_shading_normal() {
-    // Slopes of 60° facing light that arrives from behind them, at 3° to 20° above the surface.
+    // Slopes of 60°. The light is 3° to 20° above the surface, behind the shading normal.
     let slope = 3.0_f64.sqrt();
     for (name, material) in materials().into_iter().filter(|(name, _)| !["glass", "mirror"].contains(name)) {
         for (degrees, shadows) in [
@@ -273,7 +280,7 @@ fn no_light_from_behind_the_shading_normal() {
 
 #[test]
 fn hard_and_soft_point_shadows_agree_on_bumps() {
-    // Lobe samples that lead behind the shading normal have no pdf.
+    // Lobe samples behind the shading normal have zero pdf.
     for (name, material) in [
         ("translucent", translucent(0.8, 0.3, 0.5)),
         ("plastic", plastic(0.7, 0.3)),

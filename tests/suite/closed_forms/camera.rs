@@ -1,4 +1,4 @@
-//! The camera: projection and the circle of confusion.
+//! Camera: projection and circle of confusion.
 
 use glimt::film::Rect;
 use glimt::integrators::RenderSettings;
@@ -9,7 +9,8 @@ use glimt::scene::description::Render;
 use super::scenes::{emitter, scene, tile};
 use super::{Random, assert_close, assert_mean, v};
 
-/// A camera with aperture 0.2, focused at 5, with 40° over 480 pixels, looking along −z.
+/// A camera looking along −z, with aperture 0.2, focal distance 5, and a field of view of 40° over 480
+/// pixels.
 fn lens() -> Camera {
     Camera::LookAt {
         position: DVec3::ZERO,
@@ -23,7 +24,7 @@ fn lens() -> Camera {
 
 const SIZE: u32 = 480;
 
-/// Pixels per unit of length at distance d.
+/// Pixels per unit length at distance d.
 fn pixels_per_length(d: f64) -> f64 {
     f64::from(SIZE) / (2.0 * d * 20.0_f64.to_radians().tan())
 }
@@ -38,7 +39,7 @@ fn rays_pass_through_projected_points() {
             scene.camera = Camera::LookAt { position, look_at: target, up, fov, aperture: 0.0, focus: 1.0 };
         });
         let camera = build.world().camera;
-        // The textbook view matrix, with rows s, u, −f, followed by the perspective division.
+        // The textbook view matrix with rows s, u, −f, followed by perspective division.
         let f = (target - position).normalize();
         let s = f.cross(up).normalize();
         let u = s.cross(f);
@@ -58,14 +59,15 @@ fn rays_pass_through_projected_points() {
 }
 
 #[test]
-fn circle_of_confusion_has_the_right_diameter() {
-    // A point at distance d is spread over A·|d − d_f|/d on the focal plane, measured in pixels of that plane.
+fn circle_of_confusion_diameter_is_exact() {
+    // A point at distance d is blurred over A·|d − d_f|/d on the focal plane. Convert to pixels at that
+    // distance.
     let camera = scene().with(|scene| scene.camera = lens()).world().camera;
     for (d, exact) in [(10.0, 13.187_9), (2.5, 26.375_8)] {
         let formula = 0.2 * f64::abs(d - 5.0) / d * pixels_per_length(5.0);
         assert!((formula - exact).abs() < 1e-4);
-        // Intersect the ray through the middle pixel and a point of the lens with the plane at d, in pixels of that
-        // plane.
+        // Intersect a ray through the center pixel and a lens point with the plane at d, and convert to
+        // pixels at d.
         let mut extent = DVec3::ZERO;
         for step in 0..3600 {
             let (sin, cos) = (f64::from(step) / 1800.0 * std::f64::consts::PI).sin_cos();
@@ -73,14 +75,15 @@ fn circle_of_confusion_has_the_right_diameter() {
             let (o, k) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
             extent = extent.max((o + k * ((-d - o.z) / k.z)) * 2.0 * pixels_per_length(d));
         }
-        assert_close(&format!("across at {d}"), extent.x, formula);
+        assert_close(&format!("diameter at {d}"), extent.x, formula);
         assert_close(&format!("down at {d}"), extent.y, formula);
     }
 }
 
 #[test]
-fn small_light_blurs_with_the_right_variance() {
-    // Its image is disk ∗ square ∗ pixel: the variance along an axis is D²/16 + s²/12 + 1/12, the sum of all pixels s².
+fn small_light_has_analytic_blur_variance() {
+    // Its image is a convolution, disk ∗ square ∗ pixel. The variance along an axis is D²/16 + s²/12 + 1/12,
+    // and the sum of all pixels is s².
     for (d, diameter) in [(10.0, 13.187_9), (2.5, 26.375_8)] {
         let s = 3.0 / pixels_per_length(d);
         let build = scene().quad(v(-s / 2.0, -s / 2.0, -d), v(s, 0.0, 0.0), v(0.0, s, 0.0), emitter(1.0));

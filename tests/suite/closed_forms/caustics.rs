@@ -1,5 +1,5 @@
-//! Photon-mapped light against the same path-traced light: means of blocks of pixels and of the whole image, with their
-//! spread over seeds. Also uniform light up to edges and walls, which truncate kernels.
+//! Photon mapping against path tracing: means over pixel blocks and the whole image, with their spread over
+//! seeds. Also uniform light near edges and walls, which truncate kernels.
 
 use std::f64::consts::PI;
 
@@ -19,17 +19,18 @@ use super::scenes::{
 };
 use super::v;
 
-/// Seeds for each method.
+/// Seeds per method.
 const SEEDS: u32 = 16;
-/// Pixels along one side of an image, and blocks of them.
+/// Image side length in pixels, and in blocks.
 const SIDE: usize = 16;
 const BLOCKS: usize = 4;
-/// Largest joint standard error of both methods, relative to the light: a deviation of 3 % is then far beyond chance.
+/// Largest relative standard error of the difference between both methods. A difference of 3 % is then highly
+/// significant.
 const MOST_ERROR: f64 = 4.5e-3;
-/// Allowed bias of the kernels in smooth light, far from edges.
+/// Allowed kernel bias in smooth light, away from edges.
 const SLACK: f64 = 1.5e-3;
 
-/// Effort of both methods, and the radius of the kernels.
+/// Sample counts of both methods, and the kernel radius.
 struct Effort {
     path_samples: u32,
     passes: u32,
@@ -37,7 +38,7 @@ struct Effort {
     radius: f64,
 }
 
-/// Means of the blocks, row by row, followed by the mean of the whole image.
+/// Block means, row by row, followed by the mean of the whole image.
 fn means(picture: &[DVec3]) -> Vec<f64> {
     let of = SIDE / BLOCKS;
     let block = |number: usize| {
@@ -50,7 +51,7 @@ fn means(picture: &[DVec3]) -> Vec<f64> {
     blocks.into_iter().chain([whole]).collect()
 }
 
-/// Mean and standard error of each of these means, for each view.
+/// Mean and standard error of each value of `means`, for each view.
 fn spread(build: &Build, views: &[View], samples: u32) -> Vec<Vec<(f64, f64)>> {
     let world = build.world();
     let rect = Rect { x: 0, y: 0, width: SIDE as u32, height: SIDE as u32 };
@@ -66,8 +67,8 @@ fn spread(build: &Build, views: &[View], samples: u32) -> Vec<Vec<(f64, f64)>> {
     (0..views.len()).map(|view| (0..=BLOCKS * BLOCKS).map(|i| of(view, i)).collect()).collect()
 }
 
-/// Checks that both methods give the same light: each block within 5 standard errors and 1.5 %, the whole image within
-/// 4 and `SLACK`.
+/// Checks that both methods agree: each block within 5 standard errors plus 1.5 %, the whole image within 4
+/// standard errors plus `SLACK`.
 #[track_caller]
 fn assert_same_light(what: &str, build: &Build, views: &[View], effort: &Effort) {
     let &Effort { path_samples, passes, photons, radius } = effort;
@@ -79,17 +80,17 @@ fn assert_same_light(what: &str, build: &Build, views: &[View], effort: &Effort)
         let (blocks, whole) = (0..BLOCKS * BLOCKS, BLOCKS * BLOCKS);
         let ((a, da), (b, db)) = (by_paths[whole], by_photons[whole]);
         let error = da.hypot(db);
-        assert!(error < MOST_ERROR * a, "{what}: {b} ± {db} is too noisy, path-traced {a} ± {da}");
-        assert!((a - b).abs() < 4.0 * error + SLACK * a, "{what}: {b} ± {db}, path-traced {a} ± {da}");
+        assert!(error < MOST_ERROR * a, "{what}: too noisy: photons {b} ± {db}, path {a} ± {da}");
+        assert!((a - b).abs() < 4.0 * error + SLACK * a, "{what}: photons {b} ± {db}, path {a} ± {da}");
         for i in blocks {
             let ((a, da), (b, db)) = (by_paths[i], by_photons[i]);
             let allowed = 5.0 * da.hypot(db) + 1.5e-2 * a;
-            assert!((a - b).abs() <= allowed, "{what}, block {i}: {b} ± {db}, path-traced {a} ± {da}");
+            assert!((a - b).abs() <= allowed, "{what}, block {i}: photons {b} ± {db}, path {a} ± {da}");
         }
     }
 }
 
-/// [`assert_same_light`] for the caustic only.
+/// [`assert_same_light`] for the caustic view only.
 #[track_caller]
 fn assert_same_caustic(what: &str, build: &Build, effort: &Effort) {
     assert_same_light(what, build, &[View::Caustic], effort);
@@ -100,14 +101,14 @@ fn floor() -> Build {
     scene().quad(v(-3.0, 0.0, 3.0), v(6.0, 0.0, 0.0), v(0.0, 0.0, -6.0), matte(0.7))
 }
 
-/// A square of this width around a point, seen from this height above.
+/// Views a square of the given width around a point from the given height above.
 fn looked_at(build: Build, at: DVec3, width: f64, above: f64) -> Build {
     let from = v(at.x, at.y + above, at.z + 1e-4 * above);
     let angle = 2.0 * (0.5 * width / above).atan();
     build.pictured(from, at, angle.to_degrees(), SIDE as u32, SIDE as u32)
 }
 
-/// A glowing room with a mirror ball and a glass ball, without a camera.
+/// A room with emissive walls, a mirror ball and a glass ball, without a camera.
 fn room(floor: Material, wall: impl Fn(f32) -> Material) -> Build {
     let (low, side) = (-1.0, 2.0);
     let (x, y, z) = (v(side, 0.0, 0.0), v(0.0, side, 0.0), v(0.0, 0.0, side));
@@ -136,7 +137,7 @@ fn photon_components_match_path_and_add_up() {
     let whole = glossy.pictured(v(0.0, 1.4, 0.9), v(0.15, 0.1, 0.4), 40.0, SIDE as u32, SIDE as u32).depth(5);
     let effort = Effort { path_samples: 128, passes: 20, photons: 15_000, radius: 0.03 };
     let views = [View::Emission, View::Diffuse, View::Specular, View::Caustic, View::Indirect, View::Beauty];
-    assert_same_light("a glowing room", &whole, &views, &effort);
+    assert_same_light("emissive room", &whole, &views, &effort);
     let part = |view| whole.clone().photons(5000, 0.05).viewed(view).picture(4, 3);
     let parts = [View::Emission, View::Diffuse, View::Specular].map(part);
     for (pixel, beauty) in part(View::Beauty).into_iter().enumerate() {
@@ -188,7 +189,7 @@ fn smooth_mesh_caustics_match_path() {
 }
 
 #[test]
-fn caustics_of_a_light_in_glass_match_path() {
+fn caustics_of_light_in_glass_match_path() {
     let center = v(0.0, 0.6, 0.0);
     let build = floor().sphere(center, 0.35, emitter(1.0)).sphere(center, 0.5, glass(1.5));
     let lit = build.pictured(v(3.0, 1.5, 0.0), v(0.5, 0.0, 0.0), 20.0, SIDE as u32, SIDE as u32).depth(5);
@@ -196,19 +197,20 @@ fn caustics_of_a_light_in_glass_match_path() {
     assert_same_caustic("a light in glass", &lit, &effort);
 }
 
-/// Passes after which the light at an edge is correct within [`AT_EDGES`].
+/// Number of passes after which light at an edge is accurate to within [`AT_EDGES`].
 const PASSES: u32 = 64;
-/// Largest remaining loss of kernels at edges, relative to the light. Without a correction, a kernel of radius r loses
-/// 8r/15πW of it in a strip of width W along an edge, with F(x) the part of 2/πr²·(1 − ρ²/r²) beyond the distance x and
-/// 8r/15π = ∫F.
+/// Largest remaining relative energy loss of kernels at edges. Without correction, a kernel of radius r loses
+/// a fraction of 8r/15πW in a strip of width W along an edge, where 8r/15π = ∫F and F(x) is the part of the
+/// kernel 2/πr²·(1 − ρ²/r²) that lies beyond distance x.
 const AT_EDGES: f64 = 2e-3;
 
-/// A rectangle on the ground seen from above, given its center and its sides along x and z, in nearly square pixels.
+/// A view from above of a rectangle on the ground, given its center and its side lengths along x and z.
+/// Pixels are nearly square.
 fn strip(build: Build, middle: DVec3, (x, z): (f64, f64)) -> Build {
     const PIXELS: f64 = 256.0;
     let side = (x * z / PIXELS).sqrt();
     let (across, up) = ((z / side).round().max(1.0), (x / side).round().max(1.0));
-    // The image is oriented along x; its width follows from its pixels.
+    // The image's vertical axis is x. Its width follows from the pixel count.
     let above = 20.0 * x.max(z);
     let fov = 2.0 * (0.5 * x / above).atan().to_degrees();
     assert!((across / up * x / z - 1.0).abs() < 0.3, "{across}×{up}");
@@ -216,21 +218,21 @@ fn strip(build: Build, middle: DVec3, (x, z): (f64, f64)) -> Build {
     build.pictured(from, middle, fov, across as u32, up as u32).depth(3)
 }
 
-/// A sun at 45° that a lossless mirror at x = 0 reflects to the ground from x = `far` to x = `near` < 0, equally wide
-/// along z. The mirrored sun gives an irradiance of cos 45° there, and the same on walls across x that face the mirror.
-/// Direct light is not shown.
+/// A sun at 45°, reflected by a lossless mirror at x = 0 onto the ground between x = `far` and x = `near` <
+/// 0, with constant width along z. The reflected sun has an irradiance of cos 45° there, and also on walls
+/// perpendicular to x that face the mirror. Direct light is excluded from the view.
 fn mirrored(build: Build, (far, near): (f64, f64), (z, width): (f64, f64)) -> Build {
     let corner = v(0.0, -near, z + 0.5 * width);
     let lit = build.quad(corner, v(0.0, near - far, 0.0), v(0.0, 0.0, -width), mirror(1.0));
     sun(lit, v(1.0, -1.0, 0.0).normalize(), 1.0, 0.0).viewed(View::Caustic)
 }
 
-/// Radiance of a surface with reflectance 0.7 in that light.
+/// Radiance of a surface with reflectance 0.7 in the reflected sunlight.
 fn even() -> f64 {
     0.5_f64.sqrt() * 0.7 / PI
 }
 
-/// Checks that the mean of the image after [`PASSES`] is exact, within [`AT_EDGES`] and noise.
+/// Checks that the image mean after [`PASSES`] is exact within [`AT_EDGES`] and noise.
 #[track_caller]
 fn assert_even(what: &str, build: &Build, (photons, radius): (u64, f64), exact: f64) {
     let build = build.clone().photons(photons, radius);
@@ -244,8 +246,11 @@ fn assert_even(what: &str, build: &Build, (photons, radius): (u64, f64), exact: 
     };
     let (mean, error) = mean_and_error(&(0..SEEDS).into_par_iter().map(one).collect::<Vec<_>>());
     let (off, error) = (mean / exact - 1.0, error / exact);
-    assert!(error < 1e-3, "{what}: {mean} ± {error} is too noisy");
-    assert!(off.abs() < AT_EDGES + 4.0 * error, "{what}: {mean} is not {exact}, by {off} ± {error}");
+    assert!(error < 1e-3, "{what}: too noisy: {mean} ± {error}");
+    assert!(
+        off.abs() < AT_EDGES + 4.0 * error,
+        "{what}: {mean}, expected {exact}, relative error {off} ± {error}"
+    );
 }
 
 /// A floor with reflectance 0.7 from x = −2 to −1.
@@ -253,7 +258,7 @@ fn small_floor() -> Build {
     scene().quad(v(-2.0, 0.0, 0.5), v(1.0, 0.0, 0.0), v(0.0, 0.0, -1.0), matte(0.7))
 }
 
-/// A floor that extends further on all sides.
+/// A larger floor, extended on all sides.
 fn long_floor() -> Build {
     scene().quad(v(-3.0, 0.0, 0.9), v(2.0, 0.0, 0.0), v(0.0, 0.0, -1.8), matte(0.7))
 }
@@ -273,23 +278,24 @@ fn photon_light_is_uniform_up_to_floor_edges() {
 
 #[test]
 fn photon_light_is_uniform_up_to_walls() {
-    // A wall at the far edge of the floor, and on a floor that continues behind it in its shadow.
+    // A wall at the far edge of the floor, and a wall on a floor that continues behind it in shadow.
     let wall = |build: Build| build.quad(v(-2.0, 0.0, 0.5), v(0.0, 0.0, -1.0), v(0.0, 0.6, 0.0), matte(0.7));
     for (what, floor) in [("at its edge", small_floor()), ("on it", long_floor())] {
         let room = mirrored(wall(floor), (-2.2, -1.75), (0.0, 0.6));
         let foot = strip(room.clone(), v(-1.95, 0.0, 0.0), (0.099, 0.3));
         assert_even(&format!("a floor before a wall {what}"), &foot, (5000, 0.1), even());
-        // On the wall, seen from the mirror's side, from the floor upwards.
+        // The lower part of the wall, on the side of the mirror.
         let low = room.pictured(v(-1.0, 0.05, 0.0), v(-2.0, 0.05, 0.0), 5.65, 48, 16).depth(3);
         assert_even(&format!("a wall {what}"), &low, (5000, 0.1), even());
     }
-    // Nothing leaks through: the shadow behind the wall stays dark.
+    // No light leaks into the shadow behind the wall.
     let behind =
         strip(mirrored(wall(long_floor()), (-2.2, -1.75), (0.0, 0.6)), v(-2.06, 0.0, 0.0), (0.1, 0.3));
     assert!(behind.photons(5000, 0.1).picture(4, 1).iter().all(|color| *color == DVec3::ZERO));
 }
 
-/// A flat ring about (−1.5, 0, 0) between two radii, in `steps` steps around and `rows` rows of triangles.
+/// A flat ring around (−1.5, 0, 0) between two radii, divided into `steps` angular steps and `rows` radial
+/// steps.
 fn flat_ring(steps: u32, rows: u32, inner: f32, outer: f32) -> TriangleMesh {
     let mut mesh = TriangleMesh::default();
     for step in 0..steps {
@@ -313,10 +319,10 @@ fn photon_light_is_uniform_up_to_rims() {
     let of_mesh = |steps, rows| scene().mesh(flat_ring(steps, rows, 0.35, 0.5), AS_IT_IS, matte(0.7));
     for (what, build) in [
         ("a disk", scene().shape(disk, matte(0.7))),
-        ("a ring of some triangles", of_mesh(96, 1)),
-        ("a ring of many triangles", of_mesh(288, 6)),
+        ("a coarse ring", of_mesh(96, 1)),
+        ("a fine ring", of_mesh(288, 6)),
     ] {
-        // A square that ends 4·10⁻³ before the rim.
+        // A rectangle that ends 4·10⁻³ before the rim.
         let lit = mirrored(build, (-1.16, -0.99), (0.0, 0.2));
         let rim = strip(lit, v(-1.024, 0.0, 0.0), (0.04, 0.06));
         assert_even(&format!("the rim of {what}"), &rim, (6000, 0.05), even());
@@ -325,7 +331,7 @@ fn photon_light_is_uniform_up_to_rims() {
 
 #[test]
 fn photon_light_is_uniform_around_a_box() {
-    // In front of it, and next to it, where no shadow falls.
+    // In front of the box and beside it, outside its shadow.
     let standing = long_floor().cuboid(v(-1.7, 0.1, 0.0), v(0.2, 0.2, 0.6), DVec3::ZERO, matte(0.5));
     let before = mirrored(standing.clone(), (-1.75, -1.4), (0.0, 0.6));
     let before = strip(before, v(-1.55, 0.0, 0.0), (0.099, 0.4));
@@ -333,7 +339,7 @@ fn photon_light_is_uniform_around_a_box() {
     let beside = mirrored(standing, (-1.9, -1.5), (0.35, 0.35));
     let beside = strip(beside, v(-1.7, 0.0, 0.35), (0.18, 0.099));
     assert_even("beside a box", &beside, (4500, 0.08), even());
-    // On top of a box so low that kernels reach the floor around it, whose plane receives no light.
+    // The top of a box that is low enough for kernels to reach the floor around it.
     let low = long_floor().cuboid(v(-1.7, 0.01, 0.0), v(0.2, 0.02, 0.6), DVec3::ZERO, matte(0.7));
     let top = strip(mirrored(low, (-1.95, -1.45), (0.0, 0.85)), v(-1.7, 0.02, 0.0), (0.199, 0.599));
     assert_even("on a low box", &top, (4500, 0.08), even());
@@ -341,10 +347,10 @@ fn photon_light_is_uniform_around_a_box() {
 
 #[test]
 fn photons_do_not_leak_under_a_wall() {
-    // A mirror without thickness stands on the ground and faces the sun. It reflects light to the ground in front of
-    // it, where kernels extend past its foot; no light reaches the ground behind it.
+    // An infinitely thin mirror stands on the ground and faces the sun. It reflects light onto the ground in
+    // front of it, where kernels extend under its lower edge. No light reaches the ground behind it.
     let (width, radius, passes) = (0.2, 0.1, 32);
-    // Place it on the ground, and slightly above, where the light under it is negligible.
+    // Test the mirror on the ground, and slightly above it, where little light passes underneath.
     let ground = |gap| floor().quad(v(0.0, gap, 2.0), v(0.0, 1.0, 0.0), v(0.0, 0.0, -4.0), mirror(0.9));
     let seen = |side: f64, gap: f64| {
         let strip = looked_at(ground(gap), v(side * 0.5 * width, 0.0, 0.0), width, 0.5).depth(3);
@@ -354,7 +360,7 @@ fn photons_do_not_leak_under_a_wall() {
     let exact = 0.9 * 0.5_f64.sqrt() * 0.7 / PI;
     let (before, error) = seen(-1.0, 0.0);
     assert!(error < 2.0 * MOST_ERROR * exact, "{before} ± {error}");
-    assert!((before - exact).abs() < 4.0 * error + AT_EDGES * exact, "{before} ± {error}, not {exact}");
+    assert!((before - exact).abs() < 4.0 * error + AT_EDGES * exact, "{before} ± {error}, expected {exact}");
     for gap in [0.0, 0.005] {
         assert_eq!(seen(1.0, gap).0, 0.0, "{gap}");
     }
@@ -362,7 +368,7 @@ fn photons_do_not_leak_under_a_wall() {
 
 #[test]
 fn caustic_under_a_resting_ball_matches_path() {
-    // A glass ball rests on the ground: there is no gap under it, yet light arrives there.
+    // A glass ball rests on the ground. There is no gap under it, but light still arrives there.
     let ball = floor().sphere(v(0.0, 0.5, 0.0), 0.5, glass(1.5));
     let foot = looked_at(ball, v(0.06, 0.0, 0.0), 0.16, 0.15).depth(6);
     let lit = sun(foot, v(0.2, -1.0, 0.0).normalize(), 1.0, 25.0);

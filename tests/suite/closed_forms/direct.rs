@@ -1,4 +1,4 @@
-//! Direct light from every kind of light on a diffuse surface: L = ρ·E/π.
+//! Direct light on a diffuse surface from every kind of light: L = ρ·E/π.
 
 use std::f64::consts::PI;
 
@@ -11,7 +11,7 @@ use glimt::scene::description::light::Falloff;
 use super::scenes::{AS_IT_IS, Build, emitter, lat_long_sphere, matte, receiver};
 use super::{assert_close, assert_mean, lambert, v};
 
-/// Checks the irradiance E for radiance 1, with one and with several shadow rays at equal cost.
+/// Checks the irradiance E for radiance 1, with one and with several shadow rays at equal total cost.
 #[track_caller]
 pub fn assert_irradiance(what: &str, lit: &Build, irradiance: f64) {
     for (samples, shadow_samples) in [(256, 1), (16, 16)] {
@@ -20,8 +20,8 @@ pub fn assert_irradiance(what: &str, lit: &Build, irradiance: f64) {
     }
 }
 
-/// Checks the value with hard shadows, where one ray to the center decides: from the receiver, the light is either
-/// fully visible or fully hidden.
+/// Checks the value with hard shadows, where a single ray to the light's center decides whether it is fully
+/// visible or fully hidden.
 #[track_caller]
 pub fn assert_hard(what: &str, lit: &Build, irradiance: f64) {
     let values = lit.clone().shadows(Shadows::Hard, 4).values(64, 64);
@@ -32,7 +32,7 @@ pub fn at_origin() -> Build {
     receiver(DVec3::ZERO, 0.7)
 }
 
-/// A unit square at `height` that shines down on the origin.
+/// A unit square light at `height`, facing down toward the origin.
 fn square_above(height: f64) -> Build {
     at_origin().quad(v(-0.5, height, -0.5), DVec3::X, DVec3::Z, emitter(1.0))
 }
@@ -49,9 +49,9 @@ fn point_light_falloff_is_exact() {
 }
 
 #[test]
-fn point_shadow_is_sharp_and_in_place() {
-    // Light at height 4 over x = 0, blocker x < 0 at height 1: the shadow ends at x = 0 · 4/3 − 0 = 0; for a blocker
-    // that ends at x = b it ends at b·4/3.
+fn point_light_shadow_edge_is_exact() {
+    // The light is at height 4 above x = 0. The shadow of a blocker at height 1 that ends at x = b ends at x
+    // = b·4/3.
     let lit = |x: f64, b: f64| {
         receiver(v(x, 0.0, 0.0), 0.7).point_light(v(0.0, 4.0, 0.0), 1.0, Falloff::None).quad(
             v(b - 100.0, 1.0, -100.0),
@@ -73,7 +73,7 @@ fn point_shadow_is_sharp_and_in_place() {
 
 #[test]
 fn parallel_squares() {
-    // A quarter of the square from the corner formula with A = B = ½/h, four times; E = π·F·L.
+    // Four times the corner formula for a quarter of the square, with A = B = ½/h. E = π·F·L.
     for (height, exact) in [(1.0, 0.752_274_688_5), (4.0, 0.061_225_761_1), (0.1, 3.042_128)] {
         let a: f64 = 0.5 / height;
         let w = (1.0 + a * a).sqrt();
@@ -86,7 +86,7 @@ fn parallel_squares() {
 
 #[test]
 fn perpendicular_square_touching_the_plane() {
-    // F = (atan 1 − atan(1/√2)/√2)/2π for all lengths 1.
+    // F = (atan 1 − atan(1/√2)/√2)/2π if all lengths are 1.
     let exact = 0.5 * (PI / 4.0 - 0.5_f64.sqrt().atan() / 2.0_f64.sqrt());
     assert_close("the formula", exact, 0.175_094_143_9);
     let lit = at_origin().quad(v(0.0, 0.0, 1.0), DVec3::Y, DVec3::X, emitter(1.0));
@@ -98,7 +98,7 @@ fn perpendicular_square_touching_the_plane() {
 
 #[test]
 fn rectangle_lights_match_lambert() {
-    // Lambert's formula for rectangles anywhere above the plane, facing the origin.
+    // Lambert's formula for arbitrary rectangles above the plane that face the origin.
     for (corner, u, w) in [
         (v(0.3, 0.01, -0.5), v(0.0, 0.0, 1.0), v(0.0, 2.0, 0.0)),
         (v(0.02, 0.5, -5.0), v(0.0, 0.0, 10.0), v(0.1, 0.1, 0.0)),
@@ -133,7 +133,7 @@ fn parallelogram_and_triangle_lights() {
     assert_eq!(turned.value(), 0.0);
 }
 
-/// Irradiance E at the origin from the faces of a convex polyhedron that face it.
+/// Irradiance E at the origin from the visible faces of a convex polyhedron.
 fn convex(faces: impl IntoIterator<Item = Vec<DVec3>>) -> f64 {
     let visible = faces.into_iter().filter(|face| {
         let normal = (face[1] - face[0]).cross(face[2] - face[0]);
@@ -158,7 +158,7 @@ fn box_light_shines_from_visible_faces() {
     let exact = convex((0..3).flat_map(|axis| [face(axis, 1.0), face(axis, -1.0)]));
     let lit = at_origin().cuboid(center, half * 2.0, DVec3::ZERO, emitter(1.0));
     assert_irradiance("box", &lit, exact);
-    // Rotated by a quarter turn about y, the box has its x and z edges exchanged.
+    // A quarter turn around y exchanges the x and z edges of the box.
     let turned = v(half.z, half.y, half.x) * 2.0;
     let lit = at_origin().cuboid(center, turned, v(0.0, 90.0, 0.0), emitter(1.0));
     assert_irradiance("turned box", &lit, exact);
@@ -166,7 +166,8 @@ fn box_light_shines_from_visible_faces() {
 
 #[test]
 fn transformed_and_mirrored_mesh_light() {
-    // A closed ball of triangles: each triangle that faces the origin counts fully, because the ball is convex.
+    // A closed ball of triangles. Every triangle that faces the origin is fully visible, because the ball is
+    // convex.
     let ball = lat_long_sphere(6, 8, 0.5, DVec3::ZERO);
     let place = v(0.6, 1.6, 0.2);
     for scale in [v(1.0, 1.0, 1.0), v(1.0, 0.6, -1.3)] {
@@ -183,8 +184,8 @@ fn transformed_and_mirrored_mesh_light() {
 
 #[test]
 fn mesh_light_occludes_itself() {
-    // Two downward-facing squares of one mesh: the lower one, twice as wide at half the height, hides the upper one
-    // completely from the origin.
+    // Two equal, downward-facing squares in one mesh. The lower one is at half the height and completely
+    // hides the upper one from the origin.
     let mut mesh = TriangleMesh::default();
     for (half, y) in [(0.5_f32, 1.0_f32), (0.5, 2.0)] {
         let first = mesh.positions.len() as u32;
@@ -199,7 +200,8 @@ fn mesh_light_occludes_itself() {
 
 #[test]
 fn sphere_lights_at_every_elevation() {
-    // E/πL = cos θ/H² where the whole sphere is above the horizon; otherwise the tabulated integral, H = 2.
+    // With H = 2, E/πL is cos θ/H² if the whole sphere is above the horizon, and otherwise a tabulated
+    // integral.
     for (cosine, exact) in
         [(1.0, 0.25), (0.2, 0.059_345_832_4), (0.0, 0.028_834_442_8), (-0.3, 0.003_715_430_7)]
     {
@@ -221,7 +223,7 @@ fn sphere_lights_near_and_far() {
     }
 }
 
-/// A unit square at height 4, half of the hemisphere hidden by a blocker x < 0 at height 1.
+/// A unit square light at height 4. A blocker at height 1 hides everything above x < 0.
 fn penumbra(x: f64, blocker: bool) -> Build {
     let lit = receiver(v(x, 0.0, 0.0), 0.7).quad(v(-0.5, 4.0, -0.5), DVec3::X, DVec3::Z, emitter(1.0));
     let hide =
@@ -231,7 +233,8 @@ fn penumbra(x: f64, blocker: bool) -> Build {
 
 #[test]
 fn half_plane_penumbra_is_exact() {
-    // The line of sight over the edge meets the light at x' = −3x: everything to the right of it is visible.
+    // The line of sight past the blocker's edge meets the light at x' = −3x. The part of the light to the
+    // right of x' is visible.
     for (x, exact) in [
         (-1.0_f64 / 6.0, 0.0),
         (-1.0 / 12.0, 0.015_059_393_9),
@@ -246,7 +249,7 @@ fn half_plane_penumbra_is_exact() {
         assert_irradiance(&format!("penumbra at {x}"), &penumbra(x, true), formula);
         let off = |blocker| penumbra(x, blocker).shadows(Shadows::Off, 4).values(8, 16);
         assert_eq!(off(true), off(false));
-        // The center is hidden for x < 0; for x > 0 the whole light counts.
+        // The light's center is hidden for x < 0. For x > 0, the whole light counts.
         let square = [v(-0.5, 4.0, -0.5), v(0.5, 4.0, -0.5), v(0.5, 4.0, 0.5), v(-0.5, 4.0, 0.5)];
         let hard = if x > 0.0 { lambert(v(x, 0.0, 0.0), DVec3::Y, &square) } else { 0.0 };
         if x != 0.0 {
@@ -256,14 +259,15 @@ fn half_plane_penumbra_is_exact() {
 }
 
 #[test]
-fn shadow_view_shows_the_visible_fraction() {
-    // In the middle of the penumbra half of the light is visible, by symmetry.
+fn shadow_view_shows_visible_fraction() {
+    // By symmetry, half of the light is visible from the middle of the penumbra.
     for shadow_samples in [1, 16] {
         let view = penumbra(0.0, true).viewed(View::Shadow).shadows(Shadows::Soft, shadow_samples);
         assert_mean("half", &view.values(64, 64), 0.5);
     }
     assert_eq!(penumbra(0.3, true).viewed(View::Shadow).value(), 1.0);
-    // Two point lights: the hidden one has E = 3/2², the visible one E = 5/1, so the fraction is 5/(5 + ¾).
+    // Two point lights. The hidden one has E = 3/2², the visible one E = 5/1, so the visible fraction is 5/(5
+    // + ¾).
     let lit = at_origin()
         .point_light(v(0.0, 2.0, 0.0), 3.0, Falloff::Square)
         .point_light(v(0.0, 1.0, 0.0), 5.0, Falloff::Square)
@@ -273,7 +277,8 @@ fn shadow_view_shows_the_visible_fraction() {
 
 #[test]
 fn diffuse_surface_in_uniform_light() {
-    // L = 1 over the whole hemisphere: E = π, so L = ρ, whatever the surface's position and orientation.
+    // With radiance 1 over the whole hemisphere, E = π and L = ρ, regardless of the surface's position and
+    // orientation.
     for (point, size) in [(v(0.0, 0.0, 0.0), 2.0), (v(0.6, -0.7, 0.3), 1.0), (v(0.3, 0.9, -0.2), 1.0)] {
         let mut lit = receiver(point, 0.7);
         for axis in 0..3 {

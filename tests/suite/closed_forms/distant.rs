@@ -10,19 +10,19 @@ use super::direct::at_origin;
 use super::scenes::{Build, matte, plain, receiver, scene};
 use super::{assert_close, assert_mean, v};
 
-/// Adds a distant light; `angle` is its apparent diameter in degrees.
+/// Adds a directional light. `angle` is its apparent diameter in degrees.
 pub fn sun(build: Build, direction: DVec3, irradiance: f32, angle: f64) -> Build {
     let light = DirectionalLight { direction, irradiance: Vec3::splat(irradiance), angle };
     build.with(|scene| scene.lights.push(Light::Directional(light)))
 }
 
 #[test]
-fn spotlight_fades_towards_its_cone() {
-    // From height 2 above (1, 0, 0), aimed so that the origin is at an angle θ from the axis.
+fn spotlight_fades_toward_cone_edge() {
+    // The light is at height 2 above (1, 0, 0), aimed so that the origin is at angle θ from the axis.
     let from = v(1.0, 2.0, 0.0);
     let lit = |theta: f64, angle: f64, blend: f32, falloff| {
         let (sin, cos) = theta.sin_cos();
-        // The direction to the origin is (−1, −2)/√5; rotated by θ it is the axis.
+        // The axis is the direction to the origin, (−1, −2)/√5, rotated by θ.
         let (x, y) = (-1.0 / 5.0_f64.sqrt(), -2.0 / 5.0_f64.sqrt());
         let axis = v(x * cos - y * sin, x * sin + y * cos, 0.0);
         let point = PointLight { position: from, intensity: Vec3::splat(10.0), falloff };
@@ -58,7 +58,7 @@ fn directional_light_is_uniform() {
         for shadows in [Shadows::Soft, Shadows::Hard, Shadows::Off] {
             let lit = sun(receiver(place, 0.7), direction, 5.0, 0.0).shadows(shadows, 3);
             assert_close("lit", lit.value(), 0.7 / PI * 5.0 * 0.8);
-            // In front of the light, and next to its rays.
+            // A blocker between the light and the receiver, one beside the ray, and one on the other side.
             let blocked = |at: DVec3| lit.clone().sphere(place + at, 0.5, matte(0.5)).value();
             let expected = if shadows == Shadows::Off { lit.value() } else { 0.0 };
             assert_eq!(blocked(v(-300.0, 400.0, 0.0)), expected);
@@ -69,8 +69,8 @@ fn directional_light_is_uniform() {
 }
 
 #[test]
-fn sun_disk_gives_irradiance_and_soft_shadows() {
-    // The whole disk is above the horizon: E = irradiance · cos θ of its center. `hard` uses the center.
+fn sun_disk_irradiance_and_shadow_are_exact() {
+    // The whole disk is above the horizon, so E = irradiance · cos θ at its center. `hard` uses the center.
     for degrees in [0.53, 10.0, 60.0] {
         let lit = sun(at_origin(), v(1.0, -2.0, 0.0), 5.0, degrees);
         let expected = 0.7 / PI * 5.0 * 2.0 / 5.0_f64.sqrt();
@@ -78,8 +78,8 @@ fn sun_disk_gives_irradiance_and_soft_shadows() {
         let hard = lit.clone().shadows(Shadows::Hard, 1);
         assert_mean(&format!("{degrees}, hard"), &hard.values(64, 64), expected);
     }
-    // A half plane whose edge crosses the center of the disk hides half of it: from (0, 0, 0), straight above, x < 0 at
-    // 1.
+    // A half plane at height 1 with x < 0, whose edge crosses the center of the disk overhead, hides half of
+    // the disk from (0, 0, 0).
     let overhead = sun(at_origin(), v(0.0, -1.0, 0.0), 5.0, 40.0);
     let half = overhead.quad(v(-100.0, 1.0, -100.0), v(100.0, 0.0, 0.0), v(0.0, 0.0, 200.0), matte(0.5));
     assert_mean("half", &half.values(64, 256), 0.7 / PI * 2.5);
@@ -87,7 +87,7 @@ fn sun_disk_gives_irradiance_and_soft_shadows() {
 
 #[test]
 fn sun_disk_is_visible_to_escaping_rays() {
-    // Radiance E/(π sin²(α/2)); the camera looks along −z, and the light travels along z.
+    // The radiance is E/(π sin²(α/2)). The camera looks along −z, and the light travels along +z.
     let radiance = |angle: f64| 5.0 / (PI * (angle.to_radians() / 2.0).sin().powi(2));
     for angle in [0.53, 20.0, 180.0] {
         let seen = sun(scene(), DVec3::Z, 5.0, angle).value();
@@ -101,7 +101,7 @@ fn sun_disk_is_visible_to_escaping_rays() {
     };
     assert!((beside(9.99) - radiance(20.0) - 0.25).abs() < 1e-3 && beside(10.01) == 0.25);
     assert_eq!(sun(scene(), DVec3::Z, 5.0, 0.0).value(), 0.0);
-    // By a mirror.
+    // The sun reflected in a mirror.
     let mirror = plain(MaterialKind::Mirror { reflectance: ColorSource::Constant(Vec3::splat(0.5)) });
     let build = scene().quad(v(-1.0, -1.0, -2.0), v(2.0, 0.0, 0.0), v(0.0, 2.0, 0.0), mirror);
     let seen = sun(build, DVec3::NEG_Z, 5.0, 20.0).value();

@@ -1,5 +1,5 @@
-//! Keys of every surface on metals, plastics and principled materials, smooth and rough: opacity, vertex colors, and
-//! two-sided emission.
+//! Keys common to all materials, tested on smooth and rough metals, plastics and principled materials:
+//! opacity, vertex colors, and two-sided emission.
 
 use std::f64::consts::PI;
 
@@ -13,7 +13,7 @@ use glimt::scene::description::{
 use super::scenes::{AS_IT_IS, Build, metal, plastic, principled, receiver, scene};
 use super::{assert_mean, mean_and_error, v};
 
-/// The materials, with names for messages.
+/// Materials with names for messages.
 fn materials() -> [(&'static str, Material); 6] {
     [
         ("metal", metal(0.8, 0.5, 0.0)),
@@ -25,7 +25,7 @@ fn materials() -> [(&'static str, Material); 6] {
     ]
 }
 
-/// The material without its clear coat, which attenuates the emission.
+/// The material without its clear coat, which would attenuate emission.
 fn uncoated(mut material: Material) -> Material {
     if let MaterialKind::Principled { clearcoat, .. } = &mut material.kind {
         *clearcoat = NumberSource::Constant(0.0);
@@ -33,13 +33,13 @@ fn uncoated(mut material: Material) -> Material {
     material
 }
 
-/// The same scene with every integrator.
+/// The scene with every integrator.
 fn each(build: &Build) -> [(&'static str, Build); 3] {
     let path = build.clone().with(|scene| scene.render.integrator = Integrator::Path);
     [("whitted", build.clone()), ("path", path), ("photons", build.clone().photons(256, 0.1))]
 }
 
-/// A mesh of a 2 × 2 square at the origin, facing up, seen from above under a light.
+/// A 2 × 2 mesh square at the origin, facing up, lit and viewed from above.
 fn square(material: Material, color: Option<[u8; 3]>) -> Build {
     let mesh = TriangleMesh {
         positions: [[-1.0, 1.0], [1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]]
@@ -61,7 +61,7 @@ fn square(material: Material, color: Option<[u8; 3]>) -> Build {
 }
 
 #[test]
-fn half_opacity_gives_half_the_light() {
+fn half_opacity_halves_the_light() {
     for (name, material) in materials() {
         let veiled = |opacity: f32| {
             let opacity = OpacitySource { value: NumberSource::Constant(opacity), cutoff: 0.0 };
@@ -70,10 +70,10 @@ fn half_opacity_gives_half_the_light() {
         let whole = square(material.clone(), None).value();
         assert!(whole > 0.01, "{name}: {whole}");
         for (integrator, build) in each(&veiled(0.5)) {
-            assert_mean(&format!("{name} by {integrator}"), &build.values(64, 64), whole * 0.5);
+            assert_mean(&format!("{name} with {integrator}"), &build.values(64, 64), whole * 0.5);
         }
         for (integrator, build) in each(&veiled(0.0)) {
-            assert!(build.values(4, 4).iter().all(|value| *value == 0.0), "{name} by {integrator}");
+            assert!(build.values(4, 4).iter().all(|value| *value == 0.0), "{name} with {integrator}");
         }
     }
 }
@@ -85,7 +85,8 @@ fn two_sided_emission_with_half_opacity() {
             let emission = EmissionSource { sides, ..EmissionSource::constant(Vec3::splat(2.0)) };
             let opacity = OpacitySource { value: NumberSource::Constant(0.5), cutoff: 0.0 };
             let shining = Material { emission, opacity, ..uncoated(material.clone()) };
-            // On the axis of a disk E = π·r²/(r² + h²) · L: here π/5 · 2, halved, on either side.
+            // On the axis of a disk, E = π·r²/(r² + h²)·L, here π/5·2. Half opacity halves it, on either
+            // side.
             let disk = |normal| Shape::Disk { center: v(0.0, 2.0, 0.0), normal, radius: 1.0 };
             for (normal, part) in [(DVec3::NEG_Y, 1.0), (DVec3::Y, of_back)] {
                 let lit = receiver(DVec3::ZERO, 0.7).shape(disk(normal), shining.clone()).depth(1);
@@ -99,13 +100,13 @@ fn two_sided_emission_with_half_opacity() {
                         assert_mean(&what, &values, exact);
                     }
                 }
-                // Seen directly: half of its radiance.
+                // The camera sees half of the disk's radiance.
                 let seen =
                     scene().shape(disk(normal), shining.clone()).depth(0).seen(DVec3::ZERO, v(0.0, 2.0, 0.1));
                 for (integrator, build) in each(&seen) {
                     let values = build.values(64, 64);
                     match part == 0.0 {
-                        true => assert!(values.iter().all(|value| *value == 0.0), "{name} by {integrator}"),
+                        true => assert!(values.iter().all(|value| *value == 0.0), "{name} with {integrator}"),
                         false => assert_mean(&format!("{name} seen with {integrator}"), &values, 1.0),
                     }
                 }
@@ -116,7 +117,7 @@ fn two_sided_emission_with_half_opacity() {
 
 #[test]
 fn vertex_colors_multiply_metal_and_base_color() {
-    // In sRGB, 188 is 0.5029 in linear light.
+    // The sRGB value 188 is 0.5029 in linear light.
     let linear = f64::from(((188.0_f32 / 255.0 + 0.055) / 1.055).powf(2.4));
     let gray = |material: Material| square(material, Some([188; 3]));
     for (name, colored, equal) in [
@@ -129,12 +130,15 @@ fn vertex_colors_multiply_metal_and_base_color() {
         let exact = square(equal, None).value();
         assert!(
             (square(colored.clone(), None).value() / exact - 1.0).abs() > 0.05,
-            "{name}: the color matters"
+            "{name}: the vertex color must have an effect"
         );
         for (integrator, build) in each(&gray(colored)) {
             let (mean, error) = mean_and_error(&build.values(16, 64));
             let most = 3.5 * error + 1e-3 * exact;
-            assert!((mean - exact).abs() < most, "{name} with {integrator}: {mean} ± {error}, not {exact}");
+            assert!(
+                (mean - exact).abs() < most,
+                "{name} with {integrator}: {mean} ± {error}, expected {exact}"
+            );
         }
     }
 }

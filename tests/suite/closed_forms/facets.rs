@@ -1,4 +1,4 @@
-//! Light on the facets of smooth meshes: none inside closed meshes, none missing on convex ones.
+//! Light on smooth meshes: no light leaks into closed meshes, and convex meshes are fully lit.
 
 use std::f64::consts::PI;
 
@@ -11,14 +11,14 @@ use glimt::scene::description::{Bump, NormalMap, Shadows, TextureFilter, Wrap};
 use super::scenes::{AS_IT_IS, Build, emitter, lat_long_sphere, matte, scene};
 use super::{Random, v};
 
-/// Number of lit pixels of an image, and the largest value.
+/// Number of lit pixels in an image, and the largest value.
 fn lit(build: &Build) -> (usize, f64) {
     let picture = build.picture(1, 0);
     let most = picture.iter().map(|color| color.max_element()).fold(0.0, f64::max);
     (picture.iter().filter(|color| color.max_element() > 0.0).count(), most)
 }
 
-/// The box between two corners, with eight vertices and twelve outward-facing triangles.
+/// A box between two corners, with eight vertices and twelve outward-facing triangles.
 fn cube(least: DVec3, greatest: DVec3) -> TriangleMesh {
     let corner = |i: usize| {
         let pick = |axis: usize| if i & (1 << axis) == 0 { least[axis] } else { greatest[axis] };
@@ -37,13 +37,13 @@ fn smooth_cube_lit_from_outside_is_dark_inside() {
             .smooth()
             .point_light(light, 100.0, Falloff::Square)
             .pictured(v(0.3, 0.2, 0.9), v(-0.4, -0.3, -1.0), 90.0, 64, 64);
-        assert_eq!(lit(&build).0, 0, "the light is at {light}, the brightest pixel is {}", lit(&build).1);
+        assert_eq!(lit(&build).0, 0, "light at {light}, brightest pixel {}", lit(&build).1);
     }
 }
 
 #[test]
-fn smooth_ball_in_a_close_shell_is_dark() {
-    // The center of a facet of the ball, the gap between it and the shell, and the light.
+fn smooth_ball_in_a_tight_shell_is_dark() {
+    // The camera is in the gap between a facet of the ball and the shell. The light is outside.
     for gap in [0.02, 0.002] {
         let ball = lat_long_sphere(7, 12, 1.0, DVec3::ZERO);
         let out = v((PI / 12.0).cos(), 0.0, (PI / 12.0).sin());
@@ -53,7 +53,7 @@ fn smooth_ball_in_a_close_shell_is_dark() {
             .sphere(DVec3::ZERO, 1.0 + gap, matte(0.8))
             .point_light(v(2.0, 3.0, 1.5), 100.0, Falloff::Square)
             .pictured(out * (1.0 + 0.9 * gap), out * 0.5 + v(0.0, 0.2, 0.0), 120.0, 64, 64);
-        assert_eq!(lit(&build).0, 0, "a gap of {gap}, the brightest pixel is {}", lit(&build).1);
+        assert_eq!(lit(&build).0, 0, "gap {gap}, brightest pixel {}", lit(&build).1);
     }
 }
 
@@ -102,7 +102,7 @@ fn blob(random: &mut Random, rough: f64) -> TriangleMesh {
     mesh
 }
 
-/// The mesh at another size, seen from the inside or the outside.
+/// The mesh scaled by `size`, with its facets optionally reversed.
 fn layer(mesh: &TriangleMesh, size: f64, turned: bool) -> TriangleMesh {
     let mut layer = mesh.clone();
     layer.positions.iter_mut().for_each(|p| *p *= size as f32);
@@ -119,20 +119,20 @@ fn joined(mut mesh: TriangleMesh, other: &TriangleMesh) -> TriangleMesh {
     mesh
 }
 
-/// Distance from the center to the nearest surface in a direction.
+/// Distance from the center to the nearest surface in the given direction.
 fn radius_of(mesh: &TriangleMesh, direction: DVec3) -> f64 {
     let world = scene().mesh(mesh.clone(), AS_IT_IS, matte(0.5)).world();
     let hit = world.geometry.closest(&Ray::new(Vec3::ZERO, direction.as_vec3()));
-    f64::from(hit.expect("the center is inside").shape.t)
+    f64::from(hit.expect("the mesh must surround the center").shape.t)
 }
 
-/// A closed opaque mesh of kind `number`, with a camera inside and lights outside.
+/// Case `number`: a closed opaque mesh with a camera inside and lights outside.
 fn closed(number: u32, random: &mut Random) -> Build {
     let rough = [0.0, 0.2, 0.6][number as usize % 3];
     let mesh = blob(random, rough);
     let towards = random.direction();
     let gap = 10.0_f64.powf(-1.0 - 3.0 * random.unit());
-    // A single wall; a shell of two; a camera between two shells, near the outer or the inner one.
+    // A single wall, a double-walled shell, or a camera between two walls.
     let (walls, eye) = match number % 5 {
         0 => (vec![mesh], towards * 0.1 * random.unit()),
         1 => (
@@ -167,7 +167,7 @@ fn closed(number: u32, random: &mut Random) -> Build {
             wall.normals = wall.positions.iter().map(any).collect();
         }
         let mut material = matte(0.8);
-        // Any numbers are valid normals and heights.
+        // Any texture values are valid normals and heights.
         let as_heights = bumps.filter(|_| number % 8 == 3);
         material.bump = as_heights.map(|texture| Bump { texture, channel: None, scale: 0.3 });
         material.normal_map = bumps.map(|texture| NormalMap { texture, strength: 2.0 });
@@ -189,8 +189,9 @@ fn closed(number: u32, random: &mut Random) -> Build {
     build.shadows(Shadows::Soft, 2).depth(1).pictured(at, at + random.direction(), 110.0, 12, 12)
 }
 
-/// Checks a thousand closed opaque meshes, smooth and flat, with perturbed normals, single walls and shells, round and
-/// rough, lit from outside by point and area lights: no pixel is lit inside.
+/// Checks that no pixel is lit inside a thousand closed opaque meshes lit from outside by point and area
+/// lights. The meshes are smooth or flat, round or rough, single walls or shells, some with perturbed
+/// normals.
 #[test]
 fn no_light_enters_a_closed_opaque_mesh() {
     let mut random = Random(77);

@@ -1,4 +1,4 @@
-//! Scenes far from the origin look the same as near it.
+//! Scenes look the same far from the origin and near it.
 
 use std::path::Path;
 
@@ -19,8 +19,8 @@ fn difference(a: &[DVec3], b: &[DVec3]) -> f64 {
     (off / b.iter().map(|b| b.length_squared()).sum::<f64>()).sqrt()
 }
 
-/// Every shape, some of them emitting, a mesh and a point light, of size 8, with a moved origin. All numbers are
-/// multiples of 1/1024, so that sums are exact.
+/// A scene of size 8 with every shape, some of them emissive, a mesh and a point light, moved to `at`. All
+/// coordinates are multiples of 1/1024, so that sums are exact.
 fn everything_at(at: DVec3, accel: Accel) -> Build {
     let p = |x: f64, y: f64, z: f64| at + (v(x, y, z) * 1024.0).round() / 1024.0;
     let d = |x: f64, y: f64, z: f64| (v(x, y, z) * 1024.0).round() / 1024.0;
@@ -93,7 +93,7 @@ fn scene_far_from_the_origin_looks_the_same() {
 }
 
 #[test]
-fn distant_object_keeps_near_precision() {
+fn distant_object_does_not_reduce_precision() {
     for accel in [Accel::Bvh, Accel::KdTree] {
         let near = everything_at(DVec3::ZERO, accel).picture(4, 3);
         let far = v(1e8, 2e7, 3e7);
@@ -110,8 +110,8 @@ fn distant_object_keeps_near_precision() {
 }
 
 #[test]
-fn plane_texture_stays_in_place_far_away() {
-    // The texture's period is one tile, so a move by whole tiles shows the same image.
+fn plane_texture_is_stable_far_from_origin() {
+    // The texture's period is one tile, so moving by whole tiles does not change the image.
     for (wrap, repeat) in
         [(Wrap::Repeat, Vec2::ONE), (Wrap::Mirror, Vec2::splat(2.0)), (Wrap::Repeat, Vec2::splat(0.25))]
     {
@@ -140,7 +140,7 @@ fn plane_texture_stays_in_place_far_away() {
     }
 }
 
-/// A mesh as the text of a file, moved by adding to its numbers in double precision.
+/// A mesh as a text file, moved by adding `at` to its coordinates in double precision.
 fn text_of(mesh: &TriangleMesh, at: DVec3, ending: &str) -> String {
     let points = mesh.positions.iter().map(|p| p.as_dvec3() + at);
     let (vertices, faces) = (mesh.positions.len(), mesh.triangles.len());
@@ -171,7 +171,7 @@ fn mesh_files_keep_distant_vertices() {
             .smooth()
             .point_light(at + v(2.0, 3.0, 1.0), 30.0, Falloff::Square)
             .pictured(at + v(0.5, 1.0, 3.0), at, 50.0, 32, 32)
-            // With seed 1, a sample falls exactly on the edge of a facet, where rounding decides.
+            // With seed 1, a sample lies exactly on a facet's edge, where the result depends on rounding.
             .picture(2, 2)
     };
     let near = seen(scene().mesh(ball.clone(), AS_IT_IS, matte(0.8)), DVec3::ZERO);
@@ -182,7 +182,7 @@ fn mesh_files_keep_distant_vertices() {
             std::fs::write(&path, text_of(&ball, far, ending)).expect("written");
             let loaded = load(Path::new(&path), &ignore_progress, &CancelToken::new()).expect("a mesh");
             assert_eq!(loaded.mesh.triangles.len(), ball.triangles.len(), "{ending}");
-            // At its position in the file, and moved back by the scene.
+            // Rendered at the position in the file, and moved back by the scene.
             let off = difference(&seen(scene().loaded(loaded.clone(), AS_IT_IS, matte(0.8)), far), &near);
             assert!(off <= 1e-3, "{ending} at {far}: {off}");
             let back = [DVec3::ONE, DVec3::ZERO, -far];

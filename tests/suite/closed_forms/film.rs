@@ -1,4 +1,4 @@
-//! From samples to pixels: filter weights and the error estimate.
+//! Film: filter weights and the error estimate.
 
 use glimt::choice::Choice;
 use glimt::control::CancelToken;
@@ -11,7 +11,7 @@ use glimt::world::World;
 use super::scenes::{Build, emitter, matte, scene};
 use super::v;
 
-/// Adds the samples from `from` up to `to` to a film.
+/// Adds the samples `from..to` to a film.
 fn go_on(film: &Film, world: &World, build: &Build, seed: u32, from: u32, to: u32) {
     for tile in 0..film.tile_count() {
         let rect = film.tile_rect(tile).expect("a tile");
@@ -41,7 +41,7 @@ fn filters_preserve_a_constant_image() {
     }
 }
 
-/// Walls, a light under the ceiling and a box: penumbras.
+/// A room with penumbras: walls, a light under the ceiling and a box.
 fn room() -> Build {
     let (x, y, z) = (v(2.0, 0.0, 0.0), v(0.0, 2.0, 0.0), v(0.0, 0.0, 2.0));
     scene()
@@ -54,7 +54,7 @@ fn room() -> Build {
         .pictured(v(0.0, 1.0, 4.4), v(0.0, 1.0, 0.0), 34.0, 24, 24)
 }
 
-/// Balls under a point light: only sharp edges.
+/// A scene with only sharp edges: balls under a point light.
 fn balls() -> Build {
     let ball = |build: Build, x: f64, z: f64, r: f64| build.sphere(v(x, r, z), r, matte(0.6));
     let floor = scene().quad(v(-9.0, 0.0, 9.0), v(18.0, 0.0, 0.0), v(0.0, 0.0, -18.0), matte(0.6));
@@ -69,7 +69,7 @@ fn balls() -> Build {
 }
 
 #[test]
-fn error_estimate_matches_the_spread_over_seeds() {
+fn error_estimate_matches_spread_over_seeds() {
     const SEEDS: u32 = 16;
     for (name, build) in [("room", room()), ("balls", balls())] {
         let world = build.world();
@@ -80,7 +80,7 @@ fn error_estimate_matches_the_spread_over_seeds() {
                 go_on(film, &world, &build, seed, done, samples);
             }
             done = samples;
-            // The variance of a pixel over seeds needs no reference.
+            // The variance of a pixel over seeds requires no reference image.
             let luminance = |film: &Film| -> Vec<f64> {
                 let color = |c: &glimt::math::Vec3| glimt::math::color::luminance(*c).into();
                 film.radiance().pixels.iter().map(color).collect()
@@ -100,7 +100,8 @@ fn error_estimate_matches_the_spread_over_seeds() {
                 films.iter().map(|film| film.relative_error().expect("an estimate") / truth).collect();
             eprintln!("{name}, {samples} samples, {truth:.1e}: {ratios:.2?}");
             let rms = (ratios.iter().map(|ratio| ratio * ratio).sum::<f64>() / count).sqrt();
-            // In such a small room, the last doubling may gain more than the forecast from the earlier ones.
+            // In such a small image, the last doubling may reduce the error more than predicted from earlier
+            // doublings.
             let most = if samples > 256 { 1.5 } else { 1.35 };
             assert!((0.9..=most).contains(&rms), "{name}, {samples} samples: {rms:.2}");
             let outside = |least, most| ratios.iter().filter(move |ratio| !(least..=most).contains(*ratio));

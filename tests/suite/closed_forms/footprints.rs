@@ -1,4 +1,4 @@
-//! Mip levels of textures: the footprint of a pixel.
+//! Pixel footprints and the mip levels of textures.
 
 use glimt::integrators::View;
 use glimt::math::{DVec3, Vec2, Vec3};
@@ -9,7 +9,7 @@ use glimt::scene::description::{
 use super::scenes::{Build, emitter, lat_long_sphere, matte, mirror, phong, plain, scene};
 use super::{mean_and_error, v};
 
-/// A tiled checkerboard of black and white squares of 16 texels.
+/// A tiled checkerboard of black and white squares, 16 texels wide.
 fn checkers(build: &mut Build, filter: TextureFilter, repeat: f32) -> usize {
     let rows: Vec<Vec<Vec3>> = (0..32)
         .map(|y| (0..32).map(|x| Vec3::splat(if (x / 16 + y / 16) % 2 == 0 { 0.0 } else { 1.0 })).collect())
@@ -18,7 +18,7 @@ fn checkers(build: &mut Build, filter: TextureFilter, repeat: f32) -> usize {
     build.texture(&rows, filter, Wrap::Repeat, Vec2::splat(repeat))
 }
 
-/// The board under ambient light only.
+/// The checkerboard material, lit only by ambient light.
 fn board(filter: TextureFilter, repeat: f32) -> (Build, Material) {
     let mut build = scene().with(|scene| scene.render.ambient = Vec3::ONE);
     let texture = checkers(&mut build, filter, repeat);
@@ -41,16 +41,16 @@ fn grays(build: &Build) -> Vec<f64> {
 
 #[test]
 fn distant_board_is_gray_after_one_sample() {
-    // From 60 units away, a pixel of 40°/16 is at least 2.6 units wide.
+    // At a distance of 60 units, a pixel of 40°/16 is at least 2.6 units wide.
     let seen = |filter| grays(&floor(filter).pictured(v(0.0, 40.0, 20.0), v(0.0, 0.0, -40.0), 40.0, 16, 16));
     let off = |values: &[f64]| values.iter().map(|x| (x - 0.5).abs()).fold(0.0, f64::max);
     let mipmapped = seen(TextureFilter::Mipmap);
     assert!(off(&mipmapped) < 0.01, "{}", off(&mipmapped));
     let (mean, error) = mean_and_error(&seen(TextureFilter::Bilinear));
-    assert!(error * 16.0 > 0.4, "bilinear look-ups alias: {mean} ± {error}");
+    assert!(error * 16.0 > 0.4, "bilinear lookups must alias: {mean} ± {error}");
 }
 
-/// A name, and a material with this texture.
+/// A name, and a function that creates a material with the given texture.
 type Textured = (&'static str, fn(texture: usize) -> Material);
 
 #[test]
@@ -66,13 +66,13 @@ fn distant_boards_are_gray_for_every_key() {
             Material { emission: EmissionSource { texture: Some(board), ..own.emission }, ..own }
         }),
         ("mirror", |board| plain(MaterialKind::Mirror { reflectance: ColorSource::Texture(board) })),
-        // Without refraction, a pane reflects nothing.
+        // With an IOR of 1, a pane reflects nothing.
         ("pane", |board| plain(MaterialKind::Pane { ior: 1.0, tint: ColorSource::Texture(board) })),
     ];
     for (what, material) in materials {
         let mut build = scene().background(1.0).with(|scene| scene.render.ambient = Vec3::ONE);
         let board = checkers(&mut build, TextureFilter::Mipmap, 200.0);
-        // Next to it is a material without a texture.
+        // Also add a material without a texture.
         let build = build
             .quad(v(-100.0, 0.0, 0.0), v(200.0, 0.0, 0.0), v(0.0, 0.0, -200.0), material(board))
             .sphere(v(0.0, 90.0, 0.0), 1.0, matte(0.5))
@@ -84,8 +84,8 @@ fn distant_boards_are_gray_for_every_key() {
 }
 
 #[test]
-fn mip_levels_fade_with_distance() {
-    // Pixels of 1°: half a square is 0.25 units, which is one pixel at a distance of 14.3.
+fn contrast_fades_with_distance() {
+    // Pixels are 1° wide. Half a square is 0.25 units, which is one pixel at a distance of 14.3.
     let contrast = |distance: f64| {
         let eye = v(0.25, distance, -50.25);
         let build = floor(TextureFilter::Mipmap).pictured(eye, v(0.25, 0.0, -50.25), 1.0, 1, 1);
@@ -98,7 +98,7 @@ fn mip_levels_fade_with_distance() {
 }
 
 #[test]
-fn near_texture_shows_its_texels() {
+fn near_texture_uses_full_resolution() {
     let seen = |filter| grays(&floor(filter).pictured(v(0.3, 0.4, -50.0), v(0.4, 0.0, -50.2), 3.0, 16, 16));
     assert_eq!(seen(TextureFilter::Mipmap), seen(TextureFilter::Bilinear));
 }
@@ -124,7 +124,7 @@ fn constant_texture_is_constant_at_every_level() {
 
 #[test]
 fn flat_mirror_keeps_the_mip_level() {
-    // The mirror is at z = −5; a point at z appears at −10 − z.
+    // The mirror is at z = −5, so a point at z appears at −10 − z.
     let unfolded = |p: DVec3| v(p.x, p.y, -10.0 - p.z);
     let (corner, u, w) = (v(-40.0, -30.0, 12.0), v(80.0, 0.0, 8.0), v(0.0, 60.0, 3.0));
     let eye = v(0.0, 0.0, 0.0);
@@ -145,7 +145,7 @@ fn flat_mirror_keeps_the_mip_level() {
     };
     let (mirrored, plain) = (picture(true), picture(false));
     let gray = |picture: &[DVec3]| picture.iter().filter(|color| color.x > 0.05 && color.x < 0.95).count();
-    assert!(gray(&plain) > 100, "intermediate levels are used");
+    assert!(gray(&plain) > 100, "intermediate levels must be used");
     for (a, b) in mirrored.iter().zip(&plain) {
         assert!((*a - *b).abs().max_element() < 5e-3, "{a} {b}");
     }
@@ -153,7 +153,8 @@ fn flat_mirror_keeps_the_mip_level() {
 
 #[test]
 fn mirror_ball_matches_its_smooth_mesh() {
-    // Surround the camera with a board. In the ball, which shrinks it, everything is gray; in a flat mirror it is not.
+    // A checkerboard behind the camera. In the ball, which shrinks the board's image, everything is gray, but
+    // not in a flat mirror.
     let (build, kind) = board(TextureFilter::Mipmap, 12.0);
     let room =
         |build: Build| build.quad(v(-30.0, -30.0, 9.0), v(60.0, 0.0, 0.0), v(0.0, 60.0, 0.0), kind.clone());
@@ -177,8 +178,8 @@ fn views_use_the_same_mip_level() {
 }
 
 #[test]
-fn path_bounces_agree_with_sharp_lookups() {
-    // A wall lit through a board on the floor: mip levels at the second hit preserve the mean irradiance.
+fn mipmapped_bounces_match_bilinear_lookups() {
+    // A wall lit by a checkerboard floor. Mip levels at the second hit must preserve the mean irradiance.
     let lit = |filter| {
         let (build, kind) = board(filter, 4.0);
         build

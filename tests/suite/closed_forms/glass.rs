@@ -1,4 +1,4 @@
-//! Glass: Fresnel and Snell at slabs, prisms and balls; absorption; nesting.
+//! Glass: Fresnel reflectance and Snell's law in slabs, prisms and balls, absorption, and nesting.
 
 use glimt::geometry::Ray;
 use glimt::geometry::mesh::TriangleMesh;
@@ -11,7 +11,7 @@ use glimt::world::Geometry;
 use super::scenes::{AS_IT_IS, Build, emitter, file_material, glass, lat_long_sphere, scene, tinted};
 use super::{assert_close, assert_mean, v};
 
-/// Horizontal and downward step of a ray at an angle to the vertical.
+/// Direction of a downward ray at an angle to the vertical.
 fn tilted(degrees: f64) -> DVec3 {
     v(degrees.to_radians().sin(), -degrees.to_radians().cos(), 0.0)
 }
@@ -23,7 +23,7 @@ fn slab(degrees: f64, material: Material) -> Build {
         .seen(-tilted(degrees) * 2.0, DVec3::ZERO)
 }
 
-/// Light from below everywhere.
+/// Uniform light from below.
 fn lit_from_below(build: Build) -> Build {
     build.quad(v(-1e4, -2.0, 1e4), v(2e4, 0.0, 0.0), v(0.0, 0.0, -2e4), emitter(1.0))
 }
@@ -39,7 +39,7 @@ fn reflectance(degrees: f64) -> f64 {
 }
 
 #[test]
-fn slab_sums_its_inner_reflections() {
+fn slab_includes_all_internal_reflections() {
     // T = (1 − R)²·Σ R²ⁱ = (1 − R)/(1 + R).
     for (degrees, exact) in
         [(0.0, 0.923_076_923_1), (45.0, 0.904_326_79), (60.0, 0.836_232_46), (80.0, 0.441_229_17)]
@@ -52,8 +52,9 @@ fn slab_sums_its_inner_reflections() {
 }
 
 #[test]
-fn slab_orders_are_powers_of_the_reflectance() {
-    // Depth 2: straight through, (1 − R)²; depth 1: nothing from below; the sky above only by reflection, R.
+fn slab_terms_are_powers_of_reflectance() {
+    // At depth 2, light passes straight through: (1 − R)². At depth 1, no light arrives from below, and the
+    // sky above is visible only by reflection: R.
     for degrees in [0.0, 45.0, 60.0] {
         let r = reflectance(degrees);
         let through = lit_from_below(slab(degrees, glass(1.5)));
@@ -71,8 +72,8 @@ fn slab_orders_are_powers_of_the_reflectance() {
 
 #[test]
 fn slab_shifts_rays_laterally() {
-    // t·sin θ·(1 − cos θ/√(n² − sin²θ)): the position at which the edge of a light below is just visible straight
-    // through.
+    // The shift is t·sin θ·(1 − cos θ/√(n² − sin²θ)). It determines where the edge of a light below becomes
+    // visible straight through the slab.
     for (degrees, exact) in [(45.0, 0.329_142_31), (60.0, 0.512_472_01), (80.0, 0.833_663_85)] {
         let seen = |edge: f64| {
             let half = v(1e4, 0.0, 0.0);
@@ -89,7 +90,7 @@ fn slab_shifts_rays_laterally() {
     }
 }
 
-/// A ray refracted at every surface of glass with n = 1.5 until it leaves. `None` for total internal reflection.
+/// Traces a ray through glass with n = 1.5 until it leaves. `None` for total internal reflection.
 fn through(geometry: &Geometry, mut ray: Ray) -> Option<Ray> {
     while let Some(hit) = geometry.closest(&ray) {
         let surface = geometry.surface(&ray, &hit);
@@ -103,8 +104,8 @@ fn through(geometry: &Geometry, mut ray: Ray) -> Option<Ray> {
 }
 
 #[test]
-fn prism_has_its_minimum_deviation() {
-    // 2·asin(n·sin 30°) − 60° = 37.180756°, at the symmetric passage.
+fn prism_has_analytic_minimum_deviation() {
+    // 2·asin(n·sin 30°) − 60° = 37.180756° for the symmetric path.
     let mut mesh = TriangleMesh::default();
     for z in [-10.0, 10.0] {
         for degrees in [90.0_f64, 210.0, 330.0] {
@@ -116,7 +117,7 @@ fn prism_has_its_minimum_deviation() {
         mesh.triangles.extend([[a, b, b + 3], [a, b + 3, a + 3]]);
     }
     let world = scene().mesh(mesh, AS_IT_IS, glass(1.5)).world();
-    // Towards the left face, whose normal points 150° from +x.
+    // Toward the left face, whose normal is 150° from +x.
     let deviation = |incidence: f64| {
         let heading = (incidence - 30.0).to_radians();
         let direction = v(heading.cos(), heading.sin(), 0.0);
@@ -134,14 +135,15 @@ fn prism_has_its_minimum_deviation() {
 
 #[test]
 fn ball_lens_focuses_paraxial_rays() {
-    // sin θ = h, sin θ' = h/n: the ray leaves deflected by 2(θ − θ') and meets the axis at h/sin(2(θ − θ')) from the
-    // center.
+    // With sin θ = h and sin θ' = h/n, the ray is deflected by 2(θ − θ') and meets the axis at distance
+    // h/sin(2(θ − θ')) from the center.
     let world = scene().sphere(DVec3::ZERO, 1.0, glass(1.5)).world();
     for (h, exact) in [(1e-3_f64, 1.5), (0.5, 1.391_572_9), (0.9, 1.104_445_6)] {
         let formula = h / (2.0 * (h.asin() - (h / 1.5).asin())).sin();
         assert_close("the formula", formula, exact);
         let start = Vec3::new(h as f32, 0.0, 3.0);
-        let out = through(&world.geometry, Ray::new(start, Vec3::NEG_Z)).expect("no total reflection");
+        let out =
+            through(&world.geometry, Ray::new(start, Vec3::NEG_Z)).expect("no total internal reflection");
         let (o, d) = (out.origin.as_dvec3(), out.direction.as_dvec3());
         assert_close(&format!("h = {h}"), -(o.z - d.z * o.x / d.x), formula);
     }
@@ -149,8 +151,8 @@ fn ball_lens_focuses_paraxial_rays() {
 
 #[test]
 fn lossless_glass_under_a_sky_is_invisible() {
-    // Radiance over n² is conserved, reflection and refraction split it without loss, and every path ends in the sky:
-    // exactly 1, in every pixel.
+    // Radiance/n² is conserved, reflection and refraction are lossless, and every path ends in the sky, so
+    // every pixel is exactly 1.
     let ball = lat_long_sphere(8, 10, 1.0, v(0.0, -2.2, -6.0));
     let seen = scene()
         .sphere(v(-1.2, 0.0, -5.0), 1.0, glass(1.5))
@@ -176,8 +178,8 @@ fn lossless_glass_under_a_sky_is_invisible() {
 
 #[test]
 fn white_furnace_from_inside_a_ball() {
-    // Internal reflections that roulette keeps carry the weight of those it ends: the result is 1, however weak they
-    // are.
+    // Russian roulette preserves the total weight of internal reflections, so the result is 1, however weak
+    // they are.
     for ior in [1.1, 1.5, 2.4] {
         let ball = scene().sphere(DVec3::ZERO, 1.0, glass(ior)).background(1.0).depth(300);
         let seen = ball.pictured(v(0.0, 0.0, 1e-3), v(0.0, 0.0, -1.0), 2.0, 8, 8).picture(1024, 1);
@@ -188,7 +190,8 @@ fn white_furnace_from_inside_a_ball() {
 
 #[test]
 fn absorption_along_a_slab_and_a_ball() {
-    // Straight through d of tint a: (1 − R)²·aᵈ, R = .04; with all reflections (1 − R)²aᵈ/(1 − R²a²ᵈ).
+    // Straight through thickness d with tint a: (1 − R)²·aᵈ, R = 0.04. With all reflections: (1 − R)²aᵈ/(1 −
+    // R²a²ᵈ).
     let tint = DVec3::new(0.5, 0.9, 0.25);
     let green = tinted(1.5, tint);
     let ball = scene().sphere(v(0.0, -0.75, 0.0), 0.75, green.clone()).seen(v(0.0, 2.0, 0.0), DVec3::ZERO);
@@ -203,7 +206,7 @@ fn absorption_along_a_slab_and_a_ball() {
             assert_mean("all", &all, 0.96 * 0.96 * a / (1.0 - 0.0016 * a * a));
         }
     }
-    // Through a ball at the angle θ: the chord is 2R·cos θ', T = (1 − R(θ))²·a^chord.
+    // Through a ball at angle θ, the chord is 2R·cos θ' and T = (1 − R(θ))²·a^chord.
     let h = 0.7_f64;
     let ball = scene()
         .sphere(DVec3::ZERO, 1.0, tinted(1.5, tint))
@@ -213,16 +216,16 @@ fn absorption_along_a_slab_and_a_ball() {
     let r = reflectance(h.asin().to_degrees());
     let chord = 2.0 * (1.0 - (h / 1.5).powi(2)).sqrt();
     for channel in 0..3 {
-        // The sky is visible by reflection, straight through, and in no other way at depth 2.
+        // At depth 2, the sky is visible only by reflection and straight through.
         let exact = r + (1.0 - r).powi(2) * tint[channel].powf(chord);
         assert_close("chord", ball.color()[channel], exact);
     }
 }
 
 #[test]
-fn glass_of_the_surrounding_index_is_invisible() {
-    // Without a change of n there is no reflection and no refraction: the images with and without the ball are equal up
-    // to its rim.
+fn glass_with_surrounding_ior_is_invisible() {
+    // Without a change in n, there is no reflection or refraction, so the ball changes no pixel, even at its
+    // rim.
     let behind = |build: Build| {
         (0..10).fold(build.background(0.1), |build, i| {
             let x = f64::from(i) * 0.4 - 2.0;
@@ -233,7 +236,7 @@ fn glass_of_the_surrounding_index_is_invisible() {
     let ball = behind(scene().sphere(v(0.0, 0.0, -5.0), 1.0, glass(1.0)));
     let mut random = super::Random(5);
     for i in 0..3000 {
-        // Rays near the rim, at distances 1 − 10⁻¹ … 1 − 10⁻⁷ from the center of the ball as seen from the camera.
+        // Rays near the rim, passing the center of the ball at distances 1 − 10⁻¹ … 1 − 10⁻⁷.
         let rim = 1.0 / (1.0 - 1.0 / 25.0_f64).sqrt();
         let r = rim * (1.0 - 10.0_f64.powf(-1.0 - 6.0 * random.unit()));
         let (sin, cos) = (f64::from(i) * 2.4).sin_cos();
@@ -245,23 +248,24 @@ fn glass_of_the_surrounding_index_is_invisible() {
 
 #[test]
 fn nested_glass() {
-    // In a slab of n = 1.5, a ball of the same n changes nothing: at depth 4 the path through both is (1 − R)².
+    // In a slab with n = 1.5, a ball with the same n has no effect. At depth 4, the path through both
+    // transmits (1 − R)².
     let r = reflectance(30.0);
     let inside = slab(30.0, glass(1.5)).sphere(v(0.2, -0.5, 0.05), 0.3, glass(1.5));
     assert_close("equal", lit_from_below(inside).depth(4).value(), (1.0 - r).powi(2));
-    // A ball of air along the axis: four surfaces at normal incidence, (1 − .04)⁴.
+    // A ball of air on the axis, with four surfaces at normal incidence: (1 − 0.04)⁴.
     let bubble = slab(0.0, glass(1.5)).sphere(v(0.0, -0.5, 0.0), 0.25, glass(1.0));
     assert_close("bubble", lit_from_below(bubble).depth(4).value(), 0.96_f64.powi(4));
-    // A ball of n = 2 in it: the inner surfaces have ((2 − 1.5)/(2 + 1.5))².
+    // A ball with n = 2 in the slab. The reflectance of the inner surfaces is ((2 − 1.5)/(2 + 1.5))².
     let dense = slab(0.0, glass(1.5)).sphere(v(0.0, -0.5, 0.0), 0.25, glass(2.0));
     let inner = 1.0 - 1.0 / 49.0;
     assert_mean("dense", &lit_from_below(dense).depth(4).values(64, 64), (0.96 * inner) * (0.96 * inner));
-    // From inside the slab one surface remains; radiance is basic, L/n².
+    // From inside the slab, only one surface remains. Radiance is basic radiance, L/n².
     let within = slab(0.0, glass(1.5)).seen(v(0.0, -0.5, 0.0), v(0.0, -1.0, 0.0));
     assert_close("from within", lit_from_below(within).depth(1).value(), 0.96);
 }
 
-/// Cubes given as (center, edge, material) in one mesh, faces outwards.
+/// A mesh of outward-facing cubes, given as (center, edge, material).
 pub fn boxes(parts: &[(DVec3, f64, u32)]) -> TriangleMesh {
     let mut mesh = TriangleMesh::default();
     for &(center, edge, material) in parts {
@@ -283,7 +287,8 @@ pub fn boxes(parts: &[(DVec3, f64, u32)]) -> TriangleMesh {
 
 #[test]
 fn mesh_parts_have_their_own_glass() {
-    // Straight through a slab, T = (1 − R)² with R = ((n − 1)/(n + 1))²; the first triangles have another material.
+    // Straight through a slab, T = (1 − R)² with R = ((n − 1)/(n + 1))². The first triangles have a different
+    // material.
     let passed = |n: f64| (1.0 - ((n - 1.0) / (n + 1.0)).powi(2)).powi(2);
     let look = |build: &Build, x: f64| {
         let through = build.clone().seen(v(x, 3.0, 0.1), v(x, 0.0, 0.1));
@@ -304,7 +309,8 @@ fn mesh_parts_have_their_own_glass() {
 
 #[test]
 fn mesh_parts_can_be_nested() {
-    // Four surfaces along the axis: air to 1.5 and back .04 each, 1.5 to 2 and back 1/49 each, in one object.
+    // Four surfaces on the axis of a single object: R = 0.04 between air and 1.5, and R = 1/49 between 1.5
+    // and 2.
     let mesh = boxes(&[(v(0.0, 0.0, 0.0), 1.0, 0), (v(0.0, 0.0, 0.0), 0.5, 1)]);
     let nested = scene().own_mesh(mesh, vec![file_material(9, 1.5), file_material(9, 2.0)]);
     let straight = lit_from_below(nested.seen(v(0.05, 3.0, 0.1), v(0.05, 0.0, 0.1))).depth(4);
@@ -314,9 +320,10 @@ fn mesh_parts_can_be_nested() {
 
 #[test]
 fn shading_normals_create_no_light() {
-    // Reflection and refraction split a ray's radiance over n², choosing one of them at random preserves it, and each
-    // part that leaves sees the sky once: at most 1, inside glass as well. Rays that the shading normal refracts along
-    // the outside, but not through the facet, must not count as having left.
+    // Reflection and refraction split radiance/n² without loss, and a random choice between them preserves
+    // its expectation. Each path sees the sky at most once, so the value is at most 1, even inside glass.
+    // Rays that the shading normal refracts to the outside but that do not cross the facet must not count as
+    // outside.
     let mut ball = lat_long_sphere(8, 10, 1.0, DVec3::ZERO);
     ball.normals = ball.positions.iter().map(|p| p.normalize()).collect();
     let seen = scene().mesh(ball, AS_IT_IS, glass(1.5)).background(1.0).depth(50).with(|scene| {
@@ -340,7 +347,7 @@ fn shading_normals_create_no_light() {
         }
         along += 1;
         let value = seen.clone().seen(eye.as_dvec3(), (eye + direction).as_dvec3()).value();
-        assert!(value <= 1.0 + 1e-5, "from {eye} along {direction}: {value}");
+        assert!(value <= 1.0 + 1e-5, "from {eye} in direction {direction}: {value}");
     }
     assert!(along > 50, "{along}");
 }

@@ -1,4 +1,4 @@
-//! Global illumination by path tracing, against closed forms.
+//! Path-traced global illumination against closed forms.
 
 use std::f64::consts::PI;
 
@@ -16,25 +16,25 @@ pub fn by_paths(build: Build, max_depth: u32) -> Build {
     build.with(|scene| scene.render.integrator = Integrator::Path).depth(max_depth)
 }
 
-/// Checks |mean − exact| ≤ 4 standard errors over seeds. The standard error is at most this fraction of the exact
-/// value, so that a noisy estimate cannot pass.
+/// Checks that |mean − exact| is at most 4 standard errors over seeds. To reject noisy estimates, also limits
+/// the standard error to a fraction of the exact value.
 #[track_caller]
 pub fn assert_near(what: &str, values: &[f64], exact: f64, most_error: f64) {
     assert!(values.len() >= 16, "too few seeds");
     let (mean, error) = mean_and_error(values);
-    assert!(error <= most_error * exact, "{what}: {mean} ± {error} is too noisy for {exact}");
+    assert!(error <= most_error * exact, "{what}: too noisy: {mean} ± {error}, expected {exact}");
     let allowed = (4.0 * error).max(2e-5 * exact);
-    assert!((mean - exact).abs() <= allowed, "{what}: {mean} ± {error} is not {exact}");
+    assert!((mean - exact).abs() <= allowed, "{what}: {mean} ± {error}, expected {exact}");
 }
 
-/// A closed room whose walls are all of one material. The camera sees the back of a sphere, or the fronts of a box of
-/// quads.
+/// A closed room with a single wall material. The camera sees the back faces of a sphere, or the front faces
+/// of a box of quads.
 fn room(emission: f32, reflectance: f32, specular: f32) -> Build {
     let wall = || phong(reflectance, specular, 20.0, emission);
     let (low, side) = (-1.0, 2.0);
     let (x, y, z) = (v(side, 0.0, 0.0), v(0.0, side, 0.0), v(0.0, 0.0, side));
     let (o, far) = (v(low, low, low), v(low + side, low + side, low + side));
-    // Fronts are along u × v, inwards.
+    // Front faces point along u × v, inward.
     scene()
         .quad(o, x, y, wall())
         .quad(o, y, z, wall())
@@ -46,8 +46,8 @@ fn room(emission: f32, reflectance: f32, specular: f32) -> Build {
 }
 
 #[test]
-fn furnace_sums_its_bounces_up_to_the_depth() {
-    // L = E·(1 + ρ + … + ρᵏ); every vertex of every path receives the same light.
+fn furnace_sums_bounces_up_to_the_depth() {
+    // L = E·(1 + ρ + … + ρᵏ), as every path vertex receives the same light.
     for (reflectance, seeds) in [(0.5_f64, 16), (0.8, 32)] {
         for depth in [0, 1, 2, 3, 8, 60] {
             let values = by_paths(room(1.0, reflectance as f32, 0.0), depth).values(512, seeds);
@@ -59,21 +59,22 @@ fn furnace_sums_its_bounces_up_to_the_depth() {
 
 #[test]
 fn integrating_sphere_has_uniform_indirect_light() {
-    // R = 1, I = 1 W/sr at x = .5, ρ = .5: indirect irradiance 1; L = ρ/π·(1 + I·cos/d²).
+    // R = 1, ρ = 0.5, and I = 1 W/sr at x = 0.5. The indirect irradiance is 1, so L = ρ/π·(1 + I·cos/d²).
     let sphere = |to: DVec3| {
         let walls = scene().sphere(DVec3::ZERO, 1.0, matte(0.5)).seen(v(0.0, 0.1, 0.0), to);
         by_paths(walls.point_light(v(0.5, 0.0, 0.0), 1.0, Falloff::Square), 60)
     };
     for (to, exact) in [(v(1.0, 0.0, 0.0), 0.795_774_715_5), (v(-1.0, 0.0, 0.0), 0.229_890_473_4)] {
-        // 4 at the near wall, 4/9 at the far one, for the direct component.
+        // The direct component is 4 at the near wall and 4/9 at the far wall.
         assert_near("integrating sphere", &sphere(to).values(1024, 32), exact, 3e-3);
     }
 }
 
 #[test]
 fn concentric_spheres_exchange_light() {
-    // Inner: R = 1, E = 1, ρ = .5; outer: R = 2, ρ = .8. All light that leaves the inner sphere reaches the outer one,
-    // and a quarter of what the outer one emits returns: L₁ = 4/3, L₂ = 2/3, and .2 with direct light only.
+    // The inner sphere has R = 1, E = 1, ρ = 0.5, the outer sphere R = 2, ρ = 0.8. All light from the inner
+    // sphere reaches the outer one, and a quarter of the light from the outer sphere returns. L₁ = 4/3, L₂ =
+    // 2/3, or 0.2 with direct light only.
     let spheres =
         || scene().sphere(DVec3::ZERO, 1.0, phong(0.5, 0.0, 1.0, 1.0)).sphere(DVec3::ZERO, 2.0, matte(0.8));
     let inner = by_paths(spheres().seen(v(1.5, 0.2, 0.0), DVec3::ZERO), 80);
@@ -84,9 +85,10 @@ fn concentric_spheres_exchange_light() {
 }
 
 #[test]
-fn glowing_ball_in_a_mirror_sees_itself() {
-    // A ball of E = 1, ρ = .8 is inside a sphere that reflects .6: all light that leaves the ball returns to it after
-    // two bounces. L = Σ .48ᵏ, 2k ≤ depth. Russian roulette applies to both kinds of bounces.
+fn emissive_ball_in_a_mirror_sees_itself() {
+    // A ball with E = 1 and ρ = 0.8 inside a mirror sphere with reflectance 0.6. All light from the ball
+    // returns after two bounces, so L = Σ 0.48ᵏ with 2k ≤ depth. Russian roulette applies to both kinds of
+    // bounces.
     let ball = scene().sphere(DVec3::ZERO, 1.0, phong(0.8, 0.0, 1.0, 1.0));
     let inside = ball.sphere(DVec3::ZERO, 2.0, mirror(0.6)).seen(v(1.5, 0.2, 0.0), DVec3::ZERO);
     for (depth, turns) in [(2, 1), (5, 2), (9, 4), (40, 20)] {
@@ -98,7 +100,8 @@ fn glowing_ball_in_a_mirror_sees_itself() {
 
 #[test]
 fn two_plates_exchange_light() {
-    // Infinite: L₁ = (E + ρ₁·…): 5/3 and 4/3 for E₁ = 1, ρ = .5 and .8. As quads 1e4 times as wide as their distance.
+    // Infinite plates with E₁ = 1, ρ₁ = 0.5 and ρ₂ = 0.8 have radiances 5/3 and 4/3. The quads are 1e4 times
+    // as wide as their distance.
     let half = 5e3;
     let plates = |at: f64| {
         scene()
@@ -112,7 +115,7 @@ fn two_plates_exchange_light() {
             .seen(v(0.0, 0.5, 0.0), v(0.1, at, 0.1))
     };
     for (at, exact) in [(0.0, 5.0 / 3.0), (1.0, 4.0 / 3.0)] {
-        // Four standard errors are at most a thousandth.
+        // Four standard errors are at most 0.1 %.
         let values = by_paths(plates(at), 100).values(16384, 96);
         assert_near("plates", &values, exact, 2.5e-4);
         assert!((mean_and_error(&values).0 - exact).abs() <= 1e-3 * exact);
@@ -121,7 +124,8 @@ fn two_plates_exchange_light() {
 
 #[test]
 fn lossless_mirrors_and_glass_conserve_light() {
-    // A white background surrounds everything: 1 on every path. Roulette never ends a lossless path.
+    // Every path ends in the white background, so every value is 1. Russian roulette never ends a lossless
+    // path.
     for (what, material) in [("mirror", mirror(1.0)), ("glass", glass(1.5)), ("diamond", glass(2.4))] {
         let ball =
             scene().sphere(DVec3::ZERO, 1.0, material).pictured(v(0.0, 0.0, 4.0), DVec3::ZERO, 30.0, 16, 16);
@@ -142,7 +146,7 @@ fn background_is_visible_only_in_mirrors() {
     let one = seen.values(4, 1)[0];
     assert!(one == 0.5 || one == 1.0, "{one}");
     let indirect = by_paths(seen.seen(v(0.0, 1.0, 0.0), DVec3::ZERO), 8);
-    assert_eq!(indirect.values(64, 1), [0.0], "nor through a mirror");
+    assert_eq!(indirect.values(64, 1), [0.0], "the mirror must not transmit the background");
 }
 
 #[test]
@@ -154,7 +158,8 @@ fn paths_find_emission_through_glass() {
         }
         by_paths(build, 60).values(512, 16)
     };
-    // A closed furnace is in equilibrium: 2 in every direction, with lossless glass in it or without.
+    // A closed furnace in equilibrium has radiance 2 in every direction, with or without lossless glass in
+    // it.
     assert_near("without", &inside(false), 2.0, 3e-3);
     assert_near("with", &inside(true), 2.0, 5e-3);
 }
@@ -183,16 +188,16 @@ fn path_components_add_up() {
     }
     assert!(
         parts[1..].iter().all(|part| part.iter().any(|pixel| pixel.x > 0.01)),
-        "every component has light"
+        "every component must have light"
     );
 }
 
-/// Every kind of light, wide and near above a floor of a material.
+/// Every kind of light, large and close above a floor with the given material.
 pub fn lamps_over_a_floor(material: &Material) -> Vec<(&'static str, Build)> {
     let floor = || {
         let corner = v(-0.05, 0.0, 0.05);
         let floor = scene().quad(corner, v(0.1, 0.0, 0.0), v(0.0, 0.0, -0.1), material.clone());
-        // From −45°: the mirrored direction passes through (1, 1, 0).
+        // At −45°, so that the mirror direction passes through (1, 1, 0).
         floor.seen(v(-0.1, 0.1, 0.02), DVec3::ZERO)
     };
     let at = v(0.8, 0.9, 0.1);
@@ -220,32 +225,29 @@ pub fn lamps_over_a_floor(material: &Material) -> Vec<(&'static str, Build)> {
         ("mesh", floor().mesh(ball, [DVec3::ONE, DVec3::ZERO, at], emitter(2.0))),
         ("two", floor().sphere(at, 0.4, emitter(2.0)).sphere(v(0.1, 0.6, 0.0), 0.3, emitter(1.0))),
         (
-            "beside a point",
+            "with a point light",
             floor().sphere(at, 0.4, emitter(2.0)).point_light(v(0.1, 0.6, 0.0), 0.3, Falloff::Square),
         ),
         ("sun", sun(floor(), -at, 2.0, 40.0)),
         ("narrow sun", sun(floor(), v(-1.0, -1.05, 0.0), 2.0, 3.0)),
-        (
-            "sharp sun next to a sphere",
-            sun(floor().sphere(at, 0.4, emitter(2.0)), v(1.0, -2.0, 0.0), 0.5, 0.0),
-        ),
+        ("sharp sun with a sphere", sun(floor().sphere(at, 0.4, emitter(2.0)), v(1.0, -2.0, 0.0), 0.5, 0.0)),
         ("half a sun", sun(floor().sphere(at * 3.0, 1.0, matte(0.0)), -at, 2.0, 60.0)),
     ]
 }
 
 #[test]
 fn direct_light_of_path_matches_whitted() {
-    // Two ways to find a light: the narrower the lobe, the more of it lobe samples find.
+    // MIS of light and lobe samples. Lobe samples matter more for narrow lobes.
     for (diffuse, specular, shininess) in [(0.7, 0.0, 1.0), (0.3, 0.6, 10.0), (0.1, 0.8, 90.0)] {
         for (what, build) in lamps_over_a_floor(&phong(diffuse, specular, shininess, 0.0)) {
             let path = by_paths(build.clone(), 1).values(512, 16);
             let whitted = build.depth(1).values(2048, 16);
             let ((a, of_a), (b, of_b)) = (mean_and_error(&path), mean_and_error(&whitted));
             let error = of_a.hypot(of_b);
-            assert!(error < 0.01 * b, "{what}, α {shininess}: ± {error} of {b} is too noisy");
+            assert!(error < 0.01 * b, "{what}, α {shininess}: too noisy: ± {error} of {b}");
             assert!(
                 (a - b).abs() < 5.0 * error + 1e-5 * b,
-                "{what}, α {shininess}: {a} ± {of_a}, {b} ± {of_b}"
+                "{what}, α {shininess}: path {a} ± {of_a}, whitted {b} ± {of_b}"
             );
         }
     }
@@ -253,8 +255,8 @@ fn direct_light_of_path_matches_whitted() {
 
 #[test]
 fn sharp_highlight_has_low_variance() {
-    // The light covers the whole lobe: ∫(α + 2)/2π·cos^α·cos θ = cos θ of the mirrored direction, here 45°; plus the
-    // diffuse component.
+    // The light covers the whole lobe, so ∫(α + 2)/2π·cos^α·cos θ is cos θ of the mirror direction, here 45°.
+    // Add the diffuse component.
     let corners = [v(0.2, 1.8, -0.9), v(1.8, 0.2, -0.9), v(1.8, 0.2, 0.9), v(0.2, 1.8, 0.9)];
     let (u, w) = (corners[1] - corners[0], corners[3] - corners[0]);
     for shininess in [1e3_f32, 1e5] {
@@ -264,7 +266,8 @@ fn sharp_highlight_has_low_variance() {
         let lit = floor.quad(corners[0], u, w, emitter(3.0)).seen(v(-0.1, 0.1, 0.0), DVec3::ZERO);
         let diffuse = 0.2 / std::f64::consts::PI * lambert(DVec3::ZERO, DVec3::Y, &corners);
         let exact = 3.0 * (diffuse + 0.5 * 0.5_f64.sqrt());
-        // A disk in the sky with the same radiance; its irradiance at normal incidence is π·sin² of half its angle.
+        // A disk in the sky with the same radiance. At normal incidence, its irradiance is π·L·sin² of half
+        // its angle.
         let disc = std::f64::consts::PI * 20_f64.to_radians().sin().powi(2);
         let floor =
             scene().quad(corner, v(0.1, 0.0, 0.0), v(0.0, 0.0, -0.1), phong(0.2, 0.5, shininess, 0.0));
@@ -278,12 +281,15 @@ fn sharp_highlight_has_low_variance() {
         }
         for (what, build) in [("whitted", lit.clone()), ("path", by_paths(lit.clone(), 1))] {
             for value in build.values(256, 16) {
-                assert!((value / exact - 1.0).abs() < 0.02, "{what}, α {shininess}: {value} is not {exact}");
+                assert!(
+                    (value / exact - 1.0).abs() < 0.02,
+                    "{what}, α {shininess}: {value}, expected {exact}"
+                );
             }
             let mean = mean_and_error(&build.values(256, 64)).0;
-            assert!((mean / exact - 1.0).abs() < 3e-3, "{what}, α {shininess}: {mean} is not {exact}");
+            assert!((mean / exact - 1.0).abs() < 3e-3, "{what}, α {shininess}: {mean}, expected {exact}");
         }
-        // At the edge of the light, half of the lobe misses it.
+        // Half of the lobe extends past the edge of the light.
         let cut = lit.with(|scene| {
             if let Some(Shape::Quad { v: side, corner, .. }) =
                 scene.objects.last_mut().map(|object| &mut object.shape)
@@ -295,12 +301,12 @@ fn sharp_highlight_has_low_variance() {
         let diffuse = 0.2 / std::f64::consts::PI * lambert(DVec3::ZERO, DVec3::Y, &half);
         let exact = 3.0 * (diffuse + 0.25 * 0.5_f64.sqrt());
         let mean = mean_and_error(&cut.values(256, 32)).0;
-        assert!((mean / exact - 1.0).abs() < 0.02, "α {shininess} at the edge: {mean} is not {exact}");
+        assert!((mean / exact - 1.0).abs() < 0.02, "edge, α {shininess}: {mean}, expected {exact}");
     }
 }
 
 #[test]
-fn only_reachable_sharp_highlights_cost_rays() {
+fn no_rays_for_unreachable_sharp_highlights() {
     let scattered = |shininess: f32, lamp: bool, max_depth: u32| {
         let floor = scene().quad(
             v(-1.0, 0.0, 1.0),
@@ -325,7 +331,8 @@ fn only_reachable_sharp_highlights_cost_rays() {
 
 #[test]
 fn path_follows_mirrors_and_glass_like_whitted() {
-    // Emission through δ lobes only: whitted splits its rays, a path chooses one; both count each surface as a bounce.
+    // Emission seen only through delta lobes. Whitted splits rays and path chooses one. Both count each
+    // surface as a bounce.
     let build = || {
         scene()
             .quad(v(-9.0, -9.0, -9.0), v(18.0, 0.0, 0.0), v(0.0, 18.0, 0.0), emitter(1.0))
@@ -347,16 +354,16 @@ fn path_follows_mirrors_and_glass_like_whitted() {
         let error = of_a.hypot(of_b);
         assert!(
             error < 2e-3 * b && (a - b).abs() < 5.0 * error + 1e-6,
-            "depth {depth}: {a} ± {of_a}, {b} ± {of_b}"
+            "depth {depth}: path {a} ± {of_a}, whitted {b} ± {of_b}"
         );
     }
 }
 
 #[test]
-fn only_paths_find_light_behind_glass() {
-    // One light is covered by a pane, one is in the open. The covered light reaches the floor through glass that is
-    // opaque to light samples. A slab transmits (1 − R)/(1 + R), and integrating numerically over all angles would give
-    // the floor's light. This test checks equality instead: glass of index 1 changes nothing.
+fn paths_find_light_behind_glass() {
+    // Glass with an IOR of 1 must have no effect, although it hides the light from light samples. (For other
+    // IORs, a slab transmits (1 − R)/(1 + R), and the light on the floor would require numerical integration
+    // over all angles.)
     let lit = |ior: Option<f32>| {
         let floor =
             scene().quad(v(-0.05, 0.0, 0.05), v(0.1, 0.0, 0.0), v(0.0, 0.0, -0.1), phong(0.4, 0.4, 8.0, 0.0));
@@ -371,7 +378,7 @@ fn only_paths_find_light_behind_glass() {
     let error = of_open.hypot(of_behind);
     assert!(
         error < 0.02 * open && (open - behind).abs() < 5.0 * error,
-        "{open} ± {of_open}, {behind} ± {of_behind}"
+        "{open} ± {of_open} without glass, {behind} ± {of_behind} with glass"
     );
 }
 
@@ -385,12 +392,12 @@ fn clamp_darkens_and_is_off_by_default() {
     };
     let (free, loose, tight) = (dark(0.0), dark(1e9), dark(0.05));
     assert_eq!(free, loose);
-    assert!(tight < 0.98 * free && tight > 0.2 * free, "{tight} of {free}");
+    assert!(tight < 0.98 * free && tight > 0.2 * free, "{tight}, unclamped {free}");
 }
 
 #[test]
-fn colored_walls_multiply_their_colors() {
-    // A furnace with a different reflectance for each color: L = E/(1 − ρ).
+fn reflectances_multiply_per_color_channel() {
+    // A furnace with a different reflectance in each channel: L = E/(1 − ρ).
     let colors = Vec3::new(0.2, 0.5, 0.75);
     let room = room(1.0, 0.5, 0.0).with(|scene| {
         for material in &mut scene.materials {
@@ -409,7 +416,8 @@ fn colored_walls_multiply_their_colors() {
 
 #[test]
 fn light_samples_inside_glass_are_tinted() {
-    // Floor, light and camera are in the same glass: tint^(light to floor) · tint^(floor to camera).
+    // Floor, light and camera are in the same glass. The transmittance is tint^(light to floor) · tint^(floor
+    // to camera).
     let tint = 0.5_f64;
     let inside = || {
         let glass = tinted(1.5, DVec3::splat(tint));
@@ -426,7 +434,7 @@ fn light_samples_inside_glass_are_tinted() {
             assert_close(what, build.clone().shadows(shadows, 1).value(), exact);
         }
     }
-    // A light of 6 × 6 at a height of 1.6, summed over its midpoints.
+    // A 6 × 6 light at a height of 1.6, integrated numerically with the midpoint rule.
     let (side, height, steps) = (6.0, 1.6, 600);
     let mut sum = 0.0;
     for i in 0..steps {
@@ -442,7 +450,7 @@ fn light_samples_inside_glass_are_tinted() {
     for (what, build) in [("whitted", lit.clone()), ("path", by_paths(lit, 1))] {
         assert_mean(what, &build.values(256, 64), exact);
     }
-    // The same through the lobe of a sharp highlight.
+    // The same light in a sharp highlight.
     let glossy = |build: Build| build.with(|scene| scene.materials[0] = phong(0.1, 0.8, 1e4, 0.0));
     let lit = inside().quad(v(-3.0, height, -3.0), v(side, 0.0, 0.0), v(0.0, 0.0, side), emitter(1.0));
     let lit = glossy(lit.seen(v(0.5, 0.5, 0.0), DVec3::ZERO));

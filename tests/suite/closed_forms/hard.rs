@@ -1,5 +1,5 @@
-//! Hard shadows: one ray to the light's center decides; unoccluded light is the same as without shadows and with soft
-//! ones.
+//! Hard shadows: visibility is decided by one ray to the light's center. Unoccluded light is the same as
+//! without shadows and with soft shadows.
 
 use glimt::integrators::render_tile;
 use glimt::math::DVec3;
@@ -10,7 +10,7 @@ use super::glass::boxes;
 use super::scenes::{AS_IT_IS, Build, emitter, matte, metal, receiver, scene};
 use super::{mean_and_error, v};
 
-/// Every kind of light above a receiver, at a given height and size.
+/// Every kind of light above a receiver, with the given height and size.
 fn lights(height: f64, size: f64) -> Vec<(&'static str, Build)> {
     let at = v(0.0, height, 0.0);
     let lit = |shape: Shape| receiver(DVec3::ZERO, 0.8).shape(shape, emitter(3.0));
@@ -35,8 +35,8 @@ fn lights(height: f64, size: f64) -> Vec<(&'static str, Build)> {
 }
 
 #[test]
-fn unoccluded_light_ignores_the_shadow_mode() {
-    // Also at a tenth of the light's size from it.
+fn unoccluded_light_ignores_shadow_mode() {
+    // Includes lights close to the receiver.
     for (height, size) in [(2.0, 0.5), (1.2, 1.0), (10.0, 0.3)] {
         for (name, build) in lights(height, size) {
             let values = |shadows: Shadows| build.clone().shadows(shadows, 4).values(256, 16);
@@ -55,7 +55,8 @@ fn unoccluded_light_ignores_the_shadow_mode() {
 
 #[test]
 fn metal_lobes_use_the_same_shadow_ray() {
-    // A light and its mirror image in a metal floor; a small ball in front of the light's center, and one elsewhere.
+    // A light and its reflection in a metal floor, with a small ball either in front of the light's center or
+    // elsewhere.
     let floor = |roughness: f32| {
         scene()
             .quad(v(-0.05, 0.0, 0.05), v(0.1, 0.0, 0.0), v(0.0, 0.0, -0.1), metal(0.9, roughness, 0.0))
@@ -71,32 +72,32 @@ fn metal_lobes_use_the_same_shadow_ray() {
             let build = lit(floor(roughness)).sphere(at, 0.02, matte(0.0)).shadows(shadows, 1);
             mean_and_error(&build.values(1024, 16))
         };
-        assert_eq!(with(middle * 0.5, Shadows::Hard).0, 0.0, "the center is hidden");
+        assert_eq!(with(middle * 0.5, Shadows::Hard).0, 0.0, "a hidden center must block all light");
         let beside = corner + v(0.0, 1.5, 1.9);
         for (name, (mean, error)) in [
-            ("another place is hidden", with(beside * 0.5, Shadows::Hard)),
+            ("off-center blocker", with(beside * 0.5, Shadows::Hard)),
             ("without shadows", with(middle * 0.5, Shadows::Off)),
         ] {
             let error = error.hypot(open.1);
-            assert!(error < 0.02 * open.0, "{name}: ± {error} of {}", open.0);
-            assert!((mean - open.0).abs() < 4.0 * error, "{name}: {mean}, {open:?}");
+            assert!(error < 0.02 * open.0, "{name}: too noisy: ± {error} of {}", open.0);
+            assert!((mean - open.0).abs() < 4.0 * error, "{name}: {mean}, unoccluded {open:?}");
         }
     }
 }
 
 #[test]
-fn hard_shadows_keep_the_light_of_a_close_light() {
-    // A square of side 1, a tenth above: E/L = 3.042128 from the closed form of a parallel rectangle.
+fn hard_shadows_are_exact_for_close_lights() {
+    // A unit square at a height of 0.1. E/L = 3.042128 from the closed form for a parallel rectangle.
     let corner = v(-0.5, 0.1, -0.5);
     let lamp = receiver(DVec3::ZERO, 0.8).quad(corner, v(1.0, 0.0, 0.0), v(0.0, 0.0, 1.0), emitter(1.0));
     let values = lamp.shadows(Shadows::Hard, 16).values(256, 16);
     let (mean, error) = mean_and_error(&values);
     let exact = 3.042_128 * 0.8 / std::f64::consts::PI;
-    assert!((mean - exact).abs() < 4.0 * error + 1e-4 * exact, "{mean} ± {error} is not {exact}");
+    assert!((mean - exact).abs() < 4.0 * error + 1e-4 * exact, "{mean} ± {error}, expected {exact}");
 }
 
 #[test]
-fn ray_to_the_center_decides() {
+fn center_ray_determines_visibility() {
     let lamp = |build: Build| {
         build
             .quad(v(-1.0, 2.0, -1.0), v(2.0, 0.0, 0.0), v(0.0, 0.0, 2.0), emitter(1.0))
@@ -108,7 +109,7 @@ fn ray_to_the_center_decides() {
         lamp(receiver(DVec3::ZERO, 0.8).quad(screen, v(0.4, 0.0, 0.0), v(0.0, 0.0, 0.4), matte(0.0))).value()
     };
     assert!(free > 0.0);
-    // In front of the center, and next to it, where soft shadows would be partial.
+    // In front of the center, and beside it, where soft shadows would be partial.
     assert_eq!(blocked(-0.2), 0.0);
     assert_eq!(blocked(0.05), free);
     assert_eq!(scene().value(), 0.0);
@@ -125,8 +126,8 @@ fn rays(build: &Build) -> u64 {
 }
 
 #[test]
-fn one_ray_decides_for_a_box_and_a_mesh() {
-    // Three faces of the cube are visible from the receiver next to it.
+fn box_and_mesh_use_a_single_shadow_ray() {
+    // Three faces of the cube are visible from the receiver.
     let center = v(0.5, 1.5, 0.4);
     let cube = |build: Build| {
         build.shape(Shape::Box { center, size: v(0.8, 0.8, 0.8), rotate: DVec3::ZERO }, emitter(1.0))
@@ -147,11 +148,11 @@ fn one_ray_decides_for_a_box_and_a_mesh() {
         };
         let all = value(free);
         assert!(all > 0.0, "{name}");
-        // On the way to the center, and on the way to the center of the lower face.
+        // In front of the cube's center, and in front of the center of its lower face.
         assert_eq!(value(hard(screen(center * 0.5))), 0.0, "{name}");
         let beside = value(hard(screen((center - v(0.0, 0.4, 0.0)) * 0.5)));
         assert_eq!(beside, all, "{name}");
         let soft = value(lamp(receiver(DVec3::ZERO, 0.8)).shadows(Shadows::Soft, 16));
-        assert!((soft / all - 1.0).abs() < 0.02, "{name}: {soft}, hard {all}");
+        assert!((soft / all - 1.0).abs() < 0.02, "{name}: soft {soft}, hard {all}");
     }
 }

@@ -1,4 +1,4 @@
-//! Many lights: sampling a few of them gives the light of all.
+//! Many lights: sampling a subset matches the sum of all lights.
 
 use glimt::film::Rect;
 use glimt::geometry::mesh::TriangleMesh;
@@ -12,13 +12,14 @@ use super::global::by_paths;
 use super::scenes::{AS_IT_IS, Build, emitter, glass, lat_long_sphere, matte, mirror, phong, scene, tile};
 use super::{Random, mean_and_error, v};
 
-/// Adds nearly dark lights, enough that vertices sample from all lights; black ones would be removed.
+/// Adds enough nearly black lights that vertices sample a subset of the lights. Black lights would be
+/// removed.
 fn with_dark_lights(build: Build) -> Build {
     (0..33).fold(build, |build, i| build.point_light(v(f64::from(i), 3.0, 0.0), 1e-20, Falloff::Square))
 }
 
-/// Checks that the means of all pixels agree within 5 standard errors over seeds, which are at most this fraction of
-/// them.
+/// Checks that the image means agree within 5 standard errors over seeds, and limits the standard error to a
+/// fraction of the mean.
 #[track_caller]
 fn assert_same(what: &str, a: &Build, b: &Build, (samples, seeds): (u32, u32), most_error: f64) {
     let means = |build: &Build| -> Vec<f64> {
@@ -33,11 +34,12 @@ fn assert_same(what: &str, a: &Build, b: &Build, (samples, seeds): (u32, u32), m
     };
     let ((a, of_a), (b, of_b)) = (mean_and_error(&means(a)), mean_and_error(&means(b)));
     let error = of_a.hypot(of_b);
-    assert!(error < most_error * b, "{what}: ± {error} of {b} is too noisy");
-    assert!((a - b).abs() < 5.0 * error + 1e-5 * b, "{what}: {a} ± {of_a} is not {b} ± {of_b}");
+    assert!(error < most_error * b, "{what}: too noisy: ± {error} of {b}");
+    assert!((a - b).abs() < 5.0 * error + 1e-5 * b, "{what}: {a} ± {of_a}, expected {b} ± {of_b}");
 }
 
-/// A floor with objects, seen by a few pixels from below the lights, whose edges would add most of the noise.
+/// A floor with objects in a small image. The camera is below the lights, because edges of visible lights
+/// would dominate the noise.
 fn room(floor: glimt::scene::description::Material) -> Build {
     scene()
         .quad(v(-4.0, 0.0, 4.0), v(8.0, 0.0, 0.0), v(0.0, 0.0, -8.0), floor)
@@ -46,7 +48,7 @@ fn room(floor: glimt::scene::description::Material) -> Build {
         .pictured(v(0.0, 1.3, 3.2), DVec3::ZERO, 30.0, 12, 12)
 }
 
-/// At least one light of each kind, at most 32.
+/// At least one light of each kind, at most 32 in total.
 fn every_kind(build: Build) -> Build {
     let at = v(1.5, 1.5, 1.0);
     let shaped = build
@@ -82,7 +84,7 @@ fn every_kind(build: Build) -> Build {
 }
 
 #[test]
-fn sampled_lights_of_every_kind_match_their_sum() {
+fn every_light_kind_matches_the_full_sum() {
     let build = every_kind(room(phong(0.4, 0.3, 200.0, 0.0)));
     let picked = with_dark_lights(build.clone());
     assert!(
@@ -105,7 +107,7 @@ fn sampled_lights_of_every_kind_match_their_sum() {
 }
 
 #[test]
-fn sampled_lights_in_glass_match_their_sum() {
+fn lights_in_glass_match_the_full_sum() {
     let build = every_kind(room(matte(0.5)).sphere(v(0.0, 0.5, 1.6), 0.5, glass(1.5))).quad(
         v(-2.0, 0.0, -2.5),
         v(4.0, 0.0, 0.0),
@@ -117,7 +119,7 @@ fn sampled_lights_in_glass_match_their_sum() {
     assert_same("path", &by_paths(picked, 4), &by_paths(build, 4), (32, 24), 1.5e-2);
 }
 
-/// A 2 × 2 area light over the floor, divided into `parts` × `parts` quads.
+/// A 2 × 2 area light above the floor, divided into `parts` × `parts` quads.
 fn divided_light(build: Build, parts: u32) -> Build {
     let side = 2.0 / f64::from(parts);
     (0..parts * parts).fold(build, |build, i| {
@@ -127,7 +129,7 @@ fn divided_light(build: Build, parts: u32) -> Build {
 }
 
 #[test]
-fn divided_light_gives_the_same_light() {
+fn divided_light_matches_whole_light() {
     for (what, floor, noise) in [("matte", matte(0.7), 1.0), ("sharp", phong(0.2, 0.6, 300.0, 0.0), 2.5)] {
         let [whole, cut] = [1, 32].map(|parts| divided_light(room(floor.clone()), parts));
         assert_same(&format!("whitted, {what}"), &cut, &whole, (64, 16), 3e-3 * noise);
@@ -135,9 +137,10 @@ fn divided_light_gives_the_same_light() {
     }
 }
 
-/// The lobes find most of the light; vertices sample each of the thousand lights about once in thirty times.
+/// Lobe samples find most of the light. Vertices sample each of the thousand lights about once in thirty
+/// times.
 #[test]
-fn divided_light_keeps_its_sharp_highlight() {
+fn divided_light_keeps_sharp_highlight() {
     let floor = phong(0.0, 0.8, 300.0, 0.0);
     let seen = scene()
         .quad(v(-4.0, 0.0, 4.0), v(8.0, 0.0, 0.0), v(0.0, 0.0, -8.0), floor)
@@ -147,7 +150,7 @@ fn divided_light_keeps_its_sharp_highlight() {
     assert_same("path", &by_paths(cut, 1), &by_paths(whole, 1), (64, 16), 6e-3);
 }
 
-/// Triangles of sizes from 1 to 100 over the floor, most of them facing down, some sideways.
+/// Triangles above the floor whose sizes vary by a factor of 100. Most of them face down.
 fn uneven_triangles(count: u32) -> Vec<[DVec3; 3]> {
     let mut random = Random(4);
     let triangle = |i: u32| {
@@ -161,7 +164,7 @@ fn uneven_triangles(count: u32) -> Vec<[DVec3; 3]> {
 }
 
 #[test]
-fn mesh_light_equals_its_separate_triangles() {
+fn mesh_light_matches_separate_triangles() {
     let triangles = uneven_triangles(3000);
     let rounded = |corner: DVec3| corner.as_vec3().as_dvec3();
     let alone = triangles
@@ -173,14 +176,14 @@ fn mesh_light_equals_its_separate_triangles() {
         ..TriangleMesh::default()
     };
     let mesh = room(matte(0.7)).mesh(mesh, AS_IT_IS, emitter(20.0));
-    assert!(mesh.world().lights.sampler(SamplingMode::Eye).is_none(), "a mesh is one light");
+    assert!(mesh.world().lights.sampler(SamplingMode::Eye).is_none(), "a mesh must be a single light");
     assert_same("whitted", &mesh.clone().shadows(Shadows::Soft, 8), &alone, (64, 16), 5e-3);
     assert_same("path", &by_paths(mesh, 2), &by_paths(alone, 2), (64, 24), 1e-2);
 }
 
 #[test]
-fn hundred_point_lights_give_their_sum() {
-    // E = Σ I·cos/d², radiance ρ·E/π: only the choice of lights is random.
+fn hundred_point_lights_match_their_sum() {
+    // E = Σ I·cos/d² and L = ρ·E/π. Only the choice of lights is random.
     let mut random = Random(9);
     let places: Vec<DVec3> =
         (0..100).map(|_| v(random.signed() * 2.0, 1.0 + random.unit(), random.signed() * 2.0)).collect();
@@ -192,10 +195,13 @@ fn hundred_point_lights_give_their_sum() {
     for (what, build) in [("whitted", lit.clone()), ("path", by_paths(lit, 1))] {
         let values = build.values(4, 64);
         let (mean, error) = mean_and_error(&values);
-        assert!(error < 2e-3 * exact, "{what}: {error} of {exact}");
-        assert!((mean - exact).abs() < 4.5 * error + 1e-5 * exact, "{what}: {mean} ± {error} is not {exact}");
-        // For points at which the tree examines every light, the selection is proportional to the irradiance: hardly
-        // any noise remains.
+        assert!(error < 2e-3 * exact, "{what}: too noisy: {error} of {exact}");
+        assert!(
+            (mean - exact).abs() < 4.5 * error + 1e-5 * exact,
+            "{what}: {mean} ± {error}, expected {exact}"
+        );
+        // Where the tree examines every light, the selection probability is proportional to irradiance, which
+        // leaves hardly any noise.
         assert!(error * 8.0 < 1e-3 * exact, "{what}: {}", error * 8.0 / exact);
     }
 }

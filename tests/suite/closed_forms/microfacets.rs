@@ -30,7 +30,7 @@ fn materials() -> Vec<(&'static str, Material)> {
     ]
 }
 
-/// A single ball of a material in a furnace of radiance 1, seen at its edge.
+/// A ball in a furnace with radiance 1, viewed at its edge.
 fn in_the_open(material: Material, depth: u32) -> Build {
     scene()
         .environment(1.0)
@@ -40,13 +40,13 @@ fn in_the_open(material: Material, depth: u32) -> Build {
 }
 
 #[test]
-fn white_plastic_vanishes_in_a_furnace() {
+fn white_plastic_is_invisible_in_a_furnace() {
     for roughness in [0.0, 0.05, 0.2, 0.5, 0.8, 1.0] {
         for at in [v(0.0, 0.0, -4.0), v(0.7, 0.0, -4.0), v(0.97, 0.0, -4.2)] {
             let build = in_the_open(plastic(1.0, roughness), 1).seen(DVec3::ZERO, at);
             for (what, build) in [("whitted", build.clone()), ("path", by_paths(build, 1))] {
                 let (mean, error) = mean_and_error(&build.values(2048, 16));
-                assert!(error < 5e-4, "{what}, roughness {roughness} at {at}: ± {error} is too noisy");
+                assert!(error < 5e-4, "{what}, roughness {roughness} at {at}: too noisy: ± {error}");
                 assert!(
                     (mean - 1.0).abs() < 2e-3 + 4.0 * error,
                     "{what}, roughness {roughness} at {at}: {mean}"
@@ -58,7 +58,7 @@ fn white_plastic_vanishes_in_a_furnace() {
 
 #[test]
 fn smooth_metal_follows_schlick() {
-    // Schlick: F0 + (1 − F0)(1 − cosθ)⁵ at 60°.
+    // Schlick's approximation is F0 + (1 − F0)(1 − cos θ)⁵, here at 60°.
     let build = scene()
         .environment(1.0)
         .quad(v(-1.0, -1.0, 1.0), v(2.0, 0.0, 0.0), v(0.0, 0.0, -2.0), metal(0.5, 0.0, 0.0))
@@ -73,11 +73,11 @@ fn techniques_agree_on_area_lights() {
     for (material, kind) in materials() {
         for (what, build) in lamps_over_a_floor(&kind) {
             let whitted = build.clone().depth(1);
-            // Without occluders the shadow mode changes nothing, and neither does the noise of narrow lobes.
+            // Without occluders, the shadow mode has no effect.
             let [off, hard] = [Shadows::Off, Shadows::Hard].map(|kind| whitted.clone().shadows(kind, 1));
             let path = mean_and_error(&by_paths(build, 1).values(512, 16));
             let others = [("whitted", &whitted, 512), ("unshadowed", &off, 512), ("hard", &hard, 512)];
-            // One of the two balls is in front of the other, and half of the sun is behind a ball.
+            // In these two cases, a ball occludes part of a light.
             let others = if ["two", "half a sun"].contains(&what) { &others[..1] } else { &others[..] };
             for &(technique, build, samples) in others {
                 let (mean, error) = mean_and_error(&build.values(samples, 16));
@@ -87,7 +87,7 @@ fn techniques_agree_on_area_lights() {
                     off < 5.0 * both + 1e-5 * mean,
                     "{material}, {what}: {technique} {mean}, path {path:?}, ± {both}"
                 );
-                assert!(both < 0.03 * mean, "{material}, {what}, {technique}: ± {both} of {mean}");
+                assert!(both < 0.03 * mean, "{material}, {what}, {technique}: too noisy: ± {both} of {mean}");
             }
         }
     }
@@ -95,7 +95,7 @@ fn techniques_agree_on_area_lights() {
 
 #[test]
 fn lobe_samples_find_area_lights() {
-    // Light samples do not find a light inside glass; without refraction, that glass changes nothing.
+    // Light samples cannot find a light inside glass. Glass without refraction has no other effect.
     for (material, kind) in materials() {
         let floor = scene()
             .quad(v(-0.05, 0.0, 0.05), v(0.1, 0.0, 0.0), v(0.0, 0.0, -0.1), kind)
@@ -105,29 +105,29 @@ fn lobe_samples_find_area_lights() {
         let hidden = by_paths(floor.sphere(at, 0.6, emitter(2.0)).sphere(at, 0.65, glass(1.0)), 3);
         let (both, lobes) = (mean_and_error(&lit.values(1024, 16)), mean_and_error(&hidden.values(4096, 16)));
         let error = both.1.hypot(lobes.1);
-        assert!(error < 0.02 * both.0, "{material}: {both:?}, {lobes:?}");
+        assert!(error < 0.02 * both.0, "{material}: too noisy: {both:?}, lobe samples {lobes:?}");
         assert!((both.0 - lobes.0).abs() < 5.0 * error, "{material}: {both:?}, lobe samples {lobes:?}");
     }
 }
 
 #[test]
 fn whitted_shows_reflections_in_rough_lobes() {
-    // The surface behind the lobe is a wide board that emits, or one that is lit.
+    // A wide, lit board is visible through the rough lobe.
     for (material, kind) in materials() {
         let build = scene()
             .quad(v(-0.05, 0.0, 0.05), v(0.1, 0.0, 0.0), v(0.0, 0.0, -0.1), kind)
             .quad(v(1.0, 0.0, -4.0), v(0.0, 0.0, 8.0), v(0.0, 4.0, 0.0), matte(0.7))
             .point_light(v(-3.0, 5.0, 0.0), 40.0, Falloff::Square)
             .seen(v(-0.1, 0.1, 0.02), DVec3::ZERO);
-        // Whitted lacks the light that the diffuse lobe scatters on: compare only the specular components.
+        // Whitted excludes indirect light from the diffuse lobe, so compare only the specular components.
         let part = |build: Build| mean_and_error(&build.viewed(View::Specular).values(1024, 16));
         let (whitted, path) = (part(build.clone().depth(2)), part(by_paths(build, 2)));
         if material == "smooth plastic" {
             continue;
         }
         let error = whitted.1.hypot(path.1);
-        assert!(error < 0.02 * path.0, "{material}: {whitted:?}, {path:?}");
-        assert!((whitted.0 - path.0).abs() < 5.0 * error, "{material}: {whitted:?}, path-traced {path:?}");
+        assert!(error < 0.02 * path.0, "{material}: too noisy: {whitted:?}, path {path:?}");
+        assert!((whitted.0 - path.0).abs() < 5.0 * error, "{material}: whitted {whitted:?}, path {path:?}");
     }
 }
 
@@ -166,7 +166,7 @@ fn rough_reflection_components_add_up() {
     for integrator in [Integrator::Whitted, Integrator::Path] {
         let build = build.clone().with(|scene| scene.render.integrator = integrator);
         let picture = |name: &str| {
-            let view = View::named(name).unwrap_or_else(|| panic!("there is no view {name}"));
+            let view = View::named(name).unwrap_or_else(|| panic!("unknown view {name}"));
             build.clone().viewed(view).picture(8, 3)
         };
         let parts = ["ambient", "diffuse", "specular", "emission"].map(picture);
@@ -180,7 +180,7 @@ fn rough_reflection_components_add_up() {
 
 #[test]
 fn round_metal_mesh_has_no_black_edge() {
-    // Where shading normals face away from the viewer, the reflection still shows the sky.
+    // Reflections still show the sky where shading normals face away from the viewer.
     let ball = lat_long_sphere(12, 16, 1.0, DVec3::ZERO);
     let build = scene()
         .environment(1.0)

@@ -1,4 +1,4 @@
-//! Mirrors, and the meaning of depth.
+//! Mirrors and the depth limit.
 
 use std::f64::consts::PI;
 
@@ -8,8 +8,8 @@ use glimt::scene::description::light::Falloff;
 use super::scenes::{Build, emitter, matte, mirror, scene};
 use super::{assert_close, v};
 
-/// Two mirrors y = 0 and y = 1 over x in [0, `length`]; a ray that rises at 45° from (−¼, ½) hits one of them at x = ¼,
-/// 1¼, 2¼, …
+/// Two mirrors at y = 0 and y = 1 with x in [0, `length`]. A ray that rises at 45° from (−¼, ½) hits them at
+/// x = ¼, 1¼, 2¼, …
 fn corridor(reflectance: f32, length: f64) -> Build {
     let side = |build: Build, y: f64| {
         build.quad(v(0.0, y, -1.0), v(length, 0.0, 0.0), v(0.0, 0.0, 2.0), mirror(reflectance))
@@ -18,25 +18,26 @@ fn corridor(reflectance: f32, length: f64) -> Build {
 }
 
 #[test]
-fn the_nth_image_is_the_nth_power() {
+fn nth_reflection_has_nth_power_of_reflectance() {
     for n in [1_u32, 2, 5, 10, 40] {
         let length = f64::from(n) - 0.5;
         let seen = corridor(0.9, length).background(1.0);
         let exact = f64::from(0.9_f32).powi(n as i32);
-        assert_close(&format!("{n} images of the sky"), seen.clone().depth(n).value(), exact);
+        assert_close(&format!("{n} reflections of the sky"), seen.clone().depth(n).value(), exact);
         assert_eq!(seen.depth(n - 1).value(), 0.0);
-        // At the end of the corridor, an emitter that faces back, z × y = −x, and one that faces away.
+        // An emitter at the end of the corridor that faces the camera (z × y = −x), and one that faces away.
         let (z, y) = (v(0.0, 0.0, 18.0), v(0.0, 18.0, 0.0));
         let seen =
             |u, w| corridor(0.9, length).quad(v(length, -9.0, -9.0), u, w, emitter(2.0)).depth(n).value();
-        assert_close(&format!("{n} images of a light"), seen(z, y), 2.0 * exact);
+        assert_close(&format!("{n} reflections of a light"), seen(z, y), 2.0 * exact);
         assert_eq!(seen(y, z), 0.0);
     }
 }
 
 #[test]
-fn mirror_and_direct_light_count_as_one_bounce() {
-    // In the mirror floor the camera sees the ceiling at x = 2, lit by a point light 2 below it: E = 8/4, L = r·ρE/π.
+fn mirrors_and_direct_light_count_as_bounces() {
+    // The camera sees the ceiling at x = 2 in a mirror floor. A point light 2 units below it has E = 8/4, so
+    // L = r·ρE/π.
     let seen = scene()
         .quad(v(-5.0, 0.0, 5.0), v(10.0, 0.0, 0.0), v(0.0, 0.0, -10.0), mirror(0.8))
         .quad(v(-5.0, 4.0, -5.0), v(10.0, 0.0, 0.0), v(0.0, 0.0, 10.0), matte(0.5))
@@ -44,12 +45,12 @@ fn mirror_and_direct_light_count_as_one_bounce() {
         .seen(v(-1.0, 2.0, 0.0), DVec3::ZERO);
     assert_eq!(seen.clone().depth(0).value(), 0.0);
     assert_eq!(seen.clone().depth(1).value(), 0.0);
-    assert_close("by the mirror", seen.depth(2).value(), 0.8 * 0.5 * 2.0 / PI);
+    assert_close("in the mirror", seen.depth(2).value(), 0.8 * 0.5 * 2.0 / PI);
 }
 
 #[test]
 fn lossless_mirror_under_a_sky_is_invisible() {
-    // Each reflected ray ends in the sky, L = 1, however many mirrors it has hit.
+    // Every ray ends in the sky with L = 1, regardless of the number of reflections.
     let seen = scene()
         .sphere(v(-1.0, 0.0, -5.0), 1.0, mirror(1.0))
         .sphere(v(1.0, 0.0, -5.0), 1.0, mirror(1.0))

@@ -1,4 +1,4 @@
-//! The renderer against closed forms: each comment derives the correct result.
+//! Rendered values against closed forms, which are derived in comments.
 
 mod bodies;
 mod bumps;
@@ -50,23 +50,24 @@ pub fn mean_and_error(values: &[f64]) -> (f64, f64) {
     (mean, (variance / n).sqrt())
 }
 
-/// Checks |mean − exact| ≤ max(3·SE, 1e-5·exact), with the mean over seeds.
+/// Checks that |mean − exact| ≤ max(3·SE, 1e-5·exact), where mean and SE are over seeds.
 #[track_caller]
 pub fn assert_mean(what: &str, values: &[f64], exact: f64) {
     assert!(values.len() >= 16, "too few seeds");
     let (mean, error) = mean_and_error(values);
     let allowed = (3.0 * error).max(1e-5 * exact.abs());
-    assert!((mean - exact).abs() <= allowed, "{what}: {mean} ± {error} is not {exact}");
+    assert!((mean - exact).abs() <= allowed, "{what}: {mean} ± {error}, expected {exact}");
 }
 
-/// Checks that a value is exact within 1e-5.
+/// Checks that a value is exact to within a relative error of 1e-5.
 #[track_caller]
 pub fn assert_close(what: &str, value: f64, exact: f64) {
-    assert!((value - exact).abs() <= 1e-5 * exact.abs(), "{what}: {value} is not {exact}");
+    assert!((value - exact).abs() <= 1e-5 * exact.abs(), "{what}: {value}, expected {exact}");
 }
 
-/// Irradiance per radiance of an unoccluded polygon above the horizon, in any orientation: ½·|Σ Θᵢ(Γᵢ·n)|, with Θᵢ the
-/// angle that an edge subtends and Γᵢ the unit normal of its plane through the point (Lambert, *Photometria*, 1760).
+/// Irradiance from an unoccluded polygon of unit radiance above the horizon, in any orientation: ½·|Σ
+/// Θᵢ(Γᵢ·n)|, where Θᵢ is the angle subtended by an edge and Γᵢ the unit normal of the plane through the edge
+/// and the point (Lambert, *Photometria*, 1760).
 pub fn lambert(point: DVec3, normal: DVec3, polygon: &[DVec3]) -> f64 {
     let corners: Vec<DVec3> = polygon.iter().map(|&corner| (corner - point).normalize()).collect();
     let edges = corners.iter().zip(corners.iter().cycle().skip(1));
@@ -77,7 +78,7 @@ pub fn lambert(point: DVec3, normal: DVec3, polygon: &[DVec3]) -> f64 {
     (0.5 * sum.sum::<f64>()).abs()
 }
 
-/// A small random generator to aim rays with.
+/// A small random number generator for aiming rays.
 pub struct Random(pub u64);
 
 impl Random {
@@ -92,7 +93,7 @@ impl Random {
         2.0 * self.unit() - 1.0
     }
 
-    /// A uniform direction.
+    /// A uniformly distributed direction.
     pub fn direction(&mut self) -> DVec3 {
         let (z, phi) = (self.signed(), std::f64::consts::TAU * self.unit());
         let r = (1.0 - z * z).sqrt();

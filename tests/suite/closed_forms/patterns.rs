@@ -13,7 +13,7 @@ use super::direct::{assert_hard, assert_irradiance, at_origin};
 use super::scenes::{AS_IT_IS, Build, emitter, phong};
 use super::{assert_close, lambert, mean_and_error, v};
 
-/// Adds a gray texture with these values, rows from the top.
+/// Adds a gray texture with the given values, top row first.
 fn grays(build: &mut Build, rows: &[&[f32]], filter: TextureFilter, repeat: Vec2) -> usize {
     let rows: Vec<Vec<Vec3>> = rows.iter().map(|row| row.iter().map(|x| Vec3::splat(*x)).collect()).collect();
     let rows: Vec<&[Vec3]> = rows.iter().map(Vec::as_slice).collect();
@@ -31,17 +31,17 @@ fn by_paths(build: &Build) -> Build {
 
 const CHECKER: [&[f32]; 2] = [&[5.0, 0.0], &[1.0, 3.0]];
 
-/// Corner of the light above the origin, with u × v pointing down.
+/// Corner of the light above the origin; u × v points down.
 const CORNER: DVec3 = v(-0.7, 1.0, -0.4);
 const U: DVec3 = v(1.5, 0.2, 0.0);
 const V: DVec3 = v(0.0, 0.1, 1.2);
 
-/// Irradiance E of the checkered light, each square with Lambert's formula.
+/// Irradiance E from the checkered light, using Lambert's formula for each square.
 fn by_squares(scale: f64) -> f64 {
     let mut irradiance = 0.0;
     for (row, values) in CHECKER.iter().enumerate() {
         for (column, value) in values.iter().enumerate() {
-            // Rows are counted from the top, v from the bottom.
+            // Rows start at the top, v at the bottom.
             let at = CORNER + U * (0.5 * column as f64) + V * (0.5 - 0.5 * row as f64);
             let (s, t) = (U * 0.5, V * 0.5);
             let form = lambert(DVec3::ZERO, DVec3::Y, &[at, at + s, at + s + t, at + t]);
@@ -52,14 +52,14 @@ fn by_squares(scale: f64) -> f64 {
 }
 
 #[test]
-fn checkered_quad_light_sums_its_squares() {
+fn checkered_quad_light_matches_its_squares() {
     let mut lit = at_origin();
     let texture = grays(&mut lit, &CHECKER, TextureFilter::Nearest, Vec2::ONE);
     let lit = lit.quad(CORNER, U, V, shining(texture, 2.0));
     assert_irradiance("whitted", &lit, by_squares(2.0));
     assert_irradiance("path", &by_paths(&lit), by_squares(2.0));
-    assert_hard("one ray decides", &lit, by_squares(2.0));
-    // Mirrored, in a different place: no texel from elsewhere counts.
+    assert_hard("hard shadows", &lit, by_squares(2.0));
+    // A mirrored texture must change the result.
     let half = lit.with(|scene| scene.textures[0].repeat = Vec2::new(-1.0, 1.0));
     let turned = half.values(256, 64);
     let (mean, error) = mean_and_error(&turned);
@@ -67,7 +67,7 @@ fn checkered_quad_light_sums_its_squares() {
 }
 
 #[test]
-fn checkered_mesh_light_sums_its_squares() {
+fn checkered_mesh_light_matches_its_squares() {
     for (mirror, order) in [(1.0, [0, 1, 2, 3]), (-1.0, [0, 3, 2, 1])] {
         let corners = [CORNER, CORNER + U, CORNER + U + V, CORNER + V];
         let uvs = [Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y];
@@ -86,7 +86,7 @@ fn checkered_mesh_light_sums_its_squares() {
     }
 }
 
-/// Irradiance E at the origin, facing up, over a cosine-weighted hemisphere.
+/// Irradiance E at the origin, facing up, integrated over a cosine-weighted hemisphere.
 fn by_directions(build: &Build) -> f64 {
     const RINGS: u32 = 1500;
     let world = build.world();
@@ -110,7 +110,7 @@ fn by_directions(build: &Build) -> f64 {
 }
 
 #[test]
-fn every_shape_emits_its_texture_in_place() {
+fn every_shape_maps_its_emission_texture() {
     let (p, q) = (v(0.4, 1.1, 0.3), v(-0.3, 0.7, -0.2));
     let shapes = [
         ("sphere", Shape::Sphere { center: p, radius: 0.5 }),
@@ -128,18 +128,18 @@ fn every_shape_emits_its_texture_in_place() {
         let texture = grays(&mut lit, &rows, TextureFilter::Bilinear, Vec2::new(2.0, 3.0));
         let lit = lit.shape(shape, shining(texture, 1.0));
         let exact = 0.7 * by_directions(&lit) / PI;
-        assert!(exact > 0.01, "{name} is too dim");
+        assert!(exact > 0.01, "{name} too dim");
         for (how, lit) in [("whitted", lit.clone()), ("path", by_paths(&lit))] {
             let (mean, error) = mean_and_error(&lit.values(256, 64));
-            assert!(error < 0.01 * exact, "{name}, {how}: ± {error} of {exact}");
+            assert!(error < 0.01 * exact, "{name}, {how}: too noisy: ± {error} of {exact}");
             let allowed = 4.9 * error + 1e-3 * exact;
-            assert!((mean - exact).abs() < allowed, "{name}, {how}: {mean} ± {error} is not {exact}");
+            assert!((mean - exact).abs() < allowed, "{name}, {how}: {mean} ± {error}, expected {exact}");
         }
     }
 }
 
 #[test]
-fn constant_emission_texture_equals_its_color() {
+fn constant_emission_texture_matches_color() {
     let plain = at_origin().quad(CORNER, U, V, emitter(3.0));
     for filter in [TextureFilter::Nearest, TextureFilter::Bilinear, TextureFilter::Mipmap] {
         let mut lit = at_origin();
@@ -147,7 +147,7 @@ fn constant_emission_texture_equals_its_color() {
         let lit = lit.quad(CORNER, U, V, shining(texture, 4.0));
         for (lit, plain) in [(lit.clone(), plain.clone()), (by_paths(&lit), by_paths(&plain))] {
             for (value, exact) in lit.values(16, 8).into_iter().zip(plain.values(16, 8)) {
-                assert_close("as the color", value, exact);
+                assert_close("same as the color", value, exact);
             }
             // The camera sees the same radiance.
             let seen = |build: Build| build.seen(v(0.1, 0.0, 0.1), CORNER + U * 0.5 + V * 0.5).value();
@@ -164,7 +164,7 @@ fn black_emission_texture_emits_nothing() {
 }
 
 #[test]
-fn light_power_follows_the_mean_of_its_texture() {
+fn light_power_follows_mean_of_texture() {
     let strength = |build: &Build| {
         let world = build.world();
         let bounds = world.lights.iter().filter_map(|(_, light)| light.bounds());
@@ -177,7 +177,7 @@ fn light_power_follows_the_mean_of_its_texture() {
     assert_close("power", strength(&patterned), strength(&plain));
 }
 
-/// Adds enough lights that vertices sample some of them.
+/// Uses enough lights that vertices sample only some of them.
 #[test]
 fn sampled_lights_keep_their_textures() {
     let mut build = at_origin();

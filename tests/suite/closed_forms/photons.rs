@@ -1,4 +1,4 @@
-//! Photon-mapped light, against closed forms and path tracing.
+//! Photon mapping against closed forms and path tracing.
 
 use std::f64::consts::PI;
 use std::ops::Range;
@@ -17,7 +17,7 @@ use super::global::{assert_near, by_paths};
 use super::scenes::{AS_IT_IS, Build, emitter, file_material, glass, matte, mirror, phong, scene};
 use super::{mean_and_error, v};
 
-/// A box of quads with inward fronts.
+/// A box of inward-facing quads.
 fn room(material: impl Fn() -> glimt::scene::description::Material) -> Build {
     let (low, side) = (-1.0, 2.0);
     let (x, y, z) = (v(side, 0.0, 0.0), v(0.0, side, 0.0), v(0.0, 0.0, side));
@@ -32,16 +32,16 @@ fn room(material: impl Fn() -> glimt::scene::description::Material) -> Build {
         .seen(v(0.1, 0.2, -0.3), v(0.3, -1.0, 0.2))
 }
 
-/// A point light in the center of a small glass ball. All of its light leaves straight through the surface, so it
-/// arrives only through glass. Radiance in glass is divided by n²; outside the intensity is 1.
+/// A point light in the center of a small glass ball, so that all light arrives through glass, without
+/// refraction. Radiance in glass is divided by n²; outside, the intensity is 1.
 fn in_glass(build: Build, at: DVec3) -> Build {
     build.point_light(at, 1.0 / (1.5 * 1.5), Falloff::Square).sphere(at, 0.05, glass(1.5))
 }
 
 #[test]
-fn stored_photons_carry_the_emitted_power() {
-    // All of Φ arrives through glass, each photon once; the walls reflect ρ·Φ in the same number of hits, with variance
-    // ρ·(1 − ρ).
+fn stored_photons_carry_emitted_power() {
+    // All of Φ arrives through glass, and every photon is stored once. The walls reflect a fraction ρ of the
+    // photons and of Φ, with variance ρ·(1 − ρ).
     for (reflectance, count) in [(0.5_f64, 40_000_u32), (0.8, 40_000)] {
         let build = in_glass(room(|| matte(reflectance as f32)), v(0.2, -0.1, 0.3)).depth(10_000);
         let (world, token) = (build.world(), CancelToken::new());
@@ -76,10 +76,10 @@ fn no_photons_without_mirrors_or_glass() {
 
 #[test]
 fn integrating_sphere_has_uniform_photon_light() {
-    // R = 1, I = 1 W/sr at x = .5, ρ = .5: indirect irradiance 1; L = ρ/π·(1 + I·cos/d²). Without glass, camera paths
-    // find the light; in glass, photons do.
+    // R = 1, ρ = 0.5, and I = 1 W/sr at x = 0.5. The indirect irradiance is 1, so L = ρ/π·(1 + I·cos/d²).
+    // Camera paths find the bare light, photons the light in glass.
     let at = v(0.5, 0.0, 0.0);
-    // The kernel radius is as wide as the variation of the irradiance allows.
+    // Use the largest kernel radius that the variation of irradiance allows.
     for (to, exact, radius) in
         [(v(1.0, 0.0, 0.0), 0.795_774_715_5, 0.06), (v(-1.0, 0.0, 0.0), 0.229_890_473_4, 0.16)]
     {
@@ -92,7 +92,7 @@ fn integrating_sphere_has_uniform_photon_light() {
 }
 
 #[test]
-fn photon_furnace_sums_its_bounces_up_to_depth() {
+fn photon_furnace_sums_bounces_up_to_depth() {
     // L = E·(1 + ρ + … + ρᵏ).
     let reflectance = 0.5_f64;
     for depth in [0, 1, 2, 3, 8] {
@@ -103,9 +103,9 @@ fn photon_furnace_sums_its_bounces_up_to_depth() {
 }
 
 #[test]
-fn furnace_with_a_glowing_ball_in_glass_is_even() {
-    // Every surface emits 1 − ρ and reflects ρ; the ball in the glass has ρ = 0. The radiance is 1 everywhere. A third
-    // of it comes from that ball through the glass, carried by photons.
+fn furnace_with_emitter_in_glass_is_uniform() {
+    // Every surface emits 1 − ρ and reflects ρ, so the radiance is 1 everywhere. The ball in the glass has ρ
+    // = 0. Photons carry a third of the energy, from this ball through the glass.
     let reflectance = 0.9;
     let furnace = room(|| phong(reflectance, 0.0, 1.0, 1.0 - reflectance))
         .sphere(v(0.0, 0.0, -0.4), 0.2, emitter(1.0))
@@ -120,7 +120,7 @@ fn furnace_with_a_glowing_ball_in_glass_is_even() {
     }
 }
 
-/// A room with an area light, a mirror ball and a glass ball, seen as a whole.
+/// A view of a whole room with an area light, a mirror ball and a glass ball.
 fn caustics(depth: u32) -> Build {
     let white = || matte(0.7);
     let mut build = room(white);
@@ -137,7 +137,7 @@ fn mean(picture: &[DVec3]) -> f64 {
     picture.iter().map(|c| c.x).sum::<f64>() / picture.len() as f64
 }
 
-/// A room lit only through the glass around its light, with a glossy floor and a mirror ball.
+/// A room with a glossy floor and a mirror ball, lit only by a light inside glass.
 fn caustics_alone(depth: u32) -> Build {
     let mut build = room(|| matte(0.7));
     build.scene.objects.remove(3);
@@ -150,7 +150,7 @@ fn caustics_alone(depth: u32) -> Build {
         .depth(depth)
 }
 
-/// Means of path-traced and photon-mapped images, with their standard errors.
+/// Means and standard errors of path-traced and photon-mapped images.
 pub fn both(build: &Build, depth: u32, samples: [u32; 2], (count, radius): (u64, f64)) -> [(f64, f64); 2] {
     let means = |build: &Build, samples| -> (f64, f64) {
         let means: Vec<f64> = (0..16).map(|seed| mean(&build.picture(samples, seed))).collect();
@@ -160,13 +160,13 @@ pub fn both(build: &Build, depth: u32, samples: [u32; 2], (count, radius): (u64,
     [means(&by_paths(build.clone(), depth), samples[0]), means(&by_photons, samples[1])]
 }
 
-/// Checks that both methods give the same light: within 4 standard errors, which are at most this fraction of it, and
-/// some slack for kernels at edges.
+/// Checks that both methods agree within 4 standard errors plus some slack for kernels at edges, and limits
+/// the standard error to a fraction of the mean.
 #[track_caller]
 pub fn assert_same_light(what: &str, [(a, da), (b, db)]: [(f64, f64); 2], most_error: f64, slack: f64) {
     let error = da.hypot(db);
-    assert!(error < most_error * a, "{what}: {error} of {a}");
-    assert!((a - b).abs() < 4.0 * error + slack * a, "{what}: {b} ± {db}, path-traced {a} ± {da}");
+    assert!(error < most_error * a, "{what}: too noisy: ± {error} of {a}");
+    assert!((a - b).abs() < 4.0 * error + slack * a, "{what}: photons {b} ± {db}, path {a} ± {da}");
 }
 
 #[test]
@@ -178,7 +178,7 @@ fn photons_match_path_at_every_depth() {
 }
 
 #[test]
-fn photons_match_path_with_light_only_by_glass() {
+fn photons_match_path_with_light_in_glass() {
     for depth in [2, 3, 6] {
         let means = both(&caustics_alone(depth), depth, [128, 16], (10_000, 0.01));
         assert_same_light(&format!("depth {depth}"), means, 1e-2, 3e-3);
@@ -187,8 +187,8 @@ fn photons_match_path_with_light_only_by_glass() {
 
 #[test]
 fn photons_match_path_on_smooth_meshes() {
-    // A wall whose shading normals tilt towards the floor; about half of the light that its facets would reflect
-    // reaches the floor.
+    // A wall with shading normals tilted toward the floor. The floor receives about half of the light that a
+    // wall without tilted normals would reflect onto it.
     let wall = TriangleMesh {
         positions: vec![
             Vec3::new(-1.0, 0.0, -0.5),
@@ -213,9 +213,9 @@ fn photons_match_path_on_smooth_meshes() {
 }
 
 #[test]
-fn sun_lights_the_ground_under_water() {
-    // The ground under an infinite plane of water receives E·cosᵢ·T; light it reflects back from the surface takes
-    // another bounce.
+fn sun_lights_ground_under_water() {
+    // The ground under an infinite plane of water receives E·cosᵢ·T. Light that returns to the ground from
+    // the water surface exceeds the depth limit.
     let water = || glass(1.33);
     let angle = 40.0_f64.to_radians();
     let to_sun = v(angle.sin(), angle.cos(), 0.0);
@@ -226,20 +226,20 @@ fn sun_lights_the_ground_under_water() {
         .depth(3)
         .photons(20_000, 0.3);
     let (mean, error) = mean_and_error(&sun(ground, -to_sun, 1.0, 0.0).values(8, 16));
-    // The camera is under water as well: it sees radiance over n².
+    // The camera is also under water, where it sees radiance/n².
     let inside = (angle.sin() / 1.33).asin();
     let (i, t) = (angle.cos(), inside.cos());
     let (s, p) = ((i - 1.33 * t) / (i + 1.33 * t), (1.33 * i - t) / (1.33 * i + t));
     let passed = 1.0 - 0.5 * (s * s + p * p);
     let exact = angle.cos() * passed * 0.5 / PI / (1.33 * 1.33);
     assert!(error < 1e-2 * exact, "{mean} ± {error}");
-    assert!((mean - exact).abs() < 4.0 * error + 5e-3 * exact, "{mean} ± {error} is not {exact}");
+    assert!((mean - exact).abs() < 4.0 * error + 5e-3 * exact, "{mean} ± {error}, expected {exact}");
 }
 
 #[test]
 fn ball_lens_casts_the_analytic_caustic() {
-    // n = 1.5, R = 1, light along the axis, through two surfaces: E/E₀ on the plane z = 3 at two distances from the
-    // axis.
+    // E/E₀ on the plane z = 3 at two distances from the axis, for light along the axis through a ball with n
+    // = 1.5 and R = 1.
     for (distance, exact) in [(0.206_407_1, 0.813_230_5), (0.456_371_9, 0.552_326_4)] {
         let (x, y) = (0.6 * distance, 0.8 * distance);
         let lens = scene()
@@ -253,14 +253,14 @@ fn ball_lens_casts_the_analytic_caustic() {
         assert!(error < 0.02 * exact, "{mean} ± {error}");
         assert!(
             (mean - exact).abs() < 4.0 * error + 4e-3 * exact,
-            "at {distance}: {mean} ± {error} is not {exact}"
+            "at {distance}: {mean} ± {error}, expected {exact}"
         );
     }
 }
 
 #[test]
 fn photons_do_not_leak_through_a_thin_wall() {
-    // A quad in front of a light and a mirror, which lights it a second time.
+    // A wall lit by a light and by its reflection in a mirror.
     let wall = scene().quad(v(-1.0, -1.0, 0.0), v(2.0, 0.0, 0.0), v(0.0, 2.0, 0.0), matte(0.8));
     let mirrored = wall.quad(v(-1.0, -1.0, 1.0), v(2.0, 0.0, 0.0), v(0.0, 2.0, 0.0), mirror(0.9));
     let lit = mirrored.point_light(v(0.2, 0.3, 0.5), 1.0, Falloff::Square).depth(8).photons(4000, 0.3);
@@ -269,15 +269,15 @@ fn photons_do_not_leak_through_a_thin_wall() {
         mean(&seen.values(16, 4).iter().map(|&x| DVec3::splat(x)).collect::<Vec<_>>())
     };
     let (bright, dark) = (caustic(v(0.1, 0.2, 0.9)), caustic(v(0.1, 0.2, -0.9)));
-    // From the light's mirror image, (.2, .3, 1.5): .8/π·.9·cos/d².
+    // The light's mirror image is at (0.2, 0.3, 1.5): L = 0.8/π·0.9·cos/d².
     let squared = (v(0.2, 0.3, 1.5) - v(0.3, -0.4, 0.0)).length_squared();
     let exact = 0.8 / PI * 0.9 * 1.5 * squared.powf(-1.5);
-    assert!((bright / exact - 1.0).abs() < 0.08, "{bright} is not {exact}");
+    assert!((bright / exact - 1.0).abs() < 0.08, "{bright}, expected {exact}");
     assert_eq!(dark, 0.0);
 }
 
 #[test]
-fn photon_bits_ignore_threads_and_tiles() {
+fn photons_do_not_depend_on_threads_or_tiles() {
     let build = caustics(6).photons(5000, 0.0);
     let (world, settings, token) = (build.world(), build.settings(2), CancelToken::new());
     let of_photons = settings.photons.expect("photons are on");
@@ -306,7 +306,7 @@ fn photon_bits_ignore_threads_and_tiles() {
     };
     let whole = Rect { x: 0, y: 0, width: 16, height: 16 };
     let at_once = render(&all, whole, 0..4);
-    // Parts of the samples, with photon maps of only those samples.
+    // Sample ranges, with photon maps for only these samples.
     for cuts in [&[0, 1, 2, 3, 4][..], &[0, 1, 4], &[0, 3, 4]] {
         for part in cuts.windows(2) {
             let samples = part[0]..part[1];
@@ -321,7 +321,7 @@ fn photon_bits_ignore_threads_and_tiles() {
             assert_eq!(render(&maps, whole, samples.clone()), own, "samples {samples:?}");
         }
     }
-    // Only rows of pixels.
+    // Single rows of pixels.
     for y in 0..16 {
         let row = render(&all, Rect { x: 0, y, width: 16, height: 1 }, 0..4);
         assert_eq!(row, at_once[64 * y as usize..][..64], "row {y}");
@@ -329,8 +329,8 @@ fn photon_bits_ignore_threads_and_tiles() {
 }
 
 #[test]
-fn photons_are_aimed_at_meshes_of_file_glass() {
-    // The mesh fills about a hundredth of the light's field of view.
+fn photons_are_aimed_at_glass_from_mesh_file() {
+    // The mesh covers about 1 % of the directions from the light.
     let mesh = boxes(&[(DVec3::ZERO, 0.4, 0)]);
     let build = room(|| matte(0.5))
         .own_mesh(mesh, vec![file_material(9, 1.5)])

@@ -1,4 +1,4 @@
-//! Rays that leave surfaces, aim at edges, are huge, tiny or NaN.
+//! Robustness: rays leaving surfaces or aimed at edges, extreme scales, and NaN.
 
 use glimt::choice::Choice;
 use glimt::control::CancelToken;
@@ -18,14 +18,14 @@ use glimt::world::{Geometry, Hit};
 use super::scenes::{AS_IT_IS, Build, emitter, glass, lat_long_sphere, matte, mirror, phong, scene};
 use super::{Random, v};
 
-/// The surface hit by a ray from outside towards a point.
+/// The surface hit by a ray from outside toward a point.
 fn aimed(geometry: &Geometry, random: &mut Random, at: DVec3, far: f64) -> Option<SurfacePoint> {
     let origin = (at + random.direction() * far).as_vec3();
     let ray = Ray::new(origin, (at - origin.as_dvec3()).as_vec3().normalize());
     geometry.closest(&ray).map(|hit| geometry.surface(&ray, &hit))
 }
 
-/// A ray from a surface into the half-space of `side`, often close to its border.
+/// A ray from a surface into the hemisphere around `side`, often at a grazing angle.
 pub fn leaving(random: &mut Random, surface: &SurfacePoint, side: Vec3) -> Ray {
     let across = random.direction();
     let n = side.as_dvec3();
@@ -34,7 +34,7 @@ pub fn leaving(random: &mut Random, surface: &SurfacePoint, side: Vec3) -> Ray {
     Ray::new(offset_origin(surface.point, surface.error, surface.normal, direction), direction)
 }
 
-/// Number of tries in which a ray leaves a convex shape outwards and hits it again.
+/// Counts rays that leave a convex shape outward but hit it again. Returns this count and the number of rays.
 pub fn self_hits(build: &Build, random: &mut Random, center: DVec3, size: f64, tries: u32) -> (u32, u32) {
     let world = build.world();
     let (mut hits, mut tried) = (0, 0);
@@ -48,7 +48,7 @@ pub fn self_hits(build: &Build, random: &mut Random, center: DVec3, size: f64, t
     (hits, tried)
 }
 
-/// Positions within 10⁶ in every direction, the first such that the shape passes near the origin.
+/// Random positions up to 10⁶ from the origin. The first ones place the shape's surface near the origin.
 pub fn places(random: &mut Random, size: f64) -> Vec<DVec3> {
     let mut places = vec![v(0.0, -size, 0.0), random.direction() * size, DVec3::ZERO];
     for far in [1.0, 1e2, 1e4, 1e6] {
@@ -60,8 +60,8 @@ pub fn places(random: &mut Random, size: f64) -> Vec<DVec3> {
 }
 
 #[test]
-fn no_convex_shape_hits_itself() {
-    // A convex body lies on one side of its tangent plane: a ray that leaves on the other side never hits it.
+fn convex_shapes_do_not_self_hit() {
+    // A convex shape lies on one side of its tangent plane, so a ray leaving on the other side never hits it.
     let mut random = Random(11);
     for size in [1e-3, 1.0, 1e3, 1e6] {
         for center in places(&mut random, size) {
@@ -87,14 +87,15 @@ fn no_convex_shape_hits_itself() {
             ];
             for (what, build) in shapes {
                 let (hits, tried) = self_hits(&build, &mut random, center, size, 4000);
-                assert!(tried > 0, "{what} of size {size} at {center} is never hit");
+                assert!(tried > 0, "no ray hits {what} of size {size} at {center}");
                 assert_eq!(hits, 0, "of {tried} rays, {what} of size {size} at {center}");
             }
         }
     }
 }
 
-/// A room from −size/2 to size/2: its corners, and its walls as corner indices in order as seen from inside.
+/// A room from −size/2 to size/2. Returns its corners, and its walls as corner indices in the order seen from
+/// inside.
 fn room(size: DVec3) -> ([DVec3; 8], [[usize; 4]; 6]) {
     let corner = |i: usize| {
         size * (DVec3::new((i & 1) as f64, (i >> 1 & 1) as f64, (i >> 2 & 1) as f64) - DVec3::splat(0.5))
@@ -103,7 +104,7 @@ fn room(size: DVec3) -> ([DVec3; 8], [[usize; 4]; 6]) {
     (std::array::from_fn(corner), walls)
 }
 
-/// The room as one mesh of twelve triangles.
+/// The room as a mesh of twelve triangles.
 fn room_of_triangles(size: DVec3) -> TriangleMesh {
     let (corners, walls) = room(size);
     let triangles = |[a, b, c, d]: [usize; 4]| [[a, b, c], [a, c, d]].map(|three| three.map(|i| i as u32));
@@ -116,8 +117,8 @@ fn room_of_triangles(size: DVec3) -> TriangleMesh {
 
 #[test]
 fn no_ray_escapes_through_room_edges() {
-    // Rays go to walls very close to edges and corners, and from there in any inward direction: they must hit another
-    // wall.
+    // Trace rays to points on the walls very close to edges and corners, and from there in a random inward
+    // direction. All of them must hit another wall.
     let mut random = Random(29);
     for size in [v(1.0, 1.0, 1.0), v(8.0, 0.4, 2.0), v(200.0, 0.02, 0.02), v(3e-3, 5e-3, 4e-3)] {
         let small = size.min_element();
@@ -154,33 +155,37 @@ fn no_ray_escapes_through_room_edges() {
                     tried += 1;
                     lost += u32::from(world.geometry.closest(&next).is_none());
                 }
-                assert!(tried > 2000 && lost == 0, "{lost} of {tried}: {size} at {place}, {angles}");
+                assert!(
+                    tried > 2000 && lost == 0,
+                    "{lost} of {tried} rays escaped: {size} at {place}, {angles}"
+                );
             }
         }
     }
 }
 
-/// A cylinder around the center whose half axis is across or along `middle`, so that its side passes through the
-/// origin.
+/// A cylinder centered at `middle` with its half axis across or along `middle`, so that its surface passes
+/// through the origin.
 fn bar(middle: DVec3, towards: DVec3, radius: f64) -> Shape {
     let flat = towards - middle * (middle.dot(towards) / middle.length_squared());
     let half = if flat.length() > 1e-6 * towards.length() { flat } else { middle };
     Shape::Cylinder { a: middle - half, b: middle + half, radius, caps: true }
 }
 
-/// A cone whose side passes through the origin: its tip is up along a tangent, its base on the other side.
+/// A cone whose side passes through the origin. The tip is up along a tangent, and the base is on the other
+/// side of the origin.
 fn cone_through_origin(normal: DVec3, towards: DVec3, radius: f64) -> Shape {
     let down = normal.cross(towards).normalize();
     let tip = down * -radius;
-    // 45° between side and axis, which is on the inner side of the normal.
+    // The angle between the side and the axis is 45°. The axis is on the inner side.
     let base = tip + (down - normal) * (1.5 * radius);
     Shape::Cone { base, tip, radius: (base - tip).length(), cap: true }
 }
 
 #[test]
 fn shapes_through_the_origin_do_not_self_hit() {
-    // The coordinates of the hit are nearly 0 although the shape is large: the error of the sums is the error of their
-    // terms.
+    // The hit's coordinates are nearly 0 although the shape is large, so rounding errors of the summands
+    // dominate.
     let mut random = Random(3);
     for _ in 0..200 {
         let (u, w) = (random.direction() * 1e4, random.direction() * 1e4);
@@ -210,8 +215,8 @@ fn shapes_through_the_origin_do_not_self_hit() {
 }
 
 #[test]
-fn ray_into_a_ball_hits_its_back_and_leaves() {
-    // Inside, the next hit is the back of the sphere; beyond it there is nothing.
+fn ray_into_a_ball_hits_its_back_and_exits() {
+    // From inside, the next hit is on the back of the sphere, and nothing is behind it.
     let mut random = Random(17);
     for radius in [1e-3, 0.75, 1.0, 1e3, 1e6] {
         for center in places(&mut random, radius) {
@@ -233,7 +238,7 @@ fn ray_into_a_ball_hits_its_back_and_leaves() {
 
 #[test]
 fn closed_mesh_has_no_leaks() {
-    // Every ray from inside hits; for rays aimed at vertices and edges, the test decides nothing but ties.
+    // Every ray from inside must hit, even when aimed at vertices and edges.
     let mut random = Random(23);
     let far = v(148_376.0, 1234.0, -223_423.0);
     let at_origin = lat_long_sphere(16, 16, 2.0, DVec3::ZERO);
@@ -266,7 +271,7 @@ fn closed_mesh_has_no_leaks() {
     }
 }
 
-/// One of every kind, of size 2ᵏ.
+/// A scene of size 2ᵏ with every kind of object.
 fn of_everything(k: i32) -> Build {
     let s = 2.0_f64.powi(k);
     let intensity = (8.0 * 4.0_f64.powi(k)) as f32;
@@ -324,19 +329,19 @@ fn of_everything(k: i32) -> Build {
 }
 
 #[test]
-fn power_of_two_scale_keeps_the_bits() {
-    // Powers of two scale every number without rounding; nothing may depend on the unit of length.
+fn power_of_two_scale_keeps_bits() {
+    // Scaling by powers of two does not round, and no result may depend on the unit of length.
     let picture = of_everything(0).picture(4, 9);
     for k in [-30, -7, 1, 12, 30] {
         let scaled = of_everything(k).picture(4, 9);
         let different = picture.iter().zip(&scaled).filter(|(a, b)| a != b).count();
-        assert_eq!(different, 0, "pixels that differ at 2^{k}");
+        assert_eq!(different, 0, "differing pixels at 2^{k}");
     }
 }
 
 #[test]
-fn splitting_the_work_keeps_the_bits() {
-    // A sample is a function of the scene, its pixel, its index and the seed.
+fn splitting_the_work_keeps_bits() {
+    // A sample depends only on the scene, pixel, sample index and seed.
     for integrator in Integrator::ALL {
         assert_no_split(&of_everything(0).with(|scene| scene.render.integrator = *integrator));
     }
@@ -389,7 +394,8 @@ fn invalid_rays_hit_nothing() {
 
 #[test]
 fn tree_finds_the_same_hit_as_brute_force() {
-    // Many shapes at the same distance: the lowest index wins, whatever their order in the tree.
+    // If several shapes are at the same distance, the lowest index wins, regardless of their order in the
+    // tree.
     let mut random = Random(31);
     let mut build = scene();
     for _ in 0..60 {
@@ -422,8 +428,8 @@ fn tree_finds_the_same_hit_as_brute_force() {
 }
 
 #[test]
-fn fresnel_at_every_angle_and_index() {
-    // Both polarizations in double precision from the same f32 cosine and index; 0 where the index does not change.
+fn fresnel_matches_double_precision() {
+    // The reference averages both polarizations in double precision from the same f32 cosine and IOR.
     let mut random = Random(41);
     for _ in 0..100_000 {
         let cosine = 10.0_f64.powf(-6.0 * random.unit()) as f32;
@@ -439,7 +445,7 @@ fn fresnel_at_every_angle_and_index() {
         };
         assert!(
             (f64::from(reflectance) - exact).abs() < 1e-6,
-            "R = {reflectance}, not {exact}, at {cosine}, {eta}"
+            "R = {reflectance}, expected {exact} at cos {cosine}, eta {eta}"
         );
         assert!(eta != 1.0 || transmitted.is_some_and(|t| (t / cosine - 1.0).abs() < 1e-6), "at {cosine}");
     }

@@ -1,4 +1,4 @@
-//! Disks, cylinders, cones and tori against their distance functions, whose slope is at most 1.
+//! Disks, cylinders, cones and tori against their distance functions, which have a Lipschitz constant of 1.
 
 use glimt::geometry::Ray;
 use glimt::geometry::ray::offset_origin;
@@ -15,13 +15,14 @@ pub fn geometry(shape: &Shape) -> std::sync::Arc<Geometry> {
     scene().shape(shape.clone(), matte(0.5)).world().geometry
 }
 
-/// Height along an axis of any length, and distance from it.
+/// Position along an axis of any length, and distance from it.
 fn axial(p: DVec3, origin: DVec3, axis: DVec3) -> DVec2 {
     let (n, p) = (axis.normalize(), p - origin);
     DVec2::new(p.dot(n), p.cross(n).length())
 }
 
-/// Signed distance bound of a shape: a lower bound on the distance, negative inside the closed shape, 0 on its surface.
+/// Signed distance bound: a lower bound on the distance to the surface, negative inside the closed shape and
+/// 0 on its surface.
 fn distance(shape: &Shape, p: DVec3) -> f64 {
     match *shape {
         Shape::Cylinder { a, b, radius, .. } => {
@@ -37,18 +38,18 @@ fn distance(shape: &Shape, p: DVec3) -> f64 {
             let q = axial(p, center, axis);
             (q.y - radius).hypot(q.x) - tube
         }
-        _ => unreachable!("no closed shape"),
+        _ => unreachable!("not a closed shape"),
     }
 }
 
-/// Greatest extent of a shape.
+/// Upper bound on the distance of the shape's points from the origin.
 fn reach(shape: &Shape) -> f64 {
     match *shape {
         Shape::Disk { center, radius, .. } => center.length() + radius,
         Shape::Cylinder { a, b, radius, .. } => a.length() + b.length() + radius,
         Shape::Cone { base, tip, radius, .. } => base.length() + tip.length() + radius,
         Shape::Torus { center, radius, tube, .. } => center.length() + radius + tube,
-        _ => unreachable!("no round shape"),
+        _ => unreachable!("not a round shape"),
     }
 }
 
@@ -58,13 +59,14 @@ fn size(shape: &Shape) -> f64 {
         Shape::Cylinder { a, b, radius, .. } => radius.min((b - a).length()),
         Shape::Cone { base, tip, radius, .. } => radius.min((base - tip).length()),
         Shape::Torus { radius, tube, .. } => tube.min(radius - tube),
-        _ => unreachable!("no closed shape"),
+        _ => unreachable!("not a closed shape"),
     }
 }
 
-/// Whether the line crosses the surface by more than `allowed` between two distances. Bisects: around the center of an
-/// interval, the surface is no nearer than its distance bound. Intervals of 10⁻⁵ of the shape's size are only tested at
-/// their center, because a line in the surface would otherwise take forever.
+/// Whether the line crosses the surface by more than `allowed` between two distances. Bisects until the
+/// distance bound at the center of an interval excludes a crossing. Intervals smaller than 10⁻⁵ of the
+/// shape's size are tested only at their center, as bisection would not terminate for a line within the
+/// surface.
 fn crosses(shape: &Shape, ray: &Ray, from: f64, to: f64, sign: f64, allowed: f64) -> bool {
     let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
     let length = ray.direction.as_dvec3().length();
@@ -78,8 +80,8 @@ fn crosses(shape: &Shape, ray: &Ray, from: f64, to: f64, sign: f64, allowed: f64
     crosses(shape, ray, from, middle, sign, allowed) || crosses(shape, ray, middle, to, sign, allowed)
 }
 
-/// Checks that the hit is on the surface and that the ray crosses no surface before it, or none at all without a hit.
-/// Returns whether there is a hit.
+/// Checks that the hit is on the surface and that the ray does not cross the surface before it, or at all if
+/// there is no hit. Returns whether there is a hit.
 #[track_caller]
 fn check(shape: &Shape, geometry: &Geometry, ray: &Ray, sign: f64) -> bool {
     let far = reach(shape) + ray.origin.as_dvec3().length();
@@ -94,15 +96,15 @@ fn check(shape: &Shape, geometry: &Geometry, ray: &Ray, sign: f64) -> bool {
     let t = f64::from(hit.shape.t);
     let rounding = t * length * f64::from(f32::EPSILON);
     let off = distance(shape, ray.origin.as_dvec3() + ray.direction.as_dvec3() * t);
-    assert!(off.abs() <= rounding + allowed, "{off} beside {shape:?} {ray:?} {hit:?}");
+    assert!(off.abs() <= rounding + allowed, "hit is {off} away from {shape:?} {ray:?} {hit:?}");
     let before = t * (1.0 - f64::from(f32::EPSILON));
-    assert!(!crosses(shape, ray, 0.0, before, sign, allowed), "passed {shape:?} {ray:?} {hit:?}");
+    assert!(!crosses(shape, ray, 0.0, before, sign, allowed), "passed through {shape:?} {ray:?} {hit:?}");
     let surface = geometry.surface(ray, &hit);
     let off = distance(shape, surface.point.as_dvec3());
     let error = f64::from(surface.error.length());
-    assert!(off.abs() <= error, "{off} over {error} {shape:?} {ray:?}");
+    assert!(off.abs() <= error, "distance {off} exceeds error bound {error}: {shape:?} {ray:?}");
     assert!((surface.normal.length() - 1.0).abs() < 1e-6);
-    // The front faces outwards, where there is room to decide.
+    // The normal points outward. Skip the check where the shape is too thin for the error.
     let out = surface.point.as_dvec3() + surface.normal.as_dvec3() * (4.0 * error);
     let tells = error < 0.05 * size(shape);
     assert!(!tells || distance(shape, out) > 0.0, "{shape:?} {ray:?} {surface:?}");
@@ -123,7 +125,7 @@ pub fn cone(random: &mut Random, center: DVec3, size: f64, cap: bool) -> Shape {
     Shape::Cone { base: center - half, tip: center + half, radius: size * random.unit().max(0.01), cap }
 }
 
-/// A line near a point of the surface and nearly in its tangent plane, off by a random power of ten.
+/// A line parallel to the tangent plane at a surface point, at a random distance from it.
 fn grazing(random: &mut Random, point: DVec3, normal: DVec3, size: f64) -> Ray {
     let tangent = random.direction().cross(normal).normalize();
     let off = normal * (size * random.signed().signum() * 10.0_f64.powf(-9.0 * random.unit()));
@@ -136,7 +138,7 @@ pub fn random_in(random: &mut Random, center: DVec3, size: f64) -> DVec3 {
 }
 
 #[test]
-fn torus_hits_match_its_distance_function() {
+fn torus_hits_match_distance_function() {
     let mut random = Random(5);
     let (mut rays, mut hits) = (0, 0);
     for slimness in [1e-3, 0.03, 0.2, 0.5, 0.8, 0.97, 0.9999] {
@@ -153,17 +155,17 @@ fn torus_hits_match_its_distance_function() {
                 let aim = |from: DVec3, to: DVec3| Ray::new(from.as_vec3(), (to - from).as_vec3());
                 let ray = match i % 6 {
                     0 => aim(random_in(&mut random, center, 9.0), on),
-                    // From the hole, and from inside the tube.
+                    // From within the hole, and from inside the tube.
                     1 => aim(center + n * (0.3 * random.signed()), random_in(&mut random, center, 3.0)),
                     2 => aim(center + out * radius, random_in(&mut random, center, 3.0)),
                     3 => grazing(&mut random, on, normal, 1.3),
-                    // Along the axis, at and near its top and boundary circles.
+                    // Parallel to the axis, at and near the top circle and the silhouette circles.
                     4 => {
                         let across = [0.0, radius, radius - tube, radius + tube][i / 6 % 4];
                         let off = if i % 4 < 2 { 0.0 } else { 10.0_f64.powf(-8.0 * random.unit()) };
                         Ray::new((center + out * (across + off) - n * 5.0).as_vec3(), n.as_vec3())
                     }
-                    // In the plane of the circle, and through the axis in that plane.
+                    // In the plane of the center circle, toward the center or a random point.
                     _ if i % 12 < 6 => aim(center + out * 6.0, center),
                     _ => aim(
                         center + n.cross(random.direction()) * 6.0,
@@ -178,12 +180,12 @@ fn torus_hits_match_its_distance_function() {
             }
         }
     }
-    assert!(rays > 120_000 && hits > rays / 3, "{hits} of {rays}");
+    assert!(rays > 120_000 && hits > rays / 3, "{hits} hits of {rays} rays");
 }
 
 #[test]
-fn rays_from_a_torus_hit_it_at_the_next_zero() {
-    // On the side where the ray starts, out of the hole as well, and to the other side of the tube.
+fn ray_from_torus_finds_next_intersection() {
+    // Rays leave to the outside, including through the hole, and into the tube.
     let mut random = Random(29);
     for size in [1e-8, 1e-4, 1.0, 1e4, 1e8] {
         for center in places(&mut random, size) {
@@ -212,7 +214,7 @@ fn rays_from_a_torus_hit_it_at_the_next_zero() {
 }
 
 #[test]
-fn cylinder_and_cone_hits_match_their_distance() {
+fn cylinder_and_cone_hits_match_distance_bound() {
     let mut random = Random(13);
     let (mut rays, mut hits) = (0, 0);
     for i in 0..400 {
@@ -237,10 +239,10 @@ fn cylinder_and_cone_hits_match_their_distance() {
             let ray = match j % 6 {
                 0 => aim(random_in(&mut random, center, 9.0), inside + out * (radius * random.unit())),
                 1 => aim(inside, random_in(&mut random, center, 3.0)),
-                // Towards the rim and the tip.
+                // Toward the rim and the tip.
                 2 => aim(random_in(&mut random, center, 5.0), low + out * radius),
                 3 => aim(random_in(&mut random, center, 5.0), high),
-                // Along the axis and along the side.
+                // Parallel to the axis and to the side.
                 4 => Ray::new(
                     (low - axis * 5.0 + out * (2.0 * radius * random.unit())).as_vec3(),
                     axis.as_vec3(),
@@ -259,11 +261,11 @@ fn cylinder_and_cone_hits_match_their_distance() {
             }
         }
     }
-    assert!(rays > 100_000 && hits > rays / 3, "{hits} of {rays}");
+    assert!(rays > 100_000 && hits > rays / 3, "{hits} hits of {rays} rays");
 }
 
 #[test]
-fn rays_pass_missing_caps_to_the_side() {
+fn rays_pass_through_missing_caps() {
     let mut random = Random(37);
     let mut through = 0;
     for i in 0..200 {
@@ -305,7 +307,7 @@ fn rays_pass_missing_caps_to_the_side() {
 
 #[test]
 fn convex_round_shapes_do_not_self_hit() {
-    // A convex body lies on one side of its tangent plane, even without the caps.
+    // A convex shape lies on one side of its tangent plane, even without caps.
     let mut random = Random(19);
     for size in [1e-8, 1e-4, 1.0, 1e4, 1e8] {
         for center in places(&mut random, size) {
@@ -323,7 +325,7 @@ fn convex_round_shapes_do_not_self_hit() {
 }
 
 #[test]
-fn ray_into_a_closed_round_shape_hits_its_back() {
+fn ray_into_closed_round_shape_hits_its_back() {
     let mut random = Random(43);
     for size in [1e-8, 1.0, 1e8] {
         for center in places(&mut random, size) {
@@ -336,10 +338,10 @@ fn ray_into_a_closed_round_shape_hits_its_back() {
                     let Some(hit) = geometry.closest(&ray) else { continue };
                     let surface = geometry.surface(&ray, &hit);
                     let inner = leaving(&mut random, &surface, -surface.normal);
-                    // Next to an edge, the error of the point may cross to the other side.
+                    // Near an edge, the offset for the point's error may leave the shape.
                     if distance(&shape, inner.origin.as_dvec3()) < 0.0 {
                         let back = geometry.closest(&inner);
-                        let back = back.unwrap_or_else(|| panic!("a leak of {shape:?} {inner:?}"));
+                        let back = back.unwrap_or_else(|| panic!("leak in {shape:?} {inner:?}"));
                         let normal = geometry.surface(&inner, &back).normal;
                         assert!(normal.dot(inner.direction) > 0.0, "{shape:?} {inner:?}");
                     }

@@ -1,4 +1,4 @@
-//! Disks, cylinders, cones and tori that emit.
+//! Emissive disks, cylinders, cones and tori.
 
 use std::f64::consts::{PI, TAU};
 
@@ -10,15 +10,15 @@ use super::direct::{assert_hard, assert_irradiance, at_origin};
 use super::scenes::{Build, emitter, matte, scene};
 use super::{assert_close, v};
 
-/// Irradiance E at the origin, facing up, from a shape that emits L = 1: π times the fraction of a cosine-weighted
-/// hemisphere that hits a front.
+/// Irradiance E at the origin, facing up, from a shape with L = 1: π times the fraction of a cosine-weighted
+/// hemisphere that hits a front face.
 fn by_directions(shape: &Shape) -> f64 {
     const RINGS: u32 = 1500;
     let geometry = scene().shape(shape.clone(), matte(0.5)).world().geometry;
     let mut fronts = 0_u32;
     for i in 0..RINGS {
         for j in 0..RINGS {
-            // Multiples of the golden ratio offset each ring against its neighbors.
+            // Multiples of the golden ratio rotate each ring relative to its neighbors.
             let sin2 = (f64::from(i) + 0.5) / f64::from(RINGS);
             let phi =
                 TAU * ((f64::from(j) + 0.5) / f64::from(RINGS) + 0.618_033_988_75 * f64::from(i)).fract();
@@ -47,7 +47,7 @@ fn a_disk_on_its_axis() {
     for (radius, height) in [(1.0, 1.0), (0.5, 3.0), (2.0, 0.7), (1e-3, 10.0)] {
         let exact = PI * radius * radius / (radius * radius + height * height);
         let shape = disk(v(0.0, height, 0.0), v(0.0, -2.0, 0.0), radius);
-        assert_irradiance(&format!("disk of {radius} at {height}"), &lit(&shape), exact);
+        assert_irradiance(&format!("disk with radius {radius} at {height}"), &lit(&shape), exact);
         assert_hard("disk", &lit(&shape), exact);
         let turned = lit(&disk(v(0.0, height, 0.0), DVec3::Y, radius));
         assert_eq!((turned.value(), turned.shadows(Shadows::Hard, 1).value()), (0.0, 0.0));
@@ -56,8 +56,8 @@ fn a_disk_on_its_axis() {
 
 #[test]
 fn a_parallel_disk_beside() {
-    // F = ½·(1 − (Z − 2R²)/√(Z² − 4R²)), Z = 1 + H² + R² in units of the lateral distance (Howell, *A Catalog of
-    // Radiation Heat Transfer Configuration Factors*, B-13).
+    // F = ½·(1 − (Z − 2R²)/√(Z² − 4R²)), where Z = 1 + H² + R² and lengths are in units of the lateral
+    // distance (Howell, *A Catalog of Radiation Heat Transfer Configuration Factors*, B-13).
     let (radius, height, beside): (f64, f64, f64) = (0.8, 1.2, 0.9);
     let (h, r) = (height / beside, radius / beside);
     let z = 1.0 + h * h + r * r;
@@ -67,23 +67,23 @@ fn a_parallel_disk_beside() {
     assert_close("the reference", (by_directions(&shape) / exact - 1.0).abs().max(1e-3), 1e-3);
 }
 
-/// Compares the irradiance from area samples with the irradiance over directions.
+/// Compares the rendered irradiance, from area samples, with [`by_directions`].
 #[track_caller]
 fn assert_same(shape: &Shape) {
     let exact = by_directions(shape);
     if exact == 0.0 {
-        assert_eq!(lit(shape).value(), 0.0, "only the inside of {shape:?} is visible");
+        assert_eq!(lit(shape).value(), 0.0, "only the back of {shape:?} is visible");
         return;
     }
-    assert!(exact > 0.01, "{shape:?} is too dim: {exact}");
+    assert!(exact > 0.01, "{shape:?} too dim: {exact}");
     for (samples, shadow_samples) in [(1024, 1), (64, 16)] {
         let values = lit(shape).shadows(Shadows::Soft, shadow_samples).values(samples, 64);
         let (mean, error) = super::mean_and_error(&values);
         let (mean, error) = (mean * PI / 0.7, error * PI / 0.7);
-        assert!(error < 0.01 * exact, "{shape:?}: noise {error}");
+        assert!(error < 0.01 * exact, "{shape:?}: too noisy: {error}");
         assert!(
             (mean - exact).abs() < 3.0 * error + 1e-3 * exact,
-            "{shape:?}: {mean} ± {error} is not {exact}"
+            "{shape:?}: {mean} ± {error}, expected {exact}"
         );
     }
 }
@@ -119,7 +119,7 @@ fn cone_area_and_direction_sampling_agree() {
 
 #[test]
 fn torus_area_and_direction_sampling_agree() {
-    // Seen through the hole, from the side, and edge on, where a torus occludes itself.
+    // The tori are viewed through the hole, from the side, and edge-on, where a torus occludes itself.
     for (center, axis, radius, tube) in [
         (v(0.0, 1.2, 0.0), DVec3::Y, 0.8, 0.3),
         (v(0.7, 1.0, 0.4), v(1.0, 0.3, 0.2), 0.6, 0.35),
@@ -131,9 +131,9 @@ fn torus_area_and_direction_sampling_agree() {
 }
 
 #[test]
-fn distant_light_acts_like_its_center() {
-    // E = L·A·cos θ/d² of the silhouette along the line of sight: 2Rh for a cylinder across it, πR² along it; a cone
-    // from the side has the triangle R·h, from behind its tip the base.
+fn distant_light_matches_projected_area() {
+    // E = L·A·cos θ/d², where A is the projected area: 2Rh for a cylinder from the side and πR² along its
+    // axis, R·h for a cone from the side and πR² along its axis.
     let far = |center: DVec3, shape: Shape, shown: f64| {
         let exact = shown * center.normalize().y / center.length_squared();
         let soft = lit(&shape).shadows(Shadows::Soft, 64).values(256, 16);
@@ -148,7 +148,7 @@ fn distant_light_acts_like_its_center() {
         Shape::Cylinder { a: up - v(0.5, 1.0, 0.0), b: up + v(0.5, 1.0, 0.0), radius: 0.5, caps: false };
     far(up, open, 2.0 * 0.5 * 1.0);
     let cone = |axis: DVec3| {
-        // Its centroid is on the line of sight.
+        // The cone's centroid is on the line of sight.
         let (side, cap) = (0.5 * axis.length().hypot(0.5), 0.25);
         let from_base = axis * (side / 3.0 / (side + cap));
         Shape::Cone { base: up - from_base, tip: up - from_base + axis, radius: 0.5, cap: true }

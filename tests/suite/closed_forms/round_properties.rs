@@ -1,4 +1,4 @@
-//! Properties that disks, cylinders, cones and tori share with every shape: scales, zeros, bounds, tangents.
+//! General properties of disks, cylinders, cones and tori: scale invariance, signed zeros, bounds, tangents.
 
 use glimt::geometry::Ray;
 use glimt::math::{DVec3, Vec3};
@@ -7,7 +7,7 @@ use glimt::scene::description::Shape;
 use super::round::{cone, cylinder, geometry, random_in, torus};
 use super::{Random, v};
 
-/// One of each kind.
+/// One shape of each kind.
 fn each(random: &mut Random, center: DVec3) -> Vec<Shape> {
     vec![
         Shape::Disk { center, normal: random.direction(), radius: 0.8 },
@@ -38,7 +38,7 @@ fn scaled(shape: &Shape, s: f64) -> Shape {
 }
 
 #[test]
-fn hits_have_the_same_bits_at_any_scale() {
+fn hits_are_bit_identical_at_any_scale() {
     let mut random = Random(53);
     for shape in each(&mut random, v(0.3, -0.2, 0.5)) {
         let rays: Vec<Ray> = (0..400)
@@ -67,7 +67,7 @@ fn hits_have_the_same_bits_at_any_scale() {
 }
 
 #[test]
-fn signed_zeros_of_a_direction_hit_the_same() {
+fn signed_zero_direction_does_not_change_hit() {
     for shape in [
         Shape::Disk { center: DVec3::ZERO, normal: DVec3::Z, radius: 1.0 },
         Shape::Cylinder { a: DVec3::ZERO, b: DVec3::Y, radius: 1.0, caps: true },
@@ -105,7 +105,7 @@ fn bounds_hold_every_hit() {
         let center = random_in(&mut random, DVec3::ZERO, 10.0_f64.powi(i % 5));
         for shape in each(&mut random, center) {
             let geometry = geometry(&shape);
-            let bounds = geometry.objects()[0].bounds().expect("it is bounded");
+            let bounds = geometry.objects()[0].bounds().expect("bounded shapes only");
             let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
             for _ in 0..2000 {
                 let from = (center + random.direction() * 9.0).as_vec3();
@@ -119,12 +119,13 @@ fn bounds_hold_every_hit() {
             met += u32::from(low.x <= high.x);
         }
     }
-    assert!(met > 200, "{met} of 240 were hit");
+    assert!(met > 200, "{met} of 240 shapes were hit");
 }
 
 #[test]
 fn tangents_are_texture_coordinate_derivatives() {
-    // Hits of neighboring rays differ by dpdu·Δu + dpdv·Δv, and u × v faces outwards: images are not mirrored.
+    // Hits of neighboring rays differ by dpdu·Δu + dpdv·Δv. u × v points outward, so textures are not
+    // mirrored.
     let mut random = Random(67);
     let mut checked = 0;
     for _ in 0..30 {
@@ -147,7 +148,7 @@ fn tangents_are_texture_coordinate_derivatives() {
                         continue;
                     }
                     let predicted = here.dpdu * turned.x + here.dpdv * turned.y;
-                    // A rotation by Δu curves away quadratically.
+                    // A rotation by Δu deviates quadratically from the tangent.
                     let bend = here.dpdu.length() * turned.x * turned.x * 7.0
                         + here.dpdv.length() * turned.y * turned.y * 7.0
                         + (turned.x * turned.y).abs() * 50.0;
@@ -162,7 +163,7 @@ fn tangents_are_texture_coordinate_derivatives() {
 
 #[test]
 fn distant_hits_keep_accurate_normals() {
-    // The t of a hit is rounded to 2⁻²⁴ of the distance, 60 times the radius here; the surface is not.
+    // A hit's t is rounded to 2⁻²⁴ of the distance, here 60 times the radius, but the surface point is not.
     let thin = Shape::Cylinder { a: v(0.0, -9.0, 0.0), b: v(0.0, 9.0, 0.0), radius: 1e-3, caps: true };
     let ring = Shape::Torus { center: DVec3::ZERO, axis: DVec3::Y, radius: 1.0, tube: 1e-3 };
     for (shape, across) in [(thin, 0.0), (ring, 1.0 - 1e-3)] {

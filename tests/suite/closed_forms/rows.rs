@@ -1,4 +1,4 @@
-//! Vertices in packets and single vertices: the same bits.
+//! Bit-identical results for vertices in packets and for single vertices.
 
 use std::ops::Range;
 
@@ -12,7 +12,8 @@ use glimt::scene::description::{ColorSource, Material, MaterialKind, Shadows, Sh
 use super::scenes::{Build, emitter, glass, mirror, plain, scene};
 use super::v;
 
-/// One of each shape between mirrors and glass, under lights; `paint` sets the color of the Phong materials.
+/// Shapes of each kind between mirrors and glass, under lights. `paint` sets the colors of the Phong
+/// materials.
 fn pictured(paint: impl Fn(&mut Build, Vec3) -> ColorSource) -> Build {
     let mut build = scene();
     let phong = |build: &mut Build, r: f32, ks: f32| -> Material {
@@ -43,7 +44,7 @@ fn pictured(paint: impl Fn(&mut Build, Vec3) -> ColorSource) -> Build {
 }
 
 #[test]
-fn constant_texture_equals_its_color_bit_for_bit() {
+fn constant_texture_is_bit_identical_to_color() {
     let by_rows = pictured(|_, color| ColorSource::Constant(color));
     let one_by_one = pictured(|build, color| {
         ColorSource::Texture(build.texture(&[&[color]], TextureFilter::Nearest, Wrap::Repeat, Vec2::ONE))
@@ -51,13 +52,13 @@ fn constant_texture_equals_its_color_bit_for_bit() {
     for (shadows, count) in [(Shadows::Soft, 1), (Shadows::Soft, 3), (Shadows::Hard, 1), (Shadows::Off, 1)] {
         let picture = |build: &Build| build.clone().shadows(shadows, count).picture(3, 5);
         let (rows, single) = (picture(&by_rows), picture(&one_by_one));
-        assert!(rows.iter().any(|pixel| pixel.x > 0.1), "something is lit");
+        assert!(rows.iter().any(|pixel| pixel.x > 0.1), "the image is black");
         assert_eq!(rows, single, "{shadows:?}, {count}");
     }
 }
 
 #[test]
-fn sample_bits_do_not_depend_on_the_tiling() {
+fn sample_bits_do_not_depend_on_tiling() {
     let build = pictured(|_, color| ColorSource::Constant(color)).shadows(Shadows::Soft, 2);
     let (world, settings) = (build.world(), build.settings(4));
     let samples = |rect: Rect, samples: Range<u32>| {

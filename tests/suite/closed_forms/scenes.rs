@@ -1,4 +1,4 @@
-//! Scenes built in code, and their pixels.
+//! Scenes built in code, and their rendered pixels.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -33,7 +33,7 @@ pub struct Build {
     sky: Option<Arc<Texels>>,
 }
 
-/// An empty scene, seen from (0, 0, 0) along −z through a single narrow pixel.
+/// An empty scene, viewed from (0, 0, 0) along −z through a single narrow pixel.
 pub fn scene() -> Build {
     let render = Render {
         error: 0.0,
@@ -68,7 +68,7 @@ pub fn scene() -> Build {
     Build { scene, parts: WorldInputs::default(), view: View::Beauty, texels: Vec::new(), sky: None }
 }
 
-/// A field of view in which a pixel is a point.
+/// A field of view so narrow that a pixel is a point.
 const NARROW: f64 = 1e-6;
 
 fn look_at(position: DVec3, look_at: DVec3, fov: f64) -> Camera {
@@ -78,7 +78,7 @@ fn look_at(position: DVec3, look_at: DVec3, fov: f64) -> Camera {
 }
 
 impl Build {
-    /// One pixel that sees a point.
+    /// Renders a single pixel looking at a point.
     pub fn seen(self, from: DVec3, at: DVec3) -> Self {
         self.pictured(from, at, NARROW, 1, 1)
     }
@@ -111,7 +111,7 @@ impl Build {
         self.with(|scene| scene.render.max_depth = max_depth)
     }
 
-    /// Enables photons: `count` per pass, gathered within `radius` in the first pass.
+    /// Enables photons: `count` per pass, with `radius` as the gather radius of the first pass.
     pub fn photons(self, count: u64, radius: f64) -> Self {
         self.with(|scene| scene.photons = Photons { enabled: true, count, radius, bounces: 10_000 })
     }
@@ -165,7 +165,7 @@ impl Build {
         self.shape(Shape::Mesh(Mesh { file, placed, smooth: false, vertex_colors: false }), material)
     }
 
-    /// Makes the last mesh smooth.
+    /// Enables smooth shading for the last mesh.
     pub fn smooth(self) -> Self {
         self.with(|scene| {
             if let Some(Shape::Mesh(mesh)) = scene.objects.last_mut().map(|object| &mut object.shape) {
@@ -174,7 +174,7 @@ impl Build {
         })
     }
 
-    /// An instance of a mesh file with its own materials, without smoothing.
+    /// Adds a flat-shaded instance of a mesh with its own file materials.
     pub fn own_mesh(self, mesh: TriangleMesh, materials: Vec<FileMaterial>) -> Self {
         let mut build = self.mesh(mesh, AS_IT_IS, matte(0.5));
         let file = build.parts.meshes.len() - 1;
@@ -184,7 +184,7 @@ impl Build {
         build.with(|scene| scene.objects.last_mut().expect("the mesh").material = None)
     }
 
-    /// Adds a texture, rows from the top; returns its index.
+    /// Adds a texture, top row first. Returns its index.
     pub fn texture(&mut self, rows: &[&[Vec3]], filter: TextureFilter, wrap: Wrap, repeat: Vec2) -> usize {
         let number = self.texels.len();
         self.texels.push(Arc::new(Texels {
@@ -209,13 +209,13 @@ impl Build {
         number
     }
 
-    /// Adds an environment of constant radiance.
+    /// Adds an environment with constant radiance.
     pub fn environment(self, radiance: f32) -> Self {
         let color = Vec3::splat(radiance);
         self.with(|scene| scene.environment = Some(Environment { color, file: None, rotate: 0.0 }))
     }
 
-    /// Adds an equirectangular environment map with `width` columns, rows from the top.
+    /// Adds an equirectangular environment map with `width` columns, top row first.
     pub fn sky(mut self, width: u32, texels: Vec<Vec3>, rotate: f64) -> Self {
         let height = texels.len() as u32 / width;
         self.sky = Some(Arc::new(Texels { width, height, data: TexelData::Float(texels), unusable: 0 }));
@@ -228,7 +228,7 @@ impl Build {
         for needed in textures_needed(&self.scene, &[], TextureNeeds::ALL) {
             let texels = match needed.declared {
                 Some(number) => &self.texels[number],
-                None => self.sky.as_ref().expect("a map of the environment"),
+                None => self.sky.as_ref().expect("an environment map"),
             };
             let levels = || Arc::new(mipmaps(texels, &CancelToken::new()).expect("not cancelled"));
             let image = Image { texels: Arc::clone(texels), mipmaps: needed.has_mipmaps.then(levels) };
@@ -250,23 +250,23 @@ impl Build {
         RenderSettings { render, dof: true, view: self.view, photons: enabled.then_some(photons) }
     }
 
-    /// The whole image, as means of the samples.
+    /// The whole image: the mean of the samples of each pixel.
     pub fn picture(&self, samples: u32, seed: u32) -> Vec<DVec3> {
         let (width, height) = (self.scene.render.width, self.scene.render.height);
         tile(&self.world(), &self.settings(seed), Rect { x: 0, y: 0, width, height }, samples)
     }
 
-    /// The only pixel, with one sample.
+    /// Color of the only pixel, with one sample.
     pub fn color(&self) -> DVec3 {
         self.picture(1, 0)[0]
     }
 
-    /// The only pixel of a gray image, with one sample.
+    /// Value of the only pixel of a gray image, with one sample.
     pub fn value(&self) -> f64 {
         self.color().x
     }
 
-    /// The only pixel for each of many seeds.
+    /// Values of the only pixel, one for each seed.
     pub fn values(&self, samples: u32, seeds: u32) -> Vec<f64> {
         let world = self.world();
         let rect = Rect { x: 0, y: 0, width: 1, height: 1 };
@@ -274,12 +274,12 @@ impl Build {
     }
 }
 
-/// Mean of the samples of each pixel.
+/// Mean of each pixel's samples.
 pub fn tile(world: &World, settings: &RenderSettings, rect: Rect, samples: u32) -> Vec<DVec3> {
     tile_by(maps(world, settings, samples).as_ref(), world, settings, rect, samples)
 }
 
-/// The photon maps after `samples` samples. `None` if no photons are gathered.
+/// Photon maps for `samples` samples. `None` if no photons are gathered.
 pub fn maps(world: &World, settings: &RenderSettings, samples: u32) -> Option<PhotonMaps> {
     let token = CancelToken::new();
     settings.effective().photons.filter(|_| settings.gathers()).map(|of_photons| {
@@ -304,7 +304,7 @@ pub fn tile_by(
     sums.map(|pixel| pixel.iter().map(|c| c.as_dvec3()).sum::<DVec3>() / f64::from(samples)).collect()
 }
 
-/// A dark material without a normal map.
+/// A material without emission, normal map, bump map or transparency.
 pub fn plain(kind: MaterialKind) -> Material {
     Material {
         name: String::new(),
@@ -344,7 +344,7 @@ pub fn metal(reflectance: f32, roughness: f32, anisotropy: f32) -> Material {
     })
 }
 
-/// Plastic with an index of refraction of 1.5 under a full coat.
+/// Plastic with IOR 1.5 and full specular reflection.
 pub fn plastic(diffuse: f32, roughness: f32) -> Material {
     plain(MaterialKind::Plastic {
         diffuse: ColorSource::Constant(Vec3::splat(diffuse)),
@@ -354,7 +354,7 @@ pub fn plastic(diffuse: f32, roughness: f32) -> Material {
     })
 }
 
-/// A principled material under a clear coat of half weight.
+/// A principled material with a clear coat of weight 0.5.
 pub fn principled(color: f32, metallic: f32, roughness: f32) -> Material {
     let number = NumberSource::Constant;
     plain(MaterialKind::Principled {
@@ -380,7 +380,7 @@ pub fn frosted(ior: f32, roughness: f32) -> Material {
     plain(MaterialKind::Glass { ior, tint: DVec3::ONE, roughness })
 }
 
-/// A principled material under a clear coat, which transmits this fraction of the light.
+/// A principled material with a clear coat, and with the given transmission.
 pub fn translucent(color: f32, roughness: f32, transmission: f32) -> Material {
     let mut material = principled(color, 0.0, roughness);
     if let MaterialKind::Principled { transmission: own, .. } = &mut material.kind {
@@ -389,12 +389,12 @@ pub fn translucent(color: f32, roughness: f32, transmission: f32) -> Material {
     material
 }
 
-/// Glass with this transmittance per unit of length.
+/// Glass with the given transmittance per unit length.
 pub fn tinted(ior: f32, tint: DVec3) -> Material {
     plain(MaterialKind::Glass { ior, tint, roughness: NumberSource::Constant(0.0) })
 }
 
-/// A material of a mesh file by its illumination model: 2 is matte gray, 9 glass.
+/// A material from a mesh file with the given illumination model: 2 is matte gray, 9 is glass.
 pub fn file_material(illumination_model: u8, ior: f32) -> FileMaterial {
     FileMaterial {
         name: String::new(),
@@ -415,7 +415,8 @@ pub fn file_material(illumination_model: u8, ior: f32) -> FileMaterial {
     }
 }
 
-/// A receiver of reflectance ρ around a point, facing up, seen from so close that nothing comes between.
+/// An upward-facing receiver with reflectance ρ at a point. The camera is so close that nothing can be in
+/// between.
 pub fn receiver(at: DVec3, reflectance: f32) -> Build {
     let half = 0.125;
     let corner = at + v(-half, 0.0, half);
@@ -424,7 +425,7 @@ pub fn receiver(at: DVec3, reflectance: f32) -> Build {
         .seen(at + v(2e-5, 5e-5, 3e-5), at)
 }
 
-/// A closed latitude-longitude sphere with outward faces.
+/// A closed latitude-longitude sphere with outward-facing triangles.
 pub fn lat_long_sphere(rings: u32, steps: u32, radius: f64, center: DVec3) -> TriangleMesh {
     let mut mesh = TriangleMesh::default();
     let at = |ring: u32, step: u32| {

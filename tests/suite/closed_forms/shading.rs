@@ -1,4 +1,4 @@
-//! The Phong material, its components as views, and textures.
+//! The Phong material, its component views, and textures.
 
 use std::f64::consts::PI;
 
@@ -14,8 +14,8 @@ use glimt::scene::description::{
 use super::scenes::{Build, emitter, glass, lat_long_sphere, matte, mirror, phong, scene};
 use super::{assert_close, v};
 
-/// A square of a material at the origin, facing up, under a light of E = 3·cos 20° from 20° off the normal, seen from
-/// `degrees` off the normal on the other side.
+/// A square at the origin, facing up. The light is 20° from the normal, with E = 3·cos 20°. The camera is
+/// `degrees` from the normal on the other side.
 fn lobe(kind: Material, degrees: f64) -> Build {
     let at = |degrees: f64| v(degrees.to_radians().sin(), degrees.to_radians().cos(), 0.0);
     scene()
@@ -26,7 +26,8 @@ fn lobe(kind: Material, degrees: f64) -> Build {
 
 #[test]
 fn phong_lobe_is_normalized() {
-    // f = kd/π + ks·(α + 2)/2π·cosᵅ of the angle between the camera and the mirrored light, which is at 20°.
+    // f = kd/π + ks·(α + 2)/2π·cosᵅθ, where θ is the angle between the camera and the mirror direction, which
+    // is at 20°.
     for (kd, ks, alpha, degrees) in
         [(0.0, 1.0, 50.0, 30.0), (0.3, 0.5, 10.0, 45.0), (0.2, 0.8, 100.0, 21.0), (0.4, 0.6, 0.0, -50.0)]
     {
@@ -40,13 +41,13 @@ fn phong_lobe_is_normalized() {
             f * irradiance,
         );
     }
-    // 100° from the mirrored light there is no highlight.
+    // There is no highlight 100° from the mirror direction.
     assert_eq!(lobe(phong(0.0, 1.0, 3.0, 0.0), -80.0).value(), 0.0);
 }
 
 #[test]
-fn components_add_up_to_the_beauty() {
-    // Lₐ = ka·Isa; at depth 0 the image is only the emission.
+fn components_add_up_to_beauty() {
+    // Lₐ = ka·Isa. At depth 0, the image consists only of emission.
     let mut kind = phong(0.3, 0.5, 20.0, 0.25);
     if let MaterialKind::Phong { ambient, .. } = &mut kind.kind {
         *ambient = Some(ColorSource::Constant(Vec3::splat(0.6)));
@@ -65,13 +66,13 @@ fn components_add_up_to_the_beauty() {
     );
     assert_close("emitted", emitted, 0.25);
     assert_close("the picture", view(View::Beauty), parts.iter().sum::<f64>() + emitted);
-    // From behind there is neither light nor emission, only ambient light.
+    // From behind, only ambient light is visible.
     let behind = lit.seen(v(0.5, -2.0, 0.3), DVec3::ZERO);
     assert_close("from behind", behind.value(), 0.12);
 }
 
 #[test]
-fn ambient_light_defaults_to_the_diffuse_color() {
+fn ambient_color_defaults_to_diffuse_color() {
     let dark = scene()
         .sphere(v(0.0, 0.0, -5.0), 1.0, phong(0.35, 0.1, 3.0, 0.0))
         .with(|scene| scene.render.ambient = Vec3::new(0.5, 1.0, 2.0));
@@ -100,7 +101,7 @@ const GREEN: Vec3 = Vec3::new(0.0, 1.0, 0.0);
 const BLUE: Vec3 = Vec3::new(0.0, 0.0, 1.0);
 const GRAY: Vec3 = Vec3::new(0.5, 0.5, 0.5);
 
-/// A material whose diffuse color, under ambient light 1, is the image red green blue gray.
+/// A material with a 2 × 2 diffuse texture in red, green, blue and gray, under ambient light 1.
 fn pictured(filter: TextureFilter, wrap: Wrap, repeat: Vec2) -> (Build, Material) {
     let mut build = scene().with(|scene| scene.render.ambient = Vec3::ONE);
     let texture = build.texture(&[&[RED, GREEN], &[BLUE, GRAY]], filter, wrap, repeat);
@@ -124,15 +125,16 @@ fn texture_on_a_quad_is_upright_along_v() {
     assert_eq!(nearest((0.9, 0.4)), GRAY);
     assert_eq!(nearest((0.1, 0.6)), RED);
     assert_eq!(nearest((0.6, 0.9)), GREEN);
-    // Three tiles across, two up: (.2, .1)·(3, 2) = (.6, .2), (.5, .85)·(3, 2) = (1.5, 1.7) → (.5, .7).
+    // Three tiles across and two up: (0.2, 0.1)·(3, 2) = (0.6, 0.2), (0.52, 0.85)·(3, 2) = (1.56, 1.7) →
+    // (0.56, 0.7).
     let tiled = |place| at(TextureFilter::Nearest, Wrap::Repeat, Vec2::new(3.0, 2.0), place);
     assert_eq!(tiled((0.2, 0.1)), GRAY);
     assert_eq!(tiled((0.52, 0.85)), GREEN);
-    // Mirrored, the second tile runs backwards: 1.56 → .44 and 1.7 → .3; clamped both are 1.
+    // Mirroring reverses the second tile: 1.56 → 0.44 and 1.7 → 0.3. Clamping maps both to 1.
     let place = (0.52, 0.85);
     assert_eq!(at(TextureFilter::Nearest, Wrap::Mirror, Vec2::new(3.0, 2.0), place), BLUE);
     assert_eq!(at(TextureFilter::Nearest, Wrap::Clamp, Vec2::new(3.0, 2.0), place), GREEN);
-    // Bilinear in the middle is the mean of all texels; at a texel's center, the texel.
+    // Bilinear filtering returns the mean of all texels in the middle, and a single texel at its center.
     let smooth = |place| at(TextureFilter::Bilinear, Wrap::Clamp, Vec2::ONE, place);
     let mean = (RED + GREEN + BLUE + GRAY) / 4.0;
     assert!((smooth((0.5, 0.5)) - mean).length() < 1e-5);
@@ -141,8 +143,8 @@ fn texture_on_a_quad_is_upright_along_v() {
 }
 
 #[test]
-fn texel_borders_belong_to_the_next_texel() {
-    // u = 0 is in the left column, v = 0 in the bottom row: texels are half-open intervals starting at 0.
+fn texels_are_half_open_intervals() {
+    // Texels are half-open intervals starting at 0. u = 0 is in the left column, v = 0 in the bottom row.
     let (build, kind) = pictured(TextureFilter::Nearest, Wrap::Repeat, Vec2::ONE);
     let square = build.quad(v(0.0, 0.0, -1.0), DVec3::X, DVec3::Y, kind);
     let world = square.world();
@@ -153,7 +155,7 @@ fn texel_borders_belong_to_the_next_texel() {
 
 #[test]
 fn sphere_texture_coordinates() {
-    // u = ½ + atan2(z, x)/2π, v = ½ + asin(y)/π: (1, 1, 1)/√3 is at (.625, .6959133).
+    // u = ½ + atan2(z, x)/2π, v = ½ + asin(y)/π, so (1, 1, 1)/√3 is at (0.625, 0.6959133).
     let (build, kind) = pictured(TextureFilter::Nearest, Wrap::Repeat, Vec2::ONE);
     let center = v(3.0, -1.0, 2.0);
     let ball = build.sphere(center, 2.0, kind);
@@ -177,11 +179,11 @@ fn sphere_texture_coordinates() {
     assert_close("v", known.y, 0.695_913_3);
 }
 
-/// Checks that a coarse smooth ball is lit like the sphere it approximates, up to 4° before the terminator, where
-/// facets are turned away by up to half of their 11.25°. No facet is black, none deviates from the cosine by more than
-/// a third, the margin for vertex normals, which average the surrounding facets.
+/// Checks that a coarse smooth ball is lit like the sphere it approximates, up to 4° from the terminator,
+/// where facets are turned away by up to half of their 11.25°. No facet may be black or deviate from the
+/// cosine by more than a third, which allows for vertex normals that average adjacent facets.
 #[test]
-fn facets_do_not_show_at_the_terminator() {
+fn facets_are_invisible_at_the_terminator() {
     for shadows in [Shadows::Hard, Shadows::Off] {
         let mut seen = 0;
         for place in 0..2000 {
@@ -214,7 +216,7 @@ fn facets_do_not_show_at_the_terminator() {
 }
 
 #[test]
-fn components_add_up_through_mirrors_and_glass() {
+fn components_add_up_in_mirrors_and_glass() {
     let build = scene()
         .quad(v(-5.0, -1.0, 5.0), v(10.0, 0.0, 0.0), v(0.0, 0.0, -20.0), phong(0.5, 0.4, 20.0, 0.0))
         .sphere(v(-1.2, 0.0, -6.0), 1.0, mirror(0.9))
@@ -226,7 +228,7 @@ fn components_add_up_through_mirrors_and_glass() {
         .with(|scene| scene.render.ambient = Vec3::new(0.2, 0.1, 0.3))
         .pictured(v(0.0, 1.0, 1.0), v(0.0, 0.0, -6.0), 40.0, 24, 16);
     let picture = |name: &str| {
-        let view = View::named(name).unwrap_or_else(|| panic!("there is no view {name}"));
+        let view = View::named(name).unwrap_or_else(|| panic!("unknown view {name}"));
         build.clone().viewed(view).picture(8, 3)
     };
     let parts = ["ambient", "diffuse", "specular", "emission"].map(picture);
@@ -236,11 +238,11 @@ fn components_add_up_through_mirrors_and_glass() {
         assert!(off <= 1e-5 * beauty.max_element().max(1.0), "{pixel}: {sum} {beauty}");
     }
     for (part, name) in parts.iter().zip(["ambient", "diffuse", "specular", "emission"]) {
-        assert!(part.iter().any(|color| color.max_element() > 0.01), "{name} has light");
+        assert!(part.iter().any(|color| color.max_element() > 0.01), "{name} must have light");
     }
-    // Seen through the mirror and the glass, each component keeps its meaning.
+    // In mirrors and glass, each component shows the same component of what they reflect or transmit.
     let through = |at: DVec3, name: &str| {
-        let view = View::named(name).unwrap_or_else(|| panic!("there is no view {name}"));
+        let view = View::named(name).unwrap_or_else(|| panic!("unknown view {name}"));
         build.clone().seen(v(0.0, 1.0, 1.0), at).viewed(view).value()
     };
     for (below, above) in [(v(-1.2, -0.5, -6.0), v(-1.2, 0.7, -6.0)), (v(1.2, 0.4, -6.0), v(1.2, -0.7, -6.0))]

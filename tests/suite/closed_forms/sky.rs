@@ -19,7 +19,7 @@ fn both(build: &Build) -> [Build; 2] {
     [build.clone(), path(build.clone())]
 }
 
-/// A gray map as a function of column and row.
+/// A gray environment map from a function of column and row.
 fn map(width: u32, height: u32, radiance: impl Fn(u32, u32) -> f32) -> (u32, Vec<Vec3>) {
     let texel = |row| (0..width).map(move |column| (column, row));
     (width, (0..height).flat_map(texel).map(|(column, row)| Vec3::splat(radiance(column, row))).collect())
@@ -30,7 +30,7 @@ fn lit(build: Build, (width, texels): (u32, Vec<Vec3>), rotate: f64) -> Build {
 }
 
 #[test]
-fn plane_under_a_constant_sky_has_its_albedo() {
+fn plane_under_constant_sky_shows_its_albedo() {
     for shadows in [Shadows::Soft, Shadows::Hard, Shadows::Off] {
         for build in both(&at_origin().environment(1.0).shadows(shadows, 1)) {
             assert_mean(&format!("{shadows:?}"), &build.values(64, 64), 0.7);
@@ -38,7 +38,8 @@ fn plane_under_a_constant_sky_has_its_albedo() {
         let white = lit(at_origin(), map(16, 8, |_, _| 1.0), 0.0).shadows(shadows, 4);
         assert_mean("as a map", &white.values(64, 64), 0.7);
     }
-    // Half of it is behind a wall on the edge of the receiver's point; `hard` is soft as well, `off` ignores the wall.
+    // A wall next to the visible point hides half of the sky. `hard` behaves like `soft`, and `off` ignores
+    // the wall.
     let wall = |shadows| {
         at_origin()
             .environment(1.0)
@@ -52,13 +53,14 @@ fn plane_under_a_constant_sky_has_its_albedo() {
 }
 
 #[test]
-fn half_a_sky_gives_half_or_all_of_the_light() {
+fn half_sky_irradiance_is_exact() {
     let (height, rows) = (64, 128);
     let upper = map(rows, height, |_, row| f32::from(u8::from(row < height / 2)));
     let lower = map(rows, height, |_, row| f32::from(u8::from(row >= height / 2)));
-    // u < ½ is seen towards −x.
+    // u < ½ is toward −x.
     let left = map(rows, height, |column, _| f32::from(u8::from(column < rows / 2)));
-    // Between rows 31 and 32 the radiance falls from 1 to 0 within a texel: little is lost above the horizon.
+    // Between rows 31 and 32, the radiance falls from 1 to 0 over one texel, which loses little light above
+    // the horizon.
     for build in both(&lit(at_origin(), upper, 0.0)) {
         let values = build.values(64, 64);
         let lost = PI / f64::from(height);
@@ -72,7 +74,7 @@ fn half_a_sky_gives_half_or_all_of_the_light() {
     for build in both(&lit(at_origin(), left.clone(), 0.0)) {
         assert_mean("left", &build.values(64, 64), 0.35);
     }
-    // A wall in the dark half blocks nothing, one in the bright half blocks everything.
+    // A wall in the dark half blocks no light, and a wall in the bright half blocks all of it.
     let wall = |x: f64, rotate: f64| {
         let build = at_origin().quad(v(x, 0.0, -1e5), v(0.0, 1e5, 0.0), v(0.0, 0.0, 2e5), matte(0.0));
         let values = lit(build, left.clone(), rotate).values(64, 64);
@@ -86,20 +88,20 @@ fn half_a_sky_gives_half_or_all_of_the_light() {
 
 #[test]
 fn bright_texel_appears_in_its_direction() {
-    // In maps of 8 × 5, the centers of columns 1, 3, 5, 7 are halfway between the axes; in maps of 4 × 3, columns 0 … 3
-    // are centered at u = ⅛, ⅜, ⅝, ⅞: rotated by 45° they are on −z and so on.
+    // In a 4 × 3 map, columns 0 … 3 are centered at u = ⅛, ⅜, ⅝, ⅞, so that rotating by 45° moves them to the
+    // axes.
     let sees = |direction: DVec3, map: (u32, Vec<Vec3>), rotate: f64| {
         lit(scene().seen(DVec3::ZERO, direction), map, rotate).value()
     };
     let one = |column: u32, row: u32| map(4, 3, move |x, y| f32::from(u8::from((x, y) == (column, row))));
-    // Columns at azimuths −135°, −45°, 45°, 135° from −z towards +x; rotated counterclockwise by 45° they are at −180°,
-    // −90°, 0°, 90°.
+    // Columns are at azimuths −135°, −45°, 45°, 135° from −z toward +x. Rotated counterclockwise by 45°, they
+    // are at −180°, −90°, 0°, 90°.
     let around = [DVec3::Z, DVec3::NEG_X, DVec3::NEG_Z, DVec3::X];
     for (column, direction) in (0..4).zip(around) {
         let sees_it = sees(direction, one(column, 1), 45.0);
         assert!((sees_it - 1.0).abs() < 1e-5, "{direction}: {sees_it}");
         assert!(sees(-direction, one(column, 1), 45.0) < 1e-5);
-        // Another quarter turn moves +x to −z.
+        // Rotating by another 90° moves +x to −z.
         let turned = DVec3::new(direction.z, 0.0, -direction.x);
         assert!((sees(turned, one(column, 1), 135.0) - 1.0).abs() < 1e-5, "{turned}");
         assert!((sees(turned, one(column, 1), -225.0) - 1.0).abs() < 1e-5, "{turned}");
@@ -109,7 +111,7 @@ fn bright_texel_appears_in_its_direction() {
         assert_eq!((sees(DVec3::Y, row(0), rotate), sees(DVec3::Y, row(2), rotate)), (1.0, 0.0));
         assert_eq!((sees(DVec3::NEG_Y, row(2), rotate), sees(DVec3::NEG_Y, row(0), rotate)), (1.0, 0.0));
     }
-    // Not rotated: −z is between columns 1 and 2, +x is right of the middle.
+    // Without rotation, −z is between columns 1 and 2, and +x is right of the middle.
     let right = |rotate| {
         [DVec3::NEG_Z, DVec3::X, DVec3::Z, DVec3::NEG_X]
             .map(|direction| sees(direction, map(4, 1, |x, _| [0.0, 1.0, 2.0, 4.0][x as usize]), rotate))
@@ -122,7 +124,7 @@ fn bright_texel_appears_in_its_direction() {
 }
 
 #[test]
-fn mirrors_and_glass_show_the_sky_as_emission() {
+fn sky_in_mirrors_and_glass_is_emission() {
     let pane = |material| {
         scene().quad(v(-1.0, -1.0, -2.0), v(2.0, 0.0, 0.0), v(0.0, 2.0, 0.0), material).environment(2.0)
     };
@@ -132,15 +134,16 @@ fn mirrors_and_glass_show_the_sky_as_emission() {
         assert_eq!(build.depth(0).value(), 0.0);
     }
     assert_close("by itself", scene().environment(2.0).depth(0).value(), 2.0);
-    // Glass transmits whatever it does not reflect: nothing is lost.
+    // Glass is lossless: it transmits all light that it does not reflect.
     let ball = scene().sphere(v(0.3, 0.2, -3.0), 1.0, glass(1.5)).environment(2.0).depth(40);
     assert!((ball.value() - 2.0).abs() < 2e-2, "{}", ball.value());
-    assert_mean("glass by paths", &path(ball).values(64, 16), 2.0);
+    assert_mean("glass, path", &path(ball).values(64, 16), 2.0);
 }
 
 #[test]
-fn phong_ball_in_a_furnace_has_its_albedo() {
-    // Albedos of ks = 1 at 60°: 0.5047 (α = 10), 0.5000 (α = 100); seen along −z, the normal is 60° from z.
+fn phong_ball_in_a_furnace_shows_its_albedo() {
+    // For ks = 1, the albedo at 60° is 0.5047 (α = 10) and 0.5000 (α = 100). The camera looks along −z, and
+    // the normal is 60° from z.
     for (shininess, albedo) in [(10.0, 0.5047), (100.0, 0.5000)] {
         let normal = v(60.0_f64.to_radians().sin(), 0.0, 60.0_f64.to_radians().cos());
         let center = v(0.0, 0.0, -5.0) - normal;
@@ -163,7 +166,7 @@ fn phong_ball_in_a_furnace_has_its_albedo() {
     }
 }
 
-/// Solid angle of a texel between rows: ∫ of its tent function.
+/// Solid angle of a texel under bilinear interpolation: the integral of its tent function.
 fn weight_of(width: u32, height: u32, row: u32) -> f64 {
     let (steps, texel) = (4096, PI / f64::from(height));
     let tent = |step: i32| {
@@ -181,7 +184,7 @@ fn towards(width: u32, height: u32, column: u32, row: u32) -> DVec3 {
 }
 
 #[test]
-fn one_bright_texel_is_a_sun() {
+fn single_bright_texel_matches_a_sun() {
     let (width, height, column, row) = (1024, 512, 700, 120);
     let sky = map(width, height, |x, y| if (x, y) == (column, row) { 1e5 } else { 0.0 });
     let irradiance = 1e5 * weight_of(width, height, row);
@@ -194,13 +197,13 @@ fn one_bright_texel_is_a_sun() {
         assert!((mean / exact - 1.0).abs() < 2e-3, "{mean} {exact}");
     }
     assert_eq!(lit(blocked(to_light * 40.0), sky.clone(), 0.0).value(), 0.0);
-    // Rotated by 90° about +y, it shines from elsewhere.
+    // Rotating by 90° around +y moves the light.
     let turned = DVec3::new(to_light.z, to_light.y, -to_light.x);
     assert_eq!(lit(blocked(turned * 40.0), sky.clone(), 90.0).value(), 0.0);
     assert!(lit(blocked(to_light * 40.0), sky, 90.0).value() > 0.0);
 }
 
-/// Points of a floor with balls on it, each with its normal up; blocks of two rendered images.
+/// A floor with balls on it, viewed from above.
 fn courtyard() -> Build {
     let mut build = scene().quad(v(-9.0, 0.0, 9.0), v(18.0, 0.0, 0.0), v(0.0, 0.0, -18.0), matte(0.7));
     for (x, z, radius) in [(-1.5, 0.0, 0.8), (1.0, -1.0, 1.2), (0.5, 1.6, 0.4)] {
@@ -209,8 +212,8 @@ fn courtyard() -> Build {
     build.pictured(v(0.0, 4.0, 6.0), v(0.0, 0.4, 0.0), 45.0, 48, 32).depth(1)
 }
 
-/// The z-score of the difference between two estimates of the mean of blocks of 16 × 16 pixels, and of the whole image,
-/// from the spread of both over seeds.
+/// Checks that two scenes agree in the means of 16 × 16 pixel blocks and of the whole image, using the
+/// z-score of the difference from the spread over seeds.
 fn assert_same_picture(what: &str, one: &Build, other: &Build, [samples, others]: [u32; 2], seeds: u32) {
     let (width, height) = (48_usize, 32_usize);
     let blocks = |build: &Build, samples| -> Vec<Vec<f64>> {
@@ -237,9 +240,9 @@ fn assert_same_picture(what: &str, one: &Build, other: &Build, [samples, others]
         };
         let ((a, var_a), (b, var_b)) = (moments(&one), moments(&other));
         let error = (var_a + var_b).sqrt();
-        // Without a bound on the standard error, noise would pass.
-        assert!(error < 0.01 * b, "{what}, block {block}: {a} {b} ± {error}");
-        assert!((a - b).abs() < 4.89 * error.max(1e-4 * b), "{what}, block {block}: {a} {b} ± {error}");
+        // Without a bound on the standard error, noisy images would pass.
+        assert!(error < 0.01 * b, "{what}, block {block}: too noisy: {a} vs. {b} ± {error}");
+        assert!((a - b).abs() < 4.89 * error.max(1e-4 * b), "{what}, block {block}: {a} vs. {b} ± {error}");
     }
 }
 
@@ -255,7 +258,7 @@ fn whitted_and_path_agree_on_sky_light() {
     }
 }
 
-/// A black map with a few texels of equal brightness, and the same light as directional lights.
+/// A black map with a few equally bright texels, and the equivalent directional lights.
 fn dotted(width: u32, height: u32, count: u32) -> [Build; 2] {
     let mut bright = std::collections::BTreeSet::new();
     let mut state = 12_345_u64;
@@ -279,20 +282,20 @@ fn dotted(width: u32, height: u32, count: u32) -> [Build; 2] {
 }
 
 #[test]
-fn bright_texels_act_like_suns() {
+fn bright_texels_match_directional_lights() {
     let [map, suns] = dotted(512, 256, 40);
     assert_same_picture("40 of 512 × 256", &map, &suns, [64, 4], 16);
-    assert_same_picture("the same with path", &path(map), &suns, [64, 4], 16);
+    assert_same_picture("path, 40 of 512 × 256", &path(map), &suns, [64, 4], 16);
 }
 
-/// Ignored by default: ten seconds of processor time,
-/// `cargo test --release --test suite a_thousand_texels -- --ignored`.
+/// Ignored by default because it takes ten seconds of CPU time: `cargo test --release --test suite
+/// a_thousand_texels -- --ignored`.
 #[test]
 #[ignore = "ten seconds: cargo test --release --test suite a_thousand_texels -- --ignored"]
-fn a_thousand_texels_act_like_suns() {
+fn a_thousand_texels_match_directional_lights() {
     let [map, suns] = dotted(4096, 2048, 1000);
     assert_same_picture("1000 of 4096 × 2048", &map, &suns, [64, 1], 16);
-    assert_same_picture("the same with path", &path(map), &suns, [64, 1], 16);
+    assert_same_picture("path, 1000 of 4096 × 2048", &path(map), &suns, [64, 1], 16);
 }
 
 #[test]

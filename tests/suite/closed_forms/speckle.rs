@@ -1,4 +1,4 @@
-//! Cubes from many sides: no ray inside the silhouette misses, and every ray hits a front.
+//! Cubes viewed from many directions: every ray within the silhouette hits a front face.
 
 use glimt::geometry::Ray;
 use glimt::geometry::mesh::TriangleMesh;
@@ -8,7 +8,7 @@ use glimt::scene::description::Accel;
 use super::scenes::{AS_IT_IS, Build, matte, scene};
 use super::{Random, v};
 
-/// Distance at which a ray enters the cube [−h, h]³. `None` if it misses.
+/// Distance at which a ray enters the cube [−h, h]³. `None` if it misses the cube.
 fn entry(ray: &Ray, h: f64) -> Option<f64> {
     let (o, d) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
     let (a, b) = ((DVec3::splat(-h) - o) / d, (DVec3::splat(h) - o) / d);
@@ -20,7 +20,7 @@ fn boxes() -> Build {
     scene().cuboid(DVec3::ZERO, DVec3::splat(2.0), DVec3::ZERO, matte(0.5))
 }
 
-/// 27 touching boxes whose outside is the same cube.
+/// 27 touching boxes that form a cube.
 fn grid() -> Build {
     let third = 2.0 / 3.0;
     (0..27).fold(scene(), |build, i| {
@@ -52,7 +52,7 @@ fn triangles() -> Build {
     })
 }
 
-/// Every face as 8 × 8 squares: splitting planes pass through their edges.
+/// A cube with 8 × 8 squares per face, so that splitting planes pass through edges.
 fn mesh(accel: Accel) -> Build {
     let mut mesh = TriangleMesh::default();
     for [c, u, w] in faces() {
@@ -73,8 +73,8 @@ fn cubes_do_not_speckle() {
         ("grid", grid()),
         ("quads", quads()),
         ("triangles", triangles()),
-        ("mesh in a bvh", mesh(Accel::Bvh)),
-        ("mesh in a kd-tree", mesh(Accel::KdTree)),
+        ("mesh, BVH", mesh(Accel::Bvh)),
+        ("mesh, k-d tree", mesh(Accel::KdTree)),
     ] {
         let mut random = Random(7);
         let geometry = build.world().geometry;
@@ -82,7 +82,7 @@ fn cubes_do_not_speckle() {
         for _ in 0..1000 {
             let eye = random.direction() * 6.0;
             for _ in 0..50 {
-                // A third of the rays aim at an edge where pieces meet.
+                // Aim a third of the rays at an edge between pieces.
                 let mut target = v(random.signed(), random.signed(), random.signed());
                 if random.unit() < 0.3 {
                     target.x = if target.x < 0.0 { -1.0 / 3.0 } else { 1.0 };
@@ -94,11 +94,11 @@ fn cubes_do_not_speckle() {
                     continue;
                 }
                 inside += 1;
-                let Some(hit) = geometry.closest(&ray) else { panic!("{what}: a hole in {ray:?}") };
-                let exact = entry(&ray, 1.0).expect("the larger cube contains the smaller one");
+                let Some(hit) = geometry.closest(&ray) else { panic!("{what}: missed by {ray:?}") };
+                let exact = entry(&ray, 1.0).expect("the ray hits the smaller cube");
                 assert!((f64::from(hit.shape.t) / exact - 1.0).abs() < 1e-5, "{what}: {ray:?}");
                 let surface = geometry.surface(&ray, &hit);
-                assert!(surface.normal.dot(ray.direction) < 0.0, "{what}: a back in {ray:?}");
+                assert!(surface.normal.dot(ray.direction) < 0.0, "{what}: back face hit by {ray:?}");
             }
         }
         assert!(inside > 10_000);

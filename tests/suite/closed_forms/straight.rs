@@ -1,4 +1,4 @@
-//! Light that passes straight through: thin panes and partial opacity.
+//! Straight transmission: thin panes and partial opacity.
 
 use std::f64::consts::PI;
 
@@ -27,7 +27,7 @@ fn path(build: Build) -> Build {
     build.with(|scene| scene.render.integrator = Integrator::Path)
 }
 
-/// Reflectance of a pane with n = 1.5: 2R/(1 + R), with R from Fresnel's sine and tangent laws.
+/// Reflectance of a pane with n = 1.5: 2R/(1 + R), where R follows from Fresnel's sine and tangent laws.
 fn reflectance(i: f64) -> f64 {
     let t = (i.sin() / 1.5).asin();
     let r = if i == 0.0 {
@@ -38,37 +38,37 @@ fn reflectance(i: f64) -> f64 {
     2.0 * r / (1.0 + r)
 }
 
-/// A large square that a ray along −z hits at a given depth, rotated about x.
+/// A large square at depth `z`, rotated around the x axis.
 fn sheet(build: Build, z: f64, degrees: f64, material: Material) -> Build {
     let (sin, cos) = degrees.to_radians().sin_cos();
     let (u, w) = (v(2e3, 0.0, 0.0), v(0.0, cos, sin) * 2e3);
     build.quad(v(0.0, 0.0, z) - (u + w) * 0.5, u, w, material)
 }
 
-/// A light that fills the view behind.
+/// A light that fills the background.
 fn lamp_at(build: Build, z: f64) -> Build {
     sheet(build, z, 0.0, emitter(1.0))
 }
 
-/// Checks that means agree within their errors.
+/// Checks that two means agree within their standard errors.
 #[track_caller]
 fn assert_same(what: &str, a: &[f64], b: &[f64]) {
     let [a, b] = [mean_and_error(a), mean_and_error(b)];
-    assert!(a.0 > 0.0 && (a.0 - b.0).abs() <= 3.5 * a.1.hypot(b.1), "{what}: {a:?} {b:?}");
+    assert!(a.0 > 0.0 && (a.0 - b.0).abs() <= 3.5 * a.1.hypot(b.1), "{what}: {a:?} vs. {b:?}");
 }
 
 #[test]
 fn pane_transmits_by_angle() {
     for degrees in [0.0_f64, 30.0, 60.0, 80.0] {
         let exact = 0.9 * (1.0 - reflectance(degrees.to_radians()));
-        // The pane's reflection misses the light.
+        // The light is too small to be visible in the pane's reflection.
         let lamp = [v(-10.0, -10.0, -2e3), v(20.0, 0.0, 0.0), v(0.0, 20.0, 0.0)];
         let build = sheet(scene(), -2.0, degrees, pane(0.9));
         let seen = build.quad(lamp[0], lamp[1], lamp[2], emitter(1.0));
         for depth in [0, 8] {
-            assert_close(&format!("{degrees}° at depth {depth}"), seen.clone().depth(depth).value(), exact);
+            assert_close(&format!("{degrees}°, depth {depth}"), seen.clone().depth(depth).value(), exact);
         }
-        assert_mean(&format!("{degrees}°, by paths"), &path(seen).values(37, 256), exact);
+        assert_mean(&format!("{degrees}°, path"), &path(seen).values(37, 256), exact);
     }
 }
 
@@ -80,15 +80,15 @@ fn textured_tint_colors_transmitted_light() {
     let stained = plain(MaterialKind::Pane { ior: 1.5, tint: ColorSource::Texture(texture) });
     let [left, right] =
         [DVec3::new(0.9, 0.2, 0.1), DVec3::new(0.1, 0.3, 1.0)].map(|tint| tint * (1.0 - 0.08 / 1.04));
-    // Seen through both halves.
+    // The light through both halves of the window.
     let window = build.quad(v(-1.0, -1.0, -2.0), v(2.0, 0.0, 0.0), v(0.0, 2.0, 0.0), stained);
     for build in [lamp_at(window.clone(), -4.0), path(lamp_at(window.clone(), -4.0))] {
         for (x, exact) in [(-0.5, left), (0.5, right)] {
             let seen = build.clone().seen(v(x, 0.0, 0.0), v(x, 0.0, -1.0)).depth(0).color();
-            assert!((seen - exact).length() < 1e-5, "{seen} is not {exact}");
+            assert!((seen - exact).length() < 1e-5, "{seen}, expected {exact}");
         }
     }
-    // On a floor behind it, lit by a small distant light.
+    // The transmitted light on a wall behind the window, from a small distant light.
     let floor = |x: f64| {
         window
             .clone()
@@ -99,13 +99,13 @@ fn textured_tint_colors_transmitted_light() {
     };
     for (x, exact) in [(-0.5, left), (0.5, right)] {
         let (seen, exact) = (floor(x), exact * (0.5 / PI));
-        assert!((seen - exact).length() < 1e-3, "{seen} is not {exact}");
+        assert!((seen - exact).length() < 1e-3, "{seen}, expected {exact}");
     }
 }
 
 #[test]
 fn a_pane_reflects_the_rest() {
-    // The pane at 60° deflects the ray by 60°, down to the light.
+    // The pane at 60° reflects the ray down to the light.
     let seen = sheet(scene(), -2.0, 60.0, pane(0.9)).quad(
         v(-1e3, -500.0, 1e3),
         v(2e3, 0.0, 0.0),
@@ -115,10 +115,10 @@ fn a_pane_reflects_the_rest() {
     let exact = reflectance(PI / 3.0);
     assert_close("reflected", seen.clone().depth(1).value(), exact);
     assert_eq!(seen.clone().depth(0).value(), 0.0);
-    assert_mean("by paths", &path(seen).depth(1).values(256, 64), exact);
+    assert_mean("path", &path(seen).depth(1).values(256, 64), exact);
 }
 
-/// A receiver under a round light of radius 1 at height 2, on its axis, with something in between.
+/// A receiver on the axis of a disk light with radius 1 at height 2, with the objects added by `between`.
 fn under_lamp(between: impl Fn(Build) -> Build) -> Build {
     let disk = Shape::Disk { center: v(0.0, 2.0, 0.0), normal: DVec3::NEG_Y, radius: 1.0 };
     between(receiver(DVec3::ZERO, 0.7)).shape(disk, emitter(1.0))
@@ -130,7 +130,7 @@ fn level(build: Build, y: f64, material: Material) -> Build {
 
 #[test]
 fn light_passes_through_panes() {
-    // E = 2π·∫(1 − R')ⁿ·cos θ·sin θ dθ up to tan θ = ½.
+    // E = 2π·∫(1 − R')ⁿ·cos θ·sin θ dθ, where R' is the pane's reflectance, up to tan θ = ½.
     let irradiance = |count: i32, tint: f64| {
         let (steps, end) = (2000, 0.5_f64.atan());
         let of = |k: i32| {
@@ -149,15 +149,15 @@ fn light_passes_through_panes() {
             let values = lit.clone().shadows(Shadows::Soft, samples).values(256 / samples, 256);
             assert_mean(&format!("{count} panes, {samples} shadow rays"), &values, exact);
         }
-        assert_mean(&format!("{count} panes, path-traced"), &path(lit.clone()).values(256, 256), exact);
-        // Photons add nothing to light that passes straight through.
-        assert_mean(&format!("{count} panes, with photons"), &lit.photons(4096, 0.1).values(16, 64), exact);
+        assert_mean(&format!("{count} panes, path"), &path(lit.clone()).values(256, 256), exact);
+        // Photons must not add to the straight transmission.
+        assert_mean(&format!("{count} panes, photons"), &lit.photons(4096, 0.1).values(16, 64), exact);
     }
 }
 
 #[test]
 fn whitted_with_photons_matches_path() {
-    // Light reflected by a pane, and interreflections between the receiver and the pane.
+    // Light reflected by a pane and a half-transparent mirror, including interreflections.
     let lit = under_lamp(|build| {
         let build = level(build, 0.5, pane(0.9));
         build.quad(v(-1.0, 0.2, -1.0), v(2.0, 0.0, 0.0), v(0.0, 2.5, 0.0), veiled(mirror(0.9), 0.5)).quad(
@@ -173,13 +173,13 @@ fn whitted_with_photons_matches_path() {
 }
 
 #[test]
-fn half_opacity_shows_the_mean_of_both_sides() {
-    // Radiance 4 with opacity .25, in front of radiance 1.
+fn opacity_blends_surface_and_background() {
+    // Radiance 4 with opacity 0.25 in front of radiance 1.
     let seen = lamp_at(sheet(scene(), -2.0, 20.0, veiled(emitter(4.0), 0.25)), -9.0);
     for build in [seen.clone(), path(seen)] {
         assert_mean("both", &build.values(256, 64), 0.25 * 4.0 + 0.75);
     }
-    // Black mirrors with various opacities and cutoffs.
+    // Black mirrors with different opacities and cutoffs.
     let cut = |opacity, cutoff| {
         let mut material = veiled(mirror(0.0), opacity);
         material.opacity.cutoff = cutoff;
@@ -211,7 +211,7 @@ fn shadows_multiply_transmittances() {
             assert_eq!(value(&[0.3, 1.0]), 0.0);
         }
     }
-    // One ray to the center of a light gives the same; without shadows nothing attenuates.
+    // A single ray to the light's center is also attenuated. Without shadows, nothing attenuates.
     let under = |shadows| {
         let lit = under_lamp(|build| level(build, 1.0, veiled(matte(0.5), 0.3)));
         mean_and_error(&lit.shadows(shadows, 1).values(256, 64)).0
@@ -220,7 +220,7 @@ fn shadows_multiply_transmittances() {
 }
 
 #[test]
-fn camera_ray_passes_64_surfaces() {
+fn camera_ray_passes_up_to_64_surfaces() {
     let seen = |count: u32| {
         let build = (0..count)
             .fold(scene(), |build, i| sheet(build, -1.0 - f64::from(i), 0.0, veiled(matte(0.5), 0.0)));
@@ -239,7 +239,7 @@ fn camera_ray_passes_64_surfaces() {
 }
 
 #[test]
-fn half_opaque_lights_emit_half() {
+fn light_emission_is_scaled_by_opacity() {
     let full = mean_and_error(&under_lamp(|build| build).values(256, 64)).0;
     assert_close("the formula", full, 0.7 / 5.0);
     let disk = Shape::Disk { center: v(0.0, 2.0, 0.0), normal: DVec3::NEG_Y, radius: 1.0 };
@@ -250,8 +250,9 @@ fn half_opaque_lights_emit_half() {
 }
 
 #[test]
-fn half_opaque_lights_shine_through_themselves() {
-    // A convex two-sided light with opacity o has radiance o in front and (1 − o)·o from behind.
+fn half_opaque_lights_transmit_their_own_light() {
+    // A convex two-sided light with opacity o has radiance o from the front surface and (1 − o)·o from the
+    // back surface.
     let outside = receiver(v(3.0, 0.0, 0.0), 0.7);
     let (center, o) = (v(3.0, 2.0, 0.0), 0.4);
     let lit = |shape: &Shape, opacity: f32, sides: EmissionSides| {
@@ -278,11 +279,11 @@ fn half_opaque_lights_shine_through_themselves() {
             let (mean, error) = mean_and_error(&build.values(256, 128));
             assert!(
                 (mean - exact).abs() < 4.0 * error + 2e-3 * exact,
-                "{name} with {what}: {mean}, not {exact}"
+                "{name} with {what}: {mean}, expected {exact}"
             );
         }
     }
-    // Shapes that occlude themselves have no closed form.
+    // There is no closed form for shapes that occlude themselves.
     for shape in [
         Shape::Cylinder { a: center, b: center + v(1.0, 0.5, 0.1), radius: 0.5, caps: false },
         Shape::Torus { center, axis: v(0.2, 1.0, 0.3), radius: 1.0, tube: 0.3 },
@@ -295,8 +296,9 @@ fn half_opaque_lights_shine_through_themselves() {
 }
 
 #[test]
-fn opacity_texture_shapes_lights_and_shadows() {
-    // A square of side 2 at height 1, opaque only on its left half: as a light, and as a screen in front of a sky.
+fn opacity_texture_masks_lights_and_shadows() {
+    // A square with side 2 at height 1, opaque only in its left half, as a light and as a screen in front of
+    // the sky.
     let square = |material: Material, build: Build| {
         build.quad(v(-1.0, 1.0, -1.0), v(2.0, 0.0, 0.0), v(0.0, 0.0, 2.0), material)
     };
@@ -320,15 +322,15 @@ fn opacity_texture_shapes_lights_and_shadows() {
 }
 
 #[test]
-fn furnace_with_panes_stays_one() {
+fn furnace_with_panes_has_radiance_one() {
     let build = scene()
         .environment(1.0)
         .sphere(v(0.0, 0.0, -6.0), 1.0, matte(1.0))
         .sphere(v(0.0, 0.0, -6.0), 1.5, pane(1.0))
         .sphere(v(0.5, 0.5, -6.0), 2.5, veiled(mirror(1.0), 0.4));
     let build = sheet(sheet(build, -2.0, 30.0, pane(1.0)), -2.5, -50.0, veiled(pane(1.0), 0.5)).depth(10_000);
-    assert_mean("by paths", &path(build).values(256, 64), 1.0);
-    // Without diffuse surfaces, whitted finds all light.
+    assert_mean("path", &path(build).values(256, 64), 1.0);
+    // Without diffuse surfaces, whitted includes all light.
     let clear =
         sheet(sheet(scene().environment(1.0), -2.0, 30.0, pane(1.0)), -4.0, -50.0, pane(1.0)).depth(60);
     let (mean, _) = mean_and_error(&clear.values(64, 16));
@@ -337,7 +339,7 @@ fn furnace_with_panes_stays_one() {
 
 #[test]
 fn highlights_pass_partial_opacity() {
-    // A sharp lobe traces its own rays, which pass through as shadow rays and paths do.
+    // Sharp lobes trace separate rays, which must pass through partial opacity like shadow rays and paths.
     let lit = |material: Material| {
         scene()
             .quad(v(-9.0, 0.0, 9.0), v(18.0, 0.0, 0.0), v(0.0, 0.0, -18.0), phong(0.2, 0.7, 3000.0, 0.0))
@@ -355,7 +357,8 @@ fn highlights_pass_partial_opacity() {
 
 #[test]
 fn merged_small_meshes_attenuate_separately() {
-    // Grids of 8 × 8 squares, enough for a common tree; the solid one is off the light's path.
+    // Grids of 8 × 8 squares, small enough to share a tree. With `shift`, the opaque grid does not block the
+    // light.
     let grid = |y: f64, x: f64| {
         let mut mesh = TriangleMesh::default();
         for i in 0..9 {

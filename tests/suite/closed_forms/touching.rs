@@ -1,5 +1,5 @@
-//! Glass that touches or overlaps other glass or opaque surfaces: both surfaces count, in any order in the file, at any
-//! angle.
+//! Glass that touches or overlaps other glass or opaque surfaces. Both surfaces count, regardless of file
+//! order and angle.
 
 use glimt::geometry::mesh::TriangleMesh;
 use glimt::materials::Dielectric;
@@ -12,7 +12,8 @@ use super::global::by_paths;
 use super::scenes::{self, AS_IT_IS, Build, emitter, file_material, glass, matte, mirror, scene};
 use super::{Random, assert_close, mean_and_error, v};
 
-/// Unpolarized reflectance between indices `n` and `m` of a ray whose sine in air is `sine`, from Fresnel's amplitudes.
+/// Unpolarized reflectance between IORs `n` and `m` from the Fresnel equations. `sine` is the sine of the
+/// ray's angle in air.
 fn fresnel(n: f64, m: f64, sine: f64) -> f64 {
     let cosine = |n: f64| (1.0 - (sine / n).powi(2)).sqrt();
     let (a, b) = (cosine(n), cosine(m));
@@ -21,11 +22,11 @@ fn fresnel(n: f64, m: f64, sine: f64) -> f64 {
     0.5 * (across * across + along * along)
 }
 
-/// Reflectance and transmittance of a stack of layers in air, adding one surface after another: between the stack so
-/// far and the next surface, the interreflections form a geometric series.
+/// Reflectance and transmittance of a stack of layers in air. Adds one surface at a time; interreflections
+/// between the previous surfaces and the new one form a geometric series.
 fn layers(indices: &[f64], sine: f64) -> (f64, f64) {
     let media: Vec<f64> = [1.0].iter().chain(indices).chain(&[1.0]).copied().collect();
-    // The stack so far: reflected from above, reflected from below, transmitted.
+    // Reflectance from above, reflectance from below, and transmittance of the previous surfaces.
     let (mut above, mut below, mut passed) = (0.0, 0.0, 1.0);
     for pair in media.windows(2) {
         let r = fresnel(pair[0], pair[1], sine);
@@ -39,7 +40,8 @@ fn layers(indices: &[f64], sine: f64) -> (f64, f64) {
 
 #[test]
 fn layer_formula_matches_known_values() {
-    // A slab: (1 − R)/(1 + R); n = 1.5 and 2: 1/T − 1 is the sum of R/(1 − R), 1/24 + 1/48 + 1/8.
+    // A slab transmits (1 − R)/(1 + R). For n = 1.5 and 2, 1/T − 1 is the sum of R/(1 − R): 1/24 + 1/48 +
+    // 1/8.
     let (r, t) = layers(&[1.5], 0.0);
     assert_close("passed", t, 0.96 / 1.04);
     assert_close("reflected", r, 0.08 / 1.04);
@@ -47,7 +49,7 @@ fn layer_formula_matches_known_values() {
     assert_close("45°", layers(&[1.5], 0.5_f64.sqrt()).1, 0.904_326_79);
 }
 
-/// A scene that is rotated as a whole.
+/// Rotation of a whole scene.
 #[derive(Clone, Copy)]
 struct Turned {
     degrees: DVec3,
@@ -69,7 +71,7 @@ impl Turned {
         Shape::Box { center, size: high - low, rotate: self.degrees }
     }
 
-    /// A square at y = `height` around the axis, facing up.
+    /// A square at y = `height`, centered on the axis and facing up.
     fn square(&self, height: f64, half: f64) -> Shape {
         let [corner, u, v] = [v(-half, height, half), v(2.0 * half, 0.0, 0.0), v(0.0, 0.0, -2.0 * half)];
         Shape::Quad { corner: self.axes * corner, u: self.axes * u, v: self.axes * v }
@@ -80,15 +82,15 @@ impl Turned {
     }
 }
 
-/// Checks that the mean over seeds is within a fraction of the exact value.
+/// Checks that the mean over seeds is exact to within a fraction of the value.
 #[track_caller]
 fn assert_within(what: &str, build: &Build, samples: u32, exact: f64, part: f64) {
     let (mean, error) = mean_and_error(&build.values(samples, 16));
-    assert!(error <= 0.4 * part * exact, "{what}: {mean} ± {error} is too noisy");
-    assert!((mean - exact).abs() <= part * exact, "{what}: {mean} ± {error} is not {exact}");
+    assert!(error <= 0.4 * part * exact, "{what}: too noisy: {mean} ± {error}");
+    assert!((mean - exact).abs() <= part * exact, "{what}: {mean} ± {error}, expected {exact}");
 }
 
-/// Layers of glass, the first on top below y = 0, in the file order given by `order`.
+/// Layers of glass below y = 0, starting with the top layer. `order` is their order in the scene.
 fn stack(turned: &Turned, layers: &[(f64, f64)], order: &[usize], half: f64) -> Build {
     let mut tops = vec![0.0];
     for (_, thickness) in layers {
@@ -101,21 +103,21 @@ fn stack(turned: &Turned, layers: &[(f64, f64)], order: &[usize], half: f64) -> 
 }
 
 #[test]
-fn boxes_sharing_a_face_act_as_layers() {
+fn boxes_sharing_a_face_match_layers() {
     let level = Turned::by(DVec3::ZERO);
     let exact = layers(&[1.5, 2.0], 0.0).1;
     for order in [[0, 1], [1, 0]] {
         let both = stack(&level, &[(1.5, 1.0), (2.0, 1.0)], &order, 500.0).depth(200);
         let both = both.seen(v(0.3, 2.0, 0.2), v(0.3, 0.0, 0.2));
         let white = both.clone().background(1.0);
-        assert_within(&format!("{order:?}, white all around"), &white, 16, 1.0, 1e-3);
+        assert_within(&format!("{order:?}, white background"), &white, 16, 1.0, 1e-3);
         let lamp = both.shape(level.square(-3.0, 5000.0), emitter(1.0));
-        assert_within(&format!("{order:?}, over a light"), &lamp, 512, exact, 2e-3);
+        assert_within(&format!("{order:?}, above a light"), &lamp, 512, exact, 2e-3);
     }
 }
 
 #[test]
-fn equal_indices_are_no_boundary() {
+fn no_boundary_between_equal_iors() {
     let level = Turned::by(DVec3::ZERO);
     let lamp_under = |index: f64, depth: u32| {
         stack(&level, &[(index, 1.0); 3], &[0, 1, 2], 500.0)
@@ -123,17 +125,17 @@ fn equal_indices_are_no_boundary() {
             .seen(v(0.3, 2.0, 0.2), v(0.3, 0.0, 0.2))
             .depth(depth)
     };
-    // Two bounces pass three boxes of one index, and no bounce is needed for boxes of air.
-    assert_within("boxes of one index", &lamp_under(1.5, 2), 512, 0.96 * 0.96, 2e-3);
-    assert_within("by paths", &by_paths(lamp_under(1.5, 2), 2), 2048, 0.96 * 0.96, 5e-3);
+    // Passing three boxes with the same IOR takes two bounces. Boxes of air take none.
+    assert_within("boxes with equal IORs", &lamp_under(1.5, 2), 512, 0.96 * 0.96, 2e-3);
+    assert_within("path", &by_paths(lamp_under(1.5, 2), 2), 2048, 0.96 * 0.96, 5e-3);
     for air in [lamp_under(1.0, 0), by_paths(lamp_under(1.0, 0), 0)] {
         assert_eq!(air.value(), 1.0);
     }
 }
 
 #[test]
-fn gaps_and_overlaps_down_to_rounding() {
-    // A gap adds two surfaces, of glass and air; an overlap belongs to the later solid.
+fn gaps_and_overlaps_match_layers() {
+    // A gap adds two surfaces between glass and air. An overlap belongs to the later solid.
     let level = Turned::by(DVec3::ZERO);
     let touching = layers(&[1.5, 2.0], 0.0).1;
     let apart = layers(&[1.5, 1.0, 2.0], 0.0).1;
@@ -150,7 +152,7 @@ fn gaps_and_overlaps_down_to_rounding() {
             assert_within(&format!("gap {gap}, {later} later"), &both, 512, exact, 2e-3);
         }
     }
-    // Below rounding, either result is correct.
+    // For gaps below the rounding error, either result is correct.
     for gap in [1e-7, 3e-8] {
         let top = level.cuboid(v(-500.0, 0.0, -500.0), v(500.0, 1.0, 500.0));
         let bottom = level.cuboid(v(-500.0, -1.0, -500.0), v(500.0, -gap, 500.0));
@@ -158,12 +160,12 @@ fn gaps_and_overlaps_down_to_rounding() {
         let both = both.shape(level.square(-3.0, 5000.0), emitter(1.0));
         let (mean, _) = mean_and_error(&both.seen(v(0.3, 2.0, 0.2), v(0.3, 0.0, 0.2)).values(512, 16));
         let off = |exact: f64| (mean - exact).abs() / exact;
-        assert!(off(touching).min(off(apart)) < 2e-3, "gap {gap}: {mean} is not {touching} or {apart}");
+        assert!(off(touching).min(off(apart)) < 2e-3, "gap {gap}: {mean}, expected {touching} or {apart}");
     }
 }
 
 #[test]
-fn random_stacks_of_boxes_act_as_layers() {
+fn random_box_stacks_match_layers() {
     let mut random = Random(2026);
     for round in 0..40 {
         let turned = if round % 8 == 0 { Turned::by(DVec3::ZERO) } else { Turned::any(&mut random) };
@@ -180,10 +182,10 @@ fn random_stacks_of_boxes_act_as_layers() {
         let build = stack(&turned, &own, &order, 300.0).shape(lamp, emitter(1.0)).depth(400);
         let at = v(random.signed(), 0.0, random.signed());
         let build = turned.seen(build, at + v(angle.sin(), angle.cos(), 0.0) * 3.0, at);
-        // The indices in single precision.
+        // Round the IORs to single precision.
         let indices: Vec<f64> = own.iter().map(|layer| f64::from(layer.0 as f32)).collect();
         let (_, exact) = layers(&indices, angle.sin());
-        let what = format!("round {round}: {own:?} in the order {order:?} at {}°", angle.to_degrees());
+        let what = format!("round {round}: {own:?}, order {order:?}, {}°", angle.to_degrees());
         assert_within(&what, &build, 512, exact, 2e-3);
     }
 }
@@ -199,14 +201,15 @@ fn a_drink_in_a_glass() {
             radius,
             caps: true,
         };
-        // A full glass: the drink shares the upper face; from above, air to 1.33, 1.33 to 1.5, 1.5 to air.
+        // A full glass whose drink shares its upper face. From above: air to 1.33, 1.33 to 1.5, 1.5 to air.
         let full = scene().shape(bar(0.0, 2.0, 1.0), glass(1.5)).shape(bar(0.2, 2.0, 0.9), glass(1.33));
         let full = full.shape(turned.square(-1.0, 5000.0), emitter(1.0)).depth(200);
         let n = f64::from(1.33_f32);
         let what = format!("full, round {round}");
         let seen = turned.seen(full, v(0.05, 4.0, 0.02), v(0.05, 0.0, 0.02));
         assert_within(&what, &seen, 512, layers(&[n, 1.5], 0.0).1, 2e-3);
-        // A hollow glass with an inside of air, filled up to the wall: through the axis from the side.
+        // A hollow glass with air inside, half filled, with the drink touching the wall. Viewed from the side
+        // through the axis.
         let half = scene()
             .shape(bar(0.0, 2.0, 1.0), glass(1.5))
             .shape(bar(0.2, 2.0, 0.9), glass(1.0))
@@ -216,7 +219,7 @@ fn a_drink_in_a_glass() {
         let half = half.shape(Shape::Quad { corner, u: across, v: up }, emitter(1.0)).depth(200);
         let side = turned.seen(half.clone(), v(-4.0, 0.6, 0.0), v(0.0, 0.6, 0.0));
         assert_within(&format!("side, round {round}"), &side, 512, layers(&[1.5, n, 1.5], 0.0).1, 2e-3);
-        // Above the drink there is air.
+        // Above the drink, the glass contains air.
         let above = turned.seen(half, v(-4.0, 1.5, 0.0), v(0.0, 1.5, 0.0));
         assert_within(&format!("above, round {round}"), &above, 512, layers(&[1.5, 1.0, 1.5], 0.0).1, 2e-3);
     }
@@ -230,7 +233,7 @@ fn coincident_and_inscribed_balls() {
     let through = |build: Build| lamp(build).seen(v(0.0, 4.0, 0.0), DVec3::ZERO);
     let center = v(0.0, 0.1, 0.0);
     for (one, other) in [(1.5, 1.5), (2.0, 1.5), (1.3, 1.5)] {
-        // Coincident: the later ball counts.
+        // Of two coincident balls, the later one counts.
         let twice = scene().sphere(center, 1.0, glass(one)).sphere(center, 1.0, glass(other));
         assert_within(&format!("{one} and {other}"), &through(twice), 512, layers(&[1.5], 0.0).1, 2e-3);
         let boxes = scene().cuboid(center, v(2.0, 3.0, 4.0), DVec3::ZERO, glass(one)).cuboid(
@@ -239,24 +242,24 @@ fn coincident_and_inscribed_balls() {
             DVec3::ZERO,
             glass(other),
         );
-        assert_within(&format!("boxes {one}, {other}"), &through(boxes), 512, layers(&[1.5], 0.0).1, 2e-3);
+        assert_within(&format!("boxes {one} and {other}"), &through(boxes), 512, layers(&[1.5], 0.0).1, 2e-3);
     }
-    // The ball touches the box from inside where the axis passes: above and below there is only the ball.
+    // The ball touches the box from inside on the axis, so only the ball's glass is on the axis.
     let inside =
         scene().cuboid(center, DVec3::splat(2.0), DVec3::ZERO, glass(1.5)).sphere(center, 1.0, glass(2.0));
     assert_within("ball in a box", &through(inside), 512, layers(&[2.0], 0.0).1, 2e-3);
-    // A ball on a glass table, through the point of contact.
+    // A ball on a glass table, viewed through the point of contact.
     let table = scene().cuboid(v(0.0, -1.5, 0.0), v(20.0, 1.0, 20.0), DVec3::ZERO, glass(1.5));
     let on_table = table.sphere(DVec3::ZERO, 1.0, glass(2.0));
     assert_within("on a table", &through(on_table), 512, layers(&[2.0, 1.5], 0.0).1, 2e-3);
 }
 
 #[test]
-fn touching_meshes_act_as_layers() {
+fn touching_meshes_match_layers() {
     let mut random = Random(11);
     for round in 0..12 {
         let turned = if round == 0 { Turned::by(DVec3::ZERO) } else { Turned::any(&mut random) };
-        // Aimed next to the diagonal of the faces.
+        // Aim close to the faces' diagonal.
         let eye = v(0.13, 3.0, -0.08) + v(0.1, 0.0, 0.05) * random.signed();
         let at = eye - v(0.0, 3.0, 0.0);
         let lamp = |build: Build| build.shape(turned.square(-5.0, 5000.0), emitter(1.0)).depth(200);
@@ -271,7 +274,7 @@ fn touching_meshes_act_as_layers() {
             let what = format!("mesh on a box, round {round}, {later}");
             assert_within(&what, &seen, 512, layers(&[1.5, 2.0], 0.0).1, 2e-3);
         }
-        // Two parts of one mesh, of different glass, share a face that they triangulate differently.
+        // Two parts of a mesh with different glass share a face with different triangulations.
         let parts = boxes(&[(v(0.0, -0.5, 0.0), 1.0, 0), (v(0.2, -1.75, 0.1), 1.5, 1)]);
         let turn = |mut mesh: glimt::geometry::mesh::TriangleMesh| {
             for p in &mut mesh.positions {
@@ -282,11 +285,11 @@ fn touching_meshes_act_as_layers() {
         let parts = scene().own_mesh(turn(parts), vec![file_material(9, 1.5), file_material(9, 2.0)]);
         let seen = turned.seen(lamp(parts), eye, at);
         assert_within(&format!("parts, round {round}"), &seen, 512, layers(&[1.5, 2.0], 0.0).1, 2e-3);
-        // Between parts of the same glass there is no surface.
+        // There is no surface between parts with the same glass.
         let same = boxes(&[(v(0.0, -0.5, 0.0), 1.0, 0), (v(0.2, -1.75, 0.1), 1.5, 0)]);
         let same = scene().mesh(turn(same), AS_IT_IS, glass(1.5));
         let seen = turned.seen(lamp(same), eye, at);
-        assert_within(&format!("one glass, round {round}"), &seen, 512, layers(&[1.5], 0.0).1, 2e-3);
+        assert_within(&format!("same glass, round {round}"), &seen, 512, layers(&[1.5], 0.0).1, 2e-3);
     }
 }
 
@@ -305,14 +308,15 @@ fn glass_on_an_opaque_surface() {
         };
         for first in [false, true] {
             let what = |of: &str| format!("{of}, round {round}, floor first: {first}");
-            // Only the upper face transmits the floor's emission; the floor absorbs what it reflects.
+            // Only transmission through the upper face contributes. The floor absorbs the light that this
+            // face reflects.
             assert_within(&what("lamp"), &stood(emitter(1.0), first), 16, 1.0 - r, 1e-4);
             // r + (1 − r)²·m·Σ(m·r)ᵏ.
             let mirrored = stood(mirror(0.5), first).background(1.0);
             let exact = r + (1.0 - r).powi(2) * 0.5 / (1.0 - 0.5 * r);
             assert_within(&what("mirror"), &mirrored, 512, exact, 2e-3);
             assert_within(&what("lossless"), &stood(mirror(1.0), first).background(1.0), 512, 1.0, 1e-3);
-            // A light hangs from the ceiling: from below, the camera sees the floor's back and no glass.
+            // From below, the camera sees only the back of the floor, which does not emit.
             let below = turned.seen(stood(emitter(1.0), first), v(0.2, -4.0, 0.1), v(0.2, 0.0, 0.1));
             assert_eq!(below.background(1.0).value(), 0.0, "{}", what("from below"));
         }
@@ -321,7 +325,8 @@ fn glass_on_an_opaque_surface() {
 
 #[test]
 fn tints_apply_within_their_glass() {
-    // Straight down through 1 of one tint and 2 of another, with equal indices: no surface between them reflects.
+    // Straight down through thickness 1 of one tint and 2 of another. Their IORs are equal, so the surface
+    // between them does not reflect.
     let tinted = |tint: f64| scenes::tinted(1.5, DVec3::splat(tint));
     let level = Turned::by(DVec3::ZERO);
     let r = fresnel(1.0, 1.5, 0.0);
@@ -338,8 +343,8 @@ fn tints_apply_within_their_glass() {
 }
 
 #[test]
-fn later_glass_wins_where_solids_overlap() {
-    // From y = 2 to 0 and from 1 to −1: between 1 and 0 the later one counts.
+fn later_glass_determines_overlaps() {
+    // One solid is at y = 0 to 2, the other at −1 to 1. Between 0 and 1, the later solid counts.
     let level = Turned::by(DVec3::ZERO);
     let tinted = |ior: f32, tint: f64| scenes::tinted(ior, DVec3::splat(tint));
     for (order, exact) in [([0, 1], 0.5 * 0.8 * 0.8), ([1, 0], 0.5 * 0.5 * 0.8)] {
@@ -427,8 +432,8 @@ fn white_furnace_of_nested_glass() {
 
 #[test]
 fn ambient_light_in_and_under_glass() {
-    // Lossless glass on a white floor under ambient light 1, surrounded by white: the radiance is 1 everywhere, inside
-    // the glass and outside.
+    // Lossless glass on a white floor under ambient light 1 with a white background. The radiance is 1
+    // everywhere, inside and outside the glass.
     let mut random = Random(17);
     for round in 0..6 {
         let turned = if round == 0 { Turned::by(DVec3::ZERO) } else { Turned::any(&mut random) };
@@ -452,7 +457,7 @@ fn ambient_light_in_and_under_glass() {
     }
 }
 
-/// A box of triangles with exactly the given corners.
+/// A box mesh with exactly the given corners.
 fn block(low: DVec3, high: DVec3) -> TriangleMesh {
     let mut mesh = boxes(&[(DVec3::ZERO, 2.0, 0)]);
     for p in &mut mesh.positions {
@@ -462,7 +467,7 @@ fn block(low: DVec3, high: DVec3) -> TriangleMesh {
     mesh
 }
 
-/// Checks that a white furnace is 1 everywhere.
+/// Checks that a white furnace has value 1 everywhere.
 #[track_caller]
 fn assert_white(what: &str, build: Build) {
     let seen = build.background(1.0).depth(1000).pictured(v(2.2, 1.7, 4.5), DVec3::ZERO, 40.0, 32, 24);
@@ -475,7 +480,7 @@ fn assert_white(what: &str, build: Build) {
 fn mesh_faces_touch_in_coordinate_planes() {
     let one = DVec3::ONE;
     for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
-        // From −1 to 0 along the axis, and from 0 to 1.
+        // Boxes from −1 to 0 and from 0 to 1 along the axis.
         let (below, above) = (
             (-one * 0.5 - axis * 0.5, one * 0.5 - axis * 0.5),
             (axis * 0.5 - one * 0.5, axis * 0.5 + one * 0.5),
@@ -498,7 +503,7 @@ fn mesh_faces_touch_in_coordinate_planes() {
         let pair = mesh(scene().shape(analytic(below), glass(1.5)), above, glass(1.33));
         assert_white(&what("a box and a mesh"), pair);
     }
-    // Eight solids meet at the origin, where rays that hit their own faces again would never end.
+    // Eight solids meet at the origin, where rays that self-intersect would never terminate.
     let eight = (0..8_u32).fold(scene(), |build, i| {
         let low = v(f64::from(i & 1), f64::from(i >> 1 & 1), f64::from(i >> 2)) - one;
         build.mesh(block(low, low + one), AS_IT_IS, glass([1.5, 1.33, 2.4][i as usize % 3]))

@@ -26,7 +26,7 @@ fn at_origin() -> Build {
 fn assert_lit(what: &str, lit: &Build, irradiance: f64) {
     assert_irradiance(what, lit, irradiance);
     let paths = lit.clone().with(|scene| scene.render.integrator = Integrator::Path);
-    assert_mean(&format!("{what}, by paths"), &paths.values(256, 256), 0.7 * irradiance / PI);
+    assert_mean(&format!("{what}, path"), &paths.values(256, 256), 0.7 * irradiance / PI);
 }
 
 #[test]
@@ -36,7 +36,7 @@ fn flat_two_sided_lights_are_symmetric() {
     let polygon = [corner, corner + x, corner + x + z, corner + z];
     let whole = lambert(DVec3::ZERO, DVec3::Y, &polygon);
     let half = lambert(DVec3::ZERO, DVec3::Y, &polygon[..3]);
-    // One of each pair faces up.
+    // Test both orientations.
     for (u, w) in [(x, z), (z, x)] {
         let quad = at_origin().quad(corner, u, w, both());
         assert_lit("quad", &quad, whole);
@@ -61,7 +61,7 @@ fn two_sided_mesh_lights_are_symmetric() {
         triangles: triangles.to_vec(),
         ..TriangleMesh::default()
     };
-    // The winding order decides which side is the front, and a mirroring transform preserves it.
+    // The winding order determines the front side, and a mirroring transform preserves it.
     for (name, mesh) in [
         ("down", of(&[[0, 1, 2], [0, 2, 3]])),
         ("up", of(&[[0, 2, 1], [0, 3, 2]])),
@@ -74,8 +74,8 @@ fn two_sided_mesh_lights_are_symmetric() {
 }
 
 #[test]
-fn enclosing_light_fills_the_hemisphere() {
-    // The whole hemisphere has radiance 1: E = π.
+fn enclosing_light_fills_hemisphere() {
+    // Radiance 1 over the whole hemisphere: E = π.
     let at = v(2.0, 0.0, 0.0);
     let around = |shape: Shape| receiver(at, 0.7).shape(shape, both());
     for shape in [
@@ -92,8 +92,8 @@ fn enclosing_light_fills_the_hemisphere() {
 }
 
 #[test]
-fn open_tube_light_shines_inside() {
-    // From the axis, a disk of radius 1 at height h accounts for π/(1 + h²) of the irradiance.
+fn open_tube_light_emits_inward() {
+    // On the axis, the irradiance from a disk with radius 1 at height h is π/(1 + h²).
     let disk = |h: f64| PI / (1.0 + h * h);
     let tube = |from: f64, to: f64| {
         at_origin().shape(
@@ -103,7 +103,7 @@ fn open_tube_light_shines_inside() {
     };
     assert_lit("from inside", &tube(-0.5, 1.5), PI - disk(1.5));
     assert_lit("from below", &tube(1.0, 2.0), disk(1.0) - disk(2.0));
-    // From the side, the outside hides the inside.
+    // From the side, the outer surface hides the inner surface.
     let outside = receiver(v(3.0, 0.0, 0.0), 0.7);
     let of = |material: Material| {
         let shape = Shape::Cylinder { a: v(0.0, 0.0, 0.0), b: v(0.0, 1.0, 0.0), radius: 1.0, caps: true };
@@ -123,8 +123,8 @@ fn both_sides_are_seen() {
 }
 
 #[test]
-fn two_sided_lights_emit_photons_on_both_sides() {
-    // The light's back faces a mirror that reflects its light to the receiver.
+fn two_sided_lights_emit_photons_both_ways() {
+    // A mirror reflects light from the back of the light to the receiver.
     let lit = receiver(DVec3::ZERO, 0.7).quad(v(-0.5, 1.0, -0.5), v(0.0, 0.0, 1.0), DVec3::X, both()).quad(
         v(-3.0, 2.0, -3.0),
         v(6.0, 0.0, 0.0),

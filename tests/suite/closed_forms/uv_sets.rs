@@ -10,12 +10,12 @@ use glimt::scene::description::{
 use super::scenes::{Build, matte, phong, principled, scene};
 use super::{assert_mean, v};
 
-/// The corners of the wall.
+/// Corners of the wall.
 const CORNERS: [DVec3; 4] = [v(-1.0, -1.0, 0.0), v(1.0, -1.0, 0.0), v(1.0, 1.0, 0.0), v(-1.0, 1.0, 0.0)];
-/// Positions of the corners in the texture.
+/// Texture coordinates of the corners.
 const RIGHT: [Vec2; 4] = [Vec2::new(0.1, 0.2), Vec2::new(1.7, 0.1), Vec2::new(1.9, 1.4), Vec2::new(0.3, 1.2)];
 
-/// A wall that faces +z, with these sets of coordinates.
+/// A wall facing +z with the given sets of texture coordinates.
 fn wall(uvs: &[Vec2], second_uvs: &[Vec2]) -> TriangleMesh {
     TriangleMesh {
         positions: CORNERS.map(|corner| corner.as_vec3()).to_vec(),
@@ -26,14 +26,14 @@ fn wall(uvs: &[Vec2], second_uvs: &[Vec2]) -> TriangleMesh {
     }
 }
 
-/// Adds a texture of six values.
+/// Adds a texture with six texels.
 fn texture(build: &mut Build, filter: TextureFilter) -> usize {
     let row = |values: [f32; 3]| values.map(|x| Vec3::new(x, 0.6 * x, 0.4));
     let rows = [row([0.1, 0.9, 0.4]), row([0.7, 0.3, 0.5])];
     build.texture(&[&rows[0], &rows[1]], filter, Wrap::Repeat, Vec2::ONE)
 }
 
-/// Materials that each look up one texture in a different way.
+/// One material for each kind of texture lookup.
 fn materials(texture: usize) -> Vec<(&'static str, Material)> {
     let number = || NumberSource::Texture { texture, channel: None };
     let lit = phong(0.5, 0.3, 20.0, 0.0);
@@ -59,7 +59,7 @@ fn materials(texture: usize) -> Vec<(&'static str, Material)> {
     ]
 }
 
-/// The image of a wall under an area light and a sky, next to a mirror that reflects light onto it.
+/// Renders the wall next to a floor, under a point light and a constant sky.
 fn picture(build: &Build, mesh: TriangleMesh, material: Material, mirrored: f64) -> Vec<DVec3> {
     let lamp = v(0.5, 1.5, 2.0);
     build
@@ -73,9 +73,10 @@ fn picture(build: &Build, mesh: TriangleMesh, material: Material, mirrored: f64)
         .picture(4, 0)
 }
 
-/// Checks that a lookup with the second set gives the same bits as if that set were the first.
+/// Checks that a lookup with the second set is bit-identical to a lookup with the same coordinates in the
+/// first set.
 #[test]
-fn second_uv_set_gives_the_bits_of_the_first() {
+fn second_uv_set_is_bit_identical_to_first() {
     const OTHER: [Vec2; 4] =
         [Vec2::splat(0.5), Vec2::new(0.6, 0.5), Vec2::new(0.6, 0.7), Vec2::new(0.5, 0.9)];
     for filter in [TextureFilter::Nearest, TextureFilter::Bilinear, TextureFilter::Mipmap] {
@@ -89,9 +90,13 @@ fn second_uv_set_gives_the_bits_of_the_first() {
                     let what = format!("{name}, {filter:?}, {integrator:?}, {mirrored}");
                     let expected = seen(&build, wall(&RIGHT, &[]));
                     assert_eq!(seen(&second, wall(&OTHER, &RIGHT)), expected, "{what}");
-                    assert_eq!(seen(&build, wall(&RIGHT, &OTHER)), expected, "the first: {what}");
-                    assert_ne!(seen(&build, wall(&OTHER, &RIGHT)), expected, "both have light: {what}");
-                    // Without a second set, the first is used.
+                    assert_eq!(seen(&build, wall(&RIGHT, &OTHER)), expected, "first set: {what}");
+                    assert_ne!(
+                        seen(&build, wall(&OTHER, &RIGHT)),
+                        expected,
+                        "the coordinates must have an effect: {what}"
+                    );
+                    // Without a second set, the first set is used.
                     assert_eq!(seen(&second, wall(&RIGHT, &[])), expected, "none: {what}");
                 }
             }
@@ -99,10 +104,10 @@ fn second_uv_set_gives_the_bits_of_the_first() {
     }
 }
 
-/// A wall in a furnace of radiance 1: reflectance from one set and emission from the other, as in glTF files.
+/// A wall in a furnace with radiance 1. As in glTF files, reflectance uses one set and emission the other.
 #[test]
 fn one_material_can_use_both_uv_sets() {
-    // The color changes from left to right in the first set, the emission upwards in the second.
+    // The color changes from left to right in the first set, the emission from bottom to top in the second.
     let first = [Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y];
     let second = [Vec2::ZERO, Vec2::Y, Vec2::ONE, Vec2::X];
     let (colors, lights) = ([0.25, 0.75], [0.5, 2.0]);

@@ -1,4 +1,4 @@
-//! Views of the acceleration structures and of their cost.
+//! Views of the acceleration structures and their cost.
 
 use glimt::geometry::mesh::TriangleMesh;
 use glimt::integrators::View;
@@ -9,7 +9,7 @@ use glimt::scene::description::{Accel, Integrator, Shadows};
 use super::scenes::{AS_IT_IS, Build, matte, scene};
 use super::v;
 
-/// An image of 64 × 64 pixels, each 1/64 wide at a distance of 1, along −z.
+/// A 64 × 64 image along −z. Pixels are 1/64 wide at a distance of 1.
 fn framed(build: Build, view: View) -> Vec<DVec3> {
     let fov = 2.0 * 0.5_f64.atan().to_degrees();
     build.pictured(DVec3::ZERO, DVec3::NEG_Z, fov, 64, 64).viewed(view).picture(64, 2)
@@ -25,22 +25,23 @@ fn ball() -> Build {
 }
 
 #[test]
-fn box_edges_are_drawn_in_place() {
+fn box_edges_are_drawn_at_exact_positions() {
     let (plain, drawn) = (framed(ball(), View::Beauty), framed(ball(), View::Bounds));
-    // The near side appears at ¼, which is 16 pixels from the center, the far one at ⅙, which is 10⅔.
+    // The near side appears at ¼, 16 pixels from the center, and the far side at ⅙, 10⅔ pixels from the
+    // center.
     let root = DVec3::new(1.0, 0.85, 0.1);
     let share = |x, y| (at(&drawn, x, y) - at(&plain, x, y)).dot(root) / (root - at(&plain, x, y)).dot(root);
-    // Inside the box, a line reaches half its width of 1¼ pixels: 0.625 of the last pixel.
+    // Inside the box, a line covers half its width of 1¼ pixels, which is 0.625 of the last pixel.
     for (x, y) in [(47, 20), (16, 40), (30, 16), (33, 47)] {
         assert!((share(x, y) - 0.625).abs() < 0.12, "{x}, {y}: {}", share(x, y));
     }
-    // Nothing is drawn in front of the ball; far edges are faint behind it, and full next to it.
+    // No lines are drawn in front of the ball. Far edges are faint behind the ball and full beside it.
     assert_eq!(at(&drawn, 32, 32), at(&plain, 32, 32));
     assert_eq!(at(&drawn, 50, 32), DVec3::ZERO, "beside the box");
     let faint = share(42, 32);
-    assert!(faint > 0.1 && faint < 0.35, "{faint}: behind the ball");
+    assert!(faint > 0.1 && faint < 0.35, "behind the ball: {faint}");
     let whole = share(42, 22).max(share(21, 22));
-    assert!(whole > 0.5, "{whole}: next to the ball");
+    assert!(whole > 0.5, "beside the ball: {whole}");
 }
 
 #[test]
@@ -51,8 +52,9 @@ fn exposure_does_not_affect_lines() {
 }
 
 #[test]
-fn both_triangle_trees_show_their_boxes() {
-    // Two triangles side by side, a unit apart: their boxes, or the cells on both sides of a splitting plane.
+fn bvh_and_kd_tree_show_their_boxes() {
+    // Two groups of triangles side by side. The BVH shows their boxes, the k-d tree the cells on both sides
+    // of a splitting plane.
     let corner = |x: f32, y: f32| Vec3::new(x, y, -4.0);
     let mesh = || TriangleMesh {
         positions: (0..40)
@@ -68,28 +70,29 @@ fn both_triangle_trees_show_their_boxes() {
         |accel: Accel| framed(scene().accel(accel).mesh(mesh(), AS_IT_IS, matte(0.5)), View::Bounds);
     let (boxes, planes) = (picture(Accel::Bvh), picture(Accel::KdTree));
     for picture in [&boxes, &planes] {
-        // The root: 24 pixels to each side, 30.4 up and down.
+        // The root extends 24 pixels to each side, and 30.4 up and down.
         for (x, y) in [(8, 32), (55, 32), (12, 62), (46, 62)] {
             assert!(at(picture, x, y).max_element() > 0.3, "{x}, {y}");
         }
         assert_eq!((at(picture, 4, 32), at(picture, 61, 32)), (DVec3::ZERO, DVec3::ZERO));
     }
     let lit = |picture: &[DVec3]| (10..54).filter(|&x| at(picture, x, 32).max_element() > 0.3).count();
-    assert!(lit(&boxes) > 0 && lit(&planes) > 0, "nodes inside the root are visible");
+    assert!(lit(&boxes) > 0 && lit(&planes) > 0, "nodes inside the root must be visible");
     assert_ne!(boxes, planes);
 }
 
 #[test]
 fn cost_counts_boxes_and_shapes() {
-    // The root, its leaf and the ball in it; next to the box nothing.
+    // The root, its leaf and the ball. Beside the box, the cost is zero.
     let cost = framed(ball(), View::Cost);
     assert_eq!((at(&cost, 32, 32).x, at(&cost, 2, 2).x), (3.0, 0.0));
-    assert_eq!(at(&cost, 46, 17).x, 3.0, "through the box and past the ball");
+    assert_eq!(at(&cost, 46, 17).x, 3.0, "a ray through the box that misses the ball");
     // Every ray tests an infinite plane.
     let floor = glimt::scene::description::Shape::Plane { point: v(0.0, -2.0, 0.0), normal: DVec3::Y };
     let cost = framed(ball().shape(floor, matte(0.5)), View::Cost);
     assert_eq!((at(&cost, 32, 32).x, at(&cost, 2, 2).x), (4.0, 1.0));
-    // A lit point sends one ray to the light, which starts inside the box; its target does not matter.
+    // A lit point traces one shadow ray. The ray starts inside the box, so its cost does not depend on the
+    // light.
     let lit =
         |shadows| framed(ball().point_light(DVec3::ZERO, 1.0, Falloff::None).shadows(shadows, 1), View::Cost);
     assert_eq!(at(&lit(Shadows::Hard), 32, 32).x, 6.0);
@@ -103,8 +106,8 @@ fn cost_includes_indirect_rays() {
             ball().depth(depth).environment(1.0).with(|scene| scene.render.integrator = Integrator::Path);
         at(&framed(build, View::Cost), 32, 32).x
     };
-    // The scattered ray is the only one that looks for a constant sky. It leaves the ball: it visits the root and the
-    // leaf again.
+    // A constant sky is sampled only by the scattered ray. It leaves the ball and visits the root and leaf
+    // again.
     assert_eq!(bounce(0), 3.0);
     assert!(bounce(1) > 3.0 && bounce(1) <= 6.0, "{}", bounce(1));
 }

@@ -1,4 +1,4 @@
-//! Runs the commands of every page in a scratch copy, at small sizes.
+//! Runs the commands on every page in a temporary folder, at small image sizes.
 
 use std::collections::HashSet;
 use std::os::unix::fs::symlink;
@@ -8,7 +8,7 @@ use std::process::Command;
 use super::{Block, Page, pages, root};
 use crate::test_dir::PROGRAM;
 
-/// Programs named on the pages that this test does not start.
+/// Programs used on the pages that this test does not run.
 const OTHERS: [&str; 3] = ["cargo", "ssh", "tmux"];
 /// Subcommands of glimt.
 const COMMANDS: [&str; 15] = [
@@ -33,7 +33,7 @@ const COMMANDS: [&str; 15] = [
 fn page_commands_run() {
     let mut with_commands = HashSet::new();
     for page in pages() {
-        let folder = tempfile::tempdir().expect("a scratch folder");
+        let folder = tempfile::tempdir().expect("a temporary folder");
         furnish(folder.path(), &page);
         for Block { line, text } in page.blocks("sh") {
             let (script, count) = script(&text);
@@ -51,8 +51,8 @@ fn page_commands_run() {
     }
 }
 
-/// Creates the folder in which commands run: the bundled scenes, the program, and the files that a page shows, each
-/// named in its first line.
+/// Sets up a folder for running commands, with the bundled scenes, the program, and the files that the page
+/// shows. The first line of such a file is its name.
 fn furnish(folder: &Path, page: &Page) {
     for name in ["scenes", "assets"] {
         symlink(root().join(name), folder.join(name)).expect("linked");
@@ -77,7 +77,7 @@ fn run(folder: &Path, script: &str) -> Result<(), String> {
     if output.status.success() { Ok(()) } else { Err(said.concat()) }
 }
 
-/// The commands of a block that are run, and how many of them call glimt.
+/// The commands to run from a block, and how many of them call glimt.
 fn script(text: &str) -> (String, usize) {
     let (mut script, mut count) = (String::new(), 0);
     let mut end: Option<&str> = None;
@@ -101,7 +101,8 @@ fn script(text: &str) -> (String, usize) {
     (script, count)
 }
 
-/// A call of glimt as this test runs it: calls that would open the terminal become checks, renders become small.
+/// Adapts a glimt command for this test: commands that would open the terminal interface become checks, and
+/// images become small.
 fn call(line: &str) -> String {
     let cut = ["2>", "|"].iter().filter_map(|mark| line.find(mark)).min().unwrap_or(line.len());
     let (call, rest) = line.split_at(cut);

@@ -1,4 +1,4 @@
-//! Links between pages, images, and the files that pages name.
+//! Links between pages, images, and file names on pages.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -6,7 +6,7 @@ use std::path::Path;
 
 use super::{codes, page, pages, root};
 
-/// The targets of links, except web links.
+/// Link targets, except web links.
 fn targets(text: &str) -> Vec<String> {
     let ends = text.split("](").skip(1).filter_map(|rest| rest.split(')').next());
     ends.filter(|target| !target.starts_with("https://")).map(str::to_owned).collect()
@@ -38,9 +38,9 @@ fn links_lead_somewhere() {
 }
 
 #[test]
-fn files_named_on_pages_exist() {
+fn files_mentioned_on_pages_exist() {
     let folders = ["crates/", "src/", "tests/", "scenes/", "assets/", "benches/", "docs/", ".ci/"];
-    // Made, not stored.
+    // Generated files, which are not in the repository.
     let made = ["assets/million.ply", "assets/figure.ply"];
     for page in pages() {
         let names = page.prose().flat_map(codes).collect::<BTreeSet<_>>();
@@ -58,16 +58,16 @@ fn every_picture_is_shown() {
         .flat_map(|page| page.prose().flat_map(targets).collect::<Vec<_>>())
         .filter_map(|target| Some(target.split_once("pictures/")?.1.to_owned()))
         .collect();
-    let folder = fs::read_dir(root().join("assets/pictures")).expect("the folder of images");
+    let folder = fs::read_dir(root().join("assets/pictures")).expect("the pictures folder");
     let there = folder.map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned());
     let there: BTreeSet<String> = there.filter(|name| name.contains('.') && !name.ends_with(".py")).collect();
     let other: Vec<_> = there.difference(&shown).collect();
-    assert!(other.is_empty(), "no page shows {other:?}");
+    assert!(other.is_empty(), "pictures not shown on any page: {other:?}");
 }
 
 #[test]
 fn anchors_match_github() {
-    assert_eq!(anchor("What is replaced, and what never is"), "what-is-replaced-and-what-never-is");
-    assert_eq!(anchor("Beside Mitsuba 3.9"), "beside-mitsuba-39");
+    assert_eq!(anchor("Files, streams, and exit codes"), "files-streams-and-exit-codes");
+    assert_eq!(anchor("Compared with Mitsuba 3.9"), "compared-with-mitsuba-39");
     assert_eq!(anchor("`[[mesh]]`"), "mesh");
 }

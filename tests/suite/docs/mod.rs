@@ -1,4 +1,5 @@
-//! The user documentation against the program: its commands run, its scenes are valid, its tables are complete.
+//! Checks the user documentation against the program: commands run, scenes are valid, and tables are
+//! complete.
 
 mod commands;
 mod links;
@@ -13,14 +14,14 @@ use std::path::{Path, PathBuf};
 
 /// A Markdown page.
 struct Page {
-    /// Its path relative to the root of the repository.
+    /// Path relative to the repository root.
     name: String,
     text: String,
 }
 
-/// A fenced block of a page.
+/// A fenced block on a page.
 struct Block {
-    /// The line of its opening fence, from 1.
+    /// Line number of the opening fence, from 1.
     line: usize,
     text: String,
 }
@@ -29,10 +30,10 @@ fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// README, the pages next to it, and the pages in `docs`.
+/// README, other pages in the root folder, and the pages in `docs`.
 fn pages() -> Vec<Page> {
     let beside = ["README.md", "CONTRIBUTING.md", "CHANGELOG.md"].map(PathBuf::from);
-    let inside = fs::read_dir(root().join("docs")).expect("the folder of pages");
+    let inside = fs::read_dir(root().join("docs")).expect("the docs folder");
     let inside = inside.map(|entry| Path::new("docs").join(entry.expect("an entry").file_name()));
     let is_page = |path: &PathBuf| path.extension().is_some_and(|ending| ending == "md");
     let mut names: Vec<PathBuf> = beside.into_iter().chain(inside.filter(is_page)).collect();
@@ -42,12 +43,12 @@ fn pages() -> Vec<Page> {
 
 fn page(name: &str) -> Page {
     let path = root().join(name);
-    assert!(path.is_file(), "there is no page {name}");
+    assert!(path.is_file(), "page {name} not found");
     Page { name: name.to_owned(), text: fs::read_to_string(path).expect("a text") }
 }
 
 impl Page {
-    /// The fenced blocks in a language.
+    /// The fenced blocks in the given language.
     fn blocks(&self, language: &str) -> Vec<Block> {
         let mut blocks = Vec::new();
         let mut open: Option<(usize, &str, String)> = None;
@@ -64,11 +65,11 @@ impl Page {
                 (None, None) => {}
             }
         }
-        assert!(open.is_none(), "{}: a fence is not closed", self.name);
+        assert!(open.is_none(), "{}: unclosed fence", self.name);
         blocks
     }
 
-    /// The lines outside fenced blocks.
+    /// Lines outside fenced blocks.
     fn prose(&self) -> impl Iterator<Item = &str> {
         let mut is_open = false;
         self.text.lines().filter(move |line| {
@@ -78,7 +79,7 @@ impl Page {
         })
     }
 
-    /// The headings, each with the cells of the table rows below it, without the tables' header rows.
+    /// Headings with the cells of the table rows below them, excluding header rows.
     fn tables(&self) -> Vec<(String, Vec<Vec<String>>)> {
         let mut tables = vec![(String::new(), Vec::new())];
         let mut was_row = false;
@@ -88,7 +89,7 @@ impl Page {
             }
             let is_row = line.starts_with('|');
             if is_row && was_row && !line.starts_with("| ---") {
-                let (_, rows) = tables.last_mut().expect("there is one");
+                let (_, rows) = tables.last_mut().expect("at least one heading");
                 rows.push(cells(line));
             }
             was_row = is_row;
@@ -96,7 +97,7 @@ impl Page {
         tables
     }
 
-    /// The rows below a heading.
+    /// The table rows below a heading.
     fn rows(&self, heading: &str) -> Vec<Vec<String>> {
         let found = self.tables().into_iter().find(|(name, _)| name == heading);
         let rows = found.map(|(_, rows)| rows).unwrap_or_default();
@@ -105,14 +106,14 @@ impl Page {
     }
 }
 
-/// The cells of a row; `\|` is an escaped bar.
+/// The cells of a row. `\|` is an escaped bar.
 fn cells(row: &str) -> Vec<String> {
     let row = row.replace("\\|", "\u{0}");
     let inner = row.trim().trim_start_matches('|').trim_end_matches('|');
     inner.split('|').map(|cell| cell.trim().replace('\u{0}', "|")).collect()
 }
 
-/// The texts in backquotes.
+/// The strings in backquotes.
 fn codes(text: &str) -> BTreeSet<String> {
     text.split('`').skip(1).step_by(2).map(str::to_owned).collect()
 }

@@ -1,4 +1,4 @@
-//! The tables of options against the program's help.
+//! Checks the option tables against the program's help.
 
 use std::collections::BTreeSet;
 
@@ -10,7 +10,8 @@ fn help(command: &str) -> String {
     String::from_utf8(output.stdout).expect("UTF-8")
 }
 
-/// The long options in a help text, except the ones every program has; their descriptions are indented further.
+/// The long options in a help text, except `--help` and `--version`. Descriptions are recognized by their
+/// indentation.
 fn listed(help: &str) -> BTreeSet<String> {
     let lines = help.lines().filter(|line| !line.starts_with("        ")).map(str::trim_start);
     let words = lines
@@ -49,7 +50,7 @@ fn option_tables_match_the_help() {
 fn every_command_is_documented() {
     let help = help("");
     let commands = help.split("Commands:\n").nth(1).and_then(|rest| rest.split("\n\n").next());
-    // A command's description may continue on the next line, which is indented further.
+    // A command's description may continue on the next line, with more indentation.
     let lines = commands.expect("commands").lines().filter(|line| !line.starts_with("   "));
     let names = lines.filter_map(|line| line.split_whitespace().next());
     let rows = page("docs/command-line.md").rows("Commands");

@@ -1,4 +1,4 @@
-//! The documented keys of the report and of JSON progress against an actual render.
+//! Checks the documented keys of reports and JSON progress against an actual render.
 
 use std::collections::BTreeSet;
 
@@ -7,7 +7,7 @@ use serde_json::Value;
 use super::{codes, page};
 use crate::test_dir::TestDir;
 
-/// A glass ball, so that photons are emitted.
+/// The scene has a glass ball, so that photons are emitted.
 fn dir() -> TestDir {
     let dir = TestDir::new();
     let scene =
@@ -18,7 +18,7 @@ fn dir() -> TestDir {
     dir
 }
 
-/// The dotted paths of all values, and separately those of the tables.
+/// Dotted paths of all values, and separately of all tables.
 fn paths(value: &Value, path: &str, ends: &mut BTreeSet<String>, tables: &mut BTreeSet<String>) {
     let inner: Vec<(String, &Value)> = match value {
         Value::Object(map) => {
@@ -45,7 +45,7 @@ fn report_keys_are_documented() {
     let rows = page("docs/report.md").rows("The report");
     let documented: BTreeSet<String> = rows.iter().flat_map(|row| codes(&row[0])).collect();
     let missing: Vec<_> = ends.difference(&documented).collect();
-    assert!(missing.is_empty(), "not on the page: {missing:?}");
+    assert!(missing.is_empty(), "not documented: {missing:?}");
     let known = ends.union(&tables).cloned().collect();
     let unknown: Vec<_> = documented.difference(&known).collect();
     assert!(unknown.is_empty(), "not in the report: {unknown:?}");
@@ -63,7 +63,7 @@ fn progress_keys_are_documented() {
             let event: Value = serde_json::from_str(line).expect("JSON");
             let name = event["event"].as_str().expect("a name").to_owned();
             let row = rows.iter().find(|row| codes(&row[0]).contains(&name));
-            let keys = codes(&row.unwrap_or_else(|| panic!("{name} is not on the page"))[1]);
+            let keys = codes(&row.unwrap_or_else(|| panic!("{name} is not documented"))[1]);
             for key in event.as_object().expect("an object").keys().filter(|key| *key != "event") {
                 assert!(keys.contains(key), "{name}: {key}");
             }

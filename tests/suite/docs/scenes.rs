@@ -1,4 +1,5 @@
-//! The scenes on the pages: whole scenes unchanged, fragments completed with whatever they refer to.
+//! Checks the scenes on the pages. Whole scenes are unchanged, and fragments are completed with the elements
+//! they refer to.
 
 use std::collections::BTreeSet;
 
@@ -9,13 +10,13 @@ use crate::contract::errors;
 
 const CAMERA: &str = "\n[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n";
 
-/// The names after a key, such as the materials in `material = "clay"`.
+/// The names after a key, such as the material in `material = "clay"`.
 fn names(text: &str, before: &str) -> BTreeSet<String> {
     let rests = text.split(before).skip(1);
     rests.filter_map(|rest| rest.split('"').next()).map(str::to_owned).collect()
 }
 
-/// A fragment, completed with a camera and with the materials and textures that it names but does not define.
+/// Completes a fragment with a camera, and with the materials and textures that it uses but does not define.
 fn completed(fragment: &str) -> String {
     let mut text = format!("{fragment}{CAMERA}");
     let has = |kind: &str, name: &str| {

@@ -1,5 +1,5 @@
-//! The definition of the scene keys against the program (keys, defaults, ranges, choices) and against the documented
-//! tables.
+//! Checks the definitions of scene keys (keys, defaults, ranges, choices) against the program and the
+//! documented tables.
 
 use std::collections::BTreeSet;
 
@@ -13,17 +13,17 @@ use super::{codes, page, root};
 use crate::contract::{errors, placeless};
 use crate::test_dir::mentions;
 
-/// A key of a table, in one of the table's types.
+/// A key of a table, or of one of its types.
 #[derive(Clone)]
 struct DefinedKey {
     info: &'static KeyInfo,
     name: String,
 }
 
-/// A table of the definition, and its header in a scene.
+/// A defined table with its header in a scene.
 struct DefinedTable {
     head: String,
-    /// The headings of the page that have its rows, with the number of rows below each.
+    /// The page headings for this table, with the number of rows below each.
     headings: Vec<(String, usize)>,
     keys: Vec<DefinedKey>,
 }
@@ -35,7 +35,7 @@ fn tables() -> Vec<DefinedTable> {
     keys::tables().iter().flat_map(of_definition).collect()
 }
 
-/// The scene tables that a definition table covers: one for each type.
+/// The scene tables for a definition, one for each type.
 fn of_definition(table: &'static TableInfo) -> Vec<DefinedTable> {
     let head = table.head().replace("NAME", "it");
     let heading = |code: String| format!("`{code}`");
@@ -43,7 +43,7 @@ fn of_definition(table: &'static TableInfo) -> Vec<DefinedTable> {
     if table.types.is_empty() {
         let keys: Vec<DefinedKey> = table.keys_of(None).map(key).collect();
         let headings = match table.form {
-            // The last two are keys of every shape.
+            // The last two keys are common to all shapes.
             Form::List => {
                 vec![(heading(table.head()), keys.len() - 2), ("Every shape".to_owned(), 2)]
             }
@@ -79,7 +79,7 @@ fn example(head: &str, key: &str) -> &'static str {
 }
 
 impl DefinedTable {
-    /// A scene with this table: its required keys except one, and an extra line.
+    /// A scene with this table: all required keys except one, and an extra line.
     fn scene(&self, without: &str, line: &str) -> String {
         let required = self
             .keys
@@ -88,7 +88,7 @@ impl DefinedTable {
         let lines: String =
             required.map(|key| format!("{} = {}\n", key.name, example(&self.head, &key.name))).collect();
         let camera = if self.head.starts_with("[camera]") { "" } else { CAMERA };
-        // The mesh of the example has no materials.
+        // The example mesh has no materials.
         let is_bare = self.head.starts_with("[[mesh]]") && without != "material";
         let material = if is_bare { "material = \"wall\"\n" } else { "" };
         // A metal needs exactly one of three groups of keys.
@@ -112,13 +112,13 @@ impl DefinedTable {
         errors(&self.said(key, value)).is_empty()
     }
 
-    /// Parses the table with a line instead of a key; returns the errors and the scene.
+    /// Parses the table with a line instead of a key. Returns the errors and the scene.
     fn with(&self, key: &DefinedKey, line: &str) -> (String, Option<Scene>) {
         let outcome = parse(self.scene(&key.name, line).into(), &root().join("scenes/page.toml"));
         (errors(&outcome.diagnostics).join("\n"), outcome.scene.map(placeless))
     }
 
-    /// Reports a default that differs from the program's.
+    /// Reports a default that differs from the program's default.
     fn wrong_default(&self, key: &DefinedKey) -> Option<String> {
         let (said, without) = self.with(key, "");
         if matches!(key.info.default, Default::Required(_)) {
@@ -130,14 +130,14 @@ impl DefinedTable {
         (!is_right).then(|| format!("{}{}: {:?} {said}{refused}", self.head, key.name, key.info.default))
     }
 
-    /// Reports a range that differs from the program's.
+    /// Reports a range that differs from the program's range.
     fn wrong_range(&self, key: &DefinedKey) -> Option<String> {
         let (inside, outside) = key.range()?;
         let of = |number: f64| value(key.info.kind, number);
         let refused = inside.into_iter().map(of).find(|value| !self.takes(key, value));
         let taken = outside.into_iter().map(of).find(|value| self.takes(key, value));
-        let refused = refused.map(|value| format!("{}{} = {value} is refused", self.head, key.name));
-        refused.or(taken.map(|value| format!("{}{} = {value} is taken", self.head, key.name)))
+        let refused = refused.map(|value| format!("{}{} = {value} is rejected", self.head, key.name));
+        refused.or(taken.map(|value| format!("{}{} = {value} is accepted", self.head, key.name)))
     }
 }
 
@@ -150,10 +150,10 @@ impl DefinedKey {
         }
     }
 
-    /// Numbers inside the range, and numbers outside it.
+    /// Numbers inside and outside the range.
     fn range(&self) -> Option<(Vec<f64>, Vec<f64>)> {
         match self.info.kind {
-            // Keys for glTF files, which the scene of this test does not use.
+            // Keys for glTF files, which this test's scene does not use.
             ValueKind::Whole(..) if self.info.default == Default::Absent => None,
             ValueKind::Whole(least, most) => {
                 Some((vec![least as f64, most as f64], vec![least as f64 - 1.0, most as f64 + 1.0]))
@@ -191,7 +191,7 @@ fn ends(limits: Limits) -> Option<(Vec<f64>, Vec<f64>)> {
     })
 }
 
-/// The page's row for a key. The order of choices, and a link at the end, are up to the page.
+/// Whether a row documents the key. The page may reorder choices and add a link at the end.
 fn is_row(row: &[String], key: &KeyInfo) -> bool {
     let [name, kind, unit, range, default, meaning] = row else { return false };
     let has_kind =
@@ -206,7 +206,7 @@ fn is_row(row: &[String], key: &KeyInfo) -> bool {
         && rest.is_some_and(|rest| rest.is_empty() || rest.starts_with(". See "))
 }
 
-/// A text with each link replaced by its words.
+/// Replaces each link with its text.
 fn unlinked(text: &str) -> String {
     let Some((before, after)) = text.split_once("](") else { return text.to_owned() };
     let (begin, words) = before.rsplit_once('[').unwrap_or((before, ""));
@@ -215,7 +215,7 @@ fn unlinked(text: &str) -> String {
 }
 
 #[test]
-fn documented_rows_match_the_definition() {
+fn documented_rows_match_definitions() {
     let page = page("docs/scene.md");
     let (mut wrong, mut count) = (Vec::new(), 0);
     for DefinedTable { head, headings, keys: _ } in tables() {
@@ -229,7 +229,7 @@ fn documented_rows_match_the_definition() {
         });
         for (row, key) in rows.zip(table.keys_of(kind)) {
             count += 1;
-            // The page has one row for the material of every shape.
+            // The page has a single row for the material of all shapes.
             let is_right = is_row(&row, key) || head == "[[mesh]]\n" && key.name == "material";
             if !is_right {
                 let key = [key.kind(), key.unit.into(), key.range(), key.default_words(), key.doc.into()];
@@ -268,7 +268,7 @@ fn defined_defaults_match_the_program() {
     assert!(keys().filter(|(_, key)| key.literal().is_some()).count() > 60);
 }
 
-/// A number as a value of a type.
+/// Formats a number as a value of the given kind.
 fn value(kind: ValueKind, number: f64) -> String {
     match kind {
         ValueKind::Numbers(count, ..) => format!("[{}]", vec![number.to_string(); count].join(", ")),

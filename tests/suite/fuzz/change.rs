@@ -1,13 +1,13 @@
-//! FuzzRandom changes to a file.
+//! Random mutations of a file.
 
 use std::ops::Range;
 
 use super::random::FuzzRandom;
 
-/// Longest result: longer files only take more time.
+/// Maximum length of the result. Longer files only take more time.
 const MOST_BYTES: usize = 1 << 20;
 
-/// Words that break careless parsers.
+/// Words that may break careless parsers.
 const WORDS: &[&str] = &[
     "0",
     "-1",
@@ -116,7 +116,7 @@ const EDGES: &[u64] = &[
     0xffff_ffff_ffff_ffff,
 ];
 
-/// Applies one to five changes in sequence.
+/// Applies one to five mutations in sequence.
 pub(super) fn changed(bytes: &[u8], other: &[u8], random: &mut FuzzRandom) -> Vec<u8> {
     let mut bytes = bytes.to_vec();
     for _ in 0..=random.below(5) {
@@ -157,7 +157,7 @@ fn change(bytes: &mut Vec<u8>, other: &[u8], random: &mut FuzzRandom) {
     }
 }
 
-/// A random position, more often near the start, where headers are.
+/// A random position, biased toward the start, where headers are.
 fn place(bytes: &[u8], random: &mut FuzzRandom) -> usize {
     let within = if random.below(2) == 0 { bytes.len().min(256) } else { bytes.len() };
     random.below(within)
@@ -179,7 +179,7 @@ fn set_bytes(bytes: &mut Vec<u8>, _: &[u8], random: &mut FuzzRandom) {
     }
 }
 
-/// Writes a number of 1, 2, 4 or 8 bytes in either byte order.
+/// Writes a number with 1, 2, 4 or 8 bytes in either byte order.
 #[expect(clippy::ptr_arg, reason = "one signature for all changes")]
 fn set_number(bytes: &mut Vec<u8>, _: &[u8], random: &mut FuzzRandom) {
     let (at, length) = (place(bytes, random), 1 << random.below(4));
@@ -195,7 +195,7 @@ fn cut(bytes: &mut Vec<u8>, _: &[u8], random: &mut FuzzRandom) {
     bytes.truncate(random.below(bytes.len()));
 }
 
-/// Pieces between bytes for which `is_gap` holds; at least one.
+/// The pieces between bytes that satisfy `is_gap`, at least one.
 fn pieces(bytes: &[u8], is_gap: fn(u8) -> bool) -> Vec<Range<usize>> {
     let mut pieces = Vec::new();
     let mut start = 0;
@@ -227,7 +227,7 @@ fn delete_line(bytes: &mut Vec<u8>, _: &[u8], random: &mut FuzzRandom) {
 fn repeat_line(bytes: &mut Vec<u8>, _: &[u8], random: &mut FuzzRandom) {
     let line = random.pick(&lines(bytes)).clone();
     let text = [b"\n", &bytes[line.clone()]].concat();
-    // Do not repeat long lines beyond the limit: the worker's memory is measured.
+    // Do not repeat long lines beyond the limit, because the worker's memory use is measured.
     let times = (1 << random.below(12)).min(MOST_BYTES / text.len() + 1);
     bytes.splice(line.end..line.end, text.repeat(times));
 }
@@ -256,7 +256,7 @@ fn replace_word(bytes: &mut Vec<u8>, _: &[u8], random: &mut FuzzRandom) {
     bytes.splice(word, random.pick(WORDS).bytes());
 }
 
-/// Gives a word that starts like a number more digits or the other sign.
+/// Adds digits, an exponent or a sign to a word that starts like a number.
 fn grow_number(bytes: &mut Vec<u8>, _: &[u8], random: &mut FuzzRandom) {
     let mut numbers = words(bytes);
     numbers.retain(|word| bytes.get(word.start).is_some_and(|byte| byte.is_ascii_digit() || *byte == b'-'));

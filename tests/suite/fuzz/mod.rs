@@ -1,15 +1,15 @@
-//! Fuzzing: runs `check` on randomly changed scenes and assets. It never crashes or hangs, exits only with 0 or 2, uses little
-//! memory, and prints nothing that a terminal would interpret.
+//! Fuzzing: runs `check` on randomly mutated scenes and assets. It must not crash or hang, must exit with 0
+//! or 2, must not use much memory, and must not print control characters.
 //!
-//! The short version runs with the suite. The long one takes about ten minutes on two cores:
+//! The suite runs a short version. The long version takes about ten minutes on two cores:
 //!
 //! ```text
 //! GLIMT_FUZZ_CASES=20000,5000,500 cargo test --profile quick --test suite fuzz -- --nocapture
 //! ```
 //!
-//! The numbers are the scenes and the assets that the library checks in worker processes, and the files of each kind that the
-//! program checks. `GLIMT_FUZZ_SEED` (an integer, 1 by default) selects other files. The same seed gives the same files; files that
-//! fail are kept in the folder named by the message.
+//! The numbers are: scenes and assets that the library checks in worker processes, and files of each kind
+//! that the program checks. `GLIMT_FUZZ_SEED` (an integer, 1 by default) selects different files; a seed
+//! always generates the same files. Files that fail are kept in a folder, which the failure message names.
 
 mod change;
 mod program;
@@ -24,7 +24,7 @@ use std::path::PathBuf;
 use random::FuzzRandom;
 use seeds::{Seed, assets, scenes};
 
-/// FuzzInput of the changed file.
+/// Kind of the mutated file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum FuzzInput {
     Scene,
@@ -46,7 +46,7 @@ impl fmt::Display for Case {
     }
 }
 
-/// The seeds of all cases.
+/// The original files for all cases.
 struct Corpus {
     scenes: Vec<Seed>,
     assets: Vec<Seed>,
@@ -57,7 +57,7 @@ impl Corpus {
         Self { scenes: scenes(), assets: assets() }
     }
 
-    /// The changed file of a case, named like its original.
+    /// The mutated file for a case, named like the original.
     fn make(&self, case: Case) -> Seed {
         let seeds = match case.kind {
             FuzzInput::Scene => &self.scenes,
@@ -70,19 +70,19 @@ impl Corpus {
     }
 }
 
-/// Numbers of scenes, of assets, and of files of each kind that the program checks.
+/// Number of scenes, assets, and files of each kind that the program checks.
 fn counts() -> [u64; 3] {
     let asked = std::env::var("GLIMT_FUZZ_CASES").unwrap_or_else(|_| "250,250,15".to_owned());
     let numbers: Vec<u64> =
         asked.split(',').map(|number| number.trim().parse().expect("three numbers")).collect();
-    numbers.try_into().expect("GLIMT_FUZZ_CASES is three numbers: scenes,assets,program")
+    numbers.try_into().expect("GLIMT_FUZZ_CASES must be three numbers: scenes,assets,program")
 }
 
 fn seed() -> u64 {
     std::env::var("GLIMT_FUZZ_SEED").map_or(1, |seed| seed.parse().expect("a whole number"))
 }
 
-/// Writes the files of failed cases to a folder, and reports it.
+/// Writes the files of failed cases to a folder and panics with its path.
 fn settle(failures: &[(Case, String)]) {
     if failures.is_empty() {
         return;
@@ -101,12 +101,12 @@ fn settle(failures: &[(Case, String)]) {
 }
 
 #[test]
-fn changed_scenes_are_checked_or_rejected() {
+fn mutated_scenes_are_accepted_or_rejected() {
     settle(&worker::check_all(FuzzInput::Scene, seed(), counts()[0]));
 }
 
 #[test]
-fn changed_assets_are_checked_or_rejected() {
+fn mutated_assets_are_accepted_or_rejected() {
     settle(&worker::check_all(FuzzInput::Asset, seed(), counts()[1]));
 }
 
@@ -123,7 +123,7 @@ fn check_exits_with_0_or_2() {
 }
 
 #[test]
-fn same_seed_gives_the_same_files() {
+fn same_seed_generates_the_same_files() {
     let (one, other) = (Corpus::new(), Corpus::new());
     let mut changed = 0;
     for number in 0..100 {

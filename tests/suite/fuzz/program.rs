@@ -7,7 +7,7 @@ use super::worker::{AT_MOST, CaseDir, TRIES, harmful};
 use super::{Case, Corpus, FuzzInput};
 use crate::test_dir::PROGRAM;
 
-/// The failed cases of a kind, with the reason for each.
+/// The failed cases of a kind, each with a reason.
 pub(super) fn check_all(kind: FuzzInput, seed: u64, count: u64) -> Vec<(Case, String)> {
     let dir = CaseDir::new();
     let material = Corpus::new();
@@ -16,7 +16,7 @@ pub(super) fn check_all(kind: FuzzInput, seed: u64, count: u64) -> Vec<(Case, St
         let scene = dir.place_case(case, &material.make(case));
         let run = || run(Command::new(PROGRAM).arg("check").arg(&scene));
         let Some(output) = (0..TRIES).find_map(|_| run()) else {
-            return Some((case, "it takes more than 2 s".to_owned()));
+            return Some((case, "took more than 2 s".to_owned()));
         };
         judge(&output).err().map(|reason| (case, reason))
     };
@@ -32,7 +32,7 @@ fn run(command: &mut Command) -> Option<Output> {
     let waiting = std::thread::spawn(move || send.send(child.wait_with_output()));
     let output = output.recv_timeout(AT_MOST).ok().map(|output| output.expect("its output"));
     if output.is_none() {
-        // The child has not been waited for, so its id cannot have been reused.
+        // The child has not been reaped, so its process ID cannot have been reused.
         let _ = nix::sys::signal::kill(process, nix::sys::signal::Signal::SIGKILL);
     }
     let _ = waiting.join();

@@ -4,7 +4,7 @@
 pub(super) struct FuzzRandom(u64);
 
 impl FuzzRandom {
-    /// Creates a separate stream for each pair.
+    /// Creates a separate stream for each pair of arguments.
     pub(super) fn new(seed: u64, number: u64) -> Self {
         let mut start = Self(seed);
         let mut random = Self(start.next() ^ number);
@@ -19,7 +19,7 @@ impl FuzzRandom {
         mixed ^ mixed >> 31
     }
 
-    /// A number below `limit`, which must not be 0.
+    /// A number less than `limit`, which must not be 0.
     pub(super) fn below(&mut self, limit: usize) -> usize {
         ((u128::from(self.next()) * limit as u128) >> 64) as usize
     }

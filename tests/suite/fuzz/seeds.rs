@@ -1,4 +1,4 @@
-//! Originals of the changed files: existing scenes and assets, and a small file in every format.
+//! Original files for mutation: existing scenes and assets, and a small file in every format.
 
 use std::fs;
 use std::io::Cursor;
@@ -6,13 +6,13 @@ use std::path::{Path, PathBuf};
 
 use image::{DynamicImage, ExtendedColorType, ImageFormat, save_buffer};
 
-/// Size limit for assets, in bytes: larger ones take long and show nothing new.
+/// Size limit for assets in bytes. Larger assets are slow and find nothing new.
 const MOST_BYTES: u64 = 150_000;
 
-/// A scene file, or a file that a scene names.
+/// A scene file, or a file that a scene refers to.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Seed {
-    /// Its name in the folder of the case.
+    /// Name in the case's folder.
     pub(super) file: String,
     pub(super) bytes: Vec<u8>,
 }
@@ -21,7 +21,7 @@ pub(super) fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// Files with one of these extensions, sorted by name.
+/// Files with any of the given extensions, sorted by name.
 fn files(folder: &str, endings: &[&str]) -> Vec<PathBuf> {
     let entries = fs::read_dir(root().join(folder)).expect("a folder");
     let mut files: Vec<PathBuf> = entries.map(|entry| entry.expect("an entry").path()).collect();
@@ -33,10 +33,10 @@ fn files(folder: &str, endings: &[&str]) -> Vec<PathBuf> {
     files
 }
 
-/// All scenes, valid and broken.
+/// All scenes, valid and invalid.
 pub(super) fn scenes() -> Vec<Seed> {
     let files = [files("scenes", &["toml"]), files("tests/broken", &["toml"])].concat();
-    // The generated model takes seconds to read if it exists: use a stored one instead.
+    // The generated model takes seconds to read, so use a model from the repository instead.
     let bytes = |file: &PathBuf| match String::from_utf8(fs::read(file).expect("a scene")) {
         Ok(text) => text.replace("million.ply", "coral.ply").into_bytes(),
         Err(other) => other.into_bytes(),
@@ -54,7 +54,7 @@ pub(super) fn assets() -> Vec<Seed> {
         let ending = path.extension().expect("an ending").to_string_lossy();
         Seed { file: format!("case.{ending}"), bytes: fs::read(path).expect("an asset") }
     };
-    // Pick the small files of every format more often.
+    // Pick the small files more often.
     [made.clone(), made, found.iter().map(seed).collect()].concat()
 }
 
@@ -85,7 +85,7 @@ fn meshes() -> Vec<Seed> {
     let off = "COFF\n# small\n4 2 5\n0 0 0 255 0 0 255\n1 0 0 0 0 0 0\n1 1 0 0 0 0 0\n0 1 0 0 0 0 0\n3 0 1 2 0.5\n4 0 1 2 3\n";
     let wild = "STCN4OFF 3 1 0\n0 0 0 1 0 0 1 1 1 1 1 0 0\n1 0 0 1 0 0 1 1 1 1 1 0 1\n0 1 0 1 0 0 1 1 1 1 1 1 0\n3 0 1 2\n";
     let stl = "solid small\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1e0 0\nendloop\nendfacet\nendsolid\n";
-    // A model with materials, and a truncated image as a texture.
+    // A model with materials and a truncated texture image.
     let model = crate::gltf::cubes(b"\x89PNG\r\n\x1a\n");
     let mut binary_stl = vec![b' '; 80];
     binary_stl.extend(1_u32.to_le_bytes());
@@ -111,7 +111,7 @@ fn meshes() -> Vec<Seed> {
     ]
 }
 
-/// The image in all formats.
+/// An image in all formats.
 fn samples(count: usize) -> Vec<u8> {
     (0..count).map(|index| (index * 37 % 251) as u8).collect()
 }

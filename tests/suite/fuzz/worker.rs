@@ -1,4 +1,4 @@
-//! Runs `check` in worker processes, so that a stack overflow, a hang or excessive memory use is detected.
+//! Runs `check` in worker processes to detect stack overflows, hangs and excessive memory use.
 
 use std::io::{BufRead, BufReader, Write};
 use std::panic::{self, AssertUnwindSafe};
@@ -16,29 +16,29 @@ use nix::sys::resource::{Resource, setrlimit};
 use super::seeds::{Seed, root};
 use super::{Case, Corpus, FuzzInput};
 
-/// Time limit for a case.
+/// Time limit per case.
 pub(super) const AT_MOST: Duration = Duration::from_secs(2);
 
-/// Time limit for generating a case; only a stalled machine takes this long.
+/// Time limit for generating a case, which only a stalled machine exceeds.
 const TO_BEGIN: Duration = Duration::from_secs(120);
 
-/// Number of times that a slow case is retried on its own, because the machine may be busy.
+/// Maximum number of runs of a slow case, because the machine may be busy.
 pub(super) const TRIES: usize = 3;
 
-/// Limit of resident memory, including the worker's own. The most that a small file can claim and get is an image,
+/// Limit on resident memory, including the worker's own memory. The worst case for a small file is an image
 /// whose pixels are allocated before the file turns out to be too short.
 const MEMORY_BYTES: u64 = 768 << 20;
 
-/// Limit of memory that may be requested.
+/// Limit on virtual memory.
 const ADDRESS_BYTES: u64 = 16 << 30;
 
 /// Number of worker processes.
 const WORKERS: u64 = 2;
 
-/// Environment variable that makes a process of this test a worker, and names its cases.
+/// Environment variable that turns a test process into a worker and specifies its cases.
 const ORDER: &str = "GLIMT_FUZZ_WORKER";
 
-/// The failed cases of a kind, with the reason for each.
+/// The failed cases of a kind, each with a reason.
 pub(super) fn check_all(kind: FuzzInput, seed: u64, count: u64) -> Vec<(Case, String)> {
     let failures = Mutex::new(Vec::new());
     std::thread::scope(|scope| {
@@ -67,9 +67,9 @@ pub(super) fn check_all(kind: FuzzInput, seed: u64, count: u64) -> Vec<(Case, St
 }
 
 /// Message for a case that takes too long.
-const SLOW: &str = "it takes more than 2 s";
+const SLOW: &str = "took more than 2 s";
 
-/// Lets a worker process the cases from this one up to a number; the error is the first failure.
+/// Starts a worker for the cases from `first` up to number `end`. Returns the first failure as an error.
 fn follow(first: Case, end: u64) -> Result<(), (Case, String)> {
     let Case { kind, seed, number } = first;
     let mut worker = Command::new(std::env::current_exe().expect("this program"))
@@ -89,7 +89,7 @@ fn follow(first: Case, end: u64) -> Result<(), (Case, String)> {
             break;
         }
     }
-    // The worker may have ended already.
+    // The worker may have already exited.
     let _ = worker.kill();
     let status = worker.wait().expect("its end");
     result.map_err(
@@ -97,15 +97,15 @@ fn follow(first: Case, end: u64) -> Result<(), (Case, String)> {
     )
 }
 
-/// Message for a worker that ended within a case.
-const GONE: &str = "the process ended";
+/// Message for a worker that exited during a case.
+const GONE: &str = "the process exited";
 
 fn lines_of(worker: &mut Child) -> Receiver<String> {
     let (send, lines) = channel();
     let output = BufReader::new(worker.stdout.take().expect("its stdout"));
     std::thread::spawn(move || {
         for line in output.lines().map_while(Result::ok) {
-            // Lines of the test harness have no marker.
+            // Skip the test harness's lines, which have no marker.
             if let Some(line) = line.strip_prefix("@ ")
                 && send.send(line.to_owned()).is_err()
             {
@@ -128,7 +128,7 @@ fn next_result(lines: &Receiver<String>) -> Result<(), String> {
     if said == "right" { Ok(()) } else { Err(said) }
 }
 
-/// Runs the requested cases; does nothing unless this process is a worker.
+/// Runs the requested cases. Does nothing unless this process is a worker.
 #[test]
 fn worker() {
     let Ok(order) = std::env::var(ORDER) else { return };
@@ -153,11 +153,11 @@ fn say(text: &str) {
     writeln!(std::io::stdout(), "\n@ {text}").expect("somebody listens");
 }
 
-/// The last panic, wherever it was caught.
+/// The last panic, even if it was caught.
 static PANIC: Mutex<Option<String>> = Mutex::new(None);
 
-/// Installs a hook that records all panics. The library installs a hook of its own when
-/// it is first used, so use it before calling this.
+/// Installs a hook that records all panics. Calls the library first, because it installs its own hook on
+/// first use.
 fn listen_to_panics(dir: &CaseDir) {
     let _ = check(
         &dir.place_case(
@@ -175,10 +175,10 @@ fn listen_to_panics(dir: &CaseDir) {
 fn one(scene: &Path) -> Result<(), String> {
     let checked = panic::catch_unwind(AssertUnwindSafe(|| check(scene, &[])));
     if let Some(panic) = PANIC.lock().expect("no panic").take() {
-        // Decoders in other crates may panic: the library turns that into an error about the file.
+        // Decoders in other crates may panic. The library turns such panics into errors about the file.
         let is_foreign = panic.contains("/.cargo/registry/") || panic.contains("/registry/src/");
         if checked.is_err() || !is_foreign {
-            return Err(format!("a panic: {panic}"));
+            return Err(format!("panic: {panic}"));
         }
     }
     let diagnostics = match checked {
@@ -195,24 +195,24 @@ fn one(scene: &Path) -> Result<(), String> {
         return Err(format!("the message contains {harmful:?}"));
     }
     let used = peak_memory_bytes();
-    if used > MEMORY_BYTES { Err(format!("it takes {} MiB of memory", used >> 20)) } else { Ok(()) }
+    if used > MEMORY_BYTES { Err(format!("used {} MiB of memory", used >> 20)) } else { Ok(()) }
 }
 
-/// Peak memory of this program. getrusage(2) would include the parent's memory from before exec.
+/// Peak memory of this process. getrusage(2) would include the parent's memory before exec.
 fn peak_memory_bytes() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let peak = status.lines().find_map(|line| line.strip_prefix("VmHWM:")?.trim().strip_suffix("kB"));
     peak.and_then(|kibibytes| kibibytes.trim().parse::<u64>().ok()).map_or(0, |kibibytes| kibibytes * 1024)
 }
 
-/// A character that a terminal would interpret.
+/// A character that a terminal would interpret, if any.
 pub(super) fn harmful(text: &str) -> Option<char> {
     text.chars().find(|c| (c.is_control() && *c != '\n') || ('\u{202a}'..='\u{202e}').contains(c))
 }
 
 const MTL: &str = "newmtl red\nKd 1 0 0\n";
 
-/// A folder with all files that the scenes may name.
+/// A folder with all files that the scenes may refer to.
 pub(super) struct CaseDir(tempfile::TempDir);
 
 impl CaseDir {
@@ -229,12 +229,12 @@ impl CaseDir {
         Self(folder)
     }
 
-    /// Writes the file of a case where scenes expect it; returns the scene to check.
+    /// Writes a case's file to the path that scenes expect. Returns the scene to check.
     pub(super) fn place_case(&self, case: Case, made: &Seed) -> PathBuf {
         let folder = self.0.path().join("scenes");
         let scene = folder.join("case.toml");
         if ["case.glb", "case.gltf"].contains(&made.file.as_str()) {
-            // Check a model on its own, which reads more of it than a scene does.
+            // Check a model directly, which reads more of it than a scene does.
             std::fs::write(folder.join(&made.file), &made.bytes).expect("written");
             return folder.join(&made.file);
         }
@@ -253,7 +253,7 @@ impl CaseDir {
     }
 }
 
-/// A scene that reads an asset.
+/// A scene that refers to an asset.
 fn scene_of(file: &str) -> String {
     let camera = "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n";
     let ball = "[[sphere]]\ncenter = [0, 1, 0]\nradius = 0.5\nmaterial = \"m\"\n";

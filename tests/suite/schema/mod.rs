@@ -1,4 +1,4 @@
-//! The schema of scenes, in both drafts: it accepts the same scenes as the program, and locates mistakes.
+//! The scene schema in both drafts: it accepts the same scenes as the program, and locates errors.
 
 mod validator;
 
@@ -18,7 +18,7 @@ fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// A TOML text as JSON. `None` if it is malformed.
+/// Converts TOML to JSON. `None` if the TOML is malformed.
 fn json(text: &str) -> Option<Value> {
     fn of(value: toml::Value) -> Value {
         match value {
@@ -34,7 +34,7 @@ fn json(text: &str) -> Option<Value> {
     Some(of(toml::Value::Table(text.parse().ok()?)))
 }
 
-/// The faults that each draft finds in a scene.
+/// Errors that each draft finds in a scene.
 fn found(text: &str) -> Vec<Vec<(String, String)>> {
     let scene = json(text).expect("TOML");
     Draft::ALL.iter().map(|draft| faults(&schema(*draft), &scene)).collect()
@@ -67,7 +67,7 @@ fn bundled_scenes_and_starter_are_valid() {
         assert_eq!(found(&text), [[], []], "{}", path.display());
     }
     assert_eq!(found(starter()), [[], []]);
-    // With every key that may appear together with the others.
+    // The starter scene with all keys that can be combined.
     let stands_alone = ["orbiter", "matrix", "image", "opacity"];
     let uncommented = |line: &str| match line.strip_prefix("# ") {
         Some(text)
@@ -128,7 +128,7 @@ fn mistakes_are_located() {
 }
 
 #[test]
-fn exclusive_keys_are_a_mistake() {
+fn exclusive_keys_are_an_error() {
     for wrong in [
         "[render]",
         "[camera]\nposition = [0, 1, 4]",
@@ -143,9 +143,9 @@ fn exclusive_keys_are_a_mistake() {
     assert_eq!(found("[camera]\norbiter = \"a.txt\"\nfov = 30"), [[], []]);
 }
 
-/// A scene that the program accepts is valid for the schema, if it can be checked on its own.
+/// Every scene that the program accepts must satisfy the schema, if it can be checked without other files.
 #[test]
-fn schema_accepts_what_the_program_accepts() {
+fn schema_accepts_all_valid_scenes() {
     let mut count = 0;
     for path in files("tests/broken") {
         let text = fs::read_to_string(&path).expect("a file");
@@ -167,12 +167,12 @@ fn new_writes_the_schema() {
     assert_eq!(scene, format!("{LINE}{}", starter()));
     assert_eq!(String::from_utf8(dir.bytes(FILE)).expect("UTF-8"), text(Draft::Four));
     assert!(dir.run("check first.toml").status.success());
-    // The same schema serves another scene; a different file of that name is kept.
+    // A current schema file is reused. A different file is kept, and the command fails.
     dir.expect("new --schema second.toml", 0);
     dir.write(FILE, "mine");
     assert_mentions(&dir.expect("new --schema third.toml", 2), &[FILE, "--schema"]);
     assert!(!dir.path("third.toml").exists() && dir.bytes(FILE) == b"mine");
-    // An existing scene gets no schema.
+    // No schema is written for an existing scene.
     let other = TestDir::new();
     other.write("there.toml", "mine");
     assert_mentions(&other.expect("new --schema there.toml", 2), &["there.toml"]);

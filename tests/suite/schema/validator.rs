@@ -1,8 +1,9 @@
-//! A validator for the part of JSON Schema that the scene schema uses. `.ci/editors.py` runs widely used validators.
+//! A validator for the subset of JSON Schema used by the scene schema. `.ci/editors.py` runs widely used
+//! validators.
 
 use serde_json::{Map, Value};
 
-/// The paths of invalid values, such as `sphere.0.radius`, each with the keyword it violates.
+/// Paths of invalid values, such as `sphere.0.radius`, each with the violated keyword.
 pub(super) fn faults(schema: &Value, value: &Value) -> Vec<(String, String)> {
     let mut found = Vec::new();
     check(schema, schema, value, "", &mut found);
@@ -15,7 +16,7 @@ fn is_valid(root: &Value, schema: &Value, value: &Value) -> bool {
     found.is_empty()
 }
 
-/// Checks a value against a subschema of the schema `root`.
+/// Checks a value against a subschema of `root`.
 fn check(root: &Value, schema: &Value, value: &Value, path: &str, found: &mut Vec<(String, String)>) {
     let Value::Object(keywords) = schema else { return };
     if let Some(Value::String(reference)) = keywords.get("$ref") {
@@ -94,7 +95,7 @@ fn holds(
             _,
         ) => true,
         ("title" | "description" | "$schema", _) => condition.is_string(),
-        (unknown, _) => unreachable!("a keyword that this validator does not know: {unknown}"),
+        (unknown, _) => unreachable!("unsupported keyword: {unknown}"),
     }
 }
 
@@ -152,12 +153,12 @@ fn is_of_type(name: &str, value: &Value) -> bool {
         "boolean" => value.is_boolean(),
         "number" => value.is_number(),
         "integer" => value.is_i64() || value.is_u64(),
-        other => unreachable!("a type that this validator does not know: {other}"),
+        other => unreachable!("unsupported type: {other}"),
     }
 }
 
-/// Whether a text matches one of the patterns in use: `[^0-9]`, `\.(one|other)$` and `^(one|other)$`, where `[Pp]`
-/// matches a letter in both cases.
+/// Whether a string matches one of the supported patterns: `[^0-9]`, `\.(one|other)$` and `^(one|other)$`.
+/// `[Pp]` matches a letter in both cases.
 fn matches(pattern: &str, text: &str) -> bool {
     if pattern == "[^0-9]" {
         return text.chars().any(|c| !c.is_ascii_digit());
@@ -166,7 +167,7 @@ fn matches(pattern: &str, text: &str) -> bool {
     let (words, text) = match (inner("\\.("), inner("^(")) {
         (Some(words), _) => (words, text.rsplit_once('.').map(|(_, ending)| ending)),
         (None, Some(words)) => (words, Some(text)),
-        (None, None) => unreachable!("a pattern that this validator does not know: {pattern}"),
+        (None, None) => unreachable!("unsupported pattern: {pattern}"),
     };
     let Some(text) = text.map(str::to_ascii_lowercase) else { return false };
     words.split('|').any(|word| match word {

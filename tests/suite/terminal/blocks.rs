@@ -2,7 +2,7 @@
 
 use super::pty::{Folder, SCENE};
 
-/// A board seen from the side, with oblique edges.
+/// A board viewed from the side, with oblique edges.
 fn oblique() -> String {
     SCENE.replace("[camera]", "[camera]\nup = [0.3, 1, 0]")
 }
@@ -15,13 +15,13 @@ fn has_finer_blocks(screen: &vt100::Screen) -> bool {
 }
 
 #[test]
-fn named_terminal_gets_its_finest_blocks() {
+fn known_terminal_gets_finest_blocks() {
     let folder = Folder::new();
     folder.write("scene.toml", &oblique());
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     terminal.wait_for_color("red");
-    assert!(!terminal.settled(has_finer_blocks), "nothing is known yet");
+    assert!(!terminal.settled(has_finer_blocks), "the terminal is unknown");
     terminal.press("\x1bP>|kitty(0.40.1)\x1b\\");
     terminal.wait("finer blocks", has_finer_blocks);
     terminal.press("q");
@@ -41,7 +41,7 @@ fn preview_option_overrides_the_terminal() {
 }
 
 #[test]
-fn pixel_preview_keeps_the_text_readable() {
+fn pixel_preview_does_not_cover_text() {
     let answers = [
         ("kitty", "\x1b_Gi=4211;OK\x1b\\"),
         ("sixel", "\x1b[?62;4c"),
@@ -54,14 +54,14 @@ fn pixel_preview_keeps_the_text_readable() {
         terminal.wait_for_render(1);
         terminal.press(answer);
         terminal.resize(120, 24);
-        // The first column of the preview, which the help leaves free.
+        // The first column of the preview, which the help does not cover.
         let has_blocks = |screen: &vt100::Screen| {
             let own = vt100::Color::Default;
             screen.cell(10, 0).is_some_and(|cell| cell.fgcolor() != own || cell.bgcolor() != own)
         };
         terminal.wait("pixels", |screen| !has_blocks(screen));
         terminal.press("?");
-        terminal.wait("half blocks next to the help", has_blocks);
+        terminal.wait("half blocks beside the help", has_blocks);
         terminal.press("?");
         terminal.wait("pixels again", |screen| !has_blocks(screen));
         terminal.press("q");
@@ -80,7 +80,7 @@ fn unsupported_pixels_fall_back_to_half_blocks() {
         let folder = Folder::new();
         let call = [folder.program(), "scene.toml", "--preview", protocol];
         let mut terminal = folder.terminal_with(&call, variables);
-        // The terminal has replied to all queries, but to none about images.
+        // The terminal replied to all queries except those about images.
         terminal.press("\x1b[?62;22c");
         terminal.wait_for(words);
         terminal.wait_for_render(1);

@@ -1,10 +1,10 @@
-//! Moving the camera with keys, as seen on the screen and on disk.
+//! Moving the camera with keys: effects on the screen and on disk.
 
 use glimt::tui::messages;
 
 use super::pty::{Colors, Folder, Terminal};
 
-/// Waits for a preview whose number of red cells satisfies `holds`.
+/// Waits until the preview's number of red cells satisfies `holds`.
 #[track_caller]
 fn wait_for_red(terminal: &Terminal, what: &str, holds: impl Fn(usize) -> bool) {
     terminal.wait(what, |screen| holds(Colors::of(screen).red));
@@ -34,7 +34,7 @@ fn moved_camera_resets_without_writing() {
         terminal.wait_for("done");
         terminal.press("0");
         terminal.wait_for(messages::RESET);
-        wait_for_red(&terminal, "the picture as it was", |now| now == red);
+        wait_for_red(&terminal, "the original picture", |now| now == red);
         terminal.wait_for("done");
         assert_eq!(folder.bytes("scene.png"), own, "{keys}");
     }

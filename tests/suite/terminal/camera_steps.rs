@@ -1,4 +1,4 @@
-//! Camera position after each key and mouse action, from the numbers that `c` writes into the scene file.
+//! Camera position after each key and mouse action, read from the scene file written by `c`.
 
 use std::fs;
 
@@ -11,14 +11,15 @@ const DOWN: &str = "\x1b[B";
 const RIGHT: &str = "\x1b[C";
 const LEFT: &str = "\x1b[D";
 
-/// The numbers of a key in the scene file.
+/// The numbers of a key's value in the scene file.
 fn numbers(folder: &Folder, key: &str) -> Vec<f64> {
     let text = fs::read_to_string(folder.path("scene.toml")).expect("a scene");
     let line = text.lines().find_map(|line| line.strip_prefix(key)?.strip_prefix(" = ")).expect(key);
     line.trim_matches(['[', ']']).split(',').map(|it| it.trim().parse().expect("a number")).collect()
 }
 
-/// The value of a key in the file after these keys and `c`. Restores the file afterwards, and waits for its image.
+/// Presses `keys` and `c`. Returns the value of `key` in the scene file, then restores the file and waits for
+/// its image.
 fn kept(folder: &Folder, terminal: &mut Terminal, own: &[u8], keys: &str, key: &str) -> Vec<f64> {
     terminal.press(keys);
     terminal.wait_for_message(messages::CAMERA_MOVED);
@@ -28,11 +29,11 @@ fn kept(folder: &Folder, terminal: &mut Terminal, own: &[u8], keys: &str, key: &
     let expected = folder.once(&[]);
     assert_ne!(expected, own, "{keys:?} shows");
     let is = |bytes: &[u8]| fs::read(folder.path("scene.png")).is_ok_and(|there| there == bytes);
-    terminal.wait("the picture of the camera that was written", |_| is(&expected));
+    terminal.wait("the picture from the written camera", |_| is(&expected));
     folder.write("scene.toml", SCENE);
-    terminal.wait("the scene's own picture", |_| is(own));
+    terminal.wait("the original picture", |_| is(own));
     terminal.wait_for("done");
-    // Keys pressed before the screen shows the change would move the earlier camera.
+    // Keys pressed before the screen shows the change would move the previous camera.
     terminal.settled(|screen| screen.contents());
     kept
 }
@@ -40,10 +41,10 @@ fn kept(folder: &Folder, terminal: &mut Terminal, own: &[u8], keys: &str, key: &
 #[track_caller]
 fn assert_near(numbers: &[f64], expected: &[f64], what: &str) {
     let is_near = numbers.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-3);
-    assert!(numbers.len() == expected.len() && is_near, "{what:?}: {numbers:?} is not {expected:?}");
+    assert!(numbers.len() == expected.len() && is_near, "{what:?}: {numbers:?}, expected {expected:?}");
 }
 
-/// The camera's offset along one axis and along z after a step of 3° at a distance of 4.
+/// Camera offset along one axis and along z after a 3° step at a distance of 4.
 const ASIDE: f64 = 0.2093;
 const AHEAD: f64 = 3.9945;
 
@@ -67,11 +68,11 @@ fn camera_keys_move_by_documented_steps() {
     }
     for (keys, fov) in [("<", 40.0 / 1.05), (">", 40.0 * 1.05)] {
         let written = kept(&folder, &mut terminal, &own, keys, "fov")[0];
-        assert!((written - fov).abs() < 0.006, "{keys}: {written} is not {fov}");
+        assert!((written - fov).abs() < 0.006, "{keys}: {written}, expected {fov}");
     }
 }
 
-/// A terminal's sequence for a button or the wheel over a cell, counted from 1.
+/// The terminal sequence for a mouse button or the wheel over a cell, numbered from 1.
 fn mouse(button: u8, column: u16, row: u16) -> String {
     format!("\x1b[<{button};{column};{row}M")
 }
@@ -94,11 +95,11 @@ fn drag_orbits_and_wheel_moves_the_camera() {
     assert!(down[0] == 0.0 && down[1] > 0.1 && down[2] < 4.0, "{down:?}");
     assert_near(&up, &[down[0], -down[1], down[2]], "up");
     assert_near(&eye(mouse(64, 20, 10)), &[0.0, 0.0, 4.0 * 0.95], "the wheel");
-    assert_near(&eye(mouse(65, 20, 10)), &[0.0, 0.0, 4.0 / 0.95], "the wheel back");
+    assert_near(&eye(mouse(65, 20, 10)), &[0.0, 0.0, 4.0 / 0.95], "wheel down");
 }
 
 #[test]
-fn drag_outside_the_preview_moves_nothing() {
+fn drag_outside_the_preview_has_no_effect() {
     let folder = Folder::new();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
@@ -127,18 +128,17 @@ fn reset_undoes_every_key() {
     fs::remove_file(folder.path("scene.png")).expect("removed");
     terminal.press("0");
     terminal.wait_for(messages::RESET);
-    terminal.wait("the scene's own picture", |_| {
-        fs::read(folder.path("scene.png")).is_ok_and(|bytes| bytes == own)
-    });
+    terminal
+        .wait("the original picture", |_| fs::read(folder.path("scene.png")).is_ok_and(|bytes| bytes == own));
     let words = ["s soft", "v beauty", "done"];
-    terminal.wait("the earlier toggles", |screen| {
+    terminal.wait("the original settings", |screen| {
         let text = screen.contents();
         words.iter().all(|it| text.contains(it)) && !text.contains("camera moved")
     });
 }
 
 #[test]
-fn kept_orbiter_becomes_position_and_look_at() {
+fn saved_orbiter_becomes_position_and_look_at() {
     let folder = Folder::new();
     let text = SCENE.replace("position = [0, 0, 4]\nlook_at = [0, 0, 0]", "orbiter = \"eye.txt\" # gKit");
     folder.write("eye.txt", "c 0 0 0\ns 4 2\n");
@@ -152,17 +152,17 @@ fn kept_orbiter_becomes_position_and_look_at() {
     assert_eq!(numbers(&folder, "position").len(), 3);
     let written = fs::read_to_string(folder.path("scene.toml")).expect("a scene");
     assert!(written.contains("look_at = [") && !written.contains("orbiter"), "{written}");
-    terminal.wait("its picture on disk", |_| folder.bytes("scene.png") == folder.once(&[]));
+    terminal.wait("the picture on disk", |_| folder.bytes("scene.png") == folder.once(&[]));
 }
 
 #[test]
-fn camera_is_not_kept_in_a_changed_file() {
+fn camera_is_not_saved_to_a_changed_file() {
     let folder = Folder::new();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     terminal.press(">");
     terminal.wait_for_render(2);
-    // Make room for the message in one line.
+    // Widen the window so that the message fits on one line.
     terminal.resize(120, 40);
     let broken = SCENE.replace("samples = 4", "samples = \"four\"");
     folder.write("scene.toml", &broken);

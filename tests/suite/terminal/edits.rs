@@ -1,18 +1,18 @@
-//! Each kind of edit and the stages that it reruns, from the stage lines on the screen and from the report.
+//! Stages rerun by each kind of edit, according to the screen and the report.
 
 use glimt::tui::messages;
 
 use super::pty::{Folder, SCENE, Terminal};
 use glimt::pipeline::protocol::reasons;
 
-/// A triangle next to the board.
+/// A triangle beside the board.
 const OBJ: &str = "v 1.2 0 0\nv 1.4 0 0\nv 1.2 0.5 0\nf 1 2 3\n";
 
 fn paint(color: &str) -> String {
     format!("P3\n1 1\n255\n{color}\n")
 }
 
-/// A scene with two more textures and a mesh.
+/// The scene with two additional textures and a mesh.
 fn scene() -> String {
     let balls = "[[sphere]]\ncenter = [-0.5, 0.5, 0.5]\nradius = 0.2\nmaterial = \"skin\"\n\n\
                  [[sphere]]\ncenter = [-0.5, -0.5, 0.5]\nradius = 0.2\nmaterial = \"bark\"\n";
@@ -34,7 +34,7 @@ fn folder(text: &str) -> Folder {
     folder
 }
 
-/// The program rendering the scene, with room for every line.
+/// The program rendering the scene, in a terminal large enough for every line.
 fn terminal(folder: &Folder) -> Terminal {
     let call = [folder.program(), "scene.toml", "--report", "report.json"];
     let mut terminal = folder.terminal_with(&call, &[]);
@@ -42,7 +42,7 @@ fn terminal(folder: &Folder) -> Terminal {
     terminal
 }
 
-/// `d`one, `r`eused or `s`kipped for each stage in order, and the message of the stage with this name.
+/// `d`one, `r`eused or `s`kipped for each stage in order, and the message of the stage `name`.
 fn stages(folder: &Folder, name: &str) -> (String, String) {
     let report: serde_json::Value = serde_json::from_slice(&folder.bytes("report.json")).expect("JSON");
     let stages = report["stages"].as_array().expect("stages");
@@ -81,12 +81,12 @@ fn edits_rerun_only_dependent_stages() {
             renders += 1;
             terminal.wait_for_render(renders);
             let (statuses, said) = stages(&folder, stage);
-            // Undoing the edit finds the earlier trees and image.
+            // Undoing the edit reuses the previous trees and image.
             let is_of_light = expected.is_none() && from == "[20, 20, 20]";
             let back = if is_of_light { "drrrdsrd" } else { "drrrrsrd" };
             assert_eq!(statuses, expected.unwrap_or(back), "{to}");
             assert!(said.contains(why), "{to}: {said}");
-            // The full text, or the short one if the line has no room.
+            // The full text, or the short text if the line is too narrow.
             let count = statuses.matches('r').count();
             let words = [count.to_string(), format!("{count} stages"), "1 stage".to_owned()]
                 .map(|it| messages::cached(&it));
@@ -104,7 +104,7 @@ fn edits_rerun_only_dependent_stages() {
     assert_eq!(stages(&folder, "textures"), ("rrdrrsdd".to_owned(), "1 loaded, 1 cached".to_owned()));
 }
 
-/// Waits until all of these stage lines appear.
+/// Waits until all of the given stage lines appear.
 #[track_caller]
 fn wait_for_stages(terminal: &Terminal, lines: &[(&str, &str, &str)]) {
     for (sign, name, status) in lines {
@@ -135,7 +135,7 @@ fn stages_report_their_state_while_rendering() {
     let saved = [("=", "parse", "reused"), kept, ("✓", "textures", " "), ("=", "accel", "reused"), rendering];
     wait_for_stages(&terminal, &saved);
 
-    // Break the scene during the render, and repair it by restoring the first version.
+    // Break the scene during the render, then restore the first version.
     folder.write("scene.toml", "[render");
     terminal.wait_for(messages::LAST_GOOD_SCENE);
     folder.write("scene.toml", &own);

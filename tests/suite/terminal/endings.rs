@@ -1,4 +1,4 @@
-//! How the program ends, and the state it leaves behind.
+//! How the program exits, and the state it leaves behind.
 
 use glimt::tui::messages;
 use nix::sys::signal::Signal;
@@ -73,7 +73,7 @@ fn quit_after_save_writes_or_reports() {
     assert_eq!(terminal.end_saying("scene.png"), 0);
     assert!(folder.path("scene.png").is_file());
 
-    // There is nothing to write: most pixels have no sample yet.
+    // Nothing can be written, because most pixels have no sample yet.
     std::fs::remove_file(folder.path("scene.png")).expect("removed");
     folder.write(
         "scene.toml",
@@ -83,12 +83,12 @@ fn quit_after_save_writes_or_reports() {
     terminal.wait_for("rendering");
     terminal.press("wq");
     assert_eq!(terminal.code(), 0);
-    assert!(!terminal.last_lines().is_empty(), "the reason is printed");
+    assert!(!terminal.last_lines().is_empty(), "the reason must be printed");
     terminal.end();
     assert!(!folder.path("scene.png").exists());
 }
 
-/// Whether the write has begun depends on the machine; the image is never lost.
+/// The write may or may not have started, but the image must not be lost.
 #[test]
 fn keys_during_a_write_never_lose_the_image() {
     let folder = Folder::new();
@@ -120,7 +120,7 @@ fn keys_during_a_write_never_lose_the_image() {
     terminal.press("w");
     terminal.press("q");
     assert_eq!(terminal.code(), 0);
-    assert!(!terminal.last_lines().is_empty(), "the outcome is printed");
+    assert!(!terminal.last_lines().is_empty(), "the outcome must be printed");
     terminal.end();
 }
 
@@ -131,28 +131,28 @@ fn render_resumes_after_a_dropped_connection() {
     folder.write("scene.toml", &slow);
     let terminal = folder.terminal();
     terminal.wait_for("ETA");
-    // The system sends the signal, and a shell passes it on to its jobs at any time.
+    // The system sends the signal, and a shell may forward it to its jobs at any time.
     for _ in 0..100 {
         terminal.signal(Signal::SIGHUP);
         std::thread::sleep(std::time::Duration::from_millis(1));
     }
     assert_eq!(terminal.end(), 129);
     let checkpoint = folder.path("scene.png.checkpoint");
-    assert!(checkpoint.is_file(), "the samples are saved");
-    // A different scene leaves the checkpoint alone and starts over.
+    assert!(checkpoint.is_file(), "the samples must be saved");
+    // A different scene starts over and does not touch the checkpoint.
     folder.write("scene.toml", &SCENE.replace("samples = 4", "samples = 4000\nseed = 7"));
     let mut terminal = folder.terminal();
     terminal.wait_for("ETA");
     terminal.press("q");
     assert_eq!(terminal.end(), 0);
     assert!(checkpoint.is_file());
-    // The same scene resumes, ends with the same pixels, and removes the checkpoint.
+    // The same scene resumes, produces the same pixels, and removes the checkpoint.
     folder.write("scene.toml", &slow);
     let terminal = folder.terminal();
     terminal.wait_for(messages::RESUMING);
     terminal.wait_for_render(1);
     assert_eq!(folder.bytes("scene.png"), folder.once(&[]));
-    terminal.wait("the checkpoint's removal", |_| !checkpoint.exists());
+    terminal.wait("removal of the checkpoint", |_| !checkpoint.exists());
 }
 
 #[test]
@@ -168,14 +168,15 @@ fn ctrl_z_suspends_and_fg_resumes() {
         !screen.alternate_screen() && !screen.hide_cursor() && is_asked
     };
     terminal.wait("the shell", is_shell);
-    // The shell prints the result only if the terminal's modes were restored. The typed text does not contain the sum.
+    // The shell prints the result only if the terminal modes are restored. The typed text does not contain
+    // the sum.
     terminal.press("echo $((40 + 2))th\n");
     terminal.wait_for("42th");
     terminal.press("fg\n");
     terminal.wait("the picture", |screen| screen.alternate_screen());
     terminal.wait_for_color("red");
     terminal.press("q");
-    // The program still receives keys typed before it ends.
+    // Wait, because the program receives keys until it exits.
     terminal.wait("the shell", is_shell);
     terminal.press("exit\n");
     assert_eq!(terminal.end(), 0);

@@ -1,4 +1,5 @@
-//! Window title, progress, notifications, links and the clipboard: which terminal gets them, and that they are reset.
+//! Window title, progress, notifications, links and the clipboard: which terminals receive them, and that
+//! they are reset.
 
 use glimt::tui::messages;
 use nix::sys::signal::Signal;
@@ -6,8 +7,8 @@ use nix::sys::signal::Signal;
 use super::pty::{Colors, Folder, SCENE, Terminal};
 use super::relay::Answers;
 
-/// Terminals by their environment variables, each with its features: title, progress, a notification protocol, links,
-/// clipboard.
+/// Environment variables that identify terminals, with the terminals' features: title, progress, a
+/// notification protocol, links, clipboard.
 const KNOWN: [(&[(&str, &str)], Has); 5] = [
     (
         &[("TERM", "xterm-kitty")],
@@ -25,7 +26,7 @@ const KNOWN: [(&[(&str, &str)], Has); 5] = [
     (&[("VTE_VERSION", "7600")], Has { progress: false, notice: b"\x07", clipboard: false, ..ALL }),
 ];
 
-/// Terminals not known to have any of these features.
+/// Terminals not known to support any of these features.
 const OTHERS: [&[(&str, &str)]; 6] = [
     &[],
     &[("TERM", "dumb"), ("WT_SESSION", "1-2-3")],
@@ -60,18 +61,18 @@ fn is_last(bytes: &[u8], before: &[u8], after: &[u8]) -> bool {
     last(after).is_some_and(|after| last(before).is_none_or(|before| before < after))
 }
 
-/// A render that does not end until the scene is saved again.
+/// A scene that keeps rendering until it is saved again.
 fn endless() -> String {
     SCENE.replace("samples = 4", "samples = 10000000")
 }
 
-/// Starts the program so that every finished render triggers a notification.
+/// Starts the program with a notification for every finished render.
 fn open(folder: &Folder, variables: &[(&str, &str)]) -> Terminal {
     folder.terminal_with(&[folder.program(), "scene.toml", "--notify-after", "0.001"], variables)
 }
 
-/// Makes the program send everything: a render until there is a title, its end without focus, a click, a copy. Returns
-/// all bytes until the end.
+/// Makes the program send every kind of sequence: a render with a title, the end of a render without focus, a
+/// click and a copy. Returns all output until the program exits.
 fn through(variables: &[(&str, &str)], has_title: bool) -> Vec<u8> {
     let folder = Folder::new();
     folder.write("scene.toml", &endless());
@@ -80,7 +81,7 @@ fn through(variables: &[(&str, &str)], has_title: bool) -> Vec<u8> {
     if has_title {
         terminal.wait("a title", |_| has(&terminal.bytes(), b"\x1b]2;scene.toml: rendering 0 %"));
     }
-    // Remove the focus. The help that opens afterwards shows that this was read before the scene is saved.
+    // Remove the focus. When the help opens, the program has read this event before the scene is saved.
     terminal.press("\x1b[O?");
     terminal.wait_for_message(messages::HELP_TOGGLE);
     terminal.press("?");
@@ -88,7 +89,7 @@ fn through(variables: &[(&str, &str)], has_title: bool) -> Vec<u8> {
     folder.write("scene.toml", SCENE);
     terminal.wait_for_render(1);
     if has_title {
-        terminal.wait("its last title", |_| has(&terminal.bytes(), b"\x1b]2;scene.toml: done"));
+        terminal.wait("the last title", |_| has(&terminal.bytes(), b"\x1b]2;scene.toml: done"));
     }
     // Restore the focus, click on the board, and copy the inspected values.
     terminal.press("\x1b[I");
@@ -102,12 +103,12 @@ fn through(variables: &[(&str, &str)], has_title: bool) -> Vec<u8> {
     terminal.settled(vt100::Screen::contents);
     terminal.press("q");
     terminal.code();
-    terminal.wait("the last bytes", |screen| !screen.alternate_screen() && !screen.hide_cursor());
+    terminal.wait("the restored terminal", |screen| !screen.alternate_screen() && !screen.hide_cursor());
     terminal.bytes()
 }
 
 #[test]
-fn known_terminals_get_their_features_and_reset() {
+fn known_terminals_get_and_reset_features() {
     for (variables, has_what) in KNOWN {
         let bytes = through(variables, true);
         let check = |part: &[u8], is_there: bool| {
@@ -120,17 +121,23 @@ fn known_terminals_get_their_features_and_reset() {
         check(b"\x1b]9;4;1;", has_what.progress);
         check(has_what.notice, true);
         check(b"\x1b]8;;file://", has_what.links);
-        // The address, then perhaps a color, then the name.
+        // The address, an optional color, and the name.
         let address = b"/scene.png\x1b\\";
         let name = place(&bytes, address).map(|start| &bytes[start + address.len()..][..24]);
         assert_eq!(name.is_some_and(|name| has(name, b"scene.png")), has_what.links, "{variables:?}: a link");
         check(b"\x1b]52;c;", has_what.clipboard);
-        assert!(is_last(&bytes, b"\x1b]2;scene.toml", b"\x1b[23;2t"), "{variables:?}: the title is restored");
-        assert!(is_last(&bytes, b"\x1b[?1004h", b"\x1b[?1004l"), "{variables:?}: focus reports end");
+        assert!(
+            is_last(&bytes, b"\x1b]2;scene.toml", b"\x1b[23;2t"),
+            "{variables:?}: the title must be restored"
+        );
+        assert!(
+            is_last(&bytes, b"\x1b[?1004h", b"\x1b[?1004l"),
+            "{variables:?}: focus reports must be disabled"
+        );
         if has_what.progress {
             assert!(
                 is_last(&bytes, b"\x1b]9;4;1;", b"\x1b]9;4;0;0\x1b\\"),
-                "{variables:?}: the progress bar is removed"
+                "{variables:?}: the progress bar must be removed"
             );
         }
     }
@@ -174,7 +181,7 @@ fn signals_clear_title_and_progress() {
         });
         terminal.signal(signal);
         assert_eq!(terminal.code(), code, "{signal}");
-        terminal.wait("the last bytes", |screen| !screen.alternate_screen() && !screen.hide_cursor());
+        terminal.wait("the restored terminal", |screen| !screen.alternate_screen() && !screen.hide_cursor());
         let bytes = terminal.bytes();
         assert!(is_last(&bytes, b"\x1b]2;scene.toml", b"\x1b[23;2t"), "{signal}");
         assert!(is_last(&bytes, b"\x1b]9;4;1;", b"\x1b]9;4;0;0\x1b\\"), "{signal}");
@@ -182,7 +189,7 @@ fn signals_clear_title_and_progress() {
     }
 }
 
-/// A focused window needs no notification, and a short render deserves none.
+/// No notification for a focused window or a short render.
 #[test]
 fn only_unfocused_long_renders_notify() {
     for (focus, after) in
@@ -201,7 +208,7 @@ fn only_unfocused_long_renders_notify() {
     }
 }
 
-/// Title and progress follow the preview, and do not increase the number of queued bytes.
+/// Title and progress are sent after the preview, and do not increase the number of queued bytes.
 #[test]
 fn slow_connection_sends_the_preview_first() {
     let folder = Folder::new();
@@ -217,22 +224,22 @@ fn slow_connection_sends_the_preview_first() {
     let mut before = vt100::Parser::new(side(40), side(120), 0);
     before.process(&bytes[..title]);
     let red = Colors::of(before.screen()).red;
-    assert!(red > 500, "{red} cells of the picture before the first title");
+    assert!(red > 500, "{red} cells of the preview before the first title");
     assert!(terminal.line(|seen| seen.most_unanswered) <= 24_000);
 }
 
 #[test]
-fn late_terminal_reply_enables_its_features() {
+fn late_terminal_reply_enables_features() {
     let folder = Folder::new();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     assert!(!has(&terminal.bytes(), b"\x1b]2;"));
     terminal.press("\x1bP>|ghostty 1.2.0\x1b\\");
     terminal.wait("a title", |_| has(&terminal.bytes(), b"\x1b]2;scene.toml: done"));
-    terminal.wait("reports of the focus", |_| has(&terminal.bytes(), b"\x1b[?1004h"));
+    terminal.wait("focus reports", |_| has(&terminal.bytes(), b"\x1b[?1004h"));
     terminal.press("q");
     terminal.code();
-    terminal.wait("the last bytes", |screen| !screen.alternate_screen() && !screen.hide_cursor());
+    terminal.wait("the restored terminal", |screen| !screen.alternate_screen() && !screen.hide_cursor());
     let bytes = terminal.bytes();
     assert!(
         is_last(&bytes, b"\x1b]2;scene.toml", b"\x1b[23;2t")

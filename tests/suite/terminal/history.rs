@@ -1,4 +1,4 @@
-//! The history next to the newest image, with the changes of each edit; the noise curve; and `u`, which undoes `c`.
+//! The history with the changes of each edit, the noise curve, and undoing `c` with `u`.
 
 use std::fs;
 
@@ -7,12 +7,12 @@ use glimt::tui::messages;
 use super::pty::{BLUE, Colors, Folder, GREEN, RED, SCENE, Terminal, cells, upper};
 use super::relay::Answers;
 
-/// The text of the screen, in one line.
+/// The text on the screen as a single line.
 fn words(screen: &vt100::Screen) -> String {
     screen.contents().split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// The text right of `column`, in one line, without the blocks of thumbnails.
+/// The text to the right of `column` as a single line, without thumbnails.
 fn beside(screen: &vt100::Screen, column: usize) -> String {
     let text = screen.contents();
     let is_word = |c: &char| !('▀'..='▟').contains(c);
@@ -20,7 +20,7 @@ fn beside(screen: &vt100::Screen, column: usize) -> String {
     rows.collect::<Vec<_>>().join(" ").split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// Number of cells of each color, starting at a column.
+/// Number of cells of each color, from the given column on.
 fn colors_from(screen: &vt100::Screen, column: u16) -> [usize; 3] {
     let (_, columns) = screen.size();
     let mut count = [0; 3];
@@ -39,7 +39,7 @@ fn colors_from(screen: &vt100::Screen, column: u16) -> [usize; 3] {
     count
 }
 
-/// Three saves, each with another color.
+/// Saves the scene three times with different colors.
 fn edited(folder: &Folder, terminal: &Terminal) {
     terminal.wait_for_render(1);
     for (render, (color, value)) in (2..).zip([("green", GREEN), ("blue", BLUE)]) {
@@ -49,7 +49,7 @@ fn edited(folder: &Folder, terminal: &Terminal) {
     }
 }
 
-/// Column at which the panel begins next to an image of 64 × 48 pixels in 120 × 40 cells.
+/// First column of the panel beside a 64 × 48 image in a window of 120 × 40 cells.
 const PANEL: u16 = 97;
 
 #[test]
@@ -57,7 +57,7 @@ fn history_shows_images_and_their_changes() {
     let folder = Folder::new();
     let mut terminal = folder.terminal_of(120, 40);
     terminal.wait_for_render(1);
-    assert!(!terminal.text().contains(messages::HISTORY), "there is only one render");
+    assert!(!terminal.text().contains(messages::HISTORY), "no history with a single render");
     edited(&folder, &terminal);
     let oldest_entry = format!("1 {}", messages::OPENED);
     terminal.wait("the history", |screen| {
@@ -66,7 +66,7 @@ fn history_shows_images_and_their_changes() {
             && beside.contains("▸3 materials. board.diffuse → [0.02, 0.02, 0.8]")
             && beside.contains(&oldest_entry)
     });
-    // A thumbnail of each color, the newest at the top.
+    // A thumbnail for each color, newest at the top.
     let colors = terminal.settled(|screen| colors_from(screen, PANEL));
     assert!(colors.iter().all(|count| *count >= 3), "{colors:?}");
     let row_of = |text: &str| {
@@ -78,7 +78,7 @@ fn history_shows_images_and_their_changes() {
     };
     let (newest, oldest) = (row_of("▸3 mat"), row_of(&oldest_entry));
     assert!(newest < oldest);
-    // A click shows a render, and `n` continues from it.
+    // A click shows a render, and `n` continues from there.
     let click = |row: usize| format!("\x1b[<0;{0};{1}M\x1b[<0;{0};{1}m", PANEL + 4, row + 1);
     terminal.press(&click(oldest));
     terminal.wait("the red picture", |screen| colors_from(screen, 0)[0] > 500);
@@ -92,19 +92,19 @@ fn history_shows_images_and_their_changes() {
     terminal.press(&click(newest));
     terminal.wait_for(messages::NEWEST_RENDER);
     terminal.wait("the blue picture", |screen| colors_from(screen, 0)[2] > 500);
-    // A narrower window has no room for the history.
+    // A narrower window does not show the history.
     terminal.resize(119, 40);
     terminal.wait("no strip", |screen| !screen.contents().contains(messages::HISTORY));
 }
 
-/// Several saves including a broken one count as one edit, and so do `c` and `u`.
+/// `c` does not add an entry for the moved camera, and a broken save does not change the next entry.
 #[test]
-fn history_entry_names_only_its_own_change() {
+fn history_entry_shows_only_its_own_change() {
     let folder = Folder::new();
     let mut terminal = folder.terminal_of(120, 40);
     terminal.wait_for_render(1);
     let is_told = |screen: &vt100::Screen, words: &str| {
-        // The first line reports a render that left the image unchanged.
+        // The first line reports that a save did not change the image.
         let beside = beside(screen, PANEL.into()).replace("unchanged · ", "");
         beside.contains(words) && !beside.contains("changed") && !beside.contains(messages::AGAIN)
     };
@@ -112,7 +112,7 @@ fn history_entry_names_only_its_own_change() {
     terminal.wait("a moved camera", |screen| is_told(screen, "▸2 camera moved"));
     terminal.wait_for("done");
     terminal.press("c");
-    terminal.wait("what c wrote", |screen| {
+    terminal.wait("the camera written by c", |screen| {
         is_told(screen, " camera. position → [") && screen.contents().contains("✓ done")
     });
     let kept = fs::read_to_string(folder.path("scene.toml")).expect("a scene");
@@ -122,8 +122,8 @@ fn history_entry_names_only_its_own_change() {
     terminal.wait("the edit", |screen| is_told(screen, " materials. board.diffuse"));
 }
 
-/// Checks that a slow connection has no more queued bytes than without a history. (The painter's tests check that it
-/// follows the image.)
+/// Checks that the history does not increase the number of queued bytes on a slow connection. (The painter's
+/// tests check that it is sent after the image.)
 #[test]
 fn history_is_sent_over_slow_connections() {
     let folder = Folder::new();
@@ -134,7 +134,7 @@ fn history_is_sent_over_slow_connections() {
 }
 
 #[test]
-fn noise_curve_shows_its_target() {
+fn noise_curve_shows_the_target() {
     let folder = Folder::new();
     let noisy = SCENE.replace("samples = 4", "samples = 10000000\nerror = 0.0001\nintegrator = \"path\"");
     folder.write("scene.toml", &noisy);
@@ -150,7 +150,7 @@ fn noise_curve_shows_its_target() {
             && beside.contains(&messages::noise_target("0.01 %"))
             && cells(screen).filter(|cell| is_braille(cell)).count() >= 10
     });
-    // Changing the exposure does not start another render.
+    // Changing the exposure does not start a new render.
     terminal.press("[");
     terminal.wait_for("exposure −0.25");
     terminal.wait_for_render(1);
@@ -158,11 +158,11 @@ fn noise_curve_shows_its_target() {
     terminal.press("r");
     terminal.wait_for("ETA");
     terminal
-        .wait("no curve while it renders", |screen| !screen.contents().contains(messages::NOISE_OVER_TIME));
+        .wait("no curve while rendering", |screen| !screen.contents().contains(messages::NOISE_OVER_TIME));
 }
 
 #[test]
-fn undo_reverts_only_the_kept_camera() {
+fn undo_reverts_only_the_saved_camera() {
     let folder = Folder::new();
     let text = || fs::read_to_string(folder.path("scene.toml")).expect("a scene");
     let mut terminal = folder.terminal_of(120, 40);
@@ -176,7 +176,7 @@ fn undo_reverts_only_the_kept_camera() {
     terminal.wait_for(&messages::camera_saved("scene.toml"));
     let kept = text();
     assert_ne!(kept, SCENE);
-    // After the user has edited the file, it is kept.
+    // If the user has edited the file, undo does not change it.
     let edited = kept.replace(RED, GREEN);
     folder.write("scene.toml", &edited);
     terminal.wait("the edit", |screen| Colors::of(screen).is_most("green"));
@@ -186,9 +186,9 @@ fn undo_reverts_only_the_kept_camera() {
         words(screen).contains(&format!("scene.toml {}", glimt::pipeline::messages::NOT_UNDONE))
     });
     assert_eq!(text(), edited);
-    // When the edit is reverted by hand, `u` can undo again.
+    // After the edit is reverted by hand, `u` works again.
     folder.write("scene.toml", &kept);
-    terminal.wait("the kept camera", |screen| Colors::of(screen).is_most("red"));
+    terminal.wait("the saved camera", |screen| Colors::of(screen).is_most("red"));
     terminal.wait_for("done");
     terminal.press("u");
     terminal.wait_for(&messages::undone("scene.toml"));

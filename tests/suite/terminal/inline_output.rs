@@ -1,4 +1,4 @@
-//! Commands that print lines in the terminal: images and plots between the text, without a screen of their own.
+//! Commands without a full-screen interface: images and plots within their terminal output.
 
 use nix::sys::signal::Signal;
 
@@ -42,7 +42,7 @@ fn compare_shows_both_images_and_flip() {
 }
 
 #[test]
-fn compare_uses_the_colors_of_the_terminal() {
+fn compare_uses_the_terminal_color_depth() {
     let (_folder, terminal) = compared(&[], &[("COLORTERM", "")]);
     terminal.look(|screen| {
         assert!(cells(screen).any(|cell| matches!(cell.fgcolor(), vt100::Color::Idx(16..))));
@@ -102,5 +102,5 @@ fn bench_keeps_its_plot_at_the_end() {
     let folder = Folder::new();
     let mut terminal = measured(&folder, "1,4");
     assert_eq!(terminal.code(), 0);
-    terminal.wait("the plot, and no bar", |screen| has_plot(screen) && !screen.contents().contains('█'));
+    terminal.wait("the plot without the bar", |screen| has_plot(screen) && !screen.contents().contains('█'));
 }

@@ -1,4 +1,4 @@
-//! Bursts, pasted text and terminal replies: glimt loses no key, and treats nothing else as a key.
+//! Bursts, pasted text and terminal replies. glimt loses no key and does not mistake other input for keys.
 
 use std::time::Duration;
 
@@ -6,7 +6,7 @@ use glimt::tui::messages;
 
 use super::pty::{Folder, SCENE};
 
-/// A key without a binding.
+/// An unbound key.
 const UNBOUND: &str = "Y";
 
 fn pause(milliseconds: u64) {
@@ -18,7 +18,7 @@ fn key_after_a_burst_is_handled() {
     let folder = Folder::new();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
-    // Nothing follows: the last key must not wait for more input.
+    // The last key must be handled without waiting for more input.
     terminal.burst(UNBOUND.repeat(60_000) + "?");
     terminal.wait_for_message(messages::HELP_TOGGLE);
     terminal.burst(UNBOUND.repeat(60_000) + "q");
@@ -46,7 +46,7 @@ fn long_paste_is_not_keys() {
     let folder = Folder::new();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
-    // Each of these keys has an effect; the last two write the camera into the scene and quit.
+    // Each of these keys has an effect. The last two write the camera to the scene and quit.
     terminal.burst(format!("\x1b[200~{}\x1b[201~?", "h?vcq".repeat(300_000)));
     terminal.wait_for_message(messages::HELP_TOGGLE);
     assert_eq!(folder.bytes("scene.toml"), SCENE.as_bytes());
@@ -75,7 +75,7 @@ fn split_terminal_replies_are_not_keys() {
         ["\x1b[0n", "\x1b[?62;1;22;0c", "\x1b[24;80R", "\x1b[?2026;0$y", "\x1b]11;rgb:0000/0000/0000\x1b\\"]
     {
         terminal.press(answer);
-        // A split string looks like keys, and glimt never requests one.
+        // Skip the string reply: when split, it looks like keys, and glimt never requests it.
         for byte in answer.chars().filter(|_| !answer.starts_with("\x1b]")) {
             terminal.press(&byte.to_string());
             pause(90);
@@ -89,7 +89,7 @@ fn split_terminal_replies_are_not_keys() {
     terminal.wait_for(messages::NOTHING_TO_RESET);
     terminal.press("?");
     terminal.wait_for_message(messages::HELP_TOGGLE);
-    // An escape character that nothing follows is the Escape key.
+    // A single escape character is the Escape key.
     terminal.press("\x1b");
     terminal.wait("no help", |screen| !screen.contents().contains(messages::HELP_TOGGLE));
     terminal.press("q");
@@ -98,7 +98,7 @@ fn split_terminal_replies_are_not_keys() {
 
 #[test]
 fn unterminated_sequences_do_not_block_keys() {
-    // Use one terminal each, because the test mostly waits.
+    // Use a separate terminal for each sequence, because the test mostly waits.
     let terminals = ["\x1b]0;", "\x1bP", "\x1b[", "\x1bO", "\x1b[1;", "\x1bX", "\u{e9}\x1b"].map(|begun| {
         let folder = Folder::new();
         let mut terminal = folder.terminal();

@@ -8,17 +8,17 @@ use glimt::tui::messages;
 use super::mouse_and_editor::{EDITOR, editing};
 use super::pty::{Colors, Folder, SCENE, Terminal};
 
-/// A click on a cell, counted from 1.
+/// A click on a cell, numbered from 1.
 fn click(column: u16, row: u16) -> String {
     format!("\x1b[<0;{column};{row}M\x1b[<0;{column};{row}m")
 }
 
-/// The scene with a named ball in front of the middle of the board.
+/// The scene with a named ball in front of the board's center.
 fn centered() -> String {
     SCENE.replace("center = [0.5, 0.2, 0.8]", "name = \"apple\"\ncenter = [0, 0, 0.8]")
 }
 
-/// The line of the ball in the scene, from 1.
+/// Line number of the ball in the scene, from 1.
 fn line_of_ball() -> usize {
     centered().lines().position(|line| line == "[[sphere]]").expect("a ball") + 1
 }
@@ -27,7 +27,7 @@ fn terminal(folder: &Folder, text: &str, variables: &[(&str, &str)]) -> Terminal
     folder.write("scene.toml", text);
     let mut terminal = folder.terminal_with(&[folder.program(), "scene.toml"], variables);
     terminal.wait_for_render(1);
-    // Make room for one fact per line.
+    // Enlarge the window so that each fact fits on a line.
     terminal.resize(120, 40);
     terminal.wait("a large picture", |screen| {
         screen.contents().lines().nth(39).is_some_and(|line| line.trim_end().ends_with("? help"))
@@ -46,7 +46,7 @@ fn crosshair_shows_all_facts() {
     {
         terminal.wait_for(words);
     }
-    // The next key closes the facts; a click inspects another point, which becomes the crosshair.
+    // The next key closes the facts. A click inspects another point and moves the crosshair there.
     terminal.press("e");
     terminal.wait("no facts", |screen| !screen.contents().contains("apple"));
     terminal.press(&click(30, 10));
@@ -59,7 +59,7 @@ fn crosshair_shows_all_facts() {
 }
 
 #[test]
-fn focus_moves_to_the_crosshair_and_is_kept() {
+fn focus_moves_to_crosshair_and_is_saved() {
     let folder = Folder::new();
     let mut terminal = terminal(&folder, &centered(), &[]);
     terminal.press("f");
@@ -72,7 +72,7 @@ fn focus_moves_to_the_crosshair_and_is_kept() {
     let focus = text.split(before).nth(1).and_then(|it| it.split(' ').next()).expect("a distance");
     let depth: f64 = focus.parse().expect("a number");
     assert!((depth - 3.0).abs() < 0.01, "{depth}");
-    // An earlier `w` would save the unfinished image.
+    // Wait, because `w` would save an unfinished image.
     terminal.wait_for_render(2);
     terminal.press("w");
     terminal.wait_for_message(&messages::wrote("scene.png"));
@@ -114,20 +114,20 @@ fn editor_opens_at_the_clicked_object() {
 }
 
 #[test]
-fn actual_pixels_center_on_the_click() {
+fn actual_size_preview_centers_on_the_click() {
     let folder = Folder::new();
     let large = SCENE.replace("width = 64", "width = 320").replace("height = 48", "height = 240");
     let mut terminal = terminal(&folder, &large, &[]);
     let before = terminal.settled(|screen| Colors::of(screen).red);
-    // The corner of the image, outside the board.
+    // Click the corner of the image, outside the board.
     terminal.press(&click(4, 4));
     terminal.wait_for("nothing at pixel");
     terminal.press("x");
     terminal
         .wait("no board", |screen| screen.contents().contains("1:1") && Colors::of(screen).red < before / 2);
     terminal.press("x");
-    // A few edge cells may keep a value that is equally close.
-    terminal.wait("the earlier preview", |screen| Colors::of(screen).red.abs_diff(before) <= before / 8);
+    // A few edge cells may keep an equally close value.
+    terminal.wait("the original preview", |screen| Colors::of(screen).red.abs_diff(before) <= before / 8);
 }
 
 #[test]

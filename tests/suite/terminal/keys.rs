@@ -1,4 +1,4 @@
-//! Effects of each key, on the screen and on disk.
+//! Effects of each key on the screen and on disk.
 
 use std::fs;
 
@@ -30,14 +30,14 @@ fn settings_change_and_reset() {
         renders += 1;
         terminal.wait_for_render(renders);
         terminal.wait_for(words);
-        assert_eq!(folder.bytes("scene.png"), own, "{words} is only shown");
+        assert_eq!(folder.bytes("scene.png"), own, "{words}: must not be written");
         let is_own = matches!(words, "s soft" | "d on");
         if !is_own {
             terminal.press("w");
             let expected = folder.once(&options);
             terminal.wait(words, |_| fs::read(folder.path("scene.png")).is_ok_and(|bytes| bytes == expected));
             assert!(expected != own, "{words} shows");
-            // The scene's own image returns without a key that changes anything.
+            // Restore the original image, which a reset does not write.
             fs::write(folder.path("scene.png"), &own).expect("put back");
         }
     }
@@ -65,7 +65,7 @@ fn views_are_shown_and_saved_on_request() {
     terminal.press("v");
     terminal.wait_for_message(&messages::view("normal"));
     terminal.wait_for_render(2);
-    // The board faces the camera: (0, 0, 1) is shown as (n + 1)/2, without a tone curve.
+    // The board faces the camera, so its normal (0, 0, 1) is shown as (n + 1)/2, without tone mapping.
     let board = vt100::Color::Rgb(128, 128, 255);
     terminal.wait("normals", |screen| cells(screen).filter(|cell| upper(cell) == Some(board)).count() > 100);
     assert_eq!(folder.bytes("scene.png"), beauty);
@@ -114,12 +114,12 @@ fn paused_render_can_be_saved_and_resumed() {
     let mut terminal = folder.terminal();
     terminal.wait_for_color("red");
     terminal.wait_for("ETA");
-    // Once the file exists, every pixel has a sample.
+    // The file is written when every pixel has a sample.
     terminal.press("w");
     terminal.wait("the first picture on disk", |_| folder.path("scene.png").is_file());
     fs::remove_file(folder.path("scene.png")).expect("removed");
     terminal.press(" ");
-    terminal.wait("a held render", |screen| {
+    terminal.wait("a paused render", |screen| {
         let text = screen.contents();
         text.lines().next().is_some_and(|line| line.contains("‖ paused")) && !text.contains("ETA")
     });
@@ -168,10 +168,10 @@ fn help_and_errors_open_scroll_and_close() {
         terminal.wait_for("lines 1-");
     }
     terminal.press("e");
-    terminal.wait("no errors in sight", gone("lines 1-"));
+    terminal.wait("no errors on the screen", gone("lines 1-"));
     terminal.press("e");
     terminal.wait_for("lines 1-");
     terminal.press(ESCAPE);
-    terminal.wait("no errors in sight", gone("lines 1-"));
+    terminal.wait("no errors on the screen", gone("lines 1-"));
     terminal.wait_for("broken");
 }

@@ -1,4 +1,4 @@
-//! Long renders: checkpoints of the live program, and a merge that waits.
+//! Long renders: checkpoints in interactive use, and a merge that waits for parts.
 
 use std::fs;
 
@@ -7,12 +7,12 @@ use glimt::tui::messages;
 use super::pty::{Folder, SCENE, Terminal, shows};
 use crate::test_dir::{assert_mentions, mentions};
 
-/// The scene with `samples` samples.
+/// The scene with `samples` samples per pixel.
 fn scene(samples: u32, rest: &str) -> String {
     SCENE.replace("samples = 4", &format!("samples = {samples}\n{rest}"))
 }
 
-/// A folder with the checkpoint of a finished render of the scene.
+/// A folder with the checkpoint of a finished render.
 fn with_checkpoint(samples: u32) -> Folder {
     let folder = Folder::new();
     folder.write("scene.toml", &scene(samples, ""));
@@ -29,13 +29,13 @@ fn terminal(folder: &Folder, options: &[&str]) -> Terminal {
     folder.terminal_with(&[&[folder.program(), "scene.toml"], options].concat(), &[])
 }
 
-/// The start of the message about an ignored checkpoint.
+/// Beginning of the message about an ignored checkpoint.
 fn ignored() -> String {
     messages::checkpoint_ignored("scene.png.checkpoint", "")
 }
 
 #[test]
-fn ignored_checkpoint_is_named() {
+fn ignored_checkpoint_is_reported() {
     let is_fine = |terminal: &Terminal, facts: &[&str]| {
         terminal.wait_for_message(&ignored());
         assert_mentions(&terminal.text().split_whitespace().collect::<Vec<_>>().join(" "), facts);
@@ -49,9 +49,9 @@ fn ignored_checkpoint_is_named() {
     let long = terminal(&folder, &[]);
     is_fine(&long, &[&glimt::pipeline::messages::has_more_samples(3)]);
     assert_eq!(folder.bytes("scene.png"), folder.once(&[]), "nothing of it is in the image");
-    assert!(folder.path("scene.png.checkpoint").exists(), "it has more than the image");
+    assert!(folder.path("scene.png.checkpoint").exists(), "it has more samples than the image");
     drop(long);
-    // The checkpoint is for another image; this is reported once, not on each edit.
+    // The checkpoint belongs to a different image. This is reported once, not after each edit.
     folder.write("scene.toml", &scene(9, "seed = 5"));
     let other = terminal(&folder, &[]);
     is_fine(&other, &["seed", "0", "5"]);
@@ -71,7 +71,7 @@ fn ignored_checkpoint_is_named() {
 }
 
 #[test]
-fn quit_keeps_a_long_render_and_says_so() {
+fn quit_saves_and_reports_a_long_render() {
     let folder = Folder::new();
     folder.write("scene.toml", &scene(10_000_000, ""));
     let mut long = terminal(&folder, &["--checkpoint", "0.2"]);
@@ -84,7 +84,7 @@ fn quit_keeps_a_long_render_and_says_so() {
     again.wait_for(messages::RESUMING);
     again.press("q");
     assert_eq!(again.end_saying("continues"), 0);
-    // A short render is not worth a checkpoint.
+    // Short renders do not write a checkpoint.
     fs::remove_file(folder.path("scene.png.checkpoint")).expect("removed");
     let mut short = terminal(&folder, &["--checkpoint", "1000"]);
     short.wait_for("ETA");
@@ -123,7 +123,7 @@ fn watching_merge_shows_arriving_parts() {
     merge.wait_for("joined.png (64×48)");
     let all = cells(&merge);
     assert!(first > 0 && first < second && second < all, "{first}, {second}, {all} cells");
-    // Image and text are at most 80 columns wide, and no line of text wraps.
+    // The image and text are at most 80 columns wide, and no line wraps.
     let text = merge.text();
     assert!(text.lines().all(|line| line.chars().count() <= 80), "{text}");
     assert_eq!(merge.end(), 0);

@@ -1,4 +1,4 @@
-//! The live program in a pseudo-terminal, as the user sees it.
+//! Interactive use in a pseudo-terminal.
 
 mod blocks;
 mod camera;
@@ -58,7 +58,7 @@ fn each_save_renders_once() {
     terminal.wait_for_color("blue");
     terminal.wait_for_render(3);
 
-    // Save as vim does: the old file becomes the backup, a new file is written, and the backup is removed.
+    // Save like vim: rename the old file to a backup, write a new file, and remove the backup.
     fs::rename(&path, folder.path("scene.toml~")).expect("renamed");
     folder.write("scene.toml", SCENE);
     fs::remove_file(folder.path("scene.toml~")).expect("removed");
@@ -66,7 +66,7 @@ fn each_save_renders_once() {
     terminal.wait_for_render(4);
     assert_eq!(folder.bytes("scene.png"), folder.once(&[]));
 
-    // Saving the same content, or a file next to the scene, triggers no render.
+    // Saving unchanged contents or an unrelated file does not trigger a render.
     folder.write("scene.toml", SCENE);
     folder.write("notes.txt", "nothing");
     folder.write("scene.toml", &SCENE.replace(RED, GREEN));
@@ -91,7 +91,7 @@ fn last_of_many_fast_saves_wins() {
 }
 
 #[test]
-fn broken_scene_shows_the_position_and_image() {
+fn broken_scene_shows_position_and_last_image() {
     let folder = Folder::new();
     let terminal = folder.terminal();
     terminal.wait_for_render(1);
@@ -168,7 +168,7 @@ fn preview_follows_the_window_size() {
         is_at(screen, 9) && (1..small).contains(&red)
     });
     terminal.resize(80, 24);
-    terminal.wait("the picture as at first", |screen| is_at(screen, 23) && Colors::of(screen).red == small);
+    terminal.wait("the original picture", |screen| is_at(screen, 23) && Colors::of(screen).red == small);
 }
 
 #[test]

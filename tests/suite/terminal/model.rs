@@ -1,4 +1,4 @@
-//! Showing a model directly in the terminal.
+//! Viewing a model in the terminal.
 
 use std::fs;
 
@@ -6,13 +6,13 @@ use glimt::tui::messages;
 
 use super::pty::Folder;
 
-/// An OBJ file of a red wall of this height, one unit wide, facing the camera.
+/// An OBJ file of a red wall that faces the camera, with the given height and a width of one unit.
 fn wall(height: f32) -> String {
     format!("mtllib a.mtl\nusemtl red\nv 0 0 0\nv 1 0 0\nv 1 {height} 0\nv 0 {height} 0\nf 1 2 3 4\n")
 }
 
 #[test]
-fn model_is_watched_and_kept_once() {
+fn model_is_watched_and_imported_once() {
     let folder = Folder::new();
     folder.write("a.mtl", "newmtl red\nKd 0.9 0 0\nKe 1 0 0\n");
     folder.write("wall.obj", &wall(0.1));
@@ -26,7 +26,7 @@ fn model_is_watched_and_kept_once() {
     terminal.wait_for_render(2);
     let options = &call[2..];
     assert_ne!(folder.bytes("wall.png"), low);
-    assert_eq!(folder.bytes("wall.png"), once(&folder, options), "the picture of the model as it is now");
+    assert_eq!(folder.bytes("wall.png"), once(&folder, options), "the image must show the saved model");
     terminal.press("o");
     terminal.wait_for(messages::NO_EDITOR_FOR_MODELS);
     terminal.press("c");
@@ -37,7 +37,7 @@ fn model_is_watched_and_kept_once() {
     assert_eq!(fs::read_to_string(folder.path("wall.obj")).expect("the model"), wall(0.7));
     terminal.press("c");
     terminal.wait_for(&format!("wall.toml {}", glimt::pipeline::messages::ALREADY_EXISTS));
-    // The file is saved incompletely, then completely.
+    // Write an incomplete file, then the complete file.
     folder.write("wall.obj", "v 0 0");
     terminal.wait_for("wall.obj");
     terminal.wait_for("broken");
@@ -47,7 +47,7 @@ fn model_is_watched_and_kept_once() {
     assert_eq!(terminal.end(), 0);
 }
 
-/// The bytes that `--once` writes.
+/// The image file that `--once` writes.
 fn once(folder: &Folder, options: &[&str]) -> Vec<u8> {
     let mut process = std::process::Command::new(folder.program());
     process.args(["wall.obj", "--once", "-o", "once.png", "--progress", "none"]).args(options);

@@ -1,4 +1,4 @@
-//! The mouse, keeping the camera in the scene file, the editor, and earlier renders.
+//! The mouse, saving the camera to the scene file, the editor, and previous renders.
 
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
@@ -10,7 +10,7 @@ use nix::unistd::Pid;
 
 use super::pty::{Colors, Folder, GREEN, RED, SCENE, Terminal};
 
-/// A terminal's sequence for pressing the left button over a cell, counted from 1.
+/// The terminal sequence for pressing the left button over a cell, numbered from 1.
 fn press(column: u16, row: u16) -> String {
     format!("\x1b[<0;{column};{row}M")
 }
@@ -37,7 +37,7 @@ fn mouse_orbits_zooms_and_inspects() {
     terminal.wait_for_message(messages::CAMERA_MOVED);
     terminal.wait("a narrower board", |screen| Colors::of(screen).red + 20 < before);
     terminal.press("0");
-    terminal.wait("the earlier board", |screen| Colors::of(screen).red == before);
+    terminal.wait("the original board", |screen| Colors::of(screen).red == before);
     terminal.press("\x1b[<64;20;10M\x1b[<64;20;10M");
     terminal.wait("a larger board", |screen| Colors::of(screen).red > before + 20);
     terminal.press("0");
@@ -70,7 +70,7 @@ fn mouse_mode_is_restored() {
 }
 
 #[test]
-fn kept_camera_becomes_the_scene_camera() {
+fn saved_camera_becomes_the_scene_camera() {
     let folder = Folder::new();
     let text = SCENE.replace("[camera]", "# the eye\n[camera]");
     folder.write("scene.toml", &text);
@@ -84,10 +84,10 @@ fn kept_camera_becomes_the_scene_camera() {
     terminal.wait_for_message(&messages::camera_saved("scene.toml"));
     let kept = fs::read_to_string(folder.path("scene.toml")).expect("a scene");
     assert_eq!(kept, text.replace("focus = 4.0\n", "focus = 4.0\nfov = 42\n"));
-    terminal.wait("not moved any more", |screen| !screen.contents().contains("camera moved"));
+    terminal.wait("no moved camera", |screen| !screen.contents().contains("camera moved"));
     terminal.wait("the picture on disk", |_| folder.bytes("scene.png") == folder.once(&[]));
-    // Its own write is not an edit: the stage table still shows the reused stages. A key without another effect closes
-    // the message that covers it.
+    // glimt's own write does not count as an edit, so the stage table still shows the reused stages. Press a
+    // key without other effects to close the message that covers the table.
     terminal.press("??");
     terminal.wait("no new render", |screen| screen.contents().contains(messages::CACHED));
     folder.write("scene.toml", &kept.replace(RED, GREEN));
@@ -112,13 +112,13 @@ fn click_sets_the_focus() {
 pub(super) const EDITOR: &str =
     "#!/bin/sh\nprintf 'editing %s at %s\\r\\n' \"$2\" \"$1\"\nread -r line\necho \"# $line\" >> \"$2\"\n";
 
-/// What [`EDITOR`] prints when it opens the scene at a line.
+/// The output of [`EDITOR`] when it opens the scene at a line.
 pub(super) fn editing(line: usize) -> String {
     ["editing", "scene.toml", "at", &format!("+{line}")].join(" ")
 }
 
 #[test]
-fn editor_borrows_the_terminal() {
+fn editor_uses_the_terminal() {
     let folder = Folder::new();
     folder.write("vi", EDITOR);
     fs::set_permissions(folder.path("vi"), fs::Permissions::from_mode(0o755)).expect("permitted");
@@ -135,13 +135,13 @@ fn editor_borrows_the_terminal() {
     terminal.wait("glimt's screen", vt100::Screen::alternate_screen);
     terminal.wait_for("scene.toml:4:11");
     let text = fs::read_to_string(folder.path("scene.toml")).expect("a scene");
-    assert!(text.ends_with("# hello q\n"), "the keys were the editor's: {text}");
+    assert!(text.ends_with("# hello q\n"), "keys must go to the editor: {text}");
     terminal.press("q");
     terminal.end();
 }
 
 #[test]
-fn killed_editor_leaves_an_echoing_terminal() {
+fn echo_is_restored_after_killed_editor() {
     let folder = Folder::new();
     folder.write("vi", "#!/bin/sh\nstty raw -echo\nkill -9 $$\n");
     fs::set_permissions(folder.path("vi"), fs::Permissions::from_mode(0o755)).expect("permitted");
@@ -155,7 +155,7 @@ fn killed_editor_leaves_an_echoing_terminal() {
     assert_eq!(terminal.end(), 0);
 }
 
-/// The program with a shell script as its editor, which owns the terminal.
+/// The program with a shell script as its editor, which controls the terminal.
 fn in_editor(folder: &Folder, command: &[&str], script: &str, options: &str) -> Terminal {
     folder.write("vi", &format!("#!/bin/sh\necho $PPID > parent\necho $$ > id\n{script}\n"));
     fs::set_permissions(folder.path("vi"), fs::Permissions::from_mode(0o755)).expect("permitted");
@@ -167,17 +167,17 @@ fn in_editor(folder: &Folder, command: &[&str], script: &str, options: &str) -> 
     terminal
 }
 
-/// The process whose id is in this file.
+/// The process with the ID stored in a file.
 fn process(folder: &Folder, file: &str) -> Pid {
     let number = String::from_utf8(folder.bytes(file)).expect("a number");
     Pid::from_raw(number.trim().parse().expect("a number"))
 }
 
-/// A shell that runs glimt. If the terminal closed with glimt, its modes would be reset anyway.
+/// A shell that runs glimt. The terminal outlives glimt, so its modes are not reset by closing it.
 const FROM_SHELL: &str = "modes=$(stty -g); \"$0\" scene.toml; code=$?; test \"$modes\" = \"$(stty -g)\" && echo as before; exit $code";
 
 #[test]
-fn signal_ends_the_editor_and_restores_modes() {
+fn signal_ends_editor_and_restores_modes() {
     for (signal, code) in [(Signal::SIGTERM, 143), (Signal::SIGHUP, 129), (Signal::SIGUSR1, 138)] {
         let folder = Folder::new();
         let command = ["/bin/sh", "-c", FROM_SHELL, folder.program()];
@@ -185,16 +185,16 @@ fn signal_ends_the_editor_and_restores_modes() {
         let terminal = in_editor(&folder, &command, script, "");
         kill(process(&folder, "parent"), signal).expect("sent");
         let editor = process(&folder, "id");
-        terminal.wait("the editor's end", |_| kill(editor, None) == Err(Errno::ESRCH));
+        terminal.wait("the editor to exit", |_| kill(editor, None) == Err(Errno::ESRCH));
         assert_eq!(terminal.end_saying("as before"), code, "{signal}");
     }
 }
 
 #[test]
-fn deaf_editor_does_not_keep_raw_mode() {
+fn raw_mode_ends_if_editor_ignores_signals() {
     let folder = Folder::new();
     let command = ["/bin/sh", "-c", FROM_SHELL, folder.program()];
-    // The editor ends with the terminal.
+    // The editor exits when the terminal closes.
     let script = "trap '' TERM HUP\nstty raw -echo\nprintf at-work\nread -r line";
     let terminal = in_editor(&folder, &command, script, "");
     kill(process(&folder, "parent"), Signal::SIGTERM).expect("sent");
@@ -202,7 +202,7 @@ fn deaf_editor_does_not_keep_raw_mode() {
 }
 
 #[test]
-fn signal_reaches_the_editor_through_a_shell() {
+fn signal_reaches_editor_through_a_shell() {
     let folder = Folder::new();
     // A shell with job control, whose terminal stays open.
     let jobs = format!("set -m; {FROM_SHELL}");
@@ -211,7 +211,7 @@ fn signal_reaches_the_editor_through_a_shell() {
     let terminal = in_editor(&folder, &command, script, " #");
     kill(process(&folder, "parent"), Signal::SIGTERM).expect("sent");
     let editor = process(&folder, "id");
-    terminal.wait("the editor's end", |_| kill(editor, None) == Err(Errno::ESRCH));
+    terminal.wait("the editor to exit", |_| kill(editor, None) == Err(Errno::ESRCH));
     assert_eq!(terminal.end_saying("as before"), 143);
 }
 
@@ -280,10 +280,10 @@ fn zoom_shows_actual_pixels() {
     let before = red(&terminal);
     terminal.press("x");
     terminal.wait_for("1:1");
-    // The middle of the board fills the preview.
+    // The center of the board fills the preview.
     terminal.wait("a larger board", |screen| Colors::of(screen).red > before + 100);
     terminal.press("x");
-    terminal.wait("the earlier preview", |screen| {
+    terminal.wait("the original preview", |screen| {
         Colors::of(screen).red == before && !screen.contents().contains("1:1")
     });
 }

@@ -1,4 +1,4 @@
-//! The live program does not overwrite inputs either: it reports this and keeps rendering.
+//! In interactive use, glimt also never overwrites inputs. It reports the conflict and keeps rendering.
 
 use std::fs;
 use std::os::unix::fs::symlink;
@@ -8,16 +8,16 @@ use glimt::tui::messages;
 
 use super::pty::{Folder, GREEN, RED, SCENE};
 
-/// A red image of one texel.
+/// An image with one red texel.
 const PAINT: &str = "P3\n1 1\n255\n230 20 20\n";
 
-/// The scene with this file as the texture of its board.
+/// The scene with the given file as the board's texture.
 fn textured(file: &str) -> String {
     let texture = format!("[textures.paint]\nfile = \"{file}\"\n[materials]");
     SCENE.replace(RED, "{ texture = \"paint\" }").replace("[materials]", &texture)
 }
 
-/// Waits long enough for a render loop through the watcher to show.
+/// Waits long enough to detect a render loop caused by the file watcher.
 fn wait_a_while() {
     std::thread::sleep(Duration::from_millis(1500));
 }
@@ -65,7 +65,7 @@ fn output_that_becomes_an_input_is_kept() {
 }
 
 #[test]
-fn foreign_image_is_not_replaced() {
+fn unrelated_image_is_not_replaced() {
     let folder = Folder::new();
     let terminal = folder.terminal();
     terminal.wait_for_render(1);
@@ -78,7 +78,7 @@ fn foreign_image_is_not_replaced() {
 }
 
 #[test]
-fn link_changed_while_rendering_is_noticed() {
+fn link_changed_while_rendering_is_detected() {
     let folder = Folder::new();
     folder.write("paint.ppm", PAINT);
     symlink("first.ppm", folder.path("out.ppm")).expect("a link");
@@ -117,6 +117,6 @@ fn own_writes_do_not_trigger_renders() {
         terminal.wait_for_render(2);
         wait_a_while();
         terminal.wait_for_render(2);
-        assert_ne!(folder.bytes("r.json"), report, "a render has its report");
+        assert_ne!(folder.bytes("r.json"), report, "each render must have its report");
     }
 }

@@ -1,4 +1,4 @@
-//! A pseudo-terminal: the program inside it, its screen, keys.
+//! A pseudo-terminal that runs the program, with its screen and keyboard.
 
 use std::fs;
 use std::io::{Read, Write};
@@ -18,7 +18,7 @@ use nix::sys::termios::LocalFlags;
 use nix::unistd::Pid;
 use portable_pty::{Child, CommandBuilder, MasterPty, PtySize, SlavePty, native_pty_system};
 
-/// Time limit for any wait, however busy the machine is.
+/// Time limit for any wait, long enough for a busy machine.
 const LIMIT: Duration = Duration::from_secs(60);
 
 /// Environment variables that identify terminals.
@@ -75,12 +75,12 @@ pub const RED: &str = "[0.8, 0.02, 0.02]";
 pub const GREEN: &str = "[0.02, 0.8, 0.02]";
 pub const BLUE: &str = "[0.02, 0.02, 0.8]";
 
-/// A scratch folder with the scene in it.
+/// A temporary folder with the scene.
 pub struct Folder(tempfile::TempDir);
 
 impl Folder {
     pub fn new() -> Self {
-        let folder = Self(tempfile::tempdir().expect("a scratch folder"));
+        let folder = Self(tempfile::tempdir().expect("a temporary folder"));
         folder.write("scene.toml", SCENE);
         folder
     }
@@ -89,7 +89,7 @@ impl Folder {
         self.0.path().join(name)
     }
 
-    /// Writes in place: truncates first.
+    /// Writes in place, after truncating the file.
     pub fn write(&self, name: &str, text: &str) {
         fs::write(self.path(name), text).expect("written");
     }
@@ -98,7 +98,7 @@ impl Folder {
         fs::read(self.path(name)).expect(name)
     }
 
-    /// The image that a headless run renders from the current scene.
+    /// The image rendered with `--once` from the current scene.
     pub fn once(&self, options: &[&str]) -> Vec<u8> {
         let mut process = Process::new(PROGRAM);
         process.current_dir(self.0.path()).args(["scene.toml", "--once", "-o", "once.png"]).args(options);
@@ -107,7 +107,7 @@ impl Folder {
         self.bytes("once.png")
     }
 
-    /// The program rendering the scene, in a terminal of 80×24 cells.
+    /// The program rendering the scene in a terminal with 80×24 cells.
     pub fn terminal(&self) -> Terminal {
         self.terminal_with(&[PROGRAM, "scene.toml"], &[])
     }
@@ -116,7 +116,7 @@ impl Folder {
         Terminal::open(command, variables, self.0.path(), size(80, 24), None)
     }
 
-    /// The program rendering the scene over a slow connection, in a terminal of 120×40 cells.
+    /// The program rendering the scene over a slow connection, in a terminal with 120×40 cells.
     pub fn thin_line(&self, answers: Answers) -> Terminal {
         let tmux: &[_] = if answers == Answers::Multiplexer {
             &[("TMUX", "/tmp/tmux-0/default,1,0"), ("SSH_CONNECTION", "192.0.2.1 5000 192.0.2.2 22")]
@@ -126,17 +126,17 @@ impl Folder {
         self.thin_line_in(answers, tmux)
     }
 
-    /// The same as [`Self::thin_line`], with these environment variables.
+    /// [`Self::thin_line`] with the given environment variables.
     pub fn thin_line_in(&self, answers: Answers, variables: &[(&str, &str)]) -> Terminal {
         Terminal::open(&[PROGRAM, "scene.toml"], variables, self.0.path(), size(120, 40), Some(answers))
     }
 
-    /// The program rendering the scene in a terminal of this size.
+    /// The program rendering the scene in a terminal with the given size.
     pub fn terminal_of(&self, columns: u16, rows: u16) -> Terminal {
         Terminal::open(&[PROGRAM, "scene.toml"], &[], self.0.path(), size(columns, rows), None)
     }
 
-    /// A program in a terminal of 200×24 cells.
+    /// A program in a terminal with 200×24 cells.
     pub fn wide_terminal_with(&self, command: &[&str]) -> Terminal {
         Terminal::open(command, &[], self.0.path(), size(200, 24), None)
     }
@@ -146,15 +146,15 @@ impl Folder {
     }
 }
 
-/// A terminal with a program running in it.
+/// A terminal running a program.
 pub struct Terminal {
     master: Box<dyn MasterPty + Send>,
-    // Kept open so that the terminal's modes can be read after the program has ended.
+    // Kept open so that the terminal modes can be read after the program has exited.
     _slave: Box<dyn SlavePty + Send>,
     child: Box<dyn Child + Send + Sync>,
     keys: Arc<Mutex<Box<dyn Write + Send>>>,
     screen: Arc<Mutex<vt100::Parser>>,
-    /// Everything the program has sent.
+    /// All output of the program.
     bytes: Arc<Mutex<Vec<u8>>>,
     relay: Option<Relay>,
     is_reading: Arc<AtomicBool>,
@@ -209,7 +209,7 @@ impl Terminal {
         Self { master: pair.master, _slave: pair.slave, child, keys, screen, bytes, relay, is_reading }
     }
 
-    /// The value of `look` once it is stable: text appears before the image.
+    /// The value of `look` when it no longer changes. (Text appears before the image.)
     pub fn settled<T: PartialEq>(&self, look: impl Fn(&vt100::Screen) -> T) -> T {
         let mut before = self.look(&look);
         loop {
@@ -228,14 +228,14 @@ impl Terminal {
             return;
         }
         let mut writer = self.keys.lock().expect("not poisoned");
-        writer.write_all(keys.as_bytes()).expect("keys are taken");
+        writer.write_all(keys.as_bytes()).expect("the terminal accepts keys");
     }
 
-    /// Types more than the terminal buffers, and waits until the program has read it.
+    /// Types more keys than the terminal can buffer, in the background.
     pub fn burst(&mut self, keys: String) {
         let writer = self.keys.clone();
         std::thread::spawn(move || {
-            // A program that has ended reads no more.
+            // Ignore errors: the program may have exited.
             let _ = writer.lock().expect("not poisoned").write_all(keys.as_bytes());
         });
     }
@@ -246,7 +246,7 @@ impl Terminal {
         self.master.resize(size(columns, rows)).expect("resized");
     }
 
-    /// Writes to the screen as another program would.
+    /// Writes to the screen like another program.
     pub fn scribble(&self, bytes: &str) {
         self.screen.lock().expect("not poisoned").process(bytes.as_bytes());
     }
@@ -255,17 +255,17 @@ impl Terminal {
         kill(Pid::from_raw(i32::try_from(self.id()).expect("a process id")), signal).expect("sent");
     }
 
-    /// The program's process id.
+    /// The program's process ID.
     pub fn id(&self) -> u32 {
         self.child.process_id().expect("an id")
     }
 
-    /// Makes the terminal read the program's output, or stop reading.
+    /// Makes the terminal start or stop reading the program's output.
     pub fn set_reading(&self, reading: bool) {
         self.is_reading.store(reading, Ordering::Release);
     }
 
-    /// Waits for the program to end.
+    /// Waits for the program to exit, and returns its exit code.
     #[track_caller]
     pub fn code(&mut self) -> u32 {
         let deadline = Instant::now() + LIMIT;
@@ -273,12 +273,12 @@ impl Terminal {
             if let Some(status) = self.child.try_wait().expect("a child") {
                 return status.exit_code();
             }
-            assert!(Instant::now() < deadline, "the program does not end\n{}", self.text());
+            assert!(Instant::now() < deadline, "the program did not exit\n{}", self.text());
             std::thread::sleep(Duration::from_millis(5));
         }
     }
 
-    /// The lines that a program has left on the screen after it ended.
+    /// The lines left on the screen after the program has exited.
     pub fn last_lines(&self) -> String {
         self.wait("the restored screen", |screen| {
             !screen.alternate_screen() && !screen.contents().trim().is_empty()
@@ -292,12 +292,12 @@ impl Terminal {
         what(&relay.seen.lock().expect("no panic"))
     }
 
-    /// All bytes so far.
+    /// All output so far.
     pub fn bytes(&self) -> Vec<u8> {
         self.bytes.lock().expect("not poisoned").clone()
     }
 
-    /// Text of the screen.
+    /// Text on the screen.
     pub fn text(&self) -> String {
         self.look(|screen| screen.contents())
     }
@@ -311,7 +311,7 @@ impl Terminal {
     pub fn wait(&self, what: &str, holds: impl Fn(&vt100::Screen) -> bool) {
         let deadline = Instant::now() + LIMIT;
         while !self.look(&holds) {
-            assert!(Instant::now() < deadline, "not seen: {what}\n{}", self.text());
+            assert!(Instant::now() < deadline, "timed out waiting for {what}\n{}", self.text());
             std::thread::sleep(Duration::from_millis(5));
         }
     }
@@ -321,16 +321,16 @@ impl Terminal {
         self.wait(text, |screen| screen.contents().contains(text));
     }
 
-    /// Waits for a message of the front end, which may be cut off.
+    /// Waits for a message from the front end, which may be truncated.
     #[track_caller]
     pub fn wait_for_message(&self, message: &str) {
         self.wait(message, |screen| shows(screen, message));
     }
 
-    /// Waits until a render has a sample of every pixel.
+    /// Waits until every pixel of a render has a sample.
     #[track_caller]
     pub fn wait_for_coverage(&self) {
-        self.wait("a sample of every pixel", |screen| {
+        self.wait("a sample for every pixel", |screen| {
             let text = screen.contents();
             let counts =
                 text.lines().filter_map(|line| line.split_once(" samples · ")?.0.split_whitespace().last());
@@ -339,13 +339,14 @@ impl Terminal {
         });
     }
 
-    /// Waits until this many renders are finished and none is running.
+    /// Waits until render `number` is finished and no render is running.
     #[track_caller]
     pub fn wait_for_render(&self, number: usize) {
         let words = format!("· {}", messages::render(number));
         self.wait(&words, |screen| {
             let text = screen.contents();
-            // Frames arrive in pieces, from the top: once the bar below the image is gone, all text is there.
+            // Frames arrive in pieces, from top to bottom. All text is complete when the bar below the image
+            // is gone.
             let is_whole = !text.contains(" samples · ");
             let is_over = |line: &str| line.contains("✓ done") || line.contains("! unwritten");
             let is_done = |line: &str| is_over(line) && line.trim_end().ends_with(&words);
@@ -353,7 +354,7 @@ impl Terminal {
         });
     }
 
-    /// Waits for the image to have this color.
+    /// Waits until the image has the given color.
     #[track_caller]
     pub fn wait_for_color(&self, name: &str) {
         self.wait(name, |screen| {
@@ -362,13 +363,14 @@ impl Terminal {
         });
     }
 
-    /// Waits for the end, checks that the terminal is restored, and returns the exit code.
+    /// Waits for the program to exit, checks that the terminal is restored, and returns the exit code.
     #[track_caller]
     pub fn end(self) -> u32 {
         self.end_saying("")
     }
 
-    /// [`Terminal::end`], waiting until the final screen contains one of these texts, separated by `|`.
+    /// [`Terminal::end`] that waits until the final screen contains one of the given strings, separated by
+    /// `|`.
     #[track_caller]
     pub fn end_saying(mut self, words: &str) -> u32 {
         let code = self.code();
@@ -388,7 +390,7 @@ impl Terminal {
 
 impl Drop for Terminal {
     fn drop(&mut self) {
-        // If a test failed, the program may still run; otherwise it has ended.
+        // If a test failed, the program may still be running.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
@@ -409,7 +411,7 @@ fn side(length: u16) -> NonZeroU16 {
     NonZeroU16::new(length).expect("not zero")
 }
 
-/// Cells counted by the channel that clearly dominates.
+/// Number of cells clearly dominated by each channel.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub struct Colors {
     pub red: usize,
@@ -418,12 +420,12 @@ pub struct Colors {
 }
 
 impl Colors {
-    /// Colors of the upper halves of cells.
+    /// Counts the colors of the upper halves of cells.
     pub fn of(screen: &vt100::Screen) -> Self {
         let mut colors = Self::default();
         for color in cells(screen).filter_map(upper) {
             let vt100::Color::Rgb(r, g, b) = color else { continue };
-            // Compare far from edge colors: the last bits of a color depend on the cell's history.
+            // Use a wide margin, because the last bits of a color depend on the cell's history.
             let above = |a: u8, b: u8, c: u8| a > 50 && a / 2 > b.max(c);
             colors.red += usize::from(above(r, g, b));
             colors.green += usize::from(above(g, r, b));
@@ -440,7 +442,7 @@ impl Colors {
         self.most() == Some(name)
     }
 
-    /// The color of nearly all cells, if there are enough for an image.
+    /// The color of nearly all cells, if there are enough cells for an image.
     fn most(&self) -> Option<&'static str> {
         let total = self.total();
         let all = [(self.red, "red"), (self.green, "green"), (self.blue, "blue")];
@@ -448,7 +450,7 @@ impl Colors {
     }
 }
 
-/// The color of a cell's upper half, however it is drawn.
+/// Color of a cell's upper half, regardless of the character used.
 pub fn upper(cell: &vt100::Cell) -> Option<vt100::Color> {
     match cell.contents() {
         "▀" | "█" => Some(cell.fgcolor()),

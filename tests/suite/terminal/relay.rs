@@ -1,6 +1,6 @@
-//! A slow connection: 1 Mbit/s, a round trip of 150 ms, and buffers of 2 MB (the window of ssh).
+//! A slow connection: 1 Mbit/s, a round-trip time of 150 ms, and 2 MB of buffers (the ssh window).
 //!
-//! A relay between the pseudo-terminal and the user's screen replies to queries as a terminal does, or as tmux does
+//! A relay between the pseudo-terminal and the user's screen replies to queries like a terminal, like tmux
 //! (immediately, on behalf of the terminal), or not at all.
 
 use std::collections::VecDeque;
@@ -12,15 +12,15 @@ use std::time::{Duration, Instant};
 
 /// Bytes per second: 1 Mbit/s.
 const RATE: f64 = 125_000.0;
-/// Delay in one direction.
+/// One-way delay.
 const DELAY: Duration = Duration::from_millis(75);
 const QUESTIONS: [(&[u8], &[u8]); 3] =
     [(b"\x1b[5n", b"\x1b[0n"), (b"\x1b[c", b"\x1b[?62;22c"), (b"\x1b[?2026$p", b"\x1b[?2026;2$y")];
 
-/// Who replies to the program's queries.
+/// What replies to the program's queries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Answers {
-    /// The terminal, at the far end.
+    /// The terminal at the far end.
     Terminal,
     /// A multiplexer at the near end.
     Multiplexer,
@@ -30,11 +30,11 @@ pub enum Answers {
 /// Traffic on the connection.
 #[derive(Debug, Default)]
 pub struct Seen {
-    /// Bytes that the program has sent.
+    /// Bytes sent by the program.
     pub sent: usize,
-    /// Bytes on the user's screen.
+    /// Bytes that reached the user's screen.
     pub shown: usize,
-    /// Bytes before the last query whose reply has reached the program.
+    /// Number of bytes sent up to the last query whose reply has reached the program.
     answered: usize,
     /// Largest number of unacknowledged bytes.
     pub most_unanswered: usize,
@@ -42,7 +42,7 @@ pub struct Seen {
     pub most_waiting: usize,
 }
 
-/// Bytes in transit with the time of their arrival; for a reply, also the number of bytes before its query.
+/// Bytes in transit with their arrival time. A reply also has the number of bytes sent up to its query.
 struct Due {
     when: Instant,
     bytes: Vec<u8>,
@@ -87,7 +87,7 @@ impl Relay {
                         let _ = to_answer.send(Due::answer(answer, now));
                     }
                 }
-                // Bytes arrive in order: later ones wait for earlier ones.
+                // Bytes arrive in order, so later bytes wait for earlier ones.
                 for part in bytes.chunks(250) {
                     free = free.max(now) + Duration::from_secs_f64(part.len() as f64 / RATE);
                     let _ = down.send(Due { when: free + DELAY, bytes: part.to_vec(), asked: None });
@@ -101,7 +101,7 @@ impl Relay {
         Self { seen, up }
     }
 
-    /// Types keys as the user.
+    /// Types keys at the user's end.
     pub fn press(&self, keys: &str) {
         let when = Instant::now() + DELAY;
         let _ = self.up.send(Due { when, bytes: keys.as_bytes().to_vec(), asked: None });
@@ -163,16 +163,16 @@ fn raise(rising: &Receiver<Due>, input: &Mutex<Box<dyn Write + Send>>, seen: &Mu
     }
 }
 
-/// Finds queries in a stream that may be split anywhere.
+/// Finds queries in a stream that may be split at any byte.
 #[derive(Default)]
 struct Scanner {
     last: Vec<u8>,
-    /// Bytes so far.
+    /// Number of bytes so far.
     count: usize,
 }
 
 impl Scanner {
-    /// The replies, each with the number of bytes before its query.
+    /// Replies to queries, each with the number of bytes up to its query.
     fn answers(&mut self, bytes: &[u8]) -> Vec<(&'static [u8], usize)> {
         let mut found = Vec::new();
         for byte in bytes {

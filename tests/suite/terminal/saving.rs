@@ -1,4 +1,4 @@
-//! Ways of saving a file: each triggers one render and no error in between.
+//! Ways to save a file. Each triggers exactly one render and no intermediate error.
 
 use std::fs;
 use std::io::Write;
@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use super::pty::{BLUE, Folder, GREEN, RED, SCENE, Terminal};
 
-/// A way of saving a text to a file.
+/// A way to save text to a file.
 type Save = fn(&Path, &str);
 
 const WAYS: [(&str, Save); 6] = [
@@ -33,9 +33,9 @@ const WAYS: [(&str, Save); 6] = [
         fs::remove_file(path).expect("removed");
         fs::write(path, text).expect("written");
     }),
-    ("the target of a link is replaced", |path, text| {
-        // The first save turns the file into a link with the same content; the watcher then has to find the target on
-        // its own.
+    ("replaced link target", |path, text| {
+        // The first save turns the file into a link with the same contents. The watcher must then find the
+        // target.
         let folder = beside(path, ".d");
         if !folder.is_dir() {
             fs::create_dir(&folder).expect("a folder");
@@ -53,7 +53,7 @@ fn beside(path: &Path, ending: &str) -> std::path::PathBuf {
     name.into()
 }
 
-/// Two alternating colors that identify the saved version.
+/// Two alternating colors that identify the saved versions.
 fn shades() -> impl Iterator<Item = (&'static str, &'static str)> {
     [("green", GREEN), ("blue", BLUE)].into_iter().cycle()
 }
@@ -68,7 +68,8 @@ fn every_way_of_saving_a_scene_renders_once() {
             save(&folder.path("scene.toml"), &SCENE.replace(RED, value));
             terminal.wait_for_color(color);
             terminal.wait_for_render(render);
-            // Saving the same content again triggers no render, as the next round's count shows.
+            // Saving the same contents again triggers no render, as the next iteration's render count
+            // confirms.
             save(&folder.path("scene.toml"), &SCENE.replace(RED, value));
             println!("{way} {options:?}");
         }
@@ -96,23 +97,23 @@ fn every_way_of_saving_an_asset_renders_once() {
     }
 }
 
-/// Checks that no error appears until a render with this color finishes.
+/// Checks that no error appears before a render with the given color is finished.
 #[track_caller]
 fn no_error_until(terminal: &Terminal, color: &'static str, render: usize) {
     terminal.wait(color, |screen| {
         let text = screen.contents();
-        assert!(!text.contains("error") && !text.contains("broken"), "an error in between\n{text}");
+        assert!(!text.contains("error") && !text.contains("broken"), "intermediate error\n{text}");
         super::Colors::of(screen).is_most(color)
     });
     terminal.wait_for_render(render);
 }
 
-/// Two halves of a text, cut in the middle of a line.
+/// Splits text in the middle of a line.
 fn halves(text: &str) -> (&str, &str) {
     text.split_at(text.find("diffuse").expect("a material") + 4)
 }
 
-/// Pause of the writer. If the machine stretches it too far, the test proves nothing.
+/// Pause between the two writes. If a busy machine makes it much longer, errors are allowed.
 const PAUSE: Duration = Duration::from_millis(200);
 
 #[test]
@@ -157,7 +158,7 @@ fn persistent_error_is_shown() {
     let (half, _) = halves(SCENE);
     let mut file = fs::File::create(folder.path("scene.toml")).expect("opened");
     file.write_all(half.as_bytes()).expect("written");
-    // A file held open is reported as well in the end.
+    // The error is reported even if the file remains open.
     terminal.wait_for("broken");
     drop(file);
     folder.write("scene.toml", &SCENE.replace(RED, GREEN));
@@ -169,7 +170,7 @@ fn persistent_error_is_shown() {
 #[test]
 fn broken_save_does_not_stop_the_render() {
     let folder = Folder::new();
-    // Long enough for a save.
+    // A render that takes long enough for a save.
     let slow = SCENE.replace("samples = 4", "samples = 1000").replace("width = 64", "width = 320");
     let slow = slow.replace("height = 48", "height = 240");
     folder.write("scene.toml", &slow);
@@ -186,7 +187,8 @@ fn broken_save_does_not_stop_the_render() {
     assert_eq!(written, folder.once(&[]));
 }
 
-/// Removes and recreates the scene's folder, as a checkout does; the program runs inside it or outside.
+/// Removes and recreates the scene's folder like `git checkout`. The program runs inside or outside the
+/// folder.
 #[test]
 fn recreated_folder_is_watched() {
     for (line, picture) in [
@@ -211,11 +213,11 @@ fn recreated_folder_is_watched() {
         terminal.wait_for_color("blue");
         terminal.wait_for_render(2);
         assert!(folder.path(picture).is_file(), "{picture}");
-        // From now on, saves work as before.
+        // Saving must work as before.
         folder.write("work/scene.toml", &SCENE.replace(RED, GREEN));
         terminal.wait_for_color("green");
         terminal.wait_for_render(3);
-        // The folder disappears and returns between two polls.
+        // Remove and recreate the folder between two polls.
         fs::remove_dir_all(folder.path("work")).expect("removed");
         make(GREEN);
         folder.write("work/scene.toml", SCENE);

@@ -1,4 +1,4 @@
-//! The whole screen in windows of all sizes: only the preview, the help, the view list, quitting.
+//! The screen in windows of all sizes: preview only, the help, the view list, quitting.
 
 use glimt::tui::messages;
 
@@ -9,13 +9,13 @@ const TAB: &str = "\t";
 const ESCAPE: &str = "\x1b";
 const PAGE_DOWN: &str = "\x1b[6~";
 
-/// The last row of the screen.
+/// The text of the last row.
 fn last_line(screen: &vt100::Screen) -> String {
     let rows = usize::from(screen.size().0.get());
     screen.contents().lines().nth(rows - 1).unwrap_or_default().trim_end().to_owned()
 }
 
-/// Waits until the text for this size appears, and returns the number of red cells once it is stable.
+/// Waits until the text for this size appears. Returns the number of red cells when it no longer changes.
 fn resized(terminal: &mut Terminal, columns: u16, rows: u16) -> usize {
     terminal.resize(columns, rows);
     terminal.wait("the line of keys", |screen| last_line(screen).ends_with("? help"));
@@ -35,7 +35,8 @@ fn tab_shows_only_the_preview() {
     let last = terminal.look(last_line);
     assert!(last.contains("✓ done") && last.ends_with("tab back"), "{last}");
     terminal.press("e");
-    terminal.wait("a message in the one line", |screen| last_line(screen).contains(messages::NO_DIAGNOSTICS));
+    terminal
+        .wait("a message in the only line", |screen| last_line(screen).contains(messages::NO_DIAGNOSTICS));
     terminal.press(TAB);
     terminal.wait("the keys", |screen| last_line(screen).ends_with("? help"));
     assert_eq!(terminal.settled(|screen| Colors::of(screen).red), beside);
@@ -77,7 +78,7 @@ fn digits_choose_from_the_view_list() {
     terminal.wait("no list", |screen| !screen.contents().contains("barycentric"));
     terminal.press("V");
     terminal.wait_for("▸5 uv");
-    // The list closes after a while.
+    // The list closes after a timeout.
     terminal.wait("no list", |screen| !screen.contents().contains("barycentric"));
     terminal.wait_for("v uv");
 }
@@ -105,7 +106,7 @@ fn small_windows_show_preview_errors_and_keys() {
 }
 
 #[test]
-fn every_state_has_a_sign_and_a_word() {
+fn every_state_has_a_symbol_and_a_word() {
     let folder = Folder::new();
     let mut terminal = folder.terminal_with(&[folder.program(), "scene.toml"], &[("NO_COLOR", "1")]);
     terminal.wait_for("✓ done");
@@ -139,7 +140,7 @@ fn last_of_many_resizes_wins() {
     terminal.resize(80, 24);
     terminal.wait("the last line", |screen| last_line(screen).ends_with("? help"));
     terminal.wait("the picture", |screen| Colors::of(screen).red == red);
-    // Immediately after an escape character, the key would be Alt-q.
+    // Wait, because immediately after an escape character the key would be Alt-q.
     terminal.settled(vt100::Screen::contents);
     terminal.press("q");
     assert_eq!(terminal.end(), 0);
@@ -157,7 +158,7 @@ fn quit_leaves_one_line() {
 }
 
 #[test]
-fn terminal_of_256_colors_gets_no_others() {
+fn terminal_with_256_colors_gets_no_others() {
     let folder = Folder::new();
     let mut terminal = folder.terminal_with(&[folder.program(), "scene.toml"], &[("COLORTERM", "")]);
     terminal.wait_for_render(1);

@@ -1,4 +1,5 @@
-//! Warnings, scrolling the help with the wheel, the history, and a screen that another program wrote to.
+//! Warnings, scrolling the help with the wheel, the history, and redrawing a screen overwritten by another
+//! program.
 
 use glimt::tui::messages;
 
@@ -17,7 +18,7 @@ fn warnings_are_counted_and_shown_on_request() {
     terminal.press("e");
     terminal.wait_for(&place);
     terminal.press("e");
-    terminal.wait("no warning in sight", |screen| !screen.contents().contains(&place));
+    terminal.wait("no warning on the screen", |screen| !screen.contents().contains(&place));
     terminal.wait_for_render(1);
 }
 
@@ -62,7 +63,7 @@ fn history_ends_at_oldest_and_newest() {
     }
     terminal.press("N");
     terminal.wait_for(messages::NEWEST_RENDER);
-    // `b` shows the render before the last edit, which is not the previous one in the history.
+    // `b` shows the render before the last edit, which is not the previous history entry.
     terminal.press("n");
     terminal.wait_for_color("green");
     terminal.press("b");
@@ -78,6 +79,6 @@ fn ctrl_l_redraws_the_screen() {
     terminal.scribble(&format!("\x1b[10;5H{text}"));
     terminal.wait_for(text);
     terminal.press("\x0c");
-    terminal.wait("the text is gone", |screen| !screen.contents().contains(text));
+    terminal.wait("the text to disappear", |screen| !screen.contents().contains(text));
     terminal.wait_for_color("red");
 }

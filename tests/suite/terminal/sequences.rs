@@ -1,5 +1,5 @@
-//! Random keys, saves and endings: until `w`, the image on disk belongs to a saved scene, and the line after `q` is
-//! true.
+//! Random keys, saves and ways to exit. Before `w` is pressed, the image on disk belongs to a saved scene.
+//! The line printed after `q` must be true.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -12,11 +12,11 @@ use nix::sys::signal::Signal;
 use super::pty::{Folder, SCENE, Terminal};
 use crate::test_dir::{PROGRAM, assert_mentions, mentions};
 
-/// Number of sequences in the regular test.
+/// Sequences in the regular test.
 const SEQUENCES: u64 = 12;
-/// Number of sequences in the long test, over all its scenes.
+/// Sequences in the long test, over all scenes.
 const LONG: u64 = 300;
-/// Bundled scenes of the long test.
+/// Bundled scenes for the long test.
 const BUNDLED: [&str; 6] = ["dof", "path", "phong", "photons", "shadows", "textures"];
 /// Keys that change only the preview.
 const LOOKING: [&str; 12] = ["s", "s", "d", "p", "i", "[", "]", "v", "l", "<", "0", "0"];
@@ -30,7 +30,7 @@ impl Dice {
     }
 }
 
-/// A scene in a folder, the program rendering it, and the actions so far.
+/// A scene in a folder, the program rendering it, and all previous actions.
 struct RandomSession<'a> {
     folder: Folder,
     terminal: Terminal,
@@ -57,7 +57,7 @@ impl<'a> RandomSession<'a> {
         self.saved.push(text);
     }
 
-    /// One random step.
+    /// Performs a random step.
     fn step(&mut self, dice: &mut Dice) {
         let first = self.saved[0].clone();
         match dice.below(12) {
@@ -92,7 +92,7 @@ impl<'a> RandomSession<'a> {
         }
     }
 
-    /// The image that a headless run renders from a text.
+    /// The image rendered with `--once` from the given scene text.
     fn once(&self, known: &mut HashMap<String, Vec<u8>>, text: &str, options: &[&str]) -> Vec<u8> {
         let key = format!("{text}\0{options:?}");
         let image = known.entry(key).or_insert_with(|| {
@@ -107,7 +107,7 @@ impl<'a> RandomSession<'a> {
     }
 }
 
-/// The pixels of a PNG, without its settings, which name the scene file.
+/// Pixels of a PNG. Excludes the stored settings, which contain the scene's file name.
 fn without_settings(path: &Path) -> Vec<u8> {
     let file = std::io::BufReader::new(std::fs::File::open(path).expect("an image"));
     let mut reader = png::Decoder::new(file).read_info().expect("a PNG");
@@ -116,7 +116,7 @@ fn without_settings(path: &Path) -> Vec<u8> {
     pixels
 }
 
-/// How a sequence ends.
+/// How to end a sequence.
 #[derive(Clone, Copy, Debug)]
 enum SequenceEnd {
     Quit,
@@ -152,12 +152,12 @@ fn check(run: &RandomSession<'_>, said: &str, known: &mut HashMap<String, Vec<u8
     let image = path.exists().then(|| without_settings(&path));
     let now = run.saved.last().expect("a scene").clone();
     let newest = run.once(known, &now, &[]);
-    // The last save may have been too late for this run.
+    // The last save may have been too late to be rendered.
     let is_current = image.as_ref() == Some(&newest);
     if !run.has_written {
         let earlier = run.saved.clone();
         let is_one = |image: &Vec<u8>| earlier.iter().any(|text| run.once(known, text, &[]) == *image);
-        assert!(image.as_ref().is_none_or(is_one), "no saved scene gives this image: {log}");
+        assert!(image.as_ref().is_none_or(is_one), "image from no saved scene: {log}");
     }
     if said.is_empty() {
         return;
@@ -165,18 +165,18 @@ fn check(run: &RandomSession<'_>, said: &str, known: &mut HashMap<String, Vec<u8
     let first = said.lines().next().unwrap_or_default();
     let is_older = ["older than", "not finished", "was stopped", "no image written", "is not written"];
     if is_older.iter().any(|words| first.contains(words)) {
-        // Saving a comment makes the file older without changing the image.
+        // Saving a comment makes the image older than the scene without changing it.
         let before = run.saved.iter().rev().skip(1);
         let was_made_before = before.clone().any(|text| run.once(known, text, &[]) == newest);
         let is_true = run.has_written || !is_current || was_made_before || first.contains("was stopped");
-        assert!(is_true, "the image is up to date: {log}");
+        assert!(is_true, "reported as outdated, but the image is current: {log}");
     } else if first.starts_with("wrote ")
         && first.contains("samples")
         && !first.contains(", with ")
         && !first.contains("view ")
     {
         let was_seen = run.saved.iter().rev().take(2).any(|text| image == Some(run.once(known, text, &[])));
-        assert!(is_current || was_seen, "the image belongs to another scene: {log}");
+        assert!(is_current || was_seen, "the image belongs to a different scene: {log}");
     }
     if let Some(options) = said.lines().find_map(|line| line.strip_prefix("not kept: ")) {
         let options: Vec<String> = options.split(' ').map(|word| word.replace('\'', "")).collect();
@@ -186,7 +186,7 @@ fn check(run: &RandomSession<'_>, said: &str, known: &mut HashMap<String, Vec<u8
 }
 
 #[test]
-fn random_keys_never_write_another_scene() {
+fn random_keys_never_write_wrong_image() {
     let mut known = HashMap::new();
     for seed in 0..SEQUENCES {
         run(seed, SCENE, &["--samples", "64"], &mut known);
@@ -249,7 +249,7 @@ fn interrupted_image_resumes_in_the_next_run() {
 }
 
 #[test]
-fn foreign_change_of_the_image_is_reported() {
+fn external_change_to_image_is_reported() {
     let folder = Folder::new();
     let mut terminal = folder.wide_terminal_with(&[PROGRAM, "scene.toml"]);
     terminal.wait_for_render(1);
@@ -260,7 +260,7 @@ fn foreign_change_of_the_image_is_reported() {
     terminal.wait_for_message(&messages::wrote("scene.png"));
     assert_eq!(folder.bytes("scene.png"), image);
     terminal.wait("it is there", |screen| !screen.contents().contains("was removed"));
-    // Another glimt writes with other settings.
+    // Another glimt process writes the image with other settings.
     let other = folder.once(&["--shadows", "off", "-o", "other.png"]);
     drop(other);
     std::fs::rename(folder.path("other.png"), folder.path("scene.png")).expect("moved");

@@ -1,4 +1,4 @@
-//! Over a slow connection, glimt responds to keys immediately whatever is queued, and quitting returns immediately.
+//! Over a slow connection, glimt responds to keys and quits immediately, regardless of queued output.
 
 use std::time::{Duration, Instant};
 
@@ -7,14 +7,14 @@ use glimt::tui::messages;
 use super::pty::{Folder, GREEN, RED, SCENE, Terminal};
 use super::relay::Answers;
 
-/// Limit of bytes that the terminal has not acknowledged yet.
+/// Limit on bytes that the terminal has not acknowledged.
 const MOST: usize = 24_000;
-/// Limit from a key to its first changed cells, and from `q` to the shell.
+/// Time limit from a key press to the first changed cells, and from `q` to the shell.
 const SEEN: Duration = Duration::from_millis(400);
 
 const ALL: [Answers; 3] = [Answers::Terminal, Answers::Multiplexer, Answers::Nothing];
 
-/// A render that does not end.
+/// Starts a render that does not finish.
 fn endless(answers: Answers) -> (Folder, Terminal) {
     let folder = Folder::new();
     folder.write("scene.toml", &SCENE.replace("samples = 4", "samples = 10000000"));
@@ -24,7 +24,7 @@ fn endless(answers: Answers) -> (Folder, Terminal) {
     (folder, terminal)
 }
 
-/// Time until a key shows its effect.
+/// Time until a key has a visible effect.
 fn time(terminal: &mut Terminal, key: &str, what: &str, holds: impl Fn(&vt100::Screen) -> bool) -> Duration {
     let begin = Instant::now();
     terminal.press(key);
@@ -32,8 +32,8 @@ fn time(terminal: &mut Terminal, key: &str, what: &str, holds: impl Fn(&vt100::S
     begin.elapsed()
 }
 
-/// Checks that the shortest of several attempts is within [`SEEN`]. Other tests may occupy the processors, so only the
-/// shortest time is the program's own.
+/// Checks that the fastest of several attempts is within [`SEEN`]. Only the fastest attempt is meaningful,
+/// because other tests may occupy the processors.
 #[track_caller]
 fn assert_at_once(what: &str, mut once: impl FnMut() -> Duration) {
     const TRIES: u32 = 12;
@@ -48,8 +48,8 @@ fn assert_at_once(what: &str, mut once: impl FnMut() -> Duration) {
 }
 
 #[test]
-fn keys_respond_quickly_and_little_is_queued() {
-    /// Number of attempts, because the connection itself stalls while other tests occupy the processors.
+fn keys_respond_quickly_with_short_queue() {
+    /// Number of attempts, because the simulated connection stalls while other tests occupy the processors.
     const TRIES: u32 = 4;
     for answers in ALL {
         let mut least = usize::MAX;
@@ -63,7 +63,7 @@ fn keys_respond_quickly_and_little_is_queued() {
     }
 }
 
-/// Queued or unacknowledged bytes while keys are pressed and the scene is saved.
+/// Maximum number of queued or unacknowledged bytes while keys are pressed and the scene is saved.
 fn most_on_the_way(answers: Answers) -> usize {
     let (folder, mut terminal) = endless(answers);
     let mut words = ["shadows hard", "shadows off", "shadows soft"].into_iter().cycle();
@@ -95,7 +95,7 @@ fn quit_returns_quickly() {
 
 #[test]
 fn idle_program_sends_nothing() {
-    // Test all connections at once, because the test mostly waits.
+    // Test all connections concurrently, because the test mostly waits.
     let terminals = ALL.map(|answers| {
         let folder = Folder::new();
         let terminal = folder.thin_line(answers);
@@ -112,23 +112,23 @@ fn idle_program_sends_nothing() {
 
 #[test]
 fn connection_is_measured_and_shown() {
-    /// Kilobytes sent and the terminal's round trip in milliseconds, from the line above the keys.
+    /// Kilobytes sent and the round-trip time in milliseconds, from the line above the keys.
     fn measured(screen: &vt100::Screen) -> Option<(u32, u32)> {
         let text = screen.contents();
         let words: Vec<&str> = text.lines().nth_back(1)?.split_whitespace().collect();
-        // The frame arrives in pieces: do not read other milliseconds of that line.
+        // The frame arrives in pieces, so match the whole line to avoid other numbers.
         let &[size, "kB", "sent", "·", time, "ms", "round", "trip"] = words.last_chunk()? else {
             return None;
         };
         Some((size.parse().ok()?, time.parse().ok()?))
     }
-    // A busy machine delays replies, never the opposite.
+    // A busy machine can only delay replies.
     assert_at_once("the round trip on the screen", || {
         let folder = Folder::new();
         let mut terminal = folder.thin_line(Answers::Terminal);
         terminal.wait_for_render(1);
-        // If the machine stalls for a second, the first reply is too late to be measured, and another preview is
-        // needed.
+        // If the machine stalls for a second, the first reply is too late to be measured. Then request
+        // another preview.
         let mut seen = terminal.settled(measured);
         for _ in 0..20 {
             if seen.is_some() {
@@ -153,7 +153,7 @@ fn stalled_terminal_does_not_block_quitting() {
         let mut terminal = folder.terminal();
         terminal.wait_for("ETA");
         terminal.set_reading(false);
-        // Show another view each time, until the terminal's buffer is full.
+        // Switch views until the terminal's buffer is full.
         for _ in 0..40 {
             terminal.press("v");
             std::thread::sleep(Duration::from_millis(100));
@@ -168,7 +168,8 @@ fn stalled_terminal_does_not_block_quitting() {
     });
 }
 
-/// Checks the redraw: a terminal truncates what does not fit, and the program may see only the last size.
+/// Checks the redraw. A terminal truncates text that does not fit, and the program may see only the last
+/// size.
 #[test]
 fn quick_shrink_and_grow_redraws_the_window() {
     let folder = Folder::new();

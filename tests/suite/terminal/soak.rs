@@ -2,8 +2,8 @@
 //!
 //!     GLIMT_SOAK_MINUTES=60 cargo test --profile quick --test suite soak -- --ignored --nocapture
 //!
-//! One program runs from start to end. In a separate folder, others are ended in every way and started again, with a
-//! checkpoint. `GLIMT_SOAK_SEED` selects other events.
+//! One process runs from start to end. In a separate folder, other processes are ended in every way and
+//! restarted with a checkpoint. `GLIMT_SOAK_SEED` selects different events.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -13,11 +13,11 @@ use nix::sys::signal::Signal;
 
 use super::pty::{Folder, Terminal};
 
-/// Interval between checks of the program.
+/// Interval between checks.
 const PAUSE: Duration = Duration::from_secs(20);
 /// Time limit for an image.
 const LIMIT: Duration = Duration::from_secs(300);
-/// Memory growth from the middle to the end that does not count as a leak, in KiB.
+/// Maximum memory growth, in KiB, from the middle to the end of the test.
 const SLACK: u64 = 16 << 10;
 
 /// Random numbers.
@@ -28,7 +28,7 @@ impl Dice {
         Self(Box::new(glimt::math::random::unit(seed)))
     }
 
-    /// A whole number below `count`.
+    /// An integer less than `count`.
     fn below(&mut self, count: usize) -> usize {
         ((self.0)() * count as f32) as usize % count
     }
@@ -57,7 +57,7 @@ fn scene(dice: &mut Dice, samples: u32, number: u32) -> String {
     )
 }
 
-/// Writes a file in the manner of a random editor.
+/// Writes a file in the way of a random editor.
 fn save(folder: &Folder, dice: &mut Dice, name: &str, text: &str) {
     let new = folder.path("new~");
     match dice.below(4) {
@@ -67,13 +67,13 @@ fn save(folder: &Folder, dice: &mut Dice, name: &str, text: &str) {
             fs::rename(&new, folder.path(name)).expect("renamed");
         }
         2 => {
-            // Leave the file missing for a moment.
+            // Remove the file briefly.
             let _ = fs::remove_file(folder.path(name));
             fs::write(&new, text).expect("written");
             fs::rename(&new, folder.path(name)).expect("renamed");
         }
         _ => {
-            // In two pieces.
+            // Write the file in two pieces.
             folder.write(name, &text[..text.len() / 2]);
             std::thread::sleep(Duration::from_millis(20));
             folder.write(name, text);
@@ -81,7 +81,7 @@ fn save(folder: &Folder, dice: &mut Dice, name: &str, text: &str) {
     }
 }
 
-/// Writes the mesh and the texture with small changes.
+/// Writes slightly changed versions of the mesh and the texture.
 fn save_assets(folder: &Folder, dice: &mut Dice) {
     let top = 0.5 + dice.below(8) as f32 / 10.0;
     let gray = 100 + dice.below(100);
@@ -127,14 +127,14 @@ impl Figures {
     }
 }
 
-/// Saves a last scene, and waits until its image equals the one of `--once`.
+/// Saves a last scene, and waits until its image equals that of `--once`.
 fn assert_image(terminal: &mut Terminal, folder: &Folder, text: &str, options: &[&str]) {
     folder.write("scene.toml", text);
     let once = folder.once(options);
     let (begin, mut next) = (Instant::now(), Instant::now());
     while fs::read(folder.path("scene.png")).ok().as_ref() != Some(&once) {
-        assert!(begin.elapsed() < LIMIT, "not the image of --once\n{text}\n{}", terminal.text());
-        // Close any overlay and return to the scene's settings. On a busy machine, both keys may arrive together as a
+        assert!(begin.elapsed() < LIMIT, "the image differs from --once\n{text}\n{}", terminal.text());
+        // Close any overlay and reset the settings. On a busy machine, both keys may arrive together as a
         // different key.
         if Instant::now() >= next {
             terminal.press("\x1b");
@@ -146,7 +146,8 @@ fn assert_image(terminal: &mut Terminal, folder: &Folder, text: &str, options: &
     }
 }
 
-/// Keys that change the preview, the screen or nothing. Excludes keys that quit, start an editor or change the file.
+/// Keys that change at most the preview or the screen. Excludes keys that quit, start an editor or change the
+/// file.
 const KEYS: [&str; 34] = [
     "s", "d", "p", "i", "v", "V", "\t", "x", "z", "h", "j", "k", "l", "+", "-", "<", ">", "[", "]", "f",
     "\r", "m", "b", "n", "N", " ", "r", "w", "0", "e", "?", "\x1b", "3", "\x1b[A",
@@ -218,7 +219,7 @@ fn soak() {
                 let sent = Instant::now();
                 falls.signal(signal);
                 let code = falls.code();
-                assert!(sent.elapsed() < Duration::from_secs(20), "{signal} is heard");
+                assert!(sent.elapsed() < Duration::from_secs(20), "exit after {signal}");
                 ends.insert((signal as i32, code));
                 falls = begin_other();
             }
@@ -227,7 +228,7 @@ fn soak() {
         if Instant::now() < next {
             continue;
         }
-        // Check the images of both programs, then the metrics of the one that keeps running.
+        // Check the images of both programs, then the metrics of the long-running program.
         let text = scene(&mut dice, 8, events);
         assert_image(&mut lives, own, &text, &[]);
         let text = scene(&mut dice, 64, events % 5);
@@ -240,9 +241,9 @@ fn soak() {
         next = Instant::now() + PAUSE;
     }
     // Print a summary.
-    assert!(figures.len() >= 3, "some minutes, please");
+    assert!(figures.len() >= 3, "GLIMT_SOAK_MINUTES is too short");
     let (first, middle, last) = (figures[0], figures[figures.len() / 2], figures[figures.len() - 1]);
-    eprintln!("{events} events, {images} images as by --once; ended as (signal, code): {ends:?}");
+    eprintln!("{events} events, {images} images equal to --once; exits (signal, code): {ends:?}");
     for (when, figures) in [("start", first), ("middle", middle), ("end", last)] {
         eprintln!("{}", figures.words(when));
     }

@@ -1,4 +1,4 @@
-//! Keys for photons, integrator and views: on the screen, in the file and in the report.
+//! Keys for photons, integrator and views: effects on the screen, in the file and in the report.
 
 use std::fs;
 
@@ -6,7 +6,7 @@ use glimt::tui::messages;
 
 use super::pty::{Folder, SCENE, Terminal};
 
-/// A glass ball in front of the board, so that photons are emitted.
+/// The scene with a glass ball in front of the board, so that photons are emitted.
 fn glassy() -> String {
     let ball = "ball = { type = \"glass\" }";
     SCENE.replace("ball = { diffuse = [0.02, 0.02, 0.02] }", ball) + "[photons]\ncount = 2000\n"
@@ -40,16 +40,16 @@ fn photons_and_integrator_switch_for_this_run() {
         let expected = folder.once(&options);
         let is_own = matches!(words, "p off" | "i whitted");
         assert_eq!(expected == own, is_own, "{words} shows");
-        assert!(is_written(&own), "{words} is only shown");
+        assert!(is_written(&own), "{words}: must not be written");
         if !is_own {
-            assert_ne!(setting(&folder, name), value, "the report is of the image on disk");
+            assert_ne!(setting(&folder, name), value, "the report must describe the image on disk");
             terminal.press("w");
             terminal.wait(words, |_| is_written(&expected));
         }
         terminal.wait(name, |_| setting(&folder, name) == value);
     }
     let text = fs::read_to_string(folder.path("scene.toml")).expect("a scene");
-    assert_eq!(text, glassy(), "never the file");
+    assert_eq!(text, glassy(), "the scene file must not change");
 }
 
 #[test]
@@ -68,7 +68,7 @@ fn keys_ignored_by_path_are_explained() {
     terminal.wait_for_render(2);
 }
 
-/// Waits for a view in the key line.
+/// Waits until the key line shows a view.
 fn wait_for_view(terminal: &Terminal, name: &str) {
     terminal.wait(name, |screen| {
         let text = screen.contents();
@@ -91,7 +91,7 @@ fn digits_choose_views_in_the_open_list() {
         terminal.press("\r");
         wait_for_view(&terminal, view);
     }
-    terminal.wait("a whole picture of it", |screen| {
+    terminal.wait("a complete picture of the view", |screen| {
         let text = screen.contents();
         text.lines().any(|line| line.contains("✓ done") && line.contains("view specular"))
     });

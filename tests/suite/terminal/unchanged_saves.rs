@@ -1,11 +1,11 @@
-//! Saves that do not change the image, such as typos, their corrections, and comments, add no history entry and are
-//! skipped by comparisons.
+//! Saves that do not change the image, such as typos, corrections and comments, add no history entry and do
+//! not count for comparisons.
 
 use glimt::tui::messages;
 
 use super::pty::{BLUE, Folder, RED, SCENE, Terminal};
 
-/// Text of the panel, without the blocks of thumbnails.
+/// Text of the panel, without thumbnails.
 fn words(screen: &vt100::Screen) -> String {
     let text: String = screen.contents().chars().filter(|c| !('▀'..='▟').contains(c)).collect();
     text.split_whitespace().collect::<Vec<_>>().join(" ")
@@ -39,7 +39,7 @@ fn typo_is_not_an_edit_for_comparison() {
     terminal.wait_for_color("blue");
 }
 
-/// If colors are dithered, a preview from the cache differs in some cells from the one of its render.
+/// With dithered colors, some cells of a cached preview differ from the preview shown during the render.
 #[test]
 fn comment_and_typo_add_no_history_entry() {
     let folder = Folder::new();
@@ -78,7 +78,7 @@ fn typo_while_rendering_adds_one_entry() {
     terminal.wait_for_render(1);
     let long = SCENE.replace("samples = 4", "samples = 10000000");
     folder.write("scene.toml", &long);
-    // The history has the entry once its first cells are on the screen.
+    // The history entry exists when its first cells are on the screen.
     let is_there = |screen: &vt100::Screen| words(screen).contains("▸2 render.");
     terminal.wait("an unfinished image", is_there);
     for _ in 0..2 {
@@ -90,7 +90,7 @@ fn typo_while_rendering_adds_one_entry() {
     terminal.wait_for(&messages::render_of(1, 2));
     terminal.wait("two pictures", |screen| {
         let words = words(screen);
-        // An image that is still rendering does not count as stopped.
+        // An unfinished render does not count as stopped.
         words.contains(&format!("▸1 {}", messages::OPENED))
             && words.contains(" 2 render.")
             && !words.contains(messages::STOPPED)

@@ -1,11 +1,11 @@
-//! Enums whose values have names, shared by scene files, the command line and reports.
+//! Enums with named values, used by scene files, the command line and reports.
 
 /// A closed set of named values, implemented by [`choice!`](crate::choice!).
 pub trait Choice: Copy + PartialEq + Send + Sync + 'static {
-    /// All values, in the order in which they are offered.
+    /// All values, in display order.
     const ALL: &'static [Self];
 
-    /// Names from other versions, which are rejected with a message of their own.
+    /// Names used by other versions, rejected with a dedicated error message.
     const UNAVAILABLE: &'static [&'static str];
 
     /// Name of the value.
@@ -35,16 +35,16 @@ pub fn serialize<C: Choice, S: serde::Serializer>(choice: &C, serializer: S) -> 
 /// glimt_base::choice! {
 ///     /// Directions.
 ///     pub enum Turn {
-///         /// Against the clock.
+///         /// Counterclockwise.
 ///         Left = "left",
-///         /// With it.
+///         /// Clockwise.
 ///         Right = "right",
 ///     }
 ///     unavailable "back"
 /// }
 /// use glimt_base::choice::Choice;
 /// assert_eq!(Turn::named("right"), Some(Turn::Right));
-/// assert_eq!(Turn::Left.meaning(), "Against the clock");
+/// assert_eq!(Turn::Left.meaning(), "Counterclockwise");
 /// ```
 #[macro_export]
 macro_rules! choice {
@@ -98,7 +98,7 @@ mod tests {
     }
 
     #[test]
-    fn values_are_found_only_by_their_names() {
+    fn values_are_found_by_exact_name() {
         for &number in Number::ALL {
             assert_eq!(Number::named(number.name()), Some(number));
         }

@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Error returned by canceled work, whose partial results must not be used.
+/// Error returned by canceled work. Its partial results must not be used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("cancelled")]
 pub struct Cancelled;
@@ -59,7 +59,7 @@ impl CancelToken {
         self.0.changed.notify_all();
     }
 
-    /// Total time for which the work has been paused.
+    /// Total time the work has been paused.
     pub fn paused_time(&self) -> Duration {
         let held = self.lock();
         held.before + held.since.map_or(Duration::ZERO, |since| since.elapsed())
@@ -75,10 +75,10 @@ impl CancelToken {
         self.0.cancelled.load(Ordering::Acquire)
     }
 
-    /// Returns at once, waits while paused, or reports cancellation.
+    /// Blocks while the work is paused, and reports cancellation.
     ///
     /// # Errors
-    /// [`Cancelled`] once [`CancelToken::cancel`] was called.
+    /// [`Cancelled`] if [`CancelToken::cancel`] was called.
     #[inline]
     pub fn check(&self) -> Result<(), Cancelled> {
         if self.is_paused() {
@@ -109,7 +109,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn cancel_reaches_every_clone() {
+    fn cancel_affects_all_clones() {
         let token = CancelToken::new();
         let other = token.clone();
         assert_eq!(other.check(), Ok(()));
@@ -118,7 +118,7 @@ mod tests {
     }
 
     #[test]
-    fn paused_time_is_known_during_and_after_a_pause() {
+    fn paused_time_includes_current_and_past_pauses() {
         const HOLD: Duration = Duration::from_millis(20);
         let token = CancelToken::new();
         token.set_paused(false);
@@ -131,7 +131,7 @@ mod tests {
         let after = token.paused_time();
         std::thread::sleep(HOLD);
         assert!(HOLD <= during && during <= after);
-        assert_eq!(token.paused_time(), after, "the work runs again");
+        assert_eq!(token.paused_time(), after, "the work should have resumed");
     }
 
     #[test]
@@ -144,6 +144,6 @@ mod tests {
         };
         assert!(!worker.is_finished());
         token.cancel();
-        assert_eq!(worker.join().expect("the worker does not panic"), Err(Cancelled));
+        assert_eq!(worker.join().expect("the worker should not panic"), Err(Cancelled));
     }
 }

@@ -1,4 +1,4 @@
-//! Block sums of a film: memory and completion of blocks.
+//! Allocation and completion of a film's block sums.
 
 use super::Rect;
 use super::sum_order::SumOrder;
@@ -48,7 +48,7 @@ impl Film {
         Ok(self)
     }
 
-    /// Bytes for the sums of a crop with this summation order, and for the finished image of this size.
+    /// Bytes needed for a crop's sums with this summation order, and for the full-size finished image.
     pub fn memory_for((width, height): (u32, u32), crop: Rect, blocks: SumOrder) -> (u64, u64) {
         let more = crop.area() as u64 * (blocks.kept() * size_of::<DVec3>()) as u64;
         let picture = bytes_needed(width, height, Rect { width: 0, height: 0, ..crop });

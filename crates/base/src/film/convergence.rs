@@ -10,38 +10,38 @@ pub(super) fn luminance(radiance: DVec3) -> f64 {
     radiance.dot(LUMINANCE_WEIGHTS.as_dvec3())
 }
 
-/// Squared steps of a tile's pixel means: how much each mean changed when its samples doubled.
+/// Squared steps of a tile's pixel means: how much each mean changed when the sample count doubled.
 ///
 /// The samples of a pixel are not independent: each doubling fills the gaps between earlier samples. The
-/// sample variance therefore overestimates the noise, while splitting the samples into two halves with
-/// separate scrambles would lose the benefit of the stratification. Instead, let M be the mean of 2n samples,
-/// A the mean of the first n and B the mean of the others. (A − M)² = (A − B)²/4 has the expectation V(n) −
-/// V(2n) for any correlation of A and B, as V(2n) = (V(A) + V(B))/4 + Cov/2 and V(A) = V(B) = V(n).
+/// sample variance therefore overestimates the noise, and splitting the samples into two independently
+/// scrambled halves would lose the benefit of stratification. Instead, let M be the mean of 2n samples, A the
+/// mean of the first n and B the mean of the others. (A − M)² = (A − B)²/4 has the expected value V(n) −
+/// V(2n) for any correlation of A and B, because V(2n) = (V(A) + V(B))/4 + Cov/2 and V(A) = V(B) = V(n).
 ///
-/// The same pixels measure the rate at which V falls: the first n samples and the others each contain another
-/// such step, with the expectation V(n/2) − V(n). The rate is the mean of these two divided by the first
-/// step. A rare bright sample affects all three steps and leads to a rate of two, as for independent samples,
-/// however few pixels contain one.
+/// The rate at which V falls is measured from the same pixels. The first n samples and the other n each
+/// contain another such step, with the expected value V(n/2) − V(n). The rate is the mean of these two
+/// divided by the first step. A rare bright sample affects all three steps and results in a rate of two, as
+/// for independent samples, even if only a few pixels contain one.
 #[derive(Debug, Default)]
 pub(super) struct Steps {
     /// Luminance of each pixel at its last power-of-two sample count.
     last: Vec<f32>,
-    /// Luminance of each pixel halfway from there to the next power of two.
+    /// Luminance of each pixel at the sample count halfway to the next power of two.
     half_way: Vec<f32>,
-    /// Squared steps to 2, 4, 8, … samples, for each half of each cell.
+    /// Squared steps at 2, 4, 8, … samples, for each half of each cell.
     levels: Vec<[[LevelSums; 2]; CELLS]>,
     /// Last step of each pixel.
     recent: Vec<f32>,
 }
 
-/// Sums over pixels of the squared steps to one power-of-two sample count.
+/// Sums of squared steps over pixels, at one power-of-two sample count.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct LevelSums {
     /// Steps of the mean of all samples.
     outer: f64,
     /// Steps within the second half of the samples.
     inner: f64,
-    /// Squares of the `outer` steps, which show how few pixels dominate the sum.
+    /// Sum of the squared `outer` steps, used to detect sums dominated by a few pixels.
     outer_squares: f64,
     /// Sum of the `outer` steps, each divided by luminance² + [`RELMSE_EPSILON`].
     relative: f64,
@@ -49,11 +49,11 @@ struct LevelSums {
     relative_inner: f64,
 }
 
-/// Squared steps to a power of two, and the steps one doubling earlier.
+/// Squared steps at a power of two, and the steps one doubling earlier.
 #[derive(Clone, Copy, Debug, Default)]
 struct StepPair {
     last: f64,
-    /// Mean of the steps in both halves of the samples; `None` for two samples.
+    /// Mean of the steps in both halves of the samples. `None` for two samples.
     before: Option<f64>,
 }
 
@@ -124,8 +124,8 @@ impl Steps {
         self.recent.get(pixel).map_or(0.0, |step| f64::from(*step) * f64::from(*step))
     }
 
-    /// Number of additional samples after which a pixel with `count` samples is recorded again: at powers of
-    /// two, and halfway between them.
+    /// Number of samples until a pixel with `count` samples is next recorded. Pixels are recorded at powers
+    /// of two and halfway between them.
     pub(super) fn samples_to_next(count: u32) -> usize {
         let count = u64::from(count);
         let power = (count + 1).next_power_of_two();
@@ -148,7 +148,7 @@ impl Steps {
             let (mean, last, half_way) =
                 (f64::from(rounded), f64::from(self.last[pixel]), f64::from(self.half_way[pixel]));
             let outer = (mean - last) * (mean - last);
-            // Half the difference of the last two quarters. Two samples have no quarters.
+            // Half the difference between the means of the last two quarters. Two samples have no quarters.
             let step = if level > 1 { 3.0 * half_way - last - 2.0 * mean } else { 0.0 };
             let inner = step * step;
             let scale = 1.0 / (luminance * luminance + RELMSE_EPSILON);
@@ -163,7 +163,7 @@ impl Steps {
         self.last[pixel] = rounded;
     }
 
-    /// Steps of a half-cell to 2^`level` samples.
+    /// Steps of a half-cell at 2^`level` samples.
     fn pair(&self, level: usize, (cell, half): (usize, usize), is_relative: bool) -> Option<StepPair> {
         let of = |level: usize| self.levels.get(level.checked_sub(1)?).map(|cells| cells[cell][half]);
         let parts = |sums: LevelSums| match is_relative {
@@ -175,15 +175,15 @@ impl Steps {
         Some(StepPair { last, before })
     }
 
-    /// Steps of a half-cell to 2^`level` samples, and those one, two and three doublings earlier.
+    /// Steps of a half-cell at 2^`level` samples, followed by the steps one, two and three doublings earlier.
     fn last_four(&self, level: usize, at: (usize, usize), is_relative: bool) -> Option<[f64; 4]> {
         let StepPair { last, before } = self.pair(level, at, is_relative)?;
         let earlier = |back: usize| self.pair(level.checked_sub(back)?, at, is_relative)?.before;
         Some([last, before?, earlier(1)?, earlier(2)?])
     }
 
-    /// Factor by which quadrupling the samples to 2^`level` reduced the variance, over one half of all cells.
-    /// `None` as in [`Steps::fall`], which returns the factor for doubling.
+    /// Factor by which quadrupling the samples to 2^`level` reduced the variance, measured in one half of all
+    /// cells. `None` in the same cases as [`Steps::fall`], which returns the factor for doubling.
     fn fourfold_fall(&self, level: usize, half: usize) -> Option<f64> {
         let mut sums = [0.0; 4];
         for cell in 0..CELLS {
@@ -193,14 +193,15 @@ impl Steps {
             }
         }
         let [last, before, third, fourth] = sums;
-        // Compare with the same step at a quarter of the samples and, more cautiously, with two steps
-        // together.
+        // Compare the last step with the step at a quarter of the samples, and more conservatively the sum of
+        // the last two steps with the sum of the two before.
         let fall = (third / last).max(CAREFUL * (third + fourth) / (last + before));
         Some(fall).filter(|fall| fall.is_finite() && *fall > 0.0)
     }
 
-    /// Expected relative standard deviation of the sum of the steps to 2^`level` samples over these halves of
-    /// all cells: 1 if a single pixel dominates, less if many contribute. Ignores cells with fewer samples.
+    /// Expected relative standard deviation of the sum of the steps at 2^`level` samples over the given
+    /// halves of all cells: 1 if a single pixel dominates, lower if many contribute. Ignores cells with fewer
+    /// samples.
     pub(super) fn spread(&self, level: usize, halves: &[usize]) -> f64 {
         let Some(cells) = level.checked_sub(1).and_then(|index| self.levels.get(index)) else { return 1.0 };
         let sums = cells.iter().flat_map(|cell| halves.iter().map(|half| cell[*half]));
@@ -209,14 +210,14 @@ impl Steps {
         if sum > 0.0 { squares.sqrt() / sum } else { 0.0 }
     }
 
-    /// Confidence in a measured fall, from 0 to 1.
+    /// Confidence in a measured variance reduction, from 0 to 1.
     fn trust(&self, level: usize, halves: &[usize]) -> f64 {
         let spread = self.spread(level, halves);
         1.0 / (1.0 + DOUBT * spread * spread)
     }
 
-    /// Factor by which doubling the samples to 2^`level` reduced the variance, over these halves of all
-    /// cells. `None` if it is unknown. Ignores cells with fewer samples.
+    /// Factor by which doubling the samples to 2^`level` reduced the variance in the given halves of all
+    /// cells, or `None` if unknown. Ignores cells with fewer samples.
     pub(super) fn fall(&self, level: usize, halves: &[usize]) -> Option<f64> {
         let (mut last, mut before) = (0.0, 0.0);
         for (cell, half) in (0..CELLS).flat_map(|cell| halves.iter().map(move |half| (cell, *half))) {
@@ -233,45 +234,46 @@ impl Steps {
 /// Convergence model: how the variance of a pixel's mean falls with its sample count.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Convergence {
-    /// Stratified samples that fill each other's gaps. Doubling them divides the variance by 2 for rare
-    /// light, by 2.8 at edges and in penumbras, and by 4 or more in smooth regions. The steps between pairs
-    /// of doublings measure the factor.
+    /// Stratified samples, where each doubling fills the gaps between earlier samples. Doubling the samples
+    /// divides the variance by 2 for rare light, by 2.8 at edges and in penumbras, and by 4 or more in smooth
+    /// regions. The factor is measured by comparing the steps of successive doublings.
     #[default]
     Stratified,
-    /// Each sample has its own photons, which the pixels share. Eventually the photons' variance falls as for
-    /// independent samples, while the camera paths' variance initially falls faster.
+    /// Each sample traces its own photons, shared by all pixels. The variance of camera paths falls quickly
+    /// at first, but the photons' variance eventually dominates and falls as for independent samples.
     Photons,
 }
 
 /// Factor by which doubling independent samples reduces the variance.
 const INDEPENDENT_RATE: f64 = 2.0;
 
-/// Maximum plausible fall for one doubling.
+/// Maximum plausible variance reduction per doubling.
 const MOST_FALL: f64 = 12.0;
 
-/// Maximum fall attributed to independent samples: a few bright pixels can fall this fast by chance.
+/// Variance reduction up to which samples are assumed to be independent. A few bright pixels can cause this
+/// reduction by chance.
 const CHANCE_FALL: f64 = 2.3;
 
-/// Fraction of a fall beyond [`CHANCE_FALL`] that is expected to continue: the smooth parts of a tile
-/// converge first, and the rest falls more slowly.
+/// Fraction of the variance reduction above [`CHANCE_FALL`] that is expected to continue. The smooth parts of
+/// a tile converge first, and the rest converges more slowly.
 const LASTING: f64 = 0.65;
 
-/// Penalty for a fall measured from few pixels, per squared [`Steps::spread`].
+/// Penalty for a variance reduction measured from few pixels, multiplied by the squared [`Steps::spread`].
 const DOUBT: f64 = 2.0;
 
-/// Fraction of the fall over two steps that is trusted.
+/// Trusted fraction of the variance reduction over two steps.
 const CAREFUL: f64 = 0.8;
 
-/// Factor by which quadrupling independent samples reduces the variance, followed by the maximum fall
-/// attributed to chance, the fraction of a larger fall that continues, and the maximum rate.
+/// Factor by which quadrupling independent samples reduces the variance, followed by the maximum reduction
+/// attributed to chance, the fraction of the excess that continues, and the maximum rate.
 const FOURFOLD_RATE: f64 = 4.0;
 const FOURFOLD_CHANCE: f64 = 5.2;
 const FOURFOLD_LASTING: f64 = 1.2;
 const FOURFOLD_MOST: f64 = 40.0;
 
 impl Convergence {
-    /// Long-term exponent with which the variance of most images falls with the sample count, regardless of
-    /// the latest steps.
+    /// Typical long-term exponent of the variance's decrease with the sample count, regardless of the latest
+    /// steps.
     pub fn usual_power(self) -> f64 {
         match self {
             Self::Stratified => 1.432_959_407_276_106_2,
@@ -279,24 +281,24 @@ impl Convergence {
         }
     }
 
-    /// Factor by which doubling the samples to 2^`level` reduced the variance in these halves of a tile.
+    /// Factor by which doubling the samples to 2^`level` reduced the variance in the given halves of a tile.
     fn fall(steps: &Steps, level: usize, halves: &[usize]) -> f64 {
         steps.fall(level, halves).map_or(INDEPENDENT_RATE, |fall| fall.clamp(INDEPENDENT_RATE, MOST_FALL))
     }
 
-    /// Factor by which doubling the samples beyond 2^`level` is expected to reduce the variance in these
+    /// Factor by which doubling the samples beyond 2^`level` is expected to reduce the variance in the given
     /// halves of a tile.
     pub(super) fn rate(steps: &Steps, level: usize, halves: &[usize]) -> f64 {
         rate_after(Self::fall(steps, level, halves), steps.trust(level, halves))
     }
 
-    /// Variance of the means of `count` samples in a half-cell, summed over its pixels, and the rate at which
-    /// it falls.
+    /// Variance of the pixel means after `count` samples, summed over the pixels of a half-cell, and the rate
+    /// at which it falls.
     ///
-    /// The variance is the geometric mean of two predictions. One is based on doublings: the last step, and
-    /// its prediction from the two steps before it, as each is noisy. But base-2 sequences are best
-    /// stratified at powers of 4, so every other doubling gains more. The other prediction is therefore based
-    /// on quadrupled sample counts.
+    /// The variance is the geometric mean of two predictions. The first is based on doublings: it averages
+    /// the last step and its prediction from the two steps before, since each of them is noisy. However,
+    /// base-2 sequences are best stratified at powers of 4, so every other doubling gains more. The second
+    /// prediction is therefore based on quadrupled sample counts.
     pub(super) fn variance(
         steps: &Steps,
         (cell, half): (usize, usize),
@@ -316,8 +318,8 @@ impl Convergence {
         Some((variance, rate))
     }
 
-    /// Variance of the means of 2^`level` samples in a half-cell, summed over its pixels, predicted from its
-    /// fall over quadrupled sample counts. `None` for fewer than 16 samples.
+    /// Variance of the pixel means after 2^`level` samples, summed over the pixels of a half-cell and
+    /// predicted from its reduction over quadrupled sample counts. `None` for fewer than 16 samples.
     fn by_four(steps: &Steps, level: usize, at: (usize, usize), is_relative: bool) -> Option<f64> {
         let [last, before, ..] = steps.last_four(level, at, is_relative)?;
         let fall = steps.fourfold_fall(level, at.1).unwrap_or(FOURFOLD_RATE);
@@ -327,13 +329,13 @@ impl Convergence {
     }
 }
 
-/// Expected rate after a fall with this confidence.
+/// Expected rate, given a measured variance reduction and its confidence.
 fn rate_after(fall: f64, trust: f64) -> f64 {
     INDEPENDENT_RATE + LASTING * (fall - CHANCE_FALL).max(0.0) * trust
 }
 
-/// Variance of a mean of `count` ≥ 2 samples, from the squared step to the last power of two and the rate at
-/// which the variance falls.
+/// Variance of the mean of `count` ≥ 2 samples, computed from the squared step at the last power of two and
+/// the rate at which the variance falls.
 pub(super) fn pixel_variance(step: f64, count: u32, rate: f64) -> f64 {
     // Between powers of two, the variance falls as for independent samples.
     let part = f64::from(1_u32 << count.ilog2()) / f64::from(count);

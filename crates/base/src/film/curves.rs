@@ -1,7 +1,6 @@
 //! Tone curves: map linear radiance to linear display light in [0, 1].
 //!
-//! Every curve maps components in [0, 1e10] to [0, 1], preserves black and never makes a brighter gray
-//! darker.
+//! Every curve maps components in [0, 1e10] to [0, 1], preserves black and is monotonic for gray.
 
 use crate::math::Vec3;
 use crate::math::color::luminance;
@@ -23,8 +22,8 @@ pub(super) fn aces(color: Vec3) -> Vec3 {
 
 /// T. Sobotka's AgX (2022) with its default look: an inset matrix, a sigmoid over 16.5 stops around middle
 /// gray, and an outset matrix. The matrices are B. Wrensch's for Rec. 709 ("Minimal AgX Implementation",
-/// 2023); the sigmoid is exact rather than his polynomial fit. The result is linearized with a display gamma
-/// of 2.2.
+/// 2023). The sigmoid is exact instead of using his polynomial fit. The result is linearized with a display
+/// gamma of 2.2.
 pub(super) fn agx(color: Vec3) -> Vec3 {
     let inset = transform(&AGX_INSET, color);
     let encoded = Vec3::from_array(inset.to_array().map(agx_sigmoid_of_stops));
@@ -51,14 +50,14 @@ fn agx_sigmoid_of_stops(x: f32) -> f32 {
     agx_sigmoid((log2(x.max(f32::MIN_POSITIVE)).clamp(low, high) - low) / (high - low))
 }
 
-/// Slope 2 through (10/16.5, ½), with toe and shoulder powers of 3 and 3.25; maps 0 to 0 and 1 to 1.
+/// Sigmoid with slope 2 at (10/16.5, ½), and toe and shoulder powers of 3 and 3.25. Maps 0 to 0 and 1 to 1.
 fn agx_sigmoid(x: f32) -> f32 {
     const SLOPE: f32 = 2.0;
     const PIVOT: f32 = 10.0 / 16.5;
     let (sign, run, power) = if x < PIVOT { (-1.0, PIVOT, 3.0) } else { (1.0, 1.0 - PIVOT, 3.25) };
     let rise: f32 = SLOPE * run;
-    // The hyperbola s·t/(1 + tᵖ)^(1/p) with t = slope·distance/s, where s makes the curve end half a unit
-    // from the pivot.
+    // The hyperbola s·t/(1 + tᵖ)^(1/p) with t = slope·distance/s, where s is chosen so that the curve ends
+    // half a unit from the pivot.
     let scale = rise / pow(pow(rise / 0.5, power) - 1.0, 1.0 / power);
     let term = SLOPE * (x - PIVOT).abs() / scale;
     0.5 + sign * scale * term / pow(1.0 + pow(term, power), 1.0 / power)
@@ -81,7 +80,7 @@ mod tests {
 
     #[test]
     fn agx_sigmoid_matches_the_published_fit() {
-        // B. Wrensch's fit of the same curve; its mean squared error is 3.7e-6.
+        // B. Wrensch's fit of the same curve, with a mean squared error of 3.7e-6.
         let polynomial = |x: f32| {
             [15.5, -40.14, 31.96, -6.868, 0.4298, 0.1191, -0.00232].iter().fold(0.0, |sum, c| sum * x + c)
         };

@@ -1,11 +1,11 @@
 //! Sums of samples, tone mapping and finished images.
 //!
-//! Integrators produce [`TileSamples`]; a [`Film`] sums them in f64. Image files contain [`Film::radiance`].
-//! [`Previewer`] scales it for the screen while it renders. [`tone::develop`] turns either into a
-//! [`Picture`].
+//! Integrators produce [`TileSamples`], which a [`Film`] sums in f64. Image files contain [`Film::radiance`].
+//! [`Previewer`] scales the film to screen size during rendering. [`tone::develop`] converts the radiance or
+//! a preview to a [`Picture`].
 //!
-//! Large images are processed on all threads of the caller's rayon pool; outside a pool, on the calling
-//! thread. The caller chooses the number of threads.
+//! Large images are processed on all threads of the caller's rayon pool, or on the calling thread outside a
+//! pool. The caller chooses the number of threads.
 
 mod block_sums;
 mod convergence;
@@ -40,13 +40,13 @@ use crate::math::Vec3;
 /// Tile width and height in pixels: 1024 pixels of 40 bytes fit in a core's L2 cache.
 pub const TILE_SIZE: u32 = 32;
 
-/// Cell width and height in pixels. Each cell of a tile gets as many samples as its own noise needs. The
-/// smaller the cells, the fewer pixels get the samples that an edge needs.
+/// Cell width and height in pixels. Each cell of a tile is sampled according to its own noise. With smaller
+/// cells, fewer pixels are oversampled because of a nearby edge.
 pub const CELL_SIZE: u32 = 16;
 
 const CELLS_ACROSS: usize = (TILE_SIZE / CELL_SIZE) as usize;
 
-/// Number of cells in a tile, in row-major order.
+/// Number of cells in a tile. Cells are in row-major order.
 pub const CELLS: usize = CELLS_ACROSS * CELLS_ACROSS;
 
 /// Whether the current thread belongs to a rayon pool that can share work.
@@ -54,16 +54,16 @@ fn is_in_pool() -> bool {
     rayon::current_thread_index().is_some()
 }
 
-/// A rectangle of pixels; (0, 0) is the top left pixel.
+/// A rectangle of pixels. (0, 0) is the top left pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Rect {
     /// First column.
     pub x: u32,
     /// First row.
     pub y: u32,
-    /// Columns, ≥ 1.
+    /// Number of columns, at least 1.
     pub width: u32,
-    /// Rows, ≥ 1.
+    /// Number of rows, at least 1.
     pub height: u32,
 }
 
@@ -81,7 +81,7 @@ impl Rect {
     }
 }
 
-/// Intersection of two intervals (start, length). Uses u64, as start + length may overflow u32.
+/// Intersection of two intervals (start, length). Uses u64 because start + length may overflow u32.
 fn overlap(a: (u32, u32), b: (u32, u32)) -> Option<(u32, u32)> {
     let end = |(start, length): (u32, u32)| u64::from(start) + u64::from(length);
     let start = a.0.max(b.0);
@@ -89,8 +89,7 @@ fn overlap(a: (u32, u32), b: (u32, u32)) -> Option<(u32, u32)> {
     Some((start, u32::try_from(length).ok()?))
 }
 
-/// Samples that an integrator took in a tile: `samples` consecutive radiances for each pixel, in row-major
-/// order.
+/// An integrator's samples of a tile: `samples` consecutive radiances per pixel, in row-major order.
 #[derive(Clone, Debug)]
 pub struct TileSamples {
     /// Sampled pixels.
@@ -104,7 +103,8 @@ pub struct TileSamples {
 }
 
 /// Samples in the negative lobes of the pixel filter. A pixel's value is (1 + `weight`) · mean of the other
-/// samples − `weight` · mean of these. A constant image therefore stays constant wherever the samples fall.
+/// samples − `weight` · mean of the samples in negative lobes. A constant image therefore stays constant
+/// regardless of the sample positions.
 #[derive(Clone, Debug)]
 pub struct NegativeLobes {
     /// −∫min(f, 0)/∫f.
@@ -143,8 +143,8 @@ impl RadianceImage {
         }
     }
 
-    /// Resizes the image with an exact box filter: every new pixel is the mean of the old ones over its area,
-    /// so the mean of the image is preserved.
+    /// Resizes the image with an exact box filter: each new pixel is the mean of the old pixels it covers,
+    /// weighted by area, so the image mean is preserved.
     pub fn resized(&self, width: u32, height: u32) -> Self {
         resample::resized(self, width, height)
     }

@@ -1,12 +1,12 @@
-//! Noise of a film: its distance from the converged image, estimated from its own samples.
+//! Film noise: the error relative to the converged image, estimated from the film's own samples.
 
 use rayon::prelude::*;
 
 use super::convergence::{Convergence, luminance};
 use super::{CELLS, Film, PixelSubset, Pixels, is_in_pool};
 
-/// Number of samples that reduces the standard error of `count` samples by the factor `part`, if the variance
-/// falls with this power of the sample count.
+/// Number of samples at which the standard error is `part` times the error of `count` samples, if the
+/// variance falls with this power of the sample count.
 pub fn samples_to_reduce_error(power: f64, part: f64, count: u32) -> u32 {
     (f64::from(count) * libm::pow(part, -2.0 / power)).ceil() as u32
 }
@@ -33,7 +33,7 @@ pub struct ImageNoise {
     pub power: f64,
 }
 
-/// Sums over pixels for the noise of an image.
+/// Sums over pixels from which an image's noise is computed.
 #[derive(Clone, Copy, Debug, Default)]
 struct NoiseSums {
     variance: f64,
@@ -43,7 +43,7 @@ struct NoiseSums {
 }
 
 impl NoiseSums {
-    /// Expected exponent for the next doubling; without noise, the one for independent samples.
+    /// Expected exponent for the next doubling, or the exponent of independent samples if there is no noise.
     fn power(self) -> f64 {
         if self.left > 0.0 { libm::log2(self.variance / self.left) } else { 1.0 }
     }
@@ -57,7 +57,7 @@ impl NoiseSums {
 
 impl Film {
     /// Estimates the error of the current image relative to its brightness: the root mean square of the
-    /// pixels' standard errors of luminance, divided by the image's mean luminance. The estimate comes from
+    /// pixels' standard errors of luminance, divided by the image's mean luminance. The estimate is based on
     /// the changes caused by the latest samples.
     ///
     /// About 0 if all samples of each pixel are equal. `None` if a pixel has fewer than two samples.
@@ -111,13 +111,15 @@ impl Film {
         self.map_tiles(of_tile).into_iter().try_fold(NoiseSums::default(), add)
     }
 
-    /// Calls `tell` for every tile, in parallel inside a rayon pool, and returns the results in tile order.
+    /// Calls `tell` for every tile and returns the results in tile order. Runs in parallel inside a rayon
+    /// pool.
     pub fn map_tiles<T: Send>(&self, tell: impl Fn(usize) -> T + Send + Sync) -> Vec<T> {
         let tiles = 0..self.tile_count();
         if is_in_pool() { tiles.into_par_iter().map(tell).collect() } else { tiles.map(tell).collect() }
     }
 
-    /// Noise in one half of a cell. `None` if the half has no pixels, or one with fewer than two samples.
+    /// Noise in one half of a cell. `None` if the half has no pixels or if a pixel has fewer than two
+    /// samples.
     pub fn half_noise(&self, number: usize, half: usize) -> Option<HalfNoise> {
         let tile = self.tile(number / CELLS);
         let (mut pixels, mut samples, mut sum) = (0_u32, u32::MAX, 0.0);
@@ -131,22 +133,21 @@ impl Film {
         Some(HalfNoise { variance: variance / pixels, mean: sum / pixels, samples, power: libm::log2(rate) })
     }
 
-    /// Factor by which the last doubling reduced the variance of a tile, over the half-cells that have
-    /// completed it. `None` if there are not enough steps.
+    /// Factor by which the last doubling reduced a tile's variance, measured in the half-cells that have
+    /// completed that doubling. `None` if there are not enough steps.
     pub fn tile_fall(&self, tile: usize) -> Option<f64> {
         let tile = self.tile(tile);
         tile.steps.fall(tile.steps.level_count(), &[0, 1])
     }
 
     /// Expected relative standard deviation of the variance measured over one half of a tile's cells: 1 if a
-    /// single pixel dominates, less if many pixels contribute. Cells with fewer samples than others are
-    /// ignored.
+    /// single pixel dominates, lower if many pixels contribute. Ignores cells with fewer samples than others.
     pub fn tile_spread(&self, tile: usize, half: usize) -> f64 {
         let tile = self.tile(tile);
         tile.steps.spread(tile.steps.level_count(), &[half])
     }
 
-    /// Noise over one half of all cells of a tile. `None` as in [`Film::half_noise`].
+    /// Noise in one half of all cells of a tile. `None` in the same cases as [`Film::half_noise`].
     pub fn tile_noise(&self, tile: usize, half: usize) -> Option<HalfNoise> {
         let (mut pixels, mut samples, mut sums) = (0.0, u32::MAX, NoiseSums::default());
         for cell in CELLS * tile..CELLS * (tile + 1) {
@@ -163,9 +164,9 @@ impl Film {
     }
 
     /// Error of a half-cell after the first `count` samples per pixel, where `count` is a power of two: the
-    /// mean of luminance variance / (luminance² + [`RELMSE_EPSILON`](crate::math::color::RELMSE_EPSILON)) over
-    /// the pixels, and the exponent with which it falls. `None` for fewer than two samples, for more than the
-    /// pixels have, and if the half has no pixels.
+    /// mean of luminance variance / (luminance² + [`RELMSE_EPSILON`](crate::math::color::RELMSE_EPSILON))
+    /// over the pixels, and the exponent with which it falls. `None` if `count` is less than two or more than
+    /// the pixels' sample count, and if the half has no pixels.
     pub fn half_error(&self, number: usize, half: usize, count: u32) -> Option<(f64, f64)> {
         let tile = self.tile(number / CELLS);
         let pixels = self.half_pixel_count(number, half);
@@ -183,7 +184,7 @@ impl Film {
         self.cell_rect(cell).map_or(0, |rect| PixelSubset::Half(half).count(rect.area()))
     }
 
-    /// Indices within the tile of the pixels of a half-cell.
+    /// Tile-relative indices of the pixels in a half-cell.
     fn half_pixels(&self, cell: usize, half: usize) -> impl Iterator<Item = usize> {
         let (tile, rect) = (self.tile_rect(cell / CELLS), self.cell_rect(cell));
         let part = PixelSubset::Half(half);
@@ -215,7 +216,7 @@ mod tests {
     use crate::math::Vec3;
     use crate::math::random::unit;
 
-    /// A film of one row, with the given gray samples for each pixel.
+    /// A single-row film with the given gray samples for each pixel.
     fn film(pixels: &[&[f32]]) -> Film {
         let film = Film::new(pixels.len() as u32, 1, None).expect("a film");
         for (x, values) in pixels.iter().enumerate() {
@@ -231,11 +232,11 @@ mod tests {
 
     #[test]
     fn error_follows_from_the_last_steps() {
-        // Steps of 1 and 0.5 leave variances of the same size; mean luminance 3.
+        // The steps are 1 and 0.5, and the variances are their squares. The mean luminance is 3.
         let error = film(&[&[4.0, 6.0], &[0.5, 1.5]]).relative_error().expect("an estimate");
         assert!((error - (1.25_f64 / 2.0).sqrt() / 3.0).abs() < 1e-6, "{error}");
-        // Samples 1, 2, 3, 6: the mean steps from 1 to 1.5 to 3; within the second half it steps from 3 to
-        // 4.5.
+        // Samples 1, 2, 3, 6: the mean changes from 1 to 1.5 to 3, and the mean of the second half changes
+        // from 3 to 4.5.
         let error = film(&[&[1.0, 2.0, 3.0, 6.0]]).relative_error().expect("an estimate");
         let before = 0.5 * (0.5 * 0.5 + 1.5 * 1.5);
         let expected = ((1.5_f64 * 1.5 + before) / 3.0).sqrt() / 3.0;
@@ -243,9 +244,8 @@ mod tests {
     }
 
     #[test]
-    fn finished_halves_do_not_affect_the_fall() {
-        // Two pixels, each in a half of its own: one with steps of 1 and 0.5, the other with a single step of
-        // 3.
+    fn halves_with_fewer_samples_are_ignored() {
+        // Two pixels in different halves: one with steps of 1 and 0.5, the other with a single step of 3.
         let film = film(&[&[1.0, 3.0, 2.0, 4.0], &[1.0, 7.0]]);
         assert_eq!(film.tile_fall(0), Some(4.0));
         assert_eq!(self::film(&[&[1.0, 3.0], &[1.0, 7.0]]).tile_fall(0), None, "one step");
@@ -255,7 +255,7 @@ mod tests {
     fn spread_is_large_for_few_pixels() {
         let one: &[f32] = &[0.0, 8.0];
         let none: &[f32] = &[1.0, 1.0];
-        // The halves alternate along a row.
+        // Pixels in a row alternate between the halves.
         let of = |pixels: &[&[f32]]| film(pixels).tile_spread(0, 0);
         assert_eq!(of(&[one, one, none, none, none, none, none, none]), 1.0);
         assert_eq!(of(&[one; 8]), 0.5);
@@ -271,7 +271,7 @@ mod tests {
         assert_eq!(
             film.with_convergence(Convergence::Photons).mean_luminance_error(),
             None,
-            "photons are shared"
+            "photons correlate pixel errors"
         );
         assert_eq!(self::film(&[&[4.0, 6.0], &[0.5]]).mean_luminance_error(), None);
         let part = Film::new(4, 1, Some(Rect { x: 0, y: 0, width: 2, height: 1 })).expect("a film");
@@ -280,7 +280,7 @@ mod tests {
 
     #[test]
     fn independent_samples_have_the_expected_error() {
-        // Falls that may be due to chance are only partly trusted.
+        // Variance reductions that may be due to chance are only partly trusted.
         let mut next = unit(5);
         for count in [16, 64, 100, 1024] {
             let pixels: Vec<Vec<f32>> = (0..4000).map(|_| (0..count).map(|_| next()).collect()).collect();
@@ -294,8 +294,8 @@ mod tests {
         }
     }
 
-    /// A film of 64 × 64 pixels, and the true root-mean-square error of their means. `sample` returns the
-    /// sample with a given number for a pixel's random bits; `truth` is the expected value.
+    /// A film of 64 × 64 pixels, and the true root-mean-square error of the pixel means. `sample` returns a
+    /// sample given its index and the pixel's random bits. `truth` is the expected value.
     fn square(count: u32, truth: f64, mut sample: impl FnMut(u32, u32) -> f32) -> (Film, f64) {
         const SIDE: u32 = 64;
         let film = Film::new(SIDE, SIDE, None).expect("a film");
@@ -316,30 +316,30 @@ mod tests {
         (film, (square / f64::from(SIDE * SIDE)).sqrt() / truth)
     }
 
-    /// Ratio of the estimated to the true error.
+    /// Ratio of the estimated error to the true error.
     fn reported(count: u32, truth: f64, sample: impl FnMut(u32, u32) -> f32) -> f64 {
         let (film, exact) = square(count, truth, sample);
         film.relative_error().expect("an estimate") / exact
     }
 
-    /// A van der Corput sequence, XOR-shifted per pixel: each doubling fills the gaps.
+    /// A van der Corput sequence with a random XOR per pixel. Each doubling fills the gaps.
     fn filling(number: u32, bits: u32) -> f32 {
         ((number.reverse_bits() >> 8) ^ bits) as f32 / 16_777_216.0
     }
 
     #[test]
-    fn error_is_right_for_fast_and_slow_convergence() {
+    fn error_is_accurate_for_any_convergence_rate() {
         for count in [16, 64, 256] {
             let mut next = unit(5);
             let independent = reported(count, 0.5, |_, _| next());
             assert!((0.95..1.15).contains(&independent), "{count} independent samples: {independent}");
             let smooth = reported(count, 0.5, filling);
-            assert!((0.9..1.35).contains(&smooth), "{count} samples that fill gaps: {smooth}");
+            assert!((0.9..1.35).contains(&smooth), "{count} stratified samples: {smooth}");
         }
     }
 
     #[test]
-    fn error_is_right_for_rare_bright_samples() {
+    fn error_is_accurate_for_rare_bright_samples() {
         for count in [16, 64, 256] {
             let mut next = unit(17);
             let rare = |number, bits| if next() < 1e-3 { 100.0 } else { filling(number, bits) };

@@ -1,4 +1,5 @@
-//! Statistically similar halves of a cell, so that the noise measured in one half is valid for the other.
+//! Division of cells into statistically similar halves, so that noise measured in one half also applies to
+//! the other.
 
 use super::Rect;
 
@@ -23,7 +24,7 @@ impl Pixels {
         self.part.count(self.rect.area())
     }
 
-    /// Column and row in the image of the selected pixel `number`.
+    /// Image column and row of the selected pixel `number`.
     #[inline]
     pub fn position(&self, number: u32) -> (u32, u32) {
         let index = self.part.index(number, self.rect);
@@ -32,7 +33,7 @@ impl Pixels {
 }
 
 /// All pixels of a rectangle, or half of them: one pixel of each horizontal pair, alternating between left
-/// and right. No horizontal, vertical or diagonal edge is therefore in one half only.
+/// and right. Horizontal, vertical and diagonal edges are therefore split between both halves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PixelSubset {
     /// Every pixel.
@@ -50,7 +51,7 @@ impl PixelSubset {
         }
     }
 
-    /// Row-major index in the rectangle of the selected pixel `number`.
+    /// Row-major index, within the rectangle, of the selected pixel `number`.
     #[inline(always)]
     pub fn index(self, number: u32, rect: Rect) -> u32 {
         match self {
@@ -62,7 +63,7 @@ impl PixelSubset {
         }
     }
 
-    /// Half that contains the pixel at `index` of a rectangle.
+    /// Half that contains the pixel at `index` in a rectangle.
     pub fn half_of(index: u32, rect: Rect) -> usize {
         let area = rect.area() as u32;
         let is_alone = index + 1 == area && area % 2 == 1;
@@ -70,7 +71,7 @@ impl PixelSubset {
     }
 }
 
-/// Whether the right pixel of a pair is in the first half, which changes every two rows.
+/// Whether the right pixel of a pair is in the first half. This alternates every two rows.
 #[inline(always)]
 fn swaps(pair: u32, width: u32) -> u32 {
     (pair / width) & 1

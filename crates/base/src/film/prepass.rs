@@ -1,11 +1,12 @@
-//! Brightness prepass: a fixed subset of pixels whose first samples estimate the image's brightness. Noise
-//! thresholds are relative to it, and all machines that render parts of an image compute the same value.
+//! Brightness prepass: the first samples of a fixed subset of pixels estimate the image's brightness. Noise
+//! thresholds are relative to this brightness. All machines that render parts of an image compute the same
+//! value.
 
 use super::convergence::luminance;
 use super::{Film, Quantity, Rect, TileSamples};
 use crate::math::random::hash;
 
-/// Number of prepass pixels, unless the image has fewer.
+/// Number of prepass pixels, unless the image has fewer pixels.
 const PIXELS: u64 = 4096;
 
 /// Samples per prepass pixel.
@@ -28,8 +29,8 @@ impl Prepass {
         PIXELS.min(self.crop.area() as u64)
     }
 
-    /// Column and row of a prepass pixel: pseudo-randomly chosen in one of `count` equal runs of the
-    /// row-major pixels.
+    /// Column and row of a prepass pixel. The row-major pixels are divided into `count` equal runs, and one
+    /// pixel is chosen pseudo-randomly from each.
     pub fn position(&self, number: u64) -> (u32, u32) {
         let (area, count) = (self.crop.area() as u64, self.count().max(1));
         let (start, end) = (number * area / count, (number + 1) * area / count);
@@ -52,8 +53,8 @@ impl Prepass {
         sum.map(|sum| sum / self.count() as f64)
     }
 
-    /// Luminance of a prepass pixel from its samples, with the same rounding as in a film. `None` without
-    /// samples.
+    /// Luminance of a prepass pixel computed from its samples, with the same rounding as in a film. `None` if
+    /// there are no samples.
     pub fn luminance(mut samples: TileSamples) -> Option<f64> {
         let rect = Rect { x: 0, y: 0, width: 1, height: 1 };
         samples.pixels = rect.into();
@@ -79,7 +80,7 @@ mod tests {
             let inside = |&(x, y): &(u32, u32)| (7..7 + crop.0).contains(&x) && (9..9 + crop.1).contains(&y);
             assert!(places.iter().all(inside));
             let left = places.iter().filter(|(x, _)| x - 7 < crop.0 / 2).count() as f64 / places.len() as f64;
-            assert!((left - 0.5).abs() < 0.1 || crop.0 < 10, "{crop:?}: {left} of it is on the left");
+            assert!((left - 0.5).abs() < 0.1 || crop.0 < 10, "{crop:?}: fraction {left} in the left half");
         }
     }
 

@@ -10,9 +10,9 @@ use super::resample::Axis;
 use super::{Film, Quantity, RadianceImage, is_in_pool};
 use crate::math::{DVec3, Vec3};
 
-/// Resizes a film with an exact box filter. It caches each tile's contribution, so an update only costs as
-/// much as the tiles that changed. Pixels without samples have no weight; preview pixels that cover only such
-/// pixels show the base image.
+/// Resizes a film with an exact box filter. Each tile's contribution is cached, so only changed tiles are
+/// processed in an update. Pixels without samples have zero weight. Preview pixels that cover only pixels
+/// without samples show the base image.
 #[derive(Debug)]
 pub struct Previewer {
     quantity: Quantity,
@@ -26,7 +26,7 @@ pub struct Previewer {
     is_whole: bool,
 }
 
-/// Contribution of one tile to the preview pixels it covers.
+/// A tile's contribution to the preview pixels it covers.
 #[derive(Clone, Debug, Default)]
 struct Share {
     revision: u64,
@@ -45,14 +45,14 @@ type Weighted = (Vec3, f32);
 /// Like [`Weighted`], in double precision for summation.
 type Sum = (DVec3, f64);
 
-/// Rows summed at a time, which avoids a second copy of the whole preview.
+/// Number of rows summed at a time, which avoids a second copy of the whole preview.
 const BAND_ROWS: u32 = 32;
 
-/// Tiles per thread between checks of the clock: less than a millisecond of work.
+/// Number of tiles per thread between deadline checks: less than a millisecond of work.
 const TILES_AT_ONCE: usize = 32;
 
 impl Previewer {
-    /// Creates a previewer for images of this size, at least one pixel.
+    /// Creates a previewer for images of this size, which must be at least one pixel.
     pub fn new(width: u32, height: u32) -> Self {
         Self::of(Quantity::Radiance, width, height)
     }
@@ -79,14 +79,15 @@ impl Previewer {
         (cells * size_of::<Weighted>() + self.shares.capacity() * size_of::<Share>()) as u64
     }
 
-    /// Whether every tile of the film has been processed at least once, so that [`Previewer::picture`] has no
-    /// gaps, though it may be slightly outdated.
+    /// Whether every tile of the film has been processed at least once. If so, [`Previewer::picture`] has no
+    /// gaps but may be slightly outdated.
     pub fn is_whole(&self) -> bool {
         self.is_whole
     }
 
-    /// Processes changed tiles until `deadline` and returns whether none are left. The next call continues
-    /// with the rest. Without a deadline, processes all changes. The film may differ between calls.
+    /// Processes changed tiles until `deadline` and returns whether all of them were processed. The next call
+    /// continues with the remaining tiles. Without a deadline, processes all changes. Different calls may
+    /// pass different films.
     pub fn update(&mut self, film: &Film, deadline: Option<Instant>) -> bool {
         if self.film_id != Some(film.id()) {
             self.film_id = Some(film.id());
@@ -110,7 +111,7 @@ impl Previewer {
     }
 
     /// Builds the preview from the processed tiles. Pixels without samples show `base`, a coarse image of any
-    /// size, or black without a base.
+    /// size, or black if there is no base.
     pub fn picture(&self, base: Option<&RadianceImage>) -> RadianceImage {
         let width = self.width as usize;
         let mut pixels = Vec::with_capacity(width * self.height as usize);
@@ -139,7 +140,7 @@ impl Previewer {
     }
 }
 
-/// Updates these tiles, of which the first has index `first`.
+/// Updates these consecutive tiles, starting at index `first`.
 fn refresh(shares: &mut [Share], first: usize, (film, quantity): (&Film, Quantity), axes: [Axis; 2]) {
     let refresh = |(i, share): (usize, &mut Share)| {
         if film.tile(first + i).revision != share.revision {
@@ -186,7 +187,7 @@ impl Share {
         self.cells.extend(sums.into_iter().map(|(sum, weight)| (sum.as_vec3(), weight as f32)));
     }
 
-    /// Adds this contribution to the given rows of the preview.
+    /// Adds this contribution to the given preview rows.
     fn add_to(&self, band: &mut [Sum], rows: Range<u32>, picture_width: u32) {
         let width = self.width.max(1) as usize;
         let first = rows.start.saturating_sub(self.y) as usize;
@@ -270,7 +271,7 @@ mod tests {
     }
 
     #[test]
-    fn crops_are_previewed_in_place() {
+    fn previewed_crops_keep_their_position() {
         let film = film(100, 60, Some(Rect { x: 50, y: 30, width: 500, height: 500 }), |_, _| Some(1.0));
         let picture = preview(&film, 10, 6, None);
         for (i, pixel) in picture.pixels.iter().enumerate() {
@@ -280,7 +281,7 @@ mod tests {
     }
 
     #[test]
-    fn previewer_sees_changes_and_new_films() {
+    fn previewer_detects_changes_and_new_films() {
         let mut previewer = Previewer::new(9, 5);
         let first = film(70, 40, None, |x, _| (x < 20).then_some(1.0));
         let mut picture = |film: &Film| {
@@ -348,7 +349,7 @@ mod tests {
         }
         assert!(previewer.is_whole());
         assert_eq!(previewer.picture(None), preview(&film, 23, 23, None));
-        // Changes behind the current position are processed in the next round.
+        // Changes to tiles before the current position are processed in the next pass.
         previewer.update(&film, Some(past));
         let rect = film.tile_rect(0).expect("a tile");
         film.add(

@@ -17,8 +17,8 @@ pub enum Quantity {
     Error,
 }
 
-/// Half width, in pixels, of the window over which squared steps are averaged, as a single pixel's step is
-/// very noisy.
+/// Half-width, in pixels, of the window in which squared steps are averaged. A single pixel's step is very
+/// noisy.
 const REACH: usize = 2;
 
 impl Film {
@@ -64,8 +64,8 @@ impl Film {
 }
 
 impl Tile {
-    /// Value of a quantity at a pixel index, in a tile with this number of columns. `None` if the pixel has
-    /// no samples.
+    /// Value of a quantity at a pixel index in a tile with this many columns. `None` if the pixel has no
+    /// samples.
     pub(super) fn value(&self, quantity: Quantity, (index, columns): (usize, usize)) -> Option<DVec3> {
         match quantity {
             Quantity::Radiance => self.mean(index),
@@ -74,7 +74,7 @@ impl Tile {
         }
     }
 
-    /// Standard error of a pixel; 0 for a single sample, which carries no information about it.
+    /// Standard error of a pixel, or 0 if it has a single sample, from which the error cannot be estimated.
     fn error(&self, index: usize, columns: usize) -> Option<f64> {
         let count = self.count(index);
         let rows = self.counts.len() / columns.max(1);
@@ -115,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn pixel_error_is_the_error_of_its_mean() {
+    fn pixel_error_matches_the_exact_error() {
         let mut next = unit(9);
         for count in [2, 16, 100] {
             let errors = film(count, |_| next()).image(Quantity::Error).pixels;
@@ -123,12 +123,12 @@ mod tests {
             let mean = (errors.iter().map(|error| f64::from(error.x).powi(2)).sum::<f64>() / 400.0).sqrt();
             assert!((0.9..1.15).contains(&(mean / exact)), "{count}: {mean} {exact}");
             let spread = errors.iter().filter(|error| f64::from(error.x) < 0.25 * exact).count();
-            assert!(spread < 20, "{count}: the error of {spread} pixels is far underestimated");
+            assert!(spread < 20, "{count}: {spread} pixels have a far too small error");
         }
     }
 
     #[test]
-    fn noise_does_not_spread_to_certain_pixels() {
+    fn noise_does_not_affect_noise_free_pixels() {
         let mut next = unit(3);
         // The right half is noisy.
         let half = film(16, |pixel| if pixel % 20 < 10 { 0.4 } else { next() });

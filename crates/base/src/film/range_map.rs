@@ -1,4 +1,5 @@
-//! Range mapping: maps data without an inherent brightness (distances, counts) to the range in view.
+//! Range mapping: maps data without an inherent brightness (distances, counts) to brightness, based on the
+//! range of values in view.
 
 use super::RadianceImage;
 use crate::math::Vec3;
@@ -9,7 +10,7 @@ pub enum RangeMap {
     /// Leaves the values unchanged.
     #[default]
     None,
-    /// A mapping whose range is still unknown; gives black until [`RangeMap::resolved_for`] sets it.
+    /// A mapping whose range is unknown until [`RangeMap::resolved_for`] sets it. Maps everything to black.
     Unresolved(DataKind),
     /// A mapping to the given range.
     Resolved(DataKind, DataRange),
@@ -31,7 +32,7 @@ pub struct DataRange {
     pub least: f32,
     /// Maximum.
     pub greatest: f32,
-    /// Bias b of the curve between them; see [`DataRange::part`].
+    /// Bias b of the curve between `least` and `greatest`; see [`DataRange::part`].
     bias: f32,
 }
 
@@ -53,7 +54,7 @@ impl RangeMap {
         }
     }
 
-    /// Range of the mapping, or `None` if it is unknown or values are left unchanged.
+    /// Range of the mapping, or `None` if it is unknown or values are not mapped.
     pub fn range(&self) -> Option<DataRange> {
         match self {
             Self::None | Self::Unresolved(_) => None,
@@ -100,17 +101,17 @@ impl DataRange {
         [self.least, self.greatest]
     }
 
-    /// Position of a value in the range, from 0 to 1. Linear if at least half of the values in view are
-    /// beyond the first quarter; otherwise the curve x/(x + b(1 − x)), which moves half of them there
-    /// (Schlick, *Fast Alternatives to Perlin's Bias and Gain Functions*, Graphics Gems IV, 1994). Objects
-    /// therefore keep distinct shades in front of a plane that extends to the horizon.
+    /// Position of a value in the range, from 0 to 1. Linear if the median value in view is above the first
+    /// quarter of the range. Otherwise uses the curve x/(x + b(1 − x)), which maps the median to the end of
+    /// the first quarter (Schlick, *Fast Alternatives to Perlin's Bias and Gain Functions*, Graphics Gems IV,
+    /// 1994). Objects therefore keep distinct shades in front of a plane that extends to the horizon.
     fn part(&self, number: f32) -> f32 {
         let range = self.greatest - self.least;
         let x = if range > 0.0 { ((number - self.least) / range).clamp(0.0, 1.0) } else { 0.0 };
         if self.bias < 1.0 { x / (x + self.bias * (1.0 - x)) } else { x }
     }
 
-    /// Brightness of a distance. A pixel with a distance below the range is partly empty.
+    /// Brightness of a distance. A pixel whose distance is below the range is partly empty.
     fn nearness(&self, distance: f32) -> f32 {
         if distance < self.least {
             return if self.least.is_finite() { distance / self.least } else { distance.min(1.0) };
@@ -119,8 +120,8 @@ impl DataRange {
     }
 }
 
-/// Distances in view. Pixels at the border of empty space average distances with zeros, so they count only if
-/// there are no others.
+/// Distances in view. Pixels at the border of empty space average distances with zeros, so they are used only
+/// if there are no other pixels.
 fn distances(image: &RadianceImage) -> Vec<f32> {
     let (width, height) = (image.width as usize, image.height as usize);
     let at = |x: usize, y: usize| image.pixels[y * width + x].x;
@@ -153,7 +154,7 @@ mod tests {
     }
 
     #[test]
-    fn near_is_white_and_far_is_dark() {
+    fn near_is_bright_and_far_is_dark() {
         assert_near(&shown(DataKind::Distances, &[2.0, 4.0, 6.0]), &[1.0, 0.55, 0.1]);
         assert_near(&shown(DataKind::Distances, &[3.0; 4]), &[1.0; 4]);
         assert_near(&shown(DataKind::Distances, &[0.0; 4]), &[0.0; 4]);
@@ -165,7 +166,7 @@ mod tests {
     }
 
     #[test]
-    fn objects_thinner_than_pixels_have_a_range() {
+    fn subpixel_objects_have_a_range() {
         let range = RangeMap::Unresolved(DataKind::Distances)
             .resolved_for(&picture(&[0.0, 2.0, 0.0, 6.0, 0.0]))
             .range();
@@ -173,12 +174,14 @@ mod tests {
     }
 
     #[test]
-    fn objects_before_a_horizon_keep_their_shades() {
-        // A floor seen from a height of 1: row distances of 200/row, with the last ones far away.
+    fn objects_in_front_of_a_horizon_stay_distinct() {
+        // A floor seen from a height of 1: the distance of each row is 200/row, and the last rows are far
+        // away.
         let numbers: Vec<f32> = (1..=200).map(|row| 200.0 / row as f32).collect();
         let shown = shown(DataKind::Distances, &numbers);
         assert!(shown[199] == 1.0 && (shown[0] - 0.1).abs() < 1e-6, "both ends are used");
-        // Half of the rows are at 1 … 2: a linear mapping over 1 … 200 would make all of them white.
+        // Half of the rows are at distances 1 … 2. A linear mapping over 1 … 200 would make all of them
+        // white.
         assert!((shown[99] - (1.0 - 0.9 * 0.25)).abs() < 0.01, "{}", shown[99]);
         assert!(shown.windows(2).all(|pair| pair[0] < pair[1]), "all shades differ");
     }
@@ -188,7 +191,7 @@ mod tests {
         assert_near(&shown(DataKind::Amounts, &[0.0, 1.0, 2.0, 4.0]), &[0.0, 0.25, 0.5, 1.0]);
         assert_near(&shown(DataKind::Amounts, &[16.0; 3]), &[1.0; 3]);
         assert_near(&shown(DataKind::Amounts, &[0.0; 3]), &[0.0; 3]);
-        // One very large value does not turn the others black.
+        // One very large value does not make the others black.
         let shown = shown(DataKind::Amounts, &[1.0, 1.0, 1.0, 1000.0]);
         assert!((shown[0] - 0.25).abs() < 0.01 && shown[3] == 1.0, "{shown:?}");
     }

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::{RadianceImage, is_in_pool};
 use crate::math::DVec3;
 
-/// Mapping of pixels along one axis to another resolution.
+/// Maps pixels along one axis to another resolution.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Axis {
     from: u64,
@@ -18,8 +18,8 @@ impl Axis {
         Self { from: u64::from(from.max(1)), to: u64::from(to.max(1)) }
     }
 
-    /// New pixels covered by the old pixel `index`, each with the amount of overlap. Lengths are in units of
-    /// 1/(from·to) of the axis, so every overlap is an exact integer.
+    /// New pixels that overlap the old pixel `index`, each with the amount of overlap. Lengths are in units
+    /// of 1/(from·to) of the axis, so every overlap is an exact integer.
     pub(super) fn covered(self, index: u32) -> impl Iterator<Item = (u32, f64)> + Clone {
         let (start, end) = (u64::from(index) * self.to, (u64::from(index) + 1) * self.to);
         (start / self.from..end.div_ceil(self.from)).map(move |new| {
@@ -38,7 +38,7 @@ pub(super) fn resized(image: &RadianceImage, width: u32, height: u32) -> Radianc
         return image.clone();
     }
     let (width, height) = (width.max(1), height.max(1));
-    // Gather the old pixels that each new pixel covers: the same overlaps, through the inverse mapping.
+    // Gather the old pixels that each new pixel covers, using the inverse mapping. The overlaps are the same.
     let columns = Axis::new(image.width, width).inverse();
     let rows = Axis::new(image.height, height).inverse();
     let pixel = |i: usize| {
@@ -72,7 +72,7 @@ mod tests {
         let image =
             RadianceImage { width: 3, height: 1, pixels: vec![Vec3::X, Vec3::splat(3.0), Vec3::splat(6.0)] };
         let smaller = image.resized(2, 1);
-        // Half of the middle pixel belongs to each: (2·a + 1·b)/3.
+        // Each new pixel covers half of the middle pixel: (2·a + 1·b)/3.
         assert!((smaller.pixels[0] - Vec3::new(5.0, 3.0, 3.0) / 3.0).abs().max_element() < 1e-6);
         assert!((smaller.pixels[1] - Vec3::splat(5.0)).abs().max_element() < 1e-6);
         let larger = image.resized(9, 4);

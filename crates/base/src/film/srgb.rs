@@ -1,10 +1,11 @@
-//! Table-based sRGB encoding to bytes: the same bytes as the formula, without a power function per channel.
+//! Table-based sRGB encoding to bytes. Matches the formula exactly without calling a power function per
+//! channel.
 
 use std::sync::LazyLock;
 
 use crate::math::color;
 
-/// Values below 2⁻¹³ encode to byte 0: the first step is at 0.5/(255·12.92) ≈ 1.5e-4.
+/// Values below 2⁻¹³ encode to byte 0. The first step is at 0.5/(255·12.92) ≈ 1.5e-4.
 const FIRST_EXPONENT_BITS: u32 = (127 - 13) << 23;
 const ONE_BITS: u32 = 127 << 23;
 /// Each bucket covers 1/256 of an octave, over which the curve rises by less than one byte.
@@ -30,8 +31,8 @@ static TABLE: LazyLock<ByteTable> = LazyLock::new(|| {
     table
 });
 
-/// Smallest float in [0, 1] that encodes to `byte` or more, as bits. Bisects over the bits, which sort like
-/// the floats.
+/// Bits of the smallest float in [0, 1] that encodes to `byte` or more. Bisects over the bits, which have the
+/// same order as the floats.
 fn first_bits_of(byte: usize) -> u32 {
     let (mut low, mut high) = (0, ONE_BITS);
     while low < high {
@@ -45,8 +46,8 @@ fn first_bits_of(byte: usize) -> u32 {
     low
 }
 
-/// Encodes a linear component, clamped to [0, 1], as an sRGB byte. NaN becomes 0. Gives the same results as
-/// [`color::linear_to_srgb8`], several times faster.
+/// Encodes a linear component, clamped to [0, 1], as an sRGB byte. NaN becomes 0. Returns the same results as
+/// [`color::linear_to_srgb8`] but is several times faster.
 pub fn linear_to_srgb8(linear: f32) -> u8 {
     let bits = linear.to_bits();
     if linear.is_nan() || linear < f32::from_bits(FIRST_EXPONENT_BITS) {

@@ -7,12 +7,12 @@ use super::sums::{Negative, Tile};
 use super::{CELLS, Film, PixelSubset};
 use crate::math::DVec3;
 
-/// Error for bytes that are not a tile of the film.
+/// Error for bytes that do not represent a tile of the film.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("these bytes are not a tile of the image")]
+#[error("the data is not a valid tile of the image")]
 pub struct Malformed;
 
-/// A deserialized tile, whose blocks can be merged with other tiles' blocks.
+/// A deserialized tile. Its blocks can be merged with those of other tiles.
 #[derive(Debug, Default)]
 pub struct StoredTile {
     tile: Tile,
@@ -43,7 +43,7 @@ impl StoredTile {
         if from.0.is_empty() { Ok(Self { tile }) } else { Err(Malformed) }
     }
 
-    /// Number of block sums: the finished ones and the one in progress, which may be empty.
+    /// Number of block sums, including the one in progress, which may be empty.
     pub fn block_count(&self) -> usize {
         self.tile.earlier.len() + 1
     }
@@ -84,7 +84,7 @@ impl StoredTile {
     }
 }
 
-/// Sums of one block.
+/// Sums of a single block.
 fn block_of<'a>(earlier: &'a [Vec<DVec3>], sums: &'a [DVec3], block: usize) -> Option<&'a [DVec3]> {
     match block.cmp(&earlier.len()) {
         std::cmp::Ordering::Less => Some(&earlier[block]),
@@ -98,7 +98,7 @@ fn add_up(sums: &mut [DVec3], others: &[DVec3]) {
 }
 
 impl Film {
-    /// Appends a tile's serialized content to `bytes` and returns whether it has samples.
+    /// Appends the serialized tile to `bytes` and returns whether the tile has samples.
     pub fn store(&self, tile: usize, bytes: &mut Vec<u8>) -> bool {
         let tile = self.tile(tile);
         if tile.counts.is_empty() {
@@ -119,7 +119,7 @@ impl Film {
         true
     }
 
-    /// Replaces a tile with a deserialized one.
+    /// Replaces a tile with a deserialized tile.
     ///
     /// # Errors
     /// [`Malformed`] if the tile does not fit this film.
@@ -147,7 +147,7 @@ impl Film {
         self.tile(cell / CELLS).count((y * tile.width + x) as usize)
     }
 
-    /// Adds the non-finite samples of restored tiles to [`Film::non_finite_samples`].
+    /// Adds restored tiles' non-finite samples to [`Film::non_finite_samples`].
     pub fn add_non_finite(&self, samples: u64) {
         self.non_finite_samples.fetch_add(samples, Ordering::Relaxed);
     }
@@ -174,7 +174,7 @@ fn put_sums(bytes: &mut Vec<u8>, sums: &[DVec3], earlier: &[Vec<DVec3>]) {
     }
 }
 
-/// Appends numbers of `N` bytes. Resizing once is much faster than appending one at a time.
+/// Appends numbers of `N` bytes each. Resizing once is much faster than appending them one at a time.
 fn put_all<const N: usize>(bytes: &mut Vec<u8>, numbers: impl ExactSizeIterator<Item = [u8; N]>) {
     let start = bytes.len();
     bytes.resize(start + N * numbers.len(), 0);
@@ -183,7 +183,7 @@ fn put_all<const N: usize>(bytes: &mut Vec<u8>, numbers: impl ExactSizeIterator<
     }
 }
 
-/// Remaining bytes of the input.
+/// Remaining input bytes.
 struct Bytes<'a>(&'a [u8]);
 
 impl Bytes<'_> {
@@ -222,7 +222,7 @@ mod tests {
     use crate::math::Vec3;
     use crate::math::random::unit;
 
-    /// Adds the samples `range` of a fixed random sequence to each pixel of a film of 40 × 33 pixels.
+    /// Adds samples `range` of a fixed random sequence to each pixel of a 40 × 33 film.
     fn add(film: &Film, range: std::ops::Range<u32>, is_signed: bool) {
         for tile in 0..film.tile_count() {
             let rect = film.tile_rect(tile).expect("a tile");
@@ -268,7 +268,7 @@ mod tests {
             for tile in 0..first.tile_count() {
                 let area = first.tile_rect(tile).expect("a tile").area();
                 let read = StoredTile::read(&stored(&first, tile), area).expect("a tile");
-                second.restore(tile, read).expect("the same film");
+                second.restore(tile, read).expect("films should be identical");
             }
             assert_eq!((second.half_samples(0, 1), second.half_samples(1, 0)), (21, 21));
             add(&second, 21..37, is_signed);
@@ -281,11 +281,11 @@ mod tests {
     }
 
     #[test]
-    fn merged_blocks_equal_the_whole() {
+    fn merged_blocks_match_the_full_tile() {
         for is_signed in [false, true] {
             let whole = film(SumOrder::Blocked);
             add(&whole, 0..2 * BLOCK_SIZE + 5, is_signed);
-            // One machine renders the first and last blocks, another the middle one.
+            // One machine renders the first and last blocks, and another renders the middle block.
             let (outer, inner) = (film(SumOrder::SeparateBlocks(1)), film(SumOrder::SeparateBlocks(1)));
             add(&outer, 0..BLOCK_SIZE, is_signed);
             add(&outer, 2 * BLOCK_SIZE..2 * BLOCK_SIZE + 5, is_signed);

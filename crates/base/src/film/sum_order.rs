@@ -1,5 +1,5 @@
-//! Sample blocks: a pixel's sum is the sum of its blocks, so machines that each render some of the blocks
-//! produce the same bits.
+//! Sample blocks: a pixel's sum is the sum of its blocks, so the result has the same bits even if different
+//! machines render different blocks.
 
 use crate::math::DVec3;
 
@@ -14,8 +14,8 @@ pub enum SumOrder {
     Sequential,
     /// Sums blocks of [`BLOCK_SIZE`] samples and adds the block sums in sequence.
     Blocked,
-    /// Sums blocks of [`BLOCK_SIZE`] samples and keeps the sums separate, for at most this number of finished
-    /// blocks.
+    /// Sums blocks of [`BLOCK_SIZE`] samples and keeps the block sums separate, for at most this many
+    /// finished blocks.
     SeparateBlocks(usize),
 }
 
@@ -29,7 +29,7 @@ impl SumOrder {
         }
     }
 
-    /// Samples until the current block ends, for a pixel with `count` samples.
+    /// Number of samples until the current block ends, for a pixel with `count` samples.
     pub(super) fn samples_to_end(self, count: u32) -> usize {
         match self {
             Self::Sequential => usize::MAX,
@@ -37,7 +37,7 @@ impl SumOrder {
         }
     }
 
-    /// Index of the block sum that a block ending at `count` samples is added to, or `None` inside a block.
+    /// Index of the sum to which a block that ends at `count` samples is added, or `None` inside a block.
     pub(super) fn finished(self, count: u32) -> Option<usize> {
         let is_end = count > 0 && count.is_multiple_of(BLOCK_SIZE);
         match self {
@@ -48,7 +48,7 @@ impl SumOrder {
     }
 }
 
-/// Adds a pixel's finished blocks in order, then the unfinished one.
+/// Adds a pixel's finished blocks in order, followed by the unfinished block.
 #[cold]
 pub(super) fn total(earlier: &[Vec<DVec3>], sums: &[DVec3], index: usize) -> DVec3 {
     match earlier {

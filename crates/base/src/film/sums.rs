@@ -9,7 +9,7 @@ use super::sum_order::{SumOrder, total};
 use super::{CELL_SIZE, CELLS, CELLS_ACROSS, Rect, TILE_SIZE, TileSamples};
 use crate::math::{DVec3, Vec3};
 
-/// Reasons why a film cannot be created.
+/// Errors that can occur when a film is created.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum FilmError {
     /// There is not enough memory.
@@ -25,8 +25,8 @@ pub enum FilmError {
         height: u32,
         /// Bytes for the sums and the finished image.
         bytes: u64,
-        /// Whether a crop would help: the finished image, whose size does not depend on the crop, fits in
-        /// memory and there is no crop yet.
+        /// Whether a crop would help. True if there is no crop yet and the finished image, whose size does
+        /// not depend on the crop, fits in memory.
         crop_helps: bool,
     },
     /// The image would have no pixels.
@@ -43,7 +43,7 @@ fn remedy(crop_helps: bool) -> &'static str {
     if crop_helps {
         ", or render only part of it with a crop"
     } else {
-        "; a crop would need as much, because the rest stays black"
+        "; a crop would not help because the finished image is as large"
     }
 }
 
@@ -74,15 +74,15 @@ pub struct Film {
     pub(super) blocks: SumOrder,
 }
 
-/// Sums of one tile in row-major order. Empty until the first samples arrive, so the thread that renders the
-/// tile is the first to touch its memory.
+/// Sums of one tile in row-major order. Empty until the first samples are added, so that the thread rendering
+/// the tile is the first to touch its memory.
 #[derive(Debug, Default)]
 pub(super) struct Tile {
     pub(super) sums: Vec<DVec3>,
     pub(super) counts: Vec<u32>,
-    /// Sums of finished sample blocks: none, one for all blocks, or one for each; see [`SumOrder`].
+    /// Sums of finished sample blocks: none, one for all blocks, or one per block; see [`SumOrder`].
     pub(super) earlier: Vec<Vec<DVec3>>,
-    /// Sums of the samples in the filter's negative lobes. `None` until the first one.
+    /// Sums of the samples in the filter's negative lobes. `None` until there is such a sample.
     pub(super) negative: Option<Negative>,
     pub(super) steps: Steps,
     /// Incremented whenever the tile changes.
@@ -136,7 +136,7 @@ impl Tile {
         if self.earlier.is_empty() { self.sums[index] } else { total(&self.earlier, &self.sums, index) }
     }
 
-    /// Resizes to the tile's pixels. Cannot fail, as the memory was reserved when the film was created.
+    /// Resizes to the tile's pixels. Cannot fail because the memory was reserved when the film was created.
     pub(super) fn fill(&mut self, area: usize) {
         self.sums.resize(area, DVec3::ZERO);
         self.earlier.iter_mut().for_each(|sums| sums.resize(area, DVec3::ZERO));
@@ -144,8 +144,8 @@ impl Tile {
         self.steps.fill(area);
     }
 
-    /// Adds samples in order to one pixel, in the given cell and half, and returns the number of non-finite
-    /// ones. `lobes` is the negative lobes' weight and a flag per sample.
+    /// Adds samples in order to one pixel in the given cell and half. Returns the number of non-finite
+    /// samples. `lobes` contains the weight of the negative lobes and one flag per sample.
     fn add(
         &mut self,
         (index, cell, half): (usize, usize, usize),
@@ -156,7 +156,7 @@ impl Tile {
         let mut non_finite = 0;
         let mut rest = 0..radiances.len();
         while !rest.is_empty() {
-            // Stop at the next count at which the mean is recorded or a block ends.
+            // Stop at the next count where the mean is recorded or a block ends.
             let to_note = Steps::samples_to_next(self.counts[index]);
             let left = match blocks {
                 SumOrder::Sequential => to_note,
@@ -198,7 +198,7 @@ impl Tile {
     }
 }
 
-/// Adds the finite radiances and returns the number of non-finite ones.
+/// Adds the finite radiances and returns the number of non-finite radiances.
 fn add_up(sum: &mut DVec3, radiances: &[Vec3]) -> u64 {
     let all = radiances.iter().fold(*sum, |sum, radiance| sum + radiance.as_dvec3());
     if all.is_finite() {
@@ -217,7 +217,7 @@ fn add_up(sum: &mut DVec3, radiances: &[Vec3]) -> u64 {
 }
 
 impl Film {
-    /// Creates an empty film for an image of this size, or for the part of it covered by `crop`.
+    /// Creates an empty film for an image of this size, or for the part covered by `crop`.
     ///
     /// # Errors
     /// [`FilmError`] if the crop is outside the image, or if there is not enough memory for the sums and the
@@ -254,7 +254,7 @@ impl Film {
         })
     }
 
-    /// Sets the convergence model of the noise.
+    /// Sets the convergence model for noise estimates.
     pub fn with_convergence(self, convergence: Convergence) -> Self {
         Self { convergence, ..self }
     }
@@ -284,7 +284,7 @@ impl Film {
         (tile < self.tiles.len()).then(|| tile_rect(self.crop, tile))
     }
 
-    /// Number of cells: [`CELLS`] per tile, some of which may have no pixels in the last tiles.
+    /// Number of cells: [`CELLS`] per tile. Some cells of the last tiles may have no pixels.
     pub fn cell_count(&self) -> usize {
         CELLS * self.tiles.len()
     }
@@ -306,8 +306,8 @@ impl Film {
         (self.crop.area() * pixel + self.tiles.len() * tile) as u64
     }
 
-    /// Adds samples to a tile one by one, in order. A sample with a NaN or an infinity counts as black and in
-    /// [`Film::non_finite_samples`]. Pixels outside the tile are ignored.
+    /// Adds samples to a tile one by one, in order. A sample with a NaN or an infinity is treated as black
+    /// and counted in [`Film::non_finite_samples`]. Pixels outside the tile are ignored.
     pub fn add(&self, tile: usize, samples: &TileSamples) {
         let Some(rect) = self.tile_rect(tile) else { return };
         if samples.samples == 0 || samples.pixels.rect.width == 0 {
@@ -349,7 +349,7 @@ impl Film {
         SampleStats { min, mean: total as f64 / self.crop.area() as f64, max }
     }
 
-    /// Number of samples with a NaN or an infinity, which were counted as black.
+    /// Number of samples with a NaN or an infinity, which were treated as black.
     pub fn non_finite_samples(&self) -> u64 {
         self.non_finite_samples.load(Ordering::Relaxed)
     }
@@ -359,7 +359,7 @@ impl Film {
         self.id
     }
 
-    /// Locks a tile. Ignores poisoning, as a panicking thread leaves the sums consistent.
+    /// Locks a tile. Ignores poisoning because a panicking thread leaves the sums in a consistent state.
     pub(super) fn tile(&self, tile: usize) -> MutexGuard<'_, Tile> {
         lock(&self.tiles[tile])
     }
@@ -374,7 +374,7 @@ fn index_in(rect: Rect, x: u32, y: u32) -> Option<usize> {
     (x < rect.width && y < rect.height).then(|| y as usize * rect.width as usize + x as usize)
 }
 
-/// Cell of a tile that contains a pixel, and the cell's pixels.
+/// Cell that contains a pixel of a tile, and the cell's pixels.
 fn cell_at(tile: Rect, x: u32, y: u32) -> (usize, Rect) {
     let (column, row) = ((x - tile.x) / CELL_SIZE, (y - tile.y) / CELL_SIZE);
     let cell = row as usize * CELLS_ACROSS + column as usize;
@@ -411,10 +411,10 @@ fn rings(crop: Rect) -> Vec<usize> {
     places.into_iter().map(|(_, _, tile)| tile).collect()
 }
 
-/// Bytes per pixel: its sum, count, last two recorded means and last step.
+/// Bytes per pixel for the sum, count, last two recorded means and last step.
 const SUM_BYTES: usize = size_of::<DVec3>() + 3 * size_of::<f32>() + size_of::<u32>();
 
-/// Bytes for the sums of the crop and for the full image as radiance and as sRGB.
+/// Bytes needed for the crop's sums and for the full image as both radiance and sRGB.
 pub(super) fn bytes_needed(width: u32, height: u32, crop: Rect) -> u64 {
     let pixel = size_of::<Vec3>() + size_of::<[u8; 3]>();
     let whole = u64::from(width) * u64::from(height);
@@ -426,8 +426,8 @@ pub(super) fn is_available(bytes: u64) -> bool {
     usize::try_from(bytes).is_ok_and(|bytes| Vec::<u8>::new().try_reserve_exact(bytes).is_ok())
 }
 
-/// Allocates the tiles. Requests all the memory in one allocation first, as a system that overcommits memory
-/// refuses only that.
+/// Allocates the tiles. First tries to allocate all the memory at once, because a system that overcommits
+/// memory refuses only a single huge allocation.
 fn allocate(width: u32, height: u32, crop: Rect) -> Option<Vec<Mutex<Tile>>> {
     if !is_available(bytes_needed(width, height, crop)) {
         return None;

@@ -4,7 +4,7 @@ use std::sync::atomic::AtomicBool;
 
 use super::*;
 
-/// Samples `first..first + count` of every pixel, of widely varying magnitudes so that summation order
+/// Samples `first..first + count` of every pixel. Their magnitudes vary widely so that summation order
 /// matters.
 fn samples(rect: Rect, first: u32, count: u32) -> TileSamples {
     let value = |x: u32, y: u32, sample: u32| {
@@ -27,7 +27,7 @@ fn bits(image: &RadianceImage) -> Vec<[u32; 3]> {
     image.pixels.iter().map(|p| p.to_array().map(f32::to_bits)).collect()
 }
 
-/// Sample count of one pixel of a film with a single row of tiles.
+/// Sample count of a pixel in a film with a single row of tiles.
 fn pixel_samples(film: &Film, x: u32, y: u32) -> u32 {
     let tile = (x / TILE_SIZE) as usize;
     let rect = film.tile_rect(tile).expect("a tile");
@@ -52,7 +52,7 @@ fn sum_bits(film: &Film) -> Vec<[u64; 3]> {
 }
 
 #[test]
-fn grouping_of_samples_does_not_change_bits() {
+fn sample_grouping_does_not_change_bits() {
     let at_once = filled(&[24]);
     for passes in [&[1; 24][..], &[1, 2, 4, 8, 9], &[23, 1]] {
         let film = filled(passes);
@@ -97,7 +97,7 @@ fn tile_order_is_computed_once() {
 }
 
 #[test]
-fn pixels_have_means_and_counts() {
+fn pixel_means_and_counts_are_correct() {
     let film = Film::new(40, 2, None).expect("a film");
     let add = |x: u32, values: &[f32]| {
         let radiance = values.iter().map(|&v| Vec3::splat(v)).collect();
@@ -204,7 +204,7 @@ fn snapshots_are_consistent_during_rendering() {
             }
         });
         for writer in writers {
-            writer.join().expect("a writer does not panic");
+            writer.join().expect("writers should not panic");
         }
         done.store(true, Ordering::Release);
     });
@@ -212,12 +212,12 @@ fn snapshots_are_consistent_during_rendering() {
 }
 
 #[test]
-fn oversized_films_report_what_to_do() {
-    let error = Film::new(u32::MAX, u32::MAX, None).expect_err("no machine has this");
+fn oversized_film_errors_suggest_a_remedy() {
+    let error = Film::new(u32::MAX, u32::MAX, None).expect_err("no machine has enough memory");
     assert!(error.to_string().contains("4294967295×4294967295"), "{error}");
     assert!(error.to_string().contains("smaller"), "{error}");
     assert!(
-        error.to_string().ends_with("; a crop would need as much, because the rest stays black"),
+        error.to_string().ends_with("; a crop would not help because the finished image is as large"),
         "{error}"
     );
     let cropped = |most_bytes, crop| Film::within(most_bytes, 100, 100, crop).expect_err("too little");

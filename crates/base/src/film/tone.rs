@@ -16,14 +16,14 @@ choice! {
         None = "none",
         /// x/(1 + x) on luminance (Reinhard et al. 2002).
         Reinhard = "reinhard",
-        /// A fit of the ACES filmic curve (Narkowicz 2015).
+        /// Fit of the ACES filmic curve (Narkowicz 2015).
         Aces = "aces",
         /// AgX (Sobotka 2022).
         Agx = "agx",
     }
 }
 
-#[allow(clippy::derivable_impls, reason = "`choice!` writes the enum")]
+#[allow(clippy::derivable_impls, reason = "the enum is defined by `choice!`")]
 impl Default for Tonemap {
     fn default() -> Self {
         Self::None
@@ -53,13 +53,13 @@ pub struct ToneMapping {
     pub range_map: RangeMap,
 }
 
-/// Maximum radiance: far above the point where every curve saturates, and far below overflow.
+/// Maximum radiance, far above the saturation point of every curve and far below overflow.
 const BRIGHTEST: f32 = 1e10;
-/// Minimum number of pixels for which waking other threads pays off.
+/// Minimum number of pixels at which parallel processing pays off.
 const PARALLEL_PIXELS: usize = 1 << 18;
 
 impl ToneMapping {
-    /// Tone mapping for data images, whose values are display values: only clamps.
+    /// Tone mapping for data images, which already contain display values. Only clamps.
     pub const DATA: Self = Self {
         exposure_stops: 0.0,
         curve: Tonemap::None,
@@ -67,12 +67,12 @@ impl ToneMapping {
         range_map: RangeMap::None,
     };
 
-    /// Resolves the range mapping with the values in this image.
+    /// Resolves the range mapping using the values in this image.
     pub fn resolved_for(self, image: &RadianceImage) -> Self {
         Self { range_map: self.range_map.resolved_for(image), ..self }
     }
 
-    /// Linear display light in [0, 1] for any input color. NaN and negative components count as 0.
+    /// Linear display light in [0, 1] for any input color. NaN and negative components are treated as 0.
     pub fn apply(&self, radiance: Vec3) -> Vec3 {
         self.exposed(radiance, exp2(self.exposure_stops))
     }
@@ -144,7 +144,7 @@ mod tests {
     fn curves_are_monotonic_in_gray() {
         for &curve in Tonemap::ALL {
             let mut before = gray(curve, 0.0);
-            assert!(before.abs() < 1e-6, "{curve:?} takes black to {before}");
+            assert!(before.abs() < 1e-6, "{curve:?} maps black to {before}");
             for step in -200..=200 {
                 let now = gray(curve, (step as f32 / 10.0).exp2());
                 assert!(now >= before - 1e-6 && now <= 1.0, "{curve:?} at 2^{}: {now}", step as f32 / 10.0);
@@ -168,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn agx_desaturates_bright_light() {
+    fn agx_desaturates_bright_colors() {
         let blue = tone(Tonemap::Agx).apply(Vec3::new(0.0, 0.0, 1000.0));
         assert!(blue.min_element() > 0.3 && blue.z > 0.9, "{blue}");
     }
@@ -184,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn hostile_values_stay_in_range() {
+    fn extreme_inputs_stay_in_range() {
         let hostile =
             [f32::NAN, -f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -1.0, 1e30, f32::MAX, 0.0, 1e-45];
         for &curve in Tonemap::ALL {
@@ -218,7 +218,7 @@ mod tests {
     }
 
     #[test]
-    fn sixteen_bits_agree_with_eight() {
+    fn sixteen_bit_output_matches_eight_bit() {
         let pixels: Vec<_> = (0..=1000).map(|i| Vec3::splat(i as f32 / 1000.0)).collect();
         let image = RadianceImage { width: 1001, height: 1, pixels };
         let coarse = develop(&image, &tone(Tonemap::None)).pixels;
@@ -229,7 +229,7 @@ mod tests {
                 "{eight:?} {sixteen:?}"
             );
         }
-        assert!(fine.windows(2).all(|pair| pair[0] < pair[1]), "every thousandth is distinct");
+        assert!(fine.windows(2).all(|pair| pair[0] < pair[1]), "values 0.001 apart should be distinct");
     }
 
     #[test]
@@ -243,14 +243,14 @@ mod tests {
                 .collect::<std::collections::HashSet<_>>()
         };
         let own = std::thread::current().name().map(str::to_owned);
-        assert_eq!(threads(), [own].into(), "outside of a pool");
+        assert_eq!(threads(), [own].into(), "outside a pool");
         let pool = rayon::ThreadPoolBuilder::new().num_threads(2).thread_name(|i| format!("two-{i}"));
         let used = pool.build().expect("a pool").install(threads);
         assert!(used.iter().flatten().all(|name| name.starts_with("two-")) && used.len() <= 2, "{used:?}");
     }
 
     #[test]
-    fn parallel_images_match_single_pixels() {
+    fn parallel_images_match_per_pixel_results() {
         let pixels: Vec<_> = (0..PARALLEL_PIXELS + 7).map(|i| Vec3::splat(i as f32 * 1e-5)).collect();
         let image = RadianceImage { width: pixels.len() as u32, height: 1, pixels };
         let mapping = tone(Tonemap::Aces);

@@ -6,11 +6,11 @@ use glam::Vec3;
 
 use super::elementary::pow;
 
-/// Added to the squared reference in relMSE so that errors of black pixels stay finite: below a radiance of
-/// 0.1, errors are effectively absolute; above it, relative.
+/// Added to the squared reference in relMSE to keep errors of black pixels finite. Errors are effectively
+/// absolute below a radiance of 0.1 and relative above it.
 pub const RELMSE_EPSILON: f64 = 0.01;
 
-/// Contribution of each linear Rec. 709 primary to relative luminance (IEC 61966-2-1).
+/// Contributions of the linear Rec. 709 primaries to relative luminance (IEC 61966-2-1).
 pub const LUMINANCE_WEIGHTS: Vec3 = Vec3::new(0.2126, 0.7152, 0.0722);
 
 /// Relative luminance of a linear color.
@@ -55,7 +55,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bytes_survive_the_round_trip() {
+    fn bytes_round_trip_exactly() {
         for byte in 0..=255_u8 {
             let linear = srgb_to_linear(f32::from(byte) / 255.0);
             assert_eq!(linear_to_srgb8(linear), byte);
@@ -64,7 +64,7 @@ mod tests {
     }
 
     #[test]
-    fn srgb_curve_has_known_values() {
+    fn srgb_curve_matches_known_values() {
         assert!((srgb_to_linear(0.5) - 0.214_041_14).abs() < 1e-6);
         assert!((linear_to_srgb(0.18) - 0.461_356).abs() < 1e-5);
         assert!((linear_to_srgb_f64(0.18) - 0.461_356_129_500_442).abs() < 1e-12);

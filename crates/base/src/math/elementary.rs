@@ -1,11 +1,11 @@
-//! Branch-free elementary functions that do not use libm: they give the same bits on every machine and
-//! vectorize in loops. Some compute in `f64` internally so that the `f32` result is correct up to its final
+//! Branch-free elementary functions that do not use libm. They return the same bits on every machine and
+//! vectorize in loops. Some compute in `f64` internally so that the `f32` result is correct up to the final
 //! rounding.
 
 use std::f32::consts::{FRAC_2_PI, FRAC_PI_2, PI};
 use std::f64::consts::LN_2;
 
-/// xʸ for x ≥ 0, within one ulp; 1 for y = 0, 0 for x = 0 < y.
+/// xʸ for x ≥ 0, within one ulp. Returns 1 if y = 0, and 0 if x = 0 and y > 0.
 #[inline(always)]
 pub fn pow(x: f32, y: f32) -> f32 {
     let power = exp2_f64(f64::from(y) * log2_f64(f64::from(x))) as f32;
@@ -27,7 +27,7 @@ pub fn exp2(x: f32) -> f32 {
     exp2_f64(f64::from(x)) as f32
 }
 
-/// Binary logarithm of x > 0, for x not subnormal, within one ulp.
+/// Binary logarithm of a normal x > 0, within one ulp.
 #[inline(always)]
 pub fn log2(x: f32) -> f32 {
     log2_f64(f64::from(x)) as f32
@@ -39,7 +39,7 @@ pub fn log2(x: f32) -> f32 {
 fn log2_f64(x: f64) -> f64 {
     const SQRT_HALF: u64 = 0x3fe6_a09e_667f_3bcd;
     const MANTISSA: u64 = (1 << 52) - 1;
-    // In 2⁵² plus an integer below 2⁵², the integer occupies the low bits.
+    // Adding an integer below 2⁵² to 2⁵² stores the integer in the low bits.
     const WHOLE: u64 = 0x4330_0000_0000_0000;
     let shifted = x.to_bits().wrapping_add(0x3ff0_0000_0000_0000 - SQRT_HALF);
     let exponent = f64::from_bits((shifted >> 52) | WHOLE) - (f64::from_bits(WHOLE) + 1023.0);
@@ -56,7 +56,7 @@ fn log2_f64(x: f64) -> f64 {
 /// integer part and uses a Taylor series for the rest in [−½, ½].
 #[inline(always)]
 fn exp2_f64(x: f64) -> f64 {
-    // 1.5·2⁵²: adding it rounds to an integer, which is then in the low bits.
+    // Adding 1.5·2⁵² rounds to an integer and stores it in the low bits.
     const ROUND: f64 = 6_755_399_441_055_744.0;
     let x = if x < 200.0 { x } else { 200.0 };
     let x = if x > -200.0 { x } else { -200.0 };
@@ -68,8 +68,8 @@ fn exp2_f64(x: f64) -> f64 {
     f64::from_bits(series.to_bits().wrapping_add(sum.to_bits() << 52))
 }
 
-/// Arc cosine of x in [−1, 1] within 2 ulp. Uses the arc sine near 0 and the arc sine of the half angle
-/// beyond ½, with the polynomial of Moshier's Cephes library.
+/// Arc cosine of x in [−1, 1], within 2 ulp. Uses the arc sine for |x| up to ½ and the half-angle arc sine
+/// above, with the polynomial from Moshier's Cephes library.
 #[inline(always)]
 pub fn acos(x: f32) -> f32 {
     let size = x.abs();
@@ -81,14 +81,14 @@ pub fn acos(x: f32) -> f32 {
     let p = 7.495_300_3e-2 + z * (4.547_002_6e-2 + z * p);
     let arcsine = s + s * z * (1.666_675_2e-1 + z * p);
     let of_size = if is_large { 2.0 * arcsine } else { FRAC_PI_2 - arcsine };
-    // Rounding errors of π/2 and π as `f32`.
+    // Rounding errors of π/2 and π in `f32`.
     let rest = if is_large { 0.0 } else { -4.371_139e-8 };
     let negative = if is_large { PI - (of_size + 8.742_278e-8) } else { FRAC_PI_2 + (arcsine + rest) };
     if x < 0.0 { negative } else { of_size + rest }
 }
 
-/// Angle of (x, y) from the x axis in [−π, π], within 3 ulp; 0 at (0, 0). Computes the arc tangent of a ratio
-/// in [0, 1], reduced to ±tan(π/8), with the polynomial of Moshier's Cephes library.
+/// Angle of (x, y) from the x axis in [−π, π], within 3 ulp. Returns 0 at (0, 0). Computes the arc tangent of
+/// a ratio in [0, 1], reduced to ±tan(π/8), with the polynomial from Moshier's Cephes library.
 #[inline(always)]
 pub fn atan2(y: f32, x: f32) -> f32 {
     const TAN_EIGHTH: f32 = 0.414_213_57;
@@ -103,18 +103,18 @@ pub fn atan2(y: f32, x: f32) -> f32 {
     let p = 1.997_771_1e-1 + z * (-1.387_768_6e-1 + z * 8.053_744_5e-2);
     let rest = t + t * z * (-3.333_295e-1 + z * p);
     let first = if is_far { FRAC_PI_2 * 0.5 + rest } else { rest };
-    // Rounding errors of π/2 and π as `f32`.
+    // Rounding errors of π/2 and π in `f32`.
     let quarter = if is_steep { FRAC_PI_2 - (first + 4.371_139e-8) } else { first };
     let half = if x < 0.0 { PI - (quarter + 8.742_278e-8) } else { quarter };
     half.copysign(y)
 }
 
-/// Sine and cosine of an angle of magnitude at most 1000, within 1.2e-7. Subtracts the nearest multiple of
-/// π/2 in three parts (Cody and Waite, *Software Manual for the Elementary Functions*, 1980), then uses the
-/// polynomials of Moshier's Cephes library on [−π/4, π/4].
+/// Sine and cosine, within 1.2e-7, of an angle between −1000 and 1000. Subtracts the nearest multiple of π/2
+/// in three parts (Cody and Waite, *Software Manual for the Elementary Functions*, 1980), then uses the
+/// polynomials from Moshier's Cephes library on [−π/4, π/4].
 #[inline(always)]
 pub fn sin_cos(angle: f32) -> (f32, f32) {
-    // 1.5·2²³: adding it rounds to an integer, as in `exp2_f64`.
+    // Adding 1.5·2²³ rounds to an integer, as in `exp2_f64`.
     const ROUND: f32 = 12_582_912.0;
     let sum = angle * FRAC_2_PI + ROUND;
     let (k, quarter) = (sum - ROUND, sum.to_bits());

@@ -10,7 +10,7 @@ pub const fn gamma(n: u32) -> f32 {
     (n * UNIT_ROUNDOFF) / (1.0 - n * UNIT_ROUNDOFF)
 }
 
-/// Largest power of two that is at most `number`, for `number` > 0. Returns 0 for subnormal numbers.
+/// Largest power of two not greater than `number`, for `number` > 0. Returns 0 for subnormal numbers.
 pub fn floor_to_power_of_two(number: f64) -> f64 {
     f64::from_bits(number.to_bits() & f64::INFINITY.to_bits())
 }
@@ -20,7 +20,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn gamma_bounds_one_or_many_roundings() {
+    fn gamma_bounds_rounding_errors() {
         assert!(gamma(1) >= UNIT_ROUNDOFF && gamma(1) < UNIT_ROUNDOFF * 1.0001);
         assert!(gamma(5) > 5.0 * UNIT_ROUNDOFF);
     }

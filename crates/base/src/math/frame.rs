@@ -14,8 +14,8 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// The frame of a unit vector, without a branch and accurate over the whole sphere
-    /// (Duff et al., *Building an Orthonormal Basis, Revisited*, JCGT 2017).
+    /// Frame around a unit vector, computed without branches and accurate over the whole sphere (Duff et al.,
+    /// *Building an Orthonormal Basis, Revisited*, JCGT 2017).
     #[inline(always)]
     pub fn from_normal(n: Vec3) -> Self {
         let sign = 1.0_f32.copysign(n.z);

@@ -1,5 +1,5 @@
-//! Packets of 16 numbers, processed in branch-free loops over arrays that compilers vectorize. Each lane gets
-//! the same bits as the scalar computation would.
+//! Packets of 16 numbers, processed in branch-free array loops that compilers vectorize. Each lane has the
+//! same bits as the result of the scalar computation.
 
 use super::Vec3;
 
@@ -30,9 +30,9 @@ pub type Mask = [u32; PACKET_SIZE];
 /// Mask value of a selected lane.
 pub const TRUE: u32 = u32::MAX;
 
-/// A computation in branch-free loops over packets, compiled once per instruction set. Everything called in
-/// its loops must be inlined and must not be a closure, or it is compiled without the instruction set's
-/// features.
+/// A computation in branch-free loops over packets, compiled once per instruction set. Functions called in
+/// the loops must be inlined and must not be closures. Otherwise they are compiled without the instruction
+/// set's features.
 pub trait SimdKernel {
     /// Result of the computation.
     type Output;
@@ -41,29 +41,29 @@ pub trait SimdKernel {
     fn run(self, simd: impl Simd) -> Self::Output;
 }
 
-/// Token for an instruction set, with its cross-lane operations. A token for instructions that a processor
-/// may lack can only be created if the processor has them.
+/// Token for an instruction set, with its cross-lane operations. Tokens for optional instruction sets can
+/// only be created on processors that support them.
 pub trait Simd: Copy {
     /// Packs a mask into bits, one per lane.
     fn movemask(self, mask: &Mask) -> u32;
 
-    /// Minimum and maximum over the lanes set in `lanes`, which must not be 0. For NaN the result depends on
-    /// lane order, identically on every instruction set.
+    /// Minimum and maximum over the lanes set in `lanes`, which must not be 0. With NaNs, the result depends
+    /// on the lane order but is the same on every instruction set.
     fn min_max(self, row: &F32x16, lanes: u32) -> [f32; 2];
 
-    /// Reciprocal of every lane. A plain loop may be compiled to divisions of lane pairs.
+    /// Reciprocal of every lane. Compilers may turn a plain loop into divisions of two lanes at a time.
     fn reciprocals(self, row: &F32x16) -> F32x16;
 
-    /// `a · b + c`, rounded once if the processor has a fused multiply-add and twice otherwise. Only for
+    /// `a · b + c`, rounded once if the processor has a fused multiply-add and twice otherwise. Use only for
     /// bounds and initial guesses, where the last bits do not matter.
     fn mul_add_relaxed(self, a: f32, b: f32, c: f32) -> f32;
 
-    /// Runs a kernel in a function of its own that all callers share. Use it if the call overhead is small
+    /// Runs a kernel in a separate function shared by all callers. Use this if the call overhead is small
     /// compared with the kernel and inlined copies would bloat the binary.
     fn call<L: SimdKernel>(self, work: L) -> L::Output;
 }
 
-/// Reduces 16 numbers pairwise by halves, which compiles to vector instructions.
+/// Reduces 16 numbers by repeatedly combining the two halves, which compiles to vector instructions.
 #[macro_export]
 macro_rules! reduce {
     ($row:expr, $better:tt) => {{
@@ -81,13 +81,13 @@ macro_rules! reduce {
     }};
 }
 
-/// Portable implementation, for every processor.
+/// Portable implementation for all processors.
 #[derive(Clone, Copy)]
 pub struct PortableSimd;
 
 impl Simd for PortableSimd {
-    /// Reduces by halves. Compilers turn sums of single bits into a test of each lane in sequence;
-    /// `black_box` makes them finish the vector first.
+    /// Reduces by halves. Compilers turn sums of single bits into sequential tests of each lane. `black_box`
+    /// forces them to compute the whole vector first.
     #[inline(always)]
     fn movemask(self, mask: &Mask) -> u32 {
         let mut row = std::hint::black_box(*mask);
@@ -144,8 +144,8 @@ pub fn mask_from_bits(bits: u32) -> Mask {
     mask
 }
 
-/// Replaces the lanes of `target` selected by the mask with those of `new`. Uses bit operations, as compilers
-/// may turn `if` and `else` into a per-lane choice between memory addresses.
+/// Replaces the lanes of `target` selected by the mask with the lanes of `new`. Uses bit operations because
+/// compilers may turn `if` and `else` into a per-lane choice between memory addresses.
 #[inline(always)]
 pub fn select(mask: &Mask, new: &F32x16, target: &mut F32x16) {
     for i in 0..PACKET_SIZE {

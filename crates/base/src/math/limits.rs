@@ -5,10 +5,10 @@ use super::DVec3;
 /// Largest allowed magnitude: products of two larger numbers overflow 32-bit floats.
 pub const LARGEST: f64 = 1e18;
 
-/// Shortest nonzero length: products of two shorter ones underflow.
+/// Shortest allowed nonzero length: products of two shorter lengths underflow.
 pub const SHORTEST: f64 = 1e-18;
 
-/// Length of a vector, even if its square underflows or overflows.
+/// Length of a vector, correct even if the squared length underflows or overflows.
 pub fn length(vector: DVec3) -> f64 {
     let largest = vector.abs().max_element();
     if largest > 0.0 { (vector / largest).length() * largest } else { 0.0 }
@@ -24,7 +24,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lengths_survive_overflowing_squares() {
+    fn length_is_correct_if_its_square_overflows() {
         assert_eq!(length(DVec3::ZERO), 0.0);
         for scale in [1e-300, 1e-200, 1.0, 1e200] {
             assert!((length(DVec3::new(3.0, -4.0, 12.0) * scale) / (13.0 * scale) - 1.0).abs() < 1e-15);

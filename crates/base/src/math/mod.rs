@@ -1,4 +1,4 @@
-//! Numbers, vectors, transforms and color, available to all other modules.
+//! Numbers, vectors, transforms and color, used by all other modules.
 
 pub mod color;
 pub mod decimal;

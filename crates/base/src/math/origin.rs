@@ -3,18 +3,19 @@
 use super::DVec3;
 use super::float::floor_to_power_of_two;
 
-/// Step of the grid of origins, in scene sizes: at this distance, single precision errs by a millionth of the
-/// size.
+/// Grid spacing of the origins, in scene sizes. At this distance, the error of single precision is a
+/// millionth of the scene size.
 const STEP: f64 = 64.0;
 
-/// Keeps typical sizes such as 1, 2 and 5 away from the powers of two, where the step changes.
+/// Keeps typical sizes such as 1, 2 and 5 away from the powers of two at which the grid spacing changes.
 const OFF_POWERS: f64 = 1.37;
 
-/// Local origin for a scene of this size around `place`: 0 near 0, and otherwise on a grid whose step is a
-/// power of two. Subtracting the origin is therefore exact, and small changes of `place` leave it unchanged.
+/// Local origin for a scene of this size around `place`. It is 0 near 0 and otherwise lies on a grid whose
+/// spacing is a power of two. Subtracting the origin is therefore exact, and small changes of `place` do not
+/// change it.
 pub fn origin_near(place: DVec3, size: f64) -> DVec3 {
     let step = STEP * floor_to_power_of_two(size * OFF_POWERS);
-    // Adding 0 turns −0 into 0.
+    // Adding 0 converts −0 to 0.
     let origin = (place / step).round() * step + DVec3::ZERO;
     if step > 0.0 && origin.is_finite() { origin } else { DVec3::ZERO }
 }

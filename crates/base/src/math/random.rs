@@ -1,6 +1,6 @@
 //! Simple pseudo-random numbers for tests and fixed sampling patterns.
 
-/// Hashes `number` to 64 well-mixed bits, identically on every machine (the finalizer of `MurmurHash3`).
+/// Hashes `number` to 64 well-mixed bits, identically on every machine (`MurmurHash3` finalizer).
 pub fn hash(number: u64) -> u64 {
     let mix = |x: u64, factor: u64| (x ^ (x >> 33)).wrapping_mul(factor);
     let mixed = mix(mix(number.wrapping_add(1), 0xff51_afd7_ed55_8ccd), 0xc4ce_b9fe_1a85_ec53);

@@ -52,7 +52,7 @@ impl Transform {
         self.linear * v
     }
 
-    /// Transforms bounds on the magnitudes of a vector's components.
+    /// Transforms upper bounds on the magnitudes of a vector's components.
     pub fn reach(&self, reach: DVec3) -> DVec3 {
         let DMat3 { x_axis, y_axis, z_axis } = self.linear;
         x_axis.abs() * reach.x + y_axis.abs() * reach.y + z_axis.abs() * reach.z
@@ -76,11 +76,11 @@ impl Transform {
         self.inverse_linear * v
     }
 
-    /// Upper bound on the factor by which the inverse lengthens vectors.
+    /// Upper bound on the factor by which the inverse stretches vectors.
     pub fn max_inverse_stretch(&self) -> f64 {
         let DMat3 { x_axis, y_axis, z_axis } = self.inverse_linear.transpose();
         let lengths = DVec3::new(x_axis.length(), y_axis.length(), z_axis.length());
-        // Orthogonal rows, as in a scale followed by a rotation: the longest row is exact.
+        // If the rows are orthogonal, as in a scale followed by a rotation, the longest row is exact.
         let products = DVec3::new(x_axis.dot(y_axis), y_axis.dot(z_axis), z_axis.dot(x_axis));
         let is_straight = products.abs().cmple(lengths * lengths.yzx() * 1e-9).all();
         if is_straight { lengths.max_element() * (1.0 + 1e-8) } else { lengths.length() }
@@ -159,7 +159,7 @@ mod tests {
             inverse_linear: DMat3::from_cols(DVec3::X, DVec3::new(3.0, 1.0, 0.0), DVec3::Z),
             ..t
         };
-        assert!(sheared.max_inverse_stretch() >= 3.3027, "at least the largest singular value");
+        assert!(sheared.max_inverse_stretch() >= 3.3027, "the bound is below the largest singular value");
         // A normal stays perpendicular to a transformed tangent.
         assert!(t.normal(DVec3::Y).dot(t.vector(DVec3::new(1.0, 0.0, 2.0))).abs() < 1e-12);
     }

@@ -3,7 +3,7 @@
 /// Samples an index in proportion to its weight.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Discrete {
-    /// Cumulative sums of the weights, including each index.
+    /// Inclusive cumulative sums of the weights.
     sums: Vec<f64>,
 }
 
@@ -31,8 +31,8 @@ impl Discrete {
         (self.sums[index] - before) / self.total()
     }
 
-    /// Samples an index with `u` in [0, 1). Also returns the position of `u` within the index's share, in [0,
-    /// 1).
+    /// Samples an index with `u` in [0, 1). Also returns the relative position of `u` within that index's
+    /// interval, in [0, 1).
     pub fn sample(&self, u: f32) -> (usize, f32) {
         let target = f64::from(u) * self.total();
         let index = self.sums.partition_point(|&sum| sum <= target).min(self.sums.len() - 1);

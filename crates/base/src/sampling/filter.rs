@@ -1,5 +1,5 @@
-//! Filter importance sampling: samples are drawn in proportion to the pixel filter, so all samples of one
-//! sign have equal weight (Ernst, Stamminger, Greiner, *Filter Importance Sampling*, 2006).
+//! Filter importance sampling: samples are drawn in proportion to the pixel filter, so all samples with the
+//! same sign have equal weight (Ernst, Stamminger, Greiner, *Filter Importance Sampling*, 2006).
 
 use std::sync::LazyLock;
 
@@ -11,22 +11,23 @@ choice! {
     pub enum PixelFilter {
         /// One pixel wide.
         Box = "box",
-        /// Two pixels wide, falling linearly.
+        /// Two pixels wide, with linear falloff.
         Tent = "tent",
-        /// A truncated Gaussian of standard deviation half a pixel, three pixels wide.
+        /// Truncated Gaussian, three pixels wide, with a standard deviation of half a pixel.
         Gaussian = "gaussian",
-        /// Mitchell and Netravali, B = C = 1/3, four pixels wide.
+        /// Mitchell–Netravali filter with B = C = 1/3, four pixels wide.
         Mitchell = "mitchell",
     }
 }
 
-/// A position relative to the pixel center, in pixels, drawn in proportion to |f|, with the sign of f there.
+/// A position drawn in proportion to |f|, in pixels relative to the pixel center, and the sign of f at this
+/// position.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FilterSample {
     /// Offset from the pixel center.
     pub offset: Vec2,
-    /// Whether the filter is negative there. The pixel value is (1 + w) · mean of the positive samples − w ·
-    /// mean of the negative ones, with w from [`PixelFilter::negative_weight`].
+    /// Whether the filter is negative at this offset. The pixel value is (1 + w) · mean of the positive
+    /// samples − w · mean of the negative samples, with w from [`PixelFilter::negative_weight`].
     pub is_negative: bool,
 }
 
@@ -98,7 +99,7 @@ static MITCHELL: LazyLock<Tabulated> = LazyLock::new(|| {
     })
 });
 
-/// A tabulated even function in one dimension, sampled in proportion to its absolute value.
+/// A tabulated one-dimensional even function, sampled in proportion to its absolute value.
 struct Tabulated {
     radius: f64,
     sums: Vec<f64>,
@@ -142,7 +143,8 @@ impl Tabulated {
 mod tests {
     use super::*;
 
-    /// Moments over a fine grid: weights average to 1, offsets to 0, their squares to ∫x²f/∫f.
+    /// Moments over a fine grid: the weights average to 1, the offsets to 0, and the squared offsets to
+    /// ∫x²f/∫f.
     #[test]
     fn filters_have_the_expected_moments() {
         let n = 2048;
@@ -180,7 +182,7 @@ mod tests {
         moment_of(1.5, |x| (-x * x / 0.5).exp() - (-4.5_f64).exp())
     }
 
-    /// The general Mitchell–Netravali cubic at B = C = 1/3.
+    /// The general Mitchell–Netravali cubic with B = C = 1/3.
     fn mitchell_moment() -> f64 {
         let (b, c) = (1.0 / 3.0, 1.0 / 3.0);
         moment_of(2.0, |x| {

@@ -1,4 +1,4 @@
-//! Sample streams, warps and distributions. Random numbers are a function of seed, pixel, sample and
+//! Sample streams, warps and distributions. Random numbers are a function of the seed, pixel, sample and
 //! dimension.
 
 pub mod distribution;

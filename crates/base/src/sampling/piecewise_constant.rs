@@ -1,20 +1,21 @@
 //! Piecewise-constant distributions over the cells of a grid.
 
-/// Samples a row, then a column in it, in proportion to the weights. Every cell with a nonzero weight gets at
-/// least a small share of its row's mean, so that `f32` numbers can reach it.
+/// Samples a row and then a column within the row, in proportion to the weights. Every cell with a nonzero
+/// weight has a minimum probability relative to its row's mean, so that it can be sampled with `f32` random
+/// numbers.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PiecewiseConstant2D {
     columns: usize,
-    /// Cumulative probabilities of the rows before each row, followed by 1.
+    /// Cumulative probability of the rows before each row, followed by 1.
     rows: Vec<f32>,
-    /// Cumulative probabilities of the columns in each row, `columns + 1` values per row.
+    /// Cumulative column probabilities within each row, `columns + 1` values per row.
     in_row: Vec<f32>,
     /// Guide tables for finding a row, and a column within each row; see [`guide`].
     row_guide: Vec<u32>,
     column_guide: Vec<u32>,
 }
 
-/// A sampled point of a grid.
+/// A sampled point on a grid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GridSample {
     /// The cell's column.
@@ -25,7 +26,7 @@ pub struct GridSample {
     pub rest: [f32; 2],
 }
 
-/// Smallest share of a cell or row with a nonzero weight, relative to the mean share.
+/// Minimum probability of a cell or row with a nonzero weight, relative to the mean probability.
 const LEAST: f64 = 1.0 / 64.0;
 
 impl PiecewiseConstant2D {
@@ -75,7 +76,8 @@ impl PiecewiseConstant2D {
     }
 }
 
-/// Appends the normalized cumulative sums of the weights (exclusive, then 1) and returns the total weight.
+/// Appends the normalized exclusive cumulative sums of the weights, followed by 1, and returns the total
+/// weight.
 fn add_sums(weights: &[f64], sums: &mut Vec<f32>) -> f64 {
     let total: f64 = weights.iter().sum();
     let least = total / weights.len().max(1) as f64 * LEAST;
@@ -90,8 +92,8 @@ fn add_sums(weights: &[f64], sums: &mut Vec<f32>) -> f64 {
     total
 }
 
-/// Guide table: divides [0, 1) into as many equal parts as there are shares and yields the share at the start
-/// of each part (Chen and Asau, *On Generating Random Variates from an Empirical Distribution*, 1974).
+/// Guide table: divides [0, 1) into as many equal parts as there are intervals and yields the interval at the
+/// start of each part (Chen and Asau, *On Generating Random Variates from an Empirical Distribution*, 1974).
 fn guide(sums: &[f32]) -> impl Iterator<Item = u32> {
     let (count, mut place) = (sums.len() - 1, 0);
     (0..count).map(move |part| {
@@ -100,8 +102,8 @@ fn guide(sums: &[f32]) -> impl Iterator<Item = u32> {
     })
 }
 
-/// Last share, from `place` on, that starts at or before `u`. It is usually `place` or the next one, so the
-/// first two steps avoid branches, which would be unpredictable.
+/// Last interval, searching from `place` onward, that starts at or before `u`. This is usually `place` or the
+/// next interval, so the first two steps avoid unpredictable branches.
 #[inline(always)]
 fn last_from(sums: &[f32], mut place: usize, u: f32) -> usize {
     for _ in 0..2 {
@@ -114,10 +116,10 @@ fn last_from(sums: &[f32], mut place: usize, u: f32) -> usize {
     place
 }
 
-/// Finds the share that contains `u` in [0, 1), and the position of `u` in it, in [0, 1).
+/// Finds the interval that contains `u` in [0, 1), and the relative position of `u` within it, in [0, 1).
 #[inline(always)]
 fn find(sums: &[f32], guide: &[u32], u: f32) -> (usize, f32) {
-    // Rounding may lead to the part after the one that contains `u`, so start one part earlier.
+    // Rounding may select the part after the one that contains `u`, so start one part earlier.
     let part = ((u * guide.len() as f32) as usize).saturating_sub(1);
     let first = last_from(sums, guide[part] as usize, u);
     let rest = (u - sums[first]) / (sums[first + 1] - sums[first]);
@@ -157,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn dark_cells_next_to_bright_ones_are_reachable() {
+    fn dark_cells_in_bright_rows_are_reachable() {
         let mut row = vec![1e-3; 4096];
         row[77] = 1e12;
         let grid = PiecewiseConstant2D::new(4096, [row].into_iter()).expect("some weight");
@@ -169,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn find_returns_the_share_that_contains_u() {
+    fn find_returns_the_interval_containing_u() {
         for count in [1_usize, 2, 3, 7, 64, 1000] {
             let weight = |i: usize| match i % 5 {
                 0 | 3 => 0.0,
@@ -183,7 +185,7 @@ mod tests {
                 sums[..count].iter().flat_map(|&sum| [sum.next_down().max(0.0), sum, sum.next_up()]);
             let even = (0..10_000).map(|i| i as f32 / 1e4);
             for u in borders.chain(even).filter(|u| *u < 1.0) {
-                let expected = (0..count).rev().find(|&i| sums[i] <= u).expect("the first starts at 0");
+                let expected = (0..count).rev().find(|&i| sums[i] <= u).expect("sums should start at 0");
                 assert_eq!(find(&sums, &guide, u).0, expected, "{u} of {count}");
             }
         }

@@ -3,8 +3,9 @@
 
 use crate::math::Vec2;
 
-/// A dimension of the sample sequence: one random decision at a path vertex. Numbers for different decisions are independent; numbers for the same
-/// decision are well distributed over a pixel's samples. Every random number belongs to one decision.
+/// A dimension of the sample sequence: one random decision at a path vertex. Numbers for different decisions
+/// are independent, while numbers for the same decision are well distributed over a pixel's samples. Every
+/// random number is used for a single decision.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Dimension {
     /// Position in the pixel.
@@ -13,15 +14,15 @@ pub enum Dimension {
     Lens,
     /// Position on the light with this index.
     Light(u32),
-    /// Choice of a light, unless all lights are sampled.
+    /// Choice of a light if not all lights are sampled.
     LightChoice,
     /// Position on the chosen light.
     ChosenLight,
-    /// Choice of the selected lights that get shadow rays.
+    /// Choice of which selected lights are tested with shadow rays.
     ShadowRayChoice,
     /// Choice between reflection and refraction.
     Fresnel,
-    /// Stochastic transparency: whether the surface is opaque here.
+    /// Stochastic transparency: whether the surface is opaque at this point.
     Opacity,
     /// Choice of the BSDF lobe to sample.
     Lobe,
@@ -29,14 +30,14 @@ pub enum Dimension {
     Direction,
     /// Russian roulette after sampling a BSDF lobe.
     Roulette,
-    /// Russian roulette after a specular surface. Separate from `Roulette`, as the next vertex has the same
-    /// path number.
+    /// Russian roulette after a specular surface. Separate from `Roulette` because the next vertex has the
+    /// same path number.
     SpecularRoulette,
-    /// Choice of the vertices that look up photons, if the path has several.
+    /// Choice of the vertices at which photons are gathered, if the path has several.
     Gather,
-    /// Position in a density kernel of the trial with this index, which searches for a surface.
+    /// Position in a density kernel, for the surface search trial with this index.
     Trial(u32),
-    /// Choice of a photon's light and of a part of it.
+    /// Choice of a photon's light and the part of the light that emits it.
     PhotonLight,
     /// Whether to aim a photon, and at which target.
     PhotonTarget,
@@ -47,7 +48,7 @@ pub enum Dimension {
 }
 
 impl Dimension {
-    /// Sobol dimension of this decision; `path` distinguishes the paths of one sample.
+    /// Sobol dimension of this decision. `path` distinguishes the paths of one sample.
     #[inline(always)]
     fn hash(self, path: u32) -> u32 {
         let number = match self {
@@ -74,10 +75,10 @@ impl Dimension {
     }
 }
 
-/// Path number for the decisions made in the camera.
+/// Path number for decisions made in the camera.
 pub const CAMERA_PATH: u32 = 0;
 
-/// Random numbers of one sample of a pixel.
+/// Random numbers for one sample of a pixel.
 #[derive(Clone, Copy, Debug)]
 pub struct PixelSampler {
     seed: u32,
@@ -123,8 +124,8 @@ impl<const N: usize> SamplerPacket<N> {
         Self { seeds, samples: *samples }
     }
 
-    /// Returns two numbers in [0, 1) per sample for one of the `of` repetitions of a decision, well
-    /// distributed over repetitions and samples together. The scramble changes every 2³² points.
+    /// Returns two numbers in [0, 1) per sample for one of `of` repetitions of a decision. The numbers are
+    /// well distributed over all repetitions and samples. The scramble changes every 2³² points.
     #[inline(always)]
     pub fn pairs(&self, paths: &[u32; N], decision: Dimension, repetition: u32, of: u32) -> [[f32; N]; 2] {
         let (mut indices, mut seeds) = ([0; N], [0; N]);
@@ -137,10 +138,10 @@ impl<const N: usize> SamplerPacket<N> {
     }
 }
 
-/// Points of the first two Sobol dimensions, with their order and both coordinates Owen-scrambled.
+/// Points of the first two Sobol dimensions. Their order and both coordinates are Owen-scrambled.
 #[inline(always)]
 fn scrambled<const N: usize>(indices: [u32; N], seeds: [u32; N]) -> [[f32; N]; 2] {
-    // Run each step over all lanes before the next one so that compilers vectorize it.
+    // Run each step over all lanes before the next step so that compilers vectorize it.
     let mut places = indices;
     for (place, &seed) in places.iter_mut().zip(&seeds) {
         *place = owen(place.reverse_bits(), seed).reverse_bits();
@@ -155,16 +156,15 @@ fn scrambled<const N: usize>(indices: [u32; N], seeds: [u32; N]) -> [[f32; N]; 2
     points
 }
 
-/// Converts the upper 24 of bit-reversed bits to a fraction in [0, 1). 24 bits fit signed conversion, which
-/// is what vector units have.
+/// Converts the upper 24 bits, in reversed order, to a fraction in [0, 1). 24 bits allow signed conversion,
+/// which vector units support.
 #[inline(always)]
 fn unit(bits: u32) -> f32 {
     (bits.reverse_bits() >> 8) as i32 as f32 * (1.0 / (1 << 24) as f32)
 }
 
-/// Second Sobol coordinate with its bits reversed. Bit j is the sum (mod 2) of the index bits k for which
-/// C(k, j) is odd, which is the case if k has every bit of j. The first coordinate, reversed, is the index
-/// itself.
+/// Bit-reversed second Sobol coordinate. Bit j is the sum (mod 2) of the index bits k with odd C(k, j), which
+/// means that k has every bit of j set. The bit-reversed first coordinate is the index itself.
 #[inline(always)]
 fn pascal(mut bits: u32) -> u32 {
     for (shift, lacking) in
@@ -175,9 +175,9 @@ fn pascal(mut bits: u32) -> u32 {
     bits
 }
 
-/// Owen scrambling of reversed bits with a hash in which each bit depends only on lower ones (Laine and
-/// Karras, *Stratified Sampling for Stochastic Transparency*, 2011; constants of Vegdahl, *Building a Better
-/// LK Hash*, 2021).
+/// Owen scrambling of reversed bits with a hash in which each bit depends only on lower bits (Laine and
+/// Karras, *Stratified Sampling for Stochastic Transparency*, 2011, with the constants from Vegdahl,
+/// *Building a Better LK Hash*, 2021).
 #[inline(always)]
 fn owen(mut bits: u32, seed: u32) -> u32 {
     bits ^= bits.wrapping_mul(0x3d20_adea);
@@ -212,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn repetitions_continue_one_sequence() {
+    fn repetitions_form_a_single_sequence() {
         for (sample, n) in [(0, 3), (7, 5), (9, 1), (u32::MAX / 3, 6), (u32::MAX / 2, 3)] {
             let own = PixelSampler::new(2, 3, 4, sample);
             for (i, point) in points(2, [3, 4, sample], Dimension::Fresnel, n).enumerate() {
@@ -231,7 +231,7 @@ mod tests {
 
     #[test]
     fn power_of_two_counts_are_stratified() {
-        // 64 points, one in each cell of every grid of 64: 64×1, 32×2, … 1×64.
+        // Each cell of every 64-cell grid (64×1, 32×2, …, 1×64) contains one of the 64 points.
         for n in [1_u32, 16] {
             let all = (0..64 / n).flat_map(|sample| points(3, [10, 20, sample], Dimension::Light(2), n));
             let points: Vec<[f32; 2]> = all.collect();
@@ -291,15 +291,15 @@ mod tests {
             }
         }
         let count = f64::from(n);
-        // Five standard errors of 1/√(12n), and of 1/√n.
+        // Five standard errors, which are 1/√(12n) and 1/√n.
         assert!(sums.iter().all(|sum| (sum / count - 0.5).abs() < 5.0 / (12.0 * count).sqrt()), "{sums:?}");
         assert!((product / count).abs() < 5.0 / count.sqrt(), "{product}");
     }
 
     #[test]
     fn decisions_are_independent() {
-        // Mean correlation of first coordinates over a pixel's samples, for 64 pixels. A shared scramble
-        // would give 1.
+        // Mean correlation of the first coordinates over each pixel's samples, for 64 pixels. It would be 1
+        // with a shared scramble.
         let others = [
             (0, Dimension::Light(1)),
             (0, Dimension::Fresnel),

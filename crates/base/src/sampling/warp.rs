@@ -49,9 +49,8 @@ pub fn cosine(u: [f32; 2]) -> Vec3 {
     at.extend((1.0 - at.length_squared()).max(0.0).sqrt())
 }
 
-/// Samples a point of the unit square with a pdf that is bilinear between values ≥ 0 at the corners (0, 0),
-/// (1, 0), (0, 1), (1, 1), not all 0 (Pharr, Jakob, Humphreys, *Physically Based Rendering*, 4th edition,
-/// A.5.1).
+/// Samples a point in the unit square with a bilinear pdf, given by values ≥ 0 (not all 0) at the corners (0,
+/// 0), (1, 0), (0, 1), (1, 1) (Pharr, Jakob, Humphreys, *Physically Based Rendering*, 4th edition, A.5.1).
 #[inline(always)]
 pub fn bilinear(u: [f32; 2], corners: &[f32; 4]) -> [f32; 2] {
     let [a, b, c, d] = *corners;
@@ -59,7 +58,7 @@ pub fn bilinear(u: [f32; 2], corners: &[f32; 4]) -> [f32; 2] {
     [linear(u[0], a + (c - a) * y, b + (d - b) * y), y]
 }
 
-/// Samples a number in [0, 1] with a pdf that is linear between values ≥ 0 at both ends.
+/// Samples a number in [0, 1] with a linear pdf, given by values ≥ 0 at both ends.
 #[inline(always)]
 fn linear(u: f32, first: f32, last: f32) -> f32 {
     let sum = first + last;
@@ -98,35 +97,35 @@ mod tests {
     #[test]
     fn cosine_samples_match_their_pdf() {
         let moment = |of: fn(Vec3) -> f32| grid().map(|u| of(cosine(u.to_array()))).sum::<f32>() / 1e4;
-        // ∫cos²/π, ∫cos³/π, and 0 along x and y.
+        // The expected values are ∫cos²/π, ∫cos³/π, and 0 along x and y.
         assert!((moment(|d| d.z) - 2.0 / 3.0).abs() < 1e-3 && (moment(|d| d.z * d.z) - 0.5).abs() < 1e-3);
         assert!(moment(|d| d.x).abs() < 1e-3 && moment(|d| d.y).abs() < 1e-3);
         assert!(grid().all(|u| (cosine(u.to_array()).length() - 1.0).abs() < 1e-6));
     }
 
     #[test]
-    fn cone_samples_are_uniform_even_if_narrow() {
+    fn narrow_cone_samples_are_uniform() {
         for one_minus_cos in [2.0, 0.5, 1e-9] {
             let cone = |u: Vec2| cone(u.to_array(), one_minus_cos);
             let z = grid().map(|u| 1.0 - f64::from(cone(u).z)).sum::<f64>() / 10_000.0;
             let sin2 = grid().map(|u| f64::from(cone(u).truncate().length_squared())).sum::<f64>() / 1e4;
             let c = f64::from(one_minus_cos);
             assert!(one_minus_cos < 1e-6 || (z / (c / 2.0) - 1.0).abs() < 1e-3);
-            // ∫(2c − c²) over the cone.
+            // Integral of 2c − c² over the cone.
             assert!((sin2 / (c - c * c / 3.0) - 1.0).abs() < 1e-3, "{one_minus_cos}");
         }
     }
 
     #[test]
     fn bilinear_samples_match_their_pdf() {
-        // Compare shares of strips and cells with integrals of the pdf.
+        // Compare the fractions of samples in strips and cells with integrals of the pdf.
         for corners in
             [[1.0, 1.0, 1.0, 1.0], [0.0, 3.0, 0.0, 1.0], [5.0, 0.0, 0.0, 0.0], [1e30, 2e30, 3e30, 0.5e30]]
         {
             let [a, b, c, d] = corners.map(f64::from);
             let mean = (a + b + c + d) / 4.0;
             let below = |x: f64, y: f64| {
-                // ∫∫ of (1−s)(1−t)a + s(1−t)b + (1−s)t c + st d up to x and y.
+                // Integral of (1−s)(1−t)a + s(1−t)b + (1−s)t c + st d over [0, x] × [0, y].
                 let (s1, s0) = (x * x / 2.0, x - x * x / 2.0);
                 let (t1, t0) = (y * y / 2.0, y - y * y / 2.0);
                 (s0 * t0 * a + s1 * t0 * b + s0 * t1 * c + s1 * t1 * d) / mean

@@ -15,19 +15,19 @@ use nix::unistd::{pause, write};
 use signal_hook::consts::SIGABRT;
 use signal_hook::low_level;
 
-/// Size in bytes of the last refused allocation, or 0.
+/// Size in bytes of the last failed allocation, or 0.
 static REFUSED_BYTES: AtomicUsize = AtomicUsize::new(0);
 
 /// Restores the terminal, using only async-signal-safe calls.
 static RESTORE_TERMINAL: OnceLock<fn()> = OnceLock::new();
 
-/// Exit code for failed work.
+/// Exit code for failures.
 const FAILED: i32 = 1;
 
-/// The system allocator, extended to record refused allocations.
+/// The system allocator, extended to record failed allocations.
 pub struct Allocator;
 
-/// Records `bytes` if the allocation was refused.
+/// Records `bytes` if the allocation failed.
 #[inline(always)]
 fn record_refusal(memory: *mut u8, bytes: usize) -> *mut u8 {
     if memory.is_null() {
@@ -36,11 +36,12 @@ fn record_refusal(memory: *mut u8, bytes: usize) -> *mut u8 {
     memory
 }
 
-// SAFETY: every call is the system allocator's own, with the caller's arguments and its result.
+// SAFETY: every call is forwarded to the system allocator with the caller's arguments, and its result is
+// returned.
 unsafe impl GlobalAlloc for Allocator {
     #[inline]
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        // SAFETY: the caller keeps the contract of `GlobalAlloc`.
+        // SAFETY: the caller upholds the contract of `GlobalAlloc`.
         record_refusal(unsafe { System.alloc(layout) }, layout.size())
     }
 
@@ -63,7 +64,7 @@ unsafe impl GlobalAlloc for Allocator {
     }
 }
 
-/// Installs the SIGABRT handler: an abort then prints a message to stderr and exits with code 1.
+/// Installs the SIGABRT handler, which prints a message to stderr and exits with code 1.
 ///
 /// # Errors
 /// The handler cannot be installed.
@@ -81,8 +82,8 @@ pub fn set_terminal_restore(restore: fn()) {
 /// Whether a thread is already running the handler.
 static IS_ENDING: AtomicBool = AtomicBool::new(false);
 
-/// Restores the terminal, prints the reason and exits. Several threads may abort at once when memory runs
-/// out: the first one prints, the others wait for the process to end.
+/// Restores the terminal, prints the reason and exits. If several threads abort at once when memory runs out,
+/// the first thread prints and the others wait for the process to end.
 fn on_abort() {
     while IS_ENDING.swap(true, Ordering::AcqRel) {
         pause();
@@ -91,7 +92,7 @@ fn on_abort() {
         restore();
     }
     let mut message = MessageBuffer::default();
-    // A message that does not fit is truncated.
+    // Truncate messages that do not fit.
     let _ = match REFUSED_BYTES.load(Ordering::Relaxed) {
         0 => writeln!(message, "error: glimt was aborted (SIGABRT)"),
         bytes => writeln!(
@@ -100,12 +101,12 @@ fn on_abort() {
             bytes.div_ceil(1_000_000)
         ),
     };
-    // SAFETY: standard error is open for the whole life of the process, or the write fails.
+    // SAFETY: standard error stays open for the lifetime of the process; if not, the write fails.
     let _ = write(unsafe { BorrowedFd::borrow_raw(nix::libc::STDERR_FILENO) }, message.bytes());
     low_level::exit(FAILED);
 }
 
-/// Text buffer on the stack.
+/// Stack-allocated text buffer.
 struct MessageBuffer {
     bytes: [u8; 256],
     length: usize,
@@ -138,16 +139,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_refused_allocation_is_remembered() {
+    fn failed_allocations_are_recorded() {
         let layout = Layout::from_size_align(usize::MAX / 4, 1).expect("a layout");
-        // SAFETY: the layout has a size; a null pointer is not used.
+        // SAFETY: the layout's size is not 0, and a null pointer is not used.
         let memory = std::hint::black_box(unsafe { Allocator.alloc(layout) });
         assert!(memory.is_null());
         assert_eq!(REFUSED_BYTES.load(Ordering::Relaxed), usize::MAX / 4);
     }
 
     #[test]
-    fn messages_that_do_not_fit_are_truncated() {
+    fn long_messages_are_truncated() {
         let mut message = MessageBuffer::default();
         assert!(write!(message, "{}", "a".repeat(200)).is_ok());
         assert!(write!(message, "{}", "b".repeat(100)).is_err());

@@ -2,13 +2,13 @@
 
 use nix::time::{ClockId, clock_gettime};
 
-/// CPU seconds used by this thread, or 0 if the system does not measure them. Waiting time and other threads
-/// do not count.
+/// CPU time used by this thread in seconds, or 0 if the system does not measure it. Excludes waiting time and
+/// other threads.
 pub fn thread_cpu_seconds() -> f64 {
     seconds_by(ClockId::CLOCK_THREAD_CPUTIME_ID)
 }
 
-/// CPU seconds used by all threads of this process, or 0 if the system does not measure them.
+/// CPU time used by all threads of this process in seconds, or 0 if the system does not measure it.
 pub fn process_cpu_seconds() -> f64 {
     seconds_by(ClockId::CLOCK_PROCESS_CPUTIME_ID)
 }
@@ -29,10 +29,10 @@ mod tests {
         let (begin, before) = (Instant::now(), thread_cpu_seconds());
         std::thread::sleep(Duration::from_millis(30));
         let slept = thread_cpu_seconds() - before;
-        // Bound the loop, as the system may lack this clock.
+        // Limit the number of iterations because the system may lack this clock.
         let worked = (0..10_000_000).any(|_| thread_cpu_seconds() - before > slept + 0.01);
         assert!(worked || before == 0.0, "{slept}");
         assert!(begin.elapsed().as_secs_f64() >= slept + 0.03, "{slept}");
-        assert!(process_cpu_seconds() >= thread_cpu_seconds() - 0.01, "other threads count there");
+        assert!(process_cpu_seconds() >= thread_cpu_seconds() - 0.01, "it should include all threads");
     }
 }

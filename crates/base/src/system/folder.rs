@@ -10,7 +10,8 @@ use std::path::Path;
 
 use rustix::fs::{AtFlags, Dir, Mode, OFlags, openat, unlinkat};
 
-/// Names of the entries of a folder, in the system's order. An entry that cannot be read ends the list.
+/// Names of a folder's entries, in the order returned by the system. The list ends at the first entry that
+/// cannot be read.
 ///
 /// # Errors
 /// The folder cannot be opened.
@@ -24,7 +25,7 @@ fn names_in(folder: BorrowedFd<'_>) -> io::Result<impl Iterator<Item = OsString>
     Ok(entries.map(name).filter(|name| name != "." && name != ".."))
 }
 
-/// Removes a folder with its contents. Links in it are removed, not followed.
+/// Removes a folder and its contents. Symbolic links are removed, not followed.
 ///
 /// # Errors
 /// Something in the folder cannot be removed.
@@ -37,7 +38,7 @@ pub fn remove_all(folder: &Path) -> io::Result<()> {
 fn remove_folder(parent: BorrowedFd<'_>, name: &OsStr) -> io::Result<()> {
     let flags = OFlags::RDONLY | OFlags::DIRECTORY | OFlags::NOFOLLOW | OFlags::CLOEXEC;
     let folder: OwnedFd = openat(parent, name, flags, Mode::empty())?;
-    // Read all names first: removals may disturb the list.
+    // Read all names first because removing entries may disturb the listing.
     let names: Vec<OsString> = names_in(folder.as_fd())?.collect();
     for name in names {
         match unlinkat(&folder, &name, AtFlags::empty()) {
@@ -56,7 +57,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_removed_tree_leaves_linked_folders() {
+    fn removing_a_folder_keeps_linked_folders() {
         let folder = tempfile::tempdir().expect("a folder");
         let at = |name: &str| folder.path().join(name);
         fs::create_dir_all(at("tree/a/b")).expect("folders");

@@ -1,4 +1,4 @@
-//! Identities of machines and processes, for files in folders that several machines share.
+//! Machine and process identities, used for files in folders shared by several machines.
 
 use std::fs;
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -8,12 +8,12 @@ use nix::errno::Errno;
 use nix::sys::signal::kill;
 use nix::unistd::{Pid, gethostname};
 
-/// A process, identified uniquely among all processes of other machines and of earlier boots.
+/// A process, identified uniquely across machines and reboots.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ProcessIdentity {
-    /// Hash of the host name, the boot and the namespace of process numbers.
+    /// Hash of the host name, boot ID and process ID namespace.
     pub machine: u64,
-    /// Process number, which is only meaningful on `machine`.
+    /// Process ID, which is only meaningful on `machine`.
     pub process: u32,
 }
 
@@ -23,16 +23,15 @@ impl ProcessIdentity {
         Self { machine: machine(), process: std::process::id() }
     }
 
-    /// Whether this process has certainly ended. Always false for processes of other machines, which are not
-    /// visible from here.
+    /// Whether this process has definitely ended. Always false for processes on other machines, which cannot
+    /// be inspected.
     pub fn has_ended(&self) -> bool {
         let Ok(number) = i32::try_from(self.process) else { return false };
         self.machine == machine() && number > 0 && kill(Pid::from_raw(number), None) == Err(Errno::ESRCH)
     }
 }
 
-/// Hash that identifies this machine. Containers on one machine differ in their host name or in their
-/// namespace of process numbers.
+/// Hash that identifies this machine. Containers on one machine differ in host name or process ID namespace.
 fn machine() -> u64 {
     static MACHINE: OnceLock<u64> = OnceLock::new();
     *MACHINE.get_or_init(|| {
@@ -52,7 +51,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_dead_processes_of_this_machine_have_ended() {
+    fn only_local_processes_can_be_known_to_have_ended() {
         let current = ProcessIdentity::current();
         assert!(!current.has_ended());
         let mut child = Command::new("true").spawn().expect("true starts");
@@ -61,7 +60,7 @@ mod tests {
         assert!(ProcessIdentity { process, ..current }.has_ended());
         assert!(!ProcessIdentity { process, machine: current.machine ^ 1 }.has_ended());
         for process in [0, u32::MAX] {
-            assert!(!ProcessIdentity { process, ..current }.has_ended(), "{process} is not a process");
+            assert!(!ProcessIdentity { process, ..current }.has_ended(), "{process} is not a process ID");
         }
     }
 }

@@ -1,20 +1,20 @@
-//! Limits that the system sets on the memory of this process.
+//! System limits on this process's memory.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use nix::sys::resource::{RLIM_INFINITY, Resource, getrlimit};
 
-/// The most memory that this process may have.
+/// Maximum amount of memory available to this process.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Limit {
     /// Bytes.
     pub bytes: u64,
-    /// The setting, to follow "the … of".
+    /// Name of the setting, for use after "the … of".
     pub setting: String,
 }
 
-/// The lowest limit, of the address space or of a control group. `None` if there is none.
+/// Lowest limit imposed on the address space or by a control group. `None` if memory is unlimited.
 pub fn limit() -> Option<Limit> {
     let of_space =
         getrlimit(Resource::RLIMIT_AS).ok().map(|(bytes, _)| bytes).filter(|bytes| *bytes < RLIM_INFINITY);
@@ -24,7 +24,7 @@ pub fn limit() -> Option<Limit> {
     of_space.into_iter().chain(of_group).min_by_key(|limit| limit.bytes)
 }
 
-/// The lowest limit of the control groups that `/proc/self/cgroup` lists, version 1 or 2, and of those above them.
+/// Lowest limit of the control groups (version 1 or 2) listed in `/proc/self/cgroup` and their ancestors.
 fn of_groups(root: &Path, groups: &str) -> Option<Limit> {
     let of_line = |line: &str| {
         let [_, controllers, path] = <[&str; 3]>::try_from(line.splitn(3, ':').collect::<Vec<_>>()).ok()?;
@@ -40,10 +40,10 @@ fn of_groups(root: &Path, groups: &str) -> Option<Limit> {
     groups.lines().filter_map(of_line).min_by_key(|limit| limit.bytes)
 }
 
-/// Returns the lowest limit from a group up to the root. In a container the path may be the host's, with the container's own group as
-/// the root.
+/// Returns the lowest limit of a group and its ancestors. In a container, the path may be the host's path
+/// although the root is the container's own group.
 fn lowest(root: &Path, path: &str, file: &str) -> Option<Limit> {
-    /// Version 1 says "none" with the largest number of pages.
+    /// Version 1 represents "no limit" by the largest possible number of pages.
     const NONE: u64 = 1 << 60;
     let group = root.join(path.trim_start_matches('/'));
     let folders = group.ancestors().take_while(|folder| folder.starts_with(root));
@@ -67,7 +67,7 @@ mod tests {
     }
 
     #[test]
-    fn the_lowest_limit_of_a_control_group_and_its_ancestors_counts() {
+    fn the_lowest_limit_of_all_ancestors_applies() {
         let root = tempfile::tempdir().expect("a folder");
         let root = root.path();
         let bytes = |groups: &str| of_groups(root, groups).map(|limit| limit.bytes);
@@ -82,7 +82,7 @@ mod tests {
         assert_eq!(bytes("0::/a/b\n"), Some(1_024_000));
         let said = of_groups(root, "0::/a/b\n").expect("a limit").setting;
         assert!(said.ends_with("/a/b/memory.max)"), "{said}");
-        // A container sees its own group as the root, and may know it by the host's path.
+        // In a container, the root is the container's own group, but the listed path may be the host's.
         write(root, "memory.max", "512000\n");
         for groups in ["0::/\n", "0::/kubepods/pod1\n", "1:cpu:/x\n0::/\n"] {
             assert_eq!(bytes(groups), Some(512_000), "{groups}");
@@ -90,7 +90,7 @@ mod tests {
     }
 
     #[test]
-    fn version_1_has_a_folder_of_its_own() {
+    fn version_1_uses_a_separate_folder() {
         let root = tempfile::tempdir().expect("a folder");
         let root = root.path();
         let groups = "12:cpu,cpuacct:/job\n7:memory:/job\n0::/job\n";

@@ -1,5 +1,5 @@
-//! The operating system: error messages, printable characters, regular files, thread priorities, CPU time and
-//! abort handling.
+//! Operating system access: error messages, printable characters, regular files, thread priorities, CPU time
+//! and abort handling.
 
 #[allow(unsafe_code)]
 pub mod abort;
@@ -14,7 +14,7 @@ pub mod threads;
 
 use std::io::{Error, ErrorKind};
 
-/// Describes a file-system error as part of a sentence: in lower case, without the error number.
+/// Describes a file-system error for use within a sentence: in lower case and without the error number.
 pub fn describe_error(error: &Error) -> String {
     #[cfg(unix)]
     if error.raw_os_error() == Some(nix::libc::ELOOP) {
@@ -22,7 +22,7 @@ pub fn describe_error(error: &Error) -> String {
     }
     match error.kind() {
         ErrorKind::NotADirectory => "a part of its path is a file, not a folder".to_owned(),
-        // The system never saw this name: it contains a NUL byte.
+        // The name contains a NUL byte, so it was never passed to the system.
         ErrorKind::InvalidInput if error.raw_os_error().is_none() => {
             "that is not a valid file name".to_owned()
         }

@@ -1,10 +1,10 @@
 //! Thread priorities.
 //!
-//! A nice value determines how much a thread yields to others: a value 10 higher leaves about a tenth of the
-//! share when both want the processor.
+//! A thread's nice value determines how much it yields to other threads. When two threads compete for a
+//! processor, a thread with a nice value 10 higher gets about a tenth of the other's share.
 
-/// Raises the nice value of this thread and the threads it starts from now on, or of the whole process
-/// outside Linux (nice(2), sched(7)). Does nothing for 0 or if the system refuses.
+/// Raises the nice value of this thread and the threads it starts later, or of the whole process on systems
+/// other than Linux (nice(2), sched(7)). Does nothing if the increment is 0 or if the system refuses.
 pub fn lower_priority(steps: u8) {
     #[cfg(unix)]
     if steps > 0 {

@@ -1,7 +1,7 @@
 //! Characters that terminals print unchanged.
 
-/// Whether a terminal prints this character in place: it is not a control character, invisible, or a change
-/// of writing direction.
+/// Whether a terminal prints this character unchanged: it is not a control character, is visible, and does
+/// not change the writing direction.
 pub fn is_plain(c: char) -> bool {
     !matches!(c,
         '\0'..='\u{1f}'

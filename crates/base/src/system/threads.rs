@@ -7,15 +7,15 @@ use nix::sys::resource::{Resource, getrlimit};
 
 use super::describe_error;
 
-/// Address space used by a thread's stack: the standard library's default.
+/// Address space of a thread's stack (the standard library's default).
 const STACK_BYTES: u64 = 2 << 20;
 
-/// Checks that the stacks of `threads` threads fit in the process's address-space limit. Must run before the
-/// first thread starts: the standard library ends the process if a started thread has no room for its signal
-/// stack.
+/// Checks that the stacks of `threads` threads fit within the process's address-space limit. Must be called
+/// before the first thread is started, because the standard library terminates the process if a new thread
+/// has no room for its signal stack.
 ///
 /// # Errors
-/// The error that the system returns for a thread it cannot start.
+/// The system's error for a thread that cannot be started.
 pub fn check_stack_space(threads: usize) -> Result<(), Error> {
     let Ok((limit, _)) = getrlimit(Resource::RLIMIT_AS) else { return Ok(()) };
     if (threads as u64).saturating_mul(STACK_BYTES) > limit {
@@ -24,8 +24,8 @@ pub fn check_stack_space(threads: usize) -> Result<(), Error> {
     Ok(())
 }
 
-/// Explains why `what` could not be started and how to fix it: raise a limit on memory (for stacks) or on the
-/// number of threads, or use fewer.
+/// Explains why `what` could not be started and how to fix it: raise the limits on memory (for stacks) or on
+/// the number of threads, or use fewer threads.
 pub fn start_failure(what: &str, is_number_chosen: bool, error: &impl Display) -> String {
     let why = describe_error(&Error::other(error.to_string()));
     let fewer = if is_number_chosen { "use fewer (--threads 1), or " } else { "" };
@@ -39,7 +39,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn message_says_how_to_fix_it() {
+    fn message_suggests_a_fix() {
         let error = Error::from_raw_os_error(nix::libc::EAGAIN);
         let limits = "raise the limits on memory and on processes (ulimit -v, ulimit -u)";
         assert_eq!(

@@ -40,7 +40,7 @@ pub struct BenchArgs {
     /// Replace files not written by glimt
     #[arg(long, help_heading = "Output")]
     pub force: bool,
-    /// Report regressions since the run with this --json file
+    /// Report regressions against an earlier --json file
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub baseline: Option<PathBuf>,
 
@@ -62,10 +62,10 @@ pub struct BenchArgs {
     /// Height in pixels
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole_of("height"), help_heading = "Measurement")]
     pub height: Option<u32>,
-    /// Time limit where --samples and --time leave it open
+    /// Time limit, unless --samples and --time set the time
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = seconds, default_value = "240", help_heading = "Measurement")]
     pub within: f64,
-    /// Floating-point image to use as reference
+    /// Floating-point image to use as a reference
     ///
     /// Can be given twice, for two references with independent noise.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["reference_samples", "width", "height"], help_heading = "Measurement")]

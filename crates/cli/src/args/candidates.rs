@@ -11,7 +11,7 @@ use crate::scene::keys::{color_names, paths, tables};
 use crate::scene::outline::{OutlineTable, outline};
 use crate::scene::{is_mesh, text_now};
 
-/// Words of the command line being completed, if the shell's script passes it in another form.
+/// Words of the command line to complete, if the shell's script does not pass them as arguments.
 static WORDS: OnceLock<Vec<OsString>> = OnceLock::new();
 
 /// Stores the words of the command line, for completers that need other arguments.
@@ -19,7 +19,7 @@ pub(crate) fn remember(words: &[OsString]) {
     WORDS.get_or_init(|| words.to_vec());
 }
 
-/// Returns the words of the command line being completed.
+/// Returns the words of the command line to complete.
 fn line() -> Vec<OsString> {
     WORDS.get().cloned().unwrap_or_else(|| std::env::args_os().collect())
 }
@@ -44,7 +44,8 @@ fn is_scene(path: &Path) -> bool {
     path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml"))
 }
 
-/// Completes `TABLE.KEY=VALUE` with the keys of the scene on the command line, or else of the tables that every scene has.
+/// Completes `TABLE.KEY=VALUE` with keys of the scene on the command line. Without a scene, completes keys of
+/// the tables that every scene has.
 pub(crate) fn sets() -> ArgValueCompleter {
     ArgValueCompleter::new(|current: &OsStr| {
         let Some(current) = current.to_str() else { return Vec::new() };
@@ -64,7 +65,7 @@ pub(crate) fn keys() -> ArgValueCompleter {
     })
 }
 
-/// Candidates for the prefix `typed`, in a scene with this text.
+/// Candidates that start with `typed`, for a scene with the source `text`.
 fn candidates(text: &str, typed: &str) -> Vec<CompletionCandidate> {
     /// Maximum number of candidates.
     const MAX_CANDIDATES: usize = 2000;
@@ -94,7 +95,7 @@ fn candidates(text: &str, typed: &str) -> Vec<CompletionCandidate> {
 /// A value and its description.
 type DescribedValue = (String, &'static str);
 
-/// Candidates for one path with its `=`: the path, or its values once the path is complete.
+/// Candidates for `path`, which ends with `=`: the path itself or, once it is fully typed, its values.
 fn of_path(
     path: &str,
     doc: &str,
@@ -110,7 +111,7 @@ fn of_path(
     fitting.map(|(value, doc)| CompletionCandidate::new(format!("{path}{value}")).help(help(doc))).collect()
 }
 
-/// The named values of a type, in a scene with these tables.
+/// Named values of a type, for a scene with the tables in `outline`.
 fn values(kind: ValueKind, outline: &[OutlineTable]) -> Vec<DescribedValue> {
     let plain = |value: &str| (value.to_owned(), "");
     match kind {
@@ -143,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn set_completes_keys_of_the_scene() {
+    fn set_completes_scene_keys() {
         let text = "[materials.wall]\ntype = \"mirror\"\n[[sphere]]\nname = \"ball\"\n";
         let mirror = offered(text, "materials.wall.ref");
         assert_eq!(mirror, ["materials.wall.reflectance="]);
@@ -158,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn set_completes_values_after_the_key() {
+    fn set_completes_values_of_a_key() {
         assert_eq!(
             offered("", "render.integrator="),
             ["render.integrator=whitted", "render.integrator=path"]

@@ -1,10 +1,10 @@
-//! Tests of the layout of `-h` and `--help`.
+//! Layout tests for `-h` and `--help`.
 
 use clap::CommandFactory;
 
 use super::Args;
 
-/// The short help of the program and both helps of each command, at this width.
+/// The program's short help, and the short and long help of each command, at a width of `columns`.
 fn helps(columns: usize) -> Vec<(String, String)> {
     let mut all = Args::command().term_width(columns);
     all.build();
@@ -29,7 +29,7 @@ fn help_fits_its_columns() {
     }
 }
 
-/// A line of text ends only where the next word does not fit.
+/// Lines only break where the next word does not fit.
 #[test]
 fn help_is_wrapped_once() {
     for columns in [80, 100, 140] {

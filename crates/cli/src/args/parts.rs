@@ -26,7 +26,7 @@ The scene, its files and the output must have the same paths on all machines.";
 /// Arguments of `merge`.
 #[derive(Clone, Debug, clap::Args)]
 pub struct MergeArgs {
-    /// The image to write; the extension chooses the format
+    /// The image to write; the extension determines the format
     pub out: PathBuf,
     /// The parts, in any order
     #[arg(required = true, value_name = "PART")]

@@ -1,12 +1,12 @@
-//! Compares results with a baseline, with significance tests.
+//! Compares results with a baseline and tests the differences for significance.
 
 use super::results::{MethodResult, Results, StepResult};
 use super::statistics::{quantile, upper_tail, welch};
 
-/// Family-wise false positive rate over the whole table.
+/// Family-wise false positive rate of the whole table.
 const FALSE_POSITIVE_RATE: f64 = 0.01;
 
-/// Change of time or error of a method on a scene.
+/// Change in a method's time or error on a scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MethodChange {
     /// The scene.
@@ -15,7 +15,7 @@ pub struct MethodChange {
     pub method: String,
     /// The compared quantity.
     pub quantity: Quantity,
-    /// New value divided by old value, as geometric mean over the steps.
+    /// Geometric mean of new value / old value over the steps.
     pub factor: f64,
     /// 95 % confidence interval of the factor.
     pub interval: [f64; 2],
@@ -25,16 +25,16 @@ pub struct MethodChange {
     pub is_real: bool,
 }
 
-/// Quantities that are compared.
+/// Quantities to compare.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
-    /// Seconds of rendering.
+    /// Rendering time in seconds.
     Seconds,
     /// relMSE.
     Error,
 }
 
-/// Compares everything that both runs have: scenes with equal name and size, methods with equal name, and steps with equal
+/// Compares everything the two runs have in common: scenes by name and size, methods by name, and steps by
 /// samples.
 pub fn changes(then: &Results, now: &Results) -> Vec<MethodChange> {
     let mut changes = Vec::new();
@@ -91,8 +91,8 @@ fn matching_step<'a>(step: &StepResult, then: &'a [StepResult]) -> Option<&'a St
     })
 }
 
-/// Difference of the mean logarithms, with its standard error and degrees of freedom. `None` if there are too few positive
-/// values.
+/// Difference between the mean logarithms, its standard error and its degrees of freedom. `None` if there are
+/// too few positive values.
 fn difference(then: &StepResult, now: &StepResult, quantity: Quantity) -> Option<(f64, f64, f64)> {
     let of = |step: &StepResult| -> Vec<f64> {
         let values = step.pictures.iter().map(|picture| match quantity {
@@ -105,7 +105,7 @@ fn difference(then: &StepResult, now: &StepResult, quantity: Quantity) -> Option
     if old.len() < 2 || new.len() < 2 {
         return None;
     }
-    // Identical images have identical errors: the difference is exactly 0.
+    // Identical images have identical errors, and the difference is exactly 0.
     if old == new { Some((0.0, 0.0, 1.0)) } else { Some(welch(&old, &new)) }
 }
 
@@ -118,7 +118,7 @@ pub fn lines(changes: &[MethodChange], name: &str) -> Vec<String> {
     lines.extend(changes.iter().map(line));
     let sure = (1.0 - FALSE_POSITIVE_RATE) * 100.0;
     lines.push(format!(
-        "SLOWER, WORSE, faster and better are significant with {sure:.0} % confidence over all lines."
+        "SLOWER, WORSE, faster and better are significant at {sure:.0} % confidence over all lines."
     ));
     lines
 }

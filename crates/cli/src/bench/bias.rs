@@ -1,8 +1,8 @@
-//! Bias of a method: the error that images with different seeds share, and that the references do not have.
+//! Bias of a method: the error that images with different seeds share and the references lack.
 //!
-//! The mean of (xᵢ − r₁)(xⱼ − r₂) over all pairs of different seeds estimates the squared bias, as the noise of all four images is
-//! independent. Its standard error is estimated from the variance of the pairs, from the jackknife over seeds, and from the noise
-//! of the references.
+//! The mean of (xᵢ − r₁)(xⱼ − r₂) over all pairs of different seeds estimates the squared bias because the
+//! noise in all four images is independent. Its standard error is estimated from the variance of the pairs,
+//! from the jackknife over seeds, and from the noise of the references.
 
 use serde::{Deserialize, Serialize};
 
@@ -20,11 +20,11 @@ pub const MIN_SEEDS: usize = 3;
 pub struct Bias {
     /// Squared bias, as a contribution to relMSE. May be negative due to noise.
     pub size: f64,
-    /// Standard error of the size.
+    /// Standard error of `size`.
     pub error: f64,
     /// One-sided p-value of the hypothesis of no bias.
     pub by_chance: f64,
-    /// Upper confidence bound of the size.
+    /// Upper confidence bound on `size`.
     pub bound: f64,
 }
 
@@ -55,7 +55,7 @@ pub fn bias(references: &TwoReferences, pictures: &[RadianceImage]) -> Option<Bi
     })
 }
 
-/// Products of the errors of pairs of images.
+/// Products of errors, for all pairs of images.
 struct Pairs {
     count: usize,
     /// Indices of both images, and the product.
@@ -81,7 +81,7 @@ impl Pairs {
         sum / count
     }
 
-    /// Variance of the mean if there is no bias: then the products of different pairs are uncorrelated.
+    /// Variance of the mean without bias. In that case, the products of different pairs are uncorrelated.
     fn variance_without_bias(&self) -> f64 {
         let (mean, count) = (self.mean(), self.products.len() as f64);
         let squares: f64 =
@@ -126,7 +126,8 @@ mod tests {
             ((mixed ^ (mixed >> 31)) >> 40) as f32 / (1 << 23) as f32 - 1.0
         }
 
-        /// Gray of 0.5 + offset with noise. Blocks of `block`² pixels share their noise, like pixels lit by the same photon.
+        /// Gray of 0.5 + `offset` plus noise. Each block of `block`² pixels shares one noise value, like
+        /// pixels lit by the same photon.
         fn picture(&mut self, noise: f32, offset: f32, block: u32) -> RadianceImage {
             const SIDE: u32 = 32;
             let mut picture = RadianceImage::black(SIDE, SIDE);
@@ -155,13 +156,13 @@ mod tests {
         for (seeds, block) in [(3, 1), (6, 1), (6, 4), (6, 16)] {
             let mut noise = Noise(seeds as u64 * 1000 + u64::from(block));
             let alarms = (0..1000).filter(|_| noise.found(seeds, 0.0, block).is_found()).count();
-            // One is expected. A Poisson variable exceeds six once in ten thousand times.
+            // The expected count is 1. A Poisson variable with this mean exceeds 6 with probability 1e-4.
             assert!(alarms <= 6, "{seeds} seeds, blocks of {block}: {alarms} false alarms of 1000");
         }
     }
 
     #[test]
-    fn known_bias_is_found_with_its_size() {
+    fn known_bias_is_estimated_correctly() {
         let mut noise = Noise(7);
         let truth = 0.06_f64.powi(2) / 0.26;
         let mut sizes = Vec::new();
@@ -171,7 +172,10 @@ mod tests {
             sizes.push(found.size);
         }
         let (mean, error) = super::super::statistics::mean(&sizes);
-        assert!((mean - truth).abs() < 4.0 * error && error < 0.02 * truth, "{mean} ± {error}, not {truth}");
+        assert!(
+            (mean - truth).abs() < 4.0 * error && error < 0.02 * truth,
+            "got {mean} ± {error}, expected {truth}"
+        );
     }
 
     #[test]

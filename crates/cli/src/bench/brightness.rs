@@ -15,7 +15,7 @@ use crate::math::color::LUMINANCE_WEIGHTS;
 pub struct Brightness {
     /// The difference, relative to the mean luminance of the references.
     pub value: f64,
-    /// Its standard error.
+    /// Standard error of `value`.
     pub error: f64,
     /// Two-sided p-value of the hypothesis of no bias.
     pub by_chance: f64,
@@ -28,8 +28,9 @@ impl Brightness {
     }
 }
 
-/// Compares the brightness of images with different seeds with the references. With photons, errors of pixels are correlated and
-/// `are_pixels_independent` must be false. `None` for fewer than [`MIN_SEEDS`] images or black references.
+/// Compares the brightness of images rendered with different seeds to the references.
+/// `are_pixels_independent` must be false with photons, which correlate the errors of pixels. Returns `None`
+/// for fewer than [`MIN_SEEDS`] images or for black references.
 pub fn brightness(
     references: &TwoReferences,
     pictures: &[RadianceImage],
@@ -56,7 +57,7 @@ pub fn brightness(
     Some(Brightness { value, error, by_chance })
 }
 
-/// The standard error of the mean luminance of all images, from the variance of each pixel.
+/// Standard error of the images' mean luminance, from the variance of each pixel.
 fn error_of_pixels(pictures: &[RadianceImage]) -> f64 {
     let count = pictures.len() as f64;
     let weights: DVec3 = LUMINANCE_WEIGHTS.as_dvec3();
@@ -81,7 +82,7 @@ mod tests {
 
     const SIDE: u32 = 64;
 
-    /// Gray of 0.5 · (1 + `brighter`), with independent noise per pixel and shared noise of the whole image.
+    /// Gray of 0.5 · (1 + `brighter`), with independent noise per pixel and an offset shared by all pixels.
     fn picture(next: &mut impl FnMut() -> f32, brighter: f32, noise: f32, shared: f32) -> RadianceImage {
         let all = shared * (2.0 * next() - 1.0);
         let pixels = (0..SIDE * SIDE)
@@ -96,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn one_percent_of_darkening_is_found() {
+    fn one_percent_darkening_is_detected() {
         const SEEDS: u32 = 40;
         let (mut off, mut missed) = (Vec::new(), 0);
         for seed in 1..=SEEDS {
@@ -107,9 +108,10 @@ mod tests {
             missed += u32::from(!found.is_biased());
             off.push((found.value + 0.01) / found.error);
             let by_relmse = bias(&references, &pictures).expect("enough seeds");
-            assert!(!by_relmse.is_found(), "{seed}: relMSE must not find it");
+            assert!(!by_relmse.is_found(), "seed {seed}: relMSE should be unable to detect the bias");
         }
-        // One percent is 4.7 standard errors and the threshold is 3.3, so 8 % are missed: 3.3 of 40 on average, at most 8.
+        // One percent is 4.7 standard errors, and the threshold is 3.3. This misses 8 % of the seeds: 3.3 of
+        // 40 on average. Allow 8.
         assert!(missed <= 8, "{missed}");
         // The normalized errors have mean 0 and standard deviation 1.
         let count = f64::from(SEEDS);
@@ -128,14 +130,14 @@ mod tests {
                 let pictures: Vec<_> = (0..4).map(|_| picture(&mut next, 0.0, noise, shared)).collect();
                 brightness(&references, &pictures, shared == 0.0).expect("enough seeds").is_biased()
             });
-            // 0.2 are expected. Four or more occur once in ten thousand times.
+            // The expected count is 0.2. The probability of 4 or more is 1e-4.
             let alarms = alarms.count();
             assert!(alarms <= 3, "{noise} {shared}: {alarms} false alarms of 200");
         }
     }
 
     #[test]
-    fn few_images_and_black_references_give_none() {
+    fn few_images_or_black_references_return_none() {
         let mut next = unit(7);
         let references = references(&mut next);
         let pictures: Vec<_> = (0..2).map(|_| picture(&mut next, 0.0, 0.1, 0.0)).collect();

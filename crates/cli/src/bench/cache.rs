@@ -1,6 +1,7 @@
 //! Cached references: one file per fingerprint, with a checksum.
 //!
-//! A file consists of a line of JSON, the pixels of both images as little-endian floats, and the fingerprint of all preceding bytes.
+//! A file consists of a line of JSON, both images' pixels as little-endian floats, and a fingerprint of all
+//! preceding bytes.
 
 use std::fs;
 use std::io::Read;
@@ -16,7 +17,7 @@ use crate::output::write::Guard;
 use crate::output::{Losses, OutputError, staged, write};
 use crate::scene::fingerprint::{Fingerprint, Key};
 
-/// The folder for references, in `XDG_CACHE_HOME` or `~/.cache`. `None` if neither is set.
+/// The cache folder for references, inside `XDG_CACHE_HOME` or `~/.cache`. `None` if neither is set.
 pub fn folder() -> Option<PathBuf> {
     let absolute = |name: &str| std::env::var_os(name).map(PathBuf::from).filter(|path| path.is_absolute());
     let caches = absolute("XDG_CACHE_HOME").or_else(|| absolute("HOME").map(|home| home.join(".cache")))?;
@@ -26,10 +27,10 @@ pub fn folder() -> Option<PathBuf> {
 /// Writes the starter scene to a file in a subfolder and returns its path. Never overwrites files.
 ///
 /// # Errors
-/// The folder or the file cannot be created, or another file has this name.
+/// The folder or the file cannot be created, or a different file with this name exists.
 pub fn starter(folder: &Path) -> Result<PathBuf, OutputError> {
     let text = crate::scene::starter().as_bytes();
-    // Use a folder per version of the scene, as a scene next to the references may be the user's.
+    // Use one folder per version of the scene, because a scene next to the references may belong to the user.
     let folder = folder
         .join(format!("starter-{}", &Fingerprint::new("starter").bytes(text).finish().to_string()[..16]));
     create(&folder)?;
@@ -39,14 +40,14 @@ pub fn starter(folder: &Path) -> Result<PathBuf, OutputError> {
         return Ok(path);
     }
     match staged::new_files(&folder, &[("starter.toml".into(), text)], &CancelToken::new()) {
-        // Another process may have written it in the meantime.
+        // Another process may have written the file in the meantime.
         Err(_) if is_there() => Ok(path),
         Err(_) if path.symlink_metadata().is_ok() => Err(refused(&path, "the starter scene")),
         written => written.map(|()| path),
     }
 }
 
-/// The error about a file that was not written by glimt.
+/// Error for an existing file that glimt did not write.
 fn refused(path: &Path, what: &str) -> OutputError {
     let reason = format!(
         "cannot write {}: the existing file is not {what}; move it or choose another folder with --cache",
@@ -59,7 +60,7 @@ fn create(folder: &Path) -> Result<(), OutputError> {
     fs::create_dir_all(folder).map_err(|source| OutputError::File { path: folder.to_owned(), source })
 }
 
-/// Two references with their cost.
+/// Two references and their cost.
 #[derive(Clone, Debug)]
 pub(super) struct CachedReferences {
     pub(super) pair: Pair,
@@ -69,7 +70,7 @@ pub(super) struct CachedReferences {
 /// Rendering cost of two references.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct ReferenceCost {
-    /// Average samples per pixel of each.
+    /// Average samples per pixel of each reference.
     pub(super) samples: f64,
     /// Total rendering time in seconds.
     pub(super) seconds: f64,
@@ -165,19 +166,19 @@ mod tests {
     }
 
     #[test]
-    fn foreign_files_are_never_replaced() {
+    fn foreign_files_are_never_overwritten() {
         let folder = tempfile::tempdir().expect("a folder");
         let own = folder.path().join("starter.toml");
-        fs::write(&own, "a scene of the user").expect("written");
+        fs::write(&own, "the user's scene").expect("written");
         let scene = starter(folder.path()).expect("a scene");
-        assert_eq!(fs::read_to_string(&own).expect("a scene"), "a scene of the user");
+        assert_eq!(fs::read_to_string(&own).expect("a scene"), "the user's scene");
         assert_eq!(fs::read_to_string(&scene).expect("a scene"), crate::scene::starter());
         assert_eq!(starter(folder.path()).expect("it exists"), scene);
         fs::write(&scene, "edited").expect("written");
         let why = starter(folder.path()).expect_err("edited").to_string();
         assert!(why.contains("starter.toml") && why.contains("--cache"), "{why}");
         assert_eq!(fs::read_to_string(&scene).expect("a scene"), "edited");
-        // References only replace references.
+        // References only overwrite references.
         let key = Fingerprint::new("x").finish();
         let path = file(folder.path(), &key);
         fs::write(&path, "notes").expect("written");
@@ -220,10 +221,10 @@ mod tests {
             let mut broken = whole.clone();
             broken[place] ^= 1;
             fs::write(&path, broken).expect("written");
-            assert!(load(folder.path(), &key).is_none(), "a bit of byte {place}");
+            assert!(load(folder.path(), &key).is_none(), "flipped a bit in byte {place}");
         }
         let lie = b"{\"width\":4,\"height\":4,\"cost\":{\"samples\":1.0,\"seconds\":1.0}}\n".to_vec();
         fs::write(&path, [lie.clone(), seal_of(&lie).into_bytes()].concat()).expect("written");
-        assert!(load(folder.path(), &key).is_none(), "fewer pixels than in the header");
+        assert!(load(folder.path(), &key).is_none(), "fewer pixels than specified in the header");
     }
 }

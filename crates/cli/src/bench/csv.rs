@@ -2,7 +2,7 @@
 
 use super::results::Results;
 
-/// The header line, with its line end.
+/// The header, including the line ending.
 pub const HEAD: &str =
     "scene,width,height,method,step,seed,samples,seconds,setup_seconds,relmse,reference_noise\r\n";
 
@@ -42,7 +42,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_image_has_a_line_with_all_fields() {
+    fn each_image_has_a_line_with_all_fields() {
         let mut results = results();
         results.scenes[1].scene = "odd, \"name\".toml".to_owned();
         let text = csv(&results);

@@ -17,10 +17,10 @@ use crate::pipeline::session::{Rendered, Session};
 use crate::pipeline::settings::Overrides;
 use crate::pipeline::words;
 
-/// Ratio of the samples of consecutive steps by default.
+/// Default ratio of samples between consecutive steps.
 const SAMPLE_RATIO: u32 = 4;
 
-/// Target of one step.
+/// What to render in one step.
 #[derive(Clone, Copy)]
 struct StepTarget {
     index: u32,
@@ -34,22 +34,22 @@ pub(super) struct MethodRun<'a> {
     /// Overrides shared by all images and the references.
     pub(super) common: &'a Overrides,
     pub(super) method: &'a Method,
-    /// ReferenceKeys of the references.
+    /// Keys of the references.
     pub(super) keys: &'a ReferenceKeys,
     pub(super) two: &'a TwoReferences,
-    /// Default maximum number of samples of a step.
+    /// Default maximum number of samples per step.
     pub(super) most_samples: f64,
 }
 
 impl MethodRun<'_> {
-    /// Measures the method. Sets `threads` to the number of rendering threads.
+    /// Measures the method and sets `threads` to the number of rendering threads.
     pub(super) fn measure(
         &self,
         budget: &TimeBudget,
         threads: &mut usize,
     ) -> Result<MethodResult, BenchError> {
         let mut session = Session::default();
-        // Warm the caches before the first measured image.
+        // Warm the caches before measuring.
         let begin = StepTarget { index: 0, samples: 1, budget: None };
         let first = self.render(&mut session, SEEDS[0], begin)?;
         *threads = first.report.settings.threads;
@@ -68,7 +68,7 @@ impl MethodRun<'_> {
         Ok(MethodResult::new(self.method.name.clone(), setup(&first.report), steps))
     }
 
-    /// The target of the next step, given the previous steps and their durations in seconds.
+    /// The next step, given the previous steps and their durations in seconds.
     fn next(&self, steps: &[StepResult], took: &[f64], budget: &TimeBudget) -> Option<StepTarget> {
         let index = steps.len() as u32;
         match &self.run.order.steps {
@@ -158,7 +158,7 @@ impl MethodRun<'_> {
         self.run.begins(&what, left);
     }
 
-    /// Expected growth of the time from one step to the next, as a factor.
+    /// Expected factor by which the time grows from the previous step.
     fn growth(&self, aim: StepTarget) -> f64 {
         let index = aim.index as usize;
         match &self.run.order.steps {
@@ -168,7 +168,7 @@ impl MethodRun<'_> {
         }
     }
 
-    /// Expected total time of the later steps, relative to this one.
+    /// Expected total time of the later steps, relative to this step.
     fn later(&self, aim: StepTarget) -> f64 {
         let index = aim.index as usize;
         match &self.run.order.steps {
@@ -221,12 +221,12 @@ fn summary(
     }
 }
 
-/// Seconds per image: photon mapping and rendering.
+/// Seconds of photon mapping and rendering for an image.
 fn rendering(report: &Report) -> f64 {
     [Stage::Photons, Stage::Render].map(|stage| report.stages[stage as usize].seconds).iter().sum()
 }
 
-/// Seconds of the stages before, which run once.
+/// Seconds of the earlier stages, which run once.
 fn setup(report: &Report) -> f64 {
     report.stages[..Stage::Photons as usize].iter().map(|stage| stage.seconds).sum()
 }

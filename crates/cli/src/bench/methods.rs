@@ -4,7 +4,7 @@ use crate::choice::Choice;
 use crate::pipeline::settings::Overrides;
 use crate::scene::description::{Accel, Integrator, Scene, Shadows};
 
-/// Values of each setting to measure, in all combinations. An empty list means the scene's value.
+/// Values of each setting, measured in all combinations. An empty list means the scene's value.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Toggles {
     /// Integrators.
@@ -13,7 +13,7 @@ pub struct Toggles {
     pub photons: Vec<bool>,
     /// Shadows, in whitted.
     pub shadows: Vec<Shadows>,
-    /// Limits of the radiance per bounce.
+    /// Limits on the radiance per bounce.
     pub clamps: Vec<f32>,
     /// Acceleration structures.
     pub accels: Vec<Accel>,
@@ -22,7 +22,7 @@ pub struct Toggles {
 /// A rendering method.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Method {
-    /// Name in tables.
+    /// Name shown in tables.
     pub name: String,
     /// Overrides that select the method.
     pub overrides: Overrides,
@@ -32,13 +32,14 @@ pub struct Method {
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct MethodSettings {
     integrator: Integrator,
-    /// Photons and shadows. `None` for path, which ignores both.
+    /// Photons and shadows. `None` for path tracing, which ignores both.
     of_whitted: Option<(bool, Shadows)>,
     clamp: f32,
     accel: Accel,
 }
 
-/// The methods to measure on a scene. By default: path, whitted with photons, and the scene's own settings if they differ.
+/// The methods to measure on a scene. The default is path, whitted with photons, and the scene's settings if
+/// they differ from both.
 pub fn methods(scene: &Scene, toggles: &Toggles) -> Vec<Method> {
     let all = if *toggles == Toggles::default() {
         default_settings(scene)
@@ -95,7 +96,7 @@ fn settings(
     MethodSettings { integrator, of_whitted, clamp, accel }
 }
 
-/// Creates a method. Its name contains the settings that were requested.
+/// Creates a method, named after the requested settings.
 fn method(settings: MethodSettings, toggles: &Toggles) -> Method {
     let mut words = vec![settings.integrator.name().to_owned()];
     if let Some((photons, shadows)) = settings.of_whitted {

@@ -18,7 +18,7 @@ const ACROSS: usize = 2;
 /// Draws the plots.
 ///
 /// # Errors
-/// An error of the plotting library.
+/// An error from the plotting library.
 pub fn svg(results: &Results) -> Result<String, String> {
     let across = results.scenes.len().clamp(1, ACROSS);
     let down = results.scenes.len().div_ceil(ACROSS).max(1);
@@ -49,7 +49,7 @@ mod tests {
     }
 
     #[test]
-    fn plots_have_all_scenes_methods_and_axes() {
+    fn plots_contain_all_scenes_methods_and_axes() {
         let svg = svg(&results()).expect("a plot");
         let texts = texts(&svg);
         for word in [
@@ -61,7 +61,7 @@ mod tests {
             "10⁻²",
             "0.1",
         ] {
-            assert!(texts.iter().any(|text| text == word), "{word} in {texts:?}");
+            assert!(texts.iter().any(|text| text == word), "{word} not found in {texts:?}");
         }
         assert!(
             texts.iter().any(|text| text.starts_with("whitted, slope −0.") && text.ends_with("BIAS 1.0e-2")),
@@ -74,7 +74,7 @@ mod tests {
                 .filter(|node| node.has_tag_name("polyline") && node.attribute("stroke") == Some(color))
                 .count()
         };
-        assert!(lines("#0072B2") >= 2 && lines("#D55E00") >= 2, "a line for each method in each panel");
+        assert!(lines("#0072B2") >= 2 && lines("#D55E00") >= 2, "expected a line per method in each panel");
         let root = document.root_element();
         assert_eq!((root.attribute("width"), root.attribute("height")), (Some("1280"), Some("480")));
     }

@@ -1,4 +1,4 @@
-//! The two references of a scene: given as files, cached or rendered.
+//! The two references of a scene, from files, from the cache or newly rendered.
 
 use std::path::{Path, PathBuf};
 
@@ -14,21 +14,22 @@ use crate::scene::description::Integrator;
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::fingerprint::{Fingerprint, Key};
 
-/// Seeds of the references. Measured images never use them.
+/// Seeds of the references, never used for measured images.
 pub(super) const SEEDS: [u32; 2] = [u32::MAX - 1, u32::MAX];
 
-/// Samples for rendering until the time limit.
+/// Sample count that is never reached before the time limit.
 const UNLIMITED_SAMPLES: u32 = 1 << 24;
 
-/// Ratio of the references' samples to the most measured samples.
+/// Ratio of the references' samples to the largest measured sample count.
 const REFERENCE_RATIO: u32 = 100;
-/// Lower bound on that limit, even for references with few samples.
+/// Minimum for the largest measured sample count, even if the references have few samples.
 const MIN_MEASURED: f64 = 16.0;
 
-/// Default maximum number of samples to measure with.
+/// Maximum sample count to measure by default.
 const MAX_MEASURED: f64 = 65_536.0;
 
-/// Largest sample count that these references are good enough for. `None` for files, whose sample count is unknown.
+/// Largest sample count to measure with references of `of_references` samples, which is `None` for image
+/// files.
 pub(super) fn most_measured(of_references: Option<f64>) -> f64 {
     let most = of_references.map_or(MAX_MEASURED, |samples| samples / f64::from(REFERENCE_RATIO));
     most.clamp(MIN_MEASURED, MAX_MEASURED)
@@ -38,19 +39,20 @@ pub(super) fn most_measured(of_references: Option<f64>) -> f64 {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ReferenceQuality {
     pub(super) samples: u32,
-    /// Time limit of both in seconds.
+    /// Time limit in seconds for both references together.
     pub(super) seconds: Option<f64>,
 }
 
 impl ReferenceQuality {
-    /// The best quality possible in the given time, limited to what `most` measured samples need.
+    /// The best quality possible in the given time, but no better than needed to measure `most` samples.
     pub(super) fn in_time(seconds: f64, most: Option<u32>) -> Self {
         let samples = most
             .map_or(UNLIMITED_SAMPLES, |most| most.saturating_mul(REFERENCE_RATIO).min(UNLIMITED_SAMPLES));
         Self { samples, seconds: Some(seconds) }
     }
 
-    /// Whether cached references are good enough. Half of the time is.
+    /// Whether cached references are good enough: they have enough samples, or took at least half of the
+    /// requested time.
     fn is_met(self, cost: ReferenceCost) -> bool {
         cost.samples >= f64::from(self.samples)
             || self.seconds.is_some_and(|seconds| cost.seconds >= 0.5 * seconds)
@@ -62,7 +64,7 @@ pub(super) struct SceneReferences {
     pub(super) two: TwoReferences,
     pub(super) result: ReferenceResult,
     pub(super) warnings: Vec<Diagnostic>,
-    /// Why they could not be cached.
+    /// Why the references could not be cached.
     pub(super) cache_error: Option<String>,
 }
 
@@ -120,7 +122,7 @@ impl ReferenceRenderer<'_> {
         Some(reference(stored, true, Vec::new(), None))
     }
 
-    /// Renders both references. Calls `begin` before each with the number of references left.
+    /// Renders both references. Before each, calls `begin` with the number of references left.
     pub(super) fn make(
         &self,
         session: &mut Session,
@@ -170,8 +172,8 @@ impl ReferenceRenderer<'_> {
     }
 }
 
-/// The cache key of the references. Builds do not share references, as their renders may differ. References with requested samples
-/// have different keys from those limited by time.
+/// The cache key of the references. It differs between builds, whose renders may differ, and between
+/// references with requested samples and references limited by time.
 fn cache_key(build: &str, asked: Option<u32>, ReferenceKeys(keys): &ReferenceKeys) -> Key {
     let mut key = Fingerprint::new("references");
     key.text(build).u64(asked.unwrap_or(0).into());
@@ -204,7 +206,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn builds_share_no_references() {
+    fn builds_do_not_share_references() {
         let keys = || ReferenceKeys(["a", "b"].map(|name| Fingerprint::new(name).finish()));
         let (common, token) = (Overrides::default(), CancelToken::new());
         let renderer = ReferenceRenderer {
@@ -221,9 +223,9 @@ mod tests {
     }
 
     #[test]
-    fn steps_have_at_most_1_percent_of_samples() {
+    fn measured_samples_are_limited_to_1_percent() {
         assert_eq!(most_measured(Some(25_600.0)), 256.0);
-        assert_eq!(most_measured(Some(400.0)), 16.0, "fewer would show no slope");
+        assert_eq!(most_measured(Some(400.0)), 16.0, "fewer samples are too few for a slope");
         assert_eq!(most_measured(Some(1e9)), 65_536.0);
         assert_eq!(most_measured(None), 65_536.0, "unknown samples");
     }

@@ -1,4 +1,4 @@
-//! Requests for a benchmark, its events and its errors.
+//! Benchmark requests, events and errors.
 
 use std::path::PathBuf;
 
@@ -9,16 +9,16 @@ use crate::pipeline::session::Unrendered;
 use crate::pipeline::settings::Overrides;
 use crate::scene::diagnostic::Diagnostic;
 
-/// A request for a benchmark.
+/// A benchmark request.
 #[derive(Clone, Debug, Default)]
 pub struct BenchRequest {
     /// The scenes.
     pub scenes: Vec<PathBuf>,
-    /// Overrides of all images and references. Size, samples, seed, time and noise threshold are ignored.
+    /// Overrides for all images and references. Size, samples, seed, time and noise threshold are ignored.
     pub common: Overrides,
-    /// Width in pixels. The default follows from the height and the scene's aspect ratio.
+    /// Width in pixels. The default is computed from the height and the scene's aspect ratio.
     pub width: Option<u32>,
-    /// Height in pixels. The default follows from the width and the scene's aspect ratio.
+    /// Height in pixels. The default is computed from the width and the scene's aspect ratio.
     pub height: Option<u32>,
     /// Settings that define the methods.
     pub toggles: Toggles,
@@ -28,17 +28,17 @@ pub struct BenchRequest {
     pub seeds: u32,
     /// The first seed.
     pub seed: u32,
-    /// Where the references come from.
+    /// Source of the references.
     pub reference: ReferenceSource,
-    /// Time limit in seconds, where samples and times are not given.
+    /// Time limit in seconds if neither samples nor times are given.
     pub within: f64,
     /// Folder for cached references. `None` disables the cache.
     pub cache: Option<PathBuf>,
-    /// Output files, which no scene may depend on.
+    /// Output files. No scene may depend on them.
     pub targets: Vec<PathBuf>,
 }
 
-/// Samples or times of a method's steps.
+/// Samples or times of each step.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum StepSchedule {
     /// 1, 4, 16, … samples while time remains, up to 1 % of the references' samples.
@@ -53,12 +53,12 @@ pub enum StepSchedule {
 /// Source of the references.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum ReferenceSource {
-    /// Rendered with path in the available time, with at most a hundred times the largest requested samples.
+    /// Path traced in the available time, with up to 100 times the largest requested sample count.
     #[default]
     InTime,
-    /// Rendered with path and this many samples.
+    /// Path traced with this many samples.
     Samples(u32),
-    /// Two image files, which may be the same.
+    /// Two image files, which may be the same file.
     Files([PathBuf; 2]),
 }
 
@@ -69,20 +69,20 @@ pub enum BenchEvent {
     Begins {
         /// Name of the task.
         what: String,
-        /// Estimated seconds until the end.
+        /// Estimated seconds until the benchmark ends.
         left: Option<f64>,
     },
-    /// A task is done. A line for logs.
+    /// A task is done. Contains a line for the log.
     Done(String),
-    /// A step is done. A point of the plot.
+    /// A step is done. Contains a point for the plot.
     Point {
         /// The scene's path as given by the caller.
         scene: String,
-        /// The method's name in tables.
+        /// The method's name, as shown in tables.
         method: String,
-        /// Median of the seconds of photon mapping and rendering.
+        /// Median time of photon mapping and rendering in seconds.
         seconds: f64,
-        /// Median of relMSE.
+        /// Median relMSE.
         relmse: f64,
     },
     /// Warnings about a scene.
@@ -103,7 +103,7 @@ pub struct Unfinished {
 pub enum BenchError {
     /// A scene is invalid, or the work failed.
     Failed(Failure),
-    /// The arguments are invalid. A message with a hint.
+    /// The arguments are invalid. Contains a message with a hint.
     Call(String),
     /// The benchmark was cancelled.
     Cancelled,

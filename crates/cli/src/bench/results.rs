@@ -1,4 +1,4 @@
-//! Results of a benchmark, as stored by `bench --json` and read by `--baseline`.
+//! Benchmark results, as written by `bench --json` and read by `--baseline`.
 
 use serde::{Deserialize, Serialize};
 
@@ -19,7 +19,7 @@ pub struct Results {
     pub threads: usize,
     /// Total time in seconds.
     pub seconds: f64,
-    /// The scenes in the order of the arguments.
+    /// The scenes, in argument order.
     pub scenes: Vec<SceneResult>,
 }
 
@@ -43,28 +43,28 @@ pub struct SceneResult {
 pub struct ReferenceResult {
     /// Samples per pixel of each reference. `None` for files.
     pub samples: Option<f64>,
-    /// relMSE of one reference, estimated from the difference of both. 0 if they are the same file.
+    /// relMSE of one reference, estimated from the difference between the two. 0 if both are the same file.
     pub noise: f64,
-    /// Seconds of rendering both, possibly in an earlier run.
+    /// Seconds spent rendering both, possibly in an earlier run.
     pub seconds: Option<f64>,
-    /// Whether they were loaded from the cache.
+    /// Whether the references were loaded from the cache.
     pub is_cached: bool,
-    /// Files of the references, if given.
+    /// The reference files, if given.
     pub files: Vec<String>,
 }
 
 /// Results of a method on a scene.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MethodResult {
-    /// Its name in tables.
+    /// Name shown in tables.
     pub name: String,
     /// Seconds for reading files, building acceleration structures and preparing lights.
     pub setup_seconds: f64,
     /// The steps in order of time.
     pub steps: Vec<StepResult>,
-    /// Slope of error over time on log axes, from all steps.
+    /// Slope of error over time on log–log axes, from all steps.
     pub slope: Option<Slope>,
-    /// Slope of error over time on log axes, from the last two steps.
+    /// Slope of error over time on log–log axes, from the last two steps.
     pub last_slope: Option<Slope>,
     /// Times to reach `TARGETS`.
     pub time_to: [Option<TimeTo>; TARGETS.len()],
@@ -72,24 +72,24 @@ pub struct MethodResult {
     pub verdict: Verdict,
 }
 
-/// Results of one number of samples or one time limit.
+/// Results for one sample count or one time limit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StepResult {
-    /// Samples per pixel. The median with a time limit.
+    /// Samples per pixel. With a time limit, the median.
     pub samples: f64,
     /// The time limit in seconds.
     pub budget: Option<f64>,
-    /// Median of the seconds of photon mapping and rendering.
+    /// Median time of photon mapping and rendering in seconds.
     pub seconds: f64,
-    /// Median of relMSE.
+    /// Median relMSE.
     pub relmse: f64,
-    /// Minimum and maximum of relMSE.
+    /// Minimum and maximum relMSE.
     pub spread: [f64; 2],
-    /// Standard error of each relMSE due to the noise of the references.
+    /// Standard error of each relMSE due to reference noise.
     pub uncertainty: f64,
-    /// The estimated bias. `None` for too few images.
+    /// The estimated bias. `None` if there are too few images.
     pub bias: Option<Bias>,
-    /// Difference in brightness from the references. `None` for too few images.
+    /// Difference in brightness from the references. `None` if there are too few images.
     #[serde(default)]
     pub brightness: Option<Brightness>,
     /// The individual images.
@@ -103,9 +103,9 @@ pub struct ImageResult {
     pub seed: u32,
     /// Average samples per pixel.
     pub samples: f64,
-    /// Seconds of photon mapping and rendering.
+    /// Time of photon mapping and rendering in seconds.
     pub seconds: f64,
-    /// The error. May be negative if it is smaller than the noise of the references.
+    /// The error. May be negative if it is below the noise of the references.
     pub relmse: f64,
 }
 
@@ -117,27 +117,27 @@ pub enum Verdict {
     Unknown,
     /// No bias was found.
     NoneFound {
-        /// Upper confidence bound of the squared bias.
+        /// Upper confidence bound on the squared bias.
         bound: f64,
     },
     /// There is a bias that decreases with more samples.
     Falls {
         /// Squared bias at the last step, as a contribution to relMSE.
         size: f64,
-        /// Fraction of the error due to the bias.
+        /// Fraction of the error caused by bias.
         share: f64,
     },
     /// There is a bias that does not decrease, so the slope flattens.
     Stays {
         /// Squared bias at the last step, as a contribution to relMSE.
         size: f64,
-        /// Fraction of the error due to the bias.
+        /// Fraction of the error caused by bias.
         share: f64,
     },
 }
 
 impl Verdict {
-    /// Decides from the biases of the last two steps.
+    /// Compares the biases of the last two steps.
     pub(super) fn of(steps: &[StepResult]) -> Self {
         let Some(last) = steps.last() else { return Self::Unknown };
         let Some(bias) = last.bias else { return Self::Unknown };
@@ -155,10 +155,10 @@ impl Verdict {
     }
 }
 
-/// Whether a bias decreases significantly.
+/// Whether the bias decreased significantly.
 fn falls(before: Bias, after: Bias) -> bool {
-    /// Largest ratio of a decreasing bias after quadrupling the samples. The bias of photon mapping decreases to 0.4, a constant
-    /// bias to 1.
+    /// Maximum ratio for a bias to count as decreasing when the samples quadruple. The ratio is 0.4 for
+    /// photon mapping and 1 for a constant bias.
     const MAX_RATIO: f64 = 0.8;
     let error = (before.error * before.error + after.error * after.error).sqrt();
     after.size < MAX_RATIO * before.size && before.size - after.size > 2.0 * error
@@ -168,7 +168,7 @@ impl MethodResult {
     pub(super) fn new(name: String, setup_seconds: f64, steps: Vec<StepResult>) -> Self {
         let middle: Vec<(f64, f64)> = steps.iter().map(|step| (step.seconds, step.relmse)).collect();
         let verdict = Verdict::of(&steps);
-        // With a constant bias, do not extrapolate the error.
+        // Do not extrapolate the error if the bias is constant.
         let is_expected = |time: &TimeTo| time.is_measured || !matches!(verdict, Verdict::Stays { .. });
         Self {
             name,
@@ -182,7 +182,7 @@ impl MethodResult {
     }
 }
 
-/// One series per seed: the first image of every step, the second, and so on.
+/// One series per image number: the first image of every step, the second of every step, and so on.
 fn series(steps: &[StepResult]) -> Vec<Vec<(f64, f64)>> {
     let count = steps.iter().map(|step| step.pictures.len()).min().unwrap_or(0);
     let point = |step: &StepResult, index: usize| (step.pictures[index].seconds, step.pictures[index].relmse);
@@ -193,7 +193,7 @@ fn series(steps: &[StepResult]) -> Vec<Vec<(f64, f64)>> {
 pub(super) mod tests {
     use super::*;
 
-    /// A synthetic step with three images around an error.
+    /// A synthetic step with three images whose errors are close to `relmse`.
     pub(crate) fn step(samples: f64, seconds: f64, relmse: f64, bias: f64) -> StepResult {
         let of = |(number, factor): (u32, f64)| ImageResult {
             seed: number,
@@ -219,7 +219,7 @@ pub(super) mod tests {
         }
     }
 
-    /// A synthetic method: noise inversely proportional to time, plus a bias.
+    /// A synthetic method with noise inversely proportional to time, plus a bias.
     pub(crate) fn method(name: &str, noise: f64, bias: f64) -> MethodResult {
         let steps =
             [1.0, 4.0, 16.0, 64.0].map(|samples| step(samples, samples * 0.01, noise / samples + bias, bias));

@@ -19,7 +19,7 @@ use crate::pipeline::words;
 use crate::scene;
 use crate::scene::description::Scene;
 
-/// Default length of the longer side in pixels.
+/// Default size of the longer side in pixels.
 const LONG_SIDE: u32 = 96;
 
 /// Runs a benchmark. Checks all scenes before measuring the first one.
@@ -70,7 +70,7 @@ fn check_all(runs: &[SceneRun<'_>]) -> Result<(), BenchError> {
     if wrong.is_empty() { Ok(()) } else { Err(BenchError::Failed(Failure::Scene(wrong))) }
 }
 
-/// The size of the images of a scene.
+/// The size of a scene's images.
 pub fn size(scene: &Scene, asked: (Option<u32>, Option<u32>)) -> (u32, u32) {
     let (width, height) = (f64::from(scene.render.width), f64::from(scene.render.height));
     let side = |length: f64| length.round().clamp(1.0, 65536.0) as u32;
@@ -87,7 +87,7 @@ pub fn size(scene: &Scene, asked: (Option<u32>, Option<u32>)) -> (u32, u32) {
 
 /// Checks that the seeds of images and references do not overlap.
 fn check_seeds(order: &BenchRequest) -> Result<(), BenchError> {
-    /// Maximum number of steps in a default schedule.
+    /// Maximum number of steps in the default schedule.
     const MAX_STEPS: u32 = 64;
     let steps = match &order.steps {
         StepSchedule::Climb => MAX_STEPS,
@@ -98,11 +98,11 @@ fn check_seeds(order: &BenchRequest) -> Result<(), BenchError> {
     if last < u64::from(SEEDS[0]) {
         return Ok(());
     }
-    let way_out = "the seeds would overlap with those of the references; choose a smaller --seed";
+    let way_out = "the references use the same seeds; choose a smaller --seed";
     Err(BenchError::Call(format!("--seed {} is too large: {way_out}", order.seed)))
 }
 
-/// A run of the benchmark on one scene.
+/// A benchmark run on one scene.
 pub(super) struct SceneRun<'a> {
     pub(super) order: &'a BenchRequest,
     pub(super) path: &'a Path,
@@ -110,7 +110,7 @@ pub(super) struct SceneRun<'a> {
     tell: &'a dyn Fn(BenchEvent),
 }
 
-/// Message about a scene that was saved while being measured.
+/// Error message for a scene that was saved while it was measured.
 fn changed_during_measurement(scene: &Path) -> String {
     format!("{} or one of its files changed during the measurement; run the benchmark again", scene.display())
 }
@@ -161,7 +161,7 @@ impl SceneRun<'_> {
         }
     }
 
-    /// Measures the scene. Prepares it again, as it may have been saved since the first check.
+    /// Measures the scene. Prepares it again first, because it may have been saved since the first check.
     fn measure(&self, budget: &mut TimeBudget, threads: &mut usize) -> Result<SceneResult, BenchError> {
         let mut session = Session::default();
         let PreparedScene { scene, given, common, keys } = self.prepare(&mut session)?;
@@ -193,7 +193,7 @@ impl SceneRun<'_> {
         Ok(SceneResult { scene, width, height, reference: reference.result, methods: measured })
     }
 
-    /// Loads cached references if they are good enough, or renders new ones.
+    /// Loads cached references if they are good enough, and otherwise renders new references.
     fn reference(
         &self,
         session: &mut Session,
@@ -219,12 +219,12 @@ impl SceneRun<'_> {
         if made.keys == *keys { Ok(maker.keep(made)) } else { Err(self.changed()) }
     }
 
-    /// The error about a scene that was saved while being measured.
+    /// Error for a scene that was saved while it was measured.
     pub(super) fn changed(&self) -> BenchError {
         BenchError::Failed(Failure::Work(changed_during_measurement(self.path)))
     }
 
-    /// Checks that no output is an input of the scene.
+    /// Checks that no output file is an input of the scene.
     fn check_targets(&self, session: &Session) -> Result<(), BenchError> {
         match self.order.targets.iter().find(|target| session.reads(target)) {
             Some(target) => Err(BenchError::Call(format!(
@@ -241,7 +241,7 @@ impl SceneRun<'_> {
             (self.tell)(BenchEvent::Warnings(reference.warnings.clone()));
         }
         if let Some(why) = &reference.cache_error {
-            self.done(&format!("the references are not cached: {why}"));
+            self.done(&format!("could not cache the references: {why}"));
         }
         let result = &reference.result;
         let made = match (result.is_cached, result.seconds) {
@@ -299,10 +299,10 @@ mod tests {
     }
 
     #[test]
-    fn errors_keep_the_results_of_earlier_scenes() {
+    fn errors_keep_results_of_earlier_scenes() {
         let folder = tempfile::tempdir().expect("a folder");
         let order = two_scenes(folder.path());
-        // Remove the second scene while the first is measured.
+        // Remove the second scene while measuring the first.
         let tell = |news| match news {
             BenchEvent::Point { .. } => std::fs::remove_file(&order.scenes[1]).unwrap_or_default(),
             BenchEvent::Begins { .. } | BenchEvent::Done(_) | BenchEvent::Warnings(_) => {}
@@ -313,10 +313,11 @@ mod tests {
         assert_eq!(done, [3]);
     }
 
-    /// Two scenes in a folder, and a request that measures them quickly with a cache in the same folder.
+    /// Writes two scenes to a folder, and returns a request to measure them quickly with a cache in the same
+    /// folder.
     fn two_scenes(folder: &Path) -> BenchRequest {
         let scenes = ["a.toml", "b.toml"].map(|name| folder.join(name));
-        // Different colors, as equal scenes would share their references.
+        // Use different colors, because identical scenes would share references.
         scenes.iter().zip(["1", "2"]).for_each(|(scene, color)| write(scene, color));
         BenchRequest {
             scenes: scenes.into(),
@@ -340,7 +341,7 @@ mod tests {
     }
 
     #[test]
-    fn scenes_saved_before_their_turn_are_read_again() {
+    fn scenes_saved_before_measurement_are_reloaded() {
         let folder = tempfile::tempdir().expect("a folder");
         let order = two_scenes(folder.path());
         let save = |news| match news {
@@ -352,9 +353,9 @@ mod tests {
         };
         let measured = run(&order, &CancelToken::new(), &save).expect("both");
         for method in measured.scenes.iter().flat_map(|scene| &scene.methods) {
-            assert_eq!(method.steps[0].relmse, 0.0, "{}: the other version", method.name);
+            assert_eq!(method.steps[0].relmse, 0.0, "{}: measured the old version", method.name);
         }
-        // Cached references belong to the second version. The first version has none.
+        // Only the second version of the scene has cached references.
         let again = |color| {
             write(&order.scenes[1], color);
             let again = run(&order, &CancelToken::new(), &|_| {}).expect("both");
@@ -384,7 +385,7 @@ mod tests {
             let BenchError::Failed(Failure::Work(message)) = &unfinished.error else { panic!("{moment}") };
             assert_eq!(*message, changed_during_measurement(&order.scenes[1]));
             assert_eq!(unfinished.done.scenes.len(), 1);
-            // References of two versions are not cached.
+            // References rendered from different versions are not cached.
             write(&order.scenes[1], "3");
             let again = run(&order, &CancelToken::new(), &|_| {}).expect("both");
             assert!(!again.scenes[1].reference.is_cached, "{moment}");
@@ -393,7 +394,7 @@ mod tests {
     }
 
     #[test]
-    fn saves_that_spare_the_references_also_fail() {
+    fn saves_during_a_later_method_fail() {
         let folder = tempfile::tempdir().expect("a folder");
         let order = two_scenes(folder.path());
         let text =
@@ -407,13 +408,15 @@ mod tests {
             | BenchEvent::Done(_)
             | BenchEvent::Warnings(_) => {}
         };
-        let Err(unfinished) = run(&order, &CancelToken::new(), &save) else { panic!("it was saved") };
+        let Err(unfinished) = run(&order, &CancelToken::new(), &save) else {
+            panic!("expected an error because the scene was saved")
+        };
         let BenchError::Failed(Failure::Work(message)) = &unfinished.error else { panic!("of the work") };
         assert_eq!(*message, changed_during_measurement(&order.scenes[0]));
     }
 
     #[test]
-    fn seeds_never_overlap_with_references() {
+    fn image_and_reference_seeds_never_overlap() {
         let order = |seed| BenchRequest { seed, seeds: 6, ..BenchRequest::default() };
         assert!(check_seeds(&order(1)).is_ok());
         assert!(check_seeds(&order(u32::MAX - 6 * 64 - 2)).is_ok());

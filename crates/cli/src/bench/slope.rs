@@ -1,20 +1,20 @@
-//! Convergence: the slope of error over time on log–log axes.
+//! Convergence, as the slope of error over time on log–log axes.
 
 use serde::{Deserialize, Serialize};
 
 use super::statistics::mean;
 
-/// A slope on log–log axes. It is −1 for independent samples, and 0 if the error does not decrease.
+/// A slope on log–log axes. −1 for independent samples, 0 if the error does not decrease.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Slope {
     /// The slope.
     pub value: f64,
-    /// Standard error over the series.
+    /// Standard error across the series.
     pub error: f64,
 }
 
-/// The mean slope of independent series of times and errors. Skips errors that are not positive. `None` if no series has two
-/// points at different times.
+/// Mean slope of independent series of times and errors. Skips errors that are zero or negative. `None` if no
+/// series has two points at different times.
 pub fn slope(series: &[Vec<(f64, f64)>]) -> Option<Slope> {
     let slopes: Vec<f64> = series.iter().filter_map(|points| fit(points)).collect();
     let (value, error) = mean(&slopes);
@@ -35,8 +35,9 @@ fn fit(points: &[(f64, f64)]) -> Option<f64> {
     (square > 1e-12).then(|| product / square)
 }
 
-/// When the error reaches `target`, by linear interpolation on log–log axes, or extrapolation of the last two points. `None` if the
-/// first error is already below, the error does not decrease, or the time exceeds a thousand times the measured one.
+/// The time at which the error reaches `target`, interpolated linearly on log–log axes or extrapolated from
+/// the last two points. `None` if the first error is below the target, the error does not decrease, or the
+/// time is more than 1000 times the last measured time.
 pub fn time_to(target: f64, points: &[(f64, f64)]) -> Option<TimeTo> {
     let after = points.iter().position(|(_, error)| *error <= target);
     let (index, is_measured) = match after {
@@ -54,12 +55,12 @@ pub fn time_to(target: f64, points: &[(f64, f64)]) -> Option<TimeTo> {
     (seconds <= 1000.0 * t1).then_some(TimeTo { seconds, is_measured })
 }
 
-/// When an error reaches a target.
+/// The time at which an error reaches a target.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TimeTo {
-    /// Seconds of rendering.
+    /// Rendering time in seconds.
     pub seconds: f64,
-    /// Whether the time is interpolated, not extrapolated.
+    /// Whether the time is interpolated rather than extrapolated.
     pub is_measured: bool,
 }
 
@@ -106,8 +107,8 @@ mod tests {
         let beyond = time_to(1e-4, &fall).expect("a time");
         assert!(!beyond.is_measured && (beyond.seconds - 10.0).abs() < 1e-6, "{beyond:?}");
         assert_eq!(time_to(1e-9, &fall), None, "too far");
-        assert_eq!(time_to(0.5, &fall), None, "reached at once");
-        assert_eq!(time_to(0.001, &points(0.0, 0.0)), None, "it does not decrease");
+        assert_eq!(time_to(0.5, &fall), None, "the first point is below the target");
+        assert_eq!(time_to(0.001, &points(0.0, 0.0)), None, "the error does not decrease");
         assert_eq!(time_to(0.1, &[(1.0, 1.0)]), None);
     }
 }

@@ -41,7 +41,8 @@ pub fn quantile(probability: f64, freedom: f64) -> f64 {
     high
 }
 
-/// The difference of the means, b − a, with its standard error and degrees of freedom (Welch–Satterthwaite).
+/// The difference between the means, b − a, its standard error and its degrees of freedom
+/// (Welch–Satterthwaite).
 pub fn welch(a: &[f64], b: &[f64]) -> (f64, f64, f64) {
     let ((mean_a, error_a), (mean_b, error_b)) = (mean(a), mean(b));
     let (square_a, square_b) = (error_a * error_a, error_b * error_b);
@@ -51,7 +52,7 @@ pub fn welch(a: &[f64], b: &[f64]) -> (f64, f64, f64) {
     (mean_b - mean_a, square.sqrt(), if freedom.is_finite() { freedom } else { 1.0 })
 }
 
-/// The regularized incomplete beta function I_x(a, b), by its continued fraction (modified Lentz's method).
+/// The regularized incomplete beta function I_x(a, b), from its continued fraction (modified Lentz's method).
 fn incomplete_beta(x: f64, a: f64, b: f64) -> f64 {
     if x <= 0.0 || x >= 1.0 {
         return x.clamp(0.0, 1.0);
@@ -118,7 +119,8 @@ mod tests {
     fn welch_matches_a_manual_computation() {
         let (difference, error, freedom) = welch(&[1.0, 2.0, 3.0], &[5.0, 7.0, 9.0, 11.0]);
         assert!((difference - 6.0).abs() < 1e-14);
-        // Variances 1 and 20/3: 1/3 + 5/3 = 2; 4/((1/9)/2 + (25/9)/3).
+        // The variances are 1 and 20/3. Squared error: 1/3 + 5/3 = 2. Degrees of freedom: 4/((1/9)/2 +
+        // (25/9)/3).
         assert!((error - 2.0_f64.sqrt()).abs() < 1e-14);
         assert!((freedom - 4.0 / (1.0 / 18.0 + 25.0 / 27.0)).abs() < 1e-12, "{freedom}");
     }

@@ -1,4 +1,4 @@
-//! Formats results as a table of 80 columns.
+//! Formats results as a table that fits 80 columns.
 
 use super::results::{MethodResult, ReferenceResult, Results, SceneResult, StepResult, TARGETS, Verdict};
 use super::slope::{Slope, TimeTo};
@@ -47,7 +47,7 @@ fn references(reference: &ReferenceResult, scene: &SceneResult) -> String {
     let noise = format!("noise {}", error(reference.noise));
     let Some(samples) = reference.samples else {
         return match reference.files.as_slice() {
-            [one] => format!("reference: {one} (a single one, so its noise counts as error)"),
+            [one] => format!("reference: {one} (a single reference, so its noise counts as error)"),
             files => format!("references: {}, {noise}", files.join(" and ")),
         };
     };
@@ -71,12 +71,12 @@ fn of_step(name: &str, step: &StepResult, width: usize) -> String {
     )
 }
 
-/// Formats a number of samples, without decimals for integers.
+/// Formats a sample count, without decimals for integers.
 fn count(samples: f64) -> String {
     if samples.fract() == 0.0 { format!("{samples:.0}") } else { format!("{samples:.1}") }
 }
 
-/// Formats an error with three digits. Nonpositive errors are below the noise of the references.
+/// Formats an error with three digits. Negative errors and 0 are below the noise of the references.
 pub(super) fn error(value: f64) -> String {
     if value > 0.0 { format!("{value:.2e}") } else { "≈ 0".to_owned() }
 }
@@ -97,7 +97,7 @@ fn times(method: &MethodResult) -> Option<String> {
     (!parts.is_empty()).then(|| format!("relMSE {}", parts.join(", ")))
 }
 
-/// Formats a number of samples with its unit, as in `1 sample`.
+/// Formats a sample count with its unit, as in `1 sample`.
 pub(super) fn samples(samples: f64) -> String {
     format!("{} sample{}", count(samples), if samples == 1.0 { "" } else { "s" })
 }
@@ -165,7 +165,7 @@ mod tests {
     }
 
     #[test]
-    fn errors_below_the_noise_are_about_zero() {
+    fn errors_below_noise_are_shown_as_zero() {
         assert_eq!((error(-1e-9).as_str(), error(0.0123).as_str()), ("≈ 0", "1.23e-2"));
         assert_eq!((count(16.0).as_str(), count(16.25).as_str()), ("16", "16.2"));
     }

@@ -1,11 +1,11 @@
-//! Divides the time limit of a benchmark among scenes, references and methods, and estimates the time left.
+//! Divides a benchmark's time limit among scenes, references and methods, and estimates the time left.
 
 use std::time::Instant;
 
-/// Fraction of a scene's time for its references.
+/// Fraction of a scene's time reserved for its references.
 const REFERENCE_SHARE: f64 = 0.75;
 
-/// The time budget of a benchmark.
+/// A benchmark's time budget.
 pub(super) struct TimeBudget {
     begin: Instant,
     within: f64,
@@ -64,7 +64,7 @@ impl TimeBudget {
         self.method_begin = self.seconds();
     }
 
-    /// Time spent on the current method, in seconds.
+    /// Time spent on the current method so far, in seconds.
     pub(super) fn method_seconds(&self) -> f64 {
         self.seconds() - self.method_begin
     }
@@ -79,7 +79,8 @@ impl TimeBudget {
         self.methods -= 1;
     }
 
-    /// Estimated seconds until the end. `of_this` is the rest of the current reference or method.
+    /// Estimated seconds until the benchmark ends. `of_this` is the time left for the current reference or
+    /// method.
     pub(super) fn left(&self, of_this: f64, is_reference: bool) -> f64 {
         let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
         let remaining = if is_reference { self.methods } else { self.methods.saturating_sub(1) };
@@ -98,7 +99,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn time_is_shared_among_scenes_and_methods() {
+    fn time_is_divided_among_scenes_and_methods() {
         let near =
             |value: f64, expected: f64| assert!((value - expected).abs() < 1.0, "{value}, not {expected}");
         let mut budget = TimeBudget::new(1000.0, 2);

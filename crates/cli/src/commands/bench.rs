@@ -35,14 +35,14 @@ pub(crate) fn run(args: &BenchArgs, console: &Console) -> Exit {
     try_run(args, console).unwrap_or_else(|exit| exit)
 }
 
-/// Runs the benchmark and reports errors. `Err` is their exit code.
+/// Runs the benchmark and reports errors. `Err` contains the exit code.
 fn try_run(args: &BenchArgs, console: &Console) -> Result<Exit, Exit> {
     priority::lower_priority(args.nice);
     let order = order(args, console)?;
     let scenes = order.scenes.len();
     let outputs = BenchOutputs::of(args, &order.scenes, console)?;
     let baseline = outputs.baseline(console)?;
-    // The first signal stops the measurement, the second one the writing of results.
+    // The first signal stops measuring, the second stops writing results.
     let (token, writing) = (CancelToken::new(), CancelToken::new());
     let stop = [token.clone(), writing.clone()];
     let ended = signals::catch(move || stop[usize::from(stop[0].is_cancelled())].cancel())
@@ -67,7 +67,7 @@ fn try_run(args: &BenchArgs, console: &Console) -> Result<Exit, Exit> {
         }
         Err(unfinished) => {
             let Unfinished { error, done } = *unfinished;
-            // With invalid arguments nothing has been measured.
+            // Nothing was measured if the arguments are invalid.
             if !done.scenes.is_empty() {
                 print_results(&done, baseline.as_ref(), console);
                 // Report files that cannot be written, but keep the exit code of the first error.
@@ -87,10 +87,10 @@ fn print_results(results: &Results, baseline: Option<&(String, Results)>, consol
     }
 }
 
-/// The measuring thread.
+/// The measurement thread.
 type Worker = JoinHandle<Result<Results, Box<Unfinished>>>;
 
-/// Starts the benchmark on a thread. Returns its events.
+/// Starts the benchmark on a thread and returns its events.
 fn start(order: BenchRequest, token: CancelToken) -> std::io::Result<(Receiver<BenchEvent>, Worker)> {
     let (sender, news) = mpsc::channel();
     let tell = move |one: BenchEvent| {
@@ -113,13 +113,13 @@ fn follow(news: &Receiver<BenchEvent>, progress: &mut BenchProgress) {
     }
 }
 
-/// The result after a panic, which has printed its message.
+/// The result after a panic. The panic has printed its own message.
 fn panicked() -> Unfinished {
     let what = "internal error: the renderer panicked".to_owned();
     Unfinished { error: BenchError::Failed(Failure::Work(what)), done: Results::default() }
 }
 
-/// Reports why the benchmark is unfinished. `scenes` are the numbers of measured and of all scenes.
+/// Reports why the benchmark is unfinished. `scenes` is the number of measured scenes and of all scenes.
 fn report_unfinished(
     error: &BenchError,
     ended: &ReceivedSignal,

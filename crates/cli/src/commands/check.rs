@@ -66,7 +66,7 @@ fn summary(scene: &Path, checked: &Checked) -> String {
     format!("ok: {}: {}{warnings}", scene.display(), parts.join(", "))
 }
 
-/// Formats a number with its noun in singular or plural.
+/// Formats a count with a singular or plural noun.
 pub(crate) fn count(number: u64, noun: &str) -> String {
     format!("{number} {noun}{}", if number == 1 { "" } else { "s" })
 }

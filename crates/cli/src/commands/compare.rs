@@ -1,4 +1,4 @@
-//! `glimt compare`: measures the error of an image against a reference. Writes a table, JSON or an image.
+//! `glimt compare`: measures the error of an image relative to a reference. Writes a table, JSON or an image.
 
 mod pictures;
 
@@ -27,7 +27,7 @@ pub(crate) fn run(args: &CompareArgs, console: &Console) -> Exit {
     }
 }
 
-/// Runs the comparison and reports errors. `Err` is their exit code.
+/// Runs the comparison and reports errors. `Err` contains the exit code.
 fn run_in(pool: &ThreadPool, args: &CompareArgs, console: &Console) -> Result<Exit, Exit> {
     let diff = args.diff.as_deref().map(|path| ErrorImage::check(path, args, console)).transpose()?;
     let pair = Pair::load(&args.a, &args.b).map_err(|errors| {
@@ -78,7 +78,7 @@ fn warn_about_same_file(args: &CompareArgs, console: &Console) {
     }
 }
 
-/// The image of the error.
+/// The error image.
 struct ErrorImage<'a> {
     path: &'a Path,
     format: Format,
@@ -103,13 +103,13 @@ impl<'a> ErrorImage<'a> {
 
     fn description(&self) -> &'static str {
         if self.is_float() {
-            "|a - b| of each channel, linear"
+            "|a - b| per channel, linear"
         } else {
             "FLIP in false color, from black (0) to pale yellow (1)"
         }
     }
 
-    /// Writes the image. Returns a warning about lost properties of the replaced file.
+    /// Writes the image. Returns a warning if properties of the replaced file were lost.
     fn write(
         &self,
         args: &CompareArgs,
@@ -155,7 +155,7 @@ fn check_not_input(path: &Path, real: &Path, args: &CompareArgs) -> Result<(), O
     }
 }
 
-/// Values of the table and the JSON object.
+/// Values in the table and the JSON object.
 #[derive(Serialize)]
 struct Summary<'a> {
     a: String,
@@ -217,7 +217,7 @@ fn say_table(summary: &Summary<'_>, console: &Console) {
     table(summary, console.answer_columns()).iter().for_each(|line| console.answer(line));
 }
 
-/// Lines of the table, wrapped to `columns`.
+/// The table's lines, wrapped to `columns`.
 fn table(summary: &Summary<'_>, columns: Option<usize>) -> Vec<String> {
     let Summary { a, b, width, height, .. } = summary;
     let title = format!("{a} compared with reference {b}, {width}×{height} pixels");
@@ -233,7 +233,7 @@ fn table(summary: &Summary<'_>, columns: Option<usize>) -> Vec<String> {
     lines
 }
 
-/// Values with their description to the right, or below if there is no room.
+/// A row's values, with the description to the right, or below if there is no room.
 fn row(figures: &str, note: &str, columns: Option<usize>) -> Vec<String> {
     /// Minimum width of a description.
     const MIN_NOTE_COLUMNS: usize = 24;
@@ -253,10 +253,11 @@ fn wrap(text: &str, columns: Option<usize>) -> Vec<String> {
     columns.map_or_else(|| vec![text.to_owned()], |columns| wrapped(text, columns))
 }
 
-/// z above which a bias is reported as significant: noise exceeds it about once in two million comparisons.
+/// A bias is reported as significant above this z. Noise alone exceeds it about once in two million
+/// comparisons.
 const SIGNIFICANT_Z: f64 = 5.0;
 
-/// Remark about a significant bias.
+/// Note on a significant bias.
 const SIGNIFICANT: &str = ": significant, not explained by noise";
 
 /// Name, value, unit and description of each row.
@@ -351,7 +352,7 @@ mod tests {
     }
 
     #[test]
-    fn only_large_z_is_called_significant() {
+    fn only_large_z_is_significant() {
         for (z, is_far) in [(0.5, false), (-3.5, false), (5.5, true), (-40.0, true)] {
             let lines = table(&Summary { bias_z: Some(z), ..summary() }, None);
             let line = lines.iter().find(|line| line.contains("bias, z")).expect("a line");

@@ -1,6 +1,7 @@
-//! `glimt completions`: shell completion scripts, and the calls that they make.
+//! `glimt completions`: shell completion scripts, and the calls they make.
 //!
-//! The scripts call glimt for every completion, so that the scene on the command line determines the tables, names and keys.
+//! The scripts call glimt for every completion, because tables, names and keys depend on the scene on the
+//! command line.
 
 mod bash;
 mod powershell;
@@ -18,10 +19,10 @@ use crate::args::{Args, Shell};
 use crate::console::Console;
 use crate::exit::Exit;
 
-/// The variable that scripts set to the name of the shell.
+/// Environment variable that scripts set to the shell's name.
 const VARIABLE: &str = "GLIMT_COMPLETE";
 
-/// The script for zsh. `clap_complete`'s own script adds a space after `KEY=`.
+/// The zsh script. `clap_complete`'s own script adds a space after `KEY=`.
 const ZSH: &str = r#"#compdef glimt
 _glimt_complete() {
     local answer=("${(@f)$(
@@ -49,7 +50,7 @@ if [[ $funcstack[1] == _glimt ]]; then
 fi
 "#;
 
-/// Prints the script of a shell.
+/// Prints the script for a shell.
 pub(crate) fn run(shell: Shell, console: &Console) -> Exit {
     let completer: &dyn EnvCompleter = match shell {
         Shell::Bash => &Bash,
@@ -71,7 +72,7 @@ pub(crate) fn run(shell: Shell, console: &Console) -> Exit {
     }
 }
 
-/// Answers a call of a completion script. `None` if this is not such a call.
+/// Responds to a call from a completion script. `None` for any other call.
 pub(crate) fn answer(arguments: &[OsString]) -> Option<Exit> {
     std::env::var_os(VARIABLE)?;
     let folder = std::env::current_dir().ok();

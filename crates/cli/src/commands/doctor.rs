@@ -1,4 +1,4 @@
-//! `glimt doctor`: reports the environment that glimt detects.
+//! `glimt doctor`: reports the detected environment.
 
 use std::env::consts::{ARCH, OS};
 use std::path::Path;
@@ -104,7 +104,7 @@ fn preview(probe: &Probe) -> String {
 }
 
 fn round_trip(answers: Option<&ProbeReplies>) -> String {
-    let Some(answers) = answers else { return "the terminal does not answer".to_owned() };
+    let Some(answers) = answers else { return "the terminal does not respond".to_owned() };
     let whole = if answers.is_synchronized { "; synchronized output" } else { "" };
     format!("{:.1} ms{whole}", answers.round_trip.as_secs_f64() * 1e3)
 }

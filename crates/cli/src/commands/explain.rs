@@ -23,7 +23,7 @@ pub(crate) fn run(path: Option<&str>, console: &Console) -> Exit {
     }
 }
 
-/// Wraps a text to `columns`, with hanging indents.
+/// Wraps text to `columns` with hanging indents.
 fn wrap_indented(text: &str, columns: usize) -> String {
     let mut fitted = String::new();
     for line in text.lines() {
@@ -43,7 +43,7 @@ fn wrap_indented(text: &str, columns: usize) -> String {
 /// Minimum width for wrapping.
 const MIN_COLUMNS: usize = 16;
 
-/// Whether a table has a type of this name.
+/// Whether a table has a type with this name.
 fn has_type(table: &TableInfo, name: &str) -> bool {
     table.types.iter().any(|kind| kind.name == name)
 }
@@ -103,7 +103,7 @@ fn explained(path: &str) -> Option<String> {
     }
 }
 
-/// All keys with their paths, including their types.
+/// All keys with their full paths, such as `TABLE.TYPE.KEY`.
 fn all_keys() -> impl Iterator<Item = (String, &'static KeyInfo)> {
     tables().iter().flat_map(keys_of)
 }
@@ -143,7 +143,7 @@ fn key_details(path: &str, key: &KeyInfo) -> String {
     text
 }
 
-/// Describes one of several keys: type, unit, range and default on one line, followed by the description.
+/// Describes one of several keys, with type, unit, range and default on one line and the description below.
 fn key_summary(path: &str, key: &KeyInfo) -> String {
     let default = match key.default {
         Default::Required(_) => "required".to_owned(),
@@ -155,7 +155,7 @@ fn key_summary(path: &str, key: &KeyInfo) -> String {
     format!("{path}: {}\n    {}\n", facts.join("; "), sentence(key.doc))
 }
 
-/// Describes a table, with a line for each type and key.
+/// Describes a table, with one line per type and key.
 fn table_details(table: &'static TableInfo) -> String {
     let head = format!("{}\n    {}\n\n", table.head(), sentence(table.doc));
     let types = if table.types.is_empty() { String::new() } else { format!("{}\n", types(table)) };
@@ -170,7 +170,7 @@ fn types(table: &TableInfo) -> String {
     format!("{lines}    the default is \"{default}\"\n")
 }
 
-/// Describes a type, with a line for each of its keys and the common ones.
+/// Describes a type, with one line for each of its keys and each common key.
 fn type_details(table: &'static TableInfo, kind: &'static TypeInfo) -> String {
     let head = format!("{}, type = \"{}\"\n    {}\n\n", table.head(), kind.name, sentence(kind.doc));
     format!("{head}{}", list(table.keys_of(Some(kind))))
@@ -180,7 +180,7 @@ fn list(keys: impl Iterator<Item = &'static KeyInfo>) -> String {
     keys.map(|key| format!("    {:<22}{}\n", key.name, plain(key.doc))).collect()
 }
 
-/// Removes the backticks of Markdown.
+/// Removes Markdown backticks.
 fn plain(text: &str) -> String {
     text.replace('`', "")
 }
@@ -189,7 +189,7 @@ fn sentence(text: &str) -> String {
     format!("{}.", plain(text))
 }
 
-/// Message about an unknown path, with a suggestion.
+/// Error message for an unknown path, with a suggestion.
 fn unknown(path: &str) -> String {
     let shown = shortened(path, 60);
     let all = paths();
@@ -197,7 +197,7 @@ fn unknown(path: &str) -> String {
     let parts: Vec<&str> = path.split('.').collect();
     let (first, last) =
         (parts.first().copied().unwrap_or_default(), parts.last().copied().unwrap_or_default());
-    // Suggest a key of the same table, or of any.
+    // Suggest a key from the same table or else from any table.
     let in_table: Vec<&str> =
         names.iter().copied().filter(|name| name.split('.').next() == Some(first)).collect();
     let ends: Vec<&str> = in_table.iter().filter_map(|name| name.rsplit('.').next()).collect();
@@ -218,7 +218,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn keys_are_found_by_any_part_of_their_path() {
+    fn keys_are_found_by_partial_paths() {
         let text = explained("materials.metal.roughness").expect("a key");
         for part in ["0 … 1", "default  0.2", "number or texture", "roughness = 0.2"] {
             assert!(text.contains(part), "{part}: {text}");
@@ -236,7 +236,7 @@ mod tests {
     }
 
     #[test]
-    fn ambiguous_keys_have_two_lines_each() {
+    fn ambiguous_keys_are_summarized_in_two_lines() {
         let text = explained("radius").expect("keys");
         assert!(text.starts_with("photons.radius: number; length; 0 …; default 0.0\n    Kernel"), "{text}");
         assert!(text.contains("\nsphere.radius: number; length; > 0; required\n"), "{text}");
@@ -270,7 +270,7 @@ mod tests {
     }
 
     #[test]
-    fn unknown_keys_suggest_similar_ones() {
+    fn unknown_keys_get_suggestions() {
         for (wrong, near) in [
             ("render.sample", "render.samples"),
             ("sphere.raduis", "sphere.radius"),

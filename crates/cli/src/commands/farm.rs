@@ -18,7 +18,7 @@ pub(crate) fn run(args: &FarmArgs, console: &Console) -> Exit {
     }
     let paths = [args.scene.to_str(), args.output.to_str()];
     let words = args.options.iter().chain(&args.hosts).map(String::as_str).chain(paths.into_iter().flatten());
-    // A line break in a name could end a here-document, and scripts are shown on terminals.
+    // A line break in a name could end a here-document. Other control characters are unsafe on terminals.
     let words = words.chain([args.image.as_str(), args.claim.as_str()]);
     if paths.contains(&None) || words.into_iter().any(|word| !is_plain_word(word)) {
         return console.fail(Exit::WRONG, "names cannot contain control characters");
@@ -38,12 +38,12 @@ pub(crate) fn run(args: &FarmArgs, console: &Console) -> Exit {
     Exit::DONE
 }
 
-/// Whether a word has no control or invisible characters, so it is safe in scripts and terminals.
+/// Whether a word is safe in scripts and on terminals: it has no control characters or invisible characters.
 fn is_plain_word(word: &str) -> bool {
     word.chars().all(is_plain)
 }
 
-/// Parses the options of the renders.
+/// Parses the render options.
 ///
 /// # Errors
 /// An option is invalid, or cannot be the same for all parts.
@@ -53,7 +53,7 @@ fn check_options(args: &FarmArgs) -> Result<RenderArgs, String> {
     let render = match Args::try_parse_from(words) {
         Ok(Args { command: None, render }) => render,
         Ok(Args { command: Some(_), .. }) => {
-            return Err("expected options of a render, not a command".to_owned());
+            return Err("expected render options, not a command".to_owned());
         }
         Err(error) => return Err(message_of(&error)),
     };
@@ -74,11 +74,11 @@ fn check_options(args: &FarmArgs) -> Result<RenderArgs, String> {
     }
 }
 
-/// Threads to allow for if `--threads` is not given: a node may have more processors than this machine.
+/// Assumed thread count without `--threads`, because a node may have more processors than this machine.
 const NODE_THREADS: usize = 64;
 
-/// Memory request of a container in MiB: the estimate for one part plus 25 %. Prints a warning and returns `None` if the scene
-/// cannot be read.
+/// A container's memory request in MiB: the estimate for one part plus 25 %. Prints a warning and returns
+/// `None` if the scene cannot be read.
 fn memory(args: &FarmArgs, options: &RenderArgs, console: &Console) -> Option<u64> {
     let mut overrides = options.overrides();
     (overrides.shard, overrides.outputs) = (Some((1, args.shards)), vec![args.output.clone()]);
@@ -96,10 +96,10 @@ fn memory(args: &FarmArgs, options: &RenderArgs, console: &Console) -> Option<u6
     None
 }
 
-/// The message of a clap error, without the usage.
+/// A clap error's message without the usage.
 fn message_of(error: &clap::Error) -> String {
     if !error.use_stderr() {
-        return "expected options of a render, not --help or --version".to_owned();
+        return "expected render options, not --help or --version".to_owned();
     }
     let text = error.to_string();
     let lines: Vec<&str> = text.lines().map(str::trim).take_while(|line| !line.is_empty()).collect();
@@ -111,32 +111,32 @@ fn word(text: &str) -> String {
     shlex::try_quote(text).map_or_else(|_| text.to_owned(), |quoted| quoted.into_owned())
 }
 
-/// A path that glimt takes neither for an option nor for a command.
+/// Formats a path such that glimt does not mistake it for an option or a command.
 fn file(path: &Path) -> String {
     let text = path.to_string_lossy();
     let is_bare = text.starts_with('-') || !text.contains(['/', '.']);
     if is_bare { format!("./{text}") } else { text.into_owned() }
 }
 
-/// The command that renders one part. `index` is a shell expression for its number.
+/// The command that renders one part. `index` is a shell expression for the part's number.
 fn render(args: &FarmArgs, index: &str) -> String {
     let (scene, part) = (word(&file(&args.scene)), part(args, index));
     let options: String = args.options.iter().map(|option| format!(" {}", word(option))).collect();
     format!("glimt {scene} --once -o {part} --shard {index}/{} --resume{options}", args.shards)
 }
 
-/// The file of one part.
+/// The file name of one part, quoted for the shell.
 fn part(args: &FarmArgs, index: &str) -> String {
     format!("{}.{index}.part", word(&file(&args.output)))
 }
 
-/// The command that merges the parts. Lists them with `seq`.
+/// The command that merges the parts. It lists the parts with `seq`.
 fn merge(args: &FarmArgs, options: &str) -> String {
     let (out, count) = (word(&file(&args.output)), args.shards);
     format!("seq -f {}.%.0f.part {count} | xargs -d '\\n' glimt merge {options}{out}", word(&escaped(args)))
 }
 
-/// The output path, escaped for the format of `seq`.
+/// The output path, escaped for `seq`'s format string.
 fn escaped(args: &FarmArgs) -> String {
     file(&args.output).replace('%', "%%")
 }
@@ -169,7 +169,7 @@ echo \"parts: job $parts; merge: job $merge\"
 
 fn parallel(args: &FarmArgs) -> String {
     let (count, merge) = (args.shards, merge(args, ""));
-    // Pass one command per line: in a template, parallel would expand parts of names.
+    // Pass one command per line, because parallel would expand braces in names in a command template.
     let index = "\u{0}";
     let render: Vec<String> = render(args, index).split(index).map(word).collect();
     let (format, render) = ("%s".repeat(2 * render.len() - 1), render.join(" \"$index\" "));
@@ -233,12 +233,12 @@ spec:
     )
 }
 
-/// A container command. Escapes `$`, as Kubernetes expands `$(NAME)` and `$$`.
+/// A container command. Escapes `$` because Kubernetes expands `$(NAME)` and `$$`.
 fn command(text: &str) -> String {
     yaml(&text.replace('$', "$$"))
 }
 
-/// Quotes a string for YAML, which includes JSON strings.
+/// Quotes a string for YAML, as a JSON string.
 fn yaml(text: &str) -> String {
     serde_json::Value::from(text).to_string()
 }
@@ -323,8 +323,8 @@ mod tests {
         }
     }
 
-    /// Expands a command as Kubernetes does: `$(NAME)` is a variable if it exists, and `$$` is `$`
-    /// (k8s.io/kubernetes/third_party/forked/golang/expansion).
+    /// Expands a command like Kubernetes: `$(NAME)` becomes the value of an existing variable, and `$$`
+    /// becomes `$` (k8s.io/kubernetes/third_party/forked/golang/expansion).
     fn expanded(text: &str, variables: &[(&str, &str)]) -> String {
         let (mut out, mut rest) = (String::new(), text);
         while let Some(at) = rest.find('$') {
@@ -345,7 +345,7 @@ mod tests {
     }
 
     #[test]
-    fn names_survive_kubernetes_and_the_shell() {
+    fn kubernetes_and_the_shell_keep_names_unchanged() {
         let (scene, picture) = ("$(HOME) $$ $$(HOME).toml", "o $$ $(JOB_COMPLETION_INDEX).exr");
         let args = args(&format!("{} -o {} --shards 8 --engine kubernetes", word(scene), word(picture)));
         let script = kubernetes(&args, None);
@@ -372,14 +372,14 @@ mod tests {
     }
 
     #[test]
-    fn stated_memory_is_enough_for_large_nodes() {
+    fn memory_request_allows_for_large_nodes() {
         let folder = tempfile::tempdir().expect("a folder");
         let scene = folder.path().join("a.toml");
         std::fs::write(&scene, "[camera]\nposition = [0, 0, 4]\nlook_at = [0, 0, 0]\n").expect("written");
         let stated = |threads: &str| {
             let line = format!("{} -o a.png --shards 8 --engine kubernetes", scene.display());
             let args = args(&format!("{line} -- {threads}"));
-            let options = check_options(&args).expect("options of a render");
+            let options = check_options(&args).expect("valid options");
             memory(&args, &options, &Console::new(crate::tui::ColorChoice::None))
         };
         assert_eq!(stated("--threads 0"), stated("--threads 64"));

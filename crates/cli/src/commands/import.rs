@@ -28,7 +28,7 @@ pub(crate) fn run(args: &ImportArgs, console: &Console) -> Exit {
     Exit::signal(number)
 }
 
-/// Converts the file. Reports no error if the token is cancelled.
+/// Converts the file. Does not report an error if the token is cancelled.
 fn convert(args: &ImportArgs, console: &Console, token: &CancelToken) -> Exit {
     let scene = match &args.output {
         Some(output) => output.clone(),
@@ -67,12 +67,12 @@ fn convert(args: &ImportArgs, console: &Console, token: &CancelToken) -> Exit {
     }
 }
 
-/// Whether a path has the extension of a scene.
+/// Whether a path has a scene's extension.
 fn has_ending(scene: &Path) -> bool {
     scene.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml"))
 }
 
-/// Prints each approximation and their number.
+/// Prints all approximations and their number.
 fn report_approximations(file: &Path, notes: &[String], console: &Console) {
     let warning = |note: &String| Diagnostic {
         severity: Severity::Warning,
@@ -87,7 +87,7 @@ fn report_approximations(file: &Path, notes: &[String], console: &Console) {
     }
 }
 
-/// Writes all files or none, the scene last.
+/// Writes all files or none. The scene is written last.
 fn write_all(scene: &Path, imported: &Imported, token: &CancelToken) -> Result<(), OutputError> {
     let name = PathBuf::from(scene.file_name().unwrap_or_default());
     let others = imported.files.iter().map(|(name, bytes)| (name.clone(), bytes.as_slice()));

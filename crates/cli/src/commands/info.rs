@@ -30,10 +30,10 @@ pub(crate) fn run(args: &InfoArgs, console: &Console) -> Exit {
     if info.is_own() { Exit::DONE } else { Exit::FAILED }
 }
 
-/// Describes how a file was made. For an image in a format without settings, only the format is known.
+/// Describes how a file was rendered. Only the format is known for images whose format has no settings.
 ///
 /// # Errors
-/// Those of [`read_info`].
+/// The errors of [`read_info`].
 fn describe(path: &Path) -> Result<ImageInfo, ImageInfoError> {
     read_info(path).or_else(|error| match (&error, other_content(path)) {
         (ImageInfoError::NotAnImage { .. }, Some((format, _))) => {
@@ -43,8 +43,8 @@ fn describe(path: &Path) -> Result<ImageInfo, ImageInfoError> {
     })
 }
 
-/// If the file is an image, part or checkpoint instead of a scene, reports that and how it was rendered, as one JSON line or as text.
-/// `None` for other files.
+/// Checks whether the file is an image, part or checkpoint instead of a scene. If so, reports this and how
+/// the file was rendered, as one JSON line or as text. `None` for other files.
 pub(crate) fn instead_of_scene(path: &Path, is_json: bool, console: &Console) -> Option<Exit> {
     let (_, problem) = other_content(path)?;
     let info = describe(path);
@@ -75,10 +75,10 @@ fn as_json(path: &Path, info: &ImageInfo) -> Value {
     })
 }
 
-/// Maximum width of the name column. Longer names move their values to the right.
+/// Maximum width of the name column. The values of longer names are shifted to the right.
 const MAX_NAME_COLUMNS: usize = 40;
 
-/// A line about the file, followed by one for each setting.
+/// A line about the file, followed by one line per setting.
 fn as_text(path: &Path, info: &ImageInfo) -> String {
     let name = path.to_string_lossy();
     let size = info.size.map_or(String::new(), |(width, height)| format!(", {width}×{height}"));
@@ -91,7 +91,7 @@ fn as_text(path: &Path, info: &ImageInfo) -> String {
     if !channels.is_empty() {
         lines.push(("channels", &channels));
     }
-    // Limit the width: names may be as long as the file, and format widths end at 65,535.
+    // Limit the width, because names may be as long as the file and format widths are limited to 65,535.
     let width = lines.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0).min(MAX_NAME_COLUMNS);
     for (name, value) in lines {
         text += &format!("  {:width$}  {}\n", visible(name), visible(value));

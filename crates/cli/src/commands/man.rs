@@ -36,7 +36,7 @@ pub(crate) fn run(command: Option<&str>, console: &Console) -> Exit {
     }
 }
 
-/// Renders a page. The program's page also has the sections common to all commands.
+/// Renders a page. The program's page also contains the sections that apply to all commands.
 fn page(command: &clap::Command, is_whole: bool) -> std::io::Result<String> {
     let name = command.get_display_name().unwrap_or("glimt").to_owned();
     let notes = command.get_after_long_help().map(ToString::to_string);
@@ -45,7 +45,7 @@ fn page(command: &clap::Command, is_whole: bool) -> std::io::Result<String> {
     let mut bytes = Vec::new();
     man.render_title(&mut bytes)?;
     man.render_name_section(&mut bytes)?;
-    // clap_mangen's synopsis lists every option, which takes half a page.
+    // clap_mangen's synopsis lists every option and takes half a page.
     section("SYNOPSIS", usage.trim_start_matches("Usage:").trim()).to_writer(&mut bytes)?;
     man.render_description_section(&mut bytes)?;
     man.render_options_section(&mut bytes)?;

@@ -1,4 +1,4 @@
-//! `glimt merge`: merges parts to an image.
+//! `glimt merge`: merges parts into an image.
 
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
@@ -24,7 +24,7 @@ use crate::signals;
 use crate::system::threads::start_failure;
 use crate::tui::{NamedImage, images_as_text};
 
-/// Interval for checking for new parts.
+/// Polling interval for new parts.
 const POLL_INTERVAL: Duration = Duration::from_millis(500);
 
 pub(crate) fn run(args: &MergeArgs, console: &Console) -> Exit {
@@ -49,7 +49,7 @@ fn report_signal(number: i32, console: &Console) -> Exit {
     Exit::signal(number)
 }
 
-/// A call of `merge`.
+/// A `merge` command.
 struct Merge<'a> {
     args: &'a MergeArgs,
     console: &'a Console,
@@ -68,7 +68,7 @@ impl Merge<'_> {
         self.check_inputs(&parts)?;
         let merged = self.merged(&parts, self.args.partial, "merge")?;
         let Some(finish) = parts.first().and_then(|part| part.head.picture.finish()) else {
-            return Err(self.console.fail(Exit::WRONG, "the parts have no output settings"));
+            return Err(self.console.fail(Exit::WRONG, "the parts contain no output settings"));
         };
         self.write(format, finish, &merged, &parts)?;
         self.say_missing(&merged);
@@ -104,7 +104,7 @@ impl Merge<'_> {
     /// An error message if the parts were rendered from the file at `path`.
     fn refused_input(&self, parts: &[PartFile], path: &Path) -> Option<String> {
         let by_content = || part::input_with_content(parts, path).map(|name| (name, "it"));
-        let by_name = || part::input_with_name(parts, path).map(|name| (name, "a file of this name"));
+        let by_name = || part::input_with_name(parts, path).map(|name| (name, "a file with this name"));
         let (name, what) = by_content().or_else(by_name)?;
         let out = self.args.out.display();
         Some(format!(
@@ -139,7 +139,7 @@ impl Merge<'_> {
         }
     }
 
-    /// Reports that the limit on open files is reached. Opening further parts would fail for the same reason.
+    /// Reports that the limit on open files is reached, so that opening more parts would fail.
     fn too_many_files(&self, opened: usize) -> Exit {
         let all = self.args.parts.len();
         let message = format!(
@@ -199,7 +199,7 @@ impl Merge<'_> {
         Ok(())
     }
 
-    /// Describes the number of complete parts and the names of incomplete ones.
+    /// Describes the number of complete parts and the names of incomplete parts.
     fn parts_words(&self, count: usize, unfinished: &[&Path]) -> String {
         let names: Vec<_> = unfinished.iter().map(|path| path.to_string_lossy()).collect();
         let incomplete = match names.as_slice() {
@@ -224,7 +224,7 @@ impl Merge<'_> {
         }
     }
 
-    /// Whether the image is redrawn in place: on a terminal without lines of progress in between.
+    /// Whether to redraw the image in place. Requires a terminal without progress lines between redraws.
     fn has_block(&self) -> bool {
         let has_lines = match self.args.progress {
             Progress::Plain | Progress::Json => self.console.is_terminal,
@@ -233,7 +233,7 @@ impl Merge<'_> {
         std::io::stdout().is_terminal() && !has_lines
     }
 
-    /// Redraws the image of these parts, with a text above it.
+    /// Redraws the image merged from these parts, with a title.
     fn redraw(&self, parts: &[PartFile], words: &str, block: &mut Block) -> Result<(), Exit> {
         let words = visible(words);
         let columns = answer_columns();
@@ -252,7 +252,7 @@ impl Merge<'_> {
                 })
             }
         };
-        // A narrow terminal shows no image.
+        // Narrow terminals do not show an image.
         let lines = if lines.is_empty() { format!("{}\n", shortened(&words, columns)) } else { lines };
         self.console.text(&block.redrawn(&lines, columns));
         Ok(())
@@ -328,8 +328,8 @@ impl Merge<'_> {
     }
 }
 
-/// Records the scene's path relative to the output, as a single render does. Tries its path relative to each part, then a file next to the
-/// output.
+/// Records the scene's path relative to the output, like a single render. Looks for the scene relative to
+/// each part, then next to the output.
 fn name_scene(finish: &mut DevelopSettings, parts: &[PartFile], out: &Path) {
     let Some((_, scene)) = finish.metadata.iter_mut().find(|(name, _)| name == "glimt:scene") else { return };
     let named = parts.iter().filter(|part| !part.head.scene.is_empty());
@@ -340,10 +340,10 @@ fn name_scene(finish: &mut DevelopSettings, parts: &[PartFile], out: &Path) {
     }
 }
 
-/// A part that is not complete yet.
+/// A part that is not yet complete.
 struct Awaited {
     path: PathBuf,
-    /// Length and modification time of the incomplete file. `None` if it does not exist.
+    /// Length and modification time of the incomplete file. `None` if the file does not exist.
     unfinished: Option<(u64, Option<SystemTime>)>,
 }
 
@@ -377,7 +377,7 @@ impl Awaited {
         }
     }
 
-    /// Its path, if it exists but is incomplete.
+    /// The part's path, if the file exists but is incomplete.
     fn unfinished(&self) -> Option<&Path> {
         self.unfinished.is_some().then_some(&self.path)
     }

@@ -1,4 +1,4 @@
-//! `glimt new`: writes a scene to start from, to a file or stdout.
+//! `glimt new`: writes a starter scene to a file or stdout.
 
 use std::borrow::Cow;
 use std::io::ErrorKind;
@@ -52,7 +52,7 @@ pub(crate) fn run(file: &Path, with_schema: bool, console: &Console) -> Exit {
             console.fail(Exit::WRONG, &format!("{name} {what}"))
         }
         Err(source) => {
-            // Prefer a more specific error about the folder.
+            // Prefer the more specific error about the folder.
             let of_place = output::check_path(file).err();
             let error = of_place.unwrap_or_else(|| OutputError::File { path: file.to_owned(), source });
             console.fail(Exit::FAILED, &error.to_string())
@@ -60,10 +60,10 @@ pub(crate) fn run(file: &Path, with_schema: bool, console: &Console) -> Exit {
     }
 }
 
-/// Writes the schema next to a scene. Returns whether it was written: an identical file is kept.
+/// Writes the schema next to a scene. Returns `false` if an identical file exists.
 ///
 /// # Errors
-/// A different file has this name, or the file cannot be written.
+/// A different file with this name exists, or the file cannot be written.
 fn write_schema(path: &Path) -> Result<bool, (Exit, String)> {
     let text = schema::text(Draft::Four);
     match write::new_file(path, text.as_bytes()) {
@@ -82,7 +82,7 @@ fn write_schema(path: &Path) -> Result<bool, (Exit, String)> {
     }
 }
 
-/// Message about a scene file with the extension of an image or a mesh.
+/// Error message for a scene file with the extension of an image or a mesh.
 fn misnamed(file: &Path) -> Option<String> {
     let what = if is_mesh(file) {
         "a mesh"
@@ -99,8 +99,8 @@ fn misnamed(file: &Path) -> Option<String> {
     ))
 }
 
-/// Quotes a file for a shell, so that glimt takes it neither for an option nor for a command. `None` if a terminal cannot show
-/// the name.
+/// Quotes a file name for a shell, such that glimt does not mistake it for an option or a command. `None` if
+/// the name is not safe to print.
 fn quoted(file: &Path) -> Option<String> {
     let name = file.to_str().filter(|name| visible(name) == *name)?;
     let is_bare = !name.contains(['/', '.']) || name.starts_with('-');
@@ -108,7 +108,7 @@ fn quoted(file: &Path) -> Option<String> {
     shlex::try_quote(&name).ok().map(Cow::into_owned)
 }
 
-/// Whether a file has the extension of an image.
+/// Whether a file has an image extension.
 fn is_image(file: &Path) -> bool {
     Format::from_path(file).is_ok()
 }

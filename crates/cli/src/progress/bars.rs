@@ -1,4 +1,4 @@
-//! Progress bars on a terminal: the current stage, a bar for each asset being loaded, and a bar for the render.
+//! Progress bars on a terminal: the current stage, a bar per asset being loaded, and a bar for the render.
 
 use std::collections::HashMap;
 
@@ -11,9 +11,9 @@ use crate::scene::sanitize::visible;
 
 /// Minimum width of the bar.
 const MIN_BAR_COLUMNS: usize = 10;
-/// Assumed width of a terminal of unknown size.
+/// Assumed width if the terminal's size is unknown.
 const DEFAULT_COLUMNS: usize = 80;
-/// Resolution of the render's bar.
+/// Number of steps of the render's bar.
 const STEPS: u64 = 1000;
 
 pub(super) struct Bars {
@@ -21,7 +21,7 @@ pub(super) struct Bars {
     stage: ProgressBar,
     assets: HashMap<String, ProgressBar>,
     render: Option<ProgressBar>,
-    /// The time limit of the render in seconds.
+    /// The render's time limit in seconds.
     time: Option<f64>,
 }
 
@@ -60,7 +60,7 @@ impl Bars {
         let bar = self.render.get_or_insert_with(|| {
             all.add(ProgressBar::new(STEPS).with_style(style("  {wide_bar} {percent:>3}% {msg}")))
         });
-        // Query the size every time, as the terminal may be resized.
+        // Query the size every time, because the terminal may be resized.
         let columns =
             crossterm::terminal::size().map_or(DEFAULT_COLUMNS, |(columns, _)| usize::from(columns));
         bar.set_position((progress.fraction * STEPS as f64) as u64);
@@ -85,12 +85,13 @@ impl Reporter for Bars {
             bar.finish_and_clear();
         }
         self.stage.finish_and_clear();
-        // Ignore errors: the output then stays.
+        // Ignore errors, which only leave the output on the screen.
         let _ = self.all.clear();
     }
 }
 
-/// The text next to the bar, as detailed as the width allows. Shows seconds instead of samples with a time limit.
+/// The text next to the bar, as detailed as the width allows. With a time limit, shows seconds instead of
+/// samples.
 fn words(progress: &RenderProgress, time: Option<f64>, columns: usize) -> String {
     let done = match time {
         Some(limit) => format!("{} of {}", seconds(progress.elapsed_seconds.min(limit)), seconds(limit)),

@@ -97,7 +97,7 @@ fn value(event: &Event) -> Option<Value> {
         | Event::Warnings { .. }
         | Event::Settings { .. }
         | Event::Preview { .. }
-        // Reported with the diagnostics at the end.
+        // Reported at the end with the other diagnostics.
         | Event::NotKept { .. }
         | Event::Refused { .. }
         | Event::OwnImage { .. }
@@ -132,7 +132,7 @@ pub(crate) fn failed(failure: &Failure) -> Value {
             json!({ "event": "failed", "kind": "work", "message": message, "diagnostics": [] })
         }
         Failure::Scene(all) => json!({
-            "event": "failed", "kind": "scene", "message": "the scene or the call is wrong", "diagnostics": diagnostics(all),
+            "event": "failed", "kind": "scene", "message": "the scene or the arguments are invalid", "diagnostics": diagnostics(all),
         }),
     }
 }

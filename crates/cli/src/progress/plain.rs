@@ -1,4 +1,4 @@
-//! Occasional lines, for logs.
+//! Prints occasional lines, for logs.
 
 use std::collections::HashSet;
 use std::time::{Duration, Instant};
@@ -8,14 +8,14 @@ use crate::console::Console;
 use crate::pipeline::protocol::{AssetProgress, Event, RenderProgress, StageReport, Status};
 use crate::pipeline::words::Eta;
 
-/// Longest time between lines of a render.
+/// Maximum time between lines during a render.
 const INTERVAL: Duration = Duration::from_secs(5);
-/// Lines per render, in addition to those after [`INTERVAL`].
+/// Lines per render, not counting lines printed because [`INTERVAL`] has passed.
 const STEPS: f64 = 10.0;
 
 pub(super) struct Plain {
     console: Console,
-    /// Steps of the render reported so far.
+    /// Render steps reported so far.
     reported: f64,
     last: Instant,
     last_line: String,
@@ -34,7 +34,8 @@ impl Plain {
         }
     }
 
-    /// Whether an asset has been loaded for the first time. A file with several meshes is loaded once per mesh.
+    /// Whether this is the first time that the asset is loaded. A file with several meshes is loaded once per
+    /// mesh.
     fn is_newly_loaded(&mut self, progress: &AssetProgress) -> bool {
         progress.done == progress.total && self.loaded.insert(progress.name.clone())
     }
@@ -45,7 +46,7 @@ impl Plain {
         }
     }
 
-    /// The line to print now, if one is due. Never repeats the last line.
+    /// The line to print now, if a line is due. Never repeats the last line.
     fn due(&mut self, progress: &RenderProgress) -> Option<String> {
         let step = (progress.fraction * STEPS).floor();
         if progress.fraction >= 1.0 || (step <= self.reported && self.last.elapsed() < INTERVAL) {
@@ -82,7 +83,7 @@ fn line(progress: &RenderProgress) -> String {
     format!("{:<8} {:3.0}% ({}{eta})", "render", (progress.fraction * 100.0).floor(), samples(progress))
 }
 
-/// Describes a finished stage: `parse    done    0.40 ms`.
+/// Describes a finished stage, as in `parse done 0.40 ms`.
 pub(super) fn stage_line(stage: &StageReport) -> String {
     let status = match stage.status {
         Status::Running => "running",
@@ -114,16 +115,16 @@ mod tests {
         };
         let mut said = Vec::new();
         for samples in 0..100 {
-            // Each value is reported twice, at the end of a pass and at the start of the next.
+            // Each value is reported twice: at the end of a pass and at the start of the next pass.
             said.extend(plain.due(&progress(f64::from(samples) / 100.0, samples)));
             said.extend(plain.due(&progress(f64::from(samples) / 100.0, samples)));
         }
         let tens: Vec<_> = (1..10).map(|ten| line(&progress(f64::from(ten) / 10.0, 10 * ten))).collect();
         assert_eq!(said, tens);
         // The interval has passed, but nothing has changed.
-        plain.last = Instant::now().checked_sub(INTERVAL).expect("the machine runs for longer");
+        plain.last = Instant::now().checked_sub(INTERVAL).expect("the machine started before the interval");
         assert_eq!(plain.due(&progress(0.9, 90)), None);
-        plain.last = Instant::now().checked_sub(INTERVAL).expect("the machine runs for longer");
+        plain.last = Instant::now().checked_sub(INTERVAL).expect("the machine started before the interval");
         assert!(plain.due(&progress(0.91, 91)).is_some());
     }
 

@@ -1,4 +1,4 @@
-//! Turns panics of third-party decoders into errors.
+//! Converts panics in third-party decoders to errors.
 
 use std::any::Any;
 use std::cell::Cell;
@@ -9,10 +9,10 @@ thread_local! {
     static IS_CATCHING: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Runs `work` and returns the message of a panic inside as an error, without printing it.
+/// Runs `work`. If it panics, returns the panic message as an error instead of printing it.
 ///
-/// Installs a panic hook at the first call, which forwards all other panics to the previous hook. A front end
-/// that installs its own hook (to restore the terminal) must do so before it loads anything.
+/// The first call installs a panic hook that forwards all other panics to the previous hook. A front end that
+/// needs its own hook (to restore the terminal) must install it before loading anything.
 ///
 /// # Errors
 ///
@@ -47,7 +47,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_panic_becomes_an_error_with_its_message() {
+    fn panic_messages_are_returned_as_errors() {
         let number = 7;
         assert_eq!(catch_panic(|| panic!("at {number}")), Err::<(), _>("at 7".to_owned()));
         assert_eq!(catch_panic(|| 3), Ok(3));

@@ -1,4 +1,4 @@
-//! Reads meshes, textures and cameras. Every error names the file and, in text files, the line.
+//! Reads meshes, textures and cameras. All errors include the file name and, for text files, the line.
 
 pub mod catch_panic;
 pub mod gltf;
@@ -13,7 +13,7 @@ use crate::geometry::mesh::TriangleMesh;
 use crate::materials::PixelValue;
 use crate::math::{DVec2, Vec2, Vec3};
 
-/// Error of a file that cannot be used.
+/// Error for a file that cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum AssetError {
     /// The file could not be read, or is not a regular file.
@@ -21,17 +21,17 @@ pub enum AssetError {
     Unreadable {
         /// The file.
         path: PathBuf,
-        /// The reason, for the user.
+        /// The reason, as shown to the user.
         reason: String,
     },
-    /// The content of the file is wrong.
+    /// The file's content is invalid.
     #[error("{}{}: {reason}", path.display(), line.map_or(String::new(), |line| format!(":{line}")))]
     Malformed {
         /// The file.
         path: PathBuf,
-        /// Line, from 1. `None` for files without lines.
+        /// Line number, starting at 1. `None` for files without lines.
         line: Option<usize>,
-        /// The reason, for the user.
+        /// The reason, as shown to the user.
         reason: String,
     },
     /// An allocation for the file's content failed.
@@ -39,7 +39,7 @@ pub enum AssetError {
     OutOfMemory {
         /// The file.
         path: PathBuf,
-        /// Size of the refused allocation.
+        /// Size of the failed allocation.
         bytes: usize,
     },
     /// The work was cancelled.
@@ -57,17 +57,17 @@ impl AssetError {
     }
 }
 
-/// Line and reason of a file's rejection.
+/// Line number of an error, and the reason why the file was rejected.
 #[cfg(test)]
 pub(crate) fn rejection<T: std::fmt::Debug>(result: Result<T, AssetError>) -> (Option<usize>, String) {
     match result {
         Err(AssetError::Malformed { line, reason, .. }) => (line, reason),
         Err(AssetError::Unreadable { reason, .. }) => (None, reason),
-        other => panic!("not rejected: {other:?}"),
+        other => panic!("expected a rejection, found {other:?}"),
     }
 }
 
-/// BLAKE3 hash of a file, computed from the bytes that are decoded.
+/// BLAKE3 hash of a file, computed from the decoded bytes.
 pub type FileHash = [u8; 32];
 
 /// A file referenced by another file.
@@ -75,7 +75,7 @@ pub type FileHash = [u8; 32];
 pub struct Companion {
     /// The file.
     pub path: PathBuf,
-    /// Hash of the bytes that were decoded. `None` if the file could not be read.
+    /// Hash of the decoded bytes. `None` if the file could not be read.
     pub hash: Option<FileHash>,
 }
 
@@ -92,13 +92,11 @@ pub struct LoadedMesh {
     pub dropped: Dropped,
     /// Other warnings, one line each.
     pub warnings: Vec<String>,
-    /// Warnings about the file's materials, one line each. They do not apply if the scene assigns another
-    /// material.
+    /// Warnings about the file's materials, one line each. Irrelevant if the scene assigns another material.
     pub material_warnings: Vec<String>,
-    /// Files that the mesh depends on, read or missing: material libraries, or buffers of a glTF file. If one
-    /// of them changes, the mesh changes.
+    /// Files that affect the mesh, including missing ones: material libraries, or buffers of a glTF file.
     pub companions: Vec<Companion>,
-    /// Images named by the material libraries or the glTF file, whether or not they are used.
+    /// Images referenced by the material libraries or the glTF file, used or not.
     pub pictures: Vec<PathBuf>,
 }
 
@@ -114,7 +112,7 @@ impl LoadedMesh {
     }
 }
 
-/// Counts of faces that cannot be used.
+/// Counts of unusable faces.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Dropped {
     /// Faces with a NaN or an infinite coordinate.
@@ -134,7 +132,7 @@ pub struct FileMaterial {
     pub specular: Vec3,
     /// Phong exponent, `Ns`.
     pub shininess: f32,
-    /// Emitted radiance, `Ke`; scales the texture if there is one.
+    /// Emitted radiance, `Ke`. Scales the emission texture, if any.
     pub emission: Vec3,
     /// Index of refraction, `Ni`.
     pub ior: f32,
@@ -142,7 +140,7 @@ pub struct FileMaterial {
     pub illumination_model: Option<u8>,
     /// Opacity in [0, 1]: `d`, or 1 − `Tr`.
     pub opacity: f32,
-    /// Opacity texture, `map_d`; replaces `opacity`.
+    /// Opacity texture, `map_d`. Overrides `opacity`.
     pub opacity_texture: Option<FileTexture>,
     /// Diffuse texture, `map_Kd`.
     pub diffuse_texture: Option<FileTexture>,
@@ -152,33 +150,33 @@ pub struct FileMaterial {
     pub emission_texture: Option<FileTexture>,
     /// Normal map, `norm` or `map_Bump`.
     pub normal_texture: Option<FileTexture>,
-    /// Scale of the normal map's slopes, ≥ 0: the option `-bm`, default 1.
+    /// Scale factor for the normal map's slopes, ≥ 0. Set by the option `-bm`, 1 by default.
     pub normal_strength: f32,
-    /// Parameters of the PBR extension. `None` if the file uses none of its statements.
+    /// Parameters of the PBR extension. `None` if the material has none of its statements.
     pub physical: Option<PhysicalMaterial>,
 }
 
 impl FileMaterial {
-    /// Whether the material has a specular highlight. An exponent of 0 would spread it over the hemisphere at
-    /// full strength; illumination models 0 and 1 have none.
+    /// Whether the material has a specular highlight. Illumination models 0 and 1 have none. Materials with
+    /// an exponent of 0 are also excluded: their highlight would cover the hemisphere at full strength.
     pub fn has_highlight(&self) -> bool {
         self.shininess > 0.0 && !matches!(self.illumination_model, Some(0 | 1))
     }
 
-    /// Whether the specular reflection is a coat over a stronger diffuse color.
+    /// Whether the specular reflection is a coat over a diffuse texture or a stronger diffuse color.
     pub fn is_coated(&self) -> bool {
         self.diffuse_texture.is_some() || self.diffuse.max_element() > self.specular.max_element()
     }
 }
 
-/// A texture of an MTL material with its map options.
+/// A texture with map options in an MTL material.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FileTexture {
     /// Image file, relative to the MTL file's folder.
     pub path: PathBuf,
     /// Scale of the texture coordinates, `-s`.
     pub repeat: Vec2,
-    /// Offset of the scaled texture coordinates, `-o`.
+    /// Offset added to the scaled texture coordinates, `-o`.
     pub offset: DVec2,
     /// Whether coordinates outside [0, 1] are clamped, `-clamp on`.
     pub is_clamped: bool,
@@ -201,7 +199,7 @@ impl FileTexture {
         }
     }
 
-    /// Whether both textures show the same image at the same coordinates.
+    /// Whether both textures use the same image with the same coordinates.
     pub fn is_same_image(&self, other: &Self) -> bool {
         let at = |texture: &Self| (texture.repeat, texture.offset, texture.is_clamped);
         self.path == other.path && at(self) == at(other)
@@ -225,10 +223,10 @@ pub struct PhysicalMaterial {
     pub metallic_texture: Option<FileTexture>,
 }
 
-/// A gKit orbiter camera, which orbits around the scene's center.
+/// A gKit orbiter camera. It orbits around the scene's center.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OrbiterCamera {
-    /// `c`: point that the camera looks at.
+    /// `c`: point at which the camera looks.
     pub center: [f64; 3],
     /// `p`: offset in the image plane.
     pub position: [f64; 2],

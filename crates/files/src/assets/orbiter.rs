@@ -1,4 +1,4 @@
-//! gKit orbiter files: five lines of text, each a letter followed by numbers.
+//! Reads gKit orbiter files: five lines of text, each with a letter and numbers.
 //!
 //! ```text
 //! c 0 1 0          point that the camera looks at
@@ -8,14 +8,13 @@
 //! f 45 1024 640    vertical field of view in degrees, width and height in pixels
 //! ```
 //!
-//! gKit's `Orbiter` class defines their meaning. It maps world space to camera space (x right, y up, looking
-//! along −z):
+//! As in gKit's `Orbiter` class, world space is mapped to camera space (x right, y up, looking along −z) by
 //!
 //! `view = T(−p.x, −p.y, −size) · Rx(r.x) · Ry(r.y) · T(−c)`
 //!
-//! with right-handed rotations; the rightmost transform is applied first. The projection is a perspective
-//! with the vertical field of view `fov` and the aspect ratio `width / height`. The radius only sets its near
-//! and far planes.
+//! with right-handed rotations. The rightmost transform is applied first. The projection is a perspective
+//! with the vertical field of view `fov` and the aspect ratio `width / height`. The radius only affects the
+//! near and far planes.
 
 use std::path::Path;
 
@@ -26,15 +25,15 @@ use crate::math::limits::{LARGEST, SHORTEST, is_too_short};
 /// Maximum size of an orbiter file.
 const LIMIT: u64 = 1 << 20;
 
-/// Field of view and image size of gKit's viewer, for old files without an `f` line.
+/// gKit's default field of view and image size, for old files without an `f` line.
 const DEFAULT_FIELD: [f64; 3] = [45.0, 1024.0, 640.0];
 
-/// Reads an orbiter file and returns the camera and the file's hash. `c` and `s` are required; `p` and `r`
-/// default to 0, and `f` to 45 degrees at 1024 × 640.
+/// Reads an orbiter file and returns the camera and the file's hash. `c` and `s` are required. The defaults
+/// are 0 for `p` and `r`, and 45 degrees at 1024 × 640 for `f`.
 ///
 /// # Errors
-/// [`AssetError::Unreadable`], or [`AssetError::Malformed`] with the line: an unknown letter, a wrong count of numbers,
-/// a number that is not finite or out of range.
+/// [`AssetError::Unreadable`], or [`AssetError::Malformed`] with the line for an unknown letter, the wrong
+/// number of values, or a value that is not finite or out of range.
 pub fn load(path: &Path) -> Result<(OrbiterCamera, FileHash), AssetError> {
     let token = CancelToken::new();
     let bytes = read::text(path, LIMIT, read::Monitor { progress: &ignore_progress, token: &token })?;
@@ -121,7 +120,7 @@ fn numbers<'a, const N: usize>(
     }
 }
 
-/// Checks the distance of `s`. The radius is not checked because only a rasterizer has clip planes.
+/// Checks the distance in `s`. Ignores the radius, because it only affects a rasterizer's clip planes.
 fn positive(numbers: Result<[f64; 2], String>) -> Result<[f64; 2], String> {
     let [size, radius] = numbers?;
     match () {
@@ -171,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn errors_name_line_and_reason() {
+    fn errors_include_line_and_reason() {
         for (text, line, reason) in [
             ("c 0 0 0\np 1\n", 2, wrong_count("p", 2)),
             ("c 0 nan 0", 1, wrong_count("c", 3)),

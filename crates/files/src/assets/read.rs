@@ -9,22 +9,22 @@ use crate::control::{CancelToken, Cancelled, Progress};
 pub(crate) use crate::system::describe_error;
 use crate::system::file::{self, FileKind};
 
-/// Bytes between two polls of the cancel token.
+/// Number of bytes between two polls of the cancel token.
 const CHUNK: usize = 1 << 20;
 
-/// Reason to reject a Git LFS pointer.
+/// Error message for Git LFS pointers.
 const LFS_POINTER: &str = "it is a Git LFS pointer, not the file's content: run `git lfs pull`";
-/// Reason to reject binary data where text is expected.
+/// Error message for binary data where text is expected.
 pub(crate) const BINARY_FILE: &str = "this is a binary file in another format";
-/// Reason to reject UTF-16.
+/// Error message for UTF-16 text.
 pub(crate) const UTF16_TEXT: &str = "this is text in UTF-16; save it as UTF-8";
 
-/// Reason to reject a file of another type than a regular file.
+/// Error message for anything other than a regular file.
 fn not_regular(kind: FileKind) -> String {
     format!("it is {}, not a regular file", kind.words())
 }
 
-/// Progress callback and cancel token of a load.
+/// Progress callback and cancel token for loading a file.
 #[derive(Clone, Copy)]
 pub(crate) struct Monitor<'a> {
     pub(crate) progress: Progress<'a>,
@@ -44,8 +44,8 @@ pub(crate) fn hash(bytes: &[u8]) -> FileHash {
     *blake3::hash(bytes).as_bytes()
 }
 
-/// Opens a regular file of at most `limit` bytes and returns it with its length. Rejects pipes, devices and
-/// folders before opening them, because opening a pipe may block.
+/// Opens a regular file of at most `limit` bytes. Returns the file and its length. Rejects pipes, devices and
+/// folders without opening them, because opening a pipe may block.
 pub(crate) fn open(path: &Path, limit: u64) -> Result<(File, u64), AssetError> {
     let unreadable = |error: std::io::Error| AssetError::unreadable(path, describe_error(&error));
     let refused = |kind: FileKind| AssetError::unreadable(path, not_regular(kind));
@@ -65,10 +65,10 @@ pub(crate) fn open(path: &Path, limit: u64) -> Result<(File, u64), AssetError> {
     Ok((file, found.len()))
 }
 
-/// Bytes at the start of a file that are checked for binary data.
+/// Number of bytes at the start of a file to check for binary data.
 const START: usize = 1 << 12;
 
-/// Reads a text file. Rejects a binary file after its first [`START`] bytes.
+/// Reads a text file. Rejects binary files after reading the first [`START`] bytes.
 pub(crate) fn text(path: &Path, limit: u64, monitor: Monitor<'_>) -> Result<Vec<u8>, AssetError> {
     bytes_if(path, limit, monitor, |start| {
         refuse_utf16(path, start)?;
@@ -76,7 +76,7 @@ pub(crate) fn text(path: &Path, limit: u64, monitor: Monitor<'_>) -> Result<Vec<
     })
 }
 
-/// Reads a text or binary file of a format that starts with three letters.
+/// Reads a text or binary file in a format that starts with three letters.
 pub(crate) fn text_or_binary(path: &Path, limit: u64, monitor: Monitor<'_>) -> Result<Vec<u8>, AssetError> {
     bytes_if(path, limit, monitor, |start| {
         refuse_utf16(path, start)?;
@@ -92,14 +92,14 @@ pub(crate) fn start(path: &Path, limit: u64) -> Result<Vec<u8>, AssetError> {
     read.map(|_| bytes).map_err(|error| AssetError::unreadable(path, describe_error(&error)))
 }
 
-/// Reads a text or binary file. Rejects a file that starts with [`START`] zeros.
+/// Reads a text or binary file. Rejects files that start with [`START`] zeros.
 pub(crate) fn not_all_zero(path: &Path, limit: u64, monitor: Monitor<'_>) -> Result<Vec<u8>, AssetError> {
     bytes_if(path, limit, monitor, |start| {
         binary_if(path, !start.is_empty() && start.iter().all(|byte| *byte == 0))
     })
 }
 
-/// Reads a regular file of any content.
+/// Reads a regular file with any content.
 pub(crate) fn bytes(path: &Path, limit: u64, monitor: Monitor<'_>) -> Result<Vec<u8>, AssetError> {
     bytes_if(path, limit, monitor, |_| Ok(()))
 }
@@ -109,8 +109,8 @@ fn binary_if(path: &Path, is_binary: bool) -> Result<(), AssetError> {
     if is_binary { Err(refused()) } else { Ok(()) }
 }
 
-/// Rejects UTF-16 where a text file is expected. Must not be called for binary formats, whose 16-bit numbers
-/// can look like UTF-16.
+/// Rejects UTF-16 where a text file is expected. Must not be called for binary formats, because their 16-bit
+/// numbers can look like UTF-16.
 pub(crate) fn refuse_utf16(path: &Path, start: &[u8]) -> Result<(), AssetError> {
     let refused = || AssetError::malformed(path, Some(1), UTF16_TEXT);
     if is_utf16(start) { Err(refused()) } else { Ok(()) }
@@ -127,8 +127,8 @@ fn is_utf16(start: &[u8]) -> bool {
     }
 }
 
-/// Reads a regular file if `accept` does not reject its first [`START`] bytes. Progress counts bytes out of
-/// `2·length`: parsing is the second half.
+/// Reads a regular file unless `accept` rejects its first [`START`] bytes. Reports progress in bytes, out of
+/// `2·length`. The second half is for parsing.
 fn bytes_if(
     path: &Path,
     limit: u64,
@@ -144,7 +144,7 @@ fn bytes_if(
     rest(path, file, (length, limit), monitor)
 }
 
-/// Reads the rest of an open file of about `length` bytes. Progress counts as for [`bytes`].
+/// Reads the rest of an open file of about `length` bytes. Reports progress like [`bytes`].
 pub(crate) fn rest(
     path: &Path,
     file: File,
@@ -179,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn special_missing_and_long_files_are_rejected() {
+    fn unsuitable_files_are_rejected() {
         let folder = tempfile::tempdir().expect("a folder");
         let token = CancelToken::new();
         let reason = |path: &Path| rejection(bytes(path, 100, monitor(&token))).1;
@@ -196,7 +196,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let token = CancelToken::new();
         let path = folder.path().join("zeros");
-        // 3 TiB without content: reading them would take an hour.
+        // A sparse file of 3 TiB. Reading it completely would take an hour.
         File::create(&path).and_then(|file| file.set_len(3 << 40)).expect("a sparse file");
         for read in [text, text_or_binary] {
             let error = rejection(read(&path, u64::MAX, monitor(&token)));

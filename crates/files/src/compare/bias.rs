@@ -1,4 +1,4 @@
-//! Bias: whether an image is brighter than its reference by more than the noise of both.
+//! Bias: the brightness difference between an image and its reference, relative to the noise of both.
 
 use super::Errors;
 
@@ -7,15 +7,16 @@ use super::Errors;
 pub struct Bias {
     /// mean (a − b) / mean b. `None` if the reference is black.
     pub value: Option<f64>,
-    /// Standard error of the bias due to the noise of both images. `None` if either is unknown.
+    /// Standard error of the bias due to the noise of both images. `None` if the noise of either image is
+    /// unknown.
     pub standard_error: Option<f64>,
-    /// Bias divided by its standard error. `None` if that is unknown or zero.
+    /// Bias divided by its standard error. `None` if the standard error is unknown or zero.
     pub z: Option<f64>,
 }
 
 impl Bias {
-    /// Computes the bias. `standard_errors` are those of both mean luminances, if known; the noise of the two
-    /// images must be independent.
+    /// Computes the bias. `standard_errors` contains the standard errors of both mean luminances, if known.
+    /// The noise of the two images must be independent.
     pub fn new(errors: &Errors, standard_errors: [Option<f64>; 2]) -> Self {
         let [a, b] = errors.luminances;
         let error = match standard_errors {

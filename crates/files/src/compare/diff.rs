@@ -1,4 +1,4 @@
-//! Images that show errors.
+//! Creates images that show errors.
 
 use rayon::prelude::*;
 
@@ -11,7 +11,7 @@ pub fn absolute(pair: &Pair) -> RadianceImage {
     RadianceImage { width: pair.a().width, height: pair.a().height, pixels: pixels.collect() }
 }
 
-/// FLIP of each pixel as a color: from black for 0 through purple, red and orange to pale yellow for 1.
+/// FLIP of each pixel as a color, from black (0) through purple, red and orange to pale yellow (1).
 pub fn heat(pair: &Pair, flip: &[f32]) -> RadianceImage {
     let pixels = flip.par_iter().map(|&error| colormap::error_color(f64::from(error))).collect();
     RadianceImage { width: pair.a().width, height: pair.a().height, pixels }

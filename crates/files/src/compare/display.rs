@@ -1,8 +1,8 @@
 //! Errors of displayed values (clamped sRGB without quantization): PSNR of the channels and SSIM of the luma.
 //!
 //! SSIM follows Z. Wang et al., *Image Quality Assessment: From Error Visibility to Structural Similarity*
-//! (2004): a Gaussian window of 11 × 11 pixels with σ = 1.5, K₁ = 0.01, K₂ = 0.03, L = 1; the mean over the
-//! windows inside the image. If a side has fewer than 11 pixels, windows are clipped and their weights are
+//! (2004): a Gaussian window of 11 × 11 pixels with σ = 1.5, K₁ = 0.01, K₂ = 0.03, L = 1. It is averaged over
+//! all windows inside the image. If a side has fewer than 11 pixels, windows are clipped and their weights
 //! renormalized.
 
 use rayon::prelude::*;
@@ -80,8 +80,8 @@ fn similarity([a, b]: [f64; 2], [aa, bb]: [f64; 2], ab: f64) -> f64 {
     (2.0 * a * b + C1) * (2.0 * covariance + C2) / ((a * a + b * b + C1) * (variances + C2))
 }
 
-/// Sum of squared differences of the tile's channels, and luma of the tile with a margin of [`RADIUS`]
-/// pixels. Pixels outside the image are 0.
+/// Sum of squared differences of the tile's channels, and the luma of the tile including a margin of
+/// [`RADIUS`] pixels. Pixels outside the image are 0.
 fn lumas(pair: &Pair, tile: Rect) -> (f64, [Plane; 2]) {
     let side = |length: u32| length as usize + 2 * RADIUS;
     let mut lumas =
@@ -103,7 +103,7 @@ fn lumas(pair: &Pair, tile: Rect) -> (f64, [Plane; 2]) {
     (square, lumas)
 }
 
-/// Converts a position in the tile with its margin to a position in the image. `None` if it is outside.
+/// Converts a position in the tile (with margin) to a position in the image. `None` if it is outside.
 fn inside(start: u32, offset: usize, length: usize) -> Option<usize> {
     (start as usize + offset).checked_sub(RADIUS).filter(|&position| position < length)
 }
@@ -112,7 +112,7 @@ fn is_inner(offset: usize, length: u32) -> bool {
     (RADIUS..RADIUS + length as usize).contains(&offset)
 }
 
-/// For each position of the tile along one side, the sum of its window's weights inside the image. `None` if
+/// For each position along one side of the tile, the sum of the window's weights inside the image. `None` if
 /// the window is excluded.
 fn weights_inside(start: u32, count: u32, length: usize, window: &[f64]) -> Vec<Option<f64>> {
     let weight = |position: usize| {

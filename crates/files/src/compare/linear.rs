@@ -6,7 +6,7 @@ use super::Pair;
 use crate::math::color::{LUMINANCE_WEIGHTS, RELMSE_EPSILON};
 use crate::math::{DVec2, Vec3};
 
-/// The trimmed mean drops one in this many pixels.
+/// One out of this many pixels is dropped from the trimmed mean.
 const DROPPED_ONE_IN: usize = 1000;
 
 pub(super) struct Linear {
@@ -86,7 +86,7 @@ fn relative(a: Vec3, b: Vec3) -> f64 {
     ((a - b) * (a - b) / (b * b + RELMSE_EPSILON)).element_sum() / 3.0
 }
 
-/// Mean of [`relative`] without the largest values.
+/// Mean of [`relative`], excluding the largest values.
 fn trimmed(pair: &Pair, dropped: usize) -> f64 {
     let pixels = pair.a().pixels.par_iter().zip(&pair.b().pixels);
     let mut errors: Vec<f64> = pixels.map(|(&a, &b)| relative(a, b)).collect();
@@ -101,6 +101,6 @@ fn trimmed(pair: &Pair, dropped: usize) -> f64 {
     });
     let (sum, count) =
         rows.into_iter().fold((0.0, 0_usize), |all, row: (f64, usize)| (all.0 + row.0, all.1 + row.1));
-    // Several values may equal the smallest dropped one. Keep as many of these as necessary.
+    // Several values may be equal to the smallest dropped value. Keep as many of them as necessary.
     (sum + (kept - count) as f64 * least_dropped) / kept as f64
 }

@@ -1,8 +1,8 @@
 //! Errors of an image against a reference.
 //!
-//! Linear values give RMSE, relMSE and the largest difference; displayed values (clamped sRGB) give PSNR,
-//! SSIM and FLIP. Sums use double precision, in an order that does not depend on the number of threads. The
-//! work runs in the caller's thread pool.
+//! RMSE, relMSE and the largest difference are computed from linear values, and PSNR, SSIM and FLIP from
+//! displayed values (clamped sRGB). Sums use double precision, in an order that does not depend on the number
+//! of threads. The work runs in the caller's thread pool.
 
 mod bias;
 mod colormap;
@@ -21,20 +21,21 @@ pub use flip::PIXELS_PER_DEGREE;
 pub use pair::{CompareError, Pair};
 pub use two_references::TwoReferences;
 
-/// Errors of the first image of a pair against the second, the reference. Means are over pixels and channels.
+/// Errors of a pair's first image against the second image, the reference. Means are over pixels and
+/// channels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Errors {
     /// √mean (a − b)², linear.
     pub rmse: f64,
     /// mean (a − b)²/(b² + 0.01), linear.
     pub relmse: f64,
-    /// relMSE without the 0.1 % of pixels (rounded down) with the largest values.
+    /// relMSE, excluding the 0.1 % of pixels (rounded down) with the largest values.
     pub relmse_trimmed: f64,
     /// Number of pixels excluded from the trimmed relMSE.
     pub dropped_pixels: u64,
     /// max |a − b|, linear.
     pub max: f64,
-    /// Column and row of the first pixel with the largest difference, from (0, 0) at the top left.
+    /// Column and row of the first pixel with the largest difference. (0, 0) is the top left pixel.
     pub max_at: [u32; 2],
     /// Mean luminance of both images, linear.
     pub luminances: [f64; 2],
@@ -42,7 +43,7 @@ pub struct Errors {
     pub psnr_db: f64,
     /// Structural similarity of the luma of clamped sRGB, 1 for equal images.
     pub ssim: f64,
-    /// Mean of [`Measured::flip`], from 0 for equal images to 1.
+    /// Mean of [`Measured::flip`], in [0, 1]. 0 for equal images.
     pub flip: f64,
 }
 
@@ -51,7 +52,7 @@ pub struct Errors {
 pub struct Measured {
     /// Error metrics.
     pub errors: Errors,
-    /// FLIP of each pixel, in [0, 1], in rows from the top.
+    /// FLIP of each pixel, in [0, 1], row by row from the top.
     pub flip: Vec<f32>,
 }
 

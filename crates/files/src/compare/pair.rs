@@ -8,7 +8,7 @@ use crate::control::{CancelToken, ignore_progress};
 use crate::film::RadianceImage;
 use crate::math::Vec3;
 
-/// Reason for which two files cannot be compared.
+/// Reason why two files cannot be compared.
 #[derive(Debug, thiserror::Error)]
 pub enum CompareError {
     /// A file could not be read or is not an image.
@@ -54,7 +54,7 @@ pub struct Pair {
 }
 
 impl Pair {
-    /// Checks an image and its reference. Messages use the given names.
+    /// Checks an image and its reference. The names are used in messages.
     ///
     /// # Errors
     /// All errors of both images.
@@ -64,8 +64,8 @@ impl Pair {
         if errors.is_empty() { Ok(Self { a, b, warnings: Vec::new() }) } else { Err(errors) }
     }
 
-    /// Reads two image files in any format that textures support: integers as sRGB, floats as linear, without
-    /// alpha.
+    /// Reads two image files in any supported texture format. Integers are sRGB, floats are linear, and alpha
+    /// is ignored.
     ///
     /// # Errors
     /// All errors of both images.
@@ -114,7 +114,7 @@ impl Pair {
     }
 }
 
-/// Reads an image, with the warnings about it.
+/// Reads an image. Returns it with its warnings.
 fn read(path: &Path) -> Result<(RadianceImage, Vec<String>), AssetError> {
     let image =
         load(path, ImageEncoding::Raw, ImageLimits::default(), &ignore_progress, &CancelToken::new())?;

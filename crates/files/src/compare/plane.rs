@@ -19,8 +19,8 @@ impl Plane {
         Self { values, ..*self }
     }
 
-    /// Filters rows and columns, at pixels where all taps are inside: the plane shrinks by `taps − 1` in both
-    /// dimensions.
+    /// Filters rows and columns. Pixels whose taps are not all inside the plane are dropped, which shrinks it
+    /// by `taps − 1` in both dimensions.
     pub(super) fn filtered(&self, along_rows: &[f64], along_columns: &[f64]) -> Self {
         self.along_rows(along_rows).along_columns(along_columns)
     }
@@ -46,7 +46,7 @@ impl Plane {
     }
 }
 
-/// Adds rows multiplied by their taps. Four at a time, to load and store the sums less often.
+/// Adds rows multiplied by their taps. Processes four rows at a time to reduce loads and stores of the sums.
 fn add(sums: &mut [f64], rows: &[&[f64]], taps: &[f64]) {
     let (fours, rest) = taps.as_chunks();
     let (fours_of_rows, rest_of_rows) = rows.as_chunks();
@@ -63,7 +63,7 @@ fn add(sums: &mut [f64], rows: &[&[f64]], taps: &[f64]) {
     }
 }
 
-/// exp(−x²/2σ²) at integers from −radius to radius, in pixels.
+/// exp(−x²/2σ²) at integer pixel offsets from −radius to radius.
 pub(super) fn gaussian(sigma: f64, radius: usize) -> Vec<f64> {
     offsets(radius).map(|x| libm::exp(-x * x / (2.0 * sigma * sigma))).collect()
 }

@@ -4,7 +4,7 @@ use super::*;
 use crate::film::RadianceImage;
 use crate::math::Vec3;
 
-/// An image defined by a formula of column, row and channel.
+/// An image defined by a function of column, row and channel.
 fn image(width: u32, height: u32, value: impl Fn(u32, u32, u32) -> f32) -> RadianceImage {
     let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
     let pixels = pixels.map(|(x, y)| Vec3::new(value(x, y, 0), value(x, y, 1), value(x, y, 2))).collect();
@@ -41,14 +41,14 @@ fn warnings_about_the_files_are_returned() {
     }
 }
 
-/// Hashed values in [0, 1] with noise of ±1/8, partly outside the display range.
+/// Hashed values in [0, 1] plus noise of ±1/8. Some are outside the display range.
 fn noisy(width: u32, height: u32) -> [RadianceImage; 2] {
     let clean = |x, y, c| ((x * 7 + y * 13 + c * 29) * (x + 2 * y + 3) % 257) as f32 / 256.0;
     let noise = |x, y, c| (((x * 5 + y * 11 + c * 17) % 33) as f32 - 16.0) / 128.0;
     [image(width, height, |x, y, c| clean(x, y, c) + noise(x, y, c)), image(width, height, clean)]
 }
 
-/// Ramps and a checkerboard. Every third diagonal is brighter by a quarter, and a few pixels by 40.
+/// Ramps and a checkerboard. Every third diagonal is a quarter brighter, and a few pixels are brighter by 40.
 fn edges(width: u32, height: u32) -> [RadianceImage; 2] {
     let clean = |x, y, c| {
         ((x + 2 * y + 40 * c) % 512) as f32 / 1024.0 + if (x / 16 + y / 16) % 2 == 0 { 0.25 } else { 0.0 }
@@ -62,7 +62,10 @@ fn edges(width: u32, height: u32) -> [RadianceImage; 2] {
 
 #[track_caller]
 fn assert_near(name: &str, value: f64, expected: f64) {
-    assert!((value - expected).abs() <= 1e-6 * expected.abs().max(1.0), "{name}: {value}, not {expected}");
+    assert!(
+        (value - expected).abs() <= 1e-6 * expected.abs().max(1.0),
+        "{name}: got {value}, expected {expected}"
+    );
 }
 
 struct Expected {
@@ -72,7 +75,7 @@ struct Expected {
     psnr: f64,
     ssim: f64,
     flip: f64,
-    /// FLIP of the published program, in single precision.
+    /// FLIP computed by the published program, in single precision.
     published_flip: f64,
 }
 
@@ -87,14 +90,14 @@ fn assert_measures([a, b]: &[RadianceImage; 2], expected: &Expected) {
     assert_near("PSNR", errors.psnr_db, expected.psnr);
     assert_near("SSIM", errors.ssim, expected.ssim);
     assert_near("FLIP", errors.flip, expected.flip);
-    assert_near("FLIP as published", errors.flip, expected.published_flip);
+    assert_near("published FLIP", errors.flip, expected.published_flip);
     assert_eq!((errors.max_at, errors.dropped_pixels), (expected.max_at, expected.dropped));
 }
 
-// Expected values were computed with numpy in double precision: SSIM window by window, in agreement with
-// `structural_similarity` of scikit-image 0.26 (gaussian_weights, sigma 1.5, no sample covariance) where the
-// image is large enough; FLIP with the 2D kernels of the paper. `published_flip` was computed with
-// flip-evaluator 1.7 by the authors of the paper (LDR, linear input, 67 pixels per degree).
+// Expected values were computed with numpy in double precision. SSIM was computed window by window and
+// matches scikit-image 0.26's `structural_similarity` (gaussian_weights, sigma 1.5, no sample covariance) for
+// images that are large enough. FLIP was computed with the 2D kernels from the paper. `published_flip` was
+// computed with flip-evaluator 1.7, by the authors of the paper (LDR, linear input, 67 pixels per degree).
 
 #[test]
 fn errors_of_noise_match_numpy() {
@@ -173,7 +176,7 @@ fn equal_images_have_no_error() {
 }
 
 #[test]
-fn only_relmse_depends_on_the_order() {
+fn only_relmse_depends_on_argument_order() {
     let [a, b] = edges(60, 40);
     let (there, back) = (errors(&a, &b), errors(&b, &a));
     assert_eq!((there.psnr_db, there.rmse, there.max), (back.psnr_db, back.rmse, back.max));
@@ -193,7 +196,8 @@ fn relmse_of_bright_images_is_scale_invariant() {
     let (large, larger) = (scaled_errors(1e4), scaled_errors(1e6));
     assert!((large.relmse / larger.relmse - 1.0).abs() < 1e-7);
     assert!((larger.rmse / large.rmse - 100.0).abs() < 1e-4);
-    // Far below 0.1 the denominator is 0.01, so the error is proportional to the squared scale.
+    // For values far below 0.1, the denominator is about 0.01, and the error is proportional to the squared
+    // scale.
     let (small, smaller) = (scaled_errors(1e-5), scaled_errors(1e-6));
     assert!((small.relmse / smaller.relmse - 100.0).abs() < 1e-3, "{} {}", small.relmse, smaller.relmse);
 }
@@ -208,7 +212,7 @@ fn constant_images_have_known_errors() {
     let black_and_white = errors(&gray(1.0), &gray(0.0));
     assert!(black_and_white.psnr_db.abs() < 1e-9, "{}", black_and_white.psnr_db);
     assert!((black_and_white.relmse - 100.0).abs() < 1e-9);
-    // C₁/(1 + C₁), for two constants of which one is 0.
+    // For the constants 0 and 1, SSIM is C₁/(1 + C₁).
     assert!((black_and_white.ssim - 1e-4 / 1.0001).abs() < 1e-9);
     let beyond = errors(&gray(7.0), &gray(1.0));
     assert_eq!((beyond.psnr_db, beyond.flip), (f64::INFINITY, 0.0), "displayed identically");
@@ -234,7 +238,7 @@ fn trimming_drops_one_pixel_in_a_thousand() {
     assert!((five - 3.0 * 900.0 / 1998.0).abs() < 1e-9, "{five}");
     let huge = image(50, 40, |x, y, _| if y == 0 && x < 2 { f32::MAX } else { 0.1 });
     let trimmed = errors(&huge, &black).relmse_trimmed;
-    assert!((trimmed - 1.0).abs() < 1e-6, "the dropped pixels have no effect: {trimmed}");
+    assert!((trimmed - 1.0).abs() < 1e-6, "the dropped pixels should have no effect: {trimmed}");
 }
 
 #[test]

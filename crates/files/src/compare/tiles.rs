@@ -1,4 +1,4 @@
-//! Divides an image into cache-sized tiles, independently of the number of threads.
+//! Divides an image into cache-sized tiles. The division does not depend on the number of threads.
 
 use crate::film::Rect;
 

@@ -1,6 +1,6 @@
-//! Errors against two noisy references. A reference is the truth plus noise; if the noise of both is
-//! independent, the expectation of (x − r₁)(x − r₂) equals that of (x − truth)², without the variance of the
-//! noise.
+//! Computes errors against two noisy references. A reference is the ground truth plus noise. If the noise of
+//! the two references is independent, the expected value of (x − r₁)(x − r₂) is the same as for (x − truth)²,
+//! without the variance of the noise.
 
 use super::Pair;
 use crate::film::RadianceImage;
@@ -15,7 +15,7 @@ fn luminance(color: DVec3) -> f64 {
 #[derive(Clone, Debug)]
 pub struct TwoReferences {
     pair: Pair,
-    /// 1/(r² + 0.01) with the references' mean r, divided by the number of channels and pixels.
+    /// 1/(r² + 0.01), where r is the mean of the references, divided by the number of channels and pixels.
     weights: Vec<DVec3>,
 }
 
@@ -36,13 +36,13 @@ impl TwoReferences {
         &self.pair
     }
 
-    /// relMSE of an image of the same size, unbiased by the noise of the references. Can be negative.
+    /// relMSE of an image of the same size, not biased by the references' noise. Can be negative.
     pub fn error(&self, x: &RadianceImage) -> f64 {
         self.cross(x, x)
     }
 
-    /// Mean of (x − r)(y − r) relative to r². For two images rendered with the same method and independent
-    /// noise, this is the square of their common error, the bias.
+    /// Mean of (x − r)(y − r), relative to r². For two images rendered by the same method with independent
+    /// noise, this is the squared bias.
     pub fn cross(&self, x: &RadianceImage, y: &RadianceImage) -> f64 {
         let pixels = self.weighted_pixels().zip(x.pixels.iter().zip(&y.pixels));
         let sum = pixels.fold(DVec3::ZERO, |sum, ((weight, a, b), (x, y))| {
@@ -52,21 +52,21 @@ impl TwoReferences {
         sum.element_sum()
     }
 
-    /// relMSE of one reference: the error that its noise would add if it were the only reference.
+    /// relMSE of one reference: the error its noise would add if only one reference were used.
     pub fn noise(&self) -> f64 {
         let sum =
             self.weighted_pixels().fold(DVec3::ZERO, |sum, (weight, a, b)| sum + weight * (a - b) * (a - b));
         sum.element_sum() / 2.0
     }
 
-    /// Standard error of [`Self::error`] due to the noise of the references, assuming independent pixels and
-    /// fully correlated channels.
+    /// Standard error of [`Self::error`] due to the references' noise, assuming independent pixels and fully
+    /// correlated channels.
     pub fn uncertainty(&self, x: &RadianceImage) -> f64 {
         let variances = self.weighted_pixels().zip(&x.pixels).map(|((weight, a, b), x)| {
             let (between, from) = ((a - b) * (a - b), x.as_dvec3() - (a + b) / 2.0);
             let channel_deviation = |channel: usize| {
-                // Add the variances of a·b and of (x − truth)(a + b). The variance of one reference is half
-                // of `between`.
+                // Add the variances of a·b and (x − truth)(a + b). The variance of one reference is half of
+                // `between`.
                 let variance = between[channel] * (between[channel] / 12.0 + from[channel] * from[channel]);
                 weight[channel] * variance.sqrt()
             };
@@ -88,8 +88,7 @@ impl TwoReferences {
         sum / self.weights.len() as f64
     }
 
-    /// Standard error of [`Self::brightness`] due to the noise of the references, assuming independent
-    /// pixels.
+    /// Standard error of [`Self::brightness`] due to the references' noise, assuming independent pixels.
     pub fn brightness_uncertainty(&self) -> f64 {
         let square = |x: f64| x * x;
         let squares = self.weighted_pixels().map(|(_, a, b)| square(luminance((a - b) / 2.0)));
@@ -117,7 +116,7 @@ mod tests {
 
     const SIDE: u32 = 64;
 
-    /// Gray 0.5 with an offset and noise of ±`noise`.
+    /// Gray 0.5 plus an offset and noise of ±`noise`.
     fn test_image(seed: u32, noise: f32, offset: f32) -> RadianceImage {
         let value = |i: u32| 0.5 + offset + noise * uniform(seed.wrapping_mul(1 << 20) + i);
         let pixels = (0..SIDE * SIDE).map(|i| Vec3::new(value(3 * i), value(3 * i + 1), value(3 * i + 2)));
@@ -135,7 +134,7 @@ mod tests {
     const WEIGHT: f64 = 1.0 / 0.26;
 
     #[test]
-    fn equal_references_give_the_standard_relmse() {
+    fn equal_references_yield_the_standard_relmse() {
         let references = references(0.0);
         assert_eq!(references.noise(), 0.0);
         let error = references.error(&test_image(3, 0.0, 0.1));
@@ -147,20 +146,24 @@ mod tests {
     fn reference_noise_does_not_bias_the_error() {
         let references = references(0.05);
         let noise = 0.05_f64.powi(2) / 3.0 * WEIGHT;
-        assert!((references.noise() / noise - 1.0).abs() < 0.05, "{} against {noise}", references.noise());
+        assert!(
+            (references.noise() / noise - 1.0).abs() < 0.05,
+            "noise is {}, expected {noise}",
+            references.noise()
+        );
         let tested = test_image(3, 0.01, 0.0);
         let truth = 0.01_f64.powi(2) / 3.0 * WEIGHT;
         let (error, uncertainty) = (references.error(&tested), references.uncertainty(&tested));
-        assert!((error - truth).abs() < 4.0 * uncertainty, "{error} ± {uncertainty}, not {truth}");
+        assert!((error - truth).abs() < 4.0 * uncertainty, "got {error} ± {uncertainty}, expected {truth}");
         assert!(uncertainty < 0.05 * noise, "{uncertainty}");
         let plain = super::super::linear::measure(
             &Pair::new([Path::new("x"), Path::new("r")], tested, test_image(1, 0.05, 0.0)).expect("a pair"),
         );
-        assert!(plain.relmse > 20.0 * truth, "a single reference: {}", plain.relmse);
+        assert!(plain.relmse > 20.0 * truth, "error with a single reference: {}", plain.relmse);
     }
 
     #[test]
-    fn cross_error_of_independent_images_is_bias() {
+    fn cross_error_is_the_squared_bias() {
         let references = references(0.02);
         let cross = |offset| references.cross(&test_image(5, 0.2, offset), &test_image(6, 0.2, offset));
         assert!((cross(0.1) / (0.01 * WEIGHT) - 1.0).abs() < 0.1, "{}", cross(0.1));

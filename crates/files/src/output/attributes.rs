@@ -1,5 +1,4 @@
-//! Carries file attributes over to the file that replaces it: owner, group, access list, extended attributes,
-//! permissions.
+//! Copies file attributes to a replacement file: owner, group, access list, extended attributes, permissions.
 
 use std::ffi::{OsStr, OsString};
 use std::fs::{self, File};
@@ -14,7 +13,7 @@ use super::flags::Flags;
 
 /// POSIX.1e access control list, as stored by Linux (acl(5)).
 const ACCESS_LIST: &str = "system.posix_acl_access";
-/// Attributes that describe the old bytes or are written by the system.
+/// Attributes that describe the old content or are managed by the system.
 const EXCLUDED: [&str; 4] = ["security.capability", "security.evm", "security.ima", "com.apple.provenance"];
 
 /// Permissions of the owner.
@@ -25,9 +24,10 @@ const NON_GROUP_BITS: u32 = 0o707;
 /// What to do if replacing a file would lose some of its attributes.
 #[derive(Clone, Copy)]
 pub enum Losses<'a> {
-    /// Replace it and report the losses in a sentence. The new file never grants additional permissions.
+    /// Replace the file and report the losses in a sentence. The new file never grants additional
+    /// permissions.
     Report(&'a dyn Fn(String)),
-    /// Do not replace it.
+    /// Do not replace the file.
     Refuse,
 }
 
@@ -43,7 +43,7 @@ pub(super) struct Attributes {
     named: Vec<(OsString, io::Result<Vec<u8>>)>,
 }
 
-/// Attributes that could not be carried over, and permissions that are safe without them.
+/// Attributes that could not be copied, and permissions that are safe without them.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct Carried {
     /// Descriptions of the lost attributes, such as `its owner`.
@@ -66,10 +66,11 @@ impl Attributes {
         }
     }
 
-    /// Applies all attributes except the permissions to a new file that only its owner can access yet.
+    /// Applies all attributes except the permissions to a new file. The file must only be accessible to its
+    /// owner until then.
     pub(super) fn carry_over(&self, new: &File) -> Carried {
         let mut carried = Carried { lost: Vec::new(), mode: self.mode };
-        // Set the flags while this user owns the new file.
+        // Set the flags before changing the owner, because only the owner may set them.
         #[cfg(target_os = "linux")]
         if !self.flags.carry_over(new) {
             carried.lost.push("its flags (chattr)".to_owned());
@@ -85,17 +86,17 @@ impl Attributes {
         if is_same(ids()) || fchown(new, Some(self.uid), Some(self.gid)).is_ok() {
             return;
         }
-        // Any member of the group can at least keep the group.
+        // Changing the group only requires being a member of it.
         let _ = fchown(new, None, Some(self.gid));
         let (uid, gid) = ids().unwrap_or((u32::MAX, u32::MAX));
-        // Drop set-user-ID and set-group-ID, which would apply to another user.
+        // Drop set-user-ID and set-group-ID. They would apply to a different user or group.
         carried.mode &= 0o777;
         if uid != self.uid {
             carried.lost.push("its owner".to_owned());
         }
         if gid != self.gid {
             carried.lost.push("its group".to_owned());
-            // Give the new group the permissions that its members had before, those of others.
+            // The new group's members previously had the permissions of others. Do not grant them more.
             let others_bits = (carried.mode & 0o007) << 3;
             carried.mode &= NON_GROUP_BITS | others_bits;
         }
@@ -108,7 +109,7 @@ impl Attributes {
                 carried.lose(name);
             }
         }
-        // New files may inherit an access list from their folder. Replace or remove it.
+        // New files may inherit an access list from their folder. Remove it if the old file had none.
         let has_list = self.named.iter().any(|(name, _)| name == ACCESS_LIST);
         let is_inherited = || matches!(new.get_xattr(ACCESS_LIST), Ok(Some(_)));
         if !has_list && is_inherited() && new.remove_xattr(ACCESS_LIST).is_err() {
@@ -118,14 +119,15 @@ impl Attributes {
 }
 
 impl Carried {
-    /// Applies the permissions. This must come last because writing clears some of them.
+    /// Applies the permissions. Must be called last, because writing clears some of them.
     pub(super) fn apply_mode(&self, new: &File) -> io::Result<()> {
         new.set_permissions(fs::Permissions::from_mode(self.mode))
     }
 
     fn lose(&mut self, name: &OsStr) {
         if name == ACCESS_LIST {
-            // With an access list, the group bits are its mask. Without it, they would grant permissions.
+            // The group bits are the mask of the access list. Without the list, they would grant permissions
+            // to the group.
             self.mode &= OWNER_BITS;
             self.lost.push("its access list".to_owned());
         } else {
@@ -149,7 +151,7 @@ fn named(path: &Path) -> Vec<(OsString, io::Result<Vec<u8>>)> {
     }
 }
 
-/// Sets an attribute, unless it already has this value, which needs no permission.
+/// Sets an attribute. Does nothing if it already has this value, because setting it may need permission.
 fn set(new: &File, name: &OsStr, value: &[u8]) -> io::Result<()> {
     if new.get_xattr(name).is_ok_and(|now| now.as_deref() == Some(value)) {
         return Ok(());
@@ -180,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn lost_attributes_are_named() {
+    fn lost_attributes_are_reported() {
         let (attributes, new) = attributes(0o664, "nonsense.of.no.space");
         let carried = attributes.carry_over(&new);
         assert_eq!(
@@ -190,7 +192,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lost_access_list_leaves_only_owner_access() {
+    fn losing_the_access_list_revokes_group_access() {
         // The value is not a valid list.
         let (attributes, new) = attributes(0o664, ACCESS_LIST);
         let carried = attributes.carry_over(&new);

@@ -12,14 +12,15 @@ use crate::control::{CancelToken, Cancelled};
 use crate::film::RadianceImage;
 use crate::film::tone::{develop, develop16};
 
-/// Pixels between two polls of the cancel token: a few milliseconds, and enough for all threads.
+/// Number of pixels between two polls of the cancel token. Takes a few milliseconds, and is large enough for
+/// all threads.
 const PIXELS: usize = 1 << 18;
 
-/// Bytes compressed or written between two polls of the cancel token.
+/// Number of bytes to compress or write between two polls of the cancel token.
 pub(super) const BYTES: usize = 1 << 15;
 
-/// Tone maps an image from the top. Components take one byte, or two in big-endian order, as in PNG and PPM.
-/// Passes the bytes to `take` in order, at most [`BYTES`] at a time.
+/// Tone maps an image from top to bottom. Components have one byte, or two bytes in big-endian order, as in
+/// PNG and PPM. Passes the bytes to `take` in order, at most [`BYTES`] at a time.
 pub(super) fn develop_parts(
     image: &RadianceImage,
     options: &EncodeOptions,
@@ -59,7 +60,7 @@ pub(super) fn develop_all(
     Ok(picture)
 }
 
-/// A memory writer that fails after cancellation, which also stops encoders that do not poll the cancel
+/// An in-memory writer that fails after cancellation. This also stops encoders that do not poll the cancel
 /// token.
 pub(super) struct CancellableBuffer<'a> {
     bytes: Cursor<Vec<u8>>,
@@ -102,9 +103,10 @@ pub(super) fn write_all(mut to: impl Write, bytes: &[u8], token: &CancelToken) -
     Ok(())
 }
 
-/// [`write_all`] to a pipe or a socket, whose reader may block for any time.
+/// Like [`write_all`], for pipes and sockets, whose reader may block indefinitely.
 pub(super) fn write_to_pipe(mut to: &File, bytes: &[u8], token: &CancelToken) -> io::Result<()> {
-    /// Bytes per write. A pipe that is ready has at least this much room, so the write does not block.
+    /// Number of bytes per write. A pipe that is ready has at least this much space, so the write does not
+    /// block.
     const PIPE_BYTES: usize = 4096;
     let mut rest = bytes;
     while !rest.is_empty() {
@@ -112,7 +114,7 @@ pub(super) fn write_to_pipe(mut to: &File, bytes: &[u8], token: &CancelToken) ->
         match to.write(&rest[..rest.len().min(PIPE_BYTES)]) {
             Ok(0) => return Err(ErrorKind::WriteZero.into()),
             Ok(taken) => rest = &rest[taken..],
-            // Another writer was faster.
+            // Another process has written to the pipe first.
             Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => {}
             Err(error) => return Err(error),
         }
@@ -134,8 +136,8 @@ fn wait_for_room(to: &File, token: &CancelToken) -> io::Result<()> {
     }
 }
 
-/// Distinguishes a cancelled write from an error of the file. Only the error itself shows a cancellation; the
-/// token may have been cancelled later, after the file was complete.
+/// Distinguishes cancelled writes from I/O errors. Checks the error instead of the token, because the token
+/// may have been cancelled after the write.
 pub(super) fn or_cancelled<T>(
     result: io::Result<T>,
     error: impl FnOnce(io::Error) -> OutputError,
@@ -151,7 +153,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn parts_make_up_the_image_and_can_be_cancelled() {
+    fn parts_form_the_image_and_can_be_cancelled() {
         let count = PIXELS + 70_000;
         let pixels = (0..count).map(|i| crate::math::Vec3::splat((i % 256) as f32 / 255.0)).collect();
         let image = RadianceImage { width: count as u32, height: 1, pixels };
@@ -177,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn only_stopped_writes_count_as_cancelled() {
+    fn only_stopped_writes_are_cancelled() {
         let token = CancelToken::new();
         token.cancel();
         let classify = |result| or_cancelled(result, |error| OutputError::file("a.png".as_ref(), error));
@@ -189,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn a_blocked_reader_does_not_delay_a_cancel() {
+    fn blocked_readers_do_not_delay_cancellation() {
         let (mut reader, writer) = io::pipe().expect("a pipe");
         let (to, token) = (File::from(std::os::fd::OwnedFd::from(writer)), CancelToken::new());
         nix::fcntl::fcntl(&to, nix::fcntl::FcntlArg::F_SETFL(nix::fcntl::OFlag::O_NONBLOCK)).expect("set");

@@ -1,32 +1,32 @@
-//! Encodes a film as an image file, the same way for a single render and for merged parts.
+//! Encodes a film as an image file. Used for both single renders and merged parts.
 
 use super::{BitDepth, EncodeOptions, Format, LayerImage, OutputError, encode_with};
 use crate::control::CancelToken;
 use crate::film::tone::ToneMapping;
 use crate::film::{Film, Quantity, RadianceImage, SampleStats};
 
-/// Settings that determine the image file of a film.
+/// Settings for encoding a film as an image file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DevelopSettings {
     /// Quantity of the film to show.
     pub quantity: Quantity,
-    /// Tone mapping, before its range is resolved for the image.
+    /// Tone mapping, with its range not yet resolved for the image.
     pub tone: ToneMapping,
     /// Bits per channel of PNG and PPM files.
     pub bit_depth: BitDepth,
-    /// Metadata names and values, without those derived from the film.
+    /// Metadata names and values, except for those derived from the film.
     pub metadata: Vec<(String, String)>,
-    /// Whether the values are radiance, so that EXR files include the error of the mean.
+    /// Whether the values are radiance. If so, EXR files include the standard error of the mean.
     pub is_light: bool,
 }
 
 impl DevelopSettings {
-    /// The image of a film.
+    /// Extracts the image from a film.
     pub fn image(&self, film: &Film) -> RadianceImage {
         film.image(self.quantity)
     }
 
-    /// Metadata including the number of samples, which follows the scene.
+    /// Metadata with the number of samples inserted after the scene.
     pub fn metadata_with(&self, SampleStats { min, mean, max }: SampleStats) -> Vec<(String, String)> {
         let mut metadata = self.metadata.clone();
         let samples =
@@ -35,7 +35,7 @@ impl DevelopSettings {
         metadata
     }
 
-    /// Encodes an image file. `image` is the film's image; layers are only written to EXR files.
+    /// Encodes an image file. `image` is the film's image. Layers are only written to EXR files.
     ///
     /// # Errors
     /// Same as [`encode`](super::encode).
@@ -47,7 +47,7 @@ impl DevelopSettings {
         token: &CancelToken,
     ) -> Result<Vec<u8>, OutputError> {
         let tone = self.tone.resolved_for(image);
-        // Add the metadata derived from the film: samples, and the range at the end.
+        // Add the metadata derived from the film: the number of samples, and the range at the end.
         let mut metadata = self.metadata_with(film.samples());
         let range = tone.range_map.range();
         let range = range.map(|range| format!("{} to {}", range.least, range.greatest));

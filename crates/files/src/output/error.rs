@@ -1,4 +1,4 @@
-//! Errors of writing images, with advice.
+//! Errors from writing images, with advice.
 
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
@@ -8,7 +8,7 @@ use nix::libc;
 use super::{AnimationFormat, Format};
 use crate::system::describe_error;
 
-/// Reason for which an image could not be written.
+/// Reason why an image could not be written.
 #[derive(Debug, thiserror::Error)]
 pub enum OutputError {
     /// The path has no file name extension.
@@ -22,7 +22,7 @@ pub enum OutputError {
     UnknownExtension {
         /// The path.
         path: PathBuf,
-        /// The extension in lower case.
+        /// The lowercase extension.
         extension: String,
     },
     /// The bit depth is neither 8 nor 16.
@@ -52,7 +52,7 @@ pub enum OutputError {
     Encoder {
         /// The format.
         format: Format,
-        /// Message of the encoder.
+        /// The encoder's message.
         why: String,
     },
     /// The target cannot be written.
@@ -65,7 +65,7 @@ pub enum OutputError {
         /// Advice.
         way_out: &'static str,
     },
-    /// The existing file must not be replaced.
+    /// Replacing the existing file is not allowed.
     #[error("{reason}")]
     Refused {
         /// The file, the reason, and advice.
@@ -74,7 +74,7 @@ pub enum OutputError {
     /// The work was cancelled.
     #[error("cancelled")]
     Cancelled(#[from] crate::control::Cancelled),
-    /// The system refused the operation.
+    /// The operating system reported an error.
     #[error("cannot write {}: {}; {}", path.display(), describe_error(source), way_out(source))]
     File {
         /// The path as given.

@@ -1,5 +1,5 @@
-//! OpenEXR: 32-bit float, linear, Rec. 709 primaries, lossless ZIP. Keeps negative values, which filters with
-//! negative lobes cause: clamping them would make dark noise too bright on average.
+//! OpenEXR: 32-bit float, linear, Rec. 709 primaries, lossless ZIP. Negative values, caused by filters with
+//! negative lobes, are preserved. Clamping them would make dark noise too bright on average.
 
 use std::fs::File;
 use std::io::BufReader;
@@ -21,11 +21,11 @@ use super::{EncodeOptions, Format, LayerImage, OutputError, SOFTWARE, as_finite,
 use crate::control::CancelToken;
 use crate::film::RadianceImage;
 
-/// Attribute (a double) with the standard error of the image's mean luminance.
+/// Name of the attribute (a double) for the standard error of the image's mean luminance.
 const MEAN_LUMINANCE_ERROR: &str = "glimtMeanLuminanceError";
 
-/// Reads the standard error of the mean luminance from an EXR file. Only regular files are read, because a
-/// pipe can be read only once.
+/// Reads the standard error of the mean luminance from an EXR file. Only reads regular files, because a pipe
+/// can only be read once.
 pub fn mean_luminance_error(path: &Path) -> Option<f64> {
     let is_regular = path.metadata().is_ok_and(|found| found.is_file());
     let file = if is_regular { File::open(path).ok()? } else { return None };
@@ -57,7 +57,7 @@ pub(super) fn encode(
     Ok(bytes.into_bytes())
 }
 
-/// Channels of an image and of its layers (`albedo.R` and so on).
+/// Channels of an image and its layers (`albedo.R` and so on).
 fn channels(image: &RadianceImage, layers: &[LayerImage]) -> AnyChannels<FlatSamples> {
     let channel = |name: &str, image: &RadianceImage, component: usize| {
         let samples = image.pixels.iter().map(|pixel| as_finite(pixel[component])).collect();
@@ -75,8 +75,8 @@ fn channels(image: &RadianceImage, layers: &[LayerImage]) -> AnyChannels<FlatSam
     AnyChannels::sort(channels)
 }
 
-/// Compresses in the caller's thread pool, or on the caller's thread outside a pool. The encoder itself would
-/// create a pool with a thread per core.
+/// Compresses in the caller's thread pool, or on the caller's thread if there is no pool. By default, the
+/// encoder would create its own pool with one thread per core.
 fn compress(
     meta: &MetaData,
     mut blocks: impl Iterator<Item = (usize, UncompressedBlock)>,
@@ -110,9 +110,9 @@ const REC_709: Chromaticities = Chromaticities {
     white: Vec2(0.3127, 0.3290),
 };
 
-/// Attributes of the file. Metadata goes into the standard attribute `comments`, one line each: custom
-/// attributes would be written in the random order of the encoder's hash map, which would make files
-/// nondeterministic. The exception is a single attribute that programs read.
+/// Attributes of the file. Metadata is written to the standard attribute `comments`, one item per line. The
+/// encoder would write custom attributes in the random order of its hash map, so files would be
+/// nondeterministic. [`MEAN_LUMINANCE_ERROR`] is the only custom attribute.
 fn attributes(options: &EncodeOptions) -> LayerAttributes {
     let line = |(name, value): &(String, String)| format!("{}: {}", one_line(name), one_line(value));
     let lines: Vec<_> = options.metadata.iter().map(line).collect();
@@ -122,7 +122,7 @@ fn attributes(options: &EncodeOptions) -> LayerAttributes {
     LayerAttributes { software_name: Some(text(SOFTWARE)), comments, other, ..Default::default() }
 }
 
-/// Text as UTF-8, the encoding that other programs use.
+/// Text as UTF-8, like in other programs.
 fn text(value: &str) -> Text {
     Text::from_slice_unchecked(value.as_bytes())
 }

@@ -1,12 +1,12 @@
-//! Carries file flags (chattr(1)) over to the file that replaces a file.
+//! Copies file flags (chattr(1)) to a replacement file.
 
 use std::fs::File;
 use std::path::Path;
 
 use rustix::fs::{IFlags, ioctl_getflags, ioctl_setflags};
 
-/// Flags that users set. Append-only and immutable files are not replaced; all other flags are managed by the
-/// system.
+/// Flags that users can set, except for append-only and immutable. Files with these two flags are not
+/// replaced. All other flags are managed by the system.
 const USER_FLAGS: IFlags = IFlags::NODUMP
     .union(IFlags::NOATIME)
     .union(IFlags::SYNC)
@@ -26,13 +26,13 @@ impl Flags {
         Self(File::open(path).ok().and_then(|file| ioctl_getflags(file).ok()))
     }
 
-    /// Applies the flags to a new, empty file. Returns whether it has them now.
+    /// Applies the flags to a new, empty file. Returns whether this succeeded.
     pub(super) fn carry_over(&self, new: &File) -> bool {
         let Some(wanted) = self.0 else { return true };
         let set = || {
             let now = ioctl_getflags(new)?;
             let then = (now - USER_FLAGS) | (wanted & USER_FLAGS);
-            // Skip the call if nothing changes, because it needs permission.
+            // Skip the call if nothing changes, because the call may need permission.
             if now == then { Ok(()) } else { ioctl_setflags(new, then) }
         };
         set().is_ok()
@@ -45,7 +45,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn flags_are_kept_despite_those_of_the_folder() {
+    fn file_flags_are_kept_despite_folder_flags() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("a.png");
         let flags = |path: &Path| ioctl_getflags(File::open(path).expect("a file"));

@@ -61,7 +61,7 @@ impl Format {
         Self::EXTENSIONS.iter().map(|(extension, _)| *extension)
     }
 
-    /// List of the known extensions for messages.
+    /// List of known extensions for messages.
     pub(super) fn known_extensions() -> String {
         Self::EXTENSIONS.map(|(extension, _)| format!(".{extension}")).join(", ")
     }
@@ -119,7 +119,7 @@ impl fmt::Display for Format {
 /// Format of an animation file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AnimationFormat {
-    /// 256 colors, the same for all frames.
+    /// 256 colors, shared by all frames.
     Gif,
     /// 8-bit sRGB, lossless.
     Apng,

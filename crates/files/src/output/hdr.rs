@@ -1,16 +1,16 @@
 //! Radiance HDR (G. Ward, *Real Pixels*, Graphics Gems II, 1991): three mantissas and a shared exponent per
-//! pixel, with run-length encoded scanlines. Negative values become 0.
+//! pixel, with run-length encoded scanlines. Negative values are clamped to 0.
 
 use super::{EncodeOptions, OutputError, SOFTWARE, as_finite, one_line};
 use crate::control::CancelToken;
 use crate::film::RadianceImage;
 use crate::math::Vec3;
 
-/// Widths of scanlines that may be compressed. Readers interpret other widths as plain pixels.
+/// Widths of scanlines that may be compressed. Scanlines with other widths must be plain pixels.
 const COMPRESSED_WIDTHS: std::ops::Range<usize> = 8..32768;
 const LONGEST_RUN: usize = 127;
 const LONGEST_LITERAL: usize = 128;
-/// Minimum length of a run. Shorter runs take as much space as literals.
+/// Minimum length of a run. Shorter runs would not save space over literals.
 const SHORTEST_RUN: usize = 4;
 
 pub(super) fn encode(
@@ -44,16 +44,16 @@ fn write_line(line: &[Vec3], bytes: &mut Vec<u8>) {
     }
 }
 
-/// Encodes a color, rounding mantissas to nearest so that decoded values are unbiased.
+/// Encodes a color. Mantissas are rounded to nearest, which keeps decoded values unbiased.
 fn rgbe(color: Vec3) -> [u8; 4] {
     let color = color.to_array().map(|component| f64::from(as_finite(component).max(0.0)));
     let brightest = color[0].max(color[1]).max(color[2]);
-    // 2^(exponent − 1) ≤ brightest < 2^exponent, plus one if the mantissa would round up to 256.
+    // 2^(exponent − 1) ≤ brightest < 2^exponent. Add one if the mantissa would round up to 256.
     let mut exponent = libm::log2(brightest).floor() + 1.0;
     if (brightest / libm::exp2(exponent) * 256.0).round() >= 256.0 {
         exponent += 1.0;
     }
-    // The exponent byte is 1 … 255; 0 means black.
+    // The exponent byte is in 1 … 255. 0 means black.
     if brightest == 0.0 || exponent < -127.0 {
         return [0; 4];
     }

@@ -1,6 +1,6 @@
-//! Replaces a user's text file only if it still has the expected content. At any moment, every saved version
-//! exists under the file's name or under a backup name. Backups are not removed automatically, and the next
-//! start reports them.
+//! Replaces a user's text file only if it still has the expected content. At all times, every saved version
+//! exists under either the file's name or a backup name. Backups that differ from the file are never removed
+//! automatically. They are reported at the next start.
 
 use std::fs::{self, File};
 use std::io::{self, ErrorKind};
@@ -12,17 +12,17 @@ use super::temporary::Temporary;
 
 /// Extension of the backup name.
 const EXTENSION: &str = ".glimt-saved";
-/// Number of concurrent saves by other programs that a replacement tolerates.
+/// Number of concurrent saves by other programs tolerated during a replacement.
 const ATTEMPTS: usize = 16;
 
-/// State of a file's backup when the file is opened.
+/// What happened to a file's backup when the file was opened.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Held {
     /// There was no backup, or it had the same content as the file.
     None,
     /// The file was missing and has been restored from the backup.
     Restored,
-    /// The backup differs from the file. The user has to compare them.
+    /// The backup differs from the file. The user must compare them.
     Differs(PathBuf),
 }
 
@@ -35,7 +35,7 @@ pub fn recover(path: &Path) -> Held {
         return Held::Restored;
     }
     if fs::read(&target).is_ok_and(|current| current == text) {
-        // Report the backup if it cannot be removed.
+        // If the backup cannot be removed, report it.
         return fs::remove_file(&held).map_or(Held::Differs(held), |()| Held::None);
     }
     Held::Differs(held)
@@ -47,7 +47,7 @@ fn backup_path(target: &Path) -> PathBuf {
     name.into()
 }
 
-/// A replacement in progress. Its steps are [`Self::begin`], [`Self::swap`] and [`Self::settle`].
+/// A replacement in progress. The steps are [`Self::begin`], [`Self::swap`] and [`Self::settle`].
 pub(super) struct Replacement<'a> {
     target: &'a Path,
     held: PathBuf,
@@ -59,17 +59,17 @@ impl<'a> Replacement<'a> {
     /// Moves the new text to the backup name.
     ///
     /// # Errors
-    /// A backup exists already, or a system error.
+    /// A backup already exists, or a system error.
     pub(super) fn begin(mut new: Temporary, target: &'a Path, expected: &'a [u8]) -> io::Result<Self> {
         let held = backup_path(target);
         new.move_to_new(&held).map_err(|error| backup_error(&held, error))?;
         Ok(Self { target, held, expected, new })
     }
 
-    /// Swaps both files, so that the old text is the backup.
+    /// Swaps both files. The old text is now the backup.
     ///
     /// # Errors
-    /// A system error, with the new text under its temporary name.
+    /// A system error. Includes the new text if it is back under its temporary name.
     pub(super) fn swap(mut self) -> Result<Self, (io::Error, Option<Temporary>)> {
         match exchange(&self.held, self.target) {
             Ok(()) => Ok(self),
@@ -80,15 +80,15 @@ impl<'a> Replacement<'a> {
         }
     }
 
-    /// Removes the old text if it is the expected one. Otherwise puts it back and returns `None`. Returns the
-    /// new file.
+    /// Removes the old text and returns the new file. If the old text is not the expected text, restores it
+    /// and returns `None`.
     ///
     /// # Errors
     /// A system error. A backup may remain.
     pub(super) fn settle(self) -> io::Result<Option<File>> {
         let text = fs::read(&self.held)?;
         if text == self.expected {
-            // A backup that cannot be removed is handled at the next start.
+            // If this fails, the backup is handled at the next start.
             let _ = fs::remove_file(&self.held);
             return self.new.file.try_clone().map(Some);
         }
@@ -96,15 +96,15 @@ impl<'a> Replacement<'a> {
         Ok(None)
     }
 
-    /// Puts the old text back, unless another program saves a newer one in the meantime.
+    /// Restores the old text, unless another program has saved a newer text in the meantime.
     fn put_back(&self, mut older: Vec<u8>) -> io::Result<()> {
         for _ in 0..ATTEMPTS {
             exchange(&self.held, self.target)?;
             if self.is_new_held() {
                 return fs::remove_file(&self.held);
             }
-            // The backup was saved after the first exchange, so it is newer. Put it back and take out the
-            // older text.
+            // The backup is not our new text, so another program saved it after the first exchange. Swap it
+            // back in and take out the older text.
             let newer = fs::read(&self.held)?;
             exchange(&self.held, self.target)?;
             if fs::read(&self.held)? == older {
@@ -115,14 +115,14 @@ impl<'a> Replacement<'a> {
         Err(io::Error::new(ErrorKind::AlreadyExists, backup_exists(&self.held)))
     }
 
-    /// Whether the backup is the new file.
+    /// Whether the backup name refers to the new file.
     fn is_new_held(&self) -> bool {
         super::FileIdentity::of(&self.held).is_some_and(|held| held.is_of(&self.new.file))
     }
 }
 
-/// Replacement on file systems that cannot exchange two names: moves the old text to the backup name, checks
-/// it, and gives the new text the file's name if that is still free.
+/// Replacement for file systems that cannot exchange two names. Moves the old text to the backup name, checks
+/// it, and moves the new text to the file's name if that name is still unused.
 pub(super) struct StepwiseReplacement<'a> {
     target: &'a Path,
     held: PathBuf,
@@ -133,14 +133,15 @@ impl<'a> StepwiseReplacement<'a> {
     /// Moves the old text to the backup name.
     ///
     /// # Errors
-    /// A backup exists already, or a system error.
+    /// A backup already exists, or a system error.
     pub(super) fn begin(target: &'a Path, expected: &'a [u8]) -> io::Result<Self> {
         let held = backup_path(target);
         move_new(target, &held).map_err(|error| backup_error(&held, error))?;
         Ok(Self { target, held, expected })
     }
 
-    /// Gives the new text the file's name, or puts the old text back and returns `None`.
+    /// Moves the new text to the file's name and returns the file. If the old text is not the expected text,
+    /// restores it and returns `None`.
     ///
     /// # Errors
     /// A system error. A backup may remain.
@@ -150,14 +151,15 @@ impl<'a> StepwiseReplacement<'a> {
         }
         let file = new.file.try_clone()?;
         match new.move_to_new(self.target) {
-            // Another program has saved in the meantime. Keep its text; the backup is older.
+            // Another program has saved the file in the meantime. Keep that version and remove the older
+            // backup.
             Err(error) if error.kind() == ErrorKind::AlreadyExists => {
                 fs::remove_file(&self.held)?;
                 Ok(None)
             }
             Err(error) => move_new(&self.held, self.target).and(Err(error)),
             Ok(()) => {
-                // A backup that cannot be removed is handled at the next start.
+                // If this fails, the backup is handled at the next start.
                 let _ = fs::remove_file(&self.held);
                 Ok(Some(file))
             }
@@ -165,15 +167,15 @@ impl<'a> StepwiseReplacement<'a> {
     }
 }
 
-/// Replaces a file that has the expected content and returns the new file. Returns `None` and keeps the file
-/// if its content differs.
+/// Replaces a file and returns the new file. If the file does not have the expected content, keeps it and
+/// returns `None`.
 ///
 /// # Errors
 /// A system error.
 pub(super) fn replace(new: Temporary, target: &Path, expected: &[u8]) -> io::Result<Option<File>> {
     match Replacement::begin(new, target, expected)?.swap() {
         Ok(replacement) => replacement.settle(),
-        // The file system cannot exchange names, or the file is gone.
+        // The file system cannot exchange names, or the file no longer exists.
         Err((error, Some(new))) if error.kind() != ErrorKind::PermissionDenied => {
             StepwiseReplacement::begin(target, expected)?.settle(new)
         }
@@ -181,7 +183,7 @@ pub(super) fn replace(new: Temporary, target: &Path, expected: &[u8]) -> io::Res
     }
 }
 
-/// Adds an explanation if the backup exists already.
+/// Adds an explanation if the backup already exists.
 fn backup_error(held: &Path, error: io::Error) -> io::Error {
     match error.kind() {
         ErrorKind::AlreadyExists => io::Error::new(ErrorKind::AlreadyExists, backup_exists(held)),
@@ -210,7 +212,7 @@ fn exchange(_: &Path, _: &Path) -> io::Result<()> {
 /// Warning about a backup that differs from its file.
 pub fn backup_warning(held: &Path) -> String {
     format!(
-        "{} contains another version of this scene: glimt was interrupted while saving it",
+        "{} contains another version of this scene, because glimt was interrupted while saving it",
         held.display()
     )
 }
@@ -249,14 +251,14 @@ mod tests {
             new
         }
 
-        /// Saves the scene like an editor: under a temporary name, then renamed.
+        /// Saves the scene like an editor: writes a temporary file, then renames it.
         fn save(&self, text: &str) {
             let other = self.folder.path().join("of the editor");
             fs::write(&other, text).expect("written");
             fs::rename(other, self.scene()).expect("renamed");
         }
 
-        /// All texts that the user finds after a kill, a cleanup and the next start.
+        /// All texts found by the user after a kill, a cleanup and the next start.
         fn after_a_kill(&self) -> Vec<String> {
             remove_stale(self.folder.path(), &|_| false);
             recover(&self.scene());
@@ -280,7 +282,7 @@ mod tests {
         assert!(replace(folder.new_text(), &folder.scene(), OLD.as_bytes()).expect("no error").is_none());
         assert!(folder.has(NEWER));
         assert_eq!(fs::read_dir(folder.folder.path()).expect("a folder").count(), 1, "no other files");
-        // Same for the stepwise replacement.
+        // Repeat with stepwise replacement.
         let scene = folder.scene();
         let steps = StepwiseReplacement::begin(&scene, OLD.as_bytes()).expect("taken");
         assert!(steps.settle(folder.new_text()).expect("no error").is_none() && folder.has(NEWER));
@@ -291,8 +293,8 @@ mod tests {
 
     #[cfg(target_os = "linux")]
     #[test]
-    fn a_kill_between_steps_loses_no_saved_text() {
-        // Number of steps before the kill, and the steps before which an editor saves.
+    fn killed_replacement_does_not_lose_text() {
+        // The process is killed after `steps` steps. An editor saves at the steps in `saves`.
         for steps in 0..=2 {
             for saves in [vec![], vec![0], vec![1], vec![0, 1], vec![2], vec![0, 2]] {
                 let folder = SceneDir::new();
@@ -321,18 +323,18 @@ mod tests {
                 let is_lost = newest != OLD && !found.contains(&newest);
                 assert!(!is_lost, "{steps} {saves:?}: {newest:?} is not in {found:?}");
                 assert!(scene.exists() && found.len() <= 2, "{steps} {saves:?}: {found:?}");
-                // The next start reports both texts until the user removes one.
+                // If there are two texts, every start reports them until the user removes one.
                 let held = recover(&scene);
                 assert_eq!(matches!(held, Held::Differs(_)), found.len() == 2, "{steps} {saves:?}: {held:?}");
                 let again = replace(folder.new_text(), &scene, newest.as_bytes());
-                assert_eq!(again.is_err(), found.len() == 2, "the backup is kept: {again:?}");
+                assert_eq!(again.is_err(), found.len() == 2, "the backup should be kept: {again:?}");
             }
         }
     }
 
     #[cfg(target_os = "linux")]
     #[test]
-    fn a_text_saved_during_the_rollback_is_kept() {
+    fn text_saved_during_a_rollback_is_kept() {
         let folder = SceneDir::new();
         let scene = folder.scene();
         folder.save("first");
@@ -345,14 +347,14 @@ mod tests {
     }
 
     #[test]
-    fn a_backup_without_its_file_is_restored() {
+    fn missing_files_are_restored_from_backups() {
         let folder = SceneDir::new();
         let scene = folder.scene();
         std::mem::forget(StepwiseReplacement::begin(&scene, OLD.as_bytes()).expect("taken"));
         assert!(!scene.exists());
         assert_eq!(recover(&scene), Held::Restored);
         assert!(folder.has(OLD));
-        // Same through a symbolic link.
+        // Repeat through a symbolic link.
         let link = folder.folder.path().join("link.toml");
         std::os::unix::fs::symlink(&scene, &link).expect("a link");
         std::mem::forget(StepwiseReplacement::begin(&scene, OLD.as_bytes()).expect("taken"));

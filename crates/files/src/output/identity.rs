@@ -1,4 +1,4 @@
-//! Identity of the file that a path refers to.
+//! Identifies the file that a path refers to.
 
 use std::ffi::OsString;
 use std::fs::{self, File};
@@ -8,13 +8,13 @@ use std::path::{Path, PathBuf};
 
 use super::resolve_path::{directory_of, follow};
 
-/// Identity of a regular file, existing or not. Two paths with the same identity refer to the same file: it
-/// resolves symbolic and hard links, `..`, and case-insensitive file systems.
+/// Identity of a regular file, existing or not. Two paths with the same identity refer to the same file, even
+/// with symbolic or hard links, `..`, or different case on a case-insensitive file system.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum FileIdentity {
     /// An existing file.
     Existing {
-        /// Device of its file system.
+        /// Device of the file system.
         device: u64,
         /// Inode number.
         inode: u64,
@@ -31,7 +31,7 @@ pub enum FileIdentity {
 }
 
 impl FileIdentity {
-    /// Returns the identity of a path's file. `None` for paths where a write replaces no file: folders,
+    /// Returns the identity of a path's file. `None` for paths that cannot be a regular file: folders,
     /// devices, pipes, and unresolvable paths.
     pub fn of(path: &Path) -> Option<Self> {
         match fs::metadata(path) {
@@ -41,7 +41,7 @@ impl FileIdentity {
         }
     }
 
-    /// Whether this is the identity of an open file.
+    /// Whether an open file has this identity.
     pub fn is_of(&self, file: &File) -> bool {
         let found = |found: fs::Metadata| Self::Existing { device: found.dev(), inode: found.ino() };
         file.metadata().is_ok_and(|metadata| found(metadata) == *self)
@@ -55,21 +55,21 @@ impl FileIdentity {
     }
 }
 
-/// Properties that identify an existing file where [`FileIdentity`] is not sufficient: some case-insensitive
-/// file systems have no stable inode numbers, such as FAT and some network file systems.
+/// Properties for identifying an existing file if [`FileIdentity`] is not sufficient. Some case-insensitive
+/// file systems, such as FAT and some network file systems, have no stable inode numbers.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FileFingerprint {
     real: PathBuf,
-    /// Folder in lower case.
+    /// Folder in lowercase.
     folder: PathBuf,
-    /// Name in lower case.
+    /// Name in lowercase.
     name: OsString,
     length: u64,
     modified: (i64, i64),
 }
 
 impl FileFingerprint {
-    /// Returns the fingerprint of a path's file. `None` unless it is an existing regular file.
+    /// Returns the fingerprint of a path's file. `None` if there is no such regular file.
     pub fn of(path: &Path) -> Option<Self> {
         let found = fs::metadata(path).ok().filter(fs::Metadata::is_file)?;
         let real = path.canonicalize().ok()?;
@@ -83,8 +83,8 @@ impl FileFingerprint {
         })
     }
 
-    /// Whether both may be the same file: they are in the same folder, and either their names differ at most
-    /// in case, or they have the same length, modification time and content.
+    /// Whether both may be the same file. They must be in the same folder, and either have the same name,
+    /// ignoring case, or the same length, modification time and content.
     pub fn may_equal(&self, other: &Self) -> bool {
         let is_stamp_same = || (self.length, self.modified) == (other.length, other.modified);
         self.folder == other.folder
@@ -101,7 +101,7 @@ fn have_same_content(a: &Path, b: &Path) -> bool {
     hash(a).is_some_and(|hash_of_a| Some(hash_of_a) == hash(b))
 }
 
-/// Whether two paths refer to the same file, existing or not, or may do so according to their
+/// Whether two paths refer to the same file, existing or not, or may refer to the same file based on their
 /// [`FileFingerprint`].
 pub fn is_same_file(a: &Path, b: &Path) -> bool {
     let Some(identity) = FileIdentity::of(a) else { return false };
@@ -134,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn files_that_do_not_exist_have_an_identity() {
+    fn missing_files_have_an_identity() {
         let folder = tempfile::tempdir().expect("a folder");
         let at = |name: &str| folder.path().join(name);
         fs::create_dir_all(at("far/away")).expect("folders");
@@ -152,7 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn possibly_identical_files_count_as_the_same() {
+    fn possibly_identical_files_are_the_same() {
         let folder = tempfile::tempdir().expect("a folder");
         let at = |name: &str| folder.path().join(name);
         fs::create_dir(at("other")).expect("a folder");

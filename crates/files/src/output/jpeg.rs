@@ -8,7 +8,7 @@ use super::{EncodeOptions, Format, OutputError, SOFTWARE, one_line};
 use crate::control::CancelToken;
 use crate::film::RadianceImage;
 
-/// Quality (maximum 100): visually lossless at arm's length, at a quarter of the size of quality 100.
+/// Quality (maximum 100). Visually lossless at arm's length, with a quarter of the file size of quality 100.
 const QUALITY: u8 = 92;
 
 pub(super) fn encode(
@@ -33,8 +33,8 @@ fn comment(options: &EncodeOptions) -> String {
     comment
 }
 
-/// Inserts a comment after the first two bytes and the segment that must follow them (ITU-T T.81, B.2.4.5).
-/// The encoder does not write comments.
+/// Inserts a comment after the first two bytes and the mandatory first segment (ITU-T T.81, B.2.4.5). The
+/// encoder does not write comments.
 fn with_comment(file: &[u8], comment: &str) -> Vec<u8> {
     const COMMENT: [u8; 2] = [0xff, 0xfe];
     /// Maximum size of a segment's content.

@@ -1,4 +1,5 @@
-//! JSON that is safe to print on a terminal: control and invisible characters are escaped like `\u200d`.
+//! Writes JSON that is safe to print on a terminal. Control characters and invisible characters are escaped,
+//! as in `\u200d`.
 
 use std::fmt::Write;
 
@@ -9,21 +10,21 @@ use crate::system::text::is_plain;
 /// Formats a value on a single line, without a line feed.
 ///
 /// # Errors
-/// Serialization errors of the value.
+/// The value cannot be serialized.
 pub fn to_line(value: &impl Serialize) -> serde_json::Result<String> {
     serde_json::to_string(value).map(escape_unsafe)
 }
 
-/// Formats a value as a file's contents: indented, with a final line feed.
+/// Formats a value for a file: indented, with a final line feed.
 ///
 /// # Errors
-/// Serialization errors of the value.
+/// The value cannot be serialized.
 pub fn file(value: &impl Serialize) -> serde_json::Result<String> {
     serde_json::to_string_pretty(value).map(|text| escape_unsafe(text) + "\n")
 }
 
-/// Escapes unsafe characters. Line feeds are only used between tokens; all other unsafe characters are inside
-/// strings.
+/// Escapes unsafe characters, which only occur inside strings. Line feeds are only used between tokens and
+/// are kept.
 fn escape_unsafe(text: String) -> String {
     let is_safe = |c: char| c == '\n' || is_plain(c);
     if text.chars().all(is_safe) {

@@ -1,8 +1,8 @@
 //! Encodes images and writes files.
 //!
-//! [`check_target`] runs before rendering, [`encode`] encodes in memory, and [`write::atomic`] writes to
-//! disk: a file is either complete or unchanged. [`FileIdentity`] decides whether two paths refer to the same
-//! file.
+//! [`check_target`] is called before rendering. [`encode`] encodes in memory. [`write::atomic`] writes to
+//! disk and leaves the file either complete or unchanged. Two paths with the same [`FileIdentity`] refer to
+//! the same file.
 
 pub mod animation;
 mod attributes;
@@ -48,7 +48,7 @@ use crate::control::CancelToken;
 use crate::film::RadianceImage;
 use crate::film::tone::ToneMapping;
 
-/// Program name and version, as written to files.
+/// Program name and version for files.
 const SOFTWARE: &str = concat!("glimt ", env!("CARGO_PKG_VERSION"));
 /// Program name.
 const PROGRAM: &str = "glimt";
@@ -58,9 +58,9 @@ const PROGRAM: &str = "glimt";
 pub struct LayerImage {
     /// Name of the layer.
     pub name: &'static str,
-    /// Names of its channels, at most three. Determines how many components of the pixels are written.
+    /// Channel names, at most three. Only as many pixel components are written.
     pub channels: &'static [&'static str],
-    /// Pixel values. Has the size of the image.
+    /// Pixel values. Same size as the image.
     pub image: RadianceImage,
 }
 
@@ -71,17 +71,18 @@ pub struct EncodeOptions {
     pub tone: ToneMapping,
     /// Bit depth of PNG and PPM. Float formats always use 32 bits.
     pub bit_depth: BitDepth,
-    /// Metadata names and values (the scene, the settings), written to PNG text chunks and to comments of
+    /// Metadata names and values (the scene, the settings), written to PNG text chunks and to comments in
     /// EXR, HDR and PPM files. The program version is always written.
     pub metadata: Vec<(String, String)>,
-    /// Standard error of the mean luminance, an attribute of EXR files. `None` if unknown.
+    /// Standard error of the mean luminance, written as an attribute of EXR files. `None` if unknown.
     pub mean_luminance_error: Option<f64>,
 }
 
-/// Encodes an image. The same image and options always give the same bytes.
+/// Encodes an image. The result is deterministic.
 ///
 /// # Errors
-/// The format does not support this size or bit depth; the encoder fails; [`OutputError::Cancelled`].
+/// The format does not support this size or bit depth, the encoder fails, or the work is cancelled
+/// ([`OutputError::Cancelled`]).
 pub fn encode(
     image: &RadianceImage,
     options: &EncodeOptions,
@@ -91,7 +92,7 @@ pub fn encode(
     encode_with((image, &[]), options, format, token)
 }
 
-/// [`encode`] with layers, which only EXR files support.
+/// Like [`encode`], with layers. Only EXR files support layers.
 pub(crate) fn encode_with(
     (image, layers): (&RadianceImage, &[LayerImage]),
     options: &EncodeOptions,
@@ -115,16 +116,16 @@ pub(crate) fn encode_with(
         Format::Ppm => ppm::encode(image, options, token),
         Format::WebP => webp::encode(image, options, token),
     };
-    // A cancelled encoder reports an error of its writer.
+    // A cancelled encoder reports an error from its writer.
     token.check()?;
     bytes
 }
 
-/// Checks that an image can be written to this path, as far as possible before rendering. Leaves no files
-/// behind. Returns the format for the extension.
+/// Checks that an image can be written to this path, as far as this is possible before rendering. Leaves no
+/// files behind. Returns the format for the extension.
 ///
 /// # Errors
-/// Unknown extension; the directory does not exist or files cannot be created there; the target is a
+/// The extension is unknown, the directory does not exist, files cannot be created there, or the target is a
 /// directory or not writable.
 pub fn check_target(path: &Path) -> Result<Format, OutputError> {
     let format = Format::from_path(path)?;
@@ -132,18 +133,17 @@ pub fn check_target(path: &Path) -> Result<Format, OutputError> {
     Ok(format)
 }
 
-/// [`check_target`] without creating a file, for frequent checks.
+/// Like [`check_target`], but does not create a file, so it can be called frequently.
 ///
 /// # Errors
-/// Same as [`check_target`], except for directories in which files cannot be created despite their
-/// permissions.
+/// Same as [`check_target`], except if files cannot be created in a directory despite its permissions.
 pub fn inspect_target(path: &Path) -> Result<Format, OutputError> {
     let format = Format::from_path(path)?;
     inspect_path(path)?;
     Ok(format)
 }
 
-/// [`inspect_target`] for any kind of file.
+/// Like [`inspect_target`], for any type of file.
 ///
 /// # Errors
 /// Same as [`inspect_target`], except for the extension.
@@ -151,7 +151,7 @@ pub fn inspect_path(path: &Path) -> Result<(), OutputError> {
     resolve_path::find(path).map(drop)
 }
 
-/// Checks that a file of any kind can be written to this path, as far as possible before the work.
+/// Checks that a file of any type can be written to this path, as far as this is possible in advance.
 ///
 /// # Errors
 /// Same as [`check_target`], except for the extension.
@@ -159,12 +159,12 @@ pub fn check_path(path: &Path) -> Result<(), OutputError> {
     resolve_path::check(path)
 }
 
-/// Replaces NaN by 0 and infinities by the largest finite value.
+/// Replaces NaN with 0 and infinities with the largest finite value.
 fn as_finite(component: f32) -> f32 {
     if component.is_nan() { 0.0 } else { component.clamp(-f32::MAX, f32::MAX) }
 }
 
-/// Replaces control characters, for text headers made of lines.
+/// Replaces control characters, for line-based text headers.
 fn one_line(text: &str) -> String {
     text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
 }

@@ -10,7 +10,7 @@ pub(super) fn move_new(from: &Path, to: &Path) -> io::Result<()> {
     use rustix::fs::{CWD, RenameFlags, renameat_with};
     use rustix::io::Errno;
     match renameat_with(CWD, from, CWD, to, RenameFlags::NOREPLACE) {
-        // The file system or the kernel does not support the flag.
+        // The flag is not supported by the file system or kernel.
         Err(Errno::INVAL | Errno::NOSYS | Errno::NOTSUP) => move_by_steps(from, to),
         moved => moved.map_err(io::Error::from),
     }
@@ -21,10 +21,10 @@ pub(super) fn move_new(from: &Path, to: &Path) -> io::Result<()> {
     move_by_steps(from, to)
 }
 
-/// [`move_new`] with two calls, of which the first fails if the destination exists.
+/// [`move_new`] in two system calls. The first one fails if the destination exists.
 fn move_by_steps(from: &Path, to: &Path) -> io::Result<()> {
     if from.is_dir() {
-        // The rename can only replace the empty folder created here.
+        // The rename can only replace an empty folder, such as this new one.
         fs::create_dir(to)?;
         fs::rename(from, to)
     } else {
@@ -38,7 +38,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn moves_in_two_steps_overwrite_nothing() {
+    fn stepwise_moves_do_not_overwrite_files() {
         let directory = tempfile::tempdir().expect("a folder");
         let at = |name: &str| directory.path().join(name);
         fs::create_dir_all(at("from/in")).expect("a folder");

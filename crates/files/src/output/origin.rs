@@ -1,5 +1,5 @@
-//! Detects from its content whether glimt wrote an existing file, so that glimt only replaces its own files,
-//! and only by the same kind of file.
+//! Detects from a file's content whether glimt wrote it. This ensures that glimt only replaces its own files,
+//! and only with the same type of file.
 
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read};
@@ -13,15 +13,15 @@ use super::{PROGRAM, SOFTWARE};
 
 /// Limit on the size of PNG chunks before the pixels. glimt writes a few hundred bytes.
 const HEADER_BYTES: usize = 1 << 20;
-/// Maximum size of a plot that is examined.
+/// Maximum size of a plot to examine.
 const PLOT_BYTES: u64 = 64 << 20;
 
-/// The file that a write would replace.
+/// The file that would be replaced.
 #[derive(Debug)]
 pub enum Replaced {
-    /// No file, or one that may be replaced.
+    /// No file, or a file that may be replaced.
     Own,
-    /// A file of another origin, with the kind that glimt would write: "a report".
+    /// A file not written by glimt. Contains the type that glimt would write: "a report".
     Foreign(&'static str),
     /// A file that cannot be read.
     Unreadable(io::Error),
@@ -42,7 +42,7 @@ impl Replaced {
         }
     }
 
-    /// [`Self::of`] for text files, where an empty file may also be replaced.
+    /// Like [`Self::of`], for text files. Empty files may also be replaced.
     fn of_text(path: &Path, kind: &'static str, is_own: impl Fn(File) -> bool) -> Self {
         let is_empty = |file: &File| file.metadata().is_ok_and(|found| found.len() == 0);
         Self::of(replaced(path), kind, |file| is_empty(&file) || is_own(file))
@@ -60,12 +60,12 @@ impl Replaced {
     }
 }
 
-/// Checks whether an image may be replaced: a PNG with a text chunk naming glimt.
+/// Checks whether an image may be replaced. It must be a PNG with a text chunk that names glimt.
 pub fn replaced_image(path: &Path) -> Replaced {
     Replaced::of(replaced(path), "an image", is_own_image)
 }
 
-/// Scene named by a PNG file written by glimt. `None` if the file does not exist or names no scene.
+/// Scene named in a PNG file written by glimt. `None` if the file does not exist or contains no scene name.
 pub fn scene_of_image(path: &Path) -> Option<String> {
     const KEY: &str = "glimt:scene";
     let reader = png_header(replaced(path)?.ok()?)?;
@@ -75,7 +75,8 @@ pub fn scene_of_image(path: &Path) -> Option<String> {
     latin.map(|text| text.text.clone()).or_else(utf8)
 }
 
-/// Checks whether a JSON file may be replaced: one that parses as `T` and passes the test, or an empty file.
+/// Checks whether a JSON file may be replaced. It must either parse as `T` and be accepted by `is_own`, or be
+/// empty.
 pub fn replaced_json<T: DeserializeOwned>(
     path: &Path,
     kind: &'static str,
@@ -83,14 +84,14 @@ pub fn replaced_json<T: DeserializeOwned>(
 ) -> Replaced {
     Replaced::of_text(path, kind, |file| {
         let mut reader = BufReader::new(file);
-        // Do not read large files of another format completely.
+        // Avoid reading all of a large file in another format.
         let is_object = reader.fill_buf().is_ok_and(|start| start.trim_ascii_start().starts_with(b"{"));
         is_object && serde_json::from_reader(reader).is_ok_and(|value| is_own(&value))
     })
 }
 
-/// Checks whether a table may be replaced: one that starts with this line, including its line end, or an
-/// empty file.
+/// Checks whether a table may be replaced. It must either start with this line, including its line end, or be
+/// empty.
 pub fn replaced_table(path: &Path, first_line: &str) -> Replaced {
     Replaced::of_text(path, "a table", |file| {
         let mut start = Vec::new();
@@ -99,13 +100,13 @@ pub fn replaced_table(path: &Path, first_line: &str) -> Replaced {
     })
 }
 
-/// Checks whether a plot may be replaced: one that contains these texts and is [`signed`] or from a version
-/// without signatures, or an empty file.
+/// Checks whether a plot may be replaced. It must either be empty, or contain these texts and be [`signed`].
+/// Plots from older versions have no signature and are also accepted.
 pub fn replaced_plot(path: &Path, texts: &[&str]) -> Replaced {
     Replaced::of_text(path, "a plot", |file| is_own_plot(file, texts))
 }
 
-/// Start of the signature, which follows the first tag of an SVG file.
+/// Start of the signature. The signature follows the first tag of an SVG file.
 const SIGNATURE: &str = "\n<desc>";
 
 /// Adds a signature with the program's name to a plot.
@@ -116,7 +117,7 @@ pub fn signed(svg: &str) -> String {
     }
 }
 
-/// Opens the regular file that a write would replace, if there is one.
+/// Opens the regular file that would be replaced, if it exists.
 fn replaced(path: &Path) -> Option<io::Result<File>> {
     match resolve_path::find(path) {
         Ok(WriteTarget::File(TargetFile { path, existing: Some(_) })) => Some(File::open(path)),
@@ -139,7 +140,7 @@ fn is_own_image(file: File) -> bool {
     texts.iter().any(|text| text.keyword == "Software" && is_program(&text.text))
 }
 
-/// Whether the text is like `glimt 0.1.0`.
+/// Whether the text has the form `glimt 0.1.0`.
 fn is_program(software: &str) -> bool {
     software.split_once(' ').is_some_and(|(name, _)| name == PROGRAM)
 }
@@ -160,7 +161,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn unreadable_files_are_not_called_foreign() {
+    fn unreadable_files_are_not_foreign() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("a.png");
         assert!(matches!(replaced_image(&path), Replaced::Own), "no file");

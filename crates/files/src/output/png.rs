@@ -46,7 +46,7 @@ fn try_encode(
     Ok(bytes)
 }
 
-/// Adds a text: ASCII as tEXt, which all readers support, and other texts as iTXt.
+/// Adds a text chunk. ASCII is written as tEXt, supported by all readers, and other text as iTXt.
 pub(super) fn add_text(
     encoder: &mut Encoder<'_, &mut Vec<u8>>,
     name: &str,

@@ -1,5 +1,5 @@
-//! Protection of files beyond permissions: chattr(1) flags and sticky directories. rename(2) checks these
-//! only after the new file has been written.
+//! Checks file protections other than permissions: chattr(1) flags and sticky directories. rename(2) would
+//! only check these after the new file is written.
 
 use std::fs::Metadata;
 use std::os::unix::fs::MetadataExt;
@@ -7,7 +7,7 @@ use std::path::Path;
 
 use nix::unistd::{Uid, geteuid};
 
-/// Mode bit of directories where only owners may replace files.
+/// Mode bit for directories in which only owners may replace files.
 const STICKY: u32 = 0o1000;
 
 /// A flag that prevents even root from replacing a file, or files in a directory.
@@ -20,7 +20,7 @@ pub(super) enum Flag {
 }
 
 impl Flag {
-    /// The flag of a file or directory. `None` if it has neither or the file system does not report flags.
+    /// Flag of a file or directory. `None` if it has no such flag or the file system does not report flags.
     #[cfg(target_os = "linux")]
     pub(super) fn of(path: &Path) -> Option<Self> {
         use rustix::fs::{AtFlags, CWD, StatxAttributes, StatxFlags, statx};
@@ -54,8 +54,8 @@ impl Flag {
     }
 }
 
-/// Whether a sticky directory prevents this process from replacing a file: the process owns neither of them
-/// and lacks the capability to act as their owner.
+/// Whether a sticky directory prevents this process from replacing a file. This is the case if the process
+/// owns neither of them and lacks the capability to act as the owner.
 pub(super) fn is_kept_for_owner(directory: &Metadata, file: &Metadata) -> bool {
     let user = geteuid();
     let is_own = |found: &Metadata| Uid::from_raw(found.uid()) == user;
@@ -86,12 +86,12 @@ mod tests {
 
     use super::super::{check_target, write};
 
-    /// A file or directory with a flag, which is cleared at the end of the test.
+    /// A file or directory with a flag. The flag is cleared when this value is dropped.
     struct Flagged(PathBuf);
 
     impl Flagged {
-        /// Sets a flag. `None` if the system refuses: for users other than root, and on file systems without
-        /// flags.
+        /// Sets a flag. `None` if this is not possible, because the user is not root or the file system does
+        /// not support flags.
         fn new(path: PathBuf, flag: IFlags) -> Option<Self> {
             let set = change(&path, |flags| flags | flag);
             if let Err(error) = &set {
@@ -104,7 +104,7 @@ mod tests {
     impl Drop for Flagged {
         fn drop(&mut self) {
             let cleared = change(&self.0, |flags| flags - IFlags::APPEND - IFlags::IMMUTABLE);
-            cleared.expect("flags that were set can be cleared");
+            cleared.expect("set flags can be cleared");
         }
     }
 
@@ -152,9 +152,9 @@ mod tests {
         assert_eq!(fs::read(&old).expect("read"), b"new");
     }
 
-    /// Requires root: a thread changes to another user.
+    /// Requires root, because a thread changes to another user.
     #[test]
-    fn sticky_directories_protect_files_of_others() {
+    fn sticky_directories_protect_other_users_files() {
         use rustix::thread::{set_thread_res_gid, set_thread_res_uid};
         const NOBODY: u32 = 65534;
         let folder = tempfile::tempdir().expect("a folder");

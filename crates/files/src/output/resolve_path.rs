@@ -1,4 +1,4 @@
-//! Resolves the path of a write: follows links and detects special files and missing permissions.
+//! Resolves the path of a file to write. Follows links, and detects special files and missing permissions.
 
 use std::fs::{self, Metadata};
 use std::io::{self, ErrorKind};
@@ -15,7 +15,7 @@ use super::{OutputError, temporary};
 /// Maximum number of links to follow, as in Linux.
 const LINKS: usize = 40;
 
-/// Where the bytes for a path are written.
+/// Where to write the bytes for a path.
 #[derive(Debug)]
 pub(super) enum WriteTarget {
     /// A regular file, existing or not, to be replaced atomically.
@@ -39,7 +39,7 @@ impl TargetFile {
     }
 }
 
-/// Resolves a path and checks that it can be written, as far as possible without writing.
+/// Resolves a path and checks that it can be written, as far as this is possible without writing.
 pub(super) fn find(path: &Path) -> Result<WriteTarget, OutputError> {
     if path.file_name().is_none() || path.as_os_str().as_bytes().ends_with(b"/") {
         return Err(is_a_directory(path));
@@ -51,13 +51,13 @@ pub(super) fn find(path: &Path) -> Result<WriteTarget, OutputError> {
     }
 }
 
-/// [`find`], and checks that a file can be created in the directory.
+/// Like [`find`], but also checks that files can be created in the directory.
 pub(super) fn check(path: &Path) -> Result<(), OutputError> {
     match find(path)? {
         WriteTarget::File(target) => {
             let directory = target.directory();
             temporary::probe(directory).map_err(|error| match error.kind() {
-                // The directory existed a moment ago. /proc reports this error for new files.
+                // The directory still exists, so the error is about the new file. /proc reports such errors.
                 ErrorKind::NotFound if directory.is_dir() => OutputError::Target {
                     path: path.to_owned(),
                     why: format!("files cannot be created in the directory {}", directory.display()),
@@ -70,8 +70,8 @@ pub(super) fn check(path: &Path) -> Result<(), OutputError> {
     }
 }
 
-/// Follows symbolic links and returns the final path with the metadata of its file. Links to open descriptors
-/// (such as /dev/stdout) are not followed because they may not correspond to a path.
+/// Follows symbolic links. Returns the final path and its file's metadata. Links to open descriptors (such as
+/// /dev/stdout) are not followed because they may not correspond to a path.
 pub(super) fn follow(path: &Path) -> io::Result<(PathBuf, Option<Metadata>)> {
     let mut target = path.to_owned();
     for _ in 0..LINKS {
@@ -108,8 +108,8 @@ fn existing(path: &Path, target: PathBuf, metadata: Metadata) -> Result<WriteTar
         return Ok(WriteTarget::InPlace(target));
     }
     check_flags(path, "it", &target)?;
-    // Check write permission although only the directory matters for replacing: the file may be read-only on
-    // purpose.
+    // Replacing the file only requires write permission for the directory. Check the file itself anyway,
+    // because it may be read-only on purpose.
     may_write(path, &target, AccessFlags::W_OK)?;
     let directory = check_directory(path, directory_of(&target))?;
     if protection::is_kept_for_owner(&directory, &metadata) {
@@ -142,8 +142,8 @@ fn check_directory(path: &Path, directory: &Path) -> Result<Metadata, OutputErro
     }
 }
 
-/// Checks that no flag protects the file or directory from changes. Otherwise, the new file could be neither
-/// renamed nor removed.
+/// Checks that no flag protects the file or directory from changes. With such a flag, the new file could not
+/// be renamed or removed.
 fn check_flags(path: &Path, name: &str, what: &Path) -> Result<(), OutputError> {
     let Some(flag) = Flag::of(what) else { return Ok(()) };
     let why = format!("{name} is {}", flag.words());

@@ -1,12 +1,12 @@
-//! Path of the scene in an image's metadata: relative to the image, so that both can be moved together.
+//! Path of the scene in an image's metadata. It is relative to the image, so both can be moved together.
 
 use std::fs;
 use std::path::{Component, Path, PathBuf};
 
 use super::resolve_path::directory_of;
 
-/// Returns the path of a scene relative to an image, with `/` as separator. In the image's own folder it
-/// starts with `./`, because bare file names are from an earlier version, which omitted the folder.
+/// Returns the path of a scene relative to an image, with `/` as separator. The path of a scene in the
+/// image's folder starts with `./`, because earlier versions wrote bare file names for scenes in any folder.
 pub fn relative(scene: &Path, image: &Path) -> String {
     let folders = fs::canonicalize(directory_of(scene)).ok().zip(fs::canonicalize(directory_of(image)).ok());
     let (Some(name), Some((to, from))) = (scene.file_name(), folders) else { return bare(scene) };
@@ -18,13 +18,13 @@ pub fn relative(scene: &Path, image: &Path) -> String {
     if names.len() == 1 { format!("./{}", names.concat()) } else { names.join("/") }
 }
 
-/// Whether the scene named in an image's metadata is this scene.
+/// Whether `named`, from an image's metadata, refers to this scene.
 pub fn is_same(named: &str, scene: &Path, image: &Path) -> bool {
     if !named.contains('/') {
         return named == bare(scene);
     }
     let Ok(scene_file) = fs::canonicalize(scene) else { return named == relative(scene, image) };
-    // The image may be a link that was written using its own path or its target's path.
+    // The image may be a link, and may have been written using either the link's or its target's path.
     let target = fs::canonicalize(image).ok();
     [Some(image), target.as_deref()].into_iter().flatten().any(|image| {
         let file = fs::canonicalize(directory_of(image).join(named));
@@ -32,7 +32,7 @@ pub fn is_same(named: &str, scene: &Path, image: &Path) -> bool {
     })
 }
 
-/// File name without its folder.
+/// File name without the folder.
 fn bare(scene: &Path) -> String {
     scene.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
@@ -85,7 +85,7 @@ mod tests {
     }
 
     #[test]
-    fn links_and_moves_preserve_the_relation() {
+    fn scenes_match_after_linking_and_moving() {
         let folder = folder(&["a/scene.toml", "big/x"]);
         let at = |path: &str| folder.path().join(path);
         // Link to a folder, a scene and an image.

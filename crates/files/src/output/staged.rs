@@ -1,4 +1,4 @@
-//! Creates several files atomically: writes them into a hidden folder, then moves them to their destination.
+//! Creates several files atomically. Writes them to a hidden folder, then moves them to their destinations.
 
 use std::ffi::OsStr;
 use std::fs::{self, DirBuilder, File};
@@ -12,13 +12,13 @@ use super::{OutputError, cancellable};
 use crate::control::CancelToken;
 use crate::system::folder::remove_all;
 
-/// Creates files at paths relative to a folder: all of them or none, never overwriting anything. Writes them
-/// into a hidden folder, then moves the first component of each path to its destination, in the order of the
-/// files. Removes hidden folders of killed writers.
+/// Creates files at paths relative to a folder. Creates either all of the files or none, without overwriting
+/// anything. The files are written to a hidden folder, then the first component of each path is moved to its
+/// destination, in the order of the files. Also removes hidden folders left by killed processes.
 ///
 /// # Errors
-/// The path that could not be written, with reasons such as [`ErrorKind::AlreadyExists`]; or the operation
-/// was cancelled.
+/// A path cannot be written, for example because it exists ([`ErrorKind::AlreadyExists`]), or the operation
+/// is cancelled.
 pub fn new_files(folder: &Path, files: &[(PathBuf, &[u8])], token: &CancelToken) -> Result<(), OutputError> {
     super::write::prepare_process();
     let at = |name: &Path| {
@@ -26,14 +26,14 @@ pub fn new_files(folder: &Path, files: &[(PathBuf, &[u8])], token: &CancelToken)
         move |error: io::Error| OutputError::file(&path, error)
     };
     let Some((last, _)) = files.last() else { return Ok(()) };
-    // Write all files into the hidden folder.
+    // Write all files to the hidden folder.
     let here = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
     remove_stale_folders(here);
     let hidden = StagingFolder::create(here, last.as_os_str()).map_err(at(last))?;
     for (name, bytes) in files {
         cancellable::or_cancelled(hidden.write(name, bytes, token), at(name))?;
     }
-    // Move them to their destination. Undo that if one of them exists by now.
+    // Move the files to their destinations. If a destination exists, undo all moves.
     let mut placed: Vec<&OsStr> = Vec::new();
     for (name, _) in files {
         let Some(first) = name.iter().next().filter(|first| !placed.contains(first)) else { continue };
@@ -46,8 +46,8 @@ pub fn new_files(folder: &Path, files: &[(PathBuf, &[u8])], token: &CancelToken)
     Ok(())
 }
 
-/// Removes files that were placed, and their folders unless other files have been added. Errors are ignored
-/// because the caller reports the original one.
+/// Removes files that were already moved, and their folders unless they contain other files. Ignores errors
+/// because the caller reports the original error.
 fn take_back(folder: &Path, placed: &[&OsStr], files: &[(PathBuf, &[u8])]) {
     for (name, _) in
         files.iter().filter(|(name, _)| name.iter().next().is_some_and(|first| placed.contains(&first)))
@@ -59,7 +59,7 @@ fn take_back(folder: &Path, placed: &[&OsStr], files: &[(PathBuf, &[u8])]) {
     }
 }
 
-/// A hidden folder that is locked by its writer and removed with its contents on drop.
+/// A hidden folder, locked by its writer. It is removed with its contents on drop.
 struct StagingFolder {
     path: PathBuf,
     _lock: File,
@@ -74,7 +74,7 @@ impl StagingFolder {
                 Err(error) => return Err(error),
                 Ok(()) => {
                     let lock = File::open(&path)?;
-                    // Without lock support, other processes do not consider it stale.
+                    // If locking is not supported, no process removes the folder as stale.
                     let _ = lock.try_lock();
                     return Ok(Self { path, _lock: lock });
                 }
@@ -96,7 +96,7 @@ impl StagingFolder {
 
 impl Drop for StagingFolder {
     fn drop(&mut self) {
-        // Ignore errors: the next writer tries again.
+        // Ignore errors. The next writer tries again.
         let _ = remove_all(&self.path);
     }
 }
@@ -116,7 +116,7 @@ mod tests {
     }
 
     #[test]
-    fn all_files_are_created_or_none() {
+    fn either_all_files_are_created_or_none() {
         let directory = tempfile::tempdir().expect("a folder");
         let at = directory.path();
         let files = [
@@ -127,7 +127,7 @@ mod tests {
         new_files(at, &files, &CancelToken::new()).expect("written");
         assert_eq!(names(at), ["a.toml", "a_files"]);
         assert_eq!(names(&at.join("a_files")), ["x.ply", "y.ply"]);
-        // Existing files stay, even an empty folder.
+        // Existing files and folders are kept, even empty folders.
         fs::remove_dir_all(at.join("a_files")).expect("removed");
         let taken = new_files(at, &files, &CancelToken::new()).expect_err("taken");
         assert!(matches!(&taken, OutputError::File { path, .. } if path.ends_with("a.toml")), "{taken}");
@@ -139,7 +139,7 @@ mod tests {
         fs::create_dir(at.join("a_files")).expect("a folder");
         assert!(new_files(at, &files, &CancelToken::new()).is_err());
         assert_eq!((names(at), names(&at.join("a_files"))), (vec!["a_files".to_owned()], Vec::new()));
-        // A cancelled operation leaves nothing.
+        // A cancelled operation leaves no files behind.
         fs::remove_dir(at.join("a_files")).expect("removed");
         let token = CancelToken::new();
         token.cancel();
@@ -148,7 +148,7 @@ mod tests {
     }
 
     #[test]
-    fn only_staging_folders_of_dead_writers_go() {
+    fn only_folders_of_dead_writers_are_removed() {
         let directory = tempfile::tempdir().expect("a folder");
         let at = directory.path();
         let living = StagingFolder::create(at, OsStr::new("a.toml")).expect("a folder");

@@ -1,6 +1,6 @@
-//! Temporary files next to a target: named after their writer's machine and process, locked while the writer
-//! lives, and removed after it has died. Locks are not sufficient because many network file systems do not
-//! share them between machines.
+//! Temporary files next to a target. Their names contain the writer's machine and process. They are locked
+//! while the writer is running, and removed if it has died. Locks alone are not sufficient, because many
+//! network file systems do not share them between machines.
 
 use std::ffi::{OsStr, OsString};
 use std::fs::{self, File, OpenOptions, TryLockError};
@@ -18,8 +18,8 @@ use crate::system::machine::ProcessIdentity;
 
 /// Maximum length of a file name on nearly all file systems.
 const NAME_BYTES: usize = 255;
-/// Number of names to try. A second one is only needed if another program removes the first at the wrong
-/// moment.
+/// Number of names to try. More than one is only needed if another process removes the first file at the
+/// wrong moment.
 pub(super) const ATTEMPTS: usize = 64;
 
 /// A file that is removed on drop unless it has been renamed to its final name.
@@ -49,11 +49,11 @@ impl Temporary {
         Err(io::Error::new(ErrorKind::AlreadyExists, "no free name for a temporary file"))
     }
 
-    /// Locks the file. Returns false if another writer considered it stale before that.
+    /// Locks the file. Returns false if another process has taken the file for stale first.
     fn claim(&self) -> io::Result<bool> {
         match self.file.try_lock() {
             Err(TryLockError::WouldBlock) => Ok(false),
-            // Without lock support, other processes do not consider it stale.
+            // If locking is not supported, no process removes the file as stale.
             Err(TryLockError::Error(_)) => Ok(true),
             Ok(()) => is_same(&self.file, &self.path),
         }
@@ -61,7 +61,7 @@ impl Temporary {
 
     /// Renames the file to its final name, replacing any existing file. Returns the file, still locked.
     pub(super) fn rename_to(mut self, target: &Path) -> io::Result<File> {
-        // The lock belongs to the open file, so a duplicate descriptor keeps it.
+        // The lock belongs to the open file, so a duplicate descriptor keeps the lock.
         let file = self.file.try_clone()?;
         fs::rename(&self.path, target)?;
         self.kept = true;
@@ -86,14 +86,15 @@ impl Temporary {
 impl Drop for Temporary {
     fn drop(&mut self) {
         if !self.kept {
-            // Ignore errors: the next write tries again.
+            // Ignore errors. The next write tries again.
             let _ = fs::remove_file(&self.path);
         }
     }
 }
 
-/// Tests whether files can be created in a directory, using a file without a name or else one that is removed
-/// at once. Some directories, such as /proc, reject files despite write permission.
+/// Tests whether files can be created in a directory, by creating an unnamed file or, if this is not
+/// supported, a file that is removed immediately. Some directories, such as /proc, reject files despite write
+/// permission.
 pub(super) fn probe(directory: &Path) -> io::Result<()> {
     if nameless(directory).is_ok() {
         return Ok(());
@@ -111,8 +112,8 @@ fn nameless(_: &Path) -> io::Result<()> {
     Err(ErrorKind::Unsupported.into())
 }
 
-/// Removes temporary files of this machine's killed writers, except those that `is_kept` protects. Files of
-/// other machines, of earlier boots and of living writers stay. Files that cannot be removed are ignored
+/// Removes temporary files of killed processes on this machine, unless `is_kept` returns true. Keeps the
+/// files of other machines, earlier boots and running processes. Ignores files that cannot be removed,
 /// because they must not prevent a write.
 pub(super) fn remove_stale(directory: &Path, is_kept: &dyn Fn(&Path) -> bool) {
     for path in stale(directory) {
@@ -122,7 +123,7 @@ pub(super) fn remove_stale(directory: &Path, is_kept: &dyn Fn(&Path) -> bool) {
     }
 }
 
-/// Removes temporary folders of this machine's killed writers, with their contents.
+/// Removes temporary folders of killed processes on this machine, with their contents.
 pub(super) fn remove_stale_folders(directory: &Path) {
     for path in stale(directory) {
         if path.symlink_metadata().is_ok_and(|found| found.is_dir()) {
@@ -131,7 +132,7 @@ pub(super) fn remove_stale_folders(directory: &Path) {
     }
 }
 
-/// Lists entries of a directory that are named after a dead writer.
+/// Lists the entries of a directory whose writer, according to their name, is dead.
 fn stale(directory: &Path) -> Vec<PathBuf> {
     let names = names(directory).into_iter().flatten();
     names.filter(|name| has_dead_writer(name)).map(|name| directory.join(name)).collect()
@@ -142,7 +143,7 @@ fn has_dead_writer(name: &OsStr) -> bool {
 }
 
 fn remove_if_stale(path: &Path, remove: impl Fn(&Path) -> io::Result<()>) -> io::Result<()> {
-    // It may have been replaced by a link or a pipe since the check.
+    // The file may have been replaced with a link or a pipe since it was checked.
     let flags = OFlag::O_NOFOLLOW | OFlag::O_NONBLOCK;
     let file = OpenOptions::new().read(true).custom_flags(flags.bits()).open(path)?;
     if file.try_lock().is_ok() && is_same(&file, path)? {
@@ -151,7 +152,7 @@ fn remove_if_stale(path: &Path, remove: impl Fn(&Path) -> io::Result<()>) -> io:
     Ok(())
 }
 
-/// Whether the open file still has this path.
+/// Whether this path still refers to the open file.
 fn is_same(file: &File, path: &Path) -> io::Result<bool> {
     let opened = file.metadata()?;
     match fs::symlink_metadata(path) {
@@ -176,7 +177,7 @@ fn name_of(name: &OsStr, writer: &ProcessIdentity) -> OsString {
     result
 }
 
-/// Parses the writer from a temporary name. `None` for other names, including those of older versions
+/// Parses the writer from a temporary name. `None` for other names, including names from older versions
 /// (`.NAME.glimt-PID-N.tmp`), which do not contain the machine.
 fn writer(name: &OsStr) -> Option<ProcessIdentity> {
     let name = name.to_string_lossy();
@@ -197,7 +198,7 @@ pub(super) mod tests {
 
     use super::*;
 
-    /// A temporary name of a process that has ended, on this machine.
+    /// A temporary name of a process on this machine that has ended.
     pub(in crate::output) fn dead_name(name: &str) -> OsString {
         name_of(OsStr::new(name), &dead_process())
     }
@@ -268,7 +269,7 @@ pub(super) mod tests {
     #[test]
     fn probing_leaves_no_file() {
         let directory = tempfile::tempdir().expect("a directory");
-        probe(directory.path()).expect("it takes files");
+        probe(directory.path()).expect("the directory should accept files");
         assert_eq!(fs::read_dir(directory.path()).expect("a directory").count(), 0);
         assert!(probe(&directory.path().join("none")).is_err());
         #[cfg(target_os = "linux")]
@@ -287,7 +288,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn removed_files_are_not_claimed() {
+    fn removed_temporary_files_are_not_claimed() {
         let directory = tempfile::tempdir().expect("a directory");
         let file = Temporary::create(directory.path(), OsStr::new("a.png"), 0o666).expect("a file");
         fs::remove_file(&file.path).expect("removed");

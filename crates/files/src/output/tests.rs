@@ -9,7 +9,7 @@ fn encode(image: &RadianceImage, options: &EncodeOptions, format: Format) -> Res
     super::encode(image, options, format, &CancelToken::new())
 }
 
-/// A colored gradient from dark to bright, with flat parts.
+/// A colored gradient from dark to bright, with some constant areas.
 fn test_image(width: u32, height: u32) -> RadianceImage {
     let pixel = |i: u32| {
         let (x, y) = (i % width, i / width);
@@ -161,7 +161,7 @@ fn only_exr_keeps_negative_values() {
 }
 
 #[test]
-fn hdr_rounds_correctly_at_any_width_and_value() {
+fn hdr_rounds_correctly() {
     for (width, height) in [(1, 5), (7, 3), (8, 3), (300, 40), (32767, 1), (32768, 1), (40000, 1)] {
         let mut image = test_image(width, height);
         for (i, pixel) in image.pixels.iter_mut().enumerate() {
@@ -188,7 +188,7 @@ fn hdr_handles_extreme_values() {
     let decoded = decode(&bytes, image::ImageFormat::Hdr).into_rgb32f();
     for (decoded, expected) in decoded.pixels().zip(values) {
         let bound = if expected > 1.6e38 { 0.51 * expected } else { expected / 255.0 + 1e-38 };
-        assert!((decoded.0[0] - expected).abs() <= bound, "{expected:e} became {:e}", decoded.0[0]);
+        assert!((decoded.0[0] - expected).abs() <= bound, "expected {expected:e}, got {:e}", decoded.0[0]);
     }
 }
 
@@ -213,7 +213,7 @@ fn ppm_contains_the_tone_mapped_image() {
 
 #[test]
 fn jpeg_chroma_is_not_subsampled() {
-    // Smooth, with a sharp edge between saturated colors, which subsampling would blur.
+    // Smooth colors, with a sharp edge between saturated colors that subsampling would blur.
     let pixel = |i: u32| if i % 64 < 31 { Vec3::new(0.8, 0.05, 0.05) } else { Vec3::new(0.05, 0.05, 0.8) };
     let image = RadianceImage { width: 64, height: 64, pixels: (0..64 * 64).map(pixel).collect() };
     let options = EncodeOptions::default();
@@ -258,7 +258,7 @@ fn encoding_is_deterministic() {
         assert!(once == again(), "{format}");
         for threads in [1, 3] {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
-            assert!(once == pool.install(again), "{format} by {threads} threads");
+            assert!(once == pool.install(again), "{format} with {threads} threads");
         }
     }
 }
@@ -325,7 +325,7 @@ fn cancelled_images_are_not_encoded_or_written() {
 }
 
 #[test]
-fn many_writes_search_a_folder_once() {
+fn each_folder_is_searched_once() {
     let folder = tempfile::tempdir().expect("a folder");
     let other = folder.path().join("other");
     std::fs::create_dir(&other).expect("a folder");
@@ -355,7 +355,7 @@ fn guards_check_the_link_target_after_writing() {
     let asked = std::cell::Cell::new(0);
     let may_replace = |path: &std::path::Path| {
         asked.set(asked.get() + 1);
-        assert_eq!((path, entries()), (real.as_path(), 3), "next to its temporary file");
+        assert_eq!((path, entries()), (real.as_path(), 3), "the temporary file should exist");
         Err(OutputError::Refused { reason: "no".to_owned() })
     };
     let guard = write::Guard { may_replace: &may_replace, ..NOTHING_KEPT };
@@ -364,8 +364,8 @@ fn guards_check_the_link_target_after_writing() {
     assert_eq!(std::fs::read(&real).expect("read"), b"old");
 }
 
-/// A writer cannot give a file back to its owner. Requires root: a thread becomes `nobody` for the file
-/// system (setfsuid(2)).
+/// A writer that is not root cannot restore the owner of a file. Requires root, because a thread changes its
+/// file system user to `nobody` (setfsuid(2)).
 #[cfg(target_os = "linux")]
 #[test]
 fn replacing_a_file_grants_no_permissions() {
@@ -429,7 +429,7 @@ fn concurrent_saves_are_not_overwritten() {
     };
     swap(&is_as_read).expect("replaced");
     assert!(has("new"));
-    // An editor saves after the check: by writing to the file, or by replacing it.
+    // An editor saves after the check, either by writing to the file or by replacing it.
     let edited = folder.path().join("edited");
     for by_rename in [false, true] {
         let saved = std::cell::Cell::new(false);

@@ -1,4 +1,4 @@
-//! Atomic writes: the old file stays until the new one is complete.
+//! Atomic writes. The old file is kept until the new one is complete.
 
 use std::cell::RefCell;
 use std::collections::HashSet;
@@ -21,19 +21,20 @@ use super::{FileIdentity, Losses, OutputError, cancellable, held};
 use crate::control::CancelToken;
 use crate::system::describe_error;
 
-/// Standard output. It is not opened by this name, which would fail for sockets.
+/// Standard output. The path is not opened, because this would fail for sockets.
 pub const STDOUT: &str = "/dev/stdout";
 
 /// Writes a file atomically: writes a locked temporary file next to it, synchronizes it, renames it, and
-/// synchronizes the directory. Whenever the process ends, the file is either the old one or the new one. Its
-/// permissions, access list, attributes and flags are kept, and its owner if this process may change owners.
-/// If the path is a link, its target is replaced. Removes temporary files of this machine's killed writers in
-/// the same directory.
+/// synchronizes the directory. If the process is killed at any time, either the old or the new file exists.
+/// The permissions, access list, attributes and flags are kept, and also the owner if this process may change
+/// owners. If the path is a link, the target is replaced. Also removes temporary files in the same directory
+/// left by killed processes on this machine.
 ///
 /// Devices, pipes and open descriptors ([`STDOUT`]) are written in place.
 ///
 /// # Errors
-/// The path, the system's message and advice. The old file is then unchanged, and no temporary file remains.
+/// The file cannot be written. The error contains the path, the system's message and advice. The old file is
+/// unchanged, and the temporary file is removed.
 pub fn atomic(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
     let losses = Losses::Report(&|_| ());
     let guard = Guard { is_kept: &|_| false, may_replace: &|_| Ok(()), sweep: None, losses };
@@ -48,7 +49,7 @@ pub fn new_file(path: &Path, bytes: &[u8]) -> io::Result<()> {
     let mut file = OpenOptions::new().write(true).create_new(true).open(path)?;
     let written = file.write_all(bytes).and_then(|()| file.sync_all());
     if written.is_err() && FileIdentity::of(path).is_some_and(|found| found.is_of(&file)) {
-        // The file is still ours. Ignore errors because the caller reports the original one.
+        // The file is still ours. Ignore errors because the caller reports the original error.
         let _ = fs::remove_file(path);
     }
     written
@@ -56,32 +57,33 @@ pub fn new_file(path: &Path, bytes: &[u8]) -> io::Result<()> {
 
 /// Policy for existing files. Both functions are called just before the replacement, with the resolved path.
 pub struct Guard<'a> {
-    /// Whether to keep a file that is named like the temporary file of a killed writer.
+    /// Whether to keep a file whose name looks like a temporary file of a killed process.
     pub is_kept: &'a dyn Fn(&Path) -> bool,
-    /// Whether this file, existing or not, may be replaced or written in place.
+    /// Decides whether this file, existing or not, may be replaced or written in place.
     pub may_replace: &'a dyn Fn(&Path) -> Result<(), OutputError>,
-    /// Folders already searched for temporary files of killed writers. `None` to search at every write.
+    /// Folders already searched for temporary files of killed processes. `None` to search at every write.
     pub sweep: Option<&'a FolderSweep>,
-    /// What to do about a file whose owner, access list or attributes cannot be kept.
+    /// What to do if a file's owner, access list or attributes cannot be kept.
     pub losses: Losses<'a>,
 }
 
-/// Folders already searched for temporary files of killed writers, so that many writes search a folder once.
+/// Folders already searched for temporary files of killed processes. Avoids searching a folder again at every
+/// write.
 #[derive(Debug, Default)]
 pub struct FolderSweep(RefCell<HashSet<PathBuf>>);
 
 impl FolderSweep {
-    /// Returns whether the folder has not been searched yet, and marks it as searched.
+    /// Returns true if the folder has not been searched yet, and marks it as searched.
     fn is_due(&self, folder: &Path) -> bool {
         let mut searched = self.0.borrow_mut();
         !searched.contains(folder) && searched.insert(folder.to_owned())
     }
 }
 
-/// [`atomic`] with a guard. Can be cancelled until the new file is complete.
+/// Like [`atomic`], with a guard. Can be cancelled until the new file is complete.
 ///
 /// # Errors
-/// The errors of [`atomic`] and of the guard, and [`OutputError::Cancelled`].
+/// The errors of [`atomic`] and the guard, and [`OutputError::Cancelled`].
 pub fn atomic_guarded(
     path: &Path,
     bytes: &[u8],
@@ -92,8 +94,8 @@ pub fn atomic_guarded(
         .map(drop)
 }
 
-/// [`atomic_guarded`] that only replaces a file with the expected content. If the content has changed by the
-/// time of the replacement, the file is kept and the guard determines the error.
+/// Like [`atomic_guarded`], but only replaces a file that has the expected content. If the content has
+/// changed before the replacement, the file is kept and the guard determines the error.
 ///
 /// # Errors
 /// Same as [`atomic_guarded`].
@@ -108,20 +110,21 @@ pub fn atomic_replace(
     replace(path, content, guard, (token, Durability::Power, Some(expected))).map(drop)
 }
 
-/// Events that a file survives once it has its final name.
+/// Events after which a renamed file still exists.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Durability {
-    /// The end of the process. The system writes the bytes to disk later.
+    /// Termination of the process. The system writes the bytes to disk later.
     Process,
     /// A power failure. The bytes are on disk.
     Power,
 }
 
-/// [`atomic_guarded`] for generated content: `content` writes all bytes each time it is called. Returns the new
-/// file, which stays locked until it is closed. `None` if it was written in place.
+/// Like [`atomic_guarded`], for generated content. `content` must write all bytes each time it is called.
+/// Returns the new file, which stays locked until it is closed. Returns `None` if the target was written in
+/// place.
 ///
 /// # Errors
-/// The errors of [`atomic_guarded`] and of `content`.
+/// The errors of [`atomic_guarded`] and `content`.
 pub fn atomic_with(
     path: &Path,
     content: &dyn Fn(&mut dyn Write) -> io::Result<()>,
@@ -131,7 +134,7 @@ pub fn atomic_with(
     replace(path, content, guard, (token, durability, None))
 }
 
-/// [`atomic_with`], optionally for a file with the expected content.
+/// Like [`atomic_with`]. Optionally only replaces a file that has the expected content.
 fn replace(
     path: &Path,
     content: &dyn Fn(&mut dyn Write) -> io::Result<()>,
@@ -169,7 +172,7 @@ fn replace(
                 Durability::Power => sync_directory(target.directory()),
             };
             if let (Err(error), Losses::Report(report)) = (synced, &guard.losses) {
-                // The file has its final name. Only a power failure could undo that.
+                // The file has been renamed. Only a power failure could undo this.
                 report(format!(
                     "{}: written, but its folder could not be synchronized: {}",
                     path.display(),
@@ -191,24 +194,25 @@ fn replace(
     }
 }
 
-/// Report about attributes that could not be carried over.
+/// Report about attributes that could not be kept.
 pub(super) fn not_kept(path: &Path, lost: &[String]) -> String {
     format!("{}: {} could not be kept", path.display(), lost.join(" and "))
 }
 
-/// Turns writing beyond `ulimit -f` into an error instead of a fatal signal (SIGXFSZ). [`atomic`] does this
-/// itself; call it once for files written in other ways.
+/// Makes exceeding `ulimit -f` an error instead of a fatal signal (SIGXFSZ). [`atomic`] calls this function.
+/// Call it once before writing files in other ways.
 pub fn prepare_process() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
-        // Any handler makes the write fail instead. Without one, the signal ends the process.
+        // Without a signal handler, the signal terminates the process. With any handler, the write fails
+        // instead.
         let unused = Arc::new(AtomicBool::new(false));
         let _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, unused);
     });
 }
 
-/// Creates an empty temporary file next to its target, with the target's attributes. Until it is complete,
-/// only its owner and users on its access list can read it.
+/// Creates an empty temporary file next to its target, with the target's attributes. If the target exists,
+/// only the owner and users on its access list can read the temporary file until it is complete.
 fn create_temporary(target: &TargetFile, guard: &Guard<'_>) -> io::Result<(Temporary, Option<Carried>)> {
     let directory = target.directory();
     if guard.sweep.is_none_or(|sweep| sweep.is_due(directory)) {
@@ -238,8 +242,8 @@ fn fill(
     }
 }
 
-/// Synchronizes a directory, so that a rename survives a power failure. Ignores file systems and directories
-/// that do not support this.
+/// Synchronizes a directory, which makes a rename survive a power failure. Ignores file systems and
+/// directories that do not support this.
 fn sync_directory(directory: &Path) -> io::Result<()> {
     use ErrorKind::{InvalidInput, PermissionDenied, Unsupported};
     match File::open(directory).and_then(|directory| directory.sync_all()) {
@@ -248,17 +252,17 @@ fn sync_directory(directory: &Path) -> io::Result<()> {
     }
 }
 
-/// Writes in place, appending so that the content of an open file is kept.
+/// Writes in place. Appends, so the content of an open file is kept.
 fn in_place(path: &Path, bytes: &[u8], token: &CancelToken) -> io::Result<()> {
     if path == Path::new(STDOUT) {
-        // Flush earlier output first, and do not hold the lock while the reader may block.
+        // Flush earlier output first. Do not hold the lock, because the reader may block.
         io::stdout().flush()?;
         let stdout = File::from(io::stdout().as_fd().try_clone_to_owned()?);
         return cancellable::write_to_pipe(&stdout, bytes, token);
     }
     let mut options = OpenOptions::new();
     options.append(true);
-    // Opening a pipe without a reader would block forever. Make it an error instead.
+    // Opening a pipe without a reader would block forever. Report an error instead.
     let is_pipe = fs::metadata(path)?.file_type().is_fifo();
     if is_pipe {
         options.custom_flags(OFlag::O_NONBLOCK.bits());

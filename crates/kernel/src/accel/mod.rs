@@ -1,5 +1,6 @@
-//! Bounding volume hierarchies and kd-trees. [`bvh`] knows only boxes and ids; a closure tests the shape with
-//! an id. [`wide_bvh`] and its alternative [`kd_tree`] are trees over triangles, stored in their leaves.
+//! Bounding volume hierarchies and kd-trees. [`bvh`] stores only boxes and ids. Shapes are tested by a
+//! closure that receives the id. [`wide_bvh`] and its alternative [`kd_tree`] store triangles in their
+//! leaves.
 
 pub mod bvh;
 pub mod kd_tree;
@@ -23,7 +24,7 @@ pub use wide_bvh::{InstructionSet, SimdKernel, WideBvh};
 
 pub use crate::geometry::packet::{F32x16, PACKET_SIZE};
 
-/// Ends of at most [`PACKET_SIZE`] rays.
+/// Ends of up to [`PACKET_SIZE`] rays.
 #[inline(always)]
 pub fn ends(rays: &[crate::geometry::Ray]) -> F32x16 {
     let mut ends = [-1.0; PACKET_SIZE];

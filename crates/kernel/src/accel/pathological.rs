@@ -1,12 +1,12 @@
-//! Meshes that are hard on trees, and brute-force reference hits.
+//! Difficult meshes for testing trees, and brute-force reference hits.
 
 use crate::geometry::watertight::ShearedRay;
 use crate::geometry::{Ray, ShapeHit};
 use crate::math::Vec3;
 use crate::math::random::signed as random;
 
-/// Hard meshes: noise, slivers, grids with coplanar and duplicate faces, identical triangles, a single
-/// triangle, none, and NaN.
+/// Difficult meshes: noise, slivers, grids with coplanar and duplicate faces, identical triangles, a single
+/// triangle, an empty mesh, and a mesh with NaN coordinates.
 pub fn meshes() -> Vec<Vec<[Vec3; 3]>> {
     let mut next = random(5);
     let mut point = |size: f32| Vec3::new(next(), next(), next()) * size;
@@ -46,7 +46,7 @@ pub fn meshes() -> Vec<Vec<[Vec3; 3]>> {
     ]
 }
 
-/// Nearest hit found by testing every triangle except the one on which the ray starts.
+/// Nearest hit found by testing every triangle except the ray's start triangle.
 pub fn brute(mesh: &[[Vec3; 3]], ray: &Ray) -> Option<ShapeHit> {
     let sheared = ShearedRay::new(ray.origin, ray.direction);
     let others = (0..).zip(mesh).filter(|&(id, _)| id != ray.start);
@@ -56,8 +56,8 @@ pub fn brute(mesh: &[[Vec3; 3]], ray: &Ray) -> Option<ShapeHit> {
     hits.min_by(|a, b| a.t.total_cmp(&b.t).then(a.primitive.cmp(&b.primitive)))
 }
 
-/// Rays in random directions, at corners and edges, along axes with both zeros, from corners, and some that
-/// start on a triangle.
+/// Rays in random directions, toward corners and edges, along axes with positive and negative zeros, from
+/// corners, and from triangles.
 pub fn rays(mesh: &[[Vec3; 3]]) -> Vec<Ray> {
     let mut next = random(11);
     let mut rays = Vec::new();
@@ -75,7 +75,7 @@ pub fn rays(mesh: &[[Vec3; 3]]) -> Vec<Ray> {
         rays.push(Ray { t_max: 0.9, ..Ray::new(origin, target - origin) });
         rays.push(Ray::new(Vec3::new(target.x, 20.0, target.z), Vec3::new(zero, -1.0, zero)));
         rays.push(Ray::new(triangle[2], Vec3::new(next(), next(), next())));
-        // Through a triangle that is excluded, and from one.
+        // A ray through an excluded triangle, and a ray that starts on one.
         let start = (i % mesh.len().max(1)) as u32;
         rays.push(Ray::new(origin, target - origin).leaving(start));
         rays.push(Ray::new(target, Vec3::new(next(), next(), next())).leaving(start));
@@ -86,7 +86,7 @@ pub fn rays(mesh: &[[Vec3; 3]]) -> Vec<Ray> {
     rays
 }
 
-/// The bits of a hit, for exact comparison.
+/// Bit patterns of a hit, for exact comparison.
 pub fn bits(hit: Option<ShapeHit>) -> Option<(u32, u32, u32, u32)> {
     hit.map(|hit| (hit.t.to_bits(), hit.primitive, hit.u.to_bits(), hit.v.to_bits()))
 }

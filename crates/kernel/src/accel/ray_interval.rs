@@ -1,4 +1,4 @@
-//! Tree nodes along a ray, for visualizing trees and their traversal cost.
+//! Tree nodes along a ray, for visualizing the tree and its traversal cost.
 
 use crate::geometry::{Aabb, Ray};
 
@@ -13,18 +13,19 @@ pub struct TreeNode {
     pub shapes: u32,
 }
 
-/// Interval of a ray inside a box.
+/// The part of a ray inside a box.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RayInterval {
-    /// Distance at which the ray enters and the axis of that face; negative if the ray starts inside.
+    /// Distance at which the ray enters the box (negative if it starts inside), and the axis of the entry
+    /// face.
     pub enter: (f32, usize),
-    /// Distance at which the ray leaves and the axis of that face.
+    /// Distance at which the ray leaves the box, and the axis of the exit face.
     pub leave: (f32, usize),
 }
 
 impl RayInterval {
-    /// Intersects a ray with a box. `None` if it misses the box between its ends. Uses the plain slab test:
-    /// rays that only touch the box may hit or miss.
+    /// Intersects a ray with a box. Returns `None` if the box is not hit before the ray's end. Uses the plain
+    /// slab test, so rays that only touch the box may hit or miss.
     #[inline]
     pub fn new(bounds: &Aabb, ray: &Ray) -> Option<Self> {
         let (mut enter, mut leave) = ((f32::NEG_INFINITY, 0), (f32::INFINITY, 0));

@@ -7,8 +7,8 @@ use crate::geometry::Aabb;
 use crate::geometry::mesh::TriangleMesh;
 use crate::math::{DVec3, Vec3, Vec4};
 
-/// A SIMD box, with unused last lanes. The maximum corner is stored negated, so that boxes grow with minima
-/// only.
+/// A SIMD box. The last lanes are unused. The maximum corner is stored negated, so growing a box needs only
+/// minima.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(32))]
 pub struct Bounds {
@@ -25,7 +25,7 @@ impl Bounds {
         Self { min, minus_max: -max }
     }
 
-    /// Bounding box of some references.
+    /// Bounding box of a slice of references.
     #[inline]
     pub fn around(references: &[Reference]) -> Self {
         references.iter().fold(Self::EMPTY, |mut all, reference| {
@@ -52,7 +52,7 @@ impl Bounds {
         self.minus_max = self.minus_max.min(other.minus_max);
     }
 
-    /// Half of the surface area.
+    /// Half the surface area.
     #[inline(always)]
     pub fn half_area(&self) -> f32 {
         let e = self.extent();
@@ -64,7 +64,7 @@ impl Bounds {
         Aabb { min: self.min.truncate(), max: self.max().truncate() }
     }
 
-    /// Parts below and above a plane.
+    /// Parts of the box below and above a plane.
     #[inline]
     pub fn halves(&self, axis: usize, at: f32) -> [Self; 2] {
         let (mut left, mut right) = (*self, *self);
@@ -74,21 +74,21 @@ impl Bounds {
     }
 }
 
-/// Bit set in ids stored as the bits of floats. Without it they would be denormals, which are slow on some
+/// Bit set in ids that are stored as float bits. Without it, they would be denormals, which are slow on some
 /// processors.
 const NORMAL: u32 = 1 << 29;
 
 const _: () = assert!(TriangleMesh::MOST_TRIANGLES < 1 << 29);
 
-/// A triangle id and the bounding box of the triangle's part inside a cell.
+/// A triangle id and the bounding box of the triangle clipped to a cell.
 #[derive(Clone, Copy, Debug)]
 pub struct Reference {
-    /// Bounds whose `min` has the bits of the id in its last lane.
+    /// Bounds, with the bits of the id in the last lane of `min`.
     pub bounds: Bounds,
 }
 
 impl Reference {
-    /// References to all triangles in order, except those that cannot be hit or whose box is not finite.
+    /// References to all triangles in order. Skips triangles that cannot be hit or have non-finite boxes.
     ///
     /// # Errors
     /// [`Cancelled`] if the build was canceled.
@@ -110,7 +110,7 @@ impl Reference {
     #[inline]
     pub fn new(id: u32, corners: [Vec3; 3]) -> Self {
         let [a, b, c] = corners.map(|corner| corner.extend(0.0));
-        // `min` and `max` drop NaN: put it back.
+        // `min` and `max` ignore NaN, so restore it.
         let poison = (a + b + c).truncate().to_array().map(|sum| if sum.is_nan() { f32::NAN } else { 0.0 });
         let mut min = a.min(b).min(c) + Vec3::from(poison).extend(0.0);
         min.w = f32::from_bits(id | NORMAL);
@@ -126,14 +126,14 @@ impl Reference {
         self.bounds.min.w.to_bits() & !NORMAL
     }
 
-    /// Whether the triangle can be hit and has a finite box.
+    /// Whether the triangle can be hit and its box is finite.
     fn is_usable(&self) -> bool {
         self.bounds.extent().truncate().is_finite()
     }
 
-    /// Splits the reference at a plane through its box. Each box contains the part of the whole triangle on
-    /// its side, rounded outward, within the old box. If rounding leaves nothing on a side, its box is the
-    /// entire half.
+    /// Splits the reference at a plane through its box. Each new box bounds the part of the triangle on its
+    /// side, rounded outward and clipped to the old box. If rounding leaves this empty, the new box is the
+    /// entire half of the old box.
     #[inline]
     pub fn split(&self, axis: usize, at: f32, corners: [Vec3; 3]) -> [Self; 2] {
         let mut parts = [Bounds::EMPTY; 2];
@@ -160,7 +160,7 @@ impl Reference {
         [self.within(left, &parts[0]), self.within(right, &parts[1])]
     }
 
-    /// The reference with the intersection of two boxes, or `half` if they do not overlap.
+    /// The reference with the intersection of both boxes, or with `half` if they do not overlap.
     #[inline(always)]
     fn within(&self, half: Bounds, part: &Bounds) -> Self {
         let mut both = Bounds { min: half.min.max(part.min), minus_max: half.minus_max.max(part.minus_max) };
@@ -170,7 +170,7 @@ impl Reference {
     }
 }
 
-/// Box around a double-precision point, rounded outward.
+/// Box around a double-precision point after rounding outward.
 #[inline(always)]
 fn around_rounded(exact: DVec3) -> Bounds {
     let near = exact.as_vec3();
@@ -238,8 +238,8 @@ impl Polygon {
         }
     }
 
-    /// Adds a vertex. Clipping a triangle by six planes gives at most nine vertices; any surplus comes from
-    /// rounding and does not extend the polygon.
+    /// Adds a vertex. Clipping a triangle by six planes produces at most nine vertices. Any more would be due
+    /// to rounding and would not extend the polygon.
     fn push(&mut self, point: DVec3) {
         if let Some(place) = self.points.get_mut(self.count) {
             *place = point;
@@ -252,7 +252,7 @@ impl Polygon {
         &self.points[..self.count]
     }
 
-    /// Bounding box; ∞ and −∞ if the polygon is empty.
+    /// Bounding box. The corners are ∞ and −∞ if the polygon is empty.
     pub fn extent(&self) -> (DVec3, DVec3) {
         let none = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         self.points().iter().fold(none, |(min, max), &p| (min.min(p), max.max(p)))
@@ -264,7 +264,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn clipped_corners_have_tight_bounds() {
+    fn clipped_triangles_have_tight_bounds() {
         let corners = [Vec3::ZERO, Vec3::new(4.0, 0.0, 0.0), Vec3::new(0.0, 4.0, 4.0)];
         let whole = Reference::new(7, corners);
         let [left, right] = whole.split(0, 3.0, corners);

@@ -1,4 +1,4 @@
-//! Comparison of the kd-tree and the wide BVH with brute force.
+//! Compares the kd-tree and the wide BVH with brute force.
 
 use rayon::prelude::*;
 
@@ -43,7 +43,7 @@ fn cuboid(squares: u32) -> TriangleSoup {
         .collect()
 }
 
-/// Triangles of all sizes at random positions, some of them long.
+/// Triangles of various sizes at random positions. Some are long and thin.
 fn noise(seed: u64, count: usize) -> TriangleSoup {
     let mut next = random(seed);
     let mut point = |size: f32| Vec3::new(next(), next(), next()) * size;
@@ -55,8 +55,8 @@ fn noise(seed: u64, count: usize) -> TriangleSoup {
     (0..count).map(triangle).collect()
 }
 
-/// More than fifty meshes: pathological meshes, boxes and noise, each as is, far from the origin, tiny and
-/// huge.
+/// More than fifty meshes: pathological meshes, boxes, and noise. Each is used unchanged, far from the
+/// origin, tiny, and huge.
 fn scenes() -> Vec<TriangleSoup> {
     let shorten = |mesh: TriangleSoup| mesh.into_iter().take(240).collect::<TriangleSoup>();
     let mut own: Vec<TriangleSoup> = meshes().into_iter().map(shorten).collect();
@@ -72,8 +72,8 @@ fn scenes() -> Vec<TriangleSoup> {
     [own, tiny, huge, far].concat()
 }
 
-/// A ray near a mesh. It starts outside, far away, or at a corner or an edge. It is directed at a vertex, in
-/// a random direction, along an axis, or in the plane of two axes.
+/// A ray near a mesh. It starts at a corner, on an edge, outside the mesh, or far away. It is aimed at a
+/// vertex, in a random direction, along an axis, or in a coordinate plane.
 fn aimed(mesh: &[[Vec3; 3]], bounds: &Aabb, kind: usize, next: &mut impl FnMut() -> f32) -> Ray {
     let (center, size) = (bounds.center(), bounds.extent().max_element().max(f32::MIN_POSITIVE));
     let mut pick = || mesh[((next() * 0.5 + 0.5) * mesh.len() as f32) as usize % mesh.len()];
@@ -96,7 +96,7 @@ fn aimed(mesh: &[[Vec3; 3]], bounds: &Aabb, kind: usize, next: &mut impl FnMut()
     match kind / 28 % 4 {
         0 => direction[kind % 3] = zero,
         1 => {
-            // Start at an axial offset from the target, to hit it along the axis.
+            // Start at an offset from the target along one axis.
             let axis = kind % 3;
             let mut origin = target;
             origin[axis] = center[axis] + 2.0 * size;
@@ -110,7 +110,7 @@ fn aimed(mesh: &[[Vec3; 3]], bounds: &Aabb, kind: usize, next: &mut impl FnMut()
     Ray { t_max, ..Ray::new(origin, direction) }
 }
 
-/// Number of rays for which a tree disagrees with brute force, with a description of the first one.
+/// Number of rays for which a tree disagrees with brute force, and a description of the first such ray.
 fn differences(mesh: &[[Vec3; 3]], seed: u64, count: usize) -> (usize, Option<String>) {
     let (planes, boxes) = (kd_tree(mesh), wide_bvh(mesh));
     let mut next = random(seed);
@@ -184,10 +184,10 @@ fn kd_trees_of_all_scenes_are_valid() {
     }
 }
 
-/// Checks that this mesh is split into many leaves: with a single leaf, the tests above would not test any
-/// plane.
+/// Checks that this mesh is split into many leaves. With a single leaf, the tests above would not cover any
+/// planes.
 #[test]
-fn kd_trees_split_large_meshes() {
+fn kd_tree_splits_large_meshes() {
     let mesh = noise(9, 3000);
     let (nodes, triangles) = kd_tree(&mesh).expected_visits();
     assert!(nodes > 10.0 && triangles < 100.0, "{nodes} nodes, {triangles} triangles");
@@ -212,7 +212,7 @@ fn builds_can_be_canceled() {
 }
 
 #[test]
-fn validation_finds_a_missing_triangle() {
+fn validation_finds_a_moved_triangle() {
     let mesh = noise(9, 400);
     let mut shifted = mesh.clone();
     shifted[17] = shifted[17].map(|corner| corner + Vec3::splat(0.5));

@@ -1,4 +1,4 @@
-//! Tests of facets: decided packet results must match single rays on every instruction set.
+//! Tests of triangle lists. Conclusive packet results must match single rays on every instruction set.
 
 use super::{InstructionSet, SimdKernel};
 use crate::geometry::packet::{HitPacket, PACKET_SIZE, RayPacket};
@@ -9,7 +9,8 @@ use crate::math::Vec3;
 use crate::math::lanes::Simd;
 use crate::math::random::signed;
 
-/// Nearest hits, undecided rays, rays that hit any triangle but their own, and undecided ones among those.
+/// Runs closest-hit and any-hit queries. Returns the nearest hits and three masks: undecided closest-hit
+/// rays, rays that hit any triangle other than `except`, and undecided any-hit rays.
 struct FacetQueries<'a> {
     facets: &'a TriangleList,
     rays: &'a [Ray],
@@ -29,7 +30,7 @@ impl SimdKernel for FacetQueries<'_> {
     }
 }
 
-/// The six walls of a box, with two triangles each.
+/// The six walls of a box, two triangles each.
 fn walls(low: Vec3, high: Vec3) -> Vec<[Vec3; 3]> {
     let corner =
         |i: usize| Vec3::from([0, 1, 2].map(|axis| if i >> axis & 1 == 0 { low[axis] } else { high[axis] }));
@@ -38,7 +39,7 @@ fn walls(low: Vec3, high: Vec3) -> Vec<[Vec3; 3]> {
     quads.into_iter().flat_map(each).collect()
 }
 
-/// Rooms with objects inside: rotated, skewed, far from the origin, or small.
+/// Rooms with objects inside. Rooms may be rotated, skewed, small, or far from the origin.
 fn room(round: usize, next: &mut dyn FnMut() -> f32) -> Vec<[Vec3; 3]> {
     let mut triangles = walls(Vec3::splat(-1.0), Vec3::ONE);
     for _ in 0..round % 3 {
@@ -83,8 +84,8 @@ fn alone(triangles: &[[Vec3; 3]], ray: &Ray, except: u32) -> Option<ShapeHit> {
 #[test]
 fn decided_packets_match_single_rays() {
     let mut next = signed(11);
-    // Count all rays, hits and undecided rays. For rays from surfaces near the origin, count all and the
-    // undecided ones.
+    // For each kind of ray, count all rays, hits, and undecided rays. Also count rays from surfaces near the
+    // origin, and those that are undecided.
     let (mut bounces, mut left) = (0, 0);
     let mut counts = [[0_u32; 3]; 6];
     for round in 0..6000 {
@@ -102,14 +103,14 @@ fn decided_packets_match_single_rays() {
             let (start, target) = (on(&triangles[from], next), on(&triangles[to], next));
             let own = Ray::new(start, target - start).leaving(from as u32);
             match kind {
-                // Rays from surfaces in any direction and to other surfaces, like bounces and shadow rays.
+                // Bounce rays in random directions and shadow rays to other surfaces.
                 0 => Ray { direction: Vec3::new(next(), next(), next()), ..own },
                 1 => Ray { t_max: 1.0 - 1e-5, ..own },
-                // Rays at corners, along edges and along axes.
+                // Rays toward corners, along edges, and along axes.
                 2 => Ray { direction: triangles[to][0] - start, ..own },
                 3 => Ray::new(triangles[from][0], triangles[from][1] - triangles[from][0]),
                 4 => Ray::new(start, [Vec3::X, Vec3::NEG_Y, Vec3::Z][to % 3]).leaving(from as u32),
-                // Distant rays, and rays within planes.
+                // Rays from far away and rays within planes.
                 _ if to % 2 == 0 => Ray::new(start * 50.0 - target * 49.0, target - start),
                 _ => Ray::new(start, on(&triangles[from], next) - start),
             }
@@ -140,7 +141,7 @@ fn decided_packets_match_single_rays() {
         }
     }
     assert!(counts.iter().all(|[all, hits, _]| *all > 5000 && hits * 4 > *all), "{counts:?}");
-    assert!(left * 20 < bounces, "{left} of {bounces} are undecided");
+    assert!(left * 20 < bounces, "{left} of {bounces} rays are undecided");
 }
 
 #[test]

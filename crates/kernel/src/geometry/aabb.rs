@@ -3,7 +3,7 @@
 use crate::math::float::gamma;
 use crate::math::{DVec3, Vec3};
 
-/// An axis-aligned box including its faces. Empty if `min > max`.
+/// An axis-aligned box, including its faces. Empty if `min > max`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct Aabb {
@@ -14,7 +14,7 @@ pub struct Aabb {
 }
 
 impl Aabb {
-    /// The empty box, which is the neutral element of [`Aabb::union`].
+    /// The empty box, the identity element of [`Aabb::union`].
     pub const EMPTY: Self = Self { min: Vec3::INFINITY, max: Vec3::NEG_INFINITY };
 
     /// Smallest box around some points.
@@ -63,7 +63,7 @@ impl Aabb {
         self.min * 0.5 + self.max * 0.5
     }
 
-    /// Half of the surface area; 0 if empty.
+    /// Half the surface area; 0 if empty.
     pub fn half_area(&self) -> f32 {
         let e = self.extent().max(Vec3::ZERO);
         e.x * e.y + e.y * e.z + e.z * e.x
@@ -73,14 +73,14 @@ impl Aabb {
 /// Factor on distances that compensates for rounding in [`SlabRay::enter`].
 pub const SLAB_PAD: f32 = 1.0 + 2.0 * gamma(3);
 
-/// [`SLAB_PAD`] as a factor on the inverse direction, which is rounded once more.
+/// Like [`SLAB_PAD`], but multiplied by the inverse direction, which requires one more rounding.
 pub const FAR_PAD: f32 = 1.0 + 2.0 * gamma(4);
 
-/// Error of the watertight triangle test perpendicular to a ray, relative to the distance: less than 13 units
-/// of rounding in the projected coordinates.
+/// Error of the watertight triangle test perpendicular to a ray, relative to the distance. It is less than 13
+/// units of rounding in the projected coordinates.
 pub const TRIANGLE_ERROR: f32 = 16.0 * f32::EPSILON;
 
-/// A ray prepared for the slab test.
+/// A ray preprocessed for the slab test.
 #[derive(Clone, Copy, Debug)]
 pub struct SlabRay {
     origin: Vec3,
@@ -90,22 +90,23 @@ pub struct SlabRay {
 }
 
 impl SlabRay {
-    /// Prepares a ray.
+    /// Preprocesses a ray.
     pub fn new(origin: Vec3, direction: Vec3) -> Self {
         Self { origin, margin: 0.0, inverse: direction.recip() }
     }
 
-    /// Prepares a ray for boxes around triangles in `whole`: it misses no box containing a triangle that the
-    /// watertight test may hit.
+    /// Preprocesses a ray for boxes around triangles in `whole`. The ray misses no box containing a triangle
+    /// that the watertight test may hit.
     pub fn for_triangles(origin: Vec3, direction: Vec3, whole: &Aabb) -> Self {
         Self { margin: triangle_margin(origin, whole), ..Self::new(origin, direction) }
     }
 
-    /// Distance at which the ray enters the box, if it overlaps it for a t in [0, `t_max`]. Never misses a
-    /// box that the exact ray hits: the far distance is padded for rounding in the slab test (Ize, *Robust
-    /// BVH Ray Traversal*, JCGT 2013). A ray in the plane of a face computes 0·∞ = NaN; every comparison with
-    /// it keeps the current interval, so both zeros of a direction behave the same. The ray's end is also
-    /// padded, so that a box with a hit exactly there is not missed.
+    /// Distance at which the ray enters the box, or `None` if it is outside the box for all t in [0,
+    /// `t_max`]. Never misses a box that the exact ray hits: the far distance is padded to account for
+    /// rounding in the slab test (Ize, *Robust BVH Ray Traversal*, JCGT 2013). A ray in the plane of a face
+    /// computes 0·∞ = NaN. Comparisons with NaN keep the current interval, so positive and negative zeros in
+    /// a direction behave the same. The ray's end is also padded to avoid missing a box with a hit exactly at
+    /// the end.
     #[inline(always)]
     pub fn enter(&self, min: Vec3, max: Vec3, t_max: f32) -> Option<f32> {
         let a = (min - (self.origin + self.margin)) * self.inverse;
@@ -122,7 +123,7 @@ impl SlabRay {
     }
 }
 
-/// Margin around the triangles of the boxes in `whole` that a ray from `origin` needs.
+/// Margin that a ray from `origin` needs around triangles in `whole`.
 pub fn triangle_margin(origin: Vec3, whole: &Aabb) -> f32 {
     (whole.min - origin).abs().max((whole.max - origin).abs()).max_element() * TRIANGLE_ERROR
 }
@@ -135,14 +136,14 @@ mod tests {
         SlabRay::new(origin, direction).enter(min, max, f32::INFINITY)
     }
 
-    /// A small random generator for aimed rays.
+    /// A small random number generator for aimed rays.
     fn random(state: &mut u64) -> f32 {
         *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         ((*state >> 40) as f32) / (1_u64 << 24) as f32
     }
 
     #[test]
-    fn positive_and_negative_zero_are_equal() {
+    fn signed_zeros_are_equivalent() {
         let (min, max) = (Vec3::ZERO, Vec3::ONE);
         for x in [0.0, 1.0] {
             for zero in [0.0, -0.0] {

@@ -11,14 +11,14 @@ use super::surface_packet::{Exact, ExactPoint};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::{DVec2, DVec3, Vec2};
 
-/// A cone with a round base, or only its side; the front is outside. Part 0 is the side and part 1 the cap at
-/// the base.
+/// A cone with a round base, or only its side. The front is outside. Part 0 is the side and part 1 is the cap
+/// at the base.
 ///
-/// On the side, u goes once around and v from 0 at the base to 1 at the tip. Images are upright and not
-/// mirrored on an upright cone with its base at the bottom. The cap is mapped like a [`Disk`].
+/// On the side, u wraps around once, and v increases from 0 at the base to 1 at the tip. Images appear
+/// upright and not mirrored if the base is at the bottom. The cap is mapped like a [`Disk`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cone {
-    /// Frame with its origin at the tip and its axis towards the base.
+    /// Frame with its origin at the tip and its axis toward the base.
     frame: AxialFrame,
     height: f64,
     radius: f64,
@@ -39,7 +39,8 @@ impl Exact for Cone {
 }
 
 impl Cone {
-    /// Creates a cone from the center of its base, a different point as the tip, and the base's radius > 0.
+    /// Creates a cone from the center of its base, a different point as the tip, and the radius of the base,
+    /// which must be positive.
     pub fn new(base: DVec3, tip: DVec3, radius: f64, capped: bool) -> Self {
         let height = (base - tip).length();
         let slant = libm::hypot(height, radius);
@@ -59,7 +60,7 @@ impl Cone {
         surface_of_revolution::first_hit(ray, &line, self.side_interval(&line)?, ends, self.capped, starts_on)
     }
 
-    /// Whether a ray starts on a part, up to rounding.
+    /// Whether a ray starts on a part, within rounding error.
     fn starts_on(&self, ray: &RayF64, part: u32) -> bool {
         let local = self.frame.local(ray.origin);
         let distance = match part {
@@ -69,10 +70,10 @@ impl Cone {
         is_rounding(distance, self.reach())
     }
 
-    /// Interval in which the line is inside the double cone |p| ≤ k|z|, which extends beyond the base and the
-    /// tip. The quadratic A·s² − 2B·s + C is relative to the point of the line nearest to the tip, so that B
-    /// is a single product. B² − AC is a difference of squares of the line's moment about the tip, which is
-    /// precise to the last digits even for lines that graze the side near the tip.
+    /// Interval in which the line is inside the double cone |p| ≤ k|z|, which extends past the base and the
+    /// tip. The quadratic A·s² − 2B·s + C is relative to the line's closest point to the tip, so B is a
+    /// single product. B² − AC is computed as a difference of squares of the line's moment about the tip.
+    /// This is precise even for lines that graze the side near the tip.
     fn side_interval(&self, line: &LocalLine) -> Option<LineInterval> {
         let k = self.radius / self.height;
         let (p, d) = (line.foot, line.direction);
@@ -88,8 +89,8 @@ impl Cone {
             return None;
         }
         let q = b + discriminant.max(0.0).sqrt().copysign(b);
-        // A line parallel to the side crosses it once: put the other root where slightly steeper lines have
-        // it.
+        // A line parallel to the side crosses it once. Put the other root where it is for slightly steeper
+        // lines.
         let a = if a == 0.0 { -0.0 } else { a };
         let (s0, s1) = if q == 0.0 { (0.0, 0.0) } else { (c / q, q / a) };
         Some(match (crosses_both, d.z > 0.0) {
@@ -99,7 +100,7 @@ impl Cone {
         })
     }
 
-    /// Unrounded point of a hit.
+    /// Hit point before rounding.
     fn exact_point(&self, ray: &RayF64, hit: &ShapeHit) -> DVec3 {
         let line = self.frame.line(ray);
         let crossings = match hit.primitive {
@@ -130,7 +131,7 @@ impl Cone {
         )
     }
 
-    /// Point of the side at a direction from the axis and the result of [`Cone::along`].
+    /// Point on the side, from a direction perpendicular to the axis and the result of [`Cone::along`].
     fn exact_side(&self, out: DVec2, (down, along): (DVec2, f64)) -> ExactPoint {
         ExactPoint {
             point: self.frame.point((out * (down.x * along)).extend(down.y * along)),
@@ -139,8 +140,8 @@ impl Cone {
         }
     }
 
-    /// Unit vector down the side from the tip, as (outward, along the axis), and a point's distance from the
-    /// tip along the side.
+    /// Unit vector down the side from the tip, as (outward, along the axis), and the distance of `local` from
+    /// the tip along the side.
     fn along(&self, local: DVec3) -> (DVec2, f64) {
         let down = DVec2::new(self.radius, self.height) / self.slant;
         (down, DVec2::new(local.truncate().length(), local.z).dot(down).clamp(0.0, self.slant))
@@ -158,8 +159,8 @@ impl Cone {
         DVec2::new(angle_to_u(mirrored(radial(local.truncate()))), 1.0 - along / self.slant)
     }
 
-    /// Mean curvature at a point of a part. On the side only the direction around the axis contributes, which
-    /// is unbounded at the tip.
+    /// Mean curvature at a point of a part. On the side, the curvature is in the direction around the axis,
+    /// and is unbounded at the tip.
     pub fn curvature(&self, part: u32, point: DVec3) -> f64 {
         let across = self.frame.local(point).truncate().length();
         if part == 0 && across > 0.0 { 0.5 * self.height / (self.slant * across) } else { 0.0 }
@@ -169,7 +170,7 @@ impl Cone {
         self.frame.origin.abs().max_element() + self.height + self.radius
     }
 
-    /// Point and unit normal of the side at texture coordinates.
+    /// Point and unit normal on the side at texture coordinates.
     pub fn side(&self, u: f64, v: f64) -> (DVec3, DVec3) {
         let out = mirrored(direction_at_u(u));
         let point = (out * self.radius).extend(self.height) * (1.0 - v);
@@ -209,7 +210,7 @@ impl Cone {
     pub fn projected_area(&self, direction: DVec3) -> f64 {
         let along = self.frame.axis().dot(direction);
         let [side, cap] = self.areas();
-        // Components of the side's normals across the axis and towards the tip.
+        // Components of the side's normals perpendicular to the axis and toward the tip.
         let (cosine, sine) = (self.height / self.slant, self.radius / self.slant);
         ring_projected_area(side, cosine * sine_from_cosine(along), -sine * along) + cap * along.max(0.0)
     }
@@ -247,7 +248,8 @@ impl Cone {
     }
 }
 
-/// Reflects a point, as angles are counted about the axis from base to tip, opposite to the frame's.
+/// Reflects a point, because angles are counted about the axis from base to tip, while the frame's axis
+/// points from tip to base.
 fn mirrored(p: DVec2) -> DVec2 {
     DVec2::new(p.x, -p.y)
 }
@@ -259,7 +261,7 @@ mod tests {
     use crate::geometry::surface_of_revolution::tests::{Thin, hits_from_afar};
     use crate::math::Vec3;
 
-    /// A cone on the ground with its tip at y = 2 and a base of radius 1.
+    /// A cone with its tip at y = 2 and a base of radius 1 at y = 0.
     fn hat(capped: bool) -> Cone {
         Cone::new(DVec3::ZERO, DVec3::Y * 2.0, 1.0, capped)
     }
@@ -279,14 +281,14 @@ mod tests {
         assert_eq!(met(&closed, [0.5, -3.0, 0.0], Vec3::Y), Some((3.0, 1, Vec3::NEG_Y)));
         assert_eq!(met(&closed, [0.5, 0.5, 0.0], Vec3::NEG_Y), Some((0.5, 1, Vec3::NEG_Y)));
         assert_eq!(met(&closed, [0.5, 5.0, 0.0], Vec3::NEG_Y), Some((4.0, 0, right)));
-        // The mirror image of the side beyond the tip is not part of the cone.
+        // The mirrored cone beyond the tip must not be hit.
         assert_eq!(met(&closed, [-9.0, 3.0, 0.0], Vec3::X), None);
         assert_eq!(met(&closed, [0.5, 2.5, 0.0], Vec3::Y), None);
     }
 
     #[test]
     fn lines_parallel_to_the_side_cross_it_once() {
-        // Direction (−1, 2): parallel to the left side, through the right side and the base.
+        // Direction (−1, 2) is parallel to the left side. The ray passes through the right side and the base.
         let slope = Vec3::new(-1.0, -2.0, 0.0);
         let right = Vec3::new(2.0, 1.0, 0.0).normalize();
         for capped in [true, false] {
@@ -300,8 +302,7 @@ mod tests {
 
     #[test]
     fn the_tip_is_sharp() {
-        // Rays that pass near the tip, at a millionth of its radius there, are decided as precisely as
-        // elsewhere.
+        // Rays that pass the tip at a millionth of the radius are decided as precisely as other rays.
         for below in [1e-3_f64, 1e-6, 1e-9] {
             let radius = below / 2.0;
             for (factor, is_hit) in [(1.0 - 1e-5, true), (1.0 + 1e-5, false)] {

@@ -7,22 +7,23 @@ use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::transform::rotation_xyz;
 use crate::math::{DMat3, DVec2, DVec3, Vec2};
 
-/// An oriented box; the front is outside.
+/// An oriented box. The front is outside.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cuboid {
     center: DVec3,
     half: DVec3,
-    /// Axes as columns: the map from local to world coordinates.
+    /// Axes as columns of the local-to-world matrix.
     axes: DMat3,
 }
 
 impl Cuboid {
-    /// Creates a box from its center, edge lengths > 0, and rotation in degrees about x, then y, then z.
+    /// Creates a box from its center, its positive edge lengths, and its rotation in degrees about x, then y,
+    /// then z.
     pub fn new(center: DVec3, size: DVec3, rotate_degrees: DVec3) -> Self {
         Self { center, half: size * 0.5, axes: rotation_xyz(rotate_degrees) }
     }
 
-    /// Finds the nearest face in the ray's interval, from outside or inside. Faces are numbered −x, +x, −y,
+    /// Finds the nearest hit in the ray's interval, from outside or inside. Faces are numbered −x, +x, −y,
     /// +y, −z, +z.
     pub fn intersect(&self, ray: &RayF64) -> Option<ShapeHit> {
         let origin = self.axes.transpose() * (ray.origin - self.center);
@@ -88,7 +89,7 @@ impl Cuboid {
         }
     }
 
-    /// Surface point at a hit, moved onto the face.
+    /// Surface point at a hit, projected onto the face.
     pub fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
         let ExactPoint { point, normal: outwards, reach } = self.exact(ray, hit);
         let chart = self.chart(hit.primitive);
@@ -101,7 +102,7 @@ impl Cuboid {
     /// Texture coordinates of a point on the surface.
     pub fn uv_at(&self, point: DVec3) -> DVec2 {
         let local = self.axes.transpose() * (point - self.center);
-        // The point is on the face in whose direction it is farthest out.
+        // The point is on the face with the largest relative coordinate.
         let axis = (local / self.half).abs().max_position();
         let face = 2 * axis as u32 + u32::from(local[axis] > 0.0);
         self.chart(face).uv(local)
@@ -112,7 +113,7 @@ impl Cuboid {
         FaceMapping { u, v, width: 2.0 * self.half.dot(u.abs()), height: 2.0 * self.half.dot(v.abs()) }
     }
 
-    /// Whether all faces but one are farther than `margin` from a point of the surface.
+    /// Whether a surface point is farther than `margin` from all faces but one.
     pub fn is_on_one_face(&self, point: DVec3, margin: f64) -> bool {
         let from_center = point - self.center;
         let along = DVec3::new(
@@ -125,7 +126,7 @@ impl Cuboid {
         are_far.into_iter().filter(|&is_far| is_far).count() == 2 && 2.0 * self.half.min_element() > margin
     }
 
-    /// Local coordinates of a hit, moved onto the face.
+    /// Local coordinates of a hit, projected onto the face.
     #[inline(always)]
     fn local(&self, ray: &RayF64, hit: &ShapeHit) -> DVec3 {
         let from_center = ray.at(f64::from(hit.t)) - self.center;
@@ -163,7 +164,7 @@ impl Cuboid {
         )
     }
 
-    /// Half of the edge lengths.
+    /// Half the edge lengths.
     pub fn half(&self) -> DVec3 {
         self.half
     }
@@ -255,18 +256,18 @@ mod tests {
         let cube = Cuboid::new(DVec3::ZERO, DVec3::new(2.0, 4.0, 6.0), DVec3::ZERO);
         for (direction, t) in [(Vec3::X, 1.0), (Vec3::Y, 2.0), (Vec3::NEG_Z, 3.0)] {
             let inside = Ray::new(Vec3::ZERO, direction).to_f64();
-            let hit = cube.intersect(&inside).expect("a ray from inside hits");
+            let hit = cube.intersect(&inside).expect("a ray from inside should hit");
             assert_eq!(hit.t, t);
             assert_eq!(cube.surface(&inside, &hit).normal, direction);
             let outside = Ray::new(-direction * 10.0, direction).to_f64();
-            let hit = cube.intersect(&outside).expect("a ray to the middle hits");
+            let hit = cube.intersect(&outside).expect("a ray toward the center should hit");
             assert_eq!(hit.t, 10.0 - t);
             assert_eq!(cube.surface(&outside, &hit).normal, -direction);
         }
     }
 
     #[test]
-    fn rotated_boxes_are_hit_at_their_corner() {
+    fn rotated_boxes_are_hit_at_their_edges() {
         let cube = Cuboid::new(DVec3::ZERO, DVec3::splat(2.0), DVec3::new(0.0, 45.0, 0.0));
         let ray = Ray::new(Vec3::new(-5.0, 0.0, 0.0), Vec3::X).to_f64();
         let hit = cube.intersect(&ray).expect("the edge is on the axis");
@@ -282,7 +283,7 @@ mod tests {
             let (corner, u, v) = cube.face(face);
             let middle = corner + (u + v) * 0.5;
             let ray = RayF64 { origin: cube.center, direction: middle - cube.center, t_max: f64::INFINITY };
-            let hit = cube.intersect(&ray).expect("a ray from inside hits");
+            let hit = cube.intersect(&ray).expect("a ray from inside should hit");
             assert_eq!((hit.primitive, hit.t), (face, 1.0));
             let surface = cube.surface(&ray, &hit);
             assert!((surface.normal - u.cross(v).normalize().as_vec3()).length() < 1e-6);

@@ -11,11 +11,11 @@ use super::surface_packet::{Exact, ExactPoint};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::{DVec2, DVec3, Vec2};
 
-/// A solid cylinder between two end points, or an open tube; the front is outside. Part 0 is the side, part 1
-/// the cap at the first end and part 2 the cap at the second.
+/// A solid cylinder between two end points, or an open tube. The front is outside. Part 0 is the side, part 1
+/// is the cap at the first end, and part 2 is the cap at the second end.
 ///
-/// On the side, u goes once around and v from 0 at the first end to 1 at the second. Images are upright and
-/// not mirrored on an upright cylinder with its first end at the bottom. The caps are mapped like a [`Disk`].
+/// On the side, u wraps around once, and v increases from 0 at the first end to 1 at the second. Images
+/// appear upright and not mirrored if the first end is at the bottom. The caps are mapped like a [`Disk`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cylinder {
     /// Frame with its origin at the center and its axis from the first end to the second.
@@ -37,7 +37,7 @@ impl Exact for Cylinder {
 }
 
 impl Cylinder {
-    /// Creates a cylinder from two different end points and a radius > 0.
+    /// Creates a cylinder from two different end points and a positive radius.
     pub fn new(a: DVec3, b: DVec3, radius: f64, capped: bool) -> Self {
         let frame = AxialFrame::new((a + b) * 0.5, b - a);
         Self { frame, half_length: (b - a).length() * 0.5, radius, capped }
@@ -56,7 +56,7 @@ impl Cylinder {
         surface_of_revolution::first_hit(ray, &line, self.side_interval(&line)?, ends, self.capped, starts_on)
     }
 
-    /// Whether a ray starts on a part, up to rounding.
+    /// Whether a ray starts on a part, within rounding error.
     fn starts_on(&self, ray: &RayF64, part: u32) -> bool {
         let local = self.frame.local(ray.origin);
         let distance = match part {
@@ -66,9 +66,9 @@ impl Cylinder {
         is_rounding(distance, self.reach())
     }
 
-    /// Interval in which the line is within the radius. Uses the distance of the projected line from the axis
-    /// and avoids cancellation, as for spheres (Haines, Günther, Akenine-Möller, Ray Tracing Gems, chapter
-    /// 7).
+    /// Interval in which the line is inside the infinite cylinder. Uses the distance of the projected line
+    /// from the axis to avoid cancellation, as for spheres (Haines, Günther, Akenine-Möller, Ray Tracing
+    /// Gems, chapter 7).
     fn side_interval(&self, line: &LocalLine) -> Option<LineInterval> {
         let (p, d) = (line.foot.truncate(), line.direction.truncate());
         let factors = |distance: f64| (distance - self.radius) * (distance + self.radius);
@@ -86,7 +86,7 @@ impl Cylinder {
         Some(LineInterval::of_side(t0.min(t1), t0.max(t1)))
     }
 
-    /// Unrounded point of a hit.
+    /// Hit point before rounding.
     fn exact_point(&self, ray: &RayF64, hit: &ShapeHit) -> DVec3 {
         let line = self.frame.line(ray);
         let height = if hit.primitive == 1 { -self.half_length } else { self.half_length };
@@ -115,13 +115,13 @@ impl Cylinder {
         )
     }
 
-    /// Direction from the axis and height of the point of the side nearest to `point`.
+    /// The point on the side that is closest to `point`, as a direction from the axis and a height.
     fn chart(&self, point: DVec3) -> (DVec2, f64) {
         let local = self.frame.local(point);
         (radial(local.truncate()), local.z.clamp(-self.half_length, self.half_length))
     }
 
-    /// Point of the side at a direction from the axis and a height.
+    /// Point on the side, from a direction perpendicular to the axis and a height.
     fn exact_side(&self, out: DVec2, z: f64) -> ExactPoint {
         ExactPoint {
             point: self.frame.point((out * self.radius).extend(z)),
@@ -154,13 +154,13 @@ impl Cylinder {
         self.frame.origin.abs().max_element() + self.half_length + self.radius
     }
 
-    /// Point and unit normal of the side at texture coordinates.
+    /// Point and unit normal on the side at texture coordinates.
     pub fn side(&self, u: f64, v: f64) -> (DVec3, DVec3) {
         let (out, z) = (direction_at_u(u), (2.0 * v - 1.0) * self.half_length);
         (self.frame.point((out * self.radius).extend(z)), self.frame.vector(out.extend(0.0)))
     }
 
-    /// Cap 1 or 2, facing outward.
+    /// The cap with index 1 or 2, facing outward.
     pub fn cap(&self, number: u32) -> Disk {
         let side = if number == 1 { -1.0 } else { 1.0 };
         let center = self.frame.point(DVec3::Z * (side * self.half_length));
@@ -216,7 +216,7 @@ impl Cylinder {
 
     /// Whether a point is inside.
     pub fn contains(&self, point: DVec3) -> bool {
-        // Most points can be rejected by height.
+        // The height test rejects most points.
         self.frame.height(point).abs() < self.half_length
             && self.frame.local(point).truncate().length() < self.radius
     }
@@ -261,11 +261,11 @@ mod tests {
     }
 
     #[test]
-    fn open_tubes_can_be_looked_through() {
+    fn rays_pass_through_open_tubes() {
         let tube = bar(false);
         assert_eq!(met(&tube, [1.25, 9.0, 0.25], Vec3::NEG_Y), None);
-        // The ray enters at the upper end and leaves through the side at x = 1.5, which it hits from inside;
-        // the front is still outside.
+        // The ray enters through the open upper end and hits the side from inside at x = 1.5. The front is
+        // still outside.
         let slanting = met(&tube, [0.5, 5.0, 0.0], Vec3::new(1.0, -2.0, 0.0));
         assert_eq!(slanting, Some((1.0, 0, Vec3::X)));
     }

@@ -10,12 +10,12 @@ use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::{DVec2, DVec3, Vec2};
 use crate::sampling::warp;
 
-/// Relative margin of a border, so that two surfaces that share it leave no gap; far below the resolution of
-/// `f32` rays.
+/// Relative margin of a border. It closes gaps between surfaces that share the border, and is far below the
+/// resolution of `f32` rays.
 pub const BORDER: f64 = 1e-14;
 
-/// A flat disk with the texture coordinates of its enclosing square: (½, ½) is the center. Images are upright
-/// on a vertical disk, and point towards −z on a horizontal one that faces up.
+/// A flat disk. Texture coordinates are those of the enclosing square, with (½, ½) at the center. Images are
+/// upright on a vertical disk. On a horizontal disk that faces up, their tops point toward −z.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Disk {
     frame: AxialFrame,
@@ -29,12 +29,12 @@ impl Exact for Disk {
 }
 
 impl Disk {
-    /// Creates a disk from its center, the nonzero normal of its front, and a radius > 0.
+    /// Creates a disk from its center, the nonzero normal of its front, and a positive radius.
     pub fn new(center: DVec3, normal: DVec3, radius: f64) -> Self {
         Self { frame: AxialFrame::new(center, normal), radius }
     }
 
-    /// Intersects the plane within the border. `None` for rays in the plane.
+    /// Intersects the plane and checks the border. `None` for rays in the plane.
     pub fn intersect(&self, ray: &RayF64) -> Option<ShapeHit> {
         self.nearest(ray).map(hit)
     }
@@ -66,7 +66,7 @@ impl Disk {
         self.surface_near(ray.at(t), self.reach())
     }
 
-    /// Surface point nearest to `point`, which was computed from lengths up to `reach`.
+    /// Surface point nearest to `point`. `reach` bounds the lengths from which `point` was computed.
     pub fn surface_near(&self, point: DVec3, reach: f64) -> SurfacePoint {
         let ExactPoint { point: near, normal, .. } = self.exact_near(point, reach);
         let edge = 2.0 * self.radius;
@@ -74,7 +74,8 @@ impl Disk {
         SurfacePoint::exact(near, normal, self.uv_at(point).as_vec2(), across, up, reach)
     }
 
-    /// Point of the disk nearest to `point`, which was computed from lengths up to `reach`, before rounding.
+    /// Point of the disk nearest to `point`, before rounding. `reach` bounds the lengths from which `point`
+    /// was computed.
     pub fn exact_near(&self, point: DVec3, reach: f64) -> ExactPoint {
         let (p, _) = self.chart(point);
         ExactPoint { point: self.frame.point(p.extend(0.0)), normal: self.normal(), reach }
@@ -84,7 +85,7 @@ impl Disk {
         self.frame.origin.abs().max_element() + self.radius
     }
 
-    /// Nearest point in the disk's plane coordinates, and its texture coordinates.
+    /// Nearest point in the disk plane's coordinates, and its texture coordinates.
     fn chart(&self, point: DVec3) -> (DVec2, DVec2) {
         let p = self.frame.local(point).truncate().clamp_length_max(self.radius);
         (p, DVec2::splat(0.5) + p / (2.0 * self.radius))
@@ -95,7 +96,7 @@ impl Disk {
         self.chart(point).1
     }
 
-    /// Maps a point of the unit disk to the disk.
+    /// Maps a point from the unit disk to this disk.
     pub fn point(&self, of_unit_disk: DVec2) -> DVec3 {
         self.frame.point((of_unit_disk * self.radius).extend(0.0))
     }
@@ -131,7 +132,7 @@ impl Disk {
         DVec2::new((local.truncate().length() - self.radius).max(0.0), local.z).length()
     }
 
-    /// Geometry of the disk near a point.
+    /// Geometry of the disk as seen from a point.
     pub fn kernel_domain(&self, point: DVec3) -> KernelDomain {
         let (normal, from) = (self.normal(), point - self.centroid());
         let extent = Extent::Flat(self.radius - from.length());
@@ -139,12 +140,13 @@ impl Disk {
         KernelDomain::Surface { distance: self.distance(point), ground: Some(ground) }
     }
 
-    /// Whether a point is inside: always false, as a disk has no volume.
+    /// Whether a point is inside. Always false because a disk has no volume.
     pub fn contains(&self, _: DVec3) -> bool {
         false
     }
 
-    /// Projected area of the front: the area times the cosine between the normal and a unit direction.
+    /// Projected area of the front: the area times the cosine of the angle between the normal and a unit
+    /// direction.
     pub fn projected_area(&self, direction: DVec3) -> f64 {
         let [area] = self.areas();
         area * self.normal().dot(direction).max(0.0)
@@ -179,7 +181,7 @@ mod tests {
     fn images_are_upright() {
         let disk = Disk::new(DVec3::ZERO, DVec3::Z, 2.0);
         let ray = Ray::new(Vec3::new(1.0, -0.5, 5.0), Vec3::NEG_Z).to_f64();
-        let hit = disk.intersect(&ray).expect("the disk is ahead");
+        let hit = disk.intersect(&ray).expect("the ray should hit the disk");
         let surface = disk.surface(&ray, &hit);
         assert_eq!((surface.uv.as_vec2(), surface.normal), (Vec2::new(0.75, 0.375), Vec3::Z));
         assert_eq!((surface.dpdu, surface.dpdv), (Vec3::X * 4.0, Vec3::Y * 4.0));

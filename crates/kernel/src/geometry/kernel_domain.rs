@@ -1,28 +1,28 @@
-//! Local geometry of a shape near a point, over which a density kernel is integrated: flat polygons, or a
-//! surface at a distance.
+//! Local shape geometry near a point: the domain over which a density kernel is integrated. It consists of
+//! flat polygons, or of a surface at a distance.
 
 use arrayvec::ArrayVec;
 
 use crate::math::DVec3;
 
-/// Corners of a flat polygon, counterclockwise as seen from its front.
+/// Corners of a flat polygon, counterclockwise when seen from the front.
 pub type FlatPolygon = ArrayVec<DVec3, 4>;
 
-/// Geometry of a shape near a point.
+/// Shape geometry near a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum KernelDomain {
-    /// Number of flat polygons that make up the shape; see [`Shape::polygon`](super::Shape::polygon).
+    /// Number of flat polygons that form the shape. See [`Shape::polygon`](super::Shape::polygon).
     Polygons(u32),
-    /// A surface at a distance from the point.
+    /// A non-polygonal surface.
     Surface {
-        /// Distance of the point from the surface.
+        /// Distance from the point to the surface.
         distance: f64,
-        /// The surface below the point, for planes, disks and spheres.
+        /// The surface below the point. Only for planes, disks, and spheres.
         ground: Option<Ground>,
     },
 }
 
-/// The surface below a point.
+/// Surface geometry below a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ground {
     /// Unit normal at the surface point closest to the point.
@@ -42,14 +42,14 @@ pub enum Extent {
     Round(f64),
 }
 
-/// Parallelogram with a corner c and edges u and v.
+/// A parallelogram with a corner c and edges u and v.
 #[inline]
 pub(super) fn parallelogram((c, u, v): (DVec3, DVec3, DVec3)) -> FlatPolygon {
     FlatPolygon::from([c, c + u, c + u + v, c + v])
 }
 
 impl KernelDomain {
-    /// A curved surface of which only the distance is known.
+    /// A curved surface. Only its distance is known.
     pub(super) fn curved(distance: f64) -> Self {
         Self::Surface { distance, ground: None }
     }

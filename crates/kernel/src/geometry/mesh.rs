@@ -2,49 +2,52 @@
 
 use crate::math::{DVec3, Vec2, Vec3};
 
-/// An indexed triangle mesh in object space. Every index is in range and every position finite; no triangle
-/// has coincident corners.
+/// An indexed triangle mesh in object space. All indices are in range, all positions are finite, and no
+/// triangle has coincident corners.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TriangleMesh {
-    /// Origin of the positions in file coordinates: 0, or a point near the mesh if the mesh is far from 0.
+    /// Origin of the positions, in file coordinates. It is near the mesh if the mesh is far from 0, and 0
+    /// otherwise.
     pub origin: DVec3,
     /// Vertex positions relative to `origin`.
     pub positions: Vec<Vec3>,
     /// Unit vertex normals, or empty.
     pub normals: Vec<Vec3>,
-    /// Vertex texture coordinates, or empty; v = 0 is the bottom row of an image.
+    /// Vertex texture coordinates, or empty. v = 0 is the bottom row of an image.
     pub uvs: Vec<Vec2>,
-    /// How vertices share normals that are computed, or empty: then each has its own, in the group [`NormalGroup::BY_ANGLE`].
+    /// Which vertices share computed normals. If empty, every vertex has its own normal in the group
+    /// [`NormalGroup::BY_ANGLE`].
     pub normal_groups: Vec<NormalGroup>,
     /// Second set of vertex texture coordinates, or empty.
     pub second_uvs: Vec<Vec2>,
     /// Vertex colors in sRGB, or empty.
     pub colors: Vec<[u8; 3]>,
-    /// Vertex indices (a, b, c) of each triangle; the front faces along (b − a) × (c − a).
+    /// Vertex indices (a, b, c) of each triangle. The front faces along (b − a) × (c − a).
     pub triangles: Vec<[u32; 3]>,
-    /// Material index of each triangle in the file's list, or `u32::MAX` for none; or empty.
+    /// Each triangle's index in the file's material list, or `u32::MAX` for no material. May be empty.
     pub materials: Vec<u32>,
 }
 
-/// The computed normal of a vertex.
+/// The normal group of a vertex.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NormalGroup {
-    /// Vertices with the same number have one normal. Less than the number of vertices in the file's order.
+    /// Vertices with the same number share a normal. Must be less than the number of vertices in the file.
     pub normal: u32,
-    /// Smoothing group. Normals at one place are joined if they are of the same group and agree within 45 degrees.
+    /// Smoothing group. Normals at the same position are merged if they have the same group and differ by at
+    /// most 45 degrees.
     pub group: u32,
 }
 
 impl NormalGroup {
-    /// The group of vertices without one.
+    /// The group of vertices without a smoothing group.
     pub const BY_ANGLE: u32 = 0;
-    /// The group of flat faces, whose normals are joined with no others.
+    /// The group of flat faces. Their normals are never merged with others.
     pub const FLAT: u32 = u32::MAX;
 }
 
 impl TriangleMesh {
-    /// Maximum number of triangles: small enough for the indices in every kind of tree node, even if
-    /// triangles are split.
+    /// Maximum number of triangles. Triangle indices must fit in the nodes of every tree type, even after
+    /// triangle splitting.
     pub const MOST_TRIANGLES: u32 = 1 << 27;
 
     /// Corners of a triangle.
@@ -53,15 +56,15 @@ impl TriangleMesh {
         self.triangles[triangle as usize].map(|vertex| self.positions[vertex as usize])
     }
 
-    /// Bounding box in file coordinates, or `None` without vertices.
+    /// Bounding box in file coordinates, or `None` if there are no vertices.
     pub fn bounds(&self) -> Option<[DVec3; 2]> {
         let first = *self.positions.first()?;
         let grow = |[least, greatest]: [Vec3; 2], at: &Vec3| [least.min(*at), greatest.max(*at)];
         Some(self.positions.iter().fold([first; 2], grow).map(|at| at.as_dvec3() + self.origin))
     }
 
-    /// Extreme vertices, in file coordinates, along 26 directions: the axes and the diagonals of two or three
-    /// axes.
+    /// Extreme vertices along 26 directions (the axes and the diagonals of two or three axes), in file
+    /// coordinates.
     pub fn extremes(&self) -> Vec<DVec3> {
         let Some(first) = self.positions.first() else { return Vec::new() };
         let steps = [-1.0_f32, 0.0, 1.0];

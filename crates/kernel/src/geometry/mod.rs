@@ -1,7 +1,7 @@
 //! Rays, boxes, shapes and hits with error bounds.
 //!
-//! Mesh triangles are intersected in `f32` with a watertight test; all other shapes are flat, quadrics or
-//! tori, intersected in `f64` so that their rounding is invisible to `f32` rays.
+//! Mesh triangles are intersected in `f32` with a watertight test. All other shapes are flat, quadrics, or
+//! tori. They are intersected in `f64`, so their rounding errors are invisible to `f32` rays.
 
 pub mod aabb;
 pub mod cone;
@@ -44,7 +44,7 @@ use surface_packet::{Exact as _, SurfacePacket};
 use torus::Torus;
 use triangle::Triangle;
 
-/// A shape in world coordinates, computed only from its parameters.
+/// An analytic shape in world coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Shape {
     /// A sphere.
@@ -67,7 +67,7 @@ pub enum Shape {
     Torus(Torus),
 }
 
-/// Calls the same method on a shape of any type.
+/// Calls a method on the shape, whatever its type.
 macro_rules! for_shape {
     ($shape:expr, $it:ident => $asked:expr) => {
         match $shape {
@@ -91,7 +91,7 @@ impl Shape {
         for_shape!(self, it => it.intersect(ray))
     }
 
-    /// Finds the nearest hits of the rays in `met`, with a SIMD loop if the shape has one. All other rays
+    /// Finds the nearest hits of the rays in `met`, with SIMD if the shape supports it. All other rays must
     /// have negative ends, and `found` must not contain hits.
     #[inline(always)]
     pub fn intersect_packet(
@@ -122,7 +122,7 @@ impl Shape {
         }
     }
 
-    /// [`SurfacePacket::fill`]: returns whether the shape has a SIMD loop.
+    /// [`SurfacePacket::fill`]. Returns whether the shape supports SIMD.
     #[inline(always)]
     fn fill_surfaces(&self, row: &mut SurfacePacket, rays: &RayPacket, hits: &HitPacket, of: u32) -> bool {
         match self {
@@ -136,7 +136,7 @@ impl Shape {
         true
     }
 
-    /// [`SurfacePacket::fill_uv`]: returns whether the shape has a SIMD loop.
+    /// [`SurfacePacket::fill_uv`]. Returns whether the shape supports SIMD.
     #[inline(always)]
     fn fill_uvs(&self, row: &mut SurfacePacket, rays: &RayPacket, hits: &HitPacket, of: u32) -> bool {
         match self {
@@ -159,7 +159,7 @@ impl Shape {
         for_shape!(self, it => it.surface(ray, hit))
     }
 
-    /// Requested parts of the surface point at a hit.
+    /// The requested parts of the surface point at a hit.
     #[inline]
     pub fn requested_surface(&self, ray: &RayF64, hit: &ShapeHit, asked: SurfaceRequest) -> SurfacePoint {
         if asked.uv { self.surface(ray, hit) } else { for_shape!(self, it => it.exact(ray, hit)).bare() }
@@ -196,12 +196,12 @@ impl Shape {
         }
     }
 
-    /// Areas of the parts, indexed like `ShapeHit::primitive`; empty if the shape is infinite.
+    /// Areas of the parts, indexed like `ShapeHit::primitive`. Empty if the shape is infinite.
     pub fn areas(&self) -> Vec<f64> {
         for_shape!(self, it => it.areas().to_vec())
     }
 
-    /// Samples a point of a part uniformly over its area, for uniform `u` in [0, 1)².
+    /// Samples a point of a part uniformly over its area. `u` is uniform in [0, 1)².
     pub fn sample(&self, part: u32, u: Vec2) -> AreaPoint {
         for_shape!(self, it => it.sample(part, u))
     }
@@ -216,7 +216,7 @@ impl Shape {
         for_shape!(self, it => it.contains(point))
     }
 
-    /// Whether the shape encloses a volume; a plane encloses the half-space behind it.
+    /// Whether the shape encloses a volume. A plane encloses the half-space behind it.
     #[inline]
     pub fn is_closed(&self) -> bool {
         match self {
@@ -256,7 +256,7 @@ impl Shape {
         for_shape!(self, it => it.uv_at(point))
     }
 
-    /// Mean curvature at a point of a part; positive where the front is convex.
+    /// Mean curvature at a point of a part. Positive if the front is convex.
     #[inline]
     pub fn curvature(&self, part: u32, point: DVec3) -> f64 {
         match self {
@@ -268,7 +268,7 @@ impl Shape {
         }
     }
 
-    /// Geometry of the shape near a point.
+    /// Geometry of the shape as seen from a point.
     #[inline]
     pub fn kernel_domain(&self, point: DVec3) -> KernelDomain {
         match self {
@@ -302,8 +302,8 @@ impl Shape {
         }
     }
 
-    /// Whether a ray that crosses the surface at a point certainly travels farther than `distance` before it
-    /// can meet another side. False if unknown.
+    /// Whether a ray that crosses the surface at a point must travel farther than `distance` before it can
+    /// hit another side. False if unknown.
     #[inline]
     pub fn is_far_side_beyond(&self, point: DVec3, distance: f64) -> bool {
         match self {
@@ -319,8 +319,8 @@ impl Shape {
         }
     }
 
-    /// Projected area: the surface area facing a unit direction, weighted by the cosine. For a torus, the
-    /// mean over all directions.
+    /// Projected area: the surface area facing a unit direction, weighted by the cosine. For a torus, this is
+    /// the mean over all directions.
     pub fn projected_area(&self, direction: DVec3) -> f64 {
         for_shape!(self, it => it.projected_area(direction))
     }
@@ -349,7 +349,7 @@ mod tests {
 
     const SIDE: u32 = 400;
 
-    /// Integrates a function over the area.
+    /// Integrates a function over the surface area.
     fn integral(shape: &Shape, asked: impl Fn(&AreaPoint) -> f64) -> f64 {
         let grid = |i: u32| Vec2::new((i % SIDE) as f32 + 0.5, (i / SIDE) as f32 + 0.5) / SIDE as f32;
         let over_part = |(part, area): (u32, f64)| {
@@ -359,7 +359,7 @@ mod tests {
         (0..).zip(shape.areas()).map(over_part).sum()
     }
 
-    /// Hits of rays aimed at the shape from a sphere around it.
+    /// Hits of rays aimed at the shape from a surrounding sphere.
     fn hits(shape: &Shape) -> impl Iterator<Item = (RayF64, ShapeHit)> + '_ {
         (0..4000).filter_map(move |i| {
             let around = Shape::Sphere(Sphere { center: shape.centroid(), radius: 5.0 });
@@ -393,7 +393,7 @@ mod tests {
     }
 
     #[test]
-    fn surfaces_are_equal_without_coordinates() {
+    fn surfaces_match_with_and_without_coordinates() {
         for shape in shapes() {
             for (ray, hit) in hits(&shape).take(1000) {
                 let [bare, full] = [false, true]
@@ -416,7 +416,7 @@ mod tests {
             let area: f64 = shape.areas().iter().sum();
             for direction in directions {
                 if matches!(shape, Shape::Torus(_)) {
-                    // Mean over the directions of a closed surface (Cauchy).
+                    // For a closed surface, the mean over all directions (Cauchy).
                     assert_eq!(shape.projected_area(direction), area / 4.0);
                 } else {
                     let off = shape.projected_area(direction) - shown(direction);
@@ -461,10 +461,10 @@ mod tests {
     }
 
     #[test]
-    fn rays_enter_at_fronts_and_leave_at_backs() {
+    fn rays_hit_fronts_on_entry_and_backs_on_exit() {
         for shape in shapes() {
             let mut seen = 0;
-            // A tube or an uncapped cone also contains points, although it is not closed.
+            // A tube or an open cone also contains points, although its surface is not closed.
             let is_closed = match shape {
                 Shape::Sphere(_) | Shape::Box(_) | Shape::Torus(_) => true,
                 Shape::Cylinder(_) | Shape::Cone(_) => shape.areas().iter().all(|&area| area > 0.0),
@@ -494,7 +494,7 @@ mod tests {
                 let point = surface.point.as_dvec3();
                 let uv = shape.uv_at(point);
                 let (u, v) = (surface.dpdu.as_dvec3(), surface.dpdv.as_dvec3());
-                // Skip steps that cross a seam, a border or a pole.
+                // Skip steps that cross a seam, a border, or a pole.
                 let step = 1e-4;
                 let is_inside = |uv: DVec2| uv.min_element() > 0.02 && uv.max_element() < 0.98;
                 let is_round =
@@ -514,8 +514,8 @@ mod tests {
                 let moved = [shape.uv_at(point + u * step) - uv, shape.uv_at(point + v * step) - uv];
                 let off = (moved[0] - DVec2::X * step).length().max((moved[1] - DVec2::Y * step).length());
                 assert!(off < 0.02 * step, "{shape:?} at {uv}: {moved:?}");
-                // The documented u grows from x to z on spheres: images are mirrored on spheres, and on no
-                // other shape.
+                // On spheres, u increases from x to z as documented, so images are mirrored. They are not
+                // mirrored on other shapes.
                 let is_mirrored = u.cross(v).dot(surface.normal.as_dvec3()) < 0.0;
                 assert_eq!(is_mirrored, matches!(shape, Shape::Sphere(_)), "{shape:?}");
                 assert!((u.dot(surface.normal.as_dvec3())).abs() < 1e-5 * u.length(), "{shape:?}");
@@ -545,7 +545,7 @@ mod tests {
                 let Some(divergence) = along(a).zip(along(b)).map(|(a, b)| a + b) else { continue };
                 let curvature = shape.curvature(hit.primitive, point);
                 let allowed = 0.02 * curvature.abs() + 2e-3;
-                // The steps are too long near the tip of a cone.
+                // The finite-difference steps are too long near the tip of a cone.
                 let is_tip = matches!(shape, Shape::Cone(_)) && curvature > 6.0;
                 assert!(
                     is_tip || (0.5 * divergence - curvature).abs() < allowed,

@@ -1,12 +1,12 @@
-//! Packets of 16 rays in structure-of-arrays layout. Shapes test them in branch-free loops that compilers
-//! vectorize. Every lane gets the same bits as the scalar test of its ray.
+//! Packets of 16 rays in structure-of-arrays layout. Shapes test them in branchless loops that compilers
+//! vectorize. Every lane's result is bit-identical to the scalar test of its ray.
 
 use super::{Ray, RayF64, ShapeHit};
 pub use crate::math::lanes::{F32x16, PACKET_SIZE};
 use crate::math::lanes::{Simd, TRUE};
 use crate::math::{DVec3, Vec3};
 
-/// Bits of the lanes with a nonnegative end.
+/// Mask of the lanes with a nonnegative end.
 #[inline(always)]
 pub fn traced(ends: &F32x16, simd: impl Simd) -> u32 {
     let mut traced = [0; PACKET_SIZE];
@@ -45,13 +45,13 @@ impl RayPacket {
         Self { origin, direction, start: [Ray::NO_TRIANGLE; PACKET_SIZE] }
     }
 
-    /// Sets the triangles on which the rays start.
+    /// Sets the start triangles of the rays.
     #[inline(always)]
     pub fn leaving(self, start: [u32; PACKET_SIZE]) -> Self {
         Self { start, ..self }
     }
 
-    /// Returns the ray in a lane, without an end.
+    /// Returns the ray in a lane, with an infinite end.
     #[inline(always)]
     pub fn ray(&self, lane: usize) -> Ray {
         let of = |rows: &[F32x16; 3]| Vec3::new(rows[0][lane], rows[1][lane], rows[2][lane]);
@@ -63,7 +63,7 @@ impl RayPacket {
     pub fn new(rays: &[Ray]) -> (Self, F32x16) {
         let mut rows = Self::of([[0.0; PACKET_SIZE]; 3], [[0.0; PACKET_SIZE]; 3]);
         let mut ends = [-1.0; PACKET_SIZE];
-        // Compile full packets separately, as the known length makes their loop faster.
+        // Compile full packets separately because a constant length makes their loop faster.
         match <&[Ray; PACKET_SIZE]>::try_from(rays) {
             Ok(full) => rows.fill(&mut ends, full),
             Err(_) => rows.fill(&mut ends, rays),
@@ -83,7 +83,7 @@ impl RayPacket {
         }
     }
 
-    /// Returns the ray in a lane in double precision, without an end.
+    /// Returns the ray in a lane in double precision, with an infinite end.
     #[inline(always)]
     pub(super) fn line(&self, lane: usize) -> RayF64 {
         let [ox, oy, oz] = &self.origin;
@@ -96,7 +96,7 @@ impl RayPacket {
     }
 }
 
-/// Hits of a packet: [`ShapeHit`]s in structure-of-arrays layout.
+/// Hits of a packet ([`ShapeHit`]s in structure-of-arrays layout).
 #[derive(Clone, Debug)]
 pub struct HitPacket {
     /// [`ShapeHit::t`], or NaN for a ray without a hit.
@@ -110,7 +110,7 @@ pub struct HitPacket {
 }
 
 impl HitPacket {
-    /// Hits for a packet in which no ray hits.
+    /// A packet without hits.
     #[inline(always)]
     pub fn none() -> Self {
         Self {
@@ -121,7 +121,7 @@ impl HitPacket {
         }
     }
 
-    /// Bits of the rays with a hit.
+    /// Mask of the rays with a hit.
     #[inline(always)]
     pub fn any(&self, simd: impl Simd) -> u32 {
         let mut any = [0; PACKET_SIZE];
@@ -147,7 +147,7 @@ impl HitPacket {
     }
 }
 
-/// Branch-free [`RayF64::accept`], with NaN for `None`.
+/// Branchless version of [`RayF64::accept`] that returns NaN for `None`.
 #[inline(always)]
 pub(super) fn accept(t: f64, end: f32) -> f32 {
     let single = t as f32;
@@ -155,14 +155,14 @@ pub(super) fn accept(t: f64, end: f32) -> f32 {
     if is_on_it { single } else { f32::NAN }
 }
 
-/// Whether [`accept`] may accept the quotient `above / along`; if not, the division can be skipped. The
-/// factor exceeds the effect of rounding the quotient to `f32`, and the added terms compensate for numbers
-/// too small for it.
+/// Whether [`accept`] may accept the quotient `above / along`. If not, the division can be skipped. The
+/// factor is larger than the relative error of rounding the quotient to `f32`. The added constants handle
+/// numbers that are too small for the factor.
 #[inline(always)]
 pub(super) fn may_accept(above: f64, along: f64, end: f32) -> bool {
     let is_ahead = ((above > 0.0) & (along > 0.0)) | ((above < 0.0) & (along < 0.0));
     let reach = along.abs() * ((f64::from(end) + f64::from(f32::MIN_POSITIVE)) * (1.0 + 1e-6)) + 1e-290;
-    // `<=` would be wrong here: an infinite end times 0 is NaN.
+    // `<=` would be wrong here because an infinite end times 0 is NaN.
     let is_beyond = above.abs() > reach;
     is_ahead & !is_beyond
 }

@@ -1,4 +1,4 @@
-//! Quads: squares and other parallelograms in double precision.
+//! Quads (squares and other parallelograms) in double precision.
 
 use super::packet::{F32x16, HitPacket, PACKET_SIZE, RayPacket, accept, may_accept};
 use super::surface_packet::{Exact, ExactPoint, Mapped};
@@ -6,11 +6,11 @@ use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::lanes::{Simd, TRUE};
 use crate::math::{DVec2, DVec3, Vec2};
 
-/// Margin of the border relative to the edges, so that two quads that share an edge leave no gap; far below
-/// the resolution of `f32` rays.
+/// Margin of the border relative to the edges. It closes gaps between quads that share an edge, and is far
+/// below the resolution of `f32` rays.
 const BORDER: f64 = 1e-14;
 
-/// The points corner + s·u + t·v with s, t in [0, 1]; the front faces along u × v.
+/// The points corner + s·u + t·v with s and t in [0, 1]. The front faces along u × v.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Parallelogram {
     /// Corner at s = t = 0.
@@ -27,7 +27,7 @@ pub struct Parallelogram {
 }
 
 impl Parallelogram {
-    /// Creates a quad from a corner and two edges that are not parallel.
+    /// Creates a quad from a corner and two nonparallel edges.
     pub fn new(corner: DVec3, u: DVec3, v: DVec3) -> Self {
         let normal = u.cross(v);
         let area_squared = normal.length_squared();
@@ -41,7 +41,7 @@ impl Parallelogram {
         }
     }
 
-    /// Intersects the plane within the edges.
+    /// Intersects the plane and checks the edges.
     pub fn intersect(&self, ray: &RayF64) -> Option<ShapeHit> {
         let to_corner = self.corner - ray.origin;
         let t = self.normal.dot(to_corner) / self.normal.dot(ray.direction);
@@ -125,12 +125,13 @@ impl Parallelogram {
         self.corner + (self.u + self.v) * 0.5
     }
 
-    /// Whether a point is inside: always false, as a quad has no volume.
+    /// Whether a point is inside. Always false because a quad has no volume.
     pub fn contains(&self, _: DVec3) -> bool {
         false
     }
 
-    /// Projected area of the front: the area times the cosine between the normal and a unit direction.
+    /// Projected area of the front: the area times the cosine of the angle between the normal and a unit
+    /// direction.
     pub fn projected_area(&self, direction: DVec3) -> f64 {
         self.normal.dot(direction).max(0.0)
     }
@@ -153,7 +154,7 @@ impl Mapped for Parallelogram {
     }
 }
 
-/// Whether a coordinate is within the border, including its margin.
+/// Whether a coordinate is within the border and its margin.
 #[inline(always)]
 fn is_in_edge(x: f64) -> bool {
     (-BORDER..=1.0 + BORDER).contains(&x)
@@ -175,7 +176,7 @@ mod tests {
         let target = (quad.corner + quad.u * 0.25 + quad.v * 0.75).as_vec3();
         let origin = Vec3::new(4.0, 3.0, 20.0);
         let ray = Ray::new(origin, target - origin).to_f64();
-        let hit = quad.intersect(&ray).expect("the ray is aimed at the quad");
+        let hit = quad.intersect(&ray).expect("the ray should hit the quad");
         assert!((hit.t - 1.0).abs() < 1e-6);
         let surface = quad.surface(&ray, &hit);
         assert!((surface.uv.as_vec2() - Vec2::new(0.25, 0.75)).length() < 1e-6);

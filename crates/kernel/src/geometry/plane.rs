@@ -11,7 +11,7 @@ use crate::math::{DVec2, DVec3, Vec2};
 /// All points p with (p − point)·normal = 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plane {
-    /// A point of the plane, with texture coordinates (0, 0).
+    /// A point on the plane. Its texture coordinates are (0, 0).
     pub point: DVec3,
     /// Unit normal of the front.
     normal: DVec3,
@@ -27,7 +27,7 @@ impl Plane {
         Self { point, normal, u, v }
     }
 
-    /// Intersects the plane. `None` for rays in the plane or parallel to it.
+    /// Intersects the plane. `None` for rays within the plane or parallel to it.
     pub fn intersect(&self, ray: &RayF64) -> Option<ShapeHit> {
         let t = self.normal.dot(self.point - ray.origin) / self.normal.dot(ray.direction);
         (t < f64::from(f32::MAX)).then(|| ray.accept(t)).flatten().map(ShapeHit::at)
@@ -53,7 +53,7 @@ impl Plane {
         }
     }
 
-    /// Surface point at a hit, with one texture tile per unit of length.
+    /// Surface point at a hit. Each texture tile has an edge length of 1.
     pub fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
         let ExactPoint { point, normal, reach } = self.exact(ray, hit);
         let uv = self.uv(ray, hit);
@@ -77,12 +77,12 @@ impl Plane {
         DVec2::from_array(self.coordinates_of(point))
     }
 
-    /// Areas of the parts: empty, as the area is infinite.
+    /// Areas of the parts. Empty because the area is infinite.
     pub fn areas(&self) -> [f64; 0] {
         []
     }
 
-    /// Returns the plane's reference point: an infinite area cannot be sampled uniformly.
+    /// Returns the plane's reference point because an infinite area cannot be sampled uniformly.
     pub fn sample(&self, _: u32, _: Vec2) -> AreaPoint {
         AreaPoint { point: self.point, normal: self.normal }
     }
@@ -102,14 +102,14 @@ impl Plane {
         (point - self.point).dot(self.normal).abs()
     }
 
-    /// Geometry of the plane near a point.
+    /// Geometry of the plane as seen from a point.
     pub fn kernel_domain(&self, point: DVec3) -> KernelDomain {
         let distance = self.distance(point);
         let ground = Ground { normal: self.normal, height: distance, extent: Extent::Flat(f64::INFINITY) };
         KernelDomain::Surface { distance, ground: Some(ground) }
     }
 
-    /// Whether a point is inside: always false.
+    /// Whether a point is inside. Always false.
     pub fn contains(&self, _: DVec3) -> bool {
         false
     }
@@ -119,7 +119,7 @@ impl Plane {
         self.normal.dot(point - self.point) < 0.0
     }
 
-    /// Projected area of the front: infinite if it faces the direction.
+    /// Projected area of the front. Infinite if the front faces the direction.
     pub fn projected_area(&self, direction: DVec3) -> f64 {
         if self.normal.dot(direction) > 0.0 { f64::INFINITY } else { 0.0 }
     }
@@ -151,7 +151,7 @@ mod tests {
     fn rays_hit_once_or_never() {
         let floor = Plane::new(DVec3::new(0.0, 1.0, 0.0), DVec3::new(0.0, 5.0, 0.0));
         let down = Ray::new(Vec3::new(2.25, 3.0, -1.5), Vec3::NEG_Y).to_f64();
-        let hit = floor.intersect(&down).expect("the floor is below");
+        let hit = floor.intersect(&down).expect("the ray should hit the floor");
         assert_eq!(hit.t, 2.0);
         let surface = floor.surface(&down, &hit);
         assert_eq!((surface.point, surface.uv.as_vec2()), (Vec3::new(2.25, 1.0, -1.5), Vec2::new(2.25, 1.5)));

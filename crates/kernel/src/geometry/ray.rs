@@ -1,4 +1,4 @@
-//! Rays, segments and robust ray origins on surfaces.
+//! Rays, segments, and robust ray origins on surfaces.
 
 use crate::math::{DVec3, Vec3};
 
@@ -8,17 +8,17 @@ use crate::math::{DVec3, Vec3};
 pub struct Ray {
     /// Origin of the ray.
     pub origin: Vec3,
-    /// Direction of any nonzero length; t is measured in this length.
+    /// Direction of any nonzero length. t is measured in units of this length.
     pub direction: Vec3,
     /// Upper end of t; ∞ for a half-line.
     pub t_max: f32,
-    /// Index of the triangle on which the ray starts, among the triangles it is tested against, or
-    /// [`Ray::NO_TRIANGLE`]. The ray leaves a flat triangle and cannot meet it again, so tests skip it.
+    /// Index of the triangle on which the ray starts, or [`Ray::NO_TRIANGLE`]. A ray that leaves a flat
+    /// triangle cannot hit it again, so intersection tests skip this triangle.
     pub start: u32,
 }
 
 impl Ray {
-    /// Index that no triangle has.
+    /// An index that no triangle has.
     pub const NO_TRIANGLE: u32 = u32::MAX;
 
     /// Creates a half-line.
@@ -26,14 +26,14 @@ impl Ray {
         Self { origin, direction, t_max: f32::INFINITY, start: Self::NO_TRIANGLE }
     }
 
-    /// Sets the triangle on which the ray starts.
+    /// Sets the ray's start triangle.
     #[inline(always)]
     pub fn leaving(self, start: u32) -> Self {
         Self { start, ..self }
     }
 
-    /// Creates the segment that ends just before `to`, shortened by the rounding errors of both ends so that
-    /// it does not hit a surface through `to` (t = 1 is `to` itself).
+    /// Creates a segment that ends just before `to`. It is shortened by the rounding errors of both ends so
+    /// that it does not hit a surface through `to`. t = 1 is `to` itself.
     #[inline(always)]
     pub fn segment(from: Vec3, to: Vec3) -> Self {
         let direction = to - from;
@@ -43,7 +43,7 @@ impl Ray {
         Self { t_max: 1.0 - shortening.min(0.5), ..Self::new(from, direction) }
     }
 
-    /// Extends the segment by the error of its end point.
+    /// Extends the segment by the error of its endpoint.
     #[inline(always)]
     pub fn beyond(self, error: Vec3) -> Self {
         let relative = 4.0 * error.max_element() / self.direction.abs().max_element();
@@ -65,7 +65,7 @@ impl Ray {
     }
 }
 
-/// A [`Ray`] in double precision, for shapes that are intersected in it.
+/// A double-precision [`Ray`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RayF64 {
     /// Origin of the ray.
@@ -82,16 +82,16 @@ impl RayF64 {
         self.origin + self.direction * t
     }
 
-    /// `t` rounded to `f32`, if it is finite and within the ray's interval.
+    /// `t` rounded to `f32`, or `None` if the result is not finite or not within the ray's interval.
     pub fn accept(&self, t: f64) -> Option<f32> {
         let single = t as f32;
         (single > 0.0 && single < f32::INFINITY && f64::from(single) <= self.t_max).then_some(single)
     }
 }
 
-/// Offsets the origin of a ray that leaves `point` towards `direction`, so that it is certainly on that side
-/// of the surface if each component of `point` has an error of at most `error` (Pharr, Jakob, Humphreys,
-/// *Physically Based Rendering*, 4th ed., section 6.8.6).
+/// Offsets the origin of a ray that leaves `point` in a direction. If no component of `point` has an error
+/// larger than `error`, the new origin is guaranteed to be on the side of the surface that the ray leaves
+/// toward (Pharr, Jakob, Humphreys, *Physically Based Rendering*, 4th ed., section 6.8.6).
 #[inline(always)]
 pub fn offset_origin(point: Vec3, error: Vec3, normal: Vec3, direction: Vec3) -> Vec3 {
     let distance = normal.abs().dot(error);

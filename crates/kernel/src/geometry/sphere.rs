@@ -9,18 +9,18 @@ use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::lanes::{Simd, TRUE};
 use crate::math::{DVec2, DVec3, Vec2};
 
-/// All points at one distance from a center; the front is outside.
+/// All points at the same distance from a center. The front is outside.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sphere {
     /// Center.
     pub center: DVec3,
-    /// Radius, > 0.
+    /// Radius. Must be positive.
     pub radius: f64,
 }
 
 impl Sphere {
-    /// Finds the nearest root in the ray's interval. Computes the discriminant from the distance of the
-    /// center to the ray rather than as b² − ac, and the roots without cancellation (Haines, Günther,
+    /// Finds the nearest root in the ray's interval. Computes the discriminant from the distance between
+    /// center and ray instead of b² − ac, and the roots without cancellation (Haines, Günther,
     /// Akenine-Möller, *Precision Improvements for Ray/Sphere Intersection*, Ray Tracing Gems, chapter 7).
     pub fn intersect(&self, ray: &RayF64) -> Option<ShapeHit> {
         let to_origin = ray.origin - self.center;
@@ -114,7 +114,7 @@ impl Sphere {
         ((point - self.center).length() - self.radius).abs()
     }
 
-    /// Geometry of the sphere near a point.
+    /// Geometry of the sphere as seen from a point.
     pub fn kernel_domain(&self, point: DVec3) -> KernelDomain {
         let (distance, out) = (self.distance(point), (point - self.center).normalize_or_zero());
         let ground = Ground { normal: out, height: distance, extent: Extent::Round(self.radius) };
@@ -124,14 +124,14 @@ impl Sphere {
     /// Whether a point is inside.
     pub fn contains(&self, point: DVec3) -> bool {
         let (distance, radius) = ((point - self.center).length_squared(), self.radius * self.radius);
-        // The slow square root is only needed within the rounding error of the root and the squares.
+        // The slow square root is only needed if rounding errors could change the result.
         if (distance - radius).abs() > radius * (16.0 * f64::EPSILON) {
             return distance < radius;
         }
         (point - self.center).length() < self.radius
     }
 
-    /// Projected area, which is the area of a great circle for every direction.
+    /// Projected area. For every direction, it is the area of a great circle.
     pub fn projected_area(&self, _: DVec3) -> f64 {
         PI * self.radius * self.radius
     }
@@ -141,7 +141,7 @@ impl Exact for Sphere {
     #[inline(always)]
     fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> ExactPoint {
         let outwards = ray.at(f64::from(hit.t)) - self.center;
-        // At the center, any direction is valid.
+        // At the center, any direction is correct.
         let is_told = outwards.length_squared() > 0.0;
         let n = (if is_told { outwards } else { -ray.direction }).normalize();
         let reach = self.center.abs().max_element() + self.radius;
@@ -149,8 +149,8 @@ impl Exact for Sphere {
     }
 }
 
-/// Texture coordinates u = ½ + atan2(z, x)/2π and v = ½ + asin(y)/π of a unit normal, and the normal's
-/// derivatives. At the poles, the tangents are any perpendicular pair.
+/// Texture coordinates u = ½ + atan2(z, x)/2π and v = ½ + asin(y)/π of a unit normal, and the derivatives of
+/// the normal. At the poles, the tangents are an arbitrary perpendicular pair.
 fn sphere_parametrisation(n: DVec3) -> (Vec2, DVec3, DVec3) {
     let u = 0.5 + libm::atan2(n.z, n.x) / (2.0 * PI);
     let v = 0.5 + libm::asin(n.y.clamp(-1.0, 1.0)) / PI;
@@ -192,16 +192,16 @@ mod tests {
             let ray =
                 RayF64 { origin: DVec3::new(0.5, 0.0, -distance), direction: DVec3::Z, t_max: f64::INFINITY };
             let exact = distance - 0.75_f64.sqrt();
-            let hit = unit().intersect(&ray).expect("the ray meets the sphere");
+            let hit = unit().intersect(&ray).expect("the ray should hit the sphere");
             assert!((f64::from(hit.t) - exact).abs() / exact < 6e-8, "at {distance}");
         }
     }
 
     #[test]
-    fn giant_spheres_are_precise_floors() {
+    fn hits_on_giant_spheres_are_precise() {
         let floor = Sphere { center: DVec3::new(0.0, -1e5, 0.0), radius: 1e5 };
         let ray = Ray::new(Vec3::Y, Vec3::new(0.6, -0.8, 0.0)).to_f64();
-        let hit = floor.intersect(&ray).expect("the ray meets the floor");
+        let hit = floor.intersect(&ray).expect("the ray should hit the floor");
         // |o + t d − c| = R with |d| = 1 up to rounding: the smaller root of t² + 2bt + c.
         let (o, d) = (ray.origin - floor.center, ray.direction);
         let (a, b, c) = (d.length_squared(), o.dot(d), 2.0 * 1e5 + 1.0);

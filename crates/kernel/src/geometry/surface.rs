@@ -5,13 +5,13 @@ use crate::math::{DVec2, DVec3, Vec2, Vec3};
 /// Nearest intersection of a ray and a shape.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShapeHit {
-    /// Distance along the ray in units of its direction's length.
+    /// Ray parameter: distance in units of the direction's length.
     pub t: f32,
-    /// Index of the part: a mesh triangle or a box face; otherwise 0.
+    /// Index of the part, for example a mesh triangle or a box face. 0 for shapes with a single part.
     pub primitive: u32,
-    /// Barycentric weight of a triangle's second corner; otherwise 0.
+    /// Barycentric weight of a triangle's second corner; 0 for other shapes.
     pub u: f32,
-    /// Barycentric weight of a triangle's third corner; otherwise 0.
+    /// Barycentric weight of a triangle's third corner; 0 for other shapes.
     pub v: f32,
 }
 
@@ -25,31 +25,29 @@ impl ShapeHit {
 /// A surface point in world coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfacePoint {
-    /// The point, on the surface up to rounding.
+    /// The point. It is on the surface up to rounding.
     pub point: Vec3,
     /// Bound on each component's error, including the error of the shape's intersection test.
     pub error: Vec3,
     /// Unit geometric normal of the front.
     pub normal: Vec3,
-    /// Origin of shadow rays towards the camera's side if the way there is unobstructed: the point itself, or
-    /// a point above it if flat triangles approximate a convex surface.
+    /// Origin of shadow rays on the camera's side, valid if the path from the point to it is unobstructed. It
+    /// is the point itself, or a point above it if flat triangles approximate a convex surface.
     pub shadow_point: Vec3,
-    /// Unit interpolated normal on the same side.
+    /// Unit interpolated normal on the same side as `normal`.
     pub shading_normal: Vec3,
-    /// Texture coordinates. On a plane they are large far from its origin, and only their fractional part
-    /// matters.
+    /// Texture coordinates. They may be large on a plane, where only the fractional part matters.
     pub uv: DVec2,
     /// Derivative of the point with respect to u, up to scale; 0 without a parametrization.
     pub dpdu: Vec3,
     /// Derivative of the point with respect to v, up to scale.
     pub dpdv: Vec3,
-    /// Barycentric weights of a triangle's corners; for other shapes (1 − u − v, u, v) of the texture
+    /// Barycentric weights of a triangle's corners. For other shapes, (1 − u − v, u, v) from the texture
     /// coordinates.
     pub barycentric: Vec3,
 }
 
-/// Parts of a [`SurfacePoint`] requested in addition to the point and its normals. Parts that are not
-/// requested may be 0 or equal to the point.
+/// Optional parts of a [`SurfacePoint`]. Parts that are not requested may be 0 or equal to the point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SurfaceRequest {
     /// Texture coordinates and tangents.
@@ -73,9 +71,9 @@ pub struct AreaPoint {
 }
 
 impl SurfacePoint {
-    /// Creates a point that was computed in double precision on a surface without shading normals. The error
-    /// is from rounding to `f32`. If the point is small compared with the lengths from which it and the next
-    /// hit are computed, their error is included: `reach` is the largest of these lengths.
+    /// Creates a surface point from a double-precision point, without a separate shading normal. Its error is
+    /// due to rounding to `f32`, plus the double-precision error. `reach` is the largest length from which
+    /// the point and the next hit are computed.
     pub fn exact(point: DVec3, normal: DVec3, uv: Vec2, dpdu: DVec3, dpdv: DVec3, reach: f64) -> Self {
         let normal = normal.normalize().as_vec3();
         let point = point.as_vec3();
@@ -93,28 +91,28 @@ impl SurfacePoint {
     }
 }
 
-/// Bound on each component's error, for a point computed in double precision from lengths up to `reach` and
-/// for the next intersection test from there.
+/// Error bound for each component of a point computed in double precision, including the next intersection
+/// test from there. `reach` is the largest length involved.
 #[inline(always)]
 pub fn error(point: Vec3, reach: f64) -> Vec3 {
     rounding_error(point) + Vec3::splat(double_error(reach))
 }
 
-/// Bound on the error of the `f64` arithmetic for a hit, its surface point and the next intersection test
-/// from there, with lengths up to `reach`.
+/// Bound on the error of `f64` arithmetic for a hit, its surface point, and the next intersection test from
+/// there. `reach` is the largest length involved.
 #[inline(always)]
 pub fn double_error(reach: f64) -> f32 {
     (reach * (32.0 * f64::EPSILON)) as f32
 }
 
-/// Twice the error of rounding a point to `f32`.
+/// Twice the error due to rounding a point to `f32`.
 #[inline(always)]
 pub fn rounding_error(point: Vec3) -> Vec3 {
     point.abs() * f32::EPSILON + Vec3::splat(f32::MIN_POSITIVE)
 }
 
-/// Tangents (u, v) of a flat surface with unit normal `n`, with u × v = n. v points up on vertical surfaces,
-/// and towards −z on horizontal ones that face up.
+/// Tangents (u, v) of a flat surface with unit normal `n`, such that u × v = n. v points up on vertical
+/// surfaces, and toward −z on horizontal surfaces that face up.
 pub fn flat_axes(n: DVec3) -> (DVec3, DVec3) {
     let across = DVec3::Y.cross(n);
     let u = if across.length_squared() > 1e-12 { across } else { DVec3::X - n * n.x };

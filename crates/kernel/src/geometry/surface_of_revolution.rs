@@ -6,12 +6,12 @@ use super::surface::flat_axes;
 use super::{Aabb, RayF64, ShapeHit};
 use crate::math::{DMat3, DVec2, DVec3};
 
-/// An origin and orthonormal axes; the z axis is the axis of revolution.
+/// An origin and orthonormal axes. The z axis is the axis of revolution.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AxialFrame {
     /// Origin in world coordinates.
     pub origin: DVec3,
-    /// Axes as columns: the map from local to world coordinates.
+    /// Axes as columns of the local-to-world matrix.
     axes: DMat3,
 }
 
@@ -38,19 +38,19 @@ impl AxialFrame {
         self.axes * local
     }
 
-    /// Transforms a point from world coordinates.
+    /// Transforms a point to local coordinates.
     #[inline(always)]
     pub fn local(&self, point: DVec3) -> DVec3 {
         self.axes.transpose() * (point - self.origin)
     }
 
-    /// Height of a world point along the axis: its local z.
+    /// Height of a world-space point along the axis (its local z).
     #[inline(always)]
     pub fn height(&self, point: DVec3) -> f64 {
         self.axes.z_axis.dot(point - self.origin)
     }
 
-    /// Line of a ray, starting at its point nearest to the frame's origin.
+    /// Line through a ray, parametrized from its closest point to the frame's origin.
     #[inline(always)]
     pub fn line(&self, ray: &RayF64) -> LocalLine {
         let origin = self.local(ray.origin);
@@ -59,13 +59,13 @@ impl AxialFrame {
         LocalLine { foot: origin + direction * start, direction, start }
     }
 
-    /// Bounding box of a circle around the axis at a height.
+    /// Bounding box of a circle around the axis at a given height.
     pub fn circle_bounds(&self, height: f64, radius: f64) -> Aabb {
         self.ball_bounds(height, radius, 0.0)
     }
 
-    /// Bounding box of all balls of radius `ball` centered on a circle around the axis, expanded by the
-    /// rounding of the sums.
+    /// Bounding box of all balls of radius `ball` with centers on a circle around the axis. Expanded to
+    /// account for rounding.
     pub fn ball_bounds(&self, height: f64, radius: f64, ball: f64) -> Aabb {
         let center = self.point(DVec3::new(0.0, 0.0, height));
         let across = |i: usize| DVec2::new(self.axes.x_axis[i], self.axes.y_axis[i]).length() * radius + ball;
@@ -76,11 +76,11 @@ impl AxialFrame {
     }
 }
 
-/// A line in local coordinates. It starts at its point nearest to the origin, so that numbers are at most the
-/// size of the shape and rays from far away stay precise.
+/// A line in local coordinates, parametrized from its closest point to the origin. This limits numbers to the
+/// size of the shape and keeps rays from far away precise.
 #[derive(Clone, Copy, Debug)]
 pub struct LocalLine {
-    /// Point nearest to the origin.
+    /// Point on the line closest to the origin.
     pub foot: DVec3,
     /// Direction of the ray.
     pub direction: DVec3,
@@ -88,7 +88,7 @@ pub struct LocalLine {
     pub start: f64,
 }
 
-/// Interval of a line relative to its foot; each end has the index of the part that it is on.
+/// Interval of a line, relative to its foot. Each end has the index of the part that contains it.
 #[derive(Clone, Copy, Debug)]
 pub struct LineInterval {
     /// Start of the interval.
@@ -101,12 +101,12 @@ impl LineInterval {
     /// The whole line.
     pub const WHOLE: Self = Self { enter: (f64::NEG_INFINITY, 0), leave: (f64::INFINITY, 0) };
 
-    /// Interval between two points of the side, which is part 0.
+    /// Interval between two points of the side (part 0).
     pub fn of_side(enter: f64, leave: f64) -> Self {
         Self { enter: (enter, 0), leave: (leave, 0) }
     }
 
-    /// Interval between two heights, each with its part.
+    /// Interval between two heights, each with its part index.
     pub fn between(line: &LocalLine, low: (f64, u32), high: (f64, u32)) -> Option<Self> {
         let (z, dz) = (line.foot.z, line.direction.z);
         if dz == 0.0 {
@@ -122,8 +122,8 @@ impl LineInterval {
     }
 }
 
-/// First t of the ray at an interval end: on the closed solid, or only on the side if it is open. `starts_on`
-/// returns whether the ray starts on a part, up to rounding, which is not a hit.
+/// First t at which the ray hits the closed solid, or only its side if it is open. `starts_on` returns
+/// whether the ray starts on a part, within rounding error. The start is not a hit.
 pub fn first_hit(
     ray: &RayF64,
     line: &LocalLine,
@@ -132,7 +132,7 @@ pub fn first_hit(
     closed: bool,
     starts_on: impl Fn(u32) -> bool,
 ) -> Option<(f64, u32)> {
-    // Of the two intersections with a side, the one closer to the start is the start itself.
+    // Of the two intersections with the side, the one closer to the start is the start itself.
     let other_on_side = |along: f64| {
         let other = if along == side.enter.0 { side.leave.0 } else { side.enter.0 };
         (line.start + other).abs()
@@ -161,12 +161,12 @@ pub fn first_hit(
     [enter, leave].into_iter().find_map(accepted)
 }
 
-/// Squared distance from the ray's origin within which a hit may be the origin itself, relative to the
-/// distance from the shape's origin: at grazing angles, rounding moves the hit by the square root of the last
-/// digit.
+/// Squared distance between a hit and the ray's origin below which they may be identical, relative to the
+/// squared distance from the shape's origin. At grazing angles, rounding moves the hit by the square root of
+/// a unit in the last place.
 const NEAR_START: f64 = 1e-12;
 
-/// Whether a distance from a surface is within rounding error for numbers up to `size`.
+/// Whether a distance from a surface is within the rounding error of numbers up to `size`.
 pub fn is_rounding(distance: f64, size: f64) -> bool {
     distance.abs() <= 8.0 * f64::EPSILON * size
 }
@@ -176,9 +176,9 @@ pub fn sine_from_cosine(cosine: f64) -> f64 {
     (1.0 - cosine * cosine).max(0.0).sqrt()
 }
 
-/// Projected area of a surface whose normals are uniformly distributed on a ring around an axis: ∫max(0,
-/// a·cos φ + b) over the area, where a·cos φ + b is the cosine between normal and direction at the angle φ
-/// around the axis.
+/// Projected area of a surface whose normals are uniformly distributed on a ring around an axis: the integral
+/// of max(0, a·cos φ + b) over the area. Here a·cos φ + b is the cosine of the angle between the normal at
+/// azimuth φ and the direction.
 pub fn ring_projected_area(area: f64, a: f64, b: f64) -> f64 {
     if b >= a {
         area * b
@@ -189,12 +189,12 @@ pub fn ring_projected_area(area: f64, a: f64, b: f64) -> f64 {
     }
 }
 
-/// Converts a t and a part to a hit.
+/// Converts t and the part index to a hit.
 pub fn hit((t, primitive): (f64, u32)) -> ShapeHit {
     ShapeHit { primitive, ..ShapeHit::at(t as f32) }
 }
 
-/// Unrounded t of a hit, from a second intersection; the rounded t if that finds another hit.
+/// t of a hit before rounding, from a second intersection. If that finds another hit, the rounded t.
 pub fn exact_t(hit: &ShapeHit, again: Option<(f64, u32)>) -> f64 {
     match again {
         Some((t, part)) if t as f32 == hit.t && part == hit.primitive => t,
@@ -202,8 +202,8 @@ pub fn exact_t(hit: &ShapeHit, again: Option<(f64, u32)>) -> f64 {
     }
 }
 
-/// Unrounded point of a hit, where the ray crosses the part that was hit. Uses a second intersection unless
-/// exactly one of the crossings is at the hit's distance.
+/// Point of a hit before rounding. A second intersection is needed unless exactly one of the crossings is at
+/// the hit's distance.
 pub fn exact_point(
     (ray, line): (&RayF64, &LocalLine),
     hit: &ShapeHit,
@@ -222,17 +222,17 @@ pub fn exact_point(
     ray.at(fitting.unwrap_or_else(|| exact_t(hit, again())))
 }
 
-/// Unit vector towards a point in the plane; x for the origin.
+/// Unit vector toward a point in the plane. The x axis for the origin.
 pub fn radial(p: DVec2) -> DVec2 {
     p.try_normalize().unwrap_or(DVec2::X)
 }
 
-/// ½ + angle/2π of a direction in the plane, in [0, 1].
+/// ½ + angle/2π of a direction in the plane. In [0, 1].
 pub fn angle_to_u(p: DVec2) -> f64 {
     0.5 + libm::atan2(p.y, p.x) / std::f64::consts::TAU
 }
 
-/// Inverse of [`angle_to_u`]: the direction for a value of `u`.
+/// Inverse of [`angle_to_u`]: the direction at a value of `u`.
 pub fn direction_at_u(u: f64) -> DVec2 {
     let (sin, cos) = libm::sincos((u - 0.5) * std::f64::consts::TAU);
     DVec2::new(cos, sin)
@@ -250,7 +250,7 @@ pub(super) mod tests {
 
     #[test]
     fn rays_do_not_hit_their_start_on_curved_shapes() {
-        // All of these touch z = 0 from behind at the origin, or end there.
+        // All of these shapes touch the origin from z < 0.
         let cylinder = |a, b, radius| Cylinder::new(a, b, radius, true);
         let mut next = unit(7);
         for _ in 0..2000 {
@@ -269,7 +269,7 @@ pub(super) mod tests {
                 [bar.intersect(ray), ring.intersect(ray), standing.intersect(ray), cone.intersect(ray)]
             };
             assert_eq!(all(&ray(out)).map(|hit| hit.map(|hit| hit.t)), [None; 4], "{along} {out}");
-            // Rays through the shape hit the other side.
+            // Rays that pass through the shape hit the other side.
             for hit in all(&ray(-out)) {
                 let t = hit.map_or(0.0, |hit| hit.t);
                 assert!(t > 1e-7, "{along} {out}: {t}");
@@ -277,22 +277,22 @@ pub(super) mod tests {
         }
     }
 
-    /// A thin shape around the z axis from −1 to 1, for [`hits_from_afar`].
+    /// A thin shape around the z axis from −1 to 1, used by [`hits_from_afar`].
     pub trait Thin {
-        /// Creates the shape with this radius.
+        /// Creates a shape with this radius.
         fn thin(radius: f64, capped: bool) -> Self;
 
         /// Nearest hit.
         fn met(&self, ray: &RayF64) -> Option<(f64, u32)>;
 
-        /// Interval of the ray within the side.
+        /// Interval of the ray inside the side.
         fn within(&self, ray: &RayF64) -> Option<LineInterval>;
 
-        /// Unrounded point of a hit.
+        /// Hit point before rounding.
         fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> DVec3;
     }
 
-    /// Checks the points of distant hits, where both crossings of the side round to the same distance.
+    /// Checks hit points of distant rays, where both crossings of the side round to the same distance.
     pub fn hits_from_afar<T: Thin + std::fmt::Debug>() {
         let mut ambiguous = 0;
         for (i, capped) in (0..4000_u32).flat_map(|i| [(i, true), (i, false)]) {

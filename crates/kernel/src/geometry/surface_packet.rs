@@ -1,4 +1,4 @@
-//! Packets of surface points, computed with SIMD loops for the most common shapes.
+//! Packets of surface points, with SIMD loops for the most common shapes.
 
 use super::packet::{HitPacket, PACKET_SIZE, RayPacket, lanes};
 use super::surface::error;
@@ -15,9 +15,9 @@ pub struct SurfacePacket {
     pub error: Vec3x16,
     /// Unit geometric normals of the fronts.
     pub normal: Vec3x16,
-    /// Bits of the lanes whose shading normal and shadow point are set.
+    /// Mask of the lanes whose shading normal and shadow point are set.
     pub smooth: u32,
-    /// Unit interpolated normals on the same sides.
+    /// Unit interpolated normals, on the same sides as `normal`.
     pub shading_normal: Vec3x16,
     /// [`SurfacePoint::shadow_point`](super::SurfacePoint::shadow_point) of each lane.
     pub shadow_point: Vec3x16,
@@ -27,9 +27,9 @@ pub struct SurfacePacket {
 
 /// A surface point before rounding to `f32`.
 pub struct ExactPoint {
-    /// The point, in world coordinates.
+    /// The point in world coordinates.
     pub point: DVec3,
-    /// Normal of the front, not normalized.
+    /// Normal of the front, not necessarily of unit length.
     pub normal: DVec3,
     /// Largest length from which the point is computed.
     pub reach: f64,
@@ -42,13 +42,13 @@ impl ExactPoint {
     }
 }
 
-/// A shape whose surface points are computed in double precision.
+/// A shape that computes surface points in double precision.
 pub trait Exact {
     /// Surface point at a hit.
     fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> ExactPoint;
 }
 
-/// A shape with branch-free texture coordinates.
+/// A shape with a branchless texture coordinate computation.
 pub trait Mapped {
     /// Texture coordinates at a hit.
     fn uv(&self, ray: &RayF64, hit: &ShapeHit) -> DVec2;
@@ -72,14 +72,14 @@ impl SurfacePacket {
         uv: [[0.0; PACKET_SIZE]; 2],
     };
 
-    /// Computes the surface points of the hits selected by `of`, all on one shape. Returns false if the shape
-    /// has no SIMD loop.
+    /// Computes the surface points of the hits selected by `of`, which must be on the same shape. Returns
+    /// false if the shape has no SIMD loop.
     #[inline(always)]
     pub fn fill(&mut self, shape: &Shape, rays: &RayPacket, hits: &HitPacket, of: u32) -> bool {
         shape.fill_surfaces(self, rays, hits, of)
     }
 
-    /// Computes the texture coordinates of the hits selected by `of`, all on one shape.
+    /// Computes the texture coordinates of the hits selected by `of`, which must be on the same shape.
     #[inline(always)]
     pub fn fill_uv(&mut self, shape: &Shape, rays: &RayPacket, hits: &HitPacket, of: u32) {
         if shape.fill_uvs(self, rays, hits, of) {
@@ -123,7 +123,7 @@ impl SurfacePacket {
         self.take(of, &found);
     }
 
-    /// Copies the selected points, errors and normals from another packet.
+    /// Copies the selected points, errors, and normals from another packet.
     #[inline(always)]
     pub fn take(&mut self, of: u32, found: &Self) {
         let of = mask_from_bits(of);

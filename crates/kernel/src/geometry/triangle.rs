@@ -6,10 +6,11 @@ use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::{DVec2, DVec3, Vec2};
 use crate::sampling::warp;
 
-/// A triangle is huge if its corners are this many times farther away than a hit and the start of its ray.
+/// Minimum ratio between the distance of the corners and the distances of the ray's origin and hit for a
+/// triangle to be considered huge.
 const HUGE: f64 = 1024.0;
 
-/// A triangle; the front faces along (b − a) × (c − a).
+/// A triangle. The front faces along (b − a) × (c − a).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Triangle {
     /// First corner.
@@ -22,8 +23,8 @@ pub struct Triangle {
 
 impl Triangle {
     /// Intersects the triangle from either side. Tests the edges with triple products of the corners relative
-    /// to the ray's origin. Two triangles compute the same value, up to sign, for a shared edge, so there is
-    /// no gap between them.
+    /// to the ray's origin. Triangles with a shared edge compute the same value for it, up to sign, so there
+    /// is no gap between them.
     pub fn intersect(&self, ray: &RayF64) -> Option<ShapeHit> {
         let (a, b, c) = (self.a - ray.origin, self.b - ray.origin, self.c - ray.origin);
         let d = ray.direction;
@@ -57,7 +58,7 @@ impl Triangle {
         }
     }
 
-    /// Surface point at a hit. The texture coordinates at the corners are (0, 0), (1, 0) and (0, 1).
+    /// Surface point at a hit. The texture coordinates at the corners are (0, 0), (1, 0), and (0, 1).
     pub fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
         let ExactPoint { point, normal, reach } = self.exact(ray, hit);
         SurfacePoint::exact(point, normal, Vec2::new(hit.u, hit.v), self.b - self.a, self.c - self.a, reach)
@@ -94,18 +95,19 @@ impl Triangle {
         (self.a + self.b + self.c) / 3.0
     }
 
-    /// Whether a point is inside: always false, as a triangle has no volume.
+    /// Whether a point is inside. Always false because a triangle has no volume.
     pub fn contains(&self, _: DVec3) -> bool {
         false
     }
 
-    /// Projected area of the front: the area times the cosine between the normal and a unit direction.
+    /// Projected area of the front: the area times the cosine of the angle between the normal and a unit
+    /// direction.
     pub fn projected_area(&self, direction: DVec3) -> f64 {
         (0.5 * self.normal().dot(direction)).max(0.0)
     }
 }
 
-/// Barycentric weights of the second and third corners at a point of a triangle.
+/// Barycentric weights of the second and third corners at a point on the triangle.
 pub fn weights([a, b, c]: [DVec3; 3], point: DVec3) -> DVec2 {
     let (ab, ac, ap) = (b - a, c - a, point - a);
     let normal = ab.cross(ac);
@@ -120,7 +122,8 @@ impl Exact for Triangle {
         let (ab, ac) = (self.b - self.a, self.c - self.a);
         let reach = (self.a.abs() + ab.abs() + ac.abs()).max_element();
         let (normal, by_weights) = (ab.cross(ac), self.a + ab * u + ac * v);
-        // On huge triangles, a point computed from the ray is more accurate than one from `f32` barycentric coordinates.
+        // On huge triangles, points computed from the ray are more accurate than those from `f32` barycentric
+        // coordinates.
         let by_ray = ray.at((self.a - ray.origin).dot(normal) / ray.direction.dot(normal));
         let is_huge = ray.origin.abs().max(by_ray.abs()).max_element() * HUGE < reach;
         ExactPoint { point: if is_huge { by_ray } else { by_weights }, normal, reach }

@@ -1,30 +1,30 @@
 //! Brute-force intersection of ray packets with a few triangles, such as the walls of a room, for any ray
 //! directions.
 //!
-//! Testing every triangle watertightly against every ray would be exact but slow. Instead, each ray first
-//! finds its nearest candidate: the planes of all facets are intersected in single precision, and a facet may
-//! be hit if it is within a bound on all errors. Two triangles that form a flat quadrilateral are one facet.
-//! Each ray then runs the watertight test on its own candidate. If the hit is not certainly nearer than the
-//! ray's other candidates, the ray stays undecided, which is rare and happens near edges. Every ray therefore
-//! gets the same bits as if traced alone.
+//! Running the watertight test on every triangle and ray would be exact but slow. Instead, the planes of all
+//! facets are intersected in single precision to find each ray's nearest candidate, with conservative bounds
+//! on all errors. Two triangles that form a flat quadrilateral are a single facet. The watertight test is
+//! then run on each ray's nearest candidate. If the hit is not guaranteed to be nearer than the other
+//! candidates, the ray is undecided, which is rare and happens near edges. Results are therefore
+//! bit-identical to tracing the ray alone.
 //!
-//! Notation for the bounds: the unit roundoff ε; a ray's direction d; a plane's unit normal n; the largest
-//! coordinate M of origins and corners; the largest distance R along an axis from the ray's origin to any
-//! corner; and for the smaller triangle of a facet its double area 2A and its longest edge D.
+//! Notation for the bounds: ε is the unit roundoff, d a ray's direction, n a plane's unit normal, M the
+//! largest coordinate of origins and corners, and R the largest distance along an axis from the ray's origin
+//! to any corner. 2A is twice the area of a facet's smaller triangle, and D is that triangle's longest edge.
 //!
 //! - The intersection with a plane has an error of less than 128 ε M/|n·d| in t: rounding n and n·p
 //!   contributes 20, n·d over a distance of 3.5 M contributes 28, and the other triangle of a quadrilateral
 //!   4.
-//! - The watertight test of a triangle that the ray passes within a quarter of its size has sheared corners
-//!   within 3 D. Its error in t is therefore less than ε (972 D + 180 R) R D/(2A |n·d|) (*Physically Based
-//!   Rendering*, 4th ed., section 6.8.7), where the determinant is 2A |n·d| over the direction's longest
-//!   component. Another D times the error of the barycentric coordinates covers hits on needles, which may be
-//!   moved to the nearest edge.
+//! - If the ray passes a triangle within a quarter of its size, the sheared corners in the watertight test
+//!   are within 3 D. Its error in t is therefore less than ε (972 D + 180 R) R D/(2A |n·d|) (*Physically
+//!   Based Rendering*, 4th ed., section 6.8.7), where the determinant is 2A |n·d| over the direction's
+//!   longest component. Another D times the error of the barycentric coordinates covers hits on needles,
+//!   which may be moved to the nearest edge.
 //! - Barycentric coordinates of a triangle at a distance of X have an error of less than 204 ε R X |d|/(2A
-//!   |n·d|). A ray that passes with a coordinate of −m has X < 2 D (1 + 2 m), so it certainly misses if m is
-//!   above 544 ε R D |d|/(2A |n·d|) and that is small.
-//! - A ray that stays farther from a plane than the first two bounds, times |n·d|, certainly misses, however
-//!   grazing it is.
+//!   |n·d|). A ray that passes with a coordinate of −m has X < 2 D (1 + 2 m). It is therefore certain to miss
+//!   if m is above 544 ε R D |d|/(2A |n·d|), provided that this bound is small.
+//! - A ray is certain to miss, even at grazing angles, if it stays farther from the plane than the sum of the
+//!   first two bounds times |n·d|.
 
 use super::packet::{F32x16, HitPacket, PACKET_SIZE, RayPacket};
 use super::watertight_packet::ShearedPacket;
@@ -38,19 +38,19 @@ pub const MOST: usize = 64;
 /// Error of the intersection with a plane, relative to the largest coordinate.
 const PLANE: f32 = 128.0 * UNIT_ROUNDOFF;
 
-/// ErrorTerms of t in the watertight test, relative to R² D/(2A) and to R D²/(2A).
+/// Error terms of t in the watertight test, relative to R² D/(2A) and R D²/(2A).
 const ALONG: [f32; 2] = [256.0 * UNIT_ROUNDOFF, 2048.0 * UNIT_ROUNDOFF];
 
 /// Error of barycentric coordinates in the watertight test, relative to R D/(2A).
 const ACROSS: f32 = 1024.0 * UNIT_ROUNDOFF;
 
-/// Largest coordinate error for which a miss can still be decided with certainty.
+/// Maximum coordinate error at which a miss can be decided with certainty.
 const BLUNT: f32 = 0.125;
 
 /// Maximum of D/(2A), relative to the size of all triangles.
 const MOST_SLENDER: f64 = 1e3;
 
-/// Index that no triangle has.
+/// An index that no triangle has.
 const NONE: u32 = u32::MAX;
 
 /// A triangle, or two triangles that form a flat quadrilateral.
@@ -58,27 +58,28 @@ const NONE: u32 = u32::MAX;
 struct Facet {
     /// Unit normal.
     normal: Vec3,
-    /// Dot product of the normal and a point of the plane.
+    /// Dot product of the normal and a point on the plane.
     offset: f32,
-    /// Vectors whose dot products with a point, plus `start`, are its coordinates, centered between the
-    /// smallest and the largest. They grow by 1 along the edges from the first corner of the first triangle.
+    /// Vectors whose dot products with a point, plus `start`, are the point's coordinates. Coordinates
+    /// increase by 1 along the edges from the first corner of the first triangle, and are centered between
+    /// their minimum and maximum.
     across: [Vec3; 2],
     start: [f32; 2],
     /// Largest coordinates.
     half: [f32; 2],
-    /// Sum of the coordinates on the edge opposite the first corner, and the most by which it may be
-    /// exceeded.
+    /// Sum of the coordinates on the edge opposite the first corner, and the maximum by which the sum may
+    /// exceed this value.
     diagonal: f32,
     beyond: f32,
-    /// Distance of the sum from `diagonal`, in margins, beyond which the hit triangle is certain; negative if
-    /// there is only one.
+    /// Distance of the sum from `diagonal`, in margins, above which it is certain which triangle is hit.
+    /// Negative if there is only one triangle.
     split: f32,
-    /// Index of the triangle where the sum of the coordinates is below 1, and of the one beyond; equal if
-    /// there is only one.
+    /// Index of the triangle where the sum of the coordinates is below `diagonal`, and index of the other
+    /// triangle. Equal if there is only one.
     numbers: [u32; 2],
-    /// D/(2A), which is at least the length of either vector of `across`.
+    /// D/(2A), which is at least the length of both vectors in `across`.
     slender: f32,
-    /// [`ALONG`] times D/(2A), and times D.
+    /// [`ALONG`] times D/(2A), and [`ALONG`] times D.
     along: [f32; 2],
 }
 
@@ -94,13 +95,13 @@ pub struct TriangleList {
 
 /// Nearest candidates of the rays of a packet.
 struct Candidates {
-    /// Lower bound on t of the nearest candidate, or ∞.
+    /// Lower bound on t of the nearest candidate; ∞ if there is none.
     near: F32x16,
     /// Triangle index of the nearest candidate.
     number: [u32; PACKET_SIZE],
-    /// Lower bound on t of the other candidates.
+    /// Lower bound on t of all other candidates.
     next: F32x16,
-    /// Rays whose candidates are unknown.
+    /// Mask of the rays whose candidates are uncertain.
     doubtful: Mask,
 }
 
@@ -114,13 +115,12 @@ struct ErrorTerms {
     across: F32x16,
     /// Bound on the length of the direction.
     length: F32x16,
-    /// Bound on t of a hit on any triangle.
+    /// Upper bound on t of a hit on any triangle.
     end: F32x16,
 }
 
 impl TriangleList {
-    /// Creates the facets of some triangles. `None` if there are too many, or one is too slender for the
-    /// bounds.
+    /// Creates facets from triangles. `None` if there are too many, or if one is too slender for the bounds.
     pub fn new(corners: Vec<[Vec3; 3]>) -> Option<Self> {
         let points = || corners.iter().flatten().copied();
         let (low, high) = (points().reduce(Vec3::min)?, points().reduce(Vec3::max)?);
@@ -156,8 +156,8 @@ impl TriangleList {
         Some(Self { facets, corners, low, high })
     }
 
-    /// Updates `found` with the nearest hits of the rays in `met`; all other rays have negative ends. Returns
-    /// the bits of the undecided rays, whose hits are unchanged.
+    /// Updates `found` with the nearest hits of the rays in `met`. All other rays must have negative ends.
+    /// Returns the mask of undecided rays, whose hits are left unchanged.
     #[inline(always)]
     pub fn closest(
         &self,
@@ -175,8 +175,8 @@ impl TriangleList {
         undecided
     }
 
-    /// Returns the bits of the rays in `met` that hit any triangle except their own in `except`, and the bits
-    /// of the undecided rays. All other rays have negative ends.
+    /// Returns the mask of the rays in `met` that hit any triangle except their own in `except`, and the mask
+    /// of undecided rays. All other rays must have negative ends.
     #[inline(always)]
     pub fn any(
         &self,
@@ -197,8 +197,7 @@ impl TriangleList {
         [simd.movemask(&hit) & met, undecided]
     }
 
-    /// Finds the nearest candidates, excluding the triangle on which a ray starts and its triangle in
-    /// `except`.
+    /// Finds the nearest candidates. Excludes each ray's start triangle and its triangle in `except`.
     #[inline(always)]
     fn candidates(
         &self,
@@ -219,7 +218,8 @@ impl TriangleList {
         for facet in &self.facets {
             let Facet { normal, offset, across: [first, second], start, half, diagonal, beyond, .. } = *facet;
             let (slender, along, split) = (facet.slender, facet.along, facet.split);
-            // Select with bit operations, as compilers would select between two addresses lane by lane.
+            // Select with bit operations. Otherwise, compilers would select between two addresses lane by
+            // lane.
             let [one, other] = facet.numbers;
             let between = one ^ other;
             for i in 0..PACKET_SIZE {
@@ -253,7 +253,7 @@ impl TriangleList {
                     simd.mul_add_relaxed(far[i], simd.mul_add_relaxed(far[i], along[0], along[1]), plane[i]);
                 let error = distance * size;
                 let margin = slender * simd.mul_add_relaxed(size * length[i], across[i], plane[i]);
-                // A facet that the ray may hit is a candidate, even if a bound is NaN.
+                // A facet that the ray may hit is a candidate. A NaN bound must not exclude it.
                 let least = t - error;
                 let over = u + v - diagonal;
                 let is_outside = (u.abs() > half[0] + margin)
@@ -263,7 +263,7 @@ impl TriangleList {
                     | (least > ends[i]);
                 let is_far = above.abs() > simd.mul_add_relaxed(falls.abs(), end[i], distance);
                 let is_sharp = margin < BLUNT;
-                // Decide which of the two triangles is hit.
+                // Decide which of the facet's triangles is hit.
                 let number = other ^ (between & if over < 0.0 { TRUE } else { 0 });
                 let is_sure = is_sharp & (over.abs() > split * margin);
                 let is_left_out = is_sure & ((rays.start[i] == number) | (except[i] == number));
@@ -305,7 +305,7 @@ impl TriangleList {
             let is_any = candidates.near[i] < f32::INFINITY;
             let is_hit = (hits.hit[i] != 0) & is_any & (candidates.doubtful[i] == 0);
             let is_nearest = is_hit & (hits.t[i] < candidates.next[i]);
-            // Other candidates matter if they may be hit before the end.
+            // Other candidates matter only if they may be hit before the ray's end.
             let has_others = candidates.next[i] <= ends[i];
             let is_open = is_any & !is_nearest & (has_others | (hits.doubtful[i] != 0));
             hit[i] = if is_nearest { TRUE } else { 0 };
@@ -327,14 +327,14 @@ impl TriangleList {
                 far = greater(far, greater((high - at).abs(), (at - low).abs()));
                 length += rays.direction[axis][i].abs();
             }
-            // There is no bound for a NaN origin; comparisons with NaN would leave `most` unchanged.
+            // Set the bound to NaN for NaN origins. Comparisons with NaN would leave `most` unchanged.
             let sum = rays.origin[0][i] + rays.origin[1][i] + rays.origin[2][i];
             let most = if sum.is_nan() { f32::NAN } else { most };
             errors.plane[i] = PLANE * most;
             errors.far[i] = far;
             errors.across[i] = PLANE * most + ACROSS * far;
             errors.length[i] = length;
-            // The distance is at most 2√3 R, and `length` is at most √3 times the length of the direction.
+            // Distances are at most 2√3 R, and `length` is at most √3 times the direction's length.
             errors.end[i] = 6.0 * far / length;
         }
         errors
@@ -346,11 +346,11 @@ impl TriangleList {
     }
 }
 
-/// Results of the watertight tests of candidates.
+/// Results of running the watertight test on the candidates.
 struct Tested {
-    /// Rays that certainly hit their candidate before all others.
+    /// Rays that are certain to hit their candidate before all others.
     hit: Mask,
-    /// Bits of the undecided rays.
+    /// Mask of the undecided rays.
     undecided: u32,
     hits: super::watertight_packet::Hits,
 }
@@ -390,8 +390,8 @@ impl Facet {
     }
 }
 
-/// Two triangles that form a flat quadrilateral close to a parallelogram. Both are returned with the corners
-/// of the shared edge in the middle and the outer corners at the ends.
+/// Reorders the corners of two triangles that form a flat quadrilateral close to a parallelogram: first the
+/// first triangle's outer corner, last the second triangle's outer corner. `None` for other triangles.
 fn paired(one: &[Vec3; 3], other: &[Vec3; 3], reach: f32) -> Option<[[Vec3; 3]; 2]> {
     let apart = |of: &[Vec3; 3], from: &[Vec3; 3]| {
         let mut own = (0..3).filter(|&i| !from.contains(&of[i]));
@@ -417,7 +417,7 @@ const FLAT: f32 = 4.0 * UNIT_ROUNDOFF;
 /// Maximum deviation of the fourth corner from a parallelogram, relative to the edges.
 const ASKEW: f64 = 0.25;
 
-/// D/(2A) of a triangle, and D²/(2A).
+/// D/(2A) and D²/(2A) of a triangle.
 fn slender([a, b, c]: &[Vec3; 3]) -> [f64; 2] {
     let [a, b, c]: [DVec3; 3] = [a, b, c].map(|corner| corner.as_dvec3());
     let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
@@ -425,7 +425,7 @@ fn slender([a, b, c]: &[Vec3; 3]) -> [f64; 2] {
     [slender, slender * longest]
 }
 
-/// The larger number; `a` if `b` is NaN.
+/// The larger number, or `a` if `b` is NaN.
 #[inline(always)]
 fn greater(a: f32, b: f32) -> f32 {
     if b > a { b } else { a }

@@ -5,10 +5,11 @@ use super::ShapeHit;
 use crate::math::float::gamma;
 use crate::math::{DVec3, Vec3};
 
-/// Relative error of t above which the test treats a triangle as a needle.
+/// Relative error of t above which a triangle is treated as a needle.
 pub const ILL_CONDITIONED: f32 = 1.0 / 32.0;
 
-/// A ray prepared for many triangles: its longest axis becomes z, and a shear aligns the ray with it.
+/// A ray preprocessed for many triangles. Its longest axis becomes z, and a shear aligns the ray with this
+/// axis.
 #[derive(Clone, Copy, Debug)]
 pub struct ShearedRay {
     origin: Vec3,
@@ -18,7 +19,7 @@ pub struct ShearedRay {
 }
 
 impl ShearedRay {
-    /// Prepares a ray.
+    /// Preprocesses a ray.
     pub fn new(origin: Vec3, direction: Vec3) -> Self {
         let size = direction.abs();
         let z = if size.x > size.y {
@@ -41,12 +42,12 @@ impl ShearedRay {
         }
     }
 
-    /// World axes that become the ray's x, y and z.
+    /// World axes that become the ray's x, y, and z.
     pub fn axes(&self) -> [usize; 3] {
         self.axes
     }
 
-    /// Finds the hit at a t in (0, `t_max`], from either side. Recomputes t in double precision if it is
+    /// Finds the hit with t in (0, `t_max`], from either side. Recomputes t in double precision if it is
     /// within its error bound of 0 (*Physically Based Rendering*, 4th ed., section 6.8.7).
     #[inline(always)]
     pub fn intersect(&self, corners: &[Vec3; 3], t_max: f32) -> Option<ShapeHit> {
@@ -91,9 +92,9 @@ impl ShearedRay {
         (t > 0.0 && t <= t_max).then_some(ShapeHit { t, primitive: 0, u: wb * inverse, v: wc * inverse })
     }
 
-    /// Finds the hit on a triangle so thin at its distance that its position along the ray is uncertain in
-    /// single precision. The ray is already known to go through the triangle, so that neighbors leave no gap.
-    /// If the ray misses it in double precision, uses the nearest point of an edge.
+    /// Finds the hit on a needle: a triangle so thin, for its distance, that t is uncertain in single
+    /// precision. The ray is already known to hit the triangle, which prevents gaps between neighbors. If the
+    /// ray misses the triangle in double precision, the nearest point on an edge is used.
     #[cold]
     fn intersect_needle(&self, corners: &[Vec3; 3], t_max: f32) -> Option<ShapeHit> {
         let ([a, b, c], [wa, wb, wc]) = self.in_f64(corners);
@@ -112,8 +113,8 @@ impl ShearedRay {
         (t > 0.0 && t <= t_max).then_some(ShapeHit { t, primitive: 0, u: u as f32, v: v as f32 })
     }
 
-    /// Finds the hit on a triangle whose plane is so close to the origin that its side is uncertain in single
-    /// precision. The ray is already known to go through the triangle.
+    /// Finds the hit on a triangle whose plane is so close to the origin that the sign of t is uncertain in
+    /// single precision. The ray's line is already known to pass through the triangle.
     #[cold]
     fn intersect_at_start(&self, corners: &[Vec3; 3], t_max: f32) -> Option<ShapeHit> {
         let ([a, b, c], [wa, wb, wc]) = self.in_f64(corners);
@@ -123,7 +124,8 @@ impl ShearedRay {
         (t > 0.0 && t <= t_max).then_some(ShapeHit { t, primitive: 0, u, v })
     }
 
-    /// Edge functions and sheared corners in double precision. The corners' z are distances along the ray.
+    /// Edge functions and sheared corners in double precision. The z coordinate of a corner is its t along
+    /// the ray.
     fn in_f64(&self, corners: &[Vec3; 3]) -> ([DVec3; 3], [f64; 3]) {
         let [x, y, z] = self.axes;
         let direction = self.direction.as_dvec3();
@@ -136,8 +138,8 @@ impl ShearedRay {
         ([a, b, c], [cross(c, b), cross(a, c), cross(b, a)])
     }
 
-    /// Bound on the absolute error of t, and the largest t of a corner. The sheared x and y have errors in
-    /// lengths, and z in units of t, which are equal only for unit directions.
+    /// Bound on the absolute error of t, and the largest t of a corner. The errors of sheared x and y are
+    /// lengths, while the error of z is in units of t. The units differ unless the direction has unit length.
     fn distance_error(&self, corners: &[(f32, f32, f32); 3], inverse_determinant: f32) -> (f32, f32) {
         let greatest = |of: fn(&(f32, f32, f32)) -> f32| corners.iter().map(of).fold(0.0, f32::max);
         let x = greatest(|corner| corner.0.abs());
@@ -153,18 +155,19 @@ impl ShearedRay {
     }
 }
 
-/// The smaller number; `b` if either is NaN, as with vector instructions.
+/// The smaller number, or `b` if either is NaN, as with vector instructions.
 fn least(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
-/// The larger number; `b` if either is NaN.
+/// The larger number, or `b` if either is NaN.
 fn greatest(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
-/// Point of the segment from p to q that is nearest to the ray, where z are distances along the ray: its
-/// squared distance from the ray, its fraction of the segment, and its distance along the ray.
+/// Finds the point on the segment from p to q that is nearest to the ray. z coordinates are distances along
+/// the ray. Returns the squared distance from the ray, the fraction of the segment, and the distance along
+/// the ray.
 fn nearest_of_edge(p: DVec3, q: DVec3) -> (f64, f64, f64) {
     let (start, way) = (p.truncate(), (q - p).truncate());
     let part = (-start.dot(way) / way.length_squared()).clamp(0.0, 1.0);
@@ -181,7 +184,7 @@ mod tests {
     fn axis_aligned_and_oblique_rays_hit_the_plane() {
         let triangle = [Vec3::new(0.0, 0.0, 2.0), Vec3::new(1.0, 0.0, 2.0), Vec3::new(0.0, 1.0, 2.0)];
         let hit = ShearedRay::new(Vec3::new(0.25, 0.5, 0.0), Vec3::Z).intersect(&triangle, f32::INFINITY);
-        let hit = hit.expect("straight through the inside");
+        let hit = hit.expect("the ray should pass through the interior");
         assert_eq!((hit.t, hit.u, hit.v), (2.0, 0.25, 0.5));
         let back = ShearedRay::new(Vec3::new(0.25, 0.5, 4.0), Vec3::NEG_Z).intersect(&triangle, 10.0);
         assert_eq!(back.map(|hit| (hit.t, hit.u, hit.v)), Some((2.0, 0.25, 0.5)));
@@ -195,8 +198,8 @@ mod tests {
         for (width, distance) in
             [(3e-4_f32, 200.0_f32), (1e-4, 200.0), (1e-4, 50.0), (1e-6, 3.0), (2e-7, 1e3)]
         {
-            // A strip of this width across the middle of a tilted square, and the other two parts of the
-            // square.
+            // A tilted square, split into a narrow strip of this width across the middle and the remaining
+            // two parts.
             let point = |x: f32, y: f32| Vec3::new(x, y, 0.3 * x - 0.2 * y);
             let [low, high] = [-width, width].map(|w| 0.5 * w);
             let quad = |a: f32, b: f32| {

@@ -1,5 +1,5 @@
-//! Watertight intersection of mesh triangles with packets of rays in any directions. Performs the operations
-//! of [`ShearedRay::intersect`] in the same order, so the bits are equal.
+//! Watertight intersection of mesh triangles with packets of rays in arbitrary directions. Performs the
+//! operations of [`ShearedRay::intersect`] in the same order, so the results are bit-identical.
 
 use super::packet::{F32x16, HitPacket, PACKET_SIZE, RayPacket, lanes};
 use super::watertight::{ILL_CONDITIONED, ShearedRay};
@@ -7,29 +7,29 @@ use crate::math::Vec3;
 use crate::math::float::gamma;
 use crate::math::lanes::{Mask, Simd, TRUE, Vec3x16, select, select_u32};
 
-/// The rays of a packet, prepared for some triangles.
+/// The rays of a packet, preprocessed for triangle tests.
 pub struct ShearedPacket<'a> {
     rays: &'a RayPacket,
-    /// Whether the longest axis of a ray is x, and whether it is y.
+    /// Whether a ray's longest axis is x, and whether it is y.
     longest: [Mask; 2],
-    /// Whether a ray points down its longest axis. The scalar test swaps the other axes, which only negates
-    /// the edge functions.
+    /// Whether the direction along a ray's longest axis is negative. The scalar test then swaps the other two
+    /// axes, which only negates the edge functions.
     is_down: Mask,
-    /// Shears of the axes following the longest one.
+    /// Shears of the two axes after the longest one, and the scale of the longest one.
     shear: Vec3x16,
 }
 
 /// Hits of a packet, with one triangle per ray.
 pub(super) struct Hits {
     pub(super) hit: Mask,
-    /// Lanes that the scalar test must decide.
+    /// Lanes to be decided by the scalar test.
     pub(super) doubtful: Mask,
     pub(super) t: F32x16,
     pub(super) u: F32x16,
     pub(super) v: F32x16,
 }
 
-/// A triangle corner: one for all rays, or one per ray.
+/// A triangle corner, shared by all rays or different for each ray.
 pub(super) trait Corner: Copy {
     /// Coordinate of the corner for the ray in a lane.
     fn along(self, axis: usize, lane: usize) -> f32;
@@ -50,7 +50,7 @@ impl Corner for &Vec3x16 {
 }
 
 impl<'a> ShearedPacket<'a> {
-    /// Prepares a packet.
+    /// Preprocesses a packet.
     #[inline(always)]
     pub fn new(rays: &'a RayPacket) -> Self {
         let (mut longest, mut is_down) = ([[0; PACKET_SIZE]; 2], [0; PACKET_SIZE]);
@@ -92,8 +92,8 @@ impl<'a> ShearedPacket<'a> {
         Self { rays, longest, is_down, shear }
     }
 
-    /// Updates `found` with nearer hits on a triangle, whose index must be higher than the previous ones.
-    /// `met` selects the traced rays; all other rays have negative ends.
+    /// Updates `found` with nearer hits on a triangle. Triangles must be tested in order of increasing
+    /// indices. `met` is the mask of traced rays. All other rays must have negative ends.
     #[inline(always)]
     pub fn closest(
         &self,
@@ -105,7 +105,7 @@ impl<'a> ShearedPacket<'a> {
         let hits = self.hits(&[number; PACKET_SIZE], *corners, ends);
         let mut is_nearer = [0; PACKET_SIZE];
         for i in 0..PACKET_SIZE {
-            // A hit at the end of a ray counts, but not at the same t as a hit on an earlier triangle.
+            // A hit at the end of a ray counts, unless an earlier triangle was hit at the same t.
             let is_tie = !found.t[i].is_nan() & (hits.t[i] == found.t[i]);
             is_nearer[i] = if is_tie { 0 } else { hits.hit[i] };
         }
@@ -120,7 +120,7 @@ impl<'a> ShearedPacket<'a> {
         }
     }
 
-    /// Bits of the rays in `met` that hit a triangle; all other rays have negative ends.
+    /// Mask of the rays in `met` that hit a triangle. All other rays must have negative ends.
     #[inline(always)]
     pub fn any(&self, (number, corners): (u32, &[Vec3; 3]), met: u32, ends: &F32x16, simd: impl Simd) -> u32 {
         let hits = self.hits(&[number; PACKET_SIZE], *corners, ends);
@@ -129,7 +129,7 @@ impl<'a> ShearedPacket<'a> {
         if doubtful == 0 { hit } else { hit | self.decided(doubtful, corners, ends) }
     }
 
-    /// [`ShearedPacket::closest`] for the given rays, one at a time.
+    /// [`ShearedPacket::closest`] for the given rays, one by one.
     #[cold]
     #[inline(never)]
     fn decide(
@@ -148,7 +148,7 @@ impl<'a> ShearedPacket<'a> {
         }
     }
 
-    /// [`ShearedPacket::any`] for the given rays, one at a time.
+    /// [`ShearedPacket::any`] for the given rays, one by one.
     #[cold]
     #[inline(never)]
     fn decided(&self, these: u32, corners: &[Vec3; 3], ends: &F32x16) -> u32 {
@@ -222,7 +222,7 @@ impl<'a> ShearedPacket<'a> {
             let inverse = 1.0 / (wa + wb + wc);
             let shear_z = self.shear[2][i];
             let t = (wa * az + wb * bz + wc * cz) * shear_z * inverse;
-            // Bound the error as in `ShearedRay::distance_error`.
+            // Compute the error bound as in `ShearedRay::distance_error`.
             let first = greatest([ax, bx, cx]);
             let second = greatest([ay, by, cy]);
             let depth = greatest([az, bz, cz]);
@@ -247,7 +247,7 @@ impl<'a> ShearedPacket<'a> {
     }
 }
 
-/// Largest absolute value of three numbers.
+/// Maximum of the absolute values of three numbers.
 #[inline(always)]
 fn greatest([a, b, c]: [f32; 3]) -> f32 {
     let (a, b, c) = (a.abs(), b.abs(), c.abs());

@@ -9,8 +9,7 @@ use super::tree::LightBounds;
 use crate::math::Vec3;
 use crate::math::lanes::{F32x16, PACKET_SIZE, Vec3x16, lane};
 
-/// A light of any kind.
-// Most lights of a scene are area lights, which should be contiguous in memory.
+/// A light of any kind. Not boxed because area lights, the most common kind, should be contiguous in memory.
 #[allow(clippy::large_enum_variant)]
 #[derive(Clone, Debug, PartialEq)]
 pub enum Light {
@@ -18,7 +17,7 @@ pub enum Light {
     Point(PointLight),
     /// A spotlight.
     Spot(SpotLight),
-    /// A directional light, or a sun of small angular size.
+    /// A directional light, or a sun with a small angular diameter.
     Directional(DirectionalLight),
     /// An environment light.
     Environment(Environment),
@@ -26,7 +25,7 @@ pub enum Light {
     Area(AreaLight),
 }
 
-/// A light as one of three families with common methods.
+/// One of three families of lights with common methods.
 #[derive(Clone, Copy)]
 pub enum LightFamily<'a> {
     /// A light without extent.
@@ -49,8 +48,8 @@ impl Light {
         }
     }
 
-    /// Samples the light for a surface point with this normal. `u` is in [0, 1)². Returns `None` if the sampled point does not
-    /// illuminate the surface.
+    /// Samples the light for a surface point with the given normal. `u` is in [0, 1)². Returns `None` if the
+    /// sampled point does not illuminate the surface.
     pub fn sample(&self, point: Vec3, normal: Vec3, u: [f32; 2]) -> Option<LightSample> {
         match self {
             Self::Point(light) => light.sample(point),
@@ -61,7 +60,7 @@ impl Light {
         }
     }
 
-    /// [`Light::sample`] for the points in mask `used`, without an emission texture.
+    /// [`Light::sample`] for the points in the mask `used`, without an emission texture.
     #[inline(always)]
     pub fn sample_row(
         &self,
@@ -79,7 +78,8 @@ impl Light {
         }
     }
 
-    /// Inverse light-sampling pdfs in sr. 0 for dark samples, and for delta lights, which no other technique can sample.
+    /// Inverse light-sampling pdfs in sr. 0 for black samples and for delta lights, which no other technique
+    /// can sample.
     #[inline(always)]
     pub fn inverse_pdfs(&self, samples: &LightSamplePacket) -> F32x16 {
         let mut inverse = [0.0; PACKET_SIZE];
@@ -97,7 +97,7 @@ impl Light {
         inverse
     }
 
-    /// [`Light::inverse_pdfs`] for one sample, from its direction and weight.
+    /// [`Light::inverse_pdfs`] for a single sample, from its direction and weight.
     #[inline(always)]
     pub(super) fn inverse_pdf(&self, direction: Vec3, weight: Vec3) -> f32 {
         match self {
@@ -119,14 +119,15 @@ impl Light {
         }
     }
 
-    /// Light-sampling pdf of a hit's direction in sr⁻¹, from the surface point `from` with this normal. 0 if light sampling never
-    /// yields that direction, or if no ray can hit the light.
+    /// Light-sampling pdf of a hit's direction in sr⁻¹, for the surface point `from` with the given normal. 0
+    /// if light sampling never generates the direction, or if rays cannot hit the light.
     #[inline]
     pub fn pdf(&self, from: Vec3, normal: Vec3, met: &LightHit) -> f32 {
         self.as_area().map_or(0.0, |light| light.pdf(from, normal, met))
     }
 
-    /// Bounds of its position and emission for a [`LightTree`](super::LightTree). `None` if it emits nothing.
+    /// Bounds of the light's position and emission, for a [`LightTree`](super::LightTree). `None` if the
+    /// light emits nothing.
     pub fn bounds(&self) -> Option<LightBounds> {
         let bounds = match self.family() {
             LightFamily::Delta(light) => light.bounds(),
@@ -136,7 +137,7 @@ impl Light {
         Some(bounds).filter(|bounds| bounds.power > 0.0)
     }
 
-    /// The emission texture that modulates its radiance. `None` without one.
+    /// The emission texture that modulates the light's radiance, if any.
     #[inline(always)]
     pub fn emission_texture(&self) -> Option<&EmissionTexture> {
         self.as_area().and_then(|light| light.texture.as_deref())
@@ -147,12 +148,12 @@ impl Light {
         matches!(self.family(), LightFamily::Infinite(_))
     }
 
-    /// Whether it is an environment light.
+    /// Whether the light is an environment light.
     pub fn is_environment(&self) -> bool {
         self.as_environment().is_some()
     }
 
-    /// Whether its light arrives from a single direction.
+    /// Whether light arrives from a single direction.
     pub fn is_single(&self) -> bool {
         match self.family() {
             LightFamily::Delta(_) => true,
@@ -161,7 +162,8 @@ impl Light {
         }
     }
 
-    /// The light's center, and the light itself, which a ray toward it must ignore. `None` for an environment.
+    /// The light's center, and the light's own geometry, which rays toward the center must ignore. `None` for
+    /// an environment.
     pub fn middle(&self) -> Option<(LightCenter, LightObject)> {
         Some(match self.family() {
             LightFamily::Delta(light) => {
@@ -172,23 +174,23 @@ impl Light {
         })
     }
 
-    /// The point light. `None` for other kinds.
+    /// The point light, or `None` for other kinds.
     #[inline(always)]
     pub(super) fn as_point(&self) -> Option<&PointLight> {
         if let Self::Point(light) = self { Some(light) } else { None }
     }
 
-    /// The directional light. `None` for other kinds.
+    /// The directional light, or `None` for other kinds.
     pub(super) fn as_directional(&self) -> Option<&DirectionalLight> {
         if let Self::Directional(light) = self { Some(light) } else { None }
     }
 
-    /// The environment light. `None` for other kinds.
+    /// The environment light, or `None` for other kinds.
     pub(super) fn as_environment(&self) -> Option<&Environment> {
         if let Self::Environment(light) = self { Some(light) } else { None }
     }
 
-    /// The area light. `None` for other kinds.
+    /// The area light, or `None` for other kinds.
     #[inline(always)]
     pub fn as_area(&self) -> Option<&AreaLight> {
         if let Self::Area(light) = self { Some(light) } else { None }

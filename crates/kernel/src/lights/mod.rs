@@ -2,31 +2,35 @@
 //!
 //! | files | contents |
 //! | --- | --- |
-//! | `sample`, `row` | light samples, for one point and for a packet of 16; points on lights hit by rays |
+//! | `sample`, `packet` | light samples for one point and for a packet of 16; points where rays hit lights |
 //! | [`delta`] | point-like lights, one file each |
 //! | [`infinite`] | lights at infinity, one file each |
 //! | [`area`] | emitting surfaces, one file per shape, and their emission textures |
-//! | [`tree`] | the light tree: picks a few of many lights, by bounds on their contributions |
-//! | `light` | [`Light`]: any kind of light |
-//! | `set`, `per_lane` | [`Lights`]: all lights of a scene; samples for a packet in which every lane picked a light |
+//! | [`tree`] | the light tree, which picks a few of many lights based on bounds on their contributions |
+//! | `light` | [`Light`], an enum of all kinds of lights |
+//! | `set`, `per_lane` | [`Lights`], all lights of a scene; samples for a packet in which each lane has picked a light |
 //! | [`photon_emission`] | photon emission |
 //!
-//! Each row depends only on those above it. A light knows neither materials nor occlusion.
+//! Each row depends only on the rows above it. Lights do not depend on materials, and do not check for
+//! occlusion.
 //!
 //! # To add a light
 //!
-//! 1. `delta/NAME.rs` or `infinite/NAME.rs`: a struct that implements [`DeltaLight`](delta::DeltaLight) or
-//!    [`InfiniteLight`](infinite::InfiniteLight). An emitting shape implements [`ShapeEmitter`](area::ShapeEmitter) in
-//!    `area/NAME.rs`; see [`area`].
-//! 2. The folder's `mod.rs`: one line for the module, one for the name.
-//! 3. `light.rs`: a variant, and the match arms that the compiler asks for: its family, its sampling, and its pdf. An infinite
-//!    light must also be added to `set.rs`, which sums the radiance of rays that leave the scene.
-//! 4. Outside this folder: see CONTRIBUTING.
+//! 1. In `delta/NAME.rs` or `infinite/NAME.rs`, add a struct that implements
+//!    [`DeltaLight`](delta::DeltaLight) or [`InfiniteLight`](infinite::InfiniteLight). An emitting shape
+//!    implements [`ShapeEmitter`](area::ShapeEmitter) in `area/NAME.rs`, see [`area`].
+//! 2. In the folder's `mod.rs`, declare the module and re-export the struct.
+//! 3. In `light.rs`, add a variant and the match arms required by the compiler, for its family, sampling, and
+//!    pdf. Infinite lights must also be added to `set.rs`, which sums the radiance along rays that leave the
+//!    scene.
+//! 4. For changes outside this folder, see CONTRIBUTING.
 //!
-//! Three quantities must agree. The tests in this folder compare them with integrals and with rays, for every kind of light:
+//! The following must hold for every kind of light. The tests in this folder compare the quantities with
+//! integrals and with traced rays.
 //!
-//! - The weight of a sample is the radiance divided by the pdf of its direction; for a delta light, the irradiance.
-//! - The pdf of a direction is the same whether it was sampled ([`Light::inverse_pdfs`]) or found by a ray
+//! - The weight of a sample is the radiance divided by the pdf of its direction. For a delta light, it is the
+//!   irradiance.
+//! - The pdf of a sampled direction ([`Light::inverse_pdfs`]) equals its pdf when a ray hits the light
 //!   ([`Light::pdf`], or [`Lights::radiance_from_infinity`] for infinite lights).
 //! - The mean photon flux equals the power implied by the bounds and the samples.
 

@@ -4,29 +4,29 @@ use super::sample::{LightObject, LightSample, ShadowRayEnd};
 use crate::math::Vec3;
 use crate::math::lanes::{F32x16, PACKET_SIZE, Vec3x16, lane, mask_from_bits, select, select_u32, set_lane};
 
-/// Samples of a light for a packet of points: a packet of [`LightSample`]s.
+/// Samples of a light for a packet of points: [`LightSample`]s in structure-of-arrays layout.
 #[derive(Clone, Debug)]
 pub struct LightSamplePacket {
     /// Unit directions to the light.
     pub directions: Vec3x16,
     /// Sampled points.
     pub targets: Vec3x16,
-    /// [`LightSample::weight`]; 0 for dark samples.
+    /// [`LightSample::weight`], or 0 for black samples.
     pub weights: Vec3x16,
-    /// Geometry that the shadow rays ignore.
+    /// Geometry to be ignored by shadow rays.
     pub sources: LightObjectPacket,
     /// Mask of samples at infinity.
     pub beyond: u32,
-    /// Inverse pdfs in sr, only for an environment. Other lights compute theirs on request.
+    /// Inverse pdfs in sr, only for environments. Other lights compute them on request.
     pub(super) environment_inverse_pdfs: F32x16,
 }
 
 /// A packet of [`LightObject`]s.
 #[derive(Clone, Debug)]
 pub struct LightObjectPacket {
-    /// The object; [`LightObjectPacket::NONE`] for no geometry.
+    /// Object index, or [`LightObjectPacket::NONE`] for no geometry.
     pub object: [u32; PACKET_SIZE],
-    /// The primitive; [`LightObjectPacket::NONE`] for the entire object.
+    /// Primitive index, or [`LightObjectPacket::NONE`] for the entire object.
     pub part: [u32; PACKET_SIZE],
     /// Whether any lane has an object.
     pub is_any: bool,
@@ -36,10 +36,10 @@ impl LightObjectPacket {
     /// Marks a lane without an object, or without a single primitive.
     pub const NONE: u32 = u32::MAX;
 
-    /// Marks a [`LightObject::SeeThrough`] lane; no primitive has this number.
+    /// Marks a [`LightObject::SeeThrough`] lane. No primitive has this index.
     const SEE_THROUGH: u32 = u32::MAX - 1;
 
-    /// The same source in all lanes.
+    /// A packet with the same source in all lanes.
     #[inline(always)]
     pub fn of(source: LightObject) -> Self {
         let (object, part) = numbers(source);
@@ -53,7 +53,7 @@ impl LightObjectPacket {
         self.is_any |= other.is_any;
     }
 
-    /// The source of a lane.
+    /// Returns the source of a lane.
     #[inline]
     pub fn source(&self, lane: usize) -> LightObject {
         match (self.object[lane], self.part[lane]) {
@@ -82,8 +82,8 @@ fn numbers(source: LightObject) -> (u32, u32) {
     }
 }
 
-/// Builds a packet from the direction, target and weight of each lane. This is a macro because a function with a closure is not
-/// always inlined into its caller, and then misses the caller's instruction set.
+/// Builds a packet from the direction, target, and weight of each lane. This is a macro because a function
+/// with a closure is not always inlined, and would then not be compiled with the caller's instruction set.
 macro_rules! packet_of {
     ($source:expr, $i:ident => $sample:expr) => {{
         let mut row = $crate::lights::packet::LightSamplePacket::dark($source);
@@ -113,7 +113,7 @@ macro_rules! infinite_packet_of {
 pub(super) use infinite_packet_of;
 
 impl LightSamplePacket {
-    /// Copies the lanes in mask `bits` from another packet.
+    /// Copies the lanes in the mask `bits` from another packet.
     #[inline(always)]
     pub(super) fn take_lanes(&mut self, bits: u32, other: &Self) {
         let of = mask_from_bits(bits);
@@ -150,7 +150,7 @@ impl LightSamplePacket {
         }
     }
 
-    /// Samples the points in mask `used` one by one.
+    /// Samples the points in the mask `used` one by one.
     pub(super) fn lane_by_lane(
         points: &Vec3x16,
         used: u32,

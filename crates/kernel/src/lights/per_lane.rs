@@ -1,4 +1,4 @@
-//! Light samples for a packet of points, each of which picked its own light.
+//! Light samples for a packet of points with a different light per point.
 
 use super::area::mesh::{AreaSampledTriangles, MeshEmitter};
 use super::area::packet::triangle_packet_of;
@@ -13,7 +13,7 @@ use crate::geometry::packet::lanes;
 use crate::math::Vec3;
 use crate::math::lanes::{F32x16, PACKET_SIZE, Vec3x16, lane, set_lane};
 
-/// Samples convex emitters for a packet, one emitter per lane.
+/// Samples convex emitters for a packet, with one emitter per lane.
 macro_rules! convex_packet_of {
     ($i:ident => $all:expr, $points:expr, $u:expr) => {{
         let mut row = packet_of!(LightObject::Nothing, $i => {
@@ -30,8 +30,8 @@ macro_rules! convex_packet_of {
 }
 
 impl Lights {
-    /// [`Light::sample`] for each point in mask `used`, with its own light. Returns the samples, the inverse pdfs in sr (as
-    /// [`Light::inverse_pdfs`]), and the number of texture lookups.
+    /// [`Light::sample`] for the points in the mask `used`, with one light per lane. Returns the samples, the
+    /// inverse pdfs in sr (as in [`Light::inverse_pdfs`]), and the number of texture lookups.
     #[inline(always)]
     pub fn sample_per_lane(
         &self,
@@ -46,7 +46,8 @@ impl Lights {
         }
         let mut row = LightSamplePacket::dark(LightObject::Nothing);
         let mut left = used;
-        // Sample all lights of one kind together. Other lanes get a copy of one of these lights; their results are discarded.
+        // Sample all lights of the same kind together. Other lanes get a copy of one of these lights, and
+        // their results are discarded.
         while left != 0 {
             let first = left.trailing_zeros() as usize % PACKET_SIZE;
             let mut of = 0;
@@ -78,7 +79,7 @@ impl Lights {
                 };
                 LightSamplePacket::lane_by_lane(points, of, sample)
             };
-            // Usually, all lanes picked lights of the same kind.
+            // Usually, all lanes have picked lights of the same kind.
             if of == used {
                 row = found;
             } else {
@@ -90,7 +91,7 @@ impl Lights {
         for i in 0..PACKET_SIZE {
             inverse[i] = lights[i].inverse_pdf(lane(&row.directions, i), lane(&row.weights, i));
         }
-        // Apply the emission textures; the pdfs are those without textures.
+        // Apply the emission textures. They do not affect the pdfs.
         let mut lookups = 0;
         for i in lanes(used) {
             let weight = lane(&row.weights, i);
@@ -123,7 +124,7 @@ fn facets(light: &Light) -> Option<(&AreaSampledTriangles, &AreaLight)> {
     light.shape.as_mesh().and_then(MeshEmitter::facets).map(|facets| (facets, light))
 }
 
-/// The lights of one kind. Lanes that have one are added to `of`; the other lanes get the filler.
+/// The lights of one kind. Adds the lanes that have such a light to `of`. The other lanes get `filler`.
 #[inline(always)]
 fn same_kind<'a, T: Copy>(
     (lights, left): (&[&'a Light; PACKET_SIZE], u32),

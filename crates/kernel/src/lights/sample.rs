@@ -1,4 +1,4 @@
-//! Light samples, and points on lights hit by rays.
+//! Light samples, and points where rays hit lights.
 
 use crate::math::Vec3;
 
@@ -9,17 +9,17 @@ pub struct LightSample {
     pub end: ShadowRayEnd,
     /// Unit direction to the light.
     pub direction: Vec3,
-    /// Radiance divided by the pdf of the direction in sr⁻¹; multiplied by the BSDF and the cosine, it is the contribution. For
-    /// delta lights, the irradiance at normal incidence.
+    /// Radiance divided by the pdf of the direction in sr⁻¹. For delta lights, the irradiance at normal
+    /// incidence. The contribution is the weight times the BSDF and the cosine.
     pub weight: Vec3,
-    /// Geometry that the shadow ray ignores: the light itself.
+    /// The light's own geometry, which the shadow ray ignores.
     pub source: LightObject,
 }
 
 /// End of a shadow ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ShadowRayEnd {
-    /// A point, in world coordinates.
+    /// A point in world coordinates.
     At(Vec3),
     /// A point beyond the entire scene.
     Beyond,
@@ -28,40 +28,40 @@ pub enum ShadowRayEnd {
 /// Position of a light's center.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LightCenter {
-    /// A point, in world coordinates.
+    /// A point in world coordinates.
     At(Vec3),
     /// At infinity, in this unit direction.
     Towards(Vec3),
 }
 
-/// The scene geometry that a light consists of.
+/// A light's scene geometry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LightObject {
     /// No geometry.
     Nothing,
-    /// A convex object, which never blocks a ray to its near side.
+    /// A convex object. It does not block rays to its near side.
     Object(u32),
-    /// A surface point on a see-through object, other parts of which may attenuate a ray to it.
+    /// A surface point on a see-through object. Other parts of the object may attenuate a ray to the point.
     SeeThrough(u32),
     /// One primitive of an object.
     Primitive(u32, u32),
 }
 
-/// A point on a light that a ray has hit.
+/// A point where a ray hits a light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LightHit {
     /// Unit direction of the ray.
     pub direction: Vec3,
     /// Distance to the point.
     pub distance: f32,
-    /// Unit normal on the light's front side.
+    /// Unit normal on the light's front.
     pub normal: Vec3,
     /// Index of the hit primitive.
     pub primitive: u32,
 }
 
 impl LightHit {
-    /// Solid-angle pdf in sr⁻¹ of points sampled uniformly over an area; 0 from behind.
+    /// Solid-angle pdf in sr⁻¹ of points sampled uniformly over an area. 0 if the light is seen from behind.
     pub(super) fn pdf_by_area(&self, area: f64) -> f32 {
         let cosine = -self.normal.dot(self.direction);
         if cosine > 0.0 { self.distance * self.distance / (area as f32 * cosine) } else { 0.0 }

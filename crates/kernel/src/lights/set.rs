@@ -10,7 +10,7 @@ use super::tree::{LightTree, LightTreeCut, MAX_WITHOUT_TREE, Receiver};
 use crate::control::{CancelToken, Cancelled};
 use crate::math::Vec3;
 
-/// The lights of a scene, by index.
+/// The lights of a scene.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Lights {
     all: Vec<Light>,
@@ -18,11 +18,11 @@ pub struct Lights {
     by_object: HashMap<u32, ObjectLights>,
     /// Lights on the backs of objects.
     by_back: HashMap<u32, ObjectLights>,
-    /// Directional lights with an extent, which rays that leave the scene can see, with their indices.
+    /// Directional lights with an extent and their indices. They are visible to rays that leave the scene.
     suns: Vec<(u32, DirectionalLight)>,
-    /// The environment light, with its index.
+    /// The environment light and its index.
     environment: Option<(u32, Environment)>,
-    /// Tree over all lights. `None` if there are few.
+    /// Tree over all lights. `None` if there are few lights.
     tree: Option<Arc<LightTree>>,
     /// Tree over all lights except those at infinity. `None` if paths sample all of them.
     local_tree: Option<Arc<LightTree>>,
@@ -31,9 +31,9 @@ pub struct Lights {
 /// Purpose of the light samples at a vertex.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SamplingMode {
-    /// Direct lighting only: the image has no other noise.
+    /// Direct lighting only. The image has no other noise.
     Eye,
-    /// Path vertices, whose light has other noise as well.
+    /// Path vertices. The image has other noise as well.
     Paths,
 }
 
@@ -44,34 +44,35 @@ pub struct LightSampler<'a> {
     pub tree: &'a LightTree,
     /// How much work to spend on picking.
     pub picks: LightSamplingEffort,
-    /// Whether lights at infinity are not in the tree but are sampled at every vertex, because their bounds ignore occlusion.
+    /// Whether lights at infinity are sampled at every vertex instead of being in the tree. Their bounds
+    /// ignore occlusion.
     pub leaves_beyond: bool,
 }
 
 /// How much work to spend on picking lights at a vertex.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LightSamplingEffort {
-    /// Number of lights to pick per requested light sample.
+    /// Number of lights to pick for each requested light sample.
     pub count: u32,
-    /// Maximum number of tree nodes to examine for all of them.
+    /// Maximum number of tree nodes to examine for all picks.
     nodes: usize,
 }
 
 impl LightSamplingEffort {
-    /// For direct lighting: as good as examining each of a thousand lights.
+    /// For direct lighting. As good as examining each of a thousand lights.
     pub const DIRECT: Self = Self { count: MAX_WITHOUT_TREE as u32, nodes: LightTreeCut::MOST };
 
-    /// For paths, which have other noise: more shadow rays cost more than they gain.
+    /// For paths, where other noise makes additional shadow rays not worthwhile.
     pub const PATHS: Self = Self { count: 1, nodes: 8 };
 
-    /// A cut of a tree with this effort.
+    /// Creates a cut of a tree for this effort.
     #[inline(always)]
     pub fn cut(self, tree: &LightTree) -> LightTreeCut<'_> {
         LightTreeCut::new(tree, self.nodes)
     }
 }
 
-/// Expected number of samples per light at a vertex, for each requested sample.
+/// Expected number of samples of each light at a vertex, per requested sample.
 pub struct ExpectedSamples<'a>(Option<(LightSampler<'a>, LightTreeCut<'a>)>);
 
 impl ExpectedSamples<'_> {
@@ -93,7 +94,7 @@ impl ExpectedSamples<'_> {
 enum ObjectLights {
     /// A single light.
     Whole(u32),
-    /// A light for each primitive, if it emits.
+    /// The light on each primitive, if any.
     Primitives(Vec<Option<u32>>),
 }
 
@@ -128,11 +129,11 @@ impl Lights {
         Ok(Self { all, ..lights })
     }
 
-    /// Maximum number of local lights for which path vertices sample all of them; with more, they pick one. Measured in rooms
-    /// with 3 to 12 lights.
+    /// Maximum number of local lights for path vertices to sample all of them. If there are more, one is
+    /// picked. Measured in rooms with 3 to 12 lights.
     const MAX_LOCAL_WITHOUT_TREE: usize = 3;
 
-    /// How vertices pick lights. `None` if they sample all of them.
+    /// How vertices pick lights. `None` if they sample all lights.
     pub fn sampler(&self, receivers: SamplingMode) -> Option<LightSampler<'_>> {
         match receivers {
             SamplingMode::Eye => {
@@ -148,17 +149,17 @@ impl Lights {
         }
     }
 
-    /// Expected number of light samples at a surface point of which only position and normal are known.
+    /// Expected number of light samples at a surface point, given only its position and normal.
     #[inline]
     pub fn samples_at(&self, receivers: SamplingMode, point: Vec3, normal: Vec3) -> ExpectedSamples<'_> {
-        // Return early: a cut is expensive to copy.
+        // Return early because a cut is expensive to copy.
         let Some(sampler) = self.sampler(receivers) else { return ExpectedSamples(None) };
         let mut cut = sampler.picks.cut(sampler.tree);
         cut.move_to(&Receiver::plain(point, normal));
         ExpectedSamples(Some((sampler, cut)))
     }
 
-    /// Bytes of the trees over lights and over the triangles of mesh lights.
+    /// Memory used by the trees over lights and over the triangles of mesh lights, in bytes.
     pub fn memory_bytes(&self) -> usize {
         let of_mesh = |light: &Light| {
             let mesh = light.as_area().and_then(|light| light.shape.as_mesh());
@@ -220,7 +221,7 @@ impl Lights {
         (0..).zip(&self.all)
     }
 
-    /// Whether rays that leave the scene may find light.
+    /// Whether rays that leave the scene may reach a light.
     pub fn has_infinite_lights(&self) -> bool {
         !self.suns.is_empty() || self.environment.is_some()
     }
@@ -230,7 +231,7 @@ impl Lights {
         self.environment.as_ref().map(|(_, environment)| environment)
     }
 
-    /// Solid angle in sr of the widest light at infinity; 0 if none has an extent.
+    /// Solid angle of the largest light at infinity, in sr. 0 if no light has an extent.
     pub fn infinite_solid_angle(&self) -> f32 {
         match self.environment {
             Some(_) => 4.0 * std::f32::consts::PI,
@@ -238,14 +239,14 @@ impl Lights {
         }
     }
 
-    /// Radiance arriving from infinity in a unit direction. `share` returns the weight of each light, given its index and its
-    /// light-sampling pdf in sr⁻¹.
+    /// Radiance from infinity in a unit direction. `share` returns the weight of a light, given its index and
+    /// its light-sampling pdf in sr⁻¹.
     pub fn radiance_from_infinity(&self, direction: Vec3, share: impl Fn(u32, f32) -> f32) -> Vec3 {
         let sky = self.environment().map(|environment| environment.arriving(direction));
         self.radiance_from_infinity_with(sky, direction, share)
     }
 
-    /// [`Lights::radiance_from_infinity`], given the result of [`Environment::arriving`].
+    /// [`Lights::radiance_from_infinity`] with a precomputed result of [`Environment::arriving`].
     pub fn radiance_from_infinity_with(
         &self,
         sky: Option<(Vec3, f32)>,
@@ -259,13 +260,13 @@ impl Lights {
         seen.map(|(number, (radiance, density))| radiance * share(number, density)).sum()
     }
 
-    /// The light with an index.
+    /// The light with the given index.
     #[inline(always)]
     pub fn get(&self, number: u32) -> &Light {
         &self.all[number as usize]
     }
 
-    /// The light on one side of an object's primitive, with its index.
+    /// The light on one side of an object's primitive, and its index.
     #[inline]
     pub fn light_at(&self, object: u32, primitive: u32, side: Side) -> Option<(u32, &Light)> {
         let by_object = match side {
@@ -280,7 +281,7 @@ impl Lights {
     }
 }
 
-/// Number of lights, where all lights on one object count as one.
+/// Number of lights. All lights on the same object count as one.
 fn count<'a>(lights: impl Iterator<Item = &'a Light> + Clone) -> usize {
     let object = |light: &Light| light.as_area().map(|light| light.object);
     let objects: HashSet<u32> = lights.clone().filter_map(object).collect();

@@ -1,4 +1,4 @@
-//! Tests of light-sampling pdfs, and of the mapping from hits to lights.
+//! Tests of light-sampling pdfs and of the mapping from hits to lights.
 
 use super::*;
 use crate::control::CancelToken;
@@ -17,7 +17,8 @@ use crate::math::lanes::{F32x16, PACKET_SIZE, Vec3x16, lane};
 use crate::math::{DVec3, Vec2, Vec3};
 use crate::sampling::{Dimension, PixelSampler};
 
-/// Shapes for every sampling method: rectangles by solid angle, other parallelograms and distant ones by area.
+/// Shapes for all sampling methods. Rectangles are sampled by solid angle, other parallelograms and distant
+/// rectangles by area.
 fn shapes() -> Vec<Shape> {
     let (p, q) = (DVec3::new(0.3, -0.2, 0.1), DVec3::new(1.0, 0.5, -0.4));
     vec![
@@ -53,7 +54,7 @@ pub fn light_hit(shape: &Shape, from: Vec3, direction: Vec3) -> Option<(LightHit
     Some((LightHit { direction, distance: hit.t, normal, primitive: hit.primitive }, hit))
 }
 
-/// Samples of a light from a point: directions, targets and inverse pdfs.
+/// Samples of a light from a point: directions, targets, and inverse pdfs.
 fn samples(light: &Light, number: u32, from: Vec3, count: u32) -> Vec<(Vec3, Vec3, f32)> {
     let one = |sample: u32| {
         let u = PixelSampler::new(1, 2, 3, sample).pair(1, Dimension::Light(number));
@@ -65,7 +66,7 @@ fn samples(light: &Light, number: u32, from: Vec3, count: u32) -> Vec<(Vec3, Vec
 }
 
 #[test]
-fn packet_samples_equal_single_samples() {
+fn packet_samples_match_single_samples() {
     let mut state = 1_u32;
     let mut next = || {
         state = state.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
@@ -92,7 +93,7 @@ fn packet_samples_equal_single_samples() {
 }
 
 #[test]
-fn per_lane_lights_equal_single_samples() {
+fn per_lane_lights_match_single_samples() {
     let quad = |at: f64| {
         let corner = |x: f64, y: f64| DVec3::new(at + x, y, 2.0);
         mesh_light(&[
@@ -133,7 +134,7 @@ fn per_lane_lights_equal_single_samples() {
                 (ShadowRayEnd::At(lane(&row.targets, i)), row.sources.source(i)),
                 (alone.end, alone.source)
             );
-            assert_eq!(inverse[i] > 0.0, picked[i] > 0, "point lights have no other technique");
+            assert_eq!(inverse[i] > 0.0, picked[i] > 0, "the inverse pdf should be 0 for point lights only");
             seen += 1;
         }
     }
@@ -154,7 +155,7 @@ fn sample_pdf_equals_pdf_of_its_hit() {
             for (number, light) in lights.iter().skip(1) {
                 for (direction, target, factor) in samples(light, number, from, 64) {
                     let Some((light_hit, hit)) = light_hit(&shape, from, direction) else { continue };
-                    // A torus may occlude the point, and a ray may miss the very edge of a shape.
+                    // A torus may occlude the point, and a ray may miss the edge of a shape.
                     if (from + direction * light_hit.distance - target).length() > 1e-3 {
                         hidden += 1;
                         continue;
@@ -172,7 +173,7 @@ fn sample_pdf_equals_pdf_of_its_hit() {
     }
 }
 
-/// Lights on both sides of a shape, the front first.
+/// Lights on both sides of a shape. The first is on the front.
 fn two_sided(shape: &Shape) -> Lights {
     let both = [area_light(shape, Vec3::ONE, OBJECT), back_light(shape, Vec3::ONE, OBJECT)];
     let all = both.into_iter().flatten().map(Light::Area).collect();
@@ -190,7 +191,7 @@ fn two_sided_samples_cover_the_visible_shape() {
     };
     for shape in shapes().into_iter().chain([open(true), open(false)]) {
         let lights = two_sided(&shape);
-        // Points around the shape, and one inside.
+        // Points around the shape and one point inside.
         let is_flat = area_light(&shape, Vec3::ONE, 0).is_some_and(|light| light.bounds.cone.cos == 1.0);
         let inner = shape.sample(0, Vec2::splat(0.5));
         let inner = (inner.point - inner.normal * 0.1).as_vec3();
@@ -209,9 +210,9 @@ fn two_sided_samples_cover_the_visible_shape() {
             }
             assert!(
                 (sum - seen).abs() <= 1e-3 * seen,
-                "{shape:?} from {from}: {sum} of {seen} sr are sampled"
+                "{shape:?} from {from}: only {sum} of {seen} sr are sampled"
             );
-            // The weights of the samples must add up to the same solid angle.
+            // The sum of the sample weights must equal the same solid angle.
             let found: f64 = lights
                 .iter()
                 .map(|(number, light)| {
@@ -221,7 +222,7 @@ fn two_sided_samples_cover_the_visible_shape() {
                 .sum();
             assert!(
                 (found - seen).abs() < 0.02 * seen + 2e-4,
-                "{shape:?} from {from}: {found} is not {seen}"
+                "{shape:?} from {from}: {found} instead of {seen}"
             );
         }
     }
@@ -241,7 +242,7 @@ fn back_sample_pdf_equals_pdf_of_its_hit() {
                 if (from + direction * light_hit.distance - target).length() > 1e-3 {
                     continue;
                 }
-                assert!(light_hit.normal.dot(direction) > 0.0, "{shape:?}: sampled the front");
+                assert!(light_hit.normal.dot(direction) > 0.0, "{shape:?}: sample is on the front");
                 let product = light.pdf(from, Vec3::Y, &light_hit) * factor;
                 assert!((product - 1.0).abs() < 2e-3, "{shape:?} {from}: {product}");
                 compared += 1;
@@ -274,11 +275,12 @@ fn pdfs_integrate_to_one_over_the_light() {
             }
             for (sum, (number, light)) in sums.iter().zip(lights.iter()).skip(1) {
                 let all = samples(light, number, from, 1024);
-                // With area sampling, samples on the back are lost: the visible ones sum to the fraction that faces the point.
+                // With area sampling, samples on the back are lost, so the integral over visible samples is
+                // the fraction that faces the point.
                 let expected = all.len() as f64 / 1024.0;
                 assert!(
                     (sum - expected).abs() < 0.03,
-                    "{shape:?} {number} from {from}: {sum} is not {expected}"
+                    "{shape:?} {number} from {from}: {sum} instead of {expected}"
                 );
             }
         }
@@ -350,7 +352,7 @@ fn mesh_triangles_map_to_their_lights() {
     assert_eq!(Light::Point(POINT).pdf(Vec3::ONE, Vec3::Z, &light_hit), 0.0);
 }
 
-/// A light with these triangles, numbered from 5.
+/// A light with these triangles. Their indices start at 5.
 fn mesh_light(triangles: &[[DVec3; 3]]) -> AreaLight {
     let numbered = triangles.iter().copied().zip(5..).collect();
     let mesh = MeshEmitter::new(numbered, &CancelToken::new()).expect("nobody cancels").expect("an area");
@@ -390,7 +392,7 @@ fn triangle_pairs_are_sampled_like_quads() {
             );
             let (LightObject::Primitive(OBJECT, part), ShadowRayEnd::At(target)) = (own.source, own.end)
             else {
-                panic!("a point of a triangle")
+                panic!("expected a point on a triangle")
             };
             let corners = if part == 5 { first } else { second };
             let triangle = Shape::Triangle(Triangle { a: corners[0], b: corners[1], c: corners[2] });
@@ -421,7 +423,7 @@ fn non_parallelograms_are_sampled_by_area() {
         ([x + y + DVec3::Z * 0.1, y, x], "a fold"),
         ([x + y, x, y], "opposite orientations"),
         ([x + y, y + x * 1e-3, x], "no common edge"),
-        ([x + y, x * 2.0, y * 2.0], "one common corner at most"),
+        ([x + y, x * 2.0, y * 2.0], "at most one common corner"),
     ] {
         assert!(mesh_light(&[first, second]).shape.as_quad().is_none(), "{what}");
     }
@@ -442,7 +444,7 @@ fn area_samples_are_proportional_to_area() {
     for sample in 0..COUNT {
         let u = PixelSampler::new(3, 1, 4, sample).pair(1, Dimension::ChosenLight);
         let Some(sample) = light.sample(from, Vec3::NEG_Z, [u.x, u.y]) else { panic!("seen from the front") };
-        let LightObject::Primitive(OBJECT, part) = sample.source else { panic!("a triangle of it") };
+        let LightObject::Primitive(OBJECT, part) = sample.source else { panic!("expected a triangle") };
         counts[(part - 5) as usize] += 1;
         flux += f64::from(sample.weight.x * -sample.direction.z) / f64::from(COUNT);
     }
@@ -460,7 +462,7 @@ fn area_samples_are_proportional_to_area() {
         0.5 * (edge(0) + edge(1) + edge(2)).abs()
     };
     let expected = of(triangle(0.0, 1.0)) + of(triangle(2.0, 2.0)) + of(triangle(5.0, 0.5));
-    assert!((flux / expected - 1.0).abs() < 1e-3, "{flux} is not {expected}");
+    assert!((flux / expected - 1.0).abs() < 1e-3, "{flux} instead of {expected}");
 }
 
 #[test]

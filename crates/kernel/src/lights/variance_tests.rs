@@ -1,4 +1,5 @@
-//! Variance and distribution of light samples, compared with a sphere of the same solid angle and with their pdfs.
+//! Tests the variance and distribution of light samples. The variance is compared with a sphere of the same
+//! solid angle, and the distribution with the pdf.
 
 use super::area::quad::QuadEmitter;
 use super::area::textured_quad::TexturedQuadEmitter;
@@ -29,7 +30,7 @@ impl PcgRandom {
     }
 }
 
-/// Samples of the irradiance from a light of radiance 1, at a point on the floor y = 0.
+/// Samples of the irradiance from a light with radiance 1, at a point on the floor y = 0.
 fn irradiance(light: &AreaLight, from: Vec3, count: u32) -> Vec<f64> {
     let mut random = PcgRandom(5);
     let mut one = || {
@@ -39,7 +40,7 @@ fn irradiance(light: &AreaLight, from: Vec3, count: u32) -> Vec<f64> {
     (0..count).map(|_| one()).collect()
 }
 
-/// The mean, and the standard deviation of one sample relative to it.
+/// The mean, and the relative standard deviation of a single sample.
 fn spread(samples: &[f64]) -> (f64, f64) {
     let n = samples.len() as f64;
     let mean = samples.iter().sum::<f64>() / n;
@@ -47,7 +48,7 @@ fn spread(samples: &[f64]) -> (f64, f64) {
     (mean, variance.sqrt() / mean)
 }
 
-/// Shapes of about unit size, at a distance of `gap` above the origin or to the side of it.
+/// Shapes with a size of about 1, at a distance of `gap` above the origin or beside it.
 fn area_lights(gap: f64) -> Vec<(&'static str, Shape)> {
     let at = |x: f64, y: f64| DVec3::new(x, y + gap, 0.0);
     let slant = DVec3::new(0.1, 1.0, 0.05).normalize();
@@ -79,7 +80,7 @@ fn area_lights(gap: f64) -> Vec<(&'static str, Shape)> {
 }
 
 fn light_of(shape: &Shape) -> AreaLight {
-    area_light(shape, Vec3::ONE, OBJECT).expect("it has an area")
+    area_light(shape, Vec3::ONE, OBJECT).expect("the shape should have an area")
 }
 
 #[test]
@@ -94,7 +95,7 @@ fn area_light_variance_is_bounded() {
                     continue;
                 }
                 let (ball, cosines) = sphere_deviation(&shape, from);
-                // Cosines at the receiver vary along an elongated light, however it is sampled.
+                // For elongated lights, cosines at the receiver vary regardless of the sampling method.
                 let verdict = if scatter > (2.0 * ball).max(1.2 * cosines) + 0.04 { "TOO HIGH" } else { "" };
                 let line = format!(
                     "{gap:7} {name:20} E {mean:8.5} scatter {scatter:.3}, ball {ball:.3}, cosines {cosines:.3} {verdict}"
@@ -109,13 +110,14 @@ fn area_light_variance_is_bounded() {
     assert!(worse.is_empty(), "{}", worse.join("\n"));
 }
 
-/// Relative standard deviation for a sphere in the same mean direction with the shape's solid angle (above and below the floor),
-/// and of the cosine at the receiver over directions uniform in the shape's solid angle.
+/// Two relative standard deviations: for a sphere in the same mean direction with the shape's solid angle
+/// (above and below the floor), and for the cosine at the receiver if directions are uniform over the shape's
+/// solid angle.
 fn sphere_deviation(shape: &Shape, from: Vec3) -> (f64, f64) {
     // Shoot rays around the shape's center and keep those that hit its front.
     let frame = Frame::from_normal((shape.centroid().as_vec3() - from).normalize());
     let (mut solid_angle, mut sum, mut cosines) = (0.0, Vec3::ZERO, Vec::new());
-    let around = shape.bounds().expect("a finite shape");
+    let around = shape.bounds().expect("expected a finite shape");
     let reach = around.extent().length() * 0.5 / (around.center() - from).length();
     let one_minus_cos = if reach < 0.9 { 1.02 * (1.0 - (1.0 - reach * reach).sqrt()) } else { 2.0 };
     let n = 20_000;
@@ -135,14 +137,14 @@ fn sphere_deviation(shape: &Shape, from: Vec3) -> (f64, f64) {
     (spread(&irradiance(&light_of(&ball), from, 20_000)).1, spread(&cosines).1)
 }
 
-/// Number of direction cells along each side.
+/// Number of direction cells along each axis.
 const SIDE: usize = 20;
-/// Number of squares along each side of a cell; the pdf is evaluated once in each.
+/// Number of squares along each side of a cell. The pdf is evaluated once per square.
 const FINE: usize = 30;
 /// Number of samples per light.
 const COUNT: usize = 400_000;
 
-/// Gaps below the lights, and the points on the floor that they are sampled from.
+/// Gaps below the lights, and points on the floor from which they are sampled.
 const PLACES: [(f64, Vec3); 2] = [(0.02, Vec3::ZERO), (0.8, Vec3::new(0.3, 0.0, -0.2))];
 
 #[test]
@@ -161,7 +163,7 @@ fn shape_samples_follow_their_pdf() {
 #[test]
 fn textured_quad_samples_follow_their_pdf() {
     for (gap, from) in PLACES {
-        // Closer than this, borders of bright areas are too slanted for the squares.
+        // If the quad were closer, the borders of bright areas would be too slanted for the squares.
         for (name, shape, light) in textured_quads(gap + 0.3) {
             let name = format!("{name} at {gap}");
             assert!(follows_its_pdf(&name, &shape, &light, from), "{name}");
@@ -175,7 +177,7 @@ fn follows_its_pdf(name: &str, shape: &Shape, light: &AreaLight, from: Vec3) -> 
     check_bins(name, &bins, &expected(shape, light, from, &directions))
 }
 
-/// Quads with emission textures above the origin.
+/// Quads with emission textures, placed above the origin.
 fn textured_quads(gap: f64) -> Vec<(&'static str, Shape, AreaLight)> {
     let at = |x: f64, z: f64| DVec3::new(x, gap, z);
     let spot =
@@ -186,7 +188,7 @@ fn textured_quads(gap: f64) -> Vec<(&'static str, Shape, AreaLight)> {
     let far = Parallelogram::new(at(-0.3, 9.0), DVec3::new(-0.2, 0.2, 0.3), DVec3::new(0.5, 0.5, 0.0));
     let with_texture = |name, quad: Parallelogram, texels, color: &dyn Fn([f64; 2]) -> Vec3| {
         let emitter = QuadEmitter::new(quad.corner, quad.u, quad.v);
-        let textured = TexturedQuadEmitter::new(emitter, texels, color).expect("a textured");
+        let textured = TexturedQuadEmitter::new(emitter, texels, color).expect("a textured quad");
         let shape = Shape::Quad(quad);
         let light = light_of(&shape);
         (name, shape, AreaLight { shape: Emitter::TexturedQuad(Box::new(textured)), ..light })
@@ -211,23 +213,23 @@ fn textured_quad_pdf_matches_its_samples() {
             let Some((met, _)) = light_hit(&shape, from, sample.direction) else { continue };
             let product = light.pdf(from, Vec3::Y, &met) * sample.weight.x;
             compared += 1;
-            // A sample on a texel border may belong to either side.
+            // A sample on the border between two texels may belong to either.
             apart += u32::from((product - 1.0).abs() > 2e-3);
         }
-        assert!(compared > 3500 && apart < 10, "{name}: {apart} of {compared}");
+        assert!(compared > 3500 && apart < 10, "{name}: {apart} of {compared} differ");
     }
 }
 
 #[test]
 fn small_bright_areas_have_low_variance() {
-    // One hundredth of the square is bright; its irradiance equals that from a square one tenth as wide.
+    // One hundredth of the square is bright. Its irradiance equals that of a square one tenth as wide.
     let bright =
         |[x, y]: [f64; 2]| -> f32 { if x > 0.3 && x < 0.4 && y > 0.6 && y < 0.7 { 1.0 } else { 0.0 } };
     for gap in [0.3, 2.0] {
         let quad = Parallelogram::new(DVec3::new(-0.5, gap, -0.5), DVec3::X, DVec3::Z);
         let emitter = QuadEmitter::new(quad.corner, quad.u, quad.v);
         let color = |at: [f64; 2]| Vec3::splat(bright(at));
-        let textured = TexturedQuadEmitter::new(emitter, [10.0, 10.0], color).expect("a textured");
+        let textured = TexturedQuadEmitter::new(emitter, [10.0, 10.0], color).expect("a textured quad");
         let plain = light_of(&Shape::Quad(quad));
         let with_texture = AreaLight { shape: Emitter::TexturedQuad(Box::new(textured)), ..plain.clone() };
         let small = Parallelogram::new(DVec3::new(-0.2, gap, 0.1), DVec3::X * 0.1, DVec3::Z * 0.1);
@@ -237,7 +239,7 @@ fn small_bright_areas_have_low_variance() {
             let mut one = || {
                 let sample = light.sample(Vec3::ZERO, Vec3::Y, [random.next(), random.next()]);
                 sample.map_or(0.0, |sample| {
-                    let ShadowRayEnd::At(target) = sample.end else { panic!("a finite light") };
+                    let ShadowRayEnd::At(target) = sample.end else { panic!("expected a finite light") };
                     let at = [target.x + 0.5, target.z + 0.5].map(f64::from);
                     f64::from(sample.weight.x * sample.direction.y.max(0.0) * bright(at))
                 })
@@ -245,14 +247,14 @@ fn small_bright_areas_have_low_variance() {
             let samples: Vec<f64> = (0..40_000).map(|_| one()).collect();
             let (mean, scatter) = spread(&samples);
             let error = mean * scatter / 200.0;
-            assert!((mean - exact).abs() < 4.0 * error, "{gap}: {mean} ± {error}, not {exact}");
+            assert!((mean - exact).abs() < 4.0 * error, "{gap}: {mean} ± {error} instead of {exact}");
             scatter
         });
         assert!(scatter[0] > 5.0 && scatter[1] < 0.5, "{gap}: {scatter:?}");
     }
 }
 
-/// The expected number of samples in each cell, from the integral of the pdf, and the variance of the integral's estimate.
+/// The expected number of samples in each cell (the integral of the pdf), and the variance of this estimate.
 fn expected(shape: &Shape, light: &AreaLight, from: Vec3, directions: &Directions) -> Vec<(f64, f64)> {
     let square = directions.solid_angle() / (SIDE * SIDE * FINE * FINE) as f64 * COUNT as f64;
     let mut random = PcgRandom(3);
@@ -265,7 +267,7 @@ fn expected(shape: &Shape, light: &AreaLight, from: Vec3, directions: &Direction
             let share = met.map_or(0.0, |(met, _)| f64::from(light.pdf(from, Vec3::Y, &met)) * square);
             let (wanted, variance) = &mut bins[i / FINE * SIDE + j / FINE];
             *wanted += share;
-            // A square on a border counts fully or not at all.
+            // A square on a border is counted either entirely or not at all.
             if (share - before).abs() > 0.2 * share.max(before) {
                 *variance += (0.5 * (share - before)).powi(2);
             }
@@ -275,7 +277,7 @@ fn expected(shape: &Shape, light: &AreaLight, from: Vec3, directions: &Direction
     bins
 }
 
-/// Compares counts with their expectations. Returns whether enough cells have samples.
+/// Compares sample counts with expected counts. Returns whether enough cells have samples.
 fn check_bins(name: &str, bins: &[usize], expected: &[(f64, f64)]) -> bool {
     let total: f64 = expected.iter().map(|(wanted, _)| wanted).sum();
     let off = total - bins.iter().sum::<usize>() as f64;
@@ -295,15 +297,16 @@ fn check_bins(name: &str, bins: &[usize], expected: &[(f64, f64)]) -> bool {
         (rest - rest_seen).abs() < allowed,
         "{name}: expected {rest} samples in small cells, found {rest_seen}"
     );
-    // Wilson–Hilferty approximation; a 1 % significance level over the whole family (Šidák correction).
+    // Wilson–Hilferty approximation. The significance level is 1 % for all tests combined (Šidák correction).
     let k = f64::from(cells);
     let z = ((chi2 / k).cbrt() - (1.0 - 2.0 / (9.0 * k))) / (2.0 / (9.0 * k)).sqrt();
-    assert!(cells < 5 || z < 3.45, "{name}: χ² {chi2} of {cells} cells, z {z}");
+    assert!(cells < 5 || z < 3.45, "{name}: χ² {chi2} for {cells} cells, z {z}");
     cells >= 5
 }
 
-/// Compares the irradiance at the origin on the floor from a light of radiance 1, estimated with independent samples, with the
-/// exact value. The difference must be within the standard error, which is itself bounded.
+/// Checks the irradiance at the origin, on the floor, from a light with radiance 1. Compares an estimate from
+/// independent samples with the exact value. The difference must be within four standard errors, and the
+/// standard error has an upper bound.
 #[track_caller]
 fn assert_irradiance(shape: &Shape, exact: f64, greatest_error: f64) {
     let count = 40_000;
@@ -311,7 +314,7 @@ fn assert_irradiance(shape: &Shape, exact: f64, greatest_error: f64) {
     let error = mean * scatter / f64::from(count).sqrt();
     assert!(error <= greatest_error * exact, "{shape:?}: ± {error}");
     let allowed = 4.0 * error + 1e-5 * exact;
-    assert!((mean - exact).abs() <= allowed, "{shape:?}: {mean} ± {error} is not {exact}");
+    assert!((mean - exact).abs() <= allowed, "{shape:?}: {mean} ± {error} instead of {exact}");
 }
 
 #[test]
@@ -322,11 +325,12 @@ fn irradiance_matches_closed_forms() {
         let (r2, h2) = (radius * radius, height * height);
         let disk = |center, normal| Shape::Disk(Disk::new(center, normal, radius));
         assert_irradiance(&disk(DVec3::Y * height, DVec3::NEG_Y), PI * r2 / (r2 + h2), error);
-        // Next to a parallel disk (Howell, *A Catalog of Radiation Heat Transfer Configuration Factors*, B-13).
+        // Beside a parallel disk (Howell, *A Catalog of Radiation Heat Transfer Configuration Factors*,
+        // B-13).
         let beside = 0.8 * radius;
         let (h, r) = (height / beside, radius / beside);
         let z = 1.0 + h * h + r * r;
-        // Z² − 4R², without cancellation.
+        // Z² − 4R², computed without cancellation.
         let root = ((h * h + (1.0 - r) * (1.0 - r)) * (h * h + (1.0 + r) * (1.0 + r))).sqrt();
         let factor = if radius < 1e-3 * height {
             r2 * h2 / (h2 + beside * beside).powi(2)
@@ -334,7 +338,7 @@ fn irradiance_matches_closed_forms() {
             0.5 * (1.0 - (z - 2.0 * r * r) / root)
         };
         assert_irradiance(&disk(DVec3::new(beside, height, 0.0), DVec3::NEG_Y), PI * factor, error);
-        // A sphere above the horizon.
+        // A sphere that is entirely above the horizon.
         let distance = radius + height;
         let center = DVec3::new(0.6, 0.8, 0.0) * distance;
         if center.y >= radius {
@@ -343,7 +347,7 @@ fn irradiance_matches_closed_forms() {
         }
     }
     for (height, exact) in [(0.1, 3.042_128), (1.0, 0.752_274_688_5), (4.0, 0.061_225_761_1)] {
-        // A square as a quad, as one triangle (half of it), and as the bottom face of a box.
+        // A square as a quad, half of it as a triangle, and as the bottom face of a box.
         let at = |x: f64, z: f64| DVec3::new(x - 0.5, height, z - 0.5);
         assert_irradiance(&Shape::Quad(Parallelogram::new(at(0.0, 0.0), DVec3::X, DVec3::Z)), exact, error);
         let half = Triangle { a: at(0.0, 0.0), b: at(1.0, 0.0), c: at(1.0, 1.0) };
@@ -351,7 +355,8 @@ fn irradiance_matches_closed_forms() {
         let center = DVec3::Y * (height + 0.5);
         assert_irradiance(&Shape::Box(Cuboid::new(center, DVec3::ONE, DVec3::ZERO)), exact, error);
     }
-    // A distant convex body gives its radiance times its projected area: 2·R·h for a cylinder seen from the side, R·h for a cone.
+    // The irradiance from a distant convex body is its radiance times its projected area: 2·R·h for a
+    // cylinder seen from the side, R·h for a cone.
     let up = DVec3::Y * 1e5;
     let far = |shown: f64| shown * 1e-10;
     let bar = Cylinder::new(up - DVec3::X, up + DVec3::X, 0.5, true);
@@ -382,7 +387,7 @@ impl Directions {
     }
 }
 
-/// Counts the samples per direction cell. `None` if there are no samples.
+/// Number of samples in each direction cell. `None` if there are no samples.
 fn histogram(light: &AreaLight, from: Vec3) -> Option<(Directions, Vec<usize>)> {
     let mut random = PcgRandom(11);
     let samples: Vec<Vec3> = (0..COUNT)

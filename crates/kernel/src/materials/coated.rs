@@ -1,4 +1,4 @@
-//! A smooth coat over a non-specular base: a δ lobe, plus the base's lobes for the remaining light.
+//! A smooth coat over a non-specular base: a δ lobe, and the base's lobes for the transmitted light.
 
 use std::sync::Arc;
 
@@ -8,19 +8,20 @@ use super::rough::Rough;
 use super::texture::{Color, Texture};
 use crate::math::Vec3;
 
-/// A smooth dielectric coat over a base, whose lobes already account for the coat's transmittance.
+/// A smooth dielectric coat over a base. The base's lobes already account for the coat's transmittance.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Coated {
     /// Factor on the coat's reflection.
     pub specular: Color,
-    /// Index of refraction of the coat, ≥ 1.
+    /// Index of refraction of the coat. At least 1.
     pub ior: f32,
     /// The surface under the coat.
     pub base: Rough,
 }
 
 impl Coated {
-    /// Fresnel reflectance of the coat at a cosine of the angle of incidence, without the factor `specular`.
+    /// The coat's Fresnel reflectance, given the cosine of the angle of incidence. Does not include the
+    /// factor `specular`.
     #[inline]
     pub fn fresnel(&self, cosine: f32) -> f32 {
         dielectric(cosine, self.ior).0

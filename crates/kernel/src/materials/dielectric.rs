@@ -1,4 +1,4 @@
-//! Dielectrics that fill a closed shape.
+//! Dielectrics that fill the inside of a closed shape.
 
 use super::footprint::TexturePoint;
 use super::microfacet;
@@ -6,31 +6,31 @@ use super::scalar::Number;
 use crate::math::elementary::exp2;
 use crate::math::{DVec3, Vec3};
 
-/// A smooth or rough dielectric that fills its shape.
+/// A smooth or rough dielectric that fills the inside of its shape.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Dielectric {
-    /// Index of refraction inside; outside is 1.
+    /// Index of refraction inside the shape. It is 1 outside.
     pub ior: f32,
-    /// Transmittance per unit length inside, as precisely as `f32` allows.
+    /// Transmittance per unit length inside the shape, as accurately as `f32` allows.
     pub tint: Vec3,
-    /// The square root of α; the constant 0 for smooth glass.
+    /// The square root of α. Constant 0 for smooth glass.
     pub roughness: Number,
-    /// Absorption in halvings per unit length. In scenes with small units, the tint of colored glass would underflow `f32`; with
-    /// large units, it would round to 1.
+    /// Absorption in halvings per unit length. In `f32`, the tint of colored glass could underflow in scenes
+    /// with large units, and round to 1 in scenes with small units.
     density: Vec3,
 }
 
 impl Dielectric {
-    /// Smooth glass with a transmittance in [0, 1] per unit length inside.
+    /// Smooth glass with the given transmittance per unit length inside the shape, in [0, 1].
     pub fn new(ior: f32, tint: DVec3) -> Self {
-        // Opaque glass gets a large finite density, because ∞ · 0 would be NaN.
+        // Opaque glass gets a large but finite density because ∞ · 0 would be NaN.
         let halvings =
             |part: f64| if part < 1.0 { (-libm::log2(part)).min(f32::MAX.into()) as f32 } else { 0.0 };
         let density = Vec3::from_array(tint.to_array().map(halvings));
         Self { ior, tint: tint.as_vec3(), roughness: Number::Constant(0.0), density }
     }
 
-    /// The same glass with a surface of this roughness.
+    /// The same glass with the given surface roughness.
     pub fn with_roughness(self, roughness: Number) -> Self {
         Self { roughness, ..self }
     }
@@ -47,7 +47,7 @@ impl Dielectric {
         (!self.is_smooth()).then(|| microfacet::alphas(self.roughness.at(at, lookups), 0.0)[0])
     }
 
-    /// Transmittance over `distance` inside (Beer–Lambert law).
+    /// Transmittance over `distance` inside the shape (Beer–Lambert law).
     #[inline]
     pub fn transmittance(&self, distance: f32) -> Vec3 {
         if self.density == Vec3::ZERO {
@@ -63,7 +63,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn absorption_multiplies_with_distance() {
+    fn absorption_is_multiplicative_over_distance() {
         let glass = Dielectric::new(1.5, DVec3::new(0.5, 1.0, 0.0));
         assert_eq!(glass.transmittance(0.0), Vec3::ONE);
         assert!((glass.transmittance(2.0) - Vec3::new(0.25, 1.0, 0.0)).length() < 1e-6);

@@ -21,13 +21,13 @@ choice! {
 /// Emitted radiance of a surface.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Emission {
-    /// Radiance; with a texture, the factor on it.
+    /// Radiance, or a factor on the texture if there is one.
     pub scale: Vec3,
     /// Texture that modulates the radiance.
     pub texture: Option<Arc<Texture>>,
     /// Which sides emit.
     pub sides: EmissionSides,
-    /// Clear coat that attenuates the radiance depending on direction. `None` without one.
+    /// Clear coat that attenuates the radiance depending on direction, if any.
     pub coat: Option<Arc<EmissionCoat>>,
 }
 
@@ -40,7 +40,7 @@ impl Emission {
         Self { scale, texture: None, sides: EmissionSides::Front, coat: None }
     }
 
-    /// Whether anything may be emitted.
+    /// Whether the surface may emit light.
     pub fn is_emissive(&self) -> bool {
         self.scale != Vec3::ZERO
     }
@@ -54,13 +54,13 @@ impl Emission {
         }
     }
 
-    /// Whether a side may emit.
+    /// Whether a side may emit light.
     #[inline]
     pub fn emits_from(&self, is_front: bool) -> bool {
         self.is_emissive() && (is_front || self.is_two_sided())
     }
 
-    /// The radiance at texture coordinates, for the cosine of its direction. Adds to `lookups`.
+    /// The radiance at texture coordinates, given the cosine of the direction of emission. Adds to `lookups`.
     #[inline]
     pub fn at(&self, at: &TexturePoint, cosine: f32, lookups: &mut u64) -> Vec3 {
         let left = self.coat.as_ref().map_or(1.0, |coat| coat.left(at, cosine, lookups));

@@ -1,26 +1,26 @@
-//! Footprints: the area of a texture that one lookup covers.
+//! Footprints, which are the areas of a texture covered by single lookups.
 
 use crate::math::{DVec2, Vec2, Vec3};
 
 /// One of a mesh's UV sets.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum UvSet {
-    /// The first set, which shapes also have.
+    /// The first set. Shapes only have this set.
     #[default]
     First,
-    /// The second set, or the first if the mesh has only one.
+    /// The second set, or the first set if the mesh has only one.
     Second,
 }
 
-/// A point in texture space, with the lookup's footprint.
+/// A point in texture space, with the footprint of the lookup.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TexturePoint {
     /// Texture coordinates.
     pub uv: DVec2,
-    /// Footprint around `uv`; ignored by filters without mip levels.
+    /// Footprint around `uv`. Ignored by filters without mip levels.
     pub footprint: Footprint,
-    /// The point in the second UV set. `None` if the object has none or no texture uses it. Boxed to keep points without it
-    /// small.
+    /// The point in the second UV set. `None` if the object has no second set or no texture uses it. Boxed to
+    /// keep this struct small.
     pub second: Option<Box<SecondUvPoint>>,
 }
 
@@ -49,20 +49,21 @@ impl TexturePoint {
     }
 }
 
-/// An ellipse in texture space, given by its axes; both are 0 for a point.
+/// An ellipse in texture space, given by its axes. Both axes are 0 for a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Footprint {
     axes: [Vec2; 2],
 }
 
 impl Footprint {
-    /// A footprint without extent.
+    /// The footprint of a point.
     pub const POINT: Self = Self { axes: [Vec2::ZERO; 2] };
 
-    /// Footprint of a ray cone with this width at a surface, around a unit direction (Akenine-Möller, Crassin, Boksansky,
-    /// Belcour, Panteleev, Wright, *Improved Shader and Texture Level of Detail Using Ray Cones*, JCGT 2021, section 5). The
-    /// ellipse has `width` perpendicular to the direction and is longer along it by the inverse cosine. `tangents` are ∂p/∂u and
-    /// ∂p/∂v; if they are parallel or 0, the footprint is a point.
+    /// Footprint of a ray cone on a surface, where `width` is the cone's width and `direction` a unit vector
+    /// (Akenine-Möller, Crassin, Boksansky, Belcour, Panteleev, Wright, *Improved Shader and Texture Level of
+    /// Detail Using Ray Cones*, JCGT 2021, section 5). The ellipse has this width perpendicular to the
+    /// direction, and the width divided by the cosine along it. `tangents` are ∂p/∂u and ∂p/∂v. If they are
+    /// parallel or 0, the footprint is a point.
     #[inline]
     pub fn of_cone(width: f32, direction: Vec3, normal: Vec3, tangents: [Vec3; 2]) -> Self {
         let cosine = normal.dot(direction);
@@ -81,7 +82,7 @@ impl Footprint {
         if axes.iter().all(|axis| axis.is_finite()) { Self { axes } } else { Self::POINT }
     }
 
-    /// Minimum cosine: below it, footprints stop growing.
+    /// Minimum cosine, which limits the size of footprints.
     const MIN_COSINE: f32 = 1e-4;
 
     /// Length of the longer axis in texels, given the texels per unit of u and v.
@@ -117,7 +118,7 @@ mod tests {
     fn oblique_tangents_are_separated() {
         let tangents = [Vec3::X, Vec3::new(1.0, 1.0, 0.0)];
         let seen = Footprint::of_cone(1.0, Vec3::new(0.6, 0.0, -0.8), Vec3::Z, tangents);
-        // Along x: only 1/0.8 of u. Along y: one v, minus one u.
+        // Along x, only u changes, by 1/0.8. Along y, v increases by one and u decreases by one.
         assert!((seen.texels(Vec2::X) - 1.25).abs() < 1e-6);
         assert!((seen.texels(Vec2::Y) - 1.0).abs() < 1e-6);
     }

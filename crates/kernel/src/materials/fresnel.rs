@@ -2,9 +2,10 @@
 
 use crate::math::Vec3;
 
-/// Unpolarized reflectance of a dielectric boundary, and the cosine of the transmitted direction, which is `None` for total
-/// internal reflection. `cos_incident` ≥ 0 is measured on the ray's side; `eta` = n(far side)/n(ray's side). Uses the exact
-/// equations for both polarizations (Born and Wolf, *Principles of Optics*, section 1.5.2).
+/// Unpolarized reflectance of a dielectric boundary, and the cosine of the transmitted direction. The cosine
+/// is `None` for total internal reflection. `cos_incident` ≥ 0 is the cosine on the ray's side, and `eta` is
+/// n(far side)/n(ray's side). Uses the exact equations for both polarizations (Born and Wolf, *Principles of
+/// Optics*, section 1.5.2).
 #[inline]
 pub fn dielectric(cos_incident: f32, eta: f32) -> (f32, Option<f32>) {
     let (cos_i, eta) = (f64::from(cos_incident.clamp(0.0, 1.0)), f64::from(eta));
@@ -19,13 +20,13 @@ pub fn dielectric(cos_incident: f32, eta: f32) -> (f32, Option<f32>) {
     ((0.5 * (parallel * parallel + perpendicular * perpendicular)) as f32, Some(cos_t as f32))
 }
 
-/// [`dielectric`] from outside (`eta` ≥ 1) in `f32`, for packets.
+/// [`dielectric`] from outside (`eta` ≥ 1), in `f32` for packets.
 #[inline(always)]
 pub fn dielectric_outside(cos_incident: f32, eta: f32) -> f32 {
     by_root(cos_incident, eta, (eta - 1.0) * (eta + 1.0) + cos_incident * cos_incident)
 }
 
-/// [`dielectric`] from either side in `f32`, for packets; 1 for total internal reflection.
+/// [`dielectric`] from either side, in `f32` for packets. 1 for total internal reflection.
 #[inline(always)]
 pub fn dielectric_either(cos_incident: f32, eta: f32) -> f32 {
     let squared = (eta - 1.0) * (eta + 1.0) + cos_incident * cos_incident;
@@ -43,8 +44,8 @@ fn by_root(cos_incident: f32, eta: f32, cos2_t: f32) -> f32 {
     0.5 * (parallel * parallel + perpendicular * perpendicular)
 }
 
-/// Transmittance of a boundary for unpolarized light, from both cosines with its normal and both indices of refraction. It is
-/// bit-identical from either side, and computed without cancellation.
+/// Transmittance of a boundary for unpolarized light, from the cosines and the indices of refraction on both
+/// sides. The result is bit-identical in both directions, and computed without cancellation.
 #[inline(always)]
 pub fn transmittance([cos_1, cos_2]: [f32; 2], [n_1, n_2]: [f32; 2]) -> f32 {
     let (parallel, perpendicular) = (n_2 * cos_1 + n_1 * cos_2, n_1 * cos_1 + n_2 * cos_2);
@@ -57,8 +58,8 @@ pub fn transmittance([cos_1, cos_2]: [f32; 2], [n_1, n_2]: [f32; 2]) -> f32 {
 pub fn conductor(cos_incident: f32, eta: f32, k: f32) -> f32 {
     let cos2 = cos_incident * cos_incident;
     let sin2 = (1.0 - cos2).max(0.0);
-    // a + ib is the square root of (η + ik)² − sin²θ. Of a² and b², compute the larger one first, because the smaller one suffers
-    // from cancellation.
+    // a + ib is the square root of (η + ik)² − sin²θ. Compute the larger of a² and b² first, because the
+    // smaller one would suffer from cancellation.
     let real = (eta - k) * (eta + k) - sin2;
     let product = eta * k;
     let sum = (real * real + 4.0 * product * product).sqrt();
@@ -66,7 +67,7 @@ pub fn conductor(cos_incident: f32, eta: f32, k: f32) -> f32 {
     let smaller = product * product / larger.max(f32::MIN_POSITIVE);
     let a = if real > 0.0 { larger } else { smaller }.sqrt();
     let (even, odd) = (sum + cos2, 2.0 * a * cos_incident);
-    // For an index of 1 the reflectance is 0; keep rounding from making it negative.
+    // For an index of 1, the reflectance is 0. Prevent rounding from making it negative.
     let rest = if even > odd { even - odd } else { 0.0 };
     let perpendicular = rest / (even + odd).max(f32::MIN_POSITIVE);
     let (even, odd) = (cos2 * sum + sin2 * sin2, odd * sin2);
@@ -76,8 +77,8 @@ pub fn conductor(cos_incident: f32, eta: f32, k: f32) -> f32 {
     0.5 * (perpendicular + parallel)
 }
 
-/// Schlick's weight (1 − cosθ)⁵ of the grazing reflectance relative to the one at normal incidence (Schlick, *An Inexpensive BRDF
-/// Model for Physically-based Rendering*, 1994).
+/// Schlick's weight (1 − cosθ)⁵ for interpolating from the reflectance at normal incidence to the reflectance
+/// at grazing incidence (Schlick, *An Inexpensive BRDF Model for Physically-based Rendering*, 1994).
 #[inline(always)]
 pub fn schlick_weight(cos_incident: f32) -> f32 {
     let rest = (1.0 - cos_incident).max(0.0);
@@ -85,8 +86,8 @@ pub fn schlick_weight(cos_incident: f32) -> f32 {
     squared * squared * rest
 }
 
-/// The refracted direction (Snell's law) of unit `incident`, given the unit normal on its side and the cosine from
-/// [`dielectric`].
+/// The refracted direction (Snell's law) of the unit vector `incident`, given the unit normal on its side and
+/// the cosine from [`dielectric`].
 pub fn refract(incident: Vec3, normal: Vec3, eta: f32, cos_transmitted: f32) -> Vec3 {
     let cos_incident = -incident.dot(normal);
     (incident / eta + normal * (cos_incident / eta - cos_transmitted)).normalize()
@@ -111,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn both_sides_of_a_boundary_agree() {
+    fn reflectance_and_transmittance_sum_to_one() {
         for eta in [0.4_f32, 0.75, 1.01, 1.5, 2.5] {
             for step in 1..=1000_u16 {
                 let cosine = f32::from(step) / 1000.0;
@@ -132,7 +133,7 @@ mod tests {
         let over = |z: Complex, [c, d]: Complex| times(z, [c / (c * c + d * d), -d / (c * c + d * d)]);
         let index = [eta, k];
         let [re, im] = times(index, index);
-        // η times the cosine of the transmitted direction: √(n² − sin²θ).
+        // η times the cosine of the transmitted direction is √(n² − sin²θ).
         let (re, im) = (re - (1.0 - cos * cos), im);
         let size = (re * re + im * im).sqrt();
         let root = [((size + re) * 0.5).sqrt(), ((size - re) * 0.5).sqrt()];
@@ -150,17 +151,17 @@ mod tests {
                 let cosine = f32::from(step) / 100.0;
                 let exact = conductor_of_complex_numbers(cosine.into(), eta.into(), k.into());
                 let found = f64::from(conductor(cosine, eta, k));
-                assert!((exact - found).abs() < 2e-5, "{eta} + {k}i at {cosine}: {found} is not {exact}");
+                assert!((exact - found).abs() < 2e-5, "{eta} + {k}i at {cosine}: {found} instead of {exact}");
             }
         }
-        // With equal indices nothing is reflected: rounding must not give a negative reflectance.
+        // With equal indices, nothing is reflected. Rounding must not make the reflectance negative.
         for eta in [1.0_f32, 1.0 - f32::EPSILON, 1.0 + f32::EPSILON, 1.001] {
             for step in 0..=1000_u16 {
                 let found = conductor(f32::from(step) / 1000.0, eta, 0.0);
                 assert!((0.0..=1.0).contains(&found), "{eta} at {step}: {found}");
             }
         }
-        // Gold at normal incidence: ((η − 1)² + k²)/((η + 1)² + k²).
+        // Gold at normal incidence is ((η − 1)² + k²)/((η + 1)² + k²).
         assert!((conductor(1.0, 0.108, 3.508) - 0.9681).abs() < 1e-4);
     }
 
@@ -172,7 +173,7 @@ mod tests {
     fn reflectance_at_known_angles() {
         assert!((reflectance(0.0, 1.5) - 0.04).abs() < 1e-7);
         assert!((reflectance(90.0, 1.5) - 1.0).abs() < 1e-5);
-        // Brewster's angle: half of the perpendicular reflectance.
+        // At Brewster's angle, half of the perpendicular reflectance.
         let brewster = 1.5_f64.atan();
         let expected =
             0.5 * ((brewster.cos() - 1.5 * brewster.sin()) / (brewster.cos() + 1.5 * brewster.sin())).powi(2);
@@ -189,7 +190,7 @@ mod tests {
     }
 
     #[test]
-    fn hemispherical_mean_from_both_sides() {
+    fn hemispherical_means_match_known_values() {
         let mean = |eta: f32| {
             let n = 1_000_000;
             let cos2 = |i: i32| (f64::from(i) + 0.5) / f64::from(n);

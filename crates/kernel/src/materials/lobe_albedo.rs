@@ -1,9 +1,10 @@
 //! Directional albedos of microfacet lobes: E(μ) = ∫ f(μ, ω) cosθ dω, as functions of the cosine μ of the view direction.
 //!
-//! They are computed by quadrature over visible normals (Heitz, *Sampling the GGX Distribution of Visible Normals*, JCGT 7(4),
-//! 2018) and stored as polynomials in t = (1 + c)μ/(μ + c), which expands grazing angles. For μ ≥ 0.05, the polynomials are never
-//! below the albedo and at most 8e-4 above it; interpolation in tables over a varying roughness adds at most 2e-3. The base under
-//! a lobe therefore never receives too much light.
+//! They are computed by quadrature over visible normals (Heitz, *Sampling the GGX Distribution of Visible
+//! Normals*, JCGT 7(4), 2018) and stored as polynomials in t = (1 + c)μ/(μ + c), which gives more weight to
+//! grazing angles. For μ ≥ 0.05, the polynomials are never below the albedo, and exceed it by at most 8e-4.
+//! Interpolation in roughness tables adds an error of at most 2e-3. Therefore, the base under a lobe never
+//! receives too much light.
 
 use std::f64::consts::TAU;
 
@@ -23,7 +24,7 @@ const TABLE_SIZE: usize = 80;
 pub struct LobeAlbedo {
     /// Coefficients of the powers of 2t − 1.
     pub terms: [f32; TERMS],
-    /// Its cosine-weighted mean over all directions, 2 ∫ E(μ) μ dμ.
+    /// The cosine-weighted mean over all directions, 2 ∫ E(μ) μ dμ.
     pub mean: f32,
 }
 
@@ -34,27 +35,28 @@ impl LobeAlbedo {
         evaluate(cosine, |number| self.terms[number])
     }
 
-    /// Computes the albedo of a lobe with isotropic α and a facet reflectance that depends on the cosine.
+    /// Computes the albedo of a lobe with an isotropic α. The facet reflectance is a function of the cosine.
     pub fn of(alpha: f64, reflectance: impl Fn(f64) -> f64) -> Self {
         Self::fitted(|cosine| quadrature::<12, 16>(cosine, alpha, &reflectance))
     }
 
-    /// Fits a known albedo, and stores its exact mean.
+    /// Fits a known albedo and stores its exact mean.
     pub fn known(albedo: impl Fn(f64) -> f64) -> Self {
         Self { mean: mean(&albedo) as f32, ..Self::fitted(albedo) }
     }
 
-    /// Fits a polynomial. The stored mean is the polynomial's, so that the light left for a base by this albedo is
+    /// Fits a polynomial. The stored mean is that of the polynomial, so the light that reaches a base is
     /// consistent with it.
     fn fitted(albedo: impl Fn(f64) -> f64) -> Self {
         const NODES: usize = 32;
-        // Evaluate the albedo at nodes that are denser at grazing angles. Nodes below μ = 0.03 have less weight.
+        // Evaluate the albedo at nodes that are denser at grazing angles.
         let nodes: [(f64, f64); NODES] = std::array::from_fn(|i| {
             let t = 0.5 - 0.5 * libm::cos(std::f64::consts::PI * (i as f64 + 0.5) / NODES as f64);
             let cosine = (t * t.sqrt()).max(0.004);
             (cosine, albedo(cosine))
         });
-        // Fit a Chebyshev series. Weights that grow with the errors equalize them (Lawson's algorithm).
+        // Fit a Chebyshev series. Increasing the weights of nodes with large errors equalizes the errors
+        // (Lawson's algorithm). Nodes below μ = 0.03 have less weight.
         let least = |cosine: f64| if cosine < 0.03 { 0.1 } else { 1.0 };
         let mut weights = nodes.map(|(cosine, _)| least(cosine));
         let mut terms = [0.0; TERMS];
@@ -66,7 +68,7 @@ impl LobeAlbedo {
                 *weight *= (0.3 + error / largest).sqrt();
             }
         }
-        // Raise the polynomial above the albedo.
+        // Raise the polynomial until it is nowhere below the albedo.
         let missing = nodes
             .iter()
             .filter(|(cosine, _)| *cosine > 0.03)
@@ -86,15 +88,15 @@ impl LobeAlbedo {
     }
 }
 
-/// Albedos as a function of roughness.
+/// Albedos as functions of roughness.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AlbedoTable {
-    /// Albedos at equidistant roughness values from 0 to 1, or a single one.
+    /// Albedos at evenly spaced roughness values from 0 to 1, or a single albedo.
     rows: Vec<LobeAlbedo>,
 }
 
 impl AlbedoTable {
-    /// A table for lobes with α = `alpha(roughness)`; it has a single entry if the roughness is constant.
+    /// A table for lobes with α = `alpha(roughness)`. It has a single entry if the roughness is constant.
     pub fn new(roughness: Option<f32>, alpha: impl Fn(f32) -> f32, reflectance: impl Fn(f64) -> f64) -> Self {
         let row = |roughness: f32| LobeAlbedo::of(alpha(roughness).into(), &reflectance);
         let rows = match roughness {
@@ -109,7 +111,7 @@ impl AlbedoTable {
         Self { rows: vec![albedo] }
     }
 
-    /// The albedo for a roughness in [0, 1].
+    /// The albedo for a given roughness in [0, 1].
     pub fn at(&self, roughness: f32) -> LobeAlbedo {
         let place = roughness.clamp(0.0, 1.0) * (self.rows.len() - 1) as f32;
         let number = (place as usize).min(self.rows.len().saturating_sub(2));
@@ -118,7 +120,7 @@ impl AlbedoTable {
     }
 }
 
-/// The albedo at μ ≥ 0, given a function that returns the terms.
+/// The albedo at μ ≥ 0, given a function that returns the coefficients.
 #[inline(always)]
 pub fn evaluate(cosine: f32, term: impl Fn(usize) -> f32) -> f32 {
     let t = (1.0 + KNEE as f32) * cosine / (cosine + KNEE as f32);
@@ -151,7 +153,8 @@ fn sum(terms: &[f64; TERMS], cosine: f64) -> f64 {
     chebyshev(cosine).iter().zip(terms).map(|(value, term)| value * term).sum()
 }
 
-/// Least-squares coefficients, from the normal equations with Gaussian elimination; the matrix is positive definite.
+/// Least-squares coefficients. Solves the normal equations with Gaussian elimination. The matrix is positive
+/// definite.
 fn least_squares(nodes: &[(f64, f64)], weights: &[f64]) -> [f64; TERMS] {
     let mut rows = [[0.0; TERMS + 1]; TERMS];
     for (&(cosine, value), weight) in nodes.iter().zip(weights) {
@@ -219,15 +222,15 @@ fn gauss(count: usize) -> impl Iterator<Item = (f64, f64)> {
     })
 }
 
-/// The facets visible from a direction, parameterized by a point (x, b) on the unit disk: x is perpendicular to the plane of
-/// incidence, b is in it.
+/// The facets that are visible from a direction. They are parameterized by a point (x, b) on the unit disk,
+/// where x is perpendicular to the plane of incidence and b is in it.
 struct VisibleFacets {
     alpha: f64,
     to_eye: DVec3,
-    /// The stretched direction, and the axis of b.
+    /// The stretched direction, followed by the axis of b.
     view: DVec3,
     second: DVec3,
-    /// Λ of the direction.
+    /// Λ of the view direction.
     masked: f64,
 }
 
@@ -239,7 +242,8 @@ impl VisibleFacets {
         Self { alpha, to_eye, view, second, masked: lambda(cosine, alpha) }
     }
 
-    /// Cosine between a facet and the direction, and cosine of the reflected direction with the surface normal.
+    /// Cosine between a facet and the view direction, and cosine between the reflected direction and the
+    /// surface normal.
     fn mirrored(&self, x: f64, b: f64) -> [f64; 2] {
         let Self { alpha, to_eye, view, second, .. } = self;
         let part = 0.5 * (1.0 + view.z);
@@ -251,12 +255,13 @@ impl VisibleFacets {
         [between, 2.0 * between * half.z - to_eye.z]
     }
 
-    /// Height of the reflected direction at a position on the chord at x, in units of half its length from its center.
+    /// Height of the reflected direction at a point on the chord at x. The point is given relative to the
+    /// chord's center, in units of half its length.
     fn height(&self, x: f64, part: f64) -> f64 {
         self.mirrored(x, (1.0 - x * x).sqrt() * part)[1]
     }
 
-    /// A position on the chord at which light is reflected above the surface. `None` if there is none.
+    /// A point on the chord for which light is reflected above the surface, if there is one.
     fn lit(&self, x: f64) -> Option<f64> {
         const STEPS: u32 = 12;
         let parts = (0..=STEPS).map(|i| 2.0 * f64::from(i) / f64::from(STEPS) - 1.0);
@@ -264,7 +269,8 @@ impl VisibleFacets {
         heights.max_by(|one, other| one.1.total_cmp(&other.1)).filter(|best| best.1 > 0.0).map(|best| best.0)
     }
 
-    /// The ends of the part of the chord around `lit` where light is reflected above the surface, in half chords from its center.
+    /// The ends of the part of the chord around `lit` for which light is reflected above the surface,
+    /// relative to the chord's center and in units of half its length.
     fn ends(&self, x: f64, lit: f64) -> [f64; 2] {
         [-1.0, 1.0].map(|end| last_true(lit, end, |part| self.height(x, part) > 0.0))
     }
@@ -276,7 +282,8 @@ fn lambda(cosine: f64, alpha: f64) -> f64 {
     0.5 * ((1.0 + alpha * alpha * tangent2).sqrt() - 1.0)
 }
 
-/// The last position from `from` toward `to` at which a predicate holds, found by bisection. It must hold at `from`.
+/// The last position from `from` toward `to` where a predicate is true, found by bisection. It must be true
+/// at `from`.
 fn last_true(mut from: f64, mut to: f64, holds: impl Fn(f64) -> bool) -> f64 {
     if holds(to) {
         return to;
@@ -288,20 +295,21 @@ fn last_true(mut from: f64, mut to: f64, holds: impl Fn(f64) -> bool) -> f64 {
     from
 }
 
-/// Nodes in (0, 1) and weights for functions that vary quickly near both ends.
+/// Nodes in (0, 1) and weights, for functions that vary quickly near both ends.
 fn dense_at_ends(count: usize) -> Vec<(f64, f64)> {
     gauss(count).map(|(t, weight)| (t * t * (3.0 - 2.0 * t), weight * 6.0 * t * (1.0 - t))).collect()
 }
 
-/// E(μ): the mean of F·G/G₁ over visible normals, with `ACROSS` nodes perpendicular to the plane of incidence and `ALONG` nodes
-/// in it. All nodes are where light is reflected above the surface; integrating across that border would cost accuracy.
+/// E(μ), which is the mean of F·G/G₁ over visible normals. There are `ACROSS` nodes perpendicular to the
+/// plane of incidence and `ALONG` nodes in it. For accuracy, nodes cover only the facets that reflect light
+/// above the surface.
 fn quadrature<const ACROSS: usize, const ALONG: usize>(
     cosine: f64,
     alpha: f64,
     reflectance: &impl Fn(f64) -> f64,
 ) -> f64 {
     let facets = VisibleFacets::new(cosine, alpha);
-    // Half of the disk is enough: the integrand is symmetric.
+    // Half of the disk is enough because the integrand is symmetric.
     let widest = last_true(0.0, 0.25 * TAU, |turn| facets.lit(libm::sin(turn)).is_some());
     let along = dense_at_ends(ALONG);
     let mut sum = 0.0;
@@ -319,7 +327,7 @@ fn quadrature<const ACROSS: usize, const ALONG: usize>(
     sum * 4.0 / TAU
 }
 
-/// [`crate::materials::fresnel::dielectric`] from outside, in `f64`.
+/// Double-precision version of [`crate::materials::fresnel::dielectric`] for light from outside.
 pub fn dielectric(cosine: f64, eta: f64) -> f64 {
     let root = (eta * eta - 1.0 + cosine * cosine).sqrt();
     let square = |over: f64, under: f64| if under > 0.0 { (over / under) * (over / under) } else { 0.0 };
@@ -327,8 +335,8 @@ pub fn dielectric(cosine: f64, eta: f64) -> f64 {
     0.5 * (parallel + square(cosine - root, cosine + root))
 }
 
-/// Effective reflectance of a diffuse base under a coat, for light already inside: kd/(1 − kd·F_dr), where `returned` is the
-/// coat's internal reflectance F_dr.
+/// Effective reflectance of a diffuse base under a coat for light that has entered the coat: kd/(1 −
+/// kd·F_dr). `returned` is the coat's internal reflectance F_dr.
 pub fn under_coat(diffuse: Vec3, returned: f32) -> Vec3 {
     diffuse / (Vec3::ONE - diffuse * returned)
 }
@@ -358,7 +366,8 @@ mod tests {
         }
     }
 
-    /// Integrates over visible normals with many uniform steps, ignoring where light is reflected to.
+    /// Integrates over visible normals in many uniform steps, without treating reflections below the surface
+    /// separately.
     fn plain_quadrature(cosine: f64, alpha: f64, reflectance: impl Fn(f64) -> f64) -> f64 {
         const STEPS: i32 = 600;
         let facets = VisibleFacets::new(cosine, alpha);
@@ -384,7 +393,7 @@ mod tests {
                     let reflectance = |cosine: f64| fresnel(cosine, eta);
                     let found = quadrature::<12, 16>(cosine, alpha, &reflectance);
                     let exact = plain_quadrature(cosine, alpha, reflectance);
-                    assert!((found - exact).abs() < 3e-4, "α {alpha}, μ {cosine}: {found} is not {exact}");
+                    assert!((found - exact).abs() < 3e-4, "α {alpha}, μ {cosine}: {found}, not {exact}");
                 }
             }
         }
@@ -400,7 +409,7 @@ mod tests {
     }
 
     #[test]
-    fn tables_interpolate_single_entries() {
+    fn interpolated_tables_match_single_entries() {
         let fresnel = |cosine: f64| dielectric(cosine, 1.5);
         let alpha = |roughness: f32| (roughness * roughness).max(0.001);
         let table = AlbedoTable::new(None, alpha, fresnel);
@@ -412,7 +421,7 @@ mod tests {
                 let (one, other) = (lerp.at(cosine), single.at(cosine));
                 assert!(
                     (one - other).abs() < 2e-3,
-                    "roughness {roughness}, μ {cosine}: {one} is not {other}"
+                    "roughness {roughness}, μ {cosine}: {one} instead of {other}"
                 );
             }
         }

@@ -2,10 +2,11 @@
 //! height-correlated Smith masking and shadowing (Heitz, *Understanding the Masking-Shadowing Function in Microfacet-Based
 //! BRDFs*, JCGT 3(2), 2014), single scattering.
 //!
-//! A lobe is f = F·D·G/(4 cosθᵢ cosθₒ) with G = 1/(1 + Λᵢ + Λₒ). With s(θ) = √(cos²θ + α² sin²θ), 1 + 2Λ = s/cosθ. So G/(4 cosθᵢ
-//! cosθₒ) = 1/(2(cosθᵢ sₒ + cosθₒ sᵢ)), and the pdf of a direction reflected at a visible normal is D/(2(cosθₒ + sₒ)): there is
-//! no division by the cosine of a grazing direction. The tangent of the half vector is computed from its part perpendicular to
-//! the normal, which stays accurate near the peak of a narrow lobe.
+//! A lobe is f = F·D·G/(4 cosθᵢ cosθₒ) with G = 1/(1 + Λᵢ + Λₒ). Let s(θ) = √(cos²θ + α² sin²θ), which
+//! implies 1 + 2Λ = s/cosθ. Then G/(4 cosθᵢ cosθₒ) = 1/(2(cosθᵢ sₒ + cosθₒ sᵢ)), and the pdf of a direction
+//! reflected at a visible normal is D/(2(cosθₒ + sₒ)). This avoids dividing by the cosine of a grazing
+//! direction. The tangent of the half vector's angle is computed from the component perpendicular to the
+//! normal, which is accurate even near the peak of a narrow lobe.
 
 use std::f32::consts::{FRAC_1_PI, PI};
 
@@ -14,16 +15,16 @@ use crate::math::elementary::sin_cos;
 use crate::math::frame::Frame;
 use crate::math::lanes::{Mask, PACKET_SIZE, Vec3x16, lane, select, set_lane};
 
-/// Minimum α: narrower lobes cannot be resolved by `f32` directions.
+/// Minimum α. Narrower lobes cannot be resolved by `f32` directions.
 pub const MIN_ALPHA: f32 = 1e-3;
 
 /// Minimum cosine of directions above the surface.
 const MIN_COSINE: f32 = 1e-6;
 
-/// Minimum cosine between a normal and the direction to the viewer; see [`facing`].
+/// Minimum cosine between a normal and the direction to the viewer, see [`facing`].
 const MIN_FACING_COSINE: f32 = 1e-3;
 
-/// α of a lobe along u and along v: α = roughness², stretched by an anisotropy in [−1, 1].
+/// A lobe's α along u and along v. The base value, roughness², is stretched by an anisotropy in [−1, 1].
 #[inline]
 pub fn alphas(roughness: f32, anisotropy: f32) -> [f32; 2] {
     let alpha = roughness * roughness;
@@ -32,8 +33,8 @@ pub fn alphas(roughness: f32, anisotropy: f32) -> [f32; 2] {
     if anisotropy < 0.0 { [narrow, wide] } else { [wide, narrow] }
 }
 
-/// Rotates the unit normal just enough to face the viewer. Shading normals may face away from it near the silhouettes of smooth
-/// meshes.
+/// Rotates the unit normal just enough to face the viewer. Shading normals may face away from the viewer near
+/// silhouettes of smooth meshes.
 #[inline(always)]
 pub fn facing(normal: Vec3, to_eye: Vec3) -> Vec3 {
     let missing = MIN_FACING_COSINE - normal.dot(to_eye);
@@ -49,9 +50,9 @@ pub fn facing_single(normal: Vec3, to_eye: Vec3) -> Vec3 {
     if normal.dot(to_eye) < MIN_FACING_COSINE { facing(normal, to_eye) } else { normal }
 }
 
-/// Sets the directions to the viewer from the incoming ray directions, rotates the normals with [`facing`], and stores them in
-/// the surfaces in `of`, or in all surfaces. Implements [`MaterialRow::orient`](super::bsdf::MaterialRow::orient) for microfacet
-/// lobes.
+/// Implements [`MaterialRow::orient`](super::bsdf::MaterialRow::orient) for microfacet lobes. Sets the
+/// directions to the viewer from the incoming ray directions, and rotates the normals with [`facing`]. The
+/// normals are stored for the surfaces in `of`, or for all surfaces.
 #[inline(always)]
 pub fn orient_to_viewers(
     of: Option<&Mask>,
@@ -79,11 +80,11 @@ pub fn orient_to_viewers(
 /// The unnormalized half vector of two unit directions.
 #[derive(Clone, Copy)]
 pub struct Half {
-    /// Squared length; for a reflection, (2 cosθ)², where θ is the angle to either direction.
+    /// Squared length. For a reflection, this is (2 cosθ)², where θ is the angle to either direction.
     pub squared: f32,
     /// Component along the normal.
     pub along: f32,
-    /// Part perpendicular to the normal.
+    /// Component perpendicular to the normal.
     pub across: Vec3,
 }
 
@@ -96,8 +97,8 @@ impl Half {
         Self { squared: sum.length_squared(), along, across: sum - normal * along }
     }
 
-    /// The half vector of a refraction, up to its sign: the sum of the directions weighted by the indices of refraction on their
-    /// sides (Walter et al. 2007, section 5.3). Also returns that sum.
+    /// The half vector of a refraction, up to its sign. It is the sum of the directions, weighted by the
+    /// indices of refraction on their sides (Walter et al. 2007, section 5.3). Also returns this sum.
     #[inline(always)]
     pub fn refracted(normal: Vec3, [one, other]: [Vec3; 2], [of_one, of_other]: [f32; 2]) -> (Self, Vec3) {
         let sum = one * of_one + other * of_other;
@@ -125,7 +126,7 @@ impl Half {
         self.distribution(x * x + y * y, u * v)
     }
 
-    /// D, given the squared perpendicular part divided by α² and the product of both α.
+    /// D, given the squared perpendicular component divided by α², and the product of both α.
     #[inline(always)]
     fn distribution(&self, stretched: f32, product: f32) -> f32 {
         let slope = self.along * self.along + stretched;
@@ -133,7 +134,7 @@ impl Half {
     }
 }
 
-/// A direction's cosine with the normal, and its s(θ) as defined at the top of this file.
+/// The cosine between a direction and the normal, and s(θ) as defined at the top of this file.
 #[derive(Clone, Copy)]
 pub struct SmithTerms {
     /// cosθ.
@@ -166,14 +167,14 @@ impl SmithTerms {
         self.cosine > MIN_COSINE
     }
 
-    /// D·G/(4 cosθᵢ cosθₒ) in sr⁻¹, given D; 0 if either direction is below the surface.
+    /// D·G/(4 cosθᵢ cosθₒ) in sr⁻¹, given D. 0 if either direction is below the surface.
     #[inline(always)]
     pub fn reflected(&self, other: &Self, distribution: f32) -> f32 {
         let value = distribution / (2.0 * (self.cosine * other.slope + other.cosine * self.slope));
         if self.is_ahead() & other.is_ahead() { value } else { 0.0 }
     }
 
-    /// Pdf in sr⁻¹ of a direction sampled by [`sample_reflection`] for this one, given D there.
+    /// Pdf in sr⁻¹ of a direction that is sampled by [`sample_reflection`] for this view direction, given D.
     #[inline(always)]
     pub fn pdf(&self, distribution: f32) -> f32 {
         let pdf = distribution / (2.0 * (self.cosine + self.slope));
@@ -182,7 +183,8 @@ impl SmithTerms {
 }
 
 impl SmithTerms {
-    /// [`SmithTerms::pdf`], given the result of [`SmithTerms::reflected`] instead of D. 0 for directions below the surface.
+    /// [`SmithTerms::pdf`], computed from the result of [`SmithTerms::reflected`] instead of D. 0 for
+    /// directions below the surface.
     #[inline(always)]
     pub fn pdf_from_reflected(&self, other: &Self, reflected: f32) -> f32 {
         let both = self.cosine * other.slope + other.cosine * self.slope;
@@ -191,7 +193,7 @@ impl SmithTerms {
     }
 }
 
-/// A frame around a normal, with its first tangent along a vector.
+/// A frame around a normal, with the first tangent along a vector.
 #[inline(always)]
 pub fn frame_along(normal: Vec3, tangent: Vec3) -> Frame {
     let plain = Frame::from_normal(normal);
@@ -204,22 +206,23 @@ pub fn frame_along(normal: Vec3, tangent: Vec3) -> Frame {
     Frame { s, t: normal.cross(s), n: normal }
 }
 
-/// Samples a direction by reflecting the view direction at a visible normal (Heitz, *Sampling the GGX Distribution of Visible
-/// Normals*, JCGT 7(4), 2018). The result may be below the surface, where the lobe is 0.
+/// Samples a direction by reflecting the view direction at a visible normal (Heitz, *Sampling the GGX
+/// Distribution of Visible Normals*, JCGT 7(4), 2018). The result may be below the surface, where f is 0.
 #[inline(always)]
 pub fn sample_reflection(frame: &Frame, to_eye: Vec3, alphas: [f32; 2], u: [f32; 2]) -> Vec3 {
     reflect_at(sample_visible_normal(frame, to_eye, alphas, u), to_eye)
 }
 
-/// Reflects the view direction at a facet with this unit normal.
+/// Reflects the view direction at a facet with the given unit normal.
 #[inline(always)]
 pub fn reflect_at(half: Vec3, to_eye: Vec3) -> Vec3 {
     let direction = half * (2.0 * half.dot(to_eye)) - to_eye;
     direction * (1.0 / direction.length_squared().sqrt())
 }
 
-/// The direction of light that a facet with this unit normal refracts toward the viewer. `eta` is the index of refraction on the
-/// light's side divided by that on the viewer's side. For total internal reflection, returns an arbitrary unit direction.
+/// The light direction that a facet with the given unit normal refracts toward the viewer. `eta` is the index
+/// of refraction on the light's side divided by the index on the viewer's side. Returns an arbitrary unit
+/// vector for total internal reflection.
 #[inline(always)]
 pub fn refract_at(half: Vec3, to_eye: Vec3, eta: f32) -> Vec3 {
     let cosine = half.dot(to_eye);
@@ -242,7 +245,7 @@ fn sample_local_visible_normal(eye: Vec3, [along_u, along_v]: [f32; 2], u: [f32;
     // Stretch the view direction to the hemisphere configuration.
     let stretched = Vec3::new(along_u * eye.x, along_v * eye.y, eye.z);
     let view = stretched * (1.0 / stretched.length_squared().sqrt());
-    // Build an orthonormal basis around it.
+    // Build an orthonormal basis around the result.
     let squared = view.x * view.x + view.y * view.y;
     let is_upright = squared < 1e-14;
     let inverse = 1.0 / if is_upright { 1.0 } else { squared.sqrt() };

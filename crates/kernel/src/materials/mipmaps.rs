@@ -1,4 +1,5 @@
-//! Mip levels of a texture, each with half the columns and rows of the previous one (Williams, *Pyramidal Parametrics*, 1983).
+//! Mip levels of a texture. Each has half as many columns and rows as the previous one (Williams, *Pyramidal
+//! Parametrics*, 1983).
 
 use std::iter::Sum;
 use std::ops::Mul;
@@ -6,17 +7,17 @@ use std::ops::Mul;
 use super::texels::{TexelData, Texels};
 use crate::math::{Vec3, Vec4};
 
-/// All mip levels of an image except the image itself, in linear light. The last level has one texel.
+/// All mip levels of an image except the image itself, in linear color space. The last level has one texel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mipmaps {
     levels: Vec<Texels>,
 }
 
 impl Mipmaps {
-    /// Computes each level from the previous one with `halve`, which may fail.
+    /// Computes each level from the previous one with `halve`.
     ///
     /// # Errors
-    /// The errors of `halve`.
+    /// Errors from `halve`.
     pub fn of<E>(texels: &Texels, halve: impl Fn(&Texels) -> Result<Texels, E>) -> Result<Self, E> {
         let mut levels: Vec<Texels> = Vec::new();
         while let last = levels.last().unwrap_or(texels)
@@ -27,22 +28,22 @@ impl Mipmaps {
         Ok(Self { levels })
     }
 
-    /// Level `number` ≥ 1; beyond the last level, the last.
+    /// Returns level `number` ≥ 1, or the last level if there are fewer.
     pub fn level(&self, number: usize) -> Option<&Texels> {
         self.levels.get(number - 1).or(self.levels.last())
     }
 
-    /// Number of levels, not counting the image.
+    /// Number of levels, not counting the original image.
     pub fn count(&self) -> usize {
         self.levels.len()
     }
 
-    /// Bytes used by the levels.
+    /// Memory used by the levels, in bytes.
     pub fn memory_bytes(&self) -> usize {
         self.levels.iter().map(Texels::memory_bytes).sum()
     }
 
-    /// Bytes used by the levels of an image of this size, with or without alpha.
+    /// Memory used by the levels of an image with this size, with or without alpha, in bytes.
     pub fn memory_bytes_of(width: u32, height: u32, is_weighted: bool) -> u64 {
         let texel_bytes = if is_weighted { size_of::<Vec4>() } else { size_of::<Vec3>() };
         let (mut width, mut height, mut bytes) = (u64::from(width), u64::from(height), 0);
@@ -62,12 +63,12 @@ pub struct ImageHalver<'a> {
 }
 
 impl<'a> ImageHalver<'a> {
-    /// Prepares to halve an image.
+    /// Creates a halver for an image.
     pub fn new(of: &'a Texels) -> Self {
         Self { of, width: (of.width / 2).max(1), height: (of.height / 2).max(1) }
     }
 
-    /// Number of rows of the smaller image.
+    /// Number of rows in the smaller image.
     pub fn rows(&self) -> u32 {
         self.height
     }
@@ -82,8 +83,8 @@ impl<'a> ImageHalver<'a> {
         }
     }
 
-    /// Appends a row of the smaller image. Each texel is the mean over the area that it covers in the larger image, so that the
-    /// overall mean is preserved even for odd sizes.
+    /// Appends a row of the smaller image. Each texel is the mean over the area that it covers in the larger
+    /// image, which preserves the overall mean even for odd sizes.
     pub fn row(&self, y: u32, to: &mut TexelData) {
         let rows = CoveredTexels::new(y, self.height, self.of.height);
         for x in 0..self.width {
@@ -109,7 +110,7 @@ impl<'a> ImageHalver<'a> {
     }
 }
 
-/// Up to three texels of the larger image, along one axis, that a texel of the smaller image covers.
+/// Up to three texels of the larger image that a texel of the smaller image covers along one axis.
 struct CoveredTexels {
     first: u32,
     weights: [f32; 3],
@@ -117,7 +118,8 @@ struct CoveredTexels {
 
 impl CoveredTexels {
     fn new(index: u32, of: u32, from: u32) -> Self {
-        // In units of 1/`of`, a texel of the larger image is `of` wide and a texel of the smaller image is `from` wide.
+        // In a common unit, a texel of the larger image is `of` wide and a texel of the smaller image is
+        // `from` wide.
         let (start, end) = (u64::from(index) * u64::from(from), u64::from(index + 1) * u64::from(from));
         let first = start / u64::from(of);
         let weight = |next: u64| {

@@ -10,14 +10,15 @@ use crate::math::Vec3;
 /// A perfect mirror.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Mirror {
-    /// The same reflectance at every angle.
+    /// The same reflectance at all angles.
     Constant(Color),
     /// A smooth conductor.
     Conductor(ConductorFresnel),
 }
 
 impl Mirror {
-    /// Reflectance at a cosine of the angle of incidence, with its color multiplied by `tint`. Adds to `lookups`.
+    /// Reflectance for a cosine of the angle of incidence, with the color multiplied by `tint`. Adds to
+    /// `lookups`.
     #[inline]
     pub fn reflectance(&self, cosine: f32, tint: Option<Vec3>, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
         match self {
@@ -47,7 +48,7 @@ impl Mirror {
     }
 }
 
-/// The direction of `incident` after reflection: R = I − 2(I·N)N.
+/// The reflected direction of `incident`: R = I − 2(I·N)N.
 pub fn reflect(incident: Vec3, normal: Vec3) -> Vec3 {
     incident - normal * (2.0 * incident.dot(normal))
 }

@@ -1,4 +1,4 @@
-//! Materials: reflection, transmission and emission of surfaces.
+//! Materials: reflection, transmission, and emission of surfaces.
 
 pub mod bsdf;
 pub mod coated;
@@ -34,21 +34,21 @@ pub use thin_dielectric::ThinDielectric;
 
 use crate::math::Vec3;
 
-/// A material, ready for texture lookups.
+/// A material that is ready for texture lookups.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Material {
     /// How the surface scatters light.
     pub bsdf: Bsdf,
     /// Emitted radiance.
     pub emission: Emission,
-    /// Perturbation of the shading normals, by a normal map or bump map.
+    /// Perturbation of the shading normals by a normal map, a bump map, or both.
     pub normal_perturbation: Option<NormalPerturbation>,
-    /// Probability that the surface exists at a point. `None` if it is opaque everywhere.
+    /// Probability that the surface exists at a point. `None` if the surface is opaque everywhere.
     pub opacity: Option<Opacity>,
 }
 
 impl Material {
-    /// Whether any property depends on texture coordinates or their directions.
+    /// Whether any property depends on texture coordinates or on tangents.
     pub fn is_textured(&self) -> bool {
         let in_bsdf = match &self.bsdf {
             Bsdf::Rough(rough) => rough.has_textures() || rough.has_direction(),
@@ -64,7 +64,8 @@ impl Material {
             || of_opacity.is_some()
     }
 
-    /// Whether light may pass the surface undeflected: it is a thin pane or partially transparent.
+    /// Whether light may pass through the surface undeflected, because it is a thin pane or partially
+    /// transparent.
     #[inline]
     pub fn has_null_interaction(&self) -> bool {
         let is_pane = match &self.bsdf {
@@ -74,8 +75,8 @@ impl Material {
         is_pane || self.opacity.is_some()
     }
 
-    /// Fraction of the light that passes undeflected, at texture coordinates and the cosine of the angle of incidence. `color`
-    /// multiplies the transmittance of a pane. Adds to `lookups`.
+    /// Fraction of light that passes undeflected, at the given texture coordinates and cosine of the angle of
+    /// incidence. `color` multiplies a pane's transmittance. Adds to `lookups`.
     pub fn null_transmittance(&self, at: &TexturePoint, color: Vec3, cosine: f32, lookups: &mut u64) -> Vec3 {
         let there = self.opacity.as_ref().map_or(1.0, |opacity| opacity.at(at, lookups));
         let through = match &self.bsdf {
@@ -88,7 +89,7 @@ impl Material {
         through * there + Vec3::splat(1.0 - there)
     }
 
-    /// Whether any of its textures has mip levels.
+    /// Whether any of the textures has mip levels.
     pub fn is_mipmapped(&self) -> bool {
         let in_bsdf = match &self.bsdf {
             Bsdf::Rough(rough) => rough.is_mipmapped(),
@@ -126,7 +127,7 @@ pub enum Bsdf {
 }
 
 impl Bsdf {
-    /// Whether it has a δ lobe.
+    /// Whether the surface has a δ lobe.
     #[inline]
     pub fn has_delta(&self) -> bool {
         match self {
@@ -136,19 +137,19 @@ impl Bsdf {
         }
     }
 
-    /// Whether it has a lobe that is not δ, so that light sampling can reach it.
+    /// Whether the surface has non-δ lobes, which light sampling can reach.
     #[inline]
     pub fn is_lit(&self) -> bool {
         self.rough().is_some()
     }
 
-    /// Whether its lobes depend on the directions of the texture axes.
+    /// Whether the lobes depend on the directions of the texture axes.
     #[inline]
     pub fn has_direction(&self) -> bool {
         self.rough().is_some_and(Rough::has_direction)
     }
 
-    /// Its lobes that are not δ. `None` if there are none.
+    /// The non-δ lobes, if there are any.
     #[inline]
     pub fn rough(&self) -> Option<&Rough> {
         match self {
@@ -165,7 +166,7 @@ impl Bsdf {
         }
     }
 
-    /// Whether it is a surface that also scatters light to its other side.
+    /// Whether the surface also scatters light to the other side.
     pub fn is_transmissive(&self) -> bool {
         match self {
             Self::Rough(rough) => rough.is_transmissive(),
@@ -174,7 +175,7 @@ impl Bsdf {
         }
     }
 
-    /// Its main color. Adds to `lookups`.
+    /// The main color. Adds to `lookups`.
     #[inline]
     pub fn albedo(&self, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
         match self {

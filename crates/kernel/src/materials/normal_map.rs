@@ -7,18 +7,18 @@ use super::texture::Texture;
 use crate::math::Vec3;
 use crate::math::frame::Frame;
 
-/// A tangent-space normal map: linear values (n + 1)/2, with z pointing away from the surface.
+/// A tangent-space normal map. Its linear values are (n + 1)/2, with z pointing away from the surface.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NormalMap {
     /// The normals.
     pub texture: Arc<Texture>,
-    /// Factor on the slopes; 0 makes the surface smooth.
+    /// Factor on the slopes. 0 makes the surface smooth.
     pub strength: f32,
 }
 
 impl NormalMap {
-    /// The perturbed shading normal, on the same side as `normal`. The tangents need not be unit vectors or perpendicular; if
-    /// they are 0, an arbitrary frame is used.
+    /// The perturbed shading normal, on the same side as `normal`. The tangents do not have to be unit
+    /// vectors or perpendicular. If they are 0, an arbitrary frame is used.
     #[inline]
     pub fn perturb(&self, at: &TexturePoint, normal: Vec3, dpdu: Vec3, dpdv: Vec3) -> Vec3 {
         let mapped = self.texture.lookup(at) * 2.0 - Vec3::ONE;
@@ -30,7 +30,8 @@ impl NormalMap {
     }
 }
 
-/// Unit tangents along u and v, perpendicular to the normal. Mirrored parameterizations keep their handedness.
+/// Unit tangents along u and v, perpendicular to the normal. Mirrored parameterizations keep their
+/// handedness.
 fn tangents(normal: Vec3, dpdu: Vec3, dpdv: Vec3) -> (Vec3, Vec3) {
     let Some(tangent) = (dpdu - normal * normal.dot(dpdu)).try_normalize() else {
         let frame = Frame::from_normal(normal);
@@ -73,11 +74,12 @@ mod tests {
         let mut turned = map(Vec3::new(0.6, 0.0, 0.8));
         let texture = Arc::make_mut(&mut turned.texture);
         texture.moved = UvTransform::new(UvSet::First, 90.0, DVec2::ZERO).map(Box::new);
-        // The texture's first coordinate is −v.
+        // The texture's first coordinate equals −v.
         let bent = turned.perturb(&middle(), Vec3::Z, Vec3::X, Vec3::Y);
         assert!((bent - Vec3::new(0.0, -0.6, 0.8)).length() < 1e-6, "{bent}");
-        // Rotated, stretched and skewed coordinates: the texture's are u' = 2 u cos + 3 v sin and v' = 3 v cos − 2 u sin with an
-        // angle of −30°. Its tangent along u' is the one along which v' is constant.
+        // Rotated, stretched, and skewed coordinates: the texture coordinates are u' = 2 u cos + 3 v sin and
+        // v' = 3 v cos − 2 u sin with an angle of −30°. The tangent along u' is the direction in which v' is
+        // constant.
         let mut turned = map(Vec3::new(0.6, 0.0, 0.8));
         let texture = Arc::make_mut(&mut turned.texture);
         (texture.moved, texture.repeat) =
@@ -88,7 +90,7 @@ mod tests {
         let along = dpdu * (cosine / 2.0) + dpdv * (sine / 3.0);
         let bent = turned.perturb(&middle(), Vec3::Z, dpdu, dpdv);
         let expected = along.normalize() * 0.6 + Vec3::Z * 0.8;
-        assert!((bent - expected).length() < 1e-6, "{bent}, not {expected}");
+        assert!((bent - expected).length() < 1e-6, "{bent} instead of {expected}");
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! Perturbation of shading normals by normal maps and bump maps, without changing the shape.
+//! Perturbs shading normals with normal maps and bump maps. The shape stays unchanged.
 
 use std::sync::Arc;
 
@@ -12,12 +12,12 @@ use crate::math::Vec3;
 pub struct NormalPerturbation {
     /// The normals.
     pub normal_map: Option<NormalMap>,
-    /// Heights over the surface with those normals.
+    /// Heights above the surface, added to the normal map's relief.
     pub bump: Option<Bump>,
 }
 
 impl NormalPerturbation {
-    /// Combines a normal map and a bump map. `None` if there is neither.
+    /// Combines a normal map and a bump map. Returns `None` if there is neither.
     pub fn new(normal_map: Option<NormalMap>, bump: Option<Bump>) -> Option<Self> {
         (normal_map.is_some() || bump.is_some()).then_some(Self { normal_map, bump })
     }
@@ -50,25 +50,27 @@ impl NormalPerturbation {
     }
 }
 
-/// A bump map: heights in the red channel of a texture (Blinn, *Simulation of Wrinkled Surfaces*, SIGGRAPH 1978).
+/// A bump map, with heights in the red channel of a texture (Blinn, *Simulation of Wrinkled Surfaces*,
+/// SIGGRAPH 1978).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bump {
     /// The heights.
     pub texture: Arc<Texture>,
-    /// Length of a height of 1. Negative values invert the relief.
+    /// Length that corresponds to a height of 1. Negative values invert the relief.
     pub scale: f32,
 }
 
 impl Bump {
-    /// Number of texture lookups per normal.
+    /// Number of texture lookups per perturbed normal.
     const LOOKUPS: u64 = 4;
 
-    /// Perturbs `bent` by the slopes of the heights over the surface with normal `normal`. If the tangents are degenerate, `bent`
-    /// is returned unchanged.
+    /// Perturbs `bent` by the slopes of the heights above the surface with normal `normal`. Returns `bent`
+    /// unchanged if the tangents are degenerate.
     ///
-    /// The surface gradient ∇h is Mikkelsen's (*Surface Gradient-Based Bump Mapping Framework*, JCGT 2020, section 2): ∇h = (h_u
-    /// (p_v × n) + h_v (n × p_u)) / (n · (p_u × p_v)). Slopes add up: with the normal m of a normal map, the perturbed normal is
-    /// along m / (m · n) − ∇h.
+    /// The surface gradient is ∇h = (h_u (p_v × n) + h_v (n × p_u)) / (n · (p_u × p_v)) (Mikkelsen, *Surface
+    /// Gradient-Based Bump Mapping Framework*, JCGT 2020, section 2). Slopes of a normal map and a bump map
+    /// add up: if m is the normal from the normal map, the perturbed normal has the direction m / (m · n) −
+    /// ∇h.
     fn perturb(&self, at: &TexturePoint, normal: Vec3, bent: Vec3, tangents: [Vec3; 2]) -> Vec3 {
         let [dpdu, dpdv] = self.texture.tangents(at, tangents);
         let slopes = self.texture.slopes(at) * self.scale;
@@ -85,7 +87,7 @@ mod tests {
     use crate::materials::texture::{TextureFilter, Wrap};
     use crate::math::{DVec2, Vec2};
 
-    /// A texture with one row of these values.
+    /// A texture with a single row of values.
     fn texture(numbers: &[Vec3]) -> Arc<Texture> {
         let data = TexelData::Float(numbers.to_vec());
         let texels = Arc::new(Texels { width: numbers.len() as u32, height: 1, data, unusable: 0 });
@@ -101,7 +103,7 @@ mod tests {
         })
     }
 
-    /// Heights that increase by 1 per unit of u around the center.
+    /// Heights that increase by 1 per unit of u near the center.
     fn ramp(scale: f32) -> Bump {
         Bump { texture: texture(&[0.0, 0.25, 0.5, 0.75].map(Vec3::splat)), scale }
     }
@@ -113,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn ramps_tilt_by_slope_over_tangent_length() {
+    fn ramps_tilt_normals_by_their_slope() {
         // (tangents, normal, scale, unnormalized expected normal)
         let cases = [
             ([Vec3::X, Vec3::Y], Vec3::Z, 0.5, Vec3::new(-0.5, 0.0, 1.0)),
@@ -121,9 +123,10 @@ mod tests {
             ([Vec3::X, Vec3::NEG_Y], Vec3::Z, 0.5, Vec3::new(-0.5, 0.0, 1.0)),
             ([Vec3::X, Vec3::Y], Vec3::NEG_Z, 0.5, Vec3::new(-0.5, 0.0, -1.0)),
             ([Vec3::X, Vec3::Y], Vec3::Z, -0.5, Vec3::new(0.5, 0.0, 1.0)),
-            // Along u + v, u does not change: the height is x − y.
+            // u does not change along u + v. The height is x − y.
             ([Vec3::X, Vec3::new(1.0, 1.0, 0.0)], Vec3::Z, 1.0, Vec3::new(-1.0, 1.0, 1.0)),
-            // The shading normal may be tilted: only the parts of the tangents perpendicular to it count.
+            // The shading normal may be tilted. Only the components of the tangents perpendicular to it
+            // matter.
             ([Vec3::new(1.0, 0.0, 0.7), Vec3::Y], Vec3::Z, 1.0, Vec3::new(-1.0, 0.0, 1.0)),
         ];
         for (tangents, normal, scale, expected) in cases {
@@ -135,11 +138,11 @@ mod tests {
     }
 
     #[test]
-    fn normal_map_and_bump_slopes_add_up() {
+    fn normal_map_and_bump_map_slopes_add_up() {
         let map = NormalMap { texture: texture(&[Vec3::new(0.8, 0.5, 0.9)]), strength: 1.0 };
         let normal_perturbation = NormalPerturbation { normal_map: Some(map), bump: Some(ramp(0.5)) };
         let (bent, lookups) = bent(&normal_perturbation, Vec3::Z, [Vec3::X, Vec3::Y]);
-        // 0.6/0.8 from the normal map, −0.5 from the ramp.
+        // A slope of 0.6/0.8 from the normal map and −0.5 from the ramp.
         assert!((bent - Vec3::new(0.25, 0.0, 1.0).normalize()).length() < 1e-6, "{bent}");
         assert_eq!(lookups, 5);
     }

@@ -3,13 +3,14 @@
 use super::footprint::TexturePoint;
 use super::scalar::Number;
 
-/// The probability that a surface exists at a point. Otherwise, rays pass undeflected.
+/// The probability that a surface exists at a point. If it does not exist, rays pass undeflected.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Opacity {
     /// The opacity, clamped to [0, 1].
     pub value: Number,
-    /// Threshold at and above which the surface is opaque, and below which it is fully transparent; 0 for no threshold. With a
-    /// threshold, a texture's mip levels hold the coverage: the fraction of texels that are opaque.
+    /// Threshold for the opacity, or 0 for no threshold. The surface is opaque at and above the threshold,
+    /// and fully transparent below. If there is a threshold, the texture's mip levels contain the fraction of
+    /// opaque texels.
     pub cutoff: f32,
 }
 
@@ -31,7 +32,7 @@ impl Opacity {
         self.value.constant().map(|value| self.cut(value))
     }
 
-    /// The mean opacity; for a texture with a cutoff, estimated by the texture's mean.
+    /// The mean opacity. For a texture with a cutoff, this is estimated as the texture's mean.
     pub fn mean(&self) -> f32 {
         match &self.value {
             Number::Constant(value) => self.cut(*value),

@@ -15,24 +15,24 @@ choice! {
         Green = "g",
         /// Blue.
         Blue = "b",
-        /// Alpha; 1 in images without an alpha channel.
+        /// Alpha. 1 for images without an alpha channel.
         Alpha = "a",
     }
 }
 
-/// Which value of a pixel a scalar texture reads.
+/// The value of a pixel that a scalar texture reads.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum PixelValue {
     /// Its luminance.
     Luminance,
     /// One channel.
     Channel(Channel),
-    /// Its alpha, or its luminance in images without an alpha channel.
+    /// The alpha, or the luminance for images without an alpha channel.
     Opacity,
-    /// [`PixelValue::Opacity`], for an image that is not a color of the material. If its alpha is 1 everywhere and all pixels are gray,
-    /// its luminance is the opacity.
+    /// [`PixelValue::Opacity`] for an image that is not also a color of the material. If alpha is 1
+    /// everywhere and all pixels are gray, the luminance is used as the opacity.
     Mask {
-        /// Whether the luminance is the opacity also if some pixels are not gray.
+        /// Whether the luminance is also used if some pixels are not gray.
         of_any_color: bool,
     },
 }
@@ -42,12 +42,12 @@ pub enum PixelValue {
 pub enum Number {
     /// A constant value.
     Constant(f32),
-    /// A texture with the value in each of its channels.
+    /// A texture that contains the value in each of its channels.
     Texture(Arc<Texture>),
 }
 
 impl Number {
-    /// The constant value. `None` for a texture.
+    /// The constant value, or `None` for a texture.
     pub fn constant(&self) -> Option<f32> {
         match self {
             Self::Constant(number) => Some(*number),
@@ -55,7 +55,7 @@ impl Number {
         }
     }
 
-    /// The texture. `None` for a constant.
+    /// The texture, or `None` for a constant.
     pub fn texture(&self) -> Option<&Arc<Texture>> {
         match self {
             Self::Constant(_) => None,

@@ -1,4 +1,4 @@
-//! Texels of an image, stored as compactly as in the file.
+//! Image texels, stored as compactly as in the file.
 
 use crate::math::color::{LINEAR_OF_SRGB8, srgb8_to_linear};
 use crate::math::lanes::{PACKET_SIZE, Vec3x16, set_lane};
@@ -7,26 +7,26 @@ use crate::math::{DVec3, DVec4, Vec3, Vec4};
 /// An RGB image in memory, with rows from top to bottom.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Texels {
-    /// Columns, ≥ 1.
+    /// Number of columns. At least 1.
     pub width: u32,
-    /// Rows, ≥ 1.
+    /// Number of rows. At least 1.
     pub height: u32,
-    /// The texels, `width · height` of them.
+    /// The texels. There are `width · height` of them.
     pub data: TexelData,
-    /// Number of texels that were negative or not finite in the file; they are stored as 0.
+    /// Number of texels that are negative or not finite in the file. They are stored as 0.
     pub unusable: u64,
 }
 
 /// Storage format of texels.
 #[derive(Clone, Debug, PartialEq)]
 pub enum TexelData {
-    /// sRGB bytes, decoded at each lookup.
+    /// sRGB bytes that are decoded in each lookup.
     Srgb8(Vec<[u8; 3]>),
-    /// Bytes / 255, linear.
+    /// Linear bytes, scaled by 1/255.
     Linear8(Vec<[u8; 3]>),
-    /// Linear floats, from 16-bit and floating-point files.
+    /// Linear floats from 16-bit and floating-point files.
     Float(Vec<Vec3>),
-    /// sRGB bytes and alpha; interpolation weights the colors by alpha.
+    /// sRGB bytes and alpha. In interpolation, colors are weighted by alpha.
     SrgbAlpha8(Vec<[u8; 4]>),
     /// Linear bytes and alpha.
     LinearAlpha8(Vec<[u8; 4]>),
@@ -35,13 +35,13 @@ pub enum TexelData {
 }
 
 impl Texels {
-    /// Linear value at column `x` and row `y` from the top, which must be in range.
+    /// Linear value at column `x` and row `y` from the top. Both must be in range.
     #[inline]
     pub fn get(&self, x: u32, y: u32) -> Vec3 {
         self.at(y as usize * self.width as usize + x as usize)
     }
 
-    /// Linear value at an index of the data.
+    /// Linear value at a texel index.
     #[inline]
     pub fn at(&self, place: usize) -> Vec3 {
         match &self.data {
@@ -54,7 +54,7 @@ impl Texels {
         }
     }
 
-    /// Whether the texels have alpha, which weights their colors.
+    /// Whether the texels have an alpha channel. If so, colors are weighted by alpha.
     #[inline(always)]
     pub fn is_weighted(&self) -> bool {
         match &self.data {
@@ -63,7 +63,7 @@ impl Texels {
         }
     }
 
-    /// Linear color without premultiplied alpha, at a texel index.
+    /// Linear color at a texel index, not premultiplied by alpha.
     #[cold]
     fn without_weight(&self, place: usize) -> Vec3 {
         match &self.data {
@@ -80,7 +80,7 @@ impl Texels {
         }
     }
 
-    /// Linear color premultiplied by alpha, and alpha, at an index of the data.
+    /// Linear color premultiplied by alpha, and alpha, at a texel index.
     pub fn weighted(&self, place: usize) -> Vec4 {
         let weight = match &self.data {
             TexelData::Srgb8(_) | TexelData::Linear8(_) | TexelData::Float(_) => 1.0,
@@ -92,14 +92,14 @@ impl Texels {
         (self.at(place) * weight).extend(weight)
     }
 
-    /// Thresholds the red channel: 1 where it is at least `least`, otherwise 0.
+    /// Thresholds the red channel. The result is 1 where it is at least `least`, otherwise 0.
     pub fn cut(&self, least: f32) -> Self {
         let texel = |place: usize| [if self.at(place).x >= least { u8::MAX } else { 0 }; 3];
         let data = TexelData::Linear8((0..self.len()).map(texel).collect());
         Self { data, unusable: 0, ..*self }
     }
 
-    /// Linear values at several indices of the data.
+    /// Linear values at several texel indices.
     #[inline(always)]
     pub fn gather<const N: usize>(&self, places: &[usize; N]) -> [Vec3; N] {
         let mut values = [Vec3::ZERO; N];
@@ -107,13 +107,14 @@ impl Texels {
         values
     }
 
-    /// Linear values at a packet of indices. Written in place, because compilers handle large return values poorly.
+    /// Linear values at a packet of texel indices. Written in place because compilers handle large return
+    /// values poorly.
     #[inline(always)]
     pub fn gather_packet(&self, places: &[usize; PACKET_SIZE], values: &mut Vec3x16) {
         self.decode(places, |i, value| set_lane(values, i, value));
     }
 
-    /// Passes the linear value at each index to `put`.
+    /// Passes the linear value at each texel index to `put`.
     #[inline(always)]
     fn decode<const N: usize>(&self, places: &[usize; N], mut put: impl FnMut(usize, Vec3)) {
         match &self.data {
@@ -156,7 +157,7 @@ impl Texels {
         }
     }
 
-    /// Mean of all texels, by their weights.
+    /// Mean of all texels, weighted by alpha if there is any.
     pub fn mean(&self) -> Vec3 {
         if self.is_weighted() {
             let sum: DVec4 = (0..self.len()).map(|place| self.weighted(place).as_dvec4()).sum();
@@ -214,12 +215,12 @@ impl Texels {
         self.width as usize * self.height as usize
     }
 
-    /// Always false: an image has at least one texel.
+    /// Always false because an image has at least one texel.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Bytes used by the texels.
+    /// Memory used by the texels, in bytes.
     pub fn memory_bytes(&self) -> usize {
         match &self.data {
             TexelData::Srgb8(bytes) | TexelData::Linear8(bytes) => size_of_val(bytes.as_slice()),
@@ -230,7 +231,7 @@ impl Texels {
     }
 }
 
-/// Divides a premultiplied color by its alpha. Black if alpha is 0.
+/// Divides a premultiplied color by its alpha. Returns black if alpha is 0.
 pub fn unweighted(weighted: Vec4) -> Vec3 {
     if weighted.w > 0.0 { weighted.truncate() / weighted.w } else { Vec3::ZERO }
 }

@@ -18,7 +18,7 @@ choice! {
         Nearest = "nearest",
         /// Bilinear interpolation between the four nearest texel centers.
         Bilinear = "bilinear",
-        /// Trilinear interpolation between two mip levels, chosen by the footprint of the pixel.
+        /// Trilinear interpolation between two mip levels, which are chosen by the footprint.
         Mipmap = "mipmap",
     }
 }
@@ -28,14 +28,14 @@ choice! {
     pub enum Wrap {
         /// Periodic.
         Repeat = "repeat",
-        /// The texels at the border.
+        /// The border texels are extended.
         Clamp = "clamp",
-        /// Periodic, with every other tile mirrored.
+        /// Periodic. Every other tile is mirrored.
         Mirror = "mirror",
     }
 }
 
-/// An image with its lookup settings.
+/// An image with settings for looking up texels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Texture {
     /// The image.
@@ -48,9 +48,10 @@ pub struct Texture {
     pub wrap: Wrap,
     /// Number of repetitions in u and v.
     pub repeat: Vec2,
-    /// Transform applied after repetition. `None` for the identity on the first UV set.
+    /// Transform after repetition. `None` for the identity on the first UV set.
     pub moved: Option<Box<UvTransform>>,
-    /// Scale and offset of looked-up values. `None` for the identity. Not used for heights and their slopes.
+    /// Scale and offset of looked-up values. `None` for the identity. Does not affect heights and their
+    /// slopes.
     pub factor: Option<Factor>,
 }
 
@@ -64,7 +65,7 @@ pub struct Factor {
 }
 
 impl Factor {
-    /// A scale without an offset. `None` if it is 1.
+    /// A scale without an offset. `None` if the scale is 1.
     pub fn new(gain: Vec3) -> Option<Self> {
         Self::with_base(gain, Vec3::ZERO)
     }
@@ -81,10 +82,10 @@ impl Factor {
     }
 }
 
-/// Choice of a UV set and a transform: rotation followed by translation.
+/// A choice of a UV set, and a transform that rotates, then translates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UvTransform {
-    /// Sine and cosine of the rotation from u to v.
+    /// Sine and cosine of the rotation angle, from u to v.
     turn: (f64, f64),
     /// Translation.
     offset: DVec2,
@@ -93,13 +94,14 @@ pub struct UvTransform {
 }
 
 impl UvTransform {
-    /// A transform that rotates about the origin by an angle in degrees, then translates. `None` if it changes nothing.
+    /// A transform that rotates about the origin by an angle in degrees, then translates. Returns `None` if
+    /// it would change nothing.
     pub fn new(of: UvSet, degrees: f64, offset: DVec2) -> Option<Self> {
         let is_moved = of != UvSet::First || degrees != 0.0 || offset != DVec2::ZERO;
         is_moved.then(|| Self { turn: sin_cos_degrees(degrees), offset, of })
     }
 
-    /// The second UV set's point, if the transform uses that set.
+    /// The point in the second UV set, if the transform uses that set.
     #[inline]
     fn second<'a>(&self, at: &'a TexturePoint) -> Option<&'a SecondUvPoint> {
         match self.of {
@@ -121,7 +123,7 @@ impl UvTransform {
         DVec2::new(by.x * cos - by.y * sin, by.x * sin + by.y * cos)
     }
 
-    /// The vector that is transformed to `moved`.
+    /// The vector that transforms to `moved`.
     #[inline]
     pub fn inverse_vector(&self, moved: DVec2) -> DVec2 {
         let (sin, cos) = self.turn;
@@ -149,7 +151,7 @@ pub enum Color {
 }
 
 impl Color {
-    /// The constant color. `None` for a texture.
+    /// The constant color, or `None` for a texture.
     pub fn constant(&self) -> Option<Vec3> {
         match self {
             Self::Constant(color) => Some(*color),
@@ -157,7 +159,7 @@ impl Color {
         }
     }
 
-    /// The texture. `None` for a constant.
+    /// The texture, or `None` for a constant.
     pub fn texture(&self) -> Option<&Arc<Texture>> {
         match self {
             Self::Constant(_) => None,
@@ -178,14 +180,15 @@ impl Color {
 }
 
 impl Texture {
-    /// The linear value at texture coordinates; v = 0 is the bottom row. Non-finite coordinates count as 0.
+    /// The linear value at texture coordinates. v = 0 is the bottom row. Non-finite coordinates are treated
+    /// as 0.
     pub fn lookup(&self, at: &TexturePoint) -> Vec3 {
         let tiles = self.tiles(at);
         let value = self.in_tiles(tiles, || self.level(at));
         self.factor.map_or(value, |factor| factor.of(value))
     }
 
-    /// The value at tile coordinates; `level` is called if the filter uses mip levels.
+    /// The value at tile coordinates. `level` is called if the filter uses mip levels.
     #[inline]
     fn in_tiles(&self, tiles: DVec2, level: impl FnOnce() -> f32) -> Vec3 {
         let folded = [self.wrap.fold(finite(tiles.x)) as f32, self.wrap.fold(finite(tiles.y)) as f32];
@@ -210,15 +213,16 @@ impl Texture {
         self.moved.as_ref().map_or(UvSet::First, |moved| moved.of)
     }
 
-    /// Tangents ∂p/∂u and ∂p/∂v of the UV set used for lookups; `first` are the tangents of the first set.
+    /// Tangents ∂p/∂u and ∂p/∂v of the UV set used for lookups. `first` contains the tangents of the first
+    /// set.
     #[inline]
     pub fn tangents(&self, at: &TexturePoint, first: [Vec3; 2]) -> [Vec3; 2] {
         let second = self.moved.as_ref().and_then(|moved| moved.second(at));
         second.map_or(first, |second| second.tangents)
     }
 
-    /// Slopes of the red channel along u and v, from central differences over one texel of the image or of the mip level chosen
-    /// by the footprint.
+    /// Slopes of the red channel along u and v. Computed as central differences over one texel of the image,
+    /// or of the mip level chosen by the footprint.
     pub fn slopes(&self, at: &TexturePoint) -> Vec2 {
         let tiles = self.tiles(at);
         let level = match (self.filter, &self.mipmaps) {
@@ -237,7 +241,8 @@ impl Texture {
         slopes.as_vec2() * self.repeat
     }
 
-    /// Converts slopes in the image to slopes along the texture's own coordinates, which [`Wrap::Mirror`] may flip.
+    /// Converts slopes in the image to slopes along the texture's own coordinates. [`Wrap::Mirror`] may flip
+    /// them.
     pub fn unmirrored_slopes(&self, at: &TexturePoint, slopes: Vec2) -> Vec2 {
         if self.wrap != Wrap::Mirror {
             return slopes;
@@ -246,7 +251,7 @@ impl Texture {
         slopes * Vec2::from([tiles.x, tiles.y].map(|tile| mirrored_tile(tile) as f32))
     }
 
-    /// Tangents along the texture's repeated and transformed coordinates, up to their lengths.
+    /// Tangents along the texture's repeated and transformed coordinates. Only the directions matter.
     pub fn own_tangents(&self, [dpdu, dpdv]: [Vec3; 2]) -> [Vec3; 2] {
         let sides = self.repeat.signum();
         let Some(moved) = &self.moved else { return [dpdu * sides.x, dpdv * sides.y] };
@@ -280,7 +285,7 @@ impl Texture {
         row
     }
 
-    /// [`Texture::lookup_row`] for textures with a transform.
+    /// [`Texture::lookup_row`] for textures that have a transform.
     #[cold]
     #[inline(never)]
     fn transformed_row(&self, moved: &UvTransform, uv: &[[f64; PACKET_SIZE]; 2]) -> Vec3x16 {
@@ -332,14 +337,14 @@ impl Texture {
         colors
     }
 
-    /// Mean of the image, which is the mean of the texture if a whole number of tiles fits into [0, 1]².
+    /// Mean of the image. This is the mean of the texture if a whole number of tiles fits into [0, 1]².
     pub fn mean(&self) -> Vec3 {
         let last = self.mipmaps.as_ref().and_then(|mipmaps| mipmaps.level(mipmaps.count()));
         let mean = last.map_or_else(|| self.texels.mean(), |last| last.get(0, 0));
         self.factor.map_or(mean, |factor| factor.of(mean))
     }
 
-    /// The mip level (≥ 0, fractional) at which the footprint is one texel wide.
+    /// The (fractional, nonnegative) mip level at which the footprint is one texel wide.
     fn level(&self, at: &TexturePoint) -> f32 {
         let texels = match &self.moved {
             None => at.footprint.texels(size(&self.texels) * self.repeat),
@@ -369,7 +374,8 @@ impl Texture {
         self.bilinear(near, folded).lerp(self.bilinear(far, folded), part)
     }
 
-    /// The two images around a mip level, and the weight of the second. `None` if only the image itself is used.
+    /// The two images around a mip level, and the weight of the second image. `None` if only the original
+    /// image is used.
     #[inline(always)]
     fn levels(&self, level: f32) -> Option<(&Texels, &Texels, f32)> {
         let mipmaps = self.mipmaps.as_ref().filter(|_| level > 0.0)?;
@@ -382,8 +388,8 @@ impl Texture {
         Some((of(number), of(number + 1), level - number as f32))
     }
 
-    /// The fraction of the footprint in which the red channel is at least `cutoff`; 0 or 1 if the lookup is in the image itself. The
-    /// mip levels must be those of [`Texels::cut`].
+    /// The fraction of the footprint where the red channel is at least `cutoff`. It is 0 or 1 for lookups in
+    /// the original image. The mip levels must be computed from [`Texels::cut`].
     pub fn coverage(&self, at: &TexturePoint, cutoff: f32) -> f32 {
         let tiles = self.tiles(at);
         let folded = [self.wrap.fold(finite(tiles.x)) as f32, self.wrap.fold(finite(tiles.y)) as f32];
@@ -399,7 +405,7 @@ impl Texture {
         near + (of(far) - near) * part
     }
 
-    /// Bilinear lookups of a packet in texels with alpha.
+    /// Bilinear lookups for a packet in texels with alpha.
     #[cold]
     #[inline(never)]
     fn weighted_row(&self, folded: &[F32x16; 2], colors: &mut Vec3x16) {
@@ -442,14 +448,15 @@ impl Texture {
     }
 }
 
-/// Rounds down without [`f32::floor`], which is a library call on processors that may lack an instruction for it.
+/// Rounds down. Unlike [`f32::floor`], this never requires a library call, which is slow on processors
+/// without the instruction.
 #[inline(always)]
 fn floor(x: f32) -> i32 {
     let towards_zero = x as i32;
     towards_zero - i32::from(towards_zero as f32 > x)
 }
 
-/// Index of a texel, from its column and its row counted from the bottom.
+/// Index of a texel, from its column and its row, where rows are counted from the bottom.
 #[inline(always)]
 fn place(column: i32, row: i32, [width, height]: [i32; 2]) -> usize {
     (height - 1 - row) as usize * width as usize + column as usize
@@ -496,7 +503,7 @@ impl Wrap {
         folded
     }
 
-    /// [`Wrap::index`] of `numbers`, each increased by `more`.
+    /// [`Wrap::index`] of `numbers` + `more`.
     #[inline(always)]
     fn index_row(self, numbers: &[i32; PACKET_SIZE], more: i32, size: i32) -> [i32; PACKET_SIZE] {
         let mut indices = [0; PACKET_SIZE];
@@ -528,24 +535,24 @@ impl Wrap {
         }
     }
 
-    /// An index and the following one, both wrapped.
+    /// An index and its successor, both wrapped.
     #[inline(always)]
     fn neighbor_indices(self, first: i32, size: i32) -> [i32; 2] {
         [self.index(first, size), self.index(first + 1, size)]
     }
 
-    /// Wraps an index in −1 … size.
+    /// Wraps an index in the range −1 to `size`.
     #[inline(always)]
     fn index(self, i: i32, size: i32) -> i32 {
         match self {
             Self::Repeat => i + if i < 0 { size } else { 0 } - if i >= size { size } else { 0 },
-            // Mirroring repeats the border texel.
+            // Mirroring also repeats the border texel.
             Self::Clamp | Self::Mirror => i.max(0).min(size - 1),
         }
     }
 }
 
-/// −1 in tiles that [`Wrap::Mirror`] mirrors, otherwise 1.
+/// −1 in tiles that [`Wrap::Mirror`] mirrors, 1 in all other tiles.
 fn mirrored_tile(x: f64) -> f64 {
     let x = finite(x);
     if x - 2.0 * (x * 0.5).floor() > 1.0 { -1.0 } else { 1.0 }
@@ -564,7 +571,7 @@ mod tests {
     use crate::materials::mipmaps::ImageHalver;
     use crate::materials::texels::TexelData;
 
-    /// A texture with the values [[0, 1], [2, 3]], bottom row first.
+    /// A texture with the values [[0, 1], [2, 3]]. The bottom row is first.
     fn numbered(filter: TextureFilter, wrap: Wrap) -> Texture {
         let data = [2.0, 3.0, 0.0, 1.0].map(Vec3::splat).to_vec();
         let texels = Arc::new(Texels { width: 2, height: 2, data: TexelData::Float(data), unusable: 0 });
@@ -576,7 +583,7 @@ mod tests {
     }
 
     #[test]
-    fn bilinear_lookups_of_known_values() {
+    fn bilinear_lookups_return_known_values() {
         for (u, v, expected) in [(0.25, 0.25, 0.0), (0.5, 0.5, 1.5), (0.5, 0.25, 0.5), (0.75, 0.75, 3.0)] {
             for wrap in [Wrap::Repeat, Wrap::Clamp, Wrap::Mirror] {
                 assert!((bilinear(wrap, u, v) - expected).abs() < 1e-6, "{wrap:?} at {u}, {v}");
@@ -605,7 +612,8 @@ mod tests {
         let mut texture = numbered(TextureFilter::Nearest, Wrap::Repeat);
         texture.repeat = Vec2::new(2.0, 1.0);
         texture.moved = UvTransform::new(UvSet::First, 90.0, DVec2::new(0.0, 0.5)).map(Box::new);
-        // (u, v) maps to (−v, 2u + ½): (0.1, 0.3) is looked up at (−0.3, 0.7), which wraps to (0.7, 0.7).
+        // (u, v) maps to (−v, 2u + ½). For example, (0.1, 0.3) maps to (−0.3, 0.7), which wraps to (0.7,
+        // 0.7).
         assert_eq!(at(&texture, 0.1, 0.3), 3.0);
         assert_eq!(at(&texture, 0.1, 0.7), 2.0);
         assert_eq!(at(&texture, 0.3, 0.3), 1.0);
@@ -631,7 +639,7 @@ mod tests {
         assert_eq!(texture.lookup(&at.without_extent()).x, 3.0);
         let alone = TexturePoint { second: None, ..at };
         assert_eq!((texture.lookup(&alone).x, texture.tangents(&alone, first)), (0.0, first));
-        // The second set is repeated, rotated and translated like the first.
+        // The second set is repeated, rotated, and translated like the first set.
         texture.repeat = Vec2::new(1.0, 0.5);
         texture.moved = UvTransform::new(UvSet::Second, 90.0, DVec2::new(0.5, 0.0)).map(Box::new);
         assert_eq!(texture.lookup(&at).x, 2.0);
@@ -652,24 +660,25 @@ mod tests {
 
     #[test]
     fn slopes_follow_the_texture_transform() {
-        // Around the center, values increase by 1 per texel across and by 2 per texel up, i.e., by 2 and 4 per image size.
+        // Near the center, values increase by 1 per texel to the right and by 2 per texel upward. Relative to
+        // the image size, this is 2 and 4.
         let mut texture = numbered(TextureFilter::Bilinear, Wrap::Repeat);
         let at = |texture: &Texture, u: f64, v: f64| texture.slopes(&TexturePoint::sharp(DVec2::new(u, v)));
         assert_eq!(at(&texture, 0.5, 0.5), Vec2::new(2.0, 4.0));
         texture.repeat = Vec2::new(2.0, -3.0);
         assert_eq!(at(&texture, 0.25, -0.5), Vec2::new(4.0, -12.0));
-        // (u, v) maps to (−v, 2u): the slope along u is the slope up the image.
+        // (u, v) maps to (−v, 2u), so the slope along u is the vertical slope of the image.
         (texture.repeat, texture.moved) =
             (Vec2::new(2.0, 1.0), UvTransform::new(UvSet::First, 90.0, DVec2::new(1.0, 0.0)).map(Box::new));
         assert_eq!(at(&texture, 0.25, 0.5), Vec2::new(8.0, -2.0));
-        // Clamped borders have no slope, and neither do non-finite coordinates.
+        // Clamped borders and non-finite coordinates have no slope.
         let clamped = numbered(TextureFilter::Bilinear, Wrap::Clamp);
         assert_eq!(at(&clamped, -1.0, 0.5), Vec2::new(0.0, 4.0));
         assert_eq!(at(&clamped, f64::NAN, f64::INFINITY), Vec2::ZERO);
     }
 
     #[test]
-    fn extreme_coordinates_stay_inside() {
+    fn extreme_coordinates_stay_in_range() {
         for filter in [TextureFilter::Nearest, TextureFilter::Bilinear] {
             for wrap in [Wrap::Repeat, Wrap::Clamp, Wrap::Mirror] {
                 let texture = numbered(filter, wrap);
@@ -687,7 +696,7 @@ mod tests {
     }
 
     #[test]
-    fn packet_lookups_equal_single_lookups() {
+    fn packet_lookups_match_single_lookups() {
         let bytes: Vec<[u8; 3]> = (0..35_u8).map(|i| [i * 7, 255 - i, i.wrapping_mul(41)]).collect();
         let floats = bytes.iter().map(|[r, g, b]| Vec3::new(f32::from(*r), f32::from(*g), f32::from(*b)));
         let images = [
@@ -730,7 +739,7 @@ mod tests {
         }
     }
 
-    /// The mip levels of an image.
+    /// Creates the mip levels of an image.
     fn levels(image: &Texels) -> Option<Arc<Mipmaps>> {
         let halved = |level: &Texels| -> Result<Texels, ()> {
             let halving = ImageHalver::new(level);
@@ -741,7 +750,7 @@ mod tests {
         Mipmaps::of(image, halved).ok().map(Arc::new)
     }
 
-    /// A clamped texture of a row of texels.
+    /// A clamped texture from a row of texels.
     fn row(width: u32, data: TexelData, filter: TextureFilter) -> Texture {
         let texels = Arc::new(Texels { width, height: 1, data, unusable: 0 });
         let (mipmaps, wrap, repeat) = (levels(&texels), Wrap::Clamp, Vec2::ONE);
@@ -775,15 +784,15 @@ mod tests {
                 assert_eq!(lane(&lanes, i), alone, "{i}");
             }
         }
-        // Partial alpha weights the colors.
+        // Colors are weighted by partial alpha.
         let half = TexelData::LinearAlpha8(vec![[255, 0, 0, 51], [0, 255, 0, 204]]);
         let color = row(2, half, TextureFilter::Bilinear).lookup(&TexturePoint::sharp(DVec2::new(0.5, 0.5)));
         assert!((color - Vec3::new(0.2, 0.8, 0.0)).length() < 1e-6, "{color}");
     }
 
     #[test]
-    fn mip_levels_preserve_the_coverage_of_a_cutoff() {
-        // Four of the ten texels are visible, with alpha just above the cutoff.
+    fn mip_levels_preserve_cutoff_coverage() {
+        // Four of the ten texels are visible. Their alpha is just above the cutoff.
         let alphas = [140, 140, 120, 0, 0, 140, 120, 0, 140, 0].map(|alpha| [alpha; 3]);
         let mut texture = row(10, TexelData::Linear8(alphas.to_vec()), TextureFilter::Mipmap);
         texture.mipmaps = levels(&texture.texels.cut(0.5));
@@ -795,11 +804,11 @@ mod tests {
             let coverage = texture.coverage(&at(u, 1e3), 0.5);
             assert!((coverage - 0.4).abs() < 1e-6, "{coverage}");
         }
-        // In the image itself, coverage is 0 or 1.
+        // In the original image, coverage is 0 or 1.
         for (u, expected) in [(0.05, 1.0), (0.25, 0.0), (0.35, 0.0), (0.55, 1.0)] {
             assert_eq!(texture.coverage(&at(u, 0.0), 0.5), expected, "{u}");
         }
-        // Coverage is continuous between the image and its first mip level.
+        // Coverage is continuous between the original image and its first mip level.
         let near = [1.0 + 1e-4, 1.0].map(|texels| texture.coverage(&at(0.05, texels * 0.1), 0.5));
         assert!((near[0] - near[1]).abs() < 1e-2, "{near:?}");
     }

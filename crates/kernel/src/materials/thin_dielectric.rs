@@ -1,20 +1,20 @@
-//! Thin panes: two parallel glass surfaces without thickness between them.
+//! Thin panes, which are two parallel glass surfaces with no distance between them.
 
 use super::fresnel::dielectric;
 use super::texture::Color;
 
-/// An infinitely thin pane. Light that it does not reflect passes undeflected.
+/// An infinitely thin pane. Light passes undeflected unless it is reflected.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ThinDielectric {
-    /// Index of refraction of the glass, relative to the outside.
+    /// Index of refraction of the glass relative to the outside.
     pub ior: f32,
-    /// Transmittance of the glass, at any angle.
+    /// Transmittance of the glass at all angles.
     pub tint: Color,
 }
 
 impl ThinDielectric {
-    /// Reflectance 2R/(1 + R) at a cosine of the angle of incidence, including all reflections between both sides, where R is the
-    /// reflectance of one side.
+    /// Reflectance for a cosine of the angle of incidence. It is 2R/(1 + R), where R is the reflectance of
+    /// one side. This includes all reflections between the two sides.
     #[inline]
     pub fn reflectance(&self, cosine: f32) -> f32 {
         let (side, _) = dielectric(cosine.abs(), self.ior);
@@ -37,7 +37,7 @@ mod tests {
             let series: f64 = r + (0..2000).map(|k| (1.0 - r).powi(2) * r.powi(2 * k + 1)).sum::<f64>();
             assert!((f64::from(pane.reflectance(cosine)) - series).abs() < 1e-6, "{degrees}");
         }
-        // At normal incidence R = 0.04 and R' = 0.08/1.04.
+        // At normal incidence, R = 0.04 and R' = 0.08/1.04.
         assert!((pane.reflectance(-1.0) - 0.08 / 1.04).abs() < 1e-6);
         assert!((pane.reflectance(0.0) - 1.0).abs() < 1e-6);
     }

@@ -1,13 +1,13 @@
-//! Eviction of cached values of earlier scenes.
+//! Eviction of values cached for earlier scenes.
 
 use super::Engine;
 use crate::cache::first_with_room;
 
-/// Maximum memory of files and trees that the current scene does not need.
+/// Memory limit for files and trees that the current scene does not need.
 const MAX_SPARE_BYTES: usize = 256 << 20;
 
 impl Engine {
-    /// Ends a request. After a success, values that it did not use become candidates for eviction.
+    /// Ends a request. If it succeeded, values that it did not use become eviction candidates.
     pub(super) fn end(&mut self, success: bool) {
         self.requests += 1;
         self.meshes.end(success, self.requests);

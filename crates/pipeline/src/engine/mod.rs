@@ -1,4 +1,5 @@
-//! The engine: runs the stages of one request, from the scene file to images on disk, and keeps state between requests.
+//! The engine runs the stages of a request, from the scene file to images on disk, and keeps state between
+//! requests.
 
 mod eviction;
 mod orders;
@@ -74,13 +75,13 @@ use crate::system::priority;
 use crate::system::threads::{check_stack_space, start_failure};
 use crate::world::{Coplanar, GlassSolids, TextureNeeds, World};
 
-/// Configuration of an engine, which tests change.
+/// Engine configuration, which tests override.
 #[derive(Clone, Copy)]
 pub(super) struct EngineConfig {
     pub(super) kernel: Kernel,
-    /// Maximum number of bytes of a film.
+    /// Maximum film size in bytes.
     pub(super) most_film_bytes: u64,
-    /// Difference in niceness between the render threads and the thread that starts them.
+    /// Niceness of the render threads relative to the thread that starts them.
     pub(super) nice: u8,
 }
 
@@ -109,7 +110,7 @@ pub(super) struct Engine {
     films: FilmCache,
     written: WrittenFiles,
     own: Option<OwnImage>,
-    /// Whether the film of the own image is kept while other images are rendered.
+    /// Whether the film of the scene's own image is kept while other images are rendered.
     pins_own: bool,
     /// Whether the current film belongs to the scene's own image.
     is_own: bool,
@@ -124,20 +125,20 @@ pub(super) struct Engine {
     query_context: Option<QueryContext>,
     /// The last valid scene, with the files it references.
     good: Option<LastGoodScene>,
-    /// Pixels per second of the last first image.
+    /// Pixels per second measured for the most recent first image.
     coarse_rate: Cell<Option<f64>>,
     pool: Option<Arc<ThreadPool>>,
     /// Assets of the last valid scene, which are watched while the scene file is broken.
     assets: Vec<FileRead>,
-    /// All files that must not be written: files of the last valid scene, and files referenced since.
+    /// All files that must not be written: those of the last valid scene and any referenced since.
     inputs: Inputs,
-    /// Whether the current scene file is invalid, so that the files it references are unknown.
+    /// Whether the current scene file is invalid, in which case its referenced files are unknown.
     is_broken: bool,
-    /// Lock of the checkpoint file, and checkpoints already reported.
+    /// The checkpoint file's lock, and the checkpoints that have been reported.
     checkpoint_lock: RefCell<CheckpointLock>,
 }
 
-/// How often a request may restart because files of the scene have changed.
+/// Maximum number of times a request tries to read the scene's files without any changes in between.
 const MAX_READS: usize = 16;
 
 /// A scene that is ready to be rendered.
@@ -146,7 +147,7 @@ struct Ready {
     parsed: Arc<Parsed>,
     plan: Plan,
     world: KeyedWorld,
-    /// Key of all surfaces and of their coordinate origin.
+    /// Key of all surfaces and their coordinate origin.
     surfaces: Key,
     origin: DVec3,
     /// Key of the film.
@@ -193,7 +194,7 @@ impl Engine {
         }
     }
 
-    /// Runs a request and sends its outcome. If the scene is invalid, renders the last good one.
+    /// Runs a request and sends its outcome. If the scene is invalid, renders the last valid one.
     pub(super) fn request(&mut self, request: &Request, sink: &Sink, context: &RequestContext<'_>) {
         let generation = request.generation;
         let outcome = self.outcome(request, sink, context);
@@ -226,7 +227,7 @@ impl Engine {
         if let Err(Stop::Failed(Failure::Scene(diagnostics))) = &outcome {
             findings.watch_underlined_files(diagnostics, &request.scene, &self.contents, context.token);
         }
-        // Files that are watched must not be written.
+        // Watched files must not be written.
         self.inputs.add_read(&findings.files);
         match &outcome {
             Ok(_) => self.is_broken = false,
@@ -240,7 +241,7 @@ impl Engine {
             }
         }
         self.say_files(&findings, sink);
-        // Keep fully read files for later requests even if the render was stopped.
+        // Even if the render was stopped, keep completely read files for later requests.
         let is_read = self.good.as_ref().is_some_and(|good| good.generation == generation);
         self.end(outcome.is_ok() || is_read);
         let report = outcome?;
@@ -250,7 +251,7 @@ impl Engine {
         Ok(Outcome { report, conflicts, warnings, unchanged })
     }
 
-    /// Returns the key of the current image, and its view.
+    /// Returns the current image's key and view.
     fn shown(&self) -> (Option<Key>, Option<View>) {
         let view = self.plan.as_ref().map(|plan| plan.settings.view);
         (self.films.current().map(|state| state.key), view)
@@ -280,14 +281,14 @@ impl Engine {
     ) -> Result<Report, Stop> {
         let watch = Stopwatch::start(context.token);
         let mut table = StageTable { sink, token: context.token, stages: Vec::new(), is_silent: false };
-        // A turntable does not return to earlier images.
+        // A turntable never revisits earlier images.
         if request.overrides.turn.is_some() {
             self.films = FilmCache::default();
         }
         let mut ready = self.prepare_of_one_version(request, &mut table, context.token, findings)?;
         let photons = self.light(request, &ready, &mut table, sink, context)?;
         let share = self.share(&ready.plan, photons);
-        // Blocks with fewer samples than the image belong to a share.
+        // A share may render fewer samples than the whole image.
         if let Some(share) = &share {
             ready.plan.settings.render.samples = share.own_samples();
         }
@@ -295,7 +296,7 @@ impl Engine {
         self.share_own(request, &ready);
         self.say_own(request, ready.film, sink);
         let rays = table.run(Stage::Render, || self.render(request, &ready, photons, sink, context))?;
-        // Links and files may have changed during the render.
+        // Symbolic links and files may have changed during the render.
         self.check_conflicts(request, &ready.plan, findings, sink)?;
         let was_own_written = self.is_own_written();
         let written =
@@ -311,7 +312,7 @@ impl Engine {
         });
         let is_written = written?;
         let pool = self.pool(ready.plan.threads)?;
-        let Some(state) = self.films.current() else { return Err(Stop::work("the film is gone")) };
+        let Some(state) = self.films.current() else { return Err(Stop::work("the film is missing")) };
         let finished = Finished {
             scene: &ready.parsed.loaded.path,
             plan: &ready.plan,
@@ -336,7 +337,7 @@ impl Engine {
         Ok(pool.install(|| report(&finished, stages, seconds)))
     }
 
-    /// Traces photons, and makes `ready` the current image. Returns the key of the photons that the image uses.
+    /// Traces photons and makes `ready` the current image. Returns the key of its photons.
     fn light(
         &mut self,
         request: &Request,
@@ -364,7 +365,7 @@ impl Engine {
             context.postpone_write(sink);
             context.run_query(&query_context, None, inputs, sink);
         };
-        // Show the scene to the user while the first photons are traced.
+        // Show the scene while the first photons are traced.
         let is_new = request.force || self.films.of(ready.film).is_none();
         let coarse = FirstPictures {
             tracer: tracer(self.config.kernel, &pool, ready, context.token),
@@ -382,7 +383,8 @@ impl Engine {
         Ok(photons_key)
     }
 
-    /// Runs [`Self::prepare`], again if a file changes meanwhile: no image mixes two versions of a file.
+    /// Runs [`Self::prepare`], and repeats it if a file changes during the run, so that an image never mixes
+    /// two versions of a file.
     fn prepare_of_one_version(
         &mut self,
         request: &Request,
@@ -400,11 +402,11 @@ impl Engine {
             table.stages.clear();
         }
         Err(Stop::work(
-            "files of the scene keep changing while they are read; render again once they are complete",
+            "the scene's files keep changing while they are being read; render again once they are complete",
         ))
     }
 
-    /// Runs all stages before photons and rendering.
+    /// Runs all stages up to photon tracing and rendering.
     fn prepare(
         &mut self,
         request: &Request,
@@ -414,7 +416,7 @@ impl Engine {
     ) -> Result<Ready, Stop> {
         let containers = Containers::default();
         let show = Show::of(&request.overrides);
-        // The scene cannot change the number of threads, and reading a model uses all of them.
+        // The thread count does not depend on the scene, and reading a model uses all threads.
         let pool = self.pool(threads(&request.overrides))?;
         let parsed = table.run(Stage::Parse, || {
             let origin = SceneSource { path: &request.scene, sets: &request.overrides.sets, show };
@@ -444,7 +446,7 @@ impl Engine {
         });
         let before = std::mem::replace(&mut self.inputs, Inputs::of_scene(&parsed));
         let looked = self.check_conflicts(request, &plan, findings, table.sink);
-        // The current image is of the previous scene and may still be written.
+        // The current image still shows the previous scene and may yet be written.
         self.inputs.add(before);
         looked?;
         if findings.conflicts.is_empty() {
@@ -452,7 +454,7 @@ impl Engine {
         }
         let pool = self.pool(plan.threads)?;
         let reading = Reading { sink: table.sink, token, contents, pool: &pool, containers: &containers };
-        // The film of the scene's own image has keys that include its textures.
+        // Include textures needed only for the scene's own image, because its film key depends on them.
         let lookups = lookups(&plan, own_plan.as_ref());
         let (meshes, bodies, textures, needed) = self.load(&parsed, lookups, findings, table, &reading)?;
         if let Some(path) = contents.changed() {
@@ -482,7 +484,7 @@ impl Engine {
         let scene = &plan.scene;
         let eye = RequestCamera::new(scene, parsed.orbiter, &request.overrides.camera).turned(plan.turn);
         let mesh_keys: Vec<Key> = meshes.iter().map(|mesh| mesh.key).collect();
-        // The orbiter's few numbers go into the key as text.
+        // The orbiter is small, so the key includes it as text.
         let orbiter = eye.orbiter.map(|camera| format!("{camera:?}"));
         let of = keys::referents(scene, &mesh_keys, orbiter.as_deref());
         let origin = eye.origin();
@@ -521,7 +523,7 @@ impl Engine {
         plan.shard.map(|shard| Share::new(shard, emits_photons, plan.settings.render.samples))
     }
 
-    /// Loads all files that the scene references. Tries every file before it returns an error.
+    /// Loads all files that the scene references. Tries every file before returning an error.
     fn load(
         &mut self,
         parsed: &Parsed,
@@ -561,7 +563,7 @@ impl Engine {
         let (plan, orders) = (&ready.plan, context.orders);
         let key = ready.film;
         let watch = Stopwatch::start(context.token);
-        // Separate the state that the stage changes from the state it reads.
+        // Borrow the state that the stage modifies separately from the state it reads.
         let (mut films, written) = (std::mem::take(&mut self.films), std::mem::take(&mut self.written));
         let written = std::cell::RefCell::new(written);
         let is_own = request.own.is_none();
@@ -623,7 +625,7 @@ impl Engine {
         rendered
     }
 
-    /// Returns a pool with this many threads. The pool is kept while the number is unchanged.
+    /// Returns a pool with the given number of threads, reusing the current pool if it has that many.
     fn pool(&mut self, threads: usize) -> Result<Arc<ThreadPool>, Stop> {
         if let Some(pool) = self.pool.as_ref().filter(|pool| pool.current_num_threads() == threads) {
             return Ok(pool.clone());
@@ -697,7 +699,7 @@ impl Engine {
     }
 }
 
-/// Creates a tracer of a scene, without photons.
+/// Creates a tracer for a scene, without photons.
 fn tracer<'a>(kernel: Kernel, pool: &'a ThreadPool, ready: &'a Ready, token: &'a CancelToken) -> Tracer<'a> {
     Tracer {
         kernel,
@@ -710,7 +712,7 @@ fn tracer<'a>(kernel: Kernel, pool: &'a ThreadPool, ready: &'a Ready, token: &'a
     }
 }
 
-/// Collects the files that the scene references and all other files that were read.
+/// Collects the files referenced by the scene and all other files that were read.
 fn inputs(parsed: &Parsed, meshes: &Meshes, findings: &Findings) -> Inputs {
     let mut inputs = Inputs::of_scene(parsed);
     inputs.add_meshes(&parsed.loaded, meshes);

@@ -1,4 +1,4 @@
-//! Orders from the front end during a request.
+//! Orders that the front end sends during a request.
 
 use std::cell::Cell;
 
@@ -12,11 +12,11 @@ use crate::sink::Sink;
 /// Why a render is interrupted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Interruption {
-    /// Another image, or nothing, replaces it. It will not be resumed.
+    /// The user wants another image or none. The render will not be resumed.
     Replaced,
-    /// The user leaves. A long render will be resumed later.
+    /// The user quit. A long render will be resumed later.
     Left,
-    /// The process is terminated. The render will be resumed later.
+    /// The process is being terminated. The render will be resumed later.
     Ended,
 }
 
@@ -24,23 +24,23 @@ pub(crate) enum Interruption {
 pub(crate) trait Orders {
     /// Whether the current image should be written.
     fn wants_write(&self) -> bool;
-    /// Like [`Self::wants_write`], and clears the order.
+    /// Like [`Self::wants_write`], but clears the order.
     fn take_write(&self) -> bool;
-    /// Takes the new size of previews.
+    /// Takes the pending change of the preview size.
     fn take_preview(&self) -> Option<Option<PreviewSize>>;
     /// Takes the next query about the current image.
     fn take_query(&self) -> Option<Query>;
-    /// Why a cancelled render will not continue now.
+    /// Why the cancelled render is being interrupted.
     fn interruption(&self) -> Interruption;
 }
 
 /// Tokens and orders of a running request.
 pub(crate) struct RequestContext<'a> {
     pub(crate) token: &'a CancelToken,
-    /// Token of the write stage, which is the last one.
+    /// Cancels the write stage, which runs last.
     pub(crate) writing: &'a CancelToken,
     pub(crate) orders: &'a dyn Orders,
-    /// Whether the front end knows that its write order is postponed.
+    /// Whether the front end has been told that its write order is postponed.
     is_postponed: Cell<bool>,
 }
 
@@ -49,7 +49,7 @@ impl<'a> RequestContext<'a> {
         Self { token, writing, orders, is_postponed: Cell::new(false) }
     }
 
-    /// Reports once that a write order is postponed until every pixel has a sample.
+    /// Reports, once, that a write order is postponed until every pixel has a sample.
     pub(super) fn postpone_write(&self, sink: &Sink) {
         if self.orders.wants_write() && !self.is_postponed.replace(true) {
             sink.send(Event::WritePostponed { generation: sink.generation });

@@ -1,4 +1,4 @@
-//! Outcome of a request, for callers that render one image synchronously.
+//! Request outcomes, for callers that render a single image synchronously.
 
 use std::error::Error;
 use std::fmt;
@@ -16,13 +16,13 @@ use crate::scene::report::{Style, render};
 /// A rendered image.
 #[derive(Clone, Debug)]
 pub struct Rendered {
-    /// Linear radiance without exposure.
+    /// Linear radiance, before exposure.
     pub image: RadianceImage,
     /// Report of the request.
     pub report: Box<Report>,
     /// Likely mistakes in the scene.
     pub warnings: Vec<Diagnostic>,
-    /// Key of everything that the image depends on, apart from the number of samples.
+    /// Key covering everything that affects the image, except the number of samples.
     pub key: Key,
 }
 
@@ -49,17 +49,17 @@ impl fmt::Display for Unrendered {
 
 impl Error for Unrendered {}
 
-/// Line width of diagnostics within an error.
+/// Line width for diagnostics in error messages.
 const COLUMNS: usize = 120;
 
 /// Outcome of a finished request.
 pub(super) struct Outcome {
     pub(super) report: Report,
-    /// Why no image is written.
+    /// Reasons why no image is written.
     pub(super) conflicts: Vec<Diagnostic>,
     /// Likely mistakes in the scene.
     pub(super) warnings: Vec<Diagnostic>,
-    /// Whether the image and its view are unchanged.
+    /// Whether the displayed image is unchanged.
     pub(super) unchanged: bool,
 }
 
@@ -67,7 +67,7 @@ impl Engine {
     /// Runs a request and returns its image.
     ///
     /// # Errors
-    /// Why no image was rendered.
+    /// Returns the reason if no image was rendered.
     pub(crate) fn rendered(
         &mut self,
         request: &Request,
@@ -75,10 +75,10 @@ impl Engine {
         context: &RequestContext<'_>,
     ) -> Result<Rendered, Unrendered> {
         match self.outcome(request, sink, context) {
-            // A request for an image in memory does not write it, so there are no conflicts.
+            // An in-memory image is not written, so there are no conflicts.
             Ok(Outcome { report, conflicts: _, warnings, unchanged: _ }) => {
                 let state = self.films.current();
-                let gone = || Unrendered::Failed(Failure::Work("the film is gone".to_owned()));
+                let gone = || Unrendered::Failed(Failure::Work("the film is missing".to_owned()));
                 let state = state.ok_or_else(gone)?;
                 let image = state.film.image(Quantity::Radiance);
                 Ok(Rendered { image, report: Box::new(report), warnings, key: state.key })
@@ -88,7 +88,7 @@ impl Engine {
         }
     }
 
-    /// Whether a path leads to a file that the last request read.
+    /// Whether a path refers to a file that the last request read.
     pub(crate) fn reads(&self, path: &Path) -> bool {
         self.inputs.contain(path)
     }

@@ -1,4 +1,4 @@
-//! Output files of the engine, and files that it must not write.
+//! The engine's output files, and the files it must not overwrite.
 
 use super::super::inputs::Inputs;
 use super::super::plan::Plan;
@@ -14,7 +14,7 @@ use crate::control::CancelToken;
 use crate::messages::{INCOMPLETE_IMAGE, NEWEST_IMAGE_NOT_WRITTEN, NO_IMAGE, SCENE_HAS_ERRORS};
 use crate::output::OutputError;
 
-/// Removes a report that does not describe the image in the files of a plan.
+/// Removes a report that does not describe the plan's image files.
 pub(super) fn drop_report(plan: &Plan, inputs: &Inputs, sink: &Sink) {
     if let Err(error) = remove_report(plan, inputs, sink) {
         sink.write_failed(None, format!("the report describes an earlier image: {error}"));
@@ -33,7 +33,7 @@ impl Engine {
             return sink.write_failed(None, NO_IMAGE.to_owned());
         };
         if !state.is_covered() {
-            // Images of earlier requests may exist.
+            // Earlier requests may have written images.
             let what = if self.written.is_empty() { "no image written" } else { NEWEST_IMAGE_NOT_WRITTEN };
             let message = format!("{what}: {INCOMPLETE_IMAGE}");
             return sink.write_failed(None, message);
@@ -65,11 +65,11 @@ impl Engine {
         }
     }
 
-    /// Looks for outputs that must not be written. If the request can continue without them, sends them to the front
-    /// end and adds them to the findings.
+    /// Checks for outputs that must not be written. If the request can continue without writing them, sends
+    /// the conflicts to the front end and adds them to the findings.
     ///
     /// # Errors
-    /// All conflicts, if the image must be written.
+    /// Returns all conflicts if the image must be written.
     pub(super) fn check_conflicts(
         &self,
         request: &Request,
@@ -93,19 +93,19 @@ impl Engine {
         Ok(())
     }
 
-    /// Writes the report of an image that the user has written with a key. If its render is not finished, removes an
-    /// older report.
+    /// Writes the report after the user has written an image with a key. If the render is unfinished, removes
+    /// the outdated report instead.
     fn report_written_image(&self, sink: &Sink) {
         let Some(plan) = &self.plan else { return };
         let Some(report) = &self.report else { return drop_report(plan, &self.inputs, sink) };
         let paths: Vec<String> =
             plan.outputs.iter().map(|path| path.to_string_lossy().into_owned()).collect();
         let image = ImageReport { path: paths.first().cloned(), paths, ..report.image.clone() };
-        // This token is never cancelled, because the user asked for the image.
+        // Use a token that is never cancelled, because the user requested the image.
         self.write_report(&Report { image, ..report.clone() }, sink, &CancelToken::new());
     }
 
-    /// Writes the report of a request whose image is written or could not be written.
+    /// Writes a request's report after its image has been written or writing has failed.
     pub(super) fn write_report(&self, report: &Report, sink: &Sink, token: &CancelToken) {
         let Some(plan) = &self.plan else { return };
         if let Err(error) = write_report(plan, &self.inputs, report, sink, token) {
@@ -132,7 +132,7 @@ impl Engine {
             return self.write_own(sink, token);
         }
         let pool = self.pool(plan.threads)?;
-        let Some(state) = self.films.current() else { return Err(Stop::work("the film is gone")) };
+        let Some(state) = self.films.current() else { return Err(Stop::work("the film is missing")) };
         let to = Destination {
             plan,
             layers: &self.layers,

@@ -1,5 +1,6 @@
-//! The scene's own image: the saved scene with the overrides of the command line. Keys may show another image
-//! meanwhile. The own image's film, checkpoint and files are kept until a request returns to it.
+//! The scene's own image: the saved scene with the command-line overrides. The user can show other images
+//! with the keyboard. Meanwhile, the own image's film, checkpoint and files are kept until a request returns
+//! to it.
 
 use std::sync::Arc;
 
@@ -26,23 +27,23 @@ use crate::stages::{Staged, Stop};
 use crate::watch::content::FileRead;
 use crate::world::TextureNeeds;
 
-/// The scene's own image, as of the newest request.
+/// The scene's own image for the newest request.
 pub(super) struct OwnImage {
     /// Key of the film.
     pub(super) film: Key,
-    /// Key of the finished image and its files.
+    /// Key of the finished image and its output files.
     pub(super) image: Key,
     parsed: Arc<Parsed>,
     pub(super) plan: Plan,
     camera: CameraChange,
-    /// Files that the image depends on.
+    /// Files that affect the image.
     files: Vec<FileRead>,
     /// Share of the image that this process renders. `None` for the whole image.
     pub(super) share: Option<Share>,
 }
 
 impl OwnImage {
-    /// Creates the image. `eye` is the scene's own camera; `surfaces` and `meshes` are keys of the scene.
+    /// Creates the image. `eye` is the scene's camera. `surfaces` and `meshes` are keys.
     pub(super) fn new(
         (parsed, plan, eye): (&Arc<Parsed>, Plan, &RequestCamera),
         (surfaces, meshes): (&Key, &[Key]),
@@ -56,7 +57,7 @@ impl OwnImage {
         Self { film, image, parsed: Arc::clone(parsed), plan, camera, files: files.to_vec(), share: None }
     }
 
-    /// Returns the names and values of everything that the image depends on.
+    /// Returns the names and values of everything that affects the image.
     pub(super) fn identity(&self) -> Vec<Dependency> {
         let divided = self.share.as_ref().map(|share| share.samples);
         let Self { parsed, plan, camera, files, .. } = self;
@@ -64,7 +65,7 @@ impl OwnImage {
     }
 }
 
-/// Returns the key of a finished image and its files.
+/// Returns the key of a finished image and its output files.
 fn image_key(film: Key, plan: &Plan) -> Key {
     let mut key = Fingerprint::new("own image");
     key.key(&keys::image(film, plan, 0)).u64(plan.bit_depth.into());
@@ -78,7 +79,7 @@ fn image_key(film: Key, plan: &Plan) -> Key {
 }
 
 impl Engine {
-    /// Sets the scene's own image of a request. Its film is kept while other images are rendered.
+    /// Sets the scene's own image for a request and keeps its film while other images are rendered.
     pub(super) fn take_own(&mut self, mut own: OwnImage) {
         if self.pins_own {
             self.films.pin(own.film);
@@ -89,11 +90,11 @@ impl Engine {
         self.own = Some(own);
     }
 
-    /// Checks the memory of a request. If keys show another image, the film of the scene's own image is included. If
-    /// both do not fit, the own film makes room once its image is written.
+    /// Checks a request's memory use. If the request shows another image, this includes the film of the
+    /// scene's own image. If both films do not fit, the own film may be dropped once its image is written.
     ///
     /// # Errors
-    /// The request needs more memory than available.
+    /// The request needs more memory than is available.
     pub(super) fn check_memory(
         &mut self,
         estimate: &MemoryEstimate,
@@ -111,7 +112,7 @@ impl Engine {
         Ok(())
     }
 
-    /// Returns the bytes of the scene's own film that is kept in addition to the film of a request.
+    /// Returns the size in bytes of the scene's own film, if it is kept in addition to the request's film.
     fn own_film_bytes(&self, request: &Request, (plan, own_plan): (&Plan, Option<&Plan>)) -> u64 {
         let (Some(own), Some(own_plan)) = (&self.own, own_plan) else { return 0 };
         let of = |plan: &Plan| keys::render(own.film, &plan.settings, plan.crop);
@@ -120,7 +121,7 @@ impl Engine {
         state.map_or(0, FilmState::memory_bytes)
     }
 
-    /// Records which share of the scene's own image this process renders, if the request renders that image.
+    /// If the request renders the scene's own image, records which share of it this process renders.
     pub(super) fn share_own(&mut self, request: &Request, ready: &Ready) {
         if let Some(own) = self.own.as_mut().filter(|_| request.own.is_none()) {
             own.share.clone_from(&ready.share);
@@ -142,13 +143,13 @@ impl Engine {
         self.own.as_ref().is_some_and(|own| self.written.own == Some(own.image))
     }
 
-    /// Records whether the files of the current plan contain its finished image.
+    /// Records whether the current plan's output files contain the finished image.
     pub(super) fn note_written(&mut self, is_written: bool) {
         let own = self.own.as_ref().filter(|_| is_written && self.is_own);
         self.written.own = own.map(|own| own.image);
     }
 
-    /// Writes the scene's own image, if the current view shows its finished film in another way.
+    /// Writes the scene's own image if the current view is based on its finished film.
     ///
     /// # Errors
     /// [`Stop::Cancelled`].
@@ -178,7 +179,8 @@ impl Engine {
         Ok(Staged { value: false, status: Status::Skipped, why: reasons::PREVIEW_ONLY.to_owned() })
     }
 
-    /// Calls `work` with a checkpointer, if `film` is the scene's own image and has checkpoints.
+    /// Calls `work`, with a checkpointer if `film` belongs to the scene's own image and checkpoints are
+    /// enabled for it.
     pub(super) fn with_checkpointer<T>(
         &self,
         film: Option<Key>,
@@ -203,7 +205,7 @@ impl Engine {
         work(Some(&Checkpointer::new(output, own.plan.checkpoints, around)), self)
     }
 
-    /// Saves a checkpoint of the scene's own render when the worker stops while another image is shown.
+    /// Saves a checkpoint of the scene's own image if the worker stops while showing another one.
     pub(crate) fn keep_own(&self, sink: &Sink, interruption: Interruption) {
         let Some(own) = self.own.as_ref().filter(|_| !self.is_own_written()) else { return };
         let Some(state) = self.films.of(own.film).filter(|state| !state.is_kept) else { return };
@@ -216,8 +218,8 @@ impl Engine {
     }
 }
 
-/// Whether a plan's render has checkpoints: its image is written to a regular file, and checkpoints are enabled or it
-/// resumes from one.
+/// Whether a plan's render uses checkpoints. The output must be a regular file, and checkpoints must be
+/// enabled or the render must resume from one.
 fn keeps(plan: &Plan) -> bool {
     let is_file =
         plan.outputs.first().is_some_and(|path| path.metadata().map_or(true, |found| found.is_file()));
@@ -225,28 +227,29 @@ fn keeps(plan: &Plan) -> bool {
     (seconds > 0.0 || resume == Resume::Asked) && is_file
 }
 
-/// Returns the plan of the scene's own image, if the request shows another one.
+/// Returns the plan for the scene's own image if the request shows another one.
 ///
 /// # Errors
-/// Errors of [`plan`].
+/// See [`plan`].
 pub(super) fn own_plan(request: &Request, parsed: &Parsed) -> Result<Option<Plan>, Stop> {
     let plan = |own: &Overrides| plan(&parsed.loaded.scene, &request.scene, own);
     let own = request.own.as_deref().map(plan).transpose();
     own.map_err(|error| Stop::Failed(Failure::Scene(vec![*error])))
 }
 
-/// Returns the textures that a request looks up. The keys of both plans' films depend on them.
+/// Returns which textures a request needs. They include the textures for the scene's own image because its
+/// film key depends on them.
 pub(super) fn lookups(plan: &Plan, own: Option<&Plan>) -> TextureNeeds {
     let shown = plan.settings.lookups();
     own.map_or(shown, |own| shown.or(own.settings.lookups()))
 }
 
-/// Returns the overrides of the scene's own image in a request.
+/// Returns the request's overrides for the scene's own image.
 pub(super) fn overrides(request: &Request) -> &Overrides {
     request.own.as_deref().unwrap_or(&request.overrides)
 }
 
-/// Whether the film of the scene's own image is meant to be written.
+/// Whether the scene's own image should be written.
 pub(super) fn is_to_be_written(request: &Request) -> bool {
     request.own.is_some() || request.write != Writing::No
 }

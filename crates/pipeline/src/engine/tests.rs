@@ -1,4 +1,4 @@
-//! Tests of the values that are kept between requests.
+//! Tests for values that are kept between requests.
 
 use std::fs;
 use std::sync::mpsc;
@@ -60,9 +60,9 @@ impl EngineFixture {
     fn request(&mut self) -> CreatedValues {
         let events = self.send();
         assert!(matches!(events.last(), Some(Event::Done { .. })), "{events:?}");
-        let geometry = self.engine.accel.latest().expect("it was built").clone();
+        let geometry = self.engine.accel.latest().expect("the geometry was built").clone();
         let mesh = geometry.objects()[1].mesh().expect("the mesh comes second").tree.clone();
-        let lights = self.engine.lights.latest().expect("they were gathered").clone();
+        let lights = self.engine.lights.latest().expect("the lights were collected").clone();
         CreatedValues {
             geometry,
             mesh,
@@ -71,7 +71,7 @@ impl EngineFixture {
         }
     }
 
-    /// Returns whether geometry, mesh, lights and world are the same values after an edit, not just equal ones.
+    /// Returns whether an edit kept the geometry, mesh, lights and world. Compares pointers, not values.
     fn kept(&mut self, from: &str, to: &str) -> [bool; 4] {
         let before = self.request();
         assert!(self.text.contains(from), "{from}");
@@ -89,7 +89,7 @@ impl EngineFixture {
 }
 
 #[test]
-fn edits_keep_values_independent_of_them() {
+fn edits_keep_unaffected_values() {
     let mut fixture = EngineFixture::new(&format!("{SCENE}[materials.light]\nemission = [0, 0, 0]\n"));
     let mut kept = |from: &str, to: &str| fixture.kept(from, to);
     assert_eq!(kept("[camera]", "# a comment\n[camera]"), [true, true, true, true]);
@@ -123,7 +123,7 @@ fn edits_keep_values_independent_of_them() {
 }
 
 #[test]
-fn previous_scene_reuses_its_trees() {
+fn switching_back_reuses_cached_trees() {
     let mut fixture = EngineFixture::new(SCENE);
     fs::write(fixture.folder.path().join("two.obj"), format!("{OBJ}f 1 3 2\n")).expect("written");
     let own = fixture.text.clone();
@@ -163,7 +163,7 @@ fn unchanged_textures_are_kept() {
 }
 
 #[test]
-fn error_names_the_renamed_scene() {
+fn error_mentions_the_renamed_scene() {
     let mut fixture = EngineFixture::new(SCENE);
     fixture.request();
     let renamed = fixture.folder.path().join("third.toml");

@@ -1,4 +1,4 @@
-//! Rendering of the last valid scene while the scene file is broken.
+//! Renders the last valid scene while the scene file is broken.
 
 use std::sync::Arc;
 
@@ -18,7 +18,7 @@ use crate::table::StageTable;
 use crate::watch::content::Snapshot;
 use crate::world::{GlassSolids, TextureNeeds};
 
-/// A valid scene with all files that its image needs.
+/// A valid scene and all files needed for its image.
 #[derive(Clone)]
 pub(super) struct LastGoodScene {
     /// Generation of the request that read it.
@@ -32,11 +32,11 @@ pub(super) struct LastGoodScene {
 }
 
 impl Engine {
-    /// Renders and writes the last good scene with the overrides of the newest request, whose own scene cannot be read.
-    /// Does not overwrite files that the broken scene might reference.
+    /// Renders and writes the last valid scene with the overrides of the newest request, whose own scene
+    /// cannot be loaded. Does not overwrite files that the broken scene might reference.
     pub(super) fn go_on(&mut self, newest: &Request, sink: &Sink, context: &RequestContext<'_>) {
         let before = self.shown();
-        // The failed request has reported its errors, so errors of this render are dropped.
+        // The failed request has already reported its errors, so errors from this render are dropped.
         let end = match self.render_last_good(newest, sink, context) {
             Ok(Some(is_reused)) => LastGoodEnd::Finished { unchanged: is_reused && self.shown() == before },
             Ok(None) | Err(_) => LastGoodEnd::Stopped,
@@ -44,8 +44,8 @@ impl Engine {
         sink.send(Event::LastGoodEnded { generation: newest.generation, end });
     }
 
-    /// Renders and writes the last good scene. Returns whether both were done before, or `None` if there is no such
-    /// scene.
+    /// Renders and writes the last valid scene. Returns whether the existing image and files were reused, or
+    /// `None` if there is no valid scene.
     fn render_last_good(
         &mut self,
         newest: &Request,
@@ -59,7 +59,7 @@ impl Engine {
         let (loaded, path) = (&good.parsed.loaded, &request.scene);
         let Ok(plan) = plan(&loaded.scene, path, &request.overrides) else { return Ok(None) };
         let own = own_plan(&request, &good.parsed)?;
-        // Load textures for another view, if the files still contain them.
+        // Load the textures needed for another view if their files are still valid.
         let pool = self.pool(plan.threads)?;
         let snapshot = Snapshot::of(Arc::clone(&self.contents));
         let containers = Containers::default();
@@ -70,7 +70,7 @@ impl Engine {
         let (meshes, texture_bytes) = (&good.meshes, good.textures.memory_bytes);
         let estimate = MemoryEstimate::of_scene(&plan, &plan.scene, meshes, texture_bytes);
         self.check_memory(&estimate, &request, (&plan, own.as_ref()))?;
-        // Prepare the scene; unchanged values are reused.
+        // Prepare the scene, reusing unchanged values.
         let mut table = StageTable { sink, token: context.token, stages: Vec::new(), is_silent: true };
         let ready = self.build(&request, &good, (plan, own), &mut table, &reading)?;
         let photons = self.light(&request, &ready, &mut table, sink, context)?;
@@ -82,14 +82,14 @@ impl Engine {
             let written = self.write(&request, &ready.plan, &Findings::default(), sink, context.writing);
             is_written_now = written.is_ok_and(|staged| staged.status == Status::Done);
             if is_written_now {
-                // A report would describe the current scene instead.
+                // The existing report does not describe this image.
                 drop_report(&ready.plan, &self.inputs, sink);
             }
         }
         Ok(Some(rendered.status == Status::Reused && !is_written_now))
     }
 
-    /// Loads the textures for this view, if the scene was read for another one.
+    /// Loads any additional textures that this view needs.
     fn with_textures(
         &mut self,
         good: LastGoodScene,
@@ -104,7 +104,7 @@ impl Engine {
         }
         let mut findings = Findings::default();
         let found = textures(loaded, &needed, &mut self.textures, &mut findings, reading)?;
-        // A texture whose file is broken by now is missing.
+        // A texture is missing if its file has since become invalid.
         let good = LastGoodScene { textures: Arc::new(found.value), needed, ..good };
         self.good = Some(good.clone());
         Ok(good)

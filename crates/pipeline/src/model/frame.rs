@@ -1,4 +1,4 @@
-//! Framing of a model: its default camera and key light.
+//! Frames a model: computes its default camera and key light.
 
 use super::toml::rounded;
 use crate::math::DVec3;
@@ -7,13 +7,13 @@ use crate::turntable::Turn;
 
 /// Vertical field of view in degrees.
 pub(super) const FOV: f64 = 30.0;
-/// Fraction of the image's half height and half width that the model's points may fill.
+/// Fraction of the image's width and height that the model may fill.
 const FILLED: f64 = 0.88;
 
-/// Minimum size of a model.
+/// Minimum model size.
 const LEAST: f64 = 1e-30;
 
-/// Maximum number of turntable frames that are measured; more directions add nothing.
+/// Maximum number of turntable frames to measure. More would not change the result noticeably.
 const MAX_MEASURED: u32 = 72;
 
 /// Position and orientation of a camera.
@@ -25,7 +25,7 @@ pub(super) struct CameraPose {
 }
 
 impl Side {
-    /// Direction from the model to the camera, and the up vector of the image. Fronts face +z.
+    /// Direction from the model to the camera, and the image's up vector. The model's front faces +z.
     fn axes(self) -> (DVec3, DVec3) {
         match self {
             Self::Front => (DVec3::Z, DVec3::Y),
@@ -39,8 +39,8 @@ impl Side {
     }
 }
 
-/// Returns a camera that shows all `points` of a box as large as the image's aspect ratio allows, in all `turns` frames
-/// of a turntable.
+/// Returns the closest camera that keeps all `points` inside the image in each of the `turns` turntable
+/// frames. `least` and `greatest` are opposite corners of the bounding box.
 pub(super) fn frame_model(
     [least, greatest]: [DVec3; 2],
     points: &[DVec3],
@@ -50,7 +50,7 @@ pub(super) fn frame_model(
     let (back, up) = from.axes();
     let middle = (least + greatest) * 0.5;
     let tangent = libm::tan((FOV * 0.5).to_radians()) * FILLED;
-    // Move back until every point is inside the frame.
+    // Move the camera back until every point is inside the frame.
     let half = (greatest - least) * 0.5;
     let mut distance = 0.0_f64;
     for back in Turn::camera_offsets(turns.min(MAX_MEASURED), back, up) {
@@ -63,30 +63,30 @@ pub(super) fn frame_model(
         }
     }
     let distance = distance.max(LEAST);
-    // Drop invisible digits.
+    // Drop digits that make no visible difference.
     let size = half.length().max(LEAST);
     let step = size * 1e-4;
     let tidy = |at: DVec3| DVec3::from(at.to_array().map(|part| round_to_step(part, step)));
     CameraPose { position: tidy(middle + back * distance), look_at: tidy(middle), up }
 }
 
-/// Rounds to a multiple of a power of ten near `step`.
+/// Rounds to a multiple of the largest power of ten that does not exceed `step`.
 pub(super) fn round_to_step(value: f64, step: f64) -> f64 {
     let unit = libm::pow(10.0, libm::floor(libm::log10(step)));
     let whole = (value / unit).round();
-    // Dividing gives fewer digits than multiplying by a fraction.
+    // Dividing by a power of ten yields fewer digits than multiplying by its reciprocal.
     if unit < 1.0 { whole / libm::round(1.0 / unit) } else { whole * unit }
 }
 
 /// Elevation of the key light in degrees.
 const ELEVATION: f64 = 50.0;
-/// Horizontal angle in degrees between the camera and the key light, to the left.
+/// Azimuth of the key light in degrees, to the left of the camera.
 const ASIDE: f64 = 40.0;
 
-/// Direction in which the key light travels: from above the viewer's left shoulder.
+/// Direction in which the key light shines: from above the viewer's left shoulder.
 pub(super) fn key_direction(eye: &CameraPose) -> DVec3 {
     let back = eye.position - eye.look_at;
-    // For views from straight above or below, use the front.
+    // For views from directly above or below, use the front direction instead.
     let flat = DVec3::new(back.x, 0.0, back.z);
     let flat = if flat.length() > 1e-3 * back.length() { flat.normalize() } else { DVec3::Z };
     let (sin, cos) = (libm::sin(ASIDE.to_radians()), libm::cos(ASIDE.to_radians()));
@@ -101,8 +101,8 @@ pub(super) const SKY: f64 = 0.5;
 /// Irradiance of the key light at normal incidence.
 pub(super) const KEY: f64 = 1.5;
 
-/// Reflectance of a level ground that is as bright as the sky behind it, which hides the horizon. Its irradiance is
-/// π·`SKY` plus the key light's.
+/// Ground reflectance that makes level ground as bright as the sky, which hides the horizon. The ground's
+/// irradiance is π·`SKY` plus the key light's contribution.
 pub(super) fn ground_reflectance() -> f64 {
     let key = KEY * libm::sin(ELEVATION.to_radians()) / std::f64::consts::PI;
     rounded(SKY / (SKY + key), 3)
@@ -139,7 +139,7 @@ mod tests {
         }
     }
 
-    /// A long model that is seen from its end must also fit when it is seen from its side.
+    /// A long model facing the camera end-on must still fit when the turntable shows its side.
     #[test]
     fn every_turntable_frame_contains_the_model() {
         let bounds = [DVec3::new(-0.5, 0.0, -4.0), DVec3::new(0.5, 1.0, 4.0)];
@@ -154,7 +154,7 @@ mod tests {
     }
 
     #[test]
-    fn invisible_digits_are_dropped() {
+    fn insignificant_digits_are_dropped() {
         assert_eq!(round_to_step(1.234_567_8, 3e-4), 1.2346);
         assert_eq!(round_to_step(-12_345.678, 30.0), -12_350.0);
     }
@@ -168,6 +168,6 @@ mod tests {
         let radiance = ground_reflectance() * irradiance / std::f64::consts::PI;
         assert!((radiance / SKY - 1.0).abs() < 0.02, "{radiance}");
         let to_eye = (eye.position - eye.look_at).normalize();
-        assert!((-direction).dot(to_eye) > 0.3, "the key light is on the camera's side");
+        assert!((-direction).dot(to_eye) > 0.3, "the key light and the camera should be on the same side");
     }
 }

@@ -1,4 +1,4 @@
-//! Conversion of glTF files to scene text.
+//! Converts glTF files to scene text.
 
 use std::collections::{BTreeSet, HashMap};
 use std::io::Read;
@@ -24,10 +24,10 @@ use crate::scene::quoted;
 use crate::settings::Side;
 use crate::stages::containers::Containers;
 
-/// Where the generated scene finds its meshes and images.
+/// Where the generated scene's meshes and images are stored.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Naming {
-    /// In the glTF file and the files it references.
+    /// In the glTF file and the files referenced by it.
     Inside,
     /// In separate files in this folder, next to the scene.
     Folder(String),
@@ -38,7 +38,7 @@ pub(crate) enum Naming {
 pub(crate) struct ExportedFile {
     /// Path relative to the scene.
     pub(crate) name: String,
-    /// Source of its content.
+    /// Source of the file's content.
     pub(crate) content: ExportSource,
 }
 
@@ -81,7 +81,7 @@ pub(super) fn text(
     let is_unseen = scene.instances.iter().all(|one| is_clear(&scene.materials[one.material]));
     let ModelScene { mut notes, .. } = scene;
     match naming {
-        // A preview tolerates unreadable images; an import does not.
+        // Previews tolerate unreadable images, but imports do not.
         Naming::Inside => notes.extend(is_unseen.then(|| INVISIBLE_MODEL.to_owned())),
         Naming::Folder(_) => {
             images.into_iter().try_for_each(|image| container.check_image_header(image, token))?;
@@ -95,14 +95,14 @@ struct Writer<'a> {
     path: &'a Path,
     naming: &'a Naming,
     toml: Toml,
-    /// Names in use in the folder.
+    /// File names already used in the folder.
     files: Unique,
     assets: Vec<ExportedFile>,
     names: HashMap<ExportSource, String>,
     /// Images used by materials.
     images: BTreeSet<usize>,
     image_names: Vec<String>,
-    /// Other files that the text depends on.
+    /// Other files that affect the text.
     companions: Vec<Companion>,
 }
 
@@ -143,7 +143,7 @@ impl Writer<'_> {
         };
         light(&mut self.toml, &eye, lighting);
         if !scene.lights.is_empty() {
-            self.toml.section("1 cd of the file counts as 1 W/sr, 1 lx as 1 W/m².");
+            self.toml.section("1 cd in the file is treated as 1 W/sr, and 1 lx as 1 W/m².");
         }
         scene.lights.iter().for_each(|light| self.light(light));
         // Write the materials, then the meshes that use them.
@@ -210,7 +210,7 @@ impl Writer<'_> {
         }
     }
 
-    /// Writes `scale` and `translate`, or `matrix` if they are not enough.
+    /// Writes `scale` and `translate` if they can represent the placement, or `matrix` otherwise.
     fn placement(&mut self, linear: &DMat3, translate: DVec3) {
         let scale = DVec3::new(linear.x_axis.x, linear.y_axis.y, linear.z_axis.z);
         if *linear == DMat3::from_diagonal(scale) {
@@ -232,7 +232,7 @@ impl Writer<'_> {
         self.toml.key("matrix", format!("[{matrix},  0, 0, 0, 1]"));
     }
 
-    /// Returns the file name for `content`, and adds a file if the content is new.
+    /// Returns the file name for `content`. Adds a file if the content is new.
     fn asset(&mut self, content: ExportSource, wanted: &str, ending: &str) -> String {
         if let Some(known) = self.names.get(&content) {
             return known.clone();
@@ -274,8 +274,8 @@ impl super::materials::Files for Writer<'_> {
                 let name = file.strip_prefix(folder).unwrap_or(&file);
                 TextureFile { file: name.to_string_lossy().into_owned(), image: None }
             }
-            // Without an image extension, the texture is read through the glTF file, where its content decides the
-            // format. A missing file is watched until it appears.
+            // A file without an image extension is read via the glTF file, which detects the format from the
+            // content. A missing file is watched until it appears.
             (Naming::Inside, bytes) => {
                 if let Ok(ImageBytes::File(file)) = bytes {
                     self.companions.push(Companion { path: file, hash: None });
@@ -300,7 +300,7 @@ impl super::materials::Files for Writer<'_> {
     }
 }
 
-/// Whether the file has the extension of an image format.
+/// Whether the file name has an image extension.
 fn has_image_extension(file: &Path) -> bool {
     let ending = file.extension().unwrap_or_default().to_string_lossy().to_lowercase();
     MAPS.contains(&ending.as_str())
@@ -316,7 +316,7 @@ fn is_clear(material: &ModelMaterial) -> bool {
     is_clear && material.glass.is_none()
 }
 
-/// Whether a material may cast caustics. A texture may have any value up to its factor.
+/// Whether a material may cast caustics. Assumes that a texture contains any value up to its factor.
 fn is_polished(material: &ModelMaterial) -> bool {
     let is_smooth = |roughness: &TexturedValue| roughness.texture.is_some() || roughness.factor.x < ROUGH;
     let reflects = material.metallic.factor.x > 0.0 || material.specular.factor.x > 0.0;
@@ -324,8 +324,8 @@ fn is_polished(material: &ModelMaterial) -> bool {
     is_coated || is_smooth(&material.roughness) && (reflects || material.transmission.factor.x > 0.0)
 }
 
-/// Upper bound of the irradiance at normal incidence that all lights together cause at the center of a box. Lights are
-/// treated as at least a quarter of the box's size away.
+/// Upper bound on the total irradiance at the center of a bounding box, assuming normal incidence from all
+/// lights. Distances to lights are clamped to at least a quarter of the box's diagonal.
 fn irradiance(lights: &[ModelLight], [least, greatest]: [DVec3; 2]) -> f64 {
     let (middle, size) = ((least + greatest) * 0.5, (greatest - least).length());
     let of_light = |light: &ModelLight| {
@@ -341,14 +341,14 @@ fn irradiance(lights: &[ModelLight], [least, greatest]: [DVec3; 2]) -> f64 {
     lights.iter().map(of_light).sum()
 }
 
-/// Reads the first bytes of a file. Returns `None` if it cannot be read.
+/// Reads the first bytes of a file. Returns `None` on failure.
 fn first_bytes(path: &Path) -> Option<[u8; 4]> {
     let (mut file, _) = crate::system::file::open(path).ok()?.ok()?;
     let mut start = [0; 4];
     file.read_exact(&mut start).ok().map(|()| start)
 }
 
-/// Returns the extension of an image format from the first bytes of a file.
+/// Detects an image format from the first bytes of a file and returns its extension.
 fn image_extension(bytes: &[u8]) -> &'static str {
     if bytes.starts_with(b"\xff\xd8") {
         "jpg"
@@ -359,12 +359,12 @@ fn image_extension(bytes: &[u8]) -> &'static str {
     }
 }
 
-/// Clears the rounding error that a rotation by a right angle leaves.
+/// Replaces near-zero values, which result from rotations by right angles, with zero.
 fn tidy(value: f64) -> f64 {
     if value.abs() < 1e-12 { 0.0 } else { value }
 }
 
-/// Converts a file's camera. It looks at the depth of the model's center.
+/// Converts a camera from the file. The `look_at` point is as far from the camera as the model's center.
 fn camera_pose(camera: &ModelCamera, [least, greatest]: [DVec3; 2]) -> CameraPose {
     let size = (greatest - least).length().max(1e-12);
     let depth = ((least + greatest) * 0.5 - camera.position).dot(camera.direction).max(size * 0.05);
@@ -375,7 +375,7 @@ fn camera_pose(camera: &ModelCamera, [least, greatest]: [DVec3; 2]) -> CameraPos
     CameraPose { position: tidy(camera.position), look_at: tidy(look_at), up }
 }
 
-/// Whether the camera is level, so that an up vector of y gives the same view.
+/// Whether the camera has no roll, in which case the y axis as up vector produces the same view.
 fn is_level(camera: &ModelCamera) -> bool {
     let side = camera.direction.cross(DVec3::Y);
     side.length() > 1e-3 && camera.up.dot(side.normalize()).abs() < 1e-6 && camera.up.y > 0.0

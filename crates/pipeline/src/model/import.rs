@@ -1,4 +1,4 @@
-//! Import of glTF files as scene files.
+//! Imports glTF files as scene files.
 
 use std::path::{Path, PathBuf};
 
@@ -19,15 +19,15 @@ use crate::system::threads::{check_stack_space, start_failure};
 /// An imported scene, ready to be written.
 #[derive(Debug)]
 pub struct Imported {
-    /// Text of the scene. Its paths are relative to it.
+    /// Scene text. Its paths are relative to the scene file.
     pub text: String,
-    /// Files that the text references, with paths relative to the text.
+    /// Files referenced by the text, with paths relative to the scene file.
     pub files: Vec<(PathBuf, Vec<u8>)>,
-    /// Approximations, each with its location in the file.
+    /// Approximations made, each with its location in the file.
     pub notes: Vec<String>,
 }
 
-/// Why a file cannot be imported, as a message.
+/// Why a file cannot be imported.
 #[derive(Debug)]
 pub enum ImportError {
     /// The file or the command line is invalid.
@@ -36,7 +36,7 @@ pub enum ImportError {
     Work(String),
 }
 
-/// Imports a glTF file as a scene whose other files are in `folder`.
+/// Imports a glTF file as a scene whose meshes and images are in `folder`.
 ///
 /// # Errors
 /// The file is invalid, the machine lacks resources, or the token is cancelled.
@@ -60,7 +60,8 @@ pub fn import(path: &Path, folder: &str, token: &CancelToken) -> Result<Imported
                     write::bytes(&container.part(part, &ignore_progress, token)?.mesh)
                 }
                 ExportSource::Image(image) => {
-                    // Check the content: otherwise arbitrary files could be copied as images.
+                    // Check the content, because a glTF file could otherwise have arbitrary files copied as
+                    // images.
                     container.check_image(image, token)?;
                     container.image_content(image, token)?
                 }
@@ -83,12 +84,12 @@ fn pool() -> Result<ThreadPool, String> {
     ThreadPoolBuilder::new().num_threads(cores()).build().map_err(|error| error.to_string())
 }
 
-/// Rejects a scene that `glimt check` would reject. Checks the text that `glimt MODEL` renders, because its files
-/// exist.
+/// Rejects a scene that `glimt check` would reject. Checks the text rendered by `glimt MODEL` because the
+/// files it references exist.
 fn check_scene(path: &Path, containers: &Containers, token: &CancelToken) -> Result<(), AssetError> {
     let shown = super::gltf::text(path, (Show::default(), &Naming::Inside), containers, token)?;
     let Err(errors) = load_generated(shown.text.into(), path, &[]) else { return Ok(()) };
-    // Ignore file names, which differ in the imported scene.
+    // Ignore errors about file names, which differ in the imported scene.
     let counts = |one: &&Diagnostic| one.severity == Severity::Error && !one.message.contains("`file`");
     let Some(first) = errors.into_iter().find(|one| counts(&one)) else { return Ok(()) };
     Err(AssetError::Malformed {

@@ -1,4 +1,4 @@
-//! The `[textures]` and `[materials]` tables of a converted glTF file.
+//! Writes the `[textures]` and `[materials]` tables of a converted glTF file.
 
 use std::collections::HashMap;
 
@@ -8,7 +8,7 @@ use crate::assets::gltf::{Alpha, ModelMaterial, ModelScene, TextureRef, TextureW
 use crate::math::{DVec3, Vec2};
 use crate::scene::quoted;
 
-/// Access to the text and to image files while materials are written.
+/// Access to the scene text and image files while writing materials.
 pub(super) trait Files {
     /// The scene text.
     fn toml(&mut self) -> &mut Toml;
@@ -21,13 +21,13 @@ pub(super) trait Files {
 /// File of a texture.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct TextureFile {
-    /// Path as written in the scene.
+    /// Path as it appears in the scene.
     pub(super) file: String,
     /// Index of the image in a glTF file.
     pub(super) image: Option<usize>,
 }
 
-/// How a texture's values are used; each use gets its own table.
+/// How a texture's values are used. Each use has its own table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 enum TextureUse {
     Colors,
@@ -38,10 +38,10 @@ enum TextureUse {
 /// Keys and values of a table.
 type TableKeys = Vec<(&'static str, String)>;
 
-/// What identifies a texture: image, use, and the other keys of its table.
+/// Identity of a texture: its image, use, and other table keys.
 type TextureIdentity = (usize, TextureUse, String);
 
-/// Writer of materials and their textures.
+/// Writer for materials and their textures.
 pub(super) struct MaterialWriter<'a, F> {
     files: &'a mut F,
     textures: HashMap<TextureIdentity, String>,
@@ -49,7 +49,7 @@ pub(super) struct MaterialWriter<'a, F> {
 }
 
 impl<F: Files> MaterialWriter<'_, F> {
-    /// Writes the tables and returns the names of the materials.
+    /// Writes the tables and returns the material names.
     pub(super) fn write(scene: &ModelScene, names: &mut Unique, files: &mut F) -> Vec<String> {
         let mut all = MaterialWriter { files, textures: HashMap::new(), names: Unique::default() };
         scene
@@ -64,7 +64,7 @@ impl<F: Files> MaterialWriter<'_, F> {
     }
 
     fn material(&mut self, material: &ModelMaterial, name: &str) {
-        // Collect the keys first: the tables of textures precede the material's table.
+        // Collect the keys first, because texture tables precede the material's table.
         let mut keys = TableKeys::new();
         match material.glass {
             Some(glass) => {
@@ -134,7 +134,7 @@ impl<F: Files> MaterialWriter<'_, F> {
             Alpha::Opaque => {}
             Alpha::Mask { value, cutoff } => {
                 self.opacity(keys, value, &material.color);
-                // A cutoff of 0 shows everything, as does any cutoff if alpha is always 1.
+                // A cutoff has no effect if it is 0 or if alpha is always 1.
                 if *cutoff > 0.0 && (value.texture.is_some() || value.factor != DVec3::ONE) {
                     keys.push(("opacity_cutoff", number(*cutoff)));
                 }
@@ -143,11 +143,11 @@ impl<F: Files> MaterialWriter<'_, F> {
         }
     }
 
-    /// Writes the opacity from an image's alpha. With a factor of 1, it shares the color's texture.
+    /// Writes the opacity, which uses the alpha channel of a texture if there is one.
     fn opacity(&mut self, keys: &mut TableKeys, value: &TexturedValue, color: &TexturedValue) {
         match &value.texture {
             Some(texture) => {
-                // Without factors, one table serves both the color and its alpha.
+                // Without factors, color and alpha can share a texture table.
                 let is_same = color.texture.as_ref() == Some(texture) && color.factor == DVec3::ONE;
                 let use_ = if is_same && value.factor == DVec3::ONE {
                     TextureUse::Colors
@@ -193,7 +193,7 @@ impl<F: Files> MaterialWriter<'_, F> {
         }
     }
 
-    /// Returns the name of a texture, and writes its table if it is new.
+    /// Returns a texture's name. Writes its table if it is new.
     fn texture(&mut self, texture: &TextureRef, use_: TextureUse, factor: DVec3) -> String {
         let mut keys = TableKeys::new();
         if texture.is_nearest {

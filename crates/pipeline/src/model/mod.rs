@@ -1,5 +1,5 @@
-//! Scene text generated for a mesh or a glTF file. `glimt MODEL` renders the text that `glimt import` writes, so both
-//! show the same image.
+//! Generates scene text for a mesh or glTF file. `glimt MODEL` and `glimt import` use the same generator, so
+//! both produce the same image.
 
 mod frame;
 mod gltf;
@@ -26,13 +26,13 @@ use crate::scene::fingerprint::Fingerprint;
 /// How to show a model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Show {
-    /// Side that faces the camera. `None` uses the file's own camera, or [`Side::Iso`] if it has none.
+    /// Side facing the camera. `None` uses the camera from the file, or [`Side::Iso`] if there is none.
     pub(crate) from: Option<Side>,
     /// Aspect ratio of the image. `None` if the command line sets neither width nor height.
     pub(crate) aspect: Option<f64>,
-    /// Up axis of a mesh file. `None` uses the default of its format.
+    /// Up axis of a mesh file. `None` uses the format's default.
     pub(crate) up: Option<UpAxis>,
-    /// Number of turntable frames, which must all contain the model. 1 for a still image.
+    /// Number of turntable frames. The model must fit in all of them. 1 for a still image.
     pub(crate) turns: u32,
 }
 
@@ -46,7 +46,7 @@ impl Default for Show {
 }
 
 impl Show {
-    /// Returns the view that the command line requests.
+    /// Returns the view requested on the command line.
     pub(crate) fn of(overrides: &Overrides) -> Self {
         let aspect = match (overrides.width, overrides.height) {
             (None, None) => None,
@@ -77,22 +77,22 @@ impl Show {
     }
 }
 
-/// Scene text of a model and the files it depends on.
+/// A model's scene text and the files it depends on.
 #[derive(Debug)]
 pub(crate) struct ModelText {
-    /// The text of the scene.
+    /// The scene text.
     pub(crate) text: String,
-    /// Hash of the model's file.
+    /// Hash of the model file.
     pub(crate) hash: FileHash,
-    /// Other files that the text depends on.
+    /// Other files that affect the text.
     pub(crate) companions: Vec<Companion>,
     /// Approximations, one message each.
     pub(crate) notes: Vec<String>,
-    /// Files that the text references and that do not exist yet.
+    /// Files referenced by the text that do not exist yet.
     pub(crate) assets: Vec<ExportedFile>,
 }
 
-/// Generates the scene that shows a model, with paths relative to the model's folder.
+/// Generates a scene showing a model. Paths are relative to the model's folder.
 ///
 /// # Errors
 /// The file cannot be read or is invalid.
@@ -112,9 +112,12 @@ pub(crate) fn text(
     plain::text(path, show, containers, token)
 }
 
-/// ReportMarks a diagnostic as one of the generated scene, which exists in no file.
+/// Marks a diagnostic as coming from the generated scene, which is not stored in a file.
 pub(crate) fn in_generated_scene(diagnostic: Diagnostic) -> Diagnostic {
-    Diagnostic { message: format!("in the scene of this model, {}", diagnostic.message), ..diagnostic }
+    Diagnostic {
+        message: format!("in the scene generated for this model, {}", diagnostic.message),
+        ..diagnostic
+    }
 }
 
 /// Returns the last component of a path.
@@ -122,13 +125,14 @@ fn file_name(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// Limit on indirect radiance per bounce in scenes with polished surfaces, where few samples would show the key light's
-/// caustics as fireflies. Four times the sky's radiance.
+/// Limit on indirect radiance per bounce in scenes with polished surfaces, where caustics from the key light
+/// would appear as fireflies at low sample counts. Four times the sky's radiance.
 const CLAMP: &str = "2";
-/// Roughness above which surfaces cause no fireflies. At 0.4 the clamp changes the error at 64 samples by a quarter, at
-/// 0.2 tenfold.
+/// Roughness above which surfaces do not cause fireflies. At 64 samples, clamping changes the error by a
+/// quarter for roughness 0.4, but by a factor of ten for 0.2.
 const ROUGH: f64 = 0.3;
-/// Exponent of a Phong highlight as narrow as a GGX lobe of roughness [`ROUGH`]: 2/α² − 2 with α = roughness².
+/// Phong exponent whose highlight is as narrow as a GGX lobe with roughness [`ROUGH`]: 2/α² − 2 with α =
+/// roughness².
 const NARROW: f32 = 245.0;
 
 /// Lighting of a model.
@@ -139,20 +143,20 @@ enum Lighting {
         /// Whether any surface is polished.
         is_polished: bool,
     },
-    /// The lights of the file, with a sky that has the default ratio to them.
+    /// The lights from the file, plus a sky scaled to match their brightness.
     FromFile {
-        /// Exposure in stops that compensates for bright lights, at most 0.
+        /// Exposure in stops to compensate for bright lights. Never positive.
         exposure: f64,
     },
 }
 
 impl Lighting {
-    /// Lighting for lights of the file that cause this irradiance on the model.
+    /// Lighting with lights from the file, given their irradiance on the model.
     fn from_file(irradiance: f64) -> Self {
-        // At this irradiance a white surface is as bright as under the default lights.
+        // With this irradiance, a white surface is as bright as with the default lights.
         const USUAL: f64 = 3.0;
         let over = (irradiance / USUAL).max(1.0);
-        // Keep the sky's radiance valid, however close a light is.
+        // Limits the sky's radiance to valid values, even if a light is very close.
         const MAX_STOPS: f64 = 40.0;
         Self::FromFile { exposure: -(libm::log2(over).min(MAX_STOPS) * 10.0).round() / 10.0 }
     }
@@ -197,7 +201,7 @@ fn camera(toml: &mut Toml, eye: &CameraPose, fov: f64) {
     }
 }
 
-/// Writes a sky, and a key light if the model has no lights of its own.
+/// Writes a sky, plus a key light if the model has no lights.
 fn light(toml: &mut Toml, eye: &CameraPose, light: Lighting) {
     toml.table("[environment]");
     toml.key("color", number(light.sky()));
@@ -225,12 +229,13 @@ fn ground(toml: &mut Toml, names: &mut Unique, [least, greatest]: [DVec3; 2], ey
     toml.key("material", format!("\"{name}\""));
 }
 
-/// Set of unique names.
+/// Set of used names.
 #[derive(Debug, Default)]
 struct Unique(HashSet<String>);
 
 impl Unique {
-    /// Returns `wanted`, with a number appended if it is in use. An empty or numeric name is replaced by `usual`.
+    /// Returns `wanted`, with a number appended if it is taken. Falls back to `usual` if `wanted` is empty or
+    /// a number.
     fn name(&mut self, wanted: &str, usual: &str) -> String {
         let plain: String = wanted.chars().filter(|c| !c.is_control()).take(100).collect();
         let plain = plain.trim();

@@ -1,4 +1,4 @@
-//! Conversion of mesh files (OBJ, OFF, PLY, STL) to scene text.
+//! Converts mesh files (OBJ, OFF, PLY, STL) to scene text.
 
 use std::fs::File;
 use std::io::Read;
@@ -19,13 +19,14 @@ use crate::settings::{Side, UpAxis};
 use crate::stages::containers::Containers;
 use crate::world::file_is_glass;
 
-/// Default up axis of a format: z for STL, as in CAD and 3D printing, and for PLY files from Blender; y otherwise.
+/// Default up axis: z for STL (the CAD and 3D printing convention) and for PLY files exported by Blender, y
+/// for all others.
 fn default_up_axis(path: &Path) -> UpAxis {
     let has = |ending: &str| path.extension().is_some_and(|own| own.eq_ignore_ascii_case(ending));
     if has("stl") || has("ply") && is_from_blender(path) { UpAxis::Z } else { UpAxis::Y }
 }
 
-/// Whether the header of a PLY file names Blender, which exports its z-up axes unchanged.
+/// Whether the header of a PLY file mentions Blender, which exports PLY files z-up.
 fn is_from_blender(path: &Path) -> bool {
     const START: usize = 256;
     let mut start = [0; START];
@@ -37,7 +38,7 @@ fn is_from_blender(path: &Path) -> bool {
 }
 
 impl UpAxis {
-    /// Euler angles in degrees that turn this axis to y. `None` for y itself.
+    /// Euler angles in degrees that rotate this axis to y. `None` for y itself.
     fn rotation(self) -> Option<[i32; 3]> {
         match self {
             Self::X => Some([0, 0, 90]),
@@ -56,7 +57,7 @@ impl UpAxis {
     }
 }
 
-/// Whether a material of a mesh file may cast caustics.
+/// Whether a material from a mesh file may cast caustics.
 fn is_polished(material: &FileMaterial) -> bool {
     let is_mirror_or_glass = matches!(material.illumination_model, Some(3..=9));
     match &material.physical {
@@ -80,7 +81,7 @@ fn is_unseen(loaded: &LoadedMesh) -> bool {
     !loaded.mesh.materials.is_empty() && loaded.mesh.materials.iter().all(is_unseen)
 }
 
-/// Generates the scene of a mesh file.
+/// Generates the scene text for a mesh file.
 pub(super) fn text(
     path: &Path,
     show: Show,
@@ -106,12 +107,12 @@ pub(super) fn text(
         (show.from.unwrap_or(Side::Iso), show.turns),
         show.aspect.unwrap_or(SIZE[0] / SIZE[1]),
     );
-    // Report the coordinates of the file, because the user did not write the camera's.
+    // Blame the file's coordinates, because the user did not choose the camera position.
     let eye_reach = eye.position.abs().max(eye.look_at.abs()).max_element();
     if eye_reach >= LARGEST {
         let farthest = least.abs().max(greatest.abs()).max_element() as f32;
         let reason = format!(
-            "its coordinates reach to {farthest:e}, which puts its camera at {eye_reach:.0e}; coordinates must stay below {LARGEST:e}"
+            "its coordinates extend to {farthest:e}, which places the camera at {eye_reach:.0e}; coordinates must be below {LARGEST:e}"
         );
         return Err(AssetError::Malformed { path: path.to_owned(), line: None, reason });
     }
@@ -134,7 +135,7 @@ pub(super) fn text(
     if let Some([x, y, z]) = up.rotation() {
         toml.key("rotate", format!("[{x}, {y}, {z}]"));
     }
-    // STL has no normals, and mechanical parts have sharp edges.
+    // STL has no vertex normals, and mechanical parts have sharp edges.
     let is_stl = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("stl"));
     if is_stl || loaded.is_faceted() {
         toml.key("smooth", "false");
@@ -146,7 +147,7 @@ pub(super) fn text(
         toml.key("vertex_colors", "true");
     }
     ground(&mut toml, &mut names, bounds, &eye);
-    // The scene's own material hides missing materials of the file, so report them here.
+    // The generated material hides the fact that the file lacks materials, so report it here.
     let mut notes = if needs_material { loaded.material_warnings.clone() } else { Vec::new() };
     notes.extend(is_unseen(&loaded).then(|| INVISIBLE_MODEL.to_owned()));
     let (hash, companions, assets) = (loaded.hash, loaded.companions.clone(), Vec::new());
@@ -160,7 +161,7 @@ mod tests {
     use crate::math::transform::rotation_xyz;
 
     #[test]
-    fn up_axis_matches_the_rotation_in_the_scene() {
+    fn up_axis_matches_scene_rotation() {
         for (up, axis) in [(UpAxis::X, DVec3::X), (UpAxis::Y, DVec3::Y), (UpAxis::Z, DVec3::Z)] {
             let rotation = rotation_xyz(DVec3::from(up.rotation().unwrap_or_default().map(f64::from)));
             assert_eq!(up.upright(axis), DVec3::Y, "{up:?}");

@@ -1,4 +1,4 @@
-//! Writer of concise TOML: short numbers, bare keys, no default values.
+//! Writer for concise TOML with short numbers, bare keys and no default values.
 
 use crate::math::{DVec3, Vec2};
 use crate::scene::quoted;
@@ -8,7 +8,7 @@ use crate::scene::quoted;
 pub(super) struct Toml(String);
 
 impl Toml {
-    /// Adds a comment, wrapped to lines.
+    /// Adds a comment, wrapped to several lines if necessary.
     pub(super) fn comment(&mut self, text: &str) {
         const WIDTH: usize = 110;
         let mut line = String::from("#");
@@ -23,7 +23,7 @@ impl Toml {
         self.line(&line);
     }
 
-    /// Adds an empty line and a header such as `[camera]`.
+    /// Adds an empty line and a table header, such as `[camera]`.
     pub(super) fn table(&mut self, header: &str) {
         if !self.0.is_empty() && !self.0.ends_with("\n\n") {
             self.0.push('\n');
@@ -39,7 +39,7 @@ impl Toml {
         self.comment(text);
     }
 
-    /// Adds a key with a value that is already TOML.
+    /// Adds a key with a value in TOML syntax.
     pub(super) fn key(&mut self, key: &str, value: impl AsRef<str>) {
         self.line(&format!("{key} = {}", value.as_ref()));
     }
@@ -54,7 +54,7 @@ impl Toml {
     }
 }
 
-/// Formats a number with the precision of a 32-bit float; coordinates of 10,000 and more keep all digits.
+/// Formats a number with 32-bit float precision. Values of 10,000 and above keep all digits.
 pub(super) fn number(value: f64) -> String {
     const FAR: f64 = 1e4;
     let magnitude = value.abs();
@@ -68,7 +68,7 @@ pub(super) fn number(value: f64) -> String {
     if text == "-0" { "0".to_owned() } else { text }
 }
 
-/// Formats a point with all digits, because a small model may be far from the origin.
+/// Formats a point with all digits, since a small model may be far from the origin.
 pub(super) fn exact_vector(value: DVec3) -> String {
     let exact = |value: f64| match value.abs() {
         0.0 => "0".to_owned(),
@@ -102,13 +102,13 @@ pub(super) fn pair(value: Vec2) -> String {
     list(&[f64::from(value.x), f64::from(value.y)])
 }
 
-/// Formats a color; gray is a single number.
+/// Formats a color. Grays become a single number.
 pub(super) fn color(value: DVec3) -> String {
     let [red, green, blue] = value.to_array();
     if red == green && green == blue { number(red) } else { vector(value) }
 }
 
-/// Formats a name as a key, without quotes where TOML allows it.
+/// Formats a name as a key, quoted only if TOML requires it.
 pub(super) fn key_name(name: &str) -> String {
     let is_bare =
         !name.is_empty() && name.bytes().all(|byte| byte.is_ascii_alphanumeric() || b"-_".contains(&byte));

@@ -1,8 +1,8 @@
 //! Reasons in [`StageReport::why`](super::StageReport::why).
 
-/// The inputs of the stage are unchanged.
+/// The stage's inputs are unchanged.
 pub const UNCHANGED: &str = "unchanged";
-/// The result is of an earlier request.
+/// The result comes from an earlier request.
 pub const CACHED: &str = "cached";
 /// The scene has no shapes.
 pub const NO_SHAPES: &str = "no shapes";
@@ -24,20 +24,20 @@ pub const NOT_USED_BY_PATH: &str = "not used by path";
 pub const TOO_FEW_BOUNCES: &str = "no photons at max_depth 1";
 /// No surface causes caustics.
 pub const NO_SPECULAR_SURFACES: &str = "no mirror or glass reflects light";
-/// The part was already finished.
+/// The part has already been finished.
 pub const PART_COMPLETE: &str = "the part is already finished";
 /// The checkpoint contains all samples.
 pub const CHECKPOINT_COMPLETE: &str = "the checkpoint is complete";
 /// The time limit ended the render.
 pub const TIME_LIMIT_REACHED: &str = "time limit reached";
-/// The noise target ended the render of some tiles early.
+/// Some tiles reached the noise target early.
 pub const NOISE_TARGET_REACHED: &str = "noise target reached in some tiles";
-/// The outputs already contain the image.
+/// The output files already contain the image.
 pub const ALREADY_WRITTEN: &str = "already written";
-/// The request does not write its image.
+/// The request's image is not to be written.
 pub const PREVIEW_ONLY: &str = "preview only";
 
-/// Start of the reason for a render that continued from existing samples.
+/// Prefix of the reason for a render that continued from existing samples.
 pub const RESUMED: &str = "resumed after ";
 
 /// Returns the reason for a render that continued from `samples` samples per pixel.

@@ -1,6 +1,6 @@
 //! Stages of a request and their results.
 
-/// A stage of a request, in the order in which they run.
+/// A stage of a request. Variants are in execution order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Stage {
@@ -54,7 +54,7 @@ impl Stage {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Status {
-    /// In progress; never in a finished report.
+    /// In progress. Never used in a finished report.
     Running,
     /// Run by this request.
     Done,
@@ -73,7 +73,7 @@ pub struct StageReport {
     pub status: Status,
     /// Wall-clock time of the stage.
     pub seconds: f64,
-    /// CPU time of all threads of the process during the stage.
+    /// CPU time used by all threads of the process during the stage.
     pub processor_seconds: f64,
     /// Why the stage was skipped or reused, or a summary of its result. May be empty.
     pub why: String,

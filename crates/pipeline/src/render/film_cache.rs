@@ -1,12 +1,12 @@
-//! Cache of recent films, so that toggling a setting back reuses its film.
+//! Cache of recent films. Switching back to an earlier setting reuses its film.
 
 use super::film_state::FilmState;
 use crate::scene::fingerprint::Key;
 
-/// Maximum memory of films other than the current one.
+/// Memory limit for all films except the current one.
 const MAX_KEPT_BYTES: u64 = 256 << 20;
 
-/// The current film and cached ones.
+/// The current film and the cached films.
 #[derive(Debug)]
 pub(crate) struct FilmCache {
     current: Option<FilmState>,
@@ -39,7 +39,7 @@ impl FilmCache {
         self.kept.iter().chain(&self.current).find(|state| state.key == key)
     }
 
-    /// Pins the film with this key, in place of the previously pinned one.
+    /// Pins the film with this key, replacing any previous pin.
     pub(crate) fn pin(&mut self, key: Key) {
         self.pinned = Some(key);
     }
@@ -49,15 +49,15 @@ impl FilmCache {
         self.pinned = None;
     }
 
-    /// Limits the size of the cached films, apart from the current and the pinned one, and evicts films above the
-    /// limit.
+    /// Limits the total size of cached films, excluding the current and the pinned film. Evicts films that
+    /// exceed the limit.
     pub(crate) fn limit(&mut self, bytes: u64) {
         self.most_kept_bytes = bytes.min(MAX_KEPT_BYTES);
         self.make_room(0);
     }
 
-    /// Makes the film with this key current if it is cached and usable; otherwise there is no current film. Caches the
-    /// previous film if there is room.
+    /// Makes the film with this key current if it is cached and usable. Otherwise, there is no current film.
+    /// Caches the previous film if there is room.
     pub(crate) fn select(&mut self, key: Key, is_usable: impl FnOnce(&FilmState) -> bool) {
         if self.current.as_ref().is_none_or(|current| current.key != key) {
             let kept = self.kept.iter().position(|state| state.key == key);
@@ -69,10 +69,10 @@ impl FilmCache {
         self.current.take_if(|current| !is_usable(current));
     }
 
-    /// Replaces the current film. If there is not enough memory, drops the cached films and tries again.
+    /// Replaces the current film. If `make` fails, drops the cached films and tries again.
     ///
     /// # Errors
-    /// Errors of `make`.
+    /// Returns the error from `make`.
     pub(crate) fn put<E>(&mut self, make: impl Fn() -> Result<FilmState, E>) -> Result<&mut FilmState, E> {
         self.current = None;
         let mut state = match make() {
@@ -93,15 +93,15 @@ impl FilmCache {
         self.kept.len() + usize::from(self.current.is_some())
     }
 
-    /// Returns the memory size of all films in bytes.
+    /// Returns the memory used by all films, in bytes.
     pub(crate) fn memory_bytes(&self) -> u64 {
         self.kept.iter().chain(&self.current).map(FilmState::memory_bytes).sum()
     }
 
-    /// Caches a film and evicts others for it. A film larger than the limit is dropped instead.
+    /// Caches a film, evicting others to make room. A film larger than the limit is dropped instead.
     fn keep(&mut self, state: FilmState) {
         let size = state.memory_bytes();
-        // Drop incomplete films of a moving camera, which would fill the cache and are never reused.
+        // Drop incomplete films from a moving camera. They would fill the cache and are never reused.
         let is_left_behind = state.is_passing && !state.is_covered();
         if !state.is_begun() {
             return;
@@ -146,7 +146,7 @@ mod tests {
         Fingerprint::new(name).finish()
     }
 
-    /// Creates a film of 64×32 pixels with samples.
+    /// Creates a film of 64×32 pixels that has samples.
     fn state(name: &str) -> FilmState {
         let scene = loaded_of("[render]\nwidth = 64\nheight = 32\n").scene;
         let plan = plan(&scene, Path::new("a.toml"), &Default::default()).expect("a plan");
@@ -176,14 +176,14 @@ mod tests {
         let mut films = films(&["a", "b", "c"], room_for_two);
         assert_eq!(films.count(), 3);
         assert_eq!(films.memory_bytes(), 3 * state("a").memory_bytes());
-        assert!(finds(&mut films, "a"), "the oldest is cached, and now the newest");
-        assert!(!finds(&mut films, "d"), "new; a, b and c do not all fit");
+        assert!(finds(&mut films, "a"), "the oldest film should still be cached");
+        assert!(!finds(&mut films, "d"), "d should not be cached");
         assert!(finds(&mut films, "a") && finds(&mut films, "c"));
         assert!(!finds(&mut films, "b"));
     }
 
     #[test]
-    fn too_large_film_does_not_evict_others() {
+    fn oversized_film_does_not_evict_others() {
         let mut films = films(&["a", "b"], state("a").memory_bytes());
         films
             .put(|| {
@@ -205,14 +205,14 @@ mod tests {
             films.select(key(name), |_| true);
             films.put(|| Ok::<_, ()>(state(name))).expect("a film");
         }
-        assert_eq!(films.count(), 2, "the pinned one and the current one");
+        assert_eq!(films.count(), 2, "only the pinned and the current film should remain");
         let tries = std::cell::Cell::new(0);
         let made = films.put(|| {
             tries.set(tries.get() + 1);
             if tries.get() == 1 { Err("no memory") } else { Ok(state("d")) }
         });
         assert!(made.is_ok() && finds(&mut films, "own"));
-        // After pinning another film, this one is treated like any other.
+        // Once another film is pinned, this one is treated like any other.
         films.pin(key("other"));
         assert!(!finds(&mut films, "d"));
         assert!(!finds(&mut films, "own"));
@@ -237,7 +237,7 @@ mod tests {
     }
 
     #[test]
-    fn cached_films_make_room_for_a_new_one() {
+    fn cached_films_are_dropped_when_out_of_memory() {
         let mut films = films(&["a", "b"], u64::MAX);
         films.select(key("a"), |_| false);
         assert!(films.current().is_none() && !finds(&mut films, "a") && finds(&mut films, "b"));

@@ -21,63 +21,63 @@ use crate::trace::{Cost, Job};
 #[derive(Debug)]
 pub(crate) struct FilmState {
     pub(crate) key: Key,
-    /// Number of the film in its cache.
+    /// Serial number, assigned by the film cache.
     pub(crate) number: u64,
     pub(crate) film: Arc<Film>,
-    /// Samples of both halves of each cell. [`u32::MAX`] for cells that get none.
+    /// Samples taken in both halves of each cell. [`u32::MAX`] for cells that are not rendered.
     pub(crate) done: Vec<[u32; 2]>,
-    /// Rays of each cell.
+    /// Number of rays traced in each cell.
     pub(crate) rays: Vec<u64>,
-    /// CPU seconds of all rays.
+    /// CPU seconds spent on all rays.
     pub(super) seconds: f64,
-    /// Recent cost of the samples in each cell.
+    /// Recent sample cost in each cell.
     costs: Vec<CellCost>,
-    /// Cost of a pixel in a job, apart from its samples.
+    /// Per-pixel overhead of a job, excluding its samples.
     pixel_share: PixelShare,
-    /// Maximum samples of both halves of each cell.
+    /// Maximum number of samples for both halves of each cell.
     pub(crate) goals: Goals,
-    /// Expected samples of halves without a goal.
+    /// Expected number of samples for halves without a goal.
     expected: ExpectedSamples,
-    /// First image at the size of the preview, shown for pixels without samples.
+    /// First image at preview size, shown where pixels have no samples.
     pub(crate) base: Option<RadianceImage>,
-    /// The previewer of the last preview.
+    /// The previewer used for the last preview.
     pub(crate) previewer: Option<Previewer>,
-    /// Whether the render began while the camera was moving.
+    /// Whether the render started while the camera was moving.
     pub(crate) is_passing: bool,
     /// The time limit that ended the last render.
     pub(crate) ended_by: Option<f64>,
-    /// Render time of all requests in seconds.
+    /// Total render time of all requests in seconds.
     pub(crate) render_seconds: f64,
-    /// The share of the image that is rendered. `None` for the whole image.
+    /// Share of the image to render. `None` for the whole image.
     pub(crate) share: Option<Share>,
-    /// Which tiles belong to the share. `None` for all tiles.
+    /// Whether each tile belongs to the share. `None` if all tiles do.
     own: Option<Vec<bool>>,
-    /// Work of the process whose checkpoint this render continues.
+    /// Work done by the process whose checkpoint this render resumed from.
     pub(crate) before: Before,
-    /// Rays of all requests and of the process whose checkpoint this render continues.
+    /// Rays traced by all requests and by the process whose checkpoint this render resumed from.
     pub(crate) traced: RayCounters,
-    /// Whether a checkpoint contains all samples.
+    /// Whether a checkpoint contains all of the film's samples.
     pub(crate) is_kept: bool,
-    /// Names and values of everything that the image depends on. `None` until first needed.
+    /// Names and values of everything that affects the image. `None` until first needed.
     pub(crate) identity: Option<Vec<Dependency>>,
-    /// Whether the film was read from a finished part.
+    /// Whether the film was loaded from a finished part.
     pub(crate) is_finished_part: bool,
 }
 
-/// Work of an earlier process.
+/// Work done by an earlier process.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Before {
-    /// Rays and texture lookups.
+    /// Numbers of rays and texture lookups.
     pub(crate) rays: RayCounters,
-    /// Seconds of the render stage.
+    /// Duration of the render stage in seconds.
     pub(crate) seconds: f64,
 }
 
 impl FilmState {
-    /// Creates a state without samples. The film may use `most_bytes`.
+    /// Creates a state without samples. The film may use at most `most_bytes`.
     ///
     /// # Errors
-    /// Not enough memory for the film.
+    /// There is not enough memory for the film.
     pub(crate) fn new(
         key: Key,
         plan: &Plan,
@@ -131,7 +131,8 @@ impl FilmState {
         self.own.as_ref().is_none_or(|own| own[tile])
     }
 
-    /// Returns the sample indices in the whole image of the first of these samples that are consecutive there.
+    /// Maps samples of this share to sample indices in the whole image. Only returns the first ones if the
+    /// indices are not all consecutive.
     pub(crate) fn numbers(&self, samples: Range<u32>) -> Range<u32> {
         match &self.share {
             Some(share) => share.numbers(samples),
@@ -139,7 +140,7 @@ impl FilmState {
         }
     }
 
-    /// Returns goals equal to the samples of this film.
+    /// Returns goals equal to the film's current sample counts.
     pub(super) fn goals_of_what_is_done(&self) -> Goals {
         Goals { decided: self.done.clone(), ..Goals::none(self.done.len()) }
     }
@@ -152,35 +153,36 @@ impl FilmState {
         }
     }
 
-    /// Whether every pixel has this many samples or has reached its goal.
+    /// Whether every pixel has at least `samples` samples or has reached its goal.
     pub(crate) fn is_complete(&self, samples: u32) -> bool {
         self.is_complete_in(None, samples)
     }
 
-    /// Whether every pixel in the tiles of `part` has this many samples or has reached its goal. `None` for all tiles.
+    /// Like [`Self::is_complete`], but only for tiles overlapping `part`. `None` means all tiles.
     pub(crate) fn is_complete_in(&self, part: Option<Rect>, samples: u32) -> bool {
         self.halves()
             .filter(|(cell, _)| self.is_in(part, *cell))
             .all(|(tile, half)| self.done[tile][half] >= self.goals.of(tile, half).min(samples))
     }
 
-    /// Whether a plan's image is finished: all samples are done or the time limit was reached.
+    /// Whether a plan's image is finished, either because all samples are done or because the time limit was
+    /// reached.
     pub(crate) fn is_finished(&self, plan: &Plan) -> bool {
         let is_over_time = plan.time_seconds.is_some() && self.ended_by == plan.time_seconds;
         self.is_finished_part || is_over_time || self.is_complete(plan.settings.render.samples)
     }
 
-    /// Whether no pixel has more than this many samples.
+    /// Whether no pixel has more than `samples` samples.
     pub(crate) fn has_at_most(&self, samples: u32) -> bool {
         self.halves().all(|(cell, half)| self.done[cell][half] <= samples)
     }
 
-    /// Returns the smallest number of samples of a pixel that needs more, at most `most`.
+    /// Returns the lowest sample count among pixels that need more samples, limited to `most`.
     pub(crate) fn samples(&self, most: u32) -> u32 {
         self.samples_in(None, most)
     }
 
-    /// Like [`Self::samples`], in the tiles of `part`. `None` for all tiles.
+    /// Like [`Self::samples`], but only for tiles overlapping `part`. `None` means all tiles.
     pub(crate) fn samples_in(&self, part: Option<Rect>, most: u32) -> u32 {
         let of = |(tile, half): (usize, usize)| {
             let done = self.done[tile][half];
@@ -189,7 +191,7 @@ impl FilmState {
         self.halves().filter(|(cell, _)| self.is_in(part, *cell)).filter_map(of).min().unwrap_or(most)
     }
 
-    /// Whether the tile of a cell overlaps `part`.
+    /// Whether a cell's tile overlaps `part`.
     fn is_in(&self, part: Option<Rect>, cell: usize) -> bool {
         part.is_none_or(|part| {
             self.film.tile_rect(cell / CELLS).is_some_and(|rect| rect.intersection(&part).is_some())
@@ -201,7 +203,7 @@ impl FilmState {
         self.halves().any(|(cell, half)| self.done[cell][half] > 0)
     }
 
-    /// Whether every pixel has a sample, so that the image may replace another one.
+    /// Whether every pixel has a sample. Only such an image may replace another one.
     pub(crate) fn is_covered(&self) -> bool {
         self.halves().all(|(cell, half)| self.done[cell][half] > 0)
     }
@@ -212,7 +214,7 @@ impl FilmState {
             .filter(|(cell, half)| self.is_own(cell / CELLS) && self.film.half_pixel_count(*cell, *half) > 0)
     }
 
-    /// Returns the memory size in bytes.
+    /// Returns the memory used, in bytes.
     pub(crate) fn memory_bytes(&self) -> u64 {
         let base = self.base.as_ref().map_or(0, |base| size_of_val(base.pixels.as_slice()) as u64);
         let cells = size_of_val(self.done.as_slice())
@@ -226,8 +228,9 @@ impl FilmState {
             + self.previewer.as_ref().map_or(0, Previewer::memory_bytes)
     }
 
-    /// Returns the jobs that bring both halves of every cell in `part` (`None` for all) to `target` or their goals.
-    /// Tiles whose cells need the same samples are one job. Jobs are in the order of the film.
+    /// Returns the jobs needed to raise both halves of every cell in `part` (`None` for all) to `target` or
+    /// their goals. If all cells of a tile need the same samples, the tile is a single job. Longer jobs
+    /// precede shorter ones, and jobs of equal length are in the film's tile order.
     pub(crate) fn jobs(&self, part: Option<Rect>, target: impl Fn(usize, usize) -> u32) -> Vec<Job> {
         let missing = |cell: usize, half: usize| {
             self.done[cell][half]..self.goals.of(cell, half).min(target(cell, half))
@@ -254,12 +257,12 @@ impl FilmState {
             }
         }
         jobs.retain(|job| !job.samples.is_empty());
-        // Run the longest jobs first, so that all threads end at about the same time.
+        // Run the longest jobs first so that all threads finish at about the same time.
         jobs.sort_by_key(|job| Reverse(job.samples.len()));
         jobs
     }
 
-    /// Records a finished job and its cost. Returns its pixels times samples.
+    /// Records a finished job and its cost. Returns its number of pixels times samples.
     pub(crate) fn note(&mut self, job: &Job, cost: &Cost) -> u64 {
         let (rays, seconds) = (cost.rays.all(), cost.seconds / job.pixels.rect.area() as f64);
         for cell in CELLS * job.tile..CELLS * (job.tile + 1) {
@@ -279,24 +282,25 @@ impl FilmState {
         job.pixel_count() * job.samples.len() as u64
     }
 
-    /// Decides which tiles have enough samples, among those with `samples`, a power of two.
+    /// Decides which of the tiles with `samples` samples, a power of two, have enough.
     pub(crate) fn judge(&mut self, samples: u32, error: f64) {
         if let Some(judgement) = self.goals.judge(&self.film, &self.done, samples, error) {
             self.expected.predict(&judgement, &self.goals, &self.done);
         }
     }
 
-    /// Returns the number of tiles that reached the sample limit above the noise target, and the noise of the worst.
+    /// Returns the number of tiles that reached their sample limit but not the noise target, and the highest
+    /// noise of these tiles.
     pub(crate) fn missed(&self, error: f64) -> Option<(usize, f64)> {
         self.goals.missed(&self.film, error)
     }
 
-    /// Returns the pixels times samples rendered so far.
+    /// Returns the number of pixels times samples rendered so far.
     pub(crate) fn units(&self) -> u64 {
         self.units_of(|tile, half| self.done[tile][half])
     }
 
-    /// Returns the expected total of pixels times samples, with at most `most` samples.
+    /// Returns the expected total number of pixels times samples, with at most `most` samples per pixel.
     pub(crate) fn units_to_come(&self, most: u32) -> u64 {
         self.units_of(|cell, half| self.to_come(cell, half, most))
     }
@@ -306,9 +310,9 @@ impl FilmState {
         self.seconds
     }
 
-    /// Returns the expected CPU seconds of the remaining samples, up to `most`. `jobs` returns the number of jobs
-    /// between two sample counts. A sample costs as much as recent ones in its cell, or the mean in cells without
-    /// samples.
+    /// Estimates the CPU seconds for the remaining samples, up to `most` per pixel. `jobs` returns the number
+    /// of jobs between two sample counts. The cost per sample is that of recent samples in the same cell, or
+    /// the mean cost in cells without samples.
     pub(crate) fn seconds_to_come(&self, most: u32, jobs: impl Fn(u32, u32) -> u32) -> f64 {
         let (mut seconds, mut known, mut worth, mut others) = (0.0, 0.0, 0.0, 0.0);
         let is_there = |cell: &usize| self.is_own(cell / CELLS) && self.film.cell_rect(*cell).is_some();
@@ -329,12 +333,12 @@ impl FilmState {
             known += cost.seconds();
             worth += of_cell;
         }
-        // Without measurements, all samples cost the same.
+        // Without measurements, assume that all samples cost the same.
         seconds + others * if worth > 0.0 { known / worth } else { 1.0 }
     }
 
-    /// Returns the current and the expected final samples of the pixel with most samples, which are also the numbers of
-    /// photon passes.
+    /// Returns the highest current and highest expected final sample count of any pixel. These are also the
+    /// numbers of photon passes.
     pub(crate) fn passes(&self, most: u32) -> [u32; 2] {
         let most_of = |samples: &dyn Fn(usize, usize) -> u32| {
             self.halves().map(|(cell, half)| samples(cell, half)).max().unwrap_or(0)
@@ -342,7 +346,7 @@ impl FilmState {
         [most_of(&|cell, half| self.done[cell][half]), most_of(&|cell, half| self.to_come(cell, half, most))]
     }
 
-    /// Whether the final number of samples can be estimated if noise ends the render.
+    /// Whether the final number of samples can be estimated with a noise target.
     pub(crate) fn is_foreseen(&self) -> bool {
         self.halves().all(|(cell, half)| self.to_come(cell, half, u32::MAX) < u32::MAX)
     }
@@ -360,7 +364,7 @@ impl FilmState {
     }
 }
 
-/// Returns the samples that all halves of all cells need, if they are equal.
+/// Returns the needed samples if they are equal for all halves of all cells.
 fn common(cells: &[(Rect, [Range<u32>; 2])]) -> Option<&Range<u32>> {
     let (_, [first, _]) = cells.first()?;
     cells.iter().all(|(_, halves)| halves.iter().all(|half| half == first)).then_some(first)
@@ -373,7 +377,7 @@ mod tests {
     use crate::math::Vec3;
     use crate::scene::fingerprint::Fingerprint;
 
-    /// Creates a film of two tiles.
+    /// Creates a film with two tiles.
     fn state() -> FilmState {
         let film = Film::new(64, 32, None).expect("a film");
         let cells = film.cell_count();
@@ -407,7 +411,7 @@ mod tests {
         u32::from(done < end)
     }
 
-    /// Adds samples to a tile that took this long.
+    /// Adds samples to a tile and records how long they took.
     fn note(state: &mut FilmState, tile: usize, samples: Range<u32>, seconds: f64) {
         let pixels = Pixels::from(state.film.tile_rect(tile).expect("a tile"));
         let count = samples.end - samples.start;
@@ -418,13 +422,13 @@ mod tests {
     }
 
     #[test]
-    fn remaining_samples_cost_as_before_per_tile() {
+    fn remaining_cost_is_estimated_per_tile() {
         let mut state = state();
         let mut noted = |tile: usize, samples: Range<u32>, seconds: f64| {
             note(&mut state, tile, samples, seconds);
             [state.seconds(), state.seconds_to_come(8, in_one)].map(|seconds| (seconds * 1e6).round() * 1e-6)
         };
-        // The second tile is unknown, so it is assumed to cost as much as the first.
+        // The second tile's cost is unknown, so it is assumed to equal the first's.
         assert_eq!(noted(0, 0..4, 1.0), [1.0, 3.0]);
         assert_eq!(noted(1, 0..2, 10.0), [11.0, 31.0]);
         assert_eq!(noted(1, 2..8, 30.0), [41.0, 1.0]);
@@ -440,7 +444,7 @@ mod tests {
             note(&mut state, tile, 1..2, 1.0);
         }
         assert_eq!(state.seconds(), 10.0);
-        // A quarter of the first and all of the second job: 2 seconds for 1.25 samples.
+        // The first job counts a quarter, and the second counts fully: 2 seconds for 1.25 samples.
         assert!(
             (state.seconds_to_come(12, in_one) - 2.0 * 10.0 * 1.6).abs() < 1e-9,
             "{}",
@@ -449,9 +453,9 @@ mod tests {
     }
 
     #[test]
-    fn pixel_cost_counts_for_each_job() {
+    fn pixel_overhead_is_charged_per_job() {
         let mut state = state();
-        // A second per sample, and three for the pixels.
+        // One second per sample plus three seconds of pixel overhead per job.
         for (samples, seconds) in [(0..1, 4.0), (1..2, 4.0), (2..4, 5.0)] {
             note(&mut state, 0, samples.clone(), seconds);
             note(&mut state, 1, samples, seconds);
@@ -462,12 +466,12 @@ mod tests {
     }
 
     #[test]
-    fn end_is_unknown_before_noise_is_measured() {
+    fn end_is_unknown_until_noise_is_measured() {
         let mut state = state();
         note(&mut state, 0, 0..1, 1.0);
         note(&mut state, 1, 0..1, 1.0);
         state.judge(1, 0.1);
-        assert!(!state.is_foreseen(), "one sample has no noise");
+        assert!(!state.is_foreseen(), "noise cannot be estimated from one sample");
         note(&mut state, 0, 1..2, 1.0);
         note(&mut state, 1, 1..2, 1.0);
         state.judge(2, 0.1);

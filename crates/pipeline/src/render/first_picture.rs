@@ -1,4 +1,4 @@
-//! First images: one sample per preview pixel, shown before the first pass is done.
+//! First images, with one sample per preview pixel. They are shown until the first pass is done.
 
 use std::cell::Cell;
 use std::time::{Duration, Instant};
@@ -12,23 +12,23 @@ use crate::scene::description::Render;
 use crate::stages::Stop;
 use crate::trace::{Job, Tracer};
 
-/// Time for the first image of a moving camera.
+/// Time budget for the first image while the camera is moving.
 const HASTE: Duration = Duration::from_millis(6);
 
-/// Inputs of first images.
+/// Inputs for rendering first images.
 #[derive(Clone, Copy)]
 pub(crate) struct FirstPictures<'a> {
     pub(crate) tracer: Tracer<'a>,
     pub(crate) plan: &'a Plan,
     /// Whether the camera is being moved.
     pub(crate) is_moved: bool,
-    /// Pixels per second of the last first image.
+    /// Pixels per second measured for the most recent first image.
     pub(crate) rate: &'a Cell<Option<f64>>,
 }
 
 impl<'a> FirstPictures<'a> {
-    /// Returns the sizes of first images that are much less work than a pass: about the preview's, preceded by a
-    /// smaller one if the camera is being moved.
+    /// Returns the sizes of the first images: about the preview's size, preceded by a smaller size if the
+    /// camera is being moved. Excludes sizes that take almost as long as a full pass.
     pub(crate) fn sizes(&self, shown: (u32, u32)) -> Vec<(u32, u32)> {
         let usual = self.usual_size(shown);
         let rate = self.rate.get().filter(|_| self.is_moved);
@@ -36,10 +36,10 @@ impl<'a> FirstPictures<'a> {
         hasty.into_iter().chain([usual]).filter(|size| self.is_less_work(*size)).collect()
     }
 
-    /// Returns the preview's size, or half as many pixels if rays are slow because the scene's trees exceed the CPU
-    /// caches.
+    /// Returns the preview's size, or half as many pixels if the trees do not fit in the CPU caches, which
+    /// makes rays slow.
     fn usual_size(&self, (width, height): (u32, u32)) -> (u32, u32) {
-        /// Number of triangles whose trees take tens of megabytes.
+        /// With this many triangles, trees take tens of megabytes.
         const LARGE: u64 = 250_000;
         let side =
             |length: u32| ((f64::from(length) * std::f64::consts::FRAC_1_SQRT_2).round() as u32).max(1);
@@ -52,7 +52,7 @@ impl<'a> FirstPictures<'a> {
         pixels(width, height) * 2 <= pixels(full_width, full_height)
     }
 
-    /// Traces a first image and records the pixels per second. `tick` is called regularly.
+    /// Traces a first image and records the pixels per second. Calls `tick` regularly.
     pub(crate) fn picture(
         &self,
         photons: Option<&PhotonMaps>,
@@ -84,8 +84,8 @@ impl<'a> FirstPictures<'a> {
         Ok(picture)
     }
 
-    /// Shows a first image before photons are traced, if the whole image is shown and this is much less work than a
-    /// pass. The film is not changed. `tick` is called regularly.
+    /// Shows a first image before photons are traced. Does nothing if the preview shows a section or if this
+    /// would take almost as long as a full pass. Does not change the film. Calls `tick` regularly.
     ///
     /// # Errors
     /// [`Stop::Cancelled`].
@@ -95,7 +95,7 @@ impl<'a> FirstPictures<'a> {
         tick: impl Fn(),
     ) -> Result<(), Stop> {
         let is_whole = screen.bounds.is_some_and(|bounds| bounds.around.is_none());
-        // Skip views of data, which depend on the range of the whole image or show the photons themselves.
+        // Skip data views, which depend on the range of the whole image or show the photons themselves.
         let is_of_light = self.plan.tone.range_map == RangeMap::None;
         let Some(shown) = screen.size().filter(|_| is_whole && is_of_light) else { return Ok(()) };
         let Some(size) = self.sizes(shown).into_iter().next() else { return Ok(()) };
@@ -105,8 +105,8 @@ impl<'a> FirstPictures<'a> {
     }
 }
 
-/// Returns the size of an image that takes [`HASTE`] at `rate` pixels per second. `None` if the usual size is hardly
-/// slower.
+/// Returns the size of an image that takes [`HASTE`] to render at `rate` pixels per second. `None` if the
+/// usual size is about as fast.
 fn hasty_size((width, height): (u32, u32), rate: f64) -> Option<(u32, u32)> {
     /// Minimum width in pixels.
     const LEAST: f64 = 16.0;
@@ -116,7 +116,7 @@ fn hasty_size((width, height): (u32, u32), rate: f64) -> Option<(u32, u32)> {
     (share < 0.8).then(|| (side(width).min(width), side(height).min(height)))
 }
 
-/// Splits a rectangle into small jobs, so that all threads end at about the same time.
+/// Splits a rectangle into small jobs so that all threads finish at about the same time.
 fn jobs(rect: Rect) -> Vec<Job> {
     const FEW: usize = 5000;
     let side = if rect.area() < FEW { 8 } else { 16 };
@@ -127,7 +127,7 @@ fn jobs(rect: Rect) -> Vec<Job> {
     places.filter_map(piece).enumerate().map(job).collect()
 }
 
-/// Returns the pixels of a smaller image that correspond to a rectangle of a larger one.
+/// Maps a rectangle in a larger image to the corresponding pixels of a smaller one.
 fn scale(rect: Rect, from: (u32, u32), to: (u32, u32)) -> Rect {
     let along = |start: u32, len: u32, from: u32, to: u32| {
         let at = |pixel: u32| u64::from(pixel) * u64::from(to) / u64::from(from);
@@ -145,7 +145,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn jobs_cover_the_image_once() {
+    fn jobs_cover_each_pixel_once() {
         let rect = Rect { x: 3, y: 5, width: 40, height: 17 };
         let mut seen = vec![0; 64 * 64];
         for job in jobs(rect) {
@@ -163,16 +163,16 @@ mod tests {
     }
 
     #[test]
-    fn hasty_image_fits_its_time() {
+    fn hasty_image_fits_its_time_budget() {
         let pixels_of = |rate: f64| hasty_size((120, 80), rate / HASTE.as_secs_f64());
-        assert_eq!(pixels_of(9600.0), None, "the usual size is fast enough");
+        assert_eq!(pixels_of(9600.0), None, "the usual size should be fast enough");
         assert_eq!(pixels_of(2400.0), Some((60, 40)));
-        assert_eq!(pixels_of(1.0), Some((16, 11)), "the minimum size");
+        assert_eq!(pixels_of(1.0), Some((16, 11)), "the size should not fall below the minimum");
         assert_eq!(hasty_size((10, 5), 0.0), Some((10, 5)));
     }
 
     #[test]
-    fn crop_covers_its_part_of_a_smaller_image() {
+    fn crop_is_scaled_to_smaller_images() {
         let rect = Rect { x: 10, y: 30, width: 5, height: 10 };
         assert_eq!(scale(rect, (100, 100), (10, 10)), Rect { x: 1, y: 3, width: 1, height: 1 });
         let last = Rect { x: 99, y: 99, width: 1, height: 1 };

@@ -1,7 +1,8 @@
-//! Layers of an EXR file: additional channels for the pixels of the finished image.
+//! EXR layers: additional channels for the finished image.
 //!
-//! A layer of light or of first hits is rendered to its own film, with as many samples per pixel as the image has. So
-//! the light components add up to the image even if noise decided the number of samples.
+//! Each light or first-hit layer is rendered to its own film with the image's number of samples per pixel.
+//! This way, the light components add up to the image even if a noise target determined the number of
+//! samples.
 
 use super::film_state::FilmState;
 use super::scheduler::{Rendering, Scheduler};
@@ -16,17 +17,17 @@ use crate::stages::Stop;
 use crate::stages::photons::PhotonStore;
 use crate::trace::Tracer;
 
-/// Channel names of colors, directions and scalars, as compositing programs expect them.
+/// Channel names that compositing programs expect for colors, directions and scalars.
 const COLOR: &[&str] = &["R", "G", "B"];
 const DIRECTION: &[&str] = &["X", "Y", "Z"];
 const DISTANCE: &[&str] = &["Z"];
 const NUMBER: &[&str] = &["X"];
 
-/// LayerSource of a layer's values.
+/// Source of a layer's values.
 enum LayerSource {
-    /// Samples of a view.
+    /// Samples rendered with a view.
     View(View),
-    /// Values of the image's film.
+    /// Values from the image's film.
     Film(fn(&FilmState) -> RadianceImage),
 }
 
@@ -45,7 +46,7 @@ impl OutputLayer {
         }
     }
 
-    /// Returns the cost of a layer relative to the image.
+    /// Returns the layer's render cost relative to the image.
     fn work(self) -> f64 {
         match self {
             Self::Albedo | Self::Normal | Self::Depth => 0.1,
@@ -55,14 +56,15 @@ impl OutputLayer {
     }
 }
 
-/// Returns the variance of each pixel's luminance: the squared standard error of its mean.
+/// Returns the squared standard error of each pixel's mean luminance.
 fn variance(state: &FilmState) -> RadianceImage {
     let mut image = state.film.image(Quantity::Error);
     image.pixels.iter_mut().for_each(|error| *error *= *error);
     image
 }
 
-/// Returns the progress fractions at the start and end of a layer. `None` is the image, which precedes layer 0.
+/// Returns the progress fractions at the start and end of a layer. `None` stands for the image, which
+/// precedes layer 0.
 pub(crate) fn progress(layers: &[OutputLayer], number: Option<usize>) -> [f64; 2] {
     let work = |layers: &[OutputLayer]| layers.iter().map(|layer| layer.work()).sum::<f64>();
     let all = 1.0 + work(layers);
@@ -75,7 +77,7 @@ pub(crate) fn progress(layers: &[OutputLayer], number: Option<usize>) -> [f64; 2
 /// Renders the layers of a finished film, in order.
 ///
 /// # Errors
-/// [`Stop::Cancelled`], or not enough memory for a film.
+/// [`Stop::Cancelled`], or there is not enough memory for a film.
 pub(crate) fn layers(
     state: &FilmState,
     rendering: &Rendering<'_>,
@@ -93,7 +95,7 @@ pub(crate) fn layers(
     Ok(images)
 }
 
-/// Renders a view with as many samples per pixel as a film has.
+/// Renders a view with the same number of samples in each pixel as the image.
 fn of_view(
     view: View,
     picture: &FilmState,
@@ -102,7 +104,7 @@ fn of_view(
 ) -> Result<RadianceImage, Stop> {
     let mut plan = rendering.plan.clone();
     plan.settings.view = view;
-    // Use the samples of the image, whatever ended its render.
+    // Use the image's sample counts, no matter what ended its render.
     plan.settings.render.error = 0.0;
     plan.settings.render.samples = picture.film.samples().max;
     plan.time_seconds = None;
@@ -123,7 +125,7 @@ fn of_view(
         preview: None,
         first: None,
         sink: &sink,
-        // Orders during this render concern the image.
+        // Orders received during this render apply to the image.
         pulse: &|_, _| (),
         take_preview: &|| None,
         share: None,
@@ -142,7 +144,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn progress_spans_the_image_and_all_layers() {
+    fn progress_covers_image_and_all_layers() {
         let all = [OutputLayer::Depth, OutputLayer::Samples, OutputLayer::Diffuse, OutputLayer::Specular];
         let ends: Vec<_> = [None, Some(0), Some(1), Some(2), Some(3)].map(|at| progress(&all, at)).to_vec();
         assert_eq!((ends[0][0], ends[4][1]), (0.0, 1.0));

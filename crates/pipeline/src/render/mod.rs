@@ -2,10 +2,10 @@
 //!
 //! | file | contents |
 //! | --- | --- |
-//! | [`scheduler`] | passes and rounds: which samples are rendered next |
-//! | [`film_state`], [`film_cache`] | the current film, and cached films of earlier settings |
-//! | [`noise_goals`], [`time_budget`] | placement of samples: up to a noise target, or within a time limit |
-//! | [`share`], [`checkpointer`] | the share of one of several processes; checkpoints |
+//! | [`scheduler`] | passes and rounds, which determine the samples to render next |
+//! | [`film_state`], [`film_cache`] | the current film, and films cached for earlier settings |
+//! | [`noise_goals`], [`time_budget`] | sample placement with a noise target or time limit |
+//! | [`share`], [`checkpointer`] | one process's share of an image, and checkpoints |
 //! | [`layers`] | additional channels of EXR files |
 //! | [`forecast`] | progress, remaining time and final noise |
 //! | [`first_picture`], [`preview`] | images for the screen |

@@ -1,62 +1,65 @@
-//! Goals from noise: which parts of an image have enough samples.
+//! Decides from the noise when each part of an image has enough samples.
 //!
-//! An image whose samples decide by themselves when they stop is too dark: without rare bright samples sampling stops
-//! early, and with them it continues. So each half of a tile (every other pixel) stops according to the noise of the
-//! other half, whose samples are independent and about as noisy. A tenth of the bias remains, because a half that has
-//! stopped yields no more information; in the worst case that is a thirtieth of the noise.
+//! If a tile's own samples decided when to stop, the image would be too dark: sampling would stop early
+//! without rare bright samples, and continue with them. Each half of a tile (every other pixel) therefore
+//! stops based on the noise of the other half, whose samples are independent and about as noisy. A tenth of
+//! the bias remains because a half that has stopped provides no new information. In the worst case, this is a
+//! thirtieth of the noise.
 
 use crate::film::{CELLS, Convergence, Film, HalfNoise, PREPASS_SAMPLES, Prepass, samples_to_reduce_error};
 
 /// Minimum number of samples for noise estimates.
 pub(crate) const LEAST: u32 = PREPASS_SAMPLES;
 
-/// Fraction of the noise target that is aimed at, because parts measured too low stop early.
+/// Fraction of the noise target to aim for. Less than 1 because parts whose noise is underestimated stop
+/// early.
 pub(crate) const AIM: f64 = 0.85;
 
-/// Tiles are reported if their noise exceeds the target by more than this factor, which allows for measurement error.
+/// A tile is reported if its noise exceeds the target by more than this factor, which allows for measurement
+/// error.
 const TOO_MUCH: f64 = 1.5;
 
 /// Maximum number of expected samples. [`u32::MAX`] means unknown.
 pub(crate) const MOST: u32 = u32::MAX - 1;
 
-/// Minimum brightness that noise is compared with, relative to the image's.
+/// Minimum reference brightness for relative noise, as a fraction of the image's mean luminance.
 const LEAST_BRIGHTNESS: f64 = 0.01;
 
-/// Maximum samples of both halves of each cell.
+/// Maximum number of samples for both halves of each cell.
 #[derive(Debug)]
 pub(crate) struct Goals {
-    /// Decided goals. [`u32::MAX`] while undecided.
+    /// The goals. [`u32::MAX`] while undecided.
     pub(super) decided: Vec<[u32; 2]>,
-    /// Samples at which each tile was last judged. Tiles are judged once per number of samples.
+    /// Sample count at which each tile was last judged. Tiles are judged only once per sample count.
     pub(super) judged: Vec<u32>,
-    /// Mean luminance of the image's [`Prepass`], once noise has been judged.
+    /// Mean luminance of the [`Prepass`]. `None` until noise has been judged.
     pub(super) brightness: Option<f64>,
 }
 
 impl Goals {
-    /// Creates undecided goals for this many cells.
+    /// Creates undecided goals for `cells` cells.
     pub(crate) fn none(cells: usize) -> Self {
         Self { decided: vec![[u32::MAX; 2]; cells], judged: vec![0; cells.div_ceil(CELLS)], brightness: None }
     }
 
-    /// Returns the maximum samples of a half of a cell.
+    /// Returns the maximum number of samples for one half of a cell.
     pub(crate) fn of(&self, cell: usize, half: usize) -> u32 {
         self.decided[cell][half]
     }
 
-    /// Returns the memory size in bytes.
+    /// Returns the memory used, in bytes.
     pub(crate) fn memory_bytes(&self) -> usize {
         size_of_val(self.decided.as_slice()) + size_of_val(self.judged.as_slice())
     }
 
-    /// Whether any half gets fewer than `samples` samples.
+    /// Whether any goal is below `samples`.
     pub(crate) fn are_below(&self, samples: u32) -> bool {
         self.decided.as_flattened().iter().any(|goal| *goal < samples)
     }
 
-    /// Decides the goals of all halves that have none and now have `samples`, a power of two, from the noise of the
-    /// other half. `done` is the number of samples of each half. Decides nothing before all halves have enough samples
-    /// for the image's brightness. Runs in parallel within a thread pool.
+    /// Decides the goals of undecided halves with `samples` samples, a power of two, based on the noise in
+    /// the other half. `done` is the number of samples in each half. Decides nothing until all halves have
+    /// enough samples to estimate the image's brightness. Runs in parallel within a thread pool.
     pub(crate) fn judge(
         &mut self,
         film: &Film,
@@ -80,8 +83,9 @@ impl Goals {
         Some(Judgement { noise, samples, aim })
     }
 
-    /// Returns the number of tiles that have reached their goals with more noise than [`TOO_MUCH`] times the target,
-    /// and the noise of the worst. Noise in few pixels of one half does not delay that half.
+    /// Returns the number of tiles whose noise exceeds [`TOO_MUCH`] times the target although they reached
+    /// their goals, and the highest noise of these tiles. This can happen because noise in a half does not
+    /// affect that half's own goal.
     pub(crate) fn missed(&self, film: &Film, error: f64) -> Option<(usize, f64)> {
         let aim = Aim { error, brightness: self.brightness?, convergence: film.convergence() };
         let noise = film.map_tiles(|tile| {
@@ -99,7 +103,7 @@ impl Goals {
         Some((too_much().count(), worst))
     }
 
-    /// Whether a half in a tile has no goal and now has `samples` samples.
+    /// Whether a tile contains an undecided half with `samples` samples.
     pub(crate) fn is_open(&self, tile: usize, done: &[[u32; 2]], samples: u32) -> bool {
         let cells = self.decided.iter().zip(done).skip(CELLS * tile).take(CELLS);
         cells
@@ -107,7 +111,7 @@ impl Goals {
             .any(|(goal, done)| *goal == u32::MAX && *done == samples)
     }
 
-    /// Whether a half that needs more samples has fewer than [`LEAST`].
+    /// Whether any half that needs more samples has fewer than [`LEAST`].
     fn lacks_least(&self, done: &[[u32; 2]]) -> bool {
         let mut halves = self.decided.as_flattened().iter().zip(done.as_flattened());
         halves.any(|(goal, done)| goal > done && *done < LEAST)
@@ -120,12 +124,12 @@ impl Goals {
                 continue;
             }
             let Some(TileNoise { halves: [even, odd], .. }) = noise[cell / CELLS] else { continue };
-            // A tile of one pixel has no other half.
+            // A one-pixel tile has no other half.
             let of_others = [odd.or(even), even.or(odd)];
             for half in 0..2 {
                 let Some(noise) = of_others[half].filter(|_| !was_decided[half]) else { continue };
                 let wanted = aim.samples(&noise);
-                // If the other half is finished, no more information will arrive.
+                // If the other half is finished, there will be no further information.
                 if was_decided[1 - half] || wanted <= done[half].saturating_mul(2) {
                     self.decided[cell][half] = wanted.max(done[half]);
                 }
@@ -134,17 +138,17 @@ impl Goals {
     }
 }
 
-/// Noise from which goals were decided.
+/// Noise on which goals are based.
 #[derive(Debug)]
 pub(crate) struct Judgement {
-    /// Noise of each tile. `None` for tiles with goals or other samples.
+    /// Noise of each tile. `None` for tiles with goals or another sample count.
     pub(crate) noise: Vec<Option<TileNoise>>,
-    /// Samples of the tiles.
+    /// Sample count of the judged tiles.
     pub(crate) samples: u32,
     pub(crate) aim: Aim,
 }
 
-/// Noise of a tile, measured from its samples.
+/// A tile's noise, measured from its samples.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TileNoise {
     pub(crate) halves: [Option<HalfNoise>; 2],
@@ -156,14 +160,15 @@ impl TileNoise {
     fn of(film: &Film, tile: usize) -> Self {
         let noise = |half| {
             let noise = film.tile_noise(tile, half)?;
-            // Use the upper bound of the noise: if it is from few bright pixels, others may not have been sampled yet.
+            // Use an upper bound of the noise. If it comes from a few bright pixels, others may not have been
+            // sampled yet.
             Some(HalfNoise { variance: noise.variance * (1.0 + film.tile_spread(tile, half)), ..noise })
         };
         Self { halves: [0, 1].map(noise), fall: film.tile_fall(tile) }
     }
 }
 
-/// Noise target, and the brightness it is relative to.
+/// Noise target and its reference brightness.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Aim {
     /// Noise target.
@@ -174,7 +179,7 @@ pub(crate) struct Aim {
 }
 
 impl Aim {
-    /// Returns the samples at which noise reaches the target.
+    /// Returns the number of samples with which the noise reaches the target.
     fn samples(&self, noise: &HalfNoise) -> u32 {
         let relative = self.relative(noise);
         if !(relative > 0.0) {
@@ -182,7 +187,8 @@ impl Aim {
         }
         let part = AIM * self.error / relative;
         let doubled = noise.samples.saturating_mul(2);
-        // Up to the next power of two samples count as independent ones. There, all are worth more.
+        // Up to the next power of two, treat samples as independent. At the power of two, they are all worth
+        // more.
         if 1.0 / (part * part) <= libm::exp2(noise.power) {
             return samples_to_reduce_error(1.0, part, noise.samples).min(doubled);
         }
@@ -190,7 +196,7 @@ impl Aim {
         samples_to_reduce_error(power, part, noise.samples).max(doubled.saturating_add(1)).min(MOST)
     }
 
-    /// Returns the noise relative to the brightness it is compared with.
+    /// Returns the noise relative to the reference brightness.
     pub(crate) fn relative(&self, noise: &HalfNoise) -> f64 {
         noise.variance.sqrt() / noise.mean.max(LEAST_BRIGHTNESS * self.brightness)
     }
@@ -203,7 +209,7 @@ pub(crate) mod tests {
     use crate::math::Vec3;
     use crate::math::random::unit;
 
-    /// Creates a film of one tile whose halves have samples with a given mean and spread.
+    /// Creates a one-tile film with a given mean and spread of the samples in each half.
     pub(crate) fn film(halves: [(f32, f32); 2], samples: u32) -> Film {
         const COLUMNS: u32 = 32;
         let film = Film::new(COLUMNS, 2, None).expect("a film");
@@ -224,10 +230,10 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn each_half_stops_on_the_other_half_s_noise() {
-        // The first half is smooth, the second is not.
+    fn each_half_stops_based_on_the_other_half() {
+        // The first half is smooth, but the second is noisy.
         let goals = judged([(1.0, 0.0), (1.0, 1.0)], 16, 0.01);
-        assert_eq!(goals.of(0, 1), 16, "the first half has no noise");
+        assert_eq!(goals.of(0, 1), 16, "the second half should stop because the first has no noise");
         assert_eq!(goals.of(0, 0), u32::MAX);
     }
 
@@ -235,16 +241,16 @@ pub(crate) mod tests {
     fn noise_in_only_one_half_is_reported() {
         let rough = film([(1.0, 0.0), (1.0, 1.0)], 16);
         let goals = judged([(1.0, 0.0), (1.0, 1.0)], 16, 0.01);
-        assert_eq!(goals.missed(&rough, 0.01), None, "the first half continues");
+        assert_eq!(goals.missed(&rough, 0.01), None, "the first half should continue");
         let clean = judged([(1.0, 0.0); 2], 16, 0.01);
         assert_eq!(clean.missed(&film([(1.0, 0.0); 2], 16), 0.01), None);
         // A standard error of √(1/12/16) in one of two halves.
-        let Some((tiles, worst)) = clean.missed(&rough, 0.01) else { panic!("no missed tile") };
+        let Some((tiles, worst)) = clean.missed(&rough, 0.01) else { panic!("one tile should be reported") };
         assert!(tiles == 1 && (worst / 0.051 - 1.0).abs() < 0.3, "{tiles} {worst}");
     }
 
     #[test]
-    fn nothing_is_decided_with_few_samples() {
+    fn nothing_is_decided_with_too_few_samples() {
         for (samples, is_open) in [(8, true), (16, false)] {
             let goals = judged([(1.0, 0.0); 2], samples, 0.01);
             assert_eq!(goals.of(0, 0) == u32::MAX, is_open, "{samples}");
@@ -252,16 +258,16 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn goals_within_twice_the_samples_are_decided() {
-        // A standard error of sqrt(1/12/16) = 0.072, up to 0.082 with so few pixels, needs 24 samples to reach the
-        // target.
+    fn goals_up_to_twice_the_samples_are_decided() {
+        // The standard error is √(1/12/16) = 0.072, or up to 0.082 with so few pixels. Reaching the target
+        // takes 24 samples.
         let goals = judged([(1.0, 1.0); 2], 16, 0.08);
         assert!((17..=32).contains(&goals.of(0, 0)), "{}", goals.of(0, 0));
         assert_eq!(judged([(1.0, 1.0); 2], 16, 0.005).of(0, 0), u32::MAX);
     }
 
     #[test]
-    fn dark_parts_use_a_minimum_brightness() {
+    fn reference_brightness_has_a_minimum() {
         // A bright and a dark tile with equal relative noise.
         let film = Film::new(64, 2, None).expect("a film");
         let mut next = unit(9);
@@ -278,8 +284,8 @@ pub(crate) mod tests {
         assert_eq!((goals.of(0, 0), goals.of(CELLS, 0)), (u32::MAX, 16));
     }
 
-    /// Returns the mean of a tile with rare bright samples, whose expected value is 1, that stops on noise: of the
-    /// other half, or of its own half (`by_own`).
+    /// Returns the mean of a tile with rare bright samples and an expected value of 1. Each half stops based
+    /// on the noise of the other half, or of its own if `by_own`.
     fn stopped(next: &mut impl FnMut() -> f32, by_own: bool) -> f64 {
         const MOST: u32 = 256;
         let film = Film::new(4, 4, None).expect("a film");
@@ -300,7 +306,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn stopping_on_the_other_half_is_nearly_unbiased() {
+    fn stopping_on_other_half_is_nearly_unbiased() {
         let mut next = unit(11);
         let mut mean_of = |by_own| {
             const TILES: u32 = 20_000;
@@ -314,6 +320,6 @@ pub(crate) mod tests {
         assert!(error.max(own_error) < 0.004, "{error} {own_error}");
         // The noise target is 0.6.
         assert!((mean - 1.0).abs() < 0.04 * 0.6, "{mean} ± {error}");
-        assert!(own < 0.9, "stopping on its own noise is biased: {own} ± {own_error}");
+        assert!(own < 0.9, "stopping based on a half's own noise should be biased: {own} ± {own_error}");
     }
 }

@@ -1,4 +1,4 @@
-//! Previews of the current film at the size of the screen.
+//! Previews of the current film at screen size.
 
 use std::time::{Duration, Instant};
 
@@ -14,7 +14,7 @@ use crate::plan::Plan;
 use crate::protocol::{ImagePosition, PreviewSize, PreviewSource, Section};
 use crate::sink::Sink;
 
-/// Maximum time to update a preview between two checks for orders.
+/// Maximum time spent on updating a preview before checking for orders.
 const PATIENCE: Duration = Duration::from_millis(4);
 
 /// Destination and contents of previews.
@@ -27,13 +27,14 @@ pub(crate) struct PreviewTarget<'a> {
 }
 
 impl PreviewTarget<'_> {
-    /// Returns the width and height of previews of the whole image.
+    /// Returns the size of a preview of the whole image.
     pub(crate) fn size(&self) -> Option<(u32, u32)> {
         let render = &self.plan.settings.render;
         self.bounds.and_then(|bounds| fit(render.width, render.height, bounds))
     }
 
-    /// Sends a preview of the whole film unless cancelled. Uses the pool, so no tile may be rendering.
+    /// Sends a preview of the whole film unless cancelled. Must not be called while tiles are rendering,
+    /// because it uses the thread pool.
     pub(crate) fn show(&self, state: &mut FilmState, pool: &ThreadPool, token: &CancelToken) {
         let Some(size) = self.size() else { return };
         if self.say_section(state, true) {
@@ -47,8 +48,8 @@ impl PreviewTarget<'_> {
         self.say(state, true);
     }
 
-    /// Updates the preview for a short time between two tiles, on this thread. Returns whether it was complete and
-    /// sent.
+    /// Updates the preview for a short time between tiles, on the current thread. Returns whether it was
+    /// completed and sent.
     pub(crate) fn show_some(&self, state: &mut FilmState) -> bool {
         let Some(size) = self.size() else { return false };
         if self.say_section(state, false) {
@@ -64,14 +65,14 @@ impl PreviewTarget<'_> {
 
     fn say(&self, state: &FilmState, has_time: bool) {
         if let Some(previewer) = &state.previewer {
-            // The first image has no data about samples.
+            // The first image contains no sample statistics.
             let base = state.base.as_ref().filter(|_| previewer.quantity() == Quantity::Radiance);
             let image = previewer.picture(base);
             self.send(state, &image, &self.tone(state, &image, has_time), None);
         }
     }
 
-    /// Sends a 1:1 section of the image if the front end wants one. Returns whether it does.
+    /// Sends a 1:1 section of the image if the front end requested one. Returns whether it did.
     fn say_section(&self, state: &FilmState, has_time: bool) -> bool {
         let Some(rect) = self.section() else { return false };
         let quantity = self.plan.settings.view.quantity();
@@ -83,7 +84,7 @@ impl PreviewTarget<'_> {
         true
     }
 
-    /// Sends an image that lacks the photons' light. It shows radiance, because no data view uses photons.
+    /// Sends a radiance image that lacks the light from photons.
     pub(crate) fn show_without_photons(&self, image: &RadianceImage) {
         self.sink.preview_without_photons(develop(image, &self.plan.tone.resolved_for(image)));
     }
@@ -97,11 +98,11 @@ impl PreviewTarget<'_> {
         self.sink.preview(develop(image, tone), range, section, source);
     }
 
-    /// Returns the tone mapping of a preview. Data are mapped from the range of the full image, because preview pixels
-    /// are averages. If some pixels have no samples, or a large image must be shown quickly, the range of the preview
-    /// is used.
+    /// Returns the tone mapping for a preview. Data views use the value range of the full image, because
+    /// preview pixels are averages. If some pixels have no samples or a large image must be shown quickly,
+    /// they use the preview's range instead.
     fn tone(&self, state: &FilmState, image: &RadianceImage, has_time: bool) -> ToneMapping {
-        /// Pixels that can be scanned in a few milliseconds.
+        /// Number of pixels that can be scanned in a few milliseconds.
         const QUICK: usize = 1 << 18;
         let tone = self.plan.tone;
         let is_known = state.is_covered() && (has_time || state.film.crop().area() <= QUICK);
@@ -111,7 +112,7 @@ impl PreviewTarget<'_> {
         tone.resolved_for(&state.film.image(self.plan.settings.view.quantity()))
     }
 
-    /// Returns the pixels of a 1:1 section.
+    /// Returns the pixels of the 1:1 section, if one was requested.
     fn section(&self) -> Option<Rect> {
         let render = &self.plan.settings.render;
         let PreviewSize { width, height, around } = self.bounds?;
@@ -127,14 +128,14 @@ impl PreviewTarget<'_> {
     }
 }
 
-/// Updates the previewer for a short time. Returns whether it is up to date.
+/// Updates the previewer for a short time. Returns whether it is now up to date.
 fn catch_up(state: &mut FilmState, quantity: Quantity, (width, height): (u32, u32)) -> bool {
     state.previewer.take_if(|it| it.size() != (width, height) || it.quantity() != quantity);
     let previewer = state.previewer.get_or_insert_with(|| Previewer::of(quantity, width, height));
     previewer.update(&state.film, Some(Instant::now() + PATIENCE))
 }
 
-/// Returns the largest size with this aspect ratio inside the bounds.
+/// Returns the largest size that fits into the bounds and keeps the aspect ratio.
 fn fit(width: u32, height: u32, bounds: PreviewSize) -> Option<(u32, u32)> {
     if bounds.width == 0 || bounds.height == 0 {
         return None;

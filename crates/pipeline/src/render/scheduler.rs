@@ -1,4 +1,4 @@
-//! Scheduling of a render: first image, first pass, later passes, and rounds within a time limit.
+//! Schedules a render: first image, first pass, later passes, and rounds if there is a time limit.
 
 use std::cell::Cell;
 use std::ops::Range;
@@ -29,7 +29,7 @@ use crate::trace::{Job, Tracer, next_pass};
 const PROGRESS_INTERVAL: Duration = Duration::from_millis(60);
 /// Minimum time between two previews.
 const PREVIEW_INTERVAL: Duration = Duration::from_millis(66);
-/// Previews may use at most `1/PREVIEW_SHARE` of the time.
+/// Previews may take at most `1/PREVIEW_SHARE` of the time.
 const PREVIEW_SHARE: u32 = 10;
 
 /// Inputs of the render stage.
@@ -40,45 +40,46 @@ pub(crate) struct Rendering<'a> {
     pub(crate) photons: Option<&'a PhotonStore>,
     pub(crate) preview: Option<PreviewSize>,
     pub(crate) most_film_bytes: u64,
-    /// Start from an empty film even if one is cached.
+    /// Whether to start with an empty film even if one is cached.
     pub(crate) force: bool,
-    /// Section that is rendered first.
+    /// Section to render first.
     pub(crate) first: Option<Section>,
     pub(crate) sink: &'a Sink,
-    /// Called often with the current film and whether every pixel has a sample, to handle orders during the render.
+    /// Handles orders during the render. Called often, with the current film and whether every pixel has a
+    /// sample.
     pub(crate) pulse: &'a dyn Fn(&FilmState, bool),
-    /// Takes an order for another preview size.
+    /// Takes a pending order to change the preview size.
     pub(crate) take_preview: &'a dyn Fn() -> Option<Option<PreviewSize>>,
-    /// Whether the camera is being moved, so that the first image must be fast, however small.
+    /// Whether the camera is being moved. If so, the first image must appear quickly, even if it is small.
     pub(crate) is_moved: bool,
-    /// Pixels per second of the last first image.
+    /// Pixels per second measured for the most recent first image.
     pub(crate) coarse_rate: &'a Cell<Option<f64>>,
-    /// The share of the image that is rendered. `None` for the whole image.
+    /// Share of the image to render. `None` for the whole image.
     pub(crate) share: Option<Share>,
-    /// Checkpointer, if the render has checkpoints.
+    /// Checkpointer, if the render uses checkpoints.
     pub(crate) checkpointer: Option<&'a Checkpointer<'a>>,
 }
 
-/// Runs passes and rounds over a film, with progress and previews between tiles.
+/// Runs passes and rounds over a film. Reports progress and sends previews between tiles.
 pub(crate) struct Scheduler<'a> {
     pub(crate) state: &'a mut FilmState,
     rendering: &'a Rendering<'a>,
     screen: PreviewTarget<'a>,
     clock: Clock,
     forecast: Forecast,
-    /// Pixels times samples so far.
+    /// Number of pixels times samples so far.
     units: u64,
-    /// Units of earlier renders.
+    /// Number of pixels times samples from earlier renders.
     units_before: u64,
     pub(crate) rays: RayCounters,
-    /// Seconds of the process whose checkpoint this render continues.
+    /// Seconds spent by the process whose checkpoint this render resumed from.
     seconds_before: f64,
-    /// Whether some pixels have no sample. Until they do, only a cancellation ends the render.
+    /// Whether some pixels have no sample. While this is true, only cancellation ends the render.
     is_first: bool,
     is_over_time: bool,
     next_progress: Instant,
     next_preview: Instant,
-    /// Transformation of each sample before it is added. `None` for none.
+    /// Transformation applied to each sample before it is added to the film.
     pub(crate) changed: Option<&'a (dyn Fn(Vec3) -> Vec3 + Sync)>,
 }
 
@@ -106,7 +107,7 @@ impl<'a> Scheduler<'a> {
         }
     }
 
-    /// Renders the film to the requested samples or noise target.
+    /// Renders the film until it reaches the requested number of samples or the noise target.
     ///
     /// # Errors
     /// [`Stop::Cancelled`]. The film keeps its samples.
@@ -121,19 +122,19 @@ impl<'a> Scheduler<'a> {
         ran
     }
 
-    /// Returns the rays of all requests for this film.
+    /// Returns the rays traced by all requests for this film.
     pub(crate) fn traced(&self) -> RayCounters {
         let mut traced = self.state.traced;
         traced += self.rays;
         traced
     }
 
-    /// Returns the seconds that all requests spent on this film.
+    /// Returns the seconds all requests have spent on this film.
     fn rendered_seconds(&mut self) -> f64 {
         self.state.render_seconds + self.clock.seconds(self.rendering.tracer.token.is_paused())
     }
 
-    /// Returns the seconds of rendering, including an earlier process.
+    /// Returns the render time in seconds, including that of an earlier process.
     pub(crate) fn seconds(&mut self) -> f64 {
         self.seconds_before + self.clock.seconds(self.rendering.tracer.token.is_paused())
     }
@@ -159,7 +160,7 @@ impl<'a> Scheduler<'a> {
             self.pilot()?;
         }
         if let Some(first) = self.first() {
-            // Noise is compared with the brightness of the whole image, so render that first.
+            // Noise is relative to the brightness of the whole image, so sample the whole image first.
             let of_all = if error > 0.0 { LEAST.min(samples) } else { 1 };
             self.passes(None, of_all)?;
             self.passes(Some(first), samples)?;
@@ -170,13 +171,13 @@ impl<'a> Scheduler<'a> {
         Ok(())
     }
 
-    /// Returns the pixels that are rendered first.
+    /// Returns the pixels to render first.
     fn first(&self) -> Option<Rect> {
         let Render { width, height, .. } = self.rendering.plan.settings.render;
         self.rendering.first.map(|section| section.pixels((width, height)))
     }
 
-    /// Renders the prepass of the whole image, of which this process renders a share.
+    /// Renders the prepass of the whole image, even though this process renders only a share of it.
     fn pilot(&mut self) -> Result<(), Stop> {
         if self.state.goals.brightness.is_some() {
             return Ok(());
@@ -185,7 +186,7 @@ impl<'a> Scheduler<'a> {
         let job = |number: u64| {
             let (x, y) = pilot.position(number);
             let pixels = Rect { x, y, width: 1, height: 1 }.into();
-            // Use the tile number for the index of the job.
+            // Store the job's index as the tile number.
             Job { tile: number as usize, pixels, samples: 0..PREPASS_SAMPLES }
         };
         let jobs: Vec<Job> = (0..pilot.count()).map(job).collect();
@@ -202,17 +203,17 @@ impl<'a> Scheduler<'a> {
         Ok(())
     }
 
-    /// Judges the noise of samples from a checkpoint or a cancelled request.
+    /// Judges the noise of existing samples from a checkpoint or a cancelled request.
     fn judge_what_is_there(&mut self, part: Option<Rect>) {
         let Render { samples, error, .. } = self.rendering.plan.settings.render;
         let done = self.state.samples_in(part, samples);
-        // With fewer samples, nothing is decided.
+        // Fewer samples do not decide any goals.
         if error > 0.0 && (LEAST..samples).contains(&done) && done.is_power_of_two() {
             self.rendering.tracer.pool.install(|| self.state.judge(done, error.into()));
         }
     }
 
-    /// Runs passes until `part` (`None` for all) has this many samples or has reached its goals.
+    /// Runs passes until `part` (`None` for all) has `samples` samples or has reached its goals.
     fn passes(&mut self, part: Option<Rect>, samples: u32) -> Result<(), Stop> {
         let Render { samples: most, error, .. } = self.rendering.plan.settings.render;
         self.judge_what_is_there(part);
@@ -250,7 +251,7 @@ impl<'a> Scheduler<'a> {
             let at_once = samples..target.min(samples.saturating_add(photons.max_passes_at_once()));
             let numbers = self.state.numbers(at_once);
             let end = samples + numbers.len() as u32;
-            // Do not trace or gather photons for which there is no time.
+            // Do not trace or gather photons if there is no time left.
             self.tick();
             if self.is_over_time {
                 break;
@@ -264,7 +265,7 @@ impl<'a> Scheduler<'a> {
         Ok(())
     }
 
-    /// Traces the photons of some samples while handling orders.
+    /// Traces photons for the given samples while handling orders.
     fn maps(&mut self, photons: &PhotonStore, samples: Range<u32>) -> Result<PhotonMaps, Stop> {
         let Rendering { plan, sink, tracer, .. } = *self.rendering;
         let Tracer { pool, world, token, .. } = tracer;
@@ -275,9 +276,9 @@ impl<'a> Scheduler<'a> {
         Ok(maps)
     }
 
-    /// Returns the next samples of each half of each cell under a time limit: more where they reduce the error most.
-    /// Returns `None` with photons, which cost the same for one cell as for all, and with a noise target, which places
-    /// samples itself.
+    /// Returns the next sample count for each half of each cell if there is a time limit. Adds samples where
+    /// they reduce the error most. Returns `None` with photons, whose cost does not depend on the number of
+    /// cells, and with a noise target, which determines the sample placement.
     fn next_round(&self) -> Option<Vec<[u32; 2]>> {
         let Rendering { plan, photons, .. } = *self.rendering;
         let Render { samples, error, .. } = plan.settings.render;
@@ -287,10 +288,10 @@ impl<'a> Scheduler<'a> {
         next_round(&self.state.film, &self.state.done, &self.state.rays, samples)
     }
 
-    /// Brings the halves of all cells to these samples in short steps.
+    /// Renders both halves of all cells up to their goals in short steps.
     fn round(&mut self, goals: &[[u32; 2]]) -> Result<(), Stop> {
         const STEP: Duration = Duration::from_millis(30);
-        /// Pixels of half a tile.
+        /// Number of pixels in half a tile.
         const PIXELS: f64 = (TILE_SIZE * TILE_SIZE / 2) as f64;
         let seconds = self.clock.seconds(self.rendering.tracer.token.is_paused());
         let threads = self.rendering.tracer.pool.current_num_threads() as f64;
@@ -339,7 +340,8 @@ impl<'a> Scheduler<'a> {
         Ok(())
     }
 
-    /// Handles everything that is due between two tiles: progress, previews, orders, checkpoints and the time limit.
+    /// Handles everything that is due between tiles: progress, previews, orders, checkpoints and the time
+    /// limit.
     fn tick(&mut self) {
         let now = Instant::now();
         if now >= self.next_progress {
@@ -368,7 +370,7 @@ impl<'a> Scheduler<'a> {
         self.next_preview = Instant::now() + PREVIEW_INTERVAL;
     }
 
-    /// Reports the progress of the render and its expected end.
+    /// Reports the render's progress and expected end.
     fn report_progress(&mut self, is_last: bool) {
         let elapsed_seconds = self.clock.seconds(self.rendering.tracer.token.is_paused());
         let Rendering { plan, photons, sink, .. } = *self.rendering;
@@ -382,7 +384,7 @@ impl<'a> Scheduler<'a> {
         FirstPictures { tracer, plan, is_moved, rate }
     }
 
-    /// Traces first images with one sample per pixel, if they are much less work than a pass.
+    /// Traces first images with one sample per pixel, unless they take almost as long as a full pass.
     fn coarse(&mut self) -> Result<(), Stop> {
         let Some(shown) = self.screen.size() else { return Ok(()) };
         let coarse = self.first_pictures();

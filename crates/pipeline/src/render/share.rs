@@ -1,9 +1,9 @@
-//! The share of an image that one of several processes renders.
+//! Divides an image among several processes.
 //!
-//! Shares consist of tiles with all their samples. With photons, whose passes are expensive, they consist of blocks of
-//! samples of all tiles, and if there are more shares than blocks, the tiles of a block are divided among several
-//! shares. The order of assignment is scrambled, so that shares cost about the same, and fixed, so that each process
-//! knows its own.
+//! A share consists of tiles with all their samples. Photon passes are expensive, so with photons it consists
+//! of blocks of samples for all tiles instead. If there are more shares than blocks, several shares divide
+//! the tiles of a block. The order of assignment is scrambled, so that shares cost about the same. It is also
+//! deterministic, so that each process knows its share.
 
 use std::ops::Range;
 
@@ -13,21 +13,21 @@ use crate::math::random::hash;
 /// A share of an image.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Share {
-    /// Index of the share, from 1.
+    /// 1-based index of the share.
     pub(crate) index: u32,
     /// Number of shares.
     pub(crate) count: u32,
-    /// Samples per pixel of the whole image.
+    /// Samples per pixel in the whole image.
     pub(crate) samples: u32,
-    /// Sample blocks of this share. `None` if its tiles have all their samples.
+    /// Sample blocks in this share. `None` if the share has all samples of its tiles.
     blocks: Option<Vec<u32>>,
-    /// Index among the shares that divide the tiles, and their number.
+    /// Index and number of the shares that divide the tiles among themselves.
     of_tiles: (u32, u32),
 }
 
 impl Share {
-    /// Creates one of several shares of an image with `samples` samples. `has_photons` selects division by passes of
-    /// photons.
+    /// Creates share `index` of `count` for an image with `samples` samples per pixel. If `has_photons`,
+    /// divides the image by photon passes.
     pub(crate) fn new((index, count): (u32, u32), has_photons: bool, samples: u32) -> Self {
         let number = index - 1;
         if !has_photons {
@@ -46,7 +46,7 @@ impl Share {
         Self { index, count, samples, blocks: Some(blocks), of_tiles }
     }
 
-    /// Returns the samples per pixel of this share.
+    /// Returns the number of samples per pixel in this share.
     pub(crate) fn own_samples(&self) -> u32 {
         match &self.blocks {
             None => self.samples,
@@ -54,7 +54,7 @@ impl Share {
         }
     }
 
-    /// Returns the indices in the whole image of this share's samples `own`, up to the end of their block.
+    /// Maps this share's samples `own` to sample indices in the whole image, up to the end of their block.
     pub(crate) fn numbers(&self, own: Range<u32>) -> Range<u32> {
         let Some(blocks) = &self.blocks else { return own };
         let Some(block) = blocks.get((own.start / BLOCK_SIZE) as usize) else { return own };
@@ -72,7 +72,7 @@ impl Share {
         }
     }
 
-    /// Returns the sorted blocks of this share. Empty if it consists of tiles with all their samples.
+    /// Returns this share's blocks in sorted order. Empty if the share has all samples of its tiles.
     pub(crate) fn blocks(&self) -> &[u32] {
         self.blocks.as_deref().unwrap_or_default()
     }
@@ -82,7 +82,7 @@ impl Share {
         if self.blocks.is_some() { self.samples.div_ceil(BLOCK_SIZE) } else { 0 }
     }
 
-    /// Returns for each of `count` tiles whether it belongs to this share.
+    /// Returns whether each of `count` tiles belongs to this share.
     pub(crate) fn tiles(&self, count: usize) -> Vec<bool> {
         let (place, of) = self.of_tiles;
         let mut own = vec![false; count];
@@ -98,7 +98,7 @@ impl Share {
     }
 }
 
-/// Returns the numbers below `count` in order of assignment.
+/// Returns the numbers below `count` in the order in which they are assigned.
 fn dealt(count: u32) -> Vec<u32> {
     let mut order: Vec<u32> = (0..count).collect();
     order.sort_by_key(|number| (hash(u64::from(*number)), *number));
@@ -111,7 +111,7 @@ mod tests {
 
     use super::*;
 
-    /// Every sample of every tile is in exactly one share.
+    /// Every sample of every tile must be in exactly one share.
     #[test]
     fn shares_partition_the_samples() {
         for (samples, tiles) in [(1, 1), (16, 6), (250, 7), (256, 40)] {
@@ -141,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn blocks_of_a_share_are_spread() {
+    fn blocks_of_a_share_are_spread_out() {
         let share = Share::new((1, 2), true, 4096);
         let first = share.blocks().iter().filter(|block| **block < 128).count();
         assert!((44..=84).contains(&first), "{first} of 128 in the first half");

@@ -1,32 +1,33 @@
-//! Placement of samples within a time limit, where they reduce the error of the image most.
+//! Places samples where they reduce the image's error most, for renders with a time limit.
 //!
-//! The units are the two halves of each cell. A round doubles the samples of halves, starting with those whose error
-//! decreases most per sample. Between powers of two the sample points of a pixel have gaps, where a third more samples
-//! may be worth nothing.
+//! Each half of a cell has its own sample count. A round doubles the samples of some halves, starting with
+//! those whose error decreases most per sample. Sample counts are powers of two. Otherwise, a pixel's sample
+//! points have gaps, and even a third more samples may be useless.
 //!
-//! Rare bright samples must not attract more samples to where they occur, which would make the image too dark. As in
-//! [`super::noise_goals`], one half follows the noise of the other half, estimated only from the samples that every
-//! half has, because any further samples of the other half depend on the first half's noise.
+//! Rare bright samples must not attract more samples to their own half, which would make the image too dark.
+//! As in [`super::noise_goals`], the noise of one half determines the samples of the other. It is estimated
+//! only from as many samples as every half has, because any further samples depend on the noise of the other
+//! half.
 
 use crate::film::Film;
 
 /// Minimum number of samples for noise estimates.
 const LEAST: u32 = 16;
 
-/// Fraction of the mean number of samples that every pixel gets, for estimating its noise.
+/// Minimum samples for every pixel, as a fraction of the mean. They are needed to estimate its noise.
 const SHARE: f64 = 1.0 / 8.0;
 
-/// Work of a round before noise is measured again, relative to all earlier work.
+/// Work done in a round, relative to all earlier work. Noise is measured again before the next round.
 const ROUND: f64 = 0.4;
 
-/// Cost of a sample apart from its rays, in rays.
+/// Overhead of a sample in addition to its rays, measured in rays.
 const BESIDE: f64 = 1.0;
 
-/// Returns the next samples of the halves of each cell, at most `most`, from their current samples and rays. Returns
-/// `None` while it is too early to decide.
+/// Returns the next sample counts for the halves of each cell, at most `most`, based on their current samples
+/// and rays. Returns `None` if it is too early to decide.
 pub(crate) fn next_round(film: &Film, done: &[[u32; 2]], rays: &[u64], most: u32) -> Option<Vec<[u32; 2]>> {
     let least = done.as_flattened().iter().copied().min().filter(|least| *least >= LEAST.min(most))?;
-    // Every half has at least these samples, whatever the goals were.
+    // Every half has at least this many samples, regardless of earlier goals.
     let known = 1 << least.ilog2();
     let halves = halves(film, done, rays, (known, most))?;
     let pixels: f64 = halves.iter().map(|half| half.pixels).sum();
@@ -45,7 +46,7 @@ pub(crate) fn next_round(film: &Film, done: &[[u32; 2]], rays: &[u64], most: u32
     Some(goals)
 }
 
-/// Half of a cell.
+/// One half of a cell.
 struct Half {
     cell: usize,
     half: usize,
@@ -53,11 +54,11 @@ struct Half {
     samples: u32,
     /// Next number of samples.
     goal: u32,
-    /// Sum of the squared errors of its pixels with one sample each.
+    /// Sum of squared errors of the pixels with one sample each.
     error: f64,
-    /// Exponent p: the error decreases with the number of samples to the power −p.
+    /// Exponent p: the squared error is proportional to the number of samples to the power −p.
     power: f64,
-    /// Cost of a sample in rays.
+    /// Cost of a sample, measured in rays.
     cost: f64,
 }
 
@@ -66,7 +67,7 @@ impl Half {
         self.pixels * f64::from(samples) * self.cost
     }
 
-    /// Returns the decrease of the sum of squared errors per cost of a sample. `mean` is the average number of samples.
+    /// Returns the decrease in squared error per unit of cost. `mean` is the average number of samples.
     fn urgency(&self, mean: f64) -> f64 {
         if f64::from(self.samples) < SHARE * mean {
             return f64::INFINITY;
@@ -85,7 +86,7 @@ fn halves(film: &Film, done: &[[u32; 2]], rays: &[u64], (known, most): (u32, u32
             [0, 1].map(|half| film.half_pixel_count(cell, half) as f64 * f64::from(done[half])).iter().sum();
         let cost = BESIDE + rays[cell] as f64 / units;
         for half in 0..2 {
-            // A cell of one pixel has no other half.
+            // A one-pixel cell has no other half.
             let (error, power) = errors[1 - half].or(errors[half])?;
             let error = error * libm::pow(f64::from(known), power);
             let samples = done[half];
@@ -107,7 +108,7 @@ mod tests {
     /// Width and height of a cell.
     const SIDE: u32 = crate::film::CELL_SIZE;
 
-    /// Adds samples to a half of a cell.
+    /// Adds samples to one half of a cell.
     fn add(film: &Film, (cell, half): (usize, usize), samples: u32, mut sample: impl FnMut() -> f32) {
         let rect = film.cell_rect(cell).expect("a cell");
         let pixels = Pixels { rect, part: PixelSubset::Half(half) };
@@ -115,7 +116,7 @@ mod tests {
         film.add(cell / CELLS, &TileSamples { pixels, samples, radiance, negative: None });
     }
 
-    /// Creates a row of cells whose halves have samples around 1 with a given spread.
+    /// Creates a row of cells. The samples of each half are around 1, with a given spread.
     fn film(spreads: &[[f32; 2]], samples: u32) -> (Film, Vec<[u32; 2]>) {
         let film = Film::new(SIDE * spreads.len() as u32, SIDE, None).expect("a film");
         let mut next = unit(7);
@@ -134,29 +135,29 @@ mod tests {
         (0..film.cell_count()).filter(|cell| film.cell_rect(*cell).is_some()).collect()
     }
 
-    /// Returns the goals of the next round for these cells.
+    /// Returns the goals for the next round, for the film's cells from left to right.
     fn round(film: &Film, done: &[[u32; 2]], most: u32) -> Option<Vec<[u32; 2]>> {
         let goals = next_round(film, done, &vec![0; done.len()], most)?;
         Some(cells(film).into_iter().map(|cell| goals[cell]).collect())
     }
 
     #[test]
-    fn noise_of_the_other_half_decides_the_order() {
+    fn priority_depends_on_noise_of_other_half() {
         let (film, done) = film(&[[0.2; 2], [1.0, 0.05], [0.2; 2]], 16);
         assert_eq!(round(&film, &done, 1000).expect("a round")[1], [16, 32]);
         assert_eq!(round(&film, &done, 20).expect("a round")[1][1], 20, "at most the requested samples");
     }
 
     #[test]
-    fn round_is_a_fraction_of_earlier_work() {
+    fn round_size_is_a_fraction_of_earlier_work() {
         let (film, done) = film(&[[1.0; 2]; 8], 32);
         let goals = round(&film, &done, 1000).expect("a round");
         let more: u32 = goals.as_flattened().iter().map(|goal| goal - 32).sum();
-        assert_eq!(more, 7 * 32, "seven of sixteen halves are doubled");
+        assert_eq!(more, 7 * 32, "seven of sixteen halves should be doubled");
     }
 
     #[test]
-    fn cells_with_few_samples_come_first() {
+    fn cells_with_few_samples_have_priority() {
         let (film, mut done) = film(&[[0.0; 2], [1.0; 2], [1.0; 2]], 16);
         for &cell in &cells(&film)[1..] {
             for half in 0..2 {
@@ -168,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn cheaper_of_equally_noisy_cells_comes_first() {
+    fn cheaper_cells_have_priority_at_equal_noise() {
         let (film, done) = film(&[[1.0; 2]; 2], 16);
         let expensive = cells(&film)[0];
         let rays: Vec<u64> =
@@ -178,20 +179,25 @@ mod tests {
     }
 
     #[test]
-    fn no_round_without_enough_samples() {
+    fn round_requires_minimum_samples() {
         let (film, done) = film(&[[1.0; 2]; 2], 8);
         assert_eq!(round(&film, &done, 1000), None);
         let (film, done) = self::film(&[[1.0; 2]; 2], 16);
-        assert_eq!(round(&film, &done, 16), Some(vec![[16; 2]; 2]), "all samples are done");
+        assert_eq!(
+            round(&film, &done, 16),
+            Some(vec![[16; 2]; 2]),
+            "the goals should equal the current samples"
+        );
     }
 
-    /// Returns the mean of many cells with rare bright samples, whose expected value is 1, after some rounds that
-    /// follow the noise of the other half or of the same half (`by_own`). With few cells, samples that one gets would
-    /// be missing in the others.
+    /// Returns the mean of many cells with rare bright samples and an expected value of 1. Runs some rounds
+    /// with priorities based on the noise of the other half, or of the same half if `by_own`. Uses many cells
+    /// because, with few, the samples given to one cell would be missing in the others.
     fn rendered(next: &mut impl FnMut() -> f32, by_own: bool) -> f64 {
         const CHANCE: f64 = 0.002;
         let film = Film::new(64 * SIDE, 1, None).expect("a film");
-        // Sample the number of dark samples before a bright one directly, instead of one Bernoulli trial per sample.
+        // Draw the number of dark samples before the next bright one, instead of one Bernoulli trial per
+        // sample.
         let mut gap = || (f64::from(1.0 - next()).ln() / (1.0 - CHANCE).ln()) as usize;
         let mut left = gap();
         let mut sample = || {
@@ -211,7 +217,7 @@ mod tests {
             let before = done.clone();
             for &(cell, half) in &places {
                 let of = if by_own { 1 - half } else { half };
-                // Multiply the samples, because the halves differ in this mode.
+                // Scale the sample count by the other half's ratio, because the halves may differ.
                 let samples = before[cell][half] * (goals[cell][of] / before[cell][of] - 1);
                 add(&film, (cell, half), samples, &mut sample);
                 done[cell][half] += samples;
@@ -221,7 +227,7 @@ mod tests {
     }
 
     #[test]
-    fn placement_by_the_other_half_is_unbiased() {
+    fn placement_based_on_other_half_is_unbiased() {
         let mut next = unit(13);
         let mut mean_of = |by_own| {
             const RENDERS: u32 = 1500;
@@ -234,6 +240,6 @@ mod tests {
         let (own, own_error) = mean_of(true);
         assert!(error.max(own_error) < 0.006, "{error} {own_error}");
         assert!((mean - 1.0).abs() < 0.02, "{mean} ± {error}");
-        assert!(own < 0.95, "following its own noise is biased: {own} ± {own_error}");
+        assert!(own < 0.95, "placement based on a half's own noise should be biased: {own} ± {own_error}");
     }
 }

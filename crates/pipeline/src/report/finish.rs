@@ -1,4 +1,4 @@
-//! Creation and writing of reports.
+//! Creates and writes reports.
 
 use std::path::{Path, PathBuf};
 
@@ -47,10 +47,10 @@ pub(crate) fn report(finished: &Finished<'_>, stages: Vec<StageReport>, seconds:
     }
 }
 
-/// Writes a report to the file of the plan.
+/// Writes a report to the plan's report file.
 ///
 /// # Errors
-/// Errors of writing, with the file name.
+/// The file cannot be written. The error contains the file name.
 pub(crate) fn write_report(
     plan: &Plan,
     inputs: &Inputs,
@@ -66,11 +66,11 @@ pub(crate) fn write_report(
     guarded(plan, inputs, target, sink, |guard| atomic_guarded(path, text.as_bytes(), guard, token))
 }
 
-/// Removes the report of an earlier image that an unfinished image has replaced. Keeps files that a report must not
-/// replace.
+/// Removes the report of an earlier image after an unfinished image has replaced that image. Keeps files that
+/// a report must not replace.
 ///
 /// # Errors
-/// Errors of removing, with the file name.
+/// The file cannot be removed. The error contains the file name.
 pub(crate) fn remove_report(plan: &Plan, inputs: &Inputs, sink: &Sink) -> Result<(), OutputError> {
     let Some(path) = plan.report.as_ref().filter(|path| path.is_file()) else { return Ok(()) };
     let failed = |source| OutputError::File { path: path.clone(), source };
@@ -155,15 +155,15 @@ fn peak_memory_bytes() -> u64 {
     peak_of_program().unwrap_or_else(peak_of_process)
 }
 
-/// Peak resident memory of this program, if the system reports it (proc_pid_status(5)).
+/// Peak resident memory of this program, on systems that report it (proc_pid_status(5)).
 fn peak_of_program() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let kibibytes = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?.trim().strip_suffix("kB")?;
     Some(kibibytes.trim().parse::<u64>().ok()? * 1024)
 }
 
-/// Peak resident memory, including the time before the process executed this program, when the caller of glimt may
-/// have used much.
+/// Peak resident memory of the process. Includes memory used before the process executed this program, which
+/// may be large depending on the parent process.
 fn peak_of_process() -> u64 {
     use nix::sys::resource::{UsageWho, getrusage};
     // Bytes on macOS, kibibytes elsewhere (getrusage(2)).

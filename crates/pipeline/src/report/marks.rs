@@ -1,11 +1,11 @@
-//! Recognition of reports among JSON files.
+//! Recognizes reports among JSON files.
 
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 
 use crate::protocol::Stage;
 
-/// Keys that reports of all versions have, and that other JSON files do not have together.
+/// Keys shared by reports of all versions. No other JSON file is expected to contain all of them.
 #[derive(Deserialize)]
 pub(crate) struct ReportMarks {
     #[serde(rename = "glimt")]
@@ -31,7 +31,7 @@ struct StageMark {
 }
 
 impl ReportMarks {
-    /// Whether the report has all stages of a render.
+    /// Whether the report contains all render stages.
     pub(crate) fn have_all_stages(&self) -> bool {
         self.stages.iter().map(|stage| stage.name.as_str()).eq(Stage::ALL.map(Stage::name))
     }

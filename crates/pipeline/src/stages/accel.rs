@@ -1,5 +1,5 @@
-//! The accel stage: one tree per mesh file, kept while its content is the same, and one over all objects. Trees of
-//! previous scenes are kept while there is room.
+//! The accel stage: builds a tree for each mesh file whose content has changed, and one over all objects.
+//! Trees of previous scenes are kept while there is room.
 
 use std::sync::Arc;
 
@@ -18,7 +18,7 @@ use crate::world::{Geometry, MeshTree, light_lifts, with_lifted_lights};
 pub(crate) struct AccelCache {
     trees: Pool<Key, MeshTree>,
     geometry: Pool<Key, Geometry>,
-    /// Offsets of lights that are coplanar with other surfaces.
+    /// Offsets for lights that are coplanar with other surfaces.
     lifts: Memo<Vec<DVec3>>,
     /// Key of the current tree over all objects.
     last: Option<Key>,
@@ -39,7 +39,7 @@ impl AccelCache {
         self.geometry.drop_before(request);
     }
 
-    /// Returns the geometry built or reused last.
+    /// Returns the most recently built or reused geometry.
     #[cfg(test)]
     pub(crate) fn latest(&self) -> Option<&Arc<Geometry>> {
         self.geometry.latest(&self.last?)
@@ -55,7 +55,7 @@ pub(crate) struct AccelResult {
     pub(crate) geometry: Arc<Geometry>,
 }
 
-/// Builds the missing trees, in coordinates relative to `origin`. `scene` includes the overrides.
+/// Builds any missing trees in coordinates relative to `origin`. `scene` includes the overrides.
 ///
 /// # Errors
 /// [`Stop::Cancelled`].
@@ -92,7 +92,7 @@ pub(crate) fn accel(
     })
 }
 
-/// Returns the trees of all meshes, and how many of them were cached.
+/// Returns the trees of all meshes and the number of trees that were cached.
 fn trees(
     scene: &Scene,
     meshes: &Meshes,
@@ -113,7 +113,7 @@ fn trees(
                 let loaded = with_lifted_lights(&mesh.mesh).map_or_else(|| mesh.mesh.clone(), Arc::new);
                 let build = || MeshTree::build(loaded, accel, reading.token);
                 let tree = Arc::new(reading.pool.install(build)?);
-                // The tree keeps its mesh alive even after the file is read again.
+                // The tree keeps its mesh alive even if the file is reloaded.
                 let bytes = tree.memory_bytes() + mesh.mesh.mesh.memory_bytes();
                 cache.trees.insert(key, key, (tree.clone(), bytes));
                 tree

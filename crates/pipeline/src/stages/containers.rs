@@ -1,4 +1,5 @@
-//! glTF files opened by a request. Each is read once, however many parts and images the scene uses.
+//! glTF files opened by a request. Each file is read only once, even if the scene uses many of its parts and
+//! images.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -9,22 +10,22 @@ use crate::assets::mesh::load;
 use crate::assets::{AssetError, FileHash, LoadedMesh};
 use crate::control::{CancelToken, Progress, ignore_progress};
 
-/// Slot of a file, filled by the first user.
+/// Slot for a file, filled by its first user.
 type Slot = Arc<Mutex<Option<Arc<Container>>>>;
 
-/// Open glTF files, and meshes that were read early.
+/// Open glTF files and preloaded meshes.
 #[derive(Debug, Default)]
 pub(crate) struct Containers {
     gltf: Mutex<HashMap<PathBuf, Slot>>,
-    /// Meshes read before the stage that needs them; each is handed out once.
+    /// Meshes loaded before the meshes stage. Each is handed out once.
     ahead: Mutex<HashMap<PathBuf, LoadedMesh>>,
 }
 
 impl Containers {
-    /// Returns the open file, and opens it if necessary.
+    /// Returns an open file. Opens it if necessary.
     ///
     /// # Errors
-    /// As for [`Container::open`]. The next call tries again.
+    /// See [`Container::open`]. The next call tries again.
     pub(crate) fn open(
         &self,
         path: &Path,
@@ -44,7 +45,7 @@ impl Containers {
         Ok(container)
     }
 
-    /// Reads a mesh file, or one part or all of a glTF file as a single mesh.
+    /// Reads a mesh file, a part of a glTF file, or a whole glTF file as a single mesh.
     pub(crate) fn mesh(
         &self,
         (path, part): (&Path, Option<u32>),
@@ -62,12 +63,12 @@ impl Containers {
         }
     }
 
-    /// Keeps a mesh from [`Containers::mesh`] for the next caller.
+    /// Stores a mesh returned by [`Containers::mesh`] for its next caller.
     pub(crate) fn keep(&self, path: &Path, mesh: LoadedMesh) {
         self.ahead.lock().unwrap_or_else(PoisonError::into_inner).insert(canonical(path), mesh);
     }
 
-    /// Returns the bytes of an image of a glTF file, or the file that contains them, and the hash of the glTF file.
+    /// Returns the bytes or the path of an image used by a glTF file, plus the glTF file's hash.
     pub(crate) fn image(
         &self,
         (path, number): (&Path, u32),
@@ -82,7 +83,7 @@ impl Containers {
     }
 }
 
-/// Source of an image's bytes.
+/// Where an image's bytes are stored.
 #[derive(Debug)]
 pub(crate) enum ImageInput {
     /// An image file.
@@ -91,7 +92,7 @@ pub(crate) enum ImageInput {
     Bytes(Arc<[u8]>),
 }
 
-/// Canonicalizes a path, so that all names of a file are equal. Returns a nonexistent path unchanged.
+/// Canonicalizes a path, so that all paths to a file compare equal. Returns a nonexistent path unchanged.
 pub(super) fn canonical(path: &Path) -> PathBuf {
     path.canonicalize().unwrap_or_else(|_| path.to_owned())
 }

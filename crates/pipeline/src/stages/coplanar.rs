@@ -12,11 +12,11 @@ use crate::scene::diagnostic::Severity;
 use crate::scene::fingerprint::Key;
 use crate::world::{Coplanar, coplanar_lights};
 
-/// Maximum number of lights with a warning.
+/// Maximum number of lights to warn about.
 const MAX_WARNINGS: usize = 10;
 
-/// Warns about lights that are moved off the plane of another surface. Reuses the search if shapes and lights are
-/// unchanged.
+/// Warns about lights that are moved off the plane of another surface. Reuses the search result if shapes and
+/// lights are unchanged.
 pub(crate) fn coplanar(
     loaded: &Loaded,
     meshes: &Meshes,
@@ -33,14 +33,15 @@ pub(crate) fn coplanar(
     let named = |number: usize| {
         let Object { shape, name, span, .. } = &scene.objects[number];
         let name = name.as_deref().map(|name| format!(" \"{name}\"")).unwrap_or_default();
-        format!("the {}{name} of line {}", shape.kind(), loaded.line(span))
+        format!("the {}{name} on line {}", shape.kind(), loaded.line(span))
     };
     for of_light in found.chunk_by(|a, b| a.light == b.light).take(MAX_WARNINGS) {
         let [Coplanar { light, surface, .. }, others @ ..] = of_light else { continue };
         let more = if others.is_empty() { String::new() } else { format!(" and {} more", others.len()) };
         let other = if surface == light { "other faces of its mesh".to_owned() } else { named(*surface) };
         let message = format!("this light is in the plane of {other}{more}");
-        let help = "glimt renders it slightly in front; move it off the plane to choose the distance";
+        let help =
+            "glimt renders it slightly in front of the plane; move it off the plane to choose the distance";
         let span = scene.objects[*light].span.clone();
         findings.warnings.push(loaded.diagnostic_at(span, Severity::Warning, message, Some(help.to_owned())));
     }

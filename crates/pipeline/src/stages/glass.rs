@@ -1,4 +1,4 @@
-//! Detection of glass solids, with warnings about open ones.
+//! Detects glass solids and warns about open ones.
 
 use std::sync::Arc;
 
@@ -18,7 +18,7 @@ use crate::world::{GlassSolids, OpenGlass};
 const LACKS: &str = "glass refracts where a ray enters and leaves it; rays through the hole are neither refracted \
                      nor tinted";
 
-/// Finds the glass solids, or reuses them if shapes and materials are unchanged, and warns about open ones.
+/// Finds the glass solids, or reuses them if shapes and materials are unchanged. Warns about open solids.
 ///
 /// # Errors
 /// [`Stop::Cancelled`].
@@ -44,7 +44,7 @@ pub(crate) fn glass(
     Ok(bodies)
 }
 
-/// A flaw that several objects may share. Each flaw causes one warning.
+/// A flaw that several objects may have. Each flaw causes one warning.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum GlassFlaw {
     /// A shape without an interior.
@@ -55,10 +55,11 @@ enum GlassFlaw {
     Fronts,
 }
 
-/// Maximum number of objects that a warning names.
+/// Maximum number of objects listed in a warning.
 const MAX_NAMES: usize = 5;
 
-/// Returns one warning per flaw, at the first object with it. Glass whose holes are covered by opaque surfaces is fine.
+/// Returns one warning per flaw, located at the first affected object. Ignores glass whose holes are covered
+/// by opaque surfaces.
 fn open_glass_warnings(loaded: &Loaded, open: &[OpenGlass]) -> Vec<Diagnostic> {
     let mut groups: Vec<(GlassFlaw, Vec<&OpenGlass>)> = Vec::new();
     for open in open.iter().filter(|open| !open.is_covered) {
@@ -71,7 +72,7 @@ fn open_glass_warnings(loaded: &Loaded, open: &[OpenGlass]) -> Vec<Diagnostic> {
     groups.iter().map(|(flaw, members)| warning(loaded, *flaw, members)).collect()
 }
 
-/// Returns the problem with an object that is not closed.
+/// Returns the flaw of an object that is not closed.
 fn flaw(loaded: &Loaded, open: &OpenGlass) -> Option<GlassFlaw> {
     let shape = &loaded.scene.objects[open.object as usize].shape;
     if shape.mesh().is_some() {
@@ -79,17 +80,25 @@ fn flaw(loaded: &Loaded, open: &OpenGlass) -> Option<GlassFlaw> {
     }
     let sheet = |one, several, help| GlassFlaw::Sheet { one, several, help };
     Some(match shape.sheet()? {
-        Sheet::Quad(_) => {
-            sheet("a quad", "quads", "use a thin [[box]] for a pane, or close it with other glass")
+        Sheet::Quad(_) => sheet(
+            "a glass quad",
+            "glass quads",
+            "use a thin [[box]] for a pane, or close it with other glass",
+        ),
+        Sheet::Triangle(_) => {
+            sheet("a glass triangle", "glass triangles", "use a [[box]], or a closed [[mesh]]")
         }
-        Sheet::Triangle(_) => sheet("a triangle", "triangles", "use a [[box]], or a closed [[mesh]]"),
-        Sheet::Disk { .. } => sheet("a disk", "disks", "use a flat [[cylinder]] for a round pane"),
-        Sheet::Cylinder { .. } => sheet("an open cylinder", "open cylinders", "close it with `caps = true`"),
-        Sheet::Cone { .. } => sheet("an open cone", "open cones", "close it with `cap = true`"),
+        Sheet::Disk { .. } => {
+            sheet("a glass disk", "glass disks", "use a flat [[cylinder]] for a round pane")
+        }
+        Sheet::Cylinder { .. } => {
+            sheet("an open glass cylinder", "open glass cylinders", "close it with `caps = true`")
+        }
+        Sheet::Cone { .. } => sheet("an open glass cone", "open glass cones", "close it with `cap = true`"),
     })
 }
 
-/// Returns the warning about all objects with a flaw. `members` is not empty.
+/// Returns a single warning about all objects with a flaw. `members` must not be empty.
 fn warning(loaded: &Loaded, flaw: GlassFlaw, members: &[&OpenGlass]) -> Diagnostic {
     let first = &loaded.scene.objects[members[0].object as usize];
     let edges: usize = members.iter().map(|open| open.edges).sum();
@@ -103,20 +112,20 @@ fn warning(loaded: &Loaded, flaw: GlassFlaw, members: &[&OpenGlass]) -> Diagnost
     };
     let list = if count == 1 { String::new() } else { format!(": {names}") };
     let (message, help) = match flaw {
-        GlassFlaw::Sheet { one, help, .. } if count == 1 => (format!("{one} of glass has no interior"), help),
-        GlassFlaw::Sheet { several, help, .. } => {
-            (format!("{count} {several} of glass have no interior{list}"), help)
-        }
+        GlassFlaw::Sheet { one, help, .. } if count == 1 => (format!("{one} has no interior"), help),
+        GlassFlaw::Sheet { several, help, .. } => (format!("{count} {several} have no interior{list}"), help),
         GlassFlaw::Hole => {
             let of = if count == 1 { "of its surface" } else { "of one surface" };
             let message = format!(
-                "{mesh} not closed: {edges} without a neighbor of the same glass, {part} {of} missing{list}"
+                "{mesh} not closed: {edges} without a neighbor made of the same glass, {part} {of} missing{list}"
             );
             (message, "close the mesh in a modeling program, or give a pane some thickness")
         }
         GlassFlaw::Fronts => {
-            let message = format!("{mesh} inconsistently oriented: {edges} between opposite faces{list}");
-            (message, "recalculate its normals to point outwards in a modeling program")
+            let message = format!(
+                "{mesh} inconsistently oriented: {edges} between faces with opposite orientations{list}"
+            );
+            (message, "recalculate its normals in a modeling program so that they point outwards")
         }
     };
     let mut diagnostic =
@@ -127,14 +136,14 @@ fn warning(loaded: &Loaded, flaw: GlassFlaw, members: &[&OpenGlass]) -> Diagnost
     diagnostic
 }
 
-/// Returns the names of the first objects, or their lines for unnamed ones: `"pane", line 12 and 3 more`.
+/// Lists the first objects by name, or by line if they are unnamed: `"pane", line 12 and 3 more`.
 fn names(loaded: &Loaded, members: &[&OpenGlass]) -> String {
     let name = |open: &&OpenGlass| {
         let object = &loaded.scene.objects[open.object as usize];
         let line = || format!("line {}", loaded.line(&object.span));
         object.name.as_deref().map_or_else(line, |name| format!("\"{name}\""))
     };
-    // "1 more" would not be shorter than the last name.
+    // Replacing only one name with "1 more" would not make the list shorter.
     let most = if members.len() == MAX_NAMES + 1 { MAX_NAMES + 1 } else { MAX_NAMES };
     let mut shown: Vec<String> = members.iter().take(most).map(name).collect();
     let last = match members.len() - shown.len() {
@@ -144,7 +153,7 @@ fn names(loaded: &Loaded, members: &[&OpenGlass]) -> String {
     if shown.is_empty() { last } else { format!("{} and {last}", shown.join(", ")) }
 }
 
-/// Returns the warning about a closed mesh without a volume.
+/// Returns the warning about a closed mesh that encloses no volume.
 fn flat_glass_warning(loaded: &Loaded, object: u32) -> Diagnostic {
     let object = &loaded.scene.objects[object as usize];
     let name = object.name.as_deref().map(|name| format!(" \"{name}\"")).unwrap_or_default();
@@ -153,7 +162,7 @@ fn flat_glass_warning(loaded: &Loaded, object: u32) -> Diagnostic {
     let help = "export each face once, facing outwards (not double-sided)".to_owned();
     let mut diagnostic = loaded.diagnostic_at(object.span.clone(), Severity::Warning, message, Some(help));
     if let Some(place) = &mut diagnostic.place {
-        place.label = "rays that enter it never leave: everything behind it is tinted".to_owned();
+        place.label = "rays enter it but never leave, so everything behind it is tinted".to_owned();
     }
     diagnostic
 }
@@ -173,7 +182,7 @@ mod tests {
     use crate::scene::fingerprint::Fingerprint;
     use crate::stages::meshes::CachedMesh;
 
-    /// Returns the warnings of a scene that uses `mesh` as all of its mesh files.
+    /// Returns the warnings for a scene, substituting `mesh` for its mesh file.
     fn warnings(text: &str, material: &str, mesh: Option<LoadedMesh>) -> Vec<Diagnostic> {
         let text = format!(
             "[materials.a]\ntype = '{material}'\n{text}\n[render]\nambient = [1, 1, 1]\n[camera]\nposition = [0, 1, 4]\n\
@@ -183,7 +192,7 @@ mod tests {
         let path = folder.path().join("scene.toml");
         std::fs::write(&path, &text).expect("written");
         std::fs::write(folder.path().join("a.ply"), "").expect("written");
-        let loaded = crate::scene::load(&path, &[]).expect("a scene that is right");
+        let loaded = crate::scene::load(&path, &[]).expect("a valid scene");
         let mut findings = Findings::default();
         let meshes: Meshes = mesh
             .into_iter()
@@ -210,18 +219,19 @@ mod tests {
     #[test]
     fn shapes_without_interior_cause_warnings() {
         for (shape, expected) in [
-            ("[[quad]]\ncorner = [0, 0, 0]\nu = [1, 0, 0]\nv = [0, 1, 0]", "a quad of glass has no interior"),
-            (
-                "[[triangle]]\na = [0, 0, 0]\nb = [1, 0, 0]\nc = [0, 1, 0]",
-                "a triangle of glass has no interior",
-            ),
-            ("[[disk]]", "a disk of glass has no interior"),
-            ("[[cylinder]]\ncaps = false", "an open cylinder of glass has no interior"),
-            ("[[cone]]\ncap = false", "an open cone of glass has no interior"),
+            ("[[quad]]\ncorner = [0, 0, 0]\nu = [1, 0, 0]\nv = [0, 1, 0]", "a glass quad has no interior"),
+            ("[[triangle]]\na = [0, 0, 0]\nb = [1, 0, 0]\nc = [0, 1, 0]", "a glass triangle has no interior"),
+            ("[[disk]]", "a glass disk has no interior"),
+            ("[[cylinder]]\ncaps = false", "an open glass cylinder has no interior"),
+            ("[[cone]]\ncap = false", "an open glass cone has no interior"),
         ] {
             let shape = format!("{shape}\nmaterial = 'a'");
             assert_eq!(messages(&shape, "glass", None), [expected]);
-            assert_eq!(messages(&shape, "phong", None), [""; 0], "{shape} that is not of glass");
+            assert_eq!(
+                messages(&shape, "phong", None),
+                [""; 0],
+                "there should be no warning for other materials: {shape}"
+            );
         }
         for closed in [
             "[[cylinder]]",
@@ -237,7 +247,7 @@ mod tests {
     }
 
     #[test]
-    fn hole_warning_names_the_mesh_and_the_size() {
+    fn hole_warning_includes_mesh_name_and_hole_size() {
         let positions = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z];
         let all = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
         let of = |triangles: &[[u32; 3]]| {
@@ -248,14 +258,19 @@ mod tests {
         };
         let text = "[[mesh]]\nname = 'drop'\nfile = 'a.ply'\nmaterial = 'a'";
         assert_eq!(messages(text, "glass", of(&all)), [""; 0]);
-        // The missing face has half an area of 1, the whole mesh half an area of 3 + √3.
-        let open = "glass mesh \"drop\" is not closed: 3 edges without a neighbor of the same glass, 27 % of its surface missing";
+        // The area of the missing face is 1/2, and that of the whole mesh is (3 + √3)/2.
+        let open = "glass mesh \"drop\" is not closed: 3 edges without a neighbor made of the same glass, 27 % of its surface missing";
         assert_eq!(messages(text, "glass", of(&all[1..])), [open]);
         assert_eq!(messages(text, "phong", of(&all[1..])), [""; 0]);
         // One face points inwards.
         let odd = [[0, 1, 2], all[1], all[2], all[3]];
         let odd = &messages(text, "glass", of(&odd))[..];
-        assert_eq!(odd, ["glass mesh \"drop\" is inconsistently oriented: 6 edges between opposite faces"]);
+        assert_eq!(
+            odd,
+            [
+                "glass mesh \"drop\" is inconsistently oriented: 6 edges between faces with opposite orientations"
+            ]
+        );
         // Every face is duplicated with the opposite orientation.
         let both: Vec<_> = all.iter().flat_map(|&[a, b, c]| [[a, b, c], [a, c, b]]).collect();
         let twice =
@@ -264,7 +279,7 @@ mod tests {
     }
 
     #[test]
-    fn similar_open_parts_share_one_warning() {
+    fn similar_flaws_share_one_warning() {
         let pane = |i: usize| {
             let name = if i == 1 { String::new() } else { format!("name = 'pane {i}'\n") };
             format!("[[quad]]\n{name}corner = [0, {i}, 0]\nu = [1, 0, 0]\nv = [0, 0, 1]\nmaterial = 'a'\n")
@@ -272,17 +287,17 @@ mod tests {
         let panes = |count: usize| (0..count).map(pane).collect::<String>();
         let of = |count: usize| messages(&panes(count), "glass", None);
         let five = "\"pane 0\", line 9, \"pane 2\", \"pane 3\"";
-        assert_eq!(of(2), ["2 quads of glass have no interior: \"pane 0\" and line 9"]);
-        assert_eq!(of(5), [format!("5 quads of glass have no interior: {five} and \"pane 4\"")]);
-        assert_eq!(of(6), [format!("6 quads of glass have no interior: {five}, \"pane 4\" and \"pane 5\"")]);
-        assert_eq!(of(30), [format!("30 quads of glass have no interior: {five}, \"pane 4\" and 25 more")]);
-        // Another kind of flaw gets its own warning.
+        assert_eq!(of(2), ["2 glass quads have no interior: \"pane 0\" and line 9"]);
+        assert_eq!(of(5), [format!("5 glass quads have no interior: {five} and \"pane 4\"")]);
+        assert_eq!(of(6), [format!("6 glass quads have no interior: {five}, \"pane 4\" and \"pane 5\"")]);
+        assert_eq!(of(30), [format!("30 glass quads have no interior: {five}, \"pane 4\" and 25 more")]);
+        // A different kind of flaw causes a separate warning.
         let mixed = format!("[[disk]]\nmaterial = 'a'\n{}", panes(2));
         assert_eq!(messages(&mixed, "glass", None).len(), 2);
     }
 
     #[test]
-    fn different_glass_does_not_close_a_solid() {
+    fn different_kinds_of_glass_do_not_close_a_solid() {
         let side = |corner: &str, u: &str, v: &str, material: &str| {
             format!("[[quad]]\ncorner = {corner}\nu = {u}\nv = {v}\nmaterial = '{material}'\n")
         };
@@ -300,7 +315,11 @@ mod tests {
         };
         let other = |glass: &str| format!("[materials.b]\ntype = 'glass'\n{glass}\n{}", cube("b"));
         assert_eq!(messages(&cube("a"), "glass", None), [""; 0]);
-        assert_eq!(messages(&other("ior = 1.5\ntint = [1, 1, 1]"), "glass", None), [""; 0], "the same glass");
+        assert_eq!(
+            messages(&other("ior = 1.5\ntint = [1, 1, 1]"), "glass", None),
+            [""; 0],
+            "equal materials should close the solid"
+        );
         for glass in ["ior = 1.33", "tint = [0.5, 1, 1]"] {
             let found = messages(&other(glass), "glass", None);
             // The warning covers the lid and its four neighbors.

@@ -1,4 +1,4 @@
-//! The lights stage: collects the scene's lights when one of them changes.
+//! The lights stage: collects the scene's lights if any of them has changed.
 
 use std::sync::Arc;
 
@@ -14,10 +14,10 @@ use crate::scene::description::{Scene, TextureRole};
 use crate::scene::fingerprint::{Key, Referents};
 use crate::world::{self, Geometry, TextureSource};
 
-/// Importance distribution of the environment map. It is independent of the map's rotation.
+/// Importance distribution of the environment map, independent of the map's rotation.
 pub(crate) type SkyMemo = Memo<Option<Arc<EnvironmentMap>>>;
 
-/// Collects the lights, or reuses them if none has changed.
+/// Collects the lights, or reuses them if they are unchanged.
 pub(crate) fn lights(
     scene: &Scene,
     of: &Referents<'_>,
@@ -50,12 +50,12 @@ pub(crate) fn lights(
     })
 }
 
-/// Describes a light tree, for scenes with too many lights to sample them all.
+/// Describes the light tree of a scene with too many lights to sample all of them.
 fn picked(which: &str, lights: &Lights) -> String {
     format!(", {which}; light tree {} kB", lights.memory_bytes().div_ceil(1000))
 }
 
-/// Returns the textures of emissive materials in the scene file.
+/// Returns the textures used by the scene file's emissive materials.
 fn patterns(scene: &Scene) -> impl Iterator<Item = TextureSource> {
     let shining = scene.materials.iter().filter(|material| material.emits());
     shining.flat_map(move |material| {

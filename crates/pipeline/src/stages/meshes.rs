@@ -1,4 +1,4 @@
-//! The meshes stage: loads mesh files in parallel, and only those whose content has changed.
+//! The meshes stage: loads mesh files whose content has changed, in parallel.
 
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
@@ -21,7 +21,7 @@ use crate::scene::{Loaded, MeshBounds};
 #[derive(Debug)]
 pub(crate) struct CachedMesh {
     pub(crate) mesh: Arc<LoadedMesh>,
-    /// Key of all file contents that the mesh depends on.
+    /// Key of the contents of all files that the mesh depends on.
     pub(crate) key: Key,
     companions: Vec<FileRead>,
     /// Bounds of the mesh, computed on demand.
@@ -38,13 +38,13 @@ impl CachedMesh {
     }
 }
 
-/// One mesh per mesh file of the scene. Meshes that failed to load are empty.
+/// One mesh for each of the scene's mesh files. Meshes that failed to load are empty.
 pub(crate) type Meshes = Vec<Arc<CachedMesh>>;
 
 /// Loads the scene's meshes. Tries all files and adds errors to the findings.
 ///
 /// # Errors
-/// [`Stop::Cancelled`] and out of memory.
+/// [`Stop::Cancelled`], or there is not enough memory.
 pub(crate) fn meshes(
     loaded: &Loaded,
     cache: &mut Pool<MeshName, CachedMesh>,
@@ -61,8 +61,8 @@ pub(crate) fn meshes(
             let name = name(file);
             let content = reading.contents.read(&file.value, reading.token)?;
             if let Some(last) = cache.latest(&name) {
-                // Hash the files that the mesh referenced before they are read, because it most likely references them
-                // again.
+                // Hash the files that the mesh referenced last time before they are read, because it probably
+                // still references them.
                 companions(&last.companions, reading)?;
             }
             Ok((content, cache.get(&name, file_key(file, content))))
@@ -126,7 +126,7 @@ pub(crate) fn meshes(
     Ok(loading_result(meshes, counts))
 }
 
-/// Warns about objects that need data their mesh files lack. Files that could not be read are skipped.
+/// Warns about objects that need data that their mesh files lack. Skips files that could not be read.
 fn warn_about_missing_parts(
     loaded: &Loaded,
     files: &[MeshFile],
@@ -164,7 +164,7 @@ fn warn_about_missing_parts(
         }
         if material.kind.has_direction() {
             warn(format!(
-                "{file} has no texture coordinates, which the `anisotropy` of \"{name}\" needs for its direction"
+                "{file} has no texture coordinates, which the `anisotropy` of \"{name}\" needs to determine its direction"
             ));
         }
         if !material.textures().is_empty() {
@@ -175,7 +175,7 @@ fn warn_about_missing_parts(
     }
 }
 
-/// Canonical path of a mesh file, and a part of it.
+/// Canonical path of a mesh file, and a part number.
 pub(crate) type MeshName = (PathBuf, Option<u32>);
 
 fn name(file: &MeshFile) -> MeshName {
@@ -225,7 +225,7 @@ fn load_one(
     Ok(LoadedAsset { files, result })
 }
 
-/// Whether a file that was missing while the mesh was loaded exists now, and this request has not seen it before.
+/// Whether a file that was missing during mesh loading now exists and is new to this request.
 fn has_appeared(companions: &[Companion], reading: &Reading<'_>) -> Result<bool, Cancelled> {
     for companion in companions.iter().filter(|companion| companion.hash.is_none()) {
         let is_new = reading.contents.known(&companion.path).is_none();
@@ -237,7 +237,7 @@ fn has_appeared(companions: &[Companion], reading: &Reading<'_>) -> Result<bool,
     Ok(false)
 }
 
-/// Returns the current contents of these files.
+/// Returns the files with their current contents.
 fn companions(files: &[FileRead], reading: &Reading<'_>) -> Result<Vec<FileRead>, Cancelled> {
     let now = |file: &FileRead| {
         let content = reading.contents.read(&file.path, reading.token)?;
@@ -252,7 +252,7 @@ fn file_key(file: &MeshFile, content: Content) -> Key {
     key.finish()
 }
 
-/// Returns for each mesh file whether an object uses the file's own materials.
+/// Returns whether each mesh file's own materials are used by any object.
 fn uses_file_materials(scene: &Scene) -> Vec<bool> {
     let mut shown = vec![false; scene.mesh_files.len()];
     let plain = scene.objects.iter().filter(|object| object.material.is_none());
@@ -260,23 +260,23 @@ fn uses_file_materials(scene: &Scene) -> Vec<bool> {
     shown
 }
 
-/// MeshWarnings about mesh files without duplicates. Dropped faces are summed over the parts of a file.
+/// Warnings about mesh files, without duplicates. Dropped faces are summed over all parts of a file.
 #[derive(Default)]
 struct MeshWarnings<'a> {
     all: Vec<(&'a MeshFile, MeshWarning)>,
-    /// Index of a file's warning about dropped faces.
+    /// Index of each file's warning about dropped faces.
     dropped: HashMap<&'a Path, usize>,
     known: HashSet<String>,
 }
 
 enum MeshWarning {
-    /// Dropped faces, and the number of parts they are from.
+    /// Dropped faces and the number of affected parts.
     Dropped(Dropped, usize),
     Message(String),
 }
 
 impl<'a> MeshWarnings<'a> {
-    /// Adds the warnings of a file. MeshWarnings about its materials are added only if an object uses them.
+    /// Adds a file's warnings. Warnings about its materials are only added if an object uses them.
     fn add(&mut self, file: &'a MeshFile, mesh: &LoadedMesh, uses_own: bool) {
         if mesh.dropped != Dropped::default() {
             let place = *self.dropped.entry(&file.value).or_insert(self.all.len());
@@ -330,7 +330,7 @@ fn warn(loaded: &Loaded, warnings: Vec<(&MeshFile, String)>, findings: &mut Find
     }
 }
 
-/// Describes the dropped faces. Returns `None` if there are none.
+/// Describes the dropped faces. Returns `None` if none were dropped.
 fn dropped(faces: &Dropped) -> Option<String> {
     let count = |number: u64, what: &str| {
         (number > 0).then(|| format!("{number} face{} {what}", if number == 1 { "" } else { "s" }))
@@ -393,7 +393,7 @@ mod tests {
             (meshes[0].clone(), findings.files)
         }
 
-        /// Loads the meshes of a scene with these tables.
+        /// Loads the meshes of a scene that contains the given tables.
         fn find(&mut self, tables: &str, contents: &Snapshot) -> (Meshes, Findings) {
             let camera = "[camera]\nposition = [0, 0, 4]\nlook_at = [0, 0, 0]\n";
             self.write("scene.toml", &format!("{tables}{camera}"));
@@ -413,7 +413,7 @@ mod tests {
     }
 
     #[test]
-    fn material_warnings_need_a_user() {
+    fn unused_materials_do_not_cause_warnings() {
         let mut fixture = MeshFixture::new();
         fixture.write("a.obj", &OBJ.replace("usemtl m\n", "f 1 3 2\nusemtl none\n"));
         let mut count = |tables: &str| {
@@ -426,7 +426,7 @@ mod tests {
     }
 
     #[test]
-    fn light_facing_away_from_all_meshes_warns() {
+    fn light_facing_away_from_meshes_causes_warning() {
         let mut fixture = MeshFixture::new();
         let mut count = |light: &str, place: &str| {
             let light =
@@ -441,7 +441,7 @@ mod tests {
             }
             warnings.len()
         };
-        // The triangle spans y = 0 to y = 1; the camera is at y = 0.
+        // The triangle spans y = 0 to y = 1. The camera is at y = 0.
         let above_up = "corner = [-1, 2, -1]\nu = [0, 0, 2]\nv = [2, 0, 0]";
         let above_down = "corner = [-1, 2, -1]\nu = [2, 0, 0]\nv = [0, 0, 2]";
         let below_down = "corner = [-1, -2, -1]\nu = [2, 0, 0]\nv = [0, 0, 2]";
@@ -451,11 +451,11 @@ mod tests {
             (below_down, "", 1),
             (above_up, "translate = [0, 3, 0]", 0),
             (above_up, "scale = [1, 4, 1]", 0),
-            // Laid on its back, and turned upside down.
+            // Rotate the mesh onto its back, and upside down.
             (above_up, "scale = [1, 4, 1]\nrotate = [90, 0, 0]", 1),
             (below_down, "rotate = [180, 0, 0]", 1),
             (below_down, "rotate = [180, 0, 0]\ntranslate = [0, -1.5, 0]", 0),
-            // A surface that the camera sees is intended.
+            // A light that is visible to the camera is assumed to be intentional.
             (above_down, "translate = [0, 3, 0]", 0),
         ] {
             assert_eq!(count(light, place), expected, "{light}\n{place}");
@@ -463,7 +463,7 @@ mod tests {
     }
 
     #[test]
-    fn warnings_are_limited_to_a_hundred() {
+    fn number_of_warnings_is_limited() {
         let mut fixture = MeshFixture::new();
         let names: String = (0..102).map(|name| format!("usemtl x{name}\nf 1 2 3\n")).collect();
         fixture.write("a.obj", &OBJ.replace("usemtl m\n", &names));
@@ -474,11 +474,11 @@ mod tests {
     }
 
     #[test]
-    fn file_changed_during_a_request_is_noticed() {
+    fn file_change_during_request_is_detected() {
         let mut fixture = MeshFixture::new();
         let old = fixture.hash("a.obj");
         fixture.read(&fixture.snapshot());
-        // The file changes after the request has hashed it.
+        // Change the file after the request has hashed it.
         let snapshot = fixture.snapshot();
         snapshot.read(&fixture.folder.path().join("a.obj"), &CancelToken::new()).expect("not cancelled");
         fixture.write("a.obj", &format!("{OBJ}f 1 3 2\n"));
@@ -488,14 +488,18 @@ mod tests {
         fixture.cache = Pool::default();
         let (mesh, files) = fixture.read(&snapshot);
         assert_eq!((mesh.mesh.mesh.triangles.len(), files[0].content), (2, fixture.hash("a.obj")), "decoded");
-        assert_eq!(snapshot.changed(), Some(fixture.folder.path().join("a.obj")), "the request starts again");
+        assert_eq!(
+            snapshot.changed(),
+            Some(fixture.folder.path().join("a.obj")),
+            "the request should start again"
+        );
         let (mesh, files) = fixture.read(&fixture.snapshot());
         assert_eq!(mesh.mesh.mesh.triangles.len(), 2);
         assert_eq!(files[0].content, fixture.hash("a.obj"));
     }
 
     #[test]
-    fn material_file_changed_later_is_noticed() {
+    fn material_file_change_after_loading_is_detected() {
         let fixture = MeshFixture::new();
         let path = fixture.folder.path().join("a.obj");
         let file = MeshFile { value: path, span: 0..0, part: None };
@@ -521,7 +525,7 @@ mod tests {
     }
 
     #[test]
-    fn material_file_that_appears_is_read() {
+    fn new_material_file_is_read() {
         let fixture = MeshFixture::new();
         std::fs::remove_file(fixture.folder.path().join("a.mtl")).expect("removed");
         let path = fixture.folder.path().join("a.obj");
@@ -548,7 +552,7 @@ mod tests {
     }
 
     #[test]
-    fn warning_about_many_parts_is_given_once() {
+    fn warnings_about_parts_are_combined() {
         let part = |part| MeshFile { value: PathBuf::from("a.glb"), part: Some(part), span: 0..0 };
         let (files, other) =
             ([part(0), part(1), part(2)], MeshFile { value: "b.ply".into(), part: None, span: 0..0 });

@@ -1,4 +1,4 @@
-//! The stages, one file each. A stage is a function of its inputs and its cache.
+//! The stages, one per file. Each stage is a function of its inputs and its cache.
 
 pub(super) mod accel;
 pub(super) mod containers;
@@ -43,12 +43,12 @@ impl From<Cancelled> for Stop {
 }
 
 impl Stop {
-    #[allow(clippy::needless_pass_by_value, reason = "it is passed to `map_err`")]
+    #[allow(clippy::needless_pass_by_value, reason = "`map_err` passes ownership")]
     pub(super) fn work(message: impl ToString) -> Self {
         Self::Failed(Failure::Work(message.to_string()))
     }
 
-    /// An invalid command line, which has no location in the scene.
+    /// An error on the command line, which has no location in the scene.
     pub(super) fn call_error(message: String, help: &str) -> Self {
         let (severity, help) = (Severity::Error, Some(help.to_owned()));
         let path = std::path::PathBuf::new();
@@ -56,7 +56,7 @@ impl Stop {
     }
 }
 
-/// Result of a stage with its status and the reason for it.
+/// A stage's result, its status and the reason for the status.
 #[derive(Debug)]
 pub(super) struct Staged<T> {
     pub(super) value: T,
@@ -90,9 +90,9 @@ pub(super) struct Reading<'a> {
 /// Files, errors and warnings found by a request.
 #[derive(Debug)]
 pub(super) struct Findings {
-    /// Time before the first read.
+    /// Point in time before the first read.
     pub(super) begun: Instant,
-    /// All files that were read or tried, without duplicates.
+    /// All files that the request tried to read, without duplicates.
     pub(super) files: Vec<FileRead>,
     known: HashSet<FileRead>,
     pub(super) errors: Vec<Diagnostic>,
@@ -126,15 +126,15 @@ impl Findings {
         }
     }
 
-    /// Replaces the earlier content of a file by the decoded one.
+    /// Replaces a file's recorded content with the decoded content.
     pub(super) fn read_instead(&mut self, file: FileRead) {
         self.known.retain(|known| known.path != file.path);
         self.files.retain(|known| known.path != file.path);
         self.read(file);
     }
 
-    /// Adds files that may be missing. A scene may be broken because a file does not exist, so the text underlined by
-    /// each error is watched as a file name.
+    /// Adds files that may be missing. An error may be due to a nonexistent file, so the text underlined by
+    /// each error is treated as a file name to watch.
     pub(super) fn watch_underlined_files(
         &mut self,
         diagnostics: &[Diagnostic],
@@ -155,7 +155,7 @@ impl Findings {
         }
     }
 
-    /// Adds an error about an asset, at the place that references it.
+    /// Adds an error about an asset, located where the scene references it.
     pub(super) fn asset_error(&mut self, loaded: &Loaded, span: Range<usize>, error: &AssetError) {
         self.errors.push(diagnostic_at_span(loaded, span, Severity::Error, error.to_string()));
     }
@@ -187,7 +187,7 @@ fn diagnostic_at_span(
     loaded.diagnostic_at(span, severity, message, None)
 }
 
-/// Result of loading one asset.
+/// Result of loading an asset.
 pub(super) struct LoadedAsset<T> {
     /// The file, followed by the files it references.
     pub(super) files: Vec<FileRead>,
@@ -195,7 +195,7 @@ pub(super) struct LoadedAsset<T> {
     pub(super) result: Result<(Arc<T>, bool), AssetError>,
 }
 
-/// Reports a stage that loads files, with the numbers of loaded and cached ones.
+/// Creates the result of a stage that loads files, including the numbers of loaded and cached files.
 pub(super) fn loading_result<T>(value: T, counts: Counts) -> Staged<T> {
     let Counts { loaded, kept, failed, left_out } = counts;
     if loaded + failed == 0 {
@@ -214,6 +214,6 @@ pub(super) struct Counts {
     pub(super) loaded: usize,
     pub(super) kept: usize,
     pub(super) failed: usize,
-    /// Not loaded because the view does not need them.
+    /// Files not loaded because the view does not need them.
     pub(super) left_out: usize,
 }

@@ -1,4 +1,4 @@
-//! The parse stage: reads the scene file, and the orbiter file if it contains the camera.
+//! The parse stage: reads the scene file, and the orbiter file if the camera uses one.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -28,27 +28,27 @@ use crate::scene::sanitize::visible;
 pub(crate) struct Parsed {
     pub(crate) loaded: Arc<scene::Loaded>,
     pub(crate) orbiter: Option<OrbiterCamera>,
-    /// Files that the scene references without the overrides, and files referenced by those.
+    /// Files that the scene references without the overrides, and files referenced by them.
     pub(crate) named: Vec<PathBuf>,
-    /// Files that a model's scene depends on, apart from the model.
+    /// Files that a model's scene depends on, except the model itself.
     companions: Vec<FileRead>,
     /// Approximations made for a model's scene.
     notes: Vec<Diagnostic>,
     orbiter_content: Option<Content>,
 }
 
-/// The scene to parse, and how.
+/// What to parse and how.
 #[derive(Clone, Copy)]
 pub(crate) struct SceneSource<'a> {
-    /// Path of a scene file or a model.
+    /// Path of a scene file or model.
     pub(crate) path: &'a Path,
-    /// Overrides of scene keys.
+    /// Overrides of scene keys from the command line.
     pub(crate) sets: &'a [String],
     /// How to show a model.
     pub(crate) show: Show,
 }
 
-/// Generates the scene of a model. Returns it with the other files it depends on.
+/// Generates a scene for a model. Returns it together with the other files it depends on.
 fn model_scene(
     SceneSource { path, sets, show }: SceneSource<'_>,
     (contents, containers): (&Snapshot, &Containers),
@@ -59,7 +59,7 @@ fn model_scene(
         AssetError::Cancelled(_) => Stop::Cancelled,
         AssetError::OutOfMemory { .. } => Stop::work(error),
         AssetError::Unreadable { path, reason } => {
-            // Watch a missing file, so that its creation is noticed.
+            // Watch a missing file to detect when it is created.
             if let Ok(content) = contents.read(&path, token) {
                 findings.read(FileRead { path: path.clone(), content });
             }
@@ -87,10 +87,10 @@ fn file_diagnostic(path: &Path, severity: Severity, message: String) -> Diagnost
     Diagnostic { severity, message, path: path.to_owned(), place: None, help: None }
 }
 
-/// Reads and validates the scene, with the overrides of the command line.
+/// Reads and validates the scene, including the command-line overrides.
 ///
 /// # Errors
-/// All errors of the scene file.
+/// Returns all errors in the scene file.
 pub(crate) fn parse(
     origin: SceneSource<'_>,
     (contents, containers): (&Snapshot, &Containers),
@@ -122,7 +122,7 @@ pub(crate) fn parse(
         )])));
     }
     let key = |content| key(origin, content, is_model);
-    // A model's scene depends on several files, all of which must be unchanged.
+    // A model's scene depends on several files. All must be unchanged.
     let is_same = |parsed: &&Arc<Parsed>| {
         let now =
             |file: &FileRead| contents.read(&file.path, token).is_ok_and(|content| content == file.content);
@@ -132,8 +132,8 @@ pub(crate) fn parse(
     let (loaded, content, companions, notes) = match &known {
         Some(parsed) => (parsed.loaded.clone(), content, parsed.companions.clone(), parsed.notes.clone()),
         None => {
-            // Record the current content, because parsing may fail. After a success, it is replaced by the parsed
-            // bytes' content.
+            // Record the current content in case parsing fails. After a success, replace it with the content
+            // that was parsed.
             findings.read(FileRead { path: path.to_owned(), content });
             read(origin, (contents, containers), memo.latest(), findings, token)?
         }
@@ -147,14 +147,14 @@ pub(crate) fn parse(
     }
     let named = referenced_files(&loaded);
     let parsed = Arc::new(Parsed { loaded, orbiter, named, companions, notes, orbiter_content });
-    // Do not keep a scene whose orbiter file could not be read, so that the next request tries again.
+    // Do not cache a scene whose orbiter file could not be read, so that the next request tries again.
     if parsed.orbiter.is_some() == orbiter_content.is_some() {
         memo.set(key(content), parsed.clone());
     }
     Ok(Staged::done(parsed, ""))
 }
 
-/// A scene with the content of its file, the other files it depends on, and its approximations.
+/// A scene, the content of its file, the other files it depends on, and the approximations made.
 type ReadScene = (Arc<scene::Loaded>, Content, Vec<FileRead>, Vec<Diagnostic>);
 
 fn read(
@@ -179,7 +179,7 @@ fn read(
     Ok((Arc::new(loaded), content, companions, notes))
 }
 
-/// Returns the key of a scene whose file has this content.
+/// Returns the key of a scene, given the content of its file.
 fn key(SceneSource { path, sets, show }: SceneSource<'_>, content: Content, is_model: bool) -> Key {
     let mut key = Fingerprint::new("parse");
     content.add_to(key.path(path));
@@ -192,7 +192,8 @@ fn key(SceneSource { path, sets, show }: SceneSource<'_>, content: Content, is_m
     key.finish()
 }
 
-/// Extends the error about a missing scene by the name of a file with the same text as the last valid scene.
+/// If the scene file is missing, adds a hint to the error if another file has the same text as the last valid
+/// scene.
 fn with_new_name_hint(
     mut errors: Vec<Diagnostic>,
     path: &Path,
@@ -210,11 +211,12 @@ fn with_new_name_hint(
     errors
 }
 
-/// Returns the files that the scene references without the overrides, and the files that its unread meshes reference.
+/// Returns the files that the scene references without the overrides. Includes files referenced by meshes
+/// that have not been read.
 fn referenced_files(loaded: &scene::Loaded) -> Vec<PathBuf> {
     let mut named = loaded.named.clone();
     let is_read = |path: &&PathBuf| loaded.scene.mesh_files.iter().any(|file| file.value == **path);
-    // Unreadable files reference nothing.
+    // Skip unreadable files.
     for path in loaded.named.iter().filter(|path| has_material_files(path) && !is_read(path)) {
         if let Ok(mesh) = load_mesh(path, &ignore_progress, &CancelToken::new()) {
             named.extend(mesh.companions.into_iter().map(|one| one.path).chain(mesh.pictures));
@@ -233,7 +235,7 @@ fn has_material_files(path: &Path) -> bool {
 
 type Orbiter = (Option<OrbiterCamera>, Option<Content>);
 
-/// Reads the camera's orbiter file if it has one. Errors go to the findings.
+/// Reads the camera's orbiter file, if any. Adds errors to the findings.
 fn orbiter(
     loaded: &scene::Loaded,
     known: Option<&Parsed>,

@@ -1,6 +1,7 @@
-//! The photons stage. It creates the data shared by all passes and traces the first pass. Later passes are traced
-//! during the render when their samples are due. Maps are kept while there is room, so that images with another camera
-//! or exposure reuse them, and images of another size do if the scene sets the number of photons per pass.
+//! The photons stage. It creates the data shared by all passes and traces the first pass. Later passes are
+//! traced during the render when they are needed. Maps are cached while there is room, so that images with
+//! another camera or exposure can reuse them. Images of another size can reuse them if the scene sets the
+//! number of photons per pass.
 
 use std::cell::{Cell, RefCell};
 use std::ops::Range;
@@ -22,13 +23,14 @@ use crate::scene::description::Render;
 use crate::scene::fingerprint::Key;
 use crate::world::World;
 
-/// Maximum memory of maps kept for later images.
+/// Memory limit for maps cached for later images.
 const MAX_KEPT_BYTES: usize = 128 << 20;
-/// Maximum memory of further maps in use at once, except that one map may be larger.
+/// Memory limit for maps in use at the same time. A single map may exceed it.
 const MAX_ALIVE_BYTES: usize = 256 << 20;
-/// Maximum number of passes in use at once. Lookups in one map at a time use the CPU's caches better.
+/// Maximum number of passes in use at the same time. Using one map at a time makes better use of the CPU
+/// caches.
 const MAX_ALIVE: u32 = 1;
-/// Maximum number of samples at once without photons.
+/// Maximum number of samples rendered at once if no photons are emitted.
 const MAX_WITHOUT_TREE: u32 = 4096;
 
 /// Cache of the photons stage: the photons of the last scene.
@@ -48,7 +50,7 @@ pub(crate) struct PhotonContext<'a> {
 #[derive(Debug)]
 pub(crate) struct PhotonStore {
     photons: Photons,
-    /// Cached passes, from the first on.
+    /// Cached passes, starting with the first.
     kept: RefCell<Vec<Arc<PhotonPass>>>,
     /// Counts of the current request.
     sent: Cell<PhotonCounts>,
@@ -66,12 +68,12 @@ struct PhotonCounts {
 }
 
 impl PhotonStore {
-    /// Whether photons are traced at all, because some surface causes caustics.
+    /// Whether any surface causes caustics. If not, no photons are traced.
     pub(crate) fn emits_photons(&self) -> bool {
         self.photons.emits_photons()
     }
 
-    /// Returns how many passes as large as the first may be in use at once.
+    /// Returns how many passes may be in use at the same time, assuming that they are as large as the first.
     pub(crate) fn max_passes_at_once(&self) -> u32 {
         if !self.emits_photons() {
             return MAX_WITHOUT_TREE;
@@ -86,7 +88,7 @@ impl PhotonStore {
         if self.emits_photons() && passes > 0 { seconds / passes as f64 } else { 0.0 }
     }
 
-    /// Returns the maps of some samples. `tick` is called regularly.
+    /// Returns the maps for the given samples. Calls `tick` regularly.
     ///
     /// # Errors
     /// [`Cancelled`].
@@ -142,7 +144,7 @@ impl PhotonStore {
         self.kept.borrow().iter().map(|pass| pass.memory_bytes()).sum()
     }
 
-    /// Reports the photons traced since the stage began, and the cached maps.
+    /// Reports the photons traced since the stage started, and the cached maps.
     pub(crate) fn report(&self) -> PhotonsReport {
         let PhotonCounts { passes, emitted, stored, lookups, seconds, most_alive_bytes } = self.sent.get();
         let [caustic, bounced] = self.photons.radii();
@@ -162,7 +164,7 @@ impl PhotonStore {
     }
 }
 
-/// Runs work in the pool and calls `tick` on this thread.
+/// Runs `work` in the pool while regularly calling `tick` on the current thread.
 fn run_with_ticks<T: Send>(
     pool: &ThreadPool,
     tick: &mut impl FnMut(),
@@ -170,7 +172,7 @@ fn run_with_ticks<T: Send>(
 ) -> Result<T, Cancelled> {
     let (sender, result) = mpsc::sync_channel(1);
     pool.in_place_scope(|scope| {
-        // The receiver exists until the result arrives.
+        // The receiver is not dropped before the result arrives.
         scope.spawn(move |_| drop(sender.send(work())));
         loop {
             match result.recv_timeout(TICK) {
@@ -182,11 +184,11 @@ fn run_with_ticks<T: Send>(
     })
 }
 
-/// Traces the first photons for an image that gathers them. `wanted` is from the command line, `enabled` from the
-/// scene. `tick` is called regularly, `before` once before any tracing.
+/// Traces the first photons if the image gathers them. `wanted` comes from the command line, and `enabled`
+/// from the scene. Calls `tick` regularly, and `before` once before any tracing.
 ///
 /// # Errors
-/// [`Stop::Cancelled`], and errors of `before`.
+/// [`Stop::Cancelled`], or an error from `before`.
 pub(crate) fn photons(
     (enabled, wanted): (bool, Option<bool>),
     key: impl FnOnce(PhotonSettings) -> Key,

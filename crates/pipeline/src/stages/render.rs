@@ -1,8 +1,8 @@
 //! The render stage: traces passes into a film, with progress and previews.
 //!
-//! The film is kept. An interrupted render resumes where it stopped, and more samples can be added to a finished one.
-//! Both give the same bits as an uninterrupted render: every sample is a function of its pixel and index, and every
-//! pixel sums its samples in order.
+//! The film is kept. An interrupted render resumes where it stopped, and more samples can be added to a
+//! finished one. In both cases, the result is bit-identical to an uninterrupted render, because every sample
+//! is a function of its pixel and index, and each pixel sums its samples in order.
 
 use super::photons::PhotonStore;
 use super::{Staged, Stop};
@@ -15,10 +15,10 @@ use crate::render::scheduler::{Rendering, Scheduler};
 use crate::scene::description::Render;
 use crate::scene::fingerprint::Key;
 
-/// Renders the film with this key to the requested number of samples or noise.
+/// Renders the film with this key until it has the requested number of samples or reaches the noise target.
 ///
 /// # Errors
-/// [`Stop::Cancelled`], or not enough memory for the film. The film keeps its samples.
+/// [`Stop::Cancelled`], or there is not enough memory for the film. The film keeps its samples.
 pub(crate) fn render(
     key: Key,
     films: &mut FilmCache,
@@ -43,7 +43,7 @@ pub(crate) fn render(
             films.put(state).map_err(Stop::work)?;
         }
     }
-    let Some(state) = films.current_mut() else { return Err(Stop::work("the film is gone")) };
+    let Some(state) = films.current_mut() else { return Err(Stop::work("the film is missing")) };
     let budget = rendering.plan.time_seconds;
     let is_part = state.is_finished_part;
     let finished = state.is_finished(rendering.plan);

@@ -1,5 +1,5 @@
-//! The textures stage: decodes the images used by visible materials in parallel, and only those whose content has
-//! changed.
+//! The textures stage: decodes images that are used by visible materials and whose content has changed, in
+//! parallel.
 
 use std::collections::{HashMap, HashSet};
 use std::ops::Range;
@@ -31,34 +31,34 @@ use crate::world::{
     Cutoff, Image, Images, NeededTexture, TextureNeeds, TextureSource, environment_source, textures_needed,
 };
 
-/// Maximum number of bytes of all texels of a scene.
+/// Maximum total size of a scene's texels in bytes.
 const MAX_BYTES: u64 = 2 << 30;
 
-/// Canonical path of an image and how its values are interpreted.
+/// Canonical path of an image, and how to interpret its values.
 type TextureName = (PathBuf, Option<u32>, ImageEncoding, Option<Cutoff>);
 
 fn name(source: &TextureSource) -> TextureName {
     (canonical(&source.path), source.image, source.encoding, source.coverage)
 }
 
-/// DecodedTexture texels, and warnings about ignored parts of the file.
+/// Decoded texels, and warnings about ignored parts of the file.
 #[derive(Clone, Debug)]
 struct DecodedTexture {
     texels: Arc<Texels>,
     warnings: Vec<String>,
 }
 
-/// Cache of textures, with an entry per file and encoding, and one for its mipmaps if a material uses them.
+/// Texture cache. It has one entry per file and encoding, and one for the mipmaps if a material uses them.
 #[derive(Debug, Default)]
 pub(crate) struct TextureCache {
     texels: Pool<TextureName, DecodedTexture>,
     mipmaps: Pool<TextureName, Mipmaps>,
-    /// Image files that glTF files link to, by the name of the image in the glTF file.
+    /// Image files referenced by glTF files, by texture name.
     linked: HashMap<TextureName, PathBuf>,
 }
 
 impl TextureCache {
-    /// Whether all of these have been loaded, whatever their files contain now.
+    /// Whether all of these textures are cached, even if their files have changed since.
     fn has_all(&self, needed: &[NeededTexture]) -> bool {
         needed.iter().all(|one| self.texels.latest(&name(&one.source)).is_some())
     }
@@ -87,7 +87,7 @@ impl TextureCache {
     }
 }
 
-/// The needed textures, without those that failed.
+/// The needed textures, except those that failed to load.
 #[derive(Debug, Default)]
 pub(crate) struct Textures {
     pub(crate) images: Images,
@@ -95,13 +95,13 @@ pub(crate) struct Textures {
     pub(crate) key_of: HashMap<TextureSource, Key>,
     /// Key of each texture, in the order of the needed textures.
     pub(crate) keys: Vec<Key>,
-    /// Keys of the textures used by materials of mesh files.
+    /// Keys of the textures used by materials from mesh files.
     pub(crate) of_files: Vec<Key>,
     /// The environment map with its key.
     pub(crate) environment: Option<(Key, Arc<Texels>)>,
     /// Number of texels that this request read from files.
     pub(crate) texels_loaded: u64,
-    /// Bytes of all images, including their mipmaps.
+    /// Bytes used by all images, including their mipmaps.
     pub(crate) memory_bytes: u64,
 }
 
@@ -109,14 +109,14 @@ pub(crate) struct Textures {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct NeededTextures {
     pub(crate) textures: Vec<NeededTexture>,
-    /// Number of textures that the scene uses but this view does not look up.
+    /// Number of textures that are used by the scene but not needed for this view.
     pub(crate) left_out: usize,
-    /// Whether a missing texture is an error even for a model, which is otherwise shown without it.
+    /// Whether a missing texture is an error even for a model. If not, the model is shown without it.
     pub(crate) are_required: bool,
 }
 
-/// Returns the textures that visible materials look up for this view. If all textures of the scene have been loaded
-/// before, returns all of them, so that lights and trees that depend on them are reused.
+/// Returns the textures that visible materials need for this view. If all of the scene's textures are cached,
+/// returns all of them, so that lights and trees that depend on them can be reused.
 pub(crate) fn needed(
     loaded: &Loaded,
     meshes: &Meshes,
@@ -133,11 +133,11 @@ pub(crate) fn needed(
     NeededTextures { textures: of_picture, left_out, ..NeededTextures::default() }
 }
 
-/// An image with all textures that use it.
+/// An image and all textures that use it.
 struct TextureRequest<'a> {
     name: TextureName,
     content: Content,
-    /// The image file that a glTF file links to.
+    /// The image file referenced by the glTF file.
     linked: Option<FileRead>,
     kept: CachedTexture,
     asked_by: Vec<&'a NeededTexture>,
@@ -153,7 +153,7 @@ struct CachedTexture {
 /// Loads the needed textures. Tries all files and adds errors to the findings.
 ///
 /// # Errors
-/// [`Stop::Cancelled`] and out of memory.
+/// [`Stop::Cancelled`], or there is not enough memory.
 pub(crate) fn textures(
     loaded: &Loaded,
     needed: &NeededTextures,
@@ -248,8 +248,9 @@ pub(crate) fn textures(
     Ok(loading_result(textures, Counts { left_out: *left_out, ..counts }))
 }
 
-/// Warns about an image that a model is shown without, and substitutes a constant. The material's factors then remain
-/// visible, except that emission is dropped. Materials of mesh files have their own values without a texture.
+/// Warns about an unreadable image of a model and replaces it with a constant. This preserves the material's
+/// factors, except that emission is dropped. Materials from mesh files have their own values to use without a
+/// texture.
 fn substitute_texture(
     loaded: &Loaded,
     one: &NeededTexture,
@@ -290,7 +291,7 @@ fn substitute_texture(
     images.insert(one.source.clone(), Image { texels: Arc::new(texels), mipmaps: None });
 }
 
-/// Warns about pixels that cannot be used.
+/// Warns about unusable pixels.
 fn warn_about_unusable_pixels(
     loaded: &Loaded,
     image: &TextureRequest<'_>,
@@ -308,7 +309,8 @@ fn warn_about_unusable_pixels(
     findings.warn(loaded, place(loaded, image.asked_by[0]), message);
 }
 
-/// Warns about a gray normal map, which probably contains heights. A mesh file's own has no effect.
+/// Warns about a gray normal map, which probably contains heights. If it comes from a mesh file, it has no
+/// effect.
 fn warn_about_gray_normal_map(
     loaded: &Loaded,
     image: &TextureRequest<'_>,
@@ -374,7 +376,7 @@ impl TextureRequest<'_> {
     }
 }
 
-/// Returns each file once per encoding, in the order of the needed textures, with its cached data.
+/// Groups the needed textures by file and encoding, preserving their order, and looks up cached data.
 fn images<'a>(
     needed: &'a [NeededTexture],
     cache: &mut TextureCache,
@@ -407,8 +409,8 @@ fn images<'a>(
     Ok(images)
 }
 
-/// Loads the images; the flag is true for cached images. An image that would exceed `most_bytes` together with
-/// the images before it is an error.
+/// Loads all images. Returns an error for each image that would exceed `most_bytes` together with the images
+/// before it.
 fn load_all(
     images: &[TextureRequest<'_>],
     most_bytes: u64,
@@ -419,7 +421,7 @@ fn load_all(
             Some(DecodedTexture { texels, .. }) => {
                 (texels.width, texels.height, texels.memory_bytes() as u64)
             }
-            // An unreadable image is reported when it is loaded.
+            // Unreadable images are reported during loading.
             None => size_of(&image.asked_by[0].source, reading).unwrap_or_default(),
         };
         let is_weighted = matches!(image.asked_by[0].source.encoding, ImageEncoding::CutOut(_));
@@ -438,7 +440,7 @@ fn load_all(
     reading.pool.install(|| images.par_iter().zip(over).map(load).collect())
 }
 
-/// Returns for each image size a message if the image exceeds the common limit.
+/// Returns an error message for each image that exceeds the total limit.
 fn over_budget(sizes: &[u64], most_bytes: u64) -> Vec<Option<String>> {
     let mib = |bytes: u64| bytes.div_ceil(1 << 20);
     let mut before = 0;
@@ -458,13 +460,13 @@ fn over_budget(sizes: &[u64], most_bytes: u64) -> Vec<Option<String>> {
     sizes.iter().map(check).collect()
 }
 
-/// Content of an image's file, and the file that a glTF image links to.
+/// Content of an image's file, and the image file referenced if it is a glTF file.
 type TextureContents = (Content, Option<FileRead>);
 
 /// An image, its mipmaps, and whether both were cached.
 type LoadedTexture = (Arc<DecodedTexture>, Option<Arc<Mipmaps>>, bool);
 
-/// Loads an image with its mipmaps. Updates `contents` to the decoded contents.
+/// Loads an image and its mipmaps. Updates `contents` to the contents that were decoded.
 fn load_one(
     image: &TextureRequest<'_>,
     contents: &mut TextureContents,
@@ -493,7 +495,7 @@ fn load_one(
     Ok((decoded, mipmaps, was_kept))
 }
 
-/// Decodes an image. Updates `contents` to the decoded contents.
+/// Decodes an image. Updates `contents` to the contents that were decoded.
 fn decode(
     image: &TextureRequest<'_>,
     contents: &mut TextureContents,
@@ -532,7 +534,7 @@ fn decode(
     Ok(texels)
 }
 
-/// Returns the source of an image's bytes.
+/// Returns where an image's bytes are stored.
 fn input(source: &TextureSource, reading: &Reading<'_>) -> Result<ImageInput, AssetError> {
     match source.image {
         None => Ok(ImageInput::File(source.path.clone())),
@@ -551,7 +553,7 @@ fn size_of(source: &TextureSource, reading: &Reading<'_>) -> Result<(u32, u32, u
     }
 }
 
-/// Adds the textures that only `check` loads: unused textures of the scene file, and a black environment map.
+/// Adds textures that only `check` loads: unused textures from the scene file, and a black environment map.
 pub(crate) fn add_declared(loaded: &Loaded, wanted: &mut Vec<NeededTexture>) {
     let name = |path: &Path, image: Option<u32>| (path.to_owned(), image);
     let mut known: HashSet<_> = wanted.iter().map(|one| name(&one.source.path, one.source.image)).collect();
@@ -601,11 +603,11 @@ mod tests {
     use crate::tests::{Bench, SCENE};
 
     #[test]
-    fn images_share_one_memory_limit() {
+    fn memory_limit_applies_to_all_images_together() {
         let over = over_budget(&[600, 400, 0, 25, 1], 1001);
         assert_eq!(over.iter().map(Option::is_some).collect::<Vec<_>>(), [false, false, false, true, false]);
-        // Three run-length encoded images of 15999 × 15999: their headers call for 732.3 MiB each, but few pixels
-        // follow.
+        // Three run-length encoded images whose headers specify 15999 × 15999 pixels (732.3 MiB each) but
+        // which contain few pixels.
         let table = |name: &str| format!("[textures.{name}]\nfile = \"{name}.tga\"\n");
         let ball = |name: &str| {
             format!(
@@ -618,10 +620,10 @@ mod tests {
         let mut bench = Bench::new(&format!("{SCENE}{tables}"));
         let header = "\0\0\x0a\0\0\0\0\0\0\0\0\0\x7f\x3e\x7f\x3e\x18\0";
         for name in names {
-            // Minimum length of such a file, with 128 pixels per run.
+            // Minimum file length for this image size, with 128 pixels per run.
             bench.write(&format!("{name}.tga"), &format!("{header}{}", "\0".repeat(3 << 20)));
         }
-        let Failure::Scene(errors) = bench.failed() else { panic!("errors in the scene") };
+        let Failure::Scene(errors) = bench.failed() else { panic!("the scene should have errors") };
         let over: Vec<_> = errors.iter().filter(|error| error.message.contains("MiB")).collect();
         assert_eq!(over.len(), 1, "{errors:?}");
         for fact in ["three.tga", " 733 MiB", " 1465 MiB", " 2048 MiB"] {
@@ -639,7 +641,7 @@ mod tests {
         bench.edit("[0.5, 0.5, 0.5]", "[0.6, 0.5, 0.5]");
         let report = bench.done().0;
         assert_eq!(report.stages[Stage::Textures as usize].status, Status::Reused);
-        // Changes are noticed under both names.
+        // Changes must be detected under both names.
         fs::write(bench.path("skin.ppm"), "P6\n1 1\n255\nxyz").expect("written");
         assert_eq!(bench.done().0.stages[Stage::Textures as usize].status, Status::Done);
     }

@@ -1,4 +1,4 @@
-//! The write stage: encodes and writes images that differ from those already written.
+//! The write stage: encodes and writes images that have changed since they were last written.
 
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
@@ -26,25 +26,25 @@ use crate::output::{self, BitDepth, DevelopSettings, Format, LayerImage, OutputE
 use crate::output::{AnimationFormat, animation};
 use crate::scene::fingerprint::{Fingerprint, Key};
 
-/// Metadata key of the scene file.
+/// Metadata key for the scene file.
 const SCENE: &str = "glimt:scene";
 
-/// Images that glimt wrote.
+/// Images written by glimt.
 #[derive(Debug, Default)]
 pub(crate) struct WrittenFiles {
-    /// Each file with the image's key and the file's content after the write.
+    /// Image key and file content after the write, for each file.
     files: HashMap<PathBuf, (Key, Content)>,
-    /// Key of the scene's own image, if all its files contain it.
+    /// Key of the scene's own image, if all its output files contain it.
     pub(crate) own: Option<Key>,
-    /// Folders of this write, or of the turntable so far, that have been cleared of temporary files from killed writers.
+    /// Folders already cleaned of temporary files from killed processes, during this write or turntable.
     sweep: FolderSweep,
 }
 
 impl WrittenFiles {
-    /// Returns the first path that exists with a content that glimt did not write.
+    /// Returns the first existing file whose content was not written by glimt.
     pub(crate) fn first_foreign<'a>(&self, paths: &'a [PathBuf], contents: &Contents) -> Option<&'a Path> {
         let holds = |path: &Path, known: &Content| {
-            // This token is never cancelled.
+            // Use a token that is never cancelled.
             contents.read(path, &CancelToken::new()).is_ok_and(|content| content == *known)
         };
         let is_ours = |path: &Path| self.files.get(path).is_some_and(|(_, known)| holds(path, known));
@@ -57,14 +57,14 @@ impl WrittenFiles {
         self.files.is_empty()
     }
 
-    /// Forgets all files, so that the next write writes them again.
+    /// Forgets all files, so that the next write rewrites them.
     fn forget(&mut self) {
         self.files.clear();
         self.own = None;
     }
 }
 
-/// Output files of an image, and files that must not be overwritten.
+/// An image's output files, and files that must not be overwritten.
 #[derive(Clone, Copy)]
 pub(crate) struct Destination<'a> {
     pub(crate) plan: &'a Plan,
@@ -72,15 +72,16 @@ pub(crate) struct Destination<'a> {
     pub(crate) layers: &'a [LayerImage],
     pub(crate) inputs: &'a Inputs,
     pub(crate) contents: &'a Contents,
-    /// Whether the image is the scene's own, without changes made by keys.
+    /// Whether this is the scene's own image, without changes made with keys.
     pub(crate) is_own: bool,
     pub(crate) sink: &'a Sink,
 }
 
-/// Checks all output files before any work is spent on an image for them.
+/// Checks all output files before starting to render.
 ///
 /// # Errors
-/// With [`Writing::Must`], the first file that cannot be written. Otherwise failures are reported as events.
+/// With [`Writing::Must`], returns an error for the first file that cannot be written. Otherwise, reports
+/// failures as events.
 pub(crate) fn check_targets(writing: Writing, plan: &Plan, sink: &Sink) -> Result<(), Stop> {
     match writing {
         Writing::No => Ok(()),
@@ -108,9 +109,9 @@ fn find_targets(
         )
     };
     match plan.shard {
-        // A part may have any extension.
+        // A part file may have any extension.
         Some(_) => plan.outputs.iter().try_for_each(|path| place(path))?,
-        // Check the later turntable frames as well, so that no problem appears after hours of work.
+        // Also check later turntable frames, to detect problems before hours of rendering.
         None => plan.outputs.iter().chain(&plan.later_outputs).try_for_each(check)?,
     }
     plan.moving.iter().try_for_each(|path| place(path))?;
@@ -120,7 +121,7 @@ fn find_targets(
 /// Runs the last stage of a request. Returns whether the image is on disk.
 ///
 /// # Errors
-/// With [`Writing::Must`], why the image could not be written.
+/// With [`Writing::Must`], returns an error if the image could not be written.
 pub(crate) fn write_if_wanted(
     writing: Writing,
     state: &FilmState,
@@ -134,11 +135,11 @@ pub(crate) fn write_if_wanted(
     }
 }
 
-/// Writes the film to every output that does not contain it already. Tries all outputs and reports failures as events.
-/// Returns whether all outputs contain it.
+/// Writes the film to every output file that is not up to date. Tries all files and reports failures as
+/// events. Returns whether all files are now up to date.
 ///
 /// # Errors
-/// [`Stop::Cancelled`]. If `is_must`, why the last failed file could not be written.
+/// [`Stop::Cancelled`]. If `is_must`, also the last failure to write a file.
 fn write(
     state: &FilmState,
     to: Destination<'_>,
@@ -174,8 +175,8 @@ fn write(
         match wrote {
             Ok(bytes) => {
                 count += 1;
-                // The image is on disk, so a cancellation no longer matters. Record the content before other programs
-                // learn about the file and may change it.
+                // The image is on disk, so ignore cancellation. Record the content before notifying other
+                // programs, which may change the file.
                 let content = contents.read(path, &CancelToken::new())?;
                 contents.outputs.end(path, Some(content));
                 written.files.insert(path.clone(), (key, content));
@@ -195,7 +196,7 @@ fn write(
     contents.outputs.retain(|path| outputs.contains(path));
     match (errors.is_empty(), count) {
         (false, _) => {
-            // Report each failure separately, except for the last one if the request fails with it.
+            // Report each failure separately, except the last one if it is returned.
             let last = errors.last().map(|(_, message)| message.clone()).unwrap_or_default();
             errors.truncate(errors.len() - usize::from(is_must));
             errors.into_iter().for_each(|(path, message)| sink.write_failed(Some(path), message));
@@ -207,8 +208,8 @@ fn write(
     }
 }
 
-/// Writes the image at the user's request even if it is on disk. Reports failures as events. Returns whether all
-/// outputs contain it.
+/// Writes the image at the user's request, even if the files are up to date. Reports failures as events.
+/// Returns whether all files were written.
 pub(crate) fn write_on_request(state: &FilmState, to: Destination<'_>, written: &mut WrittenFiles) -> bool {
     let conflicts = conflicts(to.plan, to.inputs);
     if !conflicts.is_empty() {
@@ -216,7 +217,7 @@ pub(crate) fn write_on_request(state: &FilmState, to: Destination<'_>, written: 
         return false;
     }
     written.forget();
-    // This token is never cancelled, because the user asked for the image. Failures are reported as events.
+    // Use a token that is never cancelled, because the user requested the image.
     let outcome = write(state, to, written, &CancelToken::new(), false);
     let is_written = outcome.is_ok_and(|stage| stage.value);
     if is_written {
@@ -229,11 +230,11 @@ pub(crate) fn write_on_request(state: &FilmState, to: Destination<'_>, written: 
 #[derive(Debug, Default)]
 pub(crate) struct Frames(Vec<(Picture, SampleStats)>);
 
-/// Adds an image to the frames of its turntable. After the last frame, writes the animations. Returns whether they are
-/// on disk.
+/// Adds an image to the turntable's frames. After the last frame, writes the animations. Returns whether they
+/// were written.
 ///
 /// # Errors
-/// [`Stop::Cancelled`], or why a file could not be written.
+/// [`Stop::Cancelled`], or a file could not be written.
 pub(crate) fn write_animation(
     state: &FilmState,
     to: Destination<'_>,
@@ -280,7 +281,7 @@ fn write_one(
     token: &CancelToken,
 ) -> Result<u64, OutputError> {
     let mut finish = finish_at(plan, path);
-    // Record a time limit only if it ended the render.
+    // Record the time limit only if it ended the render.
     if let Some(seconds) = state.ended_by {
         finish.metadata.push(("glimt:time".to_owned(), format!("{seconds} s")));
     }
@@ -290,7 +291,7 @@ fn write_one(
     Ok(bytes.len() as u64)
 }
 
-/// Writes the part of an image that this process rendered.
+/// Writes the part of the image that was rendered by this process.
 fn write_part(
     state: &FilmState,
     Destination { plan, inputs, sink, .. }: Destination<'_>,
@@ -307,7 +308,7 @@ fn write_part(
     Ok(path.metadata().map_or(0, |found| found.len()))
 }
 
-/// Returns the settings with which a film is developed and encoded.
+/// Returns the settings for developing and encoding a film.
 pub(crate) fn finish(plan: &Plan) -> DevelopSettings {
     DevelopSettings {
         quantity: plan.settings.view.quantity(),
@@ -328,7 +329,7 @@ fn finish_at(plan: &Plan, path: &Path) -> DevelopSettings {
     finish
 }
 
-/// Returns the metadata with which an image can be reproduced, apart from the film's own.
+/// Returns the metadata needed to reproduce an image, except for the film's own metadata.
 fn metadata(plan: &Plan) -> Vec<(String, String)> {
     let settings = &plan.effective;
     let pairs = [

@@ -1,9 +1,9 @@
-//! Tests of tiles that stop early when their noise is low enough.
+//! Tests for adaptive sampling, which stops tiles early once their noise is low enough.
 
 use super::Bench;
 use crate::protocol::{Section, Stage, reasons};
 
-/// An area light above a floor with a ball: penumbras in some tiles, almost no noise in others.
+/// An area light above a floor with a ball. Some tiles contain penumbras, and others have almost no noise.
 const LIT: &str = r#"
 [render]
 width = 128
@@ -34,7 +34,7 @@ material = "lamp"
 "#;
 
 #[test]
-fn smooth_tiles_stop_and_noisy_ones_continue() {
+fn only_smooth_tiles_stop_early() {
     let mut bench = Bench::new(LIT);
     let report = bench.done().0;
     assert_eq!(report.image.samples.min, 16);
@@ -48,7 +48,7 @@ fn smooth_tiles_stop_and_noisy_ones_continue() {
 }
 
 #[test]
-fn bits_do_not_depend_on_threads_or_history() {
+fn image_does_not_depend_on_threads_or_history() {
     let mut pictures = Vec::new();
     for threads in [1, 2, 7] {
         let mut bench = Bench::new(LIT);
@@ -56,7 +56,7 @@ fn bits_do_not_depend_on_threads_or_history() {
         bench.done();
         pictures.push(bench.picture());
     }
-    // Request more samples in several steps, to a power of two and to another number.
+    // Request more samples in several steps, which include powers of two and another number.
     let mut bench = Bench::new(LIT);
     for samples in [16, 40, 256] {
         bench.overrides.samples = Some(samples);
@@ -80,12 +80,12 @@ fn time_limit_favors_noisy_parts() {
         let samples = bench.done().0.image.samples;
         (samples.mean > 100.0).then_some(samples)
     });
-    let samples = samples.expect("a machine that renders");
+    let samples = samples.expect("the machine should be fast enough");
     assert!(samples.min >= 4 && samples.max >= 8 * samples.min, "{samples:?}");
 }
 
 #[test]
-fn sufficient_time_limit_changes_nothing() {
+fn generous_time_limit_does_not_change_image() {
     let mut bench = Bench::new(&LIT.replace("error = 0.02", "error = 0"));
     bench.overrides.samples = Some(100);
     bench.done();

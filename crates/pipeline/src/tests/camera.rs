@@ -1,4 +1,4 @@
-//! Tests of a camera that the front end moves.
+//! Tests for cameras moved by the front end.
 
 use super::*;
 use crate::math::DVec3;
@@ -6,7 +6,7 @@ use crate::messages;
 use crate::protocol::{CameraEdit, ImagePosition, KeptCamera, MovedCamera, Picked};
 use crate::scene::description::{CameraChange, Pose, Viewpoint};
 
-/// A mirror, and photons that it reflects.
+/// A mirror and photons.
 const PHOTONS: &str = "[[quad]]\ncorner = [-2, 0, -2]\nu = [4, 0, 0]\nv = [0, 4, 0]\nmaterial = \"steel\"\n\
     [materials.steel]\ntype = \"mirror\"\n[photons]\nenabled = true\ncount = 500\n";
 
@@ -15,7 +15,7 @@ fn moved() -> CameraChange {
     CameraChange { pose: Some(pose), fov: Some(35.0), focus: None }
 }
 
-/// Returns the camera of a request: the scene's own, with the changes of the front end.
+/// Returns a request's camera: the scene's camera with the front end's changes.
 fn camera(bench: &mut Bench) -> Viewpoint {
     let of = bench.send();
     let events = bench.until_end(of);
@@ -28,7 +28,7 @@ fn camera(bench: &mut Bench) -> Viewpoint {
 }
 
 #[test]
-fn moved_camera_reuses_trees_lights_and_photons() {
+fn moving_camera_reuses_trees_lights_and_photons() {
     let mut bench = Bench::new(&format!("{SCENE}{PHOTONS}"));
     bench.done();
     let own = bench.picture();
@@ -37,14 +37,14 @@ fn moved_camera_reuses_trees_lights_and_photons() {
     let (report, _) = bench.done();
     assert_statuses(&report, "rrrrrrds");
     assert_eq!(report.counters.photons_emitted, 0);
-    assert_eq!(bench.picture(), own, "it is not written");
+    assert_eq!(bench.picture(), own, "the image should not be written");
     bench.overrides.camera = CameraChange::default();
     bench.writing = Writing::Must;
     assert_statuses(&bench.done().0, "rrrrrrrr");
 }
 
 #[test]
-fn moved_camera_renders_like_the_edited_file() {
+fn moved_camera_matches_edited_file() {
     let mut bench = Bench::new(SCENE);
     bench.overrides.camera = moved();
     bench.done();
@@ -87,7 +87,7 @@ fn orbiter_camera_can_be_moved() {
     assert_eq!(other.picture(), shown);
 }
 
-/// Sends a query and waits for its answer.
+/// Sends a query and waits for the answer.
 fn answer(bench: &mut Bench, command: Command) -> Event {
     bench.worker.send(command);
     loop {
@@ -102,7 +102,7 @@ fn keep(bench: &mut Bench, camera: Viewpoint) -> Result<KeptCamera, String> {
     keep_moved_from(bench, camera, bench.own.get().expect("the scene's camera"))
 }
 
-/// Like [`keep`], for a camera that was moved from another one than the scene's.
+/// Like [`keep`], for a camera that was not moved from the scene's camera but from `own`.
 fn keep_moved_from(bench: &mut Bench, camera: Viewpoint, own: Viewpoint) -> Result<KeptCamera, String> {
     match answer(bench, Command::KeepCamera(MovedCamera { camera, own })) {
         Event::CameraKept { outcome, .. } => outcome,
@@ -125,7 +125,7 @@ fn pick(bench: &mut Bench, x: f64, y: f64) -> Picked {
 }
 
 #[test]
-fn kept_camera_renders_nothing_again() {
+fn saving_the_camera_does_not_rerender() {
     let mut bench = Bench::new(SCENE);
     bench.overrides.camera = moved();
     let camera = camera(&mut bench);
@@ -140,7 +140,7 @@ fn kept_camera_renders_nothing_again() {
     let (report, unchanged) = bench.done();
     assert_statuses(&report, "drrrrsrr");
     assert!(unchanged && bench.picture() == shown);
-    assert!(!keep(&mut bench, camera).expect("nothing to do").is_new);
+    assert!(!keep(&mut bench, camera).expect("nothing should be written").is_new);
 }
 
 #[test]
@@ -158,19 +158,19 @@ fn changed_file_is_not_overwritten() {
 }
 
 #[test]
-fn camera_from_before_a_save_is_not_kept() {
+fn camera_from_before_an_edit_is_not_saved() {
     let mut bench = Bench::new(&SCENE.replace("[camera]", "[camera]\nfov = 34"));
     bench.done();
     let own = bench.own.get().expect("a camera");
     let moved = own.changed(&CameraChange { fov: None, ..moved() });
-    // The worker has read the edited file before it receives the camera.
+    // The worker reads the edited file before it receives the camera.
     bench.edit("fov = 34", "fov = 20");
     bench.done();
     let text = fs::read_to_string(bench.path("scene.toml")).expect("a scene");
     let why = keep_moved_from(&mut bench, moved, own).expect_err("refused");
     assert_eq!(why, messages::CAMERA_CHANGED);
     assert_eq!(fs::read_to_string(bench.path("scene.toml")).expect("a scene"), text);
-    // A camera moved from the file's current camera is written, and the edit remains.
+    // A camera moved from the file's current camera is written and preserves the edit.
     let moved = Viewpoint { fov: 20.0, ..moved };
     assert!(keep(&mut bench, moved).expect("written").is_new);
     let text = fs::read_to_string(bench.path("scene.toml")).expect("a scene");
@@ -185,7 +185,7 @@ fn undo_restores_every_byte() {
     let camera = camera(&mut bench);
     let edit = keep(&mut bench, camera).expect("written").edit.expect("an edit");
     let kept = text(&bench);
-    // Later edits remain, before and after glimt has read them.
+    // Later edits are preserved, whether or not glimt has read them.
     bench.edit("[camera]", "# another edit\n[camera]");
     let edited = text(&bench);
     for _ in 0..2 {
@@ -194,11 +194,11 @@ fn undo_restores_every_byte() {
         assert_eq!(text(&bench), edited);
         bench.done();
     }
-    // After the edit is reverted, the undo succeeds.
+    // Undoing succeeds once the later edit is reverted.
     fs::write(bench.path("scene.toml"), &kept).expect("written");
     assert_eq!(undo(&mut bench, edit.clone()), Ok(bench.path("scene.toml")));
     assert_eq!(text(&bench), SCENE);
-    assert!(undo(&mut bench, edit).is_err(), "the edit is already undone");
+    assert!(undo(&mut bench, edit).is_err(), "the edit should already be undone");
     assert_eq!(text(&bench), SCENE);
 }
 
@@ -217,7 +217,7 @@ fn missing_scene_file_is_reported() {
 }
 
 #[test]
-fn kept_camera_keeps_links_and_permissions() {
+fn saving_the_camera_keeps_links_and_permissions() {
     use std::os::unix::fs::{PermissionsExt, symlink};
     let mut bench = Bench::new(SCENE);
     let real = bench.path("real.toml");
@@ -233,7 +233,7 @@ fn kept_camera_keeps_links_and_permissions() {
 }
 
 #[test]
-fn kept_camera_keeps_file_attributes() {
+fn saving_the_camera_keeps_file_attributes() {
     let mut bench = Bench::new(SCENE);
     let path = bench.path("scene.toml");
     // Skip file systems without extended attributes.
@@ -247,7 +247,7 @@ fn kept_camera_keeps_file_attributes() {
 }
 
 #[test]
-fn camera_is_not_kept_if_the_file_loses_metadata() {
+fn camera_is_not_saved_if_metadata_would_be_lost() {
     for (why, is_linked) in [("has other hard links", true), ("is read-only", false)] {
         let mut bench = Bench::new(SCENE);
         let path = bench.path("scene.toml");
@@ -267,7 +267,7 @@ fn camera_is_not_kept_if_the_file_loses_metadata() {
 }
 
 #[test]
-fn command_line_overrides_the_kept_camera() {
+fn command_line_overrides_saved_camera() {
     let mut bench = Bench::new(SCENE);
     bench.overrides.sets = vec!["camera.fov=20".to_owned()];
     bench.overrides.camera = moved();
@@ -298,24 +298,31 @@ fn pick_identifies_object_and_material() {
     assert_eq!(middle.pixel, [20, 15]);
     assert!(middle.color.expect("a sample").iter().all(|channel| channel.is_finite()));
     assert_eq!(pick(&mut bench, 0.0, 0.0).thing, None);
-    assert_eq!(pick(&mut bench, 7.0, -1.0).pixel, [39, 0], "the nearest pixel");
+    assert_eq!(
+        pick(&mut bench, 7.0, -1.0).pixel,
+        [39, 0],
+        "the position should be clamped to the nearest pixel"
+    );
 }
 
 #[test]
-fn running_render_answers_and_continues() {
+fn queries_do_not_interrupt_a_render() {
     let mut bench = Bench::new(&SCENE.replace("samples = 4", "samples = 1000000"));
     let of = bench.send();
     while !matches!(bench.next(), Event::Progress { progress, .. } if progress.samples > 0) {}
     assert!(pick(&mut bench, 0.5, 0.5).thing.is_some());
     let camera = Viewpoint { pose: moved().pose.expect("a pose"), fov: 40.0, aperture: 0.0, focus: 1.0 };
     assert!(keep(&mut bench, camera).expect("written").is_new);
-    assert!(matches!(bench.next(), Event::Progress { .. } | Event::Preview { .. }), "the render continues");
+    assert!(
+        matches!(bench.next(), Event::Progress { .. } | Event::Preview { .. }),
+        "the render should continue"
+    );
     bench.worker.send(Command::Cancel);
     bench.until_end(of);
 }
 
 #[test]
-fn pick_names_materials_of_mesh_files() {
+fn pick_reports_materials_from_mesh_files() {
     let mut bench =
         Bench::new("[camera]\nposition = [0, 0, 3]\nlook_at = [0, 0, 0]\n[[mesh]]\nfile = \"two.obj\"\n");
     bench.write("two.mtl", "newmtl chalk\nKd 1 1 1\n");

@@ -1,4 +1,4 @@
-//! Tests that drive the worker with messages, as front ends do.
+//! Tests that control the worker through messages, as front ends do.
 
 mod adaptive;
 mod camera;
@@ -27,7 +27,7 @@ use crate::settings::Overrides;
 use crate::trace::Kernel;
 use crate::worker::{Handle, start_with};
 
-/// Loads a scene from text, and adds a camera if it has none.
+/// Loads a scene from text, with a default camera.
 pub(crate) fn loaded_of(text: &str) -> Loaded {
     let place = "position = [0, 1, 4]\nlook_at = [0, 1, 0]\n";
     let text = if text.contains("[camera]\n") {
@@ -38,7 +38,7 @@ pub(crate) fn loaded_of(text: &str) -> Loaded {
     let folder = tempfile::tempdir().expect("a scratch folder");
     let path = folder.path().join("scene.toml");
     fs::write(&path, text).expect("written");
-    crate::scene::load(&path, &[]).expect("a scene that is right")
+    crate::scene::load(&path, &[]).expect("a valid scene")
 }
 
 pub(super) const SCENE: &str = r#"
@@ -78,7 +78,7 @@ pub(super) const KERNEL: Kernel = crate::integrators::render_tile_with_photons;
 
 pub(crate) struct Bench {
     pub(super) folder: tempfile::TempDir,
-    /// Name of the scene or model file.
+    /// File name of the scene or model.
     pub(super) scene: &'static str,
     pub(super) worker: Handle,
     pub(super) generation: u64,
@@ -87,7 +87,7 @@ pub(crate) struct Bench {
     pub(super) force: bool,
     pub(super) first: Option<Section>,
     pub(super) writing: Writing,
-    /// Camera of the scene, as last reported by the worker.
+    /// The scene's camera, as last reported by the worker.
     pub(super) own: Cell<Option<Viewpoint>>,
 }
 
@@ -161,7 +161,7 @@ impl Bench {
         event
     }
 
-    /// Receives all events up to the end of this generation.
+    /// Receives all events until the given generation ends.
     pub(super) fn until_end(&self, of: u64) -> Vec<Event> {
         let mut events = Vec::new();
         loop {
@@ -205,7 +205,7 @@ impl Bench {
     }
 }
 
-/// Returns `d`one, `r`eused or `s`kipped for each stage in order.
+/// Returns one letter per stage, in order: `d` for done, `r` for reused, `s` for skipped.
 pub(super) fn statuses(report: &Report) -> String {
     let names: Vec<Stage> = report.stages.iter().map(|stage| stage.name).collect();
     assert_eq!(names, Stage::ALL);

@@ -1,4 +1,4 @@
-//! Tests of orders during a render: cancelling, pausing, writing; and of failures.
+//! Tests for failures and for orders during a render: cancelling, pausing and writing.
 
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -51,7 +51,7 @@ fn paused_render_can_be_cancelled() {
 }
 
 #[test]
-fn replaced_requests_are_reported_as_cancelled() {
+fn replaced_requests_are_cancelled() {
     let mut bench = Bench::with(SCENE, endless);
     let ends: Vec<u64> = (0..4).map(|_| bench.send()).collect();
     bench.worker.send(Command::Cancel);
@@ -66,7 +66,7 @@ fn replaced_requests_are_reported_as_cancelled() {
 }
 
 #[test]
-fn late_older_request_is_dropped() {
+fn older_request_arriving_late_is_dropped() {
     let mut bench = Bench::new(SCENE);
     bench.generation = 10;
     bench.done();
@@ -85,14 +85,14 @@ fn breaks_once(
     samples: Range<u32>,
     token: &CancelToken,
 ) -> Result<(TileSamples, RayCounters), Cancelled> {
-    assert!(!BREAKS.swap(false, Ordering::SeqCst), "a tile broke");
+    assert!(!BREAKS.swap(false, Ordering::SeqCst), "a tile failed");
     KERNEL(photons, world, settings, pixels, samples, token)
 }
 
 #[test]
 fn worker_survives_a_panic() {
     let mut bench = Bench::with(SCENE, breaks_once);
-    let Failure::Work(message) = bench.failed() else { panic!("a failure of the work") };
+    let Failure::Work(message) = bench.failed() else { panic!("expected a work failure") };
     assert!(message.contains("internal error"), "{message}");
     assert!(bench.done().0.image.complete);
 }
@@ -107,21 +107,21 @@ fn breaks_first(
     samples: Range<u32>,
     token: &CancelToken,
 ) -> Result<(TileSamples, RayCounters), Cancelled> {
-    assert!(TILES.fetch_add(1, Ordering::SeqCst) != 0, "the first tile broke");
+    assert!(TILES.fetch_add(1, Ordering::SeqCst) != 0, "the first tile failed");
     slow(photons, world, settings, pixels, samples, token)
 }
 
 #[test]
-fn panic_is_noticed_during_the_pass() {
+fn panic_stops_the_current_pass() {
     let scene = SCENE.replace("width = 40", "width = 1280").replace("height = 30", "height = 1280");
     let mut bench = Bench::with(&scene, breaks_first);
     assert!(matches!(bench.failed(), Failure::Work(_)));
     let tiles = TILES.load(Ordering::SeqCst);
-    assert!(tiles < 40 * 40 / 4, "{tiles} tiles were rendered in vain");
+    assert!(tiles < 40 * 40 / 4, "{tiles} tiles were rendered after the panic");
 }
 
 #[test]
-fn too_large_film_is_an_error() {
+fn oversized_film_is_an_error() {
     let config = EngineConfig { most_film_bytes: 100_000, ..EngineConfig::default() };
     let mut bench = Bench::with_config(&SCENE.replace("width = 40", "width = 400"), config);
     assert!(matches!(bench.failed(), Failure::Work(message) if message.contains("400×30")));
@@ -130,7 +130,7 @@ fn too_large_film_is_an_error() {
     bench.done();
 }
 
-/// Renders slowly enough that orders arrive during the render.
+/// Renders slowly enough for orders to arrive during the render.
 pub(super) fn slow(
     photons: Option<&PhotonMaps>,
     world: &World,
@@ -143,7 +143,7 @@ pub(super) fn slow(
     KERNEL(photons, world, settings, pixels, samples, token)
 }
 
-/// Waits for the end of the last good scene's render while the scene of this request is broken.
+/// Waits for the last valid scene's render to end, for a request whose own scene is broken.
 fn last_good_end(bench: &Bench, of: u64) -> LastGoodEnd {
     loop {
         match bench.next() {
@@ -155,7 +155,7 @@ fn last_good_end(bench: &Bench, of: u64) -> LastGoodEnd {
 }
 
 #[test]
-fn without_a_good_scene_nothing_is_rendered() {
+fn nothing_is_rendered_without_a_valid_scene() {
     let mut bench = Bench::new(&SCENE.replace("width = 40", "width = = 40"));
     bench.writing = Writing::Try;
     assert!(matches!(bench.failed(), Failure::Scene(_)));
@@ -163,7 +163,7 @@ fn without_a_good_scene_nothing_is_rendered() {
 }
 
 #[test]
-fn broken_file_does_not_stop_a_render() {
+fn broken_scene_file_does_not_stop_a_render() {
     let mut bench = Bench::with(&SCENE.replace("samples = 4", "samples = 10000"), slow);
     (bench.writing, bench.preview) =
         (Writing::Try, Some(PreviewSize { width: 12, height: 12, around: None }));
@@ -173,7 +173,7 @@ fn broken_file_does_not_stop_a_render() {
     let broken = bench.send();
     assert!(matches!(bench.until_end(first).last(), Some(Event::Cancelled { .. })));
     assert!(matches!(bench.until_end(broken).last(), Some(Event::Failed { failure: Failure::Scene(_), .. })));
-    // The render continues to its end under the newest generation and is written.
+    // The render continues under the newest generation until it ends and is written.
     let mut is_seen = false;
     loop {
         match bench.next() {
@@ -189,7 +189,7 @@ fn broken_file_does_not_stop_a_render() {
     assert!(is_seen && samples_on_disk(&bench).starts_with("10000"), "{}", samples_on_disk(&bench));
     let finished = |unchanged| LastGoodEnd::Finished { unchanged };
     assert_eq!(last_good_end(&bench, broken), finished(false));
-    // After a second typo, the image is already finished.
+    // After a second typo, the image is still finished.
     bench.edit("width = = 40", "width = = = 40");
     assert!(matches!(bench.failed(), Failure::Scene(_)));
     assert_eq!(last_good_end(&bench, bench.generation), finished(true));
@@ -199,7 +199,7 @@ fn broken_file_does_not_stop_a_render() {
     assert_statuses(&report, "rrrrrsrr");
 }
 
-/// Returns the image of this scene with a change, rendered without any fault.
+/// Returns the image of a valid scene after applying a change.
 fn picture_by(scene: &str, change: impl Fn(&mut Bench)) -> Vec<u8> {
     let mut bench = Bench::new(scene);
     change(&mut bench);
@@ -208,7 +208,7 @@ fn picture_by(scene: &str, change: impl Fn(&mut Bench)) -> Vec<u8> {
 }
 
 #[test]
-fn keys_change_the_last_good_image() {
+fn last_valid_scene_applies_new_overrides() {
     use crate::math::DVec3;
     use crate::scene::description::{CameraChange, Pose};
     let moved = Pose { position: DVec3::new(0.5, 1.5, 4.25), look_at: DVec3::Y, up: DVec3::Y };
@@ -218,7 +218,7 @@ fn keys_change_the_last_good_image() {
         |bench, _| bench.overrides.shadows = Some(Shadows::Off),
         |bench, _| bench.overrides.exposure = Some(-2.0),
     ];
-    // Faults in the scene file, and in a file it references.
+    // Errors in the scene file and in a referenced file.
     type ChangeScene = fn(&Bench);
     let faults: [(ChangeScene, ChangeScene); 2] = [
         (|bench| bench.edit("width = 40", "width = = 40"), |bench| bench.edit("width = = 40", "width = 40")),
@@ -236,7 +236,7 @@ fn keys_change_the_last_good_image() {
             let of = bench.send();
             let failed = bench.until_end(of);
             assert!(matches!(failed.last(), Some(Event::Failed { failure: Failure::Scene(_), .. })));
-            // The image is shown and written under the generation of the key.
+            // The image is shown and written under the generation of the key press.
             let mut is_seen = false;
             loop {
                 match bench.next() {
@@ -251,19 +251,19 @@ fn keys_change_the_last_good_image() {
             }
             assert!(is_seen);
             assert_eq!(bench.picture(), picture_by(SCENE, |bench| change(bench, moved)));
-            // The fixed scene reuses that image.
+            // The fixed scene reuses this image.
             fix(&bench);
             assert_eq!(bench.done().0.stages[Stage::Render as usize].status, Status::Reused);
         }
     }
 }
 
-/// Returns a scene with many tiles, so that orders arrive during the first pass.
+/// Returns a scene with enough tiles for orders to arrive during the first pass.
 fn wide() -> String {
     SCENE.replace("width = 40", "width = 640").replace("height = 30", "height = 640")
 }
 
-/// Returns the sample count from the metadata of the image on disk.
+/// Reads the sample count from the image's metadata on disk.
 fn samples_on_disk(bench: &Bench) -> String {
     let text = String::from_utf8_lossy(&bench.picture()).into_owned();
     let line = text.lines().find_map(|line| line.strip_prefix("# glimt:samples: "));
@@ -279,7 +279,7 @@ fn first_region_is_rendered_before_the_rest() {
     bench.preview = Some(PreviewSize { width: 256, height: 256, around: None });
     bench.first = Some(Section { left: 0.0, top: 0.0, width: 0.1, height: 0.1 });
     let of = bench.send();
-    // The tile in the corner, usually the last, is complete before the one in the middle.
+    // The corner tile, which usually comes last, must be complete before the middle tile.
     loop {
         let event = bench.next();
         assert!(!matches!(event, Event::Done { .. }), "not seen");
@@ -320,7 +320,7 @@ fn write_waits_for_the_first_pass() {
 }
 
 #[test]
-fn write_is_refused_for_incomplete_images() {
+fn incomplete_images_are_not_written() {
     let mut bench = Bench::with(&wide(), slow);
     bench.write("out.ppm", "the old one");
     let of = bench.send();
@@ -333,14 +333,14 @@ fn write_is_refused_for_incomplete_images() {
         Event::WriteFailed { message, .. } => message.contains(INCOMPLETE_IMAGE),
         _ => false,
     };
-    assert!(is_refusal(bench.next()), "the postponed order");
+    assert!(is_refusal(bench.next()), "the postponed order should be refused");
     bench.worker.send(Command::Write);
-    assert!(is_refusal(bench.next()), "a later order");
+    assert!(is_refusal(bench.next()), "a later order should be refused");
     assert_eq!(bench.picture(), b"the old one");
 }
 
 #[test]
-fn refused_write_is_about_the_newest_image() {
+fn refusal_mentions_the_newest_image() {
     let mut bench = Bench::with(SCENE, slow);
     bench.done();
     bench.write("scene.toml", &wide());
@@ -355,7 +355,7 @@ fn refused_write_is_about_the_newest_image() {
 }
 
 #[test]
-fn postponed_write_is_done_by_the_next_request() {
+fn next_request_carries_out_postponed_write() {
     let mut bench = Bench::with(&wide(), slow);
     bench.send();
     while !matches!(bench.next(), Event::Progress { .. }) {}
@@ -381,7 +381,7 @@ fn write_during_a_render_saves_current_samples() {
     assert!(!bench.picture().is_empty());
     bench.worker.send(Command::Cancel);
     bench.until_end(of);
-    // The film is kept and can be written again.
+    // The film is kept, so it can be written again.
     fs::remove_file(bench.path("out.ppm")).expect("removed");
     bench.worker.send(Command::Write);
     while !matches!(bench.next(), Event::Written { .. }) {}
@@ -389,7 +389,7 @@ fn write_during_a_render_saves_current_samples() {
 
 static HELD: AtomicBool = AtomicBool::new(false);
 
-/// Pauses the work only between two passes.
+/// Pauses the work between two passes.
 fn held_between_passes(
     photons: Option<&PhotonMaps>,
     world: &World,
@@ -402,7 +402,7 @@ fn held_between_passes(
     let first = samples.start == 0;
     let done = KERNEL(photons, world, settings, pixels, samples, &CancelToken::new());
     if first {
-        // Wait until every tile of the pass has begun.
+        // Wait until every tile of the pass has started.
         std::thread::sleep(Duration::from_millis(50));
         token.set_paused(true);
         HELD.store(true, Ordering::SeqCst);
@@ -411,13 +411,13 @@ fn held_between_passes(
 }
 
 #[test]
-fn write_is_handled_while_paused_between_passes() {
+fn write_is_handled_during_pause_between_passes() {
     let mut bench = Bench::with(SCENE, held_between_passes);
     let of = bench.send();
     while !HELD.load(Ordering::SeqCst) {
         std::thread::yield_now();
     }
-    // Give the pass time to end.
+    // Give the pass time to finish.
     std::thread::sleep(Duration::from_millis(200));
     bench.worker.send(Command::Write);
     while !matches!(bench.next(), Event::Written { .. }) {}
@@ -456,14 +456,14 @@ fn time_limit_ends_a_render() {
 }
 
 #[test]
-fn unwritable_output_fails_before_the_render() {
+fn unwritable_output_fails_before_rendering() {
     let mut bench = Bench::with(SCENE, endless);
     bench.overrides.outputs = vec![bench.path("nowhere/out.png")];
     assert!(matches!(bench.failed(), Failure::Work(message) if message.contains("nowhere")));
 }
 
 #[test]
-fn unwritable_output_still_shows_the_image() {
+fn image_is_shown_despite_unwritable_output() {
     let mut bench = Bench::new(SCENE);
     bench.overrides.outputs = vec![bench.path("nowhere/out.png")];
     bench.preview = Some(PreviewSize { width: 12, height: 12, around: None });
@@ -474,12 +474,12 @@ fn unwritable_output_still_shows_the_image() {
         |event: &Event| matches!(event, Event::WriteFailed { message, .. } if message.contains("nowhere"));
     let first = events.iter().position(failed).expect("a failure");
     let shown = events.iter().position(|event| matches!(event, Event::Preview { .. })).expect("a preview");
-    assert!(first < shown, "before the work");
+    assert!(first < shown, "the failure should be reported before rendering");
     let Some(Event::Done { report, .. }) = events.last() else { panic!("{:?}", events.last()) };
     assert_eq!((report.image.path.as_deref(), report.image.complete), (None, true));
     let write = &report.stages[Stage::Write as usize];
     assert!(write.status == Status::Skipped && write.why.contains("nowhere"), "{write:?}");
-    // Create the folder, so that the next request can write.
+    // Create the folder so that the next request can write the image.
     fs::create_dir(bench.path("nowhere")).expect("a folder");
     assert_statuses(&bench.done().0, "rrrrrsrd");
     assert!(bench.path("nowhere/out.png").exists());
@@ -499,7 +499,7 @@ fn crop_outside_the_image_is_an_error() {
 #[test]
 fn warnings_are_reported_before_rendering() {
     let mut bench = Bench::new(SCENE);
-    // A face without area.
+    // A face with zero area.
     bench.write("one.obj", &format!("{OBJ}f 1 1 2\n"));
     bench.preview = Some(PreviewSize { width: 20, height: 20, around: None });
     let of = bench.send();
@@ -538,7 +538,7 @@ fn anisotropy_without_uvs_causes_a_warning() {
     assert_eq!(messages(&brushed.replace("anisotropy = 0.5", "anisotropy = 0"), OBJ), [""; 0]);
 }
 
-/// Renders a little more slowly.
+/// Renders slightly more slowly than normal.
 fn leisurely(
     photons: Option<&PhotonMaps>,
     world: &World,
@@ -570,7 +570,7 @@ fn paused_time_is_not_counted() {
 }
 
 #[test]
-fn reused_image_reports_its_render_time() {
+fn reused_image_reports_original_render_time() {
     let mut bench = Bench::with(SCENE, leisurely);
     let (first, _) = bench.done();
     bench.overrides.shadows = Some(crate::scene::description::Shadows::Off);
@@ -584,7 +584,7 @@ fn reused_image_reports_its_render_time() {
 
 #[test]
 fn continued_render_reports_total_time() {
-    // About a hundred tiles take seconds.
+    // Rendering about a hundred tiles takes seconds.
     let large =
         SCENE.replace("width = 40\nheight = 30\nsamples = 4", "width = 400\nheight = 300\nsamples = 64");
     let mut bench = Bench::with(&large, leisurely);
@@ -594,7 +594,7 @@ fn continued_render_reports_total_time() {
             if *generation == of && progress.samples > 0 && progress.fraction < 1.0)
     };
     while !is_on_its_way(&bench.next(), 1) {}
-    // The render continues during a typo, and after its fix with the existing samples.
+    // The render continues while the scene has a typo. Once it is fixed, the existing samples are reused.
     bench.edit("samples = 64", "samples = ");
     bench.send();
     while !is_on_its_way(&bench.next(), 2) {}
@@ -615,7 +615,7 @@ fn continued_render_reports_total_time() {
 }
 
 #[test]
-fn settings_event_has_the_scene_s_own_values() {
+fn settings_event_includes_scene_values() {
     let mut bench = Bench::new(&SCENE.replace("exposure = 0.0", "exposure = 0.5"));
     bench.overrides.exposure = Some(2.0);
     bench.overrides.shadows = Some(Shadows::Off);

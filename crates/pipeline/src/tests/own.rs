@@ -1,11 +1,11 @@
-//! Tests of the scene's own image while keys show another one.
+//! Tests for the scene's own image while the user views another one.
 
 use super::*;
 use crate::protocol::OwnState;
 use crate::scene::description::Shadows;
 use crate::settings::{Checkpoints, Resume, View};
 
-/// A front end whose keys show another image than the scene's own.
+/// A front end where the user views an image other than the scene's own.
 struct ToggledBench(Bench);
 
 impl ToggledBench {
@@ -21,7 +21,7 @@ impl ToggledBench {
         Self(bench)
     }
 
-    /// Requests an image changed by keys.
+    /// Requests an image with settings changed by the user.
     fn show(&mut self, change: impl FnOnce(&mut Overrides)) -> u64 {
         let own = self.0.overrides.clone();
         change(&mut self.0.overrides);
@@ -40,7 +40,7 @@ impl ToggledBench {
         self.0.generation
     }
 
-    /// Requests an image changed by keys and returns all events.
+    /// Like [`Self::show`], but waits for the end and returns all events.
     fn shown(&mut self, change: impl FnOnce(&mut Overrides)) -> Vec<Event> {
         let of = self.show(change);
         self.0.until_end(of)
@@ -67,7 +67,7 @@ fn states(events: &[Event]) -> Vec<OwnState> {
 }
 
 #[test]
-fn keys_do_not_change_the_image_or_report() {
+fn viewing_does_not_change_output_files() {
     let mut keys = ToggledBench::new();
     keys.0.overrides.report = Some(keys.0.path("r.json"));
     keys.0.done();
@@ -91,7 +91,7 @@ fn keys_do_not_change_the_image_or_report() {
 }
 
 #[test]
-fn write_key_saves_the_shown_image() {
+fn write_command_saves_the_shown_image() {
     let mut keys = ToggledBench::new();
     let report = keys.0.path("r.json");
     keys.0.overrides.report = Some(report.clone());
@@ -114,17 +114,17 @@ fn write_key_saves_the_shown_image() {
 }
 
 #[test]
-fn edit_during_toggles_keeps_the_old_image() {
+fn edit_while_toggled_keeps_the_old_image() {
     let mut keys = ToggledBench::new();
     keys.0.done();
     let old = keys.0.picture();
     keys.0.edit("intensity = [10, 10, 10]", "intensity = [5, 5, 5]");
     assert_eq!(states(&keys.shown(no_shadows)), [OwnState::NotBegun; 2]);
     assert!(keys.0.picture() == old);
-    // A comment changes nothing.
+    // Reverting the edit and adding a comment makes the image up to date again.
     keys.0.edit("intensity = [5, 5, 5]", "intensity = [10, 10, 10] # as before");
     assert_eq!(states(&keys.shown(no_shadows)), [OwnState::Written; 2]);
-    // Save the shown settings, which makes this the own image.
+    // Save the shown settings in the scene, which makes this the scene's own image.
     keys.0.edit("samples = 4", "samples = 4\nshadows = \"off\"");
     let events = keys.shown(no_shadows);
     assert_eq!(states(&events).last(), Some(&OwnState::Written));
@@ -132,7 +132,7 @@ fn edit_during_toggles_keeps_the_old_image() {
 }
 
 #[test]
-fn broken_scene_does_not_let_keys_write() {
+fn toggled_image_is_not_written_if_scene_is_broken() {
     let mut keys = ToggledBench::new();
     keys.0.done();
     let own = keys.0.picture();
@@ -143,7 +143,7 @@ fn broken_scene_does_not_let_keys_write() {
     assert!(keys.0.picture() == own);
 }
 
-/// Renders later samples slowly, so that a request can be sent meanwhile.
+/// Renders later samples slowly enough to send another request meanwhile.
 fn slow(
     photons: Option<&crate::integrators::PhotonMaps>,
     world: &crate::world::World,
@@ -158,21 +158,21 @@ fn slow(
     KERNEL(photons, world, settings, pixels, samples, token)
 }
 
-/// Requests the own image and waits until every pixel has two samples.
+/// Requests the scene's own image and waits until every pixel has two samples.
 fn begin(keys: &mut ToggledBench) -> u64 {
     keys.0.overrides.samples = Some(64);
     let of = keys.0.send();
     loop {
         match keys.0.next() {
             Event::Progress { progress, .. } if progress.samples >= 2 => return of,
-            Event::Done { .. } => panic!("the render ended too early"),
+            Event::Done { .. } => panic!("the render should not end before two samples per pixel"),
             _ => {}
         }
     }
 }
 
 #[test]
-fn interrupted_own_render_continues() {
+fn interrupted_own_render_resumes() {
     let whole = {
         let mut keys = ToggledBench::new();
         keys.0.overrides.samples = Some(64);
@@ -190,7 +190,7 @@ fn interrupted_own_render_continues() {
 }
 
 #[test]
-fn changed_exposure_still_writes_the_own_image() {
+fn own_image_is_written_despite_exposure_change() {
     let mut keys = ToggledBench::with(slow);
     begin(&mut keys);
     let events = keys.shown(|overrides| overrides.exposure = Some(2.0));
@@ -198,11 +198,11 @@ fn changed_exposure_still_writes_the_own_image() {
     let picture = keys.0.picture();
     let (report, _) = keys.0.done();
     assert_statuses(&report, "rrrrrsrr");
-    assert!(keys.0.picture() == picture, "written with the scene's exposure");
+    assert!(keys.0.picture() == picture, "the image should be written with the scene's exposure");
 }
 
 #[test]
-fn own_render_is_saved_while_toggled() {
+fn checkpoint_of_own_image_is_saved_while_toggled() {
     let checkpoints = Checkpoints { seconds: 60.0, resume: Resume::IfSame, are_kept: false };
     for (end, is_kept) in [(Command::Suspend, true), (Command::Quit, false)] {
         let mut keys = ToggledBench::with(slow);
@@ -212,15 +212,15 @@ fn own_render_is_saved_while_toggled() {
         let path = keys.0.path("out.ppm.checkpoint");
         keys.0.worker.send(end);
         assert!(keys.0.worker.end_within(Duration::from_secs(60)));
-        assert_eq!(path.exists(), is_kept, "a short render is saved only after a signal");
+        assert_eq!(path.exists(), is_kept, "a short render should be saved only after a signal");
         if is_kept {
             keys.0.worker = crate::worker::start_with(EngineConfig::default()).expect("a thread");
             let (report, _) = keys.0.done();
             assert_resumed(&report);
-            assert!(!path.exists(), "its image is written");
+            assert!(!path.exists(), "the checkpoint should be removed once the image is written");
         }
     }
-    // After an edit, the earlier render is useless.
+    // An edit makes the earlier render useless.
     let mut keys = ToggledBench::with(slow);
     keys.0.overrides.checkpoints = checkpoints;
     begin(&mut keys);
@@ -232,7 +232,7 @@ fn own_render_is_saved_while_toggled() {
 }
 
 #[test]
-fn unfinished_image_removes_an_older_report() {
+fn unfinished_image_removes_outdated_report() {
     let mut keys = ToggledBench::with(slow);
     let report = keys.0.path("r.json");
     keys.0.overrides.report = Some(report.clone());
@@ -248,10 +248,10 @@ fn unfinished_image_removes_an_older_report() {
     begins(of, &keys);
     keys.0.worker.send(Command::Write);
     while !matches!(keys.0.next(), Event::Written { is_own: false, .. }) {}
-    // The next request begins after the image and its report.
+    // The next request starts after the image and its report have been handled.
     let events = keys.shown(no_shadows);
     assert!(!report.exists(), "{events:?}");
-    // Keep a file that is not a report.
+    // A file that is not a report must be kept.
     fs::write(&report, "{}").expect("written");
     let of = keys.show(narrow);
     begins(of, &keys);
@@ -261,7 +261,7 @@ fn unfinished_image_removes_an_older_report() {
 }
 
 #[test]
-fn last_good_image_removes_an_older_report() {
+fn last_valid_image_removes_outdated_report() {
     let mut bench = Bench::with(SCENE, slow);
     bench.writing = Writing::Try;
     let report = bench.path("r.json");
@@ -271,7 +271,7 @@ fn last_good_image_removes_an_older_report() {
     bench.edit("samples = 4", "samples = 8");
     bench.edit("intensity = [10, 10, 10]", "intensity = [5, 5, 5]");
     let of = bench.send();
-    // Break the scene after its files have been read.
+    // Break the scene once its files have been read.
     while !matches!(bench.next(), Event::Progress { generation, .. } if generation == of) {}
     bench.edit("[camera]", "[camera");
     bench.send();
@@ -279,20 +279,20 @@ fn last_good_image_removes_an_older_report() {
     assert!(bench.picture() != earlier && !report.exists());
 }
 
-/// Returns the bytes that a render of the scene needs with these overrides.
+/// Returns the memory in bytes needed to render the scene with the given overrides.
 fn memory_needed(keys: &ToggledBench, overrides: &Overrides) -> u64 {
     crate::check::memory_needed(&keys.0.path("scene.toml"), overrides).expect("a scene")
 }
 
 #[test]
-fn memory_counts_the_unfinished_own_film() {
+fn memory_check_includes_unfinished_own_film() {
     let film = 40 * 30 * 40;
     for (more, fits) in [(film / 2, false), (2 * film, true)] {
         let mut keys = ToggledBench::with(slow);
         keys.0.overrides.samples = Some(64);
         keys.0.overrides.memory = Some(memory_needed(&keys, &keys.0.overrides) + more);
         begin(&mut keys);
-        // Another view of the same film needs no more memory.
+        // Another view of the same film needs no additional memory.
         let stops = |keys: &mut ToggledBench, change: fn(&mut Overrides)| {
             let of = keys.show(change);
             let begins =
@@ -308,14 +308,14 @@ fn memory_counts_the_unfinished_own_film() {
         assert!(stops(&mut keys, |overrides| overrides.exposure = Some(1.0)).is_none());
         let failure = stops(&mut keys, no_shadows);
         assert_eq!(matches!(failure, Some(Failure::Work(_))), !fits, "{failure:?}");
-        // Its render continues after a return to the scene's own settings.
+        // The own image's render continues when the user returns to the scene's settings.
         let (report, _) = keys.0.done();
         assert_resumed(&report);
     }
 }
 
 #[test]
-fn written_own_film_makes_room() {
+fn own_film_may_be_dropped_once_written() {
     let film = 40 * 30 * 40;
     for (more, stays) in [(film / 2, false), (2 * film, true)] {
         let mut keys = ToggledBench::new();

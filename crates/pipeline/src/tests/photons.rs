@@ -1,4 +1,4 @@
-//! Tests of photons in the worker: cached maps, and orders while photons are traced.
+//! Tests for photons in the worker: cached maps, and orders during photon tracing.
 
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -9,13 +9,13 @@ use crate::film::{Pixels, TileSamples};
 use crate::integrators::{PhotonMaps, RayCounters, RenderSettings};
 use crate::world::World;
 
-/// Returns a scene whose light is enclosed in glass, with `count` photons per pass.
+/// Returns a scene with a light enclosed in glass and `count` photons per pass.
 fn wrapped(count: u32) -> String {
     let glass = "[[sphere]]\ncenter = [0, 3, 0]\nradius = 0.1\nmaterial = \"clear\"\n[[plane]]\nmaterial = \"wall\"\n[materials.clear]\ntype = \"glass\"\n";
     format!("{SCENE}{glass}[photons]\nenabled = true\ncount = {count}\n")
 }
 
-/// Waits until the photons stage runs.
+/// Waits until the photons stage is running.
 fn until_first_are_sent(bench: &Bench) {
     let is_it = |event: &Event| match event {
         Event::Stage { stage, .. } => stage.name == Stage::Photons && stage.status == Status::Running,
@@ -25,11 +25,11 @@ fn until_first_are_sent(bench: &Bench) {
 }
 
 #[test]
-fn orders_are_handled_during_first_photons() {
+fn orders_are_handled_during_first_photon_pass() {
     let mut bench = Bench::new(&wrapped(1_500_000));
     let of = bench.send();
     until_first_are_sent(&bench);
-    // The pause keeps the stage from ending before the orders arrive.
+    // Pause so that the stage does not end before the orders arrive.
     bench.worker.send(Command::Pause(true));
     bench.worker.send(Command::Write);
     while !matches!(bench.next(), Event::WritePostponed { generation } if generation == of) {}
@@ -42,12 +42,12 @@ fn orders_are_handled_during_first_photons() {
 }
 
 #[test]
-fn write_is_handled_during_later_photons() {
+fn write_is_handled_during_later_photon_passes() {
     let text = wrapped(4_000_000).replace("samples = 4", "samples = 1000000");
     let mut bench = Bench::new(&text);
     let of = bench.send();
     while !matches!(bench.next(), Event::Progress { progress, .. } if progress.samples > 0) {}
-    // Most of the time is spent on photons, but not the moment in which progress is reported.
+    // Wait, because progress is not reported during photon passes, although they take most of the time.
     std::thread::sleep(Duration::from_millis(50));
     bench.worker.send(Command::Pause(true));
     std::thread::sleep(Duration::from_millis(100));
@@ -59,7 +59,7 @@ fn write_is_handled_during_later_photons() {
 
 #[test]
 fn time_limit_ends_a_photon_pass() {
-    // A photon pass takes longer than the time limit, a sample of the image does not.
+    // A photon pass takes longer than the time limit, but an image sample does not.
     let text = wrapped(2_000_000).replace("samples = 4", "samples = 1000000");
     let mut bench = Bench::new(&text);
     bench.overrides.time_seconds = Some(0.2);
@@ -70,7 +70,7 @@ fn time_limit_ends_a_photon_pass() {
 
 static WITHOUT: AtomicBool = AtomicBool::new(false);
 
-/// Renders normally and records whether any call had no photons.
+/// Renders normally and records whether any call was without photons.
 fn without(
     photons: Option<&PhotonMaps>,
     world: &World,
@@ -83,7 +83,8 @@ fn without(
     KERNEL(photons, world, settings, pixels, samples, token)
 }
 
-/// Returns for each preview whether it lacked the photons' light and whether the photons had been traced before.
+/// Returns, for each preview, whether it lacked the light from photons and whether the photons had been
+/// traced.
 fn previews_of(bench: &mut Bench) -> Vec<(bool, bool)> {
     let (of, mut previews, mut are_there) = (bench.send(), Vec::new(), false);
     loop {
@@ -102,14 +103,14 @@ fn previews_of(bench: &mut Bench) -> Vec<(bool, bool)> {
 }
 
 #[test]
-fn preview_without_photons_precedes_them() {
+fn first_preview_does_not_wait_for_photons() {
     let mut bench = Bench::with(&wrapped(300_000), without);
     bench.preview = Some(PreviewSize { width: 12, height: 12, around: None });
     let previews = previews_of(&mut bench);
     assert_eq!(previews.first(), Some(&(true, false)), "{previews:?}");
     assert!(WITHOUT.load(Ordering::SeqCst));
     assert!(previews.len() > 1 && previews[1..].iter().all(|it| *it == (false, true)), "{previews:?}");
-    // A moving camera reuses the cached photons in its first image.
+    // The first image of a moving camera reuses the cached photons.
     WITHOUT.store(false, Ordering::SeqCst);
     bench.overrides.camera.fov = Some(50.0);
     let previews = previews_of(&mut bench);
@@ -136,15 +137,15 @@ fn maps_are_kept_while_there_is_room() {
     let report = bench.done().0.photons.expect("they are on");
     assert_eq!(report.passes, 8);
     let of_pass = report.used_memory_bytes;
-    assert!(8 * of_pass > MAX_BYTES, "{of_pass} bytes per pass: all fit");
+    assert!(8 * of_pass > MAX_BYTES, "not all passes should fit: {of_pass} bytes per pass");
     let kept = report.kept_memory_bytes;
     assert!(kept <= MAX_BYTES && kept + of_pass > MAX_BYTES, "{kept} bytes kept, {of_pass} per pass");
 }
 
-/// Whether the kernel below received photons.
+/// Whether the following kernel has received photons.
 static WITH: AtomicBool = AtomicBool::new(false);
 
-/// Renders every sample black, with or without photons.
+/// Renders all samples black, with or without photons.
 fn black(
     photons: Option<&PhotonMaps>,
     world: &World,
@@ -160,7 +161,7 @@ fn black(
 }
 
 #[test]
-fn kernel_is_used_with_photons() {
+fn custom_kernel_is_used_with_photons() {
     let mut bench = Bench::with(&wrapped(1000), black);
     bench.done();
     let picture = std::fs::read(bench.path("out.ppm")).expect("an image");
@@ -169,7 +170,7 @@ fn kernel_is_used_with_photons() {
 }
 
 #[test]
-fn reason_for_no_photons_is_stable() {
+fn reason_for_skipping_photons_is_stable() {
     let mut bench = Bench::new(&format!("{SCENE}[photons]\nenabled = true\n"));
     let mut reason = |integrator| {
         bench.overrides.integrator = integrator;

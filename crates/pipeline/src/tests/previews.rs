@@ -1,11 +1,11 @@
-//! Tests of previews: size, section and range.
+//! Tests for previews: size, section and range.
 
 use super::orders::slow;
 use super::*;
 use crate::settings::View;
 
 #[test]
-fn preview_size_change_renders_nothing() {
+fn preview_size_change_does_not_render() {
     let mut bench = Bench::new(SCENE);
     bench.preview = Some(PreviewSize { width: 12, height: 12, around: None });
     let generation = bench.send();
@@ -43,7 +43,11 @@ fn close_up_shows_image_pixels() {
     bench.preview =
         Some(PreviewSize { width: 200, height: 200, around: Some(ImagePosition { x: 0.3, y: 0.3 }) });
     bench.done();
-    assert_eq!(latest(&bench).picture, whole.picture, "a small image is shown whole at its own size");
+    assert_eq!(
+        latest(&bench).picture,
+        whole.picture,
+        "a small image should be shown entirely at its own size"
+    );
 }
 
 #[test]
@@ -58,7 +62,7 @@ fn previews_identify_their_image() {
         source.image
     };
     let own = source(&mut bench);
-    // Neither another size nor a comment nor a fresh render makes it another image.
+    // Another size, a comment or a new render does not make it another image.
     bench.preview = Some(PreviewSize { width: 20, height: 30, around: None });
     assert!(source(&mut bench) == own);
     bench.edit("[camera]", "# a comment\n[camera]");
@@ -81,7 +85,7 @@ fn previews_identify_their_image() {
 }
 
 #[test]
-fn time_limited_renders_are_separate_images() {
+fn time_limited_renders_are_distinct_images() {
     let mut bench = Bench::with(&SCENE.replace("samples = 4", "samples = 1000000"), slow);
     bench.preview = Some(PreviewSize { width: 12, height: 12, around: None });
     bench.overrides.time_seconds = Some(0.2);
@@ -89,7 +93,7 @@ fn time_limited_renders_are_separate_images() {
     for force in [false, false, true] {
         bench.force = force;
         bench.done();
-        // Request a preview after the end, because earlier ones are not known to be final.
+        // Request a preview after the render has ended, because earlier previews may not be final.
         bench.worker.send(Command::Preview(bench.preview));
         while !matches!(bench.next(), Event::Preview { .. }) {}
         let latest = bench.worker.previews.lock().expect("not poisoned").clone().expect("a preview");

@@ -1,4 +1,4 @@
-//! Tests of reuse: which stages run again after an edit, and which files are reported.
+//! Tests for reuse: which stages rerun after an edit, and which files are reported.
 
 use super::*;
 use crate::integrators::View;
@@ -11,7 +11,7 @@ fn edits_rerun_only_dependent_stages() {
 
     let (report, unchanged) = bench.done();
     assert_statuses(&report, "rrrrrsrr");
-    assert!(unchanged, "the same file again");
+    assert!(unchanged, "the file is the same");
 
     bench.edit("[camera]", "# a comment\n[camera]");
     let (report, unchanged) = bench.done();
@@ -37,14 +37,17 @@ fn edits_rerun_only_dependent_stages() {
     bench.edit("translate = [0, 0, 0]", "translate = [1, 0, 0]");
     let report = bench.done().0;
     assert_statuses(&report, "drrdrsdd");
-    assert!(report.stages[Stage::Accel as usize].why.contains("1 kept"), "the mesh's tree is reused");
+    assert!(report.stages[Stage::Accel as usize].why.contains("1 kept"), "the mesh's tree should be reused");
 
     bench.edit("exposure = 1.0", "exposure = 1.0\naccel = \"kdtree\"");
     let (report, unchanged) = bench.done();
     assert_statuses(&report, "drrdrsrr");
-    assert!(unchanged, "every kind of tree gives the same image");
+    assert!(unchanged, "every kind of tree should produce the same image");
     assert_eq!(report.counters.camera_rays, 0);
-    assert!(!report.stages[Stage::Accel as usize].why.contains("kept"), "a tree of another kind");
+    assert!(
+        !report.stages[Stage::Accel as usize].why.contains("kept"),
+        "another kind of tree should be built"
+    );
     assert_eq!(report.settings.accel, Accel::KdTree);
 
     bench.write("skin.ppm", "P6\n1 1\n255\nxyz");
@@ -68,7 +71,7 @@ fn opacity_and_vertex_colors_rerun_few_stages() {
     };
     expect("diffuse = [0.5, 0.5, 0.5]", "diffuse = [0.5, 0.5, 0.5]\nopacity = 0.5", "drrrrsdd");
     expect("translate = [0, 0, 0]", "translate = [0, 0, 0]\nvertex_colors = true", "drrrrsdd");
-    // An emissive surface is a light, whose power depends on its opacity.
+    // An emissive surface is a light. Its power depends on the opacity.
     expect("opacity = 0.5", "opacity = 0.5\nemission = [1, 1, 1]", "drrrdsdd");
     expect("opacity = 0.5", "opacity = 0.25", "drrrdsdd");
     expect("emission = [1, 1, 1]", "emission = [1, 1, 1]\nemission_sides = \"both\"", "drrrdsdd");
@@ -93,7 +96,7 @@ fn bump_maps_rerun_only_the_render() {
 }
 
 #[test]
-fn files_referenced_by_a_mesh_belong_to_it() {
+fn change_of_file_referenced_by_mesh_reloads_it() {
     let mut bench = Bench::new(SCENE);
     bench.write("one.mtl", "newmtl a\nKd 1 0 0\n");
     bench.write("one.obj", &format!("mtllib one.mtl\n{OBJ}"));
@@ -104,7 +107,8 @@ fn files_referenced_by_a_mesh_belong_to_it() {
     assert_eq!(report.stages[Stage::Meshes as usize].status, Status::Done);
 }
 
-/// A file of each kind that a scene reads, which is replaced between hashing and decoding.
+/// One file of each kind that a scene reads: name, old text and new text. The test replaces the file between
+/// hashing and decoding.
 const KINDS: [(&str, &str, &str); 8] = [
     ("scene.toml", KINDS_SCENE, "#"),
     (
@@ -173,7 +177,7 @@ const KINDS_GLTF: &str = r#"{"asset": {"version": "2.0"}, "buffers": [{"uri": "a
     "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}]}"#;
 
 #[test]
-fn image_never_shows_unhashed_bytes() {
+fn image_never_uses_unhashed_bytes() {
     let new_bench = || {
         let bench = Bench::new(KINDS_SCENE);
         bench.write("a.gltf", KINDS_GLTF);
@@ -190,8 +194,8 @@ fn image_never_shows_unhashed_bytes() {
         let mut fresh = new_bench();
         fresh.write(name, &new);
         let new_image = image(&mut fresh);
-        assert!(new_image != old_image, "{name} affects the image");
-        // First without caches, then with caches of the old content.
+        assert!(new_image != old_image, "{name} should affect the image");
+        // Test without caches first, then with the old content cached.
         for is_cold in [true, false] {
             let mut bench = new_bench();
             if !is_cold {
@@ -202,13 +206,22 @@ fn image_never_shows_unhashed_bytes() {
             let replacements = || contents.replacements.lock().expect("not poisoned");
             replacements().insert(bench.path(name), new.clone().into());
             let shown = image(&mut bench);
-            assert!(shown == new_image || shown == old_image, "{name}, {is_cold}: one version or the other");
-            // A file that is hashed only when decoded has not been replaced yet.
+            assert!(
+                shown == new_image || shown == old_image,
+                "{name}, {is_cold}: the image should show one version or the other"
+            );
+            // A file that is only hashed during decoding has not been replaced yet.
             replacements().clear();
             bench.write(name, &new);
-            assert!(image(&mut bench) == new_image, "{name}, {is_cold}: the content on disk");
+            assert!(
+                image(&mut bench) == new_image,
+                "{name}, {is_cold}: the image should show the new content"
+            );
             bench.write(name, old);
-            assert!(image(&mut bench) == old_image, "{name}, {is_cold}: the old content is back");
+            assert!(
+                image(&mut bench) == old_image,
+                "{name}, {is_cold}: the image should show the old content again"
+            );
         }
     }
 }
@@ -226,7 +239,7 @@ fn each_file_is_hashed_once_per_request() {
         let mut hashed = std::mem::take(&mut *bench.worker.contents().hashed.lock().expect("not poisoned"));
         hashed.sort();
         let names = ["one.mtl", "one.obj", "out.ppm", "scene.toml", "skin.ppm"];
-        // The first round learns of the material file only from the mesh, and hashes it while decoding.
+        // In the first round, the material file is unknown until the mesh is read, and hashed while decoding.
         let names = &names[1 - round..];
         let names: Vec<_> = names.iter().map(|name| bench.path(name)).collect();
         assert_eq!(hashed, names, "round {round}");
@@ -234,7 +247,7 @@ fn each_file_is_hashed_once_per_request() {
 }
 
 #[test]
-fn toggling_back_reuses_the_film() {
+fn toggling_a_setting_back_reuses_the_film() {
     let mut bench = Bench::new(SCENE);
     bench.done();
     let soft = bench.picture();
@@ -247,7 +260,7 @@ fn toggling_back_reuses_the_film() {
     bench.writing = Writing::No;
     let (report, unchanged) = bench.done();
     assert_statuses(&report, "rrrrrsrs");
-    assert!(!unchanged, "the shown image differs");
+    assert!(!unchanged, "the shown image should differ");
     bench.writing = Writing::Must;
     let (report, _) = bench.done();
     assert_statuses(&report, "rrrrrsrd");
@@ -281,7 +294,7 @@ fn skipped_stages_have_reasons() {
 
 #[test]
 fn photons_are_retraced_only_if_affected() {
-    // The ambient light is visible only while photons are off.
+    // Ambient light is only visible while photons are off.
     let text = SCENE.replace("exposure = 0.0", "exposure = 0.0\nambient = 0.3");
     let mirror = "[[quad]]\ncorner = [-2, 0, -2]\nu = [4, 0, 0]\nv = [0, 4, 0]\nmaterial = \"steel\"\n";
     let steel = "[materials.steel]\ntype = \"mirror\"\n";
@@ -291,7 +304,7 @@ fn photons_are_retraced_only_if_affected() {
     let report = bench.done().0;
     assert_statuses(&report, "dddddddd");
     assert!(report.settings.photons);
-    assert_eq!((of(&report).passes, of(&report).emitted), (4, 2000), "one pass per sample");
+    assert_eq!((of(&report).passes, of(&report).emitted), (4, 2000), "there should be one pass per sample");
     assert_eq!((report.counters.photons_emitted, report.counters.photons_stored), (2000, of(&report).stored));
 
     for (from, to, expected) in [
@@ -316,7 +329,7 @@ fn photons_are_retraced_only_if_affected() {
     assert!(report.photons.is_none() && bench.picture() != on);
     bench.overrides.photons = None;
     assert_statuses(&bench.done().0, "rrrrrrrd");
-    assert_eq!(bench.picture(), on, "the cached film");
+    assert_eq!(bench.picture(), on, "the cached film should be shown");
 }
 
 #[test]
@@ -332,8 +345,8 @@ fn photons_are_skipped_without_mirrors() {
 }
 
 #[test]
-fn later_photons_match_a_fresh_render() {
-    // `ambient` is ignored with photons, so neither the stored photons nor the film may depend on it.
+fn reused_photons_match_a_fresh_render() {
+    // `ambient` is ignored with photons, so the stored photons and the film must not depend on it.
     let ambient =
         |value: &str| SCENE.replace("exposure = 0.0", &format!("exposure = 0.0\nambient = {value}"));
     let glass = "[[sphere]]\ncenter = [0.7, 1, 1]\nradius = 0.4\nmaterial = \"clear\"\n[materials.clear]\ntype = \"glass\"\n";
@@ -360,9 +373,15 @@ fn all_broken_assets_are_reported_and_watched() {
         panic!("no failure")
     };
     for name in ["one.obj", "skin.ppm"] {
-        let error = errors.iter().find(|error| error.message.contains(name)).expect("an error that names it");
-        let place = error.place.as_ref().expect("a place in the scene");
-        assert!(place.source[place.span.clone()].contains(name), "the place of the file name");
+        let error = errors
+            .iter()
+            .find(|error| error.message.contains(name))
+            .expect("an error that mentions the file");
+        let place = error.place.as_ref().expect("a location in the scene");
+        assert!(
+            place.source[place.span.clone()].contains(name),
+            "the error should be located at the file name"
+        );
         assert_eq!(error.path, bench.path("scene.toml"));
     }
     let Some(Event::Files { files, .. }) = events.pop() else { panic!("no files") };
@@ -389,16 +408,16 @@ fn broken_scene_keeps_its_assets() {
         _ => None,
     });
     assert!(files.expect("files").iter().any(|file| file.path == bench.path("one.obj")));
-    assert_eq!(bench.picture(), before, "the image remains");
+    assert_eq!(bench.picture(), before, "the image should remain");
     bench.edit("width = = 40", "width = 40");
-    // An invalid scene is not cached, so it is parsed again, but no other stage runs.
+    // An invalid scene is not cached, so the scene is parsed again, but no other stage runs.
     let (report, unchanged) = bench.done();
     assert_eq!(report.stages[Stage::Meshes as usize].status, Status::Reused);
     assert!(unchanged);
 }
 
 #[test]
-fn missing_file_of_a_broken_scene_is_watched() {
+fn file_missing_from_broken_scene_is_watched() {
     let mut bench = Bench::new(&SCENE.replace("one.obj", "later.obj"));
     let of = bench.send();
     let files: Vec<PathBuf> = bench
@@ -415,7 +434,7 @@ fn missing_file_of_a_broken_scene_is_watched() {
 }
 
 #[test]
-fn progress_never_falls_and_ends_at_one() {
+fn progress_never_decreases_and_ends_at_one() {
     let mut bench = Bench::new(&SCENE.replace("samples = 4", "samples = 40"));
     let of = bench.send();
     let mut fractions = Vec::new();
@@ -443,7 +462,7 @@ fn thread_count_does_not_change_the_image() {
 }
 
 #[test]
-fn added_samples_give_the_same_image() {
+fn adding_samples_later_gives_the_same_image() {
     let mut bench = Bench::new(SCENE);
     let rays = |samples: u64| 40 * 30 * samples;
     bench.done();
@@ -459,7 +478,7 @@ fn added_samples_give_the_same_image() {
 }
 
 #[test]
-fn rotating_the_environment_reloads_nothing() {
+fn rotating_the_environment_does_not_reload_files() {
     let around = "[environment]\nfile = \"sky.ppm\"\nrotate = 0\n";
     let mut bench = Bench::new(&format!("{SCENE}{around}"));
     let sky = "P6\n2 1\n255\nabcdef";
@@ -469,19 +488,19 @@ fn rotating_the_environment_reloads_nothing() {
     assert_eq!(report.counters.texels_loaded, 3);
     assert_eq!(report.stages[Stage::Lights as usize].why, "2 lights");
     assert_statuses(&bench.done().0, "rrrrrsrr");
-    // No texel is read and no tree is built.
+    // No texels are read and no trees are built.
     for (old, new) in [("rotate = 0", "rotate = 90"), ("rotate = 90", "color = [1, 0.5, 1]")] {
         bench.edit(old, new);
         let report = bench.done().0;
         assert_statuses(&report, "drrrdsdd");
         assert_eq!(report.counters.texels_loaded, 0);
     }
-    // The file is watched.
+    // Changes to the file are detected.
     bench.write("sky.ppm", "P6\n2 1\n255\nabcdeg");
     let report = bench.done().0;
     assert_statuses(&report, "rrdrdsdd");
     assert_eq!(report.counters.texels_loaded, 2);
-    // Replacing the map by a color drops it.
+    // Removing the file from the environment drops the map.
     bench.edit("file = \"sky.ppm\"\n", "");
     assert_statuses(&bench.done().0, "drrrdsdd");
     bench.edit("[environment]\n", "# ");
@@ -525,10 +544,10 @@ fn black_map_and_bad_texels_cause_warnings() {
 }
 
 #[test]
-fn invalid_map_is_an_error_at_its_reference() {
+fn invalid_map_error_points_to_its_reference() {
     let mut bench = Bench::new(&format!("{SCENE}[environment]\nfile = \"sky.hdr\"\n"));
     bench.write("sky.hdr", "not an image");
-    let Failure::Scene(errors) = bench.failed() else { panic!("errors in the scene") };
+    let Failure::Scene(errors) = bench.failed() else { panic!("expected scene errors") };
     assert_eq!(errors.len(), 1, "{errors:?}");
     let place = errors[0].place.as_ref().expect("a place");
     assert_eq!(&place.source[place.span.clone()], "\"sky.hdr\"");
@@ -565,16 +584,16 @@ fn emission_texture_changes_the_light() {
     assert_ne!(bench.picture(), before);
     bench.edit("scale = 2", "scale = 3");
     assert_statuses(&bench.done().0, "drrrdsdd");
-    // A black emitter is not a light, nor is one with a factor of 0.
+    // An emitter that is black or has a factor of 0 is not a light.
     bench.write("slide.ppm", "P6\n1 1\n255\n\0\0\0");
     assert_eq!(bench.done().0.stages[Stage::Lights as usize].why, "1 light");
     bench.edit("scale = 3", "scale = 0");
     let report = bench.done().0;
-    assert_eq!(report.counters.texture_memory_bytes, 3, "the texture is not needed");
+    assert_eq!(report.counters.texture_memory_bytes, 3, "the texture should not be loaded");
 }
 
 #[test]
-fn sample_views_need_no_samples() {
+fn sample_views_do_not_take_new_samples() {
     let mut bench = Bench::new(SCENE);
     bench.done();
     let beauty = bench.picture();
@@ -590,9 +609,9 @@ fn sample_views_need_no_samples() {
     assert_eq!(bench.picture(), beauty);
 }
 
-/// An image that is missing at first is watched, and shown once it exists.
+/// A texture that is missing at first must be watched, and shown once it exists.
 #[test]
-fn late_texture_of_a_model_is_shown() {
+fn model_texture_is_shown_once_it_exists() {
     let mut bench = Bench::new(SCENE);
     bench.scene = "one.obj";
     bench.write("one.mtl", "newmtl m\nKd 0.2 0.4 0.2\nmap_Kd later.ppm\n");

@@ -1,10 +1,10 @@
-//! Tests of switching between scenes, and of changing one texture of several.
+//! Tests for switching between scenes, and for changing one of several textures.
 
 use super::*;
 use crate::settings::View;
 
 #[test]
-fn previous_scene_reuses_trees_and_textures() {
+fn switching_back_reuses_trees_and_textures() {
     let mut bench = Bench::new(SCENE);
     bench.write("two.obj", &format!("{OBJ}f 1 3 2\n"));
     bench.write("bark.ppm", "P6\n1 1\n255\nxyz");
@@ -27,7 +27,7 @@ fn previous_scene_reuses_trees_and_textures() {
 }
 
 #[test]
-fn previous_scene_is_reused_after_errors() {
+fn switching_back_reuses_caches_after_errors() {
     let mut bench = Bench::new(SCENE);
     bench.write("two.obj", &format!("{OBJ}f 1 3 2\n"));
     bench.done();
@@ -60,7 +60,8 @@ fn only_the_changed_texture_is_read() {
     }
 }
 
-/// A light with two texels of normals, three of emission and four of specular color. The ball has one texel.
+/// A light with two texels for normals, three for emission and four for the specular color. The ball's
+/// texture has one texel.
 const BUMPY: &str = "[textures.bumps]\nfile = \"bumps.ppm\"\n[textures.glow]\nfile = \"glow.ppm\"\n\
     [textures.gloss]\nfile = \"gloss.ppm\"\n\
     [materials.lamp]\nspecular = { texture = \"gloss\" }\nemission = { texture = \"glow\" }\nnormal_map = \"bumps\"\n\
@@ -68,7 +69,7 @@ const BUMPY: &str = "[textures.bumps]\nfile = \"bumps.ppm\"\n[textures.glow]\nfi
 
 const AMBIENT: &str = "\nambient = [0.1, 0.1, 0.1]";
 
-/// Creates a bench with the files of [`BUMPY`] and a view.
+/// Creates a bench with the files used by [`BUMPY`] and the given view.
 fn bumpy(scene: &str, view: View) -> Bench {
     let mut bench = Bench::new(scene);
     bench.write("bumps.ppm", "P6\n2 1\n255\n\x7f\x7f\x7f\x7f\x7f\x7f");
@@ -78,7 +79,7 @@ fn bumpy(scene: &str, view: View) -> Bench {
     bench
 }
 
-/// Returns the status and reason of the textures stage and the number of texels loaded, for a new scene.
+/// Renders a new scene. Returns the textures stage's status and reason, and the number of texels loaded.
 fn textures_of(scene: &str, view: View) -> (char, String, u64) {
     let report = bumpy(scene, view).done().0;
     let stage = &report.stages[Stage::Textures as usize];
@@ -92,7 +93,7 @@ fn view_loads_only_the_textures_it_needs() {
     let ambient = |scene: &str| scene.replacen("samples = 4", &format!("samples = 4{AMBIENT}"), 1);
     let textures = |status, why: &str, texels| (status, why.to_owned(), texels);
     let nothing = textures('s', reasons::NOT_NEEDED_FOR_VIEW, 0);
-    // There are no photons and no ambient light in these scenes.
+    // These scenes have no photons and no ambient light.
     for view in [View::Depth, View::Uv, View::Barycentric, View::Photons, View::Ambient] {
         assert_eq!(textures_of(bumpy, view), nothing, "{view:?}");
     }
@@ -101,11 +102,11 @@ fn view_loads_only_the_textures_it_needs() {
     }
     assert_eq!(textures_of(bumpy, View::Normal), textures('d', "1 loaded, 3 not needed", 2));
     assert_eq!(textures_of(bumpy, View::Albedo), textures('d', "1 loaded, 3 not needed", 1));
-    // The view `shadow` depends on emission, but not on reflectance.
+    // The `shadow` view depends on emission but not on reflectance.
     assert_eq!(textures_of(bumpy, View::Shadow), textures('d', "2 loaded, 2 not needed", 5));
     assert_eq!(textures_of(bumpy, View::Emission), textures('d', "1 loaded, 3 not needed", 3));
     assert_eq!(textures_of(&ambient(bumpy), View::Ambient), textures('d', "1 loaded, 3 not needed", 1));
-    // Boxes are drawn over the image, and the color of a lobe affects how often it is sampled.
+    // The `bounds` view draws boxes over the image, and a lobe's color affects how often it is sampled.
     for view in [View::Beauty, View::Diffuse, View::Specular, View::Bounds, View::Cost, View::Error] {
         assert_eq!(textures_of(bumpy, view), textures('d', "4 loaded", 10), "{view:?}");
     }
@@ -117,7 +118,7 @@ fn view_loads_only_the_textures_it_needs() {
 }
 
 #[test]
-fn view_does_not_look_up_missing_textures() {
+fn view_does_not_look_up_unneeded_textures() {
     let ambient = |scene: &str| scene.replacen("samples = 4", &format!("samples = 4{AMBIENT}"), 1);
     for (view, scene) in [
         (View::Shadow, SCENE.to_owned()),
@@ -144,7 +145,7 @@ fn unneeded_textures_do_not_change_a_view() {
         [View::Normal, View::Depth, View::Uv, View::Shadow, View::Albedo, View::Ambient, View::Emission]
     {
         for scene in [SCENE, &bumpy_scene] {
-            // A black texel reflects nothing, but the arriving light must still be visible.
+            // A black texel reflects nothing, but incoming light must still be visible.
             let bench = |view| {
                 let bench = bumpy(scene, view);
                 bench.write("skin.ppm", "P6\n1 1\n255\n\0\0\0");
@@ -152,7 +153,7 @@ fn unneeded_textures_do_not_change_a_view() {
             };
             let mut without = bench(view);
             without.done();
-            // Textures of the beauty view stay loaded, so that dependent lights and trees are reused.
+            // Textures for the beauty view stay loaded so that dependent lights and trees can be reused.
             let mut with = bench(View::Beauty);
             with.done();
             with.overrides.view = Some(view);

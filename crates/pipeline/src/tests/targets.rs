@@ -1,4 +1,4 @@
-//! Tests of files that must not be overwritten.
+//! Tests for files that must not be overwritten.
 
 use std::ops::Range;
 use std::os::unix::fs::symlink;
@@ -14,7 +14,7 @@ use crate::settings::Checkpoints;
 use crate::turntable::Turn;
 use crate::world::World;
 
-/// Returns the first reported conflicts and the end of the request.
+/// Returns the first reported conflicts and the request's final event.
 fn conflicts_and_end(events: &[Event]) -> (Vec<String>, Option<&Event>) {
     let conflicts = events.iter().find_map(|event| match event {
         Event::Refused { conflicts, .. } => Some(conflicts.iter().map(|one| one.message.clone()).collect()),
@@ -24,7 +24,7 @@ fn conflicts_and_end(events: &[Event]) -> (Vec<String>, Option<&Event>) {
 }
 
 #[test]
-fn conflict_is_reported_but_the_image_is_shown() {
+fn image_is_shown_despite_conflict() {
     let mut bench = Bench::new(SCENE);
     let (good, report) = (bench.path("good.png"), bench.path("r.json"));
     bench.overrides.outputs = vec![good.clone(), bench.path("skin.ppm")];
@@ -37,15 +37,21 @@ fn conflict_is_reported_but_the_image_is_shown() {
     assert!(conflicts.len() == 1 && conflicts[0].contains("texture `skin`"), "{conflicts:?}");
     let is_refusal = |event: &Event| matches!(event, Event::Refused { .. });
     let shown = events.iter().position(|event| matches!(event, Event::Preview { .. })).expect("a preview");
-    assert!(events.iter().position(is_refusal).expect("a refusal") < shown, "before the work");
+    assert!(
+        events.iter().position(is_refusal).expect("a refusal") < shown,
+        "the conflict should be reported before rendering"
+    );
     assert_eq!(events.iter().filter(|event| is_refusal(event)).count(), 1, "once");
     let Some(Event::Done { report: made, warnings, .. }) = end else { panic!("{end:?}") };
     assert_eq!((made.image.path.as_deref(), made.image.complete), (None, true));
     assert_eq!(made.stages[Stage::Write as usize].status, Status::Skipped);
-    assert!(warnings.iter().any(|one| one.message == conflicts[0]), "it remains until the end");
+    assert!(
+        warnings.iter().any(|one| one.message == conflicts[0]),
+        "the conflict should still be reported at the end"
+    );
     bench.worker.send(Command::Write);
-    assert!(matches!(bench.next(), Event::Refused { .. }), "a write order is refused as well");
-    assert!(!good.exists() && !report.exists(), "nothing is written");
+    assert!(matches!(bench.next(), Event::Refused { .. }), "a write order should be refused too");
+    assert!(!good.exists() && !report.exists(), "nothing should be written");
     // An edit resolves the conflict.
     bench.edit("[textures.skin]\nfile = \"skin.ppm\"\n", "");
     bench.edit("{ texture = \"skin\" }", "[0.5, 0.5, 0.5]");
@@ -56,11 +62,11 @@ fn conflict_is_reported_but_the_image_is_shown() {
 }
 
 #[test]
-fn material_files_are_checked_before_the_render() {
+fn material_files_are_checked_before_rendering() {
     let mut bench = Bench::new(SCENE);
     bench.write("mtl.json", "newmtl a\nmap_d alpha.ppm\n");
     bench.write("one.obj", &format!("mtllib mtl.json\n{OBJ}"));
-    // This applies even if files may be replaced.
+    // The check applies even if foreign files may be replaced.
     bench.overrides.replaces_foreign = true;
     for (name, role) in [("mtl.json", "a material file"), ("alpha.ppm", "an image")] {
         bench.overrides.report = Some(bench.path(name));
@@ -70,7 +76,10 @@ fn material_files_are_checked_before_the_render() {
             panic!("{name}")
         };
         assert!(errors[0].message.contains(role), "{name}: {errors:?}");
-        assert!(!events.iter().any(|event| matches!(event, Event::Progress { .. })), "nothing is rendered");
+        assert!(
+            !events.iter().any(|event| matches!(event, Event::Progress { .. })),
+            "nothing should be rendered"
+        );
     }
     assert!(!bench.path("alpha.ppm").exists());
 }
@@ -93,7 +102,7 @@ fn watched_files_cannot_be_written() {
         bench.overrides.report = Some(file.path.clone());
         assert!(matches!(bench.failed(), Failure::Scene(_)), "{file:?}");
     }
-    // Files that a broken scene references are watched, so the last good scene must not be written to them.
+    // Files referenced by a broken scene are watched, so the last valid scene must not be written to them.
     bench.overrides.report = None;
     bench.overrides.outputs = vec![bench.path("later.ppm")];
     bench.done();
@@ -109,7 +118,7 @@ fn watched_files_cannot_be_written() {
 static LINK: std::sync::Mutex<Option<PathBuf>> = std::sync::Mutex::new(None);
 static IS_LINKED: AtomicBool = AtomicBool::new(false);
 
-/// Replaces the link by one to the texture during the first tile.
+/// Replaces the link with a link to the texture during the first tile.
 fn relinks(
     photons: Option<&PhotonMaps>,
     world: &World,
@@ -128,7 +137,7 @@ fn relinks(
 }
 
 #[test]
-fn link_changed_during_the_render_is_noticed() {
+fn link_change_during_render_is_detected() {
     let mut bench = Bench::with(SCENE, relinks);
     let link = bench.path("out.ppm");
     symlink("elsewhere.ppm", &link).expect("a link");
@@ -136,13 +145,13 @@ fn link_changed_during_the_render_is_noticed() {
     let before = fs::read(bench.path("skin.ppm")).expect("a texture");
     let Failure::Scene(errors) = bench.failed() else { panic!("a conflict") };
     assert!(errors[0].message.contains("texture `skin`"), "{errors:?}");
-    assert!(IS_LINKED.load(Ordering::SeqCst), "after the render began");
+    assert!(IS_LINKED.load(Ordering::SeqCst), "the link should change during the render");
     assert_eq!(fs::read(bench.path("skin.ppm")).expect("a texture"), before);
     assert!(!bench.path("elsewhere.ppm").exists());
 }
 
 #[test]
-fn broken_scene_replaces_only_own_outputs() {
+fn broken_scene_only_replaces_own_outputs() {
     let mut bench = Bench::new(SCENE);
     let output = bench.path("out.ppm");
     bench.done();
@@ -150,21 +159,21 @@ fn broken_scene_replaces_only_own_outputs() {
     assert!(matches!(bench.failed(), Failure::Scene(_)));
     assert!(matches!(bench.next(), Event::LastGoodEnded { .. }));
     bench.worker.send(Command::Write);
-    assert!(matches!(bench.next(), Event::Written { .. }), "nothing is lost");
+    assert!(matches!(bench.next(), Event::Written { .. }), "glimt's own output should be replaced");
     assert!(matches!(bench.next(), Event::WriteDone { .. }));
     fs::write(&output, "another image").expect("written");
     bench.worker.send(Command::Write);
     let Event::WriteFailed { message, .. } = bench.next() else { panic!("a refusal") };
     assert!(message.contains("out.ppm") && message.contains(crate::messages::SCENE_HAS_ERRORS), "{message}");
     assert_eq!(fs::read(&output).expect("there"), b"another image");
-    // A missing file can be written.
+    // A missing file may be written.
     fs::remove_file(&output).expect("removed");
     bench.worker.send(Command::Write);
     assert!(matches!(bench.next(), Event::Written { .. }));
 }
 
 #[test]
-fn finished_part_is_not_replaced_by_a_checkpoint() {
+fn checkpoint_does_not_replace_finished_part() {
     let mut bench = Bench::new(SCENE);
     let (out, part) = (bench.path("out"), bench.path("out.checkpoint"));
     bench.overrides.shard = Some((2, 2));
@@ -194,7 +203,7 @@ fn report_cannot_replace_a_checkpoint() {
 }
 
 #[test]
-fn blocked_later_frame_is_found_before_the_work() {
+fn unwritable_later_frame_fails_before_rendering() {
     let mut bench = Bench::with(SCENE, unused);
     bench.overrides.outputs = vec![bench.path("a_##.ppm")];
     bench.overrides.turn = Some(Turn { number: 0, of: 12 });
@@ -203,7 +212,7 @@ fn blocked_later_frame_is_found_before_the_work() {
     assert!(message.contains("a_09.ppm") && message.contains("directory"), "{message}");
 }
 
-/// Panics, for tests that must not reach the render.
+/// Panics. For tests that must not start rendering.
 fn unused(
     _: Option<&PhotonMaps>,
     _: &World,
@@ -212,5 +221,5 @@ fn unused(
     _: Range<u32>,
     _: &CancelToken,
 ) -> Result<(TileSamples, RayCounters), Cancelled> {
-    panic!("the render begins");
+    panic!("rendering should not start");
 }

@@ -1,4 +1,4 @@
-//! Decides from hints when files are checked and when they have settled.
+//! Decides, based on hints, when to check files and when they have settled.
 
 use std::collections::HashSet;
 use std::ffi::OsString;
@@ -12,14 +12,14 @@ use super::{BETWEEN_CHANGES, WatchDelays};
 pub(super) struct ChangeTracker {
     delays: WatchDelays,
     pending: Option<PendingHints>,
-    /// Files that were written to and not yet closed.
+    /// Files that were written to and have not been closed.
     open: HashSet<OsString>,
     unsettled: Option<Unsettled>,
-    /// Earliest time of the next reported change.
+    /// Earliest time at which to report the next change.
     not_before: Option<Instant>,
 }
 
-/// Hints that have not been acted on.
+/// Hints that have not yet been acted on.
 #[derive(Clone, Copy, Debug)]
 struct PendingHints {
     first: Instant,
@@ -59,7 +59,7 @@ impl ChangeTracker {
                 self.open.remove(&name);
                 false
             }
-            // Removing a backup or setting a time stamp after a save leaves it complete.
+            // A save remains complete if a backup is removed or a timestamp is set afterwards.
             Hint::Touched => was_complete,
         };
         let due = if is_complete { now } else { (now + self.delays.quiet).min(first + self.delays.longest) };
@@ -70,7 +70,7 @@ impl ChangeTracker {
         }
     }
 
-    /// Returns the time of the next check. `None` if no hint calls for one.
+    /// Returns the time of the next check. `None` if no hint requires one.
     pub(super) fn due(&self) -> Option<Instant> {
         let look = self.pending.map(|pending| pending.due);
         [look, self.unsettled.map(|unsettled| self.settled_at(unsettled))].into_iter().flatten().min()
@@ -81,13 +81,13 @@ impl ChangeTracker {
         self.pending.is_some()
     }
 
-    /// Discards the hints after a check found no change.
+    /// Discards the hints after a check that found no change.
     pub(super) fn discard_hints(&mut self) {
         self.pending = None;
     }
 
-    /// Whether it is too early to report a change that hints led to. `is_missing`: a file is missing or empty; `moves`:
-    /// the previous check found another change.
+    /// Whether it is too early to report a change found because of hints. `is_missing` is true if a file is
+    /// missing or empty, and `moves` if the previous check found another change.
     pub(super) fn is_early(&mut self, is_missing: bool, moves: bool, now: Instant) -> bool {
         let Some(pending) = &mut self.pending else { return false };
         let due = if is_missing {
@@ -104,7 +104,7 @@ impl ChangeTracker {
         is_early
     }
 
-    /// Records that the change is reported, and returns the time of its first hint.
+    /// Records that a change is being reported. Returns the time of its first hint.
     pub(super) fn reported(&mut self, now: Instant) -> Instant {
         let noticed = self.pending.take().map_or(now, |pending| pending.first);
         self.not_before = Some(now + BETWEEN_CHANGES);
@@ -113,7 +113,7 @@ impl ChangeTracker {
         noticed
     }
 
-    /// Whether the reported change has settled. Returns true once per change.
+    /// Whether the reported change has settled. Returns true only once per change.
     pub(super) fn settles(&mut self, now: Instant) -> bool {
         let settles = self.unsettled.is_some_and(|unsettled| self.settled_at(unsettled) <= now);
         self.unsettled = self.unsettled.filter(|_| !settles);

@@ -1,4 +1,4 @@
-//! Contents of files, identified by hashes that are recomputed only if the file may have changed.
+//! File contents, identified by hashes that are only recomputed if the file may have changed.
 
 use std::collections::HashMap;
 use std::fs::Metadata;
@@ -19,7 +19,7 @@ use crate::system::file::{self, FileKind};
 pub struct FileRead {
     /// Path of the file.
     pub path: PathBuf,
-    /// Hash of the decoded bytes; for files that were not decoded, the content at about that time.
+    /// The content that was decoded. If the file was not decoded, its content at about that time.
     pub content: Content,
 }
 
@@ -30,7 +30,7 @@ pub enum Content {
     Missing,
     /// Not a regular file, or not readable.
     Unusable(Obstacle),
-    /// A regular file. The hash covers its bytes or, for a very long file, its metadata.
+    /// Hash of a regular file's bytes, or of its metadata if it is very long.
     Hash([u8; 32]),
 }
 
@@ -41,7 +41,7 @@ pub enum Obstacle {
     Folder,
     /// A pipe, a socket or a device.
     Special,
-    /// A file in a kernel file system such as `/proc`.
+    /// A file in a kernel file system, such as `/proc`.
     Kernel,
     /// The file cannot be opened or read.
     Error(ErrorKind),
@@ -58,30 +58,30 @@ impl Content {
     }
 }
 
-/// Changes within this time may get the same time stamp on some file systems.
+/// On some file systems, changes within this time may have the same timestamp.
 const STAMP_RESOLUTION: Duration = Duration::from_secs(2);
-/// Maximum number of bytes that are hashed, which covers the longest file that is decoded. Longer files are compared by
-/// their metadata, so that a sparse file of terabytes is not read.
+/// Maximum length of a hashed file in bytes. No longer files are ever decoded. They are compared by their
+/// metadata, to avoid reading a sparse file of several terabytes.
 const MAX_HASHED: u64 = 4 << 30;
-/// Bytes between two checks of the token.
+/// Number of bytes between checks of the token.
 const CHUNK: usize = 1 << 20;
 
 /// Cache of file hashes.
 #[derive(Debug, Default)]
 pub struct Contents {
     known: Mutex<HashMap<PathBuf, (Stamp, Content)>>,
-    /// Files that glimt wrote.
+    /// Files written by glimt.
     pub outputs: Outputs,
-    /// Files that were hashed.
+    /// Files that have been hashed.
     #[cfg(test)]
     pub(crate) hashed: Mutex<Vec<PathBuf>>,
-    /// Replacement bytes of files, written right after the file has been hashed.
+    /// Replacement bytes, written to each file right after it has been hashed.
     #[cfg(test)]
     pub(crate) replacements: Mutex<HashMap<PathBuf, Vec<u8>>>,
 }
 
-/// File contents as seen by one request. Each file must have the same content throughout a request: a request that
-/// notices a change starts again. The watcher finds later changes.
+/// File contents as seen by one request. A file's content must not change during a request. If it does, the
+/// request starts again. The watcher detects later changes.
 #[derive(Debug)]
 pub(crate) struct Snapshot {
     contents: Arc<Contents>,
@@ -94,7 +94,7 @@ impl Snapshot {
         Self { contents, seen: Mutex::default(), changed: Mutex::default() }
     }
 
-    /// Returns the content that this request first saw.
+    /// Returns a file's content as first seen by this request.
     ///
     /// # Errors
     /// [`Cancelled`].
@@ -106,8 +106,8 @@ impl Snapshot {
         Ok(*self.seen().entry(path.to_owned()).or_insert(content))
     }
 
-    /// Returns the content of a file from the hash of its decoded bytes. Notes a change if this request has seen
-    /// another content.
+    /// Returns a file's content, given the hash of its decoded bytes. Records a change if this request has
+    /// seen different content.
     pub(crate) fn decoded(&self, path: &Path, hash: FileHash) -> Content {
         let content = Content::Hash(hash);
         if *self.seen().entry(path.to_owned()).or_insert(content) != content {
@@ -116,7 +116,7 @@ impl Snapshot {
         content
     }
 
-    /// Returns a file that another file references, with the content that was decoded.
+    /// Returns a file referenced by another file, with the content that was decoded.
     ///
     /// # Errors
     /// [`Cancelled`].
@@ -132,12 +132,12 @@ impl Snapshot {
         Ok(FileRead { path: path.clone(), content })
     }
 
-    /// Returns a file that changed while this request was reading.
+    /// Returns a file that changed while this request was reading files.
     pub(crate) fn changed(&self) -> Option<PathBuf> {
         self.changed.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// Returns the content if this request has seen it.
+    /// Returns a file's content if this request has seen it.
     pub(crate) fn known(&self, path: &Path) -> Option<Content> {
         self.seen().get(path).copied()
     }
@@ -147,7 +147,7 @@ impl Snapshot {
     }
 }
 
-/// File metadata that changes with every write, given some time between writes.
+/// File metadata that changes with every write if there is enough time between writes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Stamp {
     device: u64,
@@ -168,12 +168,12 @@ impl Stamp {
         }
     }
 
-    /// Returns a substitute for the content of a file that is too long to hash.
+    /// Returns substitute content for a file that is too long to hash.
     fn content(&self) -> Content {
         Content::Hash(*blake3::hash(format!("{self:?}").as_bytes()).as_bytes())
     }
 
-    /// Whether a change after `now` is guaranteed to change the stamp.
+    /// Whether any change after `now` is guaranteed to change the stamp.
     fn is_settled(&self, now: SystemTime) -> bool {
         let latest = self.modified.0.max(self.changed.0).max(0).unsigned_abs();
         let latest = SystemTime::UNIX_EPOCH + Duration::from_secs(latest);
@@ -211,7 +211,7 @@ impl Contents {
         Ok(content)
     }
 
-    /// Forgets all other files.
+    /// Forgets all files for which `keep` returns false.
     pub fn retain(&self, mut keep: impl FnMut(&Path) -> bool) {
         self.known().retain(|path, _| keep(path));
     }
@@ -239,7 +239,7 @@ fn unreadable(error: &io::Error) -> Content {
 fn hash(path: &Path, token: &CancelToken) -> Result<Content, Cancelled> {
     let mut file = match file::open(path) {
         Ok(Ok((file, _))) => file,
-        // The file has been replaced since its metadata was read.
+        // In these cases, the file has been replaced since its metadata was read.
         Ok(Err(FileKind::Folder)) => return Ok(Content::Unusable(Obstacle::Folder)),
         Ok(Err(FileKind::Special)) => return Ok(Content::Unusable(Obstacle::Special)),
         Ok(Err(FileKind::Regular | FileKind::Kernel)) => return Ok(Content::Unusable(Obstacle::Kernel)),
@@ -264,7 +264,7 @@ mod tests {
     use std::fs::{self, File};
 
     #[test]
-    fn content_is_compared_not_time_stamps() {
+    fn content_is_compared_instead_of_timestamps() {
         let folder = tempfile::tempdir().expect("a scratch folder");
         let path = folder.path().join("file");
         let token = CancelToken::new();
@@ -274,7 +274,7 @@ mod tests {
         let first = contents.read(&path, &token).expect("not cancelled");
         fs::write(&path, "b").expect("written");
         let second = contents.read(&path, &token).expect("not cancelled");
-        assert_ne!(first, second, "the same length within one tick of the clock");
+        assert_ne!(first, second, "a change should be detected at equal length and timestamp");
         fs::write(&path, "a").expect("written");
         assert_eq!(contents.read(&path, &token), Ok(first));
         assert_eq!(contents.read(folder.path(), &token), Ok(Content::Unusable(Obstacle::Folder)));
@@ -299,7 +299,7 @@ mod tests {
     }
 
     #[test]
-    fn request_sees_one_content_per_file() {
+    fn file_content_is_fixed_during_a_request() {
         let folder = tempfile::tempdir().expect("a scratch folder");
         let path = folder.path().join("file");
         let token = CancelToken::new();
@@ -309,7 +309,11 @@ mod tests {
         let first = snapshot.read(&path, &token).expect("not cancelled");
         fs::write(&path, "b").expect("written");
         assert_eq!(snapshot.read(&path, &token), Ok(first));
-        assert_ne!(Snapshot::of(contents).read(&path, &token), Ok(first), "the next request sees the change");
+        assert_ne!(
+            Snapshot::of(contents).read(&path, &token),
+            Ok(first),
+            "the next request should see the change"
+        );
     }
 
     #[test]
@@ -326,7 +330,7 @@ mod tests {
         assert_eq!(
             read,
             Ok(Content::Unusable(Obstacle::Special)),
-            "the cached content is valid while the stamp is unchanged"
+            "the cached content should be used while the stamp is unchanged"
         );
     }
 }

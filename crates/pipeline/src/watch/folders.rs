@@ -1,4 +1,4 @@
-//! Watches the folders of files, and converts the system's notifications to hints.
+//! Watches the folders that contain files of interest, and converts system notifications to hints.
 
 use std::collections::{HashMap, HashSet};
 use std::ffi::OsString;
@@ -26,24 +26,24 @@ pub(super) enum Hint {
 /// Set of watched folders.
 #[derive(Debug)]
 pub(super) struct Folders {
-    /// `None` if notifications are unwanted or unavailable.
+    /// `None` if notifications are disabled or unavailable.
     watcher: Option<RecommendedWatcher>,
     names: Arc<Mutex<HashSet<OsString>>>,
-    /// Folders to watch, and whether each is on a network file system, which sends no notifications.
+    /// Folders to watch, and whether each is on a network file system. Those do not send notifications.
     wanted: HashMap<PathBuf, bool>,
-    /// Watched folders, with their identities when the watch was added.
+    /// Watched folders and their identities at the time they were added.
     watched: HashMap<PathBuf, Identity>,
 }
 
-/// Device and inode of a folder, which differ if another folder takes its name.
+/// A folder's device and inode, which differ if another folder takes its name.
 type Identity = (u64, u64);
 
 fn identity(folder: &Path) -> Option<Identity> {
     fs::metadata(folder).ok().map(|metadata| (metadata.dev(), metadata.ino()))
 }
 
-/// Returns the watcher unless its thread could not be started. Without a thread, its handler, which shares `names`, has
-/// been dropped, and every use of the watcher panics, including its drop.
+/// Returns the watcher if its thread could be started. If not, its handler, which shares `names`, has been
+/// dropped, and every use of the watcher would panic, including dropping it.
 fn if_alive<W>(watcher: W, names: &Arc<Mutex<HashSet<OsString>>>) -> Option<W> {
     if Arc::strong_count(names) > 1 {
         return Some(watcher);
@@ -72,7 +72,7 @@ impl Folders {
         self.watcher.is_some() && self.watched.len() == self.wanted.len()
     }
 
-    /// Watches the folders of these files and, for links, of their targets.
+    /// Watches the folders of the given files and of symbolic link targets.
     pub(super) fn set<'a>(&mut self, files: impl Iterator<Item = &'a PathBuf>) {
         let mut folders = HashSet::new();
         let mut names = HashSet::new();
@@ -87,7 +87,7 @@ impl Folders {
                 add(&canonical);
             }
         }
-        // An event under a folder's own name reports that the folder was removed.
+        // An event with a folder's own name means that the folder was removed.
         let own = folders
             .iter()
             .filter_map(|folder| folder.canonicalize().ok()?.file_name().map(ToOwned::to_owned));
@@ -99,7 +99,7 @@ impl Folders {
         self.watch_wanted();
     }
 
-    /// Watches folders again that were replaced or recreated.
+    /// Renews the watches of folders that were replaced or recreated.
     pub(super) fn renew_lost(&mut self) {
         let lost: HashSet<PathBuf> = self
             .watched
@@ -111,7 +111,7 @@ impl Folders {
         self.watch_wanted();
     }
 
-    /// Watches all folders again after a notification was missed, because any of the watches may be broken.
+    /// Renews all watches. After a missed notification, any of them may be broken.
     pub(super) fn renew(&mut self) {
         self.release(|_| true);
         self.watch_wanted();
@@ -122,7 +122,7 @@ impl Folders {
         self.watched.retain(|folder, _| {
             let stays = !is_released(folder);
             if !stays {
-                // The folder may have been removed, which ended the watch.
+                // The folder may have been removed, which ends the watch.
                 let _ = watcher.unwatch(folder);
             }
             stays
@@ -135,7 +135,7 @@ impl Folders {
             if *is_remote || self.watched.contains_key(folder) {
                 continue;
             }
-            // Take the identity first, so that a folder replaced in between counts as replaced.
+            // Read the identity first, so that a replacement in between is detected later.
             if let Some(identity) = identity(folder)
                 && watcher.watch(folder, RecursiveMode::NonRecursive).is_ok()
             {
@@ -145,7 +145,8 @@ impl Folders {
     }
 }
 
-/// Converts an event to a hint about these names. Reads are ignored: otherwise a watcher that reads would wake itself.
+/// Converts an event to a hint if it concerns one of the names. Ignores reads, because the watcher's own
+/// reads would wake it.
 fn hint(event: &Event, names: &HashSet<OsString>) -> Option<Hint> {
     let mut of_paths = event.paths.iter().map(|path| path.file_name());
     let named = of_paths.clone().flatten().find(|name| names.contains(*name)).map(ToOwned::to_owned);
@@ -158,7 +159,7 @@ fn hint(event: &Event, names: &HashSet<OsString>) -> Option<Hint> {
         EventKind::Access(AccessKind::Close(AccessMode::Write)) => Some(Hint::Complete(name)),
         EventKind::Access(_) => None,
         EventKind::Modify(ModifyKind::Name(RenameMode::To)) => Some(Hint::Complete(name)),
-        // Both ends also have events of their own.
+        // There are also separate events for both names.
         EventKind::Modify(ModifyKind::Name(RenameMode::Both)) => None,
         EventKind::Modify(ModifyKind::Data(_)) => Some(Hint::Written(name)),
         EventKind::Modify(ModifyKind::Name(RenameMode::From)) | EventKind::Remove(_) => {
@@ -170,11 +171,12 @@ fn hint(event: &Event, names: &HashSet<OsString>) -> Option<Hint> {
     }
 }
 
-/// Whether changes made by other machines cause no notifications.
+/// Whether the folder is on a network file system, where changes by other machines do not cause
+/// notifications.
 #[cfg(target_os = "linux")]
 fn is_remote(folder: &Path) -> bool {
     use nix::sys::statfs::{self, statfs};
-    // From linux/magic.h, where nix has no constant: the kernel's SMB1 and SMB2 clients, 9P, Ceph, AFS.
+    // Constants from linux/magic.h that nix lacks: the kernel's SMB1 and SMB2 clients, 9P, Ceph, AFS.
     const OTHERS: [u32; 5] = [0xff53_4d42, 0xfe53_4d42, 0x0102_1997, 0x00c3_6400, 0x5346_414f];
     let Ok(stat) = statfs(folder) else { return false };
     let kind = stat.filesystem_type();
@@ -182,7 +184,7 @@ fn is_remote(folder: &Path) -> bool {
         || OTHERS.contains(&(kind.0 as u32))
 }
 
-/// Relies on notifications and the heartbeat on other systems.
+/// Other systems rely on notifications and the heartbeat.
 #[cfg(not(target_os = "linux"))]
 fn is_remote(_folder: &Path) -> bool {
     false
@@ -194,7 +196,7 @@ mod tests {
 
     use super::*;
 
-    /// A watcher whose thread was not started.
+    /// A watcher whose thread failed to start.
     struct Dead;
 
     impl Drop for Dead {
@@ -204,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn watchers_without_threads_are_not_used() {
+    fn watcher_without_thread_is_not_used() {
         let names: Arc<Mutex<HashSet<OsString>>> = Arc::default();
         assert!(if_alive(Dead, &names).is_none());
         let _handler = names.clone();
@@ -212,7 +214,7 @@ mod tests {
     }
 
     #[test]
-    fn events_tell_whether_a_save_is_complete() {
+    fn events_are_converted_to_hints() {
         let names = HashSet::from([OsString::from("a.toml")]);
         let of = |kind, path: &str| hint(&Event::new(kind).add_path(PathBuf::from(path)), &names);
         let name = || OsString::from("a.toml");
@@ -229,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn reads_and_other_names_are_ignored() {
+    fn reads_and_unrelated_names_are_ignored() {
         let names = HashSet::from([OsString::from("a.toml")]);
         let of = |kind, path: &str| hint(&Event::new(kind).add_path(PathBuf::from(path)), &names);
         let opened = EventKind::Access(AccessKind::Open(AccessMode::Any));
@@ -239,6 +241,6 @@ mod tests {
         assert_eq!(of(EventKind::Access(AccessKind::Close(AccessMode::Write)), "/x/a.png"), None);
         assert_eq!(of(EventKind::Create(CreateKind::File), "/x/b"), None);
         let overflow = Event::new(EventKind::Other);
-        assert_eq!(hint(&overflow, &names), Some(Hint::Touched), "the queue overflowed");
+        assert_eq!(hint(&overflow, &names), Some(Hint::Touched), "a queue overflow may concern any file");
     }
 }

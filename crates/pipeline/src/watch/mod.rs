@@ -1,14 +1,14 @@
 //! Reports when a file that a scene depends on has changed.
 //!
-//! Editors save in many ways: in place, by renaming, by removing and rewriting. So the watcher observes folders, both
-//! of a link and of its target, and treats notifications only as hints. It compares contents and reports only real
-//! changes. A file that was closed after writing or renamed into place is checked at once; a file that is still being
-//! written, after a short pause. Without notifications (network file systems, no watches left) it checks time stamps
-//! several times a second, and otherwise every two seconds. The same holds while a folder or the working directory is
-//! missing.
+//! Editors save files in many ways: in place, by renaming, or by removing and rewriting. The watcher
+//! therefore watches folders (both that of a symbolic link and that of its target) and treats notifications
+//! only as hints. It compares contents and reports only real changes. A file that was closed after writing or
+//! renamed into place is checked immediately. A file that is still being written is checked after a short
+//! pause. Timestamps are also checked every two seconds, or several times per second if there are no
+//! notifications (network file systems, no watches left) or a folder or the working directory is missing.
 //!
-//! A program may write in several steps. So [`News::Settled`] follows a change once no more changes are expected.
-//! Errors in a file are reported only then.
+//! A program may write a file in several steps. [`News::Settled`] follows a change when no further changes
+//! are expected. Errors in a file are reported only then.
 
 mod change_tracker;
 pub mod content;
@@ -35,24 +35,24 @@ use crate::control::CancelToken;
 const HEARTBEAT: Duration = Duration::from_secs(2);
 /// Interval between checks without notifications.
 const POLL: Duration = Duration::from_millis(200);
-/// Minimum time between two reported changes, long enough for a first image during continuous saves.
+/// Minimum time between reported changes. Long enough to show a first image during continuous saves.
 const BETWEEN_CHANGES: Duration = Duration::from_millis(100);
 
-/// Delays before the watcher reacts to hints.
+/// Delays before reacting to hints.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct WatchDelays {
-    /// Time without a hint after which a file that is being written is checked.
+    /// Time without hints after which to check a file that is being written.
     quiet: Duration,
-    /// The same for a missing or empty file, which is probably being replaced.
+    /// Like `quiet`, but for a missing or empty file, which is probably being replaced.
     quiet_missing: Duration,
     /// Maximum delay of a check.
     longest: Duration,
-    /// Time without a hint after which files have settled. Programs that write a file in two steps take a fraction of
-    /// it.
+    /// Time without hints after which files count as settled. Programs that write a file in two steps take
+    /// only a fraction of this time.
     settle: Duration,
-    /// The same while a file is open for writing: longer than network stalls of `scp` or `sftp`.
+    /// Like `settle`, but while a file is open for writing. Longer than network stalls in `scp` or `sftp`.
     settle_open: Duration,
-    /// Maximum time until files count as settled, whatever happens to them.
+    /// Maximum time until files count as settled, regardless of hints.
     settle_longest: Duration,
 }
 
@@ -69,25 +69,25 @@ impl Default for WatchDelays {
     }
 }
 
-/// News from a watcher.
+/// An update from a watcher.
 #[derive(Clone, Debug)]
 pub enum News {
-    /// The content of a file changed, and the save appears complete.
+    /// A file's content changed, and the save appears complete.
     Changed(Changed),
     /// The changed files appear to be complete.
     Settled,
-    /// A file that glimt wrote was changed, or restored to what glimt wrote.
+    /// A file written by glimt was changed, or restored to what glimt wrote.
     Output(OutputChange),
 }
 
-/// A change of at least one file.
+/// A change to one or more files.
 #[derive(Clone, Copy, Debug)]
 pub struct Changed {
-    /// Time of the first hint, where the measured time from save to screen starts.
+    /// Time of the first hint. The measured time from save to screen starts here.
     pub noticed: Instant,
 }
 
-/// Handle of the watcher thread, which ends when this is dropped.
+/// Handle to the watcher thread. Dropping it ends the thread.
 #[derive(Debug)]
 pub struct Watcher {
     orders: Sender<Message>,
@@ -96,7 +96,7 @@ pub struct Watcher {
 enum Message {
     /// A hint about a watched file.
     Hint(Hint),
-    /// WatchThread these files, which were read after the given time, and these, which were read earlier.
+    /// Files to watch: those read after the given time, and those read earlier.
     Files(Vec<FileRead>, Vec<FileRead>, Instant),
     /// The worker has written a file.
     Outputs,
@@ -104,8 +104,8 @@ enum Message {
 }
 
 impl Watcher {
-    /// Starts the watcher without files. `poll` disables the system's notifications. `contents` is shared with the
-    /// worker, so that no file is hashed twice.
+    /// Starts the watcher without any files. `poll` disables system notifications. `contents` is shared with
+    /// the worker so that no file is hashed twice.
     ///
     /// # Errors
     /// The system cannot start a thread.
@@ -127,7 +127,7 @@ impl Watcher {
         let (orders, received) = mpsc::channel();
         let hints = orders.clone();
         let folders = Folders::new(poll, move |hint| {
-            // The send fails only after the watcher has ended.
+            // Sending only fails after the watcher has ended.
             let _ = hints.send(Message::Hint(hint));
         });
         let change_tracker = ChangeTracker::new(delays);
@@ -148,13 +148,14 @@ impl Watcher {
         Ok(Self { orders })
     }
 
-    /// Watches only these files: `read`, which were read after `since`, and `before`, which are older. A file whose
-    /// content differs from the given one counts as changed, unless a change was reported since it was read.
+    /// Sets the files to watch: `read`, which were read after `since`, and `before`, which were read earlier.
+    /// A file whose content differs from the given content counts as changed, unless a change has been
+    /// reported since it was read.
     pub fn set_files(&self, read: Vec<FileRead>, before: Vec<FileRead>, since: Instant) {
         let _ = self.orders.send(Message::Files(read, before, since));
     }
 
-    /// Watches the files that the worker has written.
+    /// Watches the files written by the worker.
     pub fn watch_outputs(&self) {
         let _ = self.orders.send(Message::Outputs);
     }
@@ -171,15 +172,14 @@ struct WatchThread<F> {
     /// Whether the working directory exists.
     has_working_folder: bool,
     contents: Arc<Contents>,
-    /// Content of each file when a change was last reported or the file was last read, whichever is later, and that
-    /// time.
+    /// Content of each file when it was last read or a change was last reported, and the time of this event.
     files: HashMap<PathBuf, (Content, Instant)>,
     change_tracker: ChangeTracker,
-    /// Changes that the last check found but did not report.
+    /// Changes found but not reported by the last check.
     pending: Vec<FileRead>,
-    /// Changes of outputs that may be temporary.
+    /// Output changes that may be temporary.
     suspects: UnconfirmedChanges,
-    /// Time after which a missing file or a changed output is reported.
+    /// Time after which to report a missing file or a changed output.
     quiet: Duration,
     say: F,
 }
@@ -212,8 +212,8 @@ impl<F: FnMut(News)> WatchThread<F> {
             self.files.insert(path, said.unwrap_or((content, since)));
         }
         for FileRead { path, content } in read {
-            // A report after `since` is newer than the content read. An earlier report is not: the file may have been
-            // restored.
+            // A change reported after `since` is newer than the content read. An earlier report is not,
+            // because the file may have been restored.
             let said = before.get(&path).copied().filter(|(_, when)| *when > since);
             self.files.insert(path, said.unwrap_or((content, since)));
         }
@@ -253,7 +253,7 @@ impl<F: FnMut(News)> WatchThread<F> {
         }
     }
 
-    /// Whether the result of a check is not reported, or not yet.
+    /// Whether the result of a check should not be reported, or not yet.
     fn is_early(&mut self, found: &[FileRead], now: Instant) -> bool {
         let before = std::mem::take(&mut self.pending);
         if found.is_empty() {
@@ -264,8 +264,8 @@ impl<F: FnMut(News)> WatchThread<F> {
             let moves = !before.is_empty() && before != found;
             self.change_tracker.is_early(is_missing(found), moves, now)
         } else {
-            // A notification was missed or is unavailable: wait for the next check, because the file may still be
-            // written.
+            // A notification was missed or is unavailable. Wait for the next check, because the file may
+            // still be being written.
             self.folders.renew();
             self.change_tracker.hint(Hint::Touched, now);
             true
@@ -276,10 +276,10 @@ impl<F: FnMut(News)> WatchThread<F> {
         is_early
     }
 
-    /// Returns the files whose content differs from the last reported one.
+    /// Returns the files whose content differs from the last reported content.
     fn differences(&self) -> Vec<FileRead> {
         let token = CancelToken::new();
-        // This token is never cancelled.
+        // Use a token that is never cancelled.
         let now = |path: &PathBuf| self.contents.read(path, &token).unwrap_or(Content::Missing);
         let files = self.files.iter();
         let mut found: Vec<FileRead> = files
@@ -292,7 +292,7 @@ impl<F: FnMut(News)> WatchThread<F> {
     }
 }
 
-/// Whether a file is missing or empty, and probably being replaced.
+/// Whether a file is missing or empty, in which case it is probably being replaced.
 fn is_missing(files: &[FileRead]) -> bool {
     let empty = Content::Hash(*blake3::hash(b"").as_bytes());
     files.iter().any(|file| file.content == Content::Missing || file.content == empty)

@@ -1,4 +1,4 @@
-//! Files that glimt wrote, and whether other programs changed them.
+//! Tracks files written by glimt and whether other programs have changed them.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -8,17 +8,17 @@ use std::time::{Duration, Instant};
 use super::content::{Content, Contents};
 use crate::control::CancelToken;
 
-/// What another program did to a file that glimt wrote.
+/// What another program did to a file written by glimt.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ExternalChange {
     /// The file was removed.
     Removed,
-    /// The file has another content.
+    /// The file has different content.
     Replaced,
 }
 
 impl ExternalChange {
-    /// Returns a predicate whose subject is the file name.
+    /// Describes the change in words that follow the file name.
     pub fn words(self) -> &'static str {
         match self {
             Self::Removed => "was removed",
@@ -27,22 +27,22 @@ impl ExternalChange {
     }
 }
 
-/// A change of a file that glimt wrote, or its restoration.
+/// A change to a file written by glimt, or its restoration.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct OutputChange {
     /// Path of the file.
     pub path: PathBuf,
-    /// The change. `None` if the file has the content that glimt wrote.
+    /// The change. `None` if the content is what glimt wrote.
     pub lost: Option<ExternalChange>,
 }
 
-/// Written files by path, shared by the worker, which writes them, and the watcher.
+/// Written files by path. Shared by the worker and the watcher.
 #[derive(Debug, Default)]
 pub struct Outputs(Mutex<HashMap<PathBuf, Output>>);
 
 #[derive(Clone, Copy, Debug)]
 struct Output {
-    /// The content that glimt wrote.
+    /// The content written by glimt.
     content: Content,
     /// Number of writes started so far.
     writes: u64,
@@ -52,7 +52,7 @@ struct Output {
 }
 
 impl Outputs {
-    /// Records that a file is about to be written. It may have any content until [`Self::end`].
+    /// Records that a file is about to be written. Its content is ignored until [`Self::end`].
     pub(crate) fn begin(&self, path: &Path) {
         let mut known = self.known();
         let new = Output { content: Content::Missing, writes: 0, is_being_written: true, reported: None };
@@ -60,7 +60,7 @@ impl Outputs {
         (output.writes, output.is_being_written) = (output.writes + 1, true);
     }
 
-    /// Records the content of a written file, or `None` if the write failed. Special files are not watched.
+    /// Records a written file's content, or `None` if the write failed. Special files are not watched.
     pub(crate) fn end(&self, path: &Path, content: Option<Content>) {
         let mut known = self.known();
         let Some(output) = known.get_mut(path) else { return };
@@ -73,7 +73,7 @@ impl Outputs {
         }
     }
 
-    /// Forgets all other files.
+    /// Forgets all files for which `keep` returns false.
     pub(crate) fn retain(&self, mut keep: impl FnMut(&PathBuf) -> bool) {
         self.known().retain(|path, _| keep(path));
     }
@@ -83,19 +83,19 @@ impl Outputs {
         self.known().keys().cloned().collect()
     }
 
-    /// Returns the files that no longer have the content that glimt wrote.
+    /// Returns the files that no longer have the content written by glimt.
     pub fn lost(&self, contents: &Contents) -> Vec<(PathBuf, ExternalChange)> {
         let found = self.states(contents).into_iter();
         found.filter_map(|(path, _, lost)| Some((path, lost?))).collect()
     }
 
-    /// Returns the files whose state differs from the reported one.
+    /// Returns the files whose state differs from the last report.
     fn news(&self, contents: &Contents) -> Vec<OutputChange> {
         let found = self.states(contents).into_iter().filter(|(_, reported, lost)| reported != lost);
         found.map(|(path, _, lost)| OutputChange { path, lost }).collect()
     }
 
-    /// Returns the reported and the current state of each file that is not being written.
+    /// Returns the last reported and current state of each file, except files that are being written.
     fn states(&self, contents: &Contents) -> Vec<(PathBuf, Option<ExternalChange>, Option<ExternalChange>)> {
         let before: Vec<(PathBuf, Output)> = {
             let known = self.known();
@@ -103,14 +103,14 @@ impl Outputs {
             idle.map(|(path, output)| (path.clone(), *output)).collect()
         };
         let state = |(path, output): (PathBuf, Output)| {
-            // This token is never cancelled.
+            // Use a token that is never cancelled.
             let now = contents.read(&path, &CancelToken::new()).unwrap_or(Content::Missing);
             let lost = match now {
                 now if now == output.content => None,
                 Content::Missing => Some(ExternalChange::Removed),
                 Content::Hash(_) | Content::Unusable(_) => Some(ExternalChange::Replaced),
             };
-            // Ignore the content if a write has begun since.
+            // Ignore the content if another write has started since.
             let is_current = self.known().get(&path).is_some_and(|now| now.writes == output.writes);
             is_current.then_some((path, output.reported, lost))
         };
@@ -130,12 +130,12 @@ impl Outputs {
     }
 }
 
-/// Changes that may be temporary, because a program that replaces a file may remove it first.
+/// Changes that may be temporary, since programs may remove a file before replacing it.
 #[derive(Debug, Default)]
 pub(super) struct UnconfirmedChanges(Vec<(OutputChange, Instant)>);
 
 impl UnconfirmedChanges {
-    /// Returns changes that have lasted for `quiet`, each once.
+    /// Returns changes that have lasted for `quiet`. Returns each change only once.
     pub(super) fn look(&mut self, contents: &Contents, quiet: Duration, now: Instant) -> Vec<OutputChange> {
         let before = std::mem::take(&mut self.0);
         let mut lasting = Vec::new();
@@ -152,7 +152,7 @@ impl UnconfirmedChanges {
         lasting
     }
 
-    /// Returns the time of the next check. `None` without unconfirmed changes.
+    /// Returns the time of the next check. `None` if there are no unconfirmed changes.
     pub(super) fn due(&self, quiet: Duration) -> Option<Instant> {
         self.0.iter().map(|(_, since)| *since + quiet).min()
     }
@@ -185,17 +185,17 @@ mod tests {
         };
         write(&contents, &path, "one");
         assert_eq!(look(&contents, 0), []);
-        // glimt's own writes are not reported, neither during nor after them.
+        // glimt's own writes are not reported, either during or after the write.
         contents.outputs.begin(&path);
         fs::write(&path, "two").expect("written");
         assert_eq!((look(&contents, 1000), look(&contents, 2000)), (vec![], vec![]));
         write(&contents, &path, "two");
         assert_eq!((look(&contents, 3000), look(&contents, 4000)), (vec![], vec![]));
-        // Another program removes the file and then writes it.
+        // Another program removes and then rewrites the file.
         fs::remove_file(&path).expect("removed");
         assert_eq!(look(&contents, 5000), []);
         fs::write(&path, "of another").expect("written");
-        assert_eq!(look(&contents, 5300), [], "the file may be incomplete");
+        assert_eq!(look(&contents, 5300), [], "an incomplete file should not be reported");
         assert_eq!(look(&contents, 5600), [Some(ExternalChange::Replaced)]);
         fs::write(&path, "of another again").expect("written");
         assert_eq!((look(&contents, 6000), look(&contents, 7000)), (vec![], vec![]), "once");
@@ -208,7 +208,7 @@ mod tests {
         // Restore the file.
         fs::write(&path, "two").expect("written");
         assert_eq!((look(&contents, 10_000), look(&contents, 11_000)), (vec![], vec![None]));
-        // Let glimt write the file again.
+        // Have glimt write the file again.
         fs::remove_file(&path).expect("removed");
         assert_eq!(
             (look(&contents, 12_000), look(&contents, 13_000)),
@@ -219,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn failed_write_keeps_the_known_content() {
+    fn failed_write_keeps_previous_content() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("a.png");
         let contents = Contents::default();

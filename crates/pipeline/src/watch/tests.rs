@@ -5,7 +5,7 @@ use std::sync::mpsc::{Receiver, channel};
 
 use super::*;
 
-/// Longer than any change takes to settle.
+/// More than the time any change takes to settle.
 const SETTLE: Duration = Duration::from_millis(900);
 
 /// Longer than any test.
@@ -48,7 +48,7 @@ impl Scratch {
         };
         let since = Instant::now();
         self.watcher.set_files(paths.iter().map(read).collect(), Vec::new(), since);
-        // Give the watcher's thread time to watch the folders.
+        // Give the watcher's thread time to start watching the folders.
         std::thread::sleep(Duration::from_millis(150));
     }
 
@@ -57,11 +57,11 @@ impl Scratch {
         self.news.recv_timeout(Duration::from_secs(60)).expect("news within a minute")
     }
 
-    /// Expects one change, then that the files settle, then nothing.
+    /// Expects exactly one change, followed by the files settling.
     #[track_caller]
     fn expect_one(&self) {
-        assert!(matches!(self.next(), News::Changed(_)), "the first news is a change");
-        assert!(matches!(self.next(), News::Settled), "one change too many");
+        assert!(matches!(self.next(), News::Changed(_)), "expected a change first");
+        assert!(matches!(self.next(), News::Settled), "expected only one change");
         self.expect_none();
     }
 
@@ -70,7 +70,7 @@ impl Scratch {
         assert!(self.news.recv_timeout(SETTLE).is_err(), "unexpected news");
     }
 
-    /// Saves three distinct contents and expects one change each.
+    /// Saves three different contents and expects one change for each.
     #[track_caller]
     fn three_saves(&self, save: impl Fn(&str)) {
         for content in ["one", "two", "three"] {
@@ -80,7 +80,7 @@ impl Scratch {
     }
 }
 
-fn replacement_by_special_file_is_a_change() {
+fn replacement_by_special_file_is_reported() {
     use nix::sys::stat::Mode;
     let scratch = Scratch::new(false);
     let path = scratch.path("a.toml");
@@ -95,31 +95,31 @@ fn replacement_by_special_file_is_a_change() {
     scratch.expect_one();
 }
 
-/// Saves a content as `a.toml` in a folder.
+/// Saves `content` as `a.toml` in a folder.
 type Save = fn(folder: &Path, content: &str);
 
-/// Methods by which editors save.
+/// Methods used by editors to save files.
 const SAVE_METHODS: [(&str, Save); 6] = [
     ("truncate and write", |folder, content| {
         fs::write(folder.join("a.toml"), content).expect("written");
     }),
-    ("a slow truncate and write", |folder, content| {
+    ("truncate and write slowly", |folder, content| {
         fs::write(folder.join("a.toml"), "").expect("written");
         std::thread::sleep(Duration::from_millis(100));
         fs::write(folder.join("a.toml"), content).expect("written");
     }),
-    ("rename over it", |folder, content| {
+    ("rename over the file", |folder, content| {
         fs::write(folder.join("a.toml.tmp"), content).expect("written");
         fs::rename(folder.join("a.toml.tmp"), folder.join("a.toml")).expect("renamed");
     }),
-    ("backup by rename, new file and delete, as vim does", |folder, content| {
+    ("rename to backup, write and delete backup, like vim", |folder, content| {
         fs::write(folder.join("4913"), "").expect("written");
         fs::remove_file(folder.join("4913")).expect("removed");
         fs::rename(folder.join("a.toml"), folder.join("a.toml~")).expect("renamed");
         fs::write(folder.join("a.toml"), content).expect("written");
         fs::remove_file(folder.join("a.toml~")).expect("removed");
     }),
-    ("move away and write, as emacs does", |folder, content| {
+    ("rename to backup and write, like emacs", |folder, content| {
         fs::rename(folder.join("a.toml"), folder.join("a.toml~")).expect("renamed");
         fs::write(folder.join("a.toml"), content).expect("written");
     }),
@@ -129,7 +129,7 @@ const SAVE_METHODS: [(&str, Save); 6] = [
     }),
 ];
 
-/// Runs the tests concurrently, because they mostly wait. A thread that fails reports its name.
+/// Runs tests concurrently, because they mostly wait. A failing test's name is reported as the thread name.
 fn run_concurrently<T: FnOnce() + Send>(all: impl IntoIterator<Item = (&'static str, T)>) {
     std::thread::scope(|scope| {
         for (name, one) in all {
@@ -140,7 +140,7 @@ fn run_concurrently<T: FnOnce() + Send>(all: impl IntoIterator<Item = (&'static 
 }
 
 #[test]
-fn each_save_method_is_one_change() {
+fn each_save_is_reported_as_one_change() {
     run_concurrently(SAVE_METHODS.map(|(name, save)| {
         let three_saves = move || {
             let scratch = Scratch::new(false);
@@ -150,7 +150,7 @@ fn each_save_method_is_one_change() {
     }));
 }
 
-/// Functions with their names.
+/// Pairs each function with its name.
 macro_rules! named {
     ($($own:ident),+ $(,)?) => { [$((stringify!($own), $own as fn())),+] };
 }
@@ -158,20 +158,20 @@ macro_rules! named {
 #[test]
 fn changes_of_watched_files_are_reported() {
     run_concurrently(named![
-        replacement_by_special_file_is_a_change,
-        polling_sees_saves_of_equal_length,
-        replaced_link_target_is_a_change,
-        retargeted_link_is_a_change,
+        replacement_by_special_file_is_reported,
+        polling_detects_saves_of_equal_length,
+        replaced_link_target_is_reported,
+        retargeted_link_is_reported,
         same_content_and_other_files_are_ignored,
         missing_file_is_watched,
         recreated_folder_is_watched,
         swapped_folder_is_watched,
-        change_before_watching_is_noticed,
-        restored_file_is_a_change_if_read_between,
+        change_before_watching_is_detected,
+        restored_file_is_reported_if_read_in_between,
         continuous_saves_are_rate_limited,
         closed_file_is_complete,
         renamed_file_is_complete,
-        backup_save_is_complete_at_its_last_step,
+        backup_save_is_complete_after_last_step,
         open_file_is_checked_when_closed,
         open_file_settles_only_when_closed,
         two_part_write_settles_after_the_second,
@@ -179,7 +179,7 @@ fn changes_of_watched_files_are_reported() {
     ]);
 }
 
-fn polling_sees_saves_of_equal_length() {
+fn polling_detects_saves_of_equal_length() {
     let scratch = Scratch::new(true);
     for content in ["1", "2", "3"] {
         fs::write(scratch.path("a.toml"), content).expect("written");
@@ -187,7 +187,7 @@ fn polling_sees_saves_of_equal_length() {
     }
 }
 
-fn replaced_link_target_is_a_change() {
+fn replaced_link_target_is_reported() {
     let scratch = Scratch::new(false);
     fs::create_dir(scratch.path("elsewhere")).expect("a folder");
     let target = scratch.path("elsewhere/real.toml");
@@ -202,7 +202,7 @@ fn replaced_link_target_is_a_change() {
     });
 }
 
-fn retargeted_link_is_a_change() {
+fn retargeted_link_is_reported() {
     let scratch = Scratch::new(false);
     fs::write(scratch.path("one"), "1").expect("written");
     fs::write(scratch.path("two"), "2").expect("written");
@@ -244,7 +244,7 @@ fn recreated_folder_is_watched() {
     scratch.watch(&[&path]);
     fs::remove_dir_all(&folder).expect("removed");
     scratch.expect_one();
-    // While the folder is missing, there is no further report.
+    // Nothing more is reported while the folder is missing.
     scratch.expect_none();
     make("1");
     scratch.expect_one();
@@ -257,7 +257,7 @@ fn swapped_folder_is_watched() {
     fs::create_dir(&folder).expect("a folder");
     fs::write(&path, "0").expect("written");
     scratch.watch(&[&path]);
-    // Swap in a folder with the same file: nothing changes.
+    // Swap in a folder that contains the same file, which is not a change.
     fs::create_dir(scratch.path("new")).expect("a folder");
     fs::write(scratch.path("new/a.toml"), "0").expect("written");
     fs::rename(&folder, scratch.path("old")).expect("renamed");
@@ -267,7 +267,7 @@ fn swapped_folder_is_watched() {
     scratch.three_saves(|content| fs::write(&path, content).expect("written"));
 }
 
-fn change_before_watching_is_noticed() {
+fn change_before_watching_is_detected() {
     let scratch = Scratch::new(false);
     let path = scratch.path("b.toml");
     fs::write(&path, "new").expect("written");
@@ -276,20 +276,20 @@ fn change_before_watching_is_noticed() {
     scratch.expect_one();
 }
 
-fn restored_file_is_a_change_if_read_between() {
+fn restored_file_is_reported_if_read_in_between() {
     let scratch = Scratch::new(false);
     let path = scratch.path("a.toml");
     fs::write(&path, "said").expect("written");
     scratch.expect_one();
-    // The file had another content for a moment, which a request read and the watcher did not.
+    // The file temporarily had different content, which a request read but the watcher did not.
     let content = Content::Hash(*blake3::hash(b"between").as_bytes());
     let between = vec![FileRead { path: path.clone(), content }];
     scratch.watcher.set_files(between.clone(), Vec::new(), Instant::now());
     scratch.expect_one();
-    // Contents known from before a save are ignored.
+    // Contents read before a save are ignored.
     scratch.watcher.set_files(Vec::new(), between, Instant::now());
     scratch.expect_none();
-    // A report after the start of a request is newer than the content it read.
+    // A change reported after the start of a request is newer than the content that the request read.
     let begun = Instant::now();
     fs::write(&path, "said later").expect("written");
     scratch.expect_one();
@@ -306,7 +306,7 @@ fn continuous_saves_are_rate_limited() {
     }
     let most = begin.elapsed().div_duration_f64(BETWEEN_CHANGES) as usize + 1;
     let during = scratch.news.try_iter().filter(|news| matches!(news, News::Changed(_))).count();
-    assert!((1..=most).contains(&during), "{during} changes said, {most} may be");
+    assert!((1..=most).contains(&during), "{during} changes were reported, but at most {most} are allowed");
     let last = fs::read(scratch.path("a.toml")).expect("read");
     std::thread::sleep(SETTLE);
     scratch.news.try_iter().count();
@@ -314,7 +314,7 @@ fn continuous_saves_are_rate_limited() {
     scratch.expect_none();
 }
 
-/// Watches with endless delays, so that only complete saves are reported.
+/// Starts a watcher with infinite delays, so that only complete saves are reported.
 fn impatient() -> Scratch {
     Scratch::with(false, WatchDelays { quiet: NEVER, longest: NEVER, ..WatchDelays::default() })
 }
@@ -332,7 +332,7 @@ fn renamed_file_is_complete() {
     });
 }
 
-fn backup_save_is_complete_at_its_last_step() {
+fn backup_save_is_complete_after_last_step() {
     let scratch = impatient();
     scratch.three_saves(|content| {
         fs::rename(scratch.path("a.toml"), scratch.path("a.toml~")).expect("renamed");
@@ -354,7 +354,7 @@ fn open_file_is_checked_when_closed() {
     let scratch = impatient();
     let mut file = open(&scratch);
     file.write_all(b"half").expect("written");
-    assert!(scratch.news.recv_timeout(SETTLE).is_err(), "the file is still open");
+    assert!(scratch.news.recv_timeout(SETTLE).is_err(), "an open file should not be reported");
     file.write_all(b" and half").expect("written");
     drop(file);
     scratch.expect_one();

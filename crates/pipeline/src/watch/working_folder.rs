@@ -1,12 +1,13 @@
-//! The working directory, which may be removed and recreated (by a checkout or a restored backup). The process then
-//! stays in the removed directory, so it changes to the new one of the same name.
+//! Handles a working directory that is removed and recreated, for example by a checkout or a restored backup.
+//! The process is still in the removed directory at that point, so it must change to the new directory of the
+//! same name.
 
 use std::env;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-/// The working directory when watching began.
+/// The working directory at the time the watcher was started.
 static HOME: OnceLock<PathBuf> = OnceLock::new();
 
 /// Remembers the working directory.
@@ -16,7 +17,8 @@ pub(super) fn remember() {
     }
 }
 
-/// Whether the working directory exists. If it was removed, changes to a new one of the same name.
+/// Whether the working directory exists. If it was removed, tries to change to a new directory of the same
+/// name.
 pub(super) fn has_working_folder() -> bool {
     !is_removed() || HOME.get().is_some_and(|home| env::set_current_dir(home).is_ok())
 }
@@ -25,7 +27,7 @@ fn is_removed() -> bool {
     env::current_dir().is_err_and(|error| error.kind() == ErrorKind::NotFound)
 }
 
-/// Returns the missing folder that a file needs: the working directory or the file's own folder.
+/// Returns the working directory or the file's own folder if it is needed for the file but missing.
 pub fn missing_folder(file: &Path) -> Option<PathBuf> {
     if is_removed() && file.is_relative() {
         return HOME.get().cloned();

@@ -1,4 +1,4 @@
-//! Key-by-key comparison of two documents, with keys named as `--set` takes them.
+//! Key-by-key comparison of two documents, with keys named as in `--set`.
 
 use std::collections::HashMap;
 
@@ -6,16 +6,17 @@ use crate::key_path::{part, shortened_key};
 use crate::sanitize::shortened;
 use crate::toml::{self, Elements, Entries, TomlValue, Value};
 
-/// Longest text that is parsed, in bytes: parsing delays the new render by a few milliseconds.
+/// Maximum number of bytes to parse. At this size, parsing delays the new render by a few milliseconds.
 const MOST_BYTES: usize = 256 << 10;
-/// Maximum number of changes listed individually; the rest are counted.
+/// Maximum number of changes listed individually. The others are only counted.
 const MAX_LISTED: usize = 3;
 /// Maximum number of characters shown per value.
 const MAX_VALUE_CHARS: usize = 48;
 /// Maximum width of a key in columns.
 const MAX_KEY_COLUMNS: usize = 48;
 
-/// Lists the keys whose values differ, with both values. Empty if no key differs or a text is not TOML.
+/// Lists the keys whose values differ, with both values. Empty if no key differs or if a document is not
+/// valid TOML.
 pub(super) fn changes(before: &str, after: &str) -> Vec<String> {
     if before.len().max(after.len()) > MOST_BYTES {
         return Vec::new();
@@ -31,10 +32,10 @@ pub(super) fn changes(before: &str, after: &str) -> Vec<String> {
 
 /// Differences found so far.
 struct Differences<'t> {
-    /// The texts before and after the edit.
+    /// The source text before and after the edit.
     texts: [&'t str; 2],
     listed: Vec<String>,
-    /// All differences, with those not listed.
+    /// Number of differences, including unlisted differences.
     count: usize,
 }
 
@@ -82,7 +83,7 @@ impl Differences<'_> {
         }
     }
 
-    /// Compares two lists of tables `[[name]]` after skipping their common prefix and suffix.
+    /// Compares two lists of `[[name]]` tables after skipping their common prefix and suffix.
     fn compare_lists(&mut self, name: &str, old: Elements<'_>, new: Elements<'_>) {
         let (old, new): (Vec<Value<'_>>, Vec<Value<'_>>) = (old.iter().collect(), new.iter().collect());
         let least = old.len().min(new.len());
@@ -104,7 +105,7 @@ impl Differences<'_> {
         }
     }
 
-    /// Adds a key that only one text has. Tables `[[name]]` are added one by one.
+    /// Adds a key that exists in only one document. Adds `[[name]]` tables one by one.
     fn add_unmatched(&mut self, sign: char, name: &str, value: &Value<'_>, text: usize) {
         match value.item() {
             TomlValue::Array(array) if array.is_of_tables() => {
@@ -123,7 +124,7 @@ impl Differences<'_> {
         }
     }
 
-    /// Adds a single key or table that only one text has.
+    /// Adds a single key or table that exists in only one document.
     fn add_unmatched_entry(&mut self, sign: char, name: &str, value: &Value<'_>, text: usize) {
         let is_short = match value.item() {
             TomlValue::Table(_) => false,
@@ -145,7 +146,7 @@ impl Differences<'_> {
         }
         let written = self.texts[text].get(value.span()).unwrap_or_default();
         let shown = shortened(&written.split_whitespace().collect::<Vec<_>>().join(" "), MAX_VALUE_CHARS);
-        // Cut between elements: part of a number would look like another number.
+        // Cut between elements, because part of a number would look like another number.
         match (value.item(), shown.rfind(", ")) {
             (TomlValue::Array(_), Some(end)) if shown.ends_with('…') => format!("{}…", &shown[..end + 2]),
             _ => shown,
@@ -157,7 +158,8 @@ fn joined(name: &str, key: &str) -> String {
     if name.is_empty() { part(key) } else { format!("{name}.{}", part(key)) }
 }
 
-/// Key parts for the elements of a list, as `--set` accepts them: a unique name, or else the position from 1.
+/// Key parts that `--set` accepts for the elements of a list: the name if it is unique, or else the 1-based
+/// position.
 fn element_keys(all: &[Value<'_>]) -> Vec<String> {
     let mut counts: HashMap<&str, usize> = HashMap::new();
     for name in all.iter().filter_map(name_of) {
@@ -246,7 +248,7 @@ mod tests {
         changed_to_two("[[quad]]\nname = \"\"\nu = 1", "quad.\"\".u 1 → 2");
     }
 
-    /// `--set` takes a number as a position in the list, and rejects ambiguous names.
+    /// `--set` interprets a number as a position in the list and rejects ambiguous names.
     #[test]
     fn ambiguous_names_become_positions() {
         changed_to_two("[[quad]]\nname = \"7\"\nu = 1", "quad.1.u 1 → 2");
@@ -270,7 +272,7 @@ mod tests {
     }
 
     #[test]
-    fn additions_and_removals_have_a_sign() {
+    fn additions_and_removals_are_marked_with_a_sign() {
         assert_change("fov = 40.0\n", "", "− camera.fov = 40.0");
         assert_change("width = 64", "width = 64\nseed = 7", "+ render.seed = 7");
         assert_change("[[sphere]]\nradius = 1\n", "", "− sphere.2");
@@ -284,7 +286,7 @@ mod tests {
     }
 
     #[test]
-    fn changes_beyond_the_third_are_counted() {
+    fn changes_after_the_third_are_only_counted() {
         let all = SCENE.replace("64", "32").replace("40.0", "41").replace("radius = ", "radius = 1");
         let expected =
             ["render.width 64 → 32", "camera.fov 40.0 → 41", "sphere.ball.radius 0.5 → 10.5 and 2 more"];
@@ -292,7 +294,7 @@ mod tests {
     }
 
     #[test]
-    fn formatting_is_not_a_change() {
+    fn formatting_changes_are_ignored() {
         for (from, to) in
             [("fov = 40.0", "fov = 40.0 # wide"), ("[0, 1, 4]", "[ 0, 1, 4 ]"), ("\nname", "\n\nname")]
         {

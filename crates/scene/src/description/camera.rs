@@ -6,10 +6,10 @@ use super::super::fingerprint::{Fingerprint, Fingerprinted, Referents};
 use super::Located;
 use crate::math::DVec3;
 
-/// The camera of a scene.
+/// A scene's camera.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Camera {
-    /// A camera given by vectors, with `position` ≠ `look_at` and `up` not parallel to the view direction.
+    /// A camera defined by vectors. `position` ≠ `look_at`, and `up` is not parallel to the view direction.
     LookAt {
         /// Position of the camera.
         position: DVec3,
@@ -28,16 +28,17 @@ pub enum Camera {
     Orbiter {
         /// The file.
         file: Located<PathBuf>,
-        /// Vertical field of view in degrees, in (0, 180). `None` to use the file's.
+        /// Vertical field of view in degrees, in (0, 180). `None` to use the field of view in the file.
         fov: Option<f64>,
         /// Lens radius, ≥ 0.
         aperture: f64,
-        /// Focus distance. `None` for the file's distance to its center.
+        /// Focus distance. `None` for the distance to the center in the file.
         focus: Option<f64>,
     },
 }
 
-/// A camera given by vectors, from either kind of [`Camera`]. Fields have the invariants of [`Camera::LookAt`].
+/// A camera defined by vectors, created from either kind of [`Camera`]. The fields have the invariants of
+/// [`Camera::LookAt`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Viewpoint {
     /// Position and orientation.
@@ -61,7 +62,7 @@ pub struct Pose {
     pub up: DVec3,
 }
 
-/// A change of a camera. `None` keeps a value.
+/// A change to a camera. `None` keeps the current value.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CameraChange {
     /// Position and orientation.
@@ -80,14 +81,15 @@ impl Pose {
 }
 
 impl CameraChange {
-    /// Whether it changes anything.
+    /// Whether any value changes.
     pub fn is_any(&self) -> bool {
         *self != Self::default()
     }
 }
 
 impl Viewpoint {
-    /// Applies a change. A focal plane through `look_at`, which is the default, still passes through the changed `look_at`.
+    /// Applies a change. If the focal plane passes through `look_at` (the default), the focus follows
+    /// `look_at`.
     pub fn changed(&self, change: &CameraChange) -> Self {
         let pose = change.pose.unwrap_or(self.pose);
         let focus = if self.is_focused_on_look_at() { pose.distance() } else { self.focus };
@@ -112,14 +114,15 @@ impl From<Viewpoint> for Camera {
     }
 }
 
-/// Whether two distances are equal up to the rounding of camera steps. A step towards `look_at` is fifty times as long.
+/// Whether two distances are equal up to rounding by camera steps. A step towards `look_at` is 50 times
+/// larger.
 pub fn is_same_distance(a: f64, b: f64) -> bool {
     const ROUNDING: f64 = 1e-3;
     (a - b).abs() <= ROUNDING * a.abs().max(b.abs())
 }
 
 impl Camera {
-    /// Whether the camera has this viewpoint, up to rounding of the focus distance.
+    /// Whether the camera has this viewpoint, except for rounding of the focus distance.
     pub fn is_nearly(&self, view: &Viewpoint) -> bool {
         match self {
             Self::LookAt { focus, .. } if is_same_distance(*focus, view.focus) => {
@@ -143,7 +146,7 @@ impl Fingerprinted for Camera {
             Self::LookAt { position, look_at, up, fov, aperture, focus } => {
                 key.index(0).dvec3(*position).dvec3(*look_at).dvec3(*up).f64(*fov).f64(*aperture).f64(*focus);
             }
-            // Hash the file's content, not its name.
+            // Hash the file's contents rather than its name.
             Self::Orbiter { file: _, fov, aperture, focus } => {
                 // 0 is neither a valid angle nor a valid distance.
                 key.index(1).f64(*aperture).f64(fov.unwrap_or(0.0)).f64(focus.unwrap_or(0.0));

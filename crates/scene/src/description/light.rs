@@ -32,31 +32,31 @@ pub struct PointLight {
 /// A point light that shines into a cone.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SpotLight {
-    /// Position, and intensity on the axis.
+    /// Position and on-axis intensity.
     pub point: PointLight,
     /// A point on the axis, different from the position.
     pub look_at: DVec3,
     /// Full apex angle of the cone in degrees, in (0, 360).
     pub angle: f64,
-    /// Outer fraction of the half angle where the light fades out, in [0, 1].
+    /// Outer fraction of the half angle over which the light fades out, in [0, 1].
     pub blend: f32,
 }
 
 /// A distant light.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DirectionalLight {
-    /// Direction in which the light travels, of any nonzero length.
+    /// Direction in which the light travels, with any nonzero length.
     pub direction: DVec3,
     /// Irradiance at normal incidence.
     pub irradiance: Vec3,
-    /// Apparent diameter in degrees, up to 180; 0 for no extent.
+    /// Apparent diameter in degrees, from 0 (no extent) to 180.
     pub angle: f64,
 }
 
 /// Light from all directions: `[environment]`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Environment {
-    /// Radiance, or a factor on the map.
+    /// Radiance, or a scale factor for the map.
     pub color: Vec3,
     /// An equirectangular map, resolved against the scene's folder.
     pub file: Option<Located<PathBuf>>,
@@ -75,7 +75,7 @@ impl Light {
         color != Vec3::ZERO
     }
 
-    /// Whether the light is a δ distribution, so rays cannot hit it.
+    /// Whether the light is a δ distribution, which rays cannot hit.
     pub fn is_sharp(&self) -> bool {
         match self {
             Self::Point(_) | Self::Spot(_) => true,
@@ -94,7 +94,7 @@ impl Light {
 }
 
 impl Environment {
-    /// Whether the color is not black. Ignores the map.
+    /// Whether the color, without the map, is not black.
     pub fn sends(&self) -> bool {
         self.color != Vec3::ZERO
     }
@@ -122,7 +122,7 @@ impl Fingerprinted for PointLight {
     }
 }
 
-/// Fingerprint of the lookup. Texels have a separate fingerprint.
+/// Fingerprint of the lookup parameters. Texels have a separate fingerprint.
 impl Fingerprinted for Environment {
     fn add_to(&self, key: &mut Fingerprint, _: &Referents<'_>) {
         let Self { color, file, rotate } = self;

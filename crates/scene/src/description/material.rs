@@ -13,9 +13,9 @@ use crate::math::{DVec3, Vec2, Vec3};
 /// An image used by materials.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Texture {
-    /// Its name in the scene.
+    /// Name in the scene.
     pub name: String,
-    /// Its file, resolved against the scene's folder.
+    /// The image or glTF file, resolved against the scene's folder.
     pub file: Located<PathBuf>,
     /// Index of the image in a glTF file. `None` if the file is an image.
     pub image: Option<u32>,
@@ -23,7 +23,7 @@ pub struct Texture {
     pub filter: TextureFilter,
     /// Addressing mode outside of [0, 1].
     pub wrap: Wrap,
-    /// Tiling factors of u and v, not 0.
+    /// Tiling factors for u and v, not 0.
     pub repeat: Vec2,
     /// Rotation of the repeated coordinates, in degrees from u to v.
     pub rotate: f64,
@@ -33,12 +33,12 @@ pub struct Texture {
     pub uv: UvSet,
     /// Encoding of the pixels.
     pub encoding: Encoding,
-    /// Factor on linear colors and numbers. Not applied to normals and heights.
+    /// Scale factor for linear colors and numbers. Not applied to normals and heights.
     pub factor: Vec3,
 }
 
 choice! {
-    /// Encodings of textures.
+    /// Texture encodings.
     pub enum Encoding {
         /// sRGB for 8- and 16-bit colors, linear for numbers, normal maps and floating-point files.
         Auto = "auto",
@@ -67,7 +67,7 @@ pub enum NumberSource {
     Texture {
         /// Index into [`Scene::textures`](super::Scene::textures).
         texture: usize,
-        /// The channel. `None` for the default of the key.
+        /// The channel. `None` for the key's default channel.
         channel: Option<Channel>,
     },
 }
@@ -81,7 +81,8 @@ impl NumberSource {
         }
     }
 
-    /// The texture and how to get the number from a pixel, which is `usual` without a channel. `None` if constant.
+    /// The texture, and how to compute the number from a pixel: with the channel, or else with `usual`.
+    /// `None` if constant.
     pub fn texture(&self, usual: PixelValue) -> Option<(usize, PixelValue)> {
         match *self {
             Self::Constant(_) => None,
@@ -111,7 +112,7 @@ impl OpacitySource {
         }
     }
 
-    /// The texture and how to get the opacity from a pixel. `None` if constant.
+    /// The texture, and how to compute the opacity from a pixel. `None` if constant.
     pub fn texture(&self) -> Option<(usize, PixelValue)> {
         self.value.texture(PixelValue::Opacity)
     }
@@ -124,9 +125,9 @@ pub enum FresnelSource {
     Schlick(ColorSource),
     /// Fresnel equations with the complex index of refraction.
     Index {
-        /// Its real part.
+        /// Real part of the index of refraction.
         eta: ColorSource,
-        /// Its imaginary part.
+        /// Imaginary part of the index of refraction.
         k: ColorSource,
     },
 }
@@ -134,11 +135,11 @@ pub enum FresnelSource {
 /// Emitted radiance, constant or textured.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EmissionSource {
-    /// The radiance, or a factor on the texture.
+    /// The radiance, or a scale factor for the texture.
     pub scale: Vec3,
     /// Index into [`Scene::textures`](super::Scene::textures).
     pub texture: Option<usize>,
-    /// Sides that emit.
+    /// Sides that emit light.
     pub sides: EmissionSides,
 }
 
@@ -155,7 +156,7 @@ impl EmissionSource {
 /// A named material.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Material {
-    /// Its name in the scene.
+    /// Name in the scene.
     pub name: String,
     /// Reflection and transmission.
     pub kind: MaterialKind,
@@ -170,7 +171,7 @@ pub struct Material {
 }
 
 impl MaterialKind {
-    /// Name of the type in a scene file.
+    /// Name of the type in scene files.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Phong { .. } => "phong",
@@ -182,7 +183,7 @@ impl MaterialKind {
         }
     }
 
-    /// Whether it has a δ lobe, as mirrors, smooth glass and smooth coats do.
+    /// Whether the material has a δ lobe, like mirrors, smooth glass and smooth coats.
     pub fn has_delta(&self) -> bool {
         match self {
             Self::Phong { .. } | Self::Principled { .. } => false,
@@ -193,7 +194,7 @@ impl MaterialKind {
         }
     }
 
-    /// Whether it is glass of index 1, which does not refract in air, even if it is rough.
+    /// Whether the material is smooth or rough glass with index 1, which does not refract in air.
     pub fn is_like_air(&self) -> bool {
         match self {
             Self::Glass { ior, .. } => *ior == 1.0,
@@ -206,7 +207,7 @@ impl MaterialKind {
         }
     }
 
-    /// Whether it is anisotropic, so it depends on the direction of texture coordinates.
+    /// Whether the material is anisotropic and therefore depends on the direction of texture coordinates.
     pub fn has_direction(&self) -> bool {
         match self {
             Self::Metal { anisotropy, .. } => *anisotropy != NumberSource::Constant(0.0),
@@ -219,7 +220,7 @@ impl MaterialKind {
         }
     }
 
-    /// Whether it has a color that vertex colors can multiply.
+    /// Whether the material has a color that vertex colors can multiply.
     pub fn has_color(&self) -> bool {
         match self {
             Self::Metal { fresnel: FresnelSource::Index { .. }, .. } | Self::Glass { .. } => false,
@@ -232,12 +233,13 @@ impl MaterialKind {
         }
     }
 
-    /// Whether it is solid glass.
+    /// Whether the material is solid glass.
     pub fn is_glass(&self) -> bool {
         self.substance().is_some()
     }
 
-    /// The bits of the index of refraction and transmittance of solid glass, regardless of roughness. `None` for other materials.
+    /// Bits of the index of refraction and the transmittance of solid glass, independent of roughness. `None`
+    /// for other materials.
     pub fn substance(&self) -> Option<[u64; 4]> {
         match *self {
             Self::Glass { ior, tint, roughness: _ } => {
@@ -258,7 +260,7 @@ impl MaterialKind {
 pub struct NormalMap {
     /// Index into [`Scene::textures`](super::Scene::textures).
     pub texture: usize,
-    /// Factor on the slopes, ≥ 0.
+    /// Scale factor for the slopes, ≥ 0.
     pub strength: f32,
 }
 
@@ -267,14 +269,14 @@ pub struct NormalMap {
 pub struct Bump {
     /// Index into [`Scene::textures`](super::Scene::textures).
     pub texture: usize,
-    /// The channel with the heights. `None` for luminance.
+    /// The channel that contains the heights. `None` for luminance.
     pub channel: Option<Channel>,
     /// Displacement of white. Negative values invert the relief.
     pub scale: f32,
 }
 
 impl Bump {
-    /// How to get the height from a pixel.
+    /// How to compute the height from a pixel.
     pub fn number(&self) -> PixelValue {
         self.channel.map_or(PixelValue::Luminance, PixelValue::Channel)
     }
@@ -285,7 +287,7 @@ impl Bump {
 pub enum TextureUse {
     /// Colors.
     Color,
-    /// Colors of a surface whose opacity is the image's alpha channel.
+    /// Colors of a surface that takes its opacity from the image's alpha channel.
     CutOut,
     /// Normals.
     Normal,
@@ -314,7 +316,7 @@ pub enum TextureRole {
     Bump(PixelValue),
     /// Opacity.
     Opacity(PixelValue),
-    /// Clear coat over an emitter.
+    /// Clear coat on an emitter.
     EmissionCoat(PixelValue),
 }
 
@@ -355,9 +357,10 @@ pub enum MaterialKind {
     },
     /// Smooth or rough dielectric.
     Glass {
-        /// Index of refraction inside, in [0.1, 10]. Below 1 it is optically thinner than the outside, like a bubble in water.
+        /// Index of refraction inside, in [0.1, 10]. Below 1, the inside is optically thinner than the
+        /// outside, like a bubble in water.
         ior: f32,
-        /// Transmittance per unit of length inside, in [0, 1].
+        /// Transmittance per unit length inside, in [0, 1].
         tint: DVec3,
         /// Square root of the GGX α, in [0, 1]; 0 is smooth.
         roughness: NumberSource,
@@ -375,21 +378,21 @@ pub enum MaterialKind {
         fresnel: FresnelSource,
         /// Square root of the GGX α, in [0, 1]; 0 is a mirror.
         roughness: NumberSource,
-        /// Stretch of the highlight along u, in [−1, 1].
+        /// How far the highlight is stretched along u, in [−1, 1].
         anisotropy: NumberSource,
     },
     /// A diffuse base under a dielectric microfacet coat.
     Plastic {
         /// kd, in [0, 1].
         diffuse: ColorSource,
-        /// Factor on the reflectance of the coat, in [0, 1].
+        /// Scale factor for the coat's reflectance, in [0, 1].
         specular: ColorSource,
         /// Index of refraction, in [1, 10].
         ior: f32,
-        /// Square root of the GGX α of the coat, in [0, 1]; 0 is smooth.
+        /// Square root of the coat's GGX α, in [0, 1]; 0 is smooth.
         roughness: NumberSource,
     },
-    /// The material model of glTF. Colors and numbers are in [0, 1], except for `ior` and `specular_color`.
+    /// The glTF material model. Colors and numbers are in [0, 1], except for `ior` and `specular_color`.
     Principled {
         /// Diffuse reflectance of the dielectric part, and reflectance of the metal at normal incidence.
         color: ColorSource,
@@ -399,11 +402,12 @@ pub enum MaterialKind {
         roughness: NumberSource,
         /// Index of refraction, in [1, 10].
         ior: f32,
-        /// Factor on the specular reflectance of the dielectric part.
+        /// Scale factor for the dielectric part's specular reflectance.
         specular: NumberSource,
-        /// Factor on that reflectance at normal incidence, ≥ 0.
+        /// Scale factor for the dielectric part's specular reflectance at normal incidence, ≥ 0.
         specular_color: ColorSource,
-        /// Fraction of the light below the specular lobe that is transmitted.
+        /// Fraction of light not reflected by the specular lobe that is transmitted instead of scattered
+        /// diffusely.
         transmission: NumberSource,
         /// Weight of a clear coat.
         clearcoat: NumberSource,
@@ -413,7 +417,7 @@ pub enum MaterialKind {
 }
 
 impl ColorSource {
-    /// Index of the texture, if it is one.
+    /// Index of the texture. `None` if constant.
     fn texture(&self) -> Option<usize> {
         match self {
             Self::Constant(_) => None,
@@ -423,7 +427,7 @@ impl ColorSource {
 }
 
 impl MaterialKind {
-    /// The colors with their roles.
+    /// The colors and their roles.
     fn colors(&self) -> Vec<(&ColorSource, TextureRole)> {
         match self {
             Self::Phong { diffuse, specular, shininess: _, ambient } => vec![
@@ -477,7 +481,7 @@ impl Material {
         self.emission.scale != Vec3::ZERO
     }
 
-    /// Weight and roughness of the clear coat over the emission. `None` without emission or coat.
+    /// Weight and roughness of the clear coat on an emitter. `None` without emission or clear coat.
     pub fn emission_coat(&self) -> Option<[NumberSource; 2]> {
         match self.kind {
             MaterialKind::Principled { clearcoat, clearcoat_roughness, .. } => {
@@ -493,8 +497,8 @@ impl Material {
         }
     }
 
-    /// The textures used, as indices into [`Scene::textures`](super::Scene::textures), with their roles. A texture may occur
-    /// several times.
+    /// The textures as indices into [`Scene::textures`](super::Scene::textures), and their roles. A texture
+    /// may occur several times.
     pub fn textures(&self) -> Vec<(usize, TextureRole)> {
         let Self { name: _, kind, emission, normal_map, bump, opacity } = self;
         let colors = kind.colors().into_iter().filter_map(|(color, role)| Some((color.texture()?, role)));
@@ -511,7 +515,7 @@ impl Material {
     }
 }
 
-/// Fingerprint of the lookup. Texels have separate fingerprints.
+/// Fingerprint of the lookup parameters. Texels have separate fingerprints.
 impl Fingerprinted for Texture {
     fn add_to(&self, key: &mut Fingerprint, _: &Referents<'_>) {
         let Self { name: _, file, image, filter, wrap, repeat, rotate, offset, uv, encoding, factor } = self;

@@ -1,4 +1,5 @@
-//! Properties of the integrators, and the settings they support. Other code queries these instead of matching on integrators.
+//! Properties and supported settings of the integrators. Other code queries these instead of matching on
+//! integrators.
 
 use crate::choice;
 
@@ -12,18 +13,19 @@ choice! {
     }
 }
 
-/// Properties of an integrator, and the settings that it supports.
+/// Properties and supported settings of an integrator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Method {
     /// Whether camera paths split at glass, instead of choosing randomly between reflection and refraction.
     pub splits: bool,
-    /// Whether paths scatter at rough surfaces, and so find all light. Otherwise they end there, unless photons are gathered.
+    /// Whether paths scatter at rough surfaces and can therefore find all light. If not, paths end at rough
+    /// surfaces unless photons are gathered.
     pub scatters: bool,
     /// Whether `[photons]` is supported.
     pub gathers: bool,
-    /// Whether `shadows` is supported. Otherwise shadows are soft.
+    /// Whether `shadows` is supported. If not, shadows are soft.
     pub honors_shadows: bool,
-    /// Whether `ambient` is supported. Photons replace it.
+    /// Whether `ambient` is supported. Photons replace ambient light.
     pub honors_ambient: bool,
     /// Whether `clamp` is supported.
     pub honors_clamp: bool,

@@ -1,6 +1,7 @@
-//! The validated scene, with all defaults filled in. Independent of the file syntax; objects refer to each other by index.
+//! The validated scene, with all defaults filled in. It is independent of the file syntax. Objects refer to
+//! each other by index.
 //!
-//! Lengths are in the scene's unit, angles in degrees, colors linear Rec. 709. All numbers are finite.
+//! Lengths are in scene units, angles in degrees, and colors in linear Rec. 709. All numbers are finite.
 
 mod camera;
 pub mod light;
@@ -50,7 +51,7 @@ pub struct Scene {
     pub environment: Option<Environment>,
 }
 
-/// A value with its span in the scene file.
+/// A value and its span in the scene file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Located<T> {
     /// The value.
@@ -64,7 +65,7 @@ pub struct Located<T> {
 pub struct MeshFile {
     /// The file.
     pub value: PathBuf,
-    /// Byte range of its path in the scene file.
+    /// Byte range of the path in the scene file.
     pub span: Range<usize>,
     /// Index of the part. `None` for the whole file.
     pub part: Option<u32>,
@@ -77,8 +78,8 @@ pub struct Photons {
     pub enabled: bool,
     /// Photons per pass. 0 means about one per pixel.
     pub count: u64,
-    /// Kernel radius of the first pass. 0 chooses it from the photon density.
+    /// Kernel radius of the first pass. 0 chooses a radius based on the photon density.
     pub radius: f64,
-    /// Maximum number of bounces of a photon.
+    /// Maximum number of bounces per photon.
     pub bounces: u32,
 }

@@ -12,7 +12,7 @@ use crate::math::Vec3;
 use crate::math::limits::LARGEST;
 pub use crate::sampling::filter::PixelFilter;
 
-/// Largest `max_depth`. Between perfect mirrors, nothing else terminates a path.
+/// Maximum value of `max_depth`, the only limit on paths between perfect mirrors.
 pub const MAX_BOUNCES: u32 = 10_000;
 
 #[doc(hidden)]
@@ -28,7 +28,7 @@ macro_rules! __render_keys {
             height: u32 = 480, whole(1, 65_536), "pixels", option;
             /// Maximum number of samples per pixel.
             samples: u32 = 64, whole(1, u32::MAX), "per pixel", option;
-            /// Noise at which a tile is finished; 0 always takes all `samples`.
+            /// Noise threshold below which a tile is finished; 0 always takes all `samples`.
             error: f32 = 0.0, at_least(0.0), "fraction of the brightness", option;
             /// Shadow rays per sample to each area light.
             shadow_samples: u32 = 1, whole(1, 4096), "per light", scene;
@@ -38,7 +38,7 @@ macro_rules! __render_keys {
             integrator: Integrator = Integrator::Whitted, choice, "", option;
             /// Shadows in `whitted`.
             shadows: Shadows = Shadows::Soft, choice, "", option;
-            /// Limits indirect radiance per bounce: removes fireflies, but darkens the image (biased); 0 disables the limit.
+            /// Limit on indirect radiance per bounce: removes fireflies, but darkens the image (biased); 0 disables the limit.
             clamp: f32 = 0.0, at_least(0.0), "radiance", option;
             /// Ambient radiance in `whitted`, an approximation of indirect light.
             ambient: Vec3 = Vec3::ZERO, color, "radiance", scene;
@@ -46,13 +46,13 @@ macro_rules! __render_keys {
             background: Vec3 = Vec3::ZERO, color, "radiance", scene;
             /// Pixel reconstruction filter.
             filter: PixelFilter = PixelFilter::Box, choice, "", scene;
-            /// Exposure of the image: 1 is twice as bright.
+            /// Image exposure: each stop doubles the brightness.
             exposure: f32 = 0.0, between(-100.0, 100.0), "stops", live;
             /// Tone curve for 8- and 16-bit formats and the screen.
             tonemap: Tonemap = Tonemap::None, choice, "", scene;
             /// Acceleration structure.
             accel: Accel = Accel::Bvh, choice, "", option;
-            /// Random seed: a different seed gives different noise.
+            /// Random seed: different seeds produce different noise.
             seed: u32 = 0, whole(0, u32::MAX), "", option;
         }
     };
@@ -87,8 +87,8 @@ macro_rules! __render_keys {
     };
 }
 
-/// Passes the definitions of the keys of `[render]` to a macro, each as `doc name: type = default, range, unit, change;`.
-/// The parser, [`Render`], overrides and command-line options are generated from them.
+/// Passes the definitions of all `[render]` keys to a macro, each as `doc name: type = default, range, unit,
+/// change;`. The parser, [`Render`], overrides and command-line options are generated from them.
 ///
 /// The ranges are `whole(MIN, MAX)`, `at_least(MIN)`, `between(MIN, MAX)`, `choice` and `color`. The changes:
 ///
@@ -98,15 +98,15 @@ macro_rules! __render_keys {
 /// | `live` | the terminal UI overrides the key |
 /// | `scene` | only the scene sets the key |
 ///
-/// `render_keys!(callback)` passes all keys, `render_keys!(callback, changed)` those with `option` or `live`, and
-/// `render_keys!(callback, option)` those with `option`.
+/// `render_keys!(callback)` passes all keys, `render_keys!(callback, changed)` passes keys with `option` or
+/// `live`, and `render_keys!(callback, option)` passes keys with `option`.
 ///
-/// To add a key, add it here, to [`Render::add_to`](Fingerprinted::add_to) if images depend on it, to the starter scene, and
-/// to the command-line arguments if it has an option. Tests compare these.
+/// To add a key, add it here, to [`Render::add_to`](Fingerprinted::add_to) if images depend on it, to the
+/// starter scene, and to the command-line arguments if it has an option. Tests check that these agree.
 #[doc(inline)]
 pub use __render_keys as render_keys;
 
-/// Range of a key of `[render]`.
+/// Range of a `[render]` key.
 #[derive(Clone, Debug, PartialEq)]
 pub enum KeyRange {
     /// Whole numbers.
@@ -119,22 +119,22 @@ pub enum KeyRange {
     Color,
 }
 
-/// A key of `[render]`.
+/// A `[render]` key.
 #[derive(Clone, Debug)]
 pub struct RenderKey {
     /// The key.
     pub name: &'static str,
-    /// Description, one sentence without its full stop.
+    /// Description, as one sentence without a period at the end.
     pub doc: &'static str,
     /// The unit, or an empty string.
     pub unit: &'static str,
     /// Accepted values.
     pub range: KeyRange,
-    /// Returns the accepted names with their meanings. Empty for other types.
+    /// Returns the accepted names and their meanings. Empty for other types.
     pub words: WordList,
     /// The default, in scene file syntax.
     pub default: String,
-    /// Whether a command-line option overrides it.
+    /// Whether a command-line option overrides the key.
     pub has_option: bool,
 }
 
@@ -181,7 +181,7 @@ macro_rules! settings {
     ($(
         $(#[doc = $doc:literal])* $name:ident: $type:ty = $default:expr, $range:ident $(($($limit:expr),*))?, $unit:literal, $change:ident;
     )*) => {
-        /// Settings of `[render]`.
+        /// The `[render]` settings.
         #[derive(Clone, Copy, Debug, PartialEq)]
         pub struct Render {
             $($(#[doc = $doc])* pub $name: $type,)*
@@ -239,7 +239,7 @@ choice! {
 }
 
 impl Render {
-    /// Replaces settings that the integrator ignores by their defaults.
+    /// Replaces settings ignored by the integrator with their defaults.
     pub fn effective(self) -> Self {
         let method = self.integrator.method();
         Self {
@@ -251,13 +251,13 @@ impl Render {
     }
 }
 
-/// Fingerprint of the settings that affect samples.
+/// Fingerprint of all settings that affect the samples.
 impl Fingerprinted for Render {
     fn add_to(&self, key: &mut Fingerprint, _: &Referents<'_>) {
         let Self {
             width,
             height,
-            // The film stores its number of samples.
+            // The film stores its sample count.
             samples: _,
             error,
             shadow_samples,
@@ -271,7 +271,8 @@ impl Fingerprinted for Render {
             // These affect only the output.
             exposure: _,
             tonemap: _,
-            // All structures give the same hits. Views that visualize them add this key.
+            // All acceleration structures find the same hits. Views that visualize these structures add this
+            // key to their fingerprint.
             accel: _,
             seed,
         } = self.effective();

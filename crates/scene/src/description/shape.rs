@@ -16,7 +16,7 @@ use crate::geometry::triangle::Triangle;
 use crate::math::transform::Transform;
 use crate::math::{DMat3, DVec3};
 
-/// A shape with its material.
+/// A shape and its material.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Object {
     /// The geometry.
@@ -52,7 +52,7 @@ pub enum Shape {
     Plane {
         /// A point on the plane.
         point: DVec3,
-        /// Direction that the front faces, of any nonzero length.
+        /// Direction that the front side faces, with any nonzero length.
         normal: DVec3,
     },
     /// An oriented box.
@@ -77,16 +77,16 @@ pub enum Shape {
     Disk {
         /// Center.
         center: DVec3,
-        /// Direction that the front faces, of any nonzero length.
+        /// Direction that the front side faces, with any nonzero length.
         normal: DVec3,
         /// Radius, > 0.
         radius: f64,
     },
     /// A cylinder.
     Cylinder {
-        /// One end of the axis.
+        /// Start of the axis.
         a: DVec3,
-        /// The other end, different from `a`.
+        /// End of the axis, different from `a`.
         b: DVec3,
         /// Radius, > 0.
         radius: f64,
@@ -108,7 +108,7 @@ pub enum Shape {
     Torus {
         /// Center.
         center: DVec3,
-        /// Axis of symmetry, of any nonzero length.
+        /// Axis of symmetry, with any nonzero length.
         axis: DVec3,
         /// Distance from the center to the middle of the tube, > `tube`.
         radius: f64,
@@ -119,7 +119,7 @@ pub enum Shape {
     Mesh(Mesh),
 }
 
-/// A shape with a border, which does not enclose a volume on its own.
+/// An open surface, which does not enclose a volume on its own.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Sheet {
     /// A parallelogram, given by its corners in counterclockwise order seen from the front.
@@ -130,7 +130,7 @@ pub enum Sheet {
     Disk {
         /// Center.
         center: DVec3,
-        /// Normal of the front, of any length.
+        /// Normal of the front side, with any length.
         normal: DVec3,
         /// Radius.
         radius: f64,
@@ -160,7 +160,7 @@ pub enum Sheet {
 pub struct Mesh {
     /// Index into [`Scene::mesh_files`](super::Scene::mesh_files).
     pub file: usize,
-    /// Map from the file's coordinates to the scene's.
+    /// Transform from file coordinates to scene coordinates.
     pub placed: Placement,
     /// Whether vertex normals are interpolated.
     pub smooth: bool,
@@ -168,12 +168,12 @@ pub struct Mesh {
     pub vertex_colors: bool,
 }
 
-/// Transform from the coordinates of a mesh file to the scene.
+/// Transform from a mesh file's coordinates to scene coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Placement {
     /// Scale, rotation and translation.
     Steps {
-        /// Applied first. No component is 0.
+        /// Scale factors, applied first. No component is 0.
         scale: DVec3,
         /// Rotation in degrees about x, then y, then z.
         rotate: DVec3,
@@ -203,17 +203,17 @@ impl Placement {
     }
 }
 
-/// Shapes as they are traced.
+/// A shape in the form used for tracing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Lowered<'a> {
     /// An analytic shape.
     Shape(geometry::Shape),
-    /// A mesh, whose triangles are in a file.
+    /// A mesh. Its triangles are in a file.
     Mesh(&'a Mesh),
 }
 
 impl Shape {
-    /// Lowers the shape, in coordinates relative to `origin`.
+    /// Lowers the shape to coordinates relative to `origin`.
     pub fn lowered(&self, origin: DVec3) -> Lowered<'_> {
         let at = |place: DVec3| place - origin;
         Lowered::Shape(match *self {
@@ -256,12 +256,12 @@ impl Shape {
         }
     }
 
-    /// The instance of a mesh file. `None` for other shapes.
+    /// The mesh instance. `None` for other shapes.
     pub fn mesh(&self) -> Option<&Mesh> {
         if let Self::Mesh(mesh) = self { Some(mesh) } else { None }
     }
 
-    /// The shape as a sheet. `None` for shapes with an inside, planes and meshes.
+    /// The shape as a sheet. `None` for closed shapes, planes and meshes.
     pub fn sheet(&self) -> Option<Sheet> {
         match *self {
             Self::Quad { corner, u, v } => {
@@ -296,11 +296,11 @@ impl Shape {
         }
     }
 
-    /// Upper bound of the projections of all points onto a unit direction. Infinite for planes, unless they are perpendicular
-    /// to it. `None` for a mesh.
+    /// Upper bound on the projection of the shape's points onto a unit direction. Infinite for planes that
+    /// are not perpendicular to the direction. `None` for a mesh.
     pub fn reach(&self, direction: DVec3) -> Option<f64> {
         let along = |place: DVec3| direction.dot(place);
-        // Projection onto the direction of a circle's radius around an axis.
+        // Extent of a circle around an axis, projected onto the direction.
         let round = |axis: DVec3, radius: f64| {
             let cosine = axis.try_normalize().map_or(0.0, along);
             radius * (1.0 - cosine * cosine).max(0.0).sqrt()
@@ -331,7 +331,7 @@ impl Shape {
     }
 }
 
-/// The largest projection of points onto a unit direction.
+/// The largest projection of the points onto a unit direction.
 pub fn greatest(direction: DVec3, points: &[DVec3]) -> f64 {
     points.iter().map(|point| direction.dot(*point)).fold(f64::NEG_INFINITY, f64::max)
 }

@@ -9,12 +9,12 @@ use crate::math::DVec3;
 /// Default field of view.
 pub(crate) const FOV_DEGREES: f64 = 40.0;
 
-/// `up` and the view direction count as parallel if the sine of the angle between them is less than this.
+/// `up` and the view direction are considered parallel if the sine of the angle between them is below this.
 const MIN_SINE: f64 = 1e-6;
 
 pub(super) fn read(root: &TableReader<'_>) -> Option<Camera> {
     if !root.optional("camera").is_given() {
-        // The misspelled table is reported already.
+        // The misspelled table has already been reported.
         if root.has_misspelled("camera") {
             return None;
         }
@@ -29,7 +29,8 @@ pub(super) fn read(root: &TableReader<'_>) -> Option<Camera> {
     camera
 }
 
-/// Whether the orbiter file defines the camera: `--set` of both `position` and `look_at` replaces it.
+/// Whether the orbiter file defines the camera. `--set` overrides it if both `position` and `look_at` are
+/// set.
 fn has_orbiter(table: &TableReader<'_>) -> bool {
     let is_set = |name| table.optional(name).span().is_some_and(|span| table.context.is_set(&span));
     let is_replaced = is_set("position") && is_set("look_at") && !is_set("orbiter");

@@ -37,7 +37,7 @@ pub(super) fn opacity(table: &TableReader<'_>, textures: &Names) -> OpacitySourc
     OpacitySource { value: value.unwrap_or(NumberSource::Constant(1.0)), cutoff }
 }
 
-/// Warns about a key that has no effect without another one.
+/// Warns about a key that has no effect without another key.
 pub(super) fn warn_without(table: &TableReader<'_>, name: &'static str, other: &'static str) {
     let key = table.optional(name);
     if let Some(span) = key.key_span().filter(|_| !table.optional(other).is_given()) {
@@ -45,7 +45,7 @@ pub(super) fn warn_without(table: &TableReader<'_>, name: &'static str, other: &
     }
 }
 
-/// Reports opacity keys of solid glass.
+/// Reports opacity keys on solid glass.
 pub(super) fn refuse_opacity(table: &TableReader<'_>) {
     for name in ["opacity", "opacity_cutoff"] {
         let message = format!("solid glass cannot have `{name}`");

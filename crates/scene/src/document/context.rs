@@ -1,4 +1,4 @@
-//! Context shared by all readers of one file: its text, its path and the issues found.
+//! Context shared by all readers of a file: source text, path and issues found.
 
 use std::cell::{Cell, OnceCell, RefCell};
 use std::ops::Range;
@@ -19,7 +19,7 @@ pub(super) struct Context<'a> {
     searches: Cell<Searches>,
 }
 
-/// Number of searches for similar names, and of comparisons.
+/// Number of searches for similar names, and number of comparisons.
 #[derive(Clone, Copy, Default)]
 struct Searches {
     count: usize,
@@ -36,14 +36,14 @@ pub(super) struct Issue {
     cause: IssueCause,
 }
 
-/// Cause of an issue, which determines whether it is shown if there are syntax errors.
+/// Cause of an issue. Determines whether the issue is reported if there are syntax errors.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum IssueCause {
     /// A TOML syntax error.
     Syntax,
     /// The value at the span.
     Value,
-    /// A missing value, or one elsewhere: perhaps it is in a line with a syntax error.
+    /// A missing value, or a value elsewhere in the file. The cause may be a line with a syntax error.
     Absence,
 }
 
@@ -66,7 +66,7 @@ impl Issue {
         Self { severity: Severity::Warning, cause: IssueCause::Absence, ..Self::error(span, message) }
     }
 
-    /// Sets the label of the underline.
+    /// Sets the text next to the underline.
     pub(super) fn label(self, label: impl Into<String>) -> Self {
         Self { label: label.into(), ..self }
     }
@@ -76,7 +76,7 @@ impl Issue {
         Self { help: Some(help.into()), ..self }
     }
 
-    /// Sets the help text, if there is one.
+    /// Sets the help text, if any.
     pub(super) fn maybe_help(self, help: Option<String>) -> Self {
         Self { help, ..self }
     }
@@ -98,7 +98,7 @@ impl<'a> Context<'a> {
         Self { source, path, lines, issues, counts, searches }
     }
 
-    /// Whether a span is in a `--set` value instead of the file.
+    /// Whether a span is in a `--set` value rather than in the file.
     pub(super) fn is_set(&self, span: &Range<usize>) -> bool {
         self.source.is_set(span)
     }
@@ -108,7 +108,7 @@ impl<'a> Context<'a> {
         self.report_with(|| issue);
     }
 
-    /// Adds an issue to the list. Only counts it if the list is full.
+    /// Adds an issue to the list, or only counts the issue if the list is full.
     pub(super) fn report_with(&self, make: impl FnOnce() -> Issue) {
         let issue = make();
         let mut counts = self.counts.get();
@@ -124,7 +124,7 @@ impl<'a> Context<'a> {
         self.issues.borrow().iter().any(|issue| issue.severity == Severity::Error)
     }
 
-    /// The text of the file.
+    /// The file's text.
     pub(super) fn file(&self) -> &str {
         self.source.text()
     }
@@ -134,8 +134,8 @@ impl<'a> Context<'a> {
         self.source.all().get(span.clone()).unwrap_or_default()
     }
 
-    /// Searches for a similar name in a list. The cost is linear in the list, so the number of searches per file is limited: a
-    /// file with more wrong names has the same mistake many times.
+    /// Searches a list for a similar name. The cost is linear in the length of the list, so the number of
+    /// searches per file is limited. Files with more wrong names usually repeat the same mistake.
     pub(super) fn search<T>(&self, comparisons: usize, look: impl FnOnce() -> Option<T>) -> Option<T> {
         let Searches { count, comparisons: before } = self.searches.get();
         if count >= MAX_SEARCHES || before >= MAX_COMPARISONS {
@@ -151,12 +151,12 @@ impl<'a> Context<'a> {
         self.searches.get().comparisons
     }
 
-    /// The line number of a byte offset, from 1.
+    /// The 1-based line number of a byte offset.
     pub(super) fn line(&self, offset: usize) -> usize {
         self.lines().line(offset)
     }
 
-    /// The text of a line, given its number from 1.
+    /// The text of a line, given its 1-based number.
     pub(super) fn line_text(&self, line: usize) -> Option<&str> {
         let text = self.source.all();
         text.get(self.lines().span(line.checked_sub(1)?, text)?)
@@ -171,15 +171,15 @@ impl<'a> Context<'a> {
         self.path.parent().unwrap_or(Path::new("")).join(file)
     }
 
-    /// Returns all issues in file order. If there are syntax errors, omits issues that may be their consequences: those in
-    /// `broken_lines`, and missing values.
+    /// Returns all issues in file order. If there are syntax errors, omits issues that these may have caused:
+    /// issues in `broken_lines` and missing values.
     pub(super) fn finish(self, broken_lines: &[Range<usize>]) -> Vec<Diagnostic> {
         let mut issues = self.issues.take();
         if !broken_lines.is_empty() {
             issues.retain(|issue| match issue.cause {
                 IssueCause::Syntax => true,
                 IssueCause::Absence => false,
-                // The placeholder for a value lost to a syntax error has no span.
+                // A placeholder, which replaces a value with a syntax error, has no span.
                 IssueCause::Value if issue.span == (0..0) => false,
                 IssueCause::Value => {
                     let line = self.line(issue.span.start);
@@ -188,7 +188,7 @@ impl<'a> Context<'a> {
                 }
             });
         }
-        // Never let warnings displace errors: drop the last warnings first, then the last errors.
+        // Errors take precedence over warnings: drop the last warnings first, then the last errors.
         let place = |issue: &Issue| (issue.span.start, issue.severity == Severity::Warning);
         issues.sort_by_key(|issue| (issue.severity == Severity::Warning, issue.span.start));
         let collected = |severity| issues.iter().filter(|issue| issue.severity == severity).count();
@@ -209,7 +209,7 @@ impl<'a> Context<'a> {
     }
 }
 
-/// End of the message that counts the issues that are not listed.
+/// End of the message with the number of unlisted issues.
 pub(crate) const MORE_LIKE_THESE: &str = "more like these";
 
 /// Maximum number of issues listed.
@@ -221,8 +221,8 @@ const MAX_SEARCHES: usize = 48;
 /// Maximum number of name comparisons per file, checked before each search.
 const MAX_COMPARISONS: usize = 200_000;
 
-/// Maximum number of errors, and of warnings, that are collected: enough that the first ones in file order are found, except in absurdly
-/// broken files.
+/// Maximum number of collected errors, and of collected warnings. Large enough to contain the first issues in
+/// file order, except in absurdly broken files.
 const MAX_COLLECTED: usize = 10_000;
 
 impl Issue {

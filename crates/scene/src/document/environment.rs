@@ -20,8 +20,8 @@ pub(super) fn read(root: &TableReader<'_>) -> Option<Option<Environment>> {
     let degrees = if rotate.is_given() { rotate.number(table.limits("rotate")) } else { Some(0.0) };
     table.finish();
     if let (Some(Vec3::ZERO), Some(span)) = (radiance, color.span().filter(|_| file.is_given())) {
-        let issue =
-            Issue::warning(span, "`color` is black, so the environment is black").label("a factor on `file`");
+        let issue = Issue::warning(span, "`color` is black, so the environment is black")
+            .label("a scale factor for `file`");
         table.context.report(issue.help("remove it to use the map unchanged"));
     }
     if let Some(span) = rotate.span().filter(|_| !file.is_given()) {
@@ -31,7 +31,7 @@ pub(super) fn read(root: &TableReader<'_>) -> Option<Option<Environment>> {
     Some(Some(Environment { color: radiance?, file: map?, rotate: degrees? }))
 }
 
-/// Warns about a background that is hidden by the environment.
+/// Warns about a background hidden by the environment.
 pub(super) fn warn_about_background(root: &TableReader<'_>, scene: &Scene) {
     let Some(span) = root.optional("environment").key_span() else { return };
     if scene.environment.is_some() && scene.render.background != Vec3::ZERO {

@@ -1,5 +1,5 @@
-//! Reads one key of a table as the expected type. Every reader returns `None` if the key is absent. If it is invalid, it also
-//! reports an error.
+//! Reads a key of a table as the expected type. Every method returns `None` if the key is absent or invalid.
+//! If the key is invalid, the method also reports an error.
 
 mod color;
 mod file;
@@ -46,12 +46,12 @@ impl<'a> TableKey<'a> {
         self.key_span.clone()
     }
 
-    /// The span of its value.
+    /// The span of the value.
     pub(super) fn span(&self) -> Option<Range<usize>> {
         self.value.map(|value| value.span())
     }
 
-    /// A number. Integers are accepted.
+    /// A number, which may be an integer.
     pub(super) fn number(&self, limits: Limits) -> Option<f64> {
         limited(self.context, self.name, self.value?, limits, "a number")
     }
@@ -103,7 +103,7 @@ impl<'a> TableKey<'a> {
         None
     }
 
-    /// The name of a shape, if it has one. Names that look like numbers are errors.
+    /// The name of a shape, if any. Reports names that look like numbers.
     pub(super) fn shape_name(&self) -> Option<Option<Box<str>>> {
         if !self.is_given() {
             return Some(None);
@@ -118,12 +118,12 @@ impl<'a> TableKey<'a> {
         None
     }
 
-    /// Whether its value is a table.
+    /// Whether the value is a table.
     pub(super) fn is_table(&self) -> bool {
         self.value.is_some_and(|value| matches!(value.item(), TomlValue::Table(_)))
     }
 
-    /// A choice, given by its name.
+    /// A choice, given by name.
     pub(super) fn choice<C: Choice>(&self) -> Option<C> {
         let list = || {
             let list = C::ALL.iter().map(|one| format!("\"{}\"", one.name())).collect::<Vec<_>>().join(", ");
@@ -158,8 +158,8 @@ impl<'a> TableKey<'a> {
         if self.is_given() { self.vector(limits) } else { Some(default) }
     }
 
-    /// Checks that a vector is long enough to work with, and reports an error if not. Does not report vectors of length 0,
-    /// for which the caller has a better message.
+    /// Checks that a vector is long enough to compute with, and reports an error if not. Vectors of length 0
+    /// are left to the caller, which has a better message.
     pub(super) fn is_long(&self, vector: DVec3) -> bool {
         let length = length(vector);
         let Some(span) = self.span().filter(|_| is_too_short(length)) else { return true };
@@ -168,8 +168,8 @@ impl<'a> TableKey<'a> {
         false
     }
 
-    /// Checks that two points, given by `self` and `other`, are far enough apart to work with, and reports an error if not.
-    /// Does not report equal points, for which the caller has a better message.
+    /// Checks that two points, given by `self` and `other`, are far enough apart to compute with, and reports
+    /// an error if not. Equal points are left to the caller, which has a better message.
     pub(super) fn is_apart(&self, from: DVec3, other: &Self, to: DVec3) -> bool {
         let distance = length(to - from);
         let span = other.span().or(self.span());
@@ -185,7 +185,7 @@ impl<'a> TableKey<'a> {
         self.numbers(limits, "two numbers, [u, v]").map(|[u, v]: [f64; 2]| Vec2::new(u as f32, v as f32))
     }
 
-    /// An array of `N` numbers. Reports every invalid one.
+    /// An array of `N` numbers. Reports every invalid number.
     pub(super) fn numbers<const N: usize>(&self, limits: Limits, expected: &str) -> Option<[f64; N]> {
         let value = self.value?;
         let Some(array) = value.array().filter(|array| array.len() == N) else {
@@ -205,7 +205,7 @@ impl<'a> TableKey<'a> {
         if matches!(self.value?.item(), TomlValue::Integer { .. } | TomlValue::Float(_)) {
             return self.number(limits).map(DVec3::splat);
         }
-        self.numbers(limits, "a number or three, [x, y, z]").map(DVec3::from_array)
+        self.numbers(limits, "a number, or three numbers [x, y, z]").map(DVec3::from_array)
     }
 
     /// Reads a name and returns its index in `names`.
@@ -213,7 +213,7 @@ impl<'a> TableKey<'a> {
         self.find(names, self.text_or(|| format!("the name of a {}", names.kind))?)
     }
 
-    /// Looks up the name `text`, which is the value of this key.
+    /// Looks up `text`, the name given as the key's value.
     fn find(&self, names: &Names, text: &str) -> Option<usize> {
         let index = names.find(text);
         if index.is_none() {

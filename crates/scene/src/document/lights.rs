@@ -28,7 +28,7 @@ pub(super) fn read(root: &TableReader<'_>) -> Option<Vec<Light>> {
 
 fn light(table: &TableReader<'_>) -> Option<Light> {
     let key = table.optional("type");
-    // If the type is invalid, no key can be reported as unknown.
+    // Without a valid type, keys cannot be checked.
     let kind = if key.is_given() { key.choice()? } else { LightKind::Point };
     let light = match kind {
         LightKind::Point => point(table).map(Light::Point),
@@ -69,7 +69,8 @@ fn spot(table: &TableReader<'_>) -> Option<SpotLight> {
     Some(SpotLight { point, look_at, angle: angle?, blend: blend? })
 }
 
-/// Smallest apparent diameter in degrees. Directions in single precision cannot distinguish smaller ones from 0.
+/// Minimum apparent diameter in degrees. Directions in single precision cannot distinguish smaller diameters
+/// from 0.
 const MIN_ANGLE_DEGREES: f64 = 1e-3;
 
 fn directional(table: &TableReader<'_>) -> Option<DirectionalLight> {

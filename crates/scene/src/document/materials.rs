@@ -14,9 +14,9 @@ use crate::math::{DVec3, Vec3};
 
 /// The materials of a file.
 pub(super) struct MaterialList {
-    /// Names of the materials.
+    /// Material names.
     pub(super) names: Names,
-    /// The materials in the order of the names. `None` if one is invalid.
+    /// The materials, in the same order as the names. `None` if any is invalid.
     pub(super) list: Option<Vec<Material>>,
     /// Whether each material emits light.
     emissive: Vec<bool>,
@@ -52,14 +52,14 @@ choice! {
         Metal = "metal",
         /// A diffuse base under a rough or smooth coat.
         Plastic = "plastic",
-        /// The inputs of glTF.
+        /// The glTF inputs.
         Principled = "principled",
     }
 }
 
 fn material(name: String, table: &TableReader<'_>, textures: &Names) -> Option<Material> {
     let key = table.optional("type");
-    // If the type is invalid, no key can be reported as unknown.
+    // Without a valid type, keys cannot be checked.
     let kind = if key.is_given() { key.choice()? } else { MaterialType::Phong };
     let kind = match kind {
         MaterialType::Phong => Some(phong(table, textures)),
@@ -103,7 +103,7 @@ fn phong(table: &TableReader<'_>, textures: &Names) -> MaterialKind {
     }
 }
 
-/// Message for materials that create energy.
+/// Warning about materials that create energy.
 pub(crate) const ENERGY_GAIN: &str = "this material reflects more light than falls on it";
 
 /// Warns about a material that reflects more light than falls on it.
@@ -113,7 +113,7 @@ fn warn_about_gain(kd_key: &TableKey<'_>, ks_key: &TableKey<'_>, kd: &ColorSourc
         ColorSource::Texture(_) => Vec3::ZERO,
     };
     let sum = constant(kd) + constant(ks);
-    // Decimal values that sum to 1 may exceed it in binary.
+    // Decimal values that sum to 1 may sum to slightly more in binary.
     let most = sum.max_element();
     let Some(span) = ks_key.span().or(kd_key.span()).filter(|_| most > 1.0 + 1e-5) else { return };
     let channel = ["red", "green", "blue"][sum.max_position()];
@@ -160,18 +160,18 @@ fn principled(table: &TableReader<'_>, textures: &Names) -> MaterialKind {
     }
 }
 
-/// The key at a path `TYPE.KEY`.
+/// The key at the path `TYPE.KEY`.
 fn key<'a>(table: &TableReader<'a>, path: &'static str) -> TableKey<'a> {
     table.optional(path.split_once('.').map_or(path, |(_, name)| name))
 }
 
-/// Reads a color or a texture, in the range defined for `TYPE.KEY`.
+/// Reads a color or a texture, with the range defined for `TYPE.KEY`.
 fn color(table: &TableReader<'_>, textures: &Names, path: &'static str, default: f32) -> ColorSource {
     let color = key(table, path).color_or_texture(textures, table.limits(path));
     color.unwrap_or(ColorSource::Constant(Vec3::splat(default)))
 }
 
-/// Reads a number or a texture, in the range defined for `TYPE.KEY`.
+/// Reads a number or a texture, with the range defined for `TYPE.KEY`.
 fn number(table: &TableReader<'_>, textures: &Names, path: &'static str, default: f32) -> NumberSource {
     let number = key(table, path).number_or_texture(textures, table.limits(path));
     number.unwrap_or(NumberSource::Constant(default))
@@ -182,7 +182,7 @@ fn ior(table: &TableReader<'_>, path: &'static str) -> f32 {
     key(table, path).number32(table.limits(path)).unwrap_or(1.5)
 }
 
-/// Reads the reflectance of a metal, which is given by exactly one of three groups of keys.
+/// Reads a metal's reflectance, specified with exactly one of three groups of keys.
 fn fresnel(table: &TableReader<'_>, textures: &Names) -> Option<FresnelSource> {
     let [color, eta, k, element] = ["color", "eta", "k", "element"].map(|name| table.optional(name));
     let is_index = eta.is_given() || k.is_given();
@@ -220,7 +220,7 @@ fn glass(table: &TableReader<'_>, textures: &Names) -> Option<MaterialKind> {
     let (tint, thin) = (table.optional("tint"), table.optional("thin"));
     let rough = table.optional("roughness");
     let roughness = number(table, textures, "glass.roughness", 0.0);
-    // An invalid `thin` more likely means a pane.
+    // If `thin` is invalid, the user probably wants a pane.
     if !thin.flag().unwrap_or(thin.is_given()) {
         let tint = tint.exact_color(table.limits("glass.tint")).unwrap_or(DVec3::ONE);
         return Some(MaterialKind::Glass { ior, tint, roughness });

@@ -1,5 +1,5 @@
-//! Lowers TOML to a scene, with one file per group of tables. Readers continue after a mistake, so that all are reported, and
-//! return `None` for missing or invalid values.
+//! Lowers TOML to a scene, with one file per group of tables. Readers return `None` for missing or invalid
+//! values and continue after an error in order to report all errors.
 
 mod camera;
 mod common;
@@ -80,7 +80,7 @@ fn settings(document: &toml::Document<'_>) -> Vec<Setting> {
     ["render", "photons"].into_iter().flat_map(values).collect()
 }
 
-/// The camera of a scene. `None` if there are errors.
+/// A scene's camera. `None` if there are errors.
 pub(super) fn camera_of(source: &SceneText) -> Option<Camera> {
     let context = Context::new(source.clone(), Path::new(""));
     let (document, errors) = toml::parse(source.text());
@@ -89,7 +89,7 @@ pub(super) fn camera_of(source: &SceneText) -> Option<Camera> {
     camera.filter(|_| errors.is_empty() && !context.has_errors())
 }
 
-/// The files that a scene text references, even if it has errors.
+/// The files referenced by a scene, even if the scene has errors.
 pub(super) fn named_files(text: &str, path: &Path) -> Vec<PathBuf> {
     fn gather(table: toml::Entries<'_>, names: &mut Vec<String>) {
         for toml::KeyValue { key, value, .. } in table.iter() {
@@ -119,7 +119,7 @@ pub(super) fn named_files(text: &str, path: &Path) -> Vec<PathBuf> {
     names.into_iter().map(|name| folder.join(name)).collect()
 }
 
-/// Reads the whole file. Definitions of names are read before references.
+/// Reads the whole file. Reads definitions of names before references.
 fn scene(root: &TableReader<'_>) -> Option<Scene> {
     let (render, output) = render::read(root);
     let camera = camera::read(root);
@@ -150,7 +150,7 @@ fn scene(root: &TableReader<'_>) -> Option<Scene> {
         textures.names.warn_about_unused(root.context);
         materials.names.warn_about_unused(root.context);
         warn_about_darkness(root.context, &scene);
-        // With meshes, wait until their bounds are known.
+        // If there are meshes, wait until their bounds are known.
         if scene.mesh_files.is_empty() {
             for span in facing::away(&scene, Vec::new) {
                 root.context
@@ -162,9 +162,9 @@ fn scene(root: &TableReader<'_>) -> Option<Scene> {
     Some(scene)
 }
 
-/// Message for scenes without light.
+/// Warning for scenes without light.
 pub(super) const UNLIT_SCENE: &str = "nothing lights this scene";
-/// End of the messages about degenerate shapes.
+/// End of error messages about degenerate shapes.
 pub(super) const NO_AREA: &str = "has no area";
 
 /// Warns about a scene without shapes or light.

@@ -8,7 +8,7 @@ use super::super::nearest::nearest;
 use super::super::sanitize::shortened;
 use super::context::{Context, Issue};
 
-/// The names of a file's textures or materials.
+/// The names of all textures or all materials in a file.
 pub(super) struct Names {
     /// `texture` or `material`.
     pub(super) kind: &'static str,
@@ -31,7 +31,7 @@ impl Names {
         Self { kind, entries, indices }
     }
 
-    /// The span of a name. The start of the file if the index is out of range.
+    /// The span of a name, or the start of the file if the index is out of range.
     pub(super) fn span(&self, index: usize) -> Range<usize> {
         self.entries.get(index).map_or(0..0, |entry| entry.span.clone())
     }
@@ -43,7 +43,7 @@ impl Names {
         Some(index)
     }
 
-    /// Adds the known names and the most similar one to an issue about an unknown name.
+    /// Adds known names and the most similar name to an issue about an unknown name.
     pub(super) fn advise(&self, context: &Context<'_>, issue: Issue, name: &str) -> Issue {
         const MAX_LISTED: usize = 12;
         let kind = self.kind;
@@ -63,7 +63,7 @@ impl Names {
         }
     }
 
-    /// Warns about each unused name. Call this only for scenes without errors.
+    /// Warns about every unused name. Only for scenes without errors.
     pub(super) fn warn_about_unused(&self, context: &Context<'_>) {
         for entry in self.entries.iter().filter(|entry| !entry.used.get()) {
             let message = format!("the {} \"{}\" is not used", self.kind, shortened(&entry.name, 40));

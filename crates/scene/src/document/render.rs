@@ -32,7 +32,7 @@ macro_rules! reader {
     ($(
         $(#[doc = $doc:literal])* $name:ident: $type:ty = $default:expr, $range:ident $(($($limit:expr),*))?, $unit:literal, $change:ident;
     )*) => {
-        /// Reads all keys. Absent and invalid ones get their defaults.
+        /// Reads all keys. Absent or invalid keys get their default values.
         fn settings(table: &TableReader<'_>) -> Render {
             let key = |name| table.optional(name);
             Render {
@@ -44,7 +44,7 @@ macro_rules! reader {
 
 render_keys!(reader);
 
-/// Reads the settings and the output path, if the scene has one.
+/// Reads the settings and the output path, if any.
 pub(super) fn read(root: &TableReader<'_>) -> (Option<Render>, Option<PathBuf>) {
     let Some(table) = root.table("render") else { return (Some(Render::DEFAULT), None) };
     let render = settings(&table);
@@ -78,7 +78,7 @@ mod tests {
     use super::super::super::description::{KeyRange, Render};
     use super::super::super::{Outcome, parse, starter};
 
-    /// Reads the settings of a scene with this line in `[render]`. The error has the messages.
+    /// Parses a scene with this line in `[render]` and returns its settings, or else the error messages.
     fn read(line: &str) -> Result<Render, Vec<String>> {
         let camera = "[camera]\nposition = [0, 0, 4]\nlook_at = [0, 0, 0]\n";
         let Outcome { scene, diagnostics, .. } =
@@ -135,11 +135,11 @@ mod tests {
     }
 
     #[test]
-    fn starter_shows_every_key_and_choice() {
+    fn starter_scene_shows_every_key_and_choice() {
         let table = starter().split("[camera]").next().unwrap_or_default();
         for key in Render::keys() {
             let shown = |line: &&str| line.trim_start_matches("# ").starts_with(&format!("{} = ", key.name));
-            let line = table.lines().find(shown).unwrap_or_else(|| panic!("no line of `{}`", key.name));
+            let line = table.lines().find(shown).unwrap_or_else(|| panic!("no line for `{}`", key.name));
             if let KeyRange::Names(names) = key.range {
                 for name in names {
                     assert!(line.contains(&format!("\"{name}\"")), "{name}: {line}");

@@ -7,7 +7,7 @@ use super::super::toml::{Document, KeyError, KeyErrorKind, Layout, set};
 use super::context::{Context, Issue};
 use super::shapes;
 
-/// The groups and lists of a scene.
+/// Which keys of a scene are groups and lists.
 const LAYOUT: Layout =
     Layout { groups: &["materials", "textures"], is_list: |name| name == "light" || shapes::is_kind(name) };
 
@@ -61,7 +61,7 @@ fn issue(KeyError { span, above, part, why }: KeyError) -> Issue {
         }
         KeyErrorKind::Ambiguous { count } => {
             Issue::error(span, format!("{count} [[{list}]] have the name `{part}`"))
-                .help("use its number, from 1")
+                .help("use its number, counted from 1")
         }
         KeyErrorKind::Element => {
             Issue::error(span, format!("`{list}` is an array of values and can only be set as a whole"))

@@ -8,8 +8,9 @@ use super::super::sanitize::shortened;
 use super::super::toml::{Bracket, SyntaxError, brackets, last_open};
 use super::context::{Context, Issue};
 
-/// Reports the first error of each line, as others are usually its consequences. Returns the unreliable lines, in order:
-/// those with errors, and those after a broken header, whose keys appear to be in another table.
+/// Reports the first error on each line, because it usually causes the other errors. Returns the unreliable
+/// lines, in order: lines with errors, and lines after a broken header, whose keys seem to belong to another
+/// table.
 pub(super) fn report(context: &Context<'_>, mut errors: Vec<SyntaxError>) -> Vec<Range<usize>> {
     let lists = ArrayBrackets { text: context.file(), brackets: OnceCell::new() };
     let (mut lines, mut firsts) = (BTreeSet::new(), Vec::new());
@@ -24,7 +25,7 @@ pub(super) fn report(context: &Context<'_>, mut errors: Vec<SyntaxError>) -> Vec
             continue;
         }
         match unclosed(context, &lists, &error) {
-            // The parser took all lines up to here for part of the list.
+            // The parser treated all lines up to this one as part of the list.
             Some(open) => {
                 lines.extend(context.line(open)..context.line(error.span.start));
                 opened.insert(context.line(open), open);
@@ -32,7 +33,8 @@ pub(super) fn report(context: &Context<'_>, mut errors: Vec<SyntaxError>) -> Vec
             None => firsts.push(error),
         }
     }
-    // The parser does not report a list that is unclosed at the end of the file. Lists that are nested too deeply may be closed.
+    // The parser does not report an unclosed list at the end of the file. Skip this check if lists are nested
+    // too deeply, because such a list may be closed.
     if let Some(open) = open_at_end(context.file()).filter(|_| !firsts.iter().any(is_too_deep)) {
         lines.insert(context.line(open));
         opened.insert(context.line(open), open);
@@ -51,14 +53,14 @@ pub(super) fn report(context: &Context<'_>, mut errors: Vec<SyntaxError>) -> Vec
     lines.into_iter().map(|line| line..end_of_damage(context, line)).collect()
 }
 
-/// The array brackets of a text with syntax errors.
+/// The array brackets in a text with syntax errors.
 struct ArrayBrackets<'a> {
     text: &'a str,
     brackets: OnceCell<Vec<Bracket>>,
 }
 
 impl ArrayBrackets<'_> {
-    /// The opening bracket of the innermost list open at byte `end`.
+    /// The opening bracket of the innermost list that is open at byte `end`.
     fn open_at(&self, end: usize) -> Option<usize> {
         let all = self.brackets.get_or_init(|| brackets(self.text));
         last_open(&all[..all.partition_point(|bracket| bracket.at < end)])
@@ -67,7 +69,7 @@ impl ArrayBrackets<'_> {
 
 const MISSING_COMMA: &str = "missing comma between array elements";
 
-/// The unclosed bracket that causes an error: the list continues into a line with a key or a header.
+/// The unclosed bracket that caused an error: the list continues into a line with a key or a header.
 fn unclosed(
     context: &Context<'_>,
     lists: &ArrayBrackets<'_>,
@@ -93,8 +95,8 @@ fn is_key(line: &str) -> bool {
     line.split_once('=').is_some_and(|(key, _)| !key.contains(['[', '{', ',', '\"', '#']))
 }
 
-/// The opening bracket of a list that is unclosed at the end of the file. Searches only from the last key, as texts may be
-/// long.
+/// The opening bracket of a list that is unclosed at the end of the file. Only searches from the last key,
+/// because files may be long.
 fn open_at_end(text: &str) -> Option<usize> {
     let mut start = text.len();
     loop {
@@ -106,7 +108,7 @@ fn open_at_end(text: &str) -> Option<usize> {
     }
 }
 
-/// Help for an unclosed list: the whole list, if it consists of numbers on one line.
+/// Help text for an unclosed list. Contains the whole list if it consists of numbers on one line.
 fn closed(context: &Context<'_>, open: usize) -> String {
     let end =
         context.text(&(open..context.file().len())).find('\n').map_or(context.file().len(), |at| open + at);
@@ -116,7 +118,7 @@ fn closed(context: &Context<'_>, open: usize) -> String {
     }
 }
 
-/// Message about missing commas in a list on one line. `at` is the position of the first.
+/// Message about missing commas in a list on one line. `at` is the position of the first missing comma.
 fn with_commas(context: &Context<'_>, lists: &ArrayBrackets<'_>, at: usize) -> Option<String> {
     let open = lists.open_at(at)?;
     let line_start = context.text(&(0..at)).rfind('\n').map_or(0, |end| end + 1);
@@ -159,19 +161,20 @@ fn of_numbers(text: &str) -> Option<String> {
     listed(&values).filter(|_| values.iter().all(is_number))
 }
 
-/// Splits at commas, semicolons and white space.
+/// Splits at commas, semicolons and whitespace.
 fn values(text: &str) -> Vec<&str> {
     text.split([',', ';', ' ', '\t']).map(str::trim).filter(|value| !value.is_empty()).collect()
 }
 
-/// Formats several values as a list, if it is short.
+/// Formats several values as a list. `None` for long lists.
 fn listed(values: &[&str]) -> Option<String> {
     const LONGEST: usize = 60;
     let list = format!("[{}]", values.join(", "));
     (values.len() > 1 && list.len() <= LONGEST).then_some(list)
 }
 
-/// The end of the lines affected by an error: the next header after a broken header, otherwise the next line.
+/// The end of the lines affected by an error: the next header if the line is a broken header, or else the
+/// next line.
 fn end_of_damage(context: &Context<'_>, line: usize) -> usize {
     let is_header = |line: usize| context.line_text(line).map(|text| text.trim_start().starts_with('['));
     if is_header(line) != Some(true) {
@@ -261,7 +264,7 @@ fn issue(context: &Context<'_>, lists: &ArrayBrackets<'_>, error: SyntaxError) -
     }
 }
 
-/// Message for a key without a value.
+/// Error message for a key without a value.
 pub(crate) const MISSING_VALUE: &str = "a value is missing";
 
 /// Issue about a missing value, an invalid number or an unquoted string.

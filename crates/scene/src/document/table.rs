@@ -1,4 +1,4 @@
-//! A TOML table that records which keys were read.
+//! A TOML table that keeps track of which keys have been read.
 
 use std::cell::RefCell;
 use std::fmt;
@@ -25,7 +25,7 @@ pub(super) enum Title<'a> {
     List(&'static str),
     /// `[materials.wall]`
     Named(&'static str, &'a str),
-    /// An inline table, by its key.
+    /// An inline table, given by its key.
     Key(&'static str),
 }
 
@@ -41,10 +41,10 @@ impl fmt::Display for Title<'_> {
     }
 }
 
-/// A table of the file. Read its keys, then call [`TableReader::finish`].
+/// A table in the file. Read its keys, then call [`TableReader::finish`].
 pub(super) struct TableReader<'a> {
     pub(super) context: &'a Context<'a>,
-    /// Byte range of its header or braces.
+    /// Byte range of the header or the braces.
     pub(super) span: Range<usize>,
     title: Title<'a>,
     entries: Entries<'a>,
@@ -64,7 +64,7 @@ impl<'a> TableReader<'a> {
         Self::new(context, entries, 0..0, Title::Root)
     }
 
-    /// Reads a value as a table. Reports an error if it is not one.
+    /// Reads a value as a table. Reports an error for any other type.
     pub(super) fn of(context: &'a Context<'a>, value: Value<'a>, title: Title<'a>) -> Option<Self> {
         match value.item() {
             TomlValue::Table(entries) => Some(Self::new(context, entries, value.span(), title)),
@@ -96,7 +96,7 @@ impl<'a> TableReader<'a> {
         )
     }
 
-    /// The defined range of a key, `KEY` or `TYPE.KEY`.
+    /// The range defined for a key, `KEY` or `TYPE.KEY`.
     pub(super) fn limits(&self, name: &str) -> Limits {
         match self.kind_of(name) {
             Some(
@@ -122,7 +122,7 @@ impl<'a> TableReader<'a> {
         }
     }
 
-    /// The defined range of an integer key.
+    /// The range defined for an integer key.
     pub(super) fn range(&self, name: &str) -> RangeInclusive<i128> {
         match self.kind_of(name) {
             Some(ValueKind::Whole(least, most)) => least.into()..=most.into(),
@@ -130,7 +130,7 @@ impl<'a> TableReader<'a> {
         }
     }
 
-    /// The defined type of a key. A test compares the definitions with the keys that are read.
+    /// The type defined for a key. A test compares the definitions with the keys that are read.
     fn kind_of(&self, name: &str) -> Option<ValueKind> {
         let info = match self.title {
             Title::Table(table) | Title::List(table) | Title::Named(table, _) => table_info(table)?,
@@ -152,7 +152,7 @@ impl<'a> TableReader<'a> {
         key
     }
 
-    /// Reports an error if the key `name`, which is not allowed here, is present.
+    /// Reports an error if the key `name` is present, which is not allowed here.
     pub(super) fn unavailable(&self, name: &'static str, message: &str, help: Option<&str>) {
         let key = self.optional(name);
         self.unavailable.borrow_mut().push(name);
@@ -161,13 +161,13 @@ impl<'a> TableReader<'a> {
         }
     }
 
-    /// The table `[name]`.
+    /// The `[name]` table.
     pub(super) fn table(&self, name: &'static str) -> Option<Self> {
         let value = self.optional(name).value?;
         Self::of(self.context, value, Title::Table(name))
     }
 
-    /// The tables `[name.NAME]` with their names and the spans of the names, in file order.
+    /// The `[name.NAME]` tables in file order, with their names and the names' spans.
     pub(super) fn named_tables(&self, name: &'static str) -> Vec<(String, Range<usize>, Option<Self>)> {
         let Some(group) = self.table(name) else { return Vec::new() };
         let mut entries: Vec<_> = group.entries.iter().collect();
@@ -176,7 +176,7 @@ impl<'a> TableReader<'a> {
         entries.into_iter().map(|one| (one.key.to_owned(), one.span, read(one.key, one.value))).collect()
     }
 
-    /// The tables `[[name]]`.
+    /// The `[[name]]` tables.
     pub(super) fn tables(&self, name: &'static str) -> impl Iterator<Item = Self> + use<'a> {
         let context = self.context;
         let key = self.optional(name);
@@ -214,7 +214,7 @@ impl<'a> TableReader<'a> {
         }
     }
 
-    /// The key that an unknown key probably means. Prefers keys that are not present.
+    /// The key probably meant by an unknown key. Prefers keys that are not present.
     fn meant(&self, key: &str, known: &[&'static str]) -> Option<&'static str> {
         let absent = |name: &&&'static str| self.entries.get(name).is_none();
         let unavailable = self.unavailable.borrow();
@@ -223,7 +223,7 @@ impl<'a> TableReader<'a> {
         meant(key, &others).or_else(|| nearest(key, known.iter().copied()))
     }
 
-    /// Whether a table has a similar name, so it is probably this one misspelled.
+    /// Whether there is a table with a similar name, probably a misspelling of `name`.
     pub(super) fn has_misspelled(&self, name: &'static str) -> bool {
         let is_table = |value: Value<'_>| matches!(value.item(), TomlValue::Table(_));
         let mut others = self.entries.iter().filter(|one| one.key != name && is_table(one.value));

@@ -15,9 +15,9 @@ use crate::math::{Vec2, Vec3};
 
 /// The textures of a file.
 pub(super) struct TextureList {
-    /// Names of the textures.
+    /// Texture names.
     pub(super) names: Names,
-    /// The textures in the order of the names. `None` if one is invalid.
+    /// The textures, in the same order as the names. `None` if any is invalid.
     pub(super) list: Option<Vec<Texture>>,
 }
 
@@ -46,7 +46,7 @@ fn texture(name: String, table: &TableReader<'_>) -> Option<Texture> {
     Some(Texture { name, file, image, filter, wrap, repeat, rotate, offset, uv, encoding, factor })
 }
 
-/// Reads the file, and the index of an image in a glTF file.
+/// Reads the file and, for a glTF file, the index of the image.
 fn image(table: &TableReader<'_>) -> (Option<Located<PathBuf>>, Option<Option<u32>>) {
     let (key, number) = (table.required("file", "\"picture.png\""), table.optional("image"));
     if !number.is_given() {
@@ -55,7 +55,7 @@ fn image(table: &TableReader<'_>) -> (Option<Located<PathBuf>>, Option<Option<u3
     (key.file(GLTF), number.whole(table.range("image")).map(Some))
 }
 
-/// Reports textures without `encoding` that materials use for both colors and numbers. Alpha has no encoding.
+/// Reports textures without `encoding` that are used for both colors and numbers. Alpha has no encoding.
 pub(super) fn check_encodings(context: &Context<'_>, textures: &TextureList, materials: &[Material]) {
     let Some(list) = &textures.list else { return };
     let (mut colors, mut numbers) = (vec![false; list.len()], vec![false; list.len()]);

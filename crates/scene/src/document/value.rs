@@ -1,11 +1,11 @@
-//! Converts TOML values to numbers, and describes them.
+//! Converts TOML values to numbers and describes them.
 
 use super::super::sanitize::shortened;
 pub(super) use super::super::toml::{TomlValue, Value};
 use super::context::{Context, Issue};
 use super::limits::Limits;
 
-/// Describes a value, for messages such as `found the string "a"`.
+/// Describes a value for messages such as `found the string "a"`.
 pub(super) fn found(context: &Context<'_>, value: Value<'_>) -> String {
     const LONGEST: usize = 32;
     let written = || shortened(context.text(&value.span()), LONGEST);
@@ -47,7 +47,7 @@ pub(super) fn whole(digits: &str, radix: u32) -> Option<i128> {
     i128::from_str_radix(digits, radix).ok()
 }
 
-/// Reads a number within limits. Messages call it `name` and describe its type as `expected`.
+/// Reads a number within limits. Error messages refer to the number as `name` and to its type as `expected`.
 pub(super) fn limited(
     context: &Context<'_>,
     name: &str,
@@ -71,7 +71,7 @@ pub(super) fn limited(
 pub(super) fn wrong_type(context: &Context<'_>, name: &str, value: Value<'_>, expected: &str) {
     let label = format!("found {}", found(context, value));
     let issue = Issue::error(value.span(), format!("`{name}` must be {expected}")).label(label);
-    // Explain that a texture is not allowed here, so the user does not look for a typo.
+    // Explain that textures are not allowed here. Otherwise, users would look for a typo.
     let is_texture = matches!(value.item(), TomlValue::Table(table) if table.get("texture").is_some());
     context.report(match is_texture && !expected.contains("texture") {
         true => issue.help(format!("`{name}` cannot be a texture")),

@@ -2,7 +2,7 @@
 
 use csscolorparser::NAMED_COLORS;
 
-/// The lower-case color names of CSS Color Module Level 4, section 6.1.
+/// Lowercase color names from CSS Color Module Level 4, section 6.1.
 pub fn color_names() -> impl Iterator<Item = &'static str> {
     NAMED_COLORS.keys().map(|name| name.as_str())
 }

@@ -1,4 +1,4 @@
-//! File extensions accepted by keys, in lower case and without dots.
+//! File extensions accepted by keys, in lowercase and without dots.
 
 /// Image formats that glimt writes.
 pub const IMAGES: &[&str] = &["png", "exr", "ppm", "hdr", "jpg", "jpeg", "webp"];
@@ -9,7 +9,7 @@ const READ: [&str; 15] = [
     "gltf",
 ];
 
-/// Files that may be textures: images and containers of images.
+/// Files that may be textures: images and image containers.
 pub const TEXTURES: &[&str] = &READ;
 
 /// Image files, the first part of [`TEXTURES`].

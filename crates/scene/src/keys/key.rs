@@ -6,15 +6,15 @@ use crate::choice::Choice;
 /// A table of a scene file.
 #[derive(Clone, Debug)]
 pub struct TableInfo {
-    /// Its name in the file.
+    /// Name in scene files.
     pub name: &'static str,
-    /// Its syntax in the file.
+    /// Syntax in scene files.
     pub form: Form,
-    /// Description, one sentence without its full stop.
+    /// Description, as one sentence without a period at the end.
     pub doc: &'static str,
     /// The keys common to all types.
     pub keys: &'static [KeyInfo],
-    /// The values of the key `type`, default first. Empty if the table has no such key.
+    /// The values of the key `type`, starting with the default. Empty if the table has no such key.
     pub types: &'static [TypeInfo],
 }
 
@@ -34,7 +34,7 @@ pub enum Form {
 pub struct TypeInfo {
     /// The value of `type`.
     pub name: &'static str,
-    /// Description, one sentence without its full stop.
+    /// Description, as one sentence without a period at the end.
     pub doc: &'static str,
     /// The keys specific to this type.
     pub keys: &'static [KeyInfo],
@@ -49,16 +49,16 @@ pub struct KeyInfo {
     pub kind: ValueKind,
     /// The unit, or an empty string.
     pub unit: &'static str,
-    /// The value if the key is absent.
+    /// Value if the key is absent.
     pub default: Default,
-    /// Description, one sentence without its full stop.
+    /// Description, as one sentence without a period at the end.
     pub doc: &'static str,
 }
 
 /// Type of a key's value.
 #[derive(Clone, Copy, Debug)]
 pub enum ValueKind {
-    /// An integer between two bounds, inclusive.
+    /// An integer between two inclusive bounds.
     Whole(u64, u64),
     /// A number.
     Number(Limits),
@@ -68,9 +68,9 @@ pub enum ValueKind {
     Words(WordList),
     /// Any text.
     Text,
-    /// The path of a file with one of these extensions; any file if empty.
+    /// The path of a file with one of these extensions. If empty, any file is allowed.
     File(&'static [&'static str]),
-    /// A color; the limits apply to each component.
+    /// A color. The limits apply to each component.
     Color(Limits),
     /// A color or a texture.
     ColorOrTexture(Limits),
@@ -78,7 +78,7 @@ pub enum ValueKind {
     Emission(Limits),
     /// A number or a texture.
     NumberOrTexture(Limits),
-    /// An array of this many numbers, and the name of such a value.
+    /// An array with this many numbers, and the name of the type, such as `point`.
     Numbers(usize, &'static str, Limits),
     /// A number or an array of three numbers.
     Scale(Limits),
@@ -132,7 +132,7 @@ pub fn words<C: Choice>() -> Vec<Word> {
 /// Default of a key.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Default {
-    /// The key is required. An example value.
+    /// The key is required. Contains an example value.
     Required(&'static str),
     /// This value, in scene file syntax.
     Is(&'static str),
@@ -142,7 +142,7 @@ pub enum Default {
     Absent,
 }
 
-/// Upper bound of integer keys without a specific limit.
+/// Upper bound for integer keys without a specific limit.
 pub(super) const MOST_WHOLE: u64 = u32::MAX as u64;
 
 /// Defines a key.
@@ -165,7 +165,7 @@ impl TableInfo {
         }
     }
 
-    /// All keys of the table with this type, starting with the type's own. Excludes `type`.
+    /// All keys of a table with this type, starting with type-specific keys. Excludes `type`.
     pub fn keys_of(&self, kind: Option<&'static TypeInfo>) -> impl Iterator<Item = &'static KeyInfo> {
         kind.map_or(&[] as &[KeyInfo], |kind| kind.keys).iter().chain(self.keys)
     }
@@ -199,7 +199,7 @@ impl KeyInfo {
         self.kind.words()
     }
 
-    /// The default in Markdown, as in the documentation.
+    /// The default in Markdown, as shown in the documentation.
     pub fn default_words(&self) -> String {
         match self.default {
             Default::Required(_) => "*required*".to_owned(),

@@ -38,7 +38,13 @@ pub(super) const LIGHT: TableInfo = TableInfo {
             doc: "A point light that shines into a cone",
             keys: &[
                 key("position", Numbers(3, "point", Any), "length", Is("[0, 3, 0]"), "Position"),
-                key("look_at", Numbers(3, "point", Any), "length", Is("[0, 0, 0]"), "A point on its axis"),
+                key(
+                    "look_at",
+                    Numbers(3, "point", Any),
+                    "length",
+                    Is("[0, 0, 0]"),
+                    "A point on the cone's axis",
+                ),
                 key(
                     "intensity",
                     Color(AtLeast(0.0)),

@@ -1,4 +1,4 @@
-//! Ranges of numbers, with their descriptions.
+//! Ranges of numbers and their descriptions.
 
 use crate::math::limits::{LARGEST, is_too_short};
 
@@ -7,7 +7,7 @@ use crate::math::limits::{LARGEST, is_too_short};
 pub enum Limits {
     /// Any number.
     Any,
-    /// Any number but 0.
+    /// Any number except 0.
     NotZero,
     /// At least this number.
     AtLeast(f64),

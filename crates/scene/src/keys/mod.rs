@@ -1,6 +1,7 @@
-//! Definitions of all scene keys: names, types, units, ranges, defaults and descriptions. The reader takes ranges from here,
-//! except for colors and vectors outside of materials; a test compares ranges and defaults with the reader. The schema,
-//! `glimt explain` and completions are generated from the definitions, and the documentation is compared with them.
+//! Definitions of all scene keys: names, types, units, ranges, defaults and descriptions. The reader uses
+//! these ranges, except for colors and vectors outside of materials. A test compares ranges and defaults with
+//! the reader. The schema, `glimt explain` and completions are generated from these definitions, and a test
+//! compares the documentation with them.
 
 mod colors;
 pub mod endings;
@@ -31,7 +32,8 @@ pub fn tables() -> &'static [TableInfo] {
     &TABLES
 }
 
-/// The paths of all tables, types and keys, with their descriptions: `materials`, `materials.metal`, `materials.metal.roughness`.
+/// Paths and descriptions of all tables, types and keys, such as `materials`, `materials.metal`,
+/// `materials.metal.roughness`.
 pub fn paths() -> Vec<(String, &'static str)> {
     let mut all = Vec::new();
     for table in tables() {
@@ -48,7 +50,7 @@ pub fn paths() -> Vec<(String, &'static str)> {
     all
 }
 
-/// The table of this name.
+/// The table with this name.
 pub fn table(name: &str) -> Option<&'static TableInfo> {
     tables().iter().find(|table| table.name == name)
 }
@@ -59,7 +61,7 @@ mod tests {
     use crate::diagnostic::Severity;
     use crate::parse;
 
-    /// Other keys that a table needs in addition to `key`, with values.
+    /// Keys and values that a table needs in addition to `key`.
     fn other_keys(table: &str, kind: &str, key: &str) -> Vec<(String, String)> {
         let fixed: &[(&str, &str)] = match (table, kind, key) {
             ("materials", "metal", "color" | "element") => &[],
@@ -84,7 +86,7 @@ mod tests {
         fixed.into_iter().filter(|(name, _)| name != key).chain(required).collect()
     }
 
-    /// A scene that sets a key to its example value.
+    /// A scene with a key set to its example value.
     fn with_example(info: &TableInfo, kind: Option<&TypeInfo>, key: &KeyInfo) -> String {
         let mut text = String::new();
         for (table, body) in [

@@ -1,4 +1,4 @@
-//! `[render]`, derived from `render_keys!`.
+//! `[render]`, generated from `render_keys!`.
 
 use std::sync::LazyLock;
 
@@ -15,7 +15,7 @@ static KEYS: LazyLock<Vec<KeyInfo>> = LazyLock::new(|| {
         ValueKind::File(IMAGES),
         "",
         Default::By("the scene's name with `.png`"),
-        "The image file; the extension chooses the format",
+        "The image file; the extension determines the format",
     );
     Render::keys().into_iter().map(info).chain([output]).collect()
 });

@@ -8,7 +8,7 @@ use super::limits::Limits::{Any, Length, NotZero};
 
 macro_rules! shapes {
     ($($name:literal, $doc:literal: [$($own:expr),* $(,)?];)*) => {
-        /// The shapes, each with its own keys followed by the common ones.
+        /// The shapes. Each has its own keys, followed by the common keys.
         pub(super) const SHAPES: &[TableInfo] = &[$(TableInfo {
             name: $name,
             form: Form::List,
@@ -19,9 +19,9 @@ macro_rules! shapes {
     };
 }
 
-const NAME: KeyInfo = key("name", Text, "", Absent, "Name for messages, clicks and `--set`");
+const NAME: KeyInfo = key("name", Text, "", Absent, "Name used in messages, for clicks and by `--set`");
 
-/// The key `material`. It is optional for meshes, whose files may have materials.
+/// The key `material`. Optional for meshes, because their files may contain materials.
 const fn material(shape: &str) -> KeyInfo {
     // String comparison is not const, so match bytes.
     let default = match shape.as_bytes() {
@@ -75,16 +75,16 @@ shapes! {
     "torus", "A torus": [
         key("center", Numbers(3, "point", Any), "length", Is("[0, 0, 0]"), "The center"),
         key("axis", Numbers(3, "direction", Any), "", Is("[0, 1, 0]"), "The axis of symmetry"),
-        key("radius", Number(Length), "length", Is("0.5"), "From the center to the middle of the tube"),
+        key("radius", Number(Length), "length", Is("0.5"), "Distance from the center to the middle of the tube"),
         key("tube", Number(Length), "length", By("a quarter of `radius`"), "The radius of the tube, less than `radius`"),
     ];
     "mesh", "A triangle mesh from a file": [
-        key("file", File(MESHES), "", Required("\"mesh.obj\""), "OBJ (with MTL), OFF, PLY, STL or glTF (.glb, .gltf), chosen by the extension"),
-        key("part", Whole(0, MOST_WHOLE), "", Absent, "One primitive of a glTF file, numbered across all its meshes. Without it, the file's whole scene"),
+        key("file", File(MESHES), "", Required("\"mesh.obj\""), "OBJ (with MTL), OFF, PLY, STL or glTF (.glb, .gltf), determined by the extension"),
+        key("part", Whole(0, MOST_WHOLE), "", Absent, "Index of a primitive in a glTF file, counted across all meshes. Without this key, the mesh is the file's whole scene"),
         key("scale", Scale(NotZero), "", Is("1.0"), "Scale, applied first"),
         key("rotate", Numbers(3, "three numbers", Any), "degrees", Is("[0, 0, 0]"), "Rotation about x, then y, then z"),
         key("translate", Numbers(3, "three numbers", Any), "length", Is("[0, 0, 0]"), "Translation, applied last"),
-        key("matrix", Numbers(16, "16 numbers", Any), "", Absent, "An affine map, row by row, with last row 0, 0, 0, 1; instead of `scale`, `rotate` and `translate`"),
+        key("matrix", Numbers(16, "16 numbers", Any), "", Absent, "An affine transform in row-major order, with 0, 0, 0, 1 as the last row; replaces `scale`, `rotate` and `translate`"),
         key("smooth", Flag, "", Is("true"), "Whether vertex normals are interpolated; glimt computes them if the file has none"),
         key("vertex_colors", Flag, "", Is("false"), "Whether vertex colors multiply the material's color"),
     ];

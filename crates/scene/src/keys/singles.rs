@@ -45,7 +45,7 @@ pub(super) const CAMERA: TableInfo = single(
             File(&[]),
             "",
             Absent,
-            "A gKit orbiter file, instead of `position`, `look_at` and `up`; its field of view is the default of `fov`",
+            "A gKit orbiter file, instead of `position`, `look_at` and `up`; its field of view is the default for `fov`",
         ),
     ],
 );
@@ -60,16 +60,16 @@ pub(super) const PHOTONS: TableInfo = single(
             Whole(0, 1_000_000_000_000),
             "per pass",
             Is("0"),
-            "Photons emitted per sample of the image. 0 means one per pixel, but between 8,192 and 200,000. Values above 4 million are reduced to that, with a warning",
+            "Photons emitted per sample of the image. 0 means one per pixel, clamped to between 8,192 and 200,000. Values above 4 million are reduced to 4 million, with a warning",
         ),
         key(
             "radius",
             Number(LengthOrZero),
             "length",
             Is("0.0"),
-            "Kernel radius of the first pass; 0 chooses it from the photon density",
+            "Kernel radius of the first pass; 0 chooses a radius based on the photon density",
         ),
-        key("bounces", Whole(0, 4_294_967_295), "bounces", Is("16"), "Maximum number of bounces of a photon"),
+        key("bounces", Whole(0, 4_294_967_295), "bounces", Is("16"), "Maximum number of bounces per photon"),
     ],
 );
 
@@ -82,7 +82,7 @@ pub(super) const ENVIRONMENT: TableInfo = single(
             Color(AtLeast(0.0)),
             "radiance",
             By("black; `[1, 1, 1]` with a `file`"),
-            "Radiance; with a `file`, a factor on the map",
+            "Radiance; with a `file`, a scale factor for the map",
         ),
         key(
             "file",

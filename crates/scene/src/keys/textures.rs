@@ -33,7 +33,7 @@ pub(super) const TEXTURES: TableInfo = TableInfo {
             Numbers(2, "two numbers", NotZero),
             "",
             Is("[1, 1]"),
-            "Tiling across (u) and up (v): a factor on the coordinates",
+            "Scale factors for the coordinates: tiling across (u) and up (v)",
         ),
         key(
             "rotate",
@@ -54,7 +54,7 @@ pub(super) const TEXTURES: TableInfo = TableInfo {
             Color(AtLeast(0.0)),
             "",
             Is("[1, 1, 1]"),
-            "Factor on the linear colors; numbers use its red component, normal maps and heights ignore it",
+            "Scale factor for linear colors; numbers use the red component, normal maps and heights ignore the factor",
         ),
         key(
             "uv",
@@ -68,7 +68,7 @@ pub(super) const TEXTURES: TableInfo = TableInfo {
             Words(words::<Encoding>),
             "",
             Is("\"auto\""),
-            "`\"auto\"`: the color space stated in the file; by default sRGB for 8- and 16-bit colors, linear for numbers, normal maps and floating-point files",
+            "`\"auto\"`: the color space specified in the file; by default sRGB for 8- and 16-bit colors, and linear for numbers, normal maps and floating-point files",
         ),
     ],
     types: &[],

@@ -9,7 +9,7 @@ use super::render_with;
 /// A line of a report.
 pub type ReportLine = Vec<Piece>;
 
-/// A run of text of one role.
+/// A run of text with the same role.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Piece {
     /// Determines the color.
@@ -18,22 +18,22 @@ pub struct Piece {
     pub text: String,
 }
 
-/// Role of a piece of a report. Front ends choose the color.
+/// Role of a piece of text. Front ends choose the colors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
-    /// Source text, paths.
+    /// Source text and paths.
     Text,
-    /// The word `error`, underlines and labels of errors.
+    /// The word `error`, and underlines and labels for errors.
     Error,
-    /// The word `warning`, underlines and labels of warnings.
+    /// The word `warning`, and underlines and labels for warnings.
     Warning,
     /// Line numbers and rules.
     Frame,
-    /// The message, and the word `help`.
+    /// The message and the word `help`.
     Message,
 }
 
-/// Returns the report of [`super::render`] as styled lines.
+/// Returns the same report as [`super::render`], as styled lines.
 pub fn lines(diagnostics: &[Diagnostic], width: usize) -> Vec<ReportLine> {
     let renderer = Renderer::plain()
         .error(AnsiColor::Red.on_default())
@@ -43,7 +43,8 @@ pub fn lines(diagnostics: &[Diagnostic], width: usize) -> Vec<ReportLine> {
     render_with(diagnostics, width, &renderer).lines().map(pieces).collect()
 }
 
-/// Splits a line at its color escape sequences, which all come from the renderer: text from files has none.
+/// Splits a line at color escape sequences. They are all from the renderer, because text from files is
+/// sanitized.
 fn pieces(line: &str) -> ReportLine {
     let mut pieces = ReportLine::new();
     let mut role = Role::Text;
@@ -62,7 +63,7 @@ fn pieces(line: &str) -> ReportLine {
     pieces
 }
 
-/// The role with this color code in [`lines`].
+/// The role for a color code used in [`lines`].
 fn role_of(codes: &str) -> Role {
     match codes {
         "31" => Role::Error,

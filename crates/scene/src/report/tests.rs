@@ -14,7 +14,7 @@ fn at(source: &Arc<str>, span: Range<usize>, label: &str) -> Diagnostic {
 }
 
 #[test]
-fn report_has_position_source_label_and_help() {
+fn report_shows_position_source_label_and_help() {
     let source: Arc<str> = "# äöü\n[[sphere]]\nradius = -0.5\n".into();
     let text = render(&[at(&source, 27..31, "found -0.5")], 80, Style::Plain);
     let expected = "\
@@ -48,7 +48,7 @@ fn columns_count_characters() {
 }
 
 #[test]
-fn empty_labels_make_no_note() {
+fn empty_labels_are_not_shown_as_notes() {
     let source: Arc<str> = format!("{}a", "[".repeat(100)).into();
     let text = render(&[at(&source, 100..101, "")], 60, Style::Plain);
     assert!(!text.contains("note"), "{text}");
@@ -68,7 +68,7 @@ fn diagnostics_are_sorted_and_counted() {
 }
 
 #[test]
-fn huge_lines_are_cut_at_the_width() {
+fn long_lines_are_cut_to_the_width() {
     let source: Arc<str> = format!("{} = oops{}", "x".repeat(3_000_000), " y".repeat(1_000_000)).into();
     let text = render(&[at(&source, 3_000_003..3_000_007, "here")], 60, Style::Plain);
     assert!(text.contains("a.toml:1:3000004\n"), "{text}");
@@ -129,7 +129,7 @@ fn labels_are_never_cut() {
         assert!(unwrapped.contains(label), "{width}:\n{text}");
         assert!(unwrapped.contains("^^^^^^^^^"), "{width}:\n{text}");
     }
-    // A label that fits follows the carets.
+    // If the label fits, it follows the carets.
     assert!(render(std::slice::from_ref(&one), 200, Style::Plain).contains("^^^^^^^^^ `u` and"));
     assert!(
         lines(std::slice::from_ref(&one), 60)
@@ -139,7 +139,7 @@ fn labels_are_never_cut() {
 }
 
 #[test]
-fn locator_handles_several_texts() {
+fn locator_alternates_between_texts() {
     let texts: [Arc<str>; 2] = ["a\nbä\n\nc".into(), "\u{feff}x\r\ny".into()];
     let mut locator = Locator::default();
     for round in 0..2 {

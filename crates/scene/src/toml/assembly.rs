@@ -11,11 +11,11 @@ use super::tree::{Document, Name, NodeKind, Span, StringRef, TableId, TableOrigi
 #[derive(Clone, Debug)]
 pub(super) struct TableHeader<'s> {
     pub(super) path: Vec<Name<'s>>,
-    /// `None` if the header is unusable, and with it the keys below.
+    /// `None` if the header is unusable. The keys below it are then ignored.
     pub(super) key: Option<Name<'s>>,
-    /// Includes the brackets.
+    /// Span including the brackets.
     pub(super) span: Span,
-    /// Whether it has double brackets.
+    /// Whether the header has double brackets.
     pub(super) is_list: bool,
 }
 
@@ -24,11 +24,12 @@ pub(super) struct Assembly<'s> {
     pub(super) document: Document<'s>,
     /// The current table.
     table: TableId,
-    /// The header of `table`, which is inserted when the next one begins. `None` if `table` is the root.
+    /// The header of `table`. `None` if `table` is the root. The table is inserted when the next header
+    /// begins.
     header: Option<TableHeader<'s>>,
-    /// An unclosed header: the following expressions may close it.
+    /// An unclosed header, which a later expression may close.
     pub(super) open: Option<TableHeader<'s>>,
-    /// Set after a key without a value: the rest of the document is ignored.
+    /// Whether the rest of the document is ignored, after a key without a value.
     pub(super) is_lost: bool,
     pub(super) syntax: Errors,
     pub(super) meaning: Errors,
@@ -36,7 +37,7 @@ pub(super) struct Assembly<'s> {
     pub(super) elements: Vec<ValueNode>,
 }
 
-/// Collects parser errors for the part of the text that starts at byte `base`.
+/// Collects parser errors for the part of the text starting at byte `base`.
 pub(super) struct ErrorCollector<'a> {
     pub(super) errors: &'a mut Errors,
     pub(super) base: usize,
@@ -53,7 +54,7 @@ impl<'s> Assembly<'s> {
         Self::of(Document::new(source))
     }
 
-    /// Continues a document in a new, detached table.
+    /// Extends a document with a new, detached table.
     pub(super) fn detached(mut document: Document<'s>) -> (Self, TableId) {
         let table = document.add_table(TableOrigin::default());
         (Self { table, ..Self::of(document) }, table)
@@ -91,7 +92,7 @@ impl<'s> Assembly<'s> {
         self.document.add_text(span, text)
     }
 
-    /// Makes an array of the elements from `first` on.
+    /// Creates an array from the elements starting at `first`.
     pub(super) fn end_array(&mut self, first: usize) -> NodeKind {
         let kind = self.document.add_array(&self.elements[first..]);
         self.elements.truncate(first);
@@ -135,8 +136,8 @@ impl<'s> Assembly<'s> {
         }
     }
 
-    /// Starts the table of a header. Defines a table that longer headers created implicitly; reports a table that is already
-    /// defined, but continues it.
+    /// Starts the table of a header. If longer headers have created the table implicitly, defines it. If the
+    /// table is already defined, reports an error and continues it.
     pub(super) fn start_table(&mut self, header: TableHeader<'s>) {
         self.table =
             self.continued(&header).unwrap_or_else(|| self.document.add_table(TableOrigin::default()));
@@ -145,7 +146,7 @@ impl<'s> Assembly<'s> {
         self.header = Some(header);
     }
 
-    /// Removes and returns the existing table of a header, if there is one.
+    /// Removes and returns the existing table of a header, if any.
     fn continued(&mut self, header: &TableHeader<'s>) -> Option<TableId> {
         if header.is_list {
             return None;
@@ -184,7 +185,7 @@ impl<'s> Assembly<'s> {
         }
     }
 
-    /// Returns the table at `path`, creating missing ones.
+    /// Returns the table at `path`, and creates missing tables.
     fn descend(&mut self, from: TableId, path: &[Name<'s>], is_dotted: bool) -> Option<TableId> {
         path.iter().try_fold(from, |table, name| {
             let Some(found) = self.document.find(table, &name.text) else {

@@ -1,18 +1,18 @@
-//! Finds the square brackets of arrays in a text that may have syntax errors.
+//! Finds the square brackets of arrays. The text may have syntax errors.
 
 use toml_parser::Source;
 use toml_parser::lexer::TokenKind;
 
-/// A bracket of an array. Brackets in headers, strings and comments are skipped.
+/// An array bracket. Brackets in headers, strings and comments are skipped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Bracket {
     /// Byte offset in the text.
     pub(crate) at: usize,
-    /// Whether it is `[`.
+    /// Whether the bracket is `[`.
     pub(crate) opens: bool,
 }
 
-/// Returns the array brackets in a text that starts with an expression.
+/// Returns the array brackets in `text`, which must begin with an expression.
 pub(crate) fn brackets(text: &str) -> Vec<Bracket> {
     let mut brackets = Vec::new();
     let (mut depth, mut is_line_start, mut is_header) = (0_usize, true, false);
@@ -64,7 +64,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_array_brackets_count() {
+    fn only_array_brackets_are_found() {
         let open = |text: &str| last_open(&brackets(text));
         for closed in [
             "",

@@ -16,7 +16,7 @@ pub(crate) struct SyntaxError {
 }
 
 impl SyntaxError {
-    /// Converts a parser error for the part of the text that starts at byte `base`.
+    /// Converts a parser error for the part of the text starting at byte `base`.
     pub(super) fn new(error: &ParseError, base: usize) -> Self {
         let span = error.unexpected().map_or(0..0, |span| base + span.start()..base + span.end());
         Self { span, what: error.description().to_owned(), expected: error.expected().map(list) }
@@ -54,7 +54,7 @@ fn one(expected: &Expected) -> String {
 pub(super) struct Errors(Vec<SyntaxError>);
 
 impl Errors {
-    /// Enough that the first errors in text order are found, except in absurdly broken files.
+    /// Large enough to contain the first errors in text order, except in absurdly broken files.
     const CAPACITY: usize = 2_000;
 
     pub(super) fn push_with(&mut self, make: impl FnOnce() -> SyntaxError) {

@@ -1,7 +1,7 @@
-//! Converts the events of `toml_parser` to headers, keys and values.
+//! Converts `toml_parser` events to headers, keys and values.
 //!
-//! In a broken text, events may be inconsistent: a close without an open, or a key in place of a value. They give the same
-//! values as in the `toml` crate.
+//! If the text has errors, events may be inconsistent: a close without an open, or a key instead of a value.
+//! The resulting values are the same as in the `toml` crate.
 
 use std::borrow::Cow;
 
@@ -17,7 +17,7 @@ use super::tree::{Name, NodeKind, Radix, Span, TableOrigin, ValueNode};
 /// The events of one expression.
 pub(super) struct Events<'e, 's> {
     pub(super) events: &'e [Event],
-    /// The text that the events index into, and its offset in the document.
+    /// The text that the events index into. `base` is the text's offset in the document.
     pub(super) source: Source<'s>,
     pub(super) base: usize,
     pub(super) assembly: &'e mut Assembly<'s>,
@@ -39,7 +39,7 @@ impl<'s> Events<'_, 's> {
                     self.header();
                 }
                 EventKind::SimpleKey => self.key_value(event),
-                // White space, and the remains of incomplete expressions.
+                // Whitespace, and the rest of incomplete expressions.
                 _ => {}
             }
         }
@@ -60,7 +60,7 @@ impl<'s> Events<'_, 's> {
         Span::new(self.base + event.span().start(), self.base + event.span().end())
     }
 
-    /// Reads the rest of the open header. An unclosed header takes the key and the end of the next one.
+    /// Reads the rest of the open header. An unclosed header ends at the next header, whose key it takes.
     fn header(&mut self) {
         let Some(mut header) = self.assembly.open.take() else { return };
         while let Some(event) = self.next() {
@@ -96,7 +96,7 @@ impl<'s> Events<'_, 's> {
         ValueNode { span, kind: NodeKind::Integer(text, Radix::Decimal) }
     }
 
-    /// Reads a dotted key. Returns its path and last part, which is `None` if there are too many parts.
+    /// Reads a dotted key. Returns the path and the last part, which is `None` if there are too many parts.
     fn key(&mut self, event: Event) -> (Vec<Name<'s>>, Option<Name<'s>>) {
         let mut path = Vec::new();
         let mut last = event;
@@ -173,7 +173,7 @@ impl<'s> Events<'_, 's> {
         ValueNode { span, kind }
     }
 
-    /// Reads an array up to its end or the first unexpected event.
+    /// Reads an array up to the end or the first unexpected event.
     fn array(&mut self, open: Event) -> ValueNode {
         let first = self.assembly.elements.len();
         let mut span = self.span(open);
@@ -203,7 +203,7 @@ impl<'s> Events<'_, 's> {
         ValueNode { span, kind: self.assembly.end_array(first) }
     }
 
-    /// Reads an inline table up to its end or the first unexpected event.
+    /// Reads an inline table up to the end or the first unexpected event.
     fn inline_table(&mut self, open: Event) -> ValueNode {
         let origin = TableOrigin { is_inline: true, ..TableOrigin::default() };
         let table = self.assembly.document.add_table(origin);

@@ -1,7 +1,7 @@
-//! Parses one expression: a header, or a key with its value, up to the end of its line.
+//! Parses one expression: a header or a key and its value, up to the end of the line.
 //!
-//! `toml_parser` takes a list of tokens of 24 bytes each. To bound its memory, the document is split into expressions at
-//! points where the parser is certain to have finished one.
+//! `toml_parser` takes a list of tokens of 24 bytes each. To limit memory, the document is split at points
+//! where the parser has certainly finished an expression.
 
 use toml_parser::lexer::{Token, TokenKind};
 use toml_parser::parser::{Event, RecursionGuard, ValidateWhitespace, parse_document};
@@ -11,7 +11,7 @@ use super::assembly::{Assembly, ErrorCollector};
 use super::events::Events;
 use super::{MARK, MAX_DEPTH};
 
-/// Parser of expressions, with buffers that are reused.
+/// Expression parser with reusable buffers.
 #[derive(Default)]
 pub(super) struct Expressions {
     tokens: Vec<Token>,
@@ -19,12 +19,13 @@ pub(super) struct Expressions {
 }
 
 impl Expressions {
-    /// Reads the expression that starts at byte `at`, the start of a line. Returns the offset after it.
+    /// Reads the expression that starts at byte `at`, the start of a line. Returns the offset after the
+    /// expression.
     pub(super) fn read<'s>(&mut self, source: &'s str, at: usize, assembly: &mut Assembly<'s>) -> usize {
         self.tokens.clear();
         self.events.clear();
-        // The lexer skips a byte order mark at the start of its text, which is right only for the first line. Give it the
-        // previous newline before all other lines.
+        // The lexer skips a byte order mark at the start of its text, which is only correct for the first
+        // line. For all other lines, pass text that starts with the previous newline.
         let first = at == if source.starts_with(MARK) { MARK.len() } else { 0 };
         let base = if first { 0 } else { at - 1 };
         let part = Source::new(source.get(base..).unwrap_or_default());
@@ -53,8 +54,9 @@ fn parse(tokens: &[Token], source: Source<'_>, events: &mut Vec<Event>, errors: 
 
 /// Finds the end of an expression.
 ///
-/// `open` is a supersequence of the brackets open in the parser, as each is closed only by its own kind. With mismatched
-/// brackets the parser may finish earlier, but it is never inside a value while `open` is empty.
+/// `open` is a supersequence of the parser's open brackets, because a bracket is only closed by its own kind.
+/// With mismatched brackets, the parser may finish earlier, but it is never inside a value while `open` is
+/// empty.
 #[derive(Default)]
 struct ExpressionScanner {
     phase: Phase,
@@ -63,7 +65,7 @@ struct ExpressionScanner {
 
 #[derive(Clone, Copy, Default, PartialEq, Eq)]
 enum Phase {
-    /// Before the first token that is not white space.
+    /// Before the first token that is not whitespace.
     #[default]
     Start,
     /// Inside or after a key.
@@ -72,7 +74,7 @@ enum Phase {
     Equals,
     /// Within brackets.
     Value,
-    /// The rest of the line cannot open a value.
+    /// In the rest of the line, which cannot start a value.
     Rest,
 }
 

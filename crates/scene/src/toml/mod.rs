@@ -1,13 +1,14 @@
 //! A TOML parser with a compact tree that references the text.
 //!
-//! [`parse`] reads a document line by line. [`plain`] handles simple lines, which make up most of large scenes. All others are
-//! split by [`expression`], parsed by `toml_parser` and converted to values by [`events`]. [`assembly`] inserts keys and values
-//! into the tables of a [`tree`]. This module does not know about scenes. It recovers from errors.
+//! [`parse`] reads a document line by line. [`plain`] handles simple lines, the majority in large scenes. For
+//! all other lines, [`expression`] splits the text, `toml_parser` parses it, and [`events`] converts it to
+//! values. [`assembly`] inserts keys and values into the tables of a [`tree`]. This module is independent of
+//! scenes and recovers from errors.
 //!
-//! ## Why not the tree of the `toml` crate
+//! ## Why not use the `toml` crate's tree
 //!
-//! `toml::de::DeTable::parse_recoverable` (1.2) also has spans and error recovery. Measured alternately on the same machine, on
-//! a scene of a million spheres (77 MB of text):
+//! `toml::de::DeTable::parse_recoverable` (1.2) also supports spans and error recovery. Interleaved
+//! measurements on the same machine, for a scene with a million spheres (77 MB of text):
 //!
 //! | | this tree | `DeTable` |
 //! | --- | --- | --- |
@@ -16,8 +17,9 @@
 //! | peak memory, without the text | 192 MB | 2.67 GB |
 //! | errors in `tests/broken` | | the same messages and spans, but no span for dotted keys that are too deep |
 //!
-//! The `toml` crate remains the reference in tests: both use the grammar of `toml_parser` and report its errors. Scenes of that
-//! size are in use, and the crate's tree would take more memory than the rendered spheres.
+//! Tests still use the `toml` crate as the reference: both parsers use the `toml_parser` grammar and report
+//! its errors. Users have scenes of this size, and the crate's tree would take more memory than the rendered
+//! spheres.
 
 mod assembly;
 mod brackets;
@@ -36,22 +38,23 @@ pub(super) use error::SyntaxError;
 pub(super) use set::{KeyError, KeyErrorKind, Layout};
 pub(super) use tree::{Document, Elements, Entries, KeyValue, TomlValue, Value};
 
-/// Deepest nesting of arrays and tables, and most parts of a dotted key.
+/// Maximum nesting depth of arrays and tables, and maximum number of parts in a dotted key.
 const MAX_DEPTH: u32 = 80;
 
 /// The byte order mark that may precede a text.
 const MARK: &str = "\u{feff}";
 
-/// Whether a text consists of one dotted key with its value.
+/// Whether a text consists of one dotted key and its value.
 pub(super) fn is_key_value(text: &str) -> bool {
     let (document, errors) = parse(text);
     errors.is_empty() && document.only_value(tree::Document::ROOT).is_some_and(|(keys, _)| keys.len() >= 2)
 }
 
-/// Sets the key at byte `at` of `source` to the value given there. `source` starts with the text of the document.
+/// Sets a key of the document as specified by the `KEY = VALUE` at byte `at` of `source`, which starts with
+/// the document's text.
 ///
 /// # Errors
-/// The part of the key that does not exist.
+/// The part of the key that cannot be resolved.
 pub(super) fn set<'s>(
     document: Document<'s>,
     source: &'s str,
@@ -68,8 +71,8 @@ pub(super) fn set<'s>(
     (document, placed)
 }
 
-/// Parses a text of less than 4 GiB. Returns its tree and first errors: syntax errors followed by errors of keys and values,
-/// both in text order.
+/// Parses a text of less than 4 GiB. Returns the tree and the first errors: syntax errors, followed by errors
+/// in keys and values, both in text order.
 pub(super) fn parse(source: &str) -> (Document<'_>, Vec<SyntaxError>) {
     let mut assembly = Assembly::new(source);
     let mut expressions = Expressions::default();

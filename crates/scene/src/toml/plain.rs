@@ -1,8 +1,10 @@
-//! A fast path for simple lines: blank lines, comments, `[a]`, `[a.b]`, `[[a]]`, and `key = value` with a bare key and a
-//! decimal number, a Boolean, a string without escapes, or a flat array of those on one line.
+//! A fast path for simple lines: blank lines, comments, `[a]`, `[a.b]`, `[[a]]`, and `key = value` with a
+//! bare key and a decimal number, a Boolean, a string without escapes, or a flat single-line array of such
+//! values.
 //!
-//! Large scenes consist of such lines, and this parser takes a tenth of the time. All other lines, including those with
-//! errors, are left to [`super::expression`]. Tests check that both give the same result.
+//! Large scenes consist of such lines, and this parser takes a tenth of the time. All other lines, including
+//! lines with errors, are left to [`super::expression`]. Tests check that both parsers return the same
+//! results.
 
 use std::borrow::Cow;
 
@@ -45,13 +47,13 @@ pub(super) fn read<'s>(source: &'s str, at: usize, assembly: &mut Assembly<'s>) 
     Some(line.at)
 }
 
-/// A value. Without a kind it is an array.
+/// A value. An array if `kind` is `None`.
 struct ScannedValue {
     span: Span,
     kind: Option<NodeKind>,
 }
 
-/// A cursor in a line.
+/// A cursor within a line.
 struct LineScanner<'s> {
     source: &'s str,
     at: usize,
@@ -71,7 +73,7 @@ impl<'s> LineScanner<'s> {
         Some(())
     }
 
-    /// Skips bytes while `is_one` holds. Returns their number.
+    /// Skips bytes while `is_one` is true. Returns the number of bytes skipped.
     fn skip(&mut self, is_one: impl Fn(u8) -> bool) -> usize {
         let rest = self.source.as_bytes().get(self.at..).unwrap_or_default();
         let count = rest.iter().position(|byte| !is_one(*byte)).unwrap_or(rest.len());
@@ -83,7 +85,7 @@ impl<'s> LineScanner<'s> {
         self.skip(|byte| byte == b' ' || byte == b'\t');
     }
 
-    /// Reads white space, a comment and the end of the line or of the text.
+    /// Reads whitespace, a comment and the end of the line or the text.
     fn end(&mut self) -> Option<()> {
         self.space();
         if self.peek() == b'#' {
@@ -207,7 +209,7 @@ impl<'s> LineScanner<'s> {
         (self.skip(|byte| byte.is_ascii_digit()) > 0).then_some(())
     }
 
-    /// Whether the next byte is a delimiter, so the value ends here.
+    /// Whether the value ends here because the next byte is a delimiter.
     fn is_at_delimiter(&self) -> bool {
         matches!(self.peek(), b' ' | b'\t' | b',' | b']' | b'\r' | b'\n' | b'#')
             || self.at == self.source.len()

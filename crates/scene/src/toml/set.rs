@@ -9,9 +9,9 @@ use super::tree::{Document, Name, NodeKind, TableId, TableOrigin, ValueNode};
 pub(crate) struct KeyError {
     /// Byte range of the part that cannot be resolved.
     pub(crate) span: Range<usize>,
-    /// The parts before it.
+    /// The parts before `part`.
     pub(crate) above: Vec<String>,
-    /// The part itself.
+    /// The part that cannot be resolved.
     pub(crate) part: String,
     /// The reason.
     pub(crate) why: KeyErrorKind,
@@ -20,7 +20,7 @@ pub(crate) struct KeyError {
 /// Reasons why a part of a key cannot be resolved.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum KeyErrorKind {
-    /// There is no table of this name, and it must not be created.
+    /// The table does not exist and must not be created.
     Unknown {
         /// Keys that exist.
         known: Vec<String>,
@@ -29,7 +29,7 @@ pub(crate) enum KeyErrorKind {
     NoEntry {
         /// Number of elements.
         count: usize,
-        /// Names of the elements that have one.
+        /// Names of all named elements.
         names: Vec<String>,
     },
     /// Several elements have this name.
@@ -37,14 +37,14 @@ pub(crate) enum KeyErrorKind {
         /// Number of these elements.
         count: usize,
     },
-    /// The part refers to an element of an array of values.
+    /// The part refers to an element in an array of values.
     Element,
 }
 
 /// The groups and lists at the top level.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Layout {
-    /// Top-level tables of named tables, which are not created.
+    /// Top-level tables that contain named tables. Named tables are never created.
     pub(crate) groups: &'static [&'static str],
     /// Whether a top-level name is a list of tables.
     pub(crate) is_list: fn(&str) -> bool,
@@ -83,7 +83,7 @@ impl<'s> Document<'s> {
         Ok(())
     }
 
-    /// Resolves one part of a key that is not the last.
+    /// Resolves any part of a key except the last.
     fn step(
         &mut self,
         keys: &[Name<'s>],
@@ -117,7 +117,7 @@ impl<'s> Document<'s> {
         }
     }
 
-    /// Returns an error if a part of a key names a missing table of a group.
+    /// Returns an error if a part of a key refers to a missing table in a group.
     fn check_group(
         &self,
         keys: &[Name<'s>],
@@ -132,14 +132,14 @@ impl<'s> Document<'s> {
         Ok(())
     }
 
-    /// Replaces the value of a key by a new table.
+    /// Replaces the value of a key with a new table.
     fn create_table(&mut self, parent: TableId, name: &Name<'s>) -> TableId {
         let table = self.add_table(TableOrigin::default());
         self.put(parent, name.clone(), ValueNode { span: name.span, kind: NodeKind::Table(table) });
         table
     }
 
-    /// The index of an element, given its number from 1 or the value of its key `name`.
+    /// The index of an element, given its 1-based number or the value of its key `name`.
     fn find_element(&self, elements: &[ValueNode], part: &str) -> Result<usize, KeyErrorKind> {
         let number = part.parse::<usize>().ok().and_then(|number| number.checked_sub(1));
         if let Some(index) = number.filter(|index| *index < elements.len()) {

@@ -5,7 +5,7 @@ use proptest::prelude::*;
 
 use super::*;
 
-/// Formats errors as the `toml` crate does.
+/// Formats errors like the `toml` crate.
 fn errors(errors: &[SyntaxError]) -> Vec<(std::ops::Range<usize>, String)> {
     let message = |error: &SyntaxError| match &error.expected {
         Some(expected) => format!("{}, expected {expected}", error.what),
@@ -19,10 +19,10 @@ fn assert_same_table(text: &str, ours: Entries<'_>, theirs: &DeTable<'_>) {
     let our_keys: Vec<_> = ours.iter().map(|one| (one.key.to_owned(), one.span)).collect();
     let their_keys: Vec<_> =
         theirs.iter().map(|(key, _)| (key.get_ref().clone().into_owned(), key.span())).collect();
-    assert_eq!(our_keys, their_keys, "keys of {text:?}");
+    assert_eq!(our_keys, their_keys, "keys in {text:?}");
     for (one, (key, value)) in ours.iter().zip(theirs) {
         assert_eq!(ours.get(one.key).map(|found| found.value.span()), Some(one.value.span()), "{text:?}");
-        assert_eq!(one.value.span(), value.span(), "{key:?} of {text:?}");
+        assert_eq!(one.value.span(), value.span(), "{key:?} in {text:?}");
         assert_same_value(text, one.value, value.get_ref());
     }
 }
@@ -45,11 +45,11 @@ fn assert_same_value(text: &str, ours: Value<'_>, theirs: &DeValue<'_>) {
             }
         }
         (TomlValue::Table(ours), DeValue::Table(theirs)) => assert_same_table(text, ours, theirs),
-        (ours, theirs) => panic!("{ours:?} is not {theirs:?} in {text:?}"),
+        (ours, theirs) => panic!("got {ours:?}, expected {theirs:?} in {text:?}"),
     }
 }
 
-/// Compares a text with the `toml` crate. Returns whether it is valid.
+/// Parses a text and compares the result with the `toml` crate. Returns whether the text is valid.
 #[track_caller]
 fn assert_same(text: &str) -> bool {
     let (theirs, their_errors) = DeTable::parse_recoverable(text);
@@ -59,7 +59,7 @@ fn assert_same(text: &str) -> bool {
         .map(|error| (error.span().unwrap_or_default(), error.message().to_owned()))
         .collect();
     let our_found = errors(&our_errors).into_iter().map(|(span, message)| {
-        // The crate has no span for keys with too many parts.
+        // The crate reports no span for keys with too many parts.
         let is_placed = message != "recursion limit" || their_errors.iter().any(|(other, _)| *other == span);
         (if is_placed { span } else { 0..0 }, message)
     });
@@ -198,7 +198,7 @@ const KEYS: [&str; 14] = [
     "a.\"b.c\"",
 ];
 
-/// Lines that may conflict with each other.
+/// Lines that may conflict.
 fn line() -> impl Strategy<Value = String> {
     let value = prop::sample::select(&VALUES[..]);
     let key = prop::sample::select(&KEYS[..]);
@@ -245,7 +245,7 @@ fn single_lines_and_pairs_match_the_crate() {
 
 #[test]
 fn brackets_in_any_order_match_the_crate() {
-    // All sequences of six of these, within an expression and followed by another.
+    // All sequences of six of these parts, within an expression and followed by another expression.
     let parts = ["[", "]", "{", "}", ",", "\n", "b=", "1 "];
     for number in 0..parts.len().pow(6) {
         let mut rest = number;
@@ -287,7 +287,7 @@ fn large_tables_match_the_crate() {
 }
 
 #[test]
-fn overlong_keys_are_reported_in_place() {
+fn too_long_keys_are_reported_with_their_span() {
     let text = |parts: usize| format!("\n[x]\n{}a = 1\n", "a.".repeat(parts - 1));
     assert!(assert_same(&text(80)));
     let long = text(81);

@@ -1,4 +1,4 @@
-//! The document tree: nodes of 16 bytes in a few vectors, with strings as spans of the source.
+//! The document tree: 16-byte nodes in a few vectors, with strings as spans into the source.
 //!
 //! A sphere with a center, a radius and a material takes about 180 bytes.
 
@@ -25,7 +25,8 @@ impl Span {
     }
 }
 
-/// A decoded string: the whole span, the span without its quotes, or an index into the document's decoded strings.
+/// A decoded string: the whole span, the span without quotes, or an index into the document's decoded
+/// strings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct StringRef(u32);
 
@@ -55,15 +56,15 @@ pub(super) enum NodeKind {
     Float(StringRef),
     Boolean(bool),
     Datetime,
-    /// `[…]`: index into the arrays.
+    /// `[…]`, as an index into the arrays.
     Array(u32),
-    /// The tables `[[name]]` of one name: index into the lists.
+    /// All `[[name]]` tables with the same name, as an index into the lists.
     List(u32),
     Table(TableId),
 }
 
 impl NodeKind {
-    /// The table, if the value is one.
+    /// The table, if the value is a table.
     pub(super) fn table(self) -> Option<TableId> {
         if let Self::Table(table) = self { Some(table) } else { None }
     }
@@ -76,13 +77,13 @@ pub(super) struct ValueNode {
     pub(super) kind: NodeKind,
 }
 
-/// A key with its value, in the linked list of its table.
+/// A key and its value, in the linked list of a table.
 #[derive(Clone, Copy, Debug)]
 struct TableEntry {
     key: Span,
     text: StringRef,
     node: ValueNode,
-    /// The next entry of the table, or [`NONE`].
+    /// The table's next entry, or [`NONE`].
     next: u32,
     is_removed: bool,
 }
@@ -90,14 +91,14 @@ struct TableEntry {
 /// End of a linked list.
 const NONE: u32 = u32::MAX;
 
-/// Origin of a table, which determines whether keys may be added to it.
+/// Origin of a table. Determines whether keys may be added.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct TableOrigin {
-    /// Whether it was created by a longer header or key.
+    /// Whether the table was created by a longer header or key.
     pub(super) is_implicit: bool,
-    /// Whether it was created by a dotted key.
+    /// Whether the table was created by a dotted key.
     pub(super) is_dotted: bool,
-    /// Whether it is an inline table or part of one.
+    /// Whether the table is an inline table or part of an inline table.
     pub(super) is_inline: bool,
 }
 
@@ -105,12 +106,12 @@ pub(super) struct TableOrigin {
 struct TableRecord {
     first: u32,
     last: u32,
-    /// Number of entries, including removed ones.
+    /// Number of entries, including removed entries.
     length: u32,
     origin: TableOrigin,
 }
 
-/// Tables with more entries than this use the hash index.
+/// Maximum number of entries in tables that do not use the hash index.
 const MAX_LINEAR: u32 = 16;
 
 /// A key that is not yet in a table.
@@ -128,7 +129,7 @@ pub(crate) struct Document<'s> {
     texts: Vec<String>,
     tables: Vec<TableRecord>,
     entries: Vec<TableEntry>,
-    /// Each array's range of `elements`.
+    /// Each array's range in `elements`.
     arrays: Vec<Span>,
     elements: Vec<ValueNode>,
     lists: Vec<Vec<ValueNode>>,
@@ -155,7 +156,7 @@ impl<'s> Document<'s> {
         document
     }
 
-    /// Replaces the source by a text that starts with it.
+    /// Replaces the source with a text that starts with the same text.
     pub(super) fn with_source(self, source: &'s str) -> Self {
         Self { source, ..self }
     }
@@ -282,7 +283,8 @@ impl<'s> Document<'s> {
         (entry.key, entry.text, entry.node) = (name.span, text, node);
     }
 
-    /// The only value in a table, with its dotted key. `None` if there are several or it has a header.
+    /// The only value in a table, and its dotted key. `None` if there are several values or if the value has
+    /// a header.
     pub(super) fn only_value(&self, table: TableId) -> Option<(Vec<Name<'s>>, ValueNode)> {
         let mut keys = Vec::new();
         let mut table = Some(table);
@@ -340,7 +342,7 @@ impl<'s> Document<'s> {
     /// Removes an entry from its table.
     pub(super) fn remove(&mut self, table: TableId, name: &str) -> Option<ValueNode> {
         let found = self.find_entry(table, name)?;
-        // Only large tables are indexed.
+        // Only large tables have an index.
         if self.tables[table.0 as usize].length > MAX_LINEAR {
             self.index.remove(&(table, Cow::Owned(name.to_owned())));
         }
@@ -377,7 +379,7 @@ pub(crate) struct Value<'d> {
 pub(crate) enum TomlValue<'d> {
     /// A string without quotes and escapes.
     String(&'d str),
-    /// Digits with a sign, without underscores and radix prefix.
+    /// Digits with a sign, without underscores or radix prefix.
     Integer { digits: &'d str, radix: u32 },
     /// Text accepted by `f64::from_str`.
     Float(&'d str),
@@ -385,19 +387,19 @@ pub(crate) enum TomlValue<'d> {
     Boolean(bool),
     /// A date, a time, or both.
     Datetime,
-    /// An array, or all tables `[[name]]`.
+    /// An array, or all `[[name]]` tables.
     Array(Elements<'d>),
     /// A table from a header, braces or a dotted key.
     Table(Entries<'d>),
 }
 
 impl<'d> Value<'d> {
-    /// Byte range in the source: for a table, its header or braces.
+    /// Byte range in the source. For a table, the range of the header or the braces.
     pub(crate) fn span(&self) -> Range<usize> {
         self.node.span.range()
     }
 
-    /// Its elements, if it is an array.
+    /// The elements, if the value is an array.
     pub(crate) fn array(&self) -> Option<Elements<'d>> {
         if let TomlValue::Array(array) = self.item() { Some(array) } else { None }
     }

@@ -1,4 +1,4 @@
-//! AOVs of the first hit. All except depth are display values in [0, 1], not radiance.
+//! First-hit AOVs. All except depth are display values in [0, 1], not radiance.
 
 use super::photons::{GatherPoint, PhotonMaps};
 use super::transport::scratch::TraceBuffers;
@@ -10,7 +10,7 @@ use crate::geometry::SurfacePoint;
 use crate::math::lanes::PortableSimd;
 use crate::math::{DVec2, Vec3};
 
-/// Writes the AOV `quantity` at the first hit of each camera ray in the queue; black where there is no hit.
+/// Writes the AOV `quantity` at the first hit of each camera ray in the queue, or black if there is no hit.
 pub fn shade(
     (tile, maps): (&TileContext<'_>, Option<&PhotonMaps>),
     quantity: FirstHit,
@@ -49,7 +49,7 @@ pub fn shade(
     Ok(())
 }
 
-/// Number of photons within the kernels around a vertex, in the photon pass of a sample.
+/// Number of photons within the kernels around a vertex, in a sample's photon pass.
 fn photons(maps: &PhotonMaps, tile: &TileContext<'_>, slot: u32, vertex: &Vertex<'_>) -> f32 {
     let look = GatherPoint { point: vertex.surface.point, normal: vertex.normal, most_depth: u32::MAX };
     let (_, _, sample) = tile.block.sample_of(slot);

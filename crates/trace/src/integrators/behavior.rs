@@ -1,21 +1,21 @@
-//! What paths do at surfaces, derived from the integrator's method, the view and photon mapping.
+//! How paths continue at surfaces, derived from the integrator's method, the view and photon mapping.
 
 use super::settings::RenderSettings;
 use super::view::LightAov;
 use crate::lights::SamplingMode;
 use crate::scene::description::Method;
 
-/// What camera paths do at surfaces.
+/// How camera paths continue at surfaces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PathBehavior {
     /// Whether camera paths split into a reflected and a refracted path at glass.
     pub splits: bool,
-    /// Whether paths scatter at non-specular surfaces: in `path`, and in `whitted` with photons, to find light that
-    /// photons do not carry.
+    /// Whether paths scatter at non-specular surfaces. True in `path`, and in `whitted` with photons to find
+    /// light that the photons do not account for.
     pub scatters: bool,
-    /// Whether paths continue in microfacet lobes although they end at other non-specular surfaces.
+    /// Whether paths continue in microfacet lobes but end at other non-specular surfaces.
     pub mirrors: bool,
-    /// Whether photons are gathered at non-specular surfaces. Paths then ignore the lights that they hit through
+    /// Whether photons are gathered at non-specular surfaces. If so, paths ignore lights that they hit via
     /// mirrors and glass.
     pub gathers: bool,
     /// How lights are sampled.
@@ -28,7 +28,7 @@ impl PathBehavior {
         let Method { splits, scatters, gathers, .. } = settings.render.integrator.method();
         let gathers = gathers && has_photons;
         match settings.view.source().aov() {
-            // The lit fraction is measured at the first visible surface, which samples all lights.
+            // The lit fraction is measured at the first visible surface, where all lights are sampled.
             LightAov::LitFraction => Self {
                 splits: true,
                 scatters: gathers,

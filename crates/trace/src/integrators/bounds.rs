@@ -11,13 +11,13 @@ use crate::world::{RayInterval, TreeNode};
 /// Line width in pixels.
 const LINE_WIDTH: f32 = 1.25;
 
-/// Boxes that appear smaller than this many pixels are not drawn.
+/// Boxes smaller than this many pixels on screen are not drawn.
 const MIN_BOX_SIZE: f32 = 40.0;
 
 /// Opacity of lines behind surfaces.
 const HIDDEN_OPACITY: f32 = 0.3;
 
-/// Linear colors of the tree levels, starting at the root and repeating.
+/// Linear colors of the tree levels, starting at the root and repeating cyclically.
 const COLORS: [Vec3; 6] = [
     Vec3::new(1.0, 0.85, 0.1),
     Vec3::new(0.1, 0.8, 1.0),
@@ -55,8 +55,8 @@ pub fn draw(
     Ok(())
 }
 
-/// The box edge that a ray shows: edges in front of the surface at `end` win over edges behind it, then larger boxes
-/// over smaller ones.
+/// The box edge to draw for a ray. Edges in front of the surface at `end` take priority over edges behind it,
+/// and then larger boxes over smaller boxes.
 fn nearest_edge(tile: &TileContext<'_>, ray: &Ray, end: f32, spread: f32) -> Option<BoxEdge> {
     let mut best: Option<BoxEdge> = None;
     tile.world.geometry.visit_nodes(ray, |local, TreeNode { bounds, depth, .. }, stretch| {
@@ -80,7 +80,7 @@ fn nearest_edge(tile: &TileContext<'_>, ray: &Ray, end: f32, spread: f32) -> Opt
     best
 }
 
-/// Distance from a ray to the nearest edge of the box face through which it passes at t.
+/// Distance from a ray to the nearest edge of the box face that the ray crosses at t.
 fn edge_distance(bounds: &Aabb, ray: &Ray, (t, side): (f32, usize)) -> f32 {
     let (point, d) = (ray.at(t), ray.direction);
     let to_edge = |axis: usize| {
@@ -96,15 +96,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn edge_distance_is_that_between_two_lines() {
+    fn edge_distance_is_the_line_distance() {
         let cube = Aabb { min: Vec3::ZERO, max: Vec3::ONE };
         let distance = |origin: Vec3, direction: Vec3| {
             let ray = Ray::new(origin, direction);
-            let stretch = RayInterval::new(&cube, &ray).expect("the ray hits the cube");
+            let stretch = RayInterval::new(&cube, &ray).expect("the ray should hit the cube");
             edge_distance(&cube, &ray, stretch.enter)
         };
         assert!((distance(Vec3::new(0.2, 0.7, -3.0), Vec3::Z) - 0.2).abs() < 1e-6);
-        // Along (0, 1, 1) through (½, 0.9, 0): 0.1·cos 45° from the upper edge.
+        // A ray along (0, 1, 1) through (½, 0.9, 0) is 0.1·cos 45° from the upper edge.
         let diagonal = distance(Vec3::new(0.5, -0.1, -1.0), Vec3::new(0.0, 1.0, 1.0));
         assert!((diagonal - 0.1 * 0.5_f32.sqrt()).abs() < 1e-6, "{diagonal}");
     }

@@ -1,9 +1,9 @@
 //! Paths from the camera, traced bounce by bounce with queues instead of recursion.
 //!
-//! In `whitted`, paths split at glass and end at diffuse and glossy surfaces, which receive direct and ambient light
-//! (Whitted, *An Improved Illumination Model for Shaded Display*, 1980); at microfacet surfaces, they continue in the
-//! narrow lobe. In `path`, paths do not split, and continue at all surfaces (Kajiya, *The Rendering Equation*, 1986).
-//! With photons, `whitted` also continues at diffuse and glossy surfaces, as `path` does.
+//! In `whitted`, paths split at glass and end at diffuse and glossy surfaces, where direct and ambient light
+//! is added (Whitted, *An Improved Illumination Model for Shaded Display*, 1980). At microfacet surfaces,
+//! they continue in the narrow lobe. In `path`, paths do not split and continue at all surfaces (Kajiya, *The
+//! Rendering Equation*, 1986). With photons, paths in `whitted` also continue at diffuse and glossy surfaces.
 
 use std::ops::Range;
 
@@ -38,10 +38,10 @@ use crate::math::lanes::lane as lane_of;
 use crate::scene::description::Shadows;
 use crate::world::{Hit, PACKET_SIZE};
 
-/// A path splits only if the weaker branch contributes at least this much; otherwise one branch is chosen at random.
+/// Minimum contribution of the weaker branch for a path to split. Below it, one branch is chosen at random.
 const MIN_SPLIT: f32 = 0.01;
 
-/// Number of rays between two polls of the token.
+/// Number of rays between checks of the cancel token.
 const POLL_INTERVAL: usize = 256;
 
 /// Traces the camera paths of the given slots and adds their radiance to the accumulator. `negative` receives the first
@@ -81,7 +81,7 @@ pub fn trace(
             wavefront.shade_packet(PacketSource::Camera(row, first, count, first - slots.start))?;
         }
     }
-    // Light their vertices, and add the result to the accumulator.
+    // Compute direct lighting at their vertices, and add it to the accumulator.
     wavefront.light()?;
     wavefront.direct.flush_run(slots.start, &mut wavefront.accumulator);
     wavefront.next_bounce(rays);
@@ -111,22 +111,22 @@ pub fn trace(
     Ok(())
 }
 
-/// Traversal cost of a path's ray up to its hit.
+/// Traversal cost of a path's ray up to the hit.
 fn traversal_cost(tile: &TileContext<'_>, path: &PathRay, hit: Option<Hit>) -> u32 {
     let t_max = hit.map_or(path.ray.t_max, |hit| hit.shape.t);
     tile.world.geometry.traversal_cost(&Ray { t_max, ..path.ray })
 }
 
-/// One bounce of all paths of a batch.
+/// One bounce of all paths in a batch.
 struct Wavefront<'a, 's> {
     /// Number of bounces before the current hits.
     depth: u32,
-    /// How paths continue at diffuse and glossy surfaces. `None` if they end there.
+    /// How paths continue at diffuse and glossy surfaces. `None` if they end at these surfaces.
     continuation: Option<Continuation>,
     tile: &'a TileContext<'a>,
     /// Photon maps of the samples. `None` if no photons are gathered.
     maps: Option<&'a PhotonMaps>,
-    /// Vertices of this bounce that await direct lighting.
+    /// This bounce's vertices that await direct lighting.
     direct: &'a mut DirectLightQueue,
     /// Surfaces at the hits of the current packet.
     surfaces: &'a mut SurfacePacket,
@@ -195,7 +195,7 @@ impl<'a> PathStepper<'a> for Wavefront<'a, '_> {
         let reflectance = pane.reflectance(vertex.surface.shading_normal.dot(vertex.wo));
         let tint = vertex.pane_transmittance(path, pane, &mut self.counters.texture_lookups);
         let left = tint * (1.0 - reflectance);
-        // After the last bounce, only light that passes straight through the pane is found.
+        // After the last bounce, only light that passes straight through the pane is added.
         if !self.add_emission(path, vertex, hit) {
             return NullInteraction::Passed(left);
         }
@@ -235,7 +235,7 @@ impl Wavefront<'_, '_> {
         self.continuation = self.tile.behavior.scatters.then(continuation);
     }
 
-    /// Starts the next bounce with the rays found in this one; the old queue is reused as its output.
+    /// Starts the next bounce with the rays generated in this bounce, reusing the old queue for output.
     fn next_bounce(&mut self, rays: &mut Vec<PathRay>) {
         std::mem::swap(rays, self.next);
         self.next.clear();
@@ -243,7 +243,7 @@ impl Wavefront<'_, '_> {
         self.begin_bounce();
     }
 
-    /// Shades the hit of one ray of a packet. The path is large, so it is moved here only once.
+    /// Shades the hit of one ray in a packet. The path is moved only here because it is large.
     #[inline(never)]
     fn shade(&mut self, mut path: PathRay, (packet, lane): (&PacketHits, usize)) {
         let (tile, bit) = (self.tile, 1 << lane);
@@ -279,7 +279,7 @@ impl Wavefront<'_, '_> {
                 self.accumulator.add_traversal_cost(path.slot, traversal_cost(tile, &path, packet.hit(lane)));
             }
         }
-        // Queue the plain vertices for direct lighting.
+        // Queue the vertices of plain surfaces for direct lighting.
         if are_lit {
             self.direct.keep_spare();
             if tile.pixel_spread > 0.0 {
@@ -289,7 +289,7 @@ impl Wavefront<'_, '_> {
                 }
             }
         }
-        // Select the rays that hit or escape to a light, and those that must be shaded one by one.
+        // Select the rays that hit a light or escape to one, and the rays that must be shaded one by one.
         let render = &tile.settings.render;
         let all = ((1_u64 << rays.count()) - 1) as u32;
         let plain = if render.ambient == Vec3::ZERO { packet.shining } else { packet.plain };
@@ -302,20 +302,20 @@ impl Wavefront<'_, '_> {
             }
             PacketSource::Paths(..) | PacketSource::Traced(..) => wanted |= plain | beyond,
         }
-        // Shade in path order, as the contributions to a sample are added in this order.
+        // Shade in path order because the contributions to a sample are added in this order.
         for lane in lanes(wanted) {
             self.place = rays.queue_index(lane);
             self.shade(packet.path(tile, &rays, lane), (&packet, lane));
         }
-        // Light the queued vertices while their data is in the cache.
+        // Compute direct lighting at the queued vertices while their data is in the cache.
         if self.direct.is_full() {
             self.light()?;
         }
         Ok(())
     }
 
-    /// Adds the emission visible to camera rays: from plain surfaces, the background and infinite lights. Each sample
-    /// receives it before any direct light, so it can be added directly.
+    /// Adds the emission visible to camera rays: from plain surfaces, the background and infinite lights. It
+    /// can be added directly because each sample's emission precedes its direct light.
     fn add_visible_emission(
         &mut self,
         rays: &RayPacket,
@@ -366,7 +366,7 @@ impl Wavefront<'_, '_> {
         }
     }
 
-    /// Adds the emission that a path hits, with its MIS weight; light samples contribute the rest.
+    /// Adds the emission that a path hits, multiplied by its MIS weight. Light samples contribute the rest.
     fn add_emitted(&mut self, path: &PathRay, radiance: Vec3, weight: f32) {
         if self.is_found_elsewhere(path) {
             return;
@@ -378,8 +378,8 @@ impl Wavefront<'_, '_> {
         }
     }
 
-    /// Whether another technique accounts for the light that a path hits: photons, behind mirrors and glass, or light
-    /// samples, for hard shadows.
+    /// Whether another technique accounts for the light that a path hits: photons for light via mirrors and
+    /// glass, or light samples for hard shadows.
     fn is_found_elsewhere(&self, path: &PathRay) -> bool {
         let PathBehavior { gathers, mirrors, .. } = self.tile.behavior;
         let is_shared = path.state.pdf > 0.0;
@@ -391,8 +391,8 @@ impl Wavefront<'_, '_> {
         self.add_beyond(path, self.tile.infinite_light(path));
     }
 
-    /// Adds the light from infinite lights along a path that leaves the scene. The background is only visible; it
-    /// illuminates nothing.
+    /// Adds the light from infinite lights along a path that leaves the scene. The background is visible but
+    /// does not illuminate anything.
     fn add_beyond(&mut self, path: &PathRay, beyond: Vec3) {
         if path.state.only_specular_before {
             let background = self.tile.settings.render.background;
@@ -407,7 +407,7 @@ impl Wavefront<'_, '_> {
         self.depth < self.tile.settings.render.max_depth
     }
 
-    /// Adds the emission of a surface; returns whether the path may scatter there.
+    /// Adds the emission of a surface and returns whether the path may scatter at the surface.
     fn add_emission(&mut self, path: &PathRay, vertex: &Vertex<'_>, hit: OpaqueHit) -> bool {
         if vertex.emits() {
             let weight = match hit {
@@ -420,12 +420,12 @@ impl Wavefront<'_, '_> {
         self.may_scatter()
     }
 
-    /// Shades a non-specular surface; `far` is the medium behind it.
+    /// Shades a non-specular surface. `far` is the medium behind the surface.
     fn shade_rough(&mut self, path: &PathRay, vertex: &Vertex<'_>, rough: &Rough, far: &InteriorList) {
         let (at, lookups) = (&vertex.texture_point, &mut self.counters.texture_lookups);
         let ambient = self.tile.settings.render.ambient;
         let accepts_ambient = ambient != Vec3::ZERO && self.accumulator.accepts_ambient(path);
-        // Look up only the textures that the image shows.
+        // Look up only the textures needed for the displayed quantity.
         if !self.accumulator.accepts_reflected() {
             if accepts_ambient {
                 let reflectance = vertex.tinted(rough.ambient_at(at, lookups));
@@ -447,7 +447,8 @@ impl Wavefront<'_, '_> {
         self.queue_rough(path, vertex, &bsdf, far);
     }
 
-    /// Queues the vertices of a non-specular surface for direct lighting; `far` is the medium behind it.
+    /// Queues the vertices of a non-specular surface for direct lighting. `far` is the medium behind the
+    /// surface.
     #[inline(always)]
     fn queue_rough(&mut self, path: &PathRay, vertex: &Vertex<'_>, bsdf: &RoughBsdf, far: &InteriorList) {
         let (tile, place) = (self.tile, self.place);
@@ -465,8 +466,8 @@ impl Wavefront<'_, '_> {
         }
     }
 
-    /// Queues the vertices of rough glass: one for each side, or a single one if light samples find nothing from one of
-    /// the sides.
+    /// Queues the vertices of rough glass: one for each side, or a single vertex if light samples cannot
+    /// reach one of the sides.
     fn shade_rough_glass(
         &mut self,
         path: &PathRay,
@@ -483,26 +484,26 @@ impl Wavefront<'_, '_> {
         let near = &path.interiors;
         let reflection = RoughBsdf::GlassReflection(rough);
         let transmission = RoughBsdf::GlassTransmission(rough);
-        // The lit fraction is measured on the viewer's side. Blocked light counts too, so a dark side is sampled like
-        // any other.
+        // The lit fraction is measured on the viewer's side. Blocked light is included, so a dark side is
+        // sampled like any other.
         if aov == LightAov::LitFraction {
             let lit = ShadingVertex { path, interiors: near, place, vertex, shading, bsdf: &reflection };
             return self.direct.push(tile, &lit, aov, ShadingSides::OneSide { is_dark: false });
         }
-        // Without shadows, lights shine into any solid.
+        // Without shadows, lights also illuminate the inside of solids.
         let has_shadows = tile.settings.render.shadows != Shadows::Off;
         let is_dark = |interiors: &InteriorList| {
             interiors.glass().is_some_and(|inside| tile.world.is_unlit_glass(inside.body))
         };
         let dark = [near, far].map(|interiors| has_shadows && is_dark(interiors));
-        // Photons land on both sides, so these need a vertex each.
+        // Photons are stored on both sides, so each side needs a vertex.
         let is_one = dark != [false; 2] && !tile.behavior.gathers && vertex.far_origin().is_some();
         let is_behind = is_one && dark == [true, false];
         let sides = |vertex: &Vertex<'_>, is_dark: bool, interiors| match vertex.far_origin() {
             Some(beyond) if is_one => ShadingSides::TwoSides { is_dark, beyond, interiors },
             Some(_) | None => ShadingSides::OneSide { is_dark },
         };
-        // Queue the viewer's side, unless the other side's vertex represents both.
+        // Queue the viewer's side, unless the vertex on the other side represents both sides.
         let behind = (!is_one || is_behind).then(|| (vertex.behind(), shading.behind()));
         if !is_behind {
             let lit = ShadingVertex { path, interiors: near, place, vertex, shading, bsdf: &reflection };
@@ -516,7 +517,7 @@ impl Wavefront<'_, '_> {
         }
     }
 
-    /// The light AOV at a path's vertex: after the first non-specular surface, all light counts.
+    /// The light AOV at a path's vertex. After the first non-specular surface, all light is included.
     fn measure_of(&self, path: &PathRay) -> LightAov {
         if path.state.only_specular_before { self.accumulator.aov } else { LightAov::ALL }
     }
@@ -528,8 +529,8 @@ impl Wavefront<'_, '_> {
         self.push_reflected(reflected(path, vertex, &shading, reflectance));
     }
 
-    /// Splits a path at a smooth coat, or chooses between coat and base with the coat's Fresnel reflectance as
-    /// probability.
+    /// Splits a path at a smooth coat, or randomly chooses between coat and base, where the probability of
+    /// the coat is its Fresnel reflectance.
     fn shade_coated(&mut self, path: &PathRay, vertex: &Vertex<'_>, coated: &Coated, far: &InteriorList) {
         let shading = vertex.shading(self.counters);
         let fresnel = vertex.coat_reflectance(coated, &shading);

@@ -1,4 +1,4 @@
-//! Counters of rays and texture lookups.
+//! Ray and texture lookup counters.
 
 /// Number of rays and texture lookups in one tile.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

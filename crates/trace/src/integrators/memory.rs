@@ -1,11 +1,11 @@
-//! Buffers that each thread reuses for its batches.
+//! Per-thread buffers, reused for successive batches.
 
 use std::cell::RefCell;
 
 use super::direct::queue::DirectLightQueue;
 use super::transport::scratch::TraceBuffers;
 
-/// Buffers that all batches of a thread share.
+/// Buffers shared by all batches of a thread.
 #[derive(Default)]
 pub struct ThreadMemory {
     /// Queues of rays and hits.
@@ -15,12 +15,13 @@ pub struct ThreadMemory {
 }
 
 impl ThreadMemory {
-    /// Takes the buffers of this thread's previous tile; [`ThreadMemory::return_to_thread`] gives them back.
+    /// Takes the buffers used for this thread's previous tile. Use [`ThreadMemory::return_to_thread`] to
+    /// return them.
     pub fn take_from_thread() -> Self {
         MEMORY.take()
     }
 
-    /// Keeps the buffers for this thread's next tile.
+    /// Stores the buffers for this thread's next tile.
     pub fn return_to_thread(self) {
         MEMORY.set(self);
     }

@@ -1,7 +1,9 @@
-//! Integrators: render the samples of a tile of a world. Rays travel in batches, as in a wavefront renderer: first a
-//! queue of camera rays, then the shadow rays of their hits, then the queue of the next bounce.
+//! Integrators: render a world's samples for one tile. Rays are processed in batches, as in a wavefront
+//! renderer: first a queue of camera rays, then the shadow rays from their hits, then the queue of the next
+//! bounce.
 //!
-//! Each module may use the modules above it and no others; `tests/suite/architecture` compares the sources with this table.
+//! Each module may only use the modules above it. `tests/suite/architecture` checks the sources against this
+//! table.
 //!
 //! ```text
 //! view, counters      AOVs; counters of rays
@@ -46,11 +48,11 @@ pub use view::{AovSource, Components, FirstHit, LightAov, View};
 /// Number of camera rays in a batch.
 const BATCH_SIZE: usize = 1024;
 
-/// Renders the samples with the indices `samples` of every pixel of `tile`. The result depends only on the arguments:
-/// splitting an image into other tiles, or its samples into other ranges, gives the same radiances.
+/// Renders the samples with the indices `samples` of every pixel of `tile`. The result depends only on the
+/// arguments, so it does not matter how an image is divided into tiles or its samples into ranges.
 ///
 /// # Errors
-/// [`Cancelled`] if the token is cancelled; it is polled every few hundred rays.
+/// [`Cancelled`] if the token is cancelled. The token is checked every few hundred rays.
 pub fn render_tile(
     world: &World,
     settings: &RenderSettings,
@@ -61,7 +63,7 @@ pub fn render_tile(
     render_tile_with_photons(None, world, settings, pixels, samples, token)
 }
 
-/// [`render_tile`] with the photon maps of the samples. Without maps, no photons are gathered.
+/// Like [`render_tile`], with the samples' photon maps. Without maps, no photons are gathered.
 ///
 /// # Errors
 /// [`Cancelled`].
@@ -121,7 +123,7 @@ pub fn render_tile_with_photons(
     Ok((TileSamples { pixels: block.pixels, samples, radiance, negative }, counters))
 }
 
-/// Sets `marked` for each slot from `first` on to the corresponding bit.
+/// Sets `marked`, for the slots starting at `first`, to the corresponding bits.
 fn mark(marked: &mut [bool], first: u32, bits: u32) {
     for (lane, marked) in marked.iter_mut().skip(first as usize).take(PACKET_SIZE).enumerate() {
         *marked = bits & 1 << lane != 0;

@@ -11,7 +11,7 @@ use crate::world::TextureNeeds;
 pub struct RenderSettings {
     /// The scene's `[render]` settings with this run's overrides.
     pub render: Render,
-    /// Whether the lens has an aperture; false for a pinhole camera.
+    /// Whether the lens has an aperture. False for a pinhole camera.
     pub dof: bool,
     /// The view to render.
     pub view: View,
@@ -24,14 +24,14 @@ pub struct RenderSettings {
 pub struct PhotonSettings {
     /// Photons emitted per pass.
     pub count: u32,
-    /// Kernel radius of the first pass; 0 to derive it from the density of photons.
+    /// Kernel radius of the first pass, or 0 to derive it from the photon density.
     pub radius: f32,
-    /// Maximum number of bounces of a photon.
+    /// Maximum number of bounces per photon.
     pub bounces: u32,
 }
 
 impl RenderSettings {
-    /// The effective settings: those without effect are reset to their defaults.
+    /// Returns the effective settings, with settings that have no effect reset to their defaults.
     pub fn effective(&self) -> Self {
         let mut render = self.render.effective();
         let photons = self.photons.filter(|_| render.integrator.method().gathers);
@@ -41,8 +41,9 @@ impl RenderSettings {
         Self { render, photons, ..*self }
     }
 
-    /// Whether images with these settings show any light from photons. Such light has scattered at least twice: at the
-    /// mirror or glass that the photon hit, and at the point where it is gathered.
+    /// Whether images with these settings show any light from photons. Light from photons has scattered at
+    /// least twice: at the mirror or glass that the photon hit, and at the point where the photon is
+    /// gathered.
     pub fn gathers(&self) -> bool {
         let shows = match self.view.source() {
             AovSource::FirstHit(number) => number == FirstHit::Photons,
@@ -55,7 +56,7 @@ impl RenderSettings {
         shows && self.effective().photons.is_some()
     }
 
-    /// The textures that images with these settings need.
+    /// Textures needed for images with these settings.
     pub fn lookups(&self) -> TextureNeeds {
         match self.view.source() {
             AovSource::FirstHit(FirstHit::Normal) => TextureNeeds { normals: true, ..TextureNeeds::NONE },
@@ -65,7 +66,7 @@ impl RenderSettings {
             AovSource::FirstHit(
                 FirstHit::Depth | FirstHit::Barycentric | FirstHit::Uv | FirstHit::Photons,
             ) => TextureNeeds::NONE,
-            // Surface colors do not matter, but normals and emission do.
+            // Normals and emission are needed, but not surface colors.
             AovSource::Light(LightAov::LitFraction) => {
                 TextureNeeds { diffuse: false, specular: false, ambient: false, ..TextureNeeds::ALL }
             }
@@ -81,8 +82,8 @@ impl RenderSettings {
         }
     }
 
-    /// Converts a position in pixels from the top left corner of the image to camera units: to the right and up from
-    /// the center, in half image heights.
+    /// Converts a position in pixels relative to the image's top left corner to camera units: half image
+    /// heights to the right of the center and above it.
     #[inline(always)]
     pub fn pixel_to_camera(&self, from_corner: DVec2) -> DVec2 {
         let Render { width, height, .. } = self.render;
@@ -95,7 +96,8 @@ impl Fingerprinted for RenderSettings {
     fn add_to(&self, key: &mut Fingerprint, of: &Referents<'_>) {
         let Self { render, dof, view, photons } = self.effective();
         key.add(&render, of).flag(dof).choice(view.sampled());
-        // All acceleration structures give the same hits, but these two views show the structures themselves.
+        // All acceleration structures return the same hits, but these two views show the structures
+        // themselves.
         match view.source() {
             // The brightness of the lines depends on the exposure.
             AovSource::Bounds => key.choice(render.accel).f32(render.exposure),

@@ -11,8 +11,8 @@ choice! {
         Beauty = "beauty",
         /// Shading normals, as (n + 1)/2.
         Normal = "normal",
-        /// Depth along the view axis, 0 without a hit; the preview maps the visible range to gray values, near is
-        /// bright.
+        /// Depth along the view axis, or 0 without a hit. The preview maps the visible range to gray values,
+        /// with near surfaces bright.
         Depth = "depth",
         /// Barycentric coordinates: a is red, b green, c blue.
         Barycentric = "barycentric",
@@ -28,17 +28,18 @@ choice! {
         Specular = "specular",
         /// Emission of visible surfaces, and the background.
         Emission = "emission",
-        /// Light that reaches the first diffuse or glossy surface from other such surfaces.
+        /// Light that reaches the first diffuse or glossy surface from other diffuse or glossy surfaces.
         Indirect = "indirect",
-        /// Light that reaches the first diffuse or glossy surface only through mirrors and glass.
+        /// Light that reaches the first diffuse or glossy surface only via mirrors and glass.
         Caustic = "caustic",
-        /// Number of photons of one pass within the kernel at each point, if photons are on.
+        /// Number of photons in one pass within the kernel at each point, if photons are enabled.
         Photons = "photons",
-        /// Fraction of the lights' radiance that is not blocked.
+        /// Unoccluded fraction of the lights' radiance.
         Shadow = "shadow",
-        /// Boxes of the acceleration structures over the image, one color per level, faint behind surfaces.
+        /// Bounding boxes of the acceleration structures over the image, with one color per level, faint
+        /// behind surfaces.
         Bounds = "bounds",
-        /// Boxes and shapes that the rays of a sample are tested against.
+        /// Number of boxes and shapes tested against the rays of a sample.
         Cost = "cost",
         /// Samples per pixel.
         Samples = "samples",
@@ -48,7 +49,7 @@ choice! {
 }
 
 impl View {
-    /// Where the values of this view come from.
+    /// Source of this view's values.
     pub fn source(self) -> AovSource {
         let of = |parts: Components| AovSource::Light(LightAov::Radiance(parts));
         let by =
@@ -77,7 +78,7 @@ impl View {
 }
 
 impl View {
-    /// The view whose samples this view is computed from.
+    /// View whose samples are used to compute this view.
     pub fn sampled(self) -> Self {
         match self.source() {
             AovSource::Film(Quantity::Radiance | Quantity::Samples | Quantity::Error) => Self::Beauty,
@@ -85,7 +86,7 @@ impl View {
         }
     }
 
-    /// The film quantity that this view shows.
+    /// Film quantity shown by this view.
     pub fn quantity(self) -> Quantity {
         match self.source() {
             AovSource::Film(quantity) => quantity,
@@ -94,21 +95,21 @@ impl View {
     }
 }
 
-/// Source of the values of a view.
+/// Source of a view's values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AovSource {
     /// Light gathered by paths.
     Light(LightAov),
     /// A quantity at the first hit, without exposure or tone mapping. All except depth are displayed unchanged.
     FirstHit(FirstHit),
-    /// The beauty image with the acceleration structures' boxes over it.
+    /// The beauty image, overlaid with the acceleration structures' bounding boxes.
     Bounds,
-    /// A statistic of the samples of the beauty image.
+    /// A statistic of the beauty image's samples.
     Film(Quantity),
 }
 
 impl AovSource {
-    /// The light AOV that paths accumulate; first-hit views do not use it.
+    /// Light AOV accumulated by paths. Not used by first-hit views.
     pub fn aov(self) -> LightAov {
         match self {
             Self::Light(aov) => aov,
@@ -117,14 +118,14 @@ impl AovSource {
     }
 }
 
-/// What paths accumulate in a sample.
+/// Quantity accumulated by paths in a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LightAov {
     /// Radiance of these components.
     Radiance(Components),
-    /// The fraction, from 0 to 1, of the lights' unoccluded radiance that arrives.
+    /// Fraction of the lights' radiance that is not occluded, from 0 to 1.
     LitFraction,
-    /// The traversal cost of all rays of the sample: boxes and shapes visited.
+    /// Traversal cost of all rays in the sample: number of boxes and shapes visited.
     TraversalCost,
 }
 
@@ -150,7 +151,7 @@ impl LightAov {
         }
     }
 
-    /// Classes of paths by which light may reach the first diffuse or glossy surface.
+    /// Classes of paths along which light may reach the first diffuse or glossy surface.
     pub fn path_classes(self) -> PathClasses {
         match self {
             Self::Radiance(parts) => parts.paths,
@@ -159,7 +160,7 @@ impl LightAov {
     }
 }
 
-/// Components of the radiance of a sample.
+/// Components of a sample's radiance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Components {
     /// Emission of surfaces, and the background.
@@ -170,17 +171,17 @@ pub struct Components {
     pub diffuse: bool,
     /// Light reflected by glossy lobes.
     pub specular: bool,
-    /// Classes of paths by which reflected light may reach the first diffuse or glossy surface.
+    /// Classes of paths along which reflected light may reach the first diffuse or glossy surface.
     pub paths: PathClasses,
 }
 
-/// Classes of light paths, by what happens between the light and the first diffuse or glossy surface that the camera
-/// sees, directly or through mirrors and glass.
+/// Classes of light paths, distinguished by the interactions between the light and the first diffuse or
+/// glossy surface seen by the camera, directly or through mirrors and glass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PathClasses {
     /// Direct light.
     pub direct: bool,
-    /// Light that was only scattered by mirrors and glass.
+    /// Light scattered only by mirrors and glass.
     pub caustic: bool,
     /// All other paths.
     pub indirect: bool,
@@ -202,7 +203,7 @@ impl Components {
     /// All components.
     pub const ALL: Self =
         Self { emitted: true, ambient: true, diffuse: true, specular: true, paths: PathClasses::ALL };
-    /// No components. Components added to it include all path classes.
+    /// No components, but all path classes, so that any components added later include all paths.
     pub const NONE: Self =
         Self { emitted: false, ambient: false, diffuse: false, specular: false, paths: PathClasses::ALL };
 }

@@ -54,7 +54,7 @@ impl World {
     }
 }
 
-/// Whether some texture uses the second UV set and some mesh has one.
+/// Whether any texture uses the second UV set and any mesh has a second UV set.
 fn has_second_uvs(scene: &Scene, inputs: &WorldInputs) -> bool {
     let asks = scene.textures.iter().any(|texture| texture.uv == UvSet::Second);
     asks && inputs.meshes.iter().any(|mesh| !mesh.loaded().mesh.second_uvs.is_empty())
@@ -66,7 +66,7 @@ fn find_solids(scene: &Scene, inputs: &WorldInputs) -> GlassSolids {
     GlassSolids::find(scene, &meshes, &CancelToken::new()).unwrap_or_default()
 }
 
-/// Whether each object's vertex colors are used. `None` if no object's are.
+/// Whether each object's vertex colors are used. `None` if they are not used for any object.
 fn colored(scene: &Scene) -> Option<Box<[bool]>> {
     let is_colored =
         |object: &description::Object| object.shape.mesh().is_some_and(|mesh| mesh.vertex_colors);
@@ -74,7 +74,8 @@ fn colored(scene: &Scene) -> Option<Box<[bool]>> {
     all.contains(&true).then_some(all)
 }
 
-/// The scene's materials, then each mesh file's, then the fallback for triangles without a material.
+/// The scene's materials, followed by the materials of each mesh file and the fallback for triangles without
+/// a material.
 fn lower_materials(scene: &Scene, inputs: &WorldInputs) -> (Vec<Material>, Vec<ObjectMaterial>) {
     let mut materials: Vec<_> =
         scene.materials.iter().map(|material| lower::material(scene, &inputs.images, material)).collect();

@@ -4,7 +4,8 @@ use super::{Geometry, MeshInstance, Object};
 use crate::geometry::Aabb;
 
 impl Geometry {
-    /// Calls `visit` for every object that may intersect the box, until it returns false. Returns whether all were visited.
+    /// Calls `visit` for every object that may intersect the box until `visit` returns false. Returns whether
+    /// all objects were visited.
     pub fn visit_box(&self, bounds: &Aabb, mut visit: impl FnMut(u32, &Object) -> bool) -> bool {
         let mut goes_on = self.unbounded().iter().all(|&id| visit(id, &self.objects()[id as usize]));
         self.tree().meeting(bounds, |id| goes_on = goes_on && visit(id, &self.objects()[id as usize]));
@@ -13,8 +14,9 @@ impl Geometry {
 }
 
 impl MeshInstance {
-    /// Calls `visit` for every triangle that intersects a world-space box, until it returns false. It may also visit nearby
-    /// triangles, and some more than once. Returns whether all were visited.
+    /// Calls `visit` for every triangle that intersects a world-space box until `visit` returns false. Nearby
+    /// triangles may also be visited, and triangles may be visited more than once. Returns whether all
+    /// triangles were visited.
     pub fn visit_box(&self, bounds: &Aabb, visit: impl FnMut(u32) -> bool) -> bool {
         self.tree.triangles().meeting_while(&self.local_box(bounds), visit)
     }

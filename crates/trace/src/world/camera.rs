@@ -1,4 +1,4 @@
-//! The camera: a pinhole or a thin lens.
+//! Pinhole and thin-lens camera.
 
 use crate::assets::OrbiterCamera;
 use crate::geometry::Ray;
@@ -7,7 +7,7 @@ use crate::math::transform::rotation_xyz;
 use crate::math::{DMat3, DVec2, DVec3, Vec2};
 use crate::scene::description::{self, Pose, Viewpoint};
 
-/// A perspective camera with a planar focus.
+/// A perspective camera with a plane of focus.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
     /// Center of the lens.
@@ -18,14 +18,14 @@ pub struct Camera {
     forward: DVec3,
     /// Tangent of half the vertical field of view.
     tan_half_fov: f64,
-    /// Lens radius; 0 for a pinhole.
+    /// Lens radius, or 0 for a pinhole.
     pub aperture: f64,
     /// Distance to the plane of focus along the view axis.
     pub focus: f64,
 }
 
 impl Camera {
-    /// Creates the camera described by the scene, with the contents of the orbiter file if it names one.
+    /// Creates the camera described by the scene, using the contents of the orbiter file if there is one.
     pub fn new(camera: &description::Camera, orbiter: Option<&OrbiterCamera>) -> Self {
         match camera {
             description::Camera::LookAt { position, look_at, up, fov, aperture, focus } => {
@@ -53,7 +53,7 @@ impl Camera {
         }
     }
 
-    /// The point that the camera orbits, and its distance.
+    /// Returns the point that the camera orbits, and the distance to it.
     pub fn aim(camera: &description::Camera, orbiter: Option<&OrbiterCamera>) -> (DVec3, f64) {
         match camera {
             description::Camera::LookAt { position, look_at, .. } => (*look_at, position.distance(*look_at)),
@@ -64,8 +64,9 @@ impl Camera {
         }
     }
 
-    /// The camera as position, target and up vector. An orbiter camera is rounded to short decimals, closely enough to look the
-    /// same; its target is the point on the view axis at the distance of its center.
+    /// Returns the camera as position, target and up vector. An orbiter camera is rounded to short decimals,
+    /// precise enough to render the same view. Its target is the point on the view axis at the same distance
+    /// as its center.
     pub fn viewpoint(camera: &description::Camera, orbiter: Option<&OrbiterCamera>) -> Viewpoint {
         match camera {
             description::Camera::LookAt { position, look_at, up, fov, aperture, focus } => Viewpoint {
@@ -82,7 +83,7 @@ impl Camera {
                     DVec3::from_array(place.to_array().map(|at| rounded(at, decimal_step(file.size))))
                 };
                 let (position, look_at) = (short(position), short(look_at));
-                // An orbiter does not roll: unless it is upside down, y points up in the image.
+                // An orbiter does not roll. Unless it is upside down, y points up in the image.
                 let is_upright = up.y > UPRIGHT;
                 let pose = Pose { position, look_at, up: if is_upright { DVec3::Y } else { up } };
                 let focus = focus.unwrap_or_else(|| pose.distance());
@@ -91,15 +92,15 @@ impl Camera {
         }
     }
 
-    /// The camera in coordinates relative to `origin`.
+    /// Converts the camera to coordinates relative to `origin`.
     pub fn relative_to(self, origin: DVec3) -> Self {
         Self { position: self.position - origin, ..self }
     }
 
-    /// The view of a gKit orbiter: world → camera is T(−p, −size)·Rx(r.x)·Ry(r.y)·T(−center).
+    /// Camera of a gKit orbiter. The world-to-camera transform is T(−p, −size)·Rx(r.x)·Ry(r.y)·T(−center).
     fn from_orbiter(orbiter: &OrbiterCamera) -> Self {
         let [x, y] = orbiter.rotation;
-        // rotation_xyz rotates about x first; the orbiter rotates about y first.
+        // `rotation_xyz` rotates about x first, but the orbiter rotates about y first.
         let view: DMat3 = rotation_xyz(DVec3::new(x, 0.0, 0.0)) * rotation_xyz(DVec3::new(0.0, y, 0.0));
         let axes = view.transpose();
         let eye = DVec3::new(orbiter.position[0], orbiter.position[1], orbiter.size);
@@ -114,8 +115,9 @@ impl Camera {
         }
     }
 
-    /// The camera ray through an image point and a point on the unit lens disk. `place` is measured from the image center to the
-    /// right and up, in units of half the image height. The direction has unit length.
+    /// Returns the camera ray, with a normalized direction, through an image point and a point on the unit
+    /// lens disk. `place` is measured from the image center to the right and up, in units of half the image
+    /// height.
     #[inline(always)]
     pub fn ray(&self, place: DVec2, lens: Vec2) -> Ray {
         let direction = self.direction(place);
@@ -125,13 +127,14 @@ impl Camera {
         Ray::new((self.position + offset).as_vec3(), aimed.normalize().as_vec3())
     }
 
-    /// [`Camera::ray`] through the center of the lens.
+    /// Like [`Camera::ray`], through the center of the lens.
     #[inline(always)]
     pub fn pinhole_ray(&self, place: DVec2) -> Ray {
         Ray::new(self.position.as_vec3(), self.direction(place).normalize().as_vec3())
     }
 
-    /// Unnormalized direction from the lens center through an image point; its component along the view axis is 1.
+    /// Unnormalized direction from the lens center through an image point. Its component along the view axis
+    /// is 1.
     #[inline(always)]
     fn direction(&self, place: DVec2) -> DVec3 {
         let place = place * self.tan_half_fov;
@@ -149,10 +152,11 @@ impl Camera {
     }
 }
 
-/// Minimum y of the up axis for a camera that is neither upside down nor looking straight up or down.
+/// Minimum y component of the up axis for a camera that is neither upside down nor looking straight up or
+/// down.
 const UPRIGHT: f64 = 1e-3;
 
-/// Used if the orbiter file is missing; the pipeline reports that as an error first.
+/// Used if the orbiter file is missing. The pipeline reports the missing file as an error first.
 const DEFAULT_ORBITER: OrbiterCamera = OrbiterCamera {
     center: [0.0; 3],
     position: [0.0; 2],
@@ -191,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn focal_plane_is_sharp_for_every_lens_point() {
+    fn focal_plane_is_sharp_for_all_lens_points() {
         let camera = look_at(0.5);
         let on_plane = |lens| {
             let ray = camera.ray(DVec2::new(0.6, 0.6), lens);
@@ -204,20 +208,20 @@ mod tests {
     }
 
     #[test]
-    fn orbiter_looks_at_its_center_from_its_distance() {
+    fn orbiter_looks_at_its_center() {
         let orbiter =
             OrbiterCamera { center: [1.0, 2.0, 3.0], rotation: [30.0, 90.0], size: 5.0, ..DEFAULT_ORBITER };
         let camera = Camera::from_orbiter(&orbiter);
         let to_center = DVec3::new(1.0, 2.0, 3.0) - camera.position;
         assert!((to_center - camera.forward * 5.0).length() < 1e-12);
-        // Rotated 90° about y, the camera is on the scene's −x axis; 30° about x raises it.
+        // A rotation by 90° about y places the camera on the scene's −x axis, and 30° about x raises it.
         let expected = DVec3::new(-30.0_f64.to_radians().cos(), 30.0_f64.to_radians().sin(), 0.0) * 5.0;
         assert!((-to_center - expected).length() < 1e-12, "{to_center}");
         assert!(camera.up.y > 0.8);
     }
 
     #[test]
-    fn orbiter_viewpoint_is_the_same_camera() {
+    fn orbiter_viewpoint_matches_the_camera() {
         let file = description::Located { value: "camera.txt".into(), span: 0..0 };
         for rotation in [[30.0, 90.0], [18.0, 16.0], [90.0, 20.0], [120.0, -7.0], [-90.0, 0.0]] {
             let orbiter = OrbiterCamera {

@@ -1,7 +1,8 @@
-//! Finds the glass around a point, such as the camera or a light.
+//! Finds the glass around a point, such as the position of the camera or a light.
 //!
-//! A closed shape knows which points it contains. A solid made of meshes or several objects does not: rays from the point toward
-//! points on its surface vote on which side of it they start.
+//! Closed shapes can be tested directly. For a solid made of meshes or several objects, rays are cast from
+//! the point toward points on the solid's surface, and a majority vote determines whether the point is
+//! inside.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -10,13 +11,13 @@ use crate::geometry::ray::offset_origin;
 use crate::geometry::{Aabb, Ray, ShapeHit, SurfaceRequest};
 use crate::math::{DVec3, Vec2, Vec3};
 
-/// Minimum number of rays that vote.
+/// Minimum number of rays to cast.
 const MIN_RAYS: usize = 32;
 
-/// Lead of one side over the other that ends the vote.
+/// Difference between the numbers of inside and outside rays at which to stop.
 const MAJORITY: i32 = 3;
 
-/// Maximum number of other surfaces that such a ray passes through.
+/// Maximum number of other surfaces that a ray may pass through.
 const MAX_PASSED: usize = 16;
 
 /// A closed glass solid made of meshes or several objects.
@@ -25,15 +26,15 @@ pub struct CompoundSolid {
     /// The object that represents the solid.
     pub body: u32,
     objects: Vec<u32>,
-    /// Bounding box of its objects.
+    /// Bounding box of the solid's objects.
     pub bounds: Aabb,
-    /// Whether opaque surfaces close it, so that its interior may extend beyond `bounds`.
+    /// Whether the solid is closed by opaque surfaces. Its interior may then extend beyond `bounds`.
     pub is_covered: bool,
 }
 
 impl World {
-    /// The glass around a point at the camera: closed shapes that contain the point, and other solids that contain the camera,
-    /// each with its material.
+    /// Glass around a point on the lens: closed shapes that contain the point, and other solids that contain
+    /// the camera, with their materials.
     pub fn glass_around(&self, point: Vec3) -> impl Iterator<Item = (u32, u32)> {
         let is_inside = move |&(object, _): &(u32, u32)| match &self.geometry.objects()[object as usize] {
             Object::Shape(shape) => shape.encloses(point.as_dvec3()) == Some(true),
@@ -42,12 +43,13 @@ impl World {
         self.lens_glass.iter().copied().filter(is_inside).chain(self.camera_solids.iter().copied())
     }
 
-    /// Whether no part of the lens is inside a closed glass shape, and the camera is not inside any other glass solid.
+    /// Whether the lens is entirely outside closed glass shapes and the camera is not inside any other glass
+    /// solid.
     pub fn is_camera_in_air(&self) -> bool {
         self.lens_glass.is_empty() && self.camera_solids.is_empty()
     }
 
-    /// Closed glass shapes whose boxes overlap the lens, with their materials.
+    /// Closed glass shapes whose bounding boxes overlap the lens, with their materials.
     pub(super) fn find_lens_glass(&self) -> Vec<(u32, u32)> {
         let (eye, lens) = (self.camera.position.as_vec3(), Vec3::splat(self.camera.aperture as f32));
         let lens = Aabb { min: eye, max: eye }.grown(lens + eye.abs() * f32::EPSILON);
@@ -60,7 +62,7 @@ impl World {
         near.collect()
     }
 
-    /// Other glass solids that contain the camera, each with the material there.
+    /// Other glass solids that contain the camera, with the material at the camera.
     pub(super) fn find_camera_solids(&self) -> Vec<(u32, u32)> {
         let eye = self.camera.position.as_vec3();
         let at = Aabb { min: eye, max: eye };
@@ -96,8 +98,9 @@ impl World {
         solids.into_iter().map(in_parts).collect()
     }
 
-    /// The glass material that surrounds a point, decided by most of the rays from there to the solid. `None` if the point is
-    /// outside or no ray hits the solid. If the point is on object `of`, that object does not block the rays.
+    /// Glass material around a point, determined by a majority of rays from the point to the solid. `None` if
+    /// the point is outside or no ray hits the solid. If the point is on object `of`, this object does not
+    /// block the rays.
     pub fn material_around(&self, body: &CompoundSolid, point: Vec3, of: Option<u32>) -> Option<u32> {
         let (objects, mut votes, mut material) = (&body.objects, 0_i32, None);
         for ray in 0..MIN_RAYS.max(objects.len()) {
@@ -115,8 +118,8 @@ impl World {
         material.filter(|_| votes > 0)
     }
 
-    /// Casts a ray toward `target`; returns whether it hits the solid from behind, and the material there. `None` if it misses,
-    /// or leaves through an opaque surface that closes the solid.
+    /// Casts a ray toward `target`. Returns whether the ray hits the solid from behind, and the material at
+    /// the hit. `None` if it misses or leaves through an opaque surface that closes the solid.
     fn hit_side(
         &self,
         body: &CompoundSolid,
@@ -144,7 +147,7 @@ impl World {
 }
 
 impl Object {
-    /// A point on the surface; different numbers give different points. `None` if the object has no area.
+    /// Returns a point on the surface, selected by `number`. `None` if the object has no area.
     fn sample_surface(&self, number: usize) -> Option<DVec3> {
         match self {
             Self::Shape(shape) => {

@@ -1,8 +1,9 @@
 //! Coincident surfaces: surfaces so close together that a ray's hits cannot be ordered.
 //!
-//! Touching surfaces coincide within rounding. A ray that hits one of them is treated as hitting every surface within the hit's
-//! error bound. It crosses all of them at once, from a point certainly before them to one certainly beyond. New rays start at one
-//! of these two points, so that no surface is missed and none is hit twice.
+//! Touching surfaces coincide up to rounding. A ray that hits one of them is treated as hitting every surface
+//! within the hit's error bound. The ray crosses all of them at the same time, from a point guaranteed to be
+//! in front of them to a point guaranteed to be behind them. New rays start at one of these two points, so
+//! that no surface is missed or hit twice.
 
 use arrayvec::ArrayVec;
 
@@ -13,32 +14,33 @@ use crate::geometry::ray::offset_origin;
 use crate::geometry::{Aabb, Ray, Shape, ShapeHit, SurfacePoint, SurfaceRequest};
 use crate::math::{DVec3, Vec3};
 
-/// Maximum number of solids around a ray that are recorded: the last in file order.
+/// Maximum number of recorded solids around a ray. The last solids in file order are recorded.
 pub const MAX_INTERIORS: usize = 4;
 
-/// The last closed glass shapes of a subtree, in descending order. Others that enclose a point with them have no effect there.
+/// The last closed glass shapes of a subtree, in descending order. Other shapes of the subtree that enclose
+/// the same point have no effect there.
 pub(super) type EnclosingGlass = ArrayVec<u32, MAX_INTERIORS>;
 
-/// Two points on either side of coincident surfaces.
+/// Two points, one on either side of coincident surfaces.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OffsetPoints {
-    /// The point on the side that the incoming ray is on.
+    /// The point on the incoming ray's side.
     pub before: Vec3,
     /// The point on the far side.
     pub beyond: Vec3,
 }
 
 impl OffsetPoints {
-    /// The segment from `before` to `beyond`; it ends at t = 1.
+    /// Returns the segment from `before` to `beyond`, which ends at t = 1.
     pub fn ray(&self) -> Ray {
         Ray { t_max: 1.0, ..Ray::new(self.before, self.beyond - self.before) }
     }
 }
 
-/// A surface or shape at or between the two points.
+/// A surface or shape around or between the two points.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum CoincidentSurface {
-    /// A glass shape that encloses the point beyond.
+    /// A glass shape that encloses [`OffsetPoints::beyond`].
     Around {
         /// Its object.
         object: u32,
@@ -51,7 +53,7 @@ pub enum CoincidentSurface {
         hit: Hit,
         /// Its material.
         material: u32,
-        /// Whether `before` is on the surface's front side, or for glass on the outside of its solid.
+        /// Whether `before` is on the surface's front side or, for glass, outside the solid.
         is_front: bool,
     },
 }
@@ -60,7 +62,7 @@ pub enum CoincidentSurface {
 #[derive(Debug, Default)]
 pub struct ContactScratch {
     objects: Vec<u32>,
-    /// Pairs of object and triangle.
+    /// Pairs of object and triangle indices.
     triangles: Vec<(u32, u32)>,
 }
 
@@ -69,15 +71,16 @@ pub struct ContactScratch {
 pub struct ContactQuery<'a> {
     /// A hit on one of the surfaces.
     pub hit: &'a Hit,
-    /// The surface at that hit.
+    /// The surface at the hit.
     pub surface: &'a SurfacePoint,
     /// The surface normal, facing the incoming ray.
     pub normal: Vec3,
-    /// How far in front of the hit surfaces may have been missed: the rounding of the ray's t, along the normal.
+    /// Distance in front of the hit within which surfaces may have been missed: the rounding error of the
+    /// ray's t along the normal.
     pub lead: f32,
 }
 
-/// The two points, and the one before the surfaces if `lead` is ignored.
+/// The two points, and the point before the surfaces if `lead` is ignored.
 #[derive(Clone, Copy)]
 struct ContactProbe {
     sides: OffsetPoints,
@@ -85,7 +88,7 @@ struct ContactProbe {
 }
 
 impl ContactProbe {
-    /// Slightly more than the fraction of the segment from `before` to `close`.
+    /// Value of t at `close` along the segment.
     fn lead_end(&self) -> f32 {
         let way = self.sides.ray().direction;
         (self.close - self.sides.before).dot(way) / way.length_squared()
@@ -93,8 +96,8 @@ impl ContactProbe {
 }
 
 impl World {
-    /// Finds all surfaces that coincide at a hit and the points on either side of them. `visit` is called in an order that
-    /// depends only on the scene.
+    /// Finds all coincident surfaces at a hit and one point on either side of them. `visit` is called in an
+    /// order that depends only on the scene.
     #[inline]
     pub fn contact(
         &self,
@@ -114,7 +117,7 @@ impl World {
         self.classify_candidates(at, (memory, error), visit)
     }
 
-    /// Whether the hit is on a glass shape whose other sides are far from the hit point.
+    /// Whether the hit is on a glass shape whose far side is not close to the hit point.
     fn is_far_side_away(&self, at: &ContactQuery<'_>, margin: Vec3) -> bool {
         let far = 8.0 * f64::from(margin.max_element());
         let is_away = match &self.geometry.objects()[at.hit.object as usize] {
@@ -124,8 +127,8 @@ impl World {
         is_away && self.is_glass(self.material_index(at.hit) as u32)
     }
 
-    /// Fast path of [`World::classify_candidates`] if [`World::is_far_side_away`] and nothing else is near: only the
-    /// side of the incoming ray matters.
+    /// Fast path of [`World::classify_candidates`] if [`World::is_far_side_away`] is true and nothing else is
+    /// nearby. In this case, only the incoming ray's side matters.
     fn single_sided_contact(
         &self,
         at: &ContactQuery<'_>,
@@ -187,8 +190,8 @@ impl World {
         if is_led || closed_lead { sides } else { OffsetPoints { before: probe.close, ..sides } }
     }
 
-    /// Returns the shape if it is between the points, or if it is glass and encloses the point beyond. `is_around` is `None` for
-    /// open shapes.
+    /// Returns the shape if it is between the points, or if it is glass and encloses
+    /// [`OffsetPoints::beyond`]. `is_around` is `None` for open shapes.
     fn near_shape(
         &self,
         shape: &Shape,
@@ -216,7 +219,7 @@ impl World {
         self.glass_solids.place(object)
     }
 
-    /// Whether any glass solid is open, so that rays may not know whether they are inside.
+    /// Whether any glass solid is open. It may then be unknown whether a ray is inside.
     pub fn has_open_glass(&self) -> bool {
         self.has_open_glass
     }
@@ -231,8 +234,8 @@ impl World {
         self.materials[material as usize].bsdf.glass().is_some()
     }
 
-    /// Whether the object is a closed shape, which can decide whether a point is inside. For other objects, rays must keep track
-    /// of the glass they have entered.
+    /// Whether the object is a closed shape, for which point containment can be tested. For other objects,
+    /// rays must track the glass they have entered.
     pub fn is_closed(&self, object: u32) -> bool {
         match &self.geometry.objects()[object as usize] {
             Object::Shape(shape) => shape.is_closed(),
@@ -292,8 +295,9 @@ impl Geometry {
         }
     }
 
-    /// Collects shapes and triangles that may coincide with the hit point. Returns their error bound per axis.
-    /// Of the shapes that enclose it from afar, only the last in `enclosing` for each subtree.
+    /// Collects shapes and triangles that may coincide with the hit point, and returns their error bound per
+    /// axis. Of the shapes that enclose the point but whose surfaces are far away, only the shapes in
+    /// `enclosing` are included for each subtree.
     pub(super) fn find_candidates(
         &self,
         at: &ContactQuery<'_>,
@@ -340,7 +344,7 @@ impl MeshInstance {
         Aabb::around_f64((0..8).map(corner))
     }
 
-    /// Error of a triangle near a point: rounding of its corners in the file, and of the ray test.
+    /// Error of a triangle near a point, caused by rounding of its corners in the file and in the ray test.
     fn touch_error(&self, triangle: u32, point: Vec3) -> Vec3 {
         let corners = self.tree.loaded().mesh.corners(triangle).map(|corner| corner.as_dvec3());
         let reach = corners.iter().fold(DVec3::ZERO, |reach, corner| reach.max(corner.abs()));
@@ -359,8 +363,8 @@ impl MeshInstance {
         (reach + self.transform.translation.abs()).max_element() as f32 * (16.0 * f32::EPSILON)
     }
 
-    /// Intersects a segment with a triangle in `f64` arithmetic; returns the hit and whether it is from the front. At a shared
-    /// edge, exactly one of the triangles is hit.
+    /// Intersects a segment with a triangle in `f64` arithmetic. Returns the hit and whether the front was
+    /// hit. At a shared edge, exactly one of the triangles is hit.
     fn intersect_segment(&self, triangle: u32, [from, to]: [DVec3; 2]) -> Option<(ShapeHit, bool)> {
         let [a, b, c] = self.tree.loaded().mesh.corners(triangle).map(|p| self.transform.point(p.as_dvec3()));
         let normal = (b - a).cross(c - a);
@@ -370,7 +374,7 @@ impl MeshInstance {
         }
         let direction = to - from;
         let facing = if start > 0.0 { -1.0 } else { 1.0 };
-        // Scaled barycentric coordinate of the corner opposite to the edge.
+        // Scaled barycentric coordinate of the corner opposite the edge.
         let beyond = |p: DVec3, q: DVec3| {
             let weight = facing * direction.dot((p - from).cross(q - from));
             let is_own = (p.to_array() < q.to_array()) == (facing > 0.0);

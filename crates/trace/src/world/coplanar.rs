@@ -1,8 +1,9 @@
-//! Lights in the plane of other surfaces.
+//! Lights coplanar with other surfaces.
 //!
-//! For two surfaces in one plane, rounding decides which one a ray hits first. Rays from a path would hit such a light while shadow
-//! rays to it are blocked, or the reverse, and the two estimates of its contribution would disagree. Such a light is therefore moved
-//! off the plane by a tiny distance, toward the side to which it emits.
+//! For two surfaces in one plane, rounding determines which surface a ray hits first. Path rays might hit a
+//! coplanar light while shadow rays to the light are blocked, or the reverse, and the two estimates of its
+//! contribution would disagree. Coplanar lights are therefore moved off the plane by a tiny distance, toward
+//! the side to which they emit.
 
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
@@ -16,23 +17,25 @@ use crate::materials::EmissionSides;
 use crate::math::{DVec3, Vec2, Vec3};
 use crate::scene::description::{Scene, Shape};
 
-/// Distance between a light and a plane, relative to the light's size, below which they coincide.
+/// Distance between a light and a plane, relative to the light's size, below which they are considered
+/// coplanar.
 const COINCIDENT: f64 = 1.0 / (1 << 20) as f64;
-/// Lift relative to the size of the light and its surroundings: far above the rounding of `f32`, far too small to be visible.
+/// Lift relative to the size of the light and its surroundings: well above `f32` rounding errors, but too
+/// small to be visible.
 const LIFT: f64 = 1.0 / (1 << 16) as f64;
-/// Maximum sine of the angle between the normals of coincident faces.
+/// Maximum sine of the angle between the normals of coplanar faces.
 const PARALLEL: f64 = 1e-5;
 /// Maximum size of a light's surroundings, relative to the light's size.
 const SURROUNDINGS: f64 = 16.0;
-/// Maximum number of pairs of a light and a face to compare; further pairs are ignored.
+/// Maximum number of light/face pairs to compare. Further pairs are ignored.
 const MAX_PAIRS: usize = 1 << 26;
 
-/// A light in the plane of a surface that it overlaps.
+/// A light that overlaps a coplanar surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Coplanar {
     /// The emitting object.
     pub light: usize,
-    /// The other object; the same one if both are faces of one mesh.
+    /// The other object, which is the same object if both faces belong to one mesh.
     pub surface: usize,
     /// Translation that moves the light off the surface.
     pub lift: DVec3,
@@ -42,10 +45,10 @@ pub struct Coplanar {
 #[derive(Clone, Debug)]
 struct Face {
     object: usize,
-    /// Corners in counterclockwise order, seen from the front; empty for an infinite plane.
+    /// Corners in counterclockwise order as seen from the front. Empty for an infinite plane.
     corners: Vec<DVec3>,
     point: DVec3,
-    /// Unit normal on the front.
+    /// Unit normal on the front side.
     normal: DVec3,
     emits: Option<EmissionSides>,
 }
@@ -68,7 +71,7 @@ impl Face {
         self.bounds().map_or(f64::INFINITY, |[least, greatest]| (greatest - least).max_element())
     }
 
-    /// Whether the face emits to the side of a normal.
+    /// Whether the face emits on the side facing along this normal.
     fn emits_along(&self, normal: DVec3) -> bool {
         match self.emits {
             None => false,
@@ -89,7 +92,7 @@ struct Lights {
 }
 
 impl Lights {
-    /// Sorts the faces. `None` if there are none.
+    /// Sorts the faces. `None` if there are no faces.
     fn new(mut faces: Vec<Face>) -> Option<Self> {
         let least_x = |face: &Face| face.bounds().map_or(f64::NEG_INFINITY, |[least, _]| least.x);
         faces.sort_by(|a, b| least_x(a).total_cmp(&least_x(b)));
@@ -101,12 +104,13 @@ impl Lights {
         Some(Self { faces, bounds, widest, region: [least - margin, greatest + margin] })
     }
 
-    /// Whether no light can be near a box.
+    /// Whether there cannot be any lights near a box.
     fn are_apart_from(&self, bounds: [DVec3; 2]) -> bool {
         are_apart(bounds, self.region)
     }
 
-    /// Lights whose bounding boxes touch a face's bounding box. Adds the number of compared lights to `pairs`.
+    /// Returns the lights whose bounding boxes touch a face's bounding box. Adds the number of lights
+    /// compared to `pairs`.
     fn near<'a>(&'a self, face: &Face, pairs: &mut usize) -> impl Iterator<Item = &'a Face> {
         let [least, greatest] = face.bounds().unwrap_or(self.region);
         let margin = (self.region[1] - self.region[0]).max_element() * COINCIDENT;
@@ -119,8 +123,8 @@ impl Lights {
     }
 }
 
-/// Finds the lights that overlap a surface in the same plane. Coordinates are relative to `origin`; `meshes` are the contents of the
-/// scene's mesh files.
+/// Finds lights that overlap a coplanar surface. Coordinates are relative to `origin`. `meshes` contains the
+/// scene's loaded mesh files.
 pub fn coplanar_lights(scene: &Scene, meshes: &[&LoadedMesh], origin: DVec3) -> Vec<Coplanar> {
     let mut faces = Vec::new();
     for object in (0..scene.objects.len()).filter(|object| may_emit(scene, meshes, *object)) {
@@ -133,7 +137,8 @@ pub fn coplanar_lights(scene: &Scene, meshes: &[&LoadedMesh], origin: DVec3) -> 
     let Some(lights) = Lights::new(faces) else { return Vec::new() };
     let mut found = BTreeMap::new();
     let mut pairs = 0;
-    // Lights that touch glass stay in place: the glass solids already resolve that interface.
+    // Lights that touch glass are not moved because the handling of coincident glass surfaces resolves this
+    // case.
     let is_glass = |object: &usize| {
         scene.objects[*object].material.is_some_and(|own| scene.materials[own].kind.is_glass())
     };
@@ -157,7 +162,7 @@ fn are_apart(a: [DVec3; 2], b: [DVec3; 2]) -> bool {
     a[0].cmpgt(b[1]).any() || a[1].cmplt(b[0]).any()
 }
 
-/// Translation of each object that moves lights off coplanar surfaces; empty if no light needs it.
+/// Translation of each object that moves lights off coplanar surfaces. Empty if no lights need to be moved.
 pub fn light_lifts(scene: &Scene, meshes: &[Arc<MeshTree>], origin: DVec3) -> Vec<DVec3> {
     let loaded: Vec<_> = meshes.iter().map(|mesh| mesh.loaded()).collect();
     let found = coplanar_lights(scene, &loaded, origin);
@@ -167,7 +172,7 @@ pub fn light_lifts(scene: &Scene, meshes: &[Arc<MeshTree>], origin: DVec3) -> Ve
     let mut lifts = vec![DVec3::ZERO; scene.objects.len()];
     let mut directions: Vec<(usize, DVec3)> = Vec::new();
     for Coplanar { light, lift, .. } in found.into_iter().filter(|pair| pair.light != pair.surface) {
-        // Lift a light only once for several surfaces in one plane.
+        // Lift a light only once if it is coplanar with several surfaces.
         let direction = lift.normalize_or_zero();
         directions.retain(|(other, _)| *other == light);
         if !directions.iter().any(|(_, known)| known.dot(direction) > 1.0 - PARALLEL) {
@@ -178,7 +183,8 @@ pub fn light_lifts(scene: &Scene, meshes: &[Arc<MeshTree>], origin: DVec3) -> Ve
     lifts
 }
 
-/// The mesh with each emissive triangle that is coplanar with another of its faces moved off that face. `None` if there are none.
+/// Mesh in which emissive triangles coplanar with other faces of the mesh are moved off these faces. `None`
+/// if there are no such triangles.
 pub fn with_lifted_lights(loaded: &LoadedMesh) -> Option<LoadedMesh> {
     let mesh = &loaded.mesh;
     let emits = |triangle: u32| {
@@ -237,7 +243,7 @@ fn copy_vertex(mesh: &mut TriangleMesh, vertex: usize, at: Vec3) -> u32 {
     (mesh.positions.len() - 1) as u32
 }
 
-/// Adds a pair of objects, or raises its lift in this direction to the maximum over its faces.
+/// Adds a pair of objects, or updates the pair's lift in this direction to the maximum over all faces.
 fn add(found: &mut BTreeMap<(usize, usize), Vec<Coplanar>>, light: &Face, face: &Face) {
     let size = light.size();
     let around = face.size().max(light.point.abs().max_element()).min(SURROUNDINGS * size);
@@ -250,8 +256,8 @@ fn add(found: &mut BTreeMap<(usize, usize), Vec<Coplanar>>, light: &Face, face: 
     }
 }
 
-/// Whether to lift the light off the face, along the light's normal, which hides the back of a two-sided light. The light stays if the
-/// face emits to that side as well.
+/// Whether to lift the light off the face along the light's normal. This hides the back of a two-sided light.
+/// The light is not lifted if the face also emits on that side.
 fn is_lifted(light: &Face, face: &Face) -> bool {
     !face.emits_along(light.normal)
 }
@@ -276,7 +282,7 @@ fn coincide(light: &Face, face: &Face) -> bool {
     !is_separated(light, face) && !is_separated(face, light)
 }
 
-/// Whether an object may have an emissive face.
+/// Whether an object may have emissive faces.
 fn may_emit(scene: &Scene, meshes: &[&LoadedMesh], object: usize) -> bool {
     let object = &scene.objects[object];
     match (object.material, object.shape.mesh()) {
@@ -286,7 +292,7 @@ fn may_emit(scene: &Scene, meshes: &[&LoadedMesh], object: usize) -> bool {
     }
 }
 
-/// Visits the flat faces of an object. For a mesh, skips the faces that are not near the lights, if given.
+/// Visits an object's flat faces. If `near` is given, skips mesh faces that are not near these lights.
 fn each_face(
     scene: &Scene,
     meshes: &[&LoadedMesh],

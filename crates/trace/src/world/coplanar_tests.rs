@@ -28,7 +28,7 @@ fn scene(tables: &str) -> Scene {
         "[camera]\nposition = [0, 5, 1]\nlook_at = [0, 0, 0]\n[materials.w]\ndiffuse = 0.5\n\
          [materials.l]\nemission = 1\n[materials.both]\nemission = 1\nemission_sides = \"both\"\n{tables}"
     );
-    // The mesh file only has to exist: its content is `square`.
+    // The mesh file only needs to exist. Its content is replaced by `square`.
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scene.toml");
     let outcome = crate::scene::parse(Arc::from(text.as_str()), &path);
     outcome.scene.unwrap_or_else(|| panic!("{:?}: {text}", outcome.diagnostics))
@@ -74,10 +74,11 @@ fn coplanar_lights_are_found_in_any_order() {
 }
 
 #[test]
-fn other_lights_are_not_lifted() {
+fn non_coplanar_lights_are_not_lifted() {
     let surface = SURFACES[0];
     for light in [
-        // Slightly above, next to, and touching an edge of the surface; perpendicular to it; not emissive.
+        // Lights slightly above the surface, next to it, touching its edge and perpendicular to it, and a
+        // non-emissive object.
         LIGHTS[0].replace("-0.5, 0, 0.5", "-0.5, 1e-4, 0.5"),
         LIGHTS[0].replace("-0.5, 0, 0.5", "2.5, 0, 0.5"),
         LIGHTS[0].replace("-0.5, 0, 0.5", "2, 0, 0.5"),
@@ -86,7 +87,7 @@ fn other_lights_are_not_lifted() {
     ] {
         assert!(pairs(&scene(&format!("{surface}{light}"))).is_empty(), "{light}");
     }
-    // Two lights that face the same side.
+    // Two lights that face the same direction.
     assert!(pairs(&scene(&format!("{}{}", LIGHTS[0], LIGHTS[2]))).is_empty());
     assert!(pairs(&scene(&format!("{}{}", LIGHTS[0], LIGHTS[2].replace("'l'", "'both'")))).is_empty());
 }
@@ -137,14 +138,15 @@ fn lifted_lights_are_hit_only_from_the_front() {
                     let from = Vec3::new(next() * 8.0, 0.5 + next().abs() * 9.0, next() * 8.0);
                     let hit = geometry.closest(&Ray::new(from, target - from)).expect("both");
                     assert_eq!(hit.object, number, "{tables} {from}");
-                    // Shadow rays that ignore the light reach it: the surface below does not occlude it.
+                    // Shadow rays that ignore the light reach it because the surface below does not occlude
+                    // it.
                     let shadow = Ray::segment(from, target);
                     assert!(!geometry.occluded(&shadow, LightObject::Object(number)), "{tables} {from}");
                     let is_closed = tables.contains("box") || tables.contains("cylinder");
                     let below = Vec3::new(from.x, -from.y, from.z);
                     let hit = geometry.closest(&Ray::new(below, target - below)).expect("both");
                     assert!(is_closed || hit.object != number, "{tables} {below}");
-                    // Samples of the light are hidden where hits are.
+                    // Light samples are occluded from the same positions as hits.
                     let lift = geometry.lifts()[number as usize].as_vec3();
                     let hidden = Ray::segment(below, target + lift);
                     assert!(geometry.occluded(&hidden, LightObject::Object(number)), "{tables} {below}");
@@ -155,8 +157,8 @@ fn lifted_lights_are_hit_only_from_the_front() {
 }
 
 #[test]
-fn packets_equal_single_rays_at_lifted_lights() {
-    // Every light on every surface, then all lights once more, and a mesh with each face twice.
+fn packets_match_single_rays_at_lifted_lights() {
+    // Every light on every surface, another copy of every light, and a mesh with duplicate faces.
     let tables = [LIGHTS.concat(), SURFACES.concat(), LIGHTS.concat().replace("'l'", "'both'")].concat();
     let mut mesh = square();
     mesh.triangles = mesh.triangles.repeat(2);
@@ -227,7 +229,7 @@ fn mesh_file_lights_are_lifted_off_other_faces() {
         physical: None,
     };
     let loaded = LoadedMesh { mesh, materials: vec![material(0.0), material(1.0)], ..LoadedMesh::default() };
-    let lifted = with_lifted_lights(&loaded).expect("a light in the plane").mesh;
+    let lifted = with_lifted_lights(&loaded).expect("a coplanar light").mesh;
     assert_eq!(lifted.triangles[..2], loaded.mesh.triangles[..2]);
     assert_eq!((lifted.positions.len(), lifted.normals.len(), lifted.uvs.len()), (12, 12, 12));
     let down = (lifted.positions[1] - lifted.positions[0]).cross(lifted.positions[2] - lifted.positions[0]).y;
@@ -240,7 +242,7 @@ fn mesh_file_lights_are_lifted_off_other_faces() {
             );
         }
     }
-    // Meshes without coplanar lights stay unchanged.
+    // Meshes without coplanar lights are unchanged.
     let dark = LoadedMesh { materials: vec![material(0.0), material(0.0)], ..loaded.clone() };
     assert!(with_lifted_lights(&dark).is_none());
     let mut below = loaded;

@@ -1,4 +1,4 @@
-//! Builds a scene's lights: point-like and infinite ones, and one per emitting surface.
+//! Builds a scene's lights: point and infinite lights, and one light per emitting surface.
 
 use std::collections::HashSet;
 use std::sync::Arc;
@@ -20,13 +20,14 @@ use crate::materials::{Emission, EmissionSides, Opacity};
 use crate::math::{DVec3, Vec3};
 use crate::scene::description::{self, Scene};
 
-/// The environment map's sampling tables. `None` if the image is black.
+/// Sampling tables of the environment map. `None` if the image is black.
 pub fn sky(texels: &Arc<Texels>) -> Option<Arc<EnvironmentMap>> {
     EnvironmentMap::new(Arc::clone(texels)).map(Arc::new)
 }
 
-/// Builds all lights: delta and directional lights first, then the environment, then emitting objects. A mesh becomes one light
-/// per emitting material; two-sided emission becomes two lights. `sky` is the environment map, if any.
+/// Builds all lights: delta and directional lights first, then the environment, then emitting objects. A mesh
+/// becomes one light per emitting material. Two-sided emission becomes two lights. `sky` is the environment
+/// map, if any.
 ///
 /// # Errors
 /// [`Cancelled`] if the token is canceled.
@@ -62,7 +63,7 @@ pub fn lights(
     Ok(Arc::new(Lights::new(all, token)?))
 }
 
-/// The photon source for a scene. `None` if no light emits photons.
+/// Photon source for a scene. `None` if no light emits photons.
 pub fn photon_source(geometry: &Geometry, lights: &Arc<Lights>) -> Option<PhotonSource> {
     let emitter_geometry =
         |object: u32| geometry.objects().get(object as usize).map(Object::emitter_geometry);
@@ -70,7 +71,7 @@ pub fn photon_source(geometry: &Geometry, lights: &Arc<Lights>) -> Option<Photon
     PhotonSource::new(lights, emitter_geometry, BoundingSphere::around(&balls))
 }
 
-/// The environment light. `None` if it is black.
+/// Environment light. `None` if it is black.
 fn environment_light(
     environment: &description::Environment,
     sky: Option<Arc<EnvironmentMap>>,
@@ -85,7 +86,7 @@ fn environment_light(
     }
 }
 
-/// A light that is not a surface, in coordinates relative to `origin`.
+/// A non-surface light, in coordinates relative to `origin`.
 fn delta_or_directional_light(light: &description::Light, origin: DVec3) -> Light {
     let point = |light: &description::light::PointLight| {
         let description::light::PointLight { position, intensity, falloff } = *light;
@@ -105,7 +106,7 @@ fn delta_or_directional_light(light: &description::Light, origin: DVec3) -> Ligh
     }
 }
 
-/// The emission, or [`Emission::NONE`] if its texture is entirely black.
+/// Returns the emission, or [`Emission::NONE`] if its texture is entirely black.
 fn without_black_texture(emission: Emission) -> Emission {
     match &emission.texture {
         Some(texture) if emission.is_emissive() && texture.texels.is_black() => Emission::NONE,
@@ -113,14 +114,14 @@ fn without_black_texture(emission: Emission) -> Emission {
     }
 }
 
-/// Emission of a material, combined with its opacity.
+/// Emission of a material, combined with the opacity.
 #[derive(Clone)]
 struct EmissiveMaterial {
-    /// The emission, already scaled by a constant opacity.
+    /// Emission, scaled by the opacity if it is constant.
     emission: Emission,
-    /// The opacity, if it varies over the surface.
+    /// Opacity, if it varies over the surface.
     opacity: Option<Opacity>,
-    /// Whether the surface may let light pass undeflected.
+    /// Whether light may pass through the surface without changing direction.
     is_sheer: bool,
 }
 
@@ -151,7 +152,7 @@ impl EmissiveMaterial {
         self.opacity.as_ref().map_or(bounds, |opacity| bounds.times(Vec3::splat(opacity.mean())))
     }
 
-    /// The factor that varies with position or direction. `chart` maps the emitter's points to UVs.
+    /// Factor that varies with position or direction. `chart` maps points on the emitter to UVs.
     fn texture(&self, chart: UvChart) -> Option<EmissionTexture> {
         let Emission { texture, coat, .. } = &self.emission;
         EmissionTexture::under_coat(texture.as_ref(), self.opacity.as_ref(), coat.as_ref(), chart)
@@ -163,7 +164,7 @@ impl EmissiveMaterial {
     }
 }
 
-/// The lights of an emitting shape, one per side.
+/// Lights of an emitting shape, one per side.
 fn shape_lights(shape: &Shape, emissive: &EmissiveMaterial, object: u32) -> impl Iterator<Item = AreaLight> {
     let of_side = move |side: &Side| {
         let radiance = emissive.emission.scale;
@@ -181,7 +182,7 @@ fn shape_lights(shape: &Shape, emissive: &EmissiveMaterial, object: u32) -> impl
     emissive.sides().iter().filter_map(of_side)
 }
 
-/// The lights of a mesh. If `emissive` is `None`, its triangles have the materials of the mesh file.
+/// Lights of a mesh. If `emissive` is `None`, its triangles have the materials from the mesh file.
 fn mesh_lights(
     object: u32,
     mesh: &MeshInstance,
@@ -231,18 +232,19 @@ fn mesh_lights(
     of_sides.map(light).filter_map(Result::transpose).collect()
 }
 
-/// The triangles with one of the mesh file's materials, or all triangles for `None`.
+/// Triangles with one of the mesh file's materials, or all triangles if `own` is `None`.
 fn triangles_of(mesh: &MeshInstance, own: Option<u32>) -> impl Iterator<Item = u32> {
     let mesh = &mesh.tree.loaded().mesh;
     let is_meant = move |id: &u32| own.is_none() || mesh.materials.get(*id as usize).copied() == own;
     (0..mesh.triangles.len() as u32).filter(is_meant)
 }
 
-/// [`triangles_of`] without duplicates, which have the same corners in the same order: a face that a file repeats emits only once.
+/// Like [`triangles_of`], without duplicates, so that a repeated face in a file emits only once. Duplicates
+/// have the same corners in the same order.
 fn distinct(mesh: &MeshInstance, own: Option<u32>) -> impl Iterator<Item = u32> {
     let mut known = HashSet::new();
     triangles_of(mesh, own).filter(move |id| {
-        // Adding 0 turns −0 into 0.
+        // Adding 0 converts −0 to 0.
         let place = |corner: Vec3| (corner + Vec3::ZERO).to_array().map(f32::to_bits);
         let mut corners = mesh.tree.loaded().mesh.corners(*id).map(place);
         let first = (0..3).min_by_key(|index| corners[*index]).unwrap_or(0);

@@ -15,7 +15,7 @@ use super::isolated::IsolationCache;
 use super::merged::MergedTriangle;
 use super::{MergedMeshes, MeshInstance, MeshTree, Object};
 
-/// The nearest hit in a scene.
+/// Nearest hit in a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
     /// The hit within the object.
@@ -35,19 +35,20 @@ pub struct Geometry {
     merged: Option<MergedTree>,
     /// Infinite objects, which are not in the tree.
     unbounded: Vec<u32>,
-    /// Upper bound on the position error of mesh triangles, including that of ray tests.
+    /// Upper bound on the position error of mesh triangles, including the error of ray tests.
     mesh_rounding: f32,
-    /// Cache of surface regions with nothing near them.
+    /// Cache of isolated surface regions.
     isolated: IsolationCache,
-    /// Translation of each object; empty if no object is moved.
+    /// Translation of each object. Empty if no objects are moved.
     lifts: Vec<DVec3>,
     instructions: InstructionSet,
 }
 
-/// Small meshes in one tree, and the top-level tree that rays traverse instead of the one over all objects.
+/// Small meshes in one tree, and the top-level tree used for tracing instead of the tree over all objects.
 #[derive(Debug)]
 pub(super) struct MergedTree {
-    /// The merged meshes. In `over` they are one object, whose id follows all real objects.
+    /// The merged meshes. In `over`, they are represented by one object, whose id follows the ids of all real
+    /// objects.
     pub(super) meshes: MergedMeshes,
     /// The tree over the merged meshes and the remaining objects.
     pub(super) over: Bvh,
@@ -67,7 +68,7 @@ impl Geometry {
         Self::lifted(scene, meshes, (origin, light_lifts(scene, meshes, origin)), token)
     }
 
-    /// Like [`Self::of_scene`], with the translations that [`light_lifts`] returned.
+    /// Like [`Self::of_scene`], with translations from [`light_lifts`].
     ///
     /// # Errors
     /// [`Cancelled`].
@@ -84,7 +85,7 @@ impl Geometry {
         Ok(Self { origin, lifts, ..Self::build(built, token)? })
     }
 
-    /// Translation of each object, see [`super::coplanar_lights`]; empty if no object is moved.
+    /// Translation of each object; see [`super::coplanar_lights`]. Empty if no objects are moved.
     pub fn lifts(&self) -> &[DVec3] {
         &self.lifts
     }
@@ -142,12 +143,14 @@ impl Geometry {
         &self.tree
     }
 
-    /// The top-level tree that rays traverse: unmerged objects by id, followed by the merged meshes as one.
+    /// Top-level tree used for tracing. It contains the unmerged objects by id, followed by one object for
+    /// all merged meshes.
     pub(super) fn visited(&self) -> &Bvh {
         self.merged.as_ref().map_or(&self.tree, |merged| &merged.over)
     }
 
-    /// The merged meshes, if `id` (from [`Geometry::visited`]) denotes them. `None` if it is an object.
+    /// Returns the merged meshes if they are represented by `id`, an id from [`Geometry::visited`], and
+    /// `None` if it is an object.
     #[inline(always)]
     pub(super) fn merged(&self, id: u32) -> Option<&MergedMeshes> {
         let merged = self.merged.as_ref()?;
@@ -165,7 +168,7 @@ impl Geometry {
         self.merged.as_ref().is_some_and(|merged| merged.meshes.has(object))
     }
 
-    /// Whether a light is an entire merged mesh. Shadow rays to it use the per-mesh trees instead.
+    /// Whether a light is an entire merged mesh. Shadow rays to these lights use the per-mesh trees instead.
     #[inline(always)]
     pub(super) fn is_whole_merged(&self, source: LightObject) -> bool {
         match (source, &self.merged) {
@@ -190,17 +193,17 @@ impl Geometry {
         &self.unbounded
     }
 
-    /// Upper bound on the position error of mesh triangles, including that of ray tests.
+    /// Upper bound on the position error of mesh triangles, including the error of ray tests.
     pub(super) fn mesh_rounding(&self) -> f32 {
         self.mesh_rounding
     }
 
-    /// Cache of surface regions with nothing near them.
+    /// Cache of isolated surface regions.
     pub(super) fn isolated(&self) -> &IsolationCache {
         &self.isolated
     }
 
-    /// The same geometry, traced with another instruction set.
+    /// Returns the same geometry, traced with another instruction set.
     #[cfg(test)]
     pub(super) fn with(mut self, instructions: InstructionSet) -> Self {
         self.instructions = instructions;
@@ -212,7 +215,7 @@ impl Geometry {
         self.instructions
     }
 
-    /// The nearest hit; at equal distances, the lowest object id wins.
+    /// Returns the nearest hit. At equal distances, the lowest object id wins.
     pub fn closest(&self, ray: &Ray) -> Option<Hit> {
         self.closest_in(self.visited(), ray, |id, segment| match self.merged(id) {
             Some(merged) => {
@@ -224,12 +227,14 @@ impl Geometry {
         })
     }
 
-    /// The nearest hit among the objects for which `counts` returns true; at equal distances, the lowest object id wins.
+    /// Returns the nearest hit among the objects for which `counts` returns true. At equal distances, the
+    /// lowest object id wins.
     pub fn closest_of(&self, ray: &Ray, counts: impl Fn(u32) -> bool) -> Option<Hit> {
         self.closest_in(&self.tree, ray, |id, segment| if counts(id) { self.hit(id, segment) } else { None })
     }
 
-    /// The nearest hit among the objects of a tree and the infinite ones; `hit` intersects one of them with a ray segment.
+    /// Returns the nearest hit among a tree's objects and the infinite objects. `hit` intersects one object
+    /// with a ray segment.
     #[inline]
     fn closest_in(
         &self,
@@ -254,14 +259,14 @@ impl Geometry {
         best
     }
 
-    /// The nearest hit on one object.
+    /// Returns the nearest hit on one object.
     #[inline]
     fn hit(&self, id: u32, ray: &Ray) -> Option<Hit> {
         let shape = self.objects[id as usize].closest(ray, &ray.to_f64())?;
         Some(Hit { shape, object: id })
     }
 
-    /// Whether anything but the light itself blocks a shadow ray.
+    /// Whether anything other than the light itself blocks a shadow ray.
     pub fn occluded(&self, ray: &Ray, source: LightObject) -> bool {
         let ray_f64 = ray.to_f64();
         let any = |id: u32, except: Option<u32>| self.objects[id as usize].any(ray, &ray_f64, except);
@@ -292,17 +297,17 @@ impl Geometry {
         }
     }
 
-    /// The surface at a hit.
+    /// Returns the surface at a hit.
     pub fn surface(&self, ray: &Ray, hit: &Hit) -> SurfacePoint {
         self.requested_surface(ray, hit, SurfaceRequest::ALL)
     }
 
-    /// The requested surface attributes at a hit.
+    /// Returns the requested surface attributes at a hit.
     pub fn requested_surface(&self, ray: &Ray, hit: &Hit, asked: SurfaceRequest) -> SurfacePoint {
         self.objects[hit.object as usize].surface(ray, &hit.shape, asked)
     }
 
-    /// Mean curvature at a hit; positive where the surface is convex on its front side.
+    /// Mean curvature at a hit. Positive if the surface is convex on its front side.
     pub fn curvature(&self, hit: &Hit, surface: &SurfacePoint) -> f32 {
         match &self.objects[hit.object as usize] {
             Object::Shape(shape) => shape.curvature(hit.shape.primitive, surface.point.as_dvec3()) as f32,
@@ -310,14 +315,14 @@ impl Geometry {
         }
     }
 
-    /// Index of a triangle's material in its mesh file. `None` if the file assigns none.
+    /// Index of a triangle's material in its mesh file. `None` if the file does not assign a material.
     pub fn file_material(&self, object: u32, triangle: u32) -> Option<u32> {
         let mesh = self.objects[object as usize].mesh()?;
         let materials = &mesh.tree.loaded().mesh.materials;
         materials.get(triangle as usize).copied().filter(|&own| own != u32::MAX)
     }
 
-    /// The vertex color at a hit, interpolated in linear space. `None` if the mesh has none.
+    /// Vertex color at a hit, interpolated in linear space. `None` if the mesh has no vertex colors.
     pub fn vertex_color(&self, hit: &Hit) -> Option<Vec3> {
         let mesh = &self.objects[hit.object as usize].mesh()?.tree.loaded().mesh;
         let corners = mesh.triangles.get(hit.shape.primitive as usize)?;
@@ -327,19 +332,19 @@ impl Geometry {
         Some(a? * (1.0 - u - v) + b? * u + c? * v)
     }
 
-    /// UV and tangents (∂p/∂u, ∂p/∂v) at a hit in the second UV set. `None` without one.
+    /// UV and tangents (∂p/∂u, ∂p/∂v) at a hit in the second UV set. `None` without a second UV set.
     pub fn second_uv(&self, hit: &Hit) -> Option<(Vec2, [Vec3; 2])> {
         self.objects[hit.object as usize].mesh()?.second_parameterization(&hit.shape)
     }
 
-    /// Bytes of the objects and the trees over them, without per-mesh trees.
+    /// Memory use of the objects and the trees over them in bytes, excluding per-mesh trees.
     pub fn own_memory_bytes(&self) -> usize {
         let of_merged = |merged: &MergedTree| merged.meshes.memory_bytes() + merged.over.memory_bytes();
         let merged = self.merged.as_ref().map_or(0, of_merged);
         self.tree.memory_bytes() + merged + size_of_val(self.objects.as_slice())
     }
 
-    /// Bytes of all trees; each mesh tree counts once.
+    /// Memory use of all trees in bytes. Each mesh tree is counted once.
     pub fn memory_bytes(&self) -> usize {
         let mut seen = Vec::new();
         let mut bytes = self.own_memory_bytes() - size_of_val(self.objects.as_slice());
@@ -353,7 +358,7 @@ impl Geometry {
     }
 }
 
-/// The shell of an object with this bounding box.
+/// Shell of an object with this bounding box.
 fn shell(object: &Object, bounds: &Aabb) -> Shell {
     match object {
         Object::Shape(Shape::Sphere(sphere)) => Shell::sphere(sphere.center, sphere.radius),
@@ -361,8 +366,8 @@ fn shell(object: &Object, bounds: &Aabb) -> Shell {
     }
 }
 
-/// Assigns scene-wide triangle numbers: merged meshes first, in the order of their common tree, then the others. Meshes beyond
-/// the range of `u32` get none.
+/// Assigns scene-wide triangle numbers: first to merged meshes, in the order of their common tree, and then
+/// to other meshes. Meshes whose numbers would exceed `u32` are not numbered.
 fn number_triangles(objects: &mut [Object]) {
     let mut next = Some(0_u32);
     for of_merged in [true, false] {
@@ -403,7 +408,7 @@ mod tests {
     use crate::math::transform::Transform;
     use crate::world::merged::tests::mesh;
 
-    /// Merged meshes, tiny meshes, and large ones with trees of their own; some are transformed.
+    /// Merged meshes, tiny meshes, and large meshes with separate trees. Some are transformed.
     fn geometry() -> Geometry {
         let trees = [mesh(1, 70), mesh(2, 8), mesh(3, 17_000), mesh(4, 40)];
         let placed = |(place, tree): (usize, usize)| {
@@ -430,7 +435,7 @@ mod tests {
     }
 
     #[test]
-    fn ignoring_the_start_triangle_changes_no_hit() {
+    fn ignoring_the_start_triangle_keeps_hits() {
         let geometry = geometry();
         let mut next = random(5);
         let (mut started, mut hits) = (0, [0; 5]);
@@ -448,6 +453,6 @@ mod tests {
             started += 1;
             hits[hit.object as usize] += u32::from(found.is_some());
         }
-        assert!(hits.iter().all(|&hits| hits > 10), "{hits:?} hits per object that the rays start on");
+        assert!(hits.iter().all(|&hits| hits > 10), "{hits:?} hits of rays starting on each object");
     }
 }

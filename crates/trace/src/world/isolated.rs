@@ -1,8 +1,9 @@
-//! Isolated surface regions: parts of surfaces with nothing else near them, where rays need not search for coincident surfaces.
+//! Isolated surface regions: parts of surfaces with no other surfaces nearby, where rays do not need to
+//! search for coincident surfaces.
 //!
-//! The state of each mesh triangle, and of each grid cell around a shape, is computed on first use and cached in one byte. It
-//! depends only on the geometry, not on which ray asks first. [`World::contact`](super::World::contact) returns the same result
-//! with the cache as with a search.
+//! The state of each mesh triangle, and of each grid cell around a shape, is computed on first use and cached
+//! in one byte. The state depends only on the geometry, not on the order of rays. With the cache,
+//! [`World::contact`](super::World::contact) returns the same result as with a search.
 
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU8, Ordering};
@@ -12,31 +13,34 @@ use crate::accel::Met;
 use crate::geometry::{Aabb, Shape, SurfacePoint};
 use crate::math::{DVec3, Vec3};
 
-/// Not computed yet.
+/// State that has not been computed.
 const UNKNOWN: u8 = 0;
 
-/// Something may be near anywhere in the region.
+/// State of a region in which other surfaces may be near any point.
 const NEVER: u8 = u8::MAX;
 
-/// Resolution of a triangle's state: nothing is near points whose barycentric coordinates are all at least `state / STATE_STEPS`.
+/// Resolution of a triangle's state. Points whose barycentric coordinates are all at least `state /
+/// STATE_STEPS` are isolated.
 const STATE_STEPS: f32 = 256.0;
 
-/// Largest state to consider.
+/// Maximum triangle state to test.
 const MAX_STATE: f64 = 64.0;
 
-/// Distance of a triangle's isolated part from its edges, in margins. Neighbors at angles of 30° or more are then not near.
+/// Distance from a triangle's edges to its isolated part, in margins. At this distance, neighbors at angles
+/// of 30° or more are not considered near.
 const FROM_EDGES: f64 = 4.0;
 
-/// Minimum distance, in margins, of surfaces that are not near: the box of one margin around the point, with room for rounding.
+/// Minimum distance, in margins, of surfaces that are not considered near. Covers a box of one margin around
+/// the point, with room for rounding.
 const MIN_SEPARATION: f64 = 1.9;
 
 /// Grid cells along each side of a shape's bounding box.
 const CELLS: usize = 16;
 
-/// The isolation tables of all objects.
+/// Isolation tables of all objects.
 #[derive(Debug, Default)]
 pub(super) struct IsolationCache {
-    /// Diagonal of the box around all finite objects.
+    /// Diagonal of the bounding box of all finite objects.
     reach: f32,
     tables: Vec<OnceLock<IsolationTable>>,
 }
@@ -44,9 +48,9 @@ pub(super) struct IsolationCache {
 /// Cached isolation states of one object.
 #[derive(Debug)]
 struct IsolationTable {
-    /// Largest margin for which the states are valid.
+    /// Maximum margin for which the states are valid.
     margin: f32,
-    /// For shapes: the grid's minimum corner and its cells per unit length along each axis.
+    /// For shapes, the grid's minimum corner and the number of cells per unit length along each axis.
     cells: [Vec3; 2],
     states: Box<[AtomicU8]>,
 }
@@ -65,7 +69,7 @@ impl IsolationTable {
         Self { margin, cells, states: (0..count).map(|_| AtomicU8::new(UNKNOWN)).collect() }
     }
 
-    /// A table with one state per grid cell of a shape's bounding box.
+    /// Creates a table with one state per grid cell of a shape's bounding box.
     fn of_cells(margin: f32, bounds: &Aabb) -> Self {
         let dense = Vec3::splat(CELLS as f32) / bounds.extent();
         // A flat box is one cell thick.
@@ -73,7 +77,7 @@ impl IsolationTable {
         Self::new(margin, [bounds.min, dense], CELLS * CELLS * CELLS)
     }
 
-    /// The grid cell that contains a point.
+    /// Returns the grid cell that contains a point.
     #[inline]
     fn cell(&self, point: Vec3) -> GridCell {
         let [start, dense] = self.cells;
@@ -100,13 +104,14 @@ enum SurfaceRegion {
     /// The inner part of a triangle.
     Triangle {
         corners: [DVec3; 3],
-        /// Distance up to which a surface is near.
+        /// Distance up to which a surface is considered near.
         apart: f64,
     },
 }
 
 impl Geometry {
-    /// Whether nothing is within `margin` of the point except the hit object, or except the hit triangle for a mesh.
+    /// Whether there is nothing within `margin` of the point other than the hit object or, for a mesh, the
+    /// hit triangle.
     pub(super) fn is_isolated(&self, hit: &Hit, surface: &SurfacePoint, margin: Vec3) -> bool {
         let object = &self.objects()[hit.object as usize];
         let table = self.isolated().tables[hit.object as usize].get_or_init(|| self.table(object));
@@ -136,8 +141,8 @@ impl Geometry {
         }
     }
 
-    /// Creates an object's table. Its margin covers rays from up to four scene sizes away; longer ones have larger margins and do
-    /// not use the table.
+    /// Creates an object's table. The margin covers rays from up to four scene sizes away. Longer rays have
+    /// larger margins and do not use the table.
     fn table(&self, object: &Object) -> IsolationTable {
         let of_rays = self.mesh_rounding() + 8.0 * f32::EPSILON * self.isolated().reach;
         match object {
@@ -150,7 +155,7 @@ impl Geometry {
                     let size = bounds.min.abs().max(bounds.max.abs()).max_element();
                     IsolationTable::of_cells(of_rays.max(64.0 * f32::EPSILON * size), &bounds)
                 }
-                // Unbounded shape: no ray has a negative margin, so the table is never used.
+                // With a negative margin, the table of an unbounded shape is never used.
                 None => IsolationTable::new(-1.0, [Vec3::ZERO; 2], 0),
             },
         }
@@ -171,7 +176,8 @@ impl Geometry {
             corners.map(|corner| middle + (corner - middle) * (1.0 - 3.0 * parts / f64::from(STATE_STEPS)))
         };
         let apart = MIN_SEPARATION * f64::from(margin);
-        // Also try a part farther from the edges, in case a neighbor meets this triangle at a small angle.
+        // Also try a part farther from the edges, in case there is a small angle between this triangle and a
+        // neighbor.
         for parts in [least, 4.0 * least].into_iter().filter(|&parts| parts <= MAX_STATE) {
             let inner = smaller(own_corners, parts);
             if !is_clear_of_own(mesh, triangle, inner, apart * growth) {
@@ -187,7 +193,7 @@ impl Geometry {
         NEVER
     }
 
-    /// Whether no other object is near a region; any that is must overlap `around`.
+    /// Whether no other objects are near a region. Objects near the region must overlap `around`.
     fn is_clear(&self, around: &Aabb, region: &SurfaceRegion, own: u32) -> bool {
         let is_near = |id: u32| match &self.objects()[id as usize] {
             Object::Shape(shape) => shape_is_near(shape, around, region),
@@ -212,8 +218,8 @@ impl Geometry {
     }
 }
 
-/// Whether all other triangles of the mesh are at least `apart` from a part of one triangle, in mesh coordinates. Checked first:
-/// most nearby triangles are neighbors in the same mesh.
+/// Whether all other triangles of the mesh are at least `apart` from a part of one triangle, in mesh
+/// coordinates. This is checked first because most nearby triangles are neighbors in the same mesh.
 fn is_clear_of_own(mesh: &MeshInstance, triangle: u32, part: [DVec3; 3], apart: f64) -> bool {
     let around = Aabb::around_f64(part).grown(Vec3::splat((1.1 * apart) as f32));
     mesh.tree.triangles().meeting_while(&around, |other| {
@@ -243,12 +249,12 @@ fn shape_is_near(shape: &Shape, around: &Aabb, region: &SurfaceRegion) -> bool {
     if let Shape::Triangle(own) = shape {
         return region.is_near([own.a, own.b, own.c], around);
     }
-    // For other shapes, overlapping bounding boxes count as near.
+    // Other shapes are considered near if their bounding boxes overlap.
     true
 }
 
 impl SurfaceRegion {
-    /// Whether a triangle may be near the region; it is not if it does not overlap `around`.
+    /// Whether a triangle may be near the region. Triangles that do not overlap `around` are not near.
     fn is_near(&self, triangle: [DVec3; 3], around: &Aabb) -> bool {
         match self {
             Self::GridCell(cell) => meets(triangle, cell),
@@ -259,7 +265,7 @@ impl SurfaceRegion {
     }
 }
 
-/// A grid cell of a shape's bounding box, by its indices along the axes.
+/// A grid cell of a shape's bounding box, identified by its indices along the axes.
 struct GridCell([usize; 3]);
 
 impl GridCell {
@@ -268,7 +274,7 @@ impl GridCell {
         (z * CELLS + y) * CELLS + x
     }
 
-    /// Its box, expanded for rounding.
+    /// Bounding box of the cell, expanded for rounding.
     fn bounds(&self, all: &Aabb) -> Aabb {
         let side = all.extent() / CELLS as f32;
         let min = all.min + Vec3::from(self.0.map(|along| along as f32)) * side;
@@ -276,7 +282,8 @@ impl GridCell {
     }
 }
 
-/// Whether a triangle intersects a box, within rounding (Akenine-Möller, *Fast 3D Triangle-Box Overlap Testing*, 2001).
+/// Whether a triangle intersects a box, up to rounding (Akenine-Möller, *Fast 3D Triangle-Box Overlap
+/// Testing*, 2001).
 pub(super) fn meets(corners: [DVec3; 3], bounds: &Aabb) -> bool {
     if !Aabb::around_f64(corners).meets(bounds) {
         return false;
@@ -298,7 +305,7 @@ pub(super) fn meets(corners: [DVec3; 3], bounds: &Aabb) -> bool {
     !(parts(normal) || edges.into_iter().flat_map(across).any(parts))
 }
 
-/// Whether some axis separates two triangles by more than `distance`.
+/// Whether any axis separates two triangles by more than `distance`.
 fn are_apart(one: [DVec3; 3], other: [DVec3; 3], distance: f64) -> bool {
     let edges = |[a, b, c]: [DVec3; 3]| [b - a, c - b, a - c];
     let (own, others) = (edges(one), edges(other));
@@ -310,7 +317,7 @@ fn are_apart(one: [DVec3; 3], other: [DVec3; 3], distance: f64) -> bool {
         let ([a, b], [c, d]) = (range(one, axis), range(other, axis));
         (c - b).max(a - d) > distance * axis.length()
     };
-    // First try the axes that separate neighbors: the first triangle's in-plane edge normals.
+    // First try the axes that typically separate neighbors: the first triangle's in-plane edge normals.
     let normal = own[0].cross(own[1]);
     if own.into_iter().any(|edge| parts(edge.cross(normal))) || parts(normal) {
         return true;

@@ -27,7 +27,7 @@ impl SceneRandom {
     }
 }
 
-/// A scene under construction. Material 0 is matte; 1 and 2 are glass.
+/// Builder for test scenes. Material 0 is matte, and materials 1 and 2 are glass.
 struct SceneBuilder {
     scene: Scene,
     meshes: Vec<Arc<MeshTree>>,
@@ -101,7 +101,7 @@ fn ball(steps: u32) -> TriangleMesh {
     mesh
 }
 
-/// Scenes with touching and non-touching surfaces, each with points for rays to aim at.
+/// Scenes with touching and non-touching surfaces, each with target points for rays.
 fn scenes(random: &mut SceneRandom) -> Vec<(World, Vec<DVec3>)> {
     let floor = Shape::Quad { corner: v(-4.0, -4.0, -1.0), u: v(8.0, 0.0, 0.0), v: v(0.0, 8.0, 0.0) };
     let cube = |x: f64, size: f64| Shape::Box {
@@ -133,7 +133,7 @@ fn scenes(random: &mut SceneRandom) -> Vec<(World, Vec<DVec3>)> {
             ),
             places(&coarse, DVec3::ZERO),
         ),
-        // A floating sphere, and another that touches it in a point.
+        // A floating sphere, and another sphere that touches it at a point.
         (
             SceneBuilder::new().shape(floor.clone(), 0).mesh(fine.clone(), at(v(0.0, 0.0, 0.5)), 1).mesh(
                 fine.clone(),
@@ -151,7 +151,7 @@ fn scenes(random: &mut SceneRandom) -> Vec<(World, Vec<DVec3>)> {
                 .shape(globe(v(-0.6, 0.0, 0.0), 0.4), 1),
             vec![v(0.0, 0.0, -1.0), v(-1.0, 0.0, 0.0), v(0.8, 0.0, 0.0)],
         ),
-        // Boxes that share a face, one of them a mesh; and one of another size.
+        // Boxes that share a face, one of which is a mesh, and a box of another size.
         (
             SceneBuilder::new()
                 .shape(floor, 0)
@@ -188,7 +188,7 @@ fn scenes(random: &mut SceneRandom) -> Vec<(World, Vec<DVec3>)> {
                 .chain([v(0.0, 0.0, 1.5), v(1.0, 0.0, 1.5)])
                 .collect(),
         ),
-        // A triangulated sphere inside a sphere and a room, with a triangle pasted on it.
+        // A triangulated sphere inside a sphere and a room, and a triangle coplanar with one of its faces.
         (
             SceneBuilder::new()
                 .shape(
@@ -207,7 +207,7 @@ fn scenes(random: &mut SceneRandom) -> Vec<(World, Vec<DVec3>)> {
                 ),
             fine.positions.iter().map(|own| rotated * own.as_dvec3()).collect(),
         ),
-        // A crease: two sheets at a small angle, and a third at a large one.
+        // A crease: two sheets at a small angle, and a third at a large angle.
         (
             SceneBuilder::new().mesh(
                 TriangleMesh {
@@ -236,7 +236,7 @@ fn isolated_regions_match_the_full_search() {
     let (mut isolated, mut asked, mut touching) = (0, 0, 0);
     for (number, (world, places)) in scenes(&mut random).into_iter().enumerate() {
         for round in 0..30_000 {
-            // Aim at a target point, between two, near one, or anywhere.
+            // Aim at a target point, between two target points, near one, or at a random point.
             let pick = |random: &mut SceneRandom| places[(random.unit() * places.len() as f64) as usize];
             let (one, other) = (pick(&mut random), pick(&mut random));
             let target = match round % 4 {
@@ -292,9 +292,9 @@ fn isolated_regions_match_the_full_search() {
 }
 
 #[test]
-fn nested_spheres_are_searched_in_log_squared_time() {
+fn nested_sphere_search_takes_log_squared_time() {
     for count in [100_u32, 400, 1600, 6400] {
-        // The order in the file is not that of the radii. Some spheres are matte.
+        // The file order differs from the order of radii. Some spheres are matte.
         let radius = |i: u32| 1.0 + f64::from(i * 37 % count) / f64::from(count);
         let globe = |i: u32| Shape::Sphere { center: v(0.1, 0.2, 0.3), radius: radius(i) };
         let material = |i: u32| [1, 2, 1, 2, 0][i as usize % 5];
@@ -319,10 +319,10 @@ fn nested_spheres_are_searched_in_log_squared_time() {
                     around.push(object);
                 }
             });
-            // Each level of the tree lists a few spheres of its own.
+            // Each level of the tree lists a few spheres.
             let bound = 1.5 * f64::from(count).log2().powi(2);
             assert!(f64::from(found) <= bound, "{found} of {count}");
-            // Those that determine the medium are among them.
+            // They include the spheres that determine the medium.
             let glasses = world.closed_glasses().map(|(object, _)| object);
             let enclosing = glasses.filter(|object| world.encloses(*object, sides.beyond));
             let enclosing: Vec<_> = enclosing.collect();

@@ -20,7 +20,7 @@ use crate::scene::description::{
     self, ColorSource, FresnelSource, MaterialKind, NumberSource, PixelValue, Scene, TextureRole, TextureUse,
 };
 
-/// Converts a material of the scene file.
+/// Converts a material from the scene file.
 pub fn material(scene: &Scene, images: &Images, material: &description::Material) -> Material {
     let of = Declared { scene, images, material };
     let color = |source: &ColorSource| of.color(source);
@@ -80,7 +80,7 @@ pub fn material(scene: &Scene, images: &Images, material: &description::Material
     Material { bsdf, emission, normal_perturbation, opacity: opacity(scene, images, material) }
 }
 
-/// Opacity of a material of the scene file. `None` if it is fully opaque.
+/// Opacity of a material from the scene file. `None` if it is fully opaque.
 pub fn opacity(scene: &Scene, images: &Images, material: &description::Material) -> Option<Opacity> {
     let source = &material.opacity;
     if source.is_full() {
@@ -101,7 +101,7 @@ pub fn opacity(scene: &Scene, images: &Images, material: &description::Material)
     Some(Opacity { value, cutoff })
 }
 
-/// A metal: a mirror if its roughness is 0, otherwise a microfacet conductor.
+/// A metal: a mirror if its roughness is 0, and otherwise a microfacet conductor.
 fn metal(fresnel: ConductorFresnel, roughness: Number, anisotropy: Number) -> Bsdf {
     if roughness.constant() == Some(0.0) {
         return Bsdf::Mirror(Mirror::Conductor(fresnel));
@@ -111,7 +111,7 @@ fn metal(fresnel: ConductorFresnel, roughness: Number, anisotropy: Number) -> Bs
     Bsdf::Rough(if is_brushed { Rough::BrushedConductor(metal) } else { Rough::Conductor(metal) })
 }
 
-/// Plastic; with roughness 0, the coat becomes a δ lobe over the diffuse base.
+/// Plastic. With roughness 0, the coat becomes a δ lobe over the diffuse base.
 fn plastic(diffuse: Color, specular: Color, roughness: Number, ior: f32) -> Bsdf {
     let is_smooth = roughness.constant() == Some(0.0);
     let base = Rough::Plastic(Plastic::new(diffuse, specular.clone(), roughness, ior));
@@ -125,7 +125,7 @@ fn fresnel_of(source: &FresnelSource, color: impl Fn(&ColorSource) -> Color) -> 
     }
 }
 
-/// Emission of a material of the scene file.
+/// Emission of a material from the scene file.
 pub fn emission(scene: &Scene, images: &Images, material: &description::Material) -> Emission {
     let (emission, of) = (&material.emission, Declared { scene, images, material });
     let coat = material.emission_coat().and_then(|numbers| {
@@ -136,9 +136,9 @@ pub fn emission(scene: &Scene, images: &Images, material: &description::Material
     Emission { scale: emission.scale, texture, sides: emission.sides, coat }
 }
 
-/// Material class of a mesh file's material. MTL illumination models 4, 6, 7 and 9 are glass, unless an opacity texture masks
-/// them. Materials with the physically based MTL extension are principled. Otherwise, models 3, 5 and 8 with a specular color are
-/// mirrors, or coats over a stronger diffuse color.
+/// Material class of a mesh file's material. MTL illumination models 4, 6, 7 and 9 are glass, unless there is
+/// an opacity texture. Materials with the physically based MTL extension are principled. Otherwise, models 3,
+/// 5 and 8 with a specular color are mirrors, or coats over a stronger diffuse color.
 enum FileMaterialKind<'a> {
     Phong,
     Principled(&'a PhysicalMaterial),
@@ -193,7 +193,7 @@ pub fn file_emission(images: &Images, own: &FileMaterial) -> Emission {
     }
     match &own.emission_texture {
         None => Emission::constant(own.emission),
-        // If the emission map could not be read, emit nothing instead of everywhere.
+        // If the emission map could not be read, do not emit. Otherwise, the whole surface would emit.
         Some(texture) => match file_texture(images, texture, file_color_use(own, texture)) {
             None => Emission::NONE,
             texture => Emission { texture, ..Emission::constant(own.emission) },
@@ -216,7 +216,7 @@ pub fn file_opacity(images: &Images, own: &FileMaterial) -> Option<Opacity> {
     Some(Opacity { value, cutoff: 0.0 })
 }
 
-/// Converts a material of a mesh file. A highlight of strength k becomes ks = 2k/(α + 2).
+/// Converts a material from a mesh file. A highlight of strength k becomes ks = 2k/(α + 2).
 pub fn file_material(images: &Images, own: &FileMaterial) -> Material {
     let bsdf = match (kind(own), file_glass(own)) {
         (FileMaterialKind::Mirror, _) => {
@@ -237,13 +237,13 @@ pub fn file_material(images: &Images, own: &FileMaterial) -> Material {
     Material { bsdf, emission: Emission::NONE, normal_perturbation: None, opacity: file_opacity(images, own) }
 }
 
-/// A non-specular material of a mesh file, with its emission and normal map.
+/// Non-specular material from a mesh file, with emission and normal map.
 fn file_surface(images: &Images, own: &FileMaterial, rough: Rough) -> Material {
     let normals = own.normal_texture.as_ref().and_then(|texture| {
         let texture = file_texture(images, texture, TextureUse::Normal)?;
         Some(NormalMap { texture, strength: own.normal_strength })
     });
-    // Gray images are height maps whose scale the file does not specify: ignore them.
+    // Gray images are height maps. Ignore them because the file does not specify the scale.
     let normals = normals.filter(|map| !map.texture.texels.is_gray());
     Material {
         bsdf: Bsdf::Rough(rough),
@@ -258,9 +258,10 @@ fn file_color(images: &Images, own: &FileMaterial, texture: Option<&FileTexture>
     texture.map_or(Color::Constant(constant), Color::Texture)
 }
 
-/// A mirror over a diffuse color: a coat that reflects `Ks` of light along its normal.
+/// A mirror over a diffuse color, represented as a coat that reflects the fraction `Ks` of light at normal
+/// incidence.
 fn file_coated(images: &Images, own: &FileMaterial) -> Bsdf {
-    // An index of refraction for more than this would be beyond 10.
+    // A higher reflectance would require an index of refraction above 10.
     const MOST: f32 = 0.66;
     let specular = own.specular.min(Vec3::ONE);
     let root = specular.max_element().min(MOST).sqrt();
@@ -283,7 +284,7 @@ fn file_phong(images: &Images, own: &FileMaterial) -> Rough {
     })
 }
 
-/// A principled material of a mesh file. An index of refraction of 1 or less means "unspecified".
+/// Principled material from a mesh file. An index of refraction of 1 or less means "unspecified".
 fn file_principled(images: &Images, own: &FileMaterial, physical: &PhysicalMaterial) -> Rough {
     let number = |texture: &Option<FileTexture>, constant: f32| {
         let texture = texture.as_ref().and_then(|texture| file_texture(images, texture, FILE_NUMBER));
@@ -302,7 +303,7 @@ fn file_principled(images: &Images, own: &FileMaterial, physical: &PhysicalMater
     })))
 }
 
-/// The material of triangles to which a mesh file assigns none.
+/// Material of triangles for which the mesh file does not specify a material.
 pub fn fallback_material() -> Material {
     let phong = Phong {
         diffuse: Color::Constant(Vec3::splat(0.7)),
@@ -318,7 +319,7 @@ pub fn fallback_material() -> Material {
     }
 }
 
-/// Looks up the textures of a material of the scene file.
+/// Looks up the textures of a material from the scene file.
 #[derive(Clone, Copy)]
 struct Declared<'a> {
     scene: &'a Scene,
@@ -330,12 +331,12 @@ impl Declared<'_> {
     fn color(self, source: &ColorSource) -> Color {
         match source {
             ColorSource::Constant(color) => Color::Constant(*color),
-            // All color roles use textures in the same way.
+            // Textures are used in the same way for all color roles.
             ColorSource::Texture(index) => Color::Texture(self.texture(*index, TextureRole::Facets)),
         }
     }
 
-    /// A scalar parameter. If the scene names no channel of its texture, the texture's luminance.
+    /// Scalar parameter. Uses the texture's luminance if the scene does not specify a channel.
     fn number(self, source: &NumberSource, role: fn(PixelValue) -> TextureRole) -> Number {
         match (source.constant(), source.texture(PixelValue::Luminance)) {
             (Some(number), _) => Number::Constant(number),
@@ -362,7 +363,8 @@ impl Declared<'_> {
     }
 }
 
-/// A texture of a mesh file. `None` if its image was not loaded, either because it is not needed or because it could not be read.
+/// Texture from a mesh file. `None` if the image was not loaded, either because it is not needed or because
+/// it could not be read.
 fn file_texture(images: &Images, texture: &FileTexture, used: TextureUse) -> Option<Arc<Texture>> {
     let texels = images.get(&file_source(texture, used))?.texels.clone();
     let (base, gain) = texture.range;
@@ -383,7 +385,8 @@ fn file_texture(images: &Images, texture: &FileTexture, used: TextureUse) -> Opt
     }))
 }
 
-/// The loaded image. Materials without objects may refer to images that were not loaded; those are never looked up.
+/// Loaded image. Materials without objects may refer to images that were not loaded, which are never looked
+/// up.
 fn image(images: &Images, source: &TextureSource) -> Image {
     images.get(source).cloned().unwrap_or_else(|| {
         let data = TexelData::Linear8(vec![[128, 128, 255]]);

@@ -1,9 +1,9 @@
-//! Small meshes merged into one tree: a ray that passes many of them traverses one tree instead of one each. If there are few
-//! triangles in total, packets test them as [`TriangleList`], without a tree.
+//! Small meshes merged into one tree, so that a ray that passes many of them traverses only one tree. If
+//! there are few triangles in total, packets test them using a [`TriangleList`] without a tree.
 //!
-//! Triangles are transformed to world coordinates and rounded there. [`contact`](super::contact) and
-//! [`Geometry::visit_nodes`](super::Geometry::visit_nodes) use the per-mesh trees. Hits on untransformed instances are bit-identical to
-//! unmerged ones.
+//! Triangles are transformed to world coordinates and rounded. [`contact`](super::contact) and
+//! [`Geometry::visit_nodes`](super::Geometry::visit_nodes) use the per-mesh trees. Hits on untransformed
+//! instances are bit-identical to those on unmerged meshes.
 
 use super::triangle_tree::TriangleTree;
 use super::{MeshInstance, Object};
@@ -15,26 +15,27 @@ use crate::geometry::{Aabb, Ray, ShapeHit};
 use crate::math::Vec3;
 use crate::math::lanes::{Simd, TRUE};
 
-/// Maximum triangle count of a merged mesh. A larger mesh is worth its own tree, which need not be rebuilt when it moves.
+/// Maximum triangle count of a merged mesh. For a larger mesh, a separate tree is worthwhile because it does
+/// not need to be rebuilt when the mesh moves.
 const MAX_PER_MESH: usize = 1 << 14;
 
-/// Maximum triangle count of all merged meshes; building a tree of this size takes about 10 ms.
+/// Maximum total triangle count of merged meshes. Building a tree of this size takes about 10 ms.
 const MAX_TOTAL: usize = 1 << 17;
 
-/// Maximum triangle count for packets to test all triangles without a tree.
+/// Maximum triangle count at which packets test all triangles without a tree.
 const MAX_FACETS: usize = triangle_list::MOST;
 
-/// Minimum triangle count worth merging; below it, testing mesh by mesh is as fast.
+/// Minimum triangle count for merging. Below it, testing each mesh separately is as fast.
 const MIN_FACETS: usize = 8;
 
-/// Maximum coordinate of a merged mesh, relative to its size; farther out, rounding would distort it.
+/// Maximum coordinate of a merged mesh, relative to its size. Beyond this, rounding would distort the mesh.
 const MAX_RELATIVE_COORDINATE: f32 = 1024.0;
 
-/// Maximum size of a transformed mesh, relative to the scene's smallest object; the rounded corners of a larger one would move it by more
-/// than 1/256 of that object.
+/// Maximum size of a transformed mesh, relative to the scene's smallest object. Rounding of a larger mesh
+/// would move corners by more than 1/256 of the smallest object's size.
 const MAX_RELATIVE_SIZE: f32 = (1 << 17) as f32;
 
-/// Identifies a triangle of the merged tree in its object.
+/// Identifies the object and primitive of a triangle in the merged tree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MergedTriangle {
     /// Object id.
@@ -47,11 +48,11 @@ pub struct MergedTriangle {
 #[derive(Debug)]
 pub struct MergedMeshes {
     tree: TriangleTree,
-    /// Triangles for packets to test without the tree. `None` if there are too many.
+    /// Triangles that packets test without the tree. `None` if there are too many.
     facets: Option<TriangleList>,
     /// Triangles sorted by object, so that at equal distances the lowest object id wins.
     triangles: Vec<MergedTriangle>,
-    /// Index of each object's first triangle; [`MergedMeshes::NOT_HERE`] if the object is not merged.
+    /// Index of each object's first triangle, or [`MergedMeshes::NOT_HERE`] if the object is not merged.
     first: Vec<u32>,
 }
 
@@ -64,7 +65,7 @@ impl MergedMeshes {
     /// # Errors
     /// [`Cancelled`].
     pub fn of_objects(objects: &mut [Object], token: &CancelToken) -> Result<Option<Self>, Cancelled> {
-        // Choose the smallest meshes first, within the budget of triangles to rebuild after each edit.
+        // Choose the smallest meshes first, up to the maximum number of triangles to rebuild after each edit.
         let count = |object: &Object| object.mesh().map_or(0, MeshInstance::triangle_count);
         let least = least_size(objects);
         let mut chosen: Vec<usize> =
@@ -83,7 +84,7 @@ impl MergedMeshes {
         if total < MIN_FACETS || chosen.len() < 2 && total > MAX_FACETS {
             return Ok(None);
         }
-        // Few triangles are worth merging only if packets can test them without a tree.
+        // A small number of triangles is worth merging only if packets can test them without a tree.
         let rounded = |&id: &usize| {
             let mesh = objects[id].mesh();
             mesh.into_iter()
@@ -136,20 +137,20 @@ impl MergedMeshes {
         self.first.get(object as usize).is_some_and(|&first| first != Self::NOT_HERE)
     }
 
-    /// The triangle with a number in the tree.
+    /// Triangle with this number in the tree.
     #[inline(always)]
     pub fn triangle(&self, number: u32) -> MergedTriangle {
         self.triangles[number as usize]
     }
 
-    /// Number of an object's triangle in the tree. `None` if the object is not merged.
+    /// Number of an object's triangle in the tree, or `None` if the object is not merged.
     #[inline(always)]
     pub fn number(&self, object: u32, primitive: u32) -> Option<u32> {
         let first = self.first.get(object as usize).copied().filter(|&first| first != Self::NOT_HERE)?;
         Some(first + primitive)
     }
 
-    /// The nearest hit; its primitive is a triangle number of the tree.
+    /// Returns the nearest hit. The hit's primitive is a triangle number in the tree.
     pub fn closest(&self, ray: &Ray) -> Option<ShapeHit> {
         self.tree.closest(ray)
     }
@@ -159,11 +160,11 @@ impl MergedMeshes {
         self.tree.any(ray, except)
     }
 
-    /// A number that no triangle has.
+    /// Invalid triangle number.
     pub const NO_TRIANGLE: u32 = u32::MAX;
 
-    /// Finds the nearest hits of the rays in `met`; primitives are triangle numbers of the tree. Other lanes have negative
-    /// `ends`.
+    /// Finds the nearest hits of the rays in `met`. Primitives are triangle numbers in the tree. Other lanes
+    /// have negative `ends`.
     #[inline(never)]
     pub fn closest_rows(
         &self,
@@ -203,8 +204,8 @@ impl MergedMeshes {
         }
     }
 
-    /// Returns the mask of rays in `met` that hit any triangle other than the one they ignore: each lane's entry in `except`, or
-    /// [`MergedMeshes::NO_TRIANGLE`].
+    /// Returns the mask of rays in `met` that hit any triangle other than the lane's entry in `except`, which
+    /// may be [`MergedMeshes::NO_TRIANGLE`].
     #[inline(never)]
     pub fn any_rows(
         &self,
@@ -223,7 +224,7 @@ impl MergedMeshes {
         }
     }
 
-    /// Traces the rays in `these` one by one; see [`MergedMeshes::any_rows`].
+    /// Traces the rays in `these` one by one. See [`MergedMeshes::any_rows`].
     #[cold]
     #[inline(never)]
     fn any_of_each(&self, rows: &RayPacket, these: u32, ends: &F32x16, except: &[u32; PACKET_SIZE]) -> u32 {
@@ -248,15 +249,15 @@ impl MergedMeshes {
         self.tree.any_packet(&rays, ends, &own)
     }
 
-    /// Bytes of the tree and its tables.
+    /// Memory use of the tree and its tables in bytes.
     pub fn memory_bytes(&self) -> usize {
         let facets = self.facets.as_ref().map_or(0, TriangleList::memory_bytes);
         self.tree.memory_bytes() + facets + size_of_val(&*self.triangles) + size_of_val(&*self.first)
     }
 }
 
-/// Whether the rays in `met` start close together, relative to `size`, and have similar directions. Such rays are faster with the
-/// tree than without.
+/// Whether the rays in `met` start close together, relative to `size`, and have similar directions. These
+/// rays are faster with the tree than without.
 #[inline(always)]
 fn are_coherent(rows: &RayPacket, met: u32, size: Vec3, simd: impl Simd) -> bool {
     let first = met.trailing_zeros() as usize % PACKET_SIZE;
@@ -274,11 +275,12 @@ fn are_coherent(rows: &RayPacket, met: u32, size: Vec3, simd: impl Simd) -> bool
     simd.movemask(&differs) & met == 0
 }
 
-/// Coherence threshold: maximum distance of ray origins relative to the size of all triangles, and of directions relative to
-/// their length.
+/// Coherence threshold: maximum difference of ray origins relative to the size of all triangles, and of
+/// directions relative to their length.
 const COHERENCE: f32 = 0.125;
 
-/// [`TriangleList::closest`] for rays that are not coherent. Returns the lanes that need an exact test, or `None` for coherent rays.
+/// Calls [`TriangleList::closest`] for incoherent rays. Returns the lanes that need an exact test, or `None`
+/// for coherent rays.
 struct ClosestFacet<'a> {
     facets: &'a TriangleList,
     size: Vec3,
@@ -301,8 +303,8 @@ impl SimdKernel for ClosestFacet<'_> {
     }
 }
 
-/// [`TriangleList::any`] for rays that are not coherent. Returns the hit lanes and those that need an exact test, or `None` for
-/// coherent rays.
+/// Calls [`TriangleList::any`] for incoherent rays. Returns the hit lanes and the lanes that need an exact
+/// test, or `None` for coherent rays.
 struct AnyFacet<'a> {
     facets: &'a TriangleList,
     size: Vec3,
@@ -325,7 +327,8 @@ impl SimdKernel for AnyFacet<'_> {
     }
 }
 
-/// The rays of a packet. Lanes outside `met` get a copy of the first ray in `met`, whose direction is likely similar.
+/// Returns the rays of a packet. Lanes outside `met` contain a copy of the first ray in `met`, whose
+/// direction is likely similar.
 #[inline]
 fn rays(rows: &RayPacket, met: u32) -> [Ray; PACKET_SIZE] {
     let mut rays = [rows.ray(met.trailing_zeros() as usize % PACKET_SIZE); PACKET_SIZE];
@@ -335,15 +338,15 @@ fn rays(rows: &RayPacket, met: u32) -> [Ray; PACKET_SIZE] {
     rays
 }
 
-/// Whether an object is a mesh small enough to merge, with world coordinates that `f32` represents well.
-/// Size of the smallest finite object; infinite if there is none.
+/// Size of the smallest finite object, or infinity if there is none.
 fn least_size(objects: &[Object]) -> f32 {
     let bounds = objects.iter().filter_map(Object::bounds).filter(|bounds| !bounds.is_empty());
     let sizes = bounds.map(|bounds| bounds.extent().max_element());
     sizes.filter(|size| *size > 0.0).fold(f32::INFINITY, f32::min)
 }
 
-/// Whether an object is a mesh to merge, in a scene whose smallest object has the size `least`.
+/// Whether an object is a mesh that is small enough to merge and whose world coordinates `f32` represents
+/// well. `least` is the size of the scene's smallest object.
 fn may_be_merged(object: &Object, least: f32) -> bool {
     let Some(mesh) = object.mesh() else { return false };
     let Some(bounds) = object.bounds().filter(|bounds| !bounds.is_empty()) else { return false };
@@ -410,7 +413,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn a_huge_moved_mesh_keeps_its_plane() {
+    fn large_transformed_meshes_are_not_distorted() {
         let corners = [Vec3::new(-1e7, 0.0, 1e7), Vec3::new(1e7, 0.0, 1e7), Vec3::new(0.0, 0.0, -1e7)];
         let ground =
             TriangleMesh { positions: corners.to_vec(), triangles: vec![[0, 1, 2]], ..Default::default() };
@@ -434,9 +437,9 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn merged_hits_equal_unmerged_hits() {
+    fn merged_and_unmerged_hits_are_equal() {
         let trees = [mesh(1, 30), mesh(2, 50), mesh(3, 7)];
-        // The second mesh occurs twice in the same place; the lower object id wins.
+        // The second mesh occurs twice in the same place, so the lower object id wins.
         let of: Vec<_> = [0, 1, 1, 2].iter().map(|&i| (&trees[i], Transform::IDENTITY)).collect();
         let geometry = geometry(objects(&of));
         let alone = objects(&of);
@@ -449,7 +452,7 @@ pub(super) mod tests {
             let expected = each.min_by(|a, b| a.shape.t.total_cmp(&b.shape.t).then(a.object.cmp(&b.object)));
             let found = geometry.closest(&ray);
             assert_eq!(found, expected, "{ray:?}");
-            // Ignoring the hit triangle yields a hit on another one.
+            // Ignoring the hit triangle results in a hit on another triangle.
             if let Some(hit) = found {
                 let next = geometry.closest(&ray.leaving(geometry.triangle_number(&hit)));
                 let is_own =
@@ -481,7 +484,7 @@ pub(super) mod tests {
         assert!(hits > 900 && blocked > 2000, "{hits} hits, {blocked} blocked");
     }
 
-    /// Large triangles around the origin, of which only a small part is near it.
+    /// Large triangles, each with a small part near the origin.
     fn fans() -> Arc<MeshTree> {
         let mut next = random(7);
         let mut vector = |scale: f32| Vec3::new(next(), next(), next()) * scale;
@@ -526,7 +529,7 @@ pub(super) mod tests {
             }
         }
         assert!(started > 5000, "{started} rays");
-        assert_eq!(again, 0, "of {started} rays hit the triangle that they left");
+        assert_eq!(again, 0, "of {started} rays hit the triangle they started on");
     }
 
     #[test]
@@ -542,7 +545,7 @@ pub(super) mod tests {
         assert_eq!(members(&[(&small, here), (&few, here)]), Some(vec![0, 1]));
         assert_eq!(members(&[(&small, here), (&few, far), (&few, here)]), Some(vec![0, 2]));
         assert_eq!(members(&[(&small, here)]), None, "alone");
-        // A few triangles are merged without a tree if there are enough of them and none is a sliver.
+        // A few triangles are merged without a tree if there are enough of them and there are no slivers.
         assert_eq!(members(&[(&few, here), (&few, here)]), Some(vec![0, 1]));
         assert_eq!(members(&[(&few, here)]), Some(vec![0]));
         let (least, needles) = (mesh(5, 3), mesh(6, 8));
@@ -551,7 +554,7 @@ pub(super) mod tests {
         assert_eq!(members(&[(&needles, flat), (&few, here)]), None, "slivers");
         let large = mesh(3, 14_000);
         assert_eq!(members(&[(&large, here), (&small, here), (&few, here)]), Some(vec![1, 2]));
-        // The smallest are merged until the budget is used up.
+        // The smallest meshes are merged up to the triangle limit.
         let half = mesh(4, 13_000);
         let many: Vec<_> = (0..12).map(|i| (if i == 0 { &few } else { &half }, here)).collect();
         assert_eq!(members(&many), Some((0..9).collect()));

@@ -22,9 +22,10 @@ pub struct MeshInstance {
     pub transform: Transform,
     /// Whether vertex normals are interpolated.
     pub smooth: bool,
-    /// Whether rays find its triangles in the tree of [`MergedMeshes`](super::MergedMeshes), in world coordinates.
+    /// Whether the mesh is included in the tree of [`MergedMeshes`](super::MergedMeshes), in world
+    /// coordinates.
     pub(super) is_merged: bool,
-    /// Scene-wide number of its first triangle. `None` if the scene has more triangles than `u32` can count.
+    /// Scene-wide number of the mesh's first triangle. `None` if the scene has too many triangles for `u32`.
     pub(super) first: Option<u32>,
     /// Whether the transform is not the identity.
     pub(super) is_transformed: bool,
@@ -33,14 +34,14 @@ pub struct MeshInstance {
 }
 
 impl MeshInstance {
-    /// Creates an instance with a tree of its own (not merged).
+    /// Creates an unmerged instance, with a separate tree.
     pub fn new(tree: Arc<MeshTree>, transform: Transform, smooth: bool) -> Self {
         let edge_margin = EDGE_MARGIN * transform.max_inverse_stretch();
         let is_transformed = transform != Transform::IDENTITY;
         Self { tree, transform, smooth, is_merged: false, first: None, is_transformed, edge_margin }
     }
 
-    /// Transforms a ray to mesh coordinates; t stays the same.
+    /// Transforms a ray to mesh coordinates without changing t.
     pub(super) fn local_ray(&self, ray: &Ray) -> Ray {
         let start = self.own_number(ray.start);
         if self.is_transformed { self.moved(ray).leaving(start) } else { ray.leaving(start) }
@@ -55,13 +56,13 @@ impl MeshInstance {
         }
     }
 
-    /// The scene-wide number of a triangle; see [`Geometry::triangle_number`](super::Geometry::triangle_number).
+    /// Scene-wide number of a triangle; see [`Geometry::triangle_number`](super::Geometry::triangle_number).
     #[inline(always)]
     pub(super) fn scene_number(&self, triangle: u32) -> u32 {
         self.first.map_or(Ray::NO_TRIANGLE, |first| first + triangle)
     }
 
-    /// Like `scene_number`, for a packet; lanes without a triangle get arbitrary numbers.
+    /// Like `scene_number`, for a packet. Lanes without a triangle contain arbitrary numbers.
     #[inline(always)]
     pub fn scene_numbers(&self, triangles: &[u32; PACKET_SIZE]) -> [u32; PACKET_SIZE] {
         let Some(first) = self.first else { return [Ray::NO_TRIANGLE; PACKET_SIZE] };
@@ -103,7 +104,7 @@ impl MeshInstance {
         self.tree.loaded().mesh.triangles.len()
     }
 
-    /// Whether the corners in world coordinates differ from those of the mesh.
+    /// Whether world coordinates differ from mesh coordinates.
     pub(super) fn is_transformed(&self) -> bool {
         self.is_transformed
     }
@@ -117,7 +118,7 @@ impl MeshInstance {
         corners.map(|corner| self.transform.point(corner.as_dvec3()).as_vec3())
     }
 
-    /// Vertex UVs of a set; falls back to the first set if there is no second.
+    /// Vertex UVs of a set. Falls back to the first set if there is no second set.
     #[inline(always)]
     pub(super) fn uvs(&self, set: UvSet) -> &[Vec2] {
         let mesh = &self.tree.loaded().mesh;
@@ -132,7 +133,7 @@ impl MeshInstance {
         self.ordered(triangle, self.uvs(UvSet::First)).unwrap_or([Vec2::ZERO, Vec2::X, Vec2::Y])
     }
 
-    /// Second-set UVs of a triangle's corners. `None` without a second set.
+    /// UVs of a triangle's corners in the second UV set. `None` without a second set.
     pub fn second_corner_uvs(&self, triangle: u32) -> Option<[Vec2; 3]> {
         self.ordered(triangle, &self.tree.loaded().mesh.second_uvs)
     }
@@ -145,7 +146,7 @@ impl MeshInstance {
         Some(if self.transform.flips_handedness() { [a, c, b] } else { [a, b, c] })
     }
 
-    /// UV and tangents at a hit in the second UV set. `None` without one.
+    /// UV and tangents at a hit in the second UV set. `None` without a second set.
     pub(super) fn second_parameterization(&self, hit: &ShapeHit) -> Option<(Vec2, [Vec3; 2])> {
         let mesh = &self.tree.loaded().mesh;
         if mesh.second_uvs.is_empty() {
@@ -158,8 +159,8 @@ impl MeshInstance {
         Some((uv, [dpdu, dpdv]))
     }
 
-    /// Mean curvature of the surface that a triangle approximates, from its vertex normals (Akenine-Möller et al. 2021, section
-    /// 4). Positive where the surface is convex on its front side.
+    /// Mean curvature of the surface approximated by a triangle, estimated from the vertex normals
+    /// (Akenine-Möller et al. 2021, section 4). Positive if the surface is convex on its front side.
     pub(super) fn curvature(&self, triangle: u32, normal: Vec3) -> f32 {
         if !self.smooth {
             return 0.0;
@@ -178,7 +179,7 @@ impl MeshInstance {
         ((along(0) + along(1) + along(2)) / 3.0) as f32
     }
 
-    /// This mesh with `placement`, which must represent its transform.
+    /// Combines this mesh with `placement`, which must represent the mesh's transform.
     #[inline(always)]
     pub(super) fn placed<P>(&self, placement: P) -> PlacedMesh<P> {
         PlacedMesh {
@@ -238,7 +239,7 @@ impl MeshInstance {
         }
     }
 
-    /// UV and its tangents; barycentric coordinates serve as UVs if the mesh has none.
+    /// UV and tangents. Uses barycentric coordinates if the mesh has no UVs.
     fn parameterization(
         &self,
         uvs: &[Vec2],
@@ -274,8 +275,8 @@ impl MeshInstance {
         }
     }
 
-    /// Returns the mask of rays in `met` that hit any triangle other than the one they ignore (see `except` in
-    /// [`Object::any_rows`](super::Object::any_rows)).
+    /// Returns the mask of rays in `met` that hit any triangle other than the ignored triangle (see `except`
+    /// in [`Object::any_rows`](super::Object::any_rows)).
     #[inline(never)]
     pub(super) fn any_rows(
         &self,
@@ -291,8 +292,8 @@ impl MeshInstance {
         self.tree.triangles().any_packet(&local, ends, &parts)
     }
 
-    /// Transforms the rays in `met` to mesh coordinates. Other lanes get a copy of the first such ray, whose direction is likely
-    /// similar.
+    /// Transforms the rays in `met` to mesh coordinates. Other lanes contain a copy of the first ray in
+    /// `met`, whose direction is likely similar.
     #[inline]
     fn local_rays(&self, rows: &RayPacket, met: u32) -> [Ray; PACKET_SIZE] {
         let local = |lane: usize| {

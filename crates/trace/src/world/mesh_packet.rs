@@ -1,4 +1,4 @@
-//! Surface attributes of a mesh for all hits of a packet.
+//! Surface attributes of a mesh for all hits in a packet.
 
 use super::MeshInstance;
 use super::placement::{IdentityPlacement, MeshPlacement};
@@ -11,7 +11,8 @@ use crate::math::lanes::{Simd, TRUE, Vec3x16, lane, set_lane};
 use crate::math::{Vec2, Vec3};
 
 impl MeshInstance {
-    /// Computes the surfaces of the hits in `of`, which must all be on this instance, with UVs of the requested set if any.
+    /// Computes the surfaces at the hits in `of`, which must all be on this instance. Includes UVs if a set
+    /// is requested.
     #[inline(always)]
     pub fn fill_surfaces(
         &self,
@@ -41,7 +42,7 @@ impl MeshInstance {
         simd: impl Simd,
     ) {
         let mesh = &self.tree.loaded().mesh;
-        // Other lanes get a copy of some triangle; their results are discarded.
+        // Other lanes contain a copy of an arbitrary triangle, and their results are discarded.
         let filler = hits.primitive[of.trailing_zeros() as usize % PACKET_SIZE];
         let mut vertices = [[0; 3]; PACKET_SIZE];
         for i in 0..PACKET_SIZE {
@@ -58,7 +59,7 @@ impl MeshInstance {
             set_lane(&mut found.normal, i, facet.normal);
             doubtful[i] = if facet.is_doubtful() { TRUE } else { 0 };
         }
-        // Hits near an edge or in a huge triangle are rare: handle them one by one.
+        // Hits near an edge or in a huge triangle are rare, so handle them one by one.
         let doubtful = simd.movemask(&doubtful) & of;
         for i in lanes(doubtful) {
             let uv = [hits.u[i], hits.v[i]];
@@ -159,7 +160,7 @@ mod tests {
         }
     }
 
-    /// Triangles of all sizes with random normals, one of them zero.
+    /// Triangles of all sizes with random normals, including a zero normal.
     fn meshes() -> Vec<MeshInstance> {
         let mut next = random(5);
         let mut vector = || Vec3::new(next(), next(), next());
@@ -203,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn points_of_huge_triangles_are_on_their_rays() {
+    fn points_on_huge_triangles_are_on_the_rays() {
         for size in [1e5_f32, 1e7, 1e9] {
             let at = |x: f32, z: f32| Vec3::new(x * size, 0.0, z * size);
             let mesh = TriangleMesh {
@@ -221,7 +222,7 @@ mod tests {
                 (MeshInstance::new(tree, turned, true), 0.25),
             ] {
                 let mut next = random(3);
-                // Let every other ray start above the edge that the two triangles share.
+                // Start every other ray above the edge shared by the two triangles.
                 let ray = |i: usize| {
                     let [x, z] = if i.is_multiple_of(2) { [0.5, 0.5] } else { [next(), next()] };
                     Ray::new(Vec3::new(x, 1.0 + height, z), Vec3::new(next() * 0.5, -1.0, next() * 0.5))
@@ -251,7 +252,7 @@ mod tests {
     }
 
     #[test]
-    fn packet_surfaces_equal_single_surfaces() {
+    fn packet_surfaces_match_single_surfaces() {
         let mut next = random(9);
         let number = |x: f32| (x * 0.5 + 0.5).clamp(0.0, 0.999);
         for mesh in meshes() {

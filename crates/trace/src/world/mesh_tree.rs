@@ -1,4 +1,4 @@
-//! The acceleration structure of one mesh file, shared by all its instances.
+//! The acceleration structure of a mesh file, shared by all its instances.
 
 use std::sync::{Arc, OnceLock};
 
@@ -34,7 +34,7 @@ impl MeshTree {
         &self.loaded
     }
 
-    /// The tree over the triangles, in the mesh's coordinates.
+    /// The tree over the triangles, in mesh coordinates.
     pub fn triangles(&self) -> &TriangleTree {
         &self.tree
     }
@@ -49,7 +49,8 @@ impl MeshTree {
         self.tree.bounds()
     }
 
-    /// Vertex normals from the file, or computed ones; immediate after [`MeshTree::prepare_normals`].
+    /// Vertex normals from the file, or computed normals. Returns immediately after
+    /// [`MeshTree::prepare_normals`].
     pub fn normals(&self) -> &[Vec3] {
         if !self.loaded.mesh.normals.is_empty() {
             return &self.loaded.mesh.normals;
@@ -62,13 +63,13 @@ impl MeshTree {
     /// Computes vertex normals if the file has none.
     pub fn prepare_normals(&self, token: &CancelToken) -> Result<(), Cancelled> {
         if self.loaded.mesh.normals.is_empty() && self.computed_normals.get().is_none() {
-            // If another thread was faster, its result is identical.
+            // If another thread finishes first, its result is identical.
             let _ = self.computed_normals.set(vertex_normals(&self.loaded.mesh, token)?);
         }
         Ok(())
     }
 
-    /// Bytes of the tree, including its copy of the triangles.
+    /// Memory use of the tree in bytes, including its copy of the triangles.
     pub fn memory_bytes(&self) -> usize {
         self.tree.memory_bytes()
     }

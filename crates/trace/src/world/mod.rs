@@ -1,4 +1,4 @@
-//! The traceable world: geometry, materials, lights and camera, immutable and shared through `Arc`.
+//! The traceable world: geometry, materials, lights and camera. It is immutable and shared through `Arc`.
 
 mod assemble;
 mod box_query;
@@ -61,7 +61,7 @@ use crate::materials::{Footprint, Material, Mipmaps, SecondUvPoint, TexturePoint
 use crate::math::Vec3;
 use crate::scene::description;
 
-/// The decoded images of a scene, by source.
+/// Decoded images of a scene, indexed by source.
 pub type Images = HashMap<TextureSource, Image>;
 
 /// A decoded image.
@@ -69,7 +69,7 @@ pub type Images = HashMap<TextureSource, Image>;
 pub struct Image {
     /// The full-resolution pixels.
     pub texels: Arc<Texels>,
-    /// Its mip levels. `None` if no texture needs them.
+    /// Mip levels. `None` if no texture needs them.
     pub mipmaps: Option<Arc<Mipmaps>>,
 }
 
@@ -84,7 +84,7 @@ pub struct WorldInputs {
     pub orbiter: Option<OrbiterCamera>,
     /// Replaces the scene's camera.
     pub camera: Option<description::Camera>,
-    /// The glass solids, if already known.
+    /// Glass solids, if already known.
     pub glass_solids: Option<Arc<GlassSolids>>,
 }
 
@@ -95,11 +95,11 @@ pub struct World {
     pub camera: Camera,
     /// All objects and their acceleration structures.
     pub geometry: Arc<Geometry>,
-    /// Materials, indexed by the objects.
+    /// Materials, referenced by index from the objects.
     pub materials: Vec<Material>,
     /// Packet-shading data of each material. `None` for materials that are not plain.
     packet_material: Box<[Option<PacketMaterial>]>,
-    /// Whether any material's lobes depend on the directions of the texture axes.
+    /// Whether any material's lobes depend on the texture axes.
     has_directions: bool,
     /// [`Material::is_textured`] of each material.
     textured: Box<[bool]>,
@@ -115,12 +115,11 @@ pub struct World {
     has_glass: bool,
     /// Whether any glass surface is rough.
     has_rough_glass: bool,
-    /// For each object that represents a glass solid, whether that solid is closed and contains no light. Empty without rough
-    /// glass.
+    /// Whether each object represents a closed glass solid that contains no light. Empty without rough glass.
     unlit_glass: Box<[bool]>,
-    /// Closed glass shapes that may contain points of the lens, with their materials.
+    /// Closed glass shapes that may contain points on the lens, with their materials.
     lens_glass: Vec<(u32, u32)>,
-    /// The glass shapes that count in each subtree of nested objects. Empty if few objects are nested.
+    /// Relevant enclosing glass shapes in each subtree of nested objects. Empty if few objects are nested.
     enclosing_glass: Box<[contact::EnclosingGlass]>,
     /// Other glass solids that contain the camera, with their materials.
     camera_solids: Vec<(u32, u32)>,
@@ -128,9 +127,9 @@ pub struct World {
     mipmapped: Box<[bool]>,
     /// Whether any texture uses a mesh's second UV set.
     has_second_uvs: bool,
-    /// Whether each object's vertex colors are used. `None` if no object's are.
+    /// Whether each object's vertex colors are used. `None` if they are not used for any object.
     colored: Option<Box<[bool]>>,
-    /// Objects that light may pass undeflected. `None` if there are none.
+    /// Objects that light may pass through without changing direction. `None` if there are none.
     see_through: Option<Box<null_interaction::SeeThrough>>,
 }
 
@@ -143,7 +142,7 @@ enum ObjectMaterial {
     OfFile {
         /// Index of the file's first material in [`World::materials`].
         first: u32,
-        /// Material of triangles without one in the file.
+        /// Material of triangles without a material in the file.
         fallback: u32,
     },
 }
@@ -160,7 +159,7 @@ impl World {
         }
     }
 
-    /// Name of the hit triangle's material in its mesh file. `None` if the file assigns none.
+    /// Name of the hit triangle's material in the mesh file. `None` if the file does not assign a material.
     pub fn file_material_name(&self, hit: &Hit) -> Option<&str> {
         let own = self.geometry.file_material(hit.object, hit.shape.primitive)?;
         let mesh = self.geometry.objects()[hit.object as usize].mesh()?;
@@ -179,7 +178,8 @@ impl World {
         self.materials[first as usize..][..count].iter().chain(self.materials.get(one as usize))
     }
 
-    /// Material indices for the lanes in `of`, which all hit `object`. Other lanes get arbitrary valid indices.
+    /// Material indices for the lanes in `of`, which all hit `object`. Other lanes contain arbitrary valid
+    /// indices.
     #[inline(always)]
     pub fn packet_materials(
         &self,
@@ -224,7 +224,7 @@ impl World {
         self.is_colored(hit.object).then(|| self.geometry.vertex_color(hit)).flatten()
     }
 
-    /// Texture coordinates at a hit, with the footprint that `footprint` derives from the tangents.
+    /// Texture coordinates at a hit, with a footprint computed from the tangents by `footprint`.
     #[inline]
     pub fn texture_point(
         &self,
@@ -236,7 +236,7 @@ impl World {
         TexturePoint { uv: surface.uv, footprint: footprint([surface.dpdu, surface.dpdv]), second }
     }
 
-    /// The second UV set's part of [`World::texture_point`]. `None` if the mesh has no second set.
+    /// Part of [`World::texture_point`] for the second UV set. `None` if the mesh has no second set.
     #[cold]
     #[inline(never)]
     fn second_point(
@@ -248,7 +248,8 @@ impl World {
         Some(Box::new(SecondUvPoint { uv: uv.as_dvec2(), footprint: footprint(tangents), tangents }))
     }
 
-    /// Whether an object's texture axes are well defined or irrelevant: it has UVs, or no lobe depends on their directions.
+    /// Whether an object's texture axes are well defined or irrelevant: the object has UVs, or no lobes
+    /// depend on the axes.
     #[inline]
     pub fn has_texture_axes(&self, object: u32) -> bool {
         if !self.has_directions {
@@ -274,17 +275,17 @@ impl World {
         self.mipmapped.contains(&true)
     }
 
-    /// Total number of triangles, with every mesh instance counted in full.
+    /// Total number of triangles, including those of every mesh instance.
     pub fn triangle_count(&self) -> u64 {
         self.geometry.objects().iter().map(Object::triangle_count).sum()
     }
 
-    /// Number of objects; a mesh instance counts as one.
+    /// Number of objects. A mesh instance counts as one object.
     pub fn object_count(&self) -> u64 {
         self.geometry.objects().len() as u64
     }
 
-    /// Bytes of all acceleration structures; shared ones count once.
+    /// Memory use of all acceleration structures in bytes. Shared structures are counted once.
     pub fn accel_memory_bytes(&self) -> usize {
         self.geometry.memory_bytes()
     }

@@ -1,7 +1,9 @@
-//! Null interactions along shadow rays: thin panes and partial opacity let light through undeflected.
+//! Null interactions along shadow rays: light passes through thin panes and partially opaque surfaces without
+//! changing direction.
 //!
-//! Shadow rays are first tested against opaque objects only, as in a scene without such surfaces. Only unoccluded rays that enter
-//! the box of a see-through object are then followed from surface to surface.
+//! Shadow rays are first tested against opaque objects only, as in a scene without see-through surfaces. Only
+//! unoccluded rays that enter the bounding box of a see-through object are then traced from surface to
+//! surface.
 
 use super::packet::Occluders;
 use super::{Geometry, Hit, PACKET_SIZE, SimdKernel, World};
@@ -17,15 +19,15 @@ use crate::math::lanes::{Simd, Vec3x16, set_lane};
 /// Relative tolerance for equal distances.
 const SAME_DISTANCE: f32 = 1e-4;
 
-/// Maximum number of null interactions per ray; a further one blocks it.
+/// Maximum number of null interactions per ray. Further interactions block the ray.
 pub const MAX_NULL_INTERACTIONS: u32 = 64;
 
-/// Objects that light may pass undeflected.
+/// Objects that light may pass through without changing direction.
 #[derive(Debug)]
 pub(super) struct SeeThrough {
     /// Whether each object is see-through.
     objects: Vec<bool>,
-    /// Whether any of them is in the tree of merged meshes.
+    /// Whether any see-through object is in the tree of merged meshes.
     is_any_merged: bool,
 }
 
@@ -42,7 +44,8 @@ impl SeeThrough {
         objects.contains(&true).then_some(Self { objects, is_any_merged })
     }
 
-    /// Whether light may pass an object undeflected. The id of the merged meshes is out of range and returns false.
+    /// Whether light may pass through an object without changing direction. False for the id of the merged
+    /// meshes, which is out of range.
     #[inline(always)]
     fn has(&self, object: u32) -> bool {
         self.objects.get(object as usize).copied().unwrap_or(false)
@@ -66,7 +69,8 @@ impl World {
         self.see_through.is_some()
     }
 
-    /// Transmittance along a packet of shadow rays, each with its light. `traced` is the mask of rays to trace.
+    /// Transmittance along a packet of shadow rays, each with a corresponding light. `traced` is the mask of
+    /// rays to trace.
     #[cold]
     #[inline(never)]
     pub fn transmittance_packet(
@@ -123,7 +127,7 @@ impl World {
     ) -> Vec3 {
         let (mut left, mut ray, mut count) = (Vec3::ONE, *ray, 0);
         let is_own = |object: u32| source == LightObject::Object(object);
-        // The sampled point may be at the end of the ray, within rounding.
+        // The sampled point may be at the end of the ray, up to rounding.
         let end = SAME_DISTANCE * ray.t_max;
         while let Some(hit) =
             self.geometry.closest_of(&ray, |object| see_through.has(object) && !is_own(object))
@@ -166,14 +170,14 @@ impl SimdKernel for TransmittanceKernel<'_> {
         let Self { world, rows, ends, traced, sources } = self;
         let mut transmittance = Transmittance { occluded: 0, left: [[1.0; PACKET_SIZE]; 3], lookups: 0 };
         let Some(see_through) = &world.see_through else { return transmittance };
-        // Find the rays that no opaque object blocks.
+        // Find the rays not blocked by opaque objects.
         let geometry: &Geometry = &world.geometry;
         let each_mesh = see_through.is_any_merged || traced & geometry.to_whole_merged(sources) != 0;
         let tree = if each_mesh { geometry.tree() } else { geometry.visited() };
         let occluders = Occluders::new(geometry, rows, sources, simd);
         let mut solid = OpaqueOccluders { occluders, see_through, near: 0 };
         transmittance.occluded = tree.any_packet(rows, ends, traced, geometry.unbounded(), &mut solid, simd);
-        // Follow the rays that may cross see-through surfaces.
+        // Trace the rays that may cross see-through surfaces.
         for lane in lanes(traced & !transmittance.occluded & solid.near) {
             let ray = Ray { t_max: ends[lane], ..rows.ray(lane) };
             let left = world.see_through_transmittance(
@@ -193,7 +197,7 @@ impl SimdKernel for TransmittanceKernel<'_> {
 struct OpaqueOccluders<'a, F> {
     occluders: Occluders<'a, F>,
     see_through: &'a SeeThrough,
-    /// Mask of rays that enter the box of a see-through object.
+    /// Mask of rays that enter the bounding box of a see-through object.
     near: u32,
 }
 

@@ -8,7 +8,7 @@ use crate::geometry::{Aabb, Ray, RayF64, Shape, ShapeHit, SurfacePoint, SurfaceR
 use crate::lights::{BoundingSphere, EmitterGeometry};
 use crate::math::lanes::Simd;
 
-/// An object that rays can hit.
+/// A traceable object.
 #[derive(Clone, Debug)]
 pub enum Object {
     /// A shape.
@@ -52,8 +52,8 @@ impl Object {
         }
     }
 
-    /// Returns the mask of rays in `met` that hit the object. Lanes outside `met` have negative `ends`. `except` is a lane mask
-    /// and, for each of its lanes, a primitive to ignore.
+    /// Returns the mask of rays in `met` that hit the object. Lanes outside `met` have negative `ends`.
+    /// `except` is a lane mask and the primitive to ignore in each of these lanes.
     #[inline(always)]
     pub fn any_rows(
         &self,
@@ -107,7 +107,7 @@ impl Object {
         Some(BoundingSphere { center: (min + max) * 0.5, radius: (max - min).length() * 0.5 })
     }
 
-    /// The outline used for lights that are objects.
+    /// Outline used for lights that are objects.
     pub(super) fn emitter_geometry(&self) -> EmitterGeometry {
         match self {
             Self::Shape(shape) => EmitterGeometry::Shape(*shape),

@@ -1,4 +1,4 @@
-//! Traces packets of up to 16 rays; each ray gets the same hit as without a packet.
+//! Traces packets of up to 16 rays. Each ray has the same hit as without a packet.
 
 use super::merged::MergedMeshes;
 use super::{Geometry, Hit};
@@ -9,14 +9,15 @@ use crate::lights::{LightObject, LightObjectPacket};
 use crate::math::lanes::{Simd, TRUE, select, select_u32};
 
 impl Geometry {
-    /// [`Geometry::closest`] for up to [`PACKET_SIZE`] rays; `hits` must have the same length as `rays`.
+    /// Like [`Geometry::closest`], for up to [`PACKET_SIZE`] rays. `hits` must have the same length as
+    /// `rays`.
     pub fn closest_packet(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
         debug_assert!(rays.len() <= PACKET_SIZE && rays.len() == hits.len());
         self.instructions().run(ClosestKernel { geometry: self, rays, hits });
     }
 
-    /// [`Geometry::closest_packet`] for callers inside a SIMD kernel: returns the hits and their objects. `traced` is the mask of
-    /// rays to trace.
+    /// Like [`Geometry::closest_packet`], for callers inside a SIMD kernel. Returns the hits and their
+    /// objects. `traced` is the mask of rays to trace.
     #[inline(always)]
     pub fn closest_rows(
         &self,
@@ -36,8 +37,8 @@ impl Geometry {
         (nearest.hits, nearest.object)
     }
 
-    /// [`Geometry::occluded`] for a packet of shadow rays: returns the mask of occluded rays. `traced` is the mask of rays to
-    /// trace. Must be called inside a SIMD kernel.
+    /// Like [`Geometry::occluded`], for a packet of shadow rays. Returns the mask of occluded rays. `traced`
+    /// is the mask of rays to trace. Must be called inside a SIMD kernel.
     #[inline(always)]
     pub fn occluded_rows(
         &self,
@@ -65,7 +66,7 @@ impl Geometry {
         (0..PACKET_SIZE).filter(|&lane| is_whole(lane)).fold(0, |bits, lane| bits | 1 << lane)
     }
 
-    /// [`Geometry::occluded`], ray by ray.
+    /// Calls [`Geometry::occluded`] for each ray.
     #[cold]
     #[inline(never)]
     fn occluded_by_each(
@@ -174,7 +175,7 @@ impl<F: Simd> ClosestTest for ClosestObject<'_, F> {
 fn renumber_by_object(merged: &MergedMeshes, found: &mut HitPacket) -> [u32; PACKET_SIZE] {
     let mut objects = [NONE; PACKET_SIZE];
     for lane in 0..PACKET_SIZE {
-        // Lanes without a hit look up triangle 0; the result is unused.
+        // Lanes without a hit look up triangle 0. The result is not used.
         let is_hit = !found.t[lane].is_nan();
         let of = merged.triangle(if is_hit { found.primitive[lane] } else { 0 });
         (objects[lane], found.primitive[lane]) = (of.object, of.primitive);
@@ -193,7 +194,7 @@ pub(super) struct Occluders<'a, F> {
 }
 
 impl<'a, F: Simd> Occluders<'a, F> {
-    /// Creates the test for a packet of shadow rays, each with its light.
+    /// Creates the test for a packet of shadow rays, each with a corresponding light.
     #[inline(always)]
     pub(super) fn new(
         geometry: &'a Geometry,
@@ -258,7 +259,7 @@ fn own_bits(sources: &LightObjectPacket, id: u32, simd: impl Simd) -> u32 {
     simd.movemask(&own)
 }
 
-/// Copies the ends of the rays in `met`; other lanes become negative.
+/// Copies the ends of the rays in `met`, and sets other lanes to negative values.
 #[inline(always)]
 fn ends_within(met: u32, ends: &F32x16) -> F32x16 {
     let mut own = [-1.0; PACKET_SIZE];
@@ -290,7 +291,8 @@ pub(super) mod tests {
     use crate::world::MeshTree;
     use crate::world::{MeshInstance, Object};
 
-    /// A grid of spheres, boxes and quads; four instances of a triangle fan, one of them untransformed; and a floor.
+    /// A grid of spheres, boxes and quads, four instances of a triangle fan (one of them untransformed), and
+    /// a floor.
     fn geometry(accel: Accel) -> Geometry {
         let mut mesh = TriangleMesh { positions: vec![Vec3::ZERO], ..TriangleMesh::default() };
         for i in 0..40_u32 {
@@ -322,7 +324,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn packet_hits_equal_single_ray_hits() {
+    fn packet_hits_match_single_ray_hits() {
         for accel in [Accel::Bvh, Accel::BvhHigh, Accel::KdTree] {
             for instructions in InstructionSet::ALL {
                 assert_packets(&geometry(accel).with(instructions));
@@ -359,7 +361,7 @@ pub(super) mod tests {
                 if i % 2 == 0 { Ray::segment(eye, to) } else { Ray::new(eye, to - eye) }
             };
             let mut rays: Vec<Ray> = (0..=i % PACKET_SIZE).map(|_| ray()).collect();
-            // Let some rays ignore the triangle that they would hit.
+            // Let some rays ignore the triangle they would hit.
             for ray in rays.iter_mut().step_by(4) {
                 let start = geometry.closest(ray).map_or(7, |hit| geometry.triangle_number(&hit));
                 *ray = ray.leaving(start);
@@ -383,6 +385,6 @@ pub(super) mod tests {
             hits += alone.iter().flatten().count();
             shadows += occluded.count_ones();
         }
-        assert!(hits > 5000 && shadows > 1000, "{hits} hits, {shadows} shadows: the rays see something");
+        assert!(hits > 5000 && shadows > 1000, "{hits} hits and {shadows} shadows, too few for the test");
     }
 }

@@ -1,4 +1,4 @@
-//! Plain materials: a whole packet is shaded without examining each hit.
+//! Plain materials, with which a whole packet is shaded without examining each hit.
 
 use super::World;
 use crate::materials::texture::Texture;
@@ -8,9 +8,9 @@ use crate::math::Vec3;
 /// Packet-shading data of a plain material.
 #[derive(Clone, Copy, Debug)]
 pub struct PacketMaterial {
-    /// Its BSDF kind.
+    /// Kind of BSDF.
     pub kind: RoughKind,
-    /// UV set of the one texture that packet shading looks up for the BSDF. `None` without a texture.
+    /// UV set of the BSDF texture looked up in packet shading. `None` without a texture.
     pub row_texture: Option<UvSet>,
     /// Ambient reflectance, if the BSDF is constant over the surface.
     pub ambient: Option<Vec3>,
@@ -21,8 +21,8 @@ pub struct PacketMaterial {
 }
 
 impl PacketMaterial {
-    /// Returns `None` if the material perturbs normals, has textured or coated emission, may be a null interaction, or has a BSDF
-    /// without a packet form.
+    /// Returns `None` if the material perturbs normals, has textured or coated emission, may be a null
+    /// interaction, or has a BSDF that does not support packets.
     pub(super) fn of(material: &Material) -> Option<Self> {
         let Material { bsdf, emission, normal_perturbation, opacity } = material;
         let is_even = emission.texture.is_none() && emission.coat.is_none();

@@ -1,4 +1,5 @@
-//! Tests every shape with packets on every instruction set: hits are bit-identical to those of single rays.
+//! Tests every shape with packets on every instruction set. Hits must be bit-identical to those of single
+//! rays.
 
 use super::*;
 use crate::accel::{InstructionSet, SimdKernel};
@@ -29,7 +30,8 @@ impl HostileRandom {
         Vec3::new(self.number(), self.number(), self.number())
     }
 
-    /// An adversarial number: corners, faces, zero, and sizes whose products overflow or underflow.
+    /// An adversarial coordinate: on corners or faces, zero, or of a size whose products overflow or
+    /// underflow.
     fn hostile(&mut self) -> f32 {
         const HOSTILE: [f32; 16] = [
             0.0, -0.0, 0.5, -0.5, 1.0, -1.0, 2.0, -3.0, 1e-45, -1e-40, 1e-20, 1e-7, 1e10, -1e19, 3e38, -3e38,
@@ -56,7 +58,7 @@ impl HostileRandom {
     }
 }
 
-/// Shapes of a given size: an axis-aligned and a tilted one of each kind.
+/// Shapes of a given size: an axis-aligned and a tilted shape of each kind.
 fn shapes(scale: f64) -> Vec<Object> {
     let (center, askew) = (DVec3::new(0.3, -0.2, 0.1) * scale, DVec3::new(0.3, -0.7, 0.5));
     let quad = |corner: DVec3, u: DVec3, v: DVec3| {
@@ -82,7 +84,7 @@ fn shapes(scale: f64) -> Vec<Object> {
     shapes.map(Object::Shape).to_vec()
 }
 
-/// Closest hits of a packet, and its any-hit masks with and without ignored primitives.
+/// Closest hits of a packet, and any-hit masks with and without ignored primitives.
 struct PacketHits<'a> {
     object: &'a Object,
     rays: &'a [Ray],
@@ -112,7 +114,7 @@ fn bits(hit: ShapeHit) -> [u32; 4] {
     [hit.t.to_bits(), hit.primitive, hit.u.to_bits(), hit.v.to_bits()]
 }
 
-/// Compares a packet with single rays; returns the number of hits.
+/// Compares a packet with single rays and returns the number of hits.
 fn assert_packet(object: &Object, rays: &[Ray], met: u32, except: (u32, &[u32; PACKET_SIZE])) -> usize {
     let met = met & ((1 << rays.len()) - 1);
     let alone = |lane: usize| {
@@ -138,7 +140,7 @@ fn assert_packet(object: &Object, rays: &[Ray], met: u32, except: (u32, &[u32; P
 }
 
 #[test]
-fn packet_hits_are_bit_identical_to_single_rays() {
+fn packet_and_single_hits_are_bit_identical() {
     let mut random = HostileRandom(11);
     for scale in [1.0_f32, 1e-18, 1e15] {
         for object in shapes(f64::from(scale)) {

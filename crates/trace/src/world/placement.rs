@@ -1,17 +1,19 @@
-//! Mesh-to-world maps. Most meshes are not transformed, and skipping the matrix makes their surfaces cheaper.
+//! Mesh-to-world transforms. Most meshes are not transformed, and skipping the matrix makes computing their
+//! surfaces cheaper.
 
 use crate::math::DVec3;
 use crate::math::transform::Transform;
 
-/// A map from mesh to world coordinates.
+/// A transform from mesh coordinates to world coordinates.
 pub trait MeshPlacement: Copy {
     /// Transforms a point to world coordinates.
     fn point(self, local: DVec3) -> DVec3;
 
-    /// Bounds the absolute components of a transformed direction, given bounds on its components in the mesh.
+    /// Bounds the absolute components of a transformed direction, given bounds on its components in mesh
+    /// coordinates.
     fn reach(self, local: DVec3) -> DVec3;
 
-    /// Transforms a normal; the result is not normalized.
+    /// Transforms a normal. The result is not normalized.
     fn normal(self, local: DVec3) -> DVec3;
 
     /// The mesh's origin in world coordinates.
@@ -47,7 +49,7 @@ pub struct IdentityPlacement;
 impl MeshPlacement for IdentityPlacement {
     #[inline(always)]
     fn point(self, local: DVec3) -> DVec3 {
-        // Match the matrix version, which adds the translation: −0 becomes +0.
+        // Adding the translation in the matrix version converts −0 to +0. Do the same here.
         local + DVec3::ZERO
     }
 
@@ -58,7 +60,7 @@ impl MeshPlacement for IdentityPlacement {
 
     #[inline(always)]
     fn normal(self, local: DVec3) -> DVec3 {
-        // Match the signs of zeros in the matrix product; tangents depend on them.
+        // Match the signs of zeros in the matrix product because tangents depend on them.
         let DVec3 { x, y, z } = local;
         local + (DVec3::new(y, z, x) * 0.0 + DVec3::new(z, x, y) * 0.0)
     }

@@ -1,13 +1,13 @@
-//! Visits the tree nodes that a ray intersects.
+//! Visits the tree nodes intersected by a ray.
 
 use super::{Geometry, Object};
 use crate::accel::{RayInterval, TreeNode};
 use crate::geometry::Ray;
 
 impl Geometry {
-    /// Visits the nodes of all trees whose boxes a ray intersects. `visit` receives the ray in the coordinates of the node's
-    /// tree, with t unchanged, and returns whether to descend. Depth counts through both levels: a mesh's root is one below the
-    /// leaf that contains the mesh.
+    /// Visits the nodes of all trees whose boxes a ray intersects. `visit` receives the ray in the
+    /// coordinates of the node's tree, with t unchanged, and returns whether to descend. Depth is counted
+    /// across both levels: a mesh's root is one below the leaf that contains the mesh.
     pub fn visit_nodes(&self, ray: &Ray, mut visit: impl FnMut(&Ray, &TreeNode, &RayInterval) -> bool) {
         let mut below = Vec::new();
         self.visited().along(
@@ -28,7 +28,8 @@ impl Geometry {
         }
     }
 
-    /// Traversal cost of a ray: the number of boxes it intersects, plus the shapes in those leaves and the infinite objects.
+    /// Traversal cost of a ray: the number of boxes intersected, plus the number of shapes in the intersected
+    /// leaves and of infinite objects.
     pub fn traversal_cost(&self, ray: &Ray) -> u32 {
         let mut count = self.unbounded().len() as u32;
         self.visit_nodes(ray, |_, cell, _| {

@@ -1,4 +1,5 @@
-//! Small meshes: every triangle is tested against all rays of a packet, without the tree. Hits are bit-identical to the tree's.
+//! Small meshes: every triangle is tested against all rays of a packet, without using the tree. Hits are
+//! bit-identical to those found with the tree.
 
 use super::MeshInstance;
 use crate::accel::{F32x16, PACKET_SIZE};
@@ -6,11 +7,11 @@ use crate::geometry::packet::{HitPacket, RayPacket};
 use crate::geometry::watertight_packet::ShearedPacket;
 use crate::math::lanes::{Simd, lane, set_lane};
 
-/// Maximum triangle count; above it, traversing the tree is faster.
+/// Maximum triangle count. Above it, traversing the tree is faster.
 const SMALL_MESH: usize = 16;
 
 impl MeshInstance {
-    /// Whether the mesh is small enough to be tested without its tree.
+    /// Whether the mesh is small enough to be tested without the tree.
     #[inline(always)]
     pub(super) fn is_small(&self) -> bool {
         self.tree.loaded().mesh.triangles.len() <= SMALL_MESH
@@ -33,7 +34,8 @@ impl MeshInstance {
         }
     }
 
-    /// Returns the mask of rays in `met` that hit any triangle other than the one they ignore. Other lanes have negative `ends`.
+    /// Returns the mask of rays in `met` that hit any triangle other than the ignored triangle. Other lanes
+    /// have negative `ends`.
     #[inline(always)]
     pub(super) fn any_in_small(
         &self,

@@ -12,16 +12,16 @@ use crate::scene::description::{
     Channel, Encoding, Material, PixelValue, Scene, TextureFilter, TextureRole, TextureUse,
 };
 
-/// An image file and how its values are encoded.
+/// An image file and its encoding.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct TextureSource {
     /// Path of the file.
     pub path: PathBuf,
     /// Index of the image in a glTF file. `None` for image files.
     pub image: Option<u32>,
-    /// How its values are encoded.
+    /// Encoding of the pixel values.
     pub encoding: ImageEncoding,
-    /// The alpha cutoff whose coverage the mip levels preserve. `None` for ordinary mip levels.
+    /// Alpha cutoff at which mip levels preserve coverage. `None` for ordinary mip levels.
     pub coverage: Option<Cutoff>,
 }
 
@@ -30,12 +30,12 @@ pub struct TextureSource {
 pub struct Cutoff(u32);
 
 impl Cutoff {
-    /// From the cutoff of the opacity to that of the pixel values of an image with this factor.
+    /// Converts a cutoff for opacity to a cutoff for pixel values, given the image's factor.
     pub fn new(cutoff: f32, factor: f32) -> Self {
         Self(if factor > 0.0 { cutoff / factor } else { f32::INFINITY }.to_bits())
     }
 
-    /// The smallest pixel value at which the surface is opaque.
+    /// Smallest pixel value at which the surface is opaque.
     pub fn value(self) -> f32 {
         f32::from_bits(self.0)
     }
@@ -46,24 +46,24 @@ impl Cutoff {
 pub struct NeededTexture {
     /// The file and its encoding.
     pub source: TextureSource,
-    /// Its name in progress bars.
+    /// Name shown in progress bars.
     pub name: String,
-    /// Index into [`Scene::textures`]. `None` if only a mesh file refers to it.
+    /// Index into [`Scene::textures`]. `None` if only a mesh file refers to the image.
     pub declared: Option<usize>,
-    /// Index into [`Scene::mesh_files`] of the mesh file that refers to it.
+    /// Index into [`Scene::mesh_files`] of the mesh file that refers to the image.
     pub mesh_file: Option<usize>,
-    /// Name of the mesh file's material that refers to it. `None` for other textures.
+    /// Name of the mesh file's material that refers to the image. `None` for other textures.
     pub material: Option<String>,
-    /// Name of a material that uses it as a normal map. `None` if no material does.
+    /// Name of a material that uses the image as a normal map, if any.
     pub normals_of: Option<String>,
-    /// Whether it is the environment map.
+    /// Whether the image is the environment map.
     pub is_environment: bool,
-    /// Whether its mip levels are needed.
+    /// Whether mip levels are needed.
     pub has_mipmaps: bool,
 }
 
 impl NeededTexture {
-    /// The image of an environment map.
+    /// Image of an environment map.
     pub fn of_environment(file: &Path) -> Self {
         Self {
             source: environment_map(file),
@@ -87,11 +87,12 @@ pub struct TextureNeeds {
     pub specular: bool,
     /// Ambient reflectance of Phong surfaces.
     pub ambient: bool,
-    /// Emission textures, and the map of the environment.
+    /// Emission textures and the environment map.
     pub lights: bool,
-    /// Normal maps and heights.
+    /// Normal maps and height maps.
     pub normals: bool,
-    /// All textures of specular materials (mirrors, thin panes, glass, smooth coats), through which other surfaces are visible.
+    /// All textures of specular materials (mirrors, thin panes, glass, smooth coats), because other surfaces
+    /// are visible through them.
     pub by_delta: bool,
 }
 
@@ -99,7 +100,7 @@ impl TextureNeeds {
     /// Every texture.
     pub const ALL: Self =
         Self { diffuse: true, specular: true, ambient: true, lights: true, normals: true, by_delta: true };
-    /// No textures except opacity, which every image needs.
+    /// No textures except opacity, which is needed for every image.
     pub const NONE: Self = Self {
         diffuse: false,
         specular: false,
@@ -204,7 +205,7 @@ fn has_mipmaps(scene: &Scene, texture: usize) -> bool {
     }
 }
 
-/// The environment map's file. `None` without a map, or if its color factor is black.
+/// File of the environment map. `None` without a map, or if its color factor is black.
 pub fn environment_source(scene: &Scene) -> Option<TextureSource> {
     environment_file(scene).map(environment_map)
 }
@@ -218,7 +219,8 @@ fn environment_map(file: &Path) -> TextureSource {
     TextureSource { path: file.to_owned(), image: None, encoding: ImageEncoding::Color, coverage: None }
 }
 
-/// Which of the scene's materials are used by objects, and which mesh files' materials are used by instances.
+/// Which of the scene's materials are used by objects, and which mesh files' materials are used by mesh
+/// instances.
 fn in_use(scene: &Scene) -> (Vec<bool>, Vec<bool>) {
     let (mut materials, mut files) =
         (vec![false; scene.materials.len()], vec![false; scene.mesh_files.len()]);
@@ -232,7 +234,7 @@ fn in_use(scene: &Scene) -> (Vec<bool>, Vec<bool>) {
     (materials, files)
 }
 
-/// The image file and encoding of a scene material's texture in this role.
+/// Image file and encoding of a scene material's texture in this role.
 pub fn material_source(
     scene: &Scene,
     material: &Material,
@@ -255,7 +257,7 @@ pub fn material_source(
     }
 }
 
-/// The cutoff whose coverage an opacity texture's mip levels preserve. `None` without a cutoff or mip levels.
+/// Cutoff at which an opacity texture's mip levels preserve coverage. `None` without a cutoff or mip levels.
 pub fn coverage(scene: &Scene, texture: usize, cutoff: f32) -> Option<Cutoff> {
     let is_covered = cutoff > 0.0 && has_mipmaps(scene, texture);
     is_covered.then(|| Cutoff::new(cutoff, scene.textures[texture].factor.x))
@@ -298,7 +300,7 @@ fn is_same_image(scene: &Scene, a: usize, b: usize) -> bool {
     a.file.value == b.file.value && at(a) == at(b)
 }
 
-/// The image file and encoding of a scene texture for this use.
+/// Image file and encoding of a scene texture for this use.
 pub fn declared_source(scene: &Scene, texture: usize, used: TextureUse) -> TextureSource {
     let texture = &scene.textures[texture];
     let encoding = match (texture.encoding, used) {
@@ -318,7 +320,7 @@ pub fn declared_source(scene: &Scene, texture: usize, used: TextureUse) -> Textu
     TextureSource { path: texture.file.value.clone(), image: texture.image, encoding, coverage: None }
 }
 
-/// The image file and encoding of a mesh file's texture for this use.
+/// Image file and encoding of a mesh file's texture for this use.
 pub fn file_source(texture: &FileTexture, used: TextureUse) -> TextureSource {
     let encoding = match used {
         TextureUse::Color => ImageEncoding::Color,
@@ -329,10 +331,10 @@ pub fn file_source(texture: &FileTexture, used: TextureUse) -> TextureSource {
     TextureSource { path: texture.path.clone(), image: None, encoding, coverage: None }
 }
 
-/// How mesh files' textures supply scalar parameters.
+/// How textures from mesh files are used as scalar parameters.
 pub const FILE_NUMBER: TextureUse = TextureUse::Number(PixelValue::Luminance);
 
-/// How a color texture of a mesh file's material is used.
+/// How a color texture of a mesh file material is used.
 pub fn file_color_use(own: &FileMaterial, texture: &FileTexture) -> TextureUse {
     let is_alpha = |opacity: &&FileTexture| match opacity.number {
         None | Some(PixelValue::Opacity | PixelValue::Channel(Channel::Alpha)) => true,
@@ -343,7 +345,7 @@ pub fn file_color_use(own: &FileMaterial, texture: &FileTexture) -> TextureUse {
     if is_cut_out { TextureUse::CutOut } else { TextureUse::Color }
 }
 
-/// How the opacity texture of a mesh file's material is used.
+/// How the opacity texture of a mesh file material is used.
 pub fn file_opacity_use(own: &FileMaterial, opacity: &FileTexture) -> TextureUse {
     let colors = [&own.diffuse_texture, &own.specular_texture, &own.emission_texture];
     let is_color = colors.into_iter().flatten().any(|color| color.path == opacity.path);
@@ -391,7 +393,7 @@ mod tests {
 
     use super::*;
 
-    /// Uses of the textures of one material, in the order of its roles.
+    /// Texture uses of a material, in role order.
     fn uses(material: &str) -> Vec<TextureUse> {
         let text = format!(
             "[camera]\nposition = [0, 5, 1]\nlook_at = [0, 0, 0]\n\
@@ -409,7 +411,7 @@ mod tests {
     }
 
     #[test]
-    fn a_color_under_its_own_alpha_is_a_cut_out() {
+    fn color_with_alpha_from_one_image_is_a_cut_out() {
         const MASK: TextureUse = TextureUse::Number(PixelValue::Mask { of_any_color: false });
         const ALPHA: TextureUse = TextureUse::Number(PixelValue::Channel(Channel::Alpha));
         const OPACITY: TextureUse = TextureUse::Number(PixelValue::Opacity);
@@ -422,9 +424,10 @@ mod tests {
         assert_eq!(both("leaf", "texture = 'leaf'"), [cut_out, OPACITY]);
         assert_eq!(both("leaf", "texture = 'same'"), [cut_out, OPACITY]);
         assert_eq!(both("leaf", "texture = 'leaf', channel = 'a'"), [cut_out, ALPHA]);
-        // The same image elsewhere on the surface: its colors are not those under the alpha, which is still that of colors.
+        // With an offset, colors and alpha values do not match, so the color is not a cut-out. The opacity
+        // still comes from a color image.
         assert_eq!(both("leaf", "texture = 'moved'"), [color, OPACITY]);
-        // An image for opacity only is a mask.
+        // An image used only for opacity is a mask.
         assert_eq!(both("leaf", "texture = 'other'"), [color, MASK]);
         assert_eq!(uses("diffuse = 0.5\nopacity = { texture = 'leaf' }"), [MASK]);
         let red = TextureUse::Number(PixelValue::Channel(Channel::Red));

@@ -19,10 +19,10 @@ pub(super) struct TrianglePoint {
     pub(super) normal: Vec3,
     /// Barycentric coordinates.
     pub(super) barycentric: Vec3,
-    /// Whether the point is so close to an edge that a ray from here could start beyond a neighboring surface; see
-    /// [`PlacedMesh::pulled_inside`].
+    /// Whether the point is so close to an edge that a ray from the point could start beyond a neighboring
+    /// surface; see [`PlacedMesh::pulled_inside`].
     pub(super) is_near_edge: bool,
-    /// Whether the barycentric coordinates may be too coarse for the point; see [`PlacedMesh::on_ray`].
+    /// Whether the barycentric coordinates may be too imprecise; see [`PlacedMesh::on_ray`].
     is_coarse: bool,
 }
 
@@ -34,15 +34,16 @@ impl TrianglePoint {
     }
 }
 
-/// If the triangle's corners are this many times farther away than the point and the ray origin, `f32` barycentric coordinates are too
-/// coarse, and the point is computed from the ray.
+/// If the triangle's corners are this many times farther away than the point and the ray origin, `f32`
+/// barycentric coordinates are too imprecise, and the point is computed from the ray.
 const COARSE: f64 = 1024.0;
 
-/// Minimum distance from the triangle's edges, in point errors: rounding the point and offsetting it off the surface takes two.
+/// Minimum distance from the triangle's edges, in point errors. Rounding the point and offsetting it from the
+/// surface requires two.
 pub(super) const EDGE_MARGIN: f64 = 4.0;
 
-/// Whether a point with barycentric coordinate `weight` is near the opposite edge. `bound` is the squared minimum distance over
-/// the squared length of the cross product of two edges.
+/// Whether a point with barycentric coordinate `weight` is near the opposite edge. `bound` is the squared
+/// minimum distance divided by the squared length of the cross product of two edges.
 #[inline(always)]
 fn is_near(weight: f64, edge: DVec3, bound: f64) -> bool {
     (weight < 0.0) | (weight * weight < bound * edge.length_squared())
@@ -51,21 +52,22 @@ fn is_near(weight: f64, edge: DVec3, bound: f64) -> bool {
 /// Maximum distance to move a point away from an edge, as a fraction of the triangle's height.
 const MAX_EDGE_MARGIN: f64 = 0.125;
 
-/// A mesh placement, with the data its surface points need.
+/// A mesh placement, with the data needed to compute surface points.
 #[derive(Clone, Copy)]
 pub(super) struct PlacedMesh<P> {
-    /// The mesh-to-world map.
+    /// The mesh-to-world transform.
     pub(super) placement: P,
     /// Minimum distance from triangle edges, as a multiple of the point error, in mesh coordinates.
     pub(super) edge_margin: f64,
-    /// Whether rays hit triangles whose corners were rounded after the transform.
+    /// Whether rays are traced against triangles whose corners were rounded after the transform.
     pub(super) has_rounded_corners: bool,
 }
 
 impl<P: MeshPlacement> PlacedMesh<P> {
-    /// Error bound of a point on a triangle: rounding of the point, of the next ray's origin in mesh coordinates, and of the
-    /// numbers from which the point is computed. If all of these are near 0, what remains is the rounding of the `f64` arithmetic
-    /// that decides on which side of the triangle a point is. In a merged tree, the rounding of the transformed corners is added.
+    /// Error bound for a point on a triangle. Includes rounding of the point, of the next ray's origin in
+    /// mesh coordinates, and of the numbers from which the point is computed. If all of these are near 0, the
+    /// remaining error is the rounding of the `f64` arithmetic that determines the side of the triangle on
+    /// which a point lies. In a merged tree, the rounding of the transformed corners is added.
     #[inline(always)]
     pub(super) fn error(&self, point: Vec3, local: DVec3, [a, b, c]: [DVec3; 3]) -> Vec3 {
         let reach = self.placement.reach(local.abs());
@@ -80,7 +82,8 @@ impl<P: MeshPlacement> PlacedMesh<P> {
         }
     }
 
-    /// The point with barycentric coordinates `u` and `v` on the triangle with these corners, in mesh coordinates.
+    /// Computes the point with barycentric coordinates `u` and `v` on the triangle with these corners, in
+    /// mesh coordinates.
     #[inline(always)]
     pub(super) fn facet(&self, corners: [Vec3; 3], [u, v]: [f32; 2]) -> TrianglePoint {
         let corners = corners.map(|corner| corner.as_dvec3());
@@ -108,14 +111,15 @@ impl<P: MeshPlacement> PlacedMesh<P> {
         }
     }
 
-    /// Upper bound of the world coordinates of a triangle's corners.
+    /// Upper bound on the world coordinates of a triangle's corners.
     #[inline(always)]
     fn greatest(&self, [a, b, c]: [DVec3; 3]) -> f64 {
         let greatest = self.placement.reach(a.abs().max(b.abs()).max(c.abs()));
         (greatest + self.placement.shift().abs()).max_element()
     }
 
-    /// Corrects a doubtful point: computes it from the ray or pulls it inside the triangle. Returns the point and its error.
+    /// Corrects an imprecise point by computing it from the ray or pulling it inside the triangle. Returns
+    /// the point and its error.
     #[cold]
     #[inline(never)]
     pub(super) fn corrected(&self, facet: &TrianglePoint, ray: &RayF64, weights: [f32; 2]) -> [Vec3; 2] {
@@ -132,8 +136,8 @@ impl<P: MeshPlacement> PlacedMesh<P> {
         facet.is_coarse && self.on_ray(facet, ray).is_some()
     }
 
-    /// Intersection of the ray with the triangle's plane, and its error. `None` unless the triangle is much larger than the distances
-    /// of the point and the ray origin from the scene's origin.
+    /// Intersection of the ray with the triangle's plane, and its error. `None` unless the triangle is much
+    /// larger than the distances from the scene's origin to the point and the ray origin.
     fn on_ray(&self, facet: &TrianglePoint, ray: &RayF64) -> Option<[Vec3; 2]> {
         if !facet.is_coarse {
             return None;
@@ -150,16 +154,17 @@ impl<P: MeshPlacement> PlacedMesh<P> {
         is_better.then(|| [rounded, self.error(rounded, facet.local, facet.corners)])
     }
 
-    /// Minimum distance of a point from its triangle's edges, in mesh coordinates: errors of the point, plus the error of testing
-    /// a neighbor of the same size.
+    /// Minimum distance from a point to its triangle's edges, in mesh coordinates: the point's error plus the
+    /// error of testing a neighbor of the same size.
     #[inline(always)]
     fn min_edge_distance(&self, error: Vec3, [a, b, c]: [DVec3; 3]) -> f64 {
         let greatest = a.abs().max(b.abs()).max(c.abs()).max_element();
         self.edge_margin * f64::from(error.max_element()) + EDGE_MARGIN * f64::from(f32::EPSILON) * greatest
     }
 
-    /// Moves a point near an edge into the triangle, beyond the minimum distance; returns the point and its error. Otherwise a
-    /// ray could start behind the wall that adjoins this one, and escape from a closed room.
+    /// Moves a point near an edge into the triangle, to at least the minimum distance from the edge. Without
+    /// this, a ray could start behind an adjacent wall and escape from a closed room. Returns the point and
+    /// its error.
     fn pulled_inside(&self, facet: &TrianglePoint, [u, v]: [f32; 2]) -> [Vec3; 2] {
         let [a, b, c] = facet.corners;
         let (ab, ac) = (b - a, c - a);
@@ -167,7 +172,7 @@ impl<P: MeshPlacement> PlacedMesh<P> {
         let [of_u, of_v, of_w] = [ac, ab, ac - ab].map(|edge| (least * edge.length()).min(MAX_EDGE_MARGIN));
         let (u, v) = (f64::from(u).max(of_u), f64::from(v).max(of_v));
         let excess = (u + v - (1.0 - of_w)).max(0.0);
-        // Lower the coordinate with more slack.
+        // Reduce the coordinate with more slack.
         let (u, v) = if u - of_u > v - of_v { (u - excess, v) } else { (u, v - excess) };
         let local = a + ab * u + ac * v;
         let point = self.placement.point(local).as_vec3();
@@ -191,9 +196,9 @@ impl<P: MeshPlacement> PlacedMesh<P> {
         Vec3::new(choose(bent.x, normal.x), choose(bent.y, normal.y), choose(bent.z, normal.z))
     }
 
-    /// Shadow-ray origin of a smooth mesh: the point, lifted toward the viewer to those vertices' tangent planes that are above
-    /// it. This keeps facets from shadowing points that their shading normals say are lit (Hanika, *Hacking the Shadow
-    /// Terminator*, Ray Tracing Gems II, chapter 4).
+    /// Shadow-ray origin on a smooth mesh: the point, lifted toward the viewer to the vertices' tangent
+    /// planes that are above it. This prevents facets from shadowing points that are lit according to the
+    /// shading normals (Hanika, *Hacking the Shadow Terminator*, Ray Tracing Gems II, chapter 4).
     #[inline(always)]
     pub(super) fn shadow_point(&self, facet: &TrianglePoint, normals: &[Vec3; 3], direction: DVec3) -> Vec3 {
         let point = self.placement.point(facet.local);
@@ -222,7 +227,7 @@ mod tests {
     use crate::world::placement::IdentityPlacement;
 
     #[test]
-    fn unmoved_placement_equals_identity_transform() {
+    fn untransformed_placement_matches_identity() {
         let mut next = random(17);
         for _ in 0..10_000 {
             // Zeros of both signs are common in architectural models.

@@ -39,7 +39,7 @@ impl TriangleTree {
         }
     }
 
-    /// Bytes of the tree, including its copy of the triangles.
+    /// Memory use of the tree in bytes, including its copy of the triangles.
     pub fn memory_bytes(&self) -> usize {
         match self {
             Self::Boxes(tree) => tree.memory_bytes(),
@@ -47,7 +47,7 @@ impl TriangleTree {
         }
     }
 
-    /// The nearest hit; at equal distances, the lowest triangle number wins.
+    /// Returns the nearest hit. At equal distances, the lowest triangle number wins.
     pub fn closest(&self, ray: &Ray) -> Option<ShapeHit> {
         match self {
             Self::Boxes(tree) => tree.closest(ray),
@@ -63,7 +63,7 @@ impl TriangleTree {
         }
     }
 
-    /// Visits the nodes whose boxes the ray intersects, parents first; `visit` returns whether to descend.
+    /// Visits the nodes whose boxes the ray intersects, parents first. `visit` returns whether to descend.
     pub fn along(&self, ray: &Ray, visit: impl FnMut(&TreeNode, &RayInterval) -> bool) {
         match self {
             Self::Boxes(tree) => tree.along(ray, visit),
@@ -71,7 +71,8 @@ impl TriangleTree {
         }
     }
 
-    /// Visits every triangle that intersects a box. It may also visit nearby triangles, and some more than once.
+    /// Visits every triangle that intersects a box. Nearby triangles may also be visited, and triangles may
+    /// be visited more than once.
     pub fn meeting(&self, bounds: &Aabb, visit: impl FnMut(u32)) {
         match self {
             Self::Boxes(tree) => tree.meeting(bounds, visit),
@@ -79,7 +80,8 @@ impl TriangleTree {
         }
     }
 
-    /// Like [`TriangleTree::meeting`], until `visit` returns false. Returns whether all were visited.
+    /// Like [`TriangleTree::meeting`], until `visit` returns false. Returns whether all triangles were
+    /// visited.
     pub fn meeting_while(&self, bounds: &Aabb, visit: impl FnMut(u32) -> bool) -> bool {
         match self {
             Self::Boxes(tree) => tree.meeting_while(bounds, visit),
@@ -87,7 +89,7 @@ impl TriangleTree {
         }
     }
 
-    /// The nearest hits of up to [`PACKET_SIZE`](crate::accel::PACKET_SIZE) rays within their ends.
+    /// Finds the nearest hits of up to [`PACKET_SIZE`](crate::accel::PACKET_SIZE) rays within their ends.
     pub fn closest_packet(&self, rays: &[Ray], ends: &F32x16, hits: &mut [Option<ShapeHit>]) {
         match self {
             Self::Boxes(tree) => tree.closest_packet(rays, ends, hits),
@@ -100,8 +102,8 @@ impl TriangleTree {
         }
     }
 
-    /// Mask of up to [`PACKET_SIZE`](crate::accel::PACKET_SIZE) rays that hit a triangle before their ends. Each ray ignores its triangle
-    /// in `except`, which may be empty.
+    /// Returns the mask of rays, up to [`PACKET_SIZE`](crate::accel::PACKET_SIZE), that hit a triangle before
+    /// their ends. Each ray ignores its triangle in `except`, which may be empty.
     pub fn any_packet(&self, rays: &[Ray], ends: &F32x16, except: &[Option<u32>]) -> u32 {
         match self {
             Self::Boxes(tree) => tree.any_packet(rays, ends, except),

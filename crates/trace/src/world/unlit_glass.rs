@@ -1,4 +1,5 @@
-//! Rough glass solids without a light inside: sampling lights from their interior is pointless, as shadow rays never leave glass.
+//! Rough glass solids without a light inside. Sampling lights from their interior is pointless because shadow
+//! rays never leave glass.
 
 use super::World;
 use crate::geometry::Aabb;
@@ -7,12 +8,12 @@ use crate::math::Vec3;
 /// Margin for rounding around lights, relative to their distance from the origin.
 const ROUNDING: f32 = 1e-5;
 
-/// Two bounding boxes of a light; the light is inside their intersection.
+/// Two bounding boxes of a light, which is inside their intersection.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LightBox {
-    /// Box around the light's bounding sphere.
+    /// Bounding box of the light's bounding sphere.
     of_ball: Aabb,
-    /// Box of the emitting object.
+    /// Bounding box of the emitting object.
     of_object: Option<Aabb>,
     /// The emitting object.
     pub object: Option<u32>,
@@ -36,14 +37,15 @@ impl LightBox {
 }
 
 impl World {
-    /// Finds the closed glass solids that no light touches. The result is empty if no glass is rough.
+    /// Finds the closed glass solids that are not touched by a light. The result is empty if no glass is
+    /// rough.
     pub(super) fn find_unlit_glass(&self) -> Box<[bool]> {
         if !self.has_rough_glass() {
             return Box::default();
         }
         let (objects, lamps) = (self.geometry.objects(), self.light_boxes());
         let everywhere = Aabb::around([Vec3::NEG_INFINITY, Vec3::INFINITY]);
-        // Unite the bounding boxes of each solid's objects.
+        // Compute the bounding box of each solid.
         let mut boxes: Vec<Option<Aabb>> = vec![None; objects.len()];
         for (id, object) in (0_u32..).zip(objects) {
             if self.materials_of(id).any(|material| material.bsdf.glass().is_some()) {
@@ -52,7 +54,7 @@ impl World {
                 *joined = Some(joined.map_or(own, |others| others.union(own)));
             }
         }
-        // Keep those that are closed and that no light may touch.
+        // Keep the closed solids that cannot be touched by a light.
         let holds_lamp = |bounds: &Aabb| lamps.iter().any(|lamp| lamp.meets(bounds));
         let is_dark = |(body, bounds): (u32, &Option<Aabb>)| {
             let closed = bounds.as_ref().filter(|bounds| bounds.extent().is_finite() && !self.is_open(body));
@@ -61,7 +63,7 @@ impl World {
         (0..).zip(&boxes).map(is_dark).collect()
     }
 
-    /// Boxes of all lights of finite extent, with a margin for rounding.
+    /// Bounding boxes of all finite lights, with a margin for rounding.
     pub fn light_boxes(&self) -> Vec<LightBox> {
         let boxes = self.lights.iter().filter_map(|(_, light)| {
             let bounds = light.bounds().filter(|_| !light.is_beyond())?;
@@ -76,7 +78,7 @@ impl World {
         boxes.collect()
     }
 
-    /// Whether sampling lights from inside a glass solid never finds one.
+    /// Whether light samples from inside a glass solid are always occluded.
     #[inline]
     pub fn is_unlit_glass(&self, body: u32) -> bool {
         self.unlit_glass.get(body as usize).copied().unwrap_or(false)

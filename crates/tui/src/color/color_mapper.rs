@@ -11,15 +11,15 @@ use crate::math::color::srgb8_to_linear;
 use crate::mosaic::{FittedCell, Tile};
 use ratatui::style::Color;
 
-/// Preference for near colors among the 256, and among the 16.
+/// Weight of the preference for nearby colors, with 256 and 16 colors.
 const CALM_256: f32 = 3.0;
 const CALM_16: f32 = 3.0;
-/// The same for halves with edges in them.
+/// The same weight for cells drawn as two halves with an edge between them.
 const CALM_EDGES: f32 = 200.0;
-/// Halves that differ by more than this in Oklab (squared) are drawn as halves. Otherwise their mean is mixed
-/// from shade characters.
+/// Squared Oklab distance above which the two halves of a cell are drawn separately. Below it, their mean
+/// color is mixed using shade characters.
 const EDGE: f32 = 0.01;
-/// Fractions of a cell that the shade characters fill with the foreground.
+/// Fraction of the cell that each shade character fills with the foreground color.
 const LEVELS: [f32; 3] = [0.25, 0.5, 0.75];
 
 /// A cell to draw: a tile and the colors of its two parts.
@@ -29,10 +29,10 @@ pub(crate) struct DrawnCell {
     pub(crate) pair: [Color; 2],
 }
 
-/// Two of the 16 colors in one cell.
+/// A pair of the 16 colors mixed in one cell.
 #[derive(Clone, Copy, Debug)]
 struct ColorPair {
-    /// Index of the shade character. `None` for the first color only.
+    /// Index of the shade character. `None` if only the first color is used.
     level: Option<usize>,
     colors: [usize; 2],
 }
@@ -48,7 +48,7 @@ pub(crate) struct ColorMapper {
 }
 
 impl ColorMapper {
-    /// A mapper for a terminal of this color depth, with `ansi` as its 16 colors.
+    /// Creates a mapper for a terminal with this color depth and `ansi` as its 16 colors.
     pub(crate) fn new(depth: ColorDepth, ansi: &AnsiColors) -> Self {
         let none = || RefCell::new(Mixer::default());
         let mut shades = Self { depth, plain: none(), mixed: none(), pairs: Vec::new() };
@@ -72,7 +72,7 @@ impl ColorMapper {
         shades
     }
 
-    /// The terminal color for a color at a pixel position.
+    /// The terminal color that approximates a color at this pixel position.
     pub(crate) fn color(&self, rgb: [u8; 3], x: usize, y: usize) -> Color {
         let index = || self.plain.borrow_mut().ink(rgb, threshold(x, y));
         match self.depth {
@@ -110,7 +110,7 @@ impl ColorMapper {
     }
 }
 
-/// Each single color, and each pair at each level.
+/// All single colors, and all pairs with each shade character.
 fn pairs(inks: &[Ink]) -> Vec<ColorPair> {
     let alone = (0..inks.len()).map(|color| ColorPair { level: None, colors: [color; 2] });
     let both = (0..inks.len()).flat_map(|a| (0..a).map(move |b| [a, b]));
@@ -139,7 +139,7 @@ mod tests {
         for depth in [ColorDepth::Indexed256, ColorDepth::Ansi16] {
             let (one, other) = (ColorMapper::new(depth, &XTERM), ColorMapper::new(depth, &XTERM));
             for i in 0..200 {
-                // Different colors in a different order.
+                // Earlier calls with other colors must not affect the result.
                 cell(&other, [i as u8, 90, 200 - i as u8], i, 3);
             }
             for (x, y) in [(0, 0), (3, 1), (7, 5)] {

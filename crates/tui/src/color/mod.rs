@@ -1,4 +1,4 @@
-//! Colors of the terminal, and how other colors are shown with them.
+//! Terminal colors, and how other colors are approximated with them.
 
 mod bayer;
 mod color_mapper;
@@ -21,7 +21,7 @@ use crate::choice;
 choice! {
     /// Choice of colors.
     pub enum ColorChoice {
-        /// The most that the terminal supports.
+        /// As many colors as the terminal supports.
         Auto = "auto",
         /// 24-bit color.
         TrueColor = "truecolor",
@@ -47,7 +47,7 @@ pub enum ColorDepth {
     None,
 }
 
-/// Color depth for a choice in an environment.
+/// Resolves the user's choice, using environment variables for `Auto`.
 pub(super) fn depth(choice: ColorChoice, variable: impl Fn(&str) -> Option<String>) -> ColorDepth {
     match choice {
         ColorChoice::TrueColor => ColorDepth::TrueColor,
@@ -66,7 +66,7 @@ fn detected(variable: impl Fn(&str) -> Option<String>) -> ColorDepth {
     if !get("NO_COLOR").is_empty() || has_no_colors(&term) {
         return ColorDepth::None;
     }
-    // GNU screen passes on COLORTERM of the outer terminal, but does not support 24-bit color itself.
+    // GNU screen passes on the outer terminal's COLORTERM but does not support 24-bit color itself.
     let in_screen = term.starts_with("screen") && get("TMUX").is_empty();
     let says_true = matches!(get("COLORTERM").as_str(), "truecolor" | "24bit");
     if in_screen {
@@ -144,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn backgrounds_are_assumed_dark() {
+    fn background_is_dark_by_default() {
         let light = |colors: Option<&str>| has_light_background(|_| colors.map(str::to_owned));
         assert!(light(Some("0;15")) && light(Some("0;default;7")));
         assert!(!light(Some("15;0")) && !light(Some("15;8")) && !light(Some("15;default")) && !light(None));

@@ -20,14 +20,13 @@ fn product(rows: [Vec3; 3], v: Vec3) -> Vec3 {
     Vec3::from_array(rows.map(|row| row.dot(v)))
 }
 
-/// Oklab of a linear color.
+/// Converts a linear color to Oklab.
 pub(crate) fn oklab(linear: Vec3) -> Vec3 {
     let cones = product(CONES, linear.max(Vec3::ZERO));
     product(LAB, Vec3::from_array(cones.to_array().map(f32::cbrt)))
 }
 
-/// Derivative of Oklab with respect to linear light at a color. It is bounded artificially in the dark, where
-/// it would diverge.
+/// Derivative of Oklab with respect to linear light, bounded artificially near black, where it diverges.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct OklabDerivative(Vec3);
 
@@ -42,7 +41,7 @@ impl OklabDerivative {
         })))
     }
 
-    /// Change of Oklab for a small change in linear light.
+    /// Change in Oklab for a small change in linear light.
     pub(super) fn change(self, linear: Vec3) -> Vec3 {
         product(LAB, self.0 * product(CONES, linear))
     }
@@ -55,7 +54,7 @@ mod tests {
     #[test]
     fn white_has_lightness_one_and_no_hue() {
         assert!(oklab(Vec3::ONE).distance(Vec3::new(1.0, 0.0, 0.0)) < 1e-3);
-        // Lightness of red from Ottosson's article.
+        // Lightness of red, from Ottosson's article.
         assert!((oklab(Vec3::X).x - 0.628).abs() < 1e-3);
     }
 

@@ -5,7 +5,7 @@ use ratatui::style::Color;
 /// Channel levels of the 6×6×6 cube.
 pub(crate) const CUBE_LEVELS: [u8; 6] = [0, 95, 135, 175, 215, 255];
 
-/// First color that is the same in all terminals (start of the cube).
+/// First color that is the same on all terminals (start of the cube).
 pub(crate) const FIRST_FIXED: u8 = 16;
 /// First gray.
 pub(crate) const FIRST_GRAY: u8 = 232;
@@ -53,7 +53,7 @@ const VGA: AnsiColors = [
     [255, 255, 255],
 ];
 
-/// Likely ANSI colors of a terminal that has not reported them.
+/// Assumed ANSI colors of a terminal that has not reported them.
 pub(crate) fn ansi(term: &str) -> &'static AnsiColors {
     if term.starts_with("linux") { &VGA } else { &XTERM }
 }
@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn no_256_color_index_is_much_nearer() {
+    fn nearest_256_is_close_to_optimal() {
         let palette: Vec<[u8; 3]> = (FIRST_FIXED..=255).filter_map(fixed_color).collect();
         assert_eq!(palette.len(), 240);
         for i in 0..4096_u32 {

@@ -1,9 +1,9 @@
-//! Dithering recipes: colors outside of a palette, mixed from the inks in it.
+//! Dithering recipes, which approximate a color by mixing palette colors ("inks").
 //!
-//! A recipe has [`PARTS`] inks whose mean in linear light is the color, each as close to the color as
-//! possible. The remaining error is fed back from one ink to the next in Oklab, linearized at the color
-//! (after J. Yliluoma and T. Knoll, "pattern dithering"). The parts are sorted by lightness and a threshold
-//! picks one of them, so the result depends only on the color and the pixel position.
+//! A recipe is a list of [`PARTS`] inks whose mean in linear light approximates the color. Inks close to the
+//! color are preferred. The error of each ink is carried over to the next in Oklab, linearized at the color
+//! (after J. Yliluoma and T. Knoll, "pattern dithering"). The list is sorted by lightness and the dither
+//! threshold selects an entry, so the result depends only on the color and the pixel position.
 
 use std::collections::HashMap;
 
@@ -13,17 +13,17 @@ use crate::math::color::srgb8_to_linear;
 
 /// Inks per recipe.
 pub(super) const PARTS: usize = 16;
-/// Candidate inks per recipe: those nearest to the color.
+/// Number of candidate inks per recipe. The inks nearest to the color are used.
 const NEAREST: usize = 32;
 /// Maximum number of cached recipes.
 const MAX_RECIPES: usize = 1 << 16;
 
-/// A color or pattern to mix from.
+/// A solid color or a fine pattern of two colors.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ink {
     linear: Vec3,
     lab: Vec3,
-    /// Squared distance from a single color, for patterns.
+    /// For patterns, the mean squared distance of the two colors from their mean. Zero for solid colors.
     texture: f32,
 }
 
@@ -36,7 +36,7 @@ impl Ink {
 
     /// A fine pattern with a fraction `share` of `front` on `back`.
     pub(super) fn shaded(front: &Self, back: &Self, share: f32) -> Self {
-        /// A pattern within a cell is less visible than one made of cells.
+        /// Weight for patterns within a cell, which are less visible than patterns made of whole cells.
         const FINENESS: f32 = 0.25;
         let linear = front.linear * share + back.linear * (1.0 - share);
         let lab = oklab(linear);
@@ -50,19 +50,19 @@ impl Ink {
 #[derive(Debug, Default)]
 pub(super) struct Mixer {
     inks: Vec<Ink>,
-    /// Weight of the distance between the inks, relative to the error of their mean.
+    /// Weight of the distance between inks relative to the error of their mean.
     calm: f32,
     recipes: HashMap<[u8; 3], [u16; PARTS]>,
 }
 
 impl Mixer {
-    /// A mixer of these inks. For `calm` = 0 only the mean counts; the larger it is, the more the nearest ink
-    /// is preferred.
+    /// Creates a mixer for these inks. With `calm` = 0, only the mean matters. Larger values favor inks near
+    /// the color.
     pub(super) fn new(inks: Vec<Ink>, calm: f32) -> Self {
         Self { inks, calm, recipes: HashMap::new() }
     }
 
-    /// Index of the ink for a color where the dither threshold in (0, 1) is `threshold`.
+    /// Index of the ink to use for a color at a dither threshold in (0, 1).
     pub(super) fn ink(&mut self, rgb: [u8; 3], threshold: f32) -> usize {
         let part = ((threshold * PARTS as f32) as usize).min(PARTS - 1);
         let recipe = match self.recipes.get(&rgb) {

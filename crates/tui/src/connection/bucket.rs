@@ -1,13 +1,13 @@
-//! A token bucket for pacing by time.
+//! A token bucket that limits the rate of output.
 
 use std::time::{Duration, Instant};
 
-/// Less than 1 Mbit/s (125 kB/s), so that the queue of such a connection drains.
+/// Slightly less than 1 Mbit/s (125 kB/s), so the queue of a 1 Mbit/s connection drains.
 pub(super) const RATE: f64 = 100_000.0;
-/// Capacity: 100 ms at that bandwidth.
+/// Capacity: 100 ms at 1 Mbit/s.
 const FULL: f64 = 12_000.0;
 
-/// A bucket whose tokens are bytes.
+/// A token bucket; one token is one byte.
 #[derive(Debug)]
 pub(super) struct TokenBucket {
     tokens: f64,
@@ -28,12 +28,12 @@ impl TokenBucket {
         (self.tokens, self.at) = (self.level(now) - bytes as f64, now);
     }
 
-    /// Time at which there are enough tokens for `bytes`.
+    /// Time at which there are enough tokens to send `bytes`.
     pub(super) fn available_at(&self, bytes: usize, now: Instant) -> Instant {
         if self.tokens(now) >= bytes {
             return now;
         }
-        // One extra byte, so that rounding leaves enough.
+        // One extra byte to compensate for rounding.
         let missing = (bytes + 1) as f64 - self.level(now);
         now + Duration::from_secs_f64(missing / RATE)
     }

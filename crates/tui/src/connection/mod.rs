@@ -1,15 +1,17 @@
 //! Flow control: how many bytes may be sent to the terminal now.
 //!
-//! Buffers between glimt and the screen could hold seconds of outdated previews. Therefore every slice ends
-//! with a status report request, and only as many bytes are in flight as the connection carries in one round
-//! trip plus [`MAX_QUEUE`], at most [`MAX_WINDOW`]. The response to a key is never delayed by more. The
-//! window follows the round-trip times as in TCP Vegas (Brakmo and Peterson, 1995): the minimum is the
-//! connection's own, and the rest is queueing.
+//! Buffers between glimt and the screen could hold seconds of outdated previews. To prevent this, every slice
+//! ends with a status report request, and the number of bytes in flight is limited to what the connection
+//! carries in one round trip plus [`MAX_QUEUE`], up to [`MAX_WINDOW`]. This bounds the delay between a key
+//! press and its effect on the screen. The window is adjusted using round-trip times, as in TCP Vegas (Brakmo
+//! and Peterson, 1995): the minimum is taken as the latency of the idle connection, and anything above it as
+//! queueing delay.
 //!
-//! A terminal that does not answer within [`REPLY_TIMEOUT`] is paced by time. So is one behind a multiplexer,
-//! which answers itself and says nothing about the connection behind it.
+//! If the terminal does not reply within [`REPLY_TIMEOUT`], output is paced by time. The same applies behind
+//! a multiplexer, which replies itself regardless of the outer connection.
 //!
-//! A terminal that answers slices within [`FAST_REPLY`] is fast: it can follow the render.
+//! A terminal that usually replies to slices within [`FAST_REPLY`] is considered fast enough to show the
+//! render as it progresses.
 
 mod bucket;
 #[cfg(test)]
@@ -20,45 +22,46 @@ use std::time::{Duration, Instant};
 
 use self::bucket::TokenBucket;
 
-/// Maximum unacknowledged bytes: 24 kB including those that set up the screen, which are not counted.
+/// Maximum number of unacknowledged bytes: 24 kB minus the bytes that set up the screen, which are not
+/// counted.
 const MAX_WINDOW: usize = 23_800;
-/// Initial window. The minimum window follows.
+/// Initial window, followed by the minimum window.
 const INITIAL_WINDOW: f64 = 8_000.0;
 const MIN_WINDOW: f64 = 1_500.0;
 /// Maximum queueing delay.
 const MAX_QUEUE: Duration = Duration::from_millis(60);
-/// Timeout of the first reply.
+/// Timeout for the first reply.
 const REPLY_TIMEOUT: Duration = Duration::from_secs(1);
-/// After this silence, or after `SILENCE_ROUND_TRIPS` round trips, replies count as lost.
+/// After this long without a reply, or after `SILENCE_ROUND_TRIPS` round trips if that is longer, outstanding
+/// replies are considered lost.
 const SILENCE: Duration = Duration::from_secs(1);
 const SILENCE_ROUND_TRIPS: u32 = 4;
-/// A terminal is fast if it usually replies to a slice within this time, judged by the last `RECENT_SLICES`
-/// slices.
+/// A terminal is fast if it replied to most of the last `RECENT_SLICES` slices within this time.
 const FAST_REPLY: Duration = Duration::from_millis(20);
 const RECENT_SLICES: usize = 8;
-/// The minimum round trip is taken over the last one or two periods of this length.
+/// The minimum round-trip time is taken over the last one or two periods of this length.
 const ROUND_TRIP_AGE: Duration = Duration::from_secs(15);
 /// Maximum and minimum size of a slice.
 const MAX_SLICE: usize = 8_000;
 const MIN_SLICE: usize = 400;
 
-/// Queries that a terminal answers.
+/// Queries to which the terminal replies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum QueryKind {
-    /// Primary device attributes, sent last in the first batch: queries that were not answered before it
-    /// never will be.
+    /// Primary device attributes, sent last in the first batch. Queries still unanswered when this reply
+    /// arrives are not supported.
     Attributes,
     /// A status report.
     Status,
 }
 
-/// Bytes in flight, ending with a query.
+/// Bytes in flight that end with a query.
 #[derive(Clone, Copy, Debug)]
 struct SentSlice {
     question: QueryKind,
     bytes: usize,
     sent: Instant,
-    /// Whether the window kept more bytes from being sent.
+    /// Whether the window limited the number of bytes sent.
     is_limited: bool,
 }
 
@@ -79,23 +82,24 @@ pub(super) struct Connection {
     is_multiplexed: bool,
     flight: VecDeque<SentSlice>,
     in_flight: usize,
-    /// Bytes that may be in flight.
+    /// Maximum number of bytes in flight.
     window: f64,
-    /// Time at which the window last shrank. Slices sent earlier carry no new information.
+    /// Time at which the window last shrank. Slices sent before then are ignored when shrinking it again.
     shrunk: Option<Instant>,
     round_trips: RoundTrips,
-    /// Round-trip times of the last slices. Small slices are included, because after a slow moment a
-    /// connection gets only small ones, and they must reveal when it is fast again.
+    /// Round-trip times of the last slices. Small slices are included because only small ones are sent after
+    /// a slowdown, and they must show when the connection is fast again.
     recent: VecDeque<Duration>,
-    /// Time of the last reply, or of the oldest query that awaits one.
+    /// Time of the last reply or, if later, when the oldest pending query was sent.
     heard: Instant,
     bucket: TokenBucket,
-    /// Bytes that the system has not accepted yet.
+    /// Bytes that the operating system has not accepted yet.
     unwritten: usize,
 }
 
 impl Connection {
-    /// A connection of unknown speed. `is_multiplexed` if the terminal itself does not answer.
+    /// Creates a connection of unknown speed. `is_multiplexed` if a multiplexer replies instead of the
+    /// terminal.
     pub(super) fn new(is_multiplexed: bool, now: Instant) -> Self {
         Self {
             replies: ReplyState::Asked { until: now + REPLY_TIMEOUT },
@@ -112,7 +116,7 @@ impl Connection {
         }
     }
 
-    /// Maximum size of the next slice without its query; 0 if it has to wait.
+    /// Maximum size of the next slice, not counting its query. 0 if sending has to wait.
     pub(super) fn max_slice(&mut self, now: Instant) -> usize {
         self.check_timeouts(now);
         let window = self.window_bytes().saturating_sub(self.in_flight);
@@ -124,7 +128,7 @@ impl Connection {
             ReplyState::Silent if self.unwritten > 0 => 0,
             ReplyState::Silent => tokens,
         };
-        // Several slices fill a window, so the connection stays busy while a reply is in flight.
+        // Split the window into several slices so that the connection stays busy while replies are in flight.
         let slice = (self.window_bytes() / 3).clamp(MIN_SLICE, MAX_SLICE);
         let room = room.saturating_sub(QUERY_BYTES).min(slice);
         if room < MIN_SLICE { 0 } else { room }
@@ -135,7 +139,7 @@ impl Connection {
         (self.replies != ReplyState::Silent).then_some(QueryKind::Status)
     }
 
-    /// Records a sent slice; `bytes` includes its query.
+    /// Records a sent slice. `bytes` includes its query.
     pub(super) fn send(&mut self, bytes: usize, question: Option<QueryKind>, now: Instant) {
         self.unwritten += bytes;
         self.bucket.take(bytes, now);
@@ -149,7 +153,7 @@ impl Connection {
         self.flight.push_back(SentSlice { question, bytes, sent: now, is_limited });
     }
 
-    /// Records bytes that the system has accepted.
+    /// Records that the operating system has accepted bytes.
     pub(super) fn written(&mut self, bytes: usize) {
         self.unwritten = self.unwritten.saturating_sub(bytes);
     }
@@ -159,11 +163,12 @@ impl Connection {
         self.replies = ReplyState::Answering;
         self.heard = now;
         let Some(place) = self.flight.iter().position(|slice| slice.question == question) else { return };
-        // Replies arrive in order, so earlier ones are lost.
+        // Replies arrive in order, so replies to earlier slices have been lost.
         let passed: Vec<SentSlice> = self.flight.drain(..=place).collect();
         for slice in passed {
             self.in_flight -= slice.bytes;
-            // A slice larger than any window was an image that waited for itself.
+            // A slice larger than the maximum window was a single image, so its round-trip time is mostly
+            // transmission time.
             if slice.question == question && slice.bytes <= MAX_WINDOW {
                 let round_trip = now.saturating_duration_since(slice.sent);
                 self.round_trips.add(round_trip, now);
@@ -173,7 +178,7 @@ impl Connection {
         }
     }
 
-    /// Time at which there may be room even without a reply.
+    /// Time at which sending may become possible even without a reply.
     pub(super) fn wake(&self, now: Instant) -> Option<Instant> {
         let filled = self.bucket.available_at(MIN_SLICE + QUERY_BYTES, now);
         match self.replies {
@@ -188,19 +193,19 @@ impl Connection {
         }
     }
 
-    /// Whether the terminal owes a reply.
+    /// Whether a reply is pending.
     pub(super) fn awaits_reply(&self) -> bool {
         !self.flight.is_empty()
     }
 
-    /// Round-trip time of an idle connection. `None` if the terminal does not reply.
+    /// Round-trip time without queueing. `None` if the terminal does not reply.
     pub(super) fn round_trip(&self) -> Option<Duration> {
         self.round_trips.minimum().filter(|_| self.replies == ReplyState::Answering)
     }
 
-    /// Estimated bandwidth in bytes per second. `None` if it is too high to matter.
+    /// Estimated bandwidth in bytes per second. `None` if unknown or too high to matter.
     pub(super) fn bytes_per_second(&self) -> Option<f64> {
-        /// Previews take no noticeable time at this rate.
+        /// At this rate, sending a preview takes no noticeable time.
         const FAST: f64 = 2e6;
         let window_rate = || {
             let round_trip = self.round_trips.minimum()?.as_secs_f64();
@@ -214,8 +219,8 @@ impl Connection {
         rate.filter(|rate| *rate < FAST)
     }
 
-    /// Whether the terminal is fast enough to follow the render: it replied to more than half of the last
-    /// slices within [`FAST_REPLY`].
+    /// Whether the terminal is fast enough to follow the render, meaning that it replied to more than half of
+    /// the last slices within [`FAST_REPLY`].
     pub(super) fn is_fast(&self) -> bool {
         let quick = self.recent.iter().filter(|round_trip| **round_trip <= FAST_REPLY).count();
         self.replies == ReplyState::Answering && !self.is_multiplexed && 2 * quick > self.recent.len()
@@ -239,7 +244,7 @@ impl Connection {
                 self.clear_in_flight();
             }
             ReplyState::Answering if self.awaits_reply() && now >= self.heard + self.silence() => {
-                // The connection is stalled or a reply was lost. Send little until one arrives.
+                // The connection is stalled or a reply was lost. Send little until the next reply.
                 self.clear_in_flight();
                 self.window = MIN_WINDOW;
             }
@@ -247,7 +252,7 @@ impl Connection {
         }
     }
 
-    /// Time after which missing replies count as lost.
+    /// Time after which missing replies are considered lost.
     fn silence(&self) -> Duration {
         SILENCE.max(self.round_trips.minimum().unwrap_or_default() * SILENCE_ROUND_TRIPS)
     }
@@ -257,7 +262,7 @@ impl Connection {
         self.in_flight = 0;
     }
 
-    /// Adjusts the window to the queueing delay of a slice.
+    /// Adjusts the window based on a slice's queueing delay.
     fn adjust_window(&mut self, slice: &SentSlice, round_trip: Duration, now: Instant) {
         let Some(least) = self.round_trips.minimum() else { return };
         let queue = round_trip.saturating_sub(least);
@@ -273,10 +278,10 @@ impl Connection {
     }
 }
 
-/// Length of a query.
+/// Length of a query in bytes.
 const QUERY_BYTES: usize = 4;
 
-/// Minimum of recent round trips.
+/// Tracks the minimum of recent round-trip times.
 #[derive(Debug, Default)]
 struct RoundTrips {
     current: Option<(Instant, Duration)>,

@@ -1,6 +1,6 @@
 use super::*;
 
-/// A terminal behind a simulated connection, to which flow control sends as much as possible.
+/// A terminal behind a simulated connection. Sends as much as flow control allows.
 struct SimulatedTerminal {
     connection: Connection,
     start: Instant,
@@ -8,9 +8,9 @@ struct SimulatedTerminal {
     bytes_a_second: f64,
     round_trip: Duration,
     answers: bool,
-    /// Time at which the last byte leaves the queue.
+    /// Time at which the last queued byte is transmitted.
     busy: Instant,
-    /// Replies in flight.
+    /// Replies in flight, with their arrival times.
     due: VecDeque<(Instant, QueryKind)>,
     carried: usize,
     /// Maximum number of bytes in flight so far.
@@ -48,14 +48,14 @@ impl SimulatedTerminal {
         self.most_in_flight = self.most_in_flight.max(self.connection.in_flight);
         if let Some(question) = question.filter(|_| self.answers) {
             let multiplexed = self.connection.is_multiplexed;
-            // A local multiplexer replies.
+            // A local multiplexer replies immediately.
             let beside = Duration::from_millis(1);
             let when = if multiplexed { self.now + beside } else { self.busy + self.round_trip };
             self.due.push_back((when, question));
         }
     }
 
-    /// Sends continuously for this time.
+    /// Sends continuously for this long.
     fn run(&mut self, milliseconds: u64) {
         let end = self.now + Duration::from_millis(milliseconds);
         (self.carried, self.longest) = (0, Duration::ZERO);
@@ -77,14 +77,14 @@ impl SimulatedTerminal {
         }
     }
 
-    /// Fraction of the bandwidth that was used in the last run.
+    /// Fraction of the bandwidth used in the last run.
     fn bandwidth_share(&self, milliseconds: u64) -> f64 {
         self.carried as f64 / (self.bytes_a_second * milliseconds as f64 / 1e3)
     }
 }
 
 #[test]
-fn connections_are_filled_with_short_queues() {
+fn full_bandwidth_with_short_queues() {
     for (bytes_a_second, milliseconds) in
         [(125e3, 150), (125e3, 20), (1.25e6, 150), (16e3, 150), (16e3, 600), (1e8, 1), (6e3, 300)]
     {
@@ -93,7 +93,7 @@ fn connections_are_filled_with_short_queues() {
         terminal.run(10_000);
         let name = format!("{bytes_a_second} B/s, {milliseconds} ms");
         assert!(terminal.most_in_flight <= MAX_WINDOW, "{name}: {}", terminal.most_in_flight);
-        // The minimum window is more than the slowest connections carry in that time.
+        // The minimum window is larger than what the slowest connections carry in that time.
         let longest = MAX_QUEUE.as_secs_f64() * 2.0 + MIN_WINDOW / bytes_a_second;
         assert!(terminal.longest.as_secs_f64() <= longest, "{name}: {:?}", terminal.longest);
         let most = MAX_WINDOW as f64 / (bytes_a_second * milliseconds as f64 / 1e3);
@@ -140,7 +140,7 @@ fn multiplexed_terminals_are_paced_by_time() {
 }
 
 #[test]
-fn stalled_connection_gets_little_and_recovers() {
+fn stalled_connection_recovers() {
     let mut terminal = SimulatedTerminal::new(125e3, 150, true, false);
     terminal.run(3_000);
     let lost = std::mem::take(&mut terminal.due);
@@ -154,7 +154,7 @@ fn stalled_connection_gets_little_and_recovers() {
 }
 
 #[test]
-fn lost_reply_delays_the_screen_by_a_second() {
+fn lost_reply_delays_output_by_a_second() {
     let mut connection = Connection::new(false, Instant::now());
     let now = Instant::now();
     connection.send(100, Some(QueryKind::Attributes), now);
@@ -164,7 +164,7 @@ fn lost_reply_delays_the_screen_by_a_second() {
     assert_eq!(connection.max_slice(sent + Duration::from_millis(900)), 0);
     assert_eq!(connection.wake(sent), Some(sent + SILENCE));
     assert!(connection.max_slice(sent + SILENCE) > 0);
-    // With long round trips, the timeout is longer.
+    // The timeout grows with the round-trip time.
     let mut slow = Connection::new(false, now);
     slow.send(100, Some(QueryKind::Attributes), now);
     slow.answered(QueryKind::Attributes, now + Duration::from_millis(800));
@@ -174,7 +174,7 @@ fn lost_reply_delays_the_screen_by_a_second() {
 }
 
 #[test]
-fn idle_connection_needs_no_wakeup() {
+fn idle_connection_needs_no_wakeups() {
     let mut terminal = SimulatedTerminal::new(1e8, 1, true, false);
     terminal.run(100);
     terminal.now += Duration::from_secs(1);
@@ -187,7 +187,7 @@ fn idle_connection_needs_no_wakeup() {
 }
 
 #[test]
-fn unsolicited_replies_change_nothing() {
+fn unsolicited_replies_are_ignored() {
     let mut connection = Connection::new(false, Instant::now());
     let now = Instant::now();
     connection.answered(QueryKind::Status, now);
@@ -199,7 +199,7 @@ fn unsolicited_replies_change_nothing() {
 }
 
 #[test]
-fn small_slices_make_a_terminal_fast_again() {
+fn small_slices_can_make_terminal_fast_again() {
     let mut connection = Connection::new(false, Instant::now());
     let mut now = Instant::now();
     let mut answer = |connection: &mut Connection, bytes: usize, milliseconds: u64| {

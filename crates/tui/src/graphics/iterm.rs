@@ -6,7 +6,7 @@ use super::base64::encoded;
 use super::png::png;
 use crate::film::Picture;
 
-/// The command that shows an image at the cursor over these cells.
+/// The command that draws an image at the cursor, covering these cells.
 pub(super) fn encode(picture: &Picture, cells: Rect) -> Vec<u8> {
     let png = png(picture);
     let keys = format!(

@@ -6,12 +6,12 @@ use super::base64::encoded;
 use super::png::png;
 use crate::film::Picture;
 
-/// IDs of the two alternating images, unlikely to be used by other programs.
+/// IDs of the two alternating images. Other programs are unlikely to use them.
 const IDS: [u32; 2] = [0x67_6c_69, 0x6d_74_01];
 /// Maximum length of a chunk.
 const CHUNK: usize = 4096;
 
-/// The commands that show an image at the cursor over these cells and then delete the previous one.
+/// The commands that draw an image at the cursor, covering these cells, and then delete the previous image.
 pub(super) fn encode(picture: &Picture, cells: Rect, turn: bool) -> Vec<Vec<u8>> {
     let [id, other] = if turn { IDS } else { [IDS[1], IDS[0]] };
     let data = encoded(&png(picture));
@@ -19,7 +19,7 @@ pub(super) fn encode(picture: &Picture, cells: Rect, turn: bool) -> Vec<Vec<u8>>
     let mut commands = Vec::with_capacity(count);
     for (i, chunk) in data.chunks(CHUNK).enumerate() {
         let more = u8::from(i + 1 < count);
-        // Do not move the cursor and do not send a reply.
+        // Do not move the cursor or request a reply.
         let keys = if i == 0 {
             format!("a=T,f=100,i={id},p=1,c={},r={},C=1,q=2,m={more}", cells.width, cells.height)
         } else {

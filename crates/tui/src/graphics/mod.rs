@@ -1,8 +1,8 @@
-//! The preview in pixels, for terminals with an image protocol.
+//! Preview drawn as pixels, for terminals with an image protocol.
 //!
-//! An image is one large update. The next one is encoded only when the previous one has been sent, so it is
-//! always the newest. Images are sent in pieces that are subject to flow control, and other output may be
-//! sent in between.
+//! Each image is a single large update. The next image is encoded only after the previous one has been sent,
+//! so the newest one is always used. Images are sent in pieces that are subject to flow control, and other
+//! output may be sent between pieces.
 
 pub(super) mod base64;
 mod iterm;
@@ -30,11 +30,11 @@ pub(super) enum Protocol {
     Kitty,
     /// DEC's sixels: foot, xterm with `-ti vt340`, mlterm, tmux.
     Sixel,
-    /// iTerm2's protocol; see [`Brand`](super::terminals::Brand) for its terminals.
+    /// iTerm2's protocol. See [`Brand`](super::terminals::Brand) for terminals that support it.
     Iterm,
 }
 
-/// An image and the cells that it covers.
+/// An image and the cells it covers.
 #[derive(Clone, Debug)]
 pub(super) struct PixelPlacement {
     pub(super) picture: Arc<Picture>,
@@ -49,11 +49,11 @@ impl PartialEq for PixelPlacement {
     }
 }
 
-/// Approximate bytes per pixel; noise hardly compresses.
+/// Approximate bytes per pixel. Noise hardly compresses.
 const PIXEL_BYTES: f64 = 2.0;
-/// Maximum size of an image. tmux passes on less than a megabyte.
+/// Maximum size of an image in bytes. tmux passes on less than a megabyte.
 const MAX_BYTES: f64 = 600_000.0;
-/// Maximum time to send an intermediate and a final image.
+/// Maximum time to send intermediate and final images.
 const MOVING_SECONDS: f64 = 0.4;
 const STILL_SECONDS: f64 = 1.5;
 
@@ -61,26 +61,26 @@ const STILL_SECONDS: f64 = 1.5;
 #[derive(Debug)]
 pub(super) struct Images {
     protocol: Protocol,
-    /// Whether sequences are wrapped for tmux.
+    /// Whether escape sequences are wrapped for tmux.
     is_wrapped: bool,
     wanted: Option<PixelPlacement>,
-    /// The image on the screen once all pieces have arrived.
+    /// The image shown once all pieces have arrived.
     shown: Option<PixelPlacement>,
     is_still: bool,
-    /// Whether the shown image was reduced to save bytes.
+    /// Whether the displayed image was downscaled to save bytes.
     is_coarse: bool,
     pieces: VecDeque<Vec<u8>>,
-    /// Whether kitty's second image is shown. The two alternate, so the old image is deleted when the new one
-    /// is visible.
+    /// Whether kitty's second image is shown. The two images alternate so that the old one is deleted only
+    /// when the new one is visible.
     turn: bool,
-    /// Palette of the last sixel image.
+    /// Palette of the last Sixel image.
     palette: Option<Palette>,
 }
 
 impl Images {
-    /// No images yet. `is_wrapped` inside tmux.
+    /// Creates an empty state. `is_wrapped` inside tmux.
     pub(super) fn new(protocol: Protocol, is_wrapped: bool) -> Self {
-        // tmux draws sixels itself.
+        // tmux draws Sixel images itself.
         let is_wrapped = is_wrapped && protocol != Protocol::Sixel;
         Self {
             protocol,
@@ -95,8 +95,8 @@ impl Images {
         }
     }
 
-    /// Sets the image to show; `is_still` if it is final. Returns the cells that an image no longer covers
-    /// and that must be redrawn.
+    /// Sets the image to show. `is_still` if it is final. Returns the cells that are no longer covered by an
+    /// image and must be redrawn.
     pub(super) fn set_target(&mut self, wanted: Option<PixelPlacement>, is_still: bool) -> Option<Rect> {
         (self.wanted, self.is_still) = (wanted, is_still);
         let shown = self.shown.as_ref()?.cells;
@@ -166,11 +166,11 @@ impl Images {
         self.shown = Some(wanted);
     }
 
-    /// Positions the cursor at the top left cell and restores it afterwards.
+    /// Positions the cursor at the top-left cell and restores it afterwards.
     fn at_cell(&self, cells: Rect, body: Vec<u8>) -> Vec<u8> {
         let mut bytes = format!("\x1b7\x1b[{};{}H", cells.y + 1, cells.x + 1).into_bytes();
         if self.is_wrapped {
-            // tmux moves the real cursor when it draws, so print a blank there and step back.
+            // tmux moves the real cursor only when it draws, so print a blank there and step back.
             bytes.extend_from_slice(b"\x1b[0m ");
             bytes.extend(self.wrap_for_tmux([b"\x1b[D".to_vec(), body].concat()));
         } else {
@@ -185,7 +185,7 @@ impl Images {
     }
 }
 
-/// Wraps a sequence so that tmux passes it on if `allow-passthrough` is on.
+/// Wraps an escape sequence so that tmux passes it on, provided that `allow-passthrough` is on.
 pub(super) fn wrapped(body: &[u8]) -> Vec<u8> {
     let mut bytes = b"\x1bPtmux;".to_vec();
     for &byte in body {

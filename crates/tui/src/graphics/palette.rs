@@ -1,23 +1,25 @@
-//! Palette quantization: color boxes are split where their squared error is largest, and each becomes its
-//! mean (after X. Wu, "Efficient statistical computations for optimal color quantization", 1991).
+//! Palette quantization. The color box with the largest squared error is split repeatedly, and the mean of
+//! each final box becomes a palette color (after X. Wu, "Efficient statistical computations for optimal color
+//! quantization", 1991).
 //!
-//! Successive previews of a render are similar, so a palette is kept while it fits; otherwise colors would
-//! flicker. Other colors are dithered.
+//! Successive previews of a render are similar, so the palette is reused while it fits, which prevents
+//! flicker. Colors outside the palette are dithered.
 
 use std::ops::Range;
 
 use crate::color::{PaletteDither, dithered_to_6_bits};
 use crate::film::Picture;
 
-/// Maximum number of colors: registers below 16 belong to the terminal.
+/// Maximum number of colors. Registers below 16 are reserved for the terminal.
 const MAX: usize = 240;
 /// Bits per channel of the histogram.
 const BITS: u32 = 6;
-/// A palette is kept while its RMS error is at most `WORSE` times the error of a new one plus `ALLOWED` codes.
+/// The palette is reused while its RMS error is at most `WORSE` times the error of a new palette plus
+/// `ALLOWED` code values.
 const WORSE: f64 = 1.2;
 const ALLOWED: f64 = 1.5;
 
-/// The colors that show an image.
+/// Palette colors for an image.
 #[derive(Debug)]
 pub(super) struct Palette {
     colors: Vec<[u8; 3]>,
@@ -25,7 +27,7 @@ pub(super) struct Palette {
 }
 
 impl Palette {
-    /// The palette for an image: the previous one if it still fits.
+    /// Returns the palette for an image, reusing the previous one if it still fits.
     pub(super) fn for_picture(picture: &Picture, before: Option<Self>) -> Self {
         let mut bins = bins(picture);
         let colors = split_bins(&mut bins);
@@ -61,7 +63,7 @@ impl Bin {
     }
 }
 
-/// The histogram of an image, without empty bins.
+/// Histogram of an image's colors, without empty bins.
 fn bins(picture: &Picture) -> Vec<Bin> {
     let mut bins = vec![Bin::default(); 1 << (3 * BITS)];
     for rgb in &picture.pixels {
@@ -76,11 +78,11 @@ fn bins(picture: &Picture) -> Vec<Bin> {
     bins
 }
 
-/// Bins that become one palette color.
+/// Bins that are merged into one palette color.
 struct ColorBox {
     bins: Range<usize>,
     mean: [f64; 3],
-    /// Axis with the largest squared error, and that error.
+    /// Axis with the largest squared error, and its error.
     axis: usize,
     error: f64,
 }
@@ -96,13 +98,14 @@ impl ColorBox {
         };
         let errors: [f64; 3] = std::array::from_fn(along);
         let axis = (0..3).max_by(|a, b| errors[*a].total_cmp(&errors[*b])).unwrap_or(0);
-        // A single bin cannot be split, even if rounding gives it an error.
+        // A single bin cannot be split, even if rounding gives it a nonzero error.
         let error = if bins.len() > 1 { errors[axis] } else { 0.0 };
         Self { bins, mean, axis, error }
     }
 }
 
-/// Splits the worst box until there are enough or all are exact. Returns the mean colors of the boxes.
+/// Splits the box with the largest error until there are enough boxes or all are exact. Returns the mean
+/// color of each box.
 fn split_bins(bins: &mut [Bin]) -> Vec<[u8; 3]> {
     let mut boxes = vec![ColorBox::of(bins, 0..bins.len())];
     while boxes.len() < MAX {
@@ -112,7 +115,7 @@ fn split_bins(bins: &mut [Bin]) -> Vec<[u8; 3]> {
         let own = &mut bins[range.clone()];
         own.sort_by(|a, b| a.mean()[axis].total_cmp(&b.mean()[axis]));
         let middle = range.start + own.partition_point(|bin| bin.mean()[axis] < mean[axis]);
-        // Rounding may put all bins on one side.
+        // Rounding may put all bins on one side of the split.
         let middle = middle.clamp(range.start + 1, range.end - 1);
         boxes.push(ColorBox::of(bins, range.start..middle));
         boxes.push(ColorBox::of(bins, middle..range.end));
@@ -120,7 +123,7 @@ fn split_bins(bins: &mut [Bin]) -> Vec<[u8; 3]> {
     boxes.iter().map(|own| own.mean.map(|channel| channel.round() as u8)).collect()
 }
 
-/// RMS distance, in codes, between the colors of an image and the nearest palette colors.
+/// RMS distance between an image's colors and the nearest palette colors, in code values.
 fn error(bins: &[Bin], colors: &[[u8; 3]]) -> f64 {
     let nearest = |mean: [f64; 3]| {
         let distance = |color: &[u8; 3]| -> f64 {
@@ -136,7 +139,7 @@ fn error(bins: &[Bin], colors: &[[u8; 3]]) -> f64 {
 mod tests {
     use super::*;
 
-    /// A ramp from dark to light with a spot of another color.
+    /// A dark-to-light ramp with a spot of another color.
     fn ramp(most: f64) -> Picture {
         let pixel = |i: u32| {
             let light = f64::from(i % 128) / 127.0 * most;
@@ -156,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn few_colors_are_exact_and_rare_ones_kept() {
+    fn few_colors_are_exact_and_rare_ones_are_kept() {
         let (red, blue) = ([255, 0, 0], [0, 0, 255]);
         let pixels = (0..4096).map(|i| if i == 77 { red } else { blue }).collect();
         let picture = Picture { width: 64, height: 64, pixels };
@@ -168,11 +171,11 @@ mod tests {
     }
 
     #[test]
-    fn ramp_has_no_visible_bands() {
+    fn ramp_has_no_visible_banding() {
         let picture = ramp(255.0);
         let mut palette = Palette::for_picture(&picture, None);
         let error = mean_error(&picture, &mut palette);
-        // For comparison: xterm's cube has steps of 40 codes.
+        // For comparison: xterm's cube has steps of 40 code values.
         assert!(error < 4.0, "{error}");
         let indices = palette.indices(&picture);
         let means = indices.chunks(8).map(|run| {
@@ -181,7 +184,7 @@ mod tests {
         let wanted =
             picture.pixels.chunks(8).map(|run| run.iter().map(|rgb| f64::from(rgb[2])).sum::<f64>() / 8.0);
         let most = means.zip(wanted).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-        assert!(most < 8.0, "{most}: the mean of eight pixels");
+        assert!(most < 8.0, "{most}: error of eight-pixel means");
     }
 
     #[test]
@@ -189,7 +192,7 @@ mod tests {
         let first = Palette::for_picture(&ramp(255.0), None);
         let colors = first.colors().to_vec();
         let same = Palette::for_picture(&ramp(253.0), Some(first));
-        assert_eq!(same.colors(), colors, "nearly the same image");
+        assert_eq!(same.colors(), colors, "palette reused for a nearly identical image");
         let mut other = ramp(255.0);
         other.pixels.iter_mut().for_each(|rgb| rgb.swap(0, 2));
         assert_ne!(Palette::for_picture(&other, Some(same)).colors(), colors);

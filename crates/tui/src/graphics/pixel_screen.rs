@@ -1,22 +1,22 @@
-//! A minimal terminal for images in pixels, for tests and benchmarks.
+//! A minimal terminal that displays images, for tests and benchmarks.
 
 use super::base64::decoded;
 use crate::film::Picture;
 
-/// A terminal that understands only kitty's graphics and sixels, and shows the last complete image.
+/// A terminal that understands only kitty graphics and Sixel, and shows the last complete image.
 #[derive(Debug, Default)]
 pub struct PixelScreen {
-    /// The current control string, with its introducer.
+    /// The control string being received, including its introducer.
     string: Option<Vec<u8>>,
     is_escaped: bool,
-    /// Base64 data of kitty's chunks so far.
+    /// Base64 data from the kitty chunks received so far.
     chunks: Vec<u8>,
     shown: Option<Picture>,
     count: usize,
 }
 
 impl PixelScreen {
-    /// Processes terminal output, split anywhere.
+    /// Processes terminal output, which may be split at any byte.
     pub fn take(&mut self, bytes: &[u8]) {
         for byte in bytes {
             let is_escaped = std::mem::replace(&mut self.is_escaped, *byte == 0x1b);
@@ -56,7 +56,7 @@ impl PixelScreen {
         }
     }
 
-    /// Handles one of kitty's commands. Returns the image if this is its last chunk.
+    /// Handles a kitty command. Returns the image if this is its last chunk.
     fn chunk(&mut self, command: &[u8]) -> Option<Picture> {
         let split = command.iter().position(|byte| *byte == b';')?;
         let (keys, data) = (std::str::from_utf8(&command[..split]).ok()?, &command[split + 1..]);
@@ -81,7 +81,7 @@ fn png(bytes: &[u8]) -> Option<Picture> {
     })
 }
 
-/// Decodes a sixel string that contains its size and palette.
+/// Decodes a Sixel string that includes its size and palette.
 fn sixel(string: &[u8]) -> Option<Picture> {
     let start = string.iter().position(|byte| *byte == b'q')? + 1;
     let mut rest = &string[start..];
@@ -120,7 +120,7 @@ fn sixel(string: &[u8]) -> Option<Picture> {
     Some(Picture { width: width as u32, height: height as u32, pixels })
 }
 
-/// Parses and removes the semicolon-separated numbers at the start.
+/// Parses and removes leading numbers separated by semicolons.
 fn numbers(rest: &mut &[u8]) -> Vec<usize> {
     let end = rest.iter().position(|byte| !matches!(byte, b'0'..=b'9' | b';')).unwrap_or(rest.len());
     let (text, after) = rest.split_at(end);

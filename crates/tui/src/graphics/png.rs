@@ -1,8 +1,8 @@
-//! PNG encoding for the protocols that use it.
+//! PNG encoding for the image protocols that use it.
 
 use crate::film::Picture;
 
-/// Encodes an image as PNG with fast compression; empty on failure.
+/// Encodes an image as PNG with fast compression. Returns an empty vector on failure.
 pub(super) fn png(picture: &Picture) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut encoder = ::png::Encoder::new(&mut bytes, picture.width, picture.height);

@@ -1,5 +1,5 @@
-//! Sixels (DEC, "VT330/VT340 Programmer Reference Manual", chapter 14): columns of six pixels, one color at a
-//! time.
+//! Sixel encoding (DEC, "VT330/VT340 Programmer Reference Manual", chapter 14): columns of six pixels, one
+//! color at a time.
 
 use ratatui::layout::Rect;
 
@@ -7,14 +7,14 @@ use super::palette::Palette;
 use crate::film::Picture;
 use crate::rescale::resized;
 
-/// Register of the first palette color; lower ones belong to the terminal.
+/// Register of the first palette color. Lower registers are reserved for the terminal.
 const FIRST: u8 = 16;
 /// Number of registers.
 const REGISTERS: usize = 256;
 
-/// Encodes an image to be drawn at the cursor, covering these cells of `cell` pixels each. The palette is made from
-/// the image, or kept if it still fits. An image with fewer pixels is enlarged after its colors have been
-/// chosen, so time and memory depend on its own size.
+/// Encodes an image to be drawn at the cursor, covering these cells, with a cell size of `cell` pixels. The
+/// palette is reused if it still fits the image and recomputed otherwise. Images with fewer pixels are
+/// enlarged after quantization, so time and memory depend only on the image's own size.
 pub(super) fn encode(
     picture: &Picture,
     cells: Rect,
@@ -35,7 +35,7 @@ pub(super) fn encode(
         let [r, g, b] = color.map(|level| (u32::from(level) * 100 + 127) / 255);
         bytes.extend(format!("#{register};2;{r};{g};{b}").into_bytes());
     }
-    // Each sixel column and row shows the pixel at its middle.
+    // Each sixel column and row shows the pixel at its center.
     let middle = |i: u32, count: u32, of: u32| {
         ((2 * u64::from(i) + 1) * u64::from(of) / (2 * u64::from(count))) as usize
     };
@@ -52,10 +52,10 @@ pub(super) fn encode(
     bytes
 }
 
-/// Six pixel rows, with separate sixels for each color.
+/// Six pixel rows, with a separate set of sixels for each color.
 struct Band {
     width: usize,
-    /// Sixels of all registers, one register after another.
+    /// Sixels of all registers, concatenated.
     sixels: Vec<u8>,
     is_used: [bool; REGISTERS],
 }
@@ -73,8 +73,7 @@ impl Band {
         }
     }
 
-    /// Appends the sixels of each color with a carriage return after each, then a line feed, and clears the
-    /// band.
+    /// Appends the sixels of each color followed by a carriage return, then a line feed, and clears the band.
     fn push(&mut self, bytes: &mut Vec<u8>) {
         for register in (0..REGISTERS).filter(|register| std::mem::take(&mut self.is_used[*register])) {
             bytes.extend(format!("#{register}").into_bytes());
@@ -87,7 +86,7 @@ impl Band {
     }
 }
 
-/// Appends run-length encoded sixels without trailing empty ones.
+/// Appends run-length encoded sixels, omitting trailing empty ones.
 fn push_runs(sixels: impl Iterator<Item = u8>, bytes: &mut Vec<u8>) {
     let mut push = |sixel: u8, count: usize| match count {
         0..4 => bytes.extend(std::iter::repeat_n(sixel, count)),

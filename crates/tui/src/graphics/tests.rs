@@ -17,19 +17,19 @@ fn all(images: &mut Images) -> String {
 }
 
 #[test]
-fn pending_images_are_replaced_by_the_newest() {
+fn newest_image_replaces_pending_ones() {
     let mut images = Images::new(Protocol::Kitty, false);
     assert!(images.is_complete() && images.slice(5000, None).is_none());
     let (first, second, third) = (placement(1, 2), placement(2, 2), placement(3, 2));
     images.set_target(Some(first), false);
     let begin = String::from_utf8(images.slice(100, None).expect("a piece")).expect("ASCII");
     assert!(begin.starts_with("\x1b_Ga=T,f=100,i=6777961,p=1,c=8,r=3,C=1,q=2,m=1;"), "{begin}");
-    // More images arrive while it is being sent; only the last one follows.
+    // Of the images that arrive while one is being sent, only the last is sent.
     images.set_target(Some(second), false);
     images.set_target(Some(third.clone()), true);
     let rest = all(&mut images);
     assert_eq!(rest.matches("a=T").count(), 1);
-    assert_eq!(rest.matches("\x1b7\x1b[2;3H").count(), 2, "the last chunk of each shows it");
+    assert_eq!(rest.matches("\x1b7\x1b[2;3H").count(), 2, "each image is shown by its last chunk");
     assert!(images.is_complete());
     images.set_target(Some(third), true);
     assert_eq!(all(&mut images), "");
@@ -51,12 +51,12 @@ fn kitty_chunks_are_short_and_images_alternate() {
 }
 
 #[test]
-fn moved_image_uncovers_its_cells() {
+fn moving_an_image_uncovers_its_old_cells() {
     for protocol in [Protocol::Kitty, Protocol::Sixel, Protocol::Iterm] {
         let mut images = Images::new(protocol, false);
         assert_eq!(images.set_target(Some(placement(1, 2)), true), None);
         all(&mut images);
-        assert_eq!(images.set_target(Some(placement(2, 2)), true), None, "a new image at the same position");
+        assert_eq!(images.set_target(Some(placement(2, 2)), true), None, "the position is unchanged");
         all(&mut images);
         assert_eq!(images.set_target(Some(placement(2, 3)), true), Some(Rect::new(2, 1, 8, 3)));
         all(&mut images);
@@ -74,7 +74,7 @@ fn slow_connections_get_coarser_images() {
     let coarse = images.slice(5000, Some(1000.0)).expect("a picture").len();
     assert!(images.is_complete());
     images.set_target(Some(picture), true);
-    assert!(!images.is_complete(), "a final image may take longer");
+    assert!(!images.is_complete(), "sending a final image may take longer");
     let fine = images.slice(5000, Some(10_000.0)).expect("a picture").len();
     assert!(coarse * 4 < fine, "{coarse} {fine}");
     assert!(images.is_complete());
@@ -94,7 +94,7 @@ fn tmux_sequences_are_wrapped() {
 }
 
 #[test]
-fn sixels_match_size_and_colors() {
+fn sixel_size_and_colors_match_the_image() {
     let mut placed = placement(0, 0);
     let pixels = (0..64 * 48).map(|i| if i % 64 < 32 { [255, 0, 0] } else { [0, 0, 255] }).collect();
     placed.picture = Arc::new(Picture { width: 64, height: 48, pixels });
@@ -104,14 +104,14 @@ fn sixels_match_size_and_colors() {
     assert!(bytes.contains("\x1bP0;1;0q\"1;1;64;48#16;2;100;0;0#17;2;0;0;100"), "{bytes}");
     assert!(bytes.contains("#16!32~$#17!32?!32~$-"), "{bytes}");
     assert!(bytes.ends_with("-\x1b\\\x1b8"));
-    assert_eq!(bytes.matches('-').count(), 8, "48 rows are 8 bands");
+    assert_eq!(bytes.matches('-').count(), 8, "48 rows make 8 bands");
 }
 
 #[test]
 fn sixel_images_are_resized_to_their_cells() {
-    // Levels that need no dithering to 63 steps.
+    // Channel values that are exact with 63 steps, so they need no dithering.
     let color = |x: u32, y: u32| [(85 * x) as u8, (85 * y) as u8, 255 * ((x + y) % 2) as u8];
-    // The window has 64 × 48 pixels, so the images are scaled by 16 and by 1/10.
+    // The window is 64 × 48 pixels, so the images are scaled by 16 and by 1/10.
     for (width, height) in [(4, 3), (640, 480)] {
         let pixels = (0..width * height).map(|i| color(i % width * 4 / width, i / width * 3 / height));
         let mut placed = placement(0, 0);

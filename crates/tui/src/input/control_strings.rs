@@ -1,4 +1,4 @@
-//! Terminal replies in control strings: name, colors and capabilities.
+//! Terminal replies sent as control strings: name, colors and capabilities.
 
 use crate::graphics::Protocol;
 use crate::pixel_request::QUERY_ID;
@@ -22,7 +22,7 @@ enum ReportKind {
     Capability,
 }
 
-/// Maximum length; longer strings contain nothing useful.
+/// Maximum length in bytes. Longer strings contain nothing useful.
 const LONGEST: usize = 256;
 
 impl ControlString {
@@ -52,13 +52,13 @@ impl ControlString {
     }
 }
 
-/// Whether a capability is `RGB` or `Tc`. Names are in hexadecimal.
+/// Whether a capability is `RGB` or `Tc`. Names are hex-encoded.
 fn has_true_color(text: &[u8]) -> bool {
     let names = text.split(|byte| *byte == b';').filter_map(|item| item.split(|byte| *byte == b'=').next());
     names.into_iter().any(|name| name == b"524742" || name == b"5463")
 }
 
-/// Parses an operating system command (OSC): a palette or background color.
+/// Parses an operating system command (OSC) that reports a palette or background color.
 pub(super) fn command(params: &[&[u8]]) -> TerminalReply {
     let color = |text: &[u8]| color(std::str::from_utf8(text).ok()?);
     let answer = match params {
@@ -71,7 +71,7 @@ pub(super) fn command(params: &[&[u8]]) -> TerminalReply {
     answer.unwrap_or(TerminalReply::Other)
 }
 
-/// Parses an application program command (APC): kitty's reply to the image query.
+/// Parses an application program command (APC) that contains kitty's reply to the image query.
 pub(super) fn application(text: &[u8]) -> TerminalReply {
     let of_query = format!("Gi={QUERY_ID};OK");
     if text == of_query.as_bytes() { TerminalReply::Images(Protocol::Kitty) } else { TerminalReply::Other }
@@ -81,7 +81,8 @@ fn number(text: &[u8]) -> Option<u8> {
     std::str::from_utf8(text).ok()?.parse().ok()
 }
 
-/// Parses an X11 color: `rgb:r/g/b` or `rgba:r/g/b/a` with 1 to 4 hexadecimal digits each, or `#rrggbb`.
+/// Parses an X11 color: `rgb:r/g/b` or `rgba:r/g/b/a` with 1 to 4 hexadecimal digits per component, or
+/// `#rrggbb`.
 fn color(text: &str) -> Option<[u8; 3]> {
     if let Some(digits) = text.strip_prefix('#').filter(|digits| digits.len() == 6 && digits.is_ascii()) {
         let channel = |i: usize| u8::from_str_radix(&digits[2 * i..2 * i + 2], 16).ok();

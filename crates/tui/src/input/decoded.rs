@@ -8,7 +8,7 @@ use crate::terminal_replies::TerminalReply;
 pub(crate) enum DecodedInput {
     Key(KeyPress),
     Mouse(Mouse),
-    /// Pasted text; its content is not kept.
+    /// Pasted text. Its content is discarded.
     Paste,
     TerminalReply(TerminalReply),
 }

@@ -1,7 +1,7 @@
-//! Decodes terminal input that may be split anywhere.
+//! Decodes terminal input that may be split at any byte.
 //!
-//! An escape character is both a key and the start of most sequences; only timing tells them apart. A
-//! sequence that does not end in time is dropped, so no byte can block the keyboard.
+//! An escape character can be the Escape key or the start of a sequence. Only timing distinguishes the two. A
+//! sequence that does not end in time is dropped, so no input can block the keyboard.
 
 use std::time::{Duration, Instant};
 
@@ -13,37 +13,37 @@ use super::paste::Paste;
 use crate::event::KeyPress;
 
 const ESCAPE: u8 = 0x1b;
-/// Bytes that follow the escape character in a terminal's sequences: CSI, OSC, SS3, DCS, SOS, PM, APC, and
-/// the string terminator.
+/// Bytes that can follow the escape character in a terminal's sequences: CSI, OSC, SS3, DCS, SOS, PM, APC,
+/// and the string terminator.
 const INTRODUCERS: &[u8] = b"[]OPX^_\\";
-/// Silence after which an escape character is taken as the key.
+/// Silence after which an escape character is treated as a key press.
 const LONE_ESCAPE: Duration = Duration::from_millis(50);
 /// Timeout between bytes of a sequence, for connections that lose packets.
 const SEQUENCE: Duration = Duration::from_secs(1);
-/// Maximum duration and length of a sequence: alt-`]` starts one that no key ends.
+/// Maximum duration and length of a sequence. For example, alt-`]` starts a sequence that no key press ends.
 const LONGEST: Duration = Duration::from_secs(2);
 const MAX_BYTES: usize = 4096;
-/// Time after an escape key during which `[` may still be part of a sequence.
+/// How long after an Escape key press a `[` may still belong to a sequence.
 const LATE_SEQUENCE: Duration = Duration::from_secs(2);
-/// Time to wait for the byte after such a `[`, and the maximum number of bytes held back.
+/// How long to wait for the next byte after a late `[`, and the maximum number of bytes held back.
 const DOUBT_TIMEOUT: Duration = Duration::from_millis(300);
 const MAX_DOUBTFUL_BYTES: usize = 32;
 
-/// Decodes bytes into input.
+/// Decodes terminal input from bytes.
 #[derive(Default)]
 pub(crate) struct Decoder {
     parser: vte::Parser,
     meaning: KeyParser,
     held: PendingSequence,
-    /// Time of the last byte.
+    /// Time when the last byte arrived.
     last: Option<Instant>,
-    /// Time at which an escape character was taken as the key.
+    /// Time when an escape character was treated as a key press.
     escaped: Option<Instant>,
-    /// Text of the current application program command (APC), which the parser ignores.
+    /// Text of the current application program command (APC). The parser ignores these commands.
     command: Vec<u8>,
 }
 
-/// A sequence that has started and not ended.
+/// A sequence that has started but not ended.
 #[derive(Debug, Default)]
 enum PendingSequence {
     #[default]
@@ -52,13 +52,14 @@ enum PendingSequence {
     Escape,
     /// An escape character that ends a string.
     StringEnd,
-    /// A sequence with its start time and length. `introducer` is the byte after the escape character.
+    /// A sequence with its start time and length. `introducer` is the byte that follows the escape character.
     Sequence {
         begin: Instant,
         bytes: usize,
         introducer: u8,
     },
-    /// Possibly the rest of a sequence whose escape character was taken as the key, or just these keys.
+    /// Either the rest of a sequence whose escape character was treated as a key press, or separate key
+    /// presses.
     Doubtful(Vec<u8>),
     Paste(Paste),
 }
@@ -66,8 +67,9 @@ enum PendingSequence {
 impl Decoder {
     /// Decodes bytes that continue the previous ones.
     pub(crate) fn decode(&mut self, bytes: &[u8], now: Instant) -> Vec<DecodedInput> {
-        // An escape character or doubtful bytes do not expire here: what follows them has arrived, if late.
-        // Neither does a paste: its text may have waited for a busy reader.
+        // An escape character or doubtful bytes do not expire here, because the bytes that follow have
+        // arrived, even if late. A paste does not expire either, because its text may have been waiting for a
+        // busy reader.
         if matches!(self.held, PendingSequence::Sequence { .. }) {
             self.expire_into_found(now);
         }
@@ -78,7 +80,7 @@ impl Decoder {
         std::mem::take(&mut self.meaning.found)
     }
 
-    /// Time at which [`Decoder::expire`] must be called.
+    /// Time when [`Decoder::expire`] must be called.
     pub(super) fn deadline(&self) -> Option<Instant> {
         let after = |wait| self.last.map(|last| last + wait);
         match &self.held {
@@ -106,7 +108,7 @@ impl Decoder {
                 }
                 PendingSequence::Doubtful(bytes) => self.replay(&bytes),
                 PendingSequence::Paste(_) => self.meaning.found.push(DecodedInput::Paste),
-                // Nothing followed, so these are two keys.
+                // Nothing followed, so these are two key presses.
                 PendingSequence::Sequence { bytes: 2, introducer, .. } => {
                     self.press_escape();
                     self.replay(&[introducer]);
@@ -174,7 +176,7 @@ impl Decoder {
                 self.press_escape();
                 self.held = PendingSequence::Escape;
             }
-            // No terminal sends such a sequence.
+            // Not the start of any terminal sequence.
             byte if !INTRODUCERS.contains(&byte) => {
                 self.give_up();
                 self.press_escape();
@@ -239,10 +241,10 @@ impl Decoder {
     }
 }
 
-/// Whether the byte after these two is a key, and so are they: no terminal sends such a sequence.
+/// Whether `byte` cannot follow these two in any terminal's sequence, so all three are key presses.
 fn is_key_behind(introducer: u8, byte: u8) -> bool {
     match introducer {
-        // rxvt uses `a` to `d` for shifted arrows; `n` and `t` end reports.
+        // rxvt uses `a` to `d` for shifted arrows, and reports end with `n` or `t`.
         b'[' => matches!(byte, b'e'..=b'm' | b'o'..=b's' | b'u'..=b'~'),
         b']' => !byte.is_ascii_digit() && byte != ESCAPE,
         b'P' => byte.is_ascii_lowercase(),

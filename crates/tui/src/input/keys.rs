@@ -1,4 +1,4 @@
-//! Translates control sequences into keys and replies (ECMA-48; xterm, "ctlseqs").
+//! Converts control sequences to keys and replies (ECMA-48; xterm, "ctlseqs").
 
 use crossterm::event::{KeyCode, KeyModifiers};
 use vte::{Params, Perform};
@@ -9,12 +9,12 @@ use crate::event::{KeyPress, Mouse, MouseKind};
 use crate::graphics::Protocol;
 use crate::terminal_replies::TerminalReply;
 
-/// Callbacks of the parser, which collect the decoded input.
+/// Parser callbacks that collect the decoded input.
 #[derive(Debug, Default)]
 pub(super) struct KeyParser {
     /// Decoded input, in order.
     pub found: Vec<DecodedInput>,
-    /// Whether a sequence has ended, known or not.
+    /// Whether a sequence has ended, whether or not it was recognized.
     pub has_ended: bool,
     /// Whether a paste has started.
     pub is_paste: bool,
@@ -22,16 +22,16 @@ pub(super) struct KeyParser {
     report: ControlString,
 }
 
-/// Meaning of the next character.
+/// How to interpret the next character.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum NextCharacter {
     #[default]
     Character,
-    /// Last byte of an SS3 key (`ESC O`): arrows of some terminals, F1 to F4.
+    /// Last byte of an SS3 key (`ESC O`): F1 to F4, and arrows on some terminals.
     SingleShift,
-    /// Last byte of a function key of the Linux console (`ESC [ [`).
+    /// Last byte of a Linux console function key (`ESC [ [`).
     Console,
-    /// Remaining bytes of a mouse report in the original format.
+    /// Number of remaining bytes of a mouse report in the original format.
     Mouse(u8),
 }
 
@@ -51,8 +51,8 @@ impl KeyParser {
         self.answer(control_strings::application(text));
     }
 
-    /// Handles a mouse report in SGR format (mode 1006): button with modifier bits, and the cell counted from
-    /// 1.
+    /// Handles a mouse report in SGR format (mode 1006): the button with modifier bits, and the cell, counted
+    /// from 1.
     fn mouse(&mut self, code: u16, (column, row): (u16, u16), is_pressed: bool) {
         const MODIFIERS: u16 = 4 | 8 | 16;
         let kind = match (code & !MODIFIERS, is_pressed) {
@@ -142,11 +142,11 @@ impl Perform for KeyParser {
                 self.answer(TerminalReply::Attributes);
             }
             (b"?$", 'y') if first == 2026 => {
-                // 1 means set and 2 reset; other values mean unknown or permanent.
+                // 1 means set and 2 means reset. Other values mean unknown or permanent.
                 self.answer(TerminalReply::Synchronized { is_known: matches!(second, 1 | 2) });
             }
             ([], '~') if first == 200 => self.is_paste = true,
-            // The end of a paste that had already expired.
+            // The end marker of a paste that has already expired.
             ([], '~') if first == 201 => {}
             ([], '~') => {
                 if let Some(code) = numbered_key(first) {
@@ -162,7 +162,7 @@ impl Perform for KeyParser {
                 self.next = NextCharacter::Mouse(3);
                 self.has_ended = false;
             }
-            // With two numbers it is a cursor position report, not F3.
+            // With two parameters, this is a cursor position report rather than F3.
             ([], 'R') if params.len() > 1 => self.answer(TerminalReply::Other),
             ([], 'I' | 'O') => self.answer(TerminalReply::Focus { is_here: action == 'I' }),
             // Window size report.
@@ -197,7 +197,7 @@ impl Perform for KeyParser {
     }
 }
 
-/// Key of a CSI or SS3 sequence that ends with this letter.
+/// The key for a CSI or SS3 sequence with this final letter.
 fn letter_key(letter: char) -> Option<KeyCode> {
     Some(match letter {
         'A' => KeyCode::Up,
@@ -231,7 +231,7 @@ fn numbered_key(number: u16) -> Option<KeyCode> {
     })
 }
 
-/// Decodes xterm's modifier parameter: 1 plus shift 1, alt 2, ctrl 4, super 8.
+/// Decodes xterm's modifier parameter: 1, plus 1 for shift, 2 for alt, 4 for ctrl, 8 for super.
 fn modifiers(number: u16) -> KeyModifiers {
     let bits = number.saturating_sub(1);
     [(1, KeyModifiers::SHIFT), (2, KeyModifiers::ALT), (4, KeyModifiers::CONTROL), (8, KeyModifiers::SUPER)]

@@ -1,7 +1,8 @@
 //! Terminal input: keys, pasted text and replies.
 //!
-//! One thread polls the terminal and reads whatever is available, so nothing waits for another byte.
-//! [`Decoder`] turns bytes into [`DecodedInput`] and is the only place that knows how keys are encoded.
+//! A single thread polls the terminal and reads whatever is available, so it never blocks waiting for the
+//! rest of a sequence. [`Decoder`] converts bytes to [`DecodedInput`] and is the only code that depends on
+//! the encoding of keys.
 
 mod control_strings;
 mod decoded;
@@ -23,10 +24,11 @@ pub(super) use self::decoded::DecodedInput;
 pub(super) use self::decoder::Decoder;
 use super::event::{Event, EventSource};
 
-/// Reads standard input on a separate thread. Reports the loss of [`EventSource::Keys`] when it ends.
+/// Starts a thread that reads standard input. When the input ends, it reports the loss of
+/// [`EventSource::Keys`].
 ///
 /// # Errors
-/// The system has no thread left.
+/// The thread could not be created.
 pub(super) fn start(events: &Sender<Event>) -> io::Result<()> {
     let events = events.clone();
     let read = move || {
@@ -44,16 +46,16 @@ pub(super) fn start(events: &Sender<Event>) -> io::Result<()> {
     Ok(())
 }
 
-/// Whether another program reads the input.
+/// Whether another program is reading the input.
 static HELD: (Mutex<bool>, Condvar) = (Mutex::new(false), Condvar::new());
 
-/// Leaves the input to another program, or takes it back.
+/// Lets another program read the input, or resumes reading it.
 pub(super) fn set_held(is_held: bool) {
     *HELD.0.lock().unwrap_or_else(PoisonError::into_inner) = is_held;
     HELD.1.notify_all();
 }
 
-/// Waits while another program reads the input. Returns whether one did.
+/// Waits while another program is reading the input. Returns whether it had to wait.
 fn wait_while_held() -> bool {
     let held = HELD.0.lock().unwrap_or_else(PoisonError::into_inner);
     let was_held = *held;
@@ -61,7 +63,7 @@ fn wait_while_held() -> bool {
     was_held
 }
 
-/// Reads and decodes input; empty after a timeout. `None` if the terminal is gone.
+/// Reads and decodes input. Empty after a timeout; `None` if the terminal was closed.
 fn next(decoder: &mut Decoder) -> Option<Vec<DecodedInput>> {
     let mut bytes = [0; 4096];
     let waited = wait(decoder.deadline());
@@ -80,7 +82,7 @@ fn read(bytes: &mut [u8]) -> nix::Result<Option<usize>> {
     nix::unistd::read(io::stdin().as_fd(), bytes).map(Some)
 }
 
-/// Waits for input until the deadline, if any. Returns whether there is input or its end.
+/// Waits for input until the deadline, if any. Returns whether input or end-of-file is available.
 fn wait(deadline: Option<Instant>) -> nix::Result<bool> {
     let stdin = io::stdin();
     let mut ends = [PollFd::new(stdin.as_fd(), PollFlags::POLLIN)];

@@ -1,10 +1,10 @@
-//! Bracketed paste: text between two markers, which is ignored.
+//! Bracketed paste: text between two markers. The text is ignored.
 //!
-//! The keyboard must not be blocked forever if the end marker is lost on the way. A paste expires after one
-//! second without text, or after 200 ms once it has lasted ten seconds or exceeds 1 MiB. It never expires
-//! while text arrives, because the rest would count as keys. Control sequences are not text, since the
-//! terminal sends replies continuously while a preview is drawn. After that, bytes count as keys again and a
-//! late end marker has no effect.
+//! A lost end marker must not block the keyboard forever, so a paste expires after one second without text,
+//! or after 200 ms once it has lasted ten seconds or exceeded 1 MiB. It never expires while text is arriving,
+//! because the rest would be interpreted as key presses. Control sequences do not count as text, because the
+//! terminal keeps sending replies while a preview is drawn. After a paste expires, bytes are interpreted as
+//! key presses again and a late end marker is ignored.
 
 use std::time::{Duration, Instant};
 
@@ -21,7 +21,7 @@ pub(super) struct Paste {
     begin: Instant,
     last: Instant,
     bytes: usize,
-    /// Matched bytes of the end marker.
+    /// Number of end marker bytes matched so far.
     matched: usize,
     sequence: ControlSequence,
 }
@@ -29,7 +29,7 @@ pub(super) struct Paste {
 /// Parser state of a control sequence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum ControlSequence {
-    /// Outside of a sequence.
+    /// Outside a sequence.
     Outside,
     /// After ESC.
     Escape,
@@ -38,7 +38,7 @@ enum ControlSequence {
 }
 
 impl ControlSequence {
-    /// The state after one more byte. `None` if the byte is text.
+    /// The state after another byte. `None` if the byte is text.
     fn after(self, byte: u8) -> Option<Self> {
         match (self, byte) {
             (Self::Outside | Self::Escape | Self::Parameters, 0x1b) => Some(Self::Escape),
@@ -55,13 +55,13 @@ impl Paste {
         Self { begin: now, last: now, bytes: 0, matched: 0, sequence: ControlSequence::Outside }
     }
 
-    /// Time at which the paste expires if nothing more arrives.
+    /// Time when the paste expires if nothing more arrives.
     pub(super) fn deadline(&self) -> Instant {
         let long_at = if self.bytes >= MANY_BYTES { self.last } else { self.begin + LONG };
         (self.last + SILENCE).min(long_at.max(self.last + SHORT_SILENCE))
     }
 
-    /// Takes one byte. Returns whether it completed the end marker.
+    /// Processes one byte. Returns whether it completed the end marker.
     pub(super) fn push(&mut self, byte: u8, now: Instant) -> bool {
         let sequence = self.sequence.after(byte);
         if sequence.is_none() {
@@ -69,7 +69,7 @@ impl Paste {
         }
         self.sequence = sequence.unwrap_or(ControlSequence::Outside);
         self.bytes = self.bytes.saturating_add(1);
-        // No suffix of a partial marker is a prefix of the marker except ESC itself.
+        // Only ESC itself is both a suffix of a partial marker and a prefix of the marker.
         self.matched = match byte {
             _ if END[self.matched] == byte => self.matched + 1,
             0x1b => 1,

@@ -24,7 +24,7 @@ impl DecoderBench {
         self.decoder.decode(bytes, self.now)
     }
 
-    /// Simulates silence, with a wakeup at each deadline.
+    /// Simulates silence, waking up at each deadline.
     fn wait(&mut self, milliseconds: u64) -> Vec<DecodedInput> {
         let end = self.now + Duration::from_millis(milliseconds);
         let mut inputs = Vec::new();
@@ -57,7 +57,7 @@ const READY: DecodedInput = DecodedInput::TerminalReply(TerminalReply::Ready);
 const ESC: DecodedInput = DecodedInput::Key(KeyPress::special(KeyCode::Esc));
 
 #[test]
-fn keys_are_decoded_as_xterm_sends_them() {
+fn xterm_key_encodings_are_decoded() {
     use KeyModifiers as With;
     for (bytes, input) in [
         (&b"q"[..], plain('q')),
@@ -153,7 +153,7 @@ fn left_button_and_wheel_are_decoded() {
 }
 
 #[test]
-fn original_mouse_format_is_not_keys() {
+fn original_mouse_reports_are_not_keys() {
     assert_eq!(read(b"\x1b[M q!q"), [plain('q')]);
 }
 
@@ -170,7 +170,7 @@ fn lone_escape_is_a_key() {
 }
 
 #[test]
-fn sixel_support_is_an_attribute() {
+fn sixel_support_is_read_from_attributes() {
     let answers =
         [TerminalReply::Images(Protocol::Sixel), TerminalReply::Attributes].map(DecodedInput::TerminalReply);
     assert_eq!(read(b"\x1b[?62;4;22c"), answers);
@@ -185,7 +185,7 @@ fn image_replies_do_not_swallow_keys() {
         read(keys),
         [plain('q'), DecodedInput::TerminalReply(TerminalReply::Images(Protocol::Kitty)), plain('s')]
     );
-    // The end of the reply is late.
+    // The end of the reply arrives late.
     let mut bench = DecoderBench::new();
     assert_eq!(
         bench.read(b"\x1b_Gi=4211;OK\x1b"),
@@ -195,9 +195,9 @@ fn image_replies_do_not_swallow_keys() {
     assert_eq!(bench.read(b"\\s"), [plain('s')]);
 }
 
-/// Alt is not used: a character right after an escape character is a separate key.
+/// Alt is not used, so a character right after an escape character is a separate key press.
 #[test]
-fn escape_and_a_fast_key_are_two_keys() {
+fn escape_and_immediate_key_are_two_keys() {
     for key in (b' '..0x7f).filter(|byte| !b"[]OPX^_\\".contains(byte)) {
         let key = char::from(key);
         let bytes = [b"\x1b".as_slice(), key.to_string().as_bytes(), b"q"].concat();
@@ -266,7 +266,7 @@ fn bracket_after_escape_is_a_key() {
 }
 
 #[test]
-fn paste_is_one_event_without_keys() {
+fn paste_is_a_single_event() {
     assert_eq!(read(b"a\x1b[200~q\x1b[20\x1b[201~b"), [plain('a'), DecodedInput::Paste, plain('b')]);
     let mut bench = DecoderBench::new();
     for byte in b"\x1b[200~quit\x1b[A\x03" {
@@ -291,7 +291,7 @@ fn silence_ends_an_unterminated_paste() {
         inputs
     });
     let keys: Vec<DecodedInput> = keys.collect();
-    assert_eq!((keys[0], keys[1]), (DecodedInput::Paste, plain('q')), "a key is pressed repeatedly");
+    assert_eq!((keys[0], keys[1]), (DecodedInput::Paste, plain('q')), "the paste ends despite repeated keys");
 
     let long = [&b"\x1b[200~"[..], &vec![b'q'; (1 << 20) + 3]].concat();
     let mut bench = DecoderBench::new();
@@ -302,7 +302,7 @@ fn silence_ends_an_unterminated_paste() {
 }
 
 #[test]
-fn long_paste_contains_no_keys() {
+fn long_paste_produces_no_keys() {
     let mut bench = DecoderBench::new();
     assert_eq!(bench.read(b"\x1b[200~"), []);
     for _ in 0..3000 {
@@ -321,10 +321,10 @@ fn long_paste_contains_no_keys() {
 }
 
 #[test]
-fn delayed_text_belongs_to_its_paste() {
+fn delayed_text_belongs_to_the_paste() {
     let mut bench = DecoderBench::new();
     assert_eq!(bench.read(b"\x1b[200~q"), []);
-    // Nothing was read in between, so there was no observed silence.
+    // Nothing was read in between, so no silence was observed.
     bench.now += Duration::from_secs(60);
     assert_eq!(bench.read(b"q\x1b[201~"), [DecodedInput::Paste]);
 }
@@ -338,7 +338,7 @@ fn replies_do_not_extend_a_paste() {
         found.extend(bench.read(b"\x1b[0n"));
         found.extend(bench.wait(150));
     }
-    assert_eq!(found[0], DecodedInput::Paste, "one second after the last text");
+    assert_eq!(found[0], DecodedInput::Paste, "the paste ends one second after its last text");
     assert_eq!(bench.read(b"q"), [plain('q')]);
 }
 
@@ -357,7 +357,7 @@ fn unterminated_sequence_is_dropped() {
         keys.extend(bench.read(b"q"));
         bench.wait(300);
     }
-    assert!(!keys.is_empty(), "a key is pressed repeatedly");
+    assert!(!keys.is_empty(), "repeated key presses end the sequence");
     let long = [&b"\x1bP"[..], &vec![b'q'; 5000]].concat();
     assert!(read(&long).contains(&plain('q')), "strings have a maximum length");
 }
@@ -371,7 +371,7 @@ fn invalid_text_does_not_swallow_keys() {
 }
 
 proptest! {
-    /// Input is decoded the same way however it is split.
+    /// Splitting input differently does not change the result.
     #[test]
     fn splits_do_not_matter(parts in prop::collection::vec(0..10_usize, 0..40), cuts in prop::collection::vec(1..5_usize, 200)) {
         let words: [&[u8]; 10] =
@@ -391,7 +391,7 @@ proptest! {
         prop_assert_eq!(split, whole);
     }
 
-    /// After arbitrary bytes and a pause, a key is decoded as a key.
+    /// After arbitrary bytes and a pause, a key press is recognized.
     #[test]
     fn no_input_blocks_the_keyboard(bytes in prop::collection::vec(prop_oneof![Just(0x1b_u8), Just(b'['), Just(b']'), Just(b'P'), any::<u8>()], 0..300)) {
         let mut bench = DecoderBench::new();

@@ -1,24 +1,24 @@
-//! Fits two colors and a block character to the pixels of a cell.
+//! Approximates a cell's pixels by two colors and a block character.
 
 use super::tile::{CellDivision, Grid, Tile};
 use crate::color::oklab;
 use crate::math::Vec3;
 use crate::math::color::{linear_to_srgb8, srgb8_to_linear};
 
-/// A cell of two colors in sRGB.
+/// A cell with two sRGB colors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct FittedCell {
     pub(crate) tile: Tile,
-    /// Colors of the first and the second part.
+    /// Colors of the first and second part.
     pub(crate) pair: [[u8; 3]; 2],
 }
 
-/// A tile other than halves must reduce the mean squared distance in Oklab by at least this. Less is not
-/// visible, would flicker with the noise, and takes more bytes.
+/// Minimum reduction of the mean squared Oklab distance for choosing a tile other than halves. A smaller
+/// improvement is not visible, would flicker with the noise, and takes more bytes.
 const WORTH: f32 = 1e-4;
 
-/// The cell with the least squared distance in Oklab from its pixels. `pixels` are sRGB colors in row order.
-/// Of all divisions, this is the one with the smallest variance within its two parts.
+/// The cell with the smallest squared Oklab distance from its pixels. `pixels` are sRGB colors in row order.
+/// The chosen division minimizes the variance within the two parts.
 pub(crate) fn fit(grid: Grid, pixels: &[[u8; 3]]) -> FittedCell {
     if let ([first, second], Grid::Halves) = (pixels, grid) {
         return FittedCell { tile: Tile::HALVES, pair: [*first, *second] };
@@ -50,7 +50,7 @@ fn division(grid: Grid, pixels: &[Vec3]) -> CellDivision {
             size += sign;
         }
         mask = division.first;
-        // Reduction of the variance.
+        // Reduction in variance.
         let gain = sum.length_squared() / size + (all - sum).length_squared() / (count - size).max(1.0);
         let worth = if division.tile == Tile::HALVES { WORTH * count } else { 0.0 };
         if gain + worth > most {
@@ -69,7 +69,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn two_color_patterns_are_found() {
+    fn two_color_patterns_are_reproduced() {
         let colors = [[200, 20, 20], [20, 40, 180]];
         for grid in [Grid::Quadrants, Grid::Sextants, Grid::Octants] {
             for CellDivision { first, tile } in grid.divisions() {

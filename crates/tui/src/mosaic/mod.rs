@@ -1,4 +1,4 @@
-//! Cells of two colors: block characters, and fitting them to pixels.
+//! Two-color cells: block characters, and fitting them to pixels.
 
 mod fit;
 mod tile;

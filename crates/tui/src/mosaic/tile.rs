@@ -1,21 +1,21 @@
-//! Block characters that fill part of their cell with the foreground: blocks, quadrants, sextants, octants
+//! Block characters that fill part of a cell with the foreground color: blocks, quadrants, sextants, octants
 //! and shades.
 
 use std::collections::HashMap;
 use std::sync::LazyLock;
 
-/// Rows of the grid that describes parts of a cell, divisible into halves, thirds and quarters. It has two
-/// columns.
+/// Number of grid rows for describing parts of a cell, divisible into halves, thirds and quarters. The grid
+/// has two columns.
 pub(crate) const GRID_ROWS: u32 = 12;
 /// Number of squares in the grid.
 pub(crate) const PLACES: u32 = 2 * GRID_ROWS;
 const ALL: u32 = (1 << PLACES) - 1;
 
-/// A division of a cell into two parts, and the characters that show it. The first part contains the top left
+/// A division of a cell into two parts, and the characters that draw it. The first part contains the top left
 /// corner.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Tile {
-    /// Mask of the squares of the first part, in row order.
+    /// Mask of the grid squares in the first part, in row order.
     first: u32,
     symbols: [char; 2],
 }
@@ -29,15 +29,15 @@ impl PartialEq for Tile {
 impl Eq for Tile {}
 
 impl Tile {
-    /// Upper and lower half.
+    /// Upper and lower halves.
     pub(crate) const HALVES: Self = Self { first: (1 << GRID_ROWS) - 1, symbols: ['▀', '▄'] };
-    /// A quarter of the cell in the foreground color. Fonts draw the pattern in different ways.
+    /// A quarter of the cell is filled with the foreground color. The pattern varies between fonts.
     pub(crate) const LIGHT: Self = Self { first: 0x21_21_21, symbols: ['░', '▓'] };
 
-    /// A fine pattern of equal shares of both colors.
+    /// A fine pattern with equal amounts of both colors.
     pub(crate) const MEDIUM: Self = Self { first: CHECKS, symbols: ['▒', '▒'] };
 
-    /// The characters whose foreground is the first and the second part.
+    /// The characters that draw this tile, with the first or the second part in the foreground color.
     pub(crate) fn symbols(self) -> [char; 2] {
         self.symbols
     }
@@ -48,17 +48,17 @@ impl Tile {
         [first, PLACES - first]
     }
 
-    /// Number of squares that each part of this tile shares with each part of the other.
+    /// Number of grid squares shared by each part of this tile with each part of the other.
     pub(crate) fn shared(self, other: Self) -> [[u32; 2]; 2] {
         let parts = |tile: Self| [tile.first, ALL & !tile.first];
         parts(self).map(|own| parts(other).map(|its| (own & its).count_ones()))
     }
 }
 
-/// The tile of a character, and whether its foreground is the second part. `None` for other than block
-/// characters.
+/// The tile drawn by a character, and whether its foreground is the second part. `None` if it is not a block
+/// character.
 pub(crate) fn from_symbol(symbol: char) -> Option<(Tile, bool)> {
-    // Block elements and legacy computing symbols come after all letters, digits and punctuation.
+    // The code points of letters, digits and punctuation are smaller than those of block characters.
     if symbol < '▀' {
         return None;
     }
@@ -66,8 +66,8 @@ pub(crate) fn from_symbol(symbol: char) -> Option<(Tile, bool)> {
     from_mask(*mask)
 }
 
-/// The squares of a cell that a character fills with the foreground, as 12 rows of 2 columns. `None` for
-/// other than block characters.
+/// The grid squares a character fills with the foreground color, as 12 rows of 2 columns. `None` if it is not
+/// a block character.
 pub fn filled_squares(symbol: char) -> Option<[bool; 24]> {
     let mask = match symbol {
         ' ' => 0,
@@ -77,7 +77,8 @@ pub fn filled_squares(symbol: char) -> Option<[bool; 24]> {
     Some(std::array::from_fn(|place| mask >> place & 1 == 1))
 }
 
-/// The tile with this mask as its first part, or as its second part if the top left corner is not in it.
+/// The tile that has this mask as its first part, or as its second part if the mask excludes the top left
+/// corner.
 fn from_mask(mask: u32) -> Option<(Tile, bool)> {
     let is_second = mask & 1 == 0;
     let first = if is_second { ALL & !mask } else { mask };
@@ -86,7 +87,7 @@ fn from_mask(mask: u32) -> Option<(Tile, bool)> {
     Some((tile, is_second))
 }
 
-/// Characters and the squares that they fill.
+/// Characters and the grid squares they fill.
 struct TileTable {
     masks: HashMap<char, u32>,
     symbols: HashMap<u32, char>,
@@ -106,7 +107,7 @@ static TABLE: LazyLock<TileTable> = LazyLock::new(|| {
     let light = Tile::LIGHT.first;
     add('░', light);
     add('▓', ALL & !light);
-    // Inverted, it is a different mask but looks the same.
+    // The inverted mask is different but looks the same.
     for mask in [CHECKS, ALL & !CHECKS] {
         add('▒', mask);
     }
@@ -132,15 +133,15 @@ static TABLE: LazyLock<TileTable> = LazyLock::new(|| {
 /// Checkerboard.
 const CHECKS: u32 = 0x99_99_99;
 
-/// Characters by the quadrants that they fill, lowest bit first (Unicode, "Block Elements").
+/// Characters indexed by the mask of quadrants they fill, lowest bit first (Unicode, "Block Elements").
 const QUADRANTS: [char; 16] =
     [' ', '▘', '▝', '▀', '▖', '▌', '▞', '▛', '▗', '▚', '▐', '▜', '▄', '▙', '▟', '█'];
-/// First sextant (Unicode 13, "Symbols for Legacy Computing"). Sextants are in the order of their masks,
-/// without the left and right half.
+/// First sextant (Unicode 13, "Symbols for Legacy Computing"). Sextants are ordered by mask, omitting the
+/// left and right halves.
 const SEXTANTS: u32 = 0x1_FB00;
 const SEXTANTS_ELSEWHERE: [u32; 2] = [0b01_01_01, 0b10_10_10];
-/// First octant (Unicode 16, "Symbols for Legacy Computing Supplement"). Octants are in the order of their
-/// masks, without those that Unicode already had.
+/// First octant (Unicode 16, "Symbols for Legacy Computing Supplement"). Octants are ordered by mask,
+/// omitting characters that were already in Unicode.
 const OCTANTS: u32 = 0x1_CD00;
 const OCTANTS_ELSEWHERE: [(u32, char); 10] = [
     (0b00_00_00_01, '\u{1CEA8}'),
@@ -168,7 +169,7 @@ fn widened(mask: u32, from: u32, to: u32) -> u32 {
         .fold(0, |all, place| all | 1 << place)
 }
 
-/// The quadrants that are equal to these octants, if any.
+/// The quadrants that fill the same area as these octants, if any.
 fn quadrants(mask: u32) -> Option<u32> {
     (0..16).find(|quadrants| expand_mask(*quadrants, 2) == expand_mask(mask, 4))
 }
@@ -178,7 +179,7 @@ fn quadrants(mask: u32) -> Option<u32> {
 pub(crate) enum Grid {
     Halves,
     Quadrants,
-    /// Sextants, and quadrants as well.
+    /// Sextants and quadrants.
     Sextants,
     Octants,
 }
@@ -186,7 +187,7 @@ pub(crate) enum Grid {
 /// A division of a cell.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct CellDivision {
-    /// Mask of the pixels of the first part, in row order.
+    /// Mask of the pixels in the first part, in row order.
     pub(super) first: u32,
     pub(super) tile: Tile,
 }
@@ -197,7 +198,7 @@ impl Grid {
         if self == Self::Halves { 1 } else { 2 }
     }
 
-    /// Pixels per cell, vertically: enough to distinguish all divisions.
+    /// Pixels per cell, vertically. This is enough to distinguish all divisions.
     pub(crate) fn rows(self) -> u32 {
         match self {
             Self::Halves | Self::Quadrants => 2,
@@ -206,8 +207,8 @@ impl Grid {
         }
     }
 
-    /// All divisions of a cell with two columns, halves first. Most differ from the previous one in a single
-    /// part.
+    /// All divisions of a two-column cell, starting with halves. Most differ from their predecessor by a
+    /// single part.
     pub(super) fn divisions(self) -> &'static [CellDivision] {
         static QUADRANTS: LazyLock<Vec<CellDivision>> = LazyLock::new(|| divisions(2, &[2]));
         static SEXTANTS: LazyLock<Vec<CellDivision>> = LazyLock::new(|| divisions(6, &[2, 3]));
@@ -221,12 +222,12 @@ impl Grid {
     }
 }
 
-/// All divisions into grids of two columns with `part_rows` rows, for a cell of `pixel_rows` pixel rows.
+/// All divisions based on two-column grids with `part_rows` rows, for a cell of `pixel_rows` pixel rows.
 fn divisions(pixel_rows: u32, part_rows: &[u32]) -> Vec<CellDivision> {
     let mut divisions = vec![CellDivision { first: (1 << pixel_rows) - 1, tile: Tile::HALVES }];
     for rows in part_rows {
         let half = 1_u32 << (2 * rows - 1);
-        // Gray code. The top left part is always included.
+        // Iterate in Gray code order. The top left part is always included.
         for mask in (0..half).map(|i| (i ^ i >> 1) << 1 | 1) {
             let of_tile = from_mask(expand_mask(mask, *rows)).map(|(tile, _)| tile);
             let is_new = |tile: &Tile| divisions.iter().all(|division: &CellDivision| division.tile != *tile);
@@ -243,7 +244,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_division_has_its_characters() {
+    fn all_divisions_have_characters() {
         for (grid, count) in [(Grid::Quadrants, 7), (Grid::Sextants, 31 + 6), (Grid::Octants, 127)] {
             let divisions = grid.divisions();
             let mut seen = std::collections::HashSet::new();

@@ -5,24 +5,24 @@ use super::cost_model::CostModel;
 use super::terminal_color::{TerminalColor, digits};
 use crate::color::nearest_256;
 
-/// Maximum number of candidates for one part, and for both parts together.
+/// Maximum number of candidates for each part, and for both parts together.
 const MAX: usize = 6;
-/// Number of following cells that a candidate may cover.
+/// Maximum number of cells that a candidate may cover.
 const LONGEST: usize = 8;
 
-/// Base16 themes with 22 colors replace the first entries of the color cube.
+/// Base16 themes with 22 colors replace the first entries of the color cube, so only later ones are used.
 const FIRST_UNTOUCHED: u8 = 22;
 
-/// Candidate colors for the parts of one cell.
+/// Candidate colors for the parts of a cell.
 #[derive(Clone, Debug, Default)]
 pub(super) struct CandidateColors {
     pub(super) first: Vec<TerminalColor>,
     pub(super) second: Vec<TerminalColor>,
-    /// Colors for both parts at once.
+    /// Colors for both parts together.
     pub(super) both: Vec<TerminalColor>,
 }
 
-/// Candidates for the first of `cells`. Each one also suits as many of the following cells as possible.
+/// Candidates for the first of `cells`. Each candidate also fits as many of the following cells as possible.
 pub(super) fn candidates(cells: &[Option<Mosaic>], model: CostModel) -> CandidateColors {
     let column = |part: usize| cells.iter().map_while(move |cell| cell.map(|mosaic| mosaic.pair[part]));
     let both = cells.iter().map_while(|cell| cell.map(|mosaic| mosaic.pair)).flatten();
@@ -57,7 +57,7 @@ fn shades(wanted: &(impl Iterator<Item = TerminalColor> + Clone), model: CostMod
     shades
 }
 
-/// The colors that suit all of a run of cells.
+/// The range of colors that fit every cell in a run.
 struct CommonColors {
     low: [u8; 3],
     high: [u8; 3],
@@ -65,7 +65,7 @@ struct CommonColors {
     count: u32,
 }
 
-/// The colors within `span` of as many of the leading `wanted` colors as possible.
+/// The range of colors within `span` of each wanted color, for as many leading colors as possible.
 fn common_colors(wanted: impl Iterator<Item = TerminalColor>, span: u8) -> CommonColors {
     let mut common = CommonColors { low: [0; 3], high: [255; 3], sum: [0; 3], count: 0 };
     for shade in wanted.take(LONGEST) {
@@ -89,7 +89,7 @@ impl CommonColors {
         std::array::from_fn(|i| mean(i).clamp(self.low[i], self.high[i]))
     }
 
-    /// The color with the fewest decimal digits, as close to the mean as possible.
+    /// The color with the fewest decimal digits, and as close to the mean as that allows.
     fn shortest(&self) -> [u8; 3] {
         let mean = self.mean();
         std::array::from_fn(|i| {
@@ -116,12 +116,12 @@ mod tests {
     }
 
     #[test]
-    fn candidates_cover_many_neighbors() {
-        // 20 to 22 have 21 in common; 24 does not.
+    fn candidates_cover_many_following_cells() {
+        // 21 is close to 20, 21 and 22, but not to 24.
         let found = candidates(&row(&[20, 21, 22, 24]), CostModel::EXACT);
         assert_eq!(found.first, [TerminalColor::Rgb([21, 50, 99])]);
         assert_eq!(found.second, [TerminalColor::Rgb([0, 0, 0])], "themes may replace color 16");
-        assert_eq!(found.both.len(), 1, "the halves have no common color");
+        assert_eq!(found.both.len(), 1, "no color fits both halves");
         let grays = [Some(Mosaic::plain(TerminalColor::Rgb([8, 8, 8])))];
         assert_eq!(
             candidates(&grays, CostModel::EXACT).first,
@@ -130,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn palette_colors_are_kept_as_they_are() {
+    fn palette_colors_are_kept_unchanged() {
         let cells =
             [Some(Mosaic::halves([TerminalColor::DefaultBackground, TerminalColor::Palette(3)])), None];
         let found = candidates(&cells, CostModel::MOVING);

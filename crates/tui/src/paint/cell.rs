@@ -1,4 +1,4 @@
-//! Appearance of a cell, independent of how it was drawn.
+//! A cell's appearance, independent of how it was drawn.
 
 use ratatui::buffer::Cell;
 use ratatui::style::Modifier;
@@ -9,12 +9,12 @@ use super::terminal_color::{ColorLayer, TerminalColor};
 use crate::color::ColorDepth;
 use crate::mosaic::{PLACES, Tile, from_symbol};
 
-/// Content of one cell.
+/// Content of a cell.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum CellContent {
-    /// The content is not known.
+    /// The content is unknown.
     Unknown,
-    /// Two colors and the tile that divides them. A blank is two halves of the same color.
+    /// A tile with two colors. A blank has two halves of the same color.
     Mosaic(Mosaic),
     /// A character.
     Text(TextCell),
@@ -22,16 +22,16 @@ pub(super) enum CellContent {
     Covered,
 }
 
-/// A cell of two colors.
+/// A cell with two colors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Mosaic {
     pub(super) tile: Tile,
-    /// Colors of the first and the second part.
+    /// Colors of the first and second part.
     pub(super) pair: [TerminalColor; 2],
 }
 
 impl Mosaic {
-    /// Normalizes the tile, so that cells that look the same are equal.
+    /// Normalizes the tile so that cells with the same appearance are equal.
     pub(super) fn new(tile: Tile, pair: [TerminalColor; 2]) -> Self {
         Self { tile: if pair[0] == pair[1] { Tile::HALVES } else { tile }, pair }
     }
@@ -40,12 +40,12 @@ impl Mosaic {
         Self { tile: Tile::HALVES, pair }
     }
 
-    /// A cell of one color.
+    /// A cell with a single color.
     pub(super) fn plain(shade: TerminalColor) -> Self {
         Self::halves([shade; 2])
     }
 
-    /// The mosaic of a block character. `None` for other characters.
+    /// The mosaic for a block character. `None` for other characters.
     fn of(symbol: &str, fg: TerminalColor, bg: TerminalColor) -> Option<Self> {
         match symbol {
             " " => return Some(Self::plain(bg)),
@@ -56,8 +56,8 @@ impl Mosaic {
         Some(Self::new(tile, if is_second { [bg, fg] } else { [fg, bg] }))
     }
 
-    /// Pairs of colors that overlap between this cell and `other`, with twice the fraction of the cell where
-    /// they do.
+    /// Pairs of colors that overlap when this cell is compared with `other`, each with twice the overlapping
+    /// fraction of the cell.
     pub(super) fn against(self, other: Self) -> impl Iterator<Item = (TerminalColor, TerminalColor, f32)> {
         let shared = self.tile.shared(other.tile);
         let pairs = [(0, 0), (0, 1), (1, 0), (1, 1)].into_iter();
@@ -68,7 +68,7 @@ impl Mosaic {
     }
 }
 
-/// A character, possibly of several code points, with its style.
+/// A character, possibly consisting of several code points, with its style.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct TextCell {
     pub(super) symbol: Box<str>,
@@ -78,13 +78,13 @@ pub(super) struct TextCell {
 }
 
 impl TextCell {
-    /// Whether it is a single code point, one column wide.
+    /// Whether it is a single code point that is one column wide.
     pub(super) fn is_plain(&self) -> bool {
         self.columns == 1 && self.symbol.chars().nth(1).is_none()
     }
 }
 
-/// The four ways to fill the two parts of a cell with the two colors of the pen.
+/// The four ways to fill a cell's two parts with the pen's two colors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Glyph {
     Blank,
@@ -103,7 +103,7 @@ const ON_BLANKS: Modifier = Modifier::REVERSED
 impl Glyph {
     pub(super) const ALL: [Self; 4] = [Self::Blank, Self::First, Self::Second, Self::Full];
 
-    /// The character that fills this tile.
+    /// The character that draws this tile.
     pub(super) fn symbol(self, tile: Tile) -> char {
         match self {
             Self::Blank => ' ',
@@ -113,7 +113,7 @@ impl Glyph {
         }
     }
 
-    /// The layers that fill the first and the second part.
+    /// The layers that fill the first and second part.
     pub(super) fn layers(self) -> [ColorLayer; 2] {
         match self {
             Self::Blank => [ColorLayer::Background; 2],
@@ -123,7 +123,7 @@ impl Glyph {
         }
     }
 
-    /// Requirements on the pen; colors that the glyph does not show are unconstrained.
+    /// Requirements on the pen. Colors that the glyph does not show are unconstrained.
     pub(super) fn requirements(self, pair: [TerminalColor; 2]) -> PenRequirements {
         let color =
             |layer| self.layers().iter().zip(pair).find(|(l, _)| **l == layer).map(|(_, shade)| shade);
@@ -149,7 +149,7 @@ impl CellContent {
     pub(super) const BLANK: Self =
         Self::Mosaic(Mosaic { tile: Tile::HALVES, pair: [TerminalColor::DefaultBackground; 2] });
 
-    /// The content of a cell on a terminal of this color depth.
+    /// Converts a cell's content for a terminal with this color depth.
     pub(super) fn of(cell: &Cell, depth: ColorDepth) -> Self {
         let shade = |color, layer| {
             let color = if depth == ColorDepth::None { ratatui::style::Color::Reset } else { color };
@@ -180,7 +180,7 @@ impl CellContent {
     }
 }
 
-/// The symbol of a cell and its width; a blank if the symbol would move the cursor or print nothing.
+/// A cell's symbol and its width. A blank if the symbol would move the cursor or print nothing.
 fn printable(symbol: &str) -> (&str, u16) {
     let columns = symbol.width();
     if columns == 0 || columns > 2 || symbol.chars().any(char::is_control) {
@@ -204,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn cells_that_look_the_same_are_equal() {
+    fn cells_that_look_alike_are_equal() {
         let none = Modifier::empty();
         let (a, b) = (Color::Rgb(1, 2, 3), Color::Rgb(4, 5, 6));
         assert_eq!(content("▀", a, b, none), content("▄", b, a, none));

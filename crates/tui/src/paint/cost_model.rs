@@ -1,29 +1,31 @@
-//! Cost model that weighs bytes against color error.
+//! Cost model for trading output bytes against color error.
 
 use super::terminal_color::TerminalColor;
 
-/// Weights of bytes against error. The error of half a cell is the sum of the squared channel differences.
+/// Relative weight of bytes and color error. The error of half a cell is the sum of its squared channel
+/// differences.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct CostModel {
-    /// Error that is worth saving one byte.
+    /// Error that is acceptable to save one byte.
     pub(super) byte: f32,
-    /// Maximum difference of a channel.
+    /// Maximum difference per channel.
     pub(super) most: u8,
-    /// Half widths of the ranges in which neighboring colors may be merged; candidates are tried for each.
+    /// Half-widths of the ranges within which neighboring colors may be merged. Candidates are tried for
+    /// each.
     pub(super) spans: &'static [u8],
 }
 
 impl CostModel {
-    /// Colors exact to 1/255.
+    /// Colors accurate to 1/255.
     pub(super) const EXACT: Self = Self { byte: 64.0, most: 1, spans: &[1] };
 
     /// Exact colors.
     pub(super) const ALL: Self = Self { byte: 64.0, most: 0, spans: &[0] };
 
-    /// An error of 14/255 in all channels of a half is worth about the bytes of a color change.
+    /// An error of 14/255 in every channel of a half costs about as much as a color change.
     pub(super) const MOVING: Self = Self { byte: 32.0, most: 255, spans: &[1, 4, 9] };
 
-    /// The same model with another cost per byte, at least that of [`CostModel::MOVING`].
+    /// Returns the model with a different cost per byte, but no less than that of [`CostModel::MOVING`].
     pub(super) fn at(self, byte: f32) -> Self {
         let byte = byte.max(Self::MOVING.byte);
         let spans: &[u8] = match byte {
@@ -35,7 +37,7 @@ impl CostModel {
         Self { byte, spans, ..self }
     }
 
-    /// The error of showing one color instead of another; infinite if that is not allowed.
+    /// The error when one color is shown instead of another. Infinite if this is not allowed.
     pub(super) fn error(self, shown: TerminalColor, wanted: TerminalColor) -> f32 {
         if shown == wanted {
             return 0.0;

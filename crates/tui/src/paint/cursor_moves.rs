@@ -1,16 +1,16 @@
-//! Cursor movement in as few bytes as possible.
+//! Cursor movement using as few bytes as possible.
 
 use super::terminal_color::push_number;
 
-/// A cell: column and row, from 0.
+/// Column and row of a cell, counted from 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct CellPosition {
     pub(super) x: u16,
     pub(super) y: u16,
 }
 
-/// Appends the shortest movement. `from` is `None` if the cursor position is unknown, for example after a
-/// character in the last column. No movement scrolls, wraps or depends on terminal modes.
+/// Appends the shortest movement. `from` is `None` if the cursor position is unknown, for example after
+/// writing to the last column. The movement never scrolls, wraps or depends on terminal modes.
 pub(super) fn go(from: Option<CellPosition>, to: CellPosition, out: &mut Vec<u8>) {
     let Some(from) = from else { return absolute(to, out) };
     if from == to {
@@ -28,7 +28,7 @@ pub(super) fn go(from: Option<CellPosition>, to: CellPosition, out: &mut Vec<u8>
         consider(with_return(&[], to.x));
     } else if from.y < to.y {
         let down = usize::from(to.y - from.y);
-        // The effect of a line feed depends on the tty's modes, so it always follows a carriage return.
+        // A line feed's effect depends on the tty's modes, so it always follows a carriage return.
         if down <= 8 {
             consider(with_return(&vec![b'\n'; down], to.x));
         }
@@ -54,12 +54,13 @@ fn absolute(to: CellPosition, out: &mut Vec<u8>) {
     out.push(b'H');
 }
 
-/// Movement within a row (CUF or CUB). CHA is never shorter than both this and CUP.
+/// Movement within a row (CUF or CUB). CHA is never needed, because it is never shorter than both CUP and
+/// this.
 fn horizontal_move(from: u16, to: u16) -> Vec<u8> {
     if to >= from { control(to - from, b'C') } else { control(from - to, b'D') }
 }
 
-/// Carriage return, line feeds, then right.
+/// Carriage return, line feeds, then movement to the right.
 fn with_return(down: &[u8], column: u16) -> Vec<u8> {
     let mut bytes = vec![b'\r'];
     bytes.extend_from_slice(down);
@@ -69,7 +70,7 @@ fn with_return(down: &[u8], column: u16) -> Vec<u8> {
     bytes
 }
 
-/// A control sequence with a count, which is omitted if it is 1.
+/// A control sequence with a count. The count is omitted if it is 1.
 pub(super) fn control(count: u16, end: u8) -> Vec<u8> {
     let mut bytes = b"\x1b[".to_vec();
     if count != 1 {

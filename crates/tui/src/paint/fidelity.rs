@@ -1,14 +1,14 @@
-//! Precision of a drawn preview.
+//! Precision of drawn previews.
 
-/// Precision with which cells show the preview.
+/// Precision with which the preview is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fidelity {
-    /// The first preview of a request, soon refined: at most 12 bytes per cell.
+    /// The first preview of a request, to be refined soon. Uses at most 12 bytes per cell.
     First,
-    /// A later preview that will still be refined.
+    /// A later preview that is still to be refined.
     Moving,
-    /// Like `Moving`, but with exact colors, for terminals fast enough to follow the render.
+    /// Like `Moving`, but with exact colors. For terminals fast enough to follow the render.
     Following,
-    /// A final preview: colors exact to 1/255.
+    /// A final preview. Colors are accurate to 1/255.
     Still,
 }

@@ -4,20 +4,20 @@ use std::time::{Duration, Instant};
 
 use super::fidelity::Fidelity;
 
-/// Inputs of the decision about a new preview.
+/// Inputs for deciding whether to draw a new preview.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FrameTiming {
-    /// Bandwidth of the connection. `None` if it is too fast to measure.
+    /// Connection bandwidth. `None` if it is too fast to measure.
     pub bytes_per_second: Option<f64>,
-    /// Cells of the preview.
+    /// Number of cells in the preview.
     pub cells: u32,
-    /// Mean samples per pixel of the new preview; 0 for a coarse one.
+    /// Mean samples per pixel of the new preview. 0 for a coarse one.
     pub samples: f64,
-    /// Mean samples per pixel of the last drawn preview of this request. `None` if there is none.
+    /// Mean samples per pixel of this request's last drawn preview. `None` if there is none.
     pub aimed_samples: Option<f64>,
     /// Time since that preview became the target.
     pub since_aim: Duration,
-    /// Whether that preview has been sent and, on a fast terminal, acknowledged.
+    /// Whether the last drawn preview has been sent and, on a fast terminal, acknowledged.
     pub is_shown: bool,
     /// Whether the terminal is fast enough to follow the render.
     pub is_fast: bool,
@@ -25,7 +25,7 @@ pub struct FrameTiming {
     pub is_in_pixels: bool,
     /// Whether the preview is final.
     pub is_final: bool,
-    /// Estimated time until the final preview, if known.
+    /// Estimated time until the final preview is ready, if known.
     pub final_in: Option<Duration>,
 }
 
@@ -34,30 +34,31 @@ pub struct FrameTiming {
 pub enum PacingAdvice {
     /// Draw it.
     Aim(Fidelity),
-    /// Wait for a better one.
+    /// Wait for a better preview.
     Wait,
 }
 
-/// Approximate bytes per cell until a preview settles.
+/// Approximate bytes per cell for an intermediate preview.
 const MOVING_BYTES: f64 = 6.0;
-/// Minimum factor between the sample counts of successive previews; noise falls with its square root.
+/// Minimum ratio between the sample counts of successive previews. Noise decreases with the square root of
+/// the sample count.
 const MORE_SAMPLES: f64 = 2.0;
-/// Minimum factor while the previous preview is still being sent.
+/// Minimum ratio while the previous preview is still being sent.
 const MANY_MORE_SAMPLES: f64 = 4.0;
-/// During the first sample, draw again after this fraction of a sample per pixel.
+/// Fraction of a sample per pixel after which the preview is redrawn during the first sample.
 const FIRST_PASS: f64 = 0.25;
-/// Minimum time between previews, except for the first and the last one.
+/// Minimum time between previews, except for the first and last.
 const SHORTEST: Duration = Duration::from_millis(100);
-/// Minimum time between previews drawn as pixels, which take time to encode and decode.
+/// Minimum time between previews drawn as pixels, which take longer to encode and decode.
 const SHORTEST_IN_PIXELS: Duration = Duration::from_millis(180);
-/// After this time any improvement is drawn.
+/// Time after which any improvement is drawn.
 const LONGEST: Duration = Duration::from_secs(2);
-/// Fraction of the bandwidth that intermediate previews may use.
+/// Fraction of the bandwidth available for intermediate previews.
 const SHARE: f64 = 0.5;
 
-/// Decides whether a preview is worth its bytes. The first and the last preview always are. A fast terminal
-/// gets 5 to 10 previews per second. A slow connection gets few intermediate previews, and none that would
-/// delay the last one.
+/// Decides whether a preview is worth its cost. The first and last previews always are. A fast terminal gets
+/// 5 to 10 previews per second. A slow connection gets few intermediate previews, and none that would delay
+/// the last one.
 pub fn advise(moment: &FrameTiming) -> PacingAdvice {
     if moment.is_final {
         return PacingAdvice::Aim(Fidelity::Still);
@@ -85,12 +86,12 @@ pub fn advise(moment: &FrameTiming) -> PacingAdvice {
 }
 
 impl FrameTiming {
-    /// Minimum time between two previews on a fast terminal.
+    /// Minimum time between previews on a fast terminal.
     fn shortest(&self) -> Duration {
         if self.is_in_pixels { SHORTEST_IN_PIXELS } else { SHORTEST }
     }
 
-    /// When a fast terminal should get the next preview, if one is pending.
+    /// Time when a fast terminal should get the next preview, if one is pending.
     pub fn due(&self, aimed: Instant) -> Option<Instant> {
         (self.is_fast && self.is_shown).then(|| aimed + self.shortest())
     }
@@ -110,7 +111,7 @@ impl FrameTiming {
 mod tests {
     use super::*;
 
-    /// One second after drawing a preview with one sample.
+    /// One second after a preview with one sample was drawn.
     const MOMENT: FrameTiming = FrameTiming {
         bytes_per_second: None,
         cells: 2500,
@@ -127,7 +128,7 @@ mod tests {
     const MOVING: PacingAdvice = PacingAdvice::Aim(Fidelity::Moving);
 
     #[test]
-    fn first_and_last_preview_are_always_drawn() {
+    fn first_and_last_previews_are_always_drawn() {
         for bytes_per_second in [None, Some(0.0), Some(100.0), Some(f64::NAN)] {
             let slow = FrameTiming { bytes_per_second, since_aim: Duration::ZERO, is_shown: false, ..MOMENT };
             assert_eq!(
@@ -143,23 +144,23 @@ mod tests {
         assert_eq!(advise(&MOMENT), PacingAdvice::Wait);
         assert_eq!(advise(&FrameTiming { samples: 2.0, ..MOMENT }), MOVING);
         let late = FrameTiming { since_aim: Duration::from_secs(3), ..MOMENT };
-        assert_eq!(advise(&late), MOVING, "after a long time any progress counts");
+        assert_eq!(advise(&late), MOVING, "after a long time, any progress is drawn");
         assert_eq!(
             advise(&FrameTiming { samples: 1.0, ..late }),
             PacingAdvice::Wait,
-            "an unchanged preview is not repeated"
+            "an unchanged preview is not redrawn"
         );
     }
 
     #[test]
-    fn fast_terminals_get_5_to_10_previews_a_second() {
+    fn fast_terminals_get_5_to_10_previews_per_second() {
         let following = PacingAdvice::Aim(Fidelity::Following);
         let quick = FrameTiming { is_fast: true, since_aim: Duration::from_millis(100), ..MOMENT };
-        assert_eq!(advise(&quick), following, "no matter how few samples are new");
+        assert_eq!(advise(&quick), following, "drawn regardless of the number of new samples");
         assert_eq!(
             advise(&FrameTiming { samples: 0.5, ..quick }),
             following,
-            "the sample count may lag behind"
+            "drawn even if the sample count is lower"
         );
         assert_eq!(
             advise(&FrameTiming { since_aim: Duration::from_millis(99), ..quick }),
@@ -168,7 +169,7 @@ mod tests {
         assert_eq!(
             advise(&FrameTiming { is_shown: false, ..quick }),
             PacingAdvice::Wait,
-            "previews do not overlap"
+            "not drawn before the previous preview has been shown"
         );
         let in_pixels = FrameTiming { is_in_pixels: true, ..quick };
         assert_eq!(advise(&in_pixels), PacingAdvice::Wait);
@@ -185,7 +186,7 @@ mod tests {
 
     #[test]
     fn slow_connections_get_few_previews() {
-        // 15 kB: a quarter of a second at 60 kB/s.
+        // 15 kB take a quarter of a second at 60 kB/s.
         let thin = FrameTiming { bytes_per_second: Some(60e3), samples: 2.0, ..MOMENT };
         assert_eq!(advise(&thin), MOVING);
         assert_eq!(
@@ -203,14 +204,14 @@ mod tests {
             "the previous preview is much worse"
         );
         let ending = FrameTiming { final_in: Some(Duration::from_millis(200)), ..thin };
-        assert_eq!(advise(&ending), PacingAdvice::Wait, "it would delay the last preview");
+        assert_eq!(advise(&ending), PacingAdvice::Wait, "it would delay the final preview");
     }
 
     #[test]
-    fn short_render_draws_a_handful_of_previews() {
+    fn short_render_draws_few_previews() {
         for (bytes_per_second, most) in [(None, 12), (Some(125e3), 8), (Some(10e3), 2)] {
             let (mut aimed, mut at, mut count) = (None, 0.0, 0);
-            // 2.5 seconds with a preview every 66 ms.
+            // 2.5 seconds, with a preview every 66 ms.
             for preview in 0..38_u32 {
                 let seconds = f64::from(preview) * 0.066;
                 let moment = FrameTiming {

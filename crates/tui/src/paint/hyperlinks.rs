@@ -1,13 +1,13 @@
-//! Hyperlinks in the text (OSC 8).
+//! Hyperlinks in text (OSC 8).
 
 use ratatui::layout::Rect;
 
-/// Bytes that end a hyperlink.
+/// Escape sequence that ends a hyperlink.
 pub const LINK_OFF: &[u8] = b"\x1b]8;;\x1b\\";
 /// Maximum number of hyperlinks per screen.
 const MAX: usize = 1000;
 
-/// Adjacent cells of one row and the URL that they link to.
+/// Adjacent cells in a row and the URL they link to.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Hyperlink {
     /// The cells.
@@ -16,14 +16,14 @@ pub struct Hyperlink {
     pub address: String,
 }
 
-/// URLs by number, from 1. A URL keeps its number while the screen content is known.
+/// URLs numbered from 1. A URL keeps its number as long as the screen content is known.
 #[derive(Debug, Default)]
 pub(super) struct Hyperlinks {
     addresses: Vec<String>,
 }
 
 impl Hyperlinks {
-    /// The number of a URL; 0 if it is invalid or if there are too many.
+    /// The number of a URL. 0 if the URL is invalid or there are too many.
     pub(super) fn number(&mut self, address: &str) -> u16 {
         if !address.bytes().all(|byte| byte.is_ascii_graphic()) {
             return 0;
@@ -39,7 +39,7 @@ impl Hyperlinks {
         if is_known { u16::try_from(index + 1).unwrap_or(0) } else { 0 }
     }
 
-    /// Appends the bytes that open a hyperlink and close the previous one.
+    /// Appends the bytes that open a hyperlink, closing the previous one.
     pub(super) fn open(&self, number: u16, out: &mut Vec<u8>) {
         let address = usize::from(number).checked_sub(1).and_then(|index| self.addresses.get(index));
         match address {
@@ -48,7 +48,7 @@ impl Hyperlinks {
         }
     }
 
-    /// Whether no hyperlink was registered.
+    /// Whether there are no hyperlinks.
     pub(super) fn is_empty(&self) -> bool {
         self.addresses.is_empty()
     }

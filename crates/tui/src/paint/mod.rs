@@ -1,15 +1,14 @@
-//! Incremental terminal output: encodes only visible changes, in slices.
+//! Incremental terminal output. Only visible changes are encoded, in slices.
 //!
-//! A [`Painter`] knows what the screen shows because it sent everything there. It is given a target buffer
-//! and returns the bytes that lead there, slice by slice; a new target replaces the rest of the previous one.
-//! Cells are compared by the colors of their two parts, however they are drawn: `▀ ▄ █` and the space can show
-//! the same halves in several ways. The painter picks the way that costs the fewest bytes after the
-//! previously drawn cell.
+//! A [`Painter`] keeps track of the screen content. Given a target buffer, it returns the bytes that turn the
+//! current content into the target, slice by slice. A new target replaces any unfinished one. Cells are
+//! compared by the colors of their two parts, no matter how they are drawn: the same halves can often be
+//! drawn using several of `▀ ▄ █` and the space. The painter picks the one that needs the fewest bytes after
+//! the previously drawn cell.
 //!
-//! Text is always exact. A preview that will be followed by better ones is drawn only as precisely as its
-//! bytes are worth (exactly on a fast terminal), and cells that an edit did not change are kept. A final
-//! preview is exact to 1/255. [`advise`] decides which previews are worth drawing on a connection of a given
-//! speed.
+//! Text is always exact. Intermediate previews trade precision for size (except on a fast terminal, where
+//! they are exact), and cells unaffected by an edit are not redrawn. The final preview is accurate to 1/255.
+//! [`advise`] decides which previews are worth drawing at the connection's speed.
 
 mod candidates;
 mod cell;
@@ -54,7 +53,7 @@ pub struct Painter {
     depth: ColorDepth,
     /// Whether the terminal supports REP.
     can_repeat: bool,
-    /// `None` while the content is unknown.
+    /// `None` if the content is unknown.
     screen: Option<ScreenModel>,
     memory: StableCells,
     wanted: TargetScreen,
@@ -65,42 +64,42 @@ pub struct Painter {
     /// The step being drawn.
     part: Option<DrawStep>,
     strokes: vec::IntoIter<Stroke>,
-    /// Progress of the preview in each row.
+    /// Progress of drawing the preview, for each row.
     rows: Vec<RowProgress>,
     aim: u64,
 }
 
-/// One step of drawing the screen.
+/// A step in drawing the screen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum DrawStep {
-    /// The text in a row.
+    /// Draw a row's text.
     Words(u16),
-    /// The preview in a row.
+    /// Draw a row of the preview.
     Picture(u16),
-    /// Text in a row that is drawn after the preview.
+    /// Draw the text of a row that is drawn after the preview.
     Later(u16),
 }
 
 /// Content of a frame other than its cells.
 #[derive(Clone, Debug, Default)]
 pub struct FrameExtras {
-    /// Text in these cells is drawn after the preview.
+    /// Cells whose text is drawn after the preview.
     pub later: Rect,
     /// Hyperlinks in the text.
     pub links: Vec<Hyperlink>,
 }
 
-/// Progress of the preview in a row.
+/// Progress of drawing the preview in one row.
 #[derive(Clone, Copy, Debug, Default)]
 struct RowProgress {
-    /// Number of the last target that the row was drawn for.
+    /// Number of the last target for which the row was drawn.
     aim: u64,
     /// Whether the row matches its target.
     is_done: bool,
 }
 
 impl Painter {
-    /// A painter for a terminal of this color depth whose content is unknown.
+    /// Creates a painter for a terminal with this color depth and unknown content.
     pub fn new(depth: ColorDepth) -> Self {
         Self {
             depth,
@@ -118,22 +117,22 @@ impl Painter {
         }
     }
 
-    /// Sets whether the terminal supports REP; see [`can_repeat`].
+    /// Sets whether the terminal supports REP. See [`can_repeat`].
     pub fn repeating(self, can_repeat: bool) -> Self {
         Self { can_repeat, ..self }
     }
 
-    /// Sets a new target and drops the rest of the previous one. Cells in `picture` may differ from the
-    /// target as `fidelity` permits; all others are text and are drawn first. A buffer of a different size
-    /// means that the screen was resized.
+    /// Sets a new target and drops whatever remains of the previous one. Cells in `picture` may differ from
+    /// the target as far as `fidelity` permits. All other cells are text and are drawn first. If the buffer
+    /// has a different size, the screen is assumed to have been resized.
     ///
-    /// The preview continues with the rows that earlier targets did not reach, so it is drawn up to its edges
-    /// even if targets change faster than they can be drawn.
+    /// Drawing of the preview starts with the rows that have waited longest, so every row gets drawn even if
+    /// targets change faster than they can be drawn.
     pub fn set_target(&mut self, wanted: &Buffer, picture: Rect, fidelity: Fidelity) {
         self.set_target_with(wanted, picture, fidelity, &FrameExtras::default());
     }
 
-    /// Like [`Painter::set_target`], with hyperlinks and with text that is drawn after the preview.
+    /// Like [`Painter::set_target`], but with hyperlinks and with text to be drawn after the preview.
     pub fn set_target_with(
         &mut self,
         wanted: &Buffer,
@@ -177,15 +176,15 @@ impl Painter {
         self.budget = ByteBudget::default();
     }
 
-    /// The next bytes towards the target, at most `most_bytes` unless a single cell needs more. Empty if the
-    /// target is reached. The caller must write them because later slices build on them, and nothing else may
-    /// move the cursor or change colors between two slices.
+    /// The next bytes to output, at most `most_bytes` unless a single cell needs more. Empty once the screen
+    /// matches the target. The caller must write the bytes because later slices build on them. No other
+    /// output may move the cursor or change colors between slices.
     pub fn slice(&mut self, most_bytes: usize) -> Vec<u8> {
         self.slice_until(most_bytes, || false)
     }
 
-    /// Like [`Painter::slice`], but stops early once `is_late` returns true. It is called before each row
-    /// because planning a whole preview takes longer than a key press may wait.
+    /// Like [`Painter::slice`], but stops early once `is_late` returns true. `is_late` is called before each
+    /// row because planning a whole preview would delay the response to a key press too much.
     pub fn slice_until(&mut self, most_bytes: usize, is_late: impl Fn() -> bool) -> Vec<u8> {
         let mut slice = OutputSlice { bytes: Vec::new(), most: most_bytes };
         if self.wanted.is_empty() {
@@ -245,7 +244,7 @@ impl Painter {
         }
     }
 
-    /// Marks the whole screen as unknown; it is cleared before the next draw.
+    /// Marks the whole screen as unknown. It is cleared before the next draw.
     pub fn invalidate(&mut self) {
         self.screen = None;
         self.memory.invalidate();

@@ -4,32 +4,32 @@ use ratatui::style::Modifier;
 
 use super::terminal_color::{ColorLayer, TerminalColor, push_number};
 
-/// Colors and modifiers of the next character.
+/// Colors and modifiers for the next character.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Pen {
     pub(super) fg: TerminalColor,
     pub(super) bg: TerminalColor,
     pub(super) modifier: Modifier,
-    /// Number of the hyperlink that the character belongs to; 0 for none.
+    /// Number of the hyperlink the character belongs to. 0 if there is none.
     pub(super) link: u16,
 }
 
 /// Requirements on a pen.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PenRequirements {
-    /// `None` if any color will do.
+    /// `None` if any color is acceptable.
     pub(super) fg: Option<TerminalColor>,
-    /// `None` if any color will do.
+    /// `None` if any color is acceptable.
     pub(super) bg: Option<TerminalColor>,
     /// Required state of the modifiers in `matters`.
     pub(super) modifier: Modifier,
-    /// The modifiers that matter; others may be on or off.
+    /// The modifiers that matter. Others may be on or off.
     pub(super) matters: Modifier,
-    /// Number of the hyperlink; 0 for none.
+    /// Number of the hyperlink. 0 if there is none.
     pub(super) link: u16,
 }
 
-/// Modifiers with the SGR parameters that turn them on and off.
+/// Modifiers and the SGR parameters that turn them on and off.
 const MODIFIERS: [(Modifier, u16, u16); 9] = [
     (Modifier::BOLD, 1, 22),
     (Modifier::DIM, 2, 22),
@@ -43,7 +43,7 @@ const MODIFIERS: [(Modifier, u16, u16); 9] = [
 ];
 
 impl Pen {
-    /// The pen after SGR 0.
+    /// The pen's state after SGR 0.
     pub(super) const RESET: Self = Self {
         fg: TerminalColor::DefaultForeground,
         bg: TerminalColor::DefaultBackground,
@@ -51,7 +51,7 @@ impl Pen {
         link: 0,
     };
 
-    /// Requirements that only this pen meets.
+    /// Requirements met only by this pen.
     pub(super) fn exactly(self) -> PenRequirements {
         PenRequirements {
             fg: Some(self.fg),
@@ -62,8 +62,8 @@ impl Pen {
         }
     }
 
-    /// Appends the shortest SGR sequence that makes the pen meet the requirements, if it does not already.
-    /// The screen model handles hyperlinks.
+    /// If the pen does not meet the requirements, appends the shortest SGR sequence that makes it meet them.
+    /// Hyperlinks are handled by the screen model.
     pub(super) fn switch_to(&mut self, requirements: &PenRequirements, out: &mut Vec<u8>) {
         let mut list = Vec::new();
         let changed = self.changed(requirements, &mut list);
@@ -79,13 +79,13 @@ impl Pen {
         *self = if is_shorter { reset } else { changed };
     }
 
-    /// Appends the parameters that make this pen meet the requirements, and returns the new pen.
+    /// Appends SGR parameters that make this pen meet the requirements, and returns the new pen.
     fn changed(mut self, requirements: &PenRequirements, list: &mut Vec<u8>) -> Self {
         let surplus = (self.modifier - requirements.modifier) & requirements.matters;
         for (modifier, _, off) in MODIFIERS {
             if surplus.contains(modifier) && self.modifier.contains(modifier) {
                 push_parameter(off, list);
-                // One parameter can turn off two modifiers.
+                // One parameter may turn off two modifiers.
                 for (other, _, other_off) in MODIFIERS {
                     self.modifier.set(other, self.modifier.contains(other) && other_off != off);
                 }
@@ -164,7 +164,7 @@ mod tests {
                 Pen {
                     fg,
                     bg,
-                    // Some terminals cannot show bold and dim at once.
+                    // Some terminals cannot combine bold and dim.
                     modifier: Modifier::from_bits_truncate(if bits & 3 == 3 { bits & !1 } else { bits }),
                     link: 0,
                 }

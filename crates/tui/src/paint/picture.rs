@@ -1,4 +1,4 @@
-//! Drawing the preview as closely to its target as the byte budget allows.
+//! Draws the preview as close to its target as the byte budget allows.
 
 use super::cell::CellContent;
 use super::cost_model::CostModel;
@@ -9,16 +9,16 @@ use super::screen::{ScreenModel, Stroke};
 use super::stable_cells::StableCells;
 use super::target_screen::TargetScreen;
 
-/// Average bytes per cell that a first preview may take.
+/// Average number of bytes per cell available for a first preview.
 const FIRST_BYTES: u32 = 12;
-/// Bytes at the start of a row that the search does not count: resetting the modifiers of text.
+/// Bytes at the start of a row that the search does not count. They reset modifiers left over from text.
 const ROW_BYTES: u32 = 4;
-/// Factor between the byte costs of successive attempts.
+/// Ratio between the byte costs of successive attempts.
 const STEP: f32 = 1.6;
-/// Above this byte cost, nothing more can be saved.
+/// Byte cost above which no further bytes can be saved.
 const DEAREST: f32 = 4000.0;
 
-/// Byte budget of a first preview.
+/// Byte budget for a first preview.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ByteBudget {
     bytes: u32,
@@ -32,8 +32,8 @@ impl Default for ByteBudget {
 }
 
 impl ByteBudget {
-    /// Plans a row with the least error that fits into the budget. The cost of a byte falls again after rows
-    /// that left bytes over.
+    /// Plans a row with the smallest error that fits into the budget. The byte cost is lowered again after
+    /// rows that used less than their share.
     fn use_budget(&mut self, targets: &[TargetCell], start: RowStart) -> PlannedRow {
         let share = FIRST_BYTES * targets.len() as u32;
         self.bytes += share;
@@ -52,7 +52,7 @@ impl ByteBudget {
     }
 }
 
-/// Plans the strokes of the preview in a row.
+/// Plans the strokes for a row of the preview.
 pub(super) fn plan(
     screen: &ScreenModel,
     wanted: &TargetScreen,

@@ -1,9 +1,9 @@
-//! Capabilities derived from the terminal's name.
+//! Terminal capabilities derived from environment variables.
 
 use crate::terminals::Brand;
 
-/// Whether the terminal supports REP (ECMA-48 8.3.103, repeat the preceding character), judged by its
-/// environment variables. Many terminals call themselves `xterm-256color`, and not all of those support it.
+/// Whether the terminal supports REP (ECMA-48 8.3.103, repeat the preceding character), judging from
+/// environment variables. Many terminals set `TERM` to `xterm-256color`, but not all of them support REP.
 pub fn can_repeat(variable: impl Fn(&str) -> Option<String>) -> bool {
     const TERMS: [&str; 8] =
         ["xterm-kitty", "alacritty", "foot", "xterm-ghostty", "wezterm", "contour", "tmux", "rio"];
@@ -19,7 +19,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn rep_is_used_only_where_known() {
+    fn rep_is_used_only_if_known_to_work() {
         let known = |variables: &[(&str, &str)]| {
             can_repeat(|name| {
                 variables.iter().find(|(n, _)| *n == name).map(|(_, value)| (*value).to_owned())

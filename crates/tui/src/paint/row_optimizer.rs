@@ -1,8 +1,8 @@
 //! Finds the cheapest byte sequence that draws a row of the preview.
 //!
-//! Each cell is either kept or drawn with one of four glyphs, changing none, one or both colors of the pen.
-//! The cost depends on the pen and on the cursor position, so the search keeps the best path for each of a
-//! few pens (Viterbi algorithm with beam search) and traces back from the cheapest end.
+//! Each cell is either kept or drawn with one of four glyphs, changing neither, one or both of the pen's
+//! colors. The cost depends on the pen and the cursor position, so the search keeps the best path for each of
+//! a few pens (Viterbi algorithm with beam search) and traces the path back from the cheapest end.
 
 use super::candidates::{CandidateColors, candidates};
 use super::cell::{Glyph, Mosaic};
@@ -12,11 +12,11 @@ use crate::mosaic::{PLACES, Tile};
 
 /// Paths kept per cell.
 const BEAM: usize = 5;
-/// Upper bound on the bytes needed to get from any pen and cursor to any other. Paths that are worse than the
-/// best by more cannot win.
+/// Upper bound on the bytes needed to change from any pen and cursor position to any other. A path cannot win
+/// if its cost exceeds the best one by more than that.
 const MAX_BYTES: f32 = 46.0;
 
-/// A cell of the row.
+/// A cell in the row.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct TargetCell {
     /// `None` if the cell is not part of the preview.
@@ -25,7 +25,7 @@ pub(super) struct TargetCell {
     pub(super) shown: Option<Mosaic>,
 }
 
-/// Pen and cursor at the start of a row.
+/// State of the pen and cursor at the start of a row.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RowStart {
     pub(super) fg: TerminalColor,
@@ -34,7 +34,7 @@ pub(super) struct RowStart {
     pub(super) is_at_start: bool,
 }
 
-/// One drawn cell.
+/// An operation that draws one cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct DrawOp {
     /// Relative to the first target cell.
@@ -43,7 +43,7 @@ pub(super) struct DrawOp {
     pub(super) mosaic: Mosaic,
 }
 
-/// A path through the row up to a cell.
+/// A path through the row, up to a given cell.
 #[derive(Clone, Copy, Debug)]
 struct DrawPath {
     fg: TerminalColor,
@@ -52,7 +52,7 @@ struct DrawPath {
     pen: u64,
     gap: CursorGap,
     bytes: u32,
-    /// Bytes and errors, weighted.
+    /// Weighted sum of bytes and errors.
     cost: f32,
     /// Index of the path to the previous cell.
     parent: usize,
@@ -91,14 +91,14 @@ impl CursorGap {
     }
 }
 
-/// Draw operations of a row.
+/// The operations that draw a row.
 #[derive(Clone, Debug)]
 pub(super) struct PlannedRow {
     pub(super) ops: Vec<DrawOp>,
     pub(super) bytes: u32,
 }
 
-/// Finds the cheapest path through a row.
+/// Finds the cheapest path through a row of cells.
 pub(super) fn plan_row(targets: &[TargetCell], start: RowStart, model: CostModel) -> PlannedRow {
     let gap = if start.is_at_start { CursorGap::Cells(0) } else { CursorGap::Far };
     let RowStart { fg, bg, .. } = start;
@@ -134,13 +134,14 @@ fn step(last: &[DrawPath], target: TargetCell, wanted: &[Option<Mosaic>], model:
         }
     }
     let Some(mosaic) = target.wanted else { return beam.paths };
-    // A cell that is close enough is not worth a color change, but it may be redrawn instead of skipped over.
+    // A cell that is close enough to its target is not worth a color change, but redrawing it may be cheaper
+    // than skipping it.
     let changes = if leave <= model.byte { CandidateColors::default() } else { candidates(wanted, model) };
     let changes = ColorChanges::new(&changes, mosaic, model);
     for (parent, path) in last.iter().enumerate() {
         changes.change_one(parent, path, &mut beam);
     }
-    // If both colors are set, the old pen does not matter: extend only the cheapest path.
+    // If both colors are set, the previous pen does not matter, so extend only the cheapest path.
     let base = |path: &DrawPath| path.cost + path.gap.bytes() as f32 * model.byte;
     if let Some((parent, path)) = last.iter().enumerate().min_by(|(_, a), (_, b)| base(a).total_cmp(&base(b)))
     {
@@ -152,7 +153,7 @@ fn step(last: &[DrawPath], target: TargetCell, wanted: &[Option<Mosaic>], model:
 /// The best paths so far.
 struct Beam {
     paths: Vec<DrawPath>,
-    /// Paths that exceed the best cost by more than this are dropped.
+    /// Paths whose cost exceeds the best one by more than this are dropped.
     limit: f32,
 }
 
@@ -182,22 +183,22 @@ impl Beam {
     }
 }
 
-/// A color that may be set at a cell, with its cost.
+/// A color that may be set before drawing a cell, and its cost.
 #[derive(Clone, Copy)]
 struct ColorChange {
     shade: TerminalColor,
-    /// Bytes of the SGR parameters.
+    /// Number of bytes in the SGR parameters.
     bytes: u32,
-    /// Area-weighted error in the first and the second part.
+    /// Area-weighted errors in the first and second part.
     errors: [f32; 2],
 }
 
-/// Color changes to try at a cell.
+/// Color changes to try for a cell.
 struct ColorChanges {
     mosaic: Mosaic,
     model: CostModel,
     all: Vec<ColorChange>,
-    /// End of the colors for the first part; those for the second part follow up to `second`.
+    /// End index of the colors for the first part. Colors for the second part follow, up to `second`.
     first: usize,
     second: usize,
 }
@@ -216,7 +217,7 @@ impl ColorChanges {
         changes
     }
 
-    /// Errors of a color in both parts, weighted by their areas.
+    /// Area-weighted errors of a color in both parts.
     fn errors(&self, shade: TerminalColor) -> [f32; 2] {
         let sizes = self.mosaic.tile.sizes();
         std::array::from_fn(|part| {
@@ -225,8 +226,8 @@ impl ColorChanges {
         })
     }
 
-    /// Extends a path with the current pen and with each single color change. A color chosen for one part is
-    /// only used for that part.
+    /// Extends a path, using the current pen and each single color change. A color chosen for one part is
+    /// used only there.
     fn change_one(&self, parent: usize, path: &DrawPath, beam: &mut Beam) {
         let mut ends = PathEnd::new(self, parent, path, beam);
         if !ends.is_near() {
@@ -253,7 +254,7 @@ impl ColorChanges {
         }
     }
 
-    /// Extends a path with changes of both colors.
+    /// Extends a path, changing both colors.
     fn change_both(&self, parent: usize, path: &DrawPath, beam: &mut Beam) {
         let mut ends = PathEnd::new(self, parent, path, beam);
         for first in &self.all[..self.first] {
@@ -269,18 +270,18 @@ impl ColorChanges {
     }
 }
 
-/// Extension of one path by a drawn cell.
+/// Extends one path by a drawn cell.
 struct PathEnd<'a> {
     parent: usize,
-    /// Including the bytes that move the cursor to the cell.
+    /// Number of bytes, including those that move the cursor to the cell.
     bytes: u32,
-    /// Error of the previous cells.
+    /// Error of the cells before this one.
     error: f32,
     /// Cost per byte.
     byte: f32,
     tile: Tile,
     beam: &'a mut Beam,
-    /// Current bound of the beam.
+    /// Current cost bound of the beam.
     bound: f32,
 }
 
@@ -299,7 +300,7 @@ impl<'a> PathEnd<'a> {
     }
 
     fn add(&mut self, ends: PenErrors, sgr: u32, glyph: Glyph) {
-        // Inverted, the medium shade is a different pattern with the same character.
+        // The inverse of the medium shade is a different pattern but the same character.
         if glyph == Glyph::Second && self.tile == Tile::MEDIUM {
             return;
         }
@@ -392,7 +393,7 @@ mod tests {
     }
 
     #[test]
-    fn pen_changes_once_and_blanks_win() {
+    fn pen_changes_once_and_blanks_are_preferred() {
         let found = plan_row(
             &wanted(&[[RED, RED], [RED, RED], [BLACK, RED]]),
             start(BLACK, TerminalColor::DefaultBackground),
@@ -400,7 +401,7 @@ mod tests {
         );
         let glyphs: Vec<Glyph> = found.ops.iter().map(|op| op.glyph).collect();
         assert_eq!(glyphs, [Glyph::Blank, Glyph::Blank, Glyph::First]);
-        // ESC [ 48;2;200;0;0 m and the glyphs.
+        // ESC [ 48;2;200;0;0 m, followed by the glyphs.
         assert_eq!(found.bytes, 3 + 12 + 1 + 1 + 3);
     }
 
@@ -413,7 +414,8 @@ mod tests {
         let found = plan_row(&targets, start(RED, BLACK), CostModel::EXACT);
         let columns: Vec<usize> = found.ops.iter().map(|op| op.column).collect();
         assert_eq!((columns, found.bytes), (vec![0, 8], 3 + 4 + 3));
-        // A gap of one cell is redrawn: that takes no more bytes than a jump and is closer to the target.
+        // A gap of one cell is redrawn, because this takes no more bytes than moving the cursor and is more
+        // accurate.
         let found = plan_row(&[targets[0], targets[1], targets[8]], start(RED, BLACK), CostModel::EXACT);
         assert_eq!((found.ops.len(), found.bytes), (3, 9));
     }
@@ -448,7 +450,7 @@ mod tests {
                 .prop_map(|symbol| from_symbol(symbol).expect("a tile").0),
         ];
         (tile, [shade(), shade()]).prop_map(|(tile, pair)| {
-            // Normalized as if read from a character: the first part is the foreground.
+            // Normalize like a tile read from a character: the first part is the foreground.
             let is_cell = tile != Tile::MEDIUM || pair[0] != TerminalColor::DefaultBackground;
             Mosaic::new(if is_cell { tile } else { Tile::HALVES }, pair)
         })
@@ -474,9 +476,9 @@ mod tests {
             }
             for (shown, target) in screen.iter().zip(&targets) {
                 let Some(wanted) = target.wanted else { continue };
-                let shown = shown.expect("unknown cells are drawn");
+                let shown = shown.expect("unknown cells should be drawn");
                 for (shown, wanted, part) in shown.against(wanted) {
-                    // A larger error in one channel is worth any number of bytes.
+                    // Larger errors in a single channel should be avoided at any cost.
                     let most = if is_exact { 3.0 } else { CostModel::MOVING.byte * 120.0 };
                     prop_assert!(part * model.error(shown, wanted) <= most);
                 }

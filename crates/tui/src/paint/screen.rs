@@ -1,4 +1,4 @@
-//! A model of the terminal's screen, derived from the bytes sent to it.
+//! A model of the terminal's screen, updated from the bytes sent to the terminal.
 
 use ratatui::layout::Rect;
 
@@ -8,7 +8,7 @@ use super::hyperlinks::{Hyperlinks, LINK_OFF};
 use super::pen::Pen;
 use super::terminal_color::TerminalColor;
 
-/// Bytes that are written together.
+/// Bytes to be written together.
 #[derive(Debug)]
 pub(super) struct OutputSlice {
     pub(super) bytes: Vec<u8>,
@@ -16,12 +16,12 @@ pub(super) struct OutputSlice {
     pub(super) most: usize,
 }
 
-/// Cells drawn with one glyph.
+/// A group of cells drawn with a single glyph.
 #[derive(Clone, Debug)]
 pub(super) enum Stroke {
     /// A character.
     Text { at: CellPosition, text: TextCell },
-    /// Two colors shown with one glyph in `count` cells, using REP if there are several.
+    /// Two colors drawn with the same glyph in `count` cells, using REP for more than one cell.
     Mosaic { at: CellPosition, glyph: Glyph, mosaic: Mosaic, count: u16 },
     /// `count` blanks in the terminal's default background, or up to the end of the row if `None`.
     Erase { at: CellPosition, count: Option<u16> },
@@ -35,8 +35,8 @@ impl Stroke {
         }
     }
 
-    /// Replaces runs of equal blanks with REP where that is shorter. Only blanks, because some terminals
-    /// repeat ASCII characters only.
+    /// Replaces runs of equal blanks with REP where this is shorter. Only blanks are repeated because some
+    /// terminals support REP only for ASCII characters.
     pub(super) fn repeated(strokes: &[Self]) -> Vec<Self> {
         let mut shorter: Vec<Self> = Vec::with_capacity(strokes.len());
         for run in strokes.chunk_by(Self::last_good_progress) {
@@ -52,7 +52,7 @@ impl Stroke {
         shorter
     }
 
-    /// Whether `next` draws the same in the next cell.
+    /// Whether `next` draws the same content in the following cell.
     fn last_good_progress(&self, next: &Self) -> bool {
         if let (
             Self::Mosaic { at, glyph, mosaic, .. },
@@ -66,7 +66,7 @@ impl Stroke {
     }
 }
 
-/// Cells, pen and cursor of the terminal.
+/// The terminal's cells, pen and cursor.
 #[derive(Debug)]
 pub(super) struct ScreenModel {
     pub(super) columns: u16,
@@ -89,7 +89,7 @@ impl ScreenModel {
         }
     }
 
-    /// Appends the bytes that clear the screen; the result is [`ScreenModel::cleared`].
+    /// Appends the bytes that clear the screen. The resulting state is [`ScreenModel::cleared`].
     pub(super) fn clear(links: &Hyperlinks, slice: &mut OutputSlice) {
         if !links.is_empty() {
             slice.bytes.extend_from_slice(LINK_OFF);
@@ -122,7 +122,7 @@ impl ScreenModel {
         usize::from(at.y) * usize::from(self.columns) + usize::from(at.x)
     }
 
-    /// Draws a stroke. Returns false, without any effect, if it does not fit into the slice.
+    /// Draws a stroke. Returns false and does nothing if it does not fit into the slice.
     pub(super) fn draw(&mut self, stroke: &Stroke, links: &Hyperlinks, slice: &mut OutputSlice) -> bool {
         let (start, pen) = (slice.bytes.len(), self.pen);
         self.write(stroke, links, &mut slice.bytes);
@@ -163,12 +163,12 @@ impl ScreenModel {
         }
     }
 
-    /// Updates cells and cursor after a stroke.
+    /// Updates the cells and cursor after a stroke.
     fn keep(&mut self, stroke: &Stroke) {
         match stroke {
             Stroke::Text { at, text } => {
                 self.put(*at, CellContent::Text(text.clone()), text.columns);
-                // Terminals disagree about the width of other characters.
+                // Terminals differ in the width of other characters.
                 self.cursor = if text.is_plain() { self.after(*at, 1) } else { None };
             }
             Stroke::Mosaic { at, mosaic, count, .. } => {
@@ -186,7 +186,7 @@ impl ScreenModel {
         }
     }
 
-    /// The cursor after `columns` columns; `None` past the last one, where terminals differ.
+    /// The cursor position `columns` further right. `None` past the last column, where terminals differ.
     fn after(&self, at: CellPosition, columns: u16) -> Option<CellPosition> {
         Some(CellPosition { x: at.x + columns, ..at }).filter(|next| next.x < self.columns)
     }

@@ -1,7 +1,8 @@
-//! Keeps converged cells on the screen where an edit changed nothing.
+//! Keeps converged cells on the screen if an edit did not change them.
 //!
-//! The first previews of two requests use the same random numbers, so they differ only where the scene does.
-//! A cell that is equal in both keeps its converged look until the new render has converged as well.
+//! The first previews of two requests use the same random numbers, so they differ only where the scene has
+//! changed. If a cell is equal in both, the screen keeps showing its converged state until the new render has
+//! also converged.
 
 use ratatui::layout::Rect;
 
@@ -12,23 +13,24 @@ use super::screen::ScreenModel;
 use super::target_screen::TargetScreen;
 use super::terminal_color::TerminalColor;
 
-/// Maximum channel difference between equal first previews.
+/// Maximum channel difference for first previews to be considered equal.
 const ALIKE: u8 = 2;
-/// Cells are not redrawn for noise below this threshold.
+/// Upper limit of the noise threshold below which cells are not redrawn.
 const MAX_NOISE: u8 = 12;
 
-/// The first preview of the request that the screen shows, per cell.
+/// For each cell, the first preview of the request that the screen shows.
 #[derive(Debug, Default)]
 pub(super) struct StableCells {
     columns: usize,
     picture: Rect,
     /// `None` if unknown.
     firsts: Vec<Option<Mosaic>>,
-    /// The first preview of the current request; empty if there was none.
+    /// The first preview of the current request. Empty if there was none.
     newest: Vec<Option<Mosaic>>,
-    /// Whether the cell is equal in the first previews of the current request and of the one on the screen.
+    /// Whether the cell looks the same in the first previews of the current request and of the request on the
+    /// screen.
     steady: Vec<bool>,
-    /// Maximum difference between a stable cell and its target that counts as noise.
+    /// Maximum difference between a stable cell and its target that is considered noise.
     noise: u8,
 }
 
@@ -54,7 +56,7 @@ impl StableCells {
             Fidelity::First => self.begin(wanted),
             Fidelity::Moving => self.noise = noise(self.median(wanted, screen)),
             Fidelity::Following => match self.median(wanted, screen) {
-                // There is hardly any noise left to hide.
+                // There is hardly any noise left to hide, so redraw everything.
                 ..=1 => self.steady.fill(false),
                 median => self.noise = noise(median),
             },
@@ -96,7 +98,7 @@ impl StableCells {
         median.count()
     }
 
-    /// The mosaic to draw: the one already shown if it differs from the target only by noise.
+    /// The mosaic to draw. Returns the displayed one if it differs from the target only by noise.
     pub(super) fn mosaic(&self, at: CellPosition, wanted: Mosaic, shown: Option<Mosaic>) -> Mosaic {
         shown
             .filter(|shown| {
@@ -125,7 +127,7 @@ impl StableCells {
         }
     }
 
-    /// Records that a row is complete: the cells that were not drawn show the current request as well.
+    /// Records that a row is complete. Cells that were not redrawn also show the current request.
     pub(super) fn row_done(&mut self, y: u16) {
         for x in self.picture.left()..self.picture.right() {
             let index = self.index(CellPosition { x, y });
@@ -137,7 +139,7 @@ impl StableCells {
         }
     }
 
-    /// Ends the current request: its final preview is on the screen.
+    /// Ends the current request after its final preview has been drawn.
     pub(super) fn finish(&mut self) {
         self.newest.clear();
     }
@@ -148,7 +150,7 @@ fn noise(median: usize) -> u8 {
     u8::try_from(4 * median + 2).unwrap_or(u8::MAX).min(MAX_NOISE)
 }
 
-/// The largest channel difference; 255 if the colors cannot be compared.
+/// The largest channel difference. 255 if the colors cannot be compared.
 fn color_difference(a: Mosaic, b: Mosaic) -> u8 {
     let one = |a: TerminalColor, b: TerminalColor| match (a.rgb(), b.rgb()) {
         _ if a == b => 0,

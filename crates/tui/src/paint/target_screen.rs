@@ -1,4 +1,4 @@
-//! The target of the painter.
+//! The target content for the painter.
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
@@ -7,14 +7,14 @@ use super::cell::{CellContent, Mosaic};
 use super::fidelity::Fidelity;
 use crate::color::ColorDepth;
 
-/// The cells that the screen should show.
+/// The cells to be shown on the screen.
 #[derive(Debug)]
 pub(super) struct TargetScreen {
     pub(super) columns: u16,
     pub(super) rows: u16,
     contents: Vec<CellContent>,
     pub(super) picture: Rect,
-    /// Text in these cells is drawn after the preview.
+    /// Cells whose text is drawn after the preview.
     pub(super) later: Rect,
     pub(super) fidelity: Fidelity,
     depth: ColorDepth,
@@ -25,7 +25,7 @@ pub(super) struct TargetScreen {
 pub(super) enum ScreenRegion {
     Words,
     Picture,
-    /// Text that is drawn after the preview.
+    /// Text drawn after the preview.
     Later,
 }
 
@@ -61,7 +61,7 @@ impl TargetScreen {
             && self.row(y).get(columns.clone()) == other.row(y).get(columns)
     }
 
-    /// The mosaic of a preview cell. `None` for text, which may cover the preview.
+    /// The mosaic of a preview cell. `None` for text cells, which may cover the preview.
     pub(super) fn mosaic(&self, x: u16, y: u16) -> Option<Mosaic> {
         match self.row(y)[usize::from(x)] {
             CellContent::Mosaic(mosaic) if self.picture.contains((x, y).into()) => Some(mosaic),
@@ -76,7 +76,7 @@ impl TargetScreen {
         Self { later, ..self }
     }
 
-    /// Makes the text in these cells part of a hyperlink.
+    /// Makes the text in these cells a hyperlink.
     pub(super) fn link(&mut self, cells: Rect, number: u16) {
         let cells = cells.intersection(Rect::new(0, 0, self.columns, self.rows));
         for place in cells.positions() {
@@ -97,7 +97,7 @@ impl TargetScreen {
         }
     }
 
-    /// Whether a cell belongs to the preview: a mosaic or, without colors, a ramp character.
+    /// Whether a cell belongs to the preview. Preview cells are mosaics or, without colors, ramp characters.
     pub(super) fn is_preview(&self, x: u16, y: u16) -> bool {
         let is_tone = |symbol: &str| matches!(symbol.as_bytes(), [byte] if byte.is_ascii_punctuation());
         self.picture.contains((x, y).into())
@@ -108,7 +108,7 @@ impl TargetScreen {
             }
     }
 
-    /// Whether the preview is drawn with characters.
+    /// Whether the preview is drawn using characters.
     pub(super) fn is_ramp(&self) -> bool {
         self.depth == ColorDepth::None
     }
@@ -125,7 +125,7 @@ impl TargetScreen {
     }
 }
 
-/// Contents of the cells of a buffer.
+/// Contents of a buffer's cells.
 pub(super) fn contents(buffer: &Buffer, depth: ColorDepth) -> Vec<CellContent> {
     let columns = usize::from(buffer.area.width.max(1));
     let mut contents: Vec<CellContent> =

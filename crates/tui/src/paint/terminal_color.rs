@@ -1,23 +1,23 @@
-//! Colors of cells as the terminal stores them.
+//! Cell colors in the form in which terminals store them.
 
 use ratatui::style::Color;
 
 use crate::color::fixed_color;
 
-/// A color of the terminal.
+/// A terminal color.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum TerminalColor {
     /// The default background.
     DefaultBackground,
     /// The default foreground.
     DefaultForeground,
-    /// A palette entry. The user chooses the first 16; the others are the color cube and the grays.
+    /// A palette entry. The first 16 are chosen by the user. The others are the color cube and the grays.
     Palette(u8),
     /// An sRGB color.
     Rgb([u8; 3]),
 }
 
-/// The two color layers of a cell.
+/// A cell's two color layers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum ColorLayer {
     Foreground,
@@ -25,7 +25,7 @@ pub(super) enum ColorLayer {
 }
 
 impl TerminalColor {
-    /// The terminal color for a ratatui color in this layer.
+    /// Converts a ratatui color in this layer to a terminal color.
     pub(super) fn of(color: Color, layer: ColorLayer) -> Self {
         match color {
             Color::Reset => match layer {
@@ -72,7 +72,7 @@ impl TerminalColor {
         }
     }
 
-    /// The sRGB value, if it is known.
+    /// The sRGB value, if known.
     pub(super) fn rgb(self) -> Option<[u8; 3]> {
         match self {
             Self::Rgb(rgb) => Some(rgb),
@@ -102,7 +102,7 @@ impl TerminalColor {
     pub(super) fn length(self) -> u32 {
         match self {
             Self::DefaultBackground | Self::DefaultForeground | Self::Palette(0..8) => 2,
-            // 90 to 97 or 100 to 107: an upper bound, because the layer is not known here.
+            // Upper bound for 90 to 97 or 100 to 107, since the layer is not known here.
             Self::Palette(8..16) => 3,
             Self::Palette(index) => 5 + digits(index),
             Self::Rgb(rgb) => 7 + rgb.map(digits).iter().sum::<u32>(),

@@ -1,4 +1,4 @@
-//! Tests that a terminal fed with the painter's slices shows the target.
+//! Tests that a terminal shows the target after processing the painter's slices.
 
 use proptest::prelude::*;
 use ratatui::buffer::Buffer;
@@ -30,25 +30,25 @@ impl TestTerminal {
         Self { painter: Painter::new(depth).repeating(can_repeat), terminal, sent: 0 }
     }
 
-    /// Sends one slice. Returns whether there was one.
+    /// Sends one slice. Returns false if there was nothing to send.
     fn slice(&mut self, most_bytes: usize) -> bool {
         let bytes = self.painter.slice(most_bytes);
-        // A single cell needs a cursor move, a pen with all modifiers and a symbol.
-        assert!(bytes.len() <= most_bytes.max(96), "{} for {most_bytes}", bytes.len());
+        // A single cell may need a cursor move, a pen with all modifiers, and a symbol.
+        assert!(bytes.len() <= most_bytes.max(96), "{} bytes sent, limit {most_bytes}", bytes.len());
         self.terminal.process(&bytes);
         self.sent += bytes.len();
         !bytes.is_empty()
     }
 
-    /// Sends everything and returns the number of bytes.
+    /// Sends all remaining bytes and returns their number.
     fn finish(&mut self, most_bytes: usize) -> usize {
         let before = self.sent;
         while self.slice(most_bytes) {}
         self.sent - before
     }
 
-    /// The largest channel difference between the screen and a buffer. Panics if anything but colors of the
-    /// preview differs.
+    /// The largest channel difference between the screen and a buffer. Panics if there are differences other
+    /// than preview colors.
     fn difference(&self, wanted: &Buffer, depth: ColorDepth) -> u32 {
         let mut largest = 0;
         let contents = contents(wanted, depth);
@@ -78,7 +78,7 @@ fn distance(a: TerminalColor, b: TerminalColor) -> Option<u32> {
     a.iter().zip(b).map(|(a, b)| u32::from(a.abs_diff(b))).max()
 }
 
-/// The content of a terminal cell. vt100 knows fewer modifiers.
+/// The content of a terminal cell. vt100 supports fewer modifiers.
 fn cell_content(cell: &vt100::Cell) -> CellContent {
     if cell.is_wide_continuation() {
         return CellContent::Covered;
@@ -107,7 +107,7 @@ const COLUMNS: u16 = 24;
 const ROWS: u16 = 8;
 const PICTURE: Rect = Rect { x: 3, y: 1, width: 17, height: 6 };
 
-/// Symbol, colors and modifiers of a cell.
+/// A cell's symbol, colors and modifiers.
 #[derive(Clone, Debug)]
 struct CellStyle {
     symbol: &'static str,
@@ -153,7 +153,7 @@ fn ink() -> impl Strategy<Value = CellStyle> {
 
 fn buffer() -> impl Strategy<Value = Buffer> {
     let cells = usize::from(COLUMNS) * usize::from(ROWS);
-    // Few distinct cells, so that neighbors are often equal.
+    // Use few distinct cells so that neighbors are often equal.
     (proptest::collection::vec(ink(), 1..12), proptest::collection::vec(any::<u8>(), cells)).prop_map(
         |(inks, choice)| {
             let mut buffer = Buffer::empty(Rect::new(0, 0, COLUMNS, ROWS));
@@ -186,7 +186,7 @@ enum PainterStep {
     Aim(Buffer, Fidelity),
     Slice(usize),
     Forget,
-    /// Another program writes to the screen, and the painter discards what it knew about it.
+    /// Another program writes to the screen, and the painter discards its model of the screen.
     Litter,
 }
 
@@ -227,7 +227,7 @@ proptest! {
         let largest = test.difference(&last, depth);
         prop_assert!(largest <= 1, "{largest}");
         test.painter.set_target(&last, PICTURE, Fidelity::Still);
-        prop_assert_eq!(test.finish(most_bytes), 0, "an up-to-date screen needs no bytes");
+        prop_assert_eq!(test.finish(most_bytes), 0, "an up-to-date screen should need no bytes");
     }
 
     #[test]
@@ -242,7 +242,7 @@ proptest! {
 }
 
 #[test]
-fn resize_starts_a_new_screen() {
+fn resize_redraws_the_screen() {
     let mut test = TestTerminal::new(COLUMNS, ROWS, ColorDepth::TrueColor);
     for (columns, rows) in [(COLUMNS, ROWS), (10, 3), (24, 6), (1, 1)] {
         let area = Rect::new(0, 0, columns, rows);
@@ -311,7 +311,7 @@ fn character_preview_is_drawn_after_text() {
     }
     assert_eq!(order, [5, 2, 3, 1, 4, 0]);
     assert_eq!(test.difference(&buffer, ColorDepth::None), 0);
-    assert!(test.sent < 160, "{} bytes for 105 characters", test.sent);
+    assert!(test.sent < 160, "{} bytes sent for 105 characters", test.sent);
 }
 
 #[test]
@@ -332,7 +332,7 @@ fn long_blanks_are_erased() {
     }
 }
 
-/// A buffer with text around a preview in which every cell has its own colors.
+/// A buffer with text around a preview in which each cell has different colors.
 fn with_words() -> Buffer {
     let mut buffer = Buffer::empty(Rect::new(0, 0, COLUMNS, ROWS));
     for place in PICTURE.positions() {
@@ -345,7 +345,7 @@ fn with_words() -> Buffer {
 }
 
 #[test]
-fn delayed_text_follows_the_preview() {
+fn delayed_text_is_drawn_after_the_preview() {
     let buffer = with_words();
     let later = Rect { x: 0, y: 7, width: COLUMNS, height: 1 };
     for extras in [FrameExtras { later, ..FrameExtras::default() }, FrameExtras::default()] {
@@ -395,10 +395,10 @@ fn hyperlink_covers_only_its_cells() {
     let (before, _) = rest.split_once("\u{1b}]8;;\u{1b}\\").expect("its end");
     assert!(
         before.chars().all(|c| c.is_ascii_digit() || "\u{1b}[;H".contains(c)),
-        "at most a cursor move: {before:?}"
+        "expected only a cursor move: {before:?}"
     );
     assert_eq!(first.matches("file:").count(), 1);
-    assert_eq!(sent(&link("file:///a")), "", "no bytes without a change");
+    assert_eq!(sent(&link("file:///a")), "", "unchanged content needs no bytes");
     let other = sent(&link("file:///b"));
     assert!(
         other.contains("file:///b\u{1b}\\") && other.contains("there") && !other.contains("now"),

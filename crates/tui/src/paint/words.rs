@@ -1,16 +1,16 @@
-//! Planning of text, which is always drawn exactly.
+//! Plans the drawing of text, which is always exact.
 
 use super::cell::{CellContent, Glyph};
 use super::cursor_moves::{self, CellPosition};
 use super::screen::{ScreenModel, Stroke};
 use super::target_screen::{ScreenRegion, TargetScreen};
 
-/// Minimum run of blanks that is erased with one sequence.
+/// Minimum length of a run of blanks that is erased with one sequence.
 const ERASED: usize = 9;
-/// Minimum run of blanks that is erased up to the end of the row.
+/// Minimum length of a run of blanks that is erased to the end of the row.
 const ERASED_TO_END: usize = 4;
 
-/// Plans the strokes for the text of a region in a row, or for a preview made of characters.
+/// Plans the strokes for a region's text in a row, or for a preview consisting of characters.
 pub(super) fn plan(screen: &ScreenModel, wanted: &TargetScreen, y: u16, region: ScreenRegion) -> Vec<Stroke> {
     let mut strokes = Vec::new();
     for x in 0..wanted.columns {
@@ -38,7 +38,7 @@ fn stroke(at: CellPosition, look: &CellContent) -> Option<Stroke> {
     }
 }
 
-/// Redraws the cells between the last stroke and `to` if that is shorter than moving the cursor over them.
+/// Redraws the cells between the last stroke and `to` if this takes fewer bytes than moving the cursor.
 fn bridge(screen: &ScreenModel, strokes: &mut Vec<Stroke>, to: CellPosition) {
     let Some(Stroke::Text { at, text }) = strokes.last() else { return };
     let first = at.x + text.columns;

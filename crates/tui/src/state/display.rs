@@ -1,4 +1,4 @@
-//! State of the terminal: window, colors, and how previews are drawn.
+//! Terminal state: the window, colors, and how previews are drawn.
 
 use std::time::{Duration, Instant};
 
@@ -12,7 +12,7 @@ use crate::preview_kind::PreviewKind;
 use crate::terminal_replies::TerminalQueries;
 use crate::terminals::Capabilities;
 
-/// The window, the capabilities of the terminal, and the preview drawn in it.
+/// The window, the terminal's capabilities, and how the preview is drawn.
 pub(crate) struct DisplayState {
     pub window: Window,
     pub kind: PreviewKind,
@@ -20,21 +20,21 @@ pub(crate) struct DisplayState {
     pub shades: ColorMapper,
     /// The terminal's 16 ANSI colors.
     pub ansi: AnsiColors,
-    /// Queries that were sent.
+    /// Queries that have been sent.
     pub ask: TerminalQueries,
     /// Capabilities beyond text.
     pub capabilities: Capabilities,
-    /// Minimum duration of a render whose end is worth a notification. `None` for no notifications.
+    /// Minimum duration of a render that triggers a notification when it ends. `None` disables notifications.
     pub notify_after: Option<Duration>,
-    /// Whether the window has the focus, according to the terminal.
+    /// Whether the window is focused, according to the terminal.
     pub has_focus: bool,
     /// Whether the background is light.
     pub is_light: bool,
-    /// Pixels that the user requested and the terminal has not confirmed.
+    /// The user's request to draw pixels, while the terminal has not confirmed it.
     pub pixels: Option<PixelRequest>,
-    /// Time at which a missing confirmation is reported.
+    /// Time at which the user is told that a confirmation is missing.
     pub pixels_until: Option<Instant>,
-    /// Cost of the last preview.
+    /// Cost of sending the last preview.
     pub frame: Option<FrameReport>,
 }
 
@@ -58,14 +58,14 @@ impl DisplayState {
         }
     }
 
-    /// Pixels of the preview per cell, horizontally.
+    /// Preview pixels per cell, horizontally.
     pub(crate) fn pixels_across(&self) -> u32 {
-        /// More pixels are not worth their bytes.
+        /// More pixels are not worth the bytes.
         const MAX: u32 = 10;
-        /// Maximum pixels of the window: accumulating, developing and encoding a preview takes about 45 bytes
-        /// per pixel.
+        /// Maximum number of pixels in the window. Accumulating, developing and encoding a preview takes
+        /// about 45 bytes of memory per pixel.
         const MAX_PIXELS: f32 = 2_400_000.0;
-        /// Maximum pixels for sixels, which take as much memory again.
+        /// Maximum number of pixels for Sixel, which doubles the memory.
         const MAX_IN_SIXELS: f32 = 1_600_000.0;
         match self.kind {
             PreviewKind::Pixels(protocol) => {

@@ -1,4 +1,4 @@
-//! The state of the front end. Only `update` changes it.
+//! State of the front end. It is modified only by `update`.
 
 mod display;
 mod overlays;
@@ -26,7 +26,7 @@ use super::terminals::Capabilities;
 use crate::pipeline::settings::Overrides;
 use crate::scene::diagnostic::{Diagnostic, Severity};
 
-/// Initial values of the state.
+/// Initial state values.
 pub(super) struct Setup {
     pub scene: PathBuf,
     pub overrides: Overrides,
@@ -35,13 +35,13 @@ pub(super) struct Setup {
     pub depth: ColorDepth,
     /// Whether the environment indicates a light background.
     pub is_light: bool,
-    /// Likely ANSI colors.
+    /// Assumed ANSI colors.
     pub ansi: AnsiColors,
-    /// Queries that were sent.
+    /// Queries that have been sent.
     pub ask: TerminalQueries,
-    /// Capabilities beyond text, according to the environment.
+    /// Capabilities beyond text, according to environment variables.
     pub capabilities: Capabilities,
-    /// Minimum duration of a render whose end is worth a notification. `None` for no notifications.
+    /// Minimum duration of a render that triggers a notification when it ends. `None` disables notifications.
     pub notify_after: Option<Duration>,
 }
 
@@ -55,11 +55,11 @@ pub(super) struct State {
     pub selection: SelectionState,
     pub overlays: OverlayState,
 
-    /// Time of the newest event.
+    /// Time when the newest event arrived.
     pub now: Instant,
-    /// Whether the screen is out of date.
+    /// Whether the screen is outdated.
     pub dirty: bool,
-    /// Whether the next frame shows the first preview of a request or the response to a key, so it is drawn
+    /// Whether the next frame shows a request's first preview or the response to a key, and so must be drawn
     /// without delay.
     pub urgent: bool,
 }
@@ -80,11 +80,11 @@ impl State {
         }
     }
 
-    /// Whether the last camera step has no preview yet.
+    /// Whether the last camera step is still without a preview.
     pub(super) fn awaits_step(&self) -> bool {
         let Self { request, work, picture, .. } = self;
         let is_shown = picture.shown.as_ref().is_some_and(|shown| shown.generation == request.generation);
-        // While the scene is broken, the last valid one is rendered.
+        // While the scene is broken, the last valid one is being rendered.
         let is_at_work = match work.activity {
             Activity::Running { .. } => true,
             Activity::Waiting | Activity::Broken => request.camera.is_some() && self.is_scene_broken(),
@@ -94,7 +94,7 @@ impl State {
         is_newest && is_at_work && request.preview_size.is_some() && !is_shown
     }
 
-    /// Diagnostics of a valid scene, and why its image is not on disk.
+    /// Diagnostics of a valid scene, and why its image could not be written.
     pub(super) fn reported(&self) -> Vec<Diagnostic> {
         let warnings = &self.overlays.warnings;
         let failed = self.saving.write_failed.as_ref();
@@ -109,23 +109,23 @@ impl State {
         unwritten.into_iter().chain(warnings.iter().cloned()).collect()
     }
 
-    /// Whether the scene failed, not its render.
+    /// Whether the scene, rather than the render, failed.
     fn is_scene_broken(&self) -> bool {
         self.overlays.problems.as_ref().is_none_or(|problems| problems.work.is_none())
     }
 
-    /// Shows the list of views for another moment.
+    /// Opens the view list, or keeps it open a while longer.
     pub(super) fn list_views(&mut self) {
         self.overlays.list_views(self.now);
         self.dirty = true;
     }
 
-    /// Pauses or resumes the request's clock.
+    /// Pauses or resumes the clock of the current request.
     pub(super) fn set_paused(&mut self, paused: bool) {
         self.work.set_paused(paused, self.now);
     }
 
-    /// Time of the next tick that the state needs.
+    /// When the state needs its next tick.
     pub(super) fn next_tick(&self) -> Option<Instant> {
         const CLOCK: Duration = Duration::from_millis(250);
         const AGE: Duration = Duration::from_secs(1);
@@ -133,7 +133,7 @@ impl State {
         let bars = self.work.assets.iter().filter_map(AssetBar::end).min();
         let views = self.overlays.views.as_ref().map(|views| views.until);
         let notice = self.overlays.message.as_ref().and_then(|message| message.until);
-        // The age of an older render changes.
+        // The displayed age of an older render changes.
         let age = self.picture.history.is_open().then(|| self.now + AGE);
         let pixels = self.display.pixels_until;
         [clock, age, self.request.resize_due, bars, views, notice, pixels].into_iter().flatten().min()

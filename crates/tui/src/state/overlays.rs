@@ -1,25 +1,25 @@
-//! Text over the image: messages, diagnostics, help, and the list of views.
+//! Text over the image: messages, diagnostics, help, and the view list.
 
 use std::time::{Duration, Instant};
 
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::is_absence;
 
-/// Errors that keep the preview from showing the current file.
+/// Errors that prevent the preview from showing the current file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Problems {
     /// Diagnostics with source positions.
     pub diagnostics: Vec<Diagnostic>,
-    /// A failure without a position.
+    /// A failure without a source position.
     pub work: Option<String>,
 }
 
-/// The open list of views.
+/// The open view list.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct ViewList {
-    /// Time at which the list closes automatically.
+    /// Time when the list closes automatically.
     pub until: Instant,
-    /// Search text typed after `/`. `None` if no search is active.
+    /// Search text typed after `/`. `None` if not searching.
     pub name: Option<String>,
 }
 
@@ -35,23 +35,23 @@ pub(crate) struct Pane {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Message {
     pub words: String,
-    /// Time at which it disappears. `None` for errors and prompts, which stay until a key is pressed.
+    /// Time when it disappears. `None` for errors and prompts, which remain until a key is pressed.
     pub until: Option<Instant>,
 }
 
 /// Messages, diagnostics and panes.
 #[derive(Default)]
 pub(crate) struct OverlayState {
-    /// The last message, until the next key.
+    /// The last message, until a key is pressed.
     pub message: Option<Message>,
-    /// Errors of the scene. `None` while it is valid.
+    /// Errors in the scene. `None` if it is valid.
     pub problems: Option<Problems>,
     /// Errors in a file that may still be incomplete.
     pub unconfirmed: Option<Vec<Diagnostic>>,
     pub warnings: Vec<Diagnostic>,
     /// Whether the warnings belong to the newest request.
     pub are_warnings_known: bool,
-    /// The pane of errors and warnings.
+    /// The pane that lists errors and warnings.
     pub diagnostics: Pane,
     pub help: Pane,
     pub views: Option<ViewList>,
@@ -63,7 +63,7 @@ impl OverlayState {
         self.problems.as_ref().is_some_and(|problems| problems.diagnostics.iter().any(is_absence))
     }
 
-    /// Shows the list of views for another moment.
+    /// Opens the view list, or keeps it open a while longer.
     pub(crate) fn list_views(&mut self, now: Instant) {
         const MOMENT: Duration = Duration::from_secs(4);
         let name = self.views.take().and_then(|views| views.name);

@@ -1,15 +1,15 @@
-//! The image on the screen and the history.
+//! The displayed image and the history.
 
 use crate::history::{History, ShownImage};
 use crate::pipeline::protocol::ImagePosition;
 
-/// The image on the screen, and how it is shown.
+/// The displayed image, and how it is shown.
 #[derive(Default)]
 pub(crate) struct PictureState {
     pub shown: Option<ShownImage>,
     pub history: History,
-    /// Position around which the image is shown pixel by pixel. `None` if the whole image is shown.
+    /// Center of the section shown pixel by pixel. `None` if the whole image is shown.
     pub close_up: Option<ImagePosition>,
-    /// Whether only the image is shown.
+    /// Whether everything but the image is hidden.
     pub is_alone: bool,
 }

@@ -13,7 +13,7 @@ use crate::scene::description::{Integrator, Pose, Shadows};
 use crate::scene::sanitize::visible;
 use crate::scene::{changes, is_mesh};
 
-/// Settings changed with keys, which override the command line.
+/// Settings changed with keys. They override the command line.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Toggles {
     pub shadows: Option<Shadows>,
@@ -26,7 +26,8 @@ pub(crate) struct Toggles {
 }
 
 impl Toggles {
-    /// The same settings as command-line options. A position replaces the scene's orbiter camera, `orbiter`, entirely.
+    /// The same settings as command-line options. If the camera position is set, it replaces the scene's
+    /// orbiter camera, `orbiter`.
     pub(crate) fn options(&self, orbiter: Option<Viewpoint>) -> Vec<String> {
         let on_off = |is_on: bool| if is_on { "on" } else { "off" };
         let vector = |key: &str, DVec3 { x, y, z }: DVec3| format!("--set 'camera.{key}=[{x},{y},{z}]'");
@@ -56,8 +57,8 @@ impl Toggles {
         options
     }
 
-    /// Settings that differ from `before`, in words. Leaves out a camera reset if `is_camera_written`,
-    /// because the scene now has that camera.
+    /// Describes settings that differ from `before`. A reset camera is omitted if `is_camera_written`,
+    /// because the scene now contains that camera.
     pub(crate) fn differences(&self, before: &Self, is_camera_written: bool) -> Vec<String> {
         let on_off = |is_on: bool| if is_on { "on" } else { "off" }.to_owned();
         let camera = self.camera.is_any().then(|| "moved".to_owned());
@@ -73,7 +74,7 @@ impl Toggles {
         ];
         let differing = || all.iter().filter(|(_, differs, _)| *differs);
         let now = differing().filter_map(|(name, _, now)| Some(format!("{name} {}", now.as_ref()?)));
-        // Settings that were reset are listed together.
+        // Settings that were reset are grouped together.
         let back: Vec<&str> = differing().filter(|it| it.2.is_none()).map(|it| it.0).collect();
         let back = (!back.is_empty()).then(|| format!("{} reset", listed(&back)));
         now.chain(back).collect()
@@ -88,27 +89,27 @@ fn listed(names: &[&str]) -> String {
     }
 }
 
-/// Scene and settings that an image was rendered with.
+/// The scene and settings used to render an image.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct ImageOrigin {
     /// Settings changed with keys.
     pub toggles: Toggles,
     /// Text of the scene file. `None` for a model.
     pub text: Option<Arc<str>>,
-    /// Other files of the scene.
+    /// Other files used by the scene.
     pub files: Arc<[FileRead]>,
-    /// Whether its render has not finished.
+    /// Whether the render has not finished.
     pub is_unfinished: bool,
 }
 
 impl ImageOrigin {
-    /// The origin without the exposure, which does not affect the render.
+    /// The origin without the exposure, which does not affect rendering.
     pub(crate) fn without_exposure(self) -> Self {
         Self { toggles: Toggles { exposure: None, ..self.toggles }, ..self }
     }
 
-    /// Origin of an image that a later request found again: later changes had no effect on it. But if the
-    /// camera moved with keys is now in the scene, the later origin is returned.
+    /// Origin of an image that a later request reproduced. This is `self`, because the later changes had no
+    /// effect. However, if the camera moved with keys has since been written to the scene, it is `later`.
     pub(crate) fn for_same_image(&self, later: Self) -> Self {
         if self.toggles.camera.is_any() && !later.toggles.camera.is_any() {
             return later;
@@ -116,7 +117,7 @@ impl ImageOrigin {
         Self { is_unfinished: later.is_unfinished, ..self.clone() }
     }
 
-    /// Changes in the files since `before`, in words.
+    /// Describes changes in files since `before`.
     pub(crate) fn edits(&self, before: &Self) -> Vec<String> {
         let texts = before.text.as_deref().zip(self.text.as_deref());
         let of_text = texts.map(|(old, new)| changes(old, new)).unwrap_or_default();
@@ -130,7 +131,7 @@ impl ImageOrigin {
     }
 }
 
-/// Stops of exposure with a sign.
+/// Formats exposure stops with a sign.
 pub(crate) fn format_stops(stops: f32) -> String {
     match stops {
         0.0 => "0".to_owned(),
@@ -139,8 +140,8 @@ pub(crate) fn format_stops(stops: f32) -> String {
     }
 }
 
-/// A camera step. Steps arrive faster than previews, so the newest step waits until the previous one has its
-/// first preview.
+/// A camera step. Steps can arrive faster than previews, so the newest step waits until the previous one has
+/// a preview.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct CameraStep {
     /// Generation of the step's request.
@@ -149,7 +150,7 @@ pub(crate) struct CameraStep {
     pub is_waiting: bool,
 }
 
-/// The newest request: the scene, its settings, and the worker's replies about them.
+/// The newest request: the scene, its settings, and what the worker has reported about them.
 pub(crate) struct RequestState {
     pub scene: PathBuf,
     /// Overrides from the command line.
@@ -158,33 +159,33 @@ pub(crate) struct RequestState {
 
     /// Generation of the newest request.
     pub generation: u64,
-    /// Toggles of the newest request.
+    /// Toggles sent with the newest request.
     pub sent_toggles: Toggles,
-    /// Whether the newest request differs from the previous one only in its exposure.
+    /// Whether the newest request differs from the previous one only in exposure.
     pub is_exposure_only: bool,
-    /// Preview size of the newest request.
+    /// Preview size in the newest request.
     pub preview_size: Option<PreviewSize>,
-    /// Time at which a new preview size is requested.
+    /// Time when a new preview size will be requested.
     pub resize_due: Option<Instant>,
-    /// Section of the image that is rendered first.
+    /// Section of the image to render first.
     pub first_section: Option<Section>,
     pub camera_step: CameraStep,
-    /// First request with a camera moved with keys.
+    /// The first request whose camera was moved with keys.
     pub moved_since: Option<u64>,
-    /// The moved parts of the camera as they were in the scene before the first move.
+    /// Original values of the moved camera parts, from the scene before the first move.
     pub moved_from: CameraChange,
 
-    /// Text of the scene file in the newest valid request.
+    /// Text of the scene file for the newest valid request.
     pub text: Option<Arc<str>>,
-    /// Other files of the scene.
+    /// Other files used by the scene.
     pub files: Arc<[FileRead]>,
     /// Effective settings, as reported by the worker.
     pub effective: Option<Effective>,
-    /// The scene's own camera in the newest valid request.
+    /// The scene's own camera for the newest valid request.
     pub camera: Option<Viewpoint>,
     /// The scene's own exposure in stops.
     pub exposure: Option<f32>,
-    /// Other settings of the scene that keys can change.
+    /// Other scene settings that keys can change.
     pub own: Option<OwnSettings>,
 }
 
@@ -212,14 +213,13 @@ impl RequestState {
         }
     }
 
-    /// Records the input files of the newest request. The text of a scene is compared separately; models have
-    /// no text.
+    /// Records the newest request's input files. The scene text is compared separately. Models have no text.
     pub(crate) fn note_files(&mut self, files: Vec<FileRead>) {
         let is_model = is_mesh(&self.scene);
         self.files = files.into_iter().filter(|file| is_model || file.path != self.scene).collect();
     }
 
-    /// Origin of the image that the newest request renders.
+    /// Origin of the newest request's image.
     pub(crate) fn origin(&self, is_unfinished: bool) -> ImageOrigin {
         ImageOrigin {
             toggles: self.sent_toggles,
@@ -229,7 +229,7 @@ impl RequestState {
         }
     }
 
-    /// Overrides from the command line and keys together.
+    /// Combined overrides from the command line and keys.
     pub(crate) fn overrides(&self) -> Overrides {
         let mut overrides = self.command_line.clone();
         overrides.shadows = self.toggles.shadows.or(overrides.shadows);
@@ -242,12 +242,12 @@ impl RequestState {
         overrides
     }
 
-    /// Overrides of the scene's own image, if keys show a different one.
+    /// Overrides for the scene's own image, if keys have changed the displayed image.
     pub(crate) fn own_overrides(&self) -> Option<Box<Overrides>> {
         (!self.is_own()).then(|| Box::new(self.command_line.clone()))
     }
 
-    /// Drops changes made with keys that a save has put into the scene.
+    /// Drops changes made with keys that have been saved to the scene.
     pub(crate) fn drop_saved_changes(&mut self) {
         let (shadows, integrator, photons) =
             (self.base_shadows(), self.base_integrator(), self.base_photons());
@@ -261,13 +261,13 @@ impl RequestState {
         self.toggles.exposure.take_if(|now| Some(*now) == exposure);
     }
 
-    /// The camera including changes made with keys. `None` until a valid scene has been read.
+    /// The camera, including changes made with keys. `None` until a valid scene has been read.
     pub(crate) fn viewpoint(&self) -> Option<Viewpoint> {
         self.camera.map(|camera| camera.changed(&self.toggles.camera))
     }
 
-    /// Records the original values of the camera parts that were moved with keys. Values recorded earlier are
-    /// kept.
+    /// Records the original values of camera parts that were moved with keys. Does not overwrite values
+    /// recorded earlier.
     pub(crate) fn note_moved_parts(&mut self) {
         let Some(own) = self.camera else { return };
         let (moved, from) = (&self.toggles.camera, self.moved_from);
@@ -278,14 +278,14 @@ impl RequestState {
         };
     }
 
-    /// Makes the scene's current camera the origin of the movement.
+    /// Treats the scene's current camera as the one from which the user moved.
     pub(crate) fn move_from_own(&mut self) {
         self.moved_from = CameraChange::default();
         self.note_moved_parts();
     }
 
-    /// Camera keys that were saved after the camera was moved with keys, with their current values in the
-    /// scene.
+    /// Camera settings that were saved after the camera had been moved with keys, with their current values
+    /// in the scene.
     pub(crate) fn saved_since_moved(&self) -> Vec<String> {
         let Some((own, moved)) = self.camera.zip(self.viewpoint()) else { return Vec::new() };
         let from = &self.moved_from;
@@ -310,7 +310,7 @@ impl RequestState {
         all.into_iter().flatten().collect()
     }
 
-    /// Changes made with keys that are not obvious from the image, in words.
+    /// Describes changes made with keys that are not obvious from the image.
     pub(crate) fn changes(&self) -> Vec<String> {
         let CameraChange { pose, fov, focus } = self.toggles.camera;
         let is_moved = pose.is_some() || fov.is_some();
@@ -320,7 +320,7 @@ impl RequestState {
         moved.into_iter().chain(focused).chain(exposed).collect()
     }
 
-    /// Whether this is the scene's own image, without changes made with keys. Only this image is written
+    /// Whether this is the scene's own image, with no changes made with keys. Only this image is written
     /// automatically.
     pub(crate) fn is_own(&self) -> bool {
         self.toggles == Toggles::default()
@@ -335,7 +335,7 @@ impl RequestState {
         self.toggles.view.unwrap_or_else(|| self.base_view())
     }
 
-    /// Shadows of the scene with command-line overrides. `None` until a valid scene has been read.
+    /// Shadows set by the scene or the command line. `None` until a valid scene has been read.
     pub(crate) fn base_shadows(&self) -> Option<Shadows> {
         self.command_line.shadows.or(self.own.map(|own| own.shadows))
     }
@@ -345,17 +345,18 @@ impl RequestState {
         self.toggles.shadows.or(self.base_shadows()).unwrap_or(Shadows::Soft)
     }
 
-    /// Photons of the scene with command-line overrides. `None` until a valid scene has been read.
+    /// Whether photons are enabled by the scene or the command line. `None` until a valid scene has been
+    /// read.
     pub(crate) fn base_photons(&self) -> Option<bool> {
         self.command_line.photons.or(self.own.map(|own| own.photons))
     }
 
-    /// Whether photons are currently on.
+    /// Whether photons are currently enabled.
     pub(crate) fn photons(&self) -> bool {
         self.toggles.photons.or(self.base_photons()).unwrap_or(false)
     }
 
-    /// Integrator of the scene with command-line overrides. `None` until a valid scene has been read.
+    /// Integrator set by the scene or the command line. `None` until a valid scene has been read.
     pub(crate) fn base_integrator(&self) -> Option<Integrator> {
         self.command_line.integrator.or(self.own.map(|own| own.integrator))
     }
@@ -365,7 +366,7 @@ impl RequestState {
         self.toggles.integrator.or(self.base_integrator()).unwrap_or(Integrator::Whitted)
     }
 
-    /// Aspect ratio of the image; a typical one until it is known.
+    /// The image's aspect ratio. A typical value until it is known.
     pub(crate) fn aspect(&self) -> f32 {
         const USUAL: f32 = 4.0 / 3.0;
         self.effective

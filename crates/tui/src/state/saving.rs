@@ -1,4 +1,4 @@
-//! Saves of scene files by the user, and of images and cameras by glimt.
+//! State of saved files: scene files saved by the user, and images and cameras written by glimt.
 
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -8,18 +8,18 @@ use crate::event::WriteFailure;
 use crate::options::ExternalChange;
 use crate::pipeline::protocol::{CameraEdit, OwnState, Viewpoint};
 
-/// A save that is not on the screen yet.
+/// A saved change that is not on the screen yet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct PendingChange {
     pub generation: u64,
     pub noticed: Instant,
 }
 
-/// The scene's own image: the saved scene with command-line overrides.
+/// The scene's own image, rendered from the saved scene with command-line overrides.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct OwnImage {
     pub state: OwnState,
-    /// Progress of its render, from 0 to 1.
+    /// Progress of the render, from 0 to 1.
     pub fraction: f64,
 }
 
@@ -28,55 +28,56 @@ pub(crate) struct OwnImage {
 pub(crate) struct WrittenFile {
     pub path: PathBuf,
     pub bytes: u64,
-    /// Generation of the request.
+    /// Generation of the request that wrote it.
     pub generation: u64,
     /// Description of the file, if known.
     pub made: String,
-    /// Changes made with keys that it shows. `None` for the scene's own image.
+    /// Changes made with keys that the file includes. `None` for the scene's own image.
     pub shows: Option<Toggles>,
-    /// Whether a later image could not be written there, so the content is unknown.
+    /// Whether writing a later image to this file failed, so its content is unknown.
     pub is_stale: bool,
-    /// Change of the file by another program.
+    /// How another program changed the file.
     pub lost: Option<ExternalChange>,
 }
 
-/// Saves of scene files, and written images.
+/// State of saved scene files and written images.
 pub(crate) struct SavingState {
-    /// Number of changes of the scene's files.
+    /// Number of times the scene's files have changed.
     pub edits: u64,
-    /// Request of the last edit.
+    /// Request that followed the last edit.
     pub last_edit: Option<u64>,
-    /// First request with the last saved files.
+    /// First request that used the last saved files.
     pub saved_at: u64,
     pub own: OwnImage,
     /// Whether no program is writing the scene's files.
     pub is_settled: bool,
-    /// The last save, until its first changed cell is on the screen.
+    /// The last save. `None` once its first changed cell is on the screen.
     pub change: Option<PendingChange>,
-    /// Time at which the editor last exited.
+    /// Time when the editor last exited.
     pub editor_closed: Option<Instant>,
-    /// Time from the last save to its first changed cell, without the time spent in the editor.
+    /// Time between the last save and its first changed cell on the screen, excluding time spent in the
+    /// editor.
     pub first_change: Option<Duration>,
-    /// Time at which glimt wrote the camera into the scene file.
+    /// Time when glimt wrote the camera into the scene file.
     pub camera_kept: Option<Instant>,
-    /// Whether an older render was shown when the camera was last kept.
+    /// Whether an older render was displayed when the camera was last saved.
     pub is_camera_of_newest: bool,
-    /// Cameras written into the scene file that can be undone, newest last.
+    /// Cameras written into the scene file that can be undone, from oldest to newest.
     pub camera_edits: Vec<CameraEdit>,
-    /// Whether a scene file exists next to the model. `c` does not overwrite it.
+    /// Whether there is a scene file next to the model. `c` does not overwrite it.
     pub has_scene_of_model: bool,
-    /// Camera of the scene that `c` wrote for the model.
+    /// Camera in the scene that `c` wrote for the model.
     pub camera_of_model: Option<Viewpoint>,
-    /// Time at which glimt refused to write the camera into the scene file.
+    /// Time when glimt refused to write the camera into the scene file.
     pub camera_refused: Option<Instant>,
 
-    /// Whether a key requested the next written image.
+    /// Whether the next image to be written was requested with a key.
     pub is_write_requested: bool,
     /// Changes made with keys when a write was last requested.
     pub write_shows: Toggles,
-    /// Why the current image is not on disk, if it should be.
+    /// Why the current image was not written, if it should have been.
     pub unwritten: Option<String>,
-    /// The last write failure, until a later image is on disk.
+    /// The last write failure, until a later image is written.
     pub write_failed: Option<WriteFailure>,
     pub written: Vec<WrittenFile>,
 }

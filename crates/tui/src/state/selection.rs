@@ -3,15 +3,15 @@
 use crate::event::FilePosition;
 use crate::pipeline::protocol::ImagePosition;
 
-/// A press of the left button on the image.
+/// A left button press on the image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Press {
-    /// Last column of the mouse.
+    /// Current column of the mouse.
     pub column: u16,
-    /// Last row of the mouse.
+    /// Current row of the mouse.
     pub row: u16,
     pub has_moved: bool,
-    /// Position in the image at which the press started.
+    /// Image position where the press started.
     pub from: Option<ImagePosition>,
 }
 
@@ -31,15 +31,15 @@ pub(crate) struct SelectionState {
     pub is_focusing: bool,
     /// Whether the next drag selects the region to render first.
     pub is_marking: bool,
-    /// Position of the last click; initially the center of the image.
+    /// Position of the last click. Initially the image center.
     pub crosshair: ImagePosition,
     /// Purpose of the last pick query.
     pub purpose: PickPurpose,
-    /// Facts about the inspected object, until the next key.
+    /// Information about the inspected object, until a key is pressed.
     pub facts: Option<Vec<String>>,
-    /// Inspected values of the last click, in one line.
+    /// Values inspected with the last click, in one line.
     pub clicked: Option<String>,
-    /// Position of the inspected object in the scene file.
+    /// Where the inspected object is defined in the scene file.
     pub picked: Option<FilePosition>,
 }
 

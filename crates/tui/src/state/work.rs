@@ -1,4 +1,4 @@
-//! Progress of the worker on the newest request.
+//! The worker's progress on the newest request.
 
 use std::time::{Duration, Instant};
 
@@ -13,7 +13,7 @@ pub(crate) enum Activity {
     Running { since: Instant },
     /// Finished.
     Done,
-    /// Failed, but the file may still be incomplete.
+    /// Failed, but the file may be incomplete.
     Waiting,
     /// Failed.
     Broken,
@@ -21,8 +21,7 @@ pub(crate) enum Activity {
     Cancelled,
 }
 
-/// State of the render of the newest request. While the scene is broken, that is a render of the last valid
-/// scene.
+/// State of the newest request's render. While the scene is broken, this is a render of the last valid scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Rendering {
     UnderWay,
@@ -34,14 +33,14 @@ pub(crate) enum Rendering {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct AssetBar {
     pub progress: AssetProgress,
-    /// Time at which the bar was full. It stays for a moment so that 100% is visible.
+    /// Time when the bar became full. It remains visible for a moment at 100%.
     pub finished: Option<Instant>,
 }
 
 impl AssetBar {
     const LINGER: Duration = Duration::from_millis(400);
 
-    /// Time at which the bar disappears.
+    /// Time when the bar disappears.
     pub(crate) fn end(&self) -> Option<Instant> {
         self.finished.map(|finished| finished + Self::LINGER)
     }
@@ -52,23 +51,23 @@ pub(crate) struct WorkState {
     pub activity: Activity,
     pub rendering: Rendering,
     pub paused: bool,
-    /// Time at which the request was paused.
+    /// Time when the request was paused.
     pub paused_at: Option<Instant>,
     pub stages: [Option<StageReport>; Stage::ALL.len()],
-    /// Duration of each stage when it last ran before this request.
+    /// Duration of each stage the last time it ran before this request.
     pub last_seconds: [Option<f64>; Stage::ALL.len()],
     pub assets: Vec<AssetBar>,
     pub progress: Option<RenderProgress>,
     pub report: Option<Box<Report>>,
-    /// Noise over time of this render.
+    /// Noise over time for this render.
     pub curve: NoiseCurve,
-    /// Noise over time of the last finished render.
+    /// Noise over time for the last finished render.
     pub last_curve: NoiseCurve,
-    /// Curves of the last renders, newest last, for images that are found again.
+    /// Curves of recent renders, from oldest to newest, in case a later request reproduces an image.
     curves: Vec<(ImageOrigin, NoiseCurve)>,
-    /// Whether the request changed nothing.
+    /// Whether the request had no changes.
     pub unchanged: bool,
-    /// Number of finished renders; changes of exposure do not count.
+    /// Number of finished renders, not counting exposure changes.
     pub renders: u64,
 }
 
@@ -92,7 +91,7 @@ impl WorkState {
         }
     }
 
-    /// Stores the curve of a finished render.
+    /// Stores a finished render's curve.
     pub(crate) fn keep_curve(&mut self, origin: ImageOrigin) {
         const MAX: usize = 16;
         self.curves.retain(|(other, _)| *other != origin);
@@ -102,13 +101,13 @@ impl WorkState {
         }
     }
 
-    /// Restores the curve of an image that is found again, if it is known.
+    /// Restores the curve if an earlier request rendered the same image.
     pub(crate) fn restore_curve(&mut self, origin: &ImageOrigin) {
         let found = self.curves.iter().find(|(other, _)| other == origin);
         self.curve = found.map(|(_, curve)| curve.clone()).unwrap_or_default();
     }
 
-    /// Whether a render is running, possibly of the last valid scene.
+    /// Whether a render is running. It may be a render of the last valid scene.
     pub(crate) fn is_under_way(&self) -> bool {
         self.rendering == Rendering::UnderWay
     }
@@ -117,7 +116,7 @@ impl WorkState {
         matches!(self.activity, Activity::Running { .. })
     }
 
-    /// Time that the current request has been running, without pauses.
+    /// How long the current request has been running, not counting pauses.
     pub(crate) fn running_time(&self, now: Instant) -> Option<Duration> {
         match self.activity {
             Activity::Running { since } => {
@@ -127,14 +126,14 @@ impl WorkState {
         }
     }
 
-    /// Like [`WorkState::running_time`], plus the time in which earlier requests rendered its samples.
+    /// Like [`WorkState::running_time`], plus the time that earlier requests spent on its samples.
     pub(crate) fn rendering_time(&self, now: Instant) -> Option<Duration> {
         let earlier = self.progress.map_or(0.0, |progress| progress.earlier_seconds);
         let earlier = Duration::try_from_secs_f64(earlier).unwrap_or_default();
         self.running_time(now).map(|time| time.saturating_add(earlier))
     }
 
-    /// Pauses or resumes the clock of the request.
+    /// Pauses or resumes the request's clock.
     pub(crate) fn set_paused(&mut self, paused: bool, now: Instant) {
         self.paused = paused;
         if paused {

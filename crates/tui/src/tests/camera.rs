@@ -1,4 +1,4 @@
-//! Camera keys: requests and messages.
+//! Camera keys: the resulting requests and messages.
 
 use super::{BLUE, RED};
 use crate::event::{Effect, Event, KeyPress};
@@ -37,7 +37,7 @@ fn moved_camera_is_shown_but_not_written() {
     show(&mut ui);
     let effects = ui.event(Event::Changed(Changed { noticed: ui.now }));
     let edited = request(&effects).expect("a request");
-    assert_eq!(edited.overrides.camera, moved.overrides.camera, "a save does not reset it");
+    assert_eq!(edited.overrides.camera, moved.overrides.camera, "saving a file should not reset it");
     assert_eq!(edited.write, Writing::No);
     let effects = ui.press('0');
     let own = request(&effects).expect("a request");
@@ -46,22 +46,22 @@ fn moved_camera_is_shown_but_not_written() {
 }
 
 #[test]
-fn newest_camera_step_follows_a_preview() {
+fn newest_camera_step_waits_for_a_preview() {
     let mut ui = TestUi::new();
     ui.finish(RED);
     let effects = ui.press('l');
-    let first = request(&effects).expect("an immediate first step").overrides.camera.pose.expect("a pose");
+    let first = request(&effects).expect("an immediate request").overrides.camera.pose.expect("a pose");
     for key in ['l', 'l', 'k', '<'] {
-        assert!(ui.press(key).is_empty(), "the first step has no preview yet");
+        assert!(ui.press(key).is_empty(), "steps should wait for the first step's preview");
     }
     let effects = show(&mut ui);
-    let newest = request(&effects).expect("a request of the newest step").overrides.camera;
+    let newest = request(&effects).expect("the newest step is requested").overrides.camera;
     let pose = newest.pose.expect("a pose");
     assert!(pose.position.x > 2.9 * first.position.x && pose.position.y > 1.1, "{pose:?}");
     assert!(newest.fov.is_some_and(|fov| fov < 40.0));
-    assert!(show(&mut ui).is_empty(), "no step is waiting");
-    assert!(request(&ui.press('l')).is_some(), "the next step is immediate");
-    // Other keys are immediate and include all previous steps.
+    assert!(show(&mut ui).is_empty(), "no step should be waiting");
+    assert!(request(&ui.press('l')).is_some(), "the next step should be requested immediately");
+    // Other keys take effect immediately and include all previous steps.
     ui.press('l');
     let effects = ui.press('s');
     assert!(request(&effects).expect("a request").overrides.camera != newest);
@@ -69,7 +69,7 @@ fn newest_camera_step_follows_a_preview() {
 }
 
 #[test]
-fn steps_without_previews_do_not_block() {
+fn steps_without_previews_do_not_block_others() {
     let mut ui = TestUi::new();
     ui.finish(RED);
     ui.press('l');
@@ -78,17 +78,17 @@ fn steps_without_previews_do_not_block() {
     let diagnostics = vec![diagnostic(Severity::Error, "wrong")];
     let failure = protocol::Failure::Scene(diagnostics);
     let effects = ui.worker(protocol::Event::Failed { generation, failure });
-    assert!(request(&effects).is_none(), "the last valid scene is rendered");
-    assert!(request(&show(&mut ui)).is_some(), "its preview arrives");
+    assert!(request(&effects).is_none(), "the last valid scene is still being rendered");
+    assert!(request(&show(&mut ui)).is_some(), "the preview should trigger the waiting step");
     ui.press('l');
     let generation = ui.state.request.generation;
     let failure = protocol::Failure::Work("no memory".to_owned());
     let effects = ui.worker(protocol::Event::Failed { generation, failure });
-    assert!(request(&effects).is_some(), "after a failure, the waiting step is sent");
+    assert!(request(&effects).is_some(), "a failure should trigger the waiting step");
     let mut ui = TestUi::with(state(80, 1));
     ui.finish(RED);
     for _ in 0..3 {
-        assert!(request(&ui.press('l')).is_some(), "no room for a preview");
+        assert!(request(&ui.press('l')).is_some(), "without space for a preview, steps should not wait");
     }
 }
 
@@ -101,7 +101,7 @@ fn arrows_scroll_open_diagnostics() {
     assert!(ui.key(down).is_empty());
     assert!(ui.state.overlays.diagnostics.scroll > 0);
     ui.key(KeyPress::special(KeyCode::Esc));
-    assert!(request(&ui.key(down)).is_some(), "the closed pane leaves them to the camera");
+    assert!(request(&ui.key(down)).is_some(), "arrow keys should move the camera after the pane is closed");
 }
 
 #[test]
@@ -112,7 +112,7 @@ fn camera_keys_need_a_scene() {
 }
 
 #[test]
-fn exposure_starts_from_the_scene() {
+fn exposure_changes_start_from_scene_value() {
     let mut ui = TestUi::new();
     ui.finish(RED);
     ui.state.request.exposure = Some(1.0);
@@ -141,14 +141,14 @@ fn held_keys_stop_at_their_limits() {
         }
         assert!(ui.text().contains(&words), "{key}: {}", ui.text());
         let generation = ui.state.request.generation;
-        assert!(ui.press(key).is_empty() && ui.state.request.generation == generation, "{key}: no request");
+        assert!(ui.press(key).is_empty() && ui.state.request.generation == generation, "{key}: a request");
         let view = ui.state.request.viewpoint().expect("a camera");
         assert!((0.0039..4001.0).contains(&view.pose.distance()), "{key}: {view:?}");
     }
 }
 
 #[test]
-fn reverted_changes_are_no_changes() {
+fn reverted_changes_are_not_sent() {
     for keys in ["[]", "][", "<>", "><", "+-", "-+", "lh", "]]]]["] {
         let mut ui = TestUi::new();
         ui.finish(RED);
@@ -172,7 +172,7 @@ fn reverted_changes_are_no_changes() {
 }
 
 #[test]
-fn command_line_exposure_is_no_change() {
+fn command_line_exposure_is_not_a_change() {
     let base = Overrides { exposure: Some(1.0), ..Overrides::default() };
     let mut ui = TestUi::with(state_with(80, 24, PreviewKind::HalfBlock, ColorDepth::TrueColor, base));
     ui.finish(RED);
@@ -202,14 +202,14 @@ fn model_scene_is_written_once() {
     let generation = ui.state.request.generation;
     ui.worker(WorkerEvent::CameraKept { generation, outcome: Ok(kept) });
     ui.key(KeyPress::special(KeyCode::Esc));
-    assert!(!ui.text().contains("c keep"), "the scene exists: {}", ui.text());
+    assert!(!ui.text().contains("c keep"), "a scene file already exists: {}", ui.text());
     assert_eq!(crate::exit_summary::not_kept(&ui.state), None);
     ui.press('l');
     ui.finish([200, 30, 30]);
-    assert!(crate::exit_summary::not_kept(&ui.state).is_some(), "the camera moved again");
+    assert!(crate::exit_summary::not_kept(&ui.state).is_some(), "the camera moved again after saving");
 }
 
-/// Saves a scene with this camera.
+/// Simulates saving a scene with this camera.
 fn save(ui: &mut TestUi, camera: Viewpoint) {
     ui.event(Event::Changed(Changed { noticed: ui.now }));
     let generation = ui.state.request.generation;
@@ -224,7 +224,7 @@ fn save(ui: &mut TestUi, camera: Viewpoint) {
     show(ui);
 }
 
-/// The camera that `c` asks to write. `None` if it does not.
+/// The camera that pressing `c` asks the worker to write. `None` if nothing is written.
 fn kept(ui: &mut TestUi) -> Option<Viewpoint> {
     let is_order = |effect: Effect| match effect {
         Effect::Send(Command::KeepCamera(moved)) => Some(moved.camera),
@@ -239,7 +239,7 @@ fn viewpoint_at(position: [f64; 3]) -> Viewpoint {
 }
 
 #[test]
-fn conflicting_saves_are_listed_before_c() {
+fn conflicting_saves_are_listed_on_first_c() {
     let wide = |fov| Viewpoint { fov, ..camera() };
     let look_at = Viewpoint { pose: Pose { look_at: [0.0, 0.5, 0.0].into(), ..camera().pose }, ..camera() };
     let both = Viewpoint { fov: 25.0, ..viewpoint_at([0.0, 2.0, 4.0]) };
@@ -261,7 +261,7 @@ fn conflicting_saves_are_listed_before_c() {
         assert_eq!(kept(&mut ui), None, "{keys}");
         let said = format!("error: {words} {}", messages::CAMERA_CONFLICT);
         assert!(ui.text().contains(&said), "{keys}: {}", ui.text());
-        assert_eq!(kept(&mut ui), Some(saved.changed(&moved)), "{keys}: the second time confirms");
+        assert_eq!(kept(&mut ui), Some(saved.changed(&moved)), "{keys}: pressing c again should confirm");
     }
 }
 
@@ -276,14 +276,14 @@ fn later_saves_are_listed_again() {
         assert_eq!(kept(&mut ui), None);
         assert!(ui.text().contains(&format!("camera.position = [0, {height}, 4]")), "{}", ui.text());
     }
-    // Moving on does not ask again.
+    // Moving the camera again requires no confirmation.
     ui.press('h');
     show(&mut ui);
     assert!(kept(&mut ui).is_some());
 }
 
 #[test]
-fn unmoved_settings_of_a_save_are_kept() {
+fn unmoved_camera_settings_keep_saved_values() {
     let saved = Viewpoint { fov: 25.0, ..camera() };
     let mut ui = TestUi::with(state(160, 40));
     ui.finish(RED);
@@ -292,7 +292,7 @@ fn unmoved_settings_of_a_save_are_kept() {
     save(&mut ui, saved);
     let moved = ui.state.request.toggles.camera;
     assert_eq!(kept(&mut ui), Some(saved.changed(&moved)));
-    // The focus follows `look_at`, so the save did not change it.
+    // The focus follows `look_at`, so saving did not change it.
     let mut ui = TestUi::with(state(160, 40));
     ui.finish(RED);
     ui.state.request.toggles.camera.focus = Some(2.5);
@@ -302,7 +302,7 @@ fn unmoved_settings_of_a_save_are_kept() {
 }
 
 #[test]
-fn reset_camera_is_moved_without_conflict() {
+fn reset_camera_can_be_moved_without_conflict() {
     let mut ui = TestUi::with(state(160, 40));
     ui.finish(RED);
     ui.press('h');
@@ -314,13 +314,13 @@ fn reset_camera_is_moved_without_conflict() {
 }
 
 #[test]
-fn model_camera_has_no_conflicts() {
+fn model_cameras_have_no_conflicts() {
     let mut ui = TestUi::with(state(160, 40));
     ui.state.request.scene = "assets/vase.obj".into();
     ui.finish(RED);
     ui.press('h');
     show(&mut ui);
-    // The model has another size by now and is framed again.
+    // The model's size has changed, so its default camera has moved.
     save(&mut ui, viewpoint_at([0.0, 2.0, 4.0]));
     assert!(kept(&mut ui).is_some());
 }

@@ -1,4 +1,4 @@
-//! Compares the key tables in `docs/terminal.md` with the keymap.
+//! Compares the key tables in `docs/terminal.md` with the key bindings.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -6,7 +6,7 @@ use std::fs;
 use crate::event::KeyPress;
 use crate::keymap::{KEYMAP, OVERLAY, action, overlay};
 
-/// The keys in the first cells of the tables of a chapter.
+/// The keys listed in the first cells of a chapter's tables.
 fn documented() -> BTreeSet<String> {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/terminal.md");
     let page = fs::read_to_string(path).expect("the page");
@@ -15,7 +15,7 @@ fn documented() -> BTreeSet<String> {
     cells.flat_map(|cell| cell.split('`').skip(1).step_by(2)).map(str::to_owned).collect()
 }
 
-/// The keys in the help.
+/// The keys listed in the help.
 fn written() -> BTreeSet<String> {
     let labels = KEYMAP.iter().map(|one| one.label).chain(OVERLAY.iter().map(|one| one.label));
     labels
@@ -26,7 +26,7 @@ fn written() -> BTreeSet<String> {
 }
 
 #[test]
-fn documented_keys_match_the_keymap() {
+fn documented_keys_match_key_bindings() {
     let (documented, written) = (documented(), written());
     let missing: Vec<_> = written.difference(&documented).collect();
     assert!(missing.is_empty(), "not documented: {missing:?}");

@@ -12,21 +12,21 @@ use crate::scene::fingerprint::Fingerprint;
 
 const GREEN: [u8; 3] = [10, 200, 20];
 
-/// Saves this text; the worker starts to read it.
+/// Saves a scene with this text. The worker starts reading it.
 fn save(ui: &mut TestUi, text: &str) {
     ui.event(Event::Changed(Changed { noticed: ui.now }));
     let generation = ui.state.request.generation;
     ui.worker(protocol::Event::Text { generation, text: text.into() });
 }
 
-/// Saves a scene with an error.
+/// Saves a scene that contains an error.
 fn save_broken_scene(ui: &mut TestUi) {
     ui.event(Event::Changed(Changed { noticed: ui.now }));
     ui.fail(vec![diagnostic(Severity::Error, "unknown key `radus`")]);
     ui.event(Event::Settled);
 }
 
-/// A preview of an image with some or all of its samples.
+/// A preview of an image with all or some of its samples.
 fn preview(ui: &mut TestUi, name: &str, color: [u8; 3], is_finished: bool) {
     let generation = ui.state.request.generation;
     let source = Some(PreviewSource { image: Fingerprint::new(name).finish(), is_finished });
@@ -35,7 +35,7 @@ fn preview(ui: &mut TestUi, name: &str, color: [u8; 3], is_finished: bool) {
     ui.event(Event::Picture { generation, picture, range, section, lacks_photons, source });
 }
 
-/// Reports a valid scene.
+/// Reports that the scene is valid.
 fn read(ui: &mut TestUi) {
     let generation = ui.state.request.generation;
     ui.worker(protocol::Event::Started { generation });
@@ -43,7 +43,8 @@ fn read(ui: &mut TestUi) {
     ui.worker(protocol::Event::Settings { generation, settings, camera, exposure: 0.0, own: own() });
 }
 
-/// Finishes a request whose render stage took `seconds` and whose image took `of_image` seconds in total.
+/// Finishes a request whose render stage took `seconds`. Rendering the image took `of_image` seconds in
+/// total.
 fn end(ui: &mut TestUi, unchanged: bool, seconds: f64, of_image: f64) {
     let generation = ui.state.request.generation;
     let mut event = done(generation, Vec::new(), unchanged);
@@ -56,7 +57,7 @@ fn end(ui: &mut TestUi, unchanged: bool, seconds: f64, of_image: f64) {
 }
 
 #[test]
-fn fixed_typo_is_not_an_edit() {
+fn fixing_a_typo_is_not_an_edit() {
     let mut ui = TestUi::with(state(120, 40));
     save(&mut ui, "shininess = 60");
     ui.finish(RED);
@@ -65,7 +66,7 @@ fn fixed_typo_is_not_an_edit() {
     preview(&mut ui, "dull", BLUE, true);
     end(&mut ui, false, 1.0, 1.0);
     save_broken_scene(&mut ui);
-    // The last valid scene is shown again, possibly dithered differently.
+    // The last valid scene is shown again, possibly with different dithering.
     preview(&mut ui, "dull", GREEN, true);
     save(&mut ui, "shininess = 6");
     read(&mut ui);
@@ -82,7 +83,7 @@ fn fixed_typo_is_not_an_edit() {
 }
 
 #[test]
-fn comment_edit_adds_no_entry() {
+fn editing_a_comment_adds_no_entry() {
     let mut ui = TestUi::with(state(120, 40));
     save(&mut ui, "a = 1 # one");
     read(&mut ui);
@@ -98,7 +99,7 @@ fn comment_edit_adds_no_entry() {
 }
 
 #[test]
-fn output_edit_adds_no_entry() {
+fn editing_the_output_path_adds_no_entry() {
     let mut ui = TestUi::with(state(120, 40));
     save(&mut ui, "camera.fov = 40");
     read(&mut ui);
@@ -118,7 +119,7 @@ fn output_edit_adds_no_entry() {
     }
     ui.worker(event);
     let text = ui.text();
-    // Another render wrote it, but the same edit made it.
+    // The image was written by another render but is the result of the same edit.
     assert!(text.contains("· render 3") && text.contains("▸3 camera.fov"), "{text}");
     assert!(!text.contains("render.output"), "{text}");
     assert_eq!(ui.state.picture.history.len(), 2);
@@ -127,7 +128,7 @@ fn output_edit_adds_no_entry() {
 }
 
 #[test]
-fn resumed_render_counts_all_its_time() {
+fn resumed_render_time_is_cumulative() {
     let mut ui = TestUi::with(state(120, 40));
     save(&mut ui, "a = 1");
     read(&mut ui);
@@ -144,7 +145,7 @@ fn resumed_render_counts_all_its_time() {
     let generation = ui.state.request.generation;
     let progress = protocol::RenderProgress { earlier_seconds: 4.5, ..progress(0.5, None) };
     ui.worker(protocol::Event::Progress { generation, progress });
-    assert!(ui.text().contains("32/64 samples · 4.5 s"), "the time continues: {}", ui.text());
+    assert!(ui.text().contains("32/64 samples · 4.5 s"), "time should be cumulative: {}", ui.text());
     preview(&mut ui, "first", BLUE, true);
     end(&mut ui, false, 4.23, 8.73);
     let text = ui.text();
@@ -160,7 +161,7 @@ fn show_preview(ui: &mut TestUi, name: &str, color: [u8; 3], is_finished: bool) 
     ui.event(Event::Shown { generation });
 }
 
-/// Ends the render of the last valid scene.
+/// Reports the end of rendering the last valid scene.
 fn last_good(ui: &mut TestUi, end: LastGoodEnd) {
     let generation = ui.state.request.generation;
     ui.worker(protocol::Event::LastGoodEnded { generation, end });
@@ -168,7 +169,7 @@ fn last_good(ui: &mut TestUi, end: LastGoodEnd) {
 
 const FINISHED: LastGoodEnd = LastGoodEnd::Finished { unchanged: false };
 
-/// A finished render, then an edit followed by a typo during its render.
+/// A finished render, followed by an edit and by a typo while the edit is being rendered.
 fn typo_during_a_render() -> TestUi {
     let mut ui = TestUi::with(state(120, 40));
     save(&mut ui, "shininess = 60");
@@ -182,7 +183,7 @@ fn typo_during_a_render() -> TestUi {
 }
 
 #[test]
-fn last_good_render_is_counted_once() {
+fn render_of_last_valid_scene_is_counted_once() {
     let mut ui = typo_during_a_render();
     let newest = |ui: &mut TestUi| {
         let text = ui.text();
@@ -195,7 +196,7 @@ fn last_good_render_is_counted_once() {
     newest(&mut ui);
     last_good(&mut ui, FINISHED);
     assert_eq!(ui.state.work.renders, 2);
-    // The last preview arrives after the end of the render.
+    // The last preview arrives after the render has ended.
     show_preview(&mut ui, "dull", BLUE, true);
     newest(&mut ui);
     for key in ['n', 'N'] {
@@ -217,7 +218,7 @@ fn last_good_render_is_counted_once() {
 }
 
 #[test]
-fn stopped_last_good_render_is_marked() {
+fn stopped_render_of_last_valid_scene_is_marked() {
     let mut ui = typo_during_a_render();
     last_good(&mut ui, LastGoodEnd::Stopped);
     assert!(ui.text().contains(&format!("▸– {}:", messages::STOPPED)), "{}", ui.text());
@@ -225,7 +226,7 @@ fn stopped_last_good_render_is_marked() {
 }
 
 #[test]
-fn changed_last_good_render_has_a_number() {
+fn render_of_last_valid_scene_is_numbered() {
     let mut ui = TestUi::with(state(120, 40));
     save(&mut ui, "shininess = 60");
     read(&mut ui);
@@ -252,12 +253,12 @@ fn changed_last_good_render_has_a_number() {
 }
 
 #[test]
-fn complete_image_is_not_called_stopped() {
+fn complete_image_is_not_listed_as_stopped() {
     let mut ui = TestUi::with(state(120, 40));
     ui.finish(RED);
     ui.press('s');
     read(&mut ui);
-    // All samples exist, but the next key comes before the end of the request.
+    // All samples are rendered, but a key is pressed before the request is done.
     show_preview(&mut ui, "hard", GREEN, true);
     ui.press('s');
     ui.finish(BLUE);
@@ -274,7 +275,7 @@ fn complete_image_is_not_called_stopped() {
 fn entries_are_numbered_by_render() {
     let mut ui = TestUi::with(state(120, 40));
     ui.finish(RED);
-    // A stopped render is not counted.
+    // Stopped renders are not counted.
     ui.press('s');
     read(&mut ui);
     preview(&mut ui, "hard", GREEN, false);
@@ -307,7 +308,7 @@ fn entries_are_numbered_by_render() {
 }
 
 #[test]
-fn age_counts_from_the_last_improvement() {
+fn age_is_measured_from_last_improvement() {
     let mut ui = TestUi::with(state(120, 40));
     save(&mut ui, "shininess = 60");
     read(&mut ui);
@@ -315,7 +316,7 @@ fn age_counts_from_the_last_improvement() {
     ui.wait(8000);
     end(&mut ui, false, 8.0, 8.0);
     ui.wait(3000);
-    // Showing it again, for example at another size, does not change its age.
+    // Showing it again, for example at a different size, does not change its age.
     show_preview(&mut ui, "bright", GREEN, true);
     save(&mut ui, "shininess = 6");
     read(&mut ui);
@@ -323,7 +324,7 @@ fn age_counts_from_the_last_improvement() {
     ui.wait(2000);
     ui.press('n');
     assert!(ui.text().contains(&format!("{}, 5 s ago", messages::render_of(1, 2))), "{}", ui.text());
-    // The same holds for a stopped render.
+    // The same applies to a stopped render.
     ui.press('N');
     show_preview(&mut ui, "dull", GREEN, false);
     ui.wait(4000);
@@ -370,7 +371,7 @@ fn pinhole_is_reported_for_both_keys() {
 }
 
 #[test]
-fn new_model_scene_is_not_undone() {
+fn creating_a_model_scene_cannot_be_undone() {
     let mut ui = TestUi::new();
     ui.finish(RED);
     let (path, edit) = ("assets/knot.toml".into(), None);
@@ -382,7 +383,7 @@ fn new_model_scene_is_not_undone() {
 }
 
 #[test]
-fn unreadable_scenes_have_no_save_hint() {
+fn unreadable_scene_has_no_save_hint() {
     let mut ui = TestUi::new();
     let folder = Diagnostic { place: None, ..diagnostic(Severity::Error, "a folder") };
     ui.fail(vec![folder]);
@@ -405,7 +406,7 @@ fn eta_is_never_zero() {
 }
 
 #[test]
-fn status_line_facts_are_separated() {
+fn status_line_items_are_separated() {
     let mut ui = TestUi::with(state(80, 24));
     ui.finish(RED);
     ui.press('l');

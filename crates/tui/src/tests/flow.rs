@@ -1,4 +1,4 @@
-//! Requests, generations, time and signals.
+//! Requests, generations, timing and signals.
 
 use std::time::Duration;
 
@@ -37,10 +37,10 @@ fn images_of_older_requests_are_dropped() {
     });
     ui.worker(protocol::Event::Progress { generation: old, progress: progress(0.5, None) });
     ui.worker(protocol::Event::Failed { generation: old, failure: Failure::Work("old".to_owned()) });
-    assert!(!ui.state.dirty, "they change nothing");
+    assert!(!ui.state.dirty, "outdated events should not cause a redraw");
     assert!(ui.state.work.progress.is_none() && ui.state.overlays.problems.is_none());
     assert_eq!(cells_of(&mut ui, BLUE), 0);
-    assert!(cells_of(&mut ui, RED) > 0, "the last image stays");
+    assert!(cells_of(&mut ui, RED) > 0, "the last image should remain visible");
 }
 
 #[test]
@@ -52,7 +52,7 @@ fn first_change_is_measured_from_the_save() {
     let effects = ui.event(Event::Changed(Changed { noticed }));
     assert_eq!(request(&effects).map(|it| it.generation), Some(2));
     ui.event(Event::Shown { generation: 1 });
-    assert_eq!(ui.state.saving.first_change, None, "the old preview does not count");
+    assert_eq!(ui.state.saving.first_change, None, "the old preview should not count");
     ui.event(Event::Picture {
         generation: 2,
         picture: plain_picture(50, 38, BLUE),
@@ -71,7 +71,7 @@ fn first_change_is_measured_from_the_save() {
 }
 
 #[test]
-fn only_first_preview_is_urgent() {
+fn only_a_requests_first_preview_is_urgent() {
     let mut ui = TestUi::new();
     let picture = |ui: &mut TestUi, generation| {
         ui.state.urgent = false;
@@ -88,7 +88,7 @@ fn only_first_preview_is_urgent() {
     assert!(picture(&mut ui, 1));
     assert!(!picture(&mut ui, 1));
     ui.event(Event::Changed(Changed { noticed: ui.now }));
-    assert!(!picture(&mut ui, 1), "an outdated preview");
+    assert!(!picture(&mut ui, 1), "an outdated preview is not urgent");
     assert!(picture(&mut ui, 2));
     assert!(!picture(&mut ui, 2));
 }
@@ -120,11 +120,11 @@ fn clock_stops_while_paused() {
 }
 
 #[test]
-fn preview_is_resized_after_a_quiet_time() {
+fn preview_is_resized_after_a_delay() {
     let mut ui = TestUi::new();
     ui.finish(RED);
     assert!(ui.event(Event::Resize(window(120, 40))).is_empty());
-    assert!(cells_of(&mut ui, RED) > 56 * 21, "the current image is scaled");
+    assert!(cells_of(&mut ui, RED) > 56 * 21, "the current image should be scaled");
     ui.now += Duration::from_millis(50);
     ui.event(Event::Resize(window(200, 60)));
     assert!(ui.wait(50).is_empty());
@@ -141,10 +141,10 @@ fn preview_is_resized_after_a_quiet_time() {
         lacks_photons: false,
         source: None,
     });
-    assert!(cells_of(&mut ui, BLUE) > 0, "the new preview is shown");
+    assert!(cells_of(&mut ui, BLUE) > 0, "the new preview should be shown");
     ui.finish(RED);
     ui.event(Event::Resize(window(200, 60)));
-    assert!(ui.wait(1000).is_empty(), "an unchanged size needs no request");
+    assert!(ui.wait(1000).is_empty(), "no request is needed if the size is unchanged");
 }
 
 #[test]
@@ -164,7 +164,7 @@ fn resize_does_not_restart_the_render() {
 }
 
 #[test]
-fn comment_edit_reports_unchanged() {
+fn editing_a_comment_reports_unchanged() {
     let mut ui = TestUi::new();
     ui.finish(RED);
     ui.event(Event::Changed(Changed { noticed: ui.now }));
@@ -205,7 +205,7 @@ fn cancelled_render_is_reported() {
 }
 
 #[test]
-fn unanswered_writes_are_known_at_exit() {
+fn pending_writes_are_known_at_exit() {
     let generation = 1;
     let written = |generation| protocol::Event::WriteDone { generation, paths: vec!["a.png".into()] };
     let failed = protocol::Event::WriteFailed { generation, path: None, message: "full".to_owned() };
@@ -225,7 +225,7 @@ fn unanswered_writes_are_known_at_exit() {
     let mut ui = TestUi::new();
     ui.press('w');
     ui.press('r');
-    assert!(ui.state.saving.is_write_requested, "the next request writes it");
+    assert!(ui.state.saving.is_write_requested, "the next request should still write the image");
     ui.worker(written(ui.state.request.generation));
     assert!(!ui.state.saving.is_write_requested);
 }
@@ -235,7 +235,7 @@ fn error_with(message: &str) -> Vec<Diagnostic> {
 }
 
 #[test]
-fn errors_in_incomplete_files_are_held_back() {
+fn errors_in_incomplete_files_are_deferred() {
     let mut ui = TestUi::new();
     ui.finish(RED);
     ui.event(Event::Changed(Changed { noticed: ui.now }));
@@ -253,7 +253,7 @@ fn errors_in_incomplete_files_are_held_back() {
 }
 
 #[test]
-fn file_written_in_pieces_shows_no_error() {
+fn file_saved_in_steps_shows_no_error() {
     let mut ui = TestUi::new();
     ui.finish(RED);
     ui.event(Event::Changed(Changed { noticed: ui.now }));
@@ -268,7 +268,7 @@ fn file_written_in_pieces_shows_no_error() {
 }
 
 #[test]
-fn errors_in_stable_files_are_immediate() {
+fn errors_in_stable_files_are_shown_immediately() {
     let mut ui = TestUi::new();
     ui.fail(error_with("first"));
     assert!(ui.text().contains("error: first"), "no save");
@@ -282,7 +282,7 @@ fn errors_in_stable_files_are_immediate() {
 }
 
 #[test]
-fn errors_do_not_wait_for_a_lost_watcher() {
+fn errors_are_shown_if_the_watcher_is_lost() {
     let mut ui = TestUi::new();
     ui.event(Event::Changed(Changed { noticed: ui.now }));
     ui.fail(error_with("half"));
@@ -294,7 +294,7 @@ fn errors_do_not_wait_for_a_lost_watcher() {
 }
 
 #[test]
-fn render_failures_are_immediate() {
+fn render_failures_are_shown_immediately() {
     let mut ui = TestUi::new();
     ui.event(Event::Changed(Changed { noticed: ui.now }));
     let failure = Failure::Work("no memory".to_owned());
@@ -303,7 +303,7 @@ fn render_failures_are_immediate() {
 }
 
 #[test]
-fn time_in_the_editor_is_not_measured() {
+fn time_spent_in_the_editor_is_not_counted() {
     let mut ui = TestUi::new();
     ui.finish(RED);
     let noticed = ui.now;

@@ -1,4 +1,4 @@
-//! The screen during a render, on a fast terminal and over a slow connection, in simulated time.
+//! Simulates the screen contents during a render, with a fast terminal and with a slow connection.
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -21,10 +21,10 @@ use crate::preview_kind::PreviewKind;
 
 const COLUMNS: u16 = 120;
 const ROWS: u16 = 40;
-/// Duration of the render in seconds.
+/// Render duration in seconds.
 const SECONDS: f64 = 10.0;
 const SAMPLES: f64 = 256.0;
-/// Intervals between previews and between progress reports of the worker.
+/// Intervals between the worker's previews and between its progress reports.
 const PICTURE: Duration = Duration::from_millis(66);
 const PROGRESS: Duration = Duration::from_millis(60);
 
@@ -41,19 +41,19 @@ const FAST: SimulatedConnection =
 const SLOW: SimulatedConnection =
     SimulatedConnection { bytes_per_second: 125e3, round_trip: Duration::from_millis(150) };
 
-/// A terminal with its screen and its replies in flight.
+/// A terminal with its screen content and pending replies.
 struct SimulatedTerminal {
     line: SimulatedConnection,
-    /// Time at which the connection is idle.
+    /// Time when the connection becomes idle.
     free: Instant,
     arriving: VecDeque<(Instant, Vec<u8>)>,
     answers: VecDeque<(Instant, TerminalReply)>,
     cells: vt100::Parser,
     pixels: PixelScreen,
-    /// Received bytes, and their number.
+    /// Bytes received, and the number of bytes sent.
     bytes: Vec<u8>,
     sent: usize,
-    /// Bytes in flight or unacknowledged, and their maximum.
+    /// Unacknowledged bytes, and their maximum number.
     unanswered: VecDeque<(Instant, usize)>,
     most_unanswered: usize,
 }
@@ -75,7 +75,7 @@ impl SimulatedTerminal {
         }
     }
 
-    /// Sends a slice, which ends with a query.
+    /// Sends a slice that ends with a query.
     fn send(&mut self, bytes: Vec<u8>, now: Instant) {
         let SimulatedConnection { bytes_per_second, round_trip } = self.line;
         let answer =
@@ -89,7 +89,7 @@ impl SimulatedTerminal {
         self.arriving.push_back((self.free + round_trip / 2, bytes));
     }
 
-    /// Shows the bytes that have arrived.
+    /// Processes the bytes that have arrived.
     fn deliver(&mut self, now: Instant) {
         while let Some((_, bytes)) = self.arriving.pop_front_if(|(when, _)| *when <= now) {
             self.cells.process(&bytes);
@@ -104,7 +104,7 @@ impl SimulatedTerminal {
         arriving.into_iter().chain(self.answers.front().map(|(when, _)| *when)).min()
     }
 
-    /// The colors of all parts of cells, or of the pixels.
+    /// The colors of all cell parts, or of the pixels if an image is shown.
     fn visible_colors(&self) -> Vec<[u8; 3]> {
         if let Some(picture) = self.pixels.shown() {
             return picture.pixels.clone();
@@ -120,7 +120,7 @@ impl SimulatedTerminal {
     }
 }
 
-/// The colors of the parts of a block character. `None` for other characters and default colors.
+/// Colors of a block character's grid squares. `None` for other characters and default colors.
 fn parts(cell: &vt100::Cell) -> Option<[[u8; 3]; 24]> {
     let color = |color| match color {
         vt100::Color::Default => None,
@@ -134,7 +134,7 @@ fn parts(cell: &vt100::Cell) -> Option<[[u8; 3]; 24]> {
     parts.iter().all(Option::is_some).then(|| parts.map(Option::unwrap_or_default))
 }
 
-/// A render shown on a simulated terminal.
+/// A render displayed on a simulated terminal.
 struct WatchedRender {
     ui: TestUi,
     presenter: Presenter,
@@ -143,7 +143,7 @@ struct WatchedRender {
     slot: PreviewSlot,
     begin: Instant,
     size: (u32, u32),
-    /// Times of the next progress report and preview.
+    /// Times of the next progress report and the next preview.
     next: [Instant; 2],
     /// Number of previews drawn.
     shown: usize,
@@ -188,19 +188,20 @@ impl WatchedRender {
         }
     }
 
-    /// Runs until this fraction of the render is done.
+    /// Runs until the given fraction of the render is done.
     fn until(&mut self, fraction: f64) {
         let end = self.begin + Duration::from_secs_f64(SECONDS * fraction);
         self.advance(end, true);
     }
 
-    /// Holds a camera key for this time. The worker has a first preview of each step soon after its request.
+    /// Holds down a camera key for the given time. The worker produces a step's first preview soon after its
+    /// request.
     fn orbit(&mut self, time: Duration) {
         const REPEAT: Duration = Duration::from_millis(33);
         const FIRST: Duration = Duration::from_millis(12);
         let end = self.ui.now + time;
         let (mut key, mut last) = (self.ui.now, self.ui.state.request.generation);
-        // The last step of a previous key may have no preview yet.
+        // The last step of an earlier key press may still be without a preview.
         let mut asked = Some(self.ui.now);
         while self.ui.now < end {
             let next = asked.map_or(key, |asked: Instant| key.min(asked + FIRST));
@@ -214,14 +215,14 @@ impl WatchedRender {
                 key += REPEAT;
                 self.ui.press('l');
             }
-            // A waiting step is requested when the previous one has a preview.
+            // A waiting step is requested once the previous one has a preview.
             if self.ui.state.request.generation > last {
                 (asked, last) = (Some(self.ui.now), self.ui.state.request.generation);
             }
         }
     }
 
-    /// Shows the final preview completely.
+    /// Draws the final preview completely.
     fn finish(&mut self) {
         let generation = self.ui.state.request.generation;
         self.put_picture(SAMPLES);
@@ -253,7 +254,7 @@ impl WatchedRender {
         }
     }
 
-    /// Handles all events that are due.
+    /// Handles all due events.
     fn events(&mut self, is_at_work: bool) {
         let now = self.ui.now;
         self.terminal.deliver(now);
@@ -302,9 +303,9 @@ impl WatchedRender {
     }
 }
 
-/// A room in soft colors with the noise of this many samples.
+/// A room in muted colors, with the noise of a render with this many samples.
 fn picture((width, height): (u32, u32), samples: f64, turn: u32) -> Picture {
-    /// Noise of one sample in codes, similar to a Cornell box.
+    /// Noise of a single sample in code values, similar to a Cornell box.
     const NOISE: f64 = 1.2;
     let pixel = |i: u32| {
         let column = (i % width + 3 * turn) % width;
@@ -313,7 +314,7 @@ fn picture((width, height): (u32, u32), samples: f64, turn: u32) -> Picture {
         let hash = (u64::from(i) << 20 ^ samples.to_bits()).wrapping_mul(0x9E37_79B9_7F4A_7C15);
         let channel = |c: usize| {
             let unit = f64::from((hash >> (16 * c) & 0xFFFF) as u16) / 65536.0 - 0.5;
-            // The mean absolute deviation is a quarter of the width.
+            // The mean absolute deviation is a quarter of the distribution's width.
             wall[c] * (0.4 + 0.6 * y) + NOISE * 4.0 * unit / samples.sqrt()
         };
         std::array::from_fn(|c| channel(c).round() as u8)
@@ -321,18 +322,18 @@ fn picture((width, height): (u32, u32), samples: f64, turn: u32) -> Picture {
     Picture { width, height, pixels: (0..width * height).map(pixel).collect() }
 }
 
-/// Mean difference of two screens in codes of 255.
+/// Mean difference between two screens, in code values.
 fn mean_difference(a: &[[u8; 3]], b: &[[u8; 3]]) -> f64 {
-    assert!(!b.is_empty() && a.len() == b.len(), "{} and {} parts", a.len(), b.len());
+    assert!(!b.is_empty() && a.len() == b.len(), "{} and {} colors", a.len(), b.len());
     let all = a.as_flattened().iter().zip(b.as_flattened()).map(|(a, b)| f64::from(a.abs_diff(*b)));
     all.sum::<f64>() / (3 * a.len()) as f64
 }
 
-/// Maximum difference from the final screen, in codes, at 10, 25 and 50 % of a render.
+/// Maximum difference from the final screen, in code values, at 10, 25 and 50 % of a render.
 const MAX: [(f64, f64); 3] = [(0.1, 1.5), (0.25, 0.8), (0.5, 0.5)];
 
-/// Checks that the screen is close to the final one at each fraction of [`MAX`], and that there are enough
-/// previews.
+/// Checks that the screen is close to its final content at each fraction in [`MAX`], and that enough previews
+/// are drawn.
 #[track_caller]
 fn assert_followed(preview: PreviewKind, depth: ColorDepth) {
     let mut watch = WatchedRender::new(FAST, preview, depth);
@@ -345,9 +346,9 @@ fn assert_followed(preview: PreviewKind, depth: ColorDepth) {
     watch.finish();
     for ((fraction, most), screen) in MAX.into_iter().zip(&screens) {
         let apart = mean_difference(screen, &watch.terminal.visible_colors());
-        assert!(apart <= most, "{preview:?}, {depth:?}, at {fraction}: {apart} codes");
+        assert!(apart <= most, "{preview:?}, {depth:?}, at {fraction}: difference {apart}");
     }
-    assert!((45..=105).contains(&pictures), "{preview:?}, {depth:?}: {pictures} in 10 s");
+    assert!((45..=105).contains(&pictures), "{preview:?}, {depth:?}: {pictures} previews in 10 s");
 }
 
 #[test]
@@ -374,31 +375,31 @@ fn fast_terminal_follows_in_pixels() {
 fn slow_connection_gets_few_previews() {
     let mut watch = WatchedRender::new(SLOW, PreviewKind::HalfBlock, ColorDepth::TrueColor);
     watch.until(1.0);
-    assert!(watch.shown <= 12, "{} pictures in 10 s", watch.shown);
+    assert!(watch.shown <= 12, "{} previews in 10 s", watch.shown);
     let sent = watch.terminal.sent;
     assert!(sent <= 300_000, "{sent} bytes");
     assert!(watch.terminal.most_unanswered <= 24_000, "{} bytes", watch.terminal.most_unanswered);
     let before = watch.terminal.visible_colors();
     watch.finish();
     let apart = mean_difference(&before, &watch.terminal.visible_colors());
-    assert!(apart > 0.5 && apart < 4.0, "{apart} codes: only the last preview is exact");
+    assert!(apart > 0.5 && apart < 4.0, "difference {apart}: only the final preview should be exact");
 }
 
 #[test]
-fn held_key_fills_a_slow_connection() {
+fn held_key_uses_most_of_a_slow_connection() {
     let mut watch = WatchedRender::new(SLOW, PreviewKind::HalfBlock, ColorDepth::TrueColor);
     watch.until(0.2);
     watch.orbit(Duration::from_secs(2));
     let before = watch.terminal.sent;
     watch.orbit(Duration::from_secs(6));
     let used = (watch.terminal.sent - before) as f64 / (6.0 * SLOW.bytes_per_second);
-    assert!(used >= 0.7, "{used} of the line");
+    assert!(used >= 0.7, "{used} of the bandwidth used");
     assert!(watch.terminal.most_unanswered <= 24_000, "{} bytes", watch.terminal.most_unanswered);
 }
 
 /// kitty 0.26 does not show images that are sent within synchronized output.
 #[test]
-fn only_cells_are_synchronized_output() {
+fn only_cells_use_synchronized_output() {
     let (begin, end) = ("\x1b[?2026h", "\x1b[?2026l");
     for (preview, is_marked) in
         [(PreviewKind::HalfBlock, true), (PreviewKind::Pixels(Protocol::Kitty), false)]
@@ -409,7 +410,7 @@ fn only_cells_are_synchronized_output() {
         let sent = String::from_utf8_lossy(&watch.terminal.bytes).into_owned();
         let between: Vec<&str> =
             sent.split(begin).skip(1).filter_map(|rest| rest.split(end).next()).collect();
-        assert!(!is_marked || !between.is_empty(), "large slices of cells are synchronized");
+        assert!(!is_marked || !between.is_empty(), "large slices of cells should be synchronized");
         assert!(between.iter().all(|part| !part.contains("\x1b_G")), "{preview:?}");
         assert_eq!(sent.contains("\x1b_G"), !is_marked, "{preview:?}");
     }

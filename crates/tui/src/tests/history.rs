@@ -1,4 +1,4 @@
-//! The screen while an older render is shown.
+//! The screen while an older render is being viewed.
 
 use crossterm::event::KeyCode;
 
@@ -9,7 +9,7 @@ use crate::fixtures::*;
 use crate::messages;
 use crate::pipeline::protocol::{Command, Event as WorkerEvent, KeptCamera, Picked};
 
-/// A beauty image, then one with hard shadows in the view of normals; the beauty image is open.
+/// A beauty image, followed by a normal view with hard shadows. The beauty image is being viewed.
 fn older() -> TestUi {
     let mut ui = TestUi::with(state(120, 40));
     ui.finish(RED);
@@ -40,16 +40,16 @@ fn older_render_cannot_be_inspected() {
     ui.event(mouse(MouseKind::Press));
     assert!(!asks(&ui.event(mouse(MouseKind::Release))));
     assert!(ui.text().contains(messages::OLDER_RENDER), "{}", ui.text());
-    // A late reply does not refer to the older render.
+    // A reply that arrives late is not shown for the older render.
     let picked = Picked { pixel: [3, 4], thing: None, color: None };
     ui.worker(WorkerEvent::Picked { generation: 1, picked: Box::new(picked) });
     assert!(!ui.text().contains("pixel 3, 4"), "{}", ui.text());
     ui.press('b');
-    assert!(asks(&ui.key(KeyPress::special(KeyCode::Enter))), "the newest render is queried");
+    assert!(asks(&ui.key(KeyPress::special(KeyCode::Enter))), "the newest render can be inspected");
 }
 
 #[test]
-fn settings_of_the_newest_are_not_shown() {
+fn newest_settings_are_not_shown_for_older() {
     let mut ui = older();
     let keys = line(&mut ui, 39);
     assert!(!line(&mut ui, 0).contains("view normal") && !keys.contains("hard"), "{}", ui.text());
@@ -57,7 +57,7 @@ fn settings_of_the_newest_are_not_shown() {
     ui.press('i');
     ui.finish(RED);
     ui.press('n');
-    assert!(line(&mut ui, 0).contains("view normal"), "the view of this entry: {}", ui.text());
+    assert!(line(&mut ui, 0).contains("view normal"), "expected the view of this entry: {}", ui.text());
     assert!(line(&mut ui, 39).contains("n N older, newer"), "{}", ui.text());
 }
 
@@ -73,8 +73,8 @@ fn w_writes_the_newest_image() {
 }
 
 #[test]
-fn c_keeps_the_newest_camera() {
-    // The save is often noticed before the reply arrives, and leads to the newest render.
+fn c_saves_the_newest_camera() {
+    // The change is often detected before the reply arrives. This returns to the newest render.
     for (is_own, is_noticed) in [(true, false), (false, false), (true, true)] {
         let mut ui = older();
         ui.press('b');
@@ -94,7 +94,7 @@ fn c_keeps_the_newest_camera() {
 }
 
 #[test]
-fn newest_render_shows_its_progress() {
+fn newest_render_progress_is_shown() {
     let mut ui = older();
     ui.press('b');
     ui.press('r');
@@ -116,7 +116,7 @@ fn newest_render_shows_its_progress() {
     ui.press('m');
     ui.press('N');
     ui.press('n');
-    // The history marks a stopped render.
+    // A stopped render is marked in the history.
     ui.press('s');
     ui.finish(BLUE);
     assert!(ui.text().contains(&format!("{}:", messages::STOPPED)), "{}", ui.text());
@@ -129,11 +129,11 @@ fn age_is_shown_once_and_updated() {
     ui.wait(3000);
     assert!(line(&mut ui, 0).contains(&format!("{}, 3 s ago", messages::render_of(1, 2))), "{}", ui.text());
     assert!(!ui.text().contains("0 s ago") && ui.text().contains("N newer"), "{}", ui.text());
-    assert!(ui.state.next_tick().is_some(), "it is redrawn");
+    assert!(ui.state.next_tick().is_some(), "the age should be updated");
 }
 
 #[test]
-fn time_of_a_save_belongs_to_its_image() {
+fn save_time_applies_only_to_its_image() {
     let mut ui = TestUi::new();
     ui.finish(RED);
     ui.event(Event::Changed(Changed { noticed: ui.now }));
@@ -143,5 +143,5 @@ fn time_of_a_save_belongs_to_its_image() {
     assert!(ui.state.saving.first_change.is_some(), "{}", ui.text());
     ui.press('s');
     ui.finish(RED);
-    assert!(ui.state.saving.first_change.is_none(), "not made by a save: {}", ui.text());
+    assert!(ui.state.saving.first_change.is_none(), "not rendered after a save: {}", ui.text());
 }

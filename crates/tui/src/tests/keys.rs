@@ -1,4 +1,4 @@
-//! The effect of each key, and its description in the help.
+//! Effects of the keys, and their help texts.
 
 use super::{BLUE, RED, cells_of};
 use crate::action::Action;
@@ -16,7 +16,7 @@ use crate::scene::description::{Integrator, Pose, Shadows};
 use crate::scene::diagnostic::Severity;
 use crate::{Changed, ExitStatus};
 
-/// Every key has the effect that its row describes. The match has an arm for every action.
+/// Checks that each key has the effect described in its table row. `check` covers every action.
 #[test]
 fn every_key_has_its_effect() {
     for binding in KEYMAP {
@@ -28,7 +28,7 @@ fn every_key_has_its_effect() {
     }
 }
 
-/// The camera pose that a key requests.
+/// The camera pose requested by a key.
 fn requested_pose(effects: &[Effect]) -> Pose {
     request(effects).and_then(|it| it.overrides.camera.pose).expect("a request with a camera")
 }
@@ -37,7 +37,7 @@ fn check(action: Action, key: KeyPress, ui: &mut TestUi) {
     let overrides = |effects: &[Effect]| request(effects).map(|it| it.overrides.clone());
     match action {
         Action::CycleShadows => {
-            // The scene's own value is not an override.
+            // Returning to the scene's own value clears the override.
             for (wanted, by_key) in [
                 (Shadows::Hard, Some(Shadows::Hard)),
                 (Shadows::Off, Some(Shadows::Off)),
@@ -61,7 +61,7 @@ fn check(action: Action, key: KeyPress, ui: &mut TestUi) {
                 assert_eq!(ui.state.request.photons(), wanted);
             }
             ui.press('i');
-            assert!(ui.key(key).is_empty(), "path has no photons");
+            assert!(ui.key(key).is_empty(), "the path integrator does not use photons");
             assert!(ui.text().contains(&messages::no_photons("whitted")), "{}", ui.text());
         }
         Action::CycleIntegrator => {
@@ -73,7 +73,7 @@ fn check(action: Action, key: KeyPress, ui: &mut TestUi) {
             }
             ui.key(key);
             assert!(ui.text().contains("path"), "{}", ui.text());
-            assert!(ui.press('s').is_empty(), "path always has soft shadows");
+            assert!(ui.press('s').is_empty(), "the path integrator always has soft shadows");
             assert!(ui.text().contains(&messages::soft_shadows("path", "whitted")), "{}", ui.text());
         }
         Action::NextView | Action::PreviousView => {
@@ -130,20 +130,20 @@ fn check(action: Action, key: KeyPress, ui: &mut TestUi) {
             );
         }
         Action::UndoCamera => {
-            assert!(ui.key(key).is_empty(), "no kept camera");
+            assert!(ui.key(key).is_empty(), "no camera has been saved");
             let edit = CameraEdit { path: "a.toml".into(), before: "".into(), after: "a".into() };
             ui.state.saving.camera_edits.push(edit.clone());
             assert!(matches!(&ui.key(key)[..], [Effect::Send(Command::UndoCamera(asked))] if *asked == edit));
         }
         Action::Copy => {
-            assert!(ui.key(key).is_empty(), "no click yet");
+            assert!(ui.key(key).is_empty(), "nothing has been clicked");
             ui.state.selection.clicked = Some("a ball".to_owned());
             assert!(ui.key(key).is_empty() && ui.text().contains(messages::SELECT_TO_COPY), "{}", ui.text());
             ui.state.display.capabilities.clipboard = true;
             assert!(matches!(ui.key(key)[..], [Effect::Aside(_)]));
         }
         Action::Focus => {
-            assert!(ui.key(key).is_empty(), "waits for a click");
+            assert!(ui.key(key).is_empty(), "expected to wait for a click");
             assert!(matches!(ui.key(key)[..], [Effect::Send(Command::Pick(_))]));
         }
         Action::ActualPixels => {
@@ -158,8 +158,8 @@ fn check(action: Action, key: KeyPress, ui: &mut TestUi) {
         Action::RenderRegionFirst => {
             let first = |effects: &[Effect]| request(effects).expect("a request").first;
             ui.press('r');
-            assert!(ui.key(key).is_empty(), "waits for a drag");
-            let section = first(&ui.key(key)).expect("around the crosshair");
+            assert!(ui.key(key).is_empty(), "expected to wait for a drag");
+            let section = first(&ui.key(key)).expect("a region around the crosshair");
             assert!((section.left - 1.0 / 3.0).abs() < 1e-9 && (section.height - 1.0 / 3.0).abs() < 1e-9);
             assert!(ui.text().contains("z region first"), "{}", ui.text());
             assert_eq!(first(&ui.key(key)), None);
@@ -228,7 +228,7 @@ fn check(action: Action, key: KeyPress, ui: &mut TestUi) {
     }
 }
 
-/// The line of keys.
+/// The key line.
 fn bottom(ui: &mut TestUi) -> String {
     ui.text().lines().last().map(str::to_owned).unwrap_or_default()
 }
@@ -243,7 +243,7 @@ fn key_line_shows_toggles_and_values() {
     assert!(!is_bold(&mut ui));
     ui.press('s');
     assert!(bottom(&mut ui).starts_with("s hard"), "{}", bottom(&mut ui));
-    assert!(is_bold(&mut ui), "bold after a change");
+    assert!(is_bold(&mut ui), "changed settings should be bold");
     ui.press('i');
     assert!(bottom(&mut ui).starts_with("s –  p off  d on  v beauty  i path"), "{}", bottom(&mut ui));
     ui.event(Event::Resize(window(140, 40)));
@@ -260,7 +260,7 @@ fn key_line_shows_toggles_and_values() {
 }
 
 #[test]
-fn key_line_shows_what_is_useful_now() {
+fn key_line_shows_currently_useful_keys() {
     let mut ui = TestUi::new();
     assert!(bottom(&mut ui).contains("space pause"), "{}", bottom(&mut ui));
     ui.press(' ');
@@ -272,7 +272,7 @@ fn key_line_shows_what_is_useful_now() {
     ui.event(Event::Resize(window(200, 60)));
     for binding in KEYMAP.iter().filter(|it| !it.hint.is_empty() && it.action != Action::TogglePause) {
         let hint = format!("{} {}", binding.label, binding.hint);
-        assert!(bottom(&mut ui).contains(&hint), "{hint:?} is not in {}", bottom(&mut ui));
+        assert!(bottom(&mut ui).contains(&hint), "{hint:?} not found in {}", bottom(&mut ui));
     }
     let generation = ui.state.request.generation;
     ui.worker(done(generation, vec![diagnostic(Severity::Warning, "unused")], false));
@@ -284,7 +284,7 @@ fn key_line_shows_what_is_useful_now() {
 }
 
 #[test]
-fn message_is_shown_until_the_next_key() {
+fn message_is_shown_until_a_key_is_pressed() {
     let mut ui = TestUi::new();
     ui.finish(RED);
     let hints = bottom(&mut ui);
@@ -295,7 +295,7 @@ fn message_is_shown_until_the_next_key() {
     ui.press('?');
     ui.press('?');
     assert!(!ui.text().contains(messages::NOTHING_TO_RESET));
-    // If a message has no line of its own, it replaces the keys or the name in the header.
+    // If there is no separate line for messages, they replace the keys or the name in the header.
     for rows in [12, 5] {
         ui.event(Event::Resize(window(60, rows)));
         ui.press('0');
@@ -312,7 +312,7 @@ fn toggles_start_from_the_command_line() {
     let effects = ui.press('s');
     let soft = request(&effects).expect("a request");
     assert_eq!((soft.overrides.shadows, soft.write), (Some(Shadows::Soft), Writing::No));
-    assert_eq!(soft.own.as_deref(), Some(&base), "the own image continues");
+    assert_eq!(soft.own.as_deref(), Some(&base), "the scene's own image should continue");
     let effects = ui.press('V');
     assert_eq!(request(&effects).expect("a request").write, Writing::No);
     let effects = ui.press('0');
@@ -378,12 +378,12 @@ fn resuming_is_reported_with_other_messages() {
         let text = ui.text();
         assert!(text.contains(messages::RESUMED) && text.contains(&words[..5]), "{key}: {text}");
         ui.press(key);
-        assert!(!ui.text().contains(messages::RESUMED), "{key}: said once");
+        assert!(!ui.text().contains(messages::RESUMED), "{key}: should be reported only once");
     }
     let mut ui = TestUi::new();
     ui.press(' ');
     ui.press(' ');
-    assert!(!ui.text().contains(messages::RESUMED), "space needs no message");
+    assert!(!ui.text().contains(messages::RESUMED), "resuming with space should show no message");
 }
 
 #[test]
@@ -401,7 +401,7 @@ fn clock_stops_while_paused() {
 }
 
 #[test]
-fn pause_without_a_render_is_explained() {
+fn pausing_without_a_render_shows_a_message() {
     let mut ui = TestUi::new();
     ui.finish(RED);
     assert!(ui.press(' ').is_empty());
@@ -409,7 +409,7 @@ fn pause_without_a_render_is_explained() {
 }
 
 #[test]
-fn postponed_write_is_reported_twice() {
+fn postponed_write_is_reported_again_when_done() {
     let mut ui = TestUi::new();
     ui.press('w');
     ui.worker(protocol::Event::WritePostponed { generation: 1 });
@@ -427,7 +427,7 @@ fn cancelled_render_is_not_paused() {
 }
 
 #[test]
-fn reverted_toggle_is_no_change() {
+fn reverted_toggle_is_not_a_change() {
     for (keys, base) in [
         ("sss", Overrides::default()),
         ("sss", Overrides { shadows: Some(Shadows::Hard), ..Overrides::default() }),
@@ -445,7 +445,7 @@ fn reverted_toggle_is_no_change() {
             requests.extend(request(&ui.press(key)).cloned());
         }
         assert_eq!(requests.last().map(|request| &request.overrides), Some(&base), "{keys}");
-        // Toggling starts again, whether the reply has arrived or not.
+        // Toggling starts over, whether or not the reply has arrived.
         let first = request(&ui.press(keys.chars().next().expect("a key"))).cloned().expect("a request");
         assert_eq!(first.overrides, requests[0].overrides, "{keys}");
     }
@@ -457,12 +457,12 @@ fn reverted_toggle_is_no_change() {
 }
 
 #[test]
-fn save_changes_the_base_of_toggles() {
+fn saved_settings_are_the_base_for_toggles() {
     let mut ui = TestUi::with(state(120, 40));
     ui.finish(RED);
     ui.press('s');
     ui.finish(BLUE);
-    // The save sets hard shadows, as the keys do.
+    // The saved scene has hard shadows, as set with the key.
     ui.event(Event::Changed(Changed { noticed: ui.now }));
     let (generation, own) = (ui.state.request.generation, OwnSettings { shadows: Shadows::Hard, ..own() });
     let settings = Box::new(Effective { shadows: Shadows::Hard, ..settings() });

@@ -1,4 +1,4 @@
-//! The layout: room for the image, and nothing that jumps.
+//! The layout: enough space for the image, and no movement during a render.
 
 use super::{RED, cells_of};
 use crate::Changed;
@@ -16,14 +16,14 @@ use crate::view::layout::Layout;
 const WINDOWS: [(u16, u16); 3] = [(80, 24), (120, 40), (200, 60)];
 const SIZES: [(u32, u32); 4] = [(640, 480), (1280, 720), (640, 400), (512, 512)];
 
-/// The preview of an image of this size, within the requested size.
+/// Preview size for an image of this size, limited to the requested size.
 fn fitted_preview_size(size: (u32, u32), most: PreviewSize) -> (u32, u32) {
     let scale = (f64::from(most.width) / f64::from(size.0)).min(f64::from(most.height) / f64::from(size.1));
     let side = |length: u32, most: u32| ((f64::from(length) * scale).round() as u32).clamp(1, most);
     (side(size.0, most.width), side(size.1, most.height))
 }
 
-/// Reports the settings of a scene of this size and shows its preview.
+/// Reports the settings of a scene with this size and shows its preview.
 fn rendered(ui: &mut TestUi, (width, height): (u32, u32)) {
     let generation = ui.state.request.generation;
     ui.worker(protocol::Event::Started { generation });
@@ -52,7 +52,7 @@ fn show(ui: &mut TestUi, size: (u32, u32)) {
     });
 }
 
-/// Cells of the largest image that fits in a window with one line of text.
+/// Number of cells covered by the largest image that fits into a window next to one line of text.
 fn max_cells((columns, rows): (u16, u16), (width, height): (u32, u32)) -> f64 {
     let shape = f64::from(width) / f64::from(height) * 2.0;
     let room = (f64::from(columns), f64::from(rows - 1));
@@ -79,7 +79,7 @@ fn image_gets_most_of_the_space() {
 }
 
 #[test]
-fn nothing_jumps_during_a_render() {
+fn layout_is_stable_during_a_render() {
     for (columns, rows) in WINDOWS.into_iter().chain([(40, 12), (30, 8), (80, 60)]) {
         let mut ui = TestUi::with(state(columns, rows));
         rendered(&mut ui, (640, 480));
@@ -120,7 +120,7 @@ fn nothing_jumps_during_a_render() {
 }
 
 #[test]
-fn new_shape_gets_a_preview_of_its_size() {
+fn new_aspect_ratio_requests_another_preview() {
     let mut ui = TestUi::new();
     let settings = |width| Box::new(Effective { width, height: 480, ..settings() });
     let same = ui.worker(protocol::Event::Settings {
@@ -185,7 +185,7 @@ fn status_line_shows_progress_then_results() {
 }
 
 #[test]
-fn stage_times_are_compared_with_the_last() {
+fn stage_times_are_compared_with_last_render() {
     let mut ui = TestUi::new();
     let render = |ui: &mut TestUi, seconds| {
         let generation = ui.state.request.generation;
@@ -202,7 +202,7 @@ fn stage_times_are_compared_with_the_last() {
     ui.worker(protocol::Event::Started { generation: ui.state.request.generation });
     ui.press('r');
     render(&mut ui, 2.24);
-    assert!(ui.text().contains("render  2.24 s +1.1 s"), "cancelled renders do not count: {}", ui.text());
+    assert!(ui.text().contains("render  2.24 s +1.1 s"), "cancelled renders should not count: {}", ui.text());
 }
 
 #[test]
@@ -212,7 +212,7 @@ fn save_hint_is_shown_until_the_first_save() {
             let mut ui = TestUi::with(state(columns, rows));
             rendered(&mut ui, size);
             ui.worker(done(1, Vec::new(), false));
-            // With all stages, a narrow window has no room for the hint.
+            // If all stages are listed, a narrow window has no space for the hint.
             ui.state.work.stages = Default::default();
             assert!(ui.words().contains(&messages::save_to_render("cornell.toml", false)), "{}", ui.text());
             ui.event(Event::Changed(Changed { noticed: ui.now }));
@@ -231,7 +231,7 @@ fn status_line_lists_only_current_files() {
         ui.worker(done(generation, Vec::new(), false));
         let settings = ui.state.request.effective.as_mut().expect("settings");
         (settings.width, settings.height) = (320, 200);
-        // With all stages there is no room for a file.
+        // If all stages are listed, there is no space for a file.
         ui.state.work.stages = Default::default();
     };
     finish(&mut ui);
@@ -248,7 +248,7 @@ fn status_line_lists_only_current_files() {
     );
     ui.press('l');
     finish(&mut ui);
-    // A key without another effect removes the message about the move.
+    // Pressing a key without any other effect clears the message about the camera.
     ui.press('?');
     ui.press('?');
     let text = ui.text();
@@ -267,7 +267,7 @@ fn status_line_lists_only_current_files() {
 }
 
 #[test]
-fn hints_wrap_at_the_width_of_the_panel() {
+fn hints_wrap_at_the_panel_width() {
     for (columns, rows, width) in [(80, 24, 480), (120, 40, 480), (160, 40, 480)] {
         let mut ui = TestUi::with(state(columns, rows));
         ui.finish(RED);

@@ -1,4 +1,4 @@
-//! How noise is reported.
+//! How noise is displayed.
 
 use super::RED;
 use crate::event::Event;
@@ -6,7 +6,7 @@ use crate::fixtures::*;
 use crate::pipeline::protocol::{self, NoiseProgress, RenderProgress};
 
 #[test]
-fn noise_is_shown_as_it_falls() {
+fn noise_is_shown_during_a_render() {
     let mut ui = TestUi::new();
     ui.worker(protocol::Event::Started { generation: 1 });
     let noise = Some(NoiseProgress { now: 0.021, seconds: 1.0, next: Some((0.01, 14.0)) });
@@ -21,14 +21,14 @@ fn noise_is_shown_as_it_falls() {
         assert!(ui.text().contains(words), "{words}: {}", ui.text());
     }
     assert!(!ui.text().contains("noise"), "{}", ui.text());
-    // The end of a pause is not known.
+    // While paused, the remaining time is unknown.
     ui.event(Event::Resize(window(80, 24)));
     ui.press(' ');
     assert!(ui.text().contains("noise 2.1 % · 32/64 samples"), "{}", ui.text());
 }
 
 #[test]
-fn noise_target_has_no_sample_total() {
+fn noise_target_has_no_fixed_sample_count() {
     let mut ui = TestUi::new();
     ui.worker(protocol::Event::Started { generation: 1 });
     let settings = Box::new(crate::pipeline::settings::Effective { error: 0.02, ..settings() });
@@ -46,7 +46,8 @@ fn noise_target_has_no_sample_total() {
     assert!(ui.text().contains("about 32 samples"), "{}", ui.text());
 }
 
-/// The screen after a render with `error` or a time limit. `complete` and `samples` are its result.
+/// The screen after a render with the target `error` or a time limit. `complete` and `samples` describe the
+/// result.
 fn ended(error: f32, time_seconds: Option<f64>, complete: bool, samples: u32) -> String {
     let overrides = crate::pipeline::settings::Overrides { time_seconds, ..Default::default() };
     let (kind, depth) = (crate::preview_kind::PreviewKind::HalfBlock, crate::color::ColorDepth::None);
@@ -59,7 +60,7 @@ fn ended(error: f32, time_seconds: Option<f64>, complete: bool, samples: u32) ->
 }
 
 #[test]
-fn limit_that_ended_the_render_is_shown() {
+fn reason_for_stopping_is_shown() {
     for (error, time, complete, samples, words) in [
         (0.02, None, true, 40, "target ✓ 2 % per tile"),
         (0.02, None, true, 64, "stopped at max samples"),
@@ -77,7 +78,7 @@ fn limit_that_ended_the_render_is_shown() {
 }
 
 #[test]
-fn noise_of_image_and_target_per_tile_are_shown() {
+fn noise_and_target_per_tile_are_shown() {
     let mut ui = TestUi::new();
     ui.finish(RED);
     assert!(ui.text().contains("noise    0.81 %") && !ui.text().contains("per tile"), "{}", ui.text());

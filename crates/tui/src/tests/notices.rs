@@ -1,4 +1,4 @@
-//! Notices expire, and do not hide progress and results.
+//! Notices expire and do not hide progress or results.
 
 use super::{BLUE, RED};
 use crate::event::Event;
@@ -12,7 +12,7 @@ const LONG: &str = messages::CAMERA_MOVED;
 const LONGER: &str = "camera.position = [0, 1, 4.5], camera.fov = 35, camera.focus = 4.25 was saved since you moved the camera: \
     press c again to overwrite it, or 0 to reset the camera";
 
-/// A UI that shows a notice while a render is half done.
+/// A UI showing a notice while a render is half done.
 fn half_done(window: (u16, u16), notice: &str) -> TestUi {
     let mut ui = TestUi::with(state(window.0, window.1));
     ui.finish(RED);
@@ -34,14 +34,14 @@ fn notice_expires_after_four_seconds() {
         assert!(ui.text().contains(SHORT), "{}", ui.text());
         ui.wait(3900);
         assert!(ui.text().contains(SHORT), "{}", ui.text());
-        // Nothing else happens, so the event loop must wake up for it.
+        // Since there are no other events, the event loop must wake up to clear it.
         let wake = ui.state.next_tick().expect("a tick");
         assert!(wake <= ui.now + std::time::Duration::from_millis(100));
         ui.state.dirty = false;
         ui.wait(100);
         assert!(ui.state.dirty);
         let rows = ui.text();
-        // The line of keys contains it as what `0` resets.
+        // The text also appears in the key line, as the setting that `0` resets.
         let above = rows.lines().rev().skip(1).any(|row| row.contains(SHORT));
         assert!(!above, "{rows}");
         assert_eq!(ui.state.next_tick(), None);
@@ -49,7 +49,7 @@ fn notice_expires_after_four_seconds() {
 }
 
 #[test]
-fn later_notice_has_its_own_four_seconds() {
+fn newer_notice_is_shown_for_four_seconds() {
     let mut ui = TestUi::new();
     ui.finish(RED);
     ui.press(']');
@@ -92,9 +92,9 @@ fn notice_does_not_hide_the_written_file() {
     }
 }
 
-/// Without a status line, a notice replaces the line of keys.
+/// Without a status line, notices replace the key line.
 #[test]
-fn low_window_shows_keys_after_a_notice() {
+fn small_window_shows_keys_after_a_notice() {
     let mut ui = TestUi::with(state(60, 8));
     ui.finish(RED);
     ui.press(']');
@@ -105,7 +105,7 @@ fn low_window_shows_keys_after_a_notice() {
 }
 
 #[test]
-fn errors_and_prompts_stay_until_a_key() {
+fn errors_and_prompts_stay_until_a_key_press() {
     let failed = protocol::Event::WriteFailed {
         generation: 1,
         path: Some("cornell.png".into()),

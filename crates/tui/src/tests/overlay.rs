@@ -1,4 +1,4 @@
-//! Overlays: help, list of views, diagnostics.
+//! Overlays: help, view list, diagnostics.
 
 use crossterm::event::KeyCode;
 
@@ -18,7 +18,7 @@ const VIEWS: u16 = View::ALL.len() as u16;
 const ESCAPE: KeyPress = KeyPress::special(KeyCode::Esc);
 
 #[test]
-fn help_shows_every_key_in_every_window() {
+fn help_shows_every_key_at_every_window_size() {
     for (columns, rows) in [(80, 24), (120, 40), (80, 12), (80, 8)] {
         let mut ui = TestUi::with(state(columns, rows));
         ui.press('?');
@@ -31,7 +31,7 @@ fn help_shows_every_key_in_every_window() {
             KEYMAP.iter().map(|it| (it.label, it.help)).chain(OVERLAY.iter().map(|it| (it.label, it.help)));
         for (label, help) in lines.filter(|(_, help)| !help.is_empty()) {
             let line = seen.lines().find(|line| line.contains(help));
-            let line = line.unwrap_or_else(|| panic!("{help:?} is not in\n{seen}"));
+            let line = line.unwrap_or_else(|| panic!("{help:?} not found in\n{seen}"));
             assert!(line.contains(label), "{line:?}");
         }
         ui.key(ESCAPE);
@@ -40,7 +40,7 @@ fn help_shows_every_key_in_every_window() {
 }
 
 #[test]
-fn help_scrolls_with_every_key_to_its_ends() {
+fn help_scrolls_to_both_ends_with_every_key() {
     let mut ui = TestUi::with(state(60, 12));
     ui.press('?');
     let top = ui.text();
@@ -66,7 +66,7 @@ fn help_scrolls_with_every_key_to_its_ends() {
     assert!(!ui.state.dirty, "at the end");
     ui.press('?');
     ui.press('?');
-    assert_eq!(ui.text(), top, "opens at the top");
+    assert_eq!(ui.text(), top, "the help should reopen at the top");
 }
 
 #[test]
@@ -77,7 +77,7 @@ fn help_is_readable_in_a_small_window() {
         let mut seen = String::new();
         for _ in 0..200 {
             assert!(!ui.text().contains('…'), "{}", ui.text());
-            // The first line of each page, so each line is collected once.
+            // Collect only the first line of each page to avoid duplicates.
             let line = ui.text().lines().nth(1).map(str::to_owned).unwrap_or_default();
             seen += &line.replace(['│', '╭', '╮'], " ");
             ui.press('j');
@@ -85,7 +85,7 @@ fn help_is_readable_in_a_small_window() {
         let seen: Vec<&str> = seen.split_whitespace().collect();
         for help in KEYMAP.iter().map(|it| it.help).filter(|help| !help.is_empty()).take(20) {
             let is_there = help.split_whitespace().all(|word| seen.contains(&word));
-            assert!(is_there, "{help:?} is not in {seen:?}");
+            assert!(is_there, "{help:?} not found in {seen:?}");
         }
     }
 }
@@ -107,7 +107,7 @@ fn scroll_keys_are_shown_only_when_needed() {
 }
 
 #[test]
-fn help_leaves_no_cut_words_beside_it() {
+fn help_leaves_no_partial_words_beside_it() {
     let mut ui = TestUi::with(state(120, 40));
     ui.finish(RED);
     ui.press('?');
@@ -125,12 +125,12 @@ fn help_shows_how_to_close_it() {
 }
 
 #[test]
-fn views_are_chosen_by_digits() {
+fn digits_select_views() {
     for (columns, rows) in [(80, 24), (120, 40), (120, 24), (40, 12), (30, 8)] {
         let mut ui = TestUi::with(state(columns, rows));
         ui.finish(RED);
         ui.press('5');
-        assert_eq!(ui.state.request.view(), View::Beauty, "no digits without the list");
+        assert_eq!(ui.state.request.view(), View::Beauty, "digits should only work in the list");
         ui.press('v');
         let text = ui.text();
         assert!(
@@ -141,7 +141,7 @@ fn views_are_chosen_by_digits() {
         let wanted = request(&effects).expect("a request").overrides.view;
         assert_eq!(wanted, Some(View::Depth));
         assert!(ui.text().contains("▸3 depth"), "{}", ui.text());
-        // A digit always chooses the same view.
+        // Each digit always selects the same view.
         for _ in 0..7 {
             ui.press('v');
         }
@@ -151,12 +151,12 @@ fn views_are_chosen_by_digits() {
         ui.key(ESCAPE);
         assert!(!ui.text().contains("▸"));
         ui.press('1');
-        assert_eq!(ui.state.request.view(), View::Specular, "the list is closed");
+        assert_eq!(ui.state.request.view(), View::Specular, "digits should only work in the list");
     }
 }
 
 #[test]
-fn keys_navigate_the_open_list_of_views() {
+fn keys_navigate_the_open_view_list() {
     for (columns, rows) in [(80, 24), (120, 40), (200, 60), (30, 8)] {
         let mut ui = TestUi::with(state(columns, rows));
         ui.finish(RED);
@@ -174,12 +174,12 @@ fn keys_navigate_the_open_list_of_views() {
         assert_eq!(request(&ui.press('k')).and_then(|it| it.overrides.view), Some(View::Samples));
         for key in [KeyCode::Left, KeyCode::Right, KeyCode::Up] {
             ui.key(KeyPress::special(key));
-            assert!(!ui.state.request.toggles.camera.is_any(), "{key:?} is for the list");
+            assert!(!ui.state.request.toggles.camera.is_any(), "{key:?} should only affect the list");
         }
         ui.key(KeyPress::special(KeyCode::Enter));
         assert!(!ui.text().contains('▸'), "{}", ui.text());
         ui.press('j');
-        assert!(ui.state.request.toggles.camera.is_any(), "the list is closed");
+        assert!(ui.state.request.toggles.camera.is_any(), "the list is closed, so the camera should move");
     }
 }
 
@@ -190,14 +190,14 @@ fn views_are_found_by_name() {
     ui.press('v');
     assert!(ui.press('/').is_empty());
     ui.press('d');
-    assert_eq!(ui.state.request.view(), View::Depth, "the first match");
+    assert_eq!(ui.state.request.view(), View::Depth, "expected the first match");
     ui.press('i');
     assert_eq!(ui.state.request.view(), View::Diffuse);
     assert!(ui.text().contains("/ di"), "{}", ui.text());
     ui.key(KeyPress::special(KeyCode::Backspace));
     assert_eq!(ui.state.request.view(), View::Depth);
     for letter in "qqq".chars() {
-        assert!(ui.press(letter).is_empty(), "q does not quit");
+        assert!(ui.press(letter).is_empty(), "q should not quit while searching");
     }
     assert_eq!(ui.state.request.view(), View::Depth, "no match");
     ui.key(KeyPress::special(KeyCode::Enter));
@@ -206,7 +206,7 @@ fn views_are_found_by_name() {
 }
 
 #[test]
-fn list_of_views_cuts_nothing_below() {
+fn view_list_leaves_no_partial_lines_below() {
     let mut ui = TestUi::with(state(120, 40));
     ui.finish(RED);
     let settings = Box::new(Effective { width: 480, height: 480, ..settings() });
@@ -230,17 +230,17 @@ fn list_of_views_cuts_nothing_below() {
 }
 
 #[test]
-fn list_of_views_closes_automatically() {
+fn view_list_closes_automatically() {
     let mut ui = TestUi::new();
     ui.finish(RED);
     ui.press('v');
     ui.finish(RED);
-    let wake = ui.state.next_tick().expect("a wakeup for the list");
+    let wake = ui.state.next_tick().expect("a wakeup to close the list");
     assert!(wake > ui.now);
     ui.wait(3000);
     ui.press('v');
     ui.wait(3000);
-    assert!(ui.text().contains("▸3 depth"), "each key keeps it open");
+    assert!(ui.text().contains("▸3 depth"), "each key press should keep it open");
     ui.wait(2000);
     assert!(ui.state.dirty && !ui.text().contains("▸"));
     ui.finish(RED);
@@ -248,7 +248,7 @@ fn list_of_views_closes_automatically() {
 }
 
 #[test]
-fn cut_list_of_views_is_marked() {
+fn partly_visible_view_list_is_marked() {
     for (columns, rows, is_cut) in [(40, 10, true), (30, 8, true), (40, 16, false)] {
         let mut ui = TestUi::with(state(columns, rows));
         ui.finish(RED);
@@ -257,7 +257,7 @@ fn cut_list_of_views_is_marked() {
         assert!(text.contains('▾') == is_cut && !text.contains('▴'), "{columns}×{rows}\n{text}");
         assert!(text.contains("1-9 choose"), "{columns}×{rows}\n{text}");
         assert!(!text.contains("(preview"), "{columns}×{rows}\n{text}");
-        // The mark scrolls with the view.
+        // The marker scrolls with the view.
         for _ in 0..View::ALL.len() {
             ui.press('j');
         }
@@ -274,7 +274,7 @@ fn cut_list_of_views_is_marked() {
 }
 
 #[test]
-fn ten_positions_of_a_fault_are_shown() {
+fn only_ten_positions_of_an_error_are_shown() {
     let mut ui = TestUi::with(state(120, 40));
     ui.fail((1..=20).map(|line| at(Severity::Error, "unknown `wal`", line)).collect());
     let text = ui.text();
@@ -289,7 +289,7 @@ fn at(severity: Severity, message: &str, line: usize) -> Diagnostic {
 }
 
 #[test]
-fn errors_come_first_and_faults_are_merged() {
+fn errors_come_first_and_duplicates_are_merged() {
     let mut ui = TestUi::with(state(120, 40));
     let material = |line| at(Severity::Error, "unknown `wal`", line);
     ui.fail(vec![
@@ -303,7 +303,7 @@ fn errors_come_first_and_faults_are_merged() {
     assert!(text.contains("4 errors"), "{text}");
     assert_eq!(text.matches("unknown `wal`").count(), 1, "{text}");
     assert!(text.contains("cornell.toml:5:1") && text.contains(": 12:1, 17:1"), "{text}");
-    let place = |words: &str| text.find(words).unwrap_or_else(|| panic!("{words} is not in\n{text}"));
+    let place = |words: &str| text.find(words).unwrap_or_else(|| panic!("{words} not found in\n{text}"));
     assert!(place("radios") < place("wal`") && place("wal`") < place("not used"), "{text}");
 }
 
@@ -331,7 +331,7 @@ fn diagnostics_are_beside_the_image_if_possible() {
 }
 
 #[test]
-fn closed_diagnostics_stay_closed() {
+fn closed_diagnostics_stay_closed_until_new_ones() {
     let mut ui = TestUi::new();
     ui.finish(RED);
     let fault = || vec![diagnostic(Severity::Error, "misspelled")];
@@ -341,7 +341,7 @@ fn closed_diagnostics_stay_closed() {
     ui.fail(fault());
     assert!(!ui.state.overlays.diagnostics.open, "{}", ui.text());
     ui.fail(vec![diagnostic(Severity::Error, "another one")]);
-    assert!(ui.state.overlays.diagnostics.open, "new errors open it");
+    assert!(ui.state.overlays.diagnostics.open, "new errors should open the pane");
 }
 
 #[test]
@@ -352,7 +352,7 @@ fn camera_steps_wait_while_the_scene_is_broken() {
     let first = ui.press('h');
     assert!(request(&first).is_some());
     ui.fail(vec![diagnostic(Severity::Error, "misspelled")]);
-    assert!(request(&ui.press('h')).is_none(), "the first step has no preview yet");
+    assert!(request(&ui.press('h')).is_none(), "the step should wait for the first step's preview");
     let generation = ui.state.request.generation;
     let picture = plain_picture(50, 38, RED);
     let effects = ui.event(Event::Picture {
@@ -363,11 +363,11 @@ fn camera_steps_wait_while_the_scene_is_broken() {
         lacks_photons: false,
         source: None,
     });
-    assert!(request(&effects).is_some(), "the newest step follows");
+    assert!(request(&effects).is_some(), "the preview should trigger the waiting step");
 }
 
 #[test]
-fn number_of_shown_errors_is_limited() {
+fn number_of_displayed_errors_is_limited() {
     let mut ui = TestUi::with(state(120, 40));
     ui.fail((0..20_000).map(|i| diagnostic(Severity::Error, &format!("wrong number {i}"))).collect());
     for _ in 0..100 {
@@ -395,7 +395,7 @@ fn diagnostics_scroll_with_every_key() {
     assert!(!ui.text().contains("wrong number"));
     ui.screen();
     ui.key(ESCAPE);
-    assert!(!ui.state.dirty, "nothing is open");
+    assert!(!ui.state.dirty, "nothing was open, so nothing should be redrawn");
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! The mouse: requests and inspected values, and the positions that the editor opens.
+//! The mouse: requests, inspected values, and positions opened in the editor.
 
 use crossterm::event::KeyCode;
 
@@ -65,12 +65,12 @@ fn drag_orbits_and_click_inspects() {
     mouse(&mut ui, MouseKind::Press, 20, 10);
     let effects = mouse(&mut ui, MouseKind::Drag, 30, 10);
     let pose = request(&effects).expect("a request").overrides.camera.pose.expect("a pose");
-    assert!(pose.position.x < -1.0, "the scene follows the mouse: {pose:?}");
-    assert!(mouse(&mut ui, MouseKind::Release, 30, 10).is_empty(), "a drag is not a click");
+    assert!(pose.position.x < -1.0, "the scene should follow the mouse: {pose:?}");
+    assert!(mouse(&mut ui, MouseKind::Release, 30, 10).is_empty(), "a drag should not be treated as a click");
     let spot = asked(&click(&mut ui, 12, 10));
     assert!((spot.x - 12.5 / 55.0).abs() < 1e-9 && (spot.y - 9.5 / 21.0).abs() < 1e-9, "{spot:?}");
     for (column, row) in [(70, 10), (20, 0), (20, 23)] {
-        assert!(click(&mut ui, column, row).is_empty(), "outside of the image");
+        assert!(click(&mut ui, column, row).is_empty(), "clicks outside the image should be ignored");
     }
     assert!(mouse(&mut ui, MouseKind::Drag, 30, 10).is_empty(), "started elsewhere");
 }
@@ -88,7 +88,7 @@ fn wheel_zooms_and_scrolls_diagnostics() {
 }
 
 #[test]
-fn clicked_object_is_shown_and_edited() {
+fn clicked_object_is_shown_and_can_be_edited() {
     let mut ui = ui();
     click(&mut ui, 12, 10);
     assert!(answer(&mut ui, Some(thing())).is_empty());
@@ -98,7 +98,7 @@ fn clicked_object_is_shown_and_edited() {
     {
         assert!(text.contains(words), "{words}: {text}");
     }
-    // The mark is at the click.
+    // The mark is at the clicked cell.
     assert_eq!(ui.screen()[(12, 10)].symbol(), "┼");
     let place = |effects: &[Effect]| match effects {
         [Effect::Edit(place)] => (place.path.to_string_lossy().into_owned(), place.line, place.column),
@@ -108,7 +108,7 @@ fn clicked_object_is_shown_and_edited() {
     ui.fail(vec![diagnostic(Severity::Error, "wrong")]);
     assert_eq!(place(&ui.press('o')), ("scenes/cornell.toml".to_owned(), 3, 1), "errors take precedence");
     let mut fresh = self::ui();
-    assert_eq!(place(&fresh.press('o')).1, 1, "otherwise the scene");
+    assert_eq!(place(&fresh.press('o')).1, 1, "without errors, the scene file should be opened");
     fresh.event(Event::NoEditor("no editor `x`".to_owned()));
     assert!(fresh.text().contains("no editor `x`"));
 }
@@ -123,15 +123,15 @@ fn click_after_f_sets_the_focus() {
     let focused = request(&effects).expect("a request");
     assert_eq!((focused.overrides.camera.focus, focused.write), (Some(3.8167), Writing::No));
     assert!(ui.text().contains(&messages::focus_moved(3.8167)[..40]), "{}", ui.text());
-    // Another key cancels the click.
+    // Any other key cancels the pending click.
     ui.press('f');
     ui.press('e');
     click(&mut ui, 12, 10);
     assert!(answer(&mut ui, Some(thing())).is_empty());
-    // Without the mouse, focus at the crosshair immediately.
+    // If the mouse is off, `f` focuses at the crosshair immediately.
     ui.press('m');
     let spot = asked(&ui.press('f'));
-    assert!((spot.x - 12.5 / 55.0).abs() < 1e-9, "at the last click: {spot:?}");
+    assert!((spot.x - 12.5 / 55.0).abs() < 1e-9, "expected the last click: {spot:?}");
     assert!(answer(&mut ui, None).is_empty());
     assert!(ui.text().contains(messages::NOTHING_TO_FOCUS));
     ui.state.request.camera.as_mut().expect("a camera").aperture = 0.0;
@@ -147,7 +147,7 @@ fn kept(ui: &mut TestUi, is_new: bool, is_own: bool) -> Vec<Effect> {
 }
 
 #[test]
-fn kept_camera_belongs_to_the_scene() {
+fn saved_camera_becomes_the_scene_camera() {
     let mut ui = ui();
     ui.press('l');
     ui.press('c');
@@ -160,7 +160,7 @@ fn kept_camera_belongs_to_the_scene() {
             && !text.contains(messages::CAMERA_MOVED),
         "{text}"
     );
-    // The watcher also reports that save.
+    // The watcher also reports this save.
     ui.event(Event::Changed(Changed { noticed: ui.now }));
     assert!(ui.text().contains(&messages::camera_saved("scenes/cornell.toml")), "{}", ui.text());
     ui.event(Event::Changed(Changed { noticed: ui.now }));
@@ -172,7 +172,7 @@ fn kept_camera_belongs_to_the_scene() {
     assert!(ui.worker(protocol::Event::CameraKept { generation: 0, outcome }).is_empty());
     let text = ui.text();
     assert!(text.contains("error: outdated") && text.contains("reset camera"), "{text}");
-    // The watcher reports that save a little later.
+    // The watcher reports this save slightly later.
     ui.event(Event::Changed(Changed { noticed: ui.now }));
     assert!(ui.text().contains("error: outdated"), "{}", ui.text());
     ui.event(Event::Changed(Changed { noticed: ui.now }));
@@ -180,7 +180,7 @@ fn kept_camera_belongs_to_the_scene() {
 }
 
 #[test]
-fn u_undoes_until_nothing_is_left() {
+fn undo_can_be_repeated_until_nothing_is_left() {
     let mut ui = ui();
     assert!(ui.press('u').is_empty());
     assert!(ui.text().contains(messages::NOTHING_TO_UNDO), "{}", ui.text());
@@ -202,7 +202,7 @@ fn u_undoes_until_nothing_is_left() {
     assert!(asks(&mut ui, "two"));
     assert!(undone(&mut ui, Err("outdated".to_owned())).is_empty());
     assert!(ui.text().contains("error: outdated"), "{}", ui.text());
-    assert!(asks(&mut ui, "two"), "it can be retried");
+    assert!(asks(&mut ui, "two"), "a failed undo can be retried");
     assert!(request(&undone(&mut ui, Ok("a.toml".into()))).is_some(), "the file is rendered");
     assert!(ui.text().contains(&messages::undone("a.toml")), "{}", ui.text());
     assert!(asks(&mut ui, "one"));
@@ -211,7 +211,7 @@ fn u_undoes_until_nothing_is_left() {
 }
 
 #[test]
-fn y_copies_if_the_terminal_has_a_clipboard() {
+fn y_copies_if_the_terminal_supports_it() {
     let mut ui = ui();
     assert!(ui.press('y').is_empty());
     assert!(ui.text().contains(messages::NOTHING_TO_COPY), "{}", ui.text());
@@ -226,7 +226,7 @@ fn y_copies_if_the_terminal_has_a_clipboard() {
     let words = "sphere \"ball\" · cornell.toml:47 · glass crystal · distance 3.9 · position (0.2, 0.5, -0.3) · \
                  radiance (0.5, 0.5, 0.5) · normal (0, 1, 0) · pixel 1, 2";
     assert!(matches!(&effects[..], [Effect::Aside(bytes)] if *bytes == crate::window_title::copy(words)));
-    // The clicked object can be copied after other keys.
+    // The clicked object can still be copied after other key presses.
     ui.press('s');
     assert!(matches!(ui.press('y')[..], [Effect::Aside(_)]));
 }
@@ -237,7 +237,7 @@ fn command_line_camera_overrides_the_file() {
     let base = Overrides { sets, ..Overrides::default() };
     let mut ui = TestUi::with(state_with(80, 24, PreviewKind::HalfBlock, ColorDepth::TrueColor, base));
     ui.finish(RED);
-    assert!(matches!(ui.press('c')[..], [Effect::Send(Command::KeepCamera(_))]), "kept without moving");
+    assert!(matches!(ui.press('c')[..], [Effect::Send(Command::KeepCamera(_))]), "saved without moving it");
     ui.press('>');
     ui.press('c');
     assert!(kept(&mut ui, true, false).is_empty());
@@ -249,7 +249,7 @@ fn command_line_camera_overrides_the_file() {
 }
 
 #[test]
-fn older_render_stays_until_the_next_render() {
+fn older_render_is_shown_until_the_next_render() {
     let mut ui = ui();
     assert!(ui.press('b').is_empty());
     assert!(ui.text().contains(messages::NO_EARLIER_RENDER));
@@ -271,7 +271,7 @@ fn older_render_stays_until_the_next_render() {
         lacks_photons: false,
         source: None,
     });
-    assert!(super::cells_of(&mut ui, RED) > 0, "the older render stays");
+    assert!(super::cells_of(&mut ui, RED) > 0, "the older render should stay visible");
     ui.press('N');
     assert!(
         !ui.state.picture.history.is_open() && ui.text().contains(messages::NEWEST_RENDER),
@@ -281,7 +281,7 @@ fn older_render_stays_until_the_next_render() {
     assert!(super::cells_of(&mut ui, BLUE) + super::cells_of(&mut ui, [10, 200, 10]) > 0);
     ui.press('n');
     ui.press('s');
-    assert!(super::cells_of(&mut ui, RED) == 0, "a render shows the newest image");
+    assert!(super::cells_of(&mut ui, RED) == 0, "a new render should show the newest image");
 }
 
 #[test]
@@ -301,7 +301,7 @@ fn small_windows_show_all_inspected_values() {
         ui.press('y');
         ui.press('?');
         ui.press('?');
-        assert!(!ui.text().contains("crystal"), "until the next key: {}", ui.text());
+        assert!(!ui.text().contains("crystal"), "shown only until the next key press: {}", ui.text());
     }
 }
 
@@ -316,7 +316,7 @@ fn small_windows_show_how_to_copy() {
         let text = ui.text();
         assert!(
             text.lines().next().is_some_and(|line| line.contains("✓ done")),
-            "the state is visible: {text}"
+            "the state should be visible: {text}"
         );
         let words = text.split_whitespace().collect::<Vec<_>>().join(" ");
         assert!(words.contains(&format!("{} sphere \"ball\"", messages::SELECT_TO_COPY)), "{text}");
@@ -324,13 +324,13 @@ fn small_windows_show_how_to_copy() {
 }
 
 #[test]
-fn drag_after_z_marks_the_first_region() {
+fn drag_after_z_selects_the_first_region() {
     let mut ui = ui();
     ui.press('r');
     ui.press('z');
     assert!(ui.text().contains(messages::DRAG_REGION), "{}", ui.text());
     mouse(&mut ui, MouseKind::Press, 10, 5);
-    assert!(mouse(&mut ui, MouseKind::Drag, 30, 12).is_empty(), "the camera does not move");
+    assert!(mouse(&mut ui, MouseKind::Drag, 30, 12).is_empty(), "the camera should not move");
     assert_eq!(ui.screen()[(10, 5)].symbol(), "┌");
     assert_eq!(ui.screen()[(30, 12)].symbol(), "┘");
     let effects = mouse(&mut ui, MouseKind::Release, 30, 12);
@@ -338,7 +338,7 @@ fn drag_after_z_marks_the_first_region() {
     let section = marked.first.expect("a region");
     assert!((section.left - 10.5 / 55.0).abs() < 1e-9 && (section.width - 20.0 / 55.0).abs() < 1e-9);
     assert!(!marked.overrides.camera.is_any());
-    // Every render has it, until `z` is pressed again.
+    // The region applies to all renders until `z` is pressed again.
     assert_eq!(request(&ui.press('s')).expect("a request").first, Some(section));
     assert_eq!(request(&ui.press('z')).expect("a request").first, None);
     ui.finish(BLUE);
@@ -350,13 +350,13 @@ fn drag_after_z_marks_the_first_region() {
 }
 
 #[test]
-fn clicks_in_a_close_up_hit_the_right_pixel() {
+fn clicks_in_a_close_up_select_the_right_pixel() {
     let mut ui = ui();
     let spot = asked(&click(&mut ui, 12, 10));
     ui.press('x');
     let around = ui.state.request.preview_size.expect("a size").around;
     assert_eq!(around, Some(spot));
-    // 20 × 10 pixels of the image, fewer than fit.
+    // 20 × 10 image pixels, fewer than would fit.
     let section = Some(Section { left: 0.2, top: 0.4, width: 0.1, height: 0.2 });
     let generation = ui.state.request.generation;
     let picture = plain_picture(20, 10, BLUE);
@@ -384,11 +384,11 @@ fn header_marks_an_older_render() {
     ui.press('b');
     let first = |ui: &mut TestUi| ui.text().lines().next().map(str::to_owned).unwrap_or_default();
     assert!(first(&mut ui).contains("◂ older") && first(&mut ui).contains(&messages::render_of(1, 2)));
-    // A key without a meaning removes the message.
+    // A key that has no effect clears the message.
     ui.press('y');
     let text = ui.text();
-    assert!(text.contains("b newest") && text.contains("N newer"), "the keys: {text}");
-    assert!(!text.contains("samples") && !text.contains("render  "), "of the newest render: {text}");
+    assert!(text.contains("b newest") && text.contains("N newer"), "expected the keys: {text}");
+    assert!(!text.contains("samples") && !text.contains("render  "), "expected no newest values: {text}");
     ui.event(Event::Resize(window(30, 8)));
     assert!(first(&mut ui).contains("1 of 2"), "{}", ui.text());
     ui.event(Event::Resize(window(80, 24)));
@@ -397,7 +397,7 @@ fn header_marks_an_older_render() {
 }
 
 #[test]
-fn kept_camera_differs_before_and_after() {
+fn before_and_after_differ_for_a_saved_camera() {
     let mut ui = ui();
     ui.press('l');
     ui.finish(BLUE);
@@ -406,11 +406,11 @@ fn kept_camera_differs_before_and_after() {
     ui.event(Event::Changed(Changed { noticed: ui.now }));
     ui.finish(BLUE);
     ui.press('b');
-    assert!(super::cells_of(&mut ui, RED) > 0, "the previous camera: {}", ui.text());
+    assert!(super::cells_of(&mut ui, RED) > 0, "expected the previous camera: {}", ui.text());
 }
 
 #[test]
-fn escape_cancels_gestures_facts_and_history() {
+fn escape_cancels_gestures_values_and_history() {
     let mut ui = ui();
     let escape = |ui: &mut TestUi| ui.event(Event::Key(KeyPress::special(KeyCode::Esc)));
     for (key, waits) in [('z', messages::DRAG_REGION), ('f', messages::CLICK_TO_FOCUS)] {
@@ -445,13 +445,13 @@ fn cancelled_region_drag_has_no_effect() {
         assert!(ui.state.request.first_section.is_some());
         ui.key(KeyPress::special(key));
         assert!(ui.state.request.first_section.is_none() && !ui.state.selection.is_marking, "{key:?}");
-        assert!(mouse(&mut ui, MouseKind::Drag, 30, 16).is_empty(), "{key:?}: no orbit");
-        assert!(mouse(&mut ui, MouseKind::Release, 30, 16).is_empty(), "{key:?}: no click");
+        assert!(mouse(&mut ui, MouseKind::Drag, 30, 16).is_empty(), "{key:?}: the camera should not move");
+        assert!(mouse(&mut ui, MouseKind::Release, 30, 16).is_empty(), "{key:?}: not a click");
     }
 }
 
 #[test]
-fn digit_without_the_list_shows_a_hint() {
+fn digit_without_the_view_list_shows_a_hint() {
     let mut ui = TestUi::new();
     ui.finish(RED);
     ui.press('3');
@@ -464,11 +464,11 @@ fn f_needs_an_aperture() {
     ui.state.request.camera.as_mut().expect("a camera").aperture = 0.0;
     assert!(ui.press('f').is_empty());
     assert!(ui.text().contains(messages::PINHOLE), "{}", ui.text());
-    assert!(!ui.state.selection.is_focusing, "the next click does not focus");
+    assert!(!ui.state.selection.is_focusing, "the next click should not set the focus");
 }
 
 #[test]
-fn exposure_adds_no_history_entry() {
+fn exposure_changes_add_no_history_entry() {
     let mut ui = ui();
     ui.event(Event::Changed(Changed { noticed: ui.now }));
     ui.finish(BLUE);
@@ -476,11 +476,11 @@ fn exposure_adds_no_history_entry() {
         ui.press(']');
         ui.finish(color);
     }
-    assert_eq!(ui.state.work.renders, 2, "exposure is not counted");
+    assert_eq!(ui.state.work.renders, 2, "exposure changes should not be counted");
     ui.press('n');
     assert!(ui.text().contains(&messages::render_of(1, 2)), "{}", ui.text());
     ui.press('N');
-    // A toggle adds an entry.
+    // Toggling a setting adds an entry.
     ui.press('s');
     ui.finish(BLUE);
     ui.press('n');
@@ -488,7 +488,7 @@ fn exposure_adds_no_history_entry() {
 }
 
 #[test]
-fn older_render_shows_its_changes() {
+fn older_render_is_shown_with_its_changes() {
     use crate::pipeline::protocol;
     let mut ui = TestUi::with(state(120, 40));
     for (color, text) in [(RED, "r = 1\nfov = 40"), (BLUE, "r = 2\nfov = 40"), (RED, "r = 2\nfov = 30")] {

@@ -1,4 +1,4 @@
-//! The screen as a whole.
+//! Tests of the whole screen.
 
 use std::time::Duration;
 
@@ -23,12 +23,12 @@ fn preview_uses_half_blocks_in_the_middle() {
     let mut ui = TestUi::new();
     ui.finish(RED);
     let screen = ui.screen();
-    // Except for a column, 56 × 21 cells are the largest that 50:38 allows in 21 rows. The area starts in row
-    // 1.
+    // 56 × 21 cells would be the largest size for an aspect ratio of 50:38 in 21 rows, but one column is left
+    // blank. The area starts in row 1.
     let cell = &screen[(25, 10)];
     assert_eq!((cell.symbol(), cell.fg, cell.bg), ("▀", Color::Rgb(200, 20, 10), Color::Rgb(200, 20, 10)));
     assert_eq!(cells_of(&mut ui, RED), 55 * 21);
-    assert_ne!(screen[(56, 10)].symbol(), "▀", "the image ends at the panel");
+    assert_ne!(screen[(56, 10)].symbol(), "▀", "the image should end at the panel");
 }
 
 #[test]
@@ -56,7 +56,7 @@ fn half_blocks_show_two_pixels() {
 }
 
 #[test]
-fn monochrome_preview_is_a_ramp_without_colors() {
+fn preview_without_colors_is_a_character_ramp() {
     let state = state_with(80, 24, PreviewKind::Ascii, ColorDepth::None, Overrides::default());
     let mut ui = TestUi::with(state);
     ui.finish([255; 3]);
@@ -67,7 +67,7 @@ fn monochrome_preview_is_a_ramp_without_colors() {
 }
 
 #[test]
-fn range_is_shown_with_the_view() {
+fn value_range_is_shown_with_the_view() {
     let base = Overrides { view: Some(View::Depth), ..Overrides::default() };
     let state = state_with(120, 40, PreviewKind::HalfBlock, ColorDepth::TrueColor, base);
     let mut ui = TestUi::with(state);
@@ -91,7 +91,7 @@ fn range_is_shown_with_the_view() {
 }
 
 #[test]
-fn image_of_the_wrong_size_is_not_shown() {
+fn image_with_the_wrong_size_is_not_shown() {
     let mut ui = TestUi::new();
     let mut picture = (*plain_picture(4, 4, RED)).clone();
     picture.pixels.truncate(3);
@@ -119,12 +119,12 @@ fn table_shows_the_status_of_each_stage() {
     }
     let text = ui.text();
     for line in ["✓ parse    0.40 ms", "= meshes    reused", "· accel", "- photons  skipped", "> render"] {
-        assert!(text.contains(line), "{line:?} is not in\n{text}");
+        assert!(text.contains(line), "{line:?} not found in\n{text}");
     }
 }
 
 #[test]
-fn asset_bar_fills_lingers_and_disappears() {
+fn asset_bar_stays_briefly_when_full() {
     let mut ui = TestUi::new();
     let asset = |done| protocol::Event::Asset { generation: 1, progress: asset("bricks", done, 8) };
     ui.worker(asset(3));
@@ -151,7 +151,7 @@ fn asset_bar_disappears_with_its_stage() {
     assert!(ui.text().contains("━━━━━━━━ 100 %") && row(&mut ui, "save cornell.toml") == hint);
     ui.worker(of(Stage::Photons, Status::Done));
     assert!(!ui.text().contains("100 %") && row(&mut ui, "save cornell.toml") == hint, "{}", ui.text());
-    // No bar outlives the render.
+    // Bars disappear when the render ends.
     ui.worker(protocol::Event::Asset { generation: 1, progress: asset("knot.obj", 2, 2) });
     ui.worker(done(1, Vec::new(), false));
     assert!(!ui.text().contains("knot.obj"), "{}", ui.text());
@@ -159,7 +159,7 @@ fn asset_bar_disappears_with_its_stage() {
 }
 
 #[test]
-fn eta_is_never_early_or_absurd() {
+fn eta_is_shown_only_if_plausible() {
     let mut ui = TestUi::new();
     let mut eta = |progress: RenderProgress| {
         ui.worker(protocol::Event::Progress { generation: 1, progress });
@@ -204,13 +204,13 @@ fn written_file_is_shown_with_its_size() {
     });
     let text = ui.text();
     for words in ["→ out/cornell.png", "  210.4 kB, 640×480"] {
-        assert!(text.contains(words), "{words:?} is not in\n{text}");
+        assert!(text.contains(words), "{words:?} not found in\n{text}");
     }
-    assert!(!text.contains("wrote"), "the keys are visible\n{text}");
+    assert!(!text.contains("wrote"), "the keys should be visible\n{text}");
 }
 
 #[test]
-fn w_is_confirmed_after_all_files() {
+fn write_is_confirmed_after_all_files() {
     let mut ui = TestUi::new();
     ui.finish(RED);
     let written =
@@ -218,7 +218,7 @@ fn w_is_confirmed_after_all_files() {
     let done = || protocol::Event::WriteDone { generation: 1, paths: vec!["a.png".into(), "b.ppm".into()] };
     ui.press('w');
     ui.worker(written("a.png"));
-    // The key is pressed again before the second file of the first write.
+    // The key is pressed again before the first write has written its second file.
     ui.press('w');
     ui.worker(written("b.ppm"));
     assert!(!ui.text().contains("wrote"), "{}", ui.text());
@@ -226,7 +226,7 @@ fn w_is_confirmed_after_all_files() {
         ui.worker(done());
         assert!(ui.text().contains(&messages::wrote("a.png, b.ppm")), "{}", ui.text());
     }
-    // A request in between does not prevent the confirmation.
+    // An intervening request does not prevent the confirmation.
     ui.press('w');
     ui.press('r');
     ui.worker(done());
@@ -253,7 +253,7 @@ fn stage_reasons_are_wrapped_between_words() {
     ui.worker(protocol::Event::Stage { generation: 1, stage: stage(long) });
     let text = ui.text();
     assert!(text.contains(&format!("  {}", &long[..18])) && text.contains("  scene"), "{text}");
-    // Below the image, each stage has one row.
+    // Below the image, each stage takes a single row.
     ui.event(Event::Resize(window(80, 37)));
     assert!(!ui.text().contains(long) && ui.text().contains("skipped"), "{}", ui.text());
     ui.worker(protocol::Event::Stage { generation: 1, stage: stage(short) });
@@ -275,11 +275,11 @@ fn failed_stage_is_not_shown_as_running() {
     assert!(ui.text().contains("> parse"));
     let failure = Failure::Scene(vec![diagnostic(Severity::Error, "wrong")]);
     ui.worker(protocol::Event::Failed { generation: 1, failure });
-    assert!(!ui.text().contains("parse"), "stages of a broken scene: {}", ui.text());
+    assert!(!ui.text().contains("parse"), "stages of a broken scene should be hidden: {}", ui.text());
 }
 
 #[test]
-fn only_changed_renders_are_counted() {
+fn only_renders_with_changes_are_counted() {
     let mut ui = TestUi::new();
     ui.finish(RED);
     assert!(ui.text().contains("· render 1"), "{}", ui.text());
@@ -293,7 +293,7 @@ fn only_changed_renders_are_counted() {
 }
 
 #[test]
-fn deleted_file_is_missing_not_broken() {
+fn deleted_file_is_reported_as_missing() {
     let mut ui = TestUi::with(state(120, 30));
     ui.finish(RED);
     let absent = *crate::scene::text_now("no-such-folder/cornell.toml".as_ref()).expect_err("an error");
@@ -325,13 +325,13 @@ fn broken_file_keeps_the_image() {
         "─ 1 error ─",
         "broken",
     ] {
-        assert!(text.contains(words), "{words:?} is not in\n{text}");
+        assert!(text.contains(words), "{words:?} not found in\n{text}");
     }
     let after = cells_of(&mut ui, RED);
     assert!(after >= before / 2, "{after} of {before} cells");
 
     ui.event(Event::Changed(Changed { noticed: ui.now }));
-    assert!(ui.text().contains("heigth"), "the pane stays until the file is read");
+    assert!(ui.text().contains("heigth"), "the pane should stay open until the file is read");
     ui.finish(BLUE);
     assert!(!ui.text().contains("heigth"));
     assert_eq!((cells_of(&mut ui, BLUE), cells_of(&mut ui, RED)), (before, 0));
@@ -360,7 +360,7 @@ fn long_diagnostics_scroll_to_their_ends() {
 }
 
 #[test]
-fn failed_work_is_shown_in_the_pane() {
+fn render_failure_is_shown_in_the_pane() {
     let mut ui = TestUi::new();
     let failure = Failure::Work("unwritable".to_owned());
     ui.worker(protocol::Event::Failed { generation: 1, failure });
@@ -375,11 +375,11 @@ fn conflict_opens_the_pane_once() {
     ui.worker(refused());
     assert!(ui.text().contains("error: readonly") && ui.text().contains("1 error"), "{}", ui.text());
     assert!(ui.state.saving.unwritten.is_some() && ui.text().contains(messages::NOT_WRITTEN));
-    assert!(ui.state.work.is_running(), "the render continues");
+    assert!(ui.state.work.is_running(), "the render should continue");
     ui.key(KeyPress::special(crossterm::event::KeyCode::Esc));
     assert!(!ui.text().contains("readonly a.png"));
     ui.worker(refused());
-    assert!(!ui.text().contains("readonly a.png"), "the user closed it");
+    assert!(!ui.text().contains("readonly a.png"), "the user closed the pane");
     let warning = diagnostic(Severity::Warning, "texture `b` is not used");
     ui.worker(done(1, [conflict(), vec![warning]].concat(), false));
     assert!(ui.text().contains("e 1 error, 1 warning"), "{}", ui.text());
@@ -463,7 +463,7 @@ proptest! {
 }
 
 #[test]
-fn unwritten_image_is_not_done() {
+fn unwritten_image_is_not_shown_as_done() {
     let mut ui = TestUi::new();
     let generation = ui.state.request.generation;
     ui.worker(protocol::Event::WriteFailed {
@@ -476,7 +476,7 @@ fn unwritten_image_is_not_done() {
     assert!(first(&mut ui).contains("! unwritten") && !ui.text().contains("✓ done"), "{}", ui.text());
     ui.press('y');
     assert!(ui.text().contains(messages::NOT_WRITTEN), "{}", ui.text());
-    // `e` shows the reason again.
+    // Pressing `e` shows the reason again.
     ui.press('e');
     assert!(ui.text().contains("─ 1 error ─") && ui.text().contains("error: a.png"));
     ui.press('e');
@@ -485,7 +485,7 @@ fn unwritten_image_is_not_done() {
     assert!(first(&mut ui).contains("✓ done"), "{}", ui.text());
 }
 
-/// The screen below the header, in one line.
+/// The screen below the header, joined into one line.
 fn text_below_header(ui: &mut TestUi) -> String {
     let text = ui.text();
     let words = text.lines().skip(1).flat_map(str::split_whitespace);
@@ -510,14 +510,14 @@ fn files_of_other_images_are_not_listed() {
         ui.worker(written(1));
         ui.finish(super::RED);
         assert!(text_below_header(&mut ui).contains("→ a.png"), "{}", ui.text());
-        // The next image cannot be written, so the file contains the previous one.
+        // The next image could not be written, so the file still contains the previous one.
         ui.event(Event::Changed(crate::Changed { noticed: ui.now }));
         ui.worker(protocol::Event::Started { generation: 2 });
         ui.worker(failed(2, "a.png: denied"));
         ui.worker(done(2, Vec::new(), false));
         ui.key(KeyPress::special(crossterm::event::KeyCode::Esc));
         assert!(!text_below_header(&mut ui).contains("→ a.png"), "{}", ui.text());
-        // Writing works again.
+        // Writing succeeds again.
         ui.press('w');
         ui.worker(written(2));
         ui.key(KeyPress::special(crossterm::event::KeyCode::Esc));
@@ -526,7 +526,7 @@ fn files_of_other_images_are_not_listed() {
             "{}",
             ui.text()
         );
-        // Another write requested with a key fails, so the content is unknown.
+        // Another write, requested with a key, fails. The file's content is now unknown.
         ui.press('w');
         ui.worker(failed(2, "a.png: gone"));
         ui.key(KeyPress::special(crossterm::event::KeyCode::Esc));
@@ -544,7 +544,7 @@ fn files_of_other_images_are_not_listed() {
 }
 
 #[test]
-fn failed_write_during_a_render_is_not_final() {
+fn write_failure_is_cleared_by_a_later_write() {
     let mut ui = TestUi::new();
     ui.worker(protocol::Event::Started { generation: 1 });
     ui.press('w');
@@ -572,10 +572,10 @@ fn reset_is_offered_once_after_a_change() {
 }
 
 #[test]
-fn preview_cost_is_shown_if_there_is_room() {
+fn preview_cost_is_shown_if_it_fits() {
     let mut ui = TestUi::with(state(120, 40));
     ui.finish(RED);
-    // With all stages there is no room for it.
+    // If all stages are listed, there is no space for it.
     ui.state.work.stages = Default::default();
     ui.state.saving.edits = 1;
     ui.state.display.frame =
@@ -597,7 +597,7 @@ fn folder_precedes_the_name() {
 }
 
 #[test]
-fn time_changes_are_left_out_without_room() {
+fn time_differences_are_omitted_if_too_wide() {
     let mut ui = TestUi::with(state(100, 24));
     ui.finish(RED);
     ui.state.work.last_seconds[Stage::Render as usize] = Some(4.0);
@@ -632,7 +632,7 @@ fn preview_without_photons_is_marked() {
     ui.event(picture(true));
     assert!(ui.text().contains(messages::WITHOUT_PHOTONS), "{}", ui.text());
     ui.worker(protocol::Event::Progress { generation: 1, progress: progress(0.1, None) });
-    assert!(ui.text().contains(messages::WITHOUT_PHOTONS), "while that preview is shown");
+    assert!(ui.text().contains(messages::WITHOUT_PHOTONS), "marked as long as that preview is shown");
     ui.event(picture(false));
     assert!(!ui.text().contains(messages::WITHOUT_PHOTONS), "{}", ui.text());
 }

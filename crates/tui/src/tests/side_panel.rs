@@ -1,4 +1,4 @@
-//! The noise curve and the history in a wide window, and notifications.
+//! The noise curve and history in a wide window, and notifications.
 
 use ratatui::layout::Rect;
 
@@ -17,7 +17,7 @@ use crate::terminals::{Brand, TerminalId};
 use crate::view;
 use crate::view::layout::Layout;
 
-/// Simulates a render whose noise falls from 10 % after a second, with `error` as the target.
+/// Simulates a render with the target `error`, whose noise falls from 10 % after one second.
 fn rendered(ui: &mut TestUi, error: f32) {
     let generation = ui.state.request.generation;
     ui.worker(protocol::Event::Started { generation });
@@ -53,7 +53,7 @@ fn rendered(ui: &mut TestUi, error: f32) {
     ui.worker(event);
 }
 
-/// Saves the scene with each of these texts.
+/// Saves the scene with each of these texts in turn.
 fn edited(ui: &mut TestUi, edits: &[(&str, [u8; 3])]) {
     for (text, color) in edits {
         ui.event(Event::Changed(Changed { noticed: ui.now }));
@@ -63,7 +63,7 @@ fn edited(ui: &mut TestUi, edits: &[(&str, [u8; 3])]) {
     }
 }
 
-/// The text of the panel in one line, without thumbnails.
+/// The panel's text in one line, without thumbnails.
 fn panel(ui: &mut TestUi) -> String {
     let panel = Layout::of(&ui.state).panel;
     let buffer = ui.screen();
@@ -76,21 +76,21 @@ fn panel(ui: &mut TestUi) -> String {
 }
 
 #[test]
-fn noise_of_a_finished_render_is_a_curve() {
+fn finished_render_has_a_noise_curve() {
     let mut ui = TestUi::with(state(120, 40));
     rendered(&mut ui, 0.01);
     let text = panel(&mut ui);
     assert!(text.contains(messages::NOISE_OVER_TIME), "{}", ui.text());
     let words = format!("10 % after 1.00 s, 0.95 % after 1 min 50 s; {}", messages::noise_target("1 %"));
     assert!(text.contains(&words), "{text}");
-    // The line is level: a row of equal dots from the axis to the edge.
+    // The target line is horizontal: a row of equal dots from the axis to the edge.
     let is_line = |line: &str| line.chars().filter(|c| ('⠁'..='⣿').contains(c)).count() >= 12;
     assert!(ui.text().lines().any(is_line), "{}", ui.text());
-    // Another exposure is the same render; a key that changes the light is not.
+    // Changing the exposure reuses the render and its curve, unlike changing the lighting.
     ui.press(']');
     let generation = ui.state.request.generation;
     ui.worker(protocol::Event::Started { generation });
-    assert!(!panel(&mut ui).contains(messages::NOISE_OVER_TIME), "during the render");
+    assert!(!panel(&mut ui).contains(messages::NOISE_OVER_TIME), "the curve is hidden during a render");
     let mut event = done(generation, Vec::new(), false);
     if let protocol::Event::Done { report, .. } = &mut event {
         report.stages[protocol::Stage::Render as usize].status = protocol::Status::Reused;
@@ -99,8 +99,8 @@ fn noise_of_a_finished_render_is_a_curve() {
     assert!(panel(&mut ui).contains(messages::NOISE_OVER_TIME), "{}", ui.text());
     ui.press('s');
     ui.finish(BLUE);
-    assert!(!panel(&mut ui).contains(messages::NOISE_OVER_TIME), "one point is not a curve");
-    // An image that is found again has its curve.
+    assert!(!panel(&mut ui).contains(messages::NOISE_OVER_TIME), "a single point is not drawn as a curve");
+    // An image that has been rendered before has its curve restored.
     ui.press('0');
     let generation = ui.state.request.generation;
     ui.worker(protocol::Event::Started { generation });
@@ -110,7 +110,7 @@ fn noise_of_a_finished_render_is_a_curve() {
     }
     ui.worker(event);
     assert!(panel(&mut ui).contains(messages::NOISE_OVER_TIME), "{}", ui.text());
-    // Without an `error`, there is no target line.
+    // Without a target `error`, there is no target line.
     let mut ui = TestUi::with(state(120, 40));
     rendered(&mut ui, 0.0);
     assert!(panel(&mut ui).contains("1 min 50 s") && !panel(&mut ui).contains("target:"));
@@ -132,8 +132,8 @@ fn history_lists_changes_and_opens_on_click() {
     ui.finish(RED);
     assert!(panel(&mut ui).contains("▸3 shadows hard"), "{}", ui.text());
     let all = cells_of(&mut ui, BLUE);
-    assert!(all > 5 && all < 100, "a thumbnail: {all}");
-    // The cell of the blue thumbnail.
+    assert!(all > 5 && all < 100, "expected a thumbnail: {all}");
+    // Find a cell of the blue thumbnail.
     let buffer = ui.screen();
     let blue = ratatui::style::Color::Rgb(BLUE[0], BLUE[1], BLUE[2]);
     let places = buffer.area.positions();
@@ -147,7 +147,7 @@ fn history_lists_changes_and_opens_on_click() {
     assert!(panel(&mut ui).contains("▸3") && cells_of(&mut ui, RED) > 500);
 }
 
-/// Saves the scene and starts its render, which shows a preview if there is a color.
+/// Saves the scene and starts its render. If there is a color, shows a preview in that color.
 fn start_render(ui: &mut TestUi, text: &str, color: Option<[u8; 3]>) {
     ui.event(Event::Changed(Changed { noticed: ui.now }));
     let generation = ui.state.request.generation;
@@ -170,7 +170,7 @@ fn show(ui: &mut TestUi, color: [u8; 3]) {
         source: None,
     };
     ui.event(picture);
-    // Its first bytes have been sent.
+    // The preview's first bytes have been sent.
     ui.event(Event::Shown { generation });
 }
 
@@ -194,7 +194,7 @@ fn preview_does_not_wait_for_the_history() {
     ui.state.dirty = false;
     ui.event(Event::Shown { generation });
     assert_eq!(ui.state.picture.history.len(), before + 1);
-    assert!(ui.state.dirty, "the history has a new entry");
+    assert!(ui.state.dirty, "the history should have a new entry");
 }
 
 /// Color of the newest thumbnail.
@@ -204,26 +204,26 @@ fn small_color(ui: &TestUi) -> [u8; 3] {
 }
 
 #[test]
-fn entry_gets_the_preview_after_the_end() {
+fn entry_shows_a_preview_drawn_after_the_end() {
     let mut ui = TestUi::with(state(120, 40));
     edited(&mut ui, &[("camera.fov = 40", RED)]);
     start_render(&mut ui, "camera.fov = 30", Some([0, 0, 0]));
     let generation = ui.state.request.generation;
-    // The last preview is taken from its slot when there is bandwidth for it.
+    // The last preview is taken from its slot only when bandwidth is available.
     ui.worker(done(generation, Vec::new(), false));
     ui.screen();
     show(&mut ui, BLUE);
     assert_eq!(small_color(&ui), BLUE);
-    assert!(ui.state.dirty, "the history is redrawn");
+    assert!(ui.state.dirty, "the history should be redrawn");
     assert!(panel(&mut ui).contains("▸2 camera.fov 40 → 30"), "{}", ui.text());
     assert_eq!(ui.state.picture.history.len(), 2);
-    // A preview that is shown already is not redrawn.
+    // A preview that is already shown is not redrawn.
     ui.event(Event::Shown { generation });
     assert!(!ui.state.dirty);
 }
 
 #[test]
-fn hidden_entry_gets_the_preview_after_the_end() {
+fn hidden_entry_shows_preview_drawn_after_end() {
     let mut ui = TestUi::with(state(120, 40));
     edited(&mut ui, &[("camera.fov = 40", RED)]);
     start_render(&mut ui, "camera.fov = 30", Some([0, 0, 0]));
@@ -233,11 +233,11 @@ fn hidden_entry_gets_the_preview_after_the_end() {
     ui.screen();
     show(&mut ui, BLUE);
     assert_eq!(small_color(&ui), BLUE);
-    assert!(ui.state.dirty, "the history is redrawn");
+    assert!(ui.state.dirty, "the history should be redrawn");
 }
 
 #[test]
-fn actual_pixels_are_not_a_thumbnail() {
+fn actual_pixels_are_not_used_as_a_thumbnail() {
     let mut ui = TestUi::with(state(120, 40));
     edited(&mut ui, &[("camera.fov = 40", RED), ("camera.fov = 30", BLUE)]);
     let (generation, picture) = (ui.state.request.generation, plain_picture(50, 38, RED));
@@ -258,8 +258,9 @@ fn running_render_is_the_newest_entry() {
         text.contains("▸2 camera.fov 40 → 30") && text.contains(&format!(" 1 {}", messages::OPENED)),
         "{text}"
     );
-    assert!(!text.contains(messages::STOPPED), "not stopped: {text}");
-    // The next save stops it. The stopped render stays without a number until the new one has a preview.
+    assert!(!text.contains(messages::STOPPED), "the render is still running: {text}");
+    // The next save stops the render. Its entry loses its number, which is reused for the new render as soon
+    // as that has a preview.
     start_render(&mut ui, "camera.fov = 20", None);
     let text = panel(&mut ui);
     assert!(text.contains(&format!("▸– {}: camera.fov", messages::STOPPED)) && !text.contains('2'), "{text}");
@@ -275,7 +276,7 @@ fn running_render_is_the_newest_entry() {
         assert_eq!(text.contains('▸'), text.contains("▸2") || keys == "b", "{keys}: {text}");
         assert_eq!(text.matches(messages::STOPPED).count(), 1, "{text}");
     }
-    // The running render is added even while an older one is shown.
+    // A running render is added even while an older one is being viewed.
     edited(&mut ui, &[]);
     let generation = ui.state.request.generation;
     ui.worker(done(generation, Vec::new(), false));
@@ -290,7 +291,7 @@ fn running_render_is_the_newest_entry() {
 }
 
 #[test]
-fn moving_camera_is_one_entry() {
+fn moving_the_camera_adds_a_single_entry() {
     let mut ui = TestUi::with(state(120, 40));
     edited(&mut ui, &[("camera.fov = 40", RED)]);
     for step in 0..5 {
@@ -309,7 +310,7 @@ fn moving_camera_is_one_entry() {
 fn unchanged_image_keeps_its_curve() {
     let mut ui = TestUi::with(state(120, 40));
     rendered(&mut ui, 0.01);
-    // A typo that is fixed again: the image is unchanged.
+    // A typo is introduced and fixed, so the image is unchanged.
     ui.event(Event::Changed(Changed { noticed: ui.now }));
     ui.fail(vec![diagnostic(crate::scene::diagnostic::Severity::Error, "wrong")]);
     ui.event(Event::Settled);
@@ -326,7 +327,7 @@ fn unchanged_image_keeps_its_curve() {
 }
 
 #[test]
-fn numbers_stay_with_their_units() {
+fn numbers_are_not_separated_from_their_units() {
     for columns in 120..200 {
         let mut ui = TestUi::with(state(columns, 40));
         rendered(&mut ui, 0.01);
@@ -344,8 +345,8 @@ fn numbers_stay_with_their_units() {
 }
 
 #[test]
-fn diagnostics_do_not_cover_only_the_heading() {
-    // A panel too narrow for diagnostics, one too low for them, and one that holds them.
+fn history_heading_is_not_shown_without_entries() {
+    // The panel is too narrow for diagnostics, then not tall enough, then large enough.
     for (width, height) in [(640, 400), (640, 320), (640, 480)] {
         let mut ui = TestUi::with(state(200, 60));
         ui.state.request.effective = Some(Effective { width, height, ..settings() });
@@ -383,9 +384,9 @@ fn diagnostics_do_not_cover_only_the_heading() {
     }
 }
 
-/// In every window and with every kind of preview, delayed text is inside the panel.
+/// At every window size and with every kind of preview, delayed text must stay inside the panel.
 #[test]
-fn side_panel_fits_into_every_window() {
+fn side_panel_fits_every_window_size() {
     let kinds = [
         (PreviewKind::HalfBlock, ColorDepth::TrueColor),
         (PreviewKind::Octant, ColorDepth::Indexed256),
@@ -457,7 +458,7 @@ fn written_files_are_hyperlinks() {
     }
 }
 
-/// Ends a render after this many seconds. Returns what is sent after the preview.
+/// Finishes a render after this many seconds. Returns the bytes sent after the preview.
 fn notification(seconds: u64, prepare: impl Fn(&mut TestUi)) -> Option<String> {
     let mut ui = TestUi::new();
     ui.state.display.capabilities = TerminalId { brand: Brand::Kitty, version: [0, 40] }.capabilities();
@@ -471,7 +472,7 @@ fn notification(seconds: u64, prepare: impl Fn(&mut TestUi)) -> Option<String> {
 }
 
 #[test]
-fn end_of_a_long_render_is_notified() {
+fn long_renders_send_a_notification_at_the_end() {
     let focus = |is_here| {
         move |ui: &mut TestUi| drop(ui.event(Event::TerminalReply(TerminalReply::Focus { is_here })))
     };
@@ -479,9 +480,9 @@ fn end_of_a_long_render_is_notified() {
     assert_eq!(notification(31, focus(false)).as_deref(), Some(words));
     assert_eq!(notification(30, focus(false)), None);
     assert_eq!(notification(31, focus(true)), None);
-    assert_eq!(notification(31, |_| {}), None, "the terminal never reported a loss of focus");
+    assert_eq!(notification(31, |_| {}), None, "the terminal has not reported a loss of focus");
     assert_eq!(notification(31, |ui| ui.state.display.has_focus = true), None);
-    // A pause does not count.
+    // Pauses are not counted.
     let held = |ui: &mut TestUi| {
         focus(false)(ui);
         ui.key(KeyPress::plain(' '));

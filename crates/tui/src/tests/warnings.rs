@@ -19,7 +19,7 @@ fn warnings_are_counted_and_shown_on_demand() {
 }
 
 #[test]
-fn warnings_are_counted_in_one_place() {
+fn warnings_are_counted_in_only_one_place() {
     for (columns, rows) in [(60, 20), (80, 24), (120, 40), (200, 60)] {
         let mut ui = TestUi::with(state(columns, rows));
         ui.worker(done(1, vec![diagnostic(Severity::Warning, "odd")], false));
@@ -43,7 +43,7 @@ fn warnings_are_shown_during_the_render() {
     assert!(ui.text().contains("warning: unused `b`"), "{}", ui.text());
     ui.event(Event::Changed(Changed { noticed: ui.now }));
     ui.worker(protocol::Event::Warnings { generation: 2, warnings: Vec::new() });
-    assert!(!ui.text().contains("unused"), "no warnings left: {}", ui.text());
+    assert!(!ui.text().contains("unused"), "expected no more warnings: {}", ui.text());
     ui.press('e');
     assert!(ui.text().contains(messages::NO_DIAGNOSTICS), "{}", ui.text());
 }

@@ -1,4 +1,4 @@
-//! Wording that confused new users.
+//! Regression tests for text that confused new users.
 
 use crossterm::event::KeyCode;
 
@@ -18,7 +18,7 @@ fn last_line(ui: &mut TestUi) -> String {
 }
 
 #[test]
-fn click_is_answered_while_warnings_are_open() {
+fn click_result_is_shown_with_warnings_open() {
     let mut ui = TestUi::with(state(140, 40));
     ui.finish(RED);
     ui.worker(done(1, vec![diagnostic(Severity::Warning, "a warning")], false));
@@ -48,7 +48,7 @@ fn reset_lists_all_changes_once() {
 }
 
 #[test]
-fn photon_view_without_photons_has_a_hint() {
+fn photon_view_without_photons_shows_a_hint() {
     let mut ui = TestUi::new();
     ui.finish(RED);
     for key in ['v', '/'].into_iter().chain("photons".chars()) {
@@ -67,7 +67,7 @@ fn image_keys_are_hidden_without_a_preview() {
 }
 
 #[test]
-fn resume_message_disappears_at_the_end() {
+fn resume_message_disappears_after_the_render() {
     let mut ui = TestUi::new();
     let news = CheckpointNews::Resumed { path: "cornell.png.checkpoint".into(), samples: 16 };
     ui.worker(protocol::Event::Checkpoint { generation: 1, news });
@@ -77,7 +77,7 @@ fn resume_message_disappears_at_the_end() {
 }
 
 #[test]
-fn first_render_is_not_called_again() {
+fn first_render_hint_does_not_say_again() {
     let mut ui = TestUi::with(state(120, 40));
     ui.fail(vec![diagnostic(Severity::Error, "unknown key `heigth`")]);
     assert!(!ui.text().contains("render again"), "{}", ui.text());
@@ -87,7 +87,7 @@ fn first_render_is_not_called_again() {
 }
 
 #[test]
-fn name_has_room_in_every_small_window() {
+fn scene_name_is_visible_in_small_windows() {
     for columns in 26..60 {
         let mut ui = TestUi::with(state(columns, 8));
         ui.finish(RED);
@@ -96,7 +96,7 @@ fn name_has_room_in_every_small_window() {
 }
 
 #[test]
-fn reason_beside_its_stage_is_not_wrapped() {
+fn stage_reason_in_a_wide_panel_is_not_wrapped() {
     let mut ui = TestUi::with(state(200, 60));
     ui.finish(RED);
     ui.press('r');
@@ -108,9 +108,9 @@ fn reason_beside_its_stage_is_not_wrapped() {
     assert!(ui.text().contains("skipped  unneeded"), "{}", ui.text());
 }
 
-/// Otherwise it would float at the right of an empty screen.
+/// The hint must not be shown at the right edge of an empty screen.
 #[test]
-fn save_hint_is_complete_on_its_line() {
+fn save_hint_is_on_a_line_of_its_own() {
     for (columns, rows) in [(80, 24), (100, 30), (120, 40), (200, 60)] {
         let mut ui = TestUi::with(state(columns, rows));
         ui.fail(vec![diagnostic(Severity::Error, "unknown key `heigth`")]);

@@ -1,5 +1,5 @@
-//! Camera keys and mouse gestures. Steps arrive faster than previews, so a step waits until the previous one
-//! has its first preview, and only the newest waiting step is rendered.
+//! Camera keys and mouse gestures. Steps can arrive faster than previews, so each step waits until the
+//! previous one has a preview. Only the newest waiting step is rendered.
 
 use std::path::PathBuf;
 
@@ -15,31 +15,31 @@ use crate::scene::is_mesh;
 use crate::scene::sanitize::visible;
 use crate::state::{State, format_stops};
 
-/// Degrees per orbit step.
+/// Angle of an orbit step in degrees.
 const TURN: f64 = 3.0;
-/// Factor of the distance per dolly step.
+/// Factor by which a dolly step changes the distance.
 const NEARER: f64 = 0.95;
-/// Factor of the field of view per zoom step.
+/// Factor by which a zoom step changes the field of view.
 const WIDER: f64 = 1.05;
-/// Maximum deviation from the original field of view that counts as equal, since every step is rounded. Steps
-/// are larger.
+/// Maximum difference from the original field of view that is considered equal. Needed because each step is
+/// rounded. Steps are larger than this.
 const ROUNDING: f64 = 0.015;
-/// Stops per exposure step.
+/// Size of an exposure step in stops.
 const STOPS: f32 = 0.25;
-/// Exposure limit in stops, in both directions.
+/// Limit of the exposure in stops, in either direction.
 const MAX_STOPS: f32 = 20.0;
 
-/// Orbits by a number of steps to the right and up.
+/// Orbits the camera to the right and up, by the given numbers of steps.
 pub(super) fn orbit(state: &mut State, right: f64, up: f64) -> Vec<Effect> {
     orbit_by(state, right * TURN, up * TURN)
 }
 
-/// Orbits by an angle in degrees to the right and up.
+/// Orbits the camera to the right and up, by angles in degrees.
 pub(super) fn orbit_by(state: &mut State, right: f64, up: f64) -> Vec<Effect> {
     move_camera(state, |pose| orbited(pose, right, up))
 }
 
-/// Moves closer by a number of steps.
+/// Moves the camera closer by a number of steps.
 pub(super) fn dolly(state: &mut State, steps: f64) -> Vec<Effect> {
     let Some((view, own)) = state.request.viewpoint().zip(state.request.camera) else {
         return unknown(state);
@@ -62,7 +62,7 @@ pub(super) fn zoom(state: &mut State, steps: f64) -> Vec<Effect> {
     camera_step(state)
 }
 
-/// Raises the exposure by a number of steps.
+/// Increases the exposure by a number of steps.
 pub(super) fn change_exposure(state: &mut State, steps: f32) -> Vec<Effect> {
     let Some(scene) = state.request.exposure else { return unknown(state) };
     let own = state.request.command_line.exposure.unwrap_or(scene);
@@ -97,7 +97,7 @@ pub(super) fn camera_step(state: &mut State) -> Vec<Effect> {
     effects
 }
 
-/// Drops changes that restore the scene's own values.
+/// Drops camera changes that are equal to the scene's own values.
 fn drop_restored_values(state: &mut State) {
     let Some(own) = state.request.camera else { return };
     let camera = &mut state.request.toggles.camera;
@@ -107,20 +107,20 @@ fn drop_restored_values(state: &mut State) {
     camera.focus = camera.focus.filter(|focus| *focus != own.changed(&pose).focus);
 }
 
-/// Requests that the current camera is written into the scene file.
+/// Asks the worker to write the current camera into the scene file.
 pub(super) fn keep(state: &mut State) -> Vec<Effect> {
     let Some((camera, own)) = state.request.viewpoint().zip(state.request.camera) else {
         return unknown(state);
     };
     let is_set = state.request.command_line.sets.iter().any(|set| set.trim_start().starts_with("camera"));
-    // For a model, `c` writes a scene even with the default camera.
+    // For models, `c` writes a new scene file, even with the default camera.
     if !state.request.toggles.camera.is_any() && !is_set && !is_mesh(&state.request.scene) {
         return notify(state, messages::NOTHING_TO_KEEP);
     }
     let saved = state.request.saved_since_moved();
-    // Models do not contain a saved camera.
+    // Models do not contain a camera that could be overwritten.
     if !saved.is_empty() && !is_mesh(&state.request.scene) {
-        // From here on the user knows about the save.
+        // The user is told about the saved values now, so they no longer cause a conflict.
         state.request.move_from_own();
         let saved = saved.join(", ");
         return prompt(state, &format!("error: {saved} {}", messages::CAMERA_CONFLICT));
@@ -129,7 +129,8 @@ pub(super) fn keep(state: &mut State) -> Vec<Effect> {
     vec![Effect::Send(Command::KeepCamera(MovedCamera { camera, own }))]
 }
 
-/// Handles the outcome of keeping the camera. A camera that is now in the file no longer counts as moved.
+/// Handles the result of writing the camera. If the scene now uses this camera, it is no longer treated as
+/// moved.
 pub(super) fn kept(state: &mut State, outcome: Result<KeptCamera, String>) -> Vec<Effect> {
     let KeptCamera { path, is_new, is_own, of_model, edit } = match outcome {
         Ok(kept) => kept,
@@ -164,7 +165,7 @@ pub(super) fn kept(state: &mut State, outcome: Result<KeptCamera, String>) -> Ve
     effects
 }
 
-/// Requests that the last camera written into the scene file is undone.
+/// Asks the worker to undo the last camera written into the scene file.
 pub(super) fn undo(state: &mut State) -> Vec<Effect> {
     match state.saving.camera_edits.last() {
         Some(edit) => vec![Effect::Send(Command::UndoCamera(edit.clone()))],
@@ -173,7 +174,7 @@ pub(super) fn undo(state: &mut State) -> Vec<Effect> {
     }
 }
 
-/// Handles the outcome of undoing a kept camera.
+/// Handles the result of undoing a written camera.
 pub(super) fn undone(state: &mut State, outcome: Result<PathBuf, String>) -> Vec<Effect> {
     let path = match outcome {
         Ok(path) => path,
@@ -191,7 +192,7 @@ pub(super) fn undone(state: &mut State, outcome: Result<PathBuf, String>) -> Vec
     effects
 }
 
-/// Renders the newest step now, or once the previous one has a preview.
+/// Renders the newest step immediately if the previous one has a preview. Otherwise the step waits.
 fn step(state: &mut State) -> Vec<Effect> {
     state.dirty = true;
     if state.awaits_step() {
@@ -203,7 +204,7 @@ fn step(state: &mut State) -> Vec<Effect> {
     effects
 }
 
-/// Renders a waiting step if the previous one has a preview.
+/// Renders the waiting step if the previous one has a preview.
 pub(super) fn render_waiting_step(state: &mut State) -> Vec<Effect> {
     if state.request.camera_step.is_waiting && !state.awaits_step() { step(state) } else { Vec::new() }
 }

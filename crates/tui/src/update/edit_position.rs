@@ -1,10 +1,11 @@
-//! The position that the editor opens.
+//! The position to open in the editor.
 
 use crate::event::FilePosition;
 use crate::scene::diagnostic::{Diagnostic, SourceSpan};
 use crate::state::State;
 
-/// The first error, else the clicked object, else the first warning, else the scene.
+/// Position of the first error. If there is none, the clicked object, the first warning or the start of the
+/// scene.
 pub(super) fn to_edit(state: &State) -> FilePosition {
     let errors = state.overlays.problems.iter().flat_map(|problems| &problems.diagnostics).find_map(in_file);
     let warnings = || state.overlays.warnings.iter().find_map(in_file);
@@ -12,7 +13,7 @@ pub(super) fn to_edit(state: &State) -> FilePosition {
     errors.or_else(|| state.selection.picked.clone()).or_else(warnings).unwrap_or_else(scene)
 }
 
-/// Position of a diagnostic, if it refers to a file.
+/// A diagnostic's position, if it refers to a file.
 fn in_file(diagnostic: &Diagnostic) -> Option<FilePosition> {
     let SourceSpan { source, span, .. } = diagnostic.place.as_ref()?;
     let before = source.get(..span.start)?;
@@ -20,7 +21,7 @@ fn in_file(diagnostic: &Diagnostic) -> Option<FilePosition> {
     let line = before.matches('\n').count() + 1;
     let column = before.get(start..)?.chars().count() + 1;
     let path = diagnostic.path.clone();
-    // Settings from the command line are not in a file.
+    // Settings from the command line have no position in a file.
     (!path.as_os_str().is_empty() && path.as_os_str() != "--set").then_some(FilePosition {
         path,
         line,

@@ -1,4 +1,4 @@
-//! The history: older and newer renders, and the one before the last edit.
+//! The history: browsing renders, and comparing with the render before the last edit.
 
 use std::sync::Arc;
 
@@ -7,7 +7,7 @@ use crate::event::Effect;
 use crate::messages;
 use crate::state::{Rendering, State};
 
-/// Moves the current image into the history.
+/// Adds the current image to the history.
 pub(super) fn record(state: &mut State) {
     if let Some(shown) = newest(state).filter(|shown| shown.generation == state.request.generation) {
         let is_finished = state.work.rendering == Rendering::Finished || shown.is_finished();
@@ -16,8 +16,8 @@ pub(super) fn record(state: &mut State) {
     }
 }
 
-/// Records a new image of the newest request, even while an older one is shown. The last one often arrives
-/// after its render has ended. A 1:1 section never replaces a finished image.
+/// Records a new image of the newest request, even if an older one is being viewed. The last image often
+/// arrives after the render has ended. A section shown 1:1 never replaces a finished image.
 pub(super) fn record_newest(state: &mut State) {
     let is_over = !state.work.is_under_way();
     if is_over && newest(state).is_some_and(|shown| shown.section.is_some()) {
@@ -31,7 +31,7 @@ pub(super) fn record_newest(state: &mut State) {
     state.dirty |= is_new || is_over && is_other;
 }
 
-/// Moves back by `steps` renders, or forward if negative.
+/// Moves back by `steps` renders, or forward if `steps` is negative.
 pub(super) fn browse(state: &mut State, steps: isize) -> Vec<Effect> {
     record(state);
     let Some(newest) = newest(state) else { return notify(state, messages::NO_IMAGE) };
@@ -44,7 +44,7 @@ pub(super) fn browse(state: &mut State, steps: isize) -> Vec<Effect> {
     }
 }
 
-/// Opens a render of the history strip.
+/// Opens a render from the history strip.
 pub(super) fn open_at(state: &mut State, at: usize) -> Vec<Effect> {
     record(state);
     let Some(newest) = newest(state) else { return Vec::new() };
@@ -57,7 +57,7 @@ pub(super) fn open_at(state: &mut State, at: usize) -> Vec<Effect> {
     }
 }
 
-/// Shows the render before the last edit, or the newest one again.
+/// Shows the render before the last edit or returns to the newest one.
 pub(super) fn before_and_after(state: &mut State) -> Vec<Effect> {
     if state.picture.history.is_open() {
         return close(state, messages::AFTER_EDIT);
@@ -91,7 +91,7 @@ fn newest(state: &State) -> Option<crate::history::ShownImage> {
 
 fn show_image(state: &mut State, shown: crate::history::ShownImage) -> Vec<Effect> {
     state.picture.shown = Some(shown);
-    // The header shows which render it is and how old.
+    // The header shows the render's number and age.
     let keys = &messages::HISTORY_KEYS[usize::from(state.picture.history.is_oldest_open())..];
     let words = [&[&*state.picture.history.reason_of_open()], keys].concat().join(" · ");
     show_until_key(state, words);

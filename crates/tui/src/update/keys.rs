@@ -89,7 +89,7 @@ fn change(state: &mut State, how: impl FnOnce(&mut State)) -> Vec<Effect> {
     Vec::new()
 }
 
-/// Whether a setting differs from the one without keys.
+/// Whether a setting differs from its value without changes made with keys.
 fn is_change<T: PartialEq>(next: &T, base: Option<T>) -> bool {
     base.is_none_or(|base| *next != base)
 }
@@ -102,7 +102,7 @@ fn cycle_integrator(state: &mut State) -> Vec<Effect> {
     render(state, false)
 }
 
-/// Name of an integrator that supports a setting. `None` if the current one does.
+/// Name of an integrator that supports a setting. `None` if the current one supports it.
 fn other_integrator(state: &State, supports: impl Fn(Method) -> bool) -> Option<&'static str> {
     if supports(state.request.integrator().method()) {
         return None;
@@ -123,7 +123,7 @@ fn cycle_shadows(state: &mut State) -> Vec<Effect> {
     render(state, false)
 }
 
-/// If the lens is open and nothing turned depth of field off, the camera is a pinhole.
+/// If depth of field is off although no setting turned it off, the camera is a pinhole.
 fn toggle_depth_of_field(state: &mut State) -> Vec<Effect> {
     let switched_off = state.request.overrides().dof == Some(false);
     match &state.request.effective {
@@ -133,7 +133,7 @@ fn toggle_depth_of_field(state: &mut State) -> Vec<Effect> {
         }
         Some(_) => {}
     }
-    // Unless it is turned off, the lens decides.
+    // Unless depth of field is turned off, it depends on the lens.
     let base = state.request.command_line.dof.or(Some(true));
     state.request.toggles.dof = Some(switched_off).filter(|next| is_change(next, base));
     render(state, false)
@@ -168,7 +168,7 @@ fn show_image_only(state: &mut State) -> Vec<Effect> {
     resized_preview(state)
 }
 
-/// Shows actual pixels around the crosshair, or the whole image again.
+/// Toggles between actual pixels around the crosshair and the whole image.
 fn close_up(state: &mut State) -> Vec<Effect> {
     if state.request.preview_size.is_none() {
         return notify(state, messages::NO_PREVIEW);

@@ -1,4 +1,4 @@
-//! The update function: state and event in, effects out. It has no side effects.
+//! The update function, which modifies the state and returns effects. It has no side effects of its own.
 
 mod camera;
 mod edit_position;
@@ -29,7 +29,7 @@ use super::view::layout::Layout;
 use crate::film::Picture;
 use crate::pipeline::protocol::{Command, OwnState};
 
-/// Time that the window size must be stable before a new preview is requested.
+/// How long the window size must be unchanged before a new preview is requested.
 const RESIZE_QUIET: Duration = Duration::from_millis(60);
 
 /// Creates the first request.
@@ -56,7 +56,7 @@ fn handle(state: &mut State, event: Event) -> Vec<Effect> {
     match event {
         Event::Key(key) => keys::update(state, key),
         Event::Mouse(mouse) => pointer::update(state, mouse),
-        // Pasted text has no meaning. The event loop handles the others.
+        // Pasted text is ignored. The other events are handled by the event loop.
         Event::Paste | Event::Written { .. } | Event::Unwritable(_) => Vec::new(),
         Event::TerminalReply(answer) => replies::handle_reply(state, answer),
         Event::Frame(report) => {
@@ -70,7 +70,8 @@ fn handle(state: &mut State, event: Event) -> Vec<Effect> {
             show(state, ShownImage { generation, picture, range, section, lacks_photons, source })
         }
         Event::Changed(Changed { noticed }) => {
-            // The change may come from glimt itself, or may have prevented glimt's own. Keep that message.
+            // If glimt caused the change by writing the camera, or refused to write it because of the change,
+            // a message about that is shown. Keep it.
             const OWN: Duration = Duration::from_secs(1);
             let is_of = |said: Option<Instant>| said.is_some_and(|said| state.now <= said + OWN);
             let (is_own, is_known) = (is_of(state.saving.camera_kept), is_of(state.saving.camera_refused));
@@ -88,7 +89,7 @@ fn handle(state: &mut State, event: Event) -> Vec<Effect> {
             state.saving.saved_at = state.request.generation;
             state.saving.own = OwnImage { state: OwnState::NotBegun, fraction: 0.0 };
             state.saving.last_edit = (!is_own).then_some(state.request.generation);
-            // A save made in the editor can be seen only after the editor has exited.
+            // A change saved from the editor is visible only after the editor has exited.
             let noticed = state.saving.editor_closed.map_or(noticed, |back| noticed.max(back));
             state.saving.change = Some(PendingChange { generation: state.request.generation, noticed });
             effects
@@ -100,7 +101,7 @@ fn handle(state: &mut State, event: Event) -> Vec<Effect> {
         Event::Output(change) => worker::output_changed(state, &change),
         Event::Signal(signal) => vec![effect_of_signal(signal)],
         Event::Shown { generation } => {
-            // Show the preview first, then update the history.
+            // The preview has been sent, so now update the history.
             history::record_newest(state);
             handle_first_change(state, generation)
         }
@@ -142,8 +143,8 @@ fn show(state: &mut State, shown: ShownImage) -> Vec<Effect> {
     Vec::new()
 }
 
-/// Keeps the colors of pixels that differ from the last preview by at most one code. With dithering, such a
-/// difference could change the pattern.
+/// Keeps the old colors of pixels that differ from the last preview by no more than one code value, since
+/// even such a small difference could change the dither pattern.
 fn with_stable_colors(mut shown: ShownImage, last: &ShownImage) -> ShownImage {
     const MAX_DIFFERENCE: u8 = 1;
     let what = |shown: &ShownImage| (shown.picture.width, shown.picture.height, shown.section);

@@ -5,16 +5,16 @@ use std::time::Duration;
 use crate::event::Effect;
 use crate::state::{Message, State};
 
-/// Duration of a notice.
+/// How long a notice is shown.
 const NOTICE: Duration = Duration::from_secs(4);
 
-/// Shows a notice until the next key, for at most four seconds.
+/// Shows a notice for four seconds or until a key is pressed.
 pub(crate) fn show_notice(state: &mut State, words: impl Into<String>) {
     let until = Some(state.now + NOTICE);
     show(state, Message { words: words.into(), until });
 }
 
-/// Shows an error or a prompt until the next key.
+/// Shows an error or prompt until a key is pressed.
 pub(super) fn show_until_key(state: &mut State, words: impl Into<String>) {
     show(state, Message { words: words.into(), until: None });
 }
@@ -24,13 +24,13 @@ fn show(state: &mut State, message: Message) {
     state.dirty = true;
 }
 
-/// Shows a notice; returns no effects.
+/// Shows a notice. Returns no effects.
 pub(super) fn notify(state: &mut State, words: &str) -> Vec<Effect> {
     show_notice(state, words);
     Vec::new()
 }
 
-/// Shows a message until the next key; returns no effects.
+/// Shows a message until a key is pressed. Returns no effects.
 pub(super) fn prompt(state: &mut State, words: &str) -> Vec<Effect> {
     show_until_key(state, words);
     Vec::new()

@@ -1,4 +1,4 @@
-//! Keys of the overlays: help, list of views, diagnostics.
+//! Keys of the overlays: help, view list, diagnostics.
 
 use crossterm::event::KeyCode;
 
@@ -12,7 +12,7 @@ use crate::pipeline::settings::View;
 use crate::state::State;
 use crate::view::{diagnostics, help};
 
-/// Handles a key. `None` if no open overlay uses it.
+/// Handles a key. `None` if it is not used by an open overlay.
 pub(super) fn update(state: &mut State, key: KeyPress) -> Option<Vec<Effect>> {
     if let Some(effects) = views::handle_search_key(state, key) {
         return Some(effects);
@@ -28,7 +28,7 @@ pub(super) fn update(state: &mut State, key: KeyPress) -> Option<Vec<Effect>> {
     act(state, action).then(Vec::new)
 }
 
-/// Whether an open overlay uses the action.
+/// Performs the action if an open overlay uses it. Returns whether one did.
 pub(super) fn act(state: &mut State, action: OverlayAction) -> bool {
     match action {
         OverlayAction::Close => close(state),
@@ -36,7 +36,7 @@ pub(super) fn act(state: &mut State, action: OverlayAction) -> bool {
         OverlayAction::LineDown => scroll(state, |line, _| line + 1),
         OverlayAction::PageUp => scroll(state, |line, page| line.saturating_sub(page)),
         OverlayAction::PageDown => scroll(state, |line, page| line + page),
-        // Only the list of views uses these.
+        // Used only by the view list.
         OverlayAction::ColumnLeft
         | OverlayAction::ColumnRight
         | OverlayAction::Take
@@ -44,15 +44,15 @@ pub(super) fn act(state: &mut State, action: OverlayAction) -> bool {
     }
 }
 
-/// The view of a digit while the list of views is open.
+/// The view selected by a digit while the view list is open.
 fn view_of_digit(state: &State, key: KeyPress) -> Option<View> {
     let KeyCode::Char(digit @ '1'..='9') = key.code else { return None };
     state.overlays.views.as_ref().filter(|_| key.modifiers.is_empty())?;
     View::ALL.get(digit.to_digit(10)? as usize - 1).copied()
 }
 
-/// Closes the topmost overlay: panes first, then waiting for a click or a drag, then the inspected values,
-/// then an older render.
+/// Closes or cancels the topmost item, in this order: panes, waiting for a click or drag, inspected values,
+/// an older render.
 fn close(state: &mut State) -> bool {
     let is_open = if state.overlays.help.open {
         state.overlays.help.open = false;
@@ -78,7 +78,8 @@ fn close(state: &mut State) -> bool {
     is_open
 }
 
-/// Scrolls the help or a pane of diagnostics that does not fit. Otherwise the keys keep their usual meaning.
+/// Scrolls the help, or the diagnostics pane if its content does not fit. Otherwise the keys have their usual
+/// function.
 fn scroll(state: &mut State, step: impl FnOnce(usize, usize) -> usize) -> bool {
     let (is_help, (page, last)) = match () {
         () if state.overlays.help.open => (true, help::extent(state)),

@@ -1,4 +1,4 @@
-//! The mouse and queries about a position in the image.
+//! The mouse, and queries about image positions.
 
 use super::notices::{notify, prompt, show_notice};
 use super::{camera, history, overlay, region};
@@ -16,7 +16,7 @@ use crate::view::layout::Layout;
 use crate::view::preview::spot_at;
 use crate::window_title;
 
-/// Degrees per drag across the width of the preview.
+/// Rotation in degrees when dragging across the width of the preview.
 const TURN_ACROSS: f64 = 180.0;
 
 /// Handles a mouse event.
@@ -98,7 +98,7 @@ pub(super) fn inspect(state: &mut State) -> Vec<Effect> {
     ask(state, PickPurpose::Inspect)
 }
 
-/// Waits for a click; pressed again, focuses at the crosshair.
+/// Waits for a click. If already waiting, focuses at the crosshair.
 pub(super) fn focus(state: &mut State) -> Vec<Effect> {
     if state.picture.history.is_open() {
         return notify(state, messages::OLDER_RENDER);
@@ -136,7 +136,7 @@ pub(super) fn toggle_mouse(state: &mut State) -> Vec<Effect> {
 
 /// Handles the reply to a pick query.
 pub(super) fn picked(state: &mut State, picked: &Picked) -> Vec<Effect> {
-    // An older render has been opened in the meantime.
+    // An older render was opened after the click.
     if state.picture.history.is_open() {
         return Vec::new();
     }
@@ -162,7 +162,7 @@ fn focus_at(state: &mut State, depth: f64) -> Vec<Effect> {
     if !(distance > 0.0) {
         return notify(state, messages::NOTHING_TO_FOCUS);
     }
-    // The scene may have been edited in the meantime.
+    // The scene may have been edited after the click.
     if state.request.viewpoint().is_none_or(|view| view.aperture == 0.0) {
         return notify(state, messages::PINHOLE);
     }
@@ -174,7 +174,7 @@ fn focus_at(state: &mut State, depth: f64) -> Vec<Effect> {
     effects
 }
 
-/// The inspected values in one line, with the pixel.
+/// The inspected values and the pixel position, in one line.
 fn values_with_pixel(Picked { thing, pixel: [x, y], .. }: &Picked, facts: &[String]) -> String {
     let pixel = thing.as_ref().map_or(String::new(), |_| format!(" · pixel {x}, {y}"));
     facts.join(" · ") + &pixel
@@ -189,14 +189,14 @@ pub(super) fn copy(state: &mut State) -> Vec<Effect> {
         return notify(state, messages::NOTHING_TO_COPY);
     };
     if !state.display.capabilities.clipboard {
-        // The message shows the text so that it can be selected.
+        // The message contains the text so that the user can select it.
         return notify(state, &format!("{} {clicked}", messages::SELECT_TO_COPY));
     }
     show_notice(state, format!("{} {clicked}", messages::COPIED));
     vec![Effect::Aside(window_title::copy(&clicked))]
 }
 
-/// Shape and name, line, material, distance, position, radiance, normal.
+/// Shape and name, line, material, distance, position, radiance and normal.
 fn facts(Picked { thing, color, pixel: [x, y] }: &Picked) -> Vec<String> {
     let light = color.map(|color| format!("radiance {}", numbers(color.map(f64::from))));
     let Some(thing) = thing else {
@@ -207,7 +207,7 @@ fn facts(Picked { thing, color, pixel: [x, y] }: &Picked) -> Vec<String> {
     let file = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
     let back = if *is_front { "" } else { " (back)" };
     let mut facts = vec![format!("{shape}{name}")];
-    // The lines of a generated scene are not in a file.
+    // The lines of a generated scene do not exist in a file.
     facts.extend((!is_mesh(path)).then(|| format!("{}:{line}", visible(&file))));
     facts.extend([
         visible(material).into_owned(),
@@ -223,7 +223,7 @@ fn numbers(all: [f64; 3]) -> String {
     format!("({})", all.map(number).join(", "))
 }
 
-/// Formats a number with three digits, or all digits before the point.
+/// Formats a number with three significant digits, or with all digits before the decimal point.
 fn number(number: f64) -> String {
     let digits = if number == 0.0 { 0.0 } else { 2.0 - libm::floor(libm::log10(number.abs())) };
     rounded(number, libm::pow(10.0, -digits.clamp(0.0, 3.0))).to_string()
@@ -234,7 +234,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn inspected_values_are_short() {
+    fn inspected_values_are_formatted_concisely() {
         let thing = PickedObject {
             shape: "sphere",
             name: Some("ball".to_owned()),
@@ -263,7 +263,7 @@ mod tests {
         let of_model =
             picked.thing.clone().map(|thing| PickedObject { path: "scenes/vase.obj".into(), ..thing });
         let of_model = facts(&Picked { thing: of_model, ..picked });
-        assert_eq!(of_model[..2], ["sphere \"ball\"", "glass crystal"], "models have no lines");
+        assert_eq!(of_model[..2], ["sphere \"ball\"", "glass crystal"], "models should have no line numbers");
         assert_eq!(facts(&Picked { thing: None, color: None, ..picked }), ["nothing at pixel 3, 4"]);
     }
 }

@@ -1,4 +1,4 @@
-//! The region of the image that is rendered first.
+//! The image region to render first.
 
 use super::notices::{prompt, show_notice};
 use super::request::render;
@@ -7,11 +7,11 @@ use crate::messages;
 use crate::pipeline::protocol::{ImagePosition, Section};
 use crate::state::State;
 
-/// Width and height of a region around a position.
+/// Width and height of a region around a position, as fractions of the image.
 const SIDE: f64 = 1.0 / 3.0;
 
-/// Handles the key: waits for a drag; pressed again, takes the region around the crosshair; pressed once
-/// more, clears it.
+/// Handles the key. The first press waits for a drag, the second selects the region around the crosshair, and
+/// the third clears the region.
 pub(super) fn press(state: &mut State) -> Vec<Effect> {
     if state.request.first_section.take().is_some() {
         (state.selection.is_marking, state.selection.press) = (false, None);
@@ -26,7 +26,7 @@ pub(super) fn press(state: &mut State) -> Vec<Effect> {
     take(state, around(state.selection.crosshair))
 }
 
-/// Stops waiting for a drag and cancels one in progress.
+/// Stops waiting for a drag, cancelling any drag in progress.
 pub(super) fn leave(state: &mut State) {
     if std::mem::take(&mut state.selection.is_marking) {
         (state.request.first_section, state.selection.press) = (None, None);
@@ -39,7 +39,7 @@ pub(super) fn drag(state: &mut State, from: ImagePosition, to: ImagePosition) {
     state.dirty = true;
 }
 
-/// Ends a drag with the marked region, or one around the position.
+/// Ends the drag and uses the selected region, or a region around the position if there was no drag.
 pub(super) fn release(state: &mut State, spot: Option<ImagePosition>) -> Vec<Effect> {
     match (state.request.first_section, spot) {
         (Some(marked), _) => take(state, marked),
@@ -62,7 +62,7 @@ fn take(state: &mut State, section: Section) -> Vec<Effect> {
     effects
 }
 
-/// Restarts the running render with another order; it keeps its samples.
+/// Restarts a running render to change the order of rendering. Samples are kept.
 fn again(state: &mut State) -> Vec<Effect> {
     state.dirty = true;
     if state.work.is_running() && !state.work.paused { render(state, false) } else { Vec::new() }

@@ -1,4 +1,4 @@
-//! Handles terminal replies about its capabilities.
+//! Handles terminal replies that report capabilities.
 
 use super::notices::show_until_key;
 use super::request::resized_preview;
@@ -13,7 +13,7 @@ use crate::terminal_replies::TerminalReply;
 use crate::terminals::TerminalId;
 use crate::view::ramp;
 
-/// Uses newly confirmed capabilities, if they were queried.
+/// Enables newly confirmed capabilities if they were queried.
 pub(super) fn handle_reply(state: &mut State, answer: TerminalReply) -> Vec<Effect> {
     let mut effects = check_pixel_support(state, answer);
     match answer {
@@ -42,7 +42,7 @@ pub(super) fn handle_reply(state: &mut State, answer: TerminalReply) -> Vec<Effe
     effects
 }
 
-/// Support for the requested pixel protocol, according to a reply.
+/// Whether the requested pixel protocol is supported, according to a reply.
 enum PixelSupport {
     Nothing,
     Has,
@@ -90,7 +90,7 @@ fn check_pixel_support(state: &mut State, answer: TerminalReply) -> Vec<Effect> 
     }
 }
 
-/// Reports once that the terminal does not support pixels. A late confirmation is still accepted.
+/// Reports once that the terminal does not support pixels. If support is confirmed later, it is still used.
 pub(super) fn report_missing_pixels(state: &mut State) {
     let asked = state.display.pixels_until.take().and(state.display.pixels);
     if let Some(request) = asked {
@@ -104,7 +104,7 @@ fn show(state: &mut State, depth: ColorDepth) {
     state.dirty = true;
 }
 
-/// Uses the terminal's name for its block characters and other capabilities, if it was queried.
+/// If the terminal's name was queried, uses it to determine block characters and other capabilities.
 fn name(state: &mut State, terminal: TerminalId) -> Vec<Effect> {
     let ask = state.display.ask;
     let mut effects = Vec::new();
@@ -146,7 +146,7 @@ mod tests {
     use crate::terminals::{Brand, Capabilities};
     use crate::update::start;
 
-    /// A user interface whose user requested kitty images.
+    /// A UI whose user has requested kitty images.
     fn ui_requesting_pixels(route: ImageRoute) -> TestUi {
         let mut state = state(80, 24);
         let request = PixelRequest { protocol: Protocol::Kitty, route, is_known: false };
@@ -178,11 +178,11 @@ mod tests {
         ui.press('s');
         ui.event(Event::TerminalReply(TerminalReply::Attributes));
         ui.wait(2000);
-        assert!(!ui.text().contains("kitty images"), "said once: {}", ui.text());
+        assert!(!ui.text().contains("kitty images"), "should be reported only once: {}", ui.text());
     }
 
     #[test]
-    fn closed_tmux_is_reported_after_a_second() {
+    fn tmux_without_passthrough_is_reported() {
         let mut ui = ui_requesting_pixels(ImageRoute::Tmux);
         ui.event(Event::TerminalReply(TerminalReply::Attributes));
         ui.wait(900);
@@ -196,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn octants_give_a_finer_preview() {
+    fn octants_increase_the_preview_resolution() {
         let mut state = state(80, 24);
         start(&mut state);
         let before = state.request.preview_size.expect("a size");
@@ -211,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn terminal_name_sets_the_capabilities() {
+    fn terminal_name_determines_capabilities() {
         let mut state = state(80, 24);
         state.display.ask = TerminalQueries { name: true, ..TerminalQueries::default() };
         let ghostty = TerminalId { brand: Brand::Ghostty, version: [1, 2] };
@@ -219,7 +219,7 @@ mod tests {
         assert_eq!(state.display.capabilities, ghostty.capabilities());
         assert!(
             handle_reply(&mut state, TerminalReply::Name(ghostty)).is_empty(),
-            "focus reports are already on"
+            "focus reports are already enabled"
         );
     }
 

@@ -1,4 +1,4 @@
-//! Requests to the worker.
+//! Requests sent to the worker.
 
 use super::history;
 use crate::event::Effect;
@@ -6,9 +6,10 @@ use crate::pipeline::protocol::{Command, Request, Writing};
 use crate::state::{Activity, CameraStep, Rendering, State, Toggles};
 use crate::view::layout::Layout;
 
-/// Creates a request with the current settings. The table of stages stays until the worker starts on it.
+/// Creates a request with the current settings. The stage table is unchanged until the worker starts on the
+/// request.
 pub(super) fn render(state: &mut State, force: bool) -> Vec<Effect> {
-    // A moving camera would fill the history.
+    // Do not fill the history while the camera is moving.
     if state.request.camera_step.generation == Some(state.request.generation) {
         state.picture.history.drop_unfinished(state.request.generation);
     } else {
@@ -19,7 +20,7 @@ pub(super) fn render(state: &mut State, force: bool) -> Vec<Effect> {
     let now = Toggles { exposure: before.exposure, ..state.request.toggles };
     state.request.is_exposure_only = before == now && before != state.request.toggles;
     if state.request.is_exposure_only {
-        // The exposure changes only how the image is shown.
+        // Exposure only affects how the image is displayed.
         state.picture.history.transfer_to_next(state.request.generation);
     }
     state.request.generation += 1;
@@ -30,7 +31,7 @@ pub(super) fn render(state: &mut State, force: bool) -> Vec<Effect> {
     state.request.preview_size = Layout::preview_size(state);
     state.request.resize_due = None;
     state.request.camera_step = CameraStep::default();
-    // Set again once this request is known to answer a save.
+    // Set again if this request turns out to be for a saved change.
     (state.saving.change, state.saving.first_change) = (None, None);
     state.overlays.unconfirmed = None;
     state.overlays.are_warnings_known = false;
@@ -56,7 +57,8 @@ pub(super) fn render(state: &mut State, force: bool) -> Vec<Effect> {
     effects
 }
 
-/// Requests the same image at a new preview size if the window changed, without restarting the render.
+/// If the window size has changed, requests a preview of the same image at the new size, without restarting
+/// the render.
 pub(super) fn resized_preview(state: &mut State) -> Vec<Effect> {
     let size = Layout::preview_size(state);
     if size == state.request.preview_size || size.is_none() {

@@ -1,4 +1,4 @@
-//! Keys of the open list of views: navigation, search, closing.
+//! Keys for the open view list: navigation, search, closing.
 
 use crossterm::event::{KeyCode, KeyModifiers};
 
@@ -41,7 +41,7 @@ pub(super) fn update(state: &mut State, action: OverlayAction) -> Option<Vec<Eff
     Some(choose(state, View::ALL[chosen]))
 }
 
-/// Handles a key while a name is typed. `None` if no search is active.
+/// Handles a key while the user types a search text. `None` if no search is active.
 pub(super) fn handle_search_key(state: &mut State, key: KeyPress) -> Option<Vec<Effect>> {
     let mut name = state.overlays.views.as_ref().filter(|_| !state.overlays.help.open)?.name.clone()?;
     let is_held = key.modifiers.contains(KeyModifiers::CONTROL);
@@ -59,7 +59,7 @@ pub(super) fn handle_search_key(state: &mut State, key: KeyPress) -> Option<Vec<
     Some(found.map_or_else(Vec::new, |view| choose(state, view)))
 }
 
-/// Chooses a view and opens the list.
+/// Selects a view and opens the list.
 pub(super) fn choose_view(state: &mut State, view: View) -> Vec<Effect> {
     state.list_views();
     state.request.toggles.view = (view != state.request.base_view()).then_some(view);
@@ -73,7 +73,7 @@ pub(super) fn choose_view(state: &mut State, view: View) -> Vec<Effect> {
     effects
 }
 
-/// The first view whose name starts with `name`, else the first that contains it.
+/// The first view whose name starts with `name`. If there is none, the first whose name contains it.
 fn find_view(name: &str) -> Option<View> {
     let begins = |view: &&View| view.name().starts_with(name);
     let has = |view: &&View| view.name().contains(name);
@@ -93,7 +93,7 @@ fn close(state: &mut State) {
     state.dirty = true;
 }
 
-/// Chooses a view unless it is the current one.
+/// Selects a view unless it is already selected.
 fn choose(state: &mut State, view: View) -> Vec<Effect> {
     state.list_views();
     if view == state.request.view() {

@@ -1,4 +1,4 @@
-//! Handles worker events. Events of older generations are ignored, except those about files.
+//! Handles worker events. Events of older generations are ignored unless they concern files or user actions.
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -22,7 +22,7 @@ use crate::window_title;
 
 pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
     let event = match event {
-        // Replies to the user are never outdated.
+        // Replies to user actions are never outdated.
         Event::CameraKept { outcome, .. } => return camera::kept(state, outcome),
         Event::CameraUndone { outcome, .. } => return camera::undone(state, outcome),
         Event::Picked { picked, .. } => return pointer::picked(state, &picked),
@@ -30,7 +30,7 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
             report_written(state, &paths);
             return Vec::new();
         }
-        // Images of earlier requests may still be written.
+        // Images of earlier requests may be written after a new request has started.
         Event::Written { path, bytes, generation, is_own } if generation != state.request.generation => {
             record_file(state, path, bytes, (generation, is_own));
             return Vec::new();
@@ -44,7 +44,7 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
     if generation(&event) != state.request.generation {
         return Vec::new();
     }
-    // Previews are taken from their slot, and the watcher handles the files.
+    // Previews are taken from their slot, and files are handled by the watcher.
     let shows_nothing = matches!(event, Event::Preview { .. } | Event::Files { .. });
     state.dirty |= !shows_nothing;
     match event {
@@ -62,7 +62,7 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
             if pinhole {
                 show_notice(state, messages::PINHOLE);
             }
-            // The size of the preview depends on the image's shape.
+            // The preview size depends on the image's aspect ratio.
             return resized_preview(state);
         }
         Event::Warnings { warnings, .. } => warn(state, warnings),
@@ -91,7 +91,7 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
         Event::OwnImage { state: own, .. } => state.saving.own.state = own,
         Event::WriteFailed { path, message, .. } => {
             let is_by_hand = std::mem::take(&mut state.saving.is_write_requested);
-            // A write requested during the render says nothing about the final image.
+            // A failed write requested during the render does not affect the final image.
             if !is_by_hand || state.work.activity == Activity::Done {
                 state.saving.unwritten = Some(messages::NOT_WRITTEN.to_owned());
             }
@@ -146,8 +146,8 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
     Vec::new()
 }
 
-/// Notifies a user who is working in another window that a long render has ended, if the terminal supports
-/// it.
+/// Sends a notification that a long render has ended, if the user is in another window and the terminal
+/// supports notifications.
 fn notice(state: &State, time: Option<Duration>) -> Vec<Effect> {
     let is_over = matches!(state.work.activity, Activity::Done | Activity::Broken);
     let is_long = |time: &Duration| state.display.notify_after.is_some_and(|least| *time > least);
@@ -196,7 +196,7 @@ fn started(state: &mut State) {
     state.work.curve = NoiseCurve::default();
     state.work.report = None;
     state.saving.unwritten = None;
-    // A written image stays valid until samples of another one are traced.
+    // A written image stays up to date until samples of another image are traced.
     if state.request.is_own() && state.saving.own.state != OwnState::Written {
         state.saving.own = OwnImage { state: OwnState::Begun { is_rendering: true }, fraction: 0.0 };
     }
@@ -205,7 +205,7 @@ fn started(state: &mut State) {
 }
 
 fn record(state: &mut State, stage: StageReport) {
-    // The progress bars of a stage disappear with it.
+    // Progress bars disappear when their stage ends.
     if stage.status != Status::Running {
         state.work.assets.clear();
     }
@@ -214,7 +214,7 @@ fn record(state: &mut State, stage: StageReport) {
     }
 }
 
-/// Updates the progress bar of an asset; there is one per name.
+/// Updates an asset's progress bar. Each name has one bar.
 fn asset(state: &mut State, progress: AssetProgress) {
     let finished = (progress.done >= progress.total).then_some(state.now);
     let bar = AssetBar { progress, finished };
@@ -224,7 +224,7 @@ fn asset(state: &mut State, progress: AssetProgress) {
     }
 }
 
-/// Reports the files written with a key.
+/// Reports the files written at the user's request.
 fn report_written(state: &mut State, paths: &[PathBuf]) {
     state.saving.is_write_requested = false;
     let is_open = state.picture.history.is_open();
@@ -233,9 +233,9 @@ fn report_written(state: &mut State, paths: &[PathBuf]) {
     show_notice(state, messages::wrote(&names.join(", ")) + which);
 }
 
-/// Records a written file. It is shown next to the image, since a message would cover the keys.
+/// Records a written file. It is listed next to the image because a message would cover the keys.
 fn written(state: &mut State, path: PathBuf, bytes: u64, (generation, is_own): (u64, bool)) {
-    // Other outputs may still have failed.
+    // During the render, other outputs may still have failed.
     let is_by_hand = state.work.activity == Activity::Done;
     if is_by_hand {
         (state.saving.unwritten, state.saving.write_failed) = (None, None);
@@ -244,7 +244,8 @@ fn written(state: &mut State, path: PathBuf, bytes: u64, (generation, is_own): (
     record_file(state, path, bytes, (generation, is_own));
 }
 
-/// Records an image in a file. Its render may still be running; an existing report belongs to the same image.
+/// Records that an image has been written. Its render may still be running. If there is a report, it belongs
+/// to the same image.
 fn record_file(state: &mut State, path: PathBuf, bytes: u64, (generation, is_own): (u64, bool)) {
     let view = if is_own { state.request.base_view() } else { state.request.view() };
     let made = match &state.work.report {
@@ -261,7 +262,7 @@ fn record_file(state: &mut State, path: PathBuf, bytes: u64, (generation, is_own
     state.saving.written.push(written);
 }
 
-/// Adds the description to the files of a finished request.
+/// Adds a description to the files of a finished request.
 fn describe(state: &mut State, generation: u64, report: &Report) {
     let (is_written, base) = (report.image.path.is_some(), state.request.base_view());
     for written in state.saving.written.iter_mut().filter(|written| written.generation == generation) {
@@ -272,7 +273,7 @@ fn describe(state: &mut State, generation: u64, report: &Report) {
     }
 }
 
-/// Handles a change of an output file by another program.
+/// Handles a change to an output file made by another program.
 pub(super) fn output_changed(state: &mut State, OutputChange { path, lost }: &OutputChange) -> Vec<Effect> {
     let Some(written) = state.saving.written.iter_mut().find(|written| written.path == *path) else {
         return Vec::new();
@@ -285,7 +286,7 @@ pub(super) fn output_changed(state: &mut State, OutputChange { path, lost }: &Ou
     Vec::new()
 }
 
-/// Shows new conflicts immediately. A pane that the user closed stays closed unless they are new.
+/// Shows new conflicts immediately. If the user has closed the pane, only new conflicts reopen it.
 fn report_conflicts(state: &mut State, conflicts: Vec<Diagnostic>) {
     state.saving.is_write_requested = false;
     state.saving.unwritten = Some(messages::NOT_WRITTEN.to_owned());
@@ -300,7 +301,7 @@ fn report_conflicts(state: &mut State, conflicts: Vec<Diagnostic>) {
     state.overlays.warnings.splice(0..0, conflicts);
 }
 
-/// Removes the problems once the file is valid again.
+/// Clears the errors once the file is valid again.
 fn clear_problems(state: &mut State) {
     if state.overlays.problems.take().is_some() {
         state.overlays.diagnostics = Pane::default();
@@ -318,7 +319,7 @@ fn done(state: &mut State, mut report: Box<Report>, warnings: Vec<Diagnostic>, u
     (state.work.activity, state.work.rendering) = (Activity::Done, Rendering::Finished);
     state.set_paused(false);
     state.work.assets.clear();
-    // The image of this request is on disk, so none is missing.
+    // This request's image has been written, so earlier write failures no longer matter.
     let is_on_disk = report.stages[Stage::Write as usize].status != Status::Skipped;
     if state.request.is_own() && is_on_disk && state.saving.unwritten.is_none() {
         state.saving.write_failed = None;
@@ -340,7 +341,7 @@ fn done(state: &mut State, mut report: Box<Report>, warnings: Vec<Diagnostic>, u
     }
 }
 
-/// Adds the time in which earlier requests rendered samples of this image.
+/// Adds the time that earlier requests spent on this image's samples.
 fn add_earlier_seconds(report: &mut Report) {
     let all = report.image.render_seconds;
     let render = &mut report.stages[Stage::Render as usize];
@@ -350,7 +351,7 @@ fn add_earlier_seconds(report: &mut Report) {
     }
 }
 
-/// Counts a finished render, unless it found the newest image unchanged.
+/// Counts a finished render, unless it did not change the newest image.
 fn count(state: &mut State, unchanged: bool) {
     let is_new = !unchanged && !state.request.is_exposure_only;
     let is_shown = state.picture.history.is_newest(state.request.generation);
@@ -362,8 +363,8 @@ fn count(state: &mut State, unchanged: bool) {
     }
 }
 
-/// Completes the noise curve with the measured result. An unchanged image, or one with another exposure,
-/// keeps its curve.
+/// Completes the noise curve with the final measurement. If the image is unchanged or only its exposure
+/// differs, its curve is kept.
 fn note_noise(state: &mut State, report: &Report, unchanged: bool) {
     let render = &report.stages[Stage::Render as usize];
     let origin = state.request.origin(false).without_exposure();
@@ -389,18 +390,19 @@ fn warn(state: &mut State, warnings: Vec<Diagnostic>) {
     state.overlays.are_warnings_known = true;
 }
 
-/// Closes the pane of diagnostics if it is empty.
+/// Closes the diagnostics pane if it is empty.
 fn close_empty_pane(state: &mut State) {
     state.overlays.diagnostics.open &= state.overlays.problems.is_some() || !state.reported().is_empty();
 }
 
-/// Holds back errors in a file that may be incomplete until they persist.
+/// Handles a failure. Errors in a file that may be incomplete are withheld until the file has stopped
+/// changing.
 fn failed(state: &mut State, failure: Failure) {
     state.set_paused(false);
     state.work.assets.clear();
     state.saving.change = None;
     match failure {
-        // The last valid scene is rendered.
+        // The last valid scene is being rendered.
         Failure::Scene(_) => state.picture.history.broken(),
         Failure::Work(_) => state.work.rendering = Rendering::Stopped,
     }
@@ -414,7 +416,7 @@ fn failed(state: &mut State, failure: Failure) {
     }
 }
 
-/// Handles the end of the render of the last valid scene while the file is broken.
+/// Handles the end of a render of the last valid scene, which runs while the file is broken.
 fn last_good_ended(state: &mut State, end: LastGoodEnd) {
     match end {
         LastGoodEnd::Finished { unchanged } => {
@@ -426,7 +428,7 @@ fn last_good_ended(state: &mut State, end: LastGoodEnd) {
     }
 }
 
-/// Shows new problems. A pane that the user closed stays closed unless they are new.
+/// Shows new errors. If the user has closed the pane, only new errors reopen it.
 fn broken(state: &mut State, problems: Problems) {
     state.work.activity = Activity::Broken;
     if state.overlays.problems.as_ref() != Some(&problems) {
@@ -436,7 +438,7 @@ fn broken(state: &mut State, problems: Problems) {
     state.dirty = true;
 }
 
-/// Shows errors that were held back, because the files are now complete.
+/// Shows errors that were withheld, now that the files are complete.
 pub(super) fn show_delayed_errors(state: &mut State) {
     state.saving.is_settled = true;
     if let Some(diagnostics) = state.overlays.unconfirmed.take() {

@@ -1,4 +1,4 @@
-//! A small log-log chart of noise over time, with the requested `error` as a line.
+//! A small log-log chart of noise over time, with a line at the requested `error`.
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
@@ -13,16 +13,17 @@ use crate::messages;
 use crate::preview_kind::PreviewKind;
 use crate::state::State;
 
-/// Minimum and maximum rows of the chart.
+/// Minimum and maximum height of the chart in rows.
 const MIN_ROWS: u16 = 6;
 const MAX_ROWS: u16 = 12;
-/// More columns show no more detail.
+/// Maximum width. More columns would not add detail.
 const MAX_COLUMNS: u16 = 60;
-/// A curve needs this many points, whose times differ by this factor.
+/// Minimum number of points in a curve, and minimum ratio between the last and first times.
 const MIN_POINTS: usize = 3;
 const MIN_RATIO: f64 = 1.5;
 
-/// Draws the chart at the top of an area. Returns the rows used: 0 if there is no curve or no room.
+/// Draws the chart at the top of an area. Returns the number of rows used, or 0 if there is no curve or too
+/// little space.
 pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) -> u16 {
     let area = Rect { width: area.width.min(MAX_COLUMNS), ..area }.intersection(buffer.area);
     let (Some(rows), Some(points)) = (rows(state, area), points(state)) else { return 0 };
@@ -37,14 +38,14 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) -> u16 {
     rows
 }
 
-/// Rows of the chart with its caption. `None` if they do not fit.
+/// Number of rows used by the chart and its caption. `None` if they do not fit.
 pub(super) fn rows(state: &State, area: Rect) -> Option<u16> {
     let words = 1 + caption(state, points(state)?, area.width.min(MAX_COLUMNS)).len() as u16;
     let chart = area.height.checked_sub(words)?.min(MAX_ROWS);
     (chart >= MIN_ROWS && area.width >= 20).then_some(words + chart)
 }
 
-/// The points of the current image, if they form a curve.
+/// The current image's points, if there are enough for a curve.
 fn points(state: &State) -> Option<&[(f64, f64)]> {
     let points = state.work.curve.points();
     let [(first, _), .., (last, _)] = points else { return None };
@@ -59,7 +60,7 @@ fn target(state: &State) -> Option<f64> {
 /// No-break space.
 const UNBROKEN: &str = "\u{a0}";
 
-/// The caption in words; numbers stay together with their units.
+/// The caption, wrapped into lines. Numbers are not separated from their units.
 fn caption(state: &State, points: &[(f64, f64)], width: u16) -> Vec<String> {
     let ([(first, from), ..], [.., (last, to)]) = (points, points) else { return Vec::new() };
     let whole = |amount: String| amount.replace(' ', UNBROKEN);
@@ -87,7 +88,7 @@ fn plot(state: &State, points: &[(f64, f64)], area: Rect, buffer: &mut Buffer) {
     let target = target(state).map(f64::log10);
     let (x, y) = (ends(&|point| point.0, None), ends(&|point| point.1, target));
     let line = target.map(|target| [(x[0], target), (x[1], target)]);
-    // A line at the edge would not be visible.
+    // Add a margin, since a line at the very edge would not be visible.
     let margin = 0.05 * (y[1] - y[0]).max(0.1);
     let bounds = [y[0] - margin, y[1] + margin];
     let style = |tone: Tone| tone.style(depth);
@@ -110,7 +111,7 @@ fn plot(state: &State, points: &[(f64, f64)], area: Rect, buffer: &mut Buffer) {
         .render(area, buffer);
 }
 
-/// Braille dots if the terminal is likely to have them.
+/// Braille dots, if the terminal is likely to support them.
 fn marker(state: &State) -> Marker {
     let is_simple = state.display.kind == PreviewKind::Ascii
         || matches!(state.display.depth, ColorDepth::Ansi16 | ColorDepth::None);

@@ -1,4 +1,4 @@
-//! The pane of errors and warnings, next to the image or over its lower part.
+//! The pane with errors and warnings, next to the image or over its lower part.
 
 use std::collections::HashMap;
 
@@ -14,13 +14,13 @@ use crate::scene::report::{self, Role};
 use crate::scene::sanitize::visible;
 use crate::state::State;
 
-/// Maximum number of faults shown; the rest appears once these are fixed.
+/// Maximum number of distinct diagnostics shown. More are shown once these are fixed.
 const MAX: usize = 100;
 
-/// Maximum number of positions shown per fault.
+/// Maximum number of positions shown per diagnostic.
 const MAX_PLACES: usize = 10;
 
-/// Draws the pane from its scroll position.
+/// Draws the pane, starting at its scroll position.
 pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
     let area = area.intersection(buffer.area);
     let text = text(state, area);
@@ -35,7 +35,7 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
     }
 }
 
-/// The cells that the pane covers. Empty while it is closed.
+/// The cells covered by the pane. Empty if it is closed.
 pub(super) fn covered(state: &State) -> Rect {
     let Layout { pane, panel, .. } = Layout::of(state);
     if state.overlays.diagnostics.open {
@@ -45,7 +45,8 @@ pub(super) fn covered(state: &State) -> Rect {
     }
 }
 
-/// The lower part of an area that the lines and the title need; a panel is used completely.
+/// The lower part of an area, large enough for the lines and the title. Returns the whole area if it is the
+/// panel.
 fn fitting(area: Rect, lines: usize, is_panel: bool) -> Rect {
     if is_panel {
         return area;
@@ -54,7 +55,7 @@ fn fitting(area: Rect, lines: usize, is_panel: bool) -> Rect {
     Rect { y: area.bottom() - height, height, ..area }
 }
 
-/// Draws a rule with the number of errors and, if not all lines fit, the visible range.
+/// Draws a horizontal rule with the number of errors and, if not all lines fit, the range of visible lines.
 fn title(state: &State, area: Rect, shown: Option<(usize, usize, usize)>, buffer: &mut Buffer) {
     let reported = state.reported();
     let has_error = reported.iter().any(|one| one.severity == Severity::Error);
@@ -74,7 +75,7 @@ fn title(state: &State, area: Rect, shown: Option<(usize, usize, usize)>, buffer
     put(buffer, room, &[(" ", tone), (&words, tone), (" ", tone)], state.display.depth);
 }
 
-/// Lines per page, and the maximum scroll position.
+/// Number of lines per page, and the maximum scroll position.
 pub(crate) fn extent(state: &State) -> (usize, usize) {
     let area = Layout::of(state).pane;
     let text = text(state, area);
@@ -97,7 +98,7 @@ fn text(state: &State, area: Rect) -> Vec<StyledLine> {
     text
 }
 
-/// Lines of the diagnostics, errors first. A fault at several positions appears once.
+/// Formats the diagnostics, errors first. A diagnostic reported at several positions is listed once.
 fn reported(diagnostics: &[Diagnostic], width: usize) -> Vec<StyledLine> {
     let mut numbers = HashMap::new();
     let mut faults: Vec<Vec<&Diagnostic>> = Vec::new();
@@ -126,7 +127,7 @@ fn reported(diagnostics: &[Diagnostic], width: usize) -> Vec<StyledLine> {
     lines
 }
 
-/// The first position in full, the others as line and column, then an empty line.
+/// Formats the first position in full and the others as line and column, followed by an empty line.
 fn one_fault(fault: &[&Diagnostic], width: usize) -> Vec<StyledLine> {
     let tone = |role| match role {
         Role::Text => Tone::Plain,
@@ -138,7 +139,7 @@ fn one_fault(fault: &[&Diagnostic], width: usize) -> Vec<StyledLine> {
     let line =
         |line: report::ReportLine| line.into_iter().map(|piece| (piece.text, tone(piece.role))).collect();
     let mut lines = report::lines(std::slice::from_ref(fault[0]), width);
-    // The report ends with an empty line and a count, which the title shows already.
+    // Drop the empty line and the count at the end of the report. The title contains the count.
     lines.truncate(lines.len().saturating_sub(2));
     let mut lines: Vec<StyledLine> = lines.into_iter().map(line).collect();
     let places: Vec<String> = fault[1..].iter().filter_map(|one| position_words(one)).collect();

@@ -1,4 +1,4 @@
-//! Parts of the screen with special handling: file names and delayed cells.
+//! Parts of the screen that are handled separately: file names and delayed cells.
 
 use std::path::PathBuf;
 
@@ -12,14 +12,14 @@ use crate::state::State;
 /// File names to link, and cells to draw after the preview.
 #[derive(Debug, Default, PartialEq)]
 pub(crate) struct ViewExtras {
-    /// Cells of file names.
+    /// File names and the cells that contain them.
     pub(crate) files: Vec<(Rect, PathBuf)>,
-    /// Cells that are drawn after the preview on a slow connection.
+    /// Cells to draw after the preview on a slow connection.
     pub(crate) later: Rect,
 }
 
 impl ViewExtras {
-    /// Writes a line and records the cells of file names. Returns the columns used.
+    /// Writes a line and records which cells contain file names. Returns the number of columns used.
     pub(super) fn put(
         &mut self,
         state: &State,

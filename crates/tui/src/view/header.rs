@@ -1,4 +1,4 @@
-//! The header: state, scene and progress. With `tab`, it is the only line besides the image.
+//! The header: state, scene and progress. After `tab` is pressed, it is the only line besides the image.
 
 use std::time::Duration;
 
@@ -21,16 +21,16 @@ use crate::scene::diagnostic::Severity;
 use crate::scene::sanitize::visible;
 use crate::state::{Activity, State};
 
-/// Width from which the state block has a fixed width.
+/// Minimum header width for a state block of fixed width.
 const WIDE: u16 = 60;
-/// Minimum columns of a shortened name.
+/// Minimum width of a shortened name.
 const MIN_NAME: u16 = 6;
 
 pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
     let area = layout.header;
     let used = block(state, area, buffer);
     let mut room = right_part(area, used + 1);
-    // Without another line, a message takes the whole header.
+    // If there is no other line, a message takes the whole header.
     if layout.keys.is_empty() && message::replaces_line(state, layout) {
         return;
     }
@@ -40,7 +40,7 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
         room.width -= put_right(buffer, room, &back, Tone::Faint, state.display.depth);
     }
     let figures = progress_or_result(state);
-    // Keep some room for the name if the shortest figures allow it.
+    // Leave some space for the name if the shortest variant is short enough.
     let fitting = [MIN_NAME + 1, 0]
         .into_iter()
         .find_map(|name| figures.iter().find(|words| columns(words) + name <= room.width));
@@ -52,7 +52,7 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
     }
 }
 
-/// Draws the state block. Returns the columns used.
+/// Draws the state block. Returns the number of columns used.
 fn block(state: &State, area: Rect, buffer: &mut Buffer) -> u16 {
     let (sign, word, tone) = activity(state);
     let mut text = format!(" {sign} {word} ");
@@ -68,7 +68,7 @@ fn block(state: &State, area: Rect, buffer: &mut Buffer) -> u16 {
     end - area.x
 }
 
-/// Symbol, word and color of the state, each of which identifies it.
+/// Symbol, word and color for the state. Each of them alone identifies the state.
 pub(super) fn activity(state: &State) -> (&'static str, &'static str, Tone) {
     if state.picture.history.is_open() { ("◂", "older", Tone::Warning) } else { work(state) }
 }
@@ -86,24 +86,24 @@ fn work(state: &State) -> (&'static str, &'static str, Tone) {
     }
 }
 
-/// The word for the state of the work, regardless of the image shown.
+/// A word for the state of the work, regardless of the displayed image.
 pub(super) fn word(state: &State) -> &'static str {
     work(state).1
 }
 
-/// Draws the scene's path, the view and the image size.
+/// Draws the scene path, the view and the image size.
 fn name(state: &State, area: Rect, buffer: &mut Buffer) {
     let path = state.request.scene.to_string_lossy();
     let (folder, file) = path.rsplit_once('/').map_or(("", &*path), |(folder, file)| (folder, file));
     let (folder, file) = (visible(folder), visible(file));
-    // The size of older renders is not known.
+    // The image size of older renders is unknown.
     let effective = state.request.effective.as_ref().filter(|_| !state.picture.history.is_open());
     let size = effective.map_or(String::new(), |it| format!("  {}×{}", it.width, it.height));
     let folder = if folder.is_empty() { String::new() } else { format!("{folder}/") };
     let view = close_up(state) + &view(state);
     let view = (&*view, Tone::Strong);
     let mut pieces = vec![(&*folder, Tone::Faint), (&*file, Tone::Strong), view, (&*size, Tone::Faint)];
-    // Leave out parts before cutting the name.
+    // Omit parts before truncating the name.
     let width = |pieces: &[(&str, Tone)]| pieces.iter().map(|(text, _)| columns(text)).sum::<u16>();
     if width(&pieces) > area.width {
         pieces.remove(0);
@@ -114,7 +114,7 @@ fn name(state: &State, area: Rect, buffer: &mut Buffer) {
     put(buffer, area, &pieces, state.display.depth);
 }
 
-/// The view and its range, unless it is beauty.
+/// The view and its range of values, or nothing for the beauty view.
 fn view(state: &State) -> String {
     let open = state.picture.history.origin_of_open();
     let of_open = open.map(|origin| origin.toggles.view.unwrap_or_else(|| state.request.base_view()));
@@ -130,7 +130,7 @@ fn view(state: &State) -> String {
     format!("  view {}{range}", view.name())
 }
 
-/// Whether the current preview lacks the light of photons.
+/// Whether light from photons is missing in the current preview.
 fn lacks_photons(state: &State) -> bool {
     state
         .picture
@@ -139,13 +139,13 @@ fn lacks_photons(state: &State) -> bool {
         .is_some_and(|shown| shown.lacks_photons && shown.generation == state.request.generation)
 }
 
-/// Mark of a preview at actual pixels.
+/// Label for a preview that shows actual pixels.
 fn close_up(state: &State) -> String {
     let is_close = state.picture.shown.as_ref().is_some_and(|shown| shown.section.is_some());
     if is_close { "  1:1".to_owned() } else { String::new() }
 }
 
-/// Progress or result, from long to short.
+/// Progress or result, in variants from long to short.
 fn progress_or_result(state: &State) -> Vec<String> {
     if let Some((run, time)) = state.picture.history.place() {
         let is_unfinished = state.picture.history.origin_of_open().is_some_and(|origin| origin.is_unfinished);
@@ -161,7 +161,7 @@ fn progress_or_result(state: &State) -> Vec<String> {
         };
         let age = age_in_words(state.now.saturating_duration_since(time));
         let mut figures = vec![format!("{words}, {age}"), place.clone()];
-        // The newest render continues in the background.
+        // The newest render is still running in the background.
         if let Some(progress) = state.work.progress.as_ref().filter(|_| state.work.is_under_way()) {
             let done = format!("newest {} %", percent(progress.fraction));
             let eta = eta(state, progress);
@@ -202,7 +202,7 @@ fn progress_or_result(state: &State) -> Vec<String> {
     }
 }
 
-/// Number of the newest render, including the running one if it has an image.
+/// Number of the newest render. A running render is included if it has an image.
 fn last_run(state: &State) -> u64 {
     let history = &state.picture.history;
     let is_under_way =
@@ -210,9 +210,9 @@ fn last_run(state: &State) -> u64 {
     state.work.renders + u64::from(is_under_way)
 }
 
-/// Remaining time, unless the render is paused.
+/// Remaining time. Empty if the render is paused.
 fn eta(state: &State, progress: &RenderProgress) -> String {
-    /// Less rounds to zero.
+    /// Shorter times would round to zero.
     const MIN: f64 = 0.05;
     let eta = match Eta::of(progress) {
         None => "…".to_owned(),
@@ -223,7 +223,7 @@ fn eta(state: &State, progress: &RenderProgress) -> String {
     if state.work.paused { String::new() } else { format!("  ETA {eta}") }
 }
 
-/// Number of errors and warnings.
+/// Number of errors and warnings, in words.
 pub(super) fn errors(state: &State) -> String {
     let Some(problems) = &state.overlays.problems else { return String::new() };
     let count = |severity| problems.diagnostics.iter().filter(|it| it.severity == severity).count();

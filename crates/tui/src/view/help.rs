@@ -10,7 +10,7 @@ use crate::keymap::{KEYMAP, OVERLAY};
 use crate::messages;
 use crate::state::State;
 
-/// Explanations of other parts of the screen.
+/// Explanations for other parts of the screen.
 const NOTES: &[(&str, &str)] = &[
     ("on screen after 9 ms", "from a save to the first changed cell"),
     ("31 kB sent", messages::HELP_BYTES),
@@ -21,7 +21,7 @@ const NOTES: &[(&str, &str)] = &[
     ("render 3", "number of finished renders, as in the history"),
 ];
 
-/// Draws the help in the middle of the screen.
+/// Draws the help at the center of the screen.
 pub(super) fn draw(state: &State, buffer: &mut Buffer) {
     let area = area(state);
     let inner = inner(area);
@@ -33,7 +33,7 @@ pub(super) fn draw(state: &State, buffer: &mut Buffer) {
         title = format!(" keys · lines {}–{} of {} · j k ", first + 1, first + page, lines.len());
     }
     Clear.render(area, buffer);
-    // Clear lines that the help covers in part, which would look cut off.
+    // Clear lines that are partly covered by the help, which would look truncated.
     let Layout { header, under, .. } = Layout::of(state);
     for line in [header, under].into_iter().filter(|line| line.intersects(area)) {
         Clear.render(line.intersection(buffer.area), buffer);
@@ -58,16 +58,16 @@ pub(super) fn draw(state: &State, buffer: &mut Buffer) {
     }
 }
 
-/// Columns between labels and texts.
+/// Number of columns between labels and texts.
 const BESIDE: u16 = 3;
 
-/// Columns of the labels in a help of this width.
+/// Label width for help text of this width.
 fn labels(width: u16) -> u16 {
     const MIN: u16 = 9;
     widest(|(label, _)| label).min(MIN.max(width / 3))
 }
 
-/// The entries, wrapped into lines.
+/// The help entries, wrapped into lines.
 fn lines(width: u16) -> Vec<(String, String)> {
     let labels = labels(width);
     let both = |(label, help)| {
@@ -80,7 +80,7 @@ fn lines(width: u16) -> Vec<(String, String)> {
     entries().flat_map(both).collect()
 }
 
-/// Lines per page, and the maximum scroll position.
+/// Number of lines per page, and the maximum scroll position.
 pub(crate) fn extent(state: &State) -> (usize, usize) {
     let inner = inner(area(state));
     let page = usize::from(inner.height).max(1);
@@ -99,7 +99,7 @@ fn widest(part: impl Fn((&'static str, &'static str)) -> &'static str) -> u16 {
 
 fn area(state: &State) -> Rect {
     let window = Rect::new(0, 0, state.display.window.columns, state.display.window.rows);
-    // The line of keys shows how to scroll and close.
+    // Leave the key line visible, since it shows how to scroll and close the help.
     let above = Rect { height: window.height.saturating_sub(u16::from(window.height > 3)), ..window };
     let width = widest(|(label, _)| label) + widest(|(_, help)| help) + BESIDE + 3;
     let wide = centered(above, width, above.height);

@@ -1,4 +1,4 @@
-//! The line of keys: toggles with their values, keys of current use, and the way to the help.
+//! The key line: toggles with their values, keys that are currently useful, and the key that opens the help.
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
@@ -15,7 +15,7 @@ use crate::scene::is_mesh;
 use crate::scene::report::summary;
 use crate::state::{Activity, State, Toggles, ViewList};
 
-/// A key with its description in long and short form.
+/// A key with long and short descriptions.
 struct KeyHint {
     key: &'static str,
     words: String,
@@ -42,9 +42,9 @@ impl KeyHint {
     }
 }
 
-/// Columns between hints.
+/// Number of columns between hints.
 const GAP: u16 = 2;
-/// Columns reserved for keys of current use before toggles are shown in full.
+/// Columns reserved for currently useful keys when deciding whether to show toggles in their long form.
 const OF_USE: u16 = 26;
 
 pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
@@ -55,7 +55,7 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
     let ways = [KeyHint::of(Action::Quit), KeyHint::of(Action::ToggleHelp)];
     let ways: Vec<KeyHint> = ways.into_iter().flatten().collect();
     let width = |hints: &[KeyHint], is_long| hints.iter().map(|hint| hint.width(is_long)).sum::<u16>();
-    // The help key is always shown.
+    // The help key is always shown, even if `q` does not fit.
     let skipped = usize::from(area.width < 44 && ways.len() > 1);
     let ways = &ways[skipped..];
     let toggles = if state.overlays.help.open { Vec::new() } else { toggles(state) };
@@ -71,7 +71,8 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
     }
 }
 
-/// Combines toggles and other hints: urgent hints get room first, then toggles, then the rest.
+/// Combines toggles and other hints. Space is assigned first to urgent hints, then to toggles, then to the
+/// others.
 fn fitting(
     (urgent, useful): (Vec<KeyHint>, Vec<KeyHint>),
     toggles: Vec<KeyHint>,
@@ -99,9 +100,9 @@ fn show(hint: &KeyHint, area: Rect, is_long: bool, state: &State, buffer: &mut B
     hint.width(is_long)
 }
 
-/// Toggles with their values, in bold if keys changed them.
+/// Toggles with their values. Those changed with keys are bold.
 fn toggles(state: &State) -> Vec<KeyHint> {
-    // The toggles describe the newest render.
+    // The values would be those of the newest render.
     if state.picture.history.is_open() {
         return Vec::new();
     }
@@ -130,14 +131,14 @@ fn toggles(state: &State) -> Vec<KeyHint> {
     all.into_iter().filter_map(hint).collect()
 }
 
-/// Hints of current use: the urgent ones and the others.
+/// Currently useful hints: the urgent ones, and the others.
 fn current_hints(state: &State) -> (Vec<KeyHint>, Vec<KeyHint>) {
     let overlay = |wanted: &[OverlayAction]| -> Vec<KeyHint> {
         let of = OVERLAY.iter().filter(|it| wanted.contains(&it.action) && !it.hint.is_empty());
         of.map(|it| KeyHint::new(it.label, it.hint)).collect()
     };
     let closing = || overlay(&[OverlayAction::Close]);
-    // Scroll keys, if not everything is visible.
+    // Scroll keys, if some lines are not visible.
     let scrolling = |last: usize, keys: &[OverlayAction]| if last > 0 { overlay(keys) } else { Vec::new() };
     if state.overlays.help.open {
         let (_, last) = super::help::extent(state);
@@ -165,7 +166,7 @@ fn current_hints(state: &State) -> (Vec<KeyHint>, Vec<KeyHint>) {
             named(Action::OlderRender, "older, newer")
         };
         urgent.extend(both);
-        // All other keys concern the newest render.
+        // All other keys affect the newest render.
         return (urgent, KeyHint::of(Action::ShowImageOnly).into_iter().collect());
     }
     if state.request.toggles.camera.is_any() && !state.saving.has_scene_of_model {
@@ -195,7 +196,7 @@ fn current_hints(state: &State) -> (Vec<KeyHint>, Vec<KeyHint>) {
     let has_picture = state.display.kind != PreviewKind::None;
     let is_shown = |it: &&Binding| it.action != Action::ShowImageOnly || has_picture;
     let is_idle = |it: &&Binding| it.action != Action::TogglePause || state.work.is_running();
-    // Another hint above shows the key with the changes that it resets.
+    // If there are changes to list, a hint above shows them next to this key.
     let is_of_use = state.request.toggles != Toggles::default() && state.request.changes().is_empty();
     let is_back = |it: &&Binding| it.action != Action::ResetSettings || is_of_use;
     let others = KEYMAP
@@ -208,7 +209,7 @@ fn current_hints(state: &State) -> (Vec<KeyHint>, Vec<KeyHint>) {
     (urgent, first.into_iter().chain(others).collect())
 }
 
-/// Keys of the list of views, or the search text.
+/// Keys for the view list, or the search text.
 fn view_list_hints(views: &ViewList) -> Vec<KeyHint> {
     match &views.name {
         Some(name) => vec![KeyHint { tone: Tone::Strong, ..KeyHint::new("/", format!("{name}▏")) }],
@@ -218,7 +219,7 @@ fn view_list_hints(views: &ViewList) -> Vec<KeyHint> {
     }
 }
 
-/// Actions that have their own place in the line.
+/// Actions shown elsewhere in the line.
 const ELSEWHERE: [Action; 8] = [
     Action::Quit,
     Action::ToggleHelp,
@@ -235,7 +236,7 @@ fn pause_hint(hint: KeyHint, state: &State) -> KeyHint {
     if is_pause && state.work.paused { KeyHint::new(hint.key, "resume") } else { hint }
 }
 
-/// Errors and warnings in a closed pane.
+/// Number of errors and warnings, if the pane is closed.
 fn hidden_diagnostics(state: &State) -> Option<KeyHint> {
     let key = keymap::of(Action::ToggleDiagnostics)?.label;
     let (words, tone) = match &state.overlays.problems {

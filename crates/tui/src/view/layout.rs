@@ -1,7 +1,7 @@
-//! Layout of the screen.
+//! Screen layout.
 //!
-//! Positions depend only on the window, the shape of the image and `tab`, never on the state of the render,
-//! so nothing moves while it runs.
+//! Positions depend only on the window size, the image's aspect ratio and whether `tab` hides everything but
+//! the image. They do not depend on the state of the render, so nothing moves during a render.
 
 use ratatui::layout::Rect;
 
@@ -9,50 +9,50 @@ use crate::pipeline::protocol::{PreviewSize, Stage};
 use crate::preview_kind::PreviewKind;
 use crate::state::State;
 
-/// Areas of the screen, empty if there is no room for them.
+/// Areas of the screen. An area is empty if there is no space for it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Layout {
-    /// State and name; the only line with `tab`.
+    /// State and name. The only line if just the image is shown.
     pub header: Rect,
     pub preview: Rect,
-    /// Stages and results, next to or below the image. If empty, the status line shows them.
+    /// Stages and results, next to or below the image. If the panel is empty, the status line shows them.
     pub panel: Rect,
     /// The status line below the image: message, progress or result.
     pub under: Rect,
-    /// The line of keys.
+    /// The key line.
     pub keys: Rect,
-    /// Area of the diagnostics: next to the image or over its lower part.
+    /// Diagnostics pane, next to the image or over its lower part.
     pub pane: Rect,
 }
 
-/// Columns of the state block, fixed so that the name after it does not move.
+/// Width of the state block, which is fixed so that the name following it does not move.
 pub(super) const BLOCK: usize = 13;
-/// Windows with fewer rows have one line of text.
+/// Windows with fewer rows than this have one line of text.
 const TWO_LINES: u16 = 6;
-/// Windows with fewer rows have two lines of text.
+/// Windows with fewer rows than this have two lines of text.
 const THREE_LINES: u16 = 14;
-/// Columns of a stage with its time and change.
+/// Width of a stage with its time and the time difference.
 const SIDE_WIDTH: u16 = 23;
-/// Columns of a stage including the gap to the next one.
+/// Width of a stage, including the gap between stages.
 pub(super) const ENTRY_WIDTH: u16 = 26;
-/// Minimum rows of a panel next to the image: half of the stages.
+/// Minimum height of a panel next to the image, enough for half of the stages.
 const SIDE_HEIGHT: u16 = 4;
-/// Minimum share of its cells that the image keeps next to a panel; otherwise there is no panel.
+/// Minimum fraction of its cells that the image must keep next to a panel. Otherwise the panel is omitted.
 const KEPT: f32 = 0.9;
-/// Minimum sizes of a panel that also shows diagnostics: narrow panels must be high.
+/// Minimum sizes of a panel that can show diagnostics. A narrow panel must be taller.
 const TEXT_SIZES: [(u16, u16); 2] = [(44, 8), (34, 16)];
-/// Maximum rows of diagnostics over the image.
+/// Maximum height of a diagnostics pane over the image.
 const PANE_HEIGHT: u16 = 12;
 
 impl Layout {
-    /// The layout for the state's window and image.
+    /// Computes the layout for the state's window and image.
     pub(crate) fn of(state: &State) -> Self {
         let shape = state.request.aspect() * state.display.window.cell_aspect;
         let shape = (state.display.kind != PreviewKind::None).then_some(shape);
         Self::new(state.display.window.columns, state.display.window.rows, shape, state.picture.is_alone)
     }
 
-    /// The size of the preview that fits the window, in square pixels.
+    /// The size of the preview that fits into the window, in square pixels.
     pub(crate) fn preview_size(state: &State) -> Option<PreviewSize> {
         let area = Self::of(state).preview;
         let across = state.display.pixels_across();
@@ -65,7 +65,7 @@ impl Layout {
         })
     }
 
-    /// `shape` is the aspect ratio of the image in cells. `None` if no image is shown.
+    /// `shape` is the image's aspect ratio in cells. `None` if no image is shown.
     fn new(columns: u16, rows: u16, shape: Option<f32>, is_alone: bool) -> Self {
         let mut layout = Self::default();
         let mut rest = Rect::new(0, 0, columns, rows);
@@ -89,8 +89,8 @@ impl Layout {
     }
 }
 
-/// Divides the room between image and panel so that the image is largest, or leaves out the panel if it takes
-/// too much.
+/// Divides the space between image and panel to make the image as large as possible. The panel is omitted if
+/// it would take too much space.
 fn divide(rest: Rect, shape: f32) -> (Rect, Rect) {
     let cells = |area| {
         let (width, height) = fit(area, shape);
@@ -111,7 +111,7 @@ fn side_by_side(rest: Rect, shape: f32) -> Option<(Rect, Rect)> {
 
 fn stacked(rest: Rect, shape: f32) -> Option<(Rect, Rect)> {
     let columns = usize::from(rest.width / ENTRY_WIDTH);
-    // The stages, and one line of results.
+    // Rows for the stages and one line of results.
     let rows = u16::try_from(Stage::ALL.len().div_ceil(columns.max(1)) + 1).unwrap_or(u16::MAX);
     let room = Rect { height: rest.height.checked_sub(rows)?, ..rest };
     let (_, height) = fit(room, shape);
@@ -119,7 +119,7 @@ fn stacked(rest: Rect, shape: f32) -> Option<(Rect, Rect)> {
     (columns > 0).then_some((Rect { height, ..rest }, panel))
 }
 
-/// Columns and rows of the largest image of this shape in an area.
+/// Columns and rows of the largest image with this aspect ratio that fits into an area.
 fn fit(area: Rect, shape: f32) -> (u16, u16) {
     let rows = (f32::from(area.width) / shape).ceil();
     if rows <= f32::from(area.height) {
@@ -156,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn panel_is_where_the_image_is_largest() {
+    fn panel_position_maximizes_the_image() {
         let four_by_three = layout(80, 24, 4.0 / 3.0);
         assert_eq!(four_by_three.preview, Rect::new(0, 1, 56, 21));
         assert_eq!(four_by_three.panel, Rect::new(57, 1, 23, 21));
@@ -193,15 +193,15 @@ mod tests {
     }
 
     #[test]
-    fn tab_leaves_only_the_header() {
+    fn tab_hides_all_lines_but_the_header() {
         let alone = Layout::new(80, 24, Some(2.0), true);
         assert_eq!((alone.preview, alone.header), (Rect::new(0, 0, 80, 23), Rect::new(0, 23, 80, 1)));
         let none = Layout::new(80, 24, None, true);
-        assert_eq!(none.panel, Rect::new(0, 1, 80, 21), "without an image, tab changes nothing");
+        assert_eq!(none.panel, Rect::new(0, 1, 80, 21), "without an image, tab should have no effect");
     }
 
     #[test]
-    fn areas_are_in_the_window_and_disjoint() {
+    fn areas_are_disjoint_and_inside_the_window() {
         let shapes = [None, Some(0.1), Some(1.0), Some(2.7), Some(3.6), Some(40.0)];
         for (columns, rows) in (0..130).flat_map(|columns| (0..60).map(move |rows| (columns, rows))) {
             for (shape, is_alone) in shapes.into_iter().flat_map(|shape| [(shape, false), (shape, true)]) {

@@ -1,4 +1,4 @@
-//! Marks over the image: the crosshair, and the corners of the region that renders first.
+//! Marks over the image: the crosshair, and the corners of the region to render first.
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
@@ -8,7 +8,7 @@ use crate::pipeline::protocol::{ImagePosition, Section};
 use crate::preview_kind::PreviewKind;
 use crate::state::State;
 
-/// Draws the marks over an image in these cells.
+/// Draws the marks over an image that covers these cells.
 pub(super) fn draw(state: &State, cells: Rect, buffer: &mut Buffer) {
     let mut mark = |spot: ImagePosition, symbols: [&str; 2]| {
         let symbol = symbols[usize::from(state.display.kind == PreviewKind::Ascii)];
@@ -21,7 +21,7 @@ pub(super) fn draw(state: &State, cells: Rect, buffer: &mut Buffer) {
     if let Some(Section { left, top, width, height }) =
         state.request.first_section.filter(|_| is_marked(state))
     {
-        // The marks are inside the region.
+        // Keep the marks inside the region.
         let (right, bottom) = (left + width * 0.999, top + height * 0.999);
         mark(ImagePosition { x: left, y: top }, ["┌", "+"]);
         mark(ImagePosition { x: right, y: top }, ["┐", "+"]);
@@ -36,12 +36,12 @@ pub(super) fn draw(state: &State, cells: Rect, buffer: &mut Buffer) {
     }
 }
 
-/// Whether the region is marked: while it is dragged or rendered.
+/// Whether to mark the region, which is the case while it is being selected or rendered.
 fn is_marked(state: &State) -> bool {
     state.selection.is_marking || state.work.is_running()
 }
 
-/// The cell of a position in the image, if it is visible.
+/// The cell at a position in the image, if visible.
 fn cell_of(state: &State, spot: ImagePosition, cells: Rect) -> Option<(u16, u16)> {
     let section = state.picture.shown.as_ref().and_then(|shown| shown.section);
     let Section { left, top, width, height } =

@@ -1,6 +1,6 @@
-//! Messages and inspected values. A message shares the status line with progress or results. If it is too
-//! long for that, it covers the last rows of the image. Without a status line, it takes the line of keys or
-//! the header.
+//! Messages and inspected values. A message shares the status line with progress or results. If there is not
+//! enough space, it covers the last rows of the image. If there is no status line, it replaces the key line
+//! or the header.
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
@@ -12,14 +12,14 @@ use super::text::{Tone, columns, put, right_part, row, wrapped};
 use crate::scene::sanitize::visible;
 use crate::state::State;
 
-/// Rows that a panel needs for the inspected values.
+/// Panel height needed for the inspected values.
 const FACTS: u16 = 10;
 /// Columns between a message and the rest of the status line.
 const GAP: u16 = 2;
 
 /// Where a message is shown.
 enum MessagePosition {
-    /// In one line.
+    /// On a single line.
     Line(Rect),
     /// Over the last rows of this area.
     Over(Rect),
@@ -40,19 +40,19 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
     let area = Rect { y: room.bottom() - height, height, ..room };
     Clear.render(area.intersection(buffer.area), buffer);
     for (index, line) in (0..height).zip(&lines) {
-        // Lines that do not fit are cut with an ellipsis.
+        // Lines that do not fit are truncated with an ellipsis.
         let is_cut = index + 1 == height && lines.len() > usize::from(height);
         let rest = if is_cut { lines[usize::from(index)..].join(" ") } else { line.clone() };
         put(buffer, row(area, index), &[(&rest, tone)], state.display.depth);
     }
 }
 
-/// Whether a message replaces a whole line. The status line is shared instead.
+/// Whether a message replaces a whole line. The status line is shared, not replaced.
 pub(super) fn replaces_line(state: &State, layout: &Layout) -> bool {
     words(state, layout).is_some()
 }
 
-/// The part of the status line that a message leaves.
+/// The part of the status line not used by a message.
 pub(super) fn status_line_rest(state: &State, layout: &Layout) -> Rect {
     let spot = words(state, layout).map(|(words, _)| message_position(state, layout, &words));
     let used = match spot {
@@ -71,7 +71,7 @@ pub(super) fn is_over_picture(state: &State) -> bool {
     })
 }
 
-/// Whether the panel has room for the inspected values.
+/// Whether the panel has space for the inspected values.
 pub(super) fn is_in_panel(state: &State, layout: &Layout) -> bool {
     let is_covered = state.overlays.diagnostics.open && layout.pane == layout.panel;
     layout.panel.height >= FACTS && !is_covered
@@ -83,7 +83,8 @@ fn words(state: &State, layout: &Layout) -> Option<(String, Tone)> {
     }
     let message = state.overlays.message.as_ref().filter(|message| !message.words.is_empty())?;
     let words = visible(&message.words).into_owned();
-    // The list of views replaces a long message, and its keys replace a short message without its own line.
+    // The view list replaces a long message. Its keys replace a short message if there is no separate line
+    // for it.
     let has_place = !layout.under.is_empty()
         && matches!(message_position(state, layout, &words), MessagePosition::Line(_));
     if state.overlays.views.is_some() && !has_place {
@@ -97,7 +98,7 @@ fn message_position(state: &State, layout: &Layout, words: &str) -> MessagePosit
     let width = columns(words);
     let under = layout.under;
     if under.is_empty() {
-        // Keep the state block visible.
+        // Do not cover the state block.
         let beside = right_part(layout.header, super::layout::BLOCK as u16 + 1);
         let line = if layout.keys.is_empty() { beside } else { layout.keys };
         let fits = width <= line.width && !line.is_empty();
@@ -119,9 +120,9 @@ fn message_position(state: &State, layout: &Layout, words: &str) -> MessagePosit
     MessagePosition::Over(if needed == 0 || above.is_empty() { room } else { above })
 }
 
-/// A line and the rows above it that a long message may cover.
+/// A line and the rows above it that may be covered by a long message.
 fn with_rows_above(layout: &Layout, line: Rect) -> Rect {
-    // A union with an empty area would reach to its corner.
+    // Skip empty areas, since their origin would extend the union.
     let areas = [layout.preview, layout.panel].into_iter().filter(|area| !area.is_empty());
     let rest = areas.reduce(Rect::union).unwrap_or(line);
     if line.y == layout.header.y {

@@ -1,4 +1,4 @@
-//! Drawing of the state into a cell buffer.
+//! Draws the state into a cell buffer.
 
 mod curve;
 pub(super) mod diagnostics;
@@ -26,12 +26,12 @@ pub(super) use self::extras::ViewExtras;
 use self::layout::Layout;
 use super::state::State;
 
-/// The state in one word.
+/// The state as a single word.
 pub(super) fn state_word(state: &State) -> &'static str {
     header::word(state)
 }
 
-/// The render at a cell of the history strip, as an index into the history.
+/// The history entry at a cell of the history strip, as an index.
 pub(super) fn picture_at(state: &State, column: u16, row: u16) -> Option<usize> {
     let layout = Layout::of(state);
     let is_open = state.overlays.help.open || layout.panel.is_empty();
@@ -49,7 +49,7 @@ pub(super) fn draw(state: &State, buffer: &mut Buffer) -> ViewExtras {
     if state.overlays.diagnostics.open {
         diagnostics::draw(state, layout.pane, buffer);
     }
-    // A long message covers everything below it.
+    // A long message covers everything drawn before it.
     message::draw(state, &layout, buffer);
     if state.overlays.views.is_some() {
         views::draw(state, &layout, buffer);
@@ -57,7 +57,7 @@ pub(super) fn draw(state: &State, buffer: &mut Buffer) -> ViewExtras {
     if state.overlays.help.open {
         help::draw(state, buffer);
     }
-    // Covered text has no links and is not delayed.
+    // Covered text is neither linked nor delayed.
     let is_covered =
         state.overlays.help.open || state.overlays.views.is_some() || message::is_over_picture(state);
     if is_covered || state.overlays.diagnostics.open && layout.pane == layout.panel {

@@ -1,4 +1,5 @@
-//! The panel next to or below the image: stages and loading assets while they run, then the results.
+//! The panel next to or below the image. It shows stages and loading assets during a render, and the results
+//! afterwards.
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
@@ -15,12 +16,12 @@ use crate::preview_kind::PreviewKind;
 use crate::scene::sanitize::visible;
 use crate::state::{Activity, AssetBar, State};
 
-/// Columns of a progress bar.
+/// Width of a progress bar.
 const BAR: u16 = 8;
-/// Columns of a result's label.
+/// Width of a result's label.
 const LABEL: usize = 8;
 
-/// Draws the panel in as many columns as needed and possible. Lines that do not fit are left out.
+/// Draws the panel, using several columns if necessary and possible. Lines that do not fit are omitted.
 pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) -> ViewExtras {
     if area.is_empty() {
         return ViewExtras::default();
@@ -41,13 +42,13 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) -> ViewExtras
     drawn
 }
 
-/// The render of the history strip at a cell.
+/// The history entry at a cell of the history strip.
 pub(super) fn picture_at(state: &State, area: Rect, place: (u16, u16)) -> Option<usize> {
     let PanelLayout { lines, columns, room } = panel_layout(state, area);
     side_panel::picture_at(state, area, rows(&lines, columns, room), place)
 }
 
-/// Lines of the panel, the number of columns, and the cells available to them.
+/// The panel's lines, the number of columns, and the area available for them.
 struct PanelLayout {
     lines: Vec<StyledLine>,
     columns: u16,
@@ -71,21 +72,21 @@ fn panel_layout(state: &State, area: Rect) -> PanelLayout {
     PanelLayout { lines, columns, room }
 }
 
-/// Rows used by the lines: all rows if there are several columns.
+/// Number of rows used by the lines. With several columns, all rows are used.
 fn rows(lines: &[StyledLine], columns: u16, room: Rect) -> u16 {
     if columns > 1 { room.height } else { u16::try_from(lines.len()).unwrap_or(u16::MAX).min(room.height) }
 }
 
-/// The lines of a panel of this width; hints are wrapped to a column. Reasons of stages are shown in full, or
-/// shortened to fit next to the stages.
+/// The lines of a panel with this width, with hints wrapped to the column width. The reasons for stages are
+/// shown in full or shortened to fit next to the stages.
 fn lines(state: &State, (width, column): (u16, u16), is_in_full: bool) -> Vec<StyledLine> {
     let is_done = matches!(state.work.activity, Activity::Done);
     let mut lines = inspected(state, width);
-    // Stages and results belong to the newest render.
+    // Stages and results describe the newest render.
     if state.picture.history.is_open() {
         return lines;
     }
-    // The stages of a broken scene have no visible result.
+    // If the scene is broken, its stages have no visible result.
     if !is_done && !is_broken(state) {
         let of = |stage| if is_in_full { stages::lines } else { stages::short }(state, stage, width);
         lines.extend(Stage::ALL.into_iter().flat_map(of));
@@ -94,7 +95,7 @@ fn lines(state: &State, (width, column): (u16, u16), is_in_full: bool) -> Vec<St
         lines.extend(results(state, column));
     }
     lines.extend(hint(state, column));
-    // Progress bars come and go, so they are last.
+    // Progress bars are last because they appear and disappear.
     lines.extend(state.work.assets.iter().map(|asset| asset_line(state, asset, width)));
     lines
 }
@@ -131,7 +132,7 @@ fn asset_line(state: &State, asset: &AssetBar, width: u16) -> StyledLine {
     vec![(name, Tone::Plain), (filled_squares, Tone::Working), (empty, Tone::Faint), (percent, Tone::Plain)]
 }
 
-/// The results, one label and value per line.
+/// The results, with one label and value per line.
 fn results(state: &State, width: u16) -> Vec<StyledLine> {
     let fact =
         |label: &str, value: String| vec![(format!("{label:<LABEL$} "), Tone::Faint), (value, Tone::Plain)];
@@ -178,25 +179,25 @@ fn results(state: &State, width: u16) -> Vec<StyledLine> {
 enum RenderEnd {
     Time,
     Samples,
-    /// The requested `error` was reached in every tile.
+    /// The requested `error` has been reached in all tiles.
     Error,
 }
 
-/// The limit that ended the render. `None` if there is only one limit.
+/// The limit that ended the render. `None` if only one limit was set.
 fn end(state: &State) -> Option<RenderEnd> {
     let (image, effective) = (&state.work.report.as_ref()?.image, state.request.effective.as_ref()?);
     let is_by_error = effective.error > 0.0;
     match () {
         () if !is_by_error && state.request.command_line.time_seconds.is_none() => None,
         () if !image.complete => Some(RenderEnd::Time),
-        // Tiles with the maximum number of samples may not have reached the error.
+        // If a tile has reached the maximum number of samples, its error may still be too large.
         () if is_by_error && image.samples.max < effective.samples => Some(RenderEnd::Error),
         () => Some(RenderEnd::Samples),
     }
 }
 
-/// A hint for a user who has not saved yet, wrapped. For a broken scene without an image, the status line
-/// shows it.
+/// A hint for users who have not saved yet, wrapped. If the scene is broken and there is no image, the status
+/// line shows the hint instead.
 fn hint(state: &State, width: u16) -> Vec<StyledLine> {
     if is_broken(state) && state.picture.shown.is_none() {
         return Vec::new();

@@ -1,4 +1,4 @@
-//! The preview in block or other characters: the only place where pixels become cells.
+//! Draws the preview using block or other characters. Only this module converts pixels to cells.
 
 use ratatui::buffer::{Buffer, Cell};
 use ratatui::layout::Rect;
@@ -21,7 +21,7 @@ use crate::preview_kind::PreviewKind;
 use crate::rescale::rescaled;
 use crate::state::State;
 
-/// Draws the preview, or a word if there is none.
+/// Draws the preview, or a message if there is none.
 pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
     let area = area.intersection(buffer.area);
     match &state.picture.shown {
@@ -53,7 +53,7 @@ pub(super) fn draw_small(state: &State, picture: &Picture, area: Rect, buffer: &
     }
 }
 
-/// The position in the image that a cell shows.
+/// The image position shown by a cell.
 pub(crate) fn spot_at(state: &State, column: u16, row: u16) -> Option<ImagePosition> {
     let shown = state.picture.shown.as_ref()?;
     let area = Layout::of(state).preview;
@@ -67,7 +67,7 @@ pub(crate) fn spot_at(state: &State, column: u16, row: u16) -> Option<ImagePosit
     cells.contains((column, row).into()).then(spot)
 }
 
-/// Kind of the preview when it must be drawn with cells.
+/// The kind of preview to use if it must be drawn with cells.
 fn in_cells(kind: PreviewKind, depth: ColorDepth) -> PreviewKind {
     match kind {
         PreviewKind::Pixels(_) => PreviewKind::of(PreviewChoice::Auto, depth),
@@ -75,7 +75,7 @@ fn in_cells(kind: PreviewKind, depth: ColorDepth) -> PreviewKind {
     }
 }
 
-/// Whether the preview is drawn as pixels, which is only possible if nothing covers it.
+/// Whether the preview is drawn as pixels. This requires that nothing covers it.
 fn is_in_pixels(state: &State) -> bool {
     matches!(state.display.kind, PreviewKind::Pixels(_))
         && !state.overlays.help.open
@@ -84,7 +84,7 @@ fn is_in_pixels(state: &State) -> bool {
         && !message::is_over_picture(state)
 }
 
-/// Placement of the preview in pixels. `None` if it is drawn with cells.
+/// Placement of the preview in pixels. `None` if it is drawn using cells.
 pub(crate) fn placement(state: &State, area: Rect) -> Option<PixelPlacement> {
     let shown = state.picture.shown.as_ref().filter(|_| is_in_pixels(state))?;
     let placed = PlacedImage::of(state, shown, area, state.display.kind);
@@ -92,7 +92,7 @@ pub(crate) fn placement(state: &State, area: Rect) -> Option<PixelPlacement> {
     (!cells.is_empty()).then_some(PixelPlacement { picture, cells, cell: state.display.window.cell_pixels })
 }
 
-/// Color settings of a preview.
+/// Color settings for a preview.
 #[derive(Clone, Copy)]
 pub(crate) struct PreviewColors<'a> {
     pub(crate) depth: ColorDepth,
@@ -107,14 +107,15 @@ impl<'a> PreviewColors<'a> {
     }
 }
 
-/// Draws an image into these cells for a dark terminal with xterm's colors and cells twice as high as wide.
+/// Draws an image into these cells for a dark terminal that has xterm's colors and cells twice as high as
+/// wide.
 pub fn shown(picture: &Picture, choice: PreviewChoice, depth: ColorDepth, area: Rect) -> Buffer {
     let shades = ColorMapper::new(depth, &XTERM);
     let inks = PreviewColors { depth, shades: &shades, is_light: false };
     draw_image(picture, choice, inks, (area, 2.0))
 }
 
-/// Draws an image with these color settings and cells of another aspect ratio.
+/// Draws an image with the given color settings and cell aspect ratio.
 pub(crate) fn draw_image(
     picture: &Picture,
     choice: PreviewChoice,
@@ -127,7 +128,7 @@ pub(crate) fn draw_image(
     buffer
 }
 
-/// Size in cells of an image drawn with half blocks or characters, within the available cells.
+/// Size in cells of an image drawn with half blocks or ASCII characters, limited to the available cells.
 pub(crate) fn size_in_cells(
     picture: &Picture,
     depth: ColorDepth,
@@ -140,7 +141,7 @@ pub(crate) fn size_in_cells(
     (cells.width, cells.height)
 }
 
-/// Placement of an image: its cells and its pixels in them.
+/// Placement of an image: the cells it covers and its size in pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct PlacedImage {
     cells: Rect,
@@ -149,7 +150,7 @@ struct PlacedImage {
 }
 
 impl PlacedImage {
-    /// Placement of the current preview: as large as possible, or at actual pixels.
+    /// Placement of the current preview, either as large as possible or showing actual pixels.
     fn of(state: &State, shown: &ShownImage, area: Rect, kind: PreviewKind) -> Self {
         let across = kind.grid().map_or(1, Grid::columns);
         let one_to_one = across as f32 / state.display.pixels_across() as f32;
@@ -157,8 +158,8 @@ impl PlacedImage {
         Self::fit(&shown.picture, area, kind, state.display.window.cell_aspect, most)
     }
 
-    /// The largest centered placement with the aspect ratio of the image. `cell_aspect` is the height of a
-    /// cell divided by its width; a pixel is at most `most` parts of a cell wide.
+    /// The largest centered placement with the image's aspect ratio. `cell_aspect` is a cell's height divided
+    /// by its width. The width of a pixel is limited to `most` parts of a cell.
     fn fit(picture: &Picture, area: Rect, kind: PreviewKind, cell_aspect: f32, most: f32) -> Self {
         let (across, down) = kind.grid().map_or((1, 1), |grid| (grid.columns() as u16, grid.rows() as u16));
         let pixel_aspect = cell_aspect * f32::from(across) / f32::from(down);
@@ -168,7 +169,7 @@ impl PlacedImage {
         let whole = |length: f32, room: f32| (length * scale).round().clamp(room.min(1.0), room) as u16;
         let (width, height) = (whole(size.0, room.0), whole(size.1, room.1));
         let (columns, rows) = (width.div_ceil(across), height.div_ceil(down));
-        // With several pixels per cell, round up to whole cells.
+        // If cells consist of several pixels horizontally, round up to whole cells.
         let (width, height) = if across > 1 { (columns * across, rows * down) } else { (width, height) };
         let cells = Rect {
             x: area.x + (area.width - columns.min(area.width)) / 2,
@@ -202,7 +203,7 @@ impl PlacedImage {
     }
 }
 
-/// An image at the size at which it is drawn.
+/// An image scaled to the size at which it is drawn.
 struct ScaledImage<'a> {
     width: u32,
     height: u32,
@@ -216,7 +217,7 @@ impl ScaledImage<'_> {
     }
 }
 
-/// A cell with two colors.
+/// Draws a cell with two colors.
 fn mosaic(
     scaled: &ScaledImage<'_>,
     grid: Grid,
@@ -229,7 +230,7 @@ fn mosaic(
     let parts: Vec<Option<[u8; 3]>> = (0..grid.columns() * grid.rows()).map(part).collect();
     let colors: Vec<[u8; 3]> = parts.iter().copied().flatten().collect();
     if colors.len() < parts.len() {
-        // The last row of cells may have no pixels in its lower half.
+        // The last row of cells may lack pixels in its lower half.
         let color = parts[0].map_or(Color::Reset, |rgb| shades.color(rgb, x, 2 * y));
         cell.set_symbol("▀").set_style(Style::new().fg(color).bg(Color::Reset));
         return;
@@ -239,7 +240,7 @@ fn mosaic(
     cell.set_char(shown.tile.symbols()[0]).set_style(Style::new().fg(first).bg(second));
 }
 
-/// A cell as a character.
+/// Draws a cell as a character.
 fn character(
     scaled: &ScaledImage<'_>,
     ramp: Ramp,
@@ -278,7 +279,7 @@ mod tests {
     }
 
     #[test]
-    fn image_of_the_requested_size_is_not_scaled() {
+    fn image_with_the_requested_size_is_not_scaled() {
         let placed = fit(50, 40, (50, 20), PreviewKind::HalfBlock, 2.0);
         assert_eq!(placed, PlacedImage { cells: Rect::new(3, 1, 50, 20), width: 50, height: 40 });
         let narrow = fit(20, 40, (50, 20), PreviewKind::HalfBlock, 2.0);
@@ -288,7 +289,7 @@ mod tests {
     }
 
     #[test]
-    fn aspect_is_kept_in_every_area() {
+    fn aspect_ratio_is_preserved_in_any_area() {
         for (columns, rows) in [(80_u16, 24_u16), (51, 20), (150, 55), (200, 20), (30, 60)] {
             for (width, height) in [(640, 480), (100, 300), (1920, 1080), (64, 64)] {
                 for (kind, across, per_cell) in [
@@ -302,7 +303,8 @@ mod tests {
                         let placed = fit(width, height, (columns, rows), kind, aspect);
                         let shown_height = placed.height as f32 * aspect / per_cell;
                         let shown_width = placed.width as f32 / across;
-                        // Half a pixel of rounding per side; with several pixels per cell, up to a cell.
+                        // Rounding adds up to half a pixel per side, or up to a cell if there are several
+                        // pixels per cell.
                         let is_fine = across > 1.0;
                         let (off_x, off_y) =
                             if is_fine { (1.0, aspect) } else { (0.5, 0.5 * aspect / per_cell) };
@@ -312,7 +314,7 @@ mod tests {
                         assert!(low <= wanted && wanted <= high, "{placed:?} for {width}×{height}");
                         assert!(
                             placed.cells.width == columns || placed.cells.height == rows,
-                            "{placed:?} leaves room"
+                            "{placed:?} does not fill the area"
                         );
                     }
                 }

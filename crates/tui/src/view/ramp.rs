@@ -1,11 +1,11 @@
-//! The preview in characters, whose ink approximates the brightness.
+//! Draws the preview using characters whose ink coverage approximates the brightness.
 
 use crate::film::Picture;
 use crate::math::Vec3;
 use crate::math::color::{linear_to_srgb, linear_to_srgb8, luminance, srgb_to_linear, srgb8_to_linear};
 
-/// Characters with the fraction of a cell that their ink covers, measured with DejaVu Sans Mono; other fonts
-/// differ by a few percent. All are punctuation, to distinguish them from text.
+/// Characters and the fraction of a cell covered by their ink, measured with DejaVu Sans Mono. Other fonts
+/// differ by a few percent. All characters are punctuation so that they are not confused with text.
 const RAMP: [(char, f32); 15] = [
     (' ', 0.0),
     ('.', 0.027),
@@ -25,10 +25,10 @@ const RAMP: [(char, f32); 15] = [
 ];
 const MAX_INK: f32 = RAMP[RAMP.len() - 1].1;
 
-/// Mapping from brightness to ink.
+/// Mapping from brightness to characters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Ramp {
-    /// The values shown as black and as white, in sRGB.
+    /// The sRGB values shown as black and white.
     low: f32,
     high: f32,
     /// Whether the background is lighter than the foreground.
@@ -36,9 +36,9 @@ pub(super) struct Ramp {
 }
 
 impl Ramp {
-    /// The ramp for an image: from its darkest to its brightest values, ignoring a thirtieth of the pixels at
-    /// each end. The limits are quantized so that noise does not change all characters, and contrast is
-    /// increased at most four times.
+    /// Creates a ramp from an image's darkest to its brightest values, ignoring a thirtieth of the pixels at
+    /// each end. The limits are quantized to keep most characters stable under noise. Contrast is increased
+    /// by no more than a factor of four.
     pub(super) fn of(picture: &Picture, is_light: bool) -> Self {
         const STEPS: f32 = 16.0;
         const MIN: f32 = 0.25;
@@ -54,7 +54,7 @@ impl Ramp {
         Self { low: low.max(0.0), high, is_light }
     }
 
-    /// Brightness in sRGB, mapped to the range of the ramp.
+    /// Maps an sRGB brightness to the ramp's range.
     fn stretched(self, brightness: f32) -> f32 {
         ((brightness - self.low) / (self.high - self.low).max(1e-3)).clamp(0.0, 1.0)
     }
@@ -64,8 +64,8 @@ impl Ramp {
         self.nearest(self.stretched(linear_to_srgb(luminance(srgb8_to_linear(rgb)).clamp(0.0, 1.0))))
     }
 
-    /// The character for a color and its ink, which is as saturated as possible so that the character covers
-    /// as much as possible.
+    /// The character for a color and the color of its ink. The ink is as saturated as possible, which
+    /// maximizes the area covered by the character.
     pub(super) fn tinted(self, rgb: [u8; 3]) -> (char, [u8; 3]) {
         let linear = srgb8_to_linear(rgb);
         if self.is_light {
@@ -78,12 +78,12 @@ impl Ramp {
         }
     }
 
-    /// The character closest to a brightness in sRGB. One end is the bare background, the other the densest
+    /// The character closest to an sRGB brightness. The range extends from the bare background to the densest
     /// character.
     fn nearest(self, brightness: f32) -> char {
         let off = |ink: f32| {
             let covered = ink / MAX_INK;
-            // Near white, the loss of brightness is about proportional to the ink.
+            // Near white, the loss of brightness is roughly proportional to the ink coverage.
             let seen = if self.is_light { 1.0 - covered } else { linear_to_srgb(covered) };
             (seen - brightness).abs()
         };
@@ -101,7 +101,7 @@ fn end(counts: &[usize; 256], mut levels: impl Iterator<Item = usize>, beyond: u
     level.unwrap_or_default() as f32 / 255.0
 }
 
-/// Quantizes a color to 5 bits per channel, so that noise causes no redraw.
+/// Quantizes a color to 5 bits per channel so that noise does not cause redraws.
 fn quantize(linear: Vec3) -> [u8; 3] {
     linear.to_array().map(|channel| {
         let level = linear_to_srgb8(channel) >> 3;
@@ -125,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn ink_follows_brightness_and_background() {
+    fn ink_depends_on_brightness_and_background() {
         let light = Ramp { is_light: true, ..FULL };
         assert_eq!((FULL.glyph([0; 3]), FULL.glyph([255; 3])), (' ', '@'));
         assert_eq!((light.glyph([0; 3]), light.glyph([255; 3])), ('@', ' '));
@@ -138,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn low_contrast_is_stretched_and_stable() {
+    fn low_contrast_is_increased_and_stable() {
         let dull = |noise: u8| {
             let pixels = (0..1000).map(|i| [80 + (i % 60) as u8 + noise * (i % 2) as u8; 3]).collect();
             Picture { width: 100, height: 10, pixels }
@@ -151,18 +151,18 @@ mod tests {
     }
 
     #[test]
-    fn ink_carries_hue_and_character_the_rest() {
+    fn ink_and_character_reproduce_the_color() {
         assert_eq!(FULL.tinted([128, 0, 0]).1, [255, 0, 0]);
         assert!(rank(FULL.tinted([128, 0, 0]).0) < rank(FULL.tinted([255, 0, 0]).0));
         let light = Ramp { is_light: true, ..FULL };
-        // Pale red is sparse pure red.
+        // Pale red is drawn as a sparse character in pure red.
         let (symbol, ink) = light.tinted([255, 200, 200]);
         assert_eq!(ink, [255, 0, 0]);
         assert!(rank(symbol) < 11 && rank(symbol) > 0, "{symbol}");
     }
 
     #[test]
-    fn backgrounds_are_light_or_dark() {
+    fn backgrounds_are_classified_as_light_or_dark() {
         assert!(is_light([255; 3]) && is_light([253, 246, 227]) && !is_light([0, 43, 54]));
     }
 }

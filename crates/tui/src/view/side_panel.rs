@@ -1,4 +1,4 @@
-//! The noise curve and the history strip, in the panel of a wide window below stages and results.
+//! The noise curve and the history strip, shown below stages and results in the panel of a wide window.
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
@@ -7,14 +7,14 @@ use super::layout::ENTRY_WIDTH;
 use super::{curve, diagnostics, strip};
 use crate::state::{Activity, State};
 
-/// Minimum window width for them.
+/// Minimum window width for the curve and the history.
 const WIDE: u16 = 120;
-/// Columns of the lines in a divided panel, enough for a stage with its reason.
+/// Width of the lines in a divided panel, enough for a stage and its reason.
 const COLUMN: u16 = 44;
-/// Minimum width of a panel that is divided side by side.
+/// Minimum panel width for placing the lines next to the curve and the history.
 const DIVIDED: u16 = 3 * ENTRY_WIDTH;
 
-/// Columns available to the lines of the panel; the rest is free.
+/// Number of columns available for the panel's lines. The others are used for the curve and the history.
 pub(super) fn columns_of_lines(state: &State, panel: Rect) -> u16 {
     let is_divided = is_wide(state) && panel.width >= DIVIDED;
     if is_divided { COLUMN } else { panel.width }
@@ -24,7 +24,7 @@ fn is_wide(state: &State) -> bool {
     state.display.window.columns >= WIDE
 }
 
-/// The free area next to or below the lines.
+/// The area left over next to or below the lines.
 fn area(state: &State, panel: Rect, lines: u16) -> Rect {
     if !is_wide(state) || state.overlays.views.is_some() {
         return Rect::ZERO;
@@ -33,11 +33,11 @@ fn area(state: &State, panel: Rect, lines: u16) -> Rect {
     let area = if used < panel.width {
         super::text::right_part(panel, used + 2)
     } else {
-        // One row stays empty above.
+        // Leave one empty row above.
         let used = (lines + u16::from(lines > 0)).min(panel.height);
         Rect { y: panel.y + used, height: panel.height - used, ..panel }
     };
-    // Stay above the pane of diagnostics.
+    // Stay above the diagnostics pane.
     let over = diagnostics::covered(state);
     if over.intersects(area) {
         return Rect { height: over.y.saturating_sub(area.y), ..area };
@@ -45,29 +45,29 @@ fn area(state: &State, panel: Rect, lines: u16) -> Rect {
     area
 }
 
-/// Draws what fits. Returns the cells used.
+/// Draws the parts that fit. Returns the cells used.
 pub(super) fn draw(state: &State, panel: Rect, lines: u16, buffer: &mut Buffer) -> Rect {
     let (curve, strip) = divided(state, panel, lines);
     curve::draw(state, curve, buffer);
     strip::draw(state, strip, buffer);
-    // A union with an empty area would reach to its corner.
+    // Skip empty areas, since their origin would extend the union.
     [curve, strip].into_iter().filter(|area| !area.is_empty()).reduce(Rect::union).unwrap_or_default()
 }
 
-/// The render of the history strip at a cell.
+/// The history entry at a cell of the history strip.
 pub(super) fn picture_at(state: &State, panel: Rect, lines: u16, place: (u16, u16)) -> Option<usize> {
     let (_, strip) = divided(state, panel, lines);
     strip::at(state, strip, place)
 }
 
-/// Divides the area between curve and strip. The strip is at the bottom so that it does not move when the
-/// results change.
+/// Divides the area between the curve and the strip. The strip is placed at the bottom so that it does not
+/// move when the results change.
 fn divided(state: &State, panel: Rect, lines: u16) -> (Rect, Rect) {
     let area = area(state, panel, lines);
     let is_over = state.work.activity == Activity::Done && !state.picture.history.is_open();
     let wants_curve = |area| is_over && curve::rows(state, area).is_some();
     if area.width >= DIVIDED {
-        // Side by side.
+        // Place them side by side.
         let half = if wants_curve(area) { area.width / 3 } else { 0 };
         let gap = if half > 0 { 2 } else { 0 };
         return (Rect { width: half, ..area }, super::text::right_part(area, half + gap));
@@ -75,7 +75,8 @@ fn divided(state: &State, panel: Rect, lines: u16) -> (Rect, Rect) {
     if !wants_curve(area) {
         return (Rect::ZERO, area);
     }
-    // The curve is first and the strip gets the rest, unless the strip would not fit.
+    // The curve is at the top and the strip gets the remaining space. If the strip would not fit, the curve
+    // is omitted.
     let rows = curve::rows(state, area).unwrap_or(0);
     let rest = area.height.saturating_sub(rows + 1);
     let below = Rect { y: area.bottom() - rest, height: rest, ..area };

@@ -1,4 +1,4 @@
-//! The stages: one line each while they run, a single line afterwards.
+//! The stages, with one line per stage during a render and a single line for all of them afterwards.
 
 use super::text::{Tone, columns, counted, delta, seconds, shortened, wrapped};
 use crate::messages;
@@ -6,17 +6,18 @@ use crate::pipeline::protocol::{Stage, StageReport, Status};
 use crate::scene::sanitize::visible;
 use crate::state::{AssetBar, State};
 
-/// Pieces of text with their tones.
+/// A line of text pieces and their tones.
 pub(super) type StyledLine = Vec<(String, Tone)>;
 
-/// Stages that took less than this fraction of the total time are left out of the single line.
+/// Stages that took less than this fraction of the total time are omitted from the summary line.
 const SMALL: f64 = 0.02;
-/// Width of the name and time columns, including the gap.
+/// Width of the name and time, including the gap between them.
 const TIME_ENDS: u16 = 16;
-/// Minimum columns of a reason.
+/// Minimum width of a shortened reason.
 const MIN_WHY: u16 = 12;
 
-/// Symbol, name, time, change and reason. The reason gets its own lines if there is no room next to them.
+/// Symbol, name, time, time difference and reason. If there is no space for the reason, it follows on
+/// separate lines.
 pub(super) fn lines(state: &State, stage: Stage, room: u16) -> Vec<StyledLine> {
     let mut line = stage_line(state, stage, room);
     let why = why(state, stage);
@@ -32,7 +33,7 @@ pub(super) fn lines(state: &State, stage: Stage, room: u16) -> Vec<StyledLine> {
     std::iter::once(line).chain(below).collect()
 }
 
-/// Symbol, name, time, change and as much of the reason as fits in one line.
+/// Symbol, name, time, time difference and as much of the reason as fits on the same line.
 pub(super) fn short(state: &State, stage: Stage, room: u16) -> Vec<StyledLine> {
     let mut line = stage_line(state, stage, room);
     let (why, room) = (why(state, stage), reason_columns(&line, room));
@@ -42,7 +43,7 @@ pub(super) fn short(state: &State, stage: Stage, room: u16) -> Vec<StyledLine> {
     vec![line]
 }
 
-/// Columns for a reason next to a stage.
+/// Number of columns available for a reason next to a stage.
 fn reason_columns(line: &StyledLine, room: u16) -> u16 {
     room.saturating_sub(width(line) + 2)
 }
@@ -56,7 +57,7 @@ fn why(state: &State, stage: Stage) -> String {
     visible(report.map_or("", |report| report.why.as_str())).into_owned()
 }
 
-/// Symbol, name, time and, if there is room, change.
+/// Symbol, name, time and, if it fits, the time difference.
 fn stage_line(state: &State, stage: Stage, room: u16) -> StyledLine {
     let report = state.work.stages.get(stage as usize).and_then(Option::as_ref);
     let has_ended = !state.work.is_running();
@@ -73,7 +74,7 @@ fn stage_line(state: &State, stage: Stage, room: u16) -> StyledLine {
         let (name, gap) = (stage.name(), usize::from(gap));
         vec![(sign.to_owned(), tone), (format!(" {name}{:gap$}{time}", ""), text_tone)]
     };
-    // Times are aligned unless the change needs the gap.
+    // Align the times unless the gap is needed for the time difference.
     let used = columns(stage.name()) + columns(&time);
     let usual = TIME_ENDS.saturating_sub(used).max(1);
     let change = report.map_or(String::new(), |report| change(state, report));
@@ -87,13 +88,13 @@ fn stage_line(state: &State, stage: Stage, room: u16) -> StyledLine {
     line
 }
 
-/// Bold for stages that an edit caused to run.
+/// Bold for stages that were run again after an edit.
 fn tone_of_stage(state: &State, report: Option<&StageReport>) -> Tone {
     let is_again = report.is_some_and(|it| it.status == Status::Done && state.work.renders > 0);
     if is_again && state.saving.edits > 0 { Tone::Strong } else { Tone::Plain }
 }
 
-/// Difference to the previous time of the stage.
+/// Difference from the stage's previous time.
 fn change(state: &State, report: &StageReport) -> String {
     match report.status {
         Status::Done => {
@@ -103,8 +104,8 @@ fn change(state: &State, report: &StageReport) -> String {
     }
 }
 
-/// The stages that took a significant part of the time and the number of cached ones, shortened to fit. Empty
-/// if not even the longest stage fits.
+/// The stages that took a significant part of the time and the number of cached stages, shortened to fit.
+/// Empty if even the longest stage does not fit.
 pub(super) fn summary_line(state: &State, room: u16) -> StyledLine {
     let done = || state.work.stages.iter().flatten().filter(|it| it.status == Status::Done);
     let total: f64 = done().map(|it| it.seconds).sum();
@@ -144,13 +145,13 @@ fn summary_line_with(state: &State, is_long: bool, counts: impl Fn(&StageReport)
     line
 }
 
-/// The running stage.
+/// Name of the running stage.
 pub(super) fn running_stage(state: &State) -> Option<&'static str> {
     let mut stages = state.work.stages.iter().flatten();
     stages.find(|stage| stage.status == Status::Running).map(|stage| stage.name.name())
 }
 
-/// Loaded fraction of an asset.
+/// Fraction of an asset that has been loaded.
 pub(super) fn fraction(asset: &AssetBar) -> f64 {
     let progress = &asset.progress;
     if progress.total == 0 { 1.0 } else { progress.done as f64 / progress.total as f64 }

@@ -1,5 +1,5 @@
-//! The status line below the image: progress while a render runs, then stages and files. Messages take its
-//! left part.
+//! The status line below the image. It shows progress during a render, and stages and files afterwards.
+//! Messages are shown on the left.
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
@@ -23,10 +23,10 @@ use crate::state::{Activity, OwnImage, State, WrittenFile};
 /// Hints for narrow windows.
 const SHORT_HINT: &str = "save it to re-render";
 const SHORT_HINT_OF_MODEL: &str = "re-renders on changes";
-/// Minimum columns of a progress bar.
+/// Minimum width of a progress bar.
 const MIN_BAR: u16 = 6;
 
-/// Draws the status line in the part that a message leaves.
+/// Draws the status line in the part that is not used by a message.
 pub(super) fn draw(state: &State, layout: &Layout, area: Rect, buffer: &mut Buffer, drawn: &mut ViewExtras) {
     match content(state) {
         StatusContent::Nothing => {}
@@ -47,7 +47,7 @@ enum StatusContent {
 }
 
 fn content(state: &State) -> StatusContent {
-    // The results belong to the newest render.
+    // The results are those of the newest render.
     if state.picture.history.is_open() && !state.work.is_running() {
         return StatusContent::Nothing;
     }
@@ -65,7 +65,7 @@ fn content(state: &State) -> StatusContent {
     }
 }
 
-/// Columns of the status line that a message must leave.
+/// Number of columns of the status line that a message must not use.
 pub(super) fn min_columns(state: &State, layout: &Layout) -> u16 {
     match content(state) {
         StatusContent::Nothing => 0,
@@ -77,13 +77,13 @@ pub(super) fn min_columns(state: &State, layout: &Layout) -> u16 {
     }
 }
 
-/// Progress of the last valid scene, which continues to render while the file is broken.
+/// Progress of rendering the last valid scene, which continues while the file is broken.
 pub(crate) fn last_good_progress(state: &State) -> Option<&RenderProgress> {
     let is_broken = matches!(state.work.activity, Activity::Broken | Activity::Waiting);
     state.work.progress.as_ref().filter(|progress| is_broken && progress.fraction < 1.0)
 }
 
-/// Fraction and text for the loading asset or the render.
+/// Fraction and text for the asset being loaded or the render.
 fn bar_words(state: &State, layout: &Layout) -> (f64, String) {
     let time = state.work.rendering_time(state.now).map_or(String::new(), running);
     match (&state.work.progress, state.work.assets.last()) {
@@ -91,7 +91,7 @@ fn bar_words(state: &State, layout: &Layout) -> (f64, String) {
             let samples = if progress.is_total_fixed {
                 format!("{}/{} samples", samples_so_far(progress), progress.total_samples)
             } else {
-                // The total is only estimated.
+                // The total is only an estimate.
                 format!("about {:.0} samples per pixel", progress.mean_samples.floor())
             };
             (progress.fraction, format!("{samples} · {time}"))
@@ -103,13 +103,13 @@ fn bar_words(state: &State, layout: &Layout) -> (f64, String) {
     }
 }
 
-/// Draws the progress bar of the loading asset or the render.
+/// Draws the progress bar for the asset being loaded or the render.
 fn bar(state: &State, layout: &Layout, area: Rect, buffer: &mut Buffer) {
     let name = running_stage(state).unwrap_or_default();
     let (fraction, words) = bar_words(state, layout);
     let room = area.width.saturating_sub(columns(name) + columns(&words) + 2);
     let noise = state.work.progress.and_then(|progress| progress.noise);
-    // The end of a pause cannot be predicted.
+    // While paused, the remaining time is unknown.
     let noise = noise.map(|noise| NoiseProgress { next: noise.next.filter(|_| !state.work.paused), ..noise });
     let fits = |noise: &String| room >= columns(noise) + 3 + MIN_BAR;
     let noise = noise.and_then(|noise| noise_words(&noise).into_iter().find(fits));
@@ -132,7 +132,8 @@ fn bar(state: &State, layout: &Layout, area: Rect, buffer: &mut Buffer) {
     put(buffer, area, &pieces, state.display.depth);
 }
 
-/// `noise 2.1 % → 1 % in about 14 s` or shorter. Called noise because a noise-free image may still be biased.
+/// `noise 2.1 % → 1 % in about 14 s`, and a shorter variant. It is called noise rather than error because a
+/// noise-free image may still be biased.
 fn noise_words(noise: &NoiseProgress) -> [String; 2] {
     let now = format!("noise {}", two_digit_percent(noise.now));
     let next = noise.next.map(|(level, seconds)| {
@@ -141,10 +142,10 @@ fn noise_words(noise: &NoiseProgress) -> [String; 2] {
     [next.unwrap_or_else(|| now.clone()), now]
 }
 
-/// Draws the stages in one line, and facts that the panel does not show.
+/// Draws the stages on one line, followed by other information that the panel does not show.
 fn summary(state: &State, layout: &Layout, area: Rect, buffer: &mut Buffer, drawn: &mut ViewExtras) {
     let of_files = file_pieces(state, layout);
-    // Files take precedence if there is not enough room.
+    // Files take precedence if there is not enough space.
     let room = area.width.saturating_sub(min_columns(state, layout));
     let mut pieces = stages::summary_line(state, room);
     let comma = if pieces.is_empty() { "" } else { ", " };
@@ -185,7 +186,7 @@ fn summary(state: &State, layout: &Layout, area: Rect, buffer: &mut Buffer, draw
     put_right(buffer, free, &seen, Tone::Faint, state.display.depth);
 }
 
-/// Name and size of each written file, unless the panel lists them.
+/// Name and size of each written file. Empty if the panel lists the files.
 fn file_pieces(state: &State, layout: &Layout) -> Vec<Vec<(String, Tone)>> {
     let pieces = |written: &WrittenFile| {
         let name = visible(&written.path.to_string_lossy()).into_owned();
@@ -197,7 +198,7 @@ fn file_pieces(state: &State, layout: &Layout) -> Vec<Vec<(String, Tone)>> {
 
 /// The files that contain the current image.
 pub(super) fn files(state: &State) -> impl Iterator<Item = &WrittenFile> {
-    // If the scene's own image has not changed, the previous request wrote it.
+    // If the scene's own image has not changed, it may have been written by an earlier request.
     let is_own = state.request.is_own();
     let of_any_request = is_own && state.saving.unwritten.is_none();
     state
@@ -209,7 +210,7 @@ pub(super) fn files(state: &State) -> impl Iterator<Item = &WrittenFile> {
         .filter(move |written| of_any_request || written.generation == state.request.generation)
 }
 
-/// Lines about an unsaved image, and about the state of the scene's own image.
+/// Messages about an unsaved image and the state of the scene's own image.
 pub(crate) fn not_saved(state: &State) -> Vec<String> {
     if state.request.is_own() || files(state).next().is_some() {
         return Vec::new();
@@ -230,7 +231,7 @@ pub(crate) fn not_saved(state: &State) -> Vec<String> {
     words
 }
 
-/// A line about each written file that another program has changed.
+/// A message about each written file that another program has changed.
 pub(super) fn lost(state: &State) -> impl Iterator<Item = String> {
     let words = |written: &WrittenFile| {
         let name = visible(&written.path.to_string_lossy()).into_owned();
@@ -239,12 +240,12 @@ pub(super) fn lost(state: &State) -> impl Iterator<Item = String> {
     state.saving.written.iter().filter_map(words)
 }
 
-/// Time from the save to the first changed cell.
+/// Time between saving the file and drawing the first changed cell.
 pub(super) fn save_to_screen_time(state: &State) -> Option<String> {
     state.saving.first_change.map(|time| messages::on_screen(&duration(time)))
 }
 
-/// A hint for a user who has not saved yet, unless there is nothing to save.
+/// A hint for users who have not saved yet. Empty if there is nothing to save.
 pub(super) fn hint(state: &State) -> String {
     if state.saving.edits > 0 || is_unreadable(state) {
         return String::new();
@@ -252,14 +253,14 @@ pub(super) fn hint(state: &State) -> String {
     let name =
         state.request.scene.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     let name = visible(&name);
-    // Models are written by a program, not saved by the user.
+    // Models are usually exported by a program rather than saved by the user.
     if is_mesh(&state.request.scene) {
         return messages::renders_on_changes(&name);
     }
     messages::save_to_render(&name, state.picture.shown.is_some() || state.work.renders > 0)
 }
 
-/// Whether the scene cannot be read at all, for example because it does not exist.
+/// Whether the scene cannot be read at all, for example because the file does not exist.
 fn is_unreadable(state: &State) -> bool {
     let overlays = &state.overlays;
     let found = overlays.problems.as_ref().filter(|problems| problems.work.is_none());
@@ -267,7 +268,7 @@ fn is_unreadable(state: &State) -> bool {
     diagnostics.is_some_and(|all| all.iter().all(|one| one.place.is_none()))
 }
 
-/// Cost of the last preview: bytes with the round trip, or bytes only.
+/// Cost of sending the last preview: the number of bytes with and without the round-trip time.
 fn frame(state: &State) -> Vec<String> {
     let Some(frame) = state.display.frame else { return Vec::new() };
     let cost = |time| messages::preview_cost(frame.bytes.div_ceil(1000), time);

@@ -1,4 +1,4 @@
-//! The history strip: recent renders, newest first, with the changes since the previous one.
+//! The history strip: recent renders from newest to oldest, each with the changes since the previous one.
 
 use super::preview;
 use super::strip_words::{EntryText, fitting};
@@ -11,7 +11,7 @@ use crate::state::State;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-/// Rows of an entry: of its thumbnail, in total, and from one entry to the next.
+/// Height of an entry's thumbnail, height of the whole entry, and distance between entries, in rows.
 #[derive(Clone, Copy)]
 struct EntryRows {
     picture: u16,
@@ -19,17 +19,17 @@ struct EntryRows {
     pitch: u16,
 }
 
-/// In a narrow strip, the row below a thumbnail stays empty unless the text needs it.
+/// In a narrow strip, the row below a thumbnail is empty unless the text needs it.
 const NARROW_ROWS: EntryRows = EntryRows { picture: 3, entry: 4, pitch: 4 };
 const WIDE_ROWS: EntryRows = EntryRows { picture: 5, entry: 5, pitch: 6 };
-/// Minimum columns of a wide strip.
+/// Minimum width of a wide strip.
 const WIDE: u16 = 40;
-/// Minimum columns of the text next to a thumbnail.
+/// Minimum width of the text next to a thumbnail.
 const MIN_WORDS: u16 = 10;
-/// Width of a column if there are several.
+/// Width of a column if there is more than one.
 const COLUMN: u16 = 44;
 
-/// An entry of the strip and its position.
+/// A history entry and its position in the strip.
 struct StripEntry {
     /// Index into the history.
     index: usize,
@@ -63,7 +63,7 @@ fn draw_item(state: &State, StripEntry { index, cells, rows }: &StripEntry, buff
     preview::draw_small(state, picture, place, buffer);
     let is_looked_at = history.shown_index() == Some(*index);
     let (mark, tone) = if is_looked_at { ("▸", Tone::Strong) } else { (" ", Tone::Plain) };
-    // The text is next to the thumbnail, in the same columns with and without a mark.
+    // The text is next to the thumbnail. It starts at the same column with and without a mark.
     let words = EntryText {
         head: format!("{mark}{} ", number(state, *index)),
         changes: history.changes(*index, is_under_way(state, *index)),
@@ -75,39 +75,39 @@ fn draw_item(state: &State, StripEntry { index, cells, rows }: &StripEntry, buff
     }
 }
 
-/// Number of the render that made an entry; a dash if it was stopped.
+/// Number of the render that produced an entry, or a dash if it was stopped.
 fn number(state: &State, index: usize) -> String {
     let under_way = is_under_way(state, index).then_some(state.work.renders + 1);
     state.picture.history.run(index).or(under_way).map_or("–".to_owned(), |run| run.to_string())
 }
 
-/// Whether the render of an entry is running.
+/// Whether an entry's render is still running.
 fn is_under_way(state: &State, index: usize) -> bool {
     state.work.is_under_way() && state.picture.history.is_of(index, state.request.generation)
 }
 
-/// Columns of a thumbnail of this height that leave room for text.
+/// Width of a thumbnail with this height, limited to leave space for text.
 fn width(state: &State, picture: &Picture, cells: Rect) -> u16 {
     let shape = picture.width as f32 / picture.height.max(1) as f32 * state.display.window.cell_aspect;
     let width = (f32::from(cells.height) * shape).round() as u16;
     width.clamp(1, cells.width.saturating_sub(MIN_WORDS + 1).max(1))
 }
 
-/// Rows of the strip in an area. 0 if there is nothing to choose from or no room.
+/// Number of rows used by the strip in an area. 0 if there are too few entries or too little space.
 pub(super) fn rows(state: &State, area: Rect) -> u16 {
     let items = items(state, area);
     let top = items.iter().map(|item| item.cells.y).min();
     top.map_or(0, |top| area.bottom() - top + 1)
 }
 
-/// The entries that fit, at the bottom of an area. The newest is first; the one being looked at is always
+/// The entries that fit at the bottom of an area. The newest is first. The one being viewed is always
 /// included.
 fn items(state: &State, area: Rect) -> Vec<StripEntry> {
     let count = state.picture.history.len();
     let rows = if area.width >= WIDE { WIDE_ROWS } else { NARROW_ROWS };
     let columns = (area.width / COLUMN).max(1);
     let gap = rows.pitch - rows.entry;
-    // The title takes one row.
+    // The title uses one row.
     let most = (area.height + gap).saturating_sub(1) / rows.pitch;
     let room = usize::from(most) * usize::from(columns);
     if count < 2 || room < 2 || area.width < MIN_WORDS + 8 {

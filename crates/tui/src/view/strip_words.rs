@@ -1,4 +1,4 @@
-//! The text of a history entry: as many changes as fit, but always the new value.
+//! The text of a history entry. Shows as many changes as fit, and always the new value.
 
 use unicode_width::UnicodeWidthStr;
 
@@ -7,29 +7,29 @@ use crate::scene::{key_parts, shortened_key, split_key};
 
 /// Text of a history entry.
 pub(super) struct EntryText {
-    /// Mark and number, followed by a blank.
+    /// Mark and number, followed by a space.
     pub(super) head: String,
     /// Changes since the previous entry.
     pub(super) changes: Vec<String>,
 }
 
-/// How much of a change is shown, from most to least.
+/// How much of a change to show, from most to least.
 #[derive(Clone, Copy)]
 enum ChangeForm {
-    /// The key with its old and new value.
+    /// The key with its old and new values.
     Full,
     /// The key with its new value.
     New,
-    /// The last parts of the key, which identify an object and its property, with the new value.
+    /// The last parts of the key, which identify an object and its property, and the new value.
     Short,
-    /// Like `Short`, but only for this many changes.
+    /// Like `Short`, but only the given number of changes.
     First(usize),
-    /// The first change, with the property in one line.
+    /// The first change, with the property shortened to one line.
     Cut,
 }
 
-/// Lines of at most `width` columns, in the first number of rows if possible, else in the second. Surplus
-/// text is appended to the last line.
+/// Formats the text as lines of `width` columns. Tries to fit it into the first number of rows, then into the
+/// second. If it still does not fit, the excess is appended to the last line.
 pub(super) fn fitting(words: &EntryText, width: usize, rows: [usize; 2]) -> Vec<String> {
     let [few, most] = rows;
     let all = [ChangeForm::Full, ChangeForm::New, ChangeForm::Short];
@@ -54,7 +54,7 @@ pub(super) fn fitting(words: &EntryText, width: usize, rows: [usize; 2]) -> Vec<
     lines
 }
 
-/// Pieces of the changes that are kept in one line if possible.
+/// The pieces of all changes that are shown.
 fn pieces(words: &EntryText, form: ChangeForm, width: usize) -> Vec<ChangePiece> {
     let changes = &words.changes;
     let told = match form {
@@ -80,7 +80,7 @@ fn pieces(words: &EntryText, form: ChangeForm, width: usize) -> Vec<ChangePiece>
     pieces
 }
 
-/// Text that is kept in one line if possible.
+/// Text that is kept on one line if possible.
 struct ChangePiece {
     text: String,
     is_key: bool,
@@ -91,7 +91,7 @@ impl ChangePiece {
         Self { text: text.into(), is_key: false }
     }
 
-    /// The parts after which a line may break: parts of the key, or words.
+    /// The parts after which a line may be broken: parts of the key, or words.
     fn parts(&self) -> Vec<String> {
         if !self.is_key {
             return self.text.split(' ').map(str::to_owned).collect();
@@ -104,7 +104,7 @@ impl ChangePiece {
     }
 }
 
-/// Pieces of a change: the key and its values, or single words.
+/// Splits a change into pieces: the key and its values, or single words.
 fn change_pieces(change: &str, form: ChangeForm, beside_head: usize) -> Vec<ChangePiece> {
     let words = |text: &str| text.split(' ').map(ChangePiece::words).collect::<Vec<_>>();
     let key = |key: &str| ChangePiece { text: format_key(key, form, beside_head), is_key: true };
@@ -135,8 +135,8 @@ fn format_key(key: &str, form: ChangeForm, beside_head: usize) -> String {
     }
 }
 
-/// The last parts of a key, which identify an object and its property: `lamp.emission` of
-/// `materials.lamp.emission`, or all of `light.1.direction`.
+/// The last parts of a key, which identify an object and its property. Returns `lamp.emission` for
+/// `materials.lamp.emission`, but all of `light.1.direction`.
 fn last_parts(key: &str) -> String {
     let parts = key_parts(key);
     let first = parts.len().saturating_sub(2);
@@ -144,8 +144,8 @@ fn last_parts(key: &str) -> String {
     parts[first.saturating_sub(usize::from(is_number))..].join(".")
 }
 
-/// Fills lines with pieces, after a head. Pieces that are too long are broken, keys after a dot and others
-/// between words.
+/// Fills lines with pieces, after a head. Pieces that are too long are broken. Keys are broken after a dot,
+/// and other pieces between words.
 fn filled(head: &str, pieces: &[ChangePiece], width: usize) -> Vec<String> {
     let mut lines = vec![head.to_owned()];
     let mut is_behind_head = true;
@@ -178,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn number_precedes_key_and_value_is_complete() {
+    fn number_is_first_and_new_value_is_complete() {
         let emission = "materials.lamp.emission [14, 13, 11] → [20, 13, 5]";
         assert_eq!(lines("▸4", &[emission], 13), ["▸4 materials.", "lamp.emission", "→ [20, 13, 5]"]);
         assert_eq!(lines("▸4", &[emission], 12), ["▸4 lamp.", "emission →", "[20, 13, 5]"]);
@@ -191,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn property_is_never_left_out() {
+    fn property_name_is_always_shown() {
         let quoted = "materials.\"copper ball\".roughness 0.1 → 0.4";
         let light = "light.1.direction [0, -1, 0] → [0.25, -1, 0.5]";
         let comes = "+ materials.\"copper ball\".roughness = 0.4";
@@ -211,12 +211,12 @@ mod tests {
     }
 
     #[test]
-    fn reset_settings_are_one_change() {
+    fn settings_reset_together_are_one_change() {
         assert_eq!(lines(" 4", &["integrator and view reset"], 60), [" 4 integrator and view reset"]);
     }
 
     #[test]
-    fn mark_does_not_break_the_line() {
+    fn mark_does_not_affect_line_breaks() {
         let changes = [messages::STOPPED, "shadows hard", "view and camera reset"];
         for width in 10..30 {
             let [with, without] = ["▸7", " 7"].map(|number| lines(number, &changes, width));
@@ -239,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn as_many_changes_as_fit_are_shown() {
+    fn as_many_changes_as_possible_are_shown() {
         let changes = [messages::STOPPED, "camera.fov 40 → 25.0", "render.samples 64 → 16"];
         assert_eq!(lines(" –", &changes, 14), [" – stopped:", "camera.fov", "→ 25.0 …"]);
         let six = [

@@ -1,4 +1,4 @@
-//! Text in cells: styles that work without color, and formatted quantities.
+//! Text in cells: styles that also work without color, and formatting of quantities.
 
 use std::time::Duration;
 
@@ -10,7 +10,7 @@ use unicode_width::{UnicodeWidthChar, UnicodeWidthStr};
 use crate::color::ColorDepth;
 pub(super) use crate::pipeline::words::seconds;
 
-/// Role of a piece of text. Its color is one of the 16 ANSI colors, which follow the terminal's theme.
+/// Role of a piece of text. Its color is one of the 16 ANSI colors, so it matches the terminal's theme.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Tone {
     Plain,
@@ -22,14 +22,14 @@ pub(super) enum Tone {
     Good,
     Warning,
     Error,
-    /// Name of a written file, a hyperlink if the terminal supports them.
+    /// Name of a written file, shown as a hyperlink if the terminal supports them.
     File,
-    /// The selected line of a list.
+    /// The selected line in a list.
     Chosen,
 }
 
 impl Tone {
-    /// The style of the text; without colors, only modifiers.
+    /// The style for text with this tone. Without color support, only modifiers are used.
     pub(super) fn style(self, depth: ColorDepth) -> Style {
         let (color, modifier) = match self {
             Self::Plain | Self::File => (Color::Reset, Modifier::empty()),
@@ -46,8 +46,8 @@ impl Tone {
         Style::new().fg(color).bg(Color::Reset).add_modifier(modifier)
     }
 
-    /// The style of a solid block with black or white text, whichever is readable in every theme; reversed
-    /// without colors.
+    /// The style for a solid block with black or white text, chosen to be readable in any theme. Without
+    /// color support, text is reversed.
     pub(super) fn block(self, depth: ColorDepth) -> Style {
         let (fg, bg) = match self {
             _ if depth == ColorDepth::None => (Color::Reset, Color::Reset),
@@ -59,14 +59,15 @@ impl Tone {
                 (Color::Reset, Color::Reset)
             }
         };
-        // xterm and others draw bold black as gray, the bright half of the palette.
+        // xterm and others draw bold black as gray, using the bright half of the palette.
         let reversed = Modifier::REVERSED.union(Modifier::BOLD);
         let modifier = if bg == Color::Reset { reversed } else { Modifier::empty() };
         Style::new().fg(fg).bg(bg).add_modifier(modifier)
     }
 }
 
-/// Writes text into the first row of an area, shortened with an ellipsis if needed. Returns the columns used.
+/// Writes text into the first row of an area, truncated with an ellipsis if necessary. Returns the number of
+/// columns used.
 pub(super) fn put(buffer: &mut Buffer, area: Rect, pieces: &[(&str, Tone)], depth: ColorDepth) -> u16 {
     let area = area.intersection(buffer.area);
     if area.is_empty() {
@@ -80,7 +81,7 @@ pub(super) fn put(buffer: &mut Buffer, area: Rect, pieces: &[(&str, Tone)], dept
         let style = tone.style(depth);
         x = buffer.set_stringn(x, area.y, text, usize::from(end - x), style).0;
         if is_cut && x + 1 >= end && columns(text) > 0 {
-            // A wide character may leave one column.
+            // A wide character may leave one column unused.
             buffer.set_stringn(x, area.y, "…", 1, style);
         }
     }
@@ -101,18 +102,18 @@ pub(crate) fn columns(text: &str) -> u16 {
     u16::try_from(text.width()).unwrap_or(u16::MAX)
 }
 
-/// A row of an area, counted from its top; empty beyond its end.
+/// A row of an area, counted from the top. Empty if out of range.
 pub(super) fn row(area: Rect, index: u16) -> Rect {
     if index < area.height { Rect { y: area.y + index, height: 1, ..area } } else { Rect::ZERO }
 }
 
-/// The rest of a row to the right of the used columns.
+/// The part of a row to the right of the used columns.
 pub(super) fn right_part(area: Rect, used: u16) -> Rect {
     let used = used.min(area.width);
     Rect { x: area.x + used, width: area.width - used, ..area }
 }
 
-/// Shortens a text to fit, with an ellipsis.
+/// Truncates text to fit, adding an ellipsis.
 pub(crate) fn shortened(text: &str, room: u16) -> String {
     if columns(text) <= room {
         return text.to_owned();
@@ -129,7 +130,7 @@ pub(crate) fn shortened(text: &str, room: u16) -> String {
     if room == 0 { short } else { format!("{}…", short.trim_end()) }
 }
 
-/// Wraps a text into lines, between words if possible.
+/// Wraps text into lines, breaking between words if possible.
 pub fn wrapped(text: &str, width: usize) -> Vec<String> {
     let width = width.max(1);
     let (mut lines, mut line, mut length) = (Vec::new(), String::new(), 0);
@@ -153,17 +154,18 @@ pub fn wrapped(text: &str, width: usize) -> Vec<String> {
     lines.into_iter().map(|line| line.trim_end().to_owned()).collect()
 }
 
-/// A duration in a few characters.
+/// Formats a duration in a few characters.
 pub(crate) fn duration(time: Duration) -> String {
     seconds(time.as_secs_f64())
 }
 
-/// A running time, with tenths of seconds up to a minute so that it does not flicker.
+/// Formats a running time. Up to a minute, it is shown in tenths of a second, so that the format does not
+/// keep changing.
 pub(super) fn running(time: Duration) -> String {
     if time.as_secs() < 60 { format!("{:.1} s", time.as_secs_f64()) } else { duration(time) }
 }
 
-/// A file size.
+/// Formats a file size.
 pub(super) fn bytes(bytes: u64) -> String {
     match bytes {
         0..1000 => format!("{bytes} B"),
@@ -173,7 +175,7 @@ pub(super) fn bytes(bytes: u64) -> String {
     }
 }
 
-/// An estimated time with at most two digits: `about 9 s`.
+/// Formats an estimated time with one or two digits: `about 9 s`.
 pub(super) fn approximate_time(seconds: f64) -> String {
     match seconds {
         x if x < 1.0 => "under 1 s".to_owned(),
@@ -184,9 +186,10 @@ pub(super) fn approximate_time(seconds: f64) -> String {
     }
 }
 
-/// Change of a stage's time, in the unit of the time unless it is far larger; empty if insignificant.
+/// Formats the difference between a stage's time and its previous time, using the unit of the time unless the
+/// difference is far larger. Empty if insignificant.
 pub(super) fn delta(seconds: f64, before: Option<f64>) -> String {
-    /// Relative variation of identical work.
+    /// Relative variation in the time taken by identical work.
     const NOISE: f64 = 0.05;
     let Some(before) = before else { return String::new() };
     let change = seconds - before;
@@ -208,7 +211,7 @@ pub(super) fn delta(seconds: f64, before: Option<f64>) -> String {
     }
 }
 
-/// A thin progress bar of `columns` columns: filled and empty part.
+/// A thin progress bar, `columns` wide, as its filled and empty parts.
 pub(super) fn gauge(fraction: f64, columns: u16, ascii: bool) -> (String, String) {
     let (full, empty) = if ascii { ("#", "-") } else { ("━", "─") };
     let columns = usize::from(columns);
@@ -216,12 +219,12 @@ pub(super) fn gauge(fraction: f64, columns: u16, ascii: bool) -> (String, String
     (full.repeat(filled_squares), empty.repeat(columns - filled_squares))
 }
 
-/// Whole percent; 100 only when finished.
+/// Percentage rounded down, so 100 is shown only when finished.
 pub(crate) fn percent(fraction: f64) -> u32 {
     (fraction.clamp(0.0, 1.0) * 100.0).floor() as u32
 }
 
-/// A fraction in percent with two digits: `2.1 %`, `1 %`.
+/// Formats a fraction as a percentage with one or two digits: `2.1 %`, `1 %`.
 pub(super) fn two_digit_percent(part: f64) -> String {
     let percent = part * 100.0;
     let digits = if percent > 0.0 { (1 - percent.log10().floor() as i32).clamp(0, 6) } else { 0 };
@@ -281,7 +284,7 @@ mod tests {
     }
 
     #[test]
-    fn time_changes_use_the_unit_of_the_time() {
+    fn time_differences_use_the_unit_of_the_time() {
         for (seconds, before, words) in [
             (1.12, Some(1.42), "−.3 s"),
             (1.12, Some(1.10), ""),
@@ -317,7 +320,7 @@ mod tests {
     }
 
     #[test]
-    fn shortened_text_has_an_ellipsis() {
+    fn truncated_text_ends_with_an_ellipsis() {
         for (text, room, shown) in [
             ("abcdef", 6, "abcdef"),
             ("abcdef", 5, "abcd…"),
@@ -332,7 +335,7 @@ mod tests {
                 let (first, second) = text.split_at(split);
                 put(&mut buffer, area, &[(first, Tone::Plain), (second, Tone::Faint)], ColorDepth::None);
                 let seen: String = buffer.content.iter().map(|cell| cell.symbol()).collect();
-                // The right half of a wide character is blank in the buffer.
+                // The cell after a wide character is blank in the buffer.
                 assert_eq!(seen.replace(' ', ""), shown, "{text} {room} {split}");
             }
         }

@@ -1,4 +1,4 @@
-//! The list of views, shown briefly after one was chosen, in the panel or over the image.
+//! The view list, shown briefly after a view was selected, in the panel or over the image.
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
@@ -10,9 +10,9 @@ use crate::choice::Choice;
 use crate::pipeline::settings::View;
 use crate::state::State;
 
-/// Columns of a view with its digit.
+/// Width of a view and its digit.
 const WIDTH: u16 = 16;
-/// Number of views with a digit.
+/// Number of views that have a digit.
 pub(crate) const DIGITS: usize = 9;
 
 pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
@@ -21,7 +21,7 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
     if area.is_empty() {
         return;
     }
-    // Clear everything that the list would cut off.
+    // Clear everything that would be partly covered by the list.
     let is_in_panel = layout.panel.intersection(area) == area;
     Clear.render(if is_in_panel { layout.panel } else { area }, buffer);
     let (columns, rows) = (usize::from((area.width / WIDTH).max(1)), usize::from(area.height));
@@ -44,12 +44,12 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
     }
 }
 
-/// Views per column.
+/// Number of views per column.
 pub(crate) fn rows(state: &State) -> usize {
     usize::from(area(&Layout::of(state)).height).max(1)
 }
 
-/// Draws a view with its digit, and a mark if there are more above or below.
+/// Draws a view and its digit, and a mark if more views are hidden above or below.
 fn line(state: &State, number: usize, (current, more): (usize, &str), place: Rect, buffer: &mut Buffer) {
     let digit = if number < DIGITS { (number + 1).to_string() } else { " ".to_owned() };
     let is_current = number == current;
@@ -61,7 +61,8 @@ fn line(state: &State, number: usize, (current, more): (usize, &str), place: Rec
     put(buffer, place, &pieces, state.display.depth);
 }
 
-/// One column in a panel that is high enough, else as many as fit.
+/// The area of the list. It has one column in a panel of sufficient height, and otherwise as many columns as
+/// necessary.
 fn area(layout: &Layout) -> Rect {
     let all = View::ALL.len() as u16;
     let panel = layout.panel;

@@ -12,7 +12,7 @@ pub(super) struct LogAxis {
 }
 
 impl LogAxis {
-    /// An axis around the positive values, with a fraction `free` left empty at its start.
+    /// Creates an axis that spans the positive values, after an empty fraction `free` at the start.
     pub(super) fn around(values: impl Iterator<Item = f64>, free: f64) -> Self {
         let logs = values.filter(|value| *value > 0.0 && value.is_finite()).map(libm::log10);
         let (low, high) =
@@ -72,7 +72,7 @@ pub(super) fn plain(mark: f64) -> String {
     }
 }
 
-/// The first digit and the exponent.
+/// A mark's leading digit and exponent.
 fn parts(mark: f64) -> (i32, i32) {
     let whole = (mark + 1e-9).floor();
     (libm::pow(10.0, mark - whole).round() as i32, whole as i32)

@@ -65,7 +65,7 @@ pub(super) fn draw<'a>(scene: &SceneResult, place: &PanelArea<'a>) -> Result<(),
     legend(&mut chart)
 }
 
-/// The caption, without characters that XML does not allow.
+/// The caption, without characters that are invalid in XML.
 fn caption(scene: &SceneResult) -> String {
     format!("{}, {}×{}", visible(&scene.scene), scene.width, scene.height)
 }
@@ -99,7 +99,7 @@ fn floor<'c, 'a: 'c>(chart: &mut Chart<'c, 'a>, level: f64, across: &LogAxis) ->
     Ok(())
 }
 
-/// Draws the range of errors of each step.
+/// Draws the error range of each step.
 fn bars<'c, 'a: 'c>(
     chart: &mut Chart<'c, 'a>,
     method: &MethodResult,
@@ -117,7 +117,7 @@ fn bars<'c, 'a: 'c>(
     Ok(())
 }
 
-/// Draws the medians, and adds the method to the legend.
+/// Draws the medians and adds the method to the legend.
 fn line<'c, 'a: 'c>(
     chart: &mut Chart<'c, 'a>,
     method: &MethodResult,
@@ -138,7 +138,7 @@ fn line<'c, 'a: 'c>(
     Ok(())
 }
 
-/// A filled marker around a pixel. Methods differ in its shape.
+/// A filled marker centered on a pixel. The shape depends on the method's number.
 fn marker(at: (i32, i32), number: usize) -> Polygon<(i32, i32)> {
     let corners: &[(i32, i32)] = match number % 4 {
         0 => &[(-1, -1), (1, -1), (1, 1), (-1, 1)],
@@ -151,7 +151,7 @@ fn marker(at: (i32, i32), number: usize) -> Polygon<(i32, i32)> {
     Polygon::new(corners.iter().map(corner).collect::<Vec<_>>(), color(number).filled())
 }
 
-/// The legend of a method, such as `path, slope −0.98`.
+/// A method's legend entry, such as `path, slope −0.98`.
 fn label(method: &MethodResult) -> String {
     let slope = method.slope.map_or(String::new(), |Slope { value, .. }| {
         format!(", slope {}{:.2}", if value < 0.0 { "−" } else { "" }, value.abs())

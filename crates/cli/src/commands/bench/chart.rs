@@ -1,4 +1,4 @@
-//! The plot in the terminal, in braille: at the end, and above the progress bar.
+//! The braille plot in the terminal, shown above the progress bar and at the end.
 
 use std::io::IsTerminal;
 
@@ -14,10 +14,10 @@ use crate::progress::seconds;
 use crate::scene::sanitize::visible;
 use crate::tui::paint::as_text_lines;
 
-/// Colors of the methods, from the terminal's palette.
+/// Method colors, from the terminal's palette.
 const COLORS: [Color; 6] =
     [Color::Blue, Color::Red, Color::Green, Color::Magenta, Color::Yellow, Color::Cyan];
-/// Markers of the methods. Combinations of marker and color repeat after thirty methods.
+/// Method markers. Combinations of marker and color repeat after thirty methods.
 const MARKERS: [char; 5] = ['o', 'x', '+', '*', '#'];
 /// Rows of a chart.
 const ROWS: u16 = 16;
@@ -25,7 +25,7 @@ const ROWS: u16 = 16;
 const MAX_COLUMNS: u16 = 100;
 /// Minimum size of a readable chart.
 const MIN_SIZE: (u16, u16) = (30, 8);
-/// Rows that a chart leaves free for the current task, the bar and the prompt.
+/// Rows reserved for the current task, the bar and the prompt.
 const RESERVED_ROWS: u16 = 6;
 
 /// The points of one scene measured so far.
@@ -51,7 +51,7 @@ impl ConvergenceChart {
         Self { scene: scene.scene.clone(), methods: methods.collect() }
     }
 
-    /// Adds a point. Clears the points of another scene.
+    /// Adds a point. Clears the chart if the point belongs to another scene.
     pub(super) fn add(&mut self, scene: &str, method: &str, point: (f64, f64)) {
         if self.scene != scene {
             *self = Self { scene: scene.to_owned(), methods: Vec::new() };
@@ -62,9 +62,10 @@ impl ConvergenceChart {
         }
     }
 
-    /// The text above the bar in a terminal of this size. Empty without points or space.
+    /// The chart as text, for a terminal of this size. Empty if there are no points or if the chart does not
+    /// fit.
     pub(super) fn text(&self, (columns, rows): (u16, u16), is_colored: bool) -> String {
-        // Some terminals wrap lines as wide as the terminal.
+        // Some terminals wrap lines that fill the whole width.
         let size = (columns.saturating_sub(1).min(MAX_COLUMNS), rows.saturating_sub(RESERVED_ROWS).min(ROWS));
         if self.methods.is_empty() || size.0 < MIN_SIZE.0 || size.1 < MIN_SIZE.1 {
             return String::new();
@@ -80,7 +81,7 @@ impl ConvergenceChart {
             lines.map(|((line, points), style)| datasets(&line.name, points, style)).unzip();
         let across = bounds(points.iter().flatten().map(|point| point.0));
         let up = bounds(points.iter().flatten().map(|point| point.1));
-        // Draw markers over all lines.
+        // Draw markers on top of all lines.
         let chart = Chart::new(trends.into_iter().chain(signs).collect())
             .hidden_legend_constraints((Constraint::Percentage(70), Constraint::Percentage(70)))
             .x_axis(Axis::default().bounds(across).labels(labels(across, seconds)))
@@ -92,7 +93,7 @@ impl ConvergenceChart {
     }
 }
 
-/// The line through the points, and the markers with the name.
+/// The line through the points, and the markers, which are labeled with the name.
 fn datasets<'a>(
     name: &str,
     points: &'a [(f64, f64)],
@@ -133,7 +134,7 @@ fn bounds(values: impl Iterator<Item = f64>) -> [f64; 2] {
     if low > high { [-1.0, 1.0] } else { [low - 0.1, high + 0.1] }
 }
 
-/// Labels at both ends and in the middle.
+/// Axis labels at both ends and in the middle.
 fn labels([low, high]: [f64; 2], word: impl Fn(f64) -> String) -> Vec<String> {
     [low, (low + high) / 2.0, high].map(|power| word(libm::pow(10.0, power))).to_vec()
 }
@@ -176,7 +177,7 @@ mod tests {
         assert!(plain.chars().any(|c| ('\u{2801}'..='\u{28ff}').contains(&c)), "{plain}");
         assert!(plain.contains("o path") && plain.contains("201 ms") && plain.contains("1e-1"), "{plain}");
         assert!(plain.lines().all(|line| line.chars().count() <= 60) && !plain.contains('\u{1b}'), "{plain}");
-        assert_eq!(plain.matches('o').count(), 2 + 1, "two points and the legend: {plain}");
+        assert_eq!(plain.matches('o').count(), 2 + 1, "expected two points and the legend: {plain}");
         let colored = as_text_lines(&buffer, true);
         let ends = |line: &str| line.rfind('\u{1b}') == line.rfind("\u{1b}[0m");
         assert!(colored.contains("\u{1b}[34m") && colored.lines().all(ends), "{colored}");

@@ -1,4 +1,4 @@
-//! Output files of `glimt bench`, which must differ from the inputs and each other.
+//! Output files of `glimt bench`. They must differ from the inputs and from each other.
 
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -16,9 +16,9 @@ use crate::output::{
 };
 use crate::system::{describe_error, file};
 
-/// Files to write, and inputs that must not be overwritten.
+/// Files to write, and input files that must not be overwritten.
 pub(super) struct BenchOutputs {
-    /// Option, file and content.
+    /// Option, file and content of each output.
     files: Vec<(&'static str, PathBuf, OutputKind)>,
     /// Role and path of each input.
     inputs: Vec<(&'static str, PathBuf)>,
@@ -28,7 +28,7 @@ pub(super) struct BenchOutputs {
 }
 
 #[derive(Clone, Copy)]
-/// Content of an output.
+/// Content of an output file.
 enum OutputKind {
     Csv,
     Json,
@@ -95,19 +95,20 @@ impl BenchOutputs {
             return refused(what);
         }
         if let Some((other, ..)) = self.files[..index].iter().find(|(_, other, _)| is_it(other)) {
-            return refused(&format!("the file of {other}"));
+            return refused(&format!("the output of {other}"));
         }
         if self.replaces_foreign { Ok(()) } else { self.check_foreign(index, real) }
     }
 
-    /// Rejects files not written by glimt, as in `--csv scene.toml` without a file name after `--csv`.
+    /// Rejects files not written by glimt, such as the scene in `--csv scene.toml` if the name of the CSV
+    /// file is missing.
     fn check_foreign(&self, index: usize, real: &Path) -> Result<(), OutputError> {
         let (option, path, kind) = &self.files[index];
         let replaced = match kind {
             OutputKind::Csv => replaced_table(real, csv::HEAD),
-            // Accept files that are valid baselines. All of them have scenes.
+            // Accept valid baselines, which all have scenes.
             OutputKind::Json => {
-                replaced_json(real, "a file of results", |found: &Results| !found.scenes.is_empty())
+                replaced_json(real, "a results file", |found: &Results| !found.scenes.is_empty())
             }
             OutputKind::Plot => replaced_plot(real, &plot::AXES),
         };
@@ -116,7 +117,7 @@ impl BenchOutputs {
         Err(OutputError::Refused { reason: format!("cannot write {}: {why}; {way_out}", path.display()) })
     }
 
-    /// Reads the baseline. Returns its name and results.
+    /// Reads the baseline and returns its name and results.
     pub(super) fn baseline(&self, console: &Console) -> Result<Option<(String, Results)>, Exit> {
         let Some(path) = &self.baseline else { return Ok(None) };
         let name = path.display().to_string();
@@ -129,7 +130,7 @@ impl BenchOutputs {
         Ok(Some((name, results)))
     }
 
-    /// Writes all files, even if some of them fail.
+    /// Writes all files, even if some fail.
     pub(super) fn write(
         &self,
         results: &Results,
@@ -167,7 +168,7 @@ impl BenchOutputs {
     }
 }
 
-/// Reads a baseline. Rejects anything but a regular file of limited size.
+/// Reads a baseline. Rejects very large files and anything but regular files.
 fn bytes_of(path: &Path) -> Result<Vec<u8>, String> {
     /// Enough for the results of a million images.
     const MAX_BYTES: u64 = 256 << 20;

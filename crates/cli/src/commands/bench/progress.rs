@@ -13,7 +13,7 @@ use crate::console::Console;
 use crate::progress::{json_line, seconds, style};
 use crate::scene::sanitize::visible;
 
-/// Longest time between plain lines.
+/// Maximum time between plain lines.
 const INTERVAL: Duration = Duration::from_secs(10);
 /// Resolution of the bar.
 const STEPS: u64 = 1000;
@@ -26,7 +26,7 @@ pub(super) struct BenchProgress {
     format: ProgressFormat,
     begin: Instant,
     what: String,
-    /// Estimated seconds left, and the time of the estimate.
+    /// Estimated seconds left, and when they were estimated.
     left: Option<(f64, Instant)>,
     fraction: f64,
     last: Instant,
@@ -107,7 +107,7 @@ impl BenchProgress {
         let to_go = left.map_or(String::new(), |left| format!("{} left", seconds(left)));
         match &self.format {
             ProgressFormat::Bar(bar, lines) => {
-                // Query the size every time, as the terminal may be resized.
+                // Query the size every time, because the terminal may be resized.
                 let size = crossterm::terminal::size().unwrap_or_default();
                 let plot = lines.text(size, self.console.is_colored());
                 bar.set_message(plot + &visible(&self.what));
@@ -136,7 +136,7 @@ impl BenchProgress {
         }
     }
 
-    /// Whether reports are text, not JSON.
+    /// Whether reports are text rather than JSON.
     pub(super) fn is_text(&self) -> bool {
         !matches!(self.format, ProgressFormat::Json)
     }

@@ -12,7 +12,7 @@ use crate::film::tone::{ToneMapping, develop};
 use crate::scene::sanitize::visible;
 use crate::tui::{NamedImage, images_as_text};
 
-/// FLIP below this is hard to see in false color.
+/// FLIP below this value is hard to see in false color.
 const MIN_VISIBLE_FLIP: f32 = 0.1;
 
 /// Renders the images as text. Empty if the terminal is too small.

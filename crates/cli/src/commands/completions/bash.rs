@@ -1,8 +1,8 @@
-//! Completion for bash, with quoted candidates.
+//! Bash completion with quoted candidates.
 //!
-//! bash inserts candidates unquoted, so a name with `$(…)` would be executed with the command, and `clap_complete`'s adapter does
-//! not quote them. This adapter receives the whole line, splits it into words as bash does but without expansion, and quotes the
-//! candidates.
+//! Bash inserts candidates as they are, and `clap_complete`'s adapter does not quote them. Running the
+//! command would then execute a name such as `$(…)`. This adapter receives the whole line, splits it into
+//! words like bash but without expansions, and quotes the candidates.
 
 use std::ffi::OsString;
 use std::io::{Error, Write};
@@ -13,7 +13,7 @@ use clap_complete::env::EnvCompleter;
 
 use crate::args::candidates::remember;
 
-/// The script. `$2` is the text that candidates replace: the end of the line after the last space, `=`, `:` or open quote.
+/// The script. Candidates replace `$2`, the end of the line after the last space, `=`, `:` or open quote.
 const SCRIPT: &str = r#"_glimt_complete() {
     local answer line space=true
     compopt +o nospace 2> /dev/null && space=false
@@ -34,7 +34,8 @@ else
 fi
 "#;
 
-/// The adapter for bash. Its script passes the line up to the cursor, and the end of it that a candidate replaces.
+/// The bash adapter. The script passes the line up to the cursor, and the end of that line, which candidates
+/// replace.
 pub(super) struct Bash;
 
 impl EnvCompleter for Bash {
@@ -67,7 +68,7 @@ impl EnvCompleter for Bash {
         let text = |at: usize| args.get(at).and_then(|arg| arg.to_str());
         let (Some(line), Some(replaced)) = (text(0), text(1)) else { return Ok(()) };
         let Some(before) = line.strip_suffix(replaced) else { return Ok(()) };
-        // Split the line, and determine the quoting at the cursor.
+        // Split the line and determine the quoting at the cursor.
         let words: Vec<OsString> = read(line).words.into_iter().map(OsString::from).collect();
         let kept = read(before);
         let begun = if before.ends_with(is_blank) && kept.quote == Quote::None {
@@ -88,7 +89,7 @@ impl EnvCompleter for Bash {
     }
 }
 
-/// The quote open at the end of a line.
+/// The open quote at the end of a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Quote {
     None,
@@ -96,7 +97,7 @@ enum Quote {
     Double,
 }
 
-/// The unquoted words of a line, and the quote that is open at its end. The last word is empty after a space.
+/// A line's unquoted words, and the open quote at its end. After a space, the last word is empty.
 struct CommandLine {
     words: Vec<String>,
     quote: Quote,
@@ -106,7 +107,7 @@ fn is_blank(character: char) -> bool {
     matches!(character, ' ' | '\t' | '\n')
 }
 
-/// Splits a line as bash does, without expansions.
+/// Splits a line like bash, but without expansions.
 fn read(line: &str) -> CommandLine {
     let mut words = vec![String::new()];
     let mut quote = Quote::None;
@@ -135,7 +136,7 @@ fn read(line: &str) -> CommandLine {
     CommandLine { words, quote }
 }
 
-/// Quotes a candidate for a position with this open quote. `None` if it cannot be written there.
+/// Quotes a candidate that follows the open quote `quote`. `None` if this is impossible.
 fn quoted(text: &str, quote: Quote, keeps_home: bool) -> Option<String> {
     let is_plain = |c: char| c.is_alphanumeric() || "_./,:=@%+-".contains(c);
     if text.chars().any(char::is_control) {
@@ -153,7 +154,7 @@ fn quoted(text: &str, quote: Quote, keeps_home: bool) -> Option<String> {
                 continue;
             }
             Quote::Single => {}
-            // A backslash before `!` would be kept.
+            // Bash would keep a backslash before `!`.
             Quote::Double if character == '!' => {
                 out.push_str(r#""\!""#);
                 continue;
@@ -170,7 +171,7 @@ fn quoted(text: &str, quote: Quote, keeps_home: bool) -> Option<String> {
 fn escaped(character: char) -> String {
     match character {
         '\'' | '\\' => format!("\\{character}"),
-        // Three octal digits cannot merge with the next character.
+        // Write all three octal digits, because the next character may be a digit.
         control if control.is_ascii_control() => format!("\\{:03o}", u32::from(control)),
         control if control.is_control() => format!("\\u{:04x}", u32::from(control)),
         other => other.to_string(),
@@ -181,9 +182,9 @@ fn escaped(character: char) -> String {
 mod tests {
     use super::*;
 
-    /// bash reads every quoted name back as one word.
+    /// Bash reads every quoted name back as one word.
     #[test]
-    fn quoted_names_survive_bash() {
+    fn bash_reads_quoted_names_unchanged() {
         let names = [
             "plain.toml",
             "my scene.toml",

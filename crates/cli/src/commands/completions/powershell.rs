@@ -1,4 +1,4 @@
-//! Completion for PowerShell, with quoted candidates.
+//! PowerShell completion with quoted candidates.
 
 use std::ffi::OsString;
 use std::io::{Error, Write};
@@ -9,8 +9,8 @@ use clap_complete::env::EnvCompleter;
 
 use crate::args::candidates::remember;
 
-/// The script. It does not evaluate the line, unlike `clap_complete`'s, which executes a `$(…)` on completion. The last word is
-/// prefixed with `+`, as some versions do not pass empty arguments.
+/// The script. Unlike `clap_complete`'s script, which executes `$(…)` on completion, it does not evaluate the
+/// line. The last word is prefixed with `+` because some versions do not pass empty arguments.
 const SCRIPT: &str = r#"Register-ArgumentCompleter -Native -CommandName glimt -ScriptBlock {
     param($wordToComplete, $commandAst, $cursorPosition)
     $words = @()
@@ -40,7 +40,8 @@ const SCRIPT: &str = r#"Register-ArgumentCompleter -Native -CommandName glimt -S
 }
 "#;
 
-/// The adapter for PowerShell. Prints a line for each candidate: quoted, unquoted and description, separated by tabs.
+/// The PowerShell adapter. Prints one line per candidate: the quoted candidate, the unquoted candidate and
+/// the description, separated by tabs.
 pub(super) struct Powershell;
 
 impl EnvCompleter for Powershell {

@@ -1,4 +1,4 @@
-//! Color swatches in the editor. Linear numbers are converted to sRGB.
+//! Color swatches in the editor. Converts linear numbers to sRGB.
 
 use lsp_types::{Color, ColorInformation, ColorPresentation};
 use serde_json::{Value, json};
@@ -9,7 +9,7 @@ use crate::scene::keys::color_bytes;
 use crate::scene::keys::key::ValueKind;
 use crate::scene::outline::OutlineKey;
 
-/// Returns all colors of a text.
+/// Returns all colors in a document.
 pub(super) fn all(document: &OpenDocument) -> Value {
     let mut found = Vec::new();
     for table in &document.tables {
@@ -48,7 +48,7 @@ fn color(text: &str, key: &OutlineKey) -> Option<Color> {
     Some(Color { red, green, blue, alpha: 1.0 })
 }
 
-/// Formats a color chosen in the editor, as `#rrggbb` and as linear numbers.
+/// Formats a color picked in the editor as `#rrggbb` and as linear numbers.
 pub(super) fn presentations(params: &Value) -> Option<Value> {
     let color: Color = serde_json::from_value(params["color"].clone()).ok()?;
     let bytes = [color.red, color.green, color.blue].map(|part| (part.clamp(0.0, 1.0) * 255.0).round() as u8);

@@ -1,4 +1,4 @@
-//! Completion of tables, keys, values and names defined in the text.
+//! Completes tables, keys, values and names defined in the document.
 
 use lsp_types::{
     CompletionItem, CompletionItemKind, CompletionTextEdit, Documentation, MarkupContent, MarkupKind, Range,
@@ -48,7 +48,7 @@ fn item(label: &str, kind: CompletionItemKind, doc: &str, insert: String) -> Com
     }
 }
 
-/// Table headers. Each replaces the header typed so far, including brackets closed by the editor.
+/// Table headers. A candidate replaces the partial header, including closing brackets inserted by the editor.
 fn headers(document: &OpenDocument, offset: usize) -> Vec<CompletionItem> {
     let before = &document.text[..offset];
     let line = before.rsplit('\n').next().unwrap_or_default().trim_start();
@@ -70,7 +70,7 @@ fn headers(document: &OpenDocument, offset: usize) -> Vec<CompletionItem> {
     .collect()
 }
 
-/// Missing keys of a table, with example values unless `=` already follows.
+/// Missing keys of a table, with example values unless a `=` follows.
 fn keys(of: Section, given: &[String], is_assigned: bool) -> Vec<CompletionItem> {
     let whole =
         |name: &str, value: &str| if is_assigned { name.to_owned() } else { format!("{name} = {value}") };
@@ -134,7 +134,7 @@ fn words(list: &[Word], is_quoted: bool) -> Vec<CompletionItem> {
     list.iter().map(word).collect()
 }
 
-/// Names of tables defined in the text.
+/// Names of tables defined in the document.
 fn names(document: &OpenDocument, table: &str, is_quoted: bool) -> Vec<CompletionItem> {
     let named =
         document.tables.iter().filter(|one| one.info.name == table).filter_map(|one| one.name.as_ref());

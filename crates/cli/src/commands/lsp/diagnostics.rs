@@ -1,4 +1,4 @@
-//! Converts diagnostics to the protocol.
+//! Converts diagnostics to the LSP format.
 
 use std::path::Path;
 
@@ -11,14 +11,14 @@ use crate::pipeline::protocol::Failure;
 use crate::scene::diagnostic::{self, Severity};
 use crate::scene::parse;
 
-/// Diagnostics of a text.
+/// Diagnostics of a document's text.
 pub(super) fn of_text(document: &OpenDocument) -> Vec<Diagnostic> {
     let found = parse(document.text.as_str().into(), &document.path).diagnostics;
     found.iter().map(|one| diagnostic(document, one)).collect()
 }
 
-/// Diagnostics of the file and its referenced files, as in `glimt check`. `None` if the file differs from the open text, cannot
-/// be read, or the token is cancelled.
+/// Diagnostics of the file and its referenced files, as in `glimt check`. `None` if the file differs from the
+/// open document, if it cannot be read, or if the token is cancelled.
 pub(super) fn of_files(
     document: &OpenDocument,
     checker: &mut Checker,

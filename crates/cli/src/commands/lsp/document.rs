@@ -1,4 +1,4 @@
-//! An open document. Positions in the protocol are lines and UTF-16 code units.
+//! An open document. LSP positions are lines and UTF-16 code units.
 
 use std::ops::Range;
 use std::path::PathBuf;
@@ -7,13 +7,13 @@ use lsp_types::{Position, Range as Span};
 
 use crate::scene::outline::{OutlineTable, outline};
 
-/// An open document of the client.
+/// A document opened by the client.
 #[derive(Clone, Debug)]
 pub(super) struct OpenDocument {
     pub(super) path: PathBuf,
     pub(super) version: i32,
     pub(super) text: String,
-    /// The tables of the text.
+    /// The tables in the text.
     pub(super) tables: Vec<OutlineTable>,
     /// Byte offsets of the line starts.
     lines: Vec<usize>,
@@ -41,7 +41,7 @@ impl OpenDocument {
         start + text.len()
     }
 
-    /// The position of a byte offset.
+    /// The LSP position of a byte offset.
     pub(super) fn position(&self, offset: usize) -> Position {
         let offset = offset.min(self.text.len());
         let line = self.lines.partition_point(|start| *start <= offset) - 1;

@@ -1,7 +1,7 @@
 //! A thread that checks the files referenced by open documents.
 //!
-//! All documents share one thread and one checker, so unchanged files are not read again. Only the newest request of each
-//! document is kept, and it cancels an older one that is running.
+//! All documents share one thread and one checker, which does not read unchanged files again. Only the newest
+//! request for each document is kept. It cancels an older request that is still running.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -14,20 +14,20 @@ use super::document::OpenDocument;
 use crate::control::CancelToken;
 use crate::pipeline::Checker;
 
-/// A thread that checks files until it is dropped.
+/// A thread that checks files until the handle is dropped.
 pub(super) struct FileThread {
     shared: Arc<RequestQueue>,
     thread: Option<JoinHandle<()>>,
 }
 
-/// The requests, with a condition variable for changes.
+/// The requests, with a condition variable that signals changes.
 #[derive(Default)]
 struct RequestQueue {
     requests: Mutex<Requests>,
     changed: Condvar,
 }
 
-/// Pending requests and the running one.
+/// The pending requests and the running request.
 #[derive(Default)]
 struct Requests {
     /// At most one per document, in order of arrival.
@@ -55,7 +55,7 @@ impl FileThread {
         Some(Self { shared, thread: Some(thread) })
     }
 
-    /// Queues a check of the files of a document.
+    /// Queues a check of a document's files.
     pub(super) fn check(&self, uri: Uri, document: OpenDocument) {
         self.shared.lock().put(uri, document);
         self.shared.changed.notify_one();
@@ -67,7 +67,7 @@ impl Drop for FileThread {
         self.shared.lock().end();
         self.shared.changed.notify_one();
         if let Some(thread) = self.thread.take() {
-            // Ignore a panic of the thread.
+            // Ignore a panic on the thread.
             let _ = thread.join();
         }
     }
@@ -117,7 +117,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_the_newest_request_is_kept() {
+    fn only_the_newest_request_per_document_is_kept() {
         let uri = |name: &str| name.parse::<Uri>().expect("an address");
         let document = |version| OpenDocument::new("a.toml".into(), version, String::new());
         let mut requests = Requests::default();

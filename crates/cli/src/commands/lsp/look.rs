@@ -1,4 +1,4 @@
-//! Hover text and definition of the key or name under the cursor.
+//! Hover text and go-to-definition for the key or name under the cursor.
 
 use std::ops::Range;
 
@@ -9,14 +9,15 @@ use super::document::OpenDocument;
 use crate::scene::keys::key::{Default, KeyInfo, ValueKind};
 use crate::scene::outline::{OutlineKey, OutlineTable};
 
-/// The key under the cursor with its table. `outer` differs from `key` in an inline table.
+/// The key under the cursor and its table. Inside an inline table, `outer` is the key of the inline table.
+/// Otherwise, it equals `key`.
 struct KeyAtCursor<'d> {
     table: &'d OutlineTable,
     outer: &'d OutlineKey,
     key: &'d OutlineKey,
 }
 
-/// The key whose name or value contains a byte offset.
+/// Finds the key whose name or value contains a byte offset.
 fn found(document: &OpenDocument, offset: usize) -> Option<KeyAtCursor<'_>> {
     let holds = |key: &&OutlineKey| {
         let reach = |range: &Range<usize>| range.start <= offset && offset <= range.end;
@@ -29,7 +30,7 @@ fn found(document: &OpenDocument, offset: usize) -> Option<KeyAtCursor<'_>> {
     })
 }
 
-/// The hover text of the key under the cursor.
+/// Hover text for the key under the cursor.
 pub(super) fn hover(document: &OpenDocument, offset: usize) -> Option<Value> {
     let KeyAtCursor { table, outer, key } = found(document, offset)?;
     let name = key.name.text.as_str();
@@ -73,12 +74,12 @@ pub(super) fn described(key: &KeyInfo) -> String {
     text
 }
 
-/// Keys of the inline table of a texture.
+/// Keys of a texture's inline table.
 pub(super) fn texture_keys() -> [(&'static str, &'static str); 3] {
     [
         ("texture", "The name of a texture."),
-        ("channel", "The channel with the numbers: `\"r\"`, `\"g\"`, `\"b\"` or `\"a\"`."),
-        ("scale", "A factor on the texture, in `emission`."),
+        ("channel", "The channel to read: `\"r\"`, `\"g\"`, `\"b\"` or `\"a\"`."),
+        ("scale", "A factor for the texture, only in `emission`."),
     ]
 }
 

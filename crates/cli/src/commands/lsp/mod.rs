@@ -1,7 +1,7 @@
 //! `glimt lsp`: a language server for scenes, on stdin and stdout.
 //!
-//! The client sends the whole text with every change, and the text is parsed immediately. Referenced files are checked on a
-//! separate thread when the document is opened or saved.
+//! The client sends the whole document with every change, and the server parses it immediately. Referenced
+//! files are checked on a separate thread when the document is opened or saved.
 
 mod colors;
 mod complete;
@@ -40,7 +40,8 @@ use self::wire::{Client, Received};
 use crate::console::Console;
 use crate::exit::Exit;
 
-/// Serves until the client sends `exit` or closes stdin. As the protocol requires, `exit` without `shutdown` is a failure.
+/// Serves until the client sends `exit` or closes stdin. The protocol requires `exit` without `shutdown` to
+/// be a failure.
 pub(crate) fn run(console: &Console) -> Exit {
     match serve(&mut std::io::stdin().lock(), &Client::new(std::io::stdout())) {
         Ok(exit) => exit,
@@ -61,7 +62,7 @@ fn capabilities() -> Value {
     })
 }
 
-/// Phase of the server's lifecycle.
+/// The server's lifecycle phase.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Phase {
     /// Before `initialize`.
@@ -107,7 +108,8 @@ type Documents = Arc<Mutex<HashMap<String, OpenDocument>>>;
 struct Server<'c> {
     client: &'c Client,
     documents: Documents,
-    /// Checks files. `None` if the thread could not be started; then only errors in texts are reported.
+    /// Checks referenced files. `None` if the thread could not be started. In that case, only the documents
+    /// themselves are checked.
     files: Option<FileThread>,
 }
 
@@ -120,7 +122,7 @@ impl Server<'_> {
         self.client.send(message);
     }
 
-    /// Responds to a request, and updates the phase.
+    /// Responds to a request and updates the phase.
     fn respond(&self, request: Request, phase: &mut Phase) -> Response {
         let refused = |id, code: ErrorCode, why: &str| Response::new_err(id, code as i32, why.to_owned());
         match (request.method.as_str(), *phase) {
@@ -222,7 +224,7 @@ impl Server<'_> {
         self.send(&Notification::new(LogMessage::METHOD.to_owned(), params).into());
     }
 
-    /// Stores a text and publishes its diagnostics.
+    /// Stores a document and publishes its diagnostics.
     fn put(&self, uri: &Uri, version: i32, text: String) {
         let document = OpenDocument::new(path(uri), version, text);
         let found = diagnostics::of_text(&document);
@@ -257,7 +259,7 @@ fn read<P: DeserializeOwned>(params: Value) -> Option<P> {
     serde_json::from_value(params).ok()
 }
 
-/// The notification with all diagnostics of a document.
+/// The notification with a document's diagnostics.
 fn published(uri: Uri, version: Option<i32>, diagnostics: Vec<Diagnostic>) -> Message {
     let params = PublishDiagnosticsParams { uri, diagnostics, version };
     Notification::new(PublishDiagnostics::METHOD.to_owned(), params).into()
@@ -267,7 +269,7 @@ fn unknown(id: RequestId, method: &str) -> Response {
     Response::new_err(id, ErrorCode::MethodNotFound as i32, format!("unsupported method {method}"))
 }
 
-/// The path of a file URI. Other URIs give a path that does not exist.
+/// The path in a file URI. For other URIs, a path that does not exist.
 fn path(uri: &Uri) -> PathBuf {
     let decoded = uri.path().as_estr().decode().into_string();
     decoded.map_or_else(|_| PathBuf::from(uri.as_str()), |path| PathBuf::from(path.into_owned()))

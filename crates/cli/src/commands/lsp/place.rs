@@ -1,4 +1,4 @@
-//! Determines the context of the cursor. Works line by line, as the text may have syntax errors while it is typed.
+//! Determines the context of the cursor. Works line by line, because incomplete text may have syntax errors.
 
 use crate::scene::keys::key::{KeyInfo, TableInfo, TypeInfo};
 use crate::scene::keys::table;
@@ -6,9 +6,9 @@ use crate::scene::keys::table;
 /// Kind of completion at the cursor.
 #[derive(Debug)]
 pub(super) enum CursorContext {
-    /// A header, or an empty line where one can start.
+    /// A header, or a line where a header can start.
     Header,
-    /// A key of a table, with the keys already given and whether `=` follows.
+    /// A key of a table, with the table's other keys and whether `=` follows.
     Key { of: Section, given: Vec<String>, is_assigned: bool },
     /// The value of a key.
     Value { of: Section, key: String, is_quoted: bool },
@@ -18,7 +18,7 @@ pub(super) enum CursorContext {
     InnerValue { key: String, is_quoted: bool },
 }
 
-/// A table with its type.
+/// A table and its type.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Section {
     pub(super) info: &'static TableInfo,
@@ -55,7 +55,7 @@ pub(super) fn place(text: &str, offset: usize) -> Option<CursorContext> {
     let mut parts = header.split('.');
     let info = table(parts.next().unwrap_or_default().trim())?;
     if parts.next().is_none() && info.form == crate::scene::keys::key::Form::Named {
-        // `[materials]` and then `wall = { … }`.
+        // `[materials]` followed by `wall = { … }`.
         let (_, braces) = line.split_once('{')?;
         let items = format!("{braces}{after}").replace(',', "\n");
         return in_table(info, &items, (braces, after), true);
@@ -63,8 +63,8 @@ pub(super) fn place(text: &str, offset: usize) -> Option<CursorContext> {
     in_table(info, body, (line, after), false)
 }
 
-/// The context in a table. `body` has its lines, or the items of an inline table; the tuple has the text before and after the
-/// cursor. `None` in arrays and after complete values.
+/// The context in a table. `body` contains the table's lines, or an inline table's items. The tuple is the
+/// text before and after the cursor. `None` in arrays and after complete values.
 fn in_table(
     info: &'static TableInfo,
     body: &str,
@@ -116,13 +116,13 @@ fn is_in_quotes(value: &str) -> bool {
     Scan::of(value).quote.is_some()
 }
 
-/// The state at the end of a line: open string, comment and brackets.
+/// State at the end of a line: open string, comment and brackets.
 #[derive(Clone, Copy, Debug, Default)]
 struct Scan {
-    /// The quote of an open string.
+    /// The opening quote, if a string is open.
     quote: Option<char>,
     is_comment: bool,
-    /// Number of opened minus closed brackets.
+    /// Number of opening brackets minus closing brackets.
     brackets: i32,
 }
 
@@ -150,7 +150,7 @@ impl Scan {
     }
 }
 
-/// The table around a byte offset, and whether it is in an array.
+/// The table around a byte offset, and whether the offset is in an array.
 #[derive(Debug, Default)]
 struct Surroundings<'t> {
     /// The previous header without its brackets, and the lines of its table. `None` before the first header.
@@ -179,7 +179,7 @@ impl<'t> Surroundings<'t> {
             }
             at = end;
         }
-        // A text that ends with a newline has one more, empty line.
+        // Text that ends with a newline has an empty last line.
         around.is_in_array |= offset == text.len() && (text.is_empty() || text.ends_with('\n')) && open > 0;
         around.table = header.map(|(name, end)| (name, &text[end..at]));
         around
@@ -193,7 +193,7 @@ fn is_key(line: &str) -> bool {
     rest.trim_start().starts_with('=')
 }
 
-/// The name in a header. `None` for other lines, such as `[1, 0],` in an array.
+/// The name in a table header. `None` for other lines, such as `[1, 0],` in an array.
 fn header_name(line: &str) -> Option<&str> {
     let (name, rest) = line.trim_start().strip_prefix('[')?.trim_start_matches('[').split_once(']')?;
     let is_part = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-' | '.' | '"' | '\'' | ' ');
@@ -203,7 +203,7 @@ fn header_name(line: &str) -> Option<&str> {
     (is_name && (rest.is_empty() || rest.starts_with('#'))).then(|| name.trim())
 }
 
-/// The type given by the key `type`, or the default.
+/// The type from the key `type`, or the default type.
 fn kind(info: &'static TableInfo, body: &str) -> Option<&'static TypeInfo> {
     let named = body.split(['\n', ',', '{', '}']).find_map(|item| {
         let (key, value) = item.split_once('=')?;
@@ -212,13 +212,13 @@ fn kind(info: &'static TableInfo, body: &str) -> Option<&'static TypeInfo> {
     info.type_of(named).or_else(|| info.type_of(None))
 }
 
-/// The content of the first string in a value.
+/// Contents of the first string in a value.
 fn in_quotes(value: &str) -> Option<&str> {
     let (_, rest) = value.split_once(['"', '\''])?;
     Some(rest.split(['"', '\'']).next().unwrap_or(rest))
 }
 
-/// The keys in `body`, except the one being typed.
+/// The keys in `body`, except the key being typed.
 fn given(body: &str, typed: &str) -> Vec<String> {
     let keys = body.lines().filter_map(|line| line.split_once('=')).map(|(key, _)| key.trim().to_owned());
     keys.filter(|key| key != typed).collect()
@@ -228,14 +228,14 @@ fn given(body: &str, typed: &str) -> Vec<String> {
 mod tests {
     use super::*;
 
-    /// The context at `|` in a text.
+    /// The context at `|` in the text.
     fn at(text: &str) -> Option<CursorContext> {
         let offset = text.find('|').expect("a cursor");
         place(&text.replace('|', ""), offset)
     }
 
     #[test]
-    fn incomplete_texts_have_a_context() {
+    fn incomplete_text_has_a_context() {
         assert!(matches!(at("|"), Some(CursorContext::Header)));
         assert!(matches!(at("[ren|"), Some(CursorContext::Header)));
         assert!(at("# [ren|").is_none() && at("[render]\nwidth = 3 # so|").is_none());

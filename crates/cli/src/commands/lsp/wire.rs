@@ -1,7 +1,7 @@
-//! The base protocol of LSP on stdin and stdout: a header with a length, followed by JSON.
+//! The LSP base protocol on stdin and stdout: a header with a length, followed by JSON.
 //!
-//! `lsp_server`'s own reader stops at invalid messages, and allocates the length given in the header. This one responds with an
-//! error, and limits the length.
+//! `lsp_server`'s reader stops at invalid messages and allocates the length in the header. This reader
+//! responds with an error and limits the length.
 
 use std::io::{self, BufRead, Read, Write};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -9,9 +9,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 use lsp_server::{ErrorCode, Message};
 use serde_json::{Value, json};
 
-/// Maximum size of a message: enough for the largest scene with every byte escaped.
+/// Maximum message size: enough for the largest scene with every byte escaped.
 const MAX_MESSAGE_BYTES: u64 = 6 << 27;
-/// Maximum size of a header.
+/// Maximum header size.
 const MAX_HEADER_BYTES: u64 = 1 << 14;
 
 /// A frame from the client.
@@ -19,14 +19,14 @@ const MAX_HEADER_BYTES: u64 = 1 << 14;
 pub(super) enum Received {
     /// A valid message.
     Message(Message),
-    /// An invalid message, with the error response.
+    /// The error response to an invalid message.
     Invalid(Value),
 }
 
 /// Reads the next frame. `None` at the end of the stream.
 ///
 /// # Errors
-/// The stream cannot be read or has lost its framing.
+/// The stream cannot be read, or its framing is lost.
 pub(super) fn read(from: &mut impl BufRead) -> Result<Option<Received>, String> {
     let Some(length) = length(from)? else { return Ok(None) };
     if length > MAX_MESSAGE_BYTES {
@@ -54,7 +54,7 @@ fn length(from: &mut impl BufRead) -> Result<Option<u64>, String> {
             return Ok(None);
         }
         if !text.ends_with('\n') {
-            return Err("stdin ended within a header, or it is too long".to_owned());
+            return Err("stdin ended within a header, or the header is too long".to_owned());
         }
         is_first = false;
         let text = text.trim_end();
@@ -71,7 +71,7 @@ fn length(from: &mut impl BufRead) -> Result<Option<u64>, String> {
     }
 }
 
-/// Parses the content of a frame.
+/// Parses the contents of a frame.
 fn message(bytes: Vec<u8>) -> Received {
     let text = String::from_utf8(bytes).map_err(|_| "the message is not UTF-8".to_owned());
     let json = text.and_then(|text| {
@@ -97,7 +97,8 @@ fn refusal(id: &Value, code: ErrorCode, why: &str) -> Value {
     json!({ "jsonrpc": "2.0", "id": id, "error": { "code": code as i32, "message": why } })
 }
 
-/// Replaces unpaired escaped surrogates by U+FFFD. Editors send them while a character is being typed.
+/// Replaces unpaired escaped surrogates with U+FFFD. Editors send unpaired surrogates while a character is
+/// being typed.
 fn paired(text: &str) -> String {
     let surrogate = |at: usize| {
         let digits = text.get(at..)?.strip_prefix("\\u")?.get(..4)?;
@@ -111,7 +112,7 @@ fn paired(text: &str) -> String {
         let (taken, length) = match (first, second) {
             (Some(0xd800..0xdc00), Some(0xdc00..)) => (text.get(found..found + 12), 12),
             (Some(_), _) => (Some("\\ufffd"), 6),
-            // Copy a backslash with the character that it escapes.
+            // Copy a backslash and the character it escapes.
             (None, _) => {
                 let next = text[found + 1..].chars().next().map_or(0, char::len_utf8);
                 (text.get(found..found + 1 + next), 1 + next)
@@ -169,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn excessive_lengths_are_rejected() {
+    fn too_long_messages_are_rejected() {
         let mut far = &b"Content-Length: 1000000000000\r\n\r\n{}"[..];
         assert!(read(&mut far).expect_err("too long").contains("1000000000000 bytes"));
         let mut cut = &b"Content-Length: 500000000\r\n\r\n{}"[..];

@@ -1,7 +1,8 @@
 //! The JSON Schema of scene files, generated from the definitions of their keys.
 //!
-//! Draft 4 is for editors with Taplo, which does not support `if`: there, a material or light allows the keys of all types, with
-//! dependencies that tie each key to its types. In draft 2020-12, each type has its own schema.
+//! Draft 4 is for editors that use Taplo, which does not support `if`. In this draft, a material or light
+//! accepts the keys of all types, and dependencies restrict each key to its types. In draft 2020-12, each
+//! type has its own schema.
 
 mod value;
 
@@ -17,7 +18,7 @@ use crate::scene::keys::tables;
 /// The file name of the schema.
 pub const FILE: &str = "glimt.schema.json";
 
-/// The first line of a scene that references the schema in the same folder.
+/// First line of a scene, which references the schema in the same folder.
 pub const LINE: &str = "#:schema glimt.schema.json\n";
 
 /// Prints the schema.
@@ -37,7 +38,7 @@ pub fn schema(draft: Draft) -> Value {
         tables().iter().map(|info| (info.name.to_owned(), in_file(info, draft))).collect();
     let mut schema = json!({
         "$schema": draft.uri(),
-        "title": "A scene of glimt",
+        "title": "glimt scene",
         "description": "See `glimt explain KEY`, and `glimt new FILE` for a commented scene.",
         "type": "object",
         "properties": properties,
@@ -72,7 +73,7 @@ fn table(info: &'static TableInfo, draft: Draft) -> Value {
     table
 }
 
-/// The schema of an object with exactly these keys.
+/// The schema of an object that allows only these keys.
 fn object(keys: &[&'static KeyInfo], draft: Draft, of: impl Fn(&'static KeyInfo) -> Value) -> Value {
     let properties: Map<String, Value> = keys.iter().map(|key| (key.name.to_owned(), of(key))).collect();
     let is_required = |key: &&&KeyInfo| matches!(key.default, Default::Required(_)) && !is_conditional(key);
@@ -85,7 +86,7 @@ fn object(keys: &[&'static KeyInfo], draft: Draft, of: impl Fn(&'static KeyInfo)
     object
 }
 
-/// Whether another key may replace it.
+/// Whether a key can be omitted because another key replaces it.
 fn is_conditional(key: &KeyInfo) -> bool {
     matches!(key.name, "position" | "look_at")
 }
@@ -114,7 +115,7 @@ fn description(key: &KeyInfo) -> String {
     format!("{}.{}{}{default}", key.doc, named("Unit", key.unit.to_owned()), named("Range", key.range()))
 }
 
-/// The schema of a table with types, as one condition per type.
+/// The schema of a table with types, with one condition per type.
 fn by_type(info: &'static TableInfo) -> Value {
     let draft = Draft::Latest;
     let conditions: Vec<Value> = info
@@ -147,7 +148,7 @@ fn types(info: &TableInfo) -> Value {
     json!({ "type": "string", "enum": names, "default": names.first(), "description": docs.join("\n\n") })
 }
 
-/// The schema of a table with the keys of all types, where each key depends on a type that has it.
+/// The schema of a table that accepts the keys of all types. Dependencies restrict each key to its types.
 fn of_all_types(info: &'static TableInfo) -> Value {
     let draft = Draft::Four;
     let (mut properties, mut dependencies) = (Map::new(), Map::new());
@@ -168,7 +169,7 @@ fn of_all_types(info: &'static TableInfo) -> Value {
     table
 }
 
-/// The schema of a key that several types have, which accepts the values of all.
+/// The schema of a key shared by several types. Accepts the values of any of these types.
 fn merged(keys: &[(&'static TypeInfo, &'static KeyInfo)]) -> Value {
     let draft = Draft::Four;
     let mut values: Vec<Value> = keys.iter().map(|(_, key)| value(key.kind, draft)).collect();
@@ -183,7 +184,7 @@ fn merged(keys: &[(&'static TypeInfo, &'static KeyInfo)]) -> Value {
     schema
 }
 
-/// The dependency of a key on its types.
+/// The dependency that restricts a key to its types.
 fn dependency(info: &TableInfo, keys: &[(&'static TypeInfo, &'static KeyInfo)]) -> Value {
     let names: Vec<&str> = keys.iter().map(|(kind, _)| kind.name).collect();
     let has_default = info.types.first().is_some_and(|first| names.contains(&first.name));
@@ -194,7 +195,7 @@ fn dependency(info: &TableInfo, keys: &[(&'static TypeInfo, &'static KeyInfo)]) 
     schema
 }
 
-/// Conditions between the keys of a table.
+/// Conditions on combinations of keys in a table.
 fn conditions(table: &str, draft: Draft) -> Vec<(&'static str, Value)> {
     let none_of = |names: &[&str]| {
         let each: Vec<Value> = names.iter().map(|name| json!({ "required": [name] })).collect();
@@ -221,7 +222,7 @@ fn conditions(table: &str, draft: Draft) -> Vec<(&'static str, Value)> {
     }
 }
 
-/// Conditions between the keys of a type.
+/// Conditions on combinations of keys in a type.
 fn of_type(kind: &str) -> Vec<(&'static str, Value)> {
     match kind {
         // Exactly one of three groups.

@@ -26,7 +26,7 @@ pub(super) fn value(kind: ValueKind, draft: Draft) -> Value {
             }
             schema
         }
-        // Shapes can also be referred to by number, so names must not be numbers.
+        // Names must not be numbers, because shapes can also be referenced by number.
         ValueKind::Text => json!({ "type": "string", "pattern": "[^0-9]" }),
         ValueKind::File(endings) => file(endings),
         ValueKind::Color(limits) => json!({ "anyOf": colors(limits, draft) }),
@@ -88,12 +88,12 @@ pub(super) fn written_color() -> Value {
     let mut names: Vec<&str> = color_names().collect();
     names.sort_unstable();
     json!({
-        "description": "An sRGB color: `#rrggbb` or a CSS color name, in any case.",
+        "description": "An sRGB color: `#rrggbb` or a CSS color name, ignoring case.",
         "anyOf": [{ "enum": names }, { "type": "string", "pattern": color_pattern(&names) }],
     })
 }
 
-/// A pattern for `#rrggbb` and color names in any case.
+/// A pattern for `#rrggbb` and color names that ignores case.
 fn color_pattern(names: &[&str]) -> String {
     let in_any_case =
         |text: &str| text.chars().map(|c| format!("[{}{c}]", c.to_ascii_uppercase())).collect::<String>();
@@ -101,7 +101,7 @@ fn color_pattern(names: &[&str]) -> String {
     format!("^(#[0-9A-Fa-f]{{6}}|{})$", names.join("|"))
 }
 
-/// The schema of a path with one of these extensions, in any case.
+/// The schema of a path with one of these extensions, ignoring case.
 fn file(endings: &[&str]) -> Value {
     let in_any_case = |ending: &&str| {
         ending
@@ -133,6 +133,6 @@ fn texture(more: Value) -> Value {
 /// The schema of `{ texture = "name", channel = "r" }`.
 fn channel() -> Value {
     let names: Vec<&str> = Channel::ALL.iter().map(|channel| channel.name()).collect();
-    let doc = "The channel with the numbers. The default is luminance, or alpha for opacity.";
+    let doc = "The channel to read. The default is luminance, or alpha for opacity.";
     texture(json!({ "channel": { "type": "string", "enum": names, "description": doc } }))
 }

@@ -3,7 +3,7 @@
 use super::json::{Accessor, BufferView};
 use super::{Container, GltfError};
 
-/// Maximum number of elements of an accessor without a buffer view, whose elements are zero.
+/// Maximum element count of an accessor without a buffer view. All its elements are zero.
 const MAX_ZEROS: u64 = 1 << 22;
 
 /// Component type.
@@ -77,7 +77,7 @@ fn components(kind: &str) -> Option<usize> {
     }
 }
 
-/// Elements at regular distances in a buffer.
+/// Strided elements in a buffer.
 #[derive(Clone, Copy)]
 struct StridedElements<'a> {
     bytes: &'a [u8],
@@ -114,7 +114,7 @@ impl<'a> AccessorReader<'a> {
             .ok_or_else(|| GltfError::new(format!("unknown type {:?}", super::shown(&accessor.kind))))?;
         let size = width * component.size();
         if accessor.count > u64::from(u32::MAX) {
-            return Err(GltfError::new(format!("it claims {} elements", accessor.count)));
+            return Err(GltfError::new(format!("too many elements: {}", accessor.count)));
         }
         let count = accessor.count as usize;
         let elements_of_view = match accessor.buffer_view {
@@ -128,7 +128,7 @@ impl<'a> AccessorReader<'a> {
             Some(sparse) => {
                 if sparse.count > accessor.count {
                     return Err(GltfError::new(format!(
-                        "{} sparse values for {count} elements",
+                        "{} sparse values for only {count} elements",
                         sparse.count
                     )));
                 }
@@ -171,7 +171,7 @@ impl<'a> AccessorReader<'a> {
         self.elements.map(|elements| &elements.bytes[index * elements.stride..])
     }
 
-    /// The first `N` components of an element, which must exist. Missing components are `missing`.
+    /// First `N` components of an element. Missing components are set to `missing`. The element must exist.
     pub(super) fn floats<const N: usize>(&self, index: usize, missing: f32) -> [f32; N] {
         let (size, element) = (self.component.size(), self.element(index));
         std::array::from_fn(|component| match element {
@@ -186,13 +186,13 @@ impl<'a> AccessorReader<'a> {
         self.width == 1 && self.component.index(&[0; 4]).is_some()
     }
 
-    /// An index at `element`, which must exist.
+    /// Index stored in `element`, which must exist.
     pub(super) fn index(&self, element: usize) -> u32 {
         self.element(element).and_then(|bytes| self.component.index(bytes)).unwrap_or_default()
     }
 }
 
-/// Locates `count` elements of `size` bytes in a buffer view.
+/// Locates `count` elements of `size` bytes each in a buffer view.
 fn elements<'a>(
     container: &'a Container,
     view: usize,
@@ -232,13 +232,13 @@ pub(super) fn too_many_zeros(count: u64) -> String {
     format!("{count} elements without a buffer view; the limit is {MAX_ZEROS}")
 }
 
-/// Reason to reject elements that exceed their buffer view.
+/// Error message for elements that extend past their buffer view.
 pub(super) fn view_too_short(count: usize, offset: u64, needed: u64, view: &str, has: usize) -> String {
-    format!("{count} elements from byte {offset} need {needed} bytes of {view}, which has {has}")
+    format!("{count} elements at byte {offset} need {needed} bytes, but {view} has {has}")
 }
 
-/// Reason to reject a view that exceeds its buffer.
+/// Error message for a view that extends past its buffer.
 fn beyond_buffer(view: &BufferView, has: usize) -> String {
     let BufferView { buffer, byte_offset, byte_length, .. } = view;
-    format!("bytes {byte_offset} + {byte_length} exceed buffers[{buffer}], which has {has}")
+    format!("bytes {byte_offset} + {byte_length} exceed buffers[{buffer}], which has {has} bytes")
 }

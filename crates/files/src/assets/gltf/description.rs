@@ -1,4 +1,4 @@
-//! Contents of a glTF file in the terms of glimt's scenes.
+//! Contents of a glTF file, described with glimt's scene parameters.
 
 use crate::math::{DMat3, DVec3, Vec2};
 
@@ -17,9 +17,9 @@ pub struct ModelScene {
     pub cameras: Vec<ModelCamera>,
     /// Notes about approximations and omissions, with their location in the file.
     pub notes: Vec<String>,
-    /// Minimum and maximum coordinates of all instances. `None` without instances.
+    /// Minimum and maximum coordinates of all instances. `None` if there are no instances.
     pub bounds: Option<[DVec3; 2]>,
-    /// Some points of the instances, including extreme ones in every direction.
+    /// Sample points on the instances, including the extremes in every direction.
     pub outline: Vec<DVec3>,
 }
 
@@ -70,7 +70,7 @@ pub struct ModelInstance {
 pub struct TexturedValue {
     /// The factor. A scalar is stored in all components.
     pub factor: DVec3,
-    /// Texture that the factor scales.
+    /// Texture scaled by the factor.
     pub texture: Option<TextureRef>,
 }
 
@@ -88,16 +88,16 @@ pub enum TextureWrap {
     Repeat,
     /// Repeats the edge texels.
     Clamp,
-    /// Repeats the texture, mirroring every second tile.
+    /// Repeats the texture, mirroring every other tile.
     Mirror,
 }
 
-/// A texture lookup. v is 0 at the bottom; coordinates are scaled, then rotated, then translated.
+/// A texture lookup. v is 0 at the bottom. Coordinates are scaled, then rotated, then translated.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TextureRef {
     /// Index of the image.
     pub image: usize,
-    /// Whether the nearest texel is used, without interpolation.
+    /// Whether to use the nearest texel instead of interpolating.
     pub is_nearest: bool,
     /// Wrap mode outside [0, 1].
     pub wrap: TextureWrap,
@@ -116,9 +116,9 @@ pub struct TextureRef {
 pub enum Alpha {
     /// Fully opaque.
     Opaque,
-    /// Opaque where the value reaches the cutoff, otherwise invisible.
+    /// Opaque where the opacity is at least the cutoff, invisible elsewhere.
     Mask {
-        /// Opacity, from the alpha of the texture.
+        /// Opacity, from the texture's alpha.
         value: TexturedValue,
         /// Minimum opacity of visible points.
         cutoff: f64,
@@ -161,7 +161,7 @@ pub struct ModelMaterial {
     pub emission: TexturedValue,
     /// Normal map.
     pub normal: Option<TextureRef>,
-    /// Scale of the normal map's slopes.
+    /// Scale factor for the normal map's slopes.
     pub normal_strength: f64,
     /// Opacity.
     pub alpha: Alpha,
@@ -206,7 +206,7 @@ pub struct ModelLight {
     pub intensity: DVec3,
     /// Position.
     pub position: DVec3,
-    /// Direction in which the light travels.
+    /// Direction of light propagation.
     pub direction: DVec3,
 }
 
@@ -219,7 +219,7 @@ pub enum ModelLightKind {
     Spot {
         /// Full cone angle in degrees.
         angle: f64,
-        /// Fraction of the half angle over which the light fades out.
+        /// Width of the falloff region, as a fraction of the half angle.
         blend: f64,
     },
     /// Parallel light.

@@ -1,5 +1,5 @@
-//! JSON schema of the parts of glTF 2.0 that glimt uses (Khronos, *glTF 2.0 Specification*). Only types are
-//! checked here; indices are checked where they are used.
+//! JSON schema for the subset of glTF 2.0 used by glimt (Khronos, *glTF 2.0 Specification*). Only types are
+//! checked here. Indices are checked when they are used.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -317,7 +317,7 @@ impl Default for Sampler {
     }
 }
 
-/// OpenGL numbers of wrap modes and of the nearest filter.
+/// OpenGL constants for the wrap modes and the nearest filter.
 pub(super) const REPEAT: u32 = 10497;
 pub(super) const CLAMP: u32 = 33071;
 pub(super) const MIRROR: u32 = 33648;
@@ -329,7 +329,7 @@ pub(super) struct TextureInfo {
     pub(super) index: usize,
     #[serde(default)]
     pub(super) tex_coord: usize,
-    /// Scale of the slopes of a normal map.
+    /// Scale factor for a normal map's slopes.
     #[serde(default = "one")]
     pub(super) scale: f64,
     #[serde(default)]
@@ -415,7 +415,7 @@ impl Default for Pbr {
     }
 }
 
-/// Extensions of a material: those that glimt supports, and the names of the others.
+/// Material extensions: the supported ones, and the names of all others.
 #[derive(Debug, Default)]
 pub(super) struct Extensions {
     pub(super) ior: Option<Ior>,

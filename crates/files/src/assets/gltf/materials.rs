@@ -48,7 +48,7 @@ impl TextureInfo {
     }
 }
 
-/// Known extensions that are not supported, and their notes.
+/// Known but unsupported extensions, with the note for each.
 const UNSUPPORTED: [(&str, &str); 6] = [
     ("KHR_materials_sheen", "sheen is ignored"),
     ("KHR_materials_iridescence", "iridescence is ignored"),
@@ -63,7 +63,7 @@ pub(super) fn extension_ignored(name: &str) -> String {
     format!("extension {} is ignored", super::shown(name))
 }
 
-/// Converts a material. Parts without an equivalent are noted.
+/// Converts a material. Adds notes about features without an equivalent.
 pub(super) fn material(
     container: &Container,
     number: usize,
@@ -119,7 +119,7 @@ impl MaterialReader<'_> {
         }
         // Convert the extensions.
         if let Some(ior) = &extensions.ior {
-            // An index of 0 means full reflection, for converted specular-glossiness materials.
+            // Converted specular-glossiness materials use an index of 0 for full reflection.
             if ior.ior == 0.0 {
                 self.note("an index of refraction of 0 (full reflection) is replaced by 10");
             }
@@ -135,7 +135,7 @@ impl MaterialReader<'_> {
             let texture = &coat.clearcoat_roughness_texture;
             material.clearcoat_roughness = self.number(coat.clearcoat_roughness_factor, texture)?;
             if coat.clearcoat_normal_texture.is_some() {
-                self.note("the clear coat's normal map is ignored; the material's is used");
+                self.note("the clear coat's normal map is ignored; the material's normal map is used");
             }
         }
         if let Some(transmission) = &extensions.transmission {
@@ -197,13 +197,13 @@ impl MaterialReader<'_> {
         }
     }
 
-    /// Whether an image may have alpha, judging by the first bytes of PNG and JPEG files.
+    /// Whether an image may have alpha. Only the first bytes of PNG and JPEG files are checked.
     fn has_alpha(&self, image: usize) -> bool {
         const COLOR_TYPE: usize = 25;
         match self.container.image(image) {
             Ok(ImageBytes::Inside(bytes)) if bytes.starts_with(b"\xff\xd8") => false,
             Ok(ImageBytes::Inside(bytes)) if bytes.starts_with(b"\x89PNG") => {
-                // Gray or RGB images may have a transparent color.
+                // Gray and RGB images may define a transparent color.
                 let has_key = || memchr::memmem::find(&bytes[..bytes.len().min(1 << 12)], b"tRNS").is_some();
                 bytes.get(COLOR_TYPE).is_some_and(|kind| kind & 4 != 0) || has_key()
             }
@@ -230,7 +230,7 @@ impl MaterialReader<'_> {
         Ok(TexturedValue { factor, texture })
     }
 
-    /// Converts a texture reference. Unsupported features are noted.
+    /// Converts a texture reference. Adds notes about unsupported features.
     fn texture(&mut self, info: &TextureInfo) -> Result<Option<TextureRef>, GltfError> {
         let root = &self.container.root;
         let texture = root.textures.get(info.index);
@@ -249,7 +249,7 @@ impl MaterialReader<'_> {
         }
         let set = self.sets.iter().position(|used| *used == info.set());
         if set.is_none() {
-            self.note("a texture uses other coordinates than in the file: only two sets are supported");
+            self.note("a texture uses the wrong coordinates: only two coordinate sets are supported");
         }
         let sampler = match texture.sampler {
             Some(sampler) => root.samplers.get(sampler),
@@ -257,7 +257,7 @@ impl MaterialReader<'_> {
         };
         let wraps = sampler.map_or([REPEAT; 2], |sampler| [sampler.wrap_s, sampler.wrap_t]);
         if wraps[0] != wraps[1] {
-            self.note("a texture wraps in u as it does in v");
+            self.note("a texture's u wrap mode is ignored; its v wrap mode is used for both");
         }
         let wrap = match wraps[1] {
             CLAMP => TextureWrap::Clamp,
@@ -287,7 +287,7 @@ struct UvTransform {
 }
 
 impl UvTransform {
-    /// Converts `KHR_texture_transform`, which counts v from the top. Substituting (u, 1 − v) for (u, v) in
+    /// Converts `KHR_texture_transform`, which measures v from the top. Substituting (u, 1 − v) for (u, v) in
     /// u' = o.x + cos·s.x·u + sin·s.y·v and v' = o.y − sin·s.x·u + cos·s.y·v keeps the angle and changes the
     /// offset.
     fn convert(json: &TextureTransform) -> Self {
@@ -317,7 +317,7 @@ fn unit(number: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// Transforms points with the extension's formula, in coordinates that count v from the bottom.
+    /// Applies the extension's formula to points whose v is measured from the bottom.
     #[test]
     fn uv_transforms_match_the_extension() {
         let json =

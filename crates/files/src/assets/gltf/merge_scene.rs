@@ -1,4 +1,4 @@
-//! Merges the scene of a glTF file into one mesh, with materials as in mesh files.
+//! Merges a glTF file's scene into one mesh, with the same material type as mesh files.
 
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
@@ -11,14 +11,15 @@ use crate::geometry::mesh::TriangleMesh;
 use crate::math::Vec3;
 use crate::math::origin::origin_near;
 
-/// Maximum number of triangles, counting instances.
+/// Maximum number of triangles, counting every instance.
 const MAX_TRIANGLES: usize = 1 << 25;
 
 impl Container {
     /// Merges the file's scene into one mesh.
     ///
     /// # Errors
-    /// Same as [`Container::scene`] and [`Container::part`], or the scene has no faces or too many.
+    /// Same as [`Container::scene`] and [`Container::part`]. Also fails if the scene has no faces or too
+    /// many.
     pub fn merged_scene(&self, token: &CancelToken) -> Result<LoadedMesh, AssetError> {
         let scene = self.scene(token)?;
         let Some([min, max]) = scene.bounds else {
@@ -89,7 +90,7 @@ fn append(merged: &mut TriangleMesh, part: &TriangleMesh, placed: &AffineMap, ma
     merged.materials.resize(merged.triangles.len(), material);
 }
 
-/// Appends vertex attributes to a list that is empty while no part has the attribute.
+/// Appends vertex attributes. The list stays empty until a part has the attribute.
 fn fill<T: Copy>(all: &mut Vec<T>, first: u32, more: &[T], count: usize, missing: T, map: impl Fn(T) -> T) {
     if all.is_empty() && more.is_empty() {
         return;
@@ -99,7 +100,7 @@ fn fill<T: Copy>(all: &mut Vec<T>, first: u32, more: &[T], count: usize, missing
     all.resize(first as usize + count, missing);
 }
 
-/// Converts the properties that mesh file materials have.
+/// Converts the properties supported by mesh file materials.
 fn file_material(material: &ModelMaterial) -> FileMaterial {
     let number = |slot: &super::TexturedValue| slot.factor.x as f32;
     FileMaterial {

@@ -1,12 +1,13 @@
 //! glTF 2.0 (Khronos, *glTF 2.0 Specification*): reads JSON and GLB files, their meshes, images and scenes.
 //!
-//! A part is a primitive. Parts are numbered over all meshes, from 0.
+//! A part is a primitive. Part numbers start at 0 and continue across meshes.
 //!
 //! `serde_json` parses the JSON into the types of `json`; `base64` decodes data URIs. The crate `gltf` 1.4 is
-//! not used: without its validation it panics on indices out of range, and its validation rejects all
-//! required extensions that it does not know. Using only its types (`gltf-json`) would replace just the simple
-//! half of `json`: clear coats, WebP and Basis images and instancing would have to be parsed from raw values,
-//! errors in flattened extensions would lose their line, and the text of data URIs would stay in memory.
+//! not used. Without validation, it panics on out-of-range indices; with validation, it rejects every
+//! required extension it does not know. Its types alone (`gltf-json`) would replace only the simple half of
+//! `json`. Clear coats, WebP and Basis images and instancing would still have to be parsed from raw values,
+//! errors in flattened extensions would lose their line numbers, and the text of data URIs would stay in
+//! memory.
 
 mod accessor;
 mod description;
@@ -29,12 +30,12 @@ use super::read::{self, Monitor};
 use super::{AssetError, Companion, FileHash};
 use crate::control::{CancelToken, Progress, ignore_progress};
 
-/// Maximum size of a file, and of all its buffers together.
+/// Maximum file size, and maximum total size of the buffers.
 const FILE_LIMIT: u64 = 4 << 30;
 /// Maximum size of the JSON, including data URIs.
 const JSON_LIMIT: usize = 512 << 20;
 
-/// UTF-8 byte order mark, which some programs write.
+/// UTF-8 byte order mark, written by some programs.
 const BOM: &[u8] = b"\xef\xbb\xbf";
 
 /// Whether the file name has a glTF extension.
@@ -48,7 +49,8 @@ pub fn is_gltf(path: &Path) -> bool {
 /// # Errors
 /// The file cannot be read or is not glTF.
 pub fn referenced_files(path: &Path) -> Result<Vec<PathBuf>, AssetError> {
-    /// Bytes of a GLB file before the JSON (4.4.2): the file header, then length and type of the first chunk.
+    /// Number of bytes before the JSON in a GLB file (4.4.2): the file header and the first chunk's length
+    /// and type.
     const BEFORE_JSON: usize = 20;
     let header = read::start(path, BEFORE_JSON as u64)?;
     let (before, length) = match header[..] {
@@ -109,11 +111,11 @@ pub struct Container {
     /// Buffer files that were read.
     companions: Vec<Companion>,
     hash: FileHash,
-    /// For each part, the first part with the same mesh. Only that one is built.
+    /// For each part, the first part with the same mesh. Only this first part is built.
     built_as: Vec<usize>,
 }
 
-/// Where the bytes of an image are.
+/// Location of an image's bytes.
 #[derive(Debug, PartialEq)]
 pub enum ImageBytes<'a> {
     /// In the glTF file.
@@ -168,7 +170,7 @@ impl Container {
         })?;
         check_version(&root).map_err(wrong)?;
         check_required(&root).map_err(wrong)?;
-        // Keep the binary chunk, then read the buffers.
+        // Extract the binary chunk, then read the buffers.
         let binary = binary.map(|range| {
             let mut bytes = bytes;
             bytes.truncate(range.end);
@@ -203,7 +205,7 @@ impl Container {
         paths_of(&self.path, self.root.images.iter().map(|image| &image.uri))
     }
 
-    /// Locates the bytes of an image.
+    /// Locates an image's bytes.
     ///
     /// # Errors
     /// The image does not exist, or its bytes are out of range.
@@ -211,10 +213,10 @@ impl Container {
         self.image_bytes(number).map_err(|wrong| self.wrong(wrong.inside(format!("images[{number}]"))))
     }
 
-    /// Bytes of an image, read from its file if necessary.
+    /// An image's bytes, read from a separate file if necessary.
     ///
     /// # Errors
-    /// Same as [`Container::image`], or the image's file cannot be read.
+    /// Same as [`Container::image`]. Also fails if the image file cannot be read.
     pub fn image_content(&self, number: usize, token: &CancelToken) -> Result<Vec<u8>, AssetError> {
         match self.image(number)? {
             ImageBytes::Inside(bytes) => Ok(bytes.to_vec()),
@@ -244,15 +246,15 @@ impl Container {
         AssetError::malformed(&self.path, None, wrong.0)
     }
 
-    /// The first part with the same mesh, which is built instead of `part`.
+    /// First part with the same mesh as `part`. It is built instead of `part`.
     pub(super) fn built_as(&self, part: usize) -> usize {
         self.built_as.get(part).copied().unwrap_or(part)
     }
 
-    /// Finds the first part with the same mesh for each part. Rejects files whose meshes share buffer bytes
-    /// so heavily that they would take many times the file's size in memory.
+    /// For each part, finds the first part with the same mesh. Rejects files that reuse buffer bytes in so
+    /// many meshes that these would take many times the file's size in memory.
     fn shared_parts(&self) -> Result<Vec<usize>, GltfError> {
-        /// Number of corners that any file may have.
+        /// Number of corners allowed regardless of the buffer size.
         const FREE: u64 = 1 << 20;
         let mut first = HashMap::new();
         let mut built_as = Vec::new();
@@ -278,7 +280,7 @@ impl Container {
         Ok(built_as)
     }
 
-    /// An error of an image, with the image's index and this file.
+    /// Adds the image's index and this file's path to an image error.
     fn about_image(&self, number: usize, error: AssetError) -> AssetError {
         let place = format!("images[{number}]");
         match error {
@@ -295,7 +297,7 @@ impl Container {
     /// Checks that an image exists and has a valid header.
     ///
     /// # Errors
-    /// [`AssetError::Malformed`] with the index of the image; [`AssetError::Cancelled`].
+    /// [`AssetError::Malformed`] with the image's index, or [`AssetError::Cancelled`].
     pub fn check_image_header(&self, number: usize, token: &CancelToken) -> Result<(), AssetError> {
         let (limits, encoding) = (ImageLimits::default(), ImageEncoding::Color);
         let size = match self.image(number)? {
@@ -331,7 +333,7 @@ fn too_many_corners(corners: u64, bytes: u64, limit: u64) -> String {
     )
 }
 
-/// Reason to reject a file without content.
+/// Error message for an empty file.
 const EMPTY_FILE: &str = "the file is empty";
 const NEITHER_GLB_NOR_JSON: &str = "not a glTF file: neither GLB nor a JSON object";
 
@@ -351,7 +353,7 @@ fn invalid_version(text: &str) -> String {
     format!("asset.minVersion is not a version: {:?}", shown(text))
 }
 
-/// Reason to reject a file that needs an extension for its meshes or images.
+/// Error message for a file whose meshes or images need an unsupported extension.
 fn unsupported(extension: &str, help: &str) -> String {
     format!("{extension} is not supported; {help}")
 }
@@ -372,10 +374,11 @@ fn not_relative(uri: &str) -> String {
     format!("{:?} is not a relative URI", shown(uri))
 }
 
-/// The unsupported mesh compression.
+/// An unsupported mesh compression extension.
 const DRACO: &str = "KHR_draco_mesh_compression";
 
-/// Version of a file older than glTF 2.0, whose JSON has objects instead of arrays. `None` for other files.
+/// Version of a file older than glTF 2.0. `None` for other files. The older JSON has objects instead of
+/// arrays.
 fn old_version(text: &[u8]) -> Option<String> {
     #[derive(serde::Deserialize)]
     struct Old {
@@ -386,7 +389,7 @@ fn old_version(text: &[u8]) -> Option<String> {
     is_old.then_some(asset.version)
 }
 
-/// Replaces Rust terms in a message of the JSON parser by JSON terms.
+/// Replaces Rust terms with JSON terms in a JSON parser message.
 fn with_json_terms(message: &str) -> String {
     let Some((before, expected)) = message.rsplit_once(", expected ") else { return message.to_owned() };
     let before = match before.strip_prefix("invalid type: ") {
@@ -405,7 +408,7 @@ fn with_json_terms(message: &str) -> String {
     format!("{before}, expected {expected}")
 }
 
-/// Truncates a longer parser message.
+/// Truncates long parser messages.
 fn shown_long(text: &str) -> String {
     text.chars().take(200).collect()
 }
@@ -431,13 +434,13 @@ fn chunks(bytes: &[u8]) -> Result<(Range, Option<Range>), GltfError> {
     while let (Some(length), Some(kind)) = (word(at), word(at + 4)) {
         let start = at + 8;
         let Some(end) = end_of(at) else {
-            // Ignore bytes after the length declared by the header.
+            // Ignore bytes past the length given in the header.
             if at >= declared && json.is_some() && !matches!(kind, JSON | BINARY) {
                 break;
             }
             let has = bytes.len() - start;
             return Err(GltfError::new(format!(
-                "the chunk at byte {at} claims {length} bytes, but {has} are left"
+                "the chunk at byte {at} claims {length} bytes, but only {has} remain"
             )));
         };
         match kind {
@@ -474,7 +477,8 @@ fn check_version(root: &Root) -> Result<(), GltfError> {
     }
 }
 
-/// Unsupported extensions without which meshes or images are missing, and the remedy.
+/// Unsupported extensions that change how meshes or images are stored, with advice for exporting without
+/// them.
 const MISSING: [(&str, &str); 5] = [
     (DRACO, "export it without Draco compression"),
     ("EXT_meshopt_compression", "export it without meshopt compression"),
@@ -483,7 +487,7 @@ const MISSING: [(&str, &str); 5] = [
     ("EXT_mesh_gpu_instancing", "export it with a node for each instance"),
 ];
 
-/// Extensions that are supported, or whose omission is noted.
+/// Extensions that are supported, or ignored with a note.
 const KNOWN: [&str; 21] = [
     "EXT_texture_webp",
     "KHR_lights_punctual",
@@ -560,10 +564,7 @@ fn buffers(
         }
         total += bytes.len() as u64;
         if total > FILE_LIMIT {
-            return Err(wrong(GltfError::new(format!(
-                "the buffers have more than {} MiB",
-                FILE_LIMIT >> 20
-            ))));
+            return Err(wrong(GltfError::new(format!("the buffers exceed {} MiB", FILE_LIMIT >> 20))));
         }
         all.push(bytes);
     }

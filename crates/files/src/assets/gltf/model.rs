@@ -16,7 +16,7 @@ use crate::control::{CancelToken, ignore_progress};
 use crate::geometry::mesh::TriangleMesh;
 use crate::math::{DMat3, DVec3};
 
-/// Maximum number of vertices, counting instances, for which exact bounds are computed.
+/// Maximum number of vertices, counting every instance, for computing exact bounds.
 const MAX_MEASURED: usize = 20_000_000;
 /// Limit on coordinates, transform entries and light intensities. Scenes are limited to 10¹⁸, and cameras are
 /// placed at several times the model's size.
@@ -25,7 +25,7 @@ const LIMIT: f64 = 1e15;
 const MAX_INSTANCES: usize = 1 << 20;
 
 impl Container {
-    /// Converts the scene that the file selects, else the first scene, else all nodes.
+    /// Converts the file's default scene, or else its first scene, or else all nodes.
     ///
     /// # Errors
     /// [`AssetError::Malformed`] with the location in the JSON.
@@ -44,8 +44,8 @@ impl Container {
         Ok(scene)
     }
 
-    /// Computes bounds and outline of the instances. Errors of parts are reported when the parts are loaded,
-    /// unless no part is valid.
+    /// Computes the bounds and outline of the instances. Ignores errors in parts unless no part is valid.
+    /// Loading a part reports its errors.
     fn measure(&self, scene: &mut ModelScene, token: &CancelToken) -> Result<(), AssetError> {
         let mut parts: HashMap<usize, (TriangleMesh, Vec<DVec3>)> = HashMap::new();
         let (mut vertices, mut first_wrong) = (0, None);
@@ -66,7 +66,7 @@ impl Container {
             };
             let placed = &instance.placed;
             scene.outline.extend(extremes.iter().map(|at| placed.point(*at)));
-            // Include all vertices while their number is below the limit.
+            // Measure every vertex up to the limit, then only extreme points.
             vertices += mesh.positions.len();
             let all = mesh.positions.iter().map(|at| at.as_dvec3() + mesh.origin);
             let few = extremes.iter().copied();
@@ -99,8 +99,8 @@ struct SceneWalk<'a> {
     container: &'a Container,
     scene: ModelScene,
     notes: Notes,
-    /// Index of each converted material, by its index in the file and its texture coordinate sets. Primitives
-    /// without a material share one.
+    /// Maps a material's index in the file and its texture coordinate sets to the index of the converted
+    /// material. Primitives without a material share a default material.
     materials: HashMap<(Option<usize>, [usize; 2]), usize>,
 }
 
@@ -129,7 +129,7 @@ impl SceneWalk<'_> {
             let count = root.animations.len();
             self.notes.add("animations", &format!("{count} skipped; the model is shown at rest"));
         }
-        // Place all nodes. A second visit to a node reveals a cycle or a second parent.
+        // Place all nodes. Visiting a node twice means a cycle or a second parent.
         let worlds = self.world_transforms(&roots)?;
         for &(node, placed, is_visible) in &worlds.order {
             self.node(node, placed, is_visible, &worlds)
@@ -242,7 +242,7 @@ impl SceneWalk<'_> {
         Ok(())
     }
 
-    /// Adds notes about ignored attributes of a primitive that its material would use.
+    /// Adds notes about ignored vertex attributes that would affect the primitive's material.
     fn note_attributes(
         &mut self,
         place: &str,
@@ -262,7 +262,7 @@ impl SceneWalk<'_> {
         }
     }
 
-    /// Index of a material, converting it on first use.
+    /// Returns the index of a material. Converts the material on first use.
     fn material(&mut self, number: Option<usize>, sets: [usize; 2]) -> Result<usize, GltfError> {
         if let Some(known) = self.materials.get(&(number, sets)) {
             return Ok(*known);
@@ -281,8 +281,8 @@ impl SceneWalk<'_> {
         Ok(index)
     }
 
-    /// Transform of a skin in its bind pose, computed from its first joint; all joints agree there (glTF 2.0,
-    /// 3.7.3).
+    /// Transform of a skin in its bind pose (glTF 2.0, 3.7.3). All joints have the same transform in this
+    /// pose, so only the first is evaluated.
     fn bind_pose(
         &mut self,
         number: usize,
@@ -383,7 +383,7 @@ impl SceneWalk<'_> {
     }
 }
 
-/// Reason to reject a node that is visited twice.
+/// Error message for a node that is visited twice.
 pub(super) fn not_a_tree(node: usize) -> String {
     format!("nodes[{node}] is its own ancestor or has two parents")
 }
@@ -391,8 +391,8 @@ pub(super) fn not_a_tree(node: usize) -> String {
 /// Note about a camera of unknown type.
 pub(super) const UNKNOWN_CAMERA: &str = "the camera is skipped: it is neither perspective nor orthographic";
 
-/// Rejects a transform with entries beyond the limit. Blames the node's own property if that exceeds the
-/// limit.
+/// Rejects transforms with entries above the limit. If a property of the node itself exceeds the limit, the
+/// error names it.
 fn check_reach(node: &JsonNode, placed: &AffineMap) -> Result<(), GltfError> {
     let largest = |numbers: &[f64]| numbers.iter().fold(0.0_f64, |largest, number| largest.max(number.abs()));
     let all = |placed: &AffineMap| {
@@ -418,7 +418,7 @@ fn check_reach(node: &JsonNode, placed: &AffineMap) -> Result<(), GltfError> {
     ))
 }
 
-/// Rejects a light with an intensity beyond the limit.
+/// Rejects lights with an intensity above the limit.
 fn check_intensity(json: &JsonLight, number: usize) -> Result<(), GltfError> {
     let brightest = json.color.iter().fold(0.0_f64, |max, part| max.max(*part)) * json.intensity;
     if brightest < LIMIT || !(json.intensity > 0.0) {

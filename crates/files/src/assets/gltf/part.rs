@@ -1,4 +1,4 @@
-//! Builds a part of a glTF file: a primitive as a mesh in its local coordinates (glTF 2.0, 3.7.2).
+//! Builds a part (primitive) of a glTF file as a mesh in local coordinates (glTF 2.0, 3.7.2).
 
 use super::accessor::AccessorReader;
 use super::json::{Primitive, TRIANGLES};
@@ -12,17 +12,17 @@ use crate::control::{CancelToken, Progress};
 use crate::math::color::linear_to_srgb8;
 use crate::math::{DVec3, Vec2, Vec3};
 
-/// Modes of primitives with faces, in addition to [`TRIANGLES`].
+/// Primitive modes with faces, besides [`TRIANGLES`].
 const STRIP: u32 = 5;
 const FAN: u32 = 6;
 
 impl Primitive {
-    /// Whether the primitive has faces, rather than points or lines.
+    /// Whether the primitive consists of faces rather than points or lines.
     pub(super) fn has_faces(&self) -> bool {
         [TRIANGLES, STRIP, FAN].contains(&self.mode)
     }
 
-    /// Number of triangle corners made from `count` vertices in this mode.
+    /// Number of triangle corners for `count` vertices in this mode.
     pub(super) fn corners_built(&self, count: u64) -> u64 {
         match self.mode {
             TRIANGLES => count,
@@ -33,7 +33,7 @@ impl Primitive {
 }
 
 impl Container {
-    /// The primitive of a part, and its location in the file.
+    /// Primitive of a part, and the primitive's location in the file.
     pub(super) fn primitive(&self, part: usize) -> Option<(String, &Primitive)> {
         let mut first = 0;
         for (mesh, json) in self.root.meshes.iter().enumerate() {
@@ -53,7 +53,7 @@ impl Container {
     /// Builds a part as a mesh without materials.
     ///
     /// # Errors
-    /// [`AssetError::Malformed`] with the location in the JSON; [`AssetError::Cancelled`].
+    /// [`AssetError::Malformed`] with the location in the JSON, or [`AssetError::Cancelled`].
     pub fn part(
         &self,
         part: usize,
@@ -108,7 +108,7 @@ impl Container {
             let finite = |normal: Vec3| if normal.is_finite() { normal } else { Vec3::ZERO };
             parsed.normals = each().map(|vertex| finite(Vec3::from(normals.floats(vertex, 0.0)))).collect();
         }
-        // glTF counts v from the top.
+        // glTF measures v from the top.
         let upright = |[u, v]: [f32; 2]| Vec2::new(u, 1.0 - v);
         for (uvs, all) in sets.iter().zip([&mut parsed.uvs, &mut parsed.second_uvs]) {
             if let Some(uvs) = uvs {
@@ -122,7 +122,7 @@ impl Container {
         Ok(parsed)
     }
 
-    /// Opens an attribute of a primitive, if it has one.
+    /// Opens an attribute of a primitive, if present.
     pub(super) fn attribute(
         &self,
         primitive: &Primitive,
@@ -132,8 +132,8 @@ impl Container {
         AccessorReader::open(self, number).map(Some).map_err(|wrong| wrong.inside(name))
     }
 
-    /// The two texture coordinate sets of a primitive's mesh, in ascending order: the first two that its
-    /// material's textures use. If they use only one set, that one comes first.
+    /// The two texture coordinate sets of a primitive's mesh: the first two used by its material's textures,
+    /// in ascending order. If the textures use only one set, it is listed first.
     pub(super) fn coordinate_sets(&self, primitive: &Primitive) -> [usize; 2] {
         let material = primitive.material.and_then(|material| self.root.materials.get(material));
         let used = material.map(|material| material.coordinate_sets()).unwrap_or_default();
@@ -144,8 +144,8 @@ impl Container {
         }
     }
 
-    /// Returns the vertex of each corner, as an index into the list of vertices that is also returned: all
-    /// vertices, or only the used ones if those are fewer than half.
+    /// Returns the vertex index of each corner, and the list of vertices that these indices refer to. The
+    /// list contains all vertices, or only the used ones if there are few corners.
     fn corners(&self, primitive: &Primitive, vertices: usize) -> Result<(Vec<u32>, Vec<u32>), GltfError> {
         let all = || (0..vertices as u32).collect();
         let Some(number) = primitive.indices else { return Ok((all(), all())) };
@@ -174,7 +174,7 @@ pub(super) fn wrong_width(width: usize) -> String {
     format!("expected VEC3, found {width} components")
 }
 
-/// Triangulates corners according to the mode. Incomplete triangles are dropped.
+/// Triangulates corners according to the primitive mode. Drops incomplete triangles.
 fn faces(mode: u32, corners: &[u32]) -> Faces {
     let mut faces = Faces::default();
     let mut add = |triangle: [u32; 3]| {

@@ -41,7 +41,7 @@ fn scene(container: &Container) -> Result<ModelScene, AssetError> {
     container.scene(&CancelToken::new())
 }
 
-/// Error of opening a file, converting its scene or building its first part.
+/// Error from opening a file, converting its scene or building its first part.
 fn error(json: &Value) -> String {
     let all = || {
         let container = open_json(json)?;
@@ -116,7 +116,7 @@ fn glb(json: &Value, binary: &[u8]) -> Vec<u8> {
 }
 
 #[test]
-fn parts_do_not_depend_on_the_kind_of_buffer() {
+fn parts_do_not_depend_on_buffer_storage() {
     let folder = GltfDir::new();
     let embedded =
         part(&folder.open("a.gltf", square().to_string().as_bytes()).expect("read"), 0).expect("a mesh");
@@ -125,7 +125,7 @@ fn parts_do_not_depend_on_the_kind_of_buffer() {
         [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]].map(|[x, y]| Vec3::new(x, y, 0.0))
     );
     assert_eq!(embedded.mesh.triangles, [[0, 1, 2], [0, 2, 3]]);
-    // glTF counts v from the top.
+    // glTF measures v from the top.
     assert_eq!(embedded.mesh.uvs, [Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y]);
     let mut binary = square();
     binary["buffers"][0].as_object_mut().expect("an object").remove("uri");
@@ -215,7 +215,7 @@ fn buffers_may_look_like_utf16() {
 }
 
 #[test]
-fn nodes_place_parts_cameras_and_lights() {
+fn nodes_transform_parts_cameras_and_lights() {
     let mut json = square();
     json["nodes"] = json!([
         {"children": [1, 2, 3], "rotation": [0, 0.707_106_781_186_547_5, 0, 0.707_106_781_186_547_5], "scale": [2, 2, 2]},
@@ -283,7 +283,7 @@ fn material_extensions_are_converted() {
     assert_eq!(scene.images, ["paint"]);
 }
 
-/// A mesh has two texture coordinate sets: those that its material uses, in ascending order.
+/// A mesh keeps the two texture coordinate sets used by its material, in ascending order.
 #[test]
 fn two_used_texture_coordinate_sets_are_kept() {
     let mut json = square();
@@ -318,11 +318,15 @@ fn two_used_texture_coordinate_sets_are_kept() {
     assert_ne!(zero, one);
     assert_eq!(read([0, 1, 1]), (zero.clone(), one.clone(), [false, true, true], 0));
     assert_eq!(read([1, 0, 1]), (zero.clone(), one.clone(), [true, false, true], 0));
-    assert_eq!(read([1, 1, 1]), (one.clone(), zero.clone(), [false; 3], 0), "the only used set comes first");
+    assert_eq!(
+        read([1, 1, 1]),
+        (one.clone(), zero.clone(), [false; 3], 0),
+        "the only used set should be first"
+    );
     let (first, two, second, notes) = read([2, 0, 2]);
     assert_eq!((&first, second, notes), (&zero, [true, false, true], 0));
     assert!(two != zero && two != one);
-    assert_eq!(read([0, 1, 2]), (zero, one, [false, true, false], 1), "three sets are too many");
+    assert_eq!(read([0, 1, 2]), (zero, one, [false, true, false], 1), "three sets should be rejected");
 }
 
 #[test]
@@ -341,7 +345,7 @@ fn scenes_merge_into_one_mesh() {
 }
 
 #[test]
-fn errors_name_their_location() {
+fn errors_include_their_location() {
     let with = |edit: &dyn Fn(&mut Value)| {
         let mut json = square();
         edit(&mut json);
@@ -400,7 +404,7 @@ fn errors_name_their_location() {
     assert!(found.ends_with(&too_many_zeros(4_000_000_000)), "{found}");
 }
 
-/// Primitives that share an accessor many times would take many times the file's memory.
+/// Primitives that reuse the same buffer bytes could take far more memory than the size of the file.
 #[test]
 fn reuse_of_buffer_bytes_is_limited() {
     let mut json = square();
@@ -413,7 +417,7 @@ fn reuse_of_buffer_bytes_is_limited() {
     assert_eq!(error(&json), too_many_corners(400 << 20, 92, 92 + (1 << 20)));
 }
 
-/// A mesh shared by many primitives is built once, with the texture coordinates that their materials use.
+/// A mesh shared by many primitives is built once, with the texture coordinates used by their materials.
 #[test]
 fn equal_primitives_share_one_part() {
     let mut json = square();
@@ -434,9 +438,10 @@ fn equal_primitives_share_one_part() {
     assert_eq!(parts, [0, 100_000]);
 }
 
-/// Primitives that differ only in ignored attributes are built separately, and count with their triangles.
+/// Primitives that differ only in ignored attributes are built separately, so their triangles all count
+/// toward the limit.
 #[test]
-fn all_built_primitives_count() {
+fn corner_limit_counts_all_built_primitives() {
     let mut json = square();
     json["accessors"][1] = json!({"componentType": 5121, "count": 10_000, "type": "SCALAR"});
     let primitives = |mode: u32| -> Vec<Value> {
@@ -490,7 +495,7 @@ fn old_versions_and_wrong_types_are_rejected() {
     assert!(error(&flat).ends_with(&part::wrong_width(2)), "{}", error(&flat));
 }
 
-/// Some programs write unpadded chunks, or bytes after the end declared by the header.
+/// Some programs write unpadded chunks, or extra bytes past the length given in the header.
 #[test]
 fn unpadded_chunks_and_trailers_are_accepted() {
     let folder = GltfDir::new();
@@ -515,9 +520,9 @@ fn unpadded_chunks_and_trailers_are_accepted() {
     }
 }
 
-/// An image that is missing or damaged after its header is reported by its index.
+/// Errors name the index of an image that is missing or damaged after its header.
 #[test]
-fn invalid_images_are_reported_by_their_index() {
+fn image_errors_include_the_image_index() {
     let folder = GltfDir::new();
     let mut json = square();
     let mut png = Vec::new();
@@ -548,7 +553,7 @@ fn invalid_images_are_reported_by_their_index() {
 }
 
 #[test]
-fn truncated_and_foreign_glbs_are_rejected() {
+fn truncated_and_invalid_glbs_are_rejected() {
     let folder = GltfDir::new();
     let mut json = square();
     json["buffers"][0].as_object_mut().expect("an object").remove("uri");
@@ -565,7 +570,7 @@ fn truncated_and_foreign_glbs_are_rejected() {
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(400))]
-    /// Mutated files are read or rejected.
+    /// Mutated files are either read or rejected, without panics.
     #[test]
     fn mutated_files_never_panic(changes in proptest::collection::vec((any::<u16>(), any::<u8>()), 1..8), cut in any::<u16>()) {
         let mut json = square();
@@ -573,7 +578,7 @@ proptest! {
         let mut file = glb(&json, &bytes());
         for (place, byte) in changes {
             let place = usize::from(place) % file.len();
-            // Replacing digits by digits gets further than other mutations.
+            // Mutations that replace digits with digits often keep the JSON valid.
             file[place] = if file[place].is_ascii_digit() { b'0' + byte % 10 } else { byte };
         }
         if cut % 4 == 0 {
@@ -590,7 +595,7 @@ proptest! {
 }
 
 #[test]
-fn referenced_files_are_listed_from_the_json() {
+fn listing_references_reads_only_the_json() {
     let folder = GltfDir::new();
     let mut json = square();
     json["buffers"] = serde_json::json!([{"uri": "deep/a.bin", "byteLength": 9}, {"byteLength": 1, "uri": "data:;base64,AA=="}]);

@@ -4,14 +4,14 @@ use std::io::{self, Read, Seek, SeekFrom};
 
 use super::decode_thread::ProgressReporter;
 
-/// Maximum number of bytes per read, so that a decoder that reads the whole file at once still reports
-/// progress.
+/// Maximum number of bytes per read. Without this limit, a decoder that reads the whole file in one call
+/// would not report progress.
 const CHUNK: usize = 1 << 16;
 
 pub(super) struct CountingReader<R> {
     inner: R,
     at: u64,
-    /// Farthest byte read, because decoders may seek backwards.
+    /// Furthest position read so far. Decoders may seek backwards.
     reached: u64,
     length: u64,
     report: ProgressReporter,

@@ -1,5 +1,5 @@
-//! Runs image decoders, which do not poll the cancel token, on a separate thread. A cancelled call abandons
-//! the thread.
+//! Runs image decoders on a separate thread, because they do not poll the cancel token. If a call is
+//! cancelled, its thread is abandoned.
 
 use std::io;
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError, SyncSender};
@@ -24,8 +24,8 @@ static ABANDONED: Mutex<Vec<JoinHandle<()>>> = Mutex::new(Vec::new());
 pub(super) struct ProgressReporter(Option<SyncSender<u64>>);
 
 impl ProgressReporter {
-    /// Reports that `done` bytes were read. Returns an error if the call was cancelled, so that the decoder
-    /// can stop early.
+    /// Reports that `done` bytes were read. Returns an error if the call was cancelled, so the decoder can
+    /// stop early.
     pub(super) fn reached(&self, done: u64) -> io::Result<()> {
         match &self.0 {
             Some(receiver) => receiver.send(done).map_err(|_| io::Error::other(Cancelled)),
@@ -34,10 +34,11 @@ impl ProgressReporter {
     }
 }
 
-/// Runs `work` on another thread and forwards its progress reports, out of `total`. Returns `None` if the
-/// work panicked. If no thread can be started, runs the work here, without reports or cancellation.
+/// Runs `work` on another thread and forwards its progress reports, out of `total`. Returns `None` if `work`
+/// panics. If no thread can be started, runs `work` on the calling thread, without progress reports or
+/// cancellation.
 ///
-/// Abandoned work still holds memory, so new work waits until all of it has finished.
+/// Abandoned work still uses memory, so new work waits for all of it to finish.
 pub(super) fn run<T: Send + 'static>(
     monitor: Monitor<'_>,
     total: u64,
@@ -46,7 +47,7 @@ pub(super) fn run<T: Send + 'static>(
     wait_for_abandoned(monitor.token)?;
     let (report, reports) = mpsc::sync_channel(QUEUE_LENGTH);
     let (send, result) = mpsc::channel();
-    // Keep access to the work in case the thread does not start.
+    // Keep a handle to the work in case the thread does not start.
     let work = Arc::new(Mutex::new(Some(work)));
     let take = |work: &Mutex<Option<_>>| work.lock().unwrap_or_else(PoisonError::into_inner).take();
     let shared = Arc::clone(&work);
@@ -111,21 +112,21 @@ mod tests {
     use crate::control::ignore_progress;
 
     #[test]
-    fn only_new_work_waits_for_cancelled_work() {
+    fn new_work_waits_for_cancelled_work() {
         let token = CancelToken::new();
         let (release, released) = mpsc::channel::<()>();
         let (send, ended) = mpsc::channel();
         let cancel = token.clone();
         let stuck = move |report: ProgressReporter| {
             cancel.cancel();
-            // The work is released only after the call has returned. Without that, the wait times out after
-            // 20 s.
+            // The work is released after the call has returned. If the call does not return, this times out
+            // after 20 s.
             let in_time = released.recv_timeout(Duration::from_secs(20)).is_ok();
             let _ = send.send((in_time, report.reached(1).is_err()));
         };
         let monitor = Monitor { progress: &ignore_progress, token: &token };
         assert_eq!(run(monitor, 1, stuck).err(), Some(Cancelled));
-        release.send(()).expect("the work continues");
+        release.send(()).expect("the work is still waiting");
         let fresh = CancelToken::new();
         let next = move |_| ended.try_recv();
         let ended =
@@ -134,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn reports_keep_order_and_panics_give_no_result() {
+    fn reports_are_in_order_and_panics_return_none() {
         let token = CancelToken::new();
         let seen = Mutex::new(Vec::new());
         let note = |done, total| seen.lock().expect("no panic").push((done, total));

@@ -1,4 +1,4 @@
-//! The decoder of each format, and limits that are checked before memory is allocated.
+//! Selects the decoder for each format, and checks limits before memory is allocated.
 
 use std::io::{BufRead, Seek, SeekFrom};
 
@@ -12,7 +12,7 @@ use super::png::PngDecoder;
 use super::{ImageEncoding, ImageLimits, tga};
 use super::{empty_image, exceeds_memory, implausible_size, side_too_long};
 
-/// A decoder and the metadata that it does not apply.
+/// A decoder, and the metadata it does not apply itself.
 pub(super) struct OpenedImage {
     pub(super) decoder: Box<dyn ImageDecoder>,
     pub(super) metadata: ImageMetadata,
@@ -20,7 +20,7 @@ pub(super) struct OpenedImage {
     pub(super) texel_bytes: u64,
 }
 
-/// Creates the decoder of the detected format.
+/// Creates the decoder for the detected format.
 pub(super) fn choose<R: BufRead + Seek + 'static>(
     mut reader: ImageReader<R>,
     encoding: ImageEncoding,
@@ -74,8 +74,8 @@ pub(super) fn choose<R: BufRead + Seek + 'static>(
     }
 }
 
-/// Orientation of an image. In formats other than JPEG, `image` does not support Exif data with the prefix used
-/// in JPEG, which some programs write.
+/// Orientation of an image. Some programs write the JPEG prefix of Exif data in other formats, where `image`
+/// does not support it.
 pub(super) fn orientation(decoder: &mut dyn ImageDecoder) -> Result<Orientation, ImageError> {
     let orientation = decoder.orientation()?;
     let exif = if orientation == Orientation::NoTransforms { decoder.exif_metadata()? } else { None };
@@ -96,7 +96,7 @@ pub(super) fn texel_bytes(color: ColorType, encoding: ImageEncoding, metadata: &
     }
 }
 
-/// Memory that any image may take, however short its file is.
+/// Memory allowed for any image, regardless of its file size.
 const SMALL_BYTES: u64 = 256 << 20;
 /// Maximum ratio of memory to file size for each format, counting the decoded image and its texels.
 pub(super) fn max_expansion(format: Option<ImageFormat>) -> u64 {
@@ -107,13 +107,13 @@ pub(super) fn max_expansion(format: Option<ImageFormat>) -> u64 {
         Some(ImageFormat::Tga) => 512,
         // Runs of 255 pixels in two bytes.
         Some(ImageFormat::Bmp) => 1024,
-        // A single-color EXR, which deflate compresses best.
+        // A single-color EXR compressed with deflate, the worst case.
         _ => 4200,
     }
 }
 
 /// Checks an image's size before memory is allocated, and returns the size of its texels. `held_bytes` is the
-/// part of the file that the decoder holds. The file in memory (`in_memory`) is freed before the texels are
+/// size of the file data kept by the decoder. The file in memory (`in_memory`) is freed before the texels are
 /// complete.
 pub(super) fn check_size(
     decoder: &dyn ImageDecoder,
@@ -134,7 +134,7 @@ pub(super) fn check_size(
     if needed > limits.memory_bytes {
         return Err(exceeds_memory(width, height, needed, limits.memory_bytes));
     }
-    // A few bytes of runs can expand to a large image.
+    // A few run-length encoded bytes can expand to a large image.
     if needed > SMALL_BYTES.saturating_add(length.saturating_mul(max_expansion)) {
         return Err(implausible_size(width, height, needed, length));
     }

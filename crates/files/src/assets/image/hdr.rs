@@ -12,10 +12,9 @@ use super::space::ColorSpace;
 
 /// Maximum size of a header, including the line with the resolution. PLY has the same limit.
 const HEADER_BYTES: u64 = 1 << 20;
-/// Luminous efficacy of white light in lm/W, by which XYZE files scale their values (`WHTEFFICACY` in
-/// Radiance).
+/// Luminous efficacy of white light in lm/W. XYZE values are scaled by it (`WHTEFFICACY` in Radiance).
 const WHITE_EFFICACY: f64 = 179.0;
-/// First bytes of a file, followed by a program's name.
+/// First bytes of a file. A program name follows.
 pub(super) const MAGIC: &[u8] = b"#?";
 
 /// Decoder of an HDR file.
@@ -93,7 +92,7 @@ impl HdrHeader {
         let scan = loop {
             let number = lines.number + 1;
             let line = lines.next()?;
-            // The resolution follows an empty line, which some programs omit.
+            // An empty line precedes the resolution, but some programs omit it.
             if let Some(scan) = ScanOrder::parse(&line) {
                 break scan;
             }
@@ -105,7 +104,7 @@ impl HdrHeader {
     }
 }
 
-/// Lines of a header with any line ending.
+/// Lines of a header, with any line endings.
 struct HeaderLines<'a, R> {
     file: &'a mut R,
     number: usize,
@@ -128,7 +127,7 @@ impl<R: BufRead> HeaderLines<'_, R> {
 /// Header variables that affect the values.
 #[derive(Default)]
 struct HeaderVariables {
-    /// Products of all `EXPOSURE` lines and of all `COLORCORR` lines.
+    /// Product of all `EXPOSURE` lines, and product of all `COLORCORR` lines.
     exposure: Option<f64>,
     correction: Option<[f64; 3]>,
     primaries: Option<Primaries>,
@@ -137,7 +136,7 @@ struct HeaderVariables {
 }
 
 impl HeaderVariables {
-    /// Adds a line. Indented lines are quoted from other headers.
+    /// Adds a line. Ignores indented lines, which are quotes of other headers.
     fn add(&mut self, line: &str, number: usize) -> Result<(), String> {
         let Some((name, value)) = line.split_once('=').filter(|_| !line.starts_with(['#', ' ', '\t'])) else {
             return Ok(());
@@ -200,7 +199,7 @@ pub(super) fn unsupported_encoding(found: &str) -> String {
     format!("format {found:?} is neither 32-bit_rle_rgbe nor 32-bit_rle_xyze")
 }
 
-/// Warning about a header line.
+/// Warning about an ignored header line.
 pub(super) fn line_ignored(line: &str) -> String {
     format!("`{line}` is ignored")
 }
@@ -219,11 +218,11 @@ fn positive<const N: usize>(numbers: &[f64; N]) -> bool {
     numbers.iter().all(|number| number.is_finite() && *number > 0.0)
 }
 
-/// An axis along which pixels are stored.
+/// Storage direction of pixels along one axis.
 #[derive(Clone, Copy)]
 struct ScanAxis {
     is_vertical: bool,
-    /// Whether pixels run to the right or downwards.
+    /// Whether pixels are stored from left to right or from top to bottom.
     is_forward: bool,
     count: u32,
 }
@@ -240,7 +239,7 @@ impl ScanAxis {
         Some(Self { is_vertical, is_forward, count: count.parse().ok()? })
     }
 
-    /// Column or row at a position along the axis.
+    /// Column or row at a position in storage order.
     fn coordinate(self, at: usize) -> usize {
         if self.is_forward { at } else { self.count as usize - 1 - at }
     }
@@ -322,7 +321,7 @@ fn read_runs(file: &mut impl Read, channel: usize, pixels: &mut [[u8; 4]]) -> Im
     Ok(())
 }
 
-/// Reads a scanline of whole pixels, where (1, 1, 1, n) repeats the previous pixel.
+/// Reads a scanline stored pixel by pixel. A pixel of (1, 1, 1, n) repeats the previous pixel.
 fn read_flat(
     file: &mut impl Read,
     first: [u8; 4],

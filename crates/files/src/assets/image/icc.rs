@@ -31,7 +31,7 @@ pub(super) const LOOKUP_TABLES: &str = "lookup tables are not supported";
 pub(super) const UNSUPPORTED_CURVES: &str = "missing or unsupported curves";
 pub(super) const DEGENERATE_PRIMARIES: &str = "degenerate primaries";
 
-/// Reason to ignore a profile for another color space.
+/// Warning about an ignored profile of another color space.
 pub(super) fn wrong_space(found: &str, is_gray: bool) -> String {
     format!("its color space is {found:?}, not {}", if is_gray { "gray" } else { "RGB" })
 }
@@ -85,7 +85,7 @@ impl<'a> IccProfile<'a> {
         Some(DVec3::new(x?, y?, z?))
     }
 
-    /// A number of type s15Fixed16.
+    /// An s15Fixed16 number.
     fn fixed(&self, at: usize) -> Option<f64> {
         self.field(at).map(|bytes| f64::from(i32::from_be_bytes(*bytes)) / 65536.0)
     }

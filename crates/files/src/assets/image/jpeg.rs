@@ -1,4 +1,4 @@
-//! Rejects malformed JPEG files that the decoder accepts, filling missing data with gray.
+//! Rejects malformed JPEG files. The decoder would accept them and fill missing data with gray.
 
 use std::path::Path;
 
@@ -13,7 +13,7 @@ pub(super) fn check_complete(path: &Path, limit: u64, token: &CancelToken) -> Re
     check_bytes(&bytes.map_err(|error: AssetError| error.to_string())?)
 }
 
-/// Checks the kind of JPEG, and [`check_complete`], for bytes in memory.
+/// Checks the JPEG type of a file in memory, and performs the same check as [`check_complete`].
 pub(super) fn check_bytes(bytes: &[u8]) -> Result<(), String> {
     check_kind(bytes)?;
     let last = |marker: [u8; 2]| bytes.windows(2).rposition(|pair| pair == marker);
@@ -23,11 +23,11 @@ pub(super) fn check_bytes(bytes: &[u8]) -> Result<(), String> {
     }
 }
 
-/// Reason to reject a file that ends within the image.
+/// Error message for a file that ends within the image.
 pub(super) const TRUNCATED: &str = "the image data is truncated";
 
-/// Rejects kinds of JPEG that the decoder does not support, because its own message does not name them (ITU-T
-/// T.81, table B.1).
+/// Rejects JPEG types that the decoder does not support (ITU-T T.81, table B.1). The decoder's own message
+/// does not name the type.
 fn check_kind(bytes: &[u8]) -> Result<(), String> {
     // A frame header starts with the bits per sample.
     let mut frames = segments(bytes)
@@ -43,8 +43,8 @@ fn check_kind(bytes: &[u8]) -> Result<(), String> {
     Err(format!("it is {kind}; save it as a baseline or progressive JPEG, or as PNG"))
 }
 
-/// Offset of the transform byte of an Adobe segment that claims RGB although a JFIF segment claims YCbCr. Readers
-/// follow the JFIF segment.
+/// Offset of the transform byte of an Adobe segment that specifies RGB although there is a JFIF segment,
+/// which implies YCbCr. Readers follow the JFIF segment.
 pub(super) fn misleading_transform(bytes: &[u8]) -> Option<usize> {
     const ADOBE: &[u8] = b"Adobe";
     const TRANSFORM: usize = 11;
@@ -58,7 +58,7 @@ pub(super) fn misleading_transform(bytes: &[u8]) -> Option<usize> {
     (bytes.get(transform) == Some(&0)).then_some(transform)
 }
 
-/// Sets a misleading Adobe segment to YCbCr.
+/// Changes a misleading Adobe segment to YCbCr.
 pub(super) fn correct_transform(bytes: &mut [u8]) {
     if let Some(transform) = misleading_transform(bytes) {
         bytes[transform] = 1;
@@ -70,7 +70,7 @@ fn segments(bytes: &[u8]) -> impl Iterator<Item = (u8, usize)> {
     const SCAN: u8 = 0xda;
     let mut at = 2;
     std::iter::from_fn(move || {
-        // Any number of fill bytes 0xff may precede a marker.
+        // A marker may be preceded by any number of 0xff fill bytes.
         while bytes.get(at..at + 2)? == [0xff, 0xff] {
             at += 1;
         }
@@ -81,7 +81,7 @@ fn segments(bytes: &[u8]) -> impl Iterator<Item = (u8, usize)> {
     })
 }
 
-/// Checks the size in the header: each block of 8 × 8 pixels takes at least one bit, for its mean.
+/// Checks the size in the header. Each block of 8 × 8 pixels takes at least one bit for its mean.
 pub(super) fn check_plausible(width: u32, height: u32, file_bytes: u64) -> Result<(), String> {
     let blocks = u64::from(width.div_ceil(8)) * u64::from(height.div_ceil(8));
     if blocks > file_bytes.saturating_mul(8) {
@@ -90,7 +90,7 @@ pub(super) fn check_plausible(width: u32, height: u32, file_bytes: u64) -> Resul
     Ok(())
 }
 
-/// Reason to reject an image with more pixels than its file can hold.
+/// Error message for an image with more pixels than its file can contain.
 pub(super) fn too_many_pixels(width: u32, height: u32, file_bytes: u64) -> String {
     format!("the header claims {width} × {height} pixels, too many for a file of {file_bytes} bytes")
 }
@@ -100,7 +100,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn unsupported_kinds_are_rejected() {
+    fn unsupported_jpeg_types_are_rejected() {
         let file = |marker: u8, bits: u8| {
             [
                 0xff, 0xd8, 0xff, 0xe0, 0, 4, 1, 2, 0xff, 0xff, marker, 0, 5, bits, 0, 0, 0xff, 0xda, 0, 2,
@@ -110,7 +110,7 @@ mod tests {
         for (marker, bits) in [(0xc0, 8), (0xc1, 8), (0xc2, 8)] {
             assert_eq!(check_bytes(&file(marker, bits)), Ok(()), "{marker:x}");
         }
-        // A Huffman table is not a frame.
+        // A Huffman table is not a frame header.
         assert_eq!(check_bytes(&file(0xc4, 1)), Ok(()));
         let error = |marker, bits| check_bytes(&file(marker, bits)).expect_err("an error");
         let kinds = [0xc3, 0xc6, 0xc9, 0xca].map(|marker| error(marker, 8));

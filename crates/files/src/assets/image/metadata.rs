@@ -1,4 +1,4 @@
-//! Metadata of an image that its decoder does not apply to the pixels.
+//! Image metadata that the decoder does not apply to the pixels.
 
 use super::icc;
 use super::space::ColorSpace;
@@ -6,12 +6,12 @@ use super::space::ColorSpace;
 /// Meaning of the alpha sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum AlphaUsage {
-    /// Straight alpha: colors are not multiplied by it.
+    /// Straight alpha: colors are not multiplied by alpha.
     #[default]
     Straight,
-    /// Premultiplied alpha: colors are multiplied by it.
+    /// Premultiplied alpha: colors are multiplied by alpha.
     Premultiplied,
-    /// Straight alpha, or unused if it is 0 everywhere.
+    /// Straight alpha, ignored if it is 0 everywhere.
     UnusedIfZero,
     /// Unused sample.
     Unused,
@@ -20,7 +20,7 @@ pub(super) enum AlphaUsage {
 /// A warning about an ignored part of a file.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct ImageWarning {
-    /// Line number, from 1, in files with lines.
+    /// Line number, starting at 1. `None` for files without lines.
     pub(super) line: Option<usize>,
     pub(super) words: String,
 }
@@ -42,14 +42,14 @@ impl ImageMetadata {
         self.warnings.push(ImageWarning { line: None, words: words.into() });
     }
 
-    /// Warns about an animation, of which only the first frame is used.
+    /// Warns that only the first frame of an animation is used.
     pub(super) fn warn_of_frames(&mut self, frames: u32) {
         if frames > 1 {
             self.warn(format!("it has {frames} frames; only the first is used"));
         }
     }
 
-    /// Applies an ICC profile. `None` is a profile that could not be decompressed.
+    /// Applies an ICC profile. `None` means that the profile could not be decompressed.
     pub(super) fn add_profile(&mut self, profile: Option<&[u8]>, is_gray: bool) {
         match profile.map_or(Err(icc::MALFORMED.to_owned()), |profile| icc::space(profile, is_gray)) {
             Ok(space) => self.space = space,

@@ -1,4 +1,4 @@
-//! Decodes image files to texels with `image`, within limits and with panics caught.
+//! Decodes image files to texels with `image`. Enforces size limits and catches panics.
 
 mod convert;
 mod counting_reader;
@@ -39,7 +39,7 @@ use space::ColorSpace;
 
 /// Maximum size of an image file.
 const FILE_LIMIT: u64 = 4 << 30;
-/// File size from which the header is checked before the rest is read.
+/// Minimum file size for checking the header before reading the rest.
 const CHECKED_FIRST: u64 = 16 << 20;
 
 /// How the samples of an image file are interpreted.
@@ -60,8 +60,8 @@ pub enum ImageEncoding {
         /// Whether the color channels are sRGB.
         is_srgb: bool,
     },
-    /// Colors of a surface whose opacity is the alpha of the same image: straight colors, weighted by alpha
-    /// in filtering.
+    /// Straight surface colors, with the surface's opacity in the alpha channel. Filtering weights the colors
+    /// by alpha.
     CutOut(ColorCurve),
 }
 
@@ -113,7 +113,7 @@ impl ImageEncoding {
         if self.is_declared() { metadata.space.clone() } else { ColorSpace::default() }
     }
 
-    /// Whether the color space is declared by the file rather than the scene.
+    /// Whether the file rather than the scene determines the color space.
     fn is_declared(self) -> bool {
         match self {
             Self::Color | Self::Raw | Self::CutOut(ColorCurve::Auto) => true,
@@ -127,7 +127,7 @@ impl ImageEncoding {
 pub struct LoadedImage {
     /// The texels.
     pub texels: Texels,
-    /// Warnings about ignored parts of the file, starting with its name.
+    /// Warnings about ignored parts of the file. Each starts with the file name.
     pub warnings: Vec<String>,
 }
 
@@ -147,16 +147,16 @@ impl Default for ImageLimits {
     }
 }
 
-/// Reads an image: PNG, JPEG, PNM, PFM, TGA, BMP, HDR, EXR or WebP, detected from its first bytes or else from
-/// its extension.
+/// Reads a PNG, JPEG, PNM, PFM, TGA, BMP, HDR, EXR or WebP image. The format is detected from the first
+/// bytes, or else from the file name extension.
 ///
 /// Gray becomes RGB, alpha is dropped except for scalars and cutouts, and the EXIF orientation is applied.
 /// Negative and nonfinite texels become 0 (except for [`ImageEncoding::Raw`]). A truncated JPEG is an error.
-/// 16-bit and float files give linear floats. Progress is in bytes of the file.
+/// 16-bit and float files are converted to linear floats. Progress is measured in bytes of the file.
 ///
 /// # Errors
-/// [`AssetError::Unreadable`]; [`AssetError::Malformed`] if the content contradicts the header or exceeds the
-/// limits; [`AssetError::Cancelled`].
+/// [`AssetError::Unreadable`], [`AssetError::Malformed`] if the content contradicts the header or exceeds the
+/// limits, or [`AssetError::Cancelled`].
 pub fn load(
     path: &Path,
     encoding: ImageEncoding,
@@ -167,7 +167,7 @@ pub fn load(
     load_hashed(path, encoding, limits, progress, token).map(|(image, _)| image)
 }
 
-/// [`load`] that also returns the hash of the decoded bytes.
+/// Like [`load`], but also returns the hash of the decoded bytes.
 ///
 /// # Errors
 /// Same as [`load`].
@@ -207,7 +207,7 @@ fn load_source(
 /// Width and height of an image, and the size of its texels in bytes, from its header.
 ///
 /// # Errors
-/// The errors of [`load`] that the start of the file reveals.
+/// The errors of [`load`] that can be detected from the start of the file.
 pub fn size(
     path: &Path,
     encoding: ImageEncoding,
@@ -242,7 +242,7 @@ pub struct EmbeddedImage<'a> {
     pub bytes: Arc<[u8]>,
 }
 
-/// [`load`] for an embedded image.
+/// Like [`load`], for an embedded image.
 ///
 /// # Errors
 /// Same as [`load`].
@@ -256,7 +256,7 @@ pub fn load_embedded(
     load_source(ImageSource::embedded(image, limits, token)?, encoding, Monitor { progress, token })
 }
 
-/// [`size`] for an embedded image.
+/// Like [`size`], for an embedded image.
 ///
 /// # Errors
 /// Same as [`size`].
@@ -289,7 +289,7 @@ pub fn mipmaps(texels: &Texels, token: &CancelToken) -> Result<Mipmaps, Cancelle
     })
 }
 
-/// Computes the mip levels of the coverage of an image: the share of texels that are at least `cutoff`.
+/// Computes the mip levels of an image's coverage, the fraction of texels with values of at least `cutoff`.
 ///
 /// # Errors
 /// [`Cancelled`].
@@ -342,7 +342,7 @@ impl ImageSource {
         Ok(Self { path: path.to_owned(), file: ImageBytes::File(file), length, limits, token: token.clone() })
     }
 
-    /// Reads a file into memory and hashes it. The hash belongs to the decoded bytes even if the file is
+    /// Reads a file into memory and hashes it. The hash always matches the decoded bytes, even if the file is
     /// replaced in the meantime.
     fn read(
         path: &Path,
@@ -352,7 +352,7 @@ impl ImageSource {
     ) -> Result<(Self, FileHash), AssetError> {
         let (file, length) = read::open(path, FILE_LIMIT)?;
         if length > CHECKED_FIRST {
-            // Do not fill the memory with a file that will be rejected.
+            // Avoid reading a large file that will be rejected.
             size(path, encoding, limits, token)?;
         }
         let unreadable = |error: io::Error| AssetError::unreadable(path, describe_error(&error));
@@ -458,7 +458,7 @@ impl ImageSource {
             reader.set_format(ImageFormat::Pnm);
         }
         if reader.format().is_none() {
-            // Only TGA has no signature.
+            // TGA is the only format without a signature.
             let format = ImageFormat::from_path(&self.path).ok().filter(|format| *format == ImageFormat::Tga);
             reader.set_format(format.ok_or_else(unknown_format)?);
         }
@@ -486,9 +486,9 @@ impl ImageSource {
     }
 }
 
-/// Reason to reject a file without content.
+/// Error message for an empty file.
 const EMPTY_FILE: &str = "the file is empty";
-/// Reason to reject an embedded image without content.
+/// Error message for an empty embedded image.
 const EMPTY_EMBEDDED: &str = "an embedded image is empty";
 
 fn empty_image(width: u32, height: u32) -> String {
@@ -511,7 +511,7 @@ fn implausible_size(width: u32, height: u32, needed: u64, length: u64) -> String
     )
 }
 
-/// Reason to reject an image whose decoding failed.
+/// Error message for an image that cannot be decoded.
 fn claimed_size(width: u32, height: u32, reason: &str) -> String {
     format!("the header claims {width} × {height} pixels: {reason}")
 }
@@ -520,7 +520,7 @@ pub(crate) fn unknown_format() -> String {
     "unsupported image format; expected png, jpg, ppm, pfm, tga, bmp, hdr, exr or webp".to_owned()
 }
 
-/// Shortens a decoder's error message, which may quote much of the file.
+/// Shortens a decoder's error message, which may quote large parts of the file.
 fn reason(error: &ImageError) -> String {
     const MAX_LENGTH: usize = 200;
     let words = match error {
@@ -541,7 +541,7 @@ fn reason(error: &ImageError) -> String {
     }
 }
 
-/// Replaces the decoder's debug output of a PNG chunk type by the chunk's name.
+/// Replaces a PNG chunk type, printed by the decoder in debug format, with the chunk's name.
 fn without_chunk_types(words: &str) -> String {
     const OPENING: &str = "ChunkType { type: ";
     let Some((before, rest)) = words.split_once(OPENING) else { return words.to_owned() };

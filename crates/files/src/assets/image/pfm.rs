@@ -1,4 +1,4 @@
-//! PFM decoder (Debevec, *PFM Portable FloatMap Image Format*), which `image` does not include.
+//! PFM decoder (Debevec, *PFM Portable FloatMap Image Format*). `image` does not support this format.
 
 use std::io::{BufRead, Read};
 
@@ -8,13 +8,13 @@ use ::image::{ColorType, ImageDecoder, ImageError, ImageFormat, ImageResult};
 /// Maximum size of the header.
 const HEADER_BYTES: u64 = 1 << 10;
 
-/// Whether a file starts like a PFM file.
+/// Whether these bytes start a PFM file.
 pub(super) fn is_pfm(start: &[u8]) -> bool {
     matches!(start, [b'P', b'F' | b'f', blank, ..] if blank.is_ascii_whitespace())
 }
 
-/// Decoder of a PFM file, whose rows are stored from the bottom. Values are multiplied by the absolute value of the
-/// scale; a negative scale means little-endian.
+/// PFM decoder. Rows are stored from bottom to top. Values are multiplied by the absolute value of the scale.
+/// A negative scale means little-endian.
 pub(super) struct PfmDecoder<R> {
     file: R,
     size: [u32; 2],

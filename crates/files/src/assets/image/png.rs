@@ -1,4 +1,4 @@
-//! PNG decoder based on `png`. `image` would also decompress ancillary chunks.
+//! PNG decoder based on `png`. Unlike `image`, it does not decompress ancillary chunks.
 
 use std::io::{self, BufRead, Read, Seek, SeekFrom};
 
@@ -17,11 +17,11 @@ const SIGNATURE: [u8; 8] = *b"\x89PNG\r\n\x1a\n";
 /// Maximum size of a color profile, compressed and decompressed.
 const PROFILE_BYTES: u32 = 16 << 20;
 
-/// Bytes of a skipped chunk between two polls of the cancel token.
+/// Number of bytes to skip between two polls of the cancel token.
 const SKIPPED_BYTES: usize = 1 << 16;
 
-/// Reads a PNG without its text chunks, but hashes all of it. Text chunks of any length take no memory.
-/// Returns `None` and rewinds the file if it is not a PNG.
+/// Reads a PNG without its text chunks, so they take no memory. The hash covers the whole file. If the file
+/// is not a PNG, rewinds it and returns `None`.
 pub(super) fn without_text(
     mut file: impl Read + Seek,
     token: &CancelToken,
@@ -35,14 +35,14 @@ pub(super) fn without_text(
     let mut hasher = blake3::Hasher::new();
     hasher.update(&kept);
     loop {
-        // Read the length and the type of the next chunk.
+        // Read the length and type of the next chunk.
         let start = kept.len();
         (&mut file).take(8).read_to_end(&mut kept)?;
         hasher.update(&kept[start..]);
         let Some([a, b, c, d, kind @ ..]) = kept[start..].first_chunk::<8>() else {
             return Ok(Some((kept, *hasher.finalize().as_bytes())));
         };
-        // The checksum follows the data.
+        // Include the checksum after the data.
         let length = u64::from(u32::from_be_bytes([*a, *b, *c, *d])) + 4;
         if !matches!(kind, b"tEXt" | b"zTXt" | b"iTXt") {
             let start = kept.len();
@@ -65,7 +65,7 @@ pub(super) fn without_text(
     }
 }
 
-/// Decoder of the first frame. Ignores text chunks.
+/// Decoder for the first frame. Ignores text chunks.
 pub(super) struct PngDecoder<R: BufRead + Seek> {
     reader: png::Reader<R>,
     color_type: ColorType,
@@ -83,7 +83,7 @@ impl<R: BufRead + Seek> PngDecoder<R> {
         let mut decoder = png::Decoder::new_with_limits(file, limits);
         decoder.set_ignore_text_chunk(true);
         decoder.set_ignore_iccp_chunk(true);
-        // Expand palettes to colors and small integers to bytes. Keep 16 bits.
+        // Expand palettes to colors and small integers to bytes. Keep 16-bit samples.
         decoder.set_transformations(png::Transformations::EXPAND);
         let reader = decoder.read_info().map_err(image_error)?;
         let (color_type, depth) = reader.output_color_type();
@@ -101,8 +101,8 @@ impl<R: BufRead + Seek> PngDecoder<R> {
         Ok(Self { reader, color_type, profile })
     }
 
-    /// Color space and warnings. Of several color chunks, the first of `cICP`, `sRGB`, `iCCP`, and `gAMA`
-    /// with `cHRM` counts.
+    /// Color space and warnings. Color chunks take precedence in the order `cICP`, `sRGB`, `iCCP`, then
+    /// `gAMA` with `cHRM`.
     pub(super) fn metadata(&self) -> ImageMetadata {
         let (info, mut metadata) = (self.reader.info(), ImageMetadata::default());
         metadata.warn_of_frames(info.animation_control().map_or(0, |control| control.num_frames));
@@ -166,7 +166,8 @@ impl<R: BufRead + Seek> ImageDecoder for PngDecoder<R> {
     }
 }
 
-/// Curve of a `gAMA` chunk in units of 1/100000. 1/2.2 usually means sRGB (PNG, 11.3.2.5).
+/// Transfer function for a `gAMA` value in units of 1/100000. A gamma of 1/2.2 usually means sRGB (PNG,
+/// 11.3.2.5).
 fn curve(gamma: u32) -> Curve {
     const SRGB: u32 = 45_455;
     const TOLERANCE: u32 = 500;
@@ -177,7 +178,7 @@ fn curve(gamma: u32) -> Curve {
     }
 }
 
-/// Color space of code points of video signals (ITU-T H.273, tables 2 and 3). `None` for undefined codes, for
+/// Color space for video signal code points (ITU-T H.273, tables 2 and 3). `None` for undefined codes, for
 /// logarithmic curves, and for samples other than full-range RGB.
 fn space_of_code_points(points: png::CodingIndependentCodePoints) -> Option<ColorSpace> {
     let primaries = match points.color_primaries {
@@ -256,7 +257,7 @@ fn find_profile(file: &mut (impl Read + Seek)) -> io::Result<Option<ProfileChunk
     }
 }
 
-/// Decompresses a profile, which follows its name and a compression method of 0.
+/// Decompresses the profile in a chunk. Its name and a compression method of 0 precede the data.
 fn decompressed(chunk: &[u8]) -> Option<Vec<u8>> {
     let name = memchr::memchr(0, chunk)?;
     let packed = chunk[name + 1..].strip_prefix(&[0])?;

@@ -2,10 +2,10 @@
 
 use crate::math::{DMat3, DVec3};
 
-/// Differences from the identity up to which a conversion is skipped: files contain rounded primaries.
+/// Maximum difference from the identity matrix for skipping a conversion. Primaries in files are rounded.
 const TOLERANCE: f64 = 2e-3;
 
-/// XYZ of D50, the white of ICC profiles (ICC.1, 6.3.4.3).
+/// XYZ of D50, the white point of ICC profiles (ICC.1, 6.3.4.3).
 const D50: DVec3 = DVec3::new(0.9642, 1.0, 0.8249);
 
 /// Chromaticities (x, y) of primaries and white point.
@@ -31,7 +31,7 @@ impl Primaries {
     pub(super) const XYZ: Self =
         Self { red: [1.0, 0.0], green: [0.0, 1.0], blue: [0.0, 0.0], white: [1.0 / 3.0, 1.0 / 3.0] };
 
-    /// Creates primaries from numbers in file order: red, green, blue, white.
+    /// Creates primaries from numbers in the order used by files: red, green, blue, white.
     pub(super) fn from_numbers([rx, ry, gx, gy, bx, by, wx, wy]: [f64; 8]) -> Self {
         Self { red: [rx, ry], green: [gx, gy], blue: [bx, by], white: [wx, wy] }
     }
@@ -41,7 +41,7 @@ impl Primaries {
         xyz(self.white) / self.white[1]
     }
 
-    /// Matrix to XYZ, scaled such that (1, 1, 1) is white. `None` for degenerate primaries.
+    /// Matrix to XYZ, scaled to map (1, 1, 1) to white. `None` for degenerate primaries.
     fn to_xyz(self) -> Option<DMat3> {
         let primaries = DMat3::from_cols(xyz(self.red), xyz(self.green), xyz(self.blue));
         let scales = inverse(primaries)? * self.white();
@@ -65,7 +65,7 @@ pub(super) fn from_colorants(colorants: DMat3) -> Option<DMat3> {
     Some(rec_709_from_xyz(D50)? * colorants)
 }
 
-/// Whether a matrix is the identity up to rounding.
+/// Whether a matrix is the identity, within rounding.
 pub(super) fn is_identity(matrix: &DMat3) -> bool {
     (*matrix - DMat3::IDENTITY).to_cols_array().iter().all(|entry| entry.abs() <= TOLERANCE)
 }
@@ -88,7 +88,7 @@ fn xyz([x, y]: [f64; 2]) -> DVec3 {
     DVec3::new(x, y, 1.0 - x - y)
 }
 
-/// The inverse, unless the matrix is nearly singular.
+/// Inverse of a matrix. `None` if it is nearly singular.
 fn inverse(matrix: DMat3) -> Option<DMat3> {
     (matrix.determinant().abs() > 1e-9).then(|| matrix.inverse()).filter(|inverse| inverse.is_finite())
 }
@@ -110,7 +110,7 @@ mod tests {
         let rec_2020 = matrix(Primaries::REC_2020);
         assert_near(rec_2020 * DVec3::X, [1.6605, -0.1246, -0.0182], 1e-4);
         assert_near(rec_2020 * DVec3::Z, [-0.0728, -0.0083, 1.1187], 1e-4);
-        // White stays white.
+        // White is preserved.
         let ap0 = Primaries {
             red: [0.7347, 0.2653],
             green: [0.0, 1.0],
@@ -134,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn srgb_colorants_give_the_identity() {
+    fn srgb_colorants_produce_the_identity() {
         let colorants = DMat3::from_cols_array(&[
             0.43607, 0.22249, 0.01392, 0.38515, 0.71687, 0.09708, 0.14307, 0.06061, 0.71410,
         ]);

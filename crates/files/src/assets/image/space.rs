@@ -7,7 +7,7 @@ use crate::math::color::srgb_to_linear;
 use crate::math::elementary::pow_f64;
 use crate::math::{DMat3, DVec3};
 
-/// A transfer curve from samples in [0, 1] to linear light.
+/// A transfer function from samples in [0, 1] to linear light.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Curve {
     Srgb,
@@ -25,15 +25,15 @@ pub(super) enum Curve {
     },
     /// Equidistant values from 0 to 65535.
     Table(Vec<u16>),
-    /// Perceptual quantization (SMPTE ST 2084). 203 cd/m² is 1.
+    /// Perceptual quantization (SMPTE ST 2084). 203 cd/m² maps to 1.
     Pq,
-    /// Hybrid log-gamma (ITU-R BT.2100, table 5), scene-referred. A signal of 0.75 is 1.
+    /// Hybrid log-gamma (ITU-R BT.2100, table 5), scene-referred. A signal of 0.75 maps to 1.
     Hlg,
 }
 
 impl Curve {
     pub(super) const LINEAR: Self = Self::Power(1.0);
-    /// Inverse of the camera curve of ITU-R BT.709.
+    /// Inverse of the ITU-R BT.709 camera curve.
     pub(super) const REC_709: Self = Self::Parametric {
         g: 1.0 / 0.45,
         a: 1.0 / 1.099,
@@ -44,7 +44,7 @@ impl Curve {
         f: 0.0,
     };
 
-    /// Inverse of the camera curve of SMPTE ST 240.
+    /// Inverse of the SMPTE ST 240 camera curve.
     pub(super) const SMPTE_240M: Self = Self::Parametric {
         g: 1.0 / 0.45,
         a: 1.0 / 1.1115,
@@ -73,7 +73,7 @@ impl Curve {
         }
     }
 
-    /// Whether the curve is sRGB up to the rounding of values in a profile, for 8-bit samples.
+    /// Whether the curve matches sRGB for 8-bit samples, within the rounding of profile values.
     fn is_srgb(&self) -> bool {
         const TOLERANCE: f64 = 1.5e-3;
         *self == Self::Srgb
@@ -122,7 +122,7 @@ fn interpolated(values: &[u16], x: f64) -> f64 {
     (low + (high - low) * (at - first as f64)) / f64::from(u16::MAX)
 }
 
-/// Deviation of a color space from the default: sRGB for integers, linear Rec. 709 for floats.
+/// A color space, stored as its difference from the default: sRGB for integers, linear Rec. 709 for floats.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct ColorSpace {
     curves: Option<[Curve; 3]>,
@@ -138,7 +138,7 @@ impl ColorSpace {
         }
     }
 
-    /// A color space that differs only in its primaries.
+    /// A color space that differs from the default only in its primaries.
     pub(super) fn of_matrix(matrix: DMat3) -> Self {
         Self::new(None, matrix)
     }
@@ -147,7 +147,7 @@ impl ColorSpace {
         *self == Self::default()
     }
 
-    /// Tables of linear light for integers from 0 to `max`, for red, green and blue.
+    /// Tables that map integers from 0 to `max` to linear light, for red, green and blue.
     pub(super) fn tables(&self, max: u16) -> [Vec<f32>; 3] {
         const SRGB: [Curve; 3] = [Curve::Srgb, Curve::Srgb, Curve::Srgb];
         let curves = self.curves.as_ref().unwrap_or(&SRGB);
@@ -190,7 +190,7 @@ mod tests {
     }
 
     #[test]
-    fn broadcast_curves_have_reference_values() {
+    fn broadcast_curves_match_reference_values() {
         let is_near = |found: f64, exact: f64| (found - exact).abs() <= 1e-4 * exact;
         // ITU-R BT.2408, table 1: signals for the reference white, 1000 cd/m² and 18 % gray.
         for (signal, nits) in [(1.0, 10_000.0), (0.580_69, 203.0), (0.751_83, 1000.0), (0.0, 0.0)] {

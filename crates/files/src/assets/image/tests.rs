@@ -30,7 +30,7 @@ fn load_bytes(name: &str, bytes: &[u8], encoding: ImageEncoding) -> Result<Texel
     load_with(&path, encoding)
 }
 
-/// Warnings about a file, without its folder.
+/// Warnings about a file, with the folder removed.
 fn warnings_of(name: &str, bytes: &[u8], encoding: ImageEncoding) -> Vec<String> {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join(name);
@@ -41,7 +41,7 @@ fn warnings_of(name: &str, bytes: &[u8], encoding: ImageEncoding) -> Vec<String>
     loaded.warnings.iter().map(|warning| warning.replace(&folder, "")).collect()
 }
 
-/// Reason for which an image is rejected.
+/// Reason why an image is rejected.
 fn error(name: &str, bytes: &[u8]) -> String {
     rejection(load_bytes(name, bytes, ImageEncoding::Color)).1
 }
@@ -56,7 +56,7 @@ fn small_png() -> Vec<u8> {
 }
 
 #[test]
-fn lossless_formats_give_the_same_texels() {
+fn lossless_formats_decode_to_the_same_texels() {
     let folder = tempfile::tempdir().expect("a folder");
     for extension in ["png", "ppm", "tga", "bmp", "webp"] {
         let path = folder.path().join(format!("a.{extension}"));
@@ -93,11 +93,11 @@ fn all_ppm_variants_are_read() {
 }
 
 #[test]
-fn pfm_in_color_and_gray_and_both_byte_orders() {
+fn pfm_supports_color_gray_and_both_endians() {
     let color = [[0.5, 2.0, 0.0], [1.0, 0.25, 8.0]];
     for (head, order) in [("PF\n1 2\n-1.0\n", true), ("PF 1\n2 1\n", false), ("PF\r\n1 2 2e0 ", false)] {
         let scale = if head.contains('e') { 2.0 } else { 1.0 };
-        // Rows are stored from the bottom.
+        // Rows are stored from bottom to top.
         let values = color.iter().rev().flatten().map(|value: &f32| value / scale);
         let bytes = values.flat_map(|value| if order { value.to_le_bytes() } else { value.to_be_bytes() });
         let file: Vec<u8> = head.bytes().chain(bytes).collect();
@@ -138,7 +138,7 @@ fn sixteen_bit_samples_keep_their_precision() {
 }
 
 #[test]
-fn floats_are_linear_and_unusable_ones_zero() {
+fn floats_are_linear_and_invalid_floats_are_zero() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("a.exr");
     let values = [0.5_f32, 7.0, -1.0, f32::NAN, f32::INFINITY, 0.25];
@@ -165,7 +165,7 @@ fn exr_alpha_is_read() {
 }
 
 #[test]
-fn gray_becomes_rgb_and_alpha_is_dropped() {
+fn gray_is_expanded_and_alpha_is_dropped() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("a.png");
     save_buffer(&path, &[9, 0, 200, 128], 2, 1, ExtendedColorType::La8).expect("written");
@@ -184,7 +184,7 @@ fn checksum(bytes: &[u8]) -> [u8; 4] {
     (!crc).to_be_bytes()
 }
 
-/// A PNG with a valid checksum whose header claims another size.
+/// A PNG with a valid checksum and a false size in its header.
 fn png_claiming(width: u32, height: u32) -> Vec<u8> {
     let mut file = small_png();
     file[16..20].copy_from_slice(&width.to_be_bytes());
@@ -194,7 +194,7 @@ fn png_claiming(width: u32, height: u32) -> Vec<u8> {
     file
 }
 
-/// A BMP of runs that end at once, which decodes to an image of a single color.
+/// A run-length encoded BMP that ends immediately and decodes to a single color.
 fn empty_bmp(width: u32, height: u32) -> Vec<u8> {
     let palette = [[16, 32, 48, 0]; 256].concat();
     let runs = [0, 1];
@@ -206,7 +206,7 @@ fn empty_bmp(width: u32, height: u32) -> Vec<u8> {
     [file, palette, runs.to_vec()].concat()
 }
 
-/// Short files must not take gigabytes, whatever their extension is.
+/// Short files must not take gigabytes of memory, regardless of their extension.
 #[test]
 fn short_files_take_little_memory() {
     assert!(load_bytes("a.bmp", &empty_bmp(600, 400), ImageEncoding::Color).is_ok());
@@ -253,7 +253,7 @@ fn sides_are_limited_to_65536_pixels() {
 }
 
 #[test]
-fn reasons_are_short_for_long_headers() {
+fn long_headers_do_not_make_long_errors() {
     let header = |line: &str| format!("P7\n{line} {}\n", "x".repeat(100_000));
     for line in ["WIDTH", "FOO", "TUPLTYPE"] {
         let reason = error("a.ppm", header(line).as_bytes());
@@ -265,7 +265,7 @@ fn reasons_are_short_for_long_headers() {
 }
 
 #[test]
-fn truncated_and_false_jpegs_are_rejected() {
+fn truncated_and_fake_jpegs_are_rejected() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("a.jpg");
     save_buffer(&path, &[90; 32 * 32 * 3], 32, 32, ExtendedColorType::Rgb8).expect("written");
@@ -273,7 +273,7 @@ fn truncated_and_false_jpegs_are_rejected() {
     let texels = load_with(&path, ImageEncoding::Color).expect("whole");
     assert_eq!((texels.width, texels.height), (32, 32));
     assert_eq!(error("a.jpg", &whole[..whole.len() - 2]), jpeg::TRUNCATED);
-    // Height and width follow the start of the frame by 5 bytes.
+    // Height and width start 5 bytes after the start-of-frame marker.
     let frame = whole.windows(2).position(|pair| pair == [0xff, 0xc0]).expect("a baseline JPEG");
     let mut altered = whole;
     altered[frame + 5..frame + 9].copy_from_slice(&[0x3e, 0x80, 0x3e, 0x80]);

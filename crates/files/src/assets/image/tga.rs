@@ -1,5 +1,5 @@
-//! Meaning of alpha in a TGA file (Truevision, *TGA File Format Specification*, version 2.0), which `image`
-//! ignores, and headers that it rejects.
+//! Handles TGA features that `image` does not: the meaning of alpha, and some headers that it rejects
+//! (Truevision, *TGA File Format Specification*, version 2.0).
 
 use std::io::{self, Chain, Cursor, Read, Seek, SeekFrom};
 
@@ -13,7 +13,7 @@ use super::metadata::AlphaUsage;
 const HEADER: usize = 18;
 /// Offset of the image descriptor.
 const DESCRIPTOR: usize = 17;
-/// Bits of the descriptor with the number of alpha bits.
+/// Mask for the number of alpha bits in the descriptor.
 const ALPHA_BITS: u8 = 0xf;
 /// Size of the footer: two offsets and the signature.
 const FOOTER: i64 = 26;
@@ -24,8 +24,8 @@ const ATTRIBUTES: u64 = 494;
 /// A file with a corrected header.
 type Patched<R> = Chain<Cursor<[u8; HEADER]>, R>;
 
-/// Returns a decoder of a file and the meaning of its alpha. `image` requires the header to declare as many alpha
-/// bits as pixels have room for, but many files declare none, or more.
+/// Returns a decoder and the meaning of alpha. `image` requires the header to declare exactly as many alpha
+/// bits as the pixel format can store, but many files declare none, or too many.
 pub(super) fn open<R: Read + Seek>(mut file: R) -> ImageResult<(TgaDecoder<Patched<R>>, AlphaUsage)> {
     let mut header = [0; HEADER];
     file.read_exact(&mut header)?;
@@ -43,7 +43,7 @@ pub(super) fn open<R: Read + Seek>(mut file: R) -> ImageResult<(TgaDecoder<Patch
     Ok((TgaDecoder::new(Cursor::new(header).chain(file))?, alpha))
 }
 
-/// Number of bits of a pixel that may be alpha.
+/// Number of bits per pixel that may contain alpha.
 fn possible_alpha_bits(header: &[u8; HEADER]) -> Result<u8, String> {
     let (kind, map_bits, pixel_bits) = (header[2], header[7], header[16]);
     let bits = match kind {

@@ -1,4 +1,4 @@
-//! Builds a valid [`TriangleMesh`] from a parser's results.
+//! Builds a valid [`TriangleMesh`] from a parser's output.
 
 use rayon::prelude::*;
 
@@ -12,7 +12,7 @@ use crate::geometry::mesh::TriangleMesh;
 use crate::math::origin::origin_near;
 use crate::math::{DVec3, Vec2, Vec3};
 
-/// Faces between two polls of the cancel token.
+/// Number of faces between two polls of the cancel token.
 const BATCH: usize = 1 << 14;
 
 /// Assembles a mesh: triangulates polygons, drops unusable faces, removes unused vertices and completes the
@@ -21,7 +21,7 @@ pub(crate) fn assemble(source: &MeshSource<'_>, parsed: ParsedMesh) -> Result<Lo
     assemble_text(source, parsed, |_| None)
 }
 
-/// [`assemble`] for a file with lines. `start_of` returns the byte offset of a face by its index.
+/// Like [`assemble`], for text files. `start_of` returns the byte offset of a face, given its index.
 pub(super) fn assemble_text(
     source: &MeshSource<'_>,
     mut parsed: ParsedMesh,
@@ -80,7 +80,7 @@ pub(super) fn assemble_text(
     Ok(LoadedMesh { hash, mesh, materials, dropped, warnings, material_warnings, companions, pictures })
 }
 
-/// Returns positions relative to an origin near the vertices that faces use. Numbers too large for `f32`
+/// Returns positions relative to an origin near the vertices used by faces. Numbers too large for `f32`
 /// become infinite.
 fn around_origin(positions: Vec<DVec3>, faces: &Faces) -> (DVec3, Vec<Vec3>) {
     let least = DVec3::splat(f64::from(f32::MIN));
@@ -137,7 +137,7 @@ struct Cutter<'a> {
     triangles: Vec<[u32; 3]>,
     triangle_materials: Vec<u32>,
     dropped: Dropped,
-    /// Count of self-intersecting polygons, and the first of them.
+    /// Number of self-intersecting polygons, and the first one.
     crossing: (u64, usize),
 }
 
@@ -182,7 +182,8 @@ impl<'a> Cutter<'a> {
         Ok(())
     }
 
-    /// Copies all faces in parallel if they are all valid triangles, the common case. Returns whether it did.
+    /// Fast path for meshes with only valid triangles: copies all faces in parallel. Returns false for other
+    /// meshes.
     fn take_as_they_are(&mut self, faces: &Faces) -> bool {
         let (triangles, _) = faces.corners.as_chunks();
         let in_range = |corner: &u32| (*corner as usize) < self.positions.len();
@@ -218,7 +219,7 @@ impl<'a> Cutter<'a> {
         }
     }
 
-    /// Triangulates a polygon. Drops repeated corners, which quads at a pole have.
+    /// Triangulates a polygon. Drops repeated corners, as in quads at a pole.
     fn cut_polygon(&mut self, corners: &[u32], face: usize) {
         let place = |corner: u32| self.positions[corner as usize];
         let mut distinct = corners.to_vec();
@@ -244,14 +245,14 @@ impl<'a> Cutter<'a> {
     }
 }
 
-/// Whether three finite points span an area. `f32` points neither overflow nor underflow in `f64`, and
-/// products of nearby points are exact.
+/// Whether three finite points form a triangle with nonzero area. `f32` points neither overflow nor underflow
+/// in `f64`, and products of nearby points are exact.
 fn has_area([a, b, c]: [Vec3; 3]) -> bool {
     let [a, b, c] = [a, b, c].map(|point| point.as_dvec3());
     (b - a).cross(c - a) != DVec3::ZERO
 }
 
-/// Removes unused vertices, which may contain anything and would enlarge the bounds.
+/// Removes unused vertices. They may contain arbitrary values and would enlarge the bounds.
 fn drop_unused_vertices(mesh: &mut TriangleMesh) {
     let mut new_index = vec![u32::MAX; mesh.positions.len()];
     for &corner in mesh.triangles.as_flattened() {
@@ -321,13 +322,13 @@ mod tests {
     const SQUARE: [Vec3; 4] = [Vec3::ZERO, Vec3::X, Vec3::new(1.0, 1.0, 0.0), Vec3::Y];
 
     #[test]
-    fn arities_start_at_the_first_non_triangle() {
+    fn arities_start_at_the_first_polygon() {
         let faces = faces(&[&[0, 1, 2], &[0, 2, 3], &[0, 1, 2, 3], &[0, 1, 2]]);
         assert_eq!((faces.len(), faces.arities), (4, vec![3, 3, 4, 3]));
     }
 
     #[test]
-    fn materials_stay_with_faces_when_others_drop() {
+    fn dropping_faces_keeps_material_assignments() {
         let mut positions = SQUARE.to_vec();
         positions.extend([Vec3::X, Vec3::X * 2.0, Vec3::new(f32::NAN, 0.0, 0.0), Vec3::splat(9.0)]);
         let list: [&[u32]; 7] =
@@ -335,7 +336,7 @@ mod tests {
         let face_materials = vec![0, 1, 2, 3, 4, 5, 6];
         let positions = exact(&positions);
         let parsed = ParsedMesh { positions, faces: faces(&list), face_materials, ..ParsedMesh::default() };
-        let loaded = assembled(parsed).expect("some faces are good");
+        let loaded = assembled(parsed).expect("valid faces");
         assert_eq!(loaded.dropped, Dropped { non_finite: 1, degenerate: 4 });
         assert_eq!(loaded.mesh.materials, [3, 3, 5]);
         assert_eq!(loaded.mesh.triangles, [[0, 1, 2], [0, 2, 3], [1, 2, 3]]);
@@ -355,14 +356,14 @@ mod tests {
     fn far_positions_keep_their_precision() {
         let far = DVec3::new(1e8, -3e7, 5e5);
         let mut positions: Vec<DVec3> = exact(&SQUARE).into_iter().map(|corner| corner + far).collect();
-        // Positions that no face uses or that exceed `f32` do not move the origin.
+        // Unused positions and positions too large for `f32` do not affect the origin.
         positions.extend([DVec3::splat(1e30), DVec3::splat(1e39)]);
         let parsed = ParsedMesh {
             positions,
             faces: faces(&[&[0, 1, 2], &[0, 2, 3], &[0, 1, 5]]),
             ..ParsedMesh::default()
         };
-        let loaded = assembled(parsed).expect("two are good");
+        let loaded = assembled(parsed).expect("two valid faces");
         assert_eq!(loaded.dropped, Dropped { non_finite: 1, degenerate: 0 });
         let mesh = loaded.mesh;
         let places: Vec<DVec3> = mesh.positions.iter().map(|p| p.as_dvec3() + mesh.origin).collect();
@@ -423,7 +424,7 @@ mod tests {
     }
 
     #[test]
-    fn an_index_out_of_range_names_its_face() {
+    fn index_errors_include_the_face() {
         let parsed = ParsedMesh {
             positions: exact(&SQUARE),
             faces: faces(&[&[0, 1, 2], &[0, 1, 4]]),

@@ -5,11 +5,11 @@ use rayon::prelude::*;
 use crate::control::{CancelToken, Cancelled};
 use crate::math::Vec3;
 
-/// Average number of vertices per bucket. Buckets are sorted in parallel, with a poll of the cancel token for
-/// each.
+/// Average number of vertices per bucket. Buckets are sorted in parallel. The cancel token is polled once per
+/// bucket.
 const BUCKET: usize = 1 << 12;
 
-/// Vertices between two polls of the cancel token.
+/// Number of vertices between two polls of the cancel token.
 const BATCH: usize = 1 << 16;
 
 /// Hash and index of a vertex.
@@ -32,20 +32,20 @@ pub(super) fn find(positions: &[Vec3], token: &CancelToken) -> Result<Vec<Vec<u3
     Ok(found?.into_iter().flatten().collect())
 }
 
-/// Bit pattern of a position. Adding 0 turns −0 into 0.
+/// Bit pattern of a position. Adding 0 converts −0 to 0.
 fn place(position: Vec3) -> [u32; 3] {
     (position + Vec3::ZERO).to_array().map(f32::to_bits)
 }
 
 /// Multiplicative hash (Knuth, *The Art of Computer Programming*, vol. 3, section 6.4). The upper bits are
-/// mixed best.
+/// the best mixed.
 fn hash_of(position: Vec3) -> u32 {
     let [x, y, z] = place(position).map(u64::from);
     let mixed = (x | y << 32).wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ z.wrapping_mul(0xc2b2_ae3d_27d4_eb4f);
     ((mixed ^ mixed >> 29).wrapping_mul(0xbf58_476d_1ce4_e5b9) >> 32) as u32
 }
 
-/// Distributes vertices over buckets by the upper bits of their hashes. Returns them with the end of each
+/// Sorts vertices into buckets by the upper bits of their hashes. Returns the vertices and the end of each
 /// bucket.
 fn scatter(
     hashes: &[u32],
@@ -74,7 +74,7 @@ fn scatter(
     Ok((entries, ends))
 }
 
-/// Finds coincident vertices of one bucket by grouping first by hash, then by position.
+/// Finds the coincident vertices in a bucket by grouping by hash, then by position.
 fn in_bucket(
     bucket: &[HashedVertex],
     positions: &[Vec3],
@@ -99,7 +99,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn coincident_vertices_are_found_completely() {
+    fn all_coincident_vertices_are_found() {
         // Positions repeat after 5000 vertices; −0 equals 0.
         let at = |i: u32| Vec3::new((i % 5000) as f32, 0.25, if i < 5000 { 0.0 } else { -0.0 });
         let positions: Vec<_> = (0..20_000).map(at).chain([Vec3::splat(9.0), Vec3::splat(8.0)]).collect();
@@ -112,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn grid_positions_spread_over_all_buckets() {
+    fn grid_positions_use_all_buckets() {
         let mut counts = [0; 64];
         for i in 0..64_000_u32 {
             let position = Vec3::new((i % 40) as f32, (i / 40 % 40) as f32, (i / 1600) as f32) * 0.5;

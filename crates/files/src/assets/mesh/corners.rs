@@ -7,19 +7,19 @@ use crate::control::{CancelToken, Cancelled};
 use crate::geometry::mesh::NormalGroup;
 use crate::math::Vec2;
 
-/// Corners between two polls of the cancel token.
+/// Number of corners between two polls of the cancel token.
 const BATCH: usize = 1 << 14;
 
 /// Vertex index, texture coordinates (bits) and color of a corner.
 type CornerKey = (u32, [u32; 2], [u8; 3]);
 
 /// Creates a vertex for each distinct combination of vertex, texture coordinates and color among the corners.
-/// The new vertices keep the normal of the original one.
+/// New vertices keep the original vertex's normal.
 pub(super) fn split(parsed: &mut ParsedMesh, token: &CancelToken) -> Result<(), Cancelled> {
     let (uvs, colors) = (std::mem::take(&mut parsed.corner_uvs), std::mem::take(&mut parsed.corner_colors));
     let vertices = parsed.positions.len();
     let is_in_range = |corner: &u32| (*corner as usize) < vertices;
-    // Leave indices out of range to the assembly, which reports their face.
+    // Do not report out-of-range indices here. `assemble` reports them with the face.
     if (uvs.is_empty() && colors.is_empty()) || !parsed.faces.corners.iter().all(is_in_range) {
         return Ok(());
     }
@@ -58,7 +58,7 @@ pub(super) fn split(parsed: &mut ParsedMesh, token: &CancelToken) -> Result<(), 
     Ok(())
 }
 
-/// Replaces `values` by the value of each source. An empty list stays empty.
+/// Replaces `values` with the value of each source. An empty list stays empty.
 fn take<T: Copy>(values: &mut Vec<T>, sources: &[usize]) {
     if !values.is_empty() {
         *values = sources.iter().map(|vertex| values[*vertex]).collect();

@@ -1,5 +1,5 @@
-//! Mesh files: OBJ with MTL, OFF, PLY and STL. Each parser returns the file's numbers; `assemble` builds a
-//! valid [`TriangleMesh`](crate::geometry::mesh::TriangleMesh) from them.
+//! Mesh files: OBJ with MTL, OFF, PLY and STL. Each parser returns the numbers in the file, from which
+//! `assemble` builds a valid [`TriangleMesh`](crate::geometry::mesh::TriangleMesh).
 
 pub(crate) mod assemble;
 mod coincident;
@@ -28,18 +28,18 @@ const FILE_LIMIT: u64 = 4 << 30;
 /// File name extensions that [`load`] supports.
 pub const EXTENSIONS: [&str; 4] = ["obj", "off", "ply", "stl"];
 
-/// Reads a mesh file in the format given by its extension, ignoring case.
+/// Reads a mesh file. The format is determined by the extension, ignoring case.
 ///
-/// Polygons are triangulated; unusable faces are skipped and counted; unused vertices are removed. Normals
-/// have unit length: missing ones are computed, but a file without any normals gives a mesh without normals.
-/// The texture coordinate v is 0 at the bottom, as in the file. Progress is in bytes; reading and parsing
-/// each count the file once.
+/// Polygons are triangulated. Unusable faces are skipped and counted. Unused vertices are removed. Normals
+/// have unit length. Missing normals are computed, except that a file without any normals produces a mesh
+/// without normals. The texture coordinate v is 0 at the bottom, as in the file. Progress is in bytes, and
+/// counts every byte twice: when it is read and when it is parsed.
 ///
 /// # Errors
-/// [`AssetError::Unreadable`] if the file is not a regular file with a known extension and at most 4 GiB;
-/// [`AssetError::Malformed`] with the line (text) or the face (binary) if the file is invalid or has no
-/// usable face;
-/// [`AssetError::Cancelled`].
+/// - [`AssetError::Unreadable`] if the file is not a regular file with a known extension and at most 4 GiB.
+/// - [`AssetError::Malformed`] with the line (text) or the face (binary) if the file is invalid or has no
+///   usable face.
+/// - [`AssetError::Cancelled`].
 pub fn load(path: &Path, progress: Progress<'_>, token: &CancelToken) -> Result<LoadedMesh, AssetError> {
     let extension =
         path.extension().map(|extension| extension.to_string_lossy().to_lowercase()).unwrap_or_default();
@@ -63,10 +63,10 @@ pub fn load(path: &Path, progress: Progress<'_>, token: &CancelToken) -> Result<
 
 const UNKNOWN_FORMAT: &str = "unknown mesh format; the extension must be .obj, .off, .ply or .stl";
 
-/// Reason to reject a file without content.
+/// Error message for an empty file.
 const EMPTY_FILE: &str = "the file is empty";
 
-/// Reason to reject a vertex index of a file with `count` vertices, numbered from 0.
+/// Error message for an invalid vertex index in a file with `count` vertices. Indices start at 0.
 pub(crate) fn vertex_out_of_range(vertex: i64, count: u64) -> String {
     format!("vertex {vertex} is out of range: there are {count}, numbered from 0")
 }
@@ -74,7 +74,7 @@ pub(crate) fn vertex_out_of_range(vertex: i64, count: u64) -> String {
 type ParseFn = fn(&MeshSource<'_>) -> Result<LoadedMesh, AssetError>;
 type ReadFn = fn(&Path, u64, Monitor<'_>) -> Result<Vec<u8>, AssetError>;
 
-/// A mesh file in memory, and the monitor of its parsing.
+/// A mesh file in memory, and the monitor for its parser.
 #[derive(Clone, Copy)]
 pub(crate) struct MeshSource<'a> {
     pub(crate) path: &'a Path,
@@ -98,7 +98,7 @@ impl MeshSource<'_> {
         AssetError::malformed(self.path, Some(self.line(at)), reason)
     }
 
-    /// The line that contains byte `at`, from 1.
+    /// Number of the line that contains byte `at`, starting at 1.
     fn line(&self, at: usize) -> usize {
         let before = &self.bytes[..at.min(self.bytes.len())];
         1 + memchr::memchr_iter(b'\n', before).count()
@@ -145,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn progress_increases_up_to_the_total() {
+    fn progress_increases_to_the_total() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("many.off");
         let mut text = "OFF\n3 100000 0\n0 0 0\n1 0 0\n0 1 0\n".to_owned();
@@ -171,7 +171,7 @@ mod tests {
         }
     }
 
-    /// Text made of keywords of mesh files, so that parsers get past the first line.
+    /// Text made of mesh file keywords, so parsers get past the first line.
     fn wordy() -> impl Strategy<Value = String> {
         let words = "OFF COFF STOFF 4OFF ply format ascii binary_little_endian 1.0 element vertex face property \
                      list uchar int float x y z vertex_indices end_header v vt vn f l g o usemtl mtllib \

@@ -1,6 +1,6 @@
-//! Vertex normals for files without them. Each face is weighted by its angle at the vertex (Thürmer and
-//! Wüthrich, *Computing Vertex Normals from Polygonal Facets*, JGT 1998), so that the normals do not depend
-//! on the triangulation.
+//! Computes vertex normals for files without normals. Each face is weighted by its angle at the vertex, which
+//! makes the normals independent of the triangulation (Thürmer and Wüthrich, *Computing Vertex Normals from
+//! Polygonal Facets*, JGT 1998).
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -11,20 +11,20 @@ use crate::control::{CancelToken, Cancelled};
 use crate::geometry::mesh::{NormalGroup, TriangleMesh};
 use crate::math::{DVec3, Vec3};
 
-/// Minimum cosine between normals that are merged. Coincident vertices are joined if their normals agree
-/// within 45 degrees (a texture seam); otherwise they form an edge (a box with separate sides).
+/// Minimum cosine between normals that are merged. Coincident vertices are joined if their normals differ by
+/// at most 45 degrees (a texture seam). Otherwise they form a sharp edge (a box with separate sides).
 const SEAM_COSINE: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
-/// Maximum number of coincident vertices to compare pairwise, which is quadratic. Larger sets are merged
-/// without comparing.
+/// Maximum number of coincident vertices to compare pairwise, which takes quadratic time. Larger sets are
+/// merged without comparing normals.
 const COMPARED: usize = 64;
 
-/// Triangles or vertices between two polls of the cancel token.
+/// Number of triangles or vertices between two polls of the cancel token.
 const BATCH: usize = 1 << 16;
 
 /// Computes a unit normal for each vertex, weighted by angle, on the front side of its faces. Coincident
-/// vertices share a normal if they are in the same [`NormalGroup`] and their normals agree within 45 degrees.
-/// If faces cancel each other, the vertex gets the normal of one face. The result does not depend on the
+/// vertices share a normal if they are in the same [`NormalGroup`] and their normals differ by at most 45
+/// degrees. If the face normals cancel out, the normal of one face is used. The result does not depend on the
 /// number of threads.
 ///
 /// # Errors
@@ -68,7 +68,7 @@ pub fn vertex_normals(mesh: &TriangleMesh, token: &CancelToken) -> Result<Vec<Ve
     Ok(normals)
 }
 
-/// For each vertex, the first vertex with the same normal. Empty without groups.
+/// For each vertex, the first vertex with the same normal. Empty if there are no groups.
 fn first_of_each_normal(groups: &[NormalGroup]) -> Vec<usize> {
     let numbers = groups.iter().map(|group| group.normal as usize + 1).max().unwrap_or(0);
     let mut firsts = vec![usize::MAX; numbers];
@@ -80,11 +80,11 @@ fn first_of_each_normal(groups: &[NormalGroup]) -> Vec<usize> {
     groups.iter().enumerate().map(first_of).collect()
 }
 
-/// Whether a mesh without normals consists of flat faces, like a box: the normals of the faces around most
-/// vertices partly cancel.
+/// Whether a mesh without normals consists of flat faces, like a box. In such a mesh, the face normals around
+/// most vertices partly cancel.
 pub(crate) fn is_faceted(mesh: &TriangleMesh) -> bool {
-    /// Minimum length of the mean unit normal around a vertex of a smooth surface, reached by a cone with a
-    /// half-angle of 32 degrees.
+    /// Minimum length of the mean unit normal around a vertex of a smooth surface. A cone with a half-angle
+    /// of 32 degrees has this length.
     const LEAST: f32 = 0.85;
     let groups = &mesh.normal_groups;
     if !mesh.normals.is_empty() || groups.iter().any(|group| group.group != NormalGroup::BY_ANGLE) {
@@ -120,7 +120,7 @@ pub(super) fn fill_missing_normals(mesh: &mut TriangleMesh, token: &CancelToken)
 }
 
 /// Sums the unit normals of each vertex's faces, weighted by their angles, in the order of the faces. Each
-/// thread owns a range of vertices, so that the order does not depend on the number of threads.
+/// thread owns a range of vertices, so the order does not depend on the number of threads.
 fn weighted_sums(mesh: &TriangleMesh, token: &CancelToken) -> Result<Vec<DVec3>, Cancelled> {
     let mut sums = vec![DVec3::ZERO; mesh.positions.len()];
     let share = sums.len().div_ceil(rayon::current_num_threads()).max(1);
@@ -147,8 +147,8 @@ fn weighted_sums(mesh: &TriangleMesh, token: &CancelToken) -> Result<Vec<DVec3>,
     Ok(sums)
 }
 
-/// Returns the unit normal (0 without area) and the angle at each corner. Unlike an arccosine, the arctangent
-/// is accurate for the tiny angles of slivers.
+/// Returns the unit normal (0 without area) and the angle at each corner. Unlike the arccosine, the
+/// arctangent is accurate for the tiny angles of slivers.
 fn corner_weights([a, b, c]: [Vec3; 3]) -> (DVec3, [f64; 3]) {
     let [a, b, c] = [a, b, c].map(|point| point.as_dvec3());
     let (ab, bc, ca) = (b - a, c - b, a - c);
@@ -162,7 +162,8 @@ fn corner_weights([a, b, c]: [Vec3; 3]) -> (DVec3, [f64; 3]) {
 }
 
 /// Computes `atan2(y, x)` for y > 0 with a relative error of at most 2e-8 (Abramowitz and Stegun, *Handbook
-/// of Mathematical Functions*, 4.4.49): accurate enough for weights, without unpredictable branches.
+/// of Mathematical Functions*, 4.4.49). This is accurate enough for weights and avoids unpredictable
+/// branches.
 fn angle(x: f64, y: f64) -> f64 {
     const STARTS: [f64; 4] = [0.0, FRAC_PI_2, PI, FRAC_PI_2];
     const SIGNS: [f64; 4] = [1.0, -1.0, -1.0, 1.0];
@@ -191,7 +192,8 @@ fn join(group: &[u32], sums: &[DVec3], joined: &mut [DVec3]) {
     }
 }
 
-/// Gives vertices whose faces cancel out the normal of one of their faces, or +y without faces.
+/// Assigns a normal to vertices whose face normals cancel out: the normal of one of the faces, or +y for
+/// vertices without faces.
 fn take_face_normals(
     mesh: &TriangleMesh,
     normals: &mut [Vec3],
@@ -227,9 +229,9 @@ mod tests {
     }
 
     #[test]
-    fn cube_corner_normals_ignore_the_triangulation() {
-        // Three right angles meet at the origin; one of its faces is split there. Weights by area or by count
-        // would pull the normal towards it.
+    fn normals_do_not_depend_on_the_triangulation() {
+        // Three right angles meet at the origin, and one of the three faces is split there. Weighting by area
+        // or by count would pull the normal towards the split face.
         let corner = mesh(
             &[[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 1., 0.], [0., 0., 1.]],
             &[[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 1]],
@@ -263,7 +265,7 @@ mod tests {
     }
 
     #[test]
-    fn cancelling_faces_leave_one_of_their_normals() {
+    fn cancelling_faces_use_the_normal_of_one_face() {
         let normals = vertex_normals(&mesh(
             &[[0., 0., 0.], [1., 0., 0.], [0., 1., 0.], [9., 9., 9.]],
             &[[0, 1, 2], [0, 2, 1]],
@@ -273,7 +275,7 @@ mod tests {
     }
 
     #[test]
-    fn slivers_and_extreme_scales_give_unit_normals() {
+    fn slivers_and_extreme_scales_have_unit_normals() {
         for scale in [1e-20_f32, 1.0, 1e30] {
             let sliver = mesh(
                 &[[0., 0., 0.], [scale, 0., 0.], [0.5 * scale, 1e-7 * scale, 0.], [0.5 * scale, 0., scale]],
@@ -321,7 +323,7 @@ mod tests {
         assert!(vertex_normals(&mesh(&positions, &triangles)).iter().all(|normal| *normal == Vec3::Z));
     }
 
-    /// A sphere of `rows` rows and 2 · `rows` columns of quads that share vertices.
+    /// A sphere made of `rows` rows and 2 · `rows` columns of quads that share vertices.
     fn sphere(rows: u32) -> TriangleMesh {
         let at = |i: u32| {
             let (row, column) = (i / (2 * rows), i % (2 * rows));
@@ -348,7 +350,7 @@ mod tests {
             TriangleMesh { positions: (0..8).map(corner).collect(), triangles, ..TriangleMesh::default() };
         assert!(is_faceted(&cube));
         cube.normals = vec![Vec3::Y; 8];
-        assert!(!is_faceted(&cube), "it has normals");
+        assert!(!is_faceted(&cube), "the mesh has normals");
         assert!(!is_faceted(&sphere(8)) && !is_faceted(&sphere(60)));
     }
 }

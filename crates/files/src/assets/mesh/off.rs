@@ -1,6 +1,6 @@
 //! OFF: a header keyword, counts, one vertex per line, one polygon per line (Geomview manual, section *OFF*).
-//! Many files deviate: counts directly after the keyword, no edge count, undeclared columns after coordinates
-//! and faces, comments and blank lines anywhere.
+//! Many files deviate from this: they have counts directly after the keyword, no edge count, undeclared
+//! columns after coordinates and faces, or comments and blank lines anywhere.
 
 use super::assemble::assemble_text;
 use super::parsed::{ColorRange, FACE_COLORS_IGNORED, ParsedMesh, alpha_ignored};
@@ -8,7 +8,7 @@ use super::text::{Cursor, expected, expected_at_line_end, shown};
 use super::{AssetError, EMPTY_FILE, LoadedMesh, MeshSource, vertex_out_of_range};
 use crate::math::{DVec2, DVec3, Vec2};
 
-/// Vertices or faces between two polls of the cancel token.
+/// Number of vertices or faces between two polls of the cancel token.
 const BATCH: u64 = 1 << 13;
 
 /// Vertex columns declared by the header keyword.
@@ -17,7 +17,7 @@ struct OffHeader {
     uvs: bool,
     normals: bool,
     colors: bool,
-    /// Homogeneous coordinates: a fourth coordinate divides the others.
+    /// Whether coordinates are homogeneous: the first three are divided by a fourth.
     homogeneous: bool,
 }
 
@@ -36,7 +36,7 @@ struct OffReader<'a> {
     indices: IgnoredLines,
 }
 
-/// Lines to warn about: their count, and the byte offset of the first.
+/// Lines to warn about: the number of lines, and the byte offset of the first one.
 #[derive(Clone, Copy, Default)]
 struct IgnoredLines(u64, usize);
 
@@ -52,7 +52,7 @@ impl IgnoredLines {
     }
 }
 
-/// Warning about `count` lines of which something is ignored.
+/// Warning about something ignored on `count` lines.
 fn ignored_lines(first: usize, count: u64, ignored: &str) -> String {
     match count {
         1 => format!("line {first}: ignored {ignored}"),
@@ -60,7 +60,7 @@ fn ignored_lines(first: usize, count: u64, ignored: &str) -> String {
     }
 }
 
-const UNDECLARED: &str = "numbers that the header does not declare";
+const UNDECLARED: &str = "numbers not declared in the header";
 const COLOR_INDEX: &str = "a color index without a colormap";
 const BINARY_OFF: &str = "binary OFF is not supported; convert it to text or PLY";
 const NOT_OFF: &str = "OFF";
@@ -114,17 +114,17 @@ fn short_face(corner: usize, arity: usize) -> String {
     format!("a face of {arity} corners ends after {corner}")
 }
 
-/// Colors of vertices or corners, where present.
+/// Optional colors of vertices or corners.
 #[derive(Default)]
 struct OffColors {
     all: Vec<Option<[f64; 3]>>,
     range: ColorRange,
-    /// Minimum alpha, and a byte offset in its line.
+    /// Minimum alpha, and a byte offset in the same line.
     least_alpha: Option<(f64, usize)>,
 }
 
 impl OffColors {
-    /// Adds the color for `times` vertices or corners.
+    /// Adds a color for `times` vertices or corners.
     fn push(&mut self, color: &[f64], times: usize) {
         let color: Option<[f64; 3]> = color.first_chunk().copied().inspect(|color| self.range.add(*color));
         self.all.extend(std::iter::repeat_n(color, times));
@@ -136,7 +136,7 @@ impl OffColors {
         }
     }
 
-    /// Colors as bytes, with white for missing ones. Empty if there are none at all.
+    /// Colors as bytes. Missing colors are white. Empty if there are no colors at all.
     fn finish(self, source: &MeshSource<'_>, warnings: &mut Vec<String>) -> Vec<[u8; 3]> {
         if self.all.iter().all(Option::is_none) {
             return Vec::new();
@@ -171,7 +171,7 @@ impl OffReader<'_> {
         assemble_text(&self.source, parsed, |face| before_faces.start_of_face(vertices, face))
     }
 
-    /// Byte offset of a face by its index. The reader must be at the first face.
+    /// Byte offset of the face with this index. The reader must be at the first face.
     fn start_of_face(&self, vertices: u64, face: usize) -> Option<usize> {
         let mut ahead = *self;
         ahead.faces(vertices, face as u64, &mut ParsedMesh::default()).ok()?;
@@ -188,7 +188,7 @@ impl OffReader<'_> {
         self.wrong(expected(wanted, ahead.word()))
     }
 
-    /// Reads the optional header keyword `[ST][C][N][4]OFF`. Counts may follow it without a blank.
+    /// Reads the optional header keyword `[ST][C][N][4]OFF`. A count may follow without whitespace.
     fn header(&mut self) -> Result<OffHeader, AssetError> {
         if !self.cursor.skip_blank() {
             return self.wrong(EMPTY_FILE);
@@ -230,7 +230,7 @@ impl OffReader<'_> {
         self.number(of)
     }
 
-    /// Reads the nonnegative integer that starts here.
+    /// Reads a nonnegative integer at the cursor.
     fn number(&mut self, of: &str) -> Result<u64, AssetError> {
         match self.cursor.integer() {
             Some(number) => match u64::try_from(number) {
@@ -241,7 +241,7 @@ impl OffReader<'_> {
         }
     }
 
-    /// Reads the optional number of edges, which is not used, and the end of the line.
+    /// Reads the optional number of edges and the end of the line. Ignores the number.
     fn end_counts(&mut self) -> Result<(), AssetError> {
         if self.cursor.skip_in_line() {
             self.number("edges")?;
@@ -254,7 +254,7 @@ impl OffReader<'_> {
         Ok(())
     }
 
-    /// Checks the counts against the file's size: a vertex takes at least 6 bytes, a face at least 2.
+    /// Checks the counts against the file size. A vertex takes at least 6 bytes, a face at least 2.
     fn plausible(&self, vertices: u64, faces: u64) -> Result<(), AssetError> {
         let needed = vertices.saturating_mul(6).saturating_add(faces.saturating_mul(2));
         let remaining = self.cursor.remaining() as u64;
@@ -302,7 +302,7 @@ impl OffReader<'_> {
         Ok(())
     }
 
-    /// Adds the color at the end of a line for `times` vertices or corners.
+    /// Adds the color at the end of a line to `times` vertices or corners.
     fn color(&mut self, color: &[f64], times: usize, colors: &mut OffColors) {
         colors.push(color, times);
         match color {
@@ -336,7 +336,7 @@ impl OffReader<'_> {
         Ok(rest)
     }
 
-    /// Reads texture coordinates, the last two numbers of a line, after a color of any length.
+    /// Reads texture coordinates, which are the last two numbers of a line, after a color of any length.
     fn last_two(&mut self) -> Result<Vec2, AssetError> {
         let mut last = DVec2::new(self.float("u")?, self.float("v")?);
         while self.cursor.skip_in_line() {
@@ -418,7 +418,7 @@ mod tests {
     const FACES: &str = "3 0 1 2\n3 0 2 3\n";
 
     #[test]
-    fn all_notations_give_the_same_mesh() {
+    fn all_notations_are_equivalent() {
         let coordinates = ["0 0 0", "1 0 0", "1 1 0", "0 1 0"];
         let lines = |tail: &str| coordinates.map(|line| format!("{line}{tail}\n")).concat();
         let plain = read(&format!("OFF\n4 2 0\n{}{FACES}", lines(""))).expect("plain").mesh;
@@ -432,7 +432,7 @@ mod tests {
             format!("OFF\r\n4 2 0\r\n{}{}", lines("\r"), FACES.replace('\n', "\r\n")),
             format!("COFF\n4 2 0\n{}{FACES}", lines(" 150 151 152 255 ")),
             format!("COFF\n4 2 0\n{}{FACES}", lines(" 0.1 0.5 0.25")),
-            // Normals that the header does not declare.
+            // Normals not declared in the header.
             format!("OFF\n4 2 0\n{}{FACES}", lines(" 0 0 -1")),
             format!("4OFF\n4 2 0\n{}{FACES}", lines(" 1")),
             format!("OFF\n4 2 0\n{}3 0 1 2 7\n3  0 2 3 x\n", lines("")),
@@ -463,7 +463,7 @@ mod tests {
         assert_eq!(read(["3", "3", "3"]), [[0; 3]; 0]);
     }
 
-    /// Corner colors of two triangles whose lines end in `tails`, and the warnings.
+    /// Corner colors and warnings for two triangles whose lines end with `tails`.
     fn corner_colors(header: &str, vertex: &str, tails: [&str; 2]) -> (Vec<[u8; 3]>, Vec<String>) {
         let [a, b] = tails;
         let text = format!(
@@ -530,7 +530,7 @@ mod tests {
     }
 
     #[test]
-    fn errors_name_the_line_and_the_reason() {
+    fn errors_include_line_and_reason() {
         let start = "OFF\n# comment\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n";
         let first_face = |face: &str| error(&format!("{start}{face}\n"));
         for (face, reason) in [
@@ -567,7 +567,7 @@ mod tests {
     }
 
     #[test]
-    fn false_counts_allocate_nothing() {
+    fn false_counts_cause_no_allocation() {
         let huge = 4_000_000_000;
         assert_eq!(error("OFF\n4000000000 4000000000 0\n0 0 0\n").1, implausible(huge, huge, 6));
         let overflow = expected(&number_of("vertices"), b"18446744073709551615");

@@ -1,4 +1,4 @@
-//! Unprocessed contents of a mesh file, as read by its parser.
+//! Unprocessed contents of a mesh file, as returned by its parser.
 
 use std::path::PathBuf;
 
@@ -10,16 +10,16 @@ use crate::control::{CancelToken, Cancelled};
 use crate::geometry::mesh::NormalGroup;
 use crate::math::{DVec3, Vec2, Vec3};
 
-/// Polygons as vertex indices, concatenated.
+/// Concatenated vertex indices of all polygons.
 #[derive(Debug, Default)]
 pub(crate) struct Faces {
     pub(super) corners: Vec<u32>,
-    /// Number of corners of each face. Empty while all faces are triangles.
+    /// Number of corners of each face. Empty if all faces are triangles.
     pub(super) arities: Vec<u32>,
 }
 
 impl Faces {
-    /// Adds a corner to the current face, which [`Faces::close`] ends.
+    /// Adds a corner to the current face. Call [`Faces::close`] to end the face.
     pub(crate) fn corner(&mut self, vertex: u32) {
         self.corners.push(vertex);
     }
@@ -40,7 +40,7 @@ impl Faces {
         self.corners.reserve(3 * triangles);
     }
 
-    /// Replaces coincident vertices by the first of them.
+    /// Replaces coincident vertices with the first one.
     pub(super) fn join(&mut self, positions: &[Vec3], token: &CancelToken) -> Result<(), Cancelled> {
         let mut first: Vec<u32> = (0..positions.len() as u32).collect();
         for place in coincident::find(positions, token)? {
@@ -50,7 +50,7 @@ impl Faces {
         Ok(())
     }
 
-    /// Maximum number of corners: vertex indices have 32 bits.
+    /// Maximum number of corners, limited by 32-bit vertex indices.
     pub(crate) const MOST_CORNERS: usize = u32::MAX as usize;
 
     /// Number of faces.
@@ -60,7 +60,8 @@ impl Faces {
 }
 
 /// Contents of a mesh file. `normals`, `normal_groups`, `uvs`, `second_uvs` and `colors` are empty or have
-/// one entry per position; a zero normal is missing. `face_materials` is empty or has one entry per face.
+/// one entry per position. A zero normal means that the normal is missing. `face_materials` is empty or has
+/// one entry per face.
 #[derive(Debug, Default)]
 pub(crate) struct ParsedMesh {
     pub(crate) positions: Vec<DVec3>,
@@ -71,11 +72,11 @@ pub(crate) struct ParsedMesh {
     /// sRGB.
     pub(crate) colors: Vec<[u8; 3]>,
     pub(crate) faces: Faces,
-    /// Texture coordinates of each face corner, or empty. NaN selects the vertex's coordinates.
+    /// Texture coordinates of each face corner, or empty. NaN means that the vertex's coordinates are used.
     pub(crate) corner_uvs: Vec<Vec2>,
     /// Color of each face corner, or empty.
     pub(crate) corner_colors: Vec<[u8; 3]>,
-    /// Whether faces share no vertices, so that coincident ones must be joined.
+    /// Whether faces do not share vertices, in which case coincident vertices must be joined.
     pub(crate) has_separate_corners: bool,
     pub(crate) face_materials: Vec<u32>,
     pub(crate) materials: Vec<FileMaterial>,
@@ -85,7 +86,7 @@ pub(crate) struct ParsedMesh {
     pub(crate) pictures: Vec<PathBuf>,
 }
 
-/// Guesses whether colors range from 0 to 1 or from 0 to 255, for formats that do not specify it.
+/// Guesses whether colors range from 0 to 1 or from 0 to 255, for formats that do not specify the range.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct ColorRange {
     max: f64,
@@ -93,7 +94,7 @@ pub(crate) struct ColorRange {
 }
 
 impl ColorRange {
-    /// The largest value so far.
+    /// Largest value so far.
     pub(crate) fn max(&self) -> f64 {
         self.max
     }
@@ -105,13 +106,14 @@ impl ColorRange {
         }
     }
 
-    /// Value of full intensity. Fractional values up to 2 are taken as colors brighter than 1.
+    /// Color value at full intensity. If there are fractions and no value exceeds 2, values above 1 are taken
+    /// as bright colors, not bytes.
     pub(crate) fn one(&self) -> f64 {
         let are_bytes = self.max > 2.0 || (self.max > 1.0 && !self.has_fractions);
         if are_bytes { 255.0 } else { 1.0 }
     }
 
-    /// Converts a color of this range to bytes.
+    /// Converts a color in this range to bytes.
     pub(crate) fn bytes(&self, parts: [f64; 3]) -> [u8; 3] {
         color_bytes(parts.map(|part| part / self.one()))
     }
@@ -125,10 +127,10 @@ pub(crate) fn color_bytes(parts: [f64; 3]) -> [u8; 3] {
 /// Warning about a color's alpha below 1.
 pub(super) const ALPHA_IGNORED: &str = "color alpha is ignored";
 
-/// [`ALPHA_IGNORED`] with a line.
+/// [`ALPHA_IGNORED`] with a line number.
 pub(super) fn alpha_ignored(line: usize) -> String {
     format!("line {line}: {ALPHA_IGNORED}")
 }
 
-/// Warning about faces with colors whose vertices have colors as well.
+/// Warning for files with both face colors and vertex colors.
 pub(super) const FACE_COLORS_IGNORED: &str = "face colors are ignored because the vertices have colors";

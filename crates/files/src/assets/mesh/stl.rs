@@ -1,7 +1,9 @@
-//! STL: facets given by their corners, as text or binary (3D Systems, *StereoLithography Interface
-//! Specification*, 1989). Many files deviate: binary headers that begin with "solid", counts that are too
-//! small, polygons, several solids, zero or wrong normals, keywords in any case. Normals follow from the
-//! order of the corners; coincident corners become one vertex. The format has no unit and no standard colors.
+//! STL: facets defined by their corners, as text or binary (3D Systems, *StereoLithography Interface
+//! Specification*, 1989). Many files deviate from the specification: binary headers may begin with "solid",
+//! counts may be too small, facets may be polygons, there may be several solids, normals may be zero or
+//! wrong, and keywords may be in any case. The normals in the file are ignored and determined from the order
+//! of the corners. Coincident corners are merged into one vertex. The format has no units and no standard
+//! colors.
 
 use super::assemble::{assemble, assemble_text};
 use super::parsed::{Faces, ParsedMesh};
@@ -10,13 +12,13 @@ use super::{AssetError, LoadedMesh, MeshSource};
 use crate::assets::read;
 use crate::math::DVec3;
 
-/// Size of a binary file's header, before the number of facets.
+/// Size of the header of a binary file. The number of facets follows.
 const HEADER: usize = 80;
 /// Offset of the first facet.
 const START: usize = HEADER + 4;
-/// Size of a facet: a normal and three corners of three floats each, and a two-byte attribute.
+/// Size of a facet: a normal and three corners with three floats each, and a two-byte attribute.
 const FACET: usize = 50;
-/// Facets of a binary file or words of a text file between two polls of the cancel token.
+/// Number of facets (binary) or words (text) between two polls of the cancel token.
 const BATCH: usize = 1 << 13;
 
 pub(super) fn parse(source: &MeshSource<'_>) -> Result<LoadedMesh, AssetError> {
@@ -42,23 +44,23 @@ enum StlEncoding {
     Binary,
 }
 
-/// Detects the encoding. A file whose size matches its claimed number of facets is binary, whatever its
-/// header contains.
+/// Detects the encoding. If the file size matches the number of facets in a binary header, the file is
+/// binary, regardless of what the header contains.
 fn encoding(bytes: &[u8]) -> StlEncoding {
     let word = bytes.trim_ascii_start().get(..5);
     let says_solid = word.is_some_and(|word| word.eq_ignore_ascii_case(b"solid"));
-    // Text has no zero bytes. Binary headers are padded with zeros, or with blanks before facets that contain
-    // zeros.
+    // Text has no zero bytes. Binary files contain zeros in the header, or in the facets if the header is
+    // padded with blanks.
     let is_text = says_solid && memchr::memchr(0, bytes).is_none();
     if is_text && !fits_claim(bytes) { StlEncoding::Text } else { StlEncoding::Binary }
 }
 
-/// Whether the file's size matches the number of facets that it would claim as a binary file.
+/// Whether the file size matches the number of facets, assuming a binary file.
 fn fits_claim(bytes: &[u8]) -> bool {
     claimed(bytes).is_some_and(|count| bytes.len() as u64 == START as u64 + FACET as u64 * count)
 }
 
-/// Number of facets that a binary file claims. `None` if the file is too short.
+/// Number of facets according to a binary header. `None` if the file is too short.
 fn claimed(bytes: &[u8]) -> Option<u64> {
     let count = bytes.get(HEADER..START)?.first_chunk()?;
     Some(u64::from(u32::from_le_bytes(*count)))
@@ -77,10 +79,10 @@ fn binary(source: &MeshSource<'_>) -> Result<ParsedMesh, AssetError> {
     }
     if found == 0 {
         return Err(source.wrong(format!(
-                "the header claims 0 facets, and the {excess} bytes after it are less than a facet ({FACET} bytes)"
-            )));
+            "the header claims 0 facets, and only {excess} bytes follow, less than a facet ({FACET} bytes)"
+        )));
     }
-    // Accept a count of 0 from programs that write the header before they know the number of facets.
+    // Accept a count of 0. Some programs write the header before they know the number of facets.
     let (count, mut warnings) = (if claimed == 0 { found } else { claimed }, Vec::new());
     if claimed != 0 && (found > claimed || excess > 0) {
         let bytes = (found - claimed) * FACET as u64 + excess as u64;
@@ -114,7 +116,7 @@ fn missing_facets(claimed: u64, found: u64) -> String {
 
 /// Warning about bytes after the last facet.
 fn excess_bytes(bytes: u64, claimed: u64) -> String {
-    format!("ignored {bytes} bytes after the {claimed} facets that the header declares")
+    format!("ignored {bytes} bytes after the {claimed} facets declared in the header")
 }
 
 const VERTEX_OUTSIDE: &str = "a vertex outside of \"outer loop\" and \"endloop\"";
@@ -125,7 +127,7 @@ fn short_loop(corners: usize) -> String {
     format!("a loop with only {corners} corners")
 }
 
-/// Adds a corner with its own vertex.
+/// Adds a corner as a separate vertex.
 fn add(parsed: &mut ParsedMesh, position: DVec3) {
     parsed.faces.corner(parsed.positions.len() as u32);
     parsed.positions.push(position);
@@ -135,12 +137,12 @@ fn add(parsed: &mut ParsedMesh, position: DVec3) {
 struct TextReader<'a> {
     source: MeshSource<'a>,
     cursor: Cursor<'a>,
-    /// Faces with more than 3 corners, and the byte offsets of their loops.
+    /// Indices and loop byte offsets of faces with more than 3 corners.
     polygons: Vec<(usize, usize)>,
 }
 
 impl TextReader<'_> {
-    /// Byte offset of the loop of a face with more than 3 corners.
+    /// Byte offset of a face's loop, for faces with more than 3 corners.
     fn start_of(&self, face: usize) -> Option<usize> {
         self.polygons.iter().find(|(polygon, _)| *polygon == face).map(|(_, start)| *start)
     }
@@ -190,7 +192,7 @@ impl TextReader<'_> {
                 return self.wrong(start, expected(KEYWORD, word));
             }
             if parsed.positions.len() > Faces::MOST_CORNERS {
-                return self.wrong(start, "more corners than a mesh can have; split it into several files");
+                return self.wrong(start, "too many corners for one mesh; split it into several files");
             }
         }
         if corners.is_some() {
@@ -215,7 +217,8 @@ impl TextReader<'_> {
         }
     }
 
-    /// Skips a name of any number of words: up to the end of the line or a facet on the same line.
+    /// Skips a name with any number of words. The name ends at the end of the line, or at a facet on the same
+    /// line.
     fn skip_name(&mut self) {
         let bytes = self.source.bytes;
         let is_blank = |byte: &u8| byte.is_ascii_whitespace();
@@ -267,7 +270,7 @@ mod tests {
         rejection(read(bytes))
     }
 
-    /// Corners of a tetrahedron's facets, facing outwards.
+    /// Corners of a tetrahedron's facets. All facets face outwards.
     const TETRAHEDRON: [[[f32; 3]; 3]; 4] = {
         let [o, x, y, z] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         [[o, y, x], [o, x, z], [o, z, y], [x, y, z]]
@@ -306,7 +309,7 @@ mod tests {
     }
 
     #[test]
-    fn text_and_binary_give_the_same_joined_facets() {
+    fn text_and_binary_files_are_equivalent() {
         let expected = TETRAHEDRON.map(|facet| facet.map(Vec3::from_array));
         for bytes in [
             binary_of(b"made by hand", 4, &TETRAHEDRON),
@@ -319,7 +322,7 @@ mod tests {
         ] {
             let loaded = read(&bytes).expect("read");
             assert_eq!(places(&loaded), expected);
-            assert_eq!(loaded.mesh.positions.len(), 4, "coincident corners become one vertex");
+            assert_eq!(loaded.mesh.positions.len(), 4, "coincident corners should be merged");
             assert!(loaded.warnings.is_empty() && loaded.mesh.normals.is_empty());
         }
     }
@@ -343,7 +346,7 @@ mod tests {
     }
 
     #[test]
-    fn corners_that_differ_by_one_ulp_stay_separate() {
+    fn corners_one_ulp_apart_stay_separate() {
         let near = f32::from_bits(1.0_f32.to_bits() + 1);
         let facets = [
             [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
@@ -366,7 +369,7 @@ mod tests {
     }
 
     #[test]
-    fn polygons_are_cut_and_solids_are_merged() {
+    fn polygons_are_triangulated_and_solids_merged() {
         let square = "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 1 1 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid\n";
         let loaded = read(format!("{square}{}", square.replace(" 0\n", " 3\n")).as_bytes()).expect("read");
         assert_eq!((loaded.mesh.triangles.len(), loaded.mesh.positions.len()), (4, 8));
@@ -389,7 +392,7 @@ mod tests {
     }
 
     #[test]
-    fn bytes_after_the_facets_give_a_warning() {
+    fn bytes_after_the_facets_cause_a_warning() {
         let mut bytes = binary_of(b"", 3, &TETRAHEDRON);
         bytes.extend(b"rest");
         let loaded = read(&bytes).expect("read");
@@ -398,7 +401,7 @@ mod tests {
     }
 
     #[test]
-    fn errors_name_the_line_and_the_reason() {
+    fn errors_include_line_and_reason() {
         let cut = binary_of(b"", 9, &TETRAHEDRON);
         assert_eq!(error(&cut), (None, missing_facets(9, 4)));
         assert_eq!(error(&binary_of(b"", u32::MAX, &[])).1, missing_facets(u64::from(u32::MAX), 0));

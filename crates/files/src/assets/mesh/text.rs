@@ -1,10 +1,10 @@
-//! Tokenizer for text files of numbers, on bytes: it needs neither UTF-8 nor copies.
+//! Tokenizer for text files of numbers. Works on bytes, without requiring UTF-8 or copying.
 
 use std::borrow::Cow;
 
 use fast_float2::parse_partial;
 
-/// Replaces carriage returns by line feeds in a text without line feeds, as classic Mac OS wrote them.
+/// Replaces carriage returns with line feeds if there are no line feeds (classic Mac OS).
 pub(super) fn with_line_feeds(bytes: &[u8]) -> Cow<'_, [u8]> {
     if memchr::memchr(b'\n', bytes).is_some() || memchr::memchr(b'\r', bytes).is_none() {
         return Cow::Borrowed(bytes);
@@ -17,7 +17,8 @@ pub(super) fn without_mark(bytes: &[u8]) -> &[u8] {
     bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes)
 }
 
-/// Decodes a line as UTF-8, or as Latin-1 if it is not valid UTF-8, so that each byte maps to one character.
+/// Decodes a line as UTF-8. If it is not valid UTF-8, decodes it as Latin-1, where each byte is one
+/// character.
 pub(super) fn decoded(line: &[u8]) -> Cow<'_, str> {
     match std::str::from_utf8(line) {
         Ok(text) => Cow::Borrowed(text),
@@ -58,7 +59,7 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    /// Moves to the next word of this line. Returns false at the end of the line or at a comment.
+    /// Moves to the next word on this line. Returns false at the end of the line or at a comment.
     pub(super) fn skip_in_line(&mut self) -> bool {
         loop {
             match self.bytes.get(self.at) {
@@ -75,7 +76,7 @@ impl<'a> Cursor<'a> {
         self.at += rest.iter().position(|&byte| byte == b'\n').map_or(rest.len(), |end| end + 1);
     }
 
-    /// Consumes the word that starts here.
+    /// Consumes the word at the cursor.
     pub(super) fn word(&mut self) -> &'a [u8] {
         let rest = &self.bytes[self.at..];
         let length = rest.iter().position(|&byte| byte.is_ascii_whitespace() || byte == b'#');
@@ -84,13 +85,13 @@ impl<'a> Cursor<'a> {
         word
     }
 
-    /// Consumes the number that starts here. Overflow gives infinity; `nan` and `inf` are numbers.
+    /// Consumes the number at the cursor. `nan` and `inf` are accepted. Overflow results in infinity.
     pub(super) fn float(&mut self) -> Option<f64> {
         let (value, length) = parse_partial::<f64, _>(&self.bytes[self.at..]).ok()?;
         self.skip_number(length).then_some(value)
     }
 
-    /// Consumes the integer that starts here.
+    /// Consumes the integer at the cursor.
     pub(super) fn integer(&mut self) -> Option<i64> {
         let rest = &self.bytes[self.at..];
         let negative = rest.first() == Some(&b'-');
@@ -121,12 +122,12 @@ pub(super) fn shown(bytes: &[u8]) -> String {
     format!("{:?}", String::from_utf8_lossy(&bytes[..bytes.len().min(20)]))
 }
 
-/// Reason to reject a word.
+/// Error message for an unexpected word.
 pub(super) fn expected(wanted: &str, found: &[u8]) -> String {
     format!("expected {wanted}, found {}", shown(found))
 }
 
-/// Reason to reject a line that ends too early.
+/// Error message for a line that ends too early.
 pub(super) fn expected_at_line_end(wanted: &str) -> String {
     format!("expected {wanted}, found the end of the line")
 }
@@ -155,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_must_end_with_their_word() {
+    fn numbers_must_span_the_whole_word() {
         let float = |text: &'static str| Cursor::new(text.as_bytes(), 0).float();
         assert_eq!(float("1.5e-3 "), Some(1.5e-3));
         assert_eq!(float("-.5#"), Some(-0.5));

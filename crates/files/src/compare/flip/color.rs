@@ -1,4 +1,4 @@
-//! Color spaces of FLIP, with the display's white as reference white.
+//! FLIP's color spaces. The reference white is the display's white.
 
 use std::sync::LazyLock;
 
@@ -13,14 +13,14 @@ const XYZ_OF_RGB: DMat3 = DMat3::from_cols(
 
 static RGB_OF_XYZ: LazyLock<DMat3> = LazyLock::new(|| XYZ_OF_RGB.inverse());
 
-/// XYZ of white.
+/// XYZ of the reference white.
 const WHITE: DVec3 = DVec3::new(
     (10_135_552.0 + 8_788_810.0 + 4_435_075.0) / 24_577_794.0,
     1.0,
     (1_425_312.0 + 8_788_810.0 + 70_074_185.0) / 73_733_382.0,
 );
 
-/// YCxCz, a linear form of CIELAB in which the blur of the eye is modeled.
+/// YCxCz, a linear form of CIELAB. Used for simulating the blur of the eye.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Opponent {
     /// Lightness, −16 to 100.
@@ -38,7 +38,7 @@ impl Opponent {
         Self { y: 116.0 * xyz.y - 16.0, cx: 500.0 * (xyz.x - xyz.y), cz: 200.0 * (xyz.y - xyz.z) }
     }
 
-    /// Converts to [`Perceived`], after clamping to the colors of a display.
+    /// Clamps to the display's gamut and converts to [`Perceived`].
     pub(super) fn perceived(self) -> Perceived {
         let y = (self.y + 16.0) / 116.0;
         let xyz = DVec3::new(y + self.cx / 500.0, y, y - self.cz / 200.0) * WHITE;
@@ -46,7 +46,7 @@ impl Opponent {
     }
 }
 
-/// CIELAB with the Hunt effect, in which chroma grows with lightness.
+/// CIELAB with the Hunt effect: chroma increases with lightness.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Perceived {
     lightness: f64,
@@ -62,7 +62,7 @@ impl Perceived {
         Self { lightness: 116.0 * y - 16.0, a: hunt * 500.0 * (x - y), b: hunt * 200.0 * (y - z) }
     }
 
-    /// HyAB distance: absolute difference of lightness plus Euclidean distance of chroma.
+    /// HyAB distance: absolute lightness difference plus Euclidean chroma distance.
     pub(super) fn distance(&self, other: &Self) -> f64 {
         let (a, b) = (self.a - other.a, self.b - other.b);
         (self.lightness - other.lightness).abs() + (a * a + b * b).sqrt()
@@ -75,7 +75,7 @@ fn lightness(t: f64) -> f64 {
     if t > DELTA * DELTA * DELTA { libm::cbrt(t) } else { t / (3.0 * DELTA * DELTA) + 4.0 / 29.0 }
 }
 
-/// Distance of the two display colors that are furthest apart, green and blue.
+/// Distance between green and blue, the two display colors that are furthest apart.
 pub(super) fn largest_distance() -> f64 {
     Perceived::from_linear(DVec3::Y).distance(&Perceived::from_linear(DVec3::Z))
 }
@@ -93,7 +93,7 @@ mod tests {
     }
 
     #[test]
-    fn display_colors_survive_a_round_trip() {
+    fn display_colors_round_trip() {
         for rgb in [DVec3::X, DVec3::Y, DVec3::Z, DVec3::new(0.2, 0.5, 0.9), DVec3::splat(1e-4)] {
             let distance = Opponent::from_linear(rgb).perceived().distance(&Perceived::from_linear(rgb));
             assert!(distance < 1e-9, "{rgb}: {distance}");

@@ -1,11 +1,11 @@
-//! Filters of the visual system: contrast sensitivity as a blur of each opponent channel, edge and point
-//! detection on lightness.
+//! Filters that model the visual system: contrast sensitivity as a blur of each opponent channel, and edge
+//! and point detection in lightness.
 
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 
 use super::super::plane::{Plane, gaussian, normalized, offsets};
 
-/// A Gaussian of a contrast sensitivity function: amplitude, and width in square degrees.
+/// A Gaussian term of a contrast sensitivity function: amplitude, and width in square degrees.
 #[derive(Clone, Copy)]
 struct Term {
     a: f64,
@@ -20,7 +20,7 @@ const SENSITIVITY: [&[Term]; 3] = [
 ];
 /// Width of the widest Gaussian.
 const WIDEST: f64 = 0.04;
-/// Size in degrees of the feature that the eye detects best.
+/// Size in degrees of the features that the eye detects best.
 const FEATURE_DEGREES: f64 = 0.082;
 /// Filter radius in standard deviations.
 const REACH: f64 = 3.0;
@@ -31,7 +31,7 @@ struct Blur {
     taps: Vec<f64>,
 }
 
-/// All filters for some number of pixels per degree, padded to the same length.
+/// All filters for a number of pixels per degree, padded to the same length.
 pub(super) struct Filters {
     radius: usize,
     blurs: [Vec<Blur>; 3],
@@ -73,7 +73,7 @@ impl Filters {
         self.radius
     }
 
-    /// Blurs the opponent channels like the eye at this distance.
+    /// Blurs the opponent channels like the eye at the viewing distance.
     pub(super) fn blurred(&self, planes: &[Plane; 3]) -> [Plane; 3] {
         [0, 1, 2].map(|channel| {
             let parts = self.blurs[channel].iter().map(|blur| {
@@ -102,7 +102,7 @@ impl Filters {
     }
 }
 
-/// The Gaussians of a channel, weighted such that the sum of all their 2D taps is 1.
+/// Gaussians of a channel. Their weights make the sum of all 2D taps 1.
 fn blurs(terms: &[Term], radius: usize, pixels_per_degree: f64) -> Vec<Blur> {
     let volumes = terms.iter().map(|term| {
         // exp(−π²d²/b) with d in degrees.
@@ -117,7 +117,7 @@ fn blurs(terms: &[Term], radius: usize, pixels_per_degree: f64) -> Vec<Blur> {
     blurs
 }
 
-/// Scales positive taps to a sum of 1 and negative ones to a sum of −1.
+/// Scales positive taps to a sum of 1, and negative taps to a sum of −1.
 fn balanced(taps: &[f64]) -> Vec<f64> {
     let positive: f64 = taps.iter().filter(|tap| **tap > 0.0).sum();
     let negative: f64 = -taps.iter().filter(|tap| **tap < 0.0).sum::<f64>();

@@ -13,12 +13,13 @@ use super::{Pair, tiles};
 use crate::film::Rect;
 use crate::math::Vec3;
 
-/// Pixels per degree of the visual field: a display of 3840 pixels and 0.7 m width, viewed from 0.7 m.
+/// Pixels per degree of the visual field, for a display with a width of 3840 pixels and 0.7 m viewed from 0.7
+/// m.
 pub const PIXELS_PER_DEGREE: f64 = 67.0;
 
 /// Exponent of the color pipeline.
 const QC: f64 = 0.7;
-/// Color differences below this fraction of the largest one …
+/// Color differences below this fraction of the maximum …
 const PC: f64 = 0.4;
 /// … are mapped to errors below this value.
 const PT: f64 = 0.95;
@@ -58,7 +59,7 @@ fn tile_features(pair: &Pair, which: usize, tile: Rect, filters: &Filters) -> (V
     (perceived, features)
 }
 
-/// YCxCz of a tile with a margin.
+/// YCxCz of a tile and its margin.
 fn opponents(pair: &Pair, which: usize, tile: Rect, margin: usize) -> [Plane; 3] {
     let (width, height) = (tile.width as usize + 2 * margin, tile.height as usize + 2 * margin);
     let mut planes = [0; 3].map(|_| Plane::zero(width, height));
@@ -78,7 +79,7 @@ fn opponents(pair: &Pair, which: usize, tile: Rect, margin: usize) -> [Plane; 3]
     planes
 }
 
-/// Maps a color distance to an error in [0, 1]. Small distances use most of the range.
+/// Maps a color distance to an error in [0, 1]. Most of the range is used for small distances.
 fn color_error(distance: f64, max: f64) -> f64 {
     let error = libm::pow(distance, QC);
     let knee = PC * max;

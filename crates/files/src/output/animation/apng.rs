@@ -1,4 +1,4 @@
-//! APNG: PNG with several frames.
+//! APNG: animated PNG.
 
 use ::png::{BlendOp, ColorType, DisposeOp, Encoder, EncodingError, SrgbRenderingIntent};
 
@@ -19,7 +19,7 @@ pub(super) fn encode(
     encoder.set_color(ColorType::Rgb);
     encoder.set_depth(::png::BitDepth::Eight);
     encoder.set_source_srgb(SrgbRenderingIntent::Perceptual);
-    // 0 means infinitely many repetitions.
+    // 0 means that the animation repeats forever.
     encoder.set_animated(frames.len() as u32, 0)?;
     encoder.set_frame_delay(frame_time(frames.len(), 1000.0).round() as u16, 1000)?;
     encoder.set_blend_op(BlendOp::Source)?;

@@ -1,5 +1,5 @@
 //! Ordered dithering to a palette (T. Knoll, US patent 6,606,166, expired). The result depends only on a
-//! pixel's position and color, so that static parts do not flicker between frames as with error diffusion.
+//! pixel's position and color. Unlike with error diffusion, static parts do not flicker between frames.
 
 use std::collections::HashMap;
 
@@ -8,7 +8,7 @@ use crate::film::Picture;
 
 /// Width and height of the pattern.
 const SIDE: usize = 4;
-/// Number of colors that a pattern mixes.
+/// Number of colors mixed in a pattern.
 const MIXED: usize = SIDE * SIDE;
 
 /// Thresholds of the pattern (B. Bayer, 1973).
@@ -39,12 +39,12 @@ impl Dither {
         Ok(indices)
     }
 
-    /// Palette colors whose mean approximates a color, from dark to bright.
+    /// Palette colors whose mean approximates a color, in order of brightness.
     fn mixed(&self, color: [u8; 3]) -> [u8; MIXED] {
         let color = color.map(i32::from);
         let (mut mixed, mut error) = ([0; MIXED], [0; 3]);
         for entry in &mut mixed {
-            // Compensate the accumulated error.
+            // Compensate for the accumulated error.
             let aim = [0, 1, 2].map(|channel: usize| color[channel] + error[channel]);
             let index = self.nearest(aim);
             *entry = index as u8;

@@ -1,4 +1,4 @@
-//! GIF with one palette for all frames, so that static colors do not change between frames.
+//! GIF with one palette for all frames, so static colors do not change between frames.
 
 use ::gif::{AnyExtension, Encoder, EncodingError, Extension, Frame, Repeat};
 use color_quant::NeuQuant;
@@ -12,7 +12,7 @@ use crate::film::Picture;
 
 /// Size of the palette.
 const COLORS: usize = 256;
-/// Approximate number of pixels from which the palette is computed.
+/// Approximate number of pixels used for computing the palette.
 const SAMPLES: usize = 1 << 20;
 /// Quantizer setting: 1 uses every sample.
 const EVERY_SAMPLE: i32 = 1;
@@ -59,7 +59,7 @@ pub(super) fn encode(
     encoder.into_inner()
 }
 
-/// Chooses the palette of all frames, three bytes per color.
+/// Chooses a palette for all frames, with three bytes per color.
 fn palette(frames: &[Picture]) -> Vec<u8> {
     let pixels: usize = frames.iter().map(|frame| frame.pixels.len()).sum();
     // An odd step avoids sampling the same columns in every row.
@@ -67,7 +67,7 @@ fn palette(frames: &[Picture]) -> Vec<u8> {
     let all = frames.iter().flat_map(|frame| &frame.pixels);
     let samples: Vec<[u8; 4]> =
         all.step_by(step).map(|&[red, green, blue]| [red, green, blue, 255]).collect();
-    // Keep few colors exactly instead of quantizing them.
+    // If there are few colors, use them all instead of quantizing.
     let mut colors: Vec<[u8; 4]> = frames.iter().flat_map(|frame| some_colors(&frame.pixels)).collect();
     colors.sort_unstable();
     colors.dedup();
@@ -77,7 +77,7 @@ fn palette(frames: &[Picture]) -> Vec<u8> {
     NeuQuant::new(EVERY_SAMPLE, COLORS, samples.as_flattened()).color_map_rgb()
 }
 
-/// Distinct colors of a frame, up to one more than the palette can hold.
+/// Distinct colors of a frame, at most one more than the palette size.
 fn some_colors(pixels: &[[u8; 3]]) -> Vec<[u8; 4]> {
     let mut colors = std::collections::BTreeSet::new();
     for &[red, green, blue] in pixels {

@@ -10,13 +10,15 @@ use crate::film::Picture;
 
 /// Duration of a full turn in seconds.
 const TURN_SECONDS: f64 = 4.0;
-/// Minimum duration of a frame in seconds. Players slow down shorter frames to a tenth of a second.
+/// Minimum duration of a frame in seconds. Players show shorter frames for a tenth of a second.
 const SHORTEST_FRAME: f64 = 0.02;
 
-/// Encodes an endless animation from frames of the same size. The same frames always give the same bytes.
+/// Encodes an endless animation from frames of the same size. The output for the same frames is always
+/// identical.
 ///
 /// # Errors
-/// The format does not support the frames; the encoder fails; [`OutputError::Cancelled`].
+/// The format does not support the frames, the encoder fails, or the work is cancelled
+/// ([`OutputError::Cancelled`]).
 pub fn encode(
     frames: &[Picture],
     metadata: &[(String, String)],
@@ -37,12 +39,12 @@ pub fn encode(
         AnimationFormat::Gif => gif::encode(frames, metadata, token).map_err(|error| error.to_string()),
         AnimationFormat::Apng => apng::encode(frames, metadata, token).map_err(|error| error.to_string()),
     };
-    // A cancelled encoder reports an error of its own.
+    // A cancelled encoder reports its own error.
     token.check()?;
     bytes.map_err(|why| failed(format!("could not be encoded: {why}")))
 }
 
-/// Duration of a frame in units of 1/`per_second` s.
+/// Duration of a frame, in units of 1/`per_second` seconds.
 fn frame_time(frames: usize, per_second: f64) -> f64 {
     (TURN_SECONDS / frames as f64).max(SHORTEST_FRAME) * per_second
 }

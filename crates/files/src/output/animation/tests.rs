@@ -42,13 +42,13 @@ fn apng_frames_are_lossless() {
     assert!(bytes == self::bytes(AnimationFormat::Apng));
 }
 
-/// Decodes the frames of a GIF, three bytes per pixel.
+/// Decodes the frames of a GIF to three bytes per pixel.
 fn decoded(bytes: &[u8]) -> Vec<Vec<u8>> {
     let mut options = ::gif::DecodeOptions::new();
     options.set_color_output(::gif::ColorOutput::Indexed);
     let mut decoder = options.read_info(bytes).expect("GIF");
     assert_eq!(decoder.repeat(), ::gif::Repeat::Infinite);
-    let palette = decoder.global_palette().expect("one for all frames").to_vec();
+    let palette = decoder.global_palette().expect("a palette for all frames").to_vec();
     let mut frames = Vec::new();
     while let Some(frame) = decoder.read_next_frame().expect("a frame") {
         assert!(frame.palette.is_none() && frame.delay == 50);
@@ -58,11 +58,11 @@ fn decoded(bytes: &[u8]) -> Vec<Vec<u8>> {
     frames
 }
 
-/// Means over blocks of 4 × 4 pixels are close to the frame, much closer than with nearest colors, which
-/// cause banding.
+/// Averages of 4 × 4 pixels must be close to the frame, and much closer than without dithering, which causes
+/// banding.
 #[test]
-fn a_gif_keeps_gradients_on_average() {
-    // Slow gradients in many colors, so that palette colors are far apart.
+fn gif_dithering_preserves_gradients_on_average() {
+    // Slow gradients in many colors, so the palette colors are far apart.
     let smooth = |number: u32| {
         let pixel = |i: u32| {
             let (x, y, k) = (i % 96, i / 96, number % 8);
@@ -86,7 +86,7 @@ fn a_gif_keeps_gradients_on_average() {
         let at = |i: usize| 3 * ((4 * y + i / 4) * 96 + 4 * x + i % 4);
         [0, 1, 2].map(|channel| (0..16).map(|i| f64::from(pixels[at(i) + channel])).sum::<f64>() / 16.0)
     };
-    // Mean distance of block means, in levels of 255.
+    // Mean distance between block means, in 8-bit levels.
     let off = |frame: &Picture, shown: &[u8]| {
         let blocks = (0..10).flat_map(|y| (0..24).map(move |x| (x, y)));
         let each = blocks.map(|(x, y)| {
@@ -98,11 +98,16 @@ fn a_gif_keeps_gradients_on_average() {
     let banded = |frame: &Picture| frame.pixels.iter().flat_map(nearest).collect::<Vec<u8>>();
     let dithered: f64 = frames.iter().zip(&shown).map(|(frame, shown)| off(frame, shown)).sum();
     let plain: f64 = frames.iter().map(|frame| off(frame, &banded(frame))).sum();
-    assert!(dithered < 0.7 * plain && dithered / 8.0 < 2.0, "{} against {}", dithered / 8.0, plain / 8.0);
+    assert!(
+        dithered < 0.7 * plain && dithered / 8.0 < 2.0,
+        "dithered error {}, plain error {}",
+        dithered / 8.0,
+        plain / 8.0
+    );
 }
 
 #[test]
-fn static_pixels_are_equal_in_all_gif_frames() {
+fn static_gif_pixels_are_equal_in_all_frames() {
     let frames = frames();
     let shown = decoded(&bytes(AnimationFormat::Gif));
     for (frame, image) in frames.iter().zip(&shown).skip(1) {
@@ -115,7 +120,7 @@ fn static_pixels_are_equal_in_all_gif_frames() {
 }
 
 #[test]
-fn few_colors_are_kept_exactly() {
+fn images_with_few_colors_are_lossless() {
     let pixels = (0..64).map(|i| [[1, 2, 3], [250, 128, 7], [77, 77, 78]][i % 3]).collect();
     let frame = Picture { width: 8, height: 8, pixels };
     let frames = vec![frame; 8];
@@ -124,7 +129,7 @@ fn few_colors_are_kept_exactly() {
 }
 
 #[test]
-fn unsupported_and_cancelled_frames_are_errors() {
+fn invalid_frames_and_cancellation_are_errors() {
     let token = CancelToken::new();
     let wide = Picture { width: 70_000, height: 1, pixels: vec![[0; 3]; 70_000] };
     let error = encode(&[wide], &[], AnimationFormat::Gif, &token).expect_err("too wide");

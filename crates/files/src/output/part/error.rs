@@ -1,4 +1,4 @@
-//! Errors of parts and checkpoints, with advice.
+//! Errors for parts and checkpoints, with advice.
 
 use std::io;
 use std::path::PathBuf;
@@ -7,16 +7,16 @@ use nix::errno::Errno;
 
 use crate::system::describe_error;
 
-/// Number of a part.
+/// Index of a part, and the number of parts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct WhichPart {
-    /// Index of the part, from 1.
+    /// Index of the part, starting at 1.
     pub index: u32,
     /// Number of parts.
     pub count: u32,
 }
 
-/// Reasons for which parts cannot be merged or a checkpoint cannot be resumed.
+/// Reason why parts cannot be merged or a checkpoint cannot be resumed.
 #[derive(Debug, thiserror::Error)]
 pub enum PartError {
     /// The file cannot be read.
@@ -27,7 +27,7 @@ pub enum PartError {
         /// System error.
         source: io::Error,
     },
-    /// The file has another format.
+    /// The file has a different format.
     #[error("{}: not a part or checkpoint written by glimt", path.display())]
     Foreign {
         /// The file.
@@ -51,32 +51,32 @@ pub enum PartError {
         /// Length of the file.
         bytes: u64,
     },
-    /// A checksum or the structure of the file is wrong.
+    /// A checksum is wrong or the file is malformed.
     #[error("{}: it is damaged: {why}; copy or render it again", path.display())]
     Damaged {
         /// The file.
         path: PathBuf,
-        /// The fault and its location.
+        /// What is wrong, and where.
         why: String,
     },
-    /// A checkpoint instead of a part, or vice versa.
+    /// The file is a checkpoint instead of a part, or vice versa.
     #[error("{}: it is a {found}, not a {wanted}", path.display())]
     Kind {
         /// The file.
         path: PathBuf,
-        /// Kind of the file.
+        /// Type of the file.
         found: &'static str,
         /// Requested kind.
         wanted: &'static str,
     },
-    /// The file belongs to another image.
+    /// The file belongs to a different image.
     #[error("{}: it does not match {other}: {}", path.display(), differences.join("; "))]
     Other {
         /// The file.
         path: PathBuf,
-        /// The file that it is compared with.
+        /// The file to which it was compared.
         other: String,
-        /// Differences, one phrase each.
+        /// Descriptions of the differences.
         differences: Vec<String>,
     },
     /// Two files contain the same part.
@@ -108,8 +108,7 @@ pub enum PartError {
 }
 
 impl PartError {
-    /// Whether too many files are open in the process or the system. Opening further files would fail as
-    /// well.
+    /// Whether too many files are open in the process or the system. Opening more files would also fail.
     pub fn is_out_of_files(&self) -> bool {
         let Self::Unreadable { source, .. } = self else { return false };
         matches!(source.raw_os_error().map(Errno::from_raw), Some(Errno::EMFILE | Errno::ENFILE))
@@ -121,7 +120,7 @@ pub fn missing_parts(missing: &[u32], count: u32) -> String {
     format!("{} of {count} parts are missing: {}", missing.len(), part_list(missing, count))
 }
 
-/// Lists parts like `1/8, 3/8, 4/8`, truncated if there are many.
+/// Lists parts in the form `1/8, 3/8, 4/8`. Long lists are truncated.
 fn part_list(missing: &[u32], count: u32) -> String {
     const MAX_SHOWN: usize = 20;
     let names: Vec<String> = missing.iter().take(MAX_SHOWN).map(|index| format!("{index}/{count}")).collect();

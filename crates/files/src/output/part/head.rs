@@ -1,4 +1,4 @@
-//! Header of a part: the image, the part of it in the file, and the encoding settings.
+//! Header of a part: the image, which part of it the file contains, and the encoding settings.
 
 use std::path::Path;
 
@@ -15,13 +15,14 @@ use crate::film::{Convergence, Film, FilmError, Quantity, Rect, SumOrder};
 pub struct Head {
     /// Type of the file.
     pub kind: PartKind,
-    /// Everything that the image depends on, with user-visible names.
+    /// Everything the image depends on, with user-visible names.
     pub identity: Vec<Dependency>,
-    /// The part of the image that the file contains.
+    /// Which part of the image the file contains.
     pub share: ShareHead,
     /// Properties of the image.
     pub picture: ImageHead,
-    /// Path of the scene relative to the part, which may differ between parts of an image. Empty if unknown.
+    /// Path of the scene, relative to the part. It may differ between the parts of an image. Empty if
+    /// unknown.
     #[serde(default)]
     pub scene: String,
 }
@@ -32,7 +33,7 @@ pub struct Head {
 pub enum PartKind {
     /// A finished part of an image.
     Part,
-    /// A render that was interrupted or may be extended.
+    /// A render that was interrupted or can be continued.
     Checkpoint,
 }
 
@@ -46,7 +47,7 @@ impl PartKind {
     }
 }
 
-/// Something that an image depends on.
+/// Something an image depends on.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Dependency {
     /// A scene key or a file name.
@@ -56,9 +57,9 @@ pub struct Dependency {
 }
 
 impl Head {
-    /// Whether the numbers are valid.
+    /// Whether all numbers are in range.
     pub(super) fn is_possible(&self) -> bool {
-        /// Maximum size and maximum number of parts.
+        /// Maximum width, height and number of parts.
         const LIMIT: u32 = 1 << 17;
         let Self { share, picture, .. } = self;
         let [x, y, width, height] = picture.crop;
@@ -73,34 +74,34 @@ impl Head {
             && picture.tone.exposure.is_finite()
     }
 
-    /// Returns the name of the image's input file with this hash (hexadecimal), if there is one.
+    /// Returns the name of the image's input file with this hash (hexadecimal). `None` if there is none.
     pub(super) fn input_of_hash(&self, hash: &str) -> Option<&str> {
         let matches = |input: &&Dependency| input.name.starts_with(FILE) && input.value == hash;
         self.identity.iter().find(matches).map(|input| name_of(&input.name))
     }
 
-    /// Returns the name, relative to the scene's folder, of an input file (even a missing one) that this path
-    /// ends with, if there is one.
+    /// Finds an input file, existing or not, whose name is the end of this path. Returns the name, relative
+    /// to the scene's folder.
     pub(super) fn input_of_name(&self, path: &Path) -> Option<&str> {
         let files = self.identity.iter().filter(|input| input.name.starts_with(FILE));
         files.map(|input| name_of(&input.name)).find(|name| !name.is_empty() && path.ends_with(name))
     }
 }
 
-/// The part of an image that a file contains.
+/// Which part of an image a file contains.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ShareHead {
-    /// Index of the part, from 1.
+    /// Index of the part, starting at 1.
     pub index: u32,
     /// Number of parts.
     pub count: u32,
-    /// Number of sample blocks of the image. 0 if parts contain complete tiles.
+    /// Number of sample blocks in the image. 0 if parts contain complete tiles.
     pub block_count: u32,
-    /// Indices of the sample blocks that this part contains for each of its tiles, in ascending order.
+    /// Indices of the sample blocks in each tile of this part, in ascending order.
     pub blocks: Vec<u32>,
 }
 
-/// Properties of the image that a part belongs to.
+/// Properties of the image to which a part belongs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ImageHead {
     /// Width of the full image.
@@ -109,7 +110,7 @@ pub struct ImageHead {
     pub height: u32,
     /// Rendered region: left, top, width and height.
     pub crop: [u32; 4],
-    /// Whether the noise converges like photon mapping.
+    /// Whether the noise converges as in photon mapping.
     pub is_by_photons: bool,
     /// Displayed quantity: `radiance`, `samples` or `error`.
     pub quantity: String,
@@ -117,7 +118,7 @@ pub struct ImageHead {
     pub tone: ToneHead,
     /// Bits per channel of PNG and PPM files, 8 or 16.
     pub bit_depth: u8,
-    /// Metadata names and values of the image file.
+    /// Metadata names and values for the image file.
     pub metadata: Vec<(String, String)>,
     /// Whether the values are radiance.
     pub is_light: bool,
@@ -128,9 +129,9 @@ pub struct ImageHead {
 pub struct ToneHead {
     /// Exposure in stops.
     pub exposure: f32,
-    /// Name of the curve.
+    /// Name of the tone curve.
     pub curve: String,
-    /// Whether the values are display values already.
+    /// Whether the values are already display values.
     pub is_data: bool,
     /// Range mapping: `distances`, `amounts` or none.
     pub stretch: Option<String>,
@@ -144,7 +145,7 @@ const QUANTITIES: [(Quantity, &str); 3] =
 const STRETCHES: [(DataKind, &str); 2] = [(DataKind::Distances, "distances"), (DataKind::Amounts, "amounts")];
 
 impl ImageHead {
-    /// Describes the image of a film with these settings.
+    /// Describes a film's image with these settings.
     pub fn new(film: &Film, finish: &DevelopSettings) -> Self {
         let Rect { x, y, width, height } = film.crop();
         let tone = &finish.tone;
@@ -176,7 +177,7 @@ impl ImageHead {
         }
     }
 
-    /// Settings that determine the image file. `None` if a name is unknown.
+    /// Settings for encoding the image file. `None` if a name is unknown.
     pub fn finish(&self) -> Option<DevelopSettings> {
         let range_map = match self.tone.stretch.as_deref() {
             None => RangeMap::None,
@@ -210,7 +211,7 @@ impl ImageHead {
     }
 }
 
-/// Differences between two lists of inputs, one phrase each. `here` and `there` name the two sides.
+/// Describes the differences between two lists of inputs. `here` and `there` are the names of the lists.
 pub fn differences(a: &[Dependency], b: &[Dependency], (here, there): (&str, &str)) -> Vec<String> {
     let value_of = |all: &[Dependency], name: &str| {
         all.iter().find(|input| input.name == name).map(|input| input.value.clone())
@@ -223,7 +224,7 @@ pub fn differences(a: &[Dependency], b: &[Dependency], (here, there): (&str, &st
     let is_named = differing.iter().any(|name| !is_content(name));
     differing
         .iter()
-        // The total hash is only informative if nothing else differs.
+        // The total hash is only useful if nothing else differs.
         .filter(|name| **name != EVERYTHING || differing.len() == 1)
         .filter(|name| !is_named || **name != EVERYTHING)
         .map(|name| match (value_of(a, name), value_of(b, name)) {
@@ -235,17 +236,17 @@ pub fn differences(a: &[Dependency], b: &[Dependency], (here, there): (&str, &st
                 format!("{} is only used {place}", name_of(name))
             }
             (Some(a), Some(b)) if *name == PROGRAM => {
-                format!("glimt {a} rendered it {here} and glimt {b} {there}; use the same build")
+                format!("it was rendered by glimt {a} {here} and glimt {b} {there}; use the same build")
             }
             (a, b) => format!("{name} is {} {here} and {} {there}", shown(a), shown(b)),
         })
         .collect()
 }
 
-/// Name of the input that is the program's version and build.
+/// Name of the input for the program's version and build.
 const PROGRAM: &str = "glimt";
 
-/// Name of the input that is the hash of all inputs.
+/// Name of the input for the hash of all inputs.
 pub(super) const EVERYTHING: &str = "everything";
 
 fn is_content(name: &str) -> bool {
@@ -256,21 +257,21 @@ fn name_of(name: &str) -> &str {
     name.strip_prefix(FILE).unwrap_or(name)
 }
 
-/// Prefix of the keys under which file hashes are stored.
+/// Prefix of the names of file inputs.
 const FILE: &str = "file ";
 
 impl Dependency {
-    /// A setting as an input.
+    /// Creates an input for a setting.
     pub fn setting(name: &str, value: impl Into<String>) -> Self {
         Self { name: name.to_owned(), value: value.into() }
     }
 
-    /// A file as an input, with the hash of its content.
+    /// Creates an input for a file, with the hash of its content.
     pub fn file(name: &str, content: impl Into<String>) -> Self {
         Self { name: format!("{FILE}{name}"), value: content.into() }
     }
 
-    /// The hash of everything that the image depends on.
+    /// Creates an input for the hash of everything the image depends on.
     pub fn everything(key: impl Into<String>) -> Self {
         Self { name: EVERYTHING.to_owned(), value: key.into() }
     }

@@ -1,4 +1,4 @@
-//! Merges parts tile by tile, so that only the image and one tile of each part are in memory.
+//! Merges parts tile by tile. Only the image and one tile of each part are in memory.
 
 use std::collections::BTreeMap;
 
@@ -18,10 +18,11 @@ pub struct Merged {
     pub count: u32,
 }
 
-/// Checks that parts belong together. Returns the indices of the missing parts.
+/// Checks that parts belong to the same image. Returns the indices of missing parts.
 ///
 /// # Errors
-/// The first file that is not a part, belongs to another image, or is given twice.
+/// A file is not a part, belongs to another image, or is given twice. The error contains the first of these
+/// files.
 pub fn check(parts: &[PartFile]) -> Result<Vec<u32>, PartError> {
     let Some(first) = parts.first() else { return Ok(Vec::new()) };
     let mut found = BTreeMap::new();
@@ -42,12 +43,12 @@ pub fn check(parts: &[PartFile]) -> Result<Vec<u32>, PartError> {
     Ok((1..=count).filter(|index| !found.contains_key(index)).collect())
 }
 
-/// Differences between the images of two headers, or in how they are split.
+/// Differences between the images of two headers or their division into parts.
 fn head_differences(a: &Head, b: &Head) -> Vec<String> {
     let mut found = differences(&a.identity, &b.identity, ("here", "there"));
     let counts = (a.share.count, b.share.count);
     if counts.0 != counts.1 {
-        found.push(format!("it is one of {} parts here and of {} there", counts.0, counts.1));
+        found.push(format!("the image has {} parts here and {} there", counts.0, counts.1));
     }
     let (picture, there) = (&a.picture, &b.picture);
     if found.is_empty() {
@@ -59,7 +60,7 @@ fn head_differences(a: &Head, b: &Head) -> Vec<String> {
     found
 }
 
-/// Differences between the metadata of two images, one phrase each.
+/// Describes the differences between the metadata of two images.
 fn metadata_differences(a: &[(String, String)], b: &[(String, String)]) -> Vec<String> {
     let value = |all: &[(String, String)], name: &str| all.iter().find(|(known, _)| known == name).cloned();
     let names = a.iter().chain(b.iter().filter(|(name, _)| value(a, name).is_none()));
@@ -72,11 +73,11 @@ fn metadata_differences(a: &[(String, String)], b: &[(String, String)]) -> Vec<S
     names.filter_map(words).collect()
 }
 
-/// Merges parts in any order. If some are missing and `is_partial`, merges the others; the missing tiles stay
-/// black or have fewer samples. `tell` is called with the number of finished tiles and the film.
+/// Merges parts in any order. Parts may only be missing if `is_partial` is true. In this case, missing tiles
+/// are black or have fewer samples. `tell` is called with the number of finished tiles and the film.
 ///
 /// # Errors
-/// The errors of [`check`]; parts are missing; a part is inconsistent; cancelled.
+/// Same as [`check`]. Also fails if parts are missing, a part is inconsistent, or the work is cancelled.
 pub fn merge(
     parts: &[PartFile],
     is_partial: bool,
@@ -113,7 +114,7 @@ pub fn merge(
     Ok(Merged { film, missing, count })
 }
 
-/// Returns a tile that a single part contains, and whether it has all samples.
+/// Returns a tile contained in a single part, and whether it has all samples.
 fn unsplit_tile(
     parts: &[PartFile],
     tile: usize,
@@ -123,7 +124,7 @@ fn unsplit_tile(
     for part in parts {
         let Some(stored) = part.tile(tile, area)? else { continue };
         if let Some((_, twin)) = &found {
-            let why = format!("it contains tile {tile}, as does {}", twin.path.display());
+            let why = format!("it contains tile {tile}, which is also in {}", twin.path.display());
             return Err(PartError::Damaged { path: part.path.clone(), why });
         }
         found = Some((stored, part));
@@ -157,7 +158,7 @@ fn sum_blocks(
             }
             if let Some((twin, _)) = order.insert(*block, (index, position)) {
                 let why = format!(
-                    "it contains block {block} of tile {tile}, as does {}",
+                    "it contains block {block} of tile {tile}, which is also in {}",
                     tiles[twin].0.path.display()
                 );
                 return Err(damaged(part, why));

@@ -1,17 +1,17 @@
-//! Parts of an image and checkpoints: a film stored in a file, with everything that the image depends on.
+//! Parts of an image and checkpoints. A film is stored in a file with everything the image depends on.
 //!
 //! | bytes | |
 //! | --- | --- |
-//! | 12 | magic number, which no image format uses |
+//! | 12 | magic number, not used by any image format |
 //! | 4 | format version |
 //! | 4, n | length of the header, and the header: [`Head`] as JSON |
-//! | 16 | digest of everything before |
+//! | 16 | digest of all preceding bytes |
 //! | 4, 4, n, 16 | for each tile with samples: index, length, data, digest |
-//! | 4, 4, n, 16 | the footer in the same form, with an index that no tile has: counts, digest of all records, render state |
+//! | 4, 4, n, 16 | the footer in the same form, with an index not used by tiles: counts, digest of all records, render state |
 //!
 //! All numbers are little-endian. Digests are the first 16 bytes of BLAKE3. The digest of a record includes
-//! that of the header, so that records cannot be mixed between files. The footer contains a digest of all
-//! records: no record can be missing, and nothing may follow.
+//! the header's digest, so records from different files cannot be mixed. The footer contains a digest of all
+//! records, so missing records are detected. No bytes may follow the footer.
 
 mod error;
 mod head;
@@ -25,7 +25,7 @@ pub use merge::{Merged, check, merge};
 pub use read::{PartFile, input_with_content, input_with_name, is_part};
 pub use save::save;
 
-/// Magic number. Like that of PNG, it is corrupted by conversions of text files.
+/// Magic number. As in PNG, text file conversions corrupt it, which makes them detectable.
 const MARK: [u8; 12] = crate::system::file::PART_MARK;
 
 /// Version of the format.
@@ -34,10 +34,10 @@ const VERSION: u32 = 1;
 /// Index of the footer record.
 const FOOTER: u32 = u32::MAX;
 
-/// Digest of a record or of the header.
+/// Digest of a record or the header.
 type Digest = [u8; 16];
 
-/// Digest of some bytes of a file, given the digest of its header.
+/// Digest of bytes in a file, given the header's digest.
 fn digest(header_digest: &Digest, parts: &[&[u8]]) -> Digest {
     let mut hasher = blake3::Hasher::new();
     hasher.update(header_digest);
@@ -58,7 +58,7 @@ struct Footer {
     non_finite: u64,
     /// Digest of the tiles' digests, in hexadecimal.
     records: String,
-    /// State of the render, opaque to this module.
+    /// Render state, opaque to this module.
     state: serde_json::Value,
 }
 

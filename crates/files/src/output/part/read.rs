@@ -1,4 +1,4 @@
-//! Reads parts: validates the whole file first, then reads single tiles.
+//! Reads parts. The whole file is validated first, then tiles are read one at a time.
 
 use std::fs::File;
 use std::io::{self, BufReader, ErrorKind, Read};
@@ -25,22 +25,22 @@ pub struct PartFile {
     pub non_finite: u64,
     file: File,
     header_digest: Digest,
-    /// Index, file offset and length of each tile, by index.
+    /// Index, file offset and length of each tile, sorted by index.
     pub(super) tiles: Vec<(u32, u64, u32)>,
 }
 
-/// Reason to reject a header with invalid values.
-pub(super) const IMPOSSIBLE_HEADER: &str = "the header has impossible values";
+/// Error message for a header with invalid values.
+pub(super) const IMPOSSIBLE_HEADER: &str = "the header has invalid values";
 
-/// Whether a file starts like a part or checkpoint.
+/// Whether a file has the magic number of parts and checkpoints.
 pub fn is_part(path: &Path) -> bool {
     let mut mark = [0; MARK.len()];
     open(path).and_then(|mut file| file.read_exact(&mut mark)).is_ok() && mark == MARK
 }
 
-/// Returns the name of an input file of these images with the same content as the file at `path`. Such a file
-/// must not be overwritten, wherever the parts were rendered. `None` if there is none or the file cannot be
-/// read.
+/// Finds an input file of these images with the same content as the file at `path`, and returns its name. The
+/// file must not be overwritten, even if the parts were rendered on another machine. `None` if there is no
+/// such input or the file cannot be read.
 pub fn input_with_content<'a>(parts: &'a [PartFile], path: &Path) -> Option<&'a str> {
     let mut hasher = blake3::Hasher::new();
     hasher.update_reader(open(path).ok()?).ok()?;
@@ -48,8 +48,8 @@ pub fn input_with_content<'a>(parts: &'a [PartFile], path: &Path) -> Option<&'a 
     parts.iter().find_map(|part| part.head.input_of_hash(&hash))
 }
 
-/// Returns the name of an input file of these images that `path` ends with. Unlike the content, the name also
-/// matches files that were missing or have changed since.
+/// Finds an input file of these images whose name is the end of `path`, and returns the name. Unlike
+/// comparing content, this also finds files that were missing or have changed since.
 pub fn input_with_name<'a>(parts: &'a [PartFile], path: &Path) -> Option<&'a str> {
     let absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
     let real = path.canonicalize().unwrap_or_else(|_| absolute.clone());
@@ -62,7 +62,8 @@ impl PartFile {
     /// Opens and validates a file.
     ///
     /// # Errors
-    /// The file is unreadable, not a part, of another version, truncated, or damaged; cancelled.
+    /// The file is unreadable, not a part, from another version, truncated or damaged, or the work is
+    /// cancelled.
     pub fn open(path: &Path, token: &CancelToken) -> Result<Self, PartError> {
         let unreadable = |source| PartError::Unreadable { path: path.to_owned(), source };
         let file = open(path).map_err(unreadable)?;
@@ -165,9 +166,9 @@ impl PartFile {
     }
 }
 
-/// Opens a regular file. Raises the process's limit of open files if it is reached.
+/// Opens a regular file. If the process's limit on open files is reached, raises it.
 fn open(path: &Path) -> io::Result<File> {
-    // Pipes and devices have no end.
+    // Reading a pipe or device might never end.
     if !std::fs::metadata(path)?.is_file() {
         return Err(io::Error::new(ErrorKind::InvalidInput, "not a regular file"));
     }
@@ -216,7 +217,7 @@ impl PartReader<'_> {
         Ok(u32::from_le_bytes(bytes))
     }
 
-    /// Reads `length` bytes. Does not allocate beyond the end of the file.
+    /// Reads `length` bytes. Fails before allocating memory if the file is too short.
     fn bytes(&mut self, length: u32, into: &mut Vec<u8>) -> Result<(), PartError> {
         if u64::from(length) > self.size - self.at {
             return Err(self.unfinished());

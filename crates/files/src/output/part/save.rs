@@ -1,4 +1,4 @@
-//! Writes parts tile by tile, so that only one tile is in memory in addition to the film.
+//! Writes parts tile by tile. Only the film and one encoded tile are in memory.
 
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
@@ -13,12 +13,12 @@ use super::{Digest, FOOTER, Footer, Head, MARK, VERSION, digest};
 use crate::control::CancelToken;
 use crate::film::Film;
 
-/// Writes a film with its header atomically. `state` is opaque data for resuming the render. Other threads may
-/// add samples to the film: each tile is written as it is at some moment. Returns the file, like
-/// [`atomic_with`].
+/// Writes a film with its header atomically. `state` is opaque data for resuming the render. Other threads
+/// may add samples to the film in the meantime. Each tile is written in its current state. Returns the file,
+/// like [`atomic_with`].
 ///
 /// # Errors
-/// Errors of writing.
+/// The file cannot be written.
 pub fn save(
     path: &Path,
     head: &Head,
@@ -33,7 +33,7 @@ pub fn save(
 /// Size of the chunks passed to the writing thread.
 const CHUNK_BYTES: usize = 1 << 20;
 
-/// Encodes on a separate thread while this one writes.
+/// Encodes on a separate thread and writes on the current thread.
 fn write(
     file: &mut dyn Write,
     head: &Head,
@@ -48,10 +48,10 @@ fn write(
             make(&mut Chunks { sender, bytes: Vec::with_capacity(CHUNK_BYTES) }, head, film, state, token)
         };
         let Ok(making) = named.spawn_scoped(scope, make_chunks) else {
-            // Without a thread this is slower, but hours of work are not lost.
+            // Encode on this thread. This is slower, but avoids losing hours of work.
             return make(&mut BufWriter::with_capacity(CHUNK_BYTES, file), head, film, state, token);
         };
-        // If writing fails, the channel closes and the other thread stops.
+        // If writing fails, the channel is closed and the encoding thread stops.
         for chunk in chunks {
             file.write_all(&chunk)?;
         }

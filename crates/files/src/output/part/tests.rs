@@ -12,7 +12,7 @@ use crate::film::tone::ToneMapping;
 use crate::film::{Film, Quantity, TileSamples};
 use crate::math::Vec3;
 
-/// A film of 70 × 40 pixels and six tiles, with samples in the tiles of one part.
+/// A film with 70 × 40 pixels and six tiles, with samples only in the tiles of one part.
 fn film(index: u32, count: u32) -> Film {
     let film = Film::new(70, 40, None).expect("a film");
     for tile in (0..film.tile_count()).filter(|tile| *tile as u32 % count == index - 1) {
@@ -92,7 +92,7 @@ fn parts_merge_in_any_order() {
 }
 
 #[test]
-fn parts_that_do_not_match_are_rejected() {
+fn mismatched_parts_are_rejected() {
     let folder = tempfile::tempdir().expect("a folder");
     let paths = parts(folder.path(), 3);
     let error = |paths: &[PathBuf]| merged(paths).expect_err("rejected");
@@ -128,7 +128,7 @@ fn parts_that_do_not_match_are_rejected() {
         matches!(checkpoint, PartError::Kind { found: "checkpoint", wanted: "part", .. }),
         "{checkpoint}"
     );
-    // A part with another index contains the tiles of its neighbor.
+    // A part with index 3 that contains the tiles of part 2.
     let stolen = put(folder.path(), "3.part", &head(3, 3, &film), &film);
     let stolen = error(&[paths[0].clone(), paths[1].clone(), stolen]);
     assert!(matches!(stolen, PartError::Damaged { .. }), "{stolen}");
@@ -162,7 +162,7 @@ fn foreign_and_damaged_files_are_rejected() {
 }
 
 #[test]
-fn impossible_headers_are_rejected() {
+fn invalid_headers_are_rejected() {
     let folder = tempfile::tempdir().expect("a folder");
     let film = film(1, 2);
     let right = head(1, 2, &film);
@@ -229,9 +229,9 @@ fn parts_of_different_builds_do_not_match() {
     assert!(found.len() == 1 && found[0].contains("build 1") && found[0].contains("build 2"), "{found:?}");
 }
 
-/// Records cannot be removed or replaced by those of another file.
+/// Removed records must be detected.
 #[test]
-fn records_cannot_be_removed() {
+fn removed_records_are_detected() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = parts(folder.path(), 2).remove(0);
     let part = opened(&path).expect("a part");

@@ -13,7 +13,8 @@ const COMMENT: u8 = 0xfe;
 /// Flag of a global or local palette.
 const HAS_PALETTE: u8 = 0x80;
 
-/// Reads a GIF from its start. Frames of a truncated file are not counted. `None` if there are no frames.
+/// Reads a GIF from the start. Returns no frame count if the file is truncated, and `None` if it has no
+/// frames.
 pub(super) fn read_gif(mut file: impl Read) -> Option<ImageInfo> {
     let [_, _, _, _, _, _, a, b, c, d, flags, _, _] = next(&mut file)?;
     let size = (u32::from(u16::from_le_bytes([a, b])), u32::from(u16::from_le_bytes([c, d])));
@@ -64,7 +65,7 @@ fn skip_frame(file: &mut impl Read) -> Option<()> {
     sub_blocks(file, |_| {})
 }
 
-/// Reads sub-blocks of at most 255 bytes, up to an empty one.
+/// Reads sub-blocks of at most 255 bytes, up to the first empty one.
 fn sub_blocks(file: &mut impl Read, mut take: impl FnMut(&[u8])) -> Option<()> {
     let mut content = [0; 255];
     loop {

@@ -1,4 +1,4 @@
-//! Reads the settings that glimt wrote into an image.
+//! Reads settings that glimt has written to an image.
 
 mod gif;
 mod text;
@@ -15,7 +15,7 @@ use super::{PROGRAM, SOFTWARE};
 use crate::system::describe_error;
 use crate::system::file::{self, PART_MARK};
 
-/// Bytes at the start of a file that contain the settings, before the pixels.
+/// Number of bytes at the start of a file to search for settings.
 const START_BYTES: u64 = 4 << 20;
 /// Maximum number of settings.
 const LIMIT: usize = 200;
@@ -57,7 +57,7 @@ impl ImageInfo {
         }
     }
 
-    /// Adds a line of the form `name: value`. Ignores other lines.
+    /// Adds a line of the form `name: value`. Ignores all other lines.
     fn add_line(&mut self, line: &str) {
         if let Some((name, value)) = line.split_once(": ") {
             self.add(name.trim(), value.trim());
@@ -65,7 +65,7 @@ impl ImageInfo {
     }
 }
 
-/// Reason for which a file's settings cannot be read.
+/// Reason why a file's settings cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum ImageInfoError {
     /// The file cannot be read.
@@ -95,7 +95,7 @@ pub enum ImageInfoError {
     },
 }
 
-/// Reads the properties of an image in any format that glimt writes, or of a part or checkpoint.
+/// Reads the properties of a part, a checkpoint, or an image in any format that glimt can write.
 ///
 /// # Errors
 /// [`ImageInfoError`].
@@ -119,7 +119,7 @@ pub fn read_info(path: &Path) -> Result<ImageInfo, ImageInfoError> {
     {
         return Ok(info);
     }
-    // Frames of a GIF continue to the end of the file.
+    // GIF frames extend to the end of the file.
     if start.len() as u64 == START_BYTES && start.starts_with(b"GIF") {
         let rest = BufReader::new(&opened);
         if let Some(info) = gif::read_gif(start.chain(rest)) {
@@ -141,7 +141,7 @@ fn start(file: &File) -> std::io::Result<Vec<u8>> {
 /// Reads the properties of an image from its first bytes.
 ///
 /// # Errors
-/// The fault of the header. `None` for a file of another format.
+/// What is wrong with the header. `None` if the file has another format.
 fn read_header(bytes: &[u8]) -> Result<ImageInfo, Option<String>> {
     let wrong = |format: &str| Some(format!("the {format} header is damaged or truncated"));
     match bytes {
@@ -188,7 +188,7 @@ fn read_exr(bytes: &[u8]) -> Option<ImageInfo> {
     let mut info = ImageInfo { format: "EXR".to_owned(), size: Some(size), channels, ..ImageInfo::default() };
     info.program = header.own_attributes.software_name.as_ref().map(ToString::to_string);
     if let Some(comments) = &header.own_attributes.comments {
-        // The library's texts are bytes. Decode them as UTF-8.
+        // The library stores text as bytes. Decode it as UTF-8.
         let comments: Vec<u8> = comments.as_slice().to_vec();
         String::from_utf8_lossy(&comments).lines().for_each(|line| info.add_line(line));
     }
@@ -209,7 +209,8 @@ fn read_part(path: &Path) -> Result<ImageInfo, String> {
             name => info.add(name, &input.value),
         }
     }
-    // Files without the program's version are from this version, because others are rejected.
+    // If the version is missing, the file is from this version, because files from other versions are
+    // rejected.
     info.program.get_or_insert_with(|| SOFTWARE.to_owned());
     Ok(info)
 }

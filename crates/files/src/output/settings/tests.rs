@@ -15,7 +15,7 @@ fn expected() -> Vec<(String, String)> {
 }
 
 #[test]
-fn settings_survive_a_round_trip_in_all_formats() {
+fn settings_round_trip_in_all_image_formats() {
     let image = RadianceImage::black(12, 7);
     let options = EncodeOptions { metadata: settings(), ..EncodeOptions::default() };
     for extension in Format::extensions() {
@@ -25,18 +25,18 @@ fn settings_survive_a_round_trip_in_all_formats() {
         assert_eq!(info.size, Some((12, 7)), "{extension}");
         assert_eq!(info.program.as_deref(), Some(SOFTWARE), "{extension}");
         assert!(info.is_own() && info.frames.is_none());
-        // PNG stores texts beyond ASCII separately, which changes the order.
+        // PNG stores non-ASCII text separately, which changes the order.
         let mut expected = expected();
         info.settings.sort();
         expected.sort();
         assert_eq!(info.settings, expected, "{extension}");
         assert_eq!(info.channels, if extension == "exr" { vec!["B", "G", "R"] } else { vec![] });
-        image::load_from_memory(&bytes).expect("still a valid image");
+        image::load_from_memory(&bytes).expect("a valid image");
     }
 }
 
 #[test]
-fn settings_survive_a_round_trip_in_animations() {
+fn settings_round_trip_in_animations() {
     let frame = Picture { width: 5, height: 4, pixels: vec![[9, 8, 7]; 20] };
     for (format, name, frames) in
         [(AnimationFormat::Gif, "GIF", Some(3)), (AnimationFormat::Apng, "APNG", Some(3))]
@@ -60,7 +60,7 @@ fn foreign_images_have_no_settings() {
     assert_eq!(read_header(b"[camera]\n"), Err(None));
 }
 
-/// Truncated or corrupted headers are errors, or images without settings.
+/// Truncated or corrupted headers are errors or images without settings.
 #[test]
 fn corrupt_headers_do_not_panic() {
     let options = EncodeOptions { metadata: settings(), ..EncodeOptions::default() };
@@ -89,10 +89,10 @@ fn corrupt_headers_do_not_panic() {
     }
 }
 
-/// Frames may be far from the header and have their own palettes. The number of frames of a truncated file is
-/// unknown.
+/// Frames may be far from the header and have their own palettes. If the file is truncated, the number of
+/// frames is unknown.
 #[test]
-fn gif_frames_are_counted_to_the_end() {
+fn all_gif_frames_are_counted() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("a.gif");
     // Pixel data is skipped, so it may be arbitrary.

@@ -1,8 +1,8 @@
-//! Reads settings from text headers and from JPEG comments.
+//! Reads settings from text headers and JPEG comments.
 
 use super::ImageInfo;
 
-/// Radiance HDR: lines up to an empty one, then the resolution.
+/// Radiance HDR: lines up to an empty line, followed by the resolution.
 pub(super) fn read_hdr(bytes: &[u8]) -> Option<ImageInfo> {
     let mut info = ImageInfo { format: "HDR".to_owned(), ..ImageInfo::default() };
     let mut lines = bytes.split(|byte| *byte == b'\n').map(String::from_utf8_lossy);
@@ -58,7 +58,7 @@ pub(super) fn read_jpeg(bytes: &[u8]) -> Option<ImageInfo> {
         match kind {
             _ if mark != 0xff => return None,
             COMMENT => String::from_utf8_lossy(content).lines().for_each(|line| info.add_line(line)),
-            // Start of frame. The excluded codes define Huffman tables and arithmetic coding.
+            // Start of frame. The excluded codes are Huffman tables and arithmetic coding.
             0xc0..=0xcf if !matches!(kind, 0xc4 | 0xc8 | 0xcc) => {
                 let [_, height @ .., _, _] = *content.first_chunk::<5>()?;
                 let width = u16::from_be_bytes(*content.get(3..)?.first_chunk()?);

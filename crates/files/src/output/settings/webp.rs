@@ -34,13 +34,13 @@ pub(super) fn read_webp(mut file: impl Read + Seek) -> Option<ImageInfo> {
     info.size.map(|_| info)
 }
 
-/// Width or height of the canvas of an extended file: 24 bits, minus one.
+/// Canvas width or height in an extended file, stored as 24 bits, minus one.
 fn canvas(content: &[u8], at: usize) -> Option<u32> {
     let [a, b, c] = *content.get(at..)?.first_chunk()?;
     Some(u32::from_le_bytes([a, b, c, 0]) + 1)
 }
 
-/// Size of a lossless image: 14 bits each, minus one.
+/// Size of a lossless image. Width and height are stored as 14 bits each, minus one.
 fn lossless(content: &[u8]) -> Option<(u32, u32)> {
     let bits = u32::from_le_bytes(*content.get(1..)?.first_chunk()?);
     Some(((bits & 0x3fff) + 1, (bits >> 14 & 0x3fff) + 1))

@@ -1,6 +1,6 @@
 //! Construction with the binned surface area heuristic (Wald, *On fast Construction of SAH-based Bounding
-//! Volume Hierarchies*, 2007). The halves of large nodes are built in parallel. The tree depends only on the
-//! boxes, not on the threads.
+//! Volume Hierarchies*, 2007). Both halves of a large node are built in parallel. The tree does not depend on
+//! the number of threads.
 
 use super::top_node::TopNode;
 use super::{BinaryNode, Bvh, ChildRef, LEAF_SIZE, SURFACE_AREA_LEVELS};
@@ -10,19 +10,19 @@ use crate::math::Vec3;
 
 const BINS: usize = 16;
 
-/// Nodes with more primitives build their halves in parallel and poll the token.
+/// Primitive count above which a node's halves are built in parallel and the token is polled.
 const PARALLEL_SIZE: usize = 4096;
 
 /// Cost of a traversal step relative to a primitive test.
 const TRAVERSAL_COST: f32 = 1.0;
 
-/// Minimum number of nested primitives for which shells are worthwhile.
+/// Minimum number of nested primitives that makes shells worthwhile.
 const NESTED_SIZE: usize = 64;
 
-/// Minimum cost of the best plane, relative to no split, at which the boxes may be nested.
+/// The boxes may be nested if the best plane costs at least this fraction of not splitting.
 const NESTED_COST: f32 = 0.9;
 
-/// Maximum cost of a split by size, relative to the best plane, for nested boxes.
+/// Nested boxes are split by size if that costs less than this fraction of the best plane's cost.
 const SIZE_SPLIT_COST: f32 = 0.9;
 
 /// A box and its id during construction.
@@ -50,7 +50,7 @@ struct BuiltSubtree {
 }
 
 impl Bvh {
-    /// Builds a tree over boxes. Empty boxes and boxes with NaN are left out.
+    /// Builds a tree over boxes. Skips empty boxes and boxes with NaN coordinates.
     ///
     /// # Errors
     /// [`Cancelled`] if the build was canceled.
@@ -82,7 +82,7 @@ impl Bvh {
             token,
         )?;
         if tree.root.count > 0 {
-            // Only non-finite rays ever visit the other side, and their traversal ends there as well.
+            // Finite rays never visit the empty side. Non-finite rays may, but their traversal ends there.
             nodes[0] = BinaryNode { bounds: [tree.bounds, Aabb::EMPTY], child: [tree.root; 2] };
         }
         let order = references.iter().map(|reference| reference.id).collect();
@@ -103,7 +103,7 @@ struct OutputPosition {
     depth: usize,
 }
 
-/// Builds a subtree with at most one node fewer than there are references.
+/// Builds a subtree. It has fewer nodes than references.
 fn build_subtree(
     references: &mut [Reference],
     nodes: &mut [BinaryNode],
@@ -143,8 +143,8 @@ fn build_subtree(
     Ok(BuiltSubtree { root, bounds, depth: 1 + left.depth.max(right.depth), is_nested })
 }
 
-/// Partitions the references into two halves. Returns the size of the first one and whether it has the smaller boxes, or `None`
-/// if a leaf is cheaper.
+/// Partitions the references into two halves. Returns the size of the first half and whether the split was by
+/// size, or `None` if a leaf is cheaper.
 fn partition(references: &mut [Reference], bounds: Aabb, start: &OutputPosition) -> Option<(usize, bool)> {
     let count = references.len();
     if count == 1 {
@@ -178,7 +178,7 @@ fn partition(references: &mut [Reference], bounds: Aabb, start: &OutputPosition)
     }
 }
 
-/// Moves the smaller half of the boxes to the front and returns their number.
+/// Moves the smaller half of the boxes to the front and returns its length.
 fn smaller_half(references: &mut [Reference]) -> usize {
     let middle = references.len() / 2;
     references.select_nth_unstable_by(middle, |a, b| {
@@ -187,7 +187,8 @@ fn smaller_half(references: &mut [Reference]) -> usize {
     middle
 }
 
-/// Whether a split by size is much cheaper than the best plane, which leaves boxes of nearly full size on both sides.
+/// Whether splitting by size is much cheaper than the best plane. If boxes are nested, any plane leaves boxes
+/// of nearly full size on both sides.
 fn is_nested(references: &mut [Reference], bounds: Aabb, split: &Split) -> bool {
     let count = references.len() as f32;
     if split.cost < NESTED_COST * bounds.half_area() * count {
@@ -206,7 +207,7 @@ struct Split {
     bins_per_length: f32,
     /// Bins below this one are on the left.
     bin: usize,
-    /// Number of primitives on both sides, weighted by area.
+    /// Sum over both sides of the primitive count times the surface area.
     cost: f32,
 }
 
@@ -271,7 +272,7 @@ fn cheapest_plane(bounds: &[Aabb; BINS], counts: &[u32; BINS]) -> Option<(usize,
     best
 }
 
-/// Moves the references for which `is_left` returns true to the front and returns their number.
+/// Moves the references that satisfy `is_left` to the front and returns their number.
 fn partition_by(references: &mut [Reference], is_left: impl Fn(&Reference) -> bool) -> usize {
     let (mut start, mut end) = (0, references.len());
     while start < end {
@@ -301,7 +302,7 @@ mod tests {
 
     fn built(boxes: &[Aabb]) -> Bvh {
         let tree = Bvh::build(boxes, &CancelToken::new()).expect("nobody cancels");
-        tree.validate(boxes).expect("a sound tree");
+        tree.validate(boxes).expect("a valid tree");
         tree
     }
 
@@ -318,7 +319,7 @@ mod tests {
         let grid: Vec<_> =
             (0..20_000).map(|i| unit_box(Vec3::new((i % 40) as f32, (i / 40) as f32, 0.0))).collect();
         built(&grid);
-        // Each box is at twice the distance of the previous one: the surface area heuristic splits them off
+        // Each box is twice as far away as the previous one, so the surface area heuristic splits them off
         // one by one.
         let geometric: Vec<_> = (0..250).map(|i| unit_box(Vec3::X * 2.0_f32.powi(i / 2))).collect();
         built(&geometric);

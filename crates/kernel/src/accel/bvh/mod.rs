@@ -19,10 +19,11 @@ const LEAF_SIZE: usize = 4;
 /// the depth for any input.
 const SURFACE_AREA_LEVELS: usize = 56;
 
-/// Stack size for the deepest possible tree: the levels above and repeated halving of 2³² primitives.
+/// Stack size for the deepest possible tree: [`SURFACE_AREA_LEVELS`] followed by repeated halving of 2³²
+/// primitives.
 const DEEP_STACK: usize = SURFACE_AREA_LEVELS + 34;
 
-/// Stack size for small trees, whose traversal takes less time than initializing a deep stack.
+/// Stack size for small trees, where initializing a deep stack would take longer than the traversal itself.
 const SHALLOW_STACK: usize = 12;
 
 /// A binary BVH over boxes identified by index.
@@ -37,7 +38,7 @@ pub struct Bvh {
     depth: usize,
     /// Start of packet traversal.
     top: TopNode,
-    /// Whether many boxes are nested in each other.
+    /// Whether many boxes are nested.
     is_nested: bool,
     /// The shells of each node's children. `None` if few boxes are nested.
     shells: Option<Box<[[Shell; 2]]>>,
@@ -74,10 +75,10 @@ impl Bvh {
         size_of_val(self.nodes.as_slice()) + size_of_val(self.order.as_slice()) + shells
     }
 
-    /// Checks the tree: every box must contain its subtree, and every id must occur exactly once.
+    /// Checks that every box contains its subtree and that every id occurs exactly once.
     ///
     /// # Errors
-    /// A description of the first fault.
+    /// A description of the first error found.
     pub fn validate(&self, boxes: &[Aabb]) -> Result<(), String> {
         let mut seen = vec![false; boxes.len()];
         let mut pending: Vec<(u32, Aabb)> =

@@ -1,5 +1,5 @@
-//! Packet traversal with up to 16 rays: a node is visited if any ray hits its box. The arithmetic is the same
-//! as in [`SlabRay::enter`], on plain arrays. Everything is inlined, so that it is compiled with the caller's
+//! Packet traversal with up to 16 rays. A node is visited if any ray hits its box. The arithmetic matches
+//! [`SlabRay::enter`] but uses plain arrays. All functions are inlined so that they use the caller's
 //! instruction set.
 //!
 //! [`SlabRay::enter`]: crate::geometry::aabb::SlabRay::enter
@@ -17,18 +17,18 @@ use crate::math::lanes::{Simd, TRUE};
 
 /// Callback that finds the nearest hits of a packet.
 pub trait ClosestTest {
-    /// Tests a primitive against the rays in `met` and shortens the ends of those that hit it. Primitives
-    /// exactly at a ray's end are still tested, so that ties can be broken by id.
+    /// Tests a primitive against the rays in `met` and moves the end of each ray that hits it to the hit.
+    /// Primitives exactly at a ray's end are still tested because ties are broken by id.
     fn test(&mut self, id: u32, met: u32, ends: &mut F32x16);
 }
 
-/// Callback that finds any hits of a packet.
+/// Callback that tests a packet for any hit.
 pub trait AnyTest {
-    /// Returns the bits of the rays in `met` that hit a primitive.
+    /// Returns the mask of the rays in `met` that hit a primitive.
     fn test(&mut self, id: u32, met: u32, ends: &F32x16) -> u32;
 }
 
-/// A packet prepared for the slab test.
+/// A packet preprocessed for the slab test.
 struct SlabPacket<'a> {
     origin: &'a [F32x16; 3],
     inverse: [F32x16; 3],
@@ -71,8 +71,8 @@ impl<'a> SlabPacket<'a> {
 }
 
 impl SlabIntervals {
-    /// Smallest distance at which a ray that hits the box enters it. Compares bits, which sort like numbers ≥
-    /// 0 and ignore NaN.
+    /// Smallest distance at which a ray that hits the box enters it. Compares bit patterns, which order
+    /// nonnegative floats correctly and ignore NaN.
     #[inline(always)]
     fn first(&self) -> f32 {
         let mut entries = [0; PACKET_SIZE];
@@ -84,7 +84,7 @@ impl SlabIntervals {
     }
 }
 
-/// Bits of the rays that hit a box before their end.
+/// Mask of the rays that hit a box before their end.
 #[inline(always)]
 fn met(stretches: &SlabIntervals, simd: impl Simd) -> u32 {
     let mut met = [0; PACKET_SIZE];
@@ -94,7 +94,7 @@ fn met(stretches: &SlabIntervals, simd: impl Simd) -> u32 {
     simd.movemask(&met)
 }
 
-/// Largest end of all rays, negative if no ray is traced. Compares bits as in [`SlabIntervals::first`].
+/// Largest end of all rays; negative if no ray is traced. Compares bits as in [`SlabIntervals::first`].
 #[inline(always)]
 fn greatest(ends: &F32x16) -> f32 {
     let mut all = [0; PACKET_SIZE];
@@ -104,10 +104,11 @@ fn greatest(ends: &F32x16) -> f32 {
     f32::from_bits(reduce!(all, >) as u32)
 }
 
-/// Traversal stack: a lower bound on the entry distance, the rays that may hit the child, and the child.
+/// Traversal stack: lower bound on the entry distance, mask of the rays that may hit the child, and the
+/// child.
 type PacketStack = ArrayVec<(f32, u32, ChildRef), DEEP_STACK>;
 
-/// Subtrees of the top node still to be visited, with the nearest last.
+/// Subtrees of the top node that are still to be visited, nearest last.
 struct PendingSubtrees {
     entry: F32x16,
     order: [u8; PACKET_SIZE],
@@ -139,8 +140,7 @@ impl PendingSubtrees {
 }
 
 impl Bvh {
-    /// Finds the subtrees of the top node that the packet may hit, with lower bounds on their entry
-    /// distances.
+    /// Mask of the top node's subtrees that the packet may hit, with lower bounds on their entry distances.
     #[inline(always)]
     fn top_met(&self, slabs: &SlabPacket<'_>, ends: &F32x16, traced: u32, simd: impl Simd) -> (u32, F32x16) {
         if traced == 0 {
@@ -149,8 +149,8 @@ impl Bvh {
         self.top.met(&Beam::around(slabs.origin, &slabs.inverse, (ends, traced), simd), simd)
     }
 
-    /// Visits the leaves that any ray of the packet may hit, roughly front to back, after the primitives
-    /// outside the tree. `traced` has the bits of the rays with an end.
+    /// Tests the primitives outside the tree, then visits the leaves that any ray of the packet may hit,
+    /// roughly front to back. `traced` is the mask of active rays.
     #[inline(always)]
     pub fn closest_packet(
         &self,
@@ -215,8 +215,8 @@ impl Bvh {
         }
     }
 
-    /// Returns the bits of the rays that hit anything, inside or outside the tree. `traced` has the bits of
-    /// the rays with an end.
+    /// Returns the mask of the rays that hit anything inside or outside the tree. `traced` is the mask of
+    /// active rays.
     #[inline(always)]
     pub fn any_packet(
         &self,

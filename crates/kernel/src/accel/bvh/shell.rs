@@ -1,5 +1,6 @@
-//! Spherical shells around nested surfaces. The boxes of concentric spheres all contain a ray that starts between them, and so
-//! cannot tell which surfaces it hits. The shells between the smallest and the largest sphere of a subtree can.
+//! Spherical shells around nested surfaces. A ray that starts between concentric spheres is inside all of
+//! their boxes, so boxes cannot tell which spheres it hits. The shell between the smallest and the largest
+//! sphere of a subtree can.
 
 use arrayvec::ArrayVec;
 
@@ -10,17 +11,17 @@ use crate::geometry::packet::{RayPacket, lanes};
 use crate::geometry::{Aabb, Ray, RayF64};
 use crate::math::DVec3;
 
-/// Relative error bound of distances and hits, with ample room.
+/// Relative error bound for distances and hits, with a generous margin.
 const ROUNDING: f64 = 1e-6;
 
-/// Squared distance, in outer radii, beyond which rounding makes shells useless.
+/// Squared distance, relative to the squared outer radius, at which rounding errors make shells useless.
 const FAR: f64 = 1e12;
 
-/// A region between two spheres with one center. It contains the surfaces of some primitives.
+/// A region between two concentric spheres that contains the surfaces of some primitives.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shell {
     center: DVec3,
-    /// Radius of a ball that all of the primitives enclose; negative if there is none.
+    /// Radius of a ball enclosed by every primitive; negative if there is none.
     inner: f64,
     outer: f64,
 }
@@ -35,22 +36,22 @@ enum Position {
 }
 
 impl Shell {
-    /// The shell of no primitive.
+    /// The shell of an empty set.
     const EMPTY: Self = Self { center: DVec3::ZERO, inner: f64::INFINITY, outer: f64::NEG_INFINITY };
 
-    /// The shell of a closed sphere.
+    /// The shell of a full sphere.
     pub fn sphere(center: DVec3, radius: f64) -> Self {
         Self { center, inner: radius, outer: radius }
     }
 
-    /// The shell of any primitive, from its bounding box. It has no inner ball.
+    /// A shell around the bounding box of an arbitrary primitive. It has no inner ball.
     pub fn around(bounds: &Aabb) -> Self {
         let (min, max) = (bounds.min.as_dvec3(), bounds.max.as_dvec3());
         let center = (min + max) * 0.5;
         Self { center, inner: f64::NEG_INFINITY, outer: (max - center).length() }
     }
 
-    /// A shell around two shells. It keeps the smaller inner ball, or what the larger one leaves of it.
+    /// A shell around two shells. It is centered on the shell with the smaller inner ball.
     fn union(self, other: Self) -> Self {
         let (a, b) = if self.inner <= other.inner { (self, other) } else { (other, self) };
         let apart = a.center.distance(b.center);
@@ -60,13 +61,13 @@ impl Shell {
         Self { inner: a.inner.min(b.inner - apart), outer: a.outer.max(b.outer + apart), ..a }
     }
 
-    /// The shell with room for rounding.
+    /// The shell with a margin for rounding errors.
     fn padded(self) -> Self {
         let room = ROUNDING * (self.outer.max(0.0) + self.center.abs().max_element());
         Self { inner: self.inner - room, outer: self.outer + room, ..self }
     }
 
-    /// A lower bound on the distance at which a ray hits a surface in the shell. `None` if it misses the shell.
+    /// Lower bound on the distance at which a ray hits a surface in the shell. `None` if it misses the shell.
     fn entry(&self, ray: &RayF64) -> Option<f32> {
         let to_origin = ray.origin - self.center;
         let distance = to_origin.length_squared();
@@ -102,17 +103,17 @@ impl Shell {
     }
 }
 
-/// A primitive or a subtree near a box, see [`Bvh::meeting_surfaces`].
+/// A primitive or subtree reported by [`Bvh::meeting_surfaces`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Met {
     /// A primitive that may meet the box.
     Primitive(u32),
-    /// A subtree, by its index in [`Bvh::last_of_subtrees`], of which all primitives enclose the box.
+    /// A subtree whose primitives all enclose the box, as an index into [`Bvh::last_of_subtrees`].
     Enclosing(usize),
 }
 
 impl Bvh {
-    /// Adds shells if many primitives are nested; `shell` returns the shell of one of them.
+    /// Adds shells if many primitives are nested. `shell` returns the shell of one primitive.
     pub fn with_shells(self, shell: impl Fn(u32) -> Shell) -> Self {
         if !self.is_nested {
             return self;
@@ -122,7 +123,8 @@ impl Bvh {
         Self { shells: Some(shells), ..self }
     }
 
-    /// The last `N` of the primitives in each subtree for which `counts` is true, in descending order. Empty without shells.
+    /// For each subtree, the last `N` primitives that satisfy `counts`, in descending order. Empty without
+    /// shells.
     pub fn last_of_subtrees<const N: usize>(&self, counts: impl Fn(u32) -> bool) -> Vec<ArrayVec<u32, N>> {
         if self.shells.is_none() {
             return Vec::new();
@@ -136,7 +138,7 @@ impl Bvh {
         self.of_subtrees(ArrayVec::new(), own, join).into_iter().flatten().collect()
     }
 
-    /// Folds a value over the primitives of each subtree.
+    /// Folds a value over the primitives of every subtree.
     fn of_subtrees<T: Clone>(
         &self,
         empty: T,
@@ -144,7 +146,7 @@ impl Bvh {
         join: impl Fn(T, T) -> T,
     ) -> Vec<[T; 2]> {
         let mut values = vec![[empty.clone(), empty.clone()]; self.nodes.len()];
-        // Children follow their parents.
+        // Children come after their parents.
         for (place, node) in self.nodes.iter().enumerate().rev() {
             for side in (0..2).filter(|&side| !node.bounds[side].is_empty()) {
                 let ChildRef { first, count } = node.child[side];
@@ -160,8 +162,8 @@ impl Bvh {
         values
     }
 
-    /// Visits every primitive whose surface may meet a box, until `visit` returns false. Subtrees of which all primitives enclose
-    /// the box are visited as one. Without shells, visits the same as [`Bvh::meeting`].
+    /// Visits every primitive whose surface may intersect a box, until `visit` returns false. A subtree whose
+    /// primitives all enclose the box is visited as a whole. Equivalent to [`Bvh::meeting`] without shells.
     pub fn meeting_surfaces(&self, other: &Aabb, mut visit: impl FnMut(Met) -> bool) {
         let Some(shells) = &self.shells else {
             let mut goes_on = true;
@@ -284,7 +286,7 @@ impl Bvh {
     }
 }
 
-/// A ray prepared for boxes and shells.
+/// A ray preprocessed for boxes and shells.
 struct NestedRay {
     slabs: SlabRay,
     line: RayF64,
@@ -295,7 +297,7 @@ impl NestedRay {
         Self { slabs: SlabRay::new(ray.origin, ray.direction), line: ray.to_f64() }
     }
 
-    /// A lower bound on the distance at which the ray hits a surface. `None` if it misses the box or the shell.
+    /// Lower bound on the distance at which the ray hits a surface. `None` if it misses the box or the shell.
     fn entry(&self, bounds: &Aabb, shell: &Shell, t_max: f32) -> Option<f32> {
         let of_box = self.slabs.enter(bounds.min, bounds.max, t_max)?;
         let of_shell = shell.entry(&self.line)?;

@@ -4,7 +4,8 @@ use crate::geometry::sphere::Sphere;
 use crate::math::Vec3;
 use crate::math::random::signed as random;
 
-/// Nested spheres, not in order of size, with centers up to `spread` apart, and as many small ones around them.
+/// `count` nested spheres in shuffled order of size, with centers up to `spread` apart, and as many small
+/// spheres around them.
 fn spheres(count: u32, spread: f32) -> Vec<Sphere> {
     let mut next = random(5);
     let mut vector = |size: f32| (Vec3::new(next(), next(), next()) * size).as_dvec3();
@@ -19,11 +20,11 @@ fn spheres(count: u32, spread: f32) -> Vec<Sphere> {
 fn tree(spheres: &[Sphere]) -> Bvh {
     let boxes: Vec<_> = spheres.iter().map(Sphere::bounds).collect();
     let tree = Bvh::build(&boxes, &CancelToken::new()).expect("nobody cancels");
-    tree.validate(&boxes).expect("a sound tree");
+    tree.validate(&boxes).expect("a valid tree");
     tree.with_shells(|id| Shell::sphere(spheres[id as usize].center, spheres[id as usize].radius))
 }
 
-/// Rays from inside, between and outside the spheres, some tangential.
+/// Rays that start inside, between, and outside the spheres. Some are tangential.
 fn rays(count: usize) -> Vec<Ray> {
     let mut next = random(9);
     let mut vector = |size: f32| Vec3::new(next(), next(), next()) * size;
@@ -36,7 +37,7 @@ fn rays(count: usize) -> Vec<Ray> {
     (0..count).map(ray).collect()
 }
 
-/// The nearest hit, and the number of tested spheres.
+/// The nearest hit and the number of spheres tested.
 fn closest(tree: &Bvh, spheres: &[Sphere], ray: &Ray) -> (Option<(f32, u32)>, usize) {
     let (mut best, mut tests) = (None, 0);
     tree.closest(ray, |id, t_max| {
@@ -53,7 +54,7 @@ fn brute(spheres: &[Sphere], ray: &Ray) -> Option<(f32, u32)> {
     hits.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))
 }
 
-/// Tests each sphere of a packet as a single ray would.
+/// Tests each sphere against the rays of a packet, one ray at a time.
 struct Packet<'a> {
     spheres: &'a [Sphere],
     rays: &'a [Ray],
@@ -133,7 +134,7 @@ fn nested_box_queries_match_brute_force() {
                     assert!(visited.contains(&id), "{id} at {at}");
                 }
             }
-            // The last of all that enclose the box are among the visited ones.
+            // The last three enclosing primitives must be among those visited.
             let encloses = |id: &u32| spheres[*id as usize].contains(at.as_dvec3()) && id.is_multiple_of(2);
             let all = (0..spheres.len() as u32).rev().filter(encloses);
             let found: Vec<_> = visited.iter().chain(&enclosing).copied().filter(encloses).collect();
@@ -144,7 +145,7 @@ fn nested_box_queries_match_brute_force() {
 }
 
 #[test]
-fn work_per_ray_is_logarithmic_in_nested_spheres() {
+fn nested_sphere_work_is_logarithmic() {
     let work = |count: u32| {
         let spheres = spheres(count, 0.0);
         let tree = tree(&spheres[..count as usize]);

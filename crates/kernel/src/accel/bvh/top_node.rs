@@ -1,6 +1,7 @@
-//! The upper levels of a tree, flattened into one packet of boxes. A single test against the intervals of a
-//! packet's coordinates skips the boxes that all rays miss. Rounding is monotonic, so bounds on the inputs of
-//! [`SlabRay::enter`] also bound its results, and no box is skipped that a ray would hit on its own.
+//! The upper levels of a tree, flattened into one packet of boxes. Intervals around the packet's coordinates
+//! are tested against all boxes in one step, to skip the boxes that all rays miss. Rounding is monotonic, so
+//! bounds on the inputs of [`SlabRay::enter`] also bound its results: a box that any single ray would hit is
+//! never skipped.
 //!
 //! [`SlabRay::enter`]: crate::geometry::aabb::SlabRay::enter
 
@@ -19,7 +20,7 @@ pub(super) struct TopNode {
     min: [F32x16; 3],
     max: [F32x16; 3],
     child: [ChildRef; PACKET_SIZE],
-    /// Bits of the subtrees in use.
+    /// Mask of the subtrees in use.
     used: u32,
 }
 
@@ -32,7 +33,7 @@ impl TopNode {
         used: 0,
     };
 
-    /// Opens the largest nodes, then the largest leaves, while there is room.
+    /// Replaces the largest nodes, then the largest leaves, with their children while slots are free.
     pub(super) fn new(root: (Aabb, ChildRef), nodes: &[BinaryNode], references: &[Reference]) -> Self {
         let mut open = vec![root];
         while let Some(place) = largest(&open, |child, room| child.count == 0 && room > 0) {
@@ -65,7 +66,7 @@ impl TopNode {
         (Aabb { min: corner(&self.min), max: corner(&self.max) }, self.child[i])
     }
 
-    /// Bits of the subtrees whose box overlaps `other`.
+    /// Mask of the subtrees whose boxes overlap `other`.
     #[inline]
     pub(super) fn meeting(&self, other: &Aabb) -> u32 {
         let mut met = [TRUE; PACKET_SIZE];
@@ -79,7 +80,7 @@ impl TopNode {
         PortableSimd.movemask(&met) & self.used
     }
 
-    /// Bits of the subtrees that the rays of a beam may hit, with a lower bound on the entry distances.
+    /// Mask of the subtrees that the rays of a beam may hit, with lower bounds on the entry distances.
     #[inline(always)]
     pub(super) fn met(&self, beam: &Beam, simd: impl Simd) -> (u32, F32x16) {
         let (mut near, mut far) = ([0.0_f32; PACKET_SIZE], [beam.end * SLAB_PAD; PACKET_SIZE]);
@@ -112,8 +113,8 @@ impl TopNode {
     }
 }
 
-/// Index of the largest box whose subtree may be opened. `may_open` receives the child and the number of free
-/// slots.
+/// Index of the largest box that may be replaced with its children. `may_open` receives the child and the
+/// number of free slots.
 fn largest(open: &[(Aabb, ChildRef)], may_open: impl Fn(ChildRef, usize) -> bool) -> Option<usize> {
     let room = PACKET_SIZE - open.len();
     let each = open.iter().enumerate().filter(|(_, (_, child))| may_open(*child, room));
@@ -131,7 +132,7 @@ pub(super) struct Beam {
 }
 
 impl Beam {
-    /// Bounds the rays in `traced`, which must not be empty.
+    /// Bounds the rays in `traced`, which must not be 0.
     #[inline(always)]
     pub(super) fn around(
         origin: &[F32x16; 3],
@@ -165,7 +166,7 @@ mod tests {
     use crate::geometry::packet::{RayPacket, lanes, traced};
     use crate::math::random::signed as random;
 
-    /// Records which primitives are tested, and for which rays.
+    /// Records which primitives are tested for which rays.
     struct TestLog(Vec<u32>);
 
     impl ClosestTest for TestLog {
@@ -182,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn packets_test_every_box_hit_by_a_ray() {
+    fn packet_tests_every_box_hit_by_its_rays() {
         let mut next = random(11);
         for count in [0, 1, 2, 5, 15, 16, 17, 40, 300] {
             let cell = |next: &mut dyn FnMut() -> f32| {
@@ -201,7 +202,7 @@ mod tests {
                 let spread = [0.001, 0.1, 4.0][round % 3];
                 let mut ray = || {
                     let jitter = Vec3::new(next(), next(), next()) * spread;
-                    // Send the rays along an axis, from one point or from many.
+                    // Use parallel rays, rays from one point, or rays from many points.
                     match round % 7 {
                         0 => Ray::new(from + jitter, Vec3::NEG_Y),
                         1 | 2 => Ray::new(from + jitter, to - from),
@@ -229,10 +230,10 @@ mod tests {
                     tested += closest.0[id].count_ones();
                 }
             }
-            assert!(met > 0 || count == 0, "{count}: the rays hit something");
+            assert!(met > 0 || count == 0, "{count}: no ray hit anything");
             assert!(
                 count > PACKET_SIZE || tested == met,
-                "{count}: {tested} tests for {met}: in single-box leaves, no test is superfluous"
+                "{count}: {tested} tests for {met} hits; a flat tree needs exactly one test per hit box"
             );
         }
     }

@@ -10,8 +10,8 @@ use crate::geometry::{Aabb, Ray};
 
 impl Bvh {
     /// Visits the leaves that the ray may hit, roughly front to back. `test(id, t_max)` tests a primitive and
-    /// returns the ray's new end if it hits. Primitives exactly at the ray's end are still tested, so that
-    /// the caller can break ties by id.
+    /// returns the ray's new end on a hit. Primitives exactly at the ray's end are still tested because the
+    /// caller may break ties by id.
     #[inline]
     pub fn closest(&self, ray: &Ray, test: impl FnMut(u32, f32) -> Option<f32>) {
         if let Some(shells) = &self.shells {
@@ -81,7 +81,7 @@ impl Bvh {
         }
     }
 
-    /// Whether `test(id)` returns true for any primitive that the ray may hit.
+    /// Whether any primitive on the ray's path satisfies `test`.
     #[inline]
     pub fn any(&self, ray: &Ray, test: impl FnMut(u32) -> bool) -> bool {
         if let Some(shells) = &self.shells {
@@ -94,7 +94,7 @@ impl Bvh {
     }
 
     /// Visits the nodes whose boxes a ray hits, parents first, in an order that depends only on the tree.
-    /// `visit` returns whether to descend; `own` receives the ids and depths of leaf entries.
+    /// `visit` returns whether to descend. `own` receives the id and depth of each leaf entry.
     pub fn along(
         &self,
         ray: &Ray,
@@ -119,7 +119,7 @@ impl Bvh {
         }
     }
 
-    /// Visits every primitive in a leaf whose box overlaps `other`.
+    /// Visits every primitive in leaves whose boxes overlap `other`.
     pub fn meeting(&self, other: &Aabb, mut visit: impl FnMut(u32)) {
         let mut stack = ArrayVec::<ChildRef, DEEP_STACK>::new();
         for subtree in lanes(self.top.meeting(other)) {
@@ -175,7 +175,7 @@ mod tests {
     use crate::math::Vec3;
     use crate::math::random::signed;
 
-    /// Brute force with the boxes as shapes: a ray hits a box where it enters.
+    /// Brute-force nearest hit that treats each box as a solid.
     fn brute(boxes: &[Aabb], ray: &Ray) -> Option<(f32, u32)> {
         let slabs = SlabRay::new(ray.origin, ray.direction);
         let hits =
@@ -186,7 +186,7 @@ mod tests {
     #[test]
     fn hits_match_brute_force() {
         let mut next = signed(1);
-        // A coarse grid of positions produces coplanar faces and exact ties.
+        // Integer positions produce coplanar faces and exact ties.
         let boxes: Vec<_> = (0..500)
             .map(|_| {
                 let at = Vec3::new(next(), next(), next()).map(|x| (x * 8.0).round());
@@ -238,7 +238,7 @@ mod tests {
                     tests += 1;
                     None
                 });
-                assert!(tests <= 2 * count && !tree.any(&ray, |_| false), "{tests} tests of {count} boxes");
+                assert!(tests <= 2 * count && !tree.any(&ray, |_| false), "{tests} tests for {count} boxes");
             }
         }
     }

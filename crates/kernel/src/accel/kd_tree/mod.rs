@@ -1,9 +1,9 @@
 //! A kd-tree over triangles (J. L. Bentley, *Multidimensional binary search trees used for associative
-//! searching*, 1975). Unlike the BVH, it partitions space, but it returns the same hits to the bit.
+//! searching*, 1975). Unlike a BVH, it partitions space, but its hits are bit-identical to those of the BVH.
 //!
-//! Planes are chosen with the surface area heuristic. Triangles on both sides of a plane are in both
-//! children, each with the bounding box of its part. Rounding never misses a leaf, and the lowest index wins
-//! among hits at the same distance.
+//! Planes are chosen with the surface area heuristic. A triangle that straddles a plane is in both children,
+//! each time with the bounding box of its clipped part. Traversal never misses a leaf due to rounding. Among
+//! hits at the same distance, the lowest index wins.
 
 mod build;
 mod node;
@@ -20,11 +20,12 @@ use node::{KdNode, LeafTriangle, NodeKind};
 /// A kd-tree over triangles.
 #[derive(Clone, Debug)]
 pub struct KdTree {
-    /// Nodes: the root comes first, and a left child follows its parent. Empty if there are no triangles.
+    /// Nodes in depth-first order: the root is first, and a left child follows its parent. Empty if there are
+    /// no triangles.
     nodes: Vec<KdNode>,
     /// Indices into `triangles`, leaf by leaf.
     references: Vec<u32>,
-    /// Each triangle once, in the order in which leaves first refer to it.
+    /// Each triangle once, in the order in which the leaves first refer to it.
     triangles: Vec<LeafTriangle>,
     bounds: Aabb,
 }
@@ -56,8 +57,8 @@ impl KdTree {
             + size_of_val(self.triangles.as_slice())
     }
 
-    /// Expected visits for a random line through the bounding box, by surface area: nodes (including leaves)
-    /// and triangles.
+    /// Expected number of nodes (including leaves) and triangles visited by a random line through the
+    /// bounding box, from surface areas.
     pub fn expected_visits(&self) -> (f64, f64) {
         let whole = f64::from(self.bounds.half_area());
         let mut visits = (0.0, 0.0);
@@ -71,8 +72,8 @@ impl KdTree {
         visits
     }
 
-    /// Visits every triangle that overlaps a box, and possibly others near it. A triangle in several leaves
-    /// may be visited more than once.
+    /// Visits every triangle that overlaps a box, and possibly some nearby. A triangle in several leaves may
+    /// be visited more than once.
     pub fn meeting(&self, other: &Aabb, mut visit: impl FnMut(u32)) {
         self.meeting_while(other, |triangle| {
             visit(triangle);
@@ -110,7 +111,7 @@ impl KdTree {
         true
     }
 
-    /// Visits the nodes whose cells a ray hits, parents first, in an order that depends only on the tree.
+    /// Visits the nodes whose cells the ray hits, parents first, in an order that depends only on the tree.
     /// `visit` returns whether to descend.
     pub fn along(&self, ray: &Ray, mut visit: impl FnMut(&TreeNode, &RayInterval) -> bool) {
         let mut pending = if self.nodes.is_empty() { Vec::new() } else { vec![(self.bounds, 0_u32, 0)] };
@@ -145,7 +146,7 @@ impl KdTree {
     }
 }
 
-/// Parts of a box below and above a plane.
+/// The parts of a box below and above a plane.
 fn halves(cell: Aabb, axis: usize, at: f32) -> [Aabb; 2] {
     let (mut below, mut above) = (cell, cell);
     below.max[axis] = at;

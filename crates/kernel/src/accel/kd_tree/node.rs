@@ -2,18 +2,19 @@
 
 use crate::math::Vec3;
 
-/// Tag of a leaf, in place of an inner node's axis.
+/// Tag of a leaf, stored in place of an inner node's axis.
 const LEAF: u32 = 3;
 
-/// Largest number that fits next to the axis.
+/// Largest number that fits beside the axis.
 pub const MOST: u32 = u32::MAX >> 2;
 
 /// An encoded node. The left child of an inner node is the next node.
 #[derive(Clone, Copy, Debug)]
 pub struct KdNode {
-    /// Bits of the plane's coordinate for an inner node, or index of the first reference for a leaf.
+    /// Inner node: bits of the plane's coordinate. Leaf: index of the first reference.
     payload: u32,
-    /// Axis or [`LEAF`] in the two low bits; above them the right child, or the number of references.
+    /// The two low bits contain the axis or [`LEAF`]. The others contain the right child or the number of
+    /// references.
     tag: u32,
 }
 
@@ -64,7 +65,7 @@ impl KdNode {
         }
     }
 
-    /// The node with its indices offset by `nodes` preceding nodes and `references` preceding references.
+    /// The node with its indices offset by the given numbers of preceding nodes and references.
     pub fn moved(self, nodes: u32, references: u32) -> Self {
         Self::new(match self.kind() {
             NodeKind::Inner { axis, at, right } => NodeKind::Inner { axis, at, right: right + nodes },

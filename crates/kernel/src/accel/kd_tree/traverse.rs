@@ -1,7 +1,7 @@
 //! Front-to-back traversal with a stack of far children.
 //!
-//! Every distance is padded, so that rounding never misses a triangle that the test would hit. The triangle
-//! and plane tests displace a ray by a few roundings of the lengths involved, none of which exceeds the
+//! Every distance is padded, so traversal never misses a triangle due to rounding. The triangle and plane
+//! tests displace a ray by a few rounding errors relative to the lengths involved. No such length exceeds the
 //! distance from the ray's origin to the far end of the mesh.
 
 use super::KdTree;
@@ -9,28 +9,28 @@ use super::node::NodeKind;
 use crate::geometry::watertight::ShearedRay;
 use crate::geometry::{Aabb, Ray, ShapeHit};
 
-/// Displacement of a ray by rounding, relative to the largest length.
+/// Displacement of a ray due to rounding, relative to the largest length.
 const PAD: f32 = 32.0 * f32::EPSILON;
 
 /// Stack size: the depth limit for the largest possible number of triangles, plus one.
 pub(super) const STACK_SIZE: usize = 64;
 
-/// A ray prepared for plane tests, parametrized by a direction scaled so that its largest component is
-/// between 1 and 2.
+/// A ray preprocessed for plane tests. Its parameter is relative to a scaled direction whose largest
+/// component is between 1 and 2.
 struct PlaneRay {
     origin: [f32; 3],
     inverse: [f32; 3],
     backward: [bool; 3],
-    /// Bound on the displacement of a plane or the ray.
+    /// Maximum displacement of a plane or the ray.
     pad: f32,
-    /// Scaled length per unit of the ray's t.
+    /// Scaled ray parameter per unit of `t`.
     steps: f32,
 }
 
 impl PlaneRay {
     fn new(ray: &Ray, bounds: &Aabb) -> Self {
         let greatest = ray.direction.abs().max_element();
-        // Largest power of two below, taken from the exponent bits: scaling by it is exact.
+        // The next lower power of two, from the exponent bits. Scaling by a power of two is exact.
         let steps = f32::from_bits(greatest.to_bits() & 0x7f80_0000)
             .clamp(f32::MIN_POSITIVE, 1.0 / f32::MIN_POSITIVE);
         let inverse = (ray.direction * (1.0 / steps)).recip();
@@ -44,9 +44,8 @@ impl PlaneRay {
         }
     }
 
-    /// Lower and upper bounds on the ray's distance to a plane. If the ray runs within the plane up to
-    /// rounding, the bounds include all distances; if it runs parallel to it, both are −∞ or both ∞. NaN
-    /// means unbounded.
+    /// Lower and upper bounds on the ray's distance to a plane. They include all distances for a ray within
+    /// the plane, up to rounding. For other parallel rays, both are −∞ or both are ∞. NaN means unbounded.
     #[inline(always)]
     fn meets(&self, axis: usize, at: f32) -> (f32, f32) {
         let distance = at - self.origin[axis];
@@ -55,7 +54,7 @@ impl PlaneRay {
         if self.backward[axis] { (high, low) } else { (low, high) }
     }
 
-    /// Interval of the ray inside the box.
+    /// Interval of the ray inside a box.
     fn inside(&self, bounds: &Aabb, t_max: f32) -> Option<(f32, f32)> {
         let (mut near, mut far) = (0.0_f32, self.end(t_max));
         for axis in 0..3 {
@@ -67,18 +66,18 @@ impl PlaneRay {
         (near <= far).then_some((near, far))
     }
 
-    /// Upper end, in scaled distance, of a ray that ends at `t_max`.
+    /// Upper end, in the scaled parameter, of a ray that ends at `t_max`.
     #[inline(always)]
     fn end(&self, t_max: f32) -> f32 {
         t_max * self.steps + self.pad
     }
 }
 
-/// Stack entry: a node and the interval of the ray inside it.
+/// Stack entry: a node and the ray's interval inside it.
 type Pending = (u32, f32, f32);
 
 impl KdTree {
-    /// Finds the nearest hit; the lowest triangle index wins among hits at the same distance.
+    /// Finds the nearest hit. Among hits at the same distance, the lowest triangle index wins.
     pub fn closest(&self, ray: &Ray) -> Option<ShapeHit> {
         let sheared = ShearedRay::new(ray.origin, ray.direction);
         let mut best: Option<ShapeHit> = None;
@@ -100,7 +99,7 @@ impl KdTree {
         best
     }
 
-    /// Whether the ray hits any triangle except `except`.
+    /// Whether the ray hits any triangle other than `except`.
     pub fn any(&self, ray: &Ray, except: Option<u32>) -> bool {
         let sheared = ShearedRay::new(ray.origin, ray.direction);
         let mut found = false;
@@ -115,8 +114,8 @@ impl KdTree {
         found
     }
 
-    /// Visits the leaves that the ray may hit, front to back. `test` receives the indices of a leaf's
-    /// triangles and returns the ray's new end, or `None` to stop. Non-finite rays do not visit any leaf.
+    /// Visits the leaves that the ray may hit, front to back. `test` receives a leaf's triangle indices and
+    /// returns the ray's new end, or `None` to stop. Non-finite rays visit no leaves.
     #[inline(always)]
     fn visit(&self, ray: &Ray, mut test: impl FnMut(&[u32]) -> Option<f32>) {
         if self.nodes.is_empty() || !ray.origin.is_finite() || !ray.direction.is_finite() {

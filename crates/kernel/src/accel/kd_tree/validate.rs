@@ -7,23 +7,23 @@ use crate::accel::reference::Polygon;
 use crate::geometry::Aabb;
 use crate::math::{DVec3, Vec3};
 
-/// State of the traversal at a node.
+/// Traversal state at a node.
 struct Visit {
     place: u32,
     cell: Aabb,
     depth: u32,
-    /// Triangles that overlap the cell, including its faces.
+    /// Triangles that overlap the cell, including those that touch its faces.
     inside: Vec<u32>,
 }
 
 impl KdTree {
     /// Checks the tree. Planes must be inside their cells, so that the leaves tile the box. Every node must
-    /// be reached exactly once, within the depth limit. Leaves must refer to every triangle that extends into
-    /// them, never twice, and only to triangles that overlap them. A triangle in a face between leaves must
-    /// be in one of them.
+    /// be reached exactly once, within the depth limit. A leaf must refer exactly once to every triangle that
+    /// extends into it, and to no triangle that does not overlap it. A triangle within a face shared by two
+    /// leaves must be in at least one of them.
     ///
     /// # Errors
-    /// A description of the first fault.
+    /// A description of the first error found.
     pub fn validate(&self, count: u32, corners: impl Fn(u32) -> [Vec3; 3]) -> Result<(), String> {
         let usable = |id: &u32| {
             let bounds = Aabb::around(corners(*id));
@@ -49,7 +49,7 @@ impl KdTree {
                 return Err(format!("node {place} has depth {depth}, which exceeds the limit"));
             }
             if place != reached {
-                return Err(format!("node {place} is out of order"));
+                return Err(format!("node {place} is in the wrong order"));
             }
             reached += 1;
             match self.nodes[place as usize].kind() {
@@ -82,7 +82,7 @@ impl KdTree {
     }
 }
 
-/// Checks that a leaf refers to exactly the right triangles.
+/// Checks that a leaf refers to the right triangles.
 fn leaf(
     place: u32,
     cell: &Aabb,
@@ -109,7 +109,7 @@ fn overlap(a: &Aabb, b: &Aabb) -> bool {
     a.min.cmple(b.max).all() && b.min.cmple(a.max).all()
 }
 
-/// Whether a triangle extends into a cell by more than a part within one of its faces.
+/// Whether a triangle extends into a cell, beyond a part that lies within a face of the cell.
 fn reaches_into(cell: &Aabb, corners: [Vec3; 3]) -> bool {
     let (min, max) = Polygon::clipped(corners, cell).extent();
     (0..3).all(|axis| {
@@ -119,7 +119,7 @@ fn reaches_into(cell: &Aabb, corners: [Vec3; 3]) -> bool {
     })
 }
 
-/// Points on every triangle, and for each whether a leaf at the point refers to the triangle.
+/// Sample points on every triangle. Each has a flag for whether a leaf at that point refers to the triangle.
 struct Named {
     points: Vec<(u32, Vec<(DVec3, bool)>)>,
 }

@@ -1,7 +1,7 @@
 //! A BVH over triangles with eight children per node and four triangles per pack.
 //!
-//! A ray gets the same hit, bit for bit, on every instruction set: box tests may only be conservative, the
-//! triangle test always uses the same arithmetic, and the lowest id wins among hits at the same distance.
+//! Hits are bit-identical on every instruction set. Box tests are conservative, the triangle test always uses
+//! the same arithmetic, and the lowest id wins among hits at the same distance.
 
 mod build;
 mod node;
@@ -35,7 +35,7 @@ pub enum Quality {
     /// Each triangle is in one leaf.
     #[default]
     Medium,
-    /// Triangles much smaller than their boxes are split and may be in several leaves.
+    /// Triangles that fill little of their boxes are split, and may be in several leaves.
     High,
 }
 
@@ -66,7 +66,8 @@ impl WideBvh {
         Ok(Self { nodes, packs, bounds, instructions: InstructionSet::best(), quality })
     }
 
-    /// Sets the instruction set for traversal. Falls back to the best one that the processor has.
+    /// Sets the instruction set for traversal. Uses the fastest supported one if the processor lacks
+    /// `instructions`.
     pub fn with(mut self, instructions: InstructionSet) -> Self {
         self.instructions = instructions.available();
         self
@@ -87,7 +88,8 @@ impl WideBvh {
         size_of_val(self.nodes.as_slice()) + size_of_val(self.packs.as_slice())
     }
 
-    /// Expected visits for a random line through the bounding box, by surface area: nodes and triangle packs.
+    /// Expected number of nodes and triangle packs visited by a random line through the bounding box, from
+    /// surface areas.
     pub fn expected_visits(&self) -> (f64, f64) {
         let whole = f64::from(self.bounds.half_area());
         let mut visits = (f64::from(!self.nodes.is_empty()), 0.0);
@@ -104,7 +106,7 @@ impl WideBvh {
         visits
     }
 
-    /// Visits the nodes whose boxes a ray hits, parents first, in an order that depends only on the tree.
+    /// Visits the nodes whose boxes the ray hits, parents first, in an order that depends only on the tree.
     /// `visit` returns whether to descend.
     pub fn along(&self, ray: &Ray, mut visit: impl FnMut(&TreeNode, &RayInterval) -> bool) {
         let root = (self.bounds, node::Child::Inner(0), 0);
@@ -129,18 +131,18 @@ impl WideBvh {
         }
     }
 
-    /// Finds the nearest hit; the lowest triangle index wins among hits at the same distance.
+    /// Finds the nearest hit. Among hits at the same distance, the lowest triangle index wins.
     pub fn closest(&self, ray: &Ray) -> Option<ShapeHit> {
         if self.nodes.is_empty() { None } else { simd::closest(self, ray) }
     }
 
-    /// Whether the ray hits any triangle except `except`.
+    /// Whether the ray hits any triangle other than `except`.
     pub fn any(&self, ray: &Ray, except: Option<u32>) -> bool {
         !self.nodes.is_empty() && simd::any(self, ray, except)
     }
 
-    /// [`WideBvh::closest`] for at most [`PACKET_SIZE`] rays up to their ends. Faster for rays in similar
-    /// directions, such as those of neighboring pixels.
+    /// [`WideBvh::closest`] for up to [`PACKET_SIZE`] rays. Faster for rays in similar directions, such as
+    /// those of neighboring pixels.
     pub fn closest_packet(&self, rays: &[Ray], ends: &F32x16, hits: &mut [Option<ShapeHit>]) {
         debug_assert!(rays.len() <= PACKET_SIZE && rays.len() == hits.len());
         hits.fill(None);
@@ -151,8 +153,8 @@ impl WideBvh {
         }
     }
 
-    /// [`WideBvh::any`] for at most [`PACKET_SIZE`] rays up to their ends. Returns the bits of the rays that hit.
-    /// `except` has one entry per ray, or is empty.
+    /// [`WideBvh::any`] for up to [`PACKET_SIZE`] rays. Returns the mask of the rays that hit. `except` is
+    /// empty or has one entry per ray.
     pub fn any_packet(&self, rays: &[Ray], ends: &F32x16, except: &[Option<u32>]) -> u32 {
         debug_assert!(rays.len() <= PACKET_SIZE && (except.is_empty() || rays.len() == except.len()));
         if self.nodes.is_empty() {
@@ -178,8 +180,8 @@ impl WideBvh {
         bits
     }
 
-    /// Visits every triangle that overlaps a box, and possibly others near it. A split triangle may be
-    /// visited more than once.
+    /// Visits every triangle that overlaps a box, and possibly some nearby. A split triangle may be visited
+    /// more than once.
     pub fn meeting(&self, other: &Aabb, mut visit: impl FnMut(u32)) {
         self.meeting_while(other, |triangle| {
             visit(triangle);
@@ -204,10 +206,10 @@ impl WideBvh {
         })
     }
 
-    /// Checks that boxes contain their subtrees and that every triangle is in the right leaves.
+    /// Checks that every box contains its subtree and that every triangle is in the right leaves.
     ///
     /// # Errors
-    /// A description of the first fault.
+    /// A description of the first error found.
     pub fn validate(&self, count: u32, corners: impl Fn(u32) -> [Vec3; 3]) -> Result<(), String> {
         let mut leaves: Vec<Vec<Aabb>> = vec![Vec::new(); count as usize];
         let in_pieces = self.quality == Quality::High;
@@ -250,11 +252,11 @@ impl WideBvh {
     }
 }
 
-/// Number of shadow rays below which tracing them one at a time is faster.
+/// Number of shadow rays below which tracing them one by one is faster.
 const SMALL_GROUP: usize = 8;
 
-/// Calls `take` for each group of rays whose directions have the same signs and the same longest axis, with
-/// their ends and their number. All other rays get negative ends.
+/// Groups the rays whose directions have the same signs and the same longest axis. Calls `take` with each
+/// group's ends and size. Rays outside the group have negative ends.
 fn for_each_group(rays: &[Ray], ends: &F32x16, mut take: impl FnMut(&F32x16, usize)) {
     let way = |ray: &Ray| {
         let [x, y, z] = ray.direction.to_array().map(f32::abs);
@@ -298,7 +300,7 @@ mod tests {
         let tree =
             WideBvh::build_with(quality, mesh.len() as u32, |id| mesh[id as usize], &CancelToken::new());
         let tree = tree.expect("nobody cancels");
-        tree.validate(mesh.len() as u32, |id| mesh[id as usize]).expect("a sound tree");
+        tree.validate(mesh.len() as u32, |id| mesh[id as usize]).expect("a valid tree");
         tree
     }
 
@@ -325,7 +327,7 @@ mod tests {
         }
     }
 
-    /// Packets of all sizes, some with similar directions and some without.
+    /// Packets of all sizes. Some contain rays in similar directions, others random rays.
     fn packets(mesh: &[[Vec3; 3]]) -> Vec<Vec<Ray>> {
         let mut next = random(17);
         let mut packets: Vec<Vec<Ray>> = rays(mesh).chunks(PACKET_SIZE).map(<[Ray]>::to_vec).collect();

@@ -13,26 +13,27 @@ pub const PACK: usize = 4;
 /// Maximum number of packs per leaf.
 pub const MOST_PACKS: u32 = 8;
 
-/// Bit that marks a leaf in [`WideNode::children`]. The next three bits hold the number of packs minus one, and
-/// the rest the index of the first pack.
+/// Bit that marks a leaf in [`WideNode::children`]. The next three bits contain the number of packs minus
+/// one, the rest the index of the first pack.
 const LEAF: u32 = 1 << 31;
 
 const FIRST_BITS: u32 = 28;
 
-/// Bits of an encoded leaf other than the index of its first pack.
+/// All bits of an encoded leaf except those for the index of its first pack.
 pub const LEAF_BITS: u32 = !((1 << FIRST_BITS) - 1);
 
-/// A split mesh has at most 1.3 references per triangle, and every pack and node has at least one of its own.
+/// A mesh has at most 1.3 references per triangle after splitting. Every pack and every node needs at least
+/// one reference.
 const _: () = assert!(TriangleMesh::MOST_TRIANGLES as u64 * 13 / 10 < 1 << FIRST_BITS);
 
-/// Eight child boxes as arrays of their minimum and maximum coordinates, and the children.
+/// Eight children and their boxes, stored as arrays of minimum and maximum coordinates.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub struct WideNode {
-    /// Minimum x, maximum x, minimum y, maximum y, minimum z and maximum z of each box. Empty boxes are ∞ …
-    /// −∞, which finite arithmetic never hits.
+    /// Minimum x, maximum x, minimum y, maximum y, minimum z, and maximum z of each box. Empty boxes are ∞ …
+    /// −∞, which are never hit unless arithmetic overflows.
     pub rows: [[f32; WIDTH]; 6],
-    /// Encoded children; see [`Child`].
+    /// Encoded children, see [`Child`].
     pub children: [u32; WIDTH],
 }
 
@@ -73,8 +74,8 @@ impl Child {
 }
 
 impl WideNode {
-    /// A node with eight empty boxes. If arithmetic overflows, all boxes are hit: empty boxes lead to the
-    /// first pack, so that traversal still ends.
+    /// A node with eight empty boxes. Arithmetic overflow makes a ray hit all boxes. Empty boxes refer to the
+    /// first pack so that traversal still terminates.
     pub const EMPTY: Self = {
         let (least, greatest) = ([f32::INFINITY; WIDTH], [f32::NEG_INFINITY; WIDTH]);
         Self { rows: [least, greatest, least, greatest, least, greatest], children: [LEAF; WIDTH] }
@@ -94,7 +95,7 @@ impl WideNode {
         self.children[slot] = child.encode();
     }
 
-    /// Box of a slot, or `None` if it is empty.
+    /// Box of a slot, or `None` if the slot is empty.
     pub fn bounds(&self, slot: usize) -> Option<Aabb> {
         let corner = |side: usize| {
             Vec3::new(self.rows[side][slot], self.rows[2 + side][slot], self.rows[4 + side][slot])
@@ -102,7 +103,7 @@ impl WideNode {
         Some(Aabb { min: corner(0), max: corner(1) }).filter(|bounds| !bounds.is_empty())
     }
 
-    /// Bits of the slots whose box overlaps `other`.
+    /// Mask of the slots whose boxes overlap `other`.
     #[inline]
     pub fn meeting(&self, other: &Aabb) -> u32 {
         let mut met = [true; WIDTH];
@@ -121,18 +122,18 @@ impl WideNode {
     }
 }
 
-/// Four triangles. Unused lanes are NaN, which no ray hits.
+/// Four triangles. Unused lanes are NaN, which rays never hit.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(16))]
 pub struct TrianglePack {
-    /// Coordinates x, y, z of the first corners, then the second, then the third.
+    /// x, y, and z of the first corners, then of the second, then of the third.
     pub rows: [[f32; PACK]; 9],
-    /// Triangle indices; `u32::MAX` in unused lanes.
+    /// Triangle indices, or `u32::MAX` in unused lanes.
     pub ids: [u32; PACK],
 }
 
 impl TrianglePack {
-    /// Packs at most four triangles.
+    /// Packs up to four triangles.
     pub fn new(triangles: impl IntoIterator<Item = (u32, [Vec3; 3])>) -> Self {
         let mut pack = Self { rows: [[f32::NAN; PACK]; 9], ids: [u32::MAX; PACK] };
         for (lane, (id, corners)) in triangles.into_iter().take(PACK).enumerate() {
@@ -153,7 +154,7 @@ impl TrianglePack {
             .map(|row| Vec3::new(self.rows[row][lane], self.rows[row + 1][lane], self.rows[row + 2][lane]))
     }
 
-    /// Indices of the triangles in use.
+    /// Indices of the triangles in the pack.
     pub fn ids(&self) -> impl Iterator<Item = u32> {
         self.ids.into_iter().filter(|&id| id != u32::MAX)
     }

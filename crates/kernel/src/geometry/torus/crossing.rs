@@ -1,32 +1,32 @@
-//! First crossing of a line and a torus.
+//! First intersection of a line and a torus.
 //!
-//! Does not use the coefficients of the quartic: its roots lose half of their digits where the line grazes
-//! the torus, and more if the tube is slim. With q(s) the line's distance from the axis and the circle's
-//! radius as the unit,
+//! Does not use the quartic's coefficients, since its roots lose half of their digits if the line grazes the
+//! torus, and more if the tube is thin. Instead, let q(s) be the line's distance from the axis, with the
+//! circle's radius as the unit of length. Then
 //!
 //! ```text
 //! g(s) = (q − 1)² + z² − tube² = |p|² + 1 − tube² − 2q
 //! ```
 //!
 //! has the sign of the distance from the surface and is computed from that distance. Its second derivative is
-//! 2(1 − w/q³), where w is a constant of the line: there are at most two inflection points, known in closed
-//! form, and g is convex or concave on each interval between them. On such an interval, Newton's method from
-//! the correct end converges to the nearest root without overshooting it, or shows that there is no root.
+//! 2(1 − w/q³), where w is constant along the line. Therefore, g has at most two inflection points, which
+//! have a closed form, and is convex or concave between them. On each of these intervals, Newton's method
+//! from the correct end converges to the nearest root without overshooting, or shows that there is no root.
 
 use crate::math::DVec3;
 
-/// Maximum number of steps; more than bisection needs from the whole line to its last digit.
+/// Maximum number of steps. Bisecting the entire line down to its last digit takes fewer steps.
 const MOST_STEPS: u32 = 200;
 
-/// Half the width of the neighborhood of the axis in which the slope changes its sign.
+/// Half the width of the neighborhood of the axis in which the slope changes sign.
 const KINK: f64 = 1e-9;
 
-/// Rounding error of g near 0, relative to the tube: twice the error of the distance from the circle.
+/// Rounding error of g near 0, relative to the tube. Twice the error of the distance from the circle.
 const ROUNDING: f64 = 32.0 * f64::EPSILON;
 
-/// A line near a torus around z whose circle has radius 1.
+/// A line near a torus around the z axis. The torus's circle has radius 1.
 pub(super) struct UnitLine {
-    /// Point of the line nearest to the center.
+    /// Point on the line closest to the center.
     pub(super) foot: DVec3,
     /// Unit direction.
     pub(super) direction: DVec3,
@@ -43,8 +43,8 @@ struct Sample {
 }
 
 impl UnitLine {
-    /// Interval of the line within the torus's bounding ball and bounding planes, both expanded by a margin
-    /// in units of the tube.
+    /// Interval of the line inside the torus's bounding ball and bounding planes. Both are expanded by a
+    /// margin in units of the tube.
     pub(super) fn surroundings(&self, room: f64) -> Option<(f64, f64)> {
         let height = self.tube * (1.0 + room);
         let ball = 1.0 + height;
@@ -61,8 +61,8 @@ impl UnitLine {
         (half > 0.0 && enter < leave).then_some((enter, leave))
     }
 
-    /// First point between `from` and `to` where the line enters or leaves. If the line starts on the
-    /// surface, up to rounding, the start does not count.
+    /// First point between `from` and `to` where the line crosses the surface. A start on the surface, within
+    /// rounding error, does not count.
     pub(super) fn first_crossing(&self, from: f64, to: f64) -> Option<f64> {
         if !(from < to) {
             return None;
@@ -90,18 +90,19 @@ impl UnitLine {
         None
     }
 
-    /// Whether the line moves away from the circle from here on, on the outer side: both components of the
-    /// distance grow.
+    /// Whether the line moves away from the circle on its outer side: from here on, both components of the
+    /// distance increase.
     fn goes_away(&self, from: f64) -> bool {
         let p = self.foot + self.direction * from;
         let (across, d) = (p.truncate(), self.direction.truncate());
         across.length_squared() >= 1.0 && across.dot(d) >= 0.0 && p.z * self.direction.z >= 0.0
     }
 
-    /// Points between `from`, which is outside, and `to` where the line enters. There are at most two, as it
-    /// leaves as often.
+    /// Points between `from` and `to` where the line enters the torus. `from` must be outside. There are at
+    /// most two such points.
     pub(super) fn entries(&self, from: f64, to: f64) -> [Option<f64>; 2] {
-        /// Step past a crossing after which rounding does not change the side, unless the line grazes.
+        /// Step past a crossing that is long enough to change the side despite rounding, unless the line
+        /// grazes the surface.
         const BEYOND: f64 = 1e-10;
         let mut found = [None; 2];
         let mut start = from;
@@ -128,8 +129,8 @@ impl UnitLine {
         }
     }
 
-    /// Ends of the interval on which g is concave, where q³ < w. A line through the axis has a kink there, so
-    /// the interval is kept wide enough to contain it; no crossing is that close to the axis.
+    /// Ends of the interval where g is concave (q³ < w). A line through the axis has a kink there, so the
+    /// interval is widened to contain it. There are no crossings that close to the axis.
     fn inflections(&self) -> Option<[f64; 2]> {
         let (p, d) = (self.foot.truncate(), self.direction.truncate());
         let a = d.length_squared();
@@ -141,17 +142,19 @@ impl UnitLine {
         (half >= 0.0).then(|| [middle - half.max(KINK), middle + half.max(KINK)])
     }
 
-    /// First crossing in an interval that starts on a known side.
+    /// First crossing in an interval. `is_inside` is the side at its start.
     fn crossing_of_piece(&self, low: Sample, high: Sample, is_inside: bool, is_convex: bool) -> Option<f64> {
         if (high.value <= 0.0) != is_inside {
             let start = if is_inside == is_convex { high } else { low };
             return Some(self.between(low.s, high.s, start, is_inside));
         }
-        // If both ends are on one side, a convex g may dip in between, and a concave one may rise.
+        // If both ends are on the same side, a convex g may dip below 0 in between, and a concave g may rise
+        // above 0.
         (is_inside != is_convex).then(|| self.dip(low, high, if is_inside { -1.0 } else { 1.0 })).flatten()
     }
 
-    /// The only crossing between two points. Uses Newton's method, with bisection if it leaves the interval.
+    /// The only crossing between two points. Uses Newton's method, and bisection when a Newton step would
+    /// leave the interval.
     fn between(&self, mut low: f64, mut high: f64, start: Sample, is_inside: bool) -> f64 {
         let mut x = start;
         for _ in 0..MOST_STEPS {
@@ -169,9 +172,8 @@ impl UnitLine {
         x.s
     }
 
-    /// First root from `low` on in an interval on which sign·g is convex, and positive at both ends. For a
-    /// convex function, the root of a tangent is never past the function's root: if the tangents lead past
-    /// the minimum, there is no root.
+    /// First root after `low` in an interval where sign·g is convex and positive at both ends. A Newton step
+    /// on a convex function never passes its root. If the steps pass the minimum, there is no root.
     fn dip(&self, low: Sample, high: Sample, sign: f64) -> Option<f64> {
         if !(high.slope * sign > 0.0) {
             return None;
@@ -191,7 +193,7 @@ impl UnitLine {
             let before = x;
             x = self.at(next);
             if x.value * sign <= 0.0 {
-                // Rounding overshot the root.
+                // The step overshot the root because of rounding.
                 return Some(self.between(before.s, x.s, before, sign < 0.0));
             }
         }
@@ -203,13 +205,13 @@ impl UnitLine {
 mod tests {
     use super::*;
 
-    /// A small random generator for lines.
+    /// A small random number generator for lines.
     fn random(state: &mut u64) -> f64 {
         *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         ((*state >> 11) as f64) / (1_u64 << 53) as f64 * 2.0 - 1.0
     }
 
-    /// Lines close to the circle, some along the axis or through it.
+    /// Lines close to the circle. Some run along the axis or through it.
     fn lines(tube: f64) -> impl Iterator<Item = UnitLine> {
         let mut state = 3;
         (0..30_000).map(move |i| {
@@ -227,7 +229,7 @@ mod tests {
     }
 
     #[test]
-    fn crossings_are_precise_for_slim_tubes() {
+    fn crossings_are_precise_for_thin_tubes() {
         for tube in [1e-6, 1e-3, 0.3, 0.99] {
             let mut found = 0;
             for line in lines(tube) {
@@ -236,7 +238,7 @@ mod tests {
                 found += 1;
                 let p = line.foot + line.direction * s;
                 let off = ((p.truncate().length() - 1.0).hypot(p.z) - tube).abs();
-                assert!(off < 2e-15, "{off} at tube {tube}");
+                assert!(off < 2e-15, "error of {off} at tube {tube}");
             }
             assert!(found > 10_000, "{found}");
         }

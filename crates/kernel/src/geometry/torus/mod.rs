@@ -13,13 +13,13 @@ use super::{Aabb, AreaPoint, RayF64, ShapeHit};
 use crate::math::{DVec2, DVec3, Vec2};
 use crossing::UnitLine;
 
-/// Margin around a torus in units of its tube, so that a line certainly approaches it from outside.
+/// Margin around a torus in units of its tube. It ensures that a line approaches the torus from outside.
 const ROOM: f64 = 0.01;
 
-/// All points at one distance, the tube radius, from a circle around an axis; the front is outside.
+/// All points at a fixed distance, the tube radius, from a circle around an axis. The front is outside.
 ///
-/// Texture coordinate u goes once around the axis. v goes once around the tube; it is ½ on the outermost
-/// circle and increases there along the axis, so that images are not mirrored.
+/// Texture coordinate u wraps once around the axis, and v once around the tube. On the outermost circle, v is
+/// ½ and increases along the axis, so images are not mirrored.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Torus {
     frame: AxialFrame,
@@ -35,8 +35,8 @@ impl Exact for Torus {
 }
 
 impl Torus {
-    /// Creates a torus from its center, a nonzero axis, the radius of the circle and the radius of the tube,
-    /// with 0 < tube < radius.
+    /// Creates a torus from its center, a nonzero axis, the radius of the circle, and the radius of the tube.
+    /// Requires 0 < tube < radius.
     pub fn new(center: DVec3, axis: DVec3, radius: f64, tube: f64) -> Self {
         Self { frame: AxialFrame::new(center, axis), radius, tube }
     }
@@ -57,7 +57,8 @@ impl Torus {
         ray.accept(t).map(|_| (t, 0))
     }
 
-    /// A ray's line, the line in units of the circle's radius, and this unit in terms of the ray's t.
+    /// The line through a ray, the same line in units of the circle's radius, and the length of that unit in
+    /// terms of the ray's t.
     fn unit_line(&self, ray: &RayF64) -> (LocalLine, UnitLine, f64) {
         let line = self.frame.line(ray);
         let length = line.direction.length();
@@ -69,7 +70,7 @@ impl Torus {
         (line, unit_line, self.radius / length)
     }
 
-    /// Values of t at which a ray from outside enters: at most two.
+    /// Values of t (at most two) at which a ray that starts outside enters the torus.
     pub fn entries(&self, ray: &RayF64) -> [Option<f64>; 2] {
         let (line, unit_line, unit) = self.unit_line(ray);
         let Some((enter, leave)) = unit_line.surroundings(ROOM) else { return [None; 2] };
@@ -83,7 +84,7 @@ impl Torus {
         self.surface_at(out, from_circle)
     }
 
-    /// Direction of a point from the axis, and its direction from the circle in the plane of both.
+    /// Direction of a point from the axis, and its direction from the circle in the plane through the axis.
     fn chart(&self, point: DVec3) -> (DVec2, DVec2) {
         let local = self.frame.local(point);
         let out = radial(local.truncate());
@@ -102,7 +103,8 @@ impl Torus {
         0.5 * (1.0 / self.tube + across / (self.radius + self.tube * across))
     }
 
-    /// Surface point at a direction from the axis and a direction from the circle in the plane of both.
+    /// Surface point at a direction from the axis and a direction from the circle in the plane through the
+    /// axis.
     fn surface_at(&self, out: DVec2, from_circle: DVec2) -> SurfacePoint {
         let (across, up) = (from_circle.x, from_circle.y);
         let ring = self.radius + self.tube * across;
@@ -140,11 +142,11 @@ impl Torus {
     }
 
     /// Samples a point uniformly over the area. The tube angle ψ has a pdf proportional to 1 +
-    /// (tube/radius)·cos ψ. Its values at a uniform ψ and at the mirrored angle π − ψ have a constant sum, so
-    /// one of the two is chosen in proportion to them.
+    /// (tube/radius)·cos ψ. The pdf values at ψ and at the mirrored angle π − ψ have a constant sum, so a
+    /// uniform ψ is chosen or mirrored in proportion to these values.
     pub fn sample(&self, _: u32, u: Vec2) -> AreaPoint {
         let (x, y) = (f64::from(u.x), f64::from(u.y));
-        // cos ψ at v = y, since ψ = 0 is v = ½.
+        // cos ψ at v = y, where ψ = 0 corresponds to v = ½.
         let share = 0.5 - 0.5 * (self.tube / self.radius) * libm::cos(2.0 * PI * y);
         let (point, normal) =
             if x < share { self.at(x / share, y) } else { self.at((x - share) / (1.0 - share), 1.5 - y) };
@@ -162,7 +164,7 @@ impl Torus {
         self.frame.axis()
     }
 
-    /// Radius of the circle, and of the tube.
+    /// Radii of the circle and of the tube.
     pub fn radii(&self) -> (f64, f64) {
         (self.radius, self.tube)
     }
@@ -184,7 +186,7 @@ impl Torus {
         self.signed_distance(point) < 0.0
     }
 
-    /// Projected area averaged over all directions: a quarter of the area.
+    /// Projected area averaged over all directions, which is a quarter of the area.
     pub fn projected_area(&self, _: DVec3) -> f64 {
         let [area] = self.areas();
         area / 4.0
@@ -207,7 +209,7 @@ mod tests {
     use crate::geometry::Ray;
     use crate::math::Vec3;
 
-    /// A torus around y, from 1.5 to 2.5.
+    /// A torus around the y axis that extends from radius 1.5 to 2.5.
     fn ring() -> Torus {
         Torus::new(DVec3::ZERO, DVec3::Y * 7.0, 2.0, 0.5)
     }
@@ -232,7 +234,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_enter_as_often_as_they_leave() {
+    fn lines_enter_and_leave_equally_often() {
         let entries = |origin: Vec3, direction: Vec3| {
             ring().entries(&Ray::new(origin, direction).to_f64()).map(|entry| entry.map(|t| t as f32))
         };
@@ -241,7 +243,7 @@ mod tests {
         assert_eq!(entries(x(0.0), Vec3::X), [Some(1.5), None]);
         assert_eq!(entries(x(-9.0), Vec3::NEG_X), [None; 2]);
         assert_eq!(entries(Vec3::new(2.0, 9.0, 0.0), Vec3::NEG_Y), [Some(8.5), None]);
-        // Rays parallel to the axis, through the tube on both sides of the hole, and only through its outer
+        // Rays parallel to the axis: through the tube on both sides of the hole, and only through its outer
         // part.
         let [first, second] = entries(Vec3::new(-9.0, 0.0, 1.0), Vec3::X);
         assert!((first.expect("in") - (9.0 - 5.25_f32.sqrt())).abs() < 1e-5);
@@ -266,7 +268,7 @@ mod tests {
     }
 
     #[test]
-    fn outermost_circle_is_at_half_v() {
+    fn v_is_one_half_on_the_outermost_circle() {
         let ray = Ray::new(Vec3::new(9.0, 0.0, 0.0), Vec3::NEG_X).to_f64();
         let hit = ring().intersect(&ray).expect("aimed at it");
         let surface = ring().surface(&ray, &hit);

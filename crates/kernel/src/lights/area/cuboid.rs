@@ -1,4 +1,4 @@
-//! Box lights, sampled by the solid angles of the visible faces.
+//! Box lights, sampled by the solid angles of their visible faces.
 
 use super::quad::SphericalRectangle;
 use super::sample_point::LightSamplePoint;
@@ -10,17 +10,17 @@ use crate::math::{DVec3, Vec3};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BoxEmitter {
     center: DVec3,
-    /// Half the lengths along the axes.
+    /// Half the edge lengths.
     half: [f32; 3],
     /// Unit vectors of the axes.
     axes: [Vec3; 3],
 }
 
-/// A box seen from a point, mirrored so that the point is on the positive side of each axis.
+/// A box seen from a point. It is mirrored to put the point on the positive side of each axis.
 struct BoxView {
     /// Signs of the point's coordinates.
     signs: [f32; 3],
-    /// The positive faces. The first coordinate of each face is along the next axis, the second along the one after it.
+    /// The positive faces. The coordinates of each face are along the two cyclically following axes.
     faces: [BoxFace; 3],
 }
 
@@ -28,12 +28,13 @@ struct BoxView {
 #[derive(Clone, Copy)]
 struct BoxFace {
     rectangle: SphericalRectangle,
-    /// Solid angle in sr, approximate for small faces; 0 from behind.
+    /// Solid angle in sr. Approximate for small faces, and 0 from behind.
     solid_angle: f32,
 }
 
 impl ShapeEmitter for BoxEmitter {
-    /// Chooses a face proportionally to its solid angle, then a point on it uniformly over the solid angle.
+    /// Chooses a face proportionally to its solid angle, then a point on the face uniformly over its solid
+    /// angle.
     #[inline(always)]
     fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
         let BoxView { signs, faces } = self.seen_from(point);
@@ -109,7 +110,8 @@ impl BoxEmitter {
 }
 
 impl BoxFace {
-    /// A face between coordinates relative to the point, in a plane at z < 0 if the point is in front of it.
+    /// A face with the given coordinate ranges relative to the point. z is negative if the point is in front
+    /// of the face.
     #[inline(always)]
     fn new(x: [f32; 2], y: [f32; 2], z: f32) -> Self {
         let rectangle = SphericalRectangle::new(x, y, z);
@@ -118,7 +120,7 @@ impl BoxFace {
         Self { rectangle, solid_angle: if z < 0.0 { solid_angle } else { 0.0 } }
     }
 
-    /// Samples a point on the face; returns it with the inverse pdf of its direction.
+    /// Samples a point on the face. Returns the point and the inverse pdf of its direction.
     #[inline(always)]
     fn sample(&self, u: [f32; 2]) -> (f32, f32, f32) {
         let rectangle = &self.rectangle;

@@ -1,4 +1,4 @@
-//! Disk lights, sampled with a density within 20 % of uniform solid angle.
+//! Disk lights, sampled with a density within 20 % of uniform over the solid angle.
 
 use std::f64::consts::TAU;
 
@@ -16,25 +16,25 @@ pub struct DiskEmitter {
     radius: f64,
 }
 
-/// A disk seen from a point: an elliptical cone of directions.
+/// A disk seen from a point, as an elliptical cone of directions.
 #[derive(Clone, Copy, Debug)]
 pub struct DiskView {
-    /// Axis of the cone, then the directions of the ellipse's axes.
+    /// Axis of the cone, followed by the directions of the ellipse's axes.
     axes: [DVec3; 3],
-    /// Tangents of the half angles along the ellipse's axes.
+    /// Tangents of the half angles of the ellipse's axes.
     a: f64,
     b: f64,
-    /// Coefficients of the density 1/(p·cos² + q·sin²) of the angle around the axis.
+    /// Coefficients of the unnormalized density 1/(p·cos² + q·sin²) of the angle around the axis.
     p: f64,
     q: f64,
-    /// Height of the point above the front, > 0.
+    /// Height of the point above the front. Positive if the front is visible.
     height: f64,
-    /// Distance to the farthest point of the disk.
+    /// Distance to the disk's farthest point.
     farthest: f64,
 }
 
 impl ShapeEmitter for DiskEmitter {
-    /// Samples the disk with a density within 20 % of uniform solid angle.
+    /// Samples the disk with a density within 20 % of uniform over the solid angle.
     #[inline(always)]
     fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
         let view = self.seen_from(point);
@@ -63,12 +63,13 @@ impl DiskEmitter {
         Self { center: disk.centroid(), normal: disk.normal(), radius: disk.radius() }
     }
 
-    /// The disk seen from a point in front of it. From behind, the view's height is not positive and its other fields are
-    /// meaningless.
+    /// The disk seen from a point in front of it. If the point is behind the disk, the height is not positive
+    /// and the other fields are meaningless.
     ///
-    /// In the plane of the disk's normal and its center, the cone has the half angle α between the rays to the nearest and the
-    /// farthest point; perpendicular to it, at the bisector, β (Guillén et al., *Area-Preserving Parameterizations for Spherical
-    /// Ellipses*, 2017).
+    /// In the plane through the disk's normal, its center, and the point, the rays to the nearest and the
+    /// farthest point of the disk enclose an angle of 2α. The cone's half angles are α in this plane and β
+    /// perpendicular to it (Guillén et al., *Area-Preserving Parameterizations for Spherical Ellipses*,
+    /// 2017).
     #[inline(always)]
     pub fn seen_from(&self, point: Vec3) -> DiskView {
         let to_center = self.center - point.as_dvec3();
@@ -86,7 +87,7 @@ impl DiskEmitter {
         let h2 = height * height;
         let (l0, l1) = ((near * near + h2).sqrt(), (far * far + h2).sqrt());
         let both = l0 + l1;
-        // Intersect the bisector with the plane.
+        // Intersect the bisector with the disk's plane.
         let middle = (near * l1 + far * l0) / both;
         let l = (middle * middle + h2).sqrt();
         // Compute tan α from sin 2α and cos 2α, both times l0·l1, without cancellation.
@@ -124,17 +125,18 @@ impl DiskView {
         self.height > 0.0
     }
 
-    /// Upper bound on the solid angle, at most 20 % too large.
+    /// Upper bound on the solid angle. It is at most 20 % too large.
     #[inline(always)]
     pub fn solid_angle(&self) -> f64 {
         TAU * self.a * self.b / (self.p * self.q).sqrt()
     }
 
-    /// Samples a direction; returns it with the distance to the plane and the inverse pdf.
+    /// Samples a direction. Returns the direction, the distance to the plane, and the inverse pdf.
     ///
-    /// On a plane in front of the point, perpendicular to the axis, the ellipse is (a·r·cos φ, b·r·sin φ). A slice dφ fills
-    /// a·b/(Q + √Q) dφ, where Q = 1 + a²cos²φ + b²sin²φ, and cosines to the axis are uniform in it. φ has the density ∝
-    /// 1/(p·cos²φ + q·sin²φ), whose denominator equals Q + √Q at both axes and is at least 1/1.2 of it in between.
+    /// On the plane perpendicular to the axis at distance 1, the ellipse is (a·r·cos φ, b·r·sin φ) with r in
+    /// [0, 1]. A slice dφ has the solid angle a·b/(Q + √Q) dφ with Q = 1 + a²cos²φ + b²sin²φ, and the cosine
+    /// of the angle to the axis is uniform within the slice. The density of φ is proportional to 1/(p·cos²φ +
+    /// q·sin²φ). This denominator equals Q + √Q at both axes, and is at least (Q + √Q)/1.2 in between.
     #[inline(always)]
     pub fn sample(&self, normal: DVec3, u: [f32; 2]) -> (DVec3, f64, f64) {
         let (sin, cos) = sin_cos(std::f32::consts::TAU * u[1]);

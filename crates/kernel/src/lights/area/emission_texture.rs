@@ -1,8 +1,8 @@
-//! Emission textures: radiance that varies over a light because of a texture or opacity, or with direction because of a clear
-//! coat.
+//! Emission textures: radiance that varies with position because of a texture or opacity, or with direction
+//! because of a clear coat.
 //!
-//! Samples of a quad follow its texture; samples of other shapes do not. Each sample is multiplied by the texture at its point.
-//! Pdfs are the emitter's and remain exact.
+//! The texture is importance sampled on quads, but not on other shapes. Each sample is multiplied by the
+//! texture value at its point. Pdfs are exactly those of the emitter.
 
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ use crate::materials::texture::Texture;
 use crate::materials::{EmissionCoat, Footprint, Opacity, SecondUvPoint, TexturePoint};
 use crate::math::{DVec2, DVec3, Vec2, Vec3};
 
-/// Factor on the radiance of a light that varies with position and direction.
+/// A factor on a light's radiance that varies with position and direction.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EmissionTexture {
     texture: Option<Arc<Texture>>,
@@ -39,12 +39,12 @@ pub struct UvTriangle {
     pub corners: [DVec3; 3],
     /// UVs of the corners.
     pub uvs: [Vec2; 3],
-    /// UVs of the corners in the second set. `None` without one.
+    /// Second set of UVs of the corners, if any.
     pub second_uvs: Option<[Vec2; 3]>,
 }
 
 impl EmissionTexture {
-    /// The factor from a texture and an opacity. `None` if there is neither.
+    /// The factor from a texture and an opacity, or `None` if there is neither.
     pub fn new(texture: Option<&Arc<Texture>>, opacity: Option<&Opacity>, chart: UvChart) -> Option<Self> {
         Self::under_coat(texture, opacity, None, chart)
     }
@@ -82,7 +82,8 @@ impl EmissionTexture {
         }
     }
 
-    /// Number of texels per unit of u and v; with both a texture and an opacity texture, the maximum.
+    /// Number of texels per unit of u and v. The maximum of both if there are a texture and an opacity
+    /// texture.
     pub fn texels_across(&self) -> [f64; 2] {
         let of_opacity = self.opacity.as_ref().and_then(|opacity| opacity.value.texture());
         let across =
@@ -91,7 +92,8 @@ impl EmissionTexture {
         across.into_iter().flatten().reduce(finer).unwrap_or([1.0; 2])
     }
 
-    /// The factor at a point on the light, for light along a direction. `primitive` is the mesh triangle that contains the point.
+    /// The factor at a point on the light, for a ray with the given direction. `primitive` is the mesh
+    /// triangle that contains the point.
     #[inline]
     pub fn at(&self, point: Vec3, primitive: u32, direction: Vec3) -> Vec3 {
         self.at_place(point, primitive) * self.coat_transmittance(point, primitive, direction)
@@ -102,27 +104,28 @@ impl EmissionTexture {
         self.lookup_at(&self.chart.texture_point(point.as_dvec3(), primitive))
     }
 
-    /// Transmittance of the clear coat for light along a direction.
+    /// Transmittance of the clear coat for a ray with the given direction.
     pub fn coat_transmittance(&self, point: Vec3, primitive: u32, direction: Vec3) -> f32 {
         let Some(coat) = &self.coat else { return 1.0 };
         let (point, direction) = (point.as_dvec3(), direction.as_dvec3());
         let at = self.chart.texture_point(point, primitive);
-        // At the edge of a shape, rounding may prevent finding a normal.
+        // At a shape's edge, rounding errors may prevent finding a normal.
         let normal = self.chart.normal(point, primitive, direction);
         coat.left(&at, normal.map_or(1.0, |normal| normal.dot(direction)) as f32, &mut 0)
     }
 }
 
-/// Length of the ray that finds the normal at a point, relative to the size of the light.
+/// Length of the probe ray for finding the normal at a point, relative to the size of the light.
 const PROBE: f64 = 1e-3;
 
 impl UvChart {
-    /// The unit normal at a point seen along a direction, on either side. `None` if the ray misses the surface.
+    /// The unit normal at a point that is seen along a direction, on either side. `None` if the probe ray
+    /// misses the surface.
     fn normal(&self, point: DVec3, primitive: u32, direction: DVec3) -> Option<DVec3> {
         match self {
             Self::Shape(shape) => {
                 let size = f64::from(shape.bounds()?.extent().max_element());
-                // Approach the point from the side that it is seen from.
+                // Approach the point from the viewer's side.
                 let ray =
                     RayF64 { origin: point - direction * (PROBE * size), direction, t_max: f64::INFINITY };
                 let hit = shape.intersect(&ray)?;

@@ -1,4 +1,4 @@
-//! Insides of round shapes and boxes that emit from both sides.
+//! The inner sides of round shapes and boxes that emit from both sides.
 
 use std::f32::consts::{PI, TAU};
 
@@ -9,8 +9,8 @@ use crate::math::elementary::sin_cos;
 use crate::math::{DVec3, Vec2, Vec3};
 use crate::sampling::distribution::Discrete;
 
-/// The inside of a shape. The inside of a closed shape covers all directions from a point inside, which are sampled uniformly,
-/// and is invisible from outside. The inside of an open shape is sampled by area.
+/// The inside of a shape. If the shape is closed, its inside is sampled uniformly over all directions from
+/// points inside, and is invisible from outside. If it is open, its inside is sampled by area.
 #[derive(Clone, Debug, PartialEq)]
 pub struct InsideEmitter {
     shape: Shape,
@@ -40,11 +40,11 @@ impl ShapeEmitter for InsideEmitter {
     }
 }
 
-/// The solid angle of the sphere, in sr.
+/// Solid angle of the sphere in sr.
 const ALL_AROUND: f32 = 4.0 * PI;
 
 impl InsideEmitter {
-    /// The emitter of a shape's inside. `None` if the shape has no area.
+    /// Creates an emitter for a shape's inside. `None` if the shape has no area.
     pub fn new(shape: &Shape) -> Option<Self> {
         Some(Self { shape: *shape, by_area: Discrete::new(shape.areas())? })
     }
@@ -62,7 +62,7 @@ impl InsideEmitter {
         })
     }
 
-    /// Samples a point by area; the sample is dark if another part of the shape is in front of it.
+    /// Samples a point by area. The sample is black if another part of the shape occludes it.
     fn by_area(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
         let (part, rest) = self.by_area.sample(u[0]);
         let AreaPoint { point: place, normal } = self.shape.sample(part as u32, Vec2::new(rest, u[1]));
@@ -78,7 +78,7 @@ impl InsideEmitter {
         LightSamplePoint { direction, target: point + direction * distance as f32, factor: factor as f32 }
     }
 
-    /// Whether no part of the shape is in front of the point at `distance`.
+    /// Whether no part of the shape occludes the point at `distance`.
     fn is_first(&self, point: Vec3, direction: Vec3, distance: f32) -> bool {
         self.first(point, direction).is_some_and(|first| first > distance * (1.0 - SAME_DISTANCE))
     }

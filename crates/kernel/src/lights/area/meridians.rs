@@ -1,12 +1,13 @@
-//! Distribution of angles around a pole, weighted by the visible part of a light in each half plane.
+//! A distribution of angles around a pole, weighted by the visible part of a light in each half plane.
 
 use super::piecewise_linear::PiecewiseLinear;
 use crate::math::{DVec3, Vec3};
 
-/// Number of nodes on one side at which the weight is evaluated.
+/// Number of nodes on each side at which the weight is evaluated.
 const NODES: usize = 9;
 
-/// Angles around a pole on both sides of 0, up to the reach of a light. Their density is piecewise linear.
+/// Distribution of angles around a pole, from minus the reach of a light to its reach. The density is
+/// piecewise linear.
 #[derive(Clone, Copy, Debug)]
 pub struct MeridianDistribution {
     /// The largest angle.
@@ -24,10 +25,10 @@ pub struct SinCos {
 }
 
 impl SinCos {
-    /// Sine and cosine of half the angle, which is in [0, π].
+    /// Sine and cosine of half of an angle in [0, π].
     fn half(self) -> Self {
         let cos = (0.5 * (1.0 + self.cos)).max(0.0).sqrt();
-        // If the cosine is 0, the angle was π.
+        // A cosine of 0 corresponds to an angle of π.
         let sin = if cos > 0.5 { 0.5 * self.sin / cos } else { (0.5 * (1.0 - self.cos)).max(0.0).sqrt() };
         Self { sin, cos }
     }
@@ -64,7 +65,7 @@ impl MeridianDistribution {
         2.0 * self.reach * self.share.mean()
     }
 
-    /// Samples an angle; returns it with its density per radian.
+    /// Samples an angle. Returns the angle and its density per radian.
     pub fn sample(&self, u: f32) -> (f64, f64) {
         let side = 2.0 * f64::from(u) - 1.0;
         let (share, density) = self.share.sample(side.abs());
@@ -77,14 +78,14 @@ impl MeridianDistribution {
     }
 }
 
-/// Polar coordinates: the angle from a pole and the angle around it.
+/// A frame for polar coordinates: the angle from a pole and the angle around the pole.
 #[derive(Clone, Copy, Debug)]
 pub struct PolarFrame {
     /// Direction of the pole.
     pub pole: DVec3,
-    /// Perpendicular to the pole, at angle 0.
+    /// Direction perpendicular to the pole, at angle 0.
     pub front: DVec3,
-    /// Perpendicular to both, at 90°.
+    /// Direction perpendicular to both, at angle 90°.
     pub side: DVec3,
 }
 
@@ -94,12 +95,12 @@ impl PolarFrame {
         Self { pole, front, side: pole.cross(front) }
     }
 
-    /// The direction at an angle from the pole and an angle around it.
+    /// The direction at given angles from the pole and around it.
     pub fn direction(&self, from_pole: SinCos, around: SinCos) -> DVec3 {
         self.pole * from_pole.cos + (self.front * around.cos + self.side * around.sin) * from_pole.sin
     }
 
-    /// The angle of a direction around the pole.
+    /// Angle of a direction around the pole.
     pub fn around(&self, direction: Vec3) -> f64 {
         let direction = direction.as_dvec3();
         libm::atan2(direction.dot(self.side), direction.dot(self.front))

@@ -1,4 +1,5 @@
-//! Mesh lights: two triangles that form a parallelogram are sampled as a quad, a few others by area, and many with a light tree.
+//! Mesh lights. Two triangles that form a parallelogram are sampled as a quad. Otherwise, a small number of
+//! triangles is sampled by area and a large number with a light tree.
 
 use super::quad::QuadEmitter;
 use super::sample_point::LightSamplePoint;
@@ -13,27 +14,27 @@ use crate::math::{DVec3, Vec2, Vec3};
 use crate::sampling::distribution::Discrete;
 use crate::sampling::warp;
 
-/// Triangles that emit toward (b − a) × (c − a).
+/// Triangles that emit toward the side of (b − a) × (c − a).
 #[derive(Clone, Debug, PartialEq)]
 pub struct MeshEmitter {
-    /// Corners in world coordinates, with each triangle's primitive index in its object.
+    /// For each triangle, the corners in world coordinates and the primitive index in its object.
     triangles: Vec<([DVec3; 3], u32)>,
     by_area: Discrete,
     /// Centroid of the area.
     center: DVec3,
-    /// Bounds of the triangles' positions and emission, for unit radiance.
+    /// Bounds of the triangles' positions and emission, for a radiance of 1.
     bounds: LightBounds,
     sampling: MeshSampling,
 }
 
-/// How the points of a mesh light are sampled.
+/// How points on a mesh light are sampled.
 #[derive(Clone, Debug, PartialEq)]
 pub enum MeshSampling {
     /// As a quad.
     Quad(Box<TrianglePairQuad>),
     /// Uniformly over the area.
     Area(AreaSampledTriangles),
-    /// Using a light tree over all triangles, then the visible part of the triangle.
+    /// With a light tree over all triangles, then on the visible part of the chosen triangle.
     Tree(LightTree),
 }
 
@@ -41,7 +42,8 @@ pub enum MeshSampling {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrianglePairQuad {
     quad: QuadEmitter,
-    /// Its dot product with an offset from the corner is below 1 on the triangle at that corner, and above 1 on the other.
+    /// Vector whose dot product with an offset from the corner is below 1 on the triangle at that corner, and
+    /// above 1 on the other triangle.
     across: Vec3,
     /// Primitive indices of the two triangles.
     primitives: [u32; 2],
@@ -68,7 +70,8 @@ struct EmissiveTriangle {
 }
 
 impl MeshEmitter {
-    /// Creates an emitter from triangles with increasing primitive indices. Returns `None` if they have no area.
+    /// Creates an emitter from triangles in order of increasing primitive indices. Returns `None` if they
+    /// have no area.
     ///
     /// # Errors
     /// [`Cancelled`] if the token is canceled.
@@ -96,7 +99,8 @@ impl MeshEmitter {
         self.triangles.iter().map(|(_, primitive)| *primitive)
     }
 
-    /// Samples a point uniformly on one triangle; returns it with the triangle's area and primitive index.
+    /// Samples a point uniformly on one triangle. Returns the point, the triangle's area, and its primitive
+    /// index.
     pub fn place(&self, index: usize, u: Vec2) -> (AreaPoint, f64, u32) {
         let ([a, b, c], primitive) = &self.triangles[index];
         let weights = warp::triangle(u).as_dvec3();
@@ -106,12 +110,12 @@ impl MeshEmitter {
         (AreaPoint { point, normal: vector_area / area }, area, *primitive)
     }
 
-    /// Bounds of the triangles' positions and emission, for unit radiance.
+    /// Bounds of the triangles' positions and emission, for a radiance of 1.
     pub fn bounds(&self) -> LightBounds {
         self.bounds
     }
 
-    /// How its points are sampled.
+    /// How points are sampled.
     #[inline(always)]
     pub fn sampling(&self) -> &MeshSampling {
         &self.sampling
@@ -199,14 +203,14 @@ impl TrianglePairQuad {
     /// Maximum deviation of the fourth corner from a parallelogram, relative to its size.
     const FLATNESS: f64 = 1e-5;
 
-    /// The parallelogram formed by two triangles that share an edge. `None` if they do not form one.
+    /// The parallelogram formed by two triangles that share an edge, or `None` if they do not form one.
     fn of(triangles: &[([DVec3; 3], u32)]) -> Option<Self> {
         let [(first, one), (second, two)] = triangles else { return None };
         let normal = |[a, b, c]: &[DVec3; 3]| (b - a).cross(c - a);
         if normal(first).dot(normal(second)) <= 0.0 {
             return None;
         }
-        // Find the corner that is only in the first triangle, and the one that is only in the second.
+        // Find the corner that is only in the first triangle, and the corner that is only in the second.
         let corner = (0..3).find(|&i| !second.contains(&first[i]))?;
         let [p, x, y] = [0, 1, 2].map(|i| first[(corner + i) % 3]);
         let far = second.iter().find(|other| !first.contains(other))?;
@@ -227,7 +231,7 @@ impl TrianglePairQuad {
         &self.quad
     }
 
-    /// Primitive index of the triangle that contains a sample's target.
+    /// Primitive index of the triangle that contains the sampled `target`.
     #[inline(always)]
     pub fn part(&self, point: Vec3, target: Vec3) -> u32 {
         let offset = (target - point) - self.quad.corner_from(point);
@@ -246,7 +250,7 @@ impl AreaSampledTriangles {
         Self { all, by_area: by_area.clone(), area: by_area.total() as f32 }
     }
 
-    /// Samples the triangles' light at a point.
+    /// Samples the triangles as seen from `point`.
     #[inline(always)]
     pub fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
         let (index, rest) = self.by_area.sample(u[0]);
@@ -260,7 +264,7 @@ impl AreaSampledTriangles {
         LightSamplePoint { direction, target: point + offset, factor }
     }
 
-    /// Primitive index of the triangle of a sample, given its first random number.
+    /// Primitive index of the sampled triangle, given the sample's first random number.
     #[inline(always)]
     pub fn part(&self, u: f32) -> u32 {
         self.all[self.by_area.sample(u).0].primitive

@@ -1,8 +1,8 @@
 //! Emitting shapes, one file each.
 //!
-//! A shape's light sampling is entirely in its [`ShapeEmitter`]. To add a shape: its file; its variant of [`Emitter`], with an
-//! arm in `of_any` and in [`area_light`]; and the bounds of its emission, if it is flat. A shape without a loop of its own in
-//! `row` is sampled point by point.
+//! Each shape implements its light sampling in a [`ShapeEmitter`]. To add a shape, add its file, a variant of
+//! [`Emitter`], and arms in `of_any` and [`area_light`]. If the shape is flat, also add the bounds of its
+//! emission. Shapes without a loop in `packet` are sampled point by point.
 
 pub mod cuboid;
 pub mod disk;
@@ -47,24 +47,24 @@ use triangle::TriangleEmitter;
 
 /// A shape whose front emits the same radiance in every direction.
 pub trait ShapeEmitter {
-    /// Samples a point on the front that is visible from `point`, with `u` in [0, 1)².
+    /// Samples a point on the front that is visible from `point`. `u` is in [0, 1)².
     fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint;
 
-    /// Pdf of [`ShapeEmitter::sample`] in sr⁻¹, for a point on the front that a ray from `from` hits.
+    /// Pdf of [`ShapeEmitter::sample`] in sr⁻¹. `met` is a point on the front, hit by a ray from `from`.
     fn pdf(&self, from: Vec3, met: &LightHit) -> f32;
 
     /// Centroid of the area.
     fn middle(&self) -> DVec3;
 }
 
-/// A surface that emits uniformly from one side. A two-sided emitter is two lights.
+/// A surface that emits uniformly from one side. A two-sided emitter is represented by two lights.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AreaLight {
-    /// The emitting shape; its front is the emitting side.
+    /// The emitting shape. Its front is the emitting side.
     pub shape: Emitter,
     /// The side of the object that emits.
     pub side: Side,
-    /// Radiance; with a texture, the factor on it.
+    /// Radiance, or a factor on the texture if there is one.
     pub radiance: Vec3,
     /// Texture that modulates the radiance.
     pub texture: Option<Box<EmissionTexture>>,
@@ -72,7 +72,7 @@ pub struct AreaLight {
     pub object: u32,
     /// Which part of the object emits.
     pub part: LightPart,
-    /// Bounds of the light's position, directions and power.
+    /// Bounds of the light's position, directions, and power.
     pub bounds: LightBounds,
 }
 
@@ -90,7 +90,7 @@ pub enum LightPart {
 pub enum Side {
     /// The front.
     Front,
-    /// The back: the inside of closed shapes.
+    /// The back, which is the inside of closed shapes.
     Back,
 }
 
@@ -101,7 +101,7 @@ pub enum Emitter {
     Sphere(SphereEmitter),
     /// A parallelogram.
     Quad(QuadEmitter),
-    /// A parallelogram sampled according to its emission texture.
+    /// A parallelogram that importance-samples its emission texture.
     TexturedQuad(Box<TexturedQuadEmitter>),
     /// A box.
     Box(BoxEmitter),
@@ -117,13 +117,13 @@ pub enum Emitter {
     Torus(TorusEmitter),
     /// The inside of a shape.
     Inside(Box<InsideEmitter>),
-    /// One side of a see-through shape, whose near parts do not occlude the far ones.
+    /// One side of a see-through shape. Near parts do not occlude far parts.
     SeeThrough(Box<SeeThroughEmitter>),
     /// Triangles of a mesh.
     Mesh(MeshEmitter),
 }
 
-/// Calls the same method for any shape. Meshes need an arm of their own because their triangles are separate primitives.
+/// Calls a method on any shape. Meshes need a separate arm because their triangles are separate primitives.
 macro_rules! of_any {
     ($emitter:expr, $it:ident => $asked:expr, $mesh:ident => $of_mesh:expr) => {
         match $emitter {
@@ -156,7 +156,7 @@ impl Emitter {
         if let Self::Mesh(mesh) = self { Some(mesh) } else { None }
     }
 
-    /// The quad to sample, and the triangle pair that forms it, if any. `None` for other shapes.
+    /// The quad to sample and, if it is made of two triangles, the triangle pair. `None` for other shapes.
     #[inline(always)]
     pub fn as_quad(&self) -> Option<(&QuadEmitter, Option<&TrianglePairQuad>)> {
         if let Self::Quad(quad) = self {
@@ -166,7 +166,7 @@ impl Emitter {
     }
 }
 
-/// The light on the front of an emitting shape. `None` if the shape is infinite or has no area.
+/// The light on the front of a shape. `None` if the shape is infinite or has no area.
 pub fn area_light(shape: &Shape, radiance: Vec3, object: u32) -> Option<AreaLight> {
     let emitter = match shape {
         Shape::Sphere(sphere) => {
@@ -187,11 +187,11 @@ pub fn area_light(shape: &Shape, radiance: Vec3, object: u32) -> Option<AreaLigh
     Some(AreaLight { shape: emitter, side, radiance, texture, object, part, bounds })
 }
 
-/// The light on one side of an emitting shape that is see-through. `None` if the shape is infinite or has no area.
+/// The light on one side of a see-through shape. `None` if the shape is infinite or has no area.
 pub fn see_through_light(shape: &Shape, side: Side, radiance: Vec3, object: u32) -> Option<AreaLight> {
     let hides_itself = match (shape, side) {
         (Shape::Quad(_) | Shape::Triangle(_) | Shape::Disk(_) | Shape::Plane(_), _) => false,
-        // Seen from outside, at most one point of the front is in each direction.
+        // Seen from outside, the front covers each direction at most once.
         (Shape::Sphere(_) | Shape::Box(_) | Shape::Cylinder(_) | Shape::Cone(_), Side::Front) => false,
         (Shape::Sphere(_) | Shape::Box(_) | Shape::Cylinder(_) | Shape::Cone(_), Side::Back) => true,
         (Shape::Torus(_), _) => true,
@@ -207,7 +207,7 @@ pub fn see_through_light(shape: &Shape, side: Side, radiance: Vec3, object: u32)
     })
 }
 
-/// The light on the back of an emitting shape. `None` if the shape is infinite or has no area.
+/// The light on the back of a shape. `None` if the shape is infinite or has no area.
 pub fn back_light(shape: &Shape, radiance: Vec3, object: u32) -> Option<AreaLight> {
     let turned = match shape {
         Shape::Quad(quad) => Some(Shape::Quad(Parallelogram::new(quad.corner, quad.v, quad.u))),
@@ -224,8 +224,9 @@ pub fn back_light(shape: &Shape, radiance: Vec3, object: u32) -> Option<AreaLigh
     Some(AreaLight { shape: emitter, side: Side::Back, ..light })
 }
 
-/// Bounds of a shape's emission. `None` if the shape is infinite. Flat shapes emit with the cosine. Others are taken to emit a
-/// quarter of their area times the radiance in every direction, which is the mean over directions for convex shapes (Cauchy).
+/// Bounds of a shape's emission. `None` if the shape is infinite. The emission of flat shapes has a cosine
+/// falloff. Other shapes are assumed to emit a quarter of their area times the radiance in every direction,
+/// which is the mean over all directions for convex shapes (Cauchy).
 fn bounds(shape: &Shape, radiance: Vec3) -> Option<LightBounds> {
     let normal = match shape {
         Shape::Quad(quad) => Some(quad.u.cross(quad.v)),
@@ -247,10 +248,10 @@ fn bounds(shape: &Shape, radiance: Vec3) -> Option<LightBounds> {
 }
 
 impl AreaLight {
-    /// Adds an emission texture. A quad is then also sampled according to it.
+    /// Adds an emission texture. Quads are then importance sampled according to the texture.
     pub fn with_texture(mut self, texture: EmissionTexture) -> Self {
         if let (Emitter::Quad(quad), true) = (&self.shape, texture.has_places()) {
-            // For the back, the edges are swapped.
+            // The back has swapped edges.
             let ordered = |[u, v]: [f64; 2]| match self.side {
                 Side::Front => [u, v],
                 Side::Back => [v, u],
@@ -294,7 +295,7 @@ impl AreaLight {
             mesh => mesh.sample(point, normal, u, (self.radiance, self.object)))
     }
 
-    /// The geometry that the light consists of.
+    /// The light's geometry.
     pub(super) fn source(&self) -> LightObject {
         let is_sheer = matches!(self.shape, Emitter::SeeThrough(_));
         if is_sheer { LightObject::SeeThrough(self.object) } else { LightObject::Object(self.object) }

@@ -6,7 +6,7 @@ use crate::lights::packet::{LightSamplePacket, packet_of};
 use crate::lights::sample::LightObject;
 use crate::math::lanes::{F32x16, PACKET_SIZE, Vec3x16, lane, set_lane};
 
-/// Samples area-sampled triangles for a packet, with a light per lane.
+/// Area-sampled triangles for a packet, with a separate light for each lane.
 macro_rules! triangle_packet_of {
     ($i:ident => ($facets:expr, $light:expr), $points:expr, $u:expr) => {{
         let mut row = packet_of!(LightObject::Nothing, $i => {
@@ -24,7 +24,7 @@ macro_rules! triangle_packet_of {
 pub(crate) use triangle_packet_of;
 
 impl AreaLight {
-    /// [`AreaLight::sample_untextured`] for the points in mask `used`.
+    /// [`AreaLight::sample_untextured`] for the points in the mask `used`.
     #[inline(always)]
     pub fn sample_row(
         &self,
@@ -44,8 +44,8 @@ impl AreaLight {
         }
         // All quads share one loop, because compilers do not vectorize a second one.
         if let Some((quad, of_two)) = self.shape.as_quad() {
-            // Compute the differences, which need double precision, separately: otherwise, the other operations would be done
-            // only eight at a time.
+            // Compute the differences separately because they need double precision. Otherwise, compilers
+            // would also compute everything else only eight lanes at a time.
             let mut offsets = [[0.0; PACKET_SIZE]; 3];
             for i in 0..PACKET_SIZE {
                 set_lane(&mut offsets, i, quad.corner_from(lane(points, i)));
@@ -76,7 +76,7 @@ impl AreaLight {
         if let Emitter::Box(cuboid) = &self.shape {
             return packet_from!(cuboid);
         }
-        // Other shapes have no vectorized loop.
+        // Other shapes do not have a vectorized loop.
         LightSamplePacket::lane_by_lane(points, used, |i, point| {
             self.sample_untextured(point, lane(normals, i), [u[0][i], u[1][i]])
         })

@@ -1,6 +1,6 @@
 //! Piecewise linear densities.
 
-/// A density on [0, 1], proportional to these values at equidistant nodes and linear in between.
+/// A density on [0, 1] that is proportional to the given values at equidistant nodes and linear in between.
 #[derive(Clone, Copy, Debug)]
 pub struct PiecewiseLinear<const NODES: usize>(pub [f64; NODES]);
 
@@ -13,7 +13,7 @@ impl<const NODES: usize> PiecewiseLinear<NODES> {
         (inner + 0.5 * (self.0[0] + self.0[NODES - 1])) / Self::PIECES
     }
 
-    /// Inverts the cumulative distribution at `share` in [0, 1); returns the position and its density.
+    /// Inverts the cumulative distribution at `share` in [0, 1). Returns the position and its density.
     pub fn sample(&self, share: f64) -> (f64, f64) {
         let mean = self.mean();
         let (mut rest, mut piece) = (share * mean * Self::PIECES, 0);
@@ -58,7 +58,7 @@ mod tests {
                 let (place, density) = linear.sample(share);
                 assert!((density - linear.pdf(place)).abs() < 1e-9, "{place}");
                 assert!(place >= before && place <= 1.0);
-                // Steps of the position times the density are steps of the share.
+                // Steps of the position times the density must equal steps of the share.
                 if i > 0 && density > 0.05 {
                     let middle = linear.pdf(0.5 * (place + before));
                     assert!((middle * (place - before) * f64::from(n) - 1.0).abs() < 0.01, "{place}");

@@ -1,4 +1,5 @@
-//! Quad lights: rectangles are sampled by solid angle, other parallelograms and distant rectangles by area.
+//! Quad lights. Rectangles are sampled by solid angle. Other parallelograms and distant rectangles are
+//! sampled by area.
 
 use std::f32::consts::PI;
 
@@ -7,8 +8,8 @@ use super::{LightHit, ShapeEmitter};
 use crate::math::elementary::{acos, sin_cos};
 use crate::math::{DVec3, Vec3};
 
-/// Minimum solid angle in sr for solid-angle sampling. Below it, the sum of four angles has lost too many digits, and area
-/// sampling is as good.
+/// Minimum solid angle in sr for solid-angle sampling. For smaller quads, the sum of four angles loses too
+/// many digits, and area sampling is equally good.
 const MIN_SOLID_ANGLE: f32 = 0.02;
 
 /// A parallelogram that emits toward u × v.
@@ -53,7 +54,7 @@ impl ShapeEmitter for QuadEmitter {
 }
 
 impl QuadEmitter {
-    /// [`ShapeEmitter::sample`], given the offset from the point to the corner.
+    /// [`ShapeEmitter::sample`] with a precomputed offset from the point to the corner.
     #[inline(always)]
     pub(super) fn sample_from(&self, point: Vec3, to_corner: Vec3, u: [f32; 2]) -> LightSamplePoint {
         let by_area = self.by_area(to_corner, u);
@@ -101,14 +102,15 @@ impl QuadEmitter {
         (self.corner - point.as_dvec3()).as_vec3()
     }
 
-    /// Samples uniformly over the area; returns the offset from the point and the inverse solid-angle pdf.
+    /// Samples uniformly over the area. Returns the offset from the point and the inverse solid-angle pdf.
     #[inline(always)]
     pub(super) fn by_area(&self, to_corner: Vec3, u: [f32; 2]) -> (Vec3, f32) {
         let offset = to_corner + self.u * u[0] + self.v * u[1];
         (offset, self.projected_solid_angle(offset))
     }
 
-    /// Solid angle of the quad if all of it were at this offset from the point; not positive from behind.
+    /// Solid angle of the quad if all of it were at this offset from the point. Not positive if the point is
+    /// behind the quad.
     #[inline(always)]
     pub(super) fn projected_solid_angle(&self, offset: Vec3) -> f32 {
         let nearness = 1.0 / offset.length_squared().sqrt();
@@ -116,14 +118,15 @@ impl QuadEmitter {
         height * nearness * nearness * nearness
     }
 
-    /// Pdf of solid-angle sampling in sr⁻¹, for points in front. `None` if the quad is sampled by area.
+    /// Pdf of solid-angle sampling in sr⁻¹, for points in front of the quad. `None` if the quad is sampled by
+    /// area.
     #[inline(always)]
     pub(super) fn density(&self, to_corner: Vec3) -> Option<f32> {
         let spherical = self.rectangle.as_ref().map(|rectangle| rectangle.seen_from(to_corner, self.normal));
         spherical.filter(SphericalRectangle::is_accurate).map(|spherical| 1.0 / spherical.solid_angle)
     }
 
-    /// Vectors whose dot products with an offset from the corner are its coordinates along the edges.
+    /// Vectors whose dot products with an offset from the corner are the coordinates along the edges.
     pub(super) fn along(&self) -> [Vec3; 2] {
         let (u, v, n) = (self.u.as_dvec3(), self.v.as_dvec3(), self.normal.as_dvec3());
         let (across_v, across_u) = (v.cross(n), n.cross(u));
@@ -131,14 +134,14 @@ impl QuadEmitter {
     }
 }
 
-/// A spherical rectangle (Ureña, Fajardo, King, *An Area-Preserving Parametrization for Spherical Rectangles*, 2013). Its sides
-/// are parallel to x and y, and its plane is at z < 0.
+/// A spherical rectangle (Ureña, Fajardo, King, *An Area-Preserving Parametrization for Spherical
+/// Rectangles*, 2013). The sides are parallel to x and y, and the plane is at z < 0.
 #[derive(Clone, Copy, Debug)]
 pub struct SphericalRectangle {
     x: [f32; 2],
     y: [f32; 2],
     z: f32,
-    /// z components of the unit normals of the planes through the lower and the upper side.
+    /// z components of the unit normals of the planes through the lower and upper sides.
     lower: f32,
     upper: f32,
     /// Start angle of the slices.
@@ -154,20 +157,20 @@ impl PlanarRectangle {
     }
 }
 
-/// In-plane component of the unit vector from a line toward a side; `d2` is the squared distance of the line.
+/// In-plane component of the unit vector from a line toward a side. `d2` is the line's squared distance.
 #[inline(always)]
 fn towards(side: f32, d2: f32) -> f32 {
     side / (d2 + side * side).sqrt()
 }
 
-/// Angle between two planes through sides.
+/// Angle between the planes through two sides.
 #[inline(always)]
 fn angle(a: f32, b: f32) -> f32 {
     acos((-a * b).max(-1.0).min(1.0))
 }
 
 impl SphericalRectangle {
-    /// A rectangle with these coordinate ranges, in a plane at z.
+    /// A rectangle with these coordinate ranges in the plane at z.
     #[inline(always)]
     pub fn new([x0, x1]: [f32; 2], [y0, y1]: [f32; 2], z: f32) -> Self {
         let z2 = z * z;
@@ -186,7 +189,7 @@ impl SphericalRectangle {
         }
     }
 
-    /// Combines three rectangles field by field; `of` chooses among their values.
+    /// Combines three rectangles field by field. `of` maps the three values to one.
     #[inline(always)]
     pub fn each(three: [Self; 3], of: impl Fn([f32; 3]) -> f32) -> Self {
         Self {
@@ -206,13 +209,13 @@ impl SphericalRectangle {
         self.solid_angle
     }
 
-    /// The z coordinate of its plane.
+    /// The z coordinate of the plane.
     #[inline(always)]
     pub fn z(&self) -> f32 {
         self.z
     }
 
-    /// Samples uniformly over the area; returns the point and the inverse solid-angle pdf.
+    /// Samples uniformly over the area. Returns the point and the inverse solid-angle pdf.
     #[inline(always)]
     pub fn by_area(&self, u: [f32; 2]) -> (f32, f32, f32) {
         let (width, height) = (self.x[1] - self.x[0], self.y[1] - self.y[0]);
@@ -230,16 +233,16 @@ impl SphericalRectangle {
     /// Samples a point uniformly over the solid angle.
     #[inline(always)]
     pub fn sample(&self, u: [f32; 2]) -> [f32; 2] {
-        // The slice of the rectangle up to x has the fraction u₀ of the solid angle.
+        // The part of the rectangle up to x has the fraction u₀ of the solid angle.
         let (sin, cos) = sin_cos(u[0] * self.solid_angle + self.start);
-        // sin² of the angle of the lower plane.
+        // sin² of the lower plane's angle.
         let tilt = 1.0 - self.lower * self.lower;
-        // Along the slice, x/−z = sin/√(slope² − tilt·sin²), with the sign of the slope.
+        // On this slice, x/−z = sin/√(slope² − tilt·sin²), with the sign of the slope.
         let slope = cos * self.lower - self.upper;
         let sin = if slope < 0.0 { -sin } else { sin };
         let root = (slope * slope - tilt * (sin * sin)).max(f32::MIN_POSITIVE).sqrt();
         let x = (-self.z * sin / root).max(self.x[0]).min(self.x[1]);
-        // At that x, heights on the unit circle are uniform.
+        // For this x, heights on the unit circle are uniformly distributed.
         let d2 = x * x + self.z * self.z;
         let (h0, h1) = (towards(self.y[0], d2), towards(self.y[1], d2));
         let h = h0 + u[1] * (h1 - h0);

@@ -2,14 +2,14 @@
 
 use crate::math::Vec3;
 
-/// A sampled point on an area light, computed without branches.
+/// A sampled point on an area light. The computation is branchless.
 #[derive(Clone, Copy, Debug)]
 pub struct LightSamplePoint {
     /// Unit direction to the sampled point.
     pub direction: Vec3,
     /// Sampled point.
     pub target: Vec3,
-    /// Inverse pdf of the direction in sr; 0 from behind or from inside the light.
+    /// Inverse pdf of the direction, in sr. 0 if the point is behind or inside the light.
     pub factor: f32,
 }
 

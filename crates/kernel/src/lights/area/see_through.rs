@@ -1,4 +1,4 @@
-//! One side of a see-through round shape or box: surfaces behind the near side are visible through it.
+//! One side of a see-through round shape or box. Surfaces behind the near side are visible through it.
 
 use super::sample_point::LightSamplePoint;
 use super::{LightHit, ShapeEmitter, Side};
@@ -6,7 +6,7 @@ use crate::geometry::{AreaPoint, Shape};
 use crate::math::{DVec3, Vec2, Vec3};
 use crate::sampling::distribution::Discrete;
 
-/// One side of a shape, sampled by area. Shadow rays account for the parts of the shape in between.
+/// One side of a shape, sampled by area. Shadow rays account for other parts of the shape in between.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SeeThroughEmitter {
     shape: Shape,
@@ -16,7 +16,7 @@ pub struct SeeThroughEmitter {
 }
 
 impl SeeThroughEmitter {
-    /// The emitter of one side of a shape. `None` if the shape has no area.
+    /// Creates an emitter for one side of a shape. `None` if the shape has no area.
     pub fn new(shape: &Shape, side: Side) -> Option<Self> {
         let outwards = match side {
             Side::Front => 1.0,

@@ -1,4 +1,4 @@
-//! Sphere lights, sampled over the cone that they subtend.
+//! Sphere lights, sampled over the cone they subtend.
 
 use std::f32::consts::PI;
 
@@ -18,8 +18,8 @@ pub struct SphereEmitter {
 }
 
 impl ShapeEmitter for SphereEmitter {
-    /// Samples uniformly over the solid angle (*Physically Based Rendering*, 4th ed., section 6.2.4), accurately even for narrow
-    /// cones.
+    /// Samples uniformly over the solid angle (*Physically Based Rendering*, 4th ed., section 6.2.4).
+    /// Accurate even for narrow cones.
     #[inline(always)]
     fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
         let (axis, distance, sin2_max) = self.cone_around(point);
@@ -27,7 +27,7 @@ impl ShapeEmitter for SphereEmitter {
         let sin2_max = if is_outside { sin2_max } else { 0.0 };
         let one_minus_cos_max = one_minus_cos(sin2_max);
         let local = warp::cone(u, one_minus_cos_max);
-        // The near intersection along a direction at angle θ from the axis: d·cos θ − √(R² − d²·sin²θ).
+        // Near intersection along a direction at angle θ from the axis: d·cos θ − √(R² − d²·sin²θ).
         let sin2 = local.x * local.x + local.y * local.y;
         let depth = (sin2_max - sin2).max(0.0).sqrt();
         let direction = Frame::from_normal(axis).to_world(local);
@@ -50,12 +50,13 @@ impl ShapeEmitter for SphereEmitter {
 }
 
 impl SphereEmitter {
-    /// Unit direction to the center, distance, and sin² of the half angle. `None` from inside.
+    /// Unit direction to the center, distance, and sin² of the half angle. `None` if the point is inside the
+    /// sphere.
     fn cone(&self, point: Vec3) -> Option<(Vec3, f32, f32)> {
         Some(self.cone_around(point)).filter(|(_, _, sin2)| *sin2 < 1.0)
     }
 
-    /// Like [`SphereEmitter::cone`], but from inside it returns a sin² of at least 1.
+    /// Like [`SphereEmitter::cone`], but returns a sin² of at least 1 for points inside the sphere.
     #[inline(always)]
     fn cone_around(&self, point: Vec3) -> (Vec3, f32, f32) {
         let to_center = self.center - point.as_dvec3();

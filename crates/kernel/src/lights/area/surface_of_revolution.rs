@@ -1,4 +1,4 @@
-//! Cylinder and cone lights: a curved side with caps.
+//! Cylinder and cone lights: a curved side and caps.
 
 use super::disk::{DiskEmitter, perpendicular};
 use super::meridians::{MeridianDistribution, PolarFrame, SinCos};
@@ -8,7 +8,7 @@ use crate::geometry::cone::Cone;
 use crate::geometry::cylinder::Cylinder;
 use crate::math::{DVec3, Vec3};
 
-/// A curved side and its caps, at most one of which is visible from any point.
+/// A curved side and its caps. At most one cap is visible from any point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RevolutionEmitter<S> {
     side: S,
@@ -16,12 +16,12 @@ pub struct RevolutionEmitter<S> {
     middle: DVec3,
 }
 
-/// The curved side of a light, which intersects each half plane around a pole in one interval.
+/// The curved side of a light. It intersects every half plane around a pole in a single interval.
 pub trait RevolutionSide {
     /// The side seen from a point.
     type RevolutionView: RevolutionSideView;
 
-    /// The side seen from a point. `None` if the point is behind it.
+    /// The side seen from a point. `None` if the point is behind the side.
     fn seen_from(&self, point: Vec3) -> Option<Self::RevolutionView>;
 }
 
@@ -30,13 +30,14 @@ pub trait RevolutionSideView {
     /// The pole around which the half planes rotate.
     fn pole(&self) -> &PolarFrame;
 
-    /// The largest angle around the pole at which the side is visible.
+    /// Largest angle around the pole at which the side is visible.
     fn reach(&self) -> SinCos;
 
-    /// Difference of the cosines at the ends of the visible interval, at an angle around the pole.
+    /// Difference between the cosines at the ends of the visible interval, for an angle around the pole.
     fn stretch(&self, around: SinCos) -> f64;
 
-    /// The point of the interval at a fraction `share` of its cosines: its angle from the pole, and its distance.
+    /// The point at a fraction `share` of the interval of cosines. Returns its angle from the pole and its
+    /// distance.
     fn place(&self, around: SinCos, share: f64) -> (SinCos, f64);
 }
 
@@ -49,7 +50,8 @@ struct RevolutionView<V> {
 }
 
 impl<S: RevolutionSide> ShapeEmitter for RevolutionEmitter<S> {
-    /// Samples by solid angle, uniformly except for variations between meridians and the 20 % of a cap.
+    /// Samples nearly uniformly over the solid angle. The density varies between meridians, and by up to 20 %
+    /// on a cap.
     fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
         let view = self.view(point);
         let share = view.share as f32;
@@ -118,7 +120,8 @@ pub struct CylinderSide {
     radius: f64,
 }
 
-/// A cylinder seen from a point. The pole is parallel to the axis; the half planes are at the angles of the cross-section circle.
+/// A cylinder seen from a point. The pole is parallel to the cylinder's axis. Angles around the pole are
+/// those of the cross-section circle as seen from the point.
 pub struct CylinderView {
     pole: PolarFrame,
     reach: SinCos,
@@ -127,7 +130,7 @@ pub struct CylinderView {
     distance: f64,
     /// distance² − radius².
     power: f64,
-    /// Heights of the ends above the point.
+    /// Heights of the ends relative to the point.
     ends: [f64; 2],
 }
 
@@ -168,7 +171,7 @@ impl RevolutionSide for CylinderSide {
 }
 
 impl CylinderView {
-    /// Distance to the cross-section circle, without cancellation.
+    /// Distance to the cross-section circle, computed without cancellation.
     fn to_circle(&self, around: SinCos) -> f64 {
         let off = self.distance * around.sin;
         let half_chord = ((self.radius - off) * (self.radius + off)).max(0.0).sqrt();
@@ -213,12 +216,12 @@ pub struct ConeSide {
     axis: DVec3,
     /// Sine and cosine of the half angle at the tip.
     opening: (f64, f64),
-    /// Length from the tip to the rim of the base.
+    /// Distance from the tip to the rim of the base.
     slant: f64,
 }
 
-/// A cone seen from a point. The pole points to the tip; each half plane contains one straight line on the side, from the tip to
-/// the base.
+/// A cone seen from a point. The pole points to the tip. Each half plane intersects the side in one straight
+/// line from the tip to the base.
 pub struct ConeView {
     pole: PolarFrame,
     reach: SinCos,
@@ -232,7 +235,7 @@ pub struct ConeView {
 }
 
 impl RevolutionEmitter<ConeSide> {
-    /// A light in the shape of a whole cone.
+    /// Creates a light from an entire cone.
     pub fn of_cone(cone: &Cone) -> Self {
         let (base, tip) = (cone.base(), cone.tip());
         let (height, radius) = ((base.centroid() - tip).length(), base.radius());
@@ -274,13 +277,13 @@ impl RevolutionSide for ConeSide {
 }
 
 impl ConeView {
-    /// Angle at the tip between the point and the side's line in a half plane.
+    /// Angle at the tip between the point and the line on the side in a half plane.
     fn at_tip(&self, around: SinCos) -> SinCos {
         let ((m, sin), c) = (self.off_axis, self.cos_opening);
         let q = sin * around.cos;
         let square = m * m + q * q;
         let w = (square - c * c).max(0.0).sqrt();
-        // Choose the nearer of the two lines at this angle from the axis.
+        // Choose the nearer of the two lines that have this angle to the axis.
         let sin = if m > 0.0 { (c - m) * (c + m) / (q * c + m * w) } else { (q * c - m * w) / square };
         SinCos { sin, cos: (m * c + q * w) / square }
     }

@@ -7,9 +7,9 @@ use crate::lights::tree::bounds::mean_channel;
 use crate::math::{DVec3, Vec3};
 use crate::sampling::piecewise_constant::{GridSample, PiecewiseConstant2D};
 
-/// A parallelogram with an emission texture. A fraction of the samples is distributed according to the texture, the rest by solid
-/// angle. Their pdf combines both (one-sample balance heuristic: Veach, *Robust Monte Carlo Methods for Light Transport
-/// Simulation*, 1997, section 9.2.4).
+/// A parallelogram with an emission texture. A fraction of the samples is distributed according to the
+/// texture, the rest by solid angle. The pdf is a mixture of both (one-sample balance heuristic: Veach,
+/// *Robust Monte Carlo Methods for Light Transport Simulation*, 1997, section 9.2.4).
 #[derive(Clone, Debug, PartialEq)]
 pub struct TexturedQuadEmitter {
     quad: QuadEmitter,
@@ -19,17 +19,18 @@ pub struct TexturedQuadEmitter {
     cells: PiecewiseConstant2D,
     /// Fraction of the samples distributed according to the texture.
     share: f32,
-    /// Dot products of these with a point's offset from the corner are its coordinates along the edges.
+    /// Vectors whose dot products with a point's offset from the corner are its coordinates along the edges.
     along: [Vec3; 2],
 }
 
 /// Maximum number of cells along an edge.
 const MAX_CELLS: usize = 256;
 
-/// Minimum and maximum number of texture lookups per cell along each edge.
+/// Minimum and maximum number of texture lookups per cell along each axis.
 const LOOKUPS: (usize, usize) = (2, 4);
 
-/// Maximum fraction of texture samples: the texture does not account for distances.
+/// Maximum fraction of texture samples. It is below 1 because texture sampling does not account for
+/// distances.
 const MAX_TEXTURE_SHARE: f64 = 0.9;
 
 impl ShapeEmitter for TexturedQuadEmitter {
@@ -74,8 +75,8 @@ impl ShapeEmitter for TexturedQuadEmitter {
 }
 
 impl TexturedQuadEmitter {
-    /// Creates an emitter from colors at positions in [0, 1]² along the edges, with `texels` texels along each edge. Returns
-    /// `None` if the texture has too little contrast.
+    /// Creates an emitter. `color` returns the color at a position in [0, 1]² along the edges, and `texels`
+    /// are the numbers of texels along the edges. Returns `None` if the texture has too little contrast.
     pub fn new(quad: QuadEmitter, texels: [f64; 2], color: impl Fn([f64; 2]) -> Vec3) -> Option<Self> {
         let size = texels.map(|count| (count.ceil() as usize).clamp(1, MAX_CELLS));
         let lookups: [usize; 2] = std::array::from_fn(|i| {
@@ -95,7 +96,8 @@ impl TexturedQuadEmitter {
         let rows: Vec<Vec<f64>> = (0..size[1]).map(row).collect();
         let (sum, squares) =
             rows.iter().flatten().fold((0.0, 0.0), |(sum, squares), one| (sum + one, squares + one * one));
-        // Variance of the brightness divided by the mean of its square; 0 for constant brightness.
+        // Variance of the brightness divided by the mean of its square. It is 0 if the brightness is
+        // constant.
         let contrast = 1.0 - sum * sum / (squares * (size[0] * size[1]) as f64);
         let share = (MAX_TEXTURE_SHARE * contrast) as f32;
         let cells =
@@ -103,7 +105,7 @@ impl TexturedQuadEmitter {
         Some(Self { along: quad.along(), quad, size, cells, share })
     }
 
-    /// Pdf in sr⁻¹ at an offset from the point, given the pdf of the quad without its texture.
+    /// Pdf in sr⁻¹ at an offset from the point, given the untextured quad's pdf.
     #[inline(always)]
     fn density(&self, offset: Vec3, to_corner: Vec3, quad_pdf: f32) -> f32 {
         let on_quad = offset - to_corner;
@@ -123,5 +125,5 @@ impl TexturedQuadEmitter {
     }
 }
 
-/// Minimum fraction; textures with less contrast are not worth a lookup.
+/// Minimum fraction of texture samples. Textures with less contrast are not worth the lookups.
 const MIN_TEXTURE_SHARE: f32 = 0.05;

@@ -1,5 +1,5 @@
-//! Torus lights, sampled in slices around the axis and, within each slice, over the part of the tube's circle that faces the
-//! point.
+//! Torus lights. Samples a slice around the axis, then a point on the part of the slice's circle that faces
+//! the shading point.
 
 use std::f64::consts::PI;
 
@@ -25,22 +25,23 @@ const SLICES: usize = 7;
 /// Number of points on a slice's circle at which the density is evaluated.
 const PLACES: usize = 5;
 
-/// Minimum closeness. On the axis, where it would be 0, all slices look the same.
+/// Minimum closeness. Closeness would be 0 on the axis, where all slices look the same.
 const MIN_CLOSENESS: f64 = 0.01;
 
 /// A torus seen from a point outside it.
 ///
-/// A slice is a half plane through the axis at an angle φ from the point. Its parameter τ satisfies closeness·φ = sinh τ: near
-/// the point, slices are as dense as its distance requires; farther away, they are uniform in the logarithm of their distance.
-/// The visible part of a slice's circle is bounded by the tangents from the point's projection onto the slice's plane (its foot).
-/// If the circle were replaced by a plane, sines of elevations would be uniform.
+/// A slice is a half plane through the axis at an angle φ from the point. Its parameter τ satisfies
+/// closeness·φ = sinh τ. Near the point, the density of slices is adapted to the point's distance; farther
+/// away, slices are uniform in the logarithm of their distance. The foot is the point's projection onto the
+/// slice's plane. The tangents from the foot bound the visible part of the slice's circle. If the circle were
+/// replaced by a plane, the sine of the elevation would be uniformly distributed.
 struct TorusView {
     point: DVec3,
-    /// Unit vectors: from the axis toward the point, along the axis, and perpendicular to both.
+    /// Unit vectors from the axis toward the point, along the axis, and perpendicular to both.
     out: DVec3,
     axis: DVec3,
     across: DVec3,
-    /// Distance of the point from the axis, and height above the plane of the tube's center circle.
+    /// Distance of the point from the axis, and its height above the plane of the tube's center circle.
     distance: f64,
     height: f64,
     radius: f64,
@@ -51,20 +52,21 @@ struct TorusView {
     reach: f64,
 }
 
-/// The visible part of a slice. All lengths are in the slice's plane, relative to the foot of the point.
+/// The visible part of a slice. Lengths are measured from the foot in the slice's plane.
 struct TorusSlice {
     /// Sine and cosine of φ.
     turn: SinCos,
     /// Distance from the axis to the foot.
     foot: f64,
-    /// Distance from the point to the plane.
+    /// Distance from the point to the slice's plane.
     off: f64,
-    /// Direction to the circle's center, as (outward, along the axis).
+    /// Direction from the foot to the circle's center, as (outward, along the axis).
     to_middle: [f64; 2],
-    /// Smallest distance to the circle, and the power of the foot (the product of both distances along any line through it).
+    /// Smallest distance from the foot to the circle, and the power of the foot (the product of both
+    /// distances along any line through it).
     gap: f64,
     power: f64,
-    /// The largest sine of the elevation.
+    /// Maximum sine of the elevation.
     sine: f64,
 }
 
@@ -76,13 +78,13 @@ struct SlicePoint {
     /// Offset from the foot, outward and along the axis.
     outwards: f64,
     upwards: f64,
-    /// Solid angle per unit of φ and of the sine, as a fraction of the largest sine.
+    /// Solid angle per unit of φ and per unit of the sine relative to its maximum.
     factor: f64,
 }
 
 impl ShapeEmitter for TorusEmitter {
-    /// Samples a direction whose first hit on the torus faces the point. If a direction enters the torus twice, its pdf includes
-    /// both hits, so that no sample is occluded.
+    /// Samples a direction toward the front of the torus. If the direction enters the torus twice, its pdf
+    /// includes both hits, and the sample is the nearer one, so it is never occluded by the torus.
     fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
         let Some(view) = TorusView::new(&self.torus, point) else { return LightSamplePoint::NOTHING };
         let slices = view.slices();
@@ -102,7 +104,7 @@ impl ShapeEmitter for TorusEmitter {
         let offset = view.offset(&slice, &place);
         let direction = offset.normalize();
         let (densities, first) = view.densities(&self.torus, &slices, direction);
-        // A grazing ray may miss the torus due to rounding.
+        // A grazing ray may miss the torus because of rounding.
         let (density, distance) =
             first.map_or((own, offset.length()), |first| (densities.max(0.5 * own), first));
         let direction = direction.as_vec3();
@@ -117,7 +119,7 @@ impl ShapeEmitter for TorusEmitter {
         TorusView::new(&self.torus, from).map_or(0.0, |view| {
             let slices = view.slices();
             let (density, first) = view.densities(&self.torus, &slices, met.direction.as_dvec3());
-            // A ray that passes through the first surface finds another one, which is never sampled.
+            // A ray may continue through the first surface and hit another one, which is never sampled.
             let is_later = first.is_some_and(|first| f64::from(met.distance) > first * (1.0 + SAME_DISTANCE));
             if is_later { 0.0 } else { density as f32 }
         })
@@ -151,8 +153,8 @@ impl TorusView {
             return None;
         }
         let closeness = ((distance * radius).sqrt() / gap).max(MIN_CLOSENESS);
-        // Between the planes of its top and bottom and outside the ring, the far side of the ring is invisible, and its near side
-        // is visible up to the reach of the circles.
+        // Outside the ring and between the planes of its top and bottom, the far side of the ring is
+        // invisible. Its near side is visible up to the reach of the circles.
         let is_beside = height.abs() < tube && beside > 0.0;
         let widest = if is_beside {
             let half = ((tube - height) * (tube + height)).sqrt();
@@ -175,10 +177,9 @@ impl TorusView {
         })
     }
 
-    /// Density over τ of the slices on one side, with τ relative to its maximum.
+    /// Density of the slices on one side over τ, relative to its maximum.
     fn slices(&self) -> PiecewiseLinear<SLICES> {
-        // Compute sinh and cosh from powers of e
-        // step.
+        // Compute sinh and cosh from powers of e^step.
         let step = libm::exp(self.reach / (SLICES - 1) as f64);
         let mut power = 1.0;
         PiecewiseLinear(std::array::from_fn(|_| {
@@ -223,7 +224,8 @@ impl TorusView {
         outwards * place.outwards + self.axis * place.upwards + along * slice.off
     }
 
-    /// Sum of the pdfs in sr⁻¹ at all points where a direction enters the torus, and the distance to the first one.
+    /// Sum of the pdfs in sr⁻¹ at all points where the ray enters the torus, and the distance to the first
+    /// one.
     fn densities(
         &self,
         torus: &Torus,
@@ -257,26 +259,26 @@ impl TorusView {
 }
 
 impl TorusSlice {
-    /// Tangent of the angle to the circle's center, from a sine relative to the largest.
+    /// Tangent of the angle to the circle's center, from the relative sine of the elevation.
     fn tangent(&self, sine: f64) -> f64 {
         let sine = sine * self.sine;
         let distance = (self.gap * self.gap + self.off * self.off).sqrt();
         distance * sine / ((1.0 - sine) * (1.0 + sine)).sqrt() / self.gap
     }
 
-    /// Sine relative to the largest, from a tangent.
+    /// Relative sine of the elevation, from the tangent of the angle to the circle's center.
     fn sine_of(&self, tangent: f64) -> f64 {
         let y = self.gap * tangent;
         y / (self.gap * self.gap + self.off * self.off + y * y).sqrt() / self.sine
     }
 
-    /// Density of the sines from the smallest to the largest.
+    /// Density over the relative sine, from minimum to maximum.
     fn sines(&self, view: &TorusView) -> PiecewiseLinear<PLACES> {
         let sine = |i: usize| 2.0 * i as f64 / (PLACES - 1) as f64 - 1.0;
         PiecewiseLinear(std::array::from_fn(|i| self.place(view, self.tangent(sine(i))).factor))
     }
 
-    /// The near point of the circle at the tangent of an angle to its center.
+    /// Near point on the circle, given the tangent of the angle to the circle's center.
     fn place(&self, view: &TorusView, tangent: f64) -> SlicePoint {
         let cos = 1.0 / (1.0 + tangent * tangent).sqrt();
         let sin = tangent * cos;
@@ -285,9 +287,8 @@ impl TorusSlice {
         let to_circle = self.power / (middle * cos + half_chord);
         let [u, v] = self.to_middle;
         let (outwards, upwards) = (to_circle * (cos * u - sin * v), to_circle * (cos * v + sin * u));
-        // The solid angle of dη·dφ is ring·D²/d³, with d² = D² + off². With y = gap·tan η and its sine of elevation s, dη =
-        // gap·dy/(gap² + y²) and dy = (gap² + off² + y²)
-        // (3/2)/(gap² + off²) ds.
+        // The solid angle of dη·dφ is ring·D²/d³ with d² = D² + off². Let y = gap·tan η and let s be the sine
+        // of its elevation. Then dη = gap·dy/(gap² + y²) and dy = (gap² + off² + y²)^(3/2)/(gap² + off²) ds.
         let (g2, off2) = (self.gap * self.gap, self.off * self.off);
         let (y2, d2) = (g2 * tangent * tangent, to_circle * to_circle);
         let ratio = (g2 + off2 + y2) / (d2 + off2);

@@ -8,10 +8,10 @@ use crate::geometry::triangle::Triangle;
 use crate::math::{DVec3, Vec2, Vec3};
 use crate::sampling::warp;
 
-/// Minimum solid angle in sr for solid-angle sampling; below it, area sampling is as good.
+/// Minimum solid angle in sr for solid-angle sampling. For smaller triangles, area sampling is equally good.
 const MIN_SOLID_ANGLE: f64 = 1e-3;
 
-/// Difference from a hemisphere, in sr, at which the corners are on a great circle within rounding.
+/// Difference from a hemisphere, in sr, below which the corners are considered to be on a great circle.
 const ALMOST_HALF: f64 = 1e-4;
 
 /// A triangle that emits toward (b − a) × (c − a).
@@ -68,7 +68,7 @@ impl ShapeEmitter for TriangleEmitter {
 }
 
 impl TriangleEmitter {
-    /// The emitter of an entire triangle. `None` if it has no area.
+    /// The emitter for an entire triangle. `None` if it has no area.
     pub fn new(triangle: &Triangle) -> Option<Self> {
         let Triangle { a, b, c } = *triangle;
         let normal = (b - a).cross(c - a);
@@ -80,7 +80,7 @@ impl TriangleEmitter {
         })
     }
 
-    /// The triangle seen from a point. `None` from behind.
+    /// The triangle seen from a point. `None` if the point is behind the triangle.
     fn seen_from(&self, point: DVec3) -> Option<([DVec3; 3], SphericalTriangle)> {
         let offsets = self.corners.map(|corner| corner - point);
         let corners = offsets.map(DVec3::normalize);
@@ -98,23 +98,24 @@ impl SphericalTriangle {
         (MIN_SOLID_ANGLE..TAU - ALMOST_HALF).contains(&self.solid_angle)
     }
 
-    /// Samples uniformly over the solid angle (Arvo, *Stratified Sampling of Spherical Triangles*, 1995). First choose a new
-    /// corner on the side a–c such that its triangle with a and b has the required fraction of the solid angle; then choose a
-    /// point on the arc from b to that corner, uniformly in height.
+    /// Samples uniformly over the solid angle (Arvo, *Stratified Sampling of Spherical Triangles*, 1995).
+    /// Chooses a new corner on the side a–c, such that its triangle with a and b has the required fraction of
+    /// the solid angle. Then chooses a point on the arc from b to the new corner, uniformly in height.
     fn sample(&self, u: [f64; 2]) -> DVec3 {
         let [a, b, c] = self.corners;
-        // The angle at a, between the planes through b and c.
+        // Angle at a, between the planes through b and c.
         let (to_b, to_c) = (b - a * a.dot(b), c - a * a.dot(c));
         let alpha = libm::atan2(a.dot(to_b.cross(to_c)).abs(), to_b.dot(to_c));
         let (sin_alpha, cos_alpha) = libm::sincos(alpha);
-        // With the angles β at b and γ at the new corner, α + β + γ = π + share. With ψ = share − α and the cosine of the side
-        // a–b, the spherical law of cosines gives the side from a to the new corner.
+        // Let β and γ be the angles at b and at the new corner. Then α + β + γ = π + share. With ψ = share −
+        // α and the cosine of the side a–b, the side from a to the new corner follows from the spherical law
+        // of cosines.
         let (sin, cos) = libm::sincos(u[0] * self.solid_angle - alpha);
         let (p, q) = (cos - cos_alpha, sin + sin_alpha * a.dot(b));
         let cos_side = ((q * cos - p * sin) * cos_alpha - q) / ((q * sin + p * cos) * sin_alpha);
         let cos_side = cos_side.clamp(a.dot(c).min(1.0), 1.0);
         let corner = a * cos_side + to_c.normalize() * ((1.0 - cos_side) * (1.0 + cos_side)).sqrt();
-        // Cosines along the arc from b to the new corner are uniform.
+        // Cosines are uniform along the arc from b to the new corner.
         let from_b = corner - b * b.dot(corner);
         let versine = u[1] * (1.0 - corner.dot(b)).max(0.0);
         let across = (versine * (2.0 - versine)).max(0.0).sqrt();

@@ -1,4 +1,4 @@
-//! Delta lights: no ray hits them, and their light arrives from a single direction.
+//! Delta lights. Rays cannot hit them, and their light arrives from a single direction.
 
 mod point;
 mod spot;
@@ -12,31 +12,32 @@ use super::tree::LightBounds;
 use crate::math::Vec3;
 use crate::math::lanes::{Vec3x16, lane};
 
-/// A light without extent: a point light or spotlight.
+/// A light without extent: a point light or a spotlight.
 pub trait DeltaLight {
-    /// The isotropic light with the same position, falloff and peak intensity.
+    /// The isotropic light with the same position, falloff, and peak intensity.
     fn isotropic(&self) -> &PointLight;
 
-    /// Intensity in a unit direction away from the light, relative to the peak intensity; in [0, 1].
+    /// Intensity in a unit direction away from the light, relative to the peak intensity, in [0, 1].
     fn share(&self, away: Vec3) -> f32;
 
     /// Power divided by the peak intensity, in sr: the integral of [`DeltaLight::share`].
     fn solid_angle(&self) -> f64;
 
-    /// Samples a unit direction away from the light with `u` in [0, 1)², proportionally to its intensity.
+    /// Samples a unit direction away from the light, proportionally to the intensity. `u` is in [0, 1)².
     fn direction(&self, u: [f32; 2]) -> Vec3;
 
-    /// Bounds of its position and emission; nothing is emitted outside the cone.
+    /// Bounds of the light's position and emission. Nothing is emitted outside the cone.
     fn bounds(&self) -> LightBounds;
 
-    /// Unit direction from a point to the light, and the irradiance at normal incidence; 0 at the light's own position.
+    /// Unit direction from a point to the light, and irradiance at normal incidence (0 at the light's
+    /// position).
     #[inline(always)]
     fn arriving(&self, point: Vec3) -> (Vec3, Vec3) {
         let (direction, weight) = self.isotropic().irradiance(point);
         (direction, weight * self.share(-direction))
     }
 
-    /// [`Light::sample`](super::Light::sample); there is only one direction.
+    /// [`Light::sample`](super::Light::sample). There is only one direction.
     fn sample(&self, point: Vec3) -> Option<LightSample> {
         let (direction, weight) = self.arriving(point);
         let end = ShadowRayEnd::At(self.isotropic().position.as_vec3());

@@ -13,14 +13,14 @@ use crate::sampling::warp;
 pub struct PointLight {
     /// Position.
     pub position: DVec3,
-    /// Intensity in W·sr⁻¹; without falloff, the irradiance at normal incidence.
+    /// Intensity in W·sr⁻¹. Without falloff, irradiance at normal incidence.
     pub intensity: Vec3,
     /// Falloff with distance.
     pub falloff: Falloff,
 }
 
 choice! {
-    /// Fall-off of a point light with distance.
+    /// Falloff of a point light with distance.
     pub enum Falloff {
         /// Inverse-square falloff.
         Square = "square",
@@ -30,7 +30,7 @@ choice! {
 }
 
 impl PointLight {
-    /// Unit direction to the light, and the irradiance at normal incidence; 0 at the light's own position.
+    /// Unit direction to the light, and irradiance at normal incidence (0 at the light's position).
     #[inline(always)]
     pub(super) fn irradiance(&self, point: Vec3) -> (Vec3, Vec3) {
         let to_light = self.position - point.as_dvec3();

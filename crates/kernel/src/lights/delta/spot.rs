@@ -12,13 +12,13 @@ use crate::sampling::warp;
 /// A point light that emits into a cone.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SpotLight {
-    /// The same light without the cone.
+    /// The same light without the restriction to a cone.
     pub point: PointLight,
-    /// Unit direction of the cone's axis, away from the light.
+    /// Unit vector along the cone's axis, away from the light.
     pub axis: Vec3,
     /// Half the cone's angle in radians, in (0, π].
     pub half_angle: f32,
-    /// Outer fraction of the half angle, in [0, 1], over which the intensity fades linearly with the angle.
+    /// Outer fraction of the half angle, in [0, 1], where the intensity fades linearly with the angle.
     pub blend: f32,
 }
 
@@ -29,7 +29,7 @@ impl DeltaLight for SpotLight {
 
     #[inline(always)]
     fn share(&self, away: Vec3) -> f32 {
-        // Use the sine of half the angle, which is accurate even where the cosine of a small angle is not.
+        // Use the sine of half the angle, which is accurate even for small angles, unlike the cosine.
         let half_sine = (away - self.axis).length() * 0.5;
         let half_sine = if half_sine < 1.0 { half_sine } else { 1.0 };
         let angle = 2.0 * (FRAC_PI_2 - acos(half_sine));
@@ -39,7 +39,8 @@ impl DeltaLight for SpotLight {
         if inside > 0.0 || self.half_angle >= PI { share } else { 0.0 }
     }
 
-    /// The inner cone of half angle (1 − blend)·H, plus the integral of (H − θ)/(blend·H) over the directions around it.
+    /// The solid angle of the inner cone with half angle (1 − blend)·H, plus the integral of (H −
+    /// θ)/(blend·H) over the directions between both cones.
     #[inline]
     fn solid_angle(&self) -> f64 {
         let SpotCone { inner, faded, .. } = self.cones();
@@ -79,11 +80,11 @@ impl SpotLight {
     }
 }
 
-/// The inner and outer cone of a spotlight.
+/// A spotlight's inner and outer cone.
 struct SpotCone {
-    /// Half the cone's angle.
+    /// Half angle of the outer cone.
     half: f64,
-    /// Width of the outer part, over which it fades.
+    /// Angular width of the fading part.
     width: f64,
     /// Power of the inner cone divided by the intensity on the axis, in sr.
     inner: f64,
@@ -91,8 +92,8 @@ struct SpotCone {
     faded: f64,
 }
 
-/// ∫ t·sin(H − t) dt from the edge of a cone inward to δ. Small angles use the first terms of the sine series; the remainder is
-/// less than 1e-9 of the result.
+/// ∫ t·sin(H − t) dt from the edge of a cone (t = 0) inward to t = δ. For small angles, uses the first terms
+/// of the sine series, with a relative error below 1e-9.
 fn edge(half: f64, delta: f64) -> f64 {
     if half < 0.02 {
         let (h2, d2) = (half * half, delta * delta);
@@ -103,12 +104,12 @@ fn edge(half: f64, delta: f64) -> f64 {
     delta * cos - 2.0 * sin_half * (cos * cos_half - sin * sin_half)
 }
 
-/// Inverts [`edge`]: the distance inward from the edge of a cone, in [0, width], at which it reaches a fraction `part` of its
-/// total. Uses bracketed Newton iteration, whose last step is far smaller than the previous one.
+/// Inverts [`edge`]. Returns the δ in [0, width] at which the integral reaches a fraction `part` of its
+/// total. Uses a bracketed Newton iteration.
 fn from_edge(half: f64, width: f64, part: f64) -> f64 {
     let goal = part * edge(half, width);
     let (mut low, mut high) = (0.0, width);
-    // Near the edge the integral grows with the square, or with the cube for the widest cone.
+    // Near the edge, the integral is quadratic in δ, or cubic for the widest cone.
     let mut delta = width * part.sqrt();
     for _ in 0..60 {
         let off = edge(half, delta) - goal;
@@ -130,7 +131,7 @@ mod tests {
     use crate::lights::delta::Falloff;
     use crate::math::DVec3;
 
-    /// Relative intensity of a cone, at an angle in degrees from its axis.
+    /// Relative intensity of a spotlight, at an angle in degrees from the axis.
     fn share(half_angle: f64, blend: f32, angle: f64) -> f32 {
         let position = DVec3::new(1.0, 2.0, 3.0);
         let point = PointLight { position, intensity: Vec3::ONE, falloff: Falloff::None };

@@ -1,4 +1,4 @@
-//! Directional lights: a single direction, or a disk in the sky.
+//! Directional lights, which are a single direction or a disk in the sky.
 
 use std::f32::consts::PI;
 
@@ -18,14 +18,14 @@ pub struct DirectionalLight {
     pub to_light: Vec3,
     /// Irradiance on a surface that faces the light.
     pub irradiance: Vec3,
-    /// 1 − cos of half the angular diameter; 0 for a light without extent.
+    /// 1 − cos of half the angular diameter. 0 for a light without extent.
     one_minus_cos: f32,
-    /// Radiance of the disk; 0 without extent.
+    /// Radiance of the disk. 0 for a light without extent.
     radiance: Vec3,
 }
 
 impl DirectionalLight {
-    /// A light with an angular diameter of `angle` radians, up to π. An angle of 0 makes it sharp.
+    /// A light with an angular diameter of `angle` radians, up to π. The light has no extent if `angle` is 0.
     pub fn new(to_light: Vec3, irradiance: Vec3, angle: f64) -> Self {
         let (quarter, half) = (libm::sin(angle / 4.0), libm::sin(angle / 2.0));
         let radiance = if angle > 0.0 {
@@ -53,7 +53,8 @@ impl DirectionalLight {
         infinite_packet_of!(i => self.arriving([u[0][i], u[1][i]]))
     }
 
-    /// A unit direction to the light, with the radiance divided by its pdf, or the irradiance for a light without extent.
+    /// A unit direction to the light, and the radiance divided by the pdf. The irradiance instead if the
+    /// light has no extent.
     #[inline(always)]
     pub fn arriving(&self, u: [f32; 2]) -> (Vec3, Vec3) {
         if self.is_sharp() {
@@ -63,23 +64,23 @@ impl DirectionalLight {
         (direction, self.radiance * self.inverse_pdf())
     }
 
-    /// Radiance from a direction; 0 for a light without extent.
+    /// Radiance from a direction. 0 for a light without extent.
     pub fn radiance(&self, direction: Vec3) -> Vec3 {
         if self.contains(direction) { self.radiance } else { Vec3::ZERO }
     }
 
-    /// Pdf of [`DirectionalLight::sample`] in sr⁻¹; 0 without extent.
+    /// Pdf of [`DirectionalLight::sample`] in sr⁻¹. 0 for a light without extent.
     pub fn pdf(&self, direction: Vec3) -> f32 {
         if self.contains(direction) { 1.0 / self.inverse_pdf() } else { 0.0 }
     }
 
-    /// Inverse of [`DirectionalLight::pdf`] inside the disk; 0 without extent.
+    /// Inverse of [`DirectionalLight::pdf`] inside the disk. 0 for a light without extent.
     #[inline(always)]
     pub fn inverse_pdf(&self) -> f32 {
         2.0 * PI * self.one_minus_cos
     }
 
-    /// Whether a unit direction is inside the disk. Compares chords, which stays accurate for small disks.
+    /// Whether a unit direction is inside the disk. Compares chords, which is accurate even for small disks.
     fn contains(&self, direction: Vec3) -> bool {
         !self.is_sharp() && (direction - self.to_light).length_squared() <= 2.0 * self.one_minus_cos
     }
@@ -98,7 +99,7 @@ impl InfiniteLight for DirectionalLight {
         LightBounds {
             space: DistanceFalloff::Beyond,
             center: self.to_light.as_dvec3(),
-            // The chord from the center to the edge.
+            // Chord from the center to the edge.
             radius: (2.0 * f64::from(self.one_minus_cos)).sqrt(),
             power: mean_channel(self.irradiance),
             cone: EmissionCone::ALL,
@@ -129,7 +130,7 @@ mod tests {
                 let u = PixelSampler::new(1, 2, 3, sample).pair(1, Dimension::Light(0)).to_array();
                 let sample = sun.sample(u).expect("light");
                 assert_eq!(sample.end, ShadowRayEnd::Beyond);
-                // At the very edge, rounding decides.
+                // At the edge, the result depends on rounding.
                 if sun.pdf(sample.direction) > 0.0 {
                     let product =
                         sun.radiance(sample.direction).x / sun.pdf(sample.direction) / sample.weight.x;

@@ -13,10 +13,10 @@ use crate::math::lanes::{F32x16, PACKET_SIZE, Vec3x16, lane, set_lane};
 use crate::math::{DVec3, Vec3};
 use crate::sampling::warp;
 
-/// Light from every direction, visible to rays that leave the scene.
+/// Light from all directions, visible to rays that leave the scene.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Environment {
-    /// The same radiance everywhere.
+    /// The same radiance from all directions.
     Constant(Vec3),
     /// A radiance map.
     Map {
@@ -24,21 +24,22 @@ pub enum Environment {
         sky: Arc<EnvironmentMap>,
         /// Radiance of a white texel.
         factor: Vec3,
-        /// Rotation about +y as a fraction of 360°, counterclockwise seen from above, in [0, 1).
+        /// Rotation about +y as a fraction of 360°, counterclockwise when seen from above, in [0, 1).
         turn: f32,
     },
 }
 
-/// Sampling pdf of a constant environment: uniform over the hemisphere above the surface.
+/// Sampling pdf of a constant environment, which is uniform over the hemisphere above the surface.
 const HEMISPHERE_PDF: f32 = 1.0 / (2.0 * PI);
 
 impl Environment {
-    /// A map scaled by `factor` and rotated by an angle in degrees.
+    /// A map that is scaled by `factor` and rotated by an angle in degrees.
     pub fn map(sky: Arc<EnvironmentMap>, factor: Vec3, degrees: f64) -> Self {
         Self::Map { sky, factor, turn: (degrees / 360.0).rem_euclid(1.0) as f32 }
     }
 
-    /// Radiance from a unit direction, and the pdf of [`Environment::sample`] in sr⁻¹, for directions above the surface.
+    /// Radiance from a unit direction, and pdf of [`Environment::sample`] in sr⁻¹. The pdf is for directions
+    /// above the surface.
     #[inline(always)]
     pub fn arriving(&self, direction: Vec3) -> (Vec3, f32) {
         match self {
@@ -92,7 +93,7 @@ impl Environment {
         };
         let mut inverse_pdfs = [0.0; PACKET_SIZE];
         for i in 0..PACKET_SIZE {
-            // The pdf is 0 in corners of cells where only the neighboring texels are bright.
+            // The pdf is 0 at the centers of black texels.
             inverse_pdfs[i] = if pdfs[i] > 0.0 { 1.0 / pdfs[i] } else { 0.0 };
             let weight = lane(&weights, i) * inverse_pdfs[i];
             set_lane(&mut weights, i, weight);
@@ -122,7 +123,7 @@ impl Environment {
         }
     }
 
-    /// Samples the environment for a surface with this normal.
+    /// Samples the environment for a surface with the given normal.
     pub fn sample(&self, normal: Vec3, u: [f32; 2]) -> Option<LightSample> {
         let (direction, radiance, pdf) = match self {
             Self::Constant(radiance) => {
@@ -150,7 +151,7 @@ impl InfiniteLight for Environment {
             Self::Constant(radiance) => (warp::cone(u, 2.0), *radiance * (4.0 * PI)),
             Self::Map { sky, factor, turn } => {
                 let (direction, color, pdf) = sky.sample(u, *turn);
-                // The pdf is 0 in corners of cells where only the neighboring texels are bright.
+                // The pdf is 0 at the centers of black texels.
                 (direction, color * *factor * if pdf > 0.0 { 1.0 / pdf } else { 0.0 })
             }
         }
@@ -160,7 +161,7 @@ impl InfiniteLight for Environment {
         (self.mean().as_dvec3() * (4.0 * std::f64::consts::PI * area)).as_vec3()
     }
 
-    /// All directions, with the irradiance of a surface under the mean radiance.
+    /// A cone of all directions, with the irradiance on a surface due to the mean radiance.
     fn bounds(&self) -> LightBounds {
         let mean = match self {
             Self::Constant(radiance) => mean_channel(*radiance),

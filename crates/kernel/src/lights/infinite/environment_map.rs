@@ -11,17 +11,18 @@ use crate::math::{DVec3, Vec3};
 use crate::sampling::piecewise_constant::{GridSample, PiecewiseConstant2D};
 use crate::sampling::warp;
 
-/// An environment map and its sampling distribution. The top row is at +y, the image center at −z, and the right quarter at +x.
-/// Colors are interpolated between texel centers. A cell is the area between four texel centers, or between two above the first
-/// row and below the last one. Within a cell, the sampling density is proportional to the luminance, interpolated along the row
-/// and along the height.
+/// An environment map and its sampling distribution. The top row is at +y, the image center at −z, and the
+/// right quarter at +x. Colors are interpolated between texel centers. A cell is the area between four texel
+/// centers. Above the first row and below the last row, cells are between two texel centers and the pole.
+/// Within a cell, the sampling density is proportional to the luminance, which is bilinearly interpolated in
+/// azimuth and height.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EnvironmentMap {
     texels: Arc<Texels>,
     cells: PiecewiseConstant2D,
-    /// Cosines of the polar angles at which the rows of cells begin, followed by −1.
+    /// Cosines of the polar angles at the tops of the rows of cells, followed by −1.
     heights: Vec<f64>,
-    /// Pdf in sr⁻¹ of each row, if it were uniform.
+    /// Pdf of each row in sr⁻¹, if the row were uniform.
     pdfs: Vec<f32>,
     /// Mean luminance over all directions.
     mean_luminance: f64,
@@ -32,14 +33,14 @@ pub struct EnvironmentMap {
 struct TexelPosition {
     column: u32,
     row: u32,
-    /// Fractions from left to right and, in terms of angle, from top to bottom.
+    /// Fractions from left to right and from top to bottom. The latter is a fraction of the angle.
     between: [f32; 2],
-    /// The same fractions, but in terms of height from top to bottom.
+    /// Fractions from left to right and from top to bottom. The latter is a fraction of the height.
     along: [f32; 2],
 }
 
 impl EnvironmentMap {
-    /// A map of nonnegative texels. `None` if all are black.
+    /// Creates a map from nonnegative texels. `None` if all are black.
     pub fn new(texels: Arc<Texels>) -> Option<Self> {
         let (columns, rows) = (texels.width as usize, texels.height as usize);
         let height = |row: usize| match row {
@@ -67,7 +68,7 @@ impl EnvironmentMap {
             (f64::from(cells.row_probability(row)) / extent) as f32
         };
         let pdfs = (0..=rows).map(density).collect();
-        // The sum counts both texel rows around each row of cells, and heights from 1 to −1.
+        // Each row of cells has two rows of texels, and the heights range from 1 to −1.
         let mean_luminance = sum / (4.0 * columns as f64);
         Some(Self { texels, cells, heights, pdfs, mean_luminance })
     }
@@ -77,7 +78,7 @@ impl EnvironmentMap {
         self.mean_luminance
     }
 
-    /// Mean color over all directions. Between row centers, colors are linear in the polar angle.
+    /// Mean color over all directions. Between row centers, colors depend linearly on the polar angle.
     pub fn mean(&self) -> Vec3 {
         let rows = self.texels.height;
         let step = std::f64::consts::PI / f64::from(rows);
@@ -85,7 +86,7 @@ impl EnvironmentMap {
         let of_row = |row: u32| {
             let sum: DVec3 = (0..self.texels.width).map(|x| self.texels.get(x, row).as_dvec3()).sum();
             let at = f64::from(row);
-            // Integrate ∫ sin θ dθ, weighted by the row's interpolation weight, above and below it.
+            // Integrate sin θ times the row's interpolation weight, above and below the row.
             let above = if row == 0 { 1.0 - cos(at) } else { (sin(at) - sin(at - 1.0)) / step - cos(at) };
             let is_last = row + 1 == rows;
             let below = if is_last { 1.0 + cos(at) } else { cos(at) - (sin(at + 1.0) - sin(at)) / step };
@@ -95,8 +96,8 @@ impl EnvironmentMap {
         (sum / (2.0 * f64::from(self.texels.width))).as_vec3()
     }
 
-    /// Color in a unit direction, and the sampling pdf there in sr⁻¹. `turn` is the map's rotation about +y, as a
-    /// fraction of 360°, counterclockwise seen from above.
+    /// Color and sampling pdf in sr⁻¹ for a unit direction. `turn` is the map's rotation about +y, as a
+    /// fraction of 360°, counterclockwise when seen from above.
     #[inline(always)]
     pub fn lookup(&self, direction: Vec3, turn: f32) -> (Vec3, f32) {
         let place = self.place(direction, turn);
@@ -105,7 +106,8 @@ impl EnvironmentMap {
         (color(&corners, place.between), density * share(&luminances(&corners), place.along))
     }
 
-    /// Samples a unit direction; returns it with the color and pdf that [`EnvironmentMap::lookup`] would return.
+    /// Samples a unit direction. Returns the direction, and the color and pdf that [`EnvironmentMap::lookup`]
+    /// would return for it.
     #[inline(always)]
     pub fn sample(&self, u: [f32; 2], turn: f32) -> (Vec3, Vec3, f32) {
         let GridSample { column, row, rest } = self.cells.sample(u);
@@ -117,14 +119,16 @@ impl EnvironmentMap {
         (direction, color(&corners, [along[0], down]), density * share(&luminances, along))
     }
 
-    /// The unit direction at fractions of a cell along its row and along its height, and the vertical fraction in terms of angle.
+    /// Unit direction at the fractions `along` of a cell, in azimuth and height. Also returns the vertical
+    /// fraction in terms of angle.
     #[inline(always)]
     fn towards(&self, column: f32, row: usize, along: [f32; 2], turn: f32) -> (Vec3, f32) {
         let extent = self.heights[row + 1] - self.heights[row];
         self.by_height(column, row as f32, self.heights[row] + extent * f64::from(along[1]), along[0], turn)
     }
 
-    /// The unit direction at height `y` in a cell, at a fraction along its row, and the vertical fraction in terms of angle.
+    /// Unit direction at height `y` in a cell and at a fraction of its azimuth. Also returns the vertical
+    /// fraction in terms of angle.
     #[inline(always)]
     fn by_height(&self, column: f32, row: f32, y: f64, along: f32, turn: f32) -> (Vec3, f32) {
         let across = ((1.0 - y) * (1.0 + y)).max(0.0).sqrt() as f32;
@@ -135,7 +139,8 @@ impl EnvironmentMap {
         (direction, down.max(0.0).min(1.0))
     }
 
-    /// [`EnvironmentMap::sample`] for a packet: unit directions, colors and pdfs. Memory lookups alternate with branch-free loops.
+    /// [`EnvironmentMap::sample`] for a packet. Returns unit directions, colors, and pdfs. Memory lookups
+    /// alternate with branchless loops.
     #[inline(always)]
     pub fn sample_row(&self, u: &[F32x16; 2], turn: f32) -> (Vec3x16, Vec3x16, F32x16) {
         let (mut columns, mut rows, mut rest) = ([0; PACKET_SIZE], [0; PACKET_SIZE], [[0.0; PACKET_SIZE]; 2]);
@@ -210,14 +215,14 @@ impl EnvironmentMap {
         (x, atan2(across, direction.y) * (1.0 / PI) * height + 0.5)
     }
 
-    /// Column and row of cell coordinates.
+    /// Column and row of a cell from cell coordinates.
     #[inline(always)]
     fn cell(&self, x: f32, y: f32) -> (u32, u32) {
-        // A number just below 0 may have been rounded up to the width.
+        // A number just below 0 may have become equal to the width because of rounding.
         ((x as u32).min(self.texels.width - 1), (y as u32).min(self.texels.height))
     }
 
-    /// Fraction of a cell row's height above a direction.
+    /// Fraction of a cell row's height that is above a direction.
     #[inline(always)]
     fn part_of_height(&self, row: u32, y: f32) -> f32 {
         let (top, bottom) = (self.heights[row as usize], self.heights[row as usize + 1]);
@@ -237,7 +242,7 @@ impl EnvironmentMap {
     /// The texels around a cell.
     #[inline(always)]
     fn corners(&self, column: u32, row: u32) -> [Vec3; 4] {
-        // Avoid `map`, which may not be inlined.
+        // Avoid `map` because it may not be inlined.
         let [a, b, c, d] = self.corner_places(column, row);
         [self.texels.at(a), self.texels.at(b), self.texels.at(c), self.texels.at(d)]
     }
@@ -277,7 +282,7 @@ fn luminances(corners: &[Vec3; 4]) -> [f32; 4] {
     corners.map(luminance)
 }
 
-/// Pdf at a position in a cell, relative to the cell's mean.
+/// Pdf at a position in a cell, relative to the mean pdf in the cell.
 #[inline(always)]
 fn share(luminances: &[f32; 4], along: [f32; 2]) -> f32 {
     let [a, b, c, d] = *luminances;

@@ -5,7 +5,7 @@ use crate::materials::texels::{TexelData, Texels};
 use crate::math::DVec3;
 use crate::sampling::{Dimension, PixelSampler};
 
-/// A map whose texels are a function of column and row.
+/// A map with texels computed from the column and row.
 fn map(width: u32, height: u32, color: impl Fn(u32, u32) -> Vec3) -> Arc<Texels> {
     let places = (0..height).flat_map(|row| (0..width).map(move |column| (column, row)));
     let data = TexelData::Float(places.map(|(column, row)| color(column, row)).collect());
@@ -16,7 +16,7 @@ fn light(texels: &Arc<Texels>, degrees: f64) -> Environment {
     Environment::map(Arc::new(EnvironmentMap::new(Arc::clone(texels)).expect("light")), Vec3::ONE, degrees)
 }
 
-/// An irregular map with black areas and some bright spots.
+/// An irregular map with black areas and a few bright spots.
 fn patchy(width: u32, height: u32) -> Arc<Texels> {
     map(width, height, |x, y| {
         let random = (x.wrapping_mul(7919).wrapping_add(y.wrapping_mul(104_729)) >> 3) % 97;
@@ -32,7 +32,7 @@ fn random(i: u32) -> [f32; 2] {
     PixelSampler::new(5, i >> 16, 3, i & 0xffff).pair(1, Dimension::Light(0)).to_array()
 }
 
-/// Reference implementation in double precision: the color of a direction.
+/// Double-precision reference implementation of the color in a direction.
 fn reference(texels: &Texels, direction: DVec3, degrees: f64) -> DVec3 {
     // Undo the rotation about +y.
     let (sin, cos) = (-degrees).to_radians().sin_cos();
@@ -70,7 +70,7 @@ fn lookups_match_the_reference() {
                 factor: Vec3::new(1.0, 2.0, 3.0),
                 turn: (degrees / 360.0_f64).rem_euclid(1.0) as f32,
             };
-            // At the poles, every azimuth is valid.
+            // At the poles, every azimuth is correct.
             for direction in directions(4000).filter(|direction| direction.y.abs() < 1.0) {
                 let expected =
                     (reference(&texels, direction.as_dvec3(), degrees) + 1.0) * DVec3::new(1.0, 2.0, 3.0);
@@ -93,7 +93,7 @@ fn sample_pdfs_equal_direction_pdfs() {
         for i in 0..20_000 {
             let Some(sample) = environment.sample(Vec3::Y, random(i)) else { continue };
             let (radiance, density) = environment.arriving(sample.direction);
-            // Rounding of the direction changes the result next to a dark corner of a cell, or across a cell border.
+            // Rounding the direction changes the result near a black corner of a cell and at cell borders.
             let expected = radiance * (1.0 / density);
             off += u32::from(!((sample.weight - expected).length() <= 2e-3 * expected.length()));
             assert!((sample.direction.length() - 1.0).abs() < 1e-6);
@@ -102,12 +102,12 @@ fn sample_pdfs_equal_direction_pdfs() {
             assert_eq!(lane(&row.weights, 3), sample.weight);
             found += 1;
         }
-        assert!(found > 19_000 && off < 100, "{off} of {found}");
+        assert!(found > 19_000 && off < 100, "{off} relative to {found}");
     }
 }
 
-/// For a gray map, all samples should have the same weight: 4π times the mean. Rows near the poles deviate because they are
-/// interpolated by angle but sampled by height.
+/// For a gray map, every sample should have a weight of 4π times the mean. Rows near the poles deviate
+/// because they are interpolated by angle but sampled by height.
 #[test]
 fn sampling_density_follows_interpolated_light() {
     let (width, height) = (64, 32);
@@ -131,7 +131,7 @@ fn sampling_density_follows_interpolated_light() {
 fn pdfs_integrate_to_one_and_cover_all_light() {
     for texels in [patchy(64, 32), map(32, 16, |x, y| Vec3::splat(f32::from(u8::from(x == 9 && y == 0))))] {
         let environment = light(&texels, 30.0);
-        // The grid avoids column borders, where rounding decides.
+        // The grid avoids column borders, where rounding affects the result.
         let (columns, rows) = (256, 4096);
         let mut whole = 0.0;
         for (i, j) in (0..rows).flat_map(|j| (0..columns).map(move |i| (i, j))) {
@@ -146,7 +146,8 @@ fn pdfs_integrate_to_one_and_cover_all_light() {
     }
 }
 
-/// χ² test of samples against the pdfs over cells of (rotation, height); cells with fewer than 5 expected samples are merged.
+/// χ² test that compares sample counts with the pdfs, over cells of (rotation, height). Cells with fewer than
+/// 5 expected samples are merged.
 #[test]
 fn sample_frequencies_match_the_pdf() {
     let (width, height) = (24_usize, 12_usize);
@@ -156,7 +157,7 @@ fn sample_frequencies_match_the_pdf() {
         let count = 1_000_000;
         let mut counts = vec![0.0; columns * rows];
         for i in 0..count {
-            // Use independent numbers: one pixel's are stratified.
+            // Use independent random numbers, since those of a single pixel are stratified.
             let number = |salt: u32| {
                 let bits = (i * 2 + salt).wrapping_mul(0x9e37_79b9) ^ 0x85eb_ca6b;
                 let bits = (bits ^ bits >> 15).wrapping_mul(0x2c1b_3c6d);
@@ -191,10 +192,11 @@ fn sample_frequencies_match_the_pdf() {
                 pooled = (0.0, 0.0);
             }
         }
-        // Wilson–Hilferty approximation of χ². The midpoint sums above are slightly off at cell borders.
+        // Wilson–Hilferty approximation of χ². The midpoint sums above are slightly inaccurate at cell
+        // borders.
         let normal =
             ((statistic / freedom).cbrt() - (1.0 - 2.0 / (9.0 * freedom))) / (2.0 / (9.0 * freedom)).sqrt();
-        assert!(freedom > 500.0 && normal.abs() < 5.0, "{degrees}: {normal} by {freedom}");
+        assert!(freedom > 500.0 && normal.abs() < 5.0, "{degrees}: {normal}, {freedom} cells");
     }
 }
 

@@ -12,8 +12,8 @@ use crate::math::{DVec3, Vec3};
 use crate::sampling::distribution::Discrete;
 use crate::sampling::warp;
 
-/// Spheres that photons are aimed at. A sphere is chosen by the light expected to reach it; then a direction or a point is
-/// sampled uniformly over its visible part.
+/// Spheres that photons are aimed at. A sphere is chosen proportionally to the expected light that reaches
+/// it. Then a direction or a point is sampled uniformly over its visible part.
 #[derive(Clone, Debug)]
 pub struct Targets {
     balls: Vec<BoundingSphere>,
@@ -21,10 +21,10 @@ pub struct Targets {
     pick_by_disk: Discrete,
 }
 
-/// Maximum number of targets; more are merged.
+/// Maximum number of targets. If there are more, some are merged.
 pub const MAX_TARGETS: usize = 32;
 
-/// Directional distribution of the light emitted at a point.
+/// Directional distribution of the light emitted from a point.
 pub enum EmissionProfile<'a> {
     /// A delta light's distribution.
     Light {
@@ -33,7 +33,7 @@ pub enum EmissionProfile<'a> {
         /// [`DeltaLight::solid_angle`], which is expensive to compute for some lights.
         spread: f64,
     },
-    /// A cosine distribution around this unit normal.
+    /// A cosine distribution around the given unit normal.
     Front(DVec3),
 }
 
@@ -57,7 +57,7 @@ impl EmissionProfile<'_> {
     /// Upper bound on [`EmissionProfile::share`] over a cone of directions with a half angle of up to 90°, given its sine.
     fn max_share(&self, axis: DVec3, sin: f64) -> f64 {
         let cos = ((1.0 - sin) * (1.0 + sin)).max(0.0).sqrt();
-        // Cosine of the angle from a direction to the nearest one in the cone.
+        // Cosine of the smallest angle between a direction and the cone.
         let nearest = |direction: DVec3| {
             let along = direction.dot(axis).clamp(-1.0, 1.0);
             let across = ((1.0 - along) * (1.0 + along)).sqrt();
@@ -75,7 +75,7 @@ impl EmissionProfile<'_> {
 }
 
 impl Targets {
-    /// Creates targets from spheres. `None` if none has a positive radius.
+    /// Creates targets from spheres. `None` if no sphere has a positive radius.
     pub fn new(balls: &[BoundingSphere]) -> Option<Self> {
         let balls: Vec<BoundingSphere> = balls.iter().copied().filter(|ball| ball.radius > 0.0).collect();
         let balls = merged(balls);
@@ -83,13 +83,13 @@ impl Targets {
         Some(Self { balls, pick_by_disk })
     }
 
-    /// All of them.
+    /// All target spheres.
     #[cfg(test)]
     pub fn balls(&self) -> &[BoundingSphere] {
         &self.balls
     }
 
-    /// Chooses a target for light from infinity.
+    /// Chooses a target for photons from infinity.
     pub fn pick_by_disk(&self, u: f32) -> &BoundingSphere {
         &self.balls[self.pick_by_disk.sample(u).0]
     }
@@ -99,13 +99,14 @@ impl Targets {
         PI * self.pick_by_disk.total()
     }
 
-    /// Area density of points sampled uniformly on the disks of [`Targets::pick_by_disk`], at a point that is on some of them.
+    /// Area density at a point if points are sampled uniformly on the disks of [`Targets::pick_by_disk`].
+    /// `is_on` returns whether the point is on a disk.
     pub fn disk_density(&self, is_on: impl Fn(&BoundingSphere) -> bool) -> f64 {
-        // Disks are chosen proportionally to their area, so each contributes the same density.
+        // Disks are chosen proportionally to their area, so each one contributes the same density.
         self.balls.iter().filter(|ball| is_on(ball)).count() as f64 / self.disk_area()
     }
 
-    /// The targets seen from a point that emits light.
+    /// The targets seen from an emission point.
     #[inline]
     pub fn seen_from<'a>(&self, from: DVec3, sends: &'a EmissionProfile<'a>) -> TargetView<'a> {
         let mut view = TargetView { sends, seen: ArrayVec::new(), total: 0.0 };
@@ -124,7 +125,7 @@ impl Targets {
     }
 }
 
-/// Targets seen from a point that emits light.
+/// Targets seen from an emission point.
 pub struct TargetView<'a> {
     sends: &'a EmissionProfile<'a>,
     /// Targets that the light can reach.
@@ -132,11 +133,11 @@ pub struct TargetView<'a> {
     total: f64,
 }
 
-/// A target seen from a point that emits light.
+/// A target seen from an emission point.
 struct VisibleTarget {
-    /// The cone of directions to it. `None` if the point is inside.
+    /// The cone of directions to the target. `None` if the point is inside the target.
     cone: Option<TargetCone>,
-    /// Upper bound on the power it receives, relative to the peak intensity, in sr.
+    /// Upper bound on the power that the target receives, relative to the peak intensity, in sr.
     weight: f64,
 }
 
@@ -146,8 +147,9 @@ impl TargetView<'_> {
         self.total
     }
 
-    /// Samples a direction uniformly over a target's cone; returns it with the target. Returns `None` if the point is inside the
-    /// target or there is no target; an unaimed direction is then used instead.
+    /// Samples a direction uniformly over a target's cone. Returns the direction and the index of the target,
+    /// or `None` if the point is inside the target or there is no target. An unaimed direction is used
+    /// instead in that case.
     pub fn sample(&self, u: f32, direction: [f32; 2]) -> Option<(Vec3, usize)> {
         let goal = f64::from(u) * self.total;
         let (mut sum, mut target) = (0.0, 0);
@@ -162,8 +164,8 @@ impl TargetView<'_> {
         Some((Frame::from_normal(cone.axis.as_vec3()).to_world(local), target))
     }
 
-    /// Pdf of aimed directions divided by that of emitted ones, at a direction generated for the target `made_for` or by
-    /// emission. ∞ if emission never generates it.
+    /// Pdf of aimed directions divided by the pdf of emitted directions. ∞ if emission never generates
+    /// `direction`. `made_for` is the target that the direction was generated for, if any.
     pub fn ratio(&self, direction: Vec3, made_for: Option<usize>) -> f64 {
         if !(self.total > 0.0) {
             return 1.0;
@@ -171,7 +173,7 @@ impl TargetView<'_> {
         let (mut by_cones, mut by_others) = (0.0, 0.0);
         for (number, VisibleTarget { cone, weight }) in self.seen.iter().enumerate() {
             match cone {
-                // At the very edge, rounding decides.
+                // At a cone's edge, the result would depend on rounding.
                 Some(cone) if made_for == Some(number) || cone.contains(direction) => {
                     by_cones += weight / cone.solid_angle();
                 }
@@ -188,13 +190,13 @@ impl TargetView<'_> {
 /// The cone of directions to a sphere.
 struct TargetCone {
     axis: DVec3,
-    /// Sine of its half angle.
+    /// Sine of the half angle.
     sin: f64,
     one_minus_cos: f32,
 }
 
 impl TargetCone {
-    /// The cone to a sphere seen from a point. `None` from inside.
+    /// The cone of directions from a point to a sphere. `None` if the point is inside.
     fn around(ball: &BoundingSphere, from: DVec3) -> Option<Self> {
         let to_center = ball.center - from;
         let distance = to_center.length();
@@ -216,8 +218,8 @@ impl TargetCone {
     }
 }
 
-/// Merges spheres into at most [`MAX_TARGETS`]: the largest group is repeatedly split in two along its longest axis until there
-/// are enough groups.
+/// Merges spheres into at most [`MAX_TARGETS`] groups. Repeatedly splits the largest group in two along its
+/// longest axis.
 fn merged(balls: Vec<BoundingSphere>) -> Vec<BoundingSphere> {
     if balls.len() <= MAX_TARGETS {
         return balls;

@@ -1,11 +1,13 @@
 //! Photon emission: rays that start at lights and carry their power.
 //!
-//! A photon from light ℓ is a ray y. Its flux is the power per ray measure, Φ′(y), divided by the pdf of sampling such a photon,
-//! so that the mean flux over photons is the power of all lights. There are two ways to generate a photon, and the flux accounts
-//! for the pdf of both (one-sample multiple importance sampling; Veach, *Robust Monte Carlo Methods for Light Transport
-//! Simulation*, 1997, section 9.2.4). With probability 1 − q, the direction is sampled from the light's emission; with
-//! probability q, it is aimed at one of the [`BoundingSphere`]s around surfaces that need photons. Both ways choose the starting point
-//! identically. With the probabilities P and A of the light, and the ratio a(y)/e(y) of the other pdfs,
+//! A photon from light ℓ is a ray y. Its flux is the power per ray measure, Φ′(y), divided by the pdf of the
+//! photon, so that the mean flux over all photons is the total power of the lights. There are two ways to
+//! generate a photon, and the flux accounts for the pdfs of both (one-sample multiple importance sampling;
+//! Veach, *Robust Monte Carlo Methods for Light Transport Simulation*, 1997, section 9.2.4). With probability
+//! 1 − q, the direction is sampled from the light's emission. With probability q, it is aimed at one of the
+//! [`BoundingSphere`]s around surfaces that need photons. The starting point is sampled in the same way. Let
+//! P and A be the probabilities of choosing the light without and with aiming, and let e(y) and a(y) be the
+//! remaining pdfs. Then
 //!
 //! flux = Φ′(y)/e(y) / ((1 − q)·P + q·A·a(y)/e(y)).
 
@@ -30,7 +32,7 @@ use crate::sampling::warp;
 use aim::{EmissionProfile, Targets};
 use surface::EmissiveSurface;
 
-/// A bounding sphere, in the coordinates of the lights.
+/// A bounding sphere, in the same coordinates as the lights.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BoundingSphere {
     /// Center.
@@ -40,7 +42,7 @@ pub struct BoundingSphere {
 }
 
 impl BoundingSphere {
-    /// A sphere that contains all the given ones, centered in their bounding box.
+    /// A sphere that contains all given spheres. Its center is that of their bounding box.
     pub fn around(balls: &[Self]) -> Self {
         let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         for Self { center, radius } in balls {
@@ -52,50 +54,50 @@ impl BoundingSphere {
     }
 }
 
-/// The geometry of the object that emits a light.
+/// The geometry of an emitting object.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum EmitterGeometry {
     /// A shape.
     Shape(Shape),
     /// A mesh.
     Mesh {
-        /// Upper bound on the error of each of its triangles at a hit.
+        /// Upper bound on the error of a hit point on any of its triangles.
         rounding: f32,
     },
 }
 
-/// The random numbers in [0, 1) that one photon uses.
+/// Random numbers in [0, 1) for one photon.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PhotonNumbers {
-    /// Chooses the light and its piece.
+    /// Chooses the light and a piece of it.
     pub light: [f32; 2],
     /// Chooses whether to aim, and the target.
     pub aim: [f32; 2],
-    /// Position on the light, or on the disk that light from infinity passes through.
+    /// Position on the light. For light from infinity, position on the disk that it passes through.
     pub position: [f32; 2],
-    /// Direction of the photon; for lights at infinity, the direction to the light.
+    /// Direction of the photon. For lights at infinity, direction to the light.
     pub direction: [f32; 2],
 }
 
 /// A newly emitted photon.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EmittedPhoton {
-    /// Index of its light.
+    /// Index of the light.
     pub light: u32,
-    /// Where it starts.
+    /// Starting point.
     pub start: PhotonOrigin,
     /// Unit direction of travel.
     pub direction: Vec3,
-    /// Power in W divided by the pdf of the photon; the mean over photons is the power of all lights.
+    /// Power in W divided by the photon's pdf. The mean over photons is the total power of the lights.
     pub flux: Vec3,
-    /// Whether it was aimed at a target.
+    /// Whether the photon was aimed at a target.
     pub is_aimed: bool,
 }
 
 /// Starting point of a photon.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum PhotonOrigin {
-    /// At a delta light.
+    /// On a delta light.
     Point(Vec3),
     /// On a surface.
     Surface {
@@ -106,13 +108,13 @@ pub enum PhotonOrigin {
         /// Unit normal on the emitting side.
         normal: Vec3,
     },
-    /// Beyond all finite objects, on a plane tangent to their bounding sphere. Infinite objects may still be between that point
-    /// and the light.
+    /// Beyond all finite objects, on a plane tangent to their bounding sphere. Infinite objects may be
+    /// between this point and the light.
     Beyond(Vec3),
 }
 
 impl EmittedPhoton {
-    /// The photon's ray, offset from its light's surface like a scattered ray.
+    /// The photon's ray. Its origin is offset from the light's surface, as for a scattered ray.
     pub fn ray(&self) -> Ray {
         let origin = match self.start {
             PhotonOrigin::Point(point) | PhotonOrigin::Beyond(point) => point,
@@ -129,7 +131,7 @@ impl EmittedPhoton {
 pub struct PhotonSource {
     lights: Arc<Lights>,
     sources: Vec<LightEmission>,
-    /// Bounding sphere of all finite objects, which light from infinity is emitted toward.
+    /// Bounding sphere of all finite objects. Light from infinity is emitted toward it.
     around: BoundingSphere,
     by_power: Discrete,
     aim: Option<PhotonAim>,
@@ -140,9 +142,9 @@ pub struct PhotonSource {
 struct LightEmission {
     /// Power in W.
     power: Vec3,
-    /// For delta lights, power divided by peak intensity, in sr.
+    /// Power divided by peak intensity in sr, for delta lights.
     spread: f64,
-    /// For area lights, the emitting surface.
+    /// The emitting surface, for area lights.
     surface: Option<EmissiveSurface>,
 }
 
@@ -156,12 +158,14 @@ struct PhotonAim {
     by_light: Discrete,
 }
 
-/// Fraction of aimed photons whose light is chosen by power, like that of unaimed ones, because an estimate of 0 may be wrong.
+/// Fraction of aimed photons whose light is chosen by power, as for unaimed photons. Needed because an
+/// estimate of 0 may be wrong.
 const BY_POWER: f64 = 0.1;
 
 impl PhotonSource {
-    /// Creates the source for all lights. `emitter_geometry` returns the geometry of an object; `around` is a bounding sphere of all
-    /// finite objects. Returns `None` if no light emits photons. Lights without falloff emit none.
+    /// Creates a photon source from all lights. `emitter_geometry` returns the geometry of an object.
+    /// `around` is a bounding sphere of all finite objects. Returns `None` if no light emits photons. Lights
+    /// without falloff do not emit photons.
     pub fn new(
         lights: &Arc<Lights>,
         emitter_geometry: impl Fn(u32) -> Option<EmitterGeometry>,
@@ -173,8 +177,8 @@ impl PhotonSource {
         Some(Self { lights: Arc::clone(lights), sources, around, by_power, aim: None })
     }
 
-    /// Aims a fraction `share` in [0, 1] of the photons at targets. If all are aimed, only rays that hit a target are generated,
-    /// and their mean flux is the power that reaches the targets.
+    /// Aims a fraction `share` in [0, 1] of the photons at targets. If it is 1, all photons hit a target, and
+    /// their mean flux is the power that reaches the targets.
     #[must_use]
     pub fn aimed_at(self, targets: &[BoundingSphere], share: f32) -> Self {
         let targets = Targets::new(targets).filter(|_| share > 0.0);
@@ -207,12 +211,12 @@ impl PhotonSource {
         self.sources.iter().map(|source| source.power.as_dvec3()).sum::<DVec3>().as_vec3()
     }
 
-    /// Fraction of photons that are aimed.
+    /// Fraction of photons aimed at targets.
     pub fn aimed_share(&self) -> f32 {
         self.aim.as_ref().map_or(0.0, |aim| aim.share)
     }
 
-    /// Emits a photon. Returns `None` if the chosen light or target receives nothing.
+    /// Emits a photon, or returns `None` if the sample carries no flux.
     pub fn emit(&self, u: &PhotonNumbers) -> Option<EmittedPhoton> {
         let aim = self.aim.as_ref().filter(|aim| u.aim[0] < aim.share);
         let by_light = aim.map_or(&self.by_power, |aim| &aim.by_light);
@@ -227,11 +231,11 @@ impl PhotonSource {
         let flux = (sample_photon.flux.as_dvec3() / density).as_vec3();
         let PhotonSample { start, direction, .. } = sample_photon;
         let emitted = EmittedPhoton { light: number as u32, start, direction, flux, is_aimed: aim.is_some() };
-        // A direction of infinite pdf carries no flux.
+        // A direction with infinite pdf carries no flux.
         (flux != Vec3::ZERO).then_some(emitted)
     }
 
-    /// Generates a photon from one light; it is aimed if `targets` is given.
+    /// Generates a photon from one light. It is aimed if there are `targets`.
     fn sample_photon(
         &self,
         number: usize,
@@ -264,7 +268,7 @@ impl PhotonSource {
                     by_cosine,
                 );
                 let start = PhotonOrigin::Surface { point: place.point, error: place.error, normal };
-                // Apply the clear coat's transmittance in this direction.
+                // Apply the clear coat's transmittance in the photon's direction.
                 let left = |texture: &EmissionTexture| {
                     texture.coat_transmittance(place.point, place.primitive, -direction)
                 };
@@ -275,18 +279,19 @@ impl PhotonSource {
     }
 }
 
-/// A photon from one light, before accounting for the probability of the light.
+/// A photon from one light, before accounting for the probability of choosing the light.
 struct PhotonSample {
     start: PhotonOrigin,
     direction: Vec3,
-    /// Flux if all photons came from this light and none were aimed.
+    /// Flux, assuming that all photons come from this light and none are aimed.
     flux: Vec3,
-    /// Pdf of aimed photons divided by that of unaimed ones.
+    /// Pdf of aimed photons divided by the pdf of unaimed photons.
     ratio: f64,
 }
 
 impl PhotonSource {
-    /// Samples a direction from a point; returns it with the pdf of aimed directions divided by that of unaimed ones.
+    /// Samples a direction from a point. Returns the direction, and the pdf of aimed directions divided by
+    /// the pdf of unaimed directions.
     #[inline(always)]
     fn sample_direction_from(
         &self,
@@ -307,7 +312,7 @@ impl PhotonSource {
         }
     }
 
-    /// A photon from a direction at infinity, given its irradiance at normal incidence.
+    /// A photon from a direction at infinity with a given irradiance at normal incidence.
     fn photon_from_infinity(
         &self,
         to_light: Vec3,
@@ -318,7 +323,7 @@ impl PhotonSource {
         let Frame { s, t, n } = Frame::from_normal(to_light);
         let (s, t, n) = (s.as_dvec3(), t.as_dvec3(), n.as_dvec3());
         let BoundingSphere { center, radius } = self.around;
-        // Project onto the plane through the sphere's center.
+        // Project onto the plane through the center of the bounding sphere.
         let through = |ball: &BoundingSphere| {
             let at = warp::disk(Vec2::from_array(u.position)).as_dvec2() * ball.radius;
             let middle = ball.center - center;
@@ -342,7 +347,7 @@ impl PhotonSource {
         is_inside.then_some(PhotonSample { start, direction: -to_light, flux, ratio })
     }
 
-    /// Estimated power of a light toward the targets, used to choose among lights.
+    /// Estimated power that a light emits toward the targets, used for choosing a light.
     fn power_toward(&self, number: u32, light: &Light, targets: &Targets) -> f64 {
         let source = &self.sources[number as usize];
         let power = mean_channel(source.power);
@@ -371,7 +376,7 @@ impl PhotonSource {
     }
 }
 
-/// Number of points on a light from which its view of the targets is estimated.
+/// Number of points on an area light from which the power toward the targets is estimated.
 const PLACES: u32 = 16;
 
 /// A low-discrepancy sequence in the unit square (Roberts, *The Unreasonable Effectiveness of Quasirandom Sequences*, 2018).

@@ -10,7 +10,7 @@ use crate::lights::tree::bounds::mean_channel;
 use crate::math::{DVec3, Vec2, Vec3};
 use crate::sampling::distribution::Discrete;
 
-/// The surface of a light, divided into pieces that are chosen by power.
+/// A light's surface, divided into pieces that are chosen by power.
 #[derive(Clone, Debug)]
 pub struct EmissiveSurface {
     pieces: Discrete,
@@ -22,13 +22,13 @@ pub struct EmissiveSurface {
 /// Geometry of the pieces.
 #[derive(Clone, Debug)]
 enum PieceGeometry {
-    /// A shape, each part of which is divided into side × side pieces of equal area.
+    /// A shape. Each part is divided into side × side pieces of equal area.
     Shape {
         shape: Shape,
         side: u32,
         /// Areas of the parts.
         areas: Vec<f64>,
-        /// The largest length from which a point is computed.
+        /// The largest length from which points are computed.
         reach: f64,
     },
     /// The triangles of a mesh.
@@ -39,15 +39,16 @@ enum PieceGeometry {
 pub struct EmissionPoint {
     /// The point, rounded to `f32`.
     pub point: Vec3,
-    /// The point in double precision.
+    /// The point before rounding.
     pub from: DVec3,
     /// Unit normal of the emitting side.
     pub normal: DVec3,
     /// Error bound of each component of `point`.
     pub error: Vec3,
-    /// Cosine-weighted integral of the radiance, divided by the pdf of the point; its mean is the power of the light in W.
+    /// Cosine-weighted integral of the radiance, divided by the pdf of the point. The mean is the power of
+    /// the light in W.
     pub flux: Vec3,
-    /// Primitive index, for a mesh.
+    /// Primitive index (for meshes).
     pub primitive: u32,
 }
 
@@ -66,11 +67,12 @@ const PIECES: usize = 1024;
 /// Number of texture lookups along each side of a piece.
 const LOOKUPS_PER_SIDE: u32 = 4;
 
-/// Fraction of the pieces' weight that is proportional to area, in case there is more light between the lookups.
+/// Fraction of a piece's weight that is proportional to its area, since there may be more light between the
+/// lookups.
 const BY_AREA: f64 = 0.05;
 
 impl EmissiveSurface {
-    /// Divides the surface of a light into pieces. Returns `None` if it has no area or emits nothing.
+    /// Divides a light's surface into pieces. Returns `None` if it has no area or emits nothing.
     pub fn new(light: &AreaLight, emitter_geometry: &EmitterGeometry) -> Option<Self> {
         let (on, count) = match emitter_geometry {
             EmitterGeometry::Shape(shape) => {
@@ -111,12 +113,12 @@ impl EmissiveSurface {
         Some(Self { pieces, on, power: power.as_vec3() })
     }
 
-    /// Power in W; for a textured light, estimated from a dense grid of points.
+    /// Power in W. For textured lights, this is an estimate from a dense grid of points.
     pub fn power(&self) -> Vec3 {
         self.power
     }
 
-    /// Samples a point, with random numbers in [0, 1).
+    /// Samples a point from random numbers in [0, 1).
     pub fn place(&self, light: &AreaLight, piece: f32, u: Vec2) -> EmissionPoint {
         let (index, _) = self.pieces.sample(piece);
         let place = self.on.at(light, index, u);
@@ -133,7 +135,7 @@ impl EmissiveSurface {
 }
 
 impl PieceGeometry {
-    /// A point uniformly distributed on a piece.
+    /// A uniformly distributed point on a piece.
     fn at(&self, light: &AreaLight, index: usize, u: Vec2) -> PiecePoint {
         match (self, light.shape.as_mesh()) {
             (Self::Shape { shape, side, areas, .. }, _) => {
@@ -159,14 +161,14 @@ impl PieceGeometry {
     }
 }
 
-/// Radiance at a point in W·sr⁻¹·m⁻², ignoring a clear coat.
+/// Radiance at a point in W·sr⁻¹·m⁻², without a clear coat.
 fn radiance(light: &AreaLight, place: &PiecePoint) -> Vec3 {
     let texture = light.texture.as_ref();
     light.radiance
         * texture.map_or(Vec3::ONE, |texture| texture.at_place(place.point.as_vec3(), place.primitive))
 }
 
-/// Upper bound on the lengths from which the shape's points are computed. `None` if the shape is infinite.
+/// Upper bound on the lengths from which points on the shape are computed. `None` if the shape is infinite.
 fn reach(shape: &Shape) -> Option<f64> {
     let bounds = shape.bounds()?;
     let greatest = bounds.min.abs().max(bounds.max.abs()).as_dvec3().max_element();

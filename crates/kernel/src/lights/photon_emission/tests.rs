@@ -29,7 +29,7 @@ const OBJECT: u32 = 0;
 const SCENE: BoundingSphere = BoundingSphere { center: DVec3::new(0.5, 1.0, -0.5), radius: 5.0 };
 const COLOR: Vec3 = Vec3::new(2.0, 1.0, 0.5);
 
-/// Generates the random numbers of photons.
+/// Generates random numbers for photons.
 fn numbers(mut next: impl FnMut() -> f32) -> impl FnMut() -> PhotonNumbers {
     move || {
         let mut pair = || [next(), next()];
@@ -108,7 +108,7 @@ struct MeanEstimate {
 }
 
 impl MeanEstimate {
-    /// Mean and standard error from the means of independently scrambled groups.
+    /// Mean and standard error, from the means of independently scrambled groups.
     fn of(groups: &[f64]) -> Self {
         let n = groups.len() as f64;
         let mean = groups.iter().sum::<f64>() / n;
@@ -119,7 +119,7 @@ impl MeanEstimate {
 
 const GROUPS: u32 = 32;
 
-/// The mean of a function over photons; attempts without a photon count as 0.
+/// The mean of a function over photons. Attempts that produce no photon count as 0.
 fn mean(source: &PhotonSource, count: u32, of: impl Fn(&EmittedPhoton) -> f64) -> MeanEstimate {
     let groups = (0..GROUPS).map(|group| {
         let one = |i: u32| {
@@ -133,14 +133,14 @@ fn mean(source: &PhotonSource, count: u32, of: impl Fn(&EmittedPhoton) -> f64) -
     MeanEstimate::of(&groups.collect::<Vec<_>>())
 }
 
-/// Photon targets: a distant sphere, two overlapping ones, and one that contains most lights.
+/// Photon targets: a distant sphere, two overlapping spheres, and a sphere that contains most lights.
 fn targets() -> [BoundingSphere; 4] {
     let ball = |x: f64, y: f64, z: f64, radius: f64| BoundingSphere { center: DVec3::new(x, y, z), radius };
     [ball(3.0, 2.0, 1.0, 0.3), ball(-2.0, 1.0, 0.5, 0.8), ball(-2.5, 0.5, 0.5, 0.6), ball(0.2, 1.0, 0.2, 0.9)]
 }
 
 #[test]
-fn mean_flux_is_the_power_for_any_aimed_share() {
+fn mean_flux_equals_power_for_any_aimed_fraction() {
     for (light, shape, power) in lights() {
         let plain = source_of(light.clone(), shape);
         for (targets, share) in [(&targets()[..], 0.5), (&targets()[..3], 0.9), (&targets()[..1], 0.3)] {
@@ -151,19 +151,19 @@ fn mean_flux_is_the_power_for_any_aimed_share() {
             let greatest_error = if share > 0.5 { 3e-3 } else { 1e-3 };
             assert!(found.error < greatest_error * exact, "{light:?} {share}: ± {}", found.error / exact);
             let off = (found.mean - exact).abs();
-            assert!(off < 5.0 * found.error + 1e-4 * exact, "{light:?} {share}: {found:?} is not {exact}");
+            assert!(off < 5.0 * found.error + 1e-4 * exact, "{light:?} {share}: {found:?}, not {exact}");
         }
     }
 }
 
-/// A disk that photons fly through.
+/// A disk that photons pass through.
 const DISK: BoundingSphere = BoundingSphere { center: DVec3::new(1.6, 1.2, 1.4), radius: 0.2 };
 
 fn disk_normal() -> DVec3 {
     (DVec3::new(0.1, 0.8, 0.1) - DISK.center).normalize()
 }
 
-/// Irradiance that a photon contributes to the front of the disk.
+/// A photon's contribution to the irradiance on the front of the disk.
 fn disk_contribution(photon: &EmittedPhoton, shape: Option<&Shape>) -> f64 {
     let (ray, normal) = (photon.ray().to_f64(), disk_normal());
     let t = (DISK.center - ray.origin).dot(normal) / ray.direction.dot(normal);
@@ -175,7 +175,7 @@ fn disk_contribution(photon: &EmittedPhoton, shape: Option<&Shape>) -> f64 {
     if is_met && is_free() { f64::from(photon.flux.y) / area } else { 0.0 }
 }
 
-/// The irradiance of the disk, estimated with light samples.
+/// Irradiance on the disk, estimated with light samples.
 fn sampled(light: &Light, count: u32) -> MeanEstimate {
     let normal = disk_normal().as_vec3();
     let Frame { s, t, .. } = Frame::from_normal(normal);
@@ -209,7 +209,7 @@ fn assert_same_irradiance(name: &str, light: &Light, source: &PhotonSource, shap
         println!("{name:.40} {share}: {ratio:.5} ± {:.5}", error / expected.mean);
         assert!(error < greatest_error * expected.mean, "{name}: ± {}", error / expected.mean);
         let off = found.mean - expected.mean;
-        assert!(off.abs() < 5.0 * error + 1e-4 * expected.mean, "{name}: {found:?} is not {expected:?}");
+        assert!(off.abs() < 5.0 * error + 1e-4 * expected.mean, "{name}: {found:?} instead of {expected:?}");
     }
 }
 
@@ -222,7 +222,7 @@ fn photon_irradiance_matches_light_sampling() {
         let source = source_of(light.clone(), shape);
         assert_same_irradiance(&format!("{light:?}"), &light, &source, shape.as_ref());
     }
-    // Aim spotlights so that the disk is in the fading part of the cone.
+    // Aim spotlights to put the disk in the fading part of the cone.
     for (degrees, blend) in [(70.0_f64, 0.0), (40.0, 0.9), (200.0, 1.0)] {
         let point = point(Falloff::Square);
         let axis = (DISK.center + DVec3::new(0.1, 0.2, -0.1) - point.position).normalize().as_vec3();
@@ -234,17 +234,17 @@ fn photon_irradiance_matches_light_sampling() {
 }
 
 #[test]
-fn single_light_photons_carry_its_full_power() {
+fn photons_from_one_light_carry_its_power() {
     for (light, shape, power) in lights() {
         let source = source_of(light.clone(), shape);
         let power = COLOR.as_dvec3() * power;
         let told = source.power().as_dvec3();
-        assert!((told / power - 1.0).abs().max_element() < 1e-5, "{light:?}: {told} is not {power}");
+        assert!((told / power - 1.0).abs().max_element() < 1e-5, "{light:?}: {told} instead of {power}");
         let mut next = numbers(random::unit(1));
         for _ in 0..1000 {
             let photon = source.emit(&next()).expect("a photon");
             let off = (photon.flux.as_dvec3() / power - 1.0).abs().max_element();
-            // Parts of a shape are chosen proportionally to their area.
+            // Parts of a shape are chosen in proportion to their area.
             assert!(off < 1e-5, "{light:?}: {}", photon.flux);
             assert!((photon.direction.length() - 1.0).abs() < 1e-6, "{light:?}");
         }
@@ -270,7 +270,7 @@ fn photons_leave_convex_lights() {
     }
 }
 
-/// χ² test of counts in cells with equal expectations.
+/// χ² test of counts in cells with equal expected counts.
 #[track_caller]
 fn assert_even(name: &str, counts: &[u32]) {
     let freedom = (counts.len() - 1) as f64;
@@ -278,10 +278,10 @@ fn assert_even(name: &str, counts: &[u32]) {
     let chi2: f64 = counts.iter().map(|&count| (f64::from(count) - expected).powi(2) / expected).sum();
     // Wilson–Hilferty approximation.
     let z = ((chi2 / freedom).cbrt() - (1.0 - 2.0 / (9.0 * freedom))) / (2.0 / (9.0 * freedom)).sqrt();
-    assert!(z.abs() < 4.5, "{name}: χ² {chi2} of {freedom}, z {z}");
+    assert!(z.abs() < 4.5, "{name}: χ² {chi2} with {freedom} degrees of freedom, z {z}");
 }
 
-/// Index of the cell, out of `n` equal ones, that contains a fraction.
+/// Index of the cell that contains a fraction, given `n` equal cells.
 fn cell(share: f64, n: usize) -> usize {
     ((share * n as f64) as usize).min(n - 1)
 }
@@ -299,7 +299,7 @@ fn photon_directions_follow_the_intensity() {
             let Frame { s, t, n } = Frame::from_normal(normal);
             let (x, y, z) = [s, t, n].map(|axis| f64::from(photon.direction.dot(axis))).into();
             let turn = y.atan2(x) / TAU + 0.5;
-            // sin² is uniform.
+            // sin² is uniformly distributed.
             counts[cell(1.0 - z * z, 16) * 16 + cell(turn, 16)] += 1;
         }
         assert_even(&format!("{shape:?}"), &counts);
@@ -367,8 +367,8 @@ fn aimed_pdfs_integrate_to_one() {
         for balls in [&all[..3], &all[..], &all[..1]] {
             let targets = Targets::new(balls).expect("targets");
             let view = targets.seen_from(from, &sends);
-            // Integrate over all directions: the aimed pdf is the ratio times the emission pdf. Directions without emission are
-            // missing from the integral; sampling shows what fraction of aimed photons they are.
+            // Integrate the aimed pdf (the ratio times the emission pdf) over all directions. The integral
+            // lacks directions without emission, so estimate their fraction among aimed photons by sampling.
             let n = 1_000_000;
             let mut whole = 0.0;
             for i in 0..n {
@@ -443,7 +443,8 @@ fn lights_without_falloff_emit_no_photons() {
 
 #[test]
 fn fully_aimed_photons_carry_the_target_power() {
-    // For a point light, the fraction of the sphere of directions that the target covers; for the sun, the fraction of the disk.
+    // For the point light, `part` is the fraction of all directions covered by the target. For the sun, use
+    // the area of the target's disk.
     let ball = targets()[0];
     let of = |light: Light| {
         let source = source_of(light, None).aimed_at(&[ball], 1.0);

@@ -1,10 +1,11 @@
-//! Bounds of lights: position, power and emission directions.
+//! Bounds of lights: position, power, and emission directions.
 
 use crate::geometry::Aabb;
 use crate::math::{DVec3, Vec3};
 
-/// Bounds of one or more lights, used to estimate their contribution without examining each one (Conty Estevez and Kulla,
-/// *Importance Sampling of Many Lights with Adaptive Tree Splitting*, 2018, section 4).
+/// Bounds of one or more lights. Used to estimate the contribution of the lights without examining each of
+/// them (Conty Estevez and Kulla, *Importance Sampling of Many Lights with Adaptive Tree Splitting*, 2018,
+/// section 4).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LightBounds {
     /// How distance affects the light.
@@ -13,8 +14,8 @@ pub struct LightBounds {
     pub center: DVec3,
     /// Radius of the bounding sphere.
     pub radius: f64,
-    /// Expected emission along the axes, > 0, averaged over the color channels: in W·sr⁻¹, or the irradiance for lights without
-    /// falloff.
+    /// Expected emission along the axes (positive), averaged over the color channels. In W·sr⁻¹, or as
+    /// irradiance for lights without falloff.
     pub power: f64,
     /// Directions of emission.
     pub cone: EmissionCone,
@@ -23,20 +24,20 @@ pub struct LightBounds {
 /// How distance affects a light.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum DistanceFalloff {
-    /// Irradiance falls with the square of the distance.
+    /// Irradiance decreases with the square of the distance.
     InverseSquare,
-    /// The light has a position, but no falloff.
+    /// The light has a position but no falloff.
     Constant,
-    /// At infinity: the sphere bounds unit vectors toward the light.
+    /// The light is at infinity. The sphere bounds unit vectors toward the light.
     Beyond,
 }
 
-/// A bound on the directions into which lights emit.
+/// Bounds the directions of emission.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EmissionCone {
-    /// Axis of a cone that contains the emission axes of all lights.
+    /// Axis of a cone that contains the emission axes of the lights.
     pub axis: DVec3,
-    /// Cosine of its half angle.
+    /// Cosine of the cone's half angle.
     pub cos: f64,
     /// Falloff outside the cone.
     pub edge: ConeEdge,
@@ -47,7 +48,7 @@ pub struct EmissionCone {
 pub enum ConeEdge {
     /// No emission outside the cone.
     Sharp,
-    /// Cosine of the angle to the cone; 0 from 90° on.
+    /// Cosine of the angle to the cone, or 0 from 90° on.
     Cosine,
 }
 
@@ -65,7 +66,7 @@ impl EmissionCone {
         Self { axis, cos: libm::cos(half_angle), edge: ConeEdge::Sharp }
     }
 
-    /// A cone that contains all the given ones, around the mean of their axes.
+    /// A cone that contains all given cones, around the mean of their axes.
     fn around<'a>(cones: impl Iterator<Item = &'a Self> + Clone) -> Self {
         let edge = cones.clone().map(|cone| cone.edge).max().unwrap_or(ConeEdge::Sharp);
         let sum: DVec3 = cones.clone().map(|cone| cone.axis).sum();
@@ -73,11 +74,11 @@ impl EmissionCone {
         Self { axis, cos: cones.map(|cone| cone.widest_from(axis)).fold(1.0, f64::min), edge }
     }
 
-    /// Cosine of the largest angle between `axis` and a direction in the cone.
+    /// Cosine of the largest angle between `axis` and any direction in the cone.
     fn widest_from(&self, axis: DVec3) -> f64 {
         let cos = self.axis.dot(axis).clamp(-1.0, 1.0);
         let (sin, own_sin) = (sine(cos), sine(self.cos));
-        // The angles add up to more than 180°.
+        // The sum of the angles exceeds 180°.
         if cos <= -self.cos { -1.0 } else { cos * self.cos - sin * own_sin }
     }
 }
@@ -87,7 +88,7 @@ fn sine(cos: f64) -> f64 {
 }
 
 impl LightBounds {
-    /// The bounds, scaled by a color.
+    /// The bounds scaled by a color.
     pub fn times(self, color: Vec3) -> Self {
         Self { power: self.power * mean_channel(color), ..self }
     }
@@ -99,7 +100,8 @@ impl LightBounds {
         Self { space: DistanceFalloff::InverseSquare, center: (min + max) * 0.5, radius, power, cone }
     }
 
-    /// Bounds of a triangle of unit radiance whose front faces along (b − a) × (c − a). `None` if it has no area.
+    /// Bounds of a triangle with a radiance of 1 whose front faces along (b − a) × (c − a). `None` if it has
+    /// no area.
     pub fn of_triangle(corners: &[DVec3; 3]) -> Option<Self> {
         let [a, b, c] = *corners;
         let vector_area = (b - a).cross(c - a) * 0.5;
@@ -107,7 +109,7 @@ impl LightBounds {
         Some(Self::in_box(Aabb::around_f64(*corners), vector_area.length(), EmissionCone::of_front(normal)))
     }
 
-    /// Bounds that contain all the given ones, which must have the same space. `None` if there are none.
+    /// Bounds that contain all given bounds, which must have the same falloff. `None` if there are none.
     pub fn around<'a>(all: impl Iterator<Item = &'a Self> + Clone) -> Option<Self> {
         let space = all.clone().next()?.space;
         let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
@@ -126,8 +128,9 @@ impl LightBounds {
     }
 }
 
-/// Expected intensity of several lights, averaged over directions within the spread of their axes. Cosine emitters contribute all
-/// their power if their axes agree, and a quarter of it if the axes are uniformly distributed.
+/// Expected intensity of several lights, averaged over directions within the spread of their axes. Cosine
+/// emitters contribute all of their power if their axes agree, and a quarter of it if the axes are uniformly
+/// distributed.
 fn power<'a>(all: impl Iterator<Item = &'a LightBounds>) -> f64 {
     let (mut everywhere, mut by_cosine, mut axes) = (0.0, 0.0, DVec3::ZERO);
     for LightBounds { power, cone, .. } in all {
@@ -139,7 +142,8 @@ fn power<'a>(all: impl Iterator<Item = &'a LightBounds>) -> f64 {
     everywhere + 0.25 * (by_cosine + 3.0 * axes.length().min(by_cosine))
 }
 
-/// Reduces a color to one number. All channels count equally, since lights are chosen by their effect on each of them.
+/// Reduces a color to a single number. All channels have the same weight because lights are chosen by their
+/// effect on all channels.
 pub fn mean_channel(color: Vec3) -> f64 {
     color.as_dvec3().element_sum() / 3.0
 }

@@ -1,5 +1,5 @@
-//! Top-down construction of light trees: nearby lights with similar emission directions share a node (Conty Estevez and Kulla,
-//! 2018, section 4.4, with binning).
+//! Top-down construction of light trees. Nearby lights with similar emission directions share a node (Conty
+//! Estevez and Kulla, 2018, section 4.4, with binning).
 
 use super::bounds::{EmissionCone, LightBounds};
 use super::node::{LightTreeNode, NodeChild};
@@ -10,13 +10,14 @@ use crate::math::float::floor_to_power_of_two;
 use crate::math::lanes::PACKET_SIZE;
 
 impl LightTree {
-    /// Builds a tree over indexed lights; lights without bounds emit nothing. Returns `None` if no light emits.
+    /// Builds a tree over indexed lights. Lights without bounds emit nothing. Returns `None` if no light
+    /// emits.
     ///
     /// # Errors
-    /// [`Cancelled`] if the token is canceled; large trees take a while.
+    /// [`Cancelled`] if the token is canceled.
     pub fn new(lights: &[Option<LightBounds>], token: &CancelToken) -> Result<Option<Self>, Cancelled> {
         let mut leaves: Vec<LightLeaf> = (0..).zip(lights).filter_map(LightLeaf::new).collect();
-        // Group the lights by space.
+        // Group the lights by distance falloff.
         leaves.sort_by_key(|leaf| leaf.bounds.space);
         let power: f64 = leaves.iter().map(|leaf| leaf.bounds.power).sum();
         let mut positions = vec![NOT_IN_TREE; lights.len()];
@@ -51,7 +52,8 @@ impl LightLeaf {
 
 struct LightTreeBuilder<'a> {
     nodes: Vec<LightTreeNode>,
-    /// Unit of power. It is a power of two, so scaling by it is exact and a scaled scene has the same picks.
+    /// Unit of power. It is a power of two, so scaling by it is exact, and scaling the power of all lights by
+    /// a power of two does not affect picks.
     unit: f64,
     /// Number of lights.
     leaves: u32,
@@ -59,7 +61,7 @@ struct LightTreeBuilder<'a> {
 }
 
 impl LightTreeBuilder<'_> {
-    /// Builds the node over `leaves`, which follow `before` other leaves; returns its index.
+    /// Builds the node over `leaves` and returns its index. `before` is the number of preceding leaves.
     fn node(&mut self, leaves: &mut [LightLeaf], before: u32) -> Result<u32, Cancelled> {
         let number = self.nodes.len() as u32;
         self.nodes.push(LightTreeNode::empty(self.leaves));
@@ -85,8 +87,8 @@ impl LightTreeBuilder<'_> {
     }
 }
 
-/// Partitions the leaves into at most one group per child and returns the group sizes. The groups are as few as possible, so that
-/// nodes are full.
+/// Partitions the leaves into at most one group per child, and returns the group sizes. Uses as few groups as
+/// possible to fill the nodes.
 fn groups(leaves: &mut [LightLeaf], token: &CancelToken) -> Result<Vec<usize>, Cancelled> {
     token.check()?;
     if leaves.len() <= PACKET_SIZE {
@@ -119,7 +121,7 @@ fn groups(leaves: &mut [LightLeaf], token: &CancelToken) -> Result<Vec<usize>, C
     Ok(groups.into_iter().map(|group| group.count).collect())
 }
 
-/// A contiguous range of leaves.
+/// A range of leaves.
 struct LeafGroup {
     start: usize,
     count: usize,
@@ -132,14 +134,14 @@ impl LeafGroup {
     }
 }
 
-/// Sums over leaves, for the cost of a node over them.
+/// Sums over leaves, for computing the cost of a node.
 #[derive(Clone, Copy)]
 struct LeafSums {
     count: usize,
     power: f64,
     min: DVec3,
     max: DVec3,
-    /// Sum of axes weighted by power.
+    /// Power-weighted sum of the axes.
     axes: DVec3,
 }
 
@@ -171,8 +173,9 @@ impl LeafSums {
         self
     }
 
-    /// Power × area × solid angle (section 4.4, equation 1). The solid angle is computed for a cone whose mean direction has the given
-    /// length. The area is replaced by the squared diagonal, which is not 0 for lights in a row.
+    /// Power × area × solid angle (section 4.4, equation 1). The solid angle is that of a cone with the same
+    /// length of the mean direction. The area is replaced by the squared diagonal, which is nonzero even if
+    /// the lights are in a row.
     fn cost(&self) -> f64 {
         if self.count == 0 {
             return 0.0;
@@ -182,14 +185,14 @@ impl LeafSums {
     }
 }
 
-/// Maximum number of leaves to sort; more are binned.
+/// Maximum number of leaves to sort. More leaves are binned.
 const MAX_SORTED: usize = 1 << 15;
 
 /// Number of bins along the longest axis.
 const BINS: usize = 64;
 
-/// Splits leaves into two nonempty parts along the longest axis; returns the start of the second. If there are few enough to
-/// sort, the size of the first part is a multiple of `unit`.
+/// Splits leaves into two nonempty parts along the longest axis. Returns the size of the first part. It is a
+/// multiple of `unit`, unless there are too many leaves to sort.
 fn split(leaves: &mut [LightLeaf], unit: usize) -> usize {
     let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     for leaf in &*leaves {
@@ -213,14 +216,14 @@ fn split(leaves: &mut [LightLeaf], unit: usize) -> usize {
             return count;
         }
     }
-    // The sort is stable, so the tree is the same on all machines.
+    // A stable sort makes the tree identical on all machines.
     leaves.sort_by(|a, b| a.bounds.center[axis].total_cmp(&b.bounds.center[axis]));
     let parts: Vec<LeafSums> = leaves.chunks(unit).map(LeafSums::of).collect();
     cheapest_split(&parts) * unit
 }
 
-/// The split of a sequence of parts with the least total cost: returns the number of parts in the first half. Both halves have
-/// leaves.
+/// Finds the split with the lowest total cost of a sequence of parts. Returns the number of parts in the
+/// first half. Neither half is empty.
 fn cheapest_split(parts: &[LeafSums]) -> usize {
     let mut right = parts.to_vec();
     for i in (0..parts.len() - 1).rev() {

@@ -1,6 +1,7 @@
-//! Cuts through a light tree: sets of nodes from whose children a point picks. If the lights are few enough, the cut has all
-//! nodes over lights. Otherwise, nodes so close to the point that their bounds are loose are replaced by their children, while
-//! there is room. All picks for one point share a cut.
+//! Cuts through a light tree. A cut is a set of nodes, and a point picks from the children of these nodes. If
+//! there are few lights, the cut consists of all nodes whose children are lights. Otherwise, nodes too close
+//! to the point for tight bounds are replaced by their children, up to a maximum number of nodes. All picks
+//! for a point use the same cut.
 
 use arrayvec::ArrayVec;
 
@@ -9,7 +10,7 @@ use super::{CumulativeImportance, LightPick, LightTree, NOT_IN_TREE, PathCache, 
 use crate::math::Vec3;
 use crate::math::lanes::F32x16;
 
-/// A cut, for picks at successive points.
+/// A cut for picking lights at successive points.
 pub struct LightTreeCut<'a> {
     tree: &'a LightTree,
     /// Maximum number of nodes.
@@ -17,21 +18,21 @@ pub struct LightTreeCut<'a> {
     receiver: Receiver,
     /// Indices of the nodes.
     nodes: ArrayVec<u32, { LightTreeCut::MOST }>,
-    /// Importance of their children; 0 for children that are in the cut themselves.
+    /// Importance of the children of each node. 0 for children that are in the cut themselves.
     importance: ArrayVec<F32x16, { LightTreeCut::MOST }>,
     /// Cumulative importance up to and including each node.
     sums: ArrayVec<f64, { LightTreeCut::MOST }>,
 }
 
-/// Minimum nearness at which a node is replaced by its children: the squared sine of half the angle that its bounding sphere
-/// subtends.
+/// Minimum nearness at which a node is replaced by its children. Nearness is the squared sine of half the
+/// angle that the bounding sphere subtends.
 const NEAR: f32 = 0.05;
 
 impl<'a> LightTreeCut<'a> {
     /// Maximum number of nodes in any cut.
     pub const MOST: usize = 64;
 
-    /// A cut with at most `room` nodes; [`LightTreeCut::move_to`] must be called before picking.
+    /// Creates a cut with at most `room` nodes. [`LightTreeCut::move_to`] must be called before picking.
     #[inline(always)]
     pub fn new(tree: &'a LightTree, room: usize) -> Self {
         let receiver = Receiver::plain(Vec3::ZERO, Vec3::ZERO);
@@ -90,8 +91,8 @@ impl<'a> LightTreeCut<'a> {
         self.sums.last().copied().unwrap_or(0.0)
     }
 
-    /// Picks lights like [`LightTree::pick`], for increasing numbers `u`. `picked` receives the index of each number, the light
-    /// and its probability.
+    /// Picks lights like [`LightTree::pick`], for numbers `u` in increasing order. `picked` receives the
+    /// index of each number, the light, and its probability.
     #[inline(always)]
     pub fn pick(&self, u: impl Iterator<Item = f64>, mut picked: impl FnMut(usize, u32, f32)) {
         let all = self.total();
@@ -101,8 +102,8 @@ impl<'a> LightTreeCut<'a> {
         let inverse = 1.0 / all;
         let (mut index, mut way) = (0, PathCache::NEW);
         let (mut of, mut shares) = (usize::MAX, CumulativeImportance::NONE);
-        // `before` is the sum before the node. `scale` corrects for rounding: the exact sum over the children divided by the
-        // node's share of the rounded total.
+        // `before` is the sum over the preceding nodes. `scale` corrects for rounding. It is the exact sum
+        // over the children, divided by the node's share of the rounded total.
         let (mut before, mut scale) = (0.0, 0.0);
         for (place, u) in u.enumerate() {
             let target = target(u, all);
@@ -114,7 +115,7 @@ impl<'a> LightTreeCut<'a> {
                 before = if index == 0 { 0.0 } else { self.sums[index - 1] };
                 scale = shares.total() / (self.sums[index] - before);
             }
-            // Stay below the sum over the children, which is positive because the node's sum is.
+            // Stay below the sum over the children. It is positive because the node's share is.
             let part = below((target - before) * scale, shares.total());
             let child = shares.find(part);
             let probability = self.share(index, child, inverse);
@@ -130,20 +131,20 @@ impl<'a> LightTreeCut<'a> {
         }
     }
 
-    /// Probability of a node's child, given the inverse of the total importance.
+    /// Probability of picking a node's child, given the inverse of the total importance.
     #[inline(always)]
     fn share(&self, index: usize, child: usize, inverse: f64) -> f32 {
         (f64::from(self.importance[index][child]) * inverse) as f32
     }
 
-    /// The probability that [`LightTreeCut::pick`] picks a light.
+    /// Probability that [`LightTreeCut::pick`] picks a light.
     #[inline]
     pub fn probability(&self, light: u32) -> f32 {
         let place = self.tree.positions[light as usize];
         if place == NOT_IN_TREE || !(self.total() > 0.0) {
             return 0.0;
         }
-        // Find the last node of the cut on the path to the light.
+        // Find the cut's last node on the path to the light.
         let (mut node, mut last) = (ROOT, None);
         loop {
             let one = &self.tree.nodes[node as usize];
@@ -167,7 +168,7 @@ impl<'a> LightTreeCut<'a> {
     }
 }
 
-/// Sums a packet in a fixed order, the same on all machines.
+/// Sums a packet in a fixed order, which is the same on all machines.
 #[inline(always)]
 fn total(importance: &F32x16) -> f64 {
     let mut row = *importance;

@@ -20,13 +20,13 @@ use crate::math::lanes::{F32x16, PACKET_SIZE};
 pub struct LightTree {
     /// All nodes, starting with the root.
     nodes: Vec<LightTreeNode>,
-    /// Nodes whose children are lights, in tree order. Children of the other nodes are nodes.
+    /// Nodes whose children are lights, in tree order. Other nodes have only nodes as children.
     over_lights: Vec<u32>,
-    /// Position of each light in tree order; [`NOT_IN_TREE`] for lights that emit nothing.
+    /// Position of each light in tree order, or [`NOT_IN_TREE`] for lights that emit nothing.
     positions: Vec<u32>,
 }
 
-/// Maximum number of lights, or of triangles of one light, that are all sampled without a tree.
+/// Maximum number of lights (or triangles of a light) for sampling all of them without a tree.
 pub const MAX_WITHOUT_TREE: usize = 32;
 
 /// Marks a light that is not in the tree.
@@ -40,21 +40,21 @@ const ROOT: u32 = 0;
 pub struct LightPick {
     /// Index of the light.
     pub light: u32,
-    /// Probability of picking it.
+    /// Probability of picking the light.
     pub probability: f32,
-    /// Position of the random number within the light's share of [0, 1), rescaled to [0, 1).
+    /// Position of the random number within the light's subinterval of [0, 1), rescaled to [0, 1).
     pub rest: f64,
 }
 
 impl LightTree {
-    /// Picks a light for a surface point, with `u` in [0, 1). `None` if no light arrives.
+    /// Picks a light for a surface point. `u` is in [0, 1). `None` if no light reaches the point.
     #[inline(always)]
     pub fn pick(&self, receiver: &Receiver, u: f64) -> Option<LightPick> {
         let mut way = PathCache::NEW;
         self.pick_under(ROOT, receiver, LightPick { light: 0, probability: 1.0, rest: u }, &mut way)
     }
 
-    /// The probability that [`LightTree::pick`] picks this light.
+    /// Probability that [`LightTree::pick`] picks this light.
     pub fn probability(&self, receiver: &Receiver, light: u32) -> f32 {
         match self.positions[light as usize] {
             NOT_IN_TREE => 0.0,
@@ -62,7 +62,8 @@ impl LightTree {
         }
     }
 
-    /// Picks a light under `node`, which was itself picked. `way` caches the path of the previous pick for the same point.
+    /// Picks a light below `node`. `pick` is the pick so far, and `way` caches the path of the previous pick
+    /// for the same point.
     #[inline(always)]
     fn pick_under(
         &self,
@@ -95,7 +96,7 @@ impl LightTree {
         }
     }
 
-    /// Probability of the light at `place` in tree order, given the probability of a node above it.
+    /// Probability of the light at `place` in tree order, given the probability of an ancestor node.
     fn probability_under(&self, mut node: u32, receiver: &Receiver, place: u32, mut probability: f32) -> f32 {
         loop {
             let one = &self.nodes[node as usize];
@@ -114,7 +115,7 @@ impl LightTree {
         self.positions[light as usize] != NOT_IN_TREE
     }
 
-    /// Position of a light in tree order, in which nearby lights are close together.
+    /// Position of a light in tree order, where nearby lights are close together.
     #[inline(always)]
     pub fn position_of(&self, light: u32) -> u32 {
         self.positions[light as usize]
@@ -125,17 +126,17 @@ impl LightTree {
         self.nodes.len()
     }
 
-    /// Bytes of the tree.
+    /// Memory used by the tree, in bytes.
     pub fn memory_bytes(&self) -> usize {
         size_of_val(&*self.nodes) + size_of_val(&*self.over_lights) + size_of_val(&*self.positions)
     }
 }
 
-/// Levels of the previous path that are cached.
+/// Number of cached levels of the previous path.
 const LEVELS: usize = 3;
 
-/// The nodes on the path of the previous pick and their children's importance. The next pick for the same point may take the same
-/// path.
+/// The nodes on the previous pick's path, and the importance of their children. Successive picks for the same
+/// point often share part of the path.
 struct PathCache {
     nodes: [u32; LEVELS],
     shares: [CumulativeImportance; LEVELS],
@@ -152,7 +153,7 @@ struct CumulativeImportance([f64; PACKET_SIZE]);
 impl CumulativeImportance {
     const NONE: Self = Self([0.0; PACKET_SIZE]);
 
-    /// Computes prefix sums in steps of 1, 2, 4 and 8 places, for all children at once.
+    /// Computes prefix sums for all children at once, by adding sums from 1, 2, 4, and 8 places before.
     #[inline(always)]
     fn new(importance: &F32x16) -> Self {
         let mut sums = [0.0; PACKET_SIZE];
@@ -178,7 +179,7 @@ impl CumulativeImportance {
         self.0[PACKET_SIZE - 1]
     }
 
-    /// The child whose share contains `target`, which must be less than the total.
+    /// The child whose interval contains `target`. `target` must be less than the total.
     #[inline(always)]
     fn find(&self, target: f64) -> usize {
         let mut child = 0;
@@ -188,7 +189,7 @@ impl CumulativeImportance {
         child
     }
 
-    /// Position of `target` within a child's share, in [0, 1).
+    /// Position of `target` within a child's interval, in [0, 1).
     #[inline(always)]
     fn rest(&self, target: f64, child: usize) -> f64 {
         let before = if child == 0 { 0.0 } else { self.0[child - 1] };
@@ -196,7 +197,7 @@ impl CumulativeImportance {
     }
 }
 
-/// Adds to each number the one `STEP` places before it.
+/// Adds to each number the number `STEP` places before it.
 #[inline(always)]
 fn add_shifted<const STEP: usize>(sums: &[f64; PACKET_SIZE]) -> [f64; PACKET_SIZE] {
     let mut before = [0.0; PACKET_SIZE];
@@ -207,20 +208,21 @@ fn add_shifted<const STEP: usize>(sums: &[f64; PACKET_SIZE]) -> [f64; PACKET_SIZ
     before
 }
 
-/// Scales `u` in [0, 1) to a total. The result stays below the total, so that rounding cannot go past the last share.
+/// Scales `u` in [0, 1) to a total. The result is always below the total, so rounding cannot go past the last
+/// interval.
 #[inline(always)]
 fn target(u: f64, total: f64) -> f64 {
     below(u * total, total)
 }
 
-/// Clamps `part` to less than `total`.
+/// Limits `part` to less than `total`.
 #[inline(always)]
 fn below(part: f64, total: f64) -> f64 {
     let last = total.next_down();
     if part < last { part } else { last }
 }
 
-/// Position of `part` within a share, in [0, 1).
+/// Position of `part` within an interval, in [0, 1).
 #[inline(always)]
 fn rest(part: f64, share: f64) -> f64 {
     const LAST: f64 = 1.0_f64.next_down();

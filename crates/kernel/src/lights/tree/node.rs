@@ -1,4 +1,4 @@
-//! Nodes of a light tree, with the bounds of 16 children in SIMD form.
+//! Light tree nodes, with the bounds of 16 children in SIMD form.
 
 use super::bounds::{ConeEdge, DistanceFalloff, LightBounds};
 use crate::math::Vec3;
@@ -9,12 +9,12 @@ use crate::math::lanes::{F32x16, PACKET_SIZE, Vec3x16, lane, set_lane};
 pub struct LightTreeNode {
     /// Bounds of the children's positions and emission.
     bounds: LightBoundsPacket,
-    /// Whether all children have a position, inverse-square falloff, and emission in all directions, like point lights and
-    /// spheres. Otherwise, the general code path is used.
+    /// Whether all children have a position, inverse-square falloff, and emission in all directions (like
+    /// point lights and spheres). If not, the general code path is used.
     is_plain: bool,
     /// The children.
     pub children: [NodeChild; PACKET_SIZE],
-    /// Number of leaves before each child, in tree order; for unused children, the number of leaves in the tree.
+    /// Number of leaves before each child in tree order. For unused children, number of leaves in the tree.
     pub first: [u32; PACKET_SIZE],
     /// Number of children.
     pub count: u32,
@@ -29,9 +29,9 @@ struct LightBoundsPacket {
     radius: F32x16,
     /// 1 if the sphere bounds positions, 0 if it bounds directions.
     is_place: F32x16,
-    /// 1 with inverse-square falloff, otherwise 0.
+    /// 1 for inverse-square falloff, otherwise 0.
     weakens: F32x16,
-    /// Power, in units of about the whole tree's power; 0 in unused lanes.
+    /// Power in units of approximately the entire tree's power. 0 in unused lanes.
     power: F32x16,
     /// 1 / (4 · radius).
     spread: F32x16,
@@ -40,7 +40,7 @@ struct LightBoundsPacket {
     /// Cosines of the cones' half angles.
     cos: F32x16,
     sin: F32x16,
-    /// Cosine of the angle from the cone at which emission ends.
+    /// Cosine of the angle between the cone and the direction where emission ends.
     end: F32x16,
 }
 
@@ -90,7 +90,7 @@ pub enum NodeChild {
     LightTreeNode(u32),
 }
 
-/// Tolerance for rounding of cosine bounds, and the minimum cosine used in an importance.
+/// Tolerance for rounding errors in cosine bounds, and minimum cosine in an importance.
 const MIN_COSINE: f32 = 1e-3;
 
 /// Minimum and maximum importance of a child that may contribute.
@@ -107,25 +107,25 @@ pub struct Receiver {
     pub point: Vec3,
     /// Unit normal of the surface.
     pub normal: Vec3,
-    /// The glossy lobe. `None` if the surface has none or it is not known.
+    /// The glossy lobe. `None` if the surface has none or if it is unknown.
     pub lobe: Option<ReceiverLobe>,
 }
 
-/// A glossy lobe in addition to a diffuse one.
+/// A glossy lobe, usually in addition to a diffuse lobe.
 #[derive(Clone, Copy, Debug)]
 pub struct ReceiverLobe {
     /// Unit direction of the lobe's axis.
     pub axis: Vec3,
-    /// Exponent of its cosine.
+    /// Exponent of the cosine.
     pub shininess: f32,
-    /// Its peak, relative to the diffuse lobe, or absolute if `diffuse` is 0.
+    /// Peak value. It is relative to the diffuse lobe, or absolute if `diffuse` is 0.
     pub peak: f32,
-    /// 1 with a diffuse lobe, 0 without.
+    /// 1 if there is a diffuse lobe, otherwise 0.
     pub diffuse: f32,
 }
 
 impl Receiver {
-    /// A receiver of which only the position and normal are known.
+    /// A receiver with a known position and normal but unknown glossy lobe.
     #[inline(always)]
     pub fn plain(point: Vec3, normal: Vec3) -> Self {
         Self { point, normal, lobe: None }
@@ -152,7 +152,7 @@ struct LobePacket {
 }
 
 impl ReceiverPacket {
-    /// Receivers of which only the positions and normals are known.
+    /// Receivers with known positions and normals but unknown glossy lobes.
     #[inline(always)]
     pub fn plain(point: &Vec3x16, normal: &Vec3x16) -> Self {
         Self { point: *point, normal: *normal, lobes: LobePacket::NONE }
@@ -166,7 +166,7 @@ impl ReceiverPacket {
         (shininess[i], peak[i], diffuse[i]) = (lobe.shininess, lobe.peak, lobe.diffuse);
     }
 
-    /// The same receiver in all lanes.
+    /// A packet with the same receiver in all lanes.
     #[inline(always)]
     fn splat(receiver: &Receiver) -> Self {
         let mut row = Self::plain(&splat3(receiver.point), &splat3(receiver.normal));
@@ -191,8 +191,8 @@ impl LobePacket {
         diffuse: [1.0; PACKET_SIZE],
     };
 
-    /// A lobe's response to light within an angle δ of a direction, as both an upper bound and an estimate: cosⁿ δ is at most (1
-    /// + n(1 − cos δ)/8)⁻⁸, which is at least as wide as the lobe of a few lights and never 0.
+    /// A lobe's response to light within an angle δ of a direction. Serves as an upper bound and as an
+    /// estimate: cosⁿ δ is at most (1 + n(1 − cos δ)/8)⁻⁸, which is never 0.
     #[inline(always)]
     fn value(&self, i: usize, cos: f32, sin: f32) -> f32 {
         let short = 1.0 - cos - sin;
@@ -206,14 +206,14 @@ impl LobePacket {
 
 /// Expected contributions of a node's children at a point.
 pub struct ExpectedContributions {
-    /// Importance, in the tree's unit of power; 0 only if the child certainly contributes nothing.
+    /// Importance in the tree's unit of power. 0 only if the child definitely contributes nothing.
     pub importance: F32x16,
-    /// Squared sines of half the angles that the spheres subtend; 1 for points inside.
+    /// Squared sines of half the angles that the spheres subtend. 1 for points inside.
     pub nearness: F32x16,
 }
 
 impl LightTreeNode {
-    /// A node without children, in a tree with `leaves` lights.
+    /// A node without children in a tree with `leaves` lights.
     pub fn empty(leaves: u32) -> Self {
         Self {
             bounds: LightBoundsPacket::EMPTY,
@@ -224,7 +224,7 @@ impl LightTreeNode {
         }
     }
 
-    /// Sets a child. `unit` is the unit of power, about the power of the whole tree.
+    /// Sets a child. `unit` is the unit of power, approximately the power of the entire tree.
     pub fn set(&mut self, i: usize, bounds: &LightBounds, unit: f64) {
         let LightBounds { space, center, radius, power, cone } = bounds;
         let own = &mut self.bounds;
@@ -248,9 +248,9 @@ impl LightTreeNode {
         };
     }
 
-    /// Importance of the children for a surface point: power × distance falloff × mean cosine at the surface × cosine of the
-    /// smallest angle between the emission cone and a direction from the child (section 4.2, with bounds on cosines) × the lobe's
-    /// response. Never 0 if light from the child might arrive.
+    /// Importance of the children for a surface point: power × distance falloff × mean cosine at the surface
+    /// × cosine of the smallest angle between the emission cone and a direction from the child (section 4.2,
+    /// with bounds on cosines) × the lobe's response. Never 0 if light from the child may reach the point.
     #[inline(always)]
     pub fn expected(&self, receiver: &Receiver) -> ExpectedContributions {
         let receivers = ReceiverPacket::splat(receiver);
@@ -263,14 +263,14 @@ impl LightTreeNode {
         expected(&self.bounds.splat(child), receivers, self.is_plain, has_lobes).importance
     }
 
-    /// The child above the leaf at `place` in tree order.
+    /// The child that contains the leaf at `place` in tree order.
     pub fn child_above(&self, place: u32) -> usize {
         let after = self.first[1..].iter().position(|&first| first > place);
         after.unwrap_or(PACKET_SIZE - 1)
     }
 }
 
-/// Importance of lights for receivers, lane by lane.
+/// Importance of lights for receivers, one pair per lane.
 #[inline(always)]
 fn expected(
     bounds: &LightBoundsPacket,
@@ -299,7 +299,7 @@ fn expected_as<const IS_PLAIN: bool, const HAS_LOBE: bool>(
             offset[axis][i] = bounds.center[axis][i] - start;
         }
     }
-    // Compute squared distances (at least the squared radius) and components along the normal.
+    // Compute squared distances (bounded from below by the squared radius) and components along the normal.
     let [mut square, mut least, mut along] = [[0.0; PACKET_SIZE]; 3];
     for i in 0..PACKET_SIZE {
         square[i] = lane(&offset, i).length_squared();
@@ -311,16 +311,16 @@ fn expected_as<const IS_PLAIN: bool, const HAS_LOBE: bool>(
         inverse[i] = at_least(square[i], least[i]);
     }
     inverse_roots(&mut inverse);
-    // `towards` is positive if θ − β < 90° and above 1 if θ < β, where β is half the angle that the sphere subtends. Inside the
-    // sphere, light arrives from every direction.
+    // Let θ be the angle between the normal and the sphere's center, and β half the angle that the sphere
+    // subtends. `towards` is positive if θ − β < 90°. Inside the sphere, light arrives from every direction.
     let [mut sin, mut towards, mut mean] = [[0.0; PACKET_SIZE]; 3];
     for i in 0..PACKET_SIZE {
         sin[i] = bounds.radius[i] * inverse[i];
         let straight = along[i] * inverse[i];
         let sum = straight + sin[i];
         towards[i] = if square[i] <= least[i] { 1.0 } else { sum };
-        // The cosines at the points of a sphere are uniformly distributed between the minimum and the maximum; negative ones
-        // contribute nothing.
+        // The cosines for points in a sphere are approximately uniformly distributed between the minimum and
+        // the maximum. Negative cosines contribute nothing.
         let above = at_least(towards[i], 0.0);
         let cut = above * above * bounds.spread[i] * at_least(square[i], least[i]) * inverse[i];
         mean[i] = if straight > sin[i] { straight } else { cut };
@@ -362,8 +362,8 @@ fn expected_as<const IS_PLAIN: bool, const HAS_LOBE: bool>(
     }
     ExpectedContributions { importance, nearness }
 }
-/// 1/√x for x ≥ [`MIN_IMPORTANCE`], accurate to a few ulps, with Newton's method. Square roots and divisions of 16 numbers would take
-/// longer than the rest of the node test.
+/// 1/√x for x ≥ [`MIN_IMPORTANCE`], accurate to a few ulps. Uses Newton's method because square roots and
+/// divisions of 16 numbers would take longer than the rest of the node test.
 #[inline(always)]
 fn inverse_roots(x: &mut F32x16) {
     for i in 0..PACKET_SIZE {
@@ -377,7 +377,7 @@ fn inverse_roots(x: &mut F32x16) {
     }
 }
 
-/// Clamps the bound of a cosine.
+/// Clamps a bound on a cosine.
 #[inline(always)]
 fn cosine(bound: f32) -> f32 {
     at_most(at_least(bound, MIN_COSINE), 1.0)

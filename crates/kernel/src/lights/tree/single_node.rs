@@ -1,4 +1,4 @@
-//! Single-node light trees, in which a packet of points picks lights together.
+//! Single-node light trees, for picking lights for an entire packet of points.
 
 use super::node::{LightTreeNode, NodeChild, ReceiverPacket};
 use super::{LightTree, ROOT};
@@ -7,7 +7,7 @@ use crate::math::lanes::{F32x16, PACKET_SIZE};
 /// Importance of each light of a single-node tree, for a packet of points.
 pub struct SingleNodeImportance<'a> {
     node: &'a LightTreeNode,
-    /// Importance per child, then per point.
+    /// Importance, indexed by child, then by point.
     importance: [F32x16; PACKET_SIZE],
     /// Sums over the children.
     totals: [f64; PACKET_SIZE],
@@ -15,11 +15,11 @@ pub struct SingleNodeImportance<'a> {
 
 /// The lights picked by a packet of points.
 pub struct PacketPicks {
-    /// Child index of each light.
+    /// Index of the picked child for each point.
     children: [u32; PACKET_SIZE],
-    /// Index of each light.
+    /// Index of the picked light for each point.
     pub lights: [u32; PACKET_SIZE],
-    /// Probabilities of the picks; 0 if no light arrives.
+    /// Probabilities of the picks. 0 if no light reaches the point.
     pub probabilities: F32x16,
 }
 
@@ -35,7 +35,7 @@ impl LightTree {
             .then(|| SingleNodeImportance::new(&self.nodes[ROOT as usize], receivers, has_lobes))
     }
 
-    /// Whether the tree is a single node.
+    /// Whether the tree consists of a single node.
     #[inline(always)]
     pub fn is_single_node(&self) -> bool {
         self.nodes.len() == 1
@@ -55,12 +55,12 @@ impl<'a> SingleNodeImportance<'a> {
         Self { node, importance, totals }
     }
 
-    /// Picks a light for each point, with `u` in [0, 1).
+    /// Picks a light for each point. `u` is in [0, 1).
     #[inline(always)]
     pub fn pick(&self, u: &[f64; PACKET_SIZE]) -> PacketPicks {
         let mut targets = [0.0; PACKET_SIZE];
         for i in 0..PACKET_SIZE {
-            // Stay below the total, so that rounding cannot go past the last child with nonzero importance.
+            // Stay below the total to prevent rounding past the last child with nonzero importance.
             let (target, last) = (u[i] * self.totals[i], before(self.totals[i]));
             targets[i] = if target < last { target } else { last };
         }
@@ -83,7 +83,7 @@ impl<'a> SingleNodeImportance<'a> {
         PacketPicks { children, lights, probabilities: self.shares(&values) }
     }
 
-    /// The probabilities with which these importances would have led to the given picks.
+    /// Probabilities of the given picks under these importances.
     #[inline(always)]
     pub fn probabilities(&self, picks: &PacketPicks) -> F32x16 {
         let mut values = [0.0; PACKET_SIZE];
@@ -104,7 +104,7 @@ impl<'a> SingleNodeImportance<'a> {
     }
 }
 
-/// The largest number below `total` > 0; 0 for 0.
+/// The largest number below `total` > 0. Returns 0 for 0.
 #[inline(always)]
 fn before(total: f64) -> f64 {
     f64::from_bits(total.to_bits().saturating_sub(1))

@@ -15,7 +15,7 @@ use crate::lights::infinite::{DirectionalLight, Environment};
 use crate::lights::{AreaLight, Emitter, Light, LightPart, Lights, MeshEmitter, Side, area_light};
 use crate::math::{DVec3, Vec3, random};
 
-/// A light of random kind, size and position.
+/// A light with a random kind, size, and position.
 fn any_light(object: u32, next: &mut impl FnMut() -> f32) -> Light {
     let mut vector =
         |scale: f32| Vec3::from_array(std::array::from_fn(|_| (next() * 2.0 - 1.0) * scale)).as_dvec3();
@@ -41,7 +41,7 @@ fn any_light(object: u32, next: &mut impl FnMut() -> f32) -> Light {
         8 => Shape::Box(Cuboid::new(place, across.abs() * size + 0.001, direction * 90.0)),
         _ => Shape::Cylinder(Cylinder::new(place, place + direction * size, size * 0.3, true)),
     };
-    Light::Area(area_light(&shape, color, object).expect("a finite shape"))
+    Light::Area(area_light(&shape, color, object).expect("expected a finite shape"))
 }
 
 fn lights_of(count: u32, next: &mut impl FnMut() -> f32) -> Vec<Light> {
@@ -60,19 +60,19 @@ fn place(next: &mut impl FnMut() -> f32) -> (Vec3, Vec3) {
     (vector(5.0), vector(1.0).normalize())
 }
 
-/// Cut size: enough for some trees, too small for others.
+/// Cut size. Large enough for some of the trees, and too small for others.
 const NODES: usize = 12;
 
 /// A cut for a point.
 fn cut_for(tree: &LightTree, point: Vec3, normal: Vec3, nodes: usize) -> LightTreeCut<'_> {
     let mut cut = LightTreeCut::new(tree, nodes);
-    // Visit another point first: it must leave no trace.
+    // Visit another point first, which should not affect the result.
     cut.move_to(&Receiver::plain(normal, point));
     cut.move_to(&Receiver::plain(point, normal));
     cut
 }
 
-/// Lights and probabilities from [`LightTreeCut::pick`], per number.
+/// Lights and probabilities from [`LightTreeCut::pick`], for each number.
 fn picks_of<const N: usize>(cut: &LightTreeCut<'_>, u: &[f64; N]) -> [Option<(u32, f32)>; N] {
     let mut picks = [None; N];
     cut.pick(u.iter().copied(), |place, light, probability| picks[place] = Some((light, probability)));
@@ -115,7 +115,8 @@ proptest! {
                     }
                 }
             }
-            // The missing probability is that of nodes whose bounds promise light that their children do not send.
+            // The missing probability belongs to nodes whose bounds predict light although their children
+            // contribute none.
             let alone: f32 = (0..count).map(|light| tree.probability(&Receiver::plain(point, normal), light)).sum();
             let cut: f32 = (0..count).map(|light| cut.probability(light)).sum();
             prop_assert!((alone + dark[0] - 1.0).abs() < 0.02, "{} {}", alone, dark[0]);
@@ -150,9 +151,9 @@ proptest! {
 }
 
 #[test]
-fn stacked_spotlights_are_picked_from_in_between() {
-    // The lights form columns, one node each, all pointing down. A point below the lowest light that reaches it may be above the
-    // center of the node.
+fn spotlights_in_columns_are_picked_between_lights() {
+    // The lights form columns with one node each, and all point down. Points below some lights of a column
+    // may be above the center of the node.
     let mut next = random::unit(8);
     let spot = |i: u32| {
         let position = DVec3::new(f64::from(i % 16), 0.5 + f64::from(i / 16), 0.0);
@@ -224,10 +225,10 @@ fn pick_frequencies_match_probabilities() {
             } else {
                 assert!(few.0 < 20.0, "{few:?}");
             }
-            // χ² has mean n and variance 2n, where n is the number of cells − 1.
+            // χ² has mean n and variance 2n for n + 1 cells.
             assert!(
                 cells > 10.0 && chi < cells + 4.5 * (2.0 * cells).sqrt(),
-                "{round} {way}: {chi} of {cells} cells"
+                "{round} {way}: {chi} for {cells} cells"
             );
         }
     }
@@ -235,13 +236,13 @@ fn pick_frequencies_match_probabilities() {
 
 #[test]
 fn lights_without_contribution_are_not_picked() {
-    // Above a floor: lights below it, lights facing away, and spotlights aimed past the point.
+    // Lights below the floor, lights that face away, and spotlights that point away.
     let (point, normal) = (Vec3::ZERO, Vec3::Y);
     let at = |x: f64, y: f64| DVec3::new(x, y, 0.5);
     let point_at = |position| PointLight { position, intensity: Vec3::ONE, falloff: Falloff::Square };
     let disk = |place, normal| {
         let disk = Shape::Disk(Disk::new(place, normal, 0.05));
-        Light::Area(area_light(&disk, Vec3::ONE, 0).expect("a finite shape"))
+        Light::Area(area_light(&disk, Vec3::ONE, 0).expect("expected a finite shape"))
     };
     let spot =
         |place, axis| Light::Spot(SpotLight { point: point_at(place), axis, half_angle: 0.3, blend: 0.2 });
@@ -263,7 +264,7 @@ fn lights_without_contribution_are_not_picked() {
         assert!(number % 5 > 2 || tree.probability(&Receiver::plain(point, normal), number) == 0.0);
         sum += probability;
     }
-    // Almost no probability is lost to nodes without light.
+    // Nodes without contributing lights should have almost no probability.
     assert!(sum > 0.7, "{sum}");
 }
 
@@ -298,7 +299,7 @@ fn picks_are_invariant_to_power_of_two_scaling() {
                 Light::Point(PointLight { position, intensity, falloff: Falloff::Square })
             })
             .collect();
-        // A light at infinity has no position and no size.
+        // A light at infinity does not have a position or size.
         let sun = DirectionalLight::new(Vec3::new(0.6, 0.8, 0.0), Vec3::splat(3.0), 0.0);
         lights.push(Light::Directional(sun));
         let tree = tree_of(&lights);
@@ -322,7 +323,7 @@ fn joint_bounds_contain_all_lights() {
             for one in &own {
                 let reach = (one.center - all.center).length() + one.radius;
                 assert!(reach <= all.radius * (1.0 + 1e-12), "{one:?} {all:?}");
-                // Every direction of the cone must be inside the joint cone.
+                // The joint cone must contain every direction of the cone.
                 let turned = one.cone.axis.dot(all.cone.axis).clamp(-1.0, 1.0).acos() + one.cone.cos.acos();
                 assert!(turned.min(std::f64::consts::PI).cos() >= all.cone.cos - 1e-9, "{one:?} {all:?}");
                 assert!(all.cone.edge >= one.cone.edge);
@@ -401,21 +402,21 @@ fn packet_picks_match_single_picks() {
                     "{} {own}",
                     picks.probabilities[i]
                 );
-                // Sums in a different order may shift a number to the next light.
+                // Summing in a different order may shift a number to the next light.
                 picked += u32::from(alone.light == picks.lights[i]);
             }
             let greatest = shares.pick(&[1.0_f64.next_down(); PACKET_SIZE]);
             for (i, receiver) in receivers.iter().enumerate() {
                 let own = tree.probability(receiver, greatest.lights[i]);
-                assert_eq!(greatest.probabilities[i] > 0.0, own > 0.0, "the last light that contributes");
+                assert_eq!(greatest.probabilities[i] > 0.0, own > 0.0, "last contributing light");
             }
         }
     }
-    assert!(picked > 3000, "{picked} equal picks");
+    assert!(picked > 3000, "only {picked} picks are equal");
     assert!(!tree_of(&lights_of(17, &mut next)).is_single_node());
 }
 
-/// A mesh of triangles of very different sizes, near and far.
+/// A mesh of triangles with very different sizes, some near and some far.
 fn uneven_mesh(count: u32) -> MeshEmitter {
     let mut next = random::signed(8);
     let mut corner = |scale: f64| DVec3::new(f64::from(next()), f64::from(next()), f64::from(next())) * scale;
@@ -447,10 +448,10 @@ fn mesh_pdf_matches_its_samples() {
             let Some(sample) = light.sample(point, normal, [next(), next()]) else { continue };
             let crate::lights::ShadowRayEnd::At(target) = sample.end else { panic!("a finite light") };
             let crate::lights::LightObject::Primitive(4, primitive) = sample.source else {
-                panic!("a triangle of it")
+                panic!("expected a triangle")
             };
             let Emitter::Mesh(mesh) = &light.shape else { panic!("a mesh") };
-            let front = mesh.normal_of(primitive).expect("one of its triangles").as_vec3();
+            let front = mesh.normal_of(primitive).expect("expected one of the light's triangles").as_vec3();
             let met = crate::lights::LightHit {
                 direction: sample.direction,
                 distance: (target - point).length(),

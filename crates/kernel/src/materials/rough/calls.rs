@@ -1,9 +1,10 @@
-//! Calls packet functions either inlined or through one copy per instruction set, as [`RoughRow::IS_COPIED`] says.
+//! Calls packet functions either inlined or through one copy per instruction set, depending on
+//! [`RoughRow::IS_COPIED`].
 
 use crate::materials::bsdf::{BsdfValues, LobeSet, RoughRow};
 use crate::math::lanes::{F32x16, Simd, SimdKernel, Vec3x16};
 
-/// The large functions of [`RoughRow`], for all kinds.
+/// The large functions of [`RoughRow`] for all kinds.
 pub(super) trait RoughCalls: RoughRow {
     /// [`RoughRow::f`].
     #[inline(always)]

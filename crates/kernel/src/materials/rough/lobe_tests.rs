@@ -1,5 +1,5 @@
-//! Checks for microfacet lobes, shared by the tests of each kind: values against an `f64` reference, samples against pdfs, and
-//! albedos.
+//! Checks for microfacet lobes, used in the tests of each kind. Compares values with an `f64` reference,
+//! samples with pdfs, and albedos.
 
 use crate::materials::bsdf::{LobeSet, Place, RoughRow, ShownLobes, SideSamples};
 use crate::math::lanes::{F32x16, PACKET_SIZE, Vec3x16, lane, set_lane};
@@ -17,14 +17,14 @@ pub const COSINES: [f64; 5] = [0.05, 0.15, 0.4, 0.8, 1.0];
 /// Tangent of the test surfaces, along x.
 const TANGENT: Vec3 = Vec3::new(3.0, 0.0, 0.5);
 
-/// A unit direction, from its cosine with z and its azimuth.
+/// A unit direction from its cosine with z and its azimuth.
 pub fn direction(cosine: f64, azimuth: f64) -> DVec3 {
     let sine = (1.0 - cosine * cosine).max(0.0).sqrt();
     let (sin, cos) = libm::sincos(azimuth);
     DVec3::new(sine * cos, sine * sin, cosine)
 }
 
-/// D·G/(4 cosθᵢ cosθₒ) around z, as in the papers.
+/// D·G/(4 cosθᵢ cosθₒ) around z, with the formulas from the papers.
 pub fn reference(one: DVec3, other: DVec3, [u, v]: [f64; 2]) -> f64 {
     let half = (one + other).normalize();
     let stretched = (half.x / u).powi(2) + (half.y / v).powi(2) + half.z * half.z;
@@ -36,14 +36,15 @@ pub fn reference(one: DVec3, other: DVec3, [u, v]: [f64; 2]) -> f64 {
     distribution / (1.0 + lambda(one) + lambda(other)) / (4.0 * one.z * other.z)
 }
 
-/// How a narrow lobe receives light.
+/// How light reaches the viewer in a narrow lobe.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LitFrom {
     /// By reflection.
     Mirrored,
-    /// By refraction; the ratio of the index of refraction on the light's side to that on the viewer's.
+    /// By refraction. Contains the index of refraction on the light's side divided by the index on the
+    /// viewer's side.
     Refracted(f64),
-    /// By reflection, from the other side.
+    /// Through the surface, in the mirrored direction of a reflection.
     Through,
 }
 
@@ -57,7 +58,7 @@ impl LitFrom {
     }
 }
 
-/// Lobe choices and random numbers for `side` × `side` stratified samples, in packets.
+/// Packets of lobe choices and random numbers for `side` × `side` stratified samples.
 fn grid(side: u32) -> impl Iterator<Item = (F32x16, [F32x16; 2])> {
     let mut next = random(5);
     (0..side * side).step_by(PACKET_SIZE).map(move |first| {
@@ -83,11 +84,11 @@ pub struct SideSample {
     pub density: f64,
     /// f·cosθ divided by the pdf.
     pub share: f64,
-    /// Whether it is on the side opposite to the packet's light.
+    /// Whether the direction is on the opposite side from the packet's light.
     pub is_beyond: bool,
 }
 
-/// A surface around z, seen from a direction.
+/// A surface around z that is seen from a direction.
 pub struct Subject<R: RoughRow> {
     row: R,
     to_eye: DVec3,
@@ -96,12 +97,12 @@ pub struct Subject<R: RoughRow> {
 }
 
 impl<R: RoughRow> Subject<R> {
-    /// A surface with this material, whose narrow lobe has these `alphas`.
+    /// A surface with this material. `alphas` are those of its narrow lobe.
     pub fn new(point: &R::Point, alphas: [f32; 2], to_eye: DVec3) -> Self {
         Self::lit(point, alphas, to_eye, LitFrom::Mirrored)
     }
 
-    /// [`Subject::new`] with another kind of light.
+    /// [`Subject::new`] with an explicit kind of lighting.
     pub fn lit(point: &R::Point, alphas: [f32; 2], to_eye: DVec3, light: LitFrom) -> Self {
         let mut row = R::EMPTY;
         row.reset();
@@ -113,17 +114,17 @@ impl<R: RoughRow> Subject<R> {
         Self { row, to_eye, alphas: alphas.map(f64::from), light }
     }
 
-    /// Normals on the side of the light.
+    /// Normals on the lit side.
     fn normals(&self) -> Vec3x16 {
         [[0.0; PACKET_SIZE], [0.0; PACKET_SIZE], [self.light.side() as f32; PACKET_SIZE]]
     }
 
-    /// Cosine of a direction with the normal on the side of the light.
+    /// Cosine between a direction and the normal on the lit side.
     fn height(&self, direction: DVec3) -> f64 {
         direction.z * self.light.side()
     }
 
-    /// f, its wide part, and the pdf, for light from these directions.
+    /// f, the part of f from wide lobes, and the pdf, for light from the given directions.
     pub fn values(&self, lobes: LobeSet, directions: &[DVec3]) -> Vec<(DVec3, DVec3, f64)> {
         let mut all = Vec::new();
         for some in directions.chunks(PACKET_SIZE) {
@@ -139,10 +140,10 @@ impl<R: RoughRow> Subject<R> {
                 let f = lane(&values.f, i).as_dvec3();
                 assert!(
                     (wide + narrow - f).abs().max_element() <= 2e-6 * f.max_element(),
-                    "the parts of {f}"
+                    "the parts should add up to {f}"
                 );
                 let alone = self.row.f_at(i, some[i].as_vec3()).as_dvec3();
-                assert!((alone - f).abs().max_element() <= 1e-5 * f.max_element(), "{alone} is not {f}");
+                assert!((alone - f).abs().max_element() <= 1e-5 * f.max_element(), "{alone} instead of {f}");
                 all.push((f, wide, f64::from(pdf[i])));
             }
         }
@@ -158,7 +159,7 @@ impl<R: RoughRow> Subject<R> {
         all
     }
 
-    /// Samples on either side, with the random numbers of [`Subject::samples`].
+    /// Samples on either side with the same random numbers as [`Subject::samples`].
     pub fn side_samples(
         &self,
         side: u32,
@@ -177,7 +178,7 @@ impl<R: RoughRow> Subject<R> {
         all
     }
 
-    /// Albedo of all lobes, estimated with samples: the mean of f·cos/pdf.
+    /// Albedo of all lobes, estimated as the mean of f·cos/pdf over samples.
     pub fn sampled_albedo(&self, side: u32) -> DVec3 {
         self.mean_of(&self.samples(LobeSet::All, side))
     }
@@ -198,7 +199,7 @@ impl<R: RoughRow> Subject<R> {
         self.mean_of(&samples)
     }
 
-    /// The largest f·cos/pdf among samples of all lobes.
+    /// Maximum of f·cos/pdf over samples of all lobes.
     pub fn largest_weight(&self, side: u32) -> f64 {
         let samples = self.samples(LobeSet::All, side);
         let values = self.values(LobeSet::All, &samples);
@@ -208,7 +209,7 @@ impl<R: RoughRow> Subject<R> {
         weights.fold(0.0, f64::max)
     }
 
-    /// The mean of f·cos/pdf.
+    /// Mean of f·cos/pdf.
     fn mean_of(&self, samples: &[DVec3]) -> DVec3 {
         let values = self.values(LobeSet::All, samples);
         let sum: DVec3 = samples
@@ -220,12 +221,13 @@ impl<R: RoughRow> Subject<R> {
         sum / samples.len() as f64
     }
 
-    /// Albedo by quadrature of f: over half vectors for the narrow lobe, over directions for the wide ones.
+    /// Albedo by quadrature of f, over half vectors for the narrow lobe and over directions for the wide
+    /// lobes.
     pub fn albedo(&self) -> DVec3 {
         self.albedo_by_rings(192)
     }
 
-    /// [`Subject::albedo`] with this many rings of half vectors.
+    /// [`Subject::albedo`] with a given number of rings of half vectors.
     pub fn albedo_by_rings(&self, rings: u32) -> DVec3 {
         let narrow: DVec3 = self
             .half_vectors(rings, 192)
@@ -249,8 +251,8 @@ impl<R: RoughRow> Subject<R> {
         narrow + wide * (PI / f64::from(rings * steps))
     }
 
-    /// Directions above the surface, from half vectors in equal steps of y and the azimuth, each with its solid angle. (1 − y)²
-    /// is the fraction of D outside an angle, so that the tail is covered.
+    /// Directions above the surface and their solid angles, from half vectors in equal steps of y and
+    /// azimuth. (1 − y)² is the fraction of D outside a given angle, so the steps also cover the tail.
     fn half_vectors(&self, rings: u32, steps: u32) -> impl Iterator<Item = (DVec3, f64)> {
         (0..rings * steps).filter_map(move |i| {
             let y = (f64::from(i / steps) + 0.5) / f64::from(rings);
@@ -260,7 +262,8 @@ impl<R: RoughRow> Subject<R> {
         })
     }
 
-    /// The direction at a point of the half-vector map, and its solid angle per unit of the map. `None` below the surface.
+    /// The direction at a point of the half-vector map, and its solid angle per unit area of the map. `None`
+    /// if the direction is below the surface.
     pub fn at_half_vector(&self, y: f64, phi: f64) -> Option<(DVec3, f64)> {
         let [u, v] = self.alphas;
         let outside = (1.0 - y) * (1.0 - y);
@@ -269,7 +272,7 @@ impl<R: RoughRow> Subject<R> {
         let half = DVec3::new(u * slope * cos, v * slope * sin, 1.0).normalize();
         let cosine = half.dot(self.to_eye);
         let mirrored = half * (2.0 * cosine) - self.to_eye;
-        // Solid angle of directions per solid angle of half vectors.
+        // Ratio between the solid angles of directions and half vectors.
         let (direction, spread) = match self.light {
             LitFrom::Mirrored => (mirrored, 4.0 * cosine),
             LitFrom::Through => (DVec3::new(mirrored.x, mirrored.y, -mirrored.z), 4.0 * cosine),
@@ -288,7 +291,7 @@ impl<R: RoughRow> Subject<R> {
         is_seen.then(|| (direction, spread * 2.0 * (1.0 - y) / density))
     }
 
-    /// The point of a direction on the half-vector map.
+    /// The point on the half-vector map that corresponds to a direction.
     fn place(&self, direction: DVec3) -> [f64; 2] {
         let [u, v] = self.alphas;
         let sum = match self.light {
@@ -302,8 +305,8 @@ impl<R: RoughRow> Subject<R> {
         [1.0 - 1.0 / (1.0 + slope2).sqrt(), libm::atan2(y, x).rem_euclid(TAU) / TAU]
     }
 
-    /// χ² test of samples against the pdf over cells of the half-vector map: the statistic must be at most six standard
-    /// deviations above its mean.
+    /// χ² test that compares samples with the pdf over cells of the half-vector map. The statistic must be at
+    /// most six standard deviations above its mean.
     pub fn check_samples(&self, what: &str, lobes: LobeSet) {
         const CELLS: u32 = 16;
         // Near total reflection, refraction has a square-root singularity.
@@ -323,7 +326,7 @@ impl<R: RoughRow> Subject<R> {
                 counts[number as usize] += 1.0;
             }
         }
-        // Integrate the pdf over each cell; the remainder is below the surface.
+        // Integrate the pdf over each cell. The rest of the probability is below the surface.
         let side = CELLS * fine;
         let part = |i: u32| (f64::from(i) + 0.5) / f64::from(side);
         let places: Vec<(usize, DVec3, f64)> = (0..side * side)
@@ -341,7 +344,7 @@ impl<R: RoughRow> Subject<R> {
         let above: f64 = expected.iter().sum();
         assert!(above < 1.003 * total as f64, "{what}: the pdf integrates to {}", above / total as f64);
         expected[(CELLS * CELLS) as usize] = (total as f64 - above).max(0.0);
-        // Pool cells with few expected samples.
+        // Merge cells with few expected samples.
         let (mut sum, mut cells, mut rest) = (0.0, 0.0, [0.0; 2]);
         for (count, expected) in counts.iter().zip(&expected) {
             if *expected >= 20.0 {
@@ -356,7 +359,7 @@ impl<R: RoughRow> Subject<R> {
     }
 }
 
-/// Checks reciprocity, and compares f with a reference, in many directions near the peak and elsewhere.
+/// Checks reciprocity and compares f with a reference, for directions near the peak and elsewhere.
 pub fn check_values<R: RoughRow>(
     what: &str,
     point: &R::Point,
@@ -381,23 +384,23 @@ pub fn check_values<R: RoughRow>(
             let size = f.max_element();
             assert!(
                 (f - back).abs().max_element() <= reciprocity * size,
-                "{what}: {f} there, {back} back, from {light} to {to_eye}"
+                "{what}: {f} forward, {back} reversed, from {light} to {to_eye}"
             );
             let exact = reference(to_eye.normalize(), light.normalize());
             assert!(
                 (f - exact).abs().max_element() <= error * exact.max_element(),
-                "{what}: {f} is not {exact}, from {light} to {to_eye}"
+                "{what}: {f} instead of {exact}, from {light} to {to_eye}"
             );
         }
     }
 }
 
-/// Checks that values, pdfs and samples of a surface do not depend on the other lanes.
+/// Checks that values, pdfs, and samples of a surface do not depend on the other lanes.
 pub fn check_neighbors<R: RoughRow>(points: &[R::Point]) {
     check_neighbors_lit::<R>(points, LitFrom::Mirrored);
 }
 
-/// [`check_neighbors`] with another kind of light.
+/// [`check_neighbors`] with an explicit kind of lighting.
 pub fn check_neighbors_lit<R: RoughRow>(points: &[R::Point], lit: LitFrom) {
     check_shown_lobes::<R>(points, lit);
     let normals = [[0.0; PACKET_SIZE], [0.0; PACKET_SIZE], [lit.side() as f32; PACKET_SIZE]];
@@ -429,7 +432,7 @@ pub fn check_neighbors_lit<R: RoughRow>(points: &[R::Point], lit: LitFrom) {
             for lobes in [LobeSet::All, LobeSet::Narrow] {
                 bits.push(row.pdf(lobes, &normals, &light, &values)[i].to_bits());
                 let sample = lane(&row.sample(lobes, &normals, &choices, &u), i);
-                // Without a narrow lobe, its sample is never used.
+                // If there is no narrow lobe, its sample is never used.
                 if lobes == LobeSet::All || row.narrow_lobes() & 1 << i != 0 {
                     bits.extend(sample.to_array().map(f32::to_bits));
                 }
@@ -449,8 +452,9 @@ pub fn check_neighbors_lit<R: RoughRow>(points: &[R::Point], lit: LitFrom) {
     }
 }
 
-/// Checks that the lobes have the same bits whether one of them or all are shown, and add up to f. Otherwise the AOVs do not add
-/// up to the beauty image, as rays in narrow lobes divide by small pdfs.
+/// Checks that each lobe is bit-identical whether or not the other lobes are shown, and that the lobes add up
+/// to f. If they did not, the sum of the AOVs would differ from the beauty image, because rays in narrow
+/// lobes divide by small pdfs.
 pub fn check_shown_lobes<R: RoughRow>(points: &[R::Point], lit: LitFrom) {
     let mut next = random(7);
     for point in points {
@@ -478,7 +482,7 @@ pub fn check_shown_lobes<R: RoughRow>(points: &[R::Point], lit: LitFrom) {
             assert_eq!([of_wide[1], of_narrow[2]], [wide, narrow], "{to_eye} {way}");
             assert_eq!([of_wide[2], of_narrow[1]], [Vec3::ZERO; 2], "{to_eye} {way}");
             let rest = (of_wide[0] + of_narrow[0] - f).abs().max_element();
-            assert!(rest <= 2.0 * f32::EPSILON * f.max_element(), "{to_eye} {way}: {f} without {rest}");
+            assert!(rest <= 2.0 * f32::EPSILON * f.max_element(), "{to_eye} {way}: {f} is off by {rest}");
         }
     }
 }

@@ -1,4 +1,4 @@
-//! The table of non-specular BSDFs, and enums over all of them: for a material, for a point, and for a packet.
+//! The table of non-specular BSDFs, and enums over all of them for materials, points, and packets.
 
 mod calls;
 pub mod frosted;
@@ -30,10 +30,10 @@ use phong::PhongRow;
 use plastic::PlasticRow;
 use principled::PrincipledRow;
 
-/// Generates enums over all kinds, whose methods dispatch to the trait methods of the same name. Kinds listed under `materials`
-/// are entire materials; `parts` lists kinds that surfaces of other materials have for a part of their light. `kept` is how a
-/// [`BsdfRow`] stores a packet: the most common kind inline, others boxed, so that they do not enlarge the packets of scenes
-/// without them.
+/// Generates enums over all kinds. Their methods dispatch to the trait methods of the same name. `materials`
+/// lists kinds that are entire materials. `parts` lists kinds that other materials use for a part of their
+/// light. `kept` is how a [`BsdfRow`] stores a packet. The most common kind is stored inline. Others are
+/// boxed to keep packets small in scenes without them.
 macro_rules! kinds {
     (
         materials { $($(#[$doc:meta])* $kind:ident($material:ty, $row:ty, kept: $kept:ty)),+ $(,)? }
@@ -59,8 +59,8 @@ macro_rules! kinds {
             $($(#[$part_doc])* $part(<$part_row as RoughRow>::Point)),+
         }
 
-        /// A packet of non-specular surfaces of one kind.
-        // Phong packets are stored inline: boxing them would slow down every scene.
+        /// A packet of non-specular surfaces of one kind. Phong packets are stored inline because boxing them
+        /// would slow down every scene.
         #[allow(clippy::large_enum_variant)]
         #[derive(Clone, Debug)]
         pub enum BsdfRow { $($(#[$doc])* $kind($kept),)+ $($(#[$part_doc])* $part(Box<$part_row>)),+ }
@@ -102,12 +102,12 @@ macro_rules! kinds {
                 match self { $(Self::$kind(own) => own.ambient_at(at, lookups)),+ }
             }
 
-            /// Whether any of its textures has mip levels.
+            /// Whether any of the textures has mip levels.
             pub fn is_mipmapped(&self) -> bool {
                 match self { $(Self::$kind(own) => own.textures().any(|texture| texture.mipmaps.is_some())),+ }
             }
 
-            /// Whether it has any textures.
+            /// Whether there are any textures.
             #[inline]
             pub fn has_textures(&self) -> bool {
                 match self { $(Self::$kind(own) => own.textures().next().is_some()),+ }
@@ -197,7 +197,7 @@ macro_rules! kinds {
                 }
             }
 
-            /// Turns it into a packet of a kind, with arbitrary contents.
+            /// Changes the packet to a given kind, with unspecified contents.
             #[inline(always)]
             pub fn prepare(&mut self, kind: RoughKind) {
                 if self.kind() != kind {
@@ -217,7 +217,7 @@ macro_rules! kinds {
                 }
             }
 
-            /// [`RoughRow::put`] for a BSDF of the packet's kind.
+            /// [`RoughRow::put`] for a BSDF of the same kind as the packet.
             #[inline(always)]
             pub fn put(&mut self, i: usize, bsdf: &RoughBsdf, shown: ShownLobes, place: &Place) {
                 $(if let (Self::$kind(row), RoughBsdf::$kind(bsdf)) = (&mut *self, bsdf) {
@@ -228,7 +228,7 @@ macro_rules! kinds {
                 })+
             }
 
-            /// [`MaterialRow::fill`] with a material of the packet's kind.
+            /// [`MaterialRow::fill`] for a material of the same kind as the packet.
             #[inline(always)]
             pub fn fill(
                 &mut self,
@@ -390,25 +390,25 @@ kinds! {
     Phong(Phong, PhongRow, kept: PhongRow),
     /// An isotropic microfacet conductor.
     Conductor(Conductor, IsotropicConductorRow, kept: Box<IsotropicConductorRow>),
-    /// A microfacet conductor stretched along u or along v.
+    /// A microfacet conductor whose lobe is stretched along u or v.
     BrushedConductor(Conductor, BrushedConductorRow, kept: Box<BrushedConductorRow>),
     /// A diffuse base under a microfacet coat.
     Plastic(Plastic, PlasticRow, kept: Box<PlasticRow>),
-    /// A material with glTF's parameters.
+    /// A material with the parameters of glTF.
     Principled(Box<Principled>, PrincipledRow<false>, kept: Box<PrincipledRow<false>>),
     }
     parts {
-    /// The reflection of rough glass.
+    /// Reflection by rough glass.
     GlassReflection(GlassRow<false>),
-    /// The transmission of rough glass.
+    /// Transmission through rough glass.
     GlassTransmission(GlassRow<true>),
-    /// The transmission of a principled material.
+    /// Transmission through a principled material.
     PrincipledTransmission(PrincipledRow<true>),
     }
 }
 
 impl Rough {
-    /// Whether it may scatter light to its other side.
+    /// Whether the material may scatter light to the other side.
     pub fn is_transmissive(&self) -> bool {
         match self {
             Self::Principled(principled) => principled.is_transmissive(),
@@ -418,7 +418,7 @@ impl Rough {
 }
 
 impl RoughBsdf {
-    /// The BSDF for transmitted light, which is of another kind. `None` if no light is transmitted.
+    /// The BSDF for transmitted light, which has a different kind. `None` if no light is transmitted.
     #[inline(always)]
     pub fn behind(&self) -> Option<Self> {
         match self {
@@ -435,11 +435,11 @@ impl RoughBsdf {
 }
 
 impl BsdfRow {
-    /// A packet with arbitrary contents.
+    /// A packet with unspecified contents.
     pub const EMPTY: Self = Self::Phong(PhongRow::EMPTY);
 
-    /// Samples a direction for each surface, on either of its sides, with the random numbers of [`RoughRow::sample`]. `None` for
-    /// kinds without such samples.
+    /// Samples a direction for each surface, on either side, with the same random numbers as
+    /// [`RoughRow::sample`]. `None` for kinds that do not support this.
     #[inline(always)]
     pub fn sample_sides(&self, choices: &F32x16, u: &[F32x16; 2], simd: impl Simd) -> Option<SideSamples> {
         match self {

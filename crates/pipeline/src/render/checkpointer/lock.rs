@@ -1,34 +1,34 @@
-//! Locking of checkpoint files, and which checkpoints have been reported.
+//! Locks checkpoint files and tracks which checkpoints have been reported.
 
 use std::fs::{File, TryLockError};
 use std::path::Path;
 
 use crate::output::FileIdentity;
 
-/// Checkpoint state of a process across requests.
+/// A process's checkpoint state, which persists across requests.
 #[derive(Debug, Default)]
 pub(crate) struct CheckpointLock {
-    /// The checkpoint that this process wrote or resumed from. It stays open and locked, so that other processes notice
-    /// it and no other file gets its identity.
+    /// The checkpoint that this process wrote or resumed from. The file stays open and locked, so that other
+    /// processes can detect the lock and the file's identity cannot be reused.
     held: Option<File>,
-    /// Last checkpoint that was written or reported as unused.
+    /// The last checkpoint written or reported as unused.
     told: Option<FileIdentity>,
-    /// Request whose failure was reported. Further failures of it have the same cause.
+    /// The last request with a reported failure. Its later failures have the same cause and are not reported.
     failed: Option<u64>,
 }
 
 impl CheckpointLock {
-    /// Holds a file that this process has written and locked.
+    /// Keeps a file open that this process has written and locked.
     pub(super) fn hold(&mut self, path: &Path, file: Option<File>) {
         (self.held, self.told) = (file, FileIdentity::of(path));
     }
 
-    /// Holds the file of a process that has ended. Does nothing if another process holds it.
+    /// Locks a file left by a process that has ended. Does nothing if another process has locked it.
     pub(super) fn take_over(&mut self, path: &Path) {
         let Some(file) = open(path) else { return };
         match file.try_lock() {
             Err(TryLockError::WouldBlock) => {}
-            // Without locks, the identity is enough to recognize the file.
+            // If locks are unsupported, the file's identity is enough to recognize it.
             Ok(()) | Err(TryLockError::Error(_)) => self.hold(path, Some(file)),
         }
     }
@@ -38,7 +38,7 @@ impl CheckpointLock {
         self.held = None;
     }
 
-    /// Whether the file at this path is the held one.
+    /// Whether this process holds the file at this path.
     pub(super) fn holds(&self, path: &Path) -> bool {
         let is_held = |identity: FileIdentity| self.held.as_ref().is_some_and(|file| identity.is_of(file));
         FileIdentity::of(path).is_some_and(is_held)
@@ -50,12 +50,12 @@ impl CheckpointLock {
         !self.holds(path) && open(path).is_some_and(is_locked)
     }
 
-    /// Records a failure and returns whether it is the first of a request.
+    /// Records a failure. Returns whether it is the request's first.
     pub(super) fn is_first_failure(&mut self, request: u64) -> bool {
         self.failed.replace(request) != Some(request)
     }
 
-    /// Records a file as reported and returns whether it was not reported before.
+    /// Records a file as reported. Returns whether it had not been reported before.
     pub(super) fn is_news(&mut self, path: &Path) -> bool {
         let identity = FileIdentity::of(path);
         let is_news = self.told != identity;
@@ -64,7 +64,7 @@ impl CheckpointLock {
     }
 }
 
-/// Opens a regular file. Returns `None` for other files, because opening a pipe would block.
+/// Opens a regular file. Returns `None` for other kinds of files, because opening a pipe would block.
 fn open(path: &Path) -> Option<File> {
     if path.metadata().is_ok_and(|found| found.is_file()) { File::open(path).ok() } else { None }
 }
@@ -74,7 +74,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn file_is_held_by_one_process() {
+    fn file_is_held_by_only_one_process() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("a.checkpoint");
         std::fs::write(&path, "first").expect("written");
@@ -82,10 +82,10 @@ mod tests {
         assert!(!one.holds(&path) && !one.is_of_another(&path));
         one.take_over(&path);
         assert!(one.holds(&path) && !one.is_of_another(&path));
-        // A second instance acts like another process, because locks belong to open files.
+        // Locks belong to open file handles, so a second instance acts like another process.
         other.take_over(&path);
         assert!(!other.holds(&path) && other.is_of_another(&path));
-        // Replace the file by a new one of the same name.
+        // Replace the file with a new one of the same name.
         std::fs::write(folder.path().join("b"), "second").expect("written");
         std::fs::rename(folder.path().join("b"), &path).expect("renamed");
         assert!(!one.holds(&path) && !other.is_of_another(&path));
@@ -106,6 +106,6 @@ mod tests {
         std::fs::rename(folder.path().join("b"), &path).expect("renamed");
         assert!(lock.is_news(&path) && !lock.is_news(&path));
         lock.hold(&path, None);
-        assert!(!lock.is_news(&path), "this process wrote the file");
+        assert!(!lock.is_news(&path), "a file written by this process should not be reported");
     }
 }

@@ -27,13 +27,13 @@ use crate::settings::{Checkpoints, Resume};
 use crate::sink::Sink;
 use crate::stages::Stop;
 
-/// Checkpointing may use at most `1/TIME_SHARE` of the render time.
+/// Checkpointing may take at most `1/TIME_SHARE` of the render time.
 const TIME_SHARE: u32 = 100;
 
-/// Extension appended to the output's name.
+/// Extension appended to the output file name.
 const ENDING: &str = ".checkpoint";
 
-/// Creates the head of a part or checkpoint file.
+/// Creates the header of a part or checkpoint file.
 pub(crate) fn head(
     kind: PartKind,
     state: &FilmState,
@@ -56,10 +56,10 @@ fn share_head(share: Option<&Share>) -> ShareHead {
     }
 }
 
-/// Extension appended to the checkpoint of another render that is moved aside.
+/// Extension appended when moving aside another render's checkpoint.
 const ASIDE: &str = ".before";
 
-/// Returns the checkpoint path of an output.
+/// Returns the checkpoint path for an output file.
 pub(crate) fn path_of(output: &Path) -> PathBuf {
     let mut name = output.as_os_str().to_owned();
     name.push(ENDING);
@@ -72,15 +72,15 @@ pub(crate) struct CheckpointContext<'a> {
     pub(crate) finish: &'a DevelopSettings,
     pub(crate) inputs: &'a Inputs,
     pub(crate) sink: &'a Sink,
-    /// Computes the names and values of everything that the image depends on. Slow.
+    /// Computes the names and values of everything that affects the image. Slow.
     pub(crate) name: &'a dyn Fn() -> Vec<Dependency>,
     /// Returns why the render is interrupted.
     pub(crate) interruption: &'a dyn Fn() -> Interruption,
-    /// Checkpoint state of the process.
+    /// The process's checkpoint state.
     pub(crate) lock: &'a RefCell<CheckpointLock>,
 }
 
-/// Saves and restores checkpoints of one render.
+/// Saves and restores the checkpoints of one render.
 pub(crate) struct Checkpointer<'a> {
     output: PathBuf,
     path: PathBuf,
@@ -88,12 +88,12 @@ pub(crate) struct Checkpointer<'a> {
     around: CheckpointContext<'a>,
     identity: OnceCell<Vec<Dependency>>,
     due: Cell<Instant>,
-    /// Whether the checkpoint held by this process is of this render.
+    /// Whether the checkpoint held by this process belongs to this render.
     is_own: Cell<bool>,
 }
 
 impl<'a> Checkpointer<'a> {
-    /// Creates a checkpointer for an output.
+    /// Creates a checkpointer for an output file.
     pub(crate) fn new(output: &Path, settings: Checkpoints, around: CheckpointContext<'a>) -> Self {
         Self {
             output: output.to_owned(),
@@ -110,12 +110,13 @@ impl<'a> Checkpointer<'a> {
         self.identity.get_or_init(self.around.name)
     }
 
-    /// Restores an empty film from a checkpoint if the settings ask for it, or from the output if that is already this
-    /// part. Returns whether the film is usable; if not, the render must start with a new one.
+    /// Restores an empty film from a checkpoint if the settings request it, or from the output file if it
+    /// already contains this part. Returns whether the film is usable. If not, the render must start with a
+    /// new film.
     ///
     /// # Errors
-    /// A requested checkpoint is of another image, damaged, or has more samples than requested; or the output is a part
-    /// of another render.
+    /// A requested checkpoint belongs to another image, is damaged or has too many samples, or the output
+    /// file is a part of another render.
     pub(crate) fn resume(&self, state: &mut FilmState, samples: u32) -> Result<bool, Stop> {
         let resume = self.settings.resume;
         let is_there = self.path.symlink_metadata().is_ok();
@@ -160,10 +161,10 @@ impl<'a> Checkpointer<'a> {
         Ok(!state.is_begun())
     }
 
-    /// Restores the film from an output that is this part already. Returns whether it is.
+    /// Restores the film from the output file if it already contains this part. Returns whether it does.
     ///
     /// # Errors
-    /// The output is a part of another render.
+    /// The output file is a part of another render.
     fn take_finished_part(&self, state: &mut FilmState) -> Result<bool, Stop> {
         if state.share.is_none() || !part::is_part(&self.output) {
             return Ok(false);
@@ -171,7 +172,7 @@ impl<'a> Checkpointer<'a> {
         let path = self.output.clone();
         let file = match PartFile::open(&self.output, &CancelToken::new()) {
             Ok(file) if file.head.kind == PartKind::Part => file,
-            // Targets were checked before: a part never replaces a checkpoint.
+            // Earlier checks ensure that a part never replaces a checkpoint.
             Ok(_) => return Ok(false),
             Err(error) => {
                 self.tell(CheckpointNews::Unused { path, why: why(&error) });
@@ -199,11 +200,11 @@ impl<'a> Checkpointer<'a> {
         Ok(true)
     }
 
-    /// Moves the checkpoint of another render aside, unless this render includes it. If several are moved aside, the
-    /// one with the longest render time is kept.
+    /// Moves another render's checkpoint aside, unless this render includes all its samples. If another
+    /// checkpoint was moved aside before, keeps the one with the longer render time.
     ///
     /// # Errors
-    /// Why it cannot be moved. Another process may hold it.
+    /// Returns why it cannot be moved, for example because another process holds it.
     fn make_way(&self, state: &FilmState, rays: RayCounters) -> Result<(), String> {
         let is_held = self.around.lock.borrow().holds(&self.path);
         if is_held && self.is_own.get() {
@@ -239,10 +240,10 @@ impl<'a> Checkpointer<'a> {
         self.move_aside(is_longer)
     }
 
-    /// Moves the checkpoint aside, unless `is_longer` prefers the one already there.
+    /// Moves the checkpoint aside, unless `is_longer` returns true for the one already there.
     ///
     /// # Errors
-    /// Why it cannot be moved.
+    /// Returns why it cannot be moved.
     fn move_aside(&self, is_longer: impl Fn(&Path) -> bool) -> Result<(), String> {
         let mut aside = self.path.as_os_str().to_owned();
         aside.push(ASIDE);
@@ -261,7 +262,7 @@ impl<'a> Checkpointer<'a> {
         Ok(())
     }
 
-    /// Whether a checkpoint is of this image and this render has traced at least as much.
+    /// Whether a checkpoint belongs to this image and contains no more work than this render.
     fn has_all_of(&self, head: &Head, there: &State, state: &FilmState, rays: RayCounters) -> bool {
         let has_rays = state.is_finished_part || there.camera_rays() <= rays.camera_rays;
         self.unlike(head, state).is_empty() && has_rays
@@ -282,13 +283,13 @@ impl<'a> Checkpointer<'a> {
         let read: State =
             serde_json::from_value(file.state.clone()).map_err(|_| damaged("its state is invalid"))?;
         if !read.is_possible() {
-            return Err(damaged("its state has impossible numbers"));
+            return Err(damaged("its state contains implausible numbers"));
         }
         if !read.fits(state) {
-            return Err(damaged("its state does not fit the film"));
+            return Err(damaged("its state does not match the film"));
         }
         file.restore(&state.film)?;
-        read.put(state).ok_or_else(|| damaged("its state does not fit the film"))?;
+        read.put(state).ok_or_else(|| damaged("its state does not match the film"))?;
         state.count_again();
         if !state.has_at_most(samples) {
             return Err(other(vec![messages::has_more_samples(samples)]));
@@ -300,7 +301,7 @@ impl<'a> Checkpointer<'a> {
         head(kind, state, self.identity().to_vec(), self.around.finish)
     }
 
-    /// Returns the differences between a head and this render.
+    /// Returns the differences between a file header and this render.
     fn unlike(&self, head: &Head, state: &FilmState) -> Vec<String> {
         let mut unlike = differences(&head.identity, self.identity(), ("there", "here"));
         let share = share_head(state.share.as_ref());
@@ -309,7 +310,7 @@ impl<'a> Checkpointer<'a> {
             count => format!("part {}/{count}", share.index),
         };
         if unlike.is_empty() && head.share != share {
-            unlike.push(format!("it contains {}, and this run renders {}", name(&head.share), name(&share)));
+            unlike.push(format!("it contains {}, but this run renders {}", name(&head.share), name(&share)));
         }
         unlike
     }
@@ -325,11 +326,12 @@ impl<'a> Checkpointer<'a> {
         self.due.set(Instant::now() + pause);
     }
 
-    /// Saves a checkpoint of a cancelled render that will be resumed later. Returns whether it was saved.
+    /// When a render is cancelled, saves a checkpoint if it will be resumed later. Returns whether one was
+    /// saved.
     pub(crate) fn at_the_end(&self, state: &FilmState, rays: RayCounters, seconds: f64) -> bool {
         let is_kept = match (self.around.interruption)() {
             Interruption::Replaced => false,
-            // Update an existing checkpoint even if the render was short.
+            // Update an existing checkpoint even after a short render.
             Interruption::Left => seconds >= self.settings.seconds || self.is_own.get(),
             Interruption::Ended => true,
         };
@@ -337,7 +339,7 @@ impl<'a> Checkpointer<'a> {
         is_kept && state.is_begun() && self.write(state, rays, seconds, Durability::Process)
     }
 
-    /// Recognizes a checkpoint that this process saved for an earlier request of this render.
+    /// Checks whether this process has already saved a checkpoint of this render for an earlier request.
     pub(crate) fn recognize(&self, state: &FilmState) {
         let is_held = self.around.lock.borrow().holds(&self.path);
         let is_own =
@@ -345,8 +347,9 @@ impl<'a> Checkpointer<'a> {
         self.is_own.set(is_own);
     }
 
-    /// Removes the checkpoint of a written image, or saves a last one if checkpoints are kept. If a long render's image
-    /// was not written, or the process is being terminated, its samples are saved as well.
+    /// Removes the checkpoint once the image has been written, or saves a final one if checkpoints are kept.
+    /// Also saves one if the image was not written, but the render was long or the process is being
+    /// terminated.
     pub(crate) fn finish(&self, state: &FilmState, rays: RayCounters, is_written: bool) {
         let was_long = state.render_seconds >= self.settings.seconds;
         let is_ended = match (self.around.interruption)() {
@@ -362,18 +365,18 @@ impl<'a> Checkpointer<'a> {
             }
             (true, false) => {}
         }
-        // Keep a checkpoint of another image, with more samples, or of another running process.
+        // Keep the checkpoint if it belongs to another image or running process, or has more samples.
         let is_done = |(head, there)| self.has_all_of(&head, &there, state, rays);
         let mut lock = self.around.lock.borrow_mut();
         let is_own = self.is_own.get() && lock.holds(&self.path);
         if is_own || !lock.is_of_another(&self.path) && kept_in(&self.path).is_some_and(is_done) {
             lock.release();
-            // A checkpoint that cannot be removed does no harm.
+            // Failing to remove a checkpoint does no harm.
             let _ = std::fs::remove_file(&self.path);
         }
     }
 
-    /// Saves a checkpoint and returns whether that succeeded.
+    /// Saves a checkpoint. Returns whether it succeeded.
     fn write(&self, state: &FilmState, rays: RayCounters, seconds: f64, durability: Durability) -> bool {
         // 0 disables checkpoints.
         if self.settings.seconds <= 0.0 {
@@ -397,7 +400,7 @@ impl<'a> Checkpointer<'a> {
         written.is_ok()
     }
 
-    /// Saves a checkpoint and holds it. Never replaces other files.
+    /// Saves a checkpoint and keeps it locked. Never replaces other kinds of files.
     fn save(
         &self,
         head: &Head,
@@ -417,7 +420,7 @@ impl<'a> Checkpointer<'a> {
                 Ok(_) if PartFile::head(at).is_ok_and(|head| head.kind == PartKind::Part) => {
                     Err(OutputError::Refused { reason: is_finished_part(path) })
                 }
-                // Another process may have taken the file since the last check.
+                // Another process may have locked the file since the last check.
                 Ok(_) if lock.borrow().is_of_another(at) => refused(held_by_another(path)),
                 Ok(_) | Err(_) => Ok(()),
             }
@@ -428,7 +431,7 @@ impl<'a> Checkpointer<'a> {
             sweep: None,
             losses: Losses::Report(&|_| ()),
         };
-        // This short write is never cancelled, because a signal may be the reason for it.
+        // This write is short and never cancelled, because it may have been triggered by a signal.
         let file = part::save(path, head, film, state, &guard, (&CancelToken::new(), durability))?;
         lock.borrow_mut().hold(path, file);
         Ok(())
@@ -454,7 +457,7 @@ fn held_by_another(path: &Path) -> String {
     format!("another running glimt uses {}; name another file with -o", path.display())
 }
 
-/// Returns why a file is not used, without its name.
+/// Returns why a file is not used, without the file name.
 fn why(error: &PartError) -> String {
     match error {
         PartError::Other { differences, .. } => differences.join("; "),
@@ -473,7 +476,7 @@ fn why(error: &PartError) -> String {
     }
 }
 
-/// Reads the head and the state of a valid checkpoint.
+/// Reads the header and state of a valid checkpoint.
 fn kept_in(path: &Path) -> Option<(Head, State)> {
     let file = PartFile::open(path, &CancelToken::new()).ok()?;
     file.check_kind(PartKind::Checkpoint).ok()?;

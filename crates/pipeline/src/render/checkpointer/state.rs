@@ -1,22 +1,22 @@
-//! Render state in addition to the film.
+//! Render state stored in addition to the film.
 
 use serde::{Deserialize, Serialize};
 
 use crate::integrators::RayCounters;
 use crate::render::film_state::{Before, FilmState};
 
-/// State of a render that its film does not contain.
+/// Render state that is not part of the film.
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct State {
-    /// Decided samples of both halves of each cell.
+    /// Sample goals decided for both halves of each cell.
     goals: Vec<[u32; 2]>,
-    /// Samples at which each tile was last judged.
+    /// Sample count at which each tile's noise was last judged.
     judged: Vec<u32>,
-    /// Brightness that noise is compared with.
+    /// Reference brightness for relative noise.
     brightness: Option<f64>,
-    /// Rays of each cell.
+    /// Number of rays traced in each cell.
     cell_rays: Vec<u64>,
-    /// Camera, shadow, reflected, refracted and scattered rays, and texture lookups.
+    /// Numbers of camera, shadow, reflected, refracted and scattered rays, and of texture lookups.
     rays: [u64; 6],
     /// Render time in seconds.
     pub(super) seconds: f64,
@@ -51,7 +51,7 @@ impl State {
         camera_rays
     }
 
-    /// Whether a render can produce these numbers. Others would overflow sums or never end the render.
+    /// Whether the numbers are plausible. Others could overflow sums or keep a render from ending.
     pub(super) fn is_possible(&self) -> bool {
         /// About 30,000 years.
         const MAX_SECONDS: f64 = 1e12;
@@ -66,14 +66,14 @@ impl State {
             && have_rays(&self.cell_rays)
     }
 
-    /// Whether the state fits the size of a film.
+    /// Whether the state matches the film's size.
     pub(super) fn fits(&self, state: &FilmState) -> bool {
         self.goals.len() == state.done.len()
             && self.cell_rays.len() == state.done.len()
             && self.judged.len() == state.film.tile_count()
     }
 
-    /// Restores the state of a film. Returns `None` and changes nothing if it does not fit.
+    /// Restores a film's state. Returns `None` and changes nothing if the size does not match.
     pub(super) fn put(self, state: &mut FilmState) -> Option<()> {
         if !self.fits(state) {
             return None;
@@ -116,7 +116,7 @@ mod tests {
     }
 
     #[test]
-    fn impossible_numbers_are_detected() {
+    fn implausible_numbers_are_detected() {
         assert!(state().is_possible());
         for seconds in [-1e300, -1e-9, 1e300, f64::NAN, f64::INFINITY] {
             assert!(!State { seconds, ..state() }.is_possible(), "{seconds}");

@@ -1,12 +1,12 @@
-//! Cost of samples, predicted from earlier ones.
+//! Sample costs, predicted from earlier samples.
 
-/// Cost of the jobs in a cell: a part per sample of a pixel, and a part per pixel of a job.
+/// Cost of the jobs in a cell. It consists of a cost per sample and an overhead per pixel and job.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct CellCost {
     seconds: f64,
     /// Sum of pixels times samples.
     units: f64,
-    /// Sum of the pixels of all jobs.
+    /// Total number of pixels in all jobs.
     pixels: f64,
     last: Option<JobCost>,
 }
@@ -21,7 +21,8 @@ pub(crate) struct JobCost {
 }
 
 impl CellCost {
-    /// Weight of earlier jobs relative to a new one, because the first samples cost more than those of later passes.
+    /// Weight of earlier jobs relative to a new one. Less than 1 because the first samples cost more than
+    /// later ones.
     const KEPT: f64 = 0.25;
 
     pub(crate) fn note(&mut self, job: JobCost, share: &mut PixelShare) {
@@ -32,7 +33,7 @@ impl CellCost {
         self.last = Some(job);
     }
 
-    /// Whether the cost has not been measured.
+    /// Whether the cost is unknown because it has not been measured.
     pub(crate) fn is_unknown(&self) -> bool {
         !(self.units > 0.0)
     }
@@ -41,24 +42,24 @@ impl CellCost {
         self.seconds
     }
 
-    /// Number of samples that would cost the cell's seconds, including the share of its pixels.
+    /// The cell's cost in samples, including the pixel overhead.
     pub(crate) fn worth(&self, share: PixelShare) -> f64 {
         share.worth(self.units, self.pixels)
     }
 }
 
-/// Cost of a pixel in a job, apart from its samples.
+/// Per-pixel overhead of a job, excluding its samples.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct PixelShare {
-    /// A cell had n' samples in s' seconds, then n > n' in s. If a pixel costs as much as b samples, s/s' = (n + b)/(n'
-    /// + b), so that b = (s'n − sn')/(s − s'). This is the sum of the numerators.
+    /// Sum of the numerators of b, the overhead of a pixel in samples. If a cell takes s' seconds for n'
+    /// samples, then s seconds for n > n' samples, s/s' = (n + b)/(n' + b) and b = (s'n − sn')/(s − s').
     of_pixels: f64,
     /// Sum of the denominators.
     of_samples: f64,
 }
 
 impl PixelShare {
-    /// Maximum cost of a pixel, in samples.
+    /// Maximum overhead of a pixel, in samples.
     const MOST: f64 = 4.0;
 
     fn note(&mut self, before: Option<JobCost>, now: JobCost) {
@@ -70,7 +71,8 @@ impl PixelShare {
         }
     }
 
-    /// Returns the number of samples that cost as much as jobs with this many samples (`units`) and pixels.
+    /// Converts the cost of `units` samples plus the overhead of `pixels` pixels to an equivalent number of
+    /// samples.
     pub(crate) fn worth(self, units: f64, pixels: f64) -> f64 {
         let share = if self.of_samples > 0.0 { self.of_pixels / self.of_samples } else { 0.0 };
         units + share.clamp(0.0, Self::MOST) * pixels
@@ -83,7 +85,7 @@ mod tests {
 
     #[test]
     fn pixel_and_sample_costs_are_separated() {
-        // Cells of 100 pixels, where a sample takes 1 or 3 seconds, and a pixel as long as half a sample.
+        // Cells of 100 pixels. A sample takes 1 or 3 seconds, and the pixel overhead is half a sample.
         let (mut share, mut cells) = (PixelShare::default(), [CellCost::default(); 2]);
         for samples in [1.0, 1.0, 2.0, 4.0] {
             for (cell, rate) in cells.iter_mut().zip([1.0, 3.0]) {
@@ -107,13 +109,13 @@ mod tests {
             share.worth(0.0, 1.0)
         };
         assert_eq!(of([1.0, 2.0]), 0.0);
-        assert_eq!(of([1.0, 4.0]), 0.0, "twice the samples took more than twice as long");
-        assert_eq!(of([1.0, 0.5]), 0.0, "twice the samples took less time");
+        assert_eq!(of([1.0, 4.0]), 0.0, "the overhead should not be negative");
+        assert_eq!(of([1.0, 0.5]), 0.0, "more samples in less time should be ignored");
         assert_eq!(of([1.0, 1.001]), PixelShare::MOST);
     }
 
     #[test]
-    fn jobs_with_other_pixels_are_not_compared() {
+    fn jobs_of_different_sizes_are_not_compared() {
         let (mut share, mut cell) = (PixelShare::default(), CellCost::default());
         // A cell, then half of it with twice the samples.
         for (pixels, samples) in [(2.0, 1.0), (1.0, 2.0)] {
@@ -127,7 +129,7 @@ mod tests {
         let (mut share, mut cell) = (PixelShare::default(), CellCost::default());
         cell.note(JobCost { seconds: 1e-6, pixels: 1.0, samples: 1.0 }, &mut share);
         assert!(!cell.is_unknown());
-        // Halves without pixels get jobs as well.
+        // Halves without pixels also have jobs.
         for _ in 0..2000 {
             cell.note(JobCost { seconds: 1e-9, pixels: 0.0, samples: 32.0 }, &mut share);
         }

@@ -1,7 +1,7 @@
-//! Forecast of a render: progress, remaining time and final noise.
+//! Forecasts a render's progress, remaining time and final noise.
 //!
-//! All predictions of a render. They are only displayed: [`noise_goals`](super::noise_goals) and
-//! [`time_budget`](super::time_budget) decide which samples are rendered, and only those affect the image.
+//! Predictions are only displayed and never affect the image. [`noise_goals`](super::noise_goals) and
+//! [`time_budget`](super::time_budget) decide which samples are rendered.
 //!
 //! | file | predicts |
 //! | --- | --- |
@@ -29,14 +29,15 @@ use crate::scene::description::Render;
 use crate::stages::photons::PhotonStore;
 use crate::trace::remaining_jobs;
 
-/// Adding up the remaining work may take at most `1/EXPECTATION_SHARE` of the time, because it is a sum over all cells.
+/// Estimating the remaining work, which is a sum over all cells, may take at most `1/EXPECTATION_SHARE` of
+/// the time.
 const EXPECTATION_SHARE: u32 = 100;
 
-/// The last computed amount of total work.
+/// The most recent estimate of the total work.
 struct Expectation {
-    /// Time of the next computation.
+    /// When to compute the next estimate.
     due: Instant,
-    /// CPU seconds of the whole render. `None` while its end is unknown.
+    /// CPU seconds for the whole render. `None` while the end is unknown.
     total: Option<f64>,
     /// Photon passes so far and in total.
     passes: [u32; 2],
@@ -49,22 +50,22 @@ pub(crate) struct Forecast {
     expectation: Expectation,
     /// Last reported fraction.
     fraction: f64,
-    /// Expected pixels times samples in total.
+    /// Expected total number of pixels times samples.
     total_units: u64,
     /// Seconds spent on photons.
     photon_seconds: f64,
-    /// Time at which the current photon pass began. `None` outside of a pass.
+    /// Start time of the current photon pass. `None` outside of passes.
     photons_since: Option<f64>,
 }
 
-/// State of a render at some time.
+/// State of a render at some point in time.
 pub(crate) struct Moment<'a> {
     pub(crate) state: &'a FilmState,
     pub(crate) plan: &'a Plan,
     pub(crate) photons: Option<&'a PhotonStore>,
-    /// Seconds since the render stage began, without pauses.
+    /// Seconds since the render stage started, excluding pauses.
     pub(crate) elapsed_seconds: f64,
-    /// Pixels times samples so far.
+    /// Number of pixels times samples so far.
     pub(crate) units: u64,
     /// Whether some pixels have no sample.
     pub(crate) is_first: bool,
@@ -73,7 +74,7 @@ pub(crate) struct Moment<'a> {
 }
 
 impl Forecast {
-    /// Creates the forecast of a render with at most `most` samples per pixel.
+    /// Creates a forecast for a render with at most `most` samples per pixel.
     pub(crate) fn new(state: &FilmState, most: u32) -> Self {
         Self {
             rate: WorkRate::new(state.seconds()),
@@ -86,13 +87,13 @@ impl Forecast {
         }
     }
 
-    /// Recomputes the total work after goals have changed.
+    /// Updates the total work after goals have changed.
     pub(crate) fn expect_again(&mut self, state: &FilmState, most: u32) {
         self.total_units = state.units_to_come(most);
         self.expectation.due = Instant::now();
     }
 
-    /// Begins a photon pass. `seconds` is the stage's time.
+    /// Begins a photon pass. `seconds` is the time since the stage started.
     pub(crate) fn begin_photons(&mut self, seconds: f64) {
         self.photons_since = Some(seconds);
     }
@@ -104,25 +105,25 @@ impl Forecast {
         }
     }
 
-    /// Measures the noise of the film if a measurement is due. `seconds` is the stage's time.
+    /// Measures the film's noise if a measurement is due. `seconds` is the time since the stage started.
     pub(crate) fn look_at_noise(&mut self, state: &FilmState, pool: &ThreadPool, seconds: f64) {
         let least = state.samples(u32::MAX);
         pool.install(|| self.noise.look(&state.film, least, (state.seconds(), seconds)));
     }
 
-    /// Returns the progress, with the predicted time and noise.
+    /// Returns the progress, including the predicted time and noise.
     pub(crate) fn progress(&mut self, moment: &Moment<'_>) -> RenderProgress {
         let elapsed_seconds = moment.elapsed_seconds;
-        // Predict the end from the work.
+        // Predict the end from the remaining work.
         let work = self.work(moment);
         let (mut fraction, mut eta_seconds) = self.rate.at(elapsed_seconds, work);
         // Apply the time limit if it ends the render earlier.
         if let Some(budget) = moment.plan.time_seconds {
-            // The first pass is finished even if the time is up.
+            // The first pass always completes, even after the time limit.
             let of_first = eta_seconds.map_or(0.0, |eta| eta * self.share_of_first(moment));
             let left = (budget - elapsed_seconds).max(of_first);
             eta_seconds = Some(eta_seconds.unwrap_or(left).min(left));
-            // Time passes even if no work is done.
+            // Elapsed time is progress even if no work is done.
             fraction = fraction.max(elapsed_seconds / (elapsed_seconds + left)).min(1.0);
         }
         self.fraction = if moment.is_last { 1.0 } else { self.fraction.max(fraction) };
@@ -141,7 +142,8 @@ impl Forecast {
         }
     }
 
-    /// Returns the work so far and in total. If noise ends the render, the total is unknown until the noise is judged.
+    /// Returns the work done so far and the total work. With a noise target, the total is unknown until the
+    /// noise is judged.
     fn work(&mut self, moment: &Moment<'_>) -> Work {
         if Instant::now() >= self.expectation.due {
             self.expectation = expectation(moment);
@@ -169,8 +171,8 @@ impl Forecast {
     }
 }
 
-/// Whether future noise follows from past noise. With `error`, fewer and fewer tiles get samples. With photons, later
-/// passes have smaller radii than the first.
+/// Whether future noise can be predicted from past noise. With `error`, fewer and fewer tiles receive
+/// samples. With photons, the radius shrinks from pass to pass.
 fn falls_evenly(moment: &Moment<'_>) -> bool {
     match moment.state.film.convergence() {
         Convergence::Stratified => !(moment.plan.settings.render.error > 0.0),
@@ -178,7 +180,7 @@ fn falls_evenly(moment: &Moment<'_>) -> bool {
     }
 }
 
-/// Adds up the work of all cells.
+/// Sums up the work of all cells.
 fn expectation(moment: &Moment<'_>) -> Expectation {
     let Moment { state, plan, photons, .. } = moment;
     let Render { samples: most, error, .. } = plan.settings.render;

@@ -1,4 +1,4 @@
-//! Measured noise of a render and its predicted decrease.
+//! A render's measured noise and its predicted decrease.
 
 use std::time::{Duration, Instant};
 
@@ -7,9 +7,9 @@ use crate::film::{Film, ImageNoise};
 use crate::protocol::NoiseProgress;
 use crate::render::noise_goals::LEAST;
 
-/// Minimum time before the first and between two measurements, each of which is a sum over all pixels.
+/// Minimum time before the first measurement and between measurements. Each is a sum over all pixels.
 const INTERVAL: Duration = Duration::from_millis(500);
-/// Minimum ratio of the current noise to the next reported level.
+/// Minimum ratio of the current noise to the next level reported.
 const STEP: f64 = 1.5;
 
 /// The last noise measurement and the time of the next one.
@@ -23,9 +23,9 @@ pub(crate) struct NoiseForecast {
 #[derive(Clone, Copy, Debug)]
 struct Measured {
     noise: ImageNoise,
-    /// Work done before the measurement.
+    /// Work done when the noise was measured.
     done: f64,
-    /// Seconds of the stage before the measurement.
+    /// Seconds from the start of the stage to the measurement.
     seconds: f64,
 }
 
@@ -34,7 +34,7 @@ impl NoiseForecast {
         Self { due: Instant::now() + INTERVAL, told: None }
     }
 
-    /// Measures the noise if a measurement is due. Every pixel has at least `samples` samples, a power of two.
+    /// Measures the noise if a measurement is due. `samples` is the minimum number of samples per pixel.
     pub(crate) fn look(&mut self, film: &Film, samples: u32, (done, seconds): (f64, f64)) {
         if samples < LEAST || Instant::now() < self.due {
             return;
@@ -43,11 +43,11 @@ impl NoiseForecast {
         self.due = Instant::now() + INTERVAL;
     }
 
-    /// Returns the last measured noise and its predicted decrease, at `rate` work per second, with `left` seconds until
-    /// the end. Returns `None` before the first measurement.
+    /// Returns the last measured noise and its predicted decrease. `rate` is the work per second, and `left`
+    /// the seconds until the end. Returns `None` before the first measurement.
     pub(crate) fn at(&self, work: Work, rate: Option<f64>, left: Option<f64>) -> Option<NoiseProgress> {
         let Measured { noise: ImageNoise { relative_error, power }, done, seconds } = self.told?;
-        // Returns the remaining fraction of the noise after `times` as many samples.
+        // Returns the fraction of the noise that remains with `times` as many samples.
         let fall = |times: f64| libm::pow(times, -0.5 * power);
         let by_now = if done > 0.0 { relative_error * fall(work.done / done) } else { relative_error };
         let next = rate.zip(left).and_then(|(rate, left)| next_level(by_now, work, rate, power, left));
@@ -55,18 +55,18 @@ impl NoiseForecast {
     }
 }
 
-/// Returns the next round level below the expected noise and the seconds until then. Returns `None` if the render ends
-/// before, because the noise at its end depends on all its samples.
+/// Returns the next lower round noise level and the seconds until it is reached. Returns `None` if the render
+/// ends before that.
 fn next_level(by_now: f64, work: Work, rate: f64, power: f64, left: f64) -> Option<(f64, f64)> {
     let Work { done, aside: [aside, _], .. } = work;
     let level = level_below(by_now / STEP);
     let more = done * (libm::pow(by_now / level, 2.0 / power) - 1.0);
-    // Assume that other things keep their current share of the time.
+    // Assume that other activities keep taking the same fraction of the time.
     let seconds = more / rate * (1.0 + aside * rate / done);
     (level > 0.0 && seconds <= left).then_some((level, seconds))
 }
 
-/// Returns the largest of …, 1, 2, 5, 10, … % that is at most `most`.
+/// Returns the largest value of the series …, 1, 2, 5, 10, … % that does not exceed `most`.
 fn level_below(most: f64) -> f64 {
     if !(most > 0.0) {
         return 0.0;
@@ -80,7 +80,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn levels_are_round_and_below() {
+    fn levels_are_round_numbers() {
         for (most, level) in [(0.02, 0.02), (0.0199, 0.01), (0.07, 0.05), (0.0049, 0.002), (3.0, 2.0)] {
             assert!((level_below(most) / level - 1.0).abs() < 1e-9, "{most}: {}", level_below(most));
         }
@@ -94,14 +94,14 @@ mod tests {
     }
 
     #[test]
-    fn next_level_follows_from_the_samples() {
-        // At 10 units per second, 1 % takes 4.41 times as many samples.
+    fn next_level_is_predicted_from_sample_count() {
+        // Reaching 1 % takes 4.41 times as many samples, at 10 units per second.
         let work = Work { done: 100.0, total: Some(10_000.0), aside: [0.0; 2] };
         let told = measured().at(work, Some(10.0), Some(100.0)).expect("noise");
         let (level, seconds) = told.next.expect("a level");
         assert!((level - 0.01).abs() < 1e-12 && (seconds - 34.1).abs() < 1e-6, "{level} {seconds}");
         assert_eq!((told.now, told.seconds), (0.021, 9.0));
-        // Half of the time is spent on other things.
+        // Half of the time is spent on other activities.
         let half = Work { aside: [10.0, 10.0], ..work };
         let (_, seconds) =
             measured().at(half, Some(10.0), Some(100.0)).expect("noise").next.expect("a level");
@@ -109,17 +109,17 @@ mod tests {
     }
 
     #[test]
-    fn prediction_starts_from_the_current_work() {
+    fn prediction_accounts_for_work_since_measurement() {
         let work = Work { done: 400.0, total: Some(10_000.0), aside: [0.0; 2] };
         let told = measured().at(work, Some(10.0), Some(1000.0)).expect("noise");
         assert_eq!(told.now, 0.021);
-        // The expected noise by now is 1.05 %: 0.5 % takes 4.41 times as many samples.
+        // The expected current noise is 1.05 %, so reaching 0.5 % takes 4.41 times as many samples.
         let (level, seconds) = told.next.expect("a level");
         assert!((level - 0.005).abs() < 1e-12 && (seconds - 136.4).abs() < 1e-6, "{level} {seconds}");
     }
 
     #[test]
-    fn no_level_is_predicted_beyond_the_end() {
+    fn no_level_is_predicted_after_render_end() {
         let work = Work { done: 100.0, total: Some(200.0), aside: [0.0; 2] };
         for left in [Some(10.0), Some(34.0), None] {
             assert_eq!(measured().at(work, Some(10.0), left).expect("noise").next, None, "{left:?}");

@@ -1,39 +1,41 @@
-//! Expected samples of each part of the image to reach the noise target, before its goal is decided.
+//! Predicts how many samples each part of the image needs to reach the noise target, until its goal is
+//! decided.
 
 use crate::film::{CELLS, Convergence, samples_to_reduce_error};
 use crate::render::noise_goals::{AIM, Goals, Judgement, LEAST, MOST, TileNoise};
 
-/// Assumed decrease of the variance from two to four samples and from four to eight. In the bundled scenes half of the
-/// tiles decrease faster, half slower.
+/// Factor by which the variance is assumed to decrease from two to four samples and from four to eight. This
+/// is the median over all tiles in the bundled scenes.
 const EARLY_FALL: f64 = 4.0;
-/// Bounds of a measured decrease.
+/// Minimum and maximum of a measured decrease.
 const FALLS: [f64; 2] = [2.0, 8.0];
 
-/// Expected samples of both halves of each cell.
+/// Expected number of samples for both halves of each cell.
 #[derive(Debug)]
 pub(crate) struct ExpectedSamples(Vec<[u32; 2]>);
 
 impl ExpectedSamples {
-    /// Creates unknown values for this many cells.
+    /// Creates predictions for `cells` cells, all unknown.
     pub(crate) fn unknown(cells: usize) -> Self {
         Self(vec![[u32::MAX; 2]; cells])
     }
 
-    /// Returns the expected samples of a half without a goal, or [`u32::MAX`] if unknown.
+    /// Returns the expected number of samples for a half without a goal, or [`u32::MAX`] if unknown.
     pub(crate) fn of(&self, cell: usize, half: usize) -> u32 {
         self.0[cell][half]
     }
 
-    /// Memory size in bytes.
+    /// Memory used, in bytes.
     pub(crate) fn memory_bytes(&self) -> usize {
         size_of_val(self.0.as_slice())
     }
 
-    /// Predicts samples from a judgement, whose samples are a power of two: from the noise of both halves of a tile and
-    /// its decrease. `done` is the number of samples of each half. Halves with a goal keep their prediction.
+    /// Updates the predictions from the noise in both halves of each tile and its rate of decrease. The
+    /// judgement's sample count is a power of two. `done` is the number of samples in each half. Halves with
+    /// a goal keep their predictions.
     pub(crate) fn predict(&mut self, judgement: &Judgement, goals: &Goals, done: &[[u32; 2]]) {
         let Judgement { noise, samples, aim } = judgement;
-        // Collect the tiles without goals, and how fast the noise of all of them decreases.
+        // Collect the tiles without goals and the overall rate at which their noise decreases.
         let open = |(tile, noise): (usize, &Option<TileNoise>)| {
             noise.filter(|_| goals.is_open(tile, done, *samples)).map(|noise| (tile, noise))
         };
@@ -41,7 +43,7 @@ impl ExpectedSamples {
         let falls = tiles.iter().filter_map(|(_, noise)| noise.fall).collect();
         let law = NoiseFall::of(aim.convergence, falls, *samples);
         for (tile, TileNoise { halves, fall }) in tiles {
-            // Average the noise of the tile's halves.
+            // Average the noise of both halves of the tile.
             let squares = halves.iter().flatten().map(|half| {
                 let noise = aim.relative(half);
                 noise * noise
@@ -50,7 +52,7 @@ impl ExpectedSamples {
             if !mean.is_finite() {
                 continue;
             }
-            // Extrapolate its decrease to the noise target.
+            // Extrapolate to the noise target.
             let wanted = law.samples_to(AIM * aim.error, mean.sqrt(), fall);
             let cells = self.0.iter_mut().zip(done).enumerate().skip(CELLS * tile).take(CELLS);
             for (cell, (expected, done)) in cells {
@@ -62,22 +64,22 @@ impl ExpectedSamples {
     }
 }
 
-/// Expected decrease of noise. Smooth parts converge fast and are soon below any bound. The rest decreases like noise
-/// at edges and in penumbras, or more slowly.
+/// Model of how noise decreases with the number of samples. Smooth parts converge fast, so their noise soon
+/// becomes negligible. Afterwards, noise decreases as fast as at edges and in penumbras, or more slowly.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct NoiseFall {
     samples: u32,
-    /// Number of doublings at which the variance decreases by `fall`. Afterwards it decreases with `power`.
+    /// Number of doublings that each reduce the variance by a factor of `fall`. After that, `power` applies.
     doublings: u32,
-    /// Ratio of the tiles' variances before and after the last doubling. `None` below [`LEAST`] samples, where each
-    /// tile uses its own ratio.
+    /// Ratio of variances before and after the last doubling of samples, for all tiles. `None` below
+    /// [`LEAST`] samples, in which case each tile uses its own ratio.
     fall: Option<f64>,
-    /// Exponent of the samples with which the variance decreases later.
+    /// Exponent p: later, the variance is proportional to the number of samples to the power −p.
     power: f64,
 }
 
 impl NoiseFall {
-    /// Fits the law to the tiles' ratios of variance before and after their last doubling.
+    /// Fits the model to each tile's ratio of variances before and after the last doubling of samples.
     fn of(convergence: Convergence, mut falls: Vec<f64>, samples: u32) -> Self {
         let doublings = (LEAST.ilog2().saturating_sub(samples.ilog2())).max(1);
         if convergence == Convergence::Photons {
@@ -97,11 +99,11 @@ impl NoiseFall {
         Self { samples, doublings, fall: Some(fall), power: libm::log2(fall).min(convergence.usual_power()) }
     }
 
-    /// Returns the samples at which the noise of a tile reaches `bound`. `fall` is its ratio of variances at the last
-    /// doubling.
+    /// Returns the number of samples with which a tile's noise reaches `bound`. `fall` is the tile's ratio of
+    /// variances at the last doubling.
     fn samples_to(&self, bound: f64, noise: f64, fall: Option<f64>) -> u32 {
         let of_tile = || {
-            // Each doubling after two samples reveals one more of the tile's ratios.
+            // Each doubling beyond two samples provides another ratio for the tile.
             let known = fall.map_or(0.0, |_| 1.0 - 1.0 / f64::from(self.samples.ilog2()));
             let fall = fall.map_or(EARLY_FALL, |fall| fall.clamp(FALLS[0], FALLS[1]));
             libm::pow(fall, known) * libm::pow(EARLY_FALL, 1.0 - known)
@@ -132,27 +134,27 @@ mod tests {
 
     #[test]
     fn noise_of_both_halves_predicts_samples() {
-        // The first half is smooth, the second is not.
+        // The first half is smooth, but the second is noisy.
         let (goals, expected) = judged([(1.0, 0.0), (1.0, 1.0)], 16, 0.01);
-        assert_eq!(goals.of(0, 0), u32::MAX, "nothing is decided");
+        assert_eq!(goals.of(0, 0), u32::MAX, "no goal should be decided");
         assert!((64..1000).contains(&expected.of(0, 0)), "{}", expected.of(0, 0));
     }
 
     #[test]
-    fn few_samples_predict_the_total() {
-        // Independent samples with a standard deviation of √(1/12) take 833. Two samples do not reveal that the noise
-        // decreases slowly, and each doubling reveals more. The expected predictions are 80, 190 and 260; 64 pixels
-        // give them to about a fifth.
+    fn few_samples_suffice_for_a_prediction() {
+        // The target takes 833 independent samples with a standard deviation of √(1/12). Two samples do not
+        // show that the noise decreases slowly, but each doubling improves the prediction. The expected
+        // predictions are 80, 190 and 260. With 64 pixels, their error is about 20 %.
         for (samples, expected) in [(2, 80.0), (4, 190.0), (8, 260.0)] {
             let (goals, expected_samples) = judged([(1.0, 1.0); 2], samples, 0.01);
-            assert_eq!(goals.of(0, 0), u32::MAX, "nothing is decided");
+            assert_eq!(goals.of(0, 0), u32::MAX, "no goal should be decided");
             let ratio = f64::from(expected_samples.of(0, 0)) / expected;
             assert!((0.6..1.6).contains(&ratio), "{samples}: {}", expected_samples.of(0, 0));
         }
     }
 
     #[test]
-    fn recent_decrease_predicts_future_decrease() {
+    fn recent_noise_decrease_is_extrapolated() {
         let (stratified, usual) = (Convergence::Stratified, Convergence::Stratified.usual_power());
         let of = |falls: &[f64]| NoiseFall::of(stratified, falls.to_vec(), 64);
         for (falls, fall, power) in [
@@ -167,8 +169,8 @@ mod tests {
                 "{falls:?}"
             );
         }
-        // Half of the noise of 64 samples, whose variance decreases by 4 and then by 2.7 per doubling, or like
-        // independent samples.
+        // Predict half or a quarter of the noise of 64 samples. The variance decreases by factors of 4 and
+        // then 2.7 per doubling, or like that of independent samples.
         let near = |samples: u32, of: f64| (f64::from(samples) / of - 1.0).abs() < 0.02;
         assert!(near(of(&[4.0]).samples_to(0.5, 1.0, None), 128.0));
         assert!(near(of(&[4.0]).samples_to(0.25, 1.0, None), 128.0 * libm::pow(4.0, 1.0 / usual)));
@@ -180,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn huge_predictions_are_not_unknown() {
+    fn huge_predictions_differ_from_unknown() {
         for samples in [2, 16, 64] {
             let (goals, expected) = judged([(1.0, 1.0); 2], samples, 1e-12);
             assert_eq!((goals.of(0, 0), expected.of(0, 0)), (u32::MAX, MOST), "{samples}");
@@ -194,7 +196,7 @@ mod tests {
         let [smooth, unknown, rough] =
             [Some(8.0), None, Some(1.0)].map(|fall| law.samples_to(0.2, 1.0, fall));
         assert!(smooth < unknown && unknown < rough, "{smooth} {unknown} {rough}");
-        // Decreases of √(8 · 4) and √(2 · 4).
+        // The variance decreases by factors of √(8 · 4) and √(2 · 4).
         assert!((12..17).contains(&smooth) && (30..55).contains(&rough), "{smooth} {rough}");
     }
 }

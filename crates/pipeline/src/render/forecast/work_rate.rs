@@ -1,11 +1,11 @@
-//! Rate of work, and the remaining time.
+//! Work rate and remaining time.
 
-/// Time constant of the rate's average in seconds.
+/// Time constant for averaging the rate, in seconds.
 const MEMORY_SECONDS: f64 = 3.0;
 /// Minimum time between two measurements of the rate.
 const SHORTEST_SECONDS: f64 = 0.05;
 
-/// Work done over time, as a decaying average rate.
+/// Exponentially decaying average of the work rate.
 #[derive(Clone, Debug)]
 pub(crate) struct WorkRate {
     fraction: f64,
@@ -13,28 +13,28 @@ pub(crate) struct WorkRate {
     measured: (f64, f64),
 }
 
-/// Amount of work, and time spent on other things.
+/// Amount of work, and time spent on other activities.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Work {
     pub(crate) done: f64,
-    /// Total work. `None` if it is unknown.
+    /// Total work. `None` if unknown.
     pub(crate) total: Option<f64>,
-    /// Seconds spent on other things, so far and in the future.
+    /// Seconds spent on other activities so far, and expected further seconds.
     pub(crate) aside: [f64; 2],
 }
 
 impl WorkRate {
-    /// Creates a rate for work of which `done` was done before the clock started.
+    /// Creates a rate. `done` is the work completed before the clock started.
     pub(crate) fn new(done: f64) -> Self {
         Self { fraction: 0.0, rate: None, measured: (0.0, done) }
     }
 
-    /// Work per second, once it has been measured.
+    /// Work per second. `None` until it has been measured.
     pub(crate) fn rate(&self) -> Option<f64> {
         self.rate
     }
 
-    /// Returns the fraction done, which never decreases, and the remaining seconds once the rate is known.
+    /// Returns the fraction done, which never decreases, and the remaining seconds if the rate is known.
     pub(crate) fn at(&mut self, seconds: f64, work: Work) -> (f64, Option<f64>) {
         let Work { done, total, aside: [aside, aside_to_come] } = work;
         let seconds = seconds - aside;
@@ -43,13 +43,13 @@ impl WorkRate {
         if span >= SHORTEST_SECONDS && done > before {
             let rate = (done - before) / span;
             let weight = 1.0 - (-span / MEMORY_SECONDS).exp();
-            // Weigh recent work more at the beginning, because the first passes are slower.
+            // Give recent work more weight at the beginning, because the first passes are slower.
             let weight = weight.max(2.0 * span / seconds).min(1.0);
             self.rate = Some(self.rate.map_or(rate, |old| old + weight * (rate - old)));
             self.measured = (seconds, done);
         }
         let Some(total) = total else { return (self.fraction, None) };
-        // Count the time spent on other things as work.
+        // Count time spent on other activities as work.
         let rate = self.rate.unwrap_or(0.0);
         let all = total + rate * (aside + aside_to_come);
         let fraction = if all > 0.0 { (done + rate * aside) / all } else { 0.0 };
@@ -62,14 +62,14 @@ impl WorkRate {
 mod tests {
     use super::*;
 
-    /// Creates work without time spent on other things.
+    /// Creates work without other activities.
     fn of(done: f64, total: f64) -> Work {
         Work { done, total: Some(total), aside: [0.0; 2] }
     }
 
     #[test]
-    fn other_time_counts_separately() {
-        // Two seconds on other things and one second of work for 100 of 400 units.
+    fn time_for_other_activities_is_separate() {
+        // Two seconds for other activities and one second of work for 100 of 400 units.
         let mut pace = WorkRate::new(0.0);
         let work = Work { done: 100.0, total: Some(400.0), aside: [2.0, 6.0] };
         let (fraction, eta) = pace.at(3.0, work);
@@ -90,13 +90,13 @@ mod tests {
         for step in 1..10_u32 {
             let (fraction, eta) = pace.at(f64::from(step), of(f64::from(step) * 100.0, 1000.0));
             assert!((fraction - f64::from(step) / 10.0).abs() < 1e-12);
-            assert!((eta.expect("a rate is known") - f64::from(10 - step)).abs() < 1e-9);
+            assert!((eta.expect("the rate should be known") - f64::from(10 - step)).abs() < 1e-9);
         }
         assert_eq!(pace.at(10.0, of(1000.0, 1000.0)), (1.0, Some(0.0)));
     }
 
     #[test]
-    fn fraction_never_falls_and_ignores_earlier_work() {
+    fn fraction_is_monotonic_and_eta_ignores_old_work() {
         let mut pace = WorkRate::new(500.0);
         let (fraction, eta) = pace.at(1.0, of(600.0, 1000.0));
         assert_eq!(fraction, 0.6);
@@ -105,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn rate_follows_a_change_of_speed() {
+    fn rate_adapts_to_speed_changes() {
         let mut pace = WorkRate::new(0.0);
         for step in 1..=100_u32 {
             pace.at(f64::from(step) * 0.1, of(f64::from(step) * 100.0, 100_000.0));

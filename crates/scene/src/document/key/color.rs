@@ -14,7 +14,7 @@ use crate::math::color::srgb8_to_linear;
 use crate::math::{DVec3, Vec3};
 
 const COLOR: &str = "a color: [r, g, b], a number, \"#rrggbb\" or a name";
-/// Integers from this one on are taken for a component in 0–255: no reflectance is this large.
+/// An integer of at least this value is taken for a component in 0–255, because no reflectance is this large.
 const MIN_BYTE: u8 = 10;
 const COLOR_OR_TEXTURE: &str =
     "a color, [r, g, b], a number, \"#rrggbb\" or a name, or { texture = \"name\" }";
@@ -22,7 +22,7 @@ const EMISSION: &str =
     "a color, [r, g, b], a number, \"#rrggbb\" or a name, or { texture = \"name\", scale = 1.0 }";
 
 impl TableKey<'_> {
-    /// A non-negative color, decoded to linear.
+    /// A non-negative color, converted to linear.
     pub(in super::super) fn color(&self) -> Option<Vec3> {
         self.exact_color(Limits::AtLeast(0.0)).map(DVec3::as_vec3)
     }
@@ -41,7 +41,7 @@ impl TableKey<'_> {
         self.color_of(limits, COLOR_OR_TEXTURE).map(|color| ColorSource::Constant(color.as_vec3()))
     }
 
-    /// The texture of `{ texture = "name" }`.
+    /// The texture in `{ texture = "name" }`.
     fn texture(&self, textures: &Names) -> Option<usize> {
         let table = self.inline_table()?;
         let texture = table.required("texture", "\"name\"").name_in(textures);
@@ -100,7 +100,8 @@ impl TableKey<'_> {
         None
     }
 
-    /// Whether the value looks like a color in 0–255. If so, reports `issue` for its span, with the equivalent `#rrggbb`.
+    /// Whether the value looks like a color in 0–255. If so, reports `issue` at the value's span and suggests
+    /// the equivalent `#rrggbb`.
     pub(in super::super) fn reports_bytes(&self, issue: impl FnOnce(Range<usize>) -> Issue) -> bool {
         let (Some(span), Some(color)) = (self.span(), self.as_hex()) else { return false };
         let help = format!("write \"{color}\"; linear components range from 0 to 1");
@@ -108,7 +109,7 @@ impl TableKey<'_> {
         true
     }
 
-    /// The string `#rrggbb` for one or three integers up to 255, if one of them is too large for a linear component.
+    /// The string `#rrggbb` for one or three integers up to 255, if any is too large for a linear component.
     fn as_hex(&self) -> Option<String> {
         let byte = |value: Value<'_>| match value.item() {
             TomlValue::Integer { digits, radix } => u8::try_from(whole(digits, radix)?).ok(),
@@ -128,7 +129,7 @@ impl TableKey<'_> {
         is_meant.then(|| bytes.iter().fold("#".to_owned(), |text, byte| format!("{text}{byte:02x}")))
     }
 
-    /// Decodes `#rrggbb` or a case-insensitive color name from sRGB.
+    /// Converts `#rrggbb` or a case-insensitive color name from sRGB to linear.
     fn parse_color(&self, text: &str) -> Option<Vec3> {
         if let Some(bytes) = color_bytes(text) {
             return Some(srgb8_to_linear(bytes));

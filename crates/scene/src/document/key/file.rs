@@ -1,4 +1,4 @@
-//! Reads paths of files.
+//! Reads file paths.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -63,7 +63,7 @@ impl TableKey<'_> {
     }
 }
 
-/// The path of a suggested file as it would be written in the scene, relative to the scene's folder.
+/// The path of a suggested file in the form used in the scene, relative to the scene's folder.
 fn as_written(text: &str, near: &Path) -> String {
     let name = near.file_name().unwrap_or(near.as_os_str());
     Path::new(text).with_file_name(name).to_string_lossy().into_owned()
@@ -74,7 +74,7 @@ fn ending(text: &str) -> String {
     Path::new(text).extension().unwrap_or_default().to_string_lossy().to_lowercase()
 }
 
-/// Checks that a file is regular. The error has a message and whether the file is missing.
+/// Checks that a file is a regular file. The error contains a message and whether the file is missing.
 fn regular_file(path: &Path) -> Result<(), (String, bool)> {
     let shown = shortened(&path.to_string_lossy(), 200);
     match file::kind(path) {

@@ -1,4 +1,4 @@
-//! Reads numbers and textures of numbers.
+//! Reads numbers and textures used as numbers.
 
 use super::super::super::description::{Channel, NumberSource};
 use super::super::context::Issue;
@@ -44,7 +44,7 @@ impl TableKey<'_> {
         Some((self.find(textures, name)?, None))
     }
 
-    /// The texture and the channel of `{ texture = "name", channel = "r" }`.
+    /// The texture and the channel in `{ texture = "name", channel = "r" }`.
     fn texture_with_channel(&self, textures: &Names) -> Option<(usize, Option<Channel>)> {
         let table = self.inline_table()?;
         let texture = table.required("texture", "\"name\"").name_in(textures);

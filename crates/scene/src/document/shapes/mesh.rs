@@ -12,7 +12,7 @@ use super::super::table::TableReader;
 use crate::math::DVec3;
 use crate::math::limits::{SHORTEST, is_too_short, length};
 
-/// The mesh files referenced so far, without duplicates even if their paths are written differently.
+/// The mesh files referenced so far. Different paths to the same file are not duplicated.
 #[derive(Default)]
 pub(super) struct MeshFiles {
     list: Vec<MeshFile>,
@@ -43,7 +43,7 @@ pub(super) fn read(table: &TableReader<'_>, files: &mut MeshFiles) -> Option<Sha
     Some(Shape::Mesh(Mesh { file: files.index(file?, part?), placed: placed?, smooth, vertex_colors }))
 }
 
-/// Reads the number of a part of a glTF file.
+/// Reads the index of a part in a glTF file.
 fn part(table: &TableReader<'_>, file: Option<&Located<PathBuf>>) -> Option<Option<u32>> {
     let key = table.optional("part");
     let Some(span) = key.span() else { return Some(None) };
@@ -77,11 +77,11 @@ fn placement(table: &TableReader<'_>) -> Option<Placement> {
     })
 }
 
-/// Smallest ratio of a matrix's determinant to the product of its column lengths. Below it, the matrix is singular up to
-/// rounding.
+/// Minimum ratio of a matrix's determinant to the product of its column lengths. Below this ratio, the matrix
+/// is singular up to rounding.
 const MIN_VOLUME_RATIO: f64 = 1e-12;
 
-/// Reads an invertible affine map, row by row.
+/// Reads an invertible affine transform in row-major order.
 fn affine(key: &TableKey<'_>) -> Option<Placement> {
     let numbers: [f64; 16] = key.numbers(Limits::Any, "16 numbers, row by row")?;
     let [x, y, z, translate] =

@@ -22,10 +22,10 @@ use super::table::TableReader;
 use crate::math::DVec3;
 use mesh::MeshFiles;
 
-/// Reads the table of a shape. Only meshes use the list of files.
+/// Reads a shape's table. Only meshes use the list of files.
 type ShapeReader = fn(&TableReader<'_>, &mut MeshFiles) -> Option<Shape>;
 
-/// The kinds of shapes. [`read`] sorts the objects by file order.
+/// The kinds of shapes. [`read`] sorts the objects into file order.
 const KINDS: [(&str, ShapeReader); 10] = [
     ("sphere", |table, _| sphere::read(table)),
     ("quad", |table, _| quad::read(table)),
@@ -44,7 +44,7 @@ pub(super) fn is_kind(name: &str) -> bool {
     KINDS.iter().any(|(kind, _)| *kind == name)
 }
 
-/// Reads all shapes and the mesh files that they reference. Returns no shapes if one is invalid.
+/// Reads all shapes and the mesh files they reference. Returns no shapes if any is invalid.
 pub(super) fn read(root: &TableReader<'_>, materials: &MaterialList) -> (Option<Vec<Object>>, Vec<MeshFile>) {
     let mut files = MeshFiles::default();
     let mut objects = Vec::new();
@@ -90,7 +90,7 @@ fn object(
     Some(Object { shape, material, name: name?, span: table.span.clone() })
 }
 
-/// Reads a direction of any nonzero length. Errors name the shape or light `what`.
+/// Reads a direction with any nonzero length. Errors refer to the shape or light as `what`.
 pub(super) fn direction(
     table: &TableReader<'_>,
     name: &'static str,
@@ -112,7 +112,7 @@ pub(super) fn direction(
     Some(direction)
 }
 
-/// Reads the ends of an axis, by default (0, 0, 0) and (0, 1, 0).
+/// Reads both ends of an axis, by default (0, 0, 0) and (0, 1, 0).
 fn axis_ends(table: &TableReader<'_>, names: [&'static str; 2], what: &str) -> Option<[DVec3; 2]> {
     let keys = names.map(|name| table.optional(name));
     let (first, second) =
@@ -139,7 +139,8 @@ fn length(table: &TableReader<'_>, name: &'static str, default: f64) -> Option<f
     if key.is_given() { key.number(table.limits(name)) } else { Some(default) }
 }
 
-/// Whether two edges span an area: both are nonzero, and the sine of their angle exceeds rounding errors.
+/// Whether two edges span an area: both are nonzero, and the sine of the angle between them exceeds rounding
+/// errors.
 fn span_area(u: DVec3, v: DVec3) -> bool {
     const MIN_SINE: f64 = 1e-10;
     match (u.try_normalize(), v.try_normalize()) {

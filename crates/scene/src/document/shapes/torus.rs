@@ -7,7 +7,7 @@ use super::super::table::TableReader;
 use super::{direction, length};
 use crate::math::DVec3;
 
-/// Reads a torus. Rejects self-intersecting ones, whose surface has no consistent front side.
+/// Reads a torus. Rejects self-intersecting tori, whose surface has no consistent front side.
 pub(super) fn read(table: &TableReader<'_>) -> Option<Shape> {
     let center = table.optional("center").vector(Limits::Any).unwrap_or(DVec3::ZERO);
     let axis = direction(table, "axis", "torus", DVec3::Y);

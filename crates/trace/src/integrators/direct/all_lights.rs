@@ -1,4 +1,4 @@
-//! Next-event estimation at packets of vertices, sampling every light.
+//! Next-event estimation at packets of vertices with samples of every light.
 
 use super::mis::CompetingTechnique;
 use crate::geometry::Ray;
@@ -16,29 +16,29 @@ use crate::sampling::Dimension;
 use crate::scene::description::Shadows;
 use crate::world::SimdKernel;
 
-/// Samples all lights at the vertices in `used`. `MIS` is false where only light samples find lights, so that no
-/// weights are computed.
+/// Samples all lights at the vertices in `used`. `MIS` is false if lights are found only by light samples, in
+/// which case no weights are computed.
 pub struct SampleAllLights<'a, const MIS: bool> {
     pub tile: &'a TileContext<'a>,
     pub row: &'a VertexBatch,
     pub used: u32,
     pub aov: LightAov,
-    /// The competing technique; unused without MIS.
+    /// Competing technique. Not used without MIS.
     pub competing: CompetingTechnique,
-    /// Media of the vertices. `None` if all are in air.
+    /// Media at the vertices. `None` if all vertices are in air.
     pub interior_lists: Option<&'a InteriorLists>,
     /// Whether to sample only infinite lights.
     pub only_infinite: bool,
 }
 
-/// Numbers of rays and lookups for direct lighting.
+/// Numbers of rays and texture lookups for direct lighting.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct LightRayCounts {
     /// Shadow rays.
     pub shadow: u64,
     /// Rays in narrow lobes.
     pub scattered: u64,
-    /// Lookups in emission textures.
+    /// Emission texture lookups.
     pub lookups: u64,
 }
 
@@ -52,16 +52,16 @@ impl std::ops::AddAssign for LightRayCounts {
 
 /// Direct light reflected toward the viewer at a packet of vertices.
 pub struct ReflectedLight {
-    /// Reflected radiance, before the throughput of the paths.
+    /// Reflected radiance, before multiplication by the path throughput.
     pub light: Vec3x16,
     pub rays: LightRayCounts,
 }
 
-/// Sums over light samples.
+/// Sums over all light samples.
 pub struct LightSums {
-    /// Reflected light that is unoccluded.
+    /// Unoccluded reflected light.
     pub light: Vec3x16,
-    /// Reflected light if nothing were occluded.
+    /// Reflected light ignoring occlusion.
     pub total: F32x16,
     pub rays: LightRayCounts,
 }
@@ -73,7 +73,7 @@ impl LightSums {
         rays: LightRayCounts { shadow: 0, scattered: 0, lookups: 0 },
     };
 
-    /// The reflected light that results from the sums.
+    /// Converts the sums to the reflected light.
     #[inline(always)]
     pub fn into_reflected(mut self, aov: LightAov) -> ReflectedLight {
         if aov == LightAov::LitFraction {
@@ -86,7 +86,7 @@ impl LightSums {
     }
 }
 
-/// Light of one source that depends on a single shadow ray.
+/// Light from one source whose visibility is determined by a single shadow ray.
 struct PendingLight {
     light: Vec3x16,
     active: u32,
@@ -104,7 +104,7 @@ impl<const MIS: bool> SimdKernel for SampleAllLights<'_, MIS> {
 }
 
 impl<const MIS: bool> SampleAllLights<'_, MIS> {
-    /// Adds the reflected light of all lights.
+    /// Adds the reflected light from all lights.
     #[inline(always)]
     fn sample_all(&self, sums: &mut LightSums, simd: impl Simd) {
         let render = &self.tile.settings.render;
@@ -114,7 +114,8 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
             if MIS && self.tile.paths_find_sky && light.is_environment() {
                 continue;
             }
-            // If a single shadow ray decides for the whole light, defer the sum until it is traced.
+            // If a single shadow ray determines the visibility of the whole light, defer the sum until the
+            // ray is traced.
             let mut pending = PendingLight { light: [[0.0; PACKET_SIZE]; 3], active: 0 };
             let is_deferred = match render.shadows {
                 Shadows::Soft => false,
@@ -141,11 +142,11 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
                     values = self.textured(pattern, &samples, active, values);
                     sums.rays.lookups += u64::from(active.count_ones());
                 }
-                // Apply the MIS weight, unless the light has no extent and only light samples find it.
+                // Apply the MIS weight, unless the light has no extent and is found only by light samples.
                 if MIS && !is_single {
                     let leaves_gloss = self.tile.lobes_find_sky && light.is_environment();
                     let of_light = if leaves_gloss && self.competing.are_lobes() {
-                        // Pretend a vanishing light-sampling pdf, so that lobe rays account for all of the light.
+                        // Use a light-sampling pdf close to 0 so that lobe rays account for all of the light.
                         [f32::MAX; PACKET_SIZE]
                     } else {
                         light.inverse_pdfs(&samples)
@@ -168,7 +169,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         }
     }
 
-    /// Multiplies values by the transmittance of the vertices' media up to the samples.
+    /// Multiplies values by the transmittance of the media between the vertices and the samples.
     #[cold]
     #[inline(never)]
     fn attenuate_by_glass(
@@ -212,8 +213,8 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         values
     }
 
-    /// Adds the contributions of samples of one light; with `pending`, they are deferred until its shadow ray is
-    /// traced.
+    /// Adds the contributions of samples of one light. With `pending`, defers them until the light's shadow
+    /// ray is traced.
     #[inline(always)]
     fn add(
         &self,
@@ -241,7 +242,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         }
     }
 
-    /// Adds deferred light after tracing one shadow ray to the center of its source.
+    /// Adds deferred light after tracing one shadow ray to the center of the light.
     #[inline(always)]
     fn add_pending(
         &self,
@@ -254,7 +255,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         if is_untraced && self.aov == LightAov::TraversalCost {
             return;
         }
-        // Without shadows, all light arrives.
+        // Without shadows, all light is unoccluded.
         let Some((middle, source)) = middle.filter(|_| !is_untraced) else {
             return add_where(pending.active, &pending.light, &mut sums.light);
         };
@@ -283,8 +284,8 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         );
     }
 
-    /// Traces the shadow rays in `traced` and adds the light of those that are unoccluded; other rays have a `t_max`
-    /// below 0.
+    /// Traces the shadow rays in `traced` and adds the light of the unoccluded rays. Rays that are not traced
+    /// have a `t_max` below 0.
     #[inline(always)]
     pub fn add_unoccluded(
         &self,
@@ -305,7 +306,8 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         add_where(traced & !occluded, values, &mut sums.light);
     }
 
-    /// [`SampleAllLights::add_unoccluded`] in a scene with null interactions, where shadow rays have a transmittance.
+    /// Like [`SampleAllLights::add_unoccluded`], for scenes with null interactions, where shadow rays have a
+    /// transmittance.
     #[cold]
     #[inline(never)]
     fn add_attenuated(
@@ -326,7 +328,8 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         add_where(arriving, &values, &mut sums.light);
     }
 
-    /// The unoccluded contribution of each sample, the mask of nonzero ones, and the response of its vertex.
+    /// Returns the unoccluded contribution of each sample, the mask of nonzero contributions, and the
+    /// responses of the vertices.
     #[inline(always)]
     pub fn contributions(
         &self,
@@ -356,7 +359,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         (values, simd.movemask(&active) & self.used, response)
     }
 
-    /// The shadow rays to the samples in `active`; in other lanes, `t_max` is below 0.
+    /// Returns shadow rays to the samples in `active`. In other lanes, `t_max` is below 0.
     #[inline(always)]
     pub fn shadow_rays(&self, samples: &LightSamplePacket, active: u32) -> (RayPacket, F32x16) {
         let (mut direction, mut ends) = (samples.directions, [-1.0; PACKET_SIZE]);
@@ -373,7 +376,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
     }
 }
 
-/// Adds the traversal cost of the rays in `traced`, up to their ends.
+/// Adds the traversal cost of the rays in `traced` up to their ends.
 #[cold]
 #[inline(never)]
 pub fn add_traversal_cost(
@@ -390,7 +393,8 @@ pub fn add_traversal_cost(
     }
 }
 
-/// Adds the values in the lanes of `bits`, which are selected with bit masks as in [`take`](crate::math::lanes::take).
+/// Adds the values in the lanes set in `bits`, selecting them with bit masks as in
+/// [`take`](crate::math::lanes::take).
 #[inline(always)]
 pub fn add_where(bits: u32, values: &Vec3x16, sums: &mut Vec3x16) {
     let of = mask_from_bits(bits);
@@ -401,7 +405,7 @@ pub fn add_where(bits: u32, values: &Vec3x16, sums: &mut Vec3x16) {
     }
 }
 
-/// The transmittance of null interactions, as it applies to a light AOV.
+/// Transmittance of null interactions for a light AOV.
 pub fn transmitted(left: Vec3, aov: LightAov) -> Vec3 {
     match aov {
         LightAov::Radiance(_) | LightAov::TraversalCost => left,

@@ -1,4 +1,5 @@
-//! Next-event estimation with more lights than each vertex samples: lights are picked from a tree.
+//! Next-event estimation with too many lights to sample them all at each vertex. Lights are picked from a
+//! tree.
 
 use std::ops::Range;
 
@@ -21,24 +22,25 @@ use crate::world::SimdKernel;
 pub struct SampleLightTree<'a, const MIS: bool> {
     pub lighting: SampleAllLights<'a, MIS>,
     pub selection: LightSampler<'a>,
-    /// Index of the packet, under which its shadow rays are queued in the pool.
+    /// Packet index, which identifies its shadow rays in the pool.
     pub number: u32,
     pub pool: &'a mut ShadowRayQueue,
 }
 
-/// One picked light per vertex of a packet. The picks of one sample are in tree order, so that shadow rays in one
-/// packet go to nearby lights.
+/// One picked light per vertex of a packet. The picks of one sample are in tree order so that the shadow rays
+/// in a packet are aimed at nearby lights.
 #[derive(Clone)]
 struct LightPicks {
     /// Indices of the lights.
     lights: [u32; PACKET_SIZE],
-    /// Reciprocals of the expected number of samples; 0 without a pick.
+    /// Reciprocals of the expected number of samples, or 0 if no light was picked.
     shares: F32x16,
-    /// The same ignoring glossy lobes. MIS weights use it, as rays that hit the light do not know the vertex's lobe.
+    /// Like `shares` but ignoring glossy lobes. Used for MIS weights, because the vertex's lobe is unknown
+    /// when a ray hits the light.
     weighed: F32x16,
 }
 
-/// Number of samples whose lights are picked together.
+/// Number of samples for which lights are picked together.
 const PICK_BLOCK: u32 = 8;
 
 impl<const MIS: bool> SimdKernel for SampleLightTree<'_, MIS> {
@@ -69,7 +71,7 @@ impl<const MIS: bool> SimdKernel for SampleLightTree<'_, MIS> {
     }
 }
 
-/// Destination of the sampled light or of its shadow rays.
+/// Destination of the sampled light or the corresponding shadow rays.
 struct PickSink<'a> {
     tree: &'a LightTree,
     row: u32,
@@ -93,7 +95,8 @@ impl LightPicks {
         }
     }
 
-    /// The lights, and the mask of vertices that picked one. Other vertices get an arbitrary light, without effect.
+    /// Returns the lights and the mask of vertices that picked a light. The light of any other vertex is
+    /// arbitrary and has no effect.
     #[inline(always)]
     fn lights(&self) -> ([u32; PACKET_SIZE], u32) {
         let (mut lights, shares, mut used) = (self.lights, &self.shares, 0);
@@ -108,11 +111,11 @@ impl LightPicks {
     }
 }
 
-/// Weight of the second random number, whose digits follow the digits of the first.
+/// Weight of the second random number, whose digits are appended to those of the first.
 const LOW_DIGITS: f64 = 1.0 / (1 << 24) as f64;
 
 impl<const MIS: bool> SampleAllLights<'_, MIS> {
-    /// Picks lights at each vertex for some samples.
+    /// Picks lights at each vertex for the given samples.
     #[inline(always)]
     fn picks(
         &self,
@@ -129,8 +132,9 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         for k in first..end {
             let u = sampler.pairs(&row.path, Dimension::LightChoice, k, count);
             let place = (k - first) as usize / group * group;
-            // One pick of each group is in each part of [0, 1), so that they are sorted. Both numbers of a pair are the
-            // digits of one number: a light among many has a small probability.
+            // Each part of [0, 1) contains one pick per group, so a bucket sort is sufficient. The digits of
+            // both numbers of a pair are combined into one number because the probability of a light among
+            // many is small.
             let (mut parts, mut digits) = ([0; PACKET_SIZE], [0.0; PACKET_SIZE]);
             for i in 0..PACKET_SIZE {
                 let part = (u[0][i] * way.count as f32) as i32 as u32;
@@ -154,11 +158,11 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         picks
     }
 
-    /// Picks from a tree with a single node, for all vertices at once.
+    /// Picks lights from a tree with a single node, for all vertices at once.
     #[inline(always)]
     fn pick_flat(&self, tree: &LightTree, numbers: &[[f64; PACKET_SIZE]], picks: &mut [LightPicks]) {
         let row = self.row;
-        // Estimate the light from each source at each vertex, with and without glossy lobes.
+        // Estimate the light from each source at each vertex, including glossy lobes.
         let plain = ReceiverPacket::plain(&row.from, &row.normal);
         let mut glossy = plain.clone();
         for i in lanes(if row.bsdf.has_narrow_lobes() { self.used } else { 0 }) {
@@ -171,7 +175,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         let without = (MIS && row.bsdf.has_narrow_lobes())
             .then(|| tree.single_node_importance(&plain, false))
             .flatten();
-        // Pick with each row of numbers.
+        // Pick lights with each row of numbers.
         for (numbers, pick) in numbers.iter().zip(picks) {
             let picked = shares.pick(numbers);
             pick.lights = picked.lights;
@@ -187,7 +191,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         }
     }
 
-    /// Picks from a tree of any size, one vertex at a time.
+    /// Picks lights from a tree of any size, one vertex at a time.
     #[inline(always)]
     fn pick_by_cuts(
         &self,
@@ -219,7 +223,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         }
     }
 
-    /// The narrow lobe of a vertex, relative to its wide lobes.
+    /// Narrow lobe of a vertex, relative to the wide lobes.
     #[inline(always)]
     fn lobe(&self, i: usize) -> Option<ReceiverLobe> {
         let NarrowLobe { axis, exponent, peak, wide } = self.row.bsdf.narrow_lobe(i)?;
@@ -260,7 +264,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         let (mut values, active, response) = self.contributions(&samples, 1.0, simd);
         let active = active & used;
         if MIS {
-            // Each group of picks has its own pdf, and all requested BSDF samples compete with every group.
+            // Each group of picks has its own pdf, and each group competes with all requested BSDF samples.
             let competing =
                 self.competing.rays_per_sample(render.shadow_samples) * render.shadow_samples as f32;
             values = self.competing.weighted(row, (&samples, &response), values, (&inverse, competing), simd);
@@ -279,7 +283,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
             Shadows::Hard => self.aim_at_centers(&mut samples, &lights, active),
             Shadows::Soft => {}
         }
-        // Trace the shadow rays, or queue them with others to the same lights.
+        // Trace the shadow rays, or queue them with other rays to the same lights.
         let traced = active & !row.below_horizon(&samples.directions, simd);
         let (rays, ends) = self.shadow_rays(&samples, traced);
         match pool {
@@ -297,7 +301,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         }
     }
 
-    /// Aims rays at the centers of lights that have one.
+    /// Aims rays at the centers of all lights that have a center.
     fn aim_at_centers(&self, samples: &mut LightSamplePacket, lights: &[u32; PACKET_SIZE], active: u32) {
         for i in lanes(active) {
             let Some((middle, source)) = self.tile.world.lights.get(lights[i]).middle() else { continue };

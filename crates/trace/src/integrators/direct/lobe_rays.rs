@@ -1,4 +1,4 @@
-//! Rays in narrow lobes, which find lights in addition to light samples.
+//! Rays in narrow lobes, which complement light samples.
 
 use super::all_lights::{ReflectedLight, add_traversal_cost};
 use super::unshadowed::UnshadowedLobeRay;
@@ -14,16 +14,16 @@ use crate::sampling::Dimension;
 use crate::scene::description::Shadows;
 use crate::world::{Hit, SimdKernel};
 
-/// Traces rays in the glossy lobes of the vertices in `sharp`, one per light sample: a narrow lobe finds in a large
-/// light what light samples hardly ever hit.
+/// Traces rays in the glossy lobes of the vertices in `sharp`, one per light sample. Light samples on a large
+/// light rarely fall into a narrow lobe.
 pub struct LobeRays<'a> {
     pub tile: &'a TileContext<'a>,
     pub row: &'a VertexBatch,
     pub sharp: u32,
     pub aov: LightAov,
-    /// Media of the vertices. `None` if all are in air.
+    /// Media at the vertices. `None` if all vertices are in air.
     pub interior_lists: Option<&'a InteriorLists>,
-    /// The reflected light to add to.
+    /// The reflected light to which the results are added.
     pub arrived: ReflectedLight,
 }
 
@@ -61,9 +61,9 @@ impl SimdKernel for LobeRays<'_> {
             }
             let rays = RayPacket::of(row.from, wi).leaving(row.starts(&wi));
             arrived.rays.scattered += u64::from(sent.count_ones());
-            // Without soft shadows, add the light of every emitter along the rays, whatever is in front of it.
+            // Without soft shadows, add the light from every emitter along the rays, even if it is occluded.
             if tile.settings.render.shadows != Shadows::Soft {
-                // Their traversal cost is counted for the rays to the lights' centers.
+                // Traversal cost is counted only for the rays to the lights' centers.
                 let lit = if aov == LightAov::TraversalCost { 0 } else { sent };
                 for i in lanes(lit) {
                     let found = UnshadowedLobeRay { tile, row, lane: i, ray: rays.ray(i), pdf: pdfs[i] };
@@ -75,7 +75,7 @@ impl SimdKernel for LobeRays<'_> {
                 continue;
             }
             let (hits, objects) = tile.world.geometry.closest_rows(&rays, &mut ends, sent, simd);
-            // Count the work of the rays, if the view shows it.
+            // If the view shows the traversal cost, add the cost of the rays.
             if aov == LightAov::TraversalCost {
                 for i in lanes(sent) {
                     ends[i] = hits.get(i).map_or(f32::INFINITY, |hit| hit.t);
@@ -83,7 +83,7 @@ impl SimdKernel for LobeRays<'_> {
                 add_traversal_cost(tile, &rays, &ends, sent, &mut arrived.light);
                 continue;
             }
-            // Add the light that the rays find.
+            // Add the light found by the rays.
             for i in lanes(sent) {
                 let pdf = pdfs[i];
                 let lookups = &mut arrived.rays.lookups;

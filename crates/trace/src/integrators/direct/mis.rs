@@ -1,5 +1,5 @@
-//! Techniques that find lights besides light sampling, and the MIS weights between them (multiple importance sampling:
-//! Veach, *Robust Monte Carlo Methods for Light Transport Simulation*, 1997, section 9.2).
+//! Techniques that compete with light sampling, and their MIS weights (multiple importance sampling: Veach,
+//! *Robust Monte Carlo Methods for Light Transport Simulation*, 1997, section 9.2).
 
 use crate::geometry::{Ray, ShapeHit};
 use crate::integrators::transport::batch::{Response, VertexBatch};
@@ -31,7 +31,7 @@ impl CompetingTechnique {
         if sharp == 0 { Self::Nothing } else { Self::Lobes(sharp) }
     }
 
-    /// Whether the technique is rays in glossy lobes.
+    /// Whether the technique consists of rays in glossy lobes.
     pub fn are_lobes(self) -> bool {
         match self {
             Self::Nothing | Self::Paths | Self::NarrowPaths => false,
@@ -49,9 +49,9 @@ impl CompetingTechnique {
         }
     }
 
-    /// Multiplies `values`, the contributions of light samples at a packet of vertices, by their power-heuristic
-    /// weights. `of_light` are the inverse pdfs of the samples; `competing` is the number of BSDF samples per light
-    /// sample.
+    /// Multiplies `values`, the contributions of light samples at a packet of vertices, by their
+    /// power-heuristic weights. `of_light` contains the inverse pdfs of the samples. `competing` is the
+    /// number of BSDF samples per light sample.
     #[inline(always)]
     pub fn weighted(
         self,
@@ -74,7 +74,7 @@ impl CompetingTechnique {
             let weight = weight(pdfs[i] * of_light[i] * competing);
             weights[i] = if start & 1 << i != 0 { weight } else { 1.0 };
         }
-        // Apply the weights to the light reflected by those lobes.
+        // Apply the weights to the light reflected by these lobes.
         match lobes {
             LobeSet::All => {
                 for i in 0..PACKET_SIZE {
@@ -95,8 +95,8 @@ impl CompetingTechnique {
     }
 }
 
-/// Factor on reflected light when only its narrow part is weighted, as rays in a narrow lobe do not account for wide
-/// lobes. This keeps the AOVs summing to the beauty image.
+/// Factor applied to reflected light if only the narrow lobe's part is weighted, because rays in a narrow
+/// lobe do not account for wide lobes. With it, the AOVs still sum to the beauty image.
 #[inline(always)]
 fn weight_narrow_part(wide: Vec3, narrow: Vec3, weight: f32) -> Vec3 {
     let part = |wide: f32, narrow: f32| {
@@ -106,14 +106,14 @@ fn weight_narrow_part(wide: Vec3, narrow: Vec3, weight: f32) -> Vec3 {
     Vec3::new(part(wide.x, narrow.x), part(wide.y, narrow.y), part(wide.z, narrow.z))
 }
 
-/// Power-heuristic weight of a sample; `ratio` is the other technique's pdf over its own.
+/// Power-heuristic weight of a sample. `ratio` is the other technique's pdf divided by the sample's own.
 #[inline(always)]
 pub fn weight(ratio: f32) -> f32 {
     1.0 / (1.0 + ratio * ratio)
 }
 
 impl TileContext<'_> {
-    /// MIS weight of a path that hits an emitter, against light samples.
+    /// MIS weight of a path that hits an emitter, relative to light samples.
     pub fn emitter_weight(&self, path: &PathRay, hit: &Hit) -> f32 {
         let pdf = path.state.pdf;
         if !(pdf > 0.0) {
@@ -124,7 +124,7 @@ impl TileContext<'_> {
         weight(self.light_pdf(&path.ray, path.state.normal, (hit, normal)) * samples / pdf)
     }
 
-    /// Radiance of infinite lights along a path, with its MIS weight; light samples contribute the rest.
+    /// MIS-weighted radiance of infinite lights along a path. Light samples contribute the rest.
     pub fn infinite_light(&self, path: &PathRay) -> Vec3 {
         let environment = self.world.lights.environment();
         self.infinite_light_with_sky(
@@ -133,7 +133,7 @@ impl TileContext<'_> {
         )
     }
 
-    /// [`TileContext::infinite_light`], given the radiance of the environment and its light-sampling pdf.
+    /// Like [`TileContext::infinite_light`], given the environment's radiance and light-sampling pdf.
     pub fn infinite_light_with_sky(&self, sky: Option<(Vec3, f32)>, path: &PathRay) -> Vec3 {
         let (lights, pdf) = (&self.world.lights, path.state.pdf);
         let samples = self.settings.render.shadow_samples as f32;
@@ -146,12 +146,12 @@ impl TileContext<'_> {
         self.weighted_infinite_light((None, sky), &path.ray, path.state.normal, share)
     }
 
-    /// [`TileContext::emitter_radiance`] for a lobe ray that leaves the scene.
+    /// Like [`TileContext::emitter_radiance`], for a lobe ray that leaves the scene.
     pub fn infinite_radiance(&self, ray: &Ray, normal: Vec3, pdf: f32) -> Vec3 {
         self.infinite_radiance_of(None, ray, normal, pdf)
     }
 
-    /// [`TileContext::infinite_radiance`] of only the light `number`, or of all lights for `None`.
+    /// Like [`TileContext::infinite_radiance`], restricted to the light `number` unless it is `None`.
     pub fn infinite_radiance_of(&self, number: Option<u32>, ray: &Ray, normal: Vec3, pdf: f32) -> Vec3 {
         let sky = self.world.lights.environment().map(|environment| environment.arriving(ray.direction));
         // If lobe rays account for the environment, light samples skip it, and its light-sampling pdf is 0.
@@ -159,8 +159,9 @@ impl TileContext<'_> {
         self.weighted_infinite_light((number, sky), ray, normal, |of_light| weight(of_light / pdf))
     }
 
-    /// Radiance of one infinite light, or of all, along a ray that leaves the scene from a surface with this normal,
-    /// given the environment's radiance and light-sampling pdf. `share` maps each light's sampling pdf to its weight.
+    /// Weighted radiance of one infinite light, or all of them, along a ray that leaves the scene from a
+    /// surface with this normal, given the environment's radiance and light-sampling pdf. `share` maps each
+    /// light's sampling pdf to its weight.
     fn weighted_infinite_light(
         &self,
         (only, sky): (Option<u32>, Option<(Vec3, f32)>),
@@ -178,8 +179,8 @@ impl TileContext<'_> {
         })
     }
 
-    /// Light-sampling pdf of the direction to a hit, in sr⁻¹ per requested sample, from a surface with this normal; 0
-    /// if the hit is not on a light.
+    /// Light-sampling pdf of the direction to a hit, in sr⁻¹ per requested sample, from a surface with this
+    /// normal, or 0 if the hit is not on a light.
     fn light_pdf(&self, ray: &Ray, normal: Vec3, (hit, of_light): (&Hit, Vec3)) -> f32 {
         let (direction, distance, primitive) = (ray.direction, hit.shape.t, hit.shape.primitive);
         let met = LightHit { direction, distance, normal: of_light, primitive };
@@ -191,8 +192,8 @@ impl TileContext<'_> {
         })
     }
 
-    /// Radiance of the emitter that a lobe ray hits, with its MIS weight against as many light samples as there are
-    /// lobe rays.
+    /// Radiance of the emitter hit by a lobe ray, with the MIS weight for an equal number of light samples
+    /// and lobe rays.
     pub fn emitter_radiance(
         &self,
         ray: &Ray,
@@ -220,8 +221,8 @@ impl TileContext<'_> {
         radiance * weight(self.light_pdf(ray, from_normal, (hit, normal)) / pdf)
     }
 
-    /// Weighted radiance along a lobe ray, through null interactions, beginning with its first hit. `transmittance`
-    /// gives the transmittance of the medium up to a distance.
+    /// MIS-weighted radiance along a lobe ray, including null interactions, starting at its first hit.
+    /// `transmittance` returns the medium's transmittance up to a distance.
     #[cold]
     #[inline(never)]
     pub fn radiance_through(
@@ -239,7 +240,7 @@ impl TileContext<'_> {
                 let beyond = self.infinite_radiance(ray, from_normal, pdf);
                 return sum + left * beyond * transmittance(f32::MAX);
             };
-            // Add the emission of the surface, as if the ray had reached it without interactions.
+            // Add the surface's emission, using the hit distance along the original ray.
             let distance = passed + hit.shape.t;
             let met = Hit { shape: ShapeHit { t: distance, ..hit.shape }, ..hit };
             let radiance = self.emitter_radiance(ray, from_normal, &met, pdf, lookups);
@@ -258,8 +259,8 @@ impl TileContext<'_> {
         sum
     }
 
-    /// [`TileContext::emitter_weight`] of an emitter coincident with glass that the path hits: 1 if shadow rays cannot
-    /// reach it there.
+    /// Like [`TileContext::emitter_weight`], for an emitter that coincides with glass. Returns 1 if shadow
+    /// rays cannot reach the hit point.
     pub fn touching_emitter_weight(&self, path: &PathRay, hit: &Hit) -> f32 {
         let Ray { origin, direction, .. } = path.ray;
         let shadow = Ray::segment(origin, origin + direction * hit.shape.t);

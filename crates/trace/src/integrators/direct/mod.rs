@@ -1,9 +1,10 @@
-//! Next-event estimation: light samples with their shadow rays, and the techniques that compete with them.
+//! Next-event estimation: light samples with their shadow rays, and the techniques that compete with light
+//! samples.
 //!
-//! - `queue`: packets of vertices that await direct lighting, and the light that they reflect.
-//! - `all_lights`: samples of every light; `light_tree`: samples of lights picked from a tree; `shadow_rays`: shadow
-//!   rays to these, grouped by light.
-//! - `lobe_rays`: rays in narrow lobes; `unshadowed`: the same without soft shadows.
+//! - `queue`: packets of vertices that await direct lighting, and the light they reflect.
+//! - `all_lights`: samples of every light. `light_tree`: samples of lights picked from a tree. `shadow_rays`:
+//!   shadow rays to the picked lights, grouped by light.
+//! - `lobe_rays`: rays in narrow lobes. `unshadowed`: lobe rays without soft shadows.
 //! - `mis`: MIS weights of light samples, lobe rays and paths.
 
 pub mod all_lights;

@@ -1,4 +1,4 @@
-//! Queue of vertices that await direct lighting, in packets, and the light that they reflect.
+//! Queue of vertices that await direct lighting, in packets, and the light they reflect.
 
 use arrayvec::ArrayVec;
 
@@ -31,12 +31,12 @@ use crate::world::{Geometry, SimdKernel};
 #[derive(Default)]
 pub struct DirectLightQueue {
     rows: Vec<VertexBatch>,
-    /// Number of packets in use; the others are kept for reuse.
+    /// Number of packets in use. The remaining packets are kept for reuse.
     count: usize,
-    /// Index of the packet that receives single vertices, per kind of BSDF, for dark and other vertices and for one and
-    /// two sides. The packet may be full or not in use.
+    /// Index of the packet to which single vertices are added, per combination of BSDF kind, dark or not, and
+    /// one or two sides. The packet may be full or unused.
     open: [[usize; RoughKind::ALL.len()]; 4],
-    /// Direct light at the vertices of each path of this bounce.
+    /// Direct light reflected at the vertices of each path in this bounce.
     arrived: Vec<Vec3>,
     /// Media of the vertices.
     interior_lists: InteriorLists,
@@ -46,7 +46,7 @@ pub struct DirectLightQueue {
     cones: Vec<RayCone>,
 }
 
-/// The sides that a vertex represents. No light sample is visible from a dark side.
+/// The sides that a vertex represents. No light samples are visible from a dark side.
 #[derive(Clone, Copy)]
 pub enum ShadingSides<'m> {
     /// One side.
@@ -54,7 +54,7 @@ pub enum ShadingSides<'m> {
         /// Whether the vertex is dark.
         is_dark: bool,
     },
-    /// Both sides of the surface; no light sample is visible from the other side.
+    /// Both sides of the surface. No light samples are visible from the other side.
     TwoSides {
         /// Whether the vertex is dark.
         is_dark: bool,
@@ -65,17 +65,17 @@ pub enum ShadingSides<'m> {
     },
 }
 
-/// Number of packets that are lit together if lights are picked from a tree.
+/// Number of packets processed together if lights are picked from a tree.
 const ROWS: usize = 64;
 
 impl DirectLightQueue {
-    /// Number of packets at which they are lit, while their data is in the cache.
+    /// Number of packets at which the queue is processed, while the data is still in the cache.
     const FULL: usize = 64;
 
-    /// A packet with fewer vertices is merged into another one.
+    /// Packets with fewer vertices are merged into other packets.
     const MIN_OWN_ROW: u32 = 8;
 
-    /// Whether the queued packets should be lit now.
+    /// Whether the queued packets should be processed now.
     pub fn is_full(&self) -> bool {
         self.count >= Self::FULL
     }
@@ -97,8 +97,8 @@ impl DirectLightQueue {
         }
     }
 
-    /// Ends the bounce: adds the direct light to the accumulator, in path order. `path` returns the slot of a queue
-    /// index, and whether the camera sees its vertex.
+    /// Ends the bounce and adds the direct light to the accumulator in path order. `path` returns the slot
+    /// for a queue index and whether the camera sees the vertex.
     pub fn flush(&mut self, path: impl Fn(usize) -> (u32, bool), accumulator: &mut Accumulator<'_>) {
         for (place, light) in self.arrived.iter().enumerate().filter(|(_, light)| **light != Vec3::ZERO) {
             let (slot, only_specular_before) = path(place);
@@ -106,7 +106,7 @@ impl DirectLightQueue {
         }
     }
 
-    /// [`DirectLightQueue::flush`] for paths with consecutive slots.
+    /// Like [`DirectLightQueue::flush`], for paths with consecutive slots.
     pub fn flush_run(&mut self, first: u32, accumulator: &mut Accumulator<'_>) {
         accumulator.add_direct_run(first, &self.arrived);
     }
@@ -128,7 +128,7 @@ impl DirectLightQueue {
             self.count += 1;
             return;
         }
-        // Merge a small packet with others of its kind.
+        // Merge a small packet with other packets of the same kind.
         let mut left = row.used;
         let open = &mut self.open[0][row.bsdf.kind() as usize];
         if let Some(open) = kept.get_mut(*open).filter(|open| open.is_for(row.bsdf.kind(), (false, false))) {
@@ -167,7 +167,8 @@ impl DirectLightQueue {
         row.put(lane, tile, lit, aov, interiors);
     }
 
-    /// A packet for this kind of BSDF with a free lane, dark or not and two-sided or not.
+    /// Returns a packet with a free lane for this kind of BSDF, and the lane. `which` contains whether the
+    /// vertex is dark and whether it is two-sided.
     fn open_row(&mut self, kind: RoughKind, which: (bool, bool)) -> (&mut VertexBatch, usize) {
         let (is_dark, has_two_sides) = which;
         let table = usize::from(is_dark) + 2 * usize::from(has_two_sides);
@@ -190,13 +191,13 @@ impl DirectLightQueue {
     /// Removes all vertices.
     fn clear(&mut self) {
         (self.count, self.open) = (0, Default::default());
-        // A cancelled bounce may have left rays.
+        // A cancelled bounce may not have removed all rays.
         self.pool.clear();
     }
 
-    /// Lights all queued vertices and removes them; returns the number of rays traced. `gather` returns light from
-    /// another technique at a packet. The rays of continuing paths are added to `next`: with the given continuation, or
-    /// in microfacet lobes after `depth` bounces.
+    /// Computes direct lighting at all queued vertices, removes the vertices, and returns the number of rays
+    /// traced. `gather` returns light from another technique at a packet. Rays of continuing paths are added
+    /// to `next`, either with the given continuation or in microfacet lobes after `depth` bounces.
     pub fn light(
         &mut self,
         tile: &TileContext<'_>,
@@ -208,7 +209,7 @@ impl DirectLightQueue {
         let mut rays = LightRayCounts::default();
         let mut group: ArrayVec<LightSums, ROWS> = ArrayVec::new();
         let together = if tile.world.lights.sampler(tile.behavior.receivers).is_some() { ROWS } else { 1 };
-        // Hard shadows come only from light samples.
+        // Hard shadows are computed only with light samples.
         let shares_with_paths = continuation.is_some()
             && (!tile.behavior.gathers || tile.settings.render.shadows == Shadows::Soft);
         let mirrors = || tile.behavior.mirrors.then(|| Continuation::new(tile, depth, LobeSet::Narrow));
@@ -218,7 +219,7 @@ impl DirectLightQueue {
         };
         for first in (0..self.count).step_by(together) {
             let end = (first + together).min(self.count);
-            // Sample lights at each packet; shadow rays to picked lights are pooled.
+            // Sample lights at each packet, and pool the shadow rays to picked lights.
             for number in first..end {
                 tile.token.check()?;
                 let row = &mut self.rows[number];
@@ -291,7 +292,7 @@ impl DirectLightQueue {
         (!self.interior_lists.are_air() && row.is_in_glass()).then_some(&self.interior_lists)
     }
 
-    /// Samples lights at a packet; shadow rays to picked lights are pooled under index `number`.
+    /// Samples lights at a packet. Shadow rays to picked lights are pooled under index `number`.
     fn sample_lights(
         &mut self,
         request: BatchRequest,
@@ -333,7 +334,7 @@ impl DirectLightQueue {
         sums
     }
 
-    /// The reflected light, including light that lobe rays find.
+    /// Reflected light, including the light found by lobe rays.
     fn add_lobe_rays(
         &self,
         request: BatchRequest,
@@ -355,7 +356,7 @@ impl DirectLightQueue {
         }
     }
 
-    /// Adds a packet's reflected light to its paths; a path has two vertices at a transmissive surface.
+    /// Adds a packet's reflected light to its paths. A path has two vertices at a transmissive surface.
     fn store(&mut self, number: usize, aov: LightAov, arrived: &Vec3x16) {
         let row = &self.rows[number];
         let light = match aov {
@@ -378,7 +379,7 @@ impl DirectLightQueue {
     }
 }
 
-/// Mask of vertices whose direct light the view shows, if there may be any.
+/// Mask of vertices whose direct light is shown by the view and may be nonzero.
 fn shown_vertices(row: &VertexBatch, aov: LightAov) -> u32 {
     if row.is_dark {
         return 0;
@@ -388,18 +389,18 @@ fn shown_vertices(row: &VertexBatch, aov: LightAov) -> u32 {
     !(hidden(row.only_specular_before, direct) | hidden(!row.only_specular_before, indirect))
 }
 
-/// A packet to light, and options.
+/// A packet for which to compute direct lighting, and options.
 #[derive(Clone, Copy)]
 struct BatchRequest {
     /// The index of the packet.
     number: usize,
-    /// Mask of vertices to light.
+    /// Mask of vertices for which to compute direct lighting.
     used: u32,
     /// Whether continuing paths compete with the light samples.
     shares_with_paths: bool,
 }
 
-/// Moves the shadow-ray origins of a packet above their facets, where the segment to them is unoccluded.
+/// Moves a packet's shadow-ray origins above their facets if the segments from the facets are unoccluded.
 struct LiftOrigins<'a> {
     geometry: &'a Geometry,
     row: &'a mut VertexBatch,
@@ -411,7 +412,7 @@ impl SimdKernel for LiftOrigins<'_> {
     #[inline(always)]
     fn run(self, simd: impl Simd) {
         let Self { geometry, row } = self;
-        // Make rays from the facets to the points above them.
+        // Create rays from the facets to the lifted points.
         let mut direction = row.lifted;
         for axis in 0..3 {
             for i in 0..PACKET_SIZE {
@@ -428,7 +429,7 @@ impl SimdKernel for LiftOrigins<'_> {
             let (traced, nothing) = (traced(&ends, simd), LightObjectPacket::of(LightObject::Nothing));
             geometry.occluded_rows(&rays, &ends, traced, &nothing, simd)
         };
-        // Move the other origins.
+        // Move the origins of the unoccluded rays.
         let lifted = row.may_lift & !blocked;
         row.has_horizon &= !lifted;
         for i in 0..PACKET_SIZE {

@@ -1,5 +1,5 @@
-//! Shadow rays of many packets of vertices, regrouped by light. Rays to one corner of the scene visit the same boxes,
-//! whereas the rays of one packet diverge.
+//! Shadow rays of many packets of vertices, regrouped by light. Rays to nearby lights visit the same bounding
+//! boxes, whereas the rays of one packet diverge.
 
 use super::all_lights::{LightSums, add_where, transmitted};
 use crate::geometry::packet::{F32x16, RayPacket, lanes};
@@ -25,18 +25,18 @@ struct QueuedShadowRays {
 #[derive(Default)]
 pub struct ShadowRayQueue {
     rows: Vec<QueuedShadowRays>,
-    /// Each ray's light, as its position in the tree, and the ray's row and lane.
+    /// The light of each ray, given by its position in the tree, and the ray's row and lane.
     order: Vec<(u32, u32)>,
     /// Rows and lanes of the rays, grouped by light.
     sorted: Vec<u32>,
 }
 
-/// Maximum number of groups of lights.
+/// Maximum number of light groups.
 const MAX_GROUPS: usize = 1 << GROUP_BITS;
 const GROUP_BITS: u32 = 11;
 
 impl ShadowRayQueue {
-    /// Number of queued packets at which they are traced, while they are in the cache.
+    /// Number of packets at which the queued rays are traced, while they are still in the cache.
     const FULL: usize = 512;
 
     /// Whether the queued rays should be traced now.
@@ -44,7 +44,7 @@ impl ShadowRayQueue {
         self.rows.len() >= Self::FULL
     }
 
-    /// Queues the rays in `traced` of a packet of vertices, with their lights' positions in the tree.
+    /// Queues the rays of a vertex packet selected by `traced`, with the tree positions of their lights.
     #[inline(always)]
     pub fn push(
         &mut self,
@@ -66,8 +66,7 @@ impl ShadowRayQueue {
         });
     }
 
-    /// Traces all rays and removes them; adds the unoccluded light to the sums of the packets, in the order in which
-    /// the rays were queued.
+    /// Traces and removes all rays, and adds the unoccluded light to the packets' sums in queue order.
     pub fn trace(&mut self, tile: &TileContext<'_>, aov: LightAov, sums: &mut [LightSums]) {
         if self.rows.is_empty() {
             return;
@@ -82,7 +81,7 @@ impl ShadowRayQueue {
         self.clear();
     }
 
-    /// Groups rays by ranges of consecutive positions with a counting sort; rays of a group keep their order.
+    /// Groups rays by ranges of tree positions with a counting sort. Rays within a group keep their order.
     fn sort(&mut self) {
         let Self { order, sorted, .. } = self;
         let greatest = order.iter().map(|&(place, _)| place).max().unwrap_or(0);
@@ -109,7 +108,7 @@ impl ShadowRayQueue {
     }
 }
 
-/// Traces the queued rays and clears the bits of occluded ones.
+/// Traces the queued rays and clears the bits of occluded rays.
 struct TraceShadowRays<'a> {
     world: &'a World,
     aov: LightAov,
@@ -152,8 +151,8 @@ impl SimdKernel for TraceShadowRays<'_> {
     }
 }
 
-/// Multiplies the contributions of rays by the transmittance of null interactions; returns the mask of rays with none
-/// left.
+/// Multiplies the contributions of rays by the transmittance of null interactions. Returns the mask of rays
+/// with zero transmittance.
 #[cold]
 #[inline(never)]
 fn attenuate(

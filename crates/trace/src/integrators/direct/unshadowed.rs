@@ -1,5 +1,6 @@
-//! Light that narrow lobes reflect without soft shadows: the light of every emitter along a lobe ray, whatever is in
-//! front of it. For hard shadows, one ray to the center of each light decides how much of it arrives.
+//! Light reflected by narrow lobes without soft shadows: the light from every emitter along a lobe ray,
+//! ignoring occluders. For hard shadows, one ray to the center of each light determines the light's
+//! transmittance.
 
 use crate::geometry::{Ray, ShapeHit};
 use crate::integrators::transport::batch::VertexBatch;
@@ -12,7 +13,7 @@ use crate::world::{Hit, MAX_NULL_INTERACTIONS};
 
 use super::all_lights::LightRayCounts;
 
-/// A ray in a narrow lobe of a vertex, and the pdf of its direction.
+/// A ray in a vertex's narrow lobe, and the pdf of its direction.
 pub struct UnshadowedLobeRay<'a> {
     pub tile: &'a TileContext<'a>,
     pub row: &'a VertexBatch,
@@ -23,8 +24,8 @@ pub struct UnshadowedLobeRay<'a> {
 }
 
 impl UnshadowedLobeRay<'_> {
-    /// Radiance of the lights along the ray, with MIS weights against as many light samples as there are such rays.
-    /// `transmittance` gives the transmittance of the medium up to a distance.
+    /// Radiance of the lights along the ray, with MIS weights for an equal number of light samples and lobe
+    /// rays. `transmittance` returns the medium's transmittance up to a distance.
     #[cold]
     #[inline(never)]
     pub fn radiance(&self, transmittance: impl Fn(f32) -> Vec3, rays: &mut LightRayCounts) -> Vec3 {
@@ -59,13 +60,13 @@ impl UnshadowedLobeRay<'_> {
         sum
     }
 
-    /// The fraction of a light that arrives.
+    /// Unoccluded fraction of a light.
     fn arriving(&self, light: &Light, rays: &mut LightRayCounts) -> Vec3 {
         match self.tile.settings.render.shadows {
             Shadows::Off => return Vec3::ONE,
             Shadows::Hard | Shadows::Soft => {}
         }
-        // An environment has no center: the ray itself decides.
+        // An environment has no center, so test the ray itself.
         let (segment, source) = match light.middle() {
             Some((LightCenter::At(middle), source)) => (Ray::segment(self.ray.origin, middle), source),
             Some((LightCenter::Towards(direction), source)) => (Ray::new(self.ray.origin, direction), source),

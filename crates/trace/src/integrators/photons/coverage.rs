@@ -1,6 +1,6 @@
-//! Closed form of the coverage p of a kernel: the fraction that receives photons, which is surface with about the
-//! center's normal that is not occluded from the center. It exists for a few flat pieces; all other cases are estimated
-//! by trials.
+//! Closed form for the coverage p of a kernel: the fraction of the kernel that receives photons. Surfaces are
+//! included if they have about the same normal as the center and are not occluded from it. The closed form
+//! exists for a few flat pieces. All other cases are estimated by trials.
 
 use arrayvec::ArrayVec;
 
@@ -13,39 +13,39 @@ use crate::math::frame::Frame;
 use crate::math::{DVec2, DVec3};
 use crate::world::{Hit, MeshInstance, Object, World};
 
-/// Coverage of a kernel: what edges and walls leave of it.
+/// Coverage of a kernel, which is reduced by edges and walls.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum KernelCoverage {
-    /// This fraction of the kernel's weight, without occlusion within it.
+    /// Fraction of the kernel's weight, if there is no occlusion within the kernel.
     Fraction(f32),
-    /// Unknown, because edges or walls are near.
+    /// Unknown because edges or walls are nearby.
     Clipped,
-    /// Unknown, because many triangles are near; most such kernels are far from an edge.
+    /// Unknown because many triangles are nearby. Most of these kernels are far from an edge.
     Crowded,
 }
 
-/// Distance above which two planes count as different, in radii.
+/// Distance above which two planes are considered different, in radii.
 const FLAT: f64 = 4e-3;
 
 /// Minimum cosine between the normals of two pieces of one plane.
 const SAME_PLANE: f64 = 1.0 - 1e-6;
 
-/// Maximum distance between a wall and the border of the piece on which it stands, in radii.
+/// Maximum distance between a wall and the border of the piece it stands on, in radii.
 const BORDER: f64 = 2e-3;
 
-/// Maximum cosine between the normals of a wall and of the piece on which it stands.
+/// Maximum cosine between the normals of a wall and the piece it stands on.
 const UPRIGHT: f64 = 0.3;
 
-/// Distance from which surfaces do not matter, in radii: √(1 + REACH²) plus a margin.
+/// Distance beyond which surfaces are ignored, in radii: √(1 + REACH²) plus a margin.
 const FAR: f64 = 1.05;
 
-/// Minimum radius of a sphere that counts as flat around the kernel's center, in kernel radii.
+/// Minimum radius of a sphere that is treated as flat around the kernel's center, in kernel radii.
 const WIDE: f64 = 2.0;
 
-/// Minimum coverage for the closed form; below it, rounding errors matter.
+/// Minimum coverage for the closed form. Below it, rounding errors are significant.
 const MIN_COVERAGE: f64 = 1e-3;
 
-/// Capacities for triangles of a mesh near a kernel, pieces of its plane, and walls.
+/// Maximum numbers of mesh triangles near a kernel, pieces of its plane, and walls.
 const TRIANGLES: usize = 32;
 const PIECES: usize = 8;
 const WALLS: usize = 4;
@@ -66,7 +66,7 @@ pub fn kernel_coverage(world: &World, look: &GatherPoint, radius: f32) -> Kernel
     }
 }
 
-/// The material of a primitive of an object.
+/// Material of an object's primitive.
 pub fn material(world: &World, object: u32, primitive: u32) -> &Material {
     let shape = ShapeHit { primitive, ..ShapeHit::at(0.0) };
     &world.materials[world.material_index(&Hit { shape, object })]
@@ -79,8 +79,8 @@ pub fn receives(material: &Material) -> bool {
     material.bsdf.rough().is_some_and(is_lit) || is_rough_glass()
 }
 
-/// A wall perpendicular to the kernel's plane, as a half-plane that contains the center: points inside have a dot
-/// product with the normal of at most `distance`.
+/// A wall perpendicular to the kernel's plane, represented as a half-plane containing the center. The dot
+/// product of `normal` and a point in the half-plane is at most `distance`.
 struct Wall {
     normal: DVec2,
     distance: f64,
@@ -95,7 +95,7 @@ impl Wall {
     }
 }
 
-/// The surfaces around the center of a kernel.
+/// Surfaces around the center of a kernel.
 struct KernelNeighborhood {
     point: DVec3,
     normal: DVec3,
@@ -104,7 +104,7 @@ struct KernelNeighborhood {
     tangents: [DVec3; 2],
     /// Pieces of the kernel's plane that receive photons.
     pieces: ArrayVec<FlatPolygon, PIECES>,
-    /// Number of surfaces that contain the whole kernel.
+    /// Number of surfaces that cover the whole kernel.
     whole: u32,
     walls: ArrayVec<Wall, WALLS>,
 }
@@ -130,12 +130,13 @@ impl KernelNeighborhood {
         DVec2::new(self.tangents[0].dot(vector), self.tangents[1].dot(vector))
     }
 
-    /// The corners of a piece relative to the center, projected onto the plane, in radii.
+    /// A piece's corners relative to the center, projected onto the plane, in radii.
     fn project_piece(&self, piece: &FlatPolygon) -> ArrayVec<DVec2, 4> {
         piece.iter().map(|&corner| self.project(corner - self.point)).collect()
     }
 
-    /// Computes the kernel's weight over the pieces; `None` if a wall separates them or they overlap.
+    /// Computes the kernel's weight over the pieces, or `None` if a wall separates the pieces or if they
+    /// overlap.
     fn coverage(&self) -> Option<f64> {
         if !self.walls.is_empty() && self.whole > 0 {
             return None;
@@ -151,7 +152,7 @@ impl KernelNeighborhood {
         (MIN_COVERAGE..=1.0 + FLAT).contains(&part).then_some(part.min(1.0))
     }
 
-    /// Adds a shape; returns whether the coverage still has a closed form.
+    /// Adds a shape and returns whether the coverage still has a closed form.
     fn add_shape(&mut self, shape: &Shape, receives: impl Fn() -> bool) -> bool {
         match shape.kernel_domain(self.point) {
             KernelDomain::Polygons(count) => (0..count)
@@ -164,7 +165,8 @@ impl KernelNeighborhood {
         }
     }
 
-    /// Adds a surface that extends over the whole kernel and has its normal at the center; returns whether it does.
+    /// Adds a surface if it extends over the whole kernel and has the kernel's normal, and returns whether it
+    /// does.
     fn add_ground(&mut self, ground: &Ground, receives: impl Fn() -> bool) -> bool {
         let is_wide = match ground.extent {
             Extent::Flat(reach) => reach > FAR * self.radius,
@@ -184,8 +186,8 @@ impl KernelNeighborhood {
         is_crowded: &mut bool,
     ) -> bool {
         let mut near: ArrayVec<u32, TRIANGLES> = ArrayVec::new();
-        // Trees visit some triangles twice, and others that are only close. Skip both, or the result would depend on
-        // the tree.
+        // Trees visit some triangles twice, and also triangles that are close but outside the box. Skip both
+        // so that the result does not depend on the tree.
         let is_exact = mesh.visit_box(bounds, |triangle| {
             let is_known = near.contains(&triangle);
             is_known
@@ -203,14 +205,14 @@ impl KernelNeighborhood {
         })
     }
 
-    /// Adds a flat piece; returns whether the coverage still has a closed form.
+    /// Adds a flat piece and returns whether the coverage still has a closed form.
     fn add_piece(&mut self, piece: &FlatPolygon, receives: impl Fn() -> bool) -> bool {
         let normal = (piece[1] - piece[0]).cross(piece[2] - piece[0]);
         let from = piece[0] - self.point;
         let (size, distance, cosine) = (normal.length_squared(), normal.dot(from), normal.dot(self.normal));
         let is_within =
             |radii: f64| distance * distance < (radii * self.radius) * (radii * self.radius) * size;
-        // Ignore pieces that are out of reach or have no area.
+        // Ignore pieces that are too far away or have no area.
         if !(size > 0.0 && is_within(FAR)) {
             return true;
         }
@@ -273,7 +275,7 @@ mod tests {
     }
 
     #[test]
-    fn coverage_is_exact_only_for_flat_pieces() {
+    fn only_flat_pieces_have_a_closed_form() {
         let floor = quad(DVec3::ZERO, DVec3::Z, DVec3::X);
         let other = quad(DVec3::X, DVec3::Z, DVec3::X);
         let wall = quad(DVec3::ZERO, DVec3::Y, DVec3::Z);
@@ -290,7 +292,7 @@ mod tests {
             coverage_at(0.0005, 0.0005, &[floor, wall, back]),
             coverage_at(0.0005, 0.0005, &[floor]).expect("flat")
         ));
-        // A wall between two pieces, a box on the floor, a sheet above it, a ball resting on it.
+        // A wall between two pieces, a box on the floor, a sheet above the floor, and a ball on the floor.
         assert_eq!(coverage_at(0.95, 0.5, &[floor, other, quad(DVec3::X, DVec3::Y, DVec3::Z)]), None);
         let cuboid = Shape::Box(Cuboid::new(DVec3::new(0.5, 0.1, 0.5), DVec3::splat(0.2), DVec3::ZERO));
         assert_eq!(coverage_at(0.35, 0.5, &[floor, cuboid]), None);

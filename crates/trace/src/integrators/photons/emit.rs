@@ -1,6 +1,6 @@
-//! Photon tracing: bounce by bounce from the lights, sixteen photons at a time, through mirrors and glass to the first
-//! other surface and from there to the next one. Photons interact with surfaces, media and lobes in the same way as
-//! camera paths.
+//! Photon tracing: photons are traced from the lights bounce by bounce, sixteen at a time. They travel via
+//! mirrors and glass to the first other surface, and are scattered from there to the next surface. Photons
+//! interact with surfaces, media and lobes in the same way as camera paths.
 //!
 //! Photons carry basic flux, Φ/n². At a surface whose shading normal Nₛ differs from its geometric normal N₉,
 //! scattering uses the adjoint of its BSDF: f·|wi·Nₛ|·|wo·N₉|/|wi·N₉| (Veach, *Robust Monte Carlo Methods for Light
@@ -35,31 +35,31 @@ use crate::math::lanes::{Simd, lane, set_lane};
 use crate::sampling::{CAMERA_PATH, Dimension, SamplerPacket};
 use crate::world::{CompoundSolid, Hit, SimdKernel, World};
 
-/// Squared difference below which directions are equal within rounding.
+/// Squared difference below which directions are considered equal.
 const SAME: f32 = 1e-8;
 
-/// Context shared by all photons of a chunk of a pass.
+/// Context shared by all photons in a chunk of a pass.
 pub struct PhotonTracing<'a> {
-    /// The tile context; photons are numbered as the samples of a single pixel, with slots from 0.
+    /// Tile context. Photons are numbered as samples of a single pixel, with slots starting at 0.
     pub tile: &'a TileContext<'a>,
-    /// Emission of the lights.
+    /// Photon source, which represents all lights.
     pub emission: &'a PhotonSource,
-    /// The closed glass shapes that may contain lights, with their materials.
+    /// Closed glass shapes that may contain lights, with their materials.
     pub glasses: &'a [Interior],
     /// Other glass solids that may contain lights.
     pub bodies: &'a [CompoundSolid],
     /// Reciprocal of the number of photons.
     pub share: f32,
-    /// Maximum number of bounces of a photon.
+    /// Maximum number of bounces per photon.
     pub most_depth: u32,
 }
 
 /// Photons stored by one chunk of a pass.
 #[derive(Default)]
 pub struct PhotonChunk {
-    /// Caustic photons, which were scattered only by mirrors and glass, in emission order within each bounce.
+    /// Caustic photons, scattered only by mirrors and glass, in emission order within each bounce.
     pub caustic: Vec<Photon>,
-    /// Bounced photons, which were scattered at a caustic, in the same order.
+    /// Bounced photons, scattered at a caustic, in the same order.
     pub bounced: Vec<Photon>,
     /// Number of texture lookups.
     pub lookups: u64,
@@ -93,7 +93,7 @@ impl PhotonTracing<'_> {
                 self.tile.token.check()?;
                 wavefront.intersect(packet, &mut row, &mut surfaces);
             }
-            // Scatter the single vertices, and apply Russian roulette.
+            // Scatter the individually queued vertices, and apply Russian roulette.
             wavefront.scatter_open();
             wavefront.interior_lists.clear();
             wavefront.russian_roulette();
@@ -105,8 +105,8 @@ impl PhotonTracing<'_> {
         Ok(wavefront.stored)
     }
 
-    /// The ray of a photon from an infinite light, moved back past transmissive infinite planes in front of its start.
-    /// `None` if an opaque surface blocks it.
+    /// Ray of a photon from an infinite light, with the origin moved back past any transmissive infinite
+    /// planes. `None` if an opaque surface blocks the ray.
     fn skip_planes(&self, ray: Ray) -> Option<Ray> {
         let world = self.tile.world;
         let mut start = ray.origin;
@@ -125,7 +125,7 @@ impl PhotonTracing<'_> {
         None
     }
 
-    /// The medium at the start of a photon.
+    /// Medium at a photon's starting point.
     fn interiors_at(&self, point: Vec3, emitted: &EmittedPhoton) -> InteriorList {
         let world = self.tile.world;
         let emitter = || Some(world.lights.get(emitted.light).as_area()?.object);
@@ -148,14 +148,14 @@ struct PhotonWavefront<'a> {
     tracing: &'a PhotonTracing<'a>,
     /// Number of bounces so far.
     depth: u32,
-    /// Largest component of each photon's initial flux, by slot.
+    /// Largest component of each photon's initial flux, indexed by slot.
     references: Vec<f32>,
     next: Vec<PathRay>,
-    /// Packet that collects single vertices.
+    /// Packet of individually queued vertices.
     open: VertexBatch,
-    /// Packet that collects vertices of transmitted photons.
+    /// Packet of vertices of transmitted photons.
     open_behind: VertexBatch,
-    /// Media at single vertices.
+    /// Media at the individually queued vertices.
     interior_lists: InteriorLists,
     crossing: CrossingMemory,
     stored: PhotonChunk,
@@ -183,7 +183,7 @@ impl<'a> PathStepper<'a> for PhotonWavefront<'a> {
             Interaction::Glass(vertex, _, Interface { far, rough: None }) => {
                 self.shade_glass(path, vertex, far);
             }
-            // Light samples find direct light.
+            // Direct light is found by light samples.
             Interaction::Glass(..) if self.depth == 0 && !has_passed => {}
             Interaction::Glass(vertex, _, Interface { far, rough: Some(rough) }) => {
                 self.store_and_scatter(path, vertex, RoughBsdf::GlassReflection(rough), (far, Some(1.0)));
@@ -227,7 +227,7 @@ impl PhotonWavefront<'_> {
         for begin in (0..count).step_by(PACKET_SIZE) {
             let numbers = tile.world.geometry.instructions().run(EmissionNumbers { tile, first: begin });
             for (i, numbers) in numbers.iter().enumerate().take((count - begin) as usize) {
-                // Emit a photon, and start it in front of all infinite planes that it may pass.
+                // Emit a photon, and start it in front of all infinite planes it may pass through.
                 let Some(emitted) = tracing.emission.emit(numbers) else { continue };
                 let past_planes = is_beyond(&emitted) && has_planes;
                 let ray = emitted.ray();
@@ -255,12 +255,12 @@ impl PhotonWavefront<'_> {
         self.depth < self.tracing.most_depth
     }
 
-    /// Traces a packet of photons to their hits, and stores and scatters them.
+    /// Traces a packet of photons to their hits, where they are stored and scattered.
     fn intersect(&mut self, rays: &[PathRay], row: &mut VertexBatch, surfaces: &mut SurfacePacket) {
         let tile = self.tracing.tile;
         let packet = tile.intersect(PacketSource::Paths(rays, 0), LightAov::ALL, true, (row, surfaces));
         self.counters.texture_lookups += packet.lookups;
-        // Light samples find direct light.
+        // Direct light is found by light samples.
         if self.depth > 0 {
             for i in lanes(row.used) {
                 let (point, normal) = row.surface_of(i);
@@ -281,7 +281,7 @@ impl PhotonWavefront<'_> {
         }
     }
 
-    /// Stores a photon where it lands.
+    /// Stores a photon at its hit point.
     fn store(&mut self, path: &PathRay, point: Vec3, normal: Vec3) {
         let (direction, flux) = (-path.ray.direction, path.throughput);
         let photon = Photon { point, direction, flux, normal, depth: self.depth };
@@ -297,7 +297,7 @@ impl PhotonWavefront<'_> {
         (far, lacks_photons): (&InteriorList, bool),
     ) {
         match &vertex.material.bsdf {
-            // Light samples find direct light.
+            // Direct light is found by light samples.
             Bsdf::Rough(_) if lacks_photons => {}
             Bsdf::Rough(rough) => self.shade_rough(path, vertex, rough, (far, Some(1.0))),
             Bsdf::Coated(coated) => self.shade_coated(path, vertex, coated, (far, lacks_photons)),
@@ -311,9 +311,9 @@ impl PhotonWavefront<'_> {
         }
     }
 
-    /// Stores a photon at the base of a smooth coat, and reflects it from the coat. Caustic photons are reflected with
-    /// the coat's Fresnel reflectance as probability, and otherwise scattered at the base. Other photons never scatter
-    /// at the base, so all of them are reflected.
+    /// Stores a photon at the base of a smooth coat and reflects it from the coat. Caustic photons are
+    /// reflected with a probability equal to the coat's Fresnel reflectance, and otherwise scattered at the
+    /// base. Other photons never scatter at the base, so all of them are reflected.
     fn shade_coated(
         &mut self,
         path: &PathRay,
@@ -336,8 +336,8 @@ impl PhotonWavefront<'_> {
         }
     }
 
-    /// Stores a photon at a non-specular surface with the medium `far` behind it. A caustic photon is scattered if
-    /// `scattered` has a factor for its flux.
+    /// Stores a photon at a non-specular surface with the medium `far` behind it. A caustic photon is
+    /// scattered if `scattered` is a number, by which its flux is multiplied.
     fn shade_rough(
         &mut self,
         path: &PathRay,
@@ -352,7 +352,7 @@ impl PhotonWavefront<'_> {
         }
     }
 
-    /// [`PhotonWavefront::shade_rough`] with a known BSDF.
+    /// Like [`PhotonWavefront::shade_rough`], given the BSDF.
     fn store_and_scatter(
         &mut self,
         path: &PathRay,
@@ -361,7 +361,7 @@ impl PhotonWavefront<'_> {
         (far, scattered): (&InteriorList, Option<f32>),
     ) {
         let tile = self.tracing.tile;
-        // Store the photon, which also represents those that passed the surface as a null interaction.
+        // Store the photon. It also represents photons that passed through the surface as a null interaction.
         let chance = opacity_at(path, vertex, &mut self.counters.texture_lookups);
         let all = PathRay { throughput: path.throughput / chance, ..*path };
         self.store(&all, vertex.surface.point, vertex.normal);
@@ -369,7 +369,7 @@ impl PhotonWavefront<'_> {
         else {
             return;
         };
-        // Queue it for scattering.
+        // Queue the photon for scattering.
         let shading = vertex.shading(&mut self.counters);
         let behind = bsdf.behind().map(|bsdf| (bsdf, shading.behind()));
         let interiors = self.interior_lists.number(&path.interiors);
@@ -382,13 +382,13 @@ impl PhotonWavefront<'_> {
         self.open.put(i, tile, &lit, LightAov::ALL, interiors);
         let counts = self.open.photon_weight(i, vertex.wo) * by_chance;
         set_lane(&mut self.open.throughput, i, path.throughput * counts);
-        // Queue transmission, where the medium behind the surface changes its basic flux.
+        // Queue the transmitted photon. The medium behind the surface changes its basic flux.
         let Some((bsdf, shading)) = behind else { return };
         let part = if vertex.material.bsdf.glass().is_some() {
             let eta = ior(tile.world, far) / ior(tile.world, &path.interiors);
             1.0 / (eta * eta)
         } else {
-            // Seen from a camera path, this is transmission from the other side.
+            // For a camera path, this is transmission from the other side.
             through_sheet(tile.world, far, &path.interiors)
         };
         let interiors = self.interior_lists.number(far);
@@ -423,14 +423,15 @@ impl PhotonWavefront<'_> {
         }
     }
 
-    /// Queues a photon after a specular bounce, weighted by the adjoint BSDF at a shading normal (see the module
-    /// documentation). `eta` is the index of refraction on the far side relative to the near side.
+    /// Queues a photon after a specular bounce. If there is a shading normal, the photon is weighted by the
+    /// adjoint BSDF (see the module documentation). `eta` is the index of refraction on the far side relative
+    /// to the near side.
     fn push(&mut self, path: &PathRay, vertex: &Vertex<'_>, (shading, eta): (Vec3, f32), mut ray: PathRay) {
         let facet = vertex.normal;
         if shading != facet {
             let (wi, wo) = (vertex.wo, ray.ray.direction);
             let along = |direction: Vec3| direction - shading * direction.dot(shading);
-            // Otherwise the geometric normal was used in place of the shading normal.
+            // Otherwise, the geometric normal was used instead of the shading normal.
             if (along(wi) + along(wo) * eta).length_squared() < SAME {
                 let (over, under) = (wi.dot(shading) * wo.dot(facet), wi.dot(facet) * wo.dot(shading));
                 ray.throughput *= if under == 0.0 { 0.0 } else { (over / under).abs() };
@@ -440,7 +441,7 @@ impl PhotonWavefront<'_> {
         self.next.push(ray);
     }
 
-    /// Scatters photons at the single vertices.
+    /// Scatters photons at the individually queued vertices.
     fn scatter_open(&mut self) {
         let mut open = std::mem::replace(&mut self.open, VertexBatch::EMPTY);
         self.scatter(&mut open);
@@ -454,8 +455,8 @@ impl PhotonWavefront<'_> {
         }
     }
 
-    /// Scatters photons at a packet of vertices. Directions are sampled with the cosine of the geometric normal, as the
-    /// adjoint requires.
+    /// Scatters photons at a packet of vertices. Directions are sampled in proportion to the cosine at the
+    /// geometric normal, as required by the adjoint.
     fn scatter(&mut self, row: &mut VertexBatch) {
         if !self.may_scatter() || row.used == 0 {
             return;
@@ -474,7 +475,7 @@ impl PhotonWavefront<'_> {
         );
     }
 
-    /// Applies Russian roulette by flux: survivors keep about their initial flux.
+    /// Applies Russian roulette based on flux. Surviving photons keep about their initial flux.
     fn russian_roulette(&mut self) {
         let tile = self.tracing.tile;
         let mut kept = 0;
@@ -503,7 +504,7 @@ impl PhotonWavefront<'_> {
     }
 }
 
-/// Largest component of a photon's flux in W, which unlike basic flux does not depend on the medium.
+/// Largest component of a photon's flux in W. Unlike basic flux, it does not depend on the medium.
 fn flux(world: &World, path: &PathRay) -> f32 {
     let index = ior(world, &path.interiors);
     path.throughput.max_element() * index * index

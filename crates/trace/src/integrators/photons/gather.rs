@@ -16,22 +16,23 @@ use crate::math::lanes::{Simd, Vec3x16, set_lane};
 use crate::sampling::Dimension;
 use crate::world::SimdKernel;
 
-/// Probability of a lookup at a vertex that the camera does not see: a path has many such vertices, and photons there
-/// contribute little noise.
+/// Probability of a lookup at a vertex that the camera does not see. A path has many of these vertices, and
+/// the photons there contribute little noise.
 const INDIRECT_LOOKUP_PROBABILITY: f32 = 0.25;
 
-/// Probability of a lookup of bounced photons at a vertex that the camera sees: their light is weak and smooth.
+/// Probability of looking up bounced photons at a vertex that the camera sees. Their light is weak and
+/// smooth.
 const BOUNCED_LOOKUP_PROBABILITY: f32 = 0.5;
 
 /// Gathers photons at a packet of vertices.
 pub struct GatherPhotons<'a> {
-    /// Context of the tile.
+    /// Tile context.
     pub tile: &'a TileContext<'a>,
     /// The vertices.
     pub row: &'a VertexBatch,
-    /// The photon maps of the samples.
+    /// Photon maps of the samples.
     pub maps: &'a PhotonMaps,
-    /// Number of bounces of the paths before the vertices.
+    /// Number of path bounces before the vertices.
     pub depth: u32,
     /// The light AOV to accumulate.
     pub aov: LightAov,
@@ -40,7 +41,7 @@ pub struct GatherPhotons<'a> {
 impl SimdKernel for GatherPhotons<'_> {
     type Output = Vec3x16;
 
-    /// The gathered light reflected toward the viewer, before the throughput of the paths.
+    /// Returns the gathered light reflected toward the viewer, before multiplication by the path throughput.
     #[inline(always)]
     fn run(self, simd: impl Simd) -> Vec3x16 {
         let Self { tile, row, maps, depth, aov } = self;
@@ -54,13 +55,14 @@ impl SimdKernel for GatherPhotons<'_> {
             let pass = maps.pass(sample);
             let only_specular_before = row.only_specular_before & 1 << i != 0;
             let (point, normal) = row.surface_of(i);
-            // Choose the maps that contribute at the vertex.
+            // Select the maps that contribute at the vertex.
             let look = GatherPoint { point, normal, most_depth };
-            // Without a glossy lobe, bounced photons carry the light from a caustic, and continuing paths ignore it.
+            // Without a glossy lobe, bounced photons account for light from caustics, and continuing paths
+            // ignore it.
             let gathers_bounced = indirect && narrow & 1 << i == 0;
             let gathers_caustic =
                 if only_specular_before { caustic } else { indirect && row.after_gloss & 1 << i != 0 };
-            // Decide the lookup probabilities.
+            // Determine the lookup probabilities.
             let chances = if aov == LightAov::TraversalCost {
                 [1.0; 2]
             } else if only_specular_before {
@@ -68,7 +70,7 @@ impl SimdKernel for GatherPhotons<'_> {
             } else {
                 [INDIRECT_LOOKUP_PROBABILITY; 2]
             };
-            // Add their light, unless it is occluded.
+            // Add the photons' light, unless it is occluded.
             let maps = [(gathers_caustic, &pass.caustic), (gathers_bounced, &pass.bounced)];
             let mut sum = Vec3::ZERO;
             for ((gathers, map), chance) in maps.into_iter().zip(chances) {
@@ -85,8 +87,8 @@ impl SimdKernel for GatherPhotons<'_> {
     }
 }
 
-/// Factor on a kernel's light, given one of its photons: 0 if that photon is occluded, otherwise the reciprocal of the
-/// kernel's coverage, or an estimate of it.
+/// Factor for a kernel's light, given one of the kernel's photons. If the coverage p is known, the factor is
+/// 1/p. Otherwise, it is 0 if the photon is occluded and an estimate of 1/p if not.
 #[inline(never)]
 fn coverage_factor(
     tile: &TileContext<'_>,
@@ -111,7 +113,7 @@ fn coverage_factor(
     }
 }
 
-/// Light from a map's photons that a vertex reflects toward the viewer, and one of the photons.
+/// Light from a map's photons reflected by a vertex toward the viewer, and one of the photons.
 #[inline(always)]
 fn kernel_sum(
     (row, i): (&VertexBatch, usize),
@@ -133,7 +135,7 @@ fn kernel_sum(
     }
 }
 
-/// [`kernel_sum`] with the BSDF evaluated for the direction of each photon.
+/// Like [`kernel_sum`], with the BSDF evaluated for each photon's direction.
 #[inline(always)]
 fn reflected_kernel_sum(
     (row, i): (&VertexBatch, usize),
@@ -148,7 +150,7 @@ fn reflected_kernel_sum(
         sum += light;
         let weight = light.element_sum();
         total += weight;
-        // Choose a photon by reservoir sampling, as `LaneReservoirs` does.
+        // Choose a photon by reservoir sampling, as in `LaneReservoirs`.
         let part = if weight > 0.0 { weight / total } else { 0.0 };
         if left < part {
             left /= part;

@@ -1,12 +1,12 @@
-//! The Epanechnikov kernel, in units of its radius: its weight over polygons, and sampling.
+//! The Epanechnikov kernel, in units of its radius: weights over polygons, and sampling.
 
 use std::f64::consts::FRAC_2_PI;
 
 use crate::math::elementary::atan2;
 use crate::math::{DVec2, Vec2};
 
-/// The integral of the kernel (2/π)·(1 − ρ²) over a convex polygon with the given corners in order; 1 if the polygon
-/// contains the disk.
+/// Integral of the kernel (2/π)·(1 − ρ²) over a convex polygon with the given corners in order. It is 1 if
+/// the polygon contains the disk.
 pub fn weight_over(corners: &[DVec2]) -> f64 {
     let edges = || corners.iter().zip(corners.iter().cycle().skip(1)).map(|(&a, &b)| (a, b));
     let turn = edges().map(|(a, b)| a.perp_dot(b)).sum::<f64>().signum();
@@ -24,12 +24,13 @@ pub fn weight_over(corners: &[DVec2]) -> f64 {
     }
 }
 
-/// The integral of 1 − ρ² over the intersection of the unit disk and the triangle between the center and an edge, > 0
-/// if the edge is counterclockwise.
+/// Integral of 1 − ρ² over the intersection of the unit disk and the triangle formed by the center and an
+/// edge. It is positive if the edge is counterclockwise.
 ///
-/// In polar coordinates it is ∫ R²/2 − R⁴/4 dφ, where R is the smaller of 1 and the distance of the edge. Outside the
-/// disk this is a quarter of the angle. On an edge at distance d from the center, with arc length s along it, R² = d² +
-/// s² and dφ = d/R² ds, so the integral is d·∫ 1/2 − (d² + s²)/4 ds.
+/// In polar coordinates, the integral is ∫ R²/2 − R⁴/4 dφ, where R is the smaller of 1 and the distance to
+/// the edge. Where the edge is outside the disk, this is a quarter of the angle. For a point on an edge at
+/// distance d from the center, at arc length s along the edge, R² = d² + s² and dφ = d/R² ds, so the integral
+/// is d·∫ 1/2 − (d² + s²)/4 ds.
 fn below_edge(a: DVec2, b: DVec2) -> f64 {
     let length = (b - a).length();
     if !(length > 0.0) {
@@ -55,8 +56,8 @@ fn angle(from: DVec2, to: DVec2) -> f64 {
     f64::from(atan2(from.perp_dot(to) as f32, from.dot(to) as f32))
 }
 
-/// Maps a uniform point on the unit disk to a point distributed as the kernel: within ρ, the kernel has 2ρ² − ρ⁴ of its
-/// weight, the disk ρ² of its area.
+/// Maps a uniform point on the unit disk to a point distributed according to the kernel. Within radius ρ lie
+/// 2ρ² − ρ⁴ of the kernel's weight and ρ² of the disk's area.
 pub fn sample(on_disk: Vec2) -> Vec2 {
     let squared = on_disk.length_squared().min(1.0);
     // ρ² = 1 − √(1 − u), where u is the squared radius on the disk, rewritten to avoid cancellation: ρ²/u = 1/(1 + √(1
@@ -75,7 +76,7 @@ mod tests {
     }
 
     #[test]
-    fn weight_beyond_a_straight_edge_is_exact() {
+    fn weight_beyond_an_edge_is_exact() {
         // ∫ over x ≥ d: (2/π)·(4/3)·∫(1 − x²)^{3/2} dx, integrated numerically.
         for d in [-0.9, -0.3, 0.0, 0.2, 0.7, 0.99] {
             let steps = 200_000;

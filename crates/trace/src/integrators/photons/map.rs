@@ -1,5 +1,5 @@
-//! A photon map: photons sorted into the cells of a hashed grid, whose cells may therefore be as small as the radius
-//! requires. Lookups weight sixteen photons at a time.
+//! A photon map: photons sorted into the cells of a hashed grid. Because of the hashing, the cells can be as
+//! small as the radius requires. Lookups weight sixteen photons at a time.
 
 use super::packed::{self, Packed};
 use super::reservoir::{LaneReservoirs, PhotonPosition};
@@ -9,25 +9,25 @@ use crate::geometry::packet::lanes;
 use crate::math::Vec3;
 use crate::math::lanes::{F32x16, Mask, PACKET_SIZE, Simd, TRUE, Vec3x16, lane, set_lane};
 
-/// A photon that landed on a surface.
+/// A photon stored on a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Photon {
     /// Position.
     pub point: Vec3,
-    /// Unit direction from which it arrived.
+    /// Unit direction toward its origin.
     pub direction: Vec3,
     /// Basic flux in W, Φ/n².
     pub flux: Vec3,
-    /// Unit geometric normal on the side where it arrived.
+    /// Unit geometric normal on the side of the surface that the photon hit.
     pub normal: Vec3,
-    /// Number of bounces before it landed.
+    /// Number of bounces before the hit.
     pub depth: u32,
 }
 
-/// Number of photons sorted between two polls of the token.
+/// Number of photons sorted between checks of the cancel token.
 const POLL_INTERVAL: usize = 1 << 16;
 
-/// Sixteen photons as a struct of arrays: eight cache lines.
+/// Sixteen photons as a struct of arrays, eight cache lines in size.
 #[derive(Clone, Debug)]
 #[repr(align(64))]
 struct PhotonBlock {
@@ -37,7 +37,7 @@ struct PhotonBlock {
     flux: Vec3x16,
 }
 
-/// A block without photons, whose positions are at infinity.
+/// A block without photons, with all positions at infinity.
 const EMPTY: PhotonBlock = PhotonBlock {
     point: [[f32::INFINITY; PACKET_SIZE]; 3],
     normal: [0; PACKET_SIZE],
@@ -53,12 +53,12 @@ pub struct PhotonMap {
     cells: f32,
     /// Number of buckets, a power of two, minus one.
     mask: u32,
-    /// Index of the first photon of each bucket, and one more for the end.
+    /// Index of the first photon in each bucket, followed by the number of photons.
     starts: Vec<u32>,
     count: usize,
     blocks: Vec<PhotonBlock>,
     depths: Vec<[u32; PACKET_SIZE]>,
-    /// The largest depth.
+    /// Maximum depth of the photons.
     most_depth: u32,
 }
 
@@ -99,14 +99,15 @@ impl GatherPoint {
     }
 }
 
-/// Disjoint ranges of photons that cover a kernel.
+/// Disjoint ranges of photons that together cover a kernel.
 struct PhotonRanges {
     of: [[u32; 2]; 8],
     count: usize,
 }
 
 impl PhotonRanges {
-    /// Adds a range, merging it with ranges that it overlaps, as columns of different cells may have the same hash.
+    /// Adds a range and merges it with any overlapping ranges, because columns of different cells may have
+    /// the same hash.
     #[inline(always)]
     fn add(&mut self, mut range: [u32; 2]) {
         if range[0] == range[1] {
@@ -130,7 +131,7 @@ impl PhotonRanges {
 }
 
 impl PhotonMap {
-    /// Builds a map for kernels of this radius; photons in one cell keep their order.
+    /// Builds a map for kernels of this radius. Photons in one cell keep their order.
     ///
     /// # Errors
     /// [`Cancelled`].
@@ -187,7 +188,7 @@ impl PhotonMap {
         (0..self.count).map(|number| self.photon(number / PACKET_SIZE, number % PACKET_SIZE))
     }
 
-    /// Returns a photon; its directions were stored with limited precision.
+    /// Returns a photon. Its directions are stored with limited precision.
     #[inline(always)]
     fn photon(&self, block: usize, i: usize) -> Photon {
         let PhotonBlock { point, normal, direction, flux } = &self.blocks[block];
@@ -220,8 +221,8 @@ impl PhotonMap {
         size_of_val(&*self.blocks) + size_of_val(&*self.depths) + size_of_val(&*self.starts)
     }
 
-    /// Irradiance from the photons around a point in W·m⁻², and one of them, chosen with two random numbers in
-    /// proportion to its contribution.
+    /// Irradiance from the photons around a point in W·m⁻², and one of the photons, chosen with two random
+    /// numbers in proportion to its contribution.
     #[inline(always)]
     pub fn irradiance(
         &self,
@@ -272,8 +273,9 @@ impl PhotonMap {
         count
     }
 
-    /// Visits the photons around a point with their weights in m⁻², the values of the Epanechnikov kernel, whose
-    /// integral over the tangent plane is 1 (Silverman, *Density Estimation for Statistics and Data Analysis*, 1986).
+    /// Visits the photons around a point with their weights in m⁻², which are the values of an Epanechnikov
+    /// kernel with an integral of 1 over the tangent plane (Silverman, *Density Estimation for Statistics and
+    /// Data Analysis*, 1986).
     #[inline(always)]
     pub fn visit(&self, look: &GatherPoint, simd: impl Simd, mut visit: impl FnMut(&Photon, f32)) {
         let peak = self.peak();
@@ -288,13 +290,13 @@ impl PhotonMap {
         }
     }
 
-    /// The kernel's value at its center.
+    /// Kernel value at the center.
     #[inline(always)]
     fn peak(&self) -> f32 {
         2.0 / (std::f32::consts::PI * (self.radius * self.radius))
     }
 
-    /// The ranges that may contain photons of a kernel.
+    /// Ranges that may contain photons within a kernel.
     #[inline(always)]
     fn ranges(&self, look: &GatherPoint) -> PhotonRanges {
         let mut ranges = PhotonRanges { of: [[0; 2]; 8], count: 0 };
@@ -322,8 +324,8 @@ impl PhotonMap {
         ranges
     }
 
-    /// Weights of the photons of a block that are in a range and in the kernel, relative to the kernel's value at its
-    /// center. `None` if there are no such photons.
+    /// Weights of a block's photons that are in a range and within the kernel, relative to the kernel's value
+    /// at the center. `None` if there are no such photons.
     #[inline(always)]
     fn weights(&self, look: &GatherPoint, range: [u32; 2], number: usize, simd: impl Simd) -> Option<F32x16> {
         // Weight the photons within the kernel by their distance.
@@ -357,7 +359,7 @@ impl PhotonMap {
             let faces =
                 (cosine > 0.0) & (cosine * cosine > (MIN_COSINE * MIN_COSINE) * squared) & (arriving > 0.0);
             near[i] &= if faces { TRUE } else { 0 };
-            // A tilted surface has more photons per area of the tangent plane.
+            // On a tilted surface, there are more photons per unit area of the tangent plane.
             weights[i] *= cosine / squared.sqrt();
         }
         // Reject photons with too many bounces.
@@ -375,7 +377,7 @@ impl PhotonMap {
 }
 
 impl PhotonBlock {
-    /// Stores a photon in a lane; returns its depth.
+    /// Stores a photon in a lane and returns its depth.
     fn put(&mut self, i: usize, photon: &Photon) -> u32 {
         set_lane(&mut self.point, i, photon.point);
         set_lane(&mut self.flux, i, photon.flux);
@@ -385,13 +387,13 @@ impl PhotonBlock {
     }
 }
 
-/// The blocks of a nonempty range.
+/// Blocks of a nonempty range.
 #[inline(always)]
 fn blocks([start, end]: [u32; 2]) -> std::ops::Range<usize> {
     start as usize / PACKET_SIZE..(end as usize).div_ceil(PACKET_SIZE)
 }
 
-/// Mask of lanes above 0.
+/// Mask of lanes with values above 0.
 #[inline(always)]
 fn above_zero(weights: &F32x16, simd: impl Simd) -> u32 {
     let mut above: Mask = [0; PACKET_SIZE];
@@ -401,7 +403,7 @@ fn above_zero(weights: &F32x16, simd: impl Simd) -> u32 {
     simd.movemask(&above)
 }
 
-/// The sum of all lanes, added in halves.
+/// Sum of all lanes, computed by repeatedly adding the two halves.
 #[inline(always)]
 fn sum_lanes(mut row: F32x16) -> f32 {
     for i in 0..8 {
@@ -413,7 +415,7 @@ fn sum_lanes(mut row: F32x16) -> f32 {
     (row[0] + row[2]) + (row[1] + row[3])
 }
 
-/// The cell of a point.
+/// Cell that contains a point.
 #[inline(always)]
 fn cell_of(point: Vec3, cells: f32) -> [i32; 3] {
     // `f32::floor` would be a function call. Coordinates out of range are clamped to the last cell.
@@ -424,7 +426,7 @@ fn cell_of(point: Vec3, cells: f32) -> [i32; 3] {
     [below(point.x * cells), below(point.y * cells), below(point.z * cells)]
 }
 
-/// The bucket of a cell; the cells of a column have consecutive buckets.
+/// Bucket of a cell. The cells of a column have consecutive buckets.
 #[inline(always)]
 fn bucket(x: i32, y: i32, z: i32, mask: u32) -> u32 {
     let hash = (y as u32).wrapping_mul(0x9e37_79b1) ^ (z as u32).wrapping_mul(0x85eb_ca77).rotate_left(16);
@@ -458,7 +460,7 @@ mod tests {
                 let mut seen = 0;
                 for look in 0..60 {
                     let (point, normal) = match photons.get(7 * look) {
-                        // Near one of them.
+                        // Query near one of the photons.
                         Some(photon) => (
                             photon.point + 0.1 * radius * Vec3::new(next(), next(), 0.1 * next()),
                             photon.normal,
@@ -500,7 +502,7 @@ mod tests {
 
     #[test]
     fn kernel_sums_to_one_and_limits_depth() {
-        // Photons on a fine grid represent their areas.
+        // Each photon on a fine grid represents one cell's area.
         let step = 0.01_f32;
         let at = |i: i32| (i as f32 + 0.3) * step;
         let place = |i: i32| photon(Vec3::new(at(i % 200 - 100), 0.5, at(i / 200 - 100)), Vec3::Y);

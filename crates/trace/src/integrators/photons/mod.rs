@@ -1,33 +1,35 @@
-//! Photon mapping: light that reaches surfaces through mirrors, glass and other surfaces, traced from the lights
-//! (Jensen, *Global Illumination using Photon Maps*, 1996). Photons are traced in passes. The only bias of a pass is
-//! the width of a kernel that shrinks from pass to pass, so the mean over passes converges (Hachisuka, Ogaki, Jensen,
-//! *Progressive Photon Mapping*, 2008; Knaus and Zwicker, *Progressive Photon Mapping: A Probabilistic Approach*,
-//! 2011). Pass i belongs to sample i of every pixel.
+//! Photon mapping: light that reaches surfaces through mirrors, glass and other surfaces, traced from the
+//! lights (Jensen, *Global Illumination using Photon Maps*, 1996). Photons are traced in passes. The only
+//! bias of a pass is the width of a kernel that shrinks from pass to pass, so the mean over passes converges
+//! (Hachisuka, Ogaki, Jensen, *Progressive Photon Mapping*, 2008; Knaus and Zwicker, *Progressive Photon
+//! Mapping: A Probabilistic Approach*, 2011). Pass i is used for sample i of every pixel.
 //!
-//! Estimators for paths from lights L through mirrors and glass S and other surfaces D to the eye E; camera paths
+//! Estimators for paths from lights L via mirrors and glass S and other surfaces D to the eye E. Camera paths
 //! continue at each D:
 //!
 //! | paths | estimator |
 //! | --- | --- |
 //! | `L S* E` | the camera path hits the light |
-//! | `L D … E` | light samples at that D, and the camera path that hits the light right after it, combined with MIS |
+//! | `L D … E` | light samples at that D and the camera path that hits the light directly after it, combined with MIS |
 //! | `L S+ D S* E` | caustic photons at that D |
 //! | `L S+ D S* D … E`, the second D without a glossy lobe | bounced photons, at the second D |
 //! | `L S+ D S* D … E`, the second D with a glossy lobe | caustic photons at the first D |
 //!
-//! Photons therefore carry only light that hits mirrors or glass first, and camera paths ignore lights that they hit
-//! through mirrors and glass after a D. Light scattered once at a caustic arrives almost everywhere from a small region
-//! that camera paths hardly ever find, so bounced photons are scattered at the caustic. The bounces of the camera path,
-//! including the vertex at which photons are gathered, and the bounces of the photon are together at most `max_depth`.
+//! Photons therefore represent only light that first hits mirrors or glass, and camera paths ignore lights
+//! that they hit via mirrors and glass after a D. Light scattered once at a caustic reaches most of the scene
+//! from a small region that camera paths rarely hit, so it is represented by bounced photons, which are
+//! scattered at the caustic. The total number of bounces is at most `max_depth`. It includes the bounces of
+//! the camera path, the vertex at which photons are gathered, and the bounces of the photon.
 //!
-//! The light at a point is the sum over its kernel divided by the kernel's coverage p: the fraction that receives
-//! photons, which is surface with about the point's normal that is not occluded from the point. This keeps constant
-//! light constant up to edges, rims and walls. Estimators of p:
+//! The light at a point is the sum over its kernel divided by the kernel's coverage p: the fraction of the
+//! kernel that receives photons. Surfaces are included if they have about the point's normal and are not
+//! occluded from the point. With this correction, uniform light stays uniform up to edges, rims and walls.
+//! Estimators of p:
 //!
 //! | around the kernel | estimator |
 //! | --- | --- |
 //! | flat pieces of its plane, walls at their borders, large spheres | p in closed form, without occlusion |
-//! | anything else | one photon of the kernel, chosen by its contribution, decides whether the kernel's light arrives; trials at positions sampled from the kernel estimate 1/p |
+//! | anything else | one photon of the kernel, chosen by its contribution, determines whether the kernel is occluded, and trials at positions sampled from the kernel estimate 1/p |
 
 mod coverage;
 mod emit;
@@ -64,26 +66,27 @@ pub use map::{Photon, PhotonMap};
 /// Number of photons that a thread emits together.
 const CHUNK: u32 = 2048;
 
-/// α, the fraction of a pass's photons that the shrinking kernel keeps.
+/// α, the fraction of a pass's photons kept by the shrinking kernel.
 const ALPHA: f64 = 2.0 / 3.0;
 
 /// Median number of photons that the first pass's kernels should contain, for caustic and bounced photons.
 const WANTED: [f32; 2] = [12.0, 8.0];
 
-/// Fraction of photons aimed at mirrors and glass: if all of these have bounding spheres, and if some are unbounded.
+/// Fraction of photons aimed at mirrors and glass: if all of these objects are bounded, and if some are
+/// unbounded.
 const AIMED: [f32; 2] = [0.9, 0.5];
 
 /// Photon emission for an image, shared by all passes.
 #[derive(Debug)]
 pub struct Photons {
     settings: PhotonSettings,
-    /// Maximum number of bounces of a photon before it is gathered.
+    /// Maximum number of bounces per photon before it is gathered.
     most_depth: u32,
     /// Source of the photons. `None` if the scene has no mirrors or glass.
     emission: Option<PhotonSource>,
-    /// The closed glass shapes that may contain lights.
+    /// Closed glass shapes that may contain lights.
     glasses: Vec<u32>,
-    /// The other glass solids that may contain lights.
+    /// Other glass solids that may contain lights.
     bodies: Vec<CompoundSolid>,
     /// Kernel radii of the first pass, for caustic and for bounced photons.
     radii: [f32; 2],
@@ -92,9 +95,9 @@ pub struct Photons {
 /// The photon maps of one pass.
 #[derive(Debug)]
 pub struct PhotonPass {
-    /// Caustic photons, which were scattered only by mirrors and glass.
+    /// Caustic photons, scattered only by mirrors and glass.
     pub caustic: PhotonMap,
-    /// Bounced photons, which were scattered once at a caustic.
+    /// Bounced photons, scattered once at a caustic.
     pub bounced: PhotonMap,
     /// Number of emitted photons.
     pub emitted: u64,
@@ -108,13 +111,13 @@ impl PhotonPass {
         (self.caustic.len() + self.bounced.len()) as u64
     }
 
-    /// Bytes that it takes.
+    /// Memory use in bytes.
     pub fn memory_bytes(&self) -> usize {
         self.caustic.memory_bytes() + self.bounced.memory_bytes()
     }
 }
 
-/// The photon passes of a range of samples.
+/// Photon passes for a range of samples.
 #[derive(Clone, Debug)]
 pub struct PhotonMaps {
     /// The first sample.
@@ -124,7 +127,7 @@ pub struct PhotonMaps {
 }
 
 impl PhotonMaps {
-    /// The pass of a sample.
+    /// Photon pass for a sample.
     pub fn pass(&self, sample: u32) -> &PhotonPass {
         &self.passes[(sample - self.first) as usize]
     }
@@ -171,17 +174,17 @@ impl Photons {
         self.radii
     }
 
-    /// Number of photons emitted per pass; 0 if none are emitted.
+    /// Number of photons emitted per pass, which may be 0.
     pub fn count(&self) -> u64 {
         if self.emits_photons() { self.settings.count.into() } else { 0 }
     }
 
-    /// Whether photons are emitted: the scene has mirrors or glass, and lights that illuminate them.
+    /// Whether photons are emitted. True if the scene has mirrors or glass and lights that illuminate them.
     pub fn emits_photons(&self) -> bool {
         self.emission.is_some() && self.most_depth > 0
     }
 
-    /// Traces a pass. The result depends only on its number, not on the number of threads.
+    /// Traces a pass. The result depends on the pass number but not on the number of threads.
     ///
     /// # Errors
     /// [`Cancelled`].
@@ -211,7 +214,7 @@ impl Photons {
         Ok(PhotonPass { caustic: caustic?, bounced: bounced?, emitted: self.count(), lookups: sent.lookups })
     }
 
-    /// The photon passes of a range of samples.
+    /// Photon passes for a range of samples.
     ///
     /// # Errors
     /// [`Cancelled`].
@@ -238,7 +241,7 @@ impl Photons {
         let Some(emission) = self.emission.as_ref().filter(|_| self.emits_photons()) else {
             return Ok(StoredPhotons::default());
         };
-        // Photons always land on the facets and scatter from there, whatever the shadow setting.
+        // Photons always hit the facets and scatter from there, regardless of the shadow setting.
         let settings =
             RenderSettings { render: Render { shadows: Shadows::Soft, ..settings.render }, ..*settings };
         let material = |object| world.material_index(&Hit { shape: ShapeHit::at(0.0), object }) as u32;
@@ -247,7 +250,7 @@ impl Photons {
         let behavior = PathBehavior::of(&settings, false);
         let done = AtomicU64::new(0);
         let chunk = |first: u32| {
-            // Photons of consecutive passes are samples of one sequence.
+            // The photons of consecutive passes are samples of a single sequence.
             let count = self.settings.count;
             let at_once = u32::MAX / count;
             let start = number % at_once * count;
@@ -289,7 +292,7 @@ impl Photons {
 /// Photons stored by a pass.
 #[derive(Default)]
 struct StoredPhotons {
-    /// Caustic photons, which were scattered only by mirrors and glass.
+    /// Caustic photons, scattered only by mirrors and glass.
     caustic: Vec<Photon>,
     /// Bounced photons, scattered at a caustic.
     bounced: Vec<Photon>,
@@ -301,7 +304,8 @@ fn radius_factor(pass: u32) -> f64 {
     (1..=pass).map(f64::from).map(|i| (i + ALPHA) / (i + 1.0)).product::<f64>().sqrt()
 }
 
-/// A radius within which the median photon has `wanted` neighbors; `size` is the radius of the scene's bounding sphere.
+/// Radius within which the median photon has `wanted` neighbors. `size` is the radius of the scene's bounding
+/// sphere.
 fn radius_for_count(
     photons: &[Photon],
     wanted: f32,
@@ -313,7 +317,7 @@ fn radius_for_count(
     const LOOKS: usize = 256;
     /// Number of neighbors to find among the examined photons.
     const NEAR: f32 = 12.0;
-    /// Maximum radius, and the radius if there are too few photons to decide, relative to the scene's radius.
+    /// Maximum radius, and the default radius if there are too few photons, relative to the scene's radius.
     const LARGEST: f32 = 0.05;
     const BY_DEFAULT: f32 = 0.02;
     let step = photons.len().div_ceil(MOST).max(1);
@@ -344,7 +348,7 @@ fn radius_for_count(
     Ok(largest.min(radius * (wanted / (NEAR * step as f32)).sqrt()))
 }
 
-/// The closed glass shapes that may contain lights, and the other glass solids that may.
+/// Closed glass shapes and other glass solids that may contain lights.
 fn glasses_at_lights(world: &World) -> (Vec<u32>, Vec<CompoundSolid>) {
     let lamps = world.light_boxes();
     let may_hold_light = |object: &u32| {
@@ -376,8 +380,8 @@ impl GlassObjects {
         Self(each.collect())
     }
 
-    /// Whether an object's surface may not be a boundary between media: its index of refraction is that of air, or it
-    /// may touch or overlap glass with the same index.
+    /// Whether an object's surface may have no effect on light. True if its index of refraction is 1, or if
+    /// it may touch or overlap glass with the same index.
     fn may_vanish(&self, id: u32, ior: f32) -> bool {
         let own = self.0.iter().find(|(other, ..)| *other == id).and_then(|(_, bounds, _)| *bounds);
         let meets = |other: &Aabb| own.is_none_or(|own| own.grown(own.extent() * NEAR).meets(other));
@@ -388,7 +392,7 @@ impl GlassObjects {
     }
 }
 
-/// Distance between boxes whose shapes may touch, relative to the size of one of them.
+/// Distance below which the shapes in two boxes may touch, relative to the size of one box.
 const NEAR: f32 = 1e-3;
 
 /// The mirrors and glass objects of a scene.
@@ -404,7 +408,8 @@ impl SpecularObjects {
         let mut own = Self { balls: Vec::new(), is_unbounded: false };
         let glasses = GlassObjects::of(world);
         for (id, object) in (0..).zip(world.geometry.objects()) {
-            // Between equal indices, light passes rough glass undisturbed, but light samples cannot.
+            // Between equal indices of refraction, light passes through rough glass unchanged, but light
+            // samples cannot.
             let is_specular = |material: &Material| {
                 let is_passed = |glass: &Dielectric| glasses.may_vanish(id, glass.ior);
                 material.bsdf.has_delta() || material.bsdf.glass().is_some_and(is_passed)
@@ -428,7 +433,7 @@ mod tests {
     use crate::math::Vec3;
 
     #[test]
-    fn radius_shrinks_by_the_published_rule() {
+    fn radius_shrinks_according_to_the_paper() {
         // r²ᵢ₊₁ = r²ᵢ·(i + α)/(i + 1), α = 2/3 (Knaus and Zwicker, 2011).
         for (passes, exact) in [(1, 1.0), (100, 0.4882), (1000, 0.3328), (10_000, 0.2267)] {
             assert!(
@@ -459,7 +464,7 @@ mod tests {
         assert_eq!(radius(10, 1.0), 0.05);
         assert!((radius(10, 100.0) / 0.195 - 1.0).abs() < 0.2, "{}", radius(10, 100.0));
         assert!((radius(100, 1.0) / 0.0195 - 1.0).abs() < 0.2, "{}", radius(100, 1.0));
-        // There are too few photons to decide.
+        // Too few photons to determine the radius.
         assert_eq!(radius(3, 1.0), 0.02);
     }
 }

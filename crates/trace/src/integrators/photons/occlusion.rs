@@ -6,17 +6,18 @@ use crate::geometry::Ray;
 use crate::lights::LightObject;
 use crate::world::Geometry;
 
-/// Height of the test segment above the surface, in kernel radii, to clear the curvature of the surface itself.
+/// Height of the test segment above the surface, in kernel radii, chosen to clear the surface's own
+/// curvature.
 const ABOVE: f32 = 0.15;
 
-/// Height of the test segment if something is closer above the surface, such as a ball resting on it.
+/// Height of the test segment if there is an object closer to the surface, such as a ball resting on it.
 const BELOW: f32 = 0.02;
 
-/// Length in kernel radii below which a segment counts as unoccluded.
+/// Segments shorter than this, in kernel radii, are considered unoccluded.
 const NEAR: f32 = 1e-3;
 
-/// Whether a photon is occluded from the center of its kernel: along a segment above the surface or, if either end
-/// lacks the room for that, along a segment close to the surface.
+/// Whether a photon is occluded from the kernel's center. Tests a segment above the surface, or a segment
+/// close to the surface if there is not enough room above either end.
 pub fn is_occluded(geometry: &Geometry, look: &GatherPoint, photon: &PhotonPosition, radius: f32) -> bool {
     if (photon.point - look.point).length_squared() < (NEAR * radius) * (NEAR * radius) {
         return false;

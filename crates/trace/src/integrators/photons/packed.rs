@@ -10,7 +10,7 @@ pub type Packed = [u32; PACKET_SIZE];
 /// Half the side length of the square.
 const SIDE: f32 = 32767.0;
 
-/// Encodes a direction; the result may differ from the nearest code in the last bit.
+/// Encodes a direction. The result may differ from the nearest code in the last bit.
 pub fn pack(direction: Vec3) -> u32 {
     let Vec3 { x, y, z } = direction * (SIDE / (direction.x.abs() + direction.y.abs() + direction.z.abs()));
     let (u, v) = if z < 0.0 { ((SIDE - y.abs()).copysign(x), (SIDE - x.abs()).copysign(y)) } else { (x, y) };
@@ -25,7 +25,7 @@ pub fn unit(packed: u32) -> Vec3 {
     Vec3::new(x, y, z).normalize()
 }
 
-/// Decodes vectors without normalizing them; their lengths are between SIDE/√3 and SIDE.
+/// Decodes vectors without normalizing them. Their lengths are between SIDE/√3 and SIDE.
 #[inline(always)]
 pub fn lanes(packed: &Packed) -> Vec3x16 {
     let mut vectors = [[0.0; PACKET_SIZE]; 3];

@@ -1,5 +1,5 @@
-//! Chooses one photon of a kernel in proportion to its contribution. Whether it is occluded decides for the whole
-//! kernel, so that the expected light is right.
+//! Chooses one photon of a kernel in proportion to its contribution. The occlusion of this photon determines
+//! the occlusion of the whole kernel, which yields the correct expected value.
 
 use crate::math::Vec3;
 use crate::math::lanes::{F32x16, PACKET_SIZE};
@@ -12,13 +12,13 @@ const BELOW_ONE: f32 = 1.0 - f32::EPSILON / 2.0;
 pub struct PhotonPosition {
     /// The point.
     pub point: Vec3,
-    /// Unit geometric normal on the side where it arrived.
+    /// Unit geometric normal on the side of the surface that the photon hit.
     pub normal: Vec3,
 }
 
-/// Reservoir sampling in each lane: chooses among a stream of items in proportion to weights whose sum is not known in
-/// advance (Chao, *A General Purpose Unequal Probability Sampling Plan*, 1982). A single random number serves all
-/// choices, as it can be rescaled after each choice.
+/// Reservoir sampling in each lane: chooses among a stream of items in proportion to weights whose sum is not
+/// known in advance (Chao, *A General Purpose Unequal Probability Sampling Plan*, 1982). A single random
+/// number is enough for all choices because it can be rescaled after each choice.
 #[derive(Clone, Copy, Debug)]
 pub struct LaneReservoirs {
     random: F32x16,
@@ -38,7 +38,7 @@ impl LaneReservoirs {
         Self { random: randoms, totals: [0.0; PACKET_SIZE], chosen: [0; PACKET_SIZE] }
     }
 
-    /// Offers item `number` with nonnegative weights.
+    /// Adds item `number` with nonnegative weights to the stream.
     #[inline(always)]
     pub fn offer(&mut self, number: u32, weights: &F32x16) {
         for i in 0..PACKET_SIZE {
@@ -48,13 +48,14 @@ impl LaneReservoirs {
             let left = if takes { self.random[i] } else { self.random[i] - part };
             let of = if takes { part } else { 1.0 - part };
             let random = left / of;
-            // For a share close to 1, the rescaled number has no digits left.
+            // If `of` is close to 1, the rescaled number may round to 1.
             self.random[i] = if random < BELOW_ONE { random } else { BELOW_ONE };
             self.chosen[i] = if takes { number } else { self.chosen[i] };
         }
     }
 
-    /// Chooses a lane in proportion to its total weight; returns its item and the lane. `None` if all weights are 0.
+    /// Chooses a lane in proportion to its total weight and returns the lane's item and index. `None` if all
+    /// weights are 0.
     #[inline(always)]
     pub fn chosen(&self, random: f32) -> Option<(u32, usize)> {
         let mut left = random * self.totals.iter().sum::<f32>();
@@ -90,7 +91,7 @@ mod tests {
         for _ in 0..DRAWS {
             let mut choices = LaneReservoirs::new(next());
             (0..ITEMS).for_each(|number| choices.offer(number as u32, &weights[number]));
-            let (number, lane) = choices.chosen(next()).expect("some weights are positive");
+            let (number, lane) = choices.chosen(next()).expect("some weights should be positive");
             counts[number as usize][lane] += 1;
         }
         for (weight, count) in weights.as_flattened().iter().zip(counts.as_flattened()) {

@@ -15,15 +15,15 @@ use crate::world::World;
 /// Number of successes after which the trials end.
 const SUCCESSES: u32 = 4;
 
-/// Maximum number of trials: if less than a tenth of a kernel receives photons, a fraction of at most (1 − p)⁶⁵ of its
-/// light is lost.
+/// Maximum number of trials. At most the fraction (1 − p)⁶⁵ of the kernel's light is lost, which is
+/// significant only if less than about a tenth of the kernel receives photons.
 const MAX_TRIALS: u32 = 64;
 
 /// Maximum number of surfaces examined along the normal at one position in a kernel.
 const LAYERS: usize = 8;
 
-/// Estimates the reciprocal of the kernel's coverage with trials at positions that pairs of independent random numbers
-/// choose.
+/// Estimates the reciprocal of the kernel's coverage with trials at random positions. `pair` returns
+/// independent pairs of random numbers.
 #[inline(never)]
 pub fn inverse_coverage(
     world: &World,
@@ -44,17 +44,18 @@ pub fn inverse_coverage(
     }
 }
 
-/// Returns 1 if the first trial succeeds, which has probability p, and otherwise 1 + 1/p in expectation: p + (1 − p)·(1
-/// + 1/p) = 1/p.
+/// Returns 1 if the first trial succeeds, which has probability p, and otherwise a value with expectation 1 +
+/// 1/p. The overall expectation is p + (1 − p)·(1 + 1/p) = 1/p.
 fn mean_after_first(mut succeeds: impl FnMut(u32) -> bool) -> f32 {
     if succeeds(0) { 1.0 } else { 1.0 + mean_trials_per_success(|number| succeeds(number + 1)) }
 }
 
-/// Mean number of trials per success until `SUCCESSES` trials have succeeded, with expectation 1/p. If the trials end
-/// before that, the numbers of trials and of successes are each counted one higher. Over both outcomes, the expectation
-/// is (1 − (1 − p)^(MAX_TRIALS + 1))/p: the sums Σ C(n, m)·pᵐ(1 − p)ⁿ⁻ᵐ over the first and Σ C(MAX_TRIALS + 1, s + 1)·pˢ(1 −
-/// p)^(MAX_TRIALS − s) over the second are the probabilities of more than m, and of 1 to m, successes in MAX_TRIALS + 1 trials,
-/// divided by p, with m = SUCCESSES.
+/// Mean number of trials per success until `SUCCESSES` trials have succeeded, with expectation 1/p. If
+/// `MAX_TRIALS` is reached first, the numbers of trials and successes are both increased by one. Over both
+/// outcomes, the expectation is (1 − (1 − p)^(MAX_TRIALS + 1))/p. With m = SUCCESSES, the first outcome
+/// contributes Σ C(n, m)·pᵐ(1 − p)ⁿ⁻ᵐ and the second Σ C(MAX_TRIALS + 1, s + 1)·pˢ(1 − p)^(MAX_TRIALS − s).
+/// These are the probabilities of more than m successes and of 1 to m successes in MAX_TRIALS + 1 trials,
+/// divided by p.
 fn mean_trials_per_success(mut succeeds: impl FnMut(u32) -> bool) -> f32 {
     let mut successes = 0;
     for number in 0..MAX_TRIALS {
@@ -66,8 +67,8 @@ fn mean_trials_per_success(mut succeeds: impl FnMut(u32) -> bool) -> f32 {
     (MAX_TRIALS + 1) as f32 / (successes + 1) as f32
 }
 
-/// Whether a position in the tangent plane has a surface above or below it that may hold photons of the kernel and is
-/// not occluded.
+/// Whether there is an unoccluded surface, above or below a position in the tangent plane, that can receive
+/// photons of the kernel.
 fn receives_photons(world: &World, look: &GatherPoint, place: Vec3, radius: f32) -> bool {
     let above = REACH * radius * look.normal;
     let end = place - above;
@@ -79,7 +80,7 @@ fn receives_photons(world: &World, look: &GatherPoint, place: Vec3, radius: f32)
         let Some(hit) = world.geometry.closest_of(&ray, may_receive) else { return false };
         let bare = SurfaceRequest { uv: false, shadow_point: false };
         let surface = world.geometry.requested_surface(&ray, &hit, bare);
-        // Succeed if it does receive them, has about the same normal, and is not occluded.
+        // Succeed if the surface receives photons, has about the same normal, and is not occluded.
         let cosine = surface.normal.dot(look.normal);
         let normal = if cosine < 0.0 { -surface.normal } else { surface.normal };
         let photon = PhotonPosition { point: surface.point, normal };
@@ -89,7 +90,7 @@ fn receives_photons(world: &World, look: &GatherPoint, place: Vec3, radius: f32)
         {
             return true;
         }
-        // Continue below it.
+        // Continue below the surface.
         start = offset_origin(surface.point, surface.error, surface.normal, ray.direction);
         if (end - start).dot(look.normal) >= 0.0 {
             return false;
@@ -104,7 +105,7 @@ mod tests {
     use crate::math::random::unit;
 
     #[test]
-    fn trials_estimate_reciprocal_without_bias() {
+    fn reciprocal_estimate_is_unbiased() {
         let mut next = unit(7);
         for chance in [0.03_f32, 0.1, 0.3, 0.5, 0.9, 1.0] {
             for is_crowded in [false, true] {

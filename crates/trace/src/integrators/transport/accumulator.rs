@@ -1,10 +1,10 @@
-//! Accumulates the components of light that the view shows.
+//! Accumulates the light components shown by the view.
 
 use super::ray::PathRay;
 use crate::integrators::view::{Components, LightAov};
 use crate::math::Vec3;
 
-/// A contribution that is not light reflected from a light source.
+/// A contribution other than reflected light.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LocalTerm {
     /// Emission of a surface, or the background.
@@ -13,14 +13,14 @@ pub enum LocalTerm {
     Ambient,
 }
 
-/// Accumulates the radiance of each slot that the view shows. In each bounce, emission and ambient light are added
-/// first, then reflected light, in path order.
+/// Accumulates each slot's radiance, limited to the components shown by the view. In each bounce, emission
+/// and ambient light are added first, followed by reflected light, in path order.
 pub struct Accumulator<'a> {
     /// The AOV to accumulate.
     pub aov: LightAov,
     /// Sums by slot.
     pub radiance: &'a mut [Vec3],
-    /// Upper bound on contributions from vertices that the camera does not see; 0 for no bound.
+    /// Upper bound on contributions from vertices that the camera does not see, or 0 for no bound.
     pub clamp: f32,
 }
 
@@ -37,7 +37,7 @@ impl Accumulator<'_> {
         }
     }
 
-    /// Adds the light of a source that a path hits after its first diffuse or glossy surface.
+    /// Adds the light of a source hit by a path after the path's first diffuse or glossy surface.
     pub fn add_hit_light(&mut self, path: &PathRay, radiance: Vec3) {
         match self.aov {
             LightAov::Radiance(parts) if path.state.contributes(parts.paths) => {
@@ -52,7 +52,7 @@ impl Accumulator<'_> {
         self.radiance[slot as usize] += Vec3::splat(count as f32);
     }
 
-    /// The radiance components that are accumulated.
+    /// Radiance components to accumulate.
     fn components(&self) -> Components {
         match self.aov {
             LightAov::Radiance(parts) => parts,
@@ -68,8 +68,8 @@ impl Accumulator<'_> {
         }
     }
 
-    /// Whether the ambient term of a surface that a path hits is accumulated. After a diffuse or glossy surface, it
-    /// counts as light which that surface reflects.
+    /// Whether the ambient term of a surface hit by a path is accumulated. After a diffuse or glossy surface,
+    /// it is treated as light reflected by that surface.
     pub fn accepts_ambient(&self, path: &PathRay) -> bool {
         let parts = self.components();
         if path.state.only_specular_before {
@@ -79,7 +79,7 @@ impl Accumulator<'_> {
         }
     }
 
-    /// Adds the ambient term of a surface that a path hits.
+    /// Adds the ambient term of a surface hit by a path.
     #[inline]
     pub fn add_ambient(&mut self, path: &PathRay, radiance: Vec3) {
         if path.state.only_specular_before {

@@ -12,7 +12,7 @@ use crate::math::lanes::{F32x16, PACKET_SIZE, Simd, TRUE, Vec3x16, lane, mask_fr
 use crate::sampling::SamplerPacket;
 use crate::scene::description::Shadows;
 
-/// A packet of vertices to be lit.
+/// A packet of vertices for direct lighting.
 #[derive(Clone)]
 pub struct VertexBatch {
     /// Mask of lanes with a vertex.
@@ -21,16 +21,16 @@ pub struct VertexBatch {
     pub from: Vec3x16,
     /// Triangles at the origins; see [`VertexBatch::starts`].
     pub start: [u32; PACKET_SIZE],
-    /// Horizon normals: in the lanes whose bits are set, nothing behind them is visible.
+    /// Horizon normals. In lanes whose bits are set, directions behind the horizon normal are occluded.
     pub horizon: Vec3x16,
     pub has_horizon: u32,
-    /// Origins above the facets, from which lights in all directions are visible, and the `t_max` of the rays to them.
-    /// Only valid in the lanes whose bits are set, and only if those rays are unoccluded.
+    /// Origins lifted above the facets, from which lights in all directions are visible, and `t_max` of the
+    /// rays from the facets to them. Only valid in lanes whose bits are set and whose rays are unoccluded.
     pub lifted: Vec3x16,
     pub lift_end: F32x16,
     pub may_lift: u32,
-    /// Surface points, and geometric normals on the viewer's side, in the lanes whose bits are set; in other lanes
-    /// `from` and `normal` serve as both.
+    /// Surface points, and geometric normals on the viewer's side, in lanes whose bits are set. In other
+    /// lanes, `from` and `normal` are used instead.
     pub point: Vec3x16,
     /// [`VertexBatch::point`].
     pub facet: Vec3x16,
@@ -42,19 +42,19 @@ pub struct VertexBatch {
     pub after_gloss: u32,
     /// Shading normals.
     pub normal: Vec3x16,
-    /// Interpolated normals before perturbation, and their cosines with the perturbed ones; [`UNPERTURBED`] where they
-    /// are equal.
+    /// Interpolated normals before perturbation, and their cosines with the perturbed normals, or
+    /// [`UNPERTURBED`] if both normals are equal.
     pub smooth_normal: Vec3x16,
     pub shading_normal_cosine: F32x16,
     /// BSDFs, all of the same kind.
     pub bsdf: BsdfRow,
-    /// Throughputs of the paths.
+    /// Path throughputs.
     pub throughput: Vec3x16,
-    /// Sample slots of the paths.
+    /// Sample slots.
     pub slot: [u32; PACKET_SIZE],
-    /// Numbers of the paths.
+    /// Path numbers.
     pub path: [u32; PACKET_SIZE],
-    /// Indices of the paths in the bounce's queue.
+    /// Path indices in the bounce's queue.
     pub place: [u32; PACKET_SIZE],
     /// [`PathState::roulette_throughput`](super::ray::PathState::roulette_throughput) of the paths.
     pub roulette_throughput: F32x16,
@@ -62,7 +62,7 @@ pub struct VertexBatch {
     pub interiors: [u32; PACKET_SIZE],
     /// Whether any vertex has a perturbed normal.
     pub is_perturbed: bool,
-    /// Whether no light sample is visible from any of the vertices.
+    /// Whether no light samples are visible from any of the vertices.
     pub is_dark: bool,
     /// Whether the vertices represent both sides of their surfaces.
     pub has_two_sides: bool,
@@ -72,17 +72,17 @@ pub struct VertexBatch {
     pub interiors_beyond: [u32; PACKET_SIZE],
 }
 
-/// Marks a vertex whose two normals are equal, in place of their cosine.
+/// Used instead of the cosine for vertices with two equal normals.
 pub const UNPERTURBED: f32 = -2.0;
 
 impl VertexBatch {
-    /// Lobes with at least this exponent α are worth tracing their own rays under any light.
+    /// Minimum exponent α for which lobe rays are worth tracing under any light.
     const MIN_SHARP_EXPONENT: f32 = 100.0;
 
-    /// Lobes are also worth tracing rays if infinite lights are at least this many times as wide as the lobe.
+    /// Lobe rays are also worth tracing if infinite lights are at least this many times as wide as the lobe.
     const MIN_WIDTH_RATIO: f32 = 1.5;
 
-    /// Mask of vertices whose highlights are too narrow for light samples to find reliably.
+    /// Mask of vertices whose highlights are too narrow to be sampled reliably by light samples.
     pub fn sharp_lobes(&self, tile: &TileContext<'_>, aov: LightAov) -> u32 {
         let shows = match aov {
             LightAov::Radiance(Components { specular, .. }) => specular,
@@ -93,14 +93,14 @@ impl VertexBatch {
         if !(self.bsdf.has_narrow_lobes() && shows && is_soft && tile.world.lights.can_be_hit()) {
             return 0;
         }
-        // The solid angle of a lobe is about 2π/(α + 1) sr.
+        // A lobe's solid angle is about 2π/(α + 1) sr.
         let filled =
             Self::MIN_WIDTH_RATIO * std::f32::consts::TAU / tile.world.lights.infinite_solid_angle() - 1.0;
         let least = filled.min(Self::MIN_SHARP_EXPONENT);
         self.bsdf.narrower_than(self.used, least)
     }
 
-    /// The samplers of the vertices.
+    /// Returns the samplers of the vertices.
     #[inline(always)]
     pub fn sampler(&self, tile: &TileContext<'_>) -> SamplerPacket<PACKET_SIZE> {
         let (block, slots) = (tile.block, &self.slot);
@@ -144,7 +144,7 @@ impl VertexBatch {
         interiors_beyond: [0; PACKET_SIZE],
     };
 
-    /// Empties the packet; normals count as unperturbed.
+    /// Empties the packet and marks all normals as unperturbed.
     #[inline(always)]
     pub fn reset(&mut self) {
         (self.used, self.has_horizon, self.may_lift) = (0, 0, 0);
@@ -154,7 +154,8 @@ impl VertexBatch {
         self.shading_normal_cosine = [UNPERTURBED; PACKET_SIZE];
     }
 
-    /// Whether the packet holds vertices with this kind of BSDF, dark or not, and two-sided or not.
+    /// Whether the packet is for vertices with this kind of BSDF and these values of `is_dark` and
+    /// `has_two_sides`.
     #[inline(always)]
     pub fn is_for(&self, kind: RoughKind, (is_dark, has_two_sides): (bool, bool)) -> bool {
         self.bsdf.kind() == kind && self.is_dark == is_dark && self.has_two_sides == has_two_sides
@@ -168,7 +169,7 @@ impl VertexBatch {
         }
     }
 
-    /// Copies a vertex from another packet with the same kind of BSDFs; neither packet has two sides.
+    /// Copies a vertex from another packet with the same kind of BSDFs. Neither packet may have two sides.
     pub fn copy(&mut self, i: usize, other: &Self, from: usize) {
         for (own, other) in [
             (&mut self.from, &other.from),
@@ -198,7 +199,7 @@ impl VertexBatch {
         self.used |= 1 << i;
     }
 
-    /// Stores a vertex whose BSDF is of the packet's kind.
+    /// Stores a vertex. Its BSDF must be of the packet's kind.
     pub fn put(
         &mut self,
         i: usize,
@@ -232,7 +233,7 @@ impl VertexBatch {
         // Set the BSDF.
         let frame = Place { normal, to_eye: vertex.wo, tangent: vertex.tangent() };
         self.bsdf.put(i, bsdf, aov.lobes(), &frame);
-        // Copy the state of the path.
+        // Copy the path state.
         (self.roulette_throughput[i], self.interiors[i]) = (path.state.roulette_throughput, interiors);
         set_lane(&mut self.throughput, i, path.throughput);
         (self.slot[i], self.path[i], self.place[i]) = (path.slot, path.path, *place);
@@ -240,7 +241,7 @@ impl VertexBatch {
         self.used |= 1 << i;
     }
 
-    /// Stores the other side of a vertex: its ray origin, and the index of the glass around it.
+    /// Stores the ray origin on the other side of a vertex and the index of the glass around it.
     pub fn put_beyond(&mut self, i: usize, beyond: Vec3, interiors: u32) {
         set_lane(&mut self.beyond, i, beyond);
         self.interiors_beyond[i] = interiors;
@@ -262,8 +263,9 @@ impl VertexBatch {
         Response { bsdf: self.bsdf.f(wi, simd), cosines }
     }
 
-    /// Shadow-terminator factors for light from the directions `wi`, on the viewer's side where `sides` is 1 and on the
-    /// other side where it is −1. Not above 0 if no light arrives.
+    /// Shadow-terminator factors for light from the directions `wi`, on the viewer's side in lanes where
+    /// `sides` is 1 and on the other side where it is −1. Not positive if the light is on the wrong side of a
+    /// normal.
     #[inline(always)]
     pub fn terminator_factors(&self, wi: &Vec3x16, sides: &F32x16) -> F32x16 {
         let mut left = [1.0; PACKET_SIZE];
@@ -278,10 +280,11 @@ impl VertexBatch {
         left
     }
 
-    /// [`Ray::start`] of rays from the vertices in the directions `wi`; rays that go behind their facet have none.
+    /// [`Ray::start`] of rays from the vertices in the directions `wi`, or [`Ray::NO_TRIANGLE`] for rays
+    /// behind their facet.
     #[inline(always)]
     pub fn starts(&self, wi: &Vec3x16) -> [u32; PACKET_SIZE] {
-        // Vertices on shapes are not on triangles.
+        // Vertices on analytic shapes are not on triangles.
         if self.start.iter().fold(!0, |all, start| all & start) == Ray::NO_TRIANGLE {
             return self.start;
         }
@@ -298,7 +301,7 @@ impl VertexBatch {
         starts
     }
 
-    /// [`VertexBatch::starts`] for one vertex.
+    /// Like [`VertexBatch::starts`], for a single vertex.
     pub fn start_of(&self, i: usize, direction: Vec3) -> u32 {
         let normal = if self.has_facet & 1 << i != 0 { &self.facet } else { &self.normal };
         if lane(normal, i).dot(direction) > 0.0 { self.start[i] } else { Ray::NO_TRIANGLE }
@@ -319,8 +322,8 @@ impl VertexBatch {
         }
     }
 
-    /// Weight of a photon that lands at a vertex: the cosine with the shading normal, times the terminator factor, over
-    /// the cosine with the geometric normal.
+    /// Weight of a photon at a vertex: the cosine at the shading normal times the terminator factor, divided
+    /// by the cosine at the geometric normal.
     #[inline(always)]
     pub fn photon_weight(&self, i: usize, direction: Vec3) -> f32 {
         if self.has_facet & 1 << i == 0 {
@@ -333,7 +336,7 @@ impl VertexBatch {
         if (left > 0.0) & (arriving > 0.0) { left / arriving } else { 0.0 }
     }
 
-    /// Multiplies light at the vertices by the throughputs of the paths.
+    /// Multiplies light at the vertices by the path throughputs.
     #[inline(always)]
     pub fn times_throughput(&self, light: &Vec3x16) -> Vec3x16 {
         let mut radiance = *light;
@@ -345,7 +348,8 @@ impl VertexBatch {
         radiance
     }
 
-    /// The first queue index, if every lane has a vertex and the indices are consecutive; otherwise `None`.
+    /// Returns the first queue index if every lane has a vertex and the indices are consecutive, and
+    /// otherwise `None`.
     #[inline(always)]
     pub fn consecutive_start(&self) -> Option<u32> {
         let mut is_run = self.used == ALL;
@@ -374,25 +378,26 @@ impl VertexBatch {
     }
 }
 
-/// BSDF values and cosines of a packet of vertices for one direction each.
+/// BSDF values and cosines of a packet of vertices, for one direction per vertex.
 pub struct Response {
     /// BSDF values.
     pub bsdf: BsdfValues,
-    /// Cosines times the terminator factors; not above 0 if no light arrives.
+    /// Cosines times the terminator factors. Not positive if the light is on the wrong side of a normal.
     pub cosines: F32x16,
 }
 
 /// Mask of all lanes.
 pub const ALL: u32 = ((1_u64 << PACKET_SIZE) - 1) as u32;
 
-/// Shadow-terminator factor: softens the edge of the lit region of perturbed normals; 0 behind the unperturbed surface,
-/// 1 without perturbation (Chiang, Li, Burley, *Taming the Shadow Terminator*, 2019).
+/// Shadow-terminator factor, which softens the shadow edge of surfaces with perturbed normals. It is 0 behind
+/// the unperturbed surface and 1 without perturbation (Chiang, Li, Burley, *Taming the Shadow Terminator*,
+/// 2019).
 #[inline(always)]
 fn terminator(cosine: f32, smooth: f32, shading_normal_cosine: f32) -> f32 {
     let g = smooth / (cosine * shading_normal_cosine);
     let g = if g < 1.0 { g } else { 1.0 };
-    // No light arrives from behind the shading normal. Clamp g to 0: for g < 0 the polynomial and the cosine are both
-    // negative, and their product would be positive.
+    // Light behind the shading normal must not contribute. Clamp g to 0, because for g < 0 the polynomial and
+    // the cosine are both negative and their product would be positive.
     let g = if g > 0.0 { g } else { 0.0 };
     let soft = if shading_normal_cosine > 0.0 { -g * g * g + g * g + g } else { 1.0 };
     if (smooth > 0.0) | (shading_normal_cosine == UNPERTURBED) { soft } else { 0.0 }
@@ -403,8 +408,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn replaced_lanes_keep_no_stale_bits() {
-        // A packet with all bits set, also for unused lanes.
+    fn replaced_lanes_have_no_stale_bits() {
+        // A packet with all bits set, including the bits of unused lanes.
         let noisy = VertexBatch {
             used: ALL,
             has_horizon: ALL,

@@ -14,7 +14,7 @@ use crate::sampling::filter::FilterSample;
 use crate::sampling::{CAMERA_PATH, Dimension, SamplerPacket, warp};
 use crate::world::{PACKET_SIZE, SimdKernel};
 
-/// Number of camera-ray packets generated in one loop, which hides the latency of each packet's random numbers.
+/// Number of camera-ray packets generated together, which hides the latency of random number generation.
 pub const CAMERA_ROWS: usize = 8;
 
 /// A packet of camera rays.
@@ -27,8 +27,8 @@ pub struct CameraRow {
 }
 
 impl TileContext<'_> {
-    /// Replaces the queue's content with camera rays for the given slots, and reports those with a negative filter
-    /// weight.
+    /// Replaces the queue's content with camera rays for the given slots, and reports the rays with a
+    /// negative filter weight.
     pub fn camera_rays(
         &self,
         slots: Range<u32>,
@@ -59,7 +59,7 @@ impl TileContext<'_> {
         });
     }
 
-    /// The path that begins with a camera ray.
+    /// Path that starts with a camera ray.
     #[inline(always)]
     pub fn camera_path(&self, ray: Ray, slot: u32) -> PathRay {
         let interiors = if self.world.is_camera_in_air() {
@@ -72,7 +72,7 @@ impl TileContext<'_> {
         PathRay { ray, throughput: Vec3::ONE, slot, path: CAMERA_PATH + 1, interiors, state, cone }
     }
 
-    /// The glass around a point on the lens.
+    /// Glass around a point on the lens.
     #[cold]
     #[inline(never)]
     fn camera_interiors(&self, point: Vec3) -> InteriorList {
@@ -80,8 +80,8 @@ impl TileContext<'_> {
         around.fold(InteriorList::default(), InteriorList::entered)
     }
 
-    /// The rays of the sixteen slots from `first` on, even past the last one. Must be called inside a kernel that is
-    /// compiled for each instruction set.
+    /// Rays of the sixteen slots starting at `first`, even past the last slot. Must be called inside a kernel
+    /// that is compiled for each instruction set.
     #[inline(always)]
     fn camera_row(&self, first: u32) -> CameraRow {
         let paths = [CAMERA_PATH; PACKET_SIZE];
@@ -101,7 +101,7 @@ impl TileContext<'_> {
             let place = settings.pixel_to_camera(place);
             (places[0][lane], places[1][lane]) = (place.x, place.y);
         }
-        // Generate rays through them, from points on the lens if it has an aperture.
+        // Generate rays through these positions, from points on the lens if it has an aperture.
         let (mut origin, mut direction) = ([[0.0; PACKET_SIZE]; 3], [[0.0; PACKET_SIZE]; 3]);
         if settings.dof && camera.aperture > 0.0 {
             let lens = sample_lens(sampler.pairs(&paths, Dimension::Lens, 0, 1));

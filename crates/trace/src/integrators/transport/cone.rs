@@ -1,6 +1,6 @@
 //! Ray cones, which track the width of the beam around a ray to choose the mip level of texture lookups
-//! (Akenine-Möller, Crassin, Boksansky, Belcour, Panteleev, Wright, *Improved Shader and Texture Level of Detail Using
-//! Ray Cones*, JCGT 2021). Without mip levels they stay 0.
+//! (Akenine-Möller, Crassin, Boksansky, Belcour, Panteleev, Wright, *Improved Shader and Texture Level of
+//! Detail Using Ray Cones*, JCGT 2021). Without mip levels, the cones stay 0.
 
 /// A beam around a ray. A negative width means that the beam is past its focus.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -11,10 +11,10 @@ pub struct RayCone {
     pub spread: f32,
 }
 
-/// Fraction of a lobe's radius that one path's cone covers, as if a hundred paths shared the lobe.
+/// Fraction of a lobe's radius covered by one path's cone, as if a hundred paths shared the lobe.
 const SHARE: f32 = 0.1;
 
-/// A specular bounce, which changes the spread of a beam depending on the width of the beam.
+/// A specular bounce, which changes a beam's spread depending on its width.
 #[derive(Clone, Copy, Debug)]
 pub enum SpecularEvent {
     /// Reflection.
@@ -24,14 +24,14 @@ pub enum SpecularEvent {
 }
 
 impl RayCone {
-    /// The beam at a distance along the ray.
+    /// Returns the beam at a distance along the ray.
     #[inline(always)]
     pub fn at_distance(self, distance: f32) -> Self {
         Self { width: self.width + self.spread * distance, ..self }
     }
 
-    /// The beam after a specular bounce at a surface with this mean curvature, > 0 if the surface bulges toward the
-    /// camera, in the paraxial approximation. `cosine` is the cosine of the angle of incidence.
+    /// Returns the beam after a specular bounce, in the paraxial approximation. The surface's mean curvature
+    /// is positive if it bulges toward the camera. `cosine` is the cosine of the angle of incidence.
     pub fn after_specular(self, event: SpecularEvent, curvature: f32, cosine: f32) -> Self {
         let turn = curvature * self.width / cosine.abs().max(MIN_COSINE);
         let spread = match event {
@@ -41,9 +41,9 @@ impl RayCone {
         Self { spread, ..self }
     }
 
-    /// The beam after scattering in a direction with this pdf in sr⁻¹.
+    /// Returns the beam after scattering in a direction with this pdf in sr⁻¹.
     pub fn scattered(self, pdf: f32) -> Self {
-        // A cone of solid angle 1/pdf has this radius in radians.
+        // Radius in radians of a cone with solid angle 1/pdf.
         let radius = (1.0 / (std::f32::consts::PI * pdf)).sqrt();
         Self { spread: self.spread.abs().max(2.0 * SHARE * radius.min(1.0)), ..self }
     }
@@ -69,13 +69,13 @@ mod tests {
             convex.at_distance(-1.0).width.abs() < 1e-8
                 && (convex.at_distance(1.0).width - 0.04).abs() < 1e-8
         );
-        // A surface of radius 2 into glass of index 1.5 focuses at nR/(n − 1).
+        // A surface of radius 2 on glass with an index of 1.5 focuses at nR/(n − 1).
         let glass = PARALLEL.after_specular(SpecularEvent::Refracted(1.5), 0.5, 1.0);
         assert!(glass.at_distance(6.0).width.abs() < 1e-7);
     }
 
     #[test]
-    fn flat_surfaces_change_beams_only_by_snells_law() {
+    fn flat_surfaces_refract_beams_by_snells_law() {
         let spreading = RayCone { width: 0.1, spread: 0.3 };
         assert_eq!(spreading.after_specular(SpecularEvent::Reflected, 0.0, 0.3), spreading);
         assert!(

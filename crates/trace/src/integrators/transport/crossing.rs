@@ -1,5 +1,5 @@
-//! Crossing of coincident surfaces at glass: all surfaces that touch at a hit are crossed at once, from one medium to
-//! another.
+//! Crossing of coincident surfaces at glass: all surfaces that touch at a hit are crossed together, from one
+//! medium to another.
 
 use super::interiors::{Interior, InteriorList};
 use super::ray::PathRay;
@@ -7,11 +7,11 @@ use super::tile::TileContext;
 use super::vertex::Vertex;
 use crate::world::{CoincidentSurface, ContactQuery, ContactScratch, Hit, OffsetPoints};
 
-/// The surfaces and media that a ray crosses at a hit on glass.
+/// Surfaces and media crossed by a ray at a hit on glass.
 pub struct Crossing {
-    /// Origins for rays that leave on either side.
+    /// Origins for rays leaving on either side.
     pub sides: OffsetPoints,
-    /// The medium that the ray traveled through, and the medium on the near side. `None` if both are the ray's recorded
+    /// Medium traversed by the ray, and medium on the near side. `None` if both are the ray's recorded
     /// medium.
     pub before: Option<[InteriorList; 2]>,
     /// The medium on the far side.
@@ -20,13 +20,14 @@ pub struct Crossing {
     pub opaque: Option<Hit>,
 }
 
-/// The glass whose surface separates two media: the one with the higher priority, which is later in the scene file.
+/// The glass whose surface separates two media: the glass with the higher priority, which is later in the
+/// scene file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Boundary {
-    /// Its material at this point.
+    /// Material of the glass at this point.
     pub material: u32,
-    /// The hit on its surface, along the ray between the two origins. `None` if the path itself hits it, or if it is
-    /// only known to enclose the far origin.
+    /// Hit on the glass surface, along the ray between the two origins. `None` if the path itself hits this
+    /// surface, or if the glass is only known to enclose the far origin.
     pub hit: Option<Hit>,
 }
 
@@ -57,18 +58,19 @@ impl TileContext<'_> {
         Crossing { sides, before, far, opaque }
     }
 
-    /// The media before and beyond the coincident surfaces. The near medium is the one the ray has recorded; for closed
-    /// shapes, the far medium follows from their geometry. A ray that leaves a solid was inside it, even if its record
-    /// disagrees. Open solids count only if they are entered or left here, so that a ray and its reverse agree, as the
-    /// path of the ray around other open solids is unknown. The first medium of the pair absorbed light on the way
-    /// here; the pair is `None` if both are as recorded.
+    /// Media before and beyond the coincident surfaces. The near medium is the medium recorded for the ray.
+    /// For closed shapes, the far medium is determined by their geometry. A ray that leaves a solid must have
+    /// been inside it, even if the record differs. Open solids are only considered if they are entered or
+    /// left here, because the ray's path around other open solids is unknown. A ray and its reverse therefore
+    /// see the same media. In the returned pair, the first medium is the one that absorbed light on the way
+    /// here. The pair is `None` if both media match the record.
     fn crossing_interiors(
         &self,
         known: &InteriorList,
         found: &[CoincidentSurface],
     ) -> (Option<[InteriorList; 2]>, InteriorList) {
         let is_told_by_record = |glass: Interior| !self.world.is_closed(glass.body);
-        // With only closed shapes, most hits find at most the shape that they enter.
+        // With only closed shapes, most rays enter at most one shape.
         if !self.world.has_open_glass() {
             match *found {
                 [] => return (None, known.retained(is_told_by_record)),
@@ -79,7 +81,7 @@ impl TileContext<'_> {
                 [CoincidentSurface::Surface { .. }] | [_, _, ..] => {}
             }
         }
-        // Begin with the recorded media, without open solids.
+        // Start with the recorded media, without open solids.
         let (mut arrived, mut near) = (*known, self.without_open_glass(*known));
         let mut far = near.retained(is_told_by_record);
         let crossed = |as_front: bool| {
@@ -95,7 +97,7 @@ impl TileContext<'_> {
             CoincidentSurface::Around { object, material } => Some(Interior { body: object, material }),
             CoincidentSurface::Surface { .. } => None,
         });
-        // Leave the solids whose back faces are here.
+        // Leave the solids whose back faces are hit.
         for glass in crossed(false) {
             if self.world.is_open(glass.body) {
                 near = near.entered(glass);
@@ -107,7 +109,7 @@ impl TileContext<'_> {
                 None => (arrived, near) = (arrived.entered(glass), near.entered(glass)),
             }
         }
-        // Enter the solids whose front faces are here, and those that enclose the point.
+        // Enter the solids whose front faces are hit, and the solids that enclose the point.
         let far = crossed(true).chain(around).fold(far, InteriorList::entered);
         (Some([arrived, near]), far)
     }
@@ -124,7 +126,7 @@ impl TileContext<'_> {
         if self.world.body(hit.object) == later.body && self.world.is_glass(own) {
             return Some(Boundary { material: own, hit: None });
         }
-        // The path hits another one of the coincident surfaces.
+        // The path hits a different coincident surface.
         let of_body = memory.near.iter().find_map(|thing| match *thing {
             CoincidentSurface::Surface { hit, material, .. } => {
                 let is_later = self.world.body(hit.object) == later.body && self.world.is_glass(material);
@@ -135,7 +137,7 @@ impl TileContext<'_> {
         Some(of_body.unwrap_or(Boundary { material: later.material, hit: None }))
     }
 
-    /// A medium without its open solids.
+    /// Removes the open solids from a medium.
     pub fn without_open_glass(&self, interiors: InteriorList) -> InteriorList {
         if self.world.has_open_glass() {
             return interiors.retained(|glass| !self.world.is_open(glass.body));

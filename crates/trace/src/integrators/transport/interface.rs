@@ -9,16 +9,16 @@ use crate::materials::mirror::reflect;
 use crate::math::Vec3;
 use crate::world::World;
 
-/// Branch numbers, which distinguish the continuations of a path.
+/// Branch numbers, which distinguish a path's continuations.
 const REFLECTED: u32 = 1;
 const REFRACTED: u32 = 2;
-/// Branch number of scattering by a non-specular lobe.
+/// Branch number for scattering by a non-specular lobe.
 pub const SCATTERED: u32 = 3;
-/// Branch number of a null interaction.
+/// Branch number for a null interaction.
 pub const PASSED: u32 = 4;
 
-/// The path after specular reflection. If the shading normal would send it below the surface, the geometric normal is
-/// used.
+/// Path after specular reflection. If the shading normal would reflect the path below the surface, the
+/// geometric normal is used.
 pub fn reflected(path: &PathRay, vertex: &Vertex<'_>, shading: &Shading, reflectance: Vec3) -> PathRay {
     let incident = path.ray.direction;
     let side = -incident.dot(vertex.normal);
@@ -36,9 +36,10 @@ pub fn reflected(path: &PathRay, vertex: &Vertex<'_>, shading: &Shading, reflect
     }
 }
 
-/// The fraction of basic radiance L/n² that passes an infinitely thin diffusing sheet between two media. Light that
-/// enters the denser medium spreads over fewer directions, and would otherwise gain energy; in the other direction its
-/// radiance is unchanged (Veach, *Robust Monte Carlo Methods for Light Transport Simulation*, 1997, section 5.2).
+/// Fraction of basic radiance L/n² that passes through an infinitely thin diffusing sheet between two media.
+/// In the denser medium, light spreads over fewer directions and would gain energy without this factor. In
+/// the opposite direction, radiance is unchanged (Veach, *Robust Monte Carlo Methods for Light Transport
+/// Simulation*, 1997, section 5.2).
 pub fn through_sheet(world: &World, near: &InteriorList, far: &InteriorList) -> f32 {
     let eta = ior(world, far) / ior(world, near);
     (eta * eta).min(1.0)
@@ -48,11 +49,11 @@ pub fn through_sheet(world: &World, near: &InteriorList, far: &InteriorList) -> 
 pub struct FresnelSplit {
     /// Reflectance.
     pub reflectance: f32,
-    /// The refracted path, not yet weighted by the transmittance. `None` for total internal reflection.
+    /// The refracted path, not weighted by the transmittance. `None` for total internal reflection.
     pub refracted: Option<PathRay>,
 }
 
-/// Computes reflection and refraction of a path at the boundary between its medium and `far`.
+/// Computes the reflection and refraction of a path at the boundary between its medium and `far`.
 pub fn fresnel_split(
     world: &World,
     path: &PathRay,
@@ -62,7 +63,7 @@ pub fn fresnel_split(
 ) -> FresnelSplit {
     let eta = ior(world, far) / ior(world, &path.interiors);
     let (reflectance, direction) = refract_at(vertex, shading, path.ray.direction, eta);
-    // Paths carry basic radiance, L/n², which refraction does not change.
+    // Path throughput applies to basic radiance, L/n², which refraction does not change.
     let refracted = direction.map(|direction| PathRay {
         ray: vertex.spawn_ray(direction),
         path: path.next_path(REFRACTED),
@@ -74,8 +75,9 @@ pub fn fresnel_split(
     FresnelSplit { reflectance, refracted }
 }
 
-/// Reflectance and refracted direction, using the shading normal. If that normal faces away from the ray, or would
-/// refract the ray to its own side, the geometric normal is used: the ray must be where its medium says.
+/// Reflectance and refracted direction, using the shading normal. If this normal faces away from the ray or
+/// would refract the ray to the incident side, the geometric normal is used, because the ray must be inside
+/// its medium.
 fn refract_at(vertex: &Vertex<'_>, shading: &Shading, incident: Vec3, eta: f32) -> (f32, Option<Vec3>) {
     let (shading, geometric) = (shading.normal, vertex.normal);
     let crosses = |direction: &Vec3| direction.dot(geometric) < 0.0;

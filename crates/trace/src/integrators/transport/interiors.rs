@@ -1,10 +1,10 @@
-//! The list of nested glass solids around a ray, which determines its medium.
+//! The list of nested glass solids around a ray, which determines the medium.
 
 use crate::materials::Dielectric;
 use crate::math::Vec3;
 use crate::world::{MAX_INTERIORS, World};
 
-/// A glass solid around a ray. The parts of one solid may have different materials.
+/// A glass solid around a ray. Parts of a solid may have different materials.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Interior {
     /// Index of the solid, in file order.
@@ -13,13 +13,13 @@ pub struct Interior {
     pub material: u32,
 }
 
-/// The glass solids around a ray, in file order. The last one has priority and determines the medium. If the list is
-/// full, the first ones are dropped.
+/// The glass solids around a ray, in file order. The last solid has priority and determines the medium. If
+/// the list is full, the first solids are dropped.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct InteriorList {
     inside: [Interior; MAX_INTERIORS],
-    /// Number of recorded solids. It takes a whole word because copying a word of which one byte was just written
-    /// stalls.
+    /// Number of recorded solids, stored as a whole word because copying a word after writing one of its
+    /// bytes stalls.
     count: u32,
 }
 
@@ -38,7 +38,7 @@ impl InteriorList {
         self.known().last().copied()
     }
 
-    /// The list after entering a solid.
+    /// Returns the list after entering a solid.
     pub fn entered(mut self, glass: Interior) -> Self {
         if self.count as usize == self.inside.len() {
             if glass < self.inside[0] {
@@ -57,8 +57,9 @@ impl InteriorList {
         self
     }
 
-    /// The list after leaving a solid. `None` if the ray was not recorded as inside it. A surface made of several
-    /// glasses may be entered through one and left through another; then the solid's last entry is removed.
+    /// Returns the list after leaving a solid, or `None` if the ray was not recorded as inside it. A surface
+    /// made of several glasses may be entered through one glass and left through another. In that case, the
+    /// solid's last entry is removed.
     pub fn left(self, glass: Interior) -> Option<Self> {
         let same = self.known().iter().rposition(|&own| own == glass);
         same.or_else(|| self.known().iter().rposition(|own| own.body == glass.body))
@@ -88,7 +89,7 @@ impl InteriorList {
 /// Interior lists of vertices, by index. Index 0 is air.
 #[derive(Debug, Default)]
 pub struct InteriorLists {
-    /// Lists with glass, from index 1 on.
+    /// Lists with glass, starting at index 1.
     inside: Vec<InteriorList>,
 }
 
@@ -112,7 +113,7 @@ impl InteriorLists {
         self.inside.len() as u32
     }
 
-    /// The list with an index.
+    /// Returns the list with this index.
     #[inline]
     pub fn get(&self, number: u32) -> InteriorList {
         (number as usize).checked_sub(1).map_or(InteriorList::default(), |index| self.inside[index])
@@ -165,7 +166,7 @@ mod tests {
     }
 
     #[test]
-    fn parts_of_a_solid_differ_by_material() {
+    fn parts_of_a_solid_may_differ_in_material() {
         let both = InteriorList::default().entered(part(1, 0)).entered(part(1, 5));
         assert_eq!(both.left(part(1, 0)), Some(InteriorList::default().entered(part(1, 5))));
         // Enter through material 0, leave through material 2.

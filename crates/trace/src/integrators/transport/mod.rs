@@ -1,14 +1,14 @@
-//! Transport: rays of a tile, their hits, and packets of sixteen vertices. It depends on the world, but not on
+//! Transport: a tile's rays, their hits, and packets of sixteen vertices. Depends on the world, but not on
 //! integrators or photons.
 //!
-//! - `tile`: the context shared by all rays of a tile; `ray`, `cone`, `interiors`: a path's ray, its ray cone, and the
-//!   glass around it.
-//! - `camera`: camera rays; `trace`, `packet`: intersection, and packets of plain surfaces.
-//! - `walk`, `crossing`: null interactions and glass boundaries up to the next scattering surface; `vertex`: that
-//!   surface, prepared for shading.
-//! - `interface`: specular reflection and refraction; `batch`: packets of non-specular vertices; `scatter`: BSDF
-//!   sampling at these.
-//! - `accumulator`: sums of the components of light that the view shows; `scratch`: reused queues.
+//! - `tile`: the context shared by all rays of a tile. `ray`, `cone`, `interiors`: a path's ray, its ray
+//!   cone, and the glass around it.
+//! - `camera`: camera rays. `trace`, `packet`: intersection, and packets of plain surfaces.
+//! - `walk`, `crossing`: null interactions and glass boundaries up to the next scattering surface. `vertex`:
+//!   that surface, prepared for shading.
+//! - `interface`: specular reflection and refraction. `batch`: packets of non-specular vertices. `scatter`:
+//!   BSDF sampling at non-specular vertices.
+//! - `accumulator`: sums of the light components shown by the view. `scratch`: reused queues.
 
 pub mod accumulator;
 pub mod batch;

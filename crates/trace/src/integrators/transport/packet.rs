@@ -1,5 +1,5 @@
-//! Intersects packets of rays and prepares plain surfaces for direct lighting in packets, since preparing one vertex at
-//! a time would cost more than lighting it.
+//! Intersects packets of rays and prepares plain surfaces for direct lighting in packets, because preparing
+//! each vertex separately would cost more than lighting it.
 
 use arrayvec::ArrayVec;
 
@@ -21,12 +21,12 @@ use crate::sampling::CAMERA_PATH;
 use crate::scene::description::Shadows;
 use crate::world::{Hit, Object, PACKET_SIZE, PacketMaterial, SimdKernel};
 
-/// Where the rays of a packet are.
+/// Source of a packet's rays.
 #[derive(Clone, Copy)]
 pub enum PacketSource<'a> {
     /// Camera rays: the packet, its first slot, the number of rays, and the queue index of the first ray.
     Camera(&'a CameraRow, u32, usize, u32),
-    /// Rays of a queue, and the queue index of the first one.
+    /// Rays of a queue, and the queue index of the first ray.
     Paths(&'a [PathRay], u32),
     /// Rays at the given queue indices, with known hits.
     Traced(&'a [PathRay], &'a [Option<Hit>], &'a [u32]),
@@ -42,7 +42,7 @@ impl PacketSource<'_> {
         }
     }
 
-    /// Queue index of a lane's path; arbitrary for a lane without a path.
+    /// Queue index of a lane's path. Arbitrary if the lane has no path.
     #[inline(always)]
     pub fn queue_index(&self, lane: usize) -> u32 {
         match self {
@@ -51,7 +51,7 @@ impl PacketSource<'_> {
         }
     }
 
-    /// The queued path of a lane. `None` for camera rays.
+    /// Queued path of a lane. `None` for camera rays.
     #[inline(always)]
     pub fn queued_path(&self, lane: usize) -> Option<&PathRay> {
         match self {
@@ -71,7 +71,7 @@ pub struct PacketHits {
     pub any: u32,
     /// Mask of plain surfaces.
     pub plain: u32,
-    /// Mask of plain surfaces that emit toward the ray.
+    /// Mask of plain surfaces that emit toward the ray's origin.
     pub shining: u32,
     /// Mask of other surfaces in the surface packet.
     found: u32,
@@ -82,12 +82,12 @@ pub struct PacketHits {
 }
 
 impl PacketHits {
-    /// The hit of a lane's ray.
+    /// Hit of a lane's ray.
     pub fn hit(&self, lane: usize) -> Option<Hit> {
         self.hits.get(lane).map(|shape| Hit { shape, object: self.object[lane] })
     }
 
-    /// The surface at a hit. `None` if it is plain or not in the surface packet.
+    /// Surface at a hit, or `None` if it is plain or not in the surface packet.
     pub fn surface(&self, surfaces: &SurfacePacket, lane_of_ray: usize) -> Option<SurfacePoint> {
         let (i, bit) = (lane_of_ray, 1 << lane_of_ray);
         if self.found & bit == 0 {
@@ -110,7 +110,7 @@ impl PacketHits {
         })
     }
 
-    /// The path of a lane.
+    /// Path of a lane.
     #[inline(always)]
     pub fn path(&self, tile: &TileContext<'_>, rays: &PacketSource<'_>, lane: usize) -> PathRay {
         match rays {
@@ -127,9 +127,9 @@ impl PacketHits {
 }
 
 impl TileContext<'_> {
-    /// Intersects at most [`PACKET_SIZE`] rays. Plain surfaces are stored in the vertex packet, ready for direct lighting if
-    /// `are_lit`; its `used` mask has those that reflect light. Other surfaces are stored in the surface packet where
-    /// this is supported.
+    /// Intersects at most [`PACKET_SIZE`] rays. Plain surfaces are stored in the vertex packet, ready for
+    /// direct lighting if `are_lit` is true. The packet's `used` mask contains the surfaces that reflect
+    /// light. Other surfaces are stored in the surface packet if supported.
     pub fn intersect(
         &self,
         rays: PacketSource<'_>,
@@ -147,19 +147,19 @@ impl TileContext<'_> {
         })
     }
 
-    /// Whether surface packets contain all that shading with a non-plain material needs: they have no texture
-    /// coordinates or tangents.
+    /// Whether surface packets contain everything needed for shading a non-plain material. They have no
+    /// texture coordinates or tangents.
     #[inline(always)]
     fn fits_surface_row(&self, material: usize) -> bool {
         // Ray cones need tangents and curvatures.
         self.pixel_spread == 0.0 && !self.world.is_textured(material)
     }
 
-    /// The material and non-specular BSDF of plain surfaces. `None` if the material's surfaces are not plain.
+    /// Material and non-specular BSDF of plain surfaces. `None` if the material's surfaces are not plain.
     #[inline(always)]
     pub fn plain(&self, material: usize) -> Option<(&PacketMaterial, &Rough)> {
         let (plain, rough) = self.world.packet_material(material)?;
-        // The ambient color may be textured, and then needs a lookup per surface.
+        // A textured ambient color needs a lookup per surface.
         let has_ambient = self.settings.render.ambient != Vec3::ZERO;
         (!has_ambient || plain.ambient.is_some()).then_some((plain, rough))
     }
@@ -174,7 +174,7 @@ struct PacketIntersection<'a> {
     surface: &'a mut SurfacePacket,
 }
 
-/// Masks of the plain surfaces of a packet.
+/// Masks of a packet's plain surfaces.
 struct PlainSurfaces {
     /// All plain surfaces.
     all: u32,
@@ -182,7 +182,7 @@ struct PlainSurfaces {
     shining: u32,
     /// Surfaces that emit on both sides.
     two_sided: u32,
-    /// Number of their texture lookups.
+    /// Number of texture lookups for plain surfaces.
     lookups: u64,
 }
 
@@ -217,7 +217,7 @@ impl SimdKernel for PacketIntersection<'_> {
                 &of_paths
             }
         };
-        // Intersect them, or use the known hits.
+        // Intersect the rays, or use the known hits.
         let (hits, object) = match rays {
             PacketSource::Camera(..) | PacketSource::Paths(..) => {
                 world.geometry.closest_rows(rows, &mut ends, traced, simd)
@@ -262,7 +262,8 @@ impl SimdKernel for PacketIntersection<'_> {
 }
 
 impl PacketIntersection<'_> {
-    /// Stores the plain surfaces among the hits of `left` in the surface packet, and their BSDFs in the vertex packet.
+    /// Stores the plain surfaces among the hits in `left` in the surface packet, and their BSDFs in the
+    /// vertex packet.
     #[inline(always)]
     fn fill_plain(
         &mut self,
@@ -279,7 +280,7 @@ impl PacketIntersection<'_> {
             if tile.world.is_colored(id) {
                 continue;
             }
-            // Skip materials that are not plain. The first plain one decides the kind of all BSDFs.
+            // Skip materials that are not plain. The first plain material determines the kind of all BSDFs.
             let materials = tile.world.packet_materials(id, of_object, &hits.primitive);
             let (mut of, mut asked_uvs) = (0, None);
             let mut groups = ArrayVec::<(&Rough, bool, u32), PACKET_SIZE>::new();
@@ -325,7 +326,7 @@ impl PacketIntersection<'_> {
                 }
             }
             plain.all |= of;
-            // Evaluate the materials. At vertices that the camera does not see, all lobes count.
+            // Evaluate the materials. At vertices that the camera does not see, all lobes are used.
             for (rough, has_uv, of) in groups {
                 plain.lookups += if has_uv { u64::from(of.count_ones()) } else { 0 };
                 let shown = [(of, aov.lobes()), (of & !row.only_specular_before, ShownLobes::ALL)];
@@ -338,7 +339,7 @@ impl PacketIntersection<'_> {
     }
 }
 
-/// The index in the first lane of `left`, and the mask of lanes in `left` that have the same index.
+/// Returns the index in the first lane of `left`, and the mask of lanes in `left` with the same index.
 #[inline(always)]
 fn group_first(indices: &[u32; PACKET_SIZE], left: u32, simd: impl Simd) -> (u32, u32) {
     let index = indices[left.trailing_zeros() as usize % PACKET_SIZE];
@@ -363,7 +364,7 @@ fn known_hits(known: &[Option<Hit>], places: &[u32]) -> (HitPacket, [u32; PACKET
 }
 
 impl TileContext<'_> {
-    /// Stores the surfaces of non-plain hits in the surface packet; returns the mask of those stored.
+    /// Stores the surfaces of non-plain hits in the surface packet and returns the mask of stored surfaces.
     #[inline(always)]
     fn fill_other_surfaces(
         &self,
@@ -378,7 +379,7 @@ impl TileContext<'_> {
             let (id, of_object) = group_first(object, left, simd);
             left &= !of_object;
             let thing = &self.world.geometry.objects()[id as usize];
-            // A single hit on a shape is cheaper to evaluate on its own.
+            // A single hit on a shape is cheaper to evaluate separately.
             if matches!(thing, Object::Shape(_)) && of_object.is_power_of_two() {
                 continue;
             }
@@ -405,7 +406,7 @@ impl TileContext<'_> {
     }
 }
 
-/// Which vertices of smooth meshes to lift above their facets.
+/// Selects the vertices of smooth meshes to lift above their facets.
 #[derive(Clone, Copy)]
 enum LiftMode {
     /// All vertices.
@@ -443,14 +444,14 @@ impl VertexBatch {
             set_lane(&mut normals, i, shading * side);
             set_lane(&mut facets, i, geometric * side);
         }
-        // Find the lifted points above the facets.
+        // Compute the lifted points above the facets.
         for i in 0..PACKET_SIZE {
             let (from, to) = (lane(&self.from, i), lane(&surface.shadow_point, i));
             let (is_above, end) = lift_segment(from, to, lane(&facets, i), lane(&surface.error, i));
             above[i] = if is_above { TRUE } else { 0 };
             ends[i] = end;
         }
-        // Decide which vertices are lifted now, and which only if the segment is unoccluded.
+        // Determine which vertices to lift now, and which to lift only if the segment is unoccluded.
         let of = mask_from_bits(surface.smooth);
         let above = simd.movemask(&above) & surface.smooth;
         let rises = match lifts {
@@ -477,7 +478,8 @@ impl VertexBatch {
         self.has_facet |= surface.smooth;
     }
 
-    /// Sets the positions and path state of plain vertices; returns the mask of those whose front face was hit.
+    /// Sets the positions and path state of plain vertices and returns the mask of vertices whose front face
+    /// was hit.
     #[inline(always)]
     fn set_positions(
         &mut self,
@@ -504,7 +506,7 @@ impl VertexBatch {
         if surface.smooth != 0 {
             self.set_smooth_normals(rays, surface, lifts, simd);
         }
-        // Copy the state of the paths.
+        // Copy the path state.
         match paths {
             PacketSource::Camera(_, slot, ..) => {
                 self.throughput = [[1.0; PACKET_SIZE]; 3];

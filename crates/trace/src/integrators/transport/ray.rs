@@ -1,4 +1,4 @@
-//! A path's ray, and the path state that weights the light the ray finds.
+//! A path's ray, and the path state that determines the weight of light found by the ray.
 
 use super::cone::RayCone;
 use super::interiors::InteriorList;
@@ -9,9 +9,9 @@ use crate::math::Vec3;
 /// The current ray of a path.
 #[derive(Clone, Copy)]
 pub struct PathRay {
-    /// The ray; its direction is normalized.
+    /// The ray, with a normalized direction.
     pub ray: Ray,
-    /// Throughput: the factor on the radiance that arrives along the ray.
+    /// Throughput: the factor applied to radiance arriving along the ray.
     pub throughput: Vec3,
     /// Slot of the sample.
     pub slot: u32,
@@ -25,13 +25,13 @@ pub struct PathRay {
     pub cone: RayCone,
 }
 
-/// Summary of a path's earlier vertices, which determines how the light that it finds is weighted.
+/// Summary of a path's earlier vertices, which determines how light found by the path is weighted.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PathState {
-    /// BSDF-sampling pdf of the direction at the last vertex, in sr⁻¹. 0 after the camera, a mirror or glass, or if the
-    /// path has passed through glass since: light samples cannot find such light.
+    /// BSDF-sampling pdf of the direction at the last vertex, in sr⁻¹. 0 after the camera, a mirror or glass,
+    /// or if the path has passed through glass since then, because light samples cannot find this light.
     pub pdf: f32,
-    /// Normal at the last vertex, which its light samples used; set if `pdf` > 0.
+    /// Normal used by light samples at the last vertex. Valid if `pdf` > 0.
     pub normal: Vec3,
     /// Throughput for Russian roulette: the largest component over all lobes, independent of the view.
     pub roulette_throughput: f32,
@@ -39,7 +39,7 @@ pub struct PathState {
     pub only_specular_before: bool,
     /// Whether exactly one of the path's vertices is diffuse or glossy.
     pub one_diffuse_before: bool,
-    /// Whether the last such vertex has a glossy lobe.
+    /// Whether the last diffuse or glossy vertex has a glossy lobe.
     pub is_after_gloss: bool,
 }
 
@@ -54,12 +54,13 @@ impl PathState {
         is_after_gloss: false,
     };
 
-    /// The state after a specular bounce with reflectance or transmittance `part`.
+    /// Returns the state after a specular bounce with reflectance or transmittance `part`.
     pub fn after_specular(self, part: f32) -> Self {
         Self { pdf: 0.0, roulette_throughput: self.roulette_throughput * part, ..self }
     }
 
-    /// The state after a null interaction with transmittance `part`. Light samples still find the light behind it.
+    /// Returns the state after a null interaction with transmittance `part`. Light samples still find the
+    /// light behind the surface.
     pub fn passed_through(self, part: f32) -> Self {
         Self { roulette_throughput: self.roulette_throughput * part, ..self }
     }
@@ -73,17 +74,17 @@ impl PathState {
         }
     }
 
-    /// The state after a surface inside glass that does not change the ray, but blocks light samples.
+    /// Returns the state after a surface inside glass that does not change the ray but blocks light samples.
     pub fn hidden_from_lights(self) -> Self {
         self.after_specular(1.0)
     }
 }
 
 impl PathRay {
-    /// Number of the continuation of this path; `branch` distinguishes the continuations.
+    /// Path number of a continuation of this path. Each continuation has a different `branch`.
     pub fn next_path(&self, branch: u32) -> u32 {
-        // With XOR, the number 1 would stay 1 at each reflection, and every choice of the path would repeat the first
-        // one.
+        // With XOR, the path number 1 would remain 1 after each reflection, and all random choices along the
+        // path would be the same.
         self.path.wrapping_add(branch).wrapping_mul(0x9e37_79b1).rotate_left(15).wrapping_add(branch)
     }
 }
@@ -110,7 +111,8 @@ mod tests {
 
     #[test]
     fn path_numbers_within_a_sample_are_unique() {
-        // Follow all paths through 12 splits, then one that is always reflected and one that is always refracted.
+        // Follow all paths through 12 splits, and then one path that is always reflected and one that is
+        // always refracted.
         let (mut round, mut visited) = (vec![CAMERA_PATH + 1], HashSet::from([CAMERA_PATH, CAMERA_PATH + 1]));
         for _ in 0..12 {
             round = round.iter().flat_map(|&path| [1, 2].map(|way| numbered(path).next_path(way))).collect();

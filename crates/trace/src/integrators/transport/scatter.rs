@@ -14,7 +14,7 @@ use crate::math::lanes::{F32x16, PACKET_SIZE, Simd, TRUE, Vec3x16, lane, set_lan
 use crate::sampling::Dimension;
 use crate::world::SimdKernel;
 
-/// How the paths of a bounce continue.
+/// How paths continue after a bounce.
 #[derive(Clone, Copy, Debug)]
 pub struct Continuation {
     /// Whether paths continue. After the last bounce, they continue only if they may hit a light.
@@ -31,7 +31,7 @@ impl Continuation {
     /// Reciprocal of the throughput below which Russian roulette may end a path.
     const GAIN: f32 = 2.5;
 
-    /// The continuation of paths after `depth` bounces, in these lobes.
+    /// Determines how paths continue after `depth` bounces, in these lobes.
     pub fn new(tile: &TileContext<'_>, depth: u32, lobes: LobeSet) -> Self {
         let emits = || tile.world.materials.iter().any(|material| material.emission.is_emissive());
         let max_depth = tile.settings.render.max_depth;
@@ -40,15 +40,16 @@ impl Continuation {
         Self { continues, uses_roulette: depth >= Self::MIN_DEPTH, lobes }
     }
 
-    /// Survival probability of a path, proportional to its throughput, so that all survivors continue with the same
-    /// throughput (Arvo and Kirk, *Particle Transport and Image Synthesis*, 1990). The gain was chosen by measurement;
-    /// see `benches/README.md`.
+    /// Survival probability of a path. Proportional to throughput, so that all surviving paths continue with
+    /// the same throughput (Arvo and Kirk, *Particle Transport and Image Synthesis*, 1990). The gain was
+    /// chosen empirically (see `benches/README.md`).
     #[inline(always)]
     fn survival_probability(self, roulette_throughput: f32) -> f32 {
         if self.uses_roulette { (roulette_throughput * Self::GAIN).min(1.0) } else { 1.0 }
     }
 
-    /// Applies Russian roulette to a path after a specular bounce. Returns `None` if it ends; survivors are reweighted.
+    /// Applies Russian roulette to a path after a specular bounce. Returns the reweighted path, or `None` if
+    /// the path ends.
     pub fn russian_roulette(self, tile: &TileContext<'_>, mut path: PathRay) -> Option<PathRay> {
         let chance = self.survival_probability(path.state.roulette_throughput);
         if chance < 1.0 {
@@ -64,7 +65,7 @@ impl Continuation {
 
 /// Samples the BSDFs of a packet of vertices to continue their paths.
 pub struct SampleBsdf<'a> {
-    /// Context of the tile.
+    /// Tile context.
     pub tile: &'a TileContext<'a>,
     /// The vertices.
     pub row: &'a VertexBatch,
@@ -88,15 +89,15 @@ pub struct Scattered {
     narrow: u32,
     /// Pdfs of the directions in sr⁻¹.
     pdfs: F32x16,
-    /// Factors on the throughputs.
+    /// Throughput factors.
     factors: Vec3x16,
     /// New values of [`PathState::roulette_throughput`].
     roulette_throughput: F32x16,
 }
 
 impl SampleBsdf<'_> {
-    /// Adds the rays of the next bounce to `next`. `interior_lists` are the media of the vertices; `cones` are the ray cones at
-    /// the vertices by queue index, or empty.
+    /// Adds the rays of the next bounce to `next`. `interior_lists` contains the media of the vertices.
+    /// `cones` is empty or contains the ray cones at the vertices, indexed by queue index.
     pub fn scatter(self, interior_lists: &InteriorLists, cones: &[RayCone], next: &mut Vec<PathRay>) {
         // Sample all vertices of the packet.
         let row = self.row;
@@ -201,7 +202,7 @@ impl SampleBsdf<'_> {
         Scattered { alive, wi, starts, beyond: 0, narrow, pdfs, factors, roulette_throughput }
     }
 
-    /// Uses directions that were sampled on both sides of the surfaces.
+    /// Uses directions sampled on both sides of the surfaces.
     #[inline(always)]
     fn sample_both_sides(&self, samples: &SideSamples, simd: impl Simd) -> Scattered {
         let row = self.row;

@@ -6,10 +6,10 @@ use super::ray::PathRay;
 use crate::geometry::surface_packet::SurfacePacket;
 use crate::world::Hit;
 
-/// Buffers that all batches of a thread reuse.
+/// Buffers reused for all batches of a thread.
 #[derive(Default)]
 pub struct TraceBuffers {
-    /// Rays of this bounce; for first-hit AOVs, camera rays.
+    /// Rays of this bounce, or camera rays for first-hit AOVs.
     pub rays: Vec<PathRay>,
     /// Rays of the next bounce.
     pub next: Vec<PathRay>,
@@ -19,13 +19,13 @@ pub struct TraceBuffers {
     pub surfaces: SurfacePacket,
     /// Hits of the rays of this bounce.
     pub hits: Vec<Option<Hit>>,
-    /// The rays ordered by the object that they hit.
+    /// Queue indices of the rays, ordered by the object hit.
     pub object_order: ObjectOrder,
     /// Buffers for the search for coincident surfaces.
     pub crossing: CrossingMemory,
 }
 
-/// Queue indices grouped by the objects that the rays hit, so that shading a packet takes few loop iterations.
+/// Queue indices grouped by the object hit, so that shading a packet takes few loop iterations.
 #[derive(Default)]
 pub struct ObjectOrder {
     places: Vec<u32>,
@@ -35,7 +35,7 @@ impl ObjectOrder {
     /// Number of groups. The low bits of an object's index select its group.
     const GROUPS: usize = 64;
 
-    /// Groups the indices of these hits. Rays without a hit are last; each group keeps the queue order.
+    /// Groups the indices of these hits. Rays without a hit are last. Each group keeps the queue order.
     pub fn sort(&mut self, hits: &[Option<Hit>]) {
         let kind = |hit: &Option<Hit>| hit.map_or(Self::GROUPS, |hit| hit.object as usize % Self::GROUPS);
         let mut starts = [0_u32; Self::GROUPS + 2];
@@ -54,7 +54,7 @@ impl ObjectOrder {
         }
     }
 
-    /// The grouped queue indices.
+    /// Returns the grouped queue indices.
     pub fn indices(&self) -> &[u32] {
         &self.places
     }

@@ -21,16 +21,16 @@ pub struct TileContext<'a> {
     pub settings: &'a RenderSettings,
     /// The samples.
     pub block: &'a SampleBlock,
-    /// Cancels the work.
+    /// Token that cancels the work.
     pub token: &'a CancelToken,
-    /// Spread of a pixel's ray cone; 0 if nothing needs it, as without mip levels.
+    /// Spread of a pixel's ray cone, or 0 if ray cones are not needed because there are no mip levels.
     pub pixel_spread: f32,
-    /// What paths do at surfaces.
+    /// How paths continue at surfaces.
     pub behavior: PathBehavior,
-    /// Whether a constant environment is left to BSDF sampling. The continuing ray is then at least as good as a light
-    /// sample, as directions differ only by occlusion.
+    /// Whether a constant environment is sampled only by BSDF sampling. The continuing ray is then at least
+    /// as good as a light sample because directions differ only in occlusion.
     pub paths_find_sky: bool,
-    /// Whether rays in glossy lobes account for all light that these lobes reflect from the environment.
+    /// Whether rays in glossy lobes account for all environment light reflected by these lobes.
     pub lobes_find_sky: bool,
 }
 
@@ -60,15 +60,14 @@ impl<'a> TileContext<'a> {
         Self { world, settings, block, token, pixel_spread, behavior, paths_find_sky, lobes_find_sky }
     }
 
-    /// The sampler of a slot.
+    /// Sampler of a slot.
     pub fn sampler(&self, slot: u32) -> PixelSampler {
         let (x, y, sample) = self.block.sample_of(slot);
         PixelSampler::new(self.settings.render.seed, x, y, sample)
     }
 }
 
-/// The samples of a tile. A slot is the index of a sample: all samples of the first pixel come first, then the samples
-/// of the next.
+/// The samples of a tile. A slot is the index of a sample. Samples are ordered by pixel.
 pub struct SampleBlock {
     /// The pixels.
     pub pixels: Pixels,
@@ -90,7 +89,7 @@ impl SampleBlock {
         (x, y, self.samples.start + sample)
     }
 
-    /// Columns, rows and sample indices of slots; arbitrary for a slot without a sample.
+    /// Columns, rows and sample indices of slots. Arbitrary for slots without a sample.
     #[inline(always)]
     pub fn samples_of(
         &self,
@@ -99,7 +98,7 @@ impl SampleBlock {
         let [mut xs, mut ys, mut samples] = [[0; PACKET_SIZE]; 3];
         let Pixels { rect, part } = self.pixels;
         let (by_samples, by_width) = (Divisor::new(self.samples.len() as u32), Divisor::new(rect.width));
-        // Compute pixel indices within the shard.
+        // Compute pixel indices within the subset.
         let mut index = [0; PACKET_SIZE];
         for lane in 0..PACKET_SIZE {
             let pixel = by_samples.quotient(slots[lane]);
@@ -107,7 +106,8 @@ impl SampleBlock {
             let first = pixel.wrapping_mul(self.samples.len() as u32);
             samples[lane] = self.samples.start.wrapping_add(slots[lane].wrapping_sub(first));
         }
-        // Map them to indices within the rectangle. This branch is outside the other loops so that these have none.
+        // Map them to indices within the rectangle. This is a separate loop to keep the other loops free of
+        // branches.
         if part != PixelSubset::All {
             index = index.map(|pixel| part.index(pixel, rect));
         }
@@ -119,7 +119,7 @@ impl SampleBlock {
         (xs, ys, samples)
     }
 
-    /// Columns, rows and sample indices of the slots from `first` on, even past the last one.
+    /// Columns, rows and sample indices of the slots starting at `first`, even past the last slot.
     #[inline(always)]
     pub fn samples_from(&self, first: u32) -> ([u32; PACKET_SIZE], [u32; PACKET_SIZE], [u32; PACKET_SIZE]) {
         let [mut xs, mut ys, mut samples] = [[0; PACKET_SIZE]; 3];
@@ -148,7 +148,8 @@ impl SampleBlock {
     }
 }
 
-/// Integer division by a constant, in `f64`, as no vector instruction divides integers.
+/// Integer division by a constant, computed in `f64` because there are no vector instructions for integer
+/// division.
 #[derive(Clone, Copy)]
 struct Divisor {
     inverse: f64,
@@ -160,8 +161,8 @@ impl Divisor {
         Self { inverse: 1.0 / f64::from(divisor) }
     }
 
-    /// ⌊n/d⌋ as (n + ½)/d − ½, rounded by adding 3·2⁵¹: exact for d ≤ 2¹⁹ and n < 2³¹, as rounding errors are then less than
-    /// ½/d.
+    /// ⌊n/d⌋, computed as (n + ½)/d − ½ and rounded by adding 3·2⁵¹. Exact for d ≤ 2¹⁹ and n < 2³¹, where
+    /// rounding errors are less than ½/d.
     #[inline(always)]
     fn quotient(self, number: u32) -> u32 {
         const LARGE: f64 = (3_u64 << 51) as f64;

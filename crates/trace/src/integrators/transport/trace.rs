@@ -6,7 +6,7 @@ use crate::control::Cancelled;
 use crate::geometry::Ray;
 use crate::world::{Hit, PACKET_SIZE};
 
-/// Number of rays between two polls of the token.
+/// Number of rays between checks of the cancel token.
 const POLL_INTERVAL: usize = 256;
 
 impl TileContext<'_> {

@@ -22,46 +22,46 @@ pub struct Vertex<'a> {
     pub material: &'a Material,
     /// [`Ray::start`] of rays that leave the vertex.
     start: u32,
-    /// Origins for rays on either side, if they are known more precisely than from the error bound of the surface.
+    /// Origins for rays on either side, if known more precisely than from the surface's error bound.
     sides: Option<OffsetPoints>,
     /// Whether the path hits the front face.
     pub is_front: bool,
-    /// Whether the surface has texture coordinates; set only for materials that need tangents.
+    /// Whether the surface has texture coordinates. Set only for materials that need tangents.
     has_uv: bool,
-    /// Unit direction toward the viewer, from which the path arrives.
+    /// Unit direction toward the viewer, opposite to the path's ray.
     pub wo: Vec3,
     /// Geometric normal on the viewer's side.
     pub normal: Vec3,
-    /// −1 if the viewer is on the back side, otherwise 1.
+    /// −1 if the viewer is on the back side, and otherwise 1.
     side: f32,
     /// Point for texture lookups.
     pub texture_point: TexturePoint,
-    /// The ray cone of the path at the surface.
+    /// The path's ray cone at the surface.
     pub cone: RayCone,
-    /// Vertex color, which multiplies the material's color. `None` if it has none.
+    /// Vertex color, multiplied with the material's color. `None` if there is no vertex color.
     pub color: Option<Vec3>,
-    /// Mean curvature, > 0 if the surface bulges toward the viewer; computed only for specular surfaces.
+    /// Mean curvature, positive if the surface bulges toward the viewer. Computed only for specular surfaces.
     pub curvature: f32,
 }
 
 impl<'a> Vertex<'a> {
-    /// The vertex at a hit.
+    /// Creates the vertex at a hit.
     pub fn new(tile: &TileContext<'a>, path: &PathRay, hit: &Hit) -> Self {
         Self::with_surface(tile, path, hit, tile.world.geometry.surface(&path.ray, hit))
     }
 
-    /// The vertex at a hit, computing only what its material needs.
+    /// Creates the vertex at a hit, computing only what the material needs.
     pub fn for_shading(tile: &TileContext<'a>, path: &PathRay, hit: &Hit) -> Self {
         Self::shaded(tile, path, (&path.ray, hit), hit.shape.t)
     }
 
-    /// The vertex at a hit whose surface is already computed.
+    /// Creates the vertex at a hit, given its surface.
     pub fn with_surface(tile: &TileContext<'a>, path: &PathRay, hit: &Hit, surface: SurfacePoint) -> Self {
         Self::at_surface(tile, path, tile.world.material_index(hit), surface, hit, hit.shape.t)
     }
 
-    /// The vertex on a surface coincident with the surface hit at this distance, where the segment between the two
-    /// origins hits it.
+    /// Creates the vertex on a surface that coincides with the surface hit at this distance. `hit` is along
+    /// the segment between the two origins.
     pub fn touching(
         tile: &TileContext<'a>,
         path: &PathRay,
@@ -79,7 +79,7 @@ impl<'a> Vertex<'a> {
         Self::at_surface(tile, path, index, surface, hit, distance)
     }
 
-    // Inlined because surfaces are large, and each call would copy them.
+    // Inlined because each call would copy the surface, which is large.
     #[inline(always)]
     fn at_surface(
         tile: &TileContext<'a>,
@@ -94,7 +94,7 @@ impl<'a> Vertex<'a> {
         let wo = -path.ray.direction;
         let side = if surface.normal.dot(wo) < 0.0 { -1.0 } else { 1.0 };
         let cone = path.cone.at_distance(distance);
-        // Compute what ray cones need, if they are used.
+        // Compute the footprint and curvature for ray cones, if used.
         let has_beam = tile.pixel_spread > 0.0;
         let footprint = |tangents| match has_beam && tile.world.is_mipmapped(index) {
             true => Footprint::of_cone(cone.width.abs(), path.ray.direction, surface.normal, tangents),
@@ -126,15 +126,15 @@ impl<'a> Vertex<'a> {
         self.material.emission.emits_from(self.is_front)
     }
 
-    /// The radiance emitted toward the path. If light samples compete with the path, textures are looked up at the
-    /// point without filtering, as light samples do.
+    /// Radiance emitted toward the path. If light samples compete with the path, textures are looked up
+    /// without filtering, as in light samples.
     pub fn emitted_radiance(&self, path: &PathRay, counters: &mut RayCounters) -> Vec3 {
         let is_shared = path.state.pdf > 0.0;
         let at = self.lookup_point(is_shared);
         self.material.emission.at(&at, self.normal.dot(self.wo), &mut counters.texture_lookups)
     }
 
-    /// The point for texture lookups, without its footprint if light samples compete with the path.
+    /// Point for texture lookups, without the footprint if light samples compete with the path.
     pub fn lookup_point(&self, is_shared: bool) -> Cow<'_, TexturePoint> {
         match is_shared {
             true => Cow::Owned(self.texture_point.without_extent()),
@@ -148,8 +148,8 @@ impl<'a> Vertex<'a> {
         self.color.map_or(color, |own| color * own)
     }
 
-    /// Transmittance of a thin pane at this vertex. If light samples compete with the path, the texture is looked up at
-    /// the point without filtering, as shadow rays do.
+    /// Transmittance of a thin pane at this vertex. If light samples compete with the path, the texture is
+    /// looked up without filtering, as for shadow rays.
     pub fn pane_transmittance(&self, path: &PathRay, pane: &ThinDielectric, lookups: &mut u64) -> Vec3 {
         let is_shared = path.state.pdf > 0.0;
         let at = self.lookup_point(is_shared);
@@ -169,7 +169,7 @@ impl<'a> Vertex<'a> {
         self.sides = Some(sides);
     }
 
-    /// The vertex for transmitted light, on the side that the viewer does not see.
+    /// Vertex for transmitted light, on the side facing away from the viewer.
     pub fn behind(&self) -> Self {
         let turned =
             |OffsetPoints { before, beyond }: OffsetPoints| OffsetPoints { before: beyond, beyond: before };
@@ -182,7 +182,7 @@ impl<'a> Vertex<'a> {
         }
     }
 
-    /// The shading normal on the front side: interpolated, then perturbed by the normal or bump map.
+    /// Shading normal on the front side: interpolated, then perturbed by the normal or bump map.
     pub fn front_shading_normal(&self, counters: &mut RayCounters) -> Vec3 {
         let surface = &self.surface;
         let Some(normal_perturbation) = &self.material.normal_perturbation else {
@@ -200,12 +200,13 @@ impl<'a> Vertex<'a> {
         Shading { normal, smooth_normal, shading_normal_cosine }
     }
 
-    /// The ray cone after specular reflection or refraction.
+    /// Ray cone after specular reflection or refraction.
     pub fn cone_after(&self, event: SpecularEvent) -> RayCone {
         self.cone.after_specular(event, self.curvature, self.wo.dot(self.normal))
     }
 
-    /// Reflectance of a mirror at this vertex, using the shading normal; textures count as white unless `is_colored`.
+    /// Reflectance of a mirror at this vertex, using the shading normal. Textures are treated as white unless
+    /// `is_colored` is true.
     pub fn mirror_reflectance(
         &self,
         mirror: &Mirror,
@@ -226,7 +227,7 @@ impl<'a> Vertex<'a> {
         coated.fresnel(shading.normal.dot(self.wo).abs().min(1.0))
     }
 
-    /// ∂p/∂u; zero on a mesh without texture coordinates, as its barycentric coordinates do not define u.
+    /// ∂p/∂u, or zero on a mesh without texture coordinates, where u is not defined.
     pub fn tangent(&self) -> Vec3 {
         if self.has_uv { self.surface.dpdu } else { Vec3::ZERO }
     }
@@ -246,15 +247,16 @@ impl<'a> Vertex<'a> {
         }
     }
 
-    /// Origin of shadow rays. On a smooth mesh, lights are sampled from a point above the facet, if the segment to that
-    /// point is unoccluded, so that neighboring facets do not shadow what the normals say is lit. Light at that point
-    /// reaches the facet without passing around a corner of a closed surface. Otherwise the origin is on the facet, and
-    /// nothing behind the facet is visible. This also applies to vertices that the camera does not see, where testing
-    /// the segment would cost a ray without a visible difference.
+    /// Origin of shadow rays. On a smooth mesh, lights are sampled from a point above the facet if the
+    /// segment to this point is unoccluded. Neighboring facets then do not shadow areas that are lit
+    /// according to the shading normals. Light that reaches the point also reaches the facet without passing
+    /// around a corner of a closed surface. Otherwise, the origin is on the facet, and nothing behind the
+    /// facet is visible. Vertices that the camera does not see also use the facet, because testing the
+    /// segment would cost a ray without a visible difference.
     pub fn shadow_origin(&self, tile: &TileContext<'_>, only_specular_before: bool) -> ShadowOrigin {
         let SurfacePoint { point, error, shadow_point, shading_normal, normal, .. } = self.surface;
         if let Some(sides) = self.sides {
-            // No ray at rough glass may pass through its own facet.
+            // Rays from rough glass must not pass through their own facet.
             let is_perturbed = shading_normal != normal && self.material.bsdf.glass().is_some();
             let horizon = is_perturbed.then_some(self.normal);
             return ShadowOrigin { point: sides.before, start: Ray::NO_TRIANGLE, horizon, lift: None };
@@ -271,8 +273,8 @@ impl<'a> Vertex<'a> {
     }
 }
 
-/// Whether lifting a point from its facet to `to` is far enough to matter, and the `t_max` of the segment: 1 at the
-/// point, plus a margin for the error.
+/// Whether the distance from a facet to the lifted point `to` is significant, and the segment's `t_max`: 1 at
+/// the point, plus a margin for the error.
 #[inline(always)]
 pub fn lift_segment(on_facet: Vec3, to: Vec3, normal: Vec3, error: Vec3) -> (bool, f32) {
     let lift = Ray { t_max: 1.0, ..Ray::new(on_facet, to - on_facet) };
@@ -280,7 +282,7 @@ pub fn lift_segment(on_facet: Vec3, to: Vec3, normal: Vec3, error: Vec3) -> (boo
     (is_above, lift.beyond(error).t_max)
 }
 
-/// Minimum lift, in units of the point's error; below it, the facet serves as well.
+/// Minimum lift, in units of the point's error. Below it, the point on the facet is used.
 const MIN_LIFT: f32 = 8.0;
 
 /// Origin of shadow rays.
@@ -290,9 +292,11 @@ pub struct ShadowOrigin {
     pub point: Vec3,
     /// [`Ray::start`] of rays in front of the facet.
     pub start: u32,
-    /// Horizon normal: nothing behind it is visible. `None` if the cosines or the shadow rays account for this.
+    /// Horizon normal. Directions behind it are occluded. `None` if the cosines or the shadow rays account
+    /// for this.
     pub horizon: Option<Vec3>,
-    /// A point above it, from which lights in all directions are sampled instead if the segment to it is unoccluded.
+    /// A point above the facet. If the segment to this point is unoccluded, it is used as the origin for
+    /// lights in all directions.
     pub lift: Option<Lift>,
 }
 
@@ -301,12 +305,12 @@ pub struct ShadowOrigin {
 pub struct Lift {
     /// The point.
     pub to: Vec3,
-    /// `t_max` of the segment: 1 at the point, plus a margin for the error.
+    /// The segment's `t_max`: 1 at the point, plus a margin for the error.
     pub end: f32,
 }
 
 impl Shading {
-    /// The normals on the other side.
+    /// Returns the normals on the other side.
     pub fn behind(&self) -> Self {
         Self {
             normal: -self.normal,
@@ -322,13 +326,13 @@ pub struct Shading {
     pub normal: Vec3,
     /// The interpolated normal.
     pub smooth_normal: Vec3,
-    /// The cosine between the two. `None` if they are equal.
+    /// The cosine between the two normals. `None` if they are equal.
     pub shading_normal_cosine: Option<f32>,
 }
 
 /// A vertex with a non-specular lobe, ready for direct lighting.
 pub struct ShadingVertex<'a> {
-    /// The path that arrived at the vertex.
+    /// The path whose ray hit the surface at this vertex.
     pub path: &'a PathRay,
     /// The medium on the lit side.
     pub interiors: &'a InteriorList,
@@ -336,7 +340,7 @@ pub struct ShadingVertex<'a> {
     pub place: u32,
     /// The vertex.
     pub vertex: &'a Vertex<'a>,
-    /// Its shading normals.
+    /// Shading normals of the vertex.
     pub shading: Shading,
     /// Its BSDF.
     pub bsdf: &'a RoughBsdf,

@@ -1,8 +1,8 @@
-//! Traces a path to its next interaction: an opaque surface, or a boundary where the index of refraction changes.
-//! Camera paths and photons share this code; a [`PathStepper`] handles the interaction.
+//! Traces a path to its next interaction: an opaque surface, or a boundary where the index of refraction
+//! changes. The code is shared by camera paths and photons. A [`PathStepper`] handles the interaction.
 //!
-//! Thin panes and stochastically transparent surfaces are null interactions: they leave the path vertex and its pdf
-//! unchanged, as for shadow rays.
+//! Thin panes and stochastically transparent surfaces are null interactions. They change neither the path
+//! vertex nor its pdf, just as for shadow rays.
 
 use super::crossing::{Crossing, CrossingMemory};
 use super::interface::PASSED;
@@ -17,7 +17,7 @@ use crate::math::Vec3;
 use crate::sampling::Dimension;
 use crate::world::{Hit, MAX_NULL_INTERACTIONS, OffsetPoints};
 
-/// Maximum number of surfaces without a change of medium that a ray passes in one walk.
+/// Maximum number of surfaces without a change of medium that a ray can pass in one walk.
 pub const MAX_HIDDEN: usize = 64;
 
 /// The interaction at which a walk ends.
@@ -41,25 +41,26 @@ pub struct Interface<'v> {
     pub rough: Option<GlassPoint>,
 }
 
-/// Handles the interactions of paths: the wavefront of camera paths or of photons.
+/// Handles the interactions of paths. Implemented by the wavefronts of camera paths and photons.
 pub trait PathStepper<'a> {
-    /// Context of the tile.
+    /// Tile context.
     fn tile(&self) -> &'a TileContext<'a>;
 
     /// Buffers for the search for coincident surfaces.
     fn crossing(&mut self) -> &mut CrossingMemory;
 
-    /// Records that the path passed a surface; `next` is the next hit behind it.
+    /// Records that the path passed a surface. `next` is the next hit behind the surface.
     fn record_pass(&mut self, path: &PathRay, next: Option<Hit>);
 
-    /// Handles the interaction that ends a walk. The path's ray is the arriving one, in the medium before the surface,
-    /// with absorption already in its throughput. `has_passed` says whether the walk passed any surface inside glass.
+    /// Handles the interaction that ends a walk. The path contains the incoming ray, in the medium before the
+    /// surface, and its throughput includes absorption. `has_passed` is true if the walk passed any surface
+    /// inside glass.
     fn interact(&mut self, path: &PathRay, reached: Interaction<'_, 'a>, has_passed: bool);
 
-    /// The counter of texture lookups.
+    /// Texture lookup counter.
     fn lookups(&mut self) -> &mut u64;
 
-    /// Handles a thin pane. The path is as for [`PathStepper::interact`].
+    /// Handles a thin pane. The path has the same state as in [`PathStepper::interact`].
     fn hit_pane(
         &mut self,
         path: &PathRay,
@@ -69,14 +70,14 @@ pub trait PathStepper<'a> {
     ) -> NullInteraction;
 }
 
-/// Outcome at a surface through which light may pass straight.
+/// Outcome at a surface that light may pass without changing direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum NullInteraction {
-    /// The path passes, with this factor on its throughput.
+    /// The path passes, and its throughput is multiplied by this factor.
     Passed(Vec3),
-    /// The surface is opaque here.
+    /// The surface is opaque at this point.
     Opaque,
-    /// The path ends, or continues elsewhere.
+    /// The path ends, or continues in another direction.
     Ended,
 }
 
@@ -85,7 +86,7 @@ pub enum NullInteraction {
 struct Segment {
     /// The last vertex, if any surface was passed.
     origin: Vec3,
-    /// Distance from it to the origin of the path's current ray.
+    /// Distance from the last vertex to the origin of the path's current ray.
     distance: f32,
     /// Number of surfaces passed.
     count: u32,
@@ -95,13 +96,14 @@ impl Segment {
     /// The segment of a path that has not passed any surface.
     const DIRECT: Self = Self { origin: Vec3::ZERO, distance: 0.0, count: 0 };
 
-    /// Extends the segment past one more surface, which the path hits at a distance.
+    /// Extends the segment past another surface, which the path hits at this distance.
     fn behind(self, path: &PathRay, distance: f32) -> Self {
         let origin = if self.count == 0 { path.ray.origin } else { self.origin };
         Self { origin, distance: self.distance + distance, count: self.count + 1 }
     }
 
-    /// Moves the origin of the path's ray back to its last vertex, and returns the hit with the distance from there.
+    /// Moves the ray origin back to the path's last vertex, and returns the hit with the distance from that
+    /// vertex.
     #[inline(always)]
     fn straighten(&self, path: &mut PathRay, mut hit: Hit) -> Hit {
         if self.count > 0 {
@@ -121,8 +123,8 @@ pub enum OpaqueHit {
     Touching(Hit),
 }
 
-/// Walks from the hit of a path's ray to its next interaction, updating the path; `surface` is the surface at the hit,
-/// if it is known. Paths and vertices are large, so they are not moved.
+/// Walks from the hit of a path's ray to the next interaction, updating the path. `surface` is the surface at
+/// the hit, if known. Paths and vertices are large, so they are not moved.
 #[inline(always)]
 pub fn walk<'a, W: PathStepper<'a>>(
     stepper: &mut W,
@@ -137,7 +139,7 @@ pub fn walk<'a, W: PathStepper<'a>>(
             Some(surface) => Vertex::with_surface(tile, path, &hit, surface),
             None => Vertex::for_shading(tile, path, &hit),
         };
-        // Stop at an opaque surface, or pass it as a null interaction.
+        // Stop at an opaque surface, or pass the surface as a null interaction.
         if vertex.material.bsdf.glass().is_none() {
             path.throughput *= absorption(tile.world, &path.interiors, hit.shape.t);
             if vertex.material.has_null_interaction() {
@@ -168,7 +170,7 @@ pub fn walk<'a, W: PathStepper<'a>>(
             }
             let mut far = path.interiors;
             if vertex.material.bsdf.is_transmissive() && tile.world.has_glass() {
-                // Light may arrive from glass that touches the surface.
+                // The path may be inside glass that touches the surface.
                 let crossing = tile.crossing(path, &vertex, &hit, stepper.crossing());
                 if let Some([_, near]) = crossing.before {
                     path.interiors = near;
@@ -231,7 +233,7 @@ pub fn walk<'a, W: PathStepper<'a>>(
     stepper.interact(path, Interaction::Hidden, true);
 }
 
-/// The rough surface between two media with different indices of refraction. `None` if it is smooth.
+/// Rough surface between two media with different indices of refraction. `None` if it is smooth.
 #[cold]
 #[inline(never)]
 fn rough_boundary<'a, W: PathStepper<'a>>(
@@ -252,7 +254,7 @@ fn rough_boundary<'a, W: PathStepper<'a>>(
     Some(GlassPoint { near: indices[0], far: indices[1], alpha })
 }
 
-/// Decides whether a path passes a surface through which light may pass straight.
+/// Determines whether a path passes a surface that light may pass without changing direction.
 #[cold]
 #[inline(never)]
 fn null_interaction<'a, W: PathStepper<'a>>(
@@ -287,8 +289,8 @@ fn stops_at_touching<'a, W: PathStepper<'a>>(stepper: &mut W, path: &PathRay, ve
     }
 }
 
-/// Opacity of the surface at a vertex. If light samples compete with the path, the texture is looked up at the point
-/// without filtering, as shadow rays do.
+/// Opacity of the surface at a vertex. If light samples compete with the path, the texture is looked up
+/// without filtering, as for shadow rays.
 pub fn opacity_at(path: &PathRay, vertex: &Vertex<'_>, lookups: &mut u64) -> f32 {
     let Some(opacity) = &vertex.material.opacity else { return 1.0 };
     let is_shared = path.state.pdf > 0.0;
@@ -296,13 +298,13 @@ pub fn opacity_at(path: &PathRay, vertex: &Vertex<'_>, lookups: &mut u64) -> f32
     opacity.at(&at, lookups)
 }
 
-/// Randomly decides whether the surface is opaque here, by its opacity.
+/// Randomly decides whether the surface is opaque at this vertex, with a probability equal to its opacity.
 fn is_opaque(tile: &TileContext<'_>, path: &PathRay, vertex: &Vertex<'_>, lookups: &mut u64) -> bool {
     let chance = opacity_at(path, vertex, lookups);
     chance >= 1.0 || tile.sampler(path.slot).pair(path.path, Dimension::Opacity).x < chance
 }
 
-/// The path after a null interaction.
+/// Path after a null interaction.
 fn past_surface(path: PathRay, vertex: &Vertex<'_>, part: Vec3) -> PathRay {
     PathRay {
         ray: vertex.spawn_ray(path.ray.direction),
@@ -315,8 +317,8 @@ fn past_surface(path: PathRay, vertex: &Vertex<'_>, part: Vec3) -> PathRay {
 }
 
 impl TileContext<'_> {
-    /// The first hit along a camera ray, starting with `hit`, at which the surface is opaque, and the path that reaches
-    /// it. `None` if there is none.
+    /// Returns the first opaque hit along a camera ray, starting with `hit`, and the path that reaches it.
+    /// `None` if there is no opaque hit.
     pub fn first_opaque_hit(
         &self,
         path: &PathRay,
@@ -335,7 +337,7 @@ impl TileContext<'_> {
         None
     }
 
-    /// Randomly decides between reflection, with this probability, and refraction.
+    /// Randomly chooses between reflection and refraction. `reflectance` is the probability of reflection.
     #[inline]
     pub fn chooses_reflection(&self, path: &PathRay, reflectance: f32) -> bool {
         self.sampler(path.slot).pair(path.path, Dimension::Fresnel).x < reflectance

@@ -1,4 +1,4 @@
-//! Open rims that end at opaque surfaces: there, light reaches the other side only through the glass.
+//! Open rims that end at opaque surfaces, where light can reach the other side only through the glass.
 
 use super::parts::{GlassParts, MeshGlass, RimEdge, glass_of};
 use crate::accel::Bvh;
@@ -11,7 +11,7 @@ use crate::scene::description::{Lowered, Mesh, Scene};
 /// Maximum number of edges examined per hole.
 const MAX_RIM_EDGES: usize = 64;
 
-/// Search distance beyond a rim, relative to the length of the ray toward it.
+/// Search distance beyond a rim, relative to the length of the ray toward the rim.
 const REACH: f64 = 1e-3;
 
 /// Queries per edge: two rays and two points.
@@ -20,17 +20,17 @@ const QUERIES: usize = 4;
 /// A query for opaque surfaces.
 #[derive(Clone, Copy)]
 enum OpaqueQuery {
-    /// Does this ray hit one?
+    /// Whether this ray hits an opaque surface.
     Way(RayF64),
-    /// Is one within this distance of this point?
+    /// Whether an opaque surface is within this distance of this point.
     Point(DVec3, f64),
 }
 
-/// Returns, for each hole, the fraction of its rim (by length) that opaque surfaces cover.
+/// Returns, for each hole, the fraction of its rim (by length) covered by opaque surfaces.
 ///
-/// An edge is covered if a ray toward its midpoint, from its triangle or from the center of the hole, hits an opaque surface at
-/// the midpoint or slightly beyond. It is also covered if both endpoints are on opaque surfaces, which the chord between them may
-/// not touch if they are curved.
+/// An edge is covered if a ray toward its midpoint, from its triangle or from the center of the hole, hits an
+/// opaque surface at the midpoint or slightly beyond. It is also covered if both endpoints are on opaque
+/// surfaces. If these surfaces are curved, the chord between the endpoints may not touch them.
 pub(super) fn covered(
     scene: &Scene,
     meshes: &[&LoadedMesh],
@@ -57,13 +57,13 @@ pub(super) fn covered(
     Ok(examined.into_iter().map(part).collect())
 }
 
-/// A uniform selection of a hole's edges.
+/// Returns a uniform selection of a hole's edges.
 fn examined(rims: &[RimEdge]) -> Vec<&RimEdge> {
     let step = rims.len().div_ceil(MAX_RIM_EDGES).max(1);
     rims.iter().step_by(step).collect()
 }
 
-/// The queries for a hole's edges, [`QUERIES`] for each.
+/// Returns the queries for a hole's edges, [`QUERIES`] per edge.
 fn queries<'a>(parts: &'a GlassParts, rims: &'a [&RimEdge]) -> impl Iterator<Item = OpaqueQuery> + 'a {
     let middle_of = |rim: &RimEdge| (rim.ends[0] + rim.ends[1]) * 0.5;
     let center = rims.iter().map(|rim| middle_of(rim)).sum::<DVec3>() / rims.len().max(1) as f64;
@@ -99,8 +99,8 @@ impl OpaqueQuery {
         }
     }
 
-    /// Whether a shape satisfies the query. One of three orthogonal segments makes an angle of at least 35° with the surface, so
-    /// it hits a surface at distance d within √3·d.
+    /// Whether a shape satisfies the query. Of three orthogonal segments, at least one is at an angle of at
+    /// least 35° to the surface, so it hits a surface at distance d within √3·d.
     fn meets_shape(&self, shape: &Shape) -> bool {
         match *self {
             Self::Way(way) => shape.intersect(&way).is_some(),
@@ -123,7 +123,7 @@ fn evaluate(
 ) -> Result<Vec<bool>, Cancelled> {
     let bounds: Vec<Aabb> = queries.iter().map(OpaqueQuery::bounds).collect();
     let all = bounds.iter().fold(Aabb::EMPTY, |all, own| all.union(*own));
-    // Use a tree over the queries: there are many of them and many surfaces.
+    // Use a tree over the queries because there are many queries and many surfaces.
     let tree = Bvh::build(&bounds, token)?;
     let mut evaluate = vec![false; queries.len()];
     for object in &scene.objects {
@@ -155,7 +155,7 @@ fn evaluate(
     Ok(evaluate)
 }
 
-/// The triangles of a placed mesh, in coordinates relative to `origin`.
+/// Returns the triangles of a placed mesh, in coordinates relative to `origin`.
 pub(super) fn triangles<'a>(
     placed: &Mesh,
     loaded: &'a LoadedMesh,
@@ -179,7 +179,7 @@ fn crosses(way: &RayF64, [a, b, c]: [DVec3; 3]) -> bool {
     u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t > 0.0 && t <= way.t_max
 }
 
-/// Squared distance of a point from a triangle.
+/// Squared distance between a point and a triangle.
 fn distance_squared(point: DVec3, [a, b, c]: [DVec3; 3]) -> f64 {
     let normal = (b - a).cross(c - a);
     let sides = [[a, b], [b, c], [c, a]];
@@ -203,7 +203,7 @@ mod tests {
     use crate::math::random::unit;
 
     #[test]
-    fn triangle_distance_is_to_its_nearest_point() {
+    fn triangle_distance_uses_the_nearest_point() {
         let mut next = unit(3);
         let mut place = || DVec3::from_array(std::array::from_fn(|_| f64::from(next()) * 2.0 - 1.0));
         for _ in 0..300 {

@@ -1,4 +1,4 @@
-//! Cavities: closed meshes whose front faces inward, inside another solid of the same glass.
+//! Cavities: closed meshes with inward-facing fronts inside another solid of the same glass.
 
 use super::caps::triangles;
 use super::parts::GlassId;
@@ -12,22 +12,23 @@ use crate::scene::description::Scene;
 pub(super) struct ClosedSolid {
     /// Its objects.
     pub objects: Vec<u32>,
-    /// Enclosed volume; negative if the front faces inward.
+    /// Enclosed volume. Negative if the front faces inward.
     pub volume: f64,
-    /// Its type of glass.
+    /// Type of glass.
     pub substance: GlassId,
 }
 
-/// Direction of the rays that count surfaces; chosen so that no man-made face is parallel to it.
+/// Direction of the rays used to count surfaces, chosen so that it is unlikely to be parallel to modeled
+/// faces.
 const PARITY_DIRECTION: DVec3 = DVec3::new(0.350_31, 0.812_77, 0.465_29);
 
-/// Number of vertices that must be inside for a mesh to be a cavity.
+/// Number of vertices tested, all of which must be inside for a mesh to be a cavity.
 const VERTICES: usize = 16;
 
-/// Finds cavities: pairs of the index of a cavity and of the solid around it.
+/// Finds cavities. Returns the index of each cavity and of the solid around it.
 ///
-/// A cavity belongs to the smallest solid around it. Large cavities are assigned first, so that a solid floating in a cavity is
-/// not taken to be inside the surrounding glass.
+/// A cavity belongs to the smallest solid around it. Large cavities are assigned first, so that a solid
+/// floating in a cavity is not considered to be inside the surrounding glass.
 pub(super) fn cavities(
     scene: &Scene,
     meshes: &[&LoadedMesh],
@@ -67,7 +68,8 @@ pub(super) fn cavities(
     Ok(found)
 }
 
-/// Whether all points are inside closed surfaces: rays from them hit an odd number of triangles.
+/// Whether all points are inside closed surfaces, which means that rays from the points hit an odd number of
+/// triangles.
 fn are_inside(points: &[DVec3], triangles: impl Iterator<Item = [DVec3; 3]>) -> bool {
     let mut hits = vec![0_u32; points.len()];
     for corners in triangles {
@@ -78,8 +80,9 @@ fn are_inside(points: &[DVec3], triangles: impl Iterator<Item = [DVec3; 3]>) -> 
     !hits.is_empty() && hits.iter().all(|hits| hits % 2 == 1)
 }
 
-/// Whether the ray from a point along [`PARITY_DIRECTION`] hits a triangle. At a shared edge, exactly one triangle is hit: the edge's
-/// product is computed from its endpoints in the same order for both.
+/// Whether the ray from a point along [`PARITY_DIRECTION`] hits a triangle. At a shared edge, exactly one
+/// triangle is hit because the edge's product is computed from the endpoints in the same order for both
+/// triangles.
 fn is_ahead(point: DVec3, corners: [DVec3; 3]) -> bool {
     let [a, b, c] = corners.map(|corner| corner - point);
     let side = |p: DVec3, q: DVec3| {

@@ -1,17 +1,19 @@
-//! Glass solids: which surfaces enclose one volume of glass together.
+//! Glass solids: determines which surfaces together enclose one volume of glass.
 //!
-//! A ray that enters glass through one object and leaves through another was inside one solid only if both objects bound the same
-//! solid. Glass objects that enclose nothing on their own (meshes, quads, triangles, disks, tubes) form one solid if they close
-//! each other: their rims coincide within rounding, possibly after splitting at the ends of other rims, and the surface continues
-//! from front to front. They must have the same index of refraction and tint, so that the interior does not depend on where a ray
-//! entered. A part whose front faces the other way than its neighbors' is flipped, and so is a solid whose front faces inward. A
-//! solid is identified by its last object in file order.
+//! A ray that enters glass through one object and leaves through another was inside one solid only if both
+//! objects bound the same solid. Glass objects that do not enclose a volume individually (meshes, quads,
+//! triangles, disks, tubes) form one solid if they close each other. This means that their rims coincide up
+//! to rounding, possibly after splitting at the ends of other rims, and that the surface continues from front
+//! to front. They must have the same index of refraction and tint, so that the interior does not depend on
+//! where a ray entered. A part is flipped if its orientation differs from its neighbors', and so is a solid
+//! whose front faces inward. A solid is identified by its last object in file order.
 //!
-//! A closed mesh whose front faces inward is a cavity if it is entirely inside another solid of the same glass. A hollow sphere
-//! of two meshes is therefore one solid, just as if both were in one file.
+//! A closed mesh whose front faces inward is a cavity if it is entirely inside another solid of the same
+//! glass. A hollow sphere consisting of two meshes is therefore one solid, just as if both were in one file.
 //!
-//! A solid with a hole is open, unless opaque surfaces surround the hole. No ray can know whether it is inside open glass: its
-//! surface determines the medium only of rays that arrive or leave there (`integrators::crossing`).
+//! A solid with a hole is open, unless the hole is surrounded by opaque surfaces. It is unknown whether a ray
+//! is inside open glass. The surface of open glass therefore only affects the medium of rays that hit the
+//! surface or leave it (`integrators::crossing`).
 
 mod caps;
 mod cavities;
@@ -29,24 +31,25 @@ use crate::control::{CancelToken, Cancelled};
 use crate::math::DVec3;
 use crate::scene::description::Scene;
 
-/// Largest missing fraction of a solid's surface at which it still counts as closed.
+/// Maximum missing fraction of the surface of a solid that is considered closed.
 const SMALL_HOLE: f64 = 1e-3;
 
-/// Missing fraction of a solid's surface up to which a hole is only rounding.
+/// Maximum missing fraction of a solid's surface at which a hole is attributed to rounding.
 const NO_HOLE: f64 = 1e-7;
 
-/// Volume below which a solid encloses nothing, relative to a cube of about the same surface area.
+/// Volume below which a solid is considered to enclose no volume, relative to a cube of about the same
+/// surface area.
 const NO_VOLUME: f64 = 1e-9;
 
-/// Minimum fraction of a rim that opaque surfaces must cover to close it.
+/// Minimum fraction of a rim that must be covered by opaque surfaces to close it.
 const COVERED: f64 = 0.95;
 
-/// The glass solids of a scene.
+/// Glass solids of a scene.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct GlassSolids {
-    /// Role of each object. Empty if every object is a solid of its own and none is open.
+    /// Role of each object. Empty if every object is a separate solid and no solids are open.
     parts: Vec<ObjectRole>,
-    /// The glass objects with open rims.
+    /// Glass objects with open rims.
     open: Vec<OpenGlass>,
     /// One object of each closed solid that encloses no volume.
     flat: Vec<u32>,
@@ -65,11 +68,11 @@ struct ObjectRole {
 pub struct OpenGlass {
     /// The object.
     pub object: u32,
-    /// Number of its edges that no other surface closes.
+    /// Number of the object's edges that are not closed by another surface.
     pub edges: usize,
     /// Missing fraction of the solid's surface. Can exceed 1 for surfaces that are mostly hole.
     pub missing: f64,
-    /// Whether its open edges coincide with edges of surfaces that face the other way.
+    /// Whether the object's open edges coincide with edges of surfaces with the opposite orientation.
     pub disagrees: bool,
     /// Whether opaque surfaces surround the hole.
     pub is_covered: bool,
@@ -87,7 +90,7 @@ impl GlassSolids {
         }
         let mut shared_edges = SharedEdges::between(&parts.list, &parts.rims, token)?;
         let groups = PartGroups::of(&parts, &shared_edges);
-        // Reopen edges between parts whose orientations disagree with the rest of their common border.
+        // Reopen edges where the orientations of two parts differ from the rest of their common border.
         let is_odd = |seam: &&SharedEdge| groups.disagree(seam.parts()) != seam.disagrees;
         let odd: Vec<OpenEdge> =
             shared_edges.joined.iter().filter(is_odd).flat_map(|seam| seam.rims).collect();
@@ -128,7 +131,8 @@ impl GlassSolids {
         Ok(solids)
     }
 
-    /// Merges a cavity into the solid around it. The cavity's front stays on the outside of the glass, facing the empty space.
+    /// Merges a cavity into the solid around it. The cavity's front remains the outside of the glass, facing
+    /// the empty space.
     fn join(&mut self, cavity: &[u32], around: &[u32]) {
         let objects = || cavity.iter().chain(around).map(|&object| object as usize);
         let place = objects().map(|object| self.parts[object].place).max().unwrap_or_default();
@@ -142,12 +146,12 @@ impl GlassSolids {
         }
     }
 
-    /// The object that identifies an object's solid.
+    /// Object that identifies an object's solid.
     pub fn place(&self, object: u32) -> u32 {
         self.parts.get(object as usize).map_or(object, |part| part.place)
     }
 
-    /// Whether the object's front faces the inside of its solid.
+    /// Whether the object's front faces the inside of the solid.
     pub fn is_inside_out(&self, object: u32) -> bool {
         self.parts.get(object as usize).is_some_and(|part| part.is_inside_out)
     }
@@ -162,7 +166,8 @@ impl GlassSolids {
         self.parts.iter().any(|part| part.is_open)
     }
 
-    /// Objects of closed solids that enclose no volume, because every face is duplicated with the opposite orientation.
+    /// Objects of closed solids that enclose no volume because every face is duplicated with the opposite
+    /// orientation.
     pub fn flat(&self) -> &[u32] {
         &self.flat
     }
@@ -190,9 +195,9 @@ fn covered(
 
 /// Connected groups of parts.
 struct PartGroups {
-    /// The first part of each part's solid.
+    /// First part of each part's solid.
     roots: Vec<u32>,
-    /// Whether each part's front faces the other way than its first part's.
+    /// Whether each part's orientation differs from that of the first part of its solid.
     flips: Vec<bool>,
 }
 
@@ -204,7 +209,7 @@ impl PartGroups {
             same[one.max(other) as usize] = one.min(other);
         }
         let roots: Vec<u32> = (0..same.len() as u32).map(|part| root(&mut same, part)).collect();
-        // Two parts agree in orientation if most of their common border does.
+        // Two parts have the same orientation if this is the case for most of their common border.
         let mut borders = BTreeMap::new();
         for seam in &shared_edges.joined {
             let [one, other] = seam.parts();
@@ -238,12 +243,12 @@ impl PartGroups {
         Self { roots, flips: flips.into_iter().map(Option::unwrap_or_default).collect() }
     }
 
-    /// Whether the fronts of two parts of one solid face different ways.
+    /// Whether two parts of one solid have different orientations.
     fn disagree(&self, [one, other]: [u32; 2]) -> bool {
         self.flips[one as usize] != self.flips[other as usize]
     }
 
-    /// Volume and area of a solid, with its parts oriented like the first one.
+    /// Volume and area of a solid, with its parts oriented like the first part.
     fn volume(&self, parts: &GlassParts, members: &[u32]) -> (f64, f64) {
         let (mut volume, mut area) = (0.0, 0.0);
         for &part in members {
@@ -260,7 +265,8 @@ impl PartGroups {
         volume.abs() <= NO_VOLUME * area * area.sqrt()
     }
 
-    /// The solid as a candidate for cavities. `None` unless it consists only of consistently oriented meshes.
+    /// Returns the solid if it may be a cavity or contain one. `None` unless it consists only of consistently
+    /// oriented meshes.
     fn closed(&self, scene: &Scene, parts: &GlassParts, members: &[u32]) -> Option<ClosedSolid> {
         let objects: Vec<u32> = members.iter().map(|&part| parts.list[part as usize].object).collect();
         let are_meshes = objects.iter().all(|&object| scene.objects[object as usize].shape.mesh().is_some());
@@ -270,7 +276,7 @@ impl PartGroups {
         (are_meshes && do_agree).then_some(ClosedSolid { objects, volume, substance })
     }
 
-    /// The parts of each solid.
+    /// Returns the parts of each solid.
     fn members(&self) -> Vec<Vec<u32>> {
         let mut members = vec![Vec::new(); self.roots.len()];
         for (part, &root) in (0..).zip(&self.roots) {
@@ -280,11 +286,11 @@ impl PartGroups {
         members
     }
 
-    /// Whether the front of a solid's first part faces inward. Decided by the volume of a closed solid, and by most of the
-    /// surface of an open one.
+    /// Whether the front of a solid's first part faces inward, based on the volume of a closed solid or on
+    /// most of the surface of an open solid.
     fn is_first_part_flipped(&self, parts: &GlassParts, members: &[u32], is_closed: bool) -> bool {
         if is_closed {
-            // Smaller volumes are rounding.
+            // Smaller volumes are attributed to rounding.
             let (volume, area) = self.volume(parts, members);
             return volume < -1e-9 * area * area.sqrt();
         }
@@ -294,17 +300,17 @@ impl PartGroups {
     }
 }
 
-/// The missing part of a solid's surface.
+/// Missing part of a solid's surface.
 struct Hole {
     rims: Vec<RimEdge>,
-    /// Whether each edge coincides with another edge of its solid, in the same direction.
+    /// Whether each edge coincides with another edge of the solid in the same direction.
     disagree: Vec<bool>,
-    /// The missing fraction of the surface.
+    /// Missing fraction of the surface.
     part: f64,
 }
 
 impl Hole {
-    /// The holes of all solids.
+    /// Returns the holes of all solids.
     fn of_all(
         parts: &GlassParts,
         groups: &PartGroups,
@@ -321,7 +327,7 @@ impl Hole {
         all.iter().map(hole).collect()
     }
 
-    /// The hole of a solid with these open edges.
+    /// Returns the hole of a solid with these open edges.
     fn of(parts: &GlassParts, groups: &PartGroups, members: &[u32], mut own: Vec<OpenEdge>) -> Self {
         if own.is_empty() {
             return Self { rims: Vec::new(), disagree: Vec::new(), part: 0.0 };
@@ -336,7 +342,7 @@ impl Hole {
         let disagree =
             own.chunk_by(|a, b| key(a.1) == key(b.1)).flat_map(|same| vec![same.len() > 1; same.len()]);
         let disagree = disagree.collect();
-        // Join edges into loops at common endpoints; the sum of p × q over a loop is twice the area that it spans.
+        // Join edges into loops at common endpoints. The sum of p × q over a loop is twice the loop's area.
         let mut sites: Vec<u32> = own.iter().flat_map(|&(_, sites)| sites).collect();
         sites.sort_unstable();
         sites.dedup();
@@ -357,7 +363,8 @@ impl Hole {
         Self { rims: own.into_iter().map(|(rim, _)| rim).collect(), disagree, part: missing / area }
     }
 
-    /// Reports on one part. `None` if it does not border the hole, or if the hole is just rounding error.
+    /// Describes the hole at one part. `None` if the part does not border the hole, or if the hole is
+    /// attributed to rounding.
     fn at(&self, part: u32, object: u32, is_covered: bool) -> Option<OpenGlass> {
         let own = || self.rims.iter().zip(&self.disagree).filter(|(rim, _)| rim.part == part);
         let edges = own().count();

@@ -1,4 +1,5 @@
-//! Parts of glass solids: objects that enclose nothing on their own, and the rims that their surfaces leave open.
+//! Parts of glass solids: objects that do not enclose a volume individually, and the open rims of their
+//! surfaces.
 
 use std::collections::HashMap;
 
@@ -12,28 +13,30 @@ use crate::scene::description::{MaterialKind, Mesh, NumberSource, Object, Scene,
 /// Chords per circular rim. All rims on one circle use the same points.
 const CHORDS: usize = 32;
 
-/// Relative rounding of coordinates in a file: single precision, or six decimal digits.
+/// Relative rounding of coordinates in a file, corresponding to single precision or six decimal digits.
 pub(super) const ROUNDING: f64 = 16.0 * f32::EPSILON as f64;
 
-/// A glass object that encloses nothing on its own.
+/// A glass object that does not enclose a volume by itself.
 #[derive(Clone, Debug)]
 pub(super) struct GlassPart {
     /// Object id.
     pub object: u32,
     /// Surface area.
     pub area: f64,
-    /// Integral of x·n/3 over the surface: its volume, if it is closed and its front faces outward.
+    /// Integral of x·n/3 over the surface, which is the volume if the surface is closed and its front faces
+    /// outward.
     pub volume: f64,
-    /// Position tolerance of its points.
+    /// Position tolerance of the part's points.
     pub tolerance: f64,
-    /// Its type of glass.
+    /// Type of glass.
     pub substance: GlassId,
 }
 
-/// Identifies a glass by the bit patterns of its index of refraction and transmittance. `None` for a mesh with several glasses.
+/// Type of glass, identified by the bit patterns of the index of refraction and transmittance. `None` for a
+/// mesh with several types of glass.
 pub(super) type GlassId = Option<[u64; 4]>;
 
-/// A straight edge of a part's boundary, directed so that the surface is on its left, seen from the front.
+/// A straight edge of a part's boundary, directed so that the surface is on its left as seen from the front.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RimEdge {
     /// Index of the part.
@@ -54,7 +57,7 @@ pub(super) struct GlassParts {
 }
 
 impl GlassParts {
-    /// Finds the parts in a scene.
+    /// Finds all parts in a scene.
     pub fn of(scene: &Scene, meshes: &[&LoadedMesh], token: &CancelToken) -> Result<Self, Cancelled> {
         let mut parts = Self::default();
         let mut open_of_file: HashMap<usize, Vec<[u32; 2]>> = HashMap::new();
@@ -115,7 +118,7 @@ impl GlassParts {
         self.list.len() as u32 - 1
     }
 
-    /// Adds a planar polygon with corners in counterclockwise order, seen from the front.
+    /// Adds a planar polygon with corners in counterclockwise order as seen from the front.
     fn add_polygon(&mut self, object: u32, corners: &[DVec3]) {
         let own: Vec<DVec3> = corners.iter().map(|&corner| corner - self.origin).collect();
         let halves = (1..own.len() - 1).map(|i| (own[i] - own[0]).cross(own[i + 1] - own[0]) * 0.5);
@@ -128,7 +131,7 @@ impl GlassParts {
         }
     }
 
-    /// Adds a circular rim of the last part, counterclockwise about a unit axis.
+    /// Adds a circular rim to the last part, counterclockwise about a unit axis.
     fn add_circle(&mut self, center: DVec3, axis: DVec3, radius: f64, inner: DVec3) {
         let part = self.list.len() as u32 - 1;
         // Rims on the same circle must have the same points in either direction.
@@ -196,7 +199,7 @@ impl GlassParts {
     }
 }
 
-/// A point on a shape.
+/// Returns a point on a shape.
 fn reference_point(shape: &Shape, meshes: &[&LoadedMesh]) -> DVec3 {
     let of_mesh = |placed: &Mesh| {
         let mesh = &meshes[placed.file].mesh;
@@ -206,16 +209,16 @@ fn reference_point(shape: &Shape, meshes: &[&LoadedMesh]) -> DVec3 {
     shape.point().or_else(|| shape.mesh().map(of_mesh)).unwrap_or(DVec3::ZERO)
 }
 
-/// Which triangles of a mesh are glass.
+/// Which of a mesh's triangles are glass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum MeshGlass {
-    /// All of them, or the object is not a mesh.
+    /// All triangles, or the object is not a mesh.
     All,
-    /// Those whose material in the mesh file is glass.
+    /// Triangles whose material in the mesh file is glass.
     Some,
 }
 
-/// Which part of an object is glass. `None` if none is.
+/// Returns which part of an object is glass, if any.
 pub(super) fn glass_of(scene: &Scene, meshes: &[&LoadedMesh], object: &Object) -> Option<MeshGlass> {
     match (object.material, object.shape.mesh()) {
         (Some(index), _) => scene.materials[index].kind.is_glass().then_some(MeshGlass::All),
@@ -226,7 +229,7 @@ pub(super) fn glass_of(scene: &Scene, meshes: &[&LoadedMesh], object: &Object) -
     }
 }
 
-/// The glass of a glass object.
+/// Type of glass of an object.
 fn substance_of(scene: &Scene, meshes: &[&LoadedMesh], object: &Object) -> GlassId {
     match (object.material, object.shape.mesh()) {
         (Some(index), _) => scene.materials[index].kind.substance(),
@@ -241,8 +244,8 @@ fn substance_of(scene: &Scene, meshes: &[&LoadedMesh], object: &Object) -> Glass
     }
 }
 
-/// Edges that no other triangle of the mesh closes, as pairs of triangle and edge number. Edges with equal endpoints close each
-/// other in pairs of opposite direction.
+/// Returns the edges not closed by another triangle of the mesh, as pairs of triangle and edge number. Edges
+/// with equal endpoints close each other in pairs of opposite direction.
 fn open_edges(mesh: &TriangleMesh) -> Vec<[u32; 2]> {
     let all = (0..mesh.triangles.len() as u32).flat_map(|triangle| (0..3).map(move |edge| [triangle, edge]));
     let open = unmatched(mesh, all, |vertex| vertex);
@@ -269,7 +272,8 @@ fn open_edges(mesh: &TriangleMesh) -> Vec<[u32; 2]> {
     unmatched(mesh, open.into_iter(), |vertex| first.get(&vertex).copied().unwrap_or(vertex))
 }
 
-/// Edges in `edges` that no other one closes. `place` maps coincident vertices to one representative.
+/// Returns the edges in `edges` that are not closed by another edge. `place` maps coincident vertices to one
+/// representative.
 fn unmatched(
     mesh: &TriangleMesh,
     edges: impl Iterator<Item = [u32; 2]> + Clone,
@@ -297,7 +301,7 @@ fn unmatched(
         sorted[*place as usize] = (a.max(b), a > b, edge);
         *place += 1;
     }
-    // Cancel edges with equal endpoints in pairs of opposite direction.
+    // Cancel pairs of edges with equal endpoints and opposite directions.
     let mut open = Vec::new();
     for range in starts.windows(2).filter(|range| range[0] < range[1]) {
         let own = &mut sorted[range[0] as usize..range[1] as usize];

@@ -1,4 +1,5 @@
-//! Shared edges: rim edges of the same glass that close each other, with the same endpoints and opposite directions.
+//! Shared edges: pairs of rim edges of the same glass that close each other because they have the same
+//! endpoints and opposite directions.
 
 use super::parts::{GlassId, GlassPart, RimEdge};
 use crate::accel::Bvh;
@@ -6,7 +7,7 @@ use crate::control::{CancelToken, Cancelled};
 use crate::geometry::Aabb;
 use crate::math::DVec3;
 
-/// Angle in radians within which surfaces that share an edge coincide.
+/// Angle in radians within which surfaces that share an edge are considered coincident.
 const SAME_ANGLE: f64 = 1e-3;
 
 /// A rim edge with the ids of its endpoints.
@@ -17,22 +18,22 @@ pub(super) type OpenEdge = (RimEdge, [u32; 2]);
 pub(super) struct SharedEdge {
     /// Both edges, with the ids of their endpoints.
     pub rims: [OpenEdge; 2],
-    /// Whether the parts' fronts are on opposite sides.
+    /// Whether the parts have opposite orientations.
     pub disagrees: bool,
 }
 
-/// Matched edges, and those left open.
+/// Matched edges and open edges.
 #[derive(Debug, Default)]
 pub(super) struct SharedEdges {
     pub joined: Vec<SharedEdge>,
-    /// Edges that nothing closes, with the ids of their endpoints.
+    /// Open edges, with the ids of their endpoints.
     pub open: Vec<OpenEdge>,
 }
 
 /// A rim edge normalized for matching.
 #[derive(Clone, Copy)]
 struct HalfEdge {
-    /// The endpoints, the lower id first.
+    /// Endpoint ids, lower id first.
     places: [u32; 2],
     /// Whether the edge runs from the higher to the lower id.
     is_back: bool,
@@ -55,7 +56,8 @@ impl SharedEdge {
 }
 
 impl SharedEdges {
-    /// Matches rim edges. Where more than two share an edge, those with glass between them close each other.
+    /// Matches rim edges. If more than two surfaces share an edge, surfaces with glass between them close
+    /// each other.
     pub fn between(parts: &[GlassPart], rims: &[RimEdge], token: &CancelToken) -> Result<Self, Cancelled> {
         let mut edges = Self::default();
         let sites = EdgeEndpoints::of(parts, rims, token)?;
@@ -63,13 +65,13 @@ impl SharedEdges {
         let halves = rims.iter().enumerate().map(|(i, rim)| (*rim, sites.of_rim(i)));
         let open = edges.join(parts, halves.collect());
         token.check()?;
-        // Split the rest at the endpoints of others, and match again.
+        // Split the remaining edges at the endpoints of other edges, and match again.
         let split = sites.cut(parts, &open, token)?;
         edges.open = edges.join(parts, split);
         Ok(edges)
     }
 
-    /// Matches edges of the same glass with the same endpoints; returns the rest.
+    /// Matches edges of the same glass with the same endpoints, and returns the remaining edges.
     fn join(&mut self, parts: &[GlassPart], rims: Vec<OpenEdge>) -> Vec<OpenEdge> {
         let half = |(rim, [from, to]): OpenEdge| HalfEdge {
             places: [from.min(to), from.max(to)],
@@ -79,7 +81,7 @@ impl SharedEdges {
         };
         let mut halves: Vec<HalfEdge> = rims.into_iter().map(half).collect();
         halves.retain(|half| half.places[0] != half.places[1]);
-        // Ties are broken by file order: the sort is stable.
+        // The sort is stable, so ties are broken by file order.
         halves.sort_by_key(|half| (half.places, half.substance, half.is_back, half.rim.part));
         let mut open = Vec::new();
         let is_same =
@@ -103,8 +105,8 @@ impl SharedEdges {
     }
 }
 
-/// Pairs of edges with glass between them: going around the common edge, a surface whose back faces forward, followed by one
-/// whose back faces backward.
+/// Returns pairs of edges with glass between them. In the order of angles around the common edge, a surface
+/// whose back faces forward is paired with the next surface if its back faces backward.
 fn around(same: &[HalfEdge]) -> impl Iterator<Item = [usize; 2]> {
     let ends =
         |half: &HalfEdge| if half.is_back { [half.rim.ends[1], half.rim.ends[0]] } else { half.rim.ends };
@@ -125,7 +127,7 @@ fn around(same: &[HalfEdge]) -> impl Iterator<Item = [usize; 2]> {
     };
     let mut order: Vec<(f64, usize)> = same.iter().enumerate().map(|(i, half)| (angle(half), i)).collect();
     order.sort_by(|one, other| one.0.total_cmp(&other.0).then(one.1.cmp(&other.1)));
-    // Where surfaces coincide, one solid ends before the next begins.
+    // If surfaces coincide, order them so that one solid ends before the next begins.
     for together in order.chunk_by_mut(|one, other| other.0 - one.0 < SAME_ANGLE) {
         together.sort_by_key(|&(_, i)| (same[i].is_back, i));
     }
@@ -136,7 +138,7 @@ fn around(same: &[HalfEdge]) -> impl Iterator<Item = [usize; 2]> {
         .filter(move |&[begin, end]| is_back[begin] && !is_back[end])
 }
 
-/// Endpoints of rim edges, merged where they coincide within rounding.
+/// Endpoints of rim edges, merged if they coincide up to rounding.
 struct EdgeEndpoints {
     points: Vec<DVec3>,
     tolerances: Vec<f64>,
@@ -188,7 +190,7 @@ impl EdgeEndpoints {
         self.ends[rim]
     }
 
-    /// Splits edges at endpoints of other edges that are on them.
+    /// Splits edges at other edges' endpoints that are on them.
     fn cut(
         &self,
         parts: &[GlassPart],
@@ -239,7 +241,7 @@ fn around_point(point: DVec3, tolerance: f64) -> Aabb {
     Aabb::around_f64([point - tolerance, point + tolerance])
 }
 
-/// Finds the lowest number in a set of joined items (union-find with path halving).
+/// Finds the lowest number in a set of joined items, using union-find with path halving.
 pub(super) fn root(same: &mut [u32], of: u32) -> u32 {
     let mut at = of;
     while same[at as usize] != at {

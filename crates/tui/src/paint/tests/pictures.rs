@@ -1,4 +1,4 @@
-//! Byte counts of whole previews and their edits, and text over them.
+//! Tests of byte counts for whole previews and edits, and of text drawn over previews.
 
 use super::*;
 
@@ -19,7 +19,7 @@ fn preview_window(columns: u16, rows: u16, pixel: impl Fn(u16, u16) -> [u8; 3]) 
     (buffer, picture)
 }
 
-/// A hash of position and seed.
+/// A hash of the position and seed.
 fn noise(x: u16, y: u16, seed: u32) -> u8 {
     let mut hash = u32::from(x).wrapping_mul(0x9E37_79B1)
         ^ u32::from(y).wrapping_mul(0x85EB_CA77)
@@ -29,7 +29,7 @@ fn noise(x: u16, y: u16, seed: u32) -> u8 {
     (hash ^ (hash >> 15)) as u8
 }
 
-/// A smooth image with noise of up to `grain` codes in both directions.
+/// A smooth image with noise of ±`grain` code values.
 fn noisy_pixel(x: u16, y: u16, seed: u32, grain: i32) -> [u8; 3] {
     let smooth = [40 + i32::from(x) * 2, 90 + i32::from(y), 200 - i32::from(x + y)];
     let mut seed = seed;
@@ -51,15 +51,15 @@ fn showing(buffer: &Buffer, picture: Rect, fidelity: Fidelity) -> TestTerminal {
 }
 
 #[test]
-fn first_preview_takes_12_bytes_a_cell() {
+fn first_preview_takes_12_bytes_per_cell() {
     for (grain, most) in [(0, 16), (5, 30), (20, 120), (60, 255), (255, 255)] {
         let (buffer, picture) = preview_window(SIDE.0, SIDE.1, |x, y| noisy_pixel(x, y, 1, grain));
         let test = showing(&buffer, picture, Fidelity::First);
-        // Clearing the screen and drawing the text.
+        // Bytes for clearing the screen and drawing the text.
         let others = 40;
-        assert!(test.sent <= 12 * CELLS + others, "grain {grain}: {} bytes a cell", test.sent / CELLS);
+        assert!(test.sent <= 12 * CELLS + others, "grain {grain}: {} bytes per cell", test.sent / CELLS);
         let largest = test.difference(&buffer, ColorDepth::TrueColor);
-        assert!(largest <= most, "grain {grain}: off by {largest}");
+        assert!(largest <= most, "grain {grain}: difference {largest}");
     }
 }
 
@@ -73,10 +73,10 @@ fn noise_below_the_threshold_is_not_sent() {
         assert_eq!(test.finish(4096), 0);
     }
     test.painter.set_target(&buffer, picture, Fidelity::Still);
-    assert_eq!(test.finish(4096), 0, "the cells are still exact");
+    assert_eq!(test.finish(4096), 0, "the cells should still be exact");
 }
 
-/// The cells that the edit changes.
+/// The cells changed by the edit.
 const CHANGED: Rect = Rect { x: 21, y: 6, width: 12, height: 6 };
 
 fn edited(x: u16, y: u16, seed: u32, grain: i32, is_edited: bool) -> [u8; 3] {
@@ -94,7 +94,7 @@ fn unedited_cells_are_not_redrawn() {
     test.finish(4096);
     let before: Vec<CellContent> = on_screen(&test, picture);
 
-    // The same noise at one sample, then less and less of different noise.
+    // The same noise at one sample, followed by decreasing amounts of different noise.
     let mut sent = 0;
     for (seed, grain, fidelity) in [
         (1, 40, Fidelity::First),
@@ -112,19 +112,19 @@ fn unedited_cells_are_not_redrawn() {
     }
     assert_eq!(test.difference(&picture_of(9, 0, true).0, ColorDepth::TrueColor).max(1), 1);
     let cells = usize::from(CHANGED.width * CHANGED.height);
-    assert!(sent <= 100 * cells, "{} bytes a cell", sent / cells);
+    assert!(sent <= 100 * cells, "{} bytes per cell", sent / cells);
 
-    // Undo the edit while the screen shows it.
+    // Undo the edit while its result is on the screen.
     test.painter.set_target(&first, picture, Fidelity::First);
     test.finish(4096);
     for (i, (old, new)) in before.iter().zip(on_screen(&test, picture)).enumerate() {
         let (x, y) = (i as u16 % picture.width + picture.x, i as u16 / picture.width + picture.y);
-        assert!(CHANGED.contains((x, y).into()) || *old == new, "{x},{y} on the way back");
+        assert!(CHANGED.contains((x, y).into()) || *old == new, "{x},{y} after undoing the edit");
     }
     let changed_back = on_screen(&test, CHANGED);
     test.painter.set_target(&picture_of(9, 0, true).0, picture, Fidelity::Still);
     test.finish(4096);
-    assert_ne!(changed_back, on_screen(&test, CHANGED), "the edit is undone on the screen");
+    assert_ne!(changed_back, on_screen(&test, CHANGED), "the edit should be undone on the screen");
 }
 
 fn on_screen(test: &TestTerminal, area: Rect) -> Vec<CellContent> {
@@ -133,18 +133,18 @@ fn on_screen(test: &TestTerminal, area: Rect) -> Vec<CellContent> {
 }
 
 #[test]
-fn frequent_targets_still_reach_the_edges() {
+fn all_rows_are_drawn_despite_frequent_targets() {
     let picture_of = |seed| preview_window(SIDE.0, SIDE.1, |x, y| noisy_pixel(x, y, seed, 60));
     let mut test = TestTerminal::new(SIDE.0 + 6, SIDE.1 + 1, ColorDepth::TrueColor);
     for seed in 0..16 {
         let (buffer, picture) = picture_of(seed);
         test.painter.set_target(&buffer, picture, if seed == 0 { Fidelity::First } else { Fidelity::Moving });
-        // About three rows with this noise.
+        // About three rows at this noise level.
         test.slice(3 * 40 * usize::from(SIDE.0));
     }
     let contents = on_screen(&test, Rect::new(1, 0, SIDE.0, SIDE.1));
     let blank = contents.iter().filter(|look| **look == CellContent::BLANK).count();
-    assert_eq!(blank, 0, "cells were never drawn");
+    assert_eq!(blank, 0, "some cells were never drawn");
 }
 
 #[test]
@@ -160,11 +160,11 @@ fn changing_text_does_not_delay_the_preview() {
     test.finish(4096);
     assert!(test.sent < whole + 40 * 80, "{} bytes instead of {whole}", test.sent);
     let contents = on_screen(&test, picture);
-    assert!(!contents.contains(&CellContent::BLANK), "cells were never drawn");
+    assert!(!contents.contains(&CellContent::BLANK), "some cells were never drawn");
 }
 
 #[test]
-fn preview_returns_when_text_over_it_goes() {
+fn preview_is_restored_when_text_disappears() {
     let (buffer, picture) = preview_window(SIDE.0, SIDE.1, |x, y| noisy_pixel(x, y, 1, 5));
     let mut test = showing(&buffer, picture, Fidelity::Still);
     let mut covered = buffer.clone();

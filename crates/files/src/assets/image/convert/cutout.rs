@@ -1,4 +1,4 @@
-//! Colors of a surface whose opacity is the alpha channel of the same image.
+//! Converts images whose alpha channel is the opacity of the same surface.
 
 use ::image::DynamicImage;
 
@@ -10,7 +10,7 @@ use crate::materials::texels::{TexelData, Texels};
 use crate::math::Vec3;
 use crate::math::color::srgb_to_linear;
 
-/// Texels weighted by alpha, or plain ones if the image is opaque.
+/// Alpha-weighted texels, or plain texels if the image is opaque.
 pub(super) fn texels(image: DynamicImage, curve: ColorCurve, metadata: &ImageMetadata) -> Texels {
     let Some(alpha) = alpha(&image, metadata).filter(|alpha| !is_everywhere(&image, *alpha, 1.0)) else {
         return super::texels(image, curve.encoding(), metadata);
@@ -47,7 +47,7 @@ fn bytes(samples: &[u8], alpha: usize, curve: ColorCurve) -> TexelData {
     }
 }
 
-/// Conversion of samples to weighted colors.
+/// How samples are converted to alpha-weighted colors.
 struct CutoutOptions {
     /// Index of the alpha sample.
     alpha: usize,
@@ -56,9 +56,9 @@ struct CutoutOptions {
     is_premultiplied: bool,
 }
 
-/// Conversion of straight colors to linear ones.
+/// How straight-alpha colors are linearized.
 enum Linearization {
-    /// Colors are linear already.
+    /// Colors are already linear.
     Linear,
     Srgb,
     Tables([Vec<f32>; 3]),

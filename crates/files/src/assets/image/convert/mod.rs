@@ -14,7 +14,7 @@ use crate::math::Vec3;
 use crate::math::color::srgb_to_linear;
 use crate::math::limits::LARGEST;
 
-/// Evaluates an expression with the samples of an image, for any sample type.
+/// Evaluates an expression on an image's samples, for any sample type.
 macro_rules! with_samples {
     ($image:expr, $samples:ident => $body:expr) => {
         match $image {
@@ -28,7 +28,7 @@ macro_rules! with_samples {
             DynamicImage::ImageRgba16($samples) => $body,
             DynamicImage::ImageRgb32F($samples) => $body,
             DynamicImage::ImageRgba32F($samples) => $body,
-            // Formats that a later version of `image` may add.
+            // Formats added in later versions of `image`.
             other => {
                 let $samples = &other.to_rgba32f();
                 $body
@@ -115,7 +115,7 @@ fn is_everywhere(image: &DynamicImage, index: usize, value: f32) -> bool {
     with_samples!(image, samples => all(samples, (channels(image), index), value))
 }
 
-/// Warning about an alpha channel that is used as opacity but is constant.
+/// Warning about a constant alpha channel that is used as opacity.
 pub(super) fn constant_alpha(
     image: &DynamicImage,
     encoding: ImageEncoding,
@@ -142,11 +142,11 @@ pub(super) fn constant_alpha(
 pub(super) const INVISIBLE: &str = "alpha is 0 everywhere; the surface is invisible";
 pub(super) const LUMINANCE_USED: &str = "alpha is 1 everywhere; luminance is used as the opacity";
 pub(super) const OPAQUE: &str =
-    "alpha is 1 everywhere, so the surface is opaque; `channel` selects a color as the opacity";
+    "alpha is 1 everywhere, so the surface is opaque; set `channel` to use a color channel as the opacity";
 
 /// Converts an image to texels.
 pub(super) fn texels(image: DynamicImage, encoding: ImageEncoding, metadata: &ImageMetadata) -> Texels {
-    // Convert formats that a later version of `image` may add.
+    // Convert formats added in later versions of `image`.
     let image = match image.color() {
         ColorType::L8 | ColorType::La8 | ColorType::Rgb8 | ColorType::Rgba8 => image,
         ColorType::L16 | ColorType::La16 | ColorType::Rgb16 | ColorType::Rgba16 => image,
@@ -176,13 +176,13 @@ pub(super) fn texels(image: DynamicImage, encoding: ImageEncoding, metadata: &Im
         DynamicImage::ImageRgba16(pixels) => words(&pixels, channels, encoding),
         DynamicImage::ImageRgb32F(pixels) => floats(&pixels, channels, encoding, &mut unusable),
         DynamicImage::ImageRgba32F(pixels) => floats(&pixels, channels, encoding, &mut unusable),
-        // Formats that a later version of `image` may add.
+        // Formats added in later versions of `image`.
         other => floats(&other.into_rgb32f(), 3, encoding, &mut unusable),
     };
     Texels { width, height, data, unusable }
 }
 
-/// Red, green and blue of a pixel of 1 (gray), 2 (gray, alpha), 3 or 4 samples.
+/// Red, green and blue of a pixel with 1 (gray), 2 (gray, alpha), 3 or 4 samples.
 fn rgb<T: Copy>(pixel: &[T]) -> [T; 3] {
     match *pixel {
         [red, green, blue, ..] => [red, green, blue],
@@ -229,7 +229,7 @@ fn floats(samples: &[f32], channels: usize, encoding: ImageEncoding, unusable: &
     TexelData::Float(samples.chunks_exact(channels).map(&mut texel).collect())
 }
 
-/// Converts colors of a nonstandard color space. Colors outside Rec. 709 are clipped, except for
+/// Converts colors from a nonstandard color space. Colors outside Rec. 709 are clipped, except for
 /// [`ImageEncoding::Raw`].
 fn converted(
     image: &DynamicImage,
@@ -269,7 +269,7 @@ fn linear<T: Sample>(pixel: &[T], tables: Option<&[Vec<f32>; 3]>) -> [f32; 3] {
     }
 }
 
-/// Clamps negative values and replaces NaN, infinity and too large values by 0.
+/// Clamps negative values, and replaces NaN, infinity and excessively large values with 0.
 fn clean(value: f32) -> f32 {
     if (0.0..=LARGEST as f32).contains(&value) { value } else { 0.0 }
 }

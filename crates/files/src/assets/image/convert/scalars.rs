@@ -1,4 +1,4 @@
-//! Scalar values of pixels: a channel, alpha or the luminance.
+//! Converts pixels to scalars: a color channel, alpha or luminance.
 
 use ::image::DynamicImage;
 
@@ -9,10 +9,10 @@ use crate::materials::{Channel, PixelValue};
 use crate::math::Vec3;
 use crate::math::color::{luminance, srgb_to_linear};
 
-/// Samples from which the scalar is computed.
+/// Samples used to compute the scalar.
 #[derive(Clone, Copy)]
 enum ScalarSamples {
-    /// The sample at an index, and whether it is sRGB.
+    /// Index of a sample, and whether it is sRGB.
     Sample(usize, bool),
     /// Luminance of red, green and blue.
     Luminance,
@@ -20,7 +20,7 @@ enum ScalarSamples {
     One,
 }
 
-/// Selects the samples of a scalar.
+/// Selects the samples for a scalar.
 fn samples_of(
     image: &DynamicImage,
     (of, is_srgb): (PixelValue, bool),
@@ -46,7 +46,7 @@ fn samples_of(
     }
 }
 
-/// Whether the luminance of an opaque image is used as its opacity.
+/// Whether to use an opaque image's luminance as its opacity.
 pub(super) fn is_gray_mask(image: &DynamicImage, of_any_color: bool) -> bool {
     of_any_color || has_gray_pixels(image)
 }
@@ -59,7 +59,7 @@ fn has_gray_pixels(image: &DynamicImage) -> bool {
     with_samples!(image, samples => all(samples, channels(image)))
 }
 
-/// Converts an image to texels with the scalar in all channels.
+/// Converts an image to texels that contain the scalar in all channels.
 pub(super) fn texels(image: &DynamicImage, of: (PixelValue, bool), metadata: &ImageMetadata) -> Texels {
     let (width, height) = (image.width(), image.height());
     let (channels, samples) = (channels(image), samples_of(image, of, metadata));
@@ -89,7 +89,7 @@ pub(super) fn texels(image: &DynamicImage, of: (PixelValue, bool), metadata: &Im
     Texels { width, height, data, unusable }
 }
 
-/// Number of pixels with an unusable sample among those that are read.
+/// Number of pixels with an unusable value among the samples that are used.
 fn unusable_pixels<T: Sample>(pixels: &[T], channels: usize, samples: ScalarSamples) -> u64 {
     let used = match samples {
         ScalarSamples::Sample(place, _) => place..place + 1,
@@ -101,13 +101,14 @@ fn unusable_pixels<T: Sample>(pixels: &[T], channels: usize, samples: ScalarSamp
     pixels.chunks_exact(channels).filter(is_broken).count() as u64
 }
 
-/// Texels of 8-bit samples, given the samples per pixel and the index of the sample to use.
+/// Converts 8-bit samples to texels, given the number of samples per pixel and the index of the sample to
+/// use.
 fn bytes(samples: &[u8], (channels, index): (usize, usize), is_srgb: bool) -> TexelData {
     let texels = samples.chunks_exact(channels).map(|pixel| [pixel[index]; 3]).collect();
     if is_srgb { TexelData::Srgb8(texels) } else { TexelData::Linear8(texels) }
 }
 
-/// Texels of all other sample types.
+/// Converts samples of all other types to texels.
 fn floats<T: Sample>(all: &[T], channels: usize, samples: ScalarSamples, is_srgb: bool) -> TexelData {
     let decoded = |sample: T, is_srgb: bool| {
         let value = clean(sample.unit());
@@ -152,10 +153,10 @@ mod tests {
         ] {
             assert!((number(color(), which, false) - exact).abs() < 1e-4, "{which:?}");
         }
-        // Alpha is linear; the other channels are decoded.
+        // Alpha is linear. The other channels are decoded.
         assert!((number(color(), PixelValue::Opacity, true) - 25.0 / 255.0).abs() < 1e-6);
         assert!((number(color(), of(Channel::Blue), true) - srgb_to_linear(0.8)).abs() < 1e-6);
-        // An image without alpha has alpha 1; as an opacity, its luminance is used.
+        // Without an alpha channel, alpha is 1, and the opacity is the luminance.
         let gray = || DynamicImage::ImageLuma8(ImageBuffer::from_pixel(1, 1, ::image::Luma([51])));
         assert_eq!(number(gray(), of(Channel::Alpha), false), 1.0);
         for which in [PixelValue::Opacity, PixelValue::Luminance, of(Channel::Green)] {
@@ -174,7 +175,7 @@ mod tests {
             &ImageMetadata::default(),
         );
         assert_eq!((broken.get(0, 0).x, broken.unusable), (0.0, 1));
-        // A pixel with several unusable samples counts once.
+        // A pixel with several unusable samples is counted once.
         let broken = texels(
             float(),
             ImageEncoding::Number { of: PixelValue::Luminance, is_srgb: false },

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use ::exr::meta::header::Header;
 
-/// A channel, by the index of its part and its index within the part.
+/// A channel, identified by a part index and a channel index within the part.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct ChannelIndex {
     pub(super) part: usize,
@@ -28,7 +28,7 @@ pub(super) enum ColorChannels {
 }
 
 impl ChosenChannels {
-    /// Channel of each slot of a pixel: red, green, blue, alpha. Chroma has no slot.
+    /// Source channel for each pixel component: red, green, blue, alpha. Chroma channels are not included.
     pub(super) fn slots(self) -> [Option<ChannelIndex>; 4] {
         match self.color {
             ColorChannels::Rgb([red, green, blue]) => [Some(red), Some(green), Some(blue), self.alpha],
@@ -52,14 +52,14 @@ impl ChosenChannels {
     }
 }
 
-/// Channels of a layer with known names, ignoring case.
+/// A layer's channels with known names, ignoring case.
 #[derive(Clone, Copy, Default)]
 struct LayerChannels {
     rgb: [Option<ChannelIndex>; 3],
     luminance: Option<ChannelIndex>,
     chroma: [Option<ChannelIndex>; 2],
     alpha: Option<ChannelIndex>,
-    /// Whether the layer has a channel X, which means that Y is a coordinate.
+    /// Whether the layer has a channel X, in which case Y is a coordinate.
     has_x: bool,
 }
 
@@ -100,14 +100,14 @@ impl LayerChannels {
 
 type LayerMap = BTreeMap<String, LayerChannels>;
 
-/// Selects the channels. Colors are preferred to gray, channels without a layer name to those with one,
-/// channels of a single part to those of several, then earlier ones to later ones. The last resort is the
-/// only channel of a part, with any name.
+/// Selects the channels. Unnamed layers are preferred to named ones. Within each group, RGB is preferred to
+/// gray, then layers within one part to layers across parts, then earlier layers to later ones. The fallback
+/// is a part's only channel, whatever its name.
 pub(super) fn choose(headers: &[Header]) -> Option<ChosenChannels> {
     let mut parts: Vec<LayerMap> =
         headers.iter().enumerate().map(|(part, header)| layers(part, header)).collect();
     let across = across_parts(headers);
-    // The X that belongs to a Y may be in another part.
+    // The X channel that matches a Y channel may be in another part.
     for layers in &mut parts {
         for (name, layer) in layers {
             layer.has_x |= across.get(name).is_some_and(|across| across.has_x);
@@ -125,7 +125,7 @@ pub(super) fn choose(headers: &[Header]) -> Option<ChosenChannels> {
     unnamed.or_else(named).or_else(|| sole_channel(headers))
 }
 
-/// Layers of a part by name, which precedes the last dot of the channel names.
+/// Layers of a part by name. The layer name is the channel name up to its last dot.
 fn layers(part: usize, header: &Header) -> LayerMap {
     let mut layers = LayerMap::new();
     if !header.deep {
@@ -142,7 +142,7 @@ fn add_channels(part: usize, header: &Header, layers: &mut LayerMap) {
     }
 }
 
-/// Layers formed by the parts with a single channel.
+/// Layers assembled from single-channel parts.
 fn across_parts(headers: &[Header]) -> LayerMap {
     let mut layers = LayerMap::new();
     for (part, header) in single_channel_parts(headers) {
@@ -157,7 +157,7 @@ fn single_channel_parts(headers: &[Header]) -> impl Iterator<Item = (usize, &Hea
     headers.filter(|(_, header)| !header.deep && header.channels.list.len() == 1)
 }
 
-/// The first part with a single channel, unless that is a component of a color or a vector.
+/// Channel of the first single-channel part. `None` if such parts are components of a color or vector.
 fn sole_channel(headers: &[Header]) -> Option<ChosenChannels> {
     const COMPONENTS: [&str; 7] = ["R", "G", "B", "RY", "BY", "X", "Y"];
     let is_component = |header: &Header| {
@@ -170,7 +170,7 @@ fn sole_channel(headers: &[Header]) -> Option<ChosenChannels> {
     Some(ChosenChannels { color: ColorChannels::Gray(ChannelIndex { part, channel: 0 }), alpha: None })
 }
 
-/// Reason why no channels can be selected.
+/// Error message if no channels can be selected.
 pub(super) fn no_color(headers: &[Header]) -> String {
     const MAX_NAMES: usize = 8;
     if headers.iter().all(|header| header.deep) {
@@ -183,7 +183,7 @@ pub(super) fn no_color(headers: &[Header]) -> String {
     no_usable_channels(&format!("{}{more}", shown.join(", ")))
 }
 
-/// Reason to reject an image with only these channels.
+/// Error message for an image with only these channels.
 pub(in crate::assets::image) fn no_usable_channels(names: &str) -> String {
     format!("no usable channels among {names}; expected R, G and B, or Y for gray")
 }

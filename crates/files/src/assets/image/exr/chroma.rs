@@ -1,5 +1,5 @@
-//! Converts luminance and chroma to red, green and blue like OpenEXR's `RgbaInputFile` (Kainz and Bogart,
-//! *Technical Introduction to OpenEXR*, "Luminance/Chroma Images").
+//! Converts luminance and chroma to red, green and blue in the same way as OpenEXR's `RgbaInputFile` (Kainz
+//! and Bogart, *Technical Introduction to OpenEXR*, "Luminance/Chroma Images").
 
 use ::exr::meta::header::Header;
 use ::exr::prelude::Vec2;
@@ -11,7 +11,7 @@ use crate::math::DVec3;
 /// Interpolation weights of the samples on either side of a pixel, from nearest to farthest (`ImfRgbaYca.cpp`).
 const WEIGHTS: [f32; 7] = [0.627_123, -0.186_077, 0.087_929, -0.043_159, 0.019_597, -0.007_540, 0.002_128];
 
-/// Planes of luminance and chroma, covering the data window.
+/// Luminance and chroma planes of the data window.
 pub(super) struct LuminanceChroma {
     /// Y, RY and BY.
     channels: [ChannelIndex; 3],
@@ -31,7 +31,7 @@ impl LuminanceChroma {
         Self { channels, size, step, luminance: vec![0.0; size.area()], chroma: [chroma(), chroma()] }
     }
 
-    /// Memory of the planes after chroma is interpolated along rows.
+    /// Memory size of the planes after chroma is interpolated along rows.
     pub(super) fn memory_bytes(headers: &[Header], [_, ry, _]: [ChannelIndex; 3]) -> u64 {
         let size = headers[ry.part].layer_size;
         let rows = size.height() / description(headers, ry).sampling.y();
@@ -86,7 +86,7 @@ impl LuminanceChroma {
         self.chroma = chroma;
     }
 
-    /// Colors of a row. Rows outside the image repeat those inside.
+    /// Colors of a row. Rows outside the image repeat rows near the edge.
     fn row(&self, y: i64, weights: DVec3) -> Vec<[f32; 3]> {
         let (width, height) = (self.size.width(), self.size.height() as i64);
         let inside = if y >= height { height - 2 } else { y.max(0) } as usize;
@@ -110,7 +110,8 @@ impl LuminanceChroma {
     }
 }
 
-/// Interpolates chroma at a column: with the filter for 2 × 2 subsampling, otherwise linearly.
+/// Interpolates chroma at a column, using the filter for 2 × 2 subsampling and linear interpolation for other
+/// factors.
 fn in_row(x: usize, step: Vec2<usize>, count: usize, sample: impl Fn(usize) -> f32) -> f32 {
     if step != Vec2(2, 2) {
         return linear(x, step.x(), count, sample);
@@ -128,14 +129,14 @@ fn filtered(left: i64, sample: impl Fn(i64) -> f32) -> f32 {
     pairs.map(|(away, weight)| weight * (sample(left - away) + sample(left + 1 + away))).sum()
 }
 
-/// Interpolates linearly between samples with a distance of `step` pixels. The last sample is repeated.
+/// Interpolates linearly between samples that are `step` pixels apart. The last sample is repeated.
 fn linear(pixel: usize, step: usize, count: usize, sample: impl Fn(usize) -> f32) -> f32 {
     let first = (pixel / step).min(count - 1);
     let (low, fraction) = (sample(first), (pixel % step) as f32 / step as f32);
     if fraction == 0.0 { low } else { low + (sample((first + 1).min(count - 1)) - low) * fraction }
 }
 
-/// Converts luminance and chroma to red, green and blue. Gray is exact.
+/// Converts luminance and chroma to red, green and blue. Gray is preserved exactly.
 fn rgb(luminance: f32, [ry, by]: [f32; 2], weights: DVec3) -> [f32; 3] {
     if ry == 0.0 && by == 0.0 {
         return [luminance; 3];
@@ -146,7 +147,7 @@ fn rgb(luminance: f32, [ry, by]: [f32; 2], weights: DVec3) -> [f32; 3] {
     [red as f32, green as f32, blue as f32]
 }
 
-/// Color of a pixel with its saturation limited by that of its neighbors, at the same luminance
+/// Limits a pixel's saturation based on its neighbors' saturation, preserving luminance
 /// (`RgbaYca::fixSaturation`).
 fn saturation_limited([above, row, below]: [&[[f32; 3]]; 3], x: usize, weights: DVec3) -> [f32; 3] {
     let (left, right) = (x.saturating_sub(1), (x + 1).min(row.len() - 1));
@@ -164,7 +165,7 @@ fn saturation_limited([above, row, below]: [&[[f32; 3]]; 3], x: usize, weights: 
     if got > 0.0 { reduced.map(|part| (f64::from(part) * wanted / got) as f32) } else { reduced }
 }
 
-/// 1 − min/max of the components, or 0 if none is positive.
+/// 1 − min/max of the components, or 0 if no component is positive.
 fn saturation(color: [f32; 3]) -> f32 {
     let greatest = color.into_iter().fold(f32::MIN, f32::max);
     let least = color.into_iter().fold(f32::MAX, f32::min);

@@ -26,8 +26,8 @@ use sampling::{BlockDecompressor, ChannelSampling, FullSamplingReader};
 /// Size of a decoded sample.
 const SAMPLE_BYTES: usize = 4;
 
-/// Decodes color or gray, with alpha, from one layer: the display window at the largest resolution, black
-/// outside the data window.
+/// Decodes color or gray, and alpha, from one layer. The image is the display window at the highest
+/// resolution, black outside the data window.
 pub(super) struct ExrDecoder<R> {
     reader: Reader<FullSamplingReader<R>>,
     channels: ChosenChannels,
@@ -73,14 +73,14 @@ impl<R: BufRead + Seek> ExrDecoder<R> {
     }
 }
 
-/// Warning about chromaticities that do not form a triangle.
+/// Warning for chromaticities that do not form a triangle.
 pub(super) const DEGENERATE_CHROMATICITIES: &str = "degenerate chromaticities are ignored";
 
 const SIZE_NOT_DIVISIBLE: &str = "the subsampling does not divide the image size";
 const CHROMA_DIFFERS: &str = "channels RY and BY have different subsampling";
 
 pub(super) fn subsampled(channel: &str) -> String {
-    format!("channel {channel} is subsampled; only RY and BY may be")
+    format!("channel {channel} is subsampled; only RY and BY may be subsampled")
 }
 
 fn primaries(header: &Header) -> Option<Primaries> {
@@ -89,7 +89,7 @@ fn primaries(header: &Header) -> Option<Primaries> {
     Some(Primaries { red, green, blue, white })
 }
 
-/// Size of a decompressed block: a tile, or some rows, with all channels.
+/// Size of a decompressed block (a tile or several rows), including all channels.
 fn block_bytes(header: &Header) -> u64 {
     let (width, height) = (header.layer_size.width(), header.layer_size.height());
     let (width, height) = match header.blocks {
@@ -106,7 +106,7 @@ fn description(headers: &[Header], channel: ChannelIndex) -> &ChannelDescription
     &headers[channel.part].channels.list[channel.channel]
 }
 
-/// Checks that only chroma is subsampled, and equally in both channels.
+/// Checks that only the chroma channels are subsampled, both by the same factors.
 fn check_samplings(headers: &[Header], channels: ChosenChannels) -> Result<(), String> {
     let sampling = |channel: ChannelIndex| description(headers, channel).sampling;
     let is_divided = |channel: &ChannelIndex| {
@@ -163,7 +163,7 @@ impl<R: BufRead + Seek> ImageDecoder for ExrDecoder<R> {
     }
 }
 
-/// An image during decoding.
+/// A partially decoded image.
 struct PartialImage<'a> {
     headers: &'a [Header],
     channels: ChosenChannels,
@@ -196,7 +196,7 @@ impl PartialImage<'_> {
         }
     }
 
-    /// Copies a row of a channel to its slots. `left` and `row` are in the data window.
+    /// Copies a row of a channel to its slots. `left` and `row` are relative to the data window.
     fn copy(&self, channel: ChannelIndex, [left, row]: [usize; 2], line: ChannelRow<'_>, samples: &mut [u8]) {
         let header = &self.headers[channel.part];
         let window = header.shared_attributes.display_window;
@@ -252,7 +252,8 @@ struct ChannelRow<'a> {
 }
 
 impl ChannelRow<'_> {
-    /// Passes each value after the first `skipped` ones to `put`, with an item of `targets`.
+    /// Skips the first `skipped` values, then passes each remaining value to `put` with the next item of
+    /// `targets`.
     fn values<T>(self, skipped: usize, targets: impl Iterator<Item = T>, put: impl Fn(T, f32)) {
         fn each<const N: usize, T>(
             bytes: &[u8],

@@ -1,5 +1,5 @@
-//! Support for subsampled channels, which `exr` rejects. Makes `exr` read the file as if no channel were
-//! subsampled, and decompresses blocks with the true sampling.
+//! Support for subsampled channels, which `exr` rejects. The file is presented to `exr` as if no channel were
+//! subsampled, and its blocks are decompressed with the actual sampling.
 
 use std::io::{self, Read, Seek, SeekFrom};
 
@@ -13,18 +13,18 @@ use ::exr::prelude::Vec2;
 
 /// Maximum size of the headers.
 const HEADER_BYTES: u64 = 1 << 20;
-/// Offset of the first header, after magic number and version.
+/// Offset of the first header, after the magic number and version.
 const START: usize = 8;
 
-/// Sampling of a channel, and the byte offset of its two integers in the file.
+/// Sampling of a channel, and the byte offset in the file of the two integers that store it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct ChannelSampling {
     at: u64,
     step: Vec2<usize>,
 }
 
-/// Reads the sampling of all channels of each part. Empty if no channel is subsampled, or if the headers are
-/// malformed, which `exr` reports.
+/// Reads the sampling of all channels of each part. Returns an empty list if no channel is subsampled, or if
+/// the headers are malformed, because `exr` reports malformed headers.
 pub(super) fn find(file: &mut (impl Read + Seek)) -> io::Result<Vec<Vec<ChannelSampling>>> {
     let mut bytes = Vec::new();
     file.by_ref().take(HEADER_BYTES).read_to_end(&mut bytes)?;
@@ -92,7 +92,7 @@ impl<'a> HeaderParser<'a> {
     }
 }
 
-/// A file whose headers read as if no channel were subsampled.
+/// A file whose headers appear to have no subsampled channels.
 pub(super) struct FullSamplingReader<R> {
     file: R,
     at: u64,
@@ -168,7 +168,7 @@ impl BlockDecompressor {
             CompressedBlock::Tile(block) => block.compressed_pixels_le.len(),
             CompressedBlock::DeepScanLine(_) | CompressedBlock::DeepTile(_) => bytes,
         };
-        // `exr` decodes the subsampled channels of B44 blocks with a wrong size.
+        // `exr` decodes subsampled channels in B44 blocks at the wrong size.
         if matches!(header.compression, Compression::B44 | Compression::B44A) && packed != bytes {
             let reason = "B44 compression of subsampled channels; save it with ZIP or PIZ";
             return Err(Error::NotSupported(reason.into()));
@@ -182,7 +182,7 @@ fn is_subsampled(header: &Header) -> bool {
     header.channels.list.iter().any(|channel| channel.sampling != Vec2(1, 1))
 }
 
-/// Size of a row of the data window, over all channels.
+/// Size of a row of the data window, including all channels.
 fn row_bytes(header: &Header, row: usize, width: usize) -> usize {
     let channels = header.channels.list.iter().filter(|channel| row.is_multiple_of(channel.sampling.y()));
     channels.map(|channel| width / channel.sampling.x() * channel.sample_type.bytes_per_sample()).sum()

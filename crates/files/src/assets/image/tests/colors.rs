@@ -114,7 +114,7 @@ fn png_gamma_and_primaries_are_applied() {
     assert!(is_near(color(&png(gamma(1.0 / 1.8))), power(1.8)));
     let wide = png(|info| info.source_chromaticities = Some(p3()));
     assert!(is_near(color(&wide), P3), "{}", color(&wide));
-    // The values that sRGB files declare change no bits.
+    // The values written in sRGB files do not change any bits.
     let usual = SourceChromaticities::new((0.3127, 0.329), (0.64, 0.33), (0.3, 0.6), (0.15, 0.06));
     assert!(
         is_plain(&png(gamma(0.45455))) && is_plain(&png(|info| info.source_chromaticities = Some(usual)))
@@ -139,7 +139,7 @@ fn color_chunks_have_a_fixed_precedence() {
         info.srgb = Some(SrgbRenderingIntent::Perceptual);
     });
     assert!(is_plain(&srgb));
-    // The encoder writes only sRGB. Insert a gamma of 1 before it; checksums are per chunk.
+    // The encoder writes only an sRGB chunk. Insert a gamma of 1 before it. Each chunk has its own checksum.
     let at = srgb.windows(4).position(|name| name == b"sRGB").expect("a chunk") - 4;
     let other = png(gamma(1.0));
     let from = other.windows(4).position(|name| name == b"gAMA").expect("a chunk") - 4;
@@ -169,7 +169,7 @@ fn matrix_profiles_are_converted() {
 }
 
 #[test]
-fn unsupported_profiles_give_warnings() {
+fn unsupported_profiles_cause_warnings() {
     let cmyk = icc(b"CMYK", b"Lab ", &[(b"A2B0", vec![0; 40])]);
     let tables = icc(b"RGB ", b"Lab ", &[(b"A2B0", vec![0; 40])]);
     let flat = rgb_profile([SRGB[0]; 3], curv(&[]));
@@ -194,7 +194,7 @@ fn unsupported_profiles_give_warnings() {
 
 #[test]
 fn code_points_have_the_highest_precedence() {
-    // The encoder of `png` does not write the chunk.
+    // The `png` encoder does not write this chunk.
     let points = |codes: [u8; 4]| {
         let mut file = png(gamma(0.5));
         let chunk = [b"cICP".as_slice(), &codes].concat();

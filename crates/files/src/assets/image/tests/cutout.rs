@@ -18,7 +18,7 @@ fn texels(image: DynamicImage, encoding: ImageEncoding, alpha: AlphaUsage) -> Te
 }
 
 #[test]
-fn alpha_weights_colors_unless_it_is_constant_1() {
+fn colors_are_alpha_weighted_unless_opaque() {
     let cut = [[255, 0, 0, 51], [0, 255, 0, 255]];
     let data = |pixels: &[[u8; 4]], curve| {
         texels(bytes(pixels), ImageEncoding::CutOut(curve), AlphaUsage::Straight).data
@@ -45,7 +45,7 @@ fn premultiplied_colors_are_unmultiplied_once() {
         assert_eq!(texels.weighted(0), Vec4::new(0.5, 0.25, 0.0, 0.5));
     }
     assert!((loaded(ColorCurve::Srgb).get(0, 0).y - srgb_to_linear(0.5)).abs() < 1e-6);
-    // Without a cutout, the color is the one composited over black.
+    // Without a cutout, the color is composited over black.
     let plain = texels(image(), ImageEncoding::Color, AlphaUsage::Premultiplied);
     assert_eq!(plain.get(0, 0), Vec3::new(0.5, 0.25, 0.0));
 }

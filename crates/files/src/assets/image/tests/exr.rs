@@ -97,7 +97,7 @@ fn the_first_layer_with_colors_is_used() {
     ]);
     let expected: Vec<_> = RAMP.iter().map(|&red| Vec3::new(red, 2.0, 3.0)).collect();
     assert_eq!(texels(&file), expected);
-    // Channels without a layer name are preferred.
+    // Channels without a layer name take precedence.
     let file = single_layer(vec![
         ("a.R", floats(OTHER)),
         ("a.G", floats(OTHER)),
@@ -118,7 +118,7 @@ fn the_first_part_with_colors_is_used() {
 }
 
 #[test]
-fn tiles_and_compressions_give_the_same_texels() {
+fn texels_do_not_depend_on_tiling_or_compression() {
     for compression in
         [Compression::Uncompressed, Compression::RLE, Compression::ZIP1, Compression::ZIP16, Compression::PIZ]
     {
@@ -165,7 +165,7 @@ fn unusable_channels_are_rejected() {
         let _ = load_bytes("a.exr", &whole[..length], ImageEncoding::Color);
     }
     assert!(load_bytes("a.exr", &whole[..whole.len() - 3], ImageEncoding::Color).is_err());
-    // Make the header claim that the channel is sampled at every second pixel only.
+    // Declare in the header that the channel is sampled only at every other pixel.
     let mut sampled = whole;
     let at = sampled.windows(8).position(|sampling| sampling == [1, 0, 0, 0, 1, 0, 0, 0]).expect("a channel");
     sampled[at] = 2;
@@ -180,7 +180,7 @@ fn parts(channels: &[(&str, [f32; 4])]) -> Vec<u8> {
 }
 
 #[test]
-fn colors_may_be_split_over_parts() {
+fn colors_may_be_split_across_parts() {
     let expected: Vec<_> = RAMP.iter().map(|&red| Vec3::new(red, 9.0, 1.0)).collect();
     let (nines, ones) = ([9.0; 4], [1.0; 4]);
     assert_eq!(texels(&parts(&[("R", RAMP), ("G", nines), ("B", ones)])), expected);
@@ -236,7 +236,7 @@ fn chromaticities_are_converted() {
     );
 }
 
-/// An uncompressed scan-line file of 4 × 2 pixels, whose chroma is sampled at every second column and row.
+/// An uncompressed scan-line file of 4 × 2 pixels, with chroma sampled at every other column and row.
 fn subsampled(window: [i32; 4]) -> Vec<u8> {
     let text = |words: &str| [words.as_bytes(), &[0]].concat();
     let ints = |values: &[i32]| -> Vec<u8> { values.iter().flat_map(|value| value.to_le_bytes()).collect() };
@@ -260,7 +260,7 @@ fn subsampled(window: [i32; 4]) -> Vec<u8> {
     .concat();
     let floats =
         |values: &[f32]| -> Vec<u8> { values.iter().flat_map(|value| value.to_le_bytes()).collect() };
-    // One row of BY, RY and Y, then one of Y only.
+    // The first row has BY, RY and Y, the second only Y.
     let rows = [floats(&[0.0, 1.0, 0.0, 0.5, 1.0, 1.0, 1.0, 1.0]), floats(&[2.0; 4])];
     let start = header.len() + 16;
     let offsets = [start, start + 8 + rows[0].len()].map(|offset| (offset as u64).to_le_bytes()).concat();
@@ -277,7 +277,7 @@ fn luminance_and_chroma_are_converted_to_rgb() {
         let (red, blue) = ((ry + 1.0) * y, (by + 1.0) * y);
         Vec3::new(red, (y - red * 0.21264 - blue * 0.07219) / 0.71517, blue)
     };
-    // The filter overshoots at the edge, like that of `RgbaInputFile`.
+    // The filter overshoots at the edge, as in `RgbaInputFile`.
     let chroma = [(0.0, 0.0), (0.25, 0.5), (0.5, 1.0), (0.563_562, 1.127_124)];
     let row = |y: f32| chroma.map(|(ry, by)| color(y, ry, by));
     let expected = [row(1.0), row(2.0)].concat();
@@ -285,7 +285,7 @@ fn luminance_and_chroma_are_converted_to_rgb() {
         assert!((*found - *expected).length() < 1e-4, "{found} {expected}");
     }
     assert_eq!(found[0], Vec3::ONE);
-    // A display window that starts between two chroma samples and extends beyond the data.
+    // A display window that starts between two chroma samples and extends past the data window.
     let moved = texels(&subsampled([1, -1, 4, 0]));
     assert_eq!((moved[..4].to_vec(), moved[7]), (vec![Vec3::ZERO; 4], Vec3::ZERO));
     assert!((moved[4] - expected[1]).length() < 1e-4);

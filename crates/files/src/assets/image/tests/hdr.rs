@@ -3,7 +3,7 @@
 use super::*;
 use crate::assets::image::hdr::{RUN_TOO_LONG, WRONG_LENGTH, line_ignored, unsupported_encoding};
 
-/// A pixel with exponent 129, whose unit is 1/128.
+/// A pixel with exponent 129, so one mantissa step is 1/128.
 const PIXEL: [u8; 4] = [128, 64, 32, 129];
 
 fn file(header: &str, size: &str, pixels: &[u8]) -> Vec<u8> {
@@ -23,7 +23,7 @@ fn single_pixel(header: &str) -> Vec3 {
 }
 
 #[test]
-fn headers_of_all_programs_are_read() {
+fn header_variants_are_read() {
     for start in ["#?RADIANCE\n", "#?RGBE\n", "#?rpict\n", "#?AUTOPANO\n", "#?RGBE\r\n", "#?\n"] {
         for rest in [
             "FORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 1\n",
@@ -44,9 +44,9 @@ fn headers_of_all_programs_are_read() {
     }
 }
 
-/// Pixels of 3 columns and 2 rows, numbered from the top left, in file order.
+/// Indices (from the top left) of the pixels of a 3 × 2 image, in file order.
 #[test]
-fn all_orientations_give_the_same_image() {
+fn all_orientations_decode_to_the_same_image() {
     for (size, order) in [
         ("-Y 2 +X 3", [0, 1, 2, 3, 4, 5]),
         ("-Y 2 -X 3", [2, 1, 0, 5, 4, 3]),
@@ -66,13 +66,13 @@ fn all_orientations_give_the_same_image() {
 }
 
 #[test]
-fn exposures_and_corrections_divide_the_values() {
+fn values_are_divided_by_exposure_and_correction() {
     let plain = Vec3::new(1.0, 0.5, 0.25);
     assert_eq!(single_pixel("EXPOSURE=2\n"), plain / 2.0);
     assert_eq!(single_pixel("EXPOSURE=2\nEXPOSURE= 4\n"), plain / 8.0);
     assert_eq!(single_pixel("COLORCORR=4 2 1\n"), Vec3::splat(0.25));
     assert_eq!(single_pixel("COLORCORR=4 2 1\nEXPOSURE=0.5\nCOLORCORR=1 2 4\n"), Vec3::new(0.5, 0.25, 0.125));
-    // Quoted lines of other headers are ignored.
+    // Lines quoted from other headers are ignored.
     assert_eq!(single_pixel("\tEXPOSURE=2\n# EXPOSURE=2\n"), plain);
     // The exposure applies to all encodings.
     let number = ImageEncoding::Number { of: PixelValue::Luminance, is_srgb: false };
@@ -105,7 +105,7 @@ fn primaries_are_converted() {
             [rec_2020, ""].map(|header| texels(&file(header, "-Y 1 +X 1", &PIXEL), encoding));
         assert_eq!(with, without);
     }
-    // Y of XYZ is in lumens. Equal-energy white becomes white.
+    // Y is in lumens. Equal-energy white is converted to white.
     let xyz = "FORMAT=32-bit_rle_xyze\n";
     assert!(near(color(xyz, &[179, 179, 179, 136]), Vec3::ONE));
     for broken in ["PRIMARIES=.64 .33 .3 .6 .15 .06", "PRIMARIES=0 0 0 0 0 0 0 0"] {
@@ -115,7 +115,7 @@ fn primaries_are_converted() {
     }
 }
 
-/// A scanline of `count` pixels, run-length encoded by channel.
+/// A scanline of `count` pixels, run-length encoded per channel.
 fn runs(count: u16, value: impl Fn(u16) -> [u8; 4]) -> Vec<u8> {
     let mut line = vec![2, 2];
     line.extend(count.to_be_bytes());
@@ -132,7 +132,7 @@ fn runs(count: u16, value: impl Fn(u16) -> [u8; 4]) -> Vec<u8> {
 }
 
 #[test]
-fn all_scanline_encodings_give_the_same_pixels() {
+fn scanline_encodings_decode_to_the_same_pixels() {
     let value = |at: u16| [(at / 5 % 256) as u8, (at % 3) as u8, 9, 136];
     let expected = |count: u16| -> Vec<Vec3> {
         (0..count).map(|at| Vec3::from_array([0, 1, 2].map(|i| f32::from(value(at)[i])))).collect()
@@ -146,13 +146,13 @@ fn all_scanline_encodings_give_the_same_pixels() {
             assert_eq!(texels(&file("", &size, &runs), ImageEncoding::Color), expected(count), "{count}");
         }
     }
-    // (1, 1, 1, n) repeats the previous pixel n times; a second one 256 · n times.
+    // (1, 1, 1, n) repeats the previous pixel n times. A second (1, 1, 1, n) repeats it 256 · n times.
     let old = [5, 6, 7, 136, 1, 1, 1, 3, 1, 1, 1, 2, 8, 0, 0, 136, 1, 1, 1, 1];
     let size = "-Y 1 +X 518";
     let found = texels(&file("", size, &old), ImageEncoding::Color);
     assert_eq!(found[..516], vec![Vec3::new(5.0, 6.0, 7.0); 516]);
     assert_eq!(found[516..], [Vec3::new(8.0, 0.0, 0.0); 2]);
-    // A line that starts like a run-length encoded one but has too few pixels for that.
+    // This line starts like a run-length encoded line but has too few pixels to be one.
     assert_eq!(texels(&file("", "-Y 1 +X 1", &[2, 2, 0, 1]), ImageEncoding::Color).len(), 1);
 }
 

@@ -24,7 +24,7 @@ fn opacity(file: &[u8]) -> f32 {
 }
 
 #[test]
-fn header_or_extension_defines_tga_alpha() {
+fn tga_alpha_is_set_by_header_or_extension() {
     let white = [255, 255, 255, 51];
     for (bits, kind, expected) in [
         (0, None, 1.0),
@@ -45,7 +45,7 @@ fn header_or_extension_defines_tga_alpha() {
     };
     assert!((cut_out(&file(8, [51, 0, 102, 102], Some(4))) - Vec3::new(1.0, 0.0, 0.5)).length() < 1e-6);
     assert!((cut_out(&file(8, [51, 0, 102, 102], None)) - Vec3::new(0.4, 0.0, 0.2)).length() < 1e-6);
-    // A footer whose extension area is beyond the end of the file.
+    // A footer with an extension area past the end of the file.
     let mut broken = file(8, white, Some(3));
     broken.truncate(18 + 4);
     broken.extend([255, 255, 255, 127, 0, 0, 0, 0]);
@@ -53,7 +53,8 @@ fn header_or_extension_defines_tga_alpha() {
     assert!((opacity(&broken) - 0.2).abs() < 1e-6);
 }
 
-/// A TGA file with one row of pixels: image type, bits per pixel, alpha bits of the header.
+/// A TGA file with one row of pixels. The header contains the given image type, bits per pixel and alpha
+/// bits.
 fn row([kind, bits, alpha_bits]: [u8; 3], pixels: &[u8]) -> Vec<u8> {
     let width = pixels.len() as u8 / bits.div_ceil(8).max(1);
     [&[0, 0, kind, 0, 0, 0, 0, 0, 0, 0, 0, 0, width, 0, 1, 0, bits, 0x20 | alpha_bits], pixels].concat()
@@ -100,7 +101,7 @@ fn impossible_alpha_bits_are_ignored() {
 }
 
 #[test]
-fn bmp_alpha_of_zero_everywhere_is_unused() {
+fn all_zero_bmp_alpha_is_ignored() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("a.bmp");
     let number = ImageEncoding::Number { of: PixelValue::Opacity, is_srgb: false };

@@ -1,4 +1,4 @@
-//! Exif data and animations in WebP files.
+//! Tests of Exif data and animations in WebP files.
 
 use ::image_webp::{ColorType, WebPEncoder};
 
@@ -10,7 +10,7 @@ fn chunk(name: &[u8; 4], data: &[u8]) -> Vec<u8> {
     [name.as_slice(), &(data.len() as u32).to_le_bytes(), data, &padding].concat()
 }
 
-/// An animation of single-color frames of 1 × 1 pixels.
+/// An animation with frames of 1 × 1 pixels.
 fn animation(colors: &[[u8; 3]]) -> Vec<u8> {
     // Animation flag; width and height minus 1.
     let mut chunks = chunk(b"VP8X", &[0x02, 0, 0, 0, 0, 0, 0, 0, 0, 0]);
@@ -18,7 +18,7 @@ fn animation(colors: &[[u8; 3]]) -> Vec<u8> {
     for color in colors {
         let mut still = Vec::new();
         WebPEncoder::new(&mut still).encode(color, 1, 1, ColorType::Rgb8).expect("written");
-        // Position, size, duration, and the flag for no blending. The chunk of the image follows.
+        // Position, size, duration, and the flag for no blending, followed by the image chunk.
         let mut frame = vec![0; 12];
         frame.extend([100, 0, 0, 0x02]);
         frame.extend(&still[12..]);
@@ -28,7 +28,7 @@ fn animation(colors: &[[u8; 3]]) -> Vec<u8> {
 }
 
 #[test]
-fn exif_data_may_have_the_prefix_of_jpeg() {
+fn exif_data_may_have_the_jpeg_prefix() {
     let (red, blue) = ([255, 0, 0], [0, 0, 255]);
     let mut still = Vec::new();
     WebPEncoder::new(&mut still).encode(&[red, blue].concat(), 2, 1, ColorType::Rgb8).expect("written");
@@ -46,7 +46,7 @@ fn exif_data_may_have_the_prefix_of_jpeg() {
 }
 
 #[test]
-fn an_animation_gives_a_warning() {
+fn animations_cause_a_warning() {
     let (red, blue) = ([255, 0, 0], [0, 0, 255]);
     for (frames, warnings) in [(vec![red, blue, blue], 1), (vec![red], 0)] {
         let file = animation(&frames);

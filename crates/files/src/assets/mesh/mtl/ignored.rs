@@ -16,8 +16,7 @@ pub(in crate::assets::mesh) struct IgnoredStatement {
     pub(super) words: String,
 }
 
-/// Collects warnings about a file and its used materials. Warnings that several materials have in common are
-/// merged.
+/// Collects warnings about a file and its used materials. Warnings shared by several materials are merged.
 pub(in crate::assets::mesh) fn warnings<'a>(
     path: &Path,
     of_file: Vec<IgnoredStatement>,
@@ -107,7 +106,7 @@ fn line<T>(at: Option<WithLine<T>>) -> Option<usize> {
     at.map(|at| at.line)
 }
 
-/// Warns about reflectances that cannot be rendered as given.
+/// Warns about reflectances that cannot be rendered as specified.
 fn add_reflection(
     found: &MtlMaterial,
     converted: &FileMaterial,

@@ -27,7 +27,7 @@ pub(super) enum MapKind {
 }
 
 impl MapKind {
-    /// The kind of a keyword, ignoring case.
+    /// Map kind for a keyword, ignoring case.
     pub(super) fn from_keyword(keyword: &str) -> Option<Self> {
         const OTHERS: [&str; 13] = [
             "map_Ns",
@@ -83,7 +83,7 @@ impl MapKind {
     }
 }
 
-/// A map with its options, as in the file.
+/// A map with its options, exactly as in the file.
 #[derive(Clone, Debug)]
 pub(super) struct Map {
     pub(super) line: usize,
@@ -93,16 +93,16 @@ pub(super) struct Map {
     is_clamped: bool,
     /// Channel to read as a scalar, if specified.
     number: Option<PixelValue>,
-    /// Scale of the normal map's slopes.
+    /// Scale factor for the normal map's slopes.
     pub(super) strength: f64,
-    /// Options without effect.
+    /// Options that have no effect.
     ignored: Vec<String>,
     /// File name: the text after the options.
     name: String,
 }
 
 impl Map {
-    /// Parses the text after the keyword. `None` if it has no file name.
+    /// Parses the text after the keyword. `None` if there is no file name.
     pub(super) fn parse(text: &str) -> Option<Self> {
         let mut map = Self {
             line: 0,
@@ -199,13 +199,14 @@ impl Map {
         self.ignored.iter().cloned().chain(channel).chain(range).chain(strength)
     }
 
-    /// Candidate paths of the file, relative to the MTL file's folder: the whole name, then the name without
-    /// possible comments.
+    /// Candidate paths of the image file, relative to the MTL file's folder: the whole name, then the name
+    /// with possible comments removed.
     pub(super) fn files(&self) -> impl Iterator<Item = PathBuf> {
         cut_at_comments(&self.name).flat_map(|name| spellings(&name.replace('\\', "/")))
     }
 
-    /// The texture of this map. Its path is the first candidate that exists, or else the first.
+    /// Texture for this map. Its path is the first candidate that exists, or the first candidate if none
+    /// exists.
     pub(super) fn texture(&self, folder: &Path) -> Option<FileTexture> {
         let [u, v] = self.repeat;
         let [base, gain] = self.range.map(|number| number as f32);
@@ -220,12 +221,12 @@ impl Map {
     }
 }
 
-/// Arguments of a map statement, of which the last is the file name.
+/// Arguments of a map statement. The last one is the file name.
 struct MapArguments<'a>(&'a str);
 
 impl<'a> MapArguments<'a> {
-    /// Consumes an option and returns it in lower case. Any other word starts the file name, even if it
-    /// begins with a dash.
+    /// Consumes an option and returns it in lowercase. Any other word starts the file name, even if it begins
+    /// with a dash.
     fn option(&mut self) -> Option<String> {
         const OPTIONS: [&str; 13] = [
             "-s", "-o", "-t", "-mm", "-bm", "-clamp", "-imfchan", "-boost", "-texres", "-blendu", "-blendv",
@@ -246,7 +247,7 @@ impl<'a> MapArguments<'a> {
         Some(word)
     }
 
-    /// Consumes up to `N` numbers. Missing ones keep their default.
+    /// Consumes up to `N` numbers. Missing numbers keep their defaults.
     fn numbers<const N: usize>(&mut self, default: [f64; N]) -> [f64; N] {
         let mut numbers = default;
         for number in &mut numbers {
@@ -284,7 +285,7 @@ pub(in crate::assets::mesh) fn spellings(name: &str) -> impl Iterator<Item = Pat
     std::iter::once(PathBuf::from(name)).chain(latin1)
 }
 
-/// The first of these files that exists, or else the first.
+/// The first of these files that exists, or the first one if none exists.
 pub(in crate::assets::mesh) fn first_existing(
     folder: &Path,
     names: impl Iterator<Item = PathBuf>,

@@ -1,4 +1,4 @@
-//! Converts MTL statements to a material of the renderer.
+//! Converts MTL statements to a material.
 
 use std::path::Path;
 
@@ -8,8 +8,8 @@ use super::statements::{MtlColor, MtlNumber};
 use crate::assets::{FileMaterial, PhysicalMaterial};
 use crate::math::{DVec3, Vec3};
 
-/// Converts a material; file names are relative to `folder`, which contains the MTL file. Defaults follow other
-/// readers of the format: diffuse 0.6 without a texture, 1 with one, and 0 for a mirror.
+/// Converts a material. File names are relative to `folder`, which contains the MTL file. The default diffuse
+/// color is the same as in other MTL readers: 0.6 without a texture, 1 with a texture, and 0 for mirrors.
 pub(in crate::assets::mesh) fn material(found: &MtlMaterial, folder: &Path) -> FileMaterial {
     let texture = |kind| found.map(kind).and_then(|map| map.texture(folder));
     let specular = color(found, MtlColor::Specular, 0.0);
@@ -43,20 +43,20 @@ pub(in crate::assets::mesh) fn material(found: &MtlMaterial, folder: &Path) -> F
     }
 }
 
-/// The color, with negative components clamped to 0.
+/// Color with negative components clamped to 0.
 fn color(found: &MtlMaterial, color: MtlColor, default: f32) -> Vec3 {
     let color = found.color(color);
     color.map_or(Vec3::splat(default), |at| DVec3::from_array(at.value).as_vec3().max(Vec3::ZERO))
 }
 
-/// The opacity: `d`, or 1 − `Tr`, unless a `Tr` without `d` would hide the material.
+/// Opacity: `d`, or else 1 − `Tr`. Opaque if `Tr` is 1 and there is no `d`.
 fn opacity(found: &MtlMaterial) -> f32 {
     let transparency = found.number(MtlNumber::Transparency).map(|part| 1.0 - part);
     let opacity = found.number(MtlNumber::Dissolve).or(transparency);
     if is_hidden_by_tr(found) { 1.0 } else { opacity.unwrap_or(1.0).clamp(0.0, 1.0) as f32 }
 }
 
-/// Whether the material has `Tr` 1 but no `d`. MeshLab and other programs write that for opaque materials.
+/// Whether the material has `Tr` 1 but no `d`. MeshLab and other programs write opaque materials this way.
 pub(super) fn is_hidden_by_tr(found: &MtlMaterial) -> bool {
     let transparency = found.number(MtlNumber::Transparency);
     found.number(MtlNumber::Dissolve).is_none() && transparency.is_some_and(|part| part >= 1.0)

@@ -21,13 +21,13 @@ const FILE_LIMIT: u64 = 64 << 20;
 /// Contents of an MTL file.
 pub(super) struct MtlLibrary {
     pub(super) materials: Vec<MtlMaterial>,
-    /// Statements that belong to no material and are ignored.
+    /// Ignored statements that do not belong to a material.
     pub(super) ignored: Vec<IgnoredStatement>,
     /// Hash of the file.
     pub(super) hash: FileHash,
 }
 
-/// Statements of a material. Of repeated statements, the last counts.
+/// Statements of a material. The last of several equal statements is used.
 #[derive(Clone, Debug, Default)]
 pub(super) struct MtlMaterial {
     pub(super) name: String,
@@ -37,11 +37,11 @@ pub(super) struct MtlMaterial {
     numbers: [Option<WithLine<f64>>; MtlNumber::ALL.len()],
     illumination: Option<WithLine<u8>>,
     maps: Vec<(map::MapKind, map::Map)>,
-    /// Statements without effect.
+    /// Statements that have no effect.
     ignored: Vec<IgnoredStatement>,
 }
 
-/// A value and the line that defines it.
+/// A value, and the line that defines it.
 #[derive(Clone, Copy, Debug)]
 struct WithLine<T> {
     value: T,
@@ -119,7 +119,7 @@ impl MtlLibrary {
         }
     }
 
-    /// Warns about duplicate names, of which the last material counts.
+    /// Warns about materials with the same name. The last one is used.
     fn add_duplicates(&mut self) {
         let mut seen = std::collections::HashMap::new();
         for material in &self.materials {
@@ -134,7 +134,7 @@ impl MtlLibrary {
 const NO_MATERIAL_YET: &str = "statements before the first `newmtl` are ignored";
 
 fn duplicate_material(name: &str, first: usize) -> String {
-    format!("material {name:?} replaces the one defined in line {first}")
+    format!("material {name:?} replaces the one defined on line {first}")
 }
 
 #[cfg(test)]

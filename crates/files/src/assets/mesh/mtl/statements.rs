@@ -14,7 +14,7 @@ pub(super) enum MtlColor {
 }
 
 impl MtlColor {
-    /// All colors with their keywords, in the order of the enum.
+    /// All colors and their keywords, in enum order.
     pub(super) const ALL: [(Self, &'static str); 5] = [
         (Self::Ambient, "Ka"),
         (Self::Diffuse, "Kd"),
@@ -41,7 +41,7 @@ pub(super) enum MtlNumber {
 }
 
 impl MtlNumber {
-    /// All numbers with their keywords, in the order of the enum.
+    /// All numbers and their keywords, in enum order.
     pub(super) const ALL: [(Self, &'static str); 11] = [
         (Self::Shininess, "Ns"),
         (Self::Ior, "Ni"),
@@ -64,14 +64,14 @@ impl MtlNumber {
 
 /// A parsed line.
 pub(super) enum Statement {
-    /// An empty line, a comment, or a statement that affects no image.
+    /// An empty line, a comment, or a statement that does not affect rendering.
     Nothing,
     New(String),
     Color(MtlColor, [f64; 3]),
     Number(MtlNumber, f64),
     Illumination(u8),
     Map(MapKind, Map),
-    /// A statement without effect, with its warning.
+    /// An ignored statement, with its warning.
     Ignored(String),
 }
 
@@ -102,13 +102,13 @@ pub(super) fn parse(line: &str) -> Result<Statement, String> {
     }
     match keyword.to_ascii_lowercase().as_str() {
         "illum" => illumination(rest),
-        // Only affects reflection maps, which have their own warning.
+        // This only affects reflection maps, and these have their own warning.
         "sharpness" => Ok(Statement::Nothing),
         _ => Ok(Statement::Ignored(unknown_statement(keyword))),
     }
 }
 
-/// Reason to reject a statement with missing or invalid arguments.
+/// Error message for a statement with missing or invalid arguments.
 pub(super) fn expected_after(keyword: &str, expected: &str) -> String {
     format!("expected {expected} after `{keyword}`")
 }
@@ -139,7 +139,7 @@ fn finite<T: std::str::FromStr + Into<f64>>(word: &str) -> Option<f64> {
     word.parse().ok().map(T::into).filter(|number: &f64| number.is_finite())
 }
 
-/// Parses a color from three numbers, or from one gray value.
+/// Parses a color: three numbers or a single gray value.
 fn color(keyword: &str, color: MtlColor, rest: &str) -> Result<Statement, String> {
     let words = words(rest);
     let (is_xyz, words) = match words.as_slice() {
@@ -167,7 +167,7 @@ fn rgb([x, y, z]: [f64; 3]) -> [f64; 3] {
     ]
 }
 
-/// Parses a number. `d -halo` is read as `d`.
+/// Parses a number. Treats `d -halo` like `d`.
 fn number(keyword: &str, number: MtlNumber, rest: &str) -> Result<Statement, String> {
     let words = words(rest);
     let word = match words.as_slice() {

@@ -17,7 +17,7 @@ fn path(texture: &Option<FileTexture>) -> Option<&Path> {
     texture.as_ref().map(|texture| texture.path.as_path())
 }
 
-/// Warnings about all materials of a text.
+/// Warnings about all materials in a text.
 fn warnings_of(text: &[u8]) -> Vec<String> {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("a.mtl");
@@ -37,7 +37,7 @@ fn read(text: &str) -> Result<Vec<FileMaterial>, AssetError> {
     Ok(found.iter().map(|found| material(found, Path::new("models"))).collect())
 }
 
-/// Asserts that `line` of a text is rejected because `expected` is missing after `keyword`.
+/// Asserts that `line` is rejected because `expected` is missing after `keyword`.
 #[track_caller]
 fn assert_rejected(text: &str, line: usize, keyword: &str, expected: &str) {
     assert_eq!(rejection(read(text)), (Some(line), expected_after(keyword, expected)), "{text}");
@@ -82,7 +82,7 @@ fn every_statement_is_converted() {
 fn all_color_notations_are_read() {
     let diffuse = |statement: &str| read(&format!("newmtl a\n{statement}\n")).expect("whole")[0].diffuse;
     assert_eq!(diffuse("Kd 0.25 # gray"), Vec3::splat(0.25));
-    // D65 white and the red primary of Rec. 709.
+    // D65 white and the Rec. 709 red primary.
     assert!((diffuse("Kd xyz 0.95046 1 1.08906") - Vec3::ONE).length() < 1e-3);
     assert!((diffuse("Kd xyz 0.41239 0.21264 0.01933") - Vec3::X).length() < 1e-3);
     assert_eq!(diffuse("Kd spectral brass.rfl 0.5"), Vec3::splat(0.6));
@@ -202,11 +202,11 @@ fn comments_may_follow_a_file_name() {
     let found = material(&found[0], folder.path());
     assert_eq!(found.diffuse_texture, file("wall.png"));
     assert_eq!(found.specular_texture, file("Map #1.png"));
-    assert_eq!(found.normal_texture, file("no #2.png"), "the whole name if no candidate exists");
+    assert_eq!(found.normal_texture, file("no #2.png"), "expected the whole name if no candidate exists");
 }
 
 #[test]
-fn errors_name_the_line_and_the_reason() {
+fn errors_include_line_and_reason() {
     for (text, line, keyword, expected) in [
         ("newmtl a\nKd 0.5 1\n", 2, "Kd", THREE_NUMBERS),
         ("newmtl a\n\nNs nan\n", 3, "Ns", ONE_NUMBER),
@@ -323,7 +323,7 @@ fn ignored_statements_are_reported_with_line() {
     ] {
         assert_eq!(of(quiet), [""; 0], "{quiet}");
     }
-    // Warnings that several materials have in common are merged.
+    // Warnings shared by several materials are merged.
     assert_eq!(
         warnings_of(b"Kd 1 1 1\nnewmtl a\nmap_Ns t.png\nnewmtl b\nmap_Ns t.png\nnewmtl a\n"),
         [

@@ -1,4 +1,4 @@
-//! Builds vertices with a single index from the statements of an OBJ file.
+//! Builds single-index vertices from the statements of an OBJ file.
 
 use std::collections::HashMap;
 
@@ -13,11 +13,11 @@ pub(super) struct FaceRun {
     pub(super) faces: usize,
     pub(super) material: u32,
     pub(super) smoothing: Smoothing,
-    /// Whether an object, a group or a material starts here, which shares no vertices with the previous ones.
+    /// Whether an object, group or material starts here. If so, no vertices are shared with earlier runs.
     pub(super) is_object: bool,
 }
 
-/// Adds the faces of all runs. Within an object, each distinct combination of indices becomes a vertex.
+/// Adds the faces of all runs. In each object, every distinct combination of indices becomes a vertex.
 pub(super) fn build(statements: &Statements, runs: &[FaceRun], parsed: &mut ParsedMesh) {
     let has = |part: usize| statements.corners.iter().any(|corner| corner[part] != NONE);
     let smooths = |run: &FaceRun| run.faces > 0 && run.smoothing != Smoothing::Unspecified;
@@ -37,7 +37,7 @@ pub(super) fn build(statements: &Statements, runs: &[FaceRun], parsed: &mut Pars
     runs.iter().for_each(|run| builder.run(run));
 }
 
-/// Smoothing group of a vertex. With flat shading, also the number of its face, from 1.
+/// Smoothing group of a vertex. For flat shading, also the face number, starting at 1.
 type SmoothingTag = (u32, u32);
 
 struct VertexBuilder<'a> {
@@ -49,7 +49,7 @@ struct VertexBuilder<'a> {
     has_materials: bool,
     /// Vertices of the current object.
     vertices: HashMap<(CornerIndices, SmoothingTag), u32>,
-    /// Normal index of each position and smoothing group, across all objects.
+    /// Maps a position and smoothing group to a normal index, across all objects.
     normals: HashMap<(u32, u32), u32>,
     parsed: &'a mut ParsedMesh,
     face: usize,

@@ -7,10 +7,10 @@ use super::super::mtl::{self, MtlLibrary, cut_at_comments, spellings};
 use super::super::{AssetError, MeshSource};
 use crate::assets::{Companion, FileMaterial};
 
-/// Loader of the libraries named by an OBJ file, in order of occurrence.
+/// Loads the libraries referenced by an OBJ file, in order of occurrence.
 pub(super) struct Libraries<'a> {
     pub(super) source: &'a MeshSource<'a>,
-    /// Names of the materials that the OBJ file uses.
+    /// Names of the materials used by the OBJ file.
     pub(super) used: &'a BTreeSet<String>,
     pub(super) found: LibraryContents,
 }
@@ -22,15 +22,15 @@ pub(super) struct LibraryContents {
     pub(super) resolved: BTreeSet<String>,
     pub(super) warnings: Vec<String>,
     pub(super) missing: bool,
-    /// Files that were read or are missing.
+    /// Library files, including missing ones.
     pub(super) files: Vec<Companion>,
     /// Images referenced by the materials.
     pub(super) images: Vec<PathBuf>,
 }
 
 impl Libraries<'_> {
-    /// Loads one or more libraries named by a statement, and returns the material index of each used name
-    /// that they define. Missing files give warnings.
+    /// Loads the libraries in a statement and returns the material index of each used name they define.
+    /// Missing files only cause warnings.
     pub(super) fn load(&mut self, statement: &str) -> Result<HashMap<String, usize>, AssetError> {
         let folder = self.source.path.parent().unwrap_or(Path::new(""));
         let readings = cut_at_comments(statement).flat_map(|name| [name.to_owned(), name.replace('\\', "/")]);
@@ -54,8 +54,8 @@ impl Libraries<'_> {
         Ok(indices)
     }
 
-    /// Returns the material index of each used name. In both files, a name may be followed by a comment or
-    /// may contain `#` itself (`Material #25`): the longest match counts.
+    /// Returns the material index of each used name. In both file formats, names may contain `#` (`Material
+    /// #25`) and may be followed by comments, so the longest match is used.
     fn resolve<'n>(&self, names: impl Iterator<Item = &'n str>) -> HashMap<String, usize> {
         let all: Vec<_> = names.enumerate().map(|(index, name)| (name, index)).collect();
         let mut known: HashMap<&str, usize> = all.iter().copied().collect();

@@ -1,5 +1,5 @@
-//! OBJ (Wavefront, *Object Files*, 1995): polygons with separate indices for position, texture coordinates
-//! and normal, which are converted to vertices with a single index.
+//! OBJ (Wavefront, *Object Files*, 1995). Its polygons have separate indices for position, texture
+//! coordinates and normal, which are converted to single-index vertices.
 
 mod build;
 mod libraries;
@@ -50,8 +50,8 @@ struct ObjMaterials {
 }
 
 impl ObjMaterials {
-    /// Loads the libraries and resolves the materials. Libraries apply to the statements after them, and to
-    /// earlier ones whose names no preceding library defines.
+    /// Loads the libraries and resolves the materials. A library applies to all later `usemtl` statements,
+    /// and to earlier ones whose material no preceding library defines.
     fn load(source: &MeshSource<'_>, changes: &[(usize, StateChange)]) -> Result<Self, AssetError> {
         let name_of = |change: &StateChange| match change {
             StateChange::Material(name) if !name.is_empty() => Some(name.clone()),
@@ -146,7 +146,7 @@ fn uvs_missing(first: usize, count: usize) -> String {
         1 => format!("line {first}: a face has"),
         _ => format!("line {first} and {} more faces have", count - 1),
     };
-    format!("{faces} corners without texture coordinates, which are set to (0, 0)")
+    format!("{faces} corners without texture coordinates; these are set to (0, 0)")
 }
 
 #[cfg(test)]

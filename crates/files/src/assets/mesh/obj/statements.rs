@@ -7,13 +7,13 @@ use super::vertex::Vertices;
 use super::words::{Words, integer, number, too_few};
 use crate::math::{DVec2, DVec3, Vec2, Vec3};
 
-/// Statements between two polls of the cancel token.
+/// Number of statements between two polls of the cancel token.
 const BATCH: u64 = 1 << 13;
 
-/// Index of an attribute that a corner does not have.
+/// Index of an attribute missing from a corner.
 pub(super) const NONE: u32 = u32::MAX;
 
-/// Position, texture coordinate and normal index of a corner, from 0.
+/// Position, texture coordinate and normal index of a corner, starting at 0.
 pub(super) type CornerIndices = [u32; 3];
 
 /// Smoothing of faces without normals.
@@ -39,7 +39,7 @@ pub(super) enum StateChange {
 /// Length of the longest keyword.
 const LONGEST_KEYWORD: usize = 6;
 
-/// Converts a keyword to lower case. Returns words longer than any keyword unchanged.
+/// Converts a keyword to lowercase. Words longer than any keyword are returned unchanged.
 fn lower_case<'a>(word: &'a [u8], lower: &'a mut [u8; LONGEST_KEYWORD]) -> &'a [u8] {
     let Some(lower) = lower.get_mut(..word.len()) else { return word };
     lower.copy_from_slice(word);
@@ -123,7 +123,7 @@ impl Statements {
         self.changes.push((self.arities.len(), change));
     }
 
-    /// Parses a smoothing group. Warns about an invalid one and ignores it.
+    /// Parses a smoothing group. Ignores invalid groups with a warning.
     fn smoothing(&mut self, source: &MeshSource<'_>, words: &mut Words<'_>, start: usize) {
         let group = words.word().unwrap_or(b"off");
         let smoothing = match integer(group).map(u32::try_from) {
@@ -149,7 +149,8 @@ impl Statements {
         Ok(())
     }
 
-    /// Drops the texture coordinate or normal indices of corners if the file defines none, with a warning.
+    /// If the file has no texture coordinates or no normals, drops their indices from all corners, with a
+    /// warning.
     fn drop_missing_attributes(&mut self, source: &MeshSource<'_>) {
         for (part, count, name) in
             [(1, self.uvs.len(), "texture coordinates"), (2, self.normals.len(), "normals")]
@@ -173,7 +174,7 @@ impl Statements {
         self.arities.iter().take_while(is_before).count()
     }
 
-    /// Checks the indices of corners. This happens at the end because faces may precede their vertices.
+    /// Checks the indices of all corners. Called at the end because faces may precede their vertices.
     fn check_ranges(&self, source: &MeshSource<'_>) -> Result<(), AssetError> {
         let counts = [self.vertices.positions.len(), self.uvs.len(), self.normals.len()];
         let wrong = |corner: &CornerIndices| {
@@ -239,7 +240,7 @@ pub(super) fn face_start(source: &MeshSource<'_>, face: usize) -> usize {
     0
 }
 
-/// Parses between `min` and `max` numbers of a statement. Missing ones are 0.
+/// Parses between `min` and `max` numbers in a statement. Missing numbers are 0.
 fn numbers(words: &mut Words<'_>, min: usize, max: usize, what: &str) -> Result<[f64; 3], String> {
     let mut values = [0.0; 3];
     let mut count = 0;
@@ -267,8 +268,7 @@ fn corner(word: &[u8], counts: [usize; 3]) -> Result<CornerIndices, String> {
     Ok(corner)
 }
 
-/// Converts an index that counts from 1, or backwards from the end if it is negative, to one that counts from
-/// 0.
+/// Converts a one-based index, or a negative index relative to the end, to a zero-based index.
 fn absolute(index: i64, count: usize) -> Option<u32> {
     let from_zero = if index < 0 { count as i64 + index } else { index - 1 };
     u32::try_from(from_zero).ok().filter(|index| *index != NONE)

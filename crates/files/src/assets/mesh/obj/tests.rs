@@ -30,7 +30,7 @@ fn error(text: &str) -> (Option<usize>, String) {
     rejection(read(text))
 }
 
-/// Error of a vertex index out of range.
+/// Error for a vertex index out of range.
 fn vertex_error(line: usize, index: i64, count: usize) -> (Option<usize>, String) {
     (Some(line), out_of_range(0, index, count))
 }
@@ -73,7 +73,7 @@ fn triangles_have_their_materials() {
 }
 
 #[test]
-fn a_byte_order_mark_in_a_library_is_skipped() {
+fn byte_order_marks_in_libraries_are_skipped() {
     let object = format!("mtllib a.mtl\n{SQUARE}usemtl m\nf 1 2 3\n");
     let library = "\u{feff}newmtl m\nKd 0 1 0\n";
     let loaded = read_with(&[("a.obj", object.as_bytes()), ("a.mtl", library.as_bytes())]).expect("whole");
@@ -83,7 +83,7 @@ fn a_byte_order_mark_in_a_library_is_skipped() {
 #[test]
 fn only_malformed_libraries_are_errors() {
     let text = format!("mtllib none.mtl\nusemtl red\n{SQUARE}f 1 2 3\n");
-    let loaded = read(&text).expect("the mesh loads");
+    let loaded = read(&text).expect("the mesh should load");
     assert_eq!(
         (loaded.material_warnings.len(), loaded.materials.len(), loaded.mesh.materials.len()),
         (1, 0, 0)
@@ -94,7 +94,7 @@ fn only_malformed_libraries_are_errors() {
 }
 
 #[test]
-fn missing_normals_of_groups_are_computed() {
+fn missing_normals_in_objects_are_computed() {
     let text = format!("{SQUARE}vn 0 0 -1\no one\nf 1//1 2//1 3//1\no two\nf 1 3 4\n");
     let mesh = read(&text).expect("whole").mesh;
     assert_eq!(mesh.normals, [Vec3::NEG_Z, Vec3::NEG_Z, Vec3::NEG_Z, Vec3::Z, Vec3::Z, Vec3::Z]);
@@ -103,13 +103,13 @@ fn missing_normals_of_groups_are_computed() {
 #[test]
 fn unusable_faces_are_dropped_and_counted() {
     let text = format!("{SQUARE}v nan 0 0\nv 1e999 0 0\nf 1 2 3\nf 1 2 5\nf 1 2 6\nf 1 2\nf 1\nf 1 1 2\n");
-    let loaded = read(&text).expect("one face is good");
+    let loaded = read(&text).expect("one valid face");
     assert_eq!(loaded.dropped, Dropped { non_finite: 2, degenerate: 3 });
     assert_eq!(loaded.mesh.positions.len(), 3);
 }
 
 #[test]
-fn errors_name_the_line_and_the_reason() {
+fn errors_include_line_and_reason() {
     assert_eq!(error("v 0 0 0\nv 1 0 0\nf 1 2 3\n"), vertex_error(3, 3, 2));
     assert_eq!(error(&format!("{SQUARE}f 1 2 -9\n")), vertex_error(5, -9, 4));
     assert_eq!(error(&format!("{SQUARE}f 0 1 2\n")), vertex_error(5, 0, 4));
@@ -122,7 +122,7 @@ fn errors_name_the_line_and_the_reason() {
 }
 
 #[test]
-fn faces_with_many_corners_finish() {
+fn faces_with_many_corners_are_triangulated() {
     let corners: Vec<String> = (0..60_000).map(|index| (index % 4 + 1).to_string()).collect();
     let loaded = read(&format!("{SQUARE}f {}\n", corners.join(" "))).expect("a fan");
     assert!(!loaded.mesh.triangles.is_empty());
@@ -134,7 +134,7 @@ fn comments_may_follow_a_statement() {
     for text in [
         "v 0 0 0 # a\nv 1 0 0#\nv 1 1 0 # 1 2 3\nv 0 1 0\nvt 0 0 # x\nvn 0 0 1# y\nf 1/1/1 2/1/1 3/1/1 4/1/1 # x\n",
         "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvn 0 0 1\nf 1/1/1 2/1/1 \\\n3/1/1 4/1/1# C:\\\n# D:\\\n",
-        // A comment ends with its line even if its last character is a backslash.
+        // A comment ends at the end of the line, even after a backslash.
         "# C:\\models\\\nv 0 0 0 # \\\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvn 0 0 1\nf 1/1/1 2/1/1 3/1/1 4/1/1\nl 1 2 # x\n",
     ] {
         assert_eq!(read(text).unwrap_or_else(|error| panic!("{error}: {text}")).mesh, plain, "{text}");
@@ -189,13 +189,13 @@ fn vertex_colors_are_read_in_all_dialects() {
     let plain = [[255, 0, 0], [0, 51, 0], [255; 3]];
     assert_eq!(colors(["1 0 0", "0 0.2 0", "1 1 1"]), (plain.to_vec(), vec![]));
     assert_eq!(colors(["255 0 0", "0 51 0", "255 255 255"]), (plain.to_vec(), vec![]));
-    // An alpha of 1, or a weight and an alpha of 1.
+    // An alpha of 1, or both a weight and an alpha of 1.
     assert_eq!(colors(["1 0 0 1", "0 0.2 0 1", "1 1 1 1"]), (plain.to_vec(), vec![]));
     assert_eq!(colors(["1 1 0 0 1", "1 0 0.2 0 1", "1 1 1 1 1"]), (plain.to_vec(), vec![]));
     // A missing color is white.
     assert_eq!(colors(["1 0 0", "0 0.2 0", ""]), (plain.to_vec(), vec![]));
     assert_eq!(colors(["", "0 51 0", "1 1 1"]).0, [[255; 3], [0, 51, 0], [1; 3]]);
-    // Colors slightly above 1 are not byte values.
+    // Fractional colors slightly above 1 are not byte values.
     assert_eq!(colors(["1.5 0 0", "0 0.2 0", "1 1 1"]).0, plain);
     assert_eq!(colors(["", "", ""]), (vec![], vec![]));
     let ignored = vec![excess_words(1)];
@@ -220,7 +220,7 @@ fn keywords_are_case_insensitive() {
     let lower = lower.expect("whole");
     assert_eq!(loaded.mesh, lower.mesh);
     assert_eq!((loaded.materials.len(), loaded.warnings.len()), (1, 1));
-    // Uppercase statements count for line numbers of errors.
+    // Error line numbers include the lines of uppercase statements.
     assert_eq!(error("V 0 0 0\nF 1 1 1\nF 1 2 3\n"), vertex_error(3, 2, 1));
 }
 
@@ -233,7 +233,7 @@ fn self_intersections_are_reported_with_line() {
 }
 
 #[test]
-fn vertex_colors_may_belong_to_one_object() {
+fn colors_are_allowed_in_only_some_objects() {
     let text = "o a\nv 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 0 1 0 0 0 1\no b\nv 0 0 1\nf 2 3 4\no a\nf 1 2 3\n";
     let mesh = read(text).expect("whole").mesh;
     let red = [255, 0, 0];
@@ -241,7 +241,7 @@ fn vertex_colors_may_belong_to_one_object() {
 }
 
 #[test]
-fn zbrush_paint_comments_give_colors() {
+fn zbrush_paint_comments_set_vertex_colors() {
     let square =
         |paint: &str| read(&format!("{SQUARE}#MRGB {paint}\nf 1 2 3 4\n")).expect("whole").mesh.colors;
     assert_eq!(
@@ -280,14 +280,14 @@ fn smoothing_groups_define_hard_edges() {
     }
     let smooth = with("", "");
     assert_ne!(smooth, flat);
-    // A group continues across objects and materials, and may be repeated.
+    // A group continues across objects and materials, and can be resumed later.
     for (a, b) in
         [("s 1", ""), ("s on", "s 1"), ("s 1", "o b"), ("s 1", "g b\nusemtl b"), ("s 2", "s 1\ns 2")]
     {
         assert_eq!(with(a, b), smooth, "{a:?}, {b:?}");
     }
     let textured = |s: &str| shaded(&format!("{CORNER}vt 0 0\nvt 1 1\n{s}\nf 1/1 2/1 3/1\nf 3/2 2/2 5/2\n"));
-    assert_eq!(textured("s 1"), smooth, "a texture seam is not an edge");
+    assert_eq!(textured("s 1"), smooth, "a texture seam should not be an edge");
     assert_eq!(textured("s off"), flat);
     let loaded = read(&format!("{CORNER}s 1\ns sharp\nf 1 2 3\n")).expect("whole");
     assert_eq!(loaded.warnings, [invalid_smoothing(8, b"sharp")]);
@@ -302,7 +302,7 @@ fn flat_faces_stay_flat_at_shallow_folds() {
     assert!(normals[6..].iter().all(|normal| *normal == normals[6] && normal.x < 0.0), "{normals:?}");
     let hard = shaded(&format!("{fold}s 1\nf 1 2 3 4\ns 2\nf 2 5 3\n"));
     assert_eq!(hard, normals);
-    // Coincident vertices of the same group are joined if their normals nearly agree.
+    // Coincident vertices in the same group are joined if their normals are similar.
     let apart = fold.to_owned() + "v 1 0 0\nv 1 1 0\n";
     let joined = shaded(&format!("{apart}s 1\nf 1 2 3 4\nf 6 5 7\n"));
     assert_eq!(joined, shaded(&format!("{fold}f 1 2 3 4\nf 2 5 3\n")));
@@ -331,7 +331,7 @@ fn each_corner_keeps_its_texture_coordinates() {
     assert_eq!(warnings, [uvs_missing(8, 2)]);
     let (found, warnings) = uvs("f 1/1 2/2 3\n");
     assert_eq!((found, warnings), (vec![a, b, Vec2::ZERO], vec![uvs_missing(8, 1)]));
-    // Objects without any texture coordinates give no warning.
+    // No warning is emitted for objects without any texture coordinates.
     let (found, warnings) = uvs("o one\nf 1 2 3\no two\nf 1/1 3/2 4/3\n");
     assert_eq!((found, warnings), ([none, [a, b, c]].concat(), vec![]));
 }
@@ -363,13 +363,13 @@ fn a_library_may_follow_usemtl() {
 }
 
 #[test]
-fn free_form_surfaces_give_a_warning() {
+fn free_form_surfaces_cause_a_warning() {
     let loaded = read(&format!("{SQUARE}f 1 2 3\ncstype bezier\nsurf 0 1 0 1 1 2 3 4\n")).expect("a face");
     assert_eq!(loaded.warnings, [free_form(7, "surf")]);
 }
 
 #[test]
-fn v_of_a_texture_coordinate_defaults_to_zero() {
+fn texture_coordinate_v_defaults_to_zero() {
     let faces = "f 1/1 2/2 3/3\n";
     for coordinates in
         ["vt 0\nvt 0.5 0\nvt 1\n", "vt 0 # 1\nvt \\\n .5\nvt 1 \\\n", "vt\t0\r\nvt 0.5 0 0\nvt 1 "]
@@ -383,7 +383,7 @@ fn v_of_a_texture_coordinate_defaults_to_zero() {
 }
 
 #[test]
-fn lines_may_end_in_only_carriage_returns() {
+fn lone_carriage_returns_end_lines() {
     let plain = read(&format!("# a\n{SQUARE}f 1 2 3 4\n")).expect("whole").mesh;
     let old = format!("# a\n{SQUARE}f 1 2 3 4\n").replace('\n', "\r");
     assert_eq!(read(&old).expect("whole").mesh, plain);
@@ -395,7 +395,7 @@ fn lines_may_end_in_only_carriage_returns() {
 }
 
 #[test]
-fn trailing_slashes_of_corners_are_ignored() {
+fn trailing_slashes_in_corners_are_ignored() {
     let head = format!("{SQUARE}vt 0 0\nvt 1 0\nvt 0 1\nvn 0 0 1\n");
     let mesh = |faces: &str| read(&format!("{head}{faces}\n")).expect(faces).mesh;
     let (plain, textured) = (mesh("f 1 2 3"), mesh("f 1/1 2/2 3/3"));
@@ -406,7 +406,7 @@ fn trailing_slashes_of_corners_are_ignored() {
         "f 1 \\\n 2/ \\\r\n 3/\t",
         "f 1 2 3/# x",
         "f 1 2 3//\r",
-        // A comment ends with its line.
+        // A comment ends at the end of the line.
         "# note \\\nf 1 2 3/",
     ] {
         assert_eq!(mesh(faces), plain, "{faces}");
@@ -432,7 +432,7 @@ fn trailing_slashes_of_corners_are_ignored() {
 }
 
 #[test]
-fn a_usemtl_without_a_name_ends_the_material() {
+fn usemtl_without_a_name_resets_the_material() {
     for none in ["usemtl", "usemtl ", "  usemtl\t", "usemtl\r"] {
         let text = format!("mtllib a.mtl\n{SQUARE}usemtl red\nf 1 2 3\n{none}\nf 1 3 4\n");
         let files = [("a.obj", text.as_bytes()), ("a.mtl", &b"newmtl red\nKd 1 0 0\n"[..])];
@@ -465,7 +465,7 @@ fn libraries_apply_to_earlier_statements() {
         assert_eq!(loaded.material_warnings, Vec::<String>::new(), "{text}");
         assert_eq!(loaded.materials[loaded.mesh.materials[0] as usize].diffuse, Vec3::X, "{text}");
     }
-    // Of two materials with the same name, the one defined before the `usemtl` counts.
+    // If two materials have the same name, the one defined before `usemtl` is used.
     let text = format!("mtllib a.mtl\n{SQUARE}usemtl red\nf 1 2 3\nmtllib c.mtl\nusemtl red\nf 1 3 4\n");
     let files = [("a.obj", text.as_bytes()), ("a.mtl", mtl), ("c.mtl", b"newmtl red\nKd 0 1 0\n")];
     let loaded = read_with(&files).expect("whole");
@@ -491,7 +491,7 @@ fn missing_attributes_are_dropped_with_warning() {
     }
 }
 
-/// A corner as the bit patterns of its position and texture coordinates, with its normal.
+/// A corner: the bit patterns of its position and texture coordinates, and its normal.
 type CornerBits = (([u32; 3], [u32; 2]), Vec3);
 
 fn corner_of(position: Vec3, uv: Vec2, normal: Vec3) -> CornerBits {
@@ -500,7 +500,7 @@ fn corner_of(position: Vec3, uv: Vec2, normal: Vec3) -> CornerBits {
 
 /// Corners of each face, read with `tobj`.
 fn faces_from_tobj(path: &std::path::Path) -> Vec<Vec<CornerBits>> {
-    let (models, _) = tobj::load_obj(path, &tobj::LoadOptions::default()).expect("tobj reads it");
+    let (models, _) = tobj::load_obj(path, &tobj::LoadOptions::default()).expect("tobj should read it");
     let mut faces = Vec::new();
     for tobj::Model { mesh, .. } in &models {
         assert!(mesh.face_arities.iter().all(|arity| *arity == 4), "all faces have four corners");
@@ -521,7 +521,7 @@ fn faces_from_tobj(path: &std::path::Path) -> Vec<Vec<CornerBits>> {
 }
 
 #[test]
-fn triangles_have_the_same_corners_as_in_tobj() {
+fn triangles_match_tobj() {
     let assets = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets");
     for name in ["knot.obj", "vase.obj", "shrub.obj", "room.obj"] {
         let path = assets.join(name);

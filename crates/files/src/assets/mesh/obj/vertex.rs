@@ -1,4 +1,4 @@
-//! Vertices of an OBJ file, with the colors that several programs add to them.
+//! Vertices of an OBJ file, with the color extensions of several programs.
 
 use super::super::parsed::ColorRange;
 use super::super::text::expected;
@@ -9,7 +9,7 @@ use crate::math::DVec3;
 #[derive(Default)]
 pub(super) struct Vertices {
     pub(super) positions: Vec<DVec3>,
-    /// Color of each position, if it has one. May be shorter than `positions`.
+    /// Optional color of each position. May be shorter than `positions`.
     colors: Vec<Option<[f32; 3]>>,
     range: ColorRange,
     /// Colors from ZBrush's `#MRGB` comments, in the order of the positions.
@@ -26,8 +26,8 @@ pub(super) const ZERO_WEIGHT: &str = "a vertex has weight 0";
 pub(super) const NONFINITE_COLOR: &str = "vertex colors must be finite";
 
 impl Vertices {
-    /// Parses a `v` statement: x y z, then nothing, a weight, a color, a color and its alpha, or a weight, a
-    /// color and its alpha.
+    /// Parses a `v` statement: x y z, followed by nothing, a weight, a color, a color with alpha, or a weight
+    /// and a color with alpha.
     pub(super) fn read(&mut self, words: &mut Words<'_>) -> Result<(), String> {
         let start = words.at();
         let mut numbers = [0.0; 8];
@@ -84,8 +84,8 @@ impl Vertices {
         Ok(())
     }
 
-    /// Parses the words of an `#MRGB` comment: for each vertex a mask, red, green and blue, as two
-    /// hexadecimal digits each.
+    /// Parses an `#MRGB` comment. Each vertex has a mask, red, green and blue, as two hexadecimal digits
+    /// each.
     pub(super) fn read_paint(&mut self, line: &[u8]) {
         let digits = line.trim_ascii().chunks_exact(8);
         let painted = digits.map_while(|digits| {
@@ -101,13 +101,13 @@ impl Vertices {
         !self.colors.is_empty() || !self.painted.is_empty()
     }
 
-    /// Byte offset of the vertex with the minimum alpha, if that is less than 1, which is ignored. Alpha has the
-    /// same range as the colors.
+    /// Byte offset of the vertex with the minimum alpha. `None` if all alphas are 1. Alpha has the same range
+    /// as the colors.
     pub(super) fn transparent(&self) -> Option<usize> {
         self.least_alpha.filter(|(least, _)| *least < self.range.one()).map(|(_, start)| start)
     }
 
-    /// The color of a position, or white if it has none.
+    /// Color of a position. White if the file does not specify it.
     pub(super) fn color_of(&self, index: usize) -> [u8; 3] {
         if self.colors.is_empty() {
             return self.painted.get(index).copied().unwrap_or([u8::MAX; 3]);

@@ -27,8 +27,8 @@ impl<'a> Words<'a> {
         self.at < self.bytes.len()
     }
 
-    /// Consumes the next word of this statement. A statement ends with its line or at a comment; a backslash
-    /// at the end of a line continues it.
+    /// Consumes the next word of this statement. A statement ends at a comment or at the end of the line,
+    /// unless the line ends with a backslash.
     pub(super) fn word(&mut self) -> Option<&'a [u8]> {
         loop {
             match self.bytes.get(self.at)? {
@@ -52,7 +52,7 @@ impl<'a> Words<'a> {
         Some(word)
     }
 
-    /// Consumes the rest of this statement as a name, which may contain blanks and `#`.
+    /// Consumes the rest of this statement as a name. Names may contain blanks and `#`.
     pub(super) fn name(&mut self) -> String {
         let mut name = String::new();
         loop {
@@ -84,7 +84,7 @@ impl<'a> Words<'a> {
     }
 }
 
-/// Parses a number. Overflow gives infinity; `nan` and `inf` are numbers.
+/// Parses a number. `nan` and `inf` are accepted. Overflow results in infinity.
 pub(super) fn number(word: &[u8]) -> Option<f64> {
     parse(word).ok()
 }
@@ -94,7 +94,7 @@ pub(super) fn integer(word: &[u8]) -> Option<i64> {
     std::str::from_utf8(word).ok()?.parse().ok()
 }
 
-/// Reason to reject a statement with too few numbers.
+/// Error message for a statement with too few numbers.
 pub(super) fn too_few(wanted: usize, what: &str, found: usize) -> String {
     format!("expected {wanted} {what}, found {found}")
 }

@@ -1,15 +1,15 @@
-//! Reads the numbers after a PLY header, as text or as binary data of either byte order.
+//! Reads the numbers after a PLY header, as text or as binary data in either byte order.
 
 use super::super::text::{Cursor, expected};
 use super::header::Scalar;
 
-/// Numbers in file order. Errors do not include the position in the file.
+/// Reads numbers in file order. Errors do not include the position in the file.
 pub(super) trait Numbers: Clone {
     fn float(&mut self, scalar: Scalar) -> Result<f64, String>;
     fn integer(&mut self, scalar: Scalar) -> Result<i64, String>;
     fn skip(&mut self, scalar: Scalar, count: usize) -> Result<(), String>;
 
-    /// Ends an item (a vertex or a face) of an element.
+    /// Ends an item of an element, such as a vertex or a face.
     fn end_item(&mut self) {}
 
     /// Byte offset in the file.
@@ -20,11 +20,11 @@ pub(super) trait Numbers: Clone {
         self.at()
     }
 
-    /// Whether the rest of the file can hold `count` numbers.
+    /// Whether the rest of the file is long enough for `count` numbers.
     fn can_hold(&self, scalar: Scalar, count: u64) -> bool;
 }
 
-/// Reason to reject a truncated body.
+/// Error message for a truncated body.
 pub(super) const END_OF_FILE: &str = "unexpected end of file";
 
 /// Numbers separated by whitespace.
@@ -36,8 +36,8 @@ pub(super) struct Ascii<'a>(pub(super) Cursor<'a>, pub(super) LineEnds);
 pub(super) enum LineEnds {
     /// As whitespace.
     Blank,
-    /// As ends of items. Extra values before them are skipped: the number of such lines, and the byte offset
-    /// of the first.
+    /// As the end of an item. Extra values on a line are skipped. Contains the number of lines with extra
+    /// values, and the byte offset of the first.
     EndItems(u64, Option<usize>),
 }
 

@@ -1,4 +1,4 @@
-//! Colors of a PLY file, whose range depends on their type and on their largest value.
+//! Colors of a PLY file. Their range depends on their type and largest value.
 
 use super::super::parsed::{ColorRange, color_bytes};
 use super::header::Scalar;
@@ -12,7 +12,7 @@ pub(super) struct PlyColors {
     /// Colors of all other types.
     numbers: Vec<[f64; 3]>,
     range: ColorRange,
-    /// Minimum alpha, its type, and a byte offset in its vertex.
+    /// Minimum alpha, its type, and a byte offset in the same vertex.
     alpha: Option<(f64, Scalar, usize)>,
 }
 
@@ -37,8 +37,8 @@ impl PlyColors {
         }
     }
 
-    /// Returns the colors as bytes, and a byte offset in the vertex with the minimum alpha if that is less than 1,
-    /// which is ignored.
+    /// Returns the colors as bytes. If any alpha is less than 1, also returns a byte offset in the vertex
+    /// with the minimum alpha, for a warning that alpha is ignored.
     pub(super) fn finish(self) -> (Vec<[u8; 3]>, Option<usize>) {
         let one = |scalar: Scalar| match scalar {
             Scalar::U8 | Scalar::I8 => scalar.full_intensity(),

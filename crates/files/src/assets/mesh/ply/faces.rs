@@ -12,12 +12,12 @@ use crate::math::DVec2;
 #[derive(Clone, Copy, PartialEq)]
 enum Role {
     Corners,
-    /// List of texture coordinates, of the corners or of the face.
+    /// List of texture coordinates for the corners or the face.
     Uvs,
-    /// List of colors, of the corners or of the face.
+    /// List of colors for the corners or the face.
     Colors,
-    /// Scalar of the face, by its index in `FaceReader::values`: texture coordinate, color component or
-    /// texture number.
+    /// Scalar value of the face (texture coordinate, color component or texture number), identified by its
+    /// index into `FaceReader::values`.
     Value(usize),
     Unused,
 }
@@ -27,7 +27,7 @@ const UV: [usize; 2] = [0, 1];
 const COLOR: [usize; 3] = [2, 3, 4];
 const TEXTURE: usize = 5;
 
-/// Returns type and role of each property. `corners` is the index of the vertex list.
+/// Returns the type and role of each property. `corners` is the index of the vertex list.
 fn roles(element: &Element, corners: usize) -> Vec<(PropertyType, Role)> {
     let role = |(index, kind, name): (usize, PropertyType, &str)| match (kind, name) {
         _ if index == corners => Role::Corners,
@@ -89,7 +89,7 @@ struct FaceReader {
     /// Texture number of the first face.
     texture: Option<f64>,
     has_several_textures: bool,
-    /// Number of faces with lists of a wrong length, and the index and byte offset of the first.
+    /// Number of faces with a list of the wrong length, and the index and byte offset of the first one.
     wrong: u64,
     first_wrong: (usize, usize),
 }
@@ -212,19 +212,23 @@ impl FaceReader {
 }
 
 /// Warning about faces with different texture numbers.
-pub(super) const SEVERAL_TEXTURES: &str = "`texnumber` is ignored: all faces get the same material";
+pub(super) const SEVERAL_TEXTURES: &str = "`texnumber` is ignored: all faces have the same material";
 
-/// Warning about `count` faces whose lists of texture coordinates or colors do not match their corners.
+/// Warning about `count` faces with texture coordinate or color lists that do not match the number of
+/// corners.
 pub(super) fn wrong_list_length(first: &str, count: u64) -> String {
     let more = if count > 1 { format!(" and {} more", count - 1) } else { String::new() };
-    format!("{first}{more}: ignored texture coordinates or colors whose number does not match the corners")
+    format!(
+        "{first}{more}: ignored texture coordinates or colors because their number does not match the corners"
+    )
 }
 
-/// Possible numbers of components of a texture coordinate or color in a list.
+/// Allowed component counts of texture coordinates and colors in lists.
 const UV_SIZES: [usize; 2] = [2, 3];
 const COLOR_SIZES: [usize; 2] = [3, 4];
 
-/// Returns the components of a corner from a list with a value per corner or a single value for the face.
+/// Returns a corner's components from a list that contains either one value per corner or a single value for
+/// the face.
 fn corner_value(list: &[f64], arity: usize, index: usize, sizes: [usize; 2]) -> Option<&[f64]> {
     match sizes.into_iter().find(|size| list.len() == size * arity) {
         Some(size) => list.get(index * size..),

@@ -50,7 +50,7 @@ impl Scalar {
         }
     }
 
-    /// Color value of full intensity.
+    /// Color value at full intensity.
     pub(super) fn full_intensity(self) -> f64 {
         match self {
             Self::I8 => f64::from(i8::MAX),
@@ -88,7 +88,7 @@ pub(super) struct Element {
 }
 
 impl Element {
-    /// Minimum size of one item. In text, a number takes a digit and a blank.
+    /// Minimum size of one item. In text, a number takes at least a digit and a space.
     pub(super) fn least_bytes(&self, encoding: Encoding) -> u64 {
         let least = |property: &Property| match (encoding, property.kind) {
             (Encoding::Ascii, _) => 2,
@@ -131,7 +131,7 @@ pub(super) fn parse(source: &MeshSource<'_>) -> Result<PlyHeader, AssetError> {
     }
     let mut encoding = None;
     let mut elements = Vec::new();
-    // Number of skipped lines, and a description of the first.
+    // Number of skipped lines, and a description of the first one.
     let mut skipped = (0_u32, String::new());
     for (start, end, line) in lines {
         if end == HEADER_LIMIT && !line.ends_with(b"\n") {
@@ -148,7 +148,7 @@ pub(super) fn parse(source: &MeshSource<'_>) -> Result<PlyHeader, AssetError> {
             })?;
             return Ok(PlyHeader { encoding, elements, warning, body: end });
         }
-        // Do not skip unknown keywords after the first element: they may be misspelled properties.
+        // Do not skip unknown keywords after the first element. They may be misspelled properties.
         if elements.is_empty() && words.first().is_some_and(|first| !KEYWORDS.contains(first)) {
             if skipped.0 == 0 {
                 skipped.1 = format!("line {}: {}", source.line(start), unknown_keyword(words[0]));
@@ -165,7 +165,7 @@ pub(super) const NO_FORMAT: &str = "the header has no format line";
 pub(super) const NO_END: &str = "the header has no end_header";
 pub(super) const PROPERTY_FIRST: &str = "a property before the first element";
 
-/// Warning about `count` skipped lines; `first` describes the first.
+/// Warning about `count` skipped lines. `first` describes the first one.
 pub(super) fn skipped_lines(first: &str, count: u32) -> String {
     match count {
         1 => format!("{first}; line skipped"),

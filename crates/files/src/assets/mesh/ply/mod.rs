@@ -1,5 +1,5 @@
-//! PLY (Turk, *The PLY Polygon File Format*, 1994): text and binary of both byte orders, all types, and
-//! unknown properties and elements.
+//! PLY (Turk, *The PLY Polygon File Format*, 1994): text and binary files in both byte orders, with all types
+//! and with unknown properties and elements.
 
 mod body;
 mod colors;
@@ -16,7 +16,7 @@ use body::{Ascii, Binary, LineEnds, Numbers};
 use colors::PlyColors;
 use header::{Element, Encoding, PlyHeader, PropertyType, Scalar};
 
-/// Items of an element between two polls of the cancel token.
+/// Number of items between two polls of the cancel token.
 const BATCH: u64 = 1 << 14;
 
 pub(super) fn parse(source: &MeshSource<'_>) -> Result<LoadedMesh, AssetError> {
@@ -30,8 +30,8 @@ pub(super) fn parse(source: &MeshSource<'_>) -> Result<LoadedMesh, AssetError> {
     }
 }
 
-/// Reads a text file, ignoring line ends. If that fails or leaves words unread, lines may have undeclared
-/// values: reads it again with one item per line.
+/// Reads a text file, ignoring line ends. If this fails or does not read all words, lines may have undeclared
+/// values, so the file is read again with one item per line.
 fn read_text(source: &MeshSource<'_>, header: &PlyHeader) -> Result<LoadedMesh, AssetError> {
     let cursor = Cursor::new(source.bytes, header.body);
     let mut words = Ascii(cursor, LineEnds::Blank);
@@ -48,8 +48,7 @@ fn read_text(source: &MeshSource<'_>, header: &PlyHeader) -> Result<LoadedMesh, 
             loaded.warnings.push(undeclared_values(line, count));
             Ok(loaded)
         }
-        // Return the error of the second pass: a faulty file with undeclared values makes no sense word by
-        // word.
+        // Return the error from the second pass. The first pass misreads files with undeclared values.
         (Err(error), LineEnds::EndItems(_, Some(_))) => Err(error),
         (Ok(_) | Err(_), LineEnds::EndItems(_, None) | LineEnds::Blank) => by_words,
     }
@@ -62,7 +61,7 @@ struct ErrorContext<'a> {
 }
 
 impl ErrorContext<'_> {
-    /// An error of an item, with its line in a text file, or its number in a binary file.
+    /// An error in an item. Includes the line number in text files.
     fn wrong(&self, at: usize, element: &Element, index: u64, reason: &str) -> AssetError {
         let reason = item_error(&element.name, index + 1, reason);
         match self.encoding {
@@ -71,7 +70,7 @@ impl ErrorContext<'_> {
         }
     }
 
-    /// Start of a message about a line. Empty for a binary file.
+    /// Prefix with the line number for a message. Empty for binary files.
     fn line_prefix(&self, at: usize) -> String {
         match self.encoding {
             Encoding::Ascii => format!("line {}: ", self.source.line(at)),
@@ -79,7 +78,7 @@ impl ErrorContext<'_> {
         }
     }
 
-    /// Name of a face in warnings, with its line in a text file.
+    /// Label of a face in warnings, with the line number in text files.
     fn face_label(&self, at: usize, index: usize) -> String {
         format!("{}face {}", self.line_prefix(at), index + 1)
     }
@@ -97,7 +96,7 @@ fn read(
     if vertices > u64::from(u32::MAX) || header.elements.iter().filter(|e| e.name == "vertex").count() > 1 {
         return Err(source.wrong(format!("too many vertices ({vertices}), or more than one vertex element")));
     }
-    // Ignore strips if there are faces, which repeat them.
+    // Ignore strips if there are faces: both describe the same triangles.
     let has_faces = count_of("face") > 0;
     let mut parsed =
         ParsedMesh { warnings: header.warning.iter().cloned().collect(), ..ParsedMesh::default() };
@@ -126,7 +125,7 @@ fn read(
     assemble_text(source, parsed, start_of)
 }
 
-/// Rejects a header that claims more than the file can hold, before anything is allocated.
+/// Rejects element counts that are too large for the file size, before any memory is allocated.
 fn plausible(
     source: &MeshSource<'_>,
     element: &Element,
@@ -155,7 +154,7 @@ fn undeclared_values(first: usize, count: u64) -> String {
         1 => format!("line {first}"),
         _ => format!("line {first} and {} more", count - 1),
     };
-    format!("{lines}: ignored values that the header does not declare")
+    format!("{lines}: ignored values not declared in the header")
 }
 
 fn list_too_long(length: i64) -> String {
@@ -326,8 +325,8 @@ fn read_faces(
     })
 }
 
-/// Reads triangle strips: each vertex forms a triangle with the previous two, with alternating orientation.
-/// −1 restarts the strip within a list; repeated vertices join strips without adding triangles.
+/// Reads triangle strips. Each vertex forms a triangle with the previous two, with alternating orientation.
+/// An index of −1 starts a new strip within a list. Repeated vertices join strips without adding triangles.
 fn read_strips(
     context: &ErrorContext<'_>,
     element: &Element,
@@ -376,7 +375,8 @@ fn corner(vertex: i64, vertices: u64) -> Result<u32, String> {
     }
 }
 
-/// Reads all items of an element. `read` gets the type and length of the list at property `corners`.
+/// Reads all items of an element. `read` receives the type and length of the list with property index
+/// `corners`.
 fn each_list<N: Numbers>(
     context: &ErrorContext<'_>,
     element: &Element,

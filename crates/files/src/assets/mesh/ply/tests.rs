@@ -24,7 +24,7 @@ fn error(bytes: &[u8]) -> (Option<usize>, String) {
     rejection(read_bytes(bytes))
 }
 
-/// Error of the first face.
+/// Error in the first face.
 fn face_error(reason: &str) -> String {
     item_error("face", 1, reason)
 }
@@ -47,7 +47,7 @@ fn both_line_ends_are_accepted() {
     assert_eq!(read_bytes(windows.as_bytes()).expect("whole").mesh, mesh);
 }
 
-/// A file with all types, unknown properties and elements, lists in vertices, and an element before the
+/// A file with all types, unknown properties and elements, lists in the vertices, and an element before the
 /// vertices.
 fn wild(big_endian: bool) -> Vec<u8> {
     let order = if big_endian { "big" } else { "little" };
@@ -120,7 +120,7 @@ fn faces_may_precede_vertices() {
 }
 
 #[test]
-fn errors_name_the_line_or_the_face() {
+fn errors_include_line_or_face() {
     for (body, line, reason) in [
         (format!("{SQUARE}3 0 1 4\n"), 15, face_error(&vertex_out_of_range(4, 4))),
         (format!("{SQUARE}-3 0 1 2\n"), 15, face_error(&negative_length(-3))),
@@ -156,7 +156,7 @@ fn errors_name_the_line_or_the_face() {
 }
 
 #[test]
-fn false_counts_allocate_nothing() {
+fn false_counts_cause_no_allocation() {
     for encoding in ["ascii", "binary_little_endian"] {
         let vertices = VERTEX.replace('4', "4000000000");
         let text = format!("ply\nformat {encoding} 1.0\n{vertices}{FACE}0 0 0\n");
@@ -179,7 +179,7 @@ fn the_header_size_is_limited() {
     assert_eq!(error(long.as_bytes()).1, too_long());
     let line = format!("ply\ncomment {}", "x".repeat(2 << 20));
     assert_eq!(error(line.as_bytes()).1, too_long());
-    // This header is just below the limit, which cuts a later line.
+    // This header is just below the limit. The limit cuts off a line after the header.
     let comments = format!("comment {}\n", "x".repeat(100)).repeat(9_000);
     let fits = format!("ply\nformat ascii 1.0\n{comments}{VERTEX}{FACE}{SQUARE}4 0 1 2 3\n");
     assert!(read_bytes(fits.as_bytes()).is_ok());
@@ -203,16 +203,16 @@ fn vertex_colors_are_read() {
 }
 
 #[test]
-fn strip_triangles_alternate_their_orientation() {
+fn strip_triangles_alternate_in_orientation() {
     let file = |strips: &str, elements: &str| {
         let header = format!("ply\nformat ascii 1.0\n{VERTEX}{elements}end_header\n");
         format!("{header}{SQUARE}{strips}").into_bytes()
     };
     let strips = "element tristrips 1\nproperty list int int vertex_indices\n";
     let read = |list: &str| read_bytes(&file(list, strips)).expect("whole");
-    // Across the square and back: both triangles face the same side.
+    // Both triangles of a strip have the same orientation.
     assert_eq!(read("4 0 1 3 2\n").mesh.triangles, [[0, 1, 3], [3, 1, 2]]);
-    // −1 restarts the strip.
+    // −1 starts a new strip.
     assert_eq!(read("7 0 1 3 -1 0 1 2\n").mesh.triangles, [[0, 1, 3], [0, 1, 2]]);
     // A repeated vertex joins strips and is not counted as a dropped face.
     let joined = read("8 0 1 3 3 3 1 2 0\n");
@@ -256,9 +256,10 @@ fn unknown_header_lines_are_skipped_with_warning() {
     assert_eq!(error(&[b"ply\n".as_slice(), &[7; 3000]].concat()).1, NO_END);
 }
 
-/// Some programs write lists that their header does not declare. Other readers parse such files line by line.
+/// Some programs write lists without declaring them in the header. Other readers parse these files line by
+/// line.
 #[test]
-fn undeclared_values_are_ignored_line_by_line() {
+fn undeclared_values_are_ignored() {
     let plain = read_bytes(&ascii(&format!("{SQUARE}3 0 1 2\n").replace('\u{0}', ""))).expect("whole");
     for body in [
         "0 0 0 9 9\n1 0 0\n1 1 0 9\n\n0 1 0\n3 0 1 2\n",
@@ -270,19 +271,19 @@ fn undeclared_values_are_ignored_line_by_line() {
         let line = if body.contains("9 9") { 11 } else { 14 };
         assert_eq!(read.warnings[0], undeclared_values(line, 2));
     }
-    // A file that is also truncated is not read word by word.
+    // A file with undeclared values that is also truncated must not be read word by word.
     let rows = "0 0 0 1 2 3\n1 0 0 1 2 3\n1 1 0 1 2 3\n0 1 0 1 2 3\n";
     assert_eq!(error(&ascii(rows)), (None, implausible("face", 1, 0)));
     let truncated = (Some(15), face_error(END_OF_FILE));
     assert_eq!(error(&ascii("0 0 0 9\n1 0 0\n1 1 0\n0 1 0\n")), truncated);
-    // A face with too few corners is an error in either pass.
+    // A face with too few corners is an error in both passes.
     assert!(error(&ascii("0 0 0 9\n1 0 0\n1 1 0\n0 1 0\n3 0 1\n")).0.is_some());
     // Several items may share a line.
     let joined = read_bytes(&ascii("0 0 0 1 0 0\n1 1 0 0 1 0\n3 0 1 2\n")).expect("whole");
     assert_eq!((joined.mesh, joined.warnings.len()), (plain.mesh, 0));
 }
 
-/// A text file with the square's vertices, and faces with the given properties and lines.
+/// A text file with the square's vertices, the given face properties and the given face lines.
 fn square(vertex: (&str, [&str; 4]), face: &str, lines: &[&str]) -> String {
     let (properties, tails) = vertex;
     let xyz = "property float x\nproperty float y\nproperty float z\n";
@@ -343,7 +344,7 @@ fn corner_texture_coordinates_are_read() {
     assert_eq!(uvs(list, &["4 0 1 2 3 2 0.5 0.25"]).0, one);
     assert_eq!(uvs("property float u\nproperty float v\n", &["4 0 1 2 3 0.5 0.25"]).0, one);
     assert_eq!(uvs("property double s\nproperty double t\n", &["4 0 1 2 3 0.5 0.25"]).0, one);
-    // An empty list gives no warning, unlike a list of the wrong length.
+    // Only nonempty lists of the wrong length cause a warning.
     assert_eq!(uvs(list, &[two[0], "3 0 2 3 0"]), (vec![a, b, c, a, a, a], vec![]));
     let (found, warnings) = uvs(list, &[two[0], "3 0 2 3 5 1 1 1 1 1"]);
     assert_eq!(found, [a, b, c, a, a, a]);
@@ -352,7 +353,7 @@ fn corner_texture_coordinates_are_read() {
 }
 
 #[test]
-fn texture_seams_keep_the_vertex_normals() {
+fn texture_seams_do_not_change_vertex_normals() {
     let list = "property list uchar float texcoord\n";
     let text = square(PLAIN, list, &["3 0 1 2 6 0 0 1 0 1 1", "3 0 2 3 6 0.5 0.5 1 0 0 1"])
         .replace("1 1 0 \n", "1 1 5 \n");
@@ -407,7 +408,7 @@ fn self_intersections_are_reported_with_line() {
 }
 
 #[test]
-fn an_alpha_below_one_gives_a_warning() {
+fn alpha_below_one_causes_a_warning() {
     let warnings = |scalar: &str, tail: &str| {
         let names = ["red", "green", "blue", "alpha"];
         let properties: String = names.iter().map(|name| format!("property {scalar} {name}\n")).collect();

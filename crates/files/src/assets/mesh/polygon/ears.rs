@@ -1,28 +1,28 @@
 //! Ear clipping (Meisters, *Polygons Have Ears*, American Mathematical Monthly 1975) for polygons that may
-//! touch themselves: holes connected to the outline by an edge in both directions, repeated corners, corners
-//! on other edges.
+//! touch themselves. They may have holes connected to the outline by a double edge, repeated corners, and
+//! corners on other edges.
 
 use std::collections::VecDeque;
 
 use super::tree::{CornerTree, turn};
 use crate::math::DVec2;
 
-/// Limit on visits of corners and tree nodes: per corner, plus a constant. Simple polygons take about 50 per
-/// corner. Beyond the limit, ears are no longer tested; this happens for polygons that wind around the same
-/// corners many times.
+/// Limit on the number of visited corners and tree nodes: a number per corner, plus a constant. Simple
+/// polygons need about 50 visits per corner. Polygons that wind around the same corners many times may exceed
+/// the limit. Corners are then clipped without testing them.
 const VISITS_PER_CORNER: u64 = 200;
 const EXTRA_VISITS: u64 = 1_000_000;
 
 /// No corner, or a corner that has been clipped.
 const NONE: u32 = u32::MAX;
 
-/// Triangulates a counterclockwise polygon. Returns whether it could be cut along diagonals only, which is
-/// not the case for self-intersecting polygons.
+/// Triangulates a counterclockwise polygon. Returns whether all cuts are diagonals, which is false for
+/// self-intersecting polygons.
 pub(super) fn clip(points: &[DVec2], emit: impl FnMut([usize; 3])) -> bool {
     Clipper::new(points, emit).run()
 }
 
-/// Returns whether the polygon could be cut along diagonals, and the number of visits.
+/// Returns whether all cuts are diagonals, and the number of visits.
 #[cfg(test)]
 pub(super) fn count_visits(points: &[DVec2]) -> (bool, u64) {
     let mut clipper = Clipper::new(points, |_| {});
@@ -39,7 +39,7 @@ struct Clipper<'a, F> {
     /// Corners to test, with their stamps. Entries with an old stamp are skipped.
     queue: VecDeque<(u32, u32)>,
     stamps: Vec<u32>,
-    /// For each corner, the head of the list in `waiting` of the corners that it blocks.
+    /// For each corner, the head of its list of blocked corners in `waiting`.
     first_waiting: Vec<u32>,
     waiting: Vec<(u32, u32, u32)>,
     visits: u64,
@@ -75,7 +75,7 @@ impl<'a, F: FnMut([usize; 3])> Clipper<'a, F> {
                 continue;
             }
             is_simple = false;
-            // Clip any convex corner. Without one, the rest has no positive area.
+            // Clip any convex corner. If there is none, the rest of the polygon has no positive area.
             if !self.clip_first(|_, _| true) {
                 break;
             }
@@ -127,13 +127,13 @@ impl<'a, F: FnMut([usize; 3])> Clipper<'a, F> {
         turn(a, b, c) > 0.0
     }
 
-    /// Whether the outline reverses its direction at a corner.
+    /// Whether the outline reverses direction at a corner.
     fn is_spike(&self, corner: u32) -> bool {
         let [a, b, c] = self.around(corner).map(|corner| self.point(corner));
         turn(a, b, c) == 0.0 && (a - b).dot(c - b) >= 0.0
     }
 
-    /// Removes a corner, and emits its triangle if that has an area.
+    /// Removes a corner, and emits its triangle unless the triangle has zero area.
     fn clip(&mut self, corner: u32) {
         let [a, b, c] = self.around(corner);
         if self.is_convex(b) {
@@ -153,7 +153,8 @@ impl<'a, F: FnMut([usize; 3])> Clipper<'a, F> {
         }
     }
 
-    /// Queues a corner last, which spreads the clipping along the outline and avoids slivers.
+    /// Appends a corner to the queue. Clipping corners in queue order spreads the cuts along the outline,
+    /// which avoids slivers.
     fn enqueue(&mut self, corner: u32) {
         let stamp = &mut self.stamps[corner as usize];
         *stamp += 1;
@@ -178,9 +179,9 @@ impl<'a, F: FnMut([usize; 3])> Clipper<'a, F> {
         }
     }
 
-    /// Finds a corner that prevents a convex corner from being an ear because the outline enters its triangle
-    /// there. Unless `may_touch`, corners on the diagonal also block, because the triangles on its two sides
-    /// would not share these vertices.
+    /// Finds a corner at which the outline enters the triangle of a convex corner, which is then not an ear.
+    /// Unless `may_touch`, corners on the diagonal also block, because the triangles on its two sides would
+    /// not share these vertices.
     fn blocker(&mut self, corner: u32, may_touch: bool) -> Option<u32> {
         if self.visits > self.max_visits {
             return None;
@@ -209,8 +210,8 @@ impl<'a, F: FnMut([usize; 3])> Clipper<'a, F> {
         if !may_touch && turns[2] == 0.0 && point != a && point != c {
             return true;
         }
-        // The corner may be on some sides of the triangle. A neighbor enters the triangle if it is on the inner
-        // side of all of them.
+        // If the corner is on one or more sides of the triangle, a neighbor enters the triangle if it is on
+        // the inner side of each of these.
         [self.previous[corner as usize], self.next[corner as usize]].into_iter().any(|neighbor| {
             let sides = self::turns(triangle, self.point(neighbor));
             (0..3).all(|side| turns[side] > 0.0 || sides[side] > 0.0)
@@ -218,7 +219,7 @@ impl<'a, F: FnMut([usize; 3])> Clipper<'a, F> {
     }
 }
 
-/// Orientation of a point relative to each side of a triangle.
+/// For each side of a triangle, which side of it the point is on (positive: inside).
 fn turns([a, b, c]: [DVec2; 3], point: DVec2) -> [f64; 3] {
     [turn(a, b, point), turn(b, c, point), turn(c, a, point)]
 }

@@ -1,13 +1,13 @@
-//! Triangulates polygons: convex ones as fans, others by ear clipping.
+//! Triangulates polygons: convex polygons as fans, others by ear clipping.
 
 mod ears;
 mod tree;
 
 use crate::math::{DVec2, DVec3, Vec3};
 
-/// Triangulates a polygon of at least 3 finite points. Emits triangles as indices of its corners, with the
-/// same orientation. Returns whether the triangles cover it exactly once; self-intersecting polygons are cut
-/// as well as possible.
+/// Triangulates a polygon of at least 3 finite points. Emits each triangle as three corner indices, with the
+/// polygon's orientation. Returns whether the triangles cover the polygon exactly once. Self-intersecting
+/// polygons are triangulated as well as possible.
 pub(super) fn triangulate(points: &[Vec3], mut emit: impl FnMut([usize; 3])) -> bool {
     let points: Vec<DVec3> = points.iter().map(|point| point.as_dvec3()).collect();
     let normal = newell_normal(&points);
@@ -34,7 +34,7 @@ fn projected(points: &[DVec3], normal: DVec3) -> Vec<DVec2> {
     points.iter().map(|point| DVec2::new(point[x], point[y])).collect()
 }
 
-/// The sum of the fan's normals, which is independent of the origin (Newell's method).
+/// Sum of the normals of a triangle fan (Newell's method). Does not depend on the origin.
 fn newell_normal(points: &[DVec3]) -> DVec3 {
     let origin = points[0];
     points.windows(2).map(|pair| (pair[0] - origin).cross(pair[1] - origin)).sum()

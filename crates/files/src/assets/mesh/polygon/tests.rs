@@ -2,7 +2,7 @@ use super::*;
 
 type Points = Vec<(f32, f32)>;
 
-/// Triangulates a polygon in two planes, checks the triangles, and returns the ones of the plane y = 7.
+/// Triangulates a polygon in two planes, checks the triangles, and returns those in the plane y = 7.
 fn cut(points: &[(f32, f32)]) -> Vec<[usize; 3]> {
     let upright: Vec<Vec3> = points.iter().map(|&(x, y)| Vec3::new(x, 7.0, -y)).collect();
     let triangles = covering(&upright, points);
@@ -87,14 +87,14 @@ fn combs_are_covered_exactly_once() {
         assert_eq!(cut(&points).len(), points.len() - 2);
         let backwards = reversed(&points);
         let triangles = cut(&backwards);
-        assert_eq!(layers(&backwards, &triangles, 0.25, 3.0), 0, "between two teeth");
-        assert_eq!(layers(&backwards, &triangles, 0.74, 2.0), 1, "in a tooth");
+        assert_eq!(layers(&backwards, &triangles, 0.25, 3.0), 0, "the point is between two teeth");
+        assert_eq!(layers(&backwards, &triangles, 0.74, 2.0), 1, "the point is in a tooth");
     }
 }
 
 #[test]
 fn work_per_corner_is_nearly_constant() {
-    // Gears, spirals, coastlines and combs: outlines whose corners block each other.
+    // The corners of gears, spirals, coastlines and combs block each other.
     let visits = |points: &[(f32, f32)]| {
         let plane: Vec<DVec2> = points.iter().map(|&(x, y)| DVec2::new(x.into(), y.into())).collect();
         let (is_simple, visits) = ears::count_visits(&plane);
@@ -104,7 +104,7 @@ fn work_per_corner_is_nearly_constant() {
     for shape in [gear, spiral, coast, comb] {
         let few = visits(&shape(500));
         let many = visits(&shape(16_000));
-        assert!(many < 4 * few + 100, "{few} visits per corner became {many}");
+        assert!(many < 4 * few + 100, "visits per corner increased from {few} to {many}");
     }
 }
 
@@ -127,7 +127,7 @@ fn coast(corners: usize) -> Points {
     around(corners, |index| radii[index])
 }
 
-/// A band that spirals inwards with twenty turns.
+/// A spiral band with twenty turns.
 fn spiral(steps: usize) -> Points {
     let side = |offset: f64| {
         move |step: usize| {
@@ -141,15 +141,15 @@ fn spiral(steps: usize) -> Points {
 }
 
 #[test]
-fn smooth_outlines_are_not_cut_into_fans() {
+fn smooth_outlines_are_not_triangulated_as_fans() {
     let triangles = cut(&coast(1000));
     let mut uses = vec![0; 1000];
     triangles.as_flattened().iter().for_each(|corner| uses[*corner] += 1);
     assert!(uses.iter().all(|uses| *uses < 100), "{uses:?}");
 }
 
-/// A square with a grid of square holes. Each hole is connected to the outline or a previous hole by an edge
-/// in both directions.
+/// A square with a grid of square holes. Each hole is connected to the outline or an earlier hole by a double
+/// edge.
 fn sieve(side: usize) -> Points {
     let size = 3.0 * side as f32 + 1.0;
     let mut outline = vec![(0.0, 0.0), (size, 0.0), (size, size), (0.0, size)];
@@ -170,7 +170,7 @@ fn sieve(side: usize) -> Points {
 }
 
 #[test]
-fn holes_connected_by_double_edges_stay_open() {
+fn holes_with_double_edges_are_not_filled() {
     let frame = [
         (0.0, 0.0),
         (3.0, 0.0),
@@ -205,8 +205,8 @@ fn holes_connected_by_double_edges_stay_open() {
 
 #[test]
 fn outlines_may_touch_themselves() {
-    // Two squares that share a corner, a corner on an edge from inside and from outside, an edge traversed
-    // back and forth, and collinear corners.
+    // Two squares that share a corner, a corner that touches an edge from inside or outside, an edge
+    // traversed in both directions, and collinear corners.
     let touching: [&[(f32, f32)]; 6] = [
         &[(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (2.0, 1.0), (2.0, 2.0), (1.0, 2.0), (1.0, 1.0), (0.0, 1.0)],
         &[(0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (3.0, 4.0), (2.0, 0.0), (1.0, 4.0), (0.0, 4.0)],
@@ -248,7 +248,7 @@ fn outlines_may_touch_themselves() {
 }
 
 #[test]
-fn collinear_corners_stay_corners() {
+fn collinear_corners_are_kept() {
     let row = |from: (f32, f32), to: (f32, f32)| {
         (0..20).map(move |step| {
             let t = step as f32 / 20.0;
@@ -266,7 +266,7 @@ fn collinear_corners_stay_corners() {
 fn random_outlines_are_covered_exactly_once() {
     let mut random = Lcg(3);
     for case in 0..2000 {
-        // The outline of a polyomino touches itself where two cells share only a corner.
+        // A polyomino's outline touches itself where two cells share only a corner.
         let points = if case % 2 == 0 { polyomino(&mut random, 4 + case % 40) } else { coast(5 + case % 60) };
         cut(&points);
     }
@@ -280,14 +280,14 @@ fn polyomino(random: &mut Lcg, size: usize) -> Points {
         let (x, y) = cells[random.below(cells.len())];
         let (dx, dy) = [(1, 0), (-1, 0), (0, 1), (0, -1)][random.below(4)];
         let (x, y) = (x + dx, y + dy);
-        // A cell with only one neighbor does not close a hole.
+        // Adding a cell with only one neighbor never creates a hole.
         let neighbors =
             [(1, 0), (-1, 0), (0, 1), (0, -1)].iter().filter(|(dx, dy)| has(&cells, x + dx, y + dy));
         if !has(&cells, x, y) && neighbors.count() == 1 {
             cells.push((x, y));
         }
     }
-    // Walk along the boundary, staying in the same cell where cells share only a corner.
+    // Follow the boundary. Where two cells share only a corner, stay in the same cell.
     let start = *cells.iter().min().expect("a cell");
     let ((mut x, mut y), (mut dx, mut dy)) = (start, (1, 0));
     let mut outline = Vec::new();

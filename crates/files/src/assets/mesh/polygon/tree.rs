@@ -5,12 +5,12 @@ use crate::math::DVec2;
 /// Maximum number of corners per leaf.
 const LEAF: usize = 8;
 
-/// Corners in the plane, ordered such that each node is a contiguous range.
+/// Corners in the plane, ordered to make each node a contiguous range.
 pub(super) struct CornerTree {
     order: Vec<u32>,
     /// Index of each corner in `order`.
     positions: Vec<u32>,
-    /// Nodes, with the layout of a binary heap.
+    /// Nodes in binary heap layout.
     nodes: Vec<BoxNode>,
 }
 
@@ -18,7 +18,7 @@ pub(super) struct CornerTree {
 struct BoxNode {
     min: DVec2,
     max: DVec2,
-    /// Corners that have not been removed.
+    /// Number of corners that have not been removed.
     remaining: u32,
 }
 
@@ -38,7 +38,7 @@ impl CornerTree {
         tree
     }
 
-    /// Bounds the node and splits its range at the median along the longer side.
+    /// Computes a node's bounding box and splits its range at the median of the longer axis.
     fn build(&mut self, points: &[DVec2], node: usize, start: usize, end: usize) {
         let range = &mut self.order[start..end];
         let at = |corner: &u32| points[*corner as usize];
@@ -72,8 +72,8 @@ impl CornerTree {
         }
     }
 
-    /// Returns a corner accepted by `is_wanted`, from the nodes that overlap the triangle. Removed corners
-    /// are not filtered out. Adds the number of visited nodes and corners to `visits`.
+    /// Searches the nodes that overlap the triangle and returns a corner accepted by `is_wanted`. Removed
+    /// corners are not filtered out. Adds the number of visited nodes and corners to `visits`.
     pub(super) fn find(
         &self,
         triangle: [DVec2; 3],
@@ -108,7 +108,7 @@ impl CornerTree {
 /// Whether a box is entirely outside one side of a triangle.
 fn is_outside([a, b, c]: [DVec2; 3], low: DVec2, high: DVec2) -> bool {
     [(a, b), (b, c), (c, a)].into_iter().any(|(from, to)| {
-        // Test the corner of the box that is farthest inside.
+        // Test the innermost corner of the box.
         let x = if to.y > from.y { low.x } else { high.x };
         let y = if to.x > from.x { high.y } else { low.y };
         turn(from, to, DVec2::new(x, y)) < 0.0

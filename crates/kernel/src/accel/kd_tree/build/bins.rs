@@ -1,7 +1,7 @@
-//! Splits of large cells. Candidate planes are evenly spaced on all three axes, and each box is counted in
-//! the bins where it starts and ends (Shevtsov, Soupikov, Kapustin, *Highly Parallel Fast KD-tree
-//! Construction for Interactive Ray Tracing of Dynamic Scenes*, 2007). The faces of the bounding box, beyond
-//! which space is empty, are also candidates.
+//! Splits large cells. Candidate planes are evenly spaced on all three axes, and each box is counted in the
+//! bins where it starts and ends (Shevtsov, Soupikov, Kapustin, *Highly Parallel Fast KD-tree Construction
+//! for Interactive Ray Tracing of Dynamic Scenes*, 2007). The faces of the references' bounding box are also
+//! candidates, because space beyond them is empty.
 
 use std::array;
 
@@ -14,25 +14,25 @@ use crate::math::Vec4;
 /// Number of bins along an axis.
 const BINS: usize = 31;
 
-/// Number of planes: between bins, before the first and after the last.
+/// Number of planes: one between each pair of bins, one before the first, and one after the last.
 const PLANES: usize = BINS + 1;
 
-/// Number of references above which they are counted in parallel.
+/// Number of references above which counting is parallel.
 const PARALLEL_SIZE: usize = 1 << 16;
 
-/// Number of boxes that start and end in each bin of each axis.
+/// For each axis and bin, the number of boxes that start and end in it.
 struct Histogram {
     starts: [[u32; PLANES]; 3],
     ends: [[u32; PLANES]; 3],
 }
 
-/// Added to a number between −½ and 2²², leaves the nearest integer in the low bits.
+/// Added to a number between −½ and 2²², puts the nearest integer into the low bits.
 const ROUND: f32 = 12_582_912.0;
 
 impl Histogram {
     fn of(references: &[Reference], start: Vec4, per_length: Vec4) -> Self {
         let mut own = Self { starts: [[0; PLANES]; 3], ends: [[0; PLANES]; 3] };
-        // Subtract ½, so that rounding to the nearest integer rounds down.
+        // Subtract ½ to turn rounding to nearest into rounding down.
         let bins = |at: Vec4| {
             let place = (at - start) * per_length - Vec4::splat(0.5);
             place.clamp(Vec4::ZERO, Vec4::splat((BINS - 1) as f32)) + Vec4::splat(ROUND)
@@ -57,7 +57,7 @@ impl Histogram {
     }
 }
 
-/// Finds the cheapest plane. `None` if a leaf is at least as cheap.
+/// Finds the cheapest plane. Returns `None` if a leaf costs no more.
 pub fn cheapest(references: &[Reference], cell: &Bounds) -> Option<SplitPlane> {
     let around = Bounds::around(references);
     let extent = around.extent();
@@ -87,6 +87,6 @@ pub fn cheapest(references: &[Reference], cell: &Bounds) -> Option<SplitPlane> {
         let counts = |counts: [u32; PLANES]| four(counts.map(|count| count as f32));
         search.offer(axis, false, &Planes { at: four(at), left: counts(left), right: counts(right) });
     }
-    // References within the plane must not go to the side that should be empty.
+    // Keep references within the plane out of the side that should be empty.
     search.cheapest().map(|plane| SplitPlane { planar_right: plane.at <= around.min[plane.axis], ..plane })
 }

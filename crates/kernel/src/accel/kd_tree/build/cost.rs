@@ -7,13 +7,13 @@ use crate::math::{Vec3, Vec4};
 /// Cost of a traversal step relative to a triangle test.
 const TRAVERSAL_COST: f32 = 1.0;
 
-/// Cost factor for a split that cuts off empty space.
+/// Cost factor of a split that cuts off empty space.
 const EMPTY_FACTOR: f32 = 0.8;
 
 /// Tag of a leaf, in place of an axis.
 const LEAF: usize = 3;
 
-/// Tag bit above the axis: triangles within the plane go to the right.
+/// Tag bit above the axis, set if triangles within the plane go to the right.
 const PLANAR_RIGHT: usize = 4;
 
 /// A splitting plane.
@@ -25,8 +25,8 @@ pub struct SplitPlane {
     pub planar_right: bool,
 }
 
-/// 4·`N` planes across one axis, with the number of triangles on either side of each. Triangles on both sides
-/// count on both.
+/// 4·`N` planes across one axis, with triangle counts on either side of each. Triangles on both sides are
+/// counted twice.
 #[derive(Clone, Copy)]
 pub struct Planes<const N: usize> {
     pub at: [Vec4; N],
@@ -34,16 +34,16 @@ pub struct Planes<const N: usize> {
     pub right: [Vec4; N],
 }
 
-/// Search over the planes of one cell, 4·`N` at a time. Keeps the cheapest plane of each lane.
+/// Searches the planes of a cell, 4·`N` at a time. Each lane keeps its cheapest plane.
 pub struct Search<const N: usize> {
     min: [f32; 4],
     max: [f32; 4],
-    /// Edge lengths of the cell. Flat cells are slightly thickened, so that cells without area can be split.
+    /// Edge lengths of the cell. Flat cells are slightly thickened to allow splitting cells without area.
     extent: [f32; 3],
     inverse_area: f32,
     cost: [Vec4; N],
     at: [Vec4; N],
-    /// Axis or [`LEAF`], and [`PLANAR_RIGHT`], as floats because all selection works on floats.
+    /// Axis or [`LEAF`], combined with [`PLANAR_RIGHT`]. Stored as floats because selection works on floats.
     tag: [Vec4; N],
 }
 
@@ -69,7 +69,7 @@ impl<const N: usize> Search<N> {
     #[inline(always)]
     pub fn offer(&mut self, axis: usize, planar_right: bool, planes: &Planes<N>) {
         let (u, v) = (self.extent[(axis + 1) % 3], self.extent[(axis + 2) % 3]);
-        // Area of the plane within the cell, and area per unit of length along the axis, relative to the
+        // Area of the plane within the cell and area per unit length along the axis, both relative to the
         // cell's area.
         let face = Vec4::splat(u * v * self.inverse_area);
         let per_length = Vec4::splat((u + v) * self.inverse_area);
@@ -86,7 +86,7 @@ impl<const N: usize> Search<N> {
         }
     }
 
-    /// Replaces the lanes whose cost is lower than the best one so far.
+    /// Updates the lanes that improve on their best cost so far.
     #[inline(always)]
     fn take(&mut self, i: usize, cost: Vec4, at: Vec4, tag: Vec4) {
         let is_cheaper = cost.cmplt(self.cost[i]);
@@ -95,7 +95,7 @@ impl<const N: usize> Search<N> {
         self.tag[i] = Vec4::select(is_cheaper, tag, self.tag[i]);
     }
 
-    /// Returns the cheapest plane, or `None` if a leaf is at least as cheap.
+    /// Returns the cheapest plane, or `None` if a leaf costs no more.
     #[inline(always)]
     pub fn cheapest(mut self) -> Option<SplitPlane> {
         for i in 1..N {

@@ -15,7 +15,7 @@ pub enum TreePart {
     Built(KdSubtree),
 }
 
-/// Number of nodes and of references to triangles.
+/// Number of nodes and number of triangle references.
 #[derive(Clone, Copy)]
 pub struct Size {
     nodes: usize,
@@ -23,7 +23,7 @@ pub struct Size {
 }
 
 impl TreePart {
-    /// Creates an upper node from its plane and both parts.
+    /// Creates an upper node from its plane and its two parts.
     pub fn halves(plane: SplitPlane, halves: [Self; 2]) -> Self {
         let [left, right] = halves.each_ref().map(Self::size);
         let size = Size { nodes: 1 + left.nodes + right.nodes, ids: left.ids + right.ids };
@@ -50,7 +50,7 @@ impl TreePart {
         all
     }
 
-    /// Writes the part after `before` nodes and references.
+    /// Writes the part, given the number of nodes and references that precede it.
     fn write(self, nodes: &mut [KdNode], ids: &mut [u32], before: Size) {
         match self {
             Self::Built(subtree) => {

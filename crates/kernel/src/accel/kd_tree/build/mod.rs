@@ -1,8 +1,8 @@
-//! Top-down construction: splits each cell at the plane with the lowest expected cost until a leaf is at
-//! least as cheap. Large cells use bins and small ones perfect splits. Triangles on both sides of a plane go
-//! to both, each with the bounding box of its part.
+//! Top-down construction. Splits each cell at the plane with the lowest expected cost until a leaf costs no
+//! more. Large cells use bins, small cells perfect splits. A triangle that straddles a plane is added to both
+//! sides, each time with the bounding box of its clipped part.
 //!
-//! The tree depends only on the triangles, not on the threads.
+//! The tree does not depend on the number of threads.
 
 mod bins;
 mod cost;
@@ -29,18 +29,18 @@ use subtree::KdSubtree;
 /// Maximum number of references in a cell built by a single thread. The token is polled between such cells.
 const TASK_SIZE: usize = 4096;
 
-/// Maximum number of leaves plus references: a tree has less than two nodes per leaf, and node indices must
+/// Maximum number of leaves plus references. A tree has fewer than two nodes per leaf, and node indices must
 /// fit.
 const MOST_ROOM: u64 = node::MOST as u64 / 2;
 
-/// A single leaf with all triangles must always be possible.
+/// A single leaf must have room for all triangles.
 const _: () = assert!((TriangleMesh::MOST_TRIANGLES as u64) < MOST_ROOM);
 
-/// Maximum number of leaves and references per triangle: several times what meshes need, but a small fraction
-/// of what triangles around a single vertex could take.
+/// Maximum number of leaves plus references per triangle. This is several times what meshes need, and a small
+/// fraction of what triangles around a single vertex could use.
 const MOST_PER_TRIANGLE: u64 = 24;
 
-/// Minimum triangle count used for that limit.
+/// Added to the triangle count to give small meshes enough room.
 const FEW: u64 = 64;
 
 /// Marks a triangle without an assigned position.
@@ -60,7 +60,7 @@ pub fn depth_limit(count: usize) -> u32 {
     8 + (1.3 * log2(count.max(1) as f32)) as u32
 }
 
-/// Builds a tree over `count` triangles. Triangles without a finite box are left out.
+/// Builds a tree over `count` triangles. Triangles without a finite bounding box are skipped.
 ///
 /// # Errors
 /// [`Cancelled`] if the build was canceled.
@@ -73,7 +73,7 @@ pub fn build(
     build_within(room, count, corners, token)
 }
 
-/// [`build`] with at most `room` leaves and references together.
+/// [`build`] with at most `room` leaves plus references.
 fn build_within(
     room: u64,
     count: u32,
@@ -114,16 +114,16 @@ fn by_first_use(mut ids: Vec<u32>, count: u32) -> (Vec<u32>, Vec<u32>) {
 #[derive(Clone, Copy)]
 struct Cell {
     bounds: Bounds,
-    /// Number of planes that may follow below.
+    /// Number of levels of planes allowed below.
     levels: u32,
-    /// Number of leaves and references that the cell may produce.
+    /// Maximum number of leaves plus references in the cell.
     room: u64,
 }
 
 impl Cell {
-    /// Chooses the splitting plane. `None` for a leaf.
+    /// Chooses the splitting plane. `None` makes a leaf.
     fn plane(&self, references: &[Reference]) -> Option<SplitPlane> {
-        // A plane through all triangles doubles them.
+        // In the worst case, every triangle straddles the plane.
         let has_room = 2 * leaf_room(references.len()) <= self.room;
         if self.levels == 0 || references.is_empty() || !has_room {
             None
@@ -137,7 +137,7 @@ impl Cell {
     /// The two halves of the cell, given the number of references in each.
     fn halves(&self, plane: &SplitPlane, counts: [usize; 2]) -> [Self; 2] {
         let [left, right] = counts.map(leaf_room);
-        // Divide the room proportionally: it suffices for both together, so each share suffices as well.
+        // Divide the room proportionally. If it is enough for both together, each share is enough.
         let room = self.room * left / (left + right);
         let levels = self.levels - 1;
         let [below, above] = self.bounds.halves(plane.axis, plane.at);
@@ -145,12 +145,12 @@ impl Cell {
     }
 }
 
-/// Room taken by a leaf with `count` references.
+/// Room needed by a leaf with `count` references.
 fn leaf_room(count: usize) -> u64 {
     count as u64 + 1
 }
 
-/// Splits cells in parallel until a single thread can take over.
+/// Splits cells in parallel until they are small enough for a single thread.
 fn part(
     cell: &Cell,
     mut references: Vec<Reference>,
@@ -177,7 +177,7 @@ mod tests {
     use super::*;
     use crate::accel::kd_tree::node::NodeKind;
 
-    /// A disk of triangles around one vertex.
+    /// A fan of triangles around one vertex.
     fn fan(count: u32) -> impl Fn(u32) -> [Vec3; 3] + Sync {
         move |id| {
             let at = |id: u32| {
@@ -194,12 +194,12 @@ mod tests {
             let built = build(count, fan(count), &CancelToken::new()).expect("nobody cancels");
             let size = (built.nodes.len() / 2 + built.references.len()) as u64;
             assert!(size <= MOST_PER_TRIANGLE * (u64::from(count) + FEW), "{size} for {count}");
-            assert!(size > 4 * u64::from(count), "{size} for {count}: the available room is used");
+            assert!(size > 4 * u64::from(count), "{size} for {count}: most of the room is unused");
         }
     }
 
     #[test]
-    fn small_room_leads_to_early_leaves() {
+    fn limited_room_leads_to_early_leaves() {
         let fan = |id: u32| {
             let angle = id as f32 * 0.1;
             [Vec3::ZERO, Vec3::new(angle.cos(), angle.sin(), 1.0), Vec3::new(angle.sin(), 1.0, angle.cos())]
@@ -216,6 +216,6 @@ mod tests {
             assert!(size(room) <= room, "{} in {room}", size(room));
         }
         assert_eq!(size(6001), 6001, "one leaf");
-        assert!(size(20_000) > 6001, "the available room is used");
+        assert!(size(20_000) > 6001, "the available room should be used");
     }
 }

@@ -7,19 +7,19 @@ use crate::math::Vec3;
 /// Reusable memory for partitioning.
 #[derive(Default)]
 pub struct Scratch {
-    /// References on the left, followed by undefined ones.
+    /// References on the left, followed by stale entries.
     left: Vec<Reference>,
-    /// Left and right indices of the references on both sides.
+    /// Left and right indices of references on both sides.
     on_both: Vec<[u32; 2]>,
 }
 
 impl Scratch {
-    /// Partitions the references from index `first` on. References on the right stay in place, each with the
-    /// bounding box of its part there; those on the left are returned. A reference that only touches the
-    /// plane goes to its own side. Preserves the order.
+    /// Partitions the references from index `first` on. Keeps the references on the right in place and
+    /// returns the ones on the left. The bounding box of a straddling reference is clipped to each side. A
+    /// reference that only touches the plane stays on its side. Preserves the order.
     ///
-    /// No branch depends on the data, as it would often be mispredicted: every reference is written to both
-    /// sides, and the end of each side then advances or not.
+    /// Branchless, since data-dependent branches would often be mispredicted: every reference is written to
+    /// both sides, and then each side's length is incremented by 0 or 1.
     pub fn partition(
         &mut self,
         references: &mut Vec<Reference>,
@@ -106,7 +106,7 @@ mod tests {
                 let on_right = expected(&|min, max| max > 1.0 || (planar(min, max) && planar_right));
                 let ids = |side: &[Reference]| side.iter().map(Reference::id).collect::<Vec<_>>();
                 assert_eq!((ids(&left), ids(&own[50..])), (on_left, on_right), "{plane:?}");
-                assert_eq!(ids(&own[..50]), ids(&all[..50]), "references of other cells are unchanged");
+                assert_eq!(ids(&own[..50]), ids(&all[..50]), "references of other cells should not change");
                 assert!(left.iter().all(|one| one.bounds.max()[axis] <= 1.0), "{plane:?}");
                 assert!(own[50..].iter().all(|one| one.bounds.min[axis] >= 1.0), "{plane:?}");
             }

@@ -32,7 +32,7 @@ impl KdSubtree {
     }
 }
 
-/// Builds a subtree in memory that is allocated once.
+/// Builds a subtree, reusing the same buffers for all cells.
 struct Builder<'a, C> {
     built: KdSubtree,
     /// References of all pending cells, with the next cell's references last.
@@ -43,8 +43,8 @@ struct Builder<'a, C> {
 }
 
 impl<C: Fn(u32) -> [Vec3; 3]> Builder<'_, C> {
-    /// Adds a cell whose references begin at `first`, and removes them. Recurses to the depth of the tree,
-    /// which is limited.
+    /// Adds a cell and removes its references, which begin at `first`. The recursion depth is limited by the
+    /// tree depth.
     fn add(&mut self, first: usize, cell: &Cell) -> Result<(), Cancelled> {
         let place = self.built.nodes.len();
         let own = &self.references[first..];

@@ -1,15 +1,15 @@
-//! Splits of small cells. Tries every plane through a face of a clipped triangle's box ("perfect splits":
-//! Wald, Havran, *On building fast kd-trees for ray tracing, and on doing that in O(N log N)*, 2006). For so
-//! few triangles, recounting both sides of all planes with SIMD is faster than keeping them sorted.
+//! Splits small cells. Tries every plane through a face of a clipped triangle's box ("perfect splits": Wald,
+//! Havran, *On building fast kd-trees for ray tracing, and on doing that in O(N log N)*, 2006). For so few
+//! triangles, counting both sides of every plane with SIMD is faster than keeping the faces sorted.
 
 use super::cost::{Planes, Search, SplitPlane};
 use crate::accel::reference::{Bounds, Reference};
 use crate::math::Vec4;
 
-/// Maximum number of references in a swept cell.
+/// Maximum number of references for sweeping a cell.
 pub const SWEPT: usize = 24;
 
-/// Finds the cheapest plane. `None` if a leaf is at least as cheap.
+/// Finds the cheapest plane. Returns `None` if a leaf costs no more.
 pub fn cheapest(references: &[Reference], cell: &Bounds) -> Option<SplitPlane> {
     match references.len() {
         0..=4 => cheapest_of::<1>(references, cell),
@@ -44,7 +44,7 @@ fn cheapest_of<const N: usize>(references: &[Reference], cell: &Bounds) -> Optio
     search.cheapest()
 }
 
-/// Offers the planes at `at` across an axis.
+/// Evaluates the planes at `at` across an axis.
 #[inline(always)]
 fn offer<const N: usize>(
     axis: usize,
@@ -85,7 +85,7 @@ mod tests {
     use crate::math::Vec3;
     use crate::math::random::signed as random;
 
-    /// Cost of a plane by definition; infinite if the plane does not intersect the cell.
+    /// Cost of a plane, from the definition. Infinite if the plane does not intersect the cell.
     fn cost(references: &[Reference], cell: &Bounds, plane: &SplitPlane) -> f32 {
         let SplitPlane { axis, at, planar_right } = *plane;
         if !(at > cell.min[axis] && at < cell.max()[axis]) {
@@ -103,13 +103,12 @@ mod tests {
     }
 
     #[test]
-    fn cheapest_plane_beats_all_faces() {
+    fn cheapest_plane_matches_brute_force() {
         let mut next = random(23);
         let (mut planes, mut leaves) = (0, 0);
         for round in 0..3000 {
             let count = 1 + round % SWEPT;
-            // Put the boxes on a grid, so that they touch and share planes, in a cell that some of them fill
-            // to the end.
+            // Put the boxes on a grid so that they touch and share planes. Some reach the cell's faces.
             let mut step = |size: f32| Vec3::new(next(), next(), next()).map(|x| (x * size).round() / 8.0);
             let references: Vec<Reference> = (0..count as u32)
                 .map(|id| {
@@ -138,7 +137,7 @@ mod tests {
                     planes += 1;
                 }
                 None => {
-                    assert!(least >= count as f32 * (1.0 - 1e-5), "{round}: a leaf, {least}");
+                    assert!(least >= count as f32 * (1.0 - 1e-5), "{round}: leaf, {least}");
                     leaves += 1;
                 }
             }

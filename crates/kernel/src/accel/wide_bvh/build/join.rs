@@ -8,7 +8,7 @@ use crate::accel::reference::Bounds;
 use crate::accel::wide_bvh::node::{Child, WIDTH, WideNode};
 use crate::accel::wide_bvh::simd::pages;
 
-/// Joins all nodes, root first, and the contents of all packs.
+/// Joins all nodes (root first) and the contents of all packs.
 pub fn join(root: TreePart) -> (Vec<WideNode>, Vec<Pack>) {
     let mut top = Top::default();
     match root {
@@ -49,7 +49,7 @@ struct Top {
 }
 
 impl Top {
-    /// Creates the node over a part and everything below it, and returns its index.
+    /// Creates the node of a part and all nodes below it. Returns its index.
     fn node(&mut self, bounds: Bounds, part: TreePart) -> usize {
         let place = self.nodes.len();
         self.nodes.push(Vec::new());
@@ -94,7 +94,7 @@ impl Top {
         (nodes, self.subtrees.iter().flat_map(|subtree| subtree.packs.iter().copied()).collect())
     }
 
-    /// Starts of all subtrees, followed by the end of the last one.
+    /// Start of each subtree, followed by the end of the last one.
     fn starts(&self) -> Vec<SubtreeStart> {
         let mut start = SubtreeStart { node: self.nodes.len() as u32, pack: 0 };
         let mut starts = vec![start];

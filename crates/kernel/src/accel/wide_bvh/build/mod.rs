@@ -1,7 +1,7 @@
-//! Construction: splits large parts in two with the binned surface area heuristic, in parallel, until each is
-//! small enough for a single thread. That thread builds eight-wide nodes, and finally all parts are joined.
+//! Construction. Parts are split in two with the binned surface area heuristic, in parallel, until each is
+//! small enough for a single thread to build eight-wide nodes. Finally, all parts are joined.
 //!
-//! The tree depends only on the triangles, not on the threads.
+//! The tree does not depend on the number of threads.
 
 mod join;
 pub mod split;
@@ -30,7 +30,7 @@ pub struct Built {
     pub bounds: Aabb,
 }
 
-/// Builds a tree over `count` triangles. Triangles without a finite box are left out.
+/// Builds a tree over `count` triangles. Triangles without a finite bounding box are skipped.
 ///
 /// # Errors
 /// [`Cancelled`] if the build was canceled.
@@ -64,14 +64,14 @@ pub fn build(
 
 /// A part of the tree: an upper node or a subtree.
 enum TreePart {
-    /// Two halves, to be collapsed into a wide node.
+    /// Two halves to be collapsed into a wide node.
     Halves(Box<[(Bounds, TreePart); 2]>),
     /// A subtree built by a single thread.
     Built(WideSubtree),
 }
 
-/// Splits parts in parallel until a single thread can take over. `start` is the index of the first reference
-/// among all.
+/// Splits parts in parallel until they are small enough for a single thread. `start` is the overall index of
+/// the part's first reference.
 fn part(
     references: &mut [Reference],
     start: usize,

@@ -11,7 +11,7 @@ use crate::math::Vec4;
 /// Maximum number of bins along an axis.
 pub const BINS: usize = 32;
 
-/// Maximum number of bins for segments with at most [`FEW`] references.
+/// Maximum number of bins for segments with up to [`FEW`] references.
 const FEW_BINS: usize = 8;
 
 const FEW: usize = 32;
@@ -22,8 +22,8 @@ const PARALLEL_SIZE: usize = 1 << 16;
 /// Cost of a traversal step relative to testing a pack.
 const TRAVERSAL_COST: f32 = 1.0;
 
-/// Number of levels split with the surface area heuristic. Deeper segments are halved by count, which limits
-/// the depth for any input.
+/// Number of levels split with the surface area heuristic. Deeper segments are split in the middle, which
+/// limits the depth for any input.
 const SURFACE_AREA_LEVELS: u32 = 56;
 
 /// A range of references and how to split it.
@@ -31,19 +31,18 @@ const SURFACE_AREA_LEVELS: u32 = 56;
 pub struct Segment {
     pub count: usize,
     pub bounds: Bounds,
-    /// Number of splits above.
+    /// Number of splits above this segment.
     level: u32,
-    /// The split. `None` if a leaf is at least as cheap, even if the parent had room for the boxes of both
-    /// halves.
+    /// `None` if a leaf costs no more than the best split, even without counting the traversal step.
     pub split: Option<Split>,
-    /// Whether the segment is worth a node of its own.
+    /// Whether the segment is worth a separate node.
     pub is_node: bool,
 }
 
 /// How to split a segment.
 #[derive(Clone, Copy, Debug)]
 pub enum Split {
-    /// At a plane: references below a bin of an axis go to the left. Includes the bounding boxes of both
+    /// At a plane. References below `bin` on `axis` go to the left. `sides` are the bounding boxes of both
     /// sides.
     Plane { axis: usize, bin: usize, bins: Bins, sides: [Bounds; 2] },
     /// In the middle of the references in their current order.
@@ -64,7 +63,7 @@ impl Segment {
     }
 }
 
-/// Bounding box of some references, and of their centroids.
+/// Bounding boxes of some references and of their centroids.
 #[derive(Clone, Copy)]
 struct Boxes {
     bounds: Bounds,
@@ -95,7 +94,7 @@ impl Boxes {
     }
 }
 
-/// Chooses the best split of a segment and whether the segment is worth a node.
+/// Chooses the best split of a segment, and whether the segment is worth a separate node.
 fn choose(references: &[Reference], boxes: &Boxes, level: u32) -> (Option<Split>, bool) {
     let count = references.len();
     let must = count > PACK * MOST_PACKS as usize;
@@ -130,14 +129,14 @@ fn blocks(count: u32) -> u32 {
 /// Mapping of centroids to bins.
 #[derive(Clone, Copy, Debug)]
 pub struct Bins {
-    /// Start of the first bin.
+    /// Lower end of the first bin.
     pub start: Vec4,
-    /// Bins per unit of length; 0 along axes without extent.
+    /// Bins per unit length; 0 along axes without extent.
     pub per_length: Vec4,
     count: usize,
 }
 
-/// Added to a number between −½ and 2²², leaves the nearest integer in the low bits.
+/// Added to a number between −½ and 2²², puts the nearest integer into the low bits.
 pub const ROUND: f32 = 12_582_912.0;
 
 impl Bins {
@@ -145,7 +144,7 @@ impl Bins {
         let count = BINS.min(4 + references / 8).max(if references > FEW { FEW_BINS } else { 0 });
         let extent = centroids.extent();
         let scale = |length: f32| {
-            // Scale down slightly, so that the last centroid falls into the last bin.
+            // Scale down slightly to put the last centroid into the last bin.
             let per_length = count as f32 * 0.999_99 / length;
             if length > 0.0 && per_length.is_finite() { per_length } else { 0.0 }
         };
@@ -166,7 +165,7 @@ impl Bins {
     }
 }
 
-/// Boxes and counts of the bins of three axes.
+/// Boxes and counts of the bins along three axes.
 pub struct Histogram<const N: usize> {
     pub bounds: [[Bounds; 3]; N],
     pub counts: [[u32; 3]; N],
@@ -177,7 +176,7 @@ struct Cheapest {
     axis: usize,
     /// First bin on the right.
     bin: usize,
-    /// Number of packs on both sides, weighted by area.
+    /// Sum over both sides of the number of packs times the surface area.
     cost: f32,
     sides: [Bounds; 2],
 }
@@ -217,7 +216,7 @@ impl<const N: usize> Histogram<N> {
         self
     }
 
-    /// Sweeps over the planes between bins from both ends.
+    /// Finds the cheapest plane between bins by sweeping from both ends.
     fn cheapest(&self, bins: &Bins) -> Option<Cheapest> {
         let mut best: Option<(usize, usize, f32)> = None;
         let count = bins.count.min(N);
@@ -255,7 +254,7 @@ impl<const N: usize> Histogram<N> {
     }
 }
 
-/// Reorders the references by the split and returns the two nonempty segments.
+/// Reorders the references according to the split and returns the two nonempty segments.
 pub fn partition(references: &mut [Reference], segment: &Segment, split: &Split) -> (Segment, Segment) {
     let (middle, left, right) = match split {
         Split::Plane { axis, bin, bins, sides } => {
@@ -291,8 +290,9 @@ fn partitioned<const AXIS: usize>(
 }
 
 /// Moves the references below a bin to the front. Returns their number and the bounding boxes of the
-/// centroids on both sides. No branch depends on the data, as it would often be mispredicted: every reference
-/// is swapped with the first one on the right, which then counts as left or not.
+/// centroids on both sides. Branchless, since data-dependent branches would often be mispredicted: every
+/// reference is swapped with the first one on the right, and then the length of the left side is incremented
+/// by 0 or 1.
 #[allow(clippy::manual_swap)] // `swap` goes through memory, where the next round stalls: half the speed of all building
 fn partition_by_plane<const AXIS: usize>(
     references: &mut [Reference],
@@ -342,7 +342,7 @@ mod tests {
 
     type Partition = fn(&mut [Reference], usize, &Bins) -> (usize, [Bounds; 2]);
 
-    /// Partitions with SIMD and with scalar code along each axis.
+    /// SIMD and scalar partition functions for each axis.
     const PARTITIONS: [[Partition; 2]; 3] = [
         [partitioned::<0>, partition_by_plane::<0>],
         [partitioned::<1>, partition_by_plane::<1>],
@@ -350,7 +350,7 @@ mod tests {
     ];
 
     #[test]
-    fn simd_histograms_match_scalar_ones() {
+    fn simd_histograms_match_scalar_histograms() {
         fn counts<const N: usize>(references: &[Reference], bins: &Bins) {
             let mut plain = Histogram::<N>::EMPTY;
             plain.count(references, bins);
@@ -358,8 +358,8 @@ mod tests {
             assert_eq!(own.counts, plain.counts);
             for axis in 0..3 {
                 let counted: u32 = own.counts[..bins.count].iter().map(|counts| counts[axis]).sum();
-                assert_eq!(counted as usize, references.len(), "all are in existing bins");
-                // Each bin has exactly its own references.
+                assert_eq!(counted as usize, references.len(), "the bins should contain all references");
+                // Each bin contains exactly the references that map to it.
                 for (bin, (bounds, counts)) in own.bounds.iter().zip(&own.counts).enumerate() {
                     let inside = |one: &&Reference| bins.of(one)[axis] == bin;
                     let inside: Vec<Reference> = references.iter().filter(inside).copied().collect();
@@ -383,7 +383,7 @@ mod tests {
     }
 
     #[test]
-    fn simd_partitions_match_scalar_ones() {
+    fn simd_partitions_match_scalar_partitions() {
         for count in [1, 2, 5, 33, 1000] {
             let references = references(count);
             let bins = Bins::new(&Boxes::around(&references).centroids, references.len());

@@ -7,9 +7,9 @@ use crate::accel::wide_bvh::node::{Child, PACK, WIDTH, WideNode};
 /// The references of a triangle pack.
 #[derive(Clone, Copy, Debug)]
 pub struct Pack {
-    /// Index of the first reference among all.
+    /// Overall index of the first reference.
     pub first: u32,
-    /// Number of references: one to four.
+    /// Number of references, from one to four.
     pub count: u32,
 }
 
@@ -23,7 +23,7 @@ pub struct WideSubtree {
 }
 
 impl WideSubtree {
-    /// Builds over references, the first of which has the index `start` among all.
+    /// Builds a subtree over references. `start` is the overall index of the first one.
     pub fn build(references: &mut [Reference], start: usize, segment: Segment) -> Self {
         let mut own = Self {
             nodes: Vec::with_capacity(references.len() / 6),
@@ -51,7 +51,7 @@ impl WideSubtree {
         Child::Leaf { first, count: self.packs.len() as u32 - first }
     }
 
-    /// Builds a node by splitting the child with the largest box until there are eight (Wald, Benthin,
+    /// Builds a node. Repeatedly splits the child with the largest box until there are eight (Wald, Benthin,
     /// Boulos, *Getting Rid of Packets*, 2008).
     fn node(&mut self, references: &mut [Reference], start: usize, segment: Segment) -> u32 {
         let place = self.nodes.len();

@@ -1,6 +1,6 @@
-//! Triangle splitting: cuts large triangles into several small boxes before construction (Karras, Aila, *Fast
-//! Parallel Construction of High-Quality Bounding Volume Hierarchies*, 2013, section 4). Prefers triangles
-//! whose box is much larger than the triangle, and cuts at planes that recursively halve the bounding box.
+//! Covers large triangles with several smaller boxes before construction (Karras, Aila, *Fast Parallel
+//! Construction of High-Quality Bounding Volume Hierarchies*, 2013, section 4). Prefers triangles that fill
+//! little of their box, and cuts at planes that recursively halve the scene's bounding box.
 
 use rayon::prelude::*;
 
@@ -9,16 +9,16 @@ use crate::control::{CancelToken, Cancelled};
 use crate::math::Vec3;
 use crate::math::elementary::exp2;
 
-/// Maximum number of additional references, as a fraction of the triangles.
+/// Maximum number of additional references as a fraction of the number of triangles.
 const MOST_MORE: f64 = 0.3;
 
-/// Levels of the grid of planes, which has 2 to this power cells along each axis.
+/// Number of levels in the grid of planes. The grid has 2 to this power cells along each axis.
 const LEVELS: u32 = 20;
 
-/// Number of references cut between polls of the token.
+/// Number of references processed between polls of the token.
 const CHUNK: usize = 4096;
 
-/// Splits some of the references. The order and the splits depend only on the triangles.
+/// Splits some of the references. The result depends only on the triangles.
 ///
 /// # Errors
 /// [`Cancelled`] if the build was canceled.
@@ -48,7 +48,7 @@ fn cuts(priority: f32, factor: f32) -> u32 {
     (priority * factor) as u32
 }
 
-/// Finds the largest factor with which the triangles together are cut at most `most` times, by bisection.
+/// Finds, by bisection, the largest factor for which the total number of cuts is at most `most`.
 fn largest_factor(priorities: &[f32], most: u64) -> f32 {
     let total =
         |factor: f32| priorities.par_iter().map(|&priority| u64::from(cuts(priority, factor))).sum::<u64>();
@@ -56,7 +56,7 @@ fn largest_factor(priorities: &[f32], most: u64) -> f32 {
     if !(sum > 0.0 && sum.is_finite()) {
         return 0.0;
     }
-    // Rounding down removes less than one cut from each triangle.
+    // Rounding down loses less than one cut per triangle.
     let (mut low, mut high) =
         ((most as f64 / sum) as f32, ((most as f64 + priorities.len() as f64) / sum) as f32);
     for _ in 0..12 {
@@ -66,7 +66,7 @@ fn largest_factor(priorities: &[f32], most: u64) -> f32 {
     if total(low) <= most { low } else { 0.0 }
 }
 
-/// The recursively halved bounding box.
+/// A bounding box that is halved recursively.
 struct Grid {
     start: Vec3,
     extent: Vec3,
@@ -76,7 +76,7 @@ struct Grid {
 struct GridPlane {
     axis: usize,
     at: f32,
-    /// Level of the plane: 0 halves a cell of the finest grid, higher levels halve larger cells.
+    /// Level of the plane. Level 0 halves a cell of the finest grid; higher levels halve larger cells.
     level: u32,
 }
 
@@ -86,12 +86,12 @@ impl Grid {
         Self { start: all.min.truncate(), extent: all.extent().truncate() }
     }
 
-    /// The coarsest plane that intersects a box, or `None`.
+    /// The coarsest plane that intersects a box.
     fn plane(&self, bounds: &Bounds) -> Option<GridPlane> {
         let cells = (1_u32 << LEVELS) as f32;
         let on_axis = |axis: usize| {
             let place = |x: f32| (x - self.start[axis]) / self.extent[axis] * cells;
-            // A box that ends on a plane is below it.
+            // A box that ends on a plane counts as below it.
             let first = place(bounds.min[axis]) as u32;
             let last = (place(bounds.max()[axis]).ceil() as u32).saturating_sub(1).max(first);
             let level = (first ^ last).checked_ilog2()?;
@@ -102,7 +102,7 @@ impl Grid {
         (0..3).filter_map(on_axis).max_by(|a, b| a.level.cmp(&b.level).then(length(a).total_cmp(&length(b))))
     }
 
-    /// Priority for cutting a triangle: the excess area of its box, reduced for finer planes.
+    /// Priority for cutting a triangle: the excess area of its box, weighted less for finer planes.
     fn priority(&self, reference: &Reference, [a, b, c]: [Vec3; 3]) -> f32 {
         let Some(plane) = self.plane(&reference.bounds) else { return 0.0 };
         let normal = (b - a).cross(c - a).abs();
@@ -112,7 +112,7 @@ impl Grid {
         if priority.is_finite() { priority } else { 0.0 }
     }
 
-    /// Cuts a triangle `cuts` times, longer parts more often.
+    /// Cuts a triangle `cuts` times. Larger parts are cut more often.
     fn cut(&self, reference: Reference, cuts: u32, corners: [Vec3; 3], pieces: &mut Vec<Reference>) {
         let plane = if cuts == 0 { None } else { self.plane(&reference.bounds) };
         let Some(GridPlane { axis, at, .. }) = plane else { return pieces.push(reference) };

@@ -1,12 +1,12 @@
-//! SIMD inner loops of construction, with a whole box per register. They compute the same numbers as the
+//! SIMD inner loops for construction, with an entire box per register. They compute the same numbers as the
 //! scalar code in `build::split`.
 
 use super::InstructionSet;
 use crate::accel::reference::{Bounds, Reference};
 use crate::accel::wide_bvh::build::split::{Bins, Histogram};
 
-/// Adds references to the bins of a histogram. Returns false without doing anything if the processor lacks
-/// the instructions.
+/// Adds references to the bins of a histogram. Returns false and does nothing if the processor lacks the
+/// instructions.
 pub fn count<const N: usize>(references: &[Reference], bins: &Bins, into: &mut Histogram<N>) -> bool {
     #[cfg(target_arch = "x86_64")]
     if InstructionSet::best() >= InstructionSet::Avx2 {
@@ -19,7 +19,7 @@ pub fn count<const N: usize>(references: &[Reference], bins: &Bins, into: &mut H
 }
 
 /// Moves the references below a bin to the front. Returns their number and the bounding boxes of the
-/// centroids on both sides, or `None` without doing anything if the processor lacks the instructions.
+/// centroids on both sides. Returns `None` and does nothing if the processor lacks the instructions.
 pub fn partition<const AXIS: usize>(
     references: &mut [Reference],
     bin: usize,
@@ -53,7 +53,7 @@ mod avx2 {
     #[target_feature(enable = "avx2")]
     #[inline]
     fn store(bounds: __m256, to: &mut Bounds) {
-        // SAFETY: a box has room for eight floats with sufficient alignment.
+        // SAFETY: a box has space for eight floats with sufficient alignment.
         unsafe { _mm256_store_ps(std::ptr::from_mut(to).cast(), bounds) }
     }
 
@@ -93,8 +93,9 @@ mod avx2 {
         }
     }
 
-    /// Branch-free partition, as branches on the data would often be mispredicted: every reference is swapped
-    /// with the first one on the right, which then counts as left or not.
+    /// Branchless partition, since data-dependent branches would often be mispredicted. Every reference is
+    /// swapped with the first one on the right, and then the length of the left side is incremented by 0 or
+    /// 1.
     #[target_feature(enable = "avx2")]
     pub fn partition<const AXIS: usize>(
         references: &mut [Reference],

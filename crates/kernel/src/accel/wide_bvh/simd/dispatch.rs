@@ -1,5 +1,5 @@
-//! Compiles portable loops again for the instruction sets of the processor. Operations are never reordered,
-//! and fused only where the last bits do not matter, so all results have the same bits.
+//! Recompiles portable loops for several x86-64 instruction sets. Operations are never reordered. They are
+//! fused only where the last bits do not matter, so results are bit-identical.
 
 #[cfg(target_arch = "x86_64")]
 use std::arch::x86_64::*;
@@ -11,13 +11,13 @@ pub use crate::math::lanes::SimdKernel;
 use crate::math::lanes::{F32x16, Mask, PACKET_SIZE, Simd};
 
 impl InstructionSet {
-    /// Runs a kernel with this instruction set, or the best one that the processor has.
+    /// Runs a kernel with this instruction set, or with the fastest supported one if the processor lacks it.
     #[inline]
     pub fn run<L: SimdKernel>(self, work: L) -> L::Output {
         match self.available() {
             Self::Portable => work.run(PortableSimd),
             #[cfg(target_arch = "x86_64")]
-            // SAFETY: `available` returns an instruction set that the processor has.
+            // SAFETY: `available` returns an instruction set that the processor supports.
             Self::Avx2 => unsafe { avx2(work) },
             #[cfg(target_arch = "x86_64")]
             // SAFETY: as above.
@@ -42,7 +42,7 @@ fn avx512<L: SimdKernel>(work: L) -> L::Output {
     work.run(Avx512Simd(()))
 }
 
-/// Proof that the processor has AVX2 and FMA.
+/// Proof that the processor supports AVX2 and FMA.
 #[cfg(target_arch = "x86_64")]
 #[derive(Clone, Copy)]
 struct Avx2Simd(());
@@ -51,7 +51,7 @@ struct Avx2Simd(());
 impl Simd for Avx2Simd {
     #[inline(always)]
     fn movemask(self, mask: &Mask) -> u32 {
-        // SAFETY: values are only created if the processor has AVX2 and FMA.
+        // SAFETY: values are only created if the processor supports AVX2 and FMA.
         unsafe { avx2_movemask(mask) }
     }
 
@@ -79,7 +79,7 @@ impl Simd for Avx2Simd {
     }
 }
 
-/// Proof that the processor has AVX-512F, VL, DQ and BW.
+/// Proof that the processor supports AVX-512F, VL, DQ, and BW.
 #[cfg(target_arch = "x86_64")]
 #[derive(Clone, Copy)]
 struct Avx512Simd(());
@@ -88,7 +88,7 @@ struct Avx512Simd(());
 impl Simd for Avx512Simd {
     #[inline(always)]
     fn movemask(self, mask: &Mask) -> u32 {
-        // SAFETY: values are only created if the processor has AVX-512F, VL, DQ and BW.
+        // SAFETY: values are only created if the processor supports AVX-512F, VL, DQ, and BW.
         unsafe { avx512_movemask(mask) }
     }
 
@@ -135,7 +135,7 @@ fn avx512_movemask(mask: &Mask) -> u32 {
     u32::from(_mm512_movepi32_mask(row))
 }
 
-/// [`Simd::min_max`] of two halves, in the order of the portable implementation.
+/// [`Simd::min_max`] of two halves, combined in the same order as the portable implementation.
 #[cfg(target_arch = "x86_64")]
 #[inline]
 #[target_feature(enable = "avx2")]
@@ -256,7 +256,7 @@ mod tests {
             let bits =
                 |(span, inverse): ([f32; 2], F32x16)| (span.map(f32::to_bits), inverse.map(f32::to_bits));
             assert!(each.iter().all(|one| bits(*one) == bits(each[0])), "{row:?} {of:b} {each:?}");
-            // Without NaN, they are the minimum and the maximum.
+            // Without NaN, these are the minimum and the maximum.
             let lanes = || (0..PACKET_SIZE).filter(|i| of >> i & 1 == 1).map(|i| row[i]);
             if !lanes().any(f32::is_nan) {
                 let ([least, greatest], inverse) = each[0];

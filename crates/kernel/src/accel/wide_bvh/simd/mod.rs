@@ -1,7 +1,6 @@
-//! Traversal with SIMD instructions selected at run time. The tree's `unsafe` code is confined to this
-//! module.
+//! Traversal with SIMD instructions selected at run time. All `unsafe` code of the tree is in this module.
 //!
-//! All instruction sets give the same bits as [`portable`], which is plain Rust.
+//! Results on all instruction sets are bit-identical to [`portable`], which is plain Rust.
 
 #[allow(unsafe_code)]
 pub mod binning;
@@ -51,8 +50,8 @@ impl InstructionSet {
     /// All instruction sets, slowest first.
     pub const ALL: [Self; 3] = [Self::Portable, Self::Avx2, Self::Avx512];
 
-    /// The fastest instruction set of this processor. For comparisons, the environment variable
-    /// `GLIMT_SIMD=portable` or `avx2` selects a slower one.
+    /// The fastest supported instruction set. For comparisons, the environment variable `GLIMT_SIMD=portable`
+    /// or `GLIMT_SIMD=avx2` selects a slower one.
     pub fn best() -> Self {
         static BEST: LazyLock<InstructionSet> =
             LazyLock::new(|| match std::env::var("GLIMT_SIMD").as_deref() {
@@ -63,7 +62,7 @@ impl InstructionSet {
         *BEST
     }
 
-    /// This instruction set, or the best one that the processor has if it lacks it.
+    /// This instruction set, or the fastest supported one if the processor lacks it.
     pub fn available(self) -> Self {
         static AVAILABLE: LazyLock<InstructionSet> = LazyLock::new(available);
         self.min(*AVAILABLE)
@@ -93,7 +92,8 @@ pub fn closest(tree: &WideBvh, ray: &Ray) -> Option<ShapeHit> {
     match tree.instructions {
         InstructionSet::Portable => portable::closest(tree, ray),
         #[cfg(target_arch = "x86_64")]
-        // SAFETY: a tree only has an instruction set that the processor has (`InstructionSet::available`).
+        // SAFETY: a tree only has an instruction set that the processor supports
+        // (`InstructionSet::available`).
         InstructionSet::Avx2 | InstructionSet::Avx512 => unsafe { single::closest(tree, ray) },
         #[cfg(not(target_arch = "x86_64"))]
         _ => portable::closest(tree, ray),
@@ -127,8 +127,8 @@ pub fn closest_packet(tree: &WideBvh, rays: &[Ray], ends: &F32x16, hits: &mut [O
     }
 }
 
-/// [`WideBvh::any_packet`] for a nonempty tree: the bits of the rays that hit, or `None` if the packet was
-/// not traced.
+/// [`WideBvh::any_packet`] for a nonempty tree. Returns the mask of the rays that hit, or `None` if the
+/// packet was not traced.
 #[allow(unsafe_code)]
 pub fn any_packet(tree: &WideBvh, rays: &[Ray], ends: &F32x16, except: &[Option<u32>]) -> Option<u32> {
     match tree.instructions {

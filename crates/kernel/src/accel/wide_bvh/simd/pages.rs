@@ -1,6 +1,6 @@
-//! Huge pages for large arrays with random access, where the system offers them.
+//! Huge pages for large randomly accessed arrays, if the system supports them.
 
-/// Allocation size in bytes from which huge pages pay off.
+/// Minimum allocation size in bytes for using huge pages.
 const LARGE: usize = 1 << 21;
 
 /// An empty vector with room for `count` items.
@@ -20,8 +20,8 @@ fn ask(start: usize, bytes: usize) {
     let first = start.next_multiple_of(PAGE);
     let length = (start + bytes).saturating_sub(first) / PAGE * PAGE;
     if let Some(address) = std::ptr::NonNull::new(first as *mut std::ffi::c_void) {
-        // SAFETY: the pages are inside the allocation, and the advice does not change their content. The
-        // result is ignored, as a refusal is harmless.
+        // SAFETY: the pages are inside the allocation, and the advice does not change their contents. Failure
+        // is harmless and ignored.
         let _ = unsafe { madvise(address, length, MmapAdvise::MADV_HUGEPAGE) };
     }
 }

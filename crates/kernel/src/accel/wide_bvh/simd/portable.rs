@@ -1,4 +1,4 @@
-//! Portable traversal, the reference for all instruction sets.
+//! Portable traversal. It is the reference for all instruction sets.
 
 use super::super::WideBvh;
 use super::super::node::{Child, PACK, TrianglePack, WIDTH, WideNode};
@@ -7,13 +7,13 @@ use crate::geometry::watertight::ShearedRay;
 use crate::geometry::{Ray, ShapeHit};
 use crate::math::Vec3;
 
-/// Whether a ray can hit anything. Rays that are not finite or have no direction hit nothing, although they
-/// would pass every box test.
+/// Whether a ray can hit anything. Non-finite rays and rays with zero direction cannot, although they would
+/// pass every box test.
 fn may_hit(ray: &Ray) -> bool {
     ray.origin.is_finite() && ray.direction.is_finite() && ray.direction != Vec3::ZERO
 }
 
-/// Finds the nearest hit, visiting children front to back.
+/// Finds the nearest hit. Visits children front to back.
 pub fn closest(tree: &WideBvh, ray: &Ray) -> Option<ShapeHit> {
     if !may_hit(ray) {
         return None;
@@ -48,7 +48,7 @@ pub fn closest(tree: &WideBvh, ray: &Ray) -> Option<ShapeHit> {
     best
 }
 
-/// Whether any triangle is hit. Visits children in any order until one is hit.
+/// Whether any triangle is hit. Visits children in any order and stops at the first hit.
 pub fn any(tree: &WideBvh, ray: &Ray, except: Option<u32>) -> bool {
     if !may_hit(ray) {
         return false;
@@ -79,7 +79,7 @@ pub fn any(tree: &WideBvh, ray: &Ray, except: Option<u32>) -> bool {
     false
 }
 
-/// Children that a ray hits, with their entry distances.
+/// Children that the ray hits, with their entry distances.
 fn met(node: &WideNode, slabs: &SlabRay, t_max: f32) -> impl Iterator<Item = (f32, Child)> {
     (0..WIDTH).filter_map(move |slot| {
         let corner = |side: usize| {
@@ -89,7 +89,7 @@ fn met(node: &WideNode, slabs: &SlabRay, t_max: f32) -> impl Iterator<Item = (f3
     })
 }
 
-/// Updates the best hit with a lane's hit if it is nearer, or equally near with a lower index.
+/// Updates the best hit with the hit in a lane if it is nearer, or equally near with a lower index.
 #[inline]
 pub fn nearer(pack: &TrianglePack, lane: usize, ray: &ShearedRay, t_max: f32, best: &mut Option<ShapeHit>) {
     if let Some(hit) = ray.intersect(&pack.corners(lane), t_max) {

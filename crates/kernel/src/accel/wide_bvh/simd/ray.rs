@@ -1,4 +1,4 @@
-//! A ray broadcast to SIMD registers. Prepared without branches, as the signs of random rays are
+//! A ray broadcast to SIMD registers. Preprocessing is branchless because the signs of random rays are
 //! unpredictable.
 
 use std::arch::x86_64::*;
@@ -9,21 +9,21 @@ use crate::accel::wide_bvh::node::{TrianglePack, WideNode};
 use crate::geometry::aabb::{FAR_PAD, TRIANGLE_ERROR};
 use crate::geometry::{Aabb, Ray};
 
-/// Minimum speed along an axis, as a fraction of the maximum.
+/// Minimum absolute direction component, as a fraction of the largest component.
 const LEAST_PART: f32 = 1.0 / (1_u64 << 40) as f32;
 
-/// A ray prepared for the boxes of nodes and the triangles of packs.
+/// A ray preprocessed for the boxes of nodes and the triangles of packs.
 pub struct SimdRay {
     /// Inverse direction.
     to_near: [F8; 3],
-    /// Inverse direction, padded so that a far plane is never reached too early.
+    /// Inverse direction, padded so that no distance to a far plane is too short.
     to_far: [F8; 3],
-    /// Origins for near and far planes, a margin apart, multiplied by the inverse direction.
+    /// Origins for near and far planes, offset by the margin and multiplied by the inverse direction.
     from_near: [F8; 3],
     from_far: [F8; 3],
-    /// Row of a node with the near planes of each axis.
+    /// Row of a node that contains the near planes of each axis.
     near: [usize; 3],
-    /// Origin along the axes of the sheared ray.
+    /// Origin permuted to the axes of the sheared ray.
     origin: [F4; 3],
     shear: [F4; 3],
     axes: [usize; 3],
@@ -31,8 +31,8 @@ pub struct SimdRay {
     start: u32,
 }
 
-/// Axes of a sheared ray, indexed by whether x > y, x > z and y > z for the magnitudes of its direction, and
-/// by which of x, y, z are negative; see `ShearedRay::new`.
+/// Axes of a sheared ray, indexed by whether |x| > |y|, |x| > |z|, and |y| > |z| for its direction, and by
+/// the signs of x, y, and z. See `ShearedRay::new`.
 const AXES: [[i32; 4]; 64] = {
     let mut table = [[0; 4]; 64];
     let mut case = 0;
@@ -52,13 +52,13 @@ const AXES: [[i32; 4]; 64] = {
     table
 };
 
-/// Origin and direction. The last lane of each holds the float that follows in memory.
+/// Origin and direction. The last lane of each contains the next float in memory.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
 fn origin_and_direction(ray: &Ray) -> (__m128, __m128) {
     const _: () = assert!(size_of::<Ray>() == 32 && std::mem::offset_of!(Ray, direction) == 12);
     let floats: *const f32 = std::ptr::from_ref(ray).cast();
-    // SAFETY: reads the first four of a ray's seven floats, and the four after the first three.
+    // SAFETY: reads floats 0–3 and 3–6 of a ray's seven floats.
     unsafe { (_mm_loadu_ps(floats), _mm_loadu_ps(floats.add(3))) }
 }
 
@@ -77,7 +77,7 @@ pub fn may_hit(ray: &Ray) -> bool {
     _mm_movemask_ps(finite) & 0b111 == 0b111 && _mm_movemask_ps(goes) & 0b111 != 0
 }
 
-/// Both corners. The last lane of each holds another float.
+/// Both corners. The last lane of each contains an unrelated float.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
 fn corners(bounds: &Aabb) -> (__m128, __m128) {
@@ -96,7 +96,7 @@ fn overflows(v: __m128) -> __m128 {
     _mm_cmpeq_ps(unsigned, _mm_set1_ps(f32::INFINITY))
 }
 
-/// Broadcasts the maximum of three nonnegative lanes.
+/// Broadcasts the maximum of the first three lanes, which must be nonnegative.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
 fn greatest(v: __m128) -> __m128 {
@@ -104,7 +104,7 @@ fn greatest(v: __m128) -> __m128 {
     _mm_permute_ps::<0>(_mm_max_ps(v, _mm_permute_ps::<0b01>(v)))
 }
 
-/// Broadcasts each of three lanes to eight.
+/// Broadcasts each of the first three lanes to eight lanes.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
 fn in_eight(v: __m128) -> [F8; 3] {
@@ -112,7 +112,7 @@ fn in_eight(v: __m128) -> [F8; 3] {
     [F8(_mm256_broadcastss_ps(x.0)), F8(_mm256_broadcastss_ps(y.0)), F8(_mm256_broadcastss_ps(z.0))]
 }
 
-/// Broadcasts each of three lanes to four.
+/// Broadcasts each of the first three lanes to four lanes.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
 fn in_four(v: __m128) -> [F4; 3] {
@@ -120,23 +120,23 @@ fn in_four(v: __m128) -> [F4; 3] {
 }
 
 impl SimdRay {
-    /// Prepares a ray for triangles in `whole`.
+    /// Preprocesses a ray for triangles in `whole`.
     #[target_feature(enable = "avx2,fma")]
     #[inline]
     pub fn new(ray: &Ray, whole: &Aabb) -> Self {
         let (origin, direction) = origin_and_direction(ray);
         let (min, max) = corners(whole);
         let unsigned = _mm_castsi128_ps(_mm_set1_epi32(i32::MAX));
-        // How far boxes extend beyond their triangles: `triangle_margin`, plus the additional error of fused
+        // Margin between boxes and their triangles: `triangle_margin`, plus the additional error of fused
         // products.
         let below = _mm_and_ps(_mm_sub_ps(min, origin), unsigned);
         let above = _mm_and_ps(_mm_sub_ps(max, origin), unsigned);
         let farthest = greatest(_mm_max_ps(below, above));
         let margin = _mm_mul_ps(farthest, _mm_set1_ps(TRIANGLE_ERROR));
         let reach = _mm_add_ps(margin, _mm_mul_ps(_mm_and_ps(origin, unsigned), _mm_set1_ps(f32::EPSILON)));
-        // Prepare the box tests. A ray that hardly moves along an axis may as well move slightly more: less
-        // than a margin over its whole way through the boxes. This keeps the inverse finite for all but the
-        // slowest rays.
+        // Prepare the box tests. Near-zero direction components are increased slightly, which moves the ray
+        // by less than a margin inside the boxes. This keeps the inverse finite unless the direction is
+        // extremely short.
         let size = _mm_and_ps(direction, unsigned);
         let least = _mm_mul_ps(greatest(size), _mm_set1_ps(LEAST_PART));
         let moving = _mm_or_ps(_mm_max_ps(size, least), _mm_andnot_ps(unsigned, direction));
@@ -154,7 +154,7 @@ impl SimdRay {
         let scale = _mm_permute_ps::<0xaa>(_mm_permutevar_ps(inverse, places));
         let shear = _mm_mul_ps(_mm_permutevar_ps(direction, places), scale);
         let [shear_x, shear_y, _] = in_four(shear);
-        // Along an axis on which the arithmetic overflows, the ray is unbounded.
+        // Ignore the planes of an axis if the arithmetic overflows.
         let (endless, minus_endless) = (_mm_set1_ps(f32::INFINITY), _mm_set1_ps(f32::NEG_INFINITY));
         let from_near = _mm_mul_ps(inverse, _mm_blendv_ps(after, before, is_down));
         let from_far = _mm_mul_ps(padded, _mm_blendv_ps(before, after, is_down));
@@ -171,14 +171,14 @@ impl SimdRay {
         }
     }
 
-    /// Distances at which the ray enters the eight boxes, and the bits of the boxes that it hits before
-    /// `end`. A NaN distance leaves the interval unchanged, as in `SlabRay::enter`.
+    /// Distances at which the ray enters the eight boxes, and the mask of the boxes that it hits before
+    /// `end`. NaN distances do not affect the interval, as in `SlabRay::enter`.
     #[inline(always)]
     pub fn enter(&self, node: &WideNode, end: F8) -> (F8, u32) {
         let (mut near, mut far) = (end.like(0.0), end);
         for axis in 0..3 {
-            // SAFETY: values of this type exist, so the processor has the instructions; both pointers are
-            // rows of a pair that begins with an even one.
+            // SAFETY: values of this type exist, so the processor has the instructions. Both rows exist: they
+            // are a row with an even index and the next one.
             let (to_near, to_far) = unsafe {
                 let row = node.rows.as_ptr().add(self.near[axis]);
                 let other = node.rows.as_ptr().add(self.near[axis] ^ 1);
@@ -193,7 +193,7 @@ impl SimdRay {
         (near, F8::movemask(near.le(far)))
     }
 
-    /// Tests the triangles of a pack, except the one on which the ray starts.
+    /// Tests the triangles of a pack, except the ray's start triangle.
     #[inline(always)]
     pub fn hits(&self, pack: &TrianglePack, t_max: f32) -> Hits<F4> {
         let corners = [self.corner(pack, 0), self.corner(pack, 3), self.corner(pack, 6)];
@@ -202,10 +202,10 @@ impl SimdRay {
         Hits { hit: hits.hit & others, doubtful: hits.doubtful & others, ..hits }
     }
 
-    /// Bit of the lane with the triangle on which the ray starts.
+    /// Mask of the lane that contains the ray's start triangle.
     #[inline(always)]
     fn own_lane(&self, pack: &TrianglePack) -> u32 {
-        // SAFETY: values of `F4` exist, so the processor has the instructions; reads four numbers.
+        // SAFETY: values of `F4` exist, so the processor has the instructions. Reads four numbers.
         unsafe {
             let ids = _mm_loadu_si128(pack.ids.as_ptr().cast());
             let is_own = _mm_cmpeq_epi32(ids, _mm_set1_epi32(self.start.cast_signed()));
@@ -213,7 +213,7 @@ impl SimdRay {
         }
     }
 
-    /// The corners whose first row is `row`.
+    /// Corners of all lanes in the ray's coordinates. `row` is their first row.
     #[inline(always)]
     fn corner(&self, pack: &TrianglePack, row: usize) -> [F4; 3] {
         let z = self.row(pack, row, 2);
@@ -222,8 +222,8 @@ impl SimdRay {
 
     #[inline(always)]
     fn row(&self, pack: &TrianglePack, row: usize, axis: usize) -> F4 {
-        // SAFETY: values of this type exist, so the processor has the instructions; `row` is 0, 3 or 6 of 9,
-        // and axes are less than 3.
+        // SAFETY: values of this type exist, so the processor has the instructions. There are nine rows,
+        // `row` is 0, 3, or 6, and axes are less than 3.
         let row = unsafe { F4::load(pack.rows.as_ptr().add(row + self.axes[axis]).cast()) };
         row - self.origin[axis]
     }

@@ -19,7 +19,7 @@ pub fn closest(tree: &WideBvh, ray: &Ray) -> Option<ShapeHit> {
     if !may_hit(ray) {
         return None;
     }
-    // SAFETY: this function is compiled with these instructions.
+    // SAFETY: this function is compiled with the required instructions.
     let like8 = unsafe { F8::splat(0.0) };
     let lines = SimdRay::new(ray, &tree.bounds);
     let mut best: Option<ShapeHit> = None;
@@ -58,7 +58,7 @@ pub fn closest(tree: &WideBvh, ray: &Ray) -> Option<ShapeHit> {
     }
 }
 
-/// Updates the best hit with the nearest of a pack's hits.
+/// Updates the best hit with the nearest hit in a pack.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
 fn nearest(pack: &TrianglePack, hits: &Hits<F4>, ray: &Ray, best: &mut Option<ShapeHit>, t_max: f32) {
@@ -84,14 +84,14 @@ fn nearest(pack: &TrianglePack, hits: &Hits<F4>, ray: &Ray, best: &mut Option<Sh
     }
 }
 
-/// [`nearer`] as a separate call, out of the common path.
+/// [`nearer`] as an outlined call, since it is rarely needed.
 #[cold]
 #[inline(never)]
 fn nearer_of(pack: &TrianglePack, lane: usize, ray: &Ray, t_max: f32, best: &mut Option<ShapeHit>) {
     nearer(pack, lane, &ShearedRay::new(ray.origin, ray.direction), t_max, best);
 }
 
-/// Pushes the children that the ray hits, farthest first, except the nearest, which is returned.
+/// Pushes the children that the ray hits, farthest first, except for the nearest. Returns the nearest.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
 fn push_ordered(tree: &WideBvh, node: &WideNode, near: F8, met: u32, stack: &mut Stack<u64>) -> Option<u32> {
@@ -122,7 +122,7 @@ fn push_ordered(tree: &WideBvh, node: &WideNode, near: F8, met: u32, stack: &mut
     }
 }
 
-/// Prefetches the start of a child's memory; prefetching all of it is slower.
+/// Prefetches the beginning of a child. Prefetching the entire child would be slower.
 #[inline(always)]
 pub fn prefetch(tree: &WideBvh, code: u32) {
     let index = (code & !LEAF_BITS) as usize;
@@ -130,7 +130,7 @@ pub fn prefetch(tree: &WideBvh, code: u32) {
     let pack: *const i8 = tree.packs.as_ptr().wrapping_add(index).cast();
     let start = std::hint::select_unpredictable(code >> 31 != 0, pack, node);
     for line in 0..2 {
-        // SAFETY: a prefetch is a hint and valid for any address.
+        // SAFETY: prefetching is a hint and valid for any address.
         unsafe { _mm_prefetch::<_MM_HINT_T0>(start.wrapping_add(64 * line)) };
     }
 }
@@ -148,7 +148,7 @@ pub fn any(tree: &WideBvh, ray: &Ray, except: Option<u32>) -> bool {
     if !may_hit(ray) {
         return false;
     }
-    // SAFETY: this function is compiled with these instructions.
+    // SAFETY: this function is compiled with the required instructions.
     let like8 = unsafe { F8::splat(0.0) };
     let lines = SimdRay::new(ray, &tree.bounds);
     let end = like8.like(ray.t_max * SLAB_PAD);

@@ -1,11 +1,11 @@
-//! Traversal stack in memory that is not cleared for every ray.
+//! Traversal stack that is not cleared for every ray.
 
 use std::mem::MaybeUninit;
 
-/// Stack size: fewer than 96 levels of the binary tree, each with at most seven pending children.
+/// Stack size. The binary tree has fewer than 96 levels, each with at most seven pending children.
 const STACK_SIZE: usize = 96 * 7;
 
-/// A stack with room for the deepest tree.
+/// A stack that is large enough for the deepest tree.
 pub struct Stack<T> {
     entries: [MaybeUninit<T>; STACK_SIZE],
     size: usize,
@@ -25,7 +25,7 @@ impl<T: Copy> Stack<T> {
         self.size += 1;
     }
 
-    /// Pushes an entry if `is_wanted`, without a branch.
+    /// Branchlessly pushes an entry if `is_wanted`.
     #[inline(always)]
     pub fn push_if(&mut self, entry: T, is_wanted: bool) {
         self.entries[self.size].write(entry);
@@ -40,7 +40,7 @@ impl<T: Copy> Stack<T> {
         Some(unsafe { self.entries[self.size].assume_init() })
     }
 
-    /// The entry `back` positions below the top.
+    /// The entry that is `back` positions below the top.
     #[inline(always)]
     fn below(&mut self, back: usize) -> &mut T {
         debug_assert!(back < self.size);
@@ -49,8 +49,8 @@ impl<T: Copy> Stack<T> {
     }
 }
 
-/// Sort key of a child: the bits of its entry distance above its code. Distances are at least 0, so their
-/// bits sort like the distances.
+/// Sort key of a child: the bits of its entry distance, followed by the encoded child. Bits of nonnegative
+/// floats sort like their values.
 #[inline(always)]
 pub fn key(entry: f32, code: u32) -> u64 {
     u64::from(entry.to_bits()) << 32 | u64::from(code)
@@ -63,7 +63,7 @@ pub fn entry(key: u64) -> f32 {
 }
 
 impl Stack<u64> {
-    /// Inserts a key among the topmost `count` keys, which are sorted with the nearest on top.
+    /// Inserts a key into the topmost `count` keys, which are sorted with the nearest on top.
     #[inline(always)]
     pub fn insert(&mut self, key: u64, count: usize) {
         self.push(key);

@@ -1,28 +1,28 @@
 //! SIMD watertight triangle test. Performs the operations of `ShearedRay::intersect` in the same order and
-//! without fused products, so the bits are equal.
+//! without fused products, so results are bit-identical.
 
 use super::vector::SimdVector;
 use crate::geometry::watertight::ILL_CONDITIONED;
 use crate::math::float::gamma;
 
-/// Corners in the ray's coordinates: sheared x and y, and z.
+/// Corners in the ray's coordinates: sheared x, sheared y, and z.
 pub type Corners<V> = [[V; 3]; 3];
 
-/// Hits of a ray.
+/// Results of intersecting a ray with a pack, or of a packet with a triangle.
 pub struct Hits<V: SimdVector> {
-    /// Bits of the lanes that are hit.
+    /// Mask of the lanes with a hit.
     pub hit: u32,
-    /// Bits of the lanes that must be tested again in higher precision: an edge function is exactly 0, the
-    /// triangle is too thin to determine t, or t is too close to 0.
+    /// Mask of the lanes that must be retested in higher precision, because an edge function is exactly 0,
+    /// the triangle is too thin to determine t, or t is too close to 0.
     pub doubtful: u32,
     pub t: V,
     pub u: V,
     pub v: V,
 }
 
-/// Tests all lanes; `shear_z` is t per unit of z. Skips the division and the error bound if no ray passes
-/// through a triangle. With `is_single`, also skips them for triangles behind the origin or past the end of
-/// the ray, which is the case for most packs.
+/// Tests all lanes. `shear_z` is t per unit of z. Skips the division and the error bound if no ray passes
+/// through a triangle. With `is_single`, also skips them if all triangles are behind the origin or past the
+/// end of the ray, as in most packs.
 #[inline(always)]
 pub fn hits<V: SimdVector>(corners: &Corners<V>, shear_z: V, t_max: V, is_single: bool) -> Hits<V> {
     let [[ax, ay, az], [bx, by, bz], [cx, cy, cz]] = *corners;
@@ -53,13 +53,15 @@ pub fn hits<V: SimdVector>(corners: &Corners<V>, shear_z: V, t_max: V, is_single
     Hits { hit, doubtful, t, u: wb * inverse, v: wc * inverse }
 }
 
-/// Unit roundoff divided by the needle ratio, slightly enlarged for rounding in [`may_count`] itself.
+/// Unit roundoff divided by the needle ratio, slightly enlarged to account for rounding in [`may_count`]
+/// itself.
 const UNITS: f32 = 1.05 * 0.5 * f32::EPSILON / ILL_CONDITIONED;
 
-/// Returns false only if the triangle is not a needle and t is below 0, or past the end, by more than its
-/// error. Let s be the sum of the largest x and y, whose product is at most s²/4, and d the largest z. Then
-/// [`distance_error`] is at most 30·s·(s + d) units of rounding of the reach, divided by the determinant. A
-/// determinant whose inverse may be infinite counts as a needle. `along` is t times the determinant.
+/// Whether a triangle may need the full test. Returns false only if the triangle is not a needle and t is
+/// negative or past the ray's end by more than its error. Let s be the sum of the maxima of |x| and |y|, so
+/// the product of both is at most s²/4, and let d be the maximum of |z|. Then [`distance_error`] is at most
+/// 30·s·(s + d) unit roundoffs of the reach, divided by the determinant. If the inverse of the determinant
+/// may be infinite, the triangle counts as a needle. `along` is t times the determinant.
 #[inline(always)]
 fn may_count<V: SimdVector>(corners: &Corners<V>, determinant: V, shear_z: V, along: V, t_max: V) -> V::Mask {
     let (sum, deepest) = (greatest(corners, 0) + greatest(corners, 1), greatest(corners, 2));
@@ -83,7 +85,7 @@ fn distance_error<V: SimdVector>(corners: &Corners<V>, shear_z: V, inverse_deter
     (shear_z.like(3.0) * sum * inverse_determinant.abs(), z)
 }
 
-/// Largest absolute value of a coordinate.
+/// Largest absolute value of the corners' coordinates along an axis.
 #[inline(always)]
 fn greatest<V: SimdVector>(corners: &Corners<V>, axis: usize) -> V {
     corners[0][axis].abs().max(corners[1][axis].abs()).max(corners[2][axis].abs())
@@ -96,16 +98,16 @@ mod tests {
     use crate::accel::wide_bvh::simd::vector::F4;
     use crate::math::random::signed as random;
 
-    /// Tests triangles at the limits of the filter in thinness and distance from the origin, and slightly
-    /// beyond.
+    /// Tests triangles near the filter's limits of thinness and distance from the origin, on both sides of
+    /// the limits.
     #[test]
-    fn filter_passes_doubtful_triangles_only() {
-        // SAFETY: every processor of this architecture has four-float vectors.
+    fn filter_rejects_only_clear_misses() {
+        // SAFETY: every x86-64 processor supports four-float vectors.
         let like = unsafe { F4::splat(0.0) };
         let mut next = random(31);
         let (mut needles, mut starts, mut passed, mut clear, mut beyond) = (0, 0, 0, 0, 0);
         for round in 0..400_000 {
-            // Use needles of all widths, sizes and distances; corners with |x| = |y| are the worst case.
+            // Use needles of various widths, sizes, and distances. Corners with |x| = |y| are the worst case.
             let size = 2.0_f32.powf(next() * 12.0);
             let depth = if round % 2 == 0 { 0.0 } else { size * 2.0_f32.powf(next() * 10.0) };
             let is_thin = round % 4 < 2;
@@ -130,7 +132,7 @@ mod tests {
             let (error, reach) = distance_error(&corners, shear_z, inverse);
             let is_needle = F4::movemask((reach * like.like(ILL_CONDITIONED)).lt(error)) != 0;
             let is_at_start = F4::movemask(t.abs().le(error)) != 0;
-            // End the ray before the triangle, at it, behind it, or nowhere.
+            // End the ray in front of the triangle, on it, behind it, or at infinity.
             let mut distance = [0.0; 4];
             t.store(&mut distance);
             let part = [0.5, 1.0, 1.0 + f32::EPSILON, 2.0, f32::INFINITY][round % 5];
@@ -152,7 +154,7 @@ mod tests {
             clear += u32::from(!passes);
         }
         assert!(needles > 20_000 && starts > 2_000 && clear > 20_000, "{needles}, {starts}, {clear}");
-        assert!(passed < 4 * (needles + starts), "{passed} pass of {needles} needles, {starts} at the start");
-        assert!(beyond > 5_000, "{beyond} beyond the end");
+        assert!(passed < 4 * (needles + starts), "{passed} pass; {needles} needles, {starts} at start");
+        assert!(beyond > 5_000, "{beyond} past the end");
     }
 }

@@ -41,7 +41,7 @@ fn textured_emission_matches_light_sampling() {
         let told = f64::from(source.power().y);
         assert!(
             found.error < 5e-3 * told && (found.mean / told - 1.0).abs() < 0.02,
-            "{found:?}, expected {told}"
+            "{found:?} instead of {told}"
         );
     }
 }
@@ -58,7 +58,7 @@ fn quad_power_is_the_mean_of_its_texture() {
     assert!(found.error < 1e-3 * exact.x && (found.mean - exact.x).abs() < 5.0 * found.error, "{found:?}");
 }
 
-/// The triangles of a bent, transformed sheet, with UVs.
+/// The triangles of a curved and transformed sheet, with UVs.
 fn sheet(side: u32) -> Vec<UvTriangle> {
     let transform = Transform::scale_rotate_translate(
         DVec3::new(0.5, -1.5, 0.8),
@@ -74,7 +74,7 @@ fn sheet(side: u32) -> Vec<UvTriangle> {
         let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
         [[a, b, c], [a, c, d]]
     });
-    // Every other triangle belongs to another light.
+    // Every other triangle belongs to a different light.
     let patch = |(number, corners): (u32, [(DVec3, Vec2); 3])| UvTriangle {
         primitive: number * 2 + 1,
         corners: corners.map(|(point, _)| point),

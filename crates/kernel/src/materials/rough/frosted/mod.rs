@@ -1,14 +1,17 @@
-//! Rough glass: a boundary of two dielectrics made of microfacets that reflect and refract (Walter, Marschner, Li, Torrance,
-//! *Microfacet Models for Refraction through Rough Surfaces*, EGSR 2007).
+//! Rough glass: a boundary between two dielectrics, with microfacets that reflect and refract (Walter,
+//! Marschner, Li, Torrance, *Microfacet Models for Refraction through Rough Surfaces*, EGSR 2007).
 //!
-//! With the Fresnel reflectance F of a facet, indices of refraction n, view direction o and light direction i:
+//! Let F be a facet's Fresnel reflectance, n the indices of refraction, o the view direction, and i the light
+//! direction. Then
 //!
-//! - reflection: f = F·D·G/(4 cosθᵢ cosθₒ), with the facet's normal h along o + i;
-//! - transmission: f = |o·h| |i·h| (1 − F)·D·G·nᵢ²/(cosθᵢ cosθₒ |nₒ o + nᵢ i|²), with h along nₒ o + nᵢ i. Light is basic
-//!   radiance, L/n², so that nᵢ² replaces the nₒ² of radiance, and f/nᵢ² is the same in both directions.
+//! - for reflection, f = F·D·G/(4 cosθᵢ cosθₒ), and the facet's normal h has the direction o + i;
+//! - for transmission, f = |o·h| |i·h| (1 − F)·D·G·nᵢ²/(cosθᵢ cosθₒ |nₒ o + nᵢ i|²), and h has the direction
+//!   nₒ o + nᵢ i. Light is measured in basic radiance, L/n². Therefore, nᵢ² replaces the nₒ² used for radiance,
+//!   and f/nᵢ² is the same in both directions.
 //!
-//! A surface is two vertices; see [`bsdf`](crate::materials::bsdf). Both sample the same facet, and choose its reflection or its
-//! refraction with probability F. So f·cosθᵢ divided by the pdf is G/G₁ for both.
+//! A surface is represented by two vertices, see [`bsdf`](crate::materials::bsdf). Both sample the same
+//! facet, and choose reflection with probability F, refraction otherwise. Therefore, f·cosθᵢ divided by the
+//! pdf is G/G₁ for both.
 
 mod row;
 
@@ -21,7 +24,7 @@ pub use row::GlassRow;
 pub struct GlassPoint {
     /// Index of refraction on the viewer's side.
     pub near: f32,
-    /// Index of refraction on the other side; differs from the viewer's.
+    /// Index of refraction on the other side. Must differ from that on the viewer's side.
     pub far: f32,
     /// α.
     pub alpha: f32,

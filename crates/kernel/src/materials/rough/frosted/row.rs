@@ -10,8 +10,8 @@ use crate::math::Vec3;
 use crate::math::frame::Frame;
 use crate::math::lanes::{F32x16, PACKET_SIZE, Simd, SimdKernel, TRUE, Vec3x16, lane, set_lane};
 
-/// A packet of rough glass surfaces: their reflection or their transmission. Both shared values are f of the lobe, whatever is
-/// shown.
+/// The reflection or the transmission of a packet of rough glass surfaces. Both shared values are f of the
+/// lobe, even if it is not shown.
 #[derive(Clone, Debug)]
 pub struct GlassRow<const THROUGH: bool> {
     /// Unit normals that face the viewer.
@@ -24,13 +24,13 @@ pub struct GlassRow<const THROUGH: bool> {
     far: F32x16,
     /// [`GlassPoint::alpha`].
     alpha: F32x16,
-    /// 1 where the lobe is shown, otherwise 0.
+    /// 1 if the lobe is shown, otherwise 0.
     shown: F32x16,
-    /// f in sr⁻¹ that is shown instead of the lobe.
+    /// f in sr⁻¹ to show instead of the lobe.
     unit: F32x16,
 }
 
-/// Factor on the lobe for the shown lobes, and f shown instead.
+/// Factor on the lobe, and the value of f to show instead.
 #[inline(always)]
 fn shown_parts(shown: ShownLobes) -> [f32; 2] {
     match shown {
@@ -40,7 +40,7 @@ fn shown_parts(shown: ShownLobes) -> [f32; 2] {
 }
 
 impl<const THROUGH: bool> GlassRow<THROUGH> {
-    /// Smith terms of the viewer and of a direction, each with the normal on its side.
+    /// Smith terms of the directions to the viewer and to the light, each with the normal on its side.
     #[inline(always)]
     fn legs(&self, i: usize, direction: Vec3) -> [SmithTerms; 2] {
         let normal = lane(&self.normal, i);
@@ -61,14 +61,14 @@ impl<const THROUGH: bool> GlassRow<THROUGH> {
         }
         let indices = [self.near[i], self.far[i]];
         let (half, sum) = Half::refracted(normal, [to_eye, direction], indices);
-        // The facet must face the viewer like the surface does; light must come from behind both.
+        // The facet must face the viewer if the surface does, and light must come from behind both.
         let scale = if half.along > 0.0 { 1.0 } else { -1.0 } / half.squared.sqrt();
         let cosines = [scale * to_eye.dot(sum), -scale * direction.dot(sum)];
         let is_through = (cosines[0] > MIN_COSINE) & (cosines[1] > MIN_COSINE);
         let by_facet = cosines[0] * cosines[1] * transmittance(cosines, indices) / half.squared;
         let value = 4.0 * (by_facet * eye.reflected(&light, half.isotropic(self.alpha[i])));
         let value = value * (self.far[i] * self.far[i]);
-        // Nearly equal indices have no usable half vector.
+        // Nearly equal indices do not have a usable half vector.
         if is_through & (value < f32::MAX) { value } else { 0.0 }
     }
 }
@@ -85,8 +85,8 @@ impl<const THROUGH: bool> GlassRow<THROUGH> {
         simd.call(SideSampling { row: self, choices, u })
     }
 
-    /// Samples a facet of each surface, and randomly chooses its reflection or its refraction. All formulas use the facet's
-    /// normal, which is the half vector of both directions.
+    /// Samples a facet of each surface, and randomly chooses reflection or refraction. All formulas use the
+    /// facet's normal, which is the half vector in both cases.
     #[inline(always)]
     pub(super) fn sample_sides(&self, choices: &F32x16, u: &[F32x16; 2]) -> SideSamples {
         let (mut directions, mut beyond) = ([[0.0; PACKET_SIZE]; 3], [0; PACKET_SIZE]);
@@ -109,13 +109,13 @@ impl<const THROUGH: bool> GlassRow<THROUGH> {
             );
             set_lane(&mut directions, i, direction);
             beyond[i] = if is_mirrored == THROUGH { TRUE } else { 0 };
-            // Compute the facet's contribution per solid angle.
+            // Compute the facet's scattering per solid angle.
             let behind = -half.dot(refracted);
             let sum = indices[0] * cosine - indices[1] * behind;
             let through = 4.0 * (cosine * behind * transmittance([cosine, behind], indices) / (sum * sum));
             let by_facet = choose(reflectance, through * (indices[1] * indices[1]));
             let is_through = (cosine > MIN_COSINE) & (behind > MIN_COSINE);
-            // Light on the wrong side of the surface does not count.
+            // Light on the wrong side of the surface does not contribute.
             let eye = SmithTerms::isotropic(normal, to_eye, alpha);
             let side = choose(1.0, -1.0);
             let light = SmithTerms::isotropic(normal * side, direction, alpha);
@@ -239,7 +239,8 @@ impl<const THROUGH: bool> RoughRow for GlassRow<THROUGH> {
             let (normal, to_eye, alpha) = (lane(&self.normal, i), lane(&self.to_eye, i), self.alpha[i]);
             let half =
                 sample_visible_normal(&Frame::from_normal(normal), to_eye, [alpha; 2], [u[0][i], u[1][i]]);
-            // The other side's vertex continues if this choice fails; the direction is then unused.
+            // If the other side is chosen, the path continues at that side's vertex, and this direction is
+            // not used.
             let eta = self.far[i] / self.near[i];
             let is_mirrored = choices[i] < dielectric_either(half.dot(to_eye), eta);
             let direction = if THROUGH { refract_at(half, to_eye, eta) } else { reflect_at(half, to_eye) };
@@ -273,8 +274,8 @@ impl<const THROUGH: bool> RoughRow for GlassRow<THROUGH> {
         if !THROUGH {
             return Some(NarrowLobe::of_microfacets(normal, to_eye, alpha, reflectance, 0.0));
         }
-        // Rotating a facet by an angle rotates what it refracts at normal incidence by 1 − 1/η of it, whereas a reflection
-        // rotates by twice the angle.
+        // Rotating a facet at normal incidence rotates the refracted direction by 1 − 1/η times the facet's
+        // angle, whereas a reflected direction rotates by twice this angle.
         let turn = 0.5 * (1.0 - 1.0 / eta).abs() * alpha;
         let axis = refract_at(normal, to_eye, eta);
         let lobe = NarrowLobe { axis, ..NarrowLobe::of_microfacets(normal, to_eye, turn, 1.0, 0.0) };

@@ -1,4 +1,4 @@
-//! Tests of rough glass: values against `f64` formulas, samples against pdfs, and albedos against quadrature.
+//! Tests of rough glass. Compares values with `f64` formulas, samples with pdfs, and albedos with quadrature.
 
 use super::*;
 use crate::materials::bsdf::{LobeSet, RoughRow};
@@ -18,14 +18,14 @@ fn glass([near, far]: [f32; 2], alpha: f32) -> GlassPoint {
     GlassPoint { near, far, alpha }
 }
 
-/// The reflection and the transmission of a surface, seen from a direction.
+/// The reflection and the transmission of a surface seen from a direction.
 fn parts(point: &GlassPoint, to_eye: DVec3) -> (Subject<GlassRow<false>>, Subject<GlassRow<true>>) {
     let (alphas, eta) = ([point.alpha; 2], f64::from(point.far) / f64::from(point.near));
     let reflection = Subject::new(point, alphas, to_eye);
     (reflection, Subject::lit(point, alphas, to_eye, LitFrom::Refracted(eta)))
 }
 
-/// Transmission f for basic radiance, as in Walter et al. (equations 16, 20, 21 and 33, with our G).
+/// f of transmission for basic radiance, as in Walter et al. (equations 16, 20, 21, and 33, with our G).
 fn transmission(point: &GlassPoint, o: DVec3, i: DVec3) -> f64 {
     let [near, far, alpha] = [point.near, point.far, point.alpha].map(f64::from);
     let half = -(i * far + o * near).normalize();
@@ -46,7 +46,7 @@ fn transmission(point: &GlassPoint, o: DVec3, i: DVec3) -> f64 {
     (cos_o * cos_i / (o.z * i.z)).abs() * (1.0 - fresnel) * shadowing * distribution * jacobian
 }
 
-/// Fresnel reflectance in `f64`.
+/// Double-precision Fresnel reflectance.
 fn exact_reflectance(cosine: f64, eta: f64) -> f64 {
     let squared = eta * eta - 1.0 + cosine * cosine;
     if squared <= 0.0 {
@@ -58,7 +58,7 @@ fn exact_reflectance(cosine: f64, eta: f64) -> f64 {
     0.5 * (parallel * parallel + perpendicular * perpendicular)
 }
 
-/// A pair of directions, near the lobe's peak or anywhere.
+/// A pair of directions. The second is near the lobe's peak or arbitrary.
 fn ways(next: &mut impl FnMut() -> f32, point: &GlassPoint, is_near: bool) -> (DVec3, Option<DVec3>) {
     let to_eye = direction(f64::from(0.05 + 0.95 * next()), f64::from(next()) * TAU).as_vec3().as_dvec3();
     let (y, turn) = (f64::from(0.98 * next()), f64::from(next()) * TAU);
@@ -78,7 +78,7 @@ fn transmission_matches_the_formulas() {
     for (indices, alpha) in INDICES.into_iter().flat_map(|one| ALPHAS.map(|alpha| (one, alpha))) {
         let point = glass(indices, alpha);
         let back = glass([indices[1], indices[0]], alpha);
-        // Half vectors lose digits if the indices are close.
+        // Half vectors are inaccurate if the indices are close.
         let least = f64::from((1.5 - 1.0_f32).min((indices[0] - indices[1]).abs()));
         let (reciprocity, error) = if alpha >= 0.05 { (1e-5, 3e-5) } else { (1e-3, 4e-3) };
         for trial in 0..400 {
@@ -94,17 +94,17 @@ fn transmission_matches_the_formulas() {
                 subject(point, eye, eta).values(LobeSet::All, &[light])[0].0.x
             };
             let there = value(&point, to_eye, light, eta);
-            // Flip both directions, so that the other side is up.
+            // Flip both directions to the other side.
             let [eye, light_back] = [light, to_eye].map(|one| DVec3::new(one.x, one.y, -one.z));
             let again = value(&back, eye, light_back, 1.0 / eta);
             let [near, far] = indices.map(f64::from);
             let (one, other) = (there / (far * far), again / (near * near));
             let what = format!("α {alpha}, {indices:?}, from {light} to {to_eye}");
-            assert!((one - other).abs() <= reciprocity * one.max(other), "{what}: {one} there, {other} back");
+            assert!((one - other).abs() <= reciprocity * one.max(other), "{what}: {one}, reversed {other}");
             let exact = transmission(&point, to_eye.normalize(), light.normalize());
             assert!(
                 (there - exact).abs() <= error * (0.5 / least) * exact + 1e-9,
-                "{what}: {there} is not {exact}"
+                "{what}: {there} instead of {exact}"
             );
         }
     }
@@ -129,16 +129,16 @@ fn reflection_matches_the_formulas() {
                 let back = Subject::<GlassRow<false>>::new(&point, [alpha; 2], light);
                 let back = back.values(LobeSet::All, &[to_eye])[0].0.x;
                 let what = format!("α {alpha}, {indices:?}, from {light} to {to_eye}");
-                assert!((there - back).abs() <= reciprocity * there, "{what}: {there} there, {back} back");
+                assert!((there - back).abs() <= reciprocity * there, "{what}: {there}, reversed {back}");
                 let (o, i) = (to_eye.normalize(), light.normalize());
                 let eta = f64::from(point.far) / f64::from(point.near);
                 let fresnel = exact_reflectance((o + i).length() * 0.5, eta);
                 let exact = fresnel * reference(o, i, [f64::from(alpha); 2]);
-                // Near total reflection, the slope of the reflectance is unbounded.
+                // Near total reflection, the reflectance has an unbounded slope.
                 let room = if fresnel > 0.5 && fresnel < 1.0 { 20.0 } else { 1.0 };
                 assert!(
                     (there - exact).abs() <= room * error * exact + 1e-12,
-                    "{what}: {there} is not {exact}"
+                    "{what}: {there} instead of {exact}"
                 );
             }
         }
@@ -146,8 +146,8 @@ fn reflection_matches_the_formulas() {
 }
 
 #[test]
-fn samples_of_both_sides_follow_the_pdf() {
-    // Three boundaries, seven lobes, five directions, both sides: 210 cases.
+fn samples_on_both_sides_follow_the_pdf() {
+    // 210 cases: three boundaries, seven lobes, five directions, and both sides.
     for (indices, alpha) in INDICES[..3].iter().flat_map(|one| ALPHAS.map(|alpha| (*one, alpha))) {
         for cosine in COSINES {
             let (reflection, transmission) = parts(&glass(indices, alpha), direction(cosine, 0.7));
@@ -164,11 +164,11 @@ fn two_sided_albedos_match_quadrature() {
         for cosine in COSINES {
             let (reflection, transmission) = parts(&glass(indices, alpha), direction(cosine, 0.3));
             let sampled = [reflection.albedo_by_choices(128).x, transmission.albedo_by_choices(128).x];
-            // Total reflection begins at a ring, which needs fine steps.
+            // Total reflection begins at a ring that needs fine steps.
             let exact = [reflection.albedo_by_rings(1000).x, transmission.albedo_by_rings(1000).x];
             let what = format!("α {alpha}, {indices:?} at a cosine of {cosine}: {sampled:?}, {exact:?}");
             let (sum, sum_exact) = (sampled[0] + sampled[1], exact[0] + exact[1]);
-            assert!((sum - sum_exact).abs() < 1e-3, "{what}: {sum} is not {sum_exact}");
+            assert!((sum - sum_exact).abs() < 1e-3, "{what}: sum of {sum} instead of {sum_exact}");
             assert!(sum < 1.0 + 1e-5, "{what}: {sum}");
             for (sampled, exact) in sampled.into_iter().zip(exact) {
                 assert!((sampled - exact).abs() < 1e-3, "{what}");
@@ -184,10 +184,10 @@ fn narrow_lobes_approach_smooth_glass() {
             let (reflection, transmission) = parts(&glass(indices, 0.001), direction(cosine, 0.2));
             let smooth = f64::from(dielectric(cosine as f32, indices[1] / indices[0]).0);
             let (reflected, through) = (reflection.sampled_albedo(128).x, transmission.sampled_albedo(128).x);
-            assert!((reflected - smooth).abs() < 1e-3, "{indices:?}, {cosine}: {reflected} is not {smooth}");
+            assert!((reflected - smooth).abs() < 1e-3, "{indices:?}, {cosine}: {reflected}, not {smooth}");
             assert!(
                 (through + smooth - 1.0).abs() < 1e-3,
-                "{indices:?}, {cosine}: {through} + {smooth} is not 1"
+                "{indices:?}, {cosine}: {through} + {smooth} should be 1"
             );
         }
     }
@@ -200,7 +200,7 @@ fn paths_continue_on_exactly_one_side() {
         let (up, down) = (reflection.samples(LobeSet::All, 32), transmission.samples(LobeSet::All, 32));
         let mut reflected = 0;
         for (up, down) in up.into_iter().zip(down) {
-            // Both sides use the same random numbers; the unused side gets the direction into the surface.
+            // Both sides use the same random numbers. The unused side returns a direction into the surface.
             let goes_on = [up != DVec3::NEG_Z, down != DVec3::Z];
             assert!(goes_on[0] != goes_on[1], "{up} {down}");
             reflected += u32::from(goes_on[0]);
@@ -210,7 +210,7 @@ fn paths_continue_on_exactly_one_side() {
 }
 
 #[test]
-fn two_sided_samples_match_one_sided_ones() {
+fn two_sided_samples_match_one_sided_samples() {
     for (indices, alpha) in INDICES.iter().flat_map(|one| ALPHAS.map(|alpha| (*one, alpha))) {
         for cosine in COSINES {
             let point = glass(indices, alpha);
@@ -227,14 +227,15 @@ fn two_sided_samples_match_one_sided_ones() {
             ];
             for (i, (up, down)) in rows[0].iter().zip(&rows[1]).enumerate() {
                 let what = format!("α {alpha}, {indices:?} at a cosine of {cosine}, sample {i}");
-                // Both sides' vertices continue identically: on one side only.
+                // The vertices on both sides generate the same continuation, which is on one side only.
                 assert_eq!((up.direction, up.density, up.share), (down.direction, down.density, down.share));
                 assert_ne!(up.is_beyond, down.is_beyond, "{what}");
                 let side = usize::from(up.is_beyond);
                 assert_eq!(up.direction, alone[side][i], "{what}");
                 let (f, _, pdf) = by_directions[side][i];
                 let (f, height) = (f.x, up.direction.z * [1.0, -1.0][side]);
-                // Recomputed from directions, narrow lobes lose digits; so do close indices, and facets near total reflection.
+                // Values recomputed from directions are less accurate for narrow lobes, for close indices,
+                // and for facets near total reflection.
                 let least = f64::from((indices[0] - indices[1]).abs()).min(0.5);
                 let there = if side == 0 { indices[0] } else { indices[1] };
                 let half = (direction(cosine, 0.3) * f64::from(indices[0]) + up.direction * f64::from(there))
@@ -252,9 +253,9 @@ fn two_sided_samples_match_one_sided_ones() {
                     );
                     continue;
                 }
-                assert!((up.density - pdf).abs() < error * pdf, "{what}: {} is not {pdf}", up.density);
+                assert!((up.density - pdf).abs() < error * pdf, "{what}: {} instead of {pdf}", up.density);
                 let share = f * height / pdf;
-                assert!((up.share - share).abs() < 1e-4 * share, "{what}: {} is not {share}", up.share);
+                assert!((up.share - share).abs() < 1e-4 * share, "{what}: {} instead of {share}", up.share);
             }
         }
     }

@@ -1,15 +1,16 @@
-//! Complex indices of refraction of metals, for linear red, green and blue.
+//! Complex indices of refraction of metals for linear red, green, and blue.
 //!
-//! The numbers are measured spectra, weighted by the matching functions of the primaries of sRGB; `assets/metals.py` has the spectra
-//! and makes this table. Gold, silver, copper: Johnson and Christy, *Optical constants of the noble metals*, Phys. Rev. B 6, 1972.
-//! Iron, chromium, titanium: Johnson and Christy, *Optical constants of transition metals*, Phys. Rev. B 9, 1974. Aluminium: Rakić,
-//! *Algorithm for the determination of intrinsic optical constants of metal films*, Appl. Opt. 34, 1995.
+//! The values are measured spectra weighted by the color matching functions of the sRGB primaries.
+//! `assets/metals.py` contains the spectra and generates this table. Gold, silver, copper: Johnson and
+//! Christy, *Optical constants of the noble metals*, Phys. Rev. B 6, 1972. Iron, chromium, titanium: Johnson
+//! and Christy, *Optical constants of transition metals*, Phys. Rev. B 9, 1974. Aluminium: Rakić, *Algorithm
+//! for the determination of intrinsic optical constants of metal films*, Appl. Opt. 34, 1995.
 
 use crate::choice;
 use crate::math::Vec3;
 
 choice! {
-    /// A metal of known index of refraction.
+    /// A metal with a known index of refraction.
     pub enum Element {
         /// Au.
         Gold = "gold",
@@ -29,7 +30,7 @@ choice! {
 }
 
 impl Element {
-    /// Real and imaginary part of its index of refraction.
+    /// Real and imaginary part of the index of refraction.
     pub fn index(self) -> [Vec3; 2] {
         let [eta, k] = match self {
             Self::Gold => [[0.108, 0.488, 1.478], [3.508, 2.338, 1.809]],

@@ -1,4 +1,4 @@
-//! Conductors: microfacets with exact Fresnel equations, or with Schlick's approximation from a color.
+//! Conductors. Microfacets with exact Fresnel equations, or with Schlick's approximation for a given color.
 
 pub mod elements;
 mod row;
@@ -23,24 +23,24 @@ pub type BrushedConductorRow = ConductorRow<true>;
 /// A rough conductor with a single lobe.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Conductor {
-    /// Reflectance of its facets.
+    /// Reflectance of the facets.
     pub fresnel: ConductorFresnel,
     /// The square root of α.
     pub roughness: Number,
-    /// Stretch along u in [−1, 1].
+    /// Elongation of the lobe along u, in [−1, 1].
     pub anisotropy: Number,
 }
 
-/// Reflectance of a smooth conductor as a function of the angle.
+/// Reflectance of a smooth conductor as a function of angle.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ConductorFresnel {
     /// Schlick's approximation, from the reflectance at normal incidence.
     Schlick(Color),
-    /// Exact equations, with the complex index of refraction.
+    /// Exact equations, from the complex index of refraction.
     Index {
-        /// Its real part for red, green and blue.
+        /// Real part for red, green, and blue.
         eta: Color,
-        /// Its imaginary part.
+        /// Imaginary part for red, green, and blue.
         k: Color,
     },
 }
@@ -48,23 +48,23 @@ pub enum ConductorFresnel {
 /// [`ConductorFresnel`] at one point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FresnelPoint {
-    /// The reflectance at normal incidence, or η.
+    /// The reflectance at normal incidence, or the real part η.
     pub first: Vec3,
-    /// k; negative for Schlick's approximation.
+    /// The imaginary part k. Negative for Schlick's approximation.
     pub second: Vec3,
 }
 
-/// [`Conductor`] at one point, with its textures looked up.
+/// [`Conductor`] at a point, with textures looked up.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ConductorPoint {
-    /// Reflectance of its facets.
+    /// Reflectance of the facets.
     pub fresnel: FresnelPoint,
     /// α along u and along v.
     pub alphas: [f32; 2],
 }
 
 impl ConductorFresnel {
-    /// Looks up its textures.
+    /// Looks up the textures.
     #[inline]
     pub fn at(&self, at: &TexturePoint, lookups: &mut u64) -> FresnelPoint {
         match self {
@@ -73,7 +73,7 @@ impl ConductorFresnel {
         }
     }
 
-    /// The same with white textures.
+    /// The conductor with white textures.
     pub fn with_white_textures(&self) -> FresnelPoint {
         let with_white_textures = |color: &Color| color.constant().unwrap_or(Vec3::ONE);
         match self {
@@ -82,7 +82,7 @@ impl ConductorFresnel {
         }
     }
 
-    /// Its value, if it has no textures.
+    /// The conductor's values if it has no textures.
     pub fn constant(&self) -> Option<FresnelPoint> {
         match self {
             Self::Schlick(color) => color.constant().map(FresnelPoint::schlick),
@@ -106,19 +106,19 @@ impl FresnelPoint {
         Self { first: reflectance.min(Vec3::ONE), second: Vec3::NEG_ONE }
     }
 
-    /// Exact equations, with the complex index of refraction. Above 1e8, every metal reflects all light, and fourth powers would
-    /// overflow.
+    /// Exact equations, from the complex index of refraction. The index is limited to 1e8, where metals
+    /// reflect all light, because fourth powers of larger values would overflow.
     pub fn index(eta: Vec3, k: Vec3) -> Self {
         const MOST: Vec3 = Vec3::splat(1e8);
         Self { first: eta.min(MOST), second: k.min(MOST) }
     }
 
-    /// The same with its color multiplied by `color`. An index of refraction is not a color and stays unchanged.
+    /// Multiplies the color by `color`. Indices of refraction are not colors and stay unchanged.
     pub fn tinted(self, color: Vec3) -> Self {
         if self.second.x < 0.0 { Self { first: self.first * color, ..self } } else { self }
     }
 
-    /// The reflectance at a cosine of the angle of incidence.
+    /// The reflectance for a cosine of the angle of incidence.
     pub fn reflectance(&self, cosine: f32) -> Vec3 {
         let of = |first, second| reflectance(first, second, cosine, schlick_weight(cosine));
         let Self { first, second } = self;
@@ -126,7 +126,7 @@ impl FresnelPoint {
     }
 }
 
-/// Reflectance of a facet in one channel, given [`schlick_weight`] of the cosine.
+/// Reflectance of a facet in one channel. `weight` is the [`schlick_weight`] of the cosine.
 #[inline(always)]
 fn reflectance(first: f32, second: f32, cosine: f32, weight: f32) -> f32 {
     let exact = conductor(cosine, first, second);

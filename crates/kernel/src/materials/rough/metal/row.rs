@@ -12,29 +12,30 @@ use crate::math::Vec3;
 use crate::math::frame::Frame;
 use crate::math::lanes::{F32x16, Mask, PACKET_SIZE, Simd, Vec3x16, lane, mask_from_bits, select, set_lane};
 
-/// A packet of conductors, either all isotropic or all brushed; the result of a lane does not depend on the other lanes. The
-/// shared values of f are its largest component, whether the renderer is monochrome or in color, and f for a reflectance of 1.
+/// A packet of conductors. Either all are isotropic or all are brushed. Results in a lane do not depend on
+/// other lanes. The shared values are the largest component of f (in monochrome and color rendering alike),
+/// and f for a reflectance of 1.
 #[derive(Clone, Debug)]
 pub struct ConductorRow<const BRUSHED: bool> {
     /// Unit normals that face the viewer.
     normal: Vec3x16,
     /// Unit directions to the viewer.
     to_eye: Vec3x16,
-    /// Directions along u; arbitrary for isotropic surfaces.
+    /// Directions along u. Arbitrary for isotropic surfaces.
     tangent: Vec3x16,
     /// α along u and along v.
     alphas: [F32x16; 2],
     /// [`FresnelPoint::first`] and [`FresnelPoint::second`].
     fresnel: [Vec3x16; 2],
-    /// 1 where the lobe is shown, otherwise 0.
+    /// 1 if the lobe is shown, otherwise 0.
     shown: F32x16,
-    /// f in sr⁻¹ that is shown instead of the lobe.
+    /// f in sr⁻¹ to show instead of the lobe.
     unit: F32x16,
     /// Whether any surface has an index of refraction instead of a color.
     has_index: bool,
 }
 
-/// Factor on the lobe for the shown lobes, and f shown instead.
+/// Factor on the lobe, and the value of f to show instead.
 #[inline(always)]
 fn shown_parts(shown: ShownLobes) -> [f32; 2] {
     match shown {
@@ -55,11 +56,11 @@ impl<const BRUSHED: bool> ConductorRow<BRUSHED> {
         [self.alphas[0][i], self.alphas[1][i]]
     }
 
-    /// Smith terms of the viewer and of a direction.
+    /// Smith terms of the directions to the viewer and to the light.
     #[inline(always)]
     fn legs(&self, i: usize, direction: Vec3) -> [SmithTerms; 2] {
         let to_eye = lane(&self.to_eye, i);
-        // Avoid `map`, which may not be inlined and would keep the surrounding loops scalar.
+        // Avoid `map` because it may not be inlined, which would keep the surrounding loops scalar.
         if BRUSHED {
             let (frame, alphas) = (self.frame(i), self.alphas(i));
             [
@@ -127,7 +128,7 @@ impl<const BRUSHED: bool> RoughRow for ConductorRow<BRUSHED> {
         set_lane(&mut self.to_eye, i, to_eye);
         set_lane(&mut self.tangent, i, tangent);
         self.set_fresnel(i, &bsdf.fresnel);
-        // Without texture coordinates it is isotropic: α is the geometric mean of both.
+        // Without texture coordinates, the surface is isotropic, with the geometric mean of both α.
         let [u, v] = bsdf.alphas;
         let mean = (u * v).sqrt();
         let [u, v] = if tangent == Vec3::ZERO { [mean; 2] } else { [u, v] };
@@ -160,7 +161,7 @@ impl<const BRUSHED: bool> RoughRow for ConductorRow<BRUSHED> {
         for i in 0..PACKET_SIZE {
             [white[i], cosines[i]] = self.lobe(i, lane(directions, i));
         }
-        // Multiply by the facets' reflectance.
+        // Multiply by the reflectance of the facets.
         let mut f = [[0.0; PACKET_SIZE]; 3];
         if self.has_index {
             for axis in 0..3 {

@@ -1,4 +1,5 @@
-//! Tests of conductor lobes: values against `f64` formulas, samples against pdfs, and albedos against quadrature.
+//! Tests of conductor lobes. Compares values with `f64` formulas, samples with pdfs, and albedos with
+//! quadrature.
 
 use super::elements::Element;
 use super::*;
@@ -56,7 +57,7 @@ fn lanes_are_independent() {
 }
 
 #[test]
-fn isotropic_packets_match_brushed_ones() {
+fn isotropic_packets_match_brushed_packets() {
     for alpha in ALPHAS {
         let (point, at) = (schlick([alpha; 2]), direction(0.6, 0.3));
         let round = Subject::<IsotropicConductorRow>::new(&point, [alpha; 2], at);
@@ -74,7 +75,7 @@ fn isotropic_packets_match_brushed_ones() {
 
 #[test]
 fn samples_follow_the_pdf() {
-    // 21 lobes in five directions.
+    // Test 21 lobes in five directions.
     for alphas in ALPHAS.into_iter().flat_map(shapes) {
         for cosine in COSINES {
             let subject =
@@ -91,7 +92,7 @@ fn sampled_albedos_match_quadrature() {
             for point in [schlick(alphas), of_element(Element::Gold, alphas)] {
                 let subject = Subject::<BrushedConductorRow>::new(&point, alphas, direction(cosine, 0.3));
                 let (sampled, exact) = (subject.sampled_albedo(192), subject.albedo());
-                let what = format!("α {alphas:?} at a cosine of {cosine}: {sampled} is not {exact}");
+                let what = format!("α {alphas:?} at a cosine of {cosine}: {sampled} instead of {exact}");
                 assert!((sampled - exact).abs().max_element() < 1e-3, "{what}");
                 assert!(sampled.max_element() < 1.0 + 1e-3, "{what}");
             }
@@ -107,7 +108,7 @@ fn narrow_lobes_approach_a_mirror() {
             let albedo = Subject::<BrushedConductorRow>::new(&point, [0.001; 2], direction(cosine, 0.0))
                 .sampled_albedo(64);
             let mirror = point.fresnel.reflectance(cosine as f32).as_dvec3();
-            assert!((albedo - mirror).abs().max_element() < 1e-3, "{element:?}: {albedo} is not {mirror}");
+            assert!((albedo - mirror).abs().max_element() < 1e-3, "{element:?}: {albedo}, not {mirror}");
         }
     }
 }

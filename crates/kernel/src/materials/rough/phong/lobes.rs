@@ -1,6 +1,7 @@
-//! Sampling of a Phong surface's lobes: the diffuse lobe is cosine-weighted, the glossy one is distributed as cos
-//! α around the reflected view direction (Lafortune and Willems, *Using the Modified Phong Reflectance Model for Physically Based
-//! Rendering*, 1994). Lobes are chosen by albedo; pdfs include both.
+//! Samples the lobes of a Phong surface. The diffuse lobe is cosine-weighted. The density of the glossy lobe
+//! is proportional to the cosine to the power α around the reflected view direction (Lafortune and Willems,
+//! *Using the Modified Phong Reflectance Model for Physically Based Rendering*, 1994). Lobes are chosen by
+//! albedo, and the pdf includes both.
 
 use std::f32::consts::{FRAC_1_PI, PI};
 
@@ -11,9 +12,9 @@ use crate::math::frame::Frame;
 /// The lobes of a Phong surface at one point, for one view direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lobes {
-    /// Unit normal on the viewer's side, for the cosine.
+    /// Unit normal on the viewer's side.
     pub normal: Vec3,
-    /// The view direction, reflected at the normal.
+    /// The view direction reflected at the normal.
     pub mirrored_eye: Vec3,
     /// The largest component of kd.
     pub diffuse: f32,
@@ -24,14 +25,14 @@ pub struct Lobes {
 }
 
 impl Lobes {
-    /// Samples a unit direction; `lobe` selects the lobe and `u` the direction within it, all in [0, 1).
+    /// Samples a unit direction. `lobe` selects the lobe and `u` the direction within it. All random numbers
+    /// are in [0, 1).
     #[inline(always)]
     pub fn sample(&self, lobe: f32, u: [f32; 2]) -> Vec3 {
         let is_diffuse = lobe < self.diffuse_share();
         let rest = 1.0 - u[0];
-        // For cos
-        // α, the cosine is (1 − u)
-        // 1/(α + 1). Computing it in f64 keeps the sine of narrow lobes accurate.
+        // For the glossy lobe, the cosine is (1 − u)^(1/(α + 1)). It is computed in `f64` for an accurate
+        // sine of narrow lobes.
         let cosine = pow_f64(f64::from(rest), 1.0 / (f64::from(self.shininess) + 1.0));
         let sine = (1.0 - cosine * cosine).max(0.0).sqrt() as f32;
         let cosine = if is_diffuse { rest.sqrt() } else { cosine as f32 };
@@ -42,13 +43,13 @@ impl Lobes {
         about(Vec3::new(x, y, z), sine, cosine, u[1])
     }
 
-    /// [`Lobes::sample`] with only the diffuse lobe.
+    /// [`Lobes::sample`] using only the diffuse lobe.
     #[inline(always)]
     pub fn sample_diffuse(&self, u: [f32; 2]) -> Vec3 {
         about(self.normal, u[0].sqrt(), (1.0 - u[0]).sqrt(), u[1])
     }
 
-    /// Pdf of a sampled direction in sr⁻¹, given its [`gloss`].
+    /// Pdf in sr⁻¹ of a sampled direction with the given [`gloss`].
     #[inline(always)]
     pub fn density(&self, direction: Vec3, gloss: f32) -> f32 {
         let cosine = self.normal.dot(direction);
@@ -58,7 +59,7 @@ impl Lobes {
         share * diffuse + (1.0 - share) * glossy
     }
 
-    /// f in sr⁻¹ of a gray surface with these albedos.
+    /// f in sr⁻¹ of a gray surface with these albedos, given its [`gloss`].
     #[inline(always)]
     pub fn value(&self, gloss: f32) -> f32 {
         self.diffuse * FRAC_1_PI + self.specular * ((self.shininess + 2.0) * (0.5 * FRAC_1_PI)) * gloss
@@ -71,7 +72,7 @@ impl Lobes {
     }
 }
 
-/// A unit direction, from its angle to an axis and a number in [0, 1) for the angle around it.
+/// A unit direction, from the angle to an axis and a number in [0, 1) for the angle around the axis.
 #[inline(always)]
 pub fn about(axis: Vec3, sine: f32, cosine: f32, turn: f32) -> Vec3 {
     let (sin_phi, cos_phi) = sin_cos(2.0 * PI * turn);
@@ -80,9 +81,9 @@ pub fn about(axis: Vec3, sine: f32, cosine: f32, turn: f32) -> Vec3 {
     direction * (1.0 / direction.length_squared().sqrt())
 }
 
-/// The glossy lobe's value in a direction, relative to its peak: the cosine between the direction and the reflected view
-/// direction, to the power α; 0 behind. The cosine is computed from the chord, because cos θ of a small angle θ
-/// loses precision in `f32`.
+/// The glossy lobe's value in a direction, relative to its peak. It is the cosine between the direction and
+/// the reflected view direction, to the power α, or 0 if the cosine is negative. The cosine is computed from
+/// the chord because cos θ loses precision in `f32` for small θ.
 #[inline(always)]
 pub fn gloss(mirrored_eye: Vec3, direction: Vec3, shininess: f32) -> f32 {
     let cosine = 1.0 - 0.5 * f64::from((mirrored_eye - direction).length_squared());

@@ -1,5 +1,5 @@
-//! The normalized Phong material: f = kd/π + ks·(α+2)/(2π)·max(0, R·V)
-//! α (Lafortune and Willems, *Using the Modified Phong Reflectance Model for Physically Based Rendering*, 1994).
+//! The normalized Phong material: f = kd/π + ks·(α+2)/(2π)·max(0, R·V)^α (Lafortune and Willems, *Using the
+//! Modified Phong Reflectance Model for Physically Based Rendering*, 1994).
 
 pub mod lobes;
 mod row;
@@ -14,7 +14,7 @@ use crate::math::Vec3;
 use lobes::{Lobes, gloss};
 pub use row::PhongRow;
 
-/// Diffuse and glossy reflection on both sides.
+/// A material with diffuse and glossy reflection on both sides.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Phong {
     /// Diffuse reflectance kd.
@@ -23,11 +23,11 @@ pub struct Phong {
     pub specular: Color,
     /// Exponent α.
     pub shininess: f32,
-    /// Ambient reflectance ka. `None` means kd.
+    /// Ambient reflectance ka. Defaults to kd if `None`.
     pub ambient: Option<Color>,
 }
 
-/// [`Phong`] at one point, with its textures looked up.
+/// [`Phong`] at a point, with textures looked up.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PhongBsdf {
     /// Diffuse reflectance kd.
@@ -129,7 +129,7 @@ impl PhongBsdf {
         self.diffuse_value() + self.specular_peak() * gloss
     }
 
-    /// Its lobes for a view direction, with the unit normal on that side.
+    /// The lobes for a view direction. `normal` is the unit normal on that side.
     pub fn lobes(&self, normal: Vec3, to_eye: Vec3) -> Lobes {
         Lobes {
             normal,
@@ -141,7 +141,7 @@ impl PhongBsdf {
         }
     }
 
-    /// The glossy part of f in sr⁻¹ at the lobe's peak.
+    /// The glossy part of f at the lobe's peak in sr⁻¹.
     pub fn specular_peak(&self) -> Vec3 {
         self.specular * ((self.shininess + 2.0) / (2.0 * PI))
     }
@@ -157,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn lobes_have_the_same_bits_in_all_views() {
+    fn lobes_are_bit_identical_in_all_views() {
         let (diffuse, specular) = (Vec3::new(0.4, 0.2, 0.1), Vec3::splat(0.5));
         let points = [0.0, 1.0, 40.0, 1e4, 1e6];
         let points = points.map(|shininess| PhongBsdf { diffuse, specular, shininess, ambient: Vec3::ZERO });
@@ -175,14 +175,14 @@ mod tests {
     }
 
     #[test]
-    fn glossy_lobe_of_known_value() {
-        // (n + 2)/2π·cosⁿ 10° at n = 50, viewed 10° away from the mirror direction.
+    fn glossy_lobe_has_the_known_value() {
+        // (n + 2)/2π·cosⁿ 10° for n = 50, seen 10° from the mirror direction.
         let value = reflected(50.0, at_angle(-30.0), at_angle(20.0));
         let expected = 52.0 / (2.0 * std::f64::consts::PI) * 10.0_f64.to_radians().cos().powi(50);
         assert!((f64::from(value) - expected).abs() < 1e-4 * expected, "{value} {expected}");
     }
 
-    /// Albedo by quadrature over the hemisphere of incoming directions.
+    /// Albedo by quadrature over the hemisphere of light directions.
     fn albedo(shininess: f32, degrees: f32) -> f64 {
         let (rings, steps) = (400, 800);
         let mut sum = 0.0;
@@ -195,7 +195,7 @@ mod tests {
                 sum += f64::from(reflected(shininess, at_angle(degrees), light));
             }
         }
-        // Equal steps of cos² are weighted by the cosine: ∫f cos dω = π·mean(f).
+        // With equal steps of cos², ∫f cos dω = π·mean(f).
         sum / f64::from(rings * steps) * std::f64::consts::PI
     }
 
@@ -208,7 +208,7 @@ mod tests {
                 let value = albedo(shininess, degrees);
                 assert!(
                     (value - expected).abs() < 2e-3,
-                    "α {shininess} at {degrees}°: {value} is not {expected}"
+                    "α {shininess} at {degrees}°: {value} instead of {expected}"
                 );
             }
         }

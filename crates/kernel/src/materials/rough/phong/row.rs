@@ -10,18 +10,18 @@ use crate::math::lanes::{
     F32x16, Mask, PACKET_SIZE, Simd, TRUE, Vec3x16, lane, mask_from_bits, select, set_lane,
 };
 
-/// A packet of Phong surfaces. The shared values of f are those of [`gloss`].
+/// A packet of Phong surfaces. The shared values are [`gloss`].
 #[derive(Clone, Debug)]
 pub struct PhongRow {
-    /// The view direction, reflected at the normal.
+    /// The view direction reflected at the normal.
     mirrored_eye: Vec3x16,
-    /// The diffuse part of f in sr⁻¹, 0 if it is not shown.
+    /// The diffuse part of f in sr⁻¹, or 0 if it is not shown.
     diffuse: Vec3x16,
-    /// The glossy part of f in sr⁻¹ at its peak, 0 if it is not shown.
+    /// The glossy part of f at its peak in sr⁻¹, or 0 if it is not shown.
     specular: Vec3x16,
     /// Exponent of the glossy lobe.
     shininess: F32x16,
-    /// The largest components of kd and ks, regardless of which parts are shown.
+    /// The largest components of kd and ks, whether or not the lobes are shown.
     albedos: [F32x16; 2],
     /// Whether any surface has a glossy lobe.
     is_glossy: bool,
@@ -72,7 +72,7 @@ impl PhongRow {
     }
 }
 
-/// The diffuse part of f in sr⁻¹, and the glossy part at its peak, each 0 if it is not shown.
+/// The diffuse part of f and the peak of the glossy part, both in sr⁻¹. Parts that are not shown are 0.
 #[inline(always)]
 fn shown_parts(bsdf: &PhongBsdf, shown: ShownLobes) -> [Vec3; 2] {
     let part = |is_taken: bool, value: Vec3| if is_taken { value } else { Vec3::ZERO };
@@ -299,8 +299,8 @@ impl MaterialRow for PhongRow {
     }
 }
 
-/// The view direction, reflected at the normal: its cosine with a light direction equals that between the reflected light
-/// direction and the viewer.
+/// The view direction reflected at the normal. Its cosine with a light direction equals the cosine between
+/// the reflected light direction and the view direction.
 #[inline(always)]
 fn mirrored(normal: Vec3, to_eye: Vec3) -> Vec3 {
     // (2(n·l)n − l)·v = (2(n·v)n − v)·l.

@@ -1,7 +1,8 @@
-//! Plastic: a diffuse base under a dielectric microfacet coat. With the coat's albedo E, its transmittance in both directions and
-//! the light that it reflects back to the base are included in f = specular·F·D·G/(4 cosθᵢ cosθₒ) + (1 − E(μᵢ))(1 − E(μₒ))·kd/(π
-//! η² (1 − kd·F_dr)), where F_dr = 1 − (1 − Ē)/η². White plastic reflects all light (Kulla and Conty, *Revisiting Physically
-//! Based Shading at Imageworks*, SIGGRAPH 2017 course, without the multiple scattering).
+//! Plastic: a diffuse base under a dielectric microfacet coat. With the coat's albedo E and its internal
+//! reflectance F_dr = 1 − (1 − Ē)/η², f = specular·F·D·G/(4 cosθᵢ cosθₒ) + (1 − E(μᵢ))(1 − E(μₒ))·kd/(π η² (1
+//! − kd·F_dr)). This includes the coat's transmittance in both directions and the light that it reflects back
+//! to the base. White plastic reflects all light (Kulla and Conty, *Revisiting Physically Based Shading at
+//! Imageworks*, SIGGRAPH 2017 course, without the multiple scattering).
 
 mod row;
 
@@ -17,7 +18,8 @@ use crate::materials::texture::{Color, Texture};
 use crate::math::Vec3;
 pub use row::PlasticRow;
 
-/// A diffuse base under a coat. If the coat is smooth, this is only the base; see [`crate::materials::Coated`].
+/// A diffuse base under a coat. If the coat is smooth, this is only the base, see
+/// [`crate::materials::Coated`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plastic {
     diffuse: Color,
@@ -28,25 +30,26 @@ pub struct Plastic {
     albedos: AlbedoTable,
 }
 
-/// [`Plastic`] at one point, with its textures looked up.
+/// [`Plastic`] at a point, with textures looked up.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlasticPoint {
     /// Diffuse reflectance kd.
     pub diffuse: Vec3,
-    /// f of the base in sr⁻¹, for light that has passed the coat in both directions.
+    /// f of the base in sr⁻¹, for light that passes through the coat in both directions.
     pub base: Vec3,
-    /// Factor on the coat's reflectance; 0 if the coat is smooth.
+    /// Factor on the coat's reflectance. 0 if the coat is smooth.
     pub specular: Vec3,
     /// Index of refraction.
     pub ior: f32,
-    /// α; 0 if the coat is smooth.
+    /// α. 0 if the coat is smooth.
     pub alpha: f32,
     /// Albedo of the coat.
     pub albedo: LobeAlbedo,
 }
 
 impl Plastic {
-    /// Plastic with the given kd, factor on the coat's reflection, square root of α, and index of refraction ≥ 1.
+    /// Creates a plastic from kd, a factor on the coat's reflection, the square root of α, and an index of
+    /// refraction ≥ 1.
     pub fn new(diffuse: Color, specular: Color, roughness: Number, ior: f32) -> Self {
         let fresnel = |cosine: f64| dielectric(cosine, ior.into());
         let is_smooth = roughness.constant() == Some(0.0);
@@ -58,7 +61,7 @@ impl Plastic {
         Self { diffuse, specular, roughness, ior, albedos }
     }
 
-    /// Whether its coat is smooth.
+    /// Whether the coat is smooth.
     fn is_smooth(&self) -> bool {
         self.roughness.constant() == Some(0.0)
     }
@@ -77,7 +80,7 @@ impl Plastic {
     }
 }
 
-/// f of a base with this kd in sr⁻¹, for light that has passed the coat in both directions.
+/// f in sr⁻¹ of a base with the given kd, for light that passes through the coat in both directions.
 fn base(diffuse: Vec3, ior: f32, coat: &LobeAlbedo) -> Vec3 {
     let squared = ior * ior;
     let returned = 1.0 - (1.0 - coat.mean) / squared;

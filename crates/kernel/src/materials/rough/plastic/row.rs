@@ -16,8 +16,8 @@ use crate::math::lanes::{
     F32x16, Mask, PACKET_SIZE, Simd, TRUE, Vec3x16, lane, mask_from_bits, select, set_lane,
 };
 
-/// A packet of plastic surfaces. The shared values of f are the largest component of f over all lobes, and the coat's
-/// transmittance in both directions.
+/// A packet of plastic surfaces. The shared values are the largest component of f of all lobes, and the
+/// coat's transmittance in both directions.
 #[derive(Clone, Debug)]
 pub struct PlasticRow {
     /// Unit normals that face the viewer.
@@ -32,25 +32,25 @@ pub struct PlasticRow {
     ior: F32x16,
     /// [`PlasticPoint::alpha`].
     alpha: F32x16,
-    /// Terms of the albedo of the coat.
+    /// Terms of the coat's albedo.
     terms: [F32x16; TERMS],
     /// Mean albedo of the coat.
     mean: F32x16,
-    /// Fraction of the light that the coat transmits on the way to the viewer.
+    /// Fraction of light that the coat transmits toward the viewer.
     left: F32x16,
     /// Probability of choosing the coat's lobe.
     share: F32x16,
-    /// 1 where the diffuse lobe is shown, otherwise 0; then the same for the coat's lobe.
+    /// 1 if the diffuse lobe is shown, otherwise 0. Then the same for the coat's lobe.
     shown: [F32x16; 2],
-    /// f in sr⁻¹ that is shown instead of the lobes.
+    /// f in sr⁻¹ to show instead of the lobes.
     unit: F32x16,
-    /// Whether any surface has a lobe of the coat.
+    /// Whether the coat of any surface is rough.
     is_rough: bool,
     /// Whether the coat of any surface is smooth.
     is_smooth: bool,
 }
 
-/// Factors on the diffuse and the coat's lobe for the shown lobes, and f shown instead.
+/// Factors on the diffuse lobe and the coat's lobe, and the value of f to show instead.
 #[inline(always)]
 fn shown_parts(shown: ShownLobes) -> [f32; 3] {
     let part = |is_taken: bool| if is_taken { 1.0 } else { 0.0 };
@@ -61,7 +61,7 @@ fn shown_parts(shown: ShownLobes) -> [f32; 3] {
 }
 
 impl PlasticRow {
-    /// Albedo of a coat at a cosine ≥ 0.
+    /// Albedo of the coat at a cosine ≥ 0.
     #[inline(always)]
     fn albedo(&self, i: usize, cosine: f32) -> f32 {
         let rough = evaluate(cosine, |number| self.terms[number][i]);
@@ -73,7 +73,7 @@ impl PlasticRow {
         }
     }
 
-    /// The coat's transmittance in both directions; 0 from behind.
+    /// The coat's transmittance in both directions. 0 for light from behind.
     #[inline(always)]
     fn through(&self, i: usize, direction: Vec3) -> f32 {
         let cosine = lane(&self.normal, i).dot(direction);
@@ -88,7 +88,7 @@ impl PlasticRow {
         [lane(&self.to_eye, i), direction].map(|one| SmithTerms::isotropic(normal, one, self.alpha[i]))
     }
 
-    /// D of the coat for a direction, and the reflectance of its facets.
+    /// D of the coat for a direction, and the reflectance of the coat's facets.
     #[inline(always)]
     fn facets(&self, i: usize, direction: Vec3) -> [f32; 2] {
         let half = Half::of(lane(&self.normal, i), lane(&self.to_eye, i), direction);
@@ -106,7 +106,7 @@ impl PlasticRow {
         fresnel * eye.reflected(&light, distribution)
     }
 
-    /// Updates the values that depend on the view direction.
+    /// Updates all values that depend on the view direction.
     #[inline(always)]
     fn look(&mut self, i: usize) {
         let cosine = lane(&self.normal, i).dot(lane(&self.to_eye, i));
@@ -117,7 +117,7 @@ impl PlasticRow {
         self.share[i] = specular / (specular + diffuse).max(f32::MIN_POSITIVE);
     }
 
-    /// Sets the values that depend neither on directions nor on the shown lobes.
+    /// Sets the values that do not depend on directions or on the shown lobes.
     #[inline(always)]
     fn set(&mut self, i: usize, bsdf: &PlasticPoint) {
         set_lane(&mut self.base, i, bsdf.base);
@@ -229,7 +229,8 @@ impl RoughRow for PlasticRow {
             for i in 0..PACKET_SIZE {
                 let base = self.base[axis][i] * values.shared[1][i];
                 wide[axis][i] = base * self.shown[0][i];
-                // Subtract the diffuse lobe from the sum of both, whatever is shown: the coat then has the same bits in all views.
+                // Always subtract the diffuse lobe from the sum of both lobes, even if only one is shown.
+                // This makes the coat bit-identical in all views.
                 let hidden = base * (1.0 - self.shown[0][i] - self.unit[i]);
                 let rest = values.f[axis][i] + hidden - (wide[axis][i] + hidden);
                 narrow[axis][i] = if rest > 0.0 { rest } else { 0.0 };

@@ -1,4 +1,4 @@
-//! Tests of plastic: values against the formulas, samples against pdfs, and the white furnace test.
+//! Tests of plastic. Compares values with formulas and samples with pdfs, and runs the white furnace test.
 
 use super::*;
 use crate::materials::bsdf::LobeSet;
@@ -13,7 +13,7 @@ fn plastic(diffuse: Vec3, specular: f32, ior: f32, alpha: f32) -> Plastic {
 }
 
 fn point(plastic: &Plastic) -> PlasticPoint {
-    plastic.constant().expect("it has no textures")
+    plastic.constant().expect("there should be no textures")
 }
 
 const RED: Vec3 = Vec3::new(0.7, 0.1, 0.05);
@@ -54,7 +54,7 @@ fn samples_follow_the_pdf() {
             direction(cosine, 0.7),
         );
         subject.check_samples(&format!("the coat of α {alpha} at a cosine of {cosine}"), LobeSet::Narrow);
-        // For a narrow lobe, the diffuse lobe's cells on the map are too large.
+        // For narrow lobes, the cells of the diffuse lobe on the map are too large.
         if alpha >= 0.2 {
             subject.check_samples(&format!("α {alpha} at a cosine of {cosine}"), LobeSet::All);
         }
@@ -73,13 +73,13 @@ fn white_furnace_and_albedos_match_quadrature() {
             let red = point(&plastic(RED, 1.0, ior, alpha));
             let subject = Subject::<PlasticRow>::new(&red, [alpha; 2], direction(cosine, 0.3));
             let (sampled, exact) = (subject.sampled_albedo(192), subject.albedo());
-            assert!((sampled - exact).abs().max_element() < 1e-3, "{what}: {sampled} is not {exact}");
+            assert!((sampled - exact).abs().max_element() < 1e-3, "{what}: {sampled} instead of {exact}");
         }
     }
 }
 
 #[test]
-fn smooth_coat_leaves_the_base_one_minus_fresnel() {
+fn base_under_smooth_coat_gets_one_minus_fresnel() {
     for ior in [1.0, 1.3, 1.5, 3.0] {
         for cosine in COSINES {
             let base = point(&plastic(Vec3::ONE, 1.0, ior, 0.0));

@@ -1,13 +1,15 @@
-//! The principled material: glTF's parameters, with energy-conserving microfacet lobes.
+//! The principled material, with the parameters of glTF and energy-conserving microfacet lobes.
 //!
-//! - Specular lobe: F is a mix, by `metallic`, of Schlick's approximation from `color` and of a dielectric's with
-//!   F0 = min(((ior − 1)/(ior + 1))² · specular_color, 1) · specular and F90 = specular.
+//! - Specular lobe: F is a mix of a metal and a dielectric, weighted by `metallic`. Both use Schlick's
+//!   approximation. For the metal, F0 is `color`. For the dielectric, F0 = min(((ior − 1)/(ior + 1))² ·
+//!   specular_color, 1) · specular and F90 = specular.
 //! - Diffuse lobe: (1 − metallic)(1 − transmission) · color/π · (1 − E(μᵢ))(1 − E(μₒ))/(1 − Ē), where E is the albedo of the
 //!   dielectric lobe.
-//! - Transmission of a thin sheet: the specular lobe, mirrored to the other side, times (1 − metallic) · transmission · color ·
-//!   (1 − F), with the dielectric's F. Transmissive surfaces are two vertices; see [`bsdf`](crate::materials::bsdf).
-//! - Clear coat c: a lobe with F0 = 0.04 times c; everything below is multiplied by (1 − c·E_c(μ)) for each of the two
-//!   directions.
+//! - Transmission through a thin sheet: the specular lobe, mirrored to the other side, times (1 − metallic) ·
+//!   transmission · color · (1 − F), where F is that of the dielectric. Transmissive surfaces are represented
+//!   by two vertices, see [`bsdf`](crate::materials::bsdf).
+//! - Clear coat c: a lobe with F0 = 0.04, times c. All other lobes are multiplied by (1 − c·E_c(μ)) for each
+//!   of the two directions.
 
 mod row;
 
@@ -30,26 +32,26 @@ const COAT_REFLECTANCE: f32 = 0.04;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Principled {
     inputs: PrincipledInputs,
-    /// Albedos of the specular lobe and of the coat. `None` for a lobe whose roughness varies.
+    /// Albedos of the specular lobe and of the coat. `None` for lobes with varying roughness.
     albedos: [Option<SchlickAlbedo>; 2],
 }
 
 /// The parameters of a principled material.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PrincipledInputs {
-    /// Diffuse reflectance, and the metal's reflectance at normal incidence.
+    /// Diffuse reflectance, and reflectance of the metal at normal incidence.
     pub color: Color,
-    /// Weight of the metal.
+    /// Weight of the metallic part.
     pub metallic: Number,
     /// The square root of α.
     pub roughness: Number,
-    /// Index of refraction, ≥ 1.
+    /// Index of refraction. At least 1.
     pub ior: f32,
-    /// Factor on the reflectance of the dielectric part.
+    /// Factor on the reflectance of the dielectric.
     pub specular: Number,
-    /// Factor on its reflectance at normal incidence.
+    /// Factor on the reflectance of the dielectric at normal incidence.
     pub specular_color: Color,
-    /// Fraction of the light below the dielectric that is transmitted instead of scattered.
+    /// Fraction of the light that enters the dielectric and is transmitted instead of scattered.
     pub transmission: Number,
     /// Weight of the clear coat.
     pub clearcoat: Number,
@@ -57,18 +59,18 @@ pub struct PrincipledInputs {
     pub clearcoat_roughness: Number,
 }
 
-/// [`Principled`] at one point, with its textures looked up.
+/// [`Principled`] at a point, with textures looked up.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PrincipledPoint {
-    /// f of the diffuse lobe in sr⁻¹, for light that has passed the lobes above it in both directions.
+    /// f of the diffuse lobe in sr⁻¹, for light that passes through the lobes above it in both directions.
     pub base: Vec3,
     /// Reflectance of the specular lobe at normal incidence.
     pub facets: Vec3,
-    /// The metal's part of [`PrincipledPoint::facets`].
+    /// The metallic part of [`PrincipledPoint::facets`].
     pub metal: Vec3,
     /// Reflectance of the specular lobe at grazing angles.
     pub grazing: f32,
-    /// Reflectances of the dielectric part, at normal incidence and at grazing angles.
+    /// Reflectances of the dielectric at normal incidence and at grazing angles.
     pub dielectric: (Vec3, f32),
     /// Factor on (1 − F)·D·G/(4 cosθᵢ cosθₒ) for transmitted light.
     pub transmission: Vec3,
@@ -87,20 +89,20 @@ pub struct PrincipledPoint {
 }
 
 impl PrincipledPoint {
-    /// Whether any light is transmitted.
+    /// Whether the material transmits light.
     #[inline]
     pub fn transmits(&self) -> bool {
         self.transmission != Vec3::ZERO
     }
 }
 
-/// Albedos of two lobes, with Schlick's approximation: one whose facets reflect 1 at normal incidence and 0 at grazing angles,
-/// and the reverse.
+/// Albedos of two lobes with Schlick's approximation. The facets of one lobe reflect 1 at normal incidence
+/// and 0 at grazing angles. Those of the other lobe do the reverse.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SchlickAlbedo {
-    /// The albedo per reflectance at normal incidence.
+    /// Albedo per unit of reflectance at normal incidence.
     pub normal: LobeAlbedo,
-    /// The albedo per reflectance at grazing angles.
+    /// Albedo per unit of reflectance at grazing angles.
     pub grazing: LobeAlbedo,
 }
 
@@ -118,7 +120,7 @@ impl SchlickAlbedo {
         Self { normal: normal.at(roughness), grazing: grazing.at(roughness) }
     }
 
-    /// Albedo of a coat with this reflectance at normal incidence and 1 at grazing angles.
+    /// Albedo of a coat with this reflectance at normal incidence, and a reflectance of 1 at grazing angles.
     fn of_coat(&self, reflectance: f32) -> LobeAlbedo {
         let sum = |normal: f32, grazing: f32| reflectance * normal + grazing;
         LobeAlbedo {
@@ -133,14 +135,14 @@ impl SchlickAlbedo {
 pub struct EmissionCoat {
     /// Its weight.
     weight: Number,
-    /// The square root of its α.
+    /// The square root of the coat's α.
     roughness: Number,
-    /// Its albedo. `None` if the roughness varies.
+    /// The coat's albedo. `None` if the roughness varies.
     albedo: Option<LobeAlbedo>,
 }
 
 impl EmissionCoat {
-    /// A coat of this weight and roughness. `None` if the weight is 0.
+    /// A coat with this weight and roughness. `None` if the weight is 0.
     pub fn new(weight: Number, roughness: Number) -> Option<Self> {
         if weight.constant() == Some(0.0) {
             return None;
@@ -149,7 +151,7 @@ impl EmissionCoat {
         Some(Self { weight, roughness, albedo })
     }
 
-    /// Transmittance for light leaving at this cosine. Adds to `lookups`.
+    /// Transmittance for light that leaves the surface with this cosine. Adds to `lookups`.
     pub fn left(&self, at: &TexturePoint, cosine: f32, lookups: &mut u64) -> f32 {
         let weight = self.weight.at(at, lookups).clamp(0.0, 1.0);
         let between = |roughness: f32| SchlickAlbedo::between(roughness.clamp(0.0, 1.0));
@@ -177,7 +179,7 @@ fn tables(roughness: Option<f32>) -> [AlbedoTable; 2] {
     [normal, AlbedoTable::new(roughness, alpha, weight)]
 }
 
-/// The parameters at one point.
+/// The parameters at a point.
 #[derive(Clone, Copy)]
 struct Inputs {
     color: Vec3,
@@ -191,17 +193,17 @@ struct Inputs {
 }
 
 impl Principled {
-    /// Whether it may transmit light.
+    /// Whether the material may transmit light.
     pub fn is_transmissive(&self) -> bool {
         self.inputs.transmission.constant() != Some(0.0)
     }
 
-    /// A material with these parameters.
+    /// Creates a material from its parameters.
     pub fn new(inputs: PrincipledInputs) -> Self {
         let has_coat = inputs.clearcoat.constant() != Some(0.0);
         let coat = inputs.clearcoat_roughness.constant().filter(|_| has_coat);
         let albedos = [inputs.roughness.constant(), coat].map(|roughness| roughness.map(SchlickAlbedo::of));
-        // The albedo does not matter if the coat has no weight.
+        // The albedo is irrelevant if the coat has no weight.
         let [specular, coat] = albedos;
         Self { inputs, albedos: [specular, if has_coat { coat } else { specular }] }
     }
@@ -304,7 +306,7 @@ impl RoughMaterial for Principled {
 
     #[inline]
     fn fills_rows(&self) -> bool {
-        // Packets have light on one side only.
+        // Packets only have light on one side.
         !self.is_transmissive() && self.textures().next().is_none()
     }
 

@@ -14,17 +14,17 @@ use crate::math::Vec3;
 use crate::math::frame::Frame;
 use crate::math::lanes::{F32x16, Mask, PACKET_SIZE, Simd, Vec3x16, lane, mask_from_bits, select, set_lane};
 
-/// A packet of principled surfaces, for reflected or for transmitted light. The first shared value of f is the largest component
-/// of f over all lobes; the second is unused.
+/// A packet of principled surfaces, for either reflected or transmitted light. The first shared value is the
+/// largest component of f of all lobes. The second one is unused.
 #[derive(Clone, Debug)]
 pub struct PrincipledRow<const THROUGH: bool> {
-    /// Unit normals that face the viewer; for transmitted light, on the other side.
+    /// Unit normals that face the viewer. For transmitted light, they are on the other side.
     normal: Vec3x16,
-    /// Unit directions to the viewer; for transmitted light, mirrored to the other side.
+    /// Unit directions to the viewer. For transmitted light, they are mirrored to the other side.
     to_eye: Vec3x16,
     /// [`PrincipledPoint::base`].
     base: Vec3x16,
-    /// The largest component of the diffuse lobe's albedo, without the lobes above it.
+    /// The largest component of the diffuse lobe's albedo, not including the lobes above it.
     diffuse: F32x16,
     /// [`PrincipledPoint::facets`].
     facets: Vec3x16,
@@ -44,17 +44,17 @@ pub struct PrincipledRow<const THROUGH: bool> {
     coat_alpha: F32x16,
     /// Terms of [`PrincipledPoint::coat_albedo`].
     coat_terms: [F32x16; TERMS],
-    /// Fraction of the light that the specular lobe leaves for the diffuse one on the way to the viewer.
+    /// Fraction of light that passes through the specular lobe between the diffuse lobe and the viewer.
     left: Vec3x16,
-    /// Fraction of the light that the coat transmits on the way to the viewer.
+    /// Fraction of light that the coat transmits toward the viewer.
     through: F32x16,
-    /// Probabilities of choosing the specular lobe, and the coat's.
+    /// Probabilities of choosing the specular lobe and the coat's lobe.
     shares: [F32x16; 2],
     /// Probability of choosing transmission.
     through_share: F32x16,
-    /// 1 where the diffuse lobe is shown, otherwise 0; then the same for the other lobes.
+    /// 1 if the diffuse lobe is shown, otherwise 0. Then the same for the other lobes.
     shown: [F32x16; 2],
-    /// f in sr⁻¹ that is shown instead of the lobes.
+    /// f in sr⁻¹ to show instead of the lobes.
     unit: F32x16,
     /// Whether any surface has a clear coat.
     is_coated: bool,
@@ -76,7 +76,7 @@ struct Seen {
     through_share: f32,
 }
 
-/// Factors on the diffuse lobe and on the others for the shown lobes, and f shown instead.
+/// Factors on the diffuse lobe and on the other lobes, and the value of f to show instead.
 #[inline(always)]
 fn shown_parts(shown: ShownLobes) -> [f32; 3] {
     let part = |is_taken: bool| if is_taken { 1.0 } else { 0.0 };
@@ -86,34 +86,35 @@ fn shown_parts(shown: ShownLobes) -> [f32; 3] {
     }
 }
 
-/// Clamps a cosine to at least 0.
+/// Limits a cosine to at least 0.
 #[inline(always)]
 fn ahead(cosine: f32) -> f32 {
     if cosine > 0.0 { cosine } else { 0.0 }
 }
 
 impl<const THROUGH: bool> PrincipledRow<THROUGH> {
-    /// Albedo of the coat, including its weight, at a cosine ≥ 0.
+    /// Albedo of the coat at a cosine ≥ 0, including the coat's weight.
     #[inline(always)]
     fn coat_albedo(&self, i: usize, cosine: f32) -> f32 {
         self.coat[i] * evaluate(cosine, |number| self.coat_terms[number][i])
     }
 
-    /// Albedos of the specular lobe per unit of its reflectance at normal incidence and at grazing angles, at a cosine ≥ 0.
+    /// Albedos of the specular lobe at a cosine ≥ 0, per unit of reflectance at normal incidence and at
+    /// grazing angles.
     #[inline(always)]
     fn albedos(&self, i: usize, cosine: f32) -> [f32; 2] {
-        // Avoid `map`, which may not be inlined and would keep the surrounding loops scalar.
+        // Avoid `map` because it may not be inlined, which would keep the surrounding loops scalar.
         let [normal, grazing] = &self.terms;
         [evaluate(cosine, |number| normal[number][i]), evaluate(cosine, |number| grazing[number][i])]
     }
 
-    /// Fraction of the light that the dielectric's specular lobe leaves, at a cosine ≥ 0.
+    /// Fraction of light that passes through the dielectric's specular lobe at a cosine ≥ 0.
     #[inline(always)]
     fn left_by_specular(&self, i: usize, cosine: f32) -> Vec3 {
         let [normal, grazing] = self.albedos(i, cosine);
         let (reflectance, of_grazing) = (lane(&self.dielectric.0, i), self.dielectric.1[i]);
         let left = Vec3::ONE - reflectance * normal - Vec3::splat(of_grazing * grazing);
-        // Fully reflective facets leave nothing; clamp the rounding error.
+        // If the facets reflect everything, no light passes. Clamp because of rounding.
         Vec3::new(ahead(left.x), ahead(left.y), ahead(left.z))
     }
 
@@ -129,7 +130,7 @@ impl<const THROUGH: bool> PrincipledRow<THROUGH> {
         if self.is_coated { self.through[i] * (1.0 - self.coat_albedo(i, ahead(cosine))) } else { 1.0 }
     }
 
-    /// f of the diffuse lobe; 0 from behind.
+    /// f of the diffuse lobe. 0 for light from behind.
     #[inline(always)]
     fn wide(&self, i: usize, direction: Vec3) -> Vec3 {
         let cosine = lane(&self.normal, i).dot(direction);
@@ -138,7 +139,7 @@ impl<const THROUGH: bool> PrincipledRow<THROUGH> {
         lane(&self.base, i) * left * through
     }
 
-    /// f of the specular lobe and the coat; 0 from behind.
+    /// f of the specular lobe and of the coat. 0 for light from behind.
     #[inline(always)]
     fn narrow(&self, i: usize, direction: Vec3) -> Vec3 {
         let half = Half::of(lane(&self.normal, i), lane(&self.to_eye, i), direction);
@@ -170,7 +171,7 @@ impl<const THROUGH: bool> PrincipledRow<THROUGH> {
         lane(&self.transmission, i) * left * (white * self.through_coat(i, light.cosine))
     }
 
-    /// Pdfs of a direction in the specular and in the coat's lobe.
+    /// Pdfs of a direction for the specular lobe and for the coat's lobe.
     #[inline(always)]
     fn densities(&self, i: usize, direction: Vec3) -> [f32; 2] {
         let half = Half::of(lane(&self.normal, i), lane(&self.to_eye, i), direction);
@@ -199,7 +200,7 @@ impl<const THROUGH: bool> PrincipledRow<THROUGH> {
             all += through;
         }
         let below = (1.0 - coat) / all.max(f32::MIN_POSITIVE);
-        // The coat gets at least its fraction of the light; the rest is split among the lobes below.
+        // The coat gets at least its fraction of the light. The rest is split among the other lobes.
         let of_coat = if self.coat[i] > 0.0 { 1.0 - below * all } else { 0.0 };
         Seen {
             left,
@@ -220,7 +221,8 @@ impl<const THROUGH: bool> PrincipledRow<THROUGH> {
     /// Updates all surfaces.
     #[inline(always)]
     fn look_all(&mut self) {
-        // Write to arrays other than those being read: otherwise, the loop is not vectorized.
+        // Write to separate arrays, because the loop is not vectorized if it writes to the arrays that it
+        // reads.
         let (mut left, mut shares) = ([[0.0; PACKET_SIZE]; 3], [[0.0; PACKET_SIZE]; 2]);
         let (mut through, mut through_share) = ([0.0; PACKET_SIZE], [0.0; PACKET_SIZE]);
         for i in 0..PACKET_SIZE {
@@ -409,7 +411,7 @@ impl<const THROUGH: bool> RoughRow for PrincipledRow<THROUGH> {
                 LobeSet::All => choices[i],
                 LobeSet::Narrow => choices[i] * (of_specular + of_coat + of_through),
             };
-            // The coat comes first, then the specular lobe; transmission comes last.
+            // The order of lobes is coat, specular, diffuse, transmission.
             let last = match lobes {
                 LobeSet::All => 1.0 - of_through,
                 LobeSet::Narrow => of_specular + of_coat,
@@ -427,7 +429,7 @@ impl<const THROUGH: bool> RoughRow for PrincipledRow<THROUGH> {
             let choose = |wide: f32, narrow: f32| if is_wide { wide } else { narrow };
             let chosen =
                 Vec3::new(choose(wide.x, narrow.x), choose(wide.y, narrow.y), choose(wide.z, narrow.z));
-            // If the path continues on the other side, this direction is unused.
+            // If the path continues on the other side, this direction is not used.
             let useless = -lane(&self.normal, i);
             let keep = |own: f32, useless: f32| if is_through == THROUGH { own } else { useless };
             let kept =

@@ -1,4 +1,5 @@
-//! Tests of principled lobes: values against the formulas, samples against pdfs, and albedos of at most 1.
+//! Tests of principled lobes. Compares values with formulas and samples with pdfs, and checks that albedos
+//! are at most 1.
 
 use super::*;
 use crate::materials::bsdf::LobeSet;
@@ -28,14 +29,15 @@ fn transmitting(color: Vec3, metallic: f32, transmission: f32, alpha: f32, coat:
 }
 
 fn point(principled: &Principled) -> PrincipledPoint {
-    principled.constant().expect("it has no textures")
+    principled.constant().expect("there should be no textures")
 }
 
 const RED: Vec3 = Vec3::new(0.7, 0.1, 0.05);
 
 fn subjects() -> impl Iterator<Item = (f32, f32, [f32; 2])> {
     ALPHAS.into_iter().flat_map(|alpha| {
-        // The coat has a different roughness, so that samples of one lobe cannot pass for the other's.
+        // The coat has a different roughness, so samples from different lobes cannot be mistaken for each
+        // other.
         [(0.0, [0.0, 0.0]), (0.4, [0.6, 0.7 * alpha]), (1.0, [0.0, 0.0])]
             .map(|(metallic, coat)| (alpha, metallic, coat))
     })
@@ -114,7 +116,7 @@ fn albedos_match_quadrature_and_stay_below_1() {
                     Subject::<PrincipledRow<false>>::new(&point, [alpha; 2], direction(cosine, 0.3));
                 let (sampled, exact) = (subject.sampled_albedo(192), subject.albedo());
                 let what = format!(
-                    "α {alpha}, metallic {metallic} at a cosine of {cosine}: {sampled} is not {exact}"
+                    "α {alpha}, metallic {metallic} at a cosine of {cosine}: {sampled} instead of {exact}"
                 );
                 assert!((sampled - exact).abs().max_element() < 1e-3, "{what}");
                 assert!(sampled.max_element() < 1.0 + 5e-4, "{what}");
@@ -142,17 +144,17 @@ fn fully_reflective_facets_have_bounded_weights() {
             let subject =
                 Subject::<PrincipledRow<false>>::new(&point(&white), [alpha; 2], direction(cosine, 0.7));
             let (largest, mean) = (subject.largest_weight(128), subject.sampled_albedo(128).x);
-            assert!(largest < 60.0, "α {alpha} at a cosine of {cosine}: a sample of {largest}");
+            assert!(largest < 60.0, "α {alpha} at a cosine of {cosine}: a sample has weight {largest}");
             assert!(mean < 1.0 + 3e-3, "α {alpha} at a cosine of {cosine}: {mean}");
         }
     }
 }
 
-/// Fractions of transmitted light to test.
+/// Transmitted fractions to test.
 const TRANSMISSIONS: [f32; 2] = [0.6, 1.0];
 
 #[test]
-fn transmission_is_the_mirrored_lobe() {
+fn transmission_is_the_mirrored_specular_lobe() {
     for ((alpha, metallic, coat), transmission) in
         subjects().filter(|one| one.1 < 1.0).flat_map(|one| TRANSMISSIONS.map(|part| (one, part)))
     {
@@ -178,7 +180,7 @@ fn transmission_is_the_mirrored_lobe() {
                 let exact = RED.as_dvec3() * (DVec3::ONE - fresnel) * (part * (1.0 - m) * lobe);
                 let found = subject.values(LobeSet::All, &[light])[0].0;
                 let error = if alpha >= 0.05 { 3e-5 } else { 5e-3 };
-                let what = format!("α {alpha}, {transmission}, {cosine}: {found} is not {exact}");
+                let what = format!("α {alpha}, {transmission}, {cosine}: {found} instead of {exact}");
                 assert!((found - exact).abs().max_element() <= error * exact.max_element(), "{what}");
             }
         }
@@ -186,7 +188,7 @@ fn transmission_is_the_mirrored_lobe() {
 }
 
 #[test]
-fn samples_of_both_sides_follow_the_pdf() {
+fn samples_on_both_sides_follow_the_pdf() {
     for (alpha, metallic, coat) in subjects().filter(|one| one.1 < 1.0) {
         for cosine in COSINES {
             let point = point(&transmitting(RED, metallic, 0.6, alpha, coat));
@@ -195,9 +197,9 @@ fn samples_of_both_sides_follow_the_pdf() {
             let front = Subject::<PrincipledRow<false>>::new(&point, [alpha; 2], at);
             let what = format!("α {alpha}, metallic {metallic} at a cosine of {cosine}");
             for lobes in [LobeSet::Narrow, LobeSet::All] {
-                behind.check_samples(&format!("behind, {lobes:?}, {what}"), lobes);
+                behind.check_samples(&format!("other side, {lobes:?}, {what}"), lobes);
                 if lobes == LobeSet::Narrow || alpha >= 0.2 {
-                    front.check_samples(&format!("before, {lobes:?}, {what}"), lobes);
+                    front.check_samples(&format!("viewer's side, {lobes:?}, {what}"), lobes);
                 }
             }
         }

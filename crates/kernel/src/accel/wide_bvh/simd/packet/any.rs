@@ -1,4 +1,4 @@
-//! Any-hit packet traversal, which visits children in any order.
+//! Any-hit packet traversal. Visits children in any order.
 
 use super::frustum::Frustum;
 use super::rays::Packet;

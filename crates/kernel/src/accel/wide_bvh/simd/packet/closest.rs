@@ -1,4 +1,4 @@
-//! Closest-hit packet traversal, which visits near children first.
+//! Closest-hit packet traversal. Visits near children first.
 
 use super::frustum::Frustum;
 use super::nearest::Nearest;
@@ -62,7 +62,7 @@ pub fn closest<V: SimdVector>(
     true
 }
 
-/// Pushes the children that any ray hits, farthest first, so that the nearest is on top.
+/// Pushes the children that any ray hits, farthest first, so the nearest is on top.
 #[inline(always)]
 fn push_ordered<V: SimdVector>(
     tree: &WideBvh,

@@ -1,14 +1,15 @@
-//! Frustum around the rays of a packet.
+//! A frustum around the rays of a packet.
 
 use super::rays::Packet;
 use crate::accel::wide_bvh::node::WideNode;
 use crate::accel::wide_bvh::simd::vector::{F8, SimdVector};
 use crate::geometry::aabb::SLAB_PAD;
 
-/// Bounds that hold for every ray of a packet, tested against eight boxes at a time. Subtraction and
-/// multiplication round monotonically, so no ray enters a box before the frustum does or leaves it later.
+/// Bounds on all rays of a packet, tested against eight boxes at a time. Subtraction and multiplication round
+/// monotonically, so no ray enters a box before the frustum does, or leaves it after the frustum.
 pub struct Frustum {
-    /// Maximum origin if the rays go up, minimum if they go down: the origin closest to the near plane.
+    /// The origin coordinate closest to the near plane: the maximum if the rays go in the positive direction,
+    /// the minimum otherwise.
     near_origin: [F8; 3],
     far_origin: [F8; 3],
     inverse: [[F8; 2]; 3],
@@ -32,7 +33,7 @@ impl Frustum {
         Self { near_origin, far_origin, inverse, near: packet.near }
     }
 
-    /// A lower bound on the distance at which a ray enters each box, and the bits of the boxes that a ray may
+    /// Lower bounds on the distances at which a ray enters each box, and the mask of the boxes that a ray may
     /// hit before `end`.
     #[inline(always)]
     pub fn enter(&self, node: &WideNode, end: F8) -> (F8, u32) {

@@ -1,6 +1,6 @@
-//! Packet traversal for 16 rays in similar directions. A frustum around the rays skips subtrees that all of
-//! them miss (Reshetov, Soupikov, Hurley, *Multi-Level Ray Tracing Algorithm*, 2005); the rest is tested for
-//! 16 rays at a time.
+//! Packet traversal for 16 rays in similar directions. A frustum around the rays is used to skip subtrees
+//! that all of them miss (Reshetov, Soupikov, Hurley, *Multi-Level Ray Tracing Algorithm*, 2005). Other boxes
+//! are tested with 16 rays at a time.
 
 mod any;
 mod closest;
@@ -20,7 +20,7 @@ use closest::closest;
 /// [`closest`] with AVX2.
 #[target_feature(enable = "avx2")]
 pub fn closest_avx2(tree: &WideBvh, rays: &[Ray], ends: &F32x16, hits: &mut [Option<ShapeHit>]) -> bool {
-    // SAFETY: this function is compiled with these instructions.
+    // SAFETY: this function is compiled with the required instructions.
     let (like, like8) = unsafe { (VectorPair::<F8>::splat(0.0), F8::splat(0.0)) };
     closest(tree, rays, ends, hits, like, like8)
 }
@@ -28,7 +28,7 @@ pub fn closest_avx2(tree: &WideBvh, rays: &[Ray], ends: &F32x16, hits: &mut [Opt
 /// [`any`] with AVX2.
 #[target_feature(enable = "avx2")]
 pub fn any_avx2(tree: &WideBvh, rays: &[Ray], ends: &F32x16, except: &[Option<u32>]) -> Option<u32> {
-    // SAFETY: this function is compiled with these instructions.
+    // SAFETY: this function is compiled with the required instructions.
     let (like, like8) = unsafe { (VectorPair::<F8>::splat(0.0), F8::splat(0.0)) };
     any(tree, rays, ends, except, like, like8)
 }
@@ -36,7 +36,7 @@ pub fn any_avx2(tree: &WideBvh, rays: &[Ray], ends: &F32x16, except: &[Option<u3
 /// [`closest`] with AVX-512.
 #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2")]
 pub fn closest_avx512(tree: &WideBvh, rays: &[Ray], ends: &F32x16, hits: &mut [Option<ShapeHit>]) -> bool {
-    // SAFETY: this function is compiled with these instructions.
+    // SAFETY: this function is compiled with the required instructions.
     let (like, like8) = unsafe { (F16::splat(0.0), F8::splat(0.0)) };
     closest(tree, rays, ends, hits, like, like8)
 }
@@ -44,7 +44,7 @@ pub fn closest_avx512(tree: &WideBvh, rays: &[Ray], ends: &F32x16, hits: &mut [O
 /// [`any`] with AVX-512.
 #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2")]
 pub fn any_avx512(tree: &WideBvh, rays: &[Ray], ends: &F32x16, except: &[Option<u32>]) -> Option<u32> {
-    // SAFETY: this function is compiled with these instructions.
+    // SAFETY: this function is compiled with the required instructions.
     let (like, like8) = unsafe { (F16::splat(0.0), F8::splat(0.0)) };
     any(tree, rays, ends, except, like, like8)
 }

@@ -13,20 +13,19 @@ pub struct Nearest<V: SimdVector> {
     pub t: V,
     u: V,
     v: V,
-    /// Triangle indices, as bits.
+    /// Bit patterns of the triangle indices.
     id: V,
     found: u32,
 }
 
 impl<V: SimdVector> Nearest<V> {
-    /// Starts without hits, with the given ends.
+    /// Starts with the given ends and no hits.
     #[inline(always)]
     pub fn new(ends: V) -> Self {
         Self { t: ends, u: ends, v: ends, id: ends.like(f32::from_bits(u32::MAX)), found: 0 }
     }
 
-    /// Updates with hits that are nearer, or equally near with a lower index. Returns the bits of the updated
-    /// rays.
+    /// Takes hits that are nearer, or equally near with a lower index. Returns the mask of the updated rays.
     #[inline(always)]
     pub fn take(&mut self, packet: &Packet<V>, pack: &TrianglePack, lane: usize, rays: &[Ray]) -> u32 {
         let hits = packet.hits(pack, lane, self.t);

@@ -9,30 +9,30 @@ use crate::geometry::aabb::{SLAB_PAD, triangle_margin};
 use crate::geometry::watertight::ShearedRay;
 use crate::math::Vec3;
 
-/// Rays in registers, prepared for boxes and triangles.
+/// Rays in registers, preprocessed for box and triangle tests.
 pub struct Packet<V: SimdVector> {
-    /// Origins for near and far planes, a margin apart.
+    /// Origins for near and far planes, offset by the margin.
     near_origin: [V; 3],
     far_origin: [V; 3],
     pub inverse: [V; 3],
-    /// Origins along the axes of the sheared rays.
+    /// Origins permuted to the axes of the sheared rays.
     sheared_origin: [V; 3],
     shear: [V; 3],
-    /// World axes that are the x, y and z axes of every sheared ray.
+    /// World axes that are the x, y, and z axes of every sheared ray.
     axes: [usize; 3],
-    /// Indices of the triangles on which the rays start, as bits.
+    /// Bit patterns of the indices of the rays' start triangles.
     start: V,
-    /// Rows of a node with the near planes.
+    /// Rows of a node that contain the near planes.
     pub near: [usize; 3],
     /// Minimum and maximum of the origins along each axis.
     pub origins: [[f32; 2]; 3],
-    /// Largest margin around boxes that any of the rays needs.
+    /// Largest box margin that any of the rays needs.
     pub margin: f32,
 }
 
 impl<V: SimdVector> Packet<V> {
-    /// Loads a packet. `None` if the rays are not coherent: their directions must have the same signs and the
-    /// same longest axis.
+    /// Loads a packet, or returns `None` if the rays are not coherent. Their directions must have the same
+    /// signs and the same longest axis.
     #[inline(always)]
     pub fn new(rows: &Rows, whole: &Aabb, like: V) -> Option<Self> {
         let axes = ShearedRay::new(rows.first.origin, rows.first.direction).axes();
@@ -92,7 +92,7 @@ impl<V: SimdVector> Packet<V> {
         Some(own)
     }
 
-    /// Whether any ray hits the box in a slot before its end; SIMD version of `SlabRay::enter`.
+    /// Whether any ray hits the box in a slot before its end. SIMD version of `SlabRay::enter`.
     #[inline(always)]
     pub fn meets(&self, node: &WideNode, slot: usize, end: V) -> bool {
         let pad = end.like(SLAB_PAD);
@@ -106,20 +106,20 @@ impl<V: SimdVector> Packet<V> {
         V::movemask(near.le(far)) != 0
     }
 
-    /// Tests the triangle in a lane of a pack against all rays, even those that start on it.
+    /// Tests the triangle in a lane of a pack against all rays, including rays that start on it.
     #[inline(always)]
     pub fn hits(&self, pack: &TrianglePack, lane: usize, t_max: V) -> triangle::Hits<V> {
         let (a, b, c) = (self.corner(pack, 0, lane), self.corner(pack, 3, lane), self.corner(pack, 6, lane));
         triangle::hits(&[a, b, c], self.shear[2], t_max, false)
     }
 
-    /// Bits of the rays that start on the triangle with this index.
+    /// Mask of the rays that start on the triangle with this index.
     #[inline(always)]
     pub fn starting_on(&self, triangle: u32) -> u32 {
         V::movemask(self.start.eq(self.start.like(f32::from_bits(triangle))))
     }
 
-    /// A corner in each ray's sheared coordinates; `row` is the corner's first row.
+    /// A corner in each ray's sheared coordinates. `row` is the corner's first row.
     #[inline(always)]
     fn corner(&self, pack: &TrianglePack, row: usize, lane: usize) -> [V; 3] {
         let z = self.coordinate(pack, row, 2, lane);

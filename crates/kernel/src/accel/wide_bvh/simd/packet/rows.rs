@@ -8,15 +8,15 @@ pub struct Rows {
     pub origin: [F32x16; 3],
     pub direction: [F32x16; 3],
     pub ends: F32x16,
-    /// Bits of [`Ray::start`]; NaN for none.
+    /// Bit patterns of [`Ray::start`]; NaN for none.
     pub start: F32x16,
-    /// Bits of the traced rays.
+    /// Mask of the traced rays.
     pub traced: u32,
     /// First traced ray.
     pub first: Ray,
 }
 
-/// Bits of all lanes.
+/// Mask of all lanes.
 const ALL: u32 = (1 << SIZE) - 1;
 
 impl Rows {
@@ -29,8 +29,8 @@ impl Rows {
         self.start[lane] = f32::from_bits(ray.start);
     }
 
-    /// Loads rays. Lanes without a ray, or with a negative end, repeat the first ray. `None` if no ray is
-    /// traced.
+    /// Loads rays. Lanes without a ray or with a negative end get a copy of the first traced ray. `None` if
+    /// no ray is traced.
     #[inline(always)]
     pub fn new(rays: &[Ray], ends: &F32x16) -> Option<Self> {
         let count = rays.len().min(SIZE);

@@ -35,13 +35,13 @@ impl SimdVector for F8 {
     #[inline(always)]
     fn store(self, to: &mut [f32]) {
         assert!(to.len() >= Self::COUNT);
-        // SAFETY: a value of this type exists; the slice has room.
+        // SAFETY: a value of this type exists, and the slice is long enough.
         unsafe { _mm256_storeu_ps(to.as_mut_ptr(), self.0) }
     }
 
     #[inline(always)]
     fn over(self, divisor: Self) -> Self {
-        // SAFETY: a value of this type exists, here and below.
+        // SAFETY: a value of this type exists, so the processor has the instructions. Also applies below.
         Self(unsafe { _mm256_div_ps(self.0, divisor.0) })
     }
 
@@ -131,13 +131,13 @@ impl SimdVector for F8 {
 }
 
 impl F8 {
-    /// Computes self · factor − less, rounded once.
+    /// Computes self · factor − less with a single rounding.
     ///
     /// # Safety
-    /// The processor must have fused multiply-add.
+    /// The processor must support fused multiply-add.
     #[inline(always)]
     pub unsafe fn times_less(self, factor: Self, less: Self) -> Self {
-        // SAFETY: a value of this type exists; FMA is upheld by the caller.
+        // SAFETY: a value of this type exists, and the caller guarantees FMA support.
         Self(unsafe { _mm256_fmsub_ps(self.0, factor.0, less.0) })
     }
 }

@@ -35,13 +35,13 @@ impl SimdVector for F4 {
     #[inline(always)]
     fn store(self, to: &mut [f32]) {
         assert!(to.len() >= Self::COUNT);
-        // SAFETY: a value of this type exists; the slice has room.
+        // SAFETY: a value of this type exists, and the slice is long enough.
         unsafe { _mm_storeu_ps(to.as_mut_ptr(), self.0) }
     }
 
     #[inline(always)]
     fn over(self, divisor: Self) -> Self {
-        // SAFETY: a value of this type exists, here and below.
+        // SAFETY: a value of this type exists, so the processor has the instructions. Also applies below.
         Self(unsafe { _mm_div_ps(self.0, divisor.0) })
     }
 

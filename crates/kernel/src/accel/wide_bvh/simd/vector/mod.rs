@@ -1,8 +1,8 @@
-//! SIMD vectors of all widths behind one trait, so that kernels are written once.
+//! A trait for SIMD vectors of all widths, so that each kernel is written only once.
 //!
-//! Values are created only by unsafe functions, whose callers guarantee the instruction set, or inside this
-//! module from a register of a function compiled with the instructions. A value therefore proves that the
-//! processor has the instructions, and its operators are safe.
+//! Outside this module, values can only be created by unsafe functions whose callers guarantee the
+//! instruction set. Inside, they are also created by functions compiled with the instructions. A value
+//! therefore proves that the processor has the instructions, which makes the operators safe.
 
 mod eight;
 mod four;
@@ -16,12 +16,12 @@ pub use four::F4;
 pub use pair::VectorPair;
 pub use sixteen::F16;
 
-/// A SIMD vector of floats. Comparisons with NaN are false; `min` and `max` return their argument if either
-/// is NaN.
+/// A SIMD vector of floats. Comparisons with NaN are false. `min` and `max` return their argument if either
+/// operand is NaN.
 pub trait SimdVector: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {
     /// Number of lanes.
     const COUNT: usize;
-    /// One truth value per lane.
+    /// One Boolean per lane.
     type Mask: Copy + BitAnd<Output = Self::Mask> + BitOr<Output = Self::Mask>;
 
     /// Broadcasts a number to all lanes.
@@ -44,25 +44,25 @@ pub trait SimdVector: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Outpu
         unsafe { Self::splat(x) }
     }
 
-    /// Loads from a slice with at least [`SimdVector::COUNT`] floats.
+    /// Loads the first [`SimdVector::COUNT`] floats of a slice.
     #[inline(always)]
     fn gather(self, from: &[f32]) -> Self {
         assert!(from.len() >= Self::COUNT);
-        // SAFETY: a value of this type exists; the length was checked.
+        // SAFETY: a value of this type exists, and the length was checked.
         unsafe { Self::load(from.as_ptr()) }
     }
 
-    /// Stores into a slice with at least [`SimdVector::COUNT`] floats.
+    /// Stores the lanes into a slice of at least [`SimdVector::COUNT`] floats.
     fn store(self, to: &mut [f32]);
     /// Divides by `divisor`.
     fn over(self, divisor: Self) -> Self;
-    /// Smaller number of each lane.
+    /// Lane-wise minimum.
     fn min(self, other: Self) -> Self;
-    /// Larger number of each lane.
+    /// Lane-wise maximum.
     fn max(self, other: Self) -> Self;
-    /// Absolute value of each lane.
+    /// Lane-wise absolute value.
     fn abs(self) -> Self;
-    /// Negates the lanes in which `other` has its sign bit set.
+    /// Negates the lanes where the sign bit of `other` is set.
     fn signed_by(self, other: Self) -> Self;
     /// self < other.
     fn lt(self, other: Self) -> Self::Mask;
@@ -70,13 +70,13 @@ pub trait SimdVector: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Outpu
     fn le(self, other: Self) -> Self::Mask;
     /// self = other.
     fn eq(self, other: Self) -> Self::Mask;
-    /// Selects `self` where the mask is set and `other` elsewhere, bit for bit.
+    /// Bitwise selection: `self` where the mask is set, `other` elsewhere.
     fn or_else(self, mask: Self::Mask, other: Self) -> Self;
     /// Lanes set in `mask` but not in `but`.
     fn without(mask: Self::Mask, but: Self::Mask) -> Self::Mask;
-    /// Packs a mask into bits, one per lane.
+    /// Converts a mask to bits, one per lane.
     fn movemask(mask: Self::Mask) -> u32;
-    /// Expands bits into a mask; `like` proves that the processor has the instructions.
+    /// Converts bits to a mask. `like` proves that the processor has the instructions.
     fn mask(bits: u32, like: Self) -> Self::Mask;
     /// Maximum of all lanes.
     fn greatest(self) -> f32;
@@ -84,7 +84,7 @@ pub trait SimdVector: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Outpu
     fn least(self) -> f32;
 }
 
-/// Implements addition, subtraction and multiplication for a vector type.
+/// Implements addition, subtraction, and multiplication for a vector type.
 macro_rules! operators {
     ($name:ident, $add:ident, $sub:ident, $mul:ident) => {
         impl Add for $name {
@@ -114,7 +114,7 @@ macro_rules! operators {
     };
 }
 
-/// Implements `&` and `|` for masks as wide as their vectors.
+/// Implements `&` and `|` for masks with full-width lanes.
 macro_rules! wide_mask {
     ($mask:ident, $and:ident, $or:ident) => {
         impl BitAnd for $mask {

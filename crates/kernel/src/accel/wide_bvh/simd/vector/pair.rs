@@ -4,7 +4,7 @@ use std::ops::{Add, BitAnd, BitOr, Mul, Sub};
 
 use super::SimdVector;
 
-/// Two vectors used as one of twice the width.
+/// Two vectors used as a single vector of twice the width.
 #[derive(Clone, Copy)]
 pub struct VectorPair<V>(V, V);
 
@@ -60,7 +60,7 @@ impl<V: SimdVector> SimdVector for VectorPair<V> {
 
     #[inline(always)]
     unsafe fn load(from: *const f32) -> Self {
-        // SAFETY: upheld by the caller; a pair has twice as many floats.
+        // SAFETY: upheld by the caller. A pair contains twice as many floats.
         unsafe { Self(V::load(from), V::load(from.add(V::COUNT))) }
     }
 

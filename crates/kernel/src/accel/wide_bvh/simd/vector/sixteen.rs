@@ -9,7 +9,7 @@ use super::{SimdVector, operators};
 #[derive(Clone, Copy)]
 pub struct F16(pub(in crate::accel::wide_bvh::simd) __m512);
 
-/// Mask of 16 lanes, one bit each.
+/// Mask of 16 lanes with one bit each.
 #[derive(Clone, Copy)]
 pub struct Mask16(u16);
 
@@ -50,13 +50,13 @@ impl SimdVector for F16 {
     #[inline(always)]
     fn store(self, to: &mut [f32]) {
         assert!(to.len() >= Self::COUNT);
-        // SAFETY: a value of this type exists; the slice has room.
+        // SAFETY: a value of this type exists, and the slice is long enough.
         unsafe { _mm512_storeu_ps(to.as_mut_ptr(), self.0) }
     }
 
     #[inline(always)]
     fn over(self, divisor: Self) -> Self {
-        // SAFETY: a value of this type exists, here and below.
+        // SAFETY: a value of this type exists, so the processor has the instructions. Also applies below.
         Self(unsafe { _mm512_div_ps(self.0, divisor.0) })
     }
 

@@ -1,4 +1,4 @@
-//! Tests of samples against pdfs, and of their means against known albedos.
+//! Tests that compare samples with pdfs, and their means with known albedos.
 
 use super::*;
 use crate::materials::phong::PhongBsdf;
@@ -9,7 +9,7 @@ fn bsdf(diffuse: f32, specular: f32, shininess: f32) -> PhongBsdf {
     PhongBsdf { diffuse, specular, shininess, ambient: Vec3::ZERO }
 }
 
-/// Unit normals, one of them near a frame's pole.
+/// Unit normals. One of them is near a frame's pole.
 fn normals() -> [Vec3; 3] {
     [Vec3::Z, Vec3::new(3.85e-4, 3.85e-4, -0.999_999_9).normalize(), Vec3::new(0.6, -0.48, 0.64)]
 }
@@ -28,7 +28,8 @@ fn sample(lobes: &Lobes, next: &mut impl FnMut() -> f32) -> Vec3 {
     lobes.sample(lobe, [next(), next()])
 }
 
-/// χ² test of counts: at most six standard deviations above the mean, a probability of 1e-9.
+/// χ² test of counts. The statistic may be at most six standard deviations above its mean, which is exceeded
+/// with a probability of 1e-9.
 fn assert_counts(what: &str, counts: &[u32], expected: &[f64]) {
     let (mut sum, mut cells, mut rest) = (0.0, 0, [0.0; 2]);
     for (count, expected) in counts.iter().zip(expected) {
@@ -43,7 +44,7 @@ fn assert_counts(what: &str, counts: &[u32], expected: &[f64]) {
         sum += (rest[0] - rest[1]).powi(2) / rest[1];
         cells += 1;
     } else {
-        assert!(rest[0] <= 5.0 * rest[1] + 8.0, "{what}: {rest:?} in cells of next to nothing");
+        assert!(rest[0] <= 5.0 * rest[1] + 8.0, "{what}: {rest:?} in cells with tiny expected counts");
     }
     let free = f64::from(cells - 1);
     assert!(sum < free + 6.0 * (2.0 * free).sqrt(), "{what}: χ² {sum} with {free} degrees of freedom");
@@ -63,8 +64,7 @@ fn glossy_samples_follow_the_pdf() {
                     let direction = sample(&lobes, &mut next);
                     let offset = (direction - lobes.mirrored_eye).as_dvec3();
                     let cosine = 1.0 - 0.5 * offset.length_squared();
-                    // cos
-                    // (α + 1) and the azimuth are uniform.
+                    // cos^(α + 1) and the azimuth are uniformly distributed.
                     let power = libm::pow(cosine.max(0.0), n - 1.0);
                     let ring = (power * cosine * 16.0) as usize;
                     let phi = frame.t.dot(direction).atan2(frame.s.dot(direction)) / (2.0 * PI) + 0.5;
@@ -72,7 +72,7 @@ fn glossy_samples_follow_the_pdf() {
                     let density = lobes.density(direction, gloss(lobes.mirrored_eye, direction, shininess));
                     let exact = n / std::f64::consts::TAU * power;
                     let is_near = (f64::from(density) - exact).abs() <= 2e-3 * exact + 1e-6 * n;
-                    assert!(is_near, "α {shininess} at {degrees}°: {density} is not {exact}");
+                    assert!(is_near, "α {shininess} at {degrees}°: {density} instead of {exact}");
                 }
                 let what = format!("α {shininess} at {degrees}° from {normal}");
                 assert_counts(&what, &counts, &[f64::from(SAMPLES) / 128.0; 256]);
@@ -86,7 +86,7 @@ fn glossy_samples_follow_the_pdf() {
 const RINGS: usize = 24;
 const STEPS: usize = 24;
 
-/// Integral of the pdf over each of the equal-area cells on the sphere.
+/// Integral of the pdf over each of the sphere's equal-area cells.
 fn integrals(lobes: &Lobes) -> Vec<f64> {
     const FINE: usize = 24;
     let cell = |ring: usize, step: usize| {
@@ -134,7 +134,7 @@ fn combined_lobe_samples_follow_the_pdf() {
     }
 }
 
-/// Albedo: the mean of f·cos/pdf over samples.
+/// Albedo, estimated as the mean of f·cos/pdf over samples.
 fn albedo(bsdf: &PhongBsdf, degrees: f32) -> f64 {
     let (mut next, normal) = (random(3), normals()[2]);
     let lobes = bsdf.lobes(normal, at_angle(normal, degrees));
@@ -154,16 +154,16 @@ fn sampled_albedos_match_known_values() {
     for (shininess, known) in [(10.0, [1.0, 0.8661, 0.5047, 0.2281]), (100.0, [1.0, 0.8660, 0.5, 0.1752])] {
         for (degrees, known) in [0.0, 30.0, 60.0, 80.0].into_iter().zip(known) {
             let found = albedo(&bsdf(0.0, 1.0, shininess), degrees);
-            assert!((found - known).abs() < 3e-3, "α {shininess} at {degrees}°: {found} is not {known}");
+            assert!((found - known).abs() < 3e-3, "α {shininess} at {degrees}°: {found} instead of {known}");
             let both = albedo(&bsdf(0.4, 0.6, shininess), degrees);
             assert!((both - 0.4 - 0.6 * known).abs() < 4e-3, "with a diffuse part: {both}");
         }
     }
-    // In the limit of narrow lobes, the albedo is cosθ.
+    // For narrow lobes, the albedo approaches cosθ.
     for degrees in [0.0_f32, 45.0, 80.0, 89.0] {
         let found = albedo(&bsdf(0.0, 1.0, 1e5), degrees);
         let known = f64::from(degrees.to_radians().cos());
-        assert!((found - known).abs() < 2e-3, "α 1e5 at {degrees}°: {found} is not {known}");
+        assert!((found - known).abs() < 2e-3, "α 1e5 at {degrees}°: {found} instead of {known}");
     }
 }
 
@@ -181,7 +181,7 @@ fn values_are_reciprocal() {
             for light in [light, near] {
                 let there = bsdf.value(&bsdf.lobes(normal, eye), light).x;
                 let back = bsdf.value(&bsdf.lobes(normal, light), eye).x;
-                assert!((there - back).abs() <= 3e-3 * there, "α {shininess}: {there} and {back}");
+                assert!((there - back).abs() <= 3e-3 * there, "α {shininess}: {there}, reversed {back}");
             }
         }
     }
