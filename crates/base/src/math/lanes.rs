@@ -1,5 +1,6 @@
 //! Packets of 16 numbers, processed in branch-free loops over arrays that compilers vectorize. Each lane gets
-//! the same bits as the scalar computation would.
+//! the same bits as the scalar computation would. Structs that hold packets are aligned to cache lines, because a
+//! load that crosses a line takes twice as long.
 
 use super::Vec3;
 

@@ -51,6 +51,7 @@ pub enum LobeSet {
 
 /// BSDF values of a packet, for one direction per lane.
 #[derive(Clone, Debug)]
+#[repr(align(64))]
 pub struct BsdfValues {
     /// f in sr⁻¹ of the shown lobes.
     pub f: Vec3x16,
@@ -60,6 +61,7 @@ pub struct BsdfValues {
 
 /// Sampled directions in which paths continue, on either side of the surfaces.
 #[derive(Clone, Debug)]
+#[repr(align(64))]
 pub struct SideSamples {
     /// Unit directions.
     pub directions: Vec3x16,

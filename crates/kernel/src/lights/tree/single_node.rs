@@ -14,6 +14,7 @@ pub struct SingleNodeImportance<'a> {
 }
 
 /// The lights picked by a packet of points.
+#[repr(align(64))]
 pub struct PacketPicks {
     /// Child index of each light.
     children: [u32; PACKET_SIZE],

@@ -51,6 +51,7 @@ impl std::ops::AddAssign for LightRayCounts {
 }
 
 /// Direct light reflected toward the viewer at a packet of vertices.
+#[repr(align(64))]
 pub struct ReflectedLight {
     /// Reflected radiance, before the throughput of the paths.
     pub light: Vec3x16,
@@ -58,6 +59,7 @@ pub struct ReflectedLight {
 }
 
 /// Sums over light samples.
+#[repr(align(64))]
 pub struct LightSums {
     /// Reflected light that is unoccluded.
     pub light: Vec3x16,
@@ -87,6 +89,7 @@ impl LightSums {
 }
 
 /// Light of one source that depends on a single shadow ray.
+#[repr(align(64))]
 struct PendingLight {
     light: Vec3x16,
     active: u32,

@@ -14,6 +14,7 @@ use crate::scene::description::Shadows;
 
 /// A packet of vertices to be lit.
 #[derive(Clone)]
+#[repr(align(64))]
 pub struct VertexBatch {
     /// Mask of lanes with a vertex.
     pub used: u32,
@@ -375,6 +376,7 @@ impl VertexBatch {
 }
 
 /// BSDF values and cosines of a packet of vertices for one direction each.
+#[repr(align(64))]
 pub struct Response {
     /// BSDF values.
     pub bsdf: BsdfValues,

@@ -15,6 +15,7 @@ use crate::math::lanes::{F32x16, Mask, PACKET_SIZE, Simd, Vec3x16, lane, mask_fr
 /// A packet of conductors, either all isotropic or all brushed; the result of a lane does not depend on the other lanes. The
 /// shared values of f are its largest component, whether the renderer is monochrome or in color, and f for a reflectance of 1.
 #[derive(Clone, Debug)]
+#[repr(align(64))]
 pub struct ConductorRow<const BRUSHED: bool> {
     /// Unit normals that face the viewer.
     normal: Vec3x16,
