@@ -29,6 +29,7 @@ pub fn lanes(mut bits: u32) -> impl Iterator<Item = usize> {
 
 /// The rays of a packet. Lanes without a ray are 0.
 #[derive(Clone, Debug)]
+#[repr(align(64))]
 pub struct RayPacket {
     /// Coordinates of the origins.
     pub origin: [F32x16; 3],
@@ -98,6 +99,7 @@ impl RayPacket {
 
 /// Hits of a packet ([`ShapeHit`]s in structure-of-arrays layout).
 #[derive(Clone, Debug)]
+#[repr(align(64))]
 pub struct HitPacket {
     /// [`ShapeHit::t`], or NaN for a ray without a hit.
     pub t: F32x16,

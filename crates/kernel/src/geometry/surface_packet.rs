@@ -8,6 +8,7 @@ use crate::math::{DVec2, DVec3, Vec2};
 
 /// The parts of a packet of [`SurfacePoint`]s that lighting needs.
 #[derive(Clone, Debug)]
+#[repr(align(64))]
 pub struct SurfacePacket {
     /// Points in world coordinates.
     pub point: Vec3x16,

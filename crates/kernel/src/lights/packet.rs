@@ -6,6 +6,7 @@ use crate::math::lanes::{F32x16, PACKET_SIZE, Vec3x16, lane, mask_from_bits, sel
 
 /// Samples of a light for a packet of points: [`LightSample`]s in structure-of-arrays layout.
 #[derive(Clone, Debug)]
+#[repr(align(64))]
 pub struct LightSamplePacket {
     /// Unit directions to the light.
     pub directions: Vec3x16,
@@ -23,6 +24,7 @@ pub struct LightSamplePacket {
 
 /// A packet of [`LightObject`]s.
 #[derive(Clone, Debug)]
+#[repr(align(64))]
 pub struct LightObjectPacket {
     /// Object index, or [`LightObjectPacket::NONE`] for no geometry.
     pub object: [u32; PACKET_SIZE],

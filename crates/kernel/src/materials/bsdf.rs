@@ -55,6 +55,7 @@ pub enum LobeSet {
 
 /// BSDF values of a packet, for one direction per lane.
 #[derive(Clone, Debug)]
+#[repr(align(64))]
 pub struct BsdfValues {
     /// f of the shown lobes in sr⁻¹.
     pub f: Vec3x16,
@@ -65,6 +66,7 @@ pub struct BsdfValues {
 
 /// Sampled directions for continuing paths, on either side of the surfaces.
 #[derive(Clone, Debug)]
+#[repr(align(64))]
 pub struct SideSamples {
     /// Unit directions.
     pub directions: Vec3x16,

@@ -107,11 +107,13 @@ impl Texels {
         values
     }
 
-    /// Linear values at a packet of texel indices. Written in place because compilers handle large return
+    /// Linear values at packets of texel indices. Written in place because compilers handle large return
     /// values poorly.
     #[inline(always)]
-    pub fn gather_packet(&self, places: &[usize; PACKET_SIZE], values: &mut Vec3x16) {
-        self.decode(places, |i, value| set_lane(values, i, value));
+    pub fn gather_packets(&self, places: &[[usize; PACKET_SIZE]], values: &mut [Vec3x16]) {
+        for (places, values) in places.iter().zip(values) {
+            self.decode(places, |i, value| set_lane(values, i, value));
+        }
     }
 
     /// Passes the linear value at each texel index to `put`.

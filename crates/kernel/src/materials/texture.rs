@@ -299,9 +299,12 @@ impl Texture {
         let folded = [self.wrap.fold_row(&uv[0], repeat.x), self.wrap.fold_row(&uv[1], repeat.y)];
         let extent = extent(texels);
         let (mut first, mut part) = ([[0; PACKET_SIZE]; 2], [[0.0; PACKET_SIZE]; 2]);
-        let shift = match self.filter {
-            TextureFilter::Nearest => 0.0,
-            TextureFilter::Bilinear | TextureFilter::Mipmap => 0.5,
+        let (shift, count) = match self.filter {
+            TextureFilter::Nearest => (0.0, 1),
+            TextureFilter::Bilinear | TextureFilter::Mipmap if texels.is_weighted() => {
+                return self.weighted_row(&folded);
+            }
+            TextureFilter::Bilinear | TextureFilter::Mipmap => (0.5, 4),
         };
         for axis in 0..2 {
             for i in 0..PACKET_SIZE {
@@ -312,22 +315,20 @@ impl Texture {
         }
         let columns = self.wrap.index_row(&first[0], 0, extent[0]);
         let rows = self.wrap.index_row(&first[1], 0, extent[1]);
-        let mut colors = [[0.0; PACKET_SIZE]; 3];
-        if shift == 0.0 {
-            texels.gather_packet(&places(&columns, &rows, extent), &mut colors);
-            return colors;
+        let mut around = [places(&columns, &rows, extent); 4];
+        if count == 4 {
+            let right = self.wrap.index_row(&first[0], 1, extent[0]);
+            let upper = self.wrap.index_row(&first[1], 1, extent[1]);
+            around[1] = places(&right, &rows, extent);
+            around[2] = places(&columns, &upper, extent);
+            around[3] = places(&right, &upper, extent);
         }
-        if texels.is_weighted() {
-            self.weighted_row(&folded, &mut colors);
-            return colors;
-        }
-        let right = self.wrap.index_row(&first[0], 1, extent[0]);
-        let upper = self.wrap.index_row(&first[1], 1, extent[1]);
         let mut corners = [[[0.0; PACKET_SIZE]; 3]; 4];
-        texels.gather_packet(&places(&columns, &rows, extent), &mut corners[0]);
-        texels.gather_packet(&places(&right, &rows, extent), &mut corners[1]);
-        texels.gather_packet(&places(&columns, &upper, extent), &mut corners[2]);
-        texels.gather_packet(&places(&right, &upper, extent), &mut corners[3]);
+        texels.gather_packets(&around[..count], &mut corners);
+        if count == 1 {
+            return corners[0];
+        }
+        let mut colors = [[0.0; PACKET_SIZE]; 3];
         for i in 0..PACKET_SIZE {
             let corner = |number: usize| lane(&corners[number], i);
             let lower = corner(0).lerp(corner(1), part[0][i]);
@@ -408,11 +409,13 @@ impl Texture {
     /// Bilinear lookups for a packet in texels with alpha.
     #[cold]
     #[inline(never)]
-    fn weighted_row(&self, folded: &[F32x16; 2], colors: &mut Vec3x16) {
+    fn weighted_row(&self, folded: &[F32x16; 2]) -> Vec3x16 {
+        let mut colors = [[0.0; PACKET_SIZE]; 3];
         for i in 0..PACKET_SIZE {
             let color = self.bilinear(&self.texels, [folded[0][i], folded[1][i]]);
-            set_lane(colors, i, color);
+            set_lane(&mut colors, i, color);
         }
+        colors
     }
 
     /// Bilinear interpolation of premultiplied texels and their alpha.

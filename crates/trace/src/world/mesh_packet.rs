@@ -59,14 +59,11 @@ impl MeshInstance {
             set_lane(&mut found.normal, i, facet.normal);
             doubtful[i] = if facet.is_doubtful() { TRUE } else { 0 };
         }
-        // Hits near an edge or in a huge triangle are rare, so handle them one by one.
+        // Hits near an edge or in a huge triangle are rare.
         let doubtful = simd.movemask(&doubtful) & of;
-        for i in lanes(doubtful) {
-            let uv = [hits.u[i], hits.v[i]];
-            let [point, error] =
-                placed.corrected(&placed.facet(corners_of(i), uv), &rays.ray(i).to_f64(), uv);
-            set_lane(&mut found.point, i, point);
-            set_lane(&mut found.error, i, error);
+        let mut on_ray = 0;
+        if doubtful != 0 {
+            on_ray = correct_points(&placed, &corners, (rays, hits), doubtful, &mut found);
         }
         surface.take(of, &found);
         if self.smooth {
@@ -82,11 +79,8 @@ impl MeshInstance {
                 let lifted = placed.shadow_point(&facet, &normals_of(i), direction);
                 set_lane(&mut found.shadow_point, i, lifted);
             }
-            for i in lanes(doubtful) {
-                let facet = placed.facet(corners_of(i), [hits.u[i], hits.v[i]]);
-                if placed.is_on_ray(&facet, &rays.ray(i).to_f64()) {
-                    set_lane(&mut found.shadow_point, i, lane(&found.point, i));
-                }
+            for i in lanes(on_ray) {
+                set_lane(&mut found.shadow_point, i, lane(&found.point, i));
             }
             surface.take_smooth(of, &found);
         }
@@ -104,6 +98,29 @@ impl MeshInstance {
             }
         }
     }
+}
+
+/// Corrects the doubtful points one by one. Returns the lanes whose points were moved onto their rays. Not inlined,
+/// to keep the SIMD code small.
+#[cold]
+#[inline(never)]
+fn correct_points(
+    placed: &PlacedMesh<impl MeshPlacement>,
+    corners: &[Vec3x16; 3],
+    (rays, hits): (&RayPacket, &HitPacket),
+    doubtful: u32,
+    found: &mut SurfacePacket,
+) -> u32 {
+    let mut on_ray = 0;
+    for i in lanes(doubtful) {
+        let (ray, uv) = (rays.ray(i).to_f64(), [hits.u[i], hits.v[i]]);
+        let facet = placed.facet([lane(&corners[0], i), lane(&corners[1], i), lane(&corners[2], i)], uv);
+        let [point, error] = placed.corrected(&facet, &ray, uv);
+        set_lane(&mut found.point, i, point);
+        set_lane(&mut found.error, i, error);
+        on_ray |= if placed.is_on_ray(&facet, &ray) { 1 << i } else { 0 };
+    }
+    on_ray
 }
 
 /// Interpolates the UVs of a triangle's corners.

@@ -53,6 +53,7 @@ impl SeeThrough {
 }
 
 /// Transmittance along the shadow rays of a packet.
+#[repr(align(64))]
 pub struct Transmittance {
     /// Mask of rays with zero transmittance.
     pub occluded: u32,

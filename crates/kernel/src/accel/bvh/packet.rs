@@ -35,6 +35,7 @@ struct SlabPacket<'a> {
 }
 
 /// Interval of distances in which each ray is inside a box; empty if `near` > `far`.
+#[repr(align(64))]
 struct SlabIntervals {
     near: F32x16,
     far: F32x16,
@@ -162,8 +163,7 @@ impl Bvh {
         simd: impl Simd,
     ) {
         if let Some(shells) = &self.shells {
-            outside.iter().for_each(|&id| closest.test(id, traced, ends));
-            return self.closest_packet_nested(shells, rays, ends, traced, closest);
+            return self.closest_packet_nested(shells, rays, ends, traced, outside, closest);
         }
         let slabs = SlabPacket::new(rays, simd);
         let (mut leaf, mut in_leaf) = (outside, traced);
@@ -228,8 +228,7 @@ impl Bvh {
         simd: impl Simd,
     ) -> u32 {
         if let Some(shells) = &self.shells {
-            let hit = outside.iter().fold(0, |hit, &id| hit | any.test(id, traced, ends));
-            return hit | self.any_packet_nested(shells, rays, ends, traced & !hit, any);
+            return self.any_packet_nested(shells, rays, ends, traced, outside, any);
         }
         let slabs = SlabPacket::new(rays, simd);
         let mut free = traced;

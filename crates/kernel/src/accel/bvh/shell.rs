@@ -192,12 +192,13 @@ impl Bvh {
     }
 
     /// [`Bvh::closest`] with shells.
+    #[cold]
     #[inline(never)]
     pub(super) fn closest_nested(
         &self,
         shells: &[[Shell; 2]],
         ray: &Ray,
-        mut test: impl FnMut(u32, f32) -> Option<f32>,
+        test: &mut dyn FnMut(u32, f32) -> Option<f32>,
     ) {
         let mut t_max = ray.t_max;
         let enter = NestedRay::new(ray);
@@ -222,12 +223,13 @@ impl Bvh {
     }
 
     /// [`Bvh::any`] with shells.
+    #[cold]
     #[inline(never)]
     pub(super) fn any_nested(
         &self,
         shells: &[[Shell; 2]],
         ray: &Ray,
-        mut test: impl FnMut(u32) -> bool,
+        test: &mut dyn FnMut(u32) -> bool,
     ) -> bool {
         let enter = NestedRay::new(ray);
         let mut stack = ArrayVec::<ChildRef, { DEEP_STACK + 1 }>::new();
@@ -247,7 +249,9 @@ impl Bvh {
         false
     }
 
-    /// [`Bvh::closest_packet`] with shells: traces the rays one by one.
+    /// [`Bvh::closest_packet`] with shells: traces the rays one by one. The callback is `dyn` so that the hot
+    /// traversals stay small: otherwise it is inlined here again.
+    #[cold]
     #[inline(never)]
     pub(super) fn closest_packet_nested(
         &self,
@@ -255,11 +259,13 @@ impl Bvh {
         rays: &RayPacket,
         ends: &mut F32x16,
         traced: u32,
-        closest: &mut impl ClosestTest,
+        outside: &[u32],
+        closest: &mut dyn ClosestTest,
     ) {
+        outside.iter().for_each(|&id| closest.test(id, traced, ends));
         for lane in lanes(traced).take(PACKET_SIZE) {
             let ray = Ray { t_max: ends[lane], ..rays.ray(lane) };
-            self.closest_nested(shells, &ray, |id, _| {
+            self.closest_nested(shells, &ray, &mut |id, _| {
                 closest.test(id, 1 << lane, ends);
                 Some(ends[lane])
             });
@@ -267,6 +273,7 @@ impl Bvh {
     }
 
     /// [`Bvh::any_packet`] with shells: traces the rays one by one.
+    #[cold]
     #[inline(never)]
     pub(super) fn any_packet_nested(
         &self,
@@ -274,12 +281,14 @@ impl Bvh {
         rays: &RayPacket,
         ends: &F32x16,
         traced: u32,
-        any: &mut impl AnyTest,
+        outside: &[u32],
+        any: &mut dyn AnyTest,
     ) -> u32 {
-        let mut hit = 0;
-        for lane in lanes(traced).take(PACKET_SIZE) {
+        let mut hit = outside.iter().fold(0, |hit, &id| hit | any.test(id, traced, ends));
+        for lane in lanes(traced & !hit).take(PACKET_SIZE) {
             let ray = Ray { t_max: ends[lane], ..rays.ray(lane) };
-            let is_hit = self.any_nested(shells, &ray, |id| any.test(id, 1 << lane, ends) & 1 << lane != 0);
+            let is_hit =
+                self.any_nested(shells, &ray, &mut |id| any.test(id, 1 << lane, ends) & 1 << lane != 0);
             hit |= u32::from(is_hit) << lane;
         }
         hit

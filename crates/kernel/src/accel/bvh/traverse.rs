@@ -13,9 +13,9 @@ impl Bvh {
     /// returns the ray's new end on a hit. Primitives exactly at the ray's end are still tested because the
     /// caller may break ties by id.
     #[inline]
-    pub fn closest(&self, ray: &Ray, test: impl FnMut(u32, f32) -> Option<f32>) {
+    pub fn closest(&self, ray: &Ray, mut test: impl FnMut(u32, f32) -> Option<f32>) {
         if let Some(shells) = &self.shells {
-            self.closest_nested(shells, ray, test);
+            self.closest_nested(shells, ray, &mut test);
         } else if self.depth < SHALLOW_STACK {
             self.closest_within::<SHALLOW_STACK>(ray, test);
         } else {
@@ -83,9 +83,9 @@ impl Bvh {
 
     /// Whether any primitive on the ray's path satisfies `test`.
     #[inline]
-    pub fn any(&self, ray: &Ray, test: impl FnMut(u32) -> bool) -> bool {
+    pub fn any(&self, ray: &Ray, mut test: impl FnMut(u32) -> bool) -> bool {
         if let Some(shells) = &self.shells {
-            self.any_nested(shells, ray, test)
+            self.any_nested(shells, ray, &mut test)
         } else if self.depth < SHALLOW_STACK {
             self.any_within::<SHALLOW_STACK>(ray, test)
         } else {

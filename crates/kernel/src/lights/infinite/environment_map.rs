@@ -258,9 +258,7 @@ impl EnvironmentMap {
             }
         }
         let mut corners = [[[0.0; PACKET_SIZE]; 3]; 4];
-        for corner in 0..4 {
-            self.texels.gather_packet(&places[corner], &mut corners[corner]);
-        }
+        self.texels.gather_packets(&places, &mut corners);
         corners
     }
 

@@ -134,6 +134,7 @@ impl Receiver {
 
 /// A packet of [`Receiver`]s.
 #[derive(Clone, Debug)]
+#[repr(align(64))]
 pub struct ReceiverPacket {
     /// Positions.
     pub point: Vec3x16,
@@ -144,6 +145,7 @@ pub struct ReceiverPacket {
 
 /// A packet of [`ReceiverLobe`]s.
 #[derive(Clone, Debug)]
+#[repr(align(64))]
 struct LobePacket {
     axis: Vec3x16,
     shininess: F32x16,
@@ -205,6 +207,7 @@ impl LobePacket {
 }
 
 /// Expected contributions of a node's children at a point.
+#[repr(align(64))]
 pub struct ExpectedContributions {
     /// Importance in the tree's unit of power. 0 only if the child definitely contributes nothing.
     pub importance: F32x16,

@@ -14,6 +14,7 @@ pub struct SingleNodeImportance<'a> {
 }
 
 /// The lights picked by a packet of points.
+#[repr(align(64))]
 pub struct PacketPicks {
     /// Index of the picked child for each point.
     children: [u32; PACKET_SIZE],

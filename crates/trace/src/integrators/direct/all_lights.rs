@@ -51,6 +51,7 @@ impl std::ops::AddAssign for LightRayCounts {
 }
 
 /// Direct light reflected toward the viewer at a packet of vertices.
+#[repr(align(64))]
 pub struct ReflectedLight {
     /// Reflected radiance, before multiplication by the path throughput.
     pub light: Vec3x16,
@@ -58,6 +59,7 @@ pub struct ReflectedLight {
 }
 
 /// Sums over all light samples.
+#[repr(align(64))]
 pub struct LightSums {
     /// Unoccluded reflected light.
     pub light: Vec3x16,
@@ -87,6 +89,7 @@ impl LightSums {
 }
 
 /// Light from one source whose visibility is determined by a single shadow ray.
+#[repr(align(64))]
 struct PendingLight {
     light: Vec3x16,
     active: u32,

@@ -30,6 +30,7 @@ pub struct SampleLightTree<'a, const MIS: bool> {
 /// One picked light per vertex of a packet. The picks of one sample are in tree order so that the shadow rays
 /// in a packet are aimed at nearby lights.
 #[derive(Clone)]
+#[repr(align(64))]
 struct LightPicks {
     /// Indices of the lights.
     lights: [u32; PACKET_SIZE],

@@ -10,6 +10,7 @@ use crate::math::lanes::{PACKET_SIZE, Simd, Vec3x16, lane, set_lane};
 use crate::world::{SimdKernel, World};
 
 /// Shadow rays of a packet of vertices, and their contributions.
+#[repr(align(64))]
 struct QueuedShadowRays {
     /// Index of the packet of vertices.
     row: u32,

@@ -20,6 +20,7 @@ pub struct PhotonPosition {
 /// known in advance (Chao, *A General Purpose Unequal Probability Sampling Plan*, 1982). A single random
 /// number is enough for all choices because it can be rescaled after each choice.
 #[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
 pub struct LaneReservoirs {
     random: F32x16,
     totals: F32x16,

@@ -14,6 +14,7 @@ use crate::scene::description::Shadows;
 
 /// A packet of vertices for direct lighting.
 #[derive(Clone)]
+#[repr(align(64))]
 pub struct VertexBatch {
     /// Mask of lanes with a vertex.
     pub used: u32,
@@ -379,6 +380,7 @@ impl VertexBatch {
 }
 
 /// BSDF values and cosines of a packet of vertices, for one direction per vertex.
+#[repr(align(64))]
 pub struct Response {
     /// BSDF values.
     pub bsdf: BsdfValues,

@@ -64,6 +64,7 @@ impl PacketSource<'_> {
 
 /// Hits of a packet. A surface is plain if its ray is in air, its shape and the textures of its non-specular material
 /// can be evaluated in packets, and all plain surfaces of the packet have the same kind of BSDF.
+#[repr(align(64))]
 pub struct PacketHits {
     hits: HitPacket,
     object: [u32; PACKET_SIZE],

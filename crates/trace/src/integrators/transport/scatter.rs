@@ -76,6 +76,7 @@ pub struct SampleBsdf<'a> {
 }
 
 /// Sampled directions at a packet of vertices.
+#[repr(align(64))]
 pub struct Scattered {
     /// Mask of paths that continue.
     alive: u32,

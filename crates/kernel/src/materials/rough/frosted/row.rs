@@ -13,6 +13,7 @@ use crate::math::lanes::{F32x16, PACKET_SIZE, Simd, SimdKernel, TRUE, Vec3x16, l
 /// The reflection or the transmission of a packet of rough glass surfaces. Both shared values are f of the
 /// lobe, even if it is not shown.
 #[derive(Clone, Debug)]
+#[repr(align(64))]
 pub struct GlassRow<const THROUGH: bool> {
     /// Unit normals that face the viewer.
     normal: Vec3x16,

@@ -16,6 +16,7 @@ use crate::math::lanes::{F32x16, Mask, PACKET_SIZE, Simd, Vec3x16, lane, mask_fr
 /// other lanes. The shared values are the largest component of f (in monochrome and color rendering alike),
 /// and f for a reflectance of 1.
 #[derive(Clone, Debug)]
+#[repr(align(64))]
 pub struct ConductorRow<const BRUSHED: bool> {
     /// Unit normals that face the viewer.
     normal: Vec3x16,

@@ -12,6 +12,7 @@ use crate::math::lanes::{
 
 /// A packet of Phong surfaces. The shared values are [`gloss`].
 #[derive(Clone, Debug)]
+#[repr(align(64))]
 pub struct PhongRow {
     /// The view direction reflected at the normal.
     mirrored_eye: Vec3x16,

@@ -19,6 +19,7 @@ use crate::math::lanes::{
 /// A packet of plastic surfaces. The shared values are the largest component of f of all lobes, and the
 /// coat's transmittance in both directions.
 #[derive(Clone, Debug)]
+#[repr(align(64))]
 pub struct PlasticRow {
     /// Unit normals that face the viewer.
     normal: Vec3x16,

@@ -17,6 +17,7 @@ use crate::math::lanes::{F32x16, Mask, PACKET_SIZE, Simd, Vec3x16, lane, mask_fr
 /// A packet of principled surfaces, for either reflected or transmitted light. The first shared value is the
 /// largest component of f of all lobes. The second one is unused.
 #[derive(Clone, Debug)]
+#[repr(align(64))]
 pub struct PrincipledRow<const THROUGH: bool> {
     /// Unit normals that face the viewer. For transmitted light, they are on the other side.
     normal: Vec3x16,

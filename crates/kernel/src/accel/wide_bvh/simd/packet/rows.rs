@@ -4,6 +4,7 @@ use crate::accel::{F32x16, PACKET_SIZE as SIZE};
 use crate::geometry::Ray;
 
 /// Rays in structure-of-arrays layout.
+#[repr(align(64))]
 pub struct Rows {
     pub origin: [F32x16; 3],
     pub direction: [F32x16; 3],
