@@ -63,6 +63,14 @@ pub struct Transmittance {
     pub lookups: u64,
 }
 
+impl Transmittance {
+    /// Sets the transmittance along the ray of a lane.
+    fn set(&mut self, lane: usize, left: Vec3) {
+        set_lane(&mut self.left, lane, left);
+        self.occluded |= u32::from(left == Vec3::ZERO) << lane;
+    }
+}
+
 impl World {
     /// Whether any surface may be a null interaction.
     #[inline(always)]
@@ -175,6 +183,14 @@ impl SimdKernel for TransmittanceKernel<'_> {
         let geometry: &Geometry = &world.geometry;
         let each_mesh = see_through.is_any_merged || traced & geometry.to_whole_merged(sources) != 0;
         let tree = if each_mesh { geometry.tree() } else { geometry.visited() };
+        if tree.has_shells() {
+            for lane in lanes(traced) {
+                let ray = Ray { t_max: ends[lane], ..rows.ray(lane) };
+                let left = world.transmittance(&ray, sources.source(lane), &mut transmittance.lookups);
+                transmittance.set(lane, left);
+            }
+            return transmittance;
+        }
         let occluders = Occluders::new(geometry, rows, sources, simd);
         let mut solid = OpaqueOccluders { occluders, see_through, near: 0 };
         transmittance.occluded = tree.any_packet(rows, ends, traced, geometry.unbounded(), &mut solid, simd);
@@ -187,8 +203,7 @@ impl SimdKernel for TransmittanceKernel<'_> {
                 sources.source(lane),
                 &mut transmittance.lookups,
             );
-            set_lane(&mut transmittance.left, lane, left);
-            transmittance.occluded |= u32::from(left == Vec3::ZERO) << lane;
+            transmittance.set(lane, left);
         }
         transmittance
     }

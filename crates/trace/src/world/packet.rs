@@ -26,6 +26,9 @@ impl Geometry {
         traced: u32,
         simd: impl Simd,
     ) -> (HitPacket, [u32; PACKET_SIZE]) {
+        if self.visited().has_shells() {
+            return self.closest_by_each(rows, ends, traced);
+        }
         let mut nearest = ClosestObject {
             geometry: self,
             rows,
@@ -66,6 +69,25 @@ impl Geometry {
         (0..PACKET_SIZE).filter(|&lane| is_whole(lane)).fold(0, |bits, lane| bits | 1 << lane)
     }
 
+    /// [`Geometry::closest_rows`], ray by ray.
+    #[cold]
+    #[inline(never)]
+    fn closest_by_each(
+        &self,
+        rows: &RayPacket,
+        ends: &mut F32x16,
+        traced: u32,
+    ) -> (HitPacket, [u32; PACKET_SIZE]) {
+        let (mut hits, mut objects) = (HitPacket::none(), [NONE; PACKET_SIZE]);
+        for lane in lanes(traced) {
+            if let Some(hit) = self.closest(&Ray { t_max: ends[lane], ..rows.ray(lane) }) {
+                hits.put(lane, &hit.shape);
+                (objects[lane], ends[lane]) = (hit.object, hit.shape.t);
+            }
+        }
+        (hits, objects)
+    }
+
     /// Calls [`Geometry::occluded`] for each ray.
     #[cold]
     #[inline(never)]
@@ -97,8 +119,7 @@ impl SimdKernel for OcclusionKernel<'_> {
     #[inline(always)]
     fn run(self, simd: impl Simd) -> u32 {
         let Self { geometry, rows, ends, traced, sources } = self;
-        let by_each = traced & geometry.to_whole_merged(sources);
-        if by_each != 0 {
+        if geometry.visited().has_shells() || traced & geometry.to_whole_merged(sources) != 0 {
             return geometry.occluded_by_each(rows, ends, traced, sources);
         }
         let mut occluders = Occluders::new(geometry, rows, sources, simd);
@@ -330,6 +351,15 @@ pub(super) mod tests {
                 assert_packets(&geometry(accel).with(instructions));
             }
         }
+    }
+
+    #[test]
+    fn packet_hits_equal_single_ray_hits_in_nested_spheres() {
+        let sphere = |i: u32| Sphere { center: DVec3::ZERO, radius: 0.5 + f64::from(i) / 64.0 };
+        let spheres = (0..200).map(|i| Object::Shape(Shape::Sphere(sphere(i))));
+        let geometry = Geometry::build(spheres.collect(), &CancelToken::new()).expect("nobody cancels");
+        assert!(geometry.visited().has_shells());
+        assert_packets(&geometry);
     }
 
     struct Occluded<'a> {

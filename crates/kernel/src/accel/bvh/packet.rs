@@ -162,9 +162,6 @@ impl Bvh {
         closest: &mut impl ClosestTest,
         simd: impl Simd,
     ) {
-        if let Some(shells) = &self.shells {
-            return self.closest_packet_nested(shells, rays, ends, traced, outside, closest);
-        }
         let slabs = SlabPacket::new(rays, simd);
         let (mut leaf, mut in_leaf) = (outside, traced);
         let mut near = PendingSubtrees::sorted(self.top_met(&slabs, ends, traced, simd));
@@ -227,9 +224,6 @@ impl Bvh {
         any: &mut impl AnyTest,
         simd: impl Simd,
     ) -> u32 {
-        if let Some(shells) = &self.shells {
-            return self.any_packet_nested(shells, rays, ends, traced, outside, any);
-        }
         let slabs = SlabPacket::new(rays, simd);
         let mut free = traced;
         let (mut leaf, mut in_leaf) = (outside, traced);

@@ -4,10 +4,8 @@
 
 use arrayvec::ArrayVec;
 
-use super::{AnyTest, Bvh, ChildRef, ClosestTest, DEEP_STACK};
-use crate::accel::{F32x16, PACKET_SIZE};
+use super::{Bvh, ChildRef, DEEP_STACK};
 use crate::geometry::aabb::{SLAB_PAD, SlabRay};
-use crate::geometry::packet::{RayPacket, lanes};
 use crate::geometry::{Aabb, Ray, RayF64};
 use crate::math::DVec3;
 
@@ -113,6 +111,12 @@ pub enum Met {
 }
 
 impl Bvh {
+    /// Whether the tree has shells. Single rays use them; packets visit the boxes and are slow in such trees.
+    #[inline(always)]
+    pub fn has_shells(&self) -> bool {
+        self.shells.is_some()
+    }
+
     /// Adds shells if many primitives are nested. `shell` returns the shell of one primitive.
     pub fn with_shells(self, shell: impl Fn(u32) -> Shell) -> Self {
         if !self.is_nested {
@@ -191,7 +195,7 @@ impl Bvh {
         }
     }
 
-    /// [`Bvh::closest`] with shells.
+    /// [`Bvh::closest`] with shells. The callback is `dyn` because a copy per caller would not be faster.
     #[cold]
     #[inline(never)]
     pub(super) fn closest_nested(
@@ -247,51 +251,6 @@ impl Bvh {
             stack.extend((0..2).filter(is_met).map(|side| node.child[side]));
         }
         false
-    }
-
-    /// [`Bvh::closest_packet`] with shells: traces the rays one by one. The callback is `dyn` so that the hot
-    /// traversals stay small: otherwise it is inlined here again.
-    #[cold]
-    #[inline(never)]
-    pub(super) fn closest_packet_nested(
-        &self,
-        shells: &[[Shell; 2]],
-        rays: &RayPacket,
-        ends: &mut F32x16,
-        traced: u32,
-        outside: &[u32],
-        closest: &mut dyn ClosestTest,
-    ) {
-        outside.iter().for_each(|&id| closest.test(id, traced, ends));
-        for lane in lanes(traced).take(PACKET_SIZE) {
-            let ray = Ray { t_max: ends[lane], ..rays.ray(lane) };
-            self.closest_nested(shells, &ray, &mut |id, _| {
-                closest.test(id, 1 << lane, ends);
-                Some(ends[lane])
-            });
-        }
-    }
-
-    /// [`Bvh::any_packet`] with shells: traces the rays one by one.
-    #[cold]
-    #[inline(never)]
-    pub(super) fn any_packet_nested(
-        &self,
-        shells: &[[Shell; 2]],
-        rays: &RayPacket,
-        ends: &F32x16,
-        traced: u32,
-        outside: &[u32],
-        any: &mut dyn AnyTest,
-    ) -> u32 {
-        let mut hit = outside.iter().fold(0, |hit, &id| hit | any.test(id, traced, ends));
-        for lane in lanes(traced & !hit).take(PACKET_SIZE) {
-            let ray = Ray { t_max: ends[lane], ..rays.ray(lane) };
-            let is_hit =
-                self.any_nested(shells, &ray, &mut |id| any.test(id, 1 << lane, ends) & 1 << lane != 0);
-            hit |= u32::from(is_hit) << lane;
-        }
-        hit
     }
 }
 

@@ -54,55 +54,17 @@ fn brute(spheres: &[Sphere], ray: &Ray) -> Option<(f32, u32)> {
     hits.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))
 }
 
-/// Tests each sphere against the rays of a packet, one ray at a time.
-struct Packet<'a> {
-    spheres: &'a [Sphere],
-    rays: &'a [Ray],
-    best: [Option<(f32, u32)>; PACKET_SIZE],
-}
-
-impl ClosestTest for Packet<'_> {
-    fn test(&mut self, id: u32, met: u32, ends: &mut F32x16) {
-        for lane in lanes(met) {
-            let ray = Ray { t_max: ends[lane], ..self.rays[lane] };
-            let Some(hit) = self.spheres[id as usize].intersect(&ray.to_f64()) else { continue };
-            let best = self.best[lane].filter(|best| *best < (hit.t, id)).unwrap_or((hit.t, id));
-            (self.best[lane], ends[lane]) = (Some(best), best.0);
-        }
-    }
-}
-
-impl AnyTest for Packet<'_> {
-    fn test(&mut self, id: u32, met: u32, ends: &F32x16) -> u32 {
-        let is_hit = |lane: &usize| {
-            let ray = Ray { t_max: ends[*lane], ..self.rays[*lane] };
-            self.spheres[id as usize].intersect(&ray.to_f64()).is_some()
-        };
-        lanes(met).filter(is_hit).map(|lane| 1 << lane).sum()
-    }
-}
-
 #[test]
 fn nested_hits_match_brute_force() {
     for spread in [0.0, 1e-4, 0.02] {
         let spheres = spheres(200, spread);
         let tree = tree(&spheres);
         assert!(tree.shells.is_some(), "{spread}");
-        for rays in rays(800).chunks(PACKET_SIZE) {
-            let expected: Vec<_> = rays.iter().map(|ray| brute(&spheres, ray)).collect();
-            let (packet, mut ends) = RayPacket::new(rays);
-            let traced = (1 << rays.len()) - 1;
-            let mut tests = Packet { spheres: &spheres, rays, best: [None; PACKET_SIZE] };
-            let simd = crate::math::lanes::PortableSimd;
-            let any = tree.any_packet(&packet, &ends, traced, &[], &mut tests, simd);
-            tree.closest_packet(&packet, &mut ends, traced, &[], &mut tests, simd);
-            for (lane, (ray, expected)) in rays.iter().zip(&expected).enumerate() {
-                assert_eq!(closest(&tree, &spheres, ray).0, *expected, "{ray:?}");
-                assert_eq!(tests.best[lane], *expected, "{ray:?}");
-                let is_hit = |id: u32| spheres[id as usize].intersect(&ray.to_f64()).is_some();
-                let found = [tree.any(ray, is_hit), any & 1 << lane != 0];
-                assert_eq!(found, [expected.is_some(); 2], "{ray:?}");
-            }
+        for ray in &rays(800) {
+            let expected = brute(&spheres, ray);
+            assert_eq!(closest(&tree, &spheres, ray).0, expected, "{ray:?}");
+            let is_hit = |id: u32| spheres[id as usize].intersect(&ray.to_f64()).is_some();
+            assert_eq!(tree.any(ray, is_hit), expected.is_some(), "{ray:?}");
         }
     }
 }
