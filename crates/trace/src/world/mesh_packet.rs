@@ -3,7 +3,7 @@
 use super::MeshInstance;
 use super::placement::{IdentityPlacement, MeshPlacement};
 use super::triangle_point::PlacedMesh;
-use crate::accel::PACKET_SIZE;
+use crate::accel::{PACKET_SIZE, SimdKernel};
 use crate::geometry::packet::{HitPacket, RayPacket, lanes};
 use crate::geometry::surface_packet::SurfacePacket;
 use crate::materials::UvSet;
@@ -23,12 +23,7 @@ impl MeshInstance {
         asked_uvs: Option<UvSet>,
         simd: impl Simd,
     ) {
-        let at = (rays, hits);
-        if self.is_transformed {
-            self.fill_placed(self.placed(&self.transform), surface, at, of, asked_uvs, simd);
-        } else {
-            self.fill_placed(self.placed(IdentityPlacement), surface, at, of, asked_uvs, simd);
-        }
+        simd.call(FillSurfaces { mesh: self, surface, rays, hits, of, asked_uvs });
     }
 
     #[inline(always)]
@@ -100,6 +95,30 @@ impl MeshInstance {
     }
 }
 
+/// Kernel of [`MeshInstance::fill_surfaces`].
+struct FillSurfaces<'a> {
+    mesh: &'a MeshInstance,
+    surface: &'a mut SurfacePacket,
+    rays: &'a RayPacket,
+    hits: &'a HitPacket,
+    of: u32,
+    asked_uvs: Option<UvSet>,
+}
+
+impl SimdKernel for FillSurfaces<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self, simd: impl Simd) {
+        let Self { mesh, surface, rays, hits, of, asked_uvs } = self;
+        if mesh.is_transformed {
+            mesh.fill_placed(mesh.placed(&mesh.transform), surface, (rays, hits), of, asked_uvs, simd);
+        } else {
+            mesh.fill_placed(mesh.placed(IdentityPlacement), surface, (rays, hits), of, asked_uvs, simd);
+        }
+    }
+}
+
 /// Corrects the doubtful points one by one. Returns the lanes whose points were moved onto their rays. Not inlined,
 /// to keep the SIMD code small.
 #[cold]
@@ -146,7 +165,7 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::accel::{InstructionSet, SimdKernel};
+    use crate::accel::InstructionSet;
     use crate::assets::LoadedMesh;
     use crate::control::CancelToken;
     use crate::geometry::mesh::TriangleMesh;
@@ -157,7 +176,7 @@ mod tests {
     use crate::scene::description::Accel;
     use crate::world::MeshTree;
 
-    struct FillSurfaces<'a> {
+    struct FillMesh<'a> {
         mesh: &'a MeshInstance,
         rays: &'a [Ray],
         hits: &'a HitPacket,
@@ -165,7 +184,7 @@ mod tests {
         set: UvSet,
     }
 
-    impl SimdKernel for FillSurfaces<'_> {
+    impl SimdKernel for FillMesh<'_> {
         type Output = SurfacePacket;
 
         #[inline(always)]
@@ -251,7 +270,7 @@ mod tests {
                     hits.put(i, &hit);
                 }
                 let (of, set) = (u32::MAX >> (32 - PACKET_SIZE), UvSet::First);
-                let filling = FillSurfaces { mesh: &mesh, rays: &rays, hits: &hits, of, set };
+                let filling = FillMesh { mesh: &mesh, rays: &rays, hits: &hits, of, set };
                 let row = InstructionSet::best().run(filling);
                 for (i, ray) in rays.iter().enumerate() {
                     let exact = ray.origin.as_dvec3() + ray.direction.as_dvec3();
@@ -289,8 +308,7 @@ mod tests {
                     .into_iter()
                     .flat_map(|one| [UvSet::First, UvSet::Second].map(|set| (one, set)))
                 {
-                    let row =
-                        instructions.run(FillSurfaces { mesh: &mesh, rays: &rays, hits: &hits, of, set });
+                    let row = instructions.run(FillMesh { mesh: &mesh, rays: &rays, hits: &hits, of, set });
                     assert_eq!(row.smooth, if mesh.smooth { of } else { 0 });
                     for i in (0..PACKET_SIZE).filter(|i| of & 1 << i != 0) {
                         let hit = hits.get(i).expect("a hit");

@@ -2,7 +2,7 @@
 
 use super::node::{LightTreeNode, NodeChild, ReceiverPacket};
 use super::{LightTree, ROOT};
-use crate::math::lanes::{F32x16, PACKET_SIZE};
+use crate::math::lanes::{F32x16, PACKET_SIZE, Simd, SimdKernel};
 
 /// Importance of each light of a single-node tree, for a packet of points.
 pub struct SingleNodeImportance<'a> {
@@ -31,9 +31,12 @@ impl LightTree {
         &self,
         receivers: &ReceiverPacket,
         has_lobes: bool,
+        simd: impl Simd,
     ) -> Option<SingleNodeImportance<'_>> {
-        self.is_single_node()
-            .then(|| SingleNodeImportance::new(&self.nodes[ROOT as usize], receivers, has_lobes))
+        if !self.is_single_node() {
+            return None;
+        }
+        Some(simd.call(ImportanceKernel { node: &self.nodes[ROOT as usize], receivers, has_lobes }))
     }
 
     /// Whether the tree consists of a single node.
@@ -43,9 +46,19 @@ impl LightTree {
     }
 }
 
-impl<'a> SingleNodeImportance<'a> {
+/// Kernel of [`LightTree::single_node_importance`].
+struct ImportanceKernel<'a, 'b> {
+    node: &'a LightTreeNode,
+    receivers: &'b ReceiverPacket,
+    has_lobes: bool,
+}
+
+impl<'a> SimdKernel for ImportanceKernel<'a, '_> {
+    type Output = SingleNodeImportance<'a>;
+
     #[inline(always)]
-    fn new(node: &'a LightTreeNode, receivers: &ReceiverPacket, has_lobes: bool) -> Self {
+    fn run(self, _: impl Simd) -> SingleNodeImportance<'a> {
+        let Self { node, receivers, has_lobes } = self;
         let (mut importance, mut totals) = ([[0.0; PACKET_SIZE]; PACKET_SIZE], [0.0; PACKET_SIZE]);
         for child in 0..node.count as usize % (PACKET_SIZE + 1) {
             importance[child] = node.expected_for_child(child, receivers, has_lobes);
@@ -53,9 +66,11 @@ impl<'a> SingleNodeImportance<'a> {
                 totals[i] += f64::from(importance[child][i]);
             }
         }
-        Self { node, importance, totals }
+        SingleNodeImportance { node, importance, totals }
     }
+}
 
+impl SingleNodeImportance<'_> {
     /// Picks a light for each point. `u` is in [0, 1).
     #[inline(always)]
     pub fn pick(&self, u: &[f64; PACKET_SIZE]) -> PacketPicks {

@@ -13,6 +13,7 @@ use crate::geometry::triangle::Triangle;
 use crate::lights::delta::{Falloff, PointLight, SpotLight};
 use crate::lights::infinite::{DirectionalLight, Environment};
 use crate::lights::{AreaLight, Emitter, Light, LightPart, Lights, MeshEmitter, Side, area_light};
+use crate::math::lanes::PortableSimd;
 use crate::math::{DVec3, Vec3, random};
 
 /// A light with a random kind, size, and position.
@@ -386,7 +387,7 @@ fn packet_picks_match_single_picks() {
             for (i, receiver) in receivers.iter().enumerate() {
                 receiver.lobe.iter().for_each(|lobe| row.set_lobe(i, lobe));
             }
-            let shares = tree.single_node_importance(&row, round % 2 == 0).expect("one node");
+            let shares = tree.single_node_importance(&row, round % 2 == 0, PortableSimd).expect("one node");
             let numbers: [f64; PACKET_SIZE] = std::array::from_fn(|_| f64::from(next()));
             let picks = shares.pick(&numbers);
             assert_eq!(shares.probabilities(&picks), picks.probabilities);

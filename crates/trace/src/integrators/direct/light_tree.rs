@@ -62,7 +62,7 @@ impl<const MIS: bool> SimdKernel for SampleLightTree<'_, MIS> {
         let mut pool = (samples <= PICK_BLOCK).then_some(pool);
         // Pick lights for several samples together, and sample the picked lights.
         for first in (0..samples).step_by(PICK_BLOCK as usize) {
-            let picks = lighting.picks(selection, &sampler, first..(first + PICK_BLOCK).min(samples));
+            let picks = lighting.picks(selection, &sampler, first..(first + PICK_BLOCK).min(samples), simd);
             for (k, pick) in (first * each..).zip(&picks) {
                 let mut sink = PickSink { tree, row: number, pool: pool.as_deref_mut(), sums: &mut sums };
                 lighting.sample_pick(pick, &sampler, (k, samples * each), &mut sink, simd);
@@ -123,6 +123,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         LightSampler { tree, picks: way, .. }: LightSampler<'_>,
         sampler: &SamplerPacket<PACKET_SIZE>,
         samples: Range<u32>,
+        simd: impl Simd,
     ) -> Vec<LightPicks> {
         let row = self.row;
         let count = self.tile.settings.render.shadow_samples * way.count;
@@ -149,7 +150,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         // Pick lights with these numbers.
         let mut picks = vec![LightPicks::EMPTY; numbers.len()];
         if tree.is_single_node() {
-            self.pick_flat(tree, &numbers, &mut picks);
+            self.pick_flat(tree, &numbers, &mut picks, simd);
         } else {
             self.pick_by_cuts(tree, way, &numbers, &mut picks);
         }
@@ -161,7 +162,13 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
 
     /// Picks lights from a tree with a single node, for all vertices at once.
     #[inline(always)]
-    fn pick_flat(&self, tree: &LightTree, numbers: &[[f64; PACKET_SIZE]], picks: &mut [LightPicks]) {
+    fn pick_flat(
+        &self,
+        tree: &LightTree,
+        numbers: &[[f64; PACKET_SIZE]],
+        picks: &mut [LightPicks],
+        simd: impl Simd,
+    ) {
         let row = self.row;
         // Estimate the light from each source at each vertex, including glossy lobes.
         let plain = ReceiverPacket::plain(&row.from, &row.normal);
@@ -172,9 +179,11 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
             }
         }
         // Normalize the estimates.
-        let Some(shares) = tree.single_node_importance(&glossy, row.bsdf.has_narrow_lobes()) else { return };
+        let Some(shares) = tree.single_node_importance(&glossy, row.bsdf.has_narrow_lobes(), simd) else {
+            return;
+        };
         let without = (MIS && row.bsdf.has_narrow_lobes())
-            .then(|| tree.single_node_importance(&plain, false))
+            .then(|| tree.single_node_importance(&plain, false, simd))
             .flatten();
         // Pick lights with each row of numbers.
         for (numbers, pick) in numbers.iter().zip(picks) {
