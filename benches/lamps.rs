@@ -3,10 +3,10 @@
 //! `cargo bench --bench lamps` renders a room with 10, 100, 1000 and 10,000 small lights using both
 //! integrators: first a reference with many samples, then three images with four samples per pixel.
 //!
-//! The error is inversely proportional to the number of samples, so seconds × relMSE / 1e-2 is the time to
-//! reach a relMSE of 1e-2 if fractional samples were possible. The last columns show the smallest whole
-//! number of samples with a relMSE of at most 1e-2, and the time of the lights and render stages with that
-//! many samples. `-- whitted 10 1000` selects rows.
+//! The error is inversely proportional to the number of samples, so seconds × relMSE / 1e-2 would be the time
+//! to reach a relMSE of 1e-2 if fractional sample counts were possible. The last columns show the smallest
+//! whole number of samples with a relMSE of at most 1e-2, and the time of the lights and render stages with
+//! that many samples. `-- whitted 10 1000` selects rows.
 
 #![allow(clippy::print_stdout)]
 

@@ -11,7 +11,7 @@ use std::process::{Command, Stdio};
 use glimt::film::Picture;
 use glimt::math::Vec3;
 use glimt::math::color::srgb8_to_linear;
-use glimt::tui::{ColorDepth, PreviewChoice, filled_squares, shown, xterm_rgb};
+use glimt::tui::{ColorDepth, PreviewChoice, draw_for_dark_xterm, filled_squares, xterm_rgb};
 use ratatui::buffer::{Buffer, Cell};
 use ratatui::layout::Rect;
 use ratatui::style::Color;
@@ -83,7 +83,9 @@ pub(crate) fn print() -> Result<(), Box<dyn Error>> {
         print!("{:<22}", mode.name);
         for name in ["cornell_glass", "textures", "shapes"] {
             let file = folder.join(name).with_extension("png");
-            let own = errors(&file, |picture, _| Ok(Some(shown(picture, mode.preview, mode.depth, WINDOW))))?;
+            let own = errors(&file, |picture, _| {
+                Ok(Some(draw_for_dark_xterm(picture, mode.preview, mode.depth, WINDOW)))
+            })?;
             let mut best: Option<[f32; 2]> = None;
             for dither in ["none", "ordered", "diffusion"] {
                 let found = errors(&file, |_, area| chafa(&file, area, &mode, dither))?;
@@ -107,7 +109,8 @@ fn errors(
     let image = image::open(file)?.to_rgb8();
     let pixels = image.pixels().map(|pixel| pixel.0).collect();
     let picture = Picture { width: image.width(), height: image.height(), pixels };
-    let place = place(&shown(&picture, PreviewChoice::HalfBlock, ColorDepth::TrueColor, WINDOW));
+    let place =
+        place(&draw_for_dark_xterm(&picture, PreviewChoice::HalfBlock, ColorDepth::TrueColor, WINDOW));
     let Some(buffer) = draw(&picture, place)? else { return Ok(None) };
     let area = if buffer.area == WINDOW { place } else { buffer.area };
     let seen = LinearImage::of_cells(&buffer, area);

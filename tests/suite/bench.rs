@@ -99,7 +99,7 @@ fn bench_measures_a_scene_end_to_end() {
 }
 
 #[test]
-fn errors_are_reproducible_references_cached() {
+fn errors_repeat_and_references_are_cached() {
     let dir = box_dir();
     let line = format!("box.toml {SMALL} --integrator path --json");
     bench(&dir, &format!("{line} a.json"), 0);
@@ -199,7 +199,7 @@ fn all_scenes_are_checked_before_measuring() {
 }
 
 #[test]
-fn references_set_size_single_reference_warns() {
+fn references_set_the_size_and_one_warns() {
     let dir = box_dir();
     for seed in [8, 9] {
         let line =

@@ -1,5 +1,5 @@
-//! Checkpoints: a render resumed with --resume has the same pixels as an uninterrupted render, however it
-//! ended.
+//! Checkpoints: however a render ended, resuming it with --resume gives the same pixels as an uninterrupted
+//! render.
 
 use std::fs;
 

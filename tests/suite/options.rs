@@ -326,7 +326,7 @@ fn unknown_word_is_reported_as_a_command() {
     for call in ["room.toml --once", "./schema --once", "scenes/schema --once"] {
         assert_mentions(&dir.expect(call, 2), &[SCENE_NOT_FOUND]);
     }
-    // Also without `--once`, before the screen opens.
+    // Without `--once`, the same error appears before the screen opens.
     let stderr = dir.expect("bal.toml", 2);
     assert_mentions(&stderr, &[SCENE_NOT_FOUND, "ball.toml"]);
     for (call, fact) in [
@@ -389,7 +389,7 @@ fn images_as_scenes_are_rejected_with_info() {
     }
 }
 
-/// Checks the suggestion in the message if the stacks of too many threads exceed the memory limit.
+/// Checks the suggested fix if the stacks of too many threads exceed the memory limit.
 #[cfg(target_os = "linux")]
 #[test]
 fn thread_failure_message_suggests_a_fix() {

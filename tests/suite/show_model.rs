@@ -179,7 +179,7 @@ fn with_image(uri: &str) -> Vec<u8> {
     }))
 }
 
-/// A model from an untrusted source must not copy arbitrary local files into the scene's folder.
+/// Importing an untrusted model must not copy arbitrary local files into the scene's folder.
 #[test]
 fn import_copies_only_images() {
     let dir = TestDir::new();

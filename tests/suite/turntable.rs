@@ -1,4 +1,4 @@
-//! `--turntable`: frames with cameras all around a scene or model.
+//! `--turntable`: frames from cameras all around a scene or model.
 
 use std::io::Cursor;
 use std::process::Stdio;

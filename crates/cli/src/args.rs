@@ -61,7 +61,7 @@ const AFTER_HELP: &str = "Run `glimt --help` for details and examples.";
 
 /// Text after the options in `--help`.
 fn after_long_help() -> String {
-    format!("Examples:\n{EXAMPLES}\n\nExit codes: {EXIT_CODES}\n\n{}", environment::section())
+    format!("Examples:\n{EXAMPLES}\n\nExit codes: {EXIT_CODES}\n\n{}", environment::help_section())
 }
 
 const STYLES: Styles = Styles::styled()
@@ -114,10 +114,10 @@ pub enum Subcommand {
     /// Validate a scene and its files without rendering
     Check {
         /// The scene file
-        #[arg(add = candidates::scenes())]
+        #[arg(add = candidates::scene_completer())]
         scene: PathBuf,
         /// Override a scene key
-        #[arg(long = "set", add = candidates::sets(), value_name = "TABLE.KEY=VALUE")]
+        #[arg(long = "set", add = candidates::set_completer(), value_name = "TABLE.KEY=VALUE")]
         sets: Vec<String>,
         /// Print errors and warnings as one JSON object on stdout
         #[arg(long)]
@@ -171,7 +171,7 @@ pub enum Subcommand {
     #[command(after_long_help = EXPLAIN_HELP)]
     Explain {
         /// A key or table, such as render.samples, materials.metal.roughness, samples or sphere
-        #[arg(add = candidates::keys())]
+        #[arg(add = candidates::key_path_completer())]
         key: Option<String>,
     },
     /// Print the JSON Schema of scenes, for editors
@@ -286,7 +286,7 @@ invalid, or the scene exists already.";
 #[derive(Clone, Debug, clap::Args)]
 pub struct ImportArgs {
     /// The file to read: gltf, glb
-    #[arg(add = candidates::importable())]
+    #[arg(add = candidates::gltf_completer())]
     pub file: PathBuf,
     /// The scene to write [default: FILE with .toml, in the current folder]
     #[arg(short, long, value_name = "SCENE")]
@@ -369,7 +369,7 @@ pub struct CompareArgs {
 #[derive(Clone, Debug, clap::Args)]
 pub struct RenderArgs {
     /// A scene (TOML) or a model: obj, off, ply, stl, glb, gltf
-    #[arg(required = true, add = candidates::scenes_and_models(), value_name = "SCENE")]
+    #[arg(required = true, add = candidates::scene_or_model_completer(), value_name = "SCENE")]
     pub scene: Option<PathBuf>,
     /// Render once, write the image and exit
     #[arg(long)]
@@ -379,7 +379,7 @@ pub struct RenderArgs {
     ///
     /// For example render.samples=3, materials.wall.diffuse=red, sphere.2.radius=.3 (the second sphere) or
     /// sphere.ball.radius=.3 (the sphere named ball). Can be given several times. Dedicated options have precedence.
-    #[arg(long = "set", add = candidates::sets(), value_name = "TABLE.KEY=VALUE")]
+    #[arg(long = "set", add = candidates::set_completer(), value_name = "TABLE.KEY=VALUE")]
     pub sets: Vec<String>,
 
     /// Output file; can be given several times

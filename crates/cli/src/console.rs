@@ -47,19 +47,19 @@ impl Console {
     }
 
     /// Prints a line to stderr. Replaces line breaks within the text with visible characters.
-    pub(super) fn say(&self, text: &str) {
+    pub(super) fn print_message(&self, text: &str) {
         let line = format!("{}\n", visible(text));
         let _ = std::io::stderr().lock().write_all(line.as_bytes());
     }
 
     /// Prints lines to stderr.
-    pub(super) fn say_lines(&self, text: &str) {
-        text.trim_end().lines().for_each(|line| self.say(line));
+    pub(super) fn print_message_lines(&self, text: &str) {
+        text.trim_end().lines().for_each(|line| self.print_message(line));
     }
 
     /// Prints a line to stdout.
-    pub(super) fn answer(&self, text: &str) {
-        self.text(&format!("{}\n", visible(text)));
+    pub(super) fn print_line(&self, text: &str) {
+        self.print_text(&format!("{}\n", visible(text)));
     }
 
     /// Width of stdout in columns, if it is a terminal.
@@ -68,13 +68,13 @@ impl Console {
     }
 
     /// Prints trusted text to stdout unchanged.
-    pub(super) fn text(&self, text: &str) {
+    pub(super) fn print_text(&self, text: &str) {
         let mut stdout = std::io::stdout().lock();
-        self.note(stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()));
+        self.record_stdout_error(stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()));
     }
 
     /// Records an error from writing to stdout.
-    pub(super) fn note(&self, written: io::Result<()>) {
+    pub(super) fn record_stdout_error(&self, written: io::Result<()>) {
         match written {
             // Ignore a closed pipe: the reader, such as `head`, does not want more output.
             Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
@@ -96,12 +96,12 @@ impl Console {
 
     /// Prints `error: …` to stderr and returns `exit`.
     pub(super) fn fail(&self, exit: Exit, message: &str) -> Exit {
-        self.say(&format!("error: {message}"));
+        self.print_message(&format!("error: {message}"));
         exit
     }
 
     /// Prints errors and warnings with their source lines to stderr.
-    pub(super) fn diagnostics(&self, diagnostics: &[Diagnostic]) {
+    pub(super) fn print_diagnostics(&self, diagnostics: &[Diagnostic]) {
         if !diagnostics.is_empty() {
             let text = render(diagnostics, columns(), self.style);
             let _ = writeln!(std::io::stderr().lock(), "{}", text.trim_end());

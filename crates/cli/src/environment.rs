@@ -23,7 +23,7 @@ pub const VARIABLES: [(&str, &str); 14] = [
 ];
 
 /// The `Environment` section of the help.
-pub(super) fn section() -> String {
+pub(super) fn help_section() -> String {
     let line = |(names, effect): &(&str, &str)| format!("\n  {names}\n          {}", effect.replace('`', ""));
     format!("Environment:{}", VARIABLES.iter().map(line).collect::<String>())
 }

@@ -37,7 +37,7 @@ use crate::scene::nearest::nearest;
 use crate::scene::sanitize::visible;
 
 /// Makes any use of rayon's global thread pool panic in debug builds, because that pool ignores `--threads`
-/// and panics if the system is out of threads. Rayon does not retry after the failed initialization here.
+/// and panics if the system is out of threads. Rayon does not retry after its initialization fails here.
 #[cfg(debug_assertions)]
 fn forbid_global_pool() {
     let refuse = |_| Err(std::io::Error::other("the global pool is not used"));
@@ -50,9 +50,9 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> Exit {
     forbid_global_pool();
     crate::output::write::prepare_process();
     // Without the handler, an abort ends the process as usual.
-    let _ = crate::system::abort::catch();
+    let _ = crate::system::abort::install_abort_handler();
     let arguments: Vec<OsString> = arguments.into_iter().collect();
-    if let Some(exit) = commands::completions::answer(&arguments) {
+    if let Some(exit) = commands::completions::answer_completion_request(&arguments) {
         return exit;
     }
     if arguments.len() <= 1 {
@@ -91,8 +91,8 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> Exit {
     console.end(exit)
 }
 
-fn render(order: lower::Order, console: &Console) -> Exit {
-    match commands::info::instead_of_scene(&order.scene, order.is_in_json(), console) {
+fn render(order: lower::RenderRequest, console: &Console) -> Exit {
+    match commands::info::report_image_instead_of_scene(&order.scene, order.is_in_json(), console) {
         Some(exit) => exit,
         None if order.is_once => once::run(&order, console),
         None => live::run(order, console),
@@ -111,7 +111,7 @@ Run `glimt -h` for all commands and options.";
 
 /// Runs glimt without arguments.
 fn run_without_arguments() -> Exit {
-    Console::new(crate::tui::ColorChoice::Auto).say_lines(GETTING_STARTED);
+    Console::new(crate::tui::ColorChoice::Auto).print_message_lines(GETTING_STARTED);
     Exit::WRONG
 }
 
@@ -119,13 +119,13 @@ fn run_without_arguments() -> Exit {
 fn report_parse_error(error: &clap::Error, arguments: &[OsString]) -> Exit {
     let console = Console::new(crate::tui::ColorChoice::Auto);
     if !error.use_stderr() {
-        console.note(error.print().and_then(|()| io::stdout().flush()));
+        console.record_stdout_error(error.print().and_then(|()| io::stdout().flush()));
         return console.end(Exit::DONE);
     }
-    if let Some(message) = second_scene(error).and_then(|_| unknown_command(arguments)) {
+    if let Some(message) = extra_argument(error).and_then(|_| unknown_command(arguments)) {
         return console.fail(Exit::WRONG, &message);
     }
-    if let Some(second) = second_scene(error) {
+    if let Some(second) = extra_argument(error) {
         let message = format!("glimt takes one scene; got a second: {second:?}");
         return console.fail(Exit::WRONG, &message);
     }
@@ -136,7 +136,7 @@ fn report_parse_error(error: &clap::Error, arguments: &[OsString]) -> Exit {
         Err(error) if error.use_stderr() => {
             let _ = error.print();
         }
-        _ => console.say_lines(&error.render().to_string()),
+        _ => console.print_message_lines(&error.render().to_string()),
     }
     Exit::WRONG
 }
@@ -163,7 +163,7 @@ fn mistyped_command(word: &Path) -> Option<String> {
 }
 
 /// An extra argument after the scene that is neither an option nor a command.
-fn second_scene(error: &clap::Error) -> Option<&str> {
+fn extra_argument(error: &clap::Error) -> Option<&str> {
     use clap::error::{ContextKind, ContextValue, ErrorKind};
     let word = match error.get(ContextKind::InvalidSubcommand).or(error.get(ContextKind::InvalidArg)) {
         Some(ContextValue::String(word)) if error.kind() == ErrorKind::ArgumentConflict => word,

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use crate::console::Console;
 use crate::exit::Exit;
-use crate::lower::Order;
+use crate::lower::RenderRequest;
 use crate::output::held;
 use crate::pipeline::protocol::{CheckpointNews, Command, Event, Failure, Stage, Status};
 use crate::pipeline::start;
@@ -15,23 +15,23 @@ use crate::pipeline::watch::{ExternalChange, Watcher, missing_folder};
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::sanitize::visible;
 use crate::scene::{SAME_TEXT, is_absence, text_now};
-use crate::system::threads::start_failure;
+use crate::system::threads::describe_start_failure;
 use crate::tui::messages::WAITING_FOR_FILE;
 use crate::tui::{self, ExitStatus, Options, TuiError, TuiOutcome};
 
-/// How long to wait at exit for an image to be written. After that, glimt exits if it received a signal. If
-/// the user pressed a key, glimt prints a message and keeps waiting.
+/// How long to wait at exit for an image to be written. After this time, glimt exits if it received a signal.
+/// If the user quit with a key, glimt prints a message and keeps waiting.
 const EXIT_TIMEOUT: Duration = Duration::from_secs(2);
 
 /// Line printed if glimt exits before the image is written.
 const NOT_WRITTEN: &str = "the image was not written: glimt exited first";
 
 /// Runs the terminal UI.
-pub(super) fn run(order: Order, console: &Console) -> Exit {
+pub(super) fn run(order: RenderRequest, console: &Console) -> Exit {
     // Restore a scene whose replacement was interrupted.
     held::recover(&order.scene);
-    if let Some(absent) = absent(&order.scene) {
-        console.diagnostics(&[absent]);
+    if let Some(absent) = missing_scene_error(&order.scene) {
+        console.print_diagnostics(&[absent]);
         return Exit::WRONG;
     }
     match live(order, console) {
@@ -40,8 +40,8 @@ pub(super) fn run(order: Order, console: &Console) -> Exit {
     }
 }
 
-fn live(order: Order, console: &Console) -> Result<Exit, (Exit, String)> {
-    let no_thread = |error: std::io::Error| (Exit::FAILED, start_failure("a thread", false, &error));
+fn live(order: RenderRequest, console: &Console) -> Result<Exit, (Exit, String)> {
+    let no_thread = |error: std::io::Error| (Exit::FAILED, describe_start_failure("a thread", false, &error));
     let mut worker = start(order.nice).map_err(no_thread)?;
     let (sender, news) = channel();
     let watcher = Watcher::start(order.poll, worker.contents(), move |said| {
@@ -51,7 +51,7 @@ fn live(order: Order, console: &Console) -> Result<Exit, (Exit, String)> {
     .map_err(no_thread)?;
     let (forward, events) = channel();
     let from_worker = std::mem::replace(&mut worker.events, channel().1);
-    let writes = Writes::default();
+    let writes = SharedWriteLog::default();
     let recorder = writes.clone();
     let forward_all =
         move || forward_events(&from_worker, &watcher, &recorder, |event| forward.send(event).is_ok());
@@ -68,8 +68,8 @@ fn live(order: Order, console: &Console) -> Result<Exit, (Exit, String)> {
         notify_after: Duration::try_from_secs_f64(order.notify_after).ok().filter(|time| !time.is_zero()),
         commands: Box::new(move |command| {
             match command {
-                Command::Write => asked.start(),
-                Command::Quit => asked.leave(),
+                Command::Write => asked.record_write_command(),
+                Command::Quit => asked.record_ui_exit(),
                 Command::Render(_)
                 | Command::Preview(_)
                 | Command::KeepCamera(_)
@@ -88,10 +88,10 @@ fn live(order: Order, console: &Console) -> Result<Exit, (Exit, String)> {
     let waits = |ended: &TuiOutcome| {
         ended.status == ExitStatus::QUIT && (ended.is_write_unanswered || writes.is_last_stage())
     };
-    let has_ended = if worker.end_within(EXIT_TIMEOUT) || !outcome.as_ref().is_ok_and(waits) {
+    let has_ended = if worker.stop_within(EXIT_TIMEOUT) || !outcome.as_ref().is_ok_and(waits) {
         worker.finish(Duration::ZERO)
     } else {
-        console.say("waiting for the image to be written; press ctrl-c to quit without it");
+        console.print_message("waiting for the image to be written; press ctrl-c to quit without it");
         worker.finish(Duration::MAX)
     };
     if has_ended {
@@ -99,8 +99,10 @@ fn live(order: Order, console: &Console) -> Result<Exit, (Exit, String)> {
         let _ = forwarder.join();
     }
     if let Ok(ended) = &outcome {
-        let lost = contents.outputs.lost(&contents);
-        last_words(&writes, ended, (has_ended, &lost, &call())).iter().for_each(|line| console.say(line));
+        let lost = contents.outputs.changed_externally(&contents);
+        closing_lines(&writes, ended, (has_ended, &lost, &shell_command_line()))
+            .iter()
+            .for_each(|line| console.print_message(line));
     }
     let exit = |ended: TuiOutcome| match ended.status {
         ExitStatus::QUIT if ended.is_unwritten => Exit::FAILED,
@@ -113,14 +115,15 @@ fn live(order: Order, console: &Console) -> Result<Exit, (Exit, String)> {
 }
 
 /// Lines printed after the terminal UI exits: unreported writes, the summary, the checkpoint and lost
-/// changes. The summary is only printed after `q`, if there are no unreported writes or if a write failed and
-/// earlier files exist. `lost` contains the outputs changed by other programs. `call` is this command line.
-fn last_words(
-    writes: &Writes,
+/// changes. The summary is printed only after `q`, and only if all writes were reported, or if a write failed
+/// but earlier files exist. `lost` contains the outputs changed by other programs. `call` is this command
+/// line.
+fn closing_lines(
+    writes: &SharedWriteLog,
     ended: &TuiOutcome,
     (has_ended, lost, call): (bool, &[(PathBuf, ExternalChange)], &str),
 ) -> Vec<String> {
-    let mut lines = writes.unreported(ended.is_write_unanswered, has_ended);
+    let mut lines = writes.unreported_lines(ended.is_write_unanswered, has_ended);
     let has_earlier_files = ended.is_write_unanswered && ended.has_written && !writes.has_written();
     let has_quit = ended.status == ExitStatus::QUIT;
     let has_summary = has_quit && (lines.is_empty() || has_earlier_files);
@@ -144,7 +147,7 @@ fn last_words(
 }
 
 /// This command line, quoted for a shell.
-fn call() -> String {
+fn shell_command_line() -> String {
     let words = std::env::args().skip(1).map(|word| match shlex::try_quote(&word) {
         Ok(quoted) => quoted.into_owned(),
         Err(_) => word.clone(),
@@ -153,7 +156,7 @@ fn call() -> String {
 }
 
 /// Error if the scene does not exist at startup. If the scene disappears later, glimt waits for it.
-fn absent(scene: &Path) -> Option<Diagnostic> {
+fn missing_scene_error(scene: &Path) -> Option<Diagnostic> {
     if scene.symlink_metadata().is_ok() {
         return None;
     }
@@ -162,12 +165,12 @@ fn absent(scene: &Path) -> Option<Diagnostic> {
 
 /// Results of writing images, shared between threads.
 #[derive(Clone, Debug, Default)]
-struct Writes(Arc<Mutex<WriteLog>>);
+struct SharedWriteLog(Arc<Mutex<WriteLog>>);
 
 /// Results of writing images.
 #[derive(Debug, Default)]
 struct WriteLog {
-    /// A line about each image since the last write command, and whether the image was written after the UI
+    /// One line per image since the last write command, and whether that image was written after the UI
     /// exited.
     lines: Vec<(bool, String)>,
     /// Whether an image was written since the last write command.
@@ -179,33 +182,33 @@ struct WriteLog {
     is_last_stage: bool,
 }
 
-impl Writes {
-    fn state(&self) -> MutexGuard<'_, WriteLog> {
+impl SharedWriteLog {
+    fn lock_log(&self) -> MutexGuard<'_, WriteLog> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Records that the user gave a write command.
-    fn start(&self) {
-        let mut log = self.state();
+    fn record_write_command(&self) {
+        let mut log = self.lock_log();
         log.lines.clear();
         log.has_written = false;
     }
 
     /// Records that the UI has exited.
-    fn leave(&self) {
-        self.state().has_left = true;
+    fn record_ui_exit(&self) {
+        self.lock_log().has_left = true;
     }
 
     fn has_written(&self) -> bool {
-        self.state().has_written
+        self.lock_log().has_written
     }
 
     fn is_last_stage(&self) -> bool {
-        self.state().is_last_stage
+        self.lock_log().is_last_stage
     }
 
-    fn record(&self, event: &Event) {
-        let mut log = self.state();
+    fn record_event(&self, event: &Event) {
+        let mut log = self.lock_log();
         let has_left = log.has_left;
         match event {
             Event::Written { path, .. } => {
@@ -256,13 +259,13 @@ impl Writes {
 
     /// The checkpoint written after the UI exited, or why there is none.
     fn checkpoint(&self) -> Option<Result<PathBuf, String>> {
-        self.state().checkpoint.clone()
+        self.lock_log().checkpoint.clone()
     }
 
     /// Lines about images not reported by the UI: images written after it exited, or all images since an
     /// unanswered write command.
-    fn unreported(&self, is_unanswered: bool, has_ended: bool) -> Vec<String> {
-        let log = self.state();
+    fn unreported_lines(&self, is_unanswered: bool, has_ended: bool) -> Vec<String> {
+        let log = self.lock_log();
         let unknown = log.lines.iter().filter(|(has_left, _)| is_unanswered || *has_left);
         let mut lines: Vec<String> = unknown.map(|(_, line)| line.clone()).collect();
         if !has_ended && (is_unanswered || log.is_last_stage) || is_unanswered && lines.is_empty() {
@@ -276,12 +279,12 @@ impl Writes {
 fn forward_events(
     events: &Receiver<Event>,
     watcher: &Watcher,
-    writes: &Writes,
+    writes: &SharedWriteLog,
     forward: impl Fn(Event) -> bool,
 ) {
     let mut is_connected = true;
     for mut event in events {
-        writes.record(&event);
+        writes.record_event(&event);
         // The UI has exited: only record written images.
         if !is_connected {
             continue;
@@ -332,17 +335,17 @@ mod tests {
             is_unwritten: false,
             not_kept: None,
         };
-        let writes = Writes::default();
-        writes.record(&Event::Written { generation: 1, path: "a.png".into(), bytes: 1, is_own: true });
-        writes.start();
-        writes.leave();
+        let writes = SharedWriteLog::default();
+        writes.record_event(&Event::Written { generation: 1, path: "a.png".into(), bytes: 1, is_own: true });
+        writes.record_write_command();
+        writes.record_ui_exit();
         let message = "the latest image is not written".to_owned();
-        writes.record(&Event::WriteFailed { generation: 2, path: None, message });
+        writes.record_event(&Event::WriteFailed { generation: 2, path: None, message });
         let error = "error: the latest image is not written";
-        let said = |ended: TuiOutcome| last_words(&writes, &ended, (true, &[], "glimt a.toml"));
+        let said = |ended: TuiOutcome| closing_lines(&writes, &ended, (true, &[], "glimt a.toml"));
         assert_eq!(said(ended(true)), [error, summary]);
         assert_eq!(said(ended(false)), [error]);
-        writes.record(&Event::Written { generation: 2, path: "a.png".into(), bytes: 1, is_own: true });
+        writes.record_event(&Event::Written { generation: 2, path: "a.png".into(), bytes: 1, is_own: true });
         assert_eq!(said(ended(true)), [error, "wrote a.png"]);
     }
 
@@ -356,18 +359,18 @@ mod tests {
             is_unwritten: false,
             not_kept: Some("not kept: --shadows off".to_owned()),
         };
-        let writes = Writes::default();
+        let writes = SharedWriteLog::default();
         let lost = [(PathBuf::from("a.png"), ExternalChange::Removed)];
         let said = |status, lost: &[(PathBuf, ExternalChange)]| {
-            last_words(&writes, &ended(status), (true, lost, "glimt a.toml --seed 1"))
+            closing_lines(&writes, &ended(status), (true, lost, "glimt a.toml --seed 1"))
         };
         let not_kept = "not kept: --shadows off";
         assert_eq!(said(ExitStatus::QUIT, &[]), ["a.png not finished (10 %)", not_kept]);
         let removed = "a.png not finished (10 %); a.png was removed since";
         assert_eq!(said(ExitStatus::QUIT, &lost), [removed, not_kept]);
-        writes.leave();
+        writes.record_ui_exit();
         let news = CheckpointNews::Written { path: "a.png.checkpoint".into() };
-        writes.record(&Event::Checkpoint { generation: 1, news });
+        writes.record_event(&Event::Checkpoint { generation: 1, news });
         let continues = "a.png not finished (10 %); glimt a.toml --seed 1 continues";
         assert_eq!(said(ExitStatus::QUIT, &[]), [continues, not_kept]);
         let saved = "progress saved in a.png.checkpoint; run glimt again to resume";

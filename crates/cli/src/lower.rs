@@ -1,4 +1,4 @@
-//! Validates render arguments and lowers them to an [`Order`].
+//! Validates render arguments and lowers them to a [`RenderRequest`].
 
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -19,7 +19,7 @@ const UI_NICENESS: u8 = 10;
 
 /// A validated render request.
 #[derive(Clone, Debug)]
-pub(super) struct Order {
+pub(super) struct RenderRequest {
     pub(super) scene: PathBuf,
     pub(super) overrides: Overrides,
     pub(super) is_once: bool,
@@ -32,7 +32,7 @@ pub(super) struct Order {
     pub(super) nice: u8,
 }
 
-impl Order {
+impl RenderRequest {
     /// Whether errors are reported as JSON lines.
     pub(super) fn is_in_json(&self) -> bool {
         self.is_once && self.progress == Progress::Json
@@ -43,7 +43,7 @@ impl Order {
 ///
 /// # Errors
 /// An error message with a hint.
-pub(super) fn lower(args: RenderArgs) -> Result<Order, String> {
+pub(super) fn lower(args: RenderArgs) -> Result<RenderRequest, String> {
     match args.shard {
         Some(_) if !args.once => {
             return Err("--shard needs --once: the terminal UI renders complete images".to_owned());
@@ -81,7 +81,7 @@ pub(super) fn lower(args: RenderArgs) -> Result<Order, String> {
         overrides.report = Some(STDOUT.into());
     }
     let scene = args.scene.ok_or("no scene given; see glimt --help")?;
-    Ok(Order {
+    Ok(RenderRequest {
         scene,
         overrides,
         is_once: args.once,
@@ -113,13 +113,13 @@ fn check_turntable(args: &RenderArgs) -> Result<(), String> {
         turntable::check_name(path)?;
         check_once(path, &mut known)?;
     }
-    if let Some(twin) = turntable::twin(&args.outputs, args.turntable.unwrap_or(1)) {
+    if let Some(twin) = turntable::first_repeated_file(&args.outputs, args.turntable.unwrap_or(1)) {
         let name = twin.display();
         return Err(format!("{name} would be written twice: choose distinct file names"));
     }
     match &args.report {
         Some(path) if path != Path::new(STDOUT_NAME) && !turntable::has_number(path) => {
-            let name = turntable::suggested(path);
+            let name = turntable::with_placeholder(path);
             Err(format!("a turntable has one report per frame: use --report {}", name.display()))
         }
         Some(_) | None => Ok(()),
@@ -161,7 +161,7 @@ mod tests {
     use crate::pipeline::settings::{Checkpoints, Resume, View};
     use crate::scene::description::{self, KeyRange};
 
-    fn lowered(line: &str) -> Result<Order, String> {
+    fn lowered(line: &str) -> Result<RenderRequest, String> {
         let words = std::iter::once("glimt").chain(line.split_whitespace());
         lower(Args::try_parse_from(words).map_err(|error| error.to_string())?.render)
     }

@@ -2,16 +2,16 @@
 
 /// Lines at the bottom of the terminal, replaced on every update.
 #[derive(Debug, Default)]
-pub(super) struct Block {
+pub(super) struct TerminalBlock {
     rows: usize,
     /// Terminal width in columns when the lines were printed.
     columns: usize,
 }
 
-impl Block {
+impl TerminalBlock {
     /// Returns the output that replaces the block with `lines`. If the terminal's width has changed, keeps
-    /// the old lines, which the terminal may have rewrapped.
-    pub(super) fn redrawn(&mut self, lines: &str, columns: usize) -> String {
+    /// the old lines, because the terminal may have rewrapped them.
+    pub(super) fn redraw(&mut self, lines: &str, columns: usize) -> String {
         let up = if self.rows > 0 && self.columns == columns {
             format!("\x1b[{}A\r\x1b[J", self.rows)
         } else {
@@ -28,11 +28,11 @@ mod tests {
 
     #[test]
     fn blocks_are_redrawn_in_place() {
-        let mut block = Block::default();
-        assert_eq!(block.redrawn("1 of 3 parts\na\nb\n", 80), "1 of 3 parts\na\nb\n");
-        assert_eq!(block.redrawn("2 of 3 parts\n", 80), "\x1b[3A\r\x1b[J2 of 3 parts\n");
-        assert_eq!(block.redrawn("3 of 3 parts\na\n", 60), "3 of 3 parts\na\n", "another width");
-        assert_eq!(block.redrawn("", 60), "\x1b[2A\r\x1b[J");
-        assert_eq!(block.redrawn("x\n", 60), "x\n", "nothing to replace");
+        let mut block = TerminalBlock::default();
+        assert_eq!(block.redraw("1 of 3 parts\na\nb\n", 80), "1 of 3 parts\na\nb\n");
+        assert_eq!(block.redraw("2 of 3 parts\n", 80), "\x1b[3A\r\x1b[J2 of 3 parts\n");
+        assert_eq!(block.redraw("3 of 3 parts\na\n", 60), "3 of 3 parts\na\n", "another width");
+        assert_eq!(block.redraw("", 60), "\x1b[2A\r\x1b[J");
+        assert_eq!(block.redraw("x\n", 60), "x\n", "nothing to replace");
     }
 }

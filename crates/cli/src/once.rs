@@ -7,19 +7,19 @@ use std::time::{Duration, Instant};
 
 use crate::console::Console;
 use crate::exit::Exit;
-use crate::lower::Order;
+use crate::lower::RenderRequest;
 use crate::output::AnimationFormat;
 use crate::pipeline::protocol::{
     CheckpointNews, Command, Event, Failure, Report, Request, Stage, StageReport, Status, Writing,
 };
-use crate::pipeline::settings::{Effective, Overrides};
-use crate::pipeline::turntable::{Turn, left_over};
+use crate::pipeline::settings::{EffectiveSettings, Overrides};
+use crate::pipeline::turntable::{Turn, leftover_frames};
 use crate::pipeline::{Handle, start};
 use crate::progress::{self, Reporter};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::signals;
 use crate::system::priority;
-use crate::system::threads::start_failure;
+use crate::system::threads::describe_start_failure;
 
 /// Time limit for exiting after a signal.
 const EXIT_TIMEOUT: Duration = Duration::from_secs(2);
@@ -29,12 +29,12 @@ const WRITE_TIMEOUT: Duration = Duration::from_secs(1);
 const TICK: Duration = Duration::from_millis(50);
 
 /// Runs `--once`.
-pub(super) fn run(order: &Order, console: &Console) -> Exit {
+pub(super) fn run(order: &RenderRequest, console: &Console) -> Exit {
     // Lower the priority before starting threads, because threads inherit it.
     priority::lower_priority(order.nice);
     let worker = match start(0) {
         Ok(worker) => worker,
-        Err(error) => return console.fail(Exit::FAILED, &start_failure("a thread", false, &error)),
+        Err(error) => return console.fail(Exit::FAILED, &describe_start_failure("a thread", false, &error)),
     };
     let remote = worker.remote();
     let is_again = AtomicBool::new(false);
@@ -47,28 +47,28 @@ pub(super) fn run(order: &Order, console: &Console) -> Exit {
         }
     }) {
         Ok(ended) => ended,
-        Err(error) => return console.fail(Exit::FAILED, &signals::failure(&error)),
+        Err(error) => return console.fail(Exit::FAILED, &signals::describe_catch_failure(&error)),
     };
-    let mut deadline = Deadline::default();
-    let mut written = WrittenFiles::default();
+    let mut deadline = ExitDeadline::default();
+    let mut written = ImagesWrittenSoFar::default();
     let has_checkpoints = order.overrides.checkpoints.seconds > 0.0;
     let mut is_over = |is_writing: bool| {
         let now = Instant::now();
         // Without checkpoints, the image being written would be lost.
         let is_lost = is_writing && !has_checkpoints;
-        if ended.by().is_some() && !is_lost && deadline.stops_writing(now, is_writing) {
+        if ended.signal_number().is_some() && !is_lost && deadline.stops_writing(now, is_writing) {
             worker.send(Command::Cancel);
         }
-        ended.by().is_some() && deadline.is_over(now)
+        ended.signal_number().is_some() && deadline.is_over(now)
     };
     let (mut exit, mut is_whole) = (Exit::DONE, false);
     // Use one reporter per image to clear the progress of the previous frame.
-    let reporter = || progress::reporter(order.progress, order.overrides.time_seconds, console);
+    let reporter = || progress::create_reporter(order.progress, order.overrides.time_seconds, console);
     let mut image_reporter = reporter();
-    for overrides in requests(&order.overrides) {
+    for overrides in render_requests(&order.overrides) {
         let turn = overrides.turn;
         if let Some(Turn { number, of }) = turn.filter(|_| image_reporter.says_results()) {
-            console.say(&format!("frame {} of {of}", number + 1));
+            console.print_message(&format!("frame {} of {of}", number + 1));
         }
         worker.send(Command::Render(Box::new(Request {
             generation: turn.map_or(1, |turn| u64::from(turn.number) + 1),
@@ -82,25 +82,25 @@ pub(super) fn run(order: &Order, console: &Console) -> Exit {
         })));
         image_reporter = reporter();
         let reporter = &mut *image_reporter;
-        exit = follow(&worker, (order, turn), console, reporter, &mut written, &mut is_over);
+        exit = handle_events(&worker, (order, turn), console, reporter, &mut written, &mut is_over);
         reporter.end();
         is_whole = exit == Exit::DONE && turn.is_none_or(Turn::is_last);
-        if exit != Exit::DONE || ended.by().is_some() {
+        if exit != Exit::DONE || ended.signal_number().is_some() {
             break;
         }
     }
     let reporter = image_reporter;
     if !reporter.says_diagnostics()
-        && let Some(signal) = ended.by().and_then(signals::name)
+        && let Some(signal) = ended.signal_number().and_then(signals::signal_name)
     {
-        console.say(&format!("terminated by {signal}: {}", outcome(is_whole, &written)));
+        console.print_message(&format!("terminated by {signal}: {}", describe_written(is_whole, &written)));
     }
-    worker.finish(deadline.left(Instant::now()));
-    ended.by().map_or(exit, Exit::signal)
+    worker.finish(deadline.time_left(Instant::now()));
+    ended.signal_number().map_or(exit, Exit::signal)
 }
 
 /// The render requests: a single request, or one per frame of a turntable.
-fn requests(overrides: &Overrides) -> impl Iterator<Item = Overrides> {
+fn render_requests(overrides: &Overrides) -> impl Iterator<Item = Overrides> {
     let count = overrides.turn.map_or(1, |turn| turn.of);
     (0..count).map(|number| {
         let turn = overrides.turn.map(|turn| Turn { number, ..turn });
@@ -109,7 +109,7 @@ fn requests(overrides: &Overrides) -> impl Iterator<Item = Overrides> {
 }
 
 /// Describes the images written before a signal. `is_whole` means that all images were written.
-fn outcome(is_whole: bool, written: &WrittenFiles) -> String {
+fn describe_written(is_whole: bool, written: &ImagesWrittenSoFar) -> String {
     let names: Vec<_> = written.images.iter().map(|path| path.display().to_string()).collect();
     let kept = written
         .checkpoint
@@ -127,21 +127,21 @@ fn outcome(is_whole: bool, written: &WrittenFiles) -> String {
 
 /// The files written so far.
 #[derive(Debug, Default)]
-struct WrittenFiles {
+struct ImagesWrittenSoFar {
     images: Vec<PathBuf>,
     /// The last checkpoint.
     checkpoint: Option<PathBuf>,
 }
 
-/// When to exit without waiting for the worker: [`EXIT_TIMEOUT`] after the first query.
+/// The time at which to exit without waiting for the worker: [`EXIT_TIMEOUT`] after the first query.
 #[derive(Debug, Default)]
-struct Deadline {
+struct ExitDeadline {
     end: Option<Instant>,
     /// Whether writing an image was cancelled.
     is_write_stopped: bool,
 }
 
-impl Deadline {
+impl ExitDeadline {
     fn is_over(&mut self, now: Instant) -> bool {
         now >= *self.end.get_or_insert(now + EXIT_TIMEOUT)
     }
@@ -161,18 +161,18 @@ impl Deadline {
     }
 
     /// Time left for the worker.
-    fn left(&self, now: Instant) -> Duration {
+    fn time_left(&self, now: Instant) -> Duration {
         self.end.map_or(EXIT_TIMEOUT, |end| end.saturating_duration_since(now))
     }
 }
 
 /// Handles events until the request is finished or aborted by a signal.
-fn follow(
+fn handle_events(
     worker: &Handle,
-    (order, turn): (&Order, Option<Turn>),
+    (order, turn): (&RenderRequest, Option<Turn>),
     console: &Console,
     reporter: &mut dyn Reporter,
-    written: &mut WrittenFiles,
+    written: &mut ImagesWrittenSoFar,
     mut is_over: impl FnMut(bool) -> bool,
 ) -> Exit {
     let mut is_writing = false;
@@ -194,10 +194,10 @@ fn follow(
         };
         // Report warnings about the arguments together with warnings about the scene.
         if let Event::Settings { settings, .. } = &event {
-            call_warnings.extend(without_effect(&order.overrides, settings));
+            call_warnings.extend(ineffective_option_warnings(&order.overrides, settings));
         } else if let Event::Stage { stage, .. } = &event
             && !is_first
-            && is_read_again(stage)
+            && rereads_changed_file(stage)
         {
             worker.send(Command::Cancel);
             reporter.end();
@@ -226,17 +226,23 @@ fn follow(
             Event::Done { report, warnings, .. } => {
                 reporter.end();
                 if !reporter.says_diagnostics() {
-                    console.diagnostics(&warnings);
+                    console.print_diagnostics(&warnings);
                 }
-                return done(&report, (&written.images[before..], turn), &unwritten, console, reporter);
+                return report_done(
+                    &report,
+                    (&written.images[before..], turn),
+                    &unwritten,
+                    console,
+                    reporter,
+                );
             }
             Event::Failed { failure, .. } => {
                 reporter.end();
                 if reporter.says_diagnostics() {
-                    return exit_of(&failure);
+                    return exit_code(&failure);
                 }
-                unwritten.iter().for_each(|message| console.say(&format!("error: {message}")));
-                return failed(&failure, console);
+                unwritten.iter().for_each(|message| console.print_message(&format!("error: {message}")));
+                return report_failure(&failure, console);
             }
             Event::Cancelled { .. } => return Exit::FAILED,
             Event::Started { .. }
@@ -263,11 +269,11 @@ fn follow(
 }
 
 /// Whether a stage read a file that has changed since the previous frame.
-fn is_read_again(stage: &StageReport) -> bool {
+fn rereads_changed_file(stage: &StageReport) -> bool {
     matches!(stage.name, Stage::Parse | Stage::Meshes | Stage::Textures) && stage.status == Status::Done
 }
 
-/// Reports checkpoint news, including warnings, immediately, because the user can still react.
+/// Reports checkpoint news and warnings immediately, while the user can still react.
 fn report_checkpoint(
     news: &CheckpointNews,
     call_warnings: &mut Vec<Diagnostic>,
@@ -276,14 +282,14 @@ fn report_checkpoint(
 ) {
     let say = |text: String| {
         if reporter.says_results() {
-            console.say(&text);
+            console.print_message(&text);
         }
     };
     let mut warn = |message: &str, help: &str| {
         if reporter.says_diagnostics() {
             call_warnings.push(warning(message, help));
         } else {
-            console.diagnostics(&[warning(message, help)]);
+            console.print_diagnostics(&[warning(message, help)]);
         }
     };
     match news {
@@ -325,7 +331,7 @@ fn warning(message: &str, help: &str) -> Diagnostic {
 }
 
 /// Warnings about options without effect. The terminal UI has its own messages for these.
-fn without_effect(asked: &Overrides, settings: &Effective) -> Vec<Diagnostic> {
+fn ineffective_option_warnings(asked: &Overrides, settings: &EffectiveSettings) -> Vec<Diagnostic> {
     let dof = (asked.dof == Some(true) && !settings.dof).then(|| {
         let help = "set `aperture` of [camera], such as 0.1";
         warning("--dof on has no effect: the camera's aperture is 0", help)
@@ -337,7 +343,7 @@ fn without_effect(asked: &Overrides, settings: &Effective) -> Vec<Diagnostic> {
     dof.into_iter().chain(photons).collect()
 }
 
-fn done(
+fn report_done(
     report: &Report,
     (written, turn): (&[PathBuf], Option<Turn>),
     unwritten: &[String],
@@ -345,37 +351,37 @@ fn done(
     reporter: &dyn Reporter,
 ) -> Exit {
     if reporter.says_results() {
-        written.iter().for_each(|path| console.say(&wrote(path, report, turn)));
+        written.iter().for_each(|path| console.print_message(&describe_written_image(path, report, turn)));
     }
     if let Some(turn) = turn.filter(|turn| turn.is_last()) {
         written
             .iter()
             .filter_map(|path| left_over_warning(path, turn))
-            .for_each(|message| console.say(&message));
+            .for_each(|message| console.print_message(&message));
     }
     if !reporter.says_diagnostics() {
-        unwritten.iter().for_each(|message| console.say(&format!("error: {message}")));
+        unwritten.iter().for_each(|message| console.print_message(&format!("error: {message}")));
     }
     if unwritten.is_empty() { Exit::DONE } else { Exit::FAILED }
 }
 
 /// A warning about files left over from an earlier, longer turntable. `None` if there are no such files.
 fn left_over_warning(last: &Path, turn: Turn) -> Option<String> {
-    let left = left_over(last, turn);
+    let left = leftover_frames(last, turn);
     let (first, more) = (left.first()?.display(), left.len() - 1);
     let more = if more == 0 { String::new() } else { format!(" and {more} more") };
     Some(format!("warning: {first}{more} left over from an earlier, longer turntable"))
 }
 
-fn failed(failure: &Failure, console: &Console) -> Exit {
+fn report_failure(failure: &Failure, console: &Console) -> Exit {
     match failure {
-        Failure::Scene(diagnostics) => console.diagnostics(diagnostics),
-        Failure::Work(message) => console.say(&format!("error: {message}")),
+        Failure::Scene(diagnostics) => console.print_diagnostics(diagnostics),
+        Failure::Work(message) => console.print_message(&format!("error: {message}")),
     }
-    exit_of(failure)
+    exit_code(failure)
 }
 
-fn exit_of(failure: &Failure) -> Exit {
+fn exit_code(failure: &Failure) -> Exit {
     match failure {
         Failure::Scene(_) => Exit::WRONG,
         Failure::Work(_) => Exit::FAILED,
@@ -383,7 +389,7 @@ fn exit_of(failure: &Failure) -> Exit {
 }
 
 /// Describes a written image, as in `wrote cornell.png (640×480, 64 samples, 1.93 s)`.
-fn wrote(path: &Path, report: &Report, turn: Option<Turn>) -> String {
+fn describe_written_image(path: &Path, report: &Report, turn: Option<Turn>) -> String {
     let image = &report.image;
     if let Some(turn) = turn.filter(|_| AnimationFormat::from_path(path).is_some()) {
         return format!("wrote {} ({}×{}, {} frames)", path.display(), image.width, image.height, turn.of);
@@ -405,19 +411,19 @@ mod tests {
     fn deadline_starts_at_the_first_query() {
         let signal = Instant::now();
         let half = signal + EXIT_TIMEOUT / 2;
-        let mut deadline = Deadline::default();
-        assert_eq!(deadline.left(half), EXIT_TIMEOUT, "without a signal");
+        let mut deadline = ExitDeadline::default();
+        assert_eq!(deadline.time_left(half), EXIT_TIMEOUT, "without a signal");
         assert!(!deadline.is_over(signal) && !deadline.is_over(half));
-        assert_eq!(deadline.left(half), EXIT_TIMEOUT / 2);
+        assert_eq!(deadline.time_left(half), EXIT_TIMEOUT / 2);
         assert!(deadline.is_over(signal + EXIT_TIMEOUT));
-        assert_eq!(deadline.left(signal + EXIT_TIMEOUT), Duration::ZERO);
+        assert_eq!(deadline.time_left(signal + EXIT_TIMEOUT), Duration::ZERO);
     }
 
     #[test]
     fn slow_writes_are_stopped_for_a_checkpoint() {
         let signal = Instant::now();
         for (is_image, end) in [(true, WRITE_TIMEOUT + EXIT_TIMEOUT), (false, EXIT_TIMEOUT)] {
-            let mut deadline = Deadline::default();
+            let mut deadline = ExitDeadline::default();
             let mut stops = |after| deadline.stops_writing(signal + after, is_image);
             assert!(!stops(Duration::ZERO) && !stops(WRITE_TIMEOUT / 2));
             assert!(stops(WRITE_TIMEOUT) && !stops(EXIT_TIMEOUT), "once");

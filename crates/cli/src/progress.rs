@@ -4,12 +4,12 @@ mod bars;
 mod json;
 mod plain;
 
-pub(super) use self::bars::style;
-pub(super) use self::json::{failed, line as json_line};
+pub(super) use self::bars::bar_style;
+pub(super) use self::json::{failure_to_json, print_json_line as json_line};
 use crate::args::Progress;
 use crate::console::Console;
 use crate::pipeline::protocol::{Event, RenderProgress};
-use crate::pipeline::words::samples_so_far;
+use crate::pipeline::words::format_mean_samples;
 pub(super) use crate::pipeline::words::seconds;
 
 /// Reports progress.
@@ -32,26 +32,26 @@ pub(super) trait Reporter {
 }
 
 /// Creates the reporter for a progress option. `time` is the render's time limit in seconds.
-pub(super) fn reporter(progress: Progress, time: Option<f64>, console: &Console) -> Box<dyn Reporter> {
+pub(super) fn create_reporter(progress: Progress, time: Option<f64>, console: &Console) -> Box<dyn Reporter> {
     match progress {
-        Progress::Auto if console.is_terminal => Box::new(bars::Bars::new(time)),
-        Progress::Auto | Progress::Plain => Box::new(plain::Plain::new(console.clone())),
-        Progress::Json => Box::new(json::Json),
-        Progress::None => Box::new(Silent),
+        Progress::Auto if console.is_terminal => Box::new(bars::ProgressBars::new(time)),
+        Progress::Auto | Progress::Plain => Box::new(plain::PlainReporter::new(console.clone())),
+        Progress::Json => Box::new(json::JsonReporter),
+        Progress::None => Box::new(SilentReporter),
     }
 }
 
 /// Describes the samples so far, with the total if known.
-fn samples(progress: &RenderProgress) -> String {
+fn describe_samples(progress: &RenderProgress) -> String {
     if progress.is_total_fixed {
-        return format!("{} of {} samples", samples_so_far(progress), progress.total_samples);
+        return format!("{} of {} samples", format_mean_samples(progress), progress.total_samples);
     }
     format!("about {:.0} samples per pixel so far", progress.mean_samples.floor())
 }
 
-struct Silent;
+struct SilentReporter;
 
-impl Reporter for Silent {
+impl Reporter for SilentReporter {
     fn event(&mut self, _event: &Event) {}
 
     fn says_results(&self) -> bool {

@@ -13,13 +13,13 @@ use crate::system::describe_error;
 pub(super) struct ReceivedSignal(Arc<AtomicI32>);
 
 impl ReceivedSignal {
-    pub(super) fn by(&self) -> Option<i32> {
+    pub(super) fn signal_number(&self) -> Option<i32> {
         Some(self.0.load(Ordering::Acquire)).filter(|number| *number != 0)
     }
 }
 
 /// A signal's name for messages. `None` for SIGHUP, because the terminal is gone.
-pub(super) fn name(number: i32) -> Option<&'static str> {
+pub(super) fn signal_name(number: i32) -> Option<&'static str> {
     match number {
         SIGINT => Some("SIGINT"),
         SIGTERM => Some("SIGTERM"),
@@ -28,7 +28,7 @@ pub(super) fn name(number: i32) -> Option<&'static str> {
 }
 
 /// Explains why [`catch`] failed and what to do.
-pub(super) fn failure(error: &std::io::Error) -> String {
+pub(super) fn describe_catch_failure(error: &std::io::Error) -> String {
     format!(
         "cannot listen to signals: {}; raise the limits on open files and on processes (ulimit -n, ulimit -u)",
         describe_error(error)

@@ -18,5 +18,5 @@ fn main() {
         println!("cargo::rerun-if-changed={}", root.display());
     }
     println!("cargo::rerun-if-changed=build");
-    println!("cargo::rustc-env=GLIMT_BUILD={:012x}", sources::identity(&roots) >> 16);
+    println!("cargo::rustc-env=GLIMT_BUILD={:012x}", sources::source_hash(&roots) >> 16);
 }

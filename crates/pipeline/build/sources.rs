@@ -6,10 +6,10 @@ use std::path::{Path, PathBuf};
 /// Hashes the content and relative path of every file in the given folders, plus the given files. Ignores
 /// tests and line endings. A missing root counts as empty, so that a crate can be built outside the
 /// workspace.
-pub fn identity(roots: &[PathBuf]) -> u64 {
-    let mut hash = Hash::default();
+pub fn source_hash(roots: &[PathBuf]) -> u64 {
+    let mut hash = Fnv1a::default();
     for root in roots {
-        for file in files(root) {
+        for file in list_files(root) {
             let name = file.strip_prefix(root).unwrap_or(&file);
             hash.add(name.to_string_lossy().as_bytes());
             hash.add(&fs::read(&file).unwrap_or_default());
@@ -19,7 +19,7 @@ pub fn identity(roots: &[PathBuf]) -> u64 {
 }
 
 /// Recursively lists all files under a path in sorted order, skipping tests.
-fn files(path: &Path) -> Vec<PathBuf> {
+fn list_files(path: &Path) -> Vec<PathBuf> {
     let name = path.file_name().unwrap_or_default();
     if name == "tests" || name == "tests.rs" {
         return Vec::new();
@@ -30,19 +30,19 @@ fn files(path: &Path) -> Vec<PathBuf> {
     let Ok(entries) = fs::read_dir(path) else { return Vec::new() };
     let mut paths: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
     paths.sort();
-    paths.iter().flat_map(|path| files(path)).collect()
+    paths.iter().flat_map(|path| list_files(path)).collect()
 }
 
 /// 64-bit FNV-1a hash.
-struct Hash(u64);
+struct Fnv1a(u64);
 
-impl Default for Hash {
+impl Default for Fnv1a {
     fn default() -> Self {
         Self(0xcbf2_9ce4_8422_2325)
     }
 }
 
-impl Hash {
+impl Fnv1a {
     /// Adds the bytes, skipping carriage returns, followed by a terminator that never occurs in UTF-8 text.
     fn add(&mut self, bytes: &[u8]) {
         for byte in bytes.iter().filter(|byte| **byte != b'\r').chain(&[0xff]) {

@@ -36,7 +36,7 @@ impl Section {
     }
 
     /// Converts a pixel rectangle in an image with the given number of columns and rows.
-    pub(super) fn of(rect: Rect, (columns, rows): (u32, u32)) -> Self {
+    pub(super) fn from_pixels(rect: Rect, (columns, rows): (u32, u32)) -> Self {
         let share = |pixels: u32, side: u32| f64::from(pixels) / f64::from(side);
         Self {
             left: share(rect.x, columns),
@@ -59,7 +59,7 @@ impl Section {
     }
 
     /// Maps a position in the section to a position in the image.
-    pub fn place(self, position: ImagePosition) -> ImagePosition {
+    pub fn to_image_position(self, position: ImagePosition) -> ImagePosition {
         ImagePosition { x: self.left + position.x * self.width, y: self.top + position.y * self.height }
     }
 }
@@ -111,7 +111,7 @@ pub struct MovedCamera {
 
 /// Result of saving the camera to the scene file.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct KeptCamera {
+pub struct SavedCamera {
     /// The scene file.
     pub path: PathBuf,
     /// Whether the file was written. `false` if it already contained this camera.
@@ -148,7 +148,7 @@ mod tests {
             Rect { x: 39, y: 29, width: 1, height: 1 },
         ] {
             // Rounding errors must not add pixels.
-            let Section { left, top, width, height } = Section::of(rect, size);
+            let Section { left, top, width, height } = Section::from_pixels(rect, size);
             let inside =
                 Section { left: left + 1e-9, top: top + 1e-9, width: width - 2e-9, height: height - 2e-9 };
             assert_eq!(inside.pixels(size), rect);

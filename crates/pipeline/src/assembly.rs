@@ -14,10 +14,10 @@ use crate::scene::description::{Camera, CameraChange, Scene, Viewpoint};
 use crate::scene::fingerprint::{Key, Referents};
 use crate::world::{self, GlassSolids, World, WorldInputs};
 
-/// A world and its key, which covers everything that affects its images.
+/// A world and its key. The key covers everything that affects the world's images.
 pub(super) type KeyedWorld = (Key, Arc<World>);
 
-/// A request's camera: the scene camera, with any changes from the request.
+/// A request's camera: the scene's camera with the request's changes applied.
 #[derive(Clone, Debug)]
 pub(super) struct RequestCamera {
     pub(super) camera: Camera,
@@ -28,7 +28,7 @@ pub(super) struct RequestCamera {
 impl RequestCamera {
     pub(super) fn new(scene: &Scene, orbiter: Option<OrbiterCamera>, change: &CameraChange) -> Self {
         let own = Self { camera: scene.camera.clone(), orbiter };
-        if change.is_any() {
+        if change.has_changes() {
             Self { camera: own.viewpoint().changed(change).into(), orbiter: None }
         } else {
             own
@@ -68,7 +68,7 @@ pub(super) fn world(
     memo: &mut Memo<Arc<World>>,
 ) -> KeyedWorld {
     let key = keys::world(surfaces, &eye.camera, of);
-    let built_key = keys::in_trees(&key, scene.render.accel);
+    let built_key = keys::with_tree_kind(&key, scene.render.accel);
     if let Some(world) = memo.get(built_key) {
         return (key, world.clone());
     }

@@ -1,6 +1,6 @@
 //! Identity of this build.
 
-/// The glimt version and a hash of the sources that affect images. Builds with the same string render
+/// The glimt version and a hash of the sources that affect images. Two builds with the same string render
 /// bit-identical images.
 pub const BUILD: &str = concat!(env!("CARGO_PKG_VERSION"), " (build ", env!("GLIMT_BUILD"), ")");
 
@@ -31,7 +31,7 @@ mod tests {
             fs::create_dir_all(path.parent().expect("a folder")).expect("made");
             fs::write(path, text).expect("written");
         };
-        let identity = || sources::identity(&[root.clone(), folder.path().join("none")]);
+        let identity = || sources::source_hash(&[root.clone(), folder.path().join("none")]);
         write("a.rs", "let a = 1;\nlet b = 2;\n");
         write("deep/b.rs", "");
         let before = identity();

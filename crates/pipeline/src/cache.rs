@@ -38,7 +38,7 @@ impl<T> Memo<T> {
 /// Cache for named values, such as loaded files and data built from them. Each value is valid for one key.
 /// Unused values are kept while there is room, which makes switching back to a scene fast.
 #[derive(Debug)]
-pub(super) struct Pool<N, T> {
+pub(super) struct NamedCache<N, T> {
     entries: HashMap<N, CacheEntry<T>>,
 }
 
@@ -58,13 +58,13 @@ struct CacheEntry<T> {
 /// An unused value: the number of the most recent request that used it, and its size in bytes.
 pub(super) type EvictionCandidate = (u64, usize);
 
-impl<N, T> Default for Pool<N, T> {
+impl<N, T> Default for NamedCache<N, T> {
     fn default() -> Self {
         Self { entries: HashMap::new() }
     }
 }
 
-impl<N: Hash + Eq, T> Pool<N, T> {
+impl<N: Hash + Eq, T> NamedCache<N, T> {
     /// Returns the value with this name if its key matches.
     pub(super) fn get(&mut self, name: &N, key: Key) -> Option<Arc<T>> {
         let entry = self.entries.get_mut(name).filter(|entry| entry.key == key)?;
@@ -84,7 +84,7 @@ impl<N: Hash + Eq, T> Pool<N, T> {
 
     /// Ends a request. If it failed, the values used by the last successful request remain protected, so
     /// fixing a typo does not reload anything.
-    pub(super) fn end(&mut self, success: bool, request: u64) {
+    pub(super) fn end_request(&mut self, success: bool, request: u64) {
         for entry in self.entries.values_mut() {
             entry.request = if entry.used { request } else { entry.request };
             entry.proven = if success { entry.used } else { entry.proven };
@@ -98,15 +98,15 @@ impl<N: Hash + Eq, T> Pool<N, T> {
     }
 
     /// Drops unused values whose last use was before this request.
-    pub(super) fn drop_before(&mut self, request: u64) {
+    pub(super) fn evict_unused_before(&mut self, request: u64) {
         self.entries.retain(|_, entry| entry.proven || entry.request >= request);
     }
 }
 
-/// Returns the earliest request such that its unused values and those of all later requests fit into
-/// `most_bytes`. The values of a request are evicted together because half a scene is of little use and trees
-/// keep their meshes alive.
-pub(super) fn first_with_room(
+/// Returns the number of the earliest request whose unused values fit into `most_bytes` together with those
+/// of all later requests. All values of a request are evicted together, because half a scene is of little use
+/// and trees keep their meshes alive.
+pub(super) fn first_request_that_fits(
     eviction_candidates: impl Iterator<Item = EvictionCandidate>,
     most_bytes: usize,
 ) -> u64 {
@@ -142,53 +142,53 @@ mod tests {
 
     const NOTHING: usize = 0;
 
-    /// Ends a request and evicts unused values beyond a total of `most_bytes`.
-    fn end(pool: &mut Pool<&str, i32>, success: bool, request: u64, most_bytes: usize) {
-        pool.end(success, request);
-        pool.drop_before(first_with_room(pool.eviction_candidates(), most_bytes));
+    /// Ends a request and evicts unused values until the rest fit into `most_bytes`.
+    fn end_request(pool: &mut NamedCache<&str, i32>, success: bool, request: u64, most_bytes: usize) {
+        pool.end_request(success, request);
+        pool.evict_unused_before(first_request_that_fits(pool.eviction_candidates(), most_bytes));
     }
 
     #[test]
     fn unused_values_are_evicted_when_out_of_room() {
-        let mut pool = Pool::default();
+        let mut pool = NamedCache::default();
         pool.insert("x", key("1"), (Arc::new(1), 10));
         pool.insert("y", key("1"), (Arc::new(2), 10));
-        end(&mut pool, true, 1, NOTHING);
+        end_request(&mut pool, true, 1, NOTHING);
         assert!(pool.get(&"x", key("1")).is_some());
         assert!(pool.get(&"x", key("2")).is_none(), "another content");
-        end(&mut pool, true, 2, NOTHING);
+        end_request(&mut pool, true, 2, NOTHING);
         assert!(pool.get(&"y", key("1")).is_none());
         assert!(pool.get(&"x", key("1")).is_some());
     }
 
     #[test]
     fn failed_request_keeps_last_valid_values() {
-        let mut pool = Pool::default();
+        let mut pool = NamedCache::default();
         pool.insert("good", key("1"), (Arc::new(1), 10));
-        end(&mut pool, true, 1, NOTHING);
+        end_request(&mut pool, true, 1, NOTHING);
         pool.insert("wrong", key("1"), (Arc::new(2), 10));
-        end(&mut pool, false, 2, NOTHING);
-        end(&mut pool, false, 3, NOTHING);
+        end_request(&mut pool, false, 2, NOTHING);
+        end_request(&mut pool, false, 3, NOTHING);
         assert!(pool.get(&"good", key("1")).is_some());
         assert!(pool.get(&"wrong", key("1")).is_none());
     }
 
     #[test]
     fn oldest_scene_is_evicted_entirely() {
-        let mut pool = Pool::default();
+        let mut pool = NamedCache::default();
         for (request, names) in [(1, ["a", "b"]), (2, ["c", "d"]), (3, ["e", "f"])] {
             for name in names {
                 pool.insert(name, key("1"), (Arc::new(1), 10));
             }
-            end(&mut pool, true, request, 30);
+            end_request(&mut pool, true, request, 30);
         }
         let mut is_kept = |name| pool.get(&name, key("1")).is_some();
         assert!(!is_kept("a") && !is_kept("b"), "newer values take 20 of 30 bytes");
         assert!(is_kept("c") && is_kept("d") && is_kept("e"));
         // Reuse the second request's values, which makes the third request's unused value the oldest.
-        end(&mut pool, true, 4, 30);
+        end_request(&mut pool, true, 4, 30);
         pool.insert("g", key("1"), (Arc::new(1), 30));
-        end(&mut pool, true, 5, 30);
+        end_request(&mut pool, true, 5, 30);
         let mut is_kept = |name| pool.get(&name, key("1")).is_some();
         assert!(is_kept("c") && is_kept("d") && is_kept("e") && is_kept("g") && !is_kept("f"));
     }

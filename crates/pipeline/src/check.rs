@@ -15,13 +15,13 @@ use super::stages::parse::Parsed;
 use super::stages::textures::Textures;
 use crate::control::CancelToken;
 use crate::math::{DVec3, Vec3};
-use crate::scene::description::{Lowered, Object, Shape};
+use crate::scene::description::{LoweredShape, Object, Shape};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::world::file_emits;
 
-/// What a valid scene contains.
+/// Object counts and warnings for a valid scene.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Checked {
+pub struct SceneSummary {
     /// Shapes of all kinds. A mesh instance counts as one.
     pub objects: u64,
     /// Triangles in all mesh instances, plus standalone triangles.
@@ -38,14 +38,14 @@ pub struct Checked {
 ///
 /// # Errors
 /// Returns all errors and warnings for the scene and its files.
-pub fn check(path: &Path, sets: &[String]) -> Result<Checked, Failure> {
-    Checker::default().check(path, sets, &CancelToken::new())
+pub fn check(path: &Path, sets: &[String]) -> Result<SceneSummary, Failure> {
+    IncrementalChecker::default().check(path, sets, &CancelToken::new())
 }
 
 /// Checks scenes repeatedly without rereading unchanged files.
-pub struct Checker(Engine);
+pub struct IncrementalChecker(Engine);
 
-impl Default for Checker {
+impl Default for IncrementalChecker {
     fn default() -> Self {
         Self(Engine::new(EngineConfig::default(), Arc::default()))
     }
@@ -55,8 +55,8 @@ impl Default for Checker {
 ///
 /// # Errors
 /// Returns all errors in the scene and its files.
-pub fn memory_needed(path: &Path, overrides: &Overrides) -> Result<u64, Failure> {
-    let Checker(mut engine) = Checker::default();
+pub fn estimate_memory(path: &Path, overrides: &Overrides) -> Result<u64, Failure> {
+    let IncrementalChecker(mut engine) = IncrementalChecker::default();
     let token = CancelToken::new();
     let (parsed, meshes, textures, _) = engine.read_all(path, &overrides.sets, &silent_sink(), &token)?;
     let plan = plan(&parsed.loaded.scene, path, overrides).map_err(|error| Failure::Scene(vec![*error]))?;
@@ -68,40 +68,50 @@ fn silent_sink() -> Sink {
     Sink { generation: 0, events, previews: PreviewSlot::default(), within: None }
 }
 
-impl Checker {
+impl IncrementalChecker {
     /// Checks a scene and all files it references, used or not.
     ///
     /// # Errors
     /// Returns all errors and warnings for the scene and its files, or [`Failure::Work`] if the token is
     /// cancelled.
-    pub fn check(&mut self, path: &Path, sets: &[String], token: &CancelToken) -> Result<Checked, Failure> {
+    pub fn check(
+        &mut self,
+        path: &Path,
+        sets: &[String],
+        token: &CancelToken,
+    ) -> Result<SceneSummary, Failure> {
         let (parsed, meshes, textures, warnings) = self.0.read_all(path, sets, &silent_sink(), token)?;
-        Ok(checked(&parsed, &meshes, &textures, warnings))
+        Ok(summarize(&parsed, &meshes, &textures, warnings))
     }
 }
 
-fn checked(parsed: &Parsed, meshes: &Meshes, textures: &Textures, mut warnings: Vec<Diagnostic>) -> Checked {
+fn summarize(
+    parsed: &Parsed,
+    meshes: &Meshes,
+    textures: &Textures,
+    mut warnings: Vec<Diagnostic>,
+) -> SceneSummary {
     let scene = &parsed.loaded.scene;
     let triangles = |shape: &Shape| match shape.lowered(DVec3::ZERO) {
-        Lowered::Shape(shape) => shape.triangle_count(),
-        Lowered::Mesh(mesh) => meshes[mesh.file].mesh.mesh.triangles.len() as u64,
+        LoweredShape::Shape(shape) => shape.triangle_count(),
+        LoweredShape::Mesh(mesh) => meshes[mesh.file].mesh.mesh.triangles.len() as u64,
     };
     let emits = |object: &&Object| match (object.material, object.shape.mesh()) {
         (Some(index), _) => scene.materials[index].emits(),
         (None, Some(mesh)) => meshes[mesh.file].mesh.materials.iter().any(file_emits),
         (None, None) => false,
     };
-    let lights = scene.lights.iter().filter(|light| light.sends()).count();
-    let environment = scene.environment.iter().filter(|environment| environment.sends()).count();
+    let lights = scene.lights.iter().filter(|light| light.has_emission()).count();
+    let environment = scene.environment.iter().filter(|environment| environment.has_emission()).count();
     let count = lights + environment + scene.objects.iter().filter(emits).count();
-    // Lights in mesh files are only known after loading.
+    // Lights in mesh files are not known until the files are loaded.
     let has_own = scene.objects.iter().any(|object| object.material.is_none());
     if count == 0 && has_own && scene.render.ambient == Vec3::ZERO {
         let (severity, message) = (Severity::Warning, "nothing lights this scene".to_owned());
         let help = "the mesh's own materials do not emit; add a [[light]] or an [environment]".to_owned();
         warnings.push(parsed.loaded.diagnostic_at(0..0, severity, message, Some(help)));
     }
-    Checked {
+    SceneSummary {
         objects: scene.objects.len() as u64,
         triangles: scene.objects.iter().map(|object| triangles(&object.shape)).sum(),
         textures: textures.images.len() as u64,

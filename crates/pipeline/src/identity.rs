@@ -29,13 +29,15 @@ pub(super) struct ImageDependencies<'a> {
 
 impl ImageDependencies<'_> {
     /// Returns the names and values.
-    pub(super) fn traits(&self) -> Vec<Dependency> {
+    pub(super) fn names_and_values(&self) -> Vec<Dependency> {
         let mut traits = vec![Dependency::setting("glimt", BUILD)];
         self.add_settings(&mut traits);
         let scene_path = &self.parsed.loaded.path;
         let others = self.files.iter().filter(|file| file.path != *scene_path);
-        traits.extend(others.map(|file| Dependency::file(&short(&file.path, scene_path), content(file))));
-        traits.push(Dependency::everything(self.everything().to_string()));
+        traits.extend(
+            others.map(|file| Dependency::file(&relative_path(&file.path, scene_path), hash_or_reason(file))),
+        );
+        traits.push(Dependency::everything(self.fingerprint().to_string()));
         traits
     }
 
@@ -55,7 +57,7 @@ impl ImageDependencies<'_> {
         add("filter", render.filter.name().to_owned());
         add("seed", render.seed.to_string());
         add("depth of field", if dof { "on" } else { "off" }.to_owned());
-        // Parts must have the same view. Checkpoints only need the same samples.
+        // All parts must have the same view. For checkpoints, it is enough if the samples are the same.
         let sampled = if self.divided.is_some() { view } else { view.sampled() };
         add("view", sampled.name().to_owned());
         add(
@@ -83,8 +85,8 @@ impl ImageDependencies<'_> {
     }
 
     /// Returns a fingerprint of shapes, materials, lights, camera and settings.
-    fn everything(&self) -> Key {
-        let scene = self.without_paths();
+    fn fingerprint(&self) -> Key {
+        let scene = self.scene_with_content_hashes();
         let eye = RequestCamera::new(&scene, self.parsed.orbiter, self.camera);
         let orbiter = eye.orbiter.map(|camera| format!("{camera:?}"));
         let meshes: Vec<Key> =
@@ -94,8 +96,8 @@ impl ImageDependencies<'_> {
         keys::render(world, &self.plan.settings, self.plan.crop)
     }
 
-    /// Returns the scene with file contents in place of paths.
-    fn without_paths(&self) -> Scene {
+    /// Returns the scene with each path replaced by a description of the file's content.
+    fn scene_with_content_hashes(&self) -> Scene {
         let mut scene = Scene::clone(&self.plan.scene);
         for texture in &mut scene.textures {
             texture.file.value = self.content_of(&texture.file.value).into();
@@ -106,11 +108,11 @@ impl ImageDependencies<'_> {
         scene
     }
 
-    /// Describes a file's content. Uses the file name if the file was not read, since it then does not affect
-    /// the image.
+    /// Describes a file's content. Uses the file name if the file was not read, because unread files do not
+    /// affect the image.
     fn content_of(&self, path: &Path) -> String {
         match self.files.iter().find(|file| file.path == path) {
-            Some(file) => content(file),
+            Some(file) => hash_or_reason(file),
             None => path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
         }
     }
@@ -126,7 +128,7 @@ fn key(content: &str, part: Option<u32>) -> Key {
 }
 
 /// Returns the path relative to the scene's folder, or just the file name if it is outside that folder.
-fn short(path: &Path, scene: &Path) -> String {
+fn relative_path(path: &Path, scene: &Path) -> String {
     let folder = scene.parent().unwrap_or(Path::new(""));
     let inside = path.strip_prefix(folder).ok().map(Path::to_owned);
     let name = || path.file_name().map(PathBuf::from).unwrap_or_default();
@@ -134,7 +136,7 @@ fn short(path: &Path, scene: &Path) -> String {
 }
 
 /// Returns the file's hash in hexadecimal, or the reason it has none.
-fn content(file: &FileRead) -> String {
+fn hash_or_reason(file: &FileRead) -> String {
     match file.content {
         Content::Missing => "missing".to_owned(),
         Content::Unusable(_) => "not readable".to_owned(),

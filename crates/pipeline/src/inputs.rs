@@ -95,8 +95,8 @@ impl Inputs {
     }
 
     /// Indexes the files by their current state on disk.
-    pub(super) fn on_disk(&self) -> OnDisk<'_> {
-        let mut on_disk = OnDisk { by_identity: HashMap::new(), alike: Vec::new() };
+    pub(super) fn index_by_identity(&self) -> InputIndex<'_> {
+        let mut on_disk = InputIndex { by_identity: HashMap::new(), alike: Vec::new() };
         for input in &self.0 {
             if let Some(identity) = FileIdentity::of(&input.path) {
                 on_disk.by_identity.entry(identity).or_insert(input);
@@ -108,17 +108,17 @@ impl Inputs {
 
     /// Whether a path currently refers to one of the files.
     pub(super) fn contain(&self, path: &Path) -> bool {
-        FileIdentity::of(path).is_some_and(|_| self.on_disk().find(path).is_some())
+        FileIdentity::of(path).is_some_and(|_| self.index_by_identity().find(path).is_some())
     }
 }
 
 /// Inputs indexed by file identity and by similarity.
-pub(super) struct OnDisk<'a> {
+pub(super) struct InputIndex<'a> {
     by_identity: HashMap<FileIdentity, &'a Input>,
     alike: Vec<(FileFingerprint, &'a Input)>,
 }
 
-impl<'a> OnDisk<'a> {
+impl<'a> InputIndex<'a> {
     /// Returns the input that a path refers to or may refer to.
     pub(super) fn find(&self, path: &Path) -> Option<&'a Input> {
         if let Some(input) = self.by_identity.get(&FileIdentity::of(path)?) {

@@ -26,7 +26,7 @@ pub(crate) fn geometry(scene: &Scene, of: &Referents<'_>, (origin, lifts): (DVec
     for lift in lifts {
         key.dvec3(*lift);
     }
-    in_trees(&key.finish(), scene.render.accel)
+    with_tree_kind(&key.finish(), scene.render.accel)
 }
 
 /// Returns the key of the shapes and their emitting sides, which determine the lights that are moved off
@@ -52,7 +52,7 @@ pub(crate) fn from(of: &Key, origin: DVec3) -> Key {
 }
 
 /// Combines a geometry key with the kind of tree.
-pub(crate) fn in_trees(of: &Key, accel: Accel) -> Key {
+pub(crate) fn with_tree_kind(of: &Key, accel: Accel) -> Key {
     Fingerprint::new("in trees").key(of).choice(accel).finish()
 }
 
@@ -69,7 +69,7 @@ pub(crate) fn glass(scene: &Scene, of: &Referents<'_>) -> Key {
     let mut key = Fingerprint::new("glass");
     key.key(&shapes(scene, of));
     for object in &scene.objects {
-        let substance = object.material.and_then(|index| scene.materials[index].kind.substance());
+        let substance = object.material.and_then(|index| scene.materials[index].kind.glass_medium_bits());
         key.flag(object.material.is_some()).flag(substance.is_some());
         for part in substance.into_iter().flatten() {
             key.u64(part);
@@ -127,8 +127,8 @@ fn described_lights(scene: &Scene, of: &Referents<'_>) -> Key {
     key.finish()
 }
 
-/// Returns the key of a world. It excludes the kind of tree, because all kinds find the same hits. Views that
-/// visualize trees add it to their keys.
+/// Returns the key of a world. It excludes the kind of tree, because all kinds produce the same hits. Views
+/// that visualize trees include the kind in their own keys.
 pub(crate) fn world(surfaces: &Key, camera: &Camera, of: &Referents<'_>) -> Key {
     Fingerprint::new("world").key(surfaces).add(camera, of).finish()
 }

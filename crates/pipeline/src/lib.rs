@@ -48,7 +48,7 @@ use glimt_scene as scene;
 use glimt_trace::{integrators, world};
 
 pub use build::BUILD;
-pub use check::{Checked, Checker, check, memory_needed};
+pub use check::{IncrementalChecker, SceneSummary, check, estimate_memory};
 pub use model::import::{ImportError, Imported, import};
 pub use watch::content::{Content, FileRead};
-pub use worker::{Handle, Remote, start};
+pub use worker::{CommandSender, Handle, start};

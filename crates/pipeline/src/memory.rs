@@ -25,9 +25,9 @@ const KEPT_MAPS: u64 = 128 << 20;
 
 /// Maximum size in bytes of an animation's frames without `--memory`.
 const MAX_FRAMES: u64 = 4 << 30;
-/// Item name of the animation frames.
+/// Name of the item for animation frames.
 const FRAMES: &str = "the frames";
-/// Item name of the film of the scene's own image.
+/// Name of the item for the film of the scene's own image.
 const OWN_FILM: &str = "the unfinished film of the scene's own image";
 
 /// Suggested fix if the film or the image is the largest item.
@@ -46,11 +46,11 @@ pub(super) struct MemoryEstimate(Vec<MemoryItem>);
 
 impl MemoryEstimate {
     /// Estimates the memory for the image before any files are read.
-    pub(super) fn of_picture(plan: &Plan) -> Self {
+    pub(super) fn for_image(plan: &Plan) -> Self {
         let render = &plan.settings.render;
         let whole = Rect { x: 0, y: 0, width: render.width, height: render.height };
         let (film, picture) =
-            Film::memory_for((render.width, render.height), plan.crop.unwrap_or(whole), blocks(plan));
+            Film::memory_for((render.width, render.height), plan.crop.unwrap_or(whole), sum_order(plan));
         let threads = plan.threads as u64 * THREAD;
         let mut items = vec![
             ("the program", PROGRAM),
@@ -71,7 +71,7 @@ impl MemoryEstimate {
 
     /// Estimates the memory for the image and everything the scene references.
     pub(super) fn of_scene(plan: &Plan, scene: &Scene, meshes: &Meshes, texture_bytes: u64) -> Self {
-        let Self(mut items) = Self::of_picture(plan);
+        let Self(mut items) = Self::for_image(plan);
         let triangle = match scene.render.accel {
             Accel::Bvh => 110,
             Accel::BvhHigh => 170,
@@ -109,13 +109,13 @@ impl MemoryEstimate {
     /// number of bytes left.
     ///
     /// # Errors
-    /// Returns a breakdown and a suggested fix if the render needs more memory.
+    /// Returns a breakdown and a suggested fix if the render needs more memory than that.
     pub(super) fn check(&self, plan: &Plan) -> Result<u64, Stop> {
-        self.check_within(plan, limit)
+        self.check_against(plan, limit)
     }
 
     /// Like [`Self::check`], with the system's limit as a parameter.
-    fn check_within(&self, plan: &Plan, limit: impl FnOnce() -> Option<Limit>) -> Result<u64, Stop> {
+    fn check_against(&self, plan: &Plan, limit: impl FnOnce() -> Option<Limit>) -> Result<u64, Stop> {
         let all = self.bytes();
         let frames = self.0.iter().find(|(name, bytes)| *name == FRAMES && *bytes > MAX_FRAMES);
         if let (Some((_, bytes)), None) = (frames, plan.memory) {
@@ -123,7 +123,7 @@ impl MemoryEstimate {
                 "the frames of the animation need {} of memory until it is written; render fewer or smaller frames, or \
                  numbered files such as a_####.png; --memory {} allows it",
                 format_bytes(*bytes),
-                allowance(all)
+                format_memory_option(all)
             )));
         }
         // A command-line limit replaces the system limit, because the estimate is conservative.
@@ -153,7 +153,8 @@ impl MemoryEstimate {
             true => MISSING_UNIT,
             false => remedy,
         };
-        let try_anyway = format!(", raise the limit, or try anyway with --memory {}", allowance(all));
+        let try_anyway =
+            format!(", raise the limit, or try anyway with --memory {}", format_memory_option(all));
         Err(Stop::work(format!(
             "the render needs about {} of memory ({}), more than the {} of {setting}; {remedy}{}",
             format_bytes(all),
@@ -166,8 +167,8 @@ impl MemoryEstimate {
 
 /// Returns the order in which samples are summed. Assumes that photons are emitted if they are enabled,
 /// because this is not known yet.
-fn blocks(plan: &Plan) -> SumOrder {
-    let gathers = plan.settings.gathers();
+fn sum_order(plan: &Plan) -> SumOrder {
+    let gathers = plan.settings.gathers_photons();
     match plan.shard {
         Some(shard) => Share::new(shard, gathers, plan.settings.render.samples).sums(),
         None if gathers => SumOrder::Blocked,
@@ -176,7 +177,7 @@ fn blocks(plan: &Plan) -> SumOrder {
 }
 
 /// Formats a byte count as a `--memory` value, rounded up.
-fn allowance(bytes: u64) -> String {
+fn format_memory_option(bytes: u64) -> String {
     format!("{}GiB", bytes.div_ceil(1 << 30))
 }
 
@@ -211,7 +212,7 @@ mod tests {
     fn every_thread_counts() {
         let bytes = |threads| {
             let overrides = Overrides { threads: Some(threads), ..Overrides::default() };
-            MemoryEstimate::of_picture(&planned(&overrides)).bytes()
+            MemoryEstimate::for_image(&planned(&overrides)).bytes()
         };
         assert_eq!(bytes(65) - bytes(1), 64 * THREAD);
     }
@@ -224,7 +225,7 @@ mod tests {
             memory: Some(1 << 30),
             ..Overrides::default()
         };
-        let said = match MemoryEstimate::of_picture(&planned(&large)).check(&planned(&large)) {
+        let said = match MemoryEstimate::for_image(&planned(&large)).check(&planned(&large)) {
             Err(Stop::Failed(Failure::Work(said))) => said,
             other => panic!("{other:?}"),
         };
@@ -234,7 +235,7 @@ mod tests {
         }
         let said = |memory: u64| {
             let small = Overrides { memory: Some(memory), ..Overrides::default() };
-            match MemoryEstimate::of_picture(&planned(&small)).check(&planned(&small)) {
+            match MemoryEstimate::for_image(&planned(&small)).check(&planned(&small)) {
                 Err(Stop::Failed(Failure::Work(said))) => said,
                 other => panic!("{other:?}"),
             }
@@ -245,7 +246,7 @@ mod tests {
         assert!(said.contains(" 8 MiB ") && said.contains(ALLOW_MORE), "{said}");
         let crop = Some(Rect { x: 10, y: 10, width: 500, height: 500 });
         let part = Overrides { crop, memory: Some(1 << 30), ..large };
-        assert!(MemoryEstimate::of_picture(&planned(&part)).check(&planned(&part)).is_ok());
+        assert!(MemoryEstimate::for_image(&planned(&part)).check(&planned(&part)).is_ok());
     }
 
     #[test]
@@ -253,7 +254,7 @@ mod tests {
         let limit = || Some(Limit { bytes: 8 << 20, setting: "the control group (x)".to_owned() });
         let check = |overrides: &Overrides| {
             let plan = planned(overrides);
-            MemoryEstimate::of_picture(&plan).check_within(&plan, limit)
+            MemoryEstimate::for_image(&plan).check_against(&plan, limit)
         };
         let said = match check(&Overrides::default()) {
             Err(Stop::Failed(Failure::Work(said))) => said,
@@ -268,7 +269,7 @@ mod tests {
     #[test]
     fn separate_blocks_are_counted() {
         let photons = Overrides { photons: Some(true), samples: Some(64), ..Overrides::default() };
-        let film = |overrides: &Overrides| MemoryEstimate::of_picture(&planned(overrides)).0[1].1;
+        let film = |overrides: &Overrides| MemoryEstimate::for_image(&planned(overrides)).0[1].1;
         let pixels = 640 * 480;
         let plain = film(&Overrides::default());
         assert_eq!(film(&photons) - plain, pixels * 24);

@@ -1,4 +1,4 @@
-//! Messages that tests look for.
+//! Messages that tests check for.
 
 /// No image is written because some pixels lack samples.
 pub const INCOMPLETE_IMAGE: &str = "the render stopped before every pixel had a sample";
@@ -35,6 +35,6 @@ pub const MODEL_MISSING: &str = "does not exist: its scene was not written";
 pub const ALREADY_EXISTS: &str = "already exists";
 
 /// Explains why a checkpoint with more than `samples` samples per pixel is not used.
-pub fn has_more_samples(samples: u32) -> String {
+pub fn too_many_samples_message(samples: u32) -> String {
     format!("it already has more than {samples} samples")
 }

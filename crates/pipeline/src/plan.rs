@@ -4,7 +4,7 @@ use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::settings::{Checkpoints, Effective, OutputLayer, Overrides, Side, UpAxis, View};
+use super::settings::{Checkpoints, EffectiveSettings, OutputLayer, Overrides, Side, UpAxis, View};
 use super::turntable::{self, Turn};
 use crate::choice::Choice;
 use crate::film::range_map::{DataKind, RangeMap};
@@ -40,12 +40,12 @@ pub(super) struct Plan {
     pub(super) turn: Option<Turn>,
     /// Additional layers for EXR files.
     pub(super) layers: Vec<OutputLayer>,
-    /// Side facing the camera and up axis of a model, if set on the command line.
+    /// For a model, the side facing the camera and the up axis, if set on the command line.
     pub(super) from: Option<Side>,
     pub(super) up: Option<UpAxis>,
     /// Output files for later turntable frames.
     pub(super) later_outputs: Vec<PathBuf>,
-    pub(super) named_by: NamedBy,
+    pub(super) named_by: OutputNameSource,
     /// Default file name pattern for turntable frames, with `#` for the number. `None` without a turntable or
     /// if the user named the files.
     pub(super) default_names: Option<PathBuf>,
@@ -56,17 +56,17 @@ pub(super) struct Plan {
     pub(super) checkpoints: Checkpoints,
     /// Maximum memory use of the render, in bytes.
     pub(super) memory: Option<u64>,
-    pub(super) effective: Effective,
+    pub(super) effective: EffectiveSettings,
 }
 
 /// Where the output file names come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum NamedBy {
+pub(super) enum OutputNameSource {
     /// `-o`.
     CommandLine,
     /// `output` in `[render]`.
     Scene,
-    /// The scene's name with `.png`.
+    /// The scene's name with the extension `.png`.
     Default,
 }
 
@@ -75,7 +75,7 @@ pub(super) enum NamedBy {
 /// # Errors
 /// The crop is outside the image, or an output format cannot store the image.
 pub(super) fn plan(scene: &Arc<Scene>, path: &Path, overrides: &Overrides) -> Result<Plan, Box<Diagnostic>> {
-    let mut render = overrides.applied(&scene.render);
+    let mut render = overrides.apply_to(&scene.render);
     if scene.environment.is_some() {
         render.background = Vec3::ZERO;
     }
@@ -90,9 +90,9 @@ pub(super) fn plan(scene: &Arc<Scene>, path: &Path, overrides: &Overrides) -> Re
             .unwrap_or(scene.photons.enabled)
             .then(|| photons(&scene.photons, (render.width, render.height))),
     };
-    let threads = threads(overrides);
-    let (outputs, named_by) = outputs(scene.output.as_ref(), path, overrides);
-    let is_usual = named_by == NamedBy::Default && overrides.turn.is_some();
+    let threads = thread_count(overrides);
+    let (outputs, named_by) = output_paths(scene.output.as_ref(), path, overrides);
+    let is_usual = named_by == OutputNameSource::Default && overrides.turn.is_some();
     let default_names = outputs.first().filter(|_| is_usual).cloned();
     let OutputFiles { outputs, moving, later_outputs } = OutputFiles::of(outputs, overrides.turn);
     let bit_depth = overrides.bit_depth.unwrap_or(8);
@@ -105,7 +105,7 @@ pub(super) fn plan(scene: &Arc<Scene>, path: &Path, overrides: &Overrides) -> Re
             check_layers(&outputs, &moving, settings.view, overrides)?;
             moving
                 .iter()
-                .try_for_each(|path| check_moving(path, (render.width, render.height), bit_depth))?;
+                .try_for_each(|path| check_animation(path, (render.width, render.height), bit_depth))?;
         }
     }
     Ok(Plan {
@@ -115,9 +115,9 @@ pub(super) fn plan(scene: &Arc<Scene>, path: &Path, overrides: &Overrides) -> Re
         threads,
         crop: overrides.crop,
         time_seconds: overrides.time_seconds,
-        tone: tone(render.exposure, render.tonemap, settings.view),
+        tone: tone_mapping(render.exposure, render.tonemap, settings.view),
         bit_depth,
-        effective: Effective::new(&settings, threads, &[outputs.as_slice(), &moving].concat()),
+        effective: EffectiveSettings::new(&settings, threads, &[outputs.as_slice(), &moving].concat()),
         outputs,
         moving,
         later_outputs,
@@ -127,7 +127,7 @@ pub(super) fn plan(scene: &Arc<Scene>, path: &Path, overrides: &Overrides) -> Re
         up: overrides.up,
         named_by,
         default_names,
-        report: report(overrides),
+        report: report_path(overrides),
         replaces_foreign: overrides.replaces_foreign,
         shard: overrides.shard,
         checkpoints: overrides.checkpoints,
@@ -140,8 +140,8 @@ pub(super) fn plan(scene: &Arc<Scene>, path: &Path, overrides: &Overrides) -> Re
 pub(super) const MAX_PHOTONS: u64 = 4_000_000;
 
 /// The default photon count is the number of pixels, clamped to this range. With fewer photons, the
-/// additional error outweighs the time saved. More photons take time from further passes and delay the first
-/// image.
+/// additional error outweighs the time saved. More photons leave less time for further passes and delay the
+/// first image.
 const PHOTONS_BY_PIXELS: RangeInclusive<u64> = 8192..=200_000;
 
 /// Returns the photon settings for the given image size.
@@ -165,29 +165,36 @@ fn with_accel(scene: &Arc<Scene>, accel: Accel) -> Arc<Scene> {
     scene
 }
 
-/// Returns the output files from the command line or else from the scene. The default is the scene's name
-/// with `.png` in the working directory.
-fn outputs(of_scene: Option<&PathBuf>, path: &Path, overrides: &Overrides) -> (Vec<PathBuf>, NamedBy) {
+/// Returns the output files given on the command line or, failing that, in the scene. The default is a `.png`
+/// file in the working directory with the scene's name.
+fn output_paths(
+    of_scene: Option<&PathBuf>,
+    path: &Path,
+    overrides: &Overrides,
+) -> (Vec<PathBuf>, OutputNameSource) {
     if !overrides.outputs.is_empty() {
-        return (overrides.outputs.clone(), NamedBy::CommandLine);
+        return (overrides.outputs.clone(), OutputNameSource::CommandLine);
     }
     if let Some(of_scene) = of_scene {
         return match overrides.turn {
-            None => (vec![of_scene.clone()], NamedBy::Scene),
+            None => (vec![of_scene.clone()], OutputNameSource::Scene),
             // The scene specifies only one file, so the turntable uses default names.
-            Some(_) => (vec![turntable::suggested(of_scene)], NamedBy::Default),
+            Some(_) => (vec![turntable::with_placeholder(of_scene)], OutputNameSource::Default),
         };
     }
     let mut name = path.file_stem().unwrap_or("glimt".as_ref()).to_owned();
     name.push(".png");
     let name = PathBuf::from(name);
-    (vec![if overrides.turn.is_some() { turntable::suggested(&name) } else { name }], NamedBy::Default)
+    (
+        vec![if overrides.turn.is_some() { turntable::with_placeholder(&name) } else { name }],
+        OutputNameSource::Default,
+    )
 }
 
 /// Returns the report's path, which contains the frame number if this is a turntable.
-fn report(overrides: &Overrides) -> Option<PathBuf> {
+fn report_path(overrides: &Overrides) -> Option<PathBuf> {
     let path = overrides.report.as_ref()?;
-    let numbered = overrides.turn.and_then(|turn| turntable::numbered(path, turn));
+    let numbered = overrides.turn.and_then(|turn| turntable::frame_path(path, turn));
     Some(numbered.unwrap_or_else(|| path.clone()))
 }
 
@@ -208,10 +215,10 @@ impl OutputFiles {
                 moving.push(path);
                 continue;
             }
-            // The first frame also lists later files so that conflicts are detected before hours of
-            // rendering.
+            // For the first frame, also list the files of later frames, so that conflicts are detected before
+            // hours of rendering.
             let others = (turn.number + 1..turn.of).filter(|_| turn.number == 0);
-            let of = |number| turntable::numbered(&path, Turn { number, ..turn });
+            let of = |number| turntable::frame_path(&path, Turn { number, ..turn });
             later_outputs.extend(others.filter_map(of));
             outputs.push(of(turn.number).unwrap_or(path));
         }
@@ -246,7 +253,7 @@ fn check_layers(
 }
 
 /// Checks that an animation format supports the image size and bit depth.
-fn check_moving(path: &Path, size: (u32, u32), bit_depth: u8) -> Result<(), Box<Diagnostic>> {
+fn check_animation(path: &Path, size: (u32, u32), bit_depth: u8) -> Result<(), Box<Diagnostic>> {
     let Some(format) = AnimationFormat::from_path(path) else { return Ok(()) };
     let message = match format.check_size(size.0, size.1) {
         Err(error) => error.to_string(),
@@ -278,7 +285,8 @@ fn check_crop(crop: Option<Rect>, width: u32, height: u32) -> Result<(), Box<Dia
     }
 }
 
-/// Checks that an image with these settings can be rendered in parts and that there is one output file.
+/// Checks that an image with these settings can be rendered in parts and that there is exactly one output
+/// file.
 fn check_shard(settings: &RenderSettings, overrides: &Overrides) -> Result<(), Box<Diagnostic>> {
     let refused = |message: &str, help: &str| {
         let (message, help) = (message.to_owned(), Some(help.to_owned()));
@@ -299,12 +307,12 @@ fn check_shard(settings: &RenderSettings, overrides: &Overrides) -> Result<(), B
             "use --samples or --error",
         );
     }
-    if settings.gathers() && settings.render.error > 0.0 {
+    if settings.gathers_photons() && settings.render.error > 0.0 {
         let message =
             "`--shard` does not work with photons and a noise target: each pass needs the whole image";
         return refused(message, "use --error 0 with --samples, or --photons off");
     }
-    if settings.gathers() && settings.view.source() == AovSource::Film(Quantity::Error) {
+    if settings.gathers_photons() && settings.view.source() == AovSource::Film(Quantity::Error) {
         return refused(
             "`--shard` does not work with photons and the `error` view",
             "render it without --shard, or use --photons off",
@@ -323,7 +331,7 @@ fn check_format(path: &Path, size: (u32, u32), bit_depth: u8) -> Result<(), Box<
 }
 
 /// Returns the tone mapping for a view. Exposure and tone curve only apply to light, not to data.
-fn tone(exposure: f32, curve: Tonemap, view: View) -> ToneMapping {
+fn tone_mapping(exposure: f32, curve: Tonemap, view: View) -> ToneMapping {
     match view.source() {
         AovSource::Light(LightAov::Radiance(_)) | AovSource::Bounds | AovSource::Film(Quantity::Radiance) => {
             ToneMapping { exposure_stops: exposure, curve, ..Default::default() }
@@ -345,11 +353,11 @@ fn tone(exposure: f32, curve: Tonemap, view: View) -> ToneMapping {
 }
 
 /// Returns the number of render threads: as requested, or one per core.
-pub(super) fn threads(overrides: &Overrides) -> usize {
-    overrides.threads.filter(|count| *count > 0).unwrap_or_else(cores)
+pub(super) fn thread_count(overrides: &Overrides) -> usize {
+    overrides.threads.filter(|count| *count > 0).unwrap_or_else(core_count)
 }
 
-pub(super) fn cores() -> usize {
+pub(super) fn core_count() -> usize {
     std::thread::available_parallelism().map_or(1, std::num::NonZero::get)
 }
 

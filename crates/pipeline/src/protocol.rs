@@ -13,11 +13,13 @@ use std::sync::Arc;
 use std::time::Instant;
 
 pub use self::stage::{Stage, StageReport, Status};
-pub use super::answers::{CameraEdit, ImagePosition, KeptCamera, MovedCamera, Picked, PickedObject, Section};
+pub use super::answers::{
+    CameraEdit, ImagePosition, MovedCamera, Picked, PickedObject, SavedCamera, Section,
+};
 pub use super::report::{
     Counters, ImageReport, LightsReport, LightsSampled, PhotonsReport, Report, SampleCounts,
 };
-use super::settings::{Effective, Overrides, OwnSettings};
+use super::settings::{AdjustableSettings, EffectiveSettings, Overrides};
 use super::watch::content::FileRead;
 use crate::film::Picture;
 pub use crate::scene::description::Viewpoint;
@@ -85,7 +87,7 @@ pub enum Writing {
     Must,
 }
 
-/// Maximum preview size, in square pixels.
+/// Maximum preview size, measured in square pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PreviewSize {
     /// Columns.
@@ -118,8 +120,7 @@ pub enum Event {
         generation: u64,
         /// The scene and all files it references.
         files: Vec<FileRead>,
-        /// Number of files at the start of the list that this request read. The others were read by earlier
-        /// requests.
+        /// This request read the first `read` files in the list. The others were read by earlier requests.
         read: usize,
         /// Point in time before the first read.
         since: Instant,
@@ -143,13 +144,13 @@ pub enum Event {
         /// Request number.
         generation: u64,
         /// The settings.
-        settings: Box<Effective>,
+        settings: Box<EffectiveSettings>,
         /// Camera of the scene.
         camera: Viewpoint,
         /// Exposure of the scene, in stops.
         exposure: f32,
         /// The scene's values for other settings that can be changed with keys.
-        own: OwnSettings,
+        own: AdjustableSettings,
     },
     /// The scene file was read.
     Text {
@@ -186,7 +187,7 @@ pub enum Event {
         /// Request number.
         generation: u64,
         /// The state.
-        state: OwnState,
+        state: OwnImageState,
     },
     /// An image or a report could not be written. Rendering continues.
     WriteFailed {
@@ -236,7 +237,7 @@ pub enum Event {
         /// Request number.
         generation: u64,
         /// The file with the camera, or why it was not written.
-        outcome: Result<KeptCamera, String>,
+        outcome: Result<SavedCamera, String>,
     },
     /// Answer to [`Command::UndoCamera`].
     CameraUndone {
@@ -270,13 +271,13 @@ pub enum Event {
         /// Why.
         failure: Failure,
     },
-    /// The render of the last valid scene ended. It was rendered because the request's own scene could not be
-    /// read, as reported by [`Event::Failed`].
+    /// The render of the last valid scene ended. That scene was rendered because the request's own scene
+    /// could not be read, as reported by [`Event::Failed`].
     LastGoodEnded {
         /// Request number.
         generation: u64,
         /// How the render ended.
-        end: LastGoodEnd,
+        end: LastValidSceneEnd,
     },
     /// The request was cancelled by a newer one or by [`Command::Cancel`].
     Cancelled {
@@ -287,7 +288,7 @@ pub enum Event {
 
 /// State of the scene's own image, which is rendered from the saved scene with the command-line overrides.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum OwnState {
+pub enum OwnImageState {
     /// It has been written to all its output files.
     Written,
     /// Some of its samples have been rendered.
@@ -359,7 +360,7 @@ pub enum Failure {
 
 /// How the render of the last valid scene ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LastGoodEnd {
+pub enum LastValidSceneEnd {
     /// The image is finished.
     Finished {
         /// Whether the image had already been finished, so nothing was rendered or written.
@@ -387,7 +388,7 @@ pub struct RenderProgress {
     pub fraction: f64,
     /// Seconds since the render stage started.
     pub elapsed_seconds: f64,
-    /// Seconds spent by earlier requests on samples that this render reuses.
+    /// Seconds that earlier requests spent on samples reused by this render.
     pub earlier_seconds: f64,
     /// Estimated remaining seconds. `None` until the rate is known.
     pub eta_seconds: Option<f64>,
@@ -425,7 +426,7 @@ pub struct LatestPreview {
     pub generation: u64,
     /// The preview image, no larger than the requested size.
     pub picture: Arc<Picture>,
-    /// Values mapped to black and white: the smallest and largest distance, or 0 and the maximum.
+    /// Range of values shown from black to white: the smallest to the largest distance, or 0 to the maximum.
     pub range: Option<[f32; 2]>,
     /// Section of the image shown at 1:1. `None` for the whole image.
     pub section: Option<Section>,
@@ -438,7 +439,7 @@ pub struct LatestPreview {
 /// The image that a preview shows, and whether it is finished.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PreviewSource {
-    /// Previews with the same key show the same image, possibly with different sizes and sample counts.
+    /// Previews with the same key show the same image, although their sizes and sample counts may differ.
     pub image: Key,
     /// Whether the image has all its samples.
     pub is_finished: bool,

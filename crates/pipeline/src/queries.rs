@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use super::inputs::Inputs;
 use super::protocol::{
-    CameraEdit, Event, ImagePosition, KeptCamera, MovedCamera, Picked, PickedObject, Viewpoint,
+    CameraEdit, Event, ImagePosition, MovedCamera, Picked, PickedObject, SavedCamera, Viewpoint,
 };
 use super::render::film_state::FilmState;
 use super::sink::Sink;
@@ -33,7 +33,7 @@ pub(super) enum Query {
 
 impl Query {
     /// Reports why the query cannot be answered.
-    pub(super) fn fail(&self, why: &str, sink: &Sink) {
+    pub(super) fn report_failure(&self, why: &str, sink: &Sink) {
         let generation = sink.generation;
         match self {
             Self::KeepCamera(_) => {
@@ -65,13 +65,15 @@ impl QueryContext {
         sink.send(match query {
             Query::Pick(spot) => Event::Picked { generation, picked: Box::new(self.pick(*spot, state)) },
             Query::KeepCamera(camera) => {
-                Event::CameraKept { generation, outcome: self.keep_camera(camera, inputs) }
+                Event::CameraKept { generation, outcome: self.save_camera(camera, inputs) }
             }
-            Query::UndoCamera(edit) => Event::CameraUndone { generation, outcome: undo(edit, inputs) },
+            Query::UndoCamera(edit) => {
+                Event::CameraUndone { generation, outcome: undo_camera_edit(edit, inputs) }
+            }
         });
     }
 
-    /// Finds the first object on the ray through the center of a pixel.
+    /// Finds the first object hit by the ray through a pixel's center.
     fn pick(&self, spot: ImagePosition, state: Option<&FilmState>) -> Picked {
         let (width, height) = (self.settings.render.width, self.settings.render.height);
         let pixel = |at: f64, side: u32| ((at * f64::from(side)).max(0.0) as u32).min(side - 1);
@@ -110,13 +112,13 @@ impl QueryContext {
         })
     }
 
-    /// Writes a camera to the scene file, unless the file or the scene's camera has changed since it was
+    /// Writes a camera to the scene file. Fails if the file or the scene's camera has changed since it was
     /// read.
-    fn keep_camera(
+    fn save_camera(
         &self,
         MovedCamera { camera, own }: &MovedCamera,
         inputs: &Inputs,
-    ) -> Result<KeptCamera, String> {
+    ) -> Result<SavedCamera, String> {
         let loaded = &self.parsed.loaded;
         let path = loaded.path.clone();
         if is_model(&path) {
@@ -133,7 +135,7 @@ impl QueryContext {
         if !has_text(&path, read) {
             return Err(changed.to_owned());
         }
-        // Values that were not changed with keys are from the old camera and would overwrite newer ones.
+        // Values not changed with keys come from the old camera, so writing them would overwrite newer ones.
         if *own != self.own {
             return Err(CAMERA_CHANGED.to_owned());
         }
@@ -141,16 +143,16 @@ impl QueryContext {
         let edit = if text == read {
             None
         } else {
-            replace(&path, (read, &text), inputs, (changed, "camera not saved"))?;
+            replace_scene_text(&path, (read, &text), inputs, (changed, "camera not saved"))?;
             Some(CameraEdit { path: path.clone(), before: read.into(), after: text.as_str().into() })
         };
         let is_own = Loaded::camera_of(&text, &self.sets).is_some_and(|own| own.is_nearly(camera));
-        Ok(KeptCamera { path, is_new: edit.is_some(), is_own, of_model: false, edit })
+        Ok(SavedCamera { path, is_new: edit.is_some(), is_own, of_model: false, edit })
     }
 }
 
-/// Restores the text from before the camera edit, unless the file has changed since.
-fn undo(edit: &CameraEdit, inputs: &Inputs) -> Result<PathBuf, String> {
+/// Restores the text from before the camera edit. Fails if the file has changed since.
+fn undo_camera_edit(edit: &CameraEdit, inputs: &Inputs) -> Result<PathBuf, String> {
     let CameraEdit { path, before, after } = edit;
     let changed = format!("{} {NOT_UNDONE}", path.display());
     if is_gone(path) {
@@ -159,7 +161,7 @@ fn undo(edit: &CameraEdit, inputs: &Inputs) -> Result<PathBuf, String> {
     if !has_text(path, after) {
         return Err(changed);
     }
-    replace(path, (after, before), inputs, (&changed, "not undone"))?;
+    replace_scene_text(path, (after, before), inputs, (&changed, "not undone"))?;
     Ok(path.clone())
 }
 
@@ -173,16 +175,16 @@ fn has_text(path: &Path, text: &str) -> bool {
     text_now(path).is_ok_and(|now| *now == *text)
 }
 
-/// Replaces the text of a scene file. `changed` is the error message if the file's text is not `old`.
-/// `outcome` ends the error message if file metadata would be lost.
-fn replace(
+/// Replaces the text of a scene file. If the file's text is not `old`, fails with the message `changed`. If
+/// file metadata would be lost, fails with a message that ends with `outcome`.
+fn replace_scene_text(
     path: &Path,
     (old, new): (&str, &str),
     inputs: &Inputs,
     (changed, outcome): (&str, &str),
 ) -> Result<(), String> {
     let metadata = file::kind(path).map(|(_, metadata)| metadata).map_err(|error| describe_error(&error))?;
-    if let Some(why) = file::reason_to_keep(&metadata) {
+    if let Some(why) = file::reason_not_to_replace(&metadata) {
         return Err(format!("{} {why}: {outcome}", path.display()));
     }
     let refused = || OutputError::Refused { reason: changed.to_owned() };
@@ -197,8 +199,9 @@ fn replace(
         .map_err(|error| error.to_string())
 }
 
-/// Writes a model's scene, with the given camera, next to the model. Never replaces a file.
-fn write_scene_of_model(loaded: &Loaded, camera: &Viewpoint) -> Result<KeptCamera, String> {
+/// Writes the scene generated for a model to a file next to the model, using the given camera. Never replaces
+/// a file.
+fn write_scene_of_model(loaded: &Loaded, camera: &Viewpoint) -> Result<SavedCamera, String> {
     let path = loaded.path.with_extension("toml");
     let shown = path.display();
     if path.symlink_metadata().is_ok() {
@@ -207,7 +210,7 @@ fn write_scene_of_model(loaded: &Loaded, camera: &Viewpoint) -> Result<KeptCamer
     let text = loaded.text_with_camera(camera)?;
     write::new_file(&path, text.as_bytes())
         .map_err(|error| format!("cannot write {shown}: {}", describe_error(&error)))?;
-    Ok(KeptCamera { path, is_new: true, is_own: false, of_model: true, edit: None })
+    Ok(SavedCamera { path, is_new: true, is_own: false, of_model: true, edit: None })
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ mod marks;
 
 pub(super) use self::marks::ReportMarks;
 use super::protocol::StageReport;
-use super::settings::Effective;
+use super::settings::EffectiveSettings;
 
 /// Report of a finished request, written as JSON with `--report`.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
@@ -17,7 +17,7 @@ pub struct Report {
     /// The image.
     pub image: ImageReport,
     /// Effective settings.
-    pub settings: Effective,
+    pub settings: EffectiveSettings,
     /// The lights and how they are sampled.
     pub lights: LightsReport,
     /// Photon statistics. `None` if the image does not use photons.
@@ -53,8 +53,8 @@ pub struct ImageReport {
     pub render_seconds: f64,
     /// Whether every pixel has the requested number of samples.
     pub complete: bool,
-    /// Range of values shown from black to white: the minimum distance (white) and the maximum for `depth`,
-    /// and 0 and the maximum (white) for other data.
+    /// Range of values shown as grays. For `depth`, from the minimum distance (white) to the maximum (black).
+    /// For other data, from 0 (black) to the maximum (white).
     pub range: Option<[f32; 2]>,
 }
 
@@ -76,8 +76,8 @@ pub struct LightsReport {
     pub count: u64,
     /// Which lights are sampled at each vertex.
     pub sampled: LightsSampled,
-    /// Number of lights sampled from the tree per vertex: 32 × `shadow_samples` for `whitted`, 4 × for
-    /// `path`. 0 without a tree.
+    /// Number of lights sampled from the tree per vertex: 32 × `shadow_samples` for `whitted`, or 4 ×
+    /// `shadow_samples` for `path`. 0 without a tree.
     pub picks: u64,
     /// Number of nodes in the light tree.
     pub tree_nodes: u64,
@@ -90,7 +90,7 @@ pub struct LightsReport {
 pub struct PhotonsReport {
     /// Photons per pass.
     pub count: u64,
-    /// Passes traced by this request. Others were cached.
+    /// Passes traced by this request. The other passes were cached.
     pub passes: u64,
     /// Photons emitted.
     pub emitted: u64,

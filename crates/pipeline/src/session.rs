@@ -46,17 +46,17 @@ impl Session {
             own: None,
             force: true,
         };
-        // The result is returned, so no one receives the events.
+        // Events are not needed, because the result is returned.
         let (events, _) = mpsc::channel();
         let sink =
             Sink { generation: self.generation, events, previews: PreviewSlot::default(), within: None };
         let context = RequestContext::new(token, token, &NoOrders);
-        self.engine.rendered(&request, &sink, &context)
+        self.engine.render_image(&request, &sink, &context)
     }
 
-    /// Whether a path refers to a file that the last image depends on.
-    pub fn reads(&self, path: &Path) -> bool {
-        self.engine.reads(path)
+    /// Whether the last image depends on the file at a path.
+    pub fn has_read(&self, path: &Path) -> bool {
+        self.engine.has_read(path)
     }
 }
 
@@ -109,7 +109,7 @@ mod tests {
         assert_ne!(one.image.pixels, other.image.pixels);
         assert!(one.key != other.key && one.key == more.key);
         assert_eq!(again.report.counters.camera_rays, 8 * 6 * 2, "rendered again");
-        assert!(session.reads(&scene) && !session.reads(&folder.path().join("b.toml")));
+        assert!(session.has_read(&scene) && !session.has_read(&folder.path().join("b.toml")));
         assert!(!folder.path().join("a.png").exists());
     }
 

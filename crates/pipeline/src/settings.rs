@@ -60,7 +60,7 @@ macro_rules! overrides {
 
         impl Overrides {
             /// Applies the overrides to a scene's settings.
-            pub(super) fn applied(&self, to: &Render) -> Render {
+            pub(super) fn apply_to(&self, to: &Render) -> Render {
                 Render { $($name: self.$name.unwrap_or(to.$name),)* ..*to }
             }
         }
@@ -125,7 +125,7 @@ choice! {
     }
 }
 
-/// When a render saves checkpoints next to its output file, and whether it resumes from them.
+/// How often a render saves checkpoints next to its output file, and whether it resumes from them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Checkpoints {
     /// Seconds between checkpoints. 0 disables them.
@@ -150,7 +150,7 @@ pub enum Resume {
 
 /// Scene settings that can be overridden with keys.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct OwnSettings {
+pub struct AdjustableSettings {
     /// Method.
     pub integrator: Integrator,
     /// Shadows.
@@ -161,7 +161,7 @@ pub struct OwnSettings {
 
 /// Effective settings of a request, for status lines.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
-pub struct Effective {
+pub struct EffectiveSettings {
     /// Width in pixels.
     pub width: u32,
     /// Height in pixels.
@@ -199,7 +199,7 @@ pub struct Effective {
     pub outputs: Vec<PathBuf>,
 }
 
-impl Effective {
+impl EffectiveSettings {
     pub(super) fn new(settings: &RenderSettings, threads: usize, outputs: &[PathBuf]) -> Self {
         let RenderSettings { render, dof, view, photons } = settings.effective();
         Self {
@@ -222,7 +222,7 @@ impl Effective {
     }
 }
 
-/// Serializes paths lossily, so that a report can be written even if a name is not UTF-8.
+/// Serializes paths lossily, so that a report can be written even if a path is not valid UTF-8.
 fn lossy_paths<S: serde::Serializer>(paths: &[PathBuf], serializer: S) -> Result<S::Ok, S::Error> {
     serializer.collect_seq(paths.iter().map(|path| path.to_string_lossy()))
 }

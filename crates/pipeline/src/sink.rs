@@ -7,7 +7,7 @@ use std::sync::{Arc, PoisonError};
 use std::time::Instant;
 
 use super::protocol::{
-    AssetProgress, CheckpointNews, Event, LatestPreview, OwnState, PreviewSlot, PreviewSource,
+    AssetProgress, CheckpointNews, Event, LatestPreview, OwnImageState, PreviewSlot, PreviewSource,
     RenderProgress, Section, StageReport,
 };
 use super::watch::content::FileRead;
@@ -20,7 +20,7 @@ pub(super) struct Sink {
     pub(super) generation: u64,
     pub(super) events: Sender<Event>,
     pub(super) previews: PreviewSlot,
-    /// Progress fractions at the start and end of the render, if it is only one part of the work.
+    /// Overall progress fractions at the start and end of the render, if it is only part of the work.
     pub(super) within: Option<[f64; 2]>,
 }
 
@@ -33,8 +33,8 @@ impl Sink {
         self.send(Event::Stage { generation: self.generation, stage });
     }
 
-    /// Returns a sink for one part of the work, given the progress fractions at its start and end.
-    pub(super) fn within(&self, ends: [f64; 2]) -> Self {
+    /// Returns a sink for one part of the work, given the overall progress fractions at its start and end.
+    pub(super) fn for_progress_range(&self, ends: [f64; 2]) -> Self {
         Self { within: Some(ends), ..self.clone() }
     }
 
@@ -47,15 +47,15 @@ impl Sink {
         self.send(Event::Progress { generation: self.generation, progress });
     }
 
-    pub(super) fn files(&self, files: Vec<FileRead>, read: usize, since: Instant) {
+    pub(super) fn files_read(&self, files: Vec<FileRead>, read: usize, since: Instant) {
         self.send(Event::Files { generation: self.generation, files, read, since });
     }
 
-    pub(super) fn written(&self, path: &Path, bytes: u64, is_own: bool) {
+    pub(super) fn image_written(&self, path: &Path, bytes: u64, is_own: bool) {
         self.send(Event::Written { generation: self.generation, path: path.to_owned(), bytes, is_own });
     }
 
-    pub(super) fn own_image(&self, state: OwnState) {
+    pub(super) fn own_image(&self, state: OwnImageState) {
         self.send(Event::OwnImage { generation: self.generation, state });
     }
 
@@ -68,7 +68,7 @@ impl Sink {
         self.send(Event::WriteFailed { generation: self.generation, path, message });
     }
 
-    pub(super) fn not_kept(&self, message: String) {
+    pub(super) fn metadata_lost(&self, message: String) {
         self.send(Event::NotKept { generation: self.generation, message });
     }
 
@@ -76,7 +76,7 @@ impl Sink {
         self.send(Event::Checkpoint { generation: self.generation, news });
     }
 
-    pub(super) fn refused(&self, conflicts: Vec<Diagnostic>) {
+    pub(super) fn write_conflicts(&self, conflicts: Vec<Diagnostic>) {
         self.send(Event::Refused { generation: self.generation, conflicts });
     }
 
@@ -88,24 +88,38 @@ impl Sink {
         source: PreviewSource,
     ) {
         let (generation, picture, source) = (self.generation, Arc::new(picture), Some(source));
-        self.put(LatestPreview { generation, picture, range, section, lacks_photons: false, source });
+        self.replace_preview(LatestPreview {
+            generation,
+            picture,
+            range,
+            section,
+            lacks_photons: false,
+            source,
+        });
     }
 
     /// Sends a preview that lacks the light from photons, before they are traced.
     pub(super) fn preview_without_photons(&self, picture: Picture) {
         let (generation, picture) = (self.generation, Arc::new(picture));
         let (range, section, source) = (None, None, None);
-        self.put(LatestPreview { generation, picture, range, section, lacks_photons: true, source });
+        self.replace_preview(LatestPreview {
+            generation,
+            picture,
+            range,
+            section,
+            lacks_photons: true,
+            source,
+        });
     }
 
-    fn put(&self, latest: LatestPreview) {
+    fn replace_preview(&self, latest: LatestPreview) {
         *self.previews.lock().unwrap_or_else(PoisonError::into_inner) = Some(latest);
         self.send(Event::Preview { generation: self.generation });
     }
 
-    /// Loads an asset and reports the progress, which `load` passes to a callback. Always reports completion
-    /// after a success.
-    pub(super) fn asset<T, E>(
+    /// Loads an asset and reports the progress that `load` passes to its callback. If loading succeeds,
+    /// always reports completion.
+    pub(super) fn load_asset<T, E>(
         &self,
         name: &str,
         load: impl FnOnce(&(dyn Fn(u64, u64) + Sync)) -> Result<T, E>,
@@ -148,7 +162,7 @@ mod tests {
             }
             Ok(())
         };
-        sink.asset("bricks", load).expect("loaded");
+        sink.load_asset("bricks", load).expect("loaded");
         drop(sink);
         let seen: Vec<(u64, u64)> = received
             .into_iter()
@@ -168,7 +182,7 @@ mod tests {
     fn failed_asset_does_not_report_completion() {
         let (events, received) = mpsc::channel();
         let sink = Sink { generation: 3, events, previews: PreviewSlot::default(), within: None };
-        sink.asset("bricks", |_| -> Result<(), ()> { Err(()) }).expect_err("failed");
+        sink.load_asset("bricks", |_| -> Result<(), ()> { Err(()) }).expect_err("failed");
         drop(sink);
         let ends = received.into_iter().filter(
             |event| matches!(event, Event::Asset { progress, .. } if progress.done == progress.total),

@@ -4,14 +4,14 @@ use std::time::{Duration, Instant};
 
 use crate::control::CancelToken;
 
-/// A clock whose caller reports whether work is paused.
+/// A clock that excludes pauses. The caller tells it whether work is paused.
 #[derive(Debug)]
-pub(super) struct Clock {
+pub(super) struct PausableClock {
     last: Instant,
     active: Duration,
 }
 
-impl Clock {
+impl PausableClock {
     pub(super) fn start() -> Self {
         Self { last: Instant::now(), active: Duration::ZERO }
     }

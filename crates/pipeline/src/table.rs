@@ -2,7 +2,7 @@
 
 use super::protocol::{Stage, StageReport, Status};
 use super::sink::Sink;
-use super::stages::{Staged, Stop};
+use super::stages::{StageResult, Stop};
 use super::stopwatch::Stopwatch;
 use crate::control::CancelToken;
 use crate::system::cpu_time::process_cpu_seconds;
@@ -25,7 +25,7 @@ impl StageTable<'_> {
     pub(super) fn run<T>(
         &mut self,
         name: Stage,
-        work: impl FnOnce() -> Result<Staged<T>, Stop>,
+        work: impl FnOnce() -> Result<StageResult<T>, Stop>,
     ) -> Result<T, Stop> {
         let watch = Stopwatch::start(self.token);
         let before = process_cpu_seconds();
@@ -33,15 +33,15 @@ impl StageTable<'_> {
             let processor_seconds = process_cpu_seconds() - before;
             StageReport { name, status, seconds: watch.seconds(), processor_seconds, why }
         };
-        self.say(report(Status::Running, String::new()));
+        self.send_report(report(Status::Running, String::new()));
         let staged = work()?;
         let report = report(staged.status, staged.why);
-        self.say(report.clone());
+        self.send_report(report.clone());
         self.stages.push(report);
         Ok(staged.value)
     }
 
-    fn say(&self, report: StageReport) {
+    fn send_report(&self, report: StageReport) {
         if !self.is_silent {
             self.sink.stage(report);
         }

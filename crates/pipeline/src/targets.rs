@@ -4,15 +4,16 @@ use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 use std::path::{Path, PathBuf};
 
-use super::inputs::{Input, Inputs, OnDisk};
-use super::plan::{NamedBy, Plan};
-use super::render::checkpointer::path_of as checkpoint_of;
+use super::inputs::{Input, InputIndex, Inputs};
+use super::plan::{OutputNameSource, Plan};
+use super::render::checkpointer::checkpoint_path;
 use super::report::ReportMarks;
 use super::sink::Sink;
 use crate::output::part::{self, PartFile};
 use crate::output::write::{FolderSweep, Guard};
 use crate::output::{
-    FileIdentity, Losses, OutputError, Replaced, replaced_image, replaced_json, scene_of_image, scene_path,
+    FileIdentity, Losses, OutputError, Replaced, may_replace_image, may_replace_json, scene_of_image,
+    scene_path,
 };
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::is_mesh;
@@ -26,26 +27,26 @@ pub(super) struct OutputTarget<'a> {
 
 impl<'a> OutputTarget<'a> {
     /// An image of the plan.
-    pub(super) fn picture(plan: &Plan, path: &'a Path) -> Self {
+    pub(super) fn for_image(plan: &Plan, path: &'a Path) -> Self {
         Self { path, kind: TargetKind::Picture(plan.named_by) }
     }
 
     /// A report.
-    pub(super) fn report(path: &'a Path) -> Self {
+    pub(super) fn for_report(path: &'a Path) -> Self {
         Self { path, kind: TargetKind::Report }
     }
 }
 
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum TargetKind {
-    Picture(NamedBy),
+    Picture(OutputNameSource),
     Report,
 }
 
-/// Returns one diagnostic for each of the plan's files that currently must not be written. Symbolic links and
-/// files may change later.
+/// Returns one diagnostic for each of the plan's files that must not be written. This may change later,
+/// because symbolic links and files can change.
 pub(super) fn conflicts(plan: &Plan, inputs: &Inputs) -> Vec<Diagnostic> {
-    let inputs = inputs.on_disk();
+    let inputs = inputs.index_by_identity();
     // Later frames have distinct files because of their numbers.
     let mut first = HashMap::new();
     for target in current_targets(plan) {
@@ -55,12 +56,12 @@ pub(super) fn conflicts(plan: &Plan, inputs: &Inputs) -> Vec<Diagnostic> {
     }
     let twin =
         |target: OutputTarget<'_>, at: &FileIdentity| first.get(at).copied().filter(|first| *first != target);
-    let each = targets(plan).filter_map(|target| conflict(plan, target, target.path, &inputs, twin));
+    let each = targets(plan).filter_map(|target| find_conflict(plan, target, target.path, &inputs, twin));
     each.chain(linked_frames(plan)).collect()
 }
 
-/// Returns diagnostics for turntable frames that are the same file because of symbolic links, so that a later
-/// frame would replace an earlier one.
+/// Returns diagnostics for turntable frames that symbolic links map to the same file, where a later frame
+/// would replace an earlier one.
 fn linked_frames(plan: &Plan) -> Vec<Diagnostic> {
     let (mut seen, mut found) = (HashMap::new(), Vec::new());
     for path in plan.outputs.iter().chain(&plan.later_outputs).filter(|_| !plan.later_outputs.is_empty()) {
@@ -82,7 +83,7 @@ fn linked_frames(plan: &Plan) -> Vec<Diagnostic> {
 ///
 /// # Errors
 /// The file cannot be written, or [`OutputError::Refused`].
-pub(super) fn guarded<'a, T>(
+pub(super) fn write_guarded<'a, T>(
     plan: &'a Plan,
     inputs: &Inputs,
     (target, sweep): (OutputTarget<'a>, Option<&FolderSweep>),
@@ -90,7 +91,7 @@ pub(super) fn guarded<'a, T>(
     write: impl FnOnce(&Guard<'_>) -> Result<T, OutputError>,
 ) -> Result<T, OutputError> {
     let may_replace = |real: &Path| {
-        let inputs = inputs.on_disk();
+        let inputs = inputs.index_by_identity();
         // Targets were compared when the write stage started. Since then, only symbolic links can have
         // changed.
         let twin = |target: OutputTarget<'_>, at: &FileIdentity| {
@@ -100,8 +101,8 @@ pub(super) fn guarded<'a, T>(
             let mut others = current_targets(plan).filter(|other| *other != target);
             others.find(|other| FileIdentity::of(other.path).as_ref() == Some(at))
         };
-        match conflict(plan, target, real, &inputs, twin) {
-            Some(conflict) => Err(OutputError::Refused { reason: one_line(&conflict) }),
+        match find_conflict(plan, target, real, &inputs, twin) {
+            Some(conflict) => Err(OutputError::Refused { reason: format_one_line(&conflict) }),
             None => Ok(()),
         }
     };
@@ -109,37 +110,37 @@ pub(super) fn guarded<'a, T>(
         is_kept: &|path| inputs.contain(path),
         may_replace: &may_replace,
         sweep,
-        losses: Losses::Report(&|what| sink.not_kept(what)),
+        losses: Losses::Report(&|what| sink.metadata_lost(what)),
     })
 }
 
 /// Formats a conflict as a single line.
-fn one_line(conflict: &Diagnostic) -> String {
+fn format_one_line(conflict: &Diagnostic) -> String {
     let help = conflict.help.as_ref().map_or(String::new(), |help| format!("; {help}"));
     format!("{}{help}", conflict.message)
 }
 
 /// Returns the files of this request, then the files of later turntable frames.
 fn targets(plan: &Plan) -> impl Iterator<Item = OutputTarget<'_>> {
-    let picture = |path| OutputTarget::picture(plan, path);
+    let picture = |path| OutputTarget::for_image(plan, path);
     current_targets(plan).chain(plan.later_outputs.iter().map(PathBuf::as_path).map(picture))
 }
 
 /// Returns the images and then the report.
 fn current_targets(plan: &Plan) -> impl Iterator<Item = OutputTarget<'_>> {
-    let picture = |path| OutputTarget::picture(plan, path);
-    let report = plan.report.iter().map(|path| OutputTarget::report(path));
+    let picture = |path| OutputTarget::for_image(plan, path);
+    let report = plan.report.iter().map(|path| OutputTarget::for_report(path));
     let pictures = plan.outputs.iter().chain(&plan.moving);
     pictures.map(PathBuf::as_path).map(picture).chain(report)
 }
 
-/// Returns why a target that resolves to `at` must not be written. `twin` finds another target with the same
-/// file.
-fn conflict<'a>(
+/// Returns why a target that resolves to `at` must not be written. `twin` finds another target that is the
+/// same file.
+fn find_conflict<'a>(
     plan: &'a Plan,
     target: OutputTarget<'a>,
     at: &Path,
-    inputs: &OnDisk<'_>,
+    inputs: &InputIndex<'_>,
     twin: impl Fn(OutputTarget<'a>, &FileIdentity) -> Option<OutputTarget<'a>>,
 ) -> Option<Diagnostic> {
     if let Some(identity) = FileIdentity::of(at) {
@@ -152,7 +153,7 @@ fn conflict<'a>(
         if let Some(output) = plan.outputs.first().filter(|output| has_checkpoint_at(output, &identity)) {
             let (name, output) = (target.path.display(), output.display());
             let message = format!("cannot write {name}: it is the checkpoint of {output}");
-            return Some(call_error(message, Some(remedy(plan, target.kind).to_owned())));
+            return Some(call_error(message, Some(conflict_help(plan, target.kind).to_owned())));
         }
     }
     if plan.replaces_foreign { None } else { foreign_file_error(plan, target, at) }
@@ -160,14 +161,14 @@ fn conflict<'a>(
 
 /// Whether a file is the checkpoint of an output.
 fn has_checkpoint_at(output: &Path, identity: &FileIdentity) -> bool {
-    FileIdentity::of(&checkpoint_of(output)).as_ref() == Some(identity)
+    FileIdentity::of(&checkpoint_path(output)).as_ref() == Some(identity)
 }
 
 fn input_error(plan: &Plan, target: OutputTarget<'_>, input: &Input) -> Diagnostic {
     let is_same_name = target.path == input.path;
     let other = if is_same_name { String::new() } else { format!("{}, ", input.path.display()) };
     let message = format!("cannot write {}: it is {other}{}", target.path.display(), input.role);
-    let help = Some(remedy(plan, target.kind).to_owned());
+    let help = Some(conflict_help(plan, target.kind).to_owned());
     match &input.place {
         Some((loaded, span)) => loaded.diagnostic_at(span.clone(), Severity::Error, message, help),
         None => call_error(message, help),
@@ -180,20 +181,20 @@ fn same_file_error(plan: &Plan, target: OutputTarget<'_>, twin: &Path) -> Diagno
         TargetKind::Picture(_) => format!("the outputs {twin} and {name} are the same file"),
         TargetKind::Report => format!("the image {twin} and the report {name} are the same file"),
     };
-    call_error(message, Some(format!("use separate files: {}", remedy(plan, target.kind))))
+    call_error(message, Some(format!("use separate files: {}", conflict_help(plan, target.kind))))
 }
 
 /// Returns an error if the target is an existing file not written by glimt.
 fn foreign_file_error(plan: &Plan, target: OutputTarget<'_>, at: &Path) -> Option<Diagnostic> {
-    let (name, remedy) = (target.path.display(), remedy(plan, target.kind));
+    let (name, remedy) = (target.path.display(), conflict_help(plan, target.kind));
     let (replaced, help) = match target.kind {
-        TargetKind::Picture(NamedBy::Default) => {
+        TargetKind::Picture(OutputNameSource::Default) => {
             let own = match &plan.default_names {
                 Some(names) => format!("'{}'", names.display()),
                 None => name.to_string(),
             };
             let help = format!("{remedy}; -o {own} or --force replaces it");
-            let replaced = replaced_image(at);
+            let replaced = may_replace_image(at);
             if let (Replaced::Own, Some(other)) = (&replaced, other_scene(plan, at)) {
                 let message = format!("cannot write {name}: it is the image of another scene, {other}");
                 return Some(call_error(message, Some(help)));
@@ -201,10 +202,10 @@ fn foreign_file_error(plan: &Plan, target: OutputTarget<'_>, at: &Path) -> Optio
             (replaced, help)
         }
         TargetKind::Report => {
-            let replaced = replaced_json(at, "a report", ReportMarks::have_all_stages);
+            let replaced = may_replace_json(at, "a report", ReportMarks::have_all_stages);
             (replaced, format!("{remedy}; --force replaces it"))
         }
-        TargetKind::Picture(NamedBy::CommandLine | NamedBy::Scene) => {
+        TargetKind::Picture(OutputNameSource::CommandLine | OutputNameSource::Scene) => {
             return other_part_error(plan, target, at);
         }
     };
@@ -232,16 +233,22 @@ fn other_part_error(plan: &Plan, target: OutputTarget<'_>, at: &Path) -> Option<
         None => "a part or checkpoint from another version of glimt".to_owned(),
     };
     let message = format!("cannot write {}: it is {what}", target.path.display());
-    Some(call_error(message, Some(format!("{}; --force replaces it", remedy(plan, target.kind)))))
+    Some(call_error(message, Some(format!("{}; --force replaces it", conflict_help(plan, target.kind)))))
 }
 
-fn remedy(plan: &Plan, kind: TargetKind) -> &'static str {
+fn conflict_help(plan: &Plan, kind: TargetKind) -> &'static str {
     match kind {
-        TargetKind::Picture(NamedBy::Default) if plan.turn.is_some() => "name others with -o 'NAME_####.png'",
-        TargetKind::Picture(NamedBy::Default) if is_mesh(Path::new(&plan.name)) => "name a file with -o FILE",
-        TargetKind::Picture(NamedBy::CommandLine) => "name another file with -o FILE",
-        TargetKind::Picture(NamedBy::Scene) => "name another file with -o FILE, or as `output` in [render]",
-        TargetKind::Picture(NamedBy::Default) => {
+        TargetKind::Picture(OutputNameSource::Default) if plan.turn.is_some() => {
+            "name others with -o 'NAME_####.png'"
+        }
+        TargetKind::Picture(OutputNameSource::Default) if is_mesh(Path::new(&plan.name)) => {
+            "name a file with -o FILE"
+        }
+        TargetKind::Picture(OutputNameSource::CommandLine) => "name another file with -o FILE",
+        TargetKind::Picture(OutputNameSource::Scene) => {
+            "name another file with -o FILE, or as `output` in [render]"
+        }
+        TargetKind::Picture(OutputNameSource::Default) => {
             "name a file with -o FILE, or with `output = \"FILE\"` in [render]"
         }
         TargetKind::Report => "name another file with --report FILE.json",

@@ -40,13 +40,13 @@ pub(super) struct Tracer<'a> {
     pub(super) token: &'a CancelToken,
     /// Photon maps for all jobs' samples, if photons are gathered.
     pub(super) photons: Option<&'a PhotonMaps>,
-    /// Sample index in the whole image that corresponds to the jobs' sample 0.
+    /// Index in the whole image of the jobs' sample 0.
     pub(super) first: u32,
 }
 
 /// Samples to render in one tile.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Job {
+pub(super) struct TileJob {
     pub(super) tile: usize,
     pub(super) pixels: Pixels,
     pub(super) samples: Range<u32>,
@@ -54,13 +54,13 @@ pub(super) struct Job {
 
 /// Cost of a job.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Cost {
+pub(super) struct TraceCost {
     pub(super) rays: RayCounters,
     /// CPU seconds. Does not affect the image.
     pub(super) seconds: f64,
 }
 
-impl Job {
+impl TileJob {
     /// Number of pixels.
     pub(super) fn pixel_count(&self) -> u64 {
         self.pixels.count() as u64
@@ -68,26 +68,26 @@ impl Job {
 }
 
 impl Tracer<'_> {
-    fn trace(&self, job: &Job) -> Result<(TileSamples, Cost), Cancelled> {
+    fn trace(&self, job: &TileJob) -> Result<(TileSamples, TraceCost), Cancelled> {
         let Self { kernel, world, settings, token, photons, first, .. } = *self;
         let samples = first + job.samples.start..first + job.samples.end;
         let begin = thread_cpu_seconds();
         let (samples, rays) = kernel(photons, world, settings, job.pixels, samples, token)?;
-        Ok((samples, Cost { rays, seconds: thread_cpu_seconds() - begin }))
+        Ok((samples, TraceCost { rays, seconds: thread_cpu_seconds() - begin }))
     }
 
-    /// Renders the jobs. `keep` stores the samples of each finished job, on the thread that rendered it
-    /// because they are in that thread's cache. `each` is called on the current thread for each finished job,
-    /// in order of completion, and with `None` at least once per [`TICK`]. It returns whether to continue.
-    /// Jobs that have already started are always finished.
+    /// Renders the jobs. `keep` stores the samples of each finished job. It runs on the thread that rendered
+    /// them, which has them in its cache. `each` is called on the current thread for each finished job, in
+    /// order of completion, and with `None` at least once per [`TICK`]. It returns whether to continue. Jobs
+    /// that have already started are always finished.
     ///
     /// # Errors
     /// [`Cancelled`].
     pub(super) fn run<K: Send>(
         &self,
-        jobs: &[Job],
-        keep: impl Fn(&Job, TileSamples) -> K + Sync,
-        mut each: impl FnMut(Option<(&Job, K, Cost)>) -> bool,
+        jobs: &[TileJob],
+        keep: impl Fn(&TileJob, TileSamples) -> K + Sync,
+        mut each: impl FnMut(Option<(&TileJob, K, TraceCost)>) -> bool,
     ) -> Result<(), Cancelled> {
         let (next, stopped) = (AtomicUsize::new(0), AtomicBool::new(false));
         let threads = self.pool.current_num_threads();
@@ -163,8 +163,8 @@ fn longest_pass(pixels: usize) -> u32 {
     (LONGEST * (TILE / pixels.clamp(1, TILE))) as u32
 }
 
-/// Estimates the number of jobs needed to get a pixel from `done` to `total` samples with [`next_pass`]. Each
-/// job has at most `at_once` samples.
+/// Estimates the number of jobs needed to raise a pixel from `done` to `total` samples using [`next_pass`].
+/// Each job has at most `at_once` samples.
 pub(super) fn remaining_jobs(done: u32, total: u32, pixels: usize, at_once: u32) -> u32 {
     let longest = longest_pass(pixels);
     let (mut reached, mut jobs) = (done, 0);

@@ -1,4 +1,4 @@
-//! Turntables: frames that orbit `look_at`, written as numbered files or as an animation.
+//! Turntables: frames of a camera orbiting `look_at`, written as numbered files or as an animation.
 
 use std::collections::HashSet;
 use std::ffi::OsString;
@@ -62,7 +62,7 @@ pub fn check_name(path: &Path) -> Result<(), String> {
         return Ok(());
     }
     let name = path.display();
-    let example = suggested(path);
+    let example = with_placeholder(path);
     let example = example.display();
     Err(format!(
         "{name} can store only one frame of the turntable; use {example} for numbered files, or a .gif or .apng file"
@@ -75,7 +75,7 @@ pub fn has_number(path: &Path) -> bool {
 }
 
 /// Adds a frame number placeholder to a still image's file name: `a.png` becomes `a_####.png`.
-pub fn suggested(path: &Path) -> PathBuf {
+pub fn with_placeholder(path: &Path) -> PathBuf {
     let mut name = path.file_stem().unwrap_or_default().to_owned();
     name.push("_####");
     if let Some(ending) = path.extension() {
@@ -87,7 +87,7 @@ pub fn suggested(path: &Path) -> PathBuf {
 
 /// Returns the file name for a frame. Replaces the last run of `#` with the 1-based frame number. Returns
 /// `None` if there is no `#`.
-pub(super) fn numbered(path: &Path, turn: Turn) -> Option<PathBuf> {
+pub(super) fn frame_path(path: &Path, turn: Turn) -> Option<PathBuf> {
     let (before, digits, after) = split_placeholder(path)?;
     Some(path.with_file_name(with_number(before, (turn.number + 1, digits), after)))
 }
@@ -100,15 +100,15 @@ fn with_number(before: &[u8], (number, digits): (u32, usize), after: &[u8]) -> O
     OsString::from_vec([before, &zeros, number.as_bytes(), after].concat())
 }
 
-/// Returns the first file that two frames would be written to. `None` if all frames have separate files.
-pub fn twin(outputs: &[PathBuf], of: u32) -> Option<PathBuf> {
+/// Returns the first file to which two frames would be written. `None` if each frame has its own file.
+pub fn first_repeated_file(outputs: &[PathBuf], of: u32) -> Option<PathBuf> {
     let mut seen = HashSet::new();
-    let all = |number| outputs.iter().filter_map(move |path| numbered(path, Turn { number, of }));
+    let all = |number| outputs.iter().filter_map(move |path| frame_path(path, Turn { number, of }));
     (0..of).flat_map(all).find(|path| !seen.insert(path.clone()))
 }
 
 /// Returns existing files with numbers after the last frame, which are left over from a longer turntable.
-pub fn left_over(last: &Path, turn: Turn) -> Vec<PathBuf> {
+pub fn leftover_frames(last: &Path, turn: Turn) -> Vec<PathBuf> {
     let name = last.file_name().unwrap_or_default().as_bytes();
     // Find the frame number, which is the last run of digits with this value.
     let ends_run = |at: usize| at + 1 == name.len() || !name[at + 1].is_ascii_digit();
@@ -144,12 +144,12 @@ mod tests {
             std::fs::write(path(name), "").expect("written");
         }
         let last = Turn { number: 1, of: 2 };
-        let found = |name: &str| left_over(&path(name), last);
+        let found = |name: &str| leftover_frames(&path(name), last);
         assert_eq!(found("a2_002.png"), [path("a2_003.png"), path("a2_004.png")]);
         assert_eq!(found("w_2.png"), [path("w_3.png")]);
         let raw = |bytes: &[u8]| folder.path().join(OsString::from_vec(bytes.to_vec()));
         std::fs::write(raw(b"\xff_3.png"), "").expect("written");
-        assert_eq!(left_over(&raw(b"\xff_2.png"), last), [raw(b"\xff_3.png")]);
+        assert_eq!(leftover_frames(&raw(b"\xff_2.png"), last), [raw(b"\xff_3.png")]);
         assert_eq!((found("w_02.png"), found("w.png")), (Vec::new(), Vec::new()));
     }
 
@@ -171,7 +171,7 @@ mod tests {
 
     #[test]
     fn files_are_numbered_by_frame() {
-        let name = |path: &str, number| numbered(Path::new(path), Turn { number, of: 100 });
+        let name = |path: &str, number| frame_path(Path::new(path), Turn { number, of: 100 });
         assert_eq!(name("out/a_####.png", 6), Some("out/a_0007.png".into()));
         assert_eq!(
             name("a#.exr", 99),
@@ -181,19 +181,19 @@ mod tests {
         assert_eq!(name("#1_##_b.png", 0), Some("#1_01_b.png".into()));
         assert_eq!(name("##/a.png", 0), None, "folders are ignored");
         assert_eq!(name("##a##_###", 4), Some("##a##_005".into()));
-        let endless = numbered(Path::new(&"#".repeat(65_536)), Turn { number: 6, of: 9 }).expect("a name");
+        let endless = frame_path(Path::new(&"#".repeat(65_536)), Turn { number: 6, of: 9 }).expect("a name");
         let endless = endless.into_os_string().into_string().expect("digits");
         assert!(endless.len() == 65_536 && endless.ends_with("007"));
         let raw = |bytes: &[u8]| PathBuf::from(OsString::from_vec(bytes.to_vec()));
-        let of_raw = numbered(&raw(b"\xff_##\xfe.png"), Turn { number: 6, of: 9 });
+        let of_raw = frame_path(&raw(b"\xff_##\xfe.png"), Turn { number: 6, of: 9 });
         assert_eq!(of_raw, Some(raw(b"\xff_07\xfe.png")), "non-UTF-8 names should be supported");
         assert_eq!(check_name(&raw(b"\xff_##\xfe.png")), Ok(()));
-        assert_eq!(suggested(Path::new("x/a.b.png")), Path::new("x/a.b_####.png"));
+        assert_eq!(with_placeholder(Path::new("x/a.b.png")), Path::new("x/a.b_####.png"));
     }
 
     #[test]
     fn colliding_names_are_found() {
-        let twin = |names: [&str; 2], of| twin(&names.map(PathBuf::from), of);
+        let twin = |names: [&str; 2], of| first_repeated_file(&names.map(PathBuf::from), of);
         assert_eq!(twin(["a_#.png", "a_1#.png"], 10), None);
         assert_eq!(twin(["a_#.png", "a_1#.png"], 11), Some("a_11.png".into()));
         assert_eq!(twin(["a_#.png", "a_##.png"], 9), None);

@@ -28,12 +28,12 @@ pub(super) fn settings_warnings(
     settings: &RenderSettings,
     overrides: &Overrides,
 ) -> Vec<Diagnostic> {
-    let place = |(cause, message)| placed(cause, message, loaded, overrides);
-    found(scene, settings).into_iter().map(place).collect()
+    let place = |(cause, message)| locate_setting(cause, message, loaded, overrides);
+    find_warnings(scene, settings).into_iter().map(place).collect()
 }
 
 /// Adds the location of the setting that caused a warning.
-fn placed(cause: Cause, message: String, loaded: &Loaded, overrides: &Overrides) -> Diagnostic {
+fn locate_setting(cause: Cause, message: String, loaded: &Loaded, overrides: &Overrides) -> Diagnostic {
     let severity = Severity::Warning;
     if let Some(option) = cause.option(overrides) {
         let help = Some(format!("caused by `{option}`, not by the scene"));
@@ -76,19 +76,19 @@ impl Cause {
     }
 }
 
-fn found(scene: &Scene, settings: &RenderSettings) -> Vec<(Cause, String)> {
+fn find_warnings(scene: &Scene, settings: &RenderSettings) -> Vec<(Cause, String)> {
     let RenderSettings { render, photons, .. } = &settings.effective();
     let finds_all_light = render.integrator.method().scatters;
     let is_specular = |kind: &MaterialKind| kind.has_delta();
-    // These surfaces block shadow rays, and path tracing has no other way to find light that passes through
-    // them in a straight line.
-    let keeps_direction = |kind: &MaterialKind| kind.has_delta() || kind.is_like_air();
+    // These surfaces block shadow rays, and path tracing has no other way to sample light that passes
+    // straight through them.
+    let keeps_direction = |kind: &MaterialKind| kind.has_delta() || kind.is_index_matched_glass();
     let has = |is_one: &dyn Fn(&MaterialKind) -> bool| {
         let used = scene.objects.iter().filter_map(|object| object.material);
         used.map(|index| &scene.materials[index].kind).any(is_one)
     };
     let mut warnings = Vec::new();
-    let is_sharp_any = scene.lights.iter().any(|light| light.sends() && light.is_sharp());
+    let is_sharp_any = scene.lights.iter().any(|light| light.has_emission() && light.is_delta());
     if finds_all_light && is_sharp_any && has(&keeps_direction) {
         let message = "path does not find light from a [[light]] without size through mirrors or glass: their caustics \
                        are missing";
@@ -96,7 +96,7 @@ fn found(scene: &Scene, settings: &RenderSettings) -> Vec<(Cause, String)> {
     }
     if photons.is_some()
         && has(&is_specular)
-        && scene.lights.iter().any(|light| light.sends() && light.is_steady())
+        && scene.lights.iter().any(|light| light.has_emission() && light.has_no_falloff())
     {
         let message = "photons ignore lights with `falloff = \"none\"`: mirrors and glass reflect none of their light onto surfaces";
         warnings.push((Cause::Photons, message.to_owned()));

@@ -20,7 +20,7 @@ impl Eta {
         Some(if seconds > DAY { Self::OverADay } else { Self::Seconds(seconds) })
     }
 
-    /// Formats the time for display in a line that is rarely redrawn.
+    /// Formats the time for a line that is rarely redrawn.
     pub fn words(self) -> String {
         match self {
             Self::Seconds(time) => seconds(time),
@@ -29,9 +29,9 @@ impl Eta {
     }
 }
 
-/// Formats the average samples per pixel, rounded down. Uses tenths if an integer would contradict the
+/// Formats the average samples per pixel, rounded down. Shows tenths if an integer would contradict the
 /// displayed percentage.
-pub fn samples_so_far(progress: &RenderProgress) -> String {
+pub fn format_mean_samples(progress: &RenderProgress) -> String {
     /// With totals of at least this many samples, one sample is at most one percent.
     const FINE: u32 = 100;
     let tenths = (progress.mean_samples * 10.0).floor();
@@ -49,11 +49,11 @@ pub fn seconds(seconds: f64) -> String {
         s if s < 0.999_5 => format!("{:.0} ms", s * 1e3),
         s if s < 9.995 => format!("{s:.2} s"),
         s if s < 59.95 => format!("{s:.1} s"),
-        s => clock(s.round() as u64),
+        s => format_clock(s.round() as u64),
     }
 }
 
-fn clock(seconds: u64) -> String {
+fn format_clock(seconds: u64) -> String {
     match (seconds / 3600, seconds / 60 % 60, seconds % 60) {
         (0, minutes, seconds) => format!("{minutes} min {seconds:02} s"),
         (hours, minutes, _) => format!("{hours} h {minutes:02} min"),
@@ -105,7 +105,7 @@ mod tests {
         ] {
             let progress =
                 RenderProgress { mean_samples: mean, total_samples: total, ..progress(0.5, 1.0, None) };
-            assert_eq!(samples_so_far(&progress), words);
+            assert_eq!(format_mean_samples(&progress), words);
         }
     }
 

@@ -31,12 +31,13 @@ pub fn start(nice: u8) -> std::io::Result<Handle> {
 /// Starts a worker with the given configuration.
 pub(super) fn start_with(config: EngineConfig) -> std::io::Result<Handle> {
     let (sender, events) = mpsc::channel();
-    let remote = Remote { mailbox: Arc::default(), events: sender };
+    let remote = CommandSender { mailbox: Arc::default(), events: sender };
     let previews = PreviewSlot::default();
     let contents = Arc::<Contents>::default();
     let worker =
         Worker { remote: remote.clone(), previews: previews.clone(), config, contents: contents.clone() };
-    let thread = std::thread::Builder::new().name("glimt-worker".to_owned()).spawn(move || worker.work())?;
+    let thread =
+        std::thread::Builder::new().name("glimt-worker".to_owned()).spawn(move || worker.run_loop())?;
     Ok(Handle { events, previews, remote, contents, thread: Some(thread) })
 }
 
@@ -47,7 +48,7 @@ pub struct Handle {
     pub events: Receiver<Event>,
     /// Slot for previews.
     pub previews: PreviewSlot,
-    remote: Remote,
+    remote: CommandSender,
     contents: Arc<Contents>,
     thread: Option<JoinHandle<()>>,
 }
@@ -59,7 +60,7 @@ impl Handle {
     }
 
     /// Returns a handle for sending commands from other threads.
-    pub fn remote(&self) -> Remote {
+    pub fn remote(&self) -> CommandSender {
         self.remote.clone()
     }
 
@@ -68,9 +69,9 @@ impl Handle {
         Arc::clone(&self.contents)
     }
 
-    /// Stops the worker and waits for at most `patience`. Returns whether it has stopped. If an image is
-    /// being written, the worker finishes writing it.
-    pub fn end_within(&self, patience: Duration) -> bool {
+    /// Stops the worker and waits at most `patience` for it to stop. Returns whether it has stopped. If an
+    /// image is being written, the worker finishes writing it.
+    pub fn stop_within(&self, patience: Duration) -> bool {
         self.send(Command::Quit);
         let deadline = Instant::now().checked_add(patience);
         while !self.has_ended() && deadline.is_none_or(|deadline| Instant::now() < deadline) {
@@ -79,9 +80,9 @@ impl Handle {
         self.has_ended()
     }
 
-    /// Like [`Self::end_within`], but abandons a worker that does not stop.
+    /// Like [`Self::stop_within`], but abandons a worker that does not stop.
     pub fn finish(mut self, patience: Duration) -> bool {
-        let has_ended = self.end_within(patience);
+        let has_ended = self.stop_within(patience);
         if !has_ended {
             self.thread = None;
         }
@@ -105,7 +106,7 @@ impl Drop for Handle {
 
 /// Sends commands to a worker.
 #[derive(Clone, Debug)]
-pub struct Remote {
+pub struct CommandSender {
     mailbox: Arc<(Mutex<Mailbox>, Condvar)>,
     events: Sender<Event>,
 }
@@ -114,9 +115,9 @@ pub struct Remote {
 struct Mailbox {
     request: Option<Box<Request>>,
     write: bool,
-    /// Whether the write order is postponed until the pending request.
+    /// Whether the write order is postponed until the pending request runs.
     is_write_postponed: bool,
-    /// Whether the write order came after the pending request and applies to it.
+    /// Whether the write order arrived after the pending request and applies to it.
     is_write_of_waiting: bool,
     /// The current request's settings that the user can change with keys.
     shown: Overrides,
@@ -130,15 +131,15 @@ struct Mailbox {
     quit: bool,
     /// Cancels or pauses the current request.
     token: CancelToken,
-    /// Cancels the write stage. It is separate because a pause, quitting, or a request without output must
-    /// not interrupt writing a finished image.
+    /// Cancels the write stage. It is separate because a finished image must be written even if the user
+    /// pauses or quits, or a request without output arrives.
     writing: CancelToken,
     /// Generation of the newest request.
     newest: u64,
 }
 
 /// Returns a request's settings that the user can change with keys.
-fn shown(request: &Request) -> Overrides {
+fn adjustable_overrides(request: &Request) -> Overrides {
     let Overrides { shadows, integrator, dof, photons, view, camera, exposure, .. } = request.overrides;
     Overrides { shadows, integrator, dof, photons, view, camera, exposure, ..Overrides::default() }
 }
@@ -153,12 +154,12 @@ enum Task {
     Quit,
 }
 
-impl Remote {
+impl CommandSender {
     /// Sends a command without blocking.
     pub fn send(&self, command: Command) {
         let mut mailbox = self.lock();
         match command {
-            Command::Render(request) => self.replace(&mut mailbox, request),
+            Command::Render(request) => self.replace_pending(&mut mailbox, request),
             Command::Write => {
                 mailbox.write = true;
                 mailbox.is_write_of_waiting = mailbox.request.is_some();
@@ -174,13 +175,13 @@ impl Remote {
                 mailbox.token.cancel();
                 mailbox.writing.cancel();
                 let dropped = mailbox.request.take();
-                self.say_cancelled(dropped);
+                self.report_cancelled(dropped);
             }
             Command::Suspend => {
                 mailbox.suspended = true;
                 mailbox.token.cancel();
                 let dropped = mailbox.request.take();
-                self.say_cancelled(dropped);
+                self.report_cancelled(dropped);
             }
             Command::Pause(paused) => {
                 mailbox.paused = paused;
@@ -196,10 +197,10 @@ impl Remote {
         self.mailbox.1.notify_all();
     }
 
-    /// Replaces the pending request unless that is newer. Requests may arrive in any order.
-    fn replace(&self, mailbox: &mut Mailbox, request: Box<Request>) {
+    /// Replaces the pending request unless the pending one is newer. Requests may arrive in any order.
+    fn replace_pending(&self, mailbox: &mut Mailbox, request: Box<Request>) {
         if request.generation < mailbox.newest {
-            return self.say_cancelled(Some(request));
+            return self.report_cancelled(Some(request));
         }
         mailbox.newest = request.generation;
         mailbox.token.cancel();
@@ -208,10 +209,10 @@ impl Remote {
         }
         (mailbox.paused, mailbox.preview) = (false, None);
         let replaced = mailbox.request.replace(request);
-        self.say_cancelled(replaced);
+        self.report_cancelled(replaced);
     }
 
-    fn say_cancelled(&self, request: Option<Box<Request>>) {
+    fn report_cancelled(&self, request: Option<Box<Request>>) {
         if let Some(request) = request {
             // Ignore a disconnected front end.
             let _ = self.events.send(Event::Cancelled { generation: request.generation });
@@ -222,16 +223,16 @@ impl Remote {
         self.mailbox.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Postpones a write order until the pending request. Does so if the order was meant for that request, or
-    /// if the current image is incomplete and the request has the same settings. Returns whether the order
-    /// was postponed.
+    /// Postpones a write order until the pending request runs, if the order was meant for that request, or if
+    /// the current image is incomplete and the pending request has the same settings. Returns whether the
+    /// order was postponed.
     fn postpone_write(&self, can_write: bool) -> bool {
         let mut mailbox = self.lock();
         let is_meant = mailbox.is_write_of_waiting;
         let postponed = mailbox
             .request
             .as_ref()
-            .is_some_and(|request| is_meant || !can_write && shown(request) == mailbox.shown);
+            .is_some_and(|request| is_meant || !can_write && adjustable_overrides(request) == mailbox.shown);
         (mailbox.write, mailbox.is_write_postponed) = (postponed, postponed);
         postponed
     }
@@ -254,7 +255,7 @@ impl Remote {
             if let Some(request) = mailbox.request.take() {
                 (mailbox.token, mailbox.writing) = (CancelToken::new(), CancelToken::new());
                 mailbox.is_write_of_waiting = false;
-                mailbox.shown = shown(&request);
+                mailbox.shown = adjustable_overrides(&request);
                 mailbox.token.set_paused(mailbox.paused);
                 return Task::Render(request, mailbox.token.clone(), mailbox.writing.clone());
             }
@@ -267,7 +268,7 @@ impl Remote {
     }
 }
 
-impl Orders for Remote {
+impl Orders for CommandSender {
     fn wants_write(&self) -> bool {
         let mailbox = self.lock();
         mailbox.write && !mailbox.is_write_of_waiting
@@ -299,15 +300,15 @@ impl Orders for Remote {
 }
 
 struct Worker {
-    remote: Remote,
+    remote: CommandSender,
     contents: Arc<Contents>,
     previews: PreviewSlot,
     config: EngineConfig,
 }
 
 impl Worker {
-    fn work(self) {
-        let _last_words = LastWords(&self.remote);
+    fn run_loop(self) {
+        let _last_words = PanicReporter(&self.remote);
         let mut engine = Engine::new(self.config, self.contents.clone());
         let mut sink = Sink {
             generation: 0,
@@ -334,20 +335,20 @@ impl Worker {
                 }
             };
             if let Err(payload) = outcome {
-                // Do not trust the state after a panic.
+                // Discard the engine's state, which may be inconsistent after a panic.
                 engine = Engine::new(self.config, self.contents.clone());
-                let failure = Failure::Work(format!("internal error: {}", reason(payload.as_ref())));
+                let failure = Failure::Work(format!("internal error: {}", panic_reason(payload.as_ref())));
                 sink.send(Event::Failed { generation: sink.generation, failure });
             }
         }
     }
 }
 
-/// If the thread itself panics, reports the newest request as failed, because the front end is waiting for it
-/// to end.
-struct LastWords<'a>(&'a Remote);
+/// If the worker thread panics, reports the newest request as failed, because the front end is waiting for
+/// that request to end.
+struct PanicReporter<'a>(&'a CommandSender);
 
-impl Drop for LastWords<'_> {
+impl Drop for PanicReporter<'_> {
     fn drop(&mut self) {
         if std::thread::panicking() {
             let generation = self.0.lock().newest;
@@ -358,7 +359,7 @@ impl Drop for LastWords<'_> {
     }
 }
 
-fn reason(payload: &(dyn Any + Send)) -> &str {
+fn panic_reason(payload: &(dyn Any + Send)) -> &str {
     let text = payload.downcast_ref::<String>().map(String::as_str);
     text.or_else(|| payload.downcast_ref::<&str>().copied()).unwrap_or("unknown panic")
 }
@@ -381,7 +382,7 @@ mod tests {
         }))
     }
 
-    fn token(remote: &Remote) -> CancelToken {
+    fn token(remote: &CommandSender) -> CancelToken {
         match remote.next() {
             Task::Render(_, token, _) => token,
             _ => panic!("expected a pending request"),
@@ -391,11 +392,11 @@ mod tests {
     #[test]
     fn panicking_worker_reports_failure() {
         let (events, received) = mpsc::channel();
-        let remote = Remote { mailbox: Arc::default(), events };
+        let remote = CommandSender { mailbox: Arc::default(), events };
         remote.send(render(7));
         let panicking = remote;
         let thread = std::thread::spawn(move || {
-            let _last_words = LastWords(&panicking);
+            let _last_words = PanicReporter(&panicking);
             panic!("outside of a request");
         });
         assert!(thread.join().is_err());
@@ -404,7 +405,7 @@ mod tests {
 
     #[test]
     fn pause_applies_to_newest_request() {
-        let remote = Remote { mailbox: Arc::default(), events: mpsc::channel().0 };
+        let remote = CommandSender { mailbox: Arc::default(), events: mpsc::channel().0 };
         remote.send(render(1));
         let ending = token(&remote);
         remote.send(render(2));
@@ -422,7 +423,7 @@ mod tests {
 
     #[test]
     fn write_before_quit_is_carried_out() {
-        let remote = Remote { mailbox: Arc::default(), events: mpsc::channel().0 };
+        let remote = CommandSender { mailbox: Arc::default(), events: mpsc::channel().0 };
         remote.send(render(1));
         let token = token(&remote);
         remote.send(render(2));
@@ -436,7 +437,7 @@ mod tests {
 
     #[test]
     fn write_stage_is_cancelled_only_by_newer_image() {
-        let remote = Remote { mailbox: Arc::default(), events: mpsc::channel().0 };
+        let remote = CommandSender { mailbox: Arc::default(), events: mpsc::channel().0 };
         let begin = |number| {
             remote.send(render(number));
             match remote.next() {
@@ -462,7 +463,7 @@ mod tests {
 
     #[test]
     fn write_order_does_not_apply_to_another_view() {
-        let remote = Remote { mailbox: Arc::default(), events: mpsc::channel().0 };
+        let remote = CommandSender { mailbox: Arc::default(), events: mpsc::channel().0 };
         remote.send(render(1));
         let _ = token(&remote);
         remote.send(Command::Write);
@@ -484,7 +485,7 @@ mod tests {
 
     #[test]
     fn pending_orders_are_handled_in_sequence() {
-        let remote = Remote { mailbox: Arc::default(), events: mpsc::channel().0 };
+        let remote = CommandSender { mailbox: Arc::default(), events: mpsc::channel().0 };
         remote.send(render(1));
         remote.send(Command::Write);
         remote.send(Command::Preview(None));

@@ -10,21 +10,21 @@ pub const MOST_COMPARED_BYTES: usize = 4 << 20;
 /// Maximum number of characters shown per line.
 const MAX_LINE_CHARS: usize = 40;
 
-/// Lists the changes between two versions of a scene, such as `sphere.ball.radius 0.5 → 0.7`, with keys as in
-/// `--set`. Lists changed lines if no key differs or if a version is not valid TOML. Empty if the versions
-/// are equal or too large.
-pub fn changes(before: &str, after: &str) -> Vec<String> {
+/// Lists the changes between two versions of a scene, such as `sphere.ball.radius 0.5 → 0.7`. Keys have the
+/// same syntax as in `--set`. If no key differs or a version is not valid TOML, lists the changed lines
+/// instead. Empty if the versions are equal or too large.
+pub fn list_changes(before: &str, after: &str) -> Vec<String> {
     if before == after || before.len().max(after.len()) > MOST_COMPARED_BYTES {
         return Vec::new();
     }
-    match keys::changes(before, after) {
-        keys if keys.is_empty() => lines(before, after).into_iter().collect(),
+    match keys::key_changes(before, after) {
+        keys if keys.is_empty() => line_changes(before, after).into_iter().collect(),
         keys => keys,
     }
 }
 
 /// Describes the changed lines.
-fn lines(before: &str, after: &str) -> Option<String> {
+fn line_changes(before: &str, after: &str) -> Option<String> {
     let (before, after): (Vec<&str>, Vec<&str>) = (before.lines().collect(), after.lines().collect());
     // Strip the common prefix and suffix.
     let same = |a: &[&str], b: &[&str]| a.iter().zip(b).take_while(|(a, b)| a == b).count();
@@ -37,7 +37,7 @@ fn lines(before: &str, after: &str) -> Option<String> {
     let lines = |count: usize| if count == 1 { "1 line".to_owned() } else { format!("{count} lines") };
     match (before, after) {
         ([], []) => None,
-        ([old], [new]) => Some(format!("line {line}: {}", line_change(old, new))),
+        ([old], [new]) => Some(format!("line {line}: {}", describe_line_change(old, new))),
         ([], [new]) => Some(format!("line {line}: + {}", shortened(new.trim(), MAX_LINE_CHARS))),
         ([old], []) => Some(format!("line {line}: − {}", shortened(old.trim(), MAX_LINE_CHARS))),
         ([], new) => Some(format!("{} added at line {line}", lines(new.len()))),
@@ -47,7 +47,7 @@ fn lines(before: &str, after: &str) -> Option<String> {
 }
 
 /// Describes a change to one line. If both lines assign to the same key, shows the key only once.
-fn line_change(old: &str, new: &str) -> String {
+fn describe_line_change(old: &str, new: &str) -> String {
     let parts = |line: &'_ str| {
         line.split_once('=').map(|(key, value)| (key.trim().to_owned(), value.trim().to_owned()))
     };
@@ -71,7 +71,7 @@ mod tests {
     #[test]
     fn changes_outside_of_keys_are_listed_by_line() {
         let text = "[sphere]\nradius = 0.5 # half\n# one\ncolor = 1\nlast = 2\n";
-        let changed = |from: &str, to: &str| changes(text, &text.replace(from, to)).pop();
+        let changed = |from: &str, to: &str| list_changes(text, &text.replace(from, to)).pop();
         assert_eq!(changed("x", "y"), None);
         assert_eq!(changed("# one", "# two").as_deref(), Some("line 3: # one → # two"));
         assert_eq!(changed("# one\n", "").as_deref(), Some("line 3: − # one"));

@@ -18,15 +18,15 @@ pub(super) fn with_camera(text: &str, wanted: &Viewpoint) -> Result<String, Stri
     let Some(TomlValue::Table(table)) = found.map(|found| found.value.item()) else {
         return Err("the scene file has no readable [camera] table".to_owned());
     };
-    let mut edits = Edits { text, table, replaced: Vec::new(), added: Vec::new() };
-    edits.camera(wanted);
-    let new = edits.applied();
+    let mut edits = CameraEdits { text, table, replaced: Vec::new(), added: Vec::new() };
+    edits.set_camera(wanted);
+    let new = edits.apply();
     let is_right = camera_of(&SceneText::file(new.as_str().into())).is_some_and(|new| new.is_nearly(wanted));
     is_right.then_some(new).ok_or_else(|| "glimt cannot edit the [camera] table in this form".to_owned())
 }
 
 /// Pending edits to a table.
-struct Edits<'t> {
+struct CameraEdits<'t> {
     text: &'t str,
     table: Entries<'t>,
     replaced: Vec<(Range<usize>, String)>,
@@ -34,56 +34,56 @@ struct Edits<'t> {
     added: Vec<String>,
 }
 
-impl Edits<'_> {
-    fn camera(&mut self, wanted: &Viewpoint) {
+impl CameraEdits<'_> {
+    fn set_camera(&mut self, wanted: &Viewpoint) {
         let Viewpoint { pose: Pose { position, look_at, up }, fov, aperture, focus } = *wanted;
         match self.table.get("orbiter") {
             Some(orbiter) => {
                 let place = [("position", position), ("look_at", look_at)];
-                let lines = place.map(|(name, vector)| format!("{name} = {}", array(vector)));
-                let both = lines.join(&self.between(&orbiter));
+                let lines = place.map(|(name, vector)| format!("{name} = {}", format_vector(vector)));
+                let both = lines.join(&self.separator_after(&orbiter));
                 self.replaced.push((orbiter.span.start..orbiter.value.span().end, both));
             }
             None => {
-                self.vector("position", position, None);
-                self.vector("look_at", look_at, None);
+                self.set_vector("position", position, None);
+                self.set_vector("look_at", look_at, None);
             }
         }
-        self.vector("up", up, Some(DVec3::Y));
-        self.number("fov", fov, FOV_DEGREES);
-        self.number("aperture", aperture, 0.0);
+        self.set_vector("up", up, Some(DVec3::Y));
+        self.set_number("fov", fov, FOV_DEGREES);
+        self.set_number("aperture", aperture, 0.0);
         match self.table.get("focus") {
             // Ignore rounding of the distance while orbiting.
-            Some(given) if wanted.is_focused_on_look_at() && is_near(&given.value, focus) => {}
-            Some(_) | None => self.number("focus", focus, wanted.pose.distance()),
+            Some(given) if wanted.is_focused_on_look_at() && is_nearly_equal(&given.value, focus) => {}
+            Some(_) | None => self.set_number("focus", focus, wanted.pose.distance()),
         }
     }
 
-    fn number(&mut self, name: &str, wanted: f64, default: f64) {
+    fn set_number(&mut self, name: &str, wanted: f64, default: f64) {
         match self.table.get(name) {
-            Some(found) => self.replace(&found.value, wanted),
-            None if wanted != default => self.added.push(format!("{name} = {}", number(wanted))),
+            Some(found) => self.replace_number(&found.value, wanted),
+            None if wanted != default => self.added.push(format!("{name} = {}", format_number(wanted))),
             None => {}
         }
     }
 
-    fn vector(&mut self, name: &str, wanted: DVec3, default: Option<DVec3>) {
+    fn set_vector(&mut self, name: &str, wanted: DVec3, default: Option<DVec3>) {
         match self.table.get(name) {
             Some(found) => match found.value.array() {
                 Some(elements) if elements.len() == 3 => {
                     for (element, wanted) in elements.iter().zip(wanted.to_array()) {
-                        self.replace(&element, wanted);
+                        self.replace_number(&element, wanted);
                     }
                 }
-                Some(_) | None => self.replaced.push((found.value.span(), array(wanted))),
+                Some(_) | None => self.replaced.push((found.value.span(), format_vector(wanted))),
             },
-            None if Some(wanted) != default => self.added.push(format!("{name} = {}", array(wanted))),
+            None if Some(wanted) != default => self.added.push(format!("{name} = {}", format_vector(wanted))),
             None => {}
         }
     }
 
     /// Replaces a number unless it already equals `wanted`.
-    fn replace(&mut self, found: &Value<'_>, wanted: f64) {
+    fn replace_number(&mut self, found: &Value<'_>, wanted: f64) {
         let is_same = match found.item() {
             TomlValue::Integer { digits, radix: 10 } | TomlValue::Float(digits) => {
                 digits.parse() == Ok(wanted)
@@ -96,7 +96,7 @@ impl Edits<'_> {
             | TomlValue::Table(_) => false,
         };
         if !is_same {
-            self.replaced.push((found.span(), number(wanted)));
+            self.replaced.push((found.span(), format_number(wanted)));
         }
     }
 
@@ -107,14 +107,14 @@ impl Edits<'_> {
     }
 
     /// Whether a key is the first on its line, possibly as `camera.key`.
-    fn has_line(&self, key: &KeyValue<'_>) -> bool {
+    fn starts_line(&self, key: &KeyValue<'_>) -> bool {
         let indent = self.indent(key).trim();
         indent.is_empty() || indent.ends_with('.')
     }
 
     /// The separator between this entry and the next entry.
-    fn between(&self, key: &KeyValue<'_>) -> String {
-        if self.has_line(key) {
+    fn separator_after(&self, key: &KeyValue<'_>) -> String {
+        if self.starts_line(key) {
             format!("{}{}", self.line_end(key), self.indent(key))
         } else {
             ", ".to_owned()
@@ -129,15 +129,16 @@ impl Edits<'_> {
         if line.ends_with('\r') { "\r\n" } else { "\n" }
     }
 
-    fn applied(mut self) -> String {
+    fn apply(mut self) -> String {
         if let Some(last) = self.table.iter().max_by_key(|entry| entry.value.span().end)
             && !self.added.is_empty()
         {
-            let between = self.between(&last);
+            let between = self.separator_after(&last);
             let end = last.value.span().end;
             // Insert after the line's comment.
             let line = self.text[end..].find('\n').map_or(self.text.len(), |at| end + at);
-            let at = if self.has_line(&last) { self.text[..line].trim_end_matches('\r').len() } else { end };
+            let at =
+                if self.starts_line(&last) { self.text[..line].trim_end_matches('\r').len() } else { end };
             let added = self.added.iter().map(|one| format!("{between}{one}")).collect();
             self.replaced.push((at..at, added));
         }
@@ -153,7 +154,7 @@ impl Edits<'_> {
 }
 
 /// Whether a value equals `distance` up to rounding.
-fn is_near(value: &Value<'_>, distance: f64) -> bool {
+fn is_nearly_equal(value: &Value<'_>, distance: f64) -> bool {
     let given: Option<f64> = match value.item() {
         TomlValue::Integer { digits, radix: 10 } | TomlValue::Float(digits) => digits.parse().ok(),
         TomlValue::Integer { .. }
@@ -166,12 +167,12 @@ fn is_near(value: &Value<'_>, distance: f64) -> bool {
     given.is_some_and(|given| is_same_distance(given, distance))
 }
 
-fn array(vector: DVec3) -> String {
-    format!("[{}]", vector.to_array().map(number).join(", "))
+fn format_vector(vector: DVec3) -> String {
+    format!("[{}]", vector.to_array().map(format_number).join(", "))
 }
 
 /// Formats a number as TOML: decimal digits without an exponent, and 0 instead of -0.
-fn number(number: f64) -> String {
+fn format_number(number: f64) -> String {
     (number + 0.0).to_string()
 }
 

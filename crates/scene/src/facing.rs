@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::description::{Camera, EmissionSides, Mesh, Object, Scene, Shape, greatest};
+use super::description::{Camera, EmissionSides, Mesh, Object, Scene, Shape, max_projection};
 use crate::math::DVec3;
 
 /// The warning, its label and its help text.
@@ -14,12 +14,15 @@ pub(super) const HELP: &str = "swap `u` and `v`: the front faces along u × v";
 pub type MeshBounds = Option<[DVec3; 2]>;
 
 /// Minimum ratio of the scene's extent in front of a light to the extent behind the light. Below this ratio,
-/// the light counts as facing away, even if it shines on a ceiling just above it.
+/// the light counts as facing away. For example, a lamp may only illuminate the ceiling just above it.
 const MIN_FRONT_RATIO: f64 = 0.02;
 
 /// Spans of one-sided quad lights with shapes behind them and nothing in front of them. Only calls `bounds`
 /// if the scene has one-sided quad lights.
-pub(super) fn away(scene: &Scene, bounds: impl FnOnce() -> Vec<MeshBounds>) -> Vec<Range<usize>> {
+pub(super) fn lights_facing_away(
+    scene: &Scene,
+    bounds: impl FnOnce() -> Vec<MeshBounds>,
+) -> Vec<Range<usize>> {
     let emits = |object: &Object| {
         let material = object.material.map(|index| &scene.materials[index]);
         material.is_some_and(|material| material.emits() && material.emission.sides == EmissionSides::Front)
@@ -42,11 +45,13 @@ pub(super) fn away(scene: &Scene, bounds: impl FnOnce() -> Vec<MeshBounds>) -> V
     let is_away = |number: usize, corner: DVec3, front: DVec3| {
         let others = scene.objects.iter().enumerate().filter(|(other, _)| *other != number);
         let reach = |direction: DVec3| {
-            let of = |object: &Object| furthest(&object.shape, &bounds, direction) - direction.dot(corner);
+            let of = |object: &Object| {
+                max_shape_projection(&object.shape, &bounds, direction) - direction.dot(corner)
+            };
             others.clone().map(|(_, object)| of(object)).fold(0.0, f64::max)
         };
         let (ahead, behind) = (reach(front), reach(-front));
-        behind > 0.0 && ahead <= MIN_FRONT_RATIO * behind && !sees(&scene.camera, corner, front)
+        behind > 0.0 && ahead <= MIN_FRONT_RATIO * behind && !is_camera_in_front(&scene.camera, corner, front)
     };
     let away = lights.into_iter().filter(|(number, (corner, front))| is_away(*number, *corner, *front));
     away.map(|(number, _)| scene.objects[number].span.clone()).collect()
@@ -54,7 +59,7 @@ pub(super) fn away(scene: &Scene, bounds: impl FnOnce() -> Vec<MeshBounds>) -> V
 
 /// Whether the camera is in front of a light. Always true for an orbiter camera, because its file is not read
 /// here.
-fn sees(camera: &Camera, corner: DVec3, front: DVec3) -> bool {
+fn is_camera_in_front(camera: &Camera, corner: DVec3, front: DVec3) -> bool {
     match camera {
         Camera::LookAt { position, .. } => front.dot(*position - corner) > 0.0,
         Camera::Orbiter { .. } => true,
@@ -62,15 +67,15 @@ fn sees(camera: &Camera, corner: DVec3, front: DVec3) -> bool {
 }
 
 /// Upper bound on the projection of a shape's points onto a unit direction.
-fn furthest(shape: &Shape, bounds: &[MeshBounds], direction: DVec3) -> f64 {
-    shape.reach(direction).unwrap_or_else(|| {
-        let of = |mesh: &Mesh| Some(corners(mesh, bounds.get(mesh.file).copied().flatten()?));
-        shape.mesh().and_then(of).map_or(f64::NEG_INFINITY, |corners| greatest(direction, &corners))
+fn max_shape_projection(shape: &Shape, bounds: &[MeshBounds], direction: DVec3) -> f64 {
+    shape.max_projection_onto(direction).unwrap_or_else(|| {
+        let of = |mesh: &Mesh| Some(bounding_box_corners(mesh, bounds.get(mesh.file).copied().flatten()?));
+        shape.mesh().and_then(of).map_or(f64::NEG_INFINITY, |corners| max_projection(direction, &corners))
     })
 }
 
 /// The transformed corners of a mesh's bounding box.
-fn corners(mesh: &Mesh, [least, greatest]: [DVec3; 2]) -> [DVec3; 8] {
+fn bounding_box_corners(mesh: &Mesh, [least, greatest]: [DVec3; 2]) -> [DVec3; 8] {
     let place = mesh.placed.transform();
     std::array::from_fn(|number| {
         let far = DVec3::new((number & 1) as f64, (number >> 1 & 1) as f64, (number >> 2) as f64);

@@ -3,12 +3,12 @@
 use unicode_width::UnicodeWidthStr;
 
 use super::sanitize::{shortened, visible};
-use super::source::quoted;
+use super::source::toml_string;
 
 /// Formats one part of a dotted key. Quotes the part if it is not a bare key.
-pub(super) fn part(name: &str) -> String {
+pub(super) fn quote_key_part(name: &str) -> String {
     let is_bare = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
-    if !name.is_empty() && name.chars().all(is_bare) { name.to_owned() } else { quoted(name) }
+    if !name.is_empty() && name.chars().all(is_bare) { name.to_owned() } else { toml_string(name) }
 }
 
 /// Splits a dotted key into parts, including their quotes. Ignores dots inside quotes.
@@ -23,7 +23,7 @@ pub fn key_parts(key: &str) -> Vec<&str> {
     parts
 }
 
-/// Splits text that starts with a dotted key at the first space outside quotes.
+/// Splits a dotted key from the text that follows it, at the first space outside quotes.
 pub fn split_key(text: &str) -> Option<(&str, &str)> {
     find_unquoted(text, ' ').map(|end| (&text[..end], &text[end + 1..]))
 }

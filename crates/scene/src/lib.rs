@@ -30,14 +30,14 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-pub use changes::{MOST_COMPARED_BYTES, changes};
+pub use changes::{MOST_COMPARED_BYTES, list_changes};
 use description::{Camera, Scene, Viewpoint};
 use diagnostic::{Diagnostic, Severity};
 pub use facing::MeshBounds;
 pub use key_path::{key_parts, shortened_key, split_key};
 pub use other_content::other_content;
-pub use read::same_text_beside;
-pub use source::{SceneText, quoted};
+pub use read::find_renamed_scene;
+pub use source::{SceneText, toml_string};
 
 /// Maximum size of a scene file in bytes.
 pub const MAX_FILE_BYTES: u64 = 128 << 20;
@@ -47,7 +47,7 @@ pub const SCENE_NOT_FOUND: &str = "scene file not found";
 /// Error message for a missing file with a model's extension.
 pub const MODEL_NOT_FOUND: &str = "file not found";
 
-/// Phrase in the help text for a missing scene that points to a renamed copy.
+/// Phrase in the help text for a missing scene if there is a renamed copy.
 pub const SAME_TEXT: &str = "has the same text";
 
 /// Whether a diagnostic reports that the scene or model file does not exist.
@@ -55,8 +55,8 @@ pub fn is_absence(diagnostic: &Diagnostic) -> bool {
     [SCENE_NOT_FOUND, MODEL_NOT_FOUND].contains(&diagnostic.message.as_str())
 }
 
-/// Maximum number of syntax elements (brackets, `=`, `,` and lines) in a scene file. In memory, each takes
-/// many times its size in the file. A scene with a million spheres has half as many.
+/// Maximum number of syntax elements (brackets, `=`, `,` and lines) in a scene file. Each takes far more
+/// space in memory than in the file. A scene with a million spheres has half as many.
 const MAX_PARTS: usize = 32 << 20;
 
 /// A valid scene, its text and warnings.
@@ -93,7 +93,7 @@ pub struct Setting {
 /// # Errors
 /// The reason why the file cannot be read.
 pub fn text_now(path: &Path) -> Result<Arc<str>, Box<Diagnostic>> {
-    read::text(path)
+    read::read_scene_text(path)
 }
 
 impl Loaded {
@@ -125,7 +125,7 @@ impl Loaded {
             }
             warning
         };
-        facing::away(&self.scene, bounds).into_iter().map(warning).collect()
+        facing::lights_facing_away(&self.scene, bounds).into_iter().map(warning).collect()
     }
 
     /// The 1-based line number in the file where `span` starts.
@@ -149,7 +149,7 @@ impl Loaded {
         message: impl Into<String>,
         help: Option<String>,
     ) -> Diagnostic {
-        let (path, place) = self.source.place(&self.path, span, String::new());
+        let (path, place) = self.source.resolve_span(&self.path, span, String::new());
         Diagnostic { severity, message: message.into(), path, place, help }
     }
 }
@@ -171,7 +171,7 @@ pub struct Outcome {
 /// All errors and warnings, in file order. Anything but a regular file of at most [`MAX_FILE_BYTES`] bytes of UTF-8 is
 /// rejected without blocking.
 pub fn load(path: &Path, sets: &[String]) -> Result<Loaded, Vec<Diagnostic>> {
-    let text = read::text(path).map_err(|problem| vec![*problem])?;
+    let text = read::read_scene_text(path).map_err(|problem| vec![*problem])?;
     load_source(SceneText::with_sets(text, sets)?, path, sets)
 }
 
@@ -181,7 +181,7 @@ pub fn load(path: &Path, sets: &[String]) -> Result<Loaded, Vec<Diagnostic>> {
 /// # Errors
 /// Same as [`load`].
 pub fn load_generated(text: Arc<str>, path: &Path, sets: &[String]) -> Result<Loaded, Vec<Diagnostic>> {
-    load_source(SceneText::with_sets(text, sets)?.generated(), path, sets)
+    load_source(SceneText::with_sets(text, sets)?.mark_generated(), path, sets)
 }
 
 fn load_source(source: SceneText, path: &Path, sets: &[String]) -> Result<Loaded, Vec<Diagnostic>> {
@@ -200,19 +200,23 @@ fn load_source(source: SceneText, path: &Path, sets: &[String]) -> Result<Loaded
 /// file is not read. Only the metadata of referenced files is read.
 pub fn parse(text: Arc<str>, path: &Path) -> Outcome {
     if text.contains('\0') {
-        return Outcome { scene: None, diagnostics: vec![*read::binary(path)], settings: Vec::new() };
+        return Outcome {
+            scene: None,
+            diagnostics: vec![*read::binary_file_error(path)],
+            settings: Vec::new(),
+        };
     }
     document::lower(&SceneText::file(text), path)
 }
 
-/// Whether a file is a model, with a mesh extension and without a scene.
+/// Whether a file is a model: it has a mesh extension and does not contain a scene.
 pub fn is_model(path: &Path) -> bool {
     read::is_model(path)
 }
 
 /// Whether a file has a mesh extension.
 pub fn is_mesh(path: &Path) -> bool {
-    document::is_mesh(path)
+    document::has_mesh_extension(path)
 }
 
 /// The commented scene written by `glimt new`.

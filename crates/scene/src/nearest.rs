@@ -47,8 +47,8 @@ const FOREIGN_NAMES: [(&[&str], &[&str]); 17] = [
     (&["sun", "distant", "infinite", "parallel"], &["directional"]),
 ];
 
-/// The candidate that corresponds to the name `written` in another renderer, or else the nearest candidate.
-pub fn meant<'a>(written: &str, candidates: &[&'a str]) -> Option<&'a str> {
+/// The candidate that corresponds to another renderer's name `written`, or else the nearest candidate.
+pub fn translate_foreign_name<'a>(written: &str, candidates: &[&'a str]) -> Option<&'a str> {
     let plain = written.to_lowercase().replace('-', "_");
     let named = FOREIGN_NAMES.iter().find(|(names, _)| names.contains(&plain.as_str()));
     let known = |name: &&str| candidates.iter().find(|candidate| *candidate == name).copied();
@@ -63,15 +63,15 @@ mod tests {
     #[test]
     fn names_from_other_renderers_are_known() {
         let phong = ["type", "diffuse", "specular", "shininess", "emission", "normal_strength"];
-        assert_eq!(meant("color", &phong), Some("diffuse"));
-        assert_eq!(meant("Roughness", &phong), Some("shininess"));
-        assert_eq!(meant("color", &["reflectance"]), Some("reflectance"));
-        assert_eq!(meant("strength", &["position", "intensity"]), Some("intensity"));
-        assert_eq!(meant("strength", &["direction", "irradiance"]), Some("irradiance"));
-        assert_eq!(meant("cube", &["box", "sphere"]), Some("box"));
-        assert_eq!(meant("sun", &["point", "spot", "directional"]), Some("directional"));
-        assert_eq!(meant("raduis", &["radius"]), Some("radius"));
-        assert_eq!(meant("sun", &["point"]), None);
+        assert_eq!(translate_foreign_name("color", &phong), Some("diffuse"));
+        assert_eq!(translate_foreign_name("Roughness", &phong), Some("shininess"));
+        assert_eq!(translate_foreign_name("color", &["reflectance"]), Some("reflectance"));
+        assert_eq!(translate_foreign_name("strength", &["position", "intensity"]), Some("intensity"));
+        assert_eq!(translate_foreign_name("strength", &["direction", "irradiance"]), Some("irradiance"));
+        assert_eq!(translate_foreign_name("cube", &["box", "sphere"]), Some("box"));
+        assert_eq!(translate_foreign_name("sun", &["point", "spot", "directional"]), Some("directional"));
+        assert_eq!(translate_foreign_name("raduis", &["radius"]), Some("radius"));
+        assert_eq!(translate_foreign_name("sun", &["point"]), None);
     }
 
     #[test]

@@ -33,24 +33,24 @@ pub fn other_content(path: &Path) -> Option<(&'static str, Box<Diagnostic>)> {
     let (opened, _) = file::open(path).ok()?.ok()?;
     let mut bytes = Vec::new();
     opened.take(START).read_to_end(&mut bytes).ok()?;
-    match OtherContent::of(&bytes)? {
+    match OtherContent::detect(&bytes)? {
         OtherContent::Model { .. } => None,
-        content @ OtherContent::Image(format) => Some((format, content.problem(path))),
-        content @ OtherContent::Part => Some(("part", content.problem(path))),
+        content @ OtherContent::Image(format) => Some((format, content.to_diagnostic(path))),
+        content @ OtherContent::Part => Some(("part", content.to_diagnostic(path))),
     }
 }
 
 impl OtherContent {
     /// Detects the type of contents from the first bytes. `None` if the file may be a scene.
-    pub(super) fn of(bytes: &[u8]) -> Option<Self> {
+    pub(super) fn detect(bytes: &[u8]) -> Option<Self> {
         if bytes.starts_with(&PART_MARK) {
             return Some(Self::Part);
         }
-        image_format(bytes).map(Self::Image).or_else(|| model(bytes))
+        image_format(bytes).map(Self::Image).or_else(|| detect_model(bytes))
     }
 
     /// Error for a file with these contents instead of a scene.
-    pub(super) fn problem(self, path: &Path) -> Box<Diagnostic> {
+    pub(super) fn to_diagnostic(self, path: &Path) -> Box<Diagnostic> {
         // Remove the extension `.toml`.
         let name = if may_be_scene(path) { path.file_stem() } else { path.file_name() };
         let name = name.unwrap_or(path.as_os_str()).to_string_lossy();
@@ -119,7 +119,7 @@ fn is_tga(bytes: &[u8]) -> bool {
 }
 
 /// Detects a model from the first line that is not a comment.
-fn model(bytes: &[u8]) -> Option<OtherContent> {
+fn detect_model(bytes: &[u8]) -> Option<OtherContent> {
     if bytes.starts_with(b"glTF") {
         return Some(OtherContent::Model { format: "glTF", ending: "glb" });
     }
@@ -165,12 +165,12 @@ mod tests {
             (&tga, "TGA"),
         ];
         for (bytes, format) in images {
-            assert_eq!(OtherContent::of(bytes), Some(OtherContent::Image(format)), "{format}");
+            assert_eq!(OtherContent::detect(bytes), Some(OtherContent::Image(format)), "{format}");
         }
         for scene in
             ["P6 = 3", "P6\n= 3", "BM = 1", "GIF8 = 1", "RIFF = 1", "# P6\n[camera]", "#? what\n", "", "P6"]
         {
-            assert_eq!(OtherContent::of(scene.as_bytes()), None, "{scene:?}");
+            assert_eq!(OtherContent::detect(scene.as_bytes()), None, "{scene:?}");
         }
     }
 
@@ -180,20 +180,20 @@ mod tests {
         let path = folder.path().join("a.toml");
         std::fs::write(&path, PART_MARK).expect("written");
         let part = super::super::text_now(&path).expect_err("an error");
-        assert_eq!(part, OtherContent::Part.problem(&path));
+        assert_eq!(part, OtherContent::Part.to_diagnostic(&path));
         assert_eq!(other_content(&path), Some(("part", part)));
         std::fs::write(&path, b"\x76\x2f\x31\x01").expect("written");
         let file = std::fs::File::options().write(true).open(&path).expect("opened");
         file.set_len(super::super::MAX_FILE_BYTES + 1).expect("made longer");
         let large = super::super::text_now(&path).expect_err("an error");
-        assert_eq!(large, OtherContent::Image("EXR").problem(&path));
+        assert_eq!(large, OtherContent::Image("EXR").to_diagnostic(&path));
         std::fs::write(&path, b"v 0 0 0\n").expect("written");
         assert_eq!(other_content(&path), None, "models are rendered");
     }
 
     #[test]
     fn models_are_recognized_by_content() {
-        let of = |text: &str| OtherContent::of(text.as_bytes());
+        let of = |text: &str| OtherContent::detect(text.as_bytes());
         let ending = |text: &str| match of(text) {
             Some(OtherContent::Model { ending, .. }) => ending,
             Some(OtherContent::Image(_) | OtherContent::Part) => "image",
@@ -223,7 +223,7 @@ mod tests {
         let path = folder.path().join("model");
         std::fs::write(&path, "v 0 0 0\n").expect("written");
         let error = super::super::text_now(&path).expect_err("an error");
-        assert_eq!(error, OtherContent::Model { format: "OBJ", ending: "obj" }.problem(&path));
+        assert_eq!(error, OtherContent::Model { format: "OBJ", ending: "obj" }.to_diagnostic(&path));
         assert!(error.help.expect("a help text").contains("model.obj"));
     }
 }

@@ -4,7 +4,7 @@
 use std::ops::Range;
 
 use super::key_path;
-use super::keys::key::{Form, KeyInfo, TableInfo, TypeInfo};
+use super::keys::key::{KeyInfo, TableInfo, TableSyntax, TypeInfo};
 use super::keys::tables;
 use super::toml::{self, Entries, KeyValue, TomlValue, Value};
 
@@ -53,68 +53,69 @@ pub fn outline(text: &str) -> Vec<OutlineTable> {
     let (document, _) = toml::parse(text);
     let of = |info: &'static TableInfo| {
         let found = document.root().get(info.name);
-        found.map_or_else(Vec::new, |found| in_table(info, &found))
+        found.map_or_else(Vec::new, |found| outline_tables(info, &found))
     };
     tables().iter().flat_map(of).collect()
 }
 
 /// The tables with the definition `info`.
-fn in_table(info: &'static TableInfo, found: &KeyValue<'_>) -> Vec<OutlineTable> {
+fn outline_tables(info: &'static TableInfo, found: &KeyValue<'_>) -> Vec<OutlineTable> {
     match info.form {
-        Form::Single => {
-            entries(found.value).map(|all| table(info, None, 1, found.value, &all)).into_iter().collect()
-        }
-        Form::Named => {
-            let named = entries(found.value).into_iter().flat_map(|all| all.iter().collect::<Vec<_>>());
+        TableSyntax::Single => table_entries(found.value)
+            .map(|all| outline_table(info, None, 1, found.value, &all))
+            .into_iter()
+            .collect(),
+        TableSyntax::Named => {
+            let named = table_entries(found.value).into_iter().flat_map(|all| all.iter().collect::<Vec<_>>());
             named
                 .filter_map(|one| {
                     let name = SpannedName { text: one.key.to_owned(), span: one.span };
-                    Some(table(info, Some(name), 1, one.value, &entries(one.value)?))
+                    Some(outline_table(info, Some(name), 1, one.value, &table_entries(one.value)?))
                 })
                 .collect()
         }
-        Form::List => {
+        TableSyntax::List => {
             let elements = found.value.array().into_iter().flat_map(|array| array.iter().collect::<Vec<_>>());
             elements
                 .enumerate()
                 .filter_map(|(index, value)| {
-                    let all = entries(value)?;
-                    let name = all.get("name").and_then(|name| spelled(name.value));
-                    Some(table(info, name, index + 1, value, &all))
+                    let all = table_entries(value)?;
+                    let name = all.get("name").and_then(|name| string_value(name.value));
+                    Some(outline_table(info, name, index + 1, value, &all))
                 })
                 .collect()
         }
     }
 }
 
-fn table(
+fn outline_table(
     info: &'static TableInfo,
     name: Option<SpannedName>,
     number: usize,
     value: Value<'_>,
     all: &Entries<'_>,
 ) -> OutlineTable {
-    let kind = all.get("type").map(|kind| spelled(kind.value));
+    let kind = all.get("type").map(|kind| string_value(kind.value));
     let kind = match &kind {
         Some(Some(kind)) => info.type_of(Some(&kind.text)),
         Some(None) => None,
         None => info.type_of(None),
     };
-    OutlineTable { info, kind, name, number, span: value.span(), keys: keys(all) }
+    OutlineTable { info, kind, name, number, span: value.span(), keys: outline_keys(all) }
 }
 
-fn keys(all: &Entries<'_>) -> Vec<OutlineKey> {
+fn outline_keys(all: &Entries<'_>) -> Vec<OutlineKey> {
     let key = |one: KeyValue<'_>| OutlineKey {
         name: SpannedName { text: one.key.to_owned(), span: one.span },
         value: one.value.span(),
-        text: spelled(one.value).map(|text| text.text),
-        inner: entries(one.value).map_or_else(Vec::new, |inner| keys(&inner)),
+        text: string_value(one.value).map(|text| text.text),
+        inner: table_entries(one.value).map_or_else(Vec::new, |inner| outline_keys(&inner)),
     };
     all.iter().map(key).collect()
 }
 
 /// The value, if it is a string.
-fn spelled(value: Value<'_>) -> Option<SpannedName> {
+fn string_value(value: Value<'_>) -> Option<SpannedName> {
     match value.item() {
         TomlValue::String(text) => Some(SpannedName { text: text.to_owned(), span: value.span() }),
         TomlValue::Integer { .. }
@@ -126,7 +127,7 @@ fn spelled(value: Value<'_>) -> Option<SpannedName> {
     }
 }
 
-fn entries(value: Value<'_>) -> Option<Entries<'_>> {
+fn table_entries(value: Value<'_>) -> Option<Entries<'_>> {
     match value.item() {
         TomlValue::Table(entries) => Some(entries),
         TomlValue::String(_)
@@ -140,7 +141,7 @@ fn entries(value: Value<'_>) -> Option<Entries<'_>> {
 
 impl OutlineTable {
     /// The keys allowed for the table's type, or for any type if the type is unknown.
-    pub fn known(&self) -> Vec<&'static KeyInfo> {
+    pub fn known_keys(&self) -> Vec<&'static KeyInfo> {
         match self.kind {
             None if !self.info.types.is_empty() => {
                 let all = self.info.types.iter().flat_map(|kind| kind.keys);
@@ -157,13 +158,13 @@ impl OutlineTable {
     }
 
     /// Key prefixes for `--set` that address this table.
-    pub fn paths(&self) -> Vec<String> {
+    pub fn set_prefixes(&self) -> Vec<String> {
         let table = self.info.name;
-        let name = self.name.as_ref().map(|name| format!("{table}.{}", key_path::part(&name.text)));
+        let name = self.name.as_ref().map(|name| format!("{table}.{}", key_path::quote_key_part(&name.text)));
         match self.info.form {
-            Form::Single => vec![table.to_owned()],
-            Form::Named => name.into_iter().collect(),
-            Form::List => [format!("{table}.{}", self.number)].into_iter().chain(name).collect(),
+            TableSyntax::Single => vec![table.to_owned()],
+            TableSyntax::Named => name.into_iter().collect(),
+            TableSyntax::List => [format!("{table}.{}", self.number)].into_iter().chain(name).collect(),
         }
     }
 }
@@ -179,7 +180,7 @@ mod tests {
     fn tables_have_names_types_and_paths() {
         let found: Vec<(Vec<String>, &str)> = outline(TEXT)
             .iter()
-            .map(|table| (table.paths(), table.kind.map_or("", |kind| kind.name)))
+            .map(|table| (table.set_prefixes(), table.kind.map_or("", |kind| kind.name)))
             .collect();
         let expected: [(&[&str], &str); 6] = [
             (&["render"], ""),
@@ -201,7 +202,8 @@ mod tests {
     #[test]
     fn inline_table_keys_have_spans() {
         let tables = outline(TEXT);
-        let wall = tables.iter().find(|table| table.paths() == ["materials.\"back wall\""]).expect("a table");
+        let wall =
+            tables.iter().find(|table| table.set_prefixes() == ["materials.\"back wall\""]).expect("a table");
         let [diffuse] = wall.keys.as_slice() else { panic!("{wall:?}") };
         assert_eq!(&TEXT[diffuse.name.span.clone()], "diffuse");
         assert_eq!(&TEXT[diffuse.value.clone()], "{ texture = \"a\" }");
@@ -213,8 +215,8 @@ mod tests {
         let tables = outline(TEXT);
         let known = |path: &str| {
             let table =
-                tables.iter().find(|table| table.paths().contains(&path.to_owned())).expect("a table");
-            table.known().iter().map(|key| key.name).collect::<Vec<_>>()
+                tables.iter().find(|table| table.set_prefixes().contains(&path.to_owned())).expect("a table");
+            table.known_keys().iter().map(|key| key.name).collect::<Vec<_>>()
         };
         assert_eq!(
             known("light.1"),

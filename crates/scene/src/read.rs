@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::diagnostic::{Diagnostic, SourceSpan};
-use super::document::is_mesh;
+use super::document::has_mesh_extension;
 use super::keys::endings::MESHES;
 use super::nearest::nearest;
 use super::other_content::{NEW_SCENE_HELP, OtherContent, may_be_scene, other_content};
@@ -26,9 +26,9 @@ const LFS_POINTER: &str = "this is a Git LFS pointer, not the file's contents";
 const LFS_HELP: &str = "run `git lfs pull`";
 
 /// Reads the text of a scene file.
-pub(super) fn text(path: &Path) -> Result<Arc<str>, Box<Diagnostic>> {
+pub(super) fn read_scene_text(path: &Path) -> Result<Arc<str>, Box<Diagnostic>> {
     if is_model(path) {
-        return Err(mesh(path));
+        return Err(mesh_file_error(path));
     }
     if is_unsupported_model(path) {
         let ending = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
@@ -36,7 +36,7 @@ pub(super) fn text(path: &Path) -> Result<Arc<str>, Box<Diagnostic>> {
         let help = format!("export it in one of these formats: .{}", MESHES.join(", ."));
         return Err(Diagnostic::error(path, message, Some(help), None));
     }
-    let bytes = bytes(path).map_err(|(message, help)| {
+    let bytes = read_bytes(path).map_err(|(message, help)| {
         // Report a large image as an image rather than as a large scene.
         other_content(path)
             .map_or_else(|| Diagnostic::error(path, message, help, None), |(_, problem)| problem)
@@ -44,20 +44,20 @@ pub(super) fn text(path: &Path) -> Result<Arc<str>, Box<Diagnostic>> {
     if file::is_lfs_pointer(&bytes) {
         return Err(Diagnostic::error(path, LFS_POINTER.to_owned(), Some(LFS_HELP.to_owned()), None));
     }
-    if let Some(content) = OtherContent::of(&bytes) {
-        return Err(content.problem(path));
+    if let Some(content) = OtherContent::detect(&bytes) {
+        return Err(content.to_diagnostic(path));
     }
     if bytes.contains(&0) || bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]) {
-        return Err(binary(path));
+        return Err(binary_file_error(path));
     }
     match String::from_utf8(bytes) {
         Ok(text) => Ok(text.into()),
-        Err(error) => Err(not_utf8(path, error.as_bytes(), error.utf8_error().valid_up_to())),
+        Err(error) => Err(not_utf8_error(path, error.as_bytes(), error.utf8_error().valid_up_to())),
     }
 }
 
 /// Error for a binary file.
-pub(super) fn binary(path: &Path) -> Box<Diagnostic> {
+pub(super) fn binary_file_error(path: &Path) -> Box<Diagnostic> {
     Diagnostic::error(
         path,
         NOT_TEXT.to_owned(),
@@ -67,7 +67,7 @@ pub(super) fn binary(path: &Path) -> Box<Diagnostic> {
 }
 
 /// Error for a mesh passed instead of a scene.
-fn mesh(path: &Path) -> Box<Diagnostic> {
+fn mesh_file_error(path: &Path) -> Box<Diagnostic> {
     let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
     let help = format!(
         "to use it in a scene, add [[mesh]] with {}; {NEW_SCENE_HELP}",
@@ -83,7 +83,7 @@ fn mesh_file_key(name: &str) -> String {
 
 /// Whether a readable file has a mesh extension and does not contain a scene.
 pub(super) fn is_model(path: &Path) -> bool {
-    is_mesh(path) && lacks_camera(path)
+    has_mesh_extension(path) && lacks_camera(path)
 }
 
 /// Extensions of unsupported model formats.
@@ -110,7 +110,7 @@ fn lacks_camera(path: &Path) -> bool {
     start().is_some_and(|bytes| memchr::memmem::find(&bytes, b"[camera]").is_none())
 }
 
-fn not_utf8(path: &Path, bytes: &[u8], offset: usize) -> Box<Diagnostic> {
+fn not_utf8_error(path: &Path, bytes: &[u8], offset: usize) -> Box<Diagnostic> {
     let source: Arc<str> = String::from_utf8_lossy(bytes).into();
     let line = bytes[..offset].iter().filter(|byte| **byte == b'\n').count() + 1;
     let message = format!("line {line} is not UTF-8 text: byte 0x{:02x} at offset {offset}", bytes[offset]);
@@ -122,19 +122,20 @@ fn not_utf8(path: &Path, bytes: &[u8], offset: usize) -> Box<Diagnostic> {
 
 type Refusal = (String, Option<String>);
 
-fn bytes(path: &Path) -> Result<Vec<u8>, Refusal> {
-    let unreadable = |error: io::Error| unreadable(path, &error);
-    let (file, metadata) = file::open(path).map_err(unreadable)?.map_err(|kind| not_regular(path, kind))?;
+fn read_bytes(path: &Path) -> Result<Vec<u8>, Refusal> {
+    let unreadable = |error: io::Error| unreadable_refusal(path, &error);
+    let (file, metadata) =
+        file::open(path).map_err(unreadable)?.map_err(|kind| not_regular_refusal(path, kind))?;
     if metadata.len() > MAX_FILE_BYTES {
-        return Err(too_large());
+        return Err(too_large_refusal());
     }
     let mut bytes = Vec::new();
     file.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes).map_err(unreadable)?;
     if bytes.len() as u64 > MAX_FILE_BYTES {
-        return Err(too_large());
+        return Err(too_large_refusal());
     }
-    if parts(&bytes) > MAX_PARTS {
-        return Err(large(format!(
+    if count_syntax_elements(&bytes) > MAX_PARTS {
+        return Err(large_refusal(format!(
             "the scene file has more than {} million syntax elements",
             MAX_PARTS >> 20
         )));
@@ -143,12 +144,12 @@ fn bytes(path: &Path) -> Result<Vec<u8>, Refusal> {
 }
 
 /// Number of syntax elements, which determines the memory used by the parsed document.
-fn parts(text: &[u8]) -> usize {
+fn count_syntax_elements(text: &[u8]) -> usize {
     text.iter().filter(|byte| b"[]{}=,\n".contains(byte)).count()
 }
 
-fn not_regular(path: &Path, kind: FileKind) -> Refusal {
-    if is_mesh(path) {
+fn not_regular_refusal(path: &Path, kind: FileKind) -> Refusal {
+    if has_mesh_extension(path) {
         return (format!("this is {}, not a model", kind.words()), None);
     }
     let help = match kind {
@@ -160,23 +161,23 @@ fn not_regular(path: &Path, kind: FileKind) -> Refusal {
     (format!("this is {}, not a scene file", kind.words()), Some(help.to_owned()))
 }
 
-fn too_large() -> Refusal {
-    large(format!("the scene file is larger than {} MiB", MAX_FILE_BYTES >> 20))
+fn too_large_refusal() -> Refusal {
+    large_refusal(format!("the scene file is larger than {} MiB", MAX_FILE_BYTES >> 20))
 }
 
-fn large(message: String) -> Refusal {
+fn large_refusal(message: String) -> Refusal {
     (message, Some("put large geometry in mesh files and reference them with [[mesh]]".to_owned()))
 }
 
-fn unreadable(path: &Path, error: &io::Error) -> Refusal {
-    if error.kind() == io::ErrorKind::NotFound && is_link(path) {
+fn unreadable_refusal(path: &Path, error: &io::Error) -> Refusal {
+    if error.kind() == io::ErrorKind::NotFound && is_symlink(path) {
         return (DANGLING_LINK.to_owned(), None);
     }
     if error.kind() == io::ErrorKind::NotFound {
         let shown = |path: &Path| visible(&path.to_string_lossy()).into_owned();
         let missing = path.parent().filter(|folder| !folder.as_os_str().is_empty() && !folder.exists());
-        let is_model = is_mesh(path);
-        let near = neighbor(path, if is_model { is_mesh } else { may_be_scene });
+        let is_model = has_mesh_extension(path);
+        let near = similar_file(path, if is_model { has_mesh_extension } else { may_be_scene });
         let help = match (missing, near) {
             (Some(folder), _) => Some(format!("the folder {} does not exist", shown(folder))),
             (None, Some(near)) => Some(format!("did you mean {}?", shown(&near))),
@@ -194,7 +195,7 @@ fn unreadable(path: &Path, error: &io::Error) -> Refusal {
 pub(super) const MAX_FOLDER_FILES: usize = 2_000;
 
 /// The file with the most similar name in a missing file's folder, among files accepted by `may_be_meant`.
-pub(super) fn neighbor(path: &Path, may_be_meant: impl Fn(&Path) -> bool) -> Option<PathBuf> {
+pub(super) fn similar_file(path: &Path, may_be_meant: impl Fn(&Path) -> bool) -> Option<PathBuf> {
     let parent = path.parent()?;
     let listed = if parent.as_os_str().is_empty() { Path::new(".") } else { parent };
     let names: Vec<String> = folder::names(listed)
@@ -209,13 +210,13 @@ pub(super) fn neighbor(path: &Path, may_be_meant: impl Fn(&Path) -> bool) -> Opt
 }
 
 /// A file with the same text in a missing scene's folder. The scene was probably renamed.
-pub fn same_text_beside(path: &Path, text: &str) -> Option<PathBuf> {
+pub fn find_renamed_scene(path: &Path, text: &str) -> Option<PathBuf> {
     let parent = path.parent()?;
     let listed = if parent.as_os_str().is_empty() { Path::new(".") } else { parent };
     let length = u64::try_from(text.len()).ok()?;
     let has_text = |file: &PathBuf| {
         matches!(file::kind(file), Ok((FileKind::Regular, metadata)) if metadata.len() == length)
-            && bytes(file).is_ok_and(|bytes| bytes == text.as_bytes())
+            && read_bytes(file).is_ok_and(|bytes| bytes == text.as_bytes())
     };
     let names = folder::names(listed).ok()?.take(MAX_FOLDER_FILES);
     let named = |name| parent.join::<std::ffi::OsString>(name);
@@ -230,7 +231,7 @@ fn is_alike(found: &Path, meant: &Path) -> bool {
 }
 
 /// Whether a path is a symbolic link, even a dangling one.
-pub(super) fn is_link(path: &Path) -> bool {
+pub(super) fn is_symlink(path: &Path) -> bool {
     std::fs::symlink_metadata(path).is_ok_and(|metadata| metadata.is_symlink())
 }
 
@@ -240,7 +241,7 @@ mod tests {
     use std::fs::File;
 
     fn message(path: &Path) -> Diagnostic {
-        *text(path).expect_err("a diagnostic")
+        *read_scene_text(path).expect_err("a diagnostic")
     }
 
     #[test]
@@ -248,7 +249,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let file = |name: &str| folder.path().join(name);
         let write = |name: &str, text: &str| std::fs::write(file(name), text).expect("written");
-        let found = || same_text_beside(&file("first.toml"), "a = 1\n");
+        let found = || find_renamed_scene(&file("first.toml"), "a = 1\n");
         assert_eq!(found(), None);
         write("other.toml", "a = 2\n");
         write("longer.toml", "a = 1\n\n");
@@ -323,7 +324,7 @@ mod tests {
         }
         let scene = folder.path().join("scene.obj");
         std::fs::write(&scene, "[camera]\n").expect("written");
-        assert!(text(&scene).is_ok());
+        assert!(read_scene_text(&scene).is_ok());
     }
 
     #[test]

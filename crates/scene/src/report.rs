@@ -108,14 +108,15 @@ fn render_one(diagnostic: &Diagnostic, width: usize, renderer: &Renderer, index:
         let whole = lines.span(line - 1, source).unwrap_or_default();
         let excerpt = Excerpt::new(source, whole, &place.span);
         let label = visible(&place.label);
-        let fits = excerpt.label_column(line) + columns(&label) <= width;
+        let fits = excerpt.label_column(line) + display_width(&label) <= width;
         // The renderer does not wrap labels, so show a long label as a note.
         note = (!fits && !label.is_empty()).then_some(place.label.as_str());
         let label = (fits && !label.is_empty()).then(|| label.into_owned());
         let annotation = AnnotationKind::Primary.span(excerpt.span).label(label);
         snippet = Some(Snippet::source(excerpt.text).line_start(line).annotation(annotation));
     }
-    let title = level.primary_title(wrapped(&diagnostic.message, width.saturating_sub("warning: ".len())));
+    let title =
+        level.primary_title(wrap_visible(&diagnostic.message, width.saturating_sub("warning: ".len())));
     // Errors in command-line arguments have no file.
     let has_origin = !path.is_empty();
     let mut group: Group<'_> = if has_origin { title.element(origin) } else { Group::with_title(title) };
@@ -123,17 +124,17 @@ fn render_one(diagnostic: &Diagnostic, width: usize, renderer: &Renderer, index:
         group = group.element(snippet);
     }
     if let Some(note) = note {
-        group = group.element(Level::NOTE.message(wrapped(note, width.saturating_sub(14))));
+        group = group.element(Level::NOTE.message(wrap_visible(note, width.saturating_sub(14))));
     }
     if let Some(help) = &diagnostic.help {
-        group = group.element(Level::HELP.message(wrapped(help, width.saturating_sub(14))));
+        group = group.element(Level::HELP.message(wrap_visible(help, width.saturating_sub(14))));
     }
     let rendered = without_second_origin(&renderer.render(&[group]));
     if has_origin { rendered } else { without_lines(&rendered, "|") }
 }
 
 /// A rendered line without colors and surrounding whitespace.
-fn bare(line: &str) -> String {
+fn without_colors(line: &str) -> String {
     let parts = line.split("\u{1b}[").enumerate().map(|(number, part)| match part.split_once('m') {
         Some((_, text)) if number > 0 => text,
         _ => part,
@@ -141,14 +142,16 @@ fn bare(line: &str) -> String {
     parts.collect::<String>().trim().to_owned()
 }
 
-/// Removes rendered lines that consist only of `text`.
+/// Removes the rendered lines that contain nothing but `text`.
 fn without_lines(rendered: &str, text: &str) -> String {
-    rendered.split_inclusive('\n').filter(|line| bare(line) != text).collect()
+    rendered.split_inclusive('\n').filter(|line| without_colors(line) != text).collect()
 }
 
 /// Removes the line `:::`, which the renderer inserts before a snippet if the origin is shown above.
 fn without_second_origin(rendered: &str) -> String {
-    let Some(second) = rendered.lines().find(|line| bare(line) == ":::") else { return rendered.to_owned() };
+    let Some(second) = rendered.lines().find(|line| without_colors(line) == ":::") else {
+        return rendered.to_owned();
+    };
     rendered.replacen(&format!("{second}\n"), "", 1)
 }
 
@@ -178,12 +181,15 @@ impl Excerpt {
     /// and a space.
     fn label_column(&self, line: usize) -> usize {
         let frame = line.to_string().len() + " | ".len();
-        frame + columns(&self.text[..self.span.start]) + columns(&self.text[self.span.clone()]).max(1) + 1
+        frame
+            + display_width(&self.text[..self.span.start])
+            + display_width(&self.text[self.span.clone()]).max(1)
+            + 1
     }
 }
 
 /// Display width of a string.
-fn columns(text: &str) -> usize {
+fn display_width(text: &str) -> usize {
     unicode_width::UnicodeWidthStr::width(text)
 }
 
@@ -231,7 +237,7 @@ impl LineIndex {
 }
 
 /// Makes text safe to display, and wraps it between words at `width` characters.
-fn wrapped(text: &str, width: usize) -> Cow<'static, str> {
+fn wrap_visible(text: &str, width: usize) -> Cow<'static, str> {
     let text = visible(text);
     let mut lines = String::with_capacity(text.len());
     let mut column = 0;

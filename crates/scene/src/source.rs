@@ -16,14 +16,14 @@ pub struct SceneText {
     all: Arc<str>,
     /// Length of the file's text, the first part of `all`.
     file: usize,
-    sets: Vec<Set>,
+    sets: Vec<SetValue>,
     /// Whether the text was generated for a model and therefore is not in a file.
     is_generated: bool,
 }
 
 /// A `--set` value: its span in the whole text, and the value alone for diagnostics.
 #[derive(Clone, Debug)]
-struct Set {
+struct SetValue {
     span: Range<usize>,
     text: Arc<str>,
 }
@@ -45,13 +45,16 @@ impl SceneText {
         }
         let (mut all, mut known, mut wrong) = (file.to_string(), Vec::new(), Vec::new());
         for set in sets {
-            match key_value(set) {
+            match set_to_toml(set) {
                 Some(text) => {
                     all.push('\n');
-                    known.push(Set { span: all.len()..all.len() + text.len(), text: text.as_str().into() });
+                    known.push(SetValue {
+                        span: all.len()..all.len() + text.len(),
+                        text: text.as_str().into(),
+                    });
                     all.push_str(&text);
                 }
-                None => wrong.push(malformed(set)),
+                None => wrong.push(malformed_set_error(set)),
             }
         }
         if wrong.is_empty() {
@@ -62,7 +65,7 @@ impl SceneText {
     }
 
     /// The file's text followed by the `--set` values.
-    pub(super) fn all(&self) -> &Arc<str> {
+    pub(super) fn full_text(&self) -> &Arc<str> {
         &self.all
     }
 
@@ -77,22 +80,22 @@ impl SceneText {
     }
 
     /// Byte offsets of the `--set` values.
-    pub(super) fn sets(&self) -> impl Iterator<Item = usize> + '_ {
+    pub(super) fn set_offsets(&self) -> impl Iterator<Item = usize> + '_ {
         self.sets.iter().map(|set| set.span.start)
     }
 
     /// Whether a span is in a `--set` value rather than in the file.
-    pub(super) fn is_set(&self, span: &Range<usize>) -> bool {
+    pub(super) fn is_in_set_value(&self, span: &Range<usize>) -> bool {
         span.start >= self.file
     }
 
     /// Marks the text as generated for a model.
-    pub(super) fn generated(self) -> Self {
+    pub(super) fn mark_generated(self) -> Self {
         Self { is_generated: true, ..self }
     }
 
     /// Resolves a span to the file at `path` or to a `--set` value. Returns no span for generated text.
-    pub(super) fn place(
+    pub(super) fn resolve_span(
         &self,
         path: &Path,
         span: Range<usize>,
@@ -100,7 +103,7 @@ impl SceneText {
     ) -> (PathBuf, Option<SourceSpan>) {
         let set = self.sets.iter().find(|set| set.span.start <= span.start && span.end <= set.span.end);
         let (path, source, span) = match set {
-            Some(Set { span: own, text }) => {
+            Some(SetValue { span: own, text }) => {
                 (Path::new(SET_OPTION), text, span.start - own.start..span.end - own.start)
             }
             None if self.is_generated => return (path.to_owned(), None),
@@ -112,27 +115,27 @@ impl SceneText {
     }
 }
 
-/// Converts `TABLE.KEY=VALUE` to TOML, and quotes the value if necessary. `None` if the `=`, the table or the
+/// Converts `TABLE.KEY=VALUE` to TOML and quotes the value if necessary. `None` if the `=`, the table or the
 /// key is missing.
-fn key_value(set: &str) -> Option<String> {
+fn set_to_toml(set: &str) -> Option<String> {
     // Quoted keys may contain `=`, so try each `=`.
     const MAX_EQUALS_SIGNS: usize = 8;
     set.match_indices('=').take(MAX_EQUALS_SIGNS).find_map(|(at, _)| {
         let (key, value) = (set[..at].trim(), set[at + 1..].trim());
         let with = |value: &str| Some(format!("{key} = {value}")).filter(|text| is_key_value(text));
         with("0")?;
-        with(value).or_else(|| with(&number(value)?)).or_else(|| with(&quoted(value)))
+        with(value).or_else(|| with(&complete_number(value)?)).or_else(|| with(&toml_string(value)))
     })
 }
 
 /// Completes numbers such as `.5` and `5.`, which are invalid in TOML.
-fn number(text: &str) -> Option<String> {
+fn complete_number(text: &str) -> Option<String> {
     let number: f64 = text.parse().ok().filter(|number: &f64| number.is_finite())?;
     text.contains('.').then(|| format!("{number:?}"))
 }
 
 /// Formats a TOML basic string.
-pub fn quoted(text: &str) -> String {
+pub fn toml_string(text: &str) -> String {
     let mut quoted = String::from('"');
     for character in text.chars() {
         match character {
@@ -150,7 +153,7 @@ pub(super) const MALFORMED_SET: &str = "malformed value";
 /// Hint for a `--set` value without `=`.
 pub(super) const MISSING_EQUALS_HELP: &str = "add `=` between the key and its value, as in render.samples=3";
 
-fn malformed(set: &str) -> Diagnostic {
+fn malformed_set_error(set: &str) -> Diagnostic {
     let place =
         SourceSpan { source: set.into(), span: 0..set.len(), label: "expected TABLE.KEY=VALUE".to_owned() };
     let key = set.split('=').next().unwrap_or_default();
@@ -189,12 +192,12 @@ mod tests {
             ("render.samples=3 # few", "render.samples = 3 # few"),
             ("render.a=1\nrender.b=2", "render.a = \"1\\U0000000arender.b=2\""),
         ] {
-            assert_eq!(key_value(set).as_deref(), Some(text), "{set}");
+            assert_eq!(set_to_toml(set).as_deref(), Some(text), "{set}");
         }
         for wrong in
             ["", "=", "render", "render=3", "=3", "render.=3", ".samples=3", "[render]\nsamples=3", "a b.c=1"]
         {
-            assert_eq!(key_value(wrong), None, "{wrong}");
+            assert_eq!(set_to_toml(wrong), None, "{wrong}");
         }
     }
 }

@@ -6,11 +6,11 @@ use crate::math::decimal::{decimal_step, rounded};
 use crate::pipeline::protocol::Viewpoint;
 use crate::scene::description::Pose;
 
-/// Minimum angle between the camera's arm and the orbit axis, in degrees.
+/// Minimum angle in degrees between the orbit axis and the direction from `look_at` to the eye.
 const POLE: f64 = 1.0;
 /// Range of the field of view, in degrees.
 const FIELD: (f64, f64) = (1.0, 160.0);
-/// Maximum factor by which the distance may be larger or smaller than the scene camera's.
+/// Maximum ratio between the distance and the scene camera's distance, in either direction.
 pub(super) const REACH: f64 = 1000.0;
 
 /// Orbits around `look_at` by `right` and `up` degrees.
@@ -19,7 +19,7 @@ pub(super) fn orbited(pose: &Pose, right: f64, up: f64) -> Pose {
     let arm = pose.position - pose.look_at;
     let distance = arm.length();
     let polar = libm::acos((arm.dot(axis) / distance).clamp(-1.0, 1.0)).to_degrees();
-    // A camera that starts closer to a pole may stay there.
+    // If the camera starts closer to a pole, leave it there.
     let (least, most) = (POLE.min(polar), (180.0 - POLE).max(polar));
     let lifted = (polar - up).clamp(least, most);
     let level = (arm - axis * arm.dot(axis)).normalize_or(axis.any_orthonormal_vector());
@@ -29,8 +29,8 @@ pub(super) fn orbited(pose: &Pose, right: f64, up: f64) -> Pose {
     with_eye_at(pose, (level * sine + axis * cosine) * distance)
 }
 
-/// Multiplies the distance to `look_at` by `factor`, limited to within a factor of [`REACH`] of `own`, the
-/// scene camera's distance.
+/// Multiplies the distance to `look_at` by `factor`, keeping it within a factor of [`REACH`] of the scene
+/// camera's distance `own`.
 pub(super) fn dollied(pose: &Pose, factor: f64, own: f64) -> Pose {
     let arm = pose.position - pose.look_at;
     let distance = arm.length();
@@ -100,6 +100,10 @@ mod tests {
         let view = Viewpoint { pose: POSE, fov: 40.0, aperture: 0.0, focus: 4.0 };
         assert_eq!(zoomed(&view, 1.1), 44.0);
         assert_eq!(zoomed(&view, 100.0), 160.0);
-        assert_eq!(zoomed(&Viewpoint { fov: 170.0, ..view }, 1.1), 170.0, "a wider field of view is kept");
+        assert_eq!(
+            zoomed(&Viewpoint { fov: 170.0, ..view }, 1.1),
+            170.0,
+            "zooming should not narrow a wider field of view"
+        );
     }
 }

@@ -53,7 +53,7 @@ impl TerminalLink {
 /// A nonblocking writer for terminal output.
 pub(super) type TerminalWriter = Box<dyn FnMut(Vec<u8>)>;
 
-/// The terminal's screen as the event loop sees it.
+/// The event loop's interface to the terminal's screen.
 pub(super) struct Display {
     painter: Painter,
     /// The preview, if drawn as pixels.
@@ -127,7 +127,7 @@ impl Display {
     }
 
     /// Switches to drawing the preview as pixels if `kind` requires it.
-    pub(super) fn draw_as(&mut self, kind: PreviewKind) {
+    pub(super) fn set_preview_kind(&mut self, kind: PreviewKind) {
         if let (PreviewKind::Pixels(protocol), None) = (kind, &self.images) {
             terminal::record_images();
             self.images = Some(Images::new(protocol, self.link.is_in_tmux));
@@ -140,7 +140,7 @@ impl Display {
     }
 
     /// Places the preview in pixels. `None` if it is drawn using cells.
-    pub(super) fn place(&mut self, wanted: Option<PixelPlacement>, is_still: bool) {
+    pub(super) fn place_pixels(&mut self, wanted: Option<PixelPlacement>, is_still: bool) {
         if let Some(uncovered) = self.images.as_mut().and_then(|images| images.set_target(wanted, is_still)) {
             self.painter.damage(uncovered);
         }
@@ -163,7 +163,7 @@ impl Display {
     }
 
     /// Starts counting bytes for a new render.
-    pub(super) fn begin_count(&mut self) {
+    pub(super) fn reset_byte_count(&mut self) {
         self.sent = 0;
     }
 
@@ -178,7 +178,7 @@ impl Display {
     }
 
     /// Whether anything is queued to be sent after the preview.
-    fn has_more(&self) -> bool {
+    fn has_queued_bytes(&self) -> bool {
         !self.asides.is_empty() || self.window_titles[0] != self.window_titles[1]
     }
 
@@ -200,9 +200,9 @@ impl Display {
         }
     }
 
-    /// Sends one slice, cut short once `is_late` returns true. Returns whether anything was sent.
-    pub(super) fn pump(&mut self, now: Instant, is_late: impl Fn() -> bool) -> bool {
-        let is_idle = self.is_complete && !self.has_more();
+    /// Sends one slice, which ends early once `is_late` returns true. Returns whether anything was sent.
+    pub(super) fn send_next_slice(&mut self, now: Instant, is_late: impl Fn() -> bool) -> bool {
+        let is_idle = self.is_complete && !self.has_queued_bytes();
         let room = if is_idle { 0 } else { self.connection.max_slice(now) };
         if room == 0 {
             return false;
@@ -214,22 +214,22 @@ impl Display {
         let room = room.saturating_sub(BEGIN.len() + END.len());
         let cells = self.painter.slice_until(room, is_late);
         if !cells.is_empty() {
-            self.send_slice(self.synchronized(cells), now);
+            self.send_slice(self.wrap_synchronized(cells), now);
             return true;
         }
         // Do not use synchronized output: kitty 0.26 loses image chunks in it. It is not needed, since an
         // image appears only with its last chunk.
         let rate = self.connection.bytes_per_second();
-        let pixels = self.images.as_mut().and_then(|images| images.slice(room, rate));
+        let pixels = self.images.as_mut().and_then(|images| images.next_slice(room, rate));
         match pixels {
             Some(pixels) => self.send_slice(pixels, now),
-            None => self.complete(),
+            None => self.mark_complete(),
         }
         !self.is_complete
     }
 
     /// Wraps a slice in synchronized output if it is large enough to flicker and the terminal supports it.
-    fn synchronized(&self, mut cells: Vec<u8>) -> Vec<u8> {
+    fn wrap_synchronized(&self, mut cells: Vec<u8>) -> Vec<u8> {
         if self.is_synchronized && !self.link.is_multiplexed && cells.len() >= LARGE {
             cells.splice(0..0, BEGIN.iter().copied());
             cells.extend_from_slice(END);
@@ -237,7 +237,7 @@ impl Display {
         cells
     }
 
-    fn complete(&mut self) {
+    fn mark_complete(&mut self) {
         self.is_complete = true;
         if std::mem::take(&mut self.is_picture_due) {
             self.report = Some(FrameReport { bytes: self.sent, round_trip: self.connection.round_trip() });
@@ -260,10 +260,10 @@ impl Display {
     }
 
     /// Handles a terminal reply.
-    pub(super) fn answered(&mut self, answer: TerminalReply, now: Instant) {
+    pub(super) fn handle_reply(&mut self, answer: TerminalReply, now: Instant) {
         match answer {
-            TerminalReply::Ready => self.connection.answered(QueryKind::Status, now),
-            TerminalReply::Attributes => self.connection.answered(QueryKind::Attributes, now),
+            TerminalReply::Ready => self.connection.handle_reply(QueryKind::Status, now),
+            TerminalReply::Attributes => self.connection.handle_reply(QueryKind::Attributes, now),
             TerminalReply::Synchronized { is_known } => self.is_synchronized = is_known,
             TerminalReply::Name(_)
             | TerminalReply::Focus { .. }
@@ -276,7 +276,7 @@ impl Display {
     }
 
     /// Records that the operating system has accepted bytes.
-    pub(super) fn written(&mut self, bytes: usize) {
+    pub(super) fn record_written(&mut self, bytes: usize) {
         self.connection.written(bytes);
     }
 
@@ -291,7 +291,7 @@ impl Display {
     }
 
     /// Whether the terminal has acknowledged the complete target.
-    pub(super) fn is_answered(&self) -> bool {
+    pub(super) fn is_acknowledged(&self) -> bool {
         self.is_complete && !self.connection.awaits_reply()
     }
 
@@ -300,17 +300,16 @@ impl Display {
         self.connection.bytes_per_second()
     }
 
-    /// Time at which more can be sent even without a reply.
-    pub(super) fn wake(&mut self, now: Instant) -> Option<Instant> {
+    /// Earliest time at which more can be sent if no reply arrives.
+    pub(super) fn next_send_time(&mut self, now: Instant) -> Option<Instant> {
         match () {
-            () if self.is_complete && !self.has_more() => None,
+            () if self.is_complete && !self.has_queued_bytes() => None,
             () if self.connection.max_slice(now) > 0 => Some(now),
             () => self.connection.wake(now),
         }
     }
 
-    /// Returns the report on the last preview once, and a second time when the first round-trip time is
-    /// known.
+    /// Returns the report on the last preview once, and again when the first round-trip time is known.
     pub(super) fn take_report(&mut self) -> Option<FrameReport> {
         let report = self.report.as_mut()?;
         if report.round_trip.is_none() && self.connection.round_trip().is_some() {
@@ -320,7 +319,7 @@ impl Display {
         (!std::mem::replace(&mut self.is_reported, true)).then_some(*report)
     }
 
-    /// How long to wait for pending replies before exiting. Without waiting, they would end up in the shell.
+    /// How long to wait for pending replies before exiting. Otherwise, the shell would receive them as input.
     /// `None` if no replies are pending.
     pub(super) fn reply_timeout(&self) -> Option<Duration> {
         const MIN: Duration = Duration::from_millis(200);
@@ -339,7 +338,7 @@ mod tests {
 
     use super::*;
 
-    /// The size of a small update is added to the preview's size and does not replace it.
+    /// The byte count of a small update is added to the preview's count instead of replacing it.
     #[test]
     fn report_counts_bytes_since_the_render_began() {
         let now = Instant::now();
@@ -358,22 +357,22 @@ mod tests {
             display.set_target(buffer, area, Fidelity::Still, (true, &FrameExtras::default()));
             for second in 1..100 {
                 let (now, sent) = (now + Duration::from_millis(second), all.get());
-                display.pump(now, || false);
-                display.written(all.get() - sent);
-                display.answered(TerminalReply::Attributes, now);
-                display.answered(TerminalReply::Ready, now);
+                display.send_next_slice(now, || false);
+                display.record_written(all.get() - sent);
+                display.handle_reply(TerminalReply::Attributes, now);
+                display.handle_reply(TerminalReply::Ready, now);
             }
             assert!(display.is_complete());
             (display.take_report().expect("a report").bytes, all.get() - before)
         };
-        display.begin_count();
+        display.reset_byte_count();
         let (told, whole) = show(&mut display, &buffer);
         assert_eq!(told, whole);
         assert!(whole > 5_000, "{whole}");
         buffer.content[7].set_fg(Color::Rgb(255, 255, 255));
         let (told, difference) = show(&mut display, &buffer);
         assert!(difference < 200 && told == whole + difference, "{told}: {whole} and {difference}");
-        display.begin_count();
+        display.reset_byte_count();
         buffer.content[9].set_fg(Color::Rgb(255, 255, 255));
         let (told, difference) = show(&mut display, &buffer);
         assert_eq!(told, difference, "only the next render is counted");

@@ -17,7 +17,7 @@ use super::signals;
 const DEFAULT: &str = "vi";
 
 /// The editor from the environment, as a shell command.
-pub(super) fn name(variable: impl Fn(&str) -> Option<String>) -> String {
+pub(super) fn editor_command(variable: impl Fn(&str) -> Option<String>) -> String {
     editor(variable).0
 }
 
@@ -39,12 +39,12 @@ pub fn editor(variable: impl Fn(&str) -> Option<String>) -> (String, Option<&'st
 pub(super) fn run(editor: &str, place: &FilePosition) -> Result<(), String> {
     let failed = |error: io::Error| format!("cannot start the editor `{editor}`: {error}");
     let mut shell = Command::new("/bin/sh");
-    shell.arg("-c").arg(line(editor)).arg(editor).args(arguments(editor, place));
+    shell.arg("-c").arg(shell_command_line(editor)).arg(editor).args(position_arguments(editor, place));
     let child = shell.spawn().map_err(failed)?;
     let id = i32::try_from(child.id()).map_err(|_| format!("lost track of the editor `{editor}`"))?;
     let id = Pid::from_raw(id);
     signals::set_child(Some(id));
-    let end = wait(id);
+    let end = wait_for_child(id);
     signals::set_child(None);
     match end {
         // Signals from the keyboard are a normal way to quit an editor.
@@ -58,10 +58,10 @@ pub(super) fn run(editor: &str, place: &FilePosition) -> Result<(), String> {
 }
 
 /// Waits for the child to exit.
-fn wait(id: Pid) -> Result<WaitStatus, Errno> {
+fn wait_for_child(id: Pid) -> Result<WaitStatus, Errno> {
     loop {
         match waitpid(id, Some(WaitPidFlag::WUNTRACED)) {
-            Ok(WaitStatus::Stopped(..)) => signals::stop(),
+            Ok(WaitStatus::Stopped(..)) => signals::stop_process(),
             Ok(end @ (WaitStatus::Exited(..) | WaitStatus::Signaled(..))) => return Ok(end),
             Ok(_) | Err(Errno::EINTR) => {}
             Err(error) => return Err(error),
@@ -71,15 +71,15 @@ fn wait(id: Pid) -> Result<WaitStatus, Errno> {
 
 /// Command line for the shell. Simple commands are run using `exec`, because a shell in between would
 /// intercept signals.
-fn line(editor: &str) -> String {
+fn shell_command_line(editor: &str) -> String {
     let is_plain = |character: char| character.is_alphanumeric() || " -_./+,:@%".contains(character);
-    let is_of_shell = ["command", "eval", "exec", "time", "."].contains(&program(editor));
+    let is_of_shell = ["command", "eval", "exec", "time", "."].contains(&executable_name(editor));
     let exec = if editor.chars().all(is_plain) && !is_of_shell { "exec " } else { "" };
     format!("{exec}{editor} \"$@\"")
 }
 
 /// Arguments that open the file at a position.
-fn arguments(editor: &str, place: &FilePosition) -> Vec<OsString> {
+fn position_arguments(editor: &str, place: &FilePosition) -> Vec<OsString> {
     let FilePosition { path, line, column } = place;
     // Prevents a file name with a leading dash from being parsed as an option.
     let path = if path.as_os_str().as_encoded_bytes().starts_with(b"-") {
@@ -92,7 +92,7 @@ fn arguments(editor: &str, place: &FilePosition) -> Vec<OsString> {
         text.push(format!(":{line}:{column}"));
         text
     };
-    match program(editor) {
+    match executable_name(editor) {
         "vi" | "vim" | "nvim" | "view" | "gvim" | "ex" | "nano" | "emacs" | "emacsclient" | "kak"
         | "micro" | "joe" | "ne" | "mg" | "jed" | "pico" => vec![format!("+{line}").into(), path.into()],
         "hx" | "helix" | "subl" | "zed" => vec![with_place()],
@@ -107,8 +107,8 @@ fn arguments(editor: &str, place: &FilePosition) -> Vec<OsString> {
     }
 }
 
-/// File name of the editor's executable.
-fn program(editor: &str) -> &str {
+/// File name of the editor's executable, without its directory.
+fn executable_name(editor: &str) -> &str {
     let first = editor.split_whitespace().next().unwrap_or_default();
     Path::new(first).file_name().and_then(OsStr::to_str).unwrap_or(first)
 }
@@ -120,7 +120,9 @@ mod tests {
     #[test]
     fn visual_takes_precedence_over_editor() {
         let of = |pairs: &[(&str, &str)]| {
-            name(|name| pairs.iter().find(|(key, _)| *key == name).map(|(_, value)| (*value).to_owned()))
+            editor_command(|name| {
+                pairs.iter().find(|(key, _)| *key == name).map(|(_, value)| (*value).to_owned())
+            })
         };
         assert_eq!(of(&[("VISUAL", "hx"), ("EDITOR", "ed")]), "hx");
         assert_eq!(of(&[("VISUAL", " "), ("EDITOR", "ed")]), "ed");
@@ -134,9 +136,9 @@ mod tests {
 
     #[test]
     fn only_simple_commands_use_exec() {
-        assert_eq!(line("/usr/bin/nvim -u NONE"), "exec /usr/bin/nvim -u NONE \"$@\"");
+        assert_eq!(shell_command_line("/usr/bin/nvim -u NONE"), "exec /usr/bin/nvim -u NONE \"$@\"");
         for editor in ["TERM=vt100 vi", "cd /; vi", "'my editor'", "vi #", "$HOME/vi", "command vi"] {
-            assert_eq!(line(editor), format!("{editor} \"$@\""));
+            assert_eq!(shell_command_line(editor), format!("{editor} \"$@\""));
         }
     }
 
@@ -152,9 +154,9 @@ mod tests {
             ("code -g --wait", "a b.toml:7:3"),
             ("my-editor", "a b.toml"),
         ] {
-            assert_eq!(arguments(editor, &place).join(OsStr::new(" ")), expected, "{editor}");
+            assert_eq!(position_arguments(editor, &place).join(OsStr::new(" ")), expected, "{editor}");
         }
         let dash = FilePosition { path: "-a.toml".into(), line: 1, column: 1 };
-        assert_eq!(arguments("vi", &dash)[1], "./-a.toml");
+        assert_eq!(position_arguments("vi", &dash)[1], "./-a.toml");
     }
 }

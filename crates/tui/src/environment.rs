@@ -25,16 +25,15 @@ pub(super) fn terminal_link(variable: impl Fn(&str) -> Option<String>) -> Termin
     }
 }
 
-/// Whether the terminal may print escape sequences it does not know, like the Linux console and Apple's
-/// Terminal do.
-pub(super) fn is_plain(variable: impl Fn(&str) -> Option<String>) -> bool {
+/// Whether the terminal may print unknown escape sequences, as the Linux console and Apple's Terminal do.
+pub(super) fn is_plain_terminal(variable: impl Fn(&str) -> Option<String>) -> bool {
     let term = variable("TERM").unwrap_or_default();
     ["linux", "dumb", "vt"].iter().any(|name| term.starts_with(name))
         || variable("TERM_PROGRAM").is_some_and(|program| program == "Apple_Terminal")
 }
 
 /// The image protocol for a preview choice.
-fn protocol(preview: PreviewChoice) -> Option<Protocol> {
+fn image_protocol(preview: PreviewChoice) -> Option<Protocol> {
     match preview {
         PreviewChoice::Kitty => Some(Protocol::Kitty),
         PreviewChoice::Sixel => Some(Protocol::Sixel),
@@ -51,7 +50,7 @@ fn protocol(preview: PreviewChoice) -> Option<Protocol> {
 
 /// Queries to send. Most are not sent to multiplexers, which reply on their own behalf or not at all, or to
 /// plain terminals, which may print them as text.
-pub(super) fn ask(
+pub(super) fn terminal_queries(
     preview: PreviewChoice,
     color: ColorChoice,
     depth: ColorDepth,
@@ -60,16 +59,16 @@ pub(super) fn ask(
     let get = |name: &str| variable(name).unwrap_or_default();
     let term = get("TERM");
     let is_outermost = !terminal_link(&variable).is_multiplexed;
-    let is_plain = is_plain(&variable);
+    let is_plain = is_plain_terminal(&variable);
     let has_palette = matches!(depth, ColorDepth::Indexed256 | ColorDepth::Ansi16);
-    let is_ramp = PreviewKind::of(preview, depth) == PreviewKind::Ascii;
+    let is_ramp = PreviewKind::from_choice(preview, depth) == PreviewKind::Ascii;
     TerminalQueries {
         blocks: preview == PreviewChoice::Auto && depth != ColorDepth::None && is_outermost && !is_plain,
         name: is_outermost && !is_plain && !term.is_empty(),
         true_color: color == ColorChoice::Auto && has_palette && is_outermost && !is_plain,
         background: is_ramp && get("STY").is_empty() && !term.starts_with("linux") && term != "dumb",
         palette: depth == ColorDepth::Ansi16 && is_outermost && !is_plain,
-        pixels: protocol(preview).map(|protocol| PixelRequest::new(protocol, &variable, is_plain)),
+        pixels: image_protocol(preview).map(|protocol| PixelRequest::new(protocol, &variable, is_plain)),
     }
 }
 
@@ -96,7 +95,7 @@ mod tests {
     #[test]
     fn only_unknown_properties_are_queried() {
         let ask = |preview, color, depth, pairs: &[(&str, &str)]| {
-            ask(preview, color, depth, |name| {
+            terminal_queries(preview, color, depth, |name| {
                 pairs.iter().find(|(key, _)| *key == name).map(|(_, value)| (*value).to_owned())
             })
         };

@@ -33,8 +33,8 @@ pub(super) enum Event {
     Resize(Window),
     /// A message from the worker. Previews arrive as [`Event::Picture`].
     Worker(protocol::Event),
-    /// A new preview. `range` is the range of values it shows, if values were mapped to colors. `section` is
-    /// the part of the image it shows pixel by pixel.
+    /// A new preview. `range` is the range of displayed values if the view maps values to colors. `section`
+    /// is the part of the image that is shown at actual pixels.
     Picture {
         generation: u64,
         picture: Arc<Picture>,

@@ -1,31 +1,31 @@
 //! The summary printed after the terminal is restored.
 
 use super::event::WriteFailure;
-use super::state::{Activity, OwnImage, State, Toggles, WrittenFile};
+use super::state::{Activity, KeyOverrides, OwnImage, State, WrittenFile};
 use crate::choice::Choice;
-use crate::pipeline::protocol::{OwnState, Report};
+use crate::pipeline::protocol::{OwnImageState, Report};
 use crate::pipeline::settings::{CameraChange, View};
 use crate::pipeline::words::seconds;
 use crate::scene::sanitize::visible;
 
 /// The written files with their samples and times, and what happened after they were written.
-pub(super) fn words(state: &State) -> String {
+pub(super) fn summary_text(state: &State) -> String {
     match &state.saving.write_failed {
-        Some(failed) => unwritten(state, failed),
-        None if state.saving.written.is_empty() => unfinished(state),
-        None => files(&state.saving.written) + &since(state),
+        Some(failed) => describe_write_failure(state, failed),
+        None if state.saving.written.is_empty() => reason_for_no_image(state),
+        None => describe_files(&state.saving.written) + &events_since_writing(state),
     }
 }
 
-/// Changes made with keys that are saved in neither the scene nor an image, as command-line options.
-pub(super) fn not_kept(state: &State) -> Option<String> {
+/// Key changes that were saved neither in the scene nor in an image, formatted as command-line options.
+pub(super) fn unsaved_as_options(state: &State) -> Option<String> {
     let shown = state.request.toggles;
     let is_in_file = state.saving.written.iter().any(|written| written.shows == Some(shown));
     let is_in_scene =
         state.saving.camera_of_model.is_some() && state.saving.camera_of_model == state.request.viewpoint();
     let camera = if is_in_scene { CameraChange::default() } else { shown.camera };
     let has_orbiter = state.request.text.as_ref().is_some_and(|text| text.contains("orbiter"));
-    let options = Toggles { camera, ..shown }.options(state.request.viewpoint().filter(|_| has_orbiter));
+    let options = KeyOverrides { camera, ..shown }.options(state.request.viewpoint().filter(|_| has_orbiter));
     (!options.is_empty() && !is_in_file).then(|| format!("not kept: {}", options.join(" ")))
 }
 
@@ -37,13 +37,13 @@ pub(super) fn image_name(state: &State) -> Option<String> {
 }
 
 /// Why this run has written no image.
-fn unfinished(state: &State) -> String {
-    if is_broken(state) {
+fn reason_for_no_image(state: &State) -> String {
+    if is_scene_broken(state) {
         return format!("no image written; {} has errors", scene_name(state));
     }
     let Some(name) = image_name(state) else { return "no image written".to_owned() };
     match state.saving.own {
-        OwnImage { state: OwnState::Written, .. } => format!("{name} is up to date"),
+        OwnImage { state: OwnImageState::Written, .. } => format!("{name} is up to date"),
         OwnImage { fraction, .. } if fraction > 0.0 => {
             format!("{name} not finished ({} %)", (fraction * 100.0).floor())
         }
@@ -57,16 +57,16 @@ const OLDER_THAN_EDIT: &str = " (older than your last edit)";
 const NEXT_RENDER: &str = "the next render";
 
 /// What happened after the files were written.
-fn since(state: &State) -> String {
-    if is_broken(state) {
+fn events_since_writing(state: &State) -> String {
+    if is_scene_broken(state) {
         return format!("; {} has errors since", scene_name(state));
     }
     let written = &state.saving.written;
     let is_older = written.iter().all(|written| written.generation < state.saving.saved_at);
-    if state.saving.own.state == OwnState::Written {
+    if state.saving.own.state == OwnImageState::Written {
         return String::new();
     }
-    if !state.request.is_own() {
+    if !state.request.is_own_image() {
         let is_by_hand = written.iter().any(|written| written.shows.is_some());
         return match state.saving.own {
             OwnImage { .. } if is_older => OLDER_THAN_EDIT.to_owned(),
@@ -87,7 +87,7 @@ fn since(state: &State) -> String {
     }
 }
 
-fn is_broken(state: &State) -> bool {
+fn is_scene_broken(state: &State) -> bool {
     matches!(state.work.activity, Activity::Waiting | Activity::Broken)
 }
 
@@ -97,7 +97,7 @@ fn scene_name(state: &State) -> String {
 }
 
 /// The written files and their descriptions, grouped by image.
-fn files(written: &[WrittenFile]) -> String {
+fn describe_files(written: &[WrittenFile]) -> String {
     let alike = written.chunk_by(|one, next| one.made == next.made && one.shows == next.shows);
     let said: Vec<String> = alike
         .map(|files| {
@@ -106,7 +106,8 @@ fn files(written: &[WrittenFile]) -> String {
             let made = files.first().map_or("", |it| &it.made);
             let colon = if made.is_empty() { "" } else { ": " };
             let shows = files.first().and_then(|it| it.shows).unwrap_or_default();
-            let changes = Toggles { view: None, ..shows }.differences(&Toggles::default(), false).join(", ");
+            let changes =
+                KeyOverrides { view: None, ..shows }.differences(&KeyOverrides::default(), false).join(", ");
             let with = if changes.is_empty() { String::new() } else { format!(", with {changes}") };
             format!("wrote {}{colon}{made}{with}", names.join(", "))
         })
@@ -115,7 +116,7 @@ fn files(written: &[WrittenFile]) -> String {
 }
 
 /// The image that could not be written and why, followed by other files of this and earlier images.
-fn unwritten(state: &State, failed: &WriteFailure) -> String {
+fn describe_write_failure(state: &State, failed: &WriteFailure) -> String {
     let mut words = format!("not written: {}", visible(&failed.why));
     for written in &state.saving.written {
         let name = visible(&written.path.to_string_lossy()).into_owned();
@@ -135,7 +136,7 @@ fn unwritten(state: &State, failed: &WriteFailure) -> String {
 pub(super) fn describe_image(report: &Report, shown: View) -> String {
     let image = &report.image;
     let time = seconds(report.seconds.max(image.render_seconds));
-    let view = view(shown);
+    let view = view_label(shown);
     let comma = if view.is_empty() { "" } else { ", " };
     let samples = if image.samples.min == image.samples.max {
         image.samples.max.to_string()
@@ -146,7 +147,7 @@ pub(super) fn describe_image(report: &Report, shown: View) -> String {
 }
 
 /// The name of the view, or nothing for the beauty view.
-pub(super) fn view(view: View) -> String {
+pub(super) fn view_label(view: View) -> String {
     if view == View::Beauty { String::new() } else { format!("view {}", view.name()) }
 }
 
@@ -154,7 +155,7 @@ pub(super) fn view(view: View) -> String {
 mod tests {
     use super::*;
     use crate::Changed;
-    use crate::fixtures::{TestUi, diagnostic, done, progress};
+    use crate::fixtures::{TestUi, diagnostic, done_event, render_progress};
     use crate::messages;
     use crate::pipeline::protocol::{Event, Stage, Status};
     use crate::scene::description::Camera;
@@ -162,7 +163,8 @@ mod tests {
 
     /// Event for a finished request, with a modified report.
     fn done_with(generation: u64, change: impl FnOnce(&mut Report)) -> Event {
-        let Event::Done { mut report, warnings, unchanged, .. } = done(generation, Vec::new(), false) else {
+        let Event::Done { mut report, warnings, unchanged, .. } = done_event(generation, Vec::new(), false)
+        else {
             panic!("a finished request")
         };
         change(&mut report);
@@ -172,22 +174,22 @@ mod tests {
     #[test]
     fn file_written_during_newer_request_is_listed() {
         let mut ui = TestUi::new();
-        ui.finish([200, 30, 30]);
+        ui.finish_render([200, 30, 30]);
         ui.press('r');
         let begun = ui.state.request.generation;
-        ui.worker(Event::Started { generation: begun });
-        ui.worker(Event::Progress { generation: begun, progress: progress(0.5, None) });
+        ui.worker_event(Event::Started { generation: begun });
+        ui.worker_event(Event::Progress { generation: begun, progress: render_progress(0.5, None) });
         ui.press('l');
-        ui.worker(Event::Written { generation: begun, path: "big.png".into(), bytes: 1, is_own: true });
+        ui.worker_event(Event::Written { generation: begun, path: "big.png".into(), bytes: 1, is_own: true });
         assert!(
-            words(&ui.state).starts_with(&format!("wrote big.png; {NEXT_RENDER}")),
+            summary_text(&ui.state).starts_with(&format!("wrote big.png; {NEXT_RENDER}")),
             "{}",
-            words(&ui.state)
+            summary_text(&ui.state)
         );
-        ui.worker(done(begun, Vec::new(), false));
-        ui.finish([30, 30, 200]);
+        ui.worker_event(done_event(begun, Vec::new(), false));
+        ui.finish_render([30, 30, 200]);
         let made = "wrote big.png: 640×480, 64 samples, 1.93 s";
-        assert_eq!(words(&ui.state), format!("{made}; {NEXT_RENDER} is not finished (50 %)"));
+        assert_eq!(summary_text(&ui.state), format!("{made}; {NEXT_RENDER} is not finished (50 %)"));
         assert!(ui.text().contains(messages::NOT_SAVED), "the newest image is not saved: {}", ui.text());
     }
 
@@ -196,9 +198,9 @@ mod tests {
         let mut ui = TestUi::new();
         let write = |ui: &mut TestUi, seconds: f64, rendered: f64| {
             let generation = ui.state.request.generation;
-            ui.worker(Event::Started { generation });
-            ui.worker(Event::Written { generation, path: "dof.png".into(), bytes: 1, is_own: true });
-            ui.worker(done_with(generation, |report| {
+            ui.worker_event(Event::Started { generation });
+            ui.worker_event(Event::Written { generation, path: "dof.png".into(), bytes: 1, is_own: true });
+            ui.worker_event(done_with(generation, |report| {
                 (report.seconds, report.image.render_seconds) = (seconds, rendered);
             }));
         };
@@ -207,27 +209,27 @@ mod tests {
         write(&mut ui, 1.02, 1.0);
         ui.press('r');
         write(&mut ui, 0.05, 2.0);
-        assert_eq!(words(&ui.state), "wrote dof.png: 640×480, 64 samples, 2.00 s");
+        assert_eq!(summary_text(&ui.state), "wrote dof.png: 640×480, 64 samples, 2.00 s");
     }
 
     #[test]
     fn written_view_is_named() {
         let mut ui = TestUi::new();
-        ui.worker(Event::Written { generation: 1, path: "a.png".into(), bytes: 1, is_own: true });
-        ui.finish([200, 30, 30]);
-        let own = words(&ui.state);
+        ui.worker_event(Event::Written { generation: 1, path: "a.png".into(), bytes: 1, is_own: true });
+        ui.finish_render([200, 30, 30]);
+        let own = summary_text(&ui.state);
         ui.press('v');
         let generation = ui.state.request.generation;
-        ui.worker(Event::Started { generation });
-        ui.worker(done_with(generation, |report| {
+        ui.worker_event(Event::Started { generation });
+        ui.worker_event(done_with(generation, |report| {
             (report.settings.view, report.seconds, report.image.render_seconds) = (View::Normal, 0.5, 0.4);
             report.stages[Stage::Render as usize].seconds = 0.4;
             (report.image.path, report.image.paths) = (None, Vec::new());
         }));
-        assert_eq!(words(&ui.state), own, "the file was not written again");
+        assert_eq!(summary_text(&ui.state), own, "the file was not written again");
         ui.press('w');
-        ui.worker(Event::Written { generation, path: "a.png".into(), bytes: 1, is_own: false });
-        assert_eq!(words(&ui.state), "wrote a.png: view normal, 640×480, 64 samples, 500 ms");
+        ui.worker_event(Event::Written { generation, path: "a.png".into(), bytes: 1, is_own: false });
+        assert_eq!(summary_text(&ui.state), "wrote a.png: view normal, 640×480, 64 samples, 500 ms");
     }
 
     #[test]
@@ -235,23 +237,26 @@ mod tests {
         let made = "wrote a.png: 640×480, 64 samples, 1.93 s";
         for key in ['v', 'l'] {
             let mut ui = TestUi::new();
-            ui.worker(Event::Written { generation: 1, path: "a.png".into(), bytes: 1, is_own: true });
-            ui.finish([200, 30, 30]);
+            ui.worker_event(Event::Written { generation: 1, path: "a.png".into(), bytes: 1, is_own: true });
+            ui.finish_render([200, 30, 30]);
             ui.press(key);
-            ui.finish([200, 30, 30]);
-            let before = words(&ui.state);
+            ui.finish_render([200, 30, 30]);
+            let before = summary_text(&ui.state);
             assert!(before.starts_with(made) && !before.contains("save"), "{key}: {before}");
-            ui.event(crate::event::Event::Changed(Changed { noticed: ui.now }));
-            ui.finish([30, 30, 200]);
-            let after = words(&ui.state);
+            ui.handle_event(crate::event::Event::Changed(Changed { noticed: ui.now }));
+            ui.finish_render([30, 30, 200]);
+            let after = summary_text(&ui.state);
             assert_eq!(after, format!("{made}{OLDER_THAN_EDIT}"), "{key}");
-            assert_eq!(not_kept(&ui.state).is_some_and(|it| it.contains("camera.position")), key == 'l');
+            assert_eq!(
+                unsaved_as_options(&ui.state).is_some_and(|it| it.contains("camera.position")),
+                key == 'l'
+            );
             // Saving the file without changing the image does not make the image newer.
-            ui.event(crate::event::Event::Changed(Changed { noticed: ui.now }));
+            ui.handle_event(crate::event::Event::Changed(Changed { noticed: ui.now }));
             let generation = ui.state.request.generation;
-            ui.worker(Event::Started { generation });
-            ui.worker(done(generation, Vec::new(), true));
-            assert_eq!(words(&ui.state), after);
+            ui.worker_event(Event::Started { generation });
+            ui.worker_event(done_event(generation, Vec::new(), true));
+            assert_eq!(summary_text(&ui.state), after);
         }
     }
 
@@ -260,40 +265,40 @@ mod tests {
         let mut ui = TestUi::new();
         let fail = |ui: &mut TestUi| {
             let generation = ui.state.request.generation;
-            ui.worker(Event::Started { generation });
-            ui.worker(Event::WriteFailed {
+            ui.worker_event(Event::Started { generation });
+            ui.worker_event(Event::WriteFailed {
                 path: None,
                 generation,
                 message: "cannot write a.png: no space".to_owned(),
             });
-            ui.worker(finished(generation, Status::Skipped));
+            ui.worker_event(finished(generation, Status::Skipped));
         };
         fail(&mut ui);
         let failed = "not written: cannot write a.png: no space";
         for key in ['l', 'v', '?'] {
             ui.press(key);
             let generation = ui.state.request.generation;
-            ui.worker(Event::Started { generation });
-            assert!(words(&ui.state).starts_with(failed), "{key}");
-            ui.worker(finished(generation, Status::Skipped));
-            assert!(words(&ui.state).starts_with(failed), "{key}");
+            ui.worker_event(Event::Started { generation });
+            assert!(summary_text(&ui.state).starts_with(failed), "{key}");
+            ui.worker_event(finished(generation, Status::Skipped));
+            assert!(summary_text(&ui.state).starts_with(failed), "{key}");
         }
-        // Return to the scene's own image when the disk has space again or the image exists.
+        // Return to the scene's own image after disk space was freed or the image was written.
         ui.press('0');
         for status in [Status::Done, Status::Reused] {
             fail(&mut ui);
-            assert_eq!(words(&ui.state), failed);
+            assert_eq!(summary_text(&ui.state), failed);
             ui.press('r');
             let generation = ui.state.request.generation;
-            ui.worker(Event::Started { generation });
-            ui.worker(finished(generation, status));
+            ui.worker_event(Event::Started { generation });
+            ui.worker_event(finished(generation, status));
             assert!(ui.state.saving.write_failed.is_none(), "{status:?}");
         }
     }
 
     /// A finished request whose write stage has this status.
     fn finished(generation: u64, write: Status) -> Event {
-        let mut event = done(generation, Vec::new(), false);
+        let mut event = done_event(generation, Vec::new(), false);
         if let Event::Done { report, .. } = &mut event {
             report.stages[Stage::Write as usize].status = write;
         }
@@ -303,80 +308,80 @@ mod tests {
     #[test]
     fn summary_lists_written_and_missing_images() {
         let mut ui = TestUi::new();
-        assert_eq!(words(&ui.state), "no image written");
-        let settings = Box::new(crate::fixtures::settings());
-        let (camera, own) = (crate::fixtures::camera(), crate::fixtures::own());
-        ui.worker(Event::Settings { generation: 1, settings, camera, exposure: 0.0, own });
-        assert_eq!(words(&ui.state), "cornell.png not finished");
-        ui.worker(Event::Progress { generation: 1, progress: progress(0.388, None) });
-        assert_eq!(words(&ui.state), "cornell.png not finished (38 %)");
-        ui.worker(Event::Written { generation: 1, path: "cornell.png".into(), bytes: 1, is_own: true });
-        ui.worker(done(1, Vec::new(), false));
+        assert_eq!(summary_text(&ui.state), "no image written");
+        let settings = Box::new(crate::fixtures::effective_settings());
+        let (camera, own) = (crate::fixtures::camera(), crate::fixtures::own_settings());
+        ui.worker_event(Event::Settings { generation: 1, settings, camera, exposure: 0.0, own });
+        assert_eq!(summary_text(&ui.state), "cornell.png not finished");
+        ui.worker_event(Event::Progress { generation: 1, progress: render_progress(0.388, None) });
+        assert_eq!(summary_text(&ui.state), "cornell.png not finished (38 %)");
+        ui.worker_event(Event::Written { generation: 1, path: "cornell.png".into(), bytes: 1, is_own: true });
+        ui.worker_event(done_event(1, Vec::new(), false));
         let made = "wrote cornell.png: 640×480, 64 samples, 1.93 s";
-        assert_eq!(words(&ui.state), made);
+        assert_eq!(summary_text(&ui.state), made);
         ui.press('r');
-        ui.worker(Event::Started { generation: 2 });
-        ui.worker(done(2, Vec::new(), true));
-        assert_eq!(words(&ui.state), made, "no new render was started");
+        ui.worker_event(Event::Started { generation: 2 });
+        ui.worker_event(done_event(2, Vec::new(), true));
+        assert_eq!(summary_text(&ui.state), made, "no new render was started");
         ui.press('r');
-        ui.worker(Event::Started { generation: 3 });
-        ui.worker(Event::Progress { generation: 3, progress: progress(0.5, None) });
-        assert_eq!(words(&ui.state), format!("{made}; {NEXT_RENDER} was stopped at 50 %"));
-        ui.worker(Event::WriteFailed {
+        ui.worker_event(Event::Started { generation: 3 });
+        ui.worker_event(Event::Progress { generation: 3, progress: render_progress(0.5, None) });
+        assert_eq!(summary_text(&ui.state), format!("{made}; {NEXT_RENDER} was stopped at 50 %"));
+        ui.worker_event(Event::WriteFailed {
             generation: 3,
             path: None,
             message: "cannot write b.exr: no space".to_owned(),
         });
-        ui.worker(Event::Written { generation: 3, path: "a.png".into(), bytes: 1, is_own: true });
-        ui.worker(done(3, Vec::new(), false));
+        ui.worker_event(Event::Written { generation: 3, path: "a.png".into(), bytes: 1, is_own: true });
+        ui.worker_event(done_event(3, Vec::new(), false));
         let failed =
             "not written: cannot write b.exr: no space; wrote an earlier image to cornell.png; wrote a.png";
-        assert_eq!(words(&ui.state), failed);
+        assert_eq!(summary_text(&ui.state), failed);
         ui.press('r');
-        ui.worker(Event::Started { generation: 4 });
-        ui.worker(Event::Written { generation: 4, path: "a.png".into(), bytes: 1, is_own: true });
-        ui.worker(done(4, Vec::new(), false));
+        ui.worker_event(Event::Started { generation: 4 });
+        ui.worker_event(Event::Written { generation: 4, path: "a.png".into(), bytes: 1, is_own: true });
+        ui.worker_event(done_event(4, Vec::new(), false));
         let made = "wrote cornell.png, a.png: 640×480, 64 samples, 1.93 s";
-        assert_eq!(words(&ui.state), made);
-        ui.fail(vec![diagnostic(Severity::Error, "wrong")]);
-        assert_eq!(words(&ui.state), format!("{made}; cornell.toml has errors since"));
+        assert_eq!(summary_text(&ui.state), made);
+        ui.fail_render(vec![diagnostic(Severity::Error, "wrong")]);
+        assert_eq!(summary_text(&ui.state), format!("{made}; cornell.toml has errors since"));
     }
 
     #[test]
     fn unsaved_changes_are_listed_as_options() {
         let mut ui = TestUi::new();
-        ui.finish([200, 30, 30]);
-        assert_eq!(not_kept(&ui.state), None);
+        ui.finish_render([200, 30, 30]);
+        assert_eq!(unsaved_as_options(&ui.state), None);
         for key in ['s', 'i', 'd', ']', '<', 'v'] {
             ui.press(key);
-            ui.finish([200, 30, 30]);
+            ui.finish_render([200, 30, 30]);
         }
         let options = "not kept: --integrator path --shadows hard --dof off --view normal \
                        --set render.exposure=0.25 --set camera.fov=38.1";
-        assert_eq!(not_kept(&ui.state).as_deref(), Some(options));
+        assert_eq!(unsaved_as_options(&ui.state).as_deref(), Some(options));
         ui.press('w');
         let generation = ui.state.request.generation;
-        ui.worker(Event::Written { generation, path: "a.png".into(), bytes: 1, is_own: false });
-        assert_eq!(not_kept(&ui.state), None, "the written image includes the changes");
+        ui.worker_event(Event::Written { generation, path: "a.png".into(), bytes: 1, is_own: false });
+        assert_eq!(unsaved_as_options(&ui.state), None, "the written image includes the changes");
         ui.key(crate::event::KeyPress::special(crossterm::event::KeyCode::Esc));
         ui.press('l');
-        ui.finish([200, 30, 30]);
-        let words = not_kept(&ui.state).expect("the camera moved");
+        ui.finish_render([200, 30, 30]);
+        let words = unsaved_as_options(&ui.state).expect("the camera moved");
         assert!(words.contains("--set 'camera.position=["), "{words}");
         ui.press('0');
-        assert_eq!(not_kept(&ui.state), None);
+        assert_eq!(unsaved_as_options(&ui.state), None);
     }
 
     #[test]
     fn orbited_camera_is_listed_as_options() {
         let text = "[camera]\norbiter = 'a.txt'\naperture = 0.1\n";
         let mut ui = TestUi::new();
-        ui.finish([200, 30, 30]);
+        ui.finish_render([200, 30, 30]);
         ui.state.request.text = Some(text.into());
         ui.state.request.camera.as_mut().expect("a camera").aperture = 0.1;
         ui.press('l');
         let moved = ui.state.request.viewpoint().expect("a camera");
-        let words = not_kept(&ui.state).expect("moved");
+        let words = unsaved_as_options(&ui.state).expect("moved");
         let sets = words.split("--set ").skip(1).map(|set| set.trim().replace('\'', ""));
         let sets: Vec<String> = sets.collect();
         let camera = crate::scene::Loaded::camera_of(text, &sets);
@@ -389,25 +394,25 @@ mod tests {
     fn revisiting_own_image_keeps_it_finished() {
         let made = "wrote cornell.png: 640×480, 64 samples, 1.93 s";
         let mut ui = TestUi::new();
-        ui.worker(Event::Started { generation: 1 });
-        ui.worker(Event::Written { generation: 1, path: "cornell.png".into(), bytes: 1, is_own: true });
-        ui.finish([200, 30, 30]);
+        ui.worker_event(Event::Started { generation: 1 });
+        ui.worker_event(Event::Written { generation: 1, path: "cornell.png".into(), bytes: 1, is_own: true });
+        ui.finish_render([200, 30, 30]);
         ui.press('s');
-        ui.finish([30, 200, 30]);
+        ui.finish_render([30, 200, 30]);
         // The next key is pressed before the request is done.
         ui.press('0');
-        ui.worker(Event::Started { generation: ui.state.request.generation });
-        assert_eq!(words(&ui.state), made);
+        ui.worker_event(Event::Started { generation: ui.state.request.generation });
+        assert_eq!(summary_text(&ui.state), made);
         ui.press(']');
-        assert_eq!(words(&ui.state), made);
+        assert_eq!(summary_text(&ui.state), made);
         // Samples for a new version of the image.
         ui.press('0');
         let generation = ui.state.request.generation;
-        ui.worker(Event::Started { generation });
-        ui.worker(Event::Progress { generation, progress: progress(0.2, None) });
-        assert_eq!(words(&ui.state), format!("{made}; {NEXT_RENDER} was stopped at 20 %"));
+        ui.worker_event(Event::Started { generation });
+        ui.worker_event(Event::Progress { generation, progress: render_progress(0.2, None) });
+        assert_eq!(summary_text(&ui.state), format!("{made}; {NEXT_RENDER} was stopped at 20 %"));
         ui.press(']');
-        assert_eq!(words(&ui.state), format!("{made}; {NEXT_RENDER} is not finished (20 %)"));
+        assert_eq!(summary_text(&ui.state), format!("{made}; {NEXT_RENDER} is not finished (20 %)"));
     }
 
     #[test]
@@ -415,39 +420,45 @@ mod tests {
         let mut ui = TestUi::new();
         let own = |ui: &mut TestUi, state| {
             let generation = ui.state.request.generation;
-            ui.worker(Event::OwnImage { generation, state });
+            ui.worker_event(Event::OwnImage { generation, state });
         };
-        ui.worker(Event::Started { generation: 1 });
-        let settings = Box::new(crate::fixtures::settings());
-        let (camera, own_settings) = (crate::fixtures::camera(), crate::fixtures::own());
-        ui.worker(Event::Settings { generation: 1, settings, camera, exposure: 0.0, own: own_settings });
-        ui.worker(Event::Progress { generation: 1, progress: progress(0.108, None) });
+        ui.worker_event(Event::Started { generation: 1 });
+        let settings = Box::new(crate::fixtures::effective_settings());
+        let (camera, own_settings) = (crate::fixtures::camera(), crate::fixtures::own_settings());
+        ui.worker_event(Event::Settings {
+            generation: 1,
+            settings,
+            camera,
+            exposure: 0.0,
+            own: own_settings,
+        });
+        ui.worker_event(Event::Progress { generation: 1, progress: render_progress(0.108, None) });
         ui.press('s');
-        own(&mut ui, OwnState::Begun { is_rendering: false });
-        ui.finish([200, 30, 30]);
-        assert_eq!(words(&ui.state), "cornell.png not finished (10 %)");
-        let said = crate::view::status_line::not_saved(&ui.state);
-        assert_eq!(said, [messages::NOT_SAVED.to_owned(), messages::own_unfinished("cornell.png", 10)]);
+        own(&mut ui, OwnImageState::Begun { is_rendering: false });
+        ui.finish_render([200, 30, 30]);
+        assert_eq!(summary_text(&ui.state), "cornell.png not finished (10 %)");
+        let said = crate::view::status_line::unsaved_messages(&ui.state);
+        assert_eq!(said, [messages::NOT_SAVED.to_owned(), messages::own_image_unfinished("cornell.png", 10)]);
         assert!(ui.text().contains(messages::NOT_SAVED), "{}", ui.text());
         // `w` writes the displayed image.
         ui.press('w');
         let generation = ui.state.request.generation;
-        ui.worker(Event::Written { generation, path: "cornell.png".into(), bytes: 1, is_own: false });
+        ui.worker_event(Event::Written { generation, path: "cornell.png".into(), bytes: 1, is_own: false });
         let made = "wrote cornell.png: 640×480, 64 samples, 1.93 s, with shadows hard";
-        assert_eq!(words(&ui.state), made);
+        assert_eq!(summary_text(&ui.state), made);
         assert!(ui.text().contains("→ cornell.png"), "{}", ui.text());
         // Back at the scene's own image, which has not been written yet.
         ui.press('0');
-        ui.worker(Event::Started { generation: ui.state.request.generation });
-        assert!(words(&ui.state).starts_with(&format!("{made}; {NEXT_RENDER}")));
+        ui.worker_event(Event::Started { generation: ui.state.request.generation });
+        assert!(summary_text(&ui.state).starts_with(&format!("{made}; {NEXT_RENDER}")));
         let generation = ui.state.request.generation;
-        ui.worker(Event::Written { generation, path: "cornell.png".into(), bytes: 1, is_own: true });
-        ui.finish([30, 200, 30]);
-        assert_eq!(words(&ui.state), "wrote cornell.png: 640×480, 64 samples, 1.93 s");
+        ui.worker_event(Event::Written { generation, path: "cornell.png".into(), bytes: 1, is_own: true });
+        ui.finish_render([30, 200, 30]);
+        assert_eq!(summary_text(&ui.state), "wrote cornell.png: 640×480, 64 samples, 1.93 s");
         ui.press('s');
-        own(&mut ui, OwnState::Written);
-        assert_eq!(words(&ui.state), "wrote cornell.png: 640×480, 64 samples, 1.93 s");
-        ui.event(crate::event::Event::Changed(Changed { noticed: ui.now }));
-        assert!(words(&ui.state).ends_with(OLDER_THAN_EDIT), "{}", words(&ui.state));
+        own(&mut ui, OwnImageState::Written);
+        assert_eq!(summary_text(&ui.state), "wrote cornell.png: 640×480, 64 samples, 1.93 s");
+        ui.handle_event(crate::event::Event::Changed(Changed { noticed: ui.now }));
+        assert!(summary_text(&ui.state).ends_with(OLDER_THAN_EDIT), "{}", summary_text(&ui.state));
     }
 }

@@ -4,7 +4,8 @@ use std::fmt::Write as _;
 use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
 
-/// The base directory for relative paths, and the host name, since the terminal may run on another machine.
+/// The base directory for relative paths, and the host name, which is needed because the terminal may run on
+/// another machine.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct FileUrls {
     folder: PathBuf,
@@ -20,7 +21,7 @@ impl FileUrls {
     }
 
     /// `file://host/path` (RFC 8089).
-    pub(super) fn address(&self, path: &Path) -> String {
+    pub(super) fn url(&self, path: &Path) -> String {
         let mut address = format!("file://{}", percent_encode(self.host.as_bytes()));
         address += &percent_encode(self.folder.join(path).as_os_str().as_bytes());
         address
@@ -51,8 +52,8 @@ mod tests {
     #[test]
     fn paths_become_file_urls() {
         let files = FileUrls { folder: "/home/ä".into(), host: "box".to_owned() };
-        assert_eq!(files.address(Path::new("a b;%.png")), "file://box/home/%C3%A4/a%20b%3B%25.png");
-        assert_eq!(files.address(Path::new("/tmp/x.png")), "file://box/tmp/x.png");
-        assert_eq!(files.address(Path::new("\u{1b}\u{7}")), "file://box/home/%C3%A4/%1B%07");
+        assert_eq!(files.url(Path::new("a b;%.png")), "file://box/home/%C3%A4/a%20b%3B%25.png");
+        assert_eq!(files.url(Path::new("/tmp/x.png")), "file://box/tmp/x.png");
+        assert_eq!(files.url(Path::new("\u{1b}\u{7}")), "file://box/home/%C3%A4/%1B%07");
     }
 }

@@ -10,7 +10,7 @@ use ratatui::layout::Rect;
 use super::color::{ColorDepth, XTERM};
 use super::event::{Effect, Event, KeyPress, Window};
 use super::preview_kind::PreviewKind;
-use super::state::{Setup, State};
+use super::state::{InitialState, State};
 use super::terminal_replies::TerminalQueries;
 use super::terminals::Capabilities;
 use super::update::{start, update};
@@ -21,7 +21,7 @@ use crate::pipeline::protocol::{
     self, AssetProgress, Command, Counters, Failure, ImageReport, RenderProgress, Report, Request,
     SampleCounts, Stage, StageReport, Status, Viewpoint,
 };
-use crate::pipeline::settings::{Effective, Overrides, OwnSettings, View};
+use crate::pipeline::settings::{AdjustableSettings, EffectiveSettings, Overrides, View};
 use crate::scene::description::{Accel, Integrator, Pose, Shadows};
 use crate::scene::diagnostic::{Diagnostic, Severity, SourceSpan};
 
@@ -42,7 +42,7 @@ pub(super) fn state_with(
     overrides: Overrides,
 ) -> State {
     let scene = PathBuf::from("scenes/cornell.toml");
-    let setup = Setup {
+    let setup = InitialState {
         scene,
         overrides,
         window: window(columns, rows),
@@ -57,7 +57,7 @@ pub(super) fn state_with(
     State::new(setup, Instant::now())
 }
 
-/// A user interface driven by a test rather than the event loop.
+/// A user interface driven by a test instead of the event loop.
 pub(super) struct TestUi {
     pub state: State,
     pub now: Instant,
@@ -76,57 +76,57 @@ impl TestUi {
     }
 
     /// Handles an event and returns its effects.
-    pub(super) fn event(&mut self, event: Event) -> Vec<Effect> {
+    pub(super) fn handle_event(&mut self, event: Event) -> Vec<Effect> {
         update(&mut self.state, event, self.now)
     }
 
-    pub(super) fn worker(&mut self, event: protocol::Event) -> Vec<Effect> {
-        self.event(Event::Worker(event))
+    pub(super) fn worker_event(&mut self, event: protocol::Event) -> Vec<Effect> {
+        self.handle_event(Event::Worker(event))
     }
 
     pub(super) fn key(&mut self, key: KeyPress) -> Vec<Effect> {
-        self.event(Event::Key(key))
+        self.handle_event(Event::Key(key))
     }
 
     pub(super) fn press(&mut self, character: char) -> Vec<Effect> {
         self.key(KeyPress::plain(character))
     }
 
-    pub(super) fn wait(&mut self, milliseconds: u64) -> Vec<Effect> {
+    pub(super) fn advance_clock(&mut self, milliseconds: u64) -> Vec<Effect> {
         self.now += Duration::from_millis(milliseconds);
-        self.event(Event::Tick)
+        self.handle_event(Event::Tick)
     }
 
     /// Simulates a complete render of a uniform image.
-    pub(super) fn finish(&mut self, color: [u8; 3]) {
+    pub(super) fn finish_render(&mut self, color: [u8; 3]) {
         let generation = self.state.request.generation;
-        self.worker(protocol::Event::Started { generation });
-        self.worker(protocol::Event::Settings {
+        self.worker_event(protocol::Event::Started { generation });
+        self.worker_event(protocol::Event::Settings {
             generation,
-            settings: Box::new(settings()),
+            settings: Box::new(effective_settings()),
             camera: camera(),
             exposure: 0.0,
-            own: own(),
+            own: own_settings(),
         });
-        self.event(Event::Picture {
+        self.handle_event(Event::Picture {
             generation,
-            picture: plain_picture(50, 38, color),
+            picture: uniform_picture(50, 38, color),
             range: None,
             section: None,
             lacks_photons: false,
             source: None,
         });
-        self.worker(done(generation, Vec::new(), false));
+        self.worker_event(done_event(generation, Vec::new(), false));
     }
 
-    pub(super) fn fail(&mut self, diagnostics: Vec<Diagnostic>) {
+    pub(super) fn fail_render(&mut self, diagnostics: Vec<Diagnostic>) {
         let generation = self.state.request.generation;
-        self.worker(protocol::Event::Started { generation });
-        self.worker(protocol::Event::Failed { generation, failure: Failure::Scene(diagnostics) });
+        self.worker_event(protocol::Event::Started { generation });
+        self.worker_event(protocol::Event::Failed { generation, failure: Failure::Scene(diagnostics) });
     }
 
     /// Draws the screen.
-    pub(super) fn screen(&mut self) -> Buffer {
+    pub(super) fn draw_screen(&mut self) -> Buffer {
         self.state.dirty = false;
         let mut buffer =
             Buffer::empty(Rect::new(0, 0, self.state.display.window.columns, self.state.display.window.rows));
@@ -134,13 +134,13 @@ impl TestUi {
         buffer
     }
 
-    /// The text on the screen, without half blocks and with runs of spaces collapsed.
-    pub(super) fn words(&mut self) -> String {
+    /// The text on the screen. Half blocks are removed and runs of spaces are collapsed.
+    pub(super) fn screen_words(&mut self) -> String {
         self.text().replace('▀', " ").split_whitespace().collect::<Vec<_>>().join(" ")
     }
 
     pub(super) fn text(&mut self) -> String {
-        text(&self.screen())
+        text(&self.draw_screen())
     }
 }
 
@@ -159,12 +159,12 @@ pub(super) fn request(effects: &[Effect]) -> Option<&Request> {
     })
 }
 
-pub(super) fn plain_picture(width: u32, height: u32, color: [u8; 3]) -> Arc<Picture> {
+pub(super) fn uniform_picture(width: u32, height: u32, color: [u8; 3]) -> Arc<Picture> {
     Arc::new(Picture { width, height, pixels: vec![color; width as usize * height as usize] })
 }
 
-pub(super) fn settings() -> Effective {
-    Effective {
+pub(super) fn effective_settings() -> EffectiveSettings {
+    EffectiveSettings {
         width: 640,
         height: 480,
         error: 0.0,
@@ -184,8 +184,8 @@ pub(super) fn settings() -> Effective {
 }
 
 /// The scene file's settings.
-pub(super) fn own() -> OwnSettings {
-    OwnSettings { integrator: Integrator::Whitted, shadows: Shadows::Soft, photons: false }
+pub(super) fn own_settings() -> AdjustableSettings {
+    AdjustableSettings { integrator: Integrator::Whitted, shadows: Shadows::Soft, photons: false }
 }
 
 /// A camera at (0, 1, 4) that looks along −z at a point 4 units away.
@@ -194,15 +194,15 @@ pub(super) fn camera() -> Viewpoint {
     Viewpoint { pose, fov: 40.0, aperture: 0.1, focus: 4.0 }
 }
 
-pub(super) fn stage(name: Stage, status: Status, seconds: f64, why: &str) -> StageReport {
+pub(super) fn stage_report(name: Stage, status: Status, seconds: f64, why: &str) -> StageReport {
     StageReport { name, status, seconds, processor_seconds: seconds, why: why.to_owned() }
 }
 
-pub(super) fn asset(name: &str, done: u64, total: u64) -> AssetProgress {
+pub(super) fn asset_progress(name: &str, done: u64, total: u64) -> AssetProgress {
     AssetProgress { name: name.to_owned(), done, total }
 }
 
-pub(super) fn progress(fraction: f64, eta_seconds: Option<f64>) -> RenderProgress {
+pub(super) fn render_progress(fraction: f64, eta_seconds: Option<f64>) -> RenderProgress {
     let samples = (fraction * 64.0) as u32;
     RenderProgress {
         fraction,
@@ -217,7 +217,7 @@ pub(super) fn progress(fraction: f64, eta_seconds: Option<f64>) -> RenderProgres
     }
 }
 
-pub(super) fn done(generation: u64, warnings: Vec<Diagnostic>, unchanged: bool) -> protocol::Event {
+pub(super) fn done_event(generation: u64, warnings: Vec<Diagnostic>, unchanged: bool) -> protocol::Event {
     let image = ImageReport {
         path: Some("cornell.png".to_owned()),
         paths: vec!["cornell.png".to_owned()],
@@ -234,7 +234,7 @@ pub(super) fn done(generation: u64, warnings: Vec<Diagnostic>, unchanged: bool) 
         glimt: "0.1.0",
         scene: "scenes/cornell.toml".to_owned(),
         image,
-        settings: settings(),
+        settings: effective_settings(),
         lights: protocol::LightsReport {
             count: 1,
             sampled: protocol::LightsSampled::All,
@@ -242,7 +242,7 @@ pub(super) fn done(generation: u64, warnings: Vec<Diagnostic>, unchanged: bool) 
             tree_nodes: 0,
             memory_bytes: 0,
         },
-        stages: Stage::ALL.iter().map(|name| stage(*name, Status::Done, 0.25, "")).collect(),
+        stages: Stage::ALL.iter().map(|name| stage_report(*name, Status::Done, 0.25, "")).collect(),
         counters: Counters::default(),
         seconds: 1.93,
         peak_memory_bytes: 0,

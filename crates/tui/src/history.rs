@@ -13,7 +13,7 @@ use crate::state::ImageOrigin;
 
 /// Memory limit for all images and scene texts, in bytes.
 const MAX_BYTES: usize = 16 << 20;
-/// Maximum width and height of a thumbnail: the finest resolution that octants can show.
+/// Maximum width and height of a thumbnail, which octants can just resolve.
 const SMALL: f32 = 32.0;
 
 /// An image and the request it shows.
@@ -23,7 +23,7 @@ pub(crate) struct ShownImage {
     pub picture: Arc<Picture>,
     /// Range of values shown, if the view maps values to colors.
     pub range: Option<[f32; 2]>,
-    /// The image section shown pixel by pixel. `None` if the whole image is shown.
+    /// The image section that is shown at actual pixels. `None` if the whole image is shown.
     pub section: Option<Section>,
     /// Whether light from photons that are still being traced is missing.
     pub lacks_photons: bool,
@@ -76,17 +76,17 @@ struct HistoryEntry {
 
 impl History {
     /// Records a scene edit. New entries include the edit once the scene has been read.
-    pub(super) fn edited(&mut self) {
+    pub(super) fn record_edit(&mut self) {
         self.edits += 1;
     }
 
     /// Records that the scene was read. New entries include the last edit.
-    pub(super) fn read(&mut self) {
+    pub(super) fn record_scene_read(&mut self) {
         self.read_edits = self.edits;
     }
 
     /// Records that the scene turned out to be invalid. New entries still show the previous version.
-    pub(super) fn broken(&mut self) {
+    pub(super) fn record_invalid_scene(&mut self) {
         self.read_edits = self.past.back().map_or(self.read_edits, |newest| newest.edits);
     }
 
@@ -106,12 +106,12 @@ impl History {
             Some(changes) if changes.is_empty() => messages::AGAIN.to_owned(),
             Some(changes) => changes.join("; "),
         };
-        past.marked(words)
+        past.marked_if_stopped(words)
     }
 
     /// Records that the camera moved with keys since request `since` has been written to the scene. This
     /// counts as an edit that is included in all entries since then.
-    pub(super) fn kept_camera(&mut self, since: u64) {
+    pub(super) fn record_saved_camera(&mut self, since: u64) {
         self.edits += 1;
         self.read_edits = self.edits;
         for past in self.past.iter_mut().filter(|past| past.shown.generation >= since) {
@@ -131,7 +131,8 @@ impl History {
     pub(super) fn record(&mut self, shown: ShownImage, time: Instant, origin: ImageOrigin) {
         let known = self.past.iter().position(|past| past.shown.generation == shown.generation);
         let last = self.past.len().checked_sub(1);
-        let is_last = |last: &usize| self.past.get(*last).is_some_and(|past| past.is_same(&shown, &origin));
+        let is_last =
+            |last: &usize| self.past.get(*last).is_some_and(|past| past.is_same_image(&shown, &origin));
         match known.or_else(|| last.filter(is_last)) {
             Some(at) => {
                 let past = &self.past[at];
@@ -149,7 +150,7 @@ impl History {
                 let edits = self.read_edits;
                 let (run, changes, small) = (None, None, OnceCell::new());
                 self.past.push_back(HistoryEntry { shown, time, edits, origin, run, changes, small });
-                self.compare(self.past.len() - 1);
+                self.compare_with_previous(self.past.len() - 1);
             }
         }
         while self.past.len() > 1 && self.bytes() > MAX_BYTES {
@@ -170,8 +171,8 @@ impl History {
         let is_other = past.origin != origin;
         (past.shown, past.origin) = (shown, origin);
         if is_other {
-            self.compare(at);
-            self.compare(at + 1);
+            self.compare_with_previous(at);
+            self.compare_with_previous(at + 1);
         }
     }
 
@@ -180,7 +181,7 @@ impl History {
         let Some(before) = at.checked_sub(1) else { return };
         let is_open = self.open.as_ref().is_some_and(|(open, _)| *open == before);
         let Some((earlier, past)) = self.past.get(before).zip(self.past.get(at)) else { return };
-        if is_open || past.origin.is_unfinished || !earlier.is_same(&past.shown, &past.origin) {
+        if is_open || past.origin.is_unfinished || !earlier.is_same_image(&past.shown, &past.origin) {
             return;
         }
         let (edits, run) = (earlier.edits, past.run.or(earlier.run));
@@ -196,7 +197,7 @@ impl History {
         {
             past.changes = None;
         }
-        self.compare(before);
+        self.compare_with_previous(before);
     }
 
     fn remove(&mut self, at: usize) {
@@ -217,7 +218,7 @@ impl History {
     }
 
     /// Records that a render has finished the newest entry.
-    pub(super) fn finish(&mut self, run: u64) {
+    pub(super) fn finish_newest(&mut self, run: u64) {
         if let Some(newest) = self.past.back_mut() {
             newest.run = Some(run);
         }
@@ -229,7 +230,7 @@ impl History {
     }
 
     /// Whether the newest entry is unfinished.
-    pub(super) fn awaits_run(&self) -> bool {
+    pub(super) fn is_newest_unfinished(&self) -> bool {
         self.past.back().is_some_and(|newest| newest.run.is_none())
     }
 
@@ -247,7 +248,7 @@ impl History {
     }
 
     /// Compares an entry's scene and settings with those of the previous entry.
-    fn compare(&mut self, at: usize) {
+    fn compare_with_previous(&mut self, at: usize) {
         let before = at.checked_sub(1).and_then(|before| self.past.get(before));
         let Some((before, past)) = before.zip(self.past.get(at)) else { return };
         let edits = past.origin.edits(&before.origin);
@@ -266,30 +267,30 @@ impl History {
     }
 
     /// Whether the oldest render is being viewed.
-    pub(super) fn is_oldest_open(&self) -> bool {
+    pub(super) fn is_oldest_shown(&self) -> bool {
         self.open.as_ref().is_some_and(|(at, _)| *at == 0)
     }
 
     /// Whether an older render is being viewed.
-    pub(super) fn is_open(&self) -> bool {
+    pub(super) fn is_older_open(&self) -> bool {
         self.open.is_some()
     }
 
     /// The newest image, if an older one is being viewed.
-    pub(super) fn newest(&self) -> Option<ShownImage> {
+    pub(super) fn newest_behind_open(&self) -> Option<ShownImage> {
         self.open.as_ref().map(|(_, newest)| newest.clone())
     }
 
     /// Stores a new image. Returns whether it stays hidden because an older one is being viewed.
-    pub(super) fn hides_newer(&mut self, shown: &ShownImage) -> bool {
+    pub(super) fn store_behind_open(&mut self, shown: &ShownImage) -> bool {
         if let Some((_, newest)) = &mut self.open {
             *newest = shown.clone();
         }
-        self.is_open()
+        self.is_older_open()
     }
 
     /// Moves back by `back` entries, or forward if `back` is negative.
-    pub(super) fn step(&mut self, back: isize, newest: ShownImage) -> Option<ShownImage> {
+    pub(super) fn step_back(&mut self, back: isize, newest: ShownImage) -> Option<ShownImage> {
         let at = self.open.as_ref().map_or(self.past.len().checked_sub(1)?, |(at, _)| *at);
         let next = at.checked_add_signed(-back).filter(|next| *next < self.past.len())?;
         self.show_entry(next, newest)
@@ -301,7 +302,7 @@ impl History {
         place.is_some_and(|place| place + 1 >= self.past.len())
     }
 
-    /// Opens the last render that precedes the last edit to change the image.
+    /// Opens the last render from before the last edit that changed the image.
     pub(super) fn open_before_edit(&mut self, newest: ShownImage) -> Option<ShownImage> {
         let last = self.past.back()?.edits;
         let at = self.past.iter().rposition(|past| past.edits < last)?;
@@ -330,7 +331,7 @@ impl History {
     }
 
     /// Whether an entry belongs to this request.
-    pub(super) fn is_of(&self, at: usize, generation: u64) -> bool {
+    pub(super) fn belongs_to_request(&self, at: usize, generation: u64) -> bool {
         self.past.get(at).is_some_and(|past| past.shown.generation == generation)
     }
 
@@ -364,15 +365,15 @@ impl History {
     }
 
     /// Render number of the older entry being viewed, and the time when its image last improved.
-    pub(super) fn place(&self) -> Option<(Option<u64>, Instant)> {
+    pub(super) fn run_and_time_of_open(&self) -> Option<(Option<u64>, Instant)> {
         let (at, _) = self.open.as_ref()?;
         self.past.get(*at).map(|past| (past.run, past.time))
     }
 }
 
 impl HistoryEntry {
-    /// Whether the other image is the same. An image in progress differs from its finished version.
-    fn is_same(&self, shown: &ShownImage, origin: &ImageOrigin) -> bool {
+    /// Whether the entry shows the same image. An image in progress differs from its finished version.
+    fn is_same_image(&self, shown: &ShownImage, origin: &ImageOrigin) -> bool {
         let is_of_image =
             self.shown.shows_same_image(shown) && (self.origin.is_unfinished || !origin.is_unfinished);
         // An unfinished image may look the same at first and change later.
@@ -380,8 +381,8 @@ impl HistoryEntry {
         is_of_image || self.shown.picture == shown.picture && !may_change
     }
 
-    /// Marks `words` if the render was stopped.
-    fn marked(&self, words: String) -> String {
+    /// Adds a mark to `words` if the render was stopped.
+    fn marked_if_stopped(&self, words: String) -> String {
         if self.origin.is_unfinished { format!("{}: {words}", messages::STOPPED) } else { words }
     }
 
@@ -409,16 +410,16 @@ pub(super) fn age_in_words(time: Duration) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fixtures::plain_picture;
+    use crate::fixtures::uniform_picture;
     use crate::pipeline::settings::{CameraChange, View};
     use crate::pipeline::{Content, FileRead};
     use crate::scene::fingerprint::Fingerprint;
-    use crate::state::Toggles;
+    use crate::state::KeyOverrides;
 
     fn shown_image(generation: u64, side: u32) -> ShownImage {
         ShownImage {
             generation,
-            picture: plain_picture(side, side, [1, 2, 3]),
+            picture: uniform_picture(side, side, [1, 2, 3]),
             range: None,
             section: None,
             lacks_photons: false,
@@ -430,7 +431,7 @@ mod tests {
     fn oldest_entries_are_dropped_at_the_limit() {
         let mut history = History::default();
         for generation in 0..10 {
-            let picture = plain_picture(1000, 1000, [generation as u8, 0, 0]);
+            let picture = uniform_picture(1000, 1000, [generation as u8, 0, 0]);
             history.record(
                 ShownImage { picture, ..shown_image(generation, 1) },
                 Instant::now(),
@@ -447,7 +448,7 @@ mod tests {
         let mut history = History::default();
         let shared: Arc<str> = "x".repeat(3 << 20).into();
         let mut record = |generation: u64, text: Arc<str>| {
-            let picture = plain_picture(1, 1, [generation as u8, 0, 0]);
+            let picture = uniform_picture(1, 1, [generation as u8, 0, 0]);
             let origin = ImageOrigin { text: Some(text), ..ImageOrigin::default() };
             history.record(ShownImage { picture, ..shown_image(generation, 1) }, Instant::now(), origin);
             history.past.len()
@@ -462,13 +463,13 @@ mod tests {
     fn equal_images_share_an_entry() {
         let mut history = History::default();
         for generation in 0..3 {
-            history.edited();
+            history.record_edit();
             history.record(shown_image(generation, 10), Instant::now(), ImageOrigin::default());
         }
         assert_eq!((history.past.len(), history.past[0].shown.generation), (1, 2));
     }
 
-    /// A render that resumes from an image initially shows the same image.
+    /// A render that resumes from an image shows that image at first.
     #[test]
     fn unfinished_image_is_a_separate_entry() {
         let unfinished = ImageOrigin { is_unfinished: true, ..ImageOrigin::default() };
@@ -479,7 +480,7 @@ mod tests {
             history.past.iter().map(|past| past.shown.generation).collect()
         };
         assert_eq!(generations(&history), [1, 2]);
-        let better = ShownImage { picture: plain_picture(10, 10, [1, 2, 4]), ..shown_image(2, 10) };
+        let better = ShownImage { picture: uniform_picture(10, 10, [1, 2, 4]), ..shown_image(2, 10) };
         history.record(better, Instant::now(), unfinished);
         assert_eq!(generations(&history), [1, 2]);
         // The finished image may be identical.
@@ -493,14 +494,14 @@ mod tests {
         history.record(shown_image(1, 10), Instant::now(), ImageOrigin::default());
         edit(&mut history);
         history.record(shown_image(2, 20), Instant::now(), ImageOrigin::default());
-        // The scene is broken and then fixed.
+        // Break the scene, then fix it.
         edit(&mut history);
-        history.broken();
+        history.record_invalid_scene();
         edit(&mut history);
         history.record(shown_image(4, 20), Instant::now(), ImageOrigin::default());
         let before = history.open_before_edit(shown_image(4, 20)).expect("a picture");
         assert_eq!(before.generation, 1);
-        // Images changed with keys include the last edit.
+        // Images rendered after a key press include the last edit.
         history.close();
         history.record(shown_image(5, 30), Instant::now(), ImageOrigin::default());
         let before = history.open_before_edit(shown_image(5, 30)).expect("a picture");
@@ -513,8 +514,8 @@ mod tests {
         history.record(shown_image(1, 10), Instant::now(), ImageOrigin::default());
         edit(&mut history);
         history.record(shown_image(2, 20), Instant::now(), ImageOrigin::default());
-        history.edited();
-        history.broken();
+        history.record_edit();
+        history.record_invalid_scene();
         history.record(shown_image(3, 30), Instant::now(), ImageOrigin::default());
         assert_eq!(history.open_before_edit(shown_image(3, 30)).expect("a picture").generation, 1);
     }
@@ -523,7 +524,7 @@ mod tests {
     fn of_image(generation: u64, name: &str, is_finished: bool) -> (ShownImage, ImageOrigin) {
         let source = Some(PreviewSource { image: Fingerprint::new(name).finish(), is_finished });
         // Make every preview different.
-        let picture = plain_picture(10, 10, [generation as u8, u8::from(is_finished), 0]);
+        let picture = uniform_picture(10, 10, [generation as u8, u8::from(is_finished), 0]);
         let origin = ImageOrigin { is_unfinished: !is_finished, ..ImageOrigin::default() };
         (ShownImage { source, picture, ..shown_image(generation, 10) }, origin)
     }
@@ -561,21 +562,21 @@ mod tests {
         for (generation, run) in [(1, Some(1)), (2, None), (3, Some(2))] {
             let (shown, origin) = of_image(generation, &generation.to_string(), run.is_some());
             history.record(shown, Instant::now(), origin);
-            assert!(history.is_newest(generation) && history.awaits_run());
-            run.into_iter().for_each(|run| history.finish(run));
+            assert!(history.is_newest(generation) && history.is_newest_unfinished());
+            run.into_iter().for_each(|run| history.finish_newest(run));
         }
         assert_eq!([0, 1, 2].map(|at| history.run(at)), [Some(1), None, Some(2)]);
         // A later request produces the same image.
         let (shown, origin) = of_image(4, "3", true);
         history.record(shown, Instant::now(), origin);
-        assert!(!history.awaits_run());
-        history.finish(5);
+        assert!(!history.is_newest_unfinished());
+        history.finish_newest(5);
         assert_eq!((history.len(), history.run(2)), (3, Some(5)));
     }
 
     fn edit(history: &mut History) {
-        history.edited();
-        history.read();
+        history.record_edit();
+        history.record_scene_read();
     }
 
     #[test]
@@ -584,7 +585,7 @@ mod tests {
         history.record(shown_image(1, 10), Instant::now(), ImageOrigin::default());
         history.record(shown_image(2, 20), Instant::now(), ImageOrigin::default());
         history.record(shown_image(3, 30), Instant::now(), ImageOrigin::default());
-        history.kept_camera(2);
+        history.record_saved_camera(2);
         let before = history.open_before_edit(shown_image(3, 30)).expect("a picture");
         assert_eq!(before.generation, 1, "the image before the camera moved");
     }
@@ -599,7 +600,7 @@ mod tests {
 
     /// A scene with this text and view.
     fn origin(text: &str, view: Option<View>) -> ImageOrigin {
-        let toggles = Toggles { view, ..Toggles::default() };
+        let toggles = KeyOverrides { view, ..KeyOverrides::default() };
         ImageOrigin { toggles, text: Some(text.into()), ..ImageOrigin::default() }
     }
 
@@ -614,11 +615,11 @@ mod tests {
         let seed = "camera.fov = 30\nseed = 1";
         history.record(shown_image(1, 10), Instant::now(), origin(wide, None));
         // Two saves. Only the second could be read.
-        history.edited();
-        history.edited();
+        history.record_edit();
+        history.record_edit();
         history.record(shown_image(2, 20), Instant::now(), origin(narrow, None));
         history.record(shown_image(3, 30), Instant::now(), origin(narrow, Some(View::Normal)));
-        history.edited();
+        history.record_edit();
         history.record(shown_image(4, 40), Instant::now(), origin(seed, None));
         history.record(shown_image(5, 50), Instant::now(), origin(seed, None));
         assert_eq!(
@@ -638,7 +639,7 @@ mod tests {
     fn saved_camera_is_listed_once() {
         let mut history = History::default();
         let camera = CameraChange { fov: Some(30.0), ..CameraChange::default() };
-        let moved = Toggles { camera, ..Toggles::default() };
+        let moved = KeyOverrides { camera, ..KeyOverrides::default() };
         history.record(shown_image(1, 10), Instant::now(), origin("camera.fov = 40", None));
         let before = ImageOrigin { toggles: moved, ..origin("camera.fov = 40", None) };
         history.record(shown_image(2, 20), Instant::now(), before.clone());
@@ -660,7 +661,7 @@ mod tests {
         let mut history = History::default();
         let record = |history: &mut History, generation, name, is_finished, text: &str, photons| {
             let (shown, origin) = of_image(generation, name, is_finished);
-            let toggles = Toggles { photons, ..Toggles::default() };
+            let toggles = KeyOverrides { photons, ..KeyOverrides::default() };
             history.record(shown, Instant::now(), ImageOrigin { toggles, text: Some(text.into()), ..origin });
         };
         let (first, second) = ("render.samples = 64", "render.samples = 16");
@@ -684,7 +685,7 @@ mod tests {
         let camera = CameraChange { fov: Some(30.0), ..CameraChange::default() };
         let text = "render.samples = 8\nradius = 1\ncamera.fov = 30";
         let (shown, origin) = of_image(7, "fov", true);
-        let moved = Toggles { camera, photons: Some(true), ..Toggles::default() };
+        let moved = KeyOverrides { camera, photons: Some(true), ..KeyOverrides::default() };
         let before = "render.samples = 8\nradius = 1";
         history.record(
             shown,
@@ -700,7 +701,7 @@ mod tests {
     fn entry_keeps_its_original_changes() {
         let mut history = History::default();
         let mut generation = 0;
-        let mut record = |history: &mut History, name: &str, toggles: Toggles, text: &str| {
+        let mut record = |history: &mut History, name: &str, toggles: KeyOverrides, text: &str| {
             generation += 1;
             // Record the image in progress, when it is finished, and once more.
             for _ in 0..3 {
@@ -714,7 +715,7 @@ mod tests {
             edit(history);
             changes(history)
         };
-        let keys = Toggles::default();
+        let keys = KeyOverrides::default();
         record(&mut history, "narrow", keys, "camera.fov = 40");
         record(&mut history, "wide", keys, "camera.fov = 44");
         let words = [messages::OPENED, "camera.fov 40 → 44"];
@@ -725,7 +726,7 @@ mod tests {
         // A camera moved with keys is listed as such unless it has been saved to the scene.
         let mut history = History::default();
         let camera = CameraChange { fov: Some(30.0), ..CameraChange::default() };
-        let moved = Toggles { camera, ..Toggles::default() };
+        let moved = KeyOverrides { camera, ..KeyOverrides::default() };
         record(&mut history, "own", keys, "camera.fov = 44");
         for (toggles, text, words) in [
             (moved, "camera.fov = 44", "camera moved"),
@@ -758,7 +759,7 @@ mod tests {
         history.record(shown_image(1, 1000), Instant::now(), ImageOrigin::default());
         let size = |history: &History| history.thumbnail(0).map(|small| (small.width, small.pixels[0]));
         assert_eq!(size(&history), Some((32, [1, 2, 3])));
-        let picture = plain_picture(10, 10, [9, 8, 7]);
+        let picture = uniform_picture(10, 10, [9, 8, 7]);
         history.record(ShownImage { picture, ..shown_image(1, 1) }, Instant::now(), ImageOrigin::default());
         assert_eq!(size(&history), Some((10, [9, 8, 7])));
     }

@@ -178,13 +178,13 @@ pub(super) const OVERLAY: &[Binding<OverlayAction>] = &[
 ];
 
 /// The overlay action for a key.
-pub(super) fn overlay(key: KeyPress) -> Option<OverlayAction> {
+pub(super) fn overlay_action_for(key: KeyPress) -> Option<OverlayAction> {
     OVERLAY.iter().find(|binding| binding.keys.contains(&key)).map(|binding| binding.action)
 }
 
 /// The action for a key. Terminals differ in whether they report shift with a capital letter or `?`, so shift
 /// is ignored for characters.
-pub(super) fn action(key: KeyPress) -> Option<Action> {
+pub(super) fn action_for(key: KeyPress) -> Option<Action> {
     let modifiers = match key.code {
         KeyCode::Char(_) => key.modifiers - KeyModifiers::SHIFT,
         _ => key.modifiers,
@@ -194,7 +194,7 @@ pub(super) fn action(key: KeyPress) -> Option<Action> {
 }
 
 /// The table row for an action. Every action has one.
-pub(super) fn of(action: Action) -> Option<&'static Binding> {
+pub(super) fn binding_of(action: Action) -> Option<&'static Binding> {
     KEYMAP.iter().find(|binding| binding.action == action)
 }
 
@@ -216,16 +216,16 @@ mod tests {
     #[test]
     fn shift_is_ignored_for_characters() {
         let shifted = KeyPress { code: KeyCode::Char('?'), modifiers: KeyModifiers::SHIFT };
-        assert_eq!(action(shifted), Some(Action::ToggleHelp));
-        assert_eq!(action(KeyPress::plain('V')), Some(Action::PreviousView));
-        assert_eq!(action(KeyPress::ctrl('q')), None);
-        assert_eq!(action(KeyPress::plain('g')), None);
+        assert_eq!(action_for(shifted), Some(Action::ToggleHelp));
+        assert_eq!(action_for(KeyPress::plain('V')), Some(Action::PreviousView));
+        assert_eq!(action_for(KeyPress::ctrl('q')), None);
+        assert_eq!(action_for(KeyPress::plain('g')), None);
     }
 
     #[test]
     fn documented_keys_are_bound() {
         for key in "?qsdpiv rw0hjkl+-<>[]fcombnNxzeuy".chars() {
-            assert!(action(KeyPress::plain(key)).is_some(), "{key:?}");
+            assert!(action_for(KeyPress::plain(key)).is_some(), "{key:?}");
         }
     }
 }

@@ -61,5 +61,5 @@ pub use options::{Changed, ExitStatus, News, Options, PreviewChoice, TuiError, T
 pub use probe::{Probe, ProbeReplies, probe};
 pub use run::run;
 pub use static_image::{NamedImage, images_as_text};
-pub use view::preview::shown;
+pub use view::preview::draw_for_dark_xterm;
 pub use view::text::wrapped;

@@ -8,7 +8,9 @@ use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use super::fixtures::{asset, camera, diagnostic, done, own, settings, stage};
+use super::fixtures::{
+    asset_progress, camera, diagnostic, done_event, effective_settings, own_settings, stage_report,
+};
 use super::{Changed, ColorChoice, News, Options, PreviewChoice, run};
 use crate::film::Picture;
 use crate::pipeline::protocol::{
@@ -96,18 +98,18 @@ fn simulate_render(
         say(Event::Failed { generation, failure });
         return None;
     }
-    say(Event::Stage { generation, stage: stage(Stage::Parse, Status::Done, 0.0003, "") });
+    say(Event::Stage { generation, stage: stage_report(Stage::Parse, Status::Done, 0.0003, "") });
     say(Event::Settings {
         generation,
-        settings: Box::new(settings()),
+        settings: Box::new(effective_settings()),
         camera: camera(),
         exposure: 0.0,
-        own: own(),
+        own: own_settings(),
     });
-    say(Event::Stage { generation, stage: stage(Stage::Textures, Status::Running, 0.0, "") });
+    say(Event::Stage { generation, stage: stage_report(Stage::Textures, Status::Running, 0.0, "") });
     let start = Instant::now();
     for step in 0..=20_u32 {
-        say(Event::Asset { generation, progress: asset("bricks", u64::from(step.min(10)), 10) });
+        say(Event::Asset { generation, progress: asset_progress("bricks", u64::from(step.min(10)), 10) });
         if let Some(size) = request.preview {
             let height = (size.width * 3 / 4).min(size.height).max(1);
             let picture = Arc::new(pretty(height * 4 / 3, height, step + text.len() as u32 * 20));
@@ -138,7 +140,7 @@ fn simulate_render(
         }
     }
     say(Event::Written { generation, path: "cornell.png".into(), bytes: 210_400, is_own: true });
-    say(done(generation, vec![diagnostic(Severity::Warning, "texture `b` is not used")], false));
+    say(done_event(generation, vec![diagnostic(Severity::Warning, "texture `b` is not used")], false));
     None
 }
 

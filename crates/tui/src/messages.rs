@@ -37,7 +37,7 @@ pub fn exposure_limit(stops: &str) -> String {
 }
 
 /// Shown when the exposure was changed with keys.
-pub fn exposure(stops: &str) -> String {
+pub fn exposure_changed(stops: &str) -> String {
     format!("exposure {stops}")
 }
 
@@ -57,17 +57,17 @@ pub fn camera_overridden(file: &str) -> String {
 }
 
 /// Shown when `c` was pressed but the scene file already contains this camera.
-pub fn camera_known(file: &str) -> String {
+pub fn camera_already_in_scene(file: &str) -> String {
     format!("{file} already has this camera")
 }
 
 /// Shown when `c` wrote a scene file for a model.
-pub fn model_scene(file: &str) -> String {
+pub fn model_scene_written(file: &str) -> String {
     format!("wrote {file}, a scene of this model with this camera")
 }
 
 /// Shown when `u` undid the last `c`.
-pub fn undone(file: &str) -> String {
+pub fn camera_undone(file: &str) -> String {
     format!("undone: {file} restored")
 }
 
@@ -101,24 +101,24 @@ pub fn unnumbered_render(state: &str) -> String {
 pub const OLDER: &str = "older";
 
 /// Position of the displayed render among the finished ones.
-pub fn render_of(number: u64, count: u64) -> String {
+pub fn render_position(number: u64, count: u64) -> String {
     format!("render {number} of {count}")
 }
 
 /// Label for the number of stages that were not run again.
 pub const CACHED: &str = "cached";
 /// Number of stages that were not run again, in words.
-pub fn cached(stages: &str) -> String {
+pub fn cached_stages(stages: &str) -> String {
     format!("{stages} {CACHED}")
 }
 
 /// Time between saving the file and drawing the first changed cell.
-pub fn on_screen(time: &str) -> String {
+pub fn save_to_screen_time(time: &str) -> String {
     format!("on screen after {time}")
 }
 
 /// Number of the finished render being shown.
-pub fn render(number: impl Display) -> String {
+pub fn render_number(number: impl Display) -> String {
     format!("render {number}")
 }
 
@@ -126,7 +126,7 @@ pub fn render(number: impl Display) -> String {
 pub const STOPPED: &str = "stopped";
 /// Listed as the change of the first render.
 pub const OPENED: &str = "opened";
-/// Listed as the change of a render that differs from the previous one only in noise.
+/// Listed as the change if a render differs from the previous one only in noise.
 pub const AGAIN: &str = "rendered again";
 
 /// Shown when depth of field was requested for a camera without a lens.
@@ -172,7 +172,7 @@ pub const WRITING: &str = "writing the current image";
 /// Shown when `w` was pressed while an older render was displayed.
 pub const WRITING_NEWEST: &str = "writing the newest image, not the one shown";
 /// Shown when `w` has written these files.
-pub fn wrote(files: &str) -> String {
+pub fn files_written(files: &str) -> String {
     format!("wrote {files}")
 }
 
@@ -194,21 +194,21 @@ pub const WRITE_POSTPONED: &str = "the image will be written when every pixel ha
 pub const RESUMING: &str = "resuming from";
 
 /// Shown when the integrator supports only soft shadows.
-pub fn soft_shadows(integrator: &str, other: &str) -> String {
+pub fn only_soft_shadows(integrator: &str, other: &str) -> String {
     format!("{integrator} always has soft shadows (i: {other})")
 }
 
 /// Shown when the integrator does not use photons.
-pub fn no_photons(other: &str) -> String {
+pub fn photons_unsupported(other: &str) -> String {
     format!("photons work with {other} only (i switches)")
 }
 
 /// Shown when a view was chosen.
-pub fn view(name: &str) -> String {
+pub fn view_chosen(name: &str) -> String {
     format!("view {name} (preview only). w: save image · 0: reset")
 }
 
-/// Shown when the photon view was chosen while photons were off.
+/// Shown when the photon view was selected while photons were off.
 pub const VIEW_WITHOUT_PHOTONS: &str = "view photons: photons are off (p: on)";
 
 /// Shown when another render's checkpoint was renamed.
@@ -238,12 +238,12 @@ pub const INCOMPLETE_FILE: &str = "for a complete file";
 pub const WAITING_FOR_FILE: &str = "waiting for it to appear";
 
 /// Shown when rendering the scene's own image was interrupted.
-pub fn own_unfinished(file: &str, percent: u32) -> String {
+pub fn own_image_unfinished(file: &str, percent: u32) -> String {
     format!("{file} at {percent} %: 0 continues it")
 }
 
 /// Shown when the scene was edited after its own image was rendered.
-pub fn own_outdated(file: &str) -> String {
+pub fn own_image_outdated(file: &str) -> String {
     format!("{file} is older than your last edit: 0 renders it")
 }
 

@@ -2,7 +2,7 @@
 
 /// Maximum number of points. When it is exceeded, every second point is dropped.
 const MAX: usize = 256;
-/// Minimum ratio between the times of successive points, since the time axis is logarithmic.
+/// Minimum ratio between the times of successive points. It is a ratio because the time axis is logarithmic.
 const STEP: f64 = 1.02;
 
 /// Render times in seconds and the noise measured at each time, in chronological order.
@@ -27,7 +27,7 @@ impl NoiseCurve {
     }
 
     /// Records the final noise, measured at the end of the render.
-    pub(super) fn end(&mut self, seconds: f64, noise: f64) {
+    pub(super) fn record_final(&mut self, seconds: f64, noise: f64) {
         self.0.retain(|(time, _)| time * STEP < seconds);
         self.record(seconds, noise);
     }
@@ -50,7 +50,7 @@ mod tests {
             curve.record(seconds, noise);
         }
         assert_eq!(curve.points(), [(0.5, 0.1), (2.0, 0.05)]);
-        curve.end(2.01, 0.04);
+        curve.record_final(2.01, 0.04);
         assert_eq!(curve.points(), [(0.5, 0.1), (2.01, 0.04)]);
         for step in 0..2000 {
             curve.record(2.01 * 1.03_f64.powi(step), 0.04);

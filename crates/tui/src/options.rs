@@ -78,7 +78,7 @@ impl ExitStatus {
     pub const TERMINATED: Self = Self(143);
 
     /// Terminated by the signal with this number.
-    pub fn signal(number: i32) -> Self {
+    pub fn from_signal(number: i32) -> Self {
         Self(u8::try_from(128 + number).unwrap_or(1))
     }
 }
@@ -88,7 +88,7 @@ impl ExitStatus {
 pub struct TuiOutcome {
     /// The program's exit code.
     pub status: ExitStatus,
-    /// Whether the user requested an image and the result is not known yet.
+    /// Whether the user requested an image that has been neither written nor refused yet.
     pub is_write_unanswered: bool,
     /// The written files with their samples and render times, in one line.
     pub summary: String,
@@ -96,7 +96,7 @@ pub struct TuiOutcome {
     pub has_written: bool,
     /// Whether the last attempt to write an image failed or was refused.
     pub is_unwritten: bool,
-    /// Changes made with keys that are saved in neither the scene nor an image, as command-line options.
+    /// Key changes that were saved neither in the scene nor in an image, formatted as command-line options.
     pub not_kept: Option<String>,
 }
 

@@ -3,7 +3,7 @@
 
 use std::time::{Duration, Instant};
 
-use super::graphics::{Protocol, wrapped};
+use super::graphics::{Protocol, tmux_passthrough};
 use super::terminals::TerminalId;
 
 /// Image ID used in the query for kitty's protocol.
@@ -15,7 +15,7 @@ const NAME_QUERY: &[u8] = b"\x1b[>q";
 /// Time after which the user is told that a reply is missing.
 const REPLY_TIMEOUT: Duration = Duration::from_secs(1);
 
-/// The path from glimt to the terminal, as far as it affects images.
+/// How escape sequences reach the terminal, as far as this affects images.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum ImageRoute {
     /// Nothing.
@@ -49,12 +49,12 @@ impl PixelRequest {
         Self { protocol, route, is_known: protocol == Protocol::Iterm && has_iterm }
     }
 
-    /// The query to send. Empty if it is part of the other queries or not supported.
+    /// The query to send. Empty if it is one of the other queries or cannot be sent.
     pub(super) fn query(self) -> Vec<u8> {
         match (self.protocol, self.route) {
             (Protocol::Kitty, ImageRoute::Direct) => KITTY_QUERY.to_vec(),
-            (Protocol::Kitty, ImageRoute::Tmux) => wrapped(KITTY_QUERY),
-            (Protocol::Iterm, ImageRoute::Tmux) => wrapped(NAME_QUERY),
+            (Protocol::Kitty, ImageRoute::Tmux) => tmux_passthrough(KITTY_QUERY),
+            (Protocol::Iterm, ImageRoute::Tmux) => tmux_passthrough(NAME_QUERY),
             (Protocol::Iterm, ImageRoute::Direct) => NAME_QUERY.to_vec(),
             // Device attributes are always queried, and tmux draws Sixel images itself.
             (Protocol::Sixel, _) | (_, ImageRoute::Closed) => Vec::new(),
@@ -62,7 +62,7 @@ impl PixelRequest {
     }
 
     /// Time at which the user is told that a reply is missing.
-    pub(super) fn deadline(self, now: Instant) -> Instant {
+    pub(super) fn reply_deadline(self, now: Instant) -> Instant {
         if self.route == ImageRoute::Closed { now } else { now + REPLY_TIMEOUT }
     }
 
@@ -76,7 +76,7 @@ impl PixelRequest {
     }
 
     /// Explains that the terminal does not support the protocol, and lists terminals that do.
-    pub(super) fn refusal(self) -> String {
+    pub(super) fn refusal_message(self) -> String {
         let (name, terminals) = match self.protocol {
             Protocol::Kitty => ("kitty", "kitty, Ghostty, WezTerm or Konsole"),
             Protocol::Sixel => ("sixel", "foot, xterm -ti vt340, mlterm, or tmux built with sixels"),
@@ -127,7 +127,7 @@ mod tests {
         for protocol in [Protocol::Kitty, Protocol::Iterm] {
             let tmux = request(protocol, &[("TMUX", "/tmp/tmux,1,0")], false);
             assert!(!tmux.ends_with_attributes());
-            assert!(tmux.refusal().contains("allow-passthrough"), "{}", tmux.refusal());
+            assert!(tmux.refusal_message().contains("allow-passthrough"), "{}", tmux.refusal_message());
             assert!(request(protocol, &[], false).ends_with_attributes());
         }
         assert!(request(Protocol::Sixel, &[("TMUX", "/tmp/tmux,1,0")], false).ends_with_attributes());

@@ -50,7 +50,7 @@ struct DrawnPreview {
     is_old: bool,
     /// Whether it is the first preview of its request.
     is_first: bool,
-    /// Whether any of it may have been sent.
+    /// Whether part of it may have been sent.
     is_shown: bool,
     /// Whether idle bandwidth is being used to draw it with exact colors.
     is_refined: bool,
@@ -70,17 +70,18 @@ impl Presenter {
 
     /// Handles a new preview in the slot. If it should be drawn, takes it out of the slot. Otherwise it stays
     /// there until a newer one replaces it, so previews never queue up.
-    pub(super) fn preview(&mut self, generation: u64, state: &State, now: Instant) -> Option<Event> {
-        let is_same_request = generation == self.drawn.generation && !self.is_other(state);
-        if is_same_request && self.advice(state, now) == PacingAdvice::Wait {
+    pub(super) fn handle_preview(&mut self, generation: u64, state: &State, now: Instant) -> Option<Event> {
+        let is_same_request = generation == self.drawn.generation && !self.is_preview_incompatible(state);
+        if is_same_request && self.pacing_advice(state, now) == PacingAdvice::Wait {
             self.drawn.is_old = true;
             return None;
         }
         self.take_preview()
     }
 
-    /// Whether the newest preview differs from the drawn one in size, section or missing photons.
-    fn is_other(&self, state: &State) -> bool {
+    /// Whether the newest preview and the drawn one differ in size, in section or in whether photons are
+    /// missing.
+    fn is_preview_incompatible(&self, state: &State) -> bool {
         let latest = self.previews.lock().unwrap_or_else(PoisonError::into_inner);
         let what = |picture: &Picture| (picture.width, picture.height);
         latest.as_ref().zip(state.picture.shown.as_ref()).is_some_and(|(new, old)| {
@@ -90,7 +91,7 @@ impl Presenter {
     }
 
     /// Whether to draw a newer preview of the same request.
-    fn advice(&self, state: &State, now: Instant) -> PacingAdvice {
+    fn pacing_advice(&self, state: &State, now: Instant) -> PacingAdvice {
         advise(&self.frame_timing(state, now))
     }
 
@@ -98,11 +99,11 @@ impl Presenter {
         let progress = state.work.progress.as_ref();
         let picture = self.drawn.picture.as_ref();
         let is_fast = self.display.is_fast();
-        let is_shown = if is_fast { self.display.is_answered() } else { self.display.is_complete() };
+        let is_shown = if is_fast { self.display.is_acknowledged() } else { self.display.is_complete() };
         FrameTiming {
             bytes_per_second: self.display.bytes_per_second(),
-            cells: picture.map_or(0, |picture| self.cells(state, picture)),
-            samples: samples(state),
+            cells: picture.map_or(0, |picture| self.preview_cells(state, picture)),
+            samples: samples_per_pixel(state),
             aimed_samples: picture.map(|_| self.drawn.samples),
             since_aim: self.drawn.at.map_or(Duration::MAX, |at| now.saturating_duration_since(at)),
             is_shown,
@@ -116,7 +117,7 @@ impl Presenter {
     }
 
     /// Number of cells in a preview, or an equivalent number for a preview drawn as pixels.
-    fn cells(&self, state: &State, picture: &Picture) -> u32 {
+    fn preview_cells(&self, state: &State, picture: &Picture) -> u32 {
         if self.display.draws_pixels() {
             return picture.width * picture.height / 4;
         }
@@ -148,26 +149,26 @@ impl Presenter {
         self.drawn.is_refined |= is_refined;
         self.postpone(state, now);
         state.dirty = false;
-        self.display.draw_as(state.display.kind);
+        self.display.set_preview_kind(state.display.kind);
         let window = state.display.window;
         let mut buffer = Buffer::empty(Rect::new(0, 0, window.columns, window.rows));
         let drawn = view::draw(state, &mut buffer);
-        if let Some(title) = WindowTitle::of(state, self.display.bytes_per_second().is_some()) {
+        if let Some(title) = WindowTitle::for_state(state, self.display.bytes_per_second().is_some()) {
             self.display.set_title(title);
         }
         let is_new = self.record_preview(state, now);
         // It remains the first preview until it is complete on the screen or a newer one is drawn.
         self.drawn.is_first &= is_new || !self.display.is_complete();
-        let area = Layout::of(state).preview;
-        self.display.place(view::preview::placement(state, area), is_final_preview(state));
-        let extras = self.extras(state, drawn);
+        let area = Layout::for_state(state).preview;
+        self.display.place_pixels(view::preview::placement(state, area), is_final_preview(state));
+        let extras = self.frame_extras(state, drawn);
         self.display.set_target(&buffer, area, self.fidelity(state), (is_new, &extras));
     }
 
     /// Hyperlinks, if the terminal supports them, and text to draw after the preview.
-    fn extras(&self, state: &State, drawn: ViewExtras) -> FrameExtras {
+    fn frame_extras(&self, state: &State, drawn: ViewExtras) -> FrameExtras {
         let files = drawn.files.into_iter().filter(|_| state.display.capabilities.links);
-        let link = |(cells, path): (Rect, PathBuf)| Hyperlink { cells, address: self.files.address(&path) };
+        let link = |(cells, path): (Rect, PathBuf)| Hyperlink { cells, address: self.files.url(&path) };
         FrameExtras { later: drawn.later, links: files.map(link).collect() }
     }
 
@@ -185,11 +186,11 @@ impl Presenter {
             return false;
         }
         let is_first = self.drawn.generation != shown.generation;
-        let (picture, samples, at) = (Some(shown.picture.clone()), samples(state), Some(now));
+        let (picture, samples, at) = (Some(shown.picture.clone()), samples_per_pixel(state), Some(now));
         let generation = shown.generation;
         if generation > self.newest {
             self.newest = generation;
-            self.display.begin_count();
+            self.display.reset_byte_count();
         }
         self.drawn = DrawnPreview { picture, generation, samples, at, is_first, ..DrawnPreview::default() };
         true
@@ -207,10 +208,15 @@ impl Presenter {
 
     /// Sends as much as the connection allows, stopping early once `is_late` returns true. Returns events for
     /// the state.
-    pub(super) fn pump(&mut self, state: &State, now: Instant, is_late: impl Fn() -> bool) -> Vec<Event> {
-        let has_sent = self.display.pump(now, is_late);
+    pub(super) fn send_pending(
+        &mut self,
+        state: &State,
+        now: Instant,
+        is_late: impl Fn() -> bool,
+    ) -> Vec<Event> {
+        let has_sent = self.display.send_next_slice(now, is_late);
         let mut events: Vec<Event> = self.display.take_report().map(Event::Frame).into_iter().collect();
-        if self.drawn.is_old && self.advice(state, now) != PacingAdvice::Wait {
+        if self.drawn.is_old && self.pacing_advice(state, now) != PacingAdvice::Wait {
             events.extend(self.take_preview());
         }
         let is_new = |drawn: &mut DrawnPreview| !std::mem::replace(&mut drawn.is_shown, true);
@@ -221,17 +227,20 @@ impl Presenter {
     }
 
     /// When to act next if no event arrives. `None` if there is nothing to do.
-    pub(super) fn wake(&mut self, state: &State, now: Instant) -> Option<Instant> {
-        let due =
-            self.drawn.at.filter(|_| self.drawn.is_old).and_then(|at| self.frame_timing(state, now).due(at));
+    pub(super) fn next_action_time(&mut self, state: &State, now: Instant) -> Option<Instant> {
+        let due = self
+            .drawn
+            .at
+            .filter(|_| self.drawn.is_old)
+            .and_then(|at| self.frame_timing(state, now).next_due_time(at));
         let refine = self.has_room_to_refine(state).then_some(now);
         let due = due.into_iter().chain(refine);
-        next_wake(state, self.next_frame).into_iter().chain(self.display.wake(now)).chain(due).min()
+        next_wake(state, self.next_frame).into_iter().chain(self.display.next_send_time(now)).chain(due).min()
     }
 }
 
 /// Mean samples per pixel rendered so far.
-fn samples(state: &State) -> f64 {
+fn samples_per_pixel(state: &State) -> f64 {
     state.work.progress.as_ref().map_or(0.0, |progress| progress.fraction * f64::from(progress.total_samples))
 }
 

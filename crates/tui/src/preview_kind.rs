@@ -1,4 +1,4 @@
-//! Ways of drawing the preview, depending on the user's choice and the terminal.
+//! Ways of drawing the preview, chosen by the user and limited by the terminal.
 
 use super::color::ColorDepth;
 use super::graphics::Protocol;
@@ -21,10 +21,10 @@ pub(super) enum PreviewKind {
 
 impl PreviewKind {
     /// Determines the kind for the user's choice and the color depth.
-    pub(super) fn of(choice: PreviewChoice, depth: ColorDepth) -> Self {
+    pub(super) fn from_choice(choice: PreviewChoice, depth: ColorDepth) -> Self {
         match choice {
             PreviewChoice::None => Self::None,
-            // All blocks need colors.
+            // Block characters require colors.
             PreviewChoice::Ascii => Self::Ascii,
             PreviewChoice::Kitty => Self::Pixels(Protocol::Kitty),
             PreviewChoice::Sixel => Self::Pixels(Protocol::Sixel),
@@ -39,9 +39,9 @@ impl PreviewKind {
 
     /// The initial kind. Pixels are used only if support is known.
     pub(super) fn initial(choice: PreviewChoice, depth: ColorDepth, pixels: Option<PixelRequest>) -> Self {
-        match (Self::of(choice, depth), pixels) {
+        match (Self::from_choice(choice, depth), pixels) {
             (Self::Pixels(_), Some(request)) if !request.is_known => {
-                Self::of(PreviewChoice::HalfBlock, depth)
+                Self::from_choice(PreviewChoice::HalfBlock, depth)
             }
             (kind, _) => kind,
         }
@@ -65,9 +65,9 @@ mod tests {
 
     #[test]
     fn preview_without_colors_is_a_ramp() {
-        assert_eq!(PreviewKind::of(PreviewChoice::Auto, ColorDepth::None), PreviewKind::Ascii);
-        assert_eq!(PreviewKind::of(PreviewChoice::HalfBlock, ColorDepth::None), PreviewKind::Ascii);
-        assert_eq!(PreviewKind::of(PreviewChoice::Auto, ColorDepth::Ansi16), PreviewKind::HalfBlock);
-        assert_eq!(PreviewKind::of(PreviewChoice::None, ColorDepth::TrueColor), PreviewKind::None);
+        assert_eq!(PreviewKind::from_choice(PreviewChoice::Auto, ColorDepth::None), PreviewKind::Ascii);
+        assert_eq!(PreviewKind::from_choice(PreviewChoice::HalfBlock, ColorDepth::None), PreviewKind::Ascii);
+        assert_eq!(PreviewKind::from_choice(PreviewChoice::Auto, ColorDepth::Ansi16), PreviewKind::HalfBlock);
+        assert_eq!(PreviewKind::from_choice(PreviewChoice::None, ColorDepth::TrueColor), PreviewKind::None);
     }
 }

@@ -9,7 +9,7 @@ use nix::sys::termios::{FlushArg, SetArg, cfmakeraw, tcgetattr, tcsetattr};
 
 use super::color::{self, ColorChoice, ColorDepth};
 use super::display::{ATTRIBUTES, STATUS, SYNCHRONIZED};
-use super::environment::{is_plain, terminal_link};
+use super::environment::{is_plain_terminal, terminal_link};
 use super::input::{DecodedInput, Decoder};
 use super::pixel_request::KITTY_QUERY;
 use super::terminal;
@@ -55,11 +55,11 @@ pub struct ProbeReplies {
 }
 
 impl Probe {
-    /// Name of the characters used to draw an automatic preview.
+    /// Name of the characters that draw the preview if the choice is automatic.
     pub fn preview(&self) -> &'static str {
         let name = self.answers.as_ref().and_then(|answers| answers.name.as_deref());
         let terminal = name.filter(|_| !self.is_multiplexed).and_then(TerminalId::from_report);
-        match (self.depth, terminal.map_or(BlockGlyphs::Unknown, BlockGlyphs::of)) {
+        match (self.depth, terminal.map_or(BlockGlyphs::Unknown, BlockGlyphs::supported_by)) {
             (ColorDepth::None, _) => "characters",
             (_, BlockGlyphs::Octants) => "octants",
             (_, BlockGlyphs::Sextants) => "sextants",
@@ -80,8 +80,8 @@ pub fn probe() -> Option<Probe> {
         return None;
     }
     let variable = |name: &str| std::env::var(name).ok();
-    let (window, link) = (terminal::window(None), terminal_link(variable));
-    let questions = if is_plain(variable) || link.is_multiplexed {
+    let (window, link) = (terminal::query_window(None), terminal_link(variable));
+    let questions = if is_plain_terminal(variable) || link.is_multiplexed {
         Vec::new()
     } else {
         let ask = TerminalQueries {
@@ -95,12 +95,12 @@ pub fn probe() -> Option<Probe> {
         [&ask.query_bytes(), SYNCHRONIZED, KITTY_QUERY].concat()
     };
     let is_dumb = variable("TERM").is_some_and(|term| term == "dumb");
-    let answers = if is_dumb { None } else { ask(&questions).ok().flatten() };
+    let answers = if is_dumb { None } else { query_in_raw_mode(&questions).ok().flatten() };
     let brand = variable("TERM_PROGRAM").and_then(|program| Brand::from_program(&program));
     Some(Probe {
         cells: (window.columns, window.rows),
         cell_pixels: window.cell_pixels,
-        depth: color::depth(ColorChoice::Auto, variable),
+        depth: color::resolve_depth(ColorChoice::Auto, variable),
         is_multiplexed: link.is_multiplexed,
         is_remote: link.is_remote,
         has_iterm: brand.is_some_and(Brand::has_iterm_images),
@@ -109,29 +109,29 @@ pub fn probe() -> Option<Probe> {
 }
 
 /// Sends the queries in raw mode, then restores the terminal modes.
-fn ask(questions: &[u8]) -> io::Result<Option<ProbeReplies>> {
+fn query_in_raw_mode(questions: &[u8]) -> io::Result<Option<ProbeReplies>> {
     let stdin = io::stdin();
     let before = tcgetattr(&stdin)?;
     let mut raw = before.clone();
     cfmakeraw(&mut raw);
     tcsetattr(&stdin, SetArg::TCSANOW, &raw)?;
-    let answers = converse(questions);
+    let answers = exchange_messages(questions);
     // Prevent late replies from reaching the shell.
     let _ = nix::sys::termios::tcflush(&stdin, FlushArg::TCIFLUSH);
     tcsetattr(&stdin, SetArg::TCSANOW, &before)?;
     answers
 }
 
-fn converse(questions: &[u8]) -> io::Result<Option<ProbeReplies>> {
+fn exchange_messages(questions: &[u8]) -> io::Result<Option<ProbeReplies>> {
     let (begin, mut heard) = (Instant::now(), ReceivedReplies::default());
     send(STATUS)?;
-    if !read_replies(&mut heard, begin, |heard| heard.has(TerminalReply::Ready))? {
+    if !read_replies(&mut heard, begin, |heard| heard.has_received(TerminalReply::Ready))? {
         return Ok(None);
     }
     let round_trip = begin.elapsed();
     send(&[questions, ATTRIBUTES].concat())?;
-    read_replies(&mut heard, Instant::now(), |heard| heard.has(TerminalReply::Attributes))?;
-    Ok(Some(ProbeReplies { round_trip, ..heard.answers() }))
+    read_replies(&mut heard, Instant::now(), |heard| heard.has_received(TerminalReply::Attributes))?;
+    Ok(Some(ProbeReplies { round_trip, ..heard.summarize() }))
 }
 
 fn send(bytes: &[u8]) -> io::Result<()> {
@@ -182,12 +182,12 @@ impl ReceivedReplies {
         self.answers.extend(self.decoder.decode(bytes, Instant::now()).into_iter().filter_map(answer));
     }
 
-    fn has(&self, answer: TerminalReply) -> bool {
+    fn has_received(&self, answer: TerminalReply) -> bool {
         self.answers.contains(&answer)
     }
 
     /// Summarizes the received replies.
-    fn answers(&self) -> ProbeReplies {
+    fn summarize(&self) -> ProbeReplies {
         let background = |answer: &TerminalReply| match answer {
             TerminalReply::Background(rgb) => Some(*rgb),
             TerminalReply::Ready
@@ -204,10 +204,10 @@ impl ReceivedReplies {
         ProbeReplies {
             round_trip: Duration::ZERO,
             name: self.text_between(b"\x1bP>|", 0x1b),
-            has_true_color: self.has(TerminalReply::TrueColor),
+            has_true_color: self.has_received(TerminalReply::TrueColor),
             has_kitty: self.text_between(b"\x1b_Gi=4211;", 0x1b).is_some_and(|text| text == "OK"),
             has_sixel: attributes.split(';').any(|attribute| attribute == "4"),
-            is_synchronized: self.has(TerminalReply::Synchronized { is_known: true }),
+            is_synchronized: self.has_received(TerminalReply::Synchronized { is_known: true }),
             background: self.answers.iter().find_map(background),
         }
     }
@@ -238,18 +238,18 @@ mod tests {
         let heard = replies_in(
             b"\x1b[0n\x1bP>|foot(1.20.2)\x1b\\\x1bP1+r524742=38\x1b\\\x1b[?2026;2$y\x1b]11;rgb:1c1c/1c1c/1c1c\x1b\\\x1b_Gi=4211;OK\x1b\\\x1b[?62;4;22c",
         );
-        let answers = heard.answers();
+        let answers = heard.summarize();
         assert_eq!(answers.name.as_deref(), Some("foot(1.20.2)"));
         assert_eq!(answers.background, Some([0x1c; 3]));
         assert!(answers.has_true_color && answers.has_kitty && answers.has_sixel && answers.is_synchronized);
-        assert!(heard.has(TerminalReply::Ready) && heard.has(TerminalReply::Attributes));
+        assert!(heard.has_received(TerminalReply::Ready) && heard.has_received(TerminalReply::Attributes));
     }
 
     #[test]
     fn negative_replies_are_not_capabilities() {
         let refused =
             replies_in(b"\x1bP0+r524742\x1b\\\x1b[?2026;0$y\x1b_Gi=4211;ENOTSUPPORTED\x1b\\\x1b[?1;42c");
-        assert_eq!(refused.answers(), ProbeReplies::default());
-        assert!(!replies_in(b"\x1b[?62;").has(TerminalReply::Attributes));
+        assert_eq!(refused.summarize(), ProbeReplies::default());
+        assert!(!replies_in(b"\x1b[?62;").has_received(TerminalReply::Attributes));
     }
 }

@@ -8,28 +8,28 @@ use crate::math::color::{linear_to_srgb8, srgb8_to_linear};
 
 /// Resizes an image to `width` × `height`.
 pub(super) fn resized(picture: &Picture, width: u32, height: u32) -> Picture {
-    Picture { width, height, pixels: rescaled(picture, width, height).into_owned() }
+    Picture { width, height, pixels: resized_pixels(picture, width, height).into_owned() }
 }
 
 /// The pixels of the resized image. Downscaling averages the covered pixels in linear light, weighted by
 /// area. Upscaling repeats the nearest pixel.
-pub(super) fn rescaled(picture: &Picture, width: u32, height: u32) -> Cow<'_, [[u8; 3]]> {
+pub(super) fn resized_pixels(picture: &Picture, width: u32, height: u32) -> Cow<'_, [[u8; 3]]> {
     if (picture.width, picture.height) == (width, height) {
         return Cow::Borrowed(&picture.pixels);
     }
-    let columns: Vec<_> = (0..width).map(|i| covered(i, width, picture.width)).collect();
-    let rows: Vec<_> = (0..height).map(|i| covered(i, height, picture.height)).collect();
+    let columns: Vec<_> = (0..width).map(|i| covered_pixels(i, width, picture.width)).collect();
+    let rows: Vec<_> = (0..height).map(|i| covered_pixels(i, height, picture.height)).collect();
     let mut pixels = Vec::with_capacity(width as usize * height as usize);
     for row in &rows {
         for column in &columns {
-            pixels.push(mean(picture, column, row));
+            pixels.push(mean_color(picture, column, row));
         }
     }
     Cow::Owned(pixels)
 }
 
 /// The source pixels covered by a target pixel along one axis, with the covered lengths.
-fn covered(target: u32, targets: u32, sources: u32) -> Vec<(u32, f32)> {
+fn covered_pixels(target: u32, targets: u32, sources: u32) -> Vec<(u32, f32)> {
     if targets >= sources {
         let middle = (u64::from(target) * 2 + 1) * u64::from(sources) / (2 * u64::from(targets.max(1)));
         return vec![(u32::try_from(middle).unwrap_or(0), 1.0)];
@@ -46,7 +46,7 @@ fn covered(target: u32, targets: u32, sources: u32) -> Vec<(u32, f32)> {
         .collect()
 }
 
-fn mean(picture: &Picture, columns: &[(u32, f32)], rows: &[(u32, f32)]) -> [u8; 3] {
+fn mean_color(picture: &Picture, columns: &[(u32, f32)], rows: &[(u32, f32)]) -> [u8; 3] {
     let at = |x: u32, y: u32| {
         picture.pixels.get(y as usize * picture.width as usize + x as usize).copied().unwrap_or_default()
     };
@@ -77,15 +77,15 @@ mod tests {
     fn downscaling_averages_in_linear_light() {
         let checks = picture(8, 8, |x, y| if (x + y) % 2 == 0 { [255; 3] } else { [0; 3] });
         let half = linear_to_srgb8(0.5);
-        assert_eq!(rescaled(&checks, 4, 4).as_ref(), [[half; 3]; 16]);
+        assert_eq!(resized_pixels(&checks, 4, 4).as_ref(), [[half; 3]; 16]);
         let thirds = picture(3, 1, |x, _| if x == 0 { [255; 3] } else { [0; 3] });
         // The first of the two pixels covers one white pixel and half of a black one.
-        assert_eq!(rescaled(&thirds, 2, 1).as_ref(), [[linear_to_srgb8(2.0 / 3.0); 3], [0; 3]]);
+        assert_eq!(resized_pixels(&thirds, 2, 1).as_ref(), [[linear_to_srgb8(2.0 / 3.0); 3], [0; 3]]);
     }
 
     #[test]
     fn enlarging_repeats_pixels() {
         let two = picture(2, 1, |x, _| if x == 0 { [1, 2, 3] } else { [4, 5, 6] });
-        assert_eq!(rescaled(&two, 4, 1).as_ref(), [[1, 2, 3], [1, 2, 3], [4, 5, 6], [4, 5, 6]]);
+        assert_eq!(resized_pixels(&two, 4, 1).as_ref(), [[1, 2, 3], [1, 2, 3], [4, 5, 6], [4, 5, 6]]);
     }
 }

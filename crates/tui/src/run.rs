@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use super::color::{self, ColorDepth};
 use super::display::{Display, TerminalLink};
 use super::editor;
-use super::environment::{ask, terminal_link};
+use super::environment::{terminal_link, terminal_queries};
 use super::event::FilePosition;
 use super::event::{Effect, Event, EventSource};
 use super::exit_summary;
@@ -17,8 +17,8 @@ use super::input;
 use super::options::{ExitStatus, Options, TuiError, TuiOutcome};
 use super::presenter::Presenter;
 use super::preview_kind::PreviewKind;
-use super::signals::{self, Listener};
-use super::state::{Setup, State};
+use super::signals::{self, SignalListener};
+use super::state::{InitialState, State};
 use super::terminal::{self, TerminalSession};
 use super::terminals::TerminalId;
 use super::update::{start, update};
@@ -34,13 +34,13 @@ const TURN: Duration = Duration::from_millis(3);
 /// # Errors
 /// Returns a [`TuiError`] if there is no terminal, if writing to it fails, or if the worker has ended.
 pub fn run(options: Options) -> Result<TuiOutcome, TuiError> {
-    terminal::require()?;
-    let depth = color::depth(options.color, |name| std::env::var(name).ok());
+    terminal::require_terminal()?;
+    let depth = color::resolve_depth(options.color, |name| std::env::var(name).ok());
     // Prevents crossterm from dropping named colors when NO_COLOR is set.
     crossterm::style::force_color_output(depth != ColorDepth::None);
 
     let (sender, events) = mpsc::channel();
-    let listener = Listener::start(&sender).map_err(failed("handle signals for"))?;
+    let listener = SignalListener::start(&sender).map_err(terminal_error_for("handle signals for"))?;
     let variable = |name: &str| std::env::var(name).ok();
     let capabilities =
         TerminalId::from_environment(variable).map(TerminalId::capabilities).unwrap_or_default();
@@ -48,27 +48,29 @@ pub fn run(options: Options) -> Result<TuiOutcome, TuiError> {
         terminal::enable_focus_reports();
     }
     let screen = TerminalSession::open()?;
-    let link =
-        TerminalLink { ask: ask(options.preview, options.color, depth, variable), ..terminal_link(variable) };
-    let setup = Setup {
+    let link = TerminalLink {
+        ask: terminal_queries(options.preview, options.color, depth, variable),
+        ..terminal_link(variable)
+    };
+    let setup = InitialState {
         scene: options.scene,
         overrides: options.overrides,
-        window: terminal::window(options.cell_aspect),
+        window: terminal::query_window(options.cell_aspect),
         preview: PreviewKind::initial(options.preview, depth, link.ask.pixels),
         depth,
         is_light: color::has_light_background(variable),
-        ansi: *color::ansi(&variable("TERM").unwrap_or_default()),
+        ansi: *color::assumed_ansi_colors(&variable("TERM").unwrap_or_default()),
         ask: link.ask,
         capabilities,
         notify_after: options.notify_after,
     };
-    forward("worker-events", options.events, &sender, Event::Worker, EventSource::Worker)?;
-    forward("news", options.news, &sender, Event::from_watcher, EventSource::Watcher)?;
-    input::start(&sender).map_err(failed("read keys from"))?;
-    writer::start(&sender).map_err(failed("write to"))?;
+    forward_channel("worker-events", options.events, &sender, Event::Worker, EventSource::Worker)?;
+    forward_channel("news", options.news, &sender, Event::from_watcher, EventSource::Watcher)?;
+    input::start_reader(&sender).map_err(terminal_error_for("read keys from"))?;
+    writer::start_writer(&sender).map_err(terminal_error_for("write to"))?;
 
     let now = Instant::now();
-    let display = Display::new(depth, link, None, Box::new(writer::send), now);
+    let display = Display::new(depth, link, None, Box::new(writer::queue_slice), now);
     let ui = Ui {
         screen,
         presenter: Presenter::new(display, options.previews, now),
@@ -83,12 +85,12 @@ pub fn run(options: Options) -> Result<TuiOutcome, TuiError> {
     outcome
 }
 
-fn failed(action: &'static str) -> impl Fn(io::Error) -> TuiError {
+fn terminal_error_for(action: &'static str) -> impl Fn(io::Error) -> TuiError {
     move |source| TuiError::Terminal { action, source }
 }
 
 /// Forwards messages from a channel to the event loop and reports when the channel closes.
-fn forward<T: Send + 'static>(
+fn forward_channel<T: Send + 'static>(
     name: &str,
     from: Receiver<T>,
     events: &Sender<Event>,
@@ -104,7 +106,10 @@ fn forward<T: Send + 'static>(
         }
         let _ = events.send(Event::Lost(source));
     };
-    thread::Builder::new().name(name.to_owned()).spawn(pass).map_err(failed("start a thread for"))?;
+    thread::Builder::new()
+        .name(name.to_owned())
+        .spawn(pass)
+        .map_err(terminal_error_for("start a thread for"))?;
     Ok(())
 }
 
@@ -130,7 +135,7 @@ impl Ui {
         let effects = start(&mut self.state);
         let mut end = self.perform(effects);
         while end.is_none() {
-            end = self.present().or_else(|| self.wait());
+            end = self.draw_and_send().or_else(|| self.wait());
         }
         // Keep the checkpoint unless the user quit: a signal arrived, or the terminal was closed or failed.
         if !matches!(&end, Some(LoopEnd::Quit(ExitStatus::QUIT))) {
@@ -140,7 +145,7 @@ impl Ui {
         let status = match end {
             // If the user sent SIGHUP, the terminal still exists and must be restored.
             Some(LoopEnd::Quit(ExitStatus::HANGUP)) => {
-                if !terminal::is_there() {
+                if !terminal::terminal_exists() {
                     self.screen.abandon();
                 }
                 ExitStatus::HANGUP
@@ -156,20 +161,23 @@ impl Ui {
         Ok(TuiOutcome {
             status,
             is_write_unanswered: saving.is_write_requested,
-            summary: exit_summary::words(&self.state),
+            summary: exit_summary::summary_text(&self.state),
             has_written: !saving.written.is_empty(),
             is_unwritten: saving.write_failed.is_some(),
-            not_kept: exit_summary::not_kept(&self.state),
+            not_kept: exit_summary::unsaved_as_options(&self.state),
         })
     }
 
-    /// Leaves the screen and waits briefly for pending replies, which a shell would interpret as typed text.
+    /// Leaves the screen and waits briefly for pending replies, which the shell would otherwise read as typed
+    /// text.
     fn leave(&mut self) {
         self.screen.leave();
         let deadline = self.presenter.display.reply_timeout().map(|patience| Instant::now() + patience);
         while let Some(deadline) = deadline.filter(|_| self.presenter.display.reply_timeout().is_some()) {
             match self.events.recv_timeout(deadline.saturating_duration_since(Instant::now())) {
-                Ok(Event::TerminalReply(answer)) => self.presenter.display.answered(answer, Instant::now()),
+                Ok(Event::TerminalReply(answer)) => {
+                    self.presenter.display.handle_reply(answer, Instant::now());
+                }
                 Ok(event) => self.postponed.push_back(event),
                 Err(_) => return,
             }
@@ -179,7 +187,7 @@ impl Ui {
     /// Waits for events and handles all that have arrived.
     fn wait(&mut self) -> Option<LoopEnd> {
         let now = Instant::now();
-        let wake = self.presenter.wake(&self.state, now);
+        let wake = self.presenter.next_action_time(&self.state, now);
         let first = match (self.postponed.pop_front(), wake) {
             (Some(event), _) => Ok(event),
             (None, Some(wake)) => self.events.recv_timeout(wake.saturating_duration_since(now)),
@@ -203,20 +211,20 @@ impl Ui {
     fn handle(&mut self, event: Event) -> Option<LoopEnd> {
         match event {
             Event::Worker(protocol::Event::Preview { generation }) => {
-                let taken = self.presenter.preview(generation, &self.state, Instant::now());
+                let taken = self.presenter.handle_preview(generation, &self.state, Instant::now());
                 return taken.and_then(|picture| self.apply(picture));
             }
             Event::TerminalReply(answer) => {
-                self.presenter.display.answered(answer, Instant::now());
+                self.presenter.display.handle_reply(answer, Instant::now());
                 return self.apply(event);
             }
-            Event::Written { bytes } => self.presenter.display.written(bytes),
-            Event::Unwritable(kind) => return Some(unwritable(kind.into())),
+            Event::Written { bytes } => self.presenter.display.record_written(bytes),
+            Event::Unwritable(kind) => return Some(write_error_end(kind.into())),
             Event::Key(_) | Event::Mouse(_) => {
                 let end = self.apply(event);
                 // A camera step is drawn together with its first preview, which arrives immediately and needs
                 // the CPU.
-                self.state.urgent |= self.state.dirty && !self.state.awaits_step();
+                self.state.urgent |= self.state.dirty && !self.state.is_step_without_preview();
                 return end;
             }
             event => return self.apply(event),
@@ -242,38 +250,41 @@ impl Ui {
             }
             Effect::StopJob if !signals::has_shell() => return self.apply(Event::NoShell),
             Effect::StopJob => {
-                return signals::stop_job().err().map(failed("stop the job of")).map(LoopEnd::Error);
+                return signals::stop_job()
+                    .err()
+                    .map(terminal_error_for("stop the job of"))
+                    .map(LoopEnd::Error);
             }
             Effect::Suspend if signals::has_shell() => {
                 self.leave();
                 self.screen.suspend();
                 // The process stops here. After it continues, SIGCONT requests a redraw.
-                signals::stop();
+                signals::stop_process();
             }
             Effect::Suspend => {}
             Effect::Mouse(is_on) => self.screen.set_mouse(is_on),
-            Effect::Edit(place) => return self.edit(&place),
+            Effect::Edit(place) => return self.run_editor(&place),
             Effect::Aside(bytes) => self.presenter.display.send_after_preview(bytes),
             Effect::ReportFocus => self.screen.report_focus(),
             Effect::Redraw => return self.redraw(),
             Effect::Measure => {
                 // The window may have shrunk and grown again, cutting off its content.
                 self.presenter.display.invalidate();
-                return self.measure();
+                return self.update_window_size();
             }
         }
         None
     }
 
     /// Lets the editor use the terminal until it exits.
-    fn edit(&mut self, place: &FilePosition) -> Option<LoopEnd> {
+    fn run_editor(&mut self, place: &FilePosition) -> Option<LoopEnd> {
         self.leave();
         input::set_held(true);
         self.screen.suspend();
         // Outside raw mode, keys send signals.
         let child_signals = signals::leave_signals_to_child();
         terminal::save_modes();
-        let outcome = editor::run(&editor::name(|name| std::env::var(name).ok()), place);
+        let outcome = editor::run(&editor::editor_command(|name| std::env::var(name).ok()), place);
         terminal::restore_modes();
         input::set_held(false);
         let end = self.apply(Event::Back).or_else(|| self.redraw());
@@ -283,32 +294,32 @@ impl Ui {
 
     fn redraw(&mut self) -> Option<LoopEnd> {
         if let Err(error) = self.screen.resume() {
-            return Some(unwritable(error));
+            return Some(write_error_end(error));
         }
         self.presenter.display.restart(Instant::now());
-        self.measure()
+        self.update_window_size()
     }
 
-    fn measure(&mut self) -> Option<LoopEnd> {
-        self.apply(Event::Resize(terminal::window(self.cell_aspect)))
+    fn update_window_size(&mut self) -> Option<LoopEnd> {
+        self.apply(Event::Resize(terminal::query_window(self.cell_aspect)))
     }
 
     /// Draws a frame if one is due and sends as much as the connection allows.
-    fn present(&mut self) -> Option<LoopEnd> {
+    fn draw_and_send(&mut self) -> Option<LoopEnd> {
         if !self.screen.is_taken() {
             self.presenter.postpone(&mut self.state, Instant::now());
             return None;
         }
         self.presenter.draw_if_due(&mut self.state, Instant::now());
         let begin = Instant::now();
-        let events = self.presenter.pump(&self.state, begin, || begin.elapsed() >= TURN);
+        let events = self.presenter.send_pending(&self.state, begin, || begin.elapsed() >= TURN);
         events.into_iter().find_map(|event| self.apply(event))
     }
 }
 
 /// Treats a terminal that no longer exists as a hangup even if SIGHUP has not arrived.
-fn unwritable(error: io::Error) -> LoopEnd {
-    if terminal::is_there() {
+fn write_error_end(error: io::Error) -> LoopEnd {
+    if terminal::terminal_exists() {
         LoopEnd::Error(TuiError::Terminal { action: "write to", source: error })
     } else {
         LoopEnd::Quit(ExitStatus::HANGUP)

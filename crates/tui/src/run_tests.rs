@@ -4,7 +4,7 @@ use super::*;
 fn channel_close_is_reported_last() {
     let (from, receiver) = mpsc::channel();
     let (sender, events) = mpsc::channel();
-    forward("test", receiver, &sender, Event::from_watcher, EventSource::Watcher).expect("a thread");
+    forward_channel("test", receiver, &sender, Event::from_watcher, EventSource::Watcher).expect("a thread");
     from.send(super::super::News::Settled).expect("a receiver");
     drop(from);
     assert!(matches!(events.recv(), Ok(Event::Settled)));

@@ -35,7 +35,7 @@ const WATCH: Duration = Duration::from_millis(500);
 
 /// Signals handled by the event loop.
 const HANDLED_SIGNALS: [i32; 7] = [SIGINT, SIGTERM, SIGQUIT, SIGHUP, SIGTSTP, SIGCONT, SIGWINCH];
-/// Other signals that terminate the program after the terminal has been restored.
+/// Other signals that terminate the program. The terminal is restored first.
 const OTHER_SIGNALS: [i32; 9] =
     [SIGUSR1, SIGUSR2, SIGALRM, SIGVTALRM, SIGPROF, SIGXCPU, SIGIO, SIGSYS, SIGTRAP];
 
@@ -54,11 +54,11 @@ fn linux_signals() -> impl Iterator<Item = i32> {
 const MARK: i32 = SIGURG;
 
 /// Handles signals. When it is dropped, signals have their default effects again.
-pub(super) struct Listener {
+pub(super) struct SignalListener {
     over: Arc<AtomicBool>,
 }
 
-impl Listener {
+impl SignalListener {
     /// Starts the signal threads, which send events to `events`.
     pub(super) fn start(events: &Sender<Event>) -> io::Result<Self> {
         let over = Arc::new(AtomicBool::new(false));
@@ -69,7 +69,7 @@ impl Listener {
         thread::Builder::new().name("signals".to_owned()).spawn(move || {
             loop {
                 signals.wait().for_each(|number| handler.handle(number));
-                *rounds() += 1;
+                *lock_round_count() += 1;
                 ROUNDS.1.notify_all();
             }
         })?;
@@ -79,7 +79,7 @@ impl Listener {
     }
 }
 
-impl Drop for Listener {
+impl Drop for SignalListener {
     fn drop(&mut self) {
         self.over.store(true, Ordering::Release);
     }
@@ -91,10 +91,10 @@ static HUNG_UP: AtomicBool = AtomicBool::new(false);
 /// Whether signals from the keyboard are handled by a child process.
 static CHILD_HANDLES_SIGNALS: AtomicBool = AtomicBool::new(false);
 
-/// Number of times that all pending signals have been handled.
+/// Number of times the signal thread has handled all pending signals.
 static ROUNDS: (Mutex<u64>, Condvar) = (Mutex::new(0), Condvar::new());
 
-fn rounds() -> MutexGuard<'static, u64> {
+fn lock_round_count() -> MutexGuard<'static, u64> {
     ROUNDS.0.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
@@ -106,7 +106,7 @@ const SIGNAL_TIMEOUT: Duration = Duration::from_secs(10);
 /// may have started before the call.
 fn wait_for_pending_signals() {
     for _ in 0..2 {
-        let before = rounds();
+        let before = lock_round_count();
         let last = *before;
         if low_level::raise(MARK).is_ok() {
             drop(ROUNDS.1.wait_timeout_while(before, SIGNAL_TIMEOUT, |now| *now == last));
@@ -122,13 +122,13 @@ struct ForegroundChild {
 
 static CHILD: Mutex<ForegroundChild> = Mutex::new(ForegroundChild { id: None, ending: None });
 
-fn child() -> MutexGuard<'static, ForegroundChild> {
+fn lock_child() -> MutexGuard<'static, ForegroundChild> {
     CHILD.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Sets the child process to which terminating signals are forwarded. `None` if it has exited.
 pub(super) fn set_child(id: Option<Pid>) {
-    let mut child = child();
+    let mut child = lock_child();
     child.id = id;
     if let (Some(id), Some(number)) = (id, child.ending) {
         forward_to_child(id, number);
@@ -138,7 +138,7 @@ pub(super) fn set_child(id: Option<Pid>) {
 /// Forwards a terminating signal to the child. Only the first one is forwarded, because this process also
 /// receives the signals that it sends to its job.
 fn end_child(number: Number) {
-    let mut child = child();
+    let mut child = lock_child();
     if child.ending.replace(number).is_none()
         && let Some(id) = child.id
     {
@@ -189,7 +189,7 @@ impl SignalThread {
                 if HUNG_UP.load(Ordering::Acquire) {
                     return;
                 }
-                if !terminal::is_there() {
+                if !terminal::terminal_exists() {
                     return self.notify(Signal::Hangup);
                 }
             }
@@ -219,7 +219,7 @@ impl SignalThread {
     fn watch_terminal(&self) {
         while !self.over.load(Ordering::Acquire) {
             thread::sleep(WATCH);
-            if !terminal::is_there() {
+            if !terminal::terminal_exists() {
                 self.notify(Signal::Hangup);
                 return;
             }
@@ -230,8 +230,8 @@ impl SignalThread {
         if signal == Signal::Hangup {
             HUNG_UP.store(true, Ordering::Release);
         }
-        if let Some(status) = ends(signal) {
-            if let Ok(number) = Number::try_from(number(signal)) {
+        if let Some(status) = exit_status_for(signal) {
+            if let Ok(number) = Number::try_from(signal_number(signal)) {
                 end_child(number);
             }
             let over = Arc::clone(&self.over);
@@ -242,7 +242,7 @@ impl SignalThread {
     }
 }
 
-fn number(signal: Signal) -> i32 {
+fn signal_number(signal: Signal) -> i32 {
     match signal {
         Signal::Interrupt => SIGINT,
         Signal::Terminate => SIGTERM,
@@ -256,19 +256,19 @@ fn number(signal: Signal) -> i32 {
 }
 
 /// Exit code for a terminating signal.
-fn ends(signal: Signal) -> Option<ExitStatus> {
+fn exit_status_for(signal: Signal) -> Option<ExitStatus> {
     match signal {
         Signal::Interrupt => Some(ExitStatus::INTERRUPTED),
         Signal::Terminate => Some(ExitStatus::TERMINATED),
         Signal::Quit => Some(ExitStatus::ABORTED),
         Signal::Hangup => Some(ExitStatus::HANGUP),
-        Signal::Other(number) => Some(ExitStatus::signal(number)),
+        Signal::Other(number) => Some(ExitStatus::from_signal(number)),
         Signal::Suspend | Signal::Continue | Signal::Resize => None,
     }
 }
 
-/// Ends the process if the event loop has not ended. After a hangup, there is no terminal to restore. A
-/// running child may have changed the terminal modes.
+/// Ends the process if the event loop has not ended. Restores the terminal first, except after a hangup, when
+/// it no longer exists. The saved modes are always restored, because a running child may have changed them.
 fn end_after_grace(signal: Signal, status: ExitStatus, over: &AtomicBool) {
     thread::sleep(GRACE);
     if signal != Signal::Hangup {
@@ -298,7 +298,7 @@ pub(super) fn stop_job() -> io::Result<()> {
 }
 
 /// Performs the default action of SIGTSTP, which stops this process. Returns when it is continued.
-pub(super) fn stop() {
+pub(super) fn stop_process() {
     // If the process cannot be stopped, it keeps running.
     let _ = low_level::emulate_default_handler(SIGTSTP);
 }
@@ -312,18 +312,18 @@ mod tests {
     fn real_time_signals_are_handled() {
         let heard: Vec<i32> = linux_signals().collect();
         assert!(heard.contains(&libc::SIGRTMIN()) && heard.contains(&libc::SIGRTMAX()));
-        assert_eq!(ends(Signal::Other(libc::SIGRTMAX())), Some(ExitStatus(128 + 64)));
+        assert_eq!(exit_status_for(Signal::Other(libc::SIGRTMAX())), Some(ExitStatus(128 + 64)));
     }
 
     #[test]
     fn terminating_signals_have_exit_codes() {
-        assert_eq!(ends(Signal::Interrupt), Some(ExitStatus(130)));
-        assert_eq!(ends(Signal::Terminate), Some(ExitStatus(143)));
-        assert_eq!(ends(Signal::Quit), Some(ExitStatus(131)));
-        assert_eq!(ends(Signal::Hangup), Some(ExitStatus(129)));
-        assert_eq!(ends(Signal::Other(SIGUSR1)), Some(ExitStatus(128 + SIGUSR1 as u8)));
-        assert_eq!(ends(Signal::Suspend), None);
-        assert_eq!(ends(Signal::Continue), None);
-        assert_eq!(ends(Signal::Resize), None);
+        assert_eq!(exit_status_for(Signal::Interrupt), Some(ExitStatus(130)));
+        assert_eq!(exit_status_for(Signal::Terminate), Some(ExitStatus(143)));
+        assert_eq!(exit_status_for(Signal::Quit), Some(ExitStatus(131)));
+        assert_eq!(exit_status_for(Signal::Hangup), Some(ExitStatus(129)));
+        assert_eq!(exit_status_for(Signal::Other(SIGUSR1)), Some(ExitStatus(128 + SIGUSR1 as u8)));
+        assert_eq!(exit_status_for(Signal::Suspend), None);
+        assert_eq!(exit_status_for(Signal::Continue), None);
+        assert_eq!(exit_status_for(Signal::Resize), None);
     }
 }

@@ -1,4 +1,4 @@
-//! Prints images as lines of text, without a full-screen UI or terminal queries.
+//! Prints images as lines of text without using a full-screen UI or terminal queries.
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
@@ -10,7 +10,7 @@ use super::options::PreviewChoice;
 use super::paint::as_text_lines;
 use super::terminal;
 use super::view::preview::{PreviewColors, draw_image, size_in_cells};
-use super::view::text::{columns, shortened};
+use super::view::text::{text_columns, truncated_text};
 use crate::film::Picture;
 
 /// Minimum terminal width for showing images.
@@ -38,11 +38,12 @@ pub struct NamedImage {
 /// 30 columns. If the output is not a terminal, its size is assumed to be 80×24.
 pub fn images_as_text(pictures: &[NamedImage], color: ColorChoice, is_terminal: bool) -> String {
     let variable = |name: &str| std::env::var(name).ok();
-    let depth = color::depth(color, variable);
-    let shades = ColorMapper::new(depth, color::ansi(&variable("TERM").unwrap_or_default()));
+    let depth = color::resolve_depth(color, variable);
+    let shades = ColorMapper::new(depth, color::assumed_ansi_colors(&variable("TERM").unwrap_or_default()));
     let inks = PreviewColors { depth, shades: &shades, is_light: color::has_light_background(variable) };
-    let (size, aspect) = if is_terminal { window_size(&terminal::window(None)) } else { ((80, 24), 2.0) };
-    let buffers = lay_out(pictures, inks, size, aspect);
+    let (size, aspect) =
+        if is_terminal { window_size(&terminal::query_window(None)) } else { ((80, 24), 2.0) };
+    let buffers = lay_out_images(pictures, inks, size, aspect);
     buffers.iter().map(|buffer| as_text_lines(buffer, depth != ColorDepth::None)).collect()
 }
 
@@ -54,7 +55,7 @@ fn window_size(window: &Window) -> ((u16, u16), f32) {
 }
 
 /// Arranges the images in one or more rows.
-fn lay_out(
+fn lay_out_images(
     pictures: &[NamedImage],
     inks: PreviewColors<'_>,
     (across, down): (u16, u16),
@@ -66,21 +67,21 @@ fn lay_out(
     if across < MIN_COLUMNS {
         Vec::new()
     } else if beside >= MIN_BESIDE {
-        vec![row(pictures, inks, (beside, rows), aspect)]
+        vec![draw_image_row(pictures, inks, (beside, rows), aspect)]
     } else {
-        pictures.chunks(1).map(|one| row(one, inks, (across, rows), aspect)).collect()
+        pictures.chunks(1).map(|one| draw_image_row(one, inks, (across, rows), aspect)).collect()
     }
 }
 
 /// Draws images side by side below their captions. Each fits into `room`.
-fn row(pictures: &[NamedImage], inks: PreviewColors<'_>, room: (u16, u16), aspect: f32) -> Buffer {
+fn draw_image_row(pictures: &[NamedImage], inks: PreviewColors<'_>, room: (u16, u16), aspect: f32) -> Buffer {
     let sizes = pictures.iter().map(|one| size_in_cells(&one.picture, inks.depth, room, aspect));
     let (width, height) = sizes.fold((0, 0), |most, size| (most.0.max(size.0), most.1.max(size.1)));
-    let names = pictures.iter().map(|one| columns(&one.name).min(room.0)).max().unwrap_or(0);
+    let names = pictures.iter().map(|one| text_columns(&one.name).min(room.0)).max().unwrap_or(0);
     let stride = width.max(names) + GAP;
     let mut buffer = Buffer::empty(Rect::new(0, 0, stride * pictures.len() as u16, height + 1));
     for (x, one) in (0..).step_by(usize::from(stride)).zip(pictures) {
-        buffer.set_string(x, 0, shortened(&one.name, room.0), Style::new());
+        buffer.set_string(x, 0, truncated_text(&one.name, room.0), Style::new());
         let area = Rect::new(x, 1, width, height);
         buffer.merge(&draw_image(&one.picture, PreviewChoice::HalfBlock, inks, (area, aspect)));
     }
@@ -97,8 +98,12 @@ mod tests {
         let named = |name: &str| NamedImage { name: name.to_owned(), picture: picture.clone() };
         let shades = ColorMapper::new(depth, &XTERM);
         let inks = PreviewColors { depth, shades: &shades, is_light: false };
-        let buffers =
-            lay_out(&["a.png", "b.png", "a very long name of a difference"].map(named), inks, size, 2.0);
+        let buffers = lay_out_images(
+            &["a.png", "b.png", "a very long name of a difference"].map(named),
+            inks,
+            size,
+            2.0,
+        );
         let text: String = buffers.iter().map(|buffer| as_text_lines(buffer, false)).collect();
         text.lines().map(str::to_owned).collect()
     }

@@ -86,11 +86,11 @@ impl TerminalSession {
     pub(super) fn open() -> Result<Self, TuiError> {
         chain_panic_hook();
         prepare_abort();
-        take().map_err(|source| TuiError::Terminal { action: "set up", source })?;
+        take_terminal().map_err(|source| TuiError::Terminal { action: "set up", source })?;
         Ok(Self(()))
     }
 
-    /// Whether drawing on the screen is allowed.
+    /// Whether the front end may draw on the screen.
     pub(super) fn is_taken(&self) -> bool {
         TAKEN.load(Ordering::Acquire)
     }
@@ -103,7 +103,7 @@ impl TerminalSession {
 
     /// Restores the terminal until [`TerminalSession::resume`] is called.
     pub(super) fn suspend(&mut self) {
-        restore();
+        restore_terminal();
     }
 
     /// Sets up the terminal again.
@@ -112,19 +112,19 @@ impl TerminalSession {
         if RAW.swap(false, Ordering::AcqRel) {
             disable_raw_mode()?;
         }
-        take()
+        take_terminal()
     }
 
     /// Enables or disables mouse reports.
     pub(super) fn set_mouse(&mut self, is_on: bool) {
         MOUSE.store(is_on, Ordering::Release);
-        writer::send(if is_on { MOUSE_ON } else { MOUSE_OFF }.as_bytes().to_vec());
+        writer::queue_slice(if is_on { MOUSE_ON } else { MOUSE_OFF }.as_bytes().to_vec());
     }
 
     /// Enables focus reports.
     pub(super) fn report_focus(&mut self) {
         enable_focus_reports();
-        writer::send(FOCUS_ON.as_bytes().to_vec());
+        writer::queue_slice(FOCUS_ON.as_bytes().to_vec());
     }
 
     /// Stops writing to a terminal that no longer exists.
@@ -136,7 +136,7 @@ impl TerminalSession {
 
 impl Drop for TerminalSession {
     fn drop(&mut self) {
-        restore();
+        restore_terminal();
     }
 }
 
@@ -156,16 +156,16 @@ pub(super) fn restore_modes() {
     }
 }
 
-fn take() -> io::Result<()> {
+fn take_terminal() -> io::Result<()> {
     enable_raw_mode()?;
     RAW.store(true, Ordering::Release);
     TAKEN.store(true, Ordering::Release);
     *OWNER.lock().unwrap_or_else(PoisonError::into_inner) = Some(thread::current().id());
-    enter(&mut io::stdout()).inspect_err(|_| restore())
+    write_setup(&mut io::stdout()).inspect_err(|_| restore_terminal())
 }
 
 /// Restores the terminal if it is in use. Errors are ignored because they cannot be reported.
-fn restore() {
+fn restore_terminal() {
     leave_screen();
     if RAW.swap(false, Ordering::AcqRel) {
         let _ = disable_raw_mode();
@@ -173,35 +173,35 @@ fn restore() {
 }
 
 /// Restores the screen if it is in use, dropping unsent output. If the terminal does not accept output, data
-/// buffered by the operating system is also dropped. Returns within three times [`STUCK`].
+/// buffered by the operating system is also dropped. Takes at most three times [`STUCK`].
 fn leave_screen() {
     if !TAKEN.swap(false, Ordering::AcqRel) {
         return;
     }
     let drop_kept = || tcflush(io::stdout(), FlushArg::TCOFLUSH);
-    if !writer::discard(STUCK) {
+    if !writer::discard_queued(STUCK) {
         let _ = drop_kept();
     }
     let mut bytes = Vec::new();
     let (deadline, dropped) = (Instant::now() + STUCK, Cell::new(false));
     // Nothing else is writing, so dropping the system's buffered output makes room.
     let is_late = || Instant::now() >= deadline && (dropped.replace(true) || drop_kept().is_err());
-    let _ = leave(&mut bytes)
+    let _ = write_restore(&mut bytes)
         .and_then(|()| writer::open_output())
         .and_then(|mut out| writer::write_all(&mut out, &bytes, is_late));
 }
 
-/// Restores the terminal from another thread in case its owner is blocked. Returns quickly: if the terminal
-/// does not accept output, only a spawned thread waits.
+/// Restores the terminal from another thread in case its owner is blocked. Does not block: if the terminal
+/// does not accept output, a spawned thread waits for it.
 pub(super) fn restore_from_other_thread() {
     if RAW.swap(false, Ordering::AcqRel) {
         let _ = disable_raw_mode();
     }
     if TAKEN.swap(false, Ordering::AcqRel) {
-        writer::discard(Duration::ZERO);
+        writer::discard_queued(Duration::ZERO);
         thread::spawn(|| {
             let tty = std::fs::OpenOptions::new().write(true).open("/dev/tty");
-            tty.and_then(|mut tty| leave(&mut tty))
+            tty.and_then(|mut tty| write_restore(&mut tty))
         });
     }
 }
@@ -223,7 +223,7 @@ fn prepare_abort() {
     LAST_WORDS.get_or_init(|| {
         let (mut delete_images, mut leave) = (Vec::new(), Vec::new());
         // Writing to a vector cannot fail.
-        let _ = leave_images(&mut delete_images).and_then(|()| leave_text(&mut leave));
+        let _ = write_image_deletion(&mut delete_images).and_then(|()| write_frame_end_and_leave(&mut leave));
         RestoreData { modes: tcgetattr(io::stdin()).ok().map(Into::into), delete_images, leave }
     });
     abort::set_terminal_restore(restore_on_abort);
@@ -266,8 +266,8 @@ pub(super) fn enable_focus_reports() {
     FOCUS.store(true, Ordering::Release);
 }
 
-/// Bytes to send before setting a window title. The first time, they save the original title. After that,
-/// they are empty.
+/// Bytes to send before setting a window title. The first call returns the bytes that save the original
+/// title, and later calls return none.
 pub(super) fn title_saving_bytes() -> &'static [u8] {
     if HAS_TITLE.swap(true, Ordering::AcqRel) { b"" } else { KEEP_TITLE }
 }
@@ -295,7 +295,7 @@ fn undo_bytes() -> impl Iterator<Item = &'static [u8]> {
 }
 
 /// Writes the bytes that set up the screen.
-fn enter(out: &mut impl Write) -> io::Result<()> {
+fn write_setup(out: &mut impl Write) -> io::Result<()> {
     let mouse = if MOUSE.load(Ordering::Acquire) { MOUSE_ON } else { MOUSE_OFF };
     let focus = if FOCUS.load(Ordering::Acquire) { FOCUS_ON } else { "" };
     execute!(
@@ -310,22 +310,22 @@ fn enter(out: &mut impl Write) -> io::Result<()> {
 }
 
 /// Writes the bytes that restore the screen, even if a frame was cut off at any point.
-fn leave(out: &mut impl Write) -> io::Result<()> {
+fn write_restore(out: &mut impl Write) -> io::Result<()> {
     if HAS_IMAGES.load(Ordering::Acquire) {
-        leave_images(out)?;
+        write_image_deletion(out)?;
     }
     undo_bytes().try_for_each(|bytes| out.write_all(bytes))?;
-    leave_text(out)
+    write_frame_end_and_leave(out)
 }
 
 /// Writes the bytes that delete stored images.
-fn leave_images(out: &mut impl Write) -> io::Result<()> {
+fn write_image_deletion(out: &mut impl Write) -> io::Result<()> {
     out.write_all(STRING_END)?;
     out.write_all(&graphics::delete_all())
 }
 
 /// Writes the bytes that end an unfinished frame and switch back to the shell's screen.
-fn leave_text(out: &mut impl Write) -> io::Result<()> {
+fn write_frame_end_and_leave(out: &mut impl Write) -> io::Result<()> {
     execute!(
         out,
         EndSynchronizedUpdate,
@@ -349,7 +349,7 @@ fn chain_panic_hook() {
             if TAKEN.load(Ordering::Acquire) && owner != Some(std::thread::current().id()) {
                 *PANIC.lock().unwrap_or_else(PoisonError::into_inner) = Some(info.to_string());
             } else {
-                restore();
+                restore_terminal();
                 previous(info);
             }
         }));
@@ -362,7 +362,7 @@ pub(super) fn last_panic() -> Option<String> {
 }
 
 /// Returns an error if stdin or stdout is not a terminal.
-pub(super) fn require() -> Result<(), TuiError> {
+pub(super) fn require_terminal() -> Result<(), TuiError> {
     if !io::stdin().is_terminal() {
         return Err(TuiError::NotATerminal { stream: "standard input" });
     }
@@ -373,19 +373,19 @@ pub(super) fn require() -> Result<(), TuiError> {
 }
 
 /// Whether the terminal still exists.
-pub(super) fn is_there() -> bool {
-    require().is_ok()
+pub(super) fn terminal_exists() -> bool {
+    require_terminal().is_ok()
 }
 
 /// Window size and cell aspect ratio. The aspect ratio is `cell_aspect` if given. Otherwise it is derived
-/// from the window size in pixels, or 2 if that is unknown.
-pub(super) fn window(cell_aspect: Option<f32>) -> Window {
+/// from the window size in pixels. It is 2 if that size is unknown.
+pub(super) fn query_window(cell_aspect: Option<f32>) -> Window {
     match terminal::window_size() {
         Ok(size) => limit_window(Window {
             columns: size.columns,
             rows: size.rows,
             cell_aspect: cell_aspect
-                .unwrap_or_else(|| aspect((size.columns, size.rows), (size.width, size.height))),
+                .unwrap_or_else(|| cell_aspect_ratio((size.columns, size.rows), (size.width, size.height))),
             cell_pixels: cell_pixels((size.columns, size.rows), (size.width, size.height)),
         }),
         Err(_) => {
@@ -416,7 +416,7 @@ fn limit_window(window: Window) -> Window {
 
 /// Height-to-width ratio of a cell. Reported pixel sizes are often zero or implausible. Values within 3% of 2
 /// are rounded to 2 so that previews need no scaling.
-fn aspect(cells: (u16, u16), pixels: (u16, u16)) -> f32 {
+fn cell_aspect_ratio(cells: (u16, u16), pixels: (u16, u16)) -> f32 {
     let width = f32::from(pixels.0) / f32::from(cells.0);
     let height = f32::from(pixels.1) / f32::from(cells.1);
     let aspect = height / width;
@@ -450,8 +450,8 @@ mod tests {
     #[test]
     fn leaving_undoes_entering() {
         let _alone = exclusive_access();
-        let enter = bytes(enter);
-        let leave = bytes(leave);
+        let enter = bytes(write_setup);
+        let leave = bytes(write_restore);
         for mode in ["?1049", "?25", "?2004", "?1000", "?1002", "?1006"] {
             assert!(enter.contains(mode) && leave.contains(mode), "{mode}: {enter:?} {leave:?}");
         }
@@ -480,21 +480,21 @@ mod tests {
         let side = |length| std::num::NonZero::new(length).expect("not zero");
         let mut screen = vt100::Parser::new(side(5), side(20), 0);
         screen.process(b"shell$ ");
-        screen.process(bytes(enter).as_bytes());
+        screen.process(bytes(write_setup).as_bytes());
         screen.process(b"picture");
         assert!(screen.screen().alternate_screen() && screen.screen().hide_cursor());
-        screen.process(bytes(leave).as_bytes());
+        screen.process(bytes(write_restore).as_bytes());
         assert!(!screen.screen().alternate_screen() && !screen.screen().hide_cursor());
         assert!(screen.screen().contents().starts_with("shell$ "));
     }
 
     #[test]
     fn implausible_cell_aspects_are_ignored() {
-        assert_eq!(aspect((80, 24), (80 * 8, 24 * 18)), 2.25);
-        assert_eq!(aspect((80, 24), (0, 0)), 2.0);
-        assert_eq!(aspect((0, 0), (640, 480)), 2.0);
-        assert_eq!(aspect((80, 24), (80, 24)), 2.0);
-        assert_eq!(aspect((100, 50), (1000, 1010)), 2.0);
+        assert_eq!(cell_aspect_ratio((80, 24), (80 * 8, 24 * 18)), 2.25);
+        assert_eq!(cell_aspect_ratio((80, 24), (0, 0)), 2.0);
+        assert_eq!(cell_aspect_ratio((0, 0), (640, 480)), 2.0);
+        assert_eq!(cell_aspect_ratio((80, 24), (80, 24)), 2.0);
+        assert_eq!(cell_aspect_ratio((100, 50), (1000, 1010)), 2.0);
     }
 
     #[test]
@@ -525,7 +525,7 @@ mod tests {
     fn restoring_unused_terminal_does_nothing() {
         let _alone = exclusive_access();
         assert!(!TAKEN.load(Ordering::Acquire));
-        restore();
+        restore_terminal();
         restore_from_other_thread();
         assert!(!TAKEN.load(Ordering::Acquire));
     }

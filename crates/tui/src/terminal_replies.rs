@@ -18,7 +18,7 @@ pub(super) enum BlockGlyphs {
 impl BlockGlyphs {
     /// Block characters supported by a terminal version. All terminals listed here have supported sextants
     /// for a long time.
-    pub(super) fn of(terminal: TerminalId) -> Self {
+    pub(super) fn supported_by(terminal: TerminalId) -> Self {
         let octants_since = match terminal.brand {
             Brand::Kitty => [0, 40],
             Brand::Foot => [1, 20],
@@ -138,7 +138,8 @@ mod tests {
             ("XTerm(390)", BlockGlyphs::Unknown),
             ("", BlockGlyphs::Unknown),
         ] {
-            let found = TerminalId::from_report(report).map_or(BlockGlyphs::Unknown, BlockGlyphs::of);
+            let found =
+                TerminalId::from_report(report).map_or(BlockGlyphs::Unknown, BlockGlyphs::supported_by);
             assert_eq!(found, blocks, "{report}");
         }
     }

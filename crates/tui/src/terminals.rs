@@ -127,11 +127,11 @@ impl TerminalId {
         ];
         let (name, rest) = report.split_at(report.find(['(', ' ']).unwrap_or(report.len()));
         let (_, brand) = NAMES.iter().find(|(known, _)| name.eq_ignore_ascii_case(known))?;
-        Some(Self { brand: *brand, version: version(rest.get(1..).unwrap_or_default()) })
+        Some(Self { brand: *brand, version: parse_version(rest.get(1..).unwrap_or_default()) })
     }
 
-    /// Detects the terminal from environment variables. `None` if unknown, or inside tmux or screen, which do
-    /// not pass on the escape sequences.
+    /// Detects the terminal from environment variables. `None` if it is unknown, and inside tmux or screen,
+    /// because these do not pass on the escape sequences.
     pub(super) fn from_environment(variable: impl Fn(&str) -> Option<String>) -> Option<Self> {
         const TERMS: [(&str, Brand); 6] = [
             ("xterm-kitty", Brand::Kitty),
@@ -147,7 +147,7 @@ impl TerminalId {
         if is_set("TMUX") || is_set("STY") || is_without_extras(&term) {
             return None;
         }
-        let known = |brand: Brand, number: &str| Some(Self { brand, version: version(&get(number)) });
+        let known = |brand: Brand, number: &str| Some(Self { brand, version: parse_version(&get(number)) });
         // These two variables are overwritten by terminals that run inside other terminals.
         if let Some(brand) = Brand::from_program(&get("TERM_PROGRAM")) {
             return known(brand, "TERM_PROGRAM_VERSION");
@@ -165,7 +165,7 @@ impl TerminalId {
                 Some(Self { brand: Brand::Konsole, version: [number / 10_000, number / 100 % 100] })
             }
             () if is_set("XTERM_VERSION") => known(Brand::Xterm, ""),
-            // iTerm2 is the only terminal whose name is forwarded over SSH by default.
+            // iTerm2's is the only name that SSH forwards by default.
             () if get("LC_TERMINAL") == "iTerm2" => known(Brand::Iterm2, "LC_TERMINAL_VERSION"),
             () => None,
         }
@@ -224,7 +224,7 @@ fn is_without_extras(term: &str) -> bool {
 }
 
 /// The first two numbers of a version string.
-fn version(text: &str) -> [u32; 2] {
+fn parse_version(text: &str) -> [u32; 2] {
     let mut numbers = text.split(|c: char| !c.is_ascii_digit());
     let mut number = || numbers.next().and_then(|digits| digits.parse().ok()).unwrap_or(0);
     [number(), number()]

@@ -57,18 +57,18 @@ pub(super) struct WindowTitle {
 
 impl WindowTitle {
     /// Title and progress bar for the state, with larger percentage steps if the connection `is_slow`. `None`
-    /// if they should stay as they are.
-    pub(super) fn of(state: &State, is_slow: bool) -> Option<Self> {
+    /// to leave both unchanged.
+    pub(super) fn for_state(state: &State, is_slow: bool) -> Option<Self> {
         let capabilities = state.display.capabilities;
         if state.work.running_time(state.now).is_some_and(|time| time < SHORT) && !state.work.paused {
             return None;
         }
         let progress = state.work.progress.as_ref().filter(|_| state.work.is_running());
         let step = if is_slow { COARSE } else { 1 };
-        let percent = progress.map(|progress| view::text::percent(progress.fraction) / step * step);
+        let percent = progress.map(|progress| view::text::floor_percent(progress.fraction) / step * step);
         Some(Self {
-            title: capabilities.title.then(|| title(state, percent)),
-            bar: capabilities.progress.then(|| bar(state, percent)),
+            title: capabilities.title.then(|| title_text(state, percent)),
+            bar: capabilities.progress.then(|| progress_bar(state, percent)),
         })
     }
 
@@ -86,19 +86,19 @@ impl WindowTitle {
 }
 
 /// `cornell.toml: rendering 38 % · glimt`.
-fn title(state: &State, percent: Option<u32>) -> String {
-    let word = view::state_word(state);
+fn title_text(state: &State, percent: Option<u32>) -> String {
+    let word = view::activity_word(state);
     let percent = percent.map_or(String::new(), |percent| format!(" {percent} %"));
-    format!("{}: {word}{percent} · glimt", name(state))
+    format!("{}: {word}{percent} · glimt", scene_file_name(state))
 }
 
 /// The scene's file name.
-fn name(state: &State) -> String {
+fn scene_file_name(state: &State) -> String {
     let name = state.request.scene.file_name().unwrap_or(state.request.scene.as_os_str());
     visible(&name.to_string_lossy()).into_owned()
 }
 
-fn bar(state: &State, percent: Option<u32>) -> ProgressBar {
+fn progress_bar(state: &State, percent: Option<u32>) -> ProgressBar {
     match state.work.activity {
         Activity::Running { .. } if state.work.paused => ProgressBar::Paused(percent.unwrap_or(0)),
         Activity::Running { .. } => percent.map_or(ProgressBar::Busy, ProgressBar::Percent),
@@ -108,8 +108,13 @@ fn bar(state: &State, percent: Option<u32>) -> ProgressBar {
 }
 
 /// Bytes that send a notification that a render has ended after `time`.
-pub(super) fn notice(state: &State, notice: NotificationProtocol, time: Duration) -> Vec<u8> {
-    let words = format!("{}: {} after {}", name(state), view::state_word(state), view::text::duration(time));
+pub(super) fn notification_bytes(state: &State, notice: NotificationProtocol, time: Duration) -> Vec<u8> {
+    let words = format!(
+        "{}: {} after {}",
+        scene_file_name(state),
+        view::activity_word(state),
+        view::text::format_duration(time)
+    );
     match notice {
         NotificationProtocol::Osc9 => format!("\x1b]9;glimt: {words}\x1b\\").into_bytes(),
         NotificationProtocol::Osc99 => format!("\x1b]99;;glimt: {words}\x1b\\").into_bytes(),
@@ -119,14 +124,14 @@ pub(super) fn notice(state: &State, notice: NotificationProtocol, time: Duration
 }
 
 /// Bytes that copy text to the clipboard.
-pub(super) fn copy(text: &str) -> Vec<u8> {
+pub(super) fn clipboard_bytes(text: &str) -> Vec<u8> {
     [b"\x1b]52;c;", &*base64::encoded(text.as_bytes()), b"\x1b\\"].concat()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fixtures::{TestUi, progress};
+    use crate::fixtures::{TestUi, render_progress};
     use crate::pipeline::protocol::Event;
     use crate::terminals::{Brand, Capabilities, TerminalId};
 
@@ -137,7 +142,7 @@ mod tests {
     }
 
     fn sent(before: &mut WindowTitle, ui: &TestUi, is_slow: bool) -> String {
-        let now = WindowTitle::of(&ui.state, is_slow).unwrap_or_else(|| before.clone());
+        let now = WindowTitle::for_state(&ui.state, is_slow).unwrap_or_else(|| before.clone());
         let bytes = before.changes(&now);
         *before = now;
         String::from_utf8(bytes).expect("UTF-8")
@@ -147,10 +152,10 @@ mod tests {
     fn title_and_progress_bar_show_the_render() {
         let (mut ui, mut shown_title) = (ui(), WindowTitle::default());
         assert_eq!(sent(&mut shown_title, &ui, false), "", "short renders should not be shown");
-        ui.wait(600);
+        ui.advance_clock(600);
         let busy = "\x1b]2;cornell.toml: rendering · glimt\x1b\\\x1b]9;4;3;0\x1b\\";
         assert_eq!(sent(&mut shown_title, &ui, false), busy);
-        ui.worker(Event::Progress { generation: 1, progress: progress(0.389, None) });
+        ui.worker_event(Event::Progress { generation: 1, progress: render_progress(0.389, None) });
         let part = "\x1b]2;cornell.toml: rendering 38 % · glimt\x1b\\\x1b]9;4;1;38\x1b\\";
         assert_eq!(sent(&mut shown_title, &ui, false), part);
         let coarse = "\x1b]2;cornell.toml: rendering 30 % · glimt\x1b\\\x1b]9;4;1;30\x1b\\";
@@ -159,12 +164,12 @@ mod tests {
         let held = "\x1b]2;cornell.toml: paused 30 % · glimt\x1b\\\x1b]9;4;4;30\x1b\\";
         assert_eq!(sent(&mut shown_title, &ui, true), held);
         ui.press(' ');
-        ui.finish([200, 30, 30]);
+        ui.finish_render([200, 30, 30]);
         let done = "\x1b]2;cornell.toml: done · glimt\x1b\\\x1b]9;4;0;0\x1b\\";
         assert_eq!(sent(&mut shown_title, &ui, false), done);
         assert_eq!(sent(&mut shown_title, &ui, false), "", "unchanged state should send no bytes");
-        ui.fail(Vec::new());
-        ui.event(crate::event::Event::Settled);
+        ui.fail_render(Vec::new());
+        ui.handle_event(crate::event::Event::Settled);
         assert!(sent(&mut shown_title, &ui, false).contains("\x1b]9;4;2;100\x1b\\"));
     }
 
@@ -172,7 +177,7 @@ mod tests {
     fn unsupported_terminals_get_no_title() {
         let (mut ui, mut shown_title) = (TestUi::new(), WindowTitle::default());
         assert_eq!(ui.state.display.capabilities, Capabilities::default());
-        ui.finish([200, 30, 30]);
+        ui.finish_render([200, 30, 30]);
         assert_eq!(sent(&mut shown_title, &ui, false), "");
     }
 
@@ -180,12 +185,12 @@ mod tests {
     fn control_characters_in_file_names_are_escaped() {
         let mut ui = ui();
         ui.state.request.scene = "a\x1b\\\x07b.toml".into();
-        ui.finish([200, 30, 30]);
+        ui.finish_render([200, 30, 30]);
         let title = sent(&mut WindowTitle::default(), &ui, false);
         assert_eq!(title, "\x1b]2;a␛\\␇b.toml: done · glimt\x1b\\");
-        let bytes = notice(&ui.state, NotificationProtocol::Osc777, Duration::from_secs(95));
+        let bytes = notification_bytes(&ui.state, NotificationProtocol::Osc777, Duration::from_secs(95));
         let words = String::from_utf8(bytes).expect("UTF-8");
         assert_eq!(words, "\x1b]777;notify;glimt;a␛\\␇b.toml: done after 1 min 35 s\x1b\\");
-        assert_eq!(copy("a b"), b"\x1b]52;c;YSBi\x1b\\");
+        assert_eq!(clipboard_bytes("a b"), b"\x1b]52;c;YSBi\x1b\\");
     }
 }

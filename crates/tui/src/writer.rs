@@ -40,7 +40,7 @@ impl WriteQueue {
     }
 
     /// Waits for the next slice.
-    fn take(&self) -> Vec<u8> {
+    fn wait_for_slice(&self) -> Vec<u8> {
         let mut waiting = self.lock();
         loop {
             if let Some(slice) = waiting.slices.pop_front() {
@@ -51,7 +51,7 @@ impl WriteQueue {
         }
     }
 
-    fn done(&self) {
+    fn finish_slice(&self) {
         self.lock().is_writing = false;
         self.changed.notify_all();
     }
@@ -61,14 +61,14 @@ impl WriteQueue {
 ///
 /// # Errors
 /// The thread or file descriptor could not be created.
-pub(super) fn start(events: &Sender<Event>) -> io::Result<()> {
+pub(super) fn start_writer(events: &Sender<Event>) -> io::Result<()> {
     let events = events.clone();
     let mut out = open_output()?;
     let write = move || {
         loop {
-            let slice = QUEUE.take();
+            let slice = QUEUE.wait_for_slice();
             let outcome = write_all(&mut out, &slice, || QUEUE.lock().is_given_up);
-            QUEUE.done();
+            QUEUE.finish_slice();
             let event = match &outcome {
                 Ok(()) => Event::Written { bytes: slice.len() },
                 Err(error) => Event::Unwritable(error.kind()),
@@ -82,8 +82,9 @@ pub(super) fn start(events: &Sender<Event>) -> io::Result<()> {
     Ok(())
 }
 
-/// Opens the terminal connected to standard output, without buffering and without a lock that a stalled
-/// writer could hold. It is opened as nonblocking, which does not affect other users of the terminal.
+/// Opens the terminal connected to standard output, bypassing the buffer and lock of `stdout`, because a
+/// stalled writer could hold the lock. It is opened in nonblocking mode, which does not affect other users of
+/// the terminal.
 pub(super) fn open_output() -> io::Result<File> {
     let stdout = io::stdout();
     let terminal = ttyname(stdout.as_fd()).map_err(io::Error::from).and_then(|name| {
@@ -95,7 +96,7 @@ pub(super) fn open_output() -> io::Result<File> {
 }
 
 /// Queues a slice.
-pub(super) fn send(slice: Vec<u8>) {
+pub(super) fn queue_slice(slice: Vec<u8>) {
     let mut waiting = QUEUE.lock();
     waiting.is_given_up = false;
     waiting.slices.push_back(slice);
@@ -105,7 +106,7 @@ pub(super) fn send(slice: Vec<u8>) {
 
 /// Drops queued slices and waits for the slice being written. If this takes longer than `patience`, also
 /// drops the rest of that slice and returns false.
-pub(super) fn discard(patience: Duration) -> bool {
+pub(super) fn discard_queued(patience: Duration) -> bool {
     let mut waiting = QUEUE.lock();
     waiting.slices.clear();
     let wait = |waiting, patience| {

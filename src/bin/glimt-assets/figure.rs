@@ -4,7 +4,7 @@
 use super::surface::Surface;
 use super::vector::{Vector, add, dot, mix, scale, subtract, unit};
 
-/// Corner of the lattice, size of a cell, and number of cells along each axis.
+/// The lattice's corner, cell size, and number of cells along each axis.
 const CORNER: Vector = [-0.13, -0.025, -0.1];
 const CELL: f64 = 0.0029;
 const CELLS: [usize; 3] = [91, 124, 91];
@@ -12,7 +12,7 @@ const CELLS: [usize; 3] = [91, 124, 91];
 /// Distance below which two parts blend.
 const BLEND: f64 = 0.022;
 
-/// Both ends and radii of each part. Parts off the center exist on both sides.
+/// The ends and radii of each part. Parts off the center are mirrored.
 const PARTS: [[(Vector, f64); 2]; 8] = [
     // Trunk, head, snout.
     [([0.0, 0.068, 0.0], 0.076), ([0.0, 0.165, -0.004], 0.058)],
@@ -27,26 +27,26 @@ const PARTS: [[(Vector, f64); 2]; 8] = [
 ];
 
 /// The zero level set of the distance, extracted with surface nets (Gibson, *Constrained Elastic Surface
-/// Nets*, MICCAI 1998): a vertex, moved onto the surface, in each cell crossed by the surface, and a quad
-/// around each edge crossed by the surface.
+/// Nets*, MICCAI 1998): one vertex, moved onto the surface, per cell that the surface crosses, and one quad
+/// per lattice edge that it crosses.
 pub(crate) fn bear() -> Surface {
-    let inside = lattice();
+    let inside = inside_flags();
     let [nx, ny, nz] = CELLS;
     let corner = |[x, y, z]: [usize; 3]| inside[(x * (ny + 1) + y) * (nz + 1) + z];
     let mut surface = Surface::default();
     // Add a vertex in each cell that has corners on both sides.
     let mut vertices = vec![u32::MAX; nx * ny * nz];
     let cell = |[x, y, z]: [usize; 3]| (x * ny + y) * nz + z;
-    for at in all(CELLS) {
+    for at in lattice_points(CELLS) {
         let corners =
             (0..8).filter(|&c| corner([at[0] + (c & 1), at[1] + (c >> 1 & 1), at[2] + (c >> 2)])).count();
         if corners % 8 != 0 {
             vertices[cell(at)] = surface.positions.len() as u32;
-            surface.positions.push(onto(place(at, 0.5)));
+            surface.positions.push(project_onto_surface(lattice_position(at, 0.5)));
         }
     }
     // Add a quad around each edge that crosses the surface, facing outward.
-    for (at, axis) in all(CELLS).flat_map(|at| (0..3).map(move |axis| (at, axis))) {
+    for (at, axis) in lattice_points(CELLS).flat_map(|at| (0..3).map(move |axis| (at, axis))) {
         let (next, last) = ((axis + 1) % 3, (axis + 2) % 3);
         if at[next] == 0 || at[last] == 0 {
             continue;
@@ -71,40 +71,42 @@ pub(crate) fn bear() -> Surface {
 }
 
 /// Whether each lattice point is inside.
-fn lattice() -> Vec<bool> {
-    all(CELLS.map(|cells| cells + 1)).map(|at| distance(place(at, 0.0)) < 0.0).collect()
+fn inside_flags() -> Vec<bool> {
+    lattice_points(CELLS.map(|cells| cells + 1))
+        .map(|at| bear_distance(lattice_position(at, 0.0)) < 0.0)
+        .collect()
 }
 
 /// All points of a lattice, with the last axis varying fastest.
-fn all([nx, ny, nz]: [usize; 3]) -> impl Iterator<Item = [usize; 3]> {
+fn lattice_points([nx, ny, nz]: [usize; 3]) -> impl Iterator<Item = [usize; 3]> {
     (0..nx).flat_map(move |x| (0..ny).flat_map(move |y| (0..nz).map(move |z| [x, y, z])))
 }
 
 /// Position of a lattice point, offset by a fraction of a cell along all axes.
-fn place(at: [usize; 3], by: f64) -> Vector {
+fn lattice_position(at: [usize; 3], by: f64) -> Vector {
     add(CORNER, at.map(|index| (index as f64 + by) * CELL))
 }
 
 /// Moves a point onto the surface with Newton steps along the gradient.
-fn onto(mut point: Vector) -> Vector {
+fn project_onto_surface(mut point: Vector) -> Vector {
     for _ in 0..6 {
-        point = subtract(point, scale(gradient(point), distance(point)));
+        point = subtract(point, scale(distance_gradient(point), bear_distance(point)));
     }
     point
 }
 
-fn gradient(point: Vector) -> Vector {
+fn distance_gradient(point: Vector) -> Vector {
     const STEP: f64 = 1e-5;
     let slope = |axis: usize| {
         let mut aside = [0.0; 3];
         aside[axis] = STEP;
-        distance(add(point, aside)) - distance(subtract(point, aside))
+        bear_distance(add(point, aside)) - bear_distance(subtract(point, aside))
     };
     unit([slope(0), slope(1), slope(2)])
 }
 
 /// Approximate signed distance to the bear, negative inside.
-fn distance([x, y, z]: Vector) -> f64 {
+fn bear_distance([x, y, z]: Vector) -> f64 {
     // The bear is symmetric.
     let point = [x.abs(), y, z];
     PARTS.iter().map(|ends| round_cone(point, ends)).fold(f64::MAX, |a, b| {
@@ -113,7 +115,7 @@ fn distance([x, y, z]: Vector) -> f64 {
     })
 }
 
-/// Distance to a round cone: a ball swept from one end to the other with a changing radius.
+/// Distance to a round cone: a ball that is swept from one end to the other while its radius changes.
 fn round_cone(point: Vector, [(from, first), (to, second)]: &[(Vector, f64); 2]) -> f64 {
     let along = subtract(*to, *from);
     let t = (dot(subtract(point, *from), along) / dot(along, along)).clamp(0.0, 1.0);

@@ -1,12 +1,12 @@
-//! Furniture for `scenes/furnished.toml` and `scenes/ajar.toml`. Units are meters. Each piece stands on the
+//! Furniture for `scenes/furnished.toml` and `scenes/ajar.toml`. Units are meters. Each piece stands at the
 //! origin and faces +z.
 
-use super::parts::{ball, bar, block, join, moved, turned_body};
+use super::parts::{ball, bar, block, join, solid_of_revolution, translate};
 use super::surface::Surface;
-use super::vector::{Vector, turn};
+use super::vector::{Vector, sin_cos_turns};
 
 /// All pieces and their file names.
-pub(crate) fn parts() -> Vec<(&'static str, Surface)> {
+pub(crate) fn furniture_meshes() -> Vec<(&'static str, Surface)> {
     vec![
         ("furniture/cushion.ply", cushion()),
         ("furniture/armrest.ply", block([-0.1, 0.1, -0.42], [0.1, 0.62, 0.42], 0.045)),
@@ -39,7 +39,7 @@ pub(crate) fn parts() -> Vec<(&'static str, Surface)> {
 fn cushion() -> Surface {
     let (rings, sides) = (9, 32);
     let outline = |ring: u32| {
-        let (sin, cos) = turn(0.5 * f64::from(ring) / f64::from(rings - 1) - 0.25);
+        let (sin, cos) = sin_cos_turns(0.5 * f64::from(ring) / f64::from(rings - 1) - 0.25);
         (0.1 + 0.1 * sin.signum() * sin.abs().sqrt(), cos.max(0.0).sqrt())
     };
     let mut surface = Surface::default();
@@ -47,7 +47,7 @@ fn cushion() -> Surface {
         let (height, reach) = outline(ring);
         let count = if ring == 0 || ring == rings - 1 { 1 } else { sides };
         surface.positions.extend((0..count).map(|side| {
-            let (sin, cos) = turn(f64::from(side) / f64::from(sides));
+            let (sin, cos) = sin_cos_turns(f64::from(side) / f64::from(sides));
             // A square with rounded corners.
             let round = |along: f64| 0.5 * along.signum() * along.abs().sqrt();
             [reach * round(cos), height, reach * round(sin)]
@@ -75,19 +75,19 @@ fn cushion() -> Surface {
 }
 
 fn foot() -> Surface {
-    turned_body(&[[0.0, 0.0], [0.018, 0.0], [0.018, 0.0], [0.03, 0.1], [0.0, 0.1]], 10)
+    solid_of_revolution(&[[0.0, 0.0], [0.018, 0.0], [0.018, 0.0], [0.03, 0.1], [0.0, 0.1]], 10)
 }
 
 /// A table leg of height 1, scaled by the scene.
 fn leg() -> Surface {
-    turned_body(&[[0.0, 0.0], [0.016, 0.0], [0.016, 0.0], [0.026, 1.0], [0.026, 1.0], [0.0, 1.0]], 12)
+    solid_of_revolution(&[[0.0, 0.0], [0.016, 0.0], [0.016, 0.0], [0.026, 1.0], [0.026, 1.0], [0.0, 1.0]], 12)
 }
 
 /// A round glass plate of radius 0.5 with a rounded edge.
 fn plate() -> Surface {
     let outline =
         [[0.0, 0.0], [0.494, 0.0], [0.498, 0.002], [0.5, 0.006], [0.498, 0.01], [0.494, 0.012], [0.0, 0.012]];
-    turned_body(&outline, 64)
+    solid_of_revolution(&outline, 64)
 }
 
 /// A 1.2 by 2.0 shelf, 0.3 deep, with four boards between its sides.
@@ -113,7 +113,7 @@ fn cover() -> Surface {
     ])
 }
 
-/// The pages inside the book cover.
+/// The pages inside the cover of a book.
 fn pages() -> Surface {
     block([-0.425, 0.01, -0.48], [0.425, 0.985, 0.445], 0.005)
 }
@@ -150,7 +150,7 @@ fn stand() -> Surface {
         [0.011, 1.5],
         [0.0, 1.5],
     ];
-    turned_body(&outline, 24)
+    solid_of_revolution(&outline, 24)
 }
 
 /// A conical lampshade, open at both ends, 0.26 high.
@@ -166,7 +166,7 @@ fn shade() -> Surface {
         [0.217, 0.0],
         [0.22, 0.0],
     ];
-    turned_body(&outline, 32)
+    solid_of_revolution(&outline, 32)
 }
 
 /// A hollow glass decanter with a round belly, 0.27 high.
@@ -198,14 +198,14 @@ fn decanter() -> Surface {
         [0.06, 0.012],
         [0.0, 0.014],
     ];
-    turned_body(&[&outside[..], &inside[..]].concat(), 40)
+    solid_of_revolution(&[&outside[..], &inside[..]].concat(), 40)
 }
 
 /// A drinking glass, 0.095 high.
 fn tumbler() -> Surface {
     let outside = [[0.0, 0.0], [0.03, 0.0], [0.034, 0.004], [0.036, 0.02], [0.04, 0.092], [0.039, 0.095]];
     let inside = [[0.0375, 0.092], [0.0335, 0.024], [0.03, 0.016], [0.0, 0.014]];
-    turned_body(&[&outside[..], &inside[..]].concat(), 32)
+    solid_of_revolution(&[&outside[..], &inside[..]].concat(), 32)
 }
 
 /// A wide bowl, 0.09 high.
@@ -213,7 +213,7 @@ fn bowl() -> Surface {
     let outside =
         [[0.0, 0.0], [0.05, 0.0], [0.05, 0.0], [0.055, 0.01], [0.11, 0.04], [0.145, 0.085], [0.142, 0.09]];
     let inside = [[0.137, 0.085], [0.104, 0.044], [0.05, 0.018], [0.0, 0.014]];
-    turned_body(&[&outside[..], &inside[..]].concat(), 32)
+    solid_of_revolution(&[&outside[..], &inside[..]].concat(), 32)
 }
 
 /// A flower pot with soil.
@@ -230,7 +230,7 @@ fn pot() -> Surface {
         [0.15, 0.26],
         [0.0, 0.27],
     ];
-    turned_body(&outline, 28)
+    solid_of_revolution(&outline, 28)
 }
 
 /// A two-sided leaf of length 1 along z, bent downward.
@@ -260,8 +260,8 @@ fn curtain() -> Surface {
     let mut surface = Surface::default();
     for column in 0..=columns {
         let along = f64::from(column) / f64::from(columns);
-        let (fold, _) = turn(6.0 * along);
-        let (uneven, _) = turn(1.7 * along + 0.1);
+        let (fold, _) = sin_cos_turns(6.0 * along);
+        let (uneven, _) = sin_cos_turns(1.7 * along + 0.1);
         for (height, depth) in [(0.0, 0.04), (0.5, 0.034), (1.0, 0.022)] {
             surface.positions.push([0.5 * along, height, depth * (fold + 0.4 * uneven)]);
         }
@@ -316,7 +316,7 @@ fn door() -> Surface {
     ])
 }
 
-/// The door frame, in a wall 0.12 thick behind the origin.
+/// The door frame, in a wall behind the origin that is 0.12 thick.
 fn jamb() -> Surface {
     join([
         block([-0.09, 0.0, -0.14], [0.0, 2.06, 0.02], 0.006),
@@ -338,6 +338,6 @@ fn bed() -> Surface {
         block([-0.47, 0.25, 0.98], [0.47, 0.45, 1.02], 0.008),
         block([-0.52, 0.24, -0.97], [-0.48, 0.34, 0.97], 0.006),
         block([0.48, 0.24, -0.97], [0.52, 0.34, 0.97], 0.006),
-        moved(block([-0.48, 0.0, -0.97], [0.48, 0.2, 0.97], 0.05), [0.0, 0.3, 0.0]),
+        translate(block([-0.48, 0.0, -0.97], [0.48, 0.2, 0.97], 0.05), [0.0, 0.3, 0.0]),
     ])
 }

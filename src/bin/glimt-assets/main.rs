@@ -29,8 +29,8 @@ type AssetFile = (&'static str, Vec<u8>);
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let files = match arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {
-        [] => stored(),
-        ["million"] => vec![("million.ply", shapes::million().to_ply())],
+        [] => stored_assets(),
+        ["million"] => vec![("million.ply", shapes::mountainous_globe().to_ply())],
         ["figure"] => vec![("figure.ply", figure::bear().to_ply())],
         _ => {
             let _ = writeln!(io::stderr(), "{USAGE}");
@@ -54,7 +54,7 @@ fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
 }
 
 /// All files stored in the repository.
-fn stored() -> Vec<AssetFile> {
+fn stored_assets() -> Vec<AssetFile> {
     let single = vec![
         ("coral.ply", shapes::coral().to_ply()),
         ("rope.ply", shapes::rope().to_ply()),
@@ -68,16 +68,16 @@ fn stored() -> Vec<AssetFile> {
             "shrub.obj",
             foliage::shrub().to_obj("A shrub of leaves, squares with texture coordinates and normals"),
         ),
-        ("textures/leaf.png", foliage::leaf()),
+        ("textures/leaf.png", foliage::leaf_png()),
         ("textures/bricks.png", pictures::bricks()),
-        ("textures/bumps.png", pictures::bumps()),
+        ("textures/bumps.png", pictures::brick_normal_map()),
         ("textures/checker.png", pictures::checker()),
         ("textures/planks.png", pictures::planks()),
         ("textures/marble.png", pictures::marble()),
         ("textures/tiles.ppm", pictures::tiles()),
-        ("textures/evening.hdr", sky::evening()),
+        ("textures/evening.hdr", sky::evening_sky_hdr()),
     ];
-    let parts = stairs::parts().into_iter().chain(furniture::parts());
+    let parts = stairs::stair_meshes().into_iter().chain(furniture::furniture_meshes());
     single.into_iter().chain(parts.map(|(name, surface)| (name, surface.to_ply()))).collect()
 }
 
@@ -95,7 +95,7 @@ mod tests {
     #[test]
     fn stored_files_match_the_generator() {
         let mut total = 0;
-        for (name, bytes) in stored() {
+        for (name, bytes) in stored_assets() {
             let found = fs::read(folder().join(name)).unwrap_or_else(|error| panic!("{name}: {error}"));
             assert!(found == bytes, "{name} differs from the output of glimt-assets: run it");
             total += bytes.len();
@@ -146,8 +146,10 @@ mod tests {
     /// In a closed surface, every edge occurs equally often in both directions. Cloth and leaves are open.
     #[test]
     fn furniture_is_closed_and_faces_outward() {
-        let parts =
-            stairs::parts().into_iter().chain(furniture::parts()).chain([("figure.ply", figure::bear())]);
+        let parts = stairs::stair_meshes()
+            .into_iter()
+            .chain(furniture::furniture_meshes())
+            .chain([("figure.ply", figure::bear())]);
         for (name, surface) in parts {
             let mut edges = HashMap::new();
             let mut volume = 0.0;
@@ -222,6 +224,6 @@ mod tests {
 
     #[test]
     fn million_has_over_a_million_triangles() {
-        assert!(shapes::million().triangle_count() >= 1_000_000);
+        assert!(shapes::mountainous_globe().triangle_count() >= 1_000_000);
     }
 }

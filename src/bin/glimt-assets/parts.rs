@@ -3,7 +3,7 @@
 
 use super::shapes::displaced_sphere;
 use super::surface::Surface;
-use super::vector::{Vector, add, cross, dot, scale, subtract, turn, unit};
+use super::vector::{Vector, add, cross, dot, scale, sin_cos_turns, subtract, unit};
 
 /// Joins several solids into one surface.
 pub(crate) fn join(parts: impl IntoIterator<Item = Surface>) -> Surface {
@@ -17,11 +17,11 @@ pub(crate) fn join(parts: impl IntoIterator<Item = Surface>) -> Surface {
 }
 
 /// Translates a surface.
-pub(crate) fn moved(surface: Surface, by: Vector) -> Surface {
-    mapped(surface, |position| add(position, by))
+pub(crate) fn translate(surface: Surface, by: Vector) -> Surface {
+    map_positions(surface, |position| add(position, by))
 }
 
-fn mapped(surface: Surface, map: impl Fn(Vector) -> Vector) -> Surface {
+fn map_positions(surface: Surface, map: impl Fn(Vector) -> Vector) -> Surface {
     Surface { positions: surface.positions.into_iter().map(map).collect(), ..surface }
 }
 
@@ -29,7 +29,7 @@ fn mapped(surface: Surface, map: impl Fn(Vector) -> Vector) -> Surface {
 pub(crate) fn block(from: Vector, to: Vector, edge: f64) -> Surface {
     let (middle, half) = (scale(add(from, to), 0.5), scale(subtract(to, from), 0.5));
     let sign = |corner: u32, axis: usize| if corner >> axis & 1 == 1 { 1.0 } else { -1.0 };
-    // Use three vertices per corner, one on each adjacent side.
+    // Use three vertices per corner, one for each adjacent side.
     let mut positions = Vec::new();
     for (corner, side) in (0..8).flat_map(|corner| (0..3).map(move |side| (corner, side))) {
         let reach = |axis: usize| half[axis] - if axis == side { 0.0 } else { edge };
@@ -56,21 +56,22 @@ pub(crate) fn block(from: Vector, to: Vector, edge: f64) -> Surface {
             }
         }
     }
-    outward(positions, faces, middle)
+    orient_outward(positions, faces, middle)
 }
 
-/// A hexahedron, given by the corners of its lower side in order, followed by the corners above.
+/// A hexahedron, given by the corners of its bottom face in order, followed by the corresponding corners of
+/// its top face.
 pub(crate) fn hexahedron(corners: [Vector; 8]) -> Surface {
     let middle = scale(corners.iter().fold([0.0; 3], |sum, &corner| add(sum, corner)), 0.125);
     let sides = [[0, 1, 2, 3], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]];
     // Each side has its own vertices because the edges are sharp.
     let positions = sides.iter().flat_map(|side| side.map(|corner: usize| corners[corner])).collect();
     let faces = (0..6).map(|side| (4 * side..4 * side + 4).collect()).collect();
-    outward(positions, faces, middle)
+    orient_outward(positions, faces, middle)
 }
 
 /// A convex solid whose faces are flipped to face outward.
-fn outward(positions: Vec<Vector>, mut faces: Vec<Vec<u32>>, middle: Vector) -> Surface {
+fn orient_outward(positions: Vec<Vector>, mut faces: Vec<Vec<u32>>, middle: Vector) -> Surface {
     for face in &mut faces {
         let [a, b, c] = [0, 1, 2].map(|corner| positions[face[corner] as usize]);
         if dot(cross(subtract(b, a), subtract(c, a)), subtract(a, middle)) < 0.0 {
@@ -82,14 +83,14 @@ fn outward(positions: Vec<Vector>, mut faces: Vec<Vec<u32>>, middle: Vector) -> 
 
 /// A solid of revolution about y. `outline` contains radii and heights, from the foot along the outside to
 /// the top. Radius 0 is on the axis. Two equal points form a sharp edge.
-pub(crate) fn turned_body(outline: &[[f64; 2]], sides: u32) -> Surface {
+pub(crate) fn solid_of_revolution(outline: &[[f64; 2]], sides: u32) -> Surface {
     let mut surface = Surface::default();
     let mut below: Option<(u32, [f64; 2])> = None;
     for &[radius, height] in outline {
         let base = surface.positions.len() as u32;
         let count = if radius == 0.0 { 1 } else { sides };
         surface.positions.extend((0..count).map(|side| {
-            let (sin, cos) = turn(f64::from(side) / f64::from(sides));
+            let (sin, cos) = sin_cos_turns(f64::from(side) / f64::from(sides));
             [radius * cos, height, radius * sin]
         }));
         if let Some((lower, point)) = below.filter(|(_, point)| *point != [radius, height]) {
@@ -121,7 +122,7 @@ pub(crate) fn bar(path: &[Vector], radius: f64, sides: u32) -> Surface {
         normal = unit(subtract(normal, scale(along, dot(normal, along))));
         let binormal = cross(along, normal);
         surface.positions.extend((0..sides).map(|side| {
-            let (sin, cos) = turn(f64::from(side) / f64::from(sides));
+            let (sin, cos) = sin_cos_turns(f64::from(side) / f64::from(sides));
             add(point, add(scale(normal, radius * cos), scale(binormal, radius * sin)))
         }));
     }
@@ -142,5 +143,5 @@ pub(crate) fn bar(path: &[Vector], radius: f64, sides: u32) -> Surface {
 
 /// A ball of 20 · 4^`times` triangles.
 pub(crate) fn ball(times: u32, center: Vector, radius: f64) -> Surface {
-    moved(displaced_sphere(times, |_| radius), center)
+    translate(displaced_sphere(times, |_| radius), center)
 }

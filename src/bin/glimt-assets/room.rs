@@ -1,8 +1,8 @@
-//! A room, its materials and an orbiter camera that looks into the room.
+//! A room, its materials and an orbiting camera that faces into the room.
 
 use std::fmt::Write;
 
-use super::vector::{Vector, add, cross, scale, turn, unit};
+use super::vector::{Vector, add, cross, scale, sin_cos_turns, unit};
 
 /// Half the width, the height, and half the depth of the room.
 const ROOM: Vector = [1.3, 2.0, 1.2];
@@ -14,7 +14,7 @@ struct ObjWriter {
 }
 
 impl ObjWriter {
-    /// Adds a quad that faces u × v. `repeat` is the number of texture repeats along each edge.
+    /// Adds a quad that faces u × v. `repeat` is the number of texture repetitions along each edge.
     fn quad(&mut self, corner: Vector, u: Vector, v: Vector, repeat: [f64; 2]) {
         let points = [corner, add(corner, u), add(add(corner, u), v), add(corner, v)];
         for [x, y, z] in points {
@@ -40,7 +40,7 @@ impl ObjWriter {
 
     /// Adds a box on the floor, rotated about y.
     fn block(&mut self, center: [f64; 2], half: Vector, turns: f64) {
-        let (sin, cos) = turn(turns);
+        let (sin, cos) = sin_cos_turns(turns);
         let right = [cos, 0.0, -sin];
         let front = [sin, 0.0, cos];
         let up = [0.0, 2.0 * half[1], 0.0];

@@ -2,38 +2,38 @@
 
 use std::collections::HashMap;
 
-use super::noise::{fractal, value};
-use super::surface::{Surface, between, icosahedron};
-use super::vector::{Vector, add, cross, dot, scale, smooth_step, subtract, turn, unit};
+use super::noise::{fractal_noise, value_noise};
+use super::surface::{Surface, icosahedron, sphere_midpoint};
+use super::vector::{Vector, add, cross, dot, scale, sin_cos_turns, smooth_step, subtract, unit};
 
-/// A coral, a round lump with branching ridges, with 81,920 triangles.
+/// A coral: a round lump with branching ridges and 81,920 triangles.
 pub(crate) fn coral() -> Surface {
     displaced_sphere(6, |direction| {
-        let ridge = 1.0 - (2.0 * fractal(scale(direction, 2.6), 3, 0, 7) - 1.0).abs();
-        0.72 + 0.34 * smooth_step(0.62, 1.0, ridge) + 0.05 * fractal(scale(direction, 14.0), 2, 0, 21)
+        let ridge = 1.0 - (2.0 * fractal_noise(scale(direction, 2.6), 3, 0, 7) - 1.0).abs();
+        0.72 + 0.34 * smooth_step(0.62, 1.0, ridge) + 0.05 * fractal_noise(scale(direction, 14.0), 2, 0, 21)
     })
 }
 
 /// A mountainous globe with 1,310,720 triangles.
-pub(crate) fn million() -> Surface {
+pub(crate) fn mountainous_globe() -> Surface {
     displaced_sphere(8, |direction| {
-        let height = fractal(scale(direction, 2.0), 8, 0, 3);
-        let crater = value(scale(direction, 9.0), 0, 11);
+        let height = fractal_noise(scale(direction, 2.0), 8, 0, 3);
+        let crater = value_noise(scale(direction, 9.0), 0, 11);
         0.82 + 0.42 * height - 0.05 * smooth_step(0.68, 0.8, crater)
     })
 }
 
-/// Three strands twisted along a knot, with 36,864 triangles.
+/// Three strands twisted along a knot: 36,864 triangles.
 pub(crate) fn rope() -> Surface {
     let mut whole = Surface::default();
     for strand in 0..3 {
         let phase = f64::from(strand) / 3.0;
         let middle = |s: f64| {
-            let (center, normal, binormal) = frame(s, trefoil);
-            let (sin, cos) = turn(phase + 22.0 * s);
+            let (center, normal, binormal) = curve_frame(s, trefoil);
+            let (sin, cos) = sin_cos_turns(phase + 22.0 * s);
             add(center, add(scale(normal, 0.085 * cos), scale(binormal, 0.085 * sin)))
         };
-        let tube = weld(Surface::grid(512, 12, [1.0, 1.0], |s, t| around(s, t, 0.082, middle)), 512, 12);
+        let tube = weld(Surface::grid(512, 12, [1.0, 1.0], |s, t| tube_point(s, t, 0.082, middle)), 512, 12);
         let base = whole.positions.len() as u32;
         whole.positions.extend(tube.positions);
         whole.faces.extend(tube.faces.into_iter().map(|face| face.into_iter().map(|v| v + base).collect()));
@@ -43,21 +43,21 @@ pub(crate) fn rope() -> Surface {
 
 /// A tube along a trefoil knot. The texture repeats 24 times along the tube and twice around it.
 pub(crate) fn knot() -> Surface {
-    Surface::grid(224, 24, [24.0, 2.0], |s, t| around(s, t, 0.24, trefoil))
+    Surface::grid(224, 24, [24.0, 2.0], |s, t| tube_point(s, t, 0.24, trefoil))
 }
 
 /// A hollow vase, a surface of revolution about y, 1.6 high.
 pub(crate) fn vase() -> Surface {
     Surface::grid(64, 64, [4.0, 4.0], |s, t| {
-        let [radius, height] = profile(t);
-        let (sin, cos) = turn(s);
+        let [radius, height] = vase_profile(t);
+        let (sin, cos) = sin_cos_turns(s);
         [radius * cos, height, radius * sin]
     })
 }
 
-/// Radius and height along the vase's profile, a Catmull–Rom spline from the center of the foot past the lip
-/// to the center of the inside.
-fn profile(t: f64) -> [f64; 2] {
+/// Radius and height along the vase's profile, a Catmull–Rom spline from the center of the foot over the lip
+/// to the center of the interior.
+fn vase_profile(t: f64) -> [f64; 2] {
     const KNOTS: [[f64; 2]; 16] = [
         [0.0, 0.0],
         [0.2, 0.0],
@@ -132,7 +132,10 @@ pub(crate) fn displaced_sphere(times: u32, radius: impl Fn(Vector) -> f64) -> Su
         for [a, b, c] in triangles {
             let mut middle = |from: u32, to: u32| {
                 *middles.entry((from.min(to), from.max(to))).or_insert_with(|| {
-                    corners.push(between(corners[from.min(to) as usize], corners[from.max(to) as usize]));
+                    corners.push(sphere_midpoint(
+                        corners[from.min(to) as usize],
+                        corners[from.max(to) as usize],
+                    ));
                     corners.len() as u32 - 1
                 })
             };
@@ -151,27 +154,27 @@ pub(crate) fn displaced_sphere(times: u32, radius: impl Fn(Vector) -> f64) -> Su
 /// A trefoil knot within a radius of about 1. It winds twice around the y axis and three times around the
 /// circle of radius 0.66 in the plane y = 0.
 fn trefoil(s: f64) -> Vector {
-    let (sin2, cos2) = turn(2.0 * s);
-    let (sin3, cos3) = turn(3.0 * s);
+    let (sin2, cos2) = sin_cos_turns(2.0 * s);
+    let (sin3, cos3) = sin_cos_turns(3.0 * s);
     let radius = 0.66 + 0.3 * cos3;
     [radius * cos2, 0.36 * sin3, radius * sin2]
 }
 
 /// A point on a closed curve, and two directions perpendicular to the curve that are periodic along it. The
 /// first points away from the circle that the knot winds around.
-fn frame(s: f64, curve: impl Fn(f64) -> Vector) -> (Vector, Vector, Vector) {
+fn curve_frame(s: f64, curve: impl Fn(f64) -> Vector) -> (Vector, Vector, Vector) {
     let center = curve(s);
     let tangent = unit(subtract(curve(s + 1e-4), curve(s - 1e-4)));
-    let (sin, cos) = turn(2.0 * s);
+    let (sin, cos) = sin_cos_turns(2.0 * s);
     let away = subtract(center, [0.66 * cos, 0.0, 0.66 * sin]);
     let normal = unit(subtract(away, scale(tangent, dot(away, tangent))));
     (center, normal, cross(tangent, normal))
 }
 
 /// A point on a tube with this radius around a closed curve.
-fn around(s: f64, t: f64, radius: f64, curve: impl Fn(f64) -> Vector) -> Vector {
-    let (center, normal, binormal) = frame(s, curve);
-    let (sin, cos) = turn(t);
+fn tube_point(s: f64, t: f64, radius: f64, curve: impl Fn(f64) -> Vector) -> Vector {
+    let (center, normal, binormal) = curve_frame(s, curve);
+    let (sin, cos) = sin_cos_turns(t);
     add(center, add(scale(normal, radius * cos), scale(binormal, radius * sin)))
 }
 

@@ -1,13 +1,13 @@
 //! An evening sky as an equirectangular radiance map.
 
-use super::noise::fractal;
-use super::vector::{Vector, add, dot, mix, scale, smooth_step, turn, unit};
+use super::noise::fractal_noise;
+use super::vector::{Vector, add, dot, mix, scale, sin_cos_turns, smooth_step, unit};
 
 const WIDTH: u32 = 256;
 const HEIGHT: u32 = 128;
 
 /// Uncompressed Radiance HDR, because noise does not compress.
-pub(crate) fn evening() -> Vec<u8> {
+pub(crate) fn evening_sky_hdr() -> Vec<u8> {
     let mut file =
         format!("#?RADIANCE\nSOFTWARE=glimt-assets\nFORMAT=32-bit_rle_rgbe\n\n-Y {HEIGHT} +X {WIDTH}\n")
             .into_bytes();
@@ -19,8 +19,8 @@ pub(crate) fn evening() -> Vec<u8> {
 
 /// Direction of a pixel. The center of the map is −z, its right quarter +x.
 fn direction(column: u32, row: u32) -> Vector {
-    let (sin, cos) = turn((f64::from(column) + 0.5) / f64::from(WIDTH) - 0.5);
-    let (across, y) = turn((f64::from(row) + 0.5) / f64::from(HEIGHT) * 0.5);
+    let (sin, cos) = sin_cos_turns((f64::from(column) + 0.5) / f64::from(WIDTH) - 0.5);
+    let (across, y) = sin_cos_turns((f64::from(row) + 0.5) / f64::from(HEIGHT) * 0.5);
     [across * sin, y, -across * cos]
 }
 
@@ -37,7 +37,7 @@ fn radiance(d: Vector) -> Vector {
     let sky = mix(low, [0.09, 0.19, 0.46], height);
     // Clouds are on a plane high above and thin out toward the horizon.
     let reach = 1.0 / (d[1] + 0.12);
-    let cover = fractal([d[0] * reach * 1.6 + 9.0, d[2] * reach * 1.6 + 5.0, 0.5], 5, 0, 23);
+    let cover = fractal_noise([d[0] * reach * 1.6 + 9.0, d[2] * reach * 1.6 + 5.0, 0.5], 5, 0, 23);
     let thick = smooth_step(0.50, 0.68, cover) * smooth_step(0.02, 0.2, d[1]);
     let cloud = mix([0.62, 0.60, 0.64], [2.6, 1.7, 1.0], to_sun.powi(12));
     let clear = mix(sky, cloud, 0.85 * thick);

@@ -1,9 +1,9 @@
 //! Parts of the stair hall in `scenes/stairs.toml`. Units are meters. Treads and balusters are at the origin
 //! and placed by the scene. Flights and rails are at their final positions.
 
-use super::parts::{ball, bar, block, hexahedron, join, moved, turned_body};
+use super::parts::{ball, bar, block, hexahedron, join, solid_of_revolution, translate};
 use super::surface::Surface;
-use super::vector::{Vector, add, turn};
+use super::vector::{Vector, add, sin_cos_turns};
 
 /// Height and depth of a step, and width of a flight.
 const RISE: f64 = 0.17;
@@ -21,7 +21,7 @@ const BACK_WALL: f64 = -2.2;
 const TREAD: f64 = 0.035;
 
 /// All parts and their file names.
-pub(crate) fn parts() -> Vec<(&'static str, Surface)> {
+pub(crate) fn stair_meshes() -> Vec<(&'static str, Surface)> {
     vec![
         ("stairs/tread.ply", tread()),
         ("stairs/flight1.ply", first_flight()),
@@ -117,7 +117,7 @@ fn baluster() -> Surface {
         [0.014, 1.05],
         [0.0, 1.05],
     ];
-    turned_body(&outline, 8)
+    solid_of_revolution(&outline, 8)
 }
 
 /// A square post with a ball.
@@ -139,7 +139,7 @@ fn rail(from: Vector, to: Vector) -> Surface {
 fn candle() -> Surface {
     let outline =
         [[0.0, 0.0], [0.012, 0.004], [0.02, 0.02], [0.022, 0.036], [0.016, 0.058], [0.007, 0.08], [0.0, 0.1]];
-    turned_body(&outline, 8)
+    solid_of_revolution(&outline, 8)
 }
 
 /// A thick-walled wall lamp, open at the top.
@@ -147,7 +147,7 @@ fn bowl() -> Surface {
     let outer = [[0.0, -0.09], [0.05, -0.085], [0.09, -0.06], [0.12, -0.02], [0.135, 0.03], [0.135, 0.03]];
     let inner =
         [[0.128, 0.03], [0.128, 0.03], [0.113, -0.018], [0.085, -0.055], [0.047, -0.078], [0.0, -0.082]];
-    turned_body(&[outer, inner].concat(), 24)
+    solid_of_revolution(&[outer, inner].concat(), 24)
 }
 
 /// A conical lampshade, open at both ends.
@@ -163,7 +163,7 @@ fn shade() -> Surface {
         [0.138, 0.0],
         [0.14, 0.0],
     ];
-    turned_body(&outline, 24)
+    solid_of_revolution(&outline, 24)
 }
 
 /// The foot of a table lamp.
@@ -181,26 +181,31 @@ fn stand() -> Surface {
         [0.008, 0.3],
         [0.0, 0.3],
     ];
-    turned_body(&outline, 20)
+    solid_of_revolution(&outline, 20)
 }
 
 /// A chandelier: a ring of five arms under a rod, without bulbs.
 fn chandelier() -> Surface {
     let rod = bar(&[[0.0, 0.0, 0.0], [0.0, 2.0, 0.0]], 0.012, 8);
-    let hub =
-        turned_body(&[[0.0, -0.08], [0.03, -0.06], [0.05, 0.0], [0.03, 0.06], [0.012, 0.1], [0.0, 0.1]], 16);
+    let hub = solid_of_revolution(
+        &[[0.0, -0.08], [0.03, -0.06], [0.05, 0.0], [0.03, 0.06], [0.012, 0.1], [0.0, 0.1]],
+        16,
+    );
     let arm = |index: u32| {
-        let (sin, cos) = turn(f64::from(index) / 5.0);
+        let (sin, cos) = sin_cos_turns(f64::from(index) / 5.0);
         let path: Vec<Vector> = (0..=10)
             .map(|step| {
                 let along = f64::from(step) / 10.0;
-                let (bend, _) = turn(0.5 * along);
+                let (bend, _) = sin_cos_turns(0.5 * along);
                 [0.42 * along * cos, 0.06 * along - 0.12 * bend, 0.42 * along * sin]
             })
             .collect();
         let holder =
             [[0.0, 0.05], [0.02, 0.05], [0.05, 0.07], [0.05, 0.075], [0.02, 0.08], [0.02, 0.12], [0.0, 0.12]];
-        join([bar(&path, 0.01, 6), moved(turned_body(&holder, 12), [0.42 * cos, 0.0, 0.42 * sin])])
+        join([
+            bar(&path, 0.01, 6),
+            translate(solid_of_revolution(&holder, 12), [0.42 * cos, 0.0, 0.42 * sin]),
+        ])
     };
     join([rod, hub].into_iter().chain((0..5).map(arm)))
 }
@@ -235,7 +240,7 @@ fn frame() -> Surface {
 fn console() -> Surface {
     let leg = |x: f64, z: f64| {
         let outline = [[0.0, 0.0], [0.015, 0.0], [0.02, 0.3], [0.024, 0.6], [0.024, 0.7], [0.0, 0.7]];
-        moved(turned_body(&outline, 10), [x, 0.0, z])
+        translate(solid_of_revolution(&outline, 10), [x, 0.0, z])
     };
     join([
         block([-0.55, 0.75, -0.18], [0.55, 0.78, 0.18], 0.008),

@@ -83,13 +83,13 @@ impl Surface {
     pub(crate) fn to_obj(&self, title: &str) -> Vec<u8> {
         let mut file = format!("# {title}. Made by glimt-assets.\n");
         for position in &self.positions {
-            line(&mut file, "v", position, 5);
+            write_line(&mut file, "v", position, 5);
         }
         for uv in &self.uvs {
-            line(&mut file, "vt", uv, 4);
+            write_line(&mut file, "vt", uv, 4);
         }
         for normal in &self.normals {
-            line(&mut file, "vn", normal, 4);
+            write_line(&mut file, "vn", normal, 4);
         }
         for face in &self.faces {
             file.push('f');
@@ -107,7 +107,7 @@ impl Surface {
         let mut file = format!("OFF\n# {title}. Made by glimt-assets.\n");
         let _ = writeln!(file, "{} {} 0", self.positions.len(), self.faces.len());
         for position in &self.positions {
-            line(&mut file, "", position, 7);
+            write_line(&mut file, "", position, 7);
         }
         for face in &self.faces {
             let corners: Vec<String> = face.iter().map(u32::to_string).collect();
@@ -117,7 +117,7 @@ impl Surface {
     }
 }
 
-fn line(file: &mut String, keyword: &str, numbers: &[f64], digits: usize) {
+fn write_line(file: &mut String, keyword: &str, numbers: &[f64], digits: usize) {
     // Add 0 after rounding to avoid `-0.00000`.
     let unit = 10_f64.powi(digits as i32);
     let words: Vec<String> =
@@ -165,6 +165,6 @@ pub(crate) fn icosahedron() -> (Vec<Vector>, Vec<[u32; 3]>) {
 }
 
 /// The midpoint of two points on the unit sphere, projected onto the sphere.
-pub(crate) fn between(a: Vector, b: Vector) -> Vector {
+pub(crate) fn sphere_midpoint(a: Vector, b: Vector) -> Vector {
     unit(scale(super::vector::add(a, b), 0.5))
 }

@@ -29,7 +29,7 @@ pub(crate) fn unit(a: Vector) -> Vector {
 }
 
 /// Sine and cosine of an angle in turns.
-pub(crate) fn turn(turns: f64) -> (f64, f64) {
+pub(crate) fn sin_cos_turns(turns: f64) -> (f64, f64) {
     let angle = std::f64::consts::TAU * turns;
     (libm::sin(angle), libm::cos(angle))
 }

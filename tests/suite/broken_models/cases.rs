@@ -1,6 +1,6 @@
 //! Malformed mesh and material files.
 
-/// The fault, the file, and the error message, empty if the valid part of the file is read.
+/// The fault, the file, and the error message. The message is empty if the valid part of the file is read.
 pub(super) type Case = (&'static str, Vec<u8>, &'static str);
 
 /// A facet in a binary STL file.

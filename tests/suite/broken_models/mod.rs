@@ -88,7 +88,7 @@ fn triangle() -> Value {
     })
 }
 
-/// The error when reading a file, with its folder removed. Empty if the file is read.
+/// The error from reading a file, with the folder stripped from its path. Empty if the file can be read.
 fn said(folder: &Path, name: &str, content: &[u8]) -> String {
     let (path, token) = (folder.join(name), CancelToken::new());
     fs::write(&path, content).expect("written");

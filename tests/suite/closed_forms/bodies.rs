@@ -129,7 +129,7 @@ fn solid_split_into_parts_renders_the_same() {
         assert!(!found.has_open() && found.open().is_empty(), "round {round}: {:?}", found.open());
         let last = several.scene.objects.len() as u32 - 1;
         for part in 2..=last {
-            assert_eq!(found.place(part), last, "round {round}");
+            assert_eq!(found.solid_id(part), last, "round {round}");
             assert!(!found.is_inside_out(part), "round {round}");
         }
         let [one_path, several_path] = [&one, &several].map(|build| by_path(build.clone()).picture(8, 5));
@@ -194,7 +194,7 @@ fn long_edge_matches_several_short_edges() {
     };
     let closed = bodies(&build(&[lid(0.0), sides.clone(), lid(1.0)]));
     assert!(closed.open().is_empty(), "{:?}", closed.open());
-    assert_eq!([0, 1, 2].map(|part| closed.place(part)), [2; 3]);
+    assert_eq!([0, 1, 2].map(|part| closed.solid_id(part)), [2; 3]);
     let without = bodies(&build(&[sides, lid(1.0)]));
     assert!(without.has_open());
     let [open] = without.open() else { panic!("{:?}", without.open()) };
@@ -230,7 +230,7 @@ fn quads_and_disks_close_solids() {
         let own = bodies(&of(quads(v(0.1, 0.2, -0.3), v(1.4, 0.9, 0.7), flips)));
         assert!(own.open().is_empty(), "{flips}: {:?}", own.open());
         for quad in 0..6 {
-            assert_eq!((own.place(quad), own.is_inside_out(quad)), (5, flips >> quad & 1 == 1), "{flips}");
+            assert_eq!((own.solid_id(quad), own.is_inside_out(quad)), (5, flips >> quad & 1 == 1), "{flips}");
         }
     }
     // One quad is missing.
@@ -241,7 +241,7 @@ fn quads_and_disks_close_solids() {
         (quads(v(0.0, 0.0, 0.0), v(1.0, 1.0, 1.0), 0), quads(v(1.0, 0.0, 0.0), v(2.0, 1.0, 1.0), 0));
     let two = bodies(&of([one, other].concat()));
     assert!(two.open().is_empty(), "{:?}", two.open());
-    assert_eq!((0..12).map(|quad| two.place(quad)).collect::<Vec<_>>(), [[5; 6], [11; 6]].concat());
+    assert_eq!((0..12).map(|quad| two.solid_id(quad)).collect::<Vec<_>>(), [[5; 6], [11; 6]].concat());
     // A tube with lids, one of them facing inward. A cone with a separate base.
     let (a, b) = (v(0.3, -0.2, 0.1), v(1.0, 0.5, -0.4));
     let tube = Shape::Cylinder { a, b, radius: 0.4, caps: false };
@@ -249,7 +249,7 @@ fn quads_and_disks_close_solids() {
     let own = bodies(&of(vec![tube.clone(), lid(a, b - a), lid(b, b - a)]));
     assert!(own.open().is_empty(), "{:?}", own.open());
     assert_eq!(
-        [0, 1, 2].map(|part| (own.place(part), own.is_inside_out(part))),
+        [0, 1, 2].map(|part| (own.solid_id(part), own.is_inside_out(part))),
         [(2, false), (2, true), (2, false)]
     );
     let hat = Shape::Cone { base: a, tip: b, radius: 0.4, cap: false };
@@ -428,7 +428,7 @@ fn glass_with_a_hole_is_reported() {
                 "round {round}: {one:?}, expected {expected}"
             );
             assert!(!one.disagrees && !one.is_covered, "round {round}: {one:?}");
-            assert_eq!(open.is_open(open.place(one.object)), expected > 1e-3, "round {round}");
+            assert_eq!(open.is_open(open.solid_id(one.object)), expected > 1e-3, "round {round}");
         }
         // Put the triangle back with reversed orientation.
         parts[0].triangles.push({
@@ -543,7 +543,7 @@ fn each_hole_is_tested_separately() {
         scene().quad(table, v(3.0, 0.0, 0.0), v(0.0, 3.0, 0.0), matte(0.5)).mesh(board, AS_IT_IS, matte(0.5));
     let build = parts.into_iter().flatten().fold(build, |build, quad| build.shape(quad, glass(1.5)));
     let found = bodies(&build);
-    let is_open = [0, 1, 2, 3].map(|part| found.is_open(found.place(2 + 5 * part)));
+    let is_open = [0, 1, 2, 3].map(|part| found.is_open(found.solid_id(2 + 5 * part)));
     assert_eq!(is_open, [false, true, true, false], "{:?}", found.open());
 }
 
@@ -582,12 +582,12 @@ fn inward_facing_mesh_in_glass_is_a_cavity() {
     let two = scene().mesh(at(1.0, 0.0), AS_IT_IS, material.clone());
     let two = two.mesh(turned(&at(0.3, -0.5)), AS_IT_IS, material.clone());
     let two = bodies(&two.mesh(turned(&at(0.3, 0.5)), AS_IT_IS, material.clone()));
-    assert_eq!([0, 1, 2].map(|object| (two.place(object), two.is_inside_out(object))), [(2, false); 3]);
+    assert_eq!([0, 1, 2].map(|object| (two.solid_id(object), two.is_inside_out(object))), [(2, false); 3]);
     for (other, x) in [(material.clone(), 0.9), (tinted(1.0, v(0.4, 0.9, 0.25)), 0.5)] {
         let build = scene().mesh(at(1.0, 0.0), AS_IT_IS, material.clone());
         let own = bodies(&build.mesh(turned(&at(0.3, x)), AS_IT_IS, other));
         assert_eq!(
-            [0, 1].map(|object| (own.place(object), own.is_inside_out(object))),
+            [0, 1].map(|object| (own.solid_id(object), own.is_inside_out(object))),
             [(0, false), (1, true)]
         );
     }

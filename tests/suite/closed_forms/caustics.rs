@@ -101,7 +101,7 @@ fn floor() -> Build {
     scene().quad(v(-3.0, 0.0, 3.0), v(6.0, 0.0, 0.0), v(0.0, 0.0, -6.0), matte(0.7))
 }
 
-/// Views a square of the given width around a point from the given height above.
+/// Views a square of the given width around a point, with the camera at the given height above it.
 fn looked_at(build: Build, at: DVec3, width: f64, above: f64) -> Build {
     let from = v(at.x, at.y + above, at.z + 1e-4 * above);
     let angle = 2.0 * (0.5 * width / above).atan();
@@ -210,7 +210,7 @@ fn strip(build: Build, middle: DVec3, (x, z): (f64, f64)) -> Build {
     const PIXELS: f64 = 256.0;
     let side = (x * z / PIXELS).sqrt();
     let (across, up) = ((z / side).round().max(1.0), (x / side).round().max(1.0));
-    // The image's vertical axis is x. Its width follows from the pixel count.
+    // The image's vertical axis is x. The image width follows from the pixel count.
     let above = 20.0 * x.max(z);
     let fov = 2.0 * (0.5 * x / above).atan().to_degrees();
     assert!((across / up * x / z - 1.0).abs() < 0.3, "{across}×{up}");

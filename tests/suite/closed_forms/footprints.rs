@@ -153,8 +153,8 @@ fn flat_mirror_keeps_the_mip_level() {
 
 #[test]
 fn mirror_ball_matches_its_smooth_mesh() {
-    // A checkerboard behind the camera. In the ball, which shrinks the board's image, everything is gray, but
-    // not in a flat mirror.
+    // A checkerboard behind the camera. Its reflection in the ball is so small that everything is gray,
+    // unlike in a flat mirror.
     let (build, kind) = board(TextureFilter::Mipmap, 12.0);
     let room =
         |build: Build| build.quad(v(-30.0, -30.0, 9.0), v(60.0, 0.0, 0.0), v(0.0, 60.0, 0.0), kind.clone());

@@ -26,8 +26,8 @@ fn sheet(material: Material) -> Build {
     quad.seen(v(-0.1, 0.1, 0.02), DVec3::ZERO)
 }
 
-/// Boundaries viewed from above and below. Each comes with the position of an area light on the other side,
-/// in the direction of refraction.
+/// Boundaries viewed from above and below, each with the position of an area light on the other side in the
+/// direction of refraction.
 fn boundaries() -> Vec<(String, Build, DVec3)> {
     let mut all = Vec::new();
     for roughness in [0.1, 0.3, 0.6, 1.0] {
@@ -352,7 +352,7 @@ fn only_closed_unlit_solids_are_dark_inside() {
 }
 
 #[test]
-fn shadows_off_lights_inside_of_rough_glass() {
+fn rough_glass_is_lit_inside_without_shadows() {
     // A weak light in the glass adds almost no energy, but enables light samples from inside.
     let ball = scene()
         .sphere(v(0.0, 0.0, -5.0), 1.0, frosted(1.5, 0.9))

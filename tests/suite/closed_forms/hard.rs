@@ -10,7 +10,7 @@ use super::glass::boxes;
 use super::scenes::{AS_IT_IS, Build, emitter, matte, metal, receiver, scene};
 use super::{mean_and_error, v};
 
-/// Every kind of light above a receiver, with the given height and size.
+/// Every kind of light, at the given height above a receiver and with the given size.
 fn lights(height: f64, size: f64) -> Vec<(&'static str, Build)> {
     let at = v(0.0, height, 0.0);
     let lit = |shape: Shape| receiver(DVec3::ZERO, 0.8).shape(shape, emitter(3.0));

@@ -15,7 +15,7 @@ pub fn geometry(shape: &Shape) -> std::sync::Arc<Geometry> {
     scene().shape(shape.clone(), matte(0.5)).world().geometry
 }
 
-/// Position along an axis of any length, and distance from it.
+/// Position along an axis vector of any length, and distance from the axis.
 fn axial(p: DVec3, origin: DVec3, axis: DVec3) -> DVec2 {
     let (n, p) = (axis.normalize(), p - origin);
     DVec2::new(p.dot(n), p.cross(n).length())

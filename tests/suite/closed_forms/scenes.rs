@@ -18,7 +18,7 @@ use glimt::scene::description::{
     PixelFilter, Placement, Render, Scene, Shadows, Shape, Texture, TextureFilter, Tonemap, UvSet, Wrap,
 };
 use glimt::world::{
-    Geometry, Image, MeshTree, TextureNeeds, World, WorldInputs, lights, origin, sky, textures_needed,
+    Geometry, Image, MeshTree, TextureNeeds, World, WorldInputs, lights, origin, sky_map, textures_needed,
 };
 
 use super::v;
@@ -237,7 +237,7 @@ impl Build {
         let origin = origin(&self.scene.camera, None);
         let geometry = Geometry::of_scene(&self.scene, &parts.meshes, origin, &CancelToken::new());
         let geometry = Arc::new(geometry.expect("not cancelled"));
-        let sky = self.sky.as_ref().and_then(sky);
+        let sky = self.sky.as_ref().and_then(sky_map);
         let lights =
             lights(&self.scene, &geometry, &parts.images, sky, &CancelToken::new()).expect("not cancelled");
         World::new(&self.scene, &parts, geometry, lights)
@@ -282,7 +282,7 @@ pub fn tile(world: &World, settings: &RenderSettings, rect: Rect, samples: u32) 
 /// Photon maps for `samples` samples. `None` if no photons are gathered.
 pub fn maps(world: &World, settings: &RenderSettings, samples: u32) -> Option<PhotonMaps> {
     let token = CancelToken::new();
-    settings.effective().photons.filter(|_| settings.gathers()).map(|of_photons| {
+    settings.effective().photons.filter(|_| settings.gathers_photons()).map(|of_photons| {
         let photons = integrators::Photons::new(world, settings, of_photons, &ignore_progress, &token);
         let (photons, _) = photons.expect("not cancelled");
         photons.maps(world, settings, 0..samples, &token).expect("not cancelled")

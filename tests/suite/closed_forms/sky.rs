@@ -212,8 +212,8 @@ fn courtyard() -> Build {
     build.pictured(v(0.0, 4.0, 6.0), v(0.0, 0.4, 0.0), 45.0, 48, 32).depth(1)
 }
 
-/// Checks that two scenes agree in the means of 16 × 16 pixel blocks and of the whole image, using the
-/// z-score of the difference from the spread over seeds.
+/// Checks that two scenes have the same mean in each block of 16 × 16 pixels and in the whole image. Tests
+/// the z-score of the difference, which is computed from the spread over seeds.
 fn assert_same_picture(what: &str, one: &Build, other: &Build, [samples, others]: [u32; 2], seeds: u32) {
     let (width, height) = (48_usize, 32_usize);
     let blocks = |build: &Build, samples| -> Vec<Vec<f64>> {

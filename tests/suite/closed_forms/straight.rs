@@ -297,8 +297,8 @@ fn half_opaque_lights_transmit_their_own_light() {
 
 #[test]
 fn opacity_texture_masks_lights_and_shadows() {
-    // A square with side 2 at height 1, opaque only in its left half, as a light and as a screen in front of
-    // the sky.
+    // A square of side length 2 at height 1, opaque only in its left half, as a light and as a screen in
+    // front of the sky.
     let square = |material: Material, build: Build| {
         build.quad(v(-1.0, 1.0, -1.0), v(2.0, 0.0, 0.0), v(0.0, 0.0, 2.0), material)
     };

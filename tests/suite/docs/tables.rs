@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 
 use glimt::scene::description::Scene;
 use glimt::scene::diagnostic::Diagnostic;
-use glimt::scene::keys::key::{Default, Form, KeyInfo, TableInfo, TypeInfo, ValueKind};
+use glimt::scene::keys::key::{Default, KeyInfo, TableInfo, TableSyntax, TypeInfo, ValueKind};
 use glimt::scene::keys::{self, limits::Limits};
 use glimt::scene::parse;
 
@@ -44,10 +44,10 @@ fn of_definition(table: &'static TableInfo) -> Vec<DefinedTable> {
         let keys: Vec<DefinedKey> = table.keys_of(None).map(key).collect();
         let headings = match table.form {
             // The last two keys are common to all shapes.
-            Form::List => {
+            TableSyntax::List => {
                 vec![(heading(table.head()), keys.len() - 2), ("Every shape".to_owned(), 2)]
             }
-            Form::Single | Form::Named => vec![(heading(table.head()), keys.len())],
+            TableSyntax::Single | TableSyntax::Named => vec![(heading(table.head()), keys.len())],
         };
         return vec![DefinedTable { head: format!("{head}\n"), headings, keys }];
     }

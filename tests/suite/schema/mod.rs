@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use glimt::choice::Choice;
 use glimt::cli::args::Draft;
-use glimt::cli::commands::schema::{FILE, LINE, schema, text};
+use glimt::cli::commands::schema::{FILE, LINE, schema, schema_text};
 use glimt::scene::starter;
 use serde_json::Value;
 
@@ -53,7 +53,7 @@ fn files(folder: &str) -> Vec<PathBuf> {
 fn bundled_schema_is_current() {
     let path = root().join("scenes").join(FILE);
     let there = fs::read_to_string(&path).unwrap_or_default();
-    assert!(there == text(Draft::Four), "glimt schema > scenes/{FILE}");
+    assert!(there == schema_text(Draft::Four), "glimt schema > scenes/{FILE}");
     for scene in files("scenes") {
         let text = fs::read_to_string(&scene).expect("a scene");
         assert!(text.starts_with(LINE), "{}: {LINE}", scene.display());
@@ -165,7 +165,7 @@ fn new_writes_the_schema() {
     dir.expect("new --schema first.toml", 0);
     let scene = String::from_utf8(dir.bytes("first.toml")).expect("UTF-8");
     assert_eq!(scene, format!("{LINE}{}", starter()));
-    assert_eq!(String::from_utf8(dir.bytes(FILE)).expect("UTF-8"), text(Draft::Four));
+    assert_eq!(String::from_utf8(dir.bytes(FILE)).expect("UTF-8"), schema_text(Draft::Four));
     assert!(dir.run("check first.toml").status.success());
     // A current schema file is reused. A different file is kept, and the command fails.
     dir.expect("new --schema second.toml", 0);

@@ -34,7 +34,7 @@ fn moved_camera_resets_without_writing() {
         terminal.wait_for("done");
         terminal.press("0");
         terminal.wait_for(messages::RESET);
-        wait_for_red(&terminal, "the original picture", |now| now == red);
+        wait_for_red(&terminal, "the original image", |now| now == red);
         terminal.wait_for("done");
         assert_eq!(folder.bytes("scene.png"), own, "{keys}");
     }
@@ -48,7 +48,7 @@ fn saved_image_has_the_moved_camera() {
     terminal.press(">");
     terminal.wait_for_render(2);
     terminal.press("w");
-    terminal.wait_for_message(&messages::wrote("scene.png"));
+    terminal.wait_for_message(&messages::files_written("scene.png"));
     assert_eq!(folder.bytes("scene.png"), folder.once(&["--set", "camera.fov=42"]));
 }
 
@@ -59,13 +59,13 @@ fn saved_image_has_the_changed_exposure() {
     terminal.wait_for_render(1);
     let own = folder.bytes("scene.png");
     terminal.press("[");
-    terminal.wait_for_message(&messages::exposure("−0.25"));
+    terminal.wait_for_message(&messages::exposure_changed("−0.25"));
     terminal.wait_for_render(1);
     terminal.press("]]");
-    terminal.wait_for_message(&messages::exposure("+0.25"));
+    terminal.wait_for_message(&messages::exposure_changed("+0.25"));
     terminal.wait_for_render(1);
     assert_eq!(folder.bytes("scene.png"), own);
     terminal.press("w");
     let brighter = folder.once(&["--set", "render.exposure=0.25"]);
-    terminal.wait("the picture on disk", |_| folder.bytes("scene.png") == brighter);
+    terminal.wait("the image on disk", |_| folder.bytes("scene.png") == brighter);
 }

@@ -29,9 +29,9 @@ fn kept(folder: &Folder, terminal: &mut Terminal, own: &[u8], keys: &str, key: &
     let expected = folder.once(&[]);
     assert_ne!(expected, own, "{keys:?} shows");
     let is = |bytes: &[u8]| fs::read(folder.path("scene.png")).is_ok_and(|there| there == bytes);
-    terminal.wait("the picture from the written camera", |_| is(&expected));
+    terminal.wait("the image from the written camera", |_| is(&expected));
     folder.write("scene.toml", SCENE);
-    terminal.wait("the original picture", |_| is(own));
+    terminal.wait("the original image", |_| is(own));
     terminal.wait_for("done");
     // Keys pressed before the screen shows the change would move the previous camera.
     terminal.settled(|screen| screen.contents());
@@ -116,10 +116,10 @@ fn reset_undoes_every_key() {
     let own = folder.bytes("scene.png");
     for (key, message) in [
         ("s", "s hard".to_owned()),
-        ("]", messages::exposure("+0.25")),
+        ("]", messages::exposure_changed("+0.25")),
         ("l", messages::CAMERA_MOVED.to_owned()),
         ("<", messages::CAMERA_MOVED.to_owned()),
-        ("v", messages::view("normal")),
+        ("v", messages::view_chosen("normal")),
     ] {
         terminal.press(key);
         terminal.wait_for_message(&message);
@@ -129,7 +129,7 @@ fn reset_undoes_every_key() {
     terminal.press("0");
     terminal.wait_for(messages::RESET);
     terminal
-        .wait("the original picture", |_| fs::read(folder.path("scene.png")).is_ok_and(|bytes| bytes == own));
+        .wait("the original image", |_| fs::read(folder.path("scene.png")).is_ok_and(|bytes| bytes == own));
     let words = ["s soft", "v beauty", "done"];
     terminal.wait("the original settings", |screen| {
         let text = screen.contents();
@@ -152,7 +152,7 @@ fn saved_orbiter_becomes_position_and_look_at() {
     assert_eq!(numbers(&folder, "position").len(), 3);
     let written = fs::read_to_string(folder.path("scene.toml")).expect("a scene");
     assert!(written.contains("look_at = [") && !written.contains("orbiter"), "{written}");
-    terminal.wait("the picture on disk", |_| folder.bytes("scene.png") == folder.once(&[]));
+    terminal.wait("the image on disk", |_| folder.bytes("scene.png") == folder.once(&[]));
 }
 
 #[test]

@@ -107,7 +107,7 @@ fn keys_during_a_write_never_lose_the_image() {
         });
         terminal.press(key);
         if key != "q" {
-            terminal.wait("the picture", |_| folder.path("scene.png").is_file());
+            terminal.wait("the image", |_| folder.path("scene.png").is_file());
             terminal.press("q");
         }
         assert_eq!(terminal.end(), 0, "{key:?}");
@@ -173,7 +173,7 @@ fn ctrl_z_suspends_and_fg_resumes() {
     terminal.press("echo $((40 + 2))th\n");
     terminal.wait_for("42th");
     terminal.press("fg\n");
-    terminal.wait("the picture", |screen| screen.alternate_screen());
+    terminal.wait("the image", |screen| screen.alternate_screen());
     terminal.wait_for_color("red");
     terminal.press("q");
     // Wait, because the program receives keys until it exits.

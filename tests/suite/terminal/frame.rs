@@ -81,7 +81,8 @@ fn through(variables: &[(&str, &str)], has_title: bool) -> Vec<u8> {
     if has_title {
         terminal.wait("a title", |_| has(&terminal.bytes(), b"\x1b]2;scene.toml: rendering 0 %"));
     }
-    // Remove the focus. When the help opens, the program has read this event before the scene is saved.
+    // Report the loss of focus. Then open the help, which shows that the program has read the event, and save
+    // the scene.
     terminal.press("\x1b[O?");
     terminal.wait_for_message(messages::HELP_TOGGLE);
     terminal.press("?");

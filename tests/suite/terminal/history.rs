@@ -81,17 +81,17 @@ fn history_shows_images_and_their_changes() {
     // A click shows a render, and `n` continues from there.
     let click = |row: usize| format!("\x1b[<0;{0};{1}M\x1b[<0;{0};{1}m", PANEL + 4, row + 1);
     terminal.press(&click(oldest));
-    terminal.wait("the red picture", |screen| colors_from(screen, 0)[0] > 500);
-    terminal.wait_for(&messages::render_of(1, 3));
+    terminal.wait("the red image", |screen| colors_from(screen, 0)[0] > 500);
+    terminal.wait_for(&messages::render_position(1, 3));
     terminal.wait("its mark", |screen| beside(screen, PANEL.into()).contains("▸1"));
     terminal.press("N");
-    terminal.wait_for(&messages::render_of(2, 3));
+    terminal.wait_for(&messages::render_position(2, 3));
     terminal.wait("its change", |screen| {
         words(screen).contains("materials.board.diffuse [0.8, 0.02, 0.02] → [0.02, 0.8, 0.02]")
     });
     terminal.press(&click(newest));
     terminal.wait_for(messages::NEWEST_RENDER);
-    terminal.wait("the blue picture", |screen| colors_from(screen, 0)[2] > 500);
+    terminal.wait("the blue image", |screen| colors_from(screen, 0)[2] > 500);
     // A narrower window does not show the history.
     terminal.resize(119, 40);
     terminal.wait("no strip", |screen| !screen.contents().contains(messages::HISTORY));
@@ -191,10 +191,10 @@ fn undo_reverts_only_the_saved_camera() {
     terminal.wait("the saved camera", |screen| Colors::of(screen).is_most("red"));
     terminal.wait_for("done");
     terminal.press("u");
-    terminal.wait_for(&messages::undone("scene.toml"));
+    terminal.wait_for(&messages::camera_undone("scene.toml"));
     assert_eq!(text(), SCENE);
     terminal
-        .wait("the picture on disk", |_| fs::read(folder.path("scene.png")).is_ok_and(|bytes| bytes == own));
+        .wait("the image on disk", |_| fs::read(folder.path("scene.png")).is_ok_and(|bytes| bytes == own));
     terminal.press("u");
     terminal.wait_for(messages::NOTHING_TO_UNDO);
     assert_eq!(text(), SCENE);

@@ -29,7 +29,7 @@ fn terminal(folder: &Folder, text: &str, variables: &[(&str, &str)]) -> Terminal
     terminal.wait_for_render(1);
     // Enlarge the window so that each fact fits on a line.
     terminal.resize(120, 40);
-    terminal.wait("a large picture", |screen| {
+    terminal.wait("a large image", |screen| {
         screen.contents().lines().nth(39).is_some_and(|line| line.trim_end().ends_with("? help"))
     });
     terminal
@@ -75,7 +75,7 @@ fn focus_moves_to_crosshair_and_is_saved() {
     // Wait, because `w` would save an unfinished image.
     terminal.wait_for_render(2);
     terminal.press("w");
-    terminal.wait_for_message(&messages::wrote("scene.png"));
+    terminal.wait_for_message(&messages::files_written("scene.png"));
     let expected = folder.once(&["--set", &format!("camera.focus={focus}")]);
     assert_eq!(folder.bytes("scene.png"), expected);
     assert_ne!(expected, folder.once(&[]), "it shows");

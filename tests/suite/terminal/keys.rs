@@ -63,14 +63,14 @@ fn views_are_shown_and_saved_on_request() {
     let beauty = folder.bytes("scene.png");
 
     terminal.press("v");
-    terminal.wait_for_message(&messages::view("normal"));
+    terminal.wait_for_message(&messages::view_chosen("normal"));
     terminal.wait_for_render(2);
     // The board faces the camera, so its normal (0, 0, 1) is shown as (n + 1)/2, without tone mapping.
     let board = vt100::Color::Rgb(128, 128, 255);
     terminal.wait("normals", |screen| cells(screen).filter(|cell| upper(cell) == Some(board)).count() > 100);
     assert_eq!(folder.bytes("scene.png"), beauty);
     terminal.press("w");
-    terminal.wait_for_message(&messages::wrote("scene.png"));
+    terminal.wait_for_message(&messages::files_written("scene.png"));
     assert_eq!(folder.bytes("scene.png"), folder.once(&["--view", "normal"]));
 
     let views = [
@@ -102,7 +102,7 @@ fn views_are_shown_and_saved_on_request() {
     terminal.press("vv");
     terminal.wait_for("v beauty");
     terminal.wait_for("done");
-    terminal.wait("the picture on disk again", |_| {
+    terminal.wait("the image on disk again", |_| {
         fs::read(folder.path("scene.png")).is_ok_and(|bytes| bytes == beauty)
     });
 }
@@ -116,7 +116,7 @@ fn paused_render_can_be_saved_and_resumed() {
     terminal.wait_for("ETA");
     // The file is written when every pixel has a sample.
     terminal.press("w");
-    terminal.wait("the first picture on disk", |_| folder.path("scene.png").is_file());
+    terminal.wait("the first image on disk", |_| folder.path("scene.png").is_file());
     fs::remove_file(folder.path("scene.png")).expect("removed");
     terminal.press(" ");
     terminal.wait("a paused render", |screen| {
@@ -124,20 +124,20 @@ fn paused_render_can_be_saved_and_resumed() {
         text.lines().next().is_some_and(|line| line.contains("‖ paused")) && !text.contains("ETA")
     });
     terminal.press("w");
-    terminal.wait("the picture on disk", |_| folder.path("scene.png").is_file());
-    terminal.wait_for_message(&messages::wrote("scene.png"));
+    terminal.wait("the image on disk", |_| folder.path("scene.png").is_file());
+    terminal.wait_for_message(&messages::files_written("scene.png"));
     terminal.press(" ");
     terminal.wait_for("ETA");
     fs::remove_file(folder.path("scene.png")).expect("removed");
     terminal.press("w");
-    terminal.wait("the picture on disk", |_| folder.path("scene.png").is_file());
+    terminal.wait("the image on disk", |_| folder.path("scene.png").is_file());
     folder.write("scene.toml", SCENE);
     terminal.wait_for_render(1);
     terminal.press(" ");
     terminal.wait_for(messages::NOT_RENDERING);
     fs::remove_file(folder.path("scene.png")).expect("removed");
     terminal.press("w");
-    terminal.wait_for_message(&messages::wrote("scene.png"));
+    terminal.wait_for_message(&messages::files_written("scene.png"));
     assert_eq!(folder.bytes("scene.png"), folder.once(&[]));
 }
 

@@ -85,7 +85,7 @@ fn last_of_many_fast_saves_wins() {
     folder.write("scene.toml", &SCENE.replace(RED, BLUE));
     terminal.wait_for_color("blue");
     let expected = folder.once(&[]);
-    terminal.wait("the last picture on disk", |_| {
+    terminal.wait("the last image on disk", |_| {
         fs::read(folder.path("scene.png")).is_ok_and(|bytes| bytes == expected)
     });
 }
@@ -117,7 +117,7 @@ fn broken_scene_shows_position_and_last_image() {
 }
 
 fn modified(folder: &Folder) -> std::time::SystemTime {
-    let metadata = fs::metadata(folder.path("scene.png")).expect("a picture");
+    let metadata = fs::metadata(folder.path("scene.png")).expect("an image");
     metadata.modified().expect("a time")
 }
 
@@ -161,14 +161,14 @@ fn preview_follows_the_window_size() {
     let is_at = |screen: &vt100::Screen, row: usize| {
         screen.contents().lines().nth(row).is_some_and(|line| line.trim_end().ends_with("? help"))
     };
-    terminal.wait("a large picture", |screen| is_at(screen, 59) && Colors::of(screen).red > 3 * small);
+    terminal.wait("a large image", |screen| is_at(screen, 59) && Colors::of(screen).red > 3 * small);
     terminal.resize(60, 10);
-    terminal.wait("a small picture", |screen| {
+    terminal.wait("a small image", |screen| {
         let red = Colors::of(screen).red;
         is_at(screen, 9) && (1..small).contains(&red)
     });
     terminal.resize(80, 24);
-    terminal.wait("the original picture", |screen| is_at(screen, 23) && Colors::of(screen).red == small);
+    terminal.wait("the original image", |screen| is_at(screen, 23) && Colors::of(screen).red == small);
 }
 
 #[test]
@@ -176,7 +176,7 @@ fn no_color_preview_uses_characters() {
     let folder = Folder::new();
     let terminal = folder.terminal_with(&[folder.program(), "scene.toml"], &[("NO_COLOR", "1")]);
     let is_ink = |cell: &vt100::Cell| "=+*#%@$&{}[]?".contains(cell.contents()) && cell.has_contents();
-    terminal.wait("a picture", |screen| cells(screen).filter(|cell| is_ink(cell)).count() > 100);
+    terminal.wait("an image", |screen| cells(screen).filter(|cell| is_ink(cell)).count() > 100);
     terminal.wait_for("done");
     terminal.look(|screen| {
         for cell in cells(screen) {

@@ -30,7 +30,7 @@ fn model_is_watched_and_imported_once() {
     terminal.press("o");
     terminal.wait_for(messages::NO_EDITOR_FOR_MODELS);
     terminal.press("c");
-    terminal.wait_for(&messages::model_scene("wall.toml"));
+    terminal.wait_for(&messages::model_scene_written("wall.toml"));
     let text = fs::read_to_string(folder.path("wall.toml")).expect("a scene");
     let mesh = "[[mesh]]\nfile = \"wall.obj\"\n";
     assert!(text.contains(mesh) && text.contains("[camera]"), "{text}");

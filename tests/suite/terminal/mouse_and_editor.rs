@@ -85,7 +85,7 @@ fn saved_camera_becomes_the_scene_camera() {
     let kept = fs::read_to_string(folder.path("scene.toml")).expect("a scene");
     assert_eq!(kept, text.replace("focus = 4.0\n", "focus = 4.0\nfov = 42\n"));
     terminal.wait("no moved camera", |screen| !screen.contents().contains("camera moved"));
-    terminal.wait("the picture on disk", |_| folder.bytes("scene.png") == folder.once(&[]));
+    terminal.wait("the image on disk", |_| folder.bytes("scene.png") == folder.once(&[]));
     // glimt's own write does not count as an edit, so the stage table still shows the reused stages. Press a
     // key without other effects to close the message that covers the table.
     terminal.press("??");
@@ -261,7 +261,7 @@ fn earlier_renders_can_be_browsed() {
     terminal.wait_for_color("green");
     terminal.press("n");
     terminal.wait_for_color("red");
-    terminal.wait_for(&messages::render_of(1, 2));
+    terminal.wait_for(&messages::render_position(1, 2));
     terminal.press("n");
     terminal.wait_for(messages::OLDEST_RENDER);
     terminal.press("N");

@@ -61,7 +61,7 @@ fn output_that_becomes_an_input_is_kept() {
     assert_eq!((folder.bytes("scene.png"), folder.bytes("r.json")), (picture, report), "nothing is written");
     folder.write("scene.toml", &SCENE.replace(RED, GREEN));
     terminal.wait_for_color("green");
-    terminal.wait("the picture on disk", |_| folder.bytes("scene.png") == folder.once(&[]));
+    terminal.wait("the image on disk", |_| folder.bytes("scene.png") == folder.once(&[]));
 }
 
 #[test]
@@ -88,7 +88,7 @@ fn link_changed_while_rendering_is_detected() {
     terminal.wait_for_color("red");
     terminal.wait_for("ETA");
     terminal.press("w");
-    terminal.wait_for_message(&messages::wrote("out.ppm"));
+    terminal.wait_for_message(&messages::files_written("out.ppm"));
     assert!(folder.path("first.ppm").is_file());
     fs::remove_file(folder.path("out.ppm")).expect("removed");
     symlink("paint.ppm", folder.path("out.ppm")).expect("a link");
@@ -108,7 +108,7 @@ fn own_writes_do_not_trigger_renders() {
         terminal.wait_for_render(1);
         for _ in 0..3 {
             terminal.press("w");
-            terminal.wait_for_message(&messages::wrote("a.png, b.ppm"));
+            terminal.wait_for_message(&messages::files_written("a.png, b.ppm"));
         }
         wait_a_while();
         terminal.wait_for_render(1);

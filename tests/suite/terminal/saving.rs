@@ -178,10 +178,10 @@ fn broken_save_does_not_stop_the_render() {
     terminal.wait_for("ETA");
     folder.write("scene.toml", "[render");
     terminal.wait_for("broken");
-    terminal.wait("the picture on disk", |_| folder.path("scene.png").is_file());
+    terminal.wait("the image on disk", |_| folder.path("scene.png").is_file());
     terminal.wait_for("broken");
     let path = folder.path("scene.png");
-    let written = std::fs::read(&path).expect("a picture");
+    let written = std::fs::read(&path).expect("an image");
     folder.write("scene.toml", &slow);
     terminal.wait_for("done");
     assert_eq!(written, folder.once(&[]));

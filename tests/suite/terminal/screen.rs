@@ -101,7 +101,7 @@ fn small_windows_show_preview_errors_and_keys() {
         terminal.wait_for(&messages::HELP_TOGGLE[..12]);
         terminal.press("?");
         terminal.press(ESCAPE);
-        terminal.wait("the picture", |screen| Colors::of(screen).red == red);
+        terminal.wait("the image", |screen| Colors::of(screen).red == red);
     }
 }
 
@@ -139,7 +139,7 @@ fn last_of_many_resizes_wins() {
     terminal.press(ESCAPE);
     terminal.resize(80, 24);
     terminal.wait("the last line", |screen| last_line(screen).ends_with("? help"));
-    terminal.wait("the picture", |screen| Colors::of(screen).red == red);
+    terminal.wait("the image", |screen| Colors::of(screen).red == red);
     // Wait, because immediately after an escape character the key would be Alt-q.
     terminal.settled(vt100::Screen::contents);
     terminal.press("q");
@@ -167,7 +167,7 @@ fn terminal_with_256_colors_gets_no_others() {
         let colors = super::pty::cells(screen).map(|cell| (cell.fgcolor(), cell.bgcolor()));
         colors.filter(|(fg, _)| matches!(fg, vt100::Color::Idx(16..))).count()
     };
-    terminal.wait("a picture", |screen| fixed(screen) > 50);
+    terminal.wait("an image", |screen| fixed(screen) > 50);
     terminal.press("l");
     terminal.wait_for("camera moved");
     terminal.look(|screen| {

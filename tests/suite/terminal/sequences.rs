@@ -157,7 +157,7 @@ fn check(run: &RandomSession<'_>, said: &str, known: &mut HashMap<String, Vec<u8
     if !run.has_written {
         let earlier = run.saved.clone();
         let is_one = |image: &Vec<u8>| earlier.iter().any(|text| run.once(known, text, &[]) == *image);
-        assert!(image.as_ref().is_none_or(is_one), "image from no saved scene: {log}");
+        assert!(image.as_ref().is_none_or(is_one), "the image matches no saved scene: {log}");
     }
     if said.is_empty() {
         return;
@@ -257,7 +257,7 @@ fn external_change_to_image_is_reported() {
     std::fs::remove_file(folder.path("scene.png")).expect("removed");
     terminal.wait_for(&messages::output_changed("scene.png", "was removed"));
     terminal.press("w");
-    terminal.wait_for_message(&messages::wrote("scene.png"));
+    terminal.wait_for_message(&messages::files_written("scene.png"));
     assert_eq!(folder.bytes("scene.png"), image);
     terminal.wait("it is there", |screen| !screen.contents().contains("was removed"));
     // Another glimt process writes the image with other settings.

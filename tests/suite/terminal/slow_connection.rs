@@ -20,7 +20,7 @@ fn endless(answers: Answers) -> (Folder, Terminal) {
     folder.write("scene.toml", &SCENE.replace("samples = 4", "samples = 10000000"));
     let terminal = folder.thin_line(answers);
     terminal.wait_for("ETA");
-    terminal.wait("a picture", |screen| super::Colors::of(screen).red > 500);
+    terminal.wait("an image", |screen| super::Colors::of(screen).red > 500);
     (folder, terminal)
 }
 

@@ -2,8 +2,8 @@
 //!
 //!     GLIMT_SOAK_MINUTES=60 cargo test --profile quick --test suite soak -- --ignored --nocapture
 //!
-//! One process runs from start to end. In a separate folder, other processes are ended in every way and
-//! restarted with a checkpoint. `GLIMT_SOAK_SEED` selects different events.
+//! One process runs from start to end. In a separate folder, other processes are ended in every possible way
+//! and restarted from a checkpoint. `GLIMT_SOAK_SEED` selects different events.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -57,7 +57,7 @@ fn scene(dice: &mut Dice, samples: u32, number: u32) -> String {
     )
 }
 
-/// Writes a file in the way of a random editor.
+/// Writes a file like a randomly chosen editor.
 fn save(folder: &Folder, dice: &mut Dice, name: &str, text: &str) {
     let new = folder.path("new~");
     match dice.below(4) {

@@ -62,9 +62,9 @@ fn keys_ignored_by_path_are_explained() {
     terminal.wait_for_render(2);
     terminal.wait_for("s –");
     terminal.press("s");
-    terminal.wait_for(&messages::soft_shadows("path", "whitted"));
+    terminal.wait_for(&messages::only_soft_shadows("path", "whitted"));
     terminal.press("p");
-    terminal.wait_for(&messages::no_photons("whitted"));
+    terminal.wait_for(&messages::photons_unsupported("whitted"));
     terminal.wait_for_render(2);
 }
 
@@ -91,12 +91,12 @@ fn digits_choose_views_in_the_open_list() {
         terminal.press("\r");
         wait_for_view(&terminal, view);
     }
-    terminal.wait("a complete picture of the view", |screen| {
+    terminal.wait("a complete image of the view", |screen| {
         let text = screen.contents();
         text.lines().any(|line| line.contains("✓ done") && line.contains("view specular"))
     });
     terminal.press("w");
-    terminal.wait_for_message(&messages::wrote("scene.png"));
+    terminal.wait_for_message(&messages::files_written("scene.png"));
     assert_eq!(folder.bytes("scene.png"), folder.once(&["--view", "specular"]));
     terminal.wait("no list", |screen| !screen.contents().contains("barycentric"));
     terminal.press("2e");

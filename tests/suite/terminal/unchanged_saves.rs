@@ -30,10 +30,10 @@ fn typo_is_not_an_edit_for_comparison() {
     terminal.wait_for_color("blue");
     terminal.wait_for_render(2);
     typo(&folder, &terminal, &blue, "radus");
-    terminal.wait_for(&format!("unchanged · {}", messages::render(2)));
+    terminal.wait_for(&format!("unchanged · {}", messages::render_number(2)));
     terminal.press("b");
     terminal.wait_for_color("red");
-    terminal.wait_for(&messages::render_of(1, 2));
+    terminal.wait_for(&messages::render_position(1, 2));
     terminal.wait_for(&format!("{}, materials.board.diffuse", messages::BEFORE_EDIT));
     terminal.press("b");
     terminal.wait_for_color("blue");
@@ -56,12 +56,12 @@ fn comment_and_typo_add_no_history_entry() {
     terminal.wait("a strip", |screen| words(screen).contains("▸2 materials."));
     let commented = blue.replace("[camera]", "# the eye\n[camera]");
     folder.write("scene.toml", &commented);
-    terminal.wait_for(&format!("unchanged · {}", messages::render(2)));
+    terminal.wait_for(&format!("unchanged · {}", messages::render_number(2)));
     typo(&folder, &terminal, &commented, "radus");
-    terminal.wait_for(&format!("unchanged · {}", messages::render(2)));
+    terminal.wait_for(&format!("unchanged · {}", messages::render_number(2)));
     terminal.press("n");
-    terminal.wait_for(&messages::render_of(1, 2));
-    terminal.wait("two pictures", |screen| {
+    terminal.wait_for(&messages::render_position(1, 2));
+    terminal.wait("two images", |screen| {
         let words = words(screen);
         words.contains(&format!("▸1 {}", messages::OPENED))
             && words.contains("2 materials.")
@@ -87,8 +87,8 @@ fn typo_while_rendering_adds_one_entry() {
     }
     terminal.wait("an unfinished image", is_there);
     terminal.press("n");
-    terminal.wait_for(&messages::render_of(1, 2));
-    terminal.wait("two pictures", |screen| {
+    terminal.wait_for(&messages::render_position(1, 2));
+    terminal.wait("two images", |screen| {
         let words = words(screen);
         // An unfinished render does not count as stopped.
         words.contains(&format!("▸1 {}", messages::OPENED))

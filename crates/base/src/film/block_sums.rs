@@ -2,13 +2,13 @@
 
 use super::Rect;
 use super::sum_order::SumOrder;
-use super::sums::{Film, FilmError, Tile, bytes_needed, is_available};
+use super::sums::{Film, FilmError, Tile, bytes_needed, can_allocate};
 use crate::math::DVec3;
 
 impl Tile {
     /// Moves a pixel's sum to its block if the block is complete.
     pub(super) fn close_block(&mut self, pixel: usize, blocks: SumOrder) {
-        let Some(block) = blocks.finished(self.counts[pixel]) else { return };
+        let Some(block) = blocks.finished_block(self.counts[pixel]) else { return };
         let put = |earlier: &mut [Vec<DVec3>], sums: &mut [DVec3]| {
             if let Some(block) = earlier.get_mut(block) {
                 block[pixel] += std::mem::take(&mut sums[pixel]);
@@ -27,11 +27,11 @@ impl Film {
     /// # Errors
     /// There is not enough memory for the block sums.
     pub fn with_sum_order(mut self, blocks: SumOrder) -> Result<Self, FilmError> {
-        let (crop, kept) = (self.crop(), blocks.kept());
+        let (crop, kept) = (self.crop(), blocks.kept_block_count());
         let more = crop.area() as u64 * (kept * size_of::<DVec3>()) as u64;
         let (width, height, bytes) = (self.width(), self.height(), self.memory_bytes() + more);
         let lacks = || FilmError::Memory { width, height, bytes, crop_helps: true };
-        if !is_available(more) {
+        if !can_allocate(more) {
             return Err(lacks());
         }
         for tile in 0..self.tile_count() {
@@ -50,7 +50,7 @@ impl Film {
 
     /// Bytes needed for a crop's sums with this summation order, and for the full-size finished image.
     pub fn memory_for((width, height): (u32, u32), crop: Rect, blocks: SumOrder) -> (u64, u64) {
-        let more = crop.area() as u64 * (blocks.kept() * size_of::<DVec3>()) as u64;
+        let more = crop.area() as u64 * (blocks.kept_block_count() * size_of::<DVec3>()) as u64;
         let picture = bytes_needed(width, height, Rect { width: 0, height: 0, ..crop });
         (bytes_needed(width, height, crop) - picture + more, picture)
     }

@@ -1,5 +1,5 @@
-//! Convergence estimation: changes of the pixel means as their samples double, and the variance predicted
-//! from them.
+//! Convergence estimation: records how pixel means change as the sample count doubles, and predicts their
+//! variance from these changes.
 
 use super::CELLS;
 use crate::math::DVec3;
@@ -23,7 +23,7 @@ pub(super) fn luminance(radiance: DVec3) -> f64 {
 /// divided by the first step. A rare bright sample affects all three steps and results in a rate of two, as
 /// for independent samples, even if only a few pixels contain one.
 #[derive(Debug, Default)]
-pub(super) struct Steps {
+pub(super) struct SquaredSteps {
     /// Luminance of each pixel at its last power-of-two sample count.
     last: Vec<f32>,
     /// Luminance of each pixel at the sample count halfway to the next power of two.
@@ -57,7 +57,7 @@ struct StepPair {
     before: Option<f64>,
 }
 
-impl Steps {
+impl SquaredSteps {
     /// Empty steps with memory reserved for `area` pixels. `None` if the allocation fails.
     pub(super) fn reserved(area: usize) -> Option<Self> {
         let reserved = || {
@@ -80,8 +80,8 @@ impl Steps {
         self.levels.len()
     }
 
-    /// Serializes all numbers as 32-bit words in the order that [`Steps::read`] expects.
-    pub(super) fn words(&self, put: &mut impl FnMut(u32)) {
+    /// Serializes all numbers as 32-bit words in the order that [`SquaredSteps::read`] expects.
+    pub(super) fn write_words(&self, put: &mut impl FnMut(u32)) {
         for values in [&self.last, &self.half_way, &self.recent] {
             values.iter().for_each(|value| put(value.to_bits()));
         }
@@ -120,13 +120,13 @@ impl Steps {
     }
 
     /// Square of a pixel's last step.
-    pub(super) fn square(&self, pixel: usize) -> f64 {
+    pub(super) fn last_squared_step(&self, pixel: usize) -> f64 {
         self.recent.get(pixel).map_or(0.0, |step| f64::from(*step) * f64::from(*step))
     }
 
     /// Number of samples until a pixel with `count` samples is next recorded. Pixels are recorded at powers
     /// of two and halfway between them.
-    pub(super) fn samples_to_next(count: u32) -> usize {
+    pub(super) fn samples_to_next_step(count: u32) -> usize {
         let count = u64::from(count);
         let power = (count + 1).next_power_of_two();
         let half_way = power / 4 * 3;
@@ -135,8 +135,8 @@ impl Steps {
     }
 
     /// Records the luminance of a pixel in the given cell and half, at a count determined by
-    /// [`Steps::samples_to_next`].
-    pub(super) fn note(&mut self, (pixel, cell, half): (usize, usize, usize), count: u32, luminance: f64) {
+    /// [`SquaredSteps::samples_to_next_step`].
+    pub(super) fn record(&mut self, (pixel, cell, half): (usize, usize, usize), count: u32, luminance: f64) {
         let rounded = luminance as f32;
         if !count.is_power_of_two() {
             self.half_way[pixel] = rounded;
@@ -164,7 +164,7 @@ impl Steps {
     }
 
     /// Steps of a half-cell at 2^`level` samples.
-    fn pair(&self, level: usize, (cell, half): (usize, usize), is_relative: bool) -> Option<StepPair> {
+    fn step_pair(&self, level: usize, (cell, half): (usize, usize), is_relative: bool) -> Option<StepPair> {
         let of = |level: usize| self.levels.get(level.checked_sub(1)?).map(|cells| cells[cell][half]);
         let parts = |sums: LevelSums| match is_relative {
             false => (sums.outer, sums.inner),
@@ -176,18 +176,19 @@ impl Steps {
     }
 
     /// Steps of a half-cell at 2^`level` samples, followed by the steps one, two and three doublings earlier.
-    fn last_four(&self, level: usize, at: (usize, usize), is_relative: bool) -> Option<[f64; 4]> {
-        let StepPair { last, before } = self.pair(level, at, is_relative)?;
-        let earlier = |back: usize| self.pair(level.checked_sub(back)?, at, is_relative)?.before;
+    fn last_four_steps(&self, level: usize, at: (usize, usize), is_relative: bool) -> Option<[f64; 4]> {
+        let StepPair { last, before } = self.step_pair(level, at, is_relative)?;
+        let earlier = |back: usize| self.step_pair(level.checked_sub(back)?, at, is_relative)?.before;
         Some([last, before?, earlier(1)?, earlier(2)?])
     }
 
     /// Factor by which quadrupling the samples to 2^`level` reduced the variance, measured in one half of all
-    /// cells. `None` in the same cases as [`Steps::fall`], which returns the factor for doubling.
-    fn fourfold_fall(&self, level: usize, half: usize) -> Option<f64> {
+    /// cells. `None` in the same cases as [`SquaredSteps::variance_reduction`], which returns the factor for
+    /// doubling.
+    fn quadrupling_reduction(&self, level: usize, half: usize) -> Option<f64> {
         let mut sums = [0.0; 4];
         for cell in 0..CELLS {
-            let steps = self.last_four(level, (cell, half), false)?;
+            let steps = self.last_four_steps(level, (cell, half), false)?;
             if steps[0] > 0.0 {
                 sums.iter_mut().zip(steps).for_each(|(sum, step)| *sum += step);
             }
@@ -202,7 +203,7 @@ impl Steps {
     /// Expected relative standard deviation of the sum of the steps at 2^`level` samples over the given
     /// halves of all cells: 1 if a single pixel dominates, lower if many contribute. Ignores cells with fewer
     /// samples.
-    pub(super) fn spread(&self, level: usize, halves: &[usize]) -> f64 {
+    pub(super) fn variance_uncertainty(&self, level: usize, halves: &[usize]) -> f64 {
         let Some(cells) = level.checked_sub(1).and_then(|index| self.levels.get(index)) else { return 1.0 };
         let sums = cells.iter().flat_map(|cell| halves.iter().map(|half| cell[*half]));
         let (sum, squares) =
@@ -211,17 +212,17 @@ impl Steps {
     }
 
     /// Confidence in a measured variance reduction, from 0 to 1.
-    fn trust(&self, level: usize, halves: &[usize]) -> f64 {
-        let spread = self.spread(level, halves);
+    fn reduction_confidence(&self, level: usize, halves: &[usize]) -> f64 {
+        let spread = self.variance_uncertainty(level, halves);
         1.0 / (1.0 + DOUBT * spread * spread)
     }
 
     /// Factor by which doubling the samples to 2^`level` reduced the variance in the given halves of all
     /// cells, or `None` if unknown. Ignores cells with fewer samples.
-    pub(super) fn fall(&self, level: usize, halves: &[usize]) -> Option<f64> {
+    pub(super) fn variance_reduction(&self, level: usize, halves: &[usize]) -> Option<f64> {
         let (mut last, mut before) = (0.0, 0.0);
         for (cell, half) in (0..CELLS).flat_map(|cell| halves.iter().map(move |half| (cell, *half))) {
-            let pair = self.pair(level, (cell, half), false)?;
+            let pair = self.step_pair(level, (cell, half), false)?;
             if pair.last > 0.0 {
                 last += pair.last;
                 before += pair.before?;
@@ -258,7 +259,8 @@ const CHANCE_FALL: f64 = 2.3;
 /// a tile converge first, and the rest converges more slowly.
 const LASTING: f64 = 0.65;
 
-/// Penalty for a variance reduction measured from few pixels, multiplied by the squared [`Steps::spread`].
+/// Penalty for a variance reduction measured from few pixels: the factor of the squared
+/// [`SquaredSteps::variance_uncertainty`].
 const DOUBT: f64 = 2.0;
 
 /// Trusted fraction of the variance reduction over two steps.
@@ -282,14 +284,19 @@ impl Convergence {
     }
 
     /// Factor by which doubling the samples to 2^`level` reduced the variance in the given halves of a tile.
-    fn fall(steps: &Steps, level: usize, halves: &[usize]) -> f64 {
-        steps.fall(level, halves).map_or(INDEPENDENT_RATE, |fall| fall.clamp(INDEPENDENT_RATE, MOST_FALL))
+    fn variance_reduction(steps: &SquaredSteps, level: usize, halves: &[usize]) -> f64 {
+        steps
+            .variance_reduction(level, halves)
+            .map_or(INDEPENDENT_RATE, |fall| fall.clamp(INDEPENDENT_RATE, MOST_FALL))
     }
 
     /// Factor by which doubling the samples beyond 2^`level` is expected to reduce the variance in the given
     /// halves of a tile.
-    pub(super) fn rate(steps: &Steps, level: usize, halves: &[usize]) -> f64 {
-        rate_after(Self::fall(steps, level, halves), steps.trust(level, halves))
+    pub(super) fn predicted_reduction(steps: &SquaredSteps, level: usize, halves: &[usize]) -> f64 {
+        expected_rate(
+            Self::variance_reduction(steps, level, halves),
+            steps.reduction_confidence(level, halves),
+        )
     }
 
     /// Variance of the pixel means after `count` samples, summed over the pixels of a half-cell, and the rate
@@ -300,18 +307,18 @@ impl Convergence {
     /// base-2 sequences are best stratified at powers of 4, so every other doubling gains more. The second
     /// prediction is therefore based on quadrupled sample counts.
     pub(super) fn variance(
-        steps: &Steps,
+        steps: &SquaredSteps,
         (cell, half): (usize, usize),
         count: u32,
         is_relative: bool,
     ) -> Option<(f64, f64)> {
         let level = count.checked_ilog2()? as usize;
-        let StepPair { last, before } = steps.pair(level, (cell, half), is_relative)?;
-        let fall = Self::fall(steps, level, &[half]);
+        let StepPair { last, before } = steps.step_pair(level, (cell, half), is_relative)?;
+        let fall = Self::variance_reduction(steps, level, &[half]);
         let step = before.map_or(last, |before| (last + 2.0 * before / fall) / 3.0);
-        let rate = rate_after(fall, steps.trust(level, &[half]));
+        let rate = expected_rate(fall, steps.reduction_confidence(level, &[half]));
         let by_two = pixel_variance(step, count, rate);
-        let variance = match Self::by_four(steps, level, (cell, half), is_relative) {
+        let variance = match Self::variance_by_quadrupling(steps, level, (cell, half), is_relative) {
             Some(four) => (by_two * pixel_variance(four, count, 2.0)).sqrt(),
             None => by_two,
         };
@@ -320,17 +327,23 @@ impl Convergence {
 
     /// Variance of the pixel means after 2^`level` samples, summed over the pixels of a half-cell and
     /// predicted from its reduction over quadrupled sample counts. `None` for fewer than 16 samples.
-    fn by_four(steps: &Steps, level: usize, at: (usize, usize), is_relative: bool) -> Option<f64> {
-        let [last, before, ..] = steps.last_four(level, at, is_relative)?;
-        let fall = steps.fourfold_fall(level, at.1).unwrap_or(FOURFOLD_RATE);
-        let lasting = FOURFOLD_LASTING * (fall - FOURFOLD_CHANCE).max(0.0) * steps.trust(level, &[at.1]);
+    fn variance_by_quadrupling(
+        steps: &SquaredSteps,
+        level: usize,
+        at: (usize, usize),
+        is_relative: bool,
+    ) -> Option<f64> {
+        let [last, before, ..] = steps.last_four_steps(level, at, is_relative)?;
+        let fall = steps.quadrupling_reduction(level, at.1).unwrap_or(FOURFOLD_RATE);
+        let lasting =
+            FOURFOLD_LASTING * (fall - FOURFOLD_CHANCE).max(0.0) * steps.reduction_confidence(level, &[at.1]);
         let rate = (FOURFOLD_RATE + lasting).min(FOURFOLD_MOST);
         Some((last + before) / (rate - 1.0))
     }
 }
 
-/// Expected rate, given a measured variance reduction and its confidence.
-fn rate_after(fall: f64, trust: f64) -> f64 {
+/// Expected rate for a measured variance reduction with this confidence.
+fn expected_rate(fall: f64, trust: f64) -> f64 {
     INDEPENDENT_RATE + LASTING * (fall - CHANCE_FALL).max(0.0) * trust
 }
 

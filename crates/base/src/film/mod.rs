@@ -25,7 +25,7 @@ mod sums;
 pub mod tone;
 
 pub use convergence::Convergence;
-pub use noise::{HalfNoise, ImageNoise, samples_to_reduce_error};
+pub use noise::{CellHalfNoise, ImageNoise, samples_to_reduce_error};
 pub use pixel_subset::{PixelSubset, Pixels};
 pub use prepass::{PREPASS_SAMPLES, Prepass};
 pub use preview::Previewer;

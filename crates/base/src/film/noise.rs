@@ -5,15 +5,15 @@ use rayon::prelude::*;
 use super::convergence::{Convergence, luminance};
 use super::{CELLS, Film, PixelSubset, Pixels, is_in_pool};
 
-/// Number of samples at which the standard error is `part` times the error of `count` samples, if the
-/// variance falls with this power of the sample count.
+/// Sample count at which the standard error is `part` times the error at `count` samples, if the variance
+/// falls with this power of the sample count.
 pub fn samples_to_reduce_error(power: f64, part: f64, count: u32) -> u32 {
     (f64::from(count) * libm::pow(part, -2.0 / power)).ceil() as u32
 }
 
 /// Noise in one half of a cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct HalfNoise {
+pub struct CellHalfNoise {
     /// Mean variance of the pixels' luminance.
     pub variance: f64,
     /// Mean luminance.
@@ -48,7 +48,7 @@ impl NoiseSums {
         if self.left > 0.0 { libm::log2(self.variance / self.left) } else { 1.0 }
     }
 
-    fn add(&mut self, noise: &HalfNoise, pixels: f64) {
+    fn add(&mut self, noise: &CellHalfNoise, pixels: f64) {
         self.variance += pixels * noise.variance;
         self.left += pixels * noise.variance * libm::exp2(-noise.power);
         self.mean += pixels * noise.mean;
@@ -96,7 +96,7 @@ impl Film {
             for (cell, half) in halves {
                 let pixels = self.half_pixel_count(cell, half) as f64;
                 if pixels > 0.0 {
-                    sums.add(&self.half_noise(cell, half)?, pixels);
+                    sums.add(&self.cell_half_noise(cell, half)?, pixels);
                 }
             }
             Some(sums)
@@ -120,54 +120,59 @@ impl Film {
 
     /// Noise in one half of a cell. `None` if the half has no pixels or if a pixel has fewer than two
     /// samples.
-    pub fn half_noise(&self, number: usize, half: usize) -> Option<HalfNoise> {
+    pub fn cell_half_noise(&self, number: usize, half: usize) -> Option<CellHalfNoise> {
         let tile = self.tile(number / CELLS);
         let (mut pixels, mut samples, mut sum) = (0_u32, u32::MAX, 0.0);
-        for pixel in self.half_pixels(number, half) {
+        for pixel in self.cell_half_pixels(number, half) {
             sum += luminance(tile.mean(pixel)?);
             samples = samples.min(tile.count(pixel));
             pixels += 1;
         }
         let pixels = Some(f64::from(pixels)).filter(|pixels| *pixels > 0.0)?;
         let (variance, rate) = Convergence::variance(&tile.steps, (number % CELLS, half), samples, false)?;
-        Some(HalfNoise { variance: variance / pixels, mean: sum / pixels, samples, power: libm::log2(rate) })
+        Some(CellHalfNoise {
+            variance: variance / pixels,
+            mean: sum / pixels,
+            samples,
+            power: libm::log2(rate),
+        })
     }
 
     /// Factor by which the last doubling reduced a tile's variance, measured in the half-cells that have
     /// completed that doubling. `None` if there are not enough steps.
-    pub fn tile_fall(&self, tile: usize) -> Option<f64> {
+    pub fn tile_variance_reduction(&self, tile: usize) -> Option<f64> {
         let tile = self.tile(tile);
-        tile.steps.fall(tile.steps.level_count(), &[0, 1])
+        tile.steps.variance_reduction(tile.steps.level_count(), &[0, 1])
     }
 
     /// Expected relative standard deviation of the variance measured over one half of a tile's cells: 1 if a
     /// single pixel dominates, lower if many pixels contribute. Ignores cells with fewer samples than others.
-    pub fn tile_spread(&self, tile: usize, half: usize) -> f64 {
+    pub fn tile_variance_uncertainty(&self, tile: usize, half: usize) -> f64 {
         let tile = self.tile(tile);
-        tile.steps.spread(tile.steps.level_count(), &[half])
+        tile.steps.variance_uncertainty(tile.steps.level_count(), &[half])
     }
 
-    /// Noise in one half of all cells of a tile. `None` in the same cases as [`Film::half_noise`].
-    pub fn tile_noise(&self, tile: usize, half: usize) -> Option<HalfNoise> {
+    /// Noise in one half of all cells of a tile. `None` in the same cases as [`Film::cell_half_noise`].
+    pub fn tile_noise(&self, tile: usize, half: usize) -> Option<CellHalfNoise> {
         let (mut pixels, mut samples, mut sums) = (0.0, u32::MAX, NoiseSums::default());
         for cell in CELLS * tile..CELLS * (tile + 1) {
             let count = self.half_pixel_count(cell, half) as f64;
             if count > 0.0 {
-                let noise = self.half_noise(cell, half)?;
+                let noise = self.cell_half_noise(cell, half)?;
                 sums.add(&noise, count);
                 samples = samples.min(noise.samples);
                 pixels += count;
             }
         }
         let (variance, mean, power) = (sums.variance / pixels, sums.mean / pixels, sums.power());
-        (pixels > 0.0).then_some(HalfNoise { variance, mean, samples, power })
+        (pixels > 0.0).then_some(CellHalfNoise { variance, mean, samples, power })
     }
 
     /// Error of a half-cell after the first `count` samples per pixel, where `count` is a power of two: the
     /// mean of luminance variance / (luminance² + [`RELMSE_EPSILON`](crate::math::color::RELMSE_EPSILON))
     /// over the pixels, and the exponent with which it falls. `None` if `count` is less than two or more than
     /// the pixels' sample count, and if the half has no pixels.
-    pub fn half_error(&self, number: usize, half: usize, count: u32) -> Option<(f64, f64)> {
+    pub fn cell_half_error(&self, number: usize, half: usize, count: u32) -> Option<(f64, f64)> {
         let tile = self.tile(number / CELLS);
         let pixels = self.half_pixel_count(number, half);
         let (sum, rate) = Convergence::variance(&tile.steps, (number % CELLS, half), count, true)?;
@@ -185,7 +190,7 @@ impl Film {
     }
 
     /// Tile-relative indices of the pixels in a half-cell.
-    fn half_pixels(&self, cell: usize, half: usize) -> impl Iterator<Item = usize> {
+    fn cell_half_pixels(&self, cell: usize, half: usize) -> impl Iterator<Item = usize> {
         let (tile, rect) = (self.tile_rect(cell / CELLS), self.cell_rect(cell));
         let part = PixelSubset::Half(half);
         tile.zip(rect).into_iter().flat_map(move |(tile, rect)| {
@@ -247,8 +252,8 @@ mod tests {
     fn halves_with_fewer_samples_are_ignored() {
         // Two pixels in different halves: one with steps of 1 and 0.5, the other with a single step of 3.
         let film = film(&[&[1.0, 3.0, 2.0, 4.0], &[1.0, 7.0]]);
-        assert_eq!(film.tile_fall(0), Some(4.0));
-        assert_eq!(self::film(&[&[1.0, 3.0], &[1.0, 7.0]]).tile_fall(0), None, "one step");
+        assert_eq!(film.tile_variance_reduction(0), Some(4.0));
+        assert_eq!(self::film(&[&[1.0, 3.0], &[1.0, 7.0]]).tile_variance_reduction(0), None, "one step");
     }
 
     #[test]
@@ -256,7 +261,7 @@ mod tests {
         let one: &[f32] = &[0.0, 8.0];
         let none: &[f32] = &[1.0, 1.0];
         // Pixels in a row alternate between the halves.
-        let of = |pixels: &[&[f32]]| film(pixels).tile_spread(0, 0);
+        let of = |pixels: &[&[f32]]| film(pixels).tile_variance_uncertainty(0, 0);
         assert_eq!(of(&[one, one, none, none, none, none, none, none]), 1.0);
         assert_eq!(of(&[one; 8]), 0.5);
         assert_eq!(of(&[none; 8]), 0.0);

@@ -58,22 +58,22 @@ impl PixelSubset {
             Self::All => number,
             // If the area is odd, the last pixel belongs to the first half.
             Self::Half(half) => {
-                (2 * number + (swaps(number, rect.width) ^ half as u32)).min(rect.area() as u32 - 1)
+                (2 * number + (is_pair_swapped(number, rect.width) ^ half as u32)).min(rect.area() as u32 - 1)
             }
         }
     }
 
     /// Half that contains the pixel at `index` in a rectangle.
-    pub fn half_of(index: u32, rect: Rect) -> usize {
+    pub fn half_containing(index: u32, rect: Rect) -> usize {
         let area = rect.area() as u32;
         let is_alone = index + 1 == area && area % 2 == 1;
-        if is_alone { 0 } else { ((index & 1) ^ swaps(index / 2, rect.width)) as usize }
+        if is_alone { 0 } else { ((index & 1) ^ is_pair_swapped(index / 2, rect.width)) as usize }
     }
 }
 
 /// Whether the right pixel of a pair is in the first half. This alternates every two rows.
 #[inline(always)]
-fn swaps(pair: u32, width: u32) -> u32 {
+fn is_pair_swapped(pair: u32, width: u32) -> u32 {
     (pair / width) & 1
 }
 
@@ -91,7 +91,7 @@ mod tests {
                 for number in 0..pixels.count() as u32 {
                     let (x, y) = pixels.position(number);
                     let index = (y - 8) * width + x - 3;
-                    assert_eq!(PixelSubset::half_of(index, rect), half, "{x} {y} of {rect:?}");
+                    assert_eq!(PixelSubset::half_containing(index, rect), half, "{x} {y} of {rect:?}");
                     seen[index as usize] += 1;
                 }
             }
@@ -102,7 +102,7 @@ mod tests {
     #[test]
     fn lines_are_split_between_both_halves() {
         let rect = Rect { x: 0, y: 0, width: 8, height: 8 };
-        let half = |x: u32, y: u32| PixelSubset::half_of(y * 8 + x, rect);
+        let half = |x: u32, y: u32| PixelSubset::half_containing(y * 8 + x, rect);
         for line in 0..8 {
             let places = |at| [(at, line), (line, at), (at, (at + line) % 8), (at, (line + 7 - at) % 8)];
             for kind in 0..4 {

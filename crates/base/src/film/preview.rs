@@ -19,7 +19,7 @@ pub struct Previewer {
     width: u32,
     height: u32,
     film_id: Option<u64>,
-    shares: Vec<Share>,
+    shares: Vec<TileContribution>,
     /// Next tile to check.
     next: usize,
     /// Whether every tile of this film has been checked.
@@ -28,7 +28,7 @@ pub struct Previewer {
 
 /// A tile's contribution to the preview pixels it covers.
 #[derive(Clone, Debug, Default)]
-struct Share {
+struct TileContribution {
     revision: u64,
     /// First column and row.
     x: u32,
@@ -76,7 +76,7 @@ impl Previewer {
     /// Bytes used by the cache.
     pub fn memory_bytes(&self) -> u64 {
         let cells: usize = self.shares.iter().map(|share| share.cells.capacity()).sum();
-        (cells * size_of::<Weighted>() + self.shares.capacity() * size_of::<Share>()) as u64
+        (cells * size_of::<Weighted>() + self.shares.capacity() * size_of::<TileContribution>()) as u64
     }
 
     /// Whether every tile of the film has been processed at least once. If so, [`Previewer::picture`] has no
@@ -91,7 +91,7 @@ impl Previewer {
     pub fn update(&mut self, film: &Film, deadline: Option<Instant>) -> bool {
         if self.film_id != Some(film.id()) {
             self.film_id = Some(film.id());
-            self.shares = vec![Share::default(); film.tile_count()];
+            self.shares = vec![TileContribution::default(); film.tile_count()];
             (self.next, self.is_whole) = (0, false);
         }
         let axes = [Axis::new(film.width(), self.width), Axis::new(film.height(), self.height)];
@@ -141,8 +141,13 @@ impl Previewer {
 }
 
 /// Updates these consecutive tiles, starting at index `first`.
-fn refresh(shares: &mut [Share], first: usize, (film, quantity): (&Film, Quantity), axes: [Axis; 2]) {
-    let refresh = |(i, share): (usize, &mut Share)| {
+fn refresh(
+    shares: &mut [TileContribution],
+    first: usize,
+    (film, quantity): (&Film, Quantity),
+    axes: [Axis; 2],
+) {
+    let refresh = |(i, share): (usize, &mut TileContribution)| {
         if film.tile(first + i).revision != share.revision {
             share.refresh((film, quantity), first + i, axes);
         }
@@ -154,21 +159,21 @@ fn refresh(shares: &mut [Share], first: usize, (film, quantity): (&Film, Quantit
     }
 }
 
-impl Share {
+impl TileContribution {
     fn refresh(&mut self, (film, quantity): (&Film, Quantity), tile: usize, [columns, rows]: [Axis; 2]) {
         let Some(rect) = film.tile_rect(tile) else { return };
-        let first = |axis: Axis, index| axis.covered(index).next().map_or(0, |(new, _)| new);
-        let last = |axis: Axis, index| axis.covered(index).last().map_or(0, |(new, _)| new);
+        let first = |axis: Axis, index| axis.overlaps(index).next().map_or(0, |(new, _)| new);
+        let last = |axis: Axis, index| axis.overlaps(index).last().map_or(0, |(new, _)| new);
         (self.x, self.y) = (first(columns, rect.x), first(rows, rect.y));
         self.width = last(columns, rect.x + rect.width - 1) - self.x + 1;
         let height = last(rows, rect.y + rect.height - 1) - self.y + 1;
         let mut sums: Vec<Sum> = vec![(DVec3::ZERO, 0.0); self.width as usize * height as usize];
         let across: Vec<Vec<_>> =
-            (rect.x..rect.x + rect.width).map(|x| columns.covered(x).collect()).collect();
+            (rect.x..rect.x + rect.width).map(|x| columns.overlaps(x).collect()).collect();
         let tile = film.tile(tile);
         self.revision = tile.revision;
         for y in 0..rect.height {
-            let down = rows.covered(rect.y + y);
+            let down = rows.overlaps(rect.y + y);
             for (x, across) in across.iter().enumerate() {
                 let index = y as usize * rect.width as usize + x;
                 let place = (index, rect.width as usize);

@@ -84,13 +84,13 @@ impl Tile {
             for x in around(index % columns, columns) {
                 let place = y * columns + x;
                 if self.count(place) > 1 {
-                    sum += self.steps.square(place);
+                    sum += self.steps.last_squared_step(place);
                     pixels += 1;
                 }
             }
         }
         let variance = if count > 1 && pixels > 0 {
-            let rate = Convergence::rate(&self.steps, count.ilog2() as usize, &[0, 1]);
+            let rate = Convergence::predicted_reduction(&self.steps, count.ilog2() as usize, &[0, 1]);
             pixel_variance(sum / f64::from(pixels), count, rate)
         } else {
             0.0

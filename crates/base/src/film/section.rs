@@ -9,7 +9,7 @@ impl Film {
     pub fn section(&self, quantity: Quantity, rect: Rect, base: Option<&RadianceImage>) -> RadianceImage {
         let mut image = RadianceImage::black(rect.width, rect.height);
         if let Some(base) = base {
-            self.enlarge(base, rect, &mut image);
+            self.fill_from_base(base, rect, &mut image);
         }
         for index in 0..self.tile_count() {
             let Some(place) = self.tile_rect(index) else { continue };
@@ -29,7 +29,7 @@ impl Film {
         image
     }
 
-    fn enlarge(&self, base: &RadianceImage, rect: Rect, image: &mut RadianceImage) {
+    fn fill_from_base(&self, base: &RadianceImage, rect: Rect, image: &mut RadianceImage) {
         let at = |pixel: u32, from: u32, to: u32| u64::from(pixel) * u64::from(to) / u64::from(from);
         for y in rect.y..rect.y + rect.height {
             let row = at(y, self.height(), base.height) as usize * base.width as usize;

@@ -22,7 +22,7 @@ struct ByteTable {
 static TABLE: LazyLock<ByteTable> = LazyLock::new(|| {
     let mut table = ByteTable { start: [0; BUCKETS], threshold: [0; 256] };
     for (byte, threshold) in table.threshold.iter_mut().enumerate() {
-        *threshold = first_bits_of(byte);
+        *threshold = smallest_bits_for_byte(byte);
     }
     for (bucket, start) in table.start.iter_mut().enumerate() {
         let bits = FIRST_EXPONENT_BITS + ((bucket as u32) << BUCKET_SHIFT);
@@ -33,7 +33,7 @@ static TABLE: LazyLock<ByteTable> = LazyLock::new(|| {
 
 /// Bits of the smallest float in [0, 1] that encodes to `byte` or more. Bisects over the bits, which have the
 /// same order as the floats.
-fn first_bits_of(byte: usize) -> u32 {
+fn smallest_bits_for_byte(byte: usize) -> u32 {
     let (mut low, mut high) = (0, ONE_BITS);
     while low < high {
         let middle = u32::midpoint(low, high);

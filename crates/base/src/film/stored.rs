@@ -2,8 +2,8 @@
 
 use std::sync::atomic::Ordering;
 
-use super::convergence::Steps;
-use super::sums::{Negative, Tile};
+use super::convergence::SquaredSteps;
+use super::sums::{NegativeLobeSums, Tile};
 use super::{CELLS, Film, PixelSubset};
 use crate::math::DVec3;
 
@@ -24,7 +24,7 @@ impl StoredTile {
     /// # Errors
     /// [`Malformed`] if there are too few or too many bytes, or invalid counts.
     pub fn read(bytes: &[u8], area: usize) -> Result<Self, Malformed> {
-        let mut from = Bytes(bytes);
+        let mut from = ByteReader(bytes);
         let (blocks, is_signed, levels) = (from.count()?, from.count()? == 1, from.count()?);
         // Check the length before reserving memory.
         if blocks.checked_mul(area * size_of::<DVec3>()).is_none_or(|all| all > bytes.len()) || levels > 32 {
@@ -37,9 +37,9 @@ impl StoredTile {
             let weight = f64::from_bits(from.u64()?);
             let sums = from.vectors(area)?;
             let earlier = (0..blocks).map(|_| from.vectors(area)).collect::<Result<_, _>>()?;
-            tile.negative = Some(Negative { weight, sums, counts: from.counts(area)?, earlier });
+            tile.negative = Some(NegativeLobeSums { weight, sums, counts: from.counts(area)?, earlier });
         }
-        tile.steps = Steps::read(area, levels, &mut || from.u32())?;
+        tile.steps = SquaredSteps::read(area, levels, &mut || from.u32())?;
         if from.0.is_empty() { Ok(Self { tile }) } else { Err(Malformed) }
     }
 
@@ -65,12 +65,13 @@ impl StoredTile {
         if is_first {
             self.tile.earlier = vec![sums.to_vec()];
         } else {
-            add_up(&mut self.tile.earlier[0], sums);
+            add_block_sums(&mut self.tile.earlier[0], sums);
         }
         if let Some(negative) = &of.tile.negative {
             let sums = block_of(&negative.earlier, &negative.sums, block).ok_or(Malformed)?;
-            let own = self.tile.negative.get_or_insert_with(|| Negative::new(negative.weight, area, 1));
-            add_up(&mut own.earlier[0], sums);
+            let own =
+                self.tile.negative.get_or_insert_with(|| NegativeLobeSums::new(negative.weight, area, 1));
+            add_block_sums(&mut own.earlier[0], sums);
         }
         Ok(())
     }
@@ -93,7 +94,7 @@ fn block_of<'a>(earlier: &'a [Vec<DVec3>], sums: &'a [DVec3], block: usize) -> O
     }
 }
 
-fn add_up(sums: &mut [DVec3], others: &[DVec3]) {
+fn add_block_sums(sums: &mut [DVec3], others: &[DVec3]) {
     sums.iter_mut().zip(others).for_each(|(sum, other)| *sum += *other);
 }
 
@@ -115,7 +116,7 @@ impl Film {
             put_sums(bytes, &negative.sums, &negative.earlier);
             put_all(bytes, negative.counts.iter().map(|count| count.to_le_bytes()));
         }
-        tile.steps.words(&mut |word| put(bytes, word));
+        tile.steps.write_words(&mut |word| put(bytes, word));
         true
     }
 
@@ -126,7 +127,7 @@ impl Film {
     pub fn restore(&self, tile: usize, stored: StoredTile) -> Result<(), Malformed> {
         let area = self.tile_rect(tile).ok_or(Malformed)?.area();
         let Tile { sums, earlier, counts, negative, steps, .. } = stored.tile;
-        if sums.len() != area || earlier.len() != self.sum_order().kept() {
+        if sums.len() != area || earlier.len() != self.sum_order().kept_block_count() {
             return Err(Malformed);
         }
         let mut own = self.tile(tile);
@@ -137,7 +138,7 @@ impl Film {
     }
 
     /// Samples per pixel in one half of a cell, or 0 if the half has no pixels.
-    pub fn half_samples(&self, cell: usize, half: usize) -> u32 {
+    pub fn cell_half_samples(&self, cell: usize, half: usize) -> u32 {
         let (Some(tile), Some(rect)) = (self.tile_rect(cell / CELLS), self.cell_rect(cell)) else { return 0 };
         if PixelSubset::Half(half).count(rect.area()) == 0 {
             return 0;
@@ -184,9 +185,9 @@ fn put_all<const N: usize>(bytes: &mut Vec<u8>, numbers: impl ExactSizeIterator<
 }
 
 /// Remaining input bytes.
-struct Bytes<'a>(&'a [u8]);
+struct ByteReader<'a>(&'a [u8]);
 
-impl Bytes<'_> {
+impl ByteReader<'_> {
     fn take<const N: usize>(&mut self) -> Result<[u8; N], Malformed> {
         let (head, rest) = self.0.split_first_chunk().ok_or(Malformed)?;
         self.0 = rest;
@@ -270,7 +271,7 @@ mod tests {
                 let read = StoredTile::read(&stored(&first, tile), area).expect("a tile");
                 second.restore(tile, read).expect("films should be identical");
             }
-            assert_eq!((second.half_samples(0, 1), second.half_samples(1, 0)), (21, 21));
+            assert_eq!((second.cell_half_samples(0, 1), second.cell_half_samples(1, 0)), (21, 21));
             add(&second, 21..37, is_signed);
             assert_eq!(second.radiance().pixels, whole.radiance().pixels);
             assert_eq!(second.noise(), whole.noise());

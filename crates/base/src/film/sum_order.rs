@@ -21,7 +21,7 @@ pub enum SumOrder {
 
 impl SumOrder {
     /// Number of finished block sums kept per pixel.
-    pub fn kept(self) -> usize {
+    pub fn kept_block_count(self) -> usize {
         match self {
             Self::Sequential => 0,
             Self::Blocked => 1,
@@ -30,7 +30,7 @@ impl SumOrder {
     }
 
     /// Number of samples until the current block ends, for a pixel with `count` samples.
-    pub(super) fn samples_to_end(self, count: u32) -> usize {
+    pub(super) fn samples_to_block_end(self, count: u32) -> usize {
         match self {
             Self::Sequential => usize::MAX,
             Self::Blocked | Self::SeparateBlocks(_) => (BLOCK_SIZE - count % BLOCK_SIZE) as usize,
@@ -38,7 +38,7 @@ impl SumOrder {
     }
 
     /// Index of the sum to which a block that ends at `count` samples is added, or `None` inside a block.
-    pub(super) fn finished(self, count: u32) -> Option<usize> {
+    pub(super) fn finished_block(self, count: u32) -> Option<usize> {
         let is_end = count > 0 && count.is_multiple_of(BLOCK_SIZE);
         match self {
             Self::Blocked if is_end => Some(0),
@@ -50,7 +50,7 @@ impl SumOrder {
 
 /// Adds a pixel's finished blocks in order, followed by the unfinished block.
 #[cold]
-pub(super) fn total(earlier: &[Vec<DVec3>], sums: &[DVec3], index: usize) -> DVec3 {
+pub(super) fn sum_with_blocks(earlier: &[Vec<DVec3>], sums: &[DVec3], index: usize) -> DVec3 {
     match earlier {
         [] => sums[index],
         [first, others @ ..] => {

@@ -3,9 +3,9 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 
-use super::convergence::{Convergence, Steps, luminance};
+use super::convergence::{Convergence, SquaredSteps, luminance};
 use super::pixel_subset::PixelSubset;
-use super::sum_order::{SumOrder, total};
+use super::sum_order::{SumOrder, sum_with_blocks};
 use super::{CELL_SIZE, CELLS, CELLS_ACROSS, Rect, TILE_SIZE, TileSamples};
 use crate::math::{DVec3, Vec3};
 
@@ -83,15 +83,15 @@ pub(super) struct Tile {
     /// Sums of finished sample blocks: none, one for all blocks, or one per block; see [`SumOrder`].
     pub(super) earlier: Vec<Vec<DVec3>>,
     /// Sums of the samples in the filter's negative lobes. `None` until there is such a sample.
-    pub(super) negative: Option<Negative>,
-    pub(super) steps: Steps,
+    pub(super) negative: Option<NegativeLobeSums>,
+    pub(super) steps: SquaredSteps,
     /// Incremented whenever the tile changes.
     pub(super) revision: u64,
 }
 
 /// Sums of the samples in a filter's negative lobes, which are excluded from all other sums.
 #[derive(Debug)]
-pub(super) struct Negative {
+pub(super) struct NegativeLobeSums {
     pub(super) weight: f64,
     pub(super) sums: Vec<DVec3>,
     pub(super) counts: Vec<u32>,
@@ -99,7 +99,7 @@ pub(super) struct Negative {
     pub(super) earlier: Vec<Vec<DVec3>>,
 }
 
-impl Negative {
+impl NegativeLobeSums {
     /// Creates zero sums for a tile with `blocks` separate block sums.
     pub(super) fn new(weight: f64, area: usize, blocks: usize) -> Self {
         let (sums, counts) = (vec![DVec3::ZERO; area], vec![0; area]);
@@ -117,7 +117,8 @@ impl Tile {
         let Some(negative) = negative else {
             return (count > 0).then(|| self.sum(index) / f64::from(count));
         };
-        let below = total(&negative.earlier, &negative.sums, index) / f64::from(negative.counts[index]);
+        let below =
+            sum_with_blocks(&negative.earlier, &negative.sums, index) / f64::from(negative.counts[index]);
         let positive_count = count - negative.counts[index];
         if positive_count == 0 {
             return Some(below);
@@ -133,7 +134,11 @@ impl Tile {
     /// Sum of a pixel's samples outside negative lobes.
     #[inline(always)]
     fn sum(&self, index: usize) -> DVec3 {
-        if self.earlier.is_empty() { self.sums[index] } else { total(&self.earlier, &self.sums, index) }
+        if self.earlier.is_empty() {
+            self.sums[index]
+        } else {
+            sum_with_blocks(&self.earlier, &self.sums, index)
+        }
     }
 
     /// Resizes to the tile's pixels. Cannot fail because the memory was reserved when the film was created.
@@ -157,16 +162,16 @@ impl Tile {
         let mut rest = 0..radiances.len();
         while !rest.is_empty() {
             // Stop at the next count where the mean is recorded or a block ends.
-            let to_note = Steps::samples_to_next(self.counts[index]);
+            let to_note = SquaredSteps::samples_to_next_step(self.counts[index]);
             let left = match blocks {
                 SumOrder::Sequential => to_note,
                 SumOrder::Blocked | SumOrder::SeparateBlocks(_) => {
-                    to_note.min(blocks.samples_to_end(self.counts[index]))
+                    to_note.min(blocks.samples_to_block_end(self.counts[index]))
                 }
             };
             let part = rest.start..rest.end.min(rest.start + left);
             non_finite += match lobes {
-                None => add_up(&mut self.sums[index], &radiances[part.clone()]),
+                None => add_finite(&mut self.sums[index], &radiances[part.clone()]),
                 Some((weight, signs)) => {
                     self.add_signed(index, weight, &radiances[part.clone()], &signs[part.clone()])
                 }
@@ -176,7 +181,7 @@ impl Tile {
             if part.len() == to_note
                 && let Some(mean) = self.mean(index)
             {
-                self.steps.note((index, cell, half), self.counts[index], luminance(mean));
+                self.steps.record((index, cell, half), self.counts[index], luminance(mean));
             }
             if blocks != SumOrder::Sequential {
                 self.close_block(index, blocks);
@@ -187,11 +192,11 @@ impl Tile {
 
     fn add_signed(&mut self, index: usize, weight: f64, radiances: &[Vec3], is_negative: &[bool]) -> u64 {
         let (area, blocks) = (self.sums.len(), self.earlier.len());
-        let negative = self.negative.get_or_insert_with(|| Negative::new(weight, area, blocks));
+        let negative = self.negative.get_or_insert_with(|| NegativeLobeSums::new(weight, area, blocks));
         let mut non_finite = 0;
         for (radiance, &is_negative) in radiances.iter().zip(is_negative) {
             let sum = if is_negative { &mut negative.sums[index] } else { &mut self.sums[index] };
-            non_finite += add_up(sum, std::slice::from_ref(radiance));
+            non_finite += add_finite(sum, std::slice::from_ref(radiance));
             negative.counts[index] += u32::from(is_negative);
         }
         non_finite
@@ -199,7 +204,7 @@ impl Tile {
 }
 
 /// Adds the finite radiances and returns the number of non-finite radiances.
-fn add_up(sum: &mut DVec3, radiances: &[Vec3]) -> u64 {
+fn add_finite(sum: &mut DVec3, radiances: &[Vec3]) -> u64 {
     let all = radiances.iter().fold(*sum, |sum, radiance| sum + radiance.as_dvec3());
     if all.is_finite() {
         *sum = all;
@@ -223,21 +228,26 @@ impl Film {
     /// [`FilmError`] if the crop is outside the image, or if there is not enough memory for the sums and the
     /// finished image.
     pub fn new(width: u32, height: u32, crop: Option<Rect>) -> Result<Self, FilmError> {
-        Self::within(u64::MAX, width, height, crop)
+        Self::with_memory_limit(u64::MAX, width, height, crop)
     }
 
     /// Like [`Film::new`], but uses at most `most_bytes` of memory.
     ///
     /// # Errors
     /// [`FilmError`] as in [`Film::new`].
-    pub fn within(most_bytes: u64, width: u32, height: u32, crop: Option<Rect>) -> Result<Self, FilmError> {
+    pub fn with_memory_limit(
+        most_bytes: u64,
+        width: u32,
+        height: u32,
+        crop: Option<Rect>,
+    ) -> Result<Self, FilmError> {
         let whole = Rect { x: 0, y: 0, width, height };
         let crop = crop.unwrap_or(whole).intersection(&whole).ok_or(FilmError::Empty { width, height })?;
         let bytes = bytes_needed(width, height, crop);
         let tiles = if bytes <= most_bytes { allocate(width, height, crop) } else { None };
         let tiles = tiles.ok_or_else(|| {
             let least = bytes_needed(width, height, Rect { width: 0, height: 0, ..crop });
-            let crop_helps = crop == whole && least <= most_bytes && is_available(least);
+            let crop_helps = crop == whole && least <= most_bytes && can_allocate(least);
             FilmError::Memory { width, height, bytes, crop_helps }
         })?;
         static IDS: AtomicU64 = AtomicU64::new(0);
@@ -296,13 +306,13 @@ impl Film {
 
     /// Indices of all tiles in rings from the center of the crop outward. Computed on the first call.
     pub fn tile_order(&self) -> &[usize] {
-        self.order.get_or_init(|| rings(self.crop))
+        self.order.get_or_init(|| tiles_in_rings(self.crop))
     }
 
     /// Bytes used by the sums.
     pub fn memory_bytes(&self) -> u64 {
         let tile = size_of::<Mutex<Tile>>() + size_of::<usize>();
-        let pixel = SUM_BYTES + self.blocks.kept() * size_of::<DVec3>();
+        let pixel = SUM_BYTES + self.blocks.kept_block_count() * size_of::<DVec3>();
         (self.crop.area() * pixel + self.tiles.len() * tile) as u64
     }
 
@@ -324,7 +334,8 @@ impl Film {
             let (cell, inside) = cell_at(rect, x, y);
             let lobes = samples.negative.as_ref();
             let lobes = lobes.map(|lobes| (lobes.weight, &lobes.is_negative[i * count..][..count]));
-            let half = index_in(inside, x, y).map_or(0, |index| PixelSubset::half_of(index as u32, inside));
+            let half =
+                index_in(inside, x, y).map_or(0, |index| PixelSubset::half_containing(index as u32, inside));
             non_finite += tile.add((index, cell, half), pixel, lobes, self.blocks);
         }
         tile.revision += 1;
@@ -398,7 +409,7 @@ pub(super) fn tile_rect(crop: Rect, tile: usize) -> Rect {
     Rect { x: crop.x + x, y: crop.y + y, width: side(x, crop.width), height: side(y, crop.height) }
 }
 
-fn rings(crop: Rect) -> Vec<usize> {
+fn tiles_in_rings(crop: Rect) -> Vec<usize> {
     let (columns, rows) = tile_grid(crop);
     // Use twice the distance from the center, which is an integer.
     let offset = |index: usize, length: usize| 2 * index as i64 - (length as i64 - 1);
@@ -422,14 +433,14 @@ pub(super) fn bytes_needed(width: u32, height: u32, crop: Rect) -> u64 {
 }
 
 /// Whether an allocation of this size succeeds.
-pub(super) fn is_available(bytes: u64) -> bool {
+pub(super) fn can_allocate(bytes: u64) -> bool {
     usize::try_from(bytes).is_ok_and(|bytes| Vec::<u8>::new().try_reserve_exact(bytes).is_ok())
 }
 
 /// Allocates the tiles. First tries to allocate all the memory at once, because a system that overcommits
 /// memory refuses only a single huge allocation.
 fn allocate(width: u32, height: u32, crop: Rect) -> Option<Vec<Mutex<Tile>>> {
-    if !is_available(bytes_needed(width, height, crop)) {
+    if !can_allocate(bytes_needed(width, height, crop)) {
         return None;
     }
     let (columns, rows) = tile_grid(crop);
@@ -440,7 +451,7 @@ fn allocate(width: u32, height: u32, crop: Rect) -> Option<Vec<Mutex<Tile>>> {
         let mut sums = Vec::new();
         let mut counts = Vec::new();
         sums.try_reserve_exact(area).ok()?;
-        let steps = Steps::reserved(area)?;
+        let steps = SquaredSteps::reserved(area)?;
         counts.try_reserve_exact(area).ok()?;
         tiles.push(Mutex::new(Tile { sums, counts, steps, ..Tile::default() }));
     }

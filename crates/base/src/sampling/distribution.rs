@@ -26,7 +26,7 @@ impl Discrete {
     }
 
     /// Probability of `index`.
-    pub fn share(&self, index: usize) -> f64 {
+    pub fn probability(&self, index: usize) -> f64 {
         let before = if index == 0 { 0.0 } else { self.sums[index - 1] };
         (self.sums[index] - before) / self.total()
     }
@@ -58,7 +58,7 @@ mod tests {
             rests += rest;
         }
         assert_eq!(counts, [250, 0, 750, 0]);
-        assert_eq!([0, 1, 2, 3].map(|index| distribution.share(index)), [0.25, 0.0, 0.75, 0.0]);
+        assert_eq!([0, 1, 2, 3].map(|index| distribution.probability(index)), [0.25, 0.0, 0.75, 0.0]);
         assert!((rests / 1000.0 - 0.5).abs() < 0.01);
         assert_eq!(distribution.sample(1.0_f32.next_down()).0, 2);
         assert_eq!(Discrete::new([0.0]), None);

@@ -37,7 +37,9 @@ impl PixelFilter {
     pub fn sample(self, u: Vec2) -> FilterSample {
         match self {
             Self::Box => FilterSample { offset: u - Vec2::splat(0.5), is_negative: false },
-            Self::Tent => FilterSample { offset: Vec2::new(tent(u.x), tent(u.y)), is_negative: false },
+            Self::Tent => {
+                FilterSample { offset: Vec2::new(sample_tent(u.x), sample_tent(u.y)), is_negative: false }
+            }
             Self::Gaussian => GAUSSIAN.sample2(u),
             Self::Mitchell => MITCHELL.sample2(u),
         }
@@ -53,7 +55,7 @@ impl PixelFilter {
     ) {
         match self {
             Self::Box => u.as_flattened_mut().iter_mut().for_each(|u| *u -= 0.5),
-            Self::Tent => u.as_flattened_mut().iter_mut().for_each(|u| *u = tent(*u)),
+            Self::Tent => u.as_flattened_mut().iter_mut().for_each(|u| *u = sample_tent(*u)),
             Self::Gaussian | Self::Mitchell => {
                 for i in 0..N {
                     let sample = self.sample(Vec2::new(u[0][i], u[1][i]));
@@ -76,19 +78,19 @@ impl PixelFilter {
 
 /// Samples the pdf 1 − |x| on [−1, 1].
 #[inline(always)]
-fn tent(u: f32) -> f32 {
+fn sample_tent(u: f32) -> f32 {
     let (is_left, twice) = (u < 0.5, 2.0 * u);
     let rest = 1.0 - (if is_left { twice } else { 2.0 - twice }).sqrt();
     if is_left { -rest } else { rest }
 }
 
-static GAUSSIAN: LazyLock<Tabulated> = LazyLock::new(|| {
+static GAUSSIAN: LazyLock<TabulatedFilter> = LazyLock::new(|| {
     let at = |x: f64| libm::exp(-2.0 * x * x);
-    Tabulated::new(1.5, |x| at(x) - at(1.5))
+    TabulatedFilter::new(1.5, |x| at(x) - at(1.5))
 });
 
-static MITCHELL: LazyLock<Tabulated> = LazyLock::new(|| {
-    Tabulated::new(2.0, |x| {
+static MITCHELL: LazyLock<TabulatedFilter> = LazyLock::new(|| {
+    TabulatedFilter::new(2.0, |x| {
         let x = x.abs();
         // B = C = 1/3 in the general cubic.
         if x < 1.0 {
@@ -100,7 +102,7 @@ static MITCHELL: LazyLock<Tabulated> = LazyLock::new(|| {
 });
 
 /// A tabulated one-dimensional even function, sampled in proportion to its absolute value.
-struct Tabulated {
+struct TabulatedFilter {
     radius: f64,
     sums: Vec<f64>,
     is_negative: Vec<bool>,
@@ -108,7 +110,7 @@ struct Tabulated {
     excess: f64,
 }
 
-impl Tabulated {
+impl TabulatedFilter {
     const CELLS: usize = 1024;
 
     fn new(radius: f64, f: impl Fn(f64) -> f64) -> Self {

@@ -10,7 +10,7 @@ pub struct PiecewiseConstant2D {
     rows: Vec<f32>,
     /// Cumulative column probabilities within each row, `columns + 1` values per row.
     in_row: Vec<f32>,
-    /// Guide tables for finding a row, and a column within each row; see [`guide`].
+    /// Guide tables for finding a row, and a column within each row; see [`guide_table`].
     row_guide: Vec<u32>,
     column_guide: Vec<u32>,
 }
@@ -42,17 +42,17 @@ impl PiecewiseConstant2D {
         if !(total > 0.0 && total.is_finite()) {
             return None;
         }
-        let row_guide = guide(&rows).collect();
-        let column_guide = in_row.chunks(columns + 1).flat_map(guide).collect();
+        let row_guide = guide_table(&rows).collect();
+        let column_guide = in_row.chunks(columns + 1).flat_map(guide_table).collect();
         Some(Self { columns, rows, in_row, row_guide, column_guide })
     }
 
     /// Samples a point with two numbers in [0, 1): the first selects the column, the second the row.
     #[inline(always)]
     pub fn sample(&self, u: [f32; 2]) -> GridSample {
-        let (row, across) = find(&self.rows, &self.row_guide, u[1]);
+        let (row, across) = find_interval(&self.rows, &self.row_guide, u[1]);
         let guide = &self.column_guide[row * self.columns..(row + 1) * self.columns];
-        let (column, along) = find(self.columns_of(row), guide, u[0]);
+        let (column, along) = find_interval(self.column_sums_in(row), guide, u[0]);
         GridSample { column, row, rest: [along, across] }
     }
 
@@ -65,12 +65,12 @@ impl PiecewiseConstant2D {
     /// Probability of sampling `column` given its row.
     #[inline(always)]
     pub fn column_probability(&self, row: usize, column: usize) -> f32 {
-        let sums = self.columns_of(row);
+        let sums = self.column_sums_in(row);
         sums[column + 1] - sums[column]
     }
 
     #[inline(always)]
-    fn columns_of(&self, row: usize) -> &[f32] {
+    fn column_sums_in(&self, row: usize) -> &[f32] {
         let start = row * (self.columns + 1);
         &self.in_row[start..=start + self.columns]
     }
@@ -94,10 +94,10 @@ fn add_sums(weights: &[f64], sums: &mut Vec<f32>) -> f64 {
 
 /// Guide table: divides [0, 1) into as many equal parts as there are intervals and yields the interval at the
 /// start of each part (Chen and Asau, *On Generating Random Variates from an Empirical Distribution*, 1974).
-fn guide(sums: &[f32]) -> impl Iterator<Item = u32> {
+fn guide_table(sums: &[f32]) -> impl Iterator<Item = u32> {
     let (count, mut place) = (sums.len() - 1, 0);
     (0..count).map(move |part| {
-        place = last_from(sums, place, part as f32 / count as f32);
+        place = last_interval_from(sums, place, part as f32 / count as f32);
         place as u32
     })
 }
@@ -105,7 +105,7 @@ fn guide(sums: &[f32]) -> impl Iterator<Item = u32> {
 /// Last interval, searching from `place` onward, that starts at or before `u`. This is usually `place` or the
 /// next interval, so the first two steps avoid unpredictable branches.
 #[inline(always)]
-fn last_from(sums: &[f32], mut place: usize, u: f32) -> usize {
+fn last_interval_from(sums: &[f32], mut place: usize, u: f32) -> usize {
     for _ in 0..2 {
         let next = (place + 1).min(sums.len() - 2);
         place = if sums[next] <= u { next } else { place };
@@ -118,10 +118,10 @@ fn last_from(sums: &[f32], mut place: usize, u: f32) -> usize {
 
 /// Finds the interval that contains `u` in [0, 1), and the relative position of `u` within it, in [0, 1).
 #[inline(always)]
-fn find(sums: &[f32], guide: &[u32], u: f32) -> (usize, f32) {
+fn find_interval(sums: &[f32], guide: &[u32], u: f32) -> (usize, f32) {
     // Rounding may select the part after the one that contains `u`, so start one part earlier.
     let part = ((u * guide.len() as f32) as usize).saturating_sub(1);
-    let first = last_from(sums, guide[part] as usize, u);
+    let first = last_interval_from(sums, guide[part] as usize, u);
     let rest = (u - sums[first]) / (sums[first + 1] - sums[first]);
     const LAST: f32 = 1.0_f32.next_down();
     (first, if rest < LAST { rest } else { LAST })
@@ -180,13 +180,13 @@ mod tests {
             };
             let mut sums = Vec::new();
             add_sums(&(0..count).map(|i| weight(i + 1)).collect::<Vec<_>>(), &mut sums);
-            let guide: Vec<u32> = guide(&sums).collect();
+            let guide: Vec<u32> = guide_table(&sums).collect();
             let borders =
                 sums[..count].iter().flat_map(|&sum| [sum.next_down().max(0.0), sum, sum.next_up()]);
             let even = (0..10_000).map(|i| i as f32 / 1e4);
             for u in borders.chain(even).filter(|u| *u < 1.0) {
                 let expected = (0..count).rev().find(|&i| sums[i] <= u).expect("sums should start at 0");
-                assert_eq!(find(&sums, &guide, u).0, expected, "{u} of {count}");
+                assert_eq!(find_interval(&sums, &guide, u).0, expected, "{u} of {count}");
             }
         }
     }

@@ -71,7 +71,7 @@ impl Dimension {
             Self::Opacity => u32::MAX - 15,
             Self::Trial(number) => (1 << 31) + number,
         };
-        mix(mix(path.wrapping_add(1)) ^ number.wrapping_mul(0x9e37_79b9))
+        mix_bits(mix_bits(path.wrapping_add(1)) ^ number.wrapping_mul(0x9e37_79b9))
     }
 }
 
@@ -88,7 +88,7 @@ pub struct PixelSampler {
 /// Hashes a pixel's coordinates in the full image.
 #[inline(always)]
 fn pixel_seed(seed: u32, x: u32, y: u32) -> u32 {
-    mix(mix(mix(seed) ^ x) ^ y.rotate_left(16))
+    mix_bits(mix_bits(mix_bits(seed) ^ x) ^ y.rotate_left(16))
 }
 
 impl PixelSampler {
@@ -101,7 +101,8 @@ impl PixelSampler {
     /// Returns two numbers in [0, 1) for one decision.
     #[inline]
     pub fn pair(&self, path: u32, decision: Dimension) -> Vec2 {
-        let [[x], [y]] = scrambled([self.sample], [mix(self.seed ^ decision.hash(path)) ^ mix(0)]);
+        let [[x], [y]] =
+            owen_scrambled_points([self.sample], [mix_bits(self.seed ^ decision.hash(path)) ^ mix_bits(0)]);
         Vec2::new(x, y)
     }
 }
@@ -132,26 +133,27 @@ impl<const N: usize> SamplerPacket<N> {
         for i in 0..N {
             let index = u64::from(self.samples[i]) * u64::from(of) + u64::from(repetition);
             indices[i] = index as u32;
-            seeds[i] = mix(self.seeds[i] ^ decision.hash(paths[i])) ^ mix((index >> 32) as u32);
+            seeds[i] = mix_bits(self.seeds[i] ^ decision.hash(paths[i])) ^ mix_bits((index >> 32) as u32);
         }
-        scrambled(indices, seeds)
+        owen_scrambled_points(indices, seeds)
     }
 }
 
 /// Points of the first two Sobol dimensions. Their order and both coordinates are Owen-scrambled.
 #[inline(always)]
-fn scrambled<const N: usize>(indices: [u32; N], seeds: [u32; N]) -> [[f32; N]; 2] {
+fn owen_scrambled_points<const N: usize>(indices: [u32; N], seeds: [u32; N]) -> [[f32; N]; 2] {
     // Run each step over all lanes before the next step so that compilers vectorize it.
     let mut places = indices;
     for (place, &seed) in places.iter_mut().zip(&seeds) {
-        *place = owen(place.reverse_bits(), seed).reverse_bits();
+        *place = owen_scramble(place.reverse_bits(), seed).reverse_bits();
     }
     let mut points = [[0.0; N]; 2];
     for i in 0..N {
-        points[0][i] = unit(owen(places[i], mix(seeds[i] ^ 0x68bc_21eb)));
+        points[0][i] = unit(owen_scramble(places[i], mix_bits(seeds[i] ^ 0x68bc_21eb)));
     }
     for i in 0..N {
-        points[1][i] = unit(owen(pascal(places[i]), mix(seeds[i] ^ 0x02e5_be93)));
+        points[1][i] =
+            unit(owen_scramble(second_sobol_coordinate(places[i]), mix_bits(seeds[i] ^ 0x02e5_be93)));
     }
     points
 }
@@ -166,7 +168,7 @@ fn unit(bits: u32) -> f32 {
 /// Bit-reversed second Sobol coordinate. Bit j is the sum (mod 2) of the index bits k with odd C(k, j), which
 /// means that k has every bit of j set. The bit-reversed first coordinate is the index itself.
 #[inline(always)]
-fn pascal(mut bits: u32) -> u32 {
+fn second_sobol_coordinate(mut bits: u32) -> u32 {
     for (shift, lacking) in
         [(1, 0x5555_5555), (2, 0x3333_3333), (4, 0x0f0f_0f0f), (8, 0x00ff_00ff), (16, 0x0000_ffff)]
     {
@@ -179,7 +181,7 @@ fn pascal(mut bits: u32) -> u32 {
 /// Karras, *Stratified Sampling for Stochastic Transparency*, 2011, with the constants from Vegdahl,
 /// *Building a Better LK Hash*, 2021).
 #[inline(always)]
-fn owen(mut bits: u32, seed: u32) -> u32 {
+fn owen_scramble(mut bits: u32, seed: u32) -> u32 {
     bits ^= bits.wrapping_mul(0x3d20_adea);
     bits = bits.wrapping_add(seed);
     bits = bits.wrapping_mul((seed >> 16) | 1);
@@ -189,7 +191,7 @@ fn owen(mut bits: u32, seed: u32) -> u32 {
 
 /// A bijective hash of 32 bits (Wellons, *Prospecting for Hash Functions*, 2018, "lowbias32").
 #[inline(always)]
-fn mix(mut x: u32) -> u32 {
+fn mix_bits(mut x: u32) -> u32 {
     x ^= x >> 16;
     x = x.wrapping_mul(0x7feb_352d);
     x ^= x >> 15;
@@ -217,8 +219,8 @@ mod tests {
             let own = PixelSampler::new(2, 3, 4, sample);
             for (i, point) in points(2, [3, 4, sample], Dimension::Fresnel, n).enumerate() {
                 let index = u64::from(sample) * u64::from(n) + i as u64;
-                let seed = mix(own.seed ^ Dimension::Fresnel.hash(1)) ^ mix((index >> 32) as u32);
-                let [[x], [y]] = scrambled([index as u32], [seed]);
+                let seed = mix_bits(own.seed ^ Dimension::Fresnel.hash(1)) ^ mix_bits((index >> 32) as u32);
+                let [[x], [y]] = owen_scrambled_points([index as u32], [seed]);
                 assert_eq!([x, y], point, "number {i} of sample {sample}");
                 let row = SamplerPacket::new(2, &[3; 16], &[4; 16], &[sample; 16]);
                 let [x, y] = row.pairs(&[1; 16], Dimension::Fresnel, i as u32, n);
@@ -257,7 +259,7 @@ mod tests {
                 sum ^= if index >> bit & 1 == 1 { direction } else { 0 };
                 direction ^= direction >> 1;
             }
-            assert_eq!(pascal(index).reverse_bits(), sum, "{index}");
+            assert_eq!(second_sobol_coordinate(index).reverse_bits(), sum, "{index}");
         }
     }
 

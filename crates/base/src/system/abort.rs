@@ -29,7 +29,7 @@ pub struct Allocator;
 
 /// Records `bytes` if the allocation failed.
 #[inline(always)]
-fn record_refusal(memory: *mut u8, bytes: usize) -> *mut u8 {
+fn record_failed_allocation(memory: *mut u8, bytes: usize) -> *mut u8 {
     if memory.is_null() {
         REFUSED_BYTES.store(bytes, Ordering::Relaxed);
     }
@@ -42,19 +42,19 @@ unsafe impl GlobalAlloc for Allocator {
     #[inline]
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         // SAFETY: the caller upholds the contract of `GlobalAlloc`.
-        record_refusal(unsafe { System.alloc(layout) }, layout.size())
+        record_failed_allocation(unsafe { System.alloc(layout) }, layout.size())
     }
 
     #[inline]
     unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
         // SAFETY: as above.
-        record_refusal(unsafe { System.alloc_zeroed(layout) }, layout.size())
+        record_failed_allocation(unsafe { System.alloc_zeroed(layout) }, layout.size())
     }
 
     #[inline]
     unsafe fn realloc(&self, memory: *mut u8, layout: Layout, new_bytes: usize) -> *mut u8 {
         // SAFETY: as above.
-        record_refusal(unsafe { System.realloc(memory, layout, new_bytes) }, new_bytes)
+        record_failed_allocation(unsafe { System.realloc(memory, layout, new_bytes) }, new_bytes)
     }
 
     #[inline]
@@ -68,7 +68,7 @@ unsafe impl GlobalAlloc for Allocator {
 ///
 /// # Errors
 /// The handler cannot be installed.
-pub fn catch() -> io::Result<()> {
+pub fn install_abort_handler() -> io::Result<()> {
     // SAFETY: `on_abort` makes only async-signal-safe calls.
     unsafe { low_level::register(SIGABRT, on_abort) }.map(drop)
 }

@@ -5,15 +5,15 @@ use nix::time::{ClockId, clock_gettime};
 /// CPU time used by this thread in seconds, or 0 if the system does not measure it. Excludes waiting time and
 /// other threads.
 pub fn thread_cpu_seconds() -> f64 {
-    seconds_by(ClockId::CLOCK_THREAD_CPUTIME_ID)
+    clock_seconds(ClockId::CLOCK_THREAD_CPUTIME_ID)
 }
 
 /// CPU time used by all threads of this process in seconds, or 0 if the system does not measure it.
 pub fn process_cpu_seconds() -> f64 {
-    seconds_by(ClockId::CLOCK_PROCESS_CPUTIME_ID)
+    clock_seconds(ClockId::CLOCK_PROCESS_CPUTIME_ID)
 }
 
-fn seconds_by(clock: ClockId) -> f64 {
+fn clock_seconds(clock: ClockId) -> f64 {
     let Ok(time) = clock_gettime(clock) else { return 0.0 };
     time.tv_sec() as f64 + 1e-9 * time.tv_nsec() as f64
 }

@@ -16,10 +16,10 @@ use rustix::fs::{AtFlags, Dir, Mode, OFlags, openat, unlinkat};
 /// # Errors
 /// The folder cannot be opened.
 pub fn names(folder: &Path) -> io::Result<impl Iterator<Item = OsString> + use<>> {
-    names_in(File::open(folder)?.as_fd())
+    entry_names_in(File::open(folder)?.as_fd())
 }
 
-fn names_in(folder: BorrowedFd<'_>) -> io::Result<impl Iterator<Item = OsString> + use<>> {
+fn entry_names_in(folder: BorrowedFd<'_>) -> io::Result<impl Iterator<Item = OsString> + use<>> {
     let entries = Dir::read_from(folder)?.map_while(Result::ok);
     let name = |entry: rustix::fs::DirEntry| OsStr::from_bytes(entry.file_name().to_bytes()).to_owned();
     Ok(entries.map(name).filter(|name| name != "." && name != ".."))
@@ -39,7 +39,7 @@ fn remove_folder(parent: BorrowedFd<'_>, name: &OsStr) -> io::Result<()> {
     let flags = OFlags::RDONLY | OFlags::DIRECTORY | OFlags::NOFOLLOW | OFlags::CLOEXEC;
     let folder: OwnedFd = openat(parent, name, flags, Mode::empty())?;
     // Read all names first because removing entries may disturb the listing.
-    let names: Vec<OsString> = names_in(folder.as_fd())?.collect();
+    let names: Vec<OsString> = entry_names_in(folder.as_fd())?.collect();
     for name in names {
         match unlinkat(&folder, &name, AtFlags::empty()) {
             Ok(()) => {}

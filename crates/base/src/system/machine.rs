@@ -20,19 +20,19 @@ pub struct ProcessIdentity {
 impl ProcessIdentity {
     /// Returns the identity of this process.
     pub fn current() -> Self {
-        Self { machine: machine(), process: std::process::id() }
+        Self { machine: machine_hash(), process: std::process::id() }
     }
 
     /// Whether this process has definitely ended. Always false for processes on other machines, which cannot
     /// be inspected.
     pub fn has_ended(&self) -> bool {
         let Ok(number) = i32::try_from(self.process) else { return false };
-        self.machine == machine() && number > 0 && kill(Pid::from_raw(number), None) == Err(Errno::ESRCH)
+        self.machine == machine_hash() && number > 0 && kill(Pid::from_raw(number), None) == Err(Errno::ESRCH)
     }
 }
 
 /// Hash that identifies this machine. Containers on one machine differ in host name or process ID namespace.
-fn machine() -> u64 {
+fn machine_hash() -> u64 {
     static MACHINE: OnceLock<u64> = OnceLock::new();
     *MACHINE.get_or_init(|| {
         let host = gethostname().unwrap_or_default();

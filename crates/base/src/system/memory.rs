@@ -20,12 +20,12 @@ pub fn limit() -> Option<Limit> {
         getrlimit(Resource::RLIMIT_AS).ok().map(|(bytes, _)| bytes).filter(|bytes| *bytes < RLIM_INFINITY);
     let of_space = of_space.map(|bytes| Limit { bytes, setting: "`ulimit -v`".to_owned() });
     let groups = fs::read_to_string("/proc/self/cgroup").unwrap_or_default();
-    let of_group = of_groups(Path::new("/sys/fs/cgroup"), &groups);
+    let of_group = cgroup_limit(Path::new("/sys/fs/cgroup"), &groups);
     of_space.into_iter().chain(of_group).min_by_key(|limit| limit.bytes)
 }
 
 /// Lowest limit of the control groups (version 1 or 2) listed in `/proc/self/cgroup` and their ancestors.
-fn of_groups(root: &Path, groups: &str) -> Option<Limit> {
+fn cgroup_limit(root: &Path, groups: &str) -> Option<Limit> {
     let of_line = |line: &str| {
         let [_, controllers, path] = <[&str; 3]>::try_from(line.splitn(3, ':').collect::<Vec<_>>()).ok()?;
         let (root, file) = match controllers {
@@ -35,14 +35,14 @@ fn of_groups(root: &Path, groups: &str) -> Option<Limit> {
             }
             _ => return None,
         };
-        lowest(&root, path, file)
+        lowest_ancestor_limit(&root, path, file)
     };
     groups.lines().filter_map(of_line).min_by_key(|limit| limit.bytes)
 }
 
 /// Returns the lowest limit of a group and its ancestors. In a container, the path may be the host's path
 /// although the root is the container's own group.
-fn lowest(root: &Path, path: &str, file: &str) -> Option<Limit> {
+fn lowest_ancestor_limit(root: &Path, path: &str, file: &str) -> Option<Limit> {
     /// Version 1 represents "no limit" by the largest possible number of pages.
     const NONE: u64 = 1 << 60;
     let group = root.join(path.trim_start_matches('/'));
@@ -70,7 +70,7 @@ mod tests {
     fn the_lowest_limit_of_all_ancestors_applies() {
         let root = tempfile::tempdir().expect("a folder");
         let root = root.path();
-        let bytes = |groups: &str| of_groups(root, groups).map(|limit| limit.bytes);
+        let bytes = |groups: &str| cgroup_limit(root, groups).map(|limit| limit.bytes);
         assert_eq!(bytes("0::/a/b\n"), None);
         write(root, "a/b/memory.max", "max\n");
         assert_eq!(bytes("0::/a/b\n"), None);
@@ -80,7 +80,7 @@ mod tests {
         assert_eq!(bytes("0::/a/b\n"), Some(4_096_000), "the group above allows less");
         write(root, "a/b/memory.max", "1024000\n");
         assert_eq!(bytes("0::/a/b\n"), Some(1_024_000));
-        let said = of_groups(root, "0::/a/b\n").expect("a limit").setting;
+        let said = cgroup_limit(root, "0::/a/b\n").expect("a limit").setting;
         assert!(said.ends_with("/a/b/memory.max)"), "{said}");
         // In a container, the root is the container's own group, but the listed path may be the host's.
         write(root, "memory.max", "512000\n");
@@ -95,8 +95,8 @@ mod tests {
         let root = root.path();
         let groups = "12:cpu,cpuacct:/job\n7:memory:/job\n0::/job\n";
         write(root, "memory/memory.limit_in_bytes", "9223372036854771712\n");
-        assert_eq!(of_groups(root, groups), None);
+        assert_eq!(cgroup_limit(root, groups), None);
         write(root, "memory/job/memory.limit_in_bytes", "2048000\n");
-        assert_eq!(of_groups(root, groups).map(|limit| limit.bytes), Some(2_048_000));
+        assert_eq!(cgroup_limit(root, groups).map(|limit| limit.bytes), Some(2_048_000));
     }
 }

@@ -1,7 +1,7 @@
 //! Thread priorities.
 //!
 //! A thread's nice value determines how much it yields to other threads. When two threads compete for a
-//! processor, a thread with a nice value 10 higher gets about a tenth of the other's share.
+//! processor, a thread whose nice value is 10 higher gets about a tenth of the other thread's share.
 
 /// Raises the nice value of this thread and the threads it starts later, or of the whole process on systems
 /// other than Linux (nice(2), sched(7)). Does nothing if the increment is 0 or if the system refuses.

@@ -26,7 +26,7 @@ pub fn check_stack_space(threads: usize) -> Result<(), Error> {
 
 /// Explains why `what` could not be started and how to fix it: raise the limits on memory (for stacks) or on
 /// the number of threads, or use fewer threads.
-pub fn start_failure(what: &str, is_number_chosen: bool, error: &impl Display) -> String {
+pub fn describe_start_failure(what: &str, is_number_chosen: bool, error: &impl Display) -> String {
     let why = describe_error(&Error::other(error.to_string()));
     let fewer = if is_number_chosen { "use fewer (--threads 1), or " } else { "" };
     format!(
@@ -43,12 +43,12 @@ mod tests {
         let error = Error::from_raw_os_error(nix::libc::EAGAIN);
         let limits = "raise the limits on memory and on processes (ulimit -v, ulimit -u)";
         assert_eq!(
-            start_failure("2 threads", true, &error),
+            describe_start_failure("2 threads", true, &error),
             format!(
                 "cannot start 2 threads: resource temporarily unavailable; use fewer (--threads 1), or {limits}"
             )
         );
         let alone = format!("cannot start a thread: resource temporarily unavailable; {limits}");
-        assert_eq!(start_failure("a thread", false, &error), alone);
+        assert_eq!(describe_start_failure("a thread", false, &error), alone);
     }
 }

@@ -25,7 +25,7 @@ Exit codes: 0 success; 1 failure; 2 invalid arguments or scene; 130, 143 or 129 
 #[derive(Clone, Debug, clap::Args)]
 pub struct BenchArgs {
     /// The scene files
-    #[arg(value_name = "SCENE", add = candidates::scenes())]
+    #[arg(value_name = "SCENE", add = candidates::scene_completer())]
     pub scenes: Vec<PathBuf>,
 
     /// Write the time and error of every image as CSV
@@ -51,7 +51,7 @@ pub struct BenchArgs {
     #[arg(long, value_name = "S,S", value_delimiter = ',', allow_negative_numbers = true, value_parser = seconds, conflicts_with = "samples", help_heading = "Measurement")]
     pub time: Vec<f64>,
     /// Images per point, each with a different seed
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = seeds, default_value = "6", help_heading = "Measurement")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = parse_seed_count, default_value = "6", help_heading = "Measurement")]
     pub seeds: u32,
     /// The first seed
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = any_whole, default_value = "1", help_heading = "Measurement")]
@@ -99,7 +99,7 @@ pub struct BenchArgs {
     pub accel: Vec<Accel>,
 
     /// Override a scene key
-    #[arg(long = "set", add = candidates::sets(), value_name = "TABLE.KEY=VALUE", help_heading = "All images and references")]
+    #[arg(long = "set", add = candidates::set_completer(), value_name = "TABLE.KEY=VALUE", help_heading = "All images and references")]
     pub sets: Vec<String>,
     /// Maximum bounces per path
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole_of("max_depth"), help_heading = "All images and references")]
@@ -122,6 +122,6 @@ pub struct BenchArgs {
     pub color: ColorChoice,
 }
 
-fn seeds(text: &str) -> Result<u32, String> {
+fn parse_seed_count(text: &str) -> Result<u32, String> {
     whole(text, 1..=1000)
 }

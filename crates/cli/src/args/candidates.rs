@@ -6,36 +6,36 @@ use std::sync::OnceLock;
 
 use clap_complete::engine::{ArgValueCompleter, CompletionCandidate, PathCompleter};
 
-use crate::scene::keys::key::{Form, KeyInfo, ValueKind};
+use crate::scene::keys::key::{KeyInfo, TableSyntax, ValueKind};
 use crate::scene::keys::{color_names, paths, tables};
 use crate::scene::outline::{OutlineTable, outline};
 use crate::scene::{is_mesh, text_now};
 
-/// Words of the command line to complete, if the shell's script does not pass them as arguments.
+/// Words of the command line being completed, for shell scripts that do not pass them as arguments.
 static WORDS: OnceLock<Vec<OsString>> = OnceLock::new();
 
-/// Stores the words of the command line, for completers that need other arguments.
-pub(crate) fn remember(words: &[OsString]) {
+/// Stores the words of the command line for completers that depend on other arguments.
+pub(crate) fn store_command_line(words: &[OsString]) {
     WORDS.get_or_init(|| words.to_vec());
 }
 
-/// Returns the words of the command line to complete.
-fn line() -> Vec<OsString> {
+/// Returns the words of the command line being completed.
+fn command_line() -> Vec<OsString> {
     WORDS.get().cloned().unwrap_or_else(|| std::env::args_os().collect())
 }
 
 /// Completes scenes.
-pub(crate) fn scenes() -> ArgValueCompleter {
+pub(crate) fn scene_completer() -> ArgValueCompleter {
     ArgValueCompleter::new(PathCompleter::file().filter(is_scene))
 }
 
 /// Completes scenes and models.
-pub(crate) fn scenes_and_models() -> ArgValueCompleter {
+pub(crate) fn scene_or_model_completer() -> ArgValueCompleter {
     ArgValueCompleter::new(PathCompleter::file().filter(|path| is_scene(path) || is_mesh(path)))
 }
 
 /// Completes glTF files.
-pub(crate) fn importable() -> ArgValueCompleter {
+pub(crate) fn gltf_completer() -> ArgValueCompleter {
     let has = |path: &Path, ending: &str| path.extension().is_some_and(|is| is.eq_ignore_ascii_case(ending));
     ArgValueCompleter::new(PathCompleter::file().filter(move |path| has(path, "glb") || has(path, "gltf")))
 }
@@ -46,17 +46,17 @@ fn is_scene(path: &Path) -> bool {
 
 /// Completes `TABLE.KEY=VALUE` with keys of the scene on the command line. Without a scene, completes keys of
 /// the tables that every scene has.
-pub(crate) fn sets() -> ArgValueCompleter {
+pub(crate) fn set_completer() -> ArgValueCompleter {
     ArgValueCompleter::new(|current: &OsStr| {
         let Some(current) = current.to_str() else { return Vec::new() };
-        let scene = line().into_iter().map(PathBuf::from).find(|word| is_scene(word));
+        let scene = command_line().into_iter().map(PathBuf::from).find(|word| is_scene(word));
         let text = scene.and_then(|scene| text_now(&scene).ok());
         candidates(text.as_deref().unwrap_or_default(), current)
     })
 }
 
 /// Completes key paths for `glimt explain`.
-pub(crate) fn keys() -> ArgValueCompleter {
+pub(crate) fn key_path_completer() -> ArgValueCompleter {
     ArgValueCompleter::new(|current: &OsStr| {
         let Some(current) = current.to_str() else { return Vec::new() };
         let all = paths().into_iter().filter(|(path, _)| path.starts_with(current));
@@ -70,23 +70,24 @@ fn candidates(text: &str, typed: &str) -> Vec<CompletionCandidate> {
     /// Maximum number of candidates.
     const MAX_CANDIDATES: usize = 2000;
     let outline = outline(text);
-    let singles = tables().iter().filter(|table| table.form == Form::Single);
+    let singles = tables().iter().filter(|table| table.form == TableSyntax::Single);
     let absent = singles.filter(|info| !outline.iter().any(|table| table.info.name == info.name));
     let of_absent = absent.flat_map(|info| info.keys.iter().map(|key| (info.name.to_owned(), key)));
     let of = |table: &OutlineTable| {
-        let paths = table.paths();
-        let known = table.known();
+        let paths = table.set_prefixes();
+        let known = table.known_keys();
         paths.into_iter().flat_map(move |path| known.clone().into_iter().map(move |key| (path.clone(), key)))
     };
     let keys = outline.iter().flat_map(of).chain(of_absent);
     let of_key = |(path, key): (String, &'static KeyInfo)| {
-        of_path(&format!("{path}.{}=", key.name), key.doc, typed, || values(key.kind, &outline))
+        path_candidates(&format!("{path}.{}=", key.name), key.doc, typed, || named_values(key.kind, &outline))
     };
     let of_type = |table: &OutlineTable| {
         let types = table.info.types.iter().map(|kind| (kind.name.to_owned(), kind.doc));
         let types: Vec<DescribedValue> = types.collect();
-        let paths = if types.is_empty() { Vec::new() } else { table.paths() };
-        let of_path = |path: String| of_path(&format!("{path}.type="), "The type", typed, || types.clone());
+        let paths = if types.is_empty() { Vec::new() } else { table.set_prefixes() };
+        let of_path =
+            |path: String| path_candidates(&format!("{path}.type="), "The type", typed, || types.clone());
         paths.into_iter().flat_map(of_path).collect::<Vec<_>>()
     };
     keys.flat_map(of_key).chain(outline.iter().flat_map(of_type)).take(MAX_CANDIDATES).collect()
@@ -96,7 +97,7 @@ fn candidates(text: &str, typed: &str) -> Vec<CompletionCandidate> {
 type DescribedValue = (String, &'static str);
 
 /// Candidates for `path`, which ends with `=`: the path itself or, once it is fully typed, its values.
-fn of_path(
+fn path_candidates(
     path: &str,
     doc: &str,
     typed: &str,
@@ -112,7 +113,7 @@ fn of_path(
 }
 
 /// Named values of a type, for a scene with the tables in `outline`.
-fn values(kind: ValueKind, outline: &[OutlineTable]) -> Vec<DescribedValue> {
+fn named_values(kind: ValueKind, outline: &[OutlineTable]) -> Vec<DescribedValue> {
     let plain = |value: &str| (value.to_owned(), "");
     match kind {
         ValueKind::Words(list) => list().iter().map(|word| (word.name.to_owned(), word.meaning)).collect(),

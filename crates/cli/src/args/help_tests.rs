@@ -4,7 +4,7 @@ use clap::CommandFactory;
 
 use super::Args;
 
-/// The program's short help, and the short and long help of each command, at a width of `columns`.
+/// The program's short help and each command's short and long help, `columns` wide.
 fn helps(columns: usize) -> Vec<(String, String)> {
     let mut all = Args::command().term_width(columns);
     all.build();

@@ -48,11 +48,11 @@ pub struct MergeArgs {
 choice! {
     /// Job schedulers.
     pub enum Scheduler {
-        /// An sbatch array, and a dependent merge job.
+        /// An sbatch array and a merge job that depends on it.
         Slurm = "slurm",
         /// A GNU parallel command, optionally over ssh.
         Parallel = "parallel",
-        /// An indexed Job, and a Job that merges the parts.
+        /// An indexed Job and a second Job that merges the parts.
         Kubernetes = "kubernetes",
     }
 }
@@ -61,7 +61,7 @@ choice! {
 #[derive(Clone, Debug, clap::Args)]
 pub struct FarmArgs {
     /// The scene file
-    #[arg(add = candidates::scenes())]
+    #[arg(add = candidates::scene_completer())]
     pub scene: PathBuf,
     /// The image to write; parts are saved next to it
     #[arg(short, long, value_name = "FILE")]

@@ -1,7 +1,7 @@
 //! Compares results with a baseline and tests the differences for significance.
 
 use super::results::{MethodResult, Results, StepResult};
-use super::statistics::{quantile, upper_tail, welch};
+use super::statistics::{student_t_quantile, student_t_tail, welch_difference};
 
 /// Family-wise false positive rate of the whole table.
 const FALSE_POSITIVE_RATE: f64 = 0.01;
@@ -15,7 +15,7 @@ pub struct MethodChange {
     pub method: String,
     /// The compared quantity.
     pub quantity: Quantity,
-    /// Geometric mean of new value / old value over the steps.
+    /// Geometric mean over the steps of the new value divided by the old value.
     pub factor: f64,
     /// 95 % confidence interval of the factor.
     pub interval: [f64; 2],
@@ -34,9 +34,9 @@ pub enum Quantity {
     Error,
 }
 
-/// Compares everything the two runs have in common: scenes by name and size, methods by name, and steps by
-/// samples.
-pub fn changes(then: &Results, now: &Results) -> Vec<MethodChange> {
+/// Compares the scenes, methods and steps that occur in both runs. Matches scenes by name and size, methods
+/// by name, and steps by sample count.
+pub fn compare_runs(then: &Results, now: &Results) -> Vec<MethodChange> {
     let mut changes = Vec::new();
     for scene in &now.scenes {
         let is_same = |other: &&super::SceneResult| {
@@ -46,7 +46,7 @@ pub fn changes(then: &Results, now: &Results) -> Vec<MethodChange> {
         for method in &scene.methods {
             let Some(old) = before.methods.iter().find(|old| old.name == method.name) else { continue };
             for quantity in [Quantity::Seconds, Quantity::Error] {
-                changes.extend(change(&scene.scene, old, method, quantity));
+                changes.extend(method_change(&scene.scene, old, method, quantity));
             }
         }
     }
@@ -55,10 +55,15 @@ pub fn changes(then: &Results, now: &Results) -> Vec<MethodChange> {
     changes
 }
 
-fn change(scene: &str, then: &MethodResult, now: &MethodResult, quantity: Quantity) -> Option<MethodChange> {
+fn method_change(
+    scene: &str,
+    then: &MethodResult,
+    now: &MethodResult,
+    quantity: Quantity,
+) -> Option<MethodChange> {
     let pairs = now.steps.iter().filter_map(|step| Some((matching_step(step, &then.steps)?, step)));
     let differences: Vec<(f64, f64, f64)> =
-        pairs.filter_map(|(old, new)| difference(old, new, quantity)).collect();
+        pairs.filter_map(|(old, new)| log_difference(old, new, quantity)).collect();
     let count = differences.len() as f64;
     let mean = differences.iter().map(|(difference, ..)| difference).sum::<f64>() / count;
     let variances = || differences.iter().map(|(_, error, freedom)| (error * error, freedom));
@@ -67,11 +72,11 @@ fn change(scene: &str, then: &MethodResult, now: &MethodResult, quantity: Quanti
     let error = variance.sqrt() / count;
     let freedom = if weights > 0.0 { variance * variance / weights } else { 1.0 };
     let by_chance = match (error > 0.0, mean == 0.0) {
-        (true, _) => 2.0 * upper_tail(mean.abs() / error, freedom),
+        (true, _) => 2.0 * student_t_tail(mean.abs() / error, freedom),
         (false, true) => 1.0,
         (false, false) => 0.0,
     };
-    let reach = quantile(0.025, freedom) * error;
+    let reach = student_t_quantile(0.025, freedom) * error;
     (count > 0.0).then(|| MethodChange {
         scene: scene.to_owned(),
         method: now.name.clone(),
@@ -93,7 +98,7 @@ fn matching_step<'a>(step: &StepResult, then: &'a [StepResult]) -> Option<&'a St
 
 /// Difference between the mean logarithms, its standard error and its degrees of freedom. `None` if there are
 /// too few positive values.
-fn difference(then: &StepResult, now: &StepResult, quantity: Quantity) -> Option<(f64, f64, f64)> {
+fn log_difference(then: &StepResult, now: &StepResult, quantity: Quantity) -> Option<(f64, f64, f64)> {
     let of = |step: &StepResult| -> Vec<f64> {
         let values = step.pictures.iter().map(|picture| match quantity {
             Quantity::Seconds => picture.seconds,
@@ -106,16 +111,16 @@ fn difference(then: &StepResult, now: &StepResult, quantity: Quantity) -> Option
         return None;
     }
     // Identical images have identical errors, and the difference is exactly 0.
-    if old == new { Some((0.0, 0.0, 1.0)) } else { Some(welch(&old, &new)) }
+    if old == new { Some((0.0, 0.0, 1.0)) } else { Some(welch_difference(&old, &new)) }
 }
 
 /// Formats the comparison as lines.
-pub fn lines(changes: &[MethodChange], name: &str) -> Vec<String> {
+pub fn format_changes(changes: &[MethodChange], name: &str) -> Vec<String> {
     if changes.is_empty() {
         return vec![format!("{name} has no scene, size, method and step in common with this run")];
     }
     let mut lines = vec![format!("compared with {name}, 95 % confidence intervals:")];
-    lines.extend(changes.iter().map(line));
+    lines.extend(changes.iter().map(format_change));
     let sure = (1.0 - FALSE_POSITIVE_RATE) * 100.0;
     lines.push(format!(
         "SLOWER, WORSE, faster and better are significant at {sure:.0} % confidence over all lines."
@@ -123,7 +128,7 @@ pub fn lines(changes: &[MethodChange], name: &str) -> Vec<String> {
     lines
 }
 
-fn line(change: &MethodChange) -> String {
+fn format_change(change: &MethodChange) -> String {
     let MethodChange { scene, method, factor, interval: [low, high], .. } = change;
     let quantity = match change.quantity {
         Quantity::Seconds => "time",
@@ -132,15 +137,15 @@ fn line(change: &MethodChange) -> String {
     let said = match (change.is_real, change.quantity, *factor > 1.0) {
         (false, _, _) if change.by_chance >= 1.0 => "unchanged".to_owned(),
         (false, _, _) => "noise".to_owned(),
-        (true, Quantity::Seconds, true) => format!("SLOWER {}", p_value(change.by_chance)),
-        (true, Quantity::Seconds, false) => format!("faster {}", p_value(change.by_chance)),
-        (true, Quantity::Error, true) => format!("WORSE {}", p_value(change.by_chance)),
-        (true, Quantity::Error, false) => format!("better {}", p_value(change.by_chance)),
+        (true, Quantity::Seconds, true) => format!("SLOWER {}", format_p_value(change.by_chance)),
+        (true, Quantity::Seconds, false) => format!("faster {}", format_p_value(change.by_chance)),
+        (true, Quantity::Error, true) => format!("WORSE {}", format_p_value(change.by_chance)),
+        (true, Quantity::Error, false) => format!("better {}", format_p_value(change.by_chance)),
     };
     format!("  {scene}, {method}: {quantity} × {factor:.3} ({low:.3} to {high:.3}): {said}")
 }
 
-fn p_value(probability: f64) -> String {
+fn format_p_value(probability: f64) -> String {
     if probability < 1e-6 { "(p < 1e-6)".to_owned() } else { format!("(p = {probability:.0e})") }
 }
 
@@ -161,18 +166,18 @@ mod tests {
 
     #[test]
     fn identical_runs_have_no_changes() {
-        let found = changes(&results(), &results());
+        let found = compare_runs(&results(), &results());
         assert_eq!(found.len(), 2 * 2 * 2);
         assert!(
             found.iter().all(|change| !change.is_real && change.factor == 1.0 && change.by_chance == 1.0)
         );
-        assert!(lines(&found, "old.json")[1].ends_with("time × 1.000 (1.000 to 1.000): unchanged"));
+        assert!(format_changes(&found, "old.json")[1].ends_with("time × 1.000 (1.000 to 1.000): unchanged"));
     }
 
     #[test]
     fn large_changes_are_significant() {
         let slower = with(|picture, _| picture.seconds *= 1.5);
-        let found = changes(&results(), &slower);
+        let found = compare_runs(&results(), &slower);
         let of = |quantity| found.iter().filter(move |change| change.quantity == quantity);
         assert!(
             of(Quantity::Seconds).all(|change| change.is_real && (change.factor - 1.5).abs() < 1e-9),
@@ -183,10 +188,10 @@ mod tests {
             "{found:?}"
         );
         assert!(of(Quantity::Error).all(|change| !change.is_real));
-        let said = lines(&found, "old.json").join("\n");
+        let said = format_changes(&found, "old.json").join("\n");
         assert!(said.contains("a.toml, path: time × 1.500 (1.3") && said.contains("SLOWER (p "), "{said}");
         let noise = with(|picture, number| picture.seconds *= [1.05, 0.97, 0.99][number]);
-        assert!(changes(&results(), &noise).iter().all(|change| !change.is_real));
+        assert!(compare_runs(&results(), &noise).iter().all(|change| !change.is_real));
     }
 
     #[test]
@@ -195,7 +200,7 @@ mod tests {
         other.scenes[0].scene = "other.toml".to_owned();
         other.scenes[1].methods[0].name = "other".to_owned();
         other.scenes[1].methods[1].steps.truncate(1);
-        assert_eq!(changes(&other, &results()).len(), 2);
-        assert!(matches!(&lines(&[], "x.json")[..], [line] if line.starts_with("x.json ")));
+        assert_eq!(compare_runs(&other, &results()).len(), 2);
+        assert!(matches!(&format_changes(&[], "x.json")[..], [line] if line.starts_with("x.json ")));
     }
 }

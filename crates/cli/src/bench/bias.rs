@@ -1,4 +1,4 @@
-//! Bias of a method: the error that images with different seeds share and the references lack.
+//! Bias of a method: the error common to images with different seeds, but absent from the references.
 //!
 //! The mean of (xᵢ − r₁)(xⱼ − r₂) over all pairs of different seeds estimates the squared bias because the
 //! noise in all four images is independent. Its standard error is estimated from the variance of the pairs,
@@ -6,7 +6,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::statistics::{quantile, upper_tail};
+use super::statistics::{student_t_quantile, student_t_tail};
 use crate::compare::TwoReferences;
 use crate::film::RadianceImage;
 
@@ -36,34 +36,34 @@ impl Bias {
 }
 
 /// Estimates the bias from images with different seeds. `None` for fewer than [`MIN_SEEDS`].
-pub fn bias(references: &TwoReferences, pictures: &[RadianceImage]) -> Option<Bias> {
+pub fn estimate_bias(references: &TwoReferences, pictures: &[RadianceImage]) -> Option<Bias> {
     if pictures.len() < MIN_SEEDS {
         return None;
     }
-    let pairs = Pairs::of(references, pictures);
-    let by_references = references.uncertainty(&mean_of(pictures));
+    let pairs = PairwiseErrorProducts::from_images(references, pictures);
+    let by_references = references.uncertainty(&mean_image(pictures));
     let by_seeds = pairs.variance_without_bias().max(pairs.jackknife_variance());
     let (size, error) = (pairs.mean(), (by_seeds + by_references * by_references).sqrt());
     let freedom = pictures.len() as f64 - 1.0;
     let by_chance =
-        if error > 0.0 { upper_tail(size / error, freedom) } else { f64::from(u8::from(size <= 0.0)) };
+        if error > 0.0 { student_t_tail(size / error, freedom) } else { f64::from(u8::from(size <= 0.0)) };
     Some(Bias {
         size,
         error,
         by_chance,
-        bound: size.max(0.0) + quantile(FALSE_POSITIVE_RATE, freedom) * error,
+        bound: size.max(0.0) + student_t_quantile(FALSE_POSITIVE_RATE, freedom) * error,
     })
 }
 
 /// Products of errors, for all pairs of images.
-struct Pairs {
+struct PairwiseErrorProducts {
     count: usize,
-    /// Indices of both images, and the product.
+    /// The indices of two images and the product of their errors.
     products: Vec<(usize, usize, f64)>,
 }
 
-impl Pairs {
-    fn of(references: &TwoReferences, pictures: &[RadianceImage]) -> Self {
+impl PairwiseErrorProducts {
+    fn from_images(references: &TwoReferences, pictures: &[RadianceImage]) -> Self {
         let count = pictures.len();
         let pairs = (0..count).flat_map(|i| (i + 1..count).map(move |j| (i, j)));
         let products = pairs.map(|(i, j)| (i, j, references.cross(&pictures[i], &pictures[j]))).collect();
@@ -81,7 +81,7 @@ impl Pairs {
         sum / count
     }
 
-    /// Variance of the mean without bias. In that case, the products of different pairs are uncorrelated.
+    /// Variance of the mean if there is no bias, so that the products of different pairs are uncorrelated.
     fn variance_without_bias(&self) -> f64 {
         let (mean, count) = (self.mean(), self.products.len() as f64);
         let squares: f64 =
@@ -97,7 +97,7 @@ impl Pairs {
     }
 }
 
-fn mean_of(pictures: &[RadianceImage]) -> RadianceImage {
+fn mean_image(pictures: &[RadianceImage]) -> RadianceImage {
     let mut mean = RadianceImage::black(pictures[0].width, pictures[0].height);
     let part = 1.0 / pictures.len() as f32;
     for picture in pictures {
@@ -147,7 +147,7 @@ mod tests {
             let pair = Pair::new(names, self.picture(0.02, 0.0, 1), self.picture(0.02, 0.0, 1));
             let references = TwoReferences::new(pair.expect("a pair"));
             let pictures: Vec<_> = (0..seeds).map(|_| self.picture(0.2, offset, block)).collect();
-            bias(&references, &pictures).expect("enough seeds")
+            estimate_bias(&references, &pictures).expect("enough seeds")
         }
     }
 
@@ -171,7 +171,7 @@ mod tests {
             assert!(found.is_found() && found.bound > truth, "{found:?}");
             sizes.push(found.size);
         }
-        let (mean, error) = super::super::statistics::mean(&sizes);
+        let (mean, error) = super::super::statistics::mean_and_error(&sizes);
         assert!(
             (mean - truth).abs() < 4.0 * error && error < 0.02 * truth,
             "got {mean} ± {error}, expected {truth}"
@@ -184,7 +184,7 @@ mod tests {
         for offset in [0.0, 0.04] {
             let tries: Vec<Bias> = (0..200).map(|_| noise.found(6, offset, 1)).collect();
             let sizes: Vec<f64> = tries.iter().map(|found| found.size).collect();
-            let (_, error) = super::super::statistics::mean(&sizes);
+            let (_, error) = super::super::statistics::mean_and_error(&sizes);
             let actual = error * (sizes.len() as f64).sqrt();
             let estimated = tries.iter().map(|found| found.error).sum::<f64>() / tries.len() as f64;
             assert!(
@@ -203,9 +203,9 @@ mod tests {
             noise.picture(0.0, 0.0, 1),
         );
         let references = TwoReferences::new(pair.expect("a pair"));
-        let of = |picture: RadianceImage| bias(&references, &vec![picture; 3]).expect("enough");
+        let of = |picture: RadianceImage| estimate_bias(&references, &vec![picture; 3]).expect("enough");
         assert!(!of(noise.picture(0.0, 0.0, 1)).is_found());
         assert!(of(noise.picture(0.0, 0.1, 1)).is_found());
-        assert_eq!(bias(&references, &[noise.picture(0.0, 0.0, 1)]), None);
+        assert_eq!(estimate_bias(&references, &[noise.picture(0.0, 0.0, 1)]), None);
     }
 }

@@ -4,7 +4,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::bias::{FALSE_POSITIVE_RATE, MIN_SEEDS};
-use super::statistics::{mean, upper_tail};
+use super::statistics::{mean_and_error, student_t_tail};
 use crate::compare::TwoReferences;
 use crate::film::RadianceImage;
 use crate::math::DVec3;
@@ -31,7 +31,7 @@ impl Brightness {
 /// Compares the brightness of images rendered with different seeds to the references.
 /// `are_pixels_independent` must be false with photons, which correlate the errors of pixels. Returns `None`
 /// for fewer than [`MIN_SEEDS`] images or for black references.
-pub fn brightness(
+pub fn compare_brightness(
     references: &TwoReferences,
     pictures: &[RadianceImage],
     are_pixels_independent: bool,
@@ -40,25 +40,28 @@ pub fn brightness(
         return None;
     }
     let values: Vec<f64> = pictures.iter().map(|picture| references.brightness(picture)).collect();
-    let (value, by_seeds) = mean(&values);
+    let (value, by_seeds) = mean_and_error(&values);
     let seeds = pictures.len() as f64 - 1.0;
     let (of_pictures, freedom) = if are_pixels_independent {
         // Estimate the noise from all pixels, not just from a few seeds.
-        (error_of_pixels(pictures) / references.mean_luminance(), seeds * pictures[0].pixels.len() as f64)
+        (
+            mean_luminance_error(pictures) / references.mean_luminance(),
+            seeds * pictures[0].pixels.len() as f64,
+        )
     } else {
         (by_seeds, seeds)
     };
     let of_references = references.brightness_uncertainty();
     let error = (of_pictures * of_pictures + of_references * of_references).sqrt();
     let by_chance = match error > 0.0 {
-        true => 2.0 * upper_tail(value.abs() / error, freedom),
+        true => 2.0 * student_t_tail(value.abs() / error, freedom),
         false => f64::from(u8::from(value == 0.0)),
     };
     Some(Brightness { value, error, by_chance })
 }
 
 /// Standard error of the images' mean luminance, from the variance of each pixel.
-fn error_of_pixels(pictures: &[RadianceImage]) -> f64 {
+fn mean_luminance_error(pictures: &[RadianceImage]) -> f64 {
     let count = pictures.len() as f64;
     let weights: DVec3 = LUMINANCE_WEIGHTS.as_dvec3();
     let pixels = pictures[0].pixels.len();
@@ -75,7 +78,7 @@ mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::bench::bias::bias;
+    use crate::bench::bias::estimate_bias;
     use crate::compare::Pair;
     use crate::math::Vec3;
     use crate::math::random::unit;
@@ -104,10 +107,10 @@ mod tests {
             let mut next = unit(seed.into());
             let references = references(&mut next);
             let pictures: Vec<_> = (0..3).map(|_| picture(&mut next, -0.01, 0.2, 0.0)).collect();
-            let found = brightness(&references, &pictures, true).expect("enough seeds");
+            let found = compare_brightness(&references, &pictures, true).expect("enough seeds");
             missed += u32::from(!found.is_biased());
             off.push((found.value + 0.01) / found.error);
-            let by_relmse = bias(&references, &pictures).expect("enough seeds");
+            let by_relmse = estimate_bias(&references, &pictures).expect("enough seeds");
             assert!(!by_relmse.is_found(), "seed {seed}: relMSE should be unable to detect the bias");
         }
         // One percent is 4.7 standard errors, and the threshold is 3.3. This misses 8 % of the seeds: 3.3 of
@@ -128,7 +131,7 @@ mod tests {
             let alarms = (0..200).filter(|_| {
                 let references = references(&mut next);
                 let pictures: Vec<_> = (0..4).map(|_| picture(&mut next, 0.0, noise, shared)).collect();
-                brightness(&references, &pictures, shared == 0.0).expect("enough seeds").is_biased()
+                compare_brightness(&references, &pictures, shared == 0.0).expect("enough seeds").is_biased()
             });
             // The expected count is 0.2. The probability of 4 or more is 1e-4.
             let alarms = alarms.count();
@@ -141,9 +144,9 @@ mod tests {
         let mut next = unit(7);
         let references = references(&mut next);
         let pictures: Vec<_> = (0..2).map(|_| picture(&mut next, 0.0, 0.1, 0.0)).collect();
-        assert_eq!(brightness(&references, &pictures, true), None);
+        assert_eq!(compare_brightness(&references, &pictures, true), None);
         let black = || RadianceImage::black(2, 2);
         let dark = Pair::new([Path::new("a"), Path::new("b")], black(), black()).expect("a pair");
-        assert_eq!(brightness(&TwoReferences::new(dark), &[black(), black(), black()], true), None);
+        assert_eq!(compare_brightness(&TwoReferences::new(dark), &[black(), black(), black()], true), None);
     }
 }

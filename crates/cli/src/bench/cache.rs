@@ -1,7 +1,7 @@
 //! Cached references: one file per fingerprint, with a checksum.
 //!
-//! A file consists of a line of JSON, both images' pixels as little-endian floats, and a fingerprint of all
-//! preceding bytes.
+//! A file contains a line of JSON, the pixels of both images as little-endian floats, and a fingerprint of
+//! all preceding bytes.
 
 use std::fs;
 use std::io::Read;
@@ -18,7 +18,7 @@ use crate::output::{Losses, OutputError, staged, write};
 use crate::scene::fingerprint::{Fingerprint, Key};
 
 /// The cache folder for references, inside `XDG_CACHE_HOME` or `~/.cache`. `None` if neither is set.
-pub fn folder() -> Option<PathBuf> {
+pub fn cache_folder() -> Option<PathBuf> {
     let absolute = |name: &str| std::env::var_os(name).map(PathBuf::from).filter(|path| path.is_absolute());
     let caches = absolute("XDG_CACHE_HOME").or_else(|| absolute("HOME").map(|home| home.join(".cache")))?;
     Some(caches.join("glimt").join("references"))
@@ -28,12 +28,12 @@ pub fn folder() -> Option<PathBuf> {
 ///
 /// # Errors
 /// The folder or the file cannot be created, or a different file with this name exists.
-pub fn starter(folder: &Path) -> Result<PathBuf, OutputError> {
+pub fn write_starter_scene(folder: &Path) -> Result<PathBuf, OutputError> {
     let text = crate::scene::starter().as_bytes();
     // Use one folder per version of the scene, because a scene next to the references may belong to the user.
     let folder = folder
         .join(format!("starter-{}", &Fingerprint::new("starter").bytes(text).finish().to_string()[..16]));
-    create(&folder)?;
+    create_folder(&folder)?;
     let path = folder.join("starter.toml");
     let is_there = || fs::read(&path).is_ok_and(|found| found == text);
     if is_there() {
@@ -42,13 +42,13 @@ pub fn starter(folder: &Path) -> Result<PathBuf, OutputError> {
     match staged::new_files(&folder, &[("starter.toml".into(), text)], &CancelToken::new()) {
         // Another process may have written the file in the meantime.
         Err(_) if is_there() => Ok(path),
-        Err(_) if path.symlink_metadata().is_ok() => Err(refused(&path, "the starter scene")),
+        Err(_) if path.symlink_metadata().is_ok() => Err(foreign_file_error(&path, "the starter scene")),
         written => written.map(|()| path),
     }
 }
 
 /// Error for an existing file that glimt did not write.
-fn refused(path: &Path, what: &str) -> OutputError {
+fn foreign_file_error(path: &Path, what: &str) -> OutputError {
     let reason = format!(
         "cannot write {}: the existing file is not {what}; move it or choose another folder with --cache",
         path.display()
@@ -56,7 +56,7 @@ fn refused(path: &Path, what: &str) -> OutputError {
     OutputError::Refused { reason }
 }
 
-fn create(folder: &Path) -> Result<(), OutputError> {
+fn create_folder(folder: &Path) -> Result<(), OutputError> {
     fs::create_dir_all(folder).map_err(|source| OutputError::File { path: folder.to_owned(), source })
 }
 
@@ -88,9 +88,9 @@ const KEY_BYTES: usize = 64;
 
 /// Loads the references stored under a key. `None` if the file is missing or damaged.
 pub(super) fn load(folder: &Path, key: &Key) -> Option<CachedReferences> {
-    let bytes = fs::read(file(folder, key)).ok()?;
+    let bytes = fs::read(cache_file_path(folder, key)).ok()?;
     let (content, seal) = bytes.split_at_checked(bytes.len().checked_sub(KEY_BYTES)?)?;
-    if seal_of(content).as_bytes() != seal {
+    if content_checksum(content).as_bytes() != seal {
         return None;
     }
     let end = content.iter().position(|byte| *byte == b'\n')?;
@@ -113,8 +113,8 @@ pub(super) fn load(folder: &Path, key: &Key) -> Option<CachedReferences> {
 /// # Errors
 /// The folder cannot be created or the file cannot be written.
 pub(super) fn store(folder: &Path, key: &Key, stored: &CachedReferences) -> Result<(), OutputError> {
-    let path = file(folder, key);
-    create(folder)?;
+    let path = cache_file_path(folder, key);
+    create_folder(folder)?;
     let (a, b) = (stored.pair.a(), stored.pair.b());
     let head = CacheHeader { width: a.width, height: a.height, cost: stored.cost };
     let mut bytes = serde_json::to_vec(&head)
@@ -123,10 +123,11 @@ pub(super) fn store(folder: &Path, key: &Key, stored: &CachedReferences) -> Resu
     for pixel in a.pixels.iter().chain(&b.pixels) {
         pixel.to_array().iter().for_each(|value| bytes.extend(value.to_le_bytes()));
     }
-    let seal = seal_of(&bytes);
+    let seal = content_checksum(&bytes);
     bytes.extend(seal.as_bytes());
-    let may_replace =
-        |real: &Path| if is_replaceable(real) { Ok(()) } else { Err(refused(&path, "a reference")) };
+    let may_replace = |real: &Path| {
+        if is_replaceable(real) { Ok(()) } else { Err(foreign_file_error(&path, "a reference")) }
+    };
     let guard = Guard {
         is_kept: &|_| false,
         may_replace: &may_replace,
@@ -146,11 +147,11 @@ fn is_replaceable(path: &Path) -> bool {
     is_read && (start.is_empty() || serde_json::from_slice::<CacheHeader>(line).is_ok())
 }
 
-fn seal_of(content: &[u8]) -> String {
+fn content_checksum(content: &[u8]) -> String {
     Fingerprint::new("references").bytes(content).finish().to_string()
 }
 
-fn file(folder: &Path, key: &Key) -> PathBuf {
+fn cache_file_path(folder: &Path, key: &Key) -> PathBuf {
     folder.join(format!("{key}.pair"))
 }
 
@@ -170,17 +171,17 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let own = folder.path().join("starter.toml");
         fs::write(&own, "the user's scene").expect("written");
-        let scene = starter(folder.path()).expect("a scene");
+        let scene = write_starter_scene(folder.path()).expect("a scene");
         assert_eq!(fs::read_to_string(&own).expect("a scene"), "the user's scene");
         assert_eq!(fs::read_to_string(&scene).expect("a scene"), crate::scene::starter());
-        assert_eq!(starter(folder.path()).expect("it exists"), scene);
+        assert_eq!(write_starter_scene(folder.path()).expect("it exists"), scene);
         fs::write(&scene, "edited").expect("written");
-        let why = starter(folder.path()).expect_err("edited").to_string();
+        let why = write_starter_scene(folder.path()).expect_err("edited").to_string();
         assert!(why.contains("starter.toml") && why.contains("--cache"), "{why}");
         assert_eq!(fs::read_to_string(&scene).expect("a scene"), "edited");
         // References only overwrite references.
         let key = Fingerprint::new("x").finish();
-        let path = file(folder.path(), &key);
+        let path = cache_file_path(folder.path(), &key);
         fs::write(&path, "notes").expect("written");
         assert!(store(folder.path(), &key, &stored()).is_err());
         assert_eq!(fs::read_to_string(&path).expect("notes"), "notes");
@@ -211,7 +212,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let key = Fingerprint::new("x").finish();
         store(folder.path(), &key, &stored()).expect("stored");
-        let path = file(folder.path(), &key);
+        let path = cache_file_path(folder.path(), &key);
         let whole = fs::read(&path).expect("bytes");
         for length in 0..whole.len() {
             fs::write(&path, &whole[..length]).expect("written");
@@ -224,7 +225,7 @@ mod tests {
             assert!(load(folder.path(), &key).is_none(), "flipped a bit in byte {place}");
         }
         let lie = b"{\"width\":4,\"height\":4,\"cost\":{\"samples\":1.0,\"seconds\":1.0}}\n".to_vec();
-        fs::write(&path, [lie.clone(), seal_of(&lie).into_bytes()].concat()).expect("written");
+        fs::write(&path, [lie.clone(), content_checksum(&lie).into_bytes()].concat()).expect("written");
         assert!(load(folder.path(), &key).is_none(), "fewer pixels than specified in the header");
     }
 }

@@ -7,13 +7,13 @@ pub const HEAD: &str =
     "scene,width,height,method,step,seed,samples,seconds,setup_seconds,relmse,reference_noise\r\n";
 
 /// Formats the results as CSV.
-pub fn csv(results: &Results) -> String {
+pub fn format_csv(results: &Results) -> String {
     let mut text = HEAD.to_owned();
     for scene in &results.scenes {
         let size = format!("{},{}", scene.width, scene.height);
         let noise = scene.reference.noise;
         for method in &scene.methods {
-            let of = format!("{},{size},{}", field(&scene.scene), field(&method.name));
+            let of = format!("{},{size},{}", quote_field(&scene.scene), quote_field(&method.name));
             for (number, step) in (1..).zip(&method.steps) {
                 for picture in &step.pictures {
                     text += &format!(
@@ -28,7 +28,7 @@ pub fn csv(results: &Results) -> String {
 }
 
 /// Quotes a field if necessary.
-fn field(text: &str) -> String {
+fn quote_field(text: &str) -> String {
     if text.contains(['"', ',', '\r', '\n']) {
         format!("\"{}\"", text.replace('"', "\"\""))
     } else {
@@ -45,7 +45,7 @@ mod tests {
     fn each_image_has_a_line_with_all_fields() {
         let mut results = results();
         results.scenes[1].scene = "odd, \"name\".toml".to_owned();
-        let text = csv(&results);
+        let text = format_csv(&results);
         let lines: Vec<&str> = text.split_terminator("\r\n").collect();
         assert_eq!(lines.len(), 1 + 2 * 2 * 4 * 3);
         let columns = HEAD.split(',').count();

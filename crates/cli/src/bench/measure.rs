@@ -1,14 +1,14 @@
 //! Measures one method on a scene, for all steps and seeds.
 
-use super::bias::bias;
-use super::brightness::brightness;
+use super::bias::estimate_bias;
+use super::brightness::compare_brightness;
 use super::methods::Method;
 use super::reference::{ReferenceKeys, SEEDS};
 use super::request::{BenchError, StepSchedule};
 use super::results::{ImageResult, MethodResult, StepResult};
 use super::run::SceneRun;
 use super::statistics::median;
-use super::table::{error, samples};
+use super::table::{format_error, format_samples};
 use super::time_budget::TimeBudget;
 use crate::compare::TwoReferences;
 use crate::film::RadianceImage;
@@ -57,15 +57,15 @@ impl MethodRun<'_> {
         let mut took = Vec::new();
         while let Some(aim) = self.next(&steps, &took, budget) {
             let before = budget.method_seconds();
-            steps.push(self.step(&mut session, aim, budget, &took)?);
+            steps.push(self.measure_step(&mut session, aim, budget, &took)?);
             took.push(budget.method_seconds() - before);
         }
         let last = self.render(&mut session, SEEDS[0], begin)?;
         if last.key != first.key || self.run.reference_renderer(self.common).keys(&mut session)? != *self.keys
         {
-            return Err(self.run.changed());
+            return Err(self.run.scene_changed_error());
         }
-        Ok(MethodResult::new(self.method.name.clone(), setup(&first.report), steps))
+        Ok(MethodResult::new(self.method.name.clone(), setup_seconds(&first.report), steps))
     }
 
     /// The next step, given the previous steps and their durations in seconds.
@@ -90,7 +90,7 @@ impl MethodRun<'_> {
         }
     }
 
-    fn step(
+    fn measure_step(
         &self,
         session: &mut Session,
         aim: StepTarget,
@@ -115,20 +115,20 @@ impl MethodRun<'_> {
             pictures.push(ImageResult {
                 seed,
                 samples: report.image.samples.mean,
-                seconds: rendering(&report),
+                seconds: rendering_seconds(&report),
                 relmse,
             });
             images.push(image);
         }
-        let brightness = brightness(self.two, &images, are_pixels_independent);
-        let step = StepResult { brightness, ..summary(aim, pictures, &images, self.two) };
+        let brightness = compare_brightness(self.two, &images, are_pixels_independent);
+        let step = StepResult { brightness, ..summarize_step(aim, pictures, &images, self.two) };
         let (name, seconds) = (&self.method.name, words::seconds(step.seconds));
-        self.run.done(&format!(
+        self.run.report_done(&format!(
             "{name}, {}: {seconds}, relMSE {}",
-            samples(step.samples),
-            error(step.relmse)
+            format_samples(step.samples),
+            format_error(step.relmse)
         ));
-        self.run.point(name, &step);
+        self.run.report_step(name, &step);
         Ok(step)
     }
 
@@ -143,23 +143,25 @@ impl MethodRun<'_> {
         let order = self.run.order;
         let amount = match aim.budget {
             Some(seconds) => words::seconds(seconds),
-            None => samples(aim.samples.into()),
+            None => format_samples(aim.samples.into()),
         };
         let what = format!("{}, {amount}, seed {} of {}", self.method.name, number + 1, order.seeds);
         // Estimate the time per image from the previous image or step.
         let each = match (pictures, took.last()) {
             ([.., last], _) => Some(last.seconds),
-            ([], Some(step)) => Some(self.growth(aim) * step / f64::from(order.seeds)),
+            ([], Some(step)) => Some(self.expected_time_growth(aim) * step / f64::from(order.seeds)),
             ([], None) => None,
         };
         let remaining = f64::from(order.seeds - number);
-        let left = each
-            .map(|each| budget.left(each * (remaining + f64::from(order.seeds) * self.later(aim)), false));
-        self.run.begins(&what, left);
+        let left = each.map(|each| {
+            budget
+                .seconds_left(each * (remaining + f64::from(order.seeds) * self.later_steps_time(aim)), false)
+        });
+        self.run.report_begin(&what, left);
     }
 
     /// Expected factor by which the time grows from the previous step.
-    fn growth(&self, aim: StepTarget) -> f64 {
+    fn expected_time_growth(&self, aim: StepTarget) -> f64 {
         let index = aim.index as usize;
         match &self.run.order.steps {
             StepSchedule::Climb => f64::from(SAMPLE_RATIO),
@@ -169,7 +171,7 @@ impl MethodRun<'_> {
     }
 
     /// Expected total time of the later steps, relative to this step.
-    fn later(&self, aim: StepTarget) -> f64 {
+    fn later_steps_time(&self, aim: StepTarget) -> f64 {
         let index = aim.index as usize;
         match &self.run.order.steps {
             StepSchedule::Climb => 0.0,
@@ -198,7 +200,7 @@ impl MethodRun<'_> {
     }
 }
 
-fn summary(
+fn summarize_step(
     aim: StepTarget,
     pictures: Vec<ImageResult>,
     images: &[RadianceImage],
@@ -215,18 +217,18 @@ fn summary(
         relmse: median(&errors),
         spread: [least, most],
         uncertainty: images.first().map_or(0.0, |image| two.uncertainty(image)),
-        bias: bias(two, images),
+        bias: estimate_bias(two, images),
         brightness: None,
         pictures,
     }
 }
 
 /// Seconds of photon mapping and rendering for an image.
-fn rendering(report: &Report) -> f64 {
+fn rendering_seconds(report: &Report) -> f64 {
     [Stage::Photons, Stage::Render].map(|stage| report.stages[stage as usize].seconds).iter().sum()
 }
 
 /// Seconds of the earlier stages, which run once.
-fn setup(report: &Report) -> f64 {
+fn setup_seconds(report: &Report) -> f64 {
     report.stages[..Stage::Photons as usize].iter().map(|stage| stage.seconds).sum()
 }

@@ -4,7 +4,7 @@ use crate::choice::Choice;
 use crate::pipeline::settings::Overrides;
 use crate::scene::description::{Accel, Integrator, Scene, Shadows};
 
-/// Values of each setting, measured in all combinations. An empty list means the scene's value.
+/// Values to measure for each setting, in all combinations. An empty list keeps the scene's value.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Toggles {
     /// Integrators.
@@ -40,7 +40,7 @@ struct MethodSettings {
 
 /// The methods to measure on a scene. The default is path, whitted with photons, and the scene's settings if
 /// they differ from both.
-pub fn methods(scene: &Scene, toggles: &Toggles) -> Vec<Method> {
+pub fn methods_to_measure(scene: &Scene, toggles: &Toggles) -> Vec<Method> {
     let all = if *toggles == Toggles::default() {
         default_settings(scene)
     } else {
@@ -52,26 +52,26 @@ pub fn methods(scene: &Scene, toggles: &Toggles) -> Vec<Method> {
             distinct.push(settings);
         }
     }
-    distinct.into_iter().map(|settings| method(settings, toggles)).collect()
+    distinct.into_iter().map(|settings| name_method(settings, toggles)).collect()
 }
 
 fn default_settings(scene: &Scene) -> Vec<MethodSettings> {
     let own = (scene.render.integrator, scene.photons.enabled);
     let ways = [(Integrator::Path, false), (Integrator::Whitted, true), own];
     let of = |(integrator, photons)| {
-        settings(integrator, photons, scene.render.shadows, scene.render.clamp, scene.render.accel)
+        all_combinations(integrator, photons, scene.render.shadows, scene.render.clamp, scene.render.accel)
     };
     ways.into_iter().map(of).collect()
 }
 
 fn requested_settings(scene: &Scene, toggles: &Toggles) -> Vec<MethodSettings> {
     let mut ways = Vec::new();
-    for integrator in or_own(&toggles.integrators, scene.render.integrator) {
-        for photons in or_own(&toggles.photons, scene.photons.enabled) {
-            for shadows in or_own(&toggles.shadows, scene.render.shadows) {
-                for clamp in or_own(&toggles.clamps, scene.render.clamp) {
-                    for accel in or_own(&toggles.accels, scene.render.accel) {
-                        ways.push(settings(integrator, photons, shadows, clamp, accel));
+    for integrator in or_scene_value(&toggles.integrators, scene.render.integrator) {
+        for photons in or_scene_value(&toggles.photons, scene.photons.enabled) {
+            for shadows in or_scene_value(&toggles.shadows, scene.render.shadows) {
+                for clamp in or_scene_value(&toggles.clamps, scene.render.clamp) {
+                    for accel in or_scene_value(&toggles.accels, scene.render.accel) {
+                        ways.push(all_combinations(integrator, photons, shadows, clamp, accel));
                     }
                 }
             }
@@ -80,11 +80,11 @@ fn requested_settings(scene: &Scene, toggles: &Toggles) -> Vec<MethodSettings> {
     ways
 }
 
-fn or_own<T: Copy>(asked: &[T], own: T) -> Vec<T> {
+fn or_scene_value<T: Copy>(asked: &[T], own: T) -> Vec<T> {
     if asked.is_empty() { vec![own] } else { asked.to_vec() }
 }
 
-fn settings(
+fn all_combinations(
     integrator: Integrator,
     photons: bool,
     shadows: Shadows,
@@ -97,7 +97,7 @@ fn settings(
 }
 
 /// Creates a method, named after the requested settings.
-fn method(settings: MethodSettings, toggles: &Toggles) -> Method {
+fn name_method(settings: MethodSettings, toggles: &Toggles) -> Method {
     let mut words = vec![settings.integrator.name().to_owned()];
     if let Some((photons, shadows)) = settings.of_whitted {
         if photons {
@@ -137,7 +137,7 @@ mod tests {
     }
 
     fn names(text: &str, toggles: &Toggles) -> Vec<String> {
-        methods(&scene(text), toggles).into_iter().map(|method| method.name).collect()
+        methods_to_measure(&scene(text), toggles).into_iter().map(|method| method.name).collect()
     }
 
     #[test]
@@ -175,7 +175,8 @@ mod tests {
     #[test]
     fn methods_override_scene_settings() {
         let toggles = Toggles { integrators: vec![Integrator::Whitted], ..Toggles::default() };
-        let method = methods(&scene("[render]\nclamp = 3\n[photons]\nenabled = true\n"), &toggles).remove(0);
+        let method = methods_to_measure(&scene("[render]\nclamp = 3\n[photons]\nenabled = true\n"), &toggles)
+            .remove(0);
         let overrides = &method.overrides;
         assert_eq!(
             (overrides.photons, overrides.shadows, overrides.clamp),

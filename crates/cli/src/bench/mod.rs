@@ -22,8 +22,10 @@ mod time_budget;
 
 pub use bias::{Bias, MIN_SEEDS};
 pub use brightness::Brightness;
-pub use methods::{Method, Toggles, methods};
-pub use request::{BenchError, BenchEvent, BenchRequest, ReferenceSource, StepSchedule, Unfinished};
-pub use results::{ImageResult, MethodResult, ReferenceResult, Results, SceneResult, StepResult, Verdict};
-pub use run::{run, size};
-pub use slope::{Slope, TimeTo};
+pub use methods::{Method, Toggles, methods_to_measure};
+pub use request::{BenchError, BenchEvent, BenchRequest, ReferenceSource, StepSchedule, UnfinishedBenchmark};
+pub use results::{
+    BiasVerdict, ImageResult, MethodResult, ReferenceResult, Results, SceneResult, StepResult,
+};
+pub use run::{image_size, run};
+pub use slope::{Slope, TimeToError};

@@ -6,7 +6,7 @@ mod panel;
 use plotters::prelude::{IntoDrawingArea, SVGBackend, WHITE};
 
 use super::results::Results;
-use crate::output::signed;
+use crate::output::sign_plot;
 
 /// Labels of the x and y axes.
 pub const AXES: [&str; 2] = ["seconds of rendering", "relMSE"];
@@ -19,7 +19,7 @@ const ACROSS: usize = 2;
 ///
 /// # Errors
 /// An error from the plotting library.
-pub fn svg(results: &Results) -> Result<String, String> {
+pub fn draw_svg(results: &Results) -> Result<String, String> {
     let across = results.scenes.len().clamp(1, ACROSS);
     let down = results.scenes.len().div_ceil(ACROSS).max(1);
     let size = (PANEL.0 * across as u32, PANEL.1 * down as u32);
@@ -29,12 +29,16 @@ pub fn svg(results: &Results) -> Result<String, String> {
         let draw = || {
             root.fill(&WHITE)?;
             let places = root.split_evenly((down, across));
-            results.scenes.iter().zip(&places).try_for_each(|(scene, place)| panel::draw(scene, place))?;
+            results
+                .scenes
+                .iter()
+                .zip(&places)
+                .try_for_each(|(scene, place)| panel::draw_panel(scene, place))?;
             root.present()
         };
         draw().map_err(|error| error.to_string())?;
     }
-    Ok(signed(&text))
+    Ok(sign_plot(&text))
 }
 
 #[cfg(test)]
@@ -50,7 +54,7 @@ mod tests {
 
     #[test]
     fn plots_contain_all_scenes_methods_and_axes() {
-        let svg = svg(&results()).expect("a plot");
+        let svg = draw_svg(&results()).expect("a plot");
         let texts = texts(&svg);
         for word in [
             "a.toml, 128×96",
@@ -88,8 +92,8 @@ mod tests {
         }
         some.scenes[1].methods[1].steps.truncate(1);
         some.scenes[1].reference.noise = 0.0;
-        texts(&svg(&some).expect("a plot"));
+        texts(&draw_svg(&some).expect("a plot"));
         some.scenes.clear();
-        texts(&svg(&some).expect("a plot"));
+        texts(&draw_svg(&some).expect("a plot"));
     }
 }

@@ -1,4 +1,4 @@
-//! The two references of a scene, from files, from the cache or newly rendered.
+//! A scene's two references, which are read from files, loaded from the cache or rendered.
 
 use std::path::{Path, PathBuf};
 
@@ -17,20 +17,20 @@ use crate::scene::fingerprint::{Fingerprint, Key};
 /// Seeds of the references, never used for measured images.
 pub(super) const SEEDS: [u32; 2] = [u32::MAX - 1, u32::MAX];
 
-/// Sample count that is never reached before the time limit.
+/// Sample count too large to be reached within the time limit.
 const UNLIMITED_SAMPLES: u32 = 1 << 24;
 
 /// Ratio of the references' samples to the largest measured sample count.
 const REFERENCE_RATIO: u32 = 100;
-/// Minimum for the largest measured sample count, even if the references have few samples.
+/// Lower bound on the largest measured sample count, for references with few samples.
 const MIN_MEASURED: f64 = 16.0;
 
 /// Maximum sample count to measure by default.
 const MAX_MEASURED: f64 = 65_536.0;
 
-/// Largest sample count to measure with references of `of_references` samples, which is `None` for image
-/// files.
-pub(super) fn most_measured(of_references: Option<f64>) -> f64 {
+/// Largest sample count to measure against references with `of_references` samples. `None` means that the
+/// references are image files.
+pub(super) fn max_measured_samples(of_references: Option<f64>) -> f64 {
     let most = of_references.map_or(MAX_MEASURED, |samples| samples / f64::from(REFERENCE_RATIO));
     most.clamp(MIN_MEASURED, MAX_MEASURED)
 }
@@ -80,7 +80,7 @@ pub(super) struct RenderedReferences {
 }
 
 /// Loads references from files.
-pub(super) fn given(files: &[PathBuf; 2]) -> Result<SceneReferences, BenchError> {
+pub(super) fn load_reference_files(files: &[PathBuf; 2]) -> Result<SceneReferences, BenchError> {
     let pair = Pair::load(&files[0], &files[1]).map_err(|errors| {
         BenchError::Call(errors.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))
     })?;
@@ -117,13 +117,17 @@ impl ReferenceRenderer<'_> {
     }
 
     /// Loads cached references, if they are good enough.
-    pub(super) fn kept(&self, keys: &ReferenceKeys, amount: ReferenceQuality) -> Option<SceneReferences> {
+    pub(super) fn load_cached(
+        &self,
+        keys: &ReferenceKeys,
+        amount: ReferenceQuality,
+    ) -> Option<SceneReferences> {
         let stored = cache::load(self.cache?, &self.key(keys)).filter(|stored| amount.is_met(stored.cost))?;
         Some(reference(stored, true, Vec::new(), None))
     }
 
-    /// Renders both references. Before each, calls `begin` with the number of references left.
-    pub(super) fn make(
+    /// Renders both references. Calls `begin` before each one with the number of references left.
+    pub(super) fn render_both(
         &self,
         session: &mut Session,
         amount: ReferenceQuality,
@@ -147,7 +151,7 @@ impl ReferenceRenderer<'_> {
     }
 
     /// Stores rendered references in the cache, if it is enabled.
-    pub(super) fn keep(&self, made: RenderedReferences) -> SceneReferences {
+    pub(super) fn store_in_cache(&self, made: RenderedReferences) -> SceneReferences {
         let RenderedReferences { keys, stored, warnings } = made;
         let cache_error = self.cache.and_then(|folder| cache::store(folder, &self.key(&keys), &stored).err());
         reference(stored, false, warnings, cache_error.map(|error| error.to_string()))
@@ -172,8 +176,8 @@ impl ReferenceRenderer<'_> {
     }
 }
 
-/// The cache key of the references. It differs between builds, whose renders may differ, and between
-/// references with requested samples and references limited by time.
+/// The cache key of the references. It depends on the build, because builds may render differently, and on
+/// whether the references are limited by samples or by time.
 fn cache_key(build: &str, asked: Option<u32>, ReferenceKeys(keys): &ReferenceKeys) -> Key {
     let mut key = Fingerprint::new("references");
     key.text(build).u64(asked.unwrap_or(0).into());
@@ -224,9 +228,9 @@ mod tests {
 
     #[test]
     fn measured_samples_are_limited_to_1_percent() {
-        assert_eq!(most_measured(Some(25_600.0)), 256.0);
-        assert_eq!(most_measured(Some(400.0)), 16.0, "fewer samples are too few for a slope");
-        assert_eq!(most_measured(Some(1e9)), 65_536.0);
-        assert_eq!(most_measured(None), 65_536.0, "unknown samples");
+        assert_eq!(max_measured_samples(Some(25_600.0)), 256.0);
+        assert_eq!(max_measured_samples(Some(400.0)), 16.0, "fewer samples are too few for a slope");
+        assert_eq!(max_measured_samples(Some(1e9)), 65_536.0);
+        assert_eq!(max_measured_samples(None), 65_536.0, "unknown samples");
     }
 }

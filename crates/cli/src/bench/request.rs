@@ -91,7 +91,7 @@ pub enum BenchEvent {
 
 /// A benchmark that ended early, with the results so far.
 #[derive(Clone, Debug)]
-pub struct Unfinished {
+pub struct UnfinishedBenchmark {
     /// The reason.
     pub error: BenchError,
     /// Results of the completed scenes.

@@ -4,10 +4,10 @@ use serde::{Deserialize, Serialize};
 
 use super::bias::Bias;
 use super::brightness::Brightness;
-use super::slope::{Slope, TimeTo, slope, time_to};
-use super::statistics::mean;
+use super::slope::{Slope, TimeToError, mean_loglog_slope, time_to_error};
+use super::statistics::mean_and_error;
 
-/// Target errors for which times are reported.
+/// Target errors. The results include the time at which each is reached.
 pub const TARGETS: [f64; 3] = [1e-2, 1e-3, 1e-4];
 
 /// Results of a benchmark.
@@ -67,9 +67,9 @@ pub struct MethodResult {
     /// Slope of error over time on log–log axes, from the last two steps.
     pub last_slope: Option<Slope>,
     /// Times to reach `TARGETS`.
-    pub time_to: [Option<TimeTo>; TARGETS.len()],
+    pub time_to: [Option<TimeToError>; TARGETS.len()],
     /// Whether the method is biased.
-    pub verdict: Verdict,
+    pub verdict: BiasVerdict,
 }
 
 /// Results for one sample count or one time limit.
@@ -112,7 +112,7 @@ pub struct ImageResult {
 /// Whether a method is biased.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
-pub enum Verdict {
+pub enum BiasVerdict {
     /// Too few seeds to decide.
     Unknown,
     /// No bias was found.
@@ -127,7 +127,7 @@ pub enum Verdict {
         /// Fraction of the error caused by bias.
         share: f64,
     },
-    /// There is a bias that does not decrease, so the slope flattens.
+    /// There is a constant bias, which flattens the slope.
     Stays {
         /// Squared bias at the last step, as a contribution to relMSE.
         size: f64,
@@ -136,18 +136,18 @@ pub enum Verdict {
     },
 }
 
-impl Verdict {
+impl BiasVerdict {
     /// Compares the biases of the last two steps.
-    pub(super) fn of(steps: &[StepResult]) -> Self {
+    pub(super) fn from_steps(steps: &[StepResult]) -> Self {
         let Some(last) = steps.last() else { return Self::Unknown };
         let Some(bias) = last.bias else { return Self::Unknown };
         if !bias.is_found() {
             return Self::NoneFound { bound: bias.bound };
         }
         let errors: Vec<f64> = last.pictures.iter().map(|picture| picture.relmse).collect();
-        let (size, share) = (bias.size, (bias.size / mean(&errors).0).clamp(0.0, 1.0));
+        let (size, share) = (bias.size, (bias.size / mean_and_error(&errors).0).clamp(0.0, 1.0));
         let before = steps.len().checked_sub(2).and_then(|index| steps[index].bias);
-        if before.is_some_and(|before| falls(before, bias)) {
+        if before.is_some_and(|before| is_bias_decreasing(before, bias)) {
             Self::Falls { size, share }
         } else {
             Self::Stays { size, share }
@@ -156,9 +156,9 @@ impl Verdict {
 }
 
 /// Whether the bias decreased significantly.
-fn falls(before: Bias, after: Bias) -> bool {
-    /// Maximum ratio for a bias to count as decreasing when the samples quadruple. The ratio is 0.4 for
-    /// photon mapping and 1 for a constant bias.
+fn is_bias_decreasing(before: Bias, after: Bias) -> bool {
+    /// A bias counts as decreasing if quadrupling the samples scales it by at most this factor. The ratio is
+    /// 0.4 for photon mapping and 1 for a constant bias.
     const MAX_RATIO: f64 = 0.8;
     let error = (before.error * before.error + after.error * after.error).sqrt();
     after.size < MAX_RATIO * before.size && before.size - after.size > 2.0 * error
@@ -167,15 +167,16 @@ fn falls(before: Bias, after: Bias) -> bool {
 impl MethodResult {
     pub(super) fn new(name: String, setup_seconds: f64, steps: Vec<StepResult>) -> Self {
         let middle: Vec<(f64, f64)> = steps.iter().map(|step| (step.seconds, step.relmse)).collect();
-        let verdict = Verdict::of(&steps);
+        let verdict = BiasVerdict::from_steps(&steps);
         // Do not extrapolate the error if the bias is constant.
-        let is_expected = |time: &TimeTo| time.is_measured || !matches!(verdict, Verdict::Stays { .. });
+        let is_expected =
+            |time: &TimeToError| time.is_measured || !matches!(verdict, BiasVerdict::Stays { .. });
         Self {
             name,
             setup_seconds,
-            slope: slope(&series(&steps)),
-            last_slope: slope(&series(&steps[steps.len().saturating_sub(2)..])),
-            time_to: TARGETS.map(|target| time_to(target, &middle).filter(is_expected)),
+            slope: mean_loglog_slope(&group_by_image(&steps)),
+            last_slope: mean_loglog_slope(&group_by_image(&steps[steps.len().saturating_sub(2)..])),
+            time_to: TARGETS.map(|target| time_to_error(target, &middle).filter(is_expected)),
             verdict,
             steps,
         }
@@ -183,7 +184,7 @@ impl MethodResult {
 }
 
 /// One series per image number: the first image of every step, the second of every step, and so on.
-fn series(steps: &[StepResult]) -> Vec<Vec<(f64, f64)>> {
+fn group_by_image(steps: &[StepResult]) -> Vec<Vec<(f64, f64)>> {
     let count = steps.iter().map(|step| step.pictures.len()).min().unwrap_or(0);
     let point = |step: &StepResult, index: usize| (step.pictures[index].seconds, step.pictures[index].relmse);
     (0..count).map(|index| steps.iter().map(|step| point(step, index)).collect()).collect()
@@ -256,15 +257,15 @@ pub(super) mod tests {
                 .zip(sizes)
                 .map(|(n, size)| step(f64::from(1 << (2 * n)), 1.0, 0.01 + size, *size))
                 .collect();
-            Verdict::of(&steps)
+            BiasVerdict::from_steps(&steps)
         };
-        assert!(matches!(of(&[1e-3, 1e-3, 1e-3]), Verdict::Stays { .. }));
-        assert!(matches!(of(&[1e-3, 4e-4, 1.6e-4]), Verdict::Falls { .. }));
-        assert!(matches!(of(&[1e-3, 9e-4]), Verdict::Stays { .. }), "not significant");
-        assert!(matches!(of(&[1e-3]), Verdict::Stays { .. }), "a single step");
-        assert!(matches!(of(&[0.0, 0.0]), Verdict::NoneFound { bound } if bound > 0.0));
-        assert_eq!(of(&[]), Verdict::Unknown);
-        let Verdict::Stays { size, share } = of(&[0.03]) else { panic!("it stays") };
+        assert!(matches!(of(&[1e-3, 1e-3, 1e-3]), BiasVerdict::Stays { .. }));
+        assert!(matches!(of(&[1e-3, 4e-4, 1.6e-4]), BiasVerdict::Falls { .. }));
+        assert!(matches!(of(&[1e-3, 9e-4]), BiasVerdict::Stays { .. }), "not significant");
+        assert!(matches!(of(&[1e-3]), BiasVerdict::Stays { .. }), "a single step");
+        assert!(matches!(of(&[0.0, 0.0]), BiasVerdict::NoneFound { bound } if bound > 0.0));
+        assert_eq!(of(&[]), BiasVerdict::Unknown);
+        let BiasVerdict::Stays { size, share } = of(&[0.03]) else { panic!("it stays") };
         assert!((size - 0.03).abs() < 1e-12 && (share - 0.75).abs() < 1e-9, "{size} {share}");
     }
 

@@ -4,11 +4,14 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::measure::MethodRun;
-use super::methods::methods;
+use super::methods::methods_to_measure;
 use super::reference::{
-    ReferenceKeys, ReferenceQuality, ReferenceRenderer, SEEDS, SceneReferences, given, most_measured,
+    ReferenceKeys, ReferenceQuality, ReferenceRenderer, SEEDS, SceneReferences, load_reference_files,
+    max_measured_samples,
 };
-use super::request::{BenchError, BenchEvent, BenchRequest, ReferenceSource, StepSchedule, Unfinished};
+use super::request::{
+    BenchError, BenchEvent, BenchRequest, ReferenceSource, StepSchedule, UnfinishedBenchmark,
+};
 use super::results::{Results, SceneResult, StepResult};
 use super::time_budget::TimeBudget;
 use crate::control::CancelToken;
@@ -30,7 +33,7 @@ pub fn run(
     order: &BenchRequest,
     token: &CancelToken,
     tell: &dyn Fn(BenchEvent),
-) -> Result<Results, Box<Unfinished>> {
+) -> Result<Results, Box<UnfinishedBenchmark>> {
     let mut budget = TimeBudget::new(order.within, order.scenes.len());
     let mut results =
         Results { glimt: env!("CARGO_PKG_VERSION").to_owned(), threads: 0, seconds: 0.0, scenes: Vec::new() };
@@ -49,7 +52,7 @@ pub fn run(
     results.seconds = budget.seconds();
     match measured {
         Ok(()) => Ok(results),
-        Err(error) => Err(Box::new(Unfinished { error, done: results })),
+        Err(error) => Err(Box::new(UnfinishedBenchmark { error, done: results })),
     }
 }
 
@@ -71,7 +74,7 @@ fn check_all(runs: &[SceneRun<'_>]) -> Result<(), BenchError> {
 }
 
 /// The size of a scene's images.
-pub fn size(scene: &Scene, asked: (Option<u32>, Option<u32>)) -> (u32, u32) {
+pub fn image_size(scene: &Scene, asked: (Option<u32>, Option<u32>)) -> (u32, u32) {
     let (width, height) = (f64::from(scene.render.width), f64::from(scene.render.height));
     let side = |length: f64| length.round().clamp(1.0, 65536.0) as u32;
     match asked {
@@ -129,16 +132,16 @@ impl SceneRun<'_> {
     /// Reads and validates the scene and its files.
     fn prepare(&self, session: &mut Session) -> Result<PreparedScene, BenchError> {
         let order = self.order;
-        self.begins("reading", None);
+        self.report_begin("reading", None);
         let loaded = scene::load(self.path, &order.common.sets)
             .map_err(|diagnostics| BenchError::Failed(Failure::Scene(diagnostics)))?;
         let given = match &order.reference {
-            ReferenceSource::Files(files) => Some(given(files)?),
+            ReferenceSource::Files(files) => Some(load_reference_files(files)?),
             ReferenceSource::InTime | ReferenceSource::Samples(_) => None,
         };
         let (width, height) = match &given {
             Some(reference) => (reference.two.pair().a().width, reference.two.pair().a().height),
-            None => size(&loaded.scene, (order.width, order.height)),
+            None => image_size(&loaded.scene, (order.width, order.height)),
         };
         let common =
             Overrides { width: Some(width), height: Some(height), error: Some(0.0), ..order.common.clone() };
@@ -165,7 +168,7 @@ impl SceneRun<'_> {
     fn measure(&self, budget: &mut TimeBudget, threads: &mut usize) -> Result<SceneResult, BenchError> {
         let mut session = Session::default();
         let PreparedScene { scene, given, common, keys } = self.prepare(&mut session)?;
-        let methods = methods(&scene, &self.order.toggles);
+        let methods = methods_to_measure(&scene, &self.order.toggles);
         budget.begin_scene(methods.len());
         let reference = match given {
             Some(reference) => reference,
@@ -174,7 +177,7 @@ impl SceneRun<'_> {
         drop(session);
         let (width, height) = (reference.two.pair().a().width, reference.two.pair().a().height);
         self.report_references(&reference, (width, height));
-        let most_samples = most_measured(reference.result.samples);
+        let most_samples = max_measured_samples(reference.result.samples);
         let mut measured = Vec::new();
         for method in &methods {
             budget.begin_method();
@@ -208,25 +211,26 @@ impl SceneRun<'_> {
             }
         };
         let maker = self.reference_renderer(common);
-        if let Some(kept) = maker.kept(keys, amount) {
+        if let Some(kept) = maker.load_cached(keys, amount) {
             return Ok(kept);
         }
         let begin = |left: usize| {
-            let seconds = amount.seconds.map(|seconds| budget.left(seconds * left as f64 / 2.0, true));
-            self.begins(&format!("reference {} of 2", 3 - left), seconds);
+            let seconds =
+                amount.seconds.map(|seconds| budget.seconds_left(seconds * left as f64 / 2.0, true));
+            self.report_begin(&format!("reference {} of 2", 3 - left), seconds);
         };
-        let made = maker.make(session, amount, begin)?;
-        if made.keys == *keys { Ok(maker.keep(made)) } else { Err(self.changed()) }
+        let made = maker.render_both(session, amount, begin)?;
+        if made.keys == *keys { Ok(maker.store_in_cache(made)) } else { Err(self.scene_changed_error()) }
     }
 
     /// Error for a scene that was saved while it was measured.
-    pub(super) fn changed(&self) -> BenchError {
+    pub(super) fn scene_changed_error(&self) -> BenchError {
         BenchError::Failed(Failure::Work(changed_during_measurement(self.path)))
     }
 
     /// Checks that no output file is an input of the scene.
     fn check_targets(&self, session: &Session) -> Result<(), BenchError> {
-        match self.order.targets.iter().find(|target| session.reads(target)) {
+        match self.order.targets.iter().find(|target| session.has_read(target)) {
             Some(target) => Err(BenchError::Call(format!(
                 "cannot write {}: {} depends on it; choose another file",
                 target.display(),
@@ -241,7 +245,7 @@ impl SceneRun<'_> {
             (self.tell)(BenchEvent::Warnings(reference.warnings.clone()));
         }
         if let Some(why) = &reference.cache_error {
-            self.done(&format!("could not cache the references: {why}"));
+            self.report_done(&format!("could not cache the references: {why}"));
         }
         let result = &reference.result;
         let made = match (result.is_cached, result.seconds) {
@@ -249,20 +253,23 @@ impl SceneRun<'_> {
             (false, Some(seconds)) => format!("rendered in {}", words::seconds(seconds)),
             (false, None) => "from files".to_owned(),
         };
-        self.done(&format!("references of {width}×{height} pixels {made}, relMSE {:.1e} each", result.noise));
+        self.report_done(&format!(
+            "references of {width}×{height} pixels {made}, relMSE {:.1e} each",
+            result.noise
+        ));
     }
 
-    pub(super) fn begins(&self, what: &str, left: Option<f64>) {
+    pub(super) fn report_begin(&self, what: &str, left: Option<f64>) {
         let what = format!("{}: {what}", self.path.display());
         (self.tell)(BenchEvent::Begins { what, left });
     }
 
-    pub(super) fn point(&self, method: &str, step: &StepResult) {
+    pub(super) fn report_step(&self, method: &str, step: &StepResult) {
         let (scene, method) = (self.path.to_string_lossy().into_owned(), method.to_owned());
         (self.tell)(BenchEvent::Point { scene, method, seconds: step.seconds, relmse: step.relmse });
     }
 
-    pub(super) fn done(&self, what: &str) {
+    pub(super) fn report_done(&self, what: &str) {
         (self.tell)(BenchEvent::Done(format!("{}: {what}", self.path.display())));
     }
 }
@@ -287,7 +294,7 @@ mod tests {
         let of = |width, height, asked| {
             let mut scene = Scene::clone(&scene::load(Path::new(file), &[]).expect("a scene").scene);
             (scene.render.width, scene.render.height) = (width, height);
-            size(&scene, asked)
+            image_size(&scene, asked)
         };
         assert_eq!(of(640, 480, (None, None)), (96, 72));
         assert_eq!(of(480, 640, (None, None)), (72, 96));
@@ -313,8 +320,8 @@ mod tests {
         assert_eq!(done, [3]);
     }
 
-    /// Writes two scenes to a folder, and returns a request to measure them quickly with a cache in the same
-    /// folder.
+    /// Writes two scenes to a folder and returns a request for a quick benchmark that also caches references
+    /// there.
     fn two_scenes(folder: &Path) -> BenchRequest {
         let scenes = ["a.toml", "b.toml"].map(|name| folder.join(name));
         // Use different colors, because identical scenes would share references.

@@ -2,9 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::statistics::mean;
+use super::statistics::mean_and_error;
 
-/// A slope on log–log axes. −1 for independent samples, 0 if the error does not decrease.
+/// A slope on log–log axes: −1 for independent samples, 0 if the error does not decrease.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Slope {
     /// The slope.
@@ -15,14 +15,14 @@ pub struct Slope {
 
 /// Mean slope of independent series of times and errors. Skips errors that are zero or negative. `None` if no
 /// series has two points at different times.
-pub fn slope(series: &[Vec<(f64, f64)>]) -> Option<Slope> {
-    let slopes: Vec<f64> = series.iter().filter_map(|points| fit(points)).collect();
-    let (value, error) = mean(&slopes);
+pub fn mean_loglog_slope(series: &[Vec<(f64, f64)>]) -> Option<Slope> {
+    let slopes: Vec<f64> = series.iter().filter_map(|points| fit_line(points)).collect();
+    let (value, error) = mean_and_error(&slopes);
     (!slopes.is_empty()).then_some(Slope { value, error: if error.is_finite() { error } else { 0.0 } })
 }
 
 /// Least-squares slope of one series.
-fn fit(points: &[(f64, f64)]) -> Option<f64> {
+fn fit_line(points: &[(f64, f64)]) -> Option<f64> {
     let usable = points.iter().filter(|(time, error)| *time > 0.0 && *error > 0.0);
     let logs: Vec<(f64, f64)> = usable.map(|&(time, error)| (libm::log(time), libm::log(error))).collect();
     let count = logs.len() as f64;
@@ -38,7 +38,7 @@ fn fit(points: &[(f64, f64)]) -> Option<f64> {
 /// The time at which the error reaches `target`, interpolated linearly on log–log axes or extrapolated from
 /// the last two points. `None` if the first error is below the target, the error does not decrease, or the
 /// time is more than 1000 times the last measured time.
-pub fn time_to(target: f64, points: &[(f64, f64)]) -> Option<TimeTo> {
+pub fn time_to_error(target: f64, points: &[(f64, f64)]) -> Option<TimeToError> {
     let after = points.iter().position(|(_, error)| *error <= target);
     let (index, is_measured) = match after {
         Some(0) | None if points.len() < 2 => return None,
@@ -52,12 +52,12 @@ pub fn time_to(target: f64, points: &[(f64, f64)]) -> Option<TimeTo> {
     }
     let share = libm::log(e0 / target) / libm::log(e0 / e1);
     let seconds = t0 * libm::pow(t1 / t0, share);
-    (seconds <= 1000.0 * t1).then_some(TimeTo { seconds, is_measured })
+    (seconds <= 1000.0 * t1).then_some(TimeToError { seconds, is_measured })
 }
 
 /// The time at which an error reaches a target.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct TimeTo {
+pub struct TimeToError {
     /// Rendering time in seconds.
     pub seconds: f64,
     /// Whether the time is interpolated rather than extrapolated.
@@ -76,17 +76,17 @@ mod tests {
     #[test]
     fn slopes_of_power_laws_are_exact() {
         for value in [-1.0, -2.0 / 3.0, 0.0] {
-            let found = slope(&[points(value, 0.0), points(value, 0.0)]).expect("a slope");
+            let found = mean_loglog_slope(&[points(value, 0.0), points(value, 0.0)]).expect("a slope");
             assert!((found.value - value).abs() < 1e-12 && found.error < 1e-12, "{found:?}");
         }
-        let of_both = slope(&[points(-1.0, 0.0), points(-0.5, 0.0)]).expect("a slope");
+        let of_both = mean_loglog_slope(&[points(-1.0, 0.0), points(-0.5, 0.0)]).expect("a slope");
         assert!((of_both.value + 0.75).abs() < 1e-12 && (of_both.error - 0.25).abs() < 1e-12, "{of_both:?}");
     }
 
     #[test]
     fn constant_bias_flattens_the_last_slope() {
         let flat = points(-1.0, 0.05);
-        let last = slope(&[flat[3..].to_vec()]).expect("a slope");
+        let last = mean_loglog_slope(&[flat[3..].to_vec()]).expect("a slope");
         assert!(last.value > -0.05, "{last:?}");
     }
 
@@ -94,21 +94,21 @@ mod tests {
     fn nonpositive_errors_are_skipped() {
         let mut some = points(-1.0, 0.0);
         some[4].1 = -1e-9;
-        assert!((slope(&[some]).expect("a slope").value + 1.0).abs() < 1e-12);
-        assert_eq!(slope(&[vec![(1.0, 1.0), (2.0, 0.0)], vec![(1.0, 1.0)]]), None);
-        assert_eq!(slope(&[]), None);
+        assert!((mean_loglog_slope(&[some]).expect("a slope").value + 1.0).abs() < 1e-12);
+        assert_eq!(mean_loglog_slope(&[vec![(1.0, 1.0), (2.0, 0.0)], vec![(1.0, 1.0)]]), None);
+        assert_eq!(mean_loglog_slope(&[]), None);
     }
 
     #[test]
     fn times_are_interpolated_or_extrapolated() {
         let fall = points(-1.0, 0.0);
-        let inside = time_to(0.01, &fall).expect("a time");
+        let inside = time_to_error(0.01, &fall).expect("a time");
         assert!(inside.is_measured && (inside.seconds - 0.1).abs() < 1e-9, "{inside:?}");
-        let beyond = time_to(1e-4, &fall).expect("a time");
+        let beyond = time_to_error(1e-4, &fall).expect("a time");
         assert!(!beyond.is_measured && (beyond.seconds - 10.0).abs() < 1e-6, "{beyond:?}");
-        assert_eq!(time_to(1e-9, &fall), None, "too far");
-        assert_eq!(time_to(0.5, &fall), None, "the first point is below the target");
-        assert_eq!(time_to(0.001, &points(0.0, 0.0)), None, "the error does not decrease");
-        assert_eq!(time_to(0.1, &[(1.0, 1.0)]), None);
+        assert_eq!(time_to_error(1e-9, &fall), None, "too far");
+        assert_eq!(time_to_error(0.5, &fall), None, "the first point is below the target");
+        assert_eq!(time_to_error(0.001, &points(0.0, 0.0)), None, "the error does not decrease");
+        assert_eq!(time_to_error(0.1, &[(1.0, 1.0)]), None);
     }
 }

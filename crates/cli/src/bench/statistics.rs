@@ -13,7 +13,7 @@ pub fn median(values: &[f64]) -> f64 {
 }
 
 /// The mean and its standard error, which is infinite for a single value.
-pub fn mean(values: &[f64]) -> (f64, f64) {
+pub fn mean_and_error(values: &[f64]) -> (f64, f64) {
     let count = values.len() as f64;
     let mean = values.iter().sum::<f64>() / count;
     let squares: f64 = values.iter().map(|value| (value - mean) * (value - mean)).sum();
@@ -22,29 +22,29 @@ pub fn mean(values: &[f64]) -> (f64, f64) {
 }
 
 /// The probability that Student's t with `freedom` degrees of freedom exceeds `t`.
-pub fn upper_tail(t: f64, freedom: f64) -> f64 {
+pub fn student_t_tail(t: f64, freedom: f64) -> f64 {
     let x = freedom / (freedom + t * t);
     let tail = if t.is_infinite() { 0.0 } else { 0.5 * incomplete_beta(x, freedom / 2.0, 0.5) };
     if t >= 0.0 { tail } else { 1.0 - tail }
 }
 
-/// The inverse of [`upper_tail`], for probabilities below 0.5.
-pub fn quantile(probability: f64, freedom: f64) -> f64 {
+/// The inverse of [`student_t_tail`], for probabilities below 0.5.
+pub fn student_t_quantile(probability: f64, freedom: f64) -> f64 {
     let (mut low, mut high) = (0.0, 1.0);
-    while upper_tail(high, freedom) > probability && high < 1e12 {
+    while student_t_tail(high, freedom) > probability && high < 1e12 {
         high *= 2.0;
     }
     for _ in 0..100 {
         let middle = (low + high) / 2.0;
-        if upper_tail(middle, freedom) > probability { low = middle } else { high = middle }
+        if student_t_tail(middle, freedom) > probability { low = middle } else { high = middle }
     }
     high
 }
 
 /// The difference between the means, b − a, its standard error and its degrees of freedom
 /// (Welch–Satterthwaite).
-pub fn welch(a: &[f64], b: &[f64]) -> (f64, f64, f64) {
-    let ((mean_a, error_a), (mean_b, error_b)) = (mean(a), mean(b));
+pub fn welch_difference(a: &[f64], b: &[f64]) -> (f64, f64, f64) {
+    let ((mean_a, error_a), (mean_b, error_b)) = (mean_and_error(a), mean_and_error(b));
     let (square_a, square_b) = (error_a * error_a, error_b * error_b);
     let square = square_a + square_b;
     let of = |square: f64, count: usize| square * square / (count as f64 - 1.0).max(1.0);
@@ -89,9 +89,9 @@ mod tests {
     fn medians_and_means_are_correct() {
         assert_eq!((median(&[3.0, 1.0, 2.0]), median(&[4.0, 1.0, 2.0, 3.0])), (2.0, 2.5));
         assert!(median(&[]).is_nan());
-        let (value, error) = mean(&[1.0, 2.0, 3.0, 4.0]);
+        let (value, error) = mean_and_error(&[1.0, 2.0, 3.0, 4.0]);
         assert!((value - 2.5).abs() < 1e-15 && (error - (5.0_f64 / 12.0).sqrt()).abs() < 1e-15);
-        assert_eq!(mean(&[1.0]), (1.0, f64::INFINITY));
+        assert_eq!(mean_and_error(&[1.0]), (1.0, f64::INFINITY));
     }
 
     /// Compares with tables of one-sided quantiles.
@@ -104,20 +104,24 @@ mod tests {
             (100.0, 0.01, 2.364_217),
         ] {
             assert!(
-                (upper_tail(t, freedom) / probability - 1.0).abs() < 1e-5,
+                (student_t_tail(t, freedom) / probability - 1.0).abs() < 1e-5,
                 "{freedom}: {}",
-                upper_tail(t, freedom)
+                student_t_tail(t, freedom)
             );
-            assert!((quantile(probability, freedom) - t).abs() < 1e-4, "{}", quantile(probability, freedom));
+            assert!(
+                (student_t_quantile(probability, freedom) - t).abs() < 1e-4,
+                "{}",
+                student_t_quantile(probability, freedom)
+            );
         }
-        assert!((upper_tail(-1.0, 3.0) + upper_tail(1.0, 3.0) - 1.0).abs() < 1e-14);
-        assert!((upper_tail(0.0, 7.0) - 0.5).abs() < 1e-14);
-        assert_eq!(upper_tail(f64::INFINITY, 7.0), 0.0);
+        assert!((student_t_tail(-1.0, 3.0) + student_t_tail(1.0, 3.0) - 1.0).abs() < 1e-14);
+        assert!((student_t_tail(0.0, 7.0) - 0.5).abs() < 1e-14);
+        assert_eq!(student_t_tail(f64::INFINITY, 7.0), 0.0);
     }
 
     #[test]
     fn welch_matches_a_manual_computation() {
-        let (difference, error, freedom) = welch(&[1.0, 2.0, 3.0], &[5.0, 7.0, 9.0, 11.0]);
+        let (difference, error, freedom) = welch_difference(&[1.0, 2.0, 3.0], &[5.0, 7.0, 9.0, 11.0]);
         assert!((difference - 6.0).abs() < 1e-14);
         // The variances are 1 and 20/3. Squared error: 1/3 + 5/3 = 2. Degrees of freedom: 4/((1/9)/2 +
         // (25/9)/3).

@@ -1,23 +1,23 @@
 //! Formats results as a table that fits 80 columns.
 
-use super::results::{MethodResult, ReferenceResult, Results, SceneResult, StepResult, TARGETS, Verdict};
-use super::slope::{Slope, TimeTo};
+use super::results::{BiasVerdict, MethodResult, ReferenceResult, Results, SceneResult, StepResult, TARGETS};
+use super::slope::{Slope, TimeToError};
 use crate::pipeline::words;
 
 /// Formats the results as lines.
-pub fn table(results: &Results) -> Vec<String> {
-    let mut lines: Vec<String> = results.scenes.iter().flat_map(of_scene).collect();
+pub fn format_results(results: &Results) -> Vec<String> {
+    let mut lines: Vec<String> = results.scenes.iter().flat_map(format_scene).collect();
     lines
         .push("Times and relMSE are medians over seeds; \"least\" and \"greatest\" are the range".to_owned());
     lines.push("of relMSE. time × relMSE is constant for an unbiased method.".to_owned());
     lines
 }
 
-fn of_scene(scene: &SceneResult) -> Vec<String> {
+fn format_scene(scene: &SceneResult) -> Vec<String> {
     let seeds = scene.methods.iter().flat_map(|method| &method.steps).map(|step| step.pictures.len()).max();
     let mut lines = vec![
         format!("{}, {}×{} pixels, {} seeds", scene.scene, scene.width, scene.height, seeds.unwrap_or(0)),
-        references(&scene.reference, scene),
+        format_references(&scene.reference, scene),
         String::new(),
     ];
     let width = scene.methods.iter().map(|method| method.name.chars().count()).max().unwrap_or(0).max(6);
@@ -26,16 +26,16 @@ fn of_scene(scene: &SceneResult) -> Vec<String> {
         "method", "samples", "seconds", "relMSE", "least", "greatest", "s × relMSE"
     ));
     for method in &scene.methods {
-        lines.extend(method.steps.iter().map(|step| of_step(&method.name, step, width)));
+        lines.extend(method.steps.iter().map(|step| format_step(&method.name, step, width)));
     }
     lines.push(String::new());
     for method in &scene.methods {
-        lines.push(format!("{}: {}", method.name, speed(method)));
+        lines.push(format!("{}: {}", method.name, format_speed(method)));
         lines.extend(
-            times(method)
+            format_target_times(method)
                 .into_iter()
-                .chain([verdict(method)])
-                .chain(brightness(method))
+                .chain([describe_bias(method)])
+                .chain(describe_brightness(method))
                 .map(|line| format!("  {line}")),
         );
     }
@@ -43,8 +43,8 @@ fn of_scene(scene: &SceneResult) -> Vec<String> {
     lines
 }
 
-fn references(reference: &ReferenceResult, scene: &SceneResult) -> String {
-    let noise = format!("noise {}", error(reference.noise));
+fn format_references(reference: &ReferenceResult, scene: &SceneResult) -> String {
+    let noise = format!("noise {}", format_error(reference.noise));
     let Some(samples) = reference.samples else {
         return match reference.files.as_slice() {
             [one] => format!("reference: {one} (a single reference, so its noise counts as error)"),
@@ -58,38 +58,38 @@ fn references(reference: &ReferenceResult, scene: &SceneResult) -> String {
     format!("references: path, 2 × {samples:.0} samples ({times}), {noise}{cached}")
 }
 
-fn of_step(name: &str, step: &StepResult, width: usize) -> String {
+fn format_step(name: &str, step: &StepResult, width: usize) -> String {
     let [least, most] = step.spread;
     format!(
         "{name:<width$} {:>8} {:>9}  {:>9} {:>9} {:>9} {:>10}",
-        count(step.samples),
+        format_count(step.samples),
         words::seconds(step.seconds),
-        error(step.relmse),
-        error(least),
-        error(most),
-        error(step.seconds * step.relmse)
+        format_error(step.relmse),
+        format_error(least),
+        format_error(most),
+        format_error(step.seconds * step.relmse)
     )
 }
 
 /// Formats a sample count, without decimals for integers.
-fn count(samples: f64) -> String {
+fn format_count(samples: f64) -> String {
     if samples.fract() == 0.0 { format!("{samples:.0}") } else { format!("{samples:.1}") }
 }
 
 /// Formats an error with three digits. Negative errors and 0 are below the noise of the references.
-pub(super) fn error(value: f64) -> String {
+pub(super) fn format_error(value: f64) -> String {
     if value > 0.0 { format!("{value:.2e}") } else { "≈ 0".to_owned() }
 }
 
-fn speed(method: &MethodResult) -> String {
-    let slope = method.slope.map_or(String::new(), |slope| format!(", slope {}", signed(slope)));
+fn format_speed(method: &MethodResult) -> String {
+    let slope = method.slope.map_or(String::new(), |slope| format!(", slope {}", format_slope(slope)));
     format!("setup {}{slope}", words::seconds(method.setup_seconds))
 }
 
 /// Describes when the target errors are reached.
-fn times(method: &MethodResult) -> Option<String> {
+fn format_target_times(method: &MethodResult) -> Option<String> {
     let times = TARGETS.iter().zip(method.time_to).filter_map(|(target, time)| Some((target, time?)));
-    let parts = times.map(|(target, TimeTo { seconds, is_measured })| {
+    let parts = times.map(|(target, TimeToError { seconds, is_measured })| {
         let about = if is_measured { "" } else { "about " };
         format!("{target:.0e} in {about}{}", words::seconds(seconds))
     });
@@ -98,36 +98,38 @@ fn times(method: &MethodResult) -> Option<String> {
 }
 
 /// Formats a sample count with its unit, as in `1 sample`.
-pub(super) fn samples(samples: f64) -> String {
-    format!("{} sample{}", count(samples), if samples == 1.0 { "" } else { "s" })
+pub(super) fn format_samples(samples: f64) -> String {
+    format!("{} sample{}", format_count(samples), if samples == 1.0 { "" } else { "s" })
 }
 
 /// Formats a slope, as in `−0.98 ± 0.02`.
-pub(super) fn signed(Slope { value, error }: Slope) -> String {
+pub(super) fn format_slope(Slope { value, error }: Slope) -> String {
     let sign = if value < 0.0 { "−" } else { "" };
     format!("{sign}{:.2} ± {error:.2}", value.abs())
 }
 
 /// Describes the bias of a method.
-fn verdict(method: &MethodResult) -> String {
-    let at = method.steps.last().map_or(String::new(), |step| format!(" at {}", samples(step.samples)));
+fn describe_bias(method: &MethodResult) -> String {
+    let at =
+        method.steps.last().map_or(String::new(), |step| format!(" at {}", format_samples(step.samples)));
     let percent = |share: f64| format!("{:.0} % of the error", share * 100.0);
     match method.verdict {
-        Verdict::Unknown => "too few seeds to detect a bias".to_owned(),
-        Verdict::NoneFound { bound } => format!("no bias in relMSE, below {}{at}", error(bound)),
-        Verdict::Falls { size, share } => {
-            format!("bias that decreases with samples: {}, {}{at}", error(size), percent(share))
+        BiasVerdict::Unknown => "too few seeds to detect a bias".to_owned(),
+        BiasVerdict::NoneFound { bound } => format!("no bias in relMSE, below {}{at}", format_error(bound)),
+        BiasVerdict::Falls { size, share } => {
+            format!("bias that decreases with samples: {}, {}{at}", format_error(size), percent(share))
         }
-        Verdict::Stays { size, share } => {
-            let last =
-                method.last_slope.map_or(String::new(), |slope| format!(", last slope {}", signed(slope)));
-            format!("BIAS: {}, {}{at}{last}", error(size), percent(share))
+        BiasVerdict::Stays { size, share } => {
+            let last = method
+                .last_slope
+                .map_or(String::new(), |slope| format!(", last slope {}", format_slope(slope)));
+            format!("BIAS: {}, {}{at}{last}", format_error(size), percent(share))
         }
     }
 }
 
 /// Describes the mean luminance at the last step.
-fn brightness(method: &MethodResult) -> Option<String> {
+fn describe_brightness(method: &MethodResult) -> Option<String> {
     let brightness = method.steps.last()?.brightness?;
     let percent = |part: f64| format!("{:.2} %", 100.0 * part.abs());
     let side = if brightness.value < 0.0 { "below" } else { "above" };
@@ -146,7 +148,7 @@ mod tests {
 
     #[test]
     fn table_fits_80_columns_and_reports_bias() {
-        let lines = table(&results());
+        let lines = format_results(&results());
         assert!(lines.iter().all(|line| line.chars().count() <= 80), "{}", lines.join("\n"));
         assert_eq!(lines[0], "a.toml, 128×96 pixels, 3 seeds");
         assert_eq!(lines[1], "references: path, 2 × 4096 samples (64 × the largest step), noise 1.00e-5");
@@ -166,7 +168,7 @@ mod tests {
 
     #[test]
     fn errors_below_noise_are_shown_as_zero() {
-        assert_eq!((error(-1e-9).as_str(), error(0.0123).as_str()), ("≈ 0", "1.23e-2"));
-        assert_eq!((count(16.0).as_str(), count(16.25).as_str()), ("16", "16.2"));
+        assert_eq!((format_error(-1e-9).as_str(), format_error(0.0123).as_str()), ("≈ 0", "1.23e-2"));
+        assert_eq!((format_count(16.0).as_str(), format_count(16.25).as_str()), ("16", "16.2"));
     }
 }

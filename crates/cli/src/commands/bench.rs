@@ -12,11 +12,11 @@ use std::time::Duration;
 use self::outputs::BenchOutputs;
 use self::progress::BenchProgress;
 use crate::args::BenchArgs;
-use crate::bench::baseline::{changes, lines};
-use crate::bench::table::table;
+use crate::bench::baseline::{compare_runs, format_changes};
+use crate::bench::table::format_results;
 use crate::bench::{
-    self, BenchError, BenchEvent, BenchRequest, ReferenceSource, Results, StepSchedule, Toggles, Unfinished,
-    cache,
+    self, BenchError, BenchEvent, BenchRequest, ReferenceSource, Results, StepSchedule, Toggles,
+    UnfinishedBenchmark, cache,
 };
 use crate::console::Console;
 use crate::control::CancelToken;
@@ -26,7 +26,7 @@ use crate::pipeline::settings::Overrides;
 use crate::scene::diagnostic::Diagnostic;
 use crate::signals::{self, ReceivedSignal};
 use crate::system::priority;
-use crate::system::threads::start_failure;
+use crate::system::threads::describe_start_failure;
 
 /// Interval for checking signals.
 const TICK: Duration = Duration::from_millis(50);
@@ -38,40 +38,40 @@ pub(crate) fn run(args: &BenchArgs, console: &Console) -> Exit {
 /// Runs the benchmark and reports errors. `Err` contains the exit code.
 fn try_run(args: &BenchArgs, console: &Console) -> Result<Exit, Exit> {
     priority::lower_priority(args.nice);
-    let order = order(args, console)?;
+    let order = lower_args(args, console)?;
     let scenes = order.scenes.len();
-    let outputs = BenchOutputs::of(args, &order.scenes, console)?;
-    let baseline = outputs.baseline(console)?;
+    let outputs = BenchOutputs::check_args(args, &order.scenes, console)?;
+    let baseline = outputs.read_baseline(console)?;
     // The first signal stops measuring, the second stops writing results.
     let (token, writing) = (CancelToken::new(), CancelToken::new());
     let stop = [token.clone(), writing.clone()];
     let ended = signals::catch(move || stop[usize::from(stop[0].is_cancelled())].cancel())
-        .map_err(|error| console.fail(Exit::FAILED, &signals::failure(&error)))?;
+        .map_err(|error| console.fail(Exit::FAILED, &signals::describe_catch_failure(&error)))?;
     let mut progress = BenchProgress::new(args.progress, console);
-    let (news, work) = start(order, token.clone())
-        .map_err(|error| console.fail(Exit::FAILED, &start_failure("a thread", false, &error)))?;
-    follow(&news, &mut progress);
-    let results = work.join().unwrap_or_else(|_| Err(Box::new(panicked())));
-    progress.end();
+    let (news, work) = spawn_benchmark(order, token.clone())
+        .map_err(|error| console.fail(Exit::FAILED, &describe_start_failure("a thread", false, &error)))?;
+    report_events(&news, &mut progress);
+    let results = work.join().unwrap_or_else(|_| Err(Box::new(panic_result())));
+    progress.clear();
     match results {
         Ok(results) => {
             print_results(&results, baseline.as_ref(), console);
-            outputs.write(
+            outputs.write_all(
                 &results,
                 &progress,
                 console,
                 if token.is_cancelled() { &writing } else { &token },
             )?;
-            progress.done(&results);
-            Ok(ended.by().map_or(Exit::DONE, Exit::signal))
+            progress.report_done(&results);
+            Ok(ended.signal_number().map_or(Exit::DONE, Exit::signal))
         }
         Err(unfinished) => {
-            let Unfinished { error, done } = *unfinished;
+            let UnfinishedBenchmark { error, done } = *unfinished;
             // Nothing was measured if the arguments are invalid.
             if !done.scenes.is_empty() {
                 print_results(&done, baseline.as_ref(), console);
                 // Report files that cannot be written, but keep the exit code of the first error.
-                let _ = outputs.write(&done, &progress, console, &writing);
+                let _ = outputs.write_all(&done, &progress, console, &writing);
             }
             Err(report_unfinished(&error, &ended, (done.scenes.len(), scenes), &progress, console))
         }
@@ -80,18 +80,21 @@ fn try_run(args: &BenchArgs, console: &Console) -> Result<Exit, Exit> {
 
 /// Prints the tables, the plots and the comparison with the baseline.
 fn print_results(results: &Results, baseline: Option<&(String, Results)>, console: &Console) {
-    table(results).iter().for_each(|line| console.answer(line));
-    chart::show(results, console);
+    format_results(results).iter().for_each(|line| console.print_line(line));
+    chart::print_charts(results, console);
     if let Some((name, then)) = baseline {
-        lines(&changes(then, results), name).iter().for_each(|line| console.answer(line));
+        format_changes(&compare_runs(then, results), name).iter().for_each(|line| console.print_line(line));
     }
 }
 
 /// The measurement thread.
-type Worker = JoinHandle<Result<Results, Box<Unfinished>>>;
+type Worker = JoinHandle<Result<Results, Box<UnfinishedBenchmark>>>;
 
 /// Starts the benchmark on a thread and returns its events.
-fn start(order: BenchRequest, token: CancelToken) -> std::io::Result<(Receiver<BenchEvent>, Worker)> {
+fn spawn_benchmark(
+    order: BenchRequest,
+    token: CancelToken,
+) -> std::io::Result<(Receiver<BenchEvent>, Worker)> {
     let (sender, news) = mpsc::channel();
     let tell = move |one: BenchEvent| {
         // Ignore a front end that has exited.
@@ -103,7 +106,7 @@ fn start(order: BenchRequest, token: CancelToken) -> std::io::Result<(Receiver<B
 }
 
 /// Reports events until the thread ends.
-fn follow(news: &Receiver<BenchEvent>, progress: &mut BenchProgress) {
+fn report_events(news: &Receiver<BenchEvent>, progress: &mut BenchProgress) {
     loop {
         match news.recv_timeout(TICK) {
             Ok(one) => progress.handle(one),
@@ -114,12 +117,13 @@ fn follow(news: &Receiver<BenchEvent>, progress: &mut BenchProgress) {
 }
 
 /// The result after a panic. The panic has printed its own message.
-fn panicked() -> Unfinished {
+fn panic_result() -> UnfinishedBenchmark {
     let what = "internal error: the renderer panicked".to_owned();
-    Unfinished { error: BenchError::Failed(Failure::Work(what)), done: Results::default() }
+    UnfinishedBenchmark { error: BenchError::Failed(Failure::Work(what)), done: Results::default() }
 }
 
-/// Reports why the benchmark is unfinished. `scenes` is the number of measured scenes and of all scenes.
+/// Reports why the benchmark is unfinished. `scenes` contains the number of measured scenes and the total
+/// number.
 fn report_unfinished(
     error: &BenchError,
     ended: &ReceivedSignal,
@@ -127,10 +131,10 @@ fn report_unfinished(
     progress: &BenchProgress,
     console: &Console,
 ) -> Exit {
-    if let Some(number) = ended.by() {
-        if let Some(signal) = signals::name(number) {
+    if let Some(number) = ended.signal_number() {
+        if let Some(signal) = signals::signal_name(number) {
             let (done, all) = scenes;
-            progress.cancelled(&format!(
+            progress.report_cancelled(&format!(
                 "terminated by {signal} after {done} of {all} scenes; finished references are cached"
             ));
         }
@@ -139,34 +143,34 @@ fn report_unfinished(
     match error {
         BenchError::Failed(Failure::Scene(diagnostics)) => {
             if progress.is_text() {
-                console.diagnostics(diagnostics);
+                console.print_diagnostics(diagnostics);
             } else {
-                let messages: Vec<_> = diagnostics.iter().map(to_line).collect();
-                progress.failed("scene", &messages.join("; "));
+                let messages: Vec<_> = diagnostics.iter().map(format_diagnostic).collect();
+                progress.report_failure("scene", &messages.join("; "));
             }
             Exit::WRONG
         }
         BenchError::Failed(Failure::Work(message)) => {
-            progress.failed("work", &format!("error: {message}"));
+            progress.report_failure("work", &format!("error: {message}"));
             Exit::FAILED
         }
         BenchError::Call(message) => {
-            progress.failed("call", &format!("error: {message}"));
+            progress.report_failure("call", &format!("error: {message}"));
             Exit::WRONG
         }
         BenchError::Cancelled => Exit::FAILED,
     }
 }
 
-fn to_line(diagnostic: &Diagnostic) -> String {
+fn format_diagnostic(diagnostic: &Diagnostic) -> String {
     format!("{}: {}", diagnostic.path.display(), diagnostic.message)
 }
 
 /// Lowers the arguments.
-fn order(args: &BenchArgs, console: &Console) -> Result<BenchRequest, Exit> {
-    let folder = if args.no_cache { None } else { args.cache.clone().or_else(cache::folder) };
+fn lower_args(args: &BenchArgs, console: &Console) -> Result<BenchRequest, Exit> {
+    let folder = if args.no_cache { None } else { args.cache.clone().or_else(cache::cache_folder) };
     let scenes = if args.scenes.is_empty() {
-        vec![starter_scene(folder.as_deref(), console)?]
+        vec![write_starter(folder.as_deref(), console)?]
     } else {
         args.scenes.clone()
     };
@@ -175,7 +179,7 @@ fn order(args: &BenchArgs, console: &Console) -> Result<BenchRequest, Exit> {
     }
     let outputs = [&args.csv, &args.json, &args.plot];
     Ok(BenchRequest {
-        reference: reference(args, scenes.len(), console)?,
+        reference: reference_source(args, scenes.len(), console)?,
         scenes,
         common: Overrides {
             sets: args.sets.clone(),
@@ -193,7 +197,7 @@ fn order(args: &BenchArgs, console: &Console) -> Result<BenchRequest, Exit> {
             clamps: args.clamp.clone(),
             accels: args.accel.clone(),
         },
-        steps: steps(args),
+        steps: requested_steps(args),
         seeds: args.seeds,
         seed: args.seed,
         within: args.within,
@@ -203,7 +207,7 @@ fn order(args: &BenchArgs, console: &Console) -> Result<BenchRequest, Exit> {
 }
 
 /// The requested steps, sorted and without duplicates.
-fn steps(args: &BenchArgs) -> StepSchedule {
+fn requested_steps(args: &BenchArgs) -> StepSchedule {
     let (mut samples, mut seconds) = (args.samples.clone(), args.time.clone());
     samples.sort_unstable();
     samples.dedup();
@@ -216,7 +220,7 @@ fn steps(args: &BenchArgs) -> StepSchedule {
     }
 }
 
-fn reference(args: &BenchArgs, scenes: usize, console: &Console) -> Result<ReferenceSource, Exit> {
+fn reference_source(args: &BenchArgs, scenes: usize, console: &Console) -> Result<ReferenceSource, Exit> {
     match (args.reference.as_slice(), args.reference_samples) {
         ([], Some(samples)) => Ok(ReferenceSource::Samples(samples)),
         ([], None) => Ok(ReferenceSource::InTime),
@@ -228,8 +232,8 @@ fn reference(args: &BenchArgs, scenes: usize, console: &Console) -> Result<Refer
 }
 
 /// The scene that `glimt new` writes, stored with the cached references.
-fn starter_scene(folder: Option<&Path>, console: &Console) -> Result<PathBuf, Exit> {
-    match folder.map(cache::starter) {
+fn write_starter(folder: Option<&Path>, console: &Console) -> Result<PathBuf, Exit> {
+    match folder.map(cache::write_starter_scene) {
         Some(made) => made.map_err(|error| console.fail(Exit::FAILED, &error.to_string())),
         None => Err(console.fail(Exit::WRONG, "no scene given; see glimt bench --help")),
     }

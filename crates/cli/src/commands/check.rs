@@ -4,30 +4,30 @@ use std::path::Path;
 
 use serde_json::{Value, json};
 
-use crate::commands::info::instead_of_scene;
+use crate::commands::info::report_image_instead_of_scene;
 use crate::console::Console;
-use crate::diagnostic_json::diagnostic;
+use crate::diagnostic_json::diagnostic_to_json;
 use crate::exit::Exit;
 use crate::output::json::to_line;
 use crate::pipeline::protocol::Failure;
-use crate::pipeline::{Checked, check};
+use crate::pipeline::{SceneSummary, check};
 use crate::scene::report::Locator;
 
 pub(crate) fn run(scene: &Path, sets: &[String], is_json: bool, console: &Console) -> Exit {
     if is_json {
-        return in_json(scene, sets, console);
+        return check_as_json(scene, sets, console);
     }
-    if let Some(exit) = instead_of_scene(scene, false, console) {
+    if let Some(exit) = report_image_instead_of_scene(scene, false, console) {
         return exit;
     }
     match check(scene, sets) {
         Ok(checked) => {
-            console.diagnostics(&checked.warnings);
-            console.answer(&summary(scene, &checked));
+            console.print_diagnostics(&checked.warnings);
+            console.print_line(&format_summary(scene, &checked));
             Exit::DONE
         }
         Err(Failure::Scene(diagnostics)) => {
-            console.diagnostics(&diagnostics);
+            console.print_diagnostics(&diagnostics);
             Exit::WRONG
         }
         Err(Failure::Work(message)) => console.fail(Exit::FAILED, &message),
@@ -35,39 +35,39 @@ pub(crate) fn run(scene: &Path, sets: &[String], is_json: bool, console: &Consol
 }
 
 /// Reports the result as one JSON object on stdout.
-fn in_json(scene: &Path, sets: &[String], console: &Console) -> Exit {
+fn check_as_json(scene: &Path, sets: &[String], console: &Console) -> Exit {
     let (exit, diagnostics) = match check(scene, sets) {
         Ok(checked) => (Exit::DONE, checked.warnings),
         Err(Failure::Scene(diagnostics)) => (Exit::WRONG, diagnostics),
         Err(Failure::Work(message)) => return console.fail(Exit::FAILED, &message),
     };
     let mut places = Locator::default();
-    let all: Vec<Value> = diagnostics.iter().map(|one| diagnostic(one, &mut places)).collect();
+    let all: Vec<Value> = diagnostics.iter().map(|one| diagnostic_to_json(one, &mut places)).collect();
     let scene = scene.to_string_lossy();
     let report = json!({ "scene": scene, "ok": exit == Exit::DONE, "diagnostics": all });
     match to_line(&report) {
-        Ok(line) => console.text(&format!("{line}\n")),
+        Ok(line) => console.print_text(&format!("{line}\n")),
         Err(error) => return console.fail(Exit::FAILED, &format!("cannot write JSON: {error}")),
     }
     exit
 }
 
-fn summary(scene: &Path, checked: &Checked) -> String {
+fn format_summary(scene: &Path, checked: &SceneSummary) -> String {
     let parts = [
-        count(checked.objects, "object"),
-        count(checked.triangles, "triangle"),
-        count(checked.textures, "texture"),
-        count(checked.lights, "light"),
+        format_count(checked.objects, "object"),
+        format_count(checked.triangles, "triangle"),
+        format_count(checked.textures, "texture"),
+        format_count(checked.lights, "light"),
     ];
     let warnings = match checked.warnings.len() as u64 {
         0 => String::new(),
-        some => format!("; {}", count(some, "warning")),
+        some => format!("; {}", format_count(some, "warning")),
     };
     format!("ok: {}: {}{warnings}", scene.display(), parts.join(", "))
 }
 
 /// Formats a count with a singular or plural noun.
-pub(crate) fn count(number: u64, noun: &str) -> String {
+pub(crate) fn format_count(number: u64, noun: &str) -> String {
     format!("{number} {noun}{}", if number == 1 { "" } else { "s" })
 }
 
@@ -77,8 +77,8 @@ mod tests {
 
     #[test]
     fn summary_uses_singular_and_plural() {
-        let checked = Checked { objects: 1, triangles: 0, textures: 2, lights: 3, warnings: Vec::new() };
-        let text = summary(Path::new("a.toml"), &checked);
+        let checked = SceneSummary { objects: 1, triangles: 0, textures: 2, lights: 3, warnings: Vec::new() };
+        let text = format_summary(Path::new("a.toml"), &checked);
         assert_eq!(text, "ok: a.toml: 1 object, 0 triangles, 2 textures, 3 lights");
     }
 }

@@ -9,7 +9,7 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 use serde::Serialize;
 
 use crate::args::CompareArgs;
-use crate::compare::{self, Bias, Errors, Measured, PIXELS_PER_DEGREE, Pair};
+use crate::compare::{self, Bias, Errors, PIXELS_PER_DEGREE, Pair, PairMeasurements};
 use crate::console::Console;
 use crate::control::CancelToken;
 use crate::exit::Exit;
@@ -17,13 +17,13 @@ use crate::film::RadianceImage;
 use crate::output::part::is_part;
 use crate::output::write::{self, Guard};
 use crate::output::{self, EncodeOptions, FileIdentity, Format, Losses, OutputError, is_same_file};
-use crate::system::threads::start_failure;
+use crate::system::threads::describe_start_failure;
 use crate::tui::wrapped;
 
 pub(crate) fn run(args: &CompareArgs, console: &Console) -> Exit {
     match ThreadPoolBuilder::new().build() {
         Ok(pool) => run_in(&pool, args, console).unwrap_or_else(|exit| exit),
-        Err(error) => console.fail(Exit::FAILED, &start_failure("threads", false, &error)),
+        Err(error) => console.fail(Exit::FAILED, &describe_start_failure("threads", false, &error)),
     }
 }
 
@@ -31,34 +31,34 @@ pub(crate) fn run(args: &CompareArgs, console: &Console) -> Exit {
 fn run_in(pool: &ThreadPool, args: &CompareArgs, console: &Console) -> Result<Exit, Exit> {
     let diff = args.diff.as_deref().map(|path| ErrorImage::check(path, args, console)).transpose()?;
     let pair = Pair::load(&args.a, &args.b).map_err(|errors| {
-        errors.iter().for_each(|error| console.say(&format!("error: {error}")));
+        errors.iter().for_each(|error| console.print_message(&format!("error: {error}")));
         Exit::WRONG
     })?;
-    pair.warnings().iter().for_each(|warning| console.say(&format!("warning: {warning}")));
+    pair.warnings().iter().for_each(|warning| console.print_message(&format!("warning: {warning}")));
     warn_about_same_file(args, console);
     let measured = pool.install(|| compare::measure(&pair));
     let errors = &measured.errors;
     let bias = Bias::new(errors, [&args.a, &args.b].map(|path| output::mean_luminance_error(path)));
     let summary = Summary::new(args, &pair, errors, bias);
     if args.json {
-        say_json(&summary, console);
+        print_json(&summary, console);
     } else {
-        pictures::show(&pool.install(|| pictures::lines(args, &pair, &measured)), console);
-        say_table(&summary, console);
+        pictures::print_images(&pool.install(|| pictures::render_images(args, &pair, &measured)), console);
+        print_table(&summary, console);
     }
     if let Some(diff) = diff {
         let written = pool.install(|| diff.write(args, &pair, &measured));
         let lost = written.map_err(|error| console.fail(Exit::FAILED, &error.to_string()))?;
-        lost.iter().for_each(|what| console.say(&format!("warning: {what}")));
-        console.say(&format!("wrote {} ({})", diff.path.display(), diff.description()));
+        lost.iter().for_each(|what| console.print_message(&format!("warning: {what}")));
+        console.print_message(&format!("wrote {} ({})", diff.path.display(), diff.description()));
     }
-    Ok(judge(&summary, console))
+    Ok(compare_to_thresholds(&summary, console))
 }
 
-fn judge(summary: &Summary<'_>, console: &Console) -> Exit {
+fn compare_to_thresholds(summary: &Summary<'_>, console: &Console) -> Exit {
     match summary.max_relmse {
         Some(most) if !summary.is_within => {
-            let relmse = figure(summary.relmse);
+            let relmse = format_significant_digits(summary.relmse);
             console.fail(Exit::FAILED, &format!("relMSE {relmse} is above --max-relmse {most}"))
         }
         Some(_) | None => Exit::DONE,
@@ -74,7 +74,7 @@ fn warn_about_same_file(args: &CompareArgs, console: &Console) {
         } else {
             format!("{a} and {b} are the same file")
         };
-        console.say(&format!("warning: {which}, so the error is 0; pass an image and a reference"));
+        console.print_message(&format!("warning: {which}, so the error is 0; pass an image and a reference"));
     }
 }
 
@@ -109,15 +109,18 @@ impl<'a> ErrorImage<'a> {
         }
     }
 
-    /// Writes the image. Returns a warning if properties of the replaced file were lost.
+    /// Writes the image. Returns a warning if the replaced file's properties could not be kept.
     fn write(
         &self,
         args: &CompareArgs,
         pair: &Pair,
-        measured: &Measured,
+        measured: &PairMeasurements,
     ) -> Result<Option<String>, OutputError> {
-        let image: RadianceImage =
-            if self.is_float() { compare::absolute(pair) } else { compare::heat(pair, &measured.flip) };
+        let image: RadianceImage = if self.is_float() {
+            compare::absolute_difference(pair)
+        } else {
+            compare::flip_heat_map(pair, &measured.flip)
+        };
         let note = format!("{}; a: {}, b: {}", self.description(), args.a.display(), args.b.display());
         let options =
             EncodeOptions { metadata: vec![("Error".to_owned(), note)], ..EncodeOptions::default() };
@@ -206,23 +209,23 @@ impl<'a> Summary<'a> {
 }
 
 /// Prints the JSON object. Values that are not finite become null.
-fn say_json(summary: &Summary<'_>, console: &Console) {
+fn print_json(summary: &Summary<'_>, console: &Console) {
     match output::json::to_line(summary) {
-        Ok(text) => console.answer(&text),
-        Err(error) => console.say(&format!("error: {error}")),
+        Ok(text) => console.print_line(&text),
+        Err(error) => console.print_message(&format!("error: {error}")),
     }
 }
 
-fn say_table(summary: &Summary<'_>, console: &Console) {
-    table(summary, console.answer_columns()).iter().for_each(|line| console.answer(line));
+fn print_table(summary: &Summary<'_>, console: &Console) {
+    format_table(summary, console.answer_columns()).iter().for_each(|line| console.print_line(line));
 }
 
 /// The table's lines, wrapped to `columns`.
-fn table(summary: &Summary<'_>, columns: Option<usize>) -> Vec<String> {
+fn format_table(summary: &Summary<'_>, columns: Option<usize>) -> Vec<String> {
     let Summary { a, b, width, height, .. } = summary;
     let title = format!("{a} compared with reference {b}, {width}×{height} pixels");
-    let rows = rows(summary).into_iter().flat_map(|(name, value, unit, note)| {
-        row(&format!("{name:<16}{value:>12} {unit:<4}"), &note, columns)
+    let rows = table_rows(summary).into_iter().flat_map(|(name, value, unit, note)| {
+        format_row(&format!("{name:<16}{value:>12} {unit:<4}"), &note, columns)
     });
     let end = "Higher is better for PSNR and SSIM; lower for the rest.";
     let mut lines = wrap(&title, columns);
@@ -233,8 +236,8 @@ fn table(summary: &Summary<'_>, columns: Option<usize>) -> Vec<String> {
     lines
 }
 
-/// A row's values, with the description to the right, or below if there is no room.
-fn row(figures: &str, note: &str, columns: Option<usize>) -> Vec<String> {
+/// A row's values, followed by the description on the same line, or on the next line if it does not fit.
+fn format_row(figures: &str, note: &str, columns: Option<usize>) -> Vec<String> {
     /// Minimum width of a description.
     const MIN_NOTE_COLUMNS: usize = 24;
     const INDENT: usize = 4;
@@ -253,34 +256,39 @@ fn wrap(text: &str, columns: Option<usize>) -> Vec<String> {
     columns.map_or_else(|| vec![text.to_owned()], |columns| wrapped(text, columns))
 }
 
-/// A bias is reported as significant above this z. Noise alone exceeds it about once in two million
-/// comparisons.
+/// Minimum z-score of a significant bias. Noise alone exceeds it about once in two million comparisons.
 const SIGNIFICANT_Z: f64 = 5.0;
 
 /// Note on a significant bias.
 const SIGNIFICANT: &str = ": significant, not explained by noise";
 
 /// Name, value, unit and description of each row.
-fn rows(summary: &Summary<'_>) -> Vec<(&'static str, String, &'static str, String)> {
+fn table_rows(summary: &Summary<'_>) -> Vec<(&'static str, String, &'static str, String)> {
     let pixels = u64::from(summary.width) * u64::from(summary.height);
     let [x, y] = summary.max_at;
     let trimmed = format!("without the worst 0.1 %: {} of {pixels} pixels", summary.dropped_pixels);
     let place = if summary.max > 0.0 { format!(", at pixel ({x}, {y})") } else { String::new() };
     let flip = format!("clamped sRGB, {PIXELS_PER_DEGREE} pixels per degree; mean, 0 to 1");
     let mut rows = vec![
-        ("RMSE", figure(summary.rmse), "", "linear".to_owned()),
-        ("relMSE", figure(summary.relmse), "", "linear: mean of (a - b)²/(b² + 0.01)".to_owned()),
-        ("relMSE, trimmed", figure(summary.relmse_trimmed), "", trimmed),
-        ("max |a - b|", figure(summary.max), "", format!("linear{place}")),
-        ("PSNR", decibels(summary.psnr_db), "dB", "clamped sRGB".to_owned()),
+        ("RMSE", format_significant_digits(summary.rmse), "", "linear".to_owned()),
+        (
+            "relMSE",
+            format_significant_digits(summary.relmse),
+            "",
+            "linear: mean of (a - b)²/(b² + 0.01)".to_owned(),
+        ),
+        ("relMSE, trimmed", format_significant_digits(summary.relmse_trimmed), "", trimmed),
+        ("max |a - b|", format_significant_digits(summary.max), "", format!("linear{place}")),
+        ("PSNR", format_decibels(summary.psnr_db), "dB", "clamped sRGB".to_owned()),
         ("SSIM", format!("{:.6}", summary.ssim), "", "luma of clamped sRGB".to_owned()),
-        ("FLIP", figure(summary.flip), "", flip),
+        ("FLIP", format_significant_digits(summary.flip), "", flip),
     ];
     if let Some(bias) = summary.bias {
-        let noise = summary
-            .bias_standard_error
-            .map_or_else(|| "noise unknown".to_owned(), |error| format!("standard error {}", figure(error)));
-        rows.push(("bias", signed(bias), "", format!("linear: mean(a - b)/mean(b); {noise}")));
+        let noise = summary.bias_standard_error.map_or_else(
+            || "noise unknown".to_owned(),
+            |error| format!("standard error {}", format_significant_digits(error)),
+        );
+        rows.push(("bias", format_signed(bias), "", format!("linear: mean(a - b)/mean(b); {noise}")));
     }
     if let Some(z) = summary.bias_z {
         let verdict = if z.abs() > SIGNIFICANT_Z { SIGNIFICANT } else { "" };
@@ -289,13 +297,13 @@ fn rows(summary: &Summary<'_>) -> Vec<(&'static str, String, &'static str, Strin
     rows
 }
 
-fn signed(value: f64) -> String {
+fn format_signed(value: f64) -> String {
     let sign = if value < 0.0 { "-" } else { "" };
-    format!("{sign}{}", figure(value.abs()))
+    format!("{sign}{}", format_significant_digits(value.abs()))
 }
 
 /// Formats six significant digits.
-fn figure(value: f64) -> String {
+fn format_significant_digits(value: f64) -> String {
     let is_short = (1e-4..1e6).contains(&value);
     let decimals = if is_short { (5.0 - libm::log10(value).floor()).max(0.0) as usize } else { 5 };
     match value {
@@ -305,7 +313,7 @@ fn figure(value: f64) -> String {
     }
 }
 
-fn decibels(value: f64) -> String {
+fn format_decibels(value: f64) -> String {
     if value.is_finite() { format!("{value:.4}") } else { "∞".to_owned() }
 }
 
@@ -341,10 +349,10 @@ mod tests {
         let summary = summary();
         let words =
             |lines: &[String]| lines.join(" ").split_whitespace().map(str::to_owned).collect::<Vec<_>>();
-        let whole = table(&summary, None);
+        let whole = format_table(&summary, None);
         assert!(whole.iter().any(|line| line.contains("0.1 %: 64 of 65536 pixels")), "{whole:?}");
         for columns in [200, 120, 80, 60, 50, 40] {
-            let lines = table(&summary, Some(columns));
+            let lines = format_table(&summary, Some(columns));
             let widest = lines.iter().map(|line| line.chars().count()).max();
             assert!(widest.is_some_and(|widest| widest <= columns), "{columns}: {lines:#?}");
             assert_eq!(words(&lines), words(&whole), "{columns}");
@@ -354,7 +362,7 @@ mod tests {
     #[test]
     fn only_large_z_is_significant() {
         for (z, is_far) in [(0.5, false), (-3.5, false), (5.5, true), (-40.0, true)] {
-            let lines = table(&Summary { bias_z: Some(z), ..summary() }, None);
+            let lines = format_table(&Summary { bias_z: Some(z), ..summary() }, None);
             let line = lines.iter().find(|line| line.contains("bias, z")).expect("a line");
             assert_eq!(line.contains(SIGNIFICANT), is_far, "{line}");
         }
@@ -374,9 +382,9 @@ mod tests {
             (5e30, "5.00000e30"),
         ];
         for (value, text) in cases {
-            assert_eq!(figure(value), text);
+            assert_eq!(format_significant_digits(value), text);
         }
-        assert_eq!(decibels(f64::INFINITY), "∞");
-        assert_eq!(decibels(31.25), "31.2500");
+        assert_eq!(format_decibels(f64::INFINITY), "∞");
+        assert_eq!(format_decibels(31.25), "31.2500");
     }
 }

@@ -1,4 +1,4 @@
-//! `glimt completions`: shell completion scripts, and the calls they make.
+//! `glimt completions`: prints shell completion scripts and answers their calls.
 //!
 //! The scripts call glimt for every completion, because tables, names and keys depend on the scene on the
 //! command line.
@@ -12,8 +12,8 @@ use clap::CommandFactory;
 use clap_complete::CompleteEnv;
 use clap_complete::env::{Elvish, EnvCompleter, Fish, Shells, Zsh};
 
-use self::bash::Bash;
-use self::powershell::Powershell;
+use self::bash::BashCompleter;
+use self::powershell::PowershellCompleter;
 
 use crate::args::{Args, Shell};
 use crate::console::Console;
@@ -53,19 +53,19 @@ fi
 /// Prints the script for a shell.
 pub(crate) fn run(shell: Shell, console: &Console) -> Exit {
     let completer: &dyn EnvCompleter = match shell {
-        Shell::Bash => &Bash,
+        Shell::Bash => &BashCompleter,
         Shell::Zsh => {
-            console.text(ZSH);
+            console.print_text(ZSH);
             return Exit::DONE;
         }
         Shell::Fish => &Fish,
-        Shell::Powershell => &Powershell,
+        Shell::Powershell => &PowershellCompleter,
         Shell::Elvish => &Elvish,
     };
     let mut script = Vec::new();
     match completer.write_registration(VARIABLE, "glimt", "glimt", "glimt", &mut script) {
         Ok(()) => {
-            console.text(&String::from_utf8_lossy(&script));
+            console.print_text(&String::from_utf8_lossy(&script));
             Exit::DONE
         }
         Err(error) => console.fail(Exit::FAILED, &format!("cannot create the script: {error}")),
@@ -73,10 +73,10 @@ pub(crate) fn run(shell: Shell, console: &Console) -> Exit {
 }
 
 /// Responds to a call from a completion script. `None` for any other call.
-pub(crate) fn answer(arguments: &[OsString]) -> Option<Exit> {
+pub(crate) fn answer_completion_request(arguments: &[OsString]) -> Option<Exit> {
     std::env::var_os(VARIABLE)?;
     let folder = std::env::current_dir().ok();
-    let shells = Shells(&[&Bash, &Elvish, &Fish, &Powershell, &Zsh]);
+    let shells = Shells(&[&BashCompleter, &Elvish, &Fish, &PowershellCompleter, &Zsh]);
     let complete = CompleteEnv::with_factory(Args::command).var(VARIABLE).shells(shells);
     let complete = complete.bin("glimt").completer("glimt");
     match complete.try_complete(arguments, folder.as_deref()) {

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use crate::accel::wide_bvh::InstructionSet;
 use crate::bench::cache;
-use crate::commands::check::count;
+use crate::commands::check::format_count;
 use crate::console::Console;
 use crate::exit::Exit;
 use crate::system::folder::names;
@@ -14,36 +14,36 @@ use crate::tui::{self, ColorDepth, Probe, ProbeReplies, probe};
 /// Prints one line per finding.
 pub(crate) fn run(console: &Console) -> Exit {
     let mut lines = vec![("glimt", format!("{}, {}-{}", crate::pipeline::BUILD, ARCH, OS))];
-    lines.extend([("processor", processor()), ("threads", threads())]);
+    lines.extend([("processor", describe_processor()), ("threads", describe_threads())]);
     match probe() {
-        Some(probe) => lines.extend(terminal(&probe)),
+        Some(probe) => lines.extend(describe_terminal(&probe)),
         None => lines.push(("terminal", "none (not a tty); use --once".to_owned())),
     }
-    lines.extend([("editor", editor()), ("cache", cache_folder())]);
+    lines.extend([("editor", describe_editor()), ("cache", cache_folder())]);
     for (name, finding) in lines {
-        console.answer(&format!("{name:<12}{finding}"));
+        console.print_line(&format!("{name:<12}{finding}"));
     }
     Exit::DONE
 }
 
-fn variable(name: &str) -> Option<String> {
+fn environment_variable(name: &str) -> Option<String> {
     std::env::var(name).ok().filter(|value| !value.is_empty())
 }
 
-fn processor() -> String {
+fn describe_processor() -> String {
     let words = |instructions| match instructions {
         InstructionSet::Portable => "no supported SIMD instructions",
         InstructionSet::Avx2 => "AVX2",
         InstructionSet::Avx512 => "AVX-512",
     };
     let (used, best) = (InstructionSet::best(), InstructionSet::Avx512.available());
-    match variable("GLIMT_SIMD") {
+    match environment_variable("GLIMT_SIMD") {
         Some(asked) => format!("{} (GLIMT_SIMD={asked}); available: {}", words(used), words(best)),
         None => words(used).to_owned(),
     }
 }
 
-fn threads() -> String {
+fn describe_threads() -> String {
     match std::thread::available_parallelism() {
         Ok(threads) => format!("{threads}, the default for renders"),
         Err(error) => format!("unknown ({error}); the default is 1"),
@@ -51,8 +51,8 @@ fn threads() -> String {
 }
 
 /// Lines about the terminal.
-fn terminal(probe: &Probe) -> Vec<(&'static str, String)> {
-    let term = variable("TERM").unwrap_or_else(|| "TERM is not set".to_owned());
+fn describe_terminal(probe: &Probe) -> Vec<(&'static str, String)> {
+    let term = environment_variable("TERM").unwrap_or_else(|| "TERM is not set".to_owned());
     let name = probe.answers.as_ref().and_then(|answers| answers.name.clone());
     let ((columns, rows), (width, height)) = (probe.cells, probe.cell_pixels);
     let size = match (columns, rows) {
@@ -66,12 +66,16 @@ fn terminal(probe: &Probe) -> Vec<(&'static str, String)> {
         (false, false) => "",
     };
     let terminal = format!("{}, {size}{way}", name.map_or(term.clone(), |name| format!("{name} ({term})")));
-    let mut lines = vec![("terminal", terminal), ("colors", colors(probe)), ("preview", preview(probe))];
-    lines.push(("round trip", round_trip(probe.answers.as_ref())));
+    let mut lines = vec![
+        ("terminal", terminal),
+        ("colors", describe_colors(probe)),
+        ("preview", describe_preview(probe)),
+    ];
+    lines.push(("round trip", describe_round_trip(probe.answers.as_ref())));
     lines
 }
 
-fn colors(probe: &Probe) -> String {
+fn describe_colors(probe: &Probe) -> String {
     let depth = match probe.depth {
         ColorDepth::TrueColor => "24 bits",
         ColorDepth::Indexed256 => "256",
@@ -87,7 +91,7 @@ fn colors(probe: &Probe) -> String {
     format!("{depth} according to the environment{asked}{background}")
 }
 
-fn preview(probe: &Probe) -> String {
+fn describe_preview(probe: &Probe) -> String {
     let protocol = |name, is_there| if is_there { Some(name) } else { None };
     let answers = probe.answers.clone().unwrap_or_default();
     let pixels = [
@@ -103,13 +107,13 @@ fn preview(probe: &Probe) -> String {
     format!("{}; {more}", probe.preview())
 }
 
-fn round_trip(answers: Option<&ProbeReplies>) -> String {
+fn describe_round_trip(answers: Option<&ProbeReplies>) -> String {
     let Some(answers) = answers else { return "the terminal does not respond".to_owned() };
     let whole = if answers.is_synchronized { "; synchronized output" } else { "" };
     format!("{:.1} ms{whole}", answers.round_trip.as_secs_f64() * 1e3)
 }
 
-fn editor() -> String {
+fn describe_editor() -> String {
     match tui::editor(|name| std::env::var(name).ok()) {
         (editor, Some(variable)) => format!("{editor} (from {variable})"),
         (editor, None) => format!("{editor} (neither VISUAL nor EDITOR is set)"),
@@ -117,7 +121,7 @@ fn editor() -> String {
 }
 
 fn cache_folder() -> String {
-    let Some(folder) = cache::folder() else {
+    let Some(folder) = cache::cache_folder() else {
         return "none (neither XDG_CACHE_HOME nor HOME is set)".to_owned();
     };
     let name = folder.display();
@@ -126,13 +130,13 @@ fn cache_folder() -> String {
             let sizes: Vec<u64> =
                 names.filter_map(|name| Some(folder.join(name).symlink_metadata().ok()?.len())).collect();
             let bytes = sizes.iter().sum::<u64>();
-            format!("{name}: {}, {:.1} MB", count(sizes.len() as u64, "file"), bytes as f64 / 1e6)
+            format!("{name}: {}, {:.1} MB", format_count(sizes.len() as u64, "file"), bytes as f64 / 1e6)
         }
-        Err(_) if !exists(&folder) => format!("{name}: does not exist yet; created by `bench`"),
+        Err(_) if !path_exists(&folder) => format!("{name}: does not exist yet; created by `bench`"),
         Err(error) => format!("{name}: cannot be read: {error}"),
     }
 }
 
-fn exists(folder: &Path) -> bool {
+fn path_exists(folder: &Path) -> bool {
     folder.symlink_metadata().is_ok()
 }

@@ -4,7 +4,7 @@ use crate::console::{Console, answer_columns};
 use crate::exit::Exit;
 use crate::scene::keys::key::{Default, KeyInfo, TableInfo, TypeInfo, ValueKind};
 use crate::scene::keys::{paths, table, tables};
-use crate::scene::nearest::{meant, nearest};
+use crate::scene::nearest::{nearest, translate_foreign_name};
 use crate::scene::sanitize::shortened;
 use crate::tui::wrapped;
 
@@ -12,14 +12,14 @@ use crate::tui::wrapped;
 pub(crate) fn run(path: Option<&str>, console: &Console) -> Exit {
     let text = match path {
         None => Some(overview()),
-        Some(path) => explained(path.trim_matches(['[', ']'])),
+        Some(path) => explain_path(path.trim_matches(['[', ']'])),
     };
     match text {
         Some(text) => {
-            console.text(&wrap_indented(&text, answer_columns()));
+            console.print_text(&wrap_indented(&text, answer_columns()));
             Exit::DONE
         }
-        None => console.fail(Exit::WRONG, &unknown(path.unwrap_or_default())),
+        None => console.fail(Exit::WRONG, &unknown_path_message(path.unwrap_or_default())),
     }
 }
 
@@ -49,12 +49,12 @@ fn has_type(table: &TableInfo, name: &str) -> bool {
 }
 
 fn overview() -> String {
-    let line = |table: &TableInfo| format!("{:<20}{}\n", table.head(), plain(table.doc));
+    let line = |table: &TableInfo| format!("{:<20}{}\n", table.head(), without_backticks(table.doc));
     tables().iter().map(line).collect()
 }
 
 /// Describes a path. `None` if it does not exist.
-fn explained(path: &str) -> Option<String> {
+fn explain_path(path: &str) -> Option<String> {
     let parts: Vec<&str> = path.split('.').collect();
     let found = |all: Vec<(String, &KeyInfo)>| match all.as_slice() {
         [] => None,
@@ -80,15 +80,15 @@ fn explained(path: &str) -> Option<String> {
                 return Some(type_details(table, kind));
             }
             if *second == "type" && !table.types.is_empty() {
-                return Some(types(table));
+                return Some(format_type_list(table));
             }
-            found(keys_of(table).filter(|(_, key)| key.name == *second).collect())
+            found(keys_of_table(table).filter(|(_, key)| key.name == *second).collect())
         }
         [name, second, third] => {
             let table = table(name)?;
             let kind = table.type_of(Some(second))?;
             if *third == "type" {
-                return Some(types(table));
+                return Some(format_type_list(table));
             }
             let path = format!("{}.{}", table.name, kind.name);
             found(
@@ -105,10 +105,10 @@ fn explained(path: &str) -> Option<String> {
 
 /// All keys with their full paths, such as `TABLE.TYPE.KEY`.
 fn all_keys() -> impl Iterator<Item = (String, &'static KeyInfo)> {
-    tables().iter().flat_map(keys_of)
+    tables().iter().flat_map(keys_of_table)
 }
 
-fn keys_of(table: &'static TableInfo) -> impl Iterator<Item = (String, &'static KeyInfo)> {
+fn keys_of_table(table: &'static TableInfo) -> impl Iterator<Item = (String, &'static KeyInfo)> {
     let own = table.types.iter().flat_map(move |kind| {
         kind.keys.iter().map(move |key| (format!("{}.{}.{}", table.name, kind.name, key.name), key))
     });
@@ -123,14 +123,14 @@ fn key_details(path: &str, key: &KeyInfo) -> String {
             text.push_str(&format!("    {name:<9}{value}\n"));
         }
     };
-    row("type", plain(&key.kind()));
+    row("type", without_backticks(&key.kind()));
     row("unit", key.unit.to_owned());
     row("range", key.range());
     row(
         "default",
         match key.default {
             Default::Required(_) => "required".to_owned(),
-            Default::Is(_) | Default::By(_) | Default::Absent => plain(&key.default_words()),
+            Default::Is(_) | Default::By(_) | Default::Absent => without_backticks(&key.default_words()),
         },
     );
     row("example", format!("{} = {}", key.name, key.example()));
@@ -143,14 +143,14 @@ fn key_details(path: &str, key: &KeyInfo) -> String {
     text
 }
 
-/// Describes one of several keys, with type, unit, range and default on one line and the description below.
+/// Describes one of several keys on two lines: type, unit, range and default, followed by the description.
 fn key_summary(path: &str, key: &KeyInfo) -> String {
     let default = match key.default {
         Default::Required(_) => "required".to_owned(),
-        Default::Is(_) | Default::By(_) => format!("default {}", plain(&key.default_words())),
+        Default::Is(_) | Default::By(_) => format!("default {}", without_backticks(&key.default_words())),
         Default::Absent => String::new(),
     };
-    let facts = [plain(&key.kind()), key.unit.to_owned(), key.range(), default];
+    let facts = [without_backticks(&key.kind()), key.unit.to_owned(), key.range(), default];
     let facts: Vec<String> = facts.into_iter().filter(|fact| !fact.is_empty()).collect();
     format!("{path}: {}\n    {}\n", facts.join("; "), sentence(key.doc))
 }
@@ -158,14 +158,15 @@ fn key_summary(path: &str, key: &KeyInfo) -> String {
 /// Describes a table, with one line per type and key.
 fn table_details(table: &'static TableInfo) -> String {
     let head = format!("{}\n    {}\n\n", table.head(), sentence(table.doc));
-    let types = if table.types.is_empty() { String::new() } else { format!("{}\n", types(table)) };
-    format!("{head}{types}{}", list(table.keys.iter()))
+    let types = if table.types.is_empty() { String::new() } else { format!("{}\n", format_type_list(table)) };
+    format!("{head}{types}{}", format_key_list(table.keys.iter()))
 }
 
-fn types(table: &TableInfo) -> String {
+fn format_type_list(table: &TableInfo) -> String {
     let default = table.types.first().map_or("", |kind| kind.name);
-    let line =
-        |kind: &TypeInfo| format!("    type = {:<15}{}\n", format!("\"{}\"", kind.name), plain(kind.doc));
+    let line = |kind: &TypeInfo| {
+        format!("    type = {:<15}{}\n", format!("\"{}\"", kind.name), without_backticks(kind.doc))
+    };
     let lines: String = table.types.iter().map(line).collect();
     format!("{lines}    the default is \"{default}\"\n")
 }
@@ -173,24 +174,24 @@ fn types(table: &TableInfo) -> String {
 /// Describes a type, with one line for each of its keys and each common key.
 fn type_details(table: &'static TableInfo, kind: &'static TypeInfo) -> String {
     let head = format!("{}, type = \"{}\"\n    {}\n\n", table.head(), kind.name, sentence(kind.doc));
-    format!("{head}{}", list(table.keys_of(Some(kind))))
+    format!("{head}{}", format_key_list(table.keys_of(Some(kind))))
 }
 
-fn list(keys: impl Iterator<Item = &'static KeyInfo>) -> String {
-    keys.map(|key| format!("    {:<22}{}\n", key.name, plain(key.doc))).collect()
+fn format_key_list(keys: impl Iterator<Item = &'static KeyInfo>) -> String {
+    keys.map(|key| format!("    {:<22}{}\n", key.name, without_backticks(key.doc))).collect()
 }
 
 /// Removes Markdown backticks.
-fn plain(text: &str) -> String {
+fn without_backticks(text: &str) -> String {
     text.replace('`', "")
 }
 
 fn sentence(text: &str) -> String {
-    format!("{}.", plain(text))
+    format!("{}.", without_backticks(text))
 }
 
 /// Error message for an unknown path, with a suggestion.
-fn unknown(path: &str) -> String {
+fn unknown_path_message(path: &str) -> String {
     let shown = shortened(path, 60);
     let all = paths();
     let names: Vec<&str> = all.iter().map(|(path, _)| path.as_str()).collect();
@@ -202,11 +203,13 @@ fn unknown(path: &str) -> String {
         names.iter().copied().filter(|name| name.split('.').next() == Some(first)).collect();
     let ends: Vec<&str> = in_table.iter().filter_map(|name| name.rsplit('.').next()).collect();
     let near_end = || {
-        meant(last, &ends)
+        translate_foreign_name(last, &ends)
             .and_then(|end| in_table.iter().copied().find(|name| name.ends_with(&format!(".{end}"))))
     };
     let keys: Vec<&str> = names.iter().filter_map(|name| name.rsplit('.').next()).collect();
-    let near = nearest(path, names.iter().copied()).or_else(near_end).or_else(|| meant(last, &keys));
+    let near = nearest(path, names.iter().copied())
+        .or_else(near_end)
+        .or_else(|| translate_foreign_name(last, &keys));
     match near {
         Some(near) => format!("unknown key {shown:?}; did you mean `{near}`?"),
         None => format!("unknown key {shown:?}; `glimt explain` lists all tables"),
@@ -219,25 +222,25 @@ mod tests {
 
     #[test]
     fn keys_are_found_by_partial_paths() {
-        let text = explained("materials.metal.roughness").expect("a key");
+        let text = explain_path("materials.metal.roughness").expect("a key");
         for part in ["0 … 1", "default  0.2", "number or texture", "roughness = 0.2"] {
             assert!(text.contains(part), "{part}: {text}");
         }
-        let all = explained("materials.roughness").expect("keys");
+        let all = explain_path("materials.roughness").expect("keys");
         assert!(
             ["glass", "metal", "plastic", "principled"]
                 .iter()
                 .all(|kind| all.contains(&format!("materials.{kind}.roughness")))
         );
-        assert!(explained("roughness").is_some_and(|alone| alone == all));
-        assert!(explained("materials.metal.emission").is_some_and(|text| text.contains("radiance")));
-        assert!(explained("render.integrator").is_some_and(|text| text.contains("\"path\"")));
-        assert!(explained("materials.type").is_some_and(|text| text.contains("type = \"glass\"")));
+        assert!(explain_path("roughness").is_some_and(|alone| alone == all));
+        assert!(explain_path("materials.metal.emission").is_some_and(|text| text.contains("radiance")));
+        assert!(explain_path("render.integrator").is_some_and(|text| text.contains("\"path\"")));
+        assert!(explain_path("materials.type").is_some_and(|text| text.contains("type = \"glass\"")));
     }
 
     #[test]
     fn ambiguous_keys_are_summarized_in_two_lines() {
-        let text = explained("radius").expect("keys");
+        let text = explain_path("radius").expect("keys");
         assert!(text.starts_with("photons.radius: number; length; 0 …; default 0.0\n    Kernel"), "{text}");
         assert!(text.contains("\nsphere.radius: number; length; > 0; required\n"), "{text}");
         assert!(text.lines().count() < 20 && text.ends_with(": glimt explain photons.radius\n"), "{text}");
@@ -251,7 +254,7 @@ mod tests {
         assert_eq!(wrap_indented(text, 34), expected);
         assert_eq!(wrap_indented(text, 10), text, "too narrow to wrap");
         for (path, _) in paths() {
-            let text = wrap_indented(&explained(&path).unwrap_or_default(), 80);
+            let text = wrap_indented(&explain_path(&path).unwrap_or_default(), 80);
             let broken: Vec<&str> = text.lines().filter(|line| line.chars().count() > 80).collect();
             assert!(broken.is_empty(), "{broken:?}");
         }
@@ -260,13 +263,13 @@ mod tests {
     #[test]
     fn every_path_is_explained() {
         for (path, doc) in paths() {
-            let text = explained(&path).unwrap_or_default();
-            assert!(text.contains(&plain(doc)), "{path}: {text}");
+            let text = explain_path(&path).unwrap_or_default();
+            assert!(text.contains(&without_backticks(doc)), "{path}: {text}");
         }
-        assert!(explained("phong").is_some_and(|text| text.contains("shininess")));
-        assert_eq!(explained("materials.metal.type"), explained("materials.type"));
-        assert_eq!(explained("nothing"), None);
-        assert_eq!(explained("materials.gold.roughness"), None);
+        assert!(explain_path("phong").is_some_and(|text| text.contains("shininess")));
+        assert_eq!(explain_path("materials.metal.type"), explain_path("materials.type"));
+        assert_eq!(explain_path("nothing"), None);
+        assert_eq!(explain_path("materials.gold.roughness"), None);
     }
 
     #[test]
@@ -278,7 +281,11 @@ mod tests {
             ("sampels", "samples"),
             ("camera.target", "camera.look_at"),
         ] {
-            assert!(unknown(wrong).contains(&format!("`{near}`")), "{}", unknown(wrong));
+            assert!(
+                unknown_path_message(wrong).contains(&format!("`{near}`")),
+                "{}",
+                unknown_path_message(wrong)
+            );
         }
     }
 }

@@ -8,7 +8,7 @@ use crate::args::{Args, FarmArgs, RenderArgs, Scheduler, Switch};
 use crate::console::Console;
 use crate::exit::Exit;
 use crate::output::Format;
-use crate::pipeline::memory_needed;
+use crate::pipeline::estimate_memory;
 use crate::pipeline::protocol::Failure;
 use crate::system::text::is_plain;
 
@@ -30,10 +30,10 @@ pub(crate) fn run(args: &FarmArgs, console: &Console) -> Exit {
         Ok(options) => options,
         Err(message) => return console.fail(Exit::WRONG, &format!("after `--`: {message}")),
     };
-    console.text(&match args.engine {
-        Scheduler::Slurm => slurm(args),
-        Scheduler::Parallel => parallel(args),
-        Scheduler::Kubernetes => kubernetes(args, memory(args, &options, console)),
+    console.print_text(&match args.engine {
+        Scheduler::Slurm => slurm_script(args),
+        Scheduler::Parallel => parallel_script(args),
+        Scheduler::Kubernetes => kubernetes_manifest(args, memory_request(args, &options, console)),
     });
     Exit::DONE
 }
@@ -46,16 +46,16 @@ fn is_plain_word(word: &str) -> bool {
 /// Parses the render options.
 ///
 /// # Errors
-/// An option is invalid, or cannot be the same for all parts.
+/// An option is invalid, or must not be the same for all parts.
 fn check_options(args: &FarmArgs) -> Result<RenderArgs, String> {
-    let (program, scene) = ("glimt".to_owned(), file(&args.scene));
+    let (program, scene) = ("glimt".to_owned(), format_path_argument(&args.scene));
     let words = [program, scene].into_iter().chain(args.options.iter().cloned());
     let render = match Args::try_parse_from(words) {
         Ok(Args { command: None, render }) => render,
         Ok(Args { command: Some(_), .. }) => {
             return Err("expected render options, not a command".to_owned());
         }
-        Err(error) => return Err(message_of(&error)),
+        Err(error) => return Err(error_without_usage(&error)),
     };
     let photons_by_error =
         render.photons == Some(Switch::On) && render.error.is_some_and(|error| error > 0.0);
@@ -74,30 +74,30 @@ fn check_options(args: &FarmArgs) -> Result<RenderArgs, String> {
     }
 }
 
-/// Assumed thread count without `--threads`, because a node may have more processors than this machine.
+/// Thread count assumed if `--threads` is not given. A node may have more processors than this machine.
 const NODE_THREADS: usize = 64;
 
 /// A container's memory request in MiB: the estimate for one part plus 25 %. Prints a warning and returns
 /// `None` if the scene cannot be read.
-fn memory(args: &FarmArgs, options: &RenderArgs, console: &Console) -> Option<u64> {
+fn memory_request(args: &FarmArgs, options: &RenderArgs, console: &Console) -> Option<u64> {
     let mut overrides = options.overrides();
     (overrides.shard, overrides.outputs) = (Some((1, args.shards)), vec![args.output.clone()]);
     // The nodes may have more processors than this machine.
     overrides.threads = overrides.threads.filter(|count| *count > 0).or(Some(NODE_THREADS));
-    let why = match memory_needed(&args.scene, &overrides) {
+    let why = match estimate_memory(&args.scene, &overrides) {
         Ok(bytes) => return Some((bytes + bytes / 4).div_ceil(1 << 20)),
         Err(Failure::Work(why)) => why,
         Err(Failure::Scene(diagnostics)) => {
-            console.diagnostics(&diagnostics);
+            console.print_diagnostics(&diagnostics);
             "the scene has errors".to_owned()
         }
     };
-    console.say(&format!("warning: the jobs have no memory request: {why}"));
+    console.print_message(&format!("warning: the jobs have no memory request: {why}"));
     None
 }
 
 /// A clap error's message without the usage.
-fn message_of(error: &clap::Error) -> String {
+fn error_without_usage(error: &clap::Error) -> String {
     if !error.use_stderr() {
         return "expected render options, not --help or --version".to_owned();
     }
@@ -107,42 +107,46 @@ fn message_of(error: &clap::Error) -> String {
 }
 
 /// Quotes a word for a shell.
-fn word(text: &str) -> String {
+fn quote_word(text: &str) -> String {
     shlex::try_quote(text).map_or_else(|_| text.to_owned(), |quoted| quoted.into_owned())
 }
 
-/// Formats a path such that glimt does not mistake it for an option or a command.
-fn file(path: &Path) -> String {
+/// Formats a path so that glimt does not mistake it for an option or a command.
+fn format_path_argument(path: &Path) -> String {
     let text = path.to_string_lossy();
     let is_bare = text.starts_with('-') || !text.contains(['/', '.']);
     if is_bare { format!("./{text}") } else { text.into_owned() }
 }
 
 /// The command that renders one part. `index` is a shell expression for the part's number.
-fn render(args: &FarmArgs, index: &str) -> String {
-    let (scene, part) = (word(&file(&args.scene)), part(args, index));
-    let options: String = args.options.iter().map(|option| format!(" {}", word(option))).collect();
+fn render_command(args: &FarmArgs, index: &str) -> String {
+    let (scene, part) = (quote_word(&format_path_argument(&args.scene)), part_file_name(args, index));
+    let options: String = args.options.iter().map(|option| format!(" {}", quote_word(option))).collect();
     format!("glimt {scene} --once -o {part} --shard {index}/{} --resume{options}", args.shards)
 }
 
 /// The file name of one part, quoted for the shell.
-fn part(args: &FarmArgs, index: &str) -> String {
-    format!("{}.{index}.part", word(&file(&args.output)))
+fn part_file_name(args: &FarmArgs, index: &str) -> String {
+    format!("{}.{index}.part", quote_word(&format_path_argument(&args.output)))
 }
 
 /// The command that merges the parts. It lists the parts with `seq`.
-fn merge(args: &FarmArgs, options: &str) -> String {
-    let (out, count) = (word(&file(&args.output)), args.shards);
-    format!("seq -f {}.%.0f.part {count} | xargs -d '\\n' glimt merge {options}{out}", word(&escaped(args)))
+fn merge_command(args: &FarmArgs, options: &str) -> String {
+    let (out, count) = (quote_word(&format_path_argument(&args.output)), args.shards);
+    format!(
+        "seq -f {}.%.0f.part {count} | xargs -d '\\n' glimt merge {options}{out}",
+        quote_word(&escape_output_for_seq(args))
+    )
 }
 
 /// The output path, escaped for `seq`'s format string.
-fn escaped(args: &FarmArgs) -> String {
-    file(&args.output).replace('%', "%%")
+fn escape_output_for_seq(args: &FarmArgs) -> String {
+    format_path_argument(&args.output).replace('%', "%%")
 }
 
-fn slurm(args: &FarmArgs) -> String {
-    let (count, render, merge) = (args.shards, render(args, "$SLURM_ARRAY_TASK_ID"), merge(args, ""));
+fn slurm_script(args: &FarmArgs) -> String {
+    let (count, render, merge) =
+        (args.shards, render_command(args, "$SLURM_ARRAY_TASK_ID"), merge_command(args, ""));
     format!(
         "\
 #!/bin/sh
@@ -167,13 +171,14 @@ echo \"parts: job $parts; merge: job $merge\"
     )
 }
 
-fn parallel(args: &FarmArgs) -> String {
-    let (count, merge) = (args.shards, merge(args, ""));
-    // Pass one command per line, because parallel would expand braces in names in a command template.
+fn parallel_script(args: &FarmArgs) -> String {
+    let (count, merge) = (args.shards, merge_command(args, ""));
+    // Pass one command per line, because parallel would expand braces in file names inside a command
+    // template.
     let index = "\u{0}";
-    let render: Vec<String> = render(args, index).split(index).map(word).collect();
+    let render: Vec<String> = render_command(args, index).split(index).map(quote_word).collect();
     let (format, render) = ("%s".repeat(2 * render.len() - 1), render.join(" \"$index\" "));
-    let hosts: String = args.hosts.iter().map(|host| format!(" --sshlogin {}", word(host))).collect();
+    let hosts: String = args.hosts.iter().map(|host| format!(" --sshlogin {}", quote_word(host))).collect();
     let way = if args.hosts.is_empty() { "" } else { " --workdir \"$PWD\"" };
     format!(
         "\
@@ -188,11 +193,11 @@ seq {count} | while read -r index; do printf '{format}\\n' {render}; done |
     )
 }
 
-fn kubernetes(args: &FarmArgs, mebibytes: Option<u64>) -> String {
+fn kubernetes_manifest(args: &FarmArgs, mebibytes: Option<u64>) -> String {
     let (count, render, merge) =
-        (args.shards, render(args, "$index"), merge(args, "--watch --progress plain "));
-    let (image, claim) = (yaml(&args.image), yaml(&args.claim));
-    let render = command(&format!("index=$((JOB_COMPLETION_INDEX + 1)); exec {render}"));
+        (args.shards, render_command(args, "$index"), merge_command(args, "--watch --progress plain "));
+    let (image, claim) = (quote_yaml(&args.image), quote_yaml(&args.claim));
+    let render = container_command(&format!("index=$((JOB_COMPLETION_INDEX + 1)); exec {render}"));
     let resources = mebibytes.map_or(String::new(), |size| {
         format!(
             "        resources:\n          requests:\n            memory: {size}Mi\n          limits:\n            memory: {size}Mi\n"
@@ -229,17 +234,17 @@ spec:
     format!(
         "# Renders {count} parts and merges them: kubectl apply -f -\n{}---\n{}",
         job("glimt", &indexed, &render),
-        job("glimt-merge", "", &command(&merge))
+        job("glimt-merge", "", &container_command(&merge))
     )
 }
 
 /// A container command. Escapes `$` because Kubernetes expands `$(NAME)` and `$$`.
-fn command(text: &str) -> String {
-    yaml(&text.replace('$', "$$"))
+fn container_command(text: &str) -> String {
+    quote_yaml(&text.replace('$', "$$"))
 }
 
 /// Quotes a string for YAML, as a JSON string.
-fn yaml(text: &str) -> String {
+fn quote_yaml(text: &str) -> String {
     serde_json::Value::from(text).to_string()
 }
 
@@ -271,19 +276,19 @@ mod tests {
     #[test]
     fn names_are_quoted_for_the_shell() {
         let args = args("'my scene.toml' -o \"it's 5% $HOME.exr\" --shards 3 --engine slurm -- --samples 8");
-        let call = render(&args, "1");
+        let call = render_command(&args, "1");
         let words = shlex::split(&call).expect("words");
         assert_eq!(&words[..5], ["glimt", "my scene.toml", "--once", "-o", "it's 5% $HOME.exr.1.part"]);
         assert_eq!(&words[words.len() - 2..], ["--samples", "8"]);
-        let joined = shlex::split(&merge(&args, "")).expect("words");
+        let joined = shlex::split(&merge_command(&args, "")).expect("words");
         assert!(joined.contains(&"it's 5%% $HOME.exr.%.0f.part".to_owned()), "{joined:?}");
     }
 
     #[test]
     fn parallel_does_not_expand_names() {
         let name = "{= `touch pwned` =}{}{1} it's.toml";
-        let args = args(&format!("{} -o 'a {{}}.exr' --shards 2 --engine parallel", word(name)));
-        let script = parallel(&args);
+        let args = args(&format!("{} -o 'a {{}}.exr' --shards 2 --engine parallel", quote_word(name)));
+        let script = parallel_script(&args);
         let lines = script.lines().find(|line| line.starts_with("seq 2 | while")).expect("the commands");
         let lines = lines.strip_suffix(" |").expect("a pipe");
         let printed = std::process::Command::new("sh").args(["-c", lines]).output().expect("a shell");
@@ -347,8 +352,9 @@ mod tests {
     #[test]
     fn kubernetes_and_the_shell_keep_names_unchanged() {
         let (scene, picture) = ("$(HOME) $$ $$(HOME).toml", "o $$ $(JOB_COMPLETION_INDEX).exr");
-        let args = args(&format!("{} -o {} --shards 8 --engine kubernetes", word(scene), word(picture)));
-        let script = kubernetes(&args, None);
+        let args =
+            args(&format!("{} -o {} --shards 8 --engine kubernetes", quote_word(scene), quote_word(picture)));
+        let script = kubernetes_manifest(&args, None);
         let commands: Vec<String> = script
             .lines()
             .filter_map(|line| line.trim().strip_prefix("command: "))
@@ -380,7 +386,7 @@ mod tests {
             let line = format!("{} -o a.png --shards 8 --engine kubernetes", scene.display());
             let args = args(&format!("{line} -- {threads}"));
             let options = check_options(&args).expect("valid options");
-            memory(&args, &options, &Console::new(crate::tui::ColorChoice::None))
+            memory_request(&args, &options, &Console::new(crate::tui::ColorChoice::None))
         };
         assert_eq!(stated("--threads 0"), stated("--threads 64"));
         assert!(stated("--threads 0") > stated("--threads 2"), "{:?}", stated("--threads 0"));
@@ -389,8 +395,8 @@ mod tests {
     #[test]
     fn kubernetes_jobs_are_yaml_with_json_strings() {
         let args = args("a.toml -o 'a \"b\".exr' --shards 8 --engine kubernetes");
-        let bare = kubernetes(&args, None);
-        let script = kubernetes(&args, Some(640));
+        let bare = kubernetes_manifest(&args, None);
+        let script = kubernetes_manifest(&args, Some(640));
         assert_eq!((script.matches("memory: 640Mi").count(), bare.contains("memory")), (4, false));
         let stated = "        resources:\n          requests:\n            memory: 640Mi\n          limits:\n            memory: 640Mi\n";
         assert_eq!(script.replace(stated, ""), bare);

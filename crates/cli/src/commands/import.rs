@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::args::ImportArgs;
-use crate::commands::check::count;
+use crate::commands::check::format_count;
 use crate::console::Console;
 use crate::control::CancelToken;
 use crate::exit::Exit;
@@ -18,12 +18,12 @@ pub(crate) fn run(args: &ImportArgs, console: &Console) -> Exit {
     let cancel = token.clone();
     let ended = match signals::catch(move || cancel.cancel()) {
         Ok(ended) => ended,
-        Err(error) => return console.fail(Exit::FAILED, &signals::failure(&error)),
+        Err(error) => return console.fail(Exit::FAILED, &signals::describe_catch_failure(&error)),
     };
     let exit = convert(args, console, &token);
-    let Some(number) = ended.by() else { return exit };
-    if let Some(signal) = signals::name(number).filter(|_| exit != Exit::DONE) {
-        console.say(&format!("terminated by {signal}: nothing was written"));
+    let Some(number) = ended.signal_number() else { return exit };
+    if let Some(signal) = signals::signal_name(number).filter(|_| exit != Exit::DONE) {
+        console.print_message(&format!("terminated by {signal}: nothing was written"));
     }
     Exit::signal(number)
 }
@@ -34,7 +34,7 @@ fn convert(args: &ImportArgs, console: &Console, token: &CancelToken) -> Exit {
         Some(output) => output.clone(),
         None => PathBuf::from(args.file.with_extension("toml").file_name().unwrap_or_default()),
     };
-    let Some(name) = scene.file_stem().filter(|_| has_ending(&scene)) else {
+    let Some(name) = scene.file_stem().filter(|_| has_scene_extension(&scene)) else {
         let shown = scene.display();
         return console.fail(Exit::WRONG, &format!("{shown} is not a scene file name: it must end in .toml"));
     };
@@ -53,13 +53,13 @@ fn convert(args: &ImportArgs, console: &Console, token: &CancelToken) -> Exit {
     };
     report_approximations(&args.file, &imported.notes, console);
     if args.strict && !imported.notes.is_empty() {
-        let what = count(imported.notes.len() as u64, "approximation");
+        let what = format_count(imported.notes.len() as u64, "approximation");
         return console.fail(Exit::FAILED, &format!("{what} with --strict: nothing was written"));
     }
     match write_all(&scene, &imported, token) {
         Ok(()) => {
-            let files = count(imported.files.len() as u64, "file");
-            console.say(&format!("wrote {} and {files} in {}", scene.display(), beside.display()));
+            let files = format_count(imported.files.len() as u64, "file");
+            console.print_message(&format!("wrote {} and {files} in {}", scene.display(), beside.display()));
             Exit::DONE
         }
         Err(OutputError::Cancelled(_)) => Exit::FAILED,
@@ -68,7 +68,7 @@ fn convert(args: &ImportArgs, console: &Console, token: &CancelToken) -> Exit {
 }
 
 /// Whether a path has a scene's extension.
-fn has_ending(scene: &Path) -> bool {
+fn has_scene_extension(scene: &Path) -> bool {
     scene.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml"))
 }
 
@@ -81,9 +81,9 @@ fn report_approximations(file: &Path, notes: &[String], console: &Console) {
         place: None,
         help: None,
     };
-    console.diagnostics(&notes.iter().map(warning).collect::<Vec<_>>());
+    console.print_diagnostics(&notes.iter().map(warning).collect::<Vec<_>>());
     if !notes.is_empty() {
-        console.say(&format!("{} in total", count(notes.len() as u64, "approximation")));
+        console.print_message(&format!("{} in total", format_count(notes.len() as u64, "approximation")));
     }
 }
 

@@ -10,7 +10,7 @@ use crate::exit::Exit;
 use crate::output::json::file;
 use crate::output::settings::{ImageInfo, ImageInfoError, read_info};
 use crate::pipeline::protocol::Failure;
-use crate::progress::{failed, json_line};
+use crate::progress::{failure_to_json, json_line};
 use crate::scene::other_content;
 use crate::scene::sanitize::visible;
 
@@ -21,16 +21,16 @@ pub(crate) fn run(args: &InfoArgs, console: &Console) -> Exit {
     };
     if args.json {
         match file(&as_json(&args.image, &info)) {
-            Ok(text) => console.text(&text),
+            Ok(text) => console.print_text(&text),
             Err(error) => return console.fail(Exit::FAILED, &error.to_string()),
         }
     } else {
-        console.text(&as_text(&args.image, &info));
+        console.print_text(&as_text(&args.image, &info));
     }
     if info.is_own() { Exit::DONE } else { Exit::FAILED }
 }
 
-/// Describes how a file was rendered. Only the format is known for images whose format has no settings.
+/// Describes how a file was rendered. Returns only the format for image formats that cannot store settings.
 ///
 /// # Errors
 /// The errors of [`read_info`].
@@ -45,16 +45,18 @@ fn describe(path: &Path) -> Result<ImageInfo, ImageInfoError> {
 
 /// Checks whether the file is an image, part or checkpoint instead of a scene. If so, reports this and how
 /// the file was rendered, as one JSON line or as text. `None` for other files.
-pub(crate) fn instead_of_scene(path: &Path, is_json: bool, console: &Console) -> Option<Exit> {
+pub(crate) fn report_image_instead_of_scene(path: &Path, is_json: bool, console: &Console) -> Option<Exit> {
     let (_, problem) = other_content(path)?;
     let info = describe(path);
     if is_json {
-        let mut value = failed(&Failure::Scene(vec![*problem]));
+        let mut value = failure_to_json(&Failure::Scene(vec![*problem]));
         value["image"] = info.map_or(Value::Null, |info| as_json(path, &info));
         json_line(&value);
     } else {
-        console.diagnostics(&[*problem]);
-        console.say_lines(&info.map_or_else(|error| format!("{error}\n"), |info| as_text(path, &info)));
+        console.print_diagnostics(&[*problem]);
+        console.print_message_lines(
+            &info.map_or_else(|error| format!("{error}\n"), |info| as_text(path, &info)),
+        );
     }
     Some(Exit::WRONG)
 }
@@ -91,7 +93,7 @@ fn as_text(path: &Path, info: &ImageInfo) -> String {
     if !channels.is_empty() {
         lines.push(("channels", &channels));
     }
-    // Limit the width, because names may be as long as the file and format widths are limited to 65,535.
+    // Limit the width: names may be as long as the file, but format widths are limited to 65,535.
     let width = lines.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0).min(MAX_NAME_COLUMNS);
     for (name, value) in lines {
         text += &format!("  {:width$}  {}\n", visible(name), visible(value));

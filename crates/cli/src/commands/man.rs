@@ -27,9 +27,9 @@ pub(crate) fn run(command: Option<&str>, console: &Console) -> Exit {
         };
         return console.fail(Exit::WRONG, &format!("unknown command {name:?}: {help}"));
     };
-    match page(found, command.is_none()) {
+    match render_page(found, command.is_none()) {
         Ok(text) => {
-            console.text(&text);
+            console.print_text(&text);
             Exit::DONE
         }
         Err(error) => console.fail(Exit::FAILED, &format!("cannot create the manual page: {error}")),
@@ -37,7 +37,7 @@ pub(crate) fn run(command: Option<&str>, console: &Console) -> Exit {
 }
 
 /// Renders a page. The program's page also contains the sections that apply to all commands.
-fn page(command: &clap::Command, is_whole: bool) -> std::io::Result<String> {
+fn render_page(command: &clap::Command, is_whole: bool) -> std::io::Result<String> {
     let name = command.get_display_name().unwrap_or("glimt").to_owned();
     let notes = command.get_after_long_help().map(ToString::to_string);
     let usage = command.clone().render_usage().to_string();

@@ -14,14 +14,14 @@ use crate::control::CancelToken;
 use crate::exit::Exit;
 use crate::film::Film;
 use crate::film::tone::develop;
-use crate::merge_block::Block;
+use crate::merge_block::TerminalBlock;
 use crate::output::part::{self, Merged, PartError, PartFile};
 use crate::output::write::{Guard, atomic_guarded};
 use crate::output::{self, DevelopSettings, Format, Losses, OutputError, is_same_file, scene_path};
-use crate::progress::{json_line, style};
+use crate::progress::{bar_style, json_line};
 use crate::scene::sanitize::{shortened, visible};
 use crate::signals;
-use crate::system::threads::start_failure;
+use crate::system::threads::describe_start_failure;
 use crate::tui::{NamedImage, images_as_text};
 
 /// Polling interval for new parts.
@@ -30,48 +30,48 @@ const POLL_INTERVAL: Duration = Duration::from_millis(500);
 pub(crate) fn run(args: &MergeArgs, console: &Console) -> Exit {
     let pool = match ThreadPoolBuilder::new().build() {
         Ok(pool) => pool,
-        Err(error) => return console.fail(Exit::FAILED, &start_failure("threads", false, &error)),
+        Err(error) => return console.fail(Exit::FAILED, &describe_start_failure("threads", false, &error)),
     };
     let token = CancelToken::new();
     let cancel = token.clone();
     let ended = match signals::catch(move || cancel.cancel()) {
         Ok(ended) => ended,
-        Err(error) => return console.fail(Exit::FAILED, &signals::failure(&error)),
+        Err(error) => return console.fail(Exit::FAILED, &signals::describe_catch_failure(&error)),
     };
-    let exit = Merge { args, console, token: &token, pool: &pool }.run();
-    ended.by().map_or(exit, |number| report_signal(number, console))
+    let exit = MergeCommand { args, console, token: &token, pool: &pool }.run();
+    ended.signal_number().map_or(exit, |number| report_signal(number, console))
 }
 
 fn report_signal(number: i32, console: &Console) -> Exit {
-    if let Some(signal) = signals::name(number) {
-        console.say(&format!("terminated by {signal}: nothing was written"));
+    if let Some(signal) = signals::signal_name(number) {
+        console.print_message(&format!("terminated by {signal}: nothing was written"));
     }
     Exit::signal(number)
 }
 
 /// A `merge` command.
-struct Merge<'a> {
+struct MergeCommand<'a> {
     args: &'a MergeArgs,
     console: &'a Console,
     token: &'a CancelToken,
     pool: &'a ThreadPool,
 }
 
-impl Merge<'_> {
+impl MergeCommand<'_> {
     fn run(&self) -> Exit {
         self.try_run().unwrap_or_else(|exit| exit)
     }
 
     fn try_run(&self) -> Result<Exit, Exit> {
         let format = self.check_output()?;
-        let parts = if self.args.watch { self.watched()? } else { self.opened()? };
+        let parts = if self.args.watch { self.wait_for_parts()? } else { self.open_parts()? };
         self.check_inputs(&parts)?;
-        let merged = self.merged(&parts, self.args.partial, "merge")?;
+        let merged = self.merge_parts(&parts, self.args.partial, "merge")?;
         let Some(finish) = parts.first().and_then(|part| part.head.picture.finish()) else {
             return Err(self.console.fail(Exit::WRONG, "the parts contain no output settings"));
         };
         self.write(format, finish, &merged, &parts)?;
-        self.say_missing(&merged);
+        self.report_missing_parts(&merged);
         Ok(Exit::DONE)
     }
 
@@ -113,7 +113,7 @@ impl Merge<'_> {
     }
 
     /// Opens all parts and reports every invalid one.
-    fn opened(&self) -> Result<Vec<PartFile>, Exit> {
+    fn open_parts(&self) -> Result<Vec<PartFile>, Exit> {
         let mut bar = StepProgress::new(self.args.progress, self.console, "read");
         let (mut parts, mut wrong) = (Vec::new(), Vec::new());
         for (index, path) in self.args.parts.iter().enumerate() {
@@ -128,10 +128,10 @@ impl Merge<'_> {
                 Err(PartError::Cancelled(_)) => return Err(Exit::FAILED),
                 Err(error) => wrong.push(error),
             }
-            bar.at(index + 1, self.args.parts.len());
+            bar.update(index + 1, self.args.parts.len());
         }
         bar.end();
-        wrong.iter().for_each(|error| self.console.say(&format!("error: {error}")));
+        wrong.iter().for_each(|error| self.console.print_message(&format!("error: {error}")));
         match (wrong.is_empty(), parts.is_empty()) {
             (false, _) => Err(Exit::WRONG),
             (true, true) => Err(self.console.fail(Exit::WRONG, "none of the parts exist")),
@@ -139,7 +139,7 @@ impl Merge<'_> {
         }
     }
 
-    /// Reports that the limit on open files is reached, so that opening more parts would fail.
+    /// Reports that no more parts can be opened because the limit on open files has been reached.
     fn too_many_files(&self, opened: usize) -> Exit {
         let all = self.args.parts.len();
         let message = format!(
@@ -149,17 +149,17 @@ impl Merge<'_> {
     }
 
     /// Waits until all parts are complete, showing the image so far.
-    fn watched(&self) -> Result<Vec<PartFile>, Exit> {
+    fn wait_for_parts(&self) -> Result<Vec<PartFile>, Exit> {
         let mut parts: Vec<PartFile> = Vec::new();
-        let mut waiting: Vec<Awaited> = self.args.parts.iter().cloned().map(Awaited::new).collect();
+        let mut waiting: Vec<AwaitedPart> = self.args.parts.iter().cloned().map(AwaitedPart::new).collect();
         let mut said = None;
-        let mut block = Block::default();
+        let mut block = TerminalBlock::default();
         loop {
             let mut rest = Vec::new();
             for mut awaited in waiting {
-                let looked = awaited.look(self.token).map_err(|error| match error.is_out_of_files() {
+                let looked = awaited.try_open(self.token).map_err(|error| match error.is_out_of_files() {
                     true => self.too_many_files(parts.len()),
-                    false => self.refuse(&error),
+                    false => self.report_part_error(&error),
                 });
                 match looked? {
                     Some(part) => parts.push(part),
@@ -167,18 +167,18 @@ impl Merge<'_> {
                 }
             }
             waiting = rest;
-            let unfinished: Vec<&Path> = waiting.iter().filter_map(Awaited::unfinished).collect();
+            let unfinished: Vec<&Path> = waiting.iter().filter_map(AwaitedPart::incomplete_path).collect();
             let state = (parts.len(), unfinished.iter().map(|path| path.to_path_buf()).collect::<Vec<_>>());
             if said.as_ref() != Some(&state) {
                 let is_new = said.is_none_or(|(count, _)| count != parts.len());
-                let words = self.parts_words(parts.len(), &unfinished);
-                if self.has_block() {
-                    self.redraw(&parts, &words, &mut block)?;
+                let words = self.describe_parts(parts.len(), &unfinished);
+                if self.redraws_in_place() {
+                    self.redraw_image(&parts, &words, &mut block)?;
                 } else if is_new {
                     // Report mismatched parts as soon as they appear.
-                    part::check(&parts).map_err(|error| self.refuse(&error))?;
+                    part::check(&parts).map_err(|error| self.report_part_error(&error))?;
                 }
-                self.say_parts(parts.len(), &unfinished, &words);
+                self.report_parts(parts.len(), &unfinished, &words);
                 said = Some(state);
             }
             if waiting.is_empty() {
@@ -200,7 +200,7 @@ impl Merge<'_> {
     }
 
     /// Describes the number of complete parts and the names of incomplete parts.
-    fn parts_words(&self, count: usize, unfinished: &[&Path]) -> String {
+    fn describe_parts(&self, count: usize, unfinished: &[&Path]) -> String {
         let names: Vec<_> = unfinished.iter().map(|path| path.to_string_lossy()).collect();
         let incomplete = match names.as_slice() {
             [] => String::new(),
@@ -211,7 +211,7 @@ impl Merge<'_> {
     }
 
     /// Reports the parts on stderr, unless the image on the same terminal shows the same text.
-    fn say_parts(&self, count: usize, unfinished: &[&Path], words: &str) {
+    fn report_parts(&self, count: usize, unfinished: &[&Path], words: &str) {
         match self.args.progress {
             Progress::None => {}
             Progress::Json => {
@@ -219,13 +219,13 @@ impl Merge<'_> {
                 let total = self.args.parts.len();
                 json_line(&json!({ "event": "parts", "parts": count, "total": total, "unfinished": names }));
             }
-            Progress::Auto if self.has_block() && self.console.is_terminal => {}
-            Progress::Auto | Progress::Plain => self.console.say(words),
+            Progress::Auto if self.redraws_in_place() && self.console.is_terminal => {}
+            Progress::Auto | Progress::Plain => self.console.print_message(words),
         }
     }
 
-    /// Whether to redraw the image in place. Requires a terminal without progress lines between redraws.
-    fn has_block(&self) -> bool {
+    /// Whether to redraw the image in place. This requires a terminal without progress lines between redraws.
+    fn redraws_in_place(&self) -> bool {
         let has_lines = match self.args.progress {
             Progress::Plain | Progress::Json => self.console.is_terminal,
             Progress::Auto | Progress::None => false,
@@ -234,17 +234,17 @@ impl Merge<'_> {
     }
 
     /// Redraws the image merged from these parts, with a title.
-    fn redraw(&self, parts: &[PartFile], words: &str, block: &mut Block) -> Result<(), Exit> {
+    fn redraw_image(&self, parts: &[PartFile], words: &str, block: &mut TerminalBlock) -> Result<(), Exit> {
         let words = visible(words);
         let columns = answer_columns();
         let finish = parts.first().and_then(|part| part.head.picture.finish());
         let lines = match finish {
             None => {
-                part::check(parts).map_err(|error| self.refuse(&error))?;
+                part::check(parts).map_err(|error| self.report_part_error(&error))?;
                 String::new()
             }
             Some(finish) => {
-                let merged = self.merged(parts, true, "show")?;
+                let merged = self.merge_parts(parts, true, "show")?;
                 self.pool.install(|| {
                     let image = finish.image(&merged.film);
                     let picture = develop(&image, &finish.tone.resolved_for(&image));
@@ -254,19 +254,19 @@ impl Merge<'_> {
         };
         // Narrow terminals do not show an image.
         let lines = if lines.is_empty() { format!("{}\n", shortened(&words, columns)) } else { lines };
-        self.console.text(&block.redrawn(&lines, columns));
+        self.console.print_text(&block.redraw(&lines, columns));
         Ok(())
     }
 
-    fn merged(&self, parts: &[PartFile], is_partial: bool, what: &'static str) -> Result<Merged, Exit> {
+    fn merge_parts(&self, parts: &[PartFile], is_partial: bool, what: &'static str) -> Result<Merged, Exit> {
         let mut bar = StepProgress::new(self.args.progress, self.console, what);
-        let tell = |tile: usize, film: &Film| bar.at(tile, film.tile_count());
+        let tell = |tile: usize, film: &Film| bar.update(tile, film.tile_count());
         let merged = part::merge(parts, is_partial, self.token, tell);
         bar.end();
-        merged.map_err(|error| self.refuse(&error))
+        merged.map_err(|error| self.report_part_error(&error))
     }
 
-    fn refuse(&self, error: &PartError) -> Exit {
+    fn report_part_error(&self, error: &PartError) -> Exit {
         match error {
             PartError::Cancelled(_) => Exit::FAILED,
             PartError::Film(_) => self.console.fail(Exit::FAILED, &error.to_string()),
@@ -290,7 +290,7 @@ impl Merge<'_> {
         parts: &[PartFile],
     ) -> Result<(), Exit> {
         let (out, token) = (&self.args.out, self.token);
-        name_scene(&mut finish, parts, out);
+        record_scene_path(&mut finish, parts, out);
         let film = &merged.film;
         let may_replace = |real: &Path| {
             let is_given = self.args.parts.iter().any(|part| is_same_file(part, real));
@@ -300,7 +300,7 @@ impl Merge<'_> {
             why.map_or(Ok(()), |reason| Err(OutputError::Refused { reason }))
         };
         let is_kept = |path: &Path| self.args.parts.iter().any(|part| is_same_file(part, path));
-        let tell = |what: String| self.console.say(&format!("warning: {what}"));
+        let tell = |what: String| self.console.print_message(&format!("warning: {what}"));
         let guard = Guard {
             is_kept: &is_kept,
             may_replace: &may_replace,
@@ -315,22 +315,22 @@ impl Merge<'_> {
         })?;
         if self.args.progress != Progress::None {
             let (width, height) = (film.width(), film.height());
-            self.console.say(&format!("wrote {} ({width}×{height})", out.display()));
+            self.console.print_message(&format!("wrote {} ({width}×{height})", out.display()));
         }
         Ok(())
     }
 
-    fn say_missing(&self, merged: &Merged) {
+    fn report_missing_parts(&self, merged: &Merged) {
         if !merged.missing.is_empty() {
             let missing = part::missing_parts(&merged.missing, merged.count);
-            self.console.say(&format!("warning: {missing}; merged the others"));
+            self.console.print_message(&format!("warning: {missing}; merged the others"));
         }
     }
 }
 
-/// Records the scene's path relative to the output, like a single render. Looks for the scene relative to
+/// Records the scene's path relative to the output, as a single render does. Looks for the scene relative to
 /// each part, then next to the output.
-fn name_scene(finish: &mut DevelopSettings, parts: &[PartFile], out: &Path) {
+fn record_scene_path(finish: &mut DevelopSettings, parts: &[PartFile], out: &Path) {
     let Some((_, scene)) = finish.metadata.iter_mut().find(|(name, _)| name == "glimt:scene") else { return };
     let named = parts.iter().filter(|part| !part.head.scene.is_empty());
     let named = named.map(|part| part.path.with_file_name(&part.head.scene));
@@ -341,13 +341,13 @@ fn name_scene(finish: &mut DevelopSettings, parts: &[PartFile], out: &Path) {
 }
 
 /// A part that is not yet complete.
-struct Awaited {
+struct AwaitedPart {
     path: PathBuf,
     /// Length and modification time of the incomplete file. `None` if the file does not exist.
     unfinished: Option<(u64, Option<SystemTime>)>,
 }
 
-impl Awaited {
+impl AwaitedPart {
     fn new(path: PathBuf) -> Self {
         Self { path, unfinished: None }
     }
@@ -356,7 +356,7 @@ impl Awaited {
     ///
     /// # Errors
     /// The part is invalid.
-    fn look(&mut self, token: &CancelToken) -> Result<Option<PartFile>, PartError> {
+    fn try_open(&mut self, token: &CancelToken) -> Result<Option<PartFile>, PartError> {
         let now = std::fs::metadata(&self.path).ok().map(|found| (found.len(), found.modified().ok()));
         // Do not read an unchanged file again.
         if now.is_none() || now == self.unfinished {
@@ -378,7 +378,7 @@ impl Awaited {
     }
 
     /// The part's path, if the file exists but is incomplete.
-    fn unfinished(&self) -> Option<&Path> {
+    fn incomplete_path(&self) -> Option<&Path> {
         self.unfinished.is_some().then_some(&self.path)
     }
 }
@@ -395,11 +395,11 @@ impl StepProgress {
     fn new(progress: Progress, console: &Console, what: &'static str) -> Self {
         let template = "  {wide_bar} {percent:>3}% {msg}";
         let has_bar = progress == Progress::Auto && console.is_terminal;
-        let bar = has_bar.then(|| ProgressBar::new(1).with_style(style(template)).with_message(what));
+        let bar = has_bar.then(|| ProgressBar::new(1).with_style(bar_style(template)).with_message(what));
         Self { what, bar, is_json: progress == Progress::Json, said: 0 }
     }
 
-    fn at(&mut self, done: usize, total: usize) {
+    fn update(&mut self, done: usize, total: usize) {
         /// Number of reports.
         const STEPS: usize = 100;
         let step = done * STEPS / total.max(1);

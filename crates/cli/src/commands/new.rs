@@ -17,12 +17,13 @@ pub(crate) fn run(file: &Path, with_schema: bool, console: &Console) -> Exit {
     if file == Path::new("-") {
         if with_schema {
             let name = schema::FILE;
-            console.say(&format!("note: write {name} next to the scene with: glimt schema > {name}"));
+            console
+                .print_message(&format!("note: write {name} next to the scene with: glimt schema > {name}"));
         }
-        console.text(&text);
+        console.print_text(&text);
         return Exit::DONE;
     }
-    if let Some(message) = misnamed(file) {
+    if let Some(message) = wrong_extension_error(file) {
         return console.fail(Exit::WRONG, &message);
     }
     // Do not write the schema if the scene cannot be written.
@@ -30,7 +31,7 @@ pub(crate) fn run(file: &Path, with_schema: bool, console: &Console) -> Exit {
     let schema = file.with_file_name(schema::FILE);
     if with_schema && is_free {
         match write_schema(&schema) {
-            Ok(true) => console.say(&format!("wrote {}", schema.display())),
+            Ok(true) => console.print_message(&format!("wrote {}", schema.display())),
             Ok(false) => {}
             Err((exit, message)) => return console.fail(exit, &message),
         }
@@ -38,10 +39,11 @@ pub(crate) fn run(file: &Path, with_schema: bool, console: &Console) -> Exit {
     let name = file.display();
     match write::new_file(file, text.as_bytes()) {
         Ok(()) => {
-            console.say(&format!("wrote {name}"));
-            if let Some(file) = quoted(file) {
-                console
-                    .say(&format!("now: glimt {file}    (edit and save it to update the image; ? for help)"));
+            console.print_message(&format!("wrote {name}"));
+            if let Some(file) = quote_file_name(file) {
+                console.print_message(&format!(
+                    "now: glimt {file}    (edit and save it to update the image; ? for help)"
+                ));
             }
             Exit::DONE
         }
@@ -65,7 +67,7 @@ pub(crate) fn run(file: &Path, with_schema: bool, console: &Console) -> Exit {
 /// # Errors
 /// A different file with this name exists, or the file cannot be written.
 fn write_schema(path: &Path) -> Result<bool, (Exit, String)> {
-    let text = schema::text(Draft::Four);
+    let text = schema::schema_text(Draft::Four);
     match write::new_file(path, text.as_bytes()) {
         Ok(()) => Ok(true),
         Err(error) if error.kind() == ErrorKind::AlreadyExists => match std::fs::read(path) {
@@ -83,15 +85,15 @@ fn write_schema(path: &Path) -> Result<bool, (Exit, String)> {
 }
 
 /// Error message for a scene file with the extension of an image or a mesh.
-fn misnamed(file: &Path) -> Option<String> {
+fn wrong_extension_error(file: &Path) -> Option<String> {
     let what = if is_mesh(file) {
         "a mesh"
-    } else if is_image(file) {
+    } else if has_image_extension(file) {
         "an image"
     } else {
         return None;
     };
-    let command = quoted(&file.with_extension("toml")).map(|scene| format!(": glimt new {scene}"));
+    let command = quote_file_name(&file.with_extension("toml")).map(|scene| format!(": glimt new {scene}"));
     Some(format!(
         "{} has the extension of {what}; use .toml for scenes{}",
         file.display(),
@@ -99,9 +101,9 @@ fn misnamed(file: &Path) -> Option<String> {
     ))
 }
 
-/// Quotes a file name for a shell, such that glimt does not mistake it for an option or a command. `None` if
-/// the name is not safe to print.
-fn quoted(file: &Path) -> Option<String> {
+/// Quotes a file name for a shell and ensures that glimt does not mistake it for an option or a command.
+/// `None` if the name is not safe to print.
+fn quote_file_name(file: &Path) -> Option<String> {
     let name = file.to_str().filter(|name| visible(name) == *name)?;
     let is_bare = !name.contains(['/', '.']) || name.starts_with('-');
     let name = if is_bare { format!("./{name}") } else { name.to_owned() };
@@ -109,7 +111,7 @@ fn quoted(file: &Path) -> Option<String> {
 }
 
 /// Whether a file has an image extension.
-fn is_image(file: &Path) -> bool {
+fn has_image_extension(file: &Path) -> bool {
     Format::from_path(file).is_ok()
 }
 
@@ -122,7 +124,7 @@ mod tests {
         for name in
             ["ball.toml", "my scene.toml", "it's.toml", "a \"b\" $HOME `c`.toml", "a;b.toml", "tilde~.toml"]
         {
-            let words = quoted(Path::new(name)).and_then(|word| shlex::split(&word));
+            let words = quote_file_name(Path::new(name)).and_then(|word| shlex::split(&word));
             assert_eq!(words, Some(vec![name.to_owned()]), "{name}");
         }
         for (name, word) in [
@@ -131,7 +133,7 @@ mod tests {
             ("check", Some("./check")),
             ("new\nline.toml", None),
         ] {
-            assert_eq!(quoted(Path::new(name)).as_deref(), word);
+            assert_eq!(quote_file_name(Path::new(name)).as_deref(), word);
         }
     }
 }

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
 
-use super::{Reporter, samples, seconds};
+use super::{Reporter, describe_samples, seconds};
 use crate::pipeline::protocol::{AssetProgress, Event, RenderProgress, Stage, StageReport, Status};
 use crate::pipeline::words::Eta;
 use crate::scene::sanitize::visible;
@@ -16,7 +16,7 @@ const DEFAULT_COLUMNS: usize = 80;
 /// Number of steps of the render's bar.
 const STEPS: u64 = 1000;
 
-pub(super) struct Bars {
+pub(super) struct ProgressBars {
     all: MultiProgress,
     stage: ProgressBar,
     assets: HashMap<String, ProgressBar>,
@@ -25,10 +25,10 @@ pub(super) struct Bars {
     time: Option<f64>,
 }
 
-impl Bars {
+impl ProgressBars {
     pub(super) fn new(time: Option<f64>) -> Self {
         let all = MultiProgress::new();
-        let stage = all.add(ProgressBar::new_spinner().with_style(style("{spinner} {msg}")));
+        let stage = all.add(ProgressBar::new_spinner().with_style(bar_style("{spinner} {msg}")));
         Self { all, stage, assets: HashMap::new(), render: None, time }
     }
 
@@ -44,7 +44,8 @@ impl Bars {
     fn asset(&mut self, progress: &AssetProgress) {
         let (all, stage) = (&self.all, &self.stage);
         let bar = self.assets.entry(progress.name.clone()).or_insert_with(|| {
-            let bar = ProgressBar::new(progress.total).with_style(style("  {bar:24} {percent:>3}% {msg}"));
+            let bar =
+                ProgressBar::new(progress.total).with_style(bar_style("  {bar:24} {percent:>3}% {msg}"));
             let bar = all.insert_after(stage, bar);
             bar.set_message(visible(&progress.name).into_owned());
             bar
@@ -58,17 +59,17 @@ impl Bars {
     fn progress(&mut self, progress: &RenderProgress) {
         let all = &self.all;
         let bar = self.render.get_or_insert_with(|| {
-            all.add(ProgressBar::new(STEPS).with_style(style("  {wide_bar} {percent:>3}% {msg}")))
+            all.add(ProgressBar::new(STEPS).with_style(bar_style("  {wide_bar} {percent:>3}% {msg}")))
         });
         // Query the size every time, because the terminal may be resized.
         let columns =
             crossterm::terminal::size().map_or(DEFAULT_COLUMNS, |(columns, _)| usize::from(columns));
         bar.set_position((progress.fraction * STEPS as f64) as u64);
-        bar.set_message(words(progress, self.time, columns));
+        bar.set_message(format_bar_text(progress, self.time, columns));
     }
 }
 
-impl Reporter for Bars {
+impl Reporter for ProgressBars {
     fn event(&mut self, event: &Event) {
         if let Event::Stage { stage, .. } = event {
             self.stage(stage);
@@ -92,10 +93,10 @@ impl Reporter for Bars {
 
 /// The text next to the bar, as detailed as the width allows. With a time limit, shows seconds instead of
 /// samples.
-fn words(progress: &RenderProgress, time: Option<f64>, columns: usize) -> String {
+fn format_bar_text(progress: &RenderProgress, time: Option<f64>, columns: usize) -> String {
     let done = match time {
         Some(limit) => format!("{} of {}", seconds(progress.elapsed_seconds.min(limit)), seconds(limit)),
-        None => samples(progress),
+        None => describe_samples(progress),
     };
     let left = Eta::of(progress).map(|eta| format!("{} left", eta.words()));
     let whole = match (&left, time) {
@@ -108,7 +109,7 @@ fn words(progress: &RenderProgress, time: Option<f64>, columns: usize) -> String
 }
 
 /// Creates a style from a template. Falls back to the library's default.
-pub(crate) fn style(template: &str) -> ProgressStyle {
+pub(crate) fn bar_style(template: &str) -> ProgressStyle {
     ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar())
 }
 
@@ -133,21 +134,21 @@ mod tests {
     #[test]
     fn narrow_terminals_keep_the_bar() {
         let progress = progress();
-        assert_eq!(words(&progress, None, 80), "1000 of 4096 samples, 7.50 s left");
+        assert_eq!(format_bar_text(&progress, None, 80), "1000 of 4096 samples, 7.50 s left");
         for columns in 0..200 {
-            let said = words(&progress, None, columns).chars().count();
+            let said = format_bar_text(&progress, None, columns).chars().count();
             assert!(
                 said == 0 || columns >= said + "  ".len() + MIN_BAR_COLUMNS + " 100% ".len(),
                 "{columns}"
             );
         }
-        assert_eq!(words(&progress, None, 30), "7.50 s left");
+        assert_eq!(format_bar_text(&progress, None, 30), "7.50 s left");
     }
 
     #[test]
     fn time_limits_are_shown_in_seconds() {
         for columns in [80, 40] {
-            assert_eq!(words(&progress(), Some(10.0), columns), "2.50 s of 10.0 s");
+            assert_eq!(format_bar_text(&progress(), Some(10.0), columns), "2.50 s of 10.0 s");
         }
     }
 }

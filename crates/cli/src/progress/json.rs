@@ -20,18 +20,18 @@ use std::io::Write;
 use serde_json::{Value, json};
 
 use super::Reporter;
-use crate::diagnostic_json::diagnostic;
+use crate::diagnostic_json::diagnostic_to_json;
 use crate::output::json::to_line;
 use crate::pipeline::protocol::{CheckpointNews, Event, Failure};
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::report::Locator;
 
-pub(super) struct Json;
+pub(super) struct JsonReporter;
 
-impl Reporter for Json {
+impl Reporter for JsonReporter {
     fn event(&mut self, event: &Event) {
-        if let Some(value) = value(event) {
-            line(&value);
+        if let Some(value) = event_to_json(event) {
+            print_json_line(&value);
         }
     }
 
@@ -45,7 +45,7 @@ impl Reporter for Json {
 }
 
 /// Prints a JSON line to stderr, ignoring errors.
-pub(crate) fn line(value: &Value) {
+pub(crate) fn print_json_line(value: &Value) {
     if let Ok(text) = with_event_first(value) {
         let _ = writeln!(std::io::stderr().lock(), "{text}");
     }
@@ -62,7 +62,7 @@ fn with_event_first(value: &Value) -> serde_json::Result<String> {
     Ok(format!("{}{comma}{}", &first[..first.len() - 1], &rest[1..]))
 }
 
-fn value(event: &Event) -> Option<Value> {
+fn event_to_json(event: &Event) -> Option<Value> {
     Some(match event {
         Event::Stage { stage, .. } => json!({
             "event": "stage", "stage": stage.name, "status": stage.status, "seconds": stage.seconds,
@@ -86,11 +86,11 @@ fn value(event: &Event) -> Option<Value> {
         }
         Event::Done { report, warnings, unchanged, .. } => json!({
             "event": "done", "unchanged": unchanged, "seconds": report.seconds,
-            "complete": report.image.complete, "diagnostics": diagnostics(warnings),
+            "complete": report.image.complete, "diagnostics": diagnostics_to_json(warnings),
         }),
-        Event::Checkpoint { news, .. } => checkpoint(news),
+        Event::Checkpoint { news, .. } => checkpoint_to_json(news),
         Event::WriteFailed { message, .. } => json!({ "event": "write_failed", "message": message }),
-        Event::Failed { failure, .. } => failed(failure),
+        Event::Failed { failure, .. } => failure_to_json(failure),
         Event::Cancelled { .. } => json!({ "event": "cancelled" }),
         Event::Started { .. }
         | Event::Files { .. }
@@ -111,7 +111,7 @@ fn value(event: &Event) -> Option<Value> {
     })
 }
 
-fn checkpoint(news: &CheckpointNews) -> Value {
+fn checkpoint_to_json(news: &CheckpointNews) -> Value {
     let (status, path, message, samples) = match news {
         CheckpointNews::Written { path } => ("written", Some(path), None, None),
         CheckpointNews::Failed { message } => ("failed", None, Some(message), None),
@@ -126,29 +126,29 @@ fn checkpoint(news: &CheckpointNews) -> Value {
     json!({ "event": "checkpoint", "status": status, "path": path, "message": message, "samples": samples })
 }
 
-pub(crate) fn failed(failure: &Failure) -> Value {
+pub(crate) fn failure_to_json(failure: &Failure) -> Value {
     match failure {
         Failure::Work(message) => {
             json!({ "event": "failed", "kind": "work", "message": message, "diagnostics": [] })
         }
         Failure::Scene(all) => json!({
-            "event": "failed", "kind": "scene", "message": "the scene or the arguments are invalid", "diagnostics": diagnostics(all),
+            "event": "failed", "kind": "scene", "message": "the scene or the arguments are invalid", "diagnostics": diagnostics_to_json(all),
         }),
     }
 }
 
 /// Diagnostics as in `check --json`, with the additional key `path`: `file`, or null if empty.
-fn diagnostics(all: &[Diagnostic]) -> Vec<Value> {
+fn diagnostics_to_json(all: &[Diagnostic]) -> Vec<Value> {
     let mut places = Locator::default();
     let with_path = |one: &Diagnostic| {
-        let mut value = diagnostic(one, &mut places);
-        value["path"] = json!(path(one));
+        let mut value = diagnostic_to_json(one, &mut places);
+        value["path"] = json!(diagnostic_path(one));
         value
     };
     all.iter().map(with_path).collect()
 }
 
-fn path(diagnostic: &Diagnostic) -> Option<Cow<'_, str>> {
+fn diagnostic_path(diagnostic: &Diagnostic) -> Option<Cow<'_, str>> {
     Some(diagnostic.path.to_string_lossy()).filter(|path| !path.is_empty())
 }
 
@@ -171,7 +171,7 @@ mod tests {
     fn diagnostics_have_the_keys_of_check() {
         let text = "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 0, 0]\n[materials.a]\ntype = \"metl\"\n";
         let outcome = crate::scene::parse(text.into(), std::path::Path::new("a.toml"));
-        let failed = failed(&Failure::Scene(outcome.diagnostics));
+        let failed = failure_to_json(&Failure::Scene(outcome.diagnostics));
         let one = &failed["diagnostics"][0];
         assert_eq!(one["path"], one["file"]);
         for key in ["severity", "message", "line", "column", "end_line", "end_column", "label"] {

@@ -3,7 +3,7 @@
 use std::collections::HashSet;
 use std::time::{Duration, Instant};
 
-use super::{Reporter, samples, seconds};
+use super::{Reporter, describe_samples, seconds};
 use crate::console::Console;
 use crate::pipeline::protocol::{AssetProgress, Event, RenderProgress, StageReport, Status};
 use crate::pipeline::words::Eta;
@@ -13,7 +13,7 @@ const INTERVAL: Duration = Duration::from_secs(5);
 /// Lines per render, not counting lines printed because [`INTERVAL`] has passed.
 const STEPS: f64 = 10.0;
 
-pub(super) struct Plain {
+pub(super) struct PlainReporter {
     console: Console,
     /// Render steps reported so far.
     reported: f64,
@@ -23,7 +23,7 @@ pub(super) struct Plain {
     loaded: HashSet<String>,
 }
 
-impl Plain {
+impl PlainReporter {
     pub(super) fn new(console: Console) -> Self {
         Self {
             console,
@@ -34,26 +34,25 @@ impl Plain {
         }
     }
 
-    /// Whether this is the first time that the asset is loaded. A file with several meshes is loaded once per
-    /// mesh.
+    /// Whether the asset is loaded for the first time. A file with several meshes is loaded once per mesh.
     fn is_newly_loaded(&mut self, progress: &AssetProgress) -> bool {
         progress.done == progress.total && self.loaded.insert(progress.name.clone())
     }
 
     fn progress(&mut self, progress: &RenderProgress) {
-        if let Some(line) = self.due(progress) {
-            self.console.say(&line);
+        if let Some(line) = self.next_line(progress) {
+            self.console.print_message(&line);
         }
     }
 
     /// The line to print now, if a line is due. Never repeats the last line.
-    fn due(&mut self, progress: &RenderProgress) -> Option<String> {
+    fn next_line(&mut self, progress: &RenderProgress) -> Option<String> {
         let step = (progress.fraction * STEPS).floor();
         if progress.fraction >= 1.0 || (step <= self.reported && self.last.elapsed() < INTERVAL) {
             return None;
         }
         (self.reported, self.last) = (step, Instant::now());
-        let line = line(progress);
+        let line = format_progress(progress);
         if line == self.last_line {
             return None;
         }
@@ -62,25 +61,30 @@ impl Plain {
     }
 }
 
-impl Reporter for Plain {
+impl Reporter for PlainReporter {
     fn event(&mut self, event: &Event) {
         if let Event::Stage { stage, .. } = event
             && stage.status != Status::Running
         {
-            self.console.say(&stage_line(stage));
+            self.console.print_message(&stage_line(stage));
         } else if let Event::Asset { progress, .. } = event
             && self.is_newly_loaded(progress)
         {
-            self.console.say(&format!("{:<8} {} 100%", "loaded", progress.name));
+            self.console.print_message(&format!("{:<8} {} 100%", "loaded", progress.name));
         } else if let Event::Progress { progress, .. } = event {
             self.progress(progress);
         }
     }
 }
 
-fn line(progress: &RenderProgress) -> String {
+fn format_progress(progress: &RenderProgress) -> String {
     let eta = Eta::of(progress).map_or(String::new(), |eta| format!(", {} left", eta.words()));
-    format!("{:<8} {:3.0}% ({}{eta})", "render", (progress.fraction * 100.0).floor(), samples(progress))
+    format!(
+        "{:<8} {:3.0}% ({}{eta})",
+        "render",
+        (progress.fraction * 100.0).floor(),
+        describe_samples(progress)
+    )
 }
 
 /// Describes a finished stage, as in `parse done 0.40 ms`.
@@ -101,7 +105,7 @@ mod tests {
 
     #[test]
     fn lines_are_not_repeated() {
-        let mut plain = Plain::new(Console::new(crate::tui::ColorChoice::None));
+        let mut plain = PlainReporter::new(Console::new(crate::tui::ColorChoice::None));
         let progress = |fraction, samples| RenderProgress {
             fraction,
             elapsed_seconds: 1.0,
@@ -115,22 +119,24 @@ mod tests {
         };
         let mut said = Vec::new();
         for samples in 0..100 {
-            // Each value is reported twice: at the end of a pass and at the start of the next pass.
-            said.extend(plain.due(&progress(f64::from(samples) / 100.0, samples)));
-            said.extend(plain.due(&progress(f64::from(samples) / 100.0, samples)));
+            // Report each value twice, like the renderer: at the end of a pass and at the start of the next
+            // pass.
+            said.extend(plain.next_line(&progress(f64::from(samples) / 100.0, samples)));
+            said.extend(plain.next_line(&progress(f64::from(samples) / 100.0, samples)));
         }
-        let tens: Vec<_> = (1..10).map(|ten| line(&progress(f64::from(ten) / 10.0, 10 * ten))).collect();
+        let tens: Vec<_> =
+            (1..10).map(|ten| format_progress(&progress(f64::from(ten) / 10.0, 10 * ten))).collect();
         assert_eq!(said, tens);
         // The interval has passed, but nothing has changed.
         plain.last = Instant::now().checked_sub(INTERVAL).expect("the machine started before the interval");
-        assert_eq!(plain.due(&progress(0.9, 90)), None);
+        assert_eq!(plain.next_line(&progress(0.9, 90)), None);
         plain.last = Instant::now().checked_sub(INTERVAL).expect("the machine started before the interval");
-        assert!(plain.due(&progress(0.91, 91)).is_some());
+        assert!(plain.next_line(&progress(0.91, 91)).is_some());
     }
 
     #[test]
     fn files_with_several_meshes_are_listed_once() {
-        let mut plain = Plain::new(Console::new(crate::tui::ColorChoice::None));
+        let mut plain = PlainReporter::new(Console::new(crate::tui::ColorChoice::None));
         let asset = |name: &str, done| AssetProgress { name: name.to_owned(), done, total: 10 };
         let said = [asset("toy.glb", 5), asset("toy.glb", 10), asset("toy.glb", 10), asset("b.png", 10)];
         assert_eq!(said.map(|progress| plain.is_newly_loaded(&progress)), [false, true, false, true]);
@@ -149,11 +155,14 @@ mod tests {
             is_total_fixed: true,
             noise: None,
         };
-        assert_eq!(line(&progress), "render    40% (25.6 of 64 samples, 1.50 s left)");
+        assert_eq!(format_progress(&progress), "render    40% (25.6 of 64 samples, 1.50 s left)");
         let by_noise = RenderProgress { is_total_fixed: false, ..progress };
-        assert_eq!(line(&by_noise), "render    40% (about 25 samples per pixel so far, 1.50 s left)");
+        assert_eq!(
+            format_progress(&by_noise),
+            "render    40% (about 25 samples per pixel so far, 1.50 s left)"
+        );
         let early = RenderProgress { elapsed_seconds: 0.1, ..progress };
-        assert_eq!(line(&early), "render    40% (25.6 of 64 samples)");
-        assert!(!line(&RenderProgress { eta_seconds: None, ..progress }).contains("left"));
+        assert_eq!(format_progress(&early), "render    40% (25.6 of 64 samples)");
+        assert!(!format_progress(&RenderProgress { eta_seconds: None, ..progress }).contains("left"));
     }
 }

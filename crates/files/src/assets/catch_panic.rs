@@ -11,8 +11,8 @@ thread_local! {
 
 /// Runs `work`. If it panics, returns the panic message as an error instead of printing it.
 ///
-/// The first call installs a panic hook that forwards all other panics to the previous hook. A front end that
-/// needs its own hook (to restore the terminal) must install it before loading anything.
+/// The first call installs a panic hook that forwards all other panics to the previous hook. A front end with
+/// its own hook (for example, to restore the terminal) must install it before it loads any file.
 ///
 /// # Errors
 ///

@@ -92,7 +92,7 @@ pub struct LoadedMesh {
     pub dropped: Dropped,
     /// Other warnings, one line each.
     pub warnings: Vec<String>,
-    /// Warnings about the file's materials, one line each. Irrelevant if the scene assigns another material.
+    /// Warnings about the file's materials, one line each. Not relevant if the scene overrides the materials.
     pub material_warnings: Vec<String>,
     /// Files that affect the mesh, including missing ones: material libraries, or buffers of a glTF file.
     pub companions: Vec<Companion>,

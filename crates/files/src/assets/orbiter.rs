@@ -32,8 +32,8 @@ const DEFAULT_FIELD: [f64; 3] = [45.0, 1024.0, 640.0];
 /// are 0 for `p` and `r`, and 45 degrees at 1024 × 640 for `f`.
 ///
 /// # Errors
-/// [`AssetError::Unreadable`], or [`AssetError::Malformed`] with the line for an unknown letter, the wrong
-/// number of values, or a value that is not finite or out of range.
+/// [`AssetError::Unreadable`], or [`AssetError::Malformed`] with the line if a letter is unknown, the number
+/// of values is wrong, or a value is not finite or out of range.
 pub fn load(path: &Path) -> Result<(OrbiterCamera, FileHash), AssetError> {
     let token = CancelToken::new();
     let bytes = read::text(path, LIMIT, read::Monitor { progress: &ignore_progress, token: &token })?;
@@ -51,7 +51,7 @@ fn parse(path: &Path, text: &str) -> Result<OrbiterCamera, AssetError> {
             Some("c") => center = Some(numbers("c", words).map_err(wrong)?),
             Some("p") => position = Some(numbers("p", words).map_err(wrong)?),
             Some("r") => rotation = Some(numbers("r", words).map_err(wrong)?),
-            Some("s") => size = Some(positive(numbers("s", words)).map_err(wrong)?),
+            Some("s") => size = Some(check_distance(numbers("s", words)).map_err(wrong)?),
             Some("f") => field = Some(view_angle(numbers("f", words)).map_err(wrong)?),
             Some(other) => {
                 let shown: String = other.chars().take(20).collect();
@@ -121,7 +121,7 @@ fn numbers<'a, const N: usize>(
 }
 
 /// Checks the distance in `s`. Ignores the radius, because it only affects a rasterizer's clip planes.
-fn positive(numbers: Result<[f64; 2], String>) -> Result<[f64; 2], String> {
+fn check_distance(numbers: Result<[f64; 2], String>) -> Result<[f64; 2], String> {
     let [size, radius] = numbers?;
     match () {
         () if !(size > 0.0) => Err(not_positive(size)),

@@ -68,19 +68,19 @@ pub(crate) fn open(path: &Path, limit: u64) -> Result<(File, u64), AssetError> {
 /// Number of bytes at the start of a file to check for binary data.
 const START: usize = 1 << 12;
 
-/// Reads a text file. Rejects binary files after reading the first [`START`] bytes.
+/// Reads a text file. Rejects binary files based on their first [`START`] bytes.
 pub(crate) fn text(path: &Path, limit: u64, monitor: Monitor<'_>) -> Result<Vec<u8>, AssetError> {
-    bytes_if(path, limit, monitor, |start| {
+    read_accepted(path, limit, monitor, |start| {
         refuse_utf16(path, start)?;
-        binary_if(path, start.contains(&0))
+        reject_if_binary(path, start.contains(&0))
     })
 }
 
 /// Reads a text or binary file in a format that starts with three letters.
 pub(crate) fn text_or_binary(path: &Path, limit: u64, monitor: Monitor<'_>) -> Result<Vec<u8>, AssetError> {
-    bytes_if(path, limit, monitor, |start| {
+    read_accepted(path, limit, monitor, |start| {
         refuse_utf16(path, start)?;
-        binary_if(path, start[..start.len().min(3)].contains(&0))
+        reject_if_binary(path, start[..start.len().min(3)].contains(&0))
     })
 }
 
@@ -94,17 +94,17 @@ pub(crate) fn start(path: &Path, limit: u64) -> Result<Vec<u8>, AssetError> {
 
 /// Reads a text or binary file. Rejects files that start with [`START`] zeros.
 pub(crate) fn not_all_zero(path: &Path, limit: u64, monitor: Monitor<'_>) -> Result<Vec<u8>, AssetError> {
-    bytes_if(path, limit, monitor, |start| {
-        binary_if(path, !start.is_empty() && start.iter().all(|byte| *byte == 0))
+    read_accepted(path, limit, monitor, |start| {
+        reject_if_binary(path, !start.is_empty() && start.iter().all(|byte| *byte == 0))
     })
 }
 
 /// Reads a regular file with any content.
 pub(crate) fn bytes(path: &Path, limit: u64, monitor: Monitor<'_>) -> Result<Vec<u8>, AssetError> {
-    bytes_if(path, limit, monitor, |_| Ok(()))
+    read_accepted(path, limit, monitor, |_| Ok(()))
 }
 
-fn binary_if(path: &Path, is_binary: bool) -> Result<(), AssetError> {
+fn reject_if_binary(path: &Path, is_binary: bool) -> Result<(), AssetError> {
     let refused = || AssetError::malformed(path, Some(1), BINARY_FILE);
     if is_binary { Err(refused()) } else { Ok(()) }
 }
@@ -128,8 +128,8 @@ fn is_utf16(start: &[u8]) -> bool {
 }
 
 /// Reads a regular file unless `accept` rejects its first [`START`] bytes. Reports progress in bytes, out of
-/// `2·length`. The second half is for parsing.
-fn bytes_if(
+/// `2·length`. The second half is reserved for parsing.
+fn read_accepted(
     path: &Path,
     limit: u64,
     monitor: Monitor<'_>,
@@ -141,11 +141,11 @@ fn bytes_if(
     (&mut file).take(START as u64).read_to_end(&mut start).map_err(unreadable)?;
     accept(&start)?;
     file.rewind().map_err(unreadable)?;
-    rest(path, file, (length, limit), monitor)
+    read_rest(path, file, (length, limit), monitor)
 }
 
 /// Reads the rest of an open file of about `length` bytes. Reports progress like [`bytes`].
-pub(crate) fn rest(
+pub(crate) fn read_rest(
     path: &Path,
     file: File,
     (length, limit): (u64, u64),

@@ -46,10 +46,10 @@ pub(super) fn measure(pair: &Pair) -> Display {
     let (width, height) = (pair.width(), pair.height());
     let window = normalized(&gaussian(SIGMA, RADIUS));
     let band_sums = |band| {
-        let sums = tiles::of_band(band, width, height).map(|tile| tile_sums(pair, tile, &window));
+        let sums = tiles::tiles_in_band(band, width, height).map(|tile| tile_sums(pair, tile, &window));
         sums.fold(Sums::default(), Sums::plus)
     };
-    let bands: Vec<_> = (0..tiles::bands(height)).into_par_iter().map(band_sums).collect();
+    let bands: Vec<_> = (0..tiles::band_count(height)).into_par_iter().map(band_sums).collect();
     let sums = bands.into_iter().fold(Sums::default(), Sums::plus);
     let mean_square = sums.square / (3 * width * height) as f64;
     Display { psnr_db: -10.0 * libm::log10(mean_square), ssim: sums.ssim / sums.windows as f64 }
@@ -67,21 +67,21 @@ fn tile_sums(pair: &Pair, tile: Rect, window: &[f64]) -> Sums {
         for (x, column) in columns.iter().enumerate() {
             let (Some(row), Some(column)) = (row, column) else { continue };
             let at = |plane: &Plane| plane.values[y * plane.width + x] / (row * column);
-            sums.ssim += similarity([at(&mean_a), at(&mean_b)], [at(&mean_aa), at(&mean_bb)], at(&mean_ab));
+            sums.ssim += ssim([at(&mean_a), at(&mean_b)], [at(&mean_aa), at(&mean_bb)], at(&mean_ab));
             sums.windows += 1;
         }
     }
     sums
 }
 
-/// Wang et al., equation 13, from the means of a, b, a², b² and ab.
-fn similarity([a, b]: [f64; 2], [aa, bb]: [f64; 2], ab: f64) -> f64 {
+/// SSIM (Wang et al., equation 13) computed from the means of a, b, a², b² and ab.
+fn ssim([a, b]: [f64; 2], [aa, bb]: [f64; 2], ab: f64) -> f64 {
     let (variances, covariance) = (aa - a * a + (bb - b * b), ab - a * b);
     (2.0 * a * b + C1) * (2.0 * covariance + C2) / ((a * a + b * b + C1) * (variances + C2))
 }
 
-/// Sum of squared differences of the tile's channels, and the luma of the tile including a margin of
-/// [`RADIUS`] pixels. Pixels outside the image are 0.
+/// Returns the sum of squared differences over the tile's channels, and the luma of both images in the tile
+/// and a margin of [`RADIUS`] pixels. The luma outside the image is 0.
 fn lumas(pair: &Pair, tile: Rect) -> (f64, [Plane; 2]) {
     let side = |length: u32| length as usize + 2 * RADIUS;
     let mut lumas =
@@ -89,9 +89,9 @@ fn lumas(pair: &Pair, tile: Rect) -> (f64, [Plane; 2]) {
     let mut square = 0.0;
     let width = side(tile.width);
     for row in 0..side(tile.height) {
-        let Some(y) = inside(tile.y, row, pair.height()) else { continue };
+        let Some(y) = image_position(tile.y, row, pair.height()) else { continue };
         for column in 0..width {
-            let Some(x) = inside(tile.x, column, pair.width()) else { continue };
+            let Some(x) = image_position(tile.x, column, pair.width()) else { continue };
             let [a, b] = pair.at(x, y).map(encoded);
             lumas[0].values[row * width + column] = luma(a);
             lumas[1].values[row * width + column] = luma(b);
@@ -104,7 +104,7 @@ fn lumas(pair: &Pair, tile: Rect) -> (f64, [Plane; 2]) {
 }
 
 /// Converts a position in the tile (with margin) to a position in the image. `None` if it is outside.
-fn inside(start: u32, offset: usize, length: usize) -> Option<usize> {
+fn image_position(start: u32, offset: usize, length: usize) -> Option<usize> {
     (start as usize + offset).checked_sub(RADIUS).filter(|&position| position < length)
 }
 

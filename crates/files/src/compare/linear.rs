@@ -6,7 +6,7 @@ use super::Pair;
 use crate::math::color::{LUMINANCE_WEIGHTS, RELMSE_EPSILON};
 use crate::math::{DVec2, Vec3};
 
-/// One out of this many pixels is dropped from the trimmed mean.
+/// The trimmed mean excludes one pixel out of this many.
 const DROPPED_ONE_IN: usize = 1000;
 
 pub(super) struct Linear {
@@ -50,7 +50,7 @@ pub(super) fn measure(pair: &Pair) -> Linear {
     Linear {
         rmse: (sums.square / (3 * pixels) as f64).sqrt(),
         relmse,
-        relmse_trimmed: if dropped == 0 { relmse } else { trimmed(pair, dropped) },
+        relmse_trimmed: if dropped == 0 { relmse } else { trimmed_mean(pair, dropped) },
         dropped_pixels: dropped as u64,
         max: sums.max,
         max_at: sums.max_at,
@@ -69,7 +69,7 @@ fn row_sums(a: &[Vec3], b: &[Vec3]) -> Sums {
     for (x, (&a, &b)) in a.iter().zip(b).enumerate() {
         let difference = a.as_dvec3() - b.as_dvec3();
         sums.square += difference.length_squared();
-        sums.relative += relative(a, b);
+        sums.relative += relative_squared_error(a, b);
         sums.luminances +=
             DVec2::from([a, b].map(|color| color.as_dvec3().dot(LUMINANCE_WEIGHTS.as_dvec3())));
         let largest = difference.abs().max_element();
@@ -81,20 +81,20 @@ fn row_sums(a: &[Vec3], b: &[Vec3]) -> Sums {
 }
 
 /// Mean over the channels of (a − b)²/(b² + 0.01).
-fn relative(a: Vec3, b: Vec3) -> f64 {
+fn relative_squared_error(a: Vec3, b: Vec3) -> f64 {
     let (a, b) = (a.as_dvec3(), b.as_dvec3());
     ((a - b) * (a - b) / (b * b + RELMSE_EPSILON)).element_sum() / 3.0
 }
 
-/// Mean of [`relative`], excluding the largest values.
-fn trimmed(pair: &Pair, dropped: usize) -> f64 {
+/// Mean of [`relative_squared_error`], excluding the largest values.
+fn trimmed_mean(pair: &Pair, dropped: usize) -> f64 {
     let pixels = pair.a().pixels.par_iter().zip(&pair.b().pixels);
-    let mut errors: Vec<f64> = pixels.map(|(&a, &b)| relative(a, b)).collect();
+    let mut errors: Vec<f64> = pixels.map(|(&a, &b)| relative_squared_error(a, b)).collect();
     let kept = errors.len() - dropped;
     let (_, &mut least_dropped, _) = errors.select_nth_unstable_by(kept, f64::total_cmp);
     drop(errors);
     let rows = map_rows(pair, |a, b| {
-        let errors = a.iter().zip(b).map(|(&a, &b)| relative(a, b));
+        let errors = a.iter().zip(b).map(|(&a, &b)| relative_squared_error(a, b));
         errors
             .filter(|error| *error < least_dropped)
             .fold((0.0, 0), |(sum, count), error| (sum + error, count + 1))

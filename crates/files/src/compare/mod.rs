@@ -16,7 +16,7 @@ mod tiles;
 mod two_references;
 
 pub use bias::Bias;
-pub use diff::{absolute, heat};
+pub use diff::{absolute_difference, flip_heat_map};
 pub use flip::PIXELS_PER_DEGREE;
 pub use pair::{CompareError, Pair};
 pub use two_references::TwoReferences;
@@ -43,13 +43,13 @@ pub struct Errors {
     pub psnr_db: f64,
     /// Structural similarity of the luma of clamped sRGB, 1 for equal images.
     pub ssim: f64,
-    /// Mean of [`Measured::flip`], in [0, 1]. 0 for equal images.
+    /// Mean of [`PairMeasurements::flip`], in [0, 1]. 0 for equal images.
     pub flip: f64,
 }
 
 /// Measurements of a pair of images.
 #[derive(Clone, Debug)]
-pub struct Measured {
+pub struct PairMeasurements {
     /// Error metrics.
     pub errors: Errors,
     /// FLIP of each pixel, in [0, 1], row by row from the top.
@@ -57,10 +57,10 @@ pub struct Measured {
 }
 
 /// Measures all errors.
-pub fn measure(pair: &Pair) -> Measured {
+pub fn measure(pair: &Pair) -> PairMeasurements {
     let linear = linear::measure(pair);
     let display = display::measure(pair);
-    let flip = flip::map(pair);
+    let flip = flip::error_map(pair);
     let errors = Errors {
         rmse: linear.rmse,
         relmse: linear.relmse,
@@ -73,7 +73,7 @@ pub fn measure(pair: &Pair) -> Measured {
         ssim: display.ssim,
         flip: mean(&flip),
     };
-    Measured { errors, flip }
+    PairMeasurements { errors, flip }
 }
 
 fn mean(values: &[f32]) -> f64 {

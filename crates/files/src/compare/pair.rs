@@ -114,7 +114,7 @@ impl Pair {
     }
 }
 
-/// Reads an image. Returns it with its warnings.
+/// Reads an image and returns it with the warnings about its file.
 fn read(path: &Path) -> Result<(RadianceImage, Vec<String>), AssetError> {
     let image =
         load(path, ImageEncoding::Raw, ImageLimits::default(), &ignore_progress, &CancelToken::new())?;

@@ -30,7 +30,7 @@ impl Plane {
         let mut out = Self::zero(self.width + 1 - taps.len(), self.height);
         for (row, out) in self.values.chunks_exact(self.width).zip(out.values.chunks_exact_mut(out.width)) {
             let shifted: Vec<_> = row.windows(out.len()).collect();
-            add(out, &shifted, taps);
+            add_weighted_rows(out, &shifted, taps);
         }
         out
     }
@@ -40,14 +40,14 @@ impl Plane {
         let mut out = Self::zero(self.width, self.height + 1 - taps.len());
         let rows: Vec<_> = self.values.chunks_exact(self.width).collect();
         for (out, rows) in out.values.chunks_exact_mut(self.width).zip(rows.windows(taps.len())) {
-            add(out, rows, taps);
+            add_weighted_rows(out, rows, taps);
         }
         out
     }
 }
 
 /// Adds rows multiplied by their taps. Processes four rows at a time to reduce loads and stores of the sums.
-fn add(sums: &mut [f64], rows: &[&[f64]], taps: &[f64]) {
+fn add_weighted_rows(sums: &mut [f64], rows: &[&[f64]], taps: &[f64]) {
     let (fours, rest) = taps.as_chunks();
     let (fours_of_rows, rest_of_rows) = rows.as_chunks();
     for ([t, u, v, w], [a, b, c, d]) in fours.iter().zip(fours_of_rows) {

@@ -247,7 +247,7 @@ fn results_do_not_depend_on_thread_count() {
     let pair = pair(a, b);
     let with = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
-        let Measured { errors, flip } = pool.install(|| measure(&pair));
+        let PairMeasurements { errors, flip } = pool.install(|| measure(&pair));
         (errors, flip)
     };
     let expected = with(1);
@@ -281,10 +281,10 @@ fn error_images_show_the_largest_error() {
     let [a, b] = edges(20, 13);
     let pair = pair(a, b);
     let measured = measure(&pair);
-    let absolute = absolute(&pair);
+    let absolute = absolute_difference(&pair);
     let largest = absolute.pixels.iter().map(|pixel| pixel.max_element()).fold(0.0, f32::max);
     assert_eq!(f64::from(largest), measured.errors.max);
-    let heat = heat(&pair, &measured.flip);
+    let heat = flip_heat_map(&pair, &measured.flip);
     assert_eq!((heat.width, heat.height, heat.pixels.len()), (20, 13, 260));
     let order = |values: Vec<f32>| {
         let mut order: Vec<_> = (0..values.len()).collect();

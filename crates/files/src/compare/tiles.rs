@@ -6,12 +6,12 @@ use crate::film::Rect;
 pub(super) const SIDE: usize = 128;
 
 /// Number of bands (rows of tiles).
-pub(super) fn bands(height: usize) -> usize {
+pub(super) fn band_count(height: usize) -> usize {
     height.div_ceil(SIDE)
 }
 
 /// Tiles of a band, from left to right.
-pub(super) fn of_band(band: usize, width: usize, height: usize) -> impl Iterator<Item = Rect> {
+pub(super) fn tiles_in_band(band: usize, width: usize, height: usize) -> impl Iterator<Item = Rect> {
     let y = band * SIDE;
     (0..width.div_ceil(SIDE)).map(move |column| {
         let x = column * SIDE;

@@ -1,6 +1,6 @@
 //! Computes errors against two noisy references. A reference is the ground truth plus noise. If the noise of
-//! the two references is independent, the expected value of (x − r₁)(x − r₂) is the same as for (x − truth)²,
-//! without the variance of the noise.
+//! the two references is independent, the expected value of (x − r₁)(x − r₂) equals that of (x − truth)²: the
+//! noise of the references does not add its variance.
 
 use super::Pair;
 use crate::film::RadianceImage;
@@ -15,7 +15,7 @@ fn luminance(color: DVec3) -> f64 {
 #[derive(Clone, Debug)]
 pub struct TwoReferences {
     pair: Pair,
-    /// 1/(r² + 0.01), where r is the mean of the references, divided by the number of channels and pixels.
+    /// 1/(r² + 0.01) for the mean r of both references, divided by the number of channels and pixels.
     weights: Vec<DVec3>,
 }
 
@@ -36,7 +36,7 @@ impl TwoReferences {
         &self.pair
     }
 
-    /// relMSE of an image of the same size, not biased by the references' noise. Can be negative.
+    /// relMSE of an image of the same size, unbiased by the references' noise. Can be negative.
     pub fn error(&self, x: &RadianceImage) -> f64 {
         self.cross(x, x)
     }

@@ -33,7 +33,7 @@ pub enum Losses<'a> {
 
 /// Attributes of the file to replace.
 #[derive(Debug)]
-pub(super) struct Attributes {
+pub(super) struct FileAttributes {
     uid: u32,
     gid: u32,
     mode: u32,
@@ -45,16 +45,16 @@ pub(super) struct Attributes {
 
 /// Attributes that could not be copied, and permissions that are safe without them.
 #[derive(Debug, PartialEq, Eq)]
-pub(super) struct Carried {
+pub(super) struct UncopiedAttributes {
     /// Descriptions of the lost attributes, such as `its owner`.
     pub(super) lost: Vec<String>,
     mode: u32,
 }
 
-impl Attributes {
+impl FileAttributes {
     /// Reads the attributes of a file.
     pub(super) fn read(path: &Path, metadata: &fs::Metadata) -> Self {
-        let mut named = named(path);
+        let mut named = extended_attributes(path);
         named.sort_by_key(|(name, _)| name == ACCESS_LIST);
         Self {
             uid: metadata.uid(),
@@ -66,10 +66,10 @@ impl Attributes {
         }
     }
 
-    /// Applies all attributes except the permissions to a new file. The file must only be accessible to its
-    /// owner until then.
-    pub(super) fn carry_over(&self, new: &File) -> Carried {
-        let mut carried = Carried { lost: Vec::new(), mode: self.mode };
+    /// Applies all attributes except the permissions to a new file. Until the permissions are applied, the
+    /// file must only be accessible to its owner.
+    pub(super) fn carry_over(&self, new: &File) -> UncopiedAttributes {
+        let mut carried = UncopiedAttributes { lost: Vec::new(), mode: self.mode };
         // Set the flags before changing the owner, because only the owner may set them.
         #[cfg(target_os = "linux")]
         if !self.flags.carry_over(new) {
@@ -80,7 +80,7 @@ impl Attributes {
         carried
     }
 
-    fn carry_owner(&self, new: &File, carried: &mut Carried) {
+    fn carry_owner(&self, new: &File, carried: &mut UncopiedAttributes) {
         let ids = || new.metadata().map(|found| (found.uid(), found.gid()));
         let is_same = |found: io::Result<(u32, u32)>| found.is_ok_and(|found| found == (self.uid, self.gid));
         if is_same(ids()) || fchown(new, Some(self.uid), Some(self.gid)).is_ok() {
@@ -102,9 +102,9 @@ impl Attributes {
         }
     }
 
-    fn carry_named(&self, new: &File, carried: &mut Carried) {
+    fn carry_named(&self, new: &File, carried: &mut UncopiedAttributes) {
         for (name, value) in &self.named {
-            let is_kept = value.as_ref().is_ok_and(|value| set(new, name, value).is_ok());
+            let is_kept = value.as_ref().is_ok_and(|value| set_attribute(new, name, value).is_ok());
             if !is_kept {
                 carried.lose(name);
             }
@@ -118,7 +118,7 @@ impl Attributes {
     }
 }
 
-impl Carried {
+impl UncopiedAttributes {
     /// Applies the permissions. Must be called last, because writing clears some of them.
     pub(super) fn apply_mode(&self, new: &File) -> io::Result<()> {
         new.set_permissions(fs::Permissions::from_mode(self.mode))
@@ -137,7 +137,7 @@ impl Carried {
 }
 
 /// Extended attributes of a file. Empty on file systems without them.
-fn named(path: &Path) -> Vec<(OsString, io::Result<Vec<u8>>)> {
+fn extended_attributes(path: &Path) -> Vec<(OsString, io::Result<Vec<u8>>)> {
     let is_carried = |name: &OsString| !EXCLUDED.iter().any(|known| name == known);
     let value = |name: OsString| match xattr::get_deref(path, &name) {
         Ok(None) => None,
@@ -152,7 +152,7 @@ fn named(path: &Path) -> Vec<(OsString, io::Result<Vec<u8>>)> {
 }
 
 /// Sets an attribute. Does nothing if it already has this value, because setting it may need permission.
-fn set(new: &File, name: &OsStr, value: &[u8]) -> io::Result<()> {
+fn set_attribute(new: &File, name: &OsStr, value: &[u8]) -> io::Result<()> {
     if new.get_xattr(name).is_ok_and(|now| now.as_deref() == Some(value)) {
         return Ok(());
     }
@@ -163,14 +163,14 @@ fn set(new: &File, name: &OsStr, value: &[u8]) -> io::Result<()> {
 mod tests {
     use super::*;
 
-    fn attributes(mode: u32, name: &str) -> (Attributes, File) {
+    fn attributes(mode: u32, name: &str) -> (FileAttributes, File) {
         let new = tempfile::tempfile().expect("a file");
         let found = new.metadata().expect("a file");
         let named = vec![(OsString::from(name), Ok(b"value".to_vec()))];
         #[cfg(target_os = "linux")]
         let flags = Flags::read(Path::new("/nowhere"));
         let (uid, gid) = (found.uid(), found.gid());
-        let attributes = Attributes {
+        let attributes = FileAttributes {
             uid,
             gid,
             mode,
@@ -187,7 +187,7 @@ mod tests {
         let carried = attributes.carry_over(&new);
         assert_eq!(
             carried,
-            Carried { lost: vec!["its attribute nonsense.of.no.space".to_owned()], mode: 0o664 }
+            UncopiedAttributes { lost: vec!["its attribute nonsense.of.no.space".to_owned()], mode: 0o664 }
         );
     }
 
@@ -196,7 +196,7 @@ mod tests {
         // The value is not a valid list.
         let (attributes, new) = attributes(0o664, ACCESS_LIST);
         let carried = attributes.carry_over(&new);
-        assert_eq!(carried, Carried { lost: vec!["its access list".to_owned()], mode: 0o600 });
+        assert_eq!(carried, UncopiedAttributes { lost: vec!["its access list".to_owned()], mode: 0o600 });
         carried.apply_mode(&new).expect("permitted");
         assert_eq!(new.metadata().expect("a file").mode() & 0o777, 0o600);
     }

@@ -12,8 +12,8 @@ use crate::control::{CancelToken, Cancelled};
 use crate::film::RadianceImage;
 use crate::film::tone::{develop, develop16};
 
-/// Number of pixels between two polls of the cancel token. Takes a few milliseconds, and is large enough for
-/// all threads.
+/// Number of pixels between two polls of the cancel token. Processing them takes a few milliseconds and keeps
+/// all threads busy.
 const PIXELS: usize = 1 << 18;
 
 /// Number of bytes to compress or write between two polls of the cancel token.
@@ -21,7 +21,7 @@ pub(super) const BYTES: usize = 1 << 15;
 
 /// Tone maps an image from top to bottom. Components have one byte, or two bytes in big-endian order, as in
 /// PNG and PPM. Passes the bytes to `take` in order, at most [`BYTES`] at a time.
-pub(super) fn develop_parts(
+pub(super) fn tone_map_in_parts(
     image: &RadianceImage,
     options: &EncodeOptions,
     token: &CancelToken,
@@ -46,7 +46,7 @@ pub(super) fn develop_parts(
 }
 
 /// Tone maps an image to three bytes per pixel.
-pub(super) fn develop_all(
+pub(super) fn tone_map_all(
     image: &RadianceImage,
     (options, format): (&EncodeOptions, Format),
     token: &CancelToken,
@@ -56,7 +56,7 @@ pub(super) fn develop_all(
         picture.extend_from_slice(part);
         Ok(())
     };
-    develop_parts(image, options, token, take).map_err(|error| OutputError::encoder(format, &error))?;
+    tone_map_in_parts(image, options, token, take).map_err(|error| OutputError::encoder(format, &error))?;
     Ok(picture)
 }
 
@@ -165,7 +165,7 @@ mod tests {
             all.extend_from_slice(bytes);
             Ok(())
         };
-        develop_parts(&image, &options, &token, take).expect("not cancelled");
+        tone_map_in_parts(&image, &options, &token, take).expect("not cancelled");
         let expected = develop16(&image, &options.tone).pixels.into_flattened();
         assert!(all.as_chunks().0.iter().map(|two| u16::from_be_bytes(*two)).eq(expected));
         let mut parts = 0;
@@ -174,7 +174,7 @@ mod tests {
             token.cancel();
             Ok(())
         };
-        assert!(develop_parts(&image, &options, &token, stop).is_err());
+        assert!(tone_map_in_parts(&image, &options, &token, stop).is_err());
         assert_eq!(parts, 1);
     }
 

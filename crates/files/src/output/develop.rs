@@ -10,7 +10,7 @@ use crate::film::{Film, Quantity, RadianceImage, SampleStats};
 pub struct DevelopSettings {
     /// Quantity of the film to show.
     pub quantity: Quantity,
-    /// Tone mapping, with its range not yet resolved for the image.
+    /// Tone mapping whose range has not been resolved for the image yet.
     pub tone: ToneMapping,
     /// Bits per channel of PNG and PPM files.
     pub bit_depth: BitDepth,
@@ -27,7 +27,10 @@ impl DevelopSettings {
     }
 
     /// Metadata with the number of samples inserted after the scene.
-    pub fn metadata_with(&self, SampleStats { min, mean, max }: SampleStats) -> Vec<(String, String)> {
+    pub fn metadata_with_samples(
+        &self,
+        SampleStats { min, mean, max }: SampleStats,
+    ) -> Vec<(String, String)> {
         let mut metadata = self.metadata.clone();
         let samples =
             if min == max { min.to_string() } else { format!("{min} to {max}, {mean:.2} on average") };
@@ -48,7 +51,7 @@ impl DevelopSettings {
     ) -> Result<Vec<u8>, OutputError> {
         let tone = self.tone.resolved_for(image);
         // Add the metadata derived from the film: the number of samples, and the range at the end.
-        let mut metadata = self.metadata_with(film.samples());
+        let mut metadata = self.metadata_with_samples(film.samples());
         let range = tone.range_map.range();
         let range = range.map(|range| format!("{} to {}", range.least, range.greatest));
         metadata.extend(range.map(|range| ("glimt:range".to_owned(), range)));

@@ -110,9 +110,9 @@ const REC_709: Chromaticities = Chromaticities {
     white: Vec2(0.3127, 0.3290),
 };
 
-/// Attributes of the file. Metadata is written to the standard attribute `comments`, one item per line. The
-/// encoder would write custom attributes in the random order of its hash map, so files would be
-/// nondeterministic. [`MEAN_LUMINANCE_ERROR`] is the only custom attribute.
+/// Attributes of the file. Metadata is written to the standard attribute `comments`, one item per line.
+/// [`MEAN_LUMINANCE_ERROR`] is the only custom attribute. With more of them, files would be nondeterministic,
+/// because the encoder would write them in the random order of its hash map.
 fn attributes(options: &EncodeOptions) -> LayerAttributes {
     let line = |(name, value): &(String, String)| format!("{}: {}", one_line(name), one_line(value));
     let lines: Vec<_> = options.metadata.iter().map(line).collect();

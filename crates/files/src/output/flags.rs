@@ -6,7 +6,7 @@ use std::path::Path;
 use rustix::fs::{IFlags, ioctl_getflags, ioctl_setflags};
 
 /// Flags that users can set, except for append-only and immutable. Files with these two flags are not
-/// replaced. All other flags are managed by the system.
+/// replaced. The remaining flags are managed by the system.
 const USER_FLAGS: IFlags = IFlags::NODUMP
     .union(IFlags::NOATIME)
     .union(IFlags::SYNC)

@@ -6,7 +6,7 @@ use crate::control::CancelToken;
 use crate::film::RadianceImage;
 use crate::math::Vec3;
 
-/// Widths of scanlines that may be compressed. Scanlines with other widths must be plain pixels.
+/// Widths of scanlines that may be compressed. Scanlines of other widths must not be compressed.
 const COMPRESSED_WIDTHS: std::ops::Range<usize> = 8..32768;
 const LONGEST_RUN: usize = 127;
 const LONGEST_LITERAL: usize = 128;
@@ -48,7 +48,8 @@ fn write_line(line: &[Vec3], bytes: &mut Vec<u8>) {
 fn rgbe(color: Vec3) -> [u8; 4] {
     let color = color.to_array().map(|component| f64::from(as_finite(component).max(0.0)));
     let brightest = color[0].max(color[1]).max(color[2]);
-    // 2^(exponent − 1) ≤ brightest < 2^exponent. Add one if the mantissa would round up to 256.
+    // 2^(exponent − 1) ≤ brightest < 2^exponent. Increase the exponent by 1 if the mantissa would round up to
+    // 256.
     let mut exponent = libm::log2(brightest).floor() + 1.0;
     if (brightest / libm::exp2(exponent) * 256.0).round() >= 256.0 {
         exponent += 1.0;

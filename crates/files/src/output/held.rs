@@ -1,5 +1,5 @@
-//! Replaces a user's text file only if it still has the expected content. At all times, every saved version
-//! exists under either the file's name or a backup name. Backups that differ from the file are never removed
+//! Replaces a user's text file only if it still has the expected content. Every saved version always exists
+//! under either the file's name or the backup name. Backups that differ from the file are never removed
 //! automatically. They are reported at the next start.
 
 use std::fs::{self, File};
@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use super::move_new::move_new;
 use super::resolve_path;
-use super::temporary::Temporary;
+use super::temporary::TemporaryFile;
 
 /// Extension of the backup name.
 const EXTENSION: &str = ".glimt-saved";
@@ -28,7 +28,7 @@ pub enum Held {
 
 /// Looks for a backup left by an interrupted replacement, and restores it if the file is missing.
 pub fn recover(path: &Path) -> Held {
-    let Ok((target, existing)) = resolve_path::follow(path) else { return Held::None };
+    let Ok((target, existing)) = resolve_path::follow_links(path) else { return Held::None };
     let held = backup_path(&target);
     let Ok(text) = fs::read(&held) else { return Held::None };
     if existing.is_none() && move_new(&held, &target).is_ok() {
@@ -52,7 +52,7 @@ pub(super) struct Replacement<'a> {
     target: &'a Path,
     held: PathBuf,
     expected: &'a [u8],
-    new: Temporary,
+    new: TemporaryFile,
 }
 
 impl<'a> Replacement<'a> {
@@ -60,7 +60,7 @@ impl<'a> Replacement<'a> {
     ///
     /// # Errors
     /// A backup already exists, or a system error.
-    pub(super) fn begin(mut new: Temporary, target: &'a Path, expected: &'a [u8]) -> io::Result<Self> {
+    pub(super) fn begin(mut new: TemporaryFile, target: &'a Path, expected: &'a [u8]) -> io::Result<Self> {
         let held = backup_path(target);
         new.move_to_new(&held).map_err(|error| backup_error(&held, error))?;
         Ok(Self { target, held, expected, new })
@@ -69,8 +69,8 @@ impl<'a> Replacement<'a> {
     /// Swaps both files. The old text is now the backup.
     ///
     /// # Errors
-    /// A system error. Includes the new text if it is back under its temporary name.
-    pub(super) fn swap(mut self) -> Result<Self, (io::Error, Option<Temporary>)> {
+    /// A system error. Includes the new text if it has been renamed back to its temporary name.
+    pub(super) fn swap(mut self) -> Result<Self, (io::Error, Option<TemporaryFile>)> {
         match exchange(&self.held, self.target) {
             Ok(()) => Ok(self),
             Err(error) => {
@@ -92,15 +92,15 @@ impl<'a> Replacement<'a> {
             let _ = fs::remove_file(&self.held);
             return self.new.file.try_clone().map(Some);
         }
-        self.put_back(text)?;
+        self.restore_old(text)?;
         Ok(None)
     }
 
     /// Restores the old text, unless another program has saved a newer text in the meantime.
-    fn put_back(&self, mut older: Vec<u8>) -> io::Result<()> {
+    fn restore_old(&self, mut older: Vec<u8>) -> io::Result<()> {
         for _ in 0..ATTEMPTS {
             exchange(&self.held, self.target)?;
-            if self.is_new_held() {
+            if self.is_new_at_backup_path() {
                 return fs::remove_file(&self.held);
             }
             // The backup is not our new text, so another program saved it after the first exchange. Swap it
@@ -116,7 +116,7 @@ impl<'a> Replacement<'a> {
     }
 
     /// Whether the backup name refers to the new file.
-    fn is_new_held(&self) -> bool {
+    fn is_new_at_backup_path(&self) -> bool {
         super::FileIdentity::of(&self.held).is_some_and(|held| held.is_of(&self.new.file))
     }
 }
@@ -145,7 +145,7 @@ impl<'a> StepwiseReplacement<'a> {
     ///
     /// # Errors
     /// A system error. A backup may remain.
-    pub(super) fn settle(self, mut new: Temporary) -> io::Result<Option<File>> {
+    pub(super) fn settle(self, mut new: TemporaryFile) -> io::Result<Option<File>> {
         if fs::read(&self.held)? != self.expected {
             return move_new(&self.held, self.target).map(|()| None);
         }
@@ -172,7 +172,7 @@ impl<'a> StepwiseReplacement<'a> {
 ///
 /// # Errors
 /// A system error.
-pub(super) fn replace(new: Temporary, target: &Path, expected: &[u8]) -> io::Result<Option<File>> {
+pub(super) fn replace(new: TemporaryFile, target: &Path, expected: &[u8]) -> io::Result<Option<File>> {
     match Replacement::begin(new, target, expected)?.swap() {
         Ok(replacement) => replacement.settle(),
         // The file system cannot exchange names, or the file no longer exists.
@@ -245,8 +245,8 @@ mod tests {
         }
 
         /// New text in a temporary file.
-        fn new_text(&self) -> Temporary {
-            let new = Temporary::create(self.folder.path(), OsStr::new("a.toml"), 0o644).expect("a file");
+        fn new_text(&self) -> TemporaryFile {
+            let new = TemporaryFile::create(self.folder.path(), OsStr::new("a.toml"), 0o644).expect("a file");
             (&new.file).write_all(NEW.as_bytes()).expect("written");
             new
         }

@@ -6,7 +6,7 @@ use std::io::ErrorKind;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
-use super::resolve_path::{directory_of, follow};
+use super::resolve_path::{directory_of, follow_links};
 
 /// Identity of a regular file, existing or not. Two paths with the same identity refer to the same file, even
 /// with symbolic or hard links, `..`, or different case on a case-insensitive file system.
@@ -48,7 +48,7 @@ impl FileIdentity {
     }
 
     fn of_new(path: &Path) -> Option<Self> {
-        let (target, _) = follow(path).ok()?;
+        let (target, _) = follow_links(path).ok()?;
         let folder = fs::metadata(directory_of(&target)).ok()?;
         let name = target.file_name()?.to_owned();
         Some(Self::New { device: folder.dev(), inode: folder.ino(), name })
@@ -101,8 +101,8 @@ fn have_same_content(a: &Path, b: &Path) -> bool {
     hash(a).is_some_and(|hash_of_a| Some(hash_of_a) == hash(b))
 }
 
-/// Whether two paths refer to the same file, existing or not, or may refer to the same file based on their
-/// [`FileFingerprint`].
+/// Whether two paths refer to the same file, existing or not. Also true if they may refer to the same file
+/// according to their [`FileFingerprint`].
 pub fn is_same_file(a: &Path, b: &Path) -> bool {
     let Some(identity) = FileIdentity::of(a) else { return false };
     let are_alike = || Some(FileFingerprint::of(a)?.may_equal(&FileFingerprint::of(b)?));

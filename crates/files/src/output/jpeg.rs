@@ -8,7 +8,8 @@ use super::{EncodeOptions, Format, OutputError, SOFTWARE, one_line};
 use crate::control::CancelToken;
 use crate::film::RadianceImage;
 
-/// Quality (maximum 100). Visually lossless at arm's length, with a quarter of the file size of quality 100.
+/// Quality (maximum 100). Visually lossless at arm's length. Files are a quarter as large as with quality
+/// 100.
 const QUALITY: u8 = 92;
 
 pub(super) fn encode(
@@ -16,12 +17,12 @@ pub(super) fn encode(
     options: &EncodeOptions,
     token: &CancelToken,
 ) -> Result<Vec<u8>, OutputError> {
-    let pixels = cancellable::develop_all(image, (options, Format::Jpeg), token)?;
+    let pixels = cancellable::tone_map_all(image, (options, Format::Jpeg), token)?;
     let mut bytes = CancellableBuffer::new(token);
     JpegEncoder::new_with_quality(&mut bytes, QUALITY)
         .encode(&pixels, image.width, image.height, ExtendedColorType::Rgb8)
         .map_err(|error| OutputError::encoder(Format::Jpeg, &error))?;
-    Ok(with_comment(&bytes.into_bytes(), &comment(options)))
+    Ok(insert_comment(&bytes.into_bytes(), &comment(options)))
 }
 
 /// Metadata, one line per item.
@@ -35,7 +36,7 @@ fn comment(options: &EncodeOptions) -> String {
 
 /// Inserts a comment after the first two bytes and the mandatory first segment (ITU-T T.81, B.2.4.5). The
 /// encoder does not write comments.
-fn with_comment(file: &[u8], comment: &str) -> Vec<u8> {
+fn insert_comment(file: &[u8], comment: &str) -> Vec<u8> {
     const COMMENT: [u8; 2] = [0xff, 0xfe];
     /// Maximum size of a segment's content.
     const MAX_BYTES: usize = u16::MAX as usize - 2;

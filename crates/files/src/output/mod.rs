@@ -41,7 +41,8 @@ pub use exr::mean_luminance_error;
 pub use format::{AnimationFormat, BitDepth, Format};
 pub use identity::{FileFingerprint, FileIdentity, is_same_file};
 pub use origin::{
-    Replaced, replaced_image, replaced_json, replaced_plot, replaced_table, scene_of_image, signed,
+    Replaced, may_replace_image, may_replace_json, may_replace_plot, may_replace_table, scene_of_image,
+    sign_plot,
 };
 
 use crate::control::CancelToken;
@@ -58,7 +59,7 @@ const PROGRAM: &str = "glimt";
 pub struct LayerImage {
     /// Name of the layer.
     pub name: &'static str,
-    /// Channel names, at most three. Only as many pixel components are written.
+    /// Channel names, at most three. One pixel component is written per name.
     pub channels: &'static [&'static str],
     /// Pixel values. Same size as the image.
     pub image: RadianceImage,
@@ -129,14 +130,14 @@ pub(crate) fn encode_with(
 /// directory or not writable.
 pub fn check_target(path: &Path) -> Result<Format, OutputError> {
     let format = Format::from_path(path)?;
-    resolve_path::check(path)?;
+    resolve_path::check_writable(path)?;
     Ok(format)
 }
 
 /// Like [`check_target`], but does not create a file, so it can be called frequently.
 ///
 /// # Errors
-/// Same as [`check_target`], except if files cannot be created in a directory despite its permissions.
+/// Same as [`check_target`], but does not detect directories that reject new files despite their permissions.
 pub fn inspect_target(path: &Path) -> Result<Format, OutputError> {
     let format = Format::from_path(path)?;
     inspect_path(path)?;
@@ -148,7 +149,7 @@ pub fn inspect_target(path: &Path) -> Result<Format, OutputError> {
 /// # Errors
 /// Same as [`inspect_target`], except for the extension.
 pub fn inspect_path(path: &Path) -> Result<(), OutputError> {
-    resolve_path::find(path).map(drop)
+    resolve_path::resolve(path).map(drop)
 }
 
 /// Checks that a file of any type can be written to this path, as far as this is possible in advance.
@@ -156,7 +157,7 @@ pub fn inspect_path(path: &Path) -> Result<(), OutputError> {
 /// # Errors
 /// Same as [`check_target`], except for the extension.
 pub fn check_path(path: &Path) -> Result<(), OutputError> {
-    resolve_path::check(path)
+    resolve_path::check_writable(path)
 }
 
 /// Replaces NaN with 0 and infinities with the largest finite value.

@@ -1,5 +1,5 @@
-//! Detects from a file's content whether glimt wrote it. This ensures that glimt only replaces its own files,
-//! and only with the same type of file.
+//! Detects from a file's content whether glimt wrote it. glimt only replaces its own files, and only with the
+//! same type of file.
 
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read};
@@ -21,7 +21,7 @@ const PLOT_BYTES: u64 = 64 << 20;
 pub enum Replaced {
     /// No file, or a file that may be replaced.
     Own,
-    /// A file not written by glimt. Contains the type that glimt would write: "a report".
+    /// A file not written by glimt. Contains a description of what glimt would write, such as "a report".
     Foreign(&'static str),
     /// A file that cannot be read.
     Unreadable(io::Error),
@@ -61,7 +61,7 @@ impl Replaced {
 }
 
 /// Checks whether an image may be replaced. It must be a PNG with a text chunk that names glimt.
-pub fn replaced_image(path: &Path) -> Replaced {
+pub fn may_replace_image(path: &Path) -> Replaced {
     Replaced::of(replaced(path), "an image", is_own_image)
 }
 
@@ -77,7 +77,7 @@ pub fn scene_of_image(path: &Path) -> Option<String> {
 
 /// Checks whether a JSON file may be replaced. It must either parse as `T` and be accepted by `is_own`, or be
 /// empty.
-pub fn replaced_json<T: DeserializeOwned>(
+pub fn may_replace_json<T: DeserializeOwned>(
     path: &Path,
     kind: &'static str,
     is_own: impl Fn(&T) -> bool,
@@ -92,7 +92,7 @@ pub fn replaced_json<T: DeserializeOwned>(
 
 /// Checks whether a table may be replaced. It must either start with this line, including its line end, or be
 /// empty.
-pub fn replaced_table(path: &Path, first_line: &str) -> Replaced {
+pub fn may_replace_table(path: &Path, first_line: &str) -> Replaced {
     Replaced::of_text(path, "a table", |file| {
         let mut start = Vec::new();
         let is_read = file.take(first_line.len() as u64).read_to_end(&mut start).is_ok();
@@ -100,9 +100,9 @@ pub fn replaced_table(path: &Path, first_line: &str) -> Replaced {
     })
 }
 
-/// Checks whether a plot may be replaced. It must either be empty, or contain these texts and be [`signed`].
-/// Plots from older versions have no signature and are also accepted.
-pub fn replaced_plot(path: &Path, texts: &[&str]) -> Replaced {
+/// Checks whether a plot may be replaced. It must either be empty, or contain these texts and the signature
+/// added by [`sign_plot`]. Plots from older versions, which have no signature, are also accepted.
+pub fn may_replace_plot(path: &Path, texts: &[&str]) -> Replaced {
     Replaced::of_text(path, "a plot", |file| is_own_plot(file, texts))
 }
 
@@ -110,7 +110,7 @@ pub fn replaced_plot(path: &Path, texts: &[&str]) -> Replaced {
 const SIGNATURE: &str = "\n<desc>";
 
 /// Adds a signature with the program's name to a plot.
-pub fn signed(svg: &str) -> String {
+pub fn sign_plot(svg: &str) -> String {
     match svg.split_once('>') {
         Some((start, rest)) => format!("{start}>{SIGNATURE}{SOFTWARE}</desc>{rest}"),
         None => svg.to_owned(),
@@ -119,7 +119,7 @@ pub fn signed(svg: &str) -> String {
 
 /// Opens the regular file that would be replaced, if it exists.
 fn replaced(path: &Path) -> Option<io::Result<File>> {
-    match resolve_path::find(path) {
+    match resolve_path::resolve(path) {
         Ok(WriteTarget::File(TargetFile { path, existing: Some(_) })) => Some(File::open(path)),
         // Nothing would be replaced. Errors are reported when the file is written.
         Ok(WriteTarget::File(TargetFile { existing: None, .. }) | WriteTarget::InPlace(_)) | Err(_) => None,
@@ -164,9 +164,9 @@ mod tests {
     fn unreadable_files_are_not_foreign() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("a.png");
-        assert!(matches!(replaced_image(&path), Replaced::Own), "no file");
+        assert!(matches!(may_replace_image(&path), Replaced::Own), "no file");
         std::fs::write(&path, "an image").expect("written");
-        assert!(matches!(replaced_image(&path), Replaced::Foreign("an image")));
+        assert!(matches!(may_replace_image(&path), Replaced::Foreign("an image")));
         let denied = || Some(Err(io::Error::from(io::ErrorKind::PermissionDenied)));
         let replaced = Replaced::of(denied(), "an image", |_| true);
         assert!(

@@ -40,13 +40,13 @@ fn try_encode(
     }
     let mut writer = encoder.write_header()?;
     let mut data = writer.stream_writer_with_size(CHUNK_BYTES)?;
-    cancellable::develop_parts(image, options, token, |part| data.write_all(part))?;
+    cancellable::tone_map_in_parts(image, options, token, |part| data.write_all(part))?;
     data.finish()?;
     writer.finish()?;
     Ok(bytes)
 }
 
-/// Adds a text chunk. ASCII is written as tEXt, supported by all readers, and other text as iTXt.
+/// Adds a text chunk. ASCII is written as tEXt, which all readers support, and other text as iTXt.
 pub(super) fn add_text(
     encoder: &mut Encoder<'_, &mut Vec<u8>>,
     name: &str,

@@ -1,5 +1,5 @@
-//! Checks file protections other than permissions: chattr(1) flags and sticky directories. rename(2) would
-//! only check these after the new file is written.
+//! Checks file protections other than permissions: chattr(1) flags and sticky directories. Without these
+//! checks, the error would only occur in rename(2), after the new file is written.
 
 use std::fs::Metadata;
 use std::os::unix::fs::MetadataExt;
@@ -10,7 +10,7 @@ use nix::unistd::{Uid, geteuid};
 /// Mode bit for directories in which only owners may replace files.
 const STICKY: u32 = 0o1000;
 
-/// A flag that prevents even root from replacing a file, or files in a directory.
+/// A flag of a file or directory. Not even root can replace the file, or any file in the directory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Flag {
     /// `chattr +a`
@@ -46,7 +46,7 @@ impl Flag {
     }
 
     /// Advice for removing the flag.
-    pub(super) fn way_out(self) -> &'static str {
+    pub(super) fn removal_advice(self) -> &'static str {
         match self {
             Self::AppendOnly => "remove the flag (chattr -a) or choose another location",
             Self::Immutable => "remove the flag (chattr -i) or choose another location",
@@ -55,23 +55,23 @@ impl Flag {
 }
 
 /// Whether a sticky directory prevents this process from replacing a file. This is the case if the process
-/// owns neither of them and lacks the capability to act as the owner.
-pub(super) fn is_kept_for_owner(directory: &Metadata, file: &Metadata) -> bool {
+/// owns neither the directory nor the file, and lacks the capability to act as the owner.
+pub(super) fn is_protected_by_sticky_bit(directory: &Metadata, file: &Metadata) -> bool {
     let user = geteuid();
     let is_own = |found: &Metadata| Uid::from_raw(found.uid()) == user;
-    directory.mode() & STICKY != 0 && !is_own(directory) && !is_own(file) && !acts_for_owners(user)
+    directory.mode() & STICKY != 0 && !is_own(directory) && !is_own(file) && !may_act_for_owners(user)
 }
 
 /// Whether this thread may act as the owner of any file.
 #[cfg(target_os = "linux")]
-fn acts_for_owners(user: Uid) -> bool {
+fn may_act_for_owners(user: Uid) -> bool {
     use rustix::thread::{CapabilitySet, capabilities};
     capabilities(None)
         .map_or(user.is_root(), |capabilities| capabilities.effective.contains(CapabilitySet::FOWNER))
 }
 
 #[cfg(not(target_os = "linux"))]
-fn acts_for_owners(user: Uid) -> bool {
+fn may_act_for_owners(user: Uid) -> bool {
     user.is_root()
 }
 

@@ -40,24 +40,24 @@ impl TargetFile {
 }
 
 /// Resolves a path and checks that it can be written, as far as this is possible without writing.
-pub(super) fn find(path: &Path) -> Result<WriteTarget, OutputError> {
+pub(super) fn resolve(path: &Path) -> Result<WriteTarget, OutputError> {
     if path.file_name().is_none() || path.as_os_str().as_bytes().ends_with(b"/") {
         return Err(is_a_directory(path));
     }
-    match follow(path).map_err(|error| OutputError::file(path, error))? {
+    match follow_links(path).map_err(|error| OutputError::file(path, error))? {
         (target, None) => new_file(path, target),
         (_, Some(metadata)) if metadata.is_symlink() => Ok(WriteTarget::InPlace(path.to_owned())),
         (target, Some(metadata)) => existing(path, target, metadata),
     }
 }
 
-/// Like [`find`], but also checks that files can be created in the directory.
-pub(super) fn check(path: &Path) -> Result<(), OutputError> {
-    match find(path)? {
+/// Like [`resolve`], but also checks that files can be created in the directory.
+pub(super) fn check_writable(path: &Path) -> Result<(), OutputError> {
+    match resolve(path)? {
         WriteTarget::File(target) => {
             let directory = target.directory();
-            temporary::probe(directory).map_err(|error| match error.kind() {
-                // The directory still exists, so the error is about the new file. /proc reports such errors.
+            temporary::check_can_create(directory).map_err(|error| match error.kind() {
+                // The directory exists, so the error is about the new file, as in /proc.
                 ErrorKind::NotFound if directory.is_dir() => OutputError::Target {
                     path: path.to_owned(),
                     why: format!("files cannot be created in the directory {}", directory.display()),
@@ -71,8 +71,8 @@ pub(super) fn check(path: &Path) -> Result<(), OutputError> {
 }
 
 /// Follows symbolic links. Returns the final path and its file's metadata. Links to open descriptors (such as
-/// /dev/stdout) are not followed because they may not correspond to a path.
-pub(super) fn follow(path: &Path) -> io::Result<(PathBuf, Option<Metadata>)> {
+/// /dev/stdout) are not followed, because an open descriptor may have no path.
+pub(super) fn follow_links(path: &Path) -> io::Result<(PathBuf, Option<Metadata>)> {
     let mut target = path.to_owned();
     for _ in 0..LINKS {
         let metadata = match fs::symlink_metadata(&target) {
@@ -112,7 +112,7 @@ fn existing(path: &Path, target: PathBuf, metadata: Metadata) -> Result<WriteTar
     // because it may be read-only on purpose.
     may_write(path, &target, AccessFlags::W_OK)?;
     let directory = check_directory(path, directory_of(&target))?;
-    if protection::is_kept_for_owner(&directory, &metadata) {
+    if protection::is_protected_by_sticky_bit(&directory, &metadata) {
         let directory = directory_of(&target).display();
         return Err(OutputError::Target {
             path: path.to_owned(),
@@ -142,12 +142,12 @@ fn check_directory(path: &Path, directory: &Path) -> Result<Metadata, OutputErro
     }
 }
 
-/// Checks that no flag protects the file or directory from changes. With such a flag, the new file could not
-/// be renamed or removed.
+/// Checks that no flag protects the file or directory from changes. If one did, the new file could not be
+/// renamed or removed.
 fn check_flags(path: &Path, name: &str, what: &Path) -> Result<(), OutputError> {
     let Some(flag) = Flag::of(what) else { return Ok(()) };
     let why = format!("{name} is {}", flag.words());
-    Err(OutputError::Target { path: path.to_owned(), why, way_out: flag.way_out() })
+    Err(OutputError::Target { path: path.to_owned(), why, way_out: flag.removal_advice() })
 }
 
 fn may_write(path: &Path, what: &Path, how: AccessFlags) -> Result<(), OutputError> {

@@ -5,8 +5,9 @@ use std::path::{Component, Path, PathBuf};
 
 use super::resolve_path::directory_of;
 
-/// Returns the path of a scene relative to an image, with `/` as separator. The path of a scene in the
-/// image's folder starts with `./`, because earlier versions wrote bare file names for scenes in any folder.
+/// Returns the path of a scene relative to an image, with `/` as separator. If the scene is in the image's
+/// folder, the path starts with `./`, because earlier versions wrote bare file names for scenes in any
+/// folder.
 pub fn relative(scene: &Path, image: &Path) -> String {
     let folders = fs::canonicalize(directory_of(scene)).ok().zip(fs::canonicalize(directory_of(image)).ok());
     let (Some(name), Some((to, from))) = (scene.file_name(), folders) else { return bare(scene) };
@@ -24,7 +25,7 @@ pub fn is_same(named: &str, scene: &Path, image: &Path) -> bool {
         return named == bare(scene);
     }
     let Ok(scene_file) = fs::canonicalize(scene) else { return named == relative(scene, image) };
-    // The image may be a link, and may have been written using either the link's or its target's path.
+    // The image may be a link, written through either the path of the link or the path of its target.
     let target = fs::canonicalize(image).ok();
     [Some(image), target.as_deref()].into_iter().flatten().any(|image| {
         let file = fs::canonicalize(directory_of(image).join(named));

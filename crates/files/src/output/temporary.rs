@@ -1,6 +1,6 @@
 //! Temporary files next to a target. Their names contain the writer's machine and process. They are locked
-//! while the writer is running, and removed if it has died. Locks alone are not sufficient, because many
-//! network file systems do not share them between machines.
+//! while the writer is running, and removed by other processes if the writer has died. Locks alone are not
+//! sufficient, because many network file systems do not share them between machines.
 
 use std::ffi::{OsStr, OsString};
 use std::fs::{self, File, OpenOptions, TryLockError};
@@ -18,19 +18,19 @@ use crate::system::machine::ProcessIdentity;
 
 /// Maximum length of a file name on nearly all file systems.
 const NAME_BYTES: usize = 255;
-/// Number of names to try. More than one is only needed if another process removes the first file at the
-/// wrong moment.
+/// Number of names to try. More than one name is only needed if another process removes a file before it is
+/// locked.
 pub(super) const ATTEMPTS: usize = 64;
 
 /// A file that is removed on drop unless it has been renamed to its final name.
 #[derive(Debug)]
-pub(super) struct Temporary {
+pub(super) struct TemporaryFile {
     pub(super) file: File,
     path: PathBuf,
     kept: bool,
 }
 
-impl Temporary {
+impl TemporaryFile {
     /// Creates an empty, locked file `.NAME.glimt-<machine>-<process>-<number>.tmp` for a target called `name`.
     pub(super) fn create(directory: &Path, name: &OsStr, mode: u32) -> io::Result<Self> {
         for _ in 0..ATTEMPTS {
@@ -49,13 +49,13 @@ impl Temporary {
         Err(io::Error::new(ErrorKind::AlreadyExists, "no free name for a temporary file"))
     }
 
-    /// Locks the file. Returns false if another process has taken the file for stale first.
+    /// Locks the file. Returns false if another process has locked or removed the file as stale.
     fn claim(&self) -> io::Result<bool> {
         match self.file.try_lock() {
             Err(TryLockError::WouldBlock) => Ok(false),
             // If locking is not supported, no process removes the file as stale.
             Err(TryLockError::Error(_)) => Ok(true),
-            Ok(()) => is_same(&self.file, &self.path),
+            Ok(()) => still_refers_to(&self.file, &self.path),
         }
     }
 
@@ -83,7 +83,7 @@ impl Temporary {
     }
 }
 
-impl Drop for Temporary {
+impl Drop for TemporaryFile {
     fn drop(&mut self) {
         if !self.kept {
             // Ignore errors. The next write tries again.
@@ -95,20 +95,20 @@ impl Drop for Temporary {
 /// Tests whether files can be created in a directory, by creating an unnamed file or, if this is not
 /// supported, a file that is removed immediately. Some directories, such as /proc, reject files despite write
 /// permission.
-pub(super) fn probe(directory: &Path) -> io::Result<()> {
-    if nameless(directory).is_ok() {
+pub(super) fn check_can_create(directory: &Path) -> io::Result<()> {
+    if create_unnamed(directory).is_ok() {
         return Ok(());
     }
-    Temporary::create(directory, OsStr::new("probe"), 0o600).map(drop)
+    TemporaryFile::create(directory, OsStr::new("probe"), 0o600).map(drop)
 }
 
 #[cfg(target_os = "linux")]
-fn nameless(directory: &Path) -> io::Result<()> {
+fn create_unnamed(directory: &Path) -> io::Result<()> {
     OpenOptions::new().write(true).mode(0o600).custom_flags(OFlag::O_TMPFILE.bits()).open(directory).map(drop)
 }
 
 #[cfg(not(target_os = "linux"))]
-fn nameless(_: &Path) -> io::Result<()> {
+fn create_unnamed(_: &Path) -> io::Result<()> {
     Err(ErrorKind::Unsupported.into())
 }
 
@@ -116,7 +116,7 @@ fn nameless(_: &Path) -> io::Result<()> {
 /// files of other machines, earlier boots and running processes. Ignores files that cannot be removed,
 /// because they must not prevent a write.
 pub(super) fn remove_stale(directory: &Path, is_kept: &dyn Fn(&Path) -> bool) {
-    for path in stale(directory) {
+    for path in stale_entries(directory) {
         if path.symlink_metadata().is_ok_and(|found| found.is_file()) && !is_kept(&path) {
             let _ = remove_if_stale(&path, |path| fs::remove_file(path));
         }
@@ -125,35 +125,35 @@ pub(super) fn remove_stale(directory: &Path, is_kept: &dyn Fn(&Path) -> bool) {
 
 /// Removes temporary folders of killed processes on this machine, with their contents.
 pub(super) fn remove_stale_folders(directory: &Path) {
-    for path in stale(directory) {
+    for path in stale_entries(directory) {
         if path.symlink_metadata().is_ok_and(|found| found.is_dir()) {
             let _ = remove_if_stale(&path, remove_all);
         }
     }
 }
 
-/// Lists the entries of a directory whose writer, according to their name, is dead.
-fn stale(directory: &Path) -> Vec<PathBuf> {
+/// Lists the entries of a directory whose names identify a dead writer.
+fn stale_entries(directory: &Path) -> Vec<PathBuf> {
     let names = names(directory).into_iter().flatten();
     names.filter(|name| has_dead_writer(name)).map(|name| directory.join(name)).collect()
 }
 
 fn has_dead_writer(name: &OsStr) -> bool {
-    writer(name).is_some_and(|writer| writer.has_ended())
+    parse_writer(name).is_some_and(|writer| writer.has_ended())
 }
 
 fn remove_if_stale(path: &Path, remove: impl Fn(&Path) -> io::Result<()>) -> io::Result<()> {
     // The file may have been replaced with a link or a pipe since it was checked.
     let flags = OFlag::O_NOFOLLOW | OFlag::O_NONBLOCK;
     let file = OpenOptions::new().read(true).custom_flags(flags.bits()).open(path)?;
-    if file.try_lock().is_ok() && is_same(&file, path)? {
+    if file.try_lock().is_ok() && still_refers_to(&file, path)? {
         remove(path)?;
     }
     Ok(())
 }
 
 /// Whether this path still refers to the open file.
-fn is_same(file: &File, path: &Path) -> io::Result<bool> {
+fn still_refers_to(file: &File, path: &Path) -> io::Result<bool> {
     let opened = file.metadata()?;
     match fs::symlink_metadata(path) {
         Ok(named) => Ok((opened.dev(), opened.ino()) == (named.dev(), named.ino())),
@@ -179,7 +179,7 @@ fn name_of(name: &OsStr, writer: &ProcessIdentity) -> OsString {
 
 /// Parses the writer from a temporary name. `None` for other names, including names from older versions
 /// (`.NAME.glimt-PID-N.tmp`), which do not contain the machine.
-fn writer(name: &OsStr) -> Option<ProcessIdentity> {
+fn parse_writer(name: &OsStr) -> Option<ProcessIdentity> {
     let name = name.to_string_lossy();
     let (_, writer) = name.strip_prefix('.')?.strip_suffix(".tmp")?.rsplit_once(".glimt-")?;
     let (machine, numbers) = writer.split_once('-')?;
@@ -220,7 +220,7 @@ pub(super) mod tests {
     fn only_temporary_names_have_a_writer() {
         for name in ["out.png", "a.glimt-b.png", "a.glimt-1-2.tmp", &"ä".repeat(127)] {
             let temporary = next_name(OsStr::new(name));
-            assert_eq!(writer(&temporary), Some(ProcessIdentity::current()), "{temporary:?}");
+            assert_eq!(parse_writer(&temporary), Some(ProcessIdentity::current()), "{temporary:?}");
             assert!(temporary.len() <= NAME_BYTES);
         }
         let machine = "0123456789abcdef";
@@ -237,14 +237,14 @@ pub(super) mod tests {
             format!(".a.glimt-{machine}-99999999999-2.tmp"),
             format!("a.glimt-{machine}-1-2.tmp"),
         ] {
-            assert_eq!(writer(OsStr::new(&other)), None, "{other}");
+            assert_eq!(parse_writer(OsStr::new(&other)), None, "{other}");
         }
     }
 
     #[test]
     fn only_files_of_dead_local_writers_are_removed() {
         let directory = tempfile::tempdir().expect("a directory");
-        let living = Temporary::create(directory.path(), OsStr::new("a.png"), 0o666).expect("a file");
+        let living = TemporaryFile::create(directory.path(), OsStr::new("a.png"), 0o666).expect("a file");
         let write = |name: OsString| {
             let path = directory.path().join(name);
             fs::write(&path, "half").expect("a file");
@@ -269,18 +269,18 @@ pub(super) mod tests {
     #[test]
     fn probing_leaves_no_file() {
         let directory = tempfile::tempdir().expect("a directory");
-        probe(directory.path()).expect("the directory should accept files");
+        check_can_create(directory.path()).expect("the directory should accept files");
         assert_eq!(fs::read_dir(directory.path()).expect("a directory").count(), 0);
-        assert!(probe(&directory.path().join("none")).is_err());
+        assert!(check_can_create(&directory.path().join("none")).is_err());
         #[cfg(target_os = "linux")]
-        assert!(probe(Path::new("/proc")).is_err());
+        assert!(check_can_create(Path::new("/proc")).is_err());
     }
 
     #[test]
     fn a_panic_leaves_no_file() {
         let directory = tempfile::tempdir().expect("a directory");
         let result = std::panic::catch_unwind(|| {
-            let _file = Temporary::create(directory.path(), OsStr::new("a.png"), 0o666).expect("a file");
+            let _file = TemporaryFile::create(directory.path(), OsStr::new("a.png"), 0o666).expect("a file");
             panic!("while writing");
         });
         assert!(result.is_err());
@@ -290,7 +290,7 @@ pub(super) mod tests {
     #[test]
     fn removed_temporary_files_are_not_claimed() {
         let directory = tempfile::tempdir().expect("a directory");
-        let file = Temporary::create(directory.path(), OsStr::new("a.png"), 0o666).expect("a file");
+        let file = TemporaryFile::create(directory.path(), OsStr::new("a.png"), 0o666).expect("a file");
         fs::remove_file(&file.path).expect("removed");
         assert!(!file.claim().expect("no error"));
         fs::write(&file.path, "another").expect("a file");

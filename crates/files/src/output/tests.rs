@@ -213,7 +213,7 @@ fn ppm_contains_the_tone_mapped_image() {
 
 #[test]
 fn jpeg_chroma_is_not_subsampled() {
-    // Smooth colors, with a sharp edge between saturated colors that subsampling would blur.
+    // Smooth colors and a sharp edge between saturated colors. Subsampling would blur the edge.
     let pixel = |i: u32| if i % 64 < 31 { Vec3::new(0.8, 0.05, 0.05) } else { Vec3::new(0.05, 0.05, 0.8) };
     let image = RadianceImage { width: 64, height: 64, pixels: (0..64 * 64).map(pixel).collect() };
     let options = EncodeOptions::default();
@@ -407,7 +407,7 @@ fn replacing_a_file_grants_no_permissions() {
     assert!(reports.lock().expect("no panic").is_empty());
     write(false).expect("written");
     let lost = ["its owner", "its group"].map(str::to_owned);
-    assert_eq!(*reports.lock().expect("no panic"), [write::not_kept(&path, &lost)]);
+    assert_eq!(*reports.lock().expect("no panic"), [write::lost_attributes_report(&path, &lost)]);
     let found = std::fs::metadata(&path).expect("a file");
     assert_eq!((found.uid(), found.mode() & 0o7777), (65534, 0o644));
 }

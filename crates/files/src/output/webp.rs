@@ -12,10 +12,10 @@ pub(super) fn encode(
     options: &EncodeOptions,
     token: &CancelToken,
 ) -> Result<Vec<u8>, OutputError> {
-    let pixels = cancellable::develop_all(image, (options, Format::WebP), token)?;
+    let pixels = cancellable::tone_map_all(image, (options, Format::WebP), token)?;
     let mut bytes = CancellableBuffer::new(token);
     let mut encoder = WebPEncoder::new(&mut bytes);
-    encoder.set_xmp_metadata(packet(options).into_bytes());
+    encoder.set_xmp_metadata(xmp_packet(options).into_bytes());
     encoder
         .encode(&pixels, image.width, image.height, ColorType::Rgb8)
         .map_err(|error| OutputError::encoder(Format::WebP, &error))?;
@@ -23,21 +23,21 @@ pub(super) fn encode(
 }
 
 /// XMP packet with the metadata as the description, one line per item.
-fn packet(options: &EncodeOptions) -> String {
+fn xmp_packet(options: &EncodeOptions) -> String {
     let lines = options.metadata.iter();
-    let lines = lines.map(|(name, value)| escaped(&format!("{}: {}\n", one_line(name), one_line(value))));
+    let lines = lines.map(|(name, value)| escape_xml(&format!("{}: {}\n", one_line(name), one_line(value))));
     format!(
         "<?xpacket begin=\"\u{feff}\" id=\"W5M0MpCehiHzreSzNTczkc9d\"?>\
          <x:xmpmeta xmlns:x=\"adobe:ns:meta/\"><rdf:RDF xmlns:rdf=\"http://www.w3.org/1999/02/22-rdf-syntax-ns#\">\
          <rdf:Description rdf:about=\"\" xmlns:xmp=\"http://ns.adobe.com/xap/1.0/\" xmlns:dc=\"http://purl.org/dc/elements/1.1/\" \
          xmp:CreatorTool=\"{}\"><dc:description><rdf:Alt><rdf:li xml:lang=\"x-default\">{}</rdf:li></rdf:Alt></dc:description>\
          </rdf:Description></rdf:RDF></x:xmpmeta><?xpacket end=\"r\"?>",
-        escaped(SOFTWARE),
+        escape_xml(SOFTWARE),
         lines.collect::<String>()
     )
 }
 
 /// Escapes text for XML.
-fn escaped(text: &str) -> String {
+fn escape_xml(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }

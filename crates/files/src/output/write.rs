@@ -14,9 +14,9 @@ use std::sync::{Arc, Once};
 use nix::errno::Errno;
 use nix::fcntl::{FcntlArg, OFlag, fcntl};
 
-use super::attributes::{Attributes, Carried};
+use super::attributes::{FileAttributes, UncopiedAttributes};
 use super::resolve_path::{self, TargetFile, WriteTarget};
-use super::temporary::{self, Temporary};
+use super::temporary::{self, TemporaryFile};
 use super::{FileIdentity, Losses, OutputError, cancellable, held};
 use crate::control::CancelToken;
 use crate::system::describe_error;
@@ -26,9 +26,9 @@ pub const STDOUT: &str = "/dev/stdout";
 
 /// Writes a file atomically: writes a locked temporary file next to it, synchronizes it, renames it, and
 /// synchronizes the directory. If the process is killed at any time, either the old or the new file exists.
-/// The permissions, access list, attributes and flags are kept, and also the owner if this process may change
-/// owners. If the path is a link, the target is replaced. Also removes temporary files in the same directory
-/// left by killed processes on this machine.
+/// The permissions, access list, attributes and flags are kept. The owner is also kept if this process may
+/// change owners. If the path is a link, the target is replaced. Also removes temporary files in the same
+/// directory left by killed processes on this machine.
 ///
 /// Devices, pipes and open descriptors ([`STDOUT`]) are written in place.
 ///
@@ -61,7 +61,8 @@ pub struct Guard<'a> {
     pub is_kept: &'a dyn Fn(&Path) -> bool,
     /// Decides whether this file, existing or not, may be replaced or written in place.
     pub may_replace: &'a dyn Fn(&Path) -> Result<(), OutputError>,
-    /// Folders already searched for temporary files of killed processes. `None` to search at every write.
+    /// Folders already searched for temporary files of killed processes. If `None`, they are searched for at
+    /// every write.
     pub sweep: Option<&'a FolderSweep>,
     /// What to do if a file's owner, access list or attributes cannot be kept.
     pub losses: Losses<'a>,
@@ -74,7 +75,7 @@ pub struct FolderSweep(RefCell<HashSet<PathBuf>>);
 
 impl FolderSweep {
     /// Returns true if the folder has not been searched yet, and marks it as searched.
-    fn is_due(&self, folder: &Path) -> bool {
+    fn mark_searched(&self, folder: &Path) -> bool {
         let mut searched = self.0.borrow_mut();
         !searched.contains(folder) && searched.insert(folder.to_owned())
     }
@@ -94,8 +95,8 @@ pub fn atomic_guarded(
         .map(drop)
 }
 
-/// Like [`atomic_guarded`], but only replaces a file that has the expected content. If the content has
-/// changed before the replacement, the file is kept and the guard determines the error.
+/// Like [`atomic_guarded`], but only replaces the file if it has the expected content. If the content has
+/// changed, the file is kept and the guard determines the error.
 ///
 /// # Errors
 /// Same as [`atomic_guarded`].
@@ -110,7 +111,7 @@ pub fn atomic_replace(
     replace(path, content, guard, (token, Durability::Power, Some(expected))).map(drop)
 }
 
-/// Events after which a renamed file still exists.
+/// Which events a renamed file is guaranteed to survive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Durability {
     /// Termination of the process. The system writes the bytes to disk later.
@@ -134,7 +135,7 @@ pub fn atomic_with(
     replace(path, content, guard, (token, durability, None))
 }
 
-/// Like [`atomic_with`]. Optionally only replaces a file that has the expected content.
+/// Like [`atomic_with`]. If an expected content is given, only replaces a file with this content.
 fn replace(
     path: &Path,
     content: &dyn Fn(&mut dyn Write) -> io::Result<()>,
@@ -143,7 +144,7 @@ fn replace(
 ) -> Result<Option<File>, OutputError> {
     prepare_process();
     let named = |error| OutputError::file(path, error);
-    match resolve_path::find(path)? {
+    match resolve_path::resolve(path)? {
         WriteTarget::File(target) => {
             let (new, carried) = create_temporary(&target, guard).map_err(named)?;
             let lost = carried.as_ref().map_or(&[][..], |carried| &carried.lost);
@@ -180,7 +181,7 @@ fn replace(
                 ));
             }
             if let (Losses::Report(report), false) = (guard.losses, lost.is_empty()) {
-                report(not_kept(path, lost));
+                report(lost_attributes_report(path, lost));
             }
             Ok(Some(file))
         }
@@ -195,7 +196,7 @@ fn replace(
 }
 
 /// Report about attributes that could not be kept.
-pub(super) fn not_kept(path: &Path, lost: &[String]) -> String {
+pub(super) fn lost_attributes_report(path: &Path, lost: &[String]) -> String {
     format!("{}: {} could not be kept", path.display(), lost.join(" and "))
 }
 
@@ -213,23 +214,26 @@ pub fn prepare_process() {
 
 /// Creates an empty temporary file next to its target, with the target's attributes. If the target exists,
 /// only the owner and users on its access list can read the temporary file until it is complete.
-fn create_temporary(target: &TargetFile, guard: &Guard<'_>) -> io::Result<(Temporary, Option<Carried>)> {
+fn create_temporary(
+    target: &TargetFile,
+    guard: &Guard<'_>,
+) -> io::Result<(TemporaryFile, Option<UncopiedAttributes>)> {
     let directory = target.directory();
-    if guard.sweep.is_none_or(|sweep| sweep.is_due(directory)) {
+    if guard.sweep.is_none_or(|sweep| sweep.mark_searched(directory)) {
         temporary::remove_stale(directory, guard.is_kept);
     }
     let mode = if target.existing.is_some() { 0o600 } else { 0o666 };
     let name = target.path.file_name().unwrap_or(OsStr::new("file"));
-    let new = Temporary::create(directory, name, mode)?;
-    let old = target.existing.as_ref().map(|existing| Attributes::read(&target.path, existing));
+    let new = TemporaryFile::create(directory, name, mode)?;
+    let old = target.existing.as_ref().map(|existing| FileAttributes::read(&target.path, existing));
     let carried = old.map(|old| old.carry_over(&new.file));
     Ok((new, carried))
 }
 
 fn fill(
-    new: &Temporary,
+    new: &TemporaryFile,
     content: &dyn Fn(&mut dyn Write) -> io::Result<()>,
-    carried: Option<&Carried>,
+    carried: Option<&UncopiedAttributes>,
     durability: Durability,
 ) -> io::Result<()> {
     content(&mut &new.file)?;

@@ -7,7 +7,7 @@ use crate::math::random::signed as random;
 
 /// Difficult meshes: noise, slivers, grids with coplanar and duplicate faces, identical triangles, a single
 /// triangle, an empty mesh, and a mesh with NaN coordinates.
-pub fn meshes() -> Vec<Vec<[Vec3; 3]>> {
+pub fn difficult_meshes() -> Vec<Vec<[Vec3; 3]>> {
     let mut next = random(5);
     let mut point = |size: f32| Vec3::new(next(), next(), next()) * size;
     let noise = (0..700).map(|_| {
@@ -47,7 +47,7 @@ pub fn meshes() -> Vec<Vec<[Vec3; 3]>> {
 }
 
 /// Nearest hit found by testing every triangle except the ray's start triangle.
-pub fn brute(mesh: &[[Vec3; 3]], ray: &Ray) -> Option<ShapeHit> {
+pub fn closest_by_brute_force(mesh: &[[Vec3; 3]], ray: &Ray) -> Option<ShapeHit> {
     let sheared = ShearedRay::new(ray.origin, ray.direction);
     let others = (0..).zip(mesh).filter(|&(id, _)| id != ray.start);
     let hits = others.filter_map(|(id, corners)| {
@@ -77,8 +77,8 @@ pub fn rays(mesh: &[[Vec3; 3]]) -> Vec<Ray> {
         rays.push(Ray::new(triangle[2], Vec3::new(next(), next(), next())));
         // A ray through an excluded triangle, and a ray that starts on one.
         let start = (i % mesh.len().max(1)) as u32;
-        rays.push(Ray::new(origin, target - origin).leaving(start));
-        rays.push(Ray::new(target, Vec3::new(next(), next(), next())).leaving(start));
+        rays.push(Ray::new(origin, target - origin).with_start_triangle(start));
+        rays.push(Ray::new(target, Vec3::new(next(), next(), next())).with_start_triangle(start));
     }
     rays.push(Ray::new(Vec3::NAN, Vec3::X));
     rays.push(Ray::new(Vec3::ZERO, Vec3::new(f32::INFINITY, 0.0, f32::NAN)));

@@ -74,8 +74,8 @@ impl Bounds {
     }
 }
 
-/// Bit set in ids that are stored as float bits. Without it, they would be denormals, which are slow on some
-/// processors.
+/// A bit that is set in ids stored as float bits. Without it, the floats would be denormals, which are slow
+/// on some processors.
 const NORMAL: u32 = 1 << 29;
 
 const _: () = assert!(TriangleMesh::MOST_TRIANGLES < 1 << 29);
@@ -132,7 +132,7 @@ impl Reference {
     }
 
     /// Splits the reference at a plane through its box. Each new box bounds the part of the triangle on its
-    /// side, rounded outward and clipped to the old box. If rounding leaves this empty, the new box is the
+    /// side, rounded outward and clipped to the old box. If this is empty due to rounding, the new box is the
     /// entire half of the old box.
     #[inline]
     pub fn split(&self, axis: usize, at: f32, corners: [Vec3; 3]) -> [Self; 2] {
@@ -157,12 +157,12 @@ impl Reference {
             before = corner;
         }
         let [left, right] = self.bounds.halves(axis, at);
-        [self.within(left, &parts[0]), self.within(right, &parts[1])]
+        [self.intersected_with(left, &parts[0]), self.intersected_with(right, &parts[1])]
     }
 
     /// The reference with the intersection of both boxes, or with `half` if they do not overlap.
     #[inline(always)]
-    fn within(&self, half: Bounds, part: &Bounds) -> Self {
+    fn intersected_with(&self, half: Bounds, part: &Bounds) -> Self {
         let mut both = Bounds { min: half.min.max(part.min), minus_max: half.minus_max.max(part.minus_max) };
         both = if both.extent().truncate().cmpge(Vec3::ZERO).all() { both } else { half };
         both.min.w = self.bounds.min.w;
@@ -170,7 +170,7 @@ impl Reference {
     }
 }
 
-/// Box around a double-precision point after rounding outward.
+/// `f32` box around a double-precision point, rounded outward.
 #[inline(always)]
 fn around_rounded(exact: DVec3) -> Bounds {
     let near = exact.as_vec3();
@@ -208,11 +208,11 @@ impl Polygon {
         }
         for axis in 0..3 {
             if least[axis] < bounds.min[axis] {
-                from.cut(axis, f64::from(bounds.min[axis]), 1.0, to);
+                from.clip_by_plane(axis, f64::from(bounds.min[axis]), 1.0, to);
                 std::mem::swap(&mut from, &mut to);
             }
             if greatest[axis] > bounds.max[axis] {
-                from.cut(axis, f64::from(bounds.max[axis]), -1.0, to);
+                from.clip_by_plane(axis, f64::from(bounds.max[axis]), -1.0, to);
                 std::mem::swap(&mut from, &mut to);
             }
         }
@@ -220,7 +220,7 @@ impl Polygon {
     }
 
     /// Keeps the part above the plane, or below it if `side` is −1.
-    fn cut(&self, axis: usize, at: f64, side: f64, kept: &mut Self) {
+    fn clip_by_plane(&self, axis: usize, at: f64, side: f64, kept: &mut Self) {
         kept.count = 0;
         let Some(mut before) = self.points().last().copied() else { return };
         let mut before_height = (before[axis] - at) * side;

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::pathological::{bits, brute, meshes, rays};
+use super::pathological::{bits, closest_by_brute_force, difficult_meshes, rays};
 use super::{KdTree, WideBvh};
 use crate::control::CancelToken;
 use crate::geometry::watertight::ShearedRay;
@@ -59,7 +59,7 @@ fn noise(seed: u64, count: usize) -> TriangleSoup {
 /// origin, tiny, and huge.
 fn scenes() -> Vec<TriangleSoup> {
     let shorten = |mesh: TriangleSoup| mesh.into_iter().take(240).collect::<TriangleSoup>();
-    let mut own: Vec<TriangleSoup> = meshes().into_iter().map(shorten).collect();
+    let mut own: Vec<TriangleSoup> = difficult_meshes().into_iter().map(shorten).collect();
     own.extend([cuboid(1), cuboid(4), noise(1, 40), noise(2, 240), noise(3, 200)]);
     let far = Vec3::new(148_376.0, 1234.0, -223_423.0);
     let placed = |size: f32, at: Vec3| {
@@ -121,7 +121,7 @@ fn differences(mesh: &[[Vec3; 3]], seed: u64, count: usize) -> (usize, Option<St
         } else {
             aimed(mesh, &planes.bounds(), kind, &mut next)
         };
-        let expected = brute(mesh, &ray);
+        let expected = closest_by_brute_force(mesh, &ray);
         let except = expected.map(|hit| hit.primitive).filter(|_| kind.is_multiple_of(2));
         let sheared = ShearedRay::new(ray.origin, ray.direction);
         let is_hit = |(corners, id): (&[Vec3; 3], u32)| {
@@ -164,12 +164,12 @@ fn ten_million_rays_match_brute_force() {
 
 #[test]
 fn kd_trees_are_valid_and_match_brute_force() {
-    for (number, mesh) in meshes().into_iter().chain([cuboid(3), noise(4, 3000)]).enumerate() {
+    for (number, mesh) in difficult_meshes().into_iter().chain([cuboid(3), noise(4, 3000)]).enumerate() {
         let tree = kd_tree(&mesh);
         tree.validate(mesh.len() as u32, |id| mesh[id as usize])
             .unwrap_or_else(|fault| panic!("{number}: {fault}"));
         for ray in rays(&mesh).iter().step_by(if mesh.len() > 1000 { 8 } else { 1 }) {
-            let expected = brute(&mesh, ray);
+            let expected = closest_by_brute_force(&mesh, ray);
             assert_eq!(bits(tree.closest(ray)), bits(expected), "mesh {number}, {ray:?}");
             assert_eq!(tree.any(ray, None), expected.is_some(), "mesh {number}, {ray:?}");
         }

@@ -1,4 +1,5 @@
-//! Tests of triangle lists. Conclusive packet results must match single rays on every instruction set.
+//! Tests of triangle lists. If a packet result is not undecided, it must match the single-ray result on every
+//! instruction set.
 
 use super::{InstructionSet, SimdKernel};
 use crate::geometry::packet::{HitPacket, PACKET_SIZE, RayPacket};
@@ -101,7 +102,7 @@ fn decided_packets_match_single_rays() {
         let ray = |next: &mut dyn FnMut() -> f32| {
             let (from, to) = (any(next), any(next));
             let (start, target) = (on(&triangles[from], next), on(&triangles[to], next));
-            let own = Ray::new(start, target - start).leaving(from as u32);
+            let own = Ray::new(start, target - start).with_start_triangle(from as u32);
             match kind {
                 // Bounce rays in random directions and shadow rays to other surfaces.
                 0 => Ray { direction: Vec3::new(next(), next(), next()), ..own },
@@ -109,7 +110,9 @@ fn decided_packets_match_single_rays() {
                 // Rays toward corners, along edges, and along axes.
                 2 => Ray { direction: triangles[to][0] - start, ..own },
                 3 => Ray::new(triangles[from][0], triangles[from][1] - triangles[from][0]),
-                4 => Ray::new(start, [Vec3::X, Vec3::NEG_Y, Vec3::Z][to % 3]).leaving(from as u32),
+                4 => {
+                    Ray::new(start, [Vec3::X, Vec3::NEG_Y, Vec3::Z][to % 3]).with_start_triangle(from as u32)
+                }
                 // Rays from far away and rays within planes.
                 _ if to % 2 == 0 => Ray::new(start * 50.0 - target * 49.0, target - start),
                 _ => Ray::new(start, on(&triangles[from], next) - start),

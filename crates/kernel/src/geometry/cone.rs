@@ -4,10 +4,10 @@ use std::f64::consts::{PI, TAU};
 
 use super::disk::{BORDER, Disk};
 use super::surface_of_revolution::{
-    self, AxialFrame, LineInterval, LocalLine, angle_to_u, direction_at_u, is_rounding, radial,
+    self, AxialFrame, LineInterval, LocalLine, angle_to_u, direction_at_u, is_rounding, radial_direction,
     ring_projected_area, sine_from_cosine,
 };
-use super::surface_packet::{Exact, ExactPoint};
+use super::surface_packet::{ExactPoint, ExactSurface};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::{DVec2, DVec3, Vec2};
 
@@ -27,14 +27,14 @@ pub struct Cone {
     capped: bool,
 }
 
-impl Exact for Cone {
+impl ExactSurface for Cone {
     fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> ExactPoint {
         let point = self.exact_point(ray, hit);
         if hit.primitive > 0 {
             return self.base().exact_near(point, self.reach());
         }
-        let local = self.frame.local(point);
-        self.exact_side(radial(local.truncate()), self.along(local))
+        let local = self.frame.point_to_local(point);
+        self.exact_side(radial_direction(local.truncate()), self.side_direction(local))
     }
 }
 
@@ -49,11 +49,11 @@ impl Cone {
 
     /// Finds the nearest hit, from outside or inside.
     pub fn intersect(&self, ray: &RayF64) -> Option<ShapeHit> {
-        self.nearest(ray).map(surface_of_revolution::hit)
+        self.nearest(ray).map(surface_of_revolution::to_shape_hit)
     }
 
     fn nearest(&self, ray: &RayF64) -> Option<(f64, u32)> {
-        let line = self.frame.line(ray);
+        let line = self.frame.line_to_local(ray);
         let base = if self.capped { self.height } else { self.height * (1.0 + BORDER) };
         let ends = LineInterval::between(&line, (0.0, 0), (base, 1))?;
         let starts_on = |part| self.starts_on(ray, part);
@@ -62,7 +62,7 @@ impl Cone {
 
     /// Whether a ray starts on a part, within rounding error.
     fn starts_on(&self, ray: &RayF64, part: u32) -> bool {
-        let local = self.frame.local(ray.origin);
+        let local = self.frame.point_to_local(ray.origin);
         let distance = match part {
             0 => (local.truncate().length() * self.height - local.z * self.radius) / self.slant,
             _ => local.z - self.height,
@@ -94,15 +94,15 @@ impl Cone {
         let a = if a == 0.0 { -0.0 } else { a };
         let (s0, s1) = if q == 0.0 { (0.0, 0.0) } else { (c / q, q / a) };
         Some(match (crosses_both, d.z > 0.0) {
-            (false, _) => LineInterval::of_side(s0.min(s1), s0.max(s1)),
-            (true, true) => LineInterval::of_side(s0.max(s1), f64::INFINITY),
-            (true, false) => LineInterval::of_side(f64::NEG_INFINITY, s0.min(s1)),
+            (false, _) => LineInterval::from_side(s0.min(s1), s0.max(s1)),
+            (true, true) => LineInterval::from_side(s0.max(s1), f64::INFINITY),
+            (true, false) => LineInterval::from_side(f64::NEG_INFINITY, s0.min(s1)),
         })
     }
 
     /// Hit point before rounding.
     fn exact_point(&self, ray: &RayF64, hit: &ShapeHit) -> DVec3 {
-        let line = self.frame.line(ray);
+        let line = self.frame.line_to_local(ray);
         let crossings = match hit.primitive {
             0 => self.side_interval(&line),
             cap => LineInterval::between(&line, (self.height, cap), (self.height, cap)),
@@ -116,53 +116,54 @@ impl Cone {
         if hit.primitive > 0 {
             return self.base().surface_near(point, self.reach());
         }
-        let local = self.frame.local(point);
-        let out = radial(local.truncate());
-        let (down, along) = self.along(local);
+        let local = self.frame.point_to_local(point);
+        let out = radial_direction(local.truncate());
+        let (down, along) = self.side_direction(local);
         let around = out.perp() * (-TAU * down.x * along);
         let ExactPoint { point, normal, reach } = self.exact_side(out, (down, along));
         SurfacePoint::exact(
             point,
             normal,
             Vec2::new(angle_to_u(mirrored(out)) as f32, (1.0 - along / self.slant) as f32),
-            self.frame.vector(around.extend(0.0)),
-            self.frame.vector((out * -self.radius).extend(-self.height)),
+            self.frame.vector_to_world(around.extend(0.0)),
+            self.frame.vector_to_world((out * -self.radius).extend(-self.height)),
             reach,
         )
     }
 
-    /// Point on the side, from a direction perpendicular to the axis and the result of [`Cone::along`].
+    /// Point on the side, from a direction perpendicular to the axis and the result of
+    /// [`Cone::side_direction`].
     fn exact_side(&self, out: DVec2, (down, along): (DVec2, f64)) -> ExactPoint {
         ExactPoint {
-            point: self.frame.point((out * (down.x * along)).extend(down.y * along)),
-            normal: self.frame.vector((out * down.y).extend(-down.x)),
+            point: self.frame.point_to_world((out * (down.x * along)).extend(down.y * along)),
+            normal: self.frame.vector_to_world((out * down.y).extend(-down.x)),
             reach: self.reach(),
         }
     }
 
     /// Unit vector down the side from the tip, as (outward, along the axis), and the distance of `local` from
     /// the tip along the side.
-    fn along(&self, local: DVec3) -> (DVec2, f64) {
+    fn side_direction(&self, local: DVec3) -> (DVec2, f64) {
         let down = DVec2::new(self.radius, self.height) / self.slant;
         (down, DVec2::new(local.truncate().length(), local.z).dot(down).clamp(0.0, self.slant))
     }
 
     /// Texture coordinates of a point on the surface.
     pub fn uv_at(&self, point: DVec3) -> DVec2 {
-        let local = self.frame.local(point);
+        let local = self.frame.point_to_local(point);
         let (across, below) = (local.truncate().length(), self.height - local.z);
         let off_side = (across * self.height - local.z * self.radius) / self.slant;
         if self.capped && below.abs() < off_side.abs() {
             return self.base().uv_at(point);
         }
-        let (_, along) = self.along(local);
-        DVec2::new(angle_to_u(mirrored(radial(local.truncate()))), 1.0 - along / self.slant)
+        let (_, along) = self.side_direction(local);
+        DVec2::new(angle_to_u(mirrored(radial_direction(local.truncate()))), 1.0 - along / self.slant)
     }
 
     /// Mean curvature at a point of a part. On the side, the curvature is in the direction around the axis,
     /// and is unbounded at the tip.
     pub fn curvature(&self, part: u32, point: DVec3) -> f64 {
-        let across = self.frame.local(point).truncate().length();
+        let across = self.frame.point_to_local(point).truncate().length();
         if part == 0 && across > 0.0 { 0.5 * self.height / (self.slant * across) } else { 0.0 }
     }
 
@@ -175,12 +176,12 @@ impl Cone {
         let out = mirrored(direction_at_u(u));
         let point = (out * self.radius).extend(self.height) * (1.0 - v);
         let normal = (out * self.height).extend(-self.radius) / self.slant;
-        (self.frame.point(point), self.frame.vector(normal))
+        (self.frame.point_to_world(point), self.frame.vector_to_world(normal))
     }
 
     /// The cap, facing outward.
     pub fn base(&self) -> Disk {
-        Disk::new(self.frame.point(DVec3::Z * self.height), self.frame.axis(), self.radius)
+        Disk::new(self.frame.point_to_world(DVec3::Z * self.height), self.frame.axis(), self.radius)
     }
 
     /// Areas of the parts.
@@ -203,7 +204,7 @@ impl Cone {
     /// Centroid of the surface.
     pub fn centroid(&self) -> DVec3 {
         let [side, cap] = self.areas();
-        self.frame.point(DVec3::Z * (self.height * (side * 2.0 / 3.0 + cap) / (side + cap)))
+        self.frame.point_to_world(DVec3::Z * (self.height * (side * 2.0 / 3.0 + cap) / (side + cap)))
     }
 
     /// Projected area: the surface area facing a unit direction, weighted by the cosine.
@@ -227,7 +228,7 @@ impl Cone {
 
     /// Distance of a point from the surface.
     pub fn distance(&self, point: DVec3) -> f64 {
-        let local = self.frame.local(point);
+        let local = self.frame.point_to_local(point);
         let point = DVec2::new(local.truncate().length(), local.z);
         let rim = DVec2::new(self.radius, self.height);
         let along = (point.dot(rim) / rim.length_squared()).clamp(0.0, 1.0);
@@ -238,7 +239,7 @@ impl Cone {
 
     /// Whether a point is inside.
     pub fn contains(&self, point: DVec3) -> bool {
-        let p = self.frame.local(point);
+        let p = self.frame.point_to_local(point);
         p.z < self.height && p.truncate().length() < self.radius / self.height * p.z
     }
 
@@ -342,7 +343,7 @@ mod tests {
         }
 
         fn within(&self, ray: &RayF64) -> Option<LineInterval> {
-            self.side_interval(&self.frame.line(ray))
+            self.side_interval(&self.frame.line_to_local(ray))
         }
 
         fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> DVec3 {

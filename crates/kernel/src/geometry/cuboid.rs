@@ -2,7 +2,7 @@
 
 use super::packet::{F32x16, HitPacket, RayPacket, accept};
 use super::surface::flat_axes;
-use super::surface_packet::{Exact, ExactPoint};
+use super::surface_packet::{ExactPoint, ExactSurface};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::transform::rotation_xyz;
 use crate::math::{DMat3, DVec2, DVec3, Vec2};
@@ -61,7 +61,7 @@ impl Cuboid {
         let axes = [self.axes.x_axis, self.axes.y_axis, self.axes.z_axis];
         let half = self.half.to_array();
         for (lane, &end) in ends.iter().enumerate() {
-            let ray = rays.line(lane);
+            let ray = rays.ray_f64(lane);
             let from_center = ray.origin - self.center;
             let (mut near, mut far) = (f64::NEG_INFINITY, f64::INFINITY);
             let (mut near_face, mut far_face) = (0, 0);
@@ -92,7 +92,7 @@ impl Cuboid {
     /// Surface point at a hit, projected onto the face.
     pub fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
         let ExactPoint { point, normal: outwards, reach } = self.exact(ray, hit);
-        let chart = self.chart(hit.primitive);
+        let chart = self.face_mapping(hit.primitive);
         let uv = chart.uv(self.local(ray, hit));
         let FaceMapping { u, v, width, height } = chart;
         let uv = uv.as_vec2();
@@ -105,10 +105,10 @@ impl Cuboid {
         // The point is on the face with the largest relative coordinate.
         let axis = (local / self.half).abs().max_position();
         let face = 2 * axis as u32 + u32::from(local[axis] > 0.0);
-        self.chart(face).uv(local)
+        self.face_mapping(face).uv(local)
     }
 
-    fn chart(&self, face: u32) -> FaceMapping {
+    fn face_mapping(&self, face: u32) -> FaceMapping {
         let (u, v) = flat_axes(face_normal(face).1);
         FaceMapping { u, v, width: 2.0 * self.half.dot(u.abs()), height: 2.0 * self.half.dot(v.abs()) }
     }
@@ -132,7 +132,7 @@ impl Cuboid {
         let from_center = ray.at(f64::from(hit.t)) - self.center;
         let along = |axis: DVec3, half: f64| axis.dot(from_center).max(-half).min(half);
         let DVec3 { x, y, z } = self.half;
-        let n = outwards(hit.primitive);
+        let n = branchless_face_normal(hit.primitive);
         let (px, py, pz) =
             (along(self.axes.x_axis, x), along(self.axes.y_axis, y), along(self.axes.z_axis, z));
         DVec3::new(
@@ -165,7 +165,7 @@ impl Cuboid {
     }
 
     /// Half the edge lengths.
-    pub fn half(&self) -> DVec3 {
+    pub fn half_extent(&self) -> DVec3 {
         self.half
     }
 
@@ -227,10 +227,10 @@ fn face_normal(face: u32) -> (usize, DVec3) {
     (axis, normal)
 }
 
-impl Exact for Cuboid {
+impl ExactSurface for Cuboid {
     #[inline(always)]
     fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> ExactPoint {
-        let (local, n) = (self.local(ray, hit), outwards(hit.primitive));
+        let (local, n) = (self.local(ray, hit), branchless_face_normal(hit.primitive));
         let out_of = |v: DVec3| self.axes.x_axis * v.x + self.axes.y_axis * v.y + self.axes.z_axis * v.z;
         let reach = self.center.abs().max_element() + self.half.length();
         ExactPoint { point: self.center + out_of(local), normal: out_of(n), reach }
@@ -239,7 +239,7 @@ impl Exact for Cuboid {
 
 /// Branch-free [`face_normal`].
 #[inline(always)]
-fn outwards(face: u32) -> DVec3 {
+fn branchless_face_normal(face: u32) -> DVec3 {
     let size = if face & 1 == 1 { 1.0 } else { -1.0 };
     let on = |axis: u32| if face >> 1 == axis { size } else { 0.0 };
     DVec3::new(on(0), on(1), on(2))

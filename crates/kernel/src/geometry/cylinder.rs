@@ -4,10 +4,10 @@ use std::f64::consts::{PI, TAU};
 
 use super::disk::{BORDER, Disk};
 use super::surface_of_revolution::{
-    self, AxialFrame, LineInterval, LocalLine, angle_to_u, direction_at_u, is_rounding, radial,
+    self, AxialFrame, LineInterval, LocalLine, angle_to_u, direction_at_u, is_rounding, radial_direction,
     ring_projected_area, sine_from_cosine,
 };
-use super::surface_packet::{Exact, ExactPoint};
+use super::surface_packet::{ExactPoint, ExactSurface};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::{DVec2, DVec3, Vec2};
 
@@ -25,13 +25,13 @@ pub struct Cylinder {
     capped: bool,
 }
 
-impl Exact for Cylinder {
+impl ExactSurface for Cylinder {
     fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> ExactPoint {
         let point = self.exact_point(ray, hit);
         if hit.primitive > 0 {
             return self.cap(hit.primitive).exact_near(point, self.reach());
         }
-        let (out, z) = self.chart(point);
+        let (out, z) = self.closest_on_side(point);
         self.exact_side(out, z)
     }
 }
@@ -45,11 +45,11 @@ impl Cylinder {
 
     /// Finds the nearest hit, from outside or inside.
     pub fn intersect(&self, ray: &RayF64) -> Option<ShapeHit> {
-        self.nearest(ray).map(surface_of_revolution::hit)
+        self.nearest(ray).map(surface_of_revolution::to_shape_hit)
     }
 
     fn nearest(&self, ray: &RayF64) -> Option<(f64, u32)> {
-        let line = self.frame.line(ray);
+        let line = self.frame.line_to_local(ray);
         let end = if self.capped { self.half_length } else { self.half_length * (1.0 + BORDER) };
         let ends = LineInterval::between(&line, (-end, 1), (end, 2))?;
         let starts_on = |part| self.starts_on(ray, part);
@@ -58,7 +58,7 @@ impl Cylinder {
 
     /// Whether a ray starts on a part, within rounding error.
     fn starts_on(&self, ray: &RayF64, part: u32) -> bool {
-        let local = self.frame.local(ray.origin);
+        let local = self.frame.point_to_local(ray.origin);
         let distance = match part {
             0 => local.truncate().length() - self.radius,
             _ => local.z.abs() - self.half_length,
@@ -83,12 +83,12 @@ impl Cylinder {
         }
         let q = b + (a * discriminant).sqrt().copysign(b);
         let (t0, t1) = (if q == 0.0 { 0.0 } else { c / q }, q / a);
-        Some(LineInterval::of_side(t0.min(t1), t0.max(t1)))
+        Some(LineInterval::from_side(t0.min(t1), t0.max(t1)))
     }
 
     /// Hit point before rounding.
     fn exact_point(&self, ray: &RayF64, hit: &ShapeHit) -> DVec3 {
-        let line = self.frame.line(ray);
+        let line = self.frame.line_to_local(ray);
         let height = if hit.primitive == 1 { -self.half_length } else { self.half_length };
         let crossings = match hit.primitive {
             0 => self.side_interval(&line),
@@ -103,29 +103,29 @@ impl Cylinder {
         if hit.primitive > 0 {
             return self.cap(hit.primitive).surface_near(point, self.reach());
         }
-        let (out, z) = self.chart(point);
+        let (out, z) = self.closest_on_side(point);
         let ExactPoint { point, normal, reach } = self.exact_side(out, z);
         SurfacePoint::exact(
             point,
             normal,
             Vec2::new(angle_to_u(out) as f32, self.height(z) as f32),
-            self.frame.vector((out.perp() * (TAU * self.radius)).extend(0.0)),
-            self.frame.vector(DVec3::Z * (2.0 * self.half_length)),
+            self.frame.vector_to_world((out.perp() * (TAU * self.radius)).extend(0.0)),
+            self.frame.vector_to_world(DVec3::Z * (2.0 * self.half_length)),
             reach,
         )
     }
 
     /// The point on the side that is closest to `point`, as a direction from the axis and a height.
-    fn chart(&self, point: DVec3) -> (DVec2, f64) {
-        let local = self.frame.local(point);
-        (radial(local.truncate()), local.z.clamp(-self.half_length, self.half_length))
+    fn closest_on_side(&self, point: DVec3) -> (DVec2, f64) {
+        let local = self.frame.point_to_local(point);
+        (radial_direction(local.truncate()), local.z.clamp(-self.half_length, self.half_length))
     }
 
     /// Point on the side, from a direction perpendicular to the axis and a height.
     fn exact_side(&self, out: DVec2, z: f64) -> ExactPoint {
         ExactPoint {
-            point: self.frame.point((out * self.radius).extend(z)),
-            normal: self.frame.vector(out.extend(0.0)),
+            point: self.frame.point_to_world((out * self.radius).extend(z)),
+            normal: self.frame.vector_to_world(out.extend(0.0)),
             reach: self.reach(),
         }
     }
@@ -137,12 +137,12 @@ impl Cylinder {
 
     /// Texture coordinates of a point on the surface.
     pub fn uv_at(&self, point: DVec3) -> DVec2 {
-        let local = self.frame.local(point);
+        let local = self.frame.point_to_local(point);
         let (inwards, below) = (self.radius - local.truncate().length(), self.half_length - local.z.abs());
         if self.capped && below.abs() < inwards.abs() {
             return self.cap(if local.z < 0.0 { 1 } else { 2 }).uv_at(point);
         }
-        DVec2::new(angle_to_u(radial(local.truncate())), self.height(local.z))
+        DVec2::new(angle_to_u(radial_direction(local.truncate())), self.height(local.z))
     }
 
     /// Mean curvature of a part.
@@ -157,13 +157,16 @@ impl Cylinder {
     /// Point and unit normal on the side at texture coordinates.
     pub fn side(&self, u: f64, v: f64) -> (DVec3, DVec3) {
         let (out, z) = (direction_at_u(u), (2.0 * v - 1.0) * self.half_length);
-        (self.frame.point((out * self.radius).extend(z)), self.frame.vector(out.extend(0.0)))
+        (
+            self.frame.point_to_world((out * self.radius).extend(z)),
+            self.frame.vector_to_world(out.extend(0.0)),
+        )
     }
 
     /// The cap with index 1 or 2, facing outward.
     pub fn cap(&self, number: u32) -> Disk {
         let side = if number == 1 { -1.0 } else { 1.0 };
-        let center = self.frame.point(DVec3::Z * (side * self.half_length));
+        let center = self.frame.point_to_world(DVec3::Z * (side * self.half_length));
         Disk::new(center, self.frame.axis() * side, self.radius)
     }
 
@@ -203,7 +206,7 @@ impl Cylinder {
 
     /// Distance of a point from the surface.
     pub fn distance(&self, point: DVec3) -> f64 {
-        let local = self.frame.local(point);
+        let local = self.frame.point_to_local(point);
         let (across, along) = (local.truncate().length(), local.z.abs());
         let from = |dx: f64, dy: f64| DVec2::new(dx, dy).length();
         let side = from(across - self.radius, (along - self.half_length).max(0.0));
@@ -218,7 +221,7 @@ impl Cylinder {
     pub fn contains(&self, point: DVec3) -> bool {
         // The height test rejects most points.
         self.frame.height(point).abs() < self.half_length
-            && self.frame.local(point).truncate().length() < self.radius
+            && self.frame.point_to_local(point).truncate().length() < self.radius
     }
 
     /// Bounding box.
@@ -300,7 +303,7 @@ mod tests {
         }
 
         fn within(&self, ray: &RayF64) -> Option<LineInterval> {
-            self.side_interval(&self.frame.line(ray))
+            self.side_interval(&self.frame.line_to_local(ray))
         }
 
         fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> DVec3 {

@@ -2,10 +2,10 @@
 
 use std::f64::consts::PI;
 
-use super::kernel_domain::{Extent, Ground, KernelDomain};
+use super::kernel_domain::{Extent, KernelDomain, SurfaceBelow};
 use super::packet::{F32x16, HitPacket, RayPacket, accept};
-use super::surface_of_revolution::{AxialFrame, exact_t, hit};
-use super::surface_packet::{Exact, ExactPoint};
+use super::surface_of_revolution::{AxialFrame, exact_t, to_shape_hit};
+use super::surface_packet::{ExactPoint, ExactSurface};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::{DVec2, DVec3, Vec2};
 use crate::sampling::warp;
@@ -22,7 +22,7 @@ pub struct Disk {
     radius: f64,
 }
 
-impl Exact for Disk {
+impl ExactSurface for Disk {
     fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> ExactPoint {
         self.exact_near(ray.at(exact_t(hit, self.nearest(ray))), self.reach())
     }
@@ -36,7 +36,7 @@ impl Disk {
 
     /// Intersects the plane and checks the border. `None` for rays in the plane.
     pub fn intersect(&self, ray: &RayF64) -> Option<ShapeHit> {
-        self.nearest(ray).map(hit)
+        self.nearest(ray).map(to_shape_hit)
     }
 
     /// [`Disk::intersect`] for a packet.
@@ -44,7 +44,7 @@ impl Disk {
     pub fn intersect_packet(&self, rays: &RayPacket, ends: &F32x16, hits: &mut HitPacket) {
         let radius = self.radius * (1.0 + BORDER);
         for (lane, &end) in ends.iter().enumerate() {
-            let line = self.frame.line(&rays.line(lane));
+            let line = self.frame.line_to_local(&rays.ray_f64(lane));
             let along = -line.foot.z / line.direction.z;
             let across = (line.foot + line.direction * along).truncate().length();
             let t = accept(line.start + along, end);
@@ -53,7 +53,7 @@ impl Disk {
     }
 
     fn nearest(&self, ray: &RayF64) -> Option<(f64, u32)> {
-        let line = self.frame.line(ray);
+        let line = self.frame.line_to_local(ray);
         let along = -line.foot.z / line.direction.z;
         let across = (line.foot + line.direction * along).truncate().length();
         let t = line.start + along;
@@ -70,35 +70,35 @@ impl Disk {
     pub fn surface_near(&self, point: DVec3, reach: f64) -> SurfacePoint {
         let ExactPoint { point: near, normal, .. } = self.exact_near(point, reach);
         let edge = 2.0 * self.radius;
-        let [across, up] = [DVec3::X, DVec3::Y].map(|axis| self.frame.vector(axis * edge));
+        let [across, up] = [DVec3::X, DVec3::Y].map(|axis| self.frame.vector_to_world(axis * edge));
         SurfacePoint::exact(near, normal, self.uv_at(point).as_vec2(), across, up, reach)
     }
 
     /// Point of the disk nearest to `point`, before rounding. `reach` bounds the lengths from which `point`
     /// was computed.
     pub fn exact_near(&self, point: DVec3, reach: f64) -> ExactPoint {
-        let (p, _) = self.chart(point);
-        ExactPoint { point: self.frame.point(p.extend(0.0)), normal: self.normal(), reach }
+        let (p, _) = self.nearest_in_plane(point);
+        ExactPoint { point: self.frame.point_to_world(p.extend(0.0)), normal: self.normal(), reach }
     }
 
     fn reach(&self) -> f64 {
         self.frame.origin.abs().max_element() + self.radius
     }
 
-    /// Nearest point in the disk plane's coordinates, and its texture coordinates.
-    fn chart(&self, point: DVec3) -> (DVec2, DVec2) {
-        let p = self.frame.local(point).truncate().clamp_length_max(self.radius);
+    /// The nearest point of the disk in the plane's coordinates, and its texture coordinates.
+    fn nearest_in_plane(&self, point: DVec3) -> (DVec2, DVec2) {
+        let p = self.frame.point_to_local(point).truncate().clamp_length_max(self.radius);
         (p, DVec2::splat(0.5) + p / (2.0 * self.radius))
     }
 
     /// Texture coordinates of a point on the disk.
     pub fn uv_at(&self, point: DVec3) -> DVec2 {
-        self.chart(point).1
+        self.nearest_in_plane(point).1
     }
 
     /// Maps a point from the unit disk to this disk.
     pub fn point(&self, of_unit_disk: DVec2) -> DVec3 {
-        self.frame.point((of_unit_disk * self.radius).extend(0.0))
+        self.frame.point_to_world((of_unit_disk * self.radius).extend(0.0))
     }
 
     /// Centroid.
@@ -128,7 +128,7 @@ impl Disk {
 
     /// Distance of a point from the disk.
     pub fn distance(&self, point: DVec3) -> f64 {
-        let local = self.frame.local(point);
+        let local = self.frame.point_to_local(point);
         DVec2::new((local.truncate().length() - self.radius).max(0.0), local.z).length()
     }
 
@@ -136,7 +136,7 @@ impl Disk {
     pub fn kernel_domain(&self, point: DVec3) -> KernelDomain {
         let (normal, from) = (self.normal(), point - self.centroid());
         let extent = Extent::Flat(self.radius - from.length());
-        let ground = Ground { normal, height: from.dot(normal).abs(), extent };
+        let ground = SurfaceBelow { normal, height: from.dot(normal).abs(), extent };
         KernelDomain::Surface { distance: self.distance(point), ground: Some(ground) }
     }
 

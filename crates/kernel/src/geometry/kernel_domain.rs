@@ -18,13 +18,13 @@ pub enum KernelDomain {
         /// Distance from the point to the surface.
         distance: f64,
         /// The surface below the point. Only for planes, disks, and spheres.
-        ground: Option<Ground>,
+        ground: Option<SurfaceBelow>,
     },
 }
 
 /// Surface geometry below a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Ground {
+pub struct SurfaceBelow {
     /// Unit normal at the surface point closest to the point.
     pub normal: DVec3,
     /// Height of the point above or below the surface.

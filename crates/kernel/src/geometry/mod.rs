@@ -40,7 +40,7 @@ use packet::{F32x16, HitPacket, RayPacket};
 use parallelogram::Parallelogram;
 use plane::Plane;
 use sphere::Sphere;
-use surface_packet::{Exact as _, SurfacePacket};
+use surface_packet::{ExactSurface as _, SurfacePacket};
 use torus::Torus;
 use triangle::Triangle;
 
@@ -140,8 +140,8 @@ impl Shape {
     #[inline(always)]
     fn fill_uvs(&self, row: &mut SurfacePacket, rays: &RayPacket, hits: &HitPacket, of: u32) -> bool {
         match self {
-            Self::Quad(quad) => row.uv_from(quad, rays, hits, of),
-            Self::Plane(plane) => row.uv_from(plane, rays, hits, of),
+            Self::Quad(quad) => row.fill_uv_from(quad, rays, hits, of),
+            Self::Plane(plane) => row.fill_uv_from(plane, rays, hits, of),
             Self::Sphere(_)
             | Self::Box(_)
             | Self::Triangle(_)
@@ -162,7 +162,11 @@ impl Shape {
     /// The requested parts of the surface point at a hit.
     #[inline]
     pub fn requested_surface(&self, ray: &RayF64, hit: &ShapeHit, asked: SurfaceRequest) -> SurfacePoint {
-        if asked.uv { self.surface(ray, hit) } else { for_shape!(self, it => it.exact(ray, hit)).bare() }
+        if asked.uv {
+            self.surface(ray, hit)
+        } else {
+            for_shape!(self, it => it.exact(ray, hit)).without_uv()
+        }
     }
 
     /// Bounding box, or `None` if the shape is infinite.

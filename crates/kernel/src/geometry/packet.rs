@@ -48,7 +48,7 @@ impl RayPacket {
 
     /// Sets the start triangles of the rays.
     #[inline(always)]
-    pub fn leaving(self, start: [u32; PACKET_SIZE]) -> Self {
+    pub fn with_start_triangle(self, start: [u32; PACKET_SIZE]) -> Self {
         Self { start, ..self }
     }
 
@@ -56,7 +56,7 @@ impl RayPacket {
     #[inline(always)]
     pub fn ray(&self, lane: usize) -> Ray {
         let of = |rows: &[F32x16; 3]| Vec3::new(rows[0][lane], rows[1][lane], rows[2][lane]);
-        Ray::new(of(&self.origin), of(&self.direction)).leaving(self.start[lane])
+        Ray::new(of(&self.origin), of(&self.direction)).with_start_triangle(self.start[lane])
     }
 
     /// Packs up to [`PACKET_SIZE`] rays and their ends.
@@ -86,7 +86,7 @@ impl RayPacket {
 
     /// Returns the ray in a lane in double precision, with an infinite end.
     #[inline(always)]
-    pub(super) fn line(&self, lane: usize) -> RayF64 {
+    pub(super) fn ray_f64(&self, lane: usize) -> RayF64 {
         let [ox, oy, oz] = &self.origin;
         let [dx, dy, dz] = &self.direction;
         RayF64 {

@@ -1,7 +1,7 @@
 //! Quads (squares and other parallelograms) in double precision.
 
 use super::packet::{F32x16, HitPacket, PACKET_SIZE, RayPacket, accept, may_accept};
-use super::surface_packet::{Exact, ExactPoint, Mapped};
+use super::surface_packet::{ExactPoint, ExactSurface, UvMapped};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::lanes::{Simd, TRUE};
 use crate::math::{DVec2, DVec3, Vec2};
@@ -56,7 +56,7 @@ impl Parallelogram {
     pub fn intersect_packet(&self, rays: &RayPacket, ends: &F32x16, hits: &mut HitPacket, simd: impl Simd) {
         let (mut above, mut along, mut may_hit) = ([0.0; PACKET_SIZE], [0.0; PACKET_SIZE], [0; PACKET_SIZE]);
         for lane in 0..PACKET_SIZE {
-            let ray = rays.line(lane);
+            let ray = rays.ray_f64(lane);
             above[lane] = self.normal.dot(self.corner - ray.origin);
             along[lane] = self.normal.dot(ray.direction);
             may_hit[lane] = if may_accept(above[lane], along[lane], ends[lane]) { TRUE } else { 0 };
@@ -65,7 +65,7 @@ impl Parallelogram {
             return;
         }
         for lane in 0..PACKET_SIZE {
-            let ray = rays.line(lane);
+            let ray = rays.ray_f64(lane);
             let t = above[lane] / along[lane];
             let from_corner = ray.direction * t - (self.corner - ray.origin);
             let (s, r) = (from_corner.dot(self.dual_u), from_corner.dot(self.dual_v));
@@ -137,7 +137,7 @@ impl Parallelogram {
     }
 }
 
-impl Exact for Parallelogram {
+impl ExactSurface for Parallelogram {
     #[inline(always)]
     fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> ExactPoint {
         let [s, t] = self.coordinates(ray, hit);
@@ -146,7 +146,7 @@ impl Exact for Parallelogram {
     }
 }
 
-impl Mapped for Parallelogram {
+impl UvMapped for Parallelogram {
     #[inline(always)]
     fn uv(&self, ray: &RayF64, hit: &ShapeHit) -> DVec2 {
         let [s, t] = self.coordinates(ray, hit);

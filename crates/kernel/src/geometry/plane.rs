@@ -1,9 +1,9 @@
 //! Infinite planes in double precision.
 
-use super::kernel_domain::{Extent, Ground, KernelDomain};
+use super::kernel_domain::{Extent, KernelDomain, SurfaceBelow};
 use super::packet::{F32x16, HitPacket, PACKET_SIZE, RayPacket, accept, may_accept};
 use super::surface::flat_axes;
-use super::surface_packet::{Exact, ExactPoint, Mapped};
+use super::surface_packet::{ExactPoint, ExactSurface, UvMapped};
 use super::{AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::lanes::{Simd, TRUE};
 use crate::math::{DVec2, DVec3, Vec2};
@@ -38,7 +38,7 @@ impl Plane {
     pub fn intersect_packet(&self, rays: &RayPacket, ends: &F32x16, hits: &mut HitPacket, simd: impl Simd) {
         let (mut above, mut along, mut may_hit) = ([0.0; PACKET_SIZE], [0.0; PACKET_SIZE], [0; PACKET_SIZE]);
         for lane in 0..PACKET_SIZE {
-            let ray = rays.line(lane);
+            let ray = rays.ray_f64(lane);
             above[lane] = self.normal.dot(self.point - ray.origin);
             along[lane] = self.normal.dot(ray.direction);
             may_hit[lane] = if may_accept(above[lane], along[lane], ends[lane]) { TRUE } else { 0 };
@@ -105,7 +105,8 @@ impl Plane {
     /// Geometry of the plane as seen from a point.
     pub fn kernel_domain(&self, point: DVec3) -> KernelDomain {
         let distance = self.distance(point);
-        let ground = Ground { normal: self.normal, height: distance, extent: Extent::Flat(f64::INFINITY) };
+        let ground =
+            SurfaceBelow { normal: self.normal, height: distance, extent: Extent::Flat(f64::INFINITY) };
         KernelDomain::Surface { distance, ground: Some(ground) }
     }
 
@@ -125,7 +126,7 @@ impl Plane {
     }
 }
 
-impl Exact for Plane {
+impl ExactSurface for Plane {
     #[inline(always)]
     fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> ExactPoint {
         let [s, t] = self.coordinates(ray, hit);
@@ -134,7 +135,7 @@ impl Exact for Plane {
     }
 }
 
-impl Mapped for Plane {
+impl UvMapped for Plane {
     #[inline(always)]
     fn uv(&self, ray: &RayF64, hit: &ShapeHit) -> DVec2 {
         DVec2::from_array(self.coordinates(ray, hit))

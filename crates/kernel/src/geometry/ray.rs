@@ -28,7 +28,7 @@ impl Ray {
 
     /// Sets the ray's start triangle.
     #[inline(always)]
-    pub fn leaving(self, start: u32) -> Self {
+    pub fn with_start_triangle(self, start: u32) -> Self {
         Self { start, ..self }
     }
 
@@ -45,7 +45,7 @@ impl Ray {
 
     /// Extends the segment by the error of its endpoint.
     #[inline(always)]
-    pub fn beyond(self, error: Vec3) -> Self {
+    pub fn extended_by(self, error: Vec3) -> Self {
         let relative = 4.0 * error.max_element() / self.direction.abs().max_element();
         Self { t_max: self.t_max + relative, ..self }
     }

@@ -2,9 +2,9 @@
 
 use std::f64::consts::PI;
 
-use super::kernel_domain::{Extent, Ground, KernelDomain};
+use super::kernel_domain::{Extent, KernelDomain, SurfaceBelow};
 use super::packet::{F32x16, HitPacket, PACKET_SIZE, RayPacket, accept};
-use super::surface_packet::{Exact, ExactPoint};
+use super::surface_packet::{ExactPoint, ExactSurface};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::lanes::{Simd, TRUE};
 use crate::math::{DVec2, DVec3, Vec2};
@@ -44,7 +44,7 @@ impl Sphere {
     pub fn intersect_packet(&self, rays: &RayPacket, ends: &F32x16, hits: &mut HitPacket, simd: impl Simd) {
         let (mut discriminants, mut may_hit) = ([0.0; PACKET_SIZE], [0; PACKET_SIZE]);
         for lane in 0..PACKET_SIZE {
-            let ray = rays.line(lane);
+            let ray = rays.ray_f64(lane);
             let to_origin = ray.origin - self.center;
             let a = ray.direction.length_squared();
             let b = -to_origin.dot(ray.direction);
@@ -56,7 +56,7 @@ impl Sphere {
             return;
         }
         for lane in 0..PACKET_SIZE {
-            let ray = rays.line(lane);
+            let ray = rays.ray_f64(lane);
             let to_origin = ray.origin - self.center;
             let a = ray.direction.length_squared();
             let b = -to_origin.dot(ray.direction);
@@ -117,7 +117,7 @@ impl Sphere {
     /// Geometry of the sphere as seen from a point.
     pub fn kernel_domain(&self, point: DVec3) -> KernelDomain {
         let (distance, out) = (self.distance(point), (point - self.center).normalize_or_zero());
-        let ground = Ground { normal: out, height: distance, extent: Extent::Round(self.radius) };
+        let ground = SurfaceBelow { normal: out, height: distance, extent: Extent::Round(self.radius) };
         KernelDomain::Surface { distance, ground: Some(ground) }
     }
 
@@ -131,13 +131,13 @@ impl Sphere {
         (point - self.center).length() < self.radius
     }
 
-    /// Projected area. For every direction, it is the area of a great circle.
+    /// Projected area, which is the area of a great circle for every direction.
     pub fn projected_area(&self, _: DVec3) -> f64 {
         PI * self.radius * self.radius
     }
 }
 
-impl Exact for Sphere {
+impl ExactSurface for Sphere {
     #[inline(always)]
     fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> ExactPoint {
         let outwards = ray.at(f64::from(hit.t)) - self.center;

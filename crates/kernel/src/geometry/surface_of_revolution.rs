@@ -29,18 +29,18 @@ impl AxialFrame {
     }
 
     /// Transforms a point to world coordinates.
-    pub fn point(&self, local: DVec3) -> DVec3 {
+    pub fn point_to_world(&self, local: DVec3) -> DVec3 {
         self.origin + self.axes * local
     }
 
     /// Transforms a direction to world coordinates.
-    pub fn vector(&self, local: DVec3) -> DVec3 {
+    pub fn vector_to_world(&self, local: DVec3) -> DVec3 {
         self.axes * local
     }
 
     /// Transforms a point to local coordinates.
     #[inline(always)]
-    pub fn local(&self, point: DVec3) -> DVec3 {
+    pub fn point_to_local(&self, point: DVec3) -> DVec3 {
         self.axes.transpose() * (point - self.origin)
     }
 
@@ -52,8 +52,8 @@ impl AxialFrame {
 
     /// Line through a ray, parametrized from its closest point to the frame's origin.
     #[inline(always)]
-    pub fn line(&self, ray: &RayF64) -> LocalLine {
-        let origin = self.local(ray.origin);
+    pub fn line_to_local(&self, ray: &RayF64) -> LocalLine {
+        let origin = self.point_to_local(ray.origin);
         let direction = self.axes.transpose() * ray.direction;
         let start = -origin.dot(direction) / direction.length_squared();
         LocalLine { foot: origin + direction * start, direction, start }
@@ -67,7 +67,7 @@ impl AxialFrame {
     /// Bounding box of all balls of radius `ball` with centers on a circle around the axis. Expanded to
     /// account for rounding.
     pub fn ball_bounds(&self, height: f64, radius: f64, ball: f64) -> Aabb {
-        let center = self.point(DVec3::new(0.0, 0.0, height));
+        let center = self.point_to_world(DVec3::new(0.0, 0.0, height));
         let across = |i: usize| DVec2::new(self.axes.x_axis[i], self.axes.y_axis[i]).length() * radius + ball;
         let extent = DVec3::new(across(0), across(1), across(2));
         let rounding = self.origin.abs() + extent + DVec3::splat(height.abs());
@@ -88,7 +88,7 @@ pub struct LocalLine {
     pub start: f64,
 }
 
-/// Interval of a line, relative to its foot. Each end has the index of the part that contains it.
+/// Interval of a line, relative to its foot. Each end is stored with the index of the part that it is on.
 #[derive(Clone, Copy, Debug)]
 pub struct LineInterval {
     /// Start of the interval.
@@ -102,7 +102,7 @@ impl LineInterval {
     pub const WHOLE: Self = Self { enter: (f64::NEG_INFINITY, 0), leave: (f64::INFINITY, 0) };
 
     /// Interval between two points of the side (part 0).
-    pub fn of_side(enter: f64, leave: f64) -> Self {
+    pub fn from_side(enter: f64, leave: f64) -> Self {
         Self { enter: (enter, 0), leave: (leave, 0) }
     }
 
@@ -117,7 +117,7 @@ impl LineInterval {
         Some(Self { enter, leave })
     }
 
-    fn holds(&self, along: f64) -> bool {
+    fn contains_position(&self, along: f64) -> bool {
         self.enter.0 <= along && along <= self.leave.0
     }
 }
@@ -150,7 +150,7 @@ pub fn first_hit(
         ray.accept(t).filter(|_| !is_start(along, part)).map(|_| (t, part))
     };
     if !closed {
-        let bare = [side.enter, side.leave].into_iter().filter(|end| ends.holds(end.0));
+        let bare = [side.enter, side.leave].into_iter().filter(|end| ends.contains_position(end.0));
         return bare.into_iter().find_map(accepted);
     }
     let enter = if side.enter.0 > ends.enter.0 { side.enter } else { ends.enter };
@@ -190,11 +190,12 @@ pub fn ring_projected_area(area: f64, a: f64, b: f64) -> f64 {
 }
 
 /// Converts t and the part index to a hit.
-pub fn hit((t, primitive): (f64, u32)) -> ShapeHit {
+pub fn to_shape_hit((t, primitive): (f64, u32)) -> ShapeHit {
     ShapeHit { primitive, ..ShapeHit::at(t as f32) }
 }
 
-/// t of a hit before rounding, from a second intersection. If that finds another hit, the rounded t.
+/// t of a hit before rounding, computed by intersecting the ray again. If the second intersection finds
+/// another hit, returns the rounded t.
 pub fn exact_t(hit: &ShapeHit, again: Option<(f64, u32)>) -> f64 {
     match again {
         Some((t, part)) if t as f32 == hit.t && part == hit.primitive => t,
@@ -222,8 +223,8 @@ pub fn exact_point(
     ray.at(fitting.unwrap_or_else(|| exact_t(hit, again())))
 }
 
-/// Unit vector toward a point in the plane. The x axis for the origin.
-pub fn radial(p: DVec2) -> DVec2 {
+/// Unit vector toward a point in the plane, or the x axis for the origin.
+pub fn radial_direction(p: DVec2) -> DVec2 {
     p.try_normalize().unwrap_or(DVec2::X)
 }
 
@@ -303,7 +304,7 @@ pub(super) mod tests {
             let from = at + DVec3::new(2e5, 0.0, f64::from(i % 7) * 2e5 - 6e5);
             let ray = Ray::new(from.as_vec3(), (at - from).normalize().as_vec3()).to_f64();
             let Some((t, part)) = thin.met(&ray) else { continue };
-            assert_eq!(thin.exact(&ray, &hit((t, part))), ray.at(t), "{thin:?} {ray:?}");
+            assert_eq!(thin.exact(&ray, &to_shape_hit((t, part))), ray.at(t), "{thin:?} {ray:?}");
             let size = thin.within(&ray).map_or(f64::INFINITY, |side| side.leave.0 - side.enter.0);
             ambiguous += u32::from((t + size) as f32 == t as f32);
         }

@@ -38,19 +38,19 @@ pub struct ExactPoint {
 
 impl ExactPoint {
     /// Surface point without texture coordinates and tangents.
-    pub fn bare(&self) -> SurfacePoint {
+    pub fn without_uv(&self) -> SurfacePoint {
         SurfacePoint::exact(self.point, self.normal, Vec2::ZERO, DVec3::ZERO, DVec3::ZERO, self.reach)
     }
 }
 
 /// A shape that computes surface points in double precision.
-pub trait Exact {
+pub trait ExactSurface {
     /// Surface point at a hit.
     fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> ExactPoint;
 }
 
 /// A shape with a branchless texture coordinate computation.
-pub trait Mapped {
+pub trait UvMapped {
     /// Texture coordinates at a hit.
     fn uv(&self, ray: &RayF64, hit: &ShapeHit) -> DVec2;
 }
@@ -88,16 +88,22 @@ impl SurfacePacket {
         }
         for lane in lanes(of) {
             let Some(hit) = hits.get(lane) else { continue };
-            let uv = shape.surface(&rays.line(lane), &hit).uv;
+            let uv = shape.surface(&rays.ray_f64(lane), &hit).uv;
             (self.uv[0][lane], self.uv[1][lane]) = (uv.x, uv.y);
         }
     }
 
     /// [`SurfacePacket::fill_uv`] for a shape with a SIMD loop.
     #[inline(always)]
-    pub(super) fn uv_from(&mut self, shape: &impl Mapped, rays: &RayPacket, hits: &HitPacket, of: u32) {
+    pub(super) fn fill_uv_from(
+        &mut self,
+        shape: &impl UvMapped,
+        rays: &RayPacket,
+        hits: &HitPacket,
+        of: u32,
+    ) {
         for lane in 0..PACKET_SIZE {
-            let uv = shape.uv(&rays.line(lane), &ShapeHit::at(hits.t[lane]));
+            let uv = shape.uv(&rays.ray_f64(lane), &ShapeHit::at(hits.t[lane]));
             let is_own = of & 1 << lane != 0;
             self.uv[0][lane] = if is_own { uv.x } else { self.uv[0][lane] };
             self.uv[1][lane] = if is_own { uv.y } else { self.uv[1][lane] };
@@ -106,7 +112,13 @@ impl SurfacePacket {
 
     /// [`SurfacePacket::fill`] for a shape with a SIMD loop.
     #[inline(always)]
-    pub(super) fn fill_from(&mut self, shape: &impl Exact, rays: &RayPacket, hits: &HitPacket, of: u32) {
+    pub(super) fn fill_from(
+        &mut self,
+        shape: &impl ExactSurface,
+        rays: &RayPacket,
+        hits: &HitPacket,
+        of: u32,
+    ) {
         let mut found = Self::EMPTY;
         for lane in 0..PACKET_SIZE {
             let hit = ShapeHit {
@@ -115,18 +127,18 @@ impl SurfacePacket {
                 u: hits.u[lane],
                 v: hits.v[lane],
             };
-            let ExactPoint { point, normal, reach } = shape.exact(&rays.line(lane), &hit);
+            let ExactPoint { point, normal, reach } = shape.exact(&rays.ray_f64(lane), &hit);
             let point = point.as_vec3();
             set_lane(&mut found.point, lane, point);
             set_lane(&mut found.error, lane, error(point, reach));
             set_lane(&mut found.normal, lane, normal.normalize().as_vec3());
         }
-        self.take(of, &found);
+        self.copy_points(of, &found);
     }
 
     /// Copies the selected points, errors, and normals from another packet.
     #[inline(always)]
-    pub fn take(&mut self, of: u32, found: &Self) {
+    pub fn copy_points(&mut self, of: u32, found: &Self) {
         let of = mask_from_bits(of);
         for axis in 0..3 {
             select(&of, &found.point[axis], &mut self.point[axis]);
@@ -137,7 +149,7 @@ impl SurfacePacket {
 
     /// Copies the selected shading normals and shadow points from another packet.
     #[inline(always)]
-    pub fn take_smooth(&mut self, of: u32, found: &Self) {
+    pub fn copy_shading_normals(&mut self, of: u32, found: &Self) {
         self.smooth |= of;
         let of = mask_from_bits(of);
         for axis in 0..3 {

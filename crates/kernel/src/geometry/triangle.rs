@@ -1,13 +1,13 @@
 //! Single triangles in double precision.
 
 use super::packet::{F32x16, HitPacket, RayPacket, accept};
-use super::surface_packet::{Exact, ExactPoint};
+use super::surface_packet::{ExactPoint, ExactSurface};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::{DVec2, DVec3, Vec2};
 use crate::sampling::warp;
 
-/// Minimum ratio between the distance of the corners and the distances of the ray's origin and hit for a
-/// triangle to be considered huge.
+/// A triangle is considered huge if the distance of its corners is at least this multiple of the distances of
+/// the ray's origin and the hit.
 const HUGE: f64 = 1024.0;
 
 /// A triangle. The front faces along (b − a) × (c − a).
@@ -42,7 +42,7 @@ impl Triangle {
     #[inline(always)]
     pub fn intersect_packet(&self, rays: &RayPacket, ends: &F32x16, hits: &mut HitPacket) {
         for (lane, &end) in ends.iter().enumerate() {
-            let ray = rays.line(lane);
+            let ray = rays.ray_f64(lane);
             let (a, b, c) = (self.a - ray.origin, self.b - ray.origin, self.c - ray.origin);
             let d = ray.direction;
             let (wa, wb, wc) = (d.dot(c.cross(b)), d.dot(a.cross(c)), d.dot(b.cross(a)));
@@ -66,7 +66,7 @@ impl Triangle {
 
     /// Texture coordinates of a point on the triangle.
     pub fn uv_at(&self, point: DVec3) -> DVec2 {
-        weights([self.a, self.b, self.c], point)
+        barycentric_weights([self.a, self.b, self.c], point)
     }
 
     /// Bounding box.
@@ -108,14 +108,14 @@ impl Triangle {
 }
 
 /// Barycentric weights of the second and third corners at a point on the triangle.
-pub fn weights([a, b, c]: [DVec3; 3], point: DVec3) -> DVec2 {
+pub fn barycentric_weights([a, b, c]: [DVec3; 3], point: DVec3) -> DVec2 {
     let (ab, ac, ap) = (b - a, c - a, point - a);
     let normal = ab.cross(ac);
     let of = |area: DVec3| area.dot(normal) / normal.length_squared();
     DVec2::new(of(ap.cross(ac)), of(ab.cross(ap)))
 }
 
-impl Exact for Triangle {
+impl ExactSurface for Triangle {
     #[inline(always)]
     fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> ExactPoint {
         let (u, v) = (f64::from(hit.u), f64::from(hit.v));

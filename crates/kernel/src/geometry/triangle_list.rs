@@ -125,7 +125,7 @@ impl TriangleList {
         let points = || corners.iter().flatten().copied();
         let (low, high) = (points().reduce(Vec3::min)?, points().reduce(Vec3::max)?);
         let size = (high - low).max_element();
-        let is_fit = |of: &[Vec3; 3]| slender(of)[0] * f64::from(size) <= MOST_SLENDER;
+        let is_fit = |of: &[Vec3; 3]| slenderness(of)[0] * f64::from(size) <= MOST_SLENDER;
         let is_finite = size.is_finite() && size > 1e-9 && low.abs().max(high.abs()).max_element() < 1e9;
         if corners.len() > MOST || !is_finite || !corners.iter().all(is_fit) {
             return None;
@@ -137,19 +137,20 @@ impl TriangleList {
                 continue;
             }
             let other = (number + 1..corners.len()).find_map(|other| {
-                let pair = is_left[other].then(|| paired(&corners[number], &corners[other], reach))??;
+                let pair =
+                    is_left[other].then(|| pair_into_quad(&corners[number], &corners[other], reach))??;
                 Some((other, pair))
             });
             facets.push(match other {
                 Some((other, [first, [.., apex]])) => {
                     is_left[other] = false;
-                    let [one, two] = [slender(&corners[number]), slender(&corners[other])];
+                    let [one, two] = [slenderness(&corners[number]), slenderness(&corners[other])];
                     let most = [one[0].max(two[0]), one[1].max(two[1])];
                     Facet::new(&first, Some(apex), [number as u32, other as u32], most)
                 }
                 None => {
                     let own = &corners[number];
-                    Facet::new(own, None, [number as u32; 2], slender(own))
+                    Facet::new(own, None, [number as u32; 2], slenderness(own))
                 }
             });
         }
@@ -167,7 +168,8 @@ impl TriangleList {
         simd: impl Simd,
     ) -> u32 {
         let candidates = self.candidates(rays, ends, &[NONE; PACKET_SIZE], simd);
-        let Tested { hit, undecided, hits } = self.test(rays, &candidates, (met, ends), simd);
+        let CandidateHits { hit, undecided, hits } =
+            self.test_candidates(rays, &candidates, (met, ends), simd);
         select(&hit, &hits.t, &mut found.t);
         select(&hit, &hits.u, &mut found.u);
         select(&hit, &hits.v, &mut found.v);
@@ -175,8 +177,8 @@ impl TriangleList {
         undecided
     }
 
-    /// Returns the mask of the rays in `met` that hit any triangle except their own in `except`, and the mask
-    /// of undecided rays. All other rays must have negative ends.
+    /// Returns the mask of the rays in `met` that hit any triangle other than the ray's entry in `except`,
+    /// and the mask of undecided rays. All other rays must have negative ends.
     #[inline(always)]
     pub fn any(
         &self,
@@ -193,7 +195,7 @@ impl TriangleList {
         if simd.movemask(&is_met) & met == 0 {
             return [0; 2];
         }
-        let Tested { hit, undecided, .. } = self.test(rays, &candidates, (met, ends), simd);
+        let CandidateHits { hit, undecided, .. } = self.test_candidates(rays, &candidates, (met, ends), simd);
         [simd.movemask(&hit) & met, undecided]
     }
 
@@ -284,13 +286,13 @@ impl TriangleList {
 
     /// Tests each ray against its nearest candidate.
     #[inline(always)]
-    fn test(
+    fn test_candidates(
         &self,
         rays: &RayPacket,
         candidates: &Candidates,
         (met, ends): (u32, &F32x16),
         simd: impl Simd,
-    ) -> Tested {
+    ) -> CandidateHits {
         let mut corners = [[[0.0; PACKET_SIZE]; 3]; 3];
         for i in 0..PACKET_SIZE {
             let own = &self.corners[candidates.number[i] as usize];
@@ -311,7 +313,7 @@ impl TriangleList {
             hit[i] = if is_nearest { TRUE } else { 0 };
             undecided[i] = if is_open | (candidates.doubtful[i] != 0) { TRUE } else { 0 };
         }
-        Tested { hit, undecided: simd.movemask(&undecided) & met, hits }
+        CandidateHits { hit, undecided: simd.movemask(&undecided) & met, hits }
     }
 
     /// Computes the error terms of the rays.
@@ -347,7 +349,7 @@ impl TriangleList {
 }
 
 /// Results of running the watertight test on the candidates.
-struct Tested {
+struct CandidateHits {
     /// Rays that are certain to hit their candidate before all others.
     hit: Mask,
     /// Mask of the undecided rays.
@@ -392,7 +394,7 @@ impl Facet {
 
 /// Reorders the corners of two triangles that form a flat quadrilateral close to a parallelogram: first the
 /// first triangle's outer corner, last the second triangle's outer corner. `None` for other triangles.
-fn paired(one: &[Vec3; 3], other: &[Vec3; 3], reach: f32) -> Option<[[Vec3; 3]; 2]> {
+fn pair_into_quad(one: &[Vec3; 3], other: &[Vec3; 3], reach: f32) -> Option<[[Vec3; 3]; 2]> {
     let apart = |of: &[Vec3; 3], from: &[Vec3; 3]| {
         let mut own = (0..3).filter(|&i| !from.contains(&of[i]));
         own.next().filter(|_| own.next().is_none())
@@ -418,7 +420,7 @@ const FLAT: f32 = 4.0 * UNIT_ROUNDOFF;
 const ASKEW: f64 = 0.25;
 
 /// D/(2A) and D²/(2A) of a triangle.
-fn slender([a, b, c]: &[Vec3; 3]) -> [f64; 2] {
+fn slenderness([a, b, c]: &[Vec3; 3]) -> [f64; 2] {
     let [a, b, c]: [DVec3; 3] = [a, b, c].map(|corner| corner.as_dvec3());
     let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
     let slender = longest / (b - a).cross(c - a).length();

@@ -97,13 +97,13 @@ impl ShearedRay {
     /// ray misses the triangle in double precision, the nearest point on an edge is used.
     #[cold]
     fn intersect_needle(&self, corners: &[Vec3; 3], t_max: f32) -> Option<ShapeHit> {
-        let ([a, b, c], [wa, wb, wc]) = self.in_f64(corners);
+        let ([a, b, c], [wa, wb, wc]) = self.edge_functions_f64(corners);
         let sum = wa + wb + wc;
         let is_inside = wa * sum >= 0.0 && wb * sum >= 0.0 && wc * sum >= 0.0 && sum != 0.0;
         let (t, u, v) = if is_inside {
             ((wa * a.z + wb * b.z + wc * c.z) / sum, wb / sum, wc / sum)
         } else {
-            let edges = [nearest_of_edge(a, b), nearest_of_edge(b, c), nearest_of_edge(c, a)];
+            let edges = [nearest_on_edge(a, b), nearest_on_edge(b, c), nearest_on_edge(c, a)];
             let edge = (0..3).min_by(|&i, &j| edges[i].0.total_cmp(&edges[j].0)).unwrap_or(0);
             let (_, part, t) = edges[edge];
             let [u, v] = [[part, 0.0], [1.0 - part, part], [0.0, 1.0 - part]][edge];
@@ -117,7 +117,7 @@ impl ShearedRay {
     /// single precision. The ray's line is already known to pass through the triangle.
     #[cold]
     fn intersect_at_start(&self, corners: &[Vec3; 3], t_max: f32) -> Option<ShapeHit> {
-        let ([a, b, c], [wa, wb, wc]) = self.in_f64(corners);
+        let ([a, b, c], [wa, wb, wc]) = self.edge_functions_f64(corners);
         let sum = wa + wb + wc;
         let t = ((wa * a.z + wb * b.z + wc * c.z) / sum) as f32;
         let [u, v] = [wb, wc].map(|weight| (weight / sum).clamp(0.0, 1.0) as f32);
@@ -126,7 +126,7 @@ impl ShearedRay {
 
     /// Edge functions and sheared corners in double precision. The z coordinate of a corner is its t along
     /// the ray.
-    fn in_f64(&self, corners: &[Vec3; 3]) -> ([DVec3; 3], [f64; 3]) {
+    fn edge_functions_f64(&self, corners: &[Vec3; 3]) -> ([DVec3; 3], [f64; 3]) {
         let [x, y, z] = self.axes;
         let direction = self.direction.as_dvec3();
         let shear = direction / direction[z];
@@ -168,7 +168,7 @@ fn greatest(a: f32, b: f32) -> f32 {
 /// Finds the point on the segment from p to q that is nearest to the ray. z coordinates are distances along
 /// the ray. Returns the squared distance from the ray, the fraction of the segment, and the distance along
 /// the ray.
-fn nearest_of_edge(p: DVec3, q: DVec3) -> (f64, f64, f64) {
+fn nearest_on_edge(p: DVec3, q: DVec3) -> (f64, f64, f64) {
     let (start, way) = (p.truncate(), (q - p).truncate());
     let part = (-start.dot(way) / way.length_squared()).clamp(0.0, 1.0);
     let part = if part.is_nan() { 0.0 } else { part };

@@ -32,19 +32,19 @@ pub(super) struct Hits {
 /// A triangle corner, shared by all rays or different for each ray.
 pub(super) trait Corner: Copy {
     /// Coordinate of the corner for the ray in a lane.
-    fn along(self, axis: usize, lane: usize) -> f32;
+    fn coordinate(self, axis: usize, lane: usize) -> f32;
 }
 
 impl Corner for Vec3 {
     #[inline(always)]
-    fn along(self, axis: usize, _: usize) -> f32 {
+    fn coordinate(self, axis: usize, _: usize) -> f32 {
         self[axis]
     }
 }
 
 impl Corner for &Vec3x16 {
     #[inline(always)]
-    fn along(self, axis: usize, lane: usize) -> f32 {
+    fn coordinate(self, axis: usize, lane: usize) -> f32 {
         self[axis][lane]
     }
 }
@@ -116,7 +116,7 @@ impl<'a> ShearedPacket<'a> {
         select_u32(&is_nearer, &[number; PACKET_SIZE], &mut found.primitive);
         let doubtful = simd.movemask(&hits.doubtful) & met;
         if doubtful != 0 {
-            self.decide(doubtful, (number, corners), ends, found);
+            self.closest_one_by_one(doubtful, (number, corners), ends, found);
         }
     }
 
@@ -126,13 +126,13 @@ impl<'a> ShearedPacket<'a> {
         let hits = self.hits(&[number; PACKET_SIZE], *corners, ends);
         let doubtful = simd.movemask(&hits.doubtful) & met;
         let hit = simd.movemask(&hits.hit) & met;
-        if doubtful == 0 { hit } else { hit | self.decided(doubtful, corners, ends) }
+        if doubtful == 0 { hit } else { hit | self.any_one_by_one(doubtful, corners, ends) }
     }
 
     /// [`ShearedPacket::closest`] for the given rays, one by one.
     #[cold]
     #[inline(never)]
-    fn decide(
+    fn closest_one_by_one(
         &self,
         these: u32,
         (number, corners): (u32, &[Vec3; 3]),
@@ -140,7 +140,7 @@ impl<'a> ShearedPacket<'a> {
         found: &mut HitPacket,
     ) {
         for i in lanes(these) {
-            let Some(hit) = self.alone(i, corners, ends[i]) else { continue };
+            let Some(hit) = self.intersect_lane(i, corners, ends[i]) else { continue };
             if found.t[i].is_nan() || hit.t < found.t[i] {
                 found.put(i, &super::ShapeHit { primitive: number, ..hit });
                 ends[i] = hit.t;
@@ -151,21 +151,23 @@ impl<'a> ShearedPacket<'a> {
     /// [`ShearedPacket::any`] for the given rays, one by one.
     #[cold]
     #[inline(never)]
-    fn decided(&self, these: u32, corners: &[Vec3; 3], ends: &F32x16) -> u32 {
-        lanes(these).filter(|&i| self.alone(i, corners, ends[i]).is_some()).fold(0, |hit, i| hit | 1 << i)
+    fn any_one_by_one(&self, these: u32, corners: &[Vec3; 3], ends: &F32x16) -> u32 {
+        lanes(these)
+            .filter(|&i| self.intersect_lane(i, corners, ends[i]).is_some())
+            .fold(0, |hit, i| hit | 1 << i)
     }
 
-    fn alone(&self, i: usize, corners: &[Vec3; 3], end: f32) -> Option<super::ShapeHit> {
+    fn intersect_lane(&self, i: usize, corners: &[Vec3; 3], end: f32) -> Option<super::ShapeHit> {
         let ray = self.rays.ray(i);
         ShearedRay::new(ray.origin, ray.direction).intersect(corners, end)
     }
 
     /// A corner in each ray's sheared coordinates.
     #[inline(always)]
-    fn sheared(&self, corner: impl Corner) -> Vec3x16 {
+    fn shear_corner(&self, corner: impl Corner) -> Vec3x16 {
         let mut seen = [[0.0; PACKET_SIZE]; 3];
         for i in 0..PACKET_SIZE {
-            let [x, y, z] = [0, 1, 2].map(|axis| corner.along(axis, i) - self.rays.origin[axis][i]);
+            let [x, y, z] = [0, 1, 2].map(|axis| corner.coordinate(axis, i) - self.rays.origin[axis][i]);
             let (is_x, is_y) = (self.longest[0][i] != 0, self.longest[1][i] != 0);
             let along = if is_x {
                 x
@@ -204,7 +206,8 @@ impl<'a> ShearedPacket<'a> {
         corners: [impl Corner; 3],
         ends: &F32x16,
     ) -> Hits {
-        let [a, b, c] = [self.sheared(corners[0]), self.sheared(corners[1]), self.sheared(corners[2])];
+        let [a, b, c] =
+            [self.shear_corner(corners[0]), self.shear_corner(corners[1]), self.shear_corner(corners[2])];
         let mut hits = Hits {
             hit: [0; PACKET_SIZE],
             doubtful: [0; PACKET_SIZE],
@@ -223,9 +226,9 @@ impl<'a> ShearedPacket<'a> {
             let shear_z = self.shear[2][i];
             let t = (wa * az + wb * bz + wc * cz) * shear_z * inverse;
             // Compute the error bound as in `ShearedRay::distance_error`.
-            let first = greatest([ax, bx, cx]);
-            let second = greatest([ay, by, cy]);
-            let depth = greatest([az, bz, cz]);
+            let first = max_abs([ax, bx, cx]);
+            let second = max_abs([ay, by, cy]);
+            let depth = max_abs([az, bz, cz]);
             let is_down = self.is_down[i] != 0;
             let (x, y) = (if is_down { second } else { first }, if is_down { first } else { second });
             let z = depth * shear_z.abs();
@@ -249,7 +252,7 @@ impl<'a> ShearedPacket<'a> {
 
 /// Maximum of the absolute values of three numbers.
 #[inline(always)]
-fn greatest([a, b, c]: [f32; 3]) -> f32 {
+fn max_abs([a, b, c]: [f32; 3]) -> f32 {
     let (a, b, c) = (a.abs(), b.abs(), c.abs());
     let most = if a > b { a } else { b };
     if most > c { most } else { c }

@@ -144,7 +144,7 @@ impl Light {
     }
 
     /// Whether the light is at infinity.
-    pub fn is_beyond(&self) -> bool {
+    pub fn is_infinite(&self) -> bool {
         matches!(self.family(), LightFamily::Infinite(_))
     }
 
@@ -157,20 +157,20 @@ impl Light {
     pub fn is_single(&self) -> bool {
         match self.family() {
             LightFamily::Delta(_) => true,
-            LightFamily::Infinite(light) => light.is_sharp(),
+            LightFamily::Infinite(light) => light.is_single_direction(),
             LightFamily::Area(_) => false,
         }
     }
 
     /// The light's center, and the light's own geometry, which rays toward the center must ignore. `None` for
     /// an environment.
-    pub fn middle(&self) -> Option<(LightCenter, LightObject)> {
+    pub fn center(&self) -> Option<(LightCenter, LightObject)> {
         Some(match self.family() {
             LightFamily::Delta(light) => {
                 (LightCenter::At(light.isotropic().position.as_vec3()), LightObject::Nothing)
             }
-            LightFamily::Infinite(light) => (LightCenter::Towards(light.middle()?), LightObject::Nothing),
-            LightFamily::Area(light) => (LightCenter::At(light.middle().as_vec3()), light.source()),
+            LightFamily::Infinite(light) => (LightCenter::Towards(light.center()?), LightObject::Nothing),
+            LightFamily::Area(light) => (LightCenter::At(light.center().as_vec3()), light.source()),
         })
     }
 

@@ -52,7 +52,7 @@ pub use area::{
 pub use light::{Light, LightFamily};
 pub use packet::{LightObjectPacket, LightSamplePacket};
 pub use photon_emission::{
-    BoundingSphere, EmittedPhoton, EmitterGeometry, PhotonNumbers, PhotonOrigin, PhotonSource,
+    BoundingSphere, EmittedPhoton, EmitterGeometry, PhotonOrigin, PhotonRandomNumbers, PhotonSource,
 };
 pub use sample::{LightCenter, LightHit, LightObject, LightSample, ShadowRayEnd};
 pub use set::{ExpectedSamples, LightSampler, LightSamplingEffort, Lights, SamplingMode};

@@ -44,7 +44,7 @@ impl LightObjectPacket {
     /// A packet with the same source in all lanes.
     #[inline(always)]
     pub fn of(source: LightObject) -> Self {
-        let (object, part) = numbers(source);
+        let (object, part) = object_and_part(source);
         Self { object: [object; PACKET_SIZE], part: [part; PACKET_SIZE], is_any: object != Self::NONE }
     }
 
@@ -69,13 +69,13 @@ impl LightObjectPacket {
     /// Sets the source of a lane.
     #[inline(always)]
     pub fn set(&mut self, lane: usize, source: LightObject) {
-        (self.object[lane], self.part[lane]) = numbers(source);
+        (self.object[lane], self.part[lane]) = object_and_part(source);
         self.is_any |= self.object[lane] != Self::NONE;
     }
 }
 
 #[inline(always)]
-fn numbers(source: LightObject) -> (u32, u32) {
+fn object_and_part(source: LightObject) -> (u32, u32) {
     match source {
         LightObject::Nothing => (LightObjectPacket::NONE, LightObjectPacket::NONE),
         LightObject::Object(object) => (object, LightObjectPacket::NONE),
@@ -88,7 +88,7 @@ fn numbers(source: LightObject) -> (u32, u32) {
 /// with a closure is not always inlined, and would then not be compiled with the caller's instruction set.
 macro_rules! packet_of {
     ($source:expr, $i:ident => $sample:expr) => {{
-        let mut row = $crate::lights::packet::LightSamplePacket::dark($source);
+        let mut row = $crate::lights::packet::LightSamplePacket::without_light($source);
         for $i in 0..$crate::math::lanes::PACKET_SIZE {
             let (direction, target, weight) = $sample;
             $crate::math::lanes::set_lane(&mut row.directions, $i, direction);
@@ -131,7 +131,7 @@ impl LightSamplePacket {
     }
 
     #[inline(always)]
-    pub(super) fn dark(source: LightObject) -> Self {
+    pub(super) fn without_light(source: LightObject) -> Self {
         Self {
             directions: [[0.0; PACKET_SIZE]; 3],
             targets: [[0.0; PACKET_SIZE]; 3],
@@ -153,12 +153,12 @@ impl LightSamplePacket {
     }
 
     /// Samples the points in the mask `used` one by one.
-    pub(super) fn lane_by_lane(
+    pub(super) fn sample_one_by_one(
         points: &Vec3x16,
         used: u32,
         sample: impl Fn(usize, Vec3) -> Option<LightSample>,
     ) -> Self {
-        let mut row = Self::dark(LightObject::Nothing);
+        let mut row = Self::without_light(LightObject::Nothing);
         for i in (0..PACKET_SIZE).filter(|i| used & 1 << i != 0) {
             if let Some(sample) = sample(i, lane(points, i)) {
                 row.put(i, &sample);

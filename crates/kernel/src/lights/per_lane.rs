@@ -44,7 +44,7 @@ impl Lights {
         for i in 1..PACKET_SIZE {
             lights[i] = self.get(picked[i]);
         }
-        let mut row = LightSamplePacket::dark(LightObject::Nothing);
+        let mut row = LightSamplePacket::without_light(LightObject::Nothing);
         let mut left = used;
         // Sample all lights of the same kind together. Other lanes get a copy of one of these lights, and
         // their results are discarded.
@@ -52,16 +52,16 @@ impl Lights {
             let first = left.trailing_zeros() as usize % PACKET_SIZE;
             let mut of = 0;
             let found = if let Some(filler) = lights[first].as_point() {
-                let lights = same_kind((&lights, left), &mut of, Light::as_point, filler);
+                let lights = lights_of_kind((&lights, left), &mut of, Light::as_point, filler);
                 packet_of!(LightObject::Nothing, i => {
-                    let (direction, weight) = lights[i].arriving(lane(points, i));
+                    let (direction, weight) = lights[i].direction_and_irradiance(lane(points, i));
                     (direction, lights[i].position.as_vec3(), weight)
                 })
             } else if let Some(filler) = sphere(lights[first]) {
-                let balls = same_kind((&lights, left), &mut of, sphere, filler);
+                let balls = lights_of_kind((&lights, left), &mut of, sphere, filler);
                 convex_packet_of!(i => balls, points, u)
             } else if let Some(filler) = quad(lights[first]) {
-                let quads = same_kind((&lights, left), &mut of, quad, filler);
+                let quads = lights_of_kind((&lights, left), &mut of, quad, filler);
                 let mut row = convex_packet_of!(i => quads, points, u);
                 for i in 0..PACKET_SIZE {
                     if let Some((_, Some(two))) = quads[i].1.shape.as_quad() {
@@ -69,15 +69,15 @@ impl Lights {
                     }
                 }
                 row
-            } else if let Some(filler) = facets(lights[first]) {
-                let all = same_kind((&lights, left), &mut of, facets, filler);
+            } else if let Some(filler) = area_sampled(lights[first]) {
+                let all = lights_of_kind((&lights, left), &mut of, area_sampled, filler);
                 triangle_packet_of!(i => (all[i].0, all[i].1), points, u)
             } else {
                 of = 1 << first;
                 let sample = |i: usize, point| {
                     lights[i].sample_untextured(point, lane(normals, i), [u[0][i], u[1][i]])
                 };
-                LightSamplePacket::lane_by_lane(points, of, sample)
+                LightSamplePacket::sample_one_by_one(points, of, sample)
             };
             // Usually, all lanes have picked lights of the same kind.
             if of == used {
@@ -119,14 +119,14 @@ fn quad(light: &Light) -> Option<(&QuadEmitter, &AreaLight)> {
 }
 
 #[inline(always)]
-fn facets(light: &Light) -> Option<(&AreaSampledTriangles, &AreaLight)> {
+fn area_sampled(light: &Light) -> Option<(&AreaSampledTriangles, &AreaLight)> {
     let light = light.as_area()?;
-    light.shape.as_mesh().and_then(MeshEmitter::facets).map(|facets| (facets, light))
+    light.shape.as_mesh().and_then(MeshEmitter::area_sampled).map(|facets| (facets, light))
 }
 
 /// The lights of one kind. Adds the lanes that have such a light to `of`. The other lanes get `filler`.
 #[inline(always)]
-fn same_kind<'a, T: Copy>(
+fn lights_of_kind<'a, T: Copy>(
     (lights, left): (&[&'a Light; PACKET_SIZE], u32),
     of: &mut u32,
     kind: impl Fn(&'a Light) -> Option<T>,

@@ -24,7 +24,7 @@ pub struct Lights {
     environment: Option<(u32, Environment)>,
     /// Tree over all lights. `None` if there are few lights.
     tree: Option<Arc<LightTree>>,
-    /// Tree over all lights except those at infinity. `None` if paths sample all of them.
+    /// Tree over all lights except those at infinity. `None` if paths sample every light.
     local_tree: Option<Arc<LightTree>>,
 }
 
@@ -62,7 +62,7 @@ impl LightSamplingEffort {
     /// For direct lighting. As good as examining each of a thousand lights.
     pub const DIRECT: Self = Self { count: MAX_WITHOUT_TREE as u32, nodes: LightTreeCut::MOST };
 
-    /// For paths, where other noise makes additional shadow rays not worthwhile.
+    /// For paths. Additional shadow rays are not worthwhile because of the other noise.
     pub const PATHS: Self = Self { count: 1, nodes: 8 };
 
     /// Creates a cut of a tree for this effort.
@@ -80,7 +80,7 @@ impl ExpectedSamples<'_> {
     #[inline]
     pub fn of(&self, number: u32) -> f32 {
         self.0.as_ref().map_or(1.0, |(sampler, cut)| {
-            if sampler.leaves_beyond && !sampler.tree.has(number) {
+            if sampler.leaves_beyond && !sampler.tree.contains(number) {
                 1.0
             } else {
                 sampler.picks.count as f32 * cut.probability(number)
@@ -108,14 +108,14 @@ impl Lights {
         for (number, light) in (0_u32..).zip(&all) {
             if let Some(light) = light.as_area() {
                 lights.index_light(number, light);
-            } else if let Some(sun) = light.as_directional().filter(|sun| !sun.is_sharp()) {
+            } else if let Some(sun) = light.as_directional().filter(|sun| !sun.is_single_direction()) {
                 lights.suns.push((number, *sun));
             } else if let Some(light) = light.as_environment() {
                 lights.environment = Some((number, light.clone()));
             }
         }
         let tree_over = |taken: &dyn Fn(&&Light) -> bool, most| -> Result<_, Cancelled> {
-            if count(all.iter().filter(taken)) <= most {
+            if count_lights(all.iter().filter(taken)) <= most {
                 return Ok(None);
             }
             let bounds = all.iter().map(|light| light.bounds().filter(|_| taken(&light)));
@@ -123,8 +123,8 @@ impl Lights {
         };
         lights.tree = tree_over(&|_| true, MAX_WITHOUT_TREE)?;
         lights.local_tree = match &lights.tree {
-            Some(tree) if all.iter().all(|light| !light.is_beyond()) => Some(tree.clone()),
-            Some(_) | None => tree_over(&|light| !light.is_beyond(), Self::MAX_LOCAL_WITHOUT_TREE)?,
+            Some(tree) if all.iter().all(|light| !light.is_infinite()) => Some(tree.clone()),
+            Some(_) | None => tree_over(&|light| !light.is_infinite(), Self::MAX_LOCAL_WITHOUT_TREE)?,
         };
         Ok(Self { all, ..lights })
     }
@@ -242,11 +242,11 @@ impl Lights {
     /// Radiance from infinity in a unit direction. `share` returns the weight of a light, given its index and
     /// its light-sampling pdf in sr⁻¹.
     pub fn radiance_from_infinity(&self, direction: Vec3, share: impl Fn(u32, f32) -> f32) -> Vec3 {
-        let sky = self.environment().map(|environment| environment.arriving(direction));
+        let sky = self.environment().map(|environment| environment.radiance_and_pdf(direction));
         self.radiance_from_infinity_with(sky, direction, share)
     }
 
-    /// [`Lights::radiance_from_infinity`] with a precomputed result of [`Environment::arriving`].
+    /// [`Lights::radiance_from_infinity`] with a precomputed result of [`Environment::radiance_and_pdf`].
     pub fn radiance_from_infinity_with(
         &self,
         sky: Option<(Vec3, f32)>,
@@ -282,7 +282,7 @@ impl Lights {
 }
 
 /// Number of lights. All lights on the same object count as one.
-fn count<'a>(lights: impl Iterator<Item = &'a Light> + Clone) -> usize {
+fn count_lights<'a>(lights: impl Iterator<Item = &'a Light> + Clone) -> usize {
     let object = |light: &Light| light.as_area().map(|light| light.object);
     let objects: HashSet<u32> = lights.clone().filter_map(object).collect();
     objects.len() + lights.filter(|light| object(light).is_none()).count()

@@ -319,7 +319,7 @@ fn mesh_triangles_map_to_their_lights() {
         let triangles = numbers.iter().map(|&number| (corners(f64::from(number)), number)).collect();
         let mesh =
             MeshEmitter::new(triangles, &CancelToken::new()).expect("nobody cancels").expect("an area");
-        let bounds = mesh.bounds().times(Vec3::splat(radiance));
+        let bounds = mesh.bounds().scaled_by(Vec3::splat(radiance));
         Light::Area(AreaLight {
             bounds,
             shape: Emitter::Mesh(mesh),

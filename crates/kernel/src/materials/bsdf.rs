@@ -7,9 +7,10 @@
 //!
 //! A packet receives light from one side. A surface that also transmits light is represented by two vertices
 //! with BSDFs of different kinds. One is lit from the viewer's side, and the other from behind, with its
-//! shading normal on that side. Both use the same random numbers, such that [`RoughRow::sample`] continues
-//! the path at exactly one of them, and the pdfs cover both sides together. If light sampling is impossible
-//! on one side, the vertex of the other side represents both, and its paths continue with [`SideSamples`].
+//! shading normal on that side. Both vertices use the same random numbers, so [`RoughRow::sample`] continues
+//! the path at exactly one of them. The pdfs include the directions on both sides. If light sampling is
+//! impossible on one side, the vertex of the other side represents both, and its paths continue with
+//! [`SideSamples`].
 //!
 //! In addition to wide lobes, a kind may have a narrow lobe that is sampled with separate rays, see
 //! [`LobeSet::Narrow`].
@@ -82,9 +83,9 @@ pub struct SideSamples {
 
 /// Directions at a surface.
 #[derive(Clone, Copy, Debug)]
-pub struct Place {
-    /// Unit shading normal on the lit side, adjusted by [`turned`](RoughRow::turned). Except for transmitted
-    /// light, this is the viewer's side.
+pub struct SurfaceDirections {
+    /// Unit shading normal on the lit side, rotated by [`RoughRow::normal_facing_viewer`]. Except for
+    /// transmitted light, this is the side of the viewer.
     pub normal: Vec3,
     /// Unit direction to the viewer.
     pub to_eye: Vec3,
@@ -151,12 +152,12 @@ pub trait RoughMaterial {
 
     /// Whether packets can be filled with the material, with at most a lookup of
     /// [`RoughMaterial::row_texture`].
-    fn fills_rows(&self) -> bool;
+    fn supports_packets(&self) -> bool;
 
     /// The texture that packets look up, if any.
     fn row_texture(&self) -> Option<&Texture>;
 
-    /// Whether the material depends on [`Place::tangent`].
+    /// Whether the material depends on [`SurfaceDirections::tangent`].
     #[inline]
     fn has_direction(&self) -> bool {
         false
@@ -180,7 +181,7 @@ pub trait RoughRow: Clone {
     /// The material at one point.
     type Point: RoughPoint;
 
-    /// Whether rays in the narrow lobe continue where other paths end, to show reflections.
+    /// Whether rays in the narrow lobe continue beyond the point where other paths end, to show reflections.
     const SENDS_RAYS: bool;
 
     /// Whether functions are inlined into every caller. Other kinds have one copy per instruction set,
@@ -191,9 +192,10 @@ pub trait RoughRow: Clone {
     const EMPTY: Self;
 
     /// The shading normal for the lobes, given a normal on the lit side and the direction to the viewer.
-    /// Microfacet lobes rotate it to face the viewer, see [`facing`](super::microfacet::facing).
+    /// Microfacet lobes rotate it to face the viewer, see
+    /// [`rotate_toward_viewer`](super::microfacet::rotate_toward_viewer).
     #[inline(always)]
-    fn turned(normal: Vec3, _to_eye: Vec3) -> Vec3 {
+    fn normal_facing_viewer(normal: Vec3, _to_eye: Vec3) -> Vec3 {
         normal
     }
 
@@ -201,7 +203,7 @@ pub trait RoughRow: Clone {
     fn reset(&mut self);
 
     /// Sets a surface.
-    fn put(&mut self, i: usize, bsdf: &Self::Point, shown: ShownLobes, place: &Place);
+    fn put(&mut self, i: usize, bsdf: &Self::Point, shown: ShownLobes, place: &SurfaceDirections);
 
     /// Copies a surface of another packet.
     fn copy(&mut self, i: usize, other: &Self, from: usize);
@@ -210,7 +212,7 @@ pub trait RoughRow: Clone {
     fn f(&self, directions: &Vec3x16) -> BsdfValues;
 
     /// The contributions of the wide and the narrow lobes to f.
-    fn parts(&self, directions: &Vec3x16, values: &BsdfValues) -> [Vec3x16; 2];
+    fn wide_and_narrow(&self, directions: &Vec3x16, values: &BsdfValues) -> [Vec3x16; 2];
 
     /// f of all lobes in sr⁻¹, whether they are shown or not. Uses the largest color components.
     fn max_component(&self, values: &BsdfValues) -> F32x16;
@@ -268,6 +270,6 @@ pub trait MaterialRow: RoughRow {
     ) -> u32;
 
     /// Sets the shading normals on the viewer's side and the incoming ray directions of the lanes in `of`, or
-    /// of all lanes. Replaces `normals` with the results of [`RoughRow::turned`].
+    /// of all lanes. Replaces `normals` with the results of [`RoughRow::normal_facing_viewer`].
     fn orient(&mut self, of: Option<&Mask>, normals: &mut Vec3x16, directions: &Vec3x16);
 }

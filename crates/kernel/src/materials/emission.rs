@@ -63,7 +63,7 @@ impl Emission {
     /// The radiance at texture coordinates, given the cosine of the direction of emission. Adds to `lookups`.
     #[inline]
     pub fn at(&self, at: &TexturePoint, cosine: f32, lookups: &mut u64) -> Vec3 {
-        let left = self.coat.as_ref().map_or(1.0, |coat| coat.left(at, cosine, lookups));
+        let left = self.coat.as_ref().map_or(1.0, |coat| coat.transmittance(at, cosine, lookups));
         let Some(texture) = self.texture.as_ref().filter(|_| self.is_emissive()) else {
             return self.scale * left;
         };

@@ -1,4 +1,4 @@
-//! Footprints, which are the areas of a texture covered by single lookups.
+//! Footprints: the texture areas that single lookups cover.
 
 use crate::math::{DVec2, Vec2, Vec3};
 
@@ -42,7 +42,7 @@ impl TexturePoint {
     }
 
     /// The same point without its footprint.
-    pub fn without_extent(&self) -> Self {
+    pub fn without_footprint(&self) -> Self {
         let sharp =
             |second: &SecondUvPoint| Box::new(SecondUvPoint { footprint: Footprint::POINT, ..*second });
         Self { uv: self.uv, footprint: Footprint::POINT, second: self.second.as_deref().map(sharp) }

@@ -37,17 +37,17 @@ impl LobeAlbedo {
 
     /// Computes the albedo of a lobe with an isotropic α. The facet reflectance is a function of the cosine.
     pub fn of(alpha: f64, reflectance: impl Fn(f64) -> f64) -> Self {
-        Self::fitted(|cosine| quadrature::<12, 16>(cosine, alpha, &reflectance))
+        Self::fit(|cosine| integrate_albedo::<12, 16>(cosine, alpha, &reflectance))
     }
 
     /// Fits a known albedo and stores its exact mean.
-    pub fn known(albedo: impl Fn(f64) -> f64) -> Self {
-        Self { mean: mean(&albedo) as f32, ..Self::fitted(albedo) }
+    pub fn fit_with_exact_mean(albedo: impl Fn(f64) -> f64) -> Self {
+        Self { mean: cosine_weighted_mean(&albedo) as f32, ..Self::fit(albedo) }
     }
 
-    /// Fits a polynomial. The stored mean is that of the polynomial, so the light that reaches a base is
-    /// consistent with it.
-    fn fitted(albedo: impl Fn(f64) -> f64) -> Self {
+    /// Fits a polynomial. Stores the mean of the polynomial, so the light that reaches the base is consistent
+    /// with the fit.
+    fn fit(albedo: impl Fn(f64) -> f64) -> Self {
         const NODES: usize = 32;
         // Evaluate the albedo at nodes that are denser at grazing angles.
         let nodes: [(f64, f64); NODES] = std::array::from_fn(|i| {
@@ -62,7 +62,8 @@ impl LobeAlbedo {
         let mut terms = [0.0; TERMS];
         for _ in 0..24 {
             terms = least_squares(&nodes, &weights);
-            let errors = nodes.map(|(cosine, value)| (sum(&terms, cosine) - value).abs() * least(cosine));
+            let errors =
+                nodes.map(|(cosine, value)| (chebyshev_sum(&terms, cosine) - value).abs() * least(cosine));
             let largest = errors.iter().fold(1e-12, |most: f64, error| most.max(*error));
             for (weight, error) in weights.iter_mut().zip(errors) {
                 *weight *= (0.3 + error / largest).sqrt();
@@ -72,10 +73,10 @@ impl LobeAlbedo {
         let missing = nodes
             .iter()
             .filter(|(cosine, _)| *cosine > 0.03)
-            .map(|(cosine, value)| value - sum(&terms, *cosine));
+            .map(|(cosine, value)| value - chebyshev_sum(&terms, *cosine));
         terms[0] += missing.fold(0.0, f64::max);
-        let fit = Self { terms: powers(&terms).map(|term| term as f32), mean: 0.0 };
-        Self { mean: mean(|cosine| fit.at(cosine as f32).into()) as f32, ..fit }
+        let fit = Self { terms: to_power_basis(&terms).map(|term| term as f32), mean: 0.0 };
+        Self { mean: cosine_weighted_mean(|cosine| fit.at(cosine as f32).into()) as f32, ..fit }
     }
 
     /// Interpolates linearly between two albedos.
@@ -134,8 +135,8 @@ pub fn evaluate(cosine: f32, term: impl Fn(usize) -> f32) -> f32 {
 }
 
 /// Cosine-weighted mean over directions, 2 ∫ E(μ) μ dμ.
-fn mean(albedo: impl Fn(f64) -> f64) -> f64 {
-    gauss(32).map(|(cosine, weight)| 2.0 * cosine * weight * albedo(cosine)).sum()
+fn cosine_weighted_mean(albedo: impl Fn(f64) -> f64) -> f64 {
+    gauss_legendre(32).map(|(cosine, weight)| 2.0 * cosine * weight * albedo(cosine)).sum()
 }
 
 /// Chebyshev polynomials at μ.
@@ -149,7 +150,7 @@ fn chebyshev(cosine: f64) -> [f64; TERMS] {
     values
 }
 
-fn sum(terms: &[f64; TERMS], cosine: f64) -> f64 {
+fn chebyshev_sum(terms: &[f64; TERMS], cosine: f64) -> f64 {
     chebyshev(cosine).iter().zip(terms).map(|(value, term)| value * term).sum()
 }
 
@@ -184,7 +185,7 @@ fn least_squares(nodes: &[(f64, f64)], weights: &[f64]) -> [f64; TERMS] {
 }
 
 /// Converts Chebyshev coefficients to power-basis coefficients.
-fn powers(terms: &[f64; TERMS]) -> [f64; TERMS] {
+fn to_power_basis(terms: &[f64; TERMS]) -> [f64; TERMS] {
     let (mut before, mut own) = ([0.0; TERMS], [0.0; TERMS]);
     (before[0], own[1]) = (1.0, 1.0);
     let mut sums = [0.0; TERMS];
@@ -205,7 +206,7 @@ fn powers(terms: &[f64; TERMS]) -> [f64; TERMS] {
 }
 
 /// Gauss–Legendre nodes in (0, 1) and weights, computed with Newton's method.
-fn gauss(count: usize) -> impl Iterator<Item = (f64, f64)> {
+fn gauss_legendre(count: usize) -> impl Iterator<Item = (f64, f64)> {
     (0..count).map(move |i| {
         let mut x = libm::cos(std::f64::consts::PI * (i as f64 + 0.75) / (count as f64 + 0.5));
         let mut slope = 1.0;
@@ -262,7 +263,7 @@ impl VisibleFacets {
     }
 
     /// A point on the chord for which light is reflected above the surface, if there is one.
-    fn lit(&self, x: f64) -> Option<f64> {
+    fn lit_point(&self, x: f64) -> Option<f64> {
         const STEPS: u32 = 12;
         let parts = (0..=STEPS).map(|i| 2.0 * f64::from(i) / f64::from(STEPS) - 1.0);
         let heights = parts.map(|part| (part, self.height(x, part)));
@@ -297,25 +298,25 @@ fn last_true(mut from: f64, mut to: f64, holds: impl Fn(f64) -> bool) -> f64 {
 
 /// Nodes in (0, 1) and weights, for functions that vary quickly near both ends.
 fn dense_at_ends(count: usize) -> Vec<(f64, f64)> {
-    gauss(count).map(|(t, weight)| (t * t * (3.0 - 2.0 * t), weight * 6.0 * t * (1.0 - t))).collect()
+    gauss_legendre(count).map(|(t, weight)| (t * t * (3.0 - 2.0 * t), weight * 6.0 * t * (1.0 - t))).collect()
 }
 
 /// E(μ), which is the mean of F·G/G₁ over visible normals. There are `ACROSS` nodes perpendicular to the
 /// plane of incidence and `ALONG` nodes in it. For accuracy, nodes cover only the facets that reflect light
 /// above the surface.
-fn quadrature<const ACROSS: usize, const ALONG: usize>(
+fn integrate_albedo<const ACROSS: usize, const ALONG: usize>(
     cosine: f64,
     alpha: f64,
     reflectance: &impl Fn(f64) -> f64,
 ) -> f64 {
     let facets = VisibleFacets::new(cosine, alpha);
     // Half of the disk is enough because the integrand is symmetric.
-    let widest = last_true(0.0, 0.25 * TAU, |turn| facets.lit(libm::sin(turn)).is_some());
+    let widest = last_true(0.0, 0.25 * TAU, |turn| facets.lit_point(libm::sin(turn)).is_some());
     let along = dense_at_ends(ALONG);
     let mut sum = 0.0;
     for (turn, by_turn) in dense_at_ends(ACROSS) {
         let (x, chord) = libm::sincos(widest * turn);
-        let Some(lit) = facets.lit(x) else { continue };
+        let Some(lit) = facets.lit_point(x) else { continue };
         let [from, to] = facets.ends(x, lit);
         for &(part, by_part) in &along {
             let [between, mirrored] = facets.mirrored(x, chord * (from + (to - from) * part));
@@ -358,7 +359,7 @@ mod tests {
                 let fit = LobeAlbedo::of(alpha, reflectance);
                 for step in (5..=100_u32).step_by(5) {
                     let cosine = f64::from(step) / 100.0;
-                    let exact = quadrature::<24, 48>(cosine, alpha, &reflectance);
+                    let exact = integrate_albedo::<24, 48>(cosine, alpha, &reflectance);
                     let missing = f64::from(fit.at(cosine as f32)) - exact;
                     assert!((-1e-4..8e-4).contains(&missing), "η {eta}, α {alpha}, μ {cosine}: {missing}");
                 }
@@ -391,7 +392,7 @@ mod tests {
             for cosine in [0.05, 0.2, 0.6, 1.0] {
                 for (eta, fresnel) in [(1.5, dielectric as fn(f64, f64) -> f64), (0.0, |_, _| 1.0)] {
                     let reflectance = |cosine: f64| fresnel(cosine, eta);
-                    let found = quadrature::<12, 16>(cosine, alpha, &reflectance);
+                    let found = integrate_albedo::<12, 16>(cosine, alpha, &reflectance);
                     let exact = plain_quadrature(cosine, alpha, reflectance);
                     assert!((found - exact).abs() < 3e-4, "α {alpha}, μ {cosine}: {found}, not {exact}");
                 }
@@ -402,7 +403,7 @@ mod tests {
     #[test]
     fn smooth_lobes_match_fresnel() {
         // 2 ∫ F(μ) μ dμ for η = 1.5.
-        let smooth = LobeAlbedo::known(|cosine| dielectric(cosine, 1.5));
+        let smooth = LobeAlbedo::fit_with_exact_mean(|cosine| dielectric(cosine, 1.5));
         assert!((smooth.mean - 0.091_778_0).abs() < 2e-5, "{}", smooth.mean);
         let narrow = LobeAlbedo::of(0.001, |cosine| dielectric(cosine, 1.5));
         assert!((narrow.mean - smooth.mean).abs() < 1e-3, "{}", narrow.mean);

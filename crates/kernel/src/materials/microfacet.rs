@@ -21,7 +21,7 @@ pub const MIN_ALPHA: f32 = 1e-3;
 /// Minimum cosine of directions above the surface.
 const MIN_COSINE: f32 = 1e-6;
 
-/// Minimum cosine between a normal and the direction to the viewer, see [`facing`].
+/// Minimum cosine between a normal and the direction to the viewer, see [`rotate_toward_viewer`].
 const MIN_FACING_COSINE: f32 = 1e-3;
 
 /// A lobe's α along u and along v. The base value, roughness², is stretched by an anisotropy in [−1, 1].
@@ -36,7 +36,7 @@ pub fn alphas(roughness: f32, anisotropy: f32) -> [f32; 2] {
 /// Rotates the unit normal just enough to face the viewer. Shading normals may face away from the viewer near
 /// silhouettes of smooth meshes.
 #[inline(always)]
-pub fn facing(normal: Vec3, to_eye: Vec3) -> Vec3 {
+pub fn rotate_toward_viewer(normal: Vec3, to_eye: Vec3) -> Vec3 {
     let missing = MIN_FACING_COSINE - normal.dot(to_eye);
     let turned = normal + to_eye * missing;
     let turned = turned * (1.0 / turned.length_squared().sqrt());
@@ -44,15 +44,15 @@ pub fn facing(normal: Vec3, to_eye: Vec3) -> Vec3 {
     Vec3::new(choose(turned.x, normal.x), choose(turned.y, normal.y), choose(turned.z, normal.z))
 }
 
-/// [`facing`] for a single normal, which rarely needs rotation.
+/// [`rotate_toward_viewer`] for a single normal, which rarely needs rotation.
 #[inline(always)]
-pub fn facing_single(normal: Vec3, to_eye: Vec3) -> Vec3 {
-    if normal.dot(to_eye) < MIN_FACING_COSINE { facing(normal, to_eye) } else { normal }
+pub fn rotate_single_toward_viewer(normal: Vec3, to_eye: Vec3) -> Vec3 {
+    if normal.dot(to_eye) < MIN_FACING_COSINE { rotate_toward_viewer(normal, to_eye) } else { normal }
 }
 
 /// Implements [`MaterialRow::orient`](super::bsdf::MaterialRow::orient) for microfacet lobes. Sets the
-/// directions to the viewer from the incoming ray directions, and rotates the normals with [`facing`]. The
-/// normals are stored for the surfaces in `of`, or for all surfaces.
+/// directions to the viewer from the incoming ray directions, and rotates the normals with
+/// [`rotate_toward_viewer`]. The normals are stored for the surfaces in `of`, or for all surfaces.
 #[inline(always)]
 pub fn orient_to_viewers(
     of: Option<&Mask>,
@@ -64,7 +64,7 @@ pub fn orient_to_viewers(
     for i in 0..PACKET_SIZE {
         let to_eye = -lane(directions, i);
         set_lane(to_eyes, i, to_eye);
-        let turned = facing(lane(normals, i), to_eye);
+        let turned = rotate_toward_viewer(lane(normals, i), to_eye);
         set_lane(normals, i, turned);
     }
     match of {
@@ -79,7 +79,7 @@ pub fn orient_to_viewers(
 
 /// The unnormalized half vector of two unit directions.
 #[derive(Clone, Copy)]
-pub struct Half {
+pub struct HalfVector {
     /// Squared length. For a reflection, this is (2 cosθ)², where θ is the angle to either direction.
     pub squared: f32,
     /// Component along the normal.
@@ -88,10 +88,10 @@ pub struct Half {
     pub across: Vec3,
 }
 
-impl Half {
+impl HalfVector {
     /// The half vector of a reflection.
     #[inline(always)]
-    pub fn of(normal: Vec3, one: Vec3, other: Vec3) -> Self {
+    pub fn between(normal: Vec3, one: Vec3, other: Vec3) -> Self {
         let sum = one + other;
         let along = sum.dot(normal);
         Self { squared: sum.length_squared(), along, across: sum - normal * along }
@@ -126,7 +126,7 @@ impl Half {
         self.distribution(x * x + y * y, u * v)
     }
 
-    /// D, given the squared perpendicular component divided by α², and the product of both α.
+    /// D, given the squared perpendicular component divided by α², and the product of the two α values.
     #[inline(always)]
     fn distribution(&self, stretched: f32, product: f32) -> f32 {
         let slope = self.along * self.along + stretched;
@@ -163,7 +163,7 @@ impl SmithTerms {
 
     /// Whether the direction is above the surface.
     #[inline(always)]
-    pub fn is_ahead(&self) -> bool {
+    pub fn is_above_surface(&self) -> bool {
         self.cosine > MIN_COSINE
     }
 
@@ -171,14 +171,14 @@ impl SmithTerms {
     #[inline(always)]
     pub fn reflected(&self, other: &Self, distribution: f32) -> f32 {
         let value = distribution / (2.0 * (self.cosine * other.slope + other.cosine * self.slope));
-        if self.is_ahead() & other.is_ahead() { value } else { 0.0 }
+        if self.is_above_surface() & other.is_above_surface() { value } else { 0.0 }
     }
 
     /// Pdf in sr⁻¹ of a direction that is sampled by [`sample_reflection`] for this view direction, given D.
     #[inline(always)]
     pub fn pdf(&self, distribution: f32) -> f32 {
         let pdf = distribution / (2.0 * (self.cosine + self.slope));
-        if self.is_ahead() { pdf } else { 0.0 }
+        if self.is_above_surface() { pdf } else { 0.0 }
     }
 }
 
@@ -189,7 +189,7 @@ impl SmithTerms {
     pub fn pdf_from_reflected(&self, other: &Self, reflected: f32) -> f32 {
         let both = self.cosine * other.slope + other.cosine * self.slope;
         let pdf = reflected * both / (self.cosine + self.slope);
-        if self.is_ahead() & other.is_ahead() { pdf } else { 0.0 }
+        if self.is_above_surface() & other.is_above_surface() { pdf } else { 0.0 }
     }
 }
 

@@ -85,7 +85,7 @@ impl<'a> ImageHalver<'a> {
 
     /// Appends a row of the smaller image. Each texel is the mean over the area that it covers in the larger
     /// image, which preserves the overall mean even for odd sizes.
-    pub fn row(&self, y: u32, to: &mut TexelData) {
+    pub fn append_row(&self, y: u32, to: &mut TexelData) {
         let rows = CoveredTexels::new(y, self.height, self.of.height);
         for x in 0..self.width {
             let columns = CoveredTexels::new(x, self.width, self.of.width);
@@ -143,7 +143,7 @@ mod tests {
     fn halved(of: &Texels) -> Result<Texels, ()> {
         let halving = ImageHalver::new(of);
         let mut rows = halving.start();
-        (0..halving.rows()).for_each(|y| halving.row(y, &mut rows));
+        (0..halving.rows()).for_each(|y| halving.append_row(y, &mut rows));
         Ok(halving.texels(rows))
     }
 

@@ -139,7 +139,7 @@ impl Bsdf {
 
     /// Whether the surface has non-δ lobes, which light sampling can reach.
     #[inline]
-    pub fn is_lit(&self) -> bool {
+    pub fn has_non_delta_lobes(&self) -> bool {
         self.rough().is_some()
     }
 

@@ -23,25 +23,25 @@ impl Opacity {
                 *lookups += 1;
                 texture.coverage(at, self.cutoff)
             }
-            value => self.cut(value.at(at, lookups)),
+            value => self.apply_cutoff(value.at(at, lookups)),
         }
     }
 
     /// The opacity, if it is constant.
     pub fn constant(&self) -> Option<f32> {
-        self.value.constant().map(|value| self.cut(value))
+        self.value.constant().map(|value| self.apply_cutoff(value))
     }
 
     /// The mean opacity. For a texture with a cutoff, this is estimated as the texture's mean.
     pub fn mean(&self) -> f32 {
         match &self.value {
-            Number::Constant(value) => self.cut(*value),
+            Number::Constant(value) => self.apply_cutoff(*value),
             Number::Texture(texture) => texture.mean().x.clamp(0.0, 1.0),
         }
     }
 
     #[inline]
-    fn cut(&self, value: f32) -> f32 {
+    fn apply_cutoff(&self, value: f32) -> f32 {
         if self.cutoff > 0.0 { f32::from(u8::from(value >= self.cutoff)) } else { value.clamp(0.0, 1.0) }
     }
 }

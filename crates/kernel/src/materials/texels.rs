@@ -46,7 +46,7 @@ impl Texels {
     pub fn at(&self, place: usize) -> Vec3 {
         match &self.data {
             TexelData::Srgb8(bytes) => srgb8_to_linear(bytes[place]),
-            TexelData::Linear8(bytes) => of_linear(bytes[place]),
+            TexelData::Linear8(bytes) => linear_from_bytes(bytes[place]),
             TexelData::Float(floats) => floats[place],
             TexelData::SrgbAlpha8(_) | TexelData::LinearAlpha8(_) | TexelData::FloatAlpha(_) => {
                 self.without_weight(place)
@@ -73,9 +73,9 @@ impl Texels {
             }
             TexelData::LinearAlpha8(bytes) => {
                 let [red, green, blue, _] = bytes[place];
-                of_linear([red, green, blue])
+                linear_from_bytes([red, green, blue])
             }
-            TexelData::FloatAlpha(floats) => unweighted(floats[place]),
+            TexelData::FloatAlpha(floats) => unpremultiply(floats[place]),
             TexelData::Srgb8(_) | TexelData::Linear8(_) | TexelData::Float(_) => self.at(place),
         }
     }
@@ -93,7 +93,7 @@ impl Texels {
     }
 
     /// Thresholds the red channel. The result is 1 where it is at least `least`, otherwise 0.
-    pub fn cut(&self, least: f32) -> Self {
+    pub fn threshold(&self, least: f32) -> Self {
         let texel = |place: usize| [if self.at(place).x >= least { u8::MAX } else { 0 }; 3];
         let data = TexelData::Linear8((0..self.len()).map(texel).collect());
         Self { data, unusable: 0, ..*self }
@@ -130,7 +130,7 @@ impl Texels {
             }
             TexelData::Linear8(bytes) => {
                 for i in 0..N {
-                    put(i, of_linear(bytes[places[i]]));
+                    put(i, linear_from_bytes(bytes[places[i]]));
                 }
             }
             TexelData::Float(floats) => {
@@ -153,7 +153,7 @@ impl Texels {
         }
         match self.data {
             TexelData::Srgb8(bytes) => bytes.into_iter().map(srgb8_to_linear).collect(),
-            TexelData::Linear8(bytes) => bytes.into_iter().map(of_linear).collect(),
+            TexelData::Linear8(bytes) => bytes.into_iter().map(linear_from_bytes).collect(),
             TexelData::Float(floats) => floats,
             TexelData::SrgbAlpha8(_) | TexelData::LinearAlpha8(_) | TexelData::FloatAlpha(_) => Vec::new(),
         }
@@ -163,7 +163,7 @@ impl Texels {
     pub fn mean(&self) -> Vec3 {
         if self.is_weighted() {
             let sum: DVec4 = (0..self.len()).map(|place| self.weighted(place).as_dvec4()).sum();
-            return unweighted((sum / self.len() as f64).as_vec4());
+            return unpremultiply((sum / self.len() as f64).as_vec4());
         }
         let rows = (0..self.height).flat_map(|y| (0..self.width).map(move |x| (x, y)));
         let sum: DVec3 = rows.map(|(x, y)| self.get(x, y).as_dvec3()).sum();
@@ -234,11 +234,11 @@ impl Texels {
 }
 
 /// Divides a premultiplied color by its alpha. Returns black if alpha is 0.
-pub fn unweighted(weighted: Vec4) -> Vec3 {
+pub fn unpremultiply(weighted: Vec4) -> Vec3 {
     if weighted.w > 0.0 { weighted.truncate() / weighted.w } else { Vec3::ZERO }
 }
 
 #[inline(always)]
-fn of_linear(bytes: [u8; 3]) -> Vec3 {
+fn linear_from_bytes(bytes: [u8; 3]) -> Vec3 {
     Vec3::from_array(bytes.map(|byte| f32::from(byte) / 255.0))
 }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::footprint::{SecondUvPoint, TexturePoint, UvSet};
 use super::mipmaps::Mipmaps;
-use super::texels::{Texels, unweighted};
+use super::texels::{Texels, unpremultiply};
 use crate::choice;
 use crate::math::elementary::{exp2, log2};
 use crate::math::lanes::{F32x16, PACKET_SIZE, Vec3x16, lane, set_lane};
@@ -52,19 +52,19 @@ pub struct Texture {
     pub moved: Option<Box<UvTransform>>,
     /// Scale and offset of looked-up values. `None` for the identity. Does not affect heights and their
     /// slopes.
-    pub factor: Option<Factor>,
+    pub factor: Option<ScaleAndOffset>,
 }
 
 /// Scale and offset of looked-up values.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Factor {
+pub struct ScaleAndOffset {
     /// The scale.
     pub gain: Vec3,
     /// The offset, added after scaling.
     pub base: Vec3,
 }
 
-impl Factor {
+impl ScaleAndOffset {
     /// A scale without an offset. `None` if the scale is 1.
     pub fn new(gain: Vec3) -> Option<Self> {
         Self::with_base(gain, Vec3::ZERO)
@@ -103,7 +103,7 @@ impl UvTransform {
 
     /// The point in the second UV set, if the transform uses that set.
     #[inline]
-    fn second<'a>(&self, at: &'a TexturePoint) -> Option<&'a SecondUvPoint> {
+    fn second_uv_point<'a>(&self, at: &'a TexturePoint) -> Option<&'a SecondUvPoint> {
         match self.of {
             UvSet::First => None,
             UvSet::Second => at.second.as_deref(),
@@ -131,7 +131,7 @@ impl UvTransform {
     }
 
     /// Repeats and transforms a packet of coordinates.
-    fn row(&self, uv: &[[f64; PACKET_SIZE]; 2], repeat: DVec2) -> [[f64; PACKET_SIZE]; 2] {
+    fn transform_row(&self, uv: &[[f64; PACKET_SIZE]; 2], repeat: DVec2) -> [[f64; PACKET_SIZE]; 2] {
         let mut row = *uv;
         for i in 0..PACKET_SIZE {
             let moved = self.point(DVec2::new(uv[0][i], uv[1][i]) * repeat);
@@ -184,14 +184,15 @@ impl Texture {
     /// as 0.
     pub fn lookup(&self, at: &TexturePoint) -> Vec3 {
         let tiles = self.tiles(at);
-        let value = self.in_tiles(tiles, || self.level(at));
+        let value = self.lookup_in_tiles(tiles, || self.mip_level(at));
         self.factor.map_or(value, |factor| factor.of(value))
     }
 
     /// The value at tile coordinates. `level` is called if the filter uses mip levels.
     #[inline]
-    fn in_tiles(&self, tiles: DVec2, level: impl FnOnce() -> f32) -> Vec3 {
-        let folded = [self.wrap.fold(finite(tiles.x)) as f32, self.wrap.fold(finite(tiles.y)) as f32];
+    fn lookup_in_tiles(&self, tiles: DVec2, level: impl FnOnce() -> f32) -> Vec3 {
+        let folded =
+            [self.wrap.fold(finite_or_zero(tiles.x)) as f32, self.wrap.fold(finite_or_zero(tiles.y)) as f32];
         match self.filter {
             TextureFilter::Nearest => self.nearest(folded),
             TextureFilter::Bilinear => self.bilinear(&self.texels, folded),
@@ -204,7 +205,7 @@ impl Texture {
     fn tiles(&self, at: &TexturePoint) -> DVec2 {
         let repeat = self.repeat.as_dvec2();
         let Some(moved) = &self.moved else { return at.uv * repeat };
-        moved.point(moved.second(at).map_or(at.uv, |second| second.uv) * repeat)
+        moved.point(moved.second_uv_point(at).map_or(at.uv, |second| second.uv) * repeat)
     }
 
     /// The UV set used for lookups.
@@ -217,7 +218,7 @@ impl Texture {
     /// set.
     #[inline]
     pub fn tangents(&self, at: &TexturePoint, first: [Vec3; 2]) -> [Vec3; 2] {
-        let second = self.moved.as_ref().and_then(|moved| moved.second(at));
+        let second = self.moved.as_ref().and_then(|moved| moved.second_uv_point(at));
         second.map_or(first, |second| second.tangents)
     }
 
@@ -226,12 +227,12 @@ impl Texture {
     pub fn slopes(&self, at: &TexturePoint) -> Vec2 {
         let tiles = self.tiles(at);
         let level = match (self.filter, &self.mipmaps) {
-            (TextureFilter::Mipmap, Some(mipmaps)) => self.level(at).min(mipmaps.count() as f32),
+            (TextureFilter::Mipmap, Some(mipmaps)) => self.mip_level(at).min(mipmaps.count() as f32),
             (TextureFilter::Mipmap | TextureFilter::Nearest | TextureFilter::Bilinear, _) => 0.0,
         };
         // Look up on both sides, along the axes of the image.
         let steps = size(&self.texels).as_dvec2().recip() * f64::from(exp2(level));
-        let beside = |by: DVec2| self.in_tiles(tiles + by, || level).x;
+        let beside = |by: DVec2| self.lookup_in_tiles(tiles + by, || level).x;
         let change = |half: DVec2| beside(half) - beside(-half);
         let changes =
             Vec2::new(change(DVec2::new(steps.x * 0.5, 0.0)), change(DVec2::new(0.0, steps.y * 0.5)));
@@ -252,7 +253,7 @@ impl Texture {
     }
 
     /// Tangents along the texture's repeated and transformed coordinates. Only the directions matter.
-    pub fn own_tangents(&self, [dpdu, dpdv]: [Vec3; 2]) -> [Vec3; 2] {
+    pub fn texture_tangents(&self, [dpdu, dpdv]: [Vec3; 2]) -> [Vec3; 2] {
         let sides = self.repeat.signum();
         let Some(moved) = &self.moved else { return [dpdu * sides.x, dpdv * sides.y] };
         [DVec2::X, DVec2::Y].map(|axis| {
@@ -262,7 +263,7 @@ impl Texture {
     }
 
     /// Number of texels per unit of u and v.
-    pub fn texels_across(&self) -> [f64; 2] {
+    pub fn texels_per_unit(&self) -> [f64; 2] {
         let (size, repeat) = (size(&self.texels).as_dvec2(), self.repeat.as_dvec2());
         let Some(moved) = &self.moved else { return (size * repeat).abs().to_array() };
         let along = |axis: DVec2| (moved.vector(axis * repeat) * size).length();
@@ -289,7 +290,7 @@ impl Texture {
     #[cold]
     #[inline(never)]
     fn transformed_row(&self, moved: &UvTransform, uv: &[[f64; PACKET_SIZE]; 2]) -> Vec3x16 {
-        self.repeated_row(&moved.row(uv, self.repeat.as_dvec2()), DVec2::ONE)
+        self.repeated_row(&moved.transform_row(uv, self.repeat.as_dvec2()), DVec2::ONE)
     }
 
     /// [`Texture::lookup_row`] at coordinates scaled by `repeat`.
@@ -315,13 +316,13 @@ impl Texture {
         }
         let columns = self.wrap.index_row(&first[0], 0, extent[0]);
         let rows = self.wrap.index_row(&first[1], 0, extent[1]);
-        let mut around = [places(&columns, &rows, extent); 4];
+        let mut around = [texel_indices(&columns, &rows, extent); 4];
         if count == 4 {
             let right = self.wrap.index_row(&first[0], 1, extent[0]);
             let upper = self.wrap.index_row(&first[1], 1, extent[1]);
-            around[1] = places(&right, &rows, extent);
-            around[2] = places(&columns, &upper, extent);
-            around[3] = places(&right, &upper, extent);
+            around[1] = texel_indices(&right, &rows, extent);
+            around[2] = texel_indices(&columns, &upper, extent);
+            around[3] = texel_indices(&right, &upper, extent);
         }
         let mut corners = [[[0.0; PACKET_SIZE]; 3]; 4];
         texels.gather_packets(&around[..count], &mut corners);
@@ -346,12 +347,12 @@ impl Texture {
     }
 
     /// The (fractional, nonnegative) mip level at which the footprint is one texel wide.
-    fn level(&self, at: &TexturePoint) -> f32 {
+    fn mip_level(&self, at: &TexturePoint) -> f32 {
         let texels = match &self.moved {
             None => at.footprint.texels(size(&self.texels) * self.repeat),
             Some(moved) => {
                 let size = size(&self.texels);
-                let footprint = moved.second(at).map_or(&at.footprint, |second| &second.footprint);
+                let footprint = moved.second_uv_point(at).map_or(&at.footprint, |second| &second.footprint);
                 footprint.longest(|axis| moved.vector((axis * self.repeat).as_dvec2()).as_vec2() * size)
             }
         };
@@ -362,15 +363,17 @@ impl Texture {
         let (size, extent) = (size(&self.texels), extent(&self.texels));
         let column = self.wrap.index(floor(u * size.x), extent[0]);
         let row = self.wrap.index(floor(v * size.y), extent[1]);
-        self.texels.at(place(column, row, extent))
+        self.texels.at(texel_index(column, row, extent))
     }
 
     /// Interpolates between the two levels around `level`.
     fn trilinear(&self, level: f32, folded: [f32; 2]) -> Vec3 {
-        let Some((near, far, part)) = self.levels(level) else { return self.bilinear(&self.texels, folded) };
+        let Some((near, far, part)) = self.adjacent_levels(level) else {
+            return self.bilinear(&self.texels, folded);
+        };
         if self.texels.is_weighted() {
             let [near, far] = [near, far].map(|texels| self.weighted(texels, folded));
-            return unweighted(near.lerp(far, part));
+            return unpremultiply(near.lerp(far, part));
         }
         self.bilinear(near, folded).lerp(self.bilinear(far, folded), part)
     }
@@ -378,7 +381,7 @@ impl Texture {
     /// The two images around a mip level, and the weight of the second image. `None` if only the original
     /// image is used.
     #[inline(always)]
-    fn levels(&self, level: f32) -> Option<(&Texels, &Texels, f32)> {
+    fn adjacent_levels(&self, level: f32) -> Option<(&Texels, &Texels, f32)> {
         let mipmaps = self.mipmaps.as_ref().filter(|_| level > 0.0)?;
         let level = level.min(mipmaps.count() as f32);
         let number = level as usize;
@@ -390,12 +393,13 @@ impl Texture {
     }
 
     /// The fraction of the footprint where the red channel is at least `cutoff`. It is 0 or 1 for lookups in
-    /// the original image. The mip levels must be computed from [`Texels::cut`].
+    /// the original image. The mip levels must be computed from [`Texels::threshold`].
     pub fn coverage(&self, at: &TexturePoint, cutoff: f32) -> f32 {
         let tiles = self.tiles(at);
-        let folded = [self.wrap.fold(finite(tiles.x)) as f32, self.wrap.fold(finite(tiles.y)) as f32];
+        let folded =
+            [self.wrap.fold(finite_or_zero(tiles.x)) as f32, self.wrap.fold(finite_or_zero(tiles.y)) as f32];
         let cut = |value: f32| f32::from(u8::from(value >= cutoff));
-        let Some((near, far, part)) = self.levels(self.level(at)) else {
+        let Some((near, far, part)) = self.adjacent_levels(self.mip_level(at)) else {
             return cut(self.bilinear(&self.texels, folded).x);
         };
         let of = |texels: &Texels| {
@@ -429,7 +433,7 @@ impl Texture {
 
     fn bilinear(&self, texels: &Texels, folded: [f32; 2]) -> Vec3 {
         if texels.is_weighted() {
-            return unweighted(self.weighted(texels, folded));
+            return unpremultiply(self.weighted(texels, folded));
         }
         let (places, [fx, fy]) = self.corners(texels, folded);
         let corners = texels.gather(&places);
@@ -446,7 +450,7 @@ impl Texture {
         let (fx, fy) = (x - first[0] as f32, y - first[1] as f32);
         let [left, right] = self.wrap.neighbor_indices(first[0], extent[0]);
         let [bottom, top] = self.wrap.neighbor_indices(first[1], extent[1]);
-        let place = |column, row| place(column, row, extent);
+        let place = |column, row| texel_index(column, row, extent);
         ([place(left, bottom), place(right, bottom), place(left, top), place(right, top)], [fx, fy])
     }
 }
@@ -461,16 +465,20 @@ fn floor(x: f32) -> i32 {
 
 /// Index of a texel, from its column and its row, where rows are counted from the bottom.
 #[inline(always)]
-fn place(column: i32, row: i32, [width, height]: [i32; 2]) -> usize {
+fn texel_index(column: i32, row: i32, [width, height]: [i32; 2]) -> usize {
     (height - 1 - row) as usize * width as usize + column as usize
 }
 
-/// [`place`] for a packet of texels.
+/// [`texel_index`] for a packet of texels.
 #[inline(always)]
-fn places(columns: &[i32; PACKET_SIZE], rows: &[i32; PACKET_SIZE], extent: [i32; 2]) -> [usize; PACKET_SIZE] {
+fn texel_indices(
+    columns: &[i32; PACKET_SIZE],
+    rows: &[i32; PACKET_SIZE],
+    extent: [i32; 2],
+) -> [usize; PACKET_SIZE] {
     let mut places = [0; PACKET_SIZE];
     for i in 0..PACKET_SIZE {
-        places[i] = place(columns[i], rows[i], extent);
+        places[i] = texel_index(columns[i], rows[i], extent);
     }
     places
 }
@@ -494,7 +502,7 @@ impl Wrap {
         macro_rules! by {
             ($wrap:expr) => {
                 for i in 0..PACKET_SIZE {
-                    folded[i] = $wrap.fold(finite(x[i] * repeat)) as f32;
+                    folded[i] = $wrap.fold(finite_or_zero(x[i] * repeat)) as f32;
                 }
             };
         }
@@ -557,13 +565,13 @@ impl Wrap {
 
 /// −1 in tiles that [`Wrap::Mirror`] mirrors, 1 in all other tiles.
 fn mirrored_tile(x: f64) -> f64 {
-    let x = finite(x);
+    let x = finite_or_zero(x);
     if x - 2.0 * (x * 0.5).floor() > 1.0 { -1.0 } else { 1.0 }
 }
 
 /// Replaces non-finite coordinates with 0.
 #[inline(always)]
-fn finite(x: f64) -> f64 {
+fn finite_or_zero(x: f64) -> f64 {
     if x.is_finite() { x } else { 0.0 }
 }
 
@@ -620,7 +628,7 @@ mod tests {
         assert_eq!(at(&texture, 0.1, 0.3), 3.0);
         assert_eq!(at(&texture, 0.1, 0.7), 2.0);
         assert_eq!(at(&texture, 0.3, 0.3), 1.0);
-        assert_eq!(texture.texels_across(), [4.0, 2.0]);
+        assert_eq!(texture.texels_per_unit(), [4.0, 2.0]);
         assert_eq!(UvTransform::new(UvSet::First, 0.0, DVec2::ZERO), None);
         let (sin, cos) = UvTransform::new(UvSet::First, -270.0, DVec2::ZERO).expect("a rotation").turn;
         assert_eq!((sin, cos), (1.0, 0.0));
@@ -639,7 +647,7 @@ mod tests {
         assert_eq!((texture.lookup(&at).x, texture.tangents(&at, first)), (0.0, first));
         texture.moved = UvTransform::new(UvSet::Second, 0.0, DVec2::ZERO).map(Box::new);
         assert_eq!((texture.lookup(&at).x, texture.tangents(&at, first)), (3.0, second.tangents));
-        assert_eq!(texture.lookup(&at.without_extent()).x, 3.0);
+        assert_eq!(texture.lookup(&at.without_footprint()).x, 3.0);
         let alone = TexturePoint { second: None, ..at };
         assert_eq!((texture.lookup(&alone).x, texture.tangents(&alone, first)), (0.0, first));
         // The second set is repeated, rotated, and translated like the first set.
@@ -652,7 +660,7 @@ mod tests {
     fn factor_scales_values_and_mean_but_not_slopes() {
         let plain = numbered(TextureFilter::Bilinear, Wrap::Repeat);
         let factor = Vec3::new(0.5, 2.0, 3.0);
-        let texture = Texture { factor: Factor::new(factor), ..plain.clone() };
+        let texture = Texture { factor: ScaleAndOffset::new(factor), ..plain.clone() };
         let at = TexturePoint::sharp(DVec2::new(0.3, 0.6));
         assert_eq!(texture.lookup(&at), plain.lookup(&at) * factor);
         assert_eq!((texture.mean(), texture.slopes(&at)), (plain.mean() * factor, plain.slopes(&at)));
@@ -747,7 +755,7 @@ mod tests {
         let halved = |level: &Texels| -> Result<Texels, ()> {
             let halving = ImageHalver::new(level);
             let mut rows = halving.start();
-            (0..halving.rows()).for_each(|y| halving.row(y, &mut rows));
+            (0..halving.rows()).for_each(|y| halving.append_row(y, &mut rows));
             Ok(halving.texels(rows))
         };
         Mipmaps::of(image, halved).ok().map(Arc::new)
@@ -798,7 +806,7 @@ mod tests {
         // Four of the ten texels are visible. Their alpha is just above the cutoff.
         let alphas = [140, 140, 120, 0, 0, 140, 120, 0, 140, 0].map(|alpha| [alpha; 3]);
         let mut texture = row(10, TexelData::Linear8(alphas.to_vec()), TextureFilter::Mipmap);
-        texture.mipmaps = levels(&texture.texels.cut(0.5));
+        texture.mipmaps = levels(&texture.texels.threshold(0.5));
         let at = |u: f64, width: f32| {
             let footprint = Footprint::of_cone(width, Vec3::Z, Vec3::Z, [Vec3::X, Vec3::Y]);
             TexturePoint { footprint, ..TexturePoint::sharp(DVec2::new(u, 0.5)) }

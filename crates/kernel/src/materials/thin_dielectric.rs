@@ -1,4 +1,4 @@
-//! Thin panes, which are two parallel glass surfaces with no distance between them.
+//! Thin panes: two parallel glass surfaces with no distance between them.
 
 use super::fresnel::dielectric;
 use super::texture::Color;

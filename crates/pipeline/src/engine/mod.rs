@@ -21,16 +21,16 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 pub(super) use self::orders::{Interruption, Orders, RequestContext};
 use self::outcome::Outcome;
 pub use self::outcome::{Rendered, Unrendered};
-use self::outputs::drop_report;
-use self::own::{OwnImage, lookups, own_plan};
-use self::unfinished::LastGoodScene;
+use self::outputs::remove_outdated_report;
+use self::own::{OwnImage, needed_textures, own_image_plan};
+use self::unfinished::LastValidScene;
 use super::assembly::{KeyedWorld, RequestCamera, world};
-use super::cache::{Memo, Pool};
+use super::cache::{Memo, NamedCache};
 use super::inputs::Inputs;
 use super::keys;
 use super::memory::MemoryEstimate;
-use super::model::Show;
-use super::plan::{NamedBy, Plan, cores, plan, threads};
+use super::model::ModelView;
+use super::plan::{OutputNameSource, Plan, core_count, plan, thread_count};
 use super::protocol::{Event, Failure, PreviewSize, Report, Request, Stage, Status, Writing};
 use super::queries::{Query, QueryContext};
 use super::render::checkpointer::CheckpointLock;
@@ -39,14 +39,14 @@ use super::render::film_state::FilmState;
 use super::render::first_picture::FirstPictures;
 use super::render::layers;
 use super::render::preview::PreviewTarget;
-use super::render::scheduler::Rendering;
+use super::render::scheduler::RenderStageInputs;
 use super::render::share::Share;
-use super::report::finish::{Finished, report};
-use super::settings::{Overrides, OwnSettings, View};
+use super::report::finish::{RequestResults, make_report};
+use super::settings::{AdjustableSettings, Overrides, View};
 use super::sink::Sink;
 use super::stages::accel::{AccelCache, accel};
 use super::stages::containers::Containers;
-use super::stages::coplanar::coplanar;
+use super::stages::coplanar::warn_about_coplanar_lights;
 use super::stages::glass::glass;
 use super::stages::lights::{SkyMemo, lights};
 use super::stages::meshes::{CachedMesh, MeshName, Meshes, meshes};
@@ -54,8 +54,8 @@ use super::stages::parse::{Parsed, SceneSource, parse};
 use super::stages::photons::{PhotonCache, PhotonContext, PhotonStore, photons};
 use super::stages::render::render;
 use super::stages::textures::{NeededTextures, TextureCache, Textures, add_declared, needed, textures};
-use super::stages::write::{Destination, Frames, WrittenFiles, check_targets, write_on_request};
-use super::stages::{Findings, Reading, Staged, Stop};
+use super::stages::write::{Destination, TurntableFrames, WrittenImages, check_targets, write_on_request};
+use super::stages::{Findings, Reading, StageResult, Stop};
 use super::stopwatch::Stopwatch;
 use super::table::StageTable;
 use super::targets::conflicts;
@@ -72,8 +72,8 @@ use crate::scene::description::CameraChange;
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::fingerprint::Key;
 use crate::system::priority;
-use crate::system::threads::{check_stack_space, start_failure};
-use crate::world::{Coplanar, GlassSolids, TextureNeeds, World};
+use crate::system::threads::{check_stack_space, describe_start_failure};
+use crate::world::{CoplanarLight, GlassSolids, TextureNeeds, World};
 
 /// Engine configuration, which tests override.
 #[derive(Clone, Copy)]
@@ -96,9 +96,9 @@ pub(super) struct Engine {
     config: EngineConfig,
     contents: Arc<Contents>,
     parsed: Memo<Arc<Parsed>>,
-    meshes: Pool<MeshName, CachedMesh>,
+    meshes: NamedCache<MeshName, CachedMesh>,
     bodies: Memo<Arc<GlassSolids>>,
-    coplanar: Memo<Vec<Coplanar>>,
+    coplanar: Memo<Vec<CoplanarLight>>,
     textures: TextureCache,
     accel: AccelCache,
     /// Number of finished requests.
@@ -108,7 +108,7 @@ pub(super) struct Engine {
     world: Memo<Arc<World>>,
     photons: PhotonCache,
     films: FilmCache,
-    written: WrittenFiles,
+    written: WrittenImages,
     own: Option<OwnImage>,
     /// Whether the film of the scene's own image is kept while other images are rendered.
     pins_own: bool,
@@ -117,14 +117,14 @@ pub(super) struct Engine {
     /// Report of the newest request, if it has finished.
     report: Option<Report>,
     /// Finished frames of a turntable.
-    frames: Frames,
+    frames: TurntableFrames,
     /// Layers of the current film.
     layers: Vec<LayerImage>,
     /// Plan of the current film.
     plan: Option<Plan>,
     query_context: Option<QueryContext>,
     /// The last valid scene, with the files it references.
-    good: Option<LastGoodScene>,
+    good: Option<LastValidScene>,
     /// Pixels per second measured for the most recent first image.
     coarse_rate: Cell<Option<f64>>,
     pool: Option<Arc<ThreadPool>>,
@@ -138,7 +138,7 @@ pub(super) struct Engine {
     checkpoint_lock: RefCell<CheckpointLock>,
 }
 
-/// Maximum number of times a request tries to read the scene's files without any changes in between.
+/// Maximum number of attempts to read all of the scene's files before any of them changes.
 const MAX_READS: usize = 16;
 
 /// A scene that is ready to be rendered.
@@ -164,7 +164,7 @@ impl Engine {
             config,
             contents,
             parsed: Memo::default(),
-            meshes: Pool::default(),
+            meshes: NamedCache::default(),
             bodies: Memo::default(),
             coplanar: Memo::default(),
             textures: TextureCache::default(),
@@ -175,12 +175,12 @@ impl Engine {
             world: Memo::default(),
             photons: PhotonCache::default(),
             films: FilmCache::default(),
-            written: WrittenFiles::default(),
+            written: WrittenImages::default(),
             own: None,
             pins_own: true,
             is_own: true,
             report: None,
-            frames: Frames::default(),
+            frames: TurntableFrames::default(),
             layers: Vec::new(),
             plan: None,
             query_context: None,
@@ -208,7 +208,7 @@ impl Engine {
             Err(Stop::Failed(failure)) => Event::Failed { generation, failure },
         });
         if is_broken {
-            self.go_on(request, sink, context);
+            self.try_last_valid_scene(request, sink, context);
         }
     }
 
@@ -222,7 +222,7 @@ impl Engine {
         let generation = request.generation;
         sink.send(Event::Started { generation });
         let mut findings = Findings::default();
-        let before = self.shown();
+        let before = self.shown_image();
         let outcome = self.run(request, sink, context, &mut findings);
         if let Err(Stop::Failed(Failure::Scene(diagnostics))) = &outcome {
             findings.watch_underlined_files(diagnostics, &request.scene, &self.contents, context.token);
@@ -240,19 +240,19 @@ impl Engine {
                 self.write_report(report, sink, context.writing);
             }
         }
-        self.say_files(&findings, sink);
+        self.report_files(&findings, sink);
         // Even if the render was stopped, keep completely read files for later requests.
         let is_read = self.good.as_ref().is_some_and(|good| good.generation == generation);
-        self.end(outcome.is_ok() || is_read);
+        self.end_request(outcome.is_ok() || is_read);
         let report = outcome?;
         let settled = |stage: Stage| report.stages[stage as usize].status != Status::Done;
-        let unchanged = self.shown() == before && settled(Stage::Render) && settled(Stage::Write);
+        let unchanged = self.shown_image() == before && settled(Stage::Render) && settled(Stage::Write);
         let Findings { conflicts, warnings, .. } = findings;
         Ok(Outcome { report, conflicts, warnings, unchanged })
     }
 
     /// Returns the current image's key and view.
-    fn shown(&self) -> (Option<Key>, Option<View>) {
+    fn shown_image(&self) -> (Option<Key>, Option<View>) {
         let view = self.plan.as_ref().map(|plan| plan.settings.view);
         (self.films.current().map(|state| state.key), view)
     }
@@ -268,7 +268,7 @@ impl Engine {
     pub(super) fn query(&self, query: &Query, sink: &Sink) {
         match &self.query_context {
             Some(query_context) => query_context.run(query, self.films.current(), &self.inputs, sink),
-            None => query.fail(NO_IMAGE, sink),
+            None => query.report_failure(NO_IMAGE, sink),
         }
     }
 
@@ -285,12 +285,12 @@ impl Engine {
         if request.overrides.turn.is_some() {
             self.films = FilmCache::default();
         }
-        let mut ready = self.prepare_of_one_version(request, &mut table, context.token, findings)?;
-        let photons = self.light(request, &ready, &mut table, sink, context)?;
+        let mut ready = self.prepare_consistent(request, &mut table, context.token, findings)?;
+        let photons = self.trace_photons(request, &ready, &mut table, sink, context)?;
         let share = self.share(&ready.plan, photons);
         // A share may render fewer samples than the whole image.
         if let Some(share) = &share {
-            ready.plan.settings.render.samples = share.own_samples();
+            ready.plan.settings.render.samples = share.samples_per_pixel();
         }
         ready.share = share;
         self.share_own(request, &ready);
@@ -299,11 +299,12 @@ impl Engine {
         // Symbolic links and files may have changed during the render.
         self.check_conflicts(request, &ready.plan, findings, sink)?;
         let was_own_written = self.is_own_written();
-        let written =
-            table.run(Stage::Write, || self.write(request, &ready.plan, findings, sink, context.writing));
+        let written = table.run(Stage::Write, || {
+            self.run_write_stage(request, &ready.plan, findings, sink, context.writing)
+        });
         let is_written = written.as_ref().is_ok_and(|is_written| *is_written);
         self.say_own(request, ready.film, sink);
-        let film = own::is_to_be_written(request).then_some(ready.film);
+        let film = own::should_write_own_image(request).then_some(ready.film);
         let interruption = || context.orders.interruption();
         self.with_checkpointer(film, sink, &interruption, |checkpointer, engine| {
             if let (Some(checkpointer), Some(state)) = (checkpointer, engine.films.current()) {
@@ -311,9 +312,9 @@ impl Engine {
             }
         });
         let is_written = written?;
-        let pool = self.pool(ready.plan.threads)?;
+        let pool = self.thread_pool(ready.plan.threads)?;
         let Some(state) = self.films.current() else { return Err(Stop::work("the film is missing")) };
-        let finished = Finished {
+        let finished = RequestResults {
             scene: &ready.parsed.loaded.path,
             plan: &ready.plan,
             world: &ready.world.1,
@@ -330,15 +331,15 @@ impl Engine {
             && self.is_own_written()
             && !was_own_written
         {
-            let finished = Finished { plan: &own.plan, is_written: true, ..finished };
-            let report = pool.install(|| report(&finished, stages.clone(), seconds));
+            let finished = RequestResults { plan: &own.plan, is_written: true, ..finished };
+            let report = pool.install(|| make_report(&finished, stages.clone(), seconds));
             self.write_report(&report, sink, context.writing);
         }
-        Ok(pool.install(|| report(&finished, stages, seconds)))
+        Ok(pool.install(|| make_report(&finished, stages, seconds)))
     }
 
     /// Traces photons and makes `ready` the current image. Returns the key of its photons.
-    fn light(
+    fn trace_photons(
         &mut self,
         request: &Request,
         ready: &Ready,
@@ -346,7 +347,7 @@ impl Engine {
         sink: &Sink,
         context: &RequestContext<'_>,
     ) -> Result<Option<Key>, Stop> {
-        let pool = self.pool(ready.plan.threads)?;
+        let pool = self.thread_pool(ready.plan.threads)?;
         let (plan, world) = (&ready.plan, &ready.world.1);
         let sending = PhotonContext { world, plan, pool: &pool, token: context.token, sink };
         let asked = (plan.scene.photons.enabled, request.overrides.photons);
@@ -363,29 +364,30 @@ impl Engine {
         let (store, inputs) = (&mut self.photons, &self.inputs);
         let hear = || {
             context.postpone_write(sink);
-            context.run_query(&query_context, None, inputs, sink);
+            context.answer_query(&query_context, None, inputs, sink);
         };
         // Show the scene while the first photons are traced.
-        let is_new = request.force || self.films.of(ready.film).is_none();
+        let is_new = request.force || self.films.get(ready.film).is_none();
         let coarse = FirstPictures {
-            tracer: tracer(self.config.kernel, &pool, ready, context.token),
+            tracer: make_tracer(self.config.kernel, &pool, ready, context.token),
             plan,
-            is_moved: request.overrides.camera.is_any(),
+            is_moved: request.overrides.camera.has_changes(),
             rate: &self.coarse_rate,
         };
         let screen = PreviewTarget { bounds: request.preview, plan, sink };
         let before = || if is_new { coarse.show_without_photons(screen, hear) } else { Ok(()) };
         table.run(Stage::Photons, || photons(asked, key, store, sending, hear, before))?;
-        let photons_key = plan.settings.effective().photons.filter(|_| plan.settings.gathers()).map(key);
+        let photons_key =
+            plan.settings.effective().photons.filter(|_| plan.settings.gathers_photons()).map(key);
         self.plan = Some(ready.plan.clone());
         (self.is_own, self.report) = (request.own.is_none(), None);
         self.query_context = Some(query_context);
         Ok(photons_key)
     }
 
-    /// Runs [`Self::prepare`], and repeats it if a file changes during the run, so that an image never mixes
+    /// Runs [`Self::prepare`]. If a file changes in the meantime, runs it again, so that an image never mixes
     /// two versions of a file.
-    fn prepare_of_one_version(
+    fn prepare_consistent(
         &mut self,
         request: &Request,
         table: &mut StageTable<'_>,
@@ -415,9 +417,9 @@ impl Engine {
         findings: &mut Findings,
     ) -> Result<Ready, Stop> {
         let containers = Containers::default();
-        let show = Show::of(&request.overrides);
+        let show = ModelView::of(&request.overrides);
         // The thread count does not depend on the scene, and reading a model uses all threads.
-        let pool = self.pool(threads(&request.overrides))?;
+        let pool = self.thread_pool(thread_count(&request.overrides))?;
         let parsed = table.run(Stage::Parse, || {
             let origin = SceneSource { path: &request.scene, sets: &request.overrides.sets, show };
             pool.install(|| parse(origin, (contents, &containers), &mut self.parsed, findings, token))
@@ -426,8 +428,8 @@ impl Engine {
         table.sink.send(Event::Text { generation: request.generation, text });
         let plan = plan(&parsed.loaded.scene, &request.scene, &request.overrides)
             .map_err(|error| Stop::Failed(Failure::Scene(vec![*error])))?;
-        let own_plan = own_plan(request, &parsed)?;
-        self.check_memory(&MemoryEstimate::of_picture(&plan), request, (&plan, own_plan.as_ref()))?;
+        let own_image_plan = own_image_plan(request, &parsed)?;
+        self.check_memory(&MemoryEstimate::for_image(&plan), request, (&plan, own_image_plan.as_ref()))?;
         let settings_warnings =
             settings_warnings(&parsed.loaded, &plan.scene, &plan.settings, &request.overrides);
         findings.warnings.extend(settings_warnings);
@@ -438,7 +440,7 @@ impl Engine {
             settings: Box::new(plan.effective.clone()),
             camera: own.viewpoint(),
             exposure: scene.render.exposure,
-            own: OwnSettings {
+            own: AdjustableSettings {
                 integrator: scene.render.integrator,
                 shadows: scene.render.shadows,
                 photons: scene.photons.enabled,
@@ -452,21 +454,22 @@ impl Engine {
         if findings.conflicts.is_empty() {
             check_targets(request.write, &plan, table.sink)?;
         }
-        let pool = self.pool(plan.threads)?;
+        let pool = self.thread_pool(plan.threads)?;
         let reading = Reading { sink: table.sink, token, contents, pool: &pool, containers: &containers };
         // Include textures needed only for the scene's own image, because its film key depends on them.
-        let lookups = lookups(&plan, own_plan.as_ref());
+        let lookups = needed_textures(&plan, own_image_plan.as_ref());
         let (meshes, bodies, textures, needed) = self.load(&parsed, lookups, findings, table, &reading)?;
         if let Some(path) = contents.changed() {
             return Err(Stop::work(format!("{} changed while it was being read", path.display())));
         }
         let estimate = MemoryEstimate::of_scene(&plan, &plan.scene, &meshes, textures.memory_bytes);
-        self.check_memory(&estimate, request, (&plan, own_plan.as_ref()))?;
-        self.inputs = inputs(&parsed, &meshes, findings);
+        self.check_memory(&estimate, request, (&plan, own_image_plan.as_ref()))?;
+        self.inputs = collect_inputs(&parsed, &meshes, findings);
         self.check_conflicts(request, &plan, findings, table.sink)?;
         let generation = request.generation;
-        let good = LastGoodScene { generation, parsed, meshes, bodies, textures: Arc::new(textures), needed };
-        let ready = self.build(request, &good, (plan, own_plan), table, &reading)?;
+        let good =
+            LastValidScene { generation, parsed, meshes, bodies, textures: Arc::new(textures), needed };
+        let ready = self.build(request, &good, (plan, own_image_plan), table, &reading)?;
         self.good = Some(good);
         Ok(ready)
     }
@@ -475,12 +478,12 @@ impl Engine {
     fn build(
         &mut self,
         request: &Request,
-        good: &LastGoodScene,
+        good: &LastValidScene,
         (plan, own): (Plan, Option<Plan>),
         table: &mut StageTable<'_>,
         reading: &Reading<'_>,
     ) -> Result<Ready, Stop> {
-        let LastGoodScene { parsed, meshes, bodies, textures, .. } = good;
+        let LastValidScene { parsed, meshes, bodies, textures, .. } = good;
         let scene = &plan.scene;
         let eye = RequestCamera::new(scene, parsed.orbiter, &request.overrides.camera).turned(plan.turn);
         let mesh_keys: Vec<Key> = meshes.iter().map(|mesh| mesh.key).collect();
@@ -498,11 +501,11 @@ impl Engine {
         let world = world(scene, (&surfaces, &of), parts, textures, &eye, &mut self.world);
         let Textures { texels_loaded, memory_bytes: texture_memory_bytes, .. } = **textures;
         let film = keys::render(world.0, &plan.settings, plan.crop);
-        let camera = own::overrides(request).camera;
+        let camera = own::own_image_overrides(request).camera;
         let own = own.unwrap_or_else(|| plan.clone());
         let own_eye = RequestCamera::new(&own.scene, parsed.orbiter, &camera).turned(own.turn);
         let own = OwnImage::new((parsed, own, &own_eye), (&surfaces, &mesh_keys), (camera, &self.assets));
-        self.take_own(own);
+        self.set_own_image(own);
         Ok(Ready {
             parsed: parsed.clone(),
             plan,
@@ -539,9 +542,9 @@ impl Engine {
         let texels = table.run(Stage::Textures, || textures(loaded, &needed, cache, findings, reading))?;
         self.assets = findings.files.clone();
         let bodies = glass(loaded, &found, &mut self.bodies, findings, reading.token)?;
-        coplanar(loaded, &found, &mut self.coplanar, findings);
+        warn_about_coplanar_lights(loaded, &found, &mut self.coplanar, findings);
         if findings.errors.is_empty() {
-            self.say_files(findings, table.sink);
+            self.report_files(findings, table.sink);
             let warnings = [findings.conflicts.as_slice(), &findings.warnings].concat();
             let generation = table.sink.generation;
             table.sink.send(Event::Warnings { generation, warnings });
@@ -558,8 +561,8 @@ impl Engine {
         photons: Option<Key>,
         sink: &Sink,
         context: &RequestContext<'_>,
-    ) -> Result<Staged<RayCounters>, Stop> {
-        let pool = self.pool(ready.plan.threads)?;
+    ) -> Result<StageResult<RayCounters>, Stop> {
+        let pool = self.thread_pool(ready.plan.threads)?;
         let (plan, orders) = (&ready.plan, context.orders);
         let key = ready.film;
         let watch = Stopwatch::start(context.token);
@@ -573,37 +576,37 @@ impl Engine {
             if !is_covered {
                 context.postpone_write(sink);
             } else if orders.take_write() && write_on_request(state, to, &mut written.borrow_mut()) {
-                drop_report(plan, to.inputs, sink);
+                remove_outdated_report(plan, to.inputs, sink);
             }
             if let Some(query_context) = &self.query_context {
-                context.run_query(query_context, Some(state), &self.inputs, sink);
+                context.answer_query(query_context, Some(state), &self.inputs, sink);
             }
         };
         let mut images = Vec::new();
         let wanted = plan.layers.as_slice();
-        let of_picture = sink.within(layers::progress(wanted, None));
+        let image_sink = sink.for_progress_range(layers::progress_range(wanted, None));
         let interruption = || orders.interruption();
-        let film = own::is_to_be_written(request).then_some(key);
+        let film = own::should_write_own_image(request).then_some(key);
         let rendered = self.with_checkpointer(film, sink, &interruption, |checkpointer, engine| {
-            let rendering = Rendering {
-                tracer: tracer(engine.config.kernel, &pool, ready, context.token),
+            let rendering = RenderStageInputs {
+                tracer: make_tracer(engine.config.kernel, &pool, ready, context.token),
                 plan,
                 photons: photons.and_then(|key| engine.photons.get(key)),
                 preview: request.preview,
                 most_film_bytes: engine.config.most_film_bytes,
                 force: request.force,
                 first: request.first,
-                sink: if wanted.is_empty() { sink } else { &of_picture },
+                sink: if wanted.is_empty() { sink } else { &image_sink },
                 pulse: &pulse,
                 take_preview: &|| orders.take_preview(),
-                is_moved: request.overrides.camera.is_any(),
+                is_moved: request.overrides.camera.has_changes(),
                 coarse_rate: &engine.coarse_rate,
                 share: ready.share.clone(),
                 checkpointer,
             };
             let rendered = render(key, &mut films, &rendering)?;
             if let Some(state) = films.current().filter(|_| request.write != Writing::No) {
-                let made = layers::layers(state, &rendering, wanted);
+                let made = layers::render_layers(state, &rendering, wanted);
                 if let (Err(_), Some(checkpointer)) = (&made, checkpointer) {
                     checkpointer.finish(state, state.traced, false);
                 }
@@ -626,7 +629,7 @@ impl Engine {
     }
 
     /// Returns a pool with the given number of threads, reusing the current pool if it has that many.
-    fn pool(&mut self, threads: usize) -> Result<Arc<ThreadPool>, Stop> {
+    fn thread_pool(&mut self, threads: usize) -> Result<Arc<ThreadPool>, Stop> {
         if let Some(pool) = self.pool.as_ref().filter(|pool| pool.current_num_threads() == threads) {
             return Ok(pool.clone());
         }
@@ -635,8 +638,8 @@ impl Engine {
         let nice = self.config.nice;
         let begin = move |_| priority::lower_thread_priority(nice);
         let failed = |error: &dyn Display| match threads {
-            1 => Stop::work(start_failure("a thread", false, &error)),
-            _ => Stop::work(start_failure(&format!("{threads} threads"), true, &error)),
+            1 => Stop::work(describe_start_failure("a thread", false, &error)),
+            _ => Stop::work(describe_start_failure(&format!("{threads} threads"), true, &error)),
         };
         check_stack_space(threads).map_err(|error| failed(&error))?;
         let builder = ThreadPoolBuilder::new().num_threads(threads).thread_name(name).start_handler(begin);
@@ -644,11 +647,11 @@ impl Engine {
         Ok(self.pool.insert(Arc::new(pool)).clone())
     }
 
-    fn say_files(&self, findings: &Findings, sink: &Sink) {
+    fn report_files(&self, findings: &Findings, sink: &Sink) {
         let mut files = findings.files.clone();
         let known: HashSet<&Path> = findings.files.iter().map(|file| file.path.as_path()).collect();
         files.extend(self.assets.iter().filter(|asset| !known.contains(asset.path.as_path())).cloned());
-        sink.files(files, findings.files.len(), findings.begun);
+        sink.files_read(files, findings.files.len(), findings.begun);
     }
 
     /// Loads the scene and all files it references, needed or not, for `check`.
@@ -663,8 +666,8 @@ impl Engine {
         let mut all = || {
             let contents = &Snapshot::of(Arc::clone(&self.contents));
             let containers = Containers::default();
-            let origin = SceneSource { path, sets, show: Show::default() };
-            let pool = self.pool(cores())?;
+            let origin = SceneSource { path, sets, show: ModelView::default() };
+            let pool = self.thread_pool(core_count())?;
             let read = || parse(origin, (contents, &containers), &mut self.parsed, &mut findings, token);
             let parsed = pool.install(read)?.value;
             let reading = Reading { sink, token, contents, pool: &pool, containers: &containers };
@@ -675,19 +678,19 @@ impl Engine {
             wanted.are_required = true;
             let texels = textures(loaded, &wanted, &mut self.textures, &mut findings, &reading)?.value;
             glass(loaded, &found, &mut self.bodies, &mut findings, token)?;
-            coplanar(loaded, &found, &mut self.coplanar, &mut findings);
+            warn_about_coplanar_lights(loaded, &found, &mut self.coplanar, &mut findings);
             let overrides = Overrides::default();
             let plan = plan(&loaded.scene, path, &overrides)
                 .map_err(|error| Stop::Failed(Failure::Scene(vec![*error])))?;
             findings.warnings.extend(settings_warnings(loaded, &plan.scene, &plan.settings, &overrides));
-            if plan.named_by == NamedBy::Scene {
-                let inputs = inputs(&parsed, &found, &findings);
+            if plan.named_by == OutputNameSource::Scene {
+                let inputs = collect_inputs(&parsed, &found, &findings);
                 findings.errors.extend(conflicts(&plan, &inputs));
             }
             Ok((parsed, found, texels))
         };
         let all = all();
-        self.end(all.is_ok());
+        self.end_request(all.is_ok());
         match all {
             Ok((parsed, found, texels)) if findings.errors.is_empty() => {
                 Ok((parsed, found, texels, findings.warnings))
@@ -700,7 +703,12 @@ impl Engine {
 }
 
 /// Creates a tracer for a scene, without photons.
-fn tracer<'a>(kernel: Kernel, pool: &'a ThreadPool, ready: &'a Ready, token: &'a CancelToken) -> Tracer<'a> {
+fn make_tracer<'a>(
+    kernel: Kernel,
+    pool: &'a ThreadPool,
+    ready: &'a Ready,
+    token: &'a CancelToken,
+) -> Tracer<'a> {
     Tracer {
         kernel,
         pool,
@@ -713,7 +721,7 @@ fn tracer<'a>(kernel: Kernel, pool: &'a ThreadPool, ready: &'a Ready, token: &'a
 }
 
 /// Collects the files referenced by the scene and all other files that were read.
-fn inputs(parsed: &Parsed, meshes: &Meshes, findings: &Findings) -> Inputs {
+fn collect_inputs(parsed: &Parsed, meshes: &Meshes, findings: &Findings) -> Inputs {
     let mut inputs = Inputs::of_scene(parsed);
     inputs.add_meshes(&parsed.loaded, meshes);
     inputs.add_read(&findings.files);

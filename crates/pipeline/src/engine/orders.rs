@@ -57,7 +57,7 @@ impl<'a> RequestContext<'a> {
     }
 
     /// Answers the next query about the current image.
-    pub(super) fn run_query(
+    pub(super) fn answer_query(
         &self,
         query_context: &QueryContext,
         state: Option<&FilmState>,

@@ -68,7 +68,7 @@ impl Engine {
     ///
     /// # Errors
     /// Returns the reason if no image was rendered.
-    pub(crate) fn rendered(
+    pub(crate) fn render_image(
         &mut self,
         request: &Request,
         sink: &Sink,
@@ -88,8 +88,8 @@ impl Engine {
         }
     }
 
-    /// Whether a path refers to a file that the last request read.
-    pub(crate) fn reads(&self, path: &Path) -> bool {
+    /// Whether the last request read the file at a path.
+    pub(crate) fn has_read(&self, path: &Path) -> bool {
         self.inputs.contain(path)
     }
 }

@@ -7,7 +7,7 @@ use super::super::render::film_state::FilmState;
 use super::super::report::finish::{remove_report, write_report};
 use super::super::sink::Sink;
 use super::super::stages::write::{Destination, write_animation, write_if_wanted, write_on_request};
-use super::super::stages::{Findings, Staged, Stop};
+use super::super::stages::{Findings, StageResult, Stop};
 use super::super::targets::conflicts;
 use super::Engine;
 use crate::control::CancelToken;
@@ -15,7 +15,7 @@ use crate::messages::{INCOMPLETE_IMAGE, NEWEST_IMAGE_NOT_WRITTEN, NO_IMAGE, SCEN
 use crate::output::OutputError;
 
 /// Removes a report that does not describe the plan's image files.
-pub(super) fn drop_report(plan: &Plan, inputs: &Inputs, sink: &Sink) {
+pub(super) fn remove_outdated_report(plan: &Plan, inputs: &Inputs, sink: &Sink) {
     if let Err(error) = remove_report(plan, inputs, sink) {
         sink.write_failed(None, format!("the report describes an earlier image: {error}"));
     }
@@ -24,7 +24,7 @@ pub(super) fn drop_report(plan: &Plan, inputs: &Inputs, sink: &Sink) {
 impl Engine {
     /// Whether every pixel of the current image has a sample.
     pub(crate) fn can_write(&self) -> bool {
-        self.films.current().is_some_and(FilmState::is_covered)
+        self.films.current().is_some_and(FilmState::covers_all_pixels)
     }
 
     /// Writes the current image, outside of a request.
@@ -32,14 +32,14 @@ impl Engine {
         let (Some(state), Some(plan), Some(pool)) = (self.films.current(), &self.plan, &self.pool) else {
             return sink.write_failed(None, NO_IMAGE.to_owned());
         };
-        if !state.is_covered() {
+        if !state.covers_all_pixels() {
             // Earlier requests may have written images.
             let what = if self.written.is_empty() { "no image written" } else { NEWEST_IMAGE_NOT_WRITTEN };
             let message = format!("{what}: {INCOMPLETE_IMAGE}");
             return sink.write_failed(None, message);
         }
         if self.is_broken
-            && let Some(path) = self.written.first_foreign(&plan.outputs, &self.contents)
+            && let Some(path) = self.written.first_foreign_file(&plan.outputs, &self.contents)
         {
             let path = path.display();
             let message = format!(
@@ -87,17 +87,17 @@ impl Engine {
             return Err(Stop::Failed(findings.take_failure()));
         }
         if found != findings.conflicts {
-            sink.refused(found.clone());
+            sink.write_conflicts(found.clone());
         }
         findings.conflicts = found;
         Ok(())
     }
 
-    /// Writes the report after the user has written an image with a key. If the render is unfinished, removes
-    /// the outdated report instead.
+    /// Writes the report after an image has been written because the user pressed a key. If the render is
+    /// unfinished, removes the outdated report instead.
     fn report_written_image(&self, sink: &Sink) {
         let Some(plan) = &self.plan else { return };
-        let Some(report) = &self.report else { return drop_report(plan, &self.inputs, sink) };
+        let Some(report) = &self.report else { return remove_outdated_report(plan, &self.inputs, sink) };
         let paths: Vec<String> =
             plan.outputs.iter().map(|path| path.to_string_lossy().into_owned()).collect();
         let image = ImageReport { path: paths.first().cloned(), paths, ..report.image.clone() };
@@ -117,21 +117,21 @@ impl Engine {
     }
 
     /// Runs the write stage. Returns whether the image is on disk.
-    pub(super) fn write(
+    pub(super) fn run_write_stage(
         &mut self,
         request: &Request,
         plan: &Plan,
         findings: &Findings,
         sink: &Sink,
         token: &CancelToken,
-    ) -> Result<Staged<bool>, Stop> {
+    ) -> Result<StageResult<bool>, Stop> {
         if let Some(conflict) = findings.conflicts.first() {
-            return Ok(Staged::skipped(false, conflict.message.clone()));
+            return Ok(StageResult::skipped(false, conflict.message.clone()));
         }
         if request.own.is_some() {
             return self.write_own(sink, token);
         }
-        let pool = self.pool(plan.threads)?;
+        let pool = self.thread_pool(plan.threads)?;
         let Some(state) = self.films.current() else { return Err(Stop::work("the film is missing")) };
         let to = Destination {
             plan,
@@ -143,7 +143,7 @@ impl Engine {
         };
         let written = &mut self.written;
         let wrote = match plan.outputs.is_empty() {
-            true => Staged::done(true, ""),
+            true => StageResult::done(true, ""),
             false => pool.install(|| write_if_wanted(request.write, state, to, written, token))?,
         };
         let own = self.own.as_ref().filter(|_| wrote.value);

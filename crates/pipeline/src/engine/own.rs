@@ -1,6 +1,5 @@
-//! The scene's own image: the saved scene with the command-line overrides. The user can show other images
-//! with the keyboard. Meanwhile, the own image's film, checkpoint and files are kept until a request returns
-//! to it.
+//! The scene's own image: the saved scene with the command-line overrides. While the user views other images
+//! by changing settings with keys, the own image's film, checkpoint and files are kept.
 
 use std::sync::Arc;
 
@@ -13,7 +12,7 @@ use crate::keys;
 use crate::memory::MemoryEstimate;
 use crate::output::part::Dependency;
 use crate::plan::{Plan, plan};
-use crate::protocol::{Failure, OwnState, Request, Status, Writing, reasons};
+use crate::protocol::{Failure, OwnImageState, Request, Status, Writing, reasons};
 use crate::render::checkpointer::{CheckpointContext, Checkpointer};
 use crate::render::film_state::FilmState;
 use crate::render::share::Share;
@@ -22,8 +21,8 @@ use crate::scene::fingerprint::{Fingerprint, Key};
 use crate::settings::{Checkpoints, Overrides, Resume};
 use crate::sink::Sink;
 use crate::stages::parse::Parsed;
-use crate::stages::write::{Destination, finish, write_if_wanted};
-use crate::stages::{Staged, Stop};
+use crate::stages::write::{Destination, develop_settings, write_if_wanted};
+use crate::stages::{StageResult, Stop};
 use crate::watch::content::FileRead;
 use crate::world::TextureNeeds;
 
@@ -61,7 +60,7 @@ impl OwnImage {
     pub(super) fn identity(&self) -> Vec<Dependency> {
         let divided = self.share.as_ref().map(|share| share.samples);
         let Self { parsed, plan, camera, files, .. } = self;
-        ImageDependencies { parsed, plan, camera, files, divided }.traits()
+        ImageDependencies { parsed, plan, camera, files, divided }.names_and_values()
     }
 }
 
@@ -80,7 +79,7 @@ fn image_key(film: Key, plan: &Plan) -> Key {
 
 impl Engine {
     /// Sets the scene's own image for a request and keeps its film while other images are rendered.
-    pub(super) fn take_own(&mut self, mut own: OwnImage) {
+    pub(super) fn set_own_image(&mut self, mut own: OwnImage) {
         if self.pins_own {
             self.films.pin(own.film);
         }
@@ -90,8 +89,9 @@ impl Engine {
         self.own = Some(own);
     }
 
-    /// Checks a request's memory use. If the request shows another image, this includes the film of the
-    /// scene's own image. If both films do not fit, the own film may be dropped once its image is written.
+    /// Checks a request's memory use. If the request shows another image, the film of the scene's own image
+    /// counts too. If the two films do not both fit, the own film may be dropped, provided that its image has
+    /// been written.
     ///
     /// # Errors
     /// The request needs more memory than is available.
@@ -113,15 +113,17 @@ impl Engine {
     }
 
     /// Returns the size in bytes of the scene's own film, if it is kept in addition to the request's film.
-    fn own_film_bytes(&self, request: &Request, (plan, own_plan): (&Plan, Option<&Plan>)) -> u64 {
-        let (Some(own), Some(own_plan)) = (&self.own, own_plan) else { return 0 };
+    fn own_film_bytes(&self, request: &Request, (plan, own_image_plan): (&Plan, Option<&Plan>)) -> u64 {
+        let (Some(own), Some(own_image_plan)) = (&self.own, own_image_plan) else { return 0 };
         let of = |plan: &Plan| keys::render(own.film, &plan.settings, plan.crop);
-        let is_shared = of(plan) == of(own_plan) && request.overrides.camera == overrides(request).camera;
-        let state = self.films.of(own.film).filter(|state| state.is_begun() && !is_shared);
+        let is_shared =
+            of(plan) == of(own_image_plan) && request.overrides.camera == own_image_overrides(request).camera;
+        let state = self.films.get(own.film).filter(|state| state.has_samples() && !is_shared);
         state.map_or(0, FilmState::memory_bytes)
     }
 
-    /// If the request renders the scene's own image, records which share of it this process renders.
+    /// Records which share of the scene's own image this process renders, if that is the image being
+    /// rendered.
     pub(super) fn share_own(&mut self, request: &Request, ready: &Ready) {
         if let Some(own) = self.own.as_mut().filter(|_| request.own.is_none()) {
             own.share.clone_from(&ready.share);
@@ -131,10 +133,10 @@ impl Engine {
     /// Reports the state of the scene's own image while another one is shown.
     pub(super) fn say_own(&self, request: &Request, film: Key, sink: &Sink) {
         let Some(own) = self.own.as_ref().filter(|_| request.own.is_some()) else { return };
-        sink.own_image(match self.films.of(own.film) {
-            _ if self.is_own_written() => OwnState::Written,
-            Some(state) if state.is_begun() => OwnState::Begun { is_rendering: own.film == film },
-            Some(_) | None => OwnState::NotBegun,
+        sink.own_image(match self.films.get(own.film) {
+            _ if self.is_own_written() => OwnImageState::Written,
+            Some(state) if state.has_samples() => OwnImageState::Begun { is_rendering: own.film == film },
+            Some(_) | None => OwnImageState::NotBegun,
         });
     }
 
@@ -153,8 +155,8 @@ impl Engine {
     ///
     /// # Errors
     /// [`Stop::Cancelled`].
-    pub(super) fn write_own(&mut self, sink: &Sink, token: &CancelToken) -> Result<Staged<bool>, Stop> {
-        let only_shown = || Ok(Staged::skipped(false, reasons::PREVIEW_ONLY));
+    pub(super) fn write_own(&mut self, sink: &Sink, token: &CancelToken) -> Result<StageResult<bool>, Stop> {
+        let only_shown = || Ok(StageResult::skipped(false, reasons::PREVIEW_ONLY));
         if self.is_own_written() {
             return only_shown();
         }
@@ -176,7 +178,7 @@ impl Engine {
         let written = &mut self.written;
         let wrote = pool.install(|| write_if_wanted(Writing::Try, state, to, written, token))?;
         written.own = wrote.value.then_some(own.image);
-        Ok(Staged { value: false, status: Status::Skipped, why: reasons::PREVIEW_ONLY.to_owned() })
+        Ok(StageResult { value: false, status: Status::Skipped, why: reasons::PREVIEW_ONLY.to_owned() })
     }
 
     /// Calls `work`, with a checkpointer if `film` belongs to the scene's own image and checkpoints are
@@ -192,7 +194,7 @@ impl Engine {
         let Some((own, output)) = own.and_then(|own| Some((own, own.plan.outputs.first()?))) else {
             return work(None, self);
         };
-        let finish = finish(&own.plan);
+        let finish = develop_settings(&own.plan);
         let name = || own.identity();
         let around = CheckpointContext {
             finish: &finish,
@@ -208,11 +210,11 @@ impl Engine {
     /// Saves a checkpoint of the scene's own image if the worker stops while showing another one.
     pub(crate) fn keep_own(&self, sink: &Sink, interruption: Interruption) {
         let Some(own) = self.own.as_ref().filter(|_| !self.is_own_written()) else { return };
-        let Some(state) = self.films.of(own.film).filter(|state| !state.is_kept) else { return };
+        let Some(state) = self.films.get(own.film).filter(|state| !state.is_kept) else { return };
         self.with_checkpointer(Some(own.film), sink, &|| interruption, |checkpointer, _| {
             if let Some(checkpointer) = checkpointer {
-                checkpointer.recognize(state);
-                checkpointer.at_the_end(state, state.traced, state.render_seconds);
+                checkpointer.check_already_saved(state);
+                checkpointer.save_if_cancelled(state, state.traced, state.render_seconds);
             }
         });
     }
@@ -231,25 +233,25 @@ fn keeps(plan: &Plan) -> bool {
 ///
 /// # Errors
 /// See [`plan`].
-pub(super) fn own_plan(request: &Request, parsed: &Parsed) -> Result<Option<Plan>, Stop> {
+pub(super) fn own_image_plan(request: &Request, parsed: &Parsed) -> Result<Option<Plan>, Stop> {
     let plan = |own: &Overrides| plan(&parsed.loaded.scene, &request.scene, own);
     let own = request.own.as_deref().map(plan).transpose();
     own.map_err(|error| Stop::Failed(Failure::Scene(vec![*error])))
 }
 
-/// Returns which textures a request needs. They include the textures for the scene's own image because its
-/// film key depends on them.
-pub(super) fn lookups(plan: &Plan, own: Option<&Plan>) -> TextureNeeds {
+/// Returns which textures a request needs, including those of the scene's own image, because its film key
+/// depends on them.
+pub(super) fn needed_textures(plan: &Plan, own: Option<&Plan>) -> TextureNeeds {
     let shown = plan.settings.lookups();
     own.map_or(shown, |own| shown.or(own.settings.lookups()))
 }
 
 /// Returns the request's overrides for the scene's own image.
-pub(super) fn overrides(request: &Request) -> &Overrides {
+pub(super) fn own_image_overrides(request: &Request) -> &Overrides {
     request.own.as_deref().unwrap_or(&request.overrides)
 }
 
 /// Whether the scene's own image should be written.
-pub(super) fn is_to_be_written(request: &Request) -> bool {
+pub(super) fn should_write_own_image(request: &Request) -> bool {
     request.own.is_some() || request.write != Writing::No
 }

@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use super::outputs::drop_report;
-use super::own::{lookups, own_plan};
+use super::outputs::remove_outdated_report;
+use super::own::{needed_textures, own_image_plan};
 use super::{Engine, RequestContext};
 use crate::memory::MemoryEstimate;
 use crate::plan::plan;
-use crate::protocol::{Event, LastGoodEnd, Request, Status};
+use crate::protocol::{Event, LastValidSceneEnd, Request, Status};
 use crate::sink::Sink;
 use crate::stages::containers::Containers;
 use crate::stages::meshes::Meshes;
@@ -20,7 +20,7 @@ use crate::world::{GlassSolids, TextureNeeds};
 
 /// A valid scene and all files needed for its image.
 #[derive(Clone)]
-pub(super) struct LastGoodScene {
+pub(super) struct LastValidScene {
     /// Generation of the request that read it.
     pub(super) generation: u64,
     pub(super) parsed: Arc<Parsed>,
@@ -34,68 +34,76 @@ pub(super) struct LastGoodScene {
 impl Engine {
     /// Renders and writes the last valid scene with the overrides of the newest request, whose own scene
     /// cannot be loaded. Does not overwrite files that the broken scene might reference.
-    pub(super) fn go_on(&mut self, newest: &Request, sink: &Sink, context: &RequestContext<'_>) {
-        let before = self.shown();
+    pub(super) fn try_last_valid_scene(
+        &mut self,
+        newest: &Request,
+        sink: &Sink,
+        context: &RequestContext<'_>,
+    ) {
+        let before = self.shown_image();
         // The failed request has already reported its errors, so errors from this render are dropped.
-        let end = match self.render_last_good(newest, sink, context) {
-            Ok(Some(is_reused)) => LastGoodEnd::Finished { unchanged: is_reused && self.shown() == before },
-            Ok(None) | Err(_) => LastGoodEnd::Stopped,
+        let end = match self.render_last_valid_scene(newest, sink, context) {
+            Ok(Some(is_reused)) => {
+                LastValidSceneEnd::Finished { unchanged: is_reused && self.shown_image() == before }
+            }
+            Ok(None) | Err(_) => LastValidSceneEnd::Stopped,
         };
         sink.send(Event::LastGoodEnded { generation: newest.generation, end });
     }
 
     /// Renders and writes the last valid scene. Returns whether the existing image and files were reused, or
     /// `None` if there is no valid scene.
-    fn render_last_good(
+    fn render_last_valid_scene(
         &mut self,
         newest: &Request,
         sink: &Sink,
         context: &RequestContext<'_>,
     ) -> Result<Option<bool>, Stop> {
-        let is_it = |good: &&LastGoodScene| good.parsed.loaded.path == newest.scene;
+        let is_it = |good: &&LastValidScene| good.parsed.loaded.path == newest.scene;
         let Some(good) = self.good.as_ref().filter(is_it).cloned() else { return Ok(None) };
         let request = Request { force: false, ..newest.clone() };
         // Combine the scene and the request.
         let (loaded, path) = (&good.parsed.loaded, &request.scene);
         let Ok(plan) = plan(&loaded.scene, path, &request.overrides) else { return Ok(None) };
-        let own = own_plan(&request, &good.parsed)?;
+        let own = own_image_plan(&request, &good.parsed)?;
         // Load the textures needed for another view if their files are still valid.
-        let pool = self.pool(plan.threads)?;
+        let pool = self.thread_pool(plan.threads)?;
         let snapshot = Snapshot::of(Arc::clone(&self.contents));
         let containers = Containers::default();
         let token = context.token;
         let reading = Reading { sink, token, contents: &snapshot, pool: &pool, containers: &containers };
-        let lookups = lookups(&plan, own.as_ref());
-        let good = self.with_textures(good, lookups, &reading)?;
+        let lookups = needed_textures(&plan, own.as_ref());
+        let good = self.load_missing_textures(good, lookups, &reading)?;
         let (meshes, texture_bytes) = (&good.meshes, good.textures.memory_bytes);
         let estimate = MemoryEstimate::of_scene(&plan, &plan.scene, meshes, texture_bytes);
         self.check_memory(&estimate, &request, (&plan, own.as_ref()))?;
         // Prepare the scene, reusing unchanged values.
         let mut table = StageTable { sink, token: context.token, stages: Vec::new(), is_silent: true };
         let ready = self.build(&request, &good, (plan, own), &mut table, &reading)?;
-        let photons = self.light(&request, &ready, &mut table, sink, context)?;
+        let photons = self.trace_photons(&request, &ready, &mut table, sink, context)?;
         // Render and write.
         let rendered = self.render(&request, &ready, photons, sink, context)?;
         let mut is_written_now = false;
-        if self.written.first_foreign(&ready.plan.outputs, &self.contents).is_none() {
+        if self.written.first_foreign_file(&ready.plan.outputs, &self.contents).is_none() {
             // The write stage reports files that cannot be written.
-            let written = self.write(&request, &ready.plan, &Findings::default(), sink, context.writing);
+            let written =
+                self.run_write_stage(&request, &ready.plan, &Findings::default(), sink, context.writing);
             is_written_now = written.is_ok_and(|staged| staged.status == Status::Done);
             if is_written_now {
                 // The existing report does not describe this image.
-                drop_report(&ready.plan, &self.inputs, sink);
+                remove_outdated_report(&ready.plan, &self.inputs, sink);
             }
         }
         Ok(Some(rendered.status == Status::Reused && !is_written_now))
     }
 
     /// Loads any additional textures that this view needs.
-    fn with_textures(
+    fn load_missing_textures(
         &mut self,
-        good: LastGoodScene,
+        good: LastValidScene,
         lookups: TextureNeeds,
         reading: &Reading<'_>,
-    ) -> Result<LastGoodScene, Stop> {
+    ) -> Result<LastValidScene, Stop> {
         let loaded = &good.parsed.loaded;
         let needed = needed(loaded, &good.meshes, lookups, &self.textures);
         let is_there = |one| good.needed.textures.contains(one);
@@ -105,7 +113,7 @@ impl Engine {
         let mut findings = Findings::default();
         let found = textures(loaded, &needed, &mut self.textures, &mut findings, reading)?;
         // A texture is missing if its file has since become invalid.
-        let good = LastGoodScene { textures: Arc::new(found.value), needed, ..good };
+        let good = LastValidScene { textures: Arc::new(found.value), needed, ..good };
         self.good = Some(good.clone());
         Ok(good)
     }

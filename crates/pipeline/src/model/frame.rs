@@ -1,6 +1,6 @@
 //! Frames a model: computes its default camera and key light.
 
-use super::toml::rounded;
+use super::toml::round_significant;
 use crate::math::DVec3;
 use crate::settings::Side;
 use crate::turntable::Turn;
@@ -74,7 +74,7 @@ pub(super) fn frame_model(
 pub(super) fn round_to_step(value: f64, step: f64) -> f64 {
     let unit = libm::pow(10.0, libm::floor(libm::log10(step)));
     let whole = (value / unit).round();
-    // Dividing by a power of ten yields fewer digits than multiplying by its reciprocal.
+    // Dividing by a power of ten produces fewer digits than multiplying by its reciprocal.
     if unit < 1.0 { whole / libm::round(1.0 / unit) } else { whole * unit }
 }
 
@@ -83,8 +83,8 @@ const ELEVATION: f64 = 50.0;
 /// Azimuth of the key light in degrees, to the left of the camera.
 const ASIDE: f64 = 40.0;
 
-/// Direction in which the key light shines: from above the viewer's left shoulder.
-pub(super) fn key_direction(eye: &CameraPose) -> DVec3 {
+/// Direction in which the key light travels. The light comes from above the viewer's left shoulder.
+pub(super) fn key_light_direction(eye: &CameraPose) -> DVec3 {
     let back = eye.position - eye.look_at;
     // For views from directly above or below, use the front direction instead.
     let flat = DVec3::new(back.x, 0.0, back.z);
@@ -93,7 +93,7 @@ pub(super) fn key_direction(eye: &CameraPose) -> DVec3 {
     let aside = DVec3::new(flat.x * cos - flat.z * sin, 0.0, flat.x * sin + flat.z * cos);
     let (rise, run) = (libm::sin(ELEVATION.to_radians()), libm::cos(ELEVATION.to_radians()));
     let towards = aside * run + DVec3::Y * rise;
-    DVec3::from((-towards).to_array().map(|part| rounded(part, 2)))
+    DVec3::from((-towards).to_array().map(|part| round_significant(part, 2)))
 }
 
 /// Radiance of the sky.
@@ -105,7 +105,7 @@ pub(super) const KEY: f64 = 1.5;
 /// irradiance is π·`SKY` plus the key light's contribution.
 pub(super) fn ground_reflectance() -> f64 {
     let key = KEY * libm::sin(ELEVATION.to_radians()) / std::f64::consts::PI;
-    rounded(SKY / (SKY + key), 3)
+    round_significant(SKY / (SKY + key), 3)
 }
 
 #[cfg(test)]
@@ -163,7 +163,7 @@ mod tests {
     #[test]
     fn ground_is_as_bright_as_the_sky() {
         let eye = frame_model([DVec3::ZERO, DVec3::ONE], &[DVec3::ZERO, DVec3::ONE], (Side::Iso, 1), 1.0);
-        let direction = key_direction(&eye).normalize();
+        let direction = key_light_direction(&eye).normalize();
         let irradiance = std::f64::consts::PI * SKY - direction.y * KEY;
         let radiance = ground_reflectance() * irradiance / std::f64::consts::PI;
         assert!((radiance / SKY - 1.0).abs() < 0.02, "{radiance}");

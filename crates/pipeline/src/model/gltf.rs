@@ -6,9 +6,10 @@ use std::path::Path;
 
 use super::frame::{frame_model, round_to_step};
 use super::materials::{MaterialWriter, TextureFile};
-use super::toml::{Toml, color, list, number, vector};
+use super::toml::{Toml, format_color, format_list, format_number, format_vector};
 use super::{
-    CameraPose, FOV, Lighting, ModelText, ROUGH, SIZE, Show, Unique, camera, file_name, ground, light, render,
+    CameraPose, FOV, Lighting, ModelText, ModelView, ROUGH, SIZE, UniqueNames, file_name, render,
+    write_camera, write_ground, write_lights,
 };
 use crate::assets::gltf::{
     Alpha, Container, ImageBytes, ModelCamera, ModelInstance, ModelLight, ModelLightKind, ModelMaterial,
@@ -20,13 +21,13 @@ use crate::math::color::luminance;
 use crate::math::{DMat3, DVec3};
 use crate::messages::INVISIBLE_MODEL;
 use crate::scene::keys::endings::MAPS;
-use crate::scene::quoted;
+use crate::scene::toml_string;
 use crate::settings::Side;
 use crate::stages::containers::Containers;
 
 /// Where the generated scene's meshes and images are stored.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Naming {
+pub(crate) enum ExportNaming {
     /// In the glTF file and the files referenced by it.
     Inside,
     /// In separate files in this folder, next to the scene.
@@ -52,9 +53,9 @@ pub(crate) enum ExportSource {
 }
 
 /// Converts a glTF file to scene text.
-pub(super) fn text(
+pub(super) fn scene_text(
     path: &Path,
-    (show, naming): (Show, &Naming),
+    (show, naming): (ModelView, &ExportNaming),
     containers: &Containers,
     token: &CancelToken,
 ) -> Result<ModelText, AssetError> {
@@ -69,7 +70,7 @@ pub(super) fn text(
         path,
         naming,
         toml: Toml::default(),
-        files: Unique::default(),
+        files: UniqueNames::default(),
         assets: Vec::new(),
         names: HashMap::new(),
         images: BTreeSet::new(),
@@ -78,12 +79,12 @@ pub(super) fn text(
     };
     writer.write(&scene, bounds, show);
     let Writer { toml, assets, images, companions, .. } = writer;
-    let is_unseen = scene.instances.iter().all(|one| is_clear(&scene.materials[one.material]));
+    let is_fully_transparent = scene.instances.iter().all(|one| is_clear(&scene.materials[one.material]));
     let ModelScene { mut notes, .. } = scene;
     match naming {
         // Previews tolerate unreadable images, but imports do not.
-        Naming::Inside => notes.extend(is_unseen.then(|| INVISIBLE_MODEL.to_owned())),
-        Naming::Folder(_) => {
+        ExportNaming::Inside => notes.extend(is_fully_transparent.then(|| INVISIBLE_MODEL.to_owned())),
+        ExportNaming::Folder(_) => {
             images.into_iter().try_for_each(|image| container.check_image_header(image, token))?;
         }
     }
@@ -93,10 +94,10 @@ pub(super) fn text(
 struct Writer<'a> {
     container: &'a Container,
     path: &'a Path,
-    naming: &'a Naming,
+    naming: &'a ExportNaming,
     toml: Toml,
     /// File names already used in the folder.
-    files: Unique,
+    files: UniqueNames,
     assets: Vec<ExportedFile>,
     names: HashMap<ExportSource, String>,
     /// Images used by materials.
@@ -107,7 +108,7 @@ struct Writer<'a> {
 }
 
 impl Writer<'_> {
-    fn write(&mut self, scene: &ModelScene, bounds: [DVec3; 2], show: Show) {
+    fn write(&mut self, scene: &ModelScene, bounds: [DVec3; 2], show: ModelView) {
         // Describe the model and its approximations.
         self.toml.comment(&format!("{}, as glimt shows it.", file_name(self.path)));
         for note in &scene.notes {
@@ -127,7 +128,7 @@ impl Writer<'_> {
         let eye = match own {
             Some(own) => {
                 let eye = camera_pose(own, bounds);
-                camera(&mut self.toml, &eye, own.fov);
+                write_camera(&mut self.toml, &eye, own.fov);
                 eye
             }
             None => {
@@ -137,26 +138,26 @@ impl Writer<'_> {
                     (show.from.unwrap_or(Side::Iso), show.turns),
                     aspect.unwrap_or(SIZE[0] / SIZE[1]),
                 );
-                camera(&mut self.toml, &eye, FOV);
+                write_camera(&mut self.toml, &eye, FOV);
                 eye
             }
         };
-        light(&mut self.toml, &eye, lighting);
+        write_lights(&mut self.toml, &eye, lighting);
         if !scene.lights.is_empty() {
             self.toml.section("1 cd in the file is treated as 1 W/sr, and 1 lx as 1 W/m².");
         }
-        scene.lights.iter().for_each(|light| self.light(light));
+        scene.lights.iter().for_each(|light| self.write_light(light));
         // Write the materials, then the meshes that use them.
-        let mut names = Unique::default();
+        let mut names = UniqueNames::default();
         let materials = MaterialWriter::write(scene, &mut names, self);
-        let mut shapes = Unique::default();
+        let mut shapes = UniqueNames::default();
         for instance in &scene.instances {
-            self.mesh(instance, &materials[instance.material], &mut shapes);
+            self.write_mesh(instance, &materials[instance.material], &mut shapes);
         }
-        ground(&mut self.toml, &mut names, bounds, &eye);
+        write_ground(&mut self.toml, &mut names, bounds, &eye);
     }
 
-    fn light(&mut self, light: &ModelLight) {
+    fn write_light(&mut self, light: &ModelLight) {
         let toml = &mut self.toml;
         toml.table("[[light]]");
         if !light.name.is_empty() {
@@ -169,39 +170,39 @@ impl Writer<'_> {
         }
         match light.kind {
             ModelLightKind::Directional => {
-                toml.key("direction", vector(light.direction));
-                toml.key("irradiance", color(light.intensity));
+                toml.key("direction", format_vector(light.direction));
+                toml.key("irradiance", format_color(light.intensity));
             }
             ModelLightKind::Point | ModelLightKind::Spot { .. } => {
-                toml.key("position", vector(light.position));
-                toml.key("intensity", color(light.intensity));
+                toml.key("position", format_vector(light.position));
+                toml.key("intensity", format_color(light.intensity));
             }
         }
         if let ModelLightKind::Spot { angle, blend } = light.kind {
-            toml.key("look_at", vector(light.position + light.direction));
-            toml.key("angle", number(angle.min(359.0)));
-            toml.key("blend", number(blend));
+            toml.key("look_at", format_vector(light.position + light.direction));
+            toml.key("angle", format_number(angle.min(359.0)));
+            toml.key("blend", format_number(blend));
         }
     }
 
-    fn mesh(&mut self, instance: &ModelInstance, material: &str, shapes: &mut Unique) {
+    fn write_mesh(&mut self, instance: &ModelInstance, material: &str, shapes: &mut UniqueNames) {
         self.toml.table("[[mesh]]");
         if !instance.name.is_empty() {
-            self.toml.key("name", quoted(&shapes.name(&instance.name, "mesh")));
+            self.toml.key("name", toml_string(&shapes.name(&instance.name, "mesh")));
         }
         let base = if instance.name.is_empty() { "part" } else { &instance.name };
         match self.naming {
-            Naming::Inside => {
-                self.toml.key("file", quoted(&file_name(self.path)));
+            ExportNaming::Inside => {
+                self.toml.key("file", toml_string(&file_name(self.path)));
                 self.toml.key("part", instance.part.to_string());
             }
-            Naming::Folder(_) => {
-                let name = self.asset(ExportSource::Part(instance.part), base, "ply");
-                self.toml.key("file", quoted(&name));
+            ExportNaming::Folder(_) => {
+                let name = self.add_asset(ExportSource::Part(instance.part), base, "ply");
+                self.toml.key("file", toml_string(&name));
             }
         }
-        self.toml.key("material", quoted(material));
-        self.placement(&instance.placed.linear, instance.placed.translate);
+        self.toml.key("material", toml_string(material));
+        self.write_placement(&instance.placed.linear, instance.placed.translate);
         if !instance.has_normals {
             self.toml.key("smooth", "false");
         }
@@ -211,20 +212,20 @@ impl Writer<'_> {
     }
 
     /// Writes `scale` and `translate` if they can represent the placement, or `matrix` otherwise.
-    fn placement(&mut self, linear: &DMat3, translate: DVec3) {
+    fn write_placement(&mut self, linear: &DMat3, translate: DVec3) {
         let scale = DVec3::new(linear.x_axis.x, linear.y_axis.y, linear.z_axis.z);
         if *linear == DMat3::from_diagonal(scale) {
             if scale != DVec3::ONE {
-                self.toml.key("scale", color(scale));
+                self.toml.key("scale", format_color(scale));
             }
             if translate != DVec3::ZERO {
-                self.toml.key("translate", vector(translate));
+                self.toml.key("translate", format_vector(translate));
             }
             return;
         }
         let rows = linear.transpose();
         let row = |axis: DVec3, last: f64| {
-            let row = list(&[axis.x, axis.y, axis.z, last].map(tidy));
+            let row = format_list(&[axis.x, axis.y, axis.z, last].map(zero_if_tiny));
             row[1..row.len() - 1].to_owned()
         };
         let matrix = [(rows.x_axis, translate.x), (rows.y_axis, translate.y), (rows.z_axis, translate.z)];
@@ -233,13 +234,13 @@ impl Writer<'_> {
     }
 
     /// Returns the file name for `content`. Adds a file if the content is new.
-    fn asset(&mut self, content: ExportSource, wanted: &str, ending: &str) -> String {
+    fn add_asset(&mut self, content: ExportSource, wanted: &str, ending: &str) -> String {
         if let Some(known) = self.names.get(&content) {
             return known.clone();
         }
         let folder = match self.naming {
-            Naming::Inside => String::new(),
-            Naming::Folder(folder) => format!("{folder}/"),
+            ExportNaming::Inside => String::new(),
+            ExportNaming::Folder(folder) => format!("{folder}/"),
         };
         let plain: String =
             wanted.chars().map(|c| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '_' }).collect();
@@ -251,7 +252,7 @@ impl Writer<'_> {
     }
 }
 
-impl super::materials::Files for Writer<'_> {
+impl super::materials::ExportFiles for Writer<'_> {
     fn toml(&mut self) -> &mut Toml {
         &mut self.toml
     }
@@ -269,20 +270,22 @@ impl super::materials::Files for Writer<'_> {
         self.images.insert(image);
         let bytes = self.container.image(image);
         match (self.naming, bytes) {
-            (Naming::Inside, Ok(ImageBytes::File(file))) if has_image_extension(&file) && file.is_file() => {
+            (ExportNaming::Inside, Ok(ImageBytes::File(file)))
+                if has_image_extension(&file) && file.is_file() =>
+            {
                 let folder = self.path.parent().unwrap_or(Path::new(""));
                 let name = file.strip_prefix(folder).unwrap_or(&file);
                 TextureFile { file: name.to_string_lossy().into_owned(), image: None }
             }
-            // A file without an image extension is read via the glTF file, which detects the format from the
-            // content. A missing file is watched until it appears.
-            (Naming::Inside, bytes) => {
+            // A file without an image extension is read through the glTF file, so that its format is detected
+            // from its content. A missing file is watched until it appears.
+            (ExportNaming::Inside, bytes) => {
                 if let Ok(ImageBytes::File(file)) = bytes {
                     self.companions.push(Companion { path: file, hash: None });
                 }
                 TextureFile { file: file_name(self.path), image: Some(image) }
             }
-            (Naming::Folder(_), bytes) => {
+            (ExportNaming::Folder(_), bytes) => {
                 let ending = match &bytes {
                     Ok(ImageBytes::Inside(bytes)) => image_extension(bytes).to_owned(),
                     Ok(ImageBytes::File(path)) => {
@@ -293,7 +296,7 @@ impl super::materials::Files for Writer<'_> {
                     Err(_) => "png".to_owned(),
                 };
                 let wanted = self.image_name(image);
-                let name = self.asset(ExportSource::Image(image), &wanted, &ending);
+                let name = self.add_asset(ExportSource::Image(image), &wanted, &ending);
                 TextureFile { file: name, image: None }
             }
         }
@@ -360,23 +363,24 @@ fn image_extension(bytes: &[u8]) -> &'static str {
 }
 
 /// Replaces near-zero values, which result from rotations by right angles, with zero.
-fn tidy(value: f64) -> f64 {
+fn zero_if_tiny(value: f64) -> f64 {
     if value.abs() < 1e-12 { 0.0 } else { value }
 }
 
-/// Converts a camera from the file. The `look_at` point is as far from the camera as the model's center.
+/// Converts a camera from the file. The distance to `look_at` is the camera's distance from the model's
+/// center.
 fn camera_pose(camera: &ModelCamera, [least, greatest]: [DVec3; 2]) -> CameraPose {
     let size = (greatest - least).length().max(1e-12);
     let depth = ((least + greatest) * 0.5 - camera.position).dot(camera.direction).max(size * 0.05);
     let look_at = camera.position + camera.direction * depth;
     let step = size.min(depth) * 1e-6;
     let tidy = |at: DVec3| DVec3::from(at.to_array().map(|part| round_to_step(part, step)));
-    let up = if (camera.up - DVec3::Y).length() < 1e-6 || is_level(camera) { DVec3::Y } else { camera.up };
+    let up = if (camera.up - DVec3::Y).length() < 1e-6 || has_no_roll(camera) { DVec3::Y } else { camera.up };
     CameraPose { position: tidy(camera.position), look_at: tidy(look_at), up }
 }
 
-/// Whether the camera has no roll, in which case the y axis as up vector produces the same view.
-fn is_level(camera: &ModelCamera) -> bool {
+/// Whether the camera has no roll. If so, using the y axis as the up vector produces the same view.
+fn has_no_roll(camera: &ModelCamera) -> bool {
     let side = camera.direction.cross(DVec3::Y);
     side.length() > 1e-3 && camera.up.dot(side.normalize()).abs() < 1e-6 && camera.up.y > 0.0
 }

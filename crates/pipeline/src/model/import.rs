@@ -4,17 +4,17 @@ use std::path::{Path, PathBuf};
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-use super::gltf::{ExportSource, Naming};
-use super::{ModelText, Show, in_generated_scene};
+use super::gltf::{ExportNaming, ExportSource};
+use super::{ModelText, ModelView, in_generated_scene};
 use crate::assets::AssetError;
 use crate::assets::gltf::is_gltf;
 use crate::assets::mesh::ply::write;
 use crate::control::{CancelToken, ignore_progress};
-use crate::plan::cores;
+use crate::plan::core_count;
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::load_generated;
 use crate::stages::containers::Containers;
-use crate::system::threads::{check_stack_space, start_failure};
+use crate::system::threads::{check_stack_space, describe_start_failure};
 
 /// An imported scene, ready to be written.
 #[derive(Debug)]
@@ -36,7 +36,7 @@ pub enum ImportError {
     Work(String),
 }
 
-/// Imports a glTF file as a scene whose meshes and images are in `folder`.
+/// Imports a glTF file as a scene whose meshes and images are stored in `folder`.
 ///
 /// # Errors
 /// The file is invalid, the machine lacks resources, or the token is cancelled.
@@ -45,22 +45,23 @@ pub fn import(path: &Path, folder: &str, token: &CancelToken) -> Result<Imported
         let message = format!("cannot import {}: only .gltf and .glb files are supported", path.display());
         return Err(ImportError::File(message));
     }
-    let pool = pool().map_err(|error| ImportError::Work(start_failure("threads", false, &error)))?;
+    let pool = create_thread_pool()
+        .map_err(|error| ImportError::Work(describe_start_failure("threads", false, &error)))?;
     let containers = Containers::default();
-    let naming = Naming::Folder(folder.to_owned());
+    let naming = ExportNaming::Folder(folder.to_owned());
     let read = || {
         let ModelText { text, notes, assets, .. } =
-            super::gltf::text(path, (Show::default(), &naming), &containers, token)?;
+            super::gltf::scene_text(path, (ModelView::default(), &naming), &containers, token)?;
         check_scene(path, &containers, token)?;
         let container = containers.open(path, &ignore_progress, token)?;
         let mut files = Vec::new();
         for asset in assets {
             let bytes = match asset.content {
                 ExportSource::Part(part) => {
-                    write::bytes(&container.part(part, &ignore_progress, token)?.mesh)
+                    write::encode_ply(&container.part(part, &ignore_progress, token)?.mesh)
                 }
                 ExportSource::Image(image) => {
-                    // Check the content, because a glTF file could otherwise have arbitrary files copied as
+                    // Check the content. Otherwise, a glTF file could make the import copy arbitrary files as
                     // images.
                     container.check_image(image, token)?;
                     container.image_content(image, token)?
@@ -79,15 +80,16 @@ pub fn import(path: &Path, folder: &str, token: &CancelToken) -> Result<Imported
 }
 
 /// Creates a thread pool with one thread per core.
-fn pool() -> Result<ThreadPool, String> {
-    check_stack_space(cores()).map_err(|error| error.to_string())?;
-    ThreadPoolBuilder::new().num_threads(cores()).build().map_err(|error| error.to_string())
+fn create_thread_pool() -> Result<ThreadPool, String> {
+    check_stack_space(core_count()).map_err(|error| error.to_string())?;
+    ThreadPoolBuilder::new().num_threads(core_count()).build().map_err(|error| error.to_string())
 }
 
 /// Rejects a scene that `glimt check` would reject. Checks the text rendered by `glimt MODEL` because the
 /// files it references exist.
 fn check_scene(path: &Path, containers: &Containers, token: &CancelToken) -> Result<(), AssetError> {
-    let shown = super::gltf::text(path, (Show::default(), &Naming::Inside), containers, token)?;
+    let shown =
+        super::gltf::scene_text(path, (ModelView::default(), &ExportNaming::Inside), containers, token)?;
     let Err(errors) = load_generated(shown.text.into(), path, &[]) else { return Ok(()) };
     // Ignore errors about file names, which differ in the imported scene.
     let counts = |one: &&Diagnostic| one.severity == Severity::Error && !one.message.contains("`file`");

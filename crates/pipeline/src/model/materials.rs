@@ -2,14 +2,14 @@
 
 use std::collections::HashMap;
 
-use super::Unique;
-use super::toml::{Toml, color, key_name, number, pair};
+use super::UniqueNames;
+use super::toml::{Toml, format_color, format_key, format_number, format_pair};
 use crate::assets::gltf::{Alpha, ModelMaterial, ModelScene, TextureRef, TextureWrap, TexturedValue};
 use crate::math::{DVec3, Vec2};
-use crate::scene::quoted;
+use crate::scene::toml_string;
 
-/// Access to the scene text and image files while writing materials.
-pub(super) trait Files {
+/// The scene text and image files, as needed for writing materials.
+pub(super) trait ExportFiles {
     /// The scene text.
     fn toml(&mut self) -> &mut Toml;
     /// Name of an image, without an extension.
@@ -45,86 +45,86 @@ type TextureIdentity = (usize, TextureUse, String);
 pub(super) struct MaterialWriter<'a, F> {
     files: &'a mut F,
     textures: HashMap<TextureIdentity, String>,
-    names: Unique,
+    names: UniqueNames,
 }
 
-impl<F: Files> MaterialWriter<'_, F> {
+impl<F: ExportFiles> MaterialWriter<'_, F> {
     /// Writes the tables and returns the material names.
-    pub(super) fn write(scene: &ModelScene, names: &mut Unique, files: &mut F) -> Vec<String> {
-        let mut all = MaterialWriter { files, textures: HashMap::new(), names: Unique::default() };
+    pub(super) fn write(scene: &ModelScene, names: &mut UniqueNames, files: &mut F) -> Vec<String> {
+        let mut all = MaterialWriter { files, textures: HashMap::new(), names: UniqueNames::default() };
         scene
             .materials
             .iter()
             .map(|material| {
                 let name = names.name(&material.name, "material");
-                all.material(material, &name);
+                all.write_material(material, &name);
                 name
             })
             .collect()
     }
 
-    fn material(&mut self, material: &ModelMaterial, name: &str) {
+    fn write_material(&mut self, material: &ModelMaterial, name: &str) {
         // Collect the keys first, because texture tables precede the material's table.
         let mut keys = TableKeys::new();
         match material.glass {
             Some(glass) => {
                 keys.push(("type", "\"glass\"".to_owned()));
-                self.number(&mut keys, ("roughness", 0.0), &material.roughness, "g");
+                self.push_number(&mut keys, ("roughness", 0.0), &material.roughness, "g");
                 if glass.tint != DVec3::ONE {
-                    keys.push(("tint", color(glass.tint)));
+                    keys.push(("tint", format_color(glass.tint)));
                 }
             }
-            None => self.principled(&mut keys, material),
+            None => self.write_principled(&mut keys, material),
         }
         if material.ior != 1.5 {
-            keys.push(("ior", number(material.ior)));
+            keys.push(("ior", format_number(material.ior)));
         }
-        self.surface(&mut keys, material);
+        self.write_common_keys(&mut keys, material);
         let toml = self.files.toml();
-        toml.table(&format!("[materials.{}]", key_name(name)));
+        toml.table(&format!("[materials.{}]", format_key(name)));
         keys.iter().for_each(|(key, value)| toml.key(key, value));
     }
 
-    fn principled(&mut self, keys: &mut TableKeys, material: &ModelMaterial) {
+    fn write_principled(&mut self, keys: &mut TableKeys, material: &ModelMaterial) {
         keys.push(("type", "\"principled\"".to_owned()));
-        self.color(keys, ("color", 0.8), &material.color);
-        self.number(keys, ("metallic", 0.0), &material.metallic, "b");
-        self.number(keys, ("roughness", 0.5), &material.roughness, "g");
-        self.number(keys, ("specular", 1.0), &material.specular, "a");
-        self.color(keys, ("specular_color", 1.0), &material.specular_color);
-        self.number(keys, ("transmission", 0.0), &material.transmission, "r");
-        self.number(keys, ("clearcoat", 0.0), &material.clearcoat, "r");
+        self.push_color(keys, ("color", 0.8), &material.color);
+        self.push_number(keys, ("metallic", 0.0), &material.metallic, "b");
+        self.push_number(keys, ("roughness", 0.5), &material.roughness, "g");
+        self.push_number(keys, ("specular", 1.0), &material.specular, "a");
+        self.push_color(keys, ("specular_color", 1.0), &material.specular_color);
+        self.push_number(keys, ("transmission", 0.0), &material.transmission, "r");
+        self.push_number(keys, ("clearcoat", 0.0), &material.clearcoat, "r");
         if material.clearcoat.factor != DVec3::ZERO {
-            self.number(keys, ("clearcoat_roughness", 0.0), &material.clearcoat_roughness, "g");
+            self.push_number(keys, ("clearcoat_roughness", 0.0), &material.clearcoat_roughness, "g");
         }
     }
 
     /// Adds the keys that all material types share.
-    fn surface(&mut self, keys: &mut TableKeys, material: &ModelMaterial) {
+    fn write_common_keys(&mut self, keys: &mut TableKeys, material: &ModelMaterial) {
         let emission = &material.emission;
         if emission.factor != DVec3::ZERO {
             match &emission.texture {
                 Some(texture) => {
-                    let name = self.texture(texture, TextureUse::Colors, DVec3::ONE);
+                    let name = self.write_texture(texture, TextureUse::Colors, DVec3::ONE);
                     let scale = emission.factor;
                     let scale = if scale == DVec3::ONE {
                         String::new()
                     } else {
-                        format!(", scale = {}", color(scale))
+                        format!(", scale = {}", format_color(scale))
                     };
-                    keys.push(("emission", format!("{{ texture = {}{scale} }}", quoted(&name))));
+                    keys.push(("emission", format!("{{ texture = {}{scale} }}", toml_string(&name))));
                 }
-                None => keys.push(("emission", color(emission.factor))),
+                None => keys.push(("emission", format_color(emission.factor))),
             }
             if material.is_two_sided {
                 keys.push(("emission_sides", "\"both\"".to_owned()));
             }
         }
         if let Some(normal) = &material.normal {
-            let name = self.texture(normal, TextureUse::Normals, DVec3::ONE);
-            keys.push(("normal_map", quoted(&name)));
+            let name = self.write_texture(normal, TextureUse::Normals, DVec3::ONE);
+            keys.push(("normal_map", toml_string(&name)));
             if material.normal_strength != 1.0 {
-                keys.push(("normal_strength", number(material.normal_strength)));
+                keys.push(("normal_strength", format_number(material.normal_strength)));
             }
         }
         if material.glass.is_some() {
@@ -133,18 +133,18 @@ impl<F: Files> MaterialWriter<'_, F> {
         match &material.alpha {
             Alpha::Opaque => {}
             Alpha::Mask { value, cutoff } => {
-                self.opacity(keys, value, &material.color);
+                self.write_opacity(keys, value, &material.color);
                 // A cutoff has no effect if it is 0 or if alpha is always 1.
                 if *cutoff > 0.0 && (value.texture.is_some() || value.factor != DVec3::ONE) {
-                    keys.push(("opacity_cutoff", number(*cutoff)));
+                    keys.push(("opacity_cutoff", format_number(*cutoff)));
                 }
             }
-            Alpha::Blend(value) => self.opacity(keys, value, &material.color),
+            Alpha::Blend(value) => self.write_opacity(keys, value, &material.color),
         }
     }
 
     /// Writes the opacity, which uses the alpha channel of a texture if there is one.
-    fn opacity(&mut self, keys: &mut TableKeys, value: &TexturedValue, color: &TexturedValue) {
+    fn write_opacity(&mut self, keys: &mut TableKeys, value: &TexturedValue, color: &TexturedValue) {
         match &value.texture {
             Some(texture) => {
                 // Without factors, color and alpha can share a texture table.
@@ -154,29 +154,29 @@ impl<F: Files> MaterialWriter<'_, F> {
                 } else {
                     TextureUse::Numbers
                 };
-                let name = self.texture(texture, use_, value.factor);
-                keys.push(("opacity", format!("{{ texture = {}, channel = \"a\" }}", quoted(&name))));
+                let name = self.write_texture(texture, use_, value.factor);
+                keys.push(("opacity", format!("{{ texture = {}, channel = \"a\" }}", toml_string(&name))));
             }
-            None if value.factor != DVec3::ONE => keys.push(("opacity", number(value.factor.x))),
+            None if value.factor != DVec3::ONE => keys.push(("opacity", format_number(value.factor.x))),
             None => {}
         }
     }
 
-    fn color(&mut self, keys: &mut TableKeys, (key, usual): (&'static str, f64), slot: &TexturedValue) {
+    fn push_color(&mut self, keys: &mut TableKeys, (key, usual): (&'static str, f64), slot: &TexturedValue) {
         match &slot.texture {
             Some(texture) => {
-                let name = self.texture(texture, TextureUse::Colors, slot.factor);
-                keys.push((key, format!("{{ texture = {} }}", quoted(&name))));
+                let name = self.write_texture(texture, TextureUse::Colors, slot.factor);
+                keys.push((key, format!("{{ texture = {} }}", toml_string(&name))));
             }
             None if slot.factor != DVec3::splat(usual) => {
                 let most = if key == "color" { slot.factor.min(DVec3::ONE) } else { slot.factor };
-                keys.push((key, color(most)));
+                keys.push((key, format_color(most)));
             }
             None => {}
         }
     }
 
-    fn number(
+    fn push_number(
         &mut self,
         keys: &mut TableKeys,
         (key, usual): (&'static str, f64),
@@ -185,16 +185,16 @@ impl<F: Files> MaterialWriter<'_, F> {
     ) {
         match &slot.texture {
             Some(texture) => {
-                let name = self.texture(texture, TextureUse::Numbers, slot.factor);
-                keys.push((key, format!("{{ texture = {}, channel = \"{channel}\" }}", quoted(&name))));
+                let name = self.write_texture(texture, TextureUse::Numbers, slot.factor);
+                keys.push((key, format!("{{ texture = {}, channel = \"{channel}\" }}", toml_string(&name))));
             }
-            None if slot.factor.x != usual => keys.push((key, number(slot.factor.x))),
+            None if slot.factor.x != usual => keys.push((key, format_number(slot.factor.x))),
             None => {}
         }
     }
 
     /// Returns a texture's name. Writes its table if it is new.
-    fn texture(&mut self, texture: &TextureRef, use_: TextureUse, factor: DVec3) -> String {
+    fn write_texture(&mut self, texture: &TextureRef, use_: TextureUse, factor: DVec3) -> String {
         let mut keys = TableKeys::new();
         if texture.is_nearest {
             keys.push(("filter", "\"nearest\"".to_owned()));
@@ -208,16 +208,16 @@ impl<F: Files> MaterialWriter<'_, F> {
             keys.push(("uv", "1".to_owned()));
         }
         if texture.repeat != Vec2::ONE {
-            keys.push(("repeat", pair(texture.repeat)));
+            keys.push(("repeat", format_pair(texture.repeat)));
         }
         if texture.rotate != 0.0 {
-            keys.push(("rotate", number(texture.rotate)));
+            keys.push(("rotate", format_number(texture.rotate)));
         }
         if texture.offset != Vec2::ZERO {
-            keys.push(("offset", pair(texture.offset)));
+            keys.push(("offset", format_pair(texture.offset)));
         }
         if factor != DVec3::ONE {
-            keys.push(("factor", color(factor)));
+            keys.push(("factor", format_color(factor)));
         }
         let shared = keys.iter().map(|(key, value)| format!("{key}={value};")).collect();
         let identity = (texture.image, use_, shared);
@@ -228,8 +228,8 @@ impl<F: Files> MaterialWriter<'_, F> {
         let name = self.names.name(&wanted, "image");
         let TextureFile { file, image } = self.files.image(texture.image);
         let toml = self.files.toml();
-        toml.table(&format!("[textures.{}]", key_name(&name)));
-        toml.key("file", quoted(&file));
+        toml.table(&format!("[textures.{}]", format_key(&name)));
+        toml.key("file", toml_string(&file));
         if let Some(image) = image {
             toml.key("image", image.to_string());
         }

@@ -11,9 +11,9 @@ mod toml;
 use std::collections::HashSet;
 use std::path::Path;
 
-use self::frame::{CameraPose, FOV, KEY, SKY, ground_reflectance, key_direction};
-use self::gltf::{ExportedFile, Naming};
-use self::toml::{Toml, exact_vector, number, rounded, vector};
+use self::frame::{CameraPose, FOV, KEY, SKY, ground_reflectance, key_light_direction};
+use self::gltf::{ExportNaming, ExportedFile};
+use self::toml::{Toml, format_exact_vector, format_number, format_vector, round_significant};
 use super::settings::{Overrides, Side, UpAxis};
 use super::stages::containers::Containers;
 use crate::assets::gltf::is_gltf;
@@ -25,27 +25,27 @@ use crate::scene::fingerprint::Fingerprint;
 
 /// How to show a model.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Show {
+pub(crate) struct ModelView {
     /// Side facing the camera. `None` uses the camera from the file, or [`Side::Iso`] if there is none.
     pub(crate) from: Option<Side>,
     /// Aspect ratio of the image. `None` if the command line sets neither width nor height.
     pub(crate) aspect: Option<f64>,
     /// Up axis of a mesh file. `None` uses the format's default.
     pub(crate) up: Option<UpAxis>,
-    /// Number of turntable frames. The model must fit in all of them. 1 for a still image.
+    /// Number of turntable frames. The model must fit in all of them. It is 1 for a still image.
     pub(crate) turns: u32,
 }
 
 /// Default width and height of the image.
 const SIZE: [f64; 2] = [640.0, 480.0];
 
-impl Default for Show {
+impl Default for ModelView {
     fn default() -> Self {
         Self { from: None, aspect: None, up: None, turns: 1 }
     }
 }
 
-impl Show {
+impl ModelView {
     /// Returns the view requested on the command line.
     pub(crate) fn of(overrides: &Overrides) -> Self {
         let aspect = match (overrides.width, overrides.height) {
@@ -96,9 +96,9 @@ pub(crate) struct ModelText {
 ///
 /// # Errors
 /// The file cannot be read or is invalid.
-pub(crate) fn text(
+pub(crate) fn scene_text(
     path: &Path,
-    show: Show,
+    show: ModelView,
     containers: &Containers,
     token: &CancelToken,
 ) -> Result<ModelText, AssetError> {
@@ -107,9 +107,9 @@ pub(crate) fn text(
             let reason = "glTF files are always y-up; `--up` applies to obj, off, ply and stl".to_owned();
             return Err(AssetError::Malformed { path: path.to_owned(), line: None, reason });
         }
-        return gltf::text(path, (show, &Naming::Inside), containers, token);
+        return gltf::scene_text(path, (show, &ExportNaming::Inside), containers, token);
     }
-    plain::text(path, show, containers, token)
+    plain::scene_text(path, show, containers, token)
 }
 
 /// Marks a diagnostic as coming from the generated scene, which is not stored in a file.
@@ -125,8 +125,8 @@ fn file_name(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// Limit on indirect radiance per bounce in scenes with polished surfaces, where caustics from the key light
-/// would appear as fireflies at low sample counts. Four times the sky's radiance.
+/// Limit on indirect radiance per bounce: four times the sky's radiance. Used for scenes with polished
+/// surfaces, where caustics from the key light would appear as fireflies at low sample counts.
 const CLAMP: &str = "2";
 /// Roughness above which surfaces do not cause fireflies. At 64 samples, clamping changes the error by a
 /// quarter for roughness 0.4, but by a factor of ten for 0.2.
@@ -151,7 +151,7 @@ enum Lighting {
 }
 
 impl Lighting {
-    /// Lighting with lights from the file, given their irradiance on the model.
+    /// Lighting that uses the lights from the file, given their irradiance on the model.
     fn from_file(irradiance: f64) -> Self {
         // With this irradiance, a white surface is as bright as with the default lights.
         const USUAL: f64 = 3.0;
@@ -165,7 +165,7 @@ impl Lighting {
     fn sky(self) -> f64 {
         match self {
             Self::Default { .. } => SKY,
-            Self::FromFile { exposure } => rounded(SKY * libm::exp2(-exposure), 3),
+            Self::FromFile { exposure } => round_significant(SKY * libm::exp2(-exposure), 3),
         }
     }
 }
@@ -183,39 +183,39 @@ fn render(toml: &mut Toml, size: Option<[u32; 2]>, light: Lighting) {
     match light {
         Lighting::Default { is_polished: true } => toml.key("clamp", CLAMP),
         Lighting::Default { is_polished: false } => {}
-        Lighting::FromFile { exposure } if exposure != 0.0 => toml.key("exposure", number(exposure)),
+        Lighting::FromFile { exposure } if exposure != 0.0 => toml.key("exposure", format_number(exposure)),
         Lighting::FromFile { .. } => {}
     }
 }
 
 /// Writes the `[camera]` table.
-fn camera(toml: &mut Toml, eye: &CameraPose, fov: f64) {
+fn write_camera(toml: &mut Toml, eye: &CameraPose, fov: f64) {
     toml.table("[camera]");
-    toml.key("position", exact_vector(eye.position));
-    toml.key("look_at", exact_vector(eye.look_at));
+    toml.key("position", format_exact_vector(eye.position));
+    toml.key("look_at", format_exact_vector(eye.look_at));
     if eye.up != DVec3::Y {
-        toml.key("up", vector(eye.up));
+        toml.key("up", format_vector(eye.up));
     }
     if fov != 40.0 {
-        toml.key("fov", number(fov));
+        toml.key("fov", format_number(fov));
     }
 }
 
 /// Writes a sky, plus a key light if the model has no lights.
-fn light(toml: &mut Toml, eye: &CameraPose, light: Lighting) {
+fn write_lights(toml: &mut Toml, eye: &CameraPose, light: Lighting) {
     toml.table("[environment]");
-    toml.key("color", number(light.sky()));
+    toml.key("color", format_number(light.sky()));
     if matches!(light, Lighting::Default { .. }) {
         toml.table("[[light]]");
         toml.key("type", "\"directional\"");
-        toml.key("direction", vector(key_direction(eye)));
-        toml.key("irradiance", number(KEY));
+        toml.key("direction", format_vector(key_light_direction(eye)));
+        toml.key("irradiance", format_number(KEY));
         toml.key("angle", "6");
     }
 }
 
 /// Writes a ground plane below the model, unless the camera is below it.
-fn ground(toml: &mut Toml, names: &mut Unique, [least, greatest]: [DVec3; 2], eye: &CameraPose) {
+fn write_ground(toml: &mut Toml, names: &mut UniqueNames, [least, greatest]: [DVec3; 2], eye: &CameraPose) {
     let size = (greatest - least).length();
     let height = least.y - size * 1e-4;
     if eye.position.y <= height {
@@ -223,17 +223,17 @@ fn ground(toml: &mut Toml, names: &mut Unique, [least, greatest]: [DVec3; 2], ey
     }
     let name = names.name("ground", "ground");
     toml.table(&format!("[materials.{name}]"));
-    toml.key("diffuse", number(ground_reflectance()));
+    toml.key("diffuse", format_number(ground_reflectance()));
     toml.table("[[plane]]");
-    toml.key("point", exact_vector(DVec3::new(0.0, frame::round_to_step(height, size * 1e-5), 0.0)));
+    toml.key("point", format_exact_vector(DVec3::new(0.0, frame::round_to_step(height, size * 1e-5), 0.0)));
     toml.key("material", format!("\"{name}\""));
 }
 
 /// Set of used names.
 #[derive(Debug, Default)]
-struct Unique(HashSet<String>);
+struct UniqueNames(HashSet<String>);
 
-impl Unique {
+impl UniqueNames {
     /// Returns `wanted`, with a number appended if it is taken. Falls back to `usual` if `wanted` is empty or
     /// a number.
     fn name(&mut self, wanted: &str, usual: &str) -> String {

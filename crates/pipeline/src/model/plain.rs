@@ -7,14 +7,15 @@ use std::path::Path;
 use super::frame::frame_model;
 use super::toml::Toml;
 use super::{
-    FOV, Lighting, ModelText, NARROW, ROUGH, SIZE, Show, Unique, camera, file_name, ground, light, render,
+    FOV, Lighting, ModelText, ModelView, NARROW, ROUGH, SIZE, UniqueNames, file_name, render, write_camera,
+    write_ground, write_lights,
 };
 use crate::assets::{AssetError, FileMaterial, LoadedMesh};
 use crate::control::{CancelToken, ignore_progress};
 use crate::math::DVec3;
 use crate::math::limits::LARGEST;
 use crate::messages::INVISIBLE_MODEL;
-use crate::scene::quoted;
+use crate::scene::toml_string;
 use crate::settings::{Side, UpAxis};
 use crate::stages::containers::Containers;
 use crate::world::file_is_glass;
@@ -48,7 +49,7 @@ impl UpAxis {
     }
 
     /// Applies [`rotation`](Self::rotation) to a point.
-    fn upright(self, at: DVec3) -> DVec3 {
+    fn rotate_upright(self, at: DVec3) -> DVec3 {
         match self {
             Self::X => DVec3::new(-at.y, at.x, at.z),
             Self::Y => at,
@@ -74,17 +75,17 @@ fn is_polished(material: &FileMaterial) -> bool {
 }
 
 /// Whether every face is fully transparent.
-fn is_unseen(loaded: &LoadedMesh) -> bool {
+fn is_fully_transparent(loaded: &LoadedMesh) -> bool {
     let is_clear =
         |own: &FileMaterial| own.opacity == 0.0 && own.opacity_texture.is_none() && !file_is_glass(own);
-    let is_unseen = |index: &u32| loaded.materials.get(*index as usize).is_some_and(is_clear);
-    !loaded.mesh.materials.is_empty() && loaded.mesh.materials.iter().all(is_unseen)
+    let is_fully_transparent = |index: &u32| loaded.materials.get(*index as usize).is_some_and(is_clear);
+    !loaded.mesh.materials.is_empty() && loaded.mesh.materials.iter().all(is_fully_transparent)
 }
 
 /// Generates the scene text for a mesh file.
-pub(super) fn text(
+pub(super) fn scene_text(
     path: &Path,
-    show: Show,
+    show: ModelView,
     containers: &Containers,
     token: &CancelToken,
 ) -> Result<ModelText, AssetError> {
@@ -97,7 +98,7 @@ pub(super) fn text(
         });
     };
     let up = show.up.unwrap_or_else(|| default_up_axis(path));
-    let upright = |at: DVec3| up.upright(at);
+    let upright = |at: DVec3| up.rotate_upright(at);
     let (a, b) = (upright(least), upright(greatest));
     let bounds = [a.min(b), a.max(b)];
     let points: Vec<DVec3> = loaded.mesh.extremes().into_iter().map(upright).collect();
@@ -107,7 +108,7 @@ pub(super) fn text(
         (show.from.unwrap_or(Side::Iso), show.turns),
         show.aspect.unwrap_or(SIZE[0] / SIZE[1]),
     );
-    // Blame the file's coordinates, because the user did not choose the camera position.
+    // Report the file's coordinates as the cause, because the user did not choose the camera position.
     let eye_reach = eye.position.abs().max(eye.look_at.abs()).max_element();
     if eye_reach >= LARGEST {
         let farthest = least.abs().max(greatest.abs()).max_element() as f32;
@@ -116,12 +117,12 @@ pub(super) fn text(
         );
         return Err(AssetError::Malformed { path: path.to_owned(), line: None, reason });
     }
-    let (mut toml, mut names) = (Toml::default(), Unique::default());
+    let (mut toml, mut names) = (Toml::default(), UniqueNames::default());
     toml.comment(&format!("{}, as glimt shows it.", file_name(path)));
     let lighting = Lighting::Default { is_polished: loaded.materials.iter().any(is_polished) };
     render(&mut toml, None, lighting);
-    camera(&mut toml, &eye, FOV);
-    light(&mut toml, &eye, lighting);
+    write_camera(&mut toml, &eye, FOV);
+    write_lights(&mut toml, &eye, lighting);
     let is_colored = !loaded.mesh.colors.is_empty();
     let needs_material = loaded.lacks_materials();
     let name = names.name("model", "model");
@@ -131,7 +132,7 @@ pub(super) fn text(
         toml.key("color", if is_colored { "1" } else { "[0.7, 0.68, 0.64]" });
     }
     toml.table("[[mesh]]");
-    toml.key("file", quoted(&file_name(path)));
+    toml.key("file", toml_string(&file_name(path)));
     if let Some([x, y, z]) = up.rotation() {
         toml.key("rotate", format!("[{x}, {y}, {z}]"));
     }
@@ -146,12 +147,12 @@ pub(super) fn text(
     if is_colored {
         toml.key("vertex_colors", "true");
     }
-    ground(&mut toml, &mut names, bounds, &eye);
+    write_ground(&mut toml, &mut names, bounds, &eye);
     // The generated material hides the fact that the file lacks materials, so report it here.
     let mut notes = if needs_material { loaded.material_warnings.clone() } else { Vec::new() };
-    notes.extend(is_unseen(&loaded).then(|| INVISIBLE_MODEL.to_owned()));
+    notes.extend(is_fully_transparent(&loaded).then(|| INVISIBLE_MODEL.to_owned()));
     let (hash, companions, assets) = (loaded.hash, loaded.companions.clone(), Vec::new());
-    containers.keep(path, loaded);
+    containers.store_mesh(path, loaded);
     Ok(ModelText { text: toml.finish(), hash, companions, notes, assets })
 }
 
@@ -164,9 +165,9 @@ mod tests {
     fn up_axis_matches_scene_rotation() {
         for (up, axis) in [(UpAxis::X, DVec3::X), (UpAxis::Y, DVec3::Y), (UpAxis::Z, DVec3::Z)] {
             let rotation = rotation_xyz(DVec3::from(up.rotation().unwrap_or_default().map(f64::from)));
-            assert_eq!(up.upright(axis), DVec3::Y, "{up:?}");
+            assert_eq!(up.rotate_upright(axis), DVec3::Y, "{up:?}");
             for at in [axis, DVec3::new(1.0, 2.0, 3.0)] {
-                assert_eq!(rotation * at, up.upright(at), "{up:?}");
+                assert_eq!(rotation * at, up.rotate_upright(at), "{up:?}");
             }
         }
     }

@@ -1,7 +1,7 @@
 //! Writer for concise TOML with short numbers, bare keys and no default values.
 
 use crate::math::{DVec3, Vec2};
-use crate::scene::quoted;
+use crate::scene::toml_string;
 
 /// TOML text under construction.
 #[derive(Debug, Default)]
@@ -55,7 +55,7 @@ impl Toml {
 }
 
 /// Formats a number with 32-bit float precision. Values of 10,000 and above keep all digits.
-pub(super) fn number(value: f64) -> String {
+pub(super) fn format_number(value: f64) -> String {
     const FAR: f64 = 1e4;
     let magnitude = value.abs();
     let text = if magnitude >= 1e15 || magnitude > 0.0 && magnitude < 1e-5 {
@@ -69,7 +69,7 @@ pub(super) fn number(value: f64) -> String {
 }
 
 /// Formats a point with all digits, since a small model may be far from the origin.
-pub(super) fn exact_vector(value: DVec3) -> String {
+pub(super) fn format_exact_vector(value: DVec3) -> String {
     let exact = |value: f64| match value.abs() {
         0.0 => "0".to_owned(),
         magnitude if !(1e-5..1e15).contains(&magnitude) => format!("{value:e}"),
@@ -79,7 +79,7 @@ pub(super) fn exact_vector(value: DVec3) -> String {
 }
 
 /// Rounds to `digits` significant digits.
-pub(super) fn rounded(value: f64, digits: i32) -> f64 {
+pub(super) fn round_significant(value: f64, digits: i32) -> f64 {
     if value == 0.0 || !value.is_finite() {
         return value;
     }
@@ -88,31 +88,31 @@ pub(super) fn rounded(value: f64, digits: i32) -> f64 {
 }
 
 /// Formats an array.
-pub(super) fn list(values: &[f64]) -> String {
-    format!("[{}]", values.iter().map(|value| number(*value)).collect::<Vec<_>>().join(", "))
+pub(super) fn format_list(values: &[f64]) -> String {
+    format!("[{}]", values.iter().map(|value| format_number(*value)).collect::<Vec<_>>().join(", "))
 }
 
 /// Formats a point or a direction.
-pub(super) fn vector(value: DVec3) -> String {
-    list(&value.to_array())
+pub(super) fn format_vector(value: DVec3) -> String {
+    format_list(&value.to_array())
 }
 
 /// Formats a pair of numbers.
-pub(super) fn pair(value: Vec2) -> String {
-    list(&[f64::from(value.x), f64::from(value.y)])
+pub(super) fn format_pair(value: Vec2) -> String {
+    format_list(&[f64::from(value.x), f64::from(value.y)])
 }
 
 /// Formats a color. Grays become a single number.
-pub(super) fn color(value: DVec3) -> String {
+pub(super) fn format_color(value: DVec3) -> String {
     let [red, green, blue] = value.to_array();
-    if red == green && green == blue { number(red) } else { vector(value) }
+    if red == green && green == blue { format_number(red) } else { format_vector(value) }
 }
 
 /// Formats a name as a key, quoted only if TOML requires it.
-pub(super) fn key_name(name: &str) -> String {
+pub(super) fn format_key(name: &str) -> String {
     let is_bare =
         !name.is_empty() && name.bytes().all(|byte| byte.is_ascii_alphanumeric() || b"-_".contains(&byte));
-    if is_bare { name.to_owned() } else { quoted(name) }
+    if is_bare { name.to_owned() } else { toml_string(name) }
 }
 
 #[cfg(test)]
@@ -131,11 +131,14 @@ mod tests {
             (1e-7, "1e-7"),
             (3e20, "3e20"),
         ] {
-            assert_eq!(number(value), text);
+            assert_eq!(format_number(value), text);
         }
-        assert_eq!((rounded(1234.56, 3), rounded(-0.012345, 2), rounded(0.0, 2)), (1230.0, -0.012, 0.0));
         assert_eq!(
-            (color(DVec3::ONE), key_name("a-b_1"), key_name("a b")),
+            (round_significant(1234.56, 3), round_significant(-0.012345, 2), round_significant(0.0, 2)),
+            (1230.0, -0.012, 0.0)
+        );
+        assert_eq!(
+            (format_color(DVec3::ONE), format_key("a-b_1"), format_key("a b")),
             ("1".into(), "a-b_1".into(), "\"a b\"".into())
         );
     }

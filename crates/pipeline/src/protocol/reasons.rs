@@ -34,7 +34,7 @@ pub const TIME_LIMIT_REACHED: &str = "time limit reached";
 pub const NOISE_TARGET_REACHED: &str = "noise target reached in some tiles";
 /// The output files already contain the image.
 pub const ALREADY_WRITTEN: &str = "already written";
-/// The request's image is not to be written.
+/// The request's image will not be written.
 pub const PREVIEW_ONLY: &str = "preview only";
 
 /// Prefix of the reason for a render that continued from existing samples.

@@ -12,7 +12,7 @@ pub(crate) struct FilmCache {
     current: Option<FilmState>,
     /// Least recently used first.
     kept: Vec<FilmState>,
-    /// Key of a film that is kept regardless of its size.
+    /// Key of the pinned film, which is kept regardless of its size.
     pinned: Option<Key>,
     most_kept_bytes: u64,
     /// Number of films created.
@@ -35,7 +35,7 @@ impl FilmCache {
     }
 
     /// Returns the film with this key.
-    pub(crate) fn of(&self, key: Key) -> Option<&FilmState> {
+    pub(crate) fn get(&self, key: Key) -> Option<&FilmState> {
         self.kept.iter().chain(&self.current).find(|state| state.key == key)
     }
 
@@ -63,17 +63,20 @@ impl FilmCache {
             let kept = self.kept.iter().position(|state| state.key == key);
             let found = kept.map(|index| self.kept.remove(index));
             if let Some(before) = std::mem::replace(&mut self.current, found) {
-                self.keep(before);
+                self.insert(before);
             }
         }
         self.current.take_if(|current| !is_usable(current));
     }
 
-    /// Replaces the current film. If `make` fails, drops the cached films and tries again.
+    /// Replaces the current film. If `make` fails, drops the cached films to free memory and tries again.
     ///
     /// # Errors
     /// Returns the error from `make`.
-    pub(crate) fn put<E>(&mut self, make: impl Fn() -> Result<FilmState, E>) -> Result<&mut FilmState, E> {
+    pub(crate) fn replace_current<E>(
+        &mut self,
+        make: impl Fn() -> Result<FilmState, E>,
+    ) -> Result<&mut FilmState, E> {
         self.current = None;
         let mut state = match make() {
             Err(_) if !self.kept.is_empty() => {
@@ -99,11 +102,11 @@ impl FilmCache {
     }
 
     /// Caches a film, evicting others to make room. A film larger than the limit is dropped instead.
-    fn keep(&mut self, state: FilmState) {
+    fn insert(&mut self, state: FilmState) {
         let size = state.memory_bytes();
         // Drop incomplete films from a moving camera. They would fill the cache and are never reused.
-        let is_left_behind = state.is_passing && !state.is_covered();
-        if !state.is_begun() {
+        let is_left_behind = state.is_passing && !state.covers_all_pixels();
+        if !state.has_samples() {
             return;
         }
         if !self.is_pinned(&state) {
@@ -160,7 +163,7 @@ mod tests {
         let mut films = FilmCache { most_kept_bytes, ..FilmCache::default() };
         for name in names {
             films.select(key(name), |_| true);
-            films.put(|| Ok::<_, ()>(state(name))).expect("a film");
+            films.replace_current(|| Ok::<_, ()>(state(name))).expect("a film");
         }
         films
     }
@@ -186,7 +189,7 @@ mod tests {
     fn oversized_film_does_not_evict_others() {
         let mut films = films(&["a", "b"], state("a").memory_bytes());
         films
-            .put(|| {
+            .replace_current(|| {
                 let mut large = state("large");
                 large.base = Some(crate::film::RadianceImage::black(100, 100));
                 Ok::<_, ()>(large)
@@ -203,11 +206,11 @@ mod tests {
         films.most_kept_bytes -= 1;
         for name in ["a", "b", "c"] {
             films.select(key(name), |_| true);
-            films.put(|| Ok::<_, ()>(state(name))).expect("a film");
+            films.replace_current(|| Ok::<_, ()>(state(name))).expect("a film");
         }
         assert_eq!(films.count(), 2, "only the pinned and the current film should remain");
         let tries = std::cell::Cell::new(0);
-        let made = films.put(|| {
+        let made = films.replace_current(|| {
             tries.set(tries.get() + 1);
             if tries.get() == 1 { Err("no memory") } else { Ok(state("d")) }
         });
@@ -229,7 +232,7 @@ mod tests {
                 passing.done[0] = [u32::from(is_whole); 2];
                 Ok::<_, ()>(passing)
             };
-            films.put(passing).expect("a film");
+            films.replace_current(passing).expect("a film");
             films.select(key("c"), |_| true);
             assert_eq!(finds(&mut films, "b"), is_whole);
             assert!(finds(&mut films, "a"));
@@ -243,7 +246,7 @@ mod tests {
         assert!(films.current().is_none() && !finds(&mut films, "a") && finds(&mut films, "b"));
         films.select(key("c"), |_| true);
         let tries = std::cell::Cell::new(0);
-        let made = films.put(|| {
+        let made = films.replace_current(|| {
             tries.set(tries.get() + 1);
             if tries.get() == 1 { Err("no memory") } else { Ok(state("c")) }
         });

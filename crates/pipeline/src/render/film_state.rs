@@ -4,7 +4,7 @@ use std::cmp::Reverse;
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::forecast::cost::{CellCost, JobCost, PixelShare};
+use super::forecast::cost::{CellCost, JobCost, PixelOverhead};
 use super::forecast::samples::ExpectedSamples;
 use crate::film::{
     CELLS, Convergence, Film, FilmError, PixelSubset, Pixels, Previewer, RadianceImage, Rect, SumOrder,
@@ -15,7 +15,7 @@ use crate::plan::Plan;
 use crate::render::noise_goals::Goals;
 use crate::render::share::Share;
 use crate::scene::fingerprint::Key;
-use crate::trace::{Cost, Job};
+use crate::trace::{TileJob, TraceCost};
 
 /// A film with its cache key and render progress.
 #[derive(Debug)]
@@ -33,7 +33,7 @@ pub(crate) struct FilmState {
     /// Recent sample cost in each cell.
     costs: Vec<CellCost>,
     /// Per-pixel overhead of a job, excluding its samples.
-    pixel_share: PixelShare,
+    pixel_share: PixelOverhead,
     /// Maximum number of samples for both halves of each cell.
     pub(crate) goals: Goals,
     /// Expected number of samples for halves without a goal.
@@ -53,7 +53,7 @@ pub(crate) struct FilmState {
     /// Whether each tile belongs to the share. `None` if all tiles do.
     own: Option<Vec<bool>>,
     /// Work done by the process whose checkpoint this render resumed from.
-    pub(crate) before: Before,
+    pub(crate) before: EarlierWork,
     /// Rays traced by all requests and by the process whose checkpoint this render resumed from.
     pub(crate) traced: RayCounters,
     /// Whether a checkpoint contains all of the film's samples.
@@ -66,8 +66,8 @@ pub(crate) struct FilmState {
 
 /// Work done by an earlier process.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Before {
-    /// Numbers of rays and texture lookups.
+pub(crate) struct EarlierWork {
+    /// Ray and texture lookup counts.
     pub(crate) rays: RayCounters,
     /// Duration of the render stage in seconds.
     pub(crate) seconds: f64,
@@ -90,10 +90,14 @@ impl FilmState {
             (None, Convergence::Photons) => SumOrder::Blocked,
             (None, Convergence::Stratified) => SumOrder::Sequential,
         };
-        let film =
-            Film::within(most_bytes, plan.settings.render.width, plan.settings.render.height, plan.crop)?
-                .with_convergence(convergence)
-                .with_sum_order(blocks)?;
+        let film = Film::with_memory_limit(
+            most_bytes,
+            plan.settings.render.width,
+            plan.settings.render.height,
+            plan.crop,
+        )?
+        .with_convergence(convergence)
+        .with_sum_order(blocks)?;
         let film_cells = film.cell_count();
         let goals = Goals::none(film_cells);
         let own = share.as_ref().map(|share| share.tiles(film.tile_count()));
@@ -107,7 +111,7 @@ impl FilmState {
             rays: vec![0; film_cells],
             seconds: 0.0,
             costs: vec![CellCost::default(); film_cells],
-            pixel_share: PixelShare::default(),
+            pixel_share: PixelOverhead::default(),
             done,
             goals,
             expected: ExpectedSamples::unknown(film_cells),
@@ -118,7 +122,7 @@ impl FilmState {
             render_seconds: 0.0,
             share,
             own,
-            before: Before::default(),
+            before: EarlierWork::default(),
             traced: RayCounters::default(),
             is_kept: false,
             identity: None,
@@ -127,29 +131,29 @@ impl FilmState {
     }
 
     /// Whether this process renders a tile.
-    fn is_own(&self, tile: usize) -> bool {
+    fn is_own_tile(&self, tile: usize) -> bool {
         self.own.as_ref().is_none_or(|own| own[tile])
     }
 
-    /// Maps samples of this share to sample indices in the whole image. Only returns the first ones if the
-    /// indices are not all consecutive.
-    pub(crate) fn numbers(&self, samples: Range<u32>) -> Range<u32> {
+    /// Maps samples of this share to sample indices in the whole image. If the indices are not all
+    /// consecutive, returns only the first consecutive range.
+    pub(crate) fn global_samples(&self, samples: Range<u32>) -> Range<u32> {
         match &self.share {
-            Some(share) => share.numbers(samples),
+            Some(share) => share.global_samples(samples),
             None => samples,
         }
     }
 
     /// Returns goals equal to the film's current sample counts.
-    pub(super) fn goals_of_what_is_done(&self) -> Goals {
+    pub(super) fn goals_at_current_samples(&self) -> Goals {
         Goals { decided: self.done.clone(), ..Goals::none(self.done.len()) }
     }
 
     /// Updates the sample counts from the film.
-    pub(super) fn count_again(&mut self) {
+    pub(super) fn recount_samples(&mut self) {
         let halves: Vec<_> = self.halves().collect();
         for (cell, half) in halves {
-            self.done[cell][half] = self.film.half_samples(cell, half);
+            self.done[cell][half] = self.film.cell_half_samples(cell, half);
         }
     }
 
@@ -161,7 +165,7 @@ impl FilmState {
     /// Like [`Self::is_complete`], but only for tiles overlapping `part`. `None` means all tiles.
     pub(crate) fn is_complete_in(&self, part: Option<Rect>, samples: u32) -> bool {
         self.halves()
-            .filter(|(cell, _)| self.is_in(part, *cell))
+            .filter(|(cell, _)| self.is_cell_in(part, *cell))
             .all(|(tile, half)| self.done[tile][half] >= self.goals.of(tile, half).min(samples))
     }
 
@@ -188,30 +192,31 @@ impl FilmState {
             let done = self.done[tile][half];
             (done < self.goals.of(tile, half).min(most)).then_some(done)
         };
-        self.halves().filter(|(cell, _)| self.is_in(part, *cell)).filter_map(of).min().unwrap_or(most)
+        self.halves().filter(|(cell, _)| self.is_cell_in(part, *cell)).filter_map(of).min().unwrap_or(most)
     }
 
     /// Whether a cell's tile overlaps `part`.
-    fn is_in(&self, part: Option<Rect>, cell: usize) -> bool {
+    fn is_cell_in(&self, part: Option<Rect>, cell: usize) -> bool {
         part.is_none_or(|part| {
             self.film.tile_rect(cell / CELLS).is_some_and(|rect| rect.intersection(&part).is_some())
         })
     }
 
     /// Whether any pixel has samples.
-    pub(crate) fn is_begun(&self) -> bool {
+    pub(crate) fn has_samples(&self) -> bool {
         self.halves().any(|(cell, half)| self.done[cell][half] > 0)
     }
 
     /// Whether every pixel has a sample. Only such an image may replace another one.
-    pub(crate) fn is_covered(&self) -> bool {
+    pub(crate) fn covers_all_pixels(&self) -> bool {
         self.halves().all(|(cell, half)| self.done[cell][half] > 0)
     }
 
     fn halves(&self) -> impl Iterator<Item = (usize, usize)> {
         let halves = (0..self.done.len()).flat_map(|cell| [(cell, 0), (cell, 1)]);
-        halves
-            .filter(|(cell, half)| self.is_own(cell / CELLS) && self.film.half_pixel_count(*cell, *half) > 0)
+        halves.filter(|(cell, half)| {
+            self.is_own_tile(cell / CELLS) && self.film.half_pixel_count(*cell, *half) > 0
+        })
     }
 
     /// Returns the memory used, in bytes.
@@ -231,19 +236,19 @@ impl FilmState {
     /// Returns the jobs needed to raise both halves of every cell in `part` (`None` for all) to `target` or
     /// their goals. If all cells of a tile need the same samples, the tile is a single job. Longer jobs
     /// precede shorter ones, and jobs of equal length are in the film's tile order.
-    pub(crate) fn jobs(&self, part: Option<Rect>, target: impl Fn(usize, usize) -> u32) -> Vec<Job> {
+    pub(crate) fn jobs(&self, part: Option<Rect>, target: impl Fn(usize, usize) -> u32) -> Vec<TileJob> {
         let missing = |cell: usize, half: usize| {
             self.done[cell][half]..self.goals.of(cell, half).min(target(cell, half))
         };
         let mut jobs = Vec::new();
-        let is_wanted = |tile: &&usize| self.is_own(**tile) && self.is_in(part, CELLS * **tile);
+        let is_wanted = |tile: &&usize| self.is_own_tile(**tile) && self.is_cell_in(part, CELLS * **tile);
         for &tile in self.film.tile_order().iter().filter(is_wanted) {
             let cells = (CELLS * tile..CELLS * (tile + 1))
                 .filter_map(|cell| Some((cell, self.film.cell_rect(cell)?)));
             let cells = cells.map(|(cell, rect)| (rect, [0, 1].map(|half| missing(cell, half))));
             let cells: Vec<(Rect, [Range<u32>; 2])> = cells.collect();
-            let job = |pixels, samples: &Range<u32>| Job { tile, pixels, samples: samples.clone() };
-            if let Some((rect, samples)) = self.film.tile_rect(tile).zip(common(&cells)) {
+            let job = |pixels, samples: &Range<u32>| TileJob { tile, pixels, samples: samples.clone() };
+            if let Some((rect, samples)) = self.film.tile_rect(tile).zip(common_range(&cells)) {
                 jobs.push(job(rect.into(), samples));
                 continue;
             }
@@ -262,8 +267,8 @@ impl FilmState {
         jobs
     }
 
-    /// Records a finished job and its cost. Returns its number of pixels times samples.
-    pub(crate) fn note(&mut self, job: &Job, cost: &Cost) -> u64 {
+    /// Records a finished job and its cost. Returns the job's number of pixels times samples.
+    pub(crate) fn record_job(&mut self, job: &TileJob, cost: &TraceCost) -> u64 {
         let (rays, seconds) = (cost.rays.all(), cost.seconds / job.pixels.rect.area() as f64);
         for cell in CELLS * job.tile..CELLS * (job.tile + 1) {
             let rect = self.film.cell_rect(cell);
@@ -272,7 +277,7 @@ impl FilmState {
                 let seconds = seconds * rect.area() as f64;
                 self.seconds += seconds;
                 let (pixels, samples) = (job.pixels.part.count(rect.area()) as f64, job.samples.len() as f64);
-                self.costs[cell].note(JobCost { seconds, pixels, samples }, &mut self.pixel_share);
+                self.costs[cell].record(JobCost { seconds, pixels, samples }, &mut self.pixel_share);
                 match job.pixels.part {
                     PixelSubset::All => self.done[cell] = [job.samples.end; 2],
                     PixelSubset::Half(half) => self.done[cell][half] = job.samples.end,
@@ -283,52 +288,52 @@ impl FilmState {
     }
 
     /// Decides which of the tiles with `samples` samples, a power of two, have enough.
-    pub(crate) fn judge(&mut self, samples: u32, error: f64) {
-        if let Some(judgement) = self.goals.judge(&self.film, &self.done, samples, error) {
+    pub(crate) fn decide_goals(&mut self, samples: u32, error: f64) {
+        if let Some(judgement) = self.goals.decide_goals(&self.film, &self.done, samples, error) {
             self.expected.predict(&judgement, &self.goals, &self.done);
         }
     }
 
     /// Returns the number of tiles that reached their sample limit but not the noise target, and the highest
     /// noise of these tiles.
-    pub(crate) fn missed(&self, error: f64) -> Option<(usize, f64)> {
-        self.goals.missed(&self.film, error)
+    pub(crate) fn tiles_above_target(&self, error: f64) -> Option<(usize, f64)> {
+        self.goals.tiles_above_target(&self.film, error)
     }
 
     /// Returns the number of pixels times samples rendered so far.
-    pub(crate) fn units(&self) -> u64 {
-        self.units_of(|tile, half| self.done[tile][half])
+    pub(crate) fn pixel_samples(&self) -> u64 {
+        self.sum_pixel_samples(|tile, half| self.done[tile][half])
     }
 
     /// Returns the expected total number of pixels times samples, with at most `most` samples per pixel.
-    pub(crate) fn units_to_come(&self, most: u32) -> u64 {
-        self.units_of(|cell, half| self.to_come(cell, half, most))
+    pub(crate) fn expected_pixel_samples(&self, most: u32) -> u64 {
+        self.sum_pixel_samples(|cell, half| self.expected_samples(cell, half, most))
     }
 
     /// Returns the CPU seconds spent so far.
-    pub(crate) fn seconds(&self) -> f64 {
+    pub(crate) fn cpu_seconds(&self) -> f64 {
         self.seconds
     }
 
     /// Estimates the CPU seconds for the remaining samples, up to `most` per pixel. `jobs` returns the number
-    /// of jobs between two sample counts. The cost per sample is that of recent samples in the same cell, or
-    /// the mean cost in cells without samples.
-    pub(crate) fn seconds_to_come(&self, most: u32, jobs: impl Fn(u32, u32) -> u32) -> f64 {
+    /// of jobs between two sample counts. Assumes that samples cost as much as recent samples in the same
+    /// cell. For cells without samples, uses the mean cost.
+    pub(crate) fn remaining_cpu_seconds(&self, most: u32, jobs: impl Fn(u32, u32) -> u32) -> f64 {
         let (mut seconds, mut known, mut worth, mut others) = (0.0, 0.0, 0.0, 0.0);
-        let is_there = |cell: &usize| self.is_own(cell / CELLS) && self.film.cell_rect(*cell).is_some();
+        let is_there = |cell: &usize| self.is_own_tile(cell / CELLS) && self.film.cell_rect(*cell).is_some();
         for cell in (0..self.done.len()).filter(is_there) {
             let lacks = |half: usize| {
-                let (done, end) = (self.done[cell][half], self.to_come(cell, half, most));
+                let (done, end) = (self.done[cell][half], self.expected_samples(cell, half, most));
                 let pixels = self.film.half_pixel_count(cell, half) as f64;
                 let samples = pixels * f64::from(end.saturating_sub(done));
-                self.pixel_share.worth(samples, pixels * f64::from(jobs(done, end)))
+                self.pixel_share.equivalent_samples(samples, pixels * f64::from(jobs(done, end)))
             };
             let (lacking, cost) = (lacks(0) + lacks(1), &self.costs[cell]);
             if cost.is_unknown() {
                 others += lacking;
                 continue;
             }
-            let of_cell = cost.worth(self.pixel_share);
+            let of_cell = cost.equivalent_samples(self.pixel_share);
             seconds += lacking * cost.seconds() / of_cell;
             known += cost.seconds();
             worth += of_cell;
@@ -337,26 +342,29 @@ impl FilmState {
         seconds + others * if worth > 0.0 { known / worth } else { 1.0 }
     }
 
-    /// Returns the highest current and highest expected final sample count of any pixel. These are also the
-    /// numbers of photon passes.
-    pub(crate) fn passes(&self, most: u32) -> [u32; 2] {
+    /// Returns the maximum over all pixels of the current and of the expected final sample count. These are
+    /// also the current and final numbers of photon passes.
+    pub(crate) fn photon_passes(&self, most: u32) -> [u32; 2] {
         let most_of = |samples: &dyn Fn(usize, usize) -> u32| {
             self.halves().map(|(cell, half)| samples(cell, half)).max().unwrap_or(0)
         };
-        [most_of(&|cell, half| self.done[cell][half]), most_of(&|cell, half| self.to_come(cell, half, most))]
+        [
+            most_of(&|cell, half| self.done[cell][half]),
+            most_of(&|cell, half| self.expected_samples(cell, half, most)),
+        ]
     }
 
-    /// Whether the final number of samples can be estimated with a noise target.
-    pub(crate) fn is_foreseen(&self) -> bool {
-        self.halves().all(|(cell, half)| self.to_come(cell, half, u32::MAX) < u32::MAX)
+    /// Whether the final number of samples can be estimated if there is a noise target.
+    pub(crate) fn can_predict_samples(&self) -> bool {
+        self.halves().all(|(cell, half)| self.expected_samples(cell, half, u32::MAX) < u32::MAX)
     }
 
-    fn to_come(&self, cell: usize, half: usize, most: u32) -> u32 {
+    fn expected_samples(&self, cell: usize, half: usize, most: u32) -> u32 {
         let (goal, expected) = (self.goals.of(cell, half), self.expected.of(cell, half));
         (if goal < u32::MAX { goal } else { expected }).min(most)
     }
 
-    fn units_of(&self, samples_of: impl Fn(usize, usize) -> u32) -> u64 {
+    fn sum_pixel_samples(&self, samples_of: impl Fn(usize, usize) -> u32) -> u64 {
         let units = |(cell, half): (usize, usize)| {
             self.film.half_pixel_count(cell, half) as u64 * u64::from(samples_of(cell, half))
         };
@@ -365,7 +373,7 @@ impl FilmState {
 }
 
 /// Returns the needed samples if they are equal for all halves of all cells.
-fn common(cells: &[(Rect, [Range<u32>; 2])]) -> Option<&Range<u32>> {
+fn common_range(cells: &[(Rect, [Range<u32>; 2])]) -> Option<&Range<u32>> {
     let (_, [first, _]) = cells.first()?;
     cells.iter().all(|(_, halves)| halves.iter().all(|half| half == first)).then_some(first)
 }
@@ -389,7 +397,7 @@ mod tests {
             rays: vec![0; cells],
             seconds: 0.0,
             costs: vec![CellCost::default(); cells],
-            pixel_share: PixelShare::default(),
+            pixel_share: PixelOverhead::default(),
             goals: Goals::none(cells),
             expected: ExpectedSamples::unknown(cells),
             base: None,
@@ -399,7 +407,7 @@ mod tests {
             render_seconds: 0.0,
             share: None,
             own: None,
-            before: Before::default(),
+            before: EarlierWork::default(),
             traced: RayCounters::default(),
             is_kept: false,
             identity: None,
@@ -412,43 +420,44 @@ mod tests {
     }
 
     /// Adds samples to a tile and records how long they took.
-    fn note(state: &mut FilmState, tile: usize, samples: Range<u32>, seconds: f64) {
+    fn record_job(state: &mut FilmState, tile: usize, samples: Range<u32>, seconds: f64) {
         let pixels = Pixels::from(state.film.tile_rect(tile).expect("a tile"));
         let count = samples.end - samples.start;
         let radiance = (0..pixels.count() as u32 * count).map(|i| Vec3::splat((i % 7) as f32)).collect();
         state.film.add(tile, &TileSamples { pixels, samples: count, radiance, negative: None });
-        let job = Job { tile, pixels, samples };
-        state.note(&job, &Cost { rays: RayCounters::default(), seconds });
+        let job = TileJob { tile, pixels, samples };
+        state.record_job(&job, &TraceCost { rays: RayCounters::default(), seconds });
     }
 
     #[test]
     fn remaining_cost_is_estimated_per_tile() {
         let mut state = state();
         let mut noted = |tile: usize, samples: Range<u32>, seconds: f64| {
-            note(&mut state, tile, samples, seconds);
-            [state.seconds(), state.seconds_to_come(8, in_one)].map(|seconds| (seconds * 1e6).round() * 1e-6)
+            record_job(&mut state, tile, samples, seconds);
+            [state.cpu_seconds(), state.remaining_cpu_seconds(8, in_one)]
+                .map(|seconds| (seconds * 1e6).round() * 1e-6)
         };
         // The second tile's cost is unknown, so it is assumed to equal the first's.
         assert_eq!(noted(0, 0..4, 1.0), [1.0, 3.0]);
         assert_eq!(noted(1, 0..2, 10.0), [11.0, 31.0]);
         assert_eq!(noted(1, 2..8, 30.0), [41.0, 1.0]);
-        assert_eq!(state.passes(8), [8, 8]);
-        assert_eq!(state.passes(16), [8, 16]);
+        assert_eq!(state.photon_passes(8), [8, 8]);
+        assert_eq!(state.photon_passes(16), [8, 16]);
     }
 
     #[test]
     fn recent_samples_determine_the_cost() {
         let mut state = state();
         for tile in 0..2 {
-            note(&mut state, tile, 0..1, 4.0);
-            note(&mut state, tile, 1..2, 1.0);
+            record_job(&mut state, tile, 0..1, 4.0);
+            record_job(&mut state, tile, 1..2, 1.0);
         }
-        assert_eq!(state.seconds(), 10.0);
+        assert_eq!(state.cpu_seconds(), 10.0);
         // The first job counts a quarter, and the second counts fully: 2 seconds for 1.25 samples.
         assert!(
-            (state.seconds_to_come(12, in_one) - 2.0 * 10.0 * 1.6).abs() < 1e-9,
+            (state.remaining_cpu_seconds(12, in_one) - 2.0 * 10.0 * 1.6).abs() < 1e-9,
             "{}",
-            state.seconds_to_come(12, in_one)
+            state.remaining_cpu_seconds(12, in_one)
         );
     }
 
@@ -457,10 +466,10 @@ mod tests {
         let mut state = state();
         // One second per sample plus three seconds of pixel overhead per job.
         for (samples, seconds) in [(0..1, 4.0), (1..2, 4.0), (2..4, 5.0)] {
-            note(&mut state, 0, samples.clone(), seconds);
-            note(&mut state, 1, samples, seconds);
+            record_job(&mut state, 0, samples.clone(), seconds);
+            record_job(&mut state, 1, samples, seconds);
         }
-        let to_come = |jobs: u32| state.seconds_to_come(16, |_, _| jobs);
+        let to_come = |jobs: u32| state.remaining_cpu_seconds(16, |_, _| jobs);
         assert!((to_come(1) - 2.0 * (12.0 + 3.0)).abs() < 1e-9, "{}", to_come(1));
         assert!((to_come(2) - 2.0 * (12.0 + 6.0)).abs() < 1e-9, "{}", to_come(2));
     }
@@ -468,13 +477,13 @@ mod tests {
     #[test]
     fn end_is_unknown_until_noise_is_measured() {
         let mut state = state();
-        note(&mut state, 0, 0..1, 1.0);
-        note(&mut state, 1, 0..1, 1.0);
-        state.judge(1, 0.1);
-        assert!(!state.is_foreseen(), "noise cannot be estimated from one sample");
-        note(&mut state, 0, 1..2, 1.0);
-        note(&mut state, 1, 1..2, 1.0);
-        state.judge(2, 0.1);
-        assert!(state.is_foreseen());
+        record_job(&mut state, 0, 0..1, 1.0);
+        record_job(&mut state, 1, 0..1, 1.0);
+        state.decide_goals(1, 0.1);
+        assert!(!state.can_predict_samples(), "noise cannot be estimated from one sample");
+        record_job(&mut state, 0, 1..2, 1.0);
+        record_job(&mut state, 1, 1..2, 1.0);
+        state.decide_goals(2, 0.1);
+        assert!(state.can_predict_samples());
     }
 }

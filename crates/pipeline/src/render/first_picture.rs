@@ -10,12 +10,12 @@ use crate::integrators::{PhotonMaps, RenderSettings};
 use crate::plan::Plan;
 use crate::scene::description::Render;
 use crate::stages::Stop;
-use crate::trace::{Job, Tracer};
+use crate::trace::{TileJob, Tracer};
 
 /// Time budget for the first image while the camera is moving.
 const HASTE: Duration = Duration::from_millis(6);
 
-/// Inputs for rendering first images.
+/// Inputs needed to render first images.
 #[derive(Clone, Copy)]
 pub(crate) struct FirstPictures<'a> {
     pub(crate) tracer: Tracer<'a>,
@@ -32,14 +32,14 @@ impl<'a> FirstPictures<'a> {
     pub(crate) fn sizes(&self, shown: (u32, u32)) -> Vec<(u32, u32)> {
         let usual = self.usual_size(shown);
         let rate = self.rate.get().filter(|_| self.is_moved);
-        let hasty = rate.and_then(|rate| hasty_size(usual, rate));
+        let hasty = rate.and_then(|rate| quick_size(usual, rate));
         hasty.into_iter().chain([usual]).filter(|size| self.is_less_work(*size)).collect()
     }
 
-    /// Returns the preview's size, or half as many pixels if the trees do not fit in the CPU caches, which
-    /// makes rays slow.
+    /// Returns the preview's size, or a size with half as many pixels if the trees do not fit in the CPU
+    /// caches, because tracing rays is then slow.
     fn usual_size(&self, (width, height): (u32, u32)) -> (u32, u32) {
-        /// With this many triangles, trees take tens of megabytes.
+        /// Trees with this many triangles take up tens of megabytes.
         const LARGE: u64 = 250_000;
         let side =
             |length: u32| ((f64::from(length) * std::f64::consts::FRAC_1_SQRT_2).round() as u32).max(1);
@@ -53,7 +53,7 @@ impl<'a> FirstPictures<'a> {
     }
 
     /// Traces a first image and records the pixels per second. Calls `tick` regularly.
-    pub(crate) fn picture(
+    pub(crate) fn trace_picture(
         &self,
         photons: Option<&PhotonMaps>,
         (width, height): (u32, u32),
@@ -64,12 +64,12 @@ impl<'a> FirstPictures<'a> {
         let render = Render { width, height, ..plan.settings.render };
         let settings = RenderSettings { render, ..plan.settings };
         let whole = Rect { x: 0, y: 0, width, height };
-        let rect = plan.crop.map_or(whole, |rect| scale(rect, full, (width, height)));
+        let rect = plan.crop.map_or(whole, |rect| scale_rect(rect, full, (width, height)));
         let tracer = Tracer { settings: &settings, photons, ..self.tracer };
         let mut picture = RadianceImage::black(width, height);
         let begin = Instant::now();
         tracer.run(
-            &jobs(rect),
+            &split_into_jobs(rect),
             |_, piece| piece,
             |result| {
                 if let Some((_, piece, _)) = result {
@@ -95,11 +95,12 @@ impl<'a> FirstPictures<'a> {
         tick: impl Fn(),
     ) -> Result<(), Stop> {
         let is_whole = screen.bounds.is_some_and(|bounds| bounds.around.is_none());
-        // Skip data views, which depend on the range of the whole image or show the photons themselves.
+        // Skip data views, because they depend on the value range of the whole image or show the photons
+        // themselves.
         let is_of_light = self.plan.tone.range_map == RangeMap::None;
         let Some(shown) = screen.size().filter(|_| is_whole && is_of_light) else { return Ok(()) };
         let Some(size) = self.sizes(shown).into_iter().next() else { return Ok(()) };
-        let picture = self.picture(None, size, tick)?;
+        let picture = self.trace_picture(None, size, tick)?;
         screen.show_without_photons(&picture.resized(shown.0, shown.1));
         Ok(())
     }
@@ -107,7 +108,7 @@ impl<'a> FirstPictures<'a> {
 
 /// Returns the size of an image that takes [`HASTE`] to render at `rate` pixels per second. `None` if the
 /// usual size is about as fast.
-fn hasty_size((width, height): (u32, u32), rate: f64) -> Option<(u32, u32)> {
+fn quick_size((width, height): (u32, u32), rate: f64) -> Option<(u32, u32)> {
     /// Minimum width in pixels.
     const LEAST: f64 = 16.0;
     let share = (rate * HASTE.as_secs_f64() / (f64::from(width) * f64::from(height))).sqrt();
@@ -117,18 +118,18 @@ fn hasty_size((width, height): (u32, u32), rate: f64) -> Option<(u32, u32)> {
 }
 
 /// Splits a rectangle into small jobs so that all threads finish at about the same time.
-fn jobs(rect: Rect) -> Vec<Job> {
+fn split_into_jobs(rect: Rect) -> Vec<TileJob> {
     const FEW: usize = 5000;
     let side = if rect.area() < FEW { 8 } else { 16 };
     let starts = |start: u32, length: u32| (start..start + length).step_by(side as usize);
     let piece = |(x, y)| Rect { x, y, width: side, height: side }.intersection(&rect);
     let places = starts(rect.y, rect.height).flat_map(|y| starts(rect.x, rect.width).map(move |x| (x, y)));
-    let job = |(tile, rect): (usize, Rect)| Job { tile, pixels: rect.into(), samples: 0..1 };
+    let job = |(tile, rect): (usize, Rect)| TileJob { tile, pixels: rect.into(), samples: 0..1 };
     places.filter_map(piece).enumerate().map(job).collect()
 }
 
 /// Maps a rectangle in a larger image to the corresponding pixels of a smaller one.
-fn scale(rect: Rect, from: (u32, u32), to: (u32, u32)) -> Rect {
+fn scale_rect(rect: Rect, from: (u32, u32), to: (u32, u32)) -> Rect {
     let along = |start: u32, len: u32, from: u32, to: u32| {
         let at = |pixel: u32| u64::from(pixel) * u64::from(to) / u64::from(from);
         let begin = (at(start) as u32).min(to - 1);
@@ -148,7 +149,7 @@ mod tests {
     fn jobs_cover_each_pixel_once() {
         let rect = Rect { x: 3, y: 5, width: 40, height: 17 };
         let mut seen = vec![0; 64 * 64];
-        for job in jobs(rect) {
+        for job in split_into_jobs(rect) {
             for y in job.pixels.rect.y..job.pixels.rect.y + job.pixels.rect.height {
                 for x in job.pixels.rect.x..job.pixels.rect.x + job.pixels.rect.width {
                     seen[(y * 64 + x) as usize] += 1;
@@ -164,18 +165,18 @@ mod tests {
 
     #[test]
     fn hasty_image_fits_its_time_budget() {
-        let pixels_of = |rate: f64| hasty_size((120, 80), rate / HASTE.as_secs_f64());
+        let pixels_of = |rate: f64| quick_size((120, 80), rate / HASTE.as_secs_f64());
         assert_eq!(pixels_of(9600.0), None, "the usual size should be fast enough");
         assert_eq!(pixels_of(2400.0), Some((60, 40)));
         assert_eq!(pixels_of(1.0), Some((16, 11)), "the size should not fall below the minimum");
-        assert_eq!(hasty_size((10, 5), 0.0), Some((10, 5)));
+        assert_eq!(quick_size((10, 5), 0.0), Some((10, 5)));
     }
 
     #[test]
     fn crop_is_scaled_to_smaller_images() {
         let rect = Rect { x: 10, y: 30, width: 5, height: 10 };
-        assert_eq!(scale(rect, (100, 100), (10, 10)), Rect { x: 1, y: 3, width: 1, height: 1 });
+        assert_eq!(scale_rect(rect, (100, 100), (10, 10)), Rect { x: 1, y: 3, width: 1, height: 1 });
         let last = Rect { x: 99, y: 99, width: 1, height: 1 };
-        assert_eq!(scale(last, (100, 100), (3, 3)), Rect { x: 2, y: 2, width: 1, height: 1 });
+        assert_eq!(scale_rect(last, (100, 100), (3, 3)), Rect { x: 2, y: 2, width: 1, height: 1 });
     }
 }

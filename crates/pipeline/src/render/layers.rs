@@ -5,7 +5,7 @@
 //! samples.
 
 use super::film_state::FilmState;
-use super::scheduler::{Rendering, Scheduler};
+use super::scheduler::{RenderStageInputs, Scheduler};
 use crate::film::{Convergence, Quantity, RadianceImage};
 use crate::integrators::View;
 use crate::keys;
@@ -47,7 +47,7 @@ impl OutputLayer {
     }
 
     /// Returns the layer's render cost relative to the image.
-    fn work(self) -> f64 {
+    fn relative_cost(self) -> f64 {
         match self {
             Self::Albedo | Self::Normal | Self::Depth => 0.1,
             Self::Variance | Self::Samples => 0.0,
@@ -65,8 +65,8 @@ fn variance(state: &FilmState) -> RadianceImage {
 
 /// Returns the progress fractions at the start and end of a layer. `None` stands for the image, which
 /// precedes layer 0.
-pub(crate) fn progress(layers: &[OutputLayer], number: Option<usize>) -> [f64; 2] {
-    let work = |layers: &[OutputLayer]| layers.iter().map(|layer| layer.work()).sum::<f64>();
+pub(crate) fn progress_range(layers: &[OutputLayer], number: Option<usize>) -> [f64; 2] {
+    let work = |layers: &[OutputLayer]| layers.iter().map(|layer| layer.relative_cost()).sum::<f64>();
     let all = 1.0 + work(layers);
     match number {
         None => [0.0, 1.0 / all],
@@ -78,9 +78,9 @@ pub(crate) fn progress(layers: &[OutputLayer], number: Option<usize>) -> [f64; 2
 ///
 /// # Errors
 /// [`Stop::Cancelled`], or there is not enough memory for a film.
-pub(crate) fn layers(
+pub(crate) fn render_layers(
     state: &FilmState,
-    rendering: &Rendering<'_>,
+    rendering: &RenderStageInputs<'_>,
     layers: &[OutputLayer],
 ) -> Result<Vec<LayerImage>, Stop> {
     let mut images = Vec::with_capacity(layers.len());
@@ -88,7 +88,9 @@ pub(crate) fn layers(
         let (source, channels) = layer.source();
         let image = match source {
             LayerSource::Film(image) => image(state),
-            LayerSource::View(view) => of_view(view, state, rendering, progress(layers, Some(number)))?,
+            LayerSource::View(view) => {
+                render_view(view, state, rendering, progress_range(layers, Some(number)))?
+            }
         };
         images.push(LayerImage { name: crate::choice::Choice::name(*layer), channels, image });
     }
@@ -96,10 +98,10 @@ pub(crate) fn layers(
 }
 
 /// Renders a view with the same number of samples in each pixel as the image.
-fn of_view(
+fn render_view(
     view: View,
     picture: &FilmState,
-    rendering: &Rendering<'_>,
+    rendering: &RenderStageInputs<'_>,
     progress: [f64; 2],
 ) -> Result<RadianceImage, Stop> {
     let mut plan = rendering.plan.clone();
@@ -108,7 +110,7 @@ fn of_view(
     plan.settings.render.error = 0.0;
     plan.settings.render.samples = picture.film.samples().max;
     plan.time_seconds = None;
-    let photons = rendering.photons.filter(|_| plan.settings.gathers());
+    let photons = rendering.photons.filter(|_| plan.settings.gathers_photons());
     let convergence = match photons.is_some_and(PhotonStore::emits_photons) {
         true => Convergence::Photons,
         false => Convergence::Stratified,
@@ -116,9 +118,9 @@ fn of_view(
     let key = keys::render(Fingerprint::new("layer").key(&picture.key).finish(), &plan.settings, plan.crop);
     let mut state =
         FilmState::new(key, &plan, rendering.most_film_bytes, convergence, None).map_err(Stop::work)?;
-    state.goals = picture.goals_of_what_is_done();
-    let sink = rendering.sink.within(progress);
-    let rendering = Rendering {
+    state.goals = picture.goals_at_current_samples();
+    let sink = rendering.sink.for_progress_range(progress);
+    let rendering = RenderStageInputs {
         tracer: Tracer { settings: &plan.settings, ..rendering.tracer },
         plan: &plan,
         photons,
@@ -146,9 +148,10 @@ mod tests {
     #[test]
     fn progress_covers_image_and_all_layers() {
         let all = [OutputLayer::Depth, OutputLayer::Samples, OutputLayer::Diffuse, OutputLayer::Specular];
-        let ends: Vec<_> = [None, Some(0), Some(1), Some(2), Some(3)].map(|at| progress(&all, at)).to_vec();
+        let ends: Vec<_> =
+            [None, Some(0), Some(1), Some(2), Some(3)].map(|at| progress_range(&all, at)).to_vec();
         assert_eq!((ends[0][0], ends[4][1]), (0.0, 1.0));
         assert!(ends.windows(2).all(|two| two[0][1] == two[1][0]), "{ends:?}");
-        assert_eq!(progress(&[], None), [0.0, 1.0]);
+        assert_eq!(progress_range(&[], None), [0.0, 1.0]);
     }
 }

@@ -1,12 +1,14 @@
 //! Decides from the noise when each part of an image has enough samples.
 //!
-//! If a tile's own samples decided when to stop, the image would be too dark: sampling would stop early
-//! without rare bright samples, and continue with them. Each half of a tile (every other pixel) therefore
-//! stops based on the noise of the other half, whose samples are independent and about as noisy. A tenth of
-//! the bias remains because a half that has stopped provides no new information. In the worst case, this is a
-//! thirtieth of the noise.
+//! If a tile's own samples decided when to stop, the image would be too dark: sampling would stop early in
+//! tiles that missed rare bright samples, and continue in tiles that found them. Each half of a tile (every
+//! other pixel) therefore stops based on the noise of the other half, whose samples are independent and about
+//! as noisy. A tenth of the bias remains because a half that has stopped provides no new information. In the
+//! worst case, this is a thirtieth of the noise.
 
-use crate::film::{CELLS, Convergence, Film, HalfNoise, PREPASS_SAMPLES, Prepass, samples_to_reduce_error};
+use crate::film::{
+    CELLS, CellHalfNoise, Convergence, Film, PREPASS_SAMPLES, Prepass, samples_to_reduce_error,
+};
 
 /// Minimum number of samples for noise estimates.
 pub(crate) const LEAST: u32 = PREPASS_SAMPLES;
@@ -15,8 +17,8 @@ pub(crate) const LEAST: u32 = PREPASS_SAMPLES;
 /// early.
 pub(crate) const AIM: f64 = 0.85;
 
-/// A tile is reported if its noise exceeds the target by more than this factor, which allows for measurement
-/// error.
+/// A tile is reported if its noise exceeds the target by more than this factor. The factor allows for
+/// measurement error.
 const TOO_MUCH: f64 = 1.5;
 
 /// Maximum number of expected samples. [`u32::MAX`] means unknown.
@@ -60,20 +62,20 @@ impl Goals {
     /// Decides the goals of undecided halves with `samples` samples, a power of two, based on the noise in
     /// the other half. `done` is the number of samples in each half. Decides nothing until all halves have
     /// enough samples to estimate the image's brightness. Runs in parallel within a thread pool.
-    pub(crate) fn judge(
+    pub(crate) fn decide_goals(
         &mut self,
         film: &Film,
         done: &[[u32; 2]],
         samples: u32,
         error: f64,
     ) -> Option<Judgement> {
-        let is_time = samples >= LEAST && !self.lacks_least(done);
+        let is_time = samples >= LEAST && !self.needs_min_samples(done);
         if is_time && self.brightness.is_none() {
             self.brightness = Prepass::new(film.crop()).film_mean(film);
         }
         let brightness = self.brightness.or_else(|| film.mean_luminance())?;
-        let aim = Aim { error, brightness, convergence: film.convergence() };
-        let is_open = |tile: usize| self.judged[tile] < samples && self.is_open(tile, done, samples);
+        let aim = NoiseTarget { error, brightness, convergence: film.convergence() };
+        let is_open = |tile: usize| self.judged[tile] < samples && self.is_undecided(tile, done, samples);
         let noise = film.map_tiles(|tile| is_open(tile).then(|| TileNoise::of(film, tile)));
         if is_time {
             self.decide(&noise, done, samples, &aim);
@@ -84,17 +86,17 @@ impl Goals {
     }
 
     /// Returns the number of tiles whose noise exceeds [`TOO_MUCH`] times the target although they reached
-    /// their goals, and the highest noise of these tiles. This can happen because noise in a half does not
-    /// affect that half's own goal.
-    pub(crate) fn missed(&self, film: &Film, error: f64) -> Option<(usize, f64)> {
-        let aim = Aim { error, brightness: self.brightness?, convergence: film.convergence() };
+    /// their goals, and the highest noise of these tiles. This can happen because a half's own noise does not
+    /// affect its goal.
+    pub(crate) fn tiles_above_target(&self, film: &Film, error: f64) -> Option<(usize, f64)> {
+        let aim = NoiseTarget { error, brightness: self.brightness?, convergence: film.convergence() };
         let noise = film.map_tiles(|tile| {
             let is_decided = |cell: &[u32; 2]| cell.iter().all(|goal| *goal < u32::MAX);
             let halves = || [0, 1].map(|half| film.tile_noise(tile, half)).into_iter().flatten();
             let count = halves().count() as f64;
             let all =
                 halves().fold((0.0, 0.0), |(v, m), one| (v + one.variance / count, m + one.mean / count));
-            let whole = halves().next().map(|half| HalfNoise { variance: all.0, mean: all.1, ..half });
+            let whole = halves().next().map(|half| CellHalfNoise { variance: all.0, mean: all.1, ..half });
             let mut cells = self.decided.iter().skip(CELLS * tile).take(CELLS);
             whole.filter(|_| cells.all(is_decided)).map(|noise| aim.relative(&noise))
         });
@@ -104,7 +106,7 @@ impl Goals {
     }
 
     /// Whether a tile contains an undecided half with `samples` samples.
-    pub(crate) fn is_open(&self, tile: usize, done: &[[u32; 2]], samples: u32) -> bool {
+    pub(crate) fn is_undecided(&self, tile: usize, done: &[[u32; 2]], samples: u32) -> bool {
         let cells = self.decided.iter().zip(done).skip(CELLS * tile).take(CELLS);
         cells
             .flat_map(|(goals, done)| goals.iter().zip(done))
@@ -112,24 +114,24 @@ impl Goals {
     }
 
     /// Whether any half that needs more samples has fewer than [`LEAST`].
-    fn lacks_least(&self, done: &[[u32; 2]]) -> bool {
+    fn needs_min_samples(&self, done: &[[u32; 2]]) -> bool {
         let mut halves = self.decided.as_flattened().iter().zip(done.as_flattened());
         halves.any(|(goal, done)| goal > done && *done < LEAST)
     }
 
-    fn decide(&mut self, noise: &[Option<TileNoise>], done: &[[u32; 2]], samples: u32, aim: &Aim) {
+    fn decide(&mut self, noise: &[Option<TileNoise>], done: &[[u32; 2]], samples: u32, aim: &NoiseTarget) {
         for (cell, done) in done.iter().enumerate() {
             let was_decided = self.decided[cell].map(|goal| goal < u32::MAX);
             if (0..2).all(|half| was_decided[half] || done[half] != samples) {
                 continue;
             }
             let Some(TileNoise { halves: [even, odd], .. }) = noise[cell / CELLS] else { continue };
-            // A one-pixel tile has no other half.
+            // A one-pixel tile has no second half.
             let of_others = [odd.or(even), even.or(odd)];
             for half in 0..2 {
                 let Some(noise) = of_others[half].filter(|_| !was_decided[half]) else { continue };
                 let wanted = aim.samples(&noise);
-                // If the other half is finished, there will be no further information.
+                // Once the other half is finished, it provides no further information.
                 if was_decided[1 - half] || wanted <= done[half].saturating_mul(2) {
                     self.decided[cell][half] = wanted.max(done[half]);
                 }
@@ -141,17 +143,17 @@ impl Goals {
 /// Noise on which goals are based.
 #[derive(Debug)]
 pub(crate) struct Judgement {
-    /// Noise of each tile. `None` for tiles with goals or another sample count.
+    /// Noise of each tile. `None` for tiles that have goals or a different sample count.
     pub(crate) noise: Vec<Option<TileNoise>>,
     /// Sample count of the judged tiles.
     pub(crate) samples: u32,
-    pub(crate) aim: Aim,
+    pub(crate) aim: NoiseTarget,
 }
 
 /// A tile's noise, measured from its samples.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TileNoise {
-    pub(crate) halves: [Option<HalfNoise>; 2],
+    pub(crate) halves: [Option<CellHalfNoise>; 2],
     /// Ratio of the variances before and after the last doubling of samples.
     pub(crate) fall: Option<f64>,
 }
@@ -162,15 +164,18 @@ impl TileNoise {
             let noise = film.tile_noise(tile, half)?;
             // Use an upper bound of the noise. If it comes from a few bright pixels, others may not have been
             // sampled yet.
-            Some(HalfNoise { variance: noise.variance * (1.0 + film.tile_spread(tile, half)), ..noise })
+            Some(CellHalfNoise {
+                variance: noise.variance * (1.0 + film.tile_variance_uncertainty(tile, half)),
+                ..noise
+            })
         };
-        Self { halves: [0, 1].map(noise), fall: film.tile_fall(tile) }
+        Self { halves: [0, 1].map(noise), fall: film.tile_variance_reduction(tile) }
     }
 }
 
 /// Noise target and its reference brightness.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Aim {
+pub(crate) struct NoiseTarget {
     /// Noise target.
     pub(crate) error: f64,
     /// Mean luminance of the image.
@@ -178,17 +183,17 @@ pub(crate) struct Aim {
     pub(crate) convergence: Convergence,
 }
 
-impl Aim {
-    /// Returns the number of samples with which the noise reaches the target.
-    fn samples(&self, noise: &HalfNoise) -> u32 {
+impl NoiseTarget {
+    /// Returns the number of samples needed for the noise to reach the target.
+    fn samples(&self, noise: &CellHalfNoise) -> u32 {
         let relative = self.relative(noise);
         if !(relative > 0.0) {
             return noise.samples;
         }
         let part = AIM * self.error / relative;
         let doubled = noise.samples.saturating_mul(2);
-        // Up to the next power of two, treat samples as independent. At the power of two, they are all worth
-        // more.
+        // Treat samples up to the next power of two as independent. Once the power of two is reached, all of
+        // them reduce the noise more.
         if 1.0 / (part * part) <= libm::exp2(noise.power) {
             return samples_to_reduce_error(1.0, part, noise.samples).min(doubled);
         }
@@ -197,7 +202,7 @@ impl Aim {
     }
 
     /// Returns the noise relative to the reference brightness.
-    pub(crate) fn relative(&self, noise: &HalfNoise) -> f64 {
+    pub(crate) fn relative(&self, noise: &CellHalfNoise) -> f64 {
         noise.variance.sqrt() / noise.mean.max(LEAST_BRIGHTNESS * self.brightness)
     }
 }
@@ -209,7 +214,7 @@ pub(crate) mod tests {
     use crate::math::Vec3;
     use crate::math::random::unit;
 
-    /// Creates a one-tile film with a given mean and spread of the samples in each half.
+    /// Creates a one-tile film. Each half's samples have a given mean and spread.
     pub(crate) fn film(halves: [(f32, f32); 2], samples: u32) -> Film {
         const COLUMNS: u32 = 32;
         let film = Film::new(COLUMNS, 2, None).expect("a film");
@@ -225,7 +230,7 @@ pub(crate) mod tests {
 
     fn judged(halves: [(f32, f32); 2], samples: u32, error: f64) -> Goals {
         let mut goals = Goals::none(1);
-        goals.judge(&film(halves, samples), &[[samples; 2]], samples, error);
+        goals.decide_goals(&film(halves, samples), &[[samples; 2]], samples, error);
         goals
     }
 
@@ -241,11 +246,13 @@ pub(crate) mod tests {
     fn noise_in_only_one_half_is_reported() {
         let rough = film([(1.0, 0.0), (1.0, 1.0)], 16);
         let goals = judged([(1.0, 0.0), (1.0, 1.0)], 16, 0.01);
-        assert_eq!(goals.missed(&rough, 0.01), None, "the first half should continue");
+        assert_eq!(goals.tiles_above_target(&rough, 0.01), None, "the first half should continue");
         let clean = judged([(1.0, 0.0); 2], 16, 0.01);
-        assert_eq!(clean.missed(&film([(1.0, 0.0); 2], 16), 0.01), None);
-        // A standard error of √(1/12/16) in one of two halves.
-        let Some((tiles, worst)) = clean.missed(&rough, 0.01) else { panic!("one tile should be reported") };
+        assert_eq!(clean.tiles_above_target(&film([(1.0, 0.0); 2], 16), 0.01), None);
+        // One of the two halves has a standard error of √(1/12/16).
+        let Some((tiles, worst)) = clean.tiles_above_target(&rough, 0.01) else {
+            panic!("one tile should be reported")
+        };
         assert!(tiles == 1 && (worst / 0.051 - 1.0).abs() < 0.3, "{tiles} {worst}");
     }
 
@@ -280,12 +287,12 @@ pub(crate) mod tests {
             );
         }
         let mut goals = Goals::none(2 * CELLS);
-        goals.judge(&film, &[[16; 2]; 2 * CELLS], 16, 0.01);
+        goals.decide_goals(&film, &[[16; 2]; 2 * CELLS], 16, 0.01);
         assert_eq!((goals.of(0, 0), goals.of(CELLS, 0)), (u32::MAX, 16));
     }
 
     /// Returns the mean of a tile with rare bright samples and an expected value of 1. Each half stops based
-    /// on the noise of the other half, or of its own if `by_own`.
+    /// on the noise of the other half, or on its own noise if `by_own`.
     fn stopped(next: &mut impl FnMut() -> f32, by_own: bool) -> f64 {
         const MOST: u32 = 256;
         let film = Film::new(4, 4, None).expect("a film");
@@ -300,7 +307,7 @@ pub(crate) mod tests {
                 film.add(0, &TileSamples { pixels, samples, radiance, negative: None });
                 done[0][half] += samples;
             }
-            goals.judge(&film, &done, target, 0.6);
+            goals.decide_goals(&film, &done, target, 0.6);
         }
         film.mean_luminance().expect("samples")
     }

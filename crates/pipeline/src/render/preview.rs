@@ -30,40 +30,40 @@ impl PreviewTarget<'_> {
     /// Returns the size of a preview of the whole image.
     pub(crate) fn size(&self) -> Option<(u32, u32)> {
         let render = &self.plan.settings.render;
-        self.bounds.and_then(|bounds| fit(render.width, render.height, bounds))
+        self.bounds.and_then(|bounds| fit_size(render.width, render.height, bounds))
     }
 
     /// Sends a preview of the whole film unless cancelled. Must not be called while tiles are rendering,
     /// because it uses the thread pool.
     pub(crate) fn show(&self, state: &mut FilmState, pool: &ThreadPool, token: &CancelToken) {
         let Some(size) = self.size() else { return };
-        if self.say_section(state, true) {
+        if self.send_section(state, true) {
             return;
         }
-        while !pool.install(|| catch_up(state, self.plan.settings.view.quantity(), size)) {
+        while !pool.install(|| update_previewer(state, self.plan.settings.view.quantity(), size)) {
             if token.is_cancelled() {
                 return;
             }
         }
-        self.say(state, true);
+        self.send_current(state, true);
     }
 
-    /// Updates the preview for a short time between tiles, on the current thread. Returns whether it was
-    /// completed and sent.
-    pub(crate) fn show_some(&self, state: &mut FilmState) -> bool {
+    /// Spends a short time between tiles on updating the preview, on the current thread. Returns whether it
+    /// was completed and sent.
+    pub(crate) fn update_briefly(&self, state: &mut FilmState) -> bool {
         let Some(size) = self.size() else { return false };
-        if self.say_section(state, false) {
+        if self.send_section(state, false) {
             return true;
         }
-        catch_up(state, self.plan.settings.view.quantity(), size);
+        update_previewer(state, self.plan.settings.view.quantity(), size);
         let is_whole = state.previewer.as_ref().is_some_and(Previewer::is_whole);
         if is_whole {
-            self.say(state, false);
+            self.send_current(state, false);
         }
         is_whole
     }
 
-    fn say(&self, state: &FilmState, has_time: bool) {
+    fn send_current(&self, state: &FilmState, has_time: bool) {
         if let Some(previewer) = &state.previewer {
             // The first image contains no sample statistics.
             let base = state.base.as_ref().filter(|_| previewer.quantity() == Quantity::Radiance);
@@ -73,12 +73,12 @@ impl PreviewTarget<'_> {
     }
 
     /// Sends a 1:1 section of the image if the front end requested one. Returns whether it did.
-    fn say_section(&self, state: &FilmState, has_time: bool) -> bool {
+    fn send_section(&self, state: &FilmState, has_time: bool) -> bool {
         let Some(rect) = self.section() else { return false };
         let quantity = self.plan.settings.view.quantity();
         let base = state.base.as_ref().filter(|_| quantity == Quantity::Radiance);
         let render = &self.plan.settings.render;
-        let section = Section::of(rect, (render.width, render.height));
+        let section = Section::from_pixels(rect, (render.width, render.height));
         let image = state.film.section(quantity, rect, base);
         self.send(state, &image, &self.tone(state, &image, has_time), Some(section));
         true
@@ -105,7 +105,7 @@ impl PreviewTarget<'_> {
         /// Number of pixels that can be scanned in a few milliseconds.
         const QUICK: usize = 1 << 18;
         let tone = self.plan.tone;
-        let is_known = state.is_covered() && (has_time || state.film.crop().area() <= QUICK);
+        let is_known = state.covers_all_pixels() && (has_time || state.film.crop().area() <= QUICK);
         if tone.range_map == RangeMap::None || !is_known {
             return tone.resolved_for(image);
         }
@@ -128,15 +128,15 @@ impl PreviewTarget<'_> {
     }
 }
 
-/// Updates the previewer for a short time. Returns whether it is now up to date.
-fn catch_up(state: &mut FilmState, quantity: Quantity, (width, height): (u32, u32)) -> bool {
+/// Spends a short time on updating the previewer. Returns whether it is now up to date.
+fn update_previewer(state: &mut FilmState, quantity: Quantity, (width, height): (u32, u32)) -> bool {
     state.previewer.take_if(|it| it.size() != (width, height) || it.quantity() != quantity);
     let previewer = state.previewer.get_or_insert_with(|| Previewer::of(quantity, width, height));
     previewer.update(&state.film, Some(Instant::now() + PATIENCE))
 }
 
 /// Returns the largest size that fits into the bounds and keeps the aspect ratio.
-fn fit(width: u32, height: u32, bounds: PreviewSize) -> Option<(u32, u32)> {
+fn fit_size(width: u32, height: u32, bounds: PreviewSize) -> Option<(u32, u32)> {
     if bounds.width == 0 || bounds.height == 0 {
         return None;
     }
@@ -158,10 +158,10 @@ mod tests {
     #[test]
     fn preview_keeps_the_aspect_ratio() {
         let bounds = |width, height| PreviewSize { width, height, around: None };
-        assert_eq!(fit(640, 480, bounds(80, 48)), Some((64, 48)));
-        assert_eq!(fit(640, 480, bounds(64, 100)), Some((64, 48)));
-        assert_eq!(fit(10_000, 1, bounds(80, 48)), Some((80, 1)));
-        assert_eq!(fit(1, 10_000, bounds(80, 48)), Some((1, 48)));
-        assert_eq!(fit(1, 1, bounds(0, 48)), None);
+        assert_eq!(fit_size(640, 480, bounds(80, 48)), Some((64, 48)));
+        assert_eq!(fit_size(640, 480, bounds(64, 100)), Some((64, 48)));
+        assert_eq!(fit_size(10_000, 1, bounds(80, 48)), Some((80, 1)));
+        assert_eq!(fit_size(1, 10_000, bounds(80, 48)), Some((1, 48)));
+        assert_eq!(fit_size(1, 1, bounds(0, 48)), None);
     }
 }

@@ -6,9 +6,9 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use super::checkpointer::Checkpointer;
-use super::film_state::{Before, FilmState};
+use super::film_state::{EarlierWork, FilmState};
 use super::first_picture::FirstPictures;
-use super::forecast::{Forecast, Moment};
+use super::forecast::{Forecast, RenderSnapshot};
 use super::noise_goals::LEAST;
 use super::preview::PreviewTarget;
 use super::share::Share;
@@ -22,8 +22,8 @@ use crate::scene::description::Render;
 use crate::sink::Sink;
 use crate::stages::Stop;
 use crate::stages::photons::{PhotonContext, PhotonStore};
-use crate::stopwatch::Clock;
-use crate::trace::{Job, Tracer, next_pass};
+use crate::stopwatch::PausableClock;
+use crate::trace::{TileJob, Tracer, next_pass};
 
 /// Minimum time between two progress reports.
 const PROGRESS_INTERVAL: Duration = Duration::from_millis(60);
@@ -33,7 +33,7 @@ const PREVIEW_INTERVAL: Duration = Duration::from_millis(66);
 const PREVIEW_SHARE: u32 = 10;
 
 /// Inputs of the render stage.
-pub(crate) struct Rendering<'a> {
+pub(crate) struct RenderStageInputs<'a> {
     pub(crate) tracer: Tracer<'a>,
     pub(crate) plan: &'a Plan,
     /// The scene's photons, if the image uses them.
@@ -63,9 +63,9 @@ pub(crate) struct Rendering<'a> {
 /// Runs passes and rounds over a film. Reports progress and sends previews between tiles.
 pub(crate) struct Scheduler<'a> {
     pub(crate) state: &'a mut FilmState,
-    rendering: &'a Rendering<'a>,
+    rendering: &'a RenderStageInputs<'a>,
     screen: PreviewTarget<'a>,
-    clock: Clock,
+    clock: PausableClock,
     forecast: Forecast,
     /// Number of pixels times samples so far.
     units: u64,
@@ -84,17 +84,17 @@ pub(crate) struct Scheduler<'a> {
 }
 
 impl<'a> Scheduler<'a> {
-    pub(crate) fn new(state: &'a mut FilmState, rendering: &'a Rendering<'a>) -> Self {
-        let units = state.units();
+    pub(crate) fn new(state: &'a mut FilmState, rendering: &'a RenderStageInputs<'a>) -> Self {
+        let units = state.pixel_samples();
         let bounds = (rendering.take_preview)().unwrap_or(rendering.preview);
         let forecast = Forecast::new(state, rendering.plan.settings.render.samples);
-        let Before { rays, seconds: seconds_before } = std::mem::take(&mut state.before);
+        let EarlierWork { rays, seconds: seconds_before } = std::mem::take(&mut state.before);
         Self {
-            is_first: !state.is_covered(),
+            is_first: !state.covers_all_pixels(),
             state,
             rendering,
             screen: PreviewTarget { bounds, plan: rendering.plan, sink: rendering.sink },
-            clock: Clock::start(),
+            clock: PausableClock::start(),
             forecast,
             units,
             units_before: units,
@@ -113,17 +113,17 @@ impl<'a> Scheduler<'a> {
     /// [`Stop::Cancelled`]. The film keeps its samples.
     pub(crate) fn run(&mut self) -> Result<(), Stop> {
         self.state.is_kept = false;
-        let ran = self.go();
-        let (traced, seconds) = (self.traced(), self.rendered_seconds());
+        let ran = self.run_passes_to_end();
+        let (traced, seconds) = (self.total_rays(), self.rendered_seconds());
         if let (Some(checkpointer), Err(Stop::Cancelled)) = (self.rendering.checkpointer, &ran) {
-            self.state.is_kept = checkpointer.at_the_end(self.state, traced, seconds);
+            self.state.is_kept = checkpointer.save_if_cancelled(self.state, traced, seconds);
         }
         self.state.traced = traced;
         ran
     }
 
     /// Returns the rays traced by all requests for this film.
-    pub(crate) fn traced(&self) -> RayCounters {
+    pub(crate) fn total_rays(&self) -> RayCounters {
         let mut traced = self.state.traced;
         traced += self.rays;
         traced
@@ -139,13 +139,13 @@ impl<'a> Scheduler<'a> {
         self.seconds_before + self.clock.seconds(self.rendering.tracer.token.is_paused())
     }
 
-    fn go(&mut self) -> Result<(), Stop> {
+    fn run_passes_to_end(&mut self) -> Result<(), Stop> {
         self.report_progress(false);
         if self.is_first {
             if self.state.base.is_none() {
-                self.coarse()?;
+                self.trace_first_pictures()?;
             }
-            let first = self.first();
+            let first = self.priority_rect();
             if first.is_some() {
                 self.pass(first, 1)?;
             }
@@ -157,28 +157,28 @@ impl<'a> Scheduler<'a> {
         }
         let Render { samples, error, .. } = self.rendering.plan.settings.render;
         if error > 0.0 && samples >= LEAST && self.state.share.is_some() {
-            self.pilot()?;
+            self.render_prepass()?;
         }
-        if let Some(first) = self.first() {
+        if let Some(first) = self.priority_rect() {
             // Noise is relative to the brightness of the whole image, so sample the whole image first.
             let of_all = if error > 0.0 { LEAST.min(samples) } else { 1 };
-            self.passes(None, of_all)?;
-            self.passes(Some(first), samples)?;
+            self.run_passes(None, of_all)?;
+            self.run_passes(Some(first), samples)?;
         }
-        self.passes(None, samples)?;
+        self.run_passes(None, samples)?;
         self.show();
         self.report_progress(true);
         Ok(())
     }
 
     /// Returns the pixels to render first.
-    fn first(&self) -> Option<Rect> {
+    fn priority_rect(&self) -> Option<Rect> {
         let Render { width, height, .. } = self.rendering.plan.settings.render;
         self.rendering.first.map(|section| section.pixels((width, height)))
     }
 
     /// Renders the prepass of the whole image, even though this process renders only a share of it.
-    fn pilot(&mut self) -> Result<(), Stop> {
+    fn render_prepass(&mut self) -> Result<(), Stop> {
         if self.state.goals.brightness.is_some() {
             return Ok(());
         }
@@ -187,11 +187,11 @@ impl<'a> Scheduler<'a> {
             let (x, y) = pilot.position(number);
             let pixels = Rect { x, y, width: 1, height: 1 }.into();
             // Store the job's index as the tile number.
-            Job { tile: number as usize, pixels, samples: 0..PREPASS_SAMPLES }
+            TileJob { tile: number as usize, pixels, samples: 0..PREPASS_SAMPLES }
         };
-        let jobs: Vec<Job> = (0..pilot.count()).map(job).collect();
+        let jobs: Vec<TileJob> = (0..pilot.count()).map(job).collect();
         let mut luminances = vec![None; jobs.len()];
-        let keep = |_: &Job, samples: TileSamples| Prepass::luminance(samples);
+        let keep = |_: &TileJob, samples: TileSamples| Prepass::luminance(samples);
         self.rendering.tracer.run(&jobs, keep, |result| {
             if let Some((job, luminance, cost)) = result {
                 luminances[job.tile] = luminance;
@@ -204,70 +204,72 @@ impl<'a> Scheduler<'a> {
     }
 
     /// Judges the noise of existing samples from a checkpoint or a cancelled request.
-    fn judge_what_is_there(&mut self, part: Option<Rect>) {
+    fn decide_goals_from_existing(&mut self, part: Option<Rect>) {
         let Render { samples, error, .. } = self.rendering.plan.settings.render;
         let done = self.state.samples_in(part, samples);
-        // Fewer samples do not decide any goals.
+        // With fewer samples, no goals are decided.
         if error > 0.0 && (LEAST..samples).contains(&done) && done.is_power_of_two() {
-            self.rendering.tracer.pool.install(|| self.state.judge(done, error.into()));
+            self.rendering.tracer.pool.install(|| self.state.decide_goals(done, error.into()));
         }
     }
 
     /// Runs passes until `part` (`None` for all) has `samples` samples or has reached its goals.
-    fn passes(&mut self, part: Option<Rect>, samples: u32) -> Result<(), Stop> {
+    fn run_passes(&mut self, part: Option<Rect>, samples: u32) -> Result<(), Stop> {
         let Render { samples: most, error, .. } = self.rendering.plan.settings.render;
-        self.judge_what_is_there(part);
+        self.decide_goals_from_existing(part);
         while !self.state.is_complete_in(part, samples) && !self.is_over_time {
             if let Some(goals) = self.next_round().filter(|_| part.is_none()) {
-                self.round(&goals)?;
-                self.look_at_noise();
+                self.run_round(&goals)?;
+                self.measure_noise_if_due();
                 continue;
             }
             let pixels = self.state.film.crop().area();
             let target = next_pass(self.state.samples_in(part, samples), samples, pixels);
             self.pass(part, target)?;
             if target.is_power_of_two() {
-                self.look_at_noise();
+                self.measure_noise_if_due();
             }
             if error > 0.0 && target.is_power_of_two() && !self.is_over_time {
-                self.rendering.tracer.pool.install(|| self.state.judge(target, error.into()));
-                self.forecast.expect_again(self.state, most);
+                self.rendering.tracer.pool.install(|| self.state.decide_goals(target, error.into()));
+                self.forecast.update_work_estimate(self.state, most);
             }
         }
         Ok(())
     }
 
-    fn look_at_noise(&mut self) {
+    fn measure_noise_if_due(&mut self) {
         let Tracer { pool, token, .. } = self.rendering.tracer;
         let seconds = self.clock.seconds(token.is_paused());
-        self.forecast.look_at_noise(self.state, pool, seconds);
+        self.forecast.measure_noise_if_due(self.state, pool, seconds);
     }
 
     /// Renders all tiles of `part` that have fewer samples than `target`.
     fn pass(&mut self, part: Option<Rect>, target: u32) -> Result<(), Stop> {
-        let Some(photons) = self.rendering.photons else { return self.pass_by(part, |_, _| target, None, 0) };
+        let Some(photons) = self.rendering.photons else {
+            return self.render_jobs(part, |_, _| target, None, 0);
+        };
         while !self.state.is_complete_in(part, target) && !self.is_over_time {
             let samples = self.state.samples_in(part, target);
             let at_once = samples..target.min(samples.saturating_add(photons.max_passes_at_once()));
-            let numbers = self.state.numbers(at_once);
+            let numbers = self.state.global_samples(at_once);
             let end = samples + numbers.len() as u32;
             // Do not trace or gather photons if there is no time left.
             self.tick();
             if self.is_over_time {
                 break;
             }
-            let maps = self.maps(photons, numbers.clone())?;
+            let maps = self.trace_photons(photons, numbers.clone())?;
             if self.is_over_time {
                 break;
             }
-            self.pass_by(part, |_, _| end, Some(&maps), numbers.start - samples)?;
+            self.render_jobs(part, |_, _| end, Some(&maps), numbers.start - samples)?;
         }
         Ok(())
     }
 
     /// Traces photons for the given samples while handling orders.
-    fn maps(&mut self, photons: &PhotonStore, samples: Range<u32>) -> Result<PhotonMaps, Stop> {
-        let Rendering { plan, sink, tracer, .. } = *self.rendering;
+    fn trace_photons(&mut self, photons: &PhotonStore, samples: Range<u32>) -> Result<PhotonMaps, Stop> {
+        let RenderStageInputs { plan, sink, tracer, .. } = *self.rendering;
         let Tracer { pool, world, token, .. } = tracer;
         let begin = self.clock.seconds(token.is_paused());
         self.forecast.begin_photons(begin);
@@ -277,10 +279,10 @@ impl<'a> Scheduler<'a> {
     }
 
     /// Returns the next sample count for each half of each cell if there is a time limit. Adds samples where
-    /// they reduce the error most. Returns `None` with photons, whose cost does not depend on the number of
-    /// cells, and with a noise target, which determines the sample placement.
+    /// they reduce the error most. Returns `None` if there are photons, because their cost does not depend on
+    /// the number of cells, or a noise target, because it determines the sample placement.
     fn next_round(&self) -> Option<Vec<[u32; 2]>> {
-        let Rendering { plan, photons, .. } = *self.rendering;
+        let RenderStageInputs { plan, photons, .. } = *self.rendering;
         let Render { samples, error, .. } = plan.settings.render;
         if plan.time_seconds.is_none() || photons.is_some() || error > 0.0 {
             return None;
@@ -289,7 +291,7 @@ impl<'a> Scheduler<'a> {
     }
 
     /// Renders both halves of all cells up to their goals in short steps.
-    fn round(&mut self, goals: &[[u32; 2]]) -> Result<(), Stop> {
+    fn run_round(&mut self, goals: &[[u32; 2]]) -> Result<(), Stop> {
         const STEP: Duration = Duration::from_millis(30);
         /// Number of pixels in half a tile.
         const PIXELS: f64 = (TILE_SIZE * TILE_SIZE / 2) as f64;
@@ -302,7 +304,7 @@ impl<'a> Scheduler<'a> {
             if done == goals {
                 break;
             }
-            self.pass_by(
+            self.render_jobs(
                 None,
                 |cell, half| goals[cell][half].min(done[cell][half].saturating_add(most)),
                 None,
@@ -312,7 +314,7 @@ impl<'a> Scheduler<'a> {
         Ok(())
     }
 
-    fn pass_by(
+    fn render_jobs(
         &mut self,
         part: Option<Rect>,
         target: impl Fn(usize, usize) -> u32,
@@ -323,7 +325,7 @@ impl<'a> Scheduler<'a> {
         let tracer = Tracer { photons, first, ..self.rendering.tracer };
         let film = Arc::clone(&self.state.film);
         let changed = self.changed;
-        let keep = |job: &Job, mut samples: TileSamples| {
+        let keep = |job: &TileJob, mut samples: TileSamples| {
             if let Some(changed) = changed {
                 samples.radiance.iter_mut().for_each(|sample| *sample = changed(*sample));
             }
@@ -331,7 +333,7 @@ impl<'a> Scheduler<'a> {
         };
         tracer.run(&jobs, keep, |result| {
             if let Some((job, (), cost)) = result {
-                self.units += self.state.note(job, &cost);
+                self.units += self.state.record_job(job, &cost);
                 self.rays += cost.rays;
             }
             self.tick();
@@ -351,14 +353,14 @@ impl<'a> Scheduler<'a> {
         if let Some(bounds) = (self.rendering.take_preview)() {
             (self.screen.bounds, self.next_preview) = (bounds, now);
         }
-        if now >= self.next_preview && self.screen.show_some(self.state) {
+        if now >= self.next_preview && self.screen.update_briefly(self.state) {
             self.next_preview = Instant::now() + PREVIEW_INTERVAL.max(now.elapsed() * PREVIEW_SHARE);
         }
         (self.rendering.pulse)(self.state, !self.is_first);
         let seconds = self.seconds();
         if let Some(checkpointer) = self.rendering.checkpointer {
             let rendered = self.rendered_seconds();
-            checkpointer.tick(self.state, self.traced(), rendered);
+            checkpointer.tick(self.state, self.total_rays(), rendered);
         }
         let budget = self.rendering.plan.time_seconds;
         self.is_over_time = !self.is_first && budget.is_some_and(|budget| seconds >= budget);
@@ -373,27 +375,27 @@ impl<'a> Scheduler<'a> {
     /// Reports the render's progress and expected end.
     fn report_progress(&mut self, is_last: bool) {
         let elapsed_seconds = self.clock.seconds(self.rendering.tracer.token.is_paused());
-        let Rendering { plan, photons, sink, .. } = *self.rendering;
+        let RenderStageInputs { plan, photons, sink, .. } = *self.rendering;
         let (state, units, is_first) = (&*self.state, self.units, self.is_first);
-        let moment = Moment { state, plan, photons, elapsed_seconds, units, is_first, is_last };
+        let moment = RenderSnapshot { state, plan, photons, elapsed_seconds, units, is_first, is_last };
         sink.progress(self.forecast.progress(&moment));
     }
 
     fn first_pictures(&self) -> FirstPictures<'a> {
-        let Rendering { tracer, plan, is_moved, coarse_rate: rate, .. } = *self.rendering;
+        let RenderStageInputs { tracer, plan, is_moved, coarse_rate: rate, .. } = *self.rendering;
         FirstPictures { tracer, plan, is_moved, rate }
     }
 
     /// Traces first images with one sample per pixel, unless they take almost as long as a full pass.
-    fn coarse(&mut self) -> Result<(), Stop> {
+    fn trace_first_pictures(&mut self) -> Result<(), Stop> {
         let Some(shown) = self.screen.size() else { return Ok(()) };
         let coarse = self.first_pictures();
         for size in coarse.sizes(shown) {
             let maps = match self.rendering.photons {
-                Some(photons) => Some(self.maps(photons, 0..1)?),
+                Some(photons) => Some(self.trace_photons(photons, 0..1)?),
                 None => None,
             };
-            let picture = coarse.picture(maps.as_ref(), size, || {})?;
+            let picture = coarse.trace_picture(maps.as_ref(), size, || {})?;
             self.state.base = Some(picture.resized(shown.0, shown.1));
             self.show();
         }

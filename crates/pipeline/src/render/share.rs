@@ -1,9 +1,9 @@
 //! Divides an image among several processes.
 //!
-//! A share consists of tiles with all their samples. Photon passes are expensive, so with photons it consists
-//! of blocks of samples for all tiles instead. If there are more shares than blocks, several shares divide
-//! the tiles of a block. The order of assignment is scrambled, so that shares cost about the same. It is also
-//! deterministic, so that each process knows its share.
+//! A share consists of tiles with all their samples. With photons, it instead consists of blocks of samples
+//! for all tiles, because photon passes are expensive. If there are more shares than blocks, several shares
+//! divide the tiles of a block. Tiles and blocks are assigned in a scrambled order, so that all shares cost
+//! about the same. The order is deterministic, so that each process knows its share.
 
 use std::ops::Range;
 
@@ -21,7 +21,7 @@ pub(crate) struct Share {
     pub(crate) samples: u32,
     /// Sample blocks in this share. `None` if the share has all samples of its tiles.
     blocks: Option<Vec<u32>>,
-    /// Index and number of the shares that divide the tiles among themselves.
+    /// This share's index among the shares that divide the tiles, and the number of these shares.
     of_tiles: (u32, u32),
 }
 
@@ -33,7 +33,7 @@ impl Share {
         if !has_photons {
             return Self { index, count, samples, blocks: None, of_tiles: (number, count) };
         }
-        let order = dealt(samples.div_ceil(BLOCK_SIZE));
+        let order = assignment_order(samples.div_ceil(BLOCK_SIZE));
         let block_count = order.len() as u32;
         let (mut blocks, of_tiles) = if count <= block_count {
             let own = order.iter().skip(number as usize).step_by(count as usize);
@@ -47,19 +47,19 @@ impl Share {
     }
 
     /// Returns the number of samples per pixel in this share.
-    pub(crate) fn own_samples(&self) -> u32 {
+    pub(crate) fn samples_per_pixel(&self) -> u32 {
         match &self.blocks {
             None => self.samples,
-            Some(blocks) => blocks.iter().map(|block| self.length(*block)).sum(),
+            Some(blocks) => blocks.iter().map(|block| self.block_length(*block)).sum(),
         }
     }
 
     /// Maps this share's samples `own` to sample indices in the whole image, up to the end of their block.
-    pub(crate) fn numbers(&self, own: Range<u32>) -> Range<u32> {
+    pub(crate) fn global_samples(&self, own: Range<u32>) -> Range<u32> {
         let Some(blocks) = &self.blocks else { return own };
         let Some(block) = blocks.get((own.start / BLOCK_SIZE) as usize) else { return own };
         let start = block * BLOCK_SIZE + own.start % BLOCK_SIZE;
-        start..(start + (own.end - own.start)).min(block * BLOCK_SIZE + self.length(*block))
+        start..(start + (own.end - own.start)).min(block * BLOCK_SIZE + self.block_length(*block))
     }
 
     /// Returns the order in which samples are summed.
@@ -67,7 +67,7 @@ impl Share {
         match &self.blocks {
             None => SumOrder::Sequential,
             Some(blocks) => SumOrder::SeparateBlocks(
-                blocks.iter().filter(|block| self.length(**block) == BLOCK_SIZE).count(),
+                blocks.iter().filter(|block| self.block_length(**block) == BLOCK_SIZE).count(),
             ),
         }
     }
@@ -86,20 +86,20 @@ impl Share {
     pub(crate) fn tiles(&self, count: usize) -> Vec<bool> {
         let (place, of) = self.of_tiles;
         let mut own = vec![false; count];
-        for tile in dealt(count as u32).into_iter().skip(place as usize).step_by(of as usize) {
+        for tile in assignment_order(count as u32).into_iter().skip(place as usize).step_by(of as usize) {
             own[tile as usize] = true;
         }
         own
     }
 
     /// Returns the number of samples in a block.
-    fn length(&self, block: u32) -> u32 {
+    fn block_length(&self, block: u32) -> u32 {
         (self.samples - block * BLOCK_SIZE).min(BLOCK_SIZE)
     }
 }
 
 /// Returns the numbers below `count` in the order in which they are assigned.
-fn dealt(count: u32) -> Vec<u32> {
+fn assignment_order(count: u32) -> Vec<u32> {
     let mut order: Vec<u32> = (0..count).collect();
     order.sort_by_key(|number| (hash(u64::from(*number)), *number));
     order
@@ -123,8 +123,8 @@ mod tests {
                         let own = share.tiles(tiles);
                         for tile in (0..tiles).filter(|tile| own[*tile]) {
                             let mut done = 0;
-                            while done < share.own_samples() {
-                                let numbers = share.numbers(done..share.own_samples());
+                            while done < share.samples_per_pixel() {
+                                let numbers = share.global_samples(done..share.samples_per_pixel());
                                 done += numbers.len() as u32;
                                 assert!(numbers.clone().all(|number| seen.insert((tile, number))));
                             }

@@ -1,8 +1,8 @@
 //! Places samples where they reduce the image's error most, for renders with a time limit.
 //!
 //! Each half of a cell has its own sample count. A round doubles the samples of some halves, starting with
-//! those whose error decreases most per sample. Sample counts are powers of two. Otherwise, a pixel's sample
-//! points have gaps, and even a third more samples may be useless.
+//! those whose error decreases most per sample. Sample counts are powers of two. With other counts, a pixel's
+//! sample points have gaps, and even a third more samples may not reduce the error.
 //!
 //! Rare bright samples must not attract more samples to their own half, which would make the image too dark.
 //! As in [`super::noise_goals`], the noise of one half determines the samples of the other. It is estimated
@@ -14,7 +14,7 @@ use crate::film::Film;
 /// Minimum number of samples for noise estimates.
 const LEAST: u32 = 16;
 
-/// Minimum samples for every pixel, as a fraction of the mean. They are needed to estimate its noise.
+/// Minimum number of samples per pixel, as a fraction of the mean. Each pixel's noise is estimated from them.
 const SHARE: f64 = 1.0 / 8.0;
 
 /// Work done in a round, relative to all earlier work. Noise is measured again before the next round.
@@ -33,7 +33,7 @@ pub(crate) fn next_round(film: &Film, done: &[[u32; 2]], rays: &[u64], most: u32
     let pixels: f64 = halves.iter().map(|half| half.pixels).sum();
     let mean = halves.iter().map(|half| half.pixels * f64::from(half.samples)).sum::<f64>() / pixels;
     let work: f64 = halves.iter().map(|half| half.work(half.samples)).sum();
-    let mut order: Vec<(f64, &Half)> = halves.iter().map(|half| (half.urgency(mean), half)).collect();
+    let mut order: Vec<(f64, &HalfCell)> = halves.iter().map(|half| (half.urgency(mean), half)).collect();
     order.sort_by(|(a, _), (b, _)| b.total_cmp(a));
     let (mut goals, mut to_do) = (done.to_vec(), 0.0);
     for (_, half) in order.into_iter().filter(|(_, half)| half.goal > half.samples) {
@@ -47,14 +47,14 @@ pub(crate) fn next_round(film: &Film, done: &[[u32; 2]], rays: &[u64], most: u32
 }
 
 /// One half of a cell.
-struct Half {
+struct HalfCell {
     cell: usize,
     half: usize,
     pixels: f64,
     samples: u32,
     /// Next number of samples.
     goal: u32,
-    /// Sum of squared errors of the pixels with one sample each.
+    /// Sum of the pixels' squared errors with one sample each.
     error: f64,
     /// Exponent p: the squared error is proportional to the number of samples to the power −p.
     power: f64,
@@ -62,7 +62,7 @@ struct Half {
     cost: f64,
 }
 
-impl Half {
+impl HalfCell {
     fn work(&self, samples: u32) -> f64 {
         self.pixels * f64::from(samples) * self.cost
     }
@@ -78,21 +78,30 @@ impl Half {
     }
 }
 
-fn halves(film: &Film, done: &[[u32; 2]], rays: &[u64], (known, most): (u32, u32)) -> Option<Vec<Half>> {
+fn halves(film: &Film, done: &[[u32; 2]], rays: &[u64], (known, most): (u32, u32)) -> Option<Vec<HalfCell>> {
     let mut halves = Vec::with_capacity(2 * done.len());
     for (cell, done) in done.iter().enumerate().filter(|(cell, _)| film.cell_rect(*cell).is_some()) {
-        let errors = [0, 1].map(|half| film.half_error(cell, half, known));
+        let errors = [0, 1].map(|half| film.cell_half_error(cell, half, known));
         let units: f64 =
             [0, 1].map(|half| film.half_pixel_count(cell, half) as f64 * f64::from(done[half])).iter().sum();
         let cost = BESIDE + rays[cell] as f64 / units;
         for half in 0..2 {
-            // A one-pixel cell has no other half.
+            // A one-pixel cell has no second half.
             let (error, power) = errors[1 - half].or(errors[half])?;
             let error = error * libm::pow(f64::from(known), power);
             let samples = done[half];
             let goal = samples.saturating_add(1).checked_next_power_of_two().unwrap_or(u32::MAX).min(most);
             let pixels = film.half_pixel_count(cell, half) as f64;
-            halves.push(Half { cell, half, pixels, samples, goal: goal.max(samples), error, power, cost });
+            halves.push(HalfCell {
+                cell,
+                half,
+                pixels,
+                samples,
+                goal: goal.max(samples),
+                error,
+                power,
+                cost,
+            });
         }
     }
     Some(halves)
@@ -190,9 +199,9 @@ mod tests {
         );
     }
 
-    /// Returns the mean of many cells with rare bright samples and an expected value of 1. Runs some rounds
-    /// with priorities based on the noise of the other half, or of the same half if `by_own`. Uses many cells
-    /// because, with few, the samples given to one cell would be missing in the others.
+    /// Returns the mean of many cells with rare bright samples and an expected value of 1. Runs a few rounds
+    /// with priorities based on the noise of the other half, or of the same half if `by_own`. Uses many
+    /// cells. With only a few, giving samples to one cell would noticeably reduce the samples in the others.
     fn rendered(next: &mut impl FnMut() -> f32, by_own: bool) -> f64 {
         const CHANCE: f64 = 0.002;
         let film = Film::new(64 * SIDE, 1, None).expect("a film");

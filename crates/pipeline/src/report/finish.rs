@@ -6,7 +6,7 @@ use super::{Counters, ImageReport, LightsReport, LightsSampled, PhotonsReport, R
 use crate::control::CancelToken;
 use crate::film::range_map::RangeMap;
 use crate::inputs::Inputs;
-use crate::integrators::{RayCounters, receivers};
+use crate::integrators::{RayCounters, light_sampling_mode};
 use crate::output::write::{Guard, atomic_guarded};
 use crate::output::{OutputError, json};
 use crate::plan::Plan;
@@ -14,12 +14,12 @@ use crate::protocol::StageReport;
 use crate::render::film_cache::FilmCache;
 use crate::render::film_state::FilmState;
 use crate::sink::Sink;
-use crate::targets::{OutputTarget, guarded};
+use crate::targets::{OutputTarget, write_guarded};
 use crate::world::World;
 
 /// Results of a request.
 #[derive(Clone, Copy)]
-pub(crate) struct Finished<'a> {
+pub(crate) struct RequestResults<'a> {
     pub(crate) scene: &'a Path,
     pub(crate) plan: &'a Plan,
     pub(crate) world: &'a World,
@@ -32,16 +32,16 @@ pub(crate) struct Finished<'a> {
     pub(crate) is_written: bool,
 }
 
-pub(crate) fn report(finished: &Finished<'_>, stages: Vec<StageReport>, seconds: f64) -> Report {
+pub(crate) fn make_report(finished: &RequestResults<'_>, stages: Vec<StageReport>, seconds: f64) -> Report {
     Report {
         glimt: env!("CARGO_PKG_VERSION"),
         scene: finished.scene.to_string_lossy().into_owned(),
-        image: image(finished),
+        image: image_report(finished),
         settings: finished.plan.effective.clone(),
-        lights: lights(finished),
+        lights: lights_report(finished),
         photons: finished.photons,
         stages,
-        counters: counters(finished),
+        counters: count_work(finished),
         seconds,
         peak_memory_bytes: peak_memory_bytes(),
     }
@@ -62,12 +62,12 @@ pub(crate) fn write_report(
     let unwritable =
         |error: serde_json::Error| OutputError::File { path: path.clone(), source: error.into() };
     let text = json::file(report).map_err(unwritable)?;
-    let target = (OutputTarget::report(path), None);
-    guarded(plan, inputs, target, sink, |guard| atomic_guarded(path, text.as_bytes(), guard, token))
+    let target = (OutputTarget::for_report(path), None);
+    write_guarded(plan, inputs, target, sink, |guard| atomic_guarded(path, text.as_bytes(), guard, token))
 }
 
-/// Removes the report of an earlier image after an unfinished image has replaced that image. Keeps files that
-/// a report must not replace.
+/// Removes an earlier image's report after an unfinished image has replaced that image. Does not remove files
+/// that a report must not replace.
 ///
 /// # Errors
 /// The file cannot be removed. The error contains the file name.
@@ -79,10 +79,10 @@ pub(crate) fn remove_report(plan: &Plan, inputs: &Inputs, sink: &Sink) -> Result
         (guard.may_replace)(&real)?;
         std::fs::remove_file(&real).map_err(failed)
     };
-    guarded(plan, inputs, (OutputTarget::report(path), None), sink, remove)
+    write_guarded(plan, inputs, (OutputTarget::for_report(path), None), sink, remove)
 }
 
-fn image(finished: &Finished<'_>) -> ImageReport {
+fn image_report(finished: &RequestResults<'_>) -> ImageReport {
     let plan = finished.plan;
     let samples = finished.state.film.samples();
     let outputs: &[PathBuf] = if finished.is_written { &plan.outputs } else { &[] };
@@ -96,16 +96,17 @@ fn image(finished: &Finished<'_>) -> ImageReport {
         error: finished.state.film.relative_error(),
         render_seconds: finished.state.render_seconds,
         complete: finished.state.is_complete(plan.settings.render.samples),
-        range: range(finished),
+        range: data_range(finished),
     }
 }
 
-fn lights(finished: &Finished<'_>) -> LightsReport {
+fn lights_report(finished: &RequestResults<'_>) -> LightsReport {
     let lights = &finished.world.lights;
     let settings = &finished.plan.settings;
     let samples = u64::from(settings.render.shadow_samples);
-    let are_gathered = settings.gathers() && finished.photons.is_some_and(|photons| photons.emitted > 0);
-    let selection = lights.sampler(receivers(settings, are_gathered));
+    let are_gathered =
+        settings.gathers_photons() && finished.photons.is_some_and(|photons| photons.emitted > 0);
+    let selection = lights.sampler(light_sampling_mode(settings, are_gathered));
     let (sampled, picks) = match selection {
         Some(selection) => (LightsSampled::Picked, samples * u64::from(selection.picks.count)),
         None => (LightsSampled::All, 0),
@@ -119,8 +120,8 @@ fn lights(finished: &Finished<'_>) -> LightsReport {
     }
 }
 
-fn range(finished: &Finished<'_>) -> Option<[f32; 2]> {
-    let Finished { plan, state, .. } = finished;
+fn data_range(finished: &RequestResults<'_>) -> Option<[f32; 2]> {
+    let RequestResults { plan, state, .. } = finished;
     if plan.tone.range_map == RangeMap::None {
         return None;
     }
@@ -128,7 +129,7 @@ fn range(finished: &Finished<'_>) -> Option<[f32; 2]> {
     plan.tone.resolved_for(&image).range_map.range().map(|range| range.limits())
 }
 
-fn counters(finished: &Finished<'_>) -> Counters {
+fn count_work(finished: &RequestResults<'_>) -> Counters {
     let (world, rays) = (finished.world, finished.rays);
     Counters {
         triangles: world.triangle_count(),

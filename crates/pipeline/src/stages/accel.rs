@@ -3,11 +3,11 @@
 
 use std::sync::Arc;
 
-use super::super::cache::{EvictionCandidate, Memo, Pool};
+use super::super::cache::{EvictionCandidate, Memo, NamedCache};
 use super::super::keys;
 use super::super::protocol::reasons;
 use super::meshes::Meshes;
-use super::{Reading, Staged, Stop};
+use super::{Reading, StageResult, Stop};
 use crate::math::DVec3;
 use crate::scene::description::Scene;
 use crate::scene::fingerprint::{Key, Referents};
@@ -16,8 +16,8 @@ use crate::world::{Geometry, MeshTree, light_lifts, with_lifted_lights};
 /// Cache of the accel stage.
 #[derive(Debug, Default)]
 pub(crate) struct AccelCache {
-    trees: Pool<Key, MeshTree>,
-    geometry: Pool<Key, Geometry>,
+    trees: NamedCache<Key, MeshTree>,
+    geometry: NamedCache<Key, Geometry>,
     /// Offsets for lights that are coplanar with other surfaces.
     lifts: Memo<Vec<DVec3>>,
     /// Key of the current tree over all objects.
@@ -25,18 +25,18 @@ pub(crate) struct AccelCache {
 }
 
 impl AccelCache {
-    pub(crate) fn end(&mut self, success: bool, request: u64) {
-        self.trees.end(success, request);
-        self.geometry.end(success, request);
+    pub(crate) fn end_request(&mut self, success: bool, request: u64) {
+        self.trees.end_request(success, request);
+        self.geometry.end_request(success, request);
     }
 
     pub(crate) fn eviction_candidates(&self) -> impl Iterator<Item = EvictionCandidate> {
         self.trees.eviction_candidates().chain(self.geometry.eviction_candidates())
     }
 
-    pub(crate) fn drop_before(&mut self, request: u64) {
-        self.trees.drop_before(request);
-        self.geometry.drop_before(request);
+    pub(crate) fn evict_unused_before(&mut self, request: u64) {
+        self.trees.evict_unused_before(request);
+        self.geometry.evict_unused_before(request);
     }
 
     /// Returns the most recently built or reused geometry.
@@ -55,7 +55,7 @@ pub(crate) struct AccelResult {
     pub(crate) geometry: Arc<Geometry>,
 }
 
-/// Builds any missing trees in coordinates relative to `origin`. `scene` includes the overrides.
+/// Builds all missing trees, using coordinates relative to `origin`. `scene` includes the overrides.
 ///
 /// # Errors
 /// [`Stop::Cancelled`].
@@ -65,7 +65,7 @@ pub(crate) fn accel(
     meshes: &Meshes,
     cache: &mut AccelCache,
     reading: &Reading<'_>,
-) -> Result<Staged<AccelResult>, Stop> {
+) -> Result<StageResult<AccelResult>, Stop> {
     let (meshes, kept) = trees(scene, meshes, cache, reading)?;
     let lights_key = keys::from(&keys::coplanar(scene, of), origin);
     let lifts = cache.lifts.get(lights_key).cloned().unwrap_or_else(|| light_lifts(scene, &meshes, origin));
@@ -75,19 +75,19 @@ pub(crate) fn accel(
     if let Some(geometry) = cache.geometry.get(&key, key) {
         cache.last = Some(key);
         let why = if is_last { reasons::UNCHANGED } else { reasons::CACHED };
-        return Ok(Staged::reused(AccelResult { meshes, geometry }, why));
+        return Ok(StageResult::reused(AccelResult { meshes, geometry }, why));
     }
-    let build = || Geometry::lifted(scene, &meshes, (origin, lifts), reading.token);
+    let build = || Geometry::with_lifts(scene, &meshes, (origin, lifts), reading.token);
     let geometry = Arc::new(reading.pool.install(build)?);
     cache.geometry.insert(key, key, (geometry.clone(), geometry.own_memory_bytes()));
     cache.last = Some(key);
     let built = meshes.len() - kept;
     let value = AccelResult { meshes, geometry };
     Ok(match (scene.objects.is_empty(), kept) {
-        (true, _) => Staged::skipped(value, reasons::NO_SHAPES),
-        (false, 0) => Staged::done(value, ""),
+        (true, _) => StageResult::skipped(value, reasons::NO_SHAPES),
+        (false, 0) => StageResult::done(value, ""),
         (false, _) => {
-            Staged::done(value, format!("{built} mesh trees built, {kept} kept, one over all objects"))
+            StageResult::done(value, format!("{built} mesh trees built, {kept} kept, one over all objects"))
         }
     })
 }

@@ -17,7 +17,7 @@ type Slot = Arc<Mutex<Option<Arc<Container>>>>;
 #[derive(Debug, Default)]
 pub(crate) struct Containers {
     gltf: Mutex<HashMap<PathBuf, Slot>>,
-    /// Meshes loaded before the meshes stage. Each is handed out once.
+    /// Meshes loaded before the meshes stage. Each can be taken only once.
     ahead: Mutex<HashMap<PathBuf, LoadedMesh>>,
 }
 
@@ -64,7 +64,7 @@ impl Containers {
     }
 
     /// Stores a mesh returned by [`Containers::mesh`] for its next caller.
-    pub(crate) fn keep(&self, path: &Path, mesh: LoadedMesh) {
+    pub(crate) fn store_mesh(&self, path: &Path, mesh: LoadedMesh) {
         self.ahead.lock().unwrap_or_else(PoisonError::into_inner).insert(canonical(path), mesh);
     }
 

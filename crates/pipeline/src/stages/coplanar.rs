@@ -10,17 +10,17 @@ use crate::scene::Loaded;
 use crate::scene::description::Object;
 use crate::scene::diagnostic::Severity;
 use crate::scene::fingerprint::Key;
-use crate::world::{Coplanar, coplanar_lights};
+use crate::world::{CoplanarLight, coplanar_lights};
 
 /// Maximum number of lights to warn about.
 const MAX_WARNINGS: usize = 10;
 
-/// Warns about lights that are moved off the plane of another surface. Reuses the search result if shapes and
-/// lights are unchanged.
-pub(crate) fn coplanar(
+/// Warns about lights that are moved off the plane of another surface. Reuses the previous search result if
+/// shapes and lights are unchanged.
+pub(crate) fn warn_about_coplanar_lights(
     loaded: &Loaded,
     meshes: &Meshes,
-    memo: &mut Memo<Vec<Coplanar>>,
+    memo: &mut Memo<Vec<CoplanarLight>>,
     findings: &mut Findings,
 ) {
     let scene = &loaded.scene;
@@ -36,7 +36,7 @@ pub(crate) fn coplanar(
         format!("the {}{name} on line {}", shape.kind(), loaded.line(span))
     };
     for of_light in found.chunk_by(|a, b| a.light == b.light).take(MAX_WARNINGS) {
-        let [Coplanar { light, surface, .. }, others @ ..] = of_light else { continue };
+        let [CoplanarLight { light, surface, .. }, others @ ..] = of_light else { continue };
         let more = if others.is_empty() { String::new() } else { format!(" and {} more", others.len()) };
         let other = if surface == light { "other faces of its mesh".to_owned() } else { named(*surface) };
         let message = format!("this light is in the plane of {other}{more}");

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::super::cache::Memo;
 use super::super::keys;
 use super::super::protocol::reasons;
-use super::Staged;
+use super::StageResult;
 use super::textures::Textures;
 use crate::control::{CancelToken, Cancelled};
 use crate::lights::infinite::EnvironmentMap;
@@ -25,38 +25,38 @@ pub(crate) fn lights(
     textures: &Textures,
     (memo, skies): (&mut Memo<Arc<Lights>>, &mut SkyMemo),
     token: &CancelToken,
-) -> Result<Staged<Arc<Lights>>, Cancelled> {
+) -> Result<StageResult<Arc<Lights>>, Cancelled> {
     let map = textures.environment.as_ref().map(|(key, _)| key);
-    let declared = patterns(scene).filter_map(|source| textures.key_of.get(&source));
+    let declared = emission_textures(scene).filter_map(|source| textures.key_of.get(&source));
     let patterns: Vec<&Key> = declared.chain(&textures.of_files).collect();
     let key = keys::lights(scene, of, (geometry.origin(), geometry.lifts()), (map, &patterns));
     if let Some(lights) = memo.get(key).filter(|lights| !lights.is_empty()) {
-        return Ok(Staged::reused(lights.clone(), reasons::UNCHANGED));
+        return Ok(StageResult::reused(lights.clone(), reasons::UNCHANGED));
     }
-    let lights = world::lights(scene, geometry, &textures.images, sky(textures, skies), token)?;
+    let lights = world::lights(scene, geometry, &textures.images, sky_map(textures, skies), token)?;
     memo.set(key, lights.clone());
     Ok(match lights.len() {
-        0 => Staged::skipped(lights, reasons::NO_LIGHTS),
-        1 => Staged::done(lights, "1 light"),
+        0 => StageResult::skipped(lights, reasons::NO_LIGHTS),
+        1 => StageResult::done(lights, "1 light"),
         count => {
             let are_picked = |receivers| lights.sampler(receivers).is_some();
             let picked = match (are_picked(SamplingMode::Eye), are_picked(SamplingMode::Paths)) {
-                (true, _) => picked("a subset is sampled", &lights),
-                (false, true) => picked("a subset is sampled after bounces", &lights),
+                (true, _) => describe_light_tree("a subset is sampled", &lights),
+                (false, true) => describe_light_tree("a subset is sampled after bounces", &lights),
                 (false, false) => String::new(),
             };
-            Staged::done(lights, format!("{count} lights{picked}"))
+            StageResult::done(lights, format!("{count} lights{picked}"))
         }
     })
 }
 
 /// Describes the light tree of a scene with too many lights to sample all of them.
-fn picked(which: &str, lights: &Lights) -> String {
+fn describe_light_tree(which: &str, lights: &Lights) -> String {
     format!(", {which}; light tree {} kB", lights.memory_bytes().div_ceil(1000))
 }
 
 /// Returns the textures used by the scene file's emissive materials.
-fn patterns(scene: &Scene) -> impl Iterator<Item = TextureSource> {
+fn emission_textures(scene: &Scene) -> impl Iterator<Item = TextureSource> {
     let shining = scene.materials.iter().filter(|material| material.emits());
     shining.flat_map(move |material| {
         let textures = material.textures().into_iter().filter(|(_, role)| match role {
@@ -73,7 +73,7 @@ fn patterns(scene: &Scene) -> impl Iterator<Item = TextureSource> {
     })
 }
 
-fn sky(textures: &Textures, memo: &mut SkyMemo) -> Option<Arc<EnvironmentMap>> {
+fn sky_map(textures: &Textures, memo: &mut SkyMemo) -> Option<Arc<EnvironmentMap>> {
     let Some((key, texels)) = &textures.environment else {
         *memo = SkyMemo::default();
         return None;
@@ -81,7 +81,7 @@ fn sky(textures: &Textures, memo: &mut SkyMemo) -> Option<Arc<EnvironmentMap>> {
     if let Some(sky) = memo.get(*key) {
         return sky.clone();
     }
-    let sky = world::sky(texels);
+    let sky = world::sky_map(texels);
     memo.set(*key, sky.clone());
     sky
 }

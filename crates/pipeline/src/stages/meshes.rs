@@ -6,11 +6,11 @@ use std::sync::{Arc, OnceLock};
 
 use rayon::prelude::*;
 
-use super::super::cache::Pool;
+use super::super::cache::NamedCache;
 use super::super::protocol::reasons;
 use super::super::watch::content::{Content, FileRead};
 use super::containers::canonical;
-use super::{Counts, Findings, LoadedAsset, Reading, Staged, Stop, loading_result};
+use super::{FileCounts, Findings, LoadedAsset, Reading, StageResult, Stop, loading_result};
 use crate::assets::{AssetError, Companion, Dropped, LoadedMesh};
 use crate::control::{CancelToken, Cancelled, Progress};
 use crate::scene::description::{MeshFile, Scene, UvSet};
@@ -47,22 +47,22 @@ pub(crate) type Meshes = Vec<Arc<CachedMesh>>;
 /// [`Stop::Cancelled`], or there is not enough memory.
 pub(crate) fn meshes(
     loaded: &Loaded,
-    cache: &mut Pool<MeshName, CachedMesh>,
+    cache: &mut NamedCache<MeshName, CachedMesh>,
     findings: &mut Findings,
     reading: &Reading<'_>,
-) -> Result<Staged<Meshes>, Stop> {
+) -> Result<StageResult<Meshes>, Stop> {
     let files = &loaded.scene.mesh_files;
     if files.is_empty() {
-        return Ok(Staged::skipped(Vec::new(), reasons::NO_MESHES));
+        return Ok(StageResult::skipped(Vec::new(), reasons::NO_MESHES));
     }
     let before: Vec<(Content, Option<Arc<CachedMesh>>)> = files
         .iter()
         .map(|file| {
-            let name = name(file);
+            let name = mesh_name(file);
             let content = reading.contents.read(&file.value, reading.token)?;
             if let Some(last) = cache.latest(&name) {
-                // Hash the files that the mesh referenced last time before they are read, because it probably
-                // still references them.
+                // The mesh probably still references the same files as last time. Hash these before they are
+                // read.
                 companions(&last.companions, reading)?;
             }
             Ok((content, cache.get(&name, file_key(file, content))))
@@ -81,33 +81,33 @@ pub(crate) fn meshes(
             .collect::<Result<_, _>>()
     })?;
     let mut meshes = Vec::new();
-    let mut counts = Counts::default();
+    let mut counts = FileCounts::default();
     let mut warnings = MeshWarnings::default();
     let file_materials = uses_file_materials(&loaded.scene);
     for ((file, asset), uses_own) in files.iter().zip(assets).zip(file_materials) {
         let content = asset.files[0].content;
-        asset.files.into_iter().for_each(|file| findings.read(file));
+        asset.files.into_iter().for_each(|file| findings.add_file(file));
         let mesh = match asset.result {
             Ok((mesh, was_kept)) => {
                 counts.kept += usize::from(was_kept);
                 counts.loaded += usize::from(!was_kept);
                 warnings.add(file, &mesh.mesh, uses_own);
                 let bytes = mesh.mesh.mesh.memory_bytes();
-                cache.insert(name(file), file_key(file, content), (mesh.clone(), bytes));
+                cache.insert(mesh_name(file), file_key(file, content), (mesh.clone(), bytes));
                 mesh
             }
             Err(AssetError::Cancelled(_)) => return Err(Stop::Cancelled),
             Err(error @ AssetError::OutOfMemory { .. }) => return Err(Stop::work(error)),
             Err(error) => {
                 counts.failed += 1;
-                findings.asset_error(loaded, file.span.clone(), &error);
+                findings.add_asset_error(loaded, file.span.clone(), &error);
                 let key = file_key(file, content);
                 Arc::new(CachedMesh::new(Arc::default(), key, Vec::new()))
             }
         };
         meshes.push(mesh);
     }
-    warn(loaded, warnings.messages(), findings);
+    add_warnings(loaded, warnings.messages(), findings);
     for object in loaded.scene.objects.iter().filter(|object| object.material.is_none()) {
         if let Some(mesh) = object.shape.mesh()
             && meshes[mesh.file].mesh.lacks_materials()
@@ -115,7 +115,7 @@ pub(crate) fn meshes(
             let name = files[mesh.file].value.display();
             let message = format!("[[mesh]] needs `material`: {name} has no materials of its own");
             let help = "add a line such as `material = \"name\"`";
-            findings.error(loaded, object.span.clone(), message, help);
+            findings.add_error(loaded, object.span.clone(), message, help);
         }
     }
     warn_about_missing_parts(loaded, files, &meshes, findings);
@@ -140,7 +140,7 @@ fn warn_about_missing_parts(
             continue;
         }
         let material = object.material.map(|material| &loaded.scene.materials[material]);
-        let mut warn = |message| findings.warn(loaded, object.span.clone(), message);
+        let mut warn = |message| findings.add_warning(loaded, object.span.clone(), message);
         if mesh.vertex_colors && read.colors.is_empty() {
             warn(format!("`vertex_colors` has no effect: the vertices of {file} have no colors"));
         } else if let Some(material) = material.filter(|own| mesh.vertex_colors && !own.kind.has_color()) {
@@ -162,7 +162,7 @@ fn warn_about_missing_parts(
         if !read.uvs.is_empty() {
             continue;
         }
-        if material.kind.has_direction() {
+        if material.kind.is_anisotropic() {
             warn(format!(
                 "{file} has no texture coordinates, which the `anisotropy` of \"{name}\" needs to determine its direction"
             ));
@@ -178,7 +178,7 @@ fn warn_about_missing_parts(
 /// Canonical path of a mesh file, and a part number.
 pub(crate) type MeshName = (PathBuf, Option<u32>);
 
-fn name(file: &MeshFile) -> MeshName {
+fn mesh_name(file: &MeshFile) -> MeshName {
     (canonical(&file.value), file.part)
 }
 
@@ -199,10 +199,10 @@ fn load_one(
         return Ok(LoadedAsset { files, result: Ok((mesh, true)) });
     }
     let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
-    let read = || reading.sink.asset(&name, |progress| load(path, progress, reading.token));
+    let read = || reading.sink.load_asset(&name, |progress| load(path, progress, reading.token));
     let mut loaded = read();
     if let Ok(mesh) = &loaded
-        && has_appeared(&mesh.companions, reading)?
+        && has_companion_appeared(&mesh.companions, reading)?
     {
         loaded = read();
     }
@@ -225,8 +225,8 @@ fn load_one(
     Ok(LoadedAsset { files, result })
 }
 
-/// Whether a file that was missing during mesh loading now exists and is new to this request.
-fn has_appeared(companions: &[Companion], reading: &Reading<'_>) -> Result<bool, Cancelled> {
+/// Whether a file that was missing when the mesh was loaded now exists and has not been seen by this request.
+fn has_companion_appeared(companions: &[Companion], reading: &Reading<'_>) -> Result<bool, Cancelled> {
     for companion in companions.iter().filter(|companion| companion.hash.is_none()) {
         let is_new = reading.contents.known(&companion.path).is_none();
         let content = reading.contents.read(&companion.path, reading.token)?;
@@ -260,7 +260,8 @@ fn uses_file_materials(scene: &Scene) -> Vec<bool> {
     shown
 }
 
-/// Warnings about mesh files, without duplicates. Dropped faces are summed over all parts of a file.
+/// Warnings about mesh files, without duplicates. The numbers of dropped faces are summed over all parts of a
+/// file.
 #[derive(Default)]
 struct MeshWarnings<'a> {
     all: Vec<(&'a MeshFile, MeshWarning)>,
@@ -276,7 +277,7 @@ enum MeshWarning {
 }
 
 impl<'a> MeshWarnings<'a> {
-    /// Adds a file's warnings. Warnings about its materials are only added if an object uses them.
+    /// Adds a file's warnings. Adds warnings about its materials only if an object uses them.
     fn add(&mut self, file: &'a MeshFile, mesh: &LoadedMesh, uses_own: bool) {
         if mesh.dropped != Dropped::default() {
             let place = *self.dropped.entry(&file.value).or_insert(self.all.len());
@@ -306,7 +307,7 @@ impl<'a> MeshWarnings<'a> {
                 MeshWarning::Message(words) => words,
                 MeshWarning::Dropped(faces, parts) => {
                     let of_parts = if parts > 1 { format!(" in {parts} parts") } else { String::new() };
-                    format!("{}: {}{of_parts}", file.value.display(), dropped(&faces)?)
+                    format!("{}: {}{of_parts}", file.value.display(), describe_dropped_faces(&faces)?)
                 }
             };
             Some((file, words))
@@ -318,20 +319,20 @@ impl<'a> MeshWarnings<'a> {
 /// Maximum number of warnings about all mesh files.
 const MAX_WARNINGS: usize = 100;
 
-fn warn(loaded: &Loaded, warnings: Vec<(&MeshFile, String)>, findings: &mut Findings) {
+fn add_warnings(loaded: &Loaded, warnings: Vec<(&MeshFile, String)>, findings: &mut Findings) {
     let unsaid = warnings.len().saturating_sub(MAX_WARNINGS);
     let last = warnings.last().map(|(file, _)| file.span.clone());
     for (file, message) in warnings.into_iter().take(MAX_WARNINGS) {
-        findings.warn(loaded, file.span.clone(), message);
+        findings.add_warning(loaded, file.span.clone(), message);
     }
     if let Some(span) = last.filter(|_| unsaid > 0) {
         let s = if unsaid == 1 { "" } else { "s" };
-        findings.warn(loaded, span, format!("{unsaid} more warning{s} about mesh files"));
+        findings.add_warning(loaded, span, format!("{unsaid} more warning{s} about mesh files"));
     }
 }
 
 /// Describes the dropped faces. Returns `None` if none were dropped.
-fn dropped(faces: &Dropped) -> Option<String> {
+fn describe_dropped_faces(faces: &Dropped) -> Option<String> {
     let count = |number: u64, what: &str| {
         (number > 0).then(|| format!("{number} face{} {what}", if number == 1 { "" } else { "s" }))
     };
@@ -357,7 +358,7 @@ mod tests {
         folder: tempfile::TempDir,
         sink: Sink,
         pool: rayon::ThreadPool,
-        cache: Pool<MeshName, CachedMesh>,
+        cache: NamedCache<MeshName, CachedMesh>,
         contents: Arc<Contents>,
     }
 
@@ -367,7 +368,7 @@ mod tests {
             let events = std::sync::mpsc::channel().0;
             let sink = Sink { generation: 0, events, previews: Default::default(), within: None };
             let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("a pool");
-            let fixture = Self { folder, sink, pool, cache: Pool::default(), contents: Arc::default() };
+            let fixture = Self { folder, sink, pool, cache: NamedCache::default(), contents: Arc::default() };
             fixture.write("a.obj", OBJ);
             fixture.write("a.mtl", "newmtl m\nKd 1 0 0\n");
             fixture
@@ -485,7 +486,7 @@ mod tests {
         let (mesh, files) = fixture.read(&snapshot);
         assert_eq!((mesh.mesh.mesh.triangles.len(), files[0].content), (1, old), "cached");
         assert_eq!(snapshot.changed(), None);
-        fixture.cache = Pool::default();
+        fixture.cache = NamedCache::default();
         let (mesh, files) = fixture.read(&snapshot);
         assert_eq!((mesh.mesh.mesh.triangles.len(), files[0].content), (2, fixture.hash("a.obj")), "decoded");
         assert_eq!(
@@ -576,10 +577,10 @@ mod tests {
 
     #[test]
     fn dropped_faces_are_counted() {
-        assert_eq!(dropped(&Dropped::default()), None);
+        assert_eq!(describe_dropped_faces(&Dropped::default()), None);
         let some = Dropped { non_finite: 1, degenerate: 12 };
         assert_eq!(
-            dropped(&some).as_deref(),
+            describe_dropped_faces(&some).as_deref(),
             Some("skipped 1 face with non-finite coordinates and 12 faces without area")
         );
     }

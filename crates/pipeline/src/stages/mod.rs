@@ -58,13 +58,13 @@ impl Stop {
 
 /// A stage's result, its status and the reason for the status.
 #[derive(Debug)]
-pub(super) struct Staged<T> {
+pub(super) struct StageResult<T> {
     pub(super) value: T,
     pub(super) status: Status,
     pub(super) why: String,
 }
 
-impl<T> Staged<T> {
+impl<T> StageResult<T> {
     pub(super) fn done(value: T, why: impl Into<String>) -> Self {
         Self { value, status: Status::Done, why: why.into() }
     }
@@ -120,21 +120,21 @@ impl Findings {
         *self = Self { begun: self.begun, ..Self::default() };
     }
 
-    pub(super) fn read(&mut self, file: FileRead) {
+    pub(super) fn add_file(&mut self, file: FileRead) {
         if self.known.insert(file.clone()) {
             self.files.push(file);
         }
     }
 
     /// Replaces a file's recorded content with the decoded content.
-    pub(super) fn read_instead(&mut self, file: FileRead) {
+    pub(super) fn replace_read_file(&mut self, file: FileRead) {
         self.known.retain(|known| known.path != file.path);
         self.files.retain(|known| known.path != file.path);
-        self.read(file);
+        self.add_file(file);
     }
 
-    /// Adds files that may be missing. An error may be due to a nonexistent file, so the text underlined by
-    /// each error is treated as a file name to watch.
+    /// Watches files whose absence may have caused an error. The text underlined by each error is treated as
+    /// a file name.
     pub(super) fn watch_underlined_files(
         &mut self,
         diagnostics: &[Diagnostic],
@@ -150,22 +150,22 @@ impl Findings {
             }
             let path = folder.join(text);
             if let Ok(content) = contents.read(&path, token) {
-                self.read(FileRead { path, content });
+                self.add_file(FileRead { path, content });
             }
         }
     }
 
     /// Adds an error about an asset, located where the scene references it.
-    pub(super) fn asset_error(&mut self, loaded: &Loaded, span: Range<usize>, error: &AssetError) {
+    pub(super) fn add_asset_error(&mut self, loaded: &Loaded, span: Range<usize>, error: &AssetError) {
         self.errors.push(diagnostic_at_span(loaded, span, Severity::Error, error.to_string()));
     }
 
     /// Adds an error about a mismatch between the scene and its assets.
-    pub(super) fn error(&mut self, loaded: &Loaded, span: Range<usize>, message: String, help: &str) {
+    pub(super) fn add_error(&mut self, loaded: &Loaded, span: Range<usize>, message: String, help: &str) {
         self.errors.push(loaded.diagnostic_at(span, Severity::Error, message, Some(help.to_owned())));
     }
 
-    pub(super) fn warn(&mut self, loaded: &Loaded, span: Range<usize>, message: String) {
+    pub(super) fn add_warning(&mut self, loaded: &Loaded, span: Range<usize>, message: String) {
         self.warnings.push(diagnostic_at_span(loaded, span, Severity::Warning, message));
     }
 
@@ -196,24 +196,24 @@ pub(super) struct LoadedAsset<T> {
 }
 
 /// Creates the result of a stage that loads files, including the numbers of loaded and cached files.
-pub(super) fn loading_result<T>(value: T, counts: Counts) -> Staged<T> {
-    let Counts { loaded, kept, failed, left_out } = counts;
+pub(super) fn loading_result<T>(value: T, counts: FileCounts) -> StageResult<T> {
+    let FileCounts { loaded, kept, failed, left_out } = counts;
     if loaded + failed == 0 {
-        return Staged::reused(value, reasons::UNCHANGED);
+        return StageResult::reused(value, reasons::UNCHANGED);
     }
     let parts =
         [(loaded, "loaded"), (kept, "cached"), (failed, "failed"), (left_out, "not needed")].into_iter();
     let parts: Vec<String> =
         parts.filter(|(count, _)| *count > 0).map(|(count, what)| format!("{count} {what}")).collect();
-    Staged::done(value, parts.join(", "))
+    StageResult::done(value, parts.join(", "))
 }
 
 /// File counts of a stage.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Counts {
+pub(super) struct FileCounts {
     pub(super) loaded: usize,
     pub(super) kept: usize,
     pub(super) failed: usize,
-    /// Files not loaded because the view does not need them.
+    /// Files that were not loaded because the view does not need them.
     pub(super) left_out: usize,
 }

@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::super::cache::Memo;
-use super::super::model::{self, ModelText, Show};
+use super::super::model::{self, ModelText, ModelView};
 use super::super::protocol::{Failure, reasons};
 use super::super::watch::content::{Content, FileRead, Snapshot};
 use super::containers::Containers;
-use super::{Findings, Staged, Stop};
+use super::{Findings, StageResult, Stop};
 use crate::assets::gltf::{self, is_gltf};
 use crate::assets::mesh::load as load_mesh;
 use crate::assets::orbiter::load as load_orbiter;
@@ -28,7 +28,7 @@ use crate::scene::sanitize::visible;
 pub(crate) struct Parsed {
     pub(crate) loaded: Arc<scene::Loaded>,
     pub(crate) orbiter: Option<OrbiterCamera>,
-    /// Files that the scene references without the overrides, and files referenced by them.
+    /// Files that the scene references without the overrides, and files that these files reference.
     pub(crate) named: Vec<PathBuf>,
     /// Files that a model's scene depends on, except the model itself.
     companions: Vec<FileRead>,
@@ -45,23 +45,23 @@ pub(crate) struct SceneSource<'a> {
     /// Overrides of scene keys from the command line.
     pub(crate) sets: &'a [String],
     /// How to show a model.
-    pub(crate) show: Show,
+    pub(crate) show: ModelView,
 }
 
-/// Generates a scene for a model. Returns it together with the other files it depends on.
+/// Generates a scene for a model. Also returns the other files that the scene depends on.
 fn model_scene(
     SceneSource { path, sets, show }: SceneSource<'_>,
     (contents, containers): (&Snapshot, &Containers),
     findings: &mut Findings,
     token: &CancelToken,
 ) -> Result<(scene::Loaded, ModelText), Stop> {
-    let made = model::text(path, show, containers, token).map_err(|error| match error {
+    let made = model::scene_text(path, show, containers, token).map_err(|error| match error {
         AssetError::Cancelled(_) => Stop::Cancelled,
         AssetError::OutOfMemory { .. } => Stop::work(error),
         AssetError::Unreadable { path, reason } => {
             // Watch a missing file to detect when it is created.
             if let Ok(content) = contents.read(&path, token) {
-                findings.read(FileRead { path: path.clone(), content });
+                findings.add_file(FileRead { path: path.clone(), content });
             }
             scene_error(&path, format!("cannot read it: {reason}"))
         }
@@ -97,7 +97,7 @@ pub(crate) fn parse(
     memo: &mut Memo<Arc<Parsed>>,
     findings: &mut Findings,
     token: &CancelToken,
-) -> Result<Staged<Arc<Parsed>>, Stop> {
+) -> Result<StageResult<Arc<Parsed>>, Stop> {
     let SceneSource { path, show, .. } = origin;
     if let Held::Differs(held) = held::recover(path) {
         let help =
@@ -110,7 +110,7 @@ pub(crate) fn parse(
     let content = contents.read(path, token)?;
     let is_model = is_model(path);
     if !is_model && (show.from.is_some() || show.up.is_some()) {
-        findings.read(FileRead { path: path.to_owned(), content });
+        findings.add_file(FileRead { path: path.to_owned(), content });
         let message = match show.from {
             Some(_) => "`--from` applies to models; a scene has its own camera",
             None => "`--up` applies to models; scenes are always y-up",
@@ -121,7 +121,7 @@ pub(crate) fn parse(
             message.to_owned(),
         )])));
     }
-    let key = |content| key(origin, content, is_model);
+    let key = |content| scene_key(origin, content, is_model);
     // A model's scene depends on several files. All must be unchanged.
     let is_same = |parsed: &&Arc<Parsed>| {
         let now =
@@ -134,16 +134,16 @@ pub(crate) fn parse(
         None => {
             // Record the current content in case parsing fails. After a success, replace it with the content
             // that was parsed.
-            findings.read(FileRead { path: path.to_owned(), content });
-            read(origin, (contents, containers), memo.latest(), findings, token)?
+            findings.add_file(FileRead { path: path.to_owned(), content });
+            read_scene(origin, (contents, containers), memo.latest(), findings, token)?
         }
     };
-    findings.read_instead(FileRead { path: path.to_owned(), content });
-    companions.iter().for_each(|file| findings.read(file.clone()));
+    findings.replace_read_file(FileRead { path: path.to_owned(), content });
+    companions.iter().for_each(|file| findings.add_file(file.clone()));
     let (orbiter, orbiter_content) = orbiter(&loaded, known.as_deref(), contents, findings, token)?;
     findings.warnings.extend(notes.iter().chain(&loaded.warnings).cloned());
     if let Some(parsed) = known.filter(|parsed| parsed.orbiter_content == orbiter_content) {
-        return Ok(Staged::reused(parsed, reasons::UNCHANGED));
+        return Ok(StageResult::reused(parsed, reasons::UNCHANGED));
     }
     let named = referenced_files(&loaded);
     let parsed = Arc::new(Parsed { loaded, orbiter, named, companions, notes, orbiter_content });
@@ -151,13 +151,13 @@ pub(crate) fn parse(
     if parsed.orbiter.is_some() == orbiter_content.is_some() {
         memo.set(key(content), parsed.clone());
     }
-    Ok(Staged::done(parsed, ""))
+    Ok(StageResult::done(parsed, ""))
 }
 
 /// A scene, the content of its file, the other files it depends on, and the approximations made.
 type ReadScene = (Arc<scene::Loaded>, Content, Vec<FileRead>, Vec<Diagnostic>);
 
-fn read(
+fn read_scene(
     origin: SceneSource<'_>,
     (contents, containers): (&Snapshot, &Containers),
     last: Option<&Arc<Parsed>>,
@@ -180,7 +180,7 @@ fn read(
 }
 
 /// Returns the key of a scene, given the content of its file.
-fn key(SceneSource { path, sets, show }: SceneSource<'_>, content: Content, is_model: bool) -> Key {
+fn scene_key(SceneSource { path, sets, show }: SceneSource<'_>, content: Content, is_model: bool) -> Key {
     let mut key = Fingerprint::new("parse");
     content.add_to(key.path(path));
     sets.iter().for_each(|set| {
@@ -203,7 +203,7 @@ fn with_new_name_hint(
     if let [error] = &mut errors[..]
         && scene::is_absence(error)
         && let Some(last) = last
-        && let Some(file) = scene::same_text_beside(path, &last.loaded.source.shared_text())
+        && let Some(file) = scene::find_renamed_scene(path, &last.loaded.source.shared_text())
     {
         let name = visible(&file.to_string_lossy()).into_owned();
         error.help = Some(format!("{name} {}; run `glimt {name}` to watch it", scene::SAME_TEXT));
@@ -246,18 +246,18 @@ fn orbiter(
     let Camera::Orbiter { file, .. } = &loaded.scene.camera else { return Ok((None, None)) };
     let content = contents.read(&file.value, token)?;
     if let Some(parsed) = known.filter(|parsed| parsed.orbiter_content == Some(content)) {
-        findings.read(FileRead { path: file.value.clone(), content });
+        findings.add_file(FileRead { path: file.value.clone(), content });
         return Ok((parsed.orbiter, Some(content)));
     }
     match load_orbiter(&file.value) {
         Ok((camera, hash)) => {
             let content = contents.decoded(&file.value, hash);
-            findings.read(FileRead { path: file.value.clone(), content });
+            findings.add_file(FileRead { path: file.value.clone(), content });
             Ok((Some(camera), Some(content)))
         }
         Err(error) => {
-            findings.read(FileRead { path: file.value.clone(), content });
-            findings.asset_error(loaded, file.span.clone(), &error);
+            findings.add_file(FileRead { path: file.value.clone(), content });
+            findings.add_asset_error(loaded, file.span.clone(), &error);
             Ok((None, Some(content)))
         }
     }

@@ -16,7 +16,7 @@ use super::super::protocol::{PhotonsReport, reasons};
 use super::super::sink::Sink;
 use super::super::stopwatch::Stopwatch;
 use super::super::trace::TICK;
-use super::{Staged, Stop};
+use super::{StageResult, Stop};
 use crate::control::{CancelToken, Cancelled, Progress};
 use crate::integrators::{PhotonMaps, PhotonPass, PhotonSettings, Photons, RenderSettings};
 use crate::scene::description::Render;
@@ -99,7 +99,7 @@ impl PhotonStore {
         mut tick: impl FnMut(),
     ) -> Result<PhotonMaps, Cancelled> {
         let first = samples.start;
-        let pass = |number| self.pass(number, sending, &mut tick);
+        let pass = |number| self.trace_pass(number, sending, &mut tick);
         let passes = samples.map(pass).collect::<Result<Vec<_>, _>>()?;
         let bytes = passes.iter().map(|pass| pass.memory_bytes()).sum();
         let sent = self.sent.get();
@@ -107,7 +107,7 @@ impl PhotonStore {
         Ok(PhotonMaps { first, passes })
     }
 
-    fn pass(
+    fn trace_pass(
         &self,
         number: u32,
         sending: PhotonContext<'_>,
@@ -132,7 +132,7 @@ impl PhotonStore {
             seconds: sent.seconds + watch.seconds(),
             ..sent
         });
-        let has_room = self.kept_bytes() + pass.memory_bytes() <= MAX_KEPT_BYTES;
+        let has_room = self.cached_bytes() + pass.memory_bytes() <= MAX_KEPT_BYTES;
         let mut kept = self.kept.borrow_mut();
         if number as usize == kept.len() && (has_room || number == 0) {
             kept.push(Arc::clone(&pass));
@@ -140,7 +140,7 @@ impl PhotonStore {
         Ok(pass)
     }
 
-    fn kept_bytes(&self) -> usize {
+    fn cached_bytes(&self) -> usize {
         self.kept.borrow().iter().map(|pass| pass.memory_bytes()).sum()
     }
 
@@ -158,7 +158,7 @@ impl PhotonStore {
             per_second: if seconds > 0.0 { emitted as f64 / seconds } else { 0.0 },
             caustic_radius: caustic,
             bounced_radius: bounced,
-            kept_memory_bytes: self.kept_bytes() as u64,
+            kept_memory_bytes: self.cached_bytes() as u64,
             used_memory_bytes: most_alive_bytes as u64,
         }
     }
@@ -185,7 +185,7 @@ fn run_with_ticks<T: Send>(
 }
 
 /// Traces the first photons if the image gathers them. `wanted` comes from the command line, and `enabled`
-/// from the scene. Calls `tick` regularly, and `before` once before any tracing.
+/// from the scene. Calls `tick` regularly, and calls `before` once before tracing any photons.
 ///
 /// # Errors
 /// [`Stop::Cancelled`], or an error from `before`.
@@ -196,9 +196,9 @@ pub(crate) fn photons(
     sending: PhotonContext<'_>,
     mut tick: impl FnMut(),
     before: impl FnOnce() -> Result<(), Stop>,
-) -> Result<Staged<()>, Stop> {
+) -> Result<StageResult<()>, Stop> {
     let settings = sending.plan.settings.effective();
-    let skipped = |why: &str| Ok(Staged::skipped((), why));
+    let skipped = |why: &str| Ok(StageResult::skipped((), why));
     let Some(of_photons) = settings.photons else {
         return match wanted.unwrap_or(enabled) {
             true => skipped(reasons::NOT_USED_BY_PATH),
@@ -206,9 +206,9 @@ pub(crate) fn photons(
             false => skipped(reasons::PHOTONS_OFF),
         };
     };
-    if !settings.gathers() {
+    if !settings.gathers_photons() {
         let deeper = Render { max_depth: u32::MAX, ..settings.render };
-        return skipped(match (RenderSettings { render: deeper, ..settings }).gathers() {
+        return skipped(match (RenderSettings { render: deeper, ..settings }).gathers_photons() {
             true => reasons::TOO_FEW_BOUNCES,
             false => reasons::NOT_NEEDED_FOR_VIEW,
         });
@@ -217,8 +217,8 @@ pub(crate) fn photons(
     if let Some(store) = cache.get(key) {
         store.sent.set(PhotonCounts::default());
         return Ok(match store.photons.emits_photons() {
-            true => Staged::reused((), reasons::UNCHANGED),
-            false => Staged::skipped((), reasons::NO_SPECULAR_SURFACES),
+            true => StageResult::reused((), reasons::UNCHANGED),
+            false => StageResult::skipped((), reasons::NO_SPECULAR_SURFACES),
         });
     }
     before()?;
@@ -227,7 +227,7 @@ pub(crate) fn photons(
     let send = |progress: Progress<'_>| {
         run_with_ticks(pool, &mut tick, || Photons::new(world, &settings, of_photons, progress, token))
     };
-    let (photons, first) = sending.sink.asset("photons", send)?;
+    let (photons, first) = sending.sink.load_asset("photons", send)?;
     let seconds = watch.seconds();
     let (passes, emitted, stored, lookups) = (1, first.emitted, first.stored(), first.lookups);
     let sent = PhotonCounts { passes, emitted, stored, lookups, seconds, most_alive_bytes: 0 };
@@ -235,5 +235,9 @@ pub(crate) fn photons(
     let emits_photons = photons.emits_photons();
     let store = PhotonStore { photons, kept, sent: Cell::new(sent) };
     cache.set(key, store);
-    Ok(if emits_photons { Staged::done((), "") } else { Staged::skipped((), reasons::NO_SPECULAR_SURFACES) })
+    Ok(if emits_photons {
+        StageResult::done((), "")
+    } else {
+        StageResult::skipped((), reasons::NO_SPECULAR_SURFACES)
+    })
 }

@@ -5,13 +5,13 @@
 //! is a function of its pixel and index, and each pixel sums its samples in order.
 
 use super::photons::PhotonStore;
-use super::{Staged, Stop};
+use super::{StageResult, Stop};
 use crate::film::Convergence;
 use crate::integrators::RayCounters;
 use crate::protocol::reasons;
 use crate::render::film_cache::FilmCache;
 use crate::render::film_state::FilmState;
-use crate::render::scheduler::{Rendering, Scheduler};
+use crate::render::scheduler::{RenderStageInputs, Scheduler};
 use crate::scene::description::Render;
 use crate::scene::fingerprint::Key;
 
@@ -22,8 +22,8 @@ use crate::scene::fingerprint::Key;
 pub(crate) fn render(
     key: Key,
     films: &mut FilmCache,
-    rendering: &Rendering<'_>,
-) -> Result<Staged<RayCounters>, Stop> {
+    rendering: &RenderStageInputs<'_>,
+) -> Result<StageResult<RayCounters>, Stop> {
     let Render { samples: wanted, error, .. } = rendering.plan.settings.render;
     let is_other = films.current().is_some_and(|current| current.key != key);
     films.select(key, |kept| !rendering.force && kept.has_at_most(wanted));
@@ -34,13 +34,13 @@ pub(crate) fn render(
         };
         let (plan, most_bytes) = (rendering.plan, rendering.most_film_bytes);
         let state = || FilmState::new(key, plan, most_bytes, convergence, rendering.share.clone());
-        let empty = films.put(state).map_err(Stop::work)?;
+        let empty = films.replace_current(state).map_err(Stop::work)?;
         let is_of_use = match rendering.checkpointer.filter(|_| !rendering.force) {
             Some(checkpointer) => checkpointer.resume(empty, wanted)?,
             None => true,
         };
         if !is_of_use {
-            films.put(state).map_err(Stop::work)?;
+            films.replace_current(state).map_err(Stop::work)?;
         }
     }
     let Some(state) = films.current_mut() else { return Err(Stop::work("the film is missing")) };
@@ -52,14 +52,14 @@ pub(crate) fn render(
     let mut scheduler = Scheduler::new(state, rendering);
     if finished {
         scheduler.show();
-        scheduler.state.traced = scheduler.traced();
+        scheduler.state.traced = scheduler.total_rays();
         let why = match (is_part, is_resumed, is_other) {
             (true, ..) => reasons::PART_COMPLETE,
             (false, true, _) => reasons::CHECKPOINT_COMPLETE,
             (false, false, true) => reasons::CACHED,
             (false, false, false) => reasons::UNCHANGED,
         };
-        return Ok(Staged::reused(scheduler.rays, why));
+        return Ok(StageResult::reused(scheduler.rays, why));
     }
     scheduler.state.ended_by = None;
     scheduler.state.is_passing = rendering.is_moved;
@@ -68,15 +68,15 @@ pub(crate) fn render(
     Ok(match (!scheduler.state.is_complete(wanted), had) {
         (true, _) => {
             state.ended_by = budget;
-            Staged::done(rays, reasons::TIME_LIMIT_REACHED)
+            StageResult::done(rays, reasons::TIME_LIMIT_REACHED)
         }
         (false, _) if state.goals.are_below(wanted) => {
-            let missed = state.missed(error.into()).map_or_else(String::new, |(tiles, worst)| {
+            let missed = state.tiles_above_target(error.into()).map_or_else(String::new, |(tiles, worst)| {
                 format!("; {tiles} with few noisy pixels: up to {worst:.2}")
             });
-            Staged::done(rays, format!("{}{missed}", reasons::NOISE_TARGET_REACHED))
+            StageResult::done(rays, format!("{}{missed}", reasons::NOISE_TARGET_REACHED))
         }
-        (false, 0) => Staged::done(rays, ""),
-        (false, _) => Staged::done(rays, reasons::resumed_after(had)),
+        (false, 0) => StageResult::done(rays, ""),
+        (false, _) => StageResult::done(rays, reasons::resumed_after(had)),
     })
 }

@@ -8,12 +8,12 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::super::cache::{EvictionCandidate, Pool};
+use super::super::cache::{EvictionCandidate, NamedCache};
 use super::super::protocol::reasons;
 use super::super::watch::content::{Content, FileRead};
 use super::containers::{ImageInput, canonical};
 use super::meshes::Meshes;
-use super::{Counts, Findings, Reading, Staged, Stop, loading_result};
+use super::{FileCounts, Findings, Reading, StageResult, Stop, loading_result};
 use crate::assets::AssetError;
 use crate::assets::image::{
     ColorCurve, EmbeddedImage, ImageEncoding, ImageLimits, LoadedImage, coverage, load_embedded, load_hashed,
@@ -28,16 +28,17 @@ use crate::scene::diagnostic::Severity;
 use crate::scene::fingerprint::{Fingerprint, Key};
 use crate::scene::{Loaded, is_model};
 use crate::world::{
-    Cutoff, Image, Images, NeededTexture, TextureNeeds, TextureSource, environment_source, textures_needed,
+    CutoffBits, Image, Images, NeededTexture, TextureNeeds, TextureSource, environment_source,
+    textures_needed,
 };
 
 /// Maximum total size of a scene's texels in bytes.
 const MAX_BYTES: u64 = 2 << 30;
 
 /// Canonical path of an image, and how to interpret its values.
-type TextureName = (PathBuf, Option<u32>, ImageEncoding, Option<Cutoff>);
+type TextureName = (PathBuf, Option<u32>, ImageEncoding, Option<CutoffBits>);
 
-fn name(source: &TextureSource) -> TextureName {
+fn texture_name(source: &TextureSource) -> TextureName {
     (canonical(&source.path), source.image, source.encoding, source.coverage)
 }
 
@@ -51,8 +52,8 @@ struct DecodedTexture {
 /// Texture cache. It has one entry per file and encoding, and one for the mipmaps if a material uses them.
 #[derive(Debug, Default)]
 pub(crate) struct TextureCache {
-    texels: Pool<TextureName, DecodedTexture>,
-    mipmaps: Pool<TextureName, Mipmaps>,
+    texels: NamedCache<TextureName, DecodedTexture>,
+    mipmaps: NamedCache<TextureName, Mipmaps>,
     /// Image files referenced by glTF files, by texture name.
     linked: HashMap<TextureName, PathBuf>,
 }
@@ -60,21 +61,21 @@ pub(crate) struct TextureCache {
 impl TextureCache {
     /// Whether all of these textures are cached, even if their files have changed since.
     fn has_all(&self, needed: &[NeededTexture]) -> bool {
-        needed.iter().all(|one| self.texels.latest(&name(&one.source)).is_some())
+        needed.iter().all(|one| self.texels.latest(&texture_name(&one.source)).is_some())
     }
 
-    pub(crate) fn end(&mut self, success: bool, request: u64) {
-        self.texels.end(success, request);
-        self.mipmaps.end(success, request);
+    pub(crate) fn end_request(&mut self, success: bool, request: u64) {
+        self.texels.end_request(success, request);
+        self.mipmaps.end_request(success, request);
     }
 
     pub(crate) fn eviction_candidates(&self) -> impl Iterator<Item = EvictionCandidate> {
         self.texels.eviction_candidates().chain(self.mipmaps.eviction_candidates())
     }
 
-    pub(crate) fn drop_before(&mut self, request: u64) {
-        self.texels.drop_before(request);
-        self.mipmaps.drop_before(request);
+    pub(crate) fn evict_unused_before(&mut self, request: u64) {
+        self.texels.evict_unused_before(request);
+        self.mipmaps.evict_unused_before(request);
         let texels = &self.texels;
         self.linked.retain(|name, _| texels.latest(name).is_some());
     }
@@ -111,12 +112,12 @@ pub(crate) struct NeededTextures {
     pub(crate) textures: Vec<NeededTexture>,
     /// Number of textures that are used by the scene but not needed for this view.
     pub(crate) left_out: usize,
-    /// Whether a missing texture is an error even for a model. If not, the model is shown without it.
+    /// Whether a missing texture is an error even for a model. Otherwise, the model is shown without it.
     pub(crate) are_required: bool,
 }
 
 /// Returns the textures that visible materials need for this view. If all of the scene's textures are cached,
-/// returns all of them, so that lights and trees that depend on them can be reused.
+/// returns all of them, so that the lights and trees that depend on them can be reused.
 pub(crate) fn needed(
     loaded: &Loaded,
     meshes: &Meshes,
@@ -125,12 +126,12 @@ pub(crate) fn needed(
 ) -> NeededTextures {
     let meshes: Vec<_> = meshes.iter().map(|kept| kept.mesh.clone()).collect();
     let all = textures_needed(&loaded.scene, &meshes, TextureNeeds::ALL);
-    let of_picture = textures_needed(&loaded.scene, &meshes, lookups);
-    let left_out = all.len() - of_picture.len();
+    let for_image = textures_needed(&loaded.scene, &meshes, lookups);
+    let left_out = all.len() - for_image.len();
     if left_out == 0 || cache.has_all(&all) {
         return NeededTextures { textures: all, ..NeededTextures::default() };
     }
-    NeededTextures { textures: of_picture, left_out, ..NeededTextures::default() }
+    NeededTextures { textures: for_image, left_out, ..NeededTextures::default() }
 }
 
 /// An image and all textures that use it.
@@ -160,7 +161,7 @@ pub(crate) fn textures(
     cache: &mut TextureCache,
     findings: &mut Findings,
     reading: &Reading<'_>,
-) -> Result<Staged<Textures>, Stop> {
+) -> Result<StageResult<Textures>, Stop> {
     let mut textures = Textures::default();
     let NeededTextures { textures: needed, left_out, are_required } = needed;
     if needed.is_empty() {
@@ -168,20 +169,20 @@ pub(crate) fn textures(
             0 => reasons::NO_TEXTURES,
             _ => reasons::NOT_NEEDED_FOR_VIEW,
         };
-        return Ok(Staged::skipped(textures, why));
+        return Ok(StageResult::skipped(textures, why));
     }
     let environment = environment_source(&loaded.scene);
     let images = images(needed, cache, reading)?;
     let assets = load_all(&images, MAX_BYTES, reading);
-    let mut counts = Counts::default();
+    let mut counts = FileCounts::default();
     for (mut image, (contents, asset)) in images.into_iter().zip(assets) {
         (image.content, image.linked) = contents;
         let key = image.key();
         for one in &image.asked_by {
-            findings.read(FileRead { path: one.source.path.clone(), content: image.content });
+            findings.add_file(FileRead { path: one.source.path.clone(), content: image.content });
         }
         if let Some(file) = &image.linked {
-            findings.read(file.clone());
+            findings.add_file(file.clone());
             cache.linked.insert(image.name.clone(), file.path.clone());
         }
         match asset {
@@ -208,7 +209,7 @@ pub(crate) fn textures(
                 warn_about_gray_normal_map(loaded, &image, texels, findings);
                 warn_about_opaque_alpha(loaded, &image, texels, findings);
                 for warning in &decoded.warnings {
-                    findings.warn(loaded, place(loaded, image.asked_by[0]), warning.clone());
+                    findings.add_warning(loaded, reference_span(loaded, image.asked_by[0]), warning.clone());
                 }
                 if let Some(mipmaps) = &mipmaps {
                     let bytes = mipmaps.memory_bytes();
@@ -232,9 +233,9 @@ pub(crate) fn textures(
                         (Some(material), Some(file)) => {
                             let file = loaded.scene.mesh_files[file].value.display();
                             let help = format!("it is used by the material \"{material}\" of {file}");
-                            findings.error(loaded, place(loaded, one), error.to_string(), &help);
+                            findings.add_error(loaded, reference_span(loaded, one), error.to_string(), &help);
                         }
-                        _ => findings.asset_error(loaded, place(loaded, one), &error),
+                        _ => findings.add_asset_error(loaded, reference_span(loaded, one), &error),
                     }
                 }
             }
@@ -243,14 +244,14 @@ pub(crate) fn textures(
     if let Some((_, texels)) = textures.environment.as_ref().filter(|(_, texels)| texels.is_black()) {
         let size = format!("{} × {}", texels.width, texels.height);
         let message = format!("the environment map is black: none of its {size} pixels emits light");
-        findings.warn(loaded, environment_span(&loaded.scene).unwrap_or(0..0), message);
+        findings.add_warning(loaded, environment_span(&loaded.scene).unwrap_or(0..0), message);
     }
-    Ok(loading_result(textures, Counts { left_out: *left_out, ..counts }))
+    Ok(loading_result(textures, FileCounts { left_out: *left_out, ..counts }))
 }
 
-/// Warns about an unreadable image of a model and replaces it with a constant. This preserves the material's
-/// factors, except that emission is dropped. Materials from mesh files have their own values to use without a
-/// texture.
+/// Warns about an unreadable image of a model and replaces it with a constant. The material's factors are
+/// preserved, except that emission is dropped. Materials from mesh files provide their own values for use
+/// without a texture.
 fn substitute_texture(
     loaded: &Loaded,
     one: &NeededTexture,
@@ -261,8 +262,12 @@ fn substitute_texture(
     let file = loaded.path.display();
     let mut warn = |material: &str| {
         let help = format!("glimt shows the material \"{material}\" of {file} without it");
-        let warning =
-            loaded.diagnostic_at(place(loaded, one), Severity::Warning, error.to_string(), Some(help));
+        let warning = loaded.diagnostic_at(
+            reference_span(loaded, one),
+            Severity::Warning,
+            error.to_string(),
+            Some(help),
+        );
         if !findings.warnings.contains(&warning) {
             findings.warnings.push(warning);
         }
@@ -306,10 +311,10 @@ fn warn_about_unusable_pixels(
     let path = image.path().display();
     let message =
         format!("{path}: {count} negative, not finite or above 1e18 in a channel; glimt uses 0 instead");
-    findings.warn(loaded, place(loaded, image.asked_by[0]), message);
+    findings.add_warning(loaded, reference_span(loaded, image.asked_by[0]), message);
 }
 
-/// Warns about a gray normal map, which probably contains heights. If it comes from a mesh file, it has no
+/// Warns about a gray normal map, which probably contains heights. A gray normal map from a mesh file has no
 /// effect.
 fn warn_about_gray_normal_map(
     loaded: &Loaded,
@@ -326,7 +331,7 @@ fn warn_about_gray_normal_map(
     let path = image.path().display();
     let message =
         format!("the normal map {path} of \"{material}\" is gray and probably contains heights: {effect}");
-    findings.warn(loaded, place(loaded, one), message);
+    findings.add_warning(loaded, reference_span(loaded, one), message);
 }
 
 /// Warns about an image used with `channel = "a"` whose alpha is 1 everywhere.
@@ -343,7 +348,7 @@ fn warn_about_opaque_alpha(
     let Some(one) = image.asked_by.iter().find(is_alpha).filter(|_| texels.is_white()) else { return };
     let path = image.path().display();
     let message = format!("{path} has no alpha below 1: `channel = \"a\"` is 1 everywhere");
-    findings.warn(loaded, place(loaded, one), message);
+    findings.add_warning(loaded, reference_span(loaded, one), message);
 }
 
 /// Returns the span of the environment map's file name.
@@ -385,7 +390,7 @@ fn images<'a>(
     let mut images: Vec<TextureRequest<'a>> = Vec::new();
     let mut known = HashMap::new();
     for one in needed {
-        let name = name(&one.source);
+        let name = texture_name(&one.source);
         let index = *known.entry(name.clone()).or_insert(images.len());
         if let Some(image) = images.get_mut(index) {
             image.asked_by.push(one);
@@ -409,8 +414,8 @@ fn images<'a>(
     Ok(images)
 }
 
-/// Loads all images. Returns an error for each image that would exceed `most_bytes` together with the images
-/// before it.
+/// Loads all images. Returns an error for each image whose size, added to that of the images before it,
+/// exceeds `most_bytes`.
 fn load_all(
     images: &[TextureRequest<'_>],
     most_bytes: u64,
@@ -466,7 +471,7 @@ type TextureContents = (Content, Option<FileRead>);
 /// An image, its mipmaps, and whether both were cached.
 type LoadedTexture = (Arc<DecodedTexture>, Option<Arc<Mipmaps>>, bool);
 
-/// Loads an image and its mipmaps. Updates `contents` to the contents that were decoded.
+/// Loads an image and its mipmaps. Sets `contents` to the contents that were decoded.
 fn load_one(
     image: &TextureRequest<'_>,
     contents: &mut TextureContents,
@@ -495,7 +500,7 @@ fn load_one(
     Ok((decoded, mipmaps, was_kept))
 }
 
-/// Decodes an image. Updates `contents` to the contents that were decoded.
+/// Decodes an image. Sets `contents` to the contents that were decoded.
 fn decode(
     image: &TextureRequest<'_>,
     contents: &mut TextureContents,
@@ -514,7 +519,7 @@ fn decode(
                     let within = EmbeddedImage { path: image.path(), bytes };
                     let load =
                         |progress: Progress<'_>| load_embedded(within, encoding, limits, progress, token);
-                    return reading.sink.asset(&one.name, load);
+                    return reading.sink.load_asset(&one.name, load);
                 }
                 ImageInput::File(path) => {
                     let content = reading.contents.read(&path, token)?;
@@ -525,7 +530,7 @@ fn decode(
         }
     };
     let load = |progress: Progress<'_>| load_hashed(&file, encoding, limits, progress, token);
-    let (texels, hash) = reading.sink.asset(&one.name, load)?;
+    let (texels, hash) = reading.sink.load_asset(&one.name, load)?;
     let content = reading.contents.decoded(&file, hash);
     match &mut contents.1 {
         Some(linked) => linked.content = content,
@@ -586,7 +591,7 @@ pub(crate) fn add_declared(loaded: &Loaded, wanted: &mut Vec<NeededTexture>) {
 }
 
 /// Returns the span that references a texture: its own table, or the mesh whose materials use it.
-fn place(loaded: &Loaded, one: &NeededTexture) -> Range<usize> {
+fn reference_span(loaded: &Loaded, one: &NeededTexture) -> Range<usize> {
     let scene = &loaded.scene;
     let declared = one.declared.map(|index| scene.textures[index].file.span.clone());
     let mesh = || one.mesh_file.map(|index| scene.mesh_files[index].span.clone());
@@ -641,7 +646,7 @@ mod tests {
         bench.edit("[0.5, 0.5, 0.5]", "[0.6, 0.5, 0.5]");
         let report = bench.done().0;
         assert_eq!(report.stages[Stage::Textures as usize].status, Status::Reused);
-        // Changes must be detected under both names.
+        // Changes must be detected through both names.
         fs::write(bench.path("skin.ppm"), "P6\n1 1\n255\nxyz").expect("written");
         assert_eq!(bench.done().0.stages[Stage::Textures as usize].status, Status::Done);
     }

@@ -8,13 +8,13 @@ use serde_json::Value;
 use super::super::inputs::Inputs;
 use super::super::plan::Plan;
 use super::super::protocol::{Writing, reasons};
-use super::super::render::checkpointer::head;
+use super::super::render::checkpointer::create_header;
 use super::super::render::film_state::FilmState;
 use super::super::sink::Sink;
-use super::super::targets::{OutputTarget, conflicts, guarded};
+use super::super::targets::{OutputTarget, conflicts, write_guarded};
 use super::super::turntable::Turn;
 use super::super::watch::content::{Content, Contents};
-use super::{Staged, Stop};
+use super::{StageResult, Stop};
 use crate::choice::Choice;
 use crate::control::CancelToken;
 use crate::film::tone::develop;
@@ -31,18 +31,23 @@ const SCENE: &str = "glimt:scene";
 
 /// Images written by glimt.
 #[derive(Debug, Default)]
-pub(crate) struct WrittenFiles {
+pub(crate) struct WrittenImages {
     /// Image key and file content after the write, for each file.
     files: HashMap<PathBuf, (Key, Content)>,
-    /// Key of the scene's own image, if all its output files contain it.
+    /// Key of the scene's own image, if all of its output files are up to date.
     pub(crate) own: Option<Key>,
-    /// Folders already cleaned of temporary files from killed processes, during this write or turntable.
+    /// Folders from which this write or turntable has already removed the temporary files of killed
+    /// processes.
     sweep: FolderSweep,
 }
 
-impl WrittenFiles {
+impl WrittenImages {
     /// Returns the first existing file whose content was not written by glimt.
-    pub(crate) fn first_foreign<'a>(&self, paths: &'a [PathBuf], contents: &Contents) -> Option<&'a Path> {
+    pub(crate) fn first_foreign_file<'a>(
+        &self,
+        paths: &'a [PathBuf],
+        contents: &Contents,
+    ) -> Option<&'a Path> {
         let holds = |path: &Path, known: &Content| {
             // Use a token that is never cancelled.
             contents.read(path, &CancelToken::new()).is_ok_and(|content| content == *known)
@@ -57,7 +62,7 @@ impl WrittenFiles {
         self.files.is_empty()
     }
 
-    /// Forgets all files, so that the next write rewrites them.
+    /// Forgets all files, so that the next write stage writes them again.
     fn forget(&mut self) {
         self.files.clear();
         self.own = None;
@@ -126,11 +131,11 @@ pub(crate) fn write_if_wanted(
     writing: Writing,
     state: &FilmState,
     to: Destination<'_>,
-    written: &mut WrittenFiles,
+    written: &mut WrittenImages,
     token: &CancelToken,
-) -> Result<Staged<bool>, Stop> {
+) -> Result<StageResult<bool>, Stop> {
     match writing {
-        Writing::No => Ok(Staged::skipped(false, reasons::PREVIEW_ONLY)),
+        Writing::No => Ok(StageResult::skipped(false, reasons::PREVIEW_ONLY)),
         Writing::Try | Writing::Must => write(state, to, written, token, writing == Writing::Must),
     }
 }
@@ -139,14 +144,14 @@ pub(crate) fn write_if_wanted(
 /// events. Returns whether all files are now up to date.
 ///
 /// # Errors
-/// [`Stop::Cancelled`]. If `is_must`, also the last failure to write a file.
+/// [`Stop::Cancelled`], or if `is_must`, the last failure to write a file.
 fn write(
     state: &FilmState,
     to: Destination<'_>,
-    written: &mut WrittenFiles,
+    written: &mut WrittenImages,
     token: &CancelToken,
     is_must: bool,
-) -> Result<Staged<bool>, Stop> {
+) -> Result<StageResult<bool>, Stop> {
     let Destination { plan, contents, is_own, sink, .. } = to;
     if plan.turn.is_none_or(|turn| turn.number == 0) {
         written.sweep = FolderSweep::default();
@@ -154,7 +159,7 @@ fn write(
     let mut radiance: Option<RadianceImage> = None;
     let (mut count, mut errors) = (0, Vec::new());
     for path in &plan.outputs {
-        let key = key(state, plan, path);
+        let key = image_file_key(state, plan, path);
         if let Some((known, content)) = written.files.get(path)
             && *known == key
             && contents.read(path, token)? == *content
@@ -180,7 +185,7 @@ fn write(
                 let content = contents.read(path, &CancelToken::new())?;
                 contents.outputs.end(path, Some(content));
                 written.files.insert(path.clone(), (key, content));
-                sink.written(path, bytes, is_own);
+                sink.image_written(path, bytes, is_own);
             }
             Err(error) => {
                 contents.outputs.end(path, None);
@@ -196,24 +201,24 @@ fn write(
     contents.outputs.retain(|path| outputs.contains(path));
     match (errors.is_empty(), count) {
         (false, _) => {
-            // Report each failure separately, except the last one if it is returned.
+            // Report each failure separately, except for the last one if it is returned instead.
             let last = errors.last().map(|(_, message)| message.clone()).unwrap_or_default();
             errors.truncate(errors.len() - usize::from(is_must));
             errors.into_iter().for_each(|(path, message)| sink.write_failed(Some(path), message));
-            if is_must { Err(Stop::work(last)) } else { Ok(Staged::skipped(false, last)) }
+            if is_must { Err(Stop::work(last)) } else { Ok(StageResult::skipped(false, last)) }
         }
-        (true, 0) => Ok(Staged::reused(true, reasons::ALREADY_WRITTEN)),
-        (true, 1) => Ok(Staged::done(true, "")),
-        (true, _) => Ok(Staged::done(true, format!("{count} files"))),
+        (true, 0) => Ok(StageResult::reused(true, reasons::ALREADY_WRITTEN)),
+        (true, 1) => Ok(StageResult::done(true, "")),
+        (true, _) => Ok(StageResult::done(true, format!("{count} files"))),
     }
 }
 
 /// Writes the image at the user's request, even if the files are up to date. Reports failures as events.
 /// Returns whether all files were written.
-pub(crate) fn write_on_request(state: &FilmState, to: Destination<'_>, written: &mut WrittenFiles) -> bool {
+pub(crate) fn write_on_request(state: &FilmState, to: Destination<'_>, written: &mut WrittenImages) -> bool {
     let conflicts = conflicts(to.plan, to.inputs);
     if !conflicts.is_empty() {
-        to.sink.refused(conflicts);
+        to.sink.write_conflicts(conflicts);
         return false;
     }
     written.forget();
@@ -228,7 +233,7 @@ pub(crate) fn write_on_request(state: &FilmState, to: Destination<'_>, written: 
 
 /// Finished frames of a turntable, with their sample counts.
 #[derive(Debug, Default)]
-pub(crate) struct Frames(Vec<(Picture, SampleStats)>);
+pub(crate) struct TurntableFrames(Vec<(Picture, SampleStats)>);
 
 /// Adds an image to the turntable's frames. After the last frame, writes the animations. Returns whether they
 /// were written.
@@ -238,16 +243,16 @@ pub(crate) struct Frames(Vec<(Picture, SampleStats)>);
 pub(crate) fn write_animation(
     state: &FilmState,
     to: Destination<'_>,
-    (turn, frames): (Turn, &mut Frames),
+    (turn, frames): (Turn, &mut TurntableFrames),
     token: &CancelToken,
-) -> Result<Staged<bool>, Stop> {
+) -> Result<StageResult<bool>, Stop> {
     let Destination { plan, inputs, sink, .. } = to;
-    let finish = finish(plan);
+    let finish = develop_settings(plan);
     let image = finish.image(&state.film);
     frames.0.truncate(turn.number as usize);
     frames.0.push((develop(&image, &finish.tone.resolved_for(&image)), state.film.samples()));
     if !turn.is_last() {
-        return Ok(Staged::skipped(false, format!("frame {} of {}", turn.number + 1, turn.of)));
+        return Ok(StageResult::skipped(false, format!("frame {} of {}", turn.number + 1, turn.of)));
     }
     let (frames, samples): (Vec<_>, Vec<_>) = std::mem::take(frames).0.into_iter().unzip();
     let samples = SampleStats {
@@ -258,19 +263,19 @@ pub(crate) fn write_animation(
     for path in &plan.moving {
         let Some(format) = AnimationFormat::from_path(path) else { continue };
         let write = || {
-            let metadata = finish_at(plan, path).metadata_with(samples);
+            let metadata = develop_settings_for(plan, path).metadata_with_samples(samples);
             let bytes = animation::encode(&frames, &metadata, format, token)?;
             let write = |guard: &Guard<'_>| output::write::atomic_guarded(path, &bytes, guard, token);
-            guarded(plan, inputs, (OutputTarget::picture(plan, path), None), sink, write)?;
+            write_guarded(plan, inputs, (OutputTarget::for_image(plan, path), None), sink, write)?;
             Ok(bytes.len() as u64)
         };
         match write() {
-            Ok(bytes) => sink.written(path, bytes, true),
+            Ok(bytes) => sink.image_written(path, bytes, true),
             Err(OutputError::Cancelled(_)) => return Err(Stop::Cancelled),
             Err(error) => return Err(Stop::work(error)),
         }
     }
-    Ok(Staged::done(true, format!("{} frames", frames.len())))
+    Ok(StageResult::done(true, format!("{} frames", frames.len())))
 }
 
 fn write_one(
@@ -280,14 +285,16 @@ fn write_one(
     (path, sweep): (&Path, &FolderSweep),
     token: &CancelToken,
 ) -> Result<u64, OutputError> {
-    let mut finish = finish_at(plan, path);
+    let mut finish = develop_settings_for(plan, path);
     // Record the time limit only if it ended the render.
     if let Some(seconds) = state.ended_by {
         finish.metadata.push(("glimt:time".to_owned(), format!("{seconds} s")));
     }
     let bytes = finish.encode(&state.film, (image, layers), Format::from_path(path)?, token)?;
-    let target = (OutputTarget::picture(plan, path), Some(sweep));
-    guarded(plan, inputs, target, sink, |guard| output::write::atomic_guarded(path, &bytes, guard, token))?;
+    let target = (OutputTarget::for_image(plan, path), Some(sweep));
+    write_guarded(plan, inputs, target, sink, |guard| {
+        output::write::atomic_guarded(path, &bytes, guard, token)
+    })?;
     Ok(bytes.len() as u64)
 }
 
@@ -300,16 +307,16 @@ fn write_part(
 ) -> Result<u64, OutputError> {
     let identity = state.identity.clone().unwrap_or_default();
     let scene = scene_path::relative(&plan.path, path);
-    let head = Head { scene, ..head(PartKind::Part, state, identity, &finish(plan)) };
+    let head = Head { scene, ..create_header(PartKind::Part, state, identity, &develop_settings(plan)) };
     let save = |guard: &Guard<'_>| {
         part::save(path, &head, &state.film, &Value::Null, guard, (token, Durability::Power)).map(drop)
     };
-    guarded(plan, inputs, (OutputTarget::picture(plan, path), Some(sweep)), sink, save)?;
+    write_guarded(plan, inputs, (OutputTarget::for_image(plan, path), Some(sweep)), sink, save)?;
     Ok(path.metadata().map_or(0, |found| found.len()))
 }
 
 /// Returns the settings for developing and encoding a film.
-pub(crate) fn finish(plan: &Plan) -> DevelopSettings {
+pub(crate) fn develop_settings(plan: &Plan) -> DevelopSettings {
     DevelopSettings {
         quantity: plan.settings.view.quantity(),
         tone: plan.tone,
@@ -319,9 +326,9 @@ pub(crate) fn finish(plan: &Plan) -> DevelopSettings {
     }
 }
 
-/// Like [`finish`], with the scene's path relative to the image.
-fn finish_at(plan: &Plan, path: &Path) -> DevelopSettings {
-    let mut finish = finish(plan);
+/// Like [`develop_settings`], with the scene's path relative to the image.
+fn develop_settings_for(plan: &Plan, path: &Path) -> DevelopSettings {
+    let mut finish = develop_settings(plan);
     let scene = finish.metadata.iter_mut().find(|(name, _)| name == SCENE);
     if let Some((_, value)) = scene {
         *value = scene_path::relative(&plan.path, path);
@@ -329,7 +336,7 @@ fn finish_at(plan: &Plan, path: &Path) -> DevelopSettings {
     finish
 }
 
-/// Returns the metadata needed to reproduce an image, except for the film's own metadata.
+/// Returns the metadata needed to reproduce an image, without the film's own metadata.
 fn metadata(plan: &Plan) -> Vec<(String, String)> {
     let settings = &plan.effective;
     let pairs = [
@@ -369,7 +376,7 @@ fn metadata(plan: &Plan) -> Vec<(String, String)> {
     pairs
 }
 
-fn key(state: &FilmState, plan: &Plan, path: &Path) -> Key {
+fn image_file_key(state: &FilmState, plan: &Plan, path: &Path) -> Key {
     let SampleStats { min, mean, max } = state.film.samples();
     let mut key = Fingerprint::new("write");
     key.key(&state.key).u64(min.into()).f64(mean).u64(max.into());

@@ -3,7 +3,7 @@
 use super::*;
 use crate::math::DVec3;
 use crate::messages;
-use crate::protocol::{CameraEdit, ImagePosition, KeptCamera, MovedCamera, Picked};
+use crate::protocol::{CameraEdit, ImagePosition, MovedCamera, Picked, SavedCamera};
 use crate::scene::description::{CameraChange, Pose, Viewpoint};
 
 /// A mirror and photons.
@@ -98,12 +98,12 @@ fn answer(bench: &mut Bench, command: Command) -> Event {
     }
 }
 
-fn keep(bench: &mut Bench, camera: Viewpoint) -> Result<KeptCamera, String> {
+fn keep(bench: &mut Bench, camera: Viewpoint) -> Result<SavedCamera, String> {
     keep_moved_from(bench, camera, bench.own.get().expect("the scene's camera"))
 }
 
-/// Like [`keep`], for a camera that was not moved from the scene's camera but from `own`.
-fn keep_moved_from(bench: &mut Bench, camera: Viewpoint, own: Viewpoint) -> Result<KeptCamera, String> {
+/// Like [`keep`], but the camera was moved starting from `own` instead of the scene's camera.
+fn keep_moved_from(bench: &mut Bench, camera: Viewpoint, own: Viewpoint) -> Result<SavedCamera, String> {
     match answer(bench, Command::KeepCamera(MovedCamera { camera, own })) {
         Event::CameraKept { outcome, .. } => outcome,
         other => panic!("{other:?}"),

@@ -10,7 +10,7 @@ use crate::engine::EngineConfig;
 use crate::film::{Pixels, Rect, TileSamples};
 use crate::integrators::{PhotonMaps, RayCounters, RenderSettings};
 use crate::messages::{INCOMPLETE_IMAGE, NEWEST_IMAGE_NOT_WRITTEN};
-use crate::protocol::LastGoodEnd;
+use crate::protocol::LastValidSceneEnd;
 use crate::scene::description::{Integrator, Shadows};
 use crate::settings::View;
 use crate::world::World;
@@ -143,8 +143,8 @@ pub(super) fn slow(
     KERNEL(photons, world, settings, pixels, samples, token)
 }
 
-/// Waits for the last valid scene's render to end, for a request whose own scene is broken.
-fn last_good_end(bench: &Bench, of: u64) -> LastGoodEnd {
+/// Waits until the render of the last valid scene ends, for a request whose own scene is invalid.
+fn last_good_end(bench: &Bench, of: u64) -> LastValidSceneEnd {
     loop {
         match bench.next() {
             Event::LastGoodEnded { generation, end } if generation == of => return end,
@@ -159,7 +159,7 @@ fn nothing_is_rendered_without_a_valid_scene() {
     let mut bench = Bench::new(&SCENE.replace("width = 40", "width = = 40"));
     bench.writing = Writing::Try;
     assert!(matches!(bench.failed(), Failure::Scene(_)));
-    assert_eq!(last_good_end(&bench, 1), LastGoodEnd::Stopped);
+    assert_eq!(last_good_end(&bench, 1), LastValidSceneEnd::Stopped);
 }
 
 #[test]
@@ -187,7 +187,7 @@ fn broken_scene_file_does_not_stop_a_render() {
         }
     }
     assert!(is_seen && samples_on_disk(&bench).starts_with("10000"), "{}", samples_on_disk(&bench));
-    let finished = |unchanged| LastGoodEnd::Finished { unchanged };
+    let finished = |unchanged| LastValidSceneEnd::Finished { unchanged };
     assert_eq!(last_good_end(&bench, broken), finished(false));
     // After a second typo, the image is still finished.
     bench.edit("width = = 40", "width = = = 40");

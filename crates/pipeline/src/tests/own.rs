@@ -1,11 +1,11 @@
 //! Tests for the scene's own image while the user views another one.
 
 use super::*;
-use crate::protocol::OwnState;
+use crate::protocol::OwnImageState;
 use crate::scene::description::Shadows;
 use crate::settings::{Checkpoints, Resume, View};
 
-/// A front end where the user views an image other than the scene's own.
+/// A front end whose user views an image other than the scene's own.
 struct ToggledBench(Bench);
 
 impl ToggledBench {
@@ -58,7 +58,7 @@ fn assert_resumed(report: &Report) {
     assert!(why.starts_with(reasons::RESUMED), "{report:?}");
 }
 
-fn states(events: &[Event]) -> Vec<OwnState> {
+fn states(events: &[Event]) -> Vec<OwnImageState> {
     let state = |event: &Event| match event {
         Event::OwnImage { state, .. } => Some(*state),
         _ => None,
@@ -82,7 +82,7 @@ fn viewing_does_not_change_output_files() {
     ];
     for change in changes {
         let events = keys.shown(change);
-        assert_eq!(states(&events), [OwnState::Written; 2], "{events:?}");
+        assert_eq!(states(&events), [OwnImageState::Written; 2], "{events:?}");
         assert!(!events.iter().any(|event| matches!(event, Event::Written { .. })));
         assert!(files(&keys) == before);
     }
@@ -103,7 +103,7 @@ fn write_command_saves_the_shown_image() {
     let events = keys.0.until_end(of);
     let by_hand = |event: &Event| matches!(event, Event::Written { is_own: false, .. });
     assert!(events.iter().any(by_hand), "{events:?}");
-    assert_eq!(states(&events).last(), Some(&OwnState::Begun { is_rendering: false }));
+    assert_eq!(states(&events).last(), Some(&OwnImageState::Begun { is_rendering: false }));
     assert!(keys.0.picture() != own, "without shadows");
     let text = fs::read_to_string(&report).expect("a report");
     assert!(text.contains("\"shadows\": \"off\"") && text.contains("out.ppm"), "{text}");
@@ -119,15 +119,15 @@ fn edit_while_toggled_keeps_the_old_image() {
     keys.0.done();
     let old = keys.0.picture();
     keys.0.edit("intensity = [10, 10, 10]", "intensity = [5, 5, 5]");
-    assert_eq!(states(&keys.shown(no_shadows)), [OwnState::NotBegun; 2]);
+    assert_eq!(states(&keys.shown(no_shadows)), [OwnImageState::NotBegun; 2]);
     assert!(keys.0.picture() == old);
     // Reverting the edit and adding a comment makes the image up to date again.
     keys.0.edit("intensity = [5, 5, 5]", "intensity = [10, 10, 10] # as before");
-    assert_eq!(states(&keys.shown(no_shadows)), [OwnState::Written; 2]);
+    assert_eq!(states(&keys.shown(no_shadows)), [OwnImageState::Written; 2]);
     // Save the shown settings in the scene, which makes this the scene's own image.
     keys.0.edit("samples = 4", "samples = 4\nshadows = \"off\"");
     let events = keys.shown(no_shadows);
-    assert_eq!(states(&events).last(), Some(&OwnState::Written));
+    assert_eq!(states(&events).last(), Some(&OwnImageState::Written));
     assert!(keys.0.picture() != old);
 }
 
@@ -182,7 +182,7 @@ fn interrupted_own_render_resumes() {
     let mut keys = ToggledBench::with(slow);
     begin(&mut keys);
     let events = keys.shown(no_shadows);
-    assert_eq!(states(&events), [OwnState::Begun { is_rendering: false }; 2]);
+    assert_eq!(states(&events), [OwnImageState::Begun { is_rendering: false }; 2]);
     assert!(!keys.0.path("out.ppm").exists());
     let (report, _) = keys.0.done();
     assert_resumed(&report);
@@ -194,7 +194,7 @@ fn own_image_is_written_despite_exposure_change() {
     let mut keys = ToggledBench::with(slow);
     begin(&mut keys);
     let events = keys.shown(|overrides| overrides.exposure = Some(2.0));
-    assert_eq!(states(&events), [OwnState::Begun { is_rendering: true }, OwnState::Written]);
+    assert_eq!(states(&events), [OwnImageState::Begun { is_rendering: true }, OwnImageState::Written]);
     let picture = keys.0.picture();
     let (report, _) = keys.0.done();
     assert_statuses(&report, "rrrrrsrr");
@@ -211,7 +211,7 @@ fn checkpoint_of_own_image_is_saved_while_toggled() {
         keys.shown(no_shadows);
         let path = keys.0.path("out.ppm.checkpoint");
         keys.0.worker.send(end);
-        assert!(keys.0.worker.end_within(Duration::from_secs(60)));
+        assert!(keys.0.worker.stop_within(Duration::from_secs(60)));
         assert_eq!(path.exists(), is_kept, "a short render should be saved only after a signal");
         if is_kept {
             keys.0.worker = crate::worker::start_with(EngineConfig::default()).expect("a thread");
@@ -227,7 +227,7 @@ fn checkpoint_of_own_image_is_saved_while_toggled() {
     keys.0.edit("intensity = [10, 10, 10]", "intensity = [5, 5, 5]");
     keys.shown(no_shadows);
     keys.0.worker.send(Command::Suspend);
-    assert!(keys.0.worker.end_within(Duration::from_secs(60)));
+    assert!(keys.0.worker.stop_within(Duration::from_secs(60)));
     assert!(!keys.0.path("out.ppm.checkpoint").exists());
 }
 
@@ -280,8 +280,8 @@ fn last_valid_image_removes_outdated_report() {
 }
 
 /// Returns the memory in bytes needed to render the scene with the given overrides.
-fn memory_needed(keys: &ToggledBench, overrides: &Overrides) -> u64 {
-    crate::check::memory_needed(&keys.0.path("scene.toml"), overrides).expect("a scene")
+fn estimate_memory(keys: &ToggledBench, overrides: &Overrides) -> u64 {
+    crate::check::estimate_memory(&keys.0.path("scene.toml"), overrides).expect("a scene")
 }
 
 #[test]
@@ -290,7 +290,7 @@ fn memory_check_includes_unfinished_own_film() {
     for (more, fits) in [(film / 2, false), (2 * film, true)] {
         let mut keys = ToggledBench::with(slow);
         keys.0.overrides.samples = Some(64);
-        keys.0.overrides.memory = Some(memory_needed(&keys, &keys.0.overrides) + more);
+        keys.0.overrides.memory = Some(estimate_memory(&keys, &keys.0.overrides) + more);
         begin(&mut keys);
         // Another view of the same film needs no additional memory.
         let stops = |keys: &mut ToggledBench, change: fn(&mut Overrides)| {
@@ -319,10 +319,10 @@ fn own_film_may_be_dropped_once_written() {
     let film = 40 * 30 * 40;
     for (more, stays) in [(film / 2, false), (2 * film, true)] {
         let mut keys = ToggledBench::new();
-        keys.0.overrides.memory = Some(memory_needed(&keys, &keys.0.overrides) + more);
+        keys.0.overrides.memory = Some(estimate_memory(&keys, &keys.0.overrides) + more);
         keys.0.done();
         let own = keys.0.picture();
-        assert_eq!(states(&keys.shown(no_shadows)), [OwnState::Written; 2]);
+        assert_eq!(states(&keys.shown(no_shadows)), [OwnImageState::Written; 2]);
         assert!(keys.0.picture() == own);
         let (report, _) = keys.0.done();
         assert_statuses(&report, if stays { "rrrrrsrr" } else { "rrrrrsdr" });

@@ -83,8 +83,8 @@ fn without(
     KERNEL(photons, world, settings, pixels, samples, token)
 }
 
-/// Returns, for each preview, whether it lacked the light from photons and whether the photons had been
-/// traced.
+/// Returns two values for each preview: whether it lacked the light from photons, and whether the photons had
+/// been traced.
 fn previews_of(bench: &mut Bench) -> Vec<(bool, bool)> {
     let (of, mut previews, mut are_there) = (bench.send(), Vec::new(), false);
     loop {

@@ -107,8 +107,8 @@ fn change_of_file_referenced_by_mesh_reloads_it() {
     assert_eq!(report.stages[Stage::Meshes as usize].status, Status::Done);
 }
 
-/// One file of each kind that a scene reads: name, old text and new text. The test replaces the file between
-/// hashing and decoding.
+/// One file of each kind that a scene can reference: its name, old text and new text. The test replaces the
+/// file between hashing and decoding.
 const KINDS: [(&str, &str, &str); 8] = [
     ("scene.toml", KINDS_SCENE, "#"),
     (
@@ -239,7 +239,8 @@ fn each_file_is_hashed_once_per_request() {
         let mut hashed = std::mem::take(&mut *bench.worker.contents().hashed.lock().expect("not poisoned"));
         hashed.sort();
         let names = ["one.mtl", "one.obj", "out.ppm", "scene.toml", "skin.ppm"];
-        // In the first round, the material file is unknown until the mesh is read, and hashed while decoding.
+        // In the first round, the material file is unknown until the mesh is read, so it is hashed during
+        // decoding.
         let names = &names[1 - round..];
         let names: Vec<_> = names.iter().map(|name| bench.path(name)).collect();
         assert_eq!(hashed, names, "round {round}");

@@ -60,7 +60,7 @@ fn only_the_changed_texture_is_read() {
     }
 }
 
-/// A light with two texels for normals, three for emission and four for the specular color. The ball's
+/// A light whose textures have two texels (normals), three (emission) and four (specular color). The ball's
 /// texture has one texel.
 const BUMPY: &str = "[textures.bumps]\nfile = \"bumps.ppm\"\n[textures.glow]\nfile = \"glow.ppm\"\n\
     [textures.gloss]\nfile = \"gloss.ppm\"\n\
@@ -106,7 +106,8 @@ fn view_loads_only_the_textures_it_needs() {
     assert_eq!(textures_of(bumpy, View::Shadow), textures('d', "2 loaded, 2 not needed", 5));
     assert_eq!(textures_of(bumpy, View::Emission), textures('d', "1 loaded, 3 not needed", 3));
     assert_eq!(textures_of(&ambient(bumpy), View::Ambient), textures('d', "1 loaded, 3 not needed", 1));
-    // The `bounds` view draws boxes over the image, and a lobe's color affects how often it is sampled.
+    // The `bounds` view draws boxes over the image, and the color of a lobe affects how often the lobe is
+    // sampled.
     for view in [View::Beauty, View::Diffuse, View::Specular, View::Bounds, View::Cost, View::Error] {
         assert_eq!(textures_of(bumpy, view), textures('d', "4 loaded", 10), "{view:?}");
     }

@@ -14,7 +14,7 @@ pub(super) struct ChangeTracker {
     pending: Option<PendingHints>,
     /// Files that were written to and have not been closed.
     open: HashSet<OsString>,
-    unsettled: Option<Unsettled>,
+    unsettled: Option<UnsettledChange>,
     /// Earliest time at which to report the next change.
     not_before: Option<Instant>,
 }
@@ -31,7 +31,7 @@ struct PendingHints {
 
 /// A reported change that may not be the last.
 #[derive(Clone, Copy, Debug)]
-struct Unsettled {
+struct UnsettledChange {
     since: Instant,
     /// Time of the last hint.
     latest: Instant,
@@ -86,8 +86,8 @@ impl ChangeTracker {
         self.pending = None;
     }
 
-    /// Whether it is too early to report a change found because of hints. `is_missing` is true if a file is
-    /// missing or empty, and `moves` if the previous check found another change.
+    /// Whether it is too early to report a change found because of hints. `is_missing` tells whether a file
+    /// is missing or empty, and `moves` whether the previous check found a different change.
     pub(super) fn is_early(&mut self, is_missing: bool, moves: bool, now: Instant) -> bool {
         let Some(pending) = &mut self.pending else { return false };
         let due = if is_missing {
@@ -105,22 +105,22 @@ impl ChangeTracker {
     }
 
     /// Records that a change is being reported. Returns the time of its first hint.
-    pub(super) fn reported(&mut self, now: Instant) -> Instant {
+    pub(super) fn mark_reported(&mut self, now: Instant) -> Instant {
         let noticed = self.pending.take().map_or(now, |pending| pending.first);
         self.not_before = Some(now + BETWEEN_CHANGES);
         let since = self.unsettled.map_or(now, |unsettled| unsettled.since);
-        self.unsettled = Some(Unsettled { since, latest: now });
+        self.unsettled = Some(UnsettledChange { since, latest: now });
         noticed
     }
 
     /// Whether the reported change has settled. Returns true only once per change.
-    pub(super) fn settles(&mut self, now: Instant) -> bool {
+    pub(super) fn take_settled(&mut self, now: Instant) -> bool {
         let settles = self.unsettled.is_some_and(|unsettled| self.settled_at(unsettled) <= now);
         self.unsettled = self.unsettled.filter(|_| !settles);
         settles
     }
 
-    fn settled_at(&self, unsettled: Unsettled) -> Instant {
+    fn settled_at(&self, unsettled: UnsettledChange) -> Instant {
         let wait = if self.open.is_empty() { self.delays.settle } else { self.delays.settle_open };
         (unsettled.latest + wait).min(unsettled.since + self.delays.settle_longest)
     }

@@ -60,8 +60,8 @@ impl Content {
 
 /// On some file systems, changes within this time may have the same timestamp.
 const STAMP_RESOLUTION: Duration = Duration::from_secs(2);
-/// Maximum length of a hashed file in bytes. No longer files are ever decoded. They are compared by their
-/// metadata, to avoid reading a sparse file of several terabytes.
+/// Maximum length of a hashed file in bytes. Longer files are never decoded. They are compared by metadata,
+/// to avoid reading sparse files of several terabytes.
 const MAX_HASHED: u64 = 4 << 30;
 /// Number of bytes between checks of the token.
 const CHUNK: usize = 1 << 20;
@@ -75,7 +75,7 @@ pub struct Contents {
     /// Files that have been hashed.
     #[cfg(test)]
     pub(crate) hashed: Mutex<Vec<PathBuf>>,
-    /// Replacement bytes, written to each file right after it has been hashed.
+    /// Replacement content that is written to each file right after it has been hashed.
     #[cfg(test)]
     pub(crate) replacements: Mutex<HashMap<PathBuf, Vec<u8>>>,
 }
@@ -106,8 +106,8 @@ impl Snapshot {
         Ok(*self.seen().entry(path.to_owned()).or_insert(content))
     }
 
-    /// Returns a file's content, given the hash of its decoded bytes. Records a change if this request has
-    /// seen different content.
+    /// Returns a file's content, given the hash of its decoded bytes. Records a change if the content differs
+    /// from what this request has seen before.
     pub(crate) fn decoded(&self, path: &Path, hash: FileHash) -> Content {
         let content = Content::Hash(hash);
         if *self.seen().entry(path.to_owned()).or_insert(content) != content {
@@ -173,7 +173,7 @@ impl Stamp {
         Content::Hash(*blake3::hash(format!("{self:?}").as_bytes()).as_bytes())
     }
 
-    /// Whether any change after `now` is guaranteed to change the stamp.
+    /// Whether the stamp is guaranteed to differ after any change made after `now`.
     fn is_settled(&self, now: SystemTime) -> bool {
         let latest = self.modified.0.max(self.changed.0).max(0).unsigned_abs();
         let latest = SystemTime::UNIX_EPOCH + Duration::from_secs(latest);

@@ -25,7 +25,7 @@ pub(super) enum Hint {
 
 /// Set of watched folders.
 #[derive(Debug)]
-pub(super) struct Folders {
+pub(super) struct WatchedFolders {
     /// `None` if notifications are disabled or unavailable.
     watcher: Option<RecommendedWatcher>,
     names: Arc<Mutex<HashSet<OsString>>>,
@@ -42,8 +42,8 @@ fn identity(folder: &Path) -> Option<Identity> {
     fs::metadata(folder).ok().map(|metadata| (metadata.dev(), metadata.ino()))
 }
 
-/// Returns the watcher if its thread could be started. If not, its handler, which shares `names`, has been
-/// dropped, and every use of the watcher would panic, including dropping it.
+/// Returns the watcher if its thread could be started. If the thread could not be started, it has dropped the
+/// watcher's handler, which shares `names`, and every use of the watcher would panic, even dropping it.
 fn if_alive<W>(watcher: W, names: &Arc<Mutex<HashSet<OsString>>>) -> Option<W> {
     if Arc::strong_count(names) > 1 {
         return Some(watcher);
@@ -52,7 +52,7 @@ fn if_alive<W>(watcher: W, names: &Arc<Mutex<HashSet<OsString>>>) -> Option<W> {
     None
 }
 
-impl Folders {
+impl WatchedFolders {
     pub(super) fn new(poll: bool, say: impl Fn(Hint) + Send + 'static) -> Self {
         let names: Arc<Mutex<HashSet<OsString>>> = Arc::default();
         let of_interest = names.clone();
@@ -68,7 +68,7 @@ impl Folders {
     }
 
     /// Whether notifications cover all folders.
-    pub(super) fn gives_hints(&self) -> bool {
+    pub(super) fn covers_all_folders(&self) -> bool {
         self.watcher.is_some() && self.watched.len() == self.wanted.len()
     }
 
@@ -87,7 +87,7 @@ impl Folders {
                 add(&canonical);
             }
         }
-        // An event with a folder's own name means that the folder was removed.
+        // An event with the folder's own name means that it was removed.
         let own = folders
             .iter()
             .filter_map(|folder| folder.canonicalize().ok()?.file_name().map(ToOwned::to_owned));
@@ -159,7 +159,7 @@ fn hint(event: &Event, names: &HashSet<OsString>) -> Option<Hint> {
         EventKind::Access(AccessKind::Close(AccessMode::Write)) => Some(Hint::Complete(name)),
         EventKind::Access(_) => None,
         EventKind::Modify(ModifyKind::Name(RenameMode::To)) => Some(Hint::Complete(name)),
-        // There are also separate events for both names.
+        // Each of the two names also has its own event.
         EventKind::Modify(ModifyKind::Name(RenameMode::Both)) => None,
         EventKind::Modify(ModifyKind::Data(_)) => Some(Hint::Written(name)),
         EventKind::Modify(ModifyKind::Name(RenameMode::From)) | EventKind::Remove(_) => {

@@ -25,7 +25,7 @@ use std::time::{Duration, Instant};
 
 use self::change_tracker::ChangeTracker;
 use self::content::{Content, Contents, FileRead};
-use self::folders::{Folders, Hint};
+use self::folders::{Hint, WatchedFolders};
 use self::outputs::UnconfirmedChanges;
 pub use self::outputs::{ExternalChange, OutputChange};
 pub use self::working_folder::missing_folder;
@@ -45,7 +45,7 @@ pub(super) struct WatchDelays {
     quiet: Duration,
     /// Like `quiet`, but for a missing or empty file, which is probably being replaced.
     quiet_missing: Duration,
-    /// Maximum delay of a check.
+    /// Maximum time by which a check may be delayed.
     longest: Duration,
     /// Time without hints after which files count as settled. Programs that write a file in two steps take
     /// only a fraction of this time.
@@ -126,7 +126,7 @@ impl Watcher {
         working_folder::remember();
         let (orders, received) = mpsc::channel();
         let hints = orders.clone();
-        let folders = Folders::new(poll, move |hint| {
+        let folders = WatchedFolders::new(poll, move |hint| {
             // Sending only fails after the watcher has ended.
             let _ = hints.send(Message::Hint(hint));
         });
@@ -149,8 +149,8 @@ impl Watcher {
     }
 
     /// Sets the files to watch: `read`, which were read after `since`, and `before`, which were read earlier.
-    /// A file whose content differs from the given content counts as changed, unless a change has been
-    /// reported since it was read.
+    /// A file counts as changed if its content differs from the given content, unless a change has been
+    /// reported since the file was read.
     pub fn set_files(&self, read: Vec<FileRead>, before: Vec<FileRead>, since: Instant) {
         let _ = self.orders.send(Message::Files(read, before, since));
     }
@@ -168,7 +168,7 @@ impl Drop for Watcher {
 }
 
 struct WatchThread<F> {
-    folders: Folders,
+    folders: WatchedFolders,
     /// Whether the working directory exists.
     has_working_folder: bool,
     contents: Arc<Contents>,
@@ -187,19 +187,20 @@ struct WatchThread<F> {
 impl<F: FnMut(News)> WatchThread<F> {
     fn run(mut self, orders: &Receiver<Message>) {
         loop {
-            let pause = self.next_look().saturating_duration_since(Instant::now());
+            let pause = self.next_check().saturating_duration_since(Instant::now());
             match orders.recv_timeout(pause) {
                 Ok(Message::Hint(hint)) => self.change_tracker.hint(hint, Instant::now()),
                 Ok(Message::Files(read, before, since)) => self.set(read, before, since),
                 Ok(Message::Outputs) => self.set_folders(),
-                Err(RecvTimeoutError::Timeout) => self.look(Instant::now()),
+                Err(RecvTimeoutError::Timeout) => self.check(Instant::now()),
                 Ok(Message::Quit) | Err(RecvTimeoutError::Disconnected) => return,
             }
         }
     }
 
-    fn next_look(&self) -> Instant {
-        let pause = if self.has_working_folder && self.folders.gives_hints() { HEARTBEAT } else { POLL };
+    fn next_check(&self) -> Instant {
+        let pause =
+            if self.has_working_folder && self.folders.covers_all_folders() { HEARTBEAT } else { POLL };
         let unhinted = Instant::now() + pause;
         let due = [self.change_tracker.due(), self.suspects.due(self.quiet)].into_iter().flatten().min();
         due.map_or(unhinted, |due| due.min(unhinted))
@@ -212,8 +213,8 @@ impl<F: FnMut(News)> WatchThread<F> {
             self.files.insert(path, said.unwrap_or((content, since)));
         }
         for FileRead { path, content } in read {
-            // A change reported after `since` is newer than the content read. An earlier report is not,
-            // because the file may have been restored.
+            // A change reported after `since` is newer than the content that was read. Ignore earlier
+            // reports, because the file may have been restored.
             let said = before.get(&path).copied().filter(|(_, when)| *when > since);
             self.files.insert(path, said.unwrap_or((content, since)));
         }
@@ -233,10 +234,10 @@ impl<F: FnMut(News)> WatchThread<F> {
     }
 
     /// Checks all files and reports changes.
-    fn look(&mut self, now: Instant) {
+    fn check(&mut self, now: Instant) {
         self.has_working_folder = working_folder::has_working_folder();
         self.folders.renew_lost();
-        for change in self.suspects.look(&self.contents, self.quiet, now) {
+        for change in self.suspects.check(&self.contents, self.quiet, now) {
             (self.say)(News::Output(change));
         }
         let found = self.differences();
@@ -245,10 +246,10 @@ impl<F: FnMut(News)> WatchThread<F> {
             for FileRead { path, content } in found {
                 self.files.insert(path, (content, now));
             }
-            let noticed = self.change_tracker.reported(now);
+            let noticed = self.change_tracker.mark_reported(now);
             (self.say)(News::Changed(Changed { noticed }));
         }
-        if self.change_tracker.settles(now) {
+        if self.change_tracker.take_settled(now) {
             (self.say)(News::Settled);
         }
     }

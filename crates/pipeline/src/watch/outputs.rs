@@ -18,7 +18,7 @@ pub enum ExternalChange {
 }
 
 impl ExternalChange {
-    /// Describes the change in words that follow the file name.
+    /// Describes the change as a phrase that follows the file name.
     pub fn words(self) -> &'static str {
         match self {
             Self::Removed => "was removed",
@@ -27,7 +27,7 @@ impl ExternalChange {
     }
 }
 
-/// A change to a file written by glimt, or its restoration.
+/// A change to a file written by glimt, or the restoration of such a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct OutputChange {
     /// Path of the file.
@@ -54,7 +54,7 @@ struct Output {
 impl Outputs {
     /// Records that a file is about to be written. Its content is ignored until [`Self::end`].
     pub(crate) fn begin(&self, path: &Path) {
-        let mut known = self.known();
+        let mut known = self.lock();
         let new = Output { content: Content::Missing, writes: 0, is_being_written: true, reported: None };
         let output = known.entry(path.to_owned()).or_insert(new);
         (output.writes, output.is_being_written) = (output.writes + 1, true);
@@ -62,7 +62,7 @@ impl Outputs {
 
     /// Records a written file's content, or `None` if the write failed. Special files are not watched.
     pub(crate) fn end(&self, path: &Path, content: Option<Content>) {
-        let mut known = self.known();
+        let mut known = self.lock();
         let Some(output) = known.get_mut(path) else { return };
         output.is_being_written = false;
         if let Some(content) = content {
@@ -75,22 +75,22 @@ impl Outputs {
 
     /// Forgets all files for which `keep` returns false.
     pub(crate) fn retain(&self, mut keep: impl FnMut(&PathBuf) -> bool) {
-        self.known().retain(|path, _| keep(path));
+        self.lock().retain(|path, _| keep(path));
     }
 
     /// Returns all paths.
     pub(super) fn paths(&self) -> Vec<PathBuf> {
-        self.known().keys().cloned().collect()
+        self.lock().keys().cloned().collect()
     }
 
     /// Returns the files that no longer have the content written by glimt.
-    pub fn lost(&self, contents: &Contents) -> Vec<(PathBuf, ExternalChange)> {
+    pub fn changed_externally(&self, contents: &Contents) -> Vec<(PathBuf, ExternalChange)> {
         let found = self.states(contents).into_iter();
         found.filter_map(|(path, _, lost)| Some((path, lost?))).collect()
     }
 
     /// Returns the files whose state differs from the last report.
-    fn news(&self, contents: &Contents) -> Vec<OutputChange> {
+    fn unreported_changes(&self, contents: &Contents) -> Vec<OutputChange> {
         let found = self.states(contents).into_iter().filter(|(_, reported, lost)| reported != lost);
         found.map(|(path, _, lost)| OutputChange { path, lost }).collect()
     }
@@ -98,7 +98,7 @@ impl Outputs {
     /// Returns the last reported and current state of each file, except files that are being written.
     fn states(&self, contents: &Contents) -> Vec<(PathBuf, Option<ExternalChange>, Option<ExternalChange>)> {
         let before: Vec<(PathBuf, Output)> = {
-            let known = self.known();
+            let known = self.lock();
             let idle = known.iter().filter(|(_, output)| !output.is_being_written);
             idle.map(|(path, output)| (path.clone(), *output)).collect()
         };
@@ -111,7 +111,7 @@ impl Outputs {
                 Content::Hash(_) | Content::Unusable(_) => Some(ExternalChange::Replaced),
             };
             // Ignore the content if another write has started since.
-            let is_current = self.known().get(&path).is_some_and(|now| now.writes == output.writes);
+            let is_current = self.lock().get(&path).is_some_and(|now| now.writes == output.writes);
             is_current.then_some((path, output.reported, lost))
         };
         let mut states: Vec<_> = before.into_iter().filter_map(state).collect();
@@ -120,12 +120,12 @@ impl Outputs {
     }
 
     fn report(&self, change: &OutputChange) {
-        if let Some(output) = self.known().get_mut(&change.path) {
+        if let Some(output) = self.lock().get_mut(&change.path) {
             output.reported = change.lost;
         }
     }
 
-    fn known(&self) -> MutexGuard<'_, HashMap<PathBuf, Output>> {
+    fn lock(&self) -> MutexGuard<'_, HashMap<PathBuf, Output>> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -136,10 +136,10 @@ pub(super) struct UnconfirmedChanges(Vec<(OutputChange, Instant)>);
 
 impl UnconfirmedChanges {
     /// Returns changes that have lasted for `quiet`. Returns each change only once.
-    pub(super) fn look(&mut self, contents: &Contents, quiet: Duration, now: Instant) -> Vec<OutputChange> {
+    pub(super) fn check(&mut self, contents: &Contents, quiet: Duration, now: Instant) -> Vec<OutputChange> {
         let before = std::mem::take(&mut self.0);
         let mut lasting = Vec::new();
-        for change in contents.outputs.news(contents) {
+        for change in contents.outputs.unreported_changes(contents) {
             let since =
                 before.iter().find(|(suspect, _)| *suspect == change).map_or(now, |(_, since)| *since);
             if now.saturating_duration_since(since) >= quiet {
@@ -180,7 +180,7 @@ mod tests {
         let (contents, mut suspects) = (Contents::default(), UnconfirmedChanges::default());
         let begin = Instant::now();
         let mut look = |contents: &Contents, after: u64| {
-            let found = suspects.look(contents, QUIET, begin + Duration::from_millis(after));
+            let found = suspects.check(contents, QUIET, begin + Duration::from_millis(after));
             found.into_iter().map(|change| change.lost).collect::<Vec<_>>()
         };
         write(&contents, &path, "one");
@@ -199,7 +199,10 @@ mod tests {
         assert_eq!(look(&contents, 5600), [Some(ExternalChange::Replaced)]);
         fs::write(&path, "of another again").expect("written");
         assert_eq!((look(&contents, 6000), look(&contents, 7000)), (vec![], vec![]), "once");
-        assert_eq!(contents.outputs.lost(&contents), [(path.clone(), ExternalChange::Replaced)]);
+        assert_eq!(
+            contents.outputs.changed_externally(&contents),
+            [(path.clone(), ExternalChange::Replaced)]
+        );
         fs::remove_file(&path).expect("removed");
         assert_eq!(
             (look(&contents, 8000), look(&contents, 9000)),
@@ -226,9 +229,9 @@ mod tests {
         write(&contents, &path, "one");
         contents.outputs.begin(&path);
         contents.outputs.end(&path, None);
-        assert_eq!(contents.outputs.lost(&contents), []);
+        assert_eq!(contents.outputs.changed_externally(&contents), []);
         fs::remove_file(&path).expect("removed");
-        assert_eq!(contents.outputs.lost(&contents), [(path, ExternalChange::Removed)]);
+        assert_eq!(contents.outputs.changed_externally(&contents), [(path, ExternalChange::Removed)]);
         // A file that was never written is not watched.
         let other = folder.path().join("b.png");
         contents.outputs.begin(&other);

@@ -57,7 +57,7 @@ impl Scratch {
         self.news.recv_timeout(Duration::from_secs(60)).expect("news within a minute")
     }
 
-    /// Expects exactly one change, followed by the files settling.
+    /// Expects exactly one change, after which the files settle.
     #[track_caller]
     fn expect_one(&self) {
         assert!(matches!(self.next(), News::Changed(_)), "expected a change first");

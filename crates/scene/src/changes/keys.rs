@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use crate::key_path::{part, shortened_key};
+use crate::key_path::{quote_key_part, shortened_key};
 use crate::sanitize::shortened;
 use crate::toml::{self, Elements, Entries, TomlValue, Value};
 
@@ -17,7 +17,7 @@ const MAX_KEY_COLUMNS: usize = 48;
 
 /// Lists the keys whose values differ, with both values. Empty if no key differs or if a document is not
 /// valid TOML.
-pub(super) fn changes(before: &str, after: &str) -> Vec<String> {
+pub(super) fn key_changes(before: &str, after: &str) -> Vec<String> {
     if before.len().max(after.len()) > MOST_BYTES {
         return Vec::new();
     }
@@ -25,13 +25,13 @@ pub(super) fn changes(before: &str, after: &str) -> Vec<String> {
     if !errors.is_empty() || !more.is_empty() {
         return Vec::new();
     }
-    let mut differences = Differences { texts: [before, after], listed: Vec::new(), count: 0 };
+    let mut differences = KeyDifferences { texts: [before, after], listed: Vec::new(), count: 0 };
     differences.compare_tables("", old.root(), new.root());
     differences.finish()
 }
 
 /// Differences found so far.
-struct Differences<'t> {
+struct KeyDifferences<'t> {
     /// The source text before and after the edit.
     texts: [&'t str; 2],
     listed: Vec<String>,
@@ -39,7 +39,7 @@ struct Differences<'t> {
     count: usize,
 }
 
-impl Differences<'_> {
+impl KeyDifferences<'_> {
     fn finish(mut self) -> Vec<String> {
         let rest = self.count - self.listed.len();
         if let Some(last) = self.listed.last_mut().filter(|_| rest > 0) {
@@ -58,14 +58,14 @@ impl Differences<'_> {
     /// Compares the entries of two tables.
     fn compare_tables(&mut self, name: &str, old: Entries<'_>, new: Entries<'_>) {
         for entry in new.iter() {
-            let name = joined(name, entry.key);
+            let name = join_key(name, entry.key);
             match old.get(entry.key) {
                 Some(before) => self.compare_values(&name, &before.value, &entry.value),
                 None => self.add_unmatched('+', &name, &entry.value, 1),
             }
         }
         for entry in old.iter().filter(|entry| new.get(entry.key).is_none()) {
-            self.add_unmatched('−', &joined(name, entry.key), &entry.value, 0);
+            self.add_unmatched('−', &join_key(name, entry.key), &entry.value, 0);
         }
     }
 
@@ -75,9 +75,9 @@ impl Differences<'_> {
             (TomlValue::Array(old), TomlValue::Array(new)) if old.is_of_tables() && new.is_of_tables() => {
                 self.compare_lists(name, old, new);
             }
-            _ if is_same(old, new) => {}
+            _ if is_equal_value(old, new) => {}
             _ => {
-                let [old, new] = [(0, old), (1, new)].map(|(text, value)| self.text(text, value));
+                let [old, new] = [(0, old), (1, new)].map(|(text, value)| self.value_text(text, value));
                 self.add(|| format!("{} {old} → {new}", shortened_key(name, MAX_KEY_COLUMNS)));
             }
         }
@@ -87,20 +87,20 @@ impl Differences<'_> {
     fn compare_lists(&mut self, name: &str, old: Elements<'_>, new: Elements<'_>) {
         let (old, new): (Vec<Value<'_>>, Vec<Value<'_>>) = (old.iter().collect(), new.iter().collect());
         let least = old.len().min(new.len());
-        let is_same = |(a, b): &(&Value<'_>, &Value<'_>)| is_same(a, b);
+        let is_same = |(a, b): &(&Value<'_>, &Value<'_>)| is_equal_value(a, b);
         let start = old.iter().zip(&new).take_while(is_same).count();
         let end = old.iter().rev().zip(new.iter().rev()).take(least - start).take_while(is_same).count();
         let (old_names, new_names) = (element_keys(&old), element_keys(&new));
         let changed = |all: &[Value<'_>]| start..all.len() - end;
         for (index, old) in changed(&old).zip(&old[changed(&old)]) {
             if let Some(after) = new[changed(&new)].get(index - start) {
-                self.compare_values(&joined(name, &new_names[index]), old, after);
+                self.compare_values(&join_key(name, &new_names[index]), old, after);
             }
         }
         let sides = [('+', 1, &new, &new_names, &old), ('−', 0, &old, &old_names, &new)];
         for (sign, text, longer, names, shorter) in sides {
             for index in changed(longer).skip(changed(shorter).len()) {
-                self.add_unmatched_entry(sign, &joined(name, &names[index]), &longer[index], text);
+                self.add_unmatched_entry(sign, &join_key(name, &names[index]), &longer[index], text);
             }
         }
     }
@@ -111,7 +111,7 @@ impl Differences<'_> {
             TomlValue::Array(array) if array.is_of_tables() => {
                 let all: Vec<Value<'_>> = array.iter().collect();
                 for (element, value) in element_keys(&all).iter().zip(&all) {
-                    self.add_unmatched_entry(sign, &joined(name, element), value, text);
+                    self.add_unmatched_entry(sign, &join_key(name, element), value, text);
                 }
             }
             TomlValue::Array(_)
@@ -135,18 +135,18 @@ impl Differences<'_> {
             | TomlValue::Boolean(_)
             | TomlValue::Datetime => true,
         };
-        let shown = if is_short { format!(" = {}", self.text(text, value)) } else { String::new() };
+        let shown = if is_short { format!(" = {}", self.value_text(text, value)) } else { String::new() };
         self.add(|| format!("{sign} {}{shown}", shortened_key(name, MAX_KEY_COLUMNS)));
     }
 
     /// The source text of a value, on one line.
-    fn text(&self, text: usize, value: &Value<'_>) -> String {
+    fn value_text(&self, text: usize, value: &Value<'_>) -> String {
         if let TomlValue::Table(_) = value.item() {
             return "{…}".to_owned();
         }
         let written = self.texts[text].get(value.span()).unwrap_or_default();
         let shown = shortened(&written.split_whitespace().collect::<Vec<_>>().join(" "), MAX_VALUE_CHARS);
-        // Cut between elements, because part of a number would look like another number.
+        // Cut between elements, because a truncated number would look like a different number.
         match (value.item(), shown.rfind(", ")) {
             (TomlValue::Array(_), Some(end)) if shown.ends_with('…') => format!("{}…", &shown[..end + 2]),
             _ => shown,
@@ -154,25 +154,24 @@ impl Differences<'_> {
     }
 }
 
-fn joined(name: &str, key: &str) -> String {
-    if name.is_empty() { part(key) } else { format!("{name}.{}", part(key)) }
+fn join_key(name: &str, key: &str) -> String {
+    if name.is_empty() { quote_key_part(key) } else { format!("{name}.{}", quote_key_part(key)) }
 }
 
-/// Key parts that `--set` accepts for the elements of a list: the name if it is unique, or else the 1-based
-/// position.
+/// Key parts that `--set` accepts for the elements of a list: unique names, or else 1-based positions.
 fn element_keys(all: &[Value<'_>]) -> Vec<String> {
     let mut counts: HashMap<&str, usize> = HashMap::new();
-    for name in all.iter().filter_map(name_of) {
+    for name in all.iter().filter_map(table_name) {
         *counts.entry(name).or_default() += 1;
     }
     let finds = |name: &&str| name.parse::<usize>().is_err() && counts.get(name) == Some(&1);
     let of = |(number, value): (usize, &Value<'_>)| {
-        name_of(value).filter(finds).map_or_else(|| number.to_string(), str::to_owned)
+        table_name(value).filter(finds).map_or_else(|| number.to_string(), str::to_owned)
     };
     (1..).zip(all).map(of).collect()
 }
 
-fn name_of<'t>(value: &Value<'t>) -> Option<&'t str> {
+fn table_name<'t>(value: &Value<'t>) -> Option<&'t str> {
     let TomlValue::Table(table) = value.item() else { return None };
     match table.get("name")?.value.item() {
         TomlValue::String(name) => Some(name),
@@ -186,17 +185,18 @@ fn name_of<'t>(value: &Value<'t>) -> Option<&'t str> {
 }
 
 /// Whether two values are equal, ignoring formatting and key order.
-fn is_same(a: &Value<'_>, b: &Value<'_>) -> bool {
+fn is_equal_value(a: &Value<'_>, b: &Value<'_>) -> bool {
     match (a.item(), b.item()) {
         (TomlValue::Table(a), TomlValue::Table(b)) => {
             let has = |a: Entries<'_>, b: Entries<'_>| {
-                a.iter()
-                    .all(|entry| b.get(entry.key).is_some_and(|other| is_same(&entry.value, &other.value)))
+                a.iter().all(|entry| {
+                    b.get(entry.key).is_some_and(|other| is_equal_value(&entry.value, &other.value))
+                })
             };
             has(a, b) && has(b, a)
         }
         (TomlValue::Array(a), TomlValue::Array(b)) => {
-            a.len() == b.len() && a.iter().zip(b.iter()).all(|(a, b)| is_same(&a, &b))
+            a.len() == b.len() && a.iter().zip(b.iter()).all(|(a, b)| is_equal_value(&a, &b))
         }
         (TomlValue::String(a), TomlValue::String(b)) => a == b,
         (TomlValue::Integer { digits: a, radix: of_a }, TomlValue::Integer { digits: b, radix: of_b }) => {
@@ -219,7 +219,7 @@ mod tests {
     #[track_caller]
     fn assert_change(from: &str, to: &str, expected: &str) {
         assert!(SCENE.contains(from), "{from}");
-        assert_eq!(changes(SCENE, &SCENE.replacen(from, to, 1)).join("; "), expected, "{from} → {to}");
+        assert_eq!(key_changes(SCENE, &SCENE.replacen(from, to, 1)).join("; "), expected, "{from} → {to}");
     }
 
     #[test]
@@ -233,7 +233,7 @@ mod tests {
 
     #[track_caller]
     fn changed_to_two(before: &str, expected: &str) {
-        assert_eq!(changes(before, &before.replacen("= 1", "= 2", 1)).join("; "), expected, "{before}");
+        assert_eq!(key_changes(before, &before.replacen("= 1", "= 2", 1)).join("; "), expected, "{before}");
     }
 
     #[test]
@@ -290,7 +290,7 @@ mod tests {
         let all = SCENE.replace("64", "32").replace("40.0", "41").replace("radius = ", "radius = 1");
         let expected =
             ["render.width 64 → 32", "camera.fov 40.0 → 41", "sphere.ball.radius 0.5 → 10.5 and 2 more"];
-        assert_eq!(changes(SCENE, &all), expected);
+        assert_eq!(key_changes(SCENE, &all), expected);
     }
 
     #[test]
@@ -298,8 +298,8 @@ mod tests {
         for (from, to) in
             [("fov = 40.0", "fov = 40.0 # wide"), ("[0, 1, 4]", "[ 0, 1, 4 ]"), ("\nname", "\n\nname")]
         {
-            assert!(changes(SCENE, &SCENE.replace(from, to)).is_empty(), "{to}");
+            assert!(key_changes(SCENE, &SCENE.replace(from, to)).is_empty(), "{to}");
         }
-        assert!(changes(SCENE, "[render").is_empty());
+        assert!(key_changes(SCENE, "[render").is_empty());
     }
 }

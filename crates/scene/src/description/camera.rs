@@ -82,7 +82,7 @@ impl Pose {
 
 impl CameraChange {
     /// Whether any value changes.
-    pub fn is_any(&self) -> bool {
+    pub fn has_changes(&self) -> bool {
         *self != Self::default()
     }
 }

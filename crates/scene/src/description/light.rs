@@ -60,13 +60,13 @@ pub struct Environment {
     pub color: Vec3,
     /// An equirectangular map, resolved against the scene's folder.
     pub file: Option<Located<PathBuf>>,
-    /// Rotation of the map about +y, in degrees, counterclockwise seen from above.
+    /// Rotation of the map about +y in degrees, counterclockwise when seen from above.
     pub rotate: f64,
 }
 
 impl Light {
     /// Whether the light is not black.
-    pub fn sends(&self) -> bool {
+    pub fn has_emission(&self) -> bool {
         let color = match self {
             Self::Point(light) => light.intensity,
             Self::Spot(light) => light.point.intensity,
@@ -76,7 +76,7 @@ impl Light {
     }
 
     /// Whether the light is a δ distribution, which rays cannot hit.
-    pub fn is_sharp(&self) -> bool {
+    pub fn is_delta(&self) -> bool {
         match self {
             Self::Point(_) | Self::Spot(_) => true,
             Self::Directional(light) => light.angle == 0.0,
@@ -84,7 +84,7 @@ impl Light {
     }
 
     /// Whether the light has no falloff with distance.
-    pub fn is_steady(&self) -> bool {
+    pub fn has_no_falloff(&self) -> bool {
         match self {
             Self::Point(light) => light.falloff == Falloff::None,
             Self::Spot(light) => light.point.falloff == Falloff::None,
@@ -94,8 +94,8 @@ impl Light {
 }
 
 impl Environment {
-    /// Whether the color, without the map, is not black.
-    pub fn sends(&self) -> bool {
+    /// Whether the color is not black, regardless of the map.
+    pub fn has_emission(&self) -> bool {
         self.color != Vec3::ZERO
     }
 }

@@ -81,8 +81,8 @@ impl NumberSource {
         }
     }
 
-    /// The texture, and how to compute the number from a pixel: with the channel, or else with `usual`.
-    /// `None` if constant.
+    /// The texture, and how to compute the number from a pixel: from the channel if one is given, or else as
+    /// `usual`. `None` if constant.
     pub fn texture(&self, usual: PixelValue) -> Option<(usize, PixelValue)> {
         match *self {
             Self::Constant(_) => None,
@@ -105,7 +105,7 @@ impl OpacitySource {
     pub const FULL: Self = Self { value: NumberSource::Constant(1.0), cutoff: 0.0 };
 
     /// Whether the surface is opaque everywhere.
-    pub fn is_full(&self) -> bool {
+    pub fn is_opaque(&self) -> bool {
         match self.value {
             NumberSource::Constant(value) => value >= 1.0 || self.cutoff > 0.0 && value >= self.cutoff,
             NumberSource::Texture { .. } => false,
@@ -195,7 +195,7 @@ impl MaterialKind {
     }
 
     /// Whether the material is smooth or rough glass with index 1, which does not refract in air.
-    pub fn is_like_air(&self) -> bool {
+    pub fn is_index_matched_glass(&self) -> bool {
         match self {
             Self::Glass { ior, .. } => *ior == 1.0,
             Self::Phong { .. }
@@ -208,7 +208,7 @@ impl MaterialKind {
     }
 
     /// Whether the material is anisotropic and therefore depends on the direction of texture coordinates.
-    pub fn has_direction(&self) -> bool {
+    pub fn is_anisotropic(&self) -> bool {
         match self {
             Self::Metal { anisotropy, .. } => *anisotropy != NumberSource::Constant(0.0),
             Self::Phong { .. }
@@ -235,12 +235,12 @@ impl MaterialKind {
 
     /// Whether the material is solid glass.
     pub fn is_glass(&self) -> bool {
-        self.substance().is_some()
+        self.glass_medium_bits().is_some()
     }
 
     /// Bits of the index of refraction and the transmittance of solid glass, independent of roughness. `None`
     /// for other materials.
-    pub fn substance(&self) -> Option<[u64; 4]> {
+    pub fn glass_medium_bits(&self) -> Option<[u64; 4]> {
         match *self {
             Self::Glass { ior, tint, roughness: _ } => {
                 Some([f64::from(ior), tint.x, tint.y, tint.z].map(f64::to_bits))
@@ -287,7 +287,7 @@ impl Bump {
 pub enum TextureUse {
     /// Colors.
     Color,
-    /// Colors of a surface that takes its opacity from the image's alpha channel.
+    /// Colors of a surface whose opacity is the image's alpha channel.
     CutOut,
     /// Normals.
     Normal,

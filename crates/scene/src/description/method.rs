@@ -16,10 +16,11 @@ choice! {
 /// Properties and supported settings of an integrator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Method {
-    /// Whether camera paths split at glass, instead of choosing randomly between reflection and refraction.
+    /// Whether camera paths split at glass. Otherwise, they choose randomly between reflection and
+    /// refraction.
     pub splits: bool,
-    /// Whether paths scatter at rough surfaces and can therefore find all light. If not, paths end at rough
-    /// surfaces unless photons are gathered.
+    /// Whether paths scatter at rough surfaces and thus find all light. Otherwise, paths end at rough
+    /// surfaces, unless photons are gathered.
     pub scatters: bool,
     /// Whether `[photons]` is supported.
     pub gathers: bool,

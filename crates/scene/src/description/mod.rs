@@ -1,5 +1,5 @@
-//! The validated scene, with all defaults filled in. It is independent of the file syntax. Objects refer to
-//! each other by index.
+//! The validated scene, with all defaults filled in and independent of the file syntax. Objects refer to each
+//! other by index.
 //!
 //! Lengths are in scene units, angles in degrees, and colors in linear Rec. 709. All numbers are finite.
 
@@ -24,7 +24,7 @@ pub use method::{Integrator, Method};
 pub use render::{
     Accel, KeyRange, MAX_BOUNCES, PixelFilter, Render, RenderKey, Shadows, Tonemap, render_keys,
 };
-pub use shape::{Lowered, Mesh, Object, Placement, Shape, Sheet, greatest};
+pub use shape::{LoweredShape, Mesh, Object, Placement, Shape, Sheet, max_projection};
 
 /// A scene.
 #[derive(Clone, Debug, PartialEq)]

@@ -122,7 +122,7 @@ pub enum Shape {
 /// An open surface, which does not enclose a volume on its own.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Sheet {
-    /// A parallelogram, given by its corners in counterclockwise order seen from the front.
+    /// A parallelogram, given by its corners, which are counterclockwise when seen from the front.
     Quad([DVec3; 4]),
     /// A triangle, given by its corners in order.
     Triangle([DVec3; 3]),
@@ -205,7 +205,7 @@ impl Placement {
 
 /// A shape in the form used for tracing.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Lowered<'a> {
+pub enum LoweredShape<'a> {
     /// An analytic shape.
     Shape(geometry::Shape),
     /// A mesh. Its triangles are in a file.
@@ -214,9 +214,9 @@ pub enum Lowered<'a> {
 
 impl Shape {
     /// Lowers the shape to coordinates relative to `origin`.
-    pub fn lowered(&self, origin: DVec3) -> Lowered<'_> {
+    pub fn lowered(&self, origin: DVec3) -> LoweredShape<'_> {
         let at = |place: DVec3| place - origin;
-        Lowered::Shape(match *self {
+        LoweredShape::Shape(match *self {
             Self::Sphere { center, radius } => geometry::Shape::Sphere(Sphere { center: at(center), radius }),
             Self::Quad { corner, u, v } => geometry::Shape::Quad(Parallelogram::new(at(corner), u, v)),
             Self::Plane { point, normal } => geometry::Shape::Plane(Plane::new(at(point), normal)),
@@ -236,7 +236,7 @@ impl Shape {
             Self::Torus { center, axis, radius, tube } => {
                 geometry::Shape::Torus(Torus::new(at(center), axis, radius, tube))
             }
-            Self::Mesh(ref mesh) => return Lowered::Mesh(mesh),
+            Self::Mesh(ref mesh) => return LoweredShape::Mesh(mesh),
         })
     }
 
@@ -298,7 +298,7 @@ impl Shape {
 
     /// Upper bound on the projection of the shape's points onto a unit direction. Infinite for planes that
     /// are not perpendicular to the direction. `None` for a mesh.
-    pub fn reach(&self, direction: DVec3) -> Option<f64> {
+    pub fn max_projection_onto(&self, direction: DVec3) -> Option<f64> {
         let along = |place: DVec3| direction.dot(place);
         // Extent of a circle around an axis, projected onto the direction.
         let round = |axis: DVec3, radius: f64| {
@@ -308,9 +308,9 @@ impl Shape {
         Some(match *self {
             Self::Sphere { center, radius } => along(center) + radius,
             Self::Quad { corner, u, v } => {
-                greatest(direction, &[corner, corner + u, corner + v, corner + u + v])
+                max_projection(direction, &[corner, corner + u, corner + v, corner + u + v])
             }
-            Self::Triangle { a, b, c } => greatest(direction, &[a, b, c]),
+            Self::Triangle { a, b, c } => max_projection(direction, &[a, b, c]),
             Self::Plane { point, normal } => {
                 let is_parallel =
                     normal.try_normalize().is_some_and(|normal| along(normal).abs() > 1.0 - 1e-9);
@@ -321,9 +321,11 @@ impl Shape {
             }
             Self::Box { center, size, rotate: _ } => along(center) + 0.5 * size.length(),
             Self::Disk { center, normal, radius } => along(center) + round(normal, radius),
-            Self::Cylinder { a, b, radius, caps: _ } => greatest(direction, &[a, b]) + round(b - a, radius),
+            Self::Cylinder { a, b, radius, caps: _ } => {
+                max_projection(direction, &[a, b]) + round(b - a, radius)
+            }
             Self::Cone { base, tip, radius, cap: _ } => {
-                greatest(direction, &[base + direction * round(tip - base, radius), tip])
+                max_projection(direction, &[base + direction * round(tip - base, radius), tip])
             }
             Self::Torus { center, axis, radius, tube } => along(center) + round(axis, radius) + tube,
             Self::Mesh(_) => return None,
@@ -332,7 +334,7 @@ impl Shape {
 }
 
 /// The largest projection of the points onto a unit direction.
-pub fn greatest(direction: DVec3, points: &[DVec3]) -> f64 {
+pub fn max_projection(direction: DVec3, points: &[DVec3]) -> f64 {
     points.iter().map(|point| direction.dot(*point)).fold(f64::NEG_INFINITY, f64::max)
 }
 

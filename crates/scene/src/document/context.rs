@@ -9,19 +9,19 @@ use super::super::report::LineIndex;
 use super::super::source::SceneText;
 
 /// A file that is being read.
-pub(super) struct Context<'a> {
+pub(super) struct FileContext<'a> {
     source: SceneText,
     path: &'a Path,
     lines: OnceCell<LineIndex>,
     issues: RefCell<Vec<Issue>>,
     /// Number of errors and of warnings.
     counts: Cell<[usize; 2]>,
-    searches: Cell<Searches>,
+    searches: Cell<SearchCounts>,
 }
 
 /// Number of searches for similar names, and number of comparisons.
 #[derive(Clone, Copy, Default)]
-struct Searches {
+struct SearchCounts {
     count: usize,
     comparisons: usize,
 }
@@ -43,7 +43,7 @@ enum IssueCause {
     Syntax,
     /// The value at the span.
     Value,
-    /// A missing value, or a value elsewhere in the file. The cause may be a line with a syntax error.
+    /// A missing value, or a value elsewhere in the file. A line with a syntax error may be the cause.
     Absence,
 }
 
@@ -82,25 +82,25 @@ impl Issue {
     }
 
     /// Marks the issue as caused by a missing value.
-    pub(super) fn absence(self) -> Self {
+    pub(super) fn caused_by_absence(self) -> Self {
         Self { cause: IssueCause::Absence, ..self }
     }
 
     /// Marks the issue as a syntax error.
-    pub(super) fn syntax(self) -> Self {
+    pub(super) fn caused_by_syntax(self) -> Self {
         Self { cause: IssueCause::Syntax, ..self }
     }
 }
 
-impl<'a> Context<'a> {
+impl<'a> FileContext<'a> {
     pub(super) fn new(source: SceneText, path: &'a Path) -> Self {
         let (lines, issues, counts, searches) = Default::default();
         Self { source, path, lines, issues, counts, searches }
     }
 
     /// Whether a span is in a `--set` value rather than in the file.
-    pub(super) fn is_set(&self, span: &Range<usize>) -> bool {
-        self.source.is_set(span)
+    pub(super) fn is_in_set_value(&self, span: &Range<usize>) -> bool {
+        self.source.is_in_set_value(span)
     }
 
     /// Adds an issue to the list.
@@ -131,17 +131,21 @@ impl<'a> Context<'a> {
 
     /// The text at `span`, or an empty string if it is out of range.
     pub(super) fn text(&self, span: &Range<usize>) -> &str {
-        self.source.all().get(span.clone()).unwrap_or_default()
+        self.source.full_text().get(span.clone()).unwrap_or_default()
     }
 
     /// Searches a list for a similar name. The cost is linear in the length of the list, so the number of
-    /// searches per file is limited. Files with more wrong names usually repeat the same mistake.
-    pub(super) fn search<T>(&self, comparisons: usize, look: impl FnOnce() -> Option<T>) -> Option<T> {
-        let Searches { count, comparisons: before } = self.searches.get();
+    /// searches per file is limited. Files with many wrong names usually repeat the same mistake.
+    pub(super) fn search_similar_name<T>(
+        &self,
+        comparisons: usize,
+        look: impl FnOnce() -> Option<T>,
+    ) -> Option<T> {
+        let SearchCounts { count, comparisons: before } = self.searches.get();
         if count >= MAX_SEARCHES || before >= MAX_COMPARISONS {
             return None;
         }
-        self.searches.set(Searches { count: count + 1, comparisons: before + comparisons });
+        self.searches.set(SearchCounts { count: count + 1, comparisons: before + comparisons });
         look()
     }
 
@@ -158,12 +162,12 @@ impl<'a> Context<'a> {
 
     /// The text of a line, given its 1-based number.
     pub(super) fn line_text(&self, line: usize) -> Option<&str> {
-        let text = self.source.all();
+        let text = self.source.full_text();
         text.get(self.lines().span(line.checked_sub(1)?, text)?)
     }
 
     fn lines(&self) -> &LineIndex {
-        self.lines.get_or_init(|| LineIndex::new(self.source.all()))
+        self.lines.get_or_init(|| LineIndex::new(self.source.full_text()))
     }
 
     /// Resolves a path relative to the scene's folder.
@@ -171,15 +175,15 @@ impl<'a> Context<'a> {
         self.path.parent().unwrap_or(Path::new("")).join(file)
     }
 
-    /// Returns all issues in file order. If there are syntax errors, omits issues that these may have caused:
-    /// issues in `broken_lines` and missing values.
+    /// Returns all issues in file order. If there are syntax errors, omits the issues that they may have
+    /// caused: issues in `broken_lines`, and missing values.
     pub(super) fn finish(self, broken_lines: &[Range<usize>]) -> Vec<Diagnostic> {
         let mut issues = self.issues.take();
         if !broken_lines.is_empty() {
             issues.retain(|issue| match issue.cause {
                 IssueCause::Syntax => true,
                 IssueCause::Absence => false,
-                // A placeholder, which replaces a value with a syntax error, has no span.
+                // Placeholders for values with syntax errors have no span.
                 IssueCause::Value if issue.span == (0..0) => false,
                 IssueCause::Value => {
                     let line = self.line(issue.span.start);
@@ -228,7 +232,7 @@ const MAX_COLLECTED: usize = 10_000;
 impl Issue {
     fn into_diagnostic(self, path: &Path, source: &SceneText) -> Diagnostic {
         let label = if self.label.is_empty() { String::new() } else { format!("; {}", self.label) };
-        let (path, place) = source.place(path, self.span, self.label);
+        let (path, place) = source.resolve_span(path, self.span, self.label);
         let (severity, mut message, help) = (self.severity, self.message, self.help);
         if place.is_none() {
             message += &label;

@@ -7,24 +7,24 @@ use super::table::TableReader;
 use crate::math::Vec3;
 
 /// Reads the environment. `None` if it is invalid, `Some(None)` if it is absent.
-pub(super) fn read(root: &TableReader<'_>) -> Option<Option<Environment>> {
+pub(super) fn read_environment(root: &TableReader<'_>) -> Option<Option<Environment>> {
     let key = root.optional("environment");
     let Some(table) = root.table("environment") else {
-        return (!key.is_given()).then_some(None);
+        return (!key.is_present()).then_some(None);
     };
     let (color, file) = (table.optional("color"), table.optional("file"));
-    let map = if file.is_given() { file.file(MAPS).map(Some) } else { Some(None) };
-    let default = if file.is_given() { Vec3::ONE } else { Vec3::ZERO };
-    let radiance = if color.is_given() { color.color() } else { Some(default) };
+    let map = if file.is_present() { file.file(MAPS).map(Some) } else { Some(None) };
+    let default = if file.is_present() { Vec3::ONE } else { Vec3::ZERO };
+    let radiance = if color.is_present() { color.color() } else { Some(default) };
     let rotate = table.optional("rotate");
-    let degrees = if rotate.is_given() { rotate.number(table.limits("rotate")) } else { Some(0.0) };
+    let degrees = if rotate.is_present() { rotate.number(table.limits("rotate")) } else { Some(0.0) };
     table.finish();
-    if let (Some(Vec3::ZERO), Some(span)) = (radiance, color.span().filter(|_| file.is_given())) {
+    if let (Some(Vec3::ZERO), Some(span)) = (radiance, color.span().filter(|_| file.is_present())) {
         let issue = Issue::warning(span, "`color` is black, so the environment is black")
             .label("a scale factor for `file`");
         table.context.report(issue.help("remove it to use the map unchanged"));
     }
-    if let Some(span) = rotate.span().filter(|_| !file.is_given()) {
+    if let Some(span) = rotate.span().filter(|_| !file.is_present()) {
         let issue = Issue::warning(span, "`rotate` has no effect without `file`");
         table.context.report(issue.help("a constant environment looks the same from every direction"));
     }

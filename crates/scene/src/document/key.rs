@@ -7,20 +7,20 @@ mod number;
 
 use std::ops::{Range, RangeInclusive};
 
-use super::super::nearest::meant;
+use super::super::nearest::translate_foreign_name;
 use super::super::sanitize::shortened;
-use super::context::{Context, Issue};
+use super::context::{FileContext, Issue};
 use super::limits::Limits;
-use super::names::Names;
-use super::table::{TableReader, Title};
-use super::value::{TomlValue, Value, found, limited, whole, wrong_type};
+use super::names::DefinedNames;
+use super::table::{TableReader, TableTitle};
+use super::value::{TomlValue, Value, describe_found, number_within, parse_integer, report_wrong_type};
 use crate::choice::Choice;
 use crate::math::limits::{SHORTEST, is_too_short, length};
 use crate::math::{DVec3, Vec2};
 
 /// A key of a table, present or absent.
 pub(super) struct TableKey<'a> {
-    pub(super) context: &'a Context<'a>,
+    pub(super) context: &'a FileContext<'a>,
     pub(super) name: &'static str,
     pub(super) value: Option<Value<'a>>,
     key_span: Option<Range<usize>>,
@@ -28,7 +28,7 @@ pub(super) struct TableKey<'a> {
 
 impl<'a> TableKey<'a> {
     pub(super) fn new(
-        context: &'a Context<'a>,
+        context: &'a FileContext<'a>,
         name: &'static str,
         key_span: Option<Range<usize>>,
         value: Option<Value<'a>>,
@@ -37,7 +37,7 @@ impl<'a> TableKey<'a> {
     }
 
     /// Whether the file has the key.
-    pub(super) fn is_given(&self) -> bool {
+    pub(super) fn is_present(&self) -> bool {
         self.value.is_some()
     }
 
@@ -53,7 +53,7 @@ impl<'a> TableKey<'a> {
 
     /// A number, which may be an integer.
     pub(super) fn number(&self, limits: Limits) -> Option<f64> {
-        limited(self.context, self.name, self.value?, limits, "a number")
+        number_within(self.context, self.name, self.value?, limits, "a number")
     }
 
     /// A number in single precision.
@@ -62,50 +62,50 @@ impl<'a> TableKey<'a> {
     }
 
     /// An integer. `N` must be able to represent the whole range.
-    pub(super) fn whole<N: TryFrom<i128>>(&self, range: RangeInclusive<i128>) -> Option<N> {
+    pub(super) fn integer<N: TryFrom<i128>>(&self, range: RangeInclusive<i128>) -> Option<N> {
         let value = self.value?;
         let TomlValue::Integer { digits, radix } = value.item() else {
-            wrong_type(self.context, self.name, value, "a whole number");
+            report_wrong_type(self.context, self.name, value, "a whole number");
             return None;
         };
-        let number = whole(digits, radix).filter(|number| range.contains(number));
+        let number = parse_integer(digits, radix).filter(|number| range.contains(number));
         if number.is_none() {
             let (name, low, high) = (self.name, range.start(), range.end());
             let message = format!("`{name}` must be a whole number between {low} and {high}");
-            let label = format!("found {}", found(self.context, value));
+            let label = format!("found {}", describe_found(self.context, value));
             self.context.report(Issue::error(value.span(), message).label(label));
         }
         number.and_then(|number| number.try_into().ok())
     }
 
     /// `true` or `false`.
-    pub(super) fn flag(&self) -> Option<bool> {
+    pub(super) fn boolean(&self) -> Option<bool> {
         let value = self.value?;
         if let TomlValue::Boolean(flag) = value.item() {
             return Some(flag);
         }
-        wrong_type(self.context, self.name, value, "true or false");
+        report_wrong_type(self.context, self.name, value, "true or false");
         None
     }
 
     /// A string. `expected` describes it in errors.
     pub(super) fn text(&self, expected: &str) -> Option<&'a str> {
-        self.text_or(|| expected.to_owned())
+        self.text_described_by(|| expected.to_owned())
     }
 
     /// A string, described by `expected` in errors.
-    fn text_or(&self, expected: impl FnOnce() -> String) -> Option<&'a str> {
+    fn text_described_by(&self, expected: impl FnOnce() -> String) -> Option<&'a str> {
         let value = self.value?;
         if let TomlValue::String(text) = value.item() {
             return Some(text);
         }
-        wrong_type(self.context, self.name, value, &expected());
+        report_wrong_type(self.context, self.name, value, &expected());
         None
     }
 
     /// The name of a shape, if any. Reports names that look like numbers.
     pub(super) fn shape_name(&self) -> Option<Option<Box<str>>> {
-        if !self.is_given() {
+        if !self.is_present() {
             return Some(None);
         }
         let text = self.text("the name of this shape")?;
@@ -129,7 +129,7 @@ impl<'a> TableKey<'a> {
             let list = C::ALL.iter().map(|one| format!("\"{}\"", one.name())).collect::<Vec<_>>().join(", ");
             if C::ALL.len() == 1 { list } else { format!("one of {list}") }
         };
-        let text = self.text_or(list)?;
+        let text = self.text_described_by(list)?;
         if let Some(meant) = C::named(text) {
             return Some(meant);
         }
@@ -141,7 +141,7 @@ impl<'a> TableKey<'a> {
             Issue::error(span, format!("`{name}` cannot be \"{shown}\"")).help(format!("expected {list}"))
         };
         let names: Vec<&str> = C::ALL.iter().map(|one| one.name()).collect();
-        if let Some(near) = meant(text, &names) {
+        if let Some(near) = translate_foreign_name(text, &names) {
             issue = issue.label(format!("did you mean \"{near}\"?"));
         }
         self.context.report(issue);
@@ -155,12 +155,12 @@ impl<'a> TableKey<'a> {
 
     /// Three numbers, or `default` if the key is absent.
     pub(super) fn vector_or(&self, limits: Limits, default: DVec3) -> Option<DVec3> {
-        if self.is_given() { self.vector(limits) } else { Some(default) }
+        if self.is_present() { self.vector(limits) } else { Some(default) }
     }
 
-    /// Checks that a vector is long enough to compute with, and reports an error if not. Vectors of length 0
-    /// are left to the caller, which has a better message.
-    pub(super) fn is_long(&self, vector: DVec3) -> bool {
+    /// Checks that a vector is long enough to compute with, and reports an error if not. The caller reports
+    /// vectors of length 0 with a more specific message.
+    pub(super) fn check_vector_length(&self, vector: DVec3) -> bool {
         let length = length(vector);
         let Some(span) = self.span().filter(|_| is_too_short(length)) else { return true };
         let issue = Issue::error(span, format!("`{}` must be more than {SHORTEST:e} long", self.name));
@@ -169,8 +169,8 @@ impl<'a> TableKey<'a> {
     }
 
     /// Checks that two points, given by `self` and `other`, are far enough apart to compute with, and reports
-    /// an error if not. Equal points are left to the caller, which has a better message.
-    pub(super) fn is_apart(&self, from: DVec3, other: &Self, to: DVec3) -> bool {
+    /// an error if not. The caller reports equal points with a more specific message.
+    pub(super) fn check_distance(&self, from: DVec3, other: &Self, to: DVec3) -> bool {
         let distance = length(to - from);
         let span = other.span().or(self.span());
         let Some(span) = span.filter(|_| is_too_short(distance)) else { return true };
@@ -189,12 +189,12 @@ impl<'a> TableKey<'a> {
     pub(super) fn numbers<const N: usize>(&self, limits: Limits, expected: &str) -> Option<[f64; N]> {
         let value = self.value?;
         let Some(array) = value.array().filter(|array| array.len() == N) else {
-            wrong_type(self.context, self.name, value, expected);
+            report_wrong_type(self.context, self.name, value, expected);
             return None;
         };
         let mut numbers = [Some(0.0); N];
         for (number, one) in numbers.iter_mut().zip(array.iter()) {
-            *number = limited(self.context, self.name, one, limits, expected);
+            *number = number_within(self.context, self.name, one, limits, expected);
         }
         let is_whole = numbers.iter().all(Option::is_some);
         is_whole.then(|| numbers.map(Option::unwrap_or_default))
@@ -209,23 +209,23 @@ impl<'a> TableKey<'a> {
     }
 
     /// Reads a name and returns its index in `names`.
-    pub(super) fn name_in(&self, names: &Names) -> Option<usize> {
-        self.find(names, self.text_or(|| format!("the name of a {}", names.kind))?)
+    pub(super) fn index_by_name(&self, names: &DefinedNames) -> Option<usize> {
+        self.find(names, self.text_described_by(|| format!("the name of a {}", names.kind))?)
     }
 
     /// Looks up `text`, the name given as the key's value.
-    fn find(&self, names: &Names, text: &str) -> Option<usize> {
+    fn find(&self, names: &DefinedNames, text: &str) -> Option<usize> {
         let index = names.find(text);
         if index.is_none() {
             let message = format!("there is no {} \"{}\"", names.kind, shortened(text, 40));
-            let issue = Issue::error(self.span()?, message).absence();
-            self.context.report(names.advise(self.context, issue, text));
+            let issue = Issue::error(self.span()?, message).caused_by_absence();
+            self.context.report(names.suggest_names(self.context, issue, text));
         }
         index
     }
 
     /// The value as an inline table, `{ … }`.
     pub(super) fn inline_table(&self) -> Option<TableReader<'a>> {
-        TableReader::of(self.context, self.value?, Title::Key(self.name))
+        TableReader::from_value(self.context, self.value?, TableTitle::Key(self.name))
     }
 }

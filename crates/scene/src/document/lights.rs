@@ -4,7 +4,7 @@ use super::super::description::Light;
 use super::super::description::light::{DirectionalLight, Falloff, PointLight, SpotLight};
 use super::context::Issue;
 use super::limits::Limits;
-use super::shapes::direction;
+use super::shapes::read_direction;
 use super::table::TableReader;
 use crate::choice;
 use crate::math::{DVec3, Vec3};
@@ -21,39 +21,39 @@ choice! {
     }
 }
 
-pub(super) fn read(root: &TableReader<'_>) -> Option<Vec<Light>> {
-    let read: Vec<Option<Light>> = root.tables("light").map(|table| light(&table)).collect();
+pub(super) fn read_lights(root: &TableReader<'_>) -> Option<Vec<Light>> {
+    let read: Vec<Option<Light>> = root.tables("light").map(|table| read_light(&table)).collect();
     read.into_iter().collect()
 }
 
-fn light(table: &TableReader<'_>) -> Option<Light> {
+fn read_light(table: &TableReader<'_>) -> Option<Light> {
     let key = table.optional("type");
     // Without a valid type, keys cannot be checked.
-    let kind = if key.is_given() { key.choice()? } else { LightKind::Point };
+    let kind = if key.is_present() { key.choice()? } else { LightKind::Point };
     let light = match kind {
-        LightKind::Point => point(table).map(Light::Point),
-        LightKind::Spot => spot(table).map(Light::Spot),
-        LightKind::Directional => directional(table).map(Light::Directional),
+        LightKind::Point => read_point(table).map(Light::Point),
+        LightKind::Spot => read_spot(table).map(Light::Spot),
+        LightKind::Directional => read_directional(table).map(Light::Directional),
     };
     table.finish();
     light
 }
 
-fn point(table: &TableReader<'_>) -> Option<PointLight> {
+fn read_point(table: &TableReader<'_>) -> Option<PointLight> {
     let position = table.optional("position").vector_or(Limits::Any, DVec3::new(0.0, 3.0, 0.0));
     let intensity = table.optional("intensity").color().unwrap_or(Vec3::splat(10.0));
     let falloff = table.optional("falloff").choice().unwrap_or(Falloff::Square);
     Some(PointLight { position: position?, intensity, falloff })
 }
 
-fn spot(table: &TableReader<'_>) -> Option<SpotLight> {
-    let point = point(table);
+fn read_spot(table: &TableReader<'_>) -> Option<SpotLight> {
+    let point = read_point(table);
     let aim = table.optional("look_at");
     let look_at = aim.vector_or(Limits::Any, DVec3::ZERO);
     let angle = table.optional("angle");
-    let angle = if angle.is_given() { angle.number(table.limits("spot.angle")) } else { Some(45.0) };
+    let angle = if angle.is_present() { angle.number(table.limits("spot.angle")) } else { Some(45.0) };
     let blend = table.optional("blend");
-    let blend = if blend.is_given() { blend.number32(table.limits("spot.blend")) } else { Some(0.2) };
+    let blend = if blend.is_present() { blend.number32(table.limits("spot.blend")) } else { Some(0.2) };
     let (point, look_at) = (point?, look_at?);
     let place = table.optional("position");
     if point.position == look_at {
@@ -63,7 +63,7 @@ fn spot(table: &TableReader<'_>) -> Option<SpotLight> {
         table.context.report(issue);
         return None;
     }
-    if !place.is_apart(point.position, &aim, look_at) {
+    if !place.check_distance(point.position, &aim, look_at) {
         return None;
     }
     Some(SpotLight { point, look_at, angle: angle?, blend: blend? })
@@ -73,11 +73,11 @@ fn spot(table: &TableReader<'_>) -> Option<SpotLight> {
 /// from 0.
 const MIN_ANGLE_DEGREES: f64 = 1e-3;
 
-fn directional(table: &TableReader<'_>) -> Option<DirectionalLight> {
-    let direction = direction(table, "direction", "light", DVec3::NEG_Y);
+fn read_directional(table: &TableReader<'_>) -> Option<DirectionalLight> {
+    let direction = read_direction(table, "direction", "light", DVec3::NEG_Y);
     let irradiance = table.optional("irradiance").color().unwrap_or(Vec3::ONE);
     let key = table.optional("angle");
-    let angle = if key.is_given() { key.number(table.limits("directional.angle")) } else { Some(0.0) };
+    let angle = if key.is_present() { key.number(table.limits("directional.angle")) } else { Some(0.0) };
     if angle.is_some_and(|angle| angle != 0.0 && angle < MIN_ANGLE_DEGREES) {
         let issue =
             Issue::error(key.span()?, format!("`angle` must be 0, or at least {MIN_ANGLE_DEGREES:e}"));

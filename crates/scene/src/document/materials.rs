@@ -6,7 +6,7 @@ use super::super::description::{
 use super::common;
 use super::context::Issue;
 use super::key::TableKey;
-use super::names::Names;
+use super::names::DefinedNames;
 use super::table::TableReader;
 use crate::choice;
 use crate::materials::metal::elements::Element;
@@ -15,7 +15,7 @@ use crate::math::{DVec3, Vec3};
 /// The materials of a file.
 pub(super) struct MaterialList {
     /// Material names.
-    pub(super) names: Names,
+    pub(super) names: DefinedNames,
     /// The materials, in the same order as the names. `None` if any is invalid.
     pub(super) list: Option<Vec<Material>>,
     /// Whether each material emits light.
@@ -29,11 +29,12 @@ impl MaterialList {
     }
 }
 
-pub(super) fn read(root: &TableReader<'_>, textures: &Names) -> MaterialList {
+pub(super) fn read_materials(root: &TableReader<'_>, textures: &DefinedNames) -> MaterialList {
     let tables = root.named_tables("materials");
-    let names = Names::new("material", tables.iter().map(|(name, span, _)| (name.clone(), span.clone())));
+    let names =
+        DefinedNames::new("material", tables.iter().map(|(name, span, _)| (name.clone(), span.clone())));
     let read: Vec<Option<Material>> =
-        tables.into_iter().map(|(name, _, table)| material(name, &table?, textures)).collect();
+        tables.into_iter().map(|(name, _, table)| read_material(name, &table?, textures)).collect();
     let emits = |material: &Material| material.emits();
     let emissive = read.iter().map(|material| material.as_ref().is_some_and(emits)).collect();
     MaterialList { names, list: read.into_iter().collect(), emissive }
@@ -57,43 +58,44 @@ choice! {
     }
 }
 
-fn material(name: String, table: &TableReader<'_>, textures: &Names) -> Option<Material> {
+fn read_material(name: String, table: &TableReader<'_>, textures: &DefinedNames) -> Option<Material> {
     let key = table.optional("type");
     // Without a valid type, keys cannot be checked.
-    let kind = if key.is_given() { key.choice()? } else { MaterialType::Phong };
+    let kind = if key.is_present() { key.choice()? } else { MaterialType::Phong };
     let kind = match kind {
-        MaterialType::Phong => Some(phong(table, textures)),
-        MaterialType::Mirror => Some(mirror(table, textures)),
-        MaterialType::Glass => glass(table, textures),
-        MaterialType::Metal => metal(table, textures),
-        MaterialType::Plastic => Some(plastic(table, textures)),
-        MaterialType::Principled => Some(principled(table, textures)),
+        MaterialType::Phong => Some(read_phong(table, textures)),
+        MaterialType::Mirror => Some(read_mirror(table, textures)),
+        MaterialType::Glass => read_glass(table, textures),
+        MaterialType::Metal => read_metal(table, textures),
+        MaterialType::Plastic => Some(read_plastic(table, textures)),
+        MaterialType::Principled => Some(read_principled(table, textures)),
     };
-    let (emission, normal_map) = (common::emission(table, textures), common::normal_map(table, textures));
-    let bump = common::bump(table, textures);
+    let (emission, normal_map) =
+        (common::read_emission(table, textures), common::read_normal_map(table, textures));
+    let bump = common::read_bump(table, textures);
     let opacity = if kind.as_ref().is_some_and(MaterialKind::is_glass) {
-        common::refuse_opacity(table);
+        common::reject_opacity_keys(table);
         OpacitySource::FULL
     } else {
-        common::opacity(table, textures)
+        common::read_opacity(table, textures)
     };
     table.finish();
     Some(Material { name, kind: kind?, emission, normal_map, bump, opacity })
 }
 
-fn phong(table: &TableReader<'_>, textures: &Names) -> MaterialKind {
+fn read_phong(table: &TableReader<'_>, textures: &DefinedNames) -> MaterialKind {
     let (diffuse_key, specular_key) = (table.optional("diffuse"), table.optional("specular"));
     let ambient_key = table.optional("ambient");
     let color = |key: &TableKey<'_>, name| key.color_or_texture(textures, table.limits(name));
     let (diffuse, specular) = (color(&diffuse_key, "phong.diffuse"), color(&specular_key, "phong.specular"));
-    let is_wrong = |key: &TableKey<'_>, color: &Option<ColorSource>| key.is_given() && color.is_none();
+    let is_wrong = |key: &TableKey<'_>, color: &Option<ColorSource>| key.is_present() && color.is_none();
     let is_invalid = is_wrong(&diffuse_key, &diffuse) || is_wrong(&specular_key, &specular);
     let diffuse = diffuse.unwrap_or(ColorSource::Constant(Vec3::splat(0.7)));
     let specular = specular.unwrap_or(ColorSource::Constant(Vec3::ZERO));
     let are_bytes = [&diffuse_key, &specular_key, &ambient_key]
-        .map(|key| key.reports_bytes(|span| Issue::warning(span, ENERGY_GAIN)));
+        .map(|key| key.rejects_byte_color(|span| Issue::warning(span, ENERGY_GAIN)));
     if !is_invalid && are_bytes == [false; 3] {
-        warn_about_gain(&diffuse_key, &specular_key, &diffuse, &specular);
+        warn_about_energy_gain(&diffuse_key, &specular_key, &diffuse, &specular);
     }
     MaterialKind::Phong {
         diffuse,
@@ -107,7 +109,7 @@ fn phong(table: &TableReader<'_>, textures: &Names) -> MaterialKind {
 pub(crate) const ENERGY_GAIN: &str = "this material reflects more light than falls on it";
 
 /// Warns about a material that reflects more light than falls on it.
-fn warn_about_gain(kd_key: &TableKey<'_>, ks_key: &TableKey<'_>, kd: &ColorSource, ks: &ColorSource) {
+fn warn_about_energy_gain(kd_key: &TableKey<'_>, ks_key: &TableKey<'_>, kd: &ColorSource, ks: &ColorSource) {
     let constant = |source: &ColorSource| match source {
         ColorSource::Constant(color) => *color,
         ColorSource::Texture(_) => Vec3::ZERO,
@@ -123,35 +125,35 @@ fn warn_about_gain(kd_key: &TableKey<'_>, ks_key: &TableKey<'_>, kd: &ColorSourc
     kd_key.context.report(issue);
 }
 
-fn metal(table: &TableReader<'_>, textures: &Names) -> Option<MaterialKind> {
-    let fresnel = fresnel(table, textures);
+fn read_metal(table: &TableReader<'_>, textures: &DefinedNames) -> Option<MaterialKind> {
+    let fresnel = read_fresnel(table, textures);
     Some(MaterialKind::Metal {
-        roughness: number(table, textures, "metal.roughness", 0.2),
-        anisotropy: number(table, textures, "metal.anisotropy", 0.0),
+        roughness: read_number(table, textures, "metal.roughness", 0.2),
+        anisotropy: read_number(table, textures, "metal.anisotropy", 0.0),
         fresnel: fresnel?,
     })
 }
 
-fn plastic(table: &TableReader<'_>, textures: &Names) -> MaterialKind {
+fn read_plastic(table: &TableReader<'_>, textures: &DefinedNames) -> MaterialKind {
     MaterialKind::Plastic {
-        diffuse: color(table, textures, "plastic.diffuse", 0.7),
-        specular: color(table, textures, "plastic.specular", 1.0),
-        ior: ior(table, "plastic.ior"),
-        roughness: number(table, textures, "plastic.roughness", 0.1),
+        diffuse: read_color(table, textures, "plastic.diffuse", 0.7),
+        specular: read_color(table, textures, "plastic.specular", 1.0),
+        ior: read_ior(table, "plastic.ior"),
+        roughness: read_number(table, textures, "plastic.roughness", 0.1),
     }
 }
 
-fn principled(table: &TableReader<'_>, textures: &Names) -> MaterialKind {
+fn read_principled(table: &TableReader<'_>, textures: &DefinedNames) -> MaterialKind {
     common::warn_without(table, "clearcoat_roughness", "clearcoat");
     let (color, number) = (
-        |path, default| color(table, textures, path, default),
-        |path, default| number(table, textures, path, default),
+        |path, default| read_color(table, textures, path, default),
+        |path, default| read_number(table, textures, path, default),
     );
     MaterialKind::Principled {
         color: color("principled.color", 0.8),
         metallic: number("principled.metallic", 0.0),
         roughness: number("principled.roughness", 0.5),
-        ior: ior(table, "principled.ior"),
+        ior: read_ior(table, "principled.ior"),
         specular: number("principled.specular", 1.0),
         specular_color: color("principled.specular_color", 1.0),
         transmission: number("principled.transmission", 0.0),
@@ -161,34 +163,45 @@ fn principled(table: &TableReader<'_>, textures: &Names) -> MaterialKind {
 }
 
 /// The key at the path `TYPE.KEY`.
-fn key<'a>(table: &TableReader<'a>, path: &'static str) -> TableKey<'a> {
+fn type_key<'a>(table: &TableReader<'a>, path: &'static str) -> TableKey<'a> {
     table.optional(path.split_once('.').map_or(path, |(_, name)| name))
 }
 
 /// Reads a color or a texture, with the range defined for `TYPE.KEY`.
-fn color(table: &TableReader<'_>, textures: &Names, path: &'static str, default: f32) -> ColorSource {
-    let color = key(table, path).color_or_texture(textures, table.limits(path));
+fn read_color(
+    table: &TableReader<'_>,
+    textures: &DefinedNames,
+    path: &'static str,
+    default: f32,
+) -> ColorSource {
+    let color = type_key(table, path).color_or_texture(textures, table.limits(path));
     color.unwrap_or(ColorSource::Constant(Vec3::splat(default)))
 }
 
 /// Reads a number or a texture, with the range defined for `TYPE.KEY`.
-fn number(table: &TableReader<'_>, textures: &Names, path: &'static str, default: f32) -> NumberSource {
-    let number = key(table, path).number_or_texture(textures, table.limits(path));
+fn read_number(
+    table: &TableReader<'_>,
+    textures: &DefinedNames,
+    path: &'static str,
+    default: f32,
+) -> NumberSource {
+    let number = type_key(table, path).number_or_texture(textures, table.limits(path));
     number.unwrap_or(NumberSource::Constant(default))
 }
 
 /// Reads an index of refraction.
-fn ior(table: &TableReader<'_>, path: &'static str) -> f32 {
-    key(table, path).number32(table.limits(path)).unwrap_or(1.5)
+fn read_ior(table: &TableReader<'_>, path: &'static str) -> f32 {
+    type_key(table, path).number32(table.limits(path)).unwrap_or(1.5)
 }
 
 /// Reads a metal's reflectance, specified with exactly one of three groups of keys.
-fn fresnel(table: &TableReader<'_>, textures: &Names) -> Option<FresnelSource> {
+fn read_fresnel(table: &TableReader<'_>, textures: &DefinedNames) -> Option<FresnelSource> {
     let [color, eta, k, element] = ["color", "eta", "k", "element"].map(|name| table.optional(name));
-    let is_index = eta.is_given() || k.is_given();
-    let count = [color.is_given(), is_index, element.is_given()].into_iter().filter(|given| *given).count();
+    let is_index = eta.is_present() || k.is_present();
+    let count =
+        [color.is_present(), is_index, element.is_present()].into_iter().filter(|given| *given).count();
     if count > 1 {
-        let given = [&element, &k, &eta, &color].into_iter().find(|key| key.is_given());
+        let given = [&element, &k, &eta, &color].into_iter().find(|key| key.is_present());
         let issue = Issue::error(
             given.and_then(TableKey::key_span)?,
             "the reflectance of this metal is specified twice",
@@ -197,7 +210,7 @@ fn fresnel(table: &TableReader<'_>, textures: &Names) -> Option<FresnelSource> {
         table.context.report(issue);
         return None;
     }
-    if element.is_given() {
+    if element.is_present() {
         let [eta, k] = element.choice::<Element>()?.index().map(ColorSource::Constant);
         return Some(FresnelSource::Index { eta, k });
     }
@@ -211,17 +224,17 @@ fn fresnel(table: &TableReader<'_>, textures: &Names) -> Option<FresnelSource> {
     color.color_or_texture(textures, table.limits("metal.color")).map(FresnelSource::Schlick)
 }
 
-fn mirror(table: &TableReader<'_>, textures: &Names) -> MaterialKind {
-    MaterialKind::Mirror { reflectance: color(table, textures, "mirror.reflectance", 0.9) }
+fn read_mirror(table: &TableReader<'_>, textures: &DefinedNames) -> MaterialKind {
+    MaterialKind::Mirror { reflectance: read_color(table, textures, "mirror.reflectance", 0.9) }
 }
 
-fn glass(table: &TableReader<'_>, textures: &Names) -> Option<MaterialKind> {
-    let ior = ior(table, "glass.ior");
+fn read_glass(table: &TableReader<'_>, textures: &DefinedNames) -> Option<MaterialKind> {
+    let ior = read_ior(table, "glass.ior");
     let (tint, thin) = (table.optional("tint"), table.optional("thin"));
     let rough = table.optional("roughness");
-    let roughness = number(table, textures, "glass.roughness", 0.0);
+    let roughness = read_number(table, textures, "glass.roughness", 0.0);
     // If `thin` is invalid, the user probably wants a pane.
-    if !thin.flag().unwrap_or(thin.is_given()) {
+    if !thin.boolean().unwrap_or(thin.is_present()) {
         let tint = tint.exact_color(table.limits("glass.tint")).unwrap_or(DVec3::ONE);
         return Some(MaterialKind::Glass { ior, tint, roughness });
     }

@@ -26,7 +26,7 @@ use super::other_content::NEW_SCENE_HELP;
 use super::source::SceneText;
 use super::{MAX_FILE_BYTES, Outcome, Setting, facing, toml};
 use crate::math::Vec3;
-use context::{Context, Issue};
+use context::{FileContext, Issue};
 use table::TableReader;
 
 pub(super) use camera::FOV_DEGREES;
@@ -34,13 +34,13 @@ pub(super) use camera::FOV_DEGREES;
 pub(super) use context::MORE_LIKE_THESE;
 #[cfg(test)]
 pub(super) use materials::ENERGY_GAIN;
-pub(super) use shapes::is_mesh;
+pub(super) use shapes::has_mesh_extension;
 #[cfg(test)]
 pub(super) use syntax::MISSING_VALUE;
 
 /// Reads and validates a scene. Relative paths are resolved against the folder of `path`.
 pub(super) fn lower(source: &SceneText, path: &Path) -> Outcome {
-    let context = Context::new(source.clone(), path);
+    let context = FileContext::new(source.clone(), path);
     let text = source.text();
     if text.trim_start_matches('\u{feff}').trim().is_empty() {
         let help = NEW_SCENE_HELP;
@@ -53,8 +53,8 @@ pub(super) fn lower(source: &SceneText, path: &Path) -> Outcome {
         return Outcome { scene: None, diagnostics: context.finish(&[]), settings: Vec::new() };
     }
     let (document, errors) = toml::parse(text);
-    let broken_lines = syntax::report(&context, errors);
-    let document = sets::put(&context, source, document);
+    let broken_lines = syntax::report_syntax_errors(&context, errors);
+    let document = sets::apply_sets(&context, source, document);
     let scene = scene(&TableReader::root(&context, document.root()));
     let has_errors = context.has_errors();
     let settings = settings(&document);
@@ -82,10 +82,10 @@ fn settings(document: &toml::Document<'_>) -> Vec<Setting> {
 
 /// A scene's camera. `None` if there are errors.
 pub(super) fn camera_of(source: &SceneText) -> Option<Camera> {
-    let context = Context::new(source.clone(), Path::new(""));
+    let context = FileContext::new(source.clone(), Path::new(""));
     let (document, errors) = toml::parse(source.text());
-    let document = sets::put(&context, source, document);
-    let camera = camera::read(&TableReader::root(&context, document.root()));
+    let document = sets::apply_sets(&context, source, document);
+    let camera = camera::read_camera(&TableReader::root(&context, document.root()));
     camera.filter(|_| errors.is_empty() && !context.has_errors())
 }
 
@@ -122,16 +122,16 @@ pub(super) fn named_files(text: &str, path: &Path) -> Vec<PathBuf> {
 /// Reads the whole file. Reads definitions of names before references.
 fn scene(root: &TableReader<'_>) -> Option<Scene> {
     let (render, output) = render::read(root);
-    let camera = camera::read(root);
-    let photons = photons::read(root);
-    let textures = textures::read(root);
-    let materials = materials::read(root, &textures.names);
+    let camera = camera::read_camera(root);
+    let photons = photons::read_photons(root);
+    let textures = textures::read_textures(root);
+    let materials = materials::read_materials(root, &textures.names);
     if let Some(list) = &materials.list {
         textures::check_encodings(root.context, &textures, list);
     }
     let (objects, mesh_files) = shapes::read(root, &materials);
-    let lights = lights::read(root);
-    let environment = environment::read(root);
+    let lights = lights::read_lights(root);
+    let environment = environment::read_environment(root);
     root.finish();
 
     let scene = Scene {
@@ -152,7 +152,7 @@ fn scene(root: &TableReader<'_>) -> Option<Scene> {
         warn_about_darkness(root.context, &scene);
         // If there are meshes, wait until their bounds are known.
         if scene.mesh_files.is_empty() {
-            for span in facing::away(&scene, Vec::new) {
+            for span in facing::lights_facing_away(&scene, Vec::new) {
                 root.context
                     .report(Issue::warning(span, facing::MESSAGE).label(facing::LABEL).help(facing::HELP));
             }
@@ -168,7 +168,7 @@ pub(super) const UNLIT_SCENE: &str = "nothing lights this scene";
 pub(super) const NO_AREA: &str = "has no area";
 
 /// Warns about a scene without shapes or light.
-fn warn_about_darkness(context: &Context<'_>, scene: &Scene) {
+fn warn_about_darkness(context: &FileContext<'_>, scene: &Scene) {
     if scene.objects.is_empty() {
         let help = "add one, such as a [[sphere]]; until then the image shows the background";
         context.report(Issue::warning(0..0, "the scene has no shapes").help(help));
@@ -177,8 +177,8 @@ fn warn_about_darkness(context: &Context<'_>, scene: &Scene) {
     let has_file_materials = scene.objects.iter().any(|object| object.material.is_none());
     let emits = |index: usize| scene.materials[index].emits();
     let has_emitters = scene.objects.iter().filter_map(|object| object.material).any(emits);
-    let has_lights =
-        scene.lights.iter().any(Light::sends) || scene.environment.iter().any(Environment::sends);
+    let has_lights = scene.lights.iter().any(Light::has_emission)
+        || scene.environment.iter().any(Environment::has_emission);
     // `path` and photons compute indirect light instead of using `ambient`.
     let method = scene.render.integrator.method();
     let has_ambient = method.honors_ambient

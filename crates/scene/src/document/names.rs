@@ -6,10 +6,10 @@ use std::ops::Range;
 
 use super::super::nearest::nearest;
 use super::super::sanitize::shortened;
-use super::context::{Context, Issue};
+use super::context::{FileContext, Issue};
 
 /// The names of all textures or all materials in a file.
-pub(super) struct Names {
+pub(super) struct DefinedNames {
     /// `texture` or `material`.
     pub(super) kind: &'static str,
     entries: Vec<NameEntry>,
@@ -23,7 +23,7 @@ struct NameEntry {
     used: Cell<bool>,
 }
 
-impl Names {
+impl DefinedNames {
     pub(super) fn new(kind: &'static str, names: impl Iterator<Item = (String, Range<usize>)>) -> Self {
         let entries: Vec<NameEntry> =
             names.map(|(name, span)| NameEntry { name, span, used: Cell::new(false) }).collect();
@@ -43,8 +43,8 @@ impl Names {
         Some(index)
     }
 
-    /// Adds known names and the most similar name to an issue about an unknown name.
-    pub(super) fn advise(&self, context: &Context<'_>, issue: Issue, name: &str) -> Issue {
+    /// Extends an issue about an unknown name with the known names and the most similar name.
+    pub(super) fn suggest_names(&self, context: &FileContext<'_>, issue: Issue, name: &str) -> Issue {
         const MAX_LISTED: usize = 12;
         let kind = self.kind;
         let known = || self.entries.iter().map(|entry| entry.name.as_str());
@@ -57,14 +57,14 @@ impl Names {
             _ => format!("there are {list}"),
         };
         let issue = issue.help(help);
-        match context.search(self.entries.len(), || nearest(name, known())) {
+        match context.search_similar_name(self.entries.len(), || nearest(name, known())) {
             Some(near) => issue.label(format!("did you mean {}?", quoted(near))),
             None => issue,
         }
     }
 
     /// Warns about every unused name. Only for scenes without errors.
-    pub(super) fn warn_about_unused(&self, context: &Context<'_>) {
+    pub(super) fn warn_about_unused(&self, context: &FileContext<'_>) {
         for entry in self.entries.iter().filter(|entry| !entry.used.get()) {
             let message = format!("the {} \"{}\" is not used", self.kind, shortened(&entry.name, 40));
             context.report(Issue::warning(entry.span.clone(), message));
@@ -81,10 +81,10 @@ mod tests {
 
     /// Number of comparisons for `count` unknown names among `count` names.
     fn comparisons(count: usize) -> usize {
-        let context = Context::new(SceneText::file("".into()), Path::new("scene.toml"));
-        let names = Names::new("material", (0..count).map(|number| (format!("name{number}"), 0..0)));
+        let context = FileContext::new(SceneText::file("".into()), Path::new("scene.toml"));
+        let names = DefinedNames::new("material", (0..count).map(|number| (format!("name{number}"), 0..0)));
         for number in 0..count {
-            names.advise(&context, Issue::error(0..0, "wrong"), &format!("nome{number}"));
+            names.suggest_names(&context, Issue::error(0..0, "wrong"), &format!("nome{number}"));
         }
         context.comparisons()
     }

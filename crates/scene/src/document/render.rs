@@ -12,7 +12,7 @@ const MAX_PIXELS: u64 = 1 << 30;
 
 macro_rules! read {
     ($key:expr, whole($least:expr, $most:expr)) => {
-        $key.whole(i128::from($least)..=i128::from($most))
+        $key.integer(i128::from($least)..=i128::from($most))
     };
     ($key:expr, at_least($least:expr)) => {
         $key.number32(Limits::AtLeast($least))
@@ -33,7 +33,7 @@ macro_rules! reader {
         $(#[doc = $doc:literal])* $name:ident: $type:ty = $default:expr, $range:ident $(($($limit:expr),*))?, $unit:literal, $change:ident;
     )*) => {
         /// Reads all keys. Absent or invalid keys get their default values.
-        fn settings(table: &TableReader<'_>) -> Render {
+        fn read_settings(table: &TableReader<'_>) -> Render {
             let key = |name| table.optional(name);
             Render {
                 $($name: read!(key(stringify!($name)), $range $(($($limit),*))?).unwrap_or(Render::DEFAULT.$name),)*
@@ -47,17 +47,17 @@ render_keys!(reader);
 /// Reads the settings and the output path, if any.
 pub(super) fn read(root: &TableReader<'_>) -> (Option<Render>, Option<PathBuf>) {
     let Some(table) = root.table("render") else { return (Some(Render::DEFAULT), None) };
-    let render = settings(&table);
-    let output = output(&table);
+    let render = read_settings(&table);
+    let output = read_output_path(&table);
     check_size(&table, &render);
     table.finish();
     (Some(render), output)
 }
 
-fn output(table: &TableReader<'_>) -> Option<PathBuf> {
+fn read_output_path(table: &TableReader<'_>) -> Option<PathBuf> {
     let key = table.optional("output");
     let text = key.text("the path of an image, such as \"image.png\"")?;
-    key.has_ending(text, IMAGES).then(|| table.context.resolve(text))
+    key.check_extension(text, IMAGES).then(|| table.context.resolve(text))
 }
 
 fn check_size(table: &TableReader<'_>, render: &Render) {

@@ -3,31 +3,33 @@
 use super::super::nearest::nearest;
 use super::super::sanitize::shortened;
 use super::super::source::SceneText;
-use super::super::toml::{Document, KeyError, KeyErrorKind, Layout, set};
-use super::context::{Context, Issue};
+use super::super::toml::{Document, KeyError, KeyErrorKind, TopLevelLayout, set};
+use super::context::{FileContext, Issue};
 use super::shapes;
 
 /// Which keys of a scene are groups and lists.
-const LAYOUT: Layout =
-    Layout { groups: &["materials", "textures"], is_list: |name| name == "light" || shapes::is_kind(name) };
+const LAYOUT: TopLevelLayout = TopLevelLayout {
+    groups: &["materials", "textures"],
+    is_list: |name| name == "light" || shapes::is_shape_table(name),
+};
 
 /// Applies all `--set` values and reports keys that cannot be set.
-pub(super) fn put<'s>(
-    context: &Context<'_>,
+pub(super) fn apply_sets<'s>(
+    context: &FileContext<'_>,
     source: &'s SceneText,
     mut document: Document<'s>,
 ) -> Document<'s> {
-    for at in source.sets() {
+    for at in source.set_offsets() {
         let placed;
-        (document, placed) = set(document, source.all(), at, LAYOUT);
+        (document, placed) = set(document, source.full_text(), at, LAYOUT);
         if let Err(key_error) = placed {
-            context.report(issue(key_error));
+            context.report(key_error_issue(key_error));
         }
     }
     document
 }
 
-fn issue(KeyError { span, above, part, why }: KeyError) -> Issue {
+fn key_error_issue(KeyError { span, above, part, why }: KeyError) -> Issue {
     let list = shortened(&above.join("."), 40);
     let part = shortened(&part, 40);
     let quoted = |names: &[String]| {

@@ -6,12 +6,15 @@ use std::ops::Range;
 
 use super::super::sanitize::shortened;
 use super::super::toml::{Bracket, SyntaxError, brackets, last_open};
-use super::context::{Context, Issue};
+use super::context::{FileContext, Issue};
 
 /// Reports the first error on each line, because it usually causes the other errors. Returns the unreliable
-/// lines, in order: lines with errors, and lines after a broken header, whose keys seem to belong to another
-/// table.
-pub(super) fn report(context: &Context<'_>, mut errors: Vec<SyntaxError>) -> Vec<Range<usize>> {
+/// lines in order: lines with errors, and the lines after a broken header, because their keys appear to
+/// belong to another table.
+pub(super) fn report_syntax_errors(
+    context: &FileContext<'_>,
+    mut errors: Vec<SyntaxError>,
+) -> Vec<Range<usize>> {
     let lists = ArrayBrackets { text: context.file(), brackets: OnceCell::new() };
     let (mut lines, mut firsts) = (BTreeSet::new(), Vec::new());
     errors.sort_by_key(|error| error.span.start);
@@ -24,7 +27,7 @@ pub(super) fn report(context: &Context<'_>, mut errors: Vec<SyntaxError>) -> Vec
         if !is_new {
             continue;
         }
-        match unclosed(context, &lists, &error) {
+        match find_unclosed_bracket(context, &lists, &error) {
             // The parser treated all lines up to this one as part of the list.
             Some(open) => {
                 lines.extend(context.line(open)..context.line(error.span.start));
@@ -43,14 +46,14 @@ pub(super) fn report(context: &Context<'_>, mut errors: Vec<SyntaxError>) -> Vec
         // Ignore errors after an unclosed bracket on the same line.
         let open = opened.get(&context.line(error.span.start));
         if open.is_none_or(|open| error.span.start < *open) {
-            context.report(issue(context, &lists, error).syntax());
+            context.report(syntax_issue(context, &lists, error).caused_by_syntax());
         }
     }
     for open in opened.into_values() {
         let issue = Issue::error(open..open + 1, "`[` opened here is not closed");
-        context.report(issue.help(closed(context, open)).syntax());
+        context.report(issue.help(unclosed_list_help(context, open)).caused_by_syntax());
     }
-    lines.into_iter().map(|line| line..end_of_damage(context, line)).collect()
+    lines.into_iter().map(|line| line..end_of_broken_lines(context, line)).collect()
 }
 
 /// The array brackets in a text with syntax errors.
@@ -69,9 +72,9 @@ impl ArrayBrackets<'_> {
 
 const MISSING_COMMA: &str = "missing comma between array elements";
 
-/// The unclosed bracket that caused an error: the list continues into a line with a key or a header.
-fn unclosed(
-    context: &Context<'_>,
+/// The unclosed bracket that caused an error by extending the list into a line with a key or a header.
+fn find_unclosed_bracket(
+    context: &FileContext<'_>,
     lists: &ArrayBrackets<'_>,
     SyntaxError { span, what, .. }: &SyntaxError,
 ) -> Option<usize> {
@@ -109,48 +112,48 @@ fn open_at_end(text: &str) -> Option<usize> {
 }
 
 /// Help text for an unclosed list. Contains the whole list if it consists of numbers on one line.
-fn closed(context: &Context<'_>, open: usize) -> String {
+fn unclosed_list_help(context: &FileContext<'_>, open: usize) -> String {
     let end =
         context.text(&(open..context.file().len())).find('\n').map_or(context.file().len(), |at| open + at);
-    match of_numbers(context.text(&(open + 1..end))) {
+    match format_number_list(context.text(&(open + 1..end))) {
         Some(list) => format!("write {list}"),
         None => "expected `]`".to_owned(),
     }
 }
 
 /// Message about missing commas in a list on one line. `at` is the position of the first missing comma.
-fn with_commas(context: &Context<'_>, lists: &ArrayBrackets<'_>, at: usize) -> Option<String> {
+fn missing_commas_message(context: &FileContext<'_>, lists: &ArrayBrackets<'_>, at: usize) -> Option<String> {
     let open = lists.open_at(at)?;
     let line_start = context.text(&(0..at)).rfind('\n').map_or(0, |end| end + 1);
     let line = context.line_text(context.line(at))?;
     let inner = line.get(open.checked_sub(line_start)? + 1..)?;
     let inner = &inner[..inner.find(']')?];
-    let values = values(inner);
+    let values = split_values(inner);
     let is_plain = |value: &&str| !value.contains(['[', '{', '"', '\'', '#', '=']);
-    let list = listed(&values).filter(|_| values.iter().all(is_plain))?;
+    let list = format_list(&values).filter(|_| values.iter().all(is_plain))?;
     let missing = (values.len() - 1).saturating_sub(inner.matches(',').count());
     let words = if missing > 1 { "commas are missing" } else { "a comma is missing" };
     Some(format!("{words}: write {list}"))
 }
 
 /// Issue about a list of numbers in the wrong brackets: `(0, 1, 0)`, `{0, 1, 0}`, `vec3(0, 1, 0)`.
-fn in_other_brackets(context: &Context<'_>, at: usize) -> Option<Issue> {
+fn wrong_brackets_issue(context: &FileContext<'_>, at: usize) -> Option<Issue> {
     let line = context.line_text(context.line(at))?;
     let line_start = context.text(&(0..at)).rfind('\n').map_or(0, |end| end + 1);
     let (key, after) = line.split_once('=').filter(|_| is_key(line))?;
     let value = after.split('#').next()?.trim();
     let name = |c: char| c.is_ascii_alphanumeric() || c == '_';
     let inner = value.trim_start_matches(name).strip_prefix(['(', '{', '<'])?;
-    let list = of_numbers(inner)?;
+    let list = format_number_list(inner)?;
     let start = line_start + key.len() + 1 + after.find(value)?;
     let issue = Issue::error(start..start + value.len(), format!("lists use square brackets: write {list}"));
     Some(issue)
 }
 
 /// Formats separated numbers as a list, ignoring any closing bracket.
-fn of_numbers(text: &str) -> Option<String> {
+fn format_number_list(text: &str) -> Option<String> {
     let text = text.split('#').next().unwrap_or_default().trim();
-    let values = values(text.strip_suffix([']', ')', '}', '>']).unwrap_or(text));
+    let values = split_values(text.strip_suffix([']', ')', '}', '>']).unwrap_or(text));
     let is_digit = |c: Option<char>| c.is_some_and(|c| c.is_ascii_digit());
     let is_number = |value: &&str| {
         let digits = value.trim_start_matches(['+', '-']);
@@ -158,16 +161,16 @@ fn of_numbers(text: &str) -> Option<String> {
             && is_digit(digits.chars().next())
             && is_digit(digits.chars().next_back())
     };
-    listed(&values).filter(|_| values.iter().all(is_number))
+    format_list(&values).filter(|_| values.iter().all(is_number))
 }
 
 /// Splits at commas, semicolons and whitespace.
-fn values(text: &str) -> Vec<&str> {
+fn split_values(text: &str) -> Vec<&str> {
     text.split([',', ';', ' ', '\t']).map(str::trim).filter(|value| !value.is_empty()).collect()
 }
 
 /// Formats several values as a list. `None` for long lists.
-fn listed(values: &[&str]) -> Option<String> {
+fn format_list(values: &[&str]) -> Option<String> {
     const LONGEST: usize = 60;
     let list = format!("[{}]", values.join(", "));
     (values.len() > 1 && list.len() <= LONGEST).then_some(list)
@@ -175,7 +178,7 @@ fn listed(values: &[&str]) -> Option<String> {
 
 /// The end of the lines affected by an error: the next header if the line is a broken header, or else the
 /// next line.
-fn end_of_damage(context: &Context<'_>, line: usize) -> usize {
+fn end_of_broken_lines(context: &FileContext<'_>, line: usize) -> usize {
     let is_header = |line: usize| context.line_text(line).map(|text| text.trim_start().starts_with('['));
     if is_header(line) != Some(true) {
         return line + 1;
@@ -184,7 +187,7 @@ fn end_of_damage(context: &Context<'_>, line: usize) -> usize {
 }
 
 /// The number around `span`.
-fn number_at<'c>(context: &'c Context<'_>, span: &Range<usize>) -> &'c str {
+fn number_at<'c>(context: &'c FileContext<'_>, span: &Range<usize>) -> &'c str {
     let is_of_number = |text: &str| text.starts_with(|c: char| c.is_ascii_digit() || "+-._eE".contains(c));
     let (mut start, mut end) = (span.start, span.end);
     while start > 0 && is_of_number(context.text(&(start - 1..start))) {
@@ -197,7 +200,7 @@ fn number_at<'c>(context: &'c Context<'_>, span: &Range<usize>) -> &'c str {
 }
 
 /// Adds missing digits before or after the decimal point. `None` if the result is not a number.
-fn with_digits(number: &str) -> Option<String> {
+fn add_missing_digits(number: &str) -> Option<String> {
     let unsigned = number.trim_start_matches(['+', '-']);
     let sign = &number[..number.len() - unsigned.len()];
     let end = unsigned.find(['e', 'E']).unwrap_or(unsigned.len());
@@ -209,10 +212,10 @@ fn with_digits(number: &str) -> Option<String> {
     (has_digit && whole != number && whole.parse::<f64>().is_ok()).then_some(whole)
 }
 
-fn issue(context: &Context<'_>, lists: &ArrayBrackets<'_>, error: SyntaxError) -> Issue {
+fn syntax_issue(context: &FileContext<'_>, lists: &ArrayBrackets<'_>, error: SyntaxError) -> Issue {
     let is_deep = is_too_deep(&error);
     let SyntaxError { span, what, expected } = error;
-    if let Some(issue) = in_other_brackets(context, span.start) {
+    if let Some(issue) = wrong_brackets_issue(context, span.start) {
         return issue;
     }
     let expected = expected.unwrap_or_default();
@@ -222,7 +225,7 @@ fn issue(context: &Context<'_>, lists: &ArrayBrackets<'_>, error: SyntaxError) -
         "duplicate key" => Issue::error(span, format!("`{written}` is defined twice"))
             .label("second definition")
             .help("remove one of them; headers of shapes have double brackets, such as [[sphere]]"),
-        MISSING_COMMA => match with_commas(context, lists, span.start) {
+        MISSING_COMMA => match missing_commas_message(context, lists, span.start) {
             Some(words) => error(&words),
             None => error("a comma is missing").help("expected `,` or the closing `]`"),
         },
@@ -231,7 +234,7 @@ fn issue(context: &Context<'_>, lists: &ArrayBrackets<'_>, error: SyntaxError) -
             error("this header is not closed").help(format!("expected {expected}"))
         }
         "invalid mantissa" | "invalid fraction" | "invalid exponent" => {
-            let help = match with_digits(number_at(context, &span)) {
+            let help = match add_missing_digits(number_at(context, &span)) {
                 Some(number) => format!("write {number}"),
                 None => "write 0.5, 5.0 and 1e3".to_owned(),
             };
@@ -249,9 +252,9 @@ fn issue(context: &Context<'_>, lists: &ArrayBrackets<'_>, error: SyntaxError) -
         _ if is_deep => {
             error("arrays or tables are nested too deeply").help("scenes need at most three levels")
         }
-        what if what.contains("must be quoted") => match with_commas(context, lists, span.start) {
+        what if what.contains("must be quoted") => match missing_commas_message(context, lists, span.start) {
             Some(words) => error(&words),
-            None => not_a_value(span, &written),
+            None => invalid_value_issue(span, &written),
         },
         what => {
             let issue = Issue::error(span, format!("this is not TOML: {what}"));
@@ -268,7 +271,7 @@ fn issue(context: &Context<'_>, lists: &ArrayBrackets<'_>, error: SyntaxError) -
 pub(crate) const MISSING_VALUE: &str = "a value is missing";
 
 /// Issue about a missing value, an invalid number or an unquoted string.
-fn not_a_value(span: Range<usize>, written: &str) -> Issue {
+fn invalid_value_issue(span: Range<usize>, written: &str) -> Issue {
     const VALUES: &str = "expected a number, true, false, a quoted string, or values in brackets";
     if written.trim().is_empty() {
         return Issue::error(span, MISSING_VALUE).help(VALUES);
@@ -296,7 +299,7 @@ mod tests {
             ("1.2.", None),
             ("", None),
         ] {
-            assert_eq!(with_digits(number).as_deref(), whole, "{number}");
+            assert_eq!(add_missing_digits(number).as_deref(), whole, "{number}");
         }
     }
 }

@@ -6,17 +6,17 @@ use std::ops::{Range, RangeInclusive};
 
 use super::super::keys::key::ValueKind;
 use super::super::keys::table as table_info;
-use super::super::nearest::{meant, nearest};
+use super::super::nearest::{nearest, translate_foreign_name};
 use super::super::sanitize::shortened;
 use super::super::toml::{Entries, KeyValue};
-use super::context::{Context, Issue};
+use super::context::{FileContext, Issue};
 use super::key::TableKey;
 use super::limits::Limits;
-use super::value::{TomlValue, Value, found};
+use super::value::{TomlValue, Value, describe_found};
 
-/// How messages refer to a table.
+/// A table's name in messages.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Title<'a> {
+pub(super) enum TableTitle<'a> {
     /// The file itself.
     Root,
     /// `[render]`
@@ -29,7 +29,7 @@ pub(super) enum Title<'a> {
     Key(&'static str),
 }
 
-impl fmt::Display for Title<'_> {
+impl fmt::Display for TableTitle<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Root => Ok(()),
@@ -43,10 +43,10 @@ impl fmt::Display for Title<'_> {
 
 /// A table in the file. Read its keys, then call [`TableReader::finish`].
 pub(super) struct TableReader<'a> {
-    pub(super) context: &'a Context<'a>,
+    pub(super) context: &'a FileContext<'a>,
     /// Byte range of the header or the braces.
     pub(super) span: Range<usize>,
-    title: Title<'a>,
+    title: TableTitle<'a>,
     entries: Entries<'a>,
     known: RefCell<Vec<&'static str>>,
     unavailable: RefCell<Vec<&'static str>>,
@@ -54,18 +54,27 @@ pub(super) struct TableReader<'a> {
 }
 
 impl<'a> TableReader<'a> {
-    fn new(context: &'a Context<'a>, entries: Entries<'a>, span: Range<usize>, title: Title<'a>) -> Self {
+    fn new(
+        context: &'a FileContext<'a>,
+        entries: Entries<'a>,
+        span: Range<usize>,
+        title: TableTitle<'a>,
+    ) -> Self {
         let (known, unavailable, missing) = Default::default();
         Self { context, span, title, entries, known, unavailable, missing }
     }
 
     /// The file itself.
-    pub(super) fn root(context: &'a Context<'a>, entries: Entries<'a>) -> Self {
-        Self::new(context, entries, 0..0, Title::Root)
+    pub(super) fn root(context: &'a FileContext<'a>, entries: Entries<'a>) -> Self {
+        Self::new(context, entries, 0..0, TableTitle::Root)
     }
 
     /// Reads a value as a table. Reports an error for any other type.
-    pub(super) fn of(context: &'a Context<'a>, value: Value<'a>, title: Title<'a>) -> Option<Self> {
+    pub(super) fn from_value(
+        context: &'a FileContext<'a>,
+        value: Value<'a>,
+        title: TableTitle<'a>,
+    ) -> Option<Self> {
         match value.item() {
             TomlValue::Table(entries) => Some(Self::new(context, entries, value.span(), title)),
             other => {
@@ -73,7 +82,7 @@ impl<'a> TableReader<'a> {
                 if is_array_of_tables(&other) {
                     issue = issue.label("found an array of tables").help(format!("write {title} once"));
                 } else {
-                    issue = issue.label(format!("found {}", found(context, value)));
+                    issue = issue.label(format!("found {}", describe_found(context, value)));
                 }
                 context.report(issue);
                 None
@@ -98,7 +107,7 @@ impl<'a> TableReader<'a> {
 
     /// The range defined for a key, `KEY` or `TYPE.KEY`.
     pub(super) fn limits(&self, name: &str) -> Limits {
-        match self.kind_of(name) {
+        match self.value_kind(name) {
             Some(
                 ValueKind::Number(limits)
                 | ValueKind::Color(limits)
@@ -124,17 +133,19 @@ impl<'a> TableReader<'a> {
 
     /// The range defined for an integer key.
     pub(super) fn range(&self, name: &str) -> RangeInclusive<i128> {
-        match self.kind_of(name) {
+        match self.value_kind(name) {
             Some(ValueKind::Whole(least, most)) => least.into()..=most.into(),
             Some(_) | None => 0..=u32::MAX.into(),
         }
     }
 
     /// The type defined for a key. A test compares the definitions with the keys that are read.
-    fn kind_of(&self, name: &str) -> Option<ValueKind> {
+    fn value_kind(&self, name: &str) -> Option<ValueKind> {
         let info = match self.title {
-            Title::Table(table) | Title::List(table) | Title::Named(table, _) => table_info(table)?,
-            Title::Root | Title::Key(_) => return None,
+            TableTitle::Table(table) | TableTitle::List(table) | TableTitle::Named(table, _) => {
+                table_info(table)?
+            }
+            TableTitle::Root | TableTitle::Key(_) => return None,
         };
         let (kind, name) = match name.split_once('.') {
             Some((kind, name)) => (info.type_of(Some(kind)), name),
@@ -146,14 +157,14 @@ impl<'a> TableReader<'a> {
     /// Reads a required key. `example` is a valid value for the help text.
     pub(super) fn required(&self, name: &'static str, example: &'static str) -> TableKey<'a> {
         let key = self.optional(name);
-        if !key.is_given() {
+        if !key.is_present() {
             self.missing.borrow_mut().push((name, example));
         }
         key
     }
 
     /// Reports an error if the key `name` is present, which is not allowed here.
-    pub(super) fn unavailable(&self, name: &'static str, message: &str, help: Option<&str>) {
+    pub(super) fn reject_key(&self, name: &'static str, message: &str, help: Option<&str>) {
         let key = self.optional(name);
         self.unavailable.borrow_mut().push(name);
         if let Some(span) = key.key_span() {
@@ -164,7 +175,7 @@ impl<'a> TableReader<'a> {
     /// The `[name]` table.
     pub(super) fn table(&self, name: &'static str) -> Option<Self> {
         let value = self.optional(name).value?;
-        Self::of(self.context, value, Title::Table(name))
+        Self::from_value(self.context, value, TableTitle::Table(name))
     }
 
     /// The `[name.NAME]` tables in file order, with their names and the names' spans.
@@ -172,7 +183,7 @@ impl<'a> TableReader<'a> {
         let Some(group) = self.table(name) else { return Vec::new() };
         let mut entries: Vec<_> = group.entries.iter().collect();
         entries.sort_by_key(|entry| entry.span.start);
-        let read = |key, value| Self::of(self.context, value, Title::Named(name, key));
+        let read = |key, value| Self::from_value(self.context, value, TableTitle::Named(name, key));
         entries.into_iter().map(|one| (one.key.to_owned(), one.span, read(one.key, one.value))).collect()
     }
 
@@ -186,13 +197,13 @@ impl<'a> TableReader<'a> {
             }
             let span = key.key_span().unwrap_or_default();
             let issue = Issue::error(span, format!("`{name}` must be a list of tables"))
-                .label(format!("found {}", found(context, value)))
+                .label(format!("found {}", describe_found(context, value)))
                 .help(format!("write [[{name}]] with double brackets"));
             context.report(issue);
             None
         });
         let values = list.into_iter().flat_map(|list| list.iter());
-        values.filter_map(move |value| Self::of(context, value, Title::List(name)))
+        values.filter_map(move |value| Self::from_value(context, value, TableTitle::List(name)))
     }
 
     /// Reports unknown and missing keys. A misspelled required key is reported only once.
@@ -201,26 +212,26 @@ impl<'a> TableReader<'a> {
         let mut meant = Vec::new();
         for KeyValue { key, span, value } in self.entries.iter().filter(|one| !known.contains(&one.key)) {
             self.context.report_with(|| {
-                let near = self.meant(key, &known);
+                let near = self.probably_meant_key(key, &known);
                 meant.extend(near);
-                self.unknown(key, span, &value.item(), near)
+                self.report_unknown_key(key, span, &value.item(), near)
             });
         }
         for (name, example) in self.missing.borrow().iter().filter(|(name, _)| !meant.contains(name)) {
             let issue = Issue::error(self.span.clone(), format!("{} needs `{name}`", self.title))
                 .label(format!("`{name}` is missing"))
                 .help(format!("add a line, such as `{name} = {example}`"));
-            self.context.report(issue.absence());
+            self.context.report(issue.caused_by_absence());
         }
     }
 
     /// The key probably meant by an unknown key. Prefers keys that are not present.
-    fn meant(&self, key: &str, known: &[&'static str]) -> Option<&'static str> {
+    fn probably_meant_key(&self, key: &str, known: &[&'static str]) -> Option<&'static str> {
         let absent = |name: &&&'static str| self.entries.get(name).is_none();
         let unavailable = self.unavailable.borrow();
         let is_other = |name: &&&'static str| absent(name) && !unavailable.contains(name);
         let others: Vec<&'static str> = known.iter().filter(is_other).copied().collect();
-        meant(key, &others).or_else(|| nearest(key, known.iter().copied()))
+        translate_foreign_name(key, &others).or_else(|| nearest(key, known.iter().copied()))
     }
 
     /// Whether there is a table with a similar name, probably a misspelling of `name`.
@@ -230,14 +241,23 @@ impl<'a> TableReader<'a> {
         others.any(|one| nearest(one.key, [name]).is_some())
     }
 
-    fn unknown(&self, key: &str, span: Range<usize>, value: &TomlValue<'_>, near: Option<&str>) -> Issue {
+    fn report_unknown_key(
+        &self,
+        key: &str,
+        span: Range<usize>,
+        value: &TomlValue<'_>,
+        near: Option<&str>,
+    ) -> Issue {
         let shown = shortened(key, 40);
         let message = match self.title {
-            Title::Root if matches!(value, TomlValue::Table(_)) || is_array_of_tables(value) => {
+            TableTitle::Root if matches!(value, TomlValue::Table(_)) || is_array_of_tables(value) => {
                 format!("unknown table `{shown}`")
             }
-            Title::Root => format!("unknown key `{shown}` outside of any table"),
-            title @ (Title::Table(_) | Title::List(_) | Title::Named(..) | Title::Key(_)) => {
+            TableTitle::Root => format!("unknown key `{shown}` outside of any table"),
+            title @ (TableTitle::Table(_)
+            | TableTitle::List(_)
+            | TableTitle::Named(..)
+            | TableTitle::Key(_)) => {
                 format!("unknown key `{shown}` in {title}")
             }
         };
@@ -245,10 +265,10 @@ impl<'a> TableReader<'a> {
         if let Some(near) = near {
             issue = issue.label(format!("did you mean `{near}`?"));
         }
-        issue.help(format!("expected one of {}", self.known_list()))
+        issue.help(format!("expected one of {}", self.format_known_keys()))
     }
 
-    fn known_list(&self) -> String {
+    fn format_known_keys(&self) -> String {
         let (known, unavailable) = (self.known.borrow(), self.unavailable.borrow());
         let names = known.iter().filter(|name| !unavailable.contains(name));
         names.map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")

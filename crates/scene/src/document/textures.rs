@@ -7,56 +7,57 @@ use super::super::description::{
 };
 use super::super::keys::endings::{GLTF, MAPS};
 use super::super::sanitize::shortened;
-use super::context::{Context, Issue};
+use super::context::{FileContext, Issue};
 use super::limits::Limits;
-use super::names::Names;
+use super::names::DefinedNames;
 use super::table::TableReader;
 use crate::math::{Vec2, Vec3};
 
 /// The textures of a file.
 pub(super) struct TextureList {
     /// Texture names.
-    pub(super) names: Names,
+    pub(super) names: DefinedNames,
     /// The textures, in the same order as the names. `None` if any is invalid.
     pub(super) list: Option<Vec<Texture>>,
 }
 
-pub(super) fn read(root: &TableReader<'_>) -> TextureList {
+pub(super) fn read_textures(root: &TableReader<'_>) -> TextureList {
     let tables = root.named_tables("textures");
-    let names = Names::new("texture", tables.iter().map(|(name, span, _)| (name.clone(), span.clone())));
+    let names =
+        DefinedNames::new("texture", tables.iter().map(|(name, span, _)| (name.clone(), span.clone())));
     let read: Vec<Option<Texture>> =
-        tables.into_iter().map(|(name, _, table)| texture(name, &table?)).collect();
+        tables.into_iter().map(|(name, _, table)| read_texture(name, &table?)).collect();
     TextureList { names, list: read.into_iter().collect() }
 }
 
-fn texture(name: String, table: &TableReader<'_>) -> Option<Texture> {
-    let (file, image) = image(table);
+fn read_texture(name: String, table: &TableReader<'_>) -> Option<Texture> {
+    let (file, image) = read_image_reference(table);
     let filter = table.optional("filter").choice().unwrap_or(TextureFilter::Bilinear);
     let wrap = table.optional("wrap").choice().unwrap_or(Wrap::Repeat);
     let repeat = table.optional("repeat").pair(table.limits("repeat")).unwrap_or(Vec2::ONE);
     let rotate = table.optional("rotate").number(Limits::Any).unwrap_or(0.0);
     let offset = table.optional("offset").pair(Limits::Any).unwrap_or(Vec2::ZERO);
     let encoding = table.optional("encoding").choice().unwrap_or(Encoding::Auto);
-    let uv = table.optional("uv").whole(table.range("uv"));
+    let uv = table.optional("uv").integer(table.range("uv"));
     let uv = if uv == Some(1) { UvSet::Second } else { UvSet::First };
     let factor = table.optional("factor");
-    let factor = if factor.is_given() { factor.color() } else { Some(Vec3::ONE) };
+    let factor = if factor.is_present() { factor.color() } else { Some(Vec3::ONE) };
     table.finish();
     let (file, image, factor) = (file?, image?, factor?);
     Some(Texture { name, file, image, filter, wrap, repeat, rotate, offset, uv, encoding, factor })
 }
 
 /// Reads the file and, for a glTF file, the index of the image.
-fn image(table: &TableReader<'_>) -> (Option<Located<PathBuf>>, Option<Option<u32>>) {
+fn read_image_reference(table: &TableReader<'_>) -> (Option<Located<PathBuf>>, Option<Option<u32>>) {
     let (key, number) = (table.required("file", "\"picture.png\""), table.optional("image"));
-    if !number.is_given() {
+    if !number.is_present() {
         return (key.file(MAPS), Some(None));
     }
-    (key.file(GLTF), number.whole(table.range("image")).map(Some))
+    (key.file(GLTF), number.integer(table.range("image")).map(Some))
 }
 
 /// Reports textures without `encoding` that are used for both colors and numbers. Alpha has no encoding.
-pub(super) fn check_encodings(context: &Context<'_>, textures: &TextureList, materials: &[Material]) {
+pub(super) fn check_encodings(context: &FileContext<'_>, textures: &TextureList, materials: &[Material]) {
     let Some(list) = &textures.list else { return };
     let (mut colors, mut numbers) = (vec![false; list.len()], vec![false; list.len()]);
     for (texture, role) in materials.iter().flat_map(Material::textures) {

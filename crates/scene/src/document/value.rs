@@ -2,11 +2,11 @@
 
 use super::super::sanitize::shortened;
 pub(super) use super::super::toml::{TomlValue, Value};
-use super::context::{Context, Issue};
+use super::context::{FileContext, Issue};
 use super::limits::Limits;
 
 /// Describes a value for messages such as `found the string "a"`.
-pub(super) fn found(context: &Context<'_>, value: Value<'_>) -> String {
+pub(super) fn describe_found(context: &FileContext<'_>, value: Value<'_>) -> String {
     const LONGEST: usize = 32;
     let written = || shortened(context.text(&value.span()), LONGEST);
     match value.item() {
@@ -23,11 +23,11 @@ pub(super) fn found(context: &Context<'_>, value: Value<'_>) -> String {
 }
 
 /// Converts an integer or a float, clamped to the range of doubles. `None` for other values.
-pub(super) fn number(value: Value<'_>) -> Option<f64> {
+pub(super) fn to_number(value: Value<'_>) -> Option<f64> {
     match value.item() {
         // Round to the nearest double, as if the number were written as a float.
         TomlValue::Integer { digits, radix } => {
-            Some(whole(digits, radix).map_or(f64::MAX, |number| number as f64))
+            Some(parse_integer(digits, radix).map_or(f64::MAX, |number| number as f64))
         }
         TomlValue::Float(text) => {
             let number: f64 = text.parse().ok()?;
@@ -43,33 +43,33 @@ pub(super) fn number(value: Value<'_>) -> Option<f64> {
 }
 
 /// Parses an integer. `None` if it overflows.
-pub(super) fn whole(digits: &str, radix: u32) -> Option<i128> {
+pub(super) fn parse_integer(digits: &str, radix: u32) -> Option<i128> {
     i128::from_str_radix(digits, radix).ok()
 }
 
 /// Reads a number within limits. Error messages refer to the number as `name` and to its type as `expected`.
-pub(super) fn limited(
-    context: &Context<'_>,
+pub(super) fn number_within(
+    context: &FileContext<'_>,
     name: &str,
     value: Value<'_>,
     limits: Limits,
     expected: &str,
 ) -> Option<f64> {
-    let Some(number) = number(value) else {
-        wrong_type(context, name, value, expected);
+    let Some(number) = to_number(value) else {
+        report_wrong_type(context, name, value, expected);
         return None;
     };
     let violation = limits.violation(number);
     if let Some(words) = &violation {
-        let label = format!("found {}", found(context, value));
+        let label = format!("found {}", describe_found(context, value));
         context.report(Issue::error(value.span(), format!("`{name}` {words}")).label(label));
     }
     violation.is_none().then_some(number)
 }
 
 /// Reports a value of the wrong type.
-pub(super) fn wrong_type(context: &Context<'_>, name: &str, value: Value<'_>, expected: &str) {
-    let label = format!("found {}", found(context, value));
+pub(super) fn report_wrong_type(context: &FileContext<'_>, name: &str, value: Value<'_>, expected: &str) {
+    let label = format!("found {}", describe_found(context, value));
     let issue = Issue::error(value.span(), format!("`{name}` must be {expected}")).label(label);
     // Explain that textures are not allowed here. Otherwise, users would look for a typo.
     let is_texture = matches!(value.item(), TomlValue::Table(table) if table.get("texture").is_some());

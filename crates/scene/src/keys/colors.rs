@@ -9,7 +9,7 @@ pub fn color_names() -> impl Iterator<Item = &'static str> {
 
 /// Parses a color string, `#rrggbb` or a case-insensitive name, to sRGB bytes.
 pub fn color_bytes(text: &str) -> Option<[u8; 3]> {
-    rgb_bytes(text).or_else(|| named(text))
+    rgb_bytes(text).or_else(|| named_color(text))
 }
 
 /// Parses `#rrggbb`.
@@ -25,7 +25,7 @@ pub(crate) fn hex_digits(text: &str) -> Option<&str> {
     text.strip_prefix('#').filter(|digits| digits.bytes().all(|digit| digit.is_ascii_hexdigit()))
 }
 
-fn named(name: &str) -> Option<[u8; 3]> {
+fn named_color(name: &str) -> Option<[u8; 3]> {
     let found = NAMED_COLORS.entries().find(|(known, _)| known.as_str().eq_ignore_ascii_case(name));
     found.map(|(_, bytes)| *bytes)
 }

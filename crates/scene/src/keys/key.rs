@@ -9,7 +9,7 @@ pub struct TableInfo {
     /// Name in scene files.
     pub name: &'static str,
     /// Syntax in scene files.
-    pub form: Form,
+    pub form: TableSyntax,
     /// Description, as one sentence without a period at the end.
     pub doc: &'static str,
     /// The keys common to all types.
@@ -20,7 +20,7 @@ pub struct TableInfo {
 
 /// Syntax of a table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Form {
+pub enum TableSyntax {
     /// `[name]`, at most once.
     Single,
     /// `[name.NAME]`, one per name.
@@ -78,7 +78,7 @@ pub enum ValueKind {
     Emission(Limits),
     /// A number or a texture.
     NumberOrTexture(Limits),
-    /// An array with this many numbers, and the name of the type, such as `point`.
+    /// An array of numbers. Contains its length and the name of the type, such as `point`.
     Numbers(usize, &'static str, Limits),
     /// A number or an array of three numbers.
     Scale(Limits),
@@ -173,9 +173,9 @@ impl TableInfo {
     /// The table header, such as `[materials.NAME]`.
     pub fn head(&self) -> String {
         match self.form {
-            Form::Single => format!("[{}]", self.name),
-            Form::Named => format!("[{}.NAME]", self.name),
-            Form::List => format!("[[{}]]", self.name),
+            TableSyntax::Single => format!("[{}]", self.name),
+            TableSyntax::Named => format!("[{}.NAME]", self.name),
+            TableSyntax::List => format!("[[{}]]", self.name),
         }
     }
 }

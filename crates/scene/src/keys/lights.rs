@@ -2,13 +2,13 @@
 
 use super::key::Default::Is;
 use super::key::ValueKind::{Color, Number, Numbers, Words};
-use super::key::{Form, TableInfo, TypeInfo, key, words};
+use super::key::{TableInfo, TableSyntax, TypeInfo, key, words};
 use super::limits::Limits::{Any, AtLeast, Between, Inside};
 use crate::description::light::Falloff;
 
 pub(super) const LIGHT: TableInfo = TableInfo {
     name: "light",
-    form: Form::List,
+    form: TableSyntax::List,
     doc: "A light without a shape",
     keys: &[],
     types: &[

@@ -4,14 +4,14 @@ use super::key::Default::{Absent, By, Is};
 use super::key::ValueKind::{
     ColorOrTexture, Emission, Flag, Heights, Number, NumberOrTexture, Texture, Words,
 };
-use super::key::{Form, TableInfo, TypeInfo, key, words};
+use super::key::{TableInfo, TableSyntax, TypeInfo, key, words};
 use super::limits::Limits::{Any, AtLeast, Between};
 use crate::description::EmissionSides;
 use crate::materials::metal::elements::Element;
 
 pub(super) const MATERIALS: TableInfo = TableInfo {
     name: "materials",
-    form: Form::Named,
+    form: TableSyntax::Named,
     doc: "A material, which shapes refer to by name",
     keys: &[
         key(

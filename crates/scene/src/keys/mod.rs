@@ -18,7 +18,7 @@ use std::sync::LazyLock;
 
 pub(super) use colors::hex_digits;
 pub use colors::{color_bytes, color_names};
-pub use key::{Default, Form, KeyInfo, TableInfo, TypeInfo, ValueKind, Word, WordList, words};
+pub use key::{Default, KeyInfo, TableInfo, TableSyntax, TypeInfo, ValueKind, Word, WordList, words};
 
 /// All tables, in the order of the documentation.
 pub fn tables() -> &'static [TableInfo] {

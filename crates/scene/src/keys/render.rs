@@ -3,7 +3,7 @@
 use std::sync::LazyLock;
 
 use super::endings::IMAGES;
-use super::key::{Default, Form, KeyInfo, TableInfo, ValueKind, key};
+use super::key::{Default, KeyInfo, TableInfo, TableSyntax, ValueKind, key};
 use super::limits::Limits;
 use crate::description::{KeyRange, Render, RenderKey};
 use crate::math::limits::LARGEST;
@@ -17,21 +17,21 @@ static KEYS: LazyLock<Vec<KeyInfo>> = LazyLock::new(|| {
         Default::By("the scene's name with `.png`"),
         "The image file; the extension determines the format",
     );
-    Render::keys().into_iter().map(info).chain([output]).collect()
+    Render::keys().into_iter().map(render_key_info).chain([output]).collect()
 });
 
 /// The table.
 pub(super) fn table() -> TableInfo {
     TableInfo {
         name: "render",
-        form: Form::Single,
+        form: TableSyntax::Single,
         doc: "Image and render settings",
         keys: &KEYS,
         types: &[],
     }
 }
 
-fn info(key: RenderKey) -> KeyInfo {
+fn render_key_info(key: RenderKey) -> KeyInfo {
     let RenderKey { name, doc, unit, range, words, default, has_option: _ } = key;
     let kind = match range {
         KeyRange::Whole(range) => ValueKind::Whole((*range.start()).into(), (*range.end()).into()),

@@ -3,7 +3,7 @@
 use super::endings::MESHES;
 use super::key::Default::{Absent, By, Is, Required};
 use super::key::ValueKind::{File, Flag, Material, Number, Numbers, Scale, Text, Whole};
-use super::key::{Form, KeyInfo, MOST_WHOLE, TableInfo, key};
+use super::key::{KeyInfo, MOST_WHOLE, TableInfo, TableSyntax, key};
 use super::limits::Limits::{Any, Length, NotZero};
 
 macro_rules! shapes {
@@ -11,9 +11,9 @@ macro_rules! shapes {
         /// The shapes. Each has its own keys, followed by the common keys.
         pub(super) const SHAPES: &[TableInfo] = &[$(TableInfo {
             name: $name,
-            form: Form::List,
+            form: TableSyntax::List,
             doc: $doc,
-            keys: &[$($own,)* material($name), NAME],
+            keys: &[$($own,)* material_key($name), NAME],
             types: &[],
         }),*];
     };
@@ -22,7 +22,7 @@ macro_rules! shapes {
 const NAME: KeyInfo = key("name", Text, "", Absent, "Name used in messages, for clicks and by `--set`");
 
 /// The key `material`. Optional for meshes, because their files may contain materials.
-const fn material(shape: &str) -> KeyInfo {
+const fn material_key(shape: &str) -> KeyInfo {
     // String comparison is not const, so match bytes.
     let default = match shape.as_bytes() {
         b"mesh" => By("the file's"),

@@ -3,10 +3,10 @@
 use super::endings::MAPS;
 use super::key::Default::{Absent, By, Is, Required};
 use super::key::ValueKind::{Color, File, Flag, Number, Numbers, Whole};
-use super::key::{Form, KeyInfo, TableInfo, key};
+use super::key::{KeyInfo, TableInfo, TableSyntax, key};
 use super::limits::Limits::{Any, AtLeast, Inside, Length, LengthOrZero};
 
-pub(super) const CAMERA: TableInfo = single(
+pub(super) const CAMERA: TableInfo = single_table(
     "camera",
     "The camera: `position` and `look_at`, or an `orbiter` file",
     &[
@@ -50,7 +50,7 @@ pub(super) const CAMERA: TableInfo = single(
     ],
 );
 
-pub(super) const PHOTONS: TableInfo = single(
+pub(super) const PHOTONS: TableInfo = single_table(
     "photons",
     "Photon mapping in `whitted`: caustics and all other indirect light",
     &[
@@ -73,7 +73,7 @@ pub(super) const PHOTONS: TableInfo = single(
     ],
 );
 
-pub(super) const ENVIRONMENT: TableInfo = single(
+pub(super) const ENVIRONMENT: TableInfo = single_table(
     "environment",
     "Light from all directions, a color or a map; replaces `background`",
     &[
@@ -101,6 +101,6 @@ pub(super) const ENVIRONMENT: TableInfo = single(
     ],
 );
 
-const fn single(name: &'static str, doc: &'static str, keys: &'static [KeyInfo]) -> TableInfo {
-    TableInfo { name, form: Form::Single, doc, keys, types: &[] }
+const fn single_table(name: &'static str, doc: &'static str, keys: &'static [KeyInfo]) -> TableInfo {
+    TableInfo { name, form: TableSyntax::Single, doc, keys, types: &[] }
 }

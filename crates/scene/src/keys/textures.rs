@@ -3,13 +3,13 @@
 use super::endings::TEXTURES as FILES;
 use super::key::Default::{Absent, Is, Required};
 use super::key::ValueKind::{Color, File, Number, Numbers, Whole, Words};
-use super::key::{Form, MOST_WHOLE, TableInfo, key, words};
+use super::key::{MOST_WHOLE, TableInfo, TableSyntax, key, words};
 use super::limits::Limits::{Any, AtLeast, NotZero};
 use crate::description::{Encoding, TextureFilter, Wrap};
 
 pub(super) const TEXTURES: TableInfo = TableInfo {
     name: "textures",
-    form: Form::Named,
+    form: TableSyntax::Named,
     doc: "An image, which materials use as `{ texture = \"NAME\" }`",
     keys: &[
         key(

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use toml_parser::{ErrorSink, ParseError};
 
-use super::error::{Errors, SyntaxError};
+use super::error::{BoundedErrors, SyntaxError};
 use super::tree::{Document, Name, NodeKind, Span, StringRef, TableId, TableOrigin, ValueNode};
 
 /// `[path.key]` or `[[path.key]]`.
@@ -20,7 +20,7 @@ pub(super) struct TableHeader<'s> {
 }
 
 /// A document under construction.
-pub(super) struct Assembly<'s> {
+pub(super) struct DocumentBuilder<'s> {
     pub(super) document: Document<'s>,
     /// The current table.
     table: TableId,
@@ -31,15 +31,15 @@ pub(super) struct Assembly<'s> {
     pub(super) open: Option<TableHeader<'s>>,
     /// Whether the rest of the document is ignored, after a key without a value.
     pub(super) is_lost: bool,
-    pub(super) syntax: Errors,
-    pub(super) meaning: Errors,
+    pub(super) syntax: BoundedErrors,
+    pub(super) meaning: BoundedErrors,
     /// Stack of elements of the arrays being read.
     pub(super) elements: Vec<ValueNode>,
 }
 
 /// Collects parser errors for the part of the text starting at byte `base`.
 pub(super) struct ErrorCollector<'a> {
-    pub(super) errors: &'a mut Errors,
+    pub(super) errors: &'a mut BoundedErrors,
     pub(super) base: usize,
 }
 
@@ -49,26 +49,26 @@ impl ErrorSink for ErrorCollector<'_> {
     }
 }
 
-impl<'s> Assembly<'s> {
+impl<'s> DocumentBuilder<'s> {
     pub(super) fn new(source: &'s str) -> Self {
-        Self::of(Document::new(source))
+        Self::from_document(Document::new(source))
     }
 
     /// Extends a document with a new, detached table.
-    pub(super) fn detached(mut document: Document<'s>) -> (Self, TableId) {
+    pub(super) fn with_detached_table(mut document: Document<'s>) -> (Self, TableId) {
         let table = document.add_table(TableOrigin::default());
-        (Self { table, ..Self::of(document) }, table)
+        (Self { table, ..Self::from_document(document) }, table)
     }
 
-    fn of(document: Document<'s>) -> Self {
+    fn from_document(document: Document<'s>) -> Self {
         Self {
             document,
             table: Document::ROOT,
             header: None,
             open: None,
             is_lost: false,
-            syntax: Errors::default(),
-            meaning: Errors::default(),
+            syntax: BoundedErrors::default(),
+            meaning: BoundedErrors::default(),
             elements: Vec::new(),
         }
     }
@@ -84,11 +84,11 @@ impl<'s> Assembly<'s> {
             self.start_table(header);
         }
         self.finish_table();
-        (self.document, self.syntax.then(self.meaning))
+        (self.document, self.syntax.concatenate(self.meaning))
     }
 
     /// Stores the decoded string at `span`.
-    pub(super) fn text(&mut self, span: Span, text: Cow<'s, str>) -> StringRef {
+    pub(super) fn store_string(&mut self, span: Span, text: Cow<'s, str>) -> StringRef {
         self.document.add_text(span, text)
     }
 
@@ -99,28 +99,28 @@ impl<'s> Assembly<'s> {
         kind
     }
 
-    fn error(&mut self, span: Span, what: impl Into<String>) {
+    fn add_error(&mut self, span: Span, what: impl Into<String>) {
         self.meaning.push_with(|| SyntaxError::at(span.range(), what));
     }
 
-    fn duplicate(&mut self, span: Span) {
-        self.error(span, "duplicate key");
+    fn report_duplicate(&mut self, span: Span) {
+        self.add_error(span, "duplicate key");
     }
 
     /// Adds `path.key = value` to the current table.
-    pub(super) fn key_value(&mut self, path: &[Name<'s>], key: Name<'s>, value: ValueNode) {
+    pub(super) fn add_key_value(&mut self, path: &[Name<'s>], key: Name<'s>, value: ValueNode) {
         let is_dotted = !path.is_empty();
         let Some(parent) = self.descend(self.table, path, is_dotted) else { return };
         let adds_to_defined = is_dotted && !self.document.origin(parent).is_implicit;
         if adds_to_defined || self.document.find(parent, &key.text).is_some() {
-            self.duplicate(key.span);
+            self.report_duplicate(key.span);
         } else {
             self.document.add_entry(parent, key, value);
         }
     }
 
     /// Adds `path.key = value` to the inline table `table`.
-    pub(super) fn inline_key_value(
+    pub(super) fn add_inline_key_value(
         &mut self,
         table: TableId,
         path: &[Name<'s>],
@@ -130,7 +130,7 @@ impl<'s> Assembly<'s> {
         let Some(parent) = self.descend_inline(table, path) else { return };
         let adds_to_defined = self.document.origin(parent).is_dotted == path.is_empty();
         if adds_to_defined || self.document.find(parent, &key.text).is_some() {
-            self.duplicate(key.span);
+            self.report_duplicate(key.span);
         } else {
             self.document.add_entry(parent, key, value);
         }
@@ -139,15 +139,16 @@ impl<'s> Assembly<'s> {
     /// Starts the table of a header. If longer headers have created the table implicitly, defines it. If the
     /// table is already defined, reports an error and continues it.
     pub(super) fn start_table(&mut self, header: TableHeader<'s>) {
-        self.table =
-            self.continued(&header).unwrap_or_else(|| self.document.add_table(TableOrigin::default()));
+        self.table = self
+            .take_existing_table(&header)
+            .unwrap_or_else(|| self.document.add_table(TableOrigin::default()));
         let is_inline = self.document.origin(self.table).is_inline;
         self.document.set_origin(self.table, TableOrigin { is_inline, ..TableOrigin::default() });
         self.header = Some(header);
     }
 
     /// Removes and returns the existing table of a header, if any.
-    fn continued(&mut self, header: &TableHeader<'s>) -> Option<TableId> {
+    fn take_existing_table(&mut self, header: &TableHeader<'s>) -> Option<TableId> {
         if header.is_list {
             return None;
         }
@@ -157,7 +158,7 @@ impl<'s> Assembly<'s> {
         let table = if let NodeKind::Table(table) = old.kind { Some(table) } else { None };
         let origin = table.map(|table| self.document.origin(table));
         if !origin.is_some_and(|origin| origin.is_implicit && !origin.is_dotted) {
-            self.duplicate(key.span);
+            self.report_duplicate(key.span);
         }
         table
     }
@@ -174,7 +175,7 @@ impl<'s> Assembly<'s> {
         }
         match self.document.find(parent, &key.text).map(|found| found.kind) {
             Some(NodeKind::List(list)) => self.document.list_mut(list).push(node),
-            Some(_) => self.duplicate(key.span),
+            Some(_) => self.report_duplicate(key.span),
             None => {
                 let list = self.document.add_list();
                 self.document.add_entry(parent, key, ValueNode { span, kind: list });
@@ -190,28 +191,28 @@ impl<'s> Assembly<'s> {
         path.iter().try_fold(from, |table, name| {
             let Some(found) = self.document.find(table, &name.text) else {
                 let origin = TableOrigin { is_implicit: true, is_dotted, is_inline: false };
-                return Some(self.implicit_table(table, name, origin));
+                return Some(self.create_implicit_table(table, name, origin));
             };
             match found.kind {
-                NodeKind::Table(inner) => self.enter(inner, name, is_dotted),
+                NodeKind::Table(inner) => self.extendable_table(inner, name, is_dotted),
                 NodeKind::List(list) => {
                     let last = self.document.list_mut(list).last()?.kind;
                     if let NodeKind::Table(last) = last { Some(last) } else { None }
                 }
-                other => self.cannot_extend(name, other),
+                other => self.report_not_extendable(name, other),
             }
         })
     }
 
     /// Returns the table if a header or dotted key may add to it.
-    fn enter(&mut self, table: TableId, name: &Name<'s>, is_dotted: bool) -> Option<TableId> {
+    fn extendable_table(&mut self, table: TableId, name: &Name<'s>, is_dotted: bool) -> Option<TableId> {
         let origin = self.document.origin(table);
         if origin.is_inline {
-            self.error(name.span, "cannot extend value of type inline table with a dotted key");
+            self.add_error(name.span, "cannot extend value of type inline table with a dotted key");
             return None;
         }
         if is_dotted && !origin.is_implicit {
-            self.duplicate(name.span);
+            self.report_duplicate(name.span);
             return None;
         }
         if is_dotted {
@@ -225,20 +226,20 @@ impl<'s> Assembly<'s> {
         path.iter().try_fold(from, |table, name| {
             let Some(found) = self.document.find(table, &name.text) else {
                 let origin = TableOrigin { is_implicit: true, is_dotted: true, is_inline: true };
-                return Some(self.implicit_table(table, name, origin));
+                return Some(self.create_implicit_table(table, name, origin));
             };
             match found.kind {
                 NodeKind::Table(inner) if self.document.origin(inner).is_implicit => Some(inner),
                 NodeKind::Table(_) => {
-                    self.duplicate(name.span);
+                    self.report_duplicate(name.span);
                     None
                 }
-                other => self.cannot_extend(name, other),
+                other => self.report_not_extendable(name, other),
             }
         })
     }
 
-    fn implicit_table(&mut self, parent: TableId, name: &Name<'s>, origin: TableOrigin) -> TableId {
+    fn create_implicit_table(&mut self, parent: TableId, name: &Name<'s>, origin: TableOrigin) -> TableId {
         let table = self.document.add_table(origin);
         self.document.add_entry(
             parent,
@@ -248,7 +249,7 @@ impl<'s> Assembly<'s> {
         table
     }
 
-    fn cannot_extend(&mut self, name: &Name<'s>, kind: NodeKind) -> Option<TableId> {
+    fn report_not_extendable(&mut self, name: &Name<'s>, kind: NodeKind) -> Option<TableId> {
         let what = match kind {
             NodeKind::String(_) => "string",
             NodeKind::Integer(..) => "integer",
@@ -258,7 +259,7 @@ impl<'s> Assembly<'s> {
             NodeKind::Array(_) | NodeKind::List(_) => "array",
             NodeKind::Table(_) => "table",
         };
-        self.error(name.span, format!("cannot extend value of type {what} with a dotted key"));
+        self.add_error(name.span, format!("cannot extend value of type {what} with a dotted key"));
         None
     }
 }

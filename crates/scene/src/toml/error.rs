@@ -19,7 +19,11 @@ impl SyntaxError {
     /// Converts a parser error for the part of the text starting at byte `base`.
     pub(super) fn new(error: &ParseError, base: usize) -> Self {
         let span = error.unexpected().map_or(0..0, |span| base + span.start()..base + span.end());
-        Self { span, what: error.description().to_owned(), expected: error.expected().map(list) }
+        Self {
+            span,
+            what: error.description().to_owned(),
+            expected: error.expected().map(format_expected_list),
+        }
     }
 
     /// An error that is not from the parser.
@@ -28,14 +32,14 @@ impl SyntaxError {
     }
 }
 
-fn list(expected: &[Expected]) -> String {
+fn format_expected_list(expected: &[Expected]) -> String {
     if expected.is_empty() {
         return "nothing".to_owned();
     }
-    expected.iter().map(one).collect::<Vec<_>>().join(", ")
+    expected.iter().map(format_expected).collect::<Vec<_>>().join(", ")
 }
 
-fn one(expected: &Expected) -> String {
+fn format_expected(expected: &Expected) -> String {
     match expected {
         Expected::Literal("\n") => "newline".to_owned(),
         Expected::Literal("`") => "'`'".to_owned(),
@@ -51,9 +55,9 @@ fn one(expected: &Expected) -> String {
 
 /// A bounded list of errors.
 #[derive(Debug, Default)]
-pub(super) struct Errors(Vec<SyntaxError>);
+pub(super) struct BoundedErrors(Vec<SyntaxError>);
 
-impl Errors {
+impl BoundedErrors {
     /// Large enough to contain the first errors in text order, except in absurdly broken files.
     const CAPACITY: usize = 2_000;
 
@@ -64,7 +68,7 @@ impl Errors {
     }
 
     /// Concatenates both lists.
-    pub(super) fn then(mut self, others: Self) -> Vec<SyntaxError> {
+    pub(super) fn concatenate(mut self, others: Self) -> Vec<SyntaxError> {
         self.0.extend(others.0);
         self.0.truncate(Self::CAPACITY);
         self.0

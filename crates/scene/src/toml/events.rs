@@ -10,24 +10,24 @@ use toml_parser::decoder::{IntegerRadix, ScalarKind};
 use toml_parser::parser::{Event, EventKind};
 
 use super::MAX_DEPTH;
-use super::assembly::{Assembly, ErrorCollector, TableHeader};
+use super::assembly::{DocumentBuilder, ErrorCollector, TableHeader};
 use super::error::SyntaxError;
 use super::tree::{Name, NodeKind, Radix, Span, TableOrigin, ValueNode};
 
 /// The events of one expression.
-pub(super) struct Events<'e, 's> {
+pub(super) struct ExpressionEvents<'e, 's> {
     pub(super) events: &'e [Event],
     /// The text that the events index into. `base` is the text's offset in the document.
     pub(super) source: Source<'s>,
     pub(super) base: usize,
-    pub(super) assembly: &'e mut Assembly<'s>,
+    pub(super) assembly: &'e mut DocumentBuilder<'s>,
 }
 
-impl<'s> Events<'_, 's> {
+impl<'s> ExpressionEvents<'_, 's> {
     /// Reads all events.
-    pub(super) fn read(mut self) {
+    pub(super) fn read_all(mut self) {
         if self.assembly.open.is_some() {
-            self.header();
+            self.read_header();
         }
         while let (false, Some(event)) = (self.assembly.is_lost, self.next()) {
             match event.kind() {
@@ -36,9 +36,9 @@ impl<'s> Events<'_, 's> {
                     let is_list = event.kind() == EventKind::ArrayTableOpen;
                     let span = self.span(event);
                     self.assembly.open = Some(TableHeader { path: Vec::new(), key: None, span, is_list });
-                    self.header();
+                    self.read_header();
                 }
-                EventKind::SimpleKey => self.key_value(event),
+                EventKind::SimpleKey => self.read_key_value(event),
                 // Whitespace, and the rest of incomplete expressions.
                 _ => {}
             }
@@ -60,8 +60,8 @@ impl<'s> Events<'_, 's> {
         Span::new(self.base + event.span().start(), self.base + event.span().end())
     }
 
-    /// Reads the rest of the open header. An unclosed header ends at the next header, whose key it takes.
-    fn header(&mut self) {
+    /// Reads the rest of the open header. An unclosed header ends at the next header and takes its key.
+    fn read_header(&mut self) {
         let Some(mut header) = self.assembly.open.take() else { return };
         while let Some(event) = self.next() {
             match event.kind() {
@@ -70,34 +70,35 @@ impl<'s> Events<'_, 's> {
                     self.assembly.start_table(header);
                     return;
                 }
-                EventKind::SimpleKey => (header.path, header.key) = self.key(event),
+                EventKind::SimpleKey => (header.path, header.key) = self.read_key(event),
                 _ => {}
             }
         }
         self.assembly.open = Some(header);
     }
 
-    fn key_value(&mut self, event: Event) {
-        let (path, key) = self.key(event);
+    fn read_key_value(&mut self, event: Event) {
+        let (path, key) = self.read_key(event);
         self.next_if(EventKind::Whitespace);
         let (Some(key), Some(_)) = (key, self.next_if(EventKind::KeyValSep)) else {
             self.assembly.is_lost = true;
             return;
         };
         self.next_if(EventKind::Whitespace);
-        let value = self.next().and_then(|event| self.value(event)).unwrap_or_else(|| self.no_value());
-        self.assembly.key_value(&path, key, value);
+        let value =
+            self.next().and_then(|event| self.read_value(event)).unwrap_or_else(|| self.missing_value());
+        self.assembly.add_key_value(&path, key, value);
     }
 
     /// Placeholder for a missing value.
-    fn no_value(&mut self) -> ValueNode {
+    fn missing_value(&mut self) -> ValueNode {
         let span = Span::default();
-        let text = self.assembly.text(span, Cow::Borrowed("0"));
+        let text = self.assembly.store_string(span, Cow::Borrowed("0"));
         ValueNode { span, kind: NodeKind::Integer(text, Radix::Decimal) }
     }
 
     /// Reads a dotted key. Returns the path and the last part, which is `None` if there are too many parts.
-    fn key(&mut self, event: Event) -> (Vec<Name<'s>>, Option<Name<'s>>) {
+    fn read_key(&mut self, event: Event) -> (Vec<Name<'s>>, Option<Name<'s>>) {
         let mut path = Vec::new();
         let mut last = event;
         let mut parts = 1;
@@ -107,7 +108,7 @@ impl<'s> Events<'_, 's> {
                     continue;
                 }
                 if parts < MAX_DEPTH {
-                    let name = self.name(last);
+                    let name = self.read_name(last);
                     path.push(name);
                 }
                 parts += 1;
@@ -120,7 +121,7 @@ impl<'s> Events<'_, 's> {
             self.assembly.meaning.push_with(|| SyntaxError::at(span.range(), "recursion limit"));
             return (Vec::new(), None);
         }
-        let name = self.name(last);
+        let name = self.read_name(last);
         (path, Some(name))
     }
 
@@ -133,7 +134,7 @@ impl<'s> Events<'_, 's> {
         }
     }
 
-    fn name(&mut self, event: Event) -> Name<'s> {
+    fn read_name(&mut self, event: Event) -> Name<'s> {
         let mut text = Cow::Borrowed("");
         let mut sink = ErrorCollector { errors: &mut self.assembly.meaning, base: self.base };
         if let Some(raw) = self.source.get(event) {
@@ -142,16 +143,16 @@ impl<'s> Events<'_, 's> {
         Name { span: self.span(event), text }
     }
 
-    fn value(&mut self, event: Event) -> Option<ValueNode> {
+    fn read_value(&mut self, event: Event) -> Option<ValueNode> {
         match event.kind() {
-            EventKind::InlineTableOpen => Some(self.inline_table(event)),
-            EventKind::ArrayOpen => Some(self.array(event)),
-            EventKind::Scalar => Some(self.scalar(event)),
+            EventKind::InlineTableOpen => Some(self.read_inline_table(event)),
+            EventKind::ArrayOpen => Some(self.read_array(event)),
+            EventKind::Scalar => Some(self.read_scalar(event)),
             _ => None,
         }
     }
 
-    fn scalar(&mut self, event: Event) -> ValueNode {
+    fn read_scalar(&mut self, event: Event) -> ValueNode {
         let span = self.span(event);
         let mut decoded = Cow::Borrowed("");
         let mut sink = ErrorCollector { errors: &mut self.assembly.meaning, base: self.base };
@@ -162,19 +163,19 @@ impl<'s> Events<'_, 's> {
         {
             self.assembly.meaning.push_with(|| SyntaxError::at(span.range(), error.to_string()));
         }
-        let mut text = || self.assembly.text(span, std::mem::take(&mut decoded));
+        let mut text = || self.assembly.store_string(span, std::mem::take(&mut decoded));
         let kind = match kind {
             ScalarKind::String => NodeKind::String(text()),
             ScalarKind::Boolean(value) => NodeKind::Boolean(value),
             ScalarKind::DateTime => NodeKind::Datetime,
             ScalarKind::Float => NodeKind::Float(text()),
-            ScalarKind::Integer(radix) => NodeKind::Integer(text(), base_of(radix)),
+            ScalarKind::Integer(radix) => NodeKind::Integer(text(), to_radix(radix)),
         };
         ValueNode { span, kind }
     }
 
     /// Reads an array up to the end or the first unexpected event.
-    fn array(&mut self, open: Event) -> ValueNode {
+    fn read_array(&mut self, open: Event) -> ValueNode {
         let first = self.assembly.elements.len();
         let mut span = self.span(open);
         let mut value = None;
@@ -182,7 +183,7 @@ impl<'s> Events<'_, 's> {
             span.end = self.span(event).end;
             match event.kind() {
                 EventKind::InlineTableOpen | EventKind::ArrayOpen | EventKind::Scalar => {
-                    value = self.value(event);
+                    value = self.read_value(event);
                 }
                 EventKind::ValueSep => self.assembly.elements.extend(value.take()),
                 EventKind::ArrayClose => {
@@ -204,7 +205,7 @@ impl<'s> Events<'_, 's> {
     }
 
     /// Reads an inline table up to the end or the first unexpected event.
-    fn inline_table(&mut self, open: Event) -> ValueNode {
+    fn read_inline_table(&mut self, open: Event) -> ValueNode {
         let origin = TableOrigin { is_inline: true, ..TableOrigin::default() };
         let table = self.assembly.document.add_table(origin);
         let mut span = self.span(open);
@@ -213,16 +214,16 @@ impl<'s> Events<'_, 's> {
             span.end = self.span(event).end;
             match event.kind() {
                 EventKind::SimpleKey => {
-                    if let (path, Some(last)) = self.key(event) {
+                    if let (path, Some(last)) = self.read_key(event) {
                         key = Some((path, last));
                     }
                 }
                 EventKind::InlineTableOpen | EventKind::ArrayOpen | EventKind::Scalar => {
-                    value = self.value(event);
+                    value = self.read_value(event);
                 }
                 EventKind::ValueSep | EventKind::InlineTableClose => {
                     if let (Some((path, key)), Some(value)) = (key.take(), value.take()) {
-                        self.assembly.inline_key_value(table, &path, key, value);
+                        self.assembly.add_inline_key_value(table, &path, key, value);
                     }
                     if event.kind() == EventKind::InlineTableClose {
                         break;
@@ -245,7 +246,7 @@ impl<'s> Events<'_, 's> {
     }
 }
 
-fn base_of(radix: IntegerRadix) -> Radix {
+fn to_radix(radix: IntegerRadix) -> Radix {
     match radix {
         IntegerRadix::Dec => Radix::Decimal,
         IntegerRadix::Hex => Radix::Hexadecimal,

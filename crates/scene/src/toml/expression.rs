@@ -7,21 +7,26 @@ use toml_parser::lexer::{Token, TokenKind};
 use toml_parser::parser::{Event, RecursionGuard, ValidateWhitespace, parse_document};
 use toml_parser::{ErrorSink, Source};
 
-use super::assembly::{Assembly, ErrorCollector};
-use super::events::Events;
+use super::assembly::{DocumentBuilder, ErrorCollector};
+use super::events::ExpressionEvents;
 use super::{MARK, MAX_DEPTH};
 
 /// Expression parser with reusable buffers.
 #[derive(Default)]
-pub(super) struct Expressions {
+pub(super) struct ExpressionParser {
     tokens: Vec<Token>,
     events: Vec<Event>,
 }
 
-impl Expressions {
+impl ExpressionParser {
     /// Reads the expression that starts at byte `at`, the start of a line. Returns the offset after the
     /// expression.
-    pub(super) fn read<'s>(&mut self, source: &'s str, at: usize, assembly: &mut Assembly<'s>) -> usize {
+    pub(super) fn read<'s>(
+        &mut self,
+        source: &'s str,
+        at: usize,
+        assembly: &mut DocumentBuilder<'s>,
+    ) -> usize {
         self.tokens.clear();
         self.events.clear();
         // The lexer skips a byte order mark at the start of its text, which is only correct for the first
@@ -40,7 +45,7 @@ impl Expressions {
         parse(&self.tokens, part, &mut self.events, &mut sink);
         let next = self.tokens.last().map_or(source.len(), |token| base + token.span().end());
         if !assembly.is_lost {
-            Events { events: &self.events, source: part, base, assembly }.read();
+            ExpressionEvents { events: &self.events, source: part, base, assembly }.read_all();
         }
         next
     }
@@ -59,12 +64,12 @@ fn parse(tokens: &[Token], source: Source<'_>, events: &mut Vec<Event>, errors: 
 /// empty.
 #[derive(Default)]
 struct ExpressionScanner {
-    phase: Phase,
+    phase: ExpressionPhase,
     open: Vec<TokenKind>,
 }
 
 #[derive(Clone, Copy, Default, PartialEq, Eq)]
-enum Phase {
+enum ExpressionPhase {
     /// Before the first token that is not whitespace.
     #[default]
     Start,
@@ -85,29 +90,44 @@ impl ExpressionScanner {
         let is_end = token == T::Newline && self.open.is_empty();
         self.phase = match (self.phase, token) {
             (phase, T::Whitespace) => phase,
-            (Phase::Start, T::Atom | T::Dot | T::LiteralString | T::BasicString) => Phase::Key,
-            (Phase::Start, T::MlLiteralString | T::MlBasicString) => Phase::Key,
-            (Phase::Start | Phase::Key | Phase::Equals, T::Equals) => Phase::Equals,
-            (Phase::Key, T::Atom | T::Dot | T::LiteralString | T::BasicString) => Phase::Key,
-            (Phase::Key, T::MlLiteralString | T::MlBasicString) => Phase::Key,
-            (Phase::Equals | Phase::Value, T::LeftSquareBracket | T::LeftCurlyBracket) => {
-                self.open.push(token);
-                Phase::Value
+            (ExpressionPhase::Start, T::Atom | T::Dot | T::LiteralString | T::BasicString) => {
+                ExpressionPhase::Key
             }
-            (Phase::Value, T::RightSquareBracket | T::RightCurlyBracket) => self.close(token),
-            (Phase::Value, _) => Phase::Value,
-            (Phase::Start | Phase::Key | Phase::Equals | Phase::Rest, _) => Phase::Rest,
+            (ExpressionPhase::Start, T::MlLiteralString | T::MlBasicString) => ExpressionPhase::Key,
+            (ExpressionPhase::Start | ExpressionPhase::Key | ExpressionPhase::Equals, T::Equals) => {
+                ExpressionPhase::Equals
+            }
+            (ExpressionPhase::Key, T::Atom | T::Dot | T::LiteralString | T::BasicString) => {
+                ExpressionPhase::Key
+            }
+            (ExpressionPhase::Key, T::MlLiteralString | T::MlBasicString) => ExpressionPhase::Key,
+            (
+                ExpressionPhase::Equals | ExpressionPhase::Value,
+                T::LeftSquareBracket | T::LeftCurlyBracket,
+            ) => {
+                self.open.push(token);
+                ExpressionPhase::Value
+            }
+            (ExpressionPhase::Value, T::RightSquareBracket | T::RightCurlyBracket) => self.close(token),
+            (ExpressionPhase::Value, _) => ExpressionPhase::Value,
+            (
+                ExpressionPhase::Start
+                | ExpressionPhase::Key
+                | ExpressionPhase::Equals
+                | ExpressionPhase::Rest,
+                _,
+            ) => ExpressionPhase::Rest,
         };
         is_end
     }
 
-    fn close(&mut self, token: TokenKind) -> Phase {
+    fn close(&mut self, token: TokenKind) -> ExpressionPhase {
         let opened = if token == TokenKind::RightSquareBracket {
             TokenKind::LeftSquareBracket
         } else {
             TokenKind::LeftCurlyBracket
         };
         self.open.pop_if(|last| *last == opened);
-        if self.open.is_empty() { Phase::Rest } else { Phase::Value }
+        if self.open.is_empty() { ExpressionPhase::Rest } else { ExpressionPhase::Value }
     }
 }

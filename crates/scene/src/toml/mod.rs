@@ -30,12 +30,12 @@ mod plain;
 mod set;
 mod tree;
 
-use assembly::Assembly;
-use expression::Expressions;
+use assembly::DocumentBuilder;
+use expression::ExpressionParser;
 
 pub(super) use brackets::{Bracket, brackets, last_open};
 pub(super) use error::SyntaxError;
-pub(super) use set::{KeyError, KeyErrorKind, Layout};
+pub(super) use set::{KeyError, KeyErrorKind, TopLevelLayout};
 pub(super) use tree::{Document, Elements, Entries, KeyValue, TomlValue, Value};
 
 /// Maximum nesting depth of arrays and tables, and maximum number of parts in a dotted key.
@@ -59,13 +59,13 @@ pub(super) fn set<'s>(
     document: Document<'s>,
     source: &'s str,
     at: usize,
-    layout: Layout,
+    layout: TopLevelLayout,
 ) -> (Document<'s>, Result<(), KeyError>) {
-    let (mut assembly, detached) = Assembly::detached(document.with_source(source));
-    Expressions::default().read(source, at, &mut assembly);
+    let (mut assembly, detached) = DocumentBuilder::with_detached_table(document.with_source(source));
+    ExpressionParser::default().read(source, at, &mut assembly);
     let (mut document, _) = assembly.finish();
     let placed = match document.only_value(detached) {
-        Some((keys, value)) => document.put_at(&keys, value, layout),
+        Some((keys, value)) => document.set_at_path(&keys, value, layout),
         None => Ok(()),
     };
     (document, placed)
@@ -74,11 +74,12 @@ pub(super) fn set<'s>(
 /// Parses a text of less than 4 GiB. Returns the tree and the first errors: syntax errors, followed by errors
 /// in keys and values, both in text order.
 pub(super) fn parse(source: &str) -> (Document<'_>, Vec<SyntaxError>) {
-    let mut assembly = Assembly::new(source);
-    let mut expressions = Expressions::default();
+    let mut assembly = DocumentBuilder::new(source);
+    let mut expressions = ExpressionParser::default();
     let mut at = if source.starts_with(MARK) { MARK.len() } else { 0 };
     while at < source.len() {
-        let plain = if assembly.is_in_header() { None } else { plain::read(source, at, &mut assembly) };
+        let plain =
+            if assembly.is_in_header() { None } else { plain::read_plain_line(source, at, &mut assembly) };
         at = plain.unwrap_or_else(|| expressions.read(source, at, &mut assembly));
     }
     assembly.finish()

@@ -8,30 +8,34 @@
 
 use std::borrow::Cow;
 
-use super::assembly::{Assembly, TableHeader};
+use super::assembly::{DocumentBuilder, TableHeader};
 use super::tree::{Name, NodeKind, Radix, Span, StringRef, ValueNode};
 
 /// Reads the line that starts at byte `at` and returns the offset after it. `None` if the line is not simple.
-pub(super) fn read<'s>(source: &'s str, at: usize, assembly: &mut Assembly<'s>) -> Option<usize> {
+pub(super) fn read_plain_line<'s>(
+    source: &'s str,
+    at: usize,
+    assembly: &mut DocumentBuilder<'s>,
+) -> Option<usize> {
     let mut line = LineScanner { source, at };
-    line.space();
+    line.skip_whitespace();
     match line.peek() {
         b'[' => {
-            let header = line.header()?;
-            line.end()?;
+            let header = line.read_header()?;
+            line.read_line_end()?;
             if !assembly.is_lost {
                 assembly.finish_table();
                 assembly.start_table(header);
             }
         }
         first if is_bare(first) => {
-            let key = line.name()?;
-            line.space();
-            line.take(b'=')?;
-            line.space();
+            let key = line.read_name()?;
+            line.skip_whitespace();
+            line.expect_byte(b'=')?;
+            line.skip_whitespace();
             let before = assembly.elements.len();
-            let value = line.value(&mut assembly.elements);
-            let Some((value, ())) = value.and_then(|value| Some((value, line.end()?))) else {
+            let value = line.read_value(&mut assembly.elements);
+            let Some((value, ())) = value.and_then(|value| Some((value, line.read_line_end()?))) else {
                 assembly.elements.truncate(before);
                 return None;
             };
@@ -39,10 +43,10 @@ pub(super) fn read<'s>(source: &'s str, at: usize, assembly: &mut Assembly<'s>) 
                 assembly.elements.truncate(before);
             } else {
                 let kind = value.kind.unwrap_or_else(|| assembly.end_array(before));
-                assembly.key_value(&[], key, ValueNode { span: value.span, kind });
+                assembly.add_key_value(&[], key, ValueNode { span: value.span, kind });
             }
         }
-        _ => line.end()?,
+        _ => line.read_line_end()?,
     }
     Some(line.at)
 }
@@ -65,7 +69,7 @@ impl<'s> LineScanner<'s> {
         self.source.as_bytes().get(self.at).copied().unwrap_or(0)
     }
 
-    fn take(&mut self, byte: u8) -> Option<()> {
+    fn expect_byte(&mut self, byte: u8) -> Option<()> {
         if self.peek() != byte {
             return None;
         }
@@ -74,22 +78,22 @@ impl<'s> LineScanner<'s> {
     }
 
     /// Skips bytes while `is_one` is true. Returns the number of bytes skipped.
-    fn skip(&mut self, is_one: impl Fn(u8) -> bool) -> usize {
+    fn skip_while(&mut self, is_one: impl Fn(u8) -> bool) -> usize {
         let rest = self.source.as_bytes().get(self.at..).unwrap_or_default();
         let count = rest.iter().position(|byte| !is_one(*byte)).unwrap_or(rest.len());
         self.at += count;
         count
     }
 
-    fn space(&mut self) {
-        self.skip(|byte| byte == b' ' || byte == b'\t');
+    fn skip_whitespace(&mut self) {
+        self.skip_while(|byte| byte == b' ' || byte == b'\t');
     }
 
     /// Reads whitespace, a comment and the end of the line or the text.
-    fn end(&mut self) -> Option<()> {
-        self.space();
+    fn read_line_end(&mut self) -> Option<()> {
+        self.skip_whitespace();
         if self.peek() == b'#' {
-            self.skip(|byte| byte == b'\t' || (byte >= b' ' && byte != 0x7f));
+            self.skip_while(|byte| byte == b'\t' || (byte >= b' ' && byte != 0x7f));
         }
         if self.at == self.source.len() {
             return Some(());
@@ -97,71 +101,72 @@ impl<'s> LineScanner<'s> {
         if self.peek() == b'\r' {
             self.at += 1;
         }
-        self.take(b'\n')
+        self.expect_byte(b'\n')
     }
 
-    fn name(&mut self) -> Option<Name<'s>> {
+    fn read_name(&mut self) -> Option<Name<'s>> {
         let start = self.at;
-        if self.skip(is_bare) == 0 {
+        if self.skip_while(is_bare) == 0 {
             return None;
         }
         let text = Cow::Borrowed(self.source.get(start..self.at)?);
         Some(Name { span: Span::new(start, self.at), text })
     }
 
-    fn header(&mut self) -> Option<TableHeader<'s>> {
+    fn read_header(&mut self) -> Option<TableHeader<'s>> {
         let start = self.at;
-        self.take(b'[')?;
-        let is_list = self.take(b'[').is_some();
-        let mut key = self.name()?;
+        self.expect_byte(b'[')?;
+        let is_list = self.expect_byte(b'[').is_some();
+        let mut key = self.read_name()?;
         let mut path = Vec::new();
-        if self.take(b'.').is_some() {
-            path.push(std::mem::replace(&mut key, self.name()?));
+        if self.expect_byte(b'.').is_some() {
+            path.push(std::mem::replace(&mut key, self.read_name()?));
         }
-        self.take(b']')?;
+        self.expect_byte(b']')?;
         if is_list {
-            self.take(b']')?;
+            self.expect_byte(b']')?;
         }
         Some(TableHeader { path, key: Some(key), span: Span::new(start, self.at), is_list })
     }
 
     /// Reads a value. Pushes the elements of an array onto `elements`.
-    fn value(&mut self, elements: &mut Vec<ValueNode>) -> Option<ScannedValue> {
+    fn read_value(&mut self, elements: &mut Vec<ValueNode>) -> Option<ScannedValue> {
         let start = self.at;
-        if self.take(b'[').is_none() {
-            let ValueNode { span, kind } = self.scalar()?;
+        if self.expect_byte(b'[').is_none() {
+            let ValueNode { span, kind } = self.read_scalar()?;
             return Some(ScannedValue { span, kind: Some(kind) });
         }
         loop {
-            self.space();
-            if self.take(b']').is_some() {
+            self.skip_whitespace();
+            if self.expect_byte(b']').is_some() {
                 return Some(ScannedValue { span: Span::new(start, self.at), kind: None });
             }
-            elements.push(self.scalar()?);
-            self.space();
+            elements.push(self.read_scalar()?);
+            self.skip_whitespace();
             if self.peek() != b']' {
-                self.take(b',')?;
+                self.expect_byte(b',')?;
             }
         }
     }
 
-    fn scalar(&mut self) -> Option<ValueNode> {
+    fn read_scalar(&mut self) -> Option<ValueNode> {
         let start = self.at;
         let kind = match self.peek() {
-            b'"' => self.quoted(|byte| byte != b'"' && byte != b'\\')?,
-            b'\'' => self.quoted(|byte| byte != b'\'')?,
-            b't' => self.word("true", true)?,
-            b'f' => self.word("false", false)?,
-            _ => self.number()?,
+            b'"' => self.read_quoted(|byte| byte != b'"' && byte != b'\\')?,
+            b'\'' => self.read_quoted(|byte| byte != b'\'')?,
+            b't' => self.read_boolean("true", true)?,
+            b'f' => self.read_boolean("false", false)?,
+            _ => self.read_number()?,
         };
         Some(ValueNode { span: Span::new(start, self.at), kind })
     }
 
-    fn quoted(&mut self, is_plain: impl Fn(u8) -> bool) -> Option<NodeKind> {
+    fn read_quoted(&mut self, is_plain: impl Fn(u8) -> bool) -> Option<NodeKind> {
         let quote = self.peek();
         self.at += 1;
-        let length = self.skip(|byte| is_plain(byte) && (byte == b'\t' || byte >= b' ') && byte != 0x7f);
-        self.take(quote)?;
+        let length =
+            self.skip_while(|byte| is_plain(byte) && (byte == b'\t' || byte >= b' ') && byte != 0x7f);
+        self.expect_byte(quote)?;
         // Three quotes start a multi-line string.
         if length == 0 && self.peek() == quote {
             return None;
@@ -169,7 +174,7 @@ impl<'s> LineScanner<'s> {
         Some(NodeKind::String(StringRef::QUOTED))
     }
 
-    fn word(&mut self, word: &str, value: bool) -> Option<NodeKind> {
+    fn read_boolean(&mut self, word: &str, value: bool) -> Option<NodeKind> {
         if !self.source.as_bytes().get(self.at..)?.starts_with(word.as_bytes()) {
             return None;
         }
@@ -178,24 +183,24 @@ impl<'s> LineScanner<'s> {
     }
 
     /// Reads a decimal number that ends at a delimiter.
-    fn number(&mut self) -> Option<NodeKind> {
+    fn read_number(&mut self) -> Option<NodeKind> {
         let sign = matches!(self.peek(), b'+' | b'-');
         self.at += usize::from(sign);
         let has_zero = self.peek() == b'0';
-        let digits = self.skip(|byte| byte.is_ascii_digit());
+        let digits = self.skip_while(|byte| byte.is_ascii_digit());
         if digits == 0 || (has_zero && digits > 1) {
             return None;
         }
         let mut is_float = false;
-        if self.take(b'.').is_some() {
+        if self.expect_byte(b'.').is_some() {
             is_float = true;
-            self.digits()?;
+            self.skip_digits()?;
         }
         if matches!(self.peek(), b'e' | b'E') {
             is_float = true;
             self.at += 1;
             self.at += usize::from(matches!(self.peek(), b'+' | b'-'));
-            self.digits()?;
+            self.skip_digits()?;
         }
         let kind = if is_float {
             NodeKind::Float(StringRef::WHOLE)
@@ -205,8 +210,8 @@ impl<'s> LineScanner<'s> {
         self.is_at_delimiter().then_some(kind)
     }
 
-    fn digits(&mut self) -> Option<()> {
-        (self.skip(|byte| byte.is_ascii_digit()) > 0).then_some(())
+    fn skip_digits(&mut self) -> Option<()> {
+        (self.skip_while(|byte| byte.is_ascii_digit()) > 0).then_some(())
     }
 
     /// Whether the value ends here because the next byte is a delimiter.

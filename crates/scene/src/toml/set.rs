@@ -37,13 +37,13 @@ pub(crate) enum KeyErrorKind {
         /// Number of these elements.
         count: usize,
     },
-    /// The part refers to an element in an array of values.
+    /// The part refers to an element of an array of values.
     Element,
 }
 
 /// The groups and lists at the top level.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Layout {
+pub(crate) struct TopLevelLayout {
     /// Top-level tables that contain named tables. Named tables are never created.
     pub(crate) groups: &'static [&'static str],
     /// Whether a top-level name is a list of tables.
@@ -52,17 +52,17 @@ pub(crate) struct Layout {
 
 impl<'s> Document<'s> {
     /// Sets the value at `keys`. Creates missing tables, except in groups.
-    pub(super) fn put_at(
+    pub(super) fn set_at_path(
         &mut self,
         keys: &[Name<'s>],
         value: ValueNode,
-        layout: Layout,
+        layout: TopLevelLayout,
     ) -> Result<(), KeyError> {
         let mut table = Self::ROOT;
         let mut depth = 0;
         while depth + 1 < keys.len() {
             let next = depth + 1;
-            match self.step(keys, depth, table, layout)? {
+            match self.resolve_part(keys, depth, table, layout)? {
                 KeyTarget::Table(inner) => table = inner,
                 KeyTarget::Element(list, index) if next + 1 == keys.len() => {
                     self.set_element(list, index, value);
@@ -78,18 +78,18 @@ impl<'s> Document<'s> {
         }
         self.check_group(keys, depth, table, layout)?;
         if let Some(last) = keys.get(depth) {
-            self.put(table, last.clone(), value);
+            self.set_value(table, last.clone(), value);
         }
         Ok(())
     }
 
     /// Resolves any part of a key except the last.
-    fn step(
+    fn resolve_part(
         &mut self,
         keys: &[Name<'s>],
         depth: usize,
         table: TableId,
-        layout: Layout,
+        layout: TopLevelLayout,
     ) -> Result<KeyTarget, KeyError> {
         let (name, next) = (&keys[depth], &keys[depth + 1]);
         let is_list = depth == 0 && (layout.is_list)(&name.text);
@@ -123,7 +123,7 @@ impl<'s> Document<'s> {
         keys: &[Name<'s>],
         depth: usize,
         table: TableId,
-        layout: Layout,
+        layout: TopLevelLayout,
     ) -> Result<(), KeyError> {
         let is_in_group = depth == 1 && layout.groups.contains(&&*keys[0].text);
         if is_in_group && self.find(table, &keys[1].text).is_none() {
@@ -135,7 +135,7 @@ impl<'s> Document<'s> {
     /// Replaces the value of a key with a new table.
     fn create_table(&mut self, parent: TableId, name: &Name<'s>) -> TableId {
         let table = self.add_table(TableOrigin::default());
-        self.put(parent, name.clone(), ValueNode { span: name.span, kind: NodeKind::Table(table) });
+        self.set_value(parent, name.clone(), ValueNode { span: name.span, kind: NodeKind::Table(table) });
         table
     }
 

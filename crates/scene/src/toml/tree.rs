@@ -25,8 +25,8 @@ impl Span {
     }
 }
 
-/// A decoded string: the whole span, the span without quotes, or an index into the document's decoded
-/// strings.
+/// A reference to a decoded string: the whole span, the span without quotes, or an index into the document's
+/// decoded strings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct StringRef(u32);
 
@@ -274,7 +274,7 @@ impl<'s> Document<'s> {
     }
 
     /// Sets the value of a key, adding it if necessary.
-    pub(super) fn put(&mut self, table: TableId, name: Name<'s>, node: ValueNode) {
+    pub(super) fn set_value(&mut self, table: TableId, name: Name<'s>, node: ValueNode) {
         let Some(found) = self.find_entry(table, &name.text) else {
             return self.add_entry(table, name, node);
         };

@@ -11,7 +11,7 @@ use crate::math::lanes::PortableSimd;
 use crate::math::{DVec2, Vec3};
 
 /// Writes the AOV `quantity` at the first hit of each camera ray in the queue, or black if there is no hit.
-pub fn shade(
+pub fn shade_aov(
     (tile, maps): (&TileContext<'_>, Option<&PhotonMaps>),
     quantity: FirstHit,
     scratch: &mut TraceBuffers,
@@ -32,16 +32,16 @@ pub fn shade(
         let surface = &vertex.surface;
         let value = match quantity {
             FirstHit::Normal => (vertex.front_shading_normal(counters) + Vec3::ONE) * 0.5,
-            FirstHit::Depth => Vec3::splat(distance(tile, surface)),
+            FirstHit::Depth => Vec3::splat(view_depth(tile, surface)),
             FirstHit::Barycentric => surface.barycentric,
             FirstHit::Photons => {
-                Vec3::splat(maps.map_or(0.0, |maps| photons(maps, tile, path.slot, &vertex)))
+                Vec3::splat(maps.map_or(0.0, |maps| count_photons(maps, tile, path.slot, &vertex)))
             }
-            FirstHit::Uv => fraction(surface.uv).as_vec2().extend(0.0),
+            FirstHit::Uv => fractional_uv(surface.uv).as_vec2().extend(0.0),
             FirstHit::Albedo => {
                 let albedo =
                     vertex.material.bsdf.albedo(&vertex.texture_point, &mut counters.texture_lookups);
-                vertex.tinted(albedo)
+                vertex.times_vertex_color(albedo)
             }
         };
         radiance[path.slot as usize] = value * path.throughput;
@@ -50,7 +50,7 @@ pub fn shade(
 }
 
 /// Number of photons within the kernels around a vertex, in a sample's photon pass.
-fn photons(maps: &PhotonMaps, tile: &TileContext<'_>, slot: u32, vertex: &Vertex<'_>) -> f32 {
+fn count_photons(maps: &PhotonMaps, tile: &TileContext<'_>, slot: u32, vertex: &Vertex<'_>) -> f32 {
     let look = GatherPoint { point: vertex.surface.point, normal: vertex.normal, most_depth: u32::MAX };
     let (_, _, sample) = tile.block.sample_of(slot);
     let pass = maps.pass(sample);
@@ -58,10 +58,10 @@ fn photons(maps: &PhotonMaps, tile: &TileContext<'_>, slot: u32, vertex: &Vertex
 }
 
 /// Depth along the view axis.
-fn distance(tile: &TileContext<'_>, surface: &SurfacePoint) -> f32 {
+fn view_depth(tile: &TileContext<'_>, surface: &SurfacePoint) -> f32 {
     tile.world.camera.depth_of(surface.point.as_dvec3()).max(0.0) as f32
 }
 
-fn fraction(uv: DVec2) -> DVec2 {
+fn fractional_uv(uv: DVec2) -> DVec2 {
     uv - uv.floor()
 }

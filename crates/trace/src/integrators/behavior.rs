@@ -10,8 +10,8 @@ use crate::scene::description::Method;
 pub struct PathBehavior {
     /// Whether camera paths split into a reflected and a refracted path at glass.
     pub splits: bool,
-    /// Whether paths scatter at non-specular surfaces. True in `path`, and in `whitted` with photons to find
-    /// light that the photons do not account for.
+    /// Whether paths scatter at non-specular surfaces. True for `path`, and for `whitted` with photons, where
+    /// scattered paths find the light that photons do not account for.
     pub scatters: bool,
     /// Whether paths continue in microfacet lobes but end at other non-specular surfaces.
     pub mirrors: bool,
@@ -46,6 +46,6 @@ impl PathBehavior {
 }
 
 /// How lights are sampled with these settings, with or without photons.
-pub fn receivers(settings: &RenderSettings, are_gathered: bool) -> SamplingMode {
+pub fn light_sampling_mode(settings: &RenderSettings, are_gathered: bool) -> SamplingMode {
     PathBehavior::of(settings, are_gathered).receivers
 }

@@ -35,7 +35,7 @@ struct BoxEdge {
 }
 
 /// Draws a line wherever a camera ray in the queue passes close to the edge of a box.
-pub fn draw(
+pub fn draw_box_edges(
     tile: &TileContext<'_>,
     scratch: &mut TraceBuffers,
     radiance: &mut [Vec3],

@@ -17,7 +17,7 @@ use super::transport::accumulator::{Accumulator, LocalTerm};
 use super::transport::batch::VertexBatch;
 use super::transport::camera::CAMERA_ROWS;
 use super::transport::crossing::CrossingMemory;
-use super::transport::interface::{FresnelSplit, fresnel_split, reflected, through_sheet};
+use super::transport::interface::{FresnelSplit, fresnel_split, reflected_path, sheet_transmission};
 use super::transport::interiors::InteriorList;
 use super::transport::packet::{PacketHits, PacketSource};
 use super::transport::ray::PathRay;
@@ -44,9 +44,9 @@ const MIN_SPLIT: f32 = 0.01;
 /// Number of rays between checks of the cancel token.
 const POLL_INTERVAL: usize = 256;
 
-/// Traces the camera paths of the given slots and adds their radiance to the accumulator. `negative` receives the first
-/// slot of each packet and the mask of samples with a negative filter weight.
-pub fn trace(
+/// Traces the camera paths of the given slots and adds their radiance to the accumulator. `negative` receives
+/// the first slot of each packet and the mask of samples with a negative filter weight.
+pub fn trace_camera_paths(
     (tile, maps): (&TileContext<'_>, Option<&PhotonMaps>),
     slots: Range<u32>,
     memory: &mut ThreadMemory,
@@ -57,7 +57,7 @@ pub fn trace(
     let ThreadMemory { scratch, direct } = memory;
     let TraceBuffers { rays, next, surfaces, crossing, camera, hits, object_order } = scratch;
     next.clear();
-    let mut wavefront = Wavefront {
+    let mut wavefront = CameraWavefront {
         depth: 0,
         continuation: None,
         tile,
@@ -74,7 +74,7 @@ pub fn trace(
     wavefront.direct.begin_bounce(slots.len(), tile.pixel_spread > 0.0);
     // Trace and shade the camera rays, which are the first bounce.
     for start in slots.clone().step_by(CAMERA_ROWS * PACKET_SIZE) {
-        tile.camera_rows(start..slots.end, camera);
+        tile.camera_packets(start..slots.end, camera);
         for (first, row) in (start..).step_by(PACKET_SIZE).zip(&*camera) {
             negative(first, row.negative);
             let count = (slots.end - first).min(PACKET_SIZE as u32) as usize;
@@ -82,7 +82,7 @@ pub fn trace(
         }
     }
     // Compute direct lighting at their vertices, and add it to the accumulator.
-    wavefront.light()?;
+    wavefront.add_direct_light()?;
     wavefront.direct.flush_run(slots.start, &mut wavefront.accumulator);
     wavefront.next_bounce(rays);
     // Trace the remaining bounces.
@@ -101,7 +101,7 @@ pub fn trace(
             }
         }
         let slots: &[PathRay] = rays;
-        wavefront.light()?;
+        wavefront.add_direct_light()?;
         wavefront.direct.flush(
             |place| (slots[place].slot, slots[place].state.only_specular_before),
             &mut wavefront.accumulator,
@@ -118,7 +118,7 @@ fn traversal_cost(tile: &TileContext<'_>, path: &PathRay, hit: Option<Hit>) -> u
 }
 
 /// One bounce of all paths in a batch.
-struct Wavefront<'a, 's> {
+struct CameraWavefront<'a, 's> {
     /// Number of bounces before the current hits.
     depth: u32,
     /// How paths continue at diffuse and glossy surfaces. `None` if they end at these surfaces.
@@ -139,7 +139,7 @@ struct Wavefront<'a, 's> {
     counters: &'a mut RayCounters,
 }
 
-impl<'a> PathStepper<'a> for Wavefront<'a, '_> {
+impl<'a> PathStepper<'a> for CameraWavefront<'a, '_> {
     fn tile(&self) -> &'a TileContext<'a> {
         self.tile
     }
@@ -177,11 +177,11 @@ impl<'a> PathStepper<'a> for Wavefront<'a, '_> {
             }
             Interaction::Hidden if self.may_scatter() => self.next.push(*path),
             Interaction::Hidden => {}
-            Interaction::Nothing => self.add_escaped(path),
+            Interaction::Nothing => self.add_escaped_light(path),
         }
     }
 
-    fn lookups(&mut self) -> &mut u64 {
+    fn texture_lookups(&mut self) -> &mut u64 {
         &mut self.counters.texture_lookups
     }
 
@@ -200,7 +200,7 @@ impl<'a> PathStepper<'a> for Wavefront<'a, '_> {
             return NullInteraction::Passed(left);
         }
         let shading = vertex.shading(self.counters);
-        let mirrored = |weight: f32| reflected(path, vertex, &shading, Vec3::splat(weight));
+        let mirrored = |weight: f32| reflected_path(path, vertex, &shading, Vec3::splat(weight));
         let weaker = reflectance.min(1.0 - reflectance) * path.throughput.abs().max_element();
         let splits = self.tile.behavior.splits && path.state.only_specular_before;
         if weaker >= MIN_SPLIT && splits {
@@ -215,15 +215,16 @@ impl<'a> PathStepper<'a> for Wavefront<'a, '_> {
     }
 }
 
-impl Wavefront<'_, '_> {
-    fn light(&mut self) -> Result<(), Cancelled> {
+impl CameraWavefront<'_, '_> {
+    fn add_direct_light(&mut self) -> Result<(), Cancelled> {
         let before = self.next.len();
         let (tile, maps, depth, aov) = (self.tile, self.maps, self.depth, self.accumulator.aov);
         let gather = |row: &VertexBatch| {
             let maps = maps?;
             Some(tile.world.geometry.instructions().run(GatherPhotons { tile, row, maps, depth, aov }))
         };
-        let rays = self.direct.light(tile, aov, (self.continuation, depth), gather, self.next)?;
+        let rays =
+            self.direct.compute_direct_light(tile, aov, (self.continuation, depth), gather, self.next)?;
         self.counters.shadow_rays += rays.shadow;
         self.counters.texture_lookups += rays.lookups;
         self.counters.scattered_rays += rays.scattered + (self.next.len() - before) as u64;
@@ -257,7 +258,7 @@ impl Wavefront<'_, '_> {
             }
             None => {
                 let sky = tile.world.lights.environment().map(|_| packet.sky(lane));
-                self.add_beyond(&path, tile.infinite_light_with_sky(sky, &path));
+                self.add_infinite_light(&path, tile.infinite_light_with_sky(sky, &path));
             }
         }
     }
@@ -309,7 +310,7 @@ impl Wavefront<'_, '_> {
         }
         // Compute direct lighting at the queued vertices while their data is in the cache.
         if self.direct.is_full() {
-            self.light()?;
+            self.add_direct_light()?;
         }
         Ok(())
     }
@@ -331,7 +332,7 @@ impl Wavefront<'_, '_> {
             let Some(hit) = packet.hit(lane) else { continue };
             let index = tile.world.material_index(&hit);
             if known.is_none_or(|(own, _)| own != index) {
-                known = tile.plain(index).map(|plain| (index, plain));
+                known = tile.plain_material(index).map(|plain| (index, plain));
             }
             let Some((_, (material, _))) = known else { continue };
             let slot = first + lane as u32;
@@ -355,7 +356,7 @@ impl Wavefront<'_, '_> {
     /// Adds the emission and ambient light of a plain surface.
     fn add_local_light(&mut self, path: &PathRay, hit: &Hit, is_shining: bool) {
         let index = self.tile.world.material_index(hit);
-        let Some((material, _)) = self.tile.plain(index) else { return };
+        let Some((material, _)) = self.tile.plain_material(index) else { return };
         if is_shining {
             self.add_emitted(path, material.emission, self.tile.emitter_weight(path, hit));
         }
@@ -368,7 +369,7 @@ impl Wavefront<'_, '_> {
 
     /// Adds the emission that a path hits, multiplied by its MIS weight. Light samples contribute the rest.
     fn add_emitted(&mut self, path: &PathRay, radiance: Vec3, weight: f32) {
-        if self.is_found_elsewhere(path) {
+        if self.is_light_counted_elsewhere(path) {
             return;
         }
         if path.state.only_specular_before {
@@ -380,24 +381,24 @@ impl Wavefront<'_, '_> {
 
     /// Whether another technique accounts for the light that a path hits: photons for light via mirrors and
     /// glass, or light samples for hard shadows.
-    fn is_found_elsewhere(&self, path: &PathRay) -> bool {
+    fn is_light_counted_elsewhere(&self, path: &PathRay) -> bool {
         let PathBehavior { gathers, mirrors, .. } = self.tile.behavior;
         let is_shared = path.state.pdf > 0.0;
         let is_soft = self.tile.settings.render.shadows == Shadows::Soft;
         !path.state.only_specular_before && (gathers || mirrors && is_shared) && !(is_shared && is_soft)
     }
 
-    fn add_escaped(&mut self, path: &PathRay) {
-        self.add_beyond(path, self.tile.infinite_light(path));
+    fn add_escaped_light(&mut self, path: &PathRay) {
+        self.add_infinite_light(path, self.tile.infinite_light(path));
     }
 
     /// Adds the light from infinite lights along a path that leaves the scene. The background is visible but
     /// does not illuminate anything.
-    fn add_beyond(&mut self, path: &PathRay, beyond: Vec3) {
+    fn add_infinite_light(&mut self, path: &PathRay, beyond: Vec3) {
         if path.state.only_specular_before {
             let background = self.tile.settings.render.background;
             self.accumulator.add(path.slot, LocalTerm::Emitted, path.throughput * (background + beyond));
-        } else if beyond != Vec3::ZERO && !self.is_found_elsewhere(path) {
+        } else if beyond != Vec3::ZERO && !self.is_light_counted_elsewhere(path) {
             self.accumulator.add_hit_light(path, path.throughput * beyond);
         }
     }
@@ -428,7 +429,7 @@ impl Wavefront<'_, '_> {
         // Look up only the textures needed for the displayed quantity.
         if !self.accumulator.accepts_reflected() {
             if accepts_ambient {
-                let reflectance = vertex.tinted(rough.ambient_at(at, lookups));
+                let reflectance = vertex.times_vertex_color(rough.ambient_at(at, lookups));
                 self.accumulator.add_ambient(path, path.throughput * ambient * reflectance);
             }
             return;
@@ -454,12 +455,13 @@ impl Wavefront<'_, '_> {
         let (tile, place) = (self.tile, self.place);
         let shading = vertex.shading(self.counters);
         let behind = bsdf.behind().map(|bsdf| (bsdf, shading.behind()));
-        let aov = self.measure_of(path);
+        let aov = self.light_aov_at(path);
         let lit = ShadingVertex { path, interiors: &path.interiors, place, vertex, shading, bsdf };
         self.direct.push(tile, &lit, aov, ShadingSides::OneSide { is_dark: false });
-        // Transmitted light has its own vertex, except for the lit fraction, which is measured on the viewer's side.
+        // Transmitted light has its own vertex, except for the lit fraction, which is measured on the
+        // viewer's side.
         if let Some((bsdf, shading)) = behind.filter(|_| aov != LightAov::LitFraction) {
-            let throughput = path.throughput * through_sheet(tile.world, &path.interiors, far);
+            let throughput = path.throughput * sheet_transmission(tile.world, &path.interiors, far);
             let (path, vertex) = (&PathRay { throughput, ..*path }, &vertex.behind());
             let lit = ShadingVertex { path, interiors: far, place, vertex, shading, bsdf: &bsdf };
             self.direct.push(tile, &lit, aov, ShadingSides::OneSide { is_dark: false });
@@ -480,7 +482,7 @@ impl Wavefront<'_, '_> {
         }
         let (tile, place) = (self.tile, self.place);
         let shading = vertex.shading(self.counters);
-        let aov = self.measure_of(path);
+        let aov = self.light_aov_at(path);
         let near = &path.interiors;
         let reflection = RoughBsdf::GlassReflection(rough);
         let transmission = RoughBsdf::GlassTransmission(rough);
@@ -518,7 +520,7 @@ impl Wavefront<'_, '_> {
     }
 
     /// The light AOV at a path's vertex. After the first non-specular surface, all light is included.
-    fn measure_of(&self, path: &PathRay) -> LightAov {
+    fn light_aov_at(&self, path: &PathRay) -> LightAov {
         if path.state.only_specular_before { self.accumulator.aov } else { LightAov::ALL }
     }
 
@@ -526,10 +528,10 @@ impl Wavefront<'_, '_> {
         let shading = vertex.shading(self.counters);
         let is_colored = self.accumulator.aov.is_colored();
         let reflectance = vertex.mirror_reflectance(mirror, &shading, is_colored, self.counters);
-        self.push_reflected(reflected(path, vertex, &shading, reflectance));
+        self.push_reflected(reflected_path(path, vertex, &shading, reflectance));
     }
 
-    /// Splits a path at a smooth coat, or randomly chooses between coat and base, where the probability of
+    /// Splits a path at a smooth coat, or randomly chooses the coat or the base. The probability of choosing
     /// the coat is its Fresnel reflectance.
     fn shade_coated(&mut self, path: &PathRay, vertex: &Vertex<'_>, coated: &Coated, far: &InteriorList) {
         let shading = vertex.shading(self.counters);
@@ -542,7 +544,7 @@ impl Wavefront<'_, '_> {
             let lookups = &mut self.counters.texture_lookups;
             let specular = coated.specular(&vertex.texture_point, lookups) * if both { fresnel } else { 1.0 };
             if specular != Vec3::ZERO {
-                self.push_reflected(reflected(path, vertex, &shading, specular));
+                self.push_reflected(reflected_path(path, vertex, &shading, specular));
             }
         }
         if !is_coat {
@@ -559,7 +561,7 @@ impl Wavefront<'_, '_> {
         let shading = vertex.shading(self.counters);
         let FresnelSplit { reflectance, refracted } =
             fresnel_split(self.tile.world, path, vertex, &shading, far);
-        let mirrored = |weight: f32| reflected(path, vertex, &shading, Vec3::splat(weight));
+        let mirrored = |weight: f32| reflected_path(path, vertex, &shading, Vec3::splat(weight));
         let Some(refracted) = refracted else { return self.push_reflected(mirrored(1.0)) };
         let weaker = reflectance.min(1.0 - reflectance) * path.throughput.abs().max_element();
         let splits = self.tile.behavior.splits && path.state.only_specular_before;

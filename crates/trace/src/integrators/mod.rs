@@ -36,7 +36,7 @@ use crate::film::{NegativeLobes, Pixels, TileSamples};
 use crate::math::Vec3;
 use crate::world::{PACKET_SIZE, World};
 use behavior::PathBehavior;
-pub use behavior::receivers;
+pub use behavior::light_sampling_mode;
 pub use counters::RayCounters;
 use memory::ThreadMemory;
 pub use photons::{Photon, PhotonMap, PhotonMaps, PhotonPass, Photons};
@@ -83,7 +83,7 @@ pub fn render_tile_with_photons(
     let mut counters = RayCounters::default();
     // Prepare the context shared by all rays.
     let settings = &settings.effective();
-    let photons = photons.filter(|_| settings.gathers());
+    let photons = photons.filter(|_| settings.gathers_photons());
     let behavior = PathBehavior::of(settings, photons.is_some());
     let tile = TileContext::new(world, settings, &block, token, behavior);
     let clamp =
@@ -97,11 +97,11 @@ pub fn render_tile_with_photons(
         match settings.view.source() {
             AovSource::FirstHit(number) => {
                 tile.camera_rays(slots, &mut memory.scratch.rays, negative);
-                aov::shade((&tile, photons), number, &mut memory.scratch, &mut radiance, &mut counters)?;
+                aov::shade_aov((&tile, photons), number, &mut memory.scratch, &mut radiance, &mut counters)?;
             }
             shown @ (AovSource::Light(_) | AovSource::Film(_) | AovSource::Bounds) => {
                 let accumulator = Accumulator { aov: shown.aov(), radiance: &mut radiance, clamp };
-                camera_paths::trace(
+                camera_paths::trace_camera_paths(
                     (&tile, photons),
                     slots.clone(),
                     &mut memory,
@@ -111,7 +111,7 @@ pub fn render_tile_with_photons(
                 )?;
                 if shown == AovSource::Bounds {
                     tile.camera_rays(slots, &mut memory.scratch.rays, |_, _| {});
-                    bounds::draw(&tile, &mut memory.scratch, &mut radiance)?;
+                    bounds::draw_box_edges(&tile, &mut memory.scratch, &mut radiance)?;
                 }
             }
         }

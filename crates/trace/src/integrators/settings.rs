@@ -44,7 +44,7 @@ impl RenderSettings {
     /// Whether images with these settings show any light from photons. Light from photons has scattered at
     /// least twice: at the mirror or glass that the photon hit, and at the point where the photon is
     /// gathered.
-    pub fn gathers(&self) -> bool {
+    pub fn gathers_photons(&self) -> bool {
         let shows = match self.view.source() {
             AovSource::FirstHit(number) => number == FirstHit::Photons,
             AovSource::Light(LightAov::LitFraction) => false,
@@ -62,7 +62,7 @@ impl RenderSettings {
             AovSource::FirstHit(FirstHit::Normal) => TextureNeeds { normals: true, ..TextureNeeds::NONE },
             AovSource::FirstHit(FirstHit::Albedo) => TextureNeeds { diffuse: true, ..TextureNeeds::NONE },
             // Photons may be scattered by any surface.
-            AovSource::FirstHit(FirstHit::Photons) if self.gathers() => TextureNeeds::ALL,
+            AovSource::FirstHit(FirstHit::Photons) if self.gathers_photons() => TextureNeeds::ALL,
             AovSource::FirstHit(
                 FirstHit::Depth | FirstHit::Barycentric | FirstHit::Uv | FirstHit::Photons,
             ) => TextureNeeds::NONE,
@@ -82,8 +82,8 @@ impl RenderSettings {
         }
     }
 
-    /// Converts a position in pixels relative to the image's top left corner to camera units: half image
-    /// heights to the right of the center and above it.
+    /// Converts a position in pixels, measured from the image's top left corner, to camera units: the offsets
+    /// right of and above the image center, in units of half the image height.
     #[inline(always)]
     pub fn pixel_to_camera(&self, from_corner: DVec2) -> DVec2 {
         let Render { width, height, .. } = self.render;

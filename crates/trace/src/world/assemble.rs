@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::null_interaction::SeeThrough;
+use super::null_interaction::SeeThroughObjects;
 use super::packet_material::PacketMaterial;
 use super::{Camera, Geometry, GlassSolids, ObjectMaterial, World, WorldInputs, lower};
 use crate::assets::LoadedMesh;
@@ -40,7 +40,7 @@ impl World {
             enclosing_glass: Box::default(),
             camera_solids: Vec::new(),
             has_second_uvs: has_second_uvs(scene, inputs),
-            colored: colored(scene),
+            colored: uses_vertex_colors(scene),
             see_through: None,
         };
         Self {
@@ -48,7 +48,7 @@ impl World {
             lens_glass: world.find_lens_glass(),
             enclosing_glass: world.find_enclosing_glass(),
             camera_solids: world.find_camera_solids(),
-            see_through: SeeThrough::of(&world).map(Box::new),
+            see_through: SeeThroughObjects::of(&world).map(Box::new),
             ..world
         }
     }
@@ -67,7 +67,7 @@ fn find_solids(scene: &Scene, inputs: &WorldInputs) -> GlassSolids {
 }
 
 /// Whether each object's vertex colors are used. `None` if they are not used for any object.
-fn colored(scene: &Scene) -> Option<Box<[bool]>> {
+fn uses_vertex_colors(scene: &Scene) -> Option<Box<[bool]>> {
     let is_colored =
         |object: &description::Object| object.shape.mesh().is_some_and(|mesh| mesh.vertex_colors);
     let all: Box<[bool]> = scene.objects.iter().map(is_colored).collect();

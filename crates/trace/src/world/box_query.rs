@@ -8,7 +8,8 @@ impl Geometry {
     /// all objects were visited.
     pub fn visit_box(&self, bounds: &Aabb, mut visit: impl FnMut(u32, &Object) -> bool) -> bool {
         let mut goes_on = self.unbounded().iter().all(|&id| visit(id, &self.objects()[id as usize]));
-        self.tree().meeting(bounds, |id| goes_on = goes_on && visit(id, &self.objects()[id as usize]));
+        self.tree()
+            .visit_overlapping(bounds, |id| goes_on = goes_on && visit(id, &self.objects()[id as usize]));
         goes_on
     }
 }
@@ -18,6 +19,6 @@ impl MeshInstance {
     /// triangles may also be visited, and triangles may be visited more than once. Returns whether all
     /// triangles were visited.
     pub fn visit_box(&self, bounds: &Aabb, visit: impl FnMut(u32) -> bool) -> bool {
-        self.tree.triangles().meeting_while(&self.local_box(bounds), visit)
+        self.tree.triangles().visit_overlapping_while(&self.local_box(bounds), visit)
     }
 }

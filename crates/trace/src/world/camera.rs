@@ -65,8 +65,8 @@ impl Camera {
     }
 
     /// Returns the camera as position, target and up vector. An orbiter camera is rounded to short decimals,
-    /// precise enough to render the same view. Its target is the point on the view axis at the same distance
-    /// as its center.
+    /// precise enough to render the same view. Its target is the point on the view axis at the distance of
+    /// the orbiter's center.
     pub fn viewpoint(camera: &description::Camera, orbiter: Option<&OrbiterCamera>) -> Viewpoint {
         match camera {
             description::Camera::LookAt { position, look_at, up, fov, aperture, focus } => Viewpoint {

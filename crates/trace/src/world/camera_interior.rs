@@ -71,20 +71,20 @@ impl World {
         near.filter_map(|body| Some((body.body, self.material_around(&body, eye, None)?))).collect()
     }
 
-    /// Closed glass solids that are not a single closed shape.
+    /// Closed glass solids that consist of meshes or several objects.
     pub fn compound_solids(&self) -> Vec<CompoundSolid> {
         if !self.has_glass {
             return Vec::new();
         }
         let covered = self.glass_solids.open().iter().filter(|open| open.is_covered);
-        let covered: BTreeSet<u32> = covered.map(|open| self.body(open.object)).collect();
+        let covered: BTreeSet<u32> = covered.map(|open| self.solid_id(open.object)).collect();
         let mut solids: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
         for object in 0..self.geometry.objects().len() as u32 {
             let may_be_glass = match self.object_materials[object as usize] {
                 ObjectMaterial::One(material) => self.is_glass(material),
                 ObjectMaterial::OfFile { .. } => true,
             };
-            let body = self.body(object);
+            let body = self.solid_id(object);
             if may_be_glass && !self.is_closed(object) && !self.is_open(body) {
                 solids.entry(body).or_default().push(object);
             }
@@ -135,7 +135,7 @@ impl World {
             }
             let bare = SurfaceRequest { uv: false, shadow_point: false };
             let surface = self.geometry.requested_surface(&ray, &hit, bare);
-            if self.is_glass(material) && self.body(hit.object) == body.body {
+            if self.is_glass(material) && self.solid_id(hit.object) == body.body {
                 let is_back = surface.normal.dot(ray.direction) > 0.0;
                 return Some((is_back != self.glass_solids.is_inside_out(hit.object), material));
             }

@@ -7,9 +7,9 @@
 
 use arrayvec::ArrayVec;
 
-use super::isolated::meets;
+use super::isolated::triangle_meets_box;
 use super::{Geometry, Hit, MeshInstance, Object, World};
-use crate::accel::Met;
+use crate::accel::OverlappingItem;
 use crate::geometry::ray::offset_origin;
 use crate::geometry::{Aabb, Ray, Shape, ShapeHit, SurfacePoint, SurfaceRequest};
 use crate::math::{DVec3, Vec3};
@@ -18,7 +18,7 @@ use crate::math::{DVec3, Vec3};
 pub const MAX_INTERIORS: usize = 4;
 
 /// The last closed glass shapes of a subtree, in descending order. Other shapes of the subtree that enclose
-/// the same point have no effect there.
+/// the same point have no effect at this point.
 pub(super) type EnclosingGlass = ArrayVec<u32, MAX_INTERIORS>;
 
 /// Two points, one on either side of coincident surfaces.
@@ -99,7 +99,7 @@ impl World {
     /// Finds all coincident surfaces at a hit and one point on either side of them. `visit` is called in an
     /// order that depends only on the scene.
     #[inline]
-    pub fn contact(
+    pub fn find_contact(
         &self,
         at: &ContactQuery<'_>,
         memory: &mut ContactScratch,
@@ -145,8 +145,8 @@ impl World {
         }
     }
 
-    /// Computes the offset points and visits the coincident surfaces among the candidates in `memory`, whose error is at most
-    /// `error`.
+    /// Computes the offset points and visits the coincident surfaces among the candidates in `memory`, whose
+    /// error is at most `error`.
     pub(super) fn classify_candidates(
         &self,
         at: &ContactQuery<'_>,
@@ -215,8 +215,8 @@ impl World {
     }
 
     /// The object that represents the glass solid of `object`: the solid's last object in file order.
-    pub fn body(&self, object: u32) -> u32 {
-        self.glass_solids.place(object)
+    pub fn solid_id(&self, object: u32) -> u32 {
+        self.glass_solids.solid_id(object)
     }
 
     /// Whether any glass solid is open. It may then be unknown whether a ray is inside.
@@ -257,7 +257,7 @@ impl World {
             let material = self.material_index(&Hit { shape: ShapeHit::at(0.0), object: id }) as u32;
             self.is_closed(id) && self.is_glass(material)
         };
-        self.geometry.tree().last_of_subtrees(is_glass).into()
+        self.geometry.tree().last_primitives_of_subtrees(is_glass).into()
     }
 
     /// Whether an object is a closed shape that contains a point.
@@ -310,18 +310,20 @@ impl Geometry {
         let point = at.surface.point;
         let near = Aabb { min: point, max: point }.grown(self.margin(at));
         objects.extend(self.unbounded());
-        self.tree().meeting_surfaces(&near, |met| {
+        self.tree().visit_overlapping_surfaces(&near, |met| {
             match met {
-                Met::Primitive(id) => objects.push(id),
-                Met::Enclosing(subtree) => objects.extend(enclosing.get(subtree).into_iter().flatten()),
+                OverlappingItem::Primitive(id) => objects.push(id),
+                OverlappingItem::Enclosing(subtree) => {
+                    objects.extend(enclosing.get(subtree).into_iter().flatten());
+                }
             }
             true
         });
         let mut error = at.surface.error;
         for &id in &*objects {
             let Object::Mesh(mesh) = &self.objects()[id as usize] else { continue };
-            mesh.tree.triangles().meeting(&mesh.local_box(&near), |triangle| {
-                if meets(mesh.world_corners(triangle), &near) {
+            mesh.tree.triangles().visit_overlapping(&mesh.local_box(&near), |triangle| {
+                if triangle_meets_box(mesh.world_corners(triangle), &near) {
                     triangles.push((id, triangle));
                     error = error.max(mesh.touch_error(triangle, point));
                 }
@@ -349,17 +351,17 @@ impl MeshInstance {
         let corners = self.tree.loaded().mesh.corners(triangle).map(|corner| corner.as_dvec3());
         let reach = corners.iter().fold(DVec3::ZERO, |reach, corner| reach.max(corner.abs()));
         let local = self.transform.inverse_point(point.as_dvec3());
-        let of_tests = self.placed(&self.transform).error(point, local, corners);
-        of_tests + self.transform.reach(reach).as_vec3() * f32::EPSILON
+        let of_tests = self.with_placement(&self.transform).error(point, local, corners);
+        of_tests + self.transform.abs_bound(reach).as_vec3() * f32::EPSILON
     }
 
     /// Upper bound on the error of any triangle in the mesh.
-    pub(super) fn rounding(&self) -> f32 {
+    pub(super) fn max_rounding_error(&self) -> f32 {
         let local = self.tree.bounds();
         if local.is_empty() {
             return 0.0;
         }
-        let reach = self.transform.reach(local.min.abs().max(local.max.abs()).as_dvec3());
+        let reach = self.transform.abs_bound(local.min.abs().max(local.max.abs()).as_dvec3());
         (reach + self.transform.translation.abs()).max_element() as f32 * (16.0 * f32::EPSILON)
     }
 

@@ -32,7 +32,7 @@ const MAX_PAIRS: usize = 1 << 26;
 
 /// A light that overlaps a coplanar surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Coplanar {
+pub struct CoplanarLight {
     /// The emitting object.
     pub light: usize,
     /// The other object, which is the same object if both faces belong to one mesh.
@@ -43,7 +43,7 @@ pub struct Coplanar {
 
 /// A flat, convex part of an object.
 #[derive(Clone, Debug)]
-struct Face {
+struct FlatFace {
     object: usize,
     /// Corners in counterclockwise order as seen from the front. Empty for an infinite plane.
     corners: Vec<DVec3>,
@@ -53,7 +53,7 @@ struct Face {
     emits: Option<EmissionSides>,
 }
 
-impl Face {
+impl FlatFace {
     fn new(corners: Vec<DVec3>) -> Option<Self> {
         let [a, b, c] = *corners.first_chunk()?;
         let normal = (b - a).cross(c - a).try_normalize()?;
@@ -82,8 +82,8 @@ impl Face {
 }
 
 /// Emissive faces, sorted by minimum x.
-struct Lights {
-    faces: Vec<Face>,
+struct EmissiveFaces {
+    faces: Vec<FlatFace>,
     bounds: Vec<[DVec3; 2]>,
     /// Maximum extent along x, plus a margin.
     widest: f64,
@@ -91,12 +91,12 @@ struct Lights {
     region: [DVec3; 2],
 }
 
-impl Lights {
+impl EmissiveFaces {
     /// Sorts the faces. `None` if there are no faces.
-    fn new(mut faces: Vec<Face>) -> Option<Self> {
-        let least_x = |face: &Face| face.bounds().map_or(f64::NEG_INFINITY, |[least, _]| least.x);
+    fn new(mut faces: Vec<FlatFace>) -> Option<Self> {
+        let least_x = |face: &FlatFace| face.bounds().map_or(f64::NEG_INFINITY, |[least, _]| least.x);
         faces.sort_by(|a, b| least_x(a).total_cmp(&least_x(b)));
-        let bounds: Vec<[DVec3; 2]> = faces.iter().filter_map(Face::bounds).collect();
+        let bounds: Vec<[DVec3; 2]> = faces.iter().filter_map(FlatFace::bounds).collect();
         let joined = |a: [DVec3; 2], b: &[DVec3; 2]| [a[0].min(b[0]), a[1].max(b[1])];
         let [least, greatest] = bounds.iter().fold(*bounds.first()?, joined);
         let margin = (greatest - least).max_element() * COINCIDENT;
@@ -106,12 +106,12 @@ impl Lights {
 
     /// Whether there cannot be any lights near a box.
     fn are_apart_from(&self, bounds: [DVec3; 2]) -> bool {
-        are_apart(bounds, self.region)
+        are_boxes_apart(bounds, self.region)
     }
 
-    /// Returns the lights whose bounding boxes touch a face's bounding box. Adds the number of lights
-    /// compared to `pairs`.
-    fn near<'a>(&'a self, face: &Face, pairs: &mut usize) -> impl Iterator<Item = &'a Face> {
+    /// Returns the lights whose bounding boxes touch a face's bounding box. Increases `pairs` by the number
+    /// of compared lights.
+    fn near<'a>(&'a self, face: &FlatFace, pairs: &mut usize) -> impl Iterator<Item = &'a FlatFace> {
         let [least, greatest] = face.bounds().unwrap_or(self.region);
         let margin = (self.region[1] - self.region[0]).max_element() * COINCIDENT;
         let bounds = [least - margin, greatest + margin];
@@ -119,22 +119,24 @@ impl Lights {
         let end = self.bounds.partition_point(|light| light[0].x <= bounds[1].x);
         *pairs += end - start;
         let range = start..end;
-        range.filter(move |index| !are_apart(self.bounds[*index], bounds)).map(|index| &self.faces[index])
+        range
+            .filter(move |index| !are_boxes_apart(self.bounds[*index], bounds))
+            .map(|index| &self.faces[index])
     }
 }
 
 /// Finds lights that overlap a coplanar surface. Coordinates are relative to `origin`. `meshes` contains the
 /// scene's loaded mesh files.
-pub fn coplanar_lights(scene: &Scene, meshes: &[&LoadedMesh], origin: DVec3) -> Vec<Coplanar> {
+pub fn coplanar_lights(scene: &Scene, meshes: &[&LoadedMesh], origin: DVec3) -> Vec<CoplanarLight> {
     let mut faces = Vec::new();
     for object in (0..scene.objects.len()).filter(|object| may_emit(scene, meshes, *object)) {
-        each_face(scene, meshes, (object, origin), None, |face| {
+        each_flat_face(scene, meshes, (object, origin), None, |face| {
             if face.emits.is_some() && !face.corners.is_empty() {
                 faces.push(face.clone());
             }
         });
     }
-    let Some(lights) = Lights::new(faces) else { return Vec::new() };
+    let Some(lights) = EmissiveFaces::new(faces) else { return Vec::new() };
     let mut found = BTreeMap::new();
     let mut pairs = 0;
     // Lights that touch glass are not moved because the handling of coincident glass surfaces resolves this
@@ -143,13 +145,13 @@ pub fn coplanar_lights(scene: &Scene, meshes: &[&LoadedMesh], origin: DVec3) -> 
         scene.objects[*object].material.is_some_and(|own| scene.materials[own].kind.is_glass())
     };
     for object in (0..scene.objects.len()).filter(|object| !is_glass(object)) {
-        each_face(scene, meshes, (object, origin), Some(&lights), |face| {
+        each_flat_face(scene, meshes, (object, origin), Some(&lights), |face| {
             if pairs > MAX_PAIRS {
                 return;
             }
             for light in lights.near(face, &mut pairs) {
-                if is_lifted(light, face) && coincide(light, face) {
-                    add(&mut found, light, face);
+                if must_lift(light, face) && are_coplanar_and_overlap(light, face) {
+                    add_coplanar_pair(&mut found, light, face);
                 }
             }
         });
@@ -158,11 +160,11 @@ pub fn coplanar_lights(scene: &Scene, meshes: &[&LoadedMesh], origin: DVec3) -> 
 }
 
 /// Whether two boxes, given as minimum and maximum corners, are disjoint.
-fn are_apart(a: [DVec3; 2], b: [DVec3; 2]) -> bool {
+fn are_boxes_apart(a: [DVec3; 2], b: [DVec3; 2]) -> bool {
     a[0].cmpgt(b[1]).any() || a[1].cmplt(b[0]).any()
 }
 
-/// Translation of each object that moves lights off coplanar surfaces. Empty if no lights need to be moved.
+/// Translation of each object, which moves lights off coplanar surfaces. Empty if no lights need to be moved.
 pub fn light_lifts(scene: &Scene, meshes: &[Arc<MeshTree>], origin: DVec3) -> Vec<DVec3> {
     let loaded: Vec<_> = meshes.iter().map(|mesh| mesh.loaded()).collect();
     let found = coplanar_lights(scene, &loaded, origin);
@@ -171,7 +173,7 @@ pub fn light_lifts(scene: &Scene, meshes: &[Arc<MeshTree>], origin: DVec3) -> Ve
     }
     let mut lifts = vec![DVec3::ZERO; scene.objects.len()];
     let mut directions: Vec<(usize, DVec3)> = Vec::new();
-    for Coplanar { light, lift, .. } in found.into_iter().filter(|pair| pair.light != pair.surface) {
+    for CoplanarLight { light, lift, .. } in found.into_iter().filter(|pair| pair.light != pair.surface) {
         // Lift a light only once if it is coplanar with several surfaces.
         let direction = lift.normalize_or_zero();
         directions.retain(|(other, _)| *other == light);
@@ -197,21 +199,21 @@ pub fn with_lifted_lights(loaded: &LoadedMesh) -> Option<LoadedMesh> {
     }
     // Find the triangles to lift.
     let face = |triangle: u32| {
-        let face = Face::new(mesh.corners(triangle).map(|corner| corner.as_dvec3()).to_vec())?;
-        Some(Face { object: triangle as usize, ..face })
+        let face = FlatFace::new(mesh.corners(triangle).map(|corner| corner.as_dvec3()).to_vec())?;
+        Some(FlatFace { object: triangle as usize, ..face })
     };
     let all = 0..mesh.triangles.len() as u32;
-    let lights = Lights::new(all.clone().filter(|id| emits(*id)).filter_map(face).collect())?;
+    let lights = EmissiveFaces::new(all.clone().filter(|id| emits(*id)).filter_map(face).collect())?;
     let (mut found, mut pairs) = (BTreeMap::new(), 0);
     for other in all.filter(|id| !emits(*id)).filter_map(face) {
         if pairs > MAX_PAIRS {
             break;
         }
-        let near = lights.near(&other, &mut pairs).filter(|light| coincide(light, &other));
+        let near = lights.near(&other, &mut pairs).filter(|light| are_coplanar_and_overlap(light, &other));
         found.extend(near.map(|light| (light.object, light.normal)));
     }
     let greatest =
-        |face: &Face| face.corners.iter().fold(face.size(), |most, at| most.max(at.abs().max_element()));
+        |face: &FlatFace| face.corners.iter().fold(face.size(), |most, at| most.max(at.abs().max_element()));
     let height = LIFT * lights.faces.iter().map(greatest).fold(0.0, f64::max);
     // Give the lifted triangles separate vertices.
     let mut lifted = loaded.clone();
@@ -243,8 +245,13 @@ fn copy_vertex(mesh: &mut TriangleMesh, vertex: usize, at: Vec3) -> u32 {
     (mesh.positions.len() - 1) as u32
 }
 
-/// Adds a pair of objects, or updates the pair's lift in this direction to the maximum over all faces.
-fn add(found: &mut BTreeMap<(usize, usize), Vec<Coplanar>>, light: &Face, face: &Face) {
+/// Adds a light and the surface that it overlaps. If the pair exists, updates its lift in this direction to
+/// the maximum over all faces.
+fn add_coplanar_pair(
+    found: &mut BTreeMap<(usize, usize), Vec<CoplanarLight>>,
+    light: &FlatFace,
+    face: &FlatFace,
+) {
     let size = light.size();
     let around = face.size().max(light.point.abs().max_element()).min(SURROUNDINGS * size);
     let lift = light.normal * (LIFT * size.max(around));
@@ -252,18 +259,18 @@ fn add(found: &mut BTreeMap<(usize, usize), Vec<Coplanar>>, light: &Face, face: 
     match of_pair.iter_mut().find(|known| known.lift.dot(lift) > 0.0) {
         Some(known) if known.lift.length_squared() < lift.length_squared() => known.lift = lift,
         Some(_) => {}
-        None => of_pair.push(Coplanar { light: light.object, surface: face.object, lift }),
+        None => of_pair.push(CoplanarLight { light: light.object, surface: face.object, lift }),
     }
 }
 
 /// Whether to lift the light off the face along the light's normal. This hides the back of a two-sided light.
 /// The light is not lifted if the face also emits on that side.
-fn is_lifted(light: &Face, face: &Face) -> bool {
+fn must_lift(light: &FlatFace, face: &FlatFace) -> bool {
     !face.emits_along(light.normal)
 }
 
 /// Whether two faces are coplanar and overlap.
-fn coincide(light: &Face, face: &Face) -> bool {
+fn are_coplanar_and_overlap(light: &FlatFace, face: &FlatFace) -> bool {
     let apart = light.size().min(face.size()) * COINCIDENT;
     let is_on_plane = |corner: &DVec3| (*corner - face.point).dot(face.normal).abs() <= apart;
     let sine = light.normal.cross(face.normal).length_squared();
@@ -271,7 +278,7 @@ fn coincide(light: &Face, face: &Face) -> bool {
         return false;
     }
     // Convex polygons overlap if no edge separates them.
-    let is_separated = |a: &Face, b: &Face| {
+    let is_separated = |a: &FlatFace, b: &FlatFace| {
         (0..a.corners.len()).any(|index| {
             let corner = a.corners[index];
             let edge = a.corners[(index + 1) % a.corners.len()] - corner;
@@ -293,23 +300,23 @@ fn may_emit(scene: &Scene, meshes: &[&LoadedMesh], object: usize) -> bool {
 }
 
 /// Visits an object's flat faces. If `near` is given, skips mesh faces that are not near these lights.
-fn each_face(
+fn each_flat_face(
     scene: &Scene,
     meshes: &[&LoadedMesh],
     (number, origin): (usize, DVec3),
-    near: Option<&Lights>,
-    mut visit: impl FnMut(&Face),
+    near: Option<&EmissiveFaces>,
+    mut visit: impl FnMut(&FlatFace),
 ) {
     let object = &scene.objects[number];
     let material = object.material.map(|index| &scene.materials[index]);
     let emits = material.filter(|material| material.emits()).map(|material| material.emission.sides);
-    let mut visit = |face: Option<Face>, emits: Option<EmissionSides>| {
+    let mut visit = |face: Option<FlatFace>, emits: Option<EmissionSides>| {
         if let Some(mut face) = face {
             (face.object, face.emits) = (number, emits);
             visit(&face);
         }
     };
-    let polygon = |corners: Vec<DVec3>| Face::new(corners.into_iter().map(|at| at - origin).collect());
+    let polygon = |corners: Vec<DVec3>| FlatFace::new(corners.into_iter().map(|at| at - origin).collect());
     match object.shape {
         Shape::Quad { corner, u, v } => {
             visit(polygon(vec![corner, corner + u, corner + u + v, corner + v]), emits);
@@ -336,7 +343,7 @@ fn each_face(
         }
         Shape::Plane { point, normal } => {
             let normal = normal.normalize_or_zero();
-            let face = Face { object: number, corners: Vec::new(), point: point - origin, normal, emits };
+            let face = FlatFace { object: number, corners: Vec::new(), point: point - origin, normal, emits };
             visit(Some(face), emits);
         }
         Shape::Mesh(ref mesh) => {

@@ -97,10 +97,10 @@ fn lights_are_compared_only_with_nearby_faces() {
     let light = |x: usize| {
         let corners = [(0.0, 0.0), (0.5, 0.0), (0.5, -0.5), (0.0, -0.5)];
         let corners = corners.map(|(dx, z)| DVec3::new(x as f64 + dx, 0.0, z));
-        Face { emits: Some(EmissionSides::Front), ..Face::new(corners.to_vec()).expect("a face") }
+        FlatFace { emits: Some(EmissionSides::Front), ..FlatFace::new(corners.to_vec()).expect("a face") }
     };
-    let all: Vec<Face> = (0..2000).rev().map(light).collect();
-    let lights = Lights::new(all.clone()).expect("lights");
+    let all: Vec<FlatFace> = (0..2000).rev().map(light).collect();
+    let lights = EmissiveFaces::new(all.clone()).expect("lights");
     let mut pairs = 0;
     for face in &all {
         let near: Vec<f64> = lights.near(face, &mut pairs).map(|light| light.point.x).collect();

@@ -21,7 +21,7 @@ use crate::math::{DVec3, Vec3};
 use crate::scene::description::{self, Scene};
 
 /// Sampling tables of the environment map. `None` if the image is black.
-pub fn sky(texels: &Arc<Texels>) -> Option<Arc<EnvironmentMap>> {
+pub fn sky_map(texels: &Arc<Texels>) -> Option<Arc<EnvironmentMap>> {
     EnvironmentMap::new(Arc::clone(texels)).map(Arc::new)
 }
 
@@ -38,7 +38,7 @@ pub fn lights(
     sky: Option<Arc<EnvironmentMap>>,
     token: &CancelToken,
 ) -> Result<Arc<Lights>, Cancelled> {
-    let points = scene.lights.iter().filter(|light| light.sends());
+    let points = scene.lights.iter().filter(|light| light.has_emission());
     let points = points.map(|light| delta_or_directional_light(light, geometry.origin()));
     let objects = (0_u32..).zip(geometry.objects()).zip(&scene.objects);
     let emissive = scene.materials.iter().map(|material| {
@@ -76,7 +76,7 @@ fn environment_light(
     environment: &description::Environment,
     sky: Option<Arc<EnvironmentMap>>,
 ) -> Option<Environment> {
-    if !environment.sends() {
+    if !environment.has_emission() {
         return None;
     }
     let description::Environment { color, file, rotate } = environment;
@@ -146,10 +146,10 @@ impl EmissiveMaterial {
     }
 
     /// Scales light bounds by the mean of the emission and opacity textures.
-    fn mean_of(&self, bounds: LightBounds) -> LightBounds {
+    fn scaled_by_mean(&self, bounds: LightBounds) -> LightBounds {
         let texture = self.emission.texture.as_ref();
-        let bounds = texture.map_or(bounds, |texture| bounds.times(texture.mean()));
-        self.opacity.as_ref().map_or(bounds, |opacity| bounds.times(Vec3::splat(opacity.mean())))
+        let bounds = texture.map_or(bounds, |texture| bounds.scaled_by(texture.mean()));
+        self.opacity.as_ref().map_or(bounds, |opacity| bounds.scaled_by(Vec3::splat(opacity.mean())))
     }
 
     /// Factor that varies with position or direction. `chart` maps points on the emitter to UVs.
@@ -173,7 +173,7 @@ fn shape_lights(shape: &Shape, emissive: &EmissiveMaterial, object: u32) -> impl
             (false, Side::Front) => area_light(shape, radiance, object)?,
             (false, Side::Back) => back_light(shape, radiance, object)?,
         };
-        let light = AreaLight { bounds: emissive.mean_of(light.bounds), ..light };
+        let light = AreaLight { bounds: emissive.scaled_by_mean(light.bounds), ..light };
         Some(match emissive.texture(UvChart::Shape(*shape)) {
             Some(texture) => light.with_texture(texture),
             None => light,
@@ -209,10 +209,10 @@ fn mesh_lights(
                 (corners, Side::Front) => corners,
                 ([a, b, c], Side::Back) => [a, c, b],
             };
-            let triangles = distinct(mesh, own).map(|id| (corners(id), id)).collect();
+            let triangles = distinct_triangles(mesh, own).map(|id| (corners(id), id)).collect();
             let Some(emitter) = MeshEmitter::new(triangles, token)? else { return Ok(None) };
             let radiance = emissive.emission.scale;
-            let bounds = emissive.mean_of(emitter.bounds().times(radiance));
+            let bounds = emissive.scaled_by_mean(emitter.bounds().scaled_by(radiance));
             let patches = || {
                 let patch = |id| UvTriangle {
                     primitive: id,
@@ -241,7 +241,7 @@ fn triangles_of(mesh: &MeshInstance, own: Option<u32>) -> impl Iterator<Item = u
 
 /// Like [`triangles_of`], without duplicates, so that a repeated face in a file emits only once. Duplicates
 /// have the same corners in the same order.
-fn distinct(mesh: &MeshInstance, own: Option<u32>) -> impl Iterator<Item = u32> {
+fn distinct_triangles(mesh: &MeshInstance, own: Option<u32>) -> impl Iterator<Item = u32> {
     let mut known = HashSet::new();
     triangles_of(mesh, own).filter(move |id| {
         // Adding 0 converts −0 to 0.
@@ -259,7 +259,7 @@ mod tests {
     use crate::assets::LoadedMesh;
     use crate::control::CancelToken;
     use crate::geometry::mesh::TriangleMesh;
-    use crate::lights::{PhotonNumbers, PhotonOrigin};
+    use crate::lights::{PhotonOrigin, PhotonRandomNumbers};
     use crate::math::transform::Transform;
     use crate::math::{Vec3, random};
     use crate::scene::description::Accel;
@@ -293,7 +293,8 @@ mod tests {
             let mut next = random::unit(1);
             for _ in 0..20_000 {
                 let mut pair = || [next(), next()];
-                let u = PhotonNumbers { light: pair(), aim: pair(), position: pair(), direction: pair() };
+                let u =
+                    PhotonRandomNumbers { light: pair(), aim: pair(), position: pair(), direction: pair() };
                 let photon = source.emit(&u).expect("a photon");
                 assert!(matches!(photon.start, PhotonOrigin::Surface { .. }));
                 assert_eq!(geometry.closest(&photon.ray()), None, "{scale} {at}: {photon:?}");

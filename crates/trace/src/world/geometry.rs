@@ -8,7 +8,7 @@ use crate::geometry::{Aabb, Ray, Shape, ShapeHit, SurfacePoint, SurfaceRequest};
 use crate::lights::LightObject;
 use crate::math::color::srgb8_to_linear;
 use crate::math::{DVec3, Vec2, Vec3};
-use crate::scene::description::{self, Lowered, Scene};
+use crate::scene::description::{self, LoweredShape, Scene};
 
 use super::coplanar::light_lifts;
 use super::isolated::IsolationCache;
@@ -65,14 +65,14 @@ impl Geometry {
         origin: DVec3,
         token: &CancelToken,
     ) -> Result<Self, Cancelled> {
-        Self::lifted(scene, meshes, (origin, light_lifts(scene, meshes, origin)), token)
+        Self::with_lifts(scene, meshes, (origin, light_lifts(scene, meshes, origin)), token)
     }
 
     /// Like [`Self::of_scene`], with translations from [`light_lifts`].
     ///
     /// # Errors
     /// [`Cancelled`].
-    pub fn lifted(
+    pub fn with_lifts(
         scene: &Scene,
         meshes: &[Arc<MeshTree>],
         (origin, lifts): (DVec3, Vec<DVec3>),
@@ -111,7 +111,7 @@ impl Geometry {
             Ok(MergedTree { over: Bvh::build(&with_all, token)?.with_shells(shell), meshes })
         });
         let merged = merged.transpose()?;
-        let rounding = objects.iter().filter_map(Object::mesh).map(MeshInstance::rounding);
+        let rounding = objects.iter().filter_map(Object::mesh).map(MeshInstance::max_rounding_error);
         let mesh_rounding = rounding.fold(0.0, f32::max);
         let origin = DVec3::ZERO;
         let isolated = IsolationCache::new(&boxes);
@@ -145,11 +145,11 @@ impl Geometry {
 
     /// Top-level tree used for tracing. It contains the unmerged objects by id, followed by one object for
     /// all merged meshes.
-    pub(super) fn visited(&self) -> &Bvh {
+    pub(super) fn traced_tree(&self) -> &Bvh {
         self.merged.as_ref().map_or(&self.tree, |merged| &merged.over)
     }
 
-    /// Returns the merged meshes if they are represented by `id`, an id from [`Geometry::visited`], and
+    /// Returns the merged meshes if they are represented by `id`, an id from [`Geometry::traced_tree`], and
     /// `None` if it is an object.
     #[inline(always)]
     pub(super) fn merged(&self, id: u32) -> Option<&MergedMeshes> {
@@ -199,7 +199,7 @@ impl Geometry {
     }
 
     /// Cache of isolated surface regions.
-    pub(super) fn isolated(&self) -> &IsolationCache {
+    pub(super) fn isolation_cache(&self) -> &IsolationCache {
         &self.isolated
     }
 
@@ -217,7 +217,7 @@ impl Geometry {
 
     /// Returns the nearest hit. At equal distances, the lowest object id wins.
     pub fn closest(&self, ray: &Ray) -> Option<Hit> {
-        self.closest_in(self.visited(), ray, |id, segment| match self.merged(id) {
+        self.closest_in(self.traced_tree(), ray, |id, segment| match self.merged(id) {
             Some(merged) => {
                 let shape = merged.closest(segment)?;
                 let MergedTriangle { object, primitive } = merged.triangle(shape.primitive);
@@ -285,7 +285,7 @@ impl Geometry {
         if self.is_whole_merged(source) {
             return self.unbounded.iter().any(|&id| of_object(id)) || self.tree.any(ray, of_object);
         }
-        self.unbounded.iter().any(|&id| test(id)) || self.visited().any(ray, test)
+        self.unbounded.iter().any(|&id| test(id)) || self.traced_tree().any(ray, test)
     }
 
     /// Scene-wide number of the hit triangle, for [`Ray::start`]. [`Ray::NO_TRIANGLE`] for other shapes.
@@ -388,8 +388,8 @@ fn lowered(
     token: &CancelToken,
 ) -> Result<Object, Cancelled> {
     let mesh = match shape.lowered(origin) {
-        Lowered::Shape(shape) => return Ok(Object::Shape(shape)),
-        Lowered::Mesh(mesh) => mesh,
+        LoweredShape::Shape(shape) => return Ok(Object::Shape(shape)),
+        LoweredShape::Mesh(mesh) => mesh,
     };
     let tree = &meshes[mesh.file];
     let transform = mesh.placed.transform().between(tree.loaded().mesh.origin, origin);
@@ -447,7 +447,7 @@ mod tests {
             let surface = geometry.surface(&ray, &hit);
             let direction = vector(1.0).normalize();
             let origin = offset_origin(surface.point, surface.error, surface.normal, direction);
-            let leaving = Ray::new(origin, direction).leaving(geometry.triangle_number(&hit));
+            let leaving = Ray::new(origin, direction).with_start_triangle(geometry.triangle_number(&hit));
             let found = geometry.closest(&leaving);
             assert_eq!(found, geometry.closest(&Ray::new(origin, direction)), "{hit:?} {leaving:?}");
             started += 1;

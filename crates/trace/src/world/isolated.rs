@@ -3,13 +3,13 @@
 //!
 //! The state of each mesh triangle, and of each grid cell around a shape, is computed on first use and cached
 //! in one byte. The state depends only on the geometry, not on the order of rays. With the cache,
-//! [`World::contact`](super::World::contact) returns the same result as with a search.
+//! [`World::find_contact`](super::World::find_contact) returns the same result as with a search.
 
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU8, Ordering};
 
 use super::{Geometry, Hit, MeshInstance, Object};
-use crate::accel::Met;
+use crate::accel::OverlappingItem;
 use crate::geometry::{Aabb, Shape, SurfacePoint};
 use crate::math::{DVec3, Vec3};
 
@@ -30,7 +30,7 @@ const MAX_STATE: f64 = 64.0;
 /// of 30° or more are not considered near.
 const FROM_EDGES: f64 = 4.0;
 
-/// Minimum distance, in margins, of surfaces that are not considered near. Covers a box of one margin around
+/// Minimum distance, in margins, at which surfaces are not considered near. Covers a box of one margin around
 /// the point, with room for rounding.
 const MIN_SEPARATION: f64 = 1.9;
 
@@ -114,7 +114,7 @@ impl Geometry {
     /// hit triangle.
     pub(super) fn is_isolated(&self, hit: &Hit, surface: &SurfacePoint, margin: Vec3) -> bool {
         let object = &self.objects()[hit.object as usize];
-        let table = self.isolated().tables[hit.object as usize].get_or_init(|| self.table(object));
+        let table = self.isolation_cache().tables[hit.object as usize].get_or_init(|| self.table(object));
         if !(margin.max_element() <= table.margin) {
             return false;
         }
@@ -130,7 +130,7 @@ impl Geometry {
                 let find = || {
                     let all = shape.bounds().unwrap_or(Aabb::EMPTY);
                     let around = cell.bounds(&all).grown(Vec3::splat(table.margin));
-                    if self.is_clear(&around, &SurfaceRegion::GridCell(around), hit.object) {
+                    if self.has_no_neighbors(&around, &SurfaceRegion::GridCell(around), hit.object) {
                         1
                     } else {
                         NEVER
@@ -144,10 +144,10 @@ impl Geometry {
     /// Creates an object's table. The margin covers rays from up to four scene sizes away. Longer rays have
     /// larger margins and do not use the table.
     fn table(&self, object: &Object) -> IsolationTable {
-        let of_rays = self.mesh_rounding() + 8.0 * f32::EPSILON * self.isolated().reach;
+        let of_rays = self.mesh_rounding() + 8.0 * f32::EPSILON * self.isolation_cache().reach;
         match object {
             Object::Mesh(mesh) => {
-                let margin = of_rays.max(4.0 * mesh.rounding());
+                let margin = of_rays.max(4.0 * mesh.max_rounding_error());
                 IsolationTable::new(margin, [Vec3::ZERO; 2], mesh.tree.loaded().mesh.triangles.len())
             }
             Object::Shape(shape) => match shape.bounds() {
@@ -170,7 +170,8 @@ impl Geometry {
         let longest = a.distance_squared(b).max(b.distance_squared(c)).max(c.distance_squared(a)).sqrt();
         let height = (b - a).cross(c - a).length() / longest;
         let least = (f64::from(STATE_STEPS) * FROM_EDGES * f64::from(margin) / height).ceil().max(1.0);
-        // Points whose barycentric coordinates all exceed a bound form a smaller triangle with the same centroid.
+        // Points whose barycentric coordinates all exceed a bound form a smaller triangle with the same
+        // centroid.
         let smaller = |corners: [DVec3; 3], parts: f64| {
             let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
             corners.map(|corner| middle + (corner - middle) * (1.0 - 3.0 * parts / f64::from(STATE_STEPS)))
@@ -180,13 +181,13 @@ impl Geometry {
         // neighbor.
         for parts in [least, 4.0 * least].into_iter().filter(|&parts| parts <= MAX_STATE) {
             let inner = smaller(own_corners, parts);
-            if !is_clear_of_own(mesh, triangle, inner, apart * growth) {
+            if !is_apart_from_own_mesh(mesh, triangle, inner, apart * growth) {
                 continue;
             }
             let inner = smaller(corners, parts);
             let region = SurfaceRegion::Triangle { corners: inner, apart };
             let around = Aabb::around_f64(inner).grown(Vec3::splat(2.0 * margin));
-            if self.is_clear(&around, &region, object) {
+            if self.has_no_neighbors(&around, &region, object) {
                 return parts as u8;
             }
         }
@@ -194,12 +195,12 @@ impl Geometry {
     }
 
     /// Whether no other objects are near a region. Objects near the region must overlap `around`.
-    fn is_clear(&self, around: &Aabb, region: &SurfaceRegion, own: u32) -> bool {
+    fn has_no_neighbors(&self, around: &Aabb, region: &SurfaceRegion, own: u32) -> bool {
         let is_near = |id: u32| match &self.objects()[id as usize] {
             Object::Shape(shape) => shape_is_near(shape, around, region),
             Object::Mesh(mesh) => {
                 let is_far = |other: u32| !region.is_near(mesh.world_corners(other), around);
-                !mesh.tree.triangles().meeting_while(&mesh.local_box(around), is_far)
+                !mesh.tree.triangles().visit_overlapping_while(&mesh.local_box(around), is_far)
             }
         };
         let is_near = |id: u32| id != own && is_near(id);
@@ -207,10 +208,10 @@ impl Geometry {
             return false;
         }
         let mut is_clear = true;
-        self.tree().meeting_surfaces(around, |met| {
+        self.tree().visit_overlapping_surfaces(around, |met| {
             is_clear = match met {
-                Met::Primitive(id) => !is_near(id),
-                Met::Enclosing(_) => false,
+                OverlappingItem::Primitive(id) => !is_near(id),
+                OverlappingItem::Enclosing(_) => false,
             };
             is_clear
         });
@@ -220,10 +221,10 @@ impl Geometry {
 
 /// Whether all other triangles of the mesh are at least `apart` from a part of one triangle, in mesh
 /// coordinates. This is checked first because most nearby triangles are neighbors in the same mesh.
-fn is_clear_of_own(mesh: &MeshInstance, triangle: u32, part: [DVec3; 3], apart: f64) -> bool {
+fn is_apart_from_own_mesh(mesh: &MeshInstance, triangle: u32, part: [DVec3; 3], apart: f64) -> bool {
     let around = Aabb::around_f64(part).grown(Vec3::splat((1.1 * apart) as f32));
-    mesh.tree.triangles().meeting_while(&around, |other| {
-        other == triangle || are_apart(part, mesh.local_corners(other), apart)
+    mesh.tree.triangles().visit_overlapping_while(&around, |other| {
+        other == triangle || are_triangles_apart(part, mesh.local_corners(other), apart)
     })
 }
 
@@ -257,9 +258,9 @@ impl SurfaceRegion {
     /// Whether a triangle may be near the region. Triangles that do not overlap `around` are not near.
     fn is_near(&self, triangle: [DVec3; 3], around: &Aabb) -> bool {
         match self {
-            Self::GridCell(cell) => meets(triangle, cell),
+            Self::GridCell(cell) => triangle_meets_box(triangle, cell),
             Self::Triangle { corners, apart } => {
-                Aabb::around_f64(triangle).meets(around) && !are_apart(*corners, triangle, *apart)
+                Aabb::around_f64(triangle).meets(around) && !are_triangles_apart(*corners, triangle, *apart)
             }
         }
     }
@@ -284,7 +285,7 @@ impl GridCell {
 
 /// Whether a triangle intersects a box, up to rounding (Akenine-Möller, *Fast 3D Triangle-Box Overlap
 /// Testing*, 2001).
-pub(super) fn meets(corners: [DVec3; 3], bounds: &Aabb) -> bool {
+pub(super) fn triangle_meets_box(corners: [DVec3; 3], bounds: &Aabb) -> bool {
     if !Aabb::around_f64(corners).meets(bounds) {
         return false;
     }
@@ -306,7 +307,7 @@ pub(super) fn meets(corners: [DVec3; 3], bounds: &Aabb) -> bool {
 }
 
 /// Whether any axis separates two triangles by more than `distance`.
-fn are_apart(one: [DVec3; 3], other: [DVec3; 3], distance: f64) -> bool {
+fn are_triangles_apart(one: [DVec3; 3], other: [DVec3; 3], distance: f64) -> bool {
     let edges = |[a, b, c]: [DVec3; 3]| [b - a, c - b, a - c];
     let (own, others) = (edges(one), edges(other));
     let range = |corners: [DVec3; 3], axis: DVec3| {

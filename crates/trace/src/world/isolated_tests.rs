@@ -276,7 +276,7 @@ fn isolated_regions_match_the_full_search() {
                 assert_eq!(found(true), searched, "scene {number}, ray {round}: {ray:?}, {hit:?}");
             }
             let mut near = Vec::new();
-            let sides = world.contact(&at, &mut ContactScratch::default(), |one| near.push(one));
+            let sides = world.find_contact(&at, &mut ContactScratch::default(), |one| near.push(one));
             assert_eq!((sides, near), searched, "scene {number}, ray {round}: {ray:?}, {hit:?}");
             let is_other = |near: &CoincidentSurface| match near {
                 CoincidentSurface::Around { object, .. }
@@ -313,7 +313,7 @@ fn nested_sphere_search_takes_log_squared_time() {
             let at = ContactQuery { hit: &hit, surface: &surface, normal, lead };
             let mut around = Vec::new();
             let mut found = 0_u32;
-            let sides = world.contact(&at, &mut memory, |near| {
+            let sides = world.find_contact(&at, &mut memory, |near| {
                 found += 1;
                 if let CoincidentSurface::Around { object, .. } = near {
                     around.push(object);

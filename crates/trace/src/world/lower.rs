@@ -3,13 +3,13 @@
 use std::sync::Arc;
 
 use super::textures::{
-    Cutoff, FILE_NUMBER, TextureSource, coverage, file_color_use, file_opacity_use, file_source,
+    CutoffBits, FILE_NUMBER, TextureSource, coverage_cutoff, file_color_use, file_opacity_use, file_source,
     material_source,
 };
 use super::{Image, Images};
 use crate::assets::{FileMaterial, FileTexture, PhysicalMaterial};
 use crate::materials::texels::{TexelData, Texels};
-use crate::materials::texture::{Color, Factor, Texture, TextureFilter, UvTransform, Wrap};
+use crate::materials::texture::{Color, ScaleAndOffset, Texture, TextureFilter, UvTransform, Wrap};
 use crate::materials::{
     Bsdf, Bump, Coated, Conductor, ConductorFresnel, Dielectric, Emission, EmissionCoat, Material, Mirror,
     NormalMap, NormalPerturbation, Number, Opacity, Phong, Plastic, Principled, PrincipledInputs, Rough,
@@ -22,7 +22,7 @@ use crate::scene::description::{
 
 /// Converts a material from the scene file.
 pub fn material(scene: &Scene, images: &Images, material: &description::Material) -> Material {
-    let of = Declared { scene, images, material };
+    let of = SceneTextureLookup { scene, images, material };
     let color = |source: &ColorSource| of.color(source);
     let number = |source: &NumberSource| of.number(source, TextureRole::Roughness);
     let bsdf = match &material.kind {
@@ -83,19 +83,19 @@ pub fn material(scene: &Scene, images: &Images, material: &description::Material
 /// Opacity of a material from the scene file. `None` if it is fully opaque.
 pub fn opacity(scene: &Scene, images: &Images, material: &description::Material) -> Option<Opacity> {
     let source = &material.opacity;
-    if source.is_full() {
+    if source.is_opaque() {
         return None;
     }
     let (value, cutoff) = match source.texture() {
         None => (Number::Constant(source.value.constant()?), source.cutoff),
         Some((index, number)) => {
-            let of = Declared { scene, images, material };
+            let of = SceneTextureLookup { scene, images, material };
             let texture = of.texture(index, TextureRole::Opacity(number));
             // If mip levels preserve coverage, the cutoff already includes the factor.
-            let coverage = coverage(scene, index, source.cutoff);
+            let coverage = coverage_cutoff(scene, index, source.cutoff);
             let factor = texture.factor.filter(|_| coverage.is_none());
             let texture = Arc::new(Texture { factor, ..(*texture).clone() });
-            (Number::Texture(texture), coverage.map_or(source.cutoff, Cutoff::value))
+            (Number::Texture(texture), coverage.map_or(source.cutoff, CutoffBits::value))
         }
     };
     Some(Opacity { value, cutoff })
@@ -127,7 +127,7 @@ fn fresnel_of(source: &FresnelSource, color: impl Fn(&ColorSource) -> Color) -> 
 
 /// Emission of a material from the scene file.
 pub fn emission(scene: &Scene, images: &Images, material: &description::Material) -> Emission {
-    let (emission, of) = (&material.emission, Declared { scene, images, material });
+    let (emission, of) = (&material.emission, SceneTextureLookup { scene, images, material });
     let coat = material.emission_coat().and_then(|numbers| {
         let [weight, roughness] = numbers.map(|number| of.number(&number, TextureRole::EmissionCoat));
         EmissionCoat::new(weight, roughness).map(Arc::new)
@@ -147,7 +147,7 @@ enum FileMaterialKind<'a> {
     Glass,
 }
 
-fn kind(own: &FileMaterial) -> FileMaterialKind<'_> {
+fn file_material_kind(own: &FileMaterial) -> FileMaterialKind<'_> {
     match (own.illumination_model, &own.physical) {
         (Some(4 | 6 | 7 | 9), _) if own.opacity_texture.is_none() => FileMaterialKind::Glass,
         (_, Some(physical)) => FileMaterialKind::Principled(physical),
@@ -164,7 +164,7 @@ fn kind(own: &FileMaterial) -> FileMaterialKind<'_> {
 
 /// Whether a mesh file's material emits light.
 pub fn file_emits(own: &FileMaterial) -> bool {
-    match kind(own) {
+    match file_material_kind(own) {
         FileMaterialKind::Phong | FileMaterialKind::Principled(_) => own.emission != Vec3::ZERO,
         FileMaterialKind::Mirror | FileMaterialKind::Coated | FileMaterialKind::Glass => false,
     }
@@ -172,7 +172,7 @@ pub fn file_emits(own: &FileMaterial) -> bool {
 
 /// Whether a mesh file's material is glass.
 pub fn file_is_glass(own: &FileMaterial) -> bool {
-    match kind(own) {
+    match file_material_kind(own) {
         FileMaterialKind::Glass => true,
         FileMaterialKind::Phong
         | FileMaterialKind::Principled(_)
@@ -218,7 +218,7 @@ pub fn file_opacity(images: &Images, own: &FileMaterial) -> Option<Opacity> {
 
 /// Converts a material from a mesh file. A highlight of strength k becomes ks = 2k/(α + 2).
 pub fn file_material(images: &Images, own: &FileMaterial) -> Material {
-    let bsdf = match (kind(own), file_glass(own)) {
+    let bsdf = match (file_material_kind(own), file_glass(own)) {
         (FileMaterialKind::Mirror, _) => {
             Bsdf::Mirror(Mirror::Constant(Color::Constant(own.specular.min(Vec3::ONE))))
         }
@@ -321,13 +321,13 @@ pub fn fallback_material() -> Material {
 
 /// Looks up the textures of a material from the scene file.
 #[derive(Clone, Copy)]
-struct Declared<'a> {
+struct SceneTextureLookup<'a> {
     scene: &'a Scene,
     images: &'a Images,
     material: &'a description::Material,
 }
 
-impl Declared<'_> {
+impl SceneTextureLookup<'_> {
     fn color(self, source: &ColorSource) -> Color {
         match source {
             ColorSource::Constant(color) => Color::Constant(*color),
@@ -349,14 +349,15 @@ impl Declared<'_> {
         let Self { scene, images, material } = self;
         let declared = &scene.textures[index];
         let &description::Texture { filter, wrap, repeat, rotate, offset, uv, factor, .. } = declared;
-        let Image { texels, mipmaps } = image(images, &material_source(scene, material, (index, role)));
+        let Image { texels, mipmaps } =
+            loaded_image(images, &material_source(scene, material, (index, role)));
         let mipmaps = match filter {
             TextureFilter::Nearest | TextureFilter::Bilinear => None,
             TextureFilter::Mipmap => mipmaps,
         };
         let moved = UvTransform::new(uv, rotate, offset.as_dvec2()).map(Box::new);
         let factor = match role.texture_use() {
-            TextureUse::Color | TextureUse::CutOut | TextureUse::Number(_) => Factor::new(factor),
+            TextureUse::Color | TextureUse::CutOut | TextureUse::Number(_) => ScaleAndOffset::new(factor),
             TextureUse::Normal => None,
         };
         Arc::new(Texture { texels, mipmaps, filter, wrap, repeat, moved, factor })
@@ -370,7 +371,7 @@ fn file_texture(images: &Images, texture: &FileTexture, used: TextureUse) -> Opt
     let (base, gain) = texture.range;
     let factor = match used {
         TextureUse::Color | TextureUse::CutOut | TextureUse::Number(_) => {
-            Factor::with_base(Vec3::splat(gain), Vec3::splat(base))
+            ScaleAndOffset::with_base(Vec3::splat(gain), Vec3::splat(base))
         }
         TextureUse::Normal => None,
     };
@@ -387,7 +388,7 @@ fn file_texture(images: &Images, texture: &FileTexture, used: TextureUse) -> Opt
 
 /// Loaded image. Materials without objects may refer to images that were not loaded, which are never looked
 /// up.
-fn image(images: &Images, source: &TextureSource) -> Image {
+fn loaded_image(images: &Images, source: &TextureSource) -> Image {
     images.get(source).cloned().unwrap_or_else(|| {
         let data = TexelData::Linear8(vec![[128, 128, 255]]);
         Image { texels: Arc::new(Texels { width: 1, height: 1, data, unusable: 0 }), mipmaps: None }

@@ -137,20 +137,20 @@ impl MergedMeshes {
         self.first.get(object as usize).is_some_and(|&first| first != Self::NOT_HERE)
     }
 
-    /// Triangle with this number in the tree.
+    /// Triangle with this index in the tree.
     #[inline(always)]
     pub fn triangle(&self, number: u32) -> MergedTriangle {
         self.triangles[number as usize]
     }
 
-    /// Number of an object's triangle in the tree, or `None` if the object is not merged.
+    /// Tree index of an object's triangle, or `None` if the object is not merged.
     #[inline(always)]
     pub fn number(&self, object: u32, primitive: u32) -> Option<u32> {
         let first = self.first.get(object as usize).copied().filter(|&first| first != Self::NOT_HERE)?;
         Some(first + primitive)
     }
 
-    /// Returns the nearest hit. The hit's primitive is a triangle number in the tree.
+    /// Returns the nearest hit. The hit's primitive is a triangle index into the tree.
     pub fn closest(&self, ray: &Ray) -> Option<ShapeHit> {
         self.tree.closest(ray)
     }
@@ -163,8 +163,8 @@ impl MergedMeshes {
     /// Invalid triangle number.
     pub const NO_TRIANGLE: u32 = u32::MAX;
 
-    /// Finds the nearest hits of the rays in `met`. Primitives are triangle numbers in the tree. Other lanes
-    /// have negative `ends`.
+    /// Finds the nearest hits of the rays in `met`. The hits' primitives are triangle indices into the tree.
+    /// Other lanes have negative `ends`.
     #[inline(never)]
     pub fn closest_rows(
         &self,
@@ -345,8 +345,8 @@ fn least_size(objects: &[Object]) -> f32 {
     sizes.filter(|size| *size > 0.0).fold(f32::INFINITY, f32::min)
 }
 
-/// Whether an object is a mesh that is small enough to merge and whose world coordinates `f32` represents
-/// well. `least` is the size of the scene's smallest object.
+/// Whether an object is a mesh that is small enough to merge and whose world coordinates are accurate enough
+/// in `f32`. `least` is the size of the scene's smallest object.
 fn may_be_merged(object: &Object, least: f32) -> bool {
     let Some(mesh) = object.mesh() else { return false };
     let Some(bounds) = object.bounds().filter(|bounds| !bounds.is_empty()) else { return false };
@@ -454,7 +454,7 @@ pub(super) mod tests {
             assert_eq!(found, expected, "{ray:?}");
             // Ignoring the hit triangle results in a hit on another triangle.
             if let Some(hit) = found {
-                let next = geometry.closest(&ray.leaving(geometry.triangle_number(&hit)));
+                let next = geometry.closest(&ray.with_start_triangle(geometry.triangle_number(&hit)));
                 let is_own =
                     |next: Hit| (next.object, next.shape.primitive) == (hit.object, hit.shape.primitive);
                 assert!(!next.is_some_and(is_own), "{ray:?}");

@@ -43,12 +43,16 @@ impl MeshInstance {
 
     /// Transforms a ray to mesh coordinates without changing t.
     pub(super) fn local_ray(&self, ray: &Ray) -> Ray {
-        let start = self.own_number(ray.start);
-        if self.is_transformed { self.moved(ray).leaving(start) } else { ray.leaving(start) }
+        let start = self.mesh_triangle_number(ray.start);
+        if self.is_transformed {
+            self.inverse_transformed(ray).with_start_triangle(start)
+        } else {
+            ray.with_start_triangle(start)
+        }
     }
 
     /// Applies the inverse transform to a ray.
-    fn moved(&self, ray: &Ray) -> Ray {
+    fn inverse_transformed(&self, ray: &Ray) -> Ray {
         Ray {
             origin: self.transform.inverse_point(ray.origin.as_dvec3()).as_vec3(),
             direction: self.transform.inverse_vector(ray.direction.as_dvec3()).as_vec3(),
@@ -69,9 +73,10 @@ impl MeshInstance {
         triangles.map(|triangle| first.wrapping_add(triangle))
     }
 
-    /// Converts a scene-wide triangle number to this mesh's numbering. For another mesh's triangle, the result is out of range.
+    /// Converts a scene-wide triangle number to this mesh's numbering. For another mesh's triangle, the
+    /// result is out of range.
     #[inline(always)]
-    pub(super) fn own_number(&self, in_scene: u32) -> u32 {
+    pub(super) fn mesh_triangle_number(&self, in_scene: u32) -> u32 {
         self.first.map_or(Ray::NO_TRIANGLE, |first| in_scene.wrapping_sub(first))
     }
 
@@ -88,7 +93,8 @@ impl MeshInstance {
         Aabb::around_f64((0..8).map(corner))
     }
 
-    /// Corners of a triangle in world coordinates, ordered so that the front side faces along (b − a) × (c − a).
+    /// Corners of a triangle in world coordinates, ordered so that the front side faces along (b − a) × (c −
+    /// a).
     pub fn world_corners(&self, triangle: u32) -> [DVec3; 3] {
         let [a, b, c] = self.tree.loaded().mesh.corners(triangle).map(|p| self.transform.point(p.as_dvec3()));
         if self.transform.flips_handedness() { [a, c, b] } else { [a, b, c] }
@@ -130,16 +136,17 @@ impl MeshInstance {
 
     /// UVs of a triangle's corners, in the order of [`MeshInstance::world_corners`].
     pub fn corner_uvs(&self, triangle: u32) -> [Vec2; 3] {
-        self.ordered(triangle, self.uvs(UvSet::First)).unwrap_or([Vec2::ZERO, Vec2::X, Vec2::Y])
+        self.in_corner_order(triangle, self.uvs(UvSet::First)).unwrap_or([Vec2::ZERO, Vec2::X, Vec2::Y])
     }
 
     /// UVs of a triangle's corners in the second UV set. `None` without a second set.
     pub fn second_corner_uvs(&self, triangle: u32) -> Option<[Vec2; 3]> {
-        self.ordered(triangle, &self.tree.loaded().mesh.second_uvs)
+        self.in_corner_order(triangle, &self.tree.loaded().mesh.second_uvs)
     }
 
-    /// Vertex values at a triangle's corners, in the order of [`MeshInstance::world_corners`]. `None` if `values` is empty.
-    fn ordered(&self, triangle: u32, values: &[Vec2]) -> Option<[Vec2; 3]> {
+    /// Vertex values at a triangle's corners, in the order of [`MeshInstance::world_corners`]. `None` if
+    /// `values` is empty.
+    fn in_corner_order(&self, triangle: u32, values: &[Vec2]) -> Option<[Vec2; 3]> {
         let corners = self.tree.loaded().mesh.triangles[triangle as usize];
         let [a, b, c] = corners.map(|vertex| values.get(vertex as usize).copied());
         let (a, b, c) = (a?, b?, c?);
@@ -181,7 +188,7 @@ impl MeshInstance {
 
     /// Combines this mesh with `placement`, which must represent the mesh's transform.
     #[inline(always)]
-    pub(super) fn placed<P>(&self, placement: P) -> PlacedMesh<P> {
+    pub(super) fn with_placement<P>(&self, placement: P) -> PlacedMesh<P> {
         PlacedMesh {
             placement,
             edge_margin: self.edge_margin,
@@ -192,8 +199,8 @@ impl MeshInstance {
     /// Computes the requested surface attributes at a hit.
     pub(super) fn surface(&self, ray: &RayF64, hit: &ShapeHit, asked: SurfaceRequest) -> SurfacePoint {
         match self.is_transformed {
-            true => self.surface_in(self.placed(&self.transform), ray, hit, asked),
-            false => self.surface_in(self.placed(IdentityPlacement), ray, hit, asked),
+            true => self.surface_in(self.with_placement(&self.transform), ray, hit, asked),
+            false => self.surface_in(self.with_placement(IdentityPlacement), ray, hit, asked),
         }
     }
 
@@ -298,8 +305,8 @@ impl MeshInstance {
     fn local_rays(&self, rows: &RayPacket, met: u32) -> [Ray; PACKET_SIZE] {
         let local = |lane: usize| {
             let ray = rows.ray(lane % PACKET_SIZE);
-            let ray = ray.leaving(self.own_number(ray.start));
-            if self.is_transformed { self.moved(&ray) } else { ray }
+            let ray = ray.with_start_triangle(self.mesh_triangle_number(ray.start));
+            if self.is_transformed { self.inverse_transformed(&ray) } else { ray }
         };
         let mut rays = [local(met.trailing_zeros() as usize); PACKET_SIZE];
         for lane in lanes(met & met.wrapping_sub(1)) {

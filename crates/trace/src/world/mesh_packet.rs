@@ -44,7 +44,7 @@ impl MeshInstance {
             let triangle = if of & 1 << i != 0 { hits.primitive[i] } else { filler };
             vertices[i] = mesh.triangles[triangle as usize];
         }
-        let corners = of_vertices(&vertices, &mesh.positions);
+        let corners = gather_vertex_attributes(&vertices, &mesh.positions);
         let corners_of = |i: usize| [lane(&corners[0], i), lane(&corners[1], i), lane(&corners[2], i)];
         let (mut found, mut doubtful) = (SurfacePacket::EMPTY, [0; PACKET_SIZE]);
         for i in 0..PACKET_SIZE {
@@ -60,9 +60,9 @@ impl MeshInstance {
         if doubtful != 0 {
             on_ray = correct_points(&placed, &corners, (rays, hits), doubtful, &mut found);
         }
-        surface.take(of, &found);
+        surface.copy_points(of, &found);
         if self.smooth {
-            let normals = of_vertices(&vertices, self.tree.normals());
+            let normals = gather_vertex_attributes(&vertices, self.tree.normals());
             let normals_of = |i: usize| [lane(&normals[0], i), lane(&normals[1], i), lane(&normals[2], i)];
             for i in 0..PACKET_SIZE {
                 let facet = placed.facet(corners_of(i), [hits.u[i], hits.v[i]]);
@@ -77,7 +77,7 @@ impl MeshInstance {
             for i in lanes(on_ray) {
                 set_lane(&mut found.shadow_point, i, lane(&found.point, i));
             }
-            surface.take_smooth(of, &found);
+            surface.copy_shading_normals(of, &found);
         }
         if let Some(set) = asked_uvs {
             let all = self.uvs(set);
@@ -112,15 +112,29 @@ impl SimdKernel for FillSurfaces<'_> {
     fn run(self, simd: impl Simd) {
         let Self { mesh, surface, rays, hits, of, asked_uvs } = self;
         if mesh.is_transformed {
-            mesh.fill_placed(mesh.placed(&mesh.transform), surface, (rays, hits), of, asked_uvs, simd);
+            mesh.fill_placed(
+                mesh.with_placement(&mesh.transform),
+                surface,
+                (rays, hits),
+                of,
+                asked_uvs,
+                simd,
+            );
         } else {
-            mesh.fill_placed(mesh.placed(IdentityPlacement), surface, (rays, hits), of, asked_uvs, simd);
+            mesh.fill_placed(
+                mesh.with_placement(IdentityPlacement),
+                surface,
+                (rays, hits),
+                of,
+                asked_uvs,
+                simd,
+            );
         }
     }
 }
 
-/// Corrects the doubtful points one by one. Returns the lanes whose points were moved onto their rays. Not inlined,
-/// to keep the SIMD code small.
+/// Corrects the doubtful points one by one. Returns the lanes whose points were moved onto their rays. Not
+/// inlined, to keep the SIMD code small.
 #[cold]
 #[inline(never)]
 fn correct_points(
@@ -150,7 +164,7 @@ pub(super) fn uv_between([a, b, c]: [Vec2; 3], barycentric: Vec3) -> Vec2 {
 
 /// Attributes of the triangles' first, second and third vertices.
 #[inline(always)]
-fn of_vertices(vertices: &[[u32; 3]; PACKET_SIZE], all: &[Vec3]) -> [Vec3x16; 3] {
+fn gather_vertex_attributes(vertices: &[[u32; 3]; PACKET_SIZE], all: &[Vec3]) -> [Vec3x16; 3] {
     let mut each = [[[0.0; PACKET_SIZE]; 3]; 3];
     for i in 0..PACKET_SIZE {
         for corner in 0..3 {

@@ -35,8 +35,8 @@ pub use crate::accel::{PACKET_SIZE, RayInterval, SimdKernel, TreeNode};
 pub use camera::Camera;
 pub use camera_interior::CompoundSolid;
 pub use contact::{CoincidentSurface, ContactQuery, ContactScratch, MAX_INTERIORS, OffsetPoints};
-pub use coplanar::{Coplanar, coplanar_lights, light_lifts, with_lifted_lights};
-pub use emitters::{lights, photon_source, sky};
+pub use coplanar::{CoplanarLight, coplanar_lights, light_lifts, with_lifted_lights};
+pub use emitters::{lights, photon_source, sky_map};
 pub use geometry::{Geometry, Hit};
 pub use glass_solids::{GlassSolids, OpenGlass};
 pub use lower::{file_emits, file_is_glass};
@@ -48,7 +48,8 @@ pub use object::Object;
 pub use origin::origin;
 pub use packet_material::PacketMaterial;
 pub use textures::{
-    Cutoff, NeededTexture, TextureNeeds, TextureSource, environment_source, material_source, textures_needed,
+    CutoffBits, NeededTexture, TextureNeeds, TextureSource, environment_source, material_source,
+    textures_needed,
 };
 pub use unlit_glass::LightBox;
 
@@ -130,7 +131,7 @@ pub struct World {
     /// Whether each object's vertex colors are used. `None` if they are not used for any object.
     colored: Option<Box<[bool]>>,
     /// Objects that light may pass through without changing direction. `None` if there are none.
-    see_through: Option<Box<null_interaction::SeeThrough>>,
+    see_through: Option<Box<null_interaction::SeeThroughObjects>>,
 }
 
 /// Material assignment of an object.

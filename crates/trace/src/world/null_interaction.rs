@@ -24,14 +24,14 @@ pub const MAX_NULL_INTERACTIONS: u32 = 64;
 
 /// Objects that light may pass through without changing direction.
 #[derive(Debug)]
-pub(super) struct SeeThrough {
+pub(super) struct SeeThroughObjects {
     /// Whether each object is see-through.
     objects: Vec<bool>,
     /// Whether any see-through object is in the tree of merged meshes.
     is_any_merged: bool,
 }
 
-impl SeeThrough {
+impl SeeThroughObjects {
     /// Collects the world's see-through objects. `None` if there are none.
     pub(super) fn of(world: &World) -> Option<Self> {
         let geometry = &world.geometry;
@@ -93,7 +93,7 @@ impl World {
     }
 
     /// Whether a shadow ray's transmittance is zero.
-    pub fn is_dark(&self, ray: &Ray, source: LightObject) -> bool {
+    pub fn is_fully_occluded(&self, ray: &Ray, source: LightObject) -> bool {
         self.transmittance(ray, source, &mut 0) == Vec3::ZERO
     }
 
@@ -111,7 +111,7 @@ impl World {
     }
 
     /// Transmittance of the surface at a hit, and the ray continued beyond it.
-    pub fn beyond(&self, ray: &Ray, hit: &Hit, lookups: &mut u64) -> (Vec3, Ray) {
+    pub fn continue_past(&self, ray: &Ray, hit: &Hit, lookups: &mut u64) -> (Vec3, Ray) {
         let index = self.material_index(hit);
         let material = &self.materials[index];
         let asked = SurfaceRequest { uv: self.is_textured(index), shadow_point: false };
@@ -122,14 +122,14 @@ impl World {
         let left = material.null_transmittance(&at, color, cosine, lookups);
         let origin = offset_origin(surface.point, surface.error, surface.normal, ray.direction);
         let start = self.geometry.triangle_number(hit);
-        let beyond = Ray::new(origin, ray.direction).leaving(start);
+        let beyond = Ray::new(origin, ray.direction).with_start_triangle(start);
         (left, Ray { t_max: ray.t_max - hit.shape.t, ..beyond })
     }
 
     /// Product of the transmittances of all see-through surfaces along a shadow ray.
     fn see_through_transmittance(
         &self,
-        see_through: &SeeThrough,
+        see_through: &SeeThroughObjects,
         ray: &Ray,
         source: LightObject,
         lookups: &mut u64,
@@ -144,7 +144,7 @@ impl World {
             if source == LightObject::SeeThrough(hit.object) && hit.shape.t >= ray.t_max - end {
                 break;
             }
-            let (part, beyond) = self.beyond(&ray, &hit, lookups);
+            let (part, beyond) = self.continue_past(&ray, &hit, lookups);
             ray = beyond;
             // A light does not occlude itself.
             if source == LightObject::Primitive(hit.object, hit.shape.primitive) {
@@ -182,7 +182,7 @@ impl SimdKernel for TransmittanceKernel<'_> {
         // Find the rays not blocked by opaque objects.
         let geometry: &Geometry = &world.geometry;
         let each_mesh = see_through.is_any_merged || traced & geometry.to_whole_merged(sources) != 0;
-        let tree = if each_mesh { geometry.tree() } else { geometry.visited() };
+        let tree = if each_mesh { geometry.tree() } else { geometry.traced_tree() };
         if tree.has_shells() {
             for lane in lanes(traced) {
                 let ray = Ray { t_max: ends[lane], ..rows.ray(lane) };
@@ -212,7 +212,7 @@ impl SimdKernel for TransmittanceKernel<'_> {
 /// Any-hit test for opaque occluders.
 struct OpaqueOccluders<'a, F> {
     occluders: Occluders<'a, F>,
-    see_through: &'a SeeThrough,
+    see_through: &'a SeeThroughObjects,
     /// Mask of rays that enter the bounding box of a see-through object.
     near: u32,
 }

@@ -34,8 +34,8 @@ impl Object {
         }
     }
 
-    /// Finds the nearest hits of the rays in `met` and writes them to `found`, which must be empty. Lanes outside `met` have
-    /// negative `ends`.
+    /// Finds the nearest hits of the rays in `met` and writes them to `found`, which must be empty. Lanes
+    /// outside `met` have negative `ends`.
     #[inline(always)]
     pub fn closest_rows(
         &self,
@@ -53,7 +53,7 @@ impl Object {
     }
 
     /// Returns the mask of rays in `met` that hit the object. Lanes outside `met` have negative `ends`.
-    /// `except` is a lane mask and the primitive to ignore in each of these lanes.
+    /// `except` contains a lane mask and the primitive to ignore in each selected lane.
     #[inline(always)]
     pub fn any_rows(
         &self,
@@ -107,11 +107,11 @@ impl Object {
         Some(BoundingSphere { center: (min + max) * 0.5, radius: (max - min).length() * 0.5 })
     }
 
-    /// Outline used for lights that are objects.
+    /// Geometry of the object as a light source.
     pub(super) fn emitter_geometry(&self) -> EmitterGeometry {
         match self {
             Self::Shape(shape) => EmitterGeometry::Shape(*shape),
-            Self::Mesh(mesh) => EmitterGeometry::Mesh { rounding: mesh.rounding() },
+            Self::Mesh(mesh) => EmitterGeometry::Mesh { rounding: mesh.max_rounding_error() },
         }
     }
 

@@ -7,9 +7,9 @@ use crate::math::origin::origin_near;
 use crate::scene::description;
 
 /// Chooses an origin near the camera's target, so that `f32` coordinates are as precise there as near 0. The
-/// origin is 0 if the target is within about 20 camera distances of 0. It only depends on the point that the
-/// camera orbits and the distance to it, and changes in discrete steps. Orbiting does not change the origin,
-/// and trees are rebuilt only when it changes.
+/// origin is 0 if the target is within about 20 camera distances of 0. It depends only on the point that the
+/// camera orbits and the distance to this point, and changes in discrete steps. Orbiting does not change the
+/// origin. Trees are rebuilt only when the origin changes.
 pub fn origin(camera: &description::Camera, orbiter: Option<&OrbiterCamera>) -> DVec3 {
     let (aim, distance) = Camera::aim(camera, orbiter);
     origin_near(aim, distance)

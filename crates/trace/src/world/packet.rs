@@ -26,7 +26,7 @@ impl Geometry {
         traced: u32,
         simd: impl Simd,
     ) -> (HitPacket, [u32; PACKET_SIZE]) {
-        if self.visited().has_shells() {
+        if self.traced_tree().has_shells() {
             return self.closest_by_each(rows, ends, traced);
         }
         let mut nearest = ClosestObject {
@@ -36,7 +36,7 @@ impl Geometry {
             object: [NONE; PACKET_SIZE],
             simd,
         };
-        self.visited().closest_packet(rows, ends, traced, self.unbounded(), &mut nearest, simd);
+        self.traced_tree().closest_packet(rows, ends, traced, self.unbounded(), &mut nearest, simd);
         (nearest.hits, nearest.object)
     }
 
@@ -119,11 +119,11 @@ impl SimdKernel for OcclusionKernel<'_> {
     #[inline(always)]
     fn run(self, simd: impl Simd) -> u32 {
         let Self { geometry, rows, ends, traced, sources } = self;
-        if geometry.visited().has_shells() || traced & geometry.to_whole_merged(sources) != 0 {
+        if geometry.traced_tree().has_shells() || traced & geometry.to_whole_merged(sources) != 0 {
             return geometry.occluded_by_each(rows, ends, traced, sources);
         }
         let mut occluders = Occluders::new(geometry, rows, sources, simd);
-        geometry.visited().any_packet(rows, ends, traced, geometry.unbounded(), &mut occluders, simd)
+        geometry.traced_tree().any_packet(rows, ends, traced, geometry.unbounded(), &mut occluders, simd)
     }
 }
 
@@ -164,7 +164,7 @@ impl<F: Simd> ClosestTest for ClosestObject<'_, F> {
     #[inline(always)]
     fn test(&mut self, id: u32, met: u32, ends: &mut F32x16) {
         let mut found = HitPacket::none();
-        let (these, mut objects) = (ends_within(met, ends), [id; PACKET_SIZE]);
+        let (these, mut objects) = (masked_ends(met, ends), [id; PACKET_SIZE]);
         match self.geometry.merged(id) {
             Some(merged) => {
                 let by = self.geometry.instructions();
@@ -223,7 +223,7 @@ impl<'a, F: Simd> Occluders<'a, F> {
         sources: &'a LightObjectPacket,
         simd: F,
     ) -> Self {
-        Self { geometry, rows, sources, in_part: in_part(sources, simd), simd }
+        Self { geometry, rows, sources, in_part: rays_to_primitive_lights(sources, simd), simd }
     }
 }
 
@@ -231,7 +231,7 @@ impl<F: Simd> AnyTest for Occluders<'_, F> {
     #[inline(always)]
     fn test(&mut self, id: u32, met: u32, ends: &F32x16) -> u32 {
         if let Some(merged) = self.geometry.merged(id) {
-            let these = ends_within(met, ends);
+            let these = masked_ends(met, ends);
             if self.in_part & met == 0 {
                 return merged.any_rows(self.geometry.instructions(), self.rows, (met, &these), None);
             }
@@ -242,7 +242,7 @@ impl<F: Simd> AnyTest for Occluders<'_, F> {
             }
             return merged.any_rows(self.geometry.instructions(), self.rows, (met, &these), Some(&own));
         }
-        let own = own_bits(self.sources, id, self.simd);
+        let own = rays_to_light_on(self.sources, id, self.simd);
         let (whole, in_part) = (own & !self.in_part, own & self.in_part);
         let met = met & !whole;
         if met == 0 {
@@ -250,13 +250,13 @@ impl<F: Simd> AnyTest for Occluders<'_, F> {
         }
         let object = &self.geometry.objects()[id as usize];
         let except = if in_part == 0 { None } else { Some((in_part, &self.sources.part)) };
-        object.any_rows(self.rows, met, &ends_within(met, ends), except, self.simd)
+        object.any_rows(self.rows, met, &masked_ends(met, ends), except, self.simd)
     }
 }
 
 /// Mask of rays whose light is a single primitive of an object.
 #[inline(always)]
-fn in_part(sources: &LightObjectPacket, simd: impl Simd) -> u32 {
+fn rays_to_primitive_lights(sources: &LightObjectPacket, simd: impl Simd) -> u32 {
     if !sources.is_any {
         return 0;
     }
@@ -269,7 +269,7 @@ fn in_part(sources: &LightObjectPacket, simd: impl Simd) -> u32 {
 
 /// Mask of rays whose light is on object `id`.
 #[inline(always)]
-fn own_bits(sources: &LightObjectPacket, id: u32, simd: impl Simd) -> u32 {
+fn rays_to_light_on(sources: &LightObjectPacket, id: u32, simd: impl Simd) -> u32 {
     if !sources.is_any {
         return 0;
     }
@@ -282,7 +282,7 @@ fn own_bits(sources: &LightObjectPacket, id: u32, simd: impl Simd) -> u32 {
 
 /// Copies the ends of the rays in `met`, and sets other lanes to negative values.
 #[inline(always)]
-fn ends_within(met: u32, ends: &F32x16) -> F32x16 {
+fn masked_ends(met: u32, ends: &F32x16) -> F32x16 {
     let mut own = [-1.0; PACKET_SIZE];
     for lane in 0..PACKET_SIZE {
         own[lane] = if met & 1 << lane != 0 { ends[lane] } else { -1.0 };
@@ -358,7 +358,7 @@ pub(super) mod tests {
         let sphere = |i: u32| Sphere { center: DVec3::ZERO, radius: 0.5 + f64::from(i) / 64.0 };
         let spheres = (0..200).map(|i| Object::Shape(Shape::Sphere(sphere(i))));
         let geometry = Geometry::build(spheres.collect(), &CancelToken::new()).expect("nobody cancels");
-        assert!(geometry.visited().has_shells());
+        assert!(geometry.traced_tree().has_shells());
         assert_packets(&geometry);
     }
 
@@ -394,7 +394,7 @@ pub(super) mod tests {
             // Let some rays ignore the triangle they would hit.
             for ray in rays.iter_mut().step_by(4) {
                 let start = geometry.closest(ray).map_or(7, |hit| geometry.triangle_number(&hit));
-                *ray = ray.leaving(start);
+                *ray = ray.with_start_triangle(start);
             }
             let mut found = vec![None; rays.len()];
             geometry.closest_packet(&rays, &mut found);

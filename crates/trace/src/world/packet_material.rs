@@ -1,4 +1,4 @@
-//! Plain materials, with which a whole packet is shaded without examining each hit.
+//! Plain materials, whose hits are shaded as a whole packet instead of one by one.
 
 use super::World;
 use crate::materials::texture::Texture;
@@ -26,7 +26,7 @@ impl PacketMaterial {
     pub(super) fn of(material: &Material) -> Option<Self> {
         let Material { bsdf, emission, normal_perturbation, opacity } = material;
         let is_even = emission.texture.is_none() && emission.coat.is_none();
-        let rough = rough_of(bsdf).filter(|rough| rough.fills_rows())?;
+        let rough = rough_of(bsdf).filter(|rough| rough.supports_packets())?;
         (is_even && normal_perturbation.is_none() && opacity.is_none()).then(|| Self {
             kind: rough.kind(),
             row_texture: rough.row_texture().map(Texture::uv_set),

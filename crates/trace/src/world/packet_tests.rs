@@ -30,7 +30,7 @@ impl HostileRandom {
         Vec3::new(self.number(), self.number(), self.number())
     }
 
-    /// An adversarial coordinate: on corners or faces, zero, or of a size whose products overflow or
+    /// An adversarial coordinate: on a corner or face, zero, or so large or small that products overflow or
     /// underflow.
     fn hostile(&mut self) -> f32 {
         const HOSTILE: [f32; 16] = [

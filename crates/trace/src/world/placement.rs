@@ -11,13 +11,13 @@ pub trait MeshPlacement: Copy {
 
     /// Bounds the absolute components of a transformed direction, given bounds on its components in mesh
     /// coordinates.
-    fn reach(self, local: DVec3) -> DVec3;
+    fn abs_bound(self, local: DVec3) -> DVec3;
 
     /// Transforms a normal. The result is not normalized.
     fn normal(self, local: DVec3) -> DVec3;
 
     /// The mesh's origin in world coordinates.
-    fn shift(self) -> DVec3;
+    fn mesh_origin(self) -> DVec3;
 }
 
 impl MeshPlacement for &Transform {
@@ -27,8 +27,8 @@ impl MeshPlacement for &Transform {
     }
 
     #[inline(always)]
-    fn reach(self, local: DVec3) -> DVec3 {
-        Transform::reach(self, local)
+    fn abs_bound(self, local: DVec3) -> DVec3 {
+        Transform::abs_bound(self, local)
     }
 
     #[inline(always)]
@@ -37,7 +37,7 @@ impl MeshPlacement for &Transform {
     }
 
     #[inline(always)]
-    fn shift(self) -> DVec3 {
+    fn mesh_origin(self) -> DVec3 {
         self.translation
     }
 }
@@ -54,7 +54,7 @@ impl MeshPlacement for IdentityPlacement {
     }
 
     #[inline(always)]
-    fn reach(self, local: DVec3) -> DVec3 {
+    fn abs_bound(self, local: DVec3) -> DVec3 {
         local
     }
 
@@ -66,7 +66,7 @@ impl MeshPlacement for IdentityPlacement {
     }
 
     #[inline(always)]
-    fn shift(self) -> DVec3 {
+    fn mesh_origin(self) -> DVec3 {
         DVec3::ZERO
     }
 }

@@ -10,7 +10,7 @@ impl Geometry {
     /// across both levels: a mesh's root is one below the leaf that contains the mesh.
     pub fn visit_nodes(&self, ray: &Ray, mut visit: impl FnMut(&Ray, &TreeNode, &RayInterval) -> bool) {
         let mut below = Vec::new();
-        self.visited().along(
+        self.traced_tree().visit_along_ray(
             ray,
             |cell, stretch| visit(ray, cell, stretch),
             |id, depth| below.push((id, depth)),
@@ -22,14 +22,14 @@ impl Geometry {
                     (None, Some(mesh)) => (mesh.local_ray(ray), mesh.tree.triangles()),
                     (None, None) => continue,
                 };
-            tree.along(&local, |cell, stretch| {
+            tree.visit_along_ray(&local, |cell, stretch| {
                 visit(&local, &TreeNode { depth: above + cell.depth, ..*cell }, stretch)
             });
         }
     }
 
-    /// Traversal cost of a ray: the number of boxes intersected, plus the number of shapes in the intersected
-    /// leaves and of infinite objects.
+    /// Traversal cost of a ray: the number of boxes intersected, plus the numbers of shapes in the
+    /// intersected leaves and of infinite objects.
     pub fn traversal_cost(&self, ray: &Ray) -> u32 {
         let mut count = self.unbounded().len() as u32;
         self.visit_nodes(ray, |_, cell, _| {

@@ -75,8 +75,8 @@ impl MeshInstance {
             }
         }
         for start in &mut start {
-            *start = self.own_number(*start);
+            *start = self.mesh_triangle_number(*start);
         }
-        RayPacket::of(origin, direction).leaving(start)
+        RayPacket::of(origin, direction).with_start_triangle(start)
     }
 }

@@ -22,14 +22,14 @@ pub struct TextureSource {
     /// Encoding of the pixel values.
     pub encoding: ImageEncoding,
     /// Alpha cutoff at which mip levels preserve coverage. `None` for ordinary mip levels.
-    pub coverage: Option<Cutoff>,
+    pub coverage: Option<CutoffBits>,
 }
 
 /// An alpha cutoff, stored as the bits of an `f32` so that it can be hashed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct Cutoff(u32);
+pub struct CutoffBits(u32);
 
-impl Cutoff {
+impl CutoffBits {
     /// Converts a cutoff for opacity to a cutoff for pixel values, given the image's factor.
     pub fn new(cutoff: f32, factor: f32) -> Self {
         Self(if factor > 0.0 { cutoff / factor } else { f32::INFINITY }.to_bits())
@@ -158,7 +158,7 @@ pub fn textures_needed(
             known.normals_of = known.normals_of.take().or(texture.normals_of);
         }
     };
-    let (used_materials, own_materials) = in_use(scene);
+    let (used_materials, own_materials) = materials_in_use(scene);
     for (material, _) in scene.materials.iter().zip(used_materials).filter(|(_, used)| *used) {
         let (textures, is_delta) = (material.textures().into_iter(), material.kind.has_delta());
         for (texture, role) in textures.filter(|(_, role)| lookups.has(*role, is_delta)) {
@@ -221,7 +221,7 @@ fn environment_map(file: &Path) -> TextureSource {
 
 /// Which of the scene's materials are used by objects, and which mesh files' materials are used by mesh
 /// instances.
-fn in_use(scene: &Scene) -> (Vec<bool>, Vec<bool>) {
+fn materials_in_use(scene: &Scene) -> (Vec<bool>, Vec<bool>) {
     let (mut materials, mut files) =
         (vec![false; scene.materials.len()], vec![false; scene.mesh_files.len()]);
     for object in &scene.objects {
@@ -243,7 +243,7 @@ pub fn material_source(
     let source = declared_source(scene, texture, texture_use(scene, material, (texture, role)));
     match role {
         TextureRole::Opacity(_) => {
-            TextureSource { coverage: coverage(scene, texture, material.opacity.cutoff), ..source }
+            TextureSource { coverage: coverage_cutoff(scene, texture, material.opacity.cutoff), ..source }
         }
         TextureRole::Diffuse
         | TextureRole::Specular
@@ -258,9 +258,9 @@ pub fn material_source(
 }
 
 /// Cutoff at which an opacity texture's mip levels preserve coverage. `None` without a cutoff or mip levels.
-pub fn coverage(scene: &Scene, texture: usize, cutoff: f32) -> Option<Cutoff> {
+pub fn coverage_cutoff(scene: &Scene, texture: usize, cutoff: f32) -> Option<CutoffBits> {
     let is_covered = cutoff > 0.0 && has_mipmaps(scene, texture);
-    is_covered.then(|| Cutoff::new(cutoff, scene.textures[texture].factor.x))
+    is_covered.then(|| CutoffBits::new(cutoff, scene.textures[texture].factor.x))
 }
 
 /// How a scene material's texture is used in this role.

@@ -70,13 +70,13 @@ impl<P: MeshPlacement> PlacedMesh<P> {
     /// which a point lies. In a merged tree, the rounding of the transformed corners is added.
     #[inline(always)]
     pub(super) fn error(&self, point: Vec3, local: DVec3, [a, b, c]: [DVec3; 3]) -> Vec3 {
-        let reach = self.placement.reach(local.abs());
-        let parts = point.abs() + reach.as_vec3() + self.placement.shift().abs().as_vec3();
-        let greatest = self.placement.reach(a.abs().max(b.abs()).max(c.abs()));
+        let reach = self.placement.abs_bound(local.abs());
+        let parts = point.abs() + reach.as_vec3() + self.placement.mesh_origin().abs().as_vec3();
+        let greatest = self.placement.abs_bound(a.abs().max(b.abs()).max(c.abs()));
         let of_double = double_error(greatest.max_element());
         let error = parts * (2.0 * f32::EPSILON) + Vec3::splat(of_double + f32::MIN_POSITIVE);
         if self.has_rounded_corners {
-            error + (greatest + self.placement.shift().abs()).as_vec3() * f32::EPSILON
+            error + (greatest + self.placement.mesh_origin().abs()).as_vec3() * f32::EPSILON
         } else {
             error
         }
@@ -107,15 +107,15 @@ impl<P: MeshPlacement> PlacedMesh<P> {
             normal: self.placement.normal(across).normalize().as_vec3(),
             barycentric: Vec3::new(1.0 - u as f32 - v as f32, u as f32, v as f32),
             is_near_edge,
-            is_coarse: f64::from(point.abs().max_element()) * COARSE < self.greatest(corners),
+            is_coarse: f64::from(point.abs().max_element()) * COARSE < self.max_coordinate(corners),
         }
     }
 
     /// Upper bound on the world coordinates of a triangle's corners.
     #[inline(always)]
-    fn greatest(&self, [a, b, c]: [DVec3; 3]) -> f64 {
-        let greatest = self.placement.reach(a.abs().max(b.abs()).max(c.abs()));
-        (greatest + self.placement.shift().abs()).max_element()
+    fn max_coordinate(&self, [a, b, c]: [DVec3; 3]) -> f64 {
+        let greatest = self.placement.abs_bound(a.abs().max(b.abs()).max(c.abs()));
+        (greatest + self.placement.mesh_origin().abs()).max_element()
     }
 
     /// Corrects an imprecise point by computing it from the ray or pulling it inside the triangle. Returns
@@ -143,7 +143,7 @@ impl<P: MeshPlacement> PlacedMesh<P> {
             return None;
         }
         let [a, b, c] = facet.corners;
-        let greatest = self.greatest(facet.corners);
+        let greatest = self.max_coordinate(facet.corners);
         let normal = self.placement.normal((b - a).cross(c - a));
         let t = (self.placement.point(a) - ray.origin).dot(normal) / ray.direction.dot(normal);
         let point = ray.at(t);
@@ -196,9 +196,9 @@ impl<P: MeshPlacement> PlacedMesh<P> {
         Vec3::new(choose(bent.x, normal.x), choose(bent.y, normal.y), choose(bent.z, normal.z))
     }
 
-    /// Shadow-ray origin on a smooth mesh: the point, lifted toward the viewer to the vertices' tangent
-    /// planes that are above it. This prevents facets from shadowing points that are lit according to the
-    /// shading normals (Hanika, *Hacking the Shadow Terminator*, Ray Tracing Gems II, chapter 4).
+    /// Shadow-ray origin on a smooth mesh: the point, lifted toward the viewer onto the vertices' tangent
+    /// planes above it. This prevents facets from shadowing points that are lit according to the shading
+    /// normals (Hanika, *Hacking the Shadow Terminator*, Ray Tracing Gems II, chapter 4).
     #[inline(always)]
     pub(super) fn shadow_point(&self, facet: &TrianglePoint, normals: &[Vec3; 3], direction: DVec3) -> Vec3 {
         let point = self.placement.point(facet.local);
@@ -239,9 +239,9 @@ mod tests {
             let (map, here) = (&Transform::IDENTITY, IdentityPlacement);
             let bits = |numbers: DVec3| numbers.to_array().map(f64::to_bits);
             assert_eq!(bits(MeshPlacement::point(map, at)), bits(here.point(at)));
-            assert_eq!(MeshPlacement::reach(map, at.abs()), here.reach(at.abs()));
+            assert_eq!(MeshPlacement::abs_bound(map, at.abs()), here.abs_bound(at.abs()));
             assert_eq!(bits(MeshPlacement::normal(map, at)), bits(here.normal(at)));
-            assert_eq!(map.shift(), here.shift());
+            assert_eq!(map.mesh_origin(), here.mesh_origin());
         }
     }
 }

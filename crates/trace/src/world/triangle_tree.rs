@@ -64,28 +64,28 @@ impl TriangleTree {
     }
 
     /// Visits the nodes whose boxes the ray intersects, parents first. `visit` returns whether to descend.
-    pub fn along(&self, ray: &Ray, visit: impl FnMut(&TreeNode, &RayInterval) -> bool) {
+    pub fn visit_along_ray(&self, ray: &Ray, visit: impl FnMut(&TreeNode, &RayInterval) -> bool) {
         match self {
-            Self::Boxes(tree) => tree.along(ray, visit),
-            Self::Planes(tree) => tree.along(ray, visit),
+            Self::Boxes(tree) => tree.visit_along_ray(ray, visit),
+            Self::Planes(tree) => tree.visit_along_ray(ray, visit),
         }
     }
 
     /// Visits every triangle that intersects a box. Nearby triangles may also be visited, and triangles may
     /// be visited more than once.
-    pub fn meeting(&self, bounds: &Aabb, visit: impl FnMut(u32)) {
+    pub fn visit_overlapping(&self, bounds: &Aabb, visit: impl FnMut(u32)) {
         match self {
-            Self::Boxes(tree) => tree.meeting(bounds, visit),
-            Self::Planes(tree) => tree.meeting(bounds, visit),
+            Self::Boxes(tree) => tree.visit_overlapping(bounds, visit),
+            Self::Planes(tree) => tree.visit_overlapping(bounds, visit),
         }
     }
 
-    /// Like [`TriangleTree::meeting`], until `visit` returns false. Returns whether all triangles were
-    /// visited.
-    pub fn meeting_while(&self, bounds: &Aabb, visit: impl FnMut(u32) -> bool) -> bool {
+    /// Like [`TriangleTree::visit_overlapping`], until `visit` returns false. Returns whether all triangles
+    /// were visited.
+    pub fn visit_overlapping_while(&self, bounds: &Aabb, visit: impl FnMut(u32) -> bool) -> bool {
         match self {
-            Self::Boxes(tree) => tree.meeting_while(bounds, visit),
-            Self::Planes(tree) => tree.meeting_while(bounds, visit),
+            Self::Boxes(tree) => tree.visit_overlapping_while(bounds, visit),
+            Self::Planes(tree) => tree.visit_overlapping_while(bounds, visit),
         }
     }
 

@@ -8,7 +8,7 @@ use crate::math::Vec3;
 /// Margin for rounding around lights, relative to their distance from the origin.
 const ROUNDING: f32 = 1e-5;
 
-/// Two bounding boxes of a light, which is inside their intersection.
+/// Two bounding boxes of a light. The light is inside both of them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LightBox {
     /// Bounding box of the light's bounding sphere.
@@ -50,7 +50,7 @@ impl World {
         for (id, object) in (0_u32..).zip(objects) {
             if self.materials_of(id).any(|material| material.bsdf.glass().is_some()) {
                 let (own, joined) =
-                    (object.bounds().unwrap_or(everywhere), &mut boxes[self.body(id) as usize]);
+                    (object.bounds().unwrap_or(everywhere), &mut boxes[self.solid_id(id) as usize]);
                 *joined = Some(joined.map_or(own, |others| others.union(own)));
             }
         }
@@ -66,7 +66,7 @@ impl World {
     /// Bounding boxes of all finite lights, with a margin for rounding.
     pub fn light_boxes(&self) -> Vec<LightBox> {
         let boxes = self.lights.iter().filter_map(|(_, light)| {
-            let bounds = light.bounds().filter(|_| !light.is_beyond())?;
+            let bounds = light.bounds().filter(|_| !light.is_infinite())?;
             let (center, radius) = (bounds.center.as_vec3(), bounds.radius as f32);
             let room = ROUNDING * (radius + center.abs().max_element());
             let around = Vec3::splat(radius + room);

@@ -42,7 +42,7 @@ mod tests {
     }
 
     #[test]
-    fn dithered_mean_matches_the_color() {
+    fn dithered_mean_matches_input_color() {
         assert_eq!(
             (dithered_to_6_bits([0; 3], 3, 4), dithered_to_6_bits([255; 3], 3, 4)),
             ([0; 3], [255; 3])

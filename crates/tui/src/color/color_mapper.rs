@@ -5,16 +5,16 @@ use std::cell::RefCell;
 use super::bayer::threshold;
 use super::oklab::oklab;
 use super::palette::{self, AnsiColors};
-use super::recipes::{Ink, Mixer};
+use super::recipes::{Ink, InkMixer};
 use super::{ColorDepth, NAMES};
 use crate::math::color::srgb8_to_linear;
 use crate::mosaic::{FittedCell, Tile};
 use ratatui::style::Color;
 
-/// Weight of the preference for nearby colors, with 256 and 16 colors.
+/// How strongly nearby colors are preferred on 256-color and 16-color terminals.
 const CALM_256: f32 = 3.0;
 const CALM_16: f32 = 3.0;
-/// The same weight for cells drawn as two halves with an edge between them.
+/// The same, for cells whose two halves are drawn separately.
 const CALM_EDGES: f32 = 200.0;
 /// Squared Oklab distance above which the two halves of a cell are drawn separately. Below it, their mean
 /// color is mixed using shade characters.
@@ -29,7 +29,7 @@ pub(crate) struct DrawnCell {
     pub(crate) pair: [Color; 2],
 }
 
-/// A pair of the 16 colors mixed in one cell.
+/// Two of the 16 colors, mixed in one cell.
 #[derive(Clone, Copy, Debug)]
 struct ColorPair {
     /// Index of the shade character. `None` if only the first color is used.
@@ -41,40 +41,40 @@ struct ColorPair {
 #[derive(Debug)]
 pub(crate) struct ColorMapper {
     depth: ColorDepth,
-    plain: RefCell<Mixer>,
-    /// Mixer for cells with shade characters, on 16-color terminals.
-    mixed: RefCell<Mixer>,
+    plain: RefCell<InkMixer>,
+    /// Ink mixer for cells with shade characters, on 16-color terminals.
+    mixed: RefCell<InkMixer>,
     pairs: Vec<ColorPair>,
 }
 
 impl ColorMapper {
     /// Creates a mapper for a terminal with this color depth and `ansi` as its 16 colors.
     pub(crate) fn new(depth: ColorDepth, ansi: &AnsiColors) -> Self {
-        let none = || RefCell::new(Mixer::default());
+        let none = || RefCell::new(InkMixer::default());
         let mut shades = Self { depth, plain: none(), mixed: none(), pairs: Vec::new() };
         match depth {
             ColorDepth::TrueColor | ColorDepth::None => {}
             ColorDepth::Indexed256 => {
-                let inks = (palette::FIRST_FIXED..=u8::MAX).filter_map(palette::fixed_color).map(Ink::plain);
-                shades.plain = RefCell::new(Mixer::new(inks.collect(), CALM_256));
+                let inks = (palette::FIRST_FIXED..=u8::MAX).filter_map(palette::fixed_color).map(Ink::solid);
+                shades.plain = RefCell::new(InkMixer::new(inks.collect(), CALM_256));
             }
             ColorDepth::Ansi16 => {
-                let inks: Vec<Ink> = ansi.iter().copied().map(Ink::plain).collect();
-                shades.pairs = pairs(&inks);
+                let inks: Vec<Ink> = ansi.iter().copied().map(Ink::solid).collect();
+                shades.pairs = color_pairs(&inks);
                 let mixed = shades.pairs.iter().map(|pair| {
                     let [front, back] = pair.colors.map(|color| &inks[color]);
                     pair.level.map_or(*front, |level| Ink::shaded(front, back, LEVELS[level]))
                 });
-                shades.mixed = RefCell::new(Mixer::new(mixed.collect(), CALM_16));
-                shades.plain = RefCell::new(Mixer::new(inks, CALM_EDGES));
+                shades.mixed = RefCell::new(InkMixer::new(mixed.collect(), CALM_16));
+                shades.plain = RefCell::new(InkMixer::new(inks, CALM_EDGES));
             }
         }
         shades
     }
 
     /// The terminal color that approximates a color at this pixel position.
-    pub(crate) fn color(&self, rgb: [u8; 3], x: usize, y: usize) -> Color {
-        let index = || self.plain.borrow_mut().ink(rgb, threshold(x, y));
+    pub(crate) fn map_color(&self, rgb: [u8; 3], x: usize, y: usize) -> Color {
+        let index = || self.plain.borrow_mut().ink_index(rgb, threshold(x, y));
         match self.depth {
             ColorDepth::TrueColor => Color::Rgb(rgb[0], rgb[1], rgb[2]),
             ColorDepth::Indexed256 => Color::Indexed(palette::FIRST_FIXED.saturating_add(index() as u8)),
@@ -84,20 +84,20 @@ impl ColorMapper {
     }
 
     /// The cell to draw at this column and row of the preview.
-    pub(crate) fn cell(&self, fitted: FittedCell, x: usize, y: usize) -> DrawnCell {
+    pub(crate) fn map_cell(&self, fitted: FittedCell, x: usize, y: usize) -> DrawnCell {
         let [first, second] = fitted.pair;
         if self.depth == ColorDepth::Ansi16 {
             let labs = fitted.pair.map(|rgb| oklab(srgb8_to_linear(rgb)));
             if labs[0].distance_squared(labs[1]) < EDGE {
-                return self.shaded(mean(first, second, fitted.tile), x, y);
+                return self.dithered_cell(mixed_color(first, second, fitted.tile), x, y);
             }
         }
-        let pair = [self.color(first, x, 2 * y), self.color(second, x, 2 * y + 1)];
+        let pair = [self.map_color(first, x, 2 * y), self.map_color(second, x, 2 * y + 1)];
         DrawnCell { tile: fitted.tile, pair }
     }
 
-    fn shaded(&self, rgb: [u8; 3], x: usize, y: usize) -> DrawnCell {
-        let index = self.mixed.borrow_mut().ink(rgb, threshold(x, y));
+    fn dithered_cell(&self, rgb: [u8; 3], x: usize, y: usize) -> DrawnCell {
+        let index = self.mixed.borrow_mut().ink_index(rgb, threshold(x, y));
         let ColorPair { level, colors } =
             self.pairs.get(index).copied().unwrap_or(ColorPair { level: None, colors: [0; 2] });
         let [front, back] = colors.map(|color| NAMES[color]);
@@ -111,7 +111,7 @@ impl ColorMapper {
 }
 
 /// All single colors, and all pairs with each shade character.
-fn pairs(inks: &[Ink]) -> Vec<ColorPair> {
+fn color_pairs(inks: &[Ink]) -> Vec<ColorPair> {
     let alone = (0..inks.len()).map(|color| ColorPair { level: None, colors: [color; 2] });
     let both = (0..inks.len()).flat_map(|a| (0..a).map(move |b| [a, b]));
     let shaded =
@@ -119,8 +119,8 @@ fn pairs(inks: &[Ink]) -> Vec<ColorPair> {
     alone.chain(shaded).collect()
 }
 
-fn mean(first: [u8; 3], second: [u8; 3], tile: Tile) -> [u8; 3] {
-    let [a, b] = tile.sizes().map(|size| size as f32);
+fn mixed_color(first: [u8; 3], second: [u8; 3], tile: Tile) -> [u8; 3] {
+    let [a, b] = tile.part_sizes().map(|size| size as f32);
     let mixed = (srgb8_to_linear(first) * a + srgb8_to_linear(second) * b) / (a + b);
     mixed.to_array().map(crate::math::color::linear_to_srgb8)
 }
@@ -131,7 +131,7 @@ mod tests {
     use crate::color::XTERM;
 
     fn cell(shades: &ColorMapper, rgb: [u8; 3], x: usize, y: usize) -> DrawnCell {
-        shades.cell(FittedCell { tile: Tile::HALVES, pair: [rgb; 2] }, x, y)
+        shades.map_cell(FittedCell { tile: Tile::HALVES, pair: [rgb; 2] }, x, y)
     }
 
     #[test]
@@ -175,7 +175,7 @@ mod tests {
         assert_eq!(cell(&shades, [150, 75, 50], 2, 2).pair, [Color::Red; 2]);
         let edge = FittedCell { tile: Tile::HALVES, pair: [[255; 3], [0; 3]] };
         assert_eq!(
-            shades.cell(edge, 1, 1),
+            shades.map_cell(edge, 1, 1),
             DrawnCell { tile: Tile::HALVES, pair: [Color::White, Color::Black] }
         );
     }

@@ -1,4 +1,4 @@
-//! Terminal colors, and how other colors are approximated with them.
+//! Terminal colors, and approximation of other colors by them.
 
 mod bayer;
 mod color_mapper;
@@ -13,7 +13,7 @@ pub(super) use self::bayer::dithered_to_6_bits;
 pub(super) use self::color_mapper::ColorMapper;
 pub(super) use self::oklab::oklab;
 pub use self::palette::xterm_rgb;
-pub(super) use self::palette::{AnsiColors, XTERM, ansi, fixed_color, nearest_256};
+pub(super) use self::palette::{AnsiColors, XTERM, assumed_ansi_colors, fixed_color, nearest_256};
 pub(super) use self::palette_dither::PaletteDither;
 use super::terminals::Brand;
 use crate::choice;
@@ -48,19 +48,19 @@ pub enum ColorDepth {
 }
 
 /// Resolves the user's choice, using environment variables for `Auto`.
-pub(super) fn depth(choice: ColorChoice, variable: impl Fn(&str) -> Option<String>) -> ColorDepth {
+pub(super) fn resolve_depth(choice: ColorChoice, variable: impl Fn(&str) -> Option<String>) -> ColorDepth {
     match choice {
         ColorChoice::TrueColor => ColorDepth::TrueColor,
         ColorChoice::Indexed256 => ColorDepth::Indexed256,
         ColorChoice::Ansi16 => ColorDepth::Ansi16,
         ColorChoice::None => ColorDepth::None,
-        ColorChoice::Auto => detected(variable),
+        ColorChoice::Auto => detect_depth(variable),
     }
 }
 
 /// Detects the color depth from `NO_COLOR` (no-color.org), `COLORTERM`, `TERM` and `TERM_PROGRAM`, in this
 /// order. SSH often forwards only `TERM`.
-fn detected(variable: impl Fn(&str) -> Option<String>) -> ColorDepth {
+fn detect_depth(variable: impl Fn(&str) -> Option<String>) -> ColorDepth {
     let get = |name: &str| variable(name).unwrap_or_default();
     let term = get("TERM");
     if !get("NO_COLOR").is_empty() || has_no_colors(&term) {
@@ -86,7 +86,7 @@ fn has_no_colors(term: &str) -> bool {
 
 fn is_true_color(term: &str, program: &str) -> bool {
     const TERMS: [&str; 8] = ["kitty", "alacritty", "foot", "wezterm", "ghostty", "contour", "iterm2", "rio"];
-    // Inside tmux, TERM_PROGRAM is `tmux`, so the outer terminal's capabilities do not leak in.
+    // Inside tmux, TERM_PROGRAM is `tmux`, so the outer terminal's name does not affect the result.
     term.ends_with("-direct")
         || TERMS.iter().any(|name| term.contains(name))
         || Brand::from_program(program).is_some_and(Brand::has_colors_and_repeats)
@@ -123,7 +123,7 @@ mod tests {
     use super::*;
 
     fn auto(pairs: &[(&str, &str)]) -> ColorDepth {
-        depth(ColorChoice::Auto, |name| {
+        resolve_depth(ColorChoice::Auto, |name| {
             pairs.iter().find(|(key, _)| *key == name).map(|(_, value)| (*value).to_owned())
         })
     }
@@ -154,6 +154,6 @@ mod tests {
     fn no_color_is_honored_unless_overridden() {
         assert_eq!(auto(&[("NO_COLOR", "1"), ("COLORTERM", "truecolor")]), ColorDepth::None);
         assert_eq!(auto(&[("NO_COLOR", ""), ("COLORTERM", "truecolor")]), ColorDepth::TrueColor);
-        assert_eq!(depth(ColorChoice::Ansi16, |_| Some("1".to_owned())), ColorDepth::Ansi16);
+        assert_eq!(resolve_depth(ColorChoice::Ansi16, |_| Some("1".to_owned())), ColorDepth::Ansi16);
     }
 }

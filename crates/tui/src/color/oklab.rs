@@ -16,14 +16,14 @@ const LAB: [Vec3; 3] = [
     Vec3::new(0.025_904_037, 0.782_771_77, -0.808_675_77),
 ];
 
-fn product(rows: [Vec3; 3], v: Vec3) -> Vec3 {
+fn multiply_matrix(rows: [Vec3; 3], v: Vec3) -> Vec3 {
     Vec3::from_array(rows.map(|row| row.dot(v)))
 }
 
 /// Converts a linear color to Oklab.
 pub(crate) fn oklab(linear: Vec3) -> Vec3 {
-    let cones = product(CONES, linear.max(Vec3::ZERO));
-    product(LAB, Vec3::from_array(cones.to_array().map(f32::cbrt)))
+    let cones = multiply_matrix(CONES, linear.max(Vec3::ZERO));
+    multiply_matrix(LAB, Vec3::from_array(cones.to_array().map(f32::cbrt)))
 }
 
 /// Derivative of Oklab with respect to linear light, bounded artificially near black, where it diverges.
@@ -34,7 +34,7 @@ impl OklabDerivative {
     /// The derivative at a linear color.
     pub(super) fn at(linear: Vec3) -> Self {
         const DARK: f32 = 0.01;
-        let cones = product(CONES, linear.max(Vec3::ZERO));
+        let cones = multiply_matrix(CONES, linear.max(Vec3::ZERO));
         Self(Vec3::from_array(cones.to_array().map(|cone| {
             let root = (cone + DARK).cbrt();
             1.0 / (3.0 * root * root)
@@ -43,7 +43,7 @@ impl OklabDerivative {
 
     /// Change in Oklab for a small change in linear light.
     pub(super) fn change(self, linear: Vec3) -> Vec3 {
-        product(LAB, self.0 * product(CONES, linear))
+        multiply_matrix(LAB, self.0 * multiply_matrix(CONES, linear))
     }
 }
 

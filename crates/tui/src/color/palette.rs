@@ -54,7 +54,7 @@ const VGA: AnsiColors = [
 ];
 
 /// Assumed ANSI colors of a terminal that has not reported them.
-pub(crate) fn ansi(term: &str) -> &'static AnsiColors {
+pub(crate) fn assumed_ansi_colors(term: &str) -> &'static AnsiColors {
     if term.starts_with("linux") { &VGA } else { &XTERM }
 }
 
@@ -98,15 +98,15 @@ pub fn xterm_rgb(color: Color) -> Option<[u8; 3]> {
     Some(XTERM[ansi])
 }
 
-/// The nearest palette color from the cube (16 to 231) and the grays (232 to 255).
+/// Index of the nearest palette color in the cube (16 to 231) or the grays (232 to 255).
 pub(crate) fn nearest_256(rgb: [u8; 3]) -> u8 {
-    let steps = rgb.map(nearest_level);
+    let steps = rgb.map(nearest_cube_level);
     let cube = steps.map(|step| CUBE_LEVELS[step]);
     let mean = rgb.iter().map(|&channel| u32::from(channel)).sum::<u32>() / 3;
     let gray_step = (mean.saturating_sub(8) + 5).min(235) / 10;
     let gray_step = u8::try_from(gray_step.min(23)).unwrap_or(23);
     let gray = [8 + 10 * gray_step; 3];
-    if difference(rgb, gray) < difference(rgb, cube) {
+    if redmean_distance_squared(rgb, gray) < redmean_distance_squared(rgb, cube) {
         FIRST_GRAY + gray_step
     } else {
         let index = 36 * steps[0] + 6 * steps[1] + steps[2];
@@ -114,7 +114,7 @@ pub(crate) fn nearest_256(rgb: [u8; 3]) -> u8 {
     }
 }
 
-fn nearest_level(channel: u8) -> usize {
+fn nearest_cube_level(channel: u8) -> usize {
     match channel {
         0..48 => 0,
         48..115 => 1,
@@ -123,7 +123,7 @@ fn nearest_level(channel: u8) -> usize {
 }
 
 /// Squared "redmean" distance in sRGB (compuphase.com/cmetric.htm), a cheap perceptual approximation.
-fn difference(a: [u8; 3], b: [u8; 3]) -> i32 {
+fn redmean_distance_squared(a: [u8; 3], b: [u8; 3]) -> i32 {
     let [dr, dg, db] = std::array::from_fn(|i| i32::from(a[i]) - i32::from(b[i]));
     let mean_red = (i32::from(a[0]) + i32::from(b[0])) / 2;
     (((512 + mean_red) * dr * dr) >> 8) + 4 * dg * dg + (((767 - mean_red) * db * db) >> 8)
@@ -148,7 +148,8 @@ mod tests {
         ] {
             assert_eq!(nearest_256(rgb), index, "{rgb:?}");
             assert!(
-                fixed_color(index).is_some_and(|fixed_color| difference(fixed_color, rgb) <= 36),
+                fixed_color(index)
+                    .is_some_and(|fixed_color| redmean_distance_squared(fixed_color, rgb) <= 36),
                 "{rgb:?}"
             );
         }
@@ -163,8 +164,9 @@ mod tests {
         assert_eq!(palette.len(), 240);
         for i in 0..4096_u32 {
             let rgb = [0, 8, 16].map(|shift| (i.wrapping_mul(2_654_435_761) >> shift) as u8);
-            let got = difference(rgb, fixed_color(nearest_256(rgb)).expect("a fixed color"));
-            let best = palette.iter().map(|&other| difference(rgb, other)).min().expect("240 colors");
+            let got = redmean_distance_squared(rgb, fixed_color(nearest_256(rgb)).expect("a fixed color"));
+            let best =
+                palette.iter().map(|&other| redmean_distance_squared(rgb, other)).min().expect("240 colors");
             assert!(f64::from(got).sqrt() <= f64::from(best).sqrt() + 12.0, "{rgb:?}: {got} {best}");
         }
     }

@@ -23,20 +23,20 @@ const MAX_RECIPES: usize = 1 << 16;
 pub(super) struct Ink {
     linear: Vec3,
     lab: Vec3,
-    /// For patterns, the mean squared distance of the two colors from their mean. Zero for solid colors.
+    /// Mean squared distance of a pattern's two colors from their mean. Zero for solid colors.
     texture: f32,
 }
 
 impl Ink {
     /// A solid color.
-    pub(super) fn plain(rgb: [u8; 3]) -> Self {
+    pub(super) fn solid(rgb: [u8; 3]) -> Self {
         let linear = srgb8_to_linear(rgb);
         Self { linear, lab: oklab(linear), texture: 0.0 }
     }
 
     /// A fine pattern with a fraction `share` of `front` on `back`.
     pub(super) fn shaded(front: &Self, back: &Self, share: f32) -> Self {
-        /// Weight for patterns within a cell, which are less visible than patterns made of whole cells.
+        /// Weight of patterns within a cell, which are less visible than patterns of whole cells.
         const FINENESS: f32 = 0.25;
         let linear = front.linear * share + back.linear * (1.0 - share);
         let lab = oklab(linear);
@@ -48,14 +48,14 @@ impl Ink {
 
 /// Cached dithering recipes for a set of inks.
 #[derive(Debug, Default)]
-pub(super) struct Mixer {
+pub(super) struct InkMixer {
     inks: Vec<Ink>,
     /// Weight of the distance between inks relative to the error of their mean.
     calm: f32,
     recipes: HashMap<[u8; 3], [u16; PARTS]>,
 }
 
-impl Mixer {
+impl InkMixer {
     /// Creates a mixer for these inks. With `calm` = 0, only the mean matters. Larger values favor inks near
     /// the color.
     pub(super) fn new(inks: Vec<Ink>, calm: f32) -> Self {
@@ -63,16 +63,16 @@ impl Mixer {
     }
 
     /// Index of the ink to use for a color at a dither threshold in (0, 1).
-    pub(super) fn ink(&mut self, rgb: [u8; 3], threshold: f32) -> usize {
+    pub(super) fn ink_index(&mut self, rgb: [u8; 3], threshold: f32) -> usize {
         let part = ((threshold * PARTS as f32) as usize).min(PARTS - 1);
         let recipe = match self.recipes.get(&rgb) {
             Some(recipe) => *recipe,
-            None => self.remember(rgb),
+            None => self.cached_recipe(rgb),
         };
         usize::from(recipe[part])
     }
 
-    fn remember(&mut self, rgb: [u8; 3]) -> [u16; PARTS] {
+    fn cached_recipe(&mut self, rgb: [u8; 3]) -> [u16; PARTS] {
         if self.recipes.len() >= MAX_RECIPES {
             self.recipes.clear();
         }
@@ -119,8 +119,8 @@ mod tests {
     use super::*;
     use crate::color::palette;
 
-    fn cube() -> Mixer {
-        Mixer::new((16..=255).filter_map(palette::fixed_color).map(Ink::plain).collect(), 0.1)
+    fn cube() -> InkMixer {
+        InkMixer::new((16..=255).filter_map(palette::fixed_color).map(Ink::solid).collect(), 0.1)
     }
 
     #[test]
@@ -129,7 +129,7 @@ mod tests {
         for index in [0, 5, 100, 215, 230] {
             let rgb = palette::fixed_color(16 + index).expect("a fixed color");
             for part in 0..PARTS {
-                let ink = mixer.ink(rgb, (part as f32 + 0.5) / PARTS as f32);
+                let ink = mixer.ink_index(rgb, (part as f32 + 0.5) / PARTS as f32);
                 assert_eq!(palette::fixed_color(16 + ink as u8), Some(rgb));
             }
         }
@@ -140,7 +140,7 @@ mod tests {
         let mut mixer = cube();
         for rgb in [[150, 75, 50], [101, 67, 33], [30, 60, 90], [200, 190, 180], [115, 115, 110]] {
             let parts: Vec<usize> =
-                (0..PARTS).map(|part| mixer.ink(rgb, (part as f32 + 0.5) / PARTS as f32)).collect();
+                (0..PARTS).map(|part| mixer.ink_index(rgb, (part as f32 + 0.5) / PARTS as f32)).collect();
             let mean = parts.iter().map(|ink| mixer.inks[*ink].linear).sum::<Vec3>() / PARTS as f32;
             let off = oklab(mean).distance(oklab(srgb8_to_linear(rgb)));
             assert!(off < 0.02, "{rgb:?}: {off}");
@@ -152,7 +152,7 @@ mod tests {
         let mut mixer = cube();
         let lab = oklab(srgb8_to_linear([150, 75, 50]));
         for part in 0..PARTS {
-            let ink = mixer.ink([150, 75, 50], (part as f32 + 0.5) / PARTS as f32);
+            let ink = mixer.ink_index([150, 75, 50], (part as f32 + 0.5) / PARTS as f32);
             assert!(mixer.inks[ink].lab.distance(lab) < 0.15);
         }
     }

@@ -21,11 +21,11 @@ impl TokenBucket {
 
     /// Current number of tokens.
     pub(super) fn tokens(&self, now: Instant) -> usize {
-        self.level(now).max(0.0) as usize
+        self.tokens_at(now).max(0.0) as usize
     }
 
     pub(super) fn take(&mut self, bytes: usize, now: Instant) {
-        (self.tokens, self.at) = (self.level(now) - bytes as f64, now);
+        (self.tokens, self.at) = (self.tokens_at(now) - bytes as f64, now);
     }
 
     /// Time at which there are enough tokens to send `bytes`.
@@ -34,11 +34,11 @@ impl TokenBucket {
             return now;
         }
         // One extra byte to compensate for rounding.
-        let missing = (bytes + 1) as f64 - self.level(now);
+        let missing = (bytes + 1) as f64 - self.tokens_at(now);
         now + Duration::from_secs_f64(missing / RATE)
     }
 
-    fn level(&self, now: Instant) -> f64 {
+    fn tokens_at(&self, now: Instant) -> f64 {
         let filled = now.saturating_duration_since(self.at).as_secs_f64() * RATE;
         (self.tokens + filled).min(FULL)
     }

@@ -25,15 +25,15 @@ use self::bucket::TokenBucket;
 /// Maximum number of unacknowledged bytes: 24 kB minus the bytes that set up the screen, which are not
 /// counted.
 const MAX_WINDOW: usize = 23_800;
-/// Initial window, followed by the minimum window.
+/// Initial and minimum window size in bytes.
 const INITIAL_WINDOW: f64 = 8_000.0;
 const MIN_WINDOW: f64 = 1_500.0;
 /// Maximum queueing delay.
 const MAX_QUEUE: Duration = Duration::from_millis(60);
 /// Timeout for the first reply.
 const REPLY_TIMEOUT: Duration = Duration::from_secs(1);
-/// After this long without a reply, or after `SILENCE_ROUND_TRIPS` round trips if that is longer, outstanding
-/// replies are considered lost.
+/// Outstanding replies are considered lost after this time or `SILENCE_ROUND_TRIPS` round trips, whichever is
+/// longer.
 const SILENCE: Duration = Duration::from_secs(1);
 const SILENCE_ROUND_TRIPS: u32 = 4;
 /// A terminal is fast if it replied to most of the last `RECENT_SLICES` slices within this time.
@@ -87,8 +87,8 @@ pub(super) struct Connection {
     /// Time at which the window last shrank. Slices sent before then are ignored when shrinking it again.
     shrunk: Option<Instant>,
     round_trips: RoundTrips,
-    /// Round-trip times of the last slices. Small slices are included because only small ones are sent after
-    /// a slowdown, and they must show when the connection is fast again.
+    /// Round-trip times of the last slices. Small slices are included because after a slowdown, only small
+    /// ones are sent, and they must be able to show that the connection is fast again.
     recent: VecDeque<Duration>,
     /// Time of the last reply or, if later, when the oldest pending query was sent.
     heard: Instant,
@@ -159,7 +159,7 @@ impl Connection {
     }
 
     /// Records a reply.
-    pub(super) fn answered(&mut self, question: QueryKind, now: Instant) {
+    pub(super) fn handle_reply(&mut self, question: QueryKind, now: Instant) {
         self.replies = ReplyState::Answering;
         self.heard = now;
         let Some(place) = self.flight.iter().position(|slice| slice.question == question) else { return };
@@ -178,7 +178,7 @@ impl Connection {
         }
     }
 
-    /// Time at which sending may become possible even without a reply.
+    /// Earliest time at which more may be sent if no reply arrives.
     pub(super) fn wake(&self, now: Instant) -> Option<Instant> {
         let filled = self.bucket.available_at(MIN_SLICE + QUERY_BYTES, now);
         match self.replies {

@@ -61,7 +61,7 @@ impl SimulatedTerminal {
         (self.carried, self.longest) = (0, Duration::ZERO);
         while self.now < end {
             while let Some((_, question)) = self.due.pop_front_if(|(when, _)| *when <= self.now) {
-                self.connection.answered(question, self.now);
+                self.connection.handle_reply(question, self.now);
             }
             loop {
                 let room = self.connection.max_slice(self.now);
@@ -93,7 +93,7 @@ fn full_bandwidth_with_short_queues() {
         terminal.run(10_000);
         let name = format!("{bytes_a_second} B/s, {milliseconds} ms");
         assert!(terminal.most_in_flight <= MAX_WINDOW, "{name}: {}", terminal.most_in_flight);
-        // The minimum window is larger than what the slowest connections carry in that time.
+        // The minimum window holds more bytes than the slowest connections carry in that time.
         let longest = MAX_QUEUE.as_secs_f64() * 2.0 + MIN_WINDOW / bytes_a_second;
         assert!(terminal.longest.as_secs_f64() <= longest, "{name}: {:?}", terminal.longest);
         let most = MAX_WINDOW as f64 / (bytes_a_second * milliseconds as f64 / 1e3);
@@ -158,7 +158,7 @@ fn lost_reply_delays_output_by_a_second() {
     let mut connection = Connection::new(false, Instant::now());
     let now = Instant::now();
     connection.send(100, Some(QueryKind::Attributes), now);
-    connection.answered(QueryKind::Attributes, now + Duration::from_millis(5));
+    connection.handle_reply(QueryKind::Attributes, now + Duration::from_millis(5));
     let sent = now + Duration::from_millis(100);
     connection.send(connection.window_bytes(), Some(QueryKind::Status), sent);
     assert_eq!(connection.max_slice(sent + Duration::from_millis(900)), 0);
@@ -167,7 +167,7 @@ fn lost_reply_delays_output_by_a_second() {
     // The timeout grows with the round-trip time.
     let mut slow = Connection::new(false, now);
     slow.send(100, Some(QueryKind::Attributes), now);
-    slow.answered(QueryKind::Attributes, now + Duration::from_millis(800));
+    slow.handle_reply(QueryKind::Attributes, now + Duration::from_millis(800));
     slow.send(slow.window_bytes(), Some(QueryKind::Status), sent);
     assert_eq!(slow.max_slice(sent + Duration::from_secs(3)), 0);
     assert!(slow.max_slice(sent + Duration::from_millis(3200)) > 0);
@@ -179,7 +179,7 @@ fn idle_connection_needs_no_wakeups() {
     terminal.run(100);
     terminal.now += Duration::from_secs(1);
     while let Some((_, question)) = terminal.due.pop_front() {
-        terminal.connection.answered(question, terminal.now);
+        terminal.connection.handle_reply(question, terminal.now);
     }
     assert!(!terminal.connection.awaits_reply());
     assert_eq!(terminal.connection.wake(terminal.now), None);
@@ -190,11 +190,11 @@ fn idle_connection_needs_no_wakeups() {
 fn unsolicited_replies_are_ignored() {
     let mut connection = Connection::new(false, Instant::now());
     let now = Instant::now();
-    connection.answered(QueryKind::Status, now);
+    connection.handle_reply(QueryKind::Status, now);
     connection.send(100, Some(QueryKind::Attributes), now);
-    connection.answered(QueryKind::Status, now);
+    connection.handle_reply(QueryKind::Status, now);
     assert!(connection.awaits_reply());
-    connection.answered(QueryKind::Attributes, now);
+    connection.handle_reply(QueryKind::Attributes, now);
     assert!(!connection.awaits_reply() && connection.in_flight == 0);
 }
 
@@ -205,7 +205,7 @@ fn small_slices_can_make_terminal_fast_again() {
     let mut answer = |connection: &mut Connection, bytes: usize, milliseconds: u64| {
         connection.send(bytes, Some(QueryKind::Status), now);
         now += Duration::from_millis(milliseconds);
-        connection.answered(QueryKind::Status, now);
+        connection.handle_reply(QueryKind::Status, now);
     };
     assert!(!connection.is_fast(), "no replies yet");
     answer(&mut connection, 2000, 1);
@@ -220,6 +220,6 @@ fn small_slices_can_make_terminal_fast_again() {
     assert!(connection.is_fast());
     let mut behind = Connection::new(true, now);
     behind.send(12, Some(QueryKind::Attributes), now);
-    behind.answered(QueryKind::Attributes, now + Duration::from_millis(1));
+    behind.handle_reply(QueryKind::Attributes, now + Duration::from_millis(1));
     assert!(!behind.is_fast(), "the multiplexer replies");
 }

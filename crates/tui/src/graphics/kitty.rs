@@ -3,7 +3,7 @@
 use ratatui::layout::Rect;
 
 use super::base64::encoded;
-use super::png::png;
+use super::png::encode_png;
 use crate::film::Picture;
 
 /// IDs of the two alternating images. Other programs are unlikely to use them.
@@ -11,10 +11,11 @@ const IDS: [u32; 2] = [0x67_6c_69, 0x6d_74_01];
 /// Maximum length of a chunk.
 const CHUNK: usize = 4096;
 
-/// The commands that draw an image at the cursor, covering these cells, and then delete the previous image.
+/// The commands that draw an image at the cursor, scaled to cover these cells, and then delete the previous
+/// image.
 pub(super) fn encode(picture: &Picture, cells: Rect, turn: bool) -> Vec<Vec<u8>> {
     let [id, other] = if turn { IDS } else { [IDS[1], IDS[0]] };
-    let data = encoded(&png(picture));
+    let data = encoded(&encode_png(picture));
     let count = data.len().div_ceil(CHUNK);
     let mut commands = Vec::with_capacity(count);
     for (i, chunk) in data.chunks(CHUNK).enumerate() {

@@ -122,9 +122,9 @@ impl Images {
             && (self.wanted.is_none() || (self.shown == self.wanted && !(self.is_coarse && self.is_still)))
     }
 
-    /// The next bytes, at most `most` unless a single piece is longer. `None` if everything has been sent.
-    /// `rate` is the bandwidth in bytes per second, if known.
-    pub(super) fn slice(&mut self, most: usize, rate: Option<f64>) -> Option<Vec<u8>> {
+    /// The next bytes. Returns at most `most` bytes unless a single piece is longer. `None` if everything has
+    /// been sent. `rate` is the bandwidth in bytes per second, if known.
+    pub(super) fn next_slice(&mut self, most: usize, rate: Option<f64>) -> Option<Vec<u8>> {
         if self.pieces.is_empty() && !self.is_complete() {
             self.encode(rate);
         }
@@ -160,17 +160,18 @@ impl Images {
         };
         let last = bodies.len().saturating_sub(1);
         for (i, body) in bodies.into_iter().enumerate() {
-            let piece = if i == last { self.at_cell(wanted.cells, body) } else { self.wrap_for_tmux(body) };
+            let piece =
+                if i == last { self.wrap_at_cell(wanted.cells, body) } else { self.wrap_for_tmux(body) };
             self.pieces.push_back(piece);
         }
         self.shown = Some(wanted);
     }
 
-    /// Positions the cursor at the top-left cell and restores it afterwards.
-    fn at_cell(&self, cells: Rect, body: Vec<u8>) -> Vec<u8> {
+    /// Wraps `body` so that it is drawn from the top-left cell and the cursor is restored afterwards.
+    fn wrap_at_cell(&self, cells: Rect, body: Vec<u8>) -> Vec<u8> {
         let mut bytes = format!("\x1b7\x1b[{};{}H", cells.y + 1, cells.x + 1).into_bytes();
         if self.is_wrapped {
-            // tmux moves the real cursor only when it draws, so print a blank there and step back.
+            // tmux moves the real cursor only when it draws, so print a blank at that cell and move back.
             bytes.extend_from_slice(b"\x1b[0m ");
             bytes.extend(self.wrap_for_tmux([b"\x1b[D".to_vec(), body].concat()));
         } else {
@@ -181,12 +182,12 @@ impl Images {
     }
 
     fn wrap_for_tmux(&self, body: Vec<u8>) -> Vec<u8> {
-        if self.is_wrapped { wrapped(&body) } else { body }
+        if self.is_wrapped { tmux_passthrough(&body) } else { body }
     }
 }
 
 /// Wraps an escape sequence so that tmux passes it on, provided that `allow-passthrough` is on.
-pub(super) fn wrapped(body: &[u8]) -> Vec<u8> {
+pub(super) fn tmux_passthrough(body: &[u8]) -> Vec<u8> {
     let mut bytes = b"\x1bPtmux;".to_vec();
     for &byte in body {
         if byte == 0x1b {

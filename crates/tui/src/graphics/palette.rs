@@ -14,7 +14,7 @@ use crate::film::Picture;
 const MAX: usize = 240;
 /// Bits per channel of the histogram.
 const BITS: u32 = 6;
-/// The palette is reused while its RMS error is at most `WORSE` times the error of a new palette plus
+/// The palette is reused while its RMS error does not exceed the error of a new palette times `WORSE`, plus
 /// `ALLOWED` code values.
 const WORSE: f64 = 1.2;
 const ALLOWED: f64 = 1.5;
@@ -29,9 +29,11 @@ pub(super) struct Palette {
 impl Palette {
     /// Returns the palette for an image, reusing the previous one if it still fits.
     pub(super) fn for_picture(picture: &Picture, before: Option<Self>) -> Self {
-        let mut bins = bins(picture);
+        let mut bins = histogram(picture);
         let colors = split_bins(&mut bins);
-        let fits = |palette: &Self| error(&bins, &palette.colors) <= WORSE * error(&bins, &colors) + ALLOWED;
+        let fits = |palette: &Self| {
+            palette_error(&bins, &palette.colors) <= WORSE * palette_error(&bins, &colors) + ALLOWED
+        };
         before.filter(fits).unwrap_or_else(|| Self { dither: PaletteDither::new(&colors), colors })
     }
 
@@ -44,7 +46,7 @@ impl Palette {
         let width = picture.width.max(1) as usize;
         let mut index = |(i, rgb): (usize, &[u8; 3])| {
             let (x, y) = (i % width, i / width);
-            self.dither.index(dithered_to_6_bits(*rgb, x, y), x, y) as u8
+            self.dither.dithered_index(dithered_to_6_bits(*rgb, x, y), x, y) as u8
         };
         picture.pixels.iter().enumerate().map(&mut index).collect()
     }
@@ -64,7 +66,7 @@ impl Bin {
 }
 
 /// Histogram of an image's colors, without empty bins.
-fn bins(picture: &Picture) -> Vec<Bin> {
+fn histogram(picture: &Picture) -> Vec<Bin> {
     let mut bins = vec![Bin::default(); 1 << (3 * BITS)];
     for rgb in &picture.pixels {
         let place = rgb.iter().fold(0, |place, channel| place << BITS | usize::from(channel >> (8 - BITS)));
@@ -88,7 +90,7 @@ struct ColorBox {
 }
 
 impl ColorBox {
-    fn of(all: &[Bin], bins: Range<usize>) -> Self {
+    fn for_bins(all: &[Bin], bins: Range<usize>) -> Self {
         let own = &all[bins.clone()];
         let count: f64 = own.iter().map(|bin| f64::from(bin.count)).sum();
         let sum = |i: usize| own.iter().map(|bin| f64::from(bin.sum[i])).sum::<f64>();
@@ -107,7 +109,7 @@ impl ColorBox {
 /// Splits the box with the largest error until there are enough boxes or all are exact. Returns the mean
 /// color of each box.
 fn split_bins(bins: &mut [Bin]) -> Vec<[u8; 3]> {
-    let mut boxes = vec![ColorBox::of(bins, 0..bins.len())];
+    let mut boxes = vec![ColorBox::for_bins(bins, 0..bins.len())];
     while boxes.len() < MAX {
         let worst = (0..boxes.len()).max_by(|a, b| boxes[*a].error.total_cmp(&boxes[*b].error));
         let Some(worst) = worst.filter(|worst| boxes[*worst].error > 0.0) else { break };
@@ -117,14 +119,14 @@ fn split_bins(bins: &mut [Bin]) -> Vec<[u8; 3]> {
         let middle = range.start + own.partition_point(|bin| bin.mean()[axis] < mean[axis]);
         // Rounding may put all bins on one side of the split.
         let middle = middle.clamp(range.start + 1, range.end - 1);
-        boxes.push(ColorBox::of(bins, range.start..middle));
-        boxes.push(ColorBox::of(bins, middle..range.end));
+        boxes.push(ColorBox::for_bins(bins, range.start..middle));
+        boxes.push(ColorBox::for_bins(bins, middle..range.end));
     }
     boxes.iter().map(|own| own.mean.map(|channel| channel.round() as u8)).collect()
 }
 
 /// RMS distance between an image's colors and the nearest palette colors, in code values.
-fn error(bins: &[Bin], colors: &[[u8; 3]]) -> f64 {
+fn palette_error(bins: &[Bin], colors: &[[u8; 3]]) -> f64 {
     let nearest = |mean: [f64; 3]| {
         let distance = |color: &[u8; 3]| -> f64 {
             mean.iter().zip(color).map(|(a, b)| (a - f64::from(*b)).powi(2)).sum()
@@ -159,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn few_colors_are_exact_and_rare_ones_are_kept() {
+    fn few_colors_are_exact_even_if_rare() {
         let (red, blue) = ([255, 0, 0], [0, 0, 255]);
         let pixels = (0..4096).map(|i| if i == 77 { red } else { blue }).collect();
         let picture = Picture { width: 64, height: 64, pixels };

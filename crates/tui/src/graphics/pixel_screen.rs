@@ -24,7 +24,7 @@ impl PixelScreen {
                 (true, b'P' | b'_', _) => self.string = Some(vec![*byte]),
                 (true, b'\\', string) => {
                     if let Some(string) = string.take() {
-                        self.end(&string);
+                        self.end_control_string(&string);
                     }
                 }
                 (_, 0x1b, _) => {}
@@ -44,10 +44,10 @@ impl PixelScreen {
         self.count
     }
 
-    fn end(&mut self, string: &[u8]) {
+    fn end_control_string(&mut self, string: &[u8]) {
         let picture = match string {
-            [b'_', b'G', command @ ..] => self.chunk(command),
-            [b'P', sixels @ ..] => sixel(sixels),
+            [b'_', b'G', command @ ..] => self.handle_kitty_chunk(command),
+            [b'P', sixels @ ..] => decode_sixel(sixels),
             _ => None,
         };
         if picture.is_some() {
@@ -57,19 +57,19 @@ impl PixelScreen {
     }
 
     /// Handles a kitty command. Returns the image if this is its last chunk.
-    fn chunk(&mut self, command: &[u8]) -> Option<Picture> {
+    fn handle_kitty_chunk(&mut self, command: &[u8]) -> Option<Picture> {
         let split = command.iter().position(|byte| *byte == b';')?;
         let (keys, data) = (std::str::from_utf8(&command[..split]).ok()?, &command[split + 1..]);
         self.chunks.extend_from_slice(data);
         if keys.split(',').any(|key| key == "m=1") {
             return None;
         }
-        png(&decoded(&std::mem::take(&mut self.chunks)))
+        decode_png(&decoded(&std::mem::take(&mut self.chunks)))
     }
 }
 
 /// Decodes an RGB image from PNG.
-fn png(bytes: &[u8]) -> Option<Picture> {
+fn decode_png(bytes: &[u8]) -> Option<Picture> {
     let mut reader = png::Decoder::new(std::io::Cursor::new(bytes)).read_info().ok()?;
     let mut data = vec![0; reader.output_buffer_size()?];
     let info = reader.next_frame(&mut data).ok()?;
@@ -82,7 +82,7 @@ fn png(bytes: &[u8]) -> Option<Picture> {
 }
 
 /// Decodes a Sixel string that includes its size and palette.
-fn sixel(string: &[u8]) -> Option<Picture> {
+fn decode_sixel(string: &[u8]) -> Option<Picture> {
     let start = string.iter().position(|byte| *byte == b'q')? + 1;
     let mut rest = &string[start..];
     let (mut width, mut height, mut pixels) = (0, 0, Vec::new());
@@ -92,19 +92,19 @@ fn sixel(string: &[u8]) -> Option<Picture> {
         rest = after;
         match byte {
             b'"' => {
-                let numbers = numbers(&mut rest);
+                let numbers = take_numbers(&mut rest);
                 (width, height) = (*numbers.get(2)?, *numbers.get(3)?);
                 pixels = vec![[0; 3]; width * height];
             }
             b'#' => {
-                let numbers = numbers(&mut rest);
+                let numbers = take_numbers(&mut rest);
                 color = *numbers.first()?;
                 if let [_, 2, rgb @ ..] = &*numbers {
                     let channel = |i: usize| (rgb.get(i).copied().unwrap_or(0) * 255 + 50) / 100;
                     *palette.get_mut(color)? = std::array::from_fn(|i| channel(i) as u8);
                 }
             }
-            b'!' => count = *numbers(&mut rest).first()?,
+            b'!' => count = *take_numbers(&mut rest).first()?,
             b'$' => x = 0,
             b'-' => (x, top) = (0, top + 6),
             b'?'..=b'~' => {
@@ -121,7 +121,7 @@ fn sixel(string: &[u8]) -> Option<Picture> {
 }
 
 /// Parses and removes leading numbers separated by semicolons.
-fn numbers(rest: &mut &[u8]) -> Vec<usize> {
+fn take_numbers(rest: &mut &[u8]) -> Vec<usize> {
     let end = rest.iter().position(|byte| !matches!(byte, b'0'..=b'9' | b';')).unwrap_or(rest.len());
     let (text, after) = rest.split_at(end);
     *rest = after;

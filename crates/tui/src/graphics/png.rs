@@ -3,7 +3,7 @@
 use crate::film::Picture;
 
 /// Encodes an image as PNG with fast compression. Returns an empty vector on failure.
-pub(super) fn png(picture: &Picture) -> Vec<u8> {
+pub(super) fn encode_png(picture: &Picture) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut encoder = ::png::Encoder::new(&mut bytes, picture.width, picture.height);
     encoder.set_color(::png::ColorType::Rgb);

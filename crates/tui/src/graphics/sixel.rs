@@ -12,9 +12,9 @@ const FIRST: u8 = 16;
 /// Number of registers.
 const REGISTERS: usize = 256;
 
-/// Encodes an image to be drawn at the cursor, covering these cells, with a cell size of `cell` pixels. The
-/// palette is reused if it still fits the image and recomputed otherwise. Images with fewer pixels are
-/// enlarged after quantization, so time and memory depend only on the image's own size.
+/// Encodes an image to be drawn at the cursor, scaled to cover these cells. `cell` is the size of a cell in
+/// pixels. The palette is reused if it still fits the image and recomputed otherwise. Images with fewer
+/// pixels are enlarged after quantization, so time and memory depend only on the image's own size.
 pub(super) fn encode(
     picture: &Picture,
     cells: Rect,
@@ -40,27 +40,27 @@ pub(super) fn encode(
         ((2 * u64::from(i) + 1) * u64::from(of) / (2 * u64::from(count))) as usize
     };
     let columns: Vec<usize> = (0..width).map(|x| middle(x, width, picture.width)).collect();
-    let mut band = Band::new(width as usize);
+    let mut band = SixelBand::new(width as usize);
     for top in (0..height).step_by(6) {
         for y in top..height.min(top + 6) {
             let row = &registers[middle(y, height, picture.height) * picture.width as usize..];
             band.set_row(y - top, columns.iter().map(|x| row[*x]));
         }
-        band.push(&mut bytes);
+        band.push_sixels(&mut bytes);
     }
     bytes.extend_from_slice(b"\x1b\\");
     bytes
 }
 
 /// Six pixel rows, with a separate set of sixels for each color.
-struct Band {
+struct SixelBand {
     width: usize,
     /// Sixels of all registers, concatenated.
     sixels: Vec<u8>,
     is_used: [bool; REGISTERS],
 }
 
-impl Band {
+impl SixelBand {
     fn new(width: usize) -> Self {
         Self { width, sixels: vec![0; REGISTERS * width], is_used: [false; REGISTERS] }
     }
@@ -74,7 +74,7 @@ impl Band {
     }
 
     /// Appends the sixels of each color followed by a carriage return, then a line feed, and clears the band.
-    fn push(&mut self, bytes: &mut Vec<u8>) {
+    fn push_sixels(&mut self, bytes: &mut Vec<u8>) {
         for register in (0..REGISTERS).filter(|register| std::mem::take(&mut self.is_used[*register])) {
             bytes.extend(format!("#{register}").into_bytes());
             let own = &mut self.sixels[register * self.width..][..self.width];

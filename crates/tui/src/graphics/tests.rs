@@ -12,19 +12,19 @@ fn placement(level: u8, x: u16) -> PixelPlacement {
 }
 
 fn all(images: &mut Images) -> String {
-    let slices = std::iter::from_fn(|| images.slice(5000, None)).flatten().collect();
+    let slices = std::iter::from_fn(|| images.next_slice(5000, None)).flatten().collect();
     String::from_utf8(slices).expect("ASCII")
 }
 
 #[test]
 fn newest_image_replaces_pending_ones() {
     let mut images = Images::new(Protocol::Kitty, false);
-    assert!(images.is_complete() && images.slice(5000, None).is_none());
+    assert!(images.is_complete() && images.next_slice(5000, None).is_none());
     let (first, second, third) = (placement(1, 2), placement(2, 2), placement(3, 2));
     images.set_target(Some(first), false);
-    let begin = String::from_utf8(images.slice(100, None).expect("a piece")).expect("ASCII");
+    let begin = String::from_utf8(images.next_slice(100, None).expect("a piece")).expect("ASCII");
     assert!(begin.starts_with("\x1b_Ga=T,f=100,i=6777961,p=1,c=8,r=3,C=1,q=2,m=1;"), "{begin}");
-    // Of the images that arrive while one is being sent, only the last is sent.
+    // If several images arrive while one is being sent, only the last of them is sent.
     images.set_target(Some(second), false);
     images.set_target(Some(third.clone()), true);
     let rest = all(&mut images);
@@ -71,18 +71,18 @@ fn slow_connections_get_coarser_images() {
     let mut images = Images::new(Protocol::Iterm, false);
     let picture = placement(1, 2);
     images.set_target(Some(picture.clone()), false);
-    let coarse = images.slice(5000, Some(1000.0)).expect("a picture").len();
+    let coarse = images.next_slice(5000, Some(1000.0)).expect("a picture").len();
     assert!(images.is_complete());
     images.set_target(Some(picture), true);
     assert!(!images.is_complete(), "sending a final image may take longer");
-    let fine = images.slice(5000, Some(10_000.0)).expect("a picture").len();
+    let fine = images.next_slice(5000, Some(10_000.0)).expect("a picture").len();
     assert!(coarse * 4 < fine, "{coarse} {fine}");
     assert!(images.is_complete());
 }
 
 #[test]
 fn tmux_sequences_are_wrapped() {
-    assert_eq!(wrapped(b"\x1b_Gx\x1b\\"), b"\x1bPtmux;\x1b\x1b_Gx\x1b\x1b\\\x1b\\");
+    assert_eq!(tmux_passthrough(b"\x1b_Gx\x1b\\"), b"\x1bPtmux;\x1b\x1b_Gx\x1b\x1b\\\x1b\\");
     let mut images = Images::new(Protocol::Iterm, true);
     images.set_target(Some(placement(1, 2)), true);
     let bytes = all(&mut images);
@@ -109,7 +109,7 @@ fn sixel_size_and_colors_match_the_image() {
 
 #[test]
 fn sixel_images_are_resized_to_their_cells() {
-    // Channel values that are exact with 63 steps, so they need no dithering.
+    // Six bits represent these channel values exactly, so no dithering is needed.
     let color = |x: u32, y: u32| [(85 * x) as u8, (85 * y) as u8, 255 * ((x + y) % 2) as u8];
     // The window is 64 × 48 pixels, so the images are scaled by 16 and by 1/10.
     for (width, height) in [(4, 3), (640, 480)] {

@@ -8,12 +8,12 @@ use crate::terminals::TerminalId;
 /// A device control string (DCS) being received.
 #[derive(Debug, Default)]
 pub(super) struct ControlString {
-    kind: ReportKind,
+    kind: ControlStringKind,
     text: Vec<u8>,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-enum ReportKind {
+enum ControlStringKind {
     #[default]
     Other,
     /// Name and version (XTVERSION).
@@ -29,25 +29,25 @@ impl ControlString {
     /// Starts a control string with these parameters.
     pub(super) fn begin(intermediates: &[u8], first: u16, action: char) -> Self {
         let kind = match (intermediates, action) {
-            (b">", '|') => ReportKind::Name,
-            (b"+", 'r') if first == 1 => ReportKind::Capability,
-            _ => ReportKind::Other,
+            (b">", '|') => ControlStringKind::Name,
+            (b"+", 'r') if first == 1 => ControlStringKind::Capability,
+            _ => ControlStringKind::Other,
         };
         Self { kind, text: Vec::new() }
     }
 
-    pub(super) fn put(&mut self, byte: u8) {
+    pub(super) fn push_byte(&mut self, byte: u8) {
         if self.text.len() < LONGEST {
             self.text.push(byte);
         }
     }
 
-    pub(super) fn answer(&self) -> TerminalReply {
+    pub(super) fn reply(&self) -> TerminalReply {
         match self.kind {
-            ReportKind::Name => TerminalId::from_report(&String::from_utf8_lossy(&self.text))
+            ControlStringKind::Name => TerminalId::from_report(&String::from_utf8_lossy(&self.text))
                 .map_or(TerminalReply::Other, TerminalReply::Name),
-            ReportKind::Capability if has_true_color(&self.text) => TerminalReply::TrueColor,
-            ReportKind::Capability | ReportKind::Other => TerminalReply::Other,
+            ControlStringKind::Capability if has_true_color(&self.text) => TerminalReply::TrueColor,
+            ControlStringKind::Capability | ControlStringKind::Other => TerminalReply::Other,
         }
     }
 }
@@ -59,12 +59,12 @@ fn has_true_color(text: &[u8]) -> bool {
 }
 
 /// Parses an operating system command (OSC) that reports a palette or background color.
-pub(super) fn command(params: &[&[u8]]) -> TerminalReply {
-    let color = |text: &[u8]| color(std::str::from_utf8(text).ok()?);
+pub(super) fn parse_osc(params: &[&[u8]]) -> TerminalReply {
+    let color = |text: &[u8]| parse_x11_color(std::str::from_utf8(text).ok()?);
     let answer = match params {
         [b"11", text, ..] => color(text).map(TerminalReply::Background),
         [b"4", index, text, ..] => {
-            number(index).zip(color(text)).map(|(index, rgb)| TerminalReply::Ink { index, rgb })
+            parse_decimal(index).zip(color(text)).map(|(index, rgb)| TerminalReply::Ink { index, rgb })
         }
         _ => None,
     };
@@ -72,18 +72,18 @@ pub(super) fn command(params: &[&[u8]]) -> TerminalReply {
 }
 
 /// Parses an application program command (APC) that contains kitty's reply to the image query.
-pub(super) fn application(text: &[u8]) -> TerminalReply {
+pub(super) fn parse_apc(text: &[u8]) -> TerminalReply {
     let of_query = format!("Gi={QUERY_ID};OK");
     if text == of_query.as_bytes() { TerminalReply::Images(Protocol::Kitty) } else { TerminalReply::Other }
 }
 
-fn number(text: &[u8]) -> Option<u8> {
+fn parse_decimal(text: &[u8]) -> Option<u8> {
     std::str::from_utf8(text).ok()?.parse().ok()
 }
 
 /// Parses an X11 color: `rgb:r/g/b` or `rgba:r/g/b/a` with 1 to 4 hexadecimal digits per component, or
 /// `#rrggbb`.
-fn color(text: &str) -> Option<[u8; 3]> {
+fn parse_x11_color(text: &str) -> Option<[u8; 3]> {
     if let Some(digits) = text.strip_prefix('#').filter(|digits| digits.len() == 6 && digits.is_ascii()) {
         let channel = |i: usize| u8::from_str_radix(&digits[2 * i..2 * i + 2], 16).ok();
         return Some([channel(0)?, channel(1)?, channel(2)?]);
@@ -104,13 +104,13 @@ mod tests {
 
     #[test]
     fn x11_colors_are_parsed() {
-        assert_eq!(color("rgb:ffff/8080/0000"), Some([255, 128, 0]));
-        assert_eq!(color("rgb:f/8/0"), Some([255, 136, 0]));
-        assert_eq!(color("rgba:1c1c/1c1c/1c1c/ffff"), Some([28, 28, 28]));
-        assert_eq!(color("#fdf6e3"), Some([253, 246, 227]));
+        assert_eq!(parse_x11_color("rgb:ffff/8080/0000"), Some([255, 128, 0]));
+        assert_eq!(parse_x11_color("rgb:f/8/0"), Some([255, 136, 0]));
+        assert_eq!(parse_x11_color("rgba:1c1c/1c1c/1c1c/ffff"), Some([28, 28, 28]));
+        assert_eq!(parse_x11_color("#fdf6e3"), Some([253, 246, 227]));
         for broken in ["rgb:", "rgb:ff/ff", "rgb:fffff0000/0/0", "rgb:+1/0/0/", "#12345", "#é2345", "red", ""]
         {
-            assert!(color(broken).is_none() || broken.contains('+'), "{broken}");
+            assert!(parse_x11_color(broken).is_none() || broken.contains('+'), "{broken}");
         }
     }
 
@@ -119,6 +119,6 @@ mod tests {
         assert!(has_true_color(b"524742=38"));
         assert!(has_true_color(b"5463"));
         assert!(!has_true_color(b"544e=787465726d"));
-        assert_eq!(ControlString::begin(b"+", 0, 'r').answer(), TerminalReply::Other);
+        assert_eq!(ControlString::begin(b"+", 0, 'r').reply(), TerminalReply::Other);
     }
 }

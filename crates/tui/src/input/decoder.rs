@@ -20,10 +20,12 @@ const INTRODUCERS: &[u8] = b"[]OPX^_\\";
 const LONE_ESCAPE: Duration = Duration::from_millis(50);
 /// Timeout between bytes of a sequence, for connections that lose packets.
 const SEQUENCE: Duration = Duration::from_secs(1);
-/// Maximum duration and length of a sequence. For example, alt-`]` starts a sequence that no key press ends.
+/// Maximum duration and length of a sequence. For example, alt-`]` looks like the start of a sequence, and no
+/// key press ends it.
 const LONGEST: Duration = Duration::from_secs(2);
 const MAX_BYTES: usize = 4096;
-/// How long after an Escape key press a `[` may still belong to a sequence.
+/// Maximum time between an escape character that was treated as a key press and a `[` that still belongs to
+/// its sequence.
 const LATE_SEQUENCE: Duration = Duration::from_secs(2);
 /// How long to wait for the next byte after a late `[`, and the maximum number of bytes held back.
 const DOUBT_TIMEOUT: Duration = Duration::from_millis(300);
@@ -71,11 +73,11 @@ impl Decoder {
         // arrived, even if late. A paste does not expire either, because its text may have been waiting for a
         // busy reader.
         if matches!(self.held, PendingSequence::Sequence { .. }) {
-            self.expire_into_found(now);
+            self.expire_pending(now);
         }
         self.last = Some(now);
         for &byte in bytes {
-            self.take(byte, now);
+            self.take_byte(byte, now);
         }
         std::mem::take(&mut self.meaning.found)
     }
@@ -95,22 +97,22 @@ impl Decoder {
 
     /// Handles silence.
     pub(super) fn expire(&mut self, now: Instant) -> Vec<DecodedInput> {
-        self.expire_into_found(now);
+        self.expire_pending(now);
         std::mem::take(&mut self.meaning.found)
     }
 
-    fn expire_into_found(&mut self, now: Instant) {
+    fn expire_pending(&mut self, now: Instant) {
         if self.deadline().is_some_and(|deadline| now >= deadline) {
-            match self.give_up() {
+            match self.drop_sequence() {
                 PendingSequence::Escape => {
                     self.escaped = Some(now);
-                    self.press_escape();
+                    self.push_escape_key();
                 }
                 PendingSequence::Doubtful(bytes) => self.replay(&bytes),
                 PendingSequence::Paste(_) => self.meaning.found.push(DecodedInput::Paste),
                 // Nothing followed, so these are two key presses.
                 PendingSequence::Sequence { bytes: 2, introducer, .. } => {
-                    self.press_escape();
+                    self.push_escape_key();
                     self.replay(&[introducer]);
                 }
                 PendingSequence::Nothing | PendingSequence::StringEnd | PendingSequence::Sequence { .. } => {}
@@ -118,24 +120,26 @@ impl Decoder {
         }
     }
 
-    fn take(&mut self, byte: u8, now: Instant) {
+    fn take_byte(&mut self, byte: u8, now: Instant) {
         match std::mem::take(&mut self.held) {
-            PendingSequence::Nothing => self.begin(byte, now),
-            PendingSequence::Escape | PendingSequence::StringEnd => self.follow_escape(byte, now),
+            PendingSequence::Nothing => self.begin_sequence(byte, now),
+            PendingSequence::Escape | PendingSequence::StringEnd => self.continue_after_escape(byte, now),
             PendingSequence::Sequence { introducer, .. } if byte == ESCAPE => {
                 if introducer == b'_' {
-                    self.meaning.end_command(&std::mem::take(&mut self.command));
+                    self.meaning.end_apc(&std::mem::take(&mut self.command));
                 }
-                self.begin(byte, now);
+                self.begin_sequence(byte, now);
                 if b"]P_X^".contains(&introducer) {
                     self.held = PendingSequence::StringEnd;
                 }
             }
-            PendingSequence::Sequence { bytes: 2, introducer, .. } if is_key_behind(introducer, byte) => {
-                self.give_up();
-                self.press_escape();
+            PendingSequence::Sequence { bytes: 2, introducer, .. }
+                if are_three_key_presses(introducer, byte) =>
+            {
+                self.drop_sequence();
+                self.push_escape_key();
                 self.replay(&[introducer]);
-                self.begin(byte, now);
+                self.begin_sequence(byte, now);
             }
             PendingSequence::Sequence { begin, bytes, introducer } => {
                 if introducer == b'_' {
@@ -143,7 +147,7 @@ impl Decoder {
                 }
                 self.continue_sequence(byte, (begin, bytes + 1, introducer), now);
             }
-            PendingSequence::Doubtful(bytes) => self.follow_doubt(bytes, byte, now),
+            PendingSequence::Doubtful(bytes) => self.continue_doubtful(bytes, byte, now),
             PendingSequence::Paste(mut paste) => {
                 if paste.push(byte, now) {
                     self.meaning.found.push(DecodedInput::Paste);
@@ -154,7 +158,7 @@ impl Decoder {
         }
     }
 
-    fn begin(&mut self, byte: u8, now: Instant) {
+    fn begin_sequence(&mut self, byte: u8, now: Instant) {
         let escaped = self.escaped.take().filter(|escaped| now < *escaped + LATE_SEQUENCE);
         match byte {
             ESCAPE => {
@@ -170,17 +174,17 @@ impl Decoder {
         }
     }
 
-    fn follow_escape(&mut self, byte: u8, now: Instant) {
+    fn continue_after_escape(&mut self, byte: u8, now: Instant) {
         match byte {
             ESCAPE => {
-                self.press_escape();
+                self.push_escape_key();
                 self.held = PendingSequence::Escape;
             }
             // Not the start of any terminal sequence.
             byte if !INTRODUCERS.contains(&byte) => {
-                self.give_up();
-                self.press_escape();
-                self.begin(byte, now);
+                self.drop_sequence();
+                self.push_escape_key();
+                self.begin_sequence(byte, now);
             }
             _ => self.continue_sequence(byte, (now, 2, byte), now),
         }
@@ -198,13 +202,13 @@ impl Decoder {
         if std::mem::take(&mut self.meaning.is_paste) {
             self.held = PendingSequence::Paste(Paste::new(now));
         } else if bytes >= MAX_BYTES {
-            self.give_up();
+            self.drop_sequence();
         } else if !self.meaning.has_ended {
             self.held = PendingSequence::Sequence { begin, bytes, introducer };
         }
     }
 
-    fn follow_doubt(&mut self, mut bytes: Vec<u8>, byte: u8, now: Instant) {
+    fn continue_doubtful(&mut self, mut bytes: Vec<u8>, byte: u8, now: Instant) {
         let before = self.meaning.found.len();
         if (0x20..0x7f).contains(&byte) {
             self.continue_sequence(byte, (now, bytes.len(), b'['), now);
@@ -218,14 +222,14 @@ impl Decoder {
             bytes.push(byte);
             self.held = PendingSequence::Doubtful(bytes);
         } else {
-            self.give_up();
+            self.drop_sequence();
             self.replay(&bytes);
-            self.begin(byte, now);
+            self.begin_sequence(byte, now);
         }
     }
 
     /// Drops the current sequence.
-    fn give_up(&mut self) -> PendingSequence {
+    fn drop_sequence(&mut self) -> PendingSequence {
         self.meaning.reset();
         self.command.clear();
         self.parser = vte::Parser::default();
@@ -236,13 +240,13 @@ impl Decoder {
         self.parser.advance(&mut self.meaning, bytes);
     }
 
-    fn press_escape(&mut self) {
+    fn push_escape_key(&mut self) {
         self.meaning.found.push(DecodedInput::Key(KeyPress::special(KeyCode::Esc)));
     }
 }
 
 /// Whether `byte` cannot follow these two in any terminal's sequence, so all three are key presses.
-fn is_key_behind(introducer: u8, byte: u8) -> bool {
+fn are_three_key_presses(introducer: u8, byte: u8) -> bool {
     match introducer {
         // rxvt uses `a` to `d` for shifted arrows, and reports end with `n` or `t`.
         b'[' => matches!(byte, b'e'..=b'm' | b'o'..=b's' | b'u'..=b'~'),

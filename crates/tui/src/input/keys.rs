@@ -14,7 +14,7 @@ use crate::terminal_replies::TerminalReply;
 pub(super) struct KeyParser {
     /// Decoded input, in order.
     pub found: Vec<DecodedInput>,
-    /// Whether a sequence has ended, whether or not it was recognized.
+    /// Whether a sequence, recognized or not, has ended.
     pub has_ended: bool,
     /// Whether a paste has started.
     pub is_paste: bool,
@@ -42,18 +42,18 @@ impl KeyParser {
         self.is_paste = false;
     }
 
-    fn key(&mut self, code: KeyCode, modifiers: KeyModifiers) {
+    fn push_key(&mut self, code: KeyCode, modifiers: KeyModifiers) {
         self.found.push(DecodedInput::Key(KeyPress { code, modifiers }));
     }
 
     /// Handles a complete application program command.
-    pub(super) fn end_command(&mut self, text: &[u8]) {
-        self.answer(control_strings::application(text));
+    pub(super) fn end_apc(&mut self, text: &[u8]) {
+        self.push_reply(control_strings::parse_apc(text));
     }
 
     /// Handles a mouse report in SGR format (mode 1006): the button with modifier bits, and the cell, counted
     /// from 1.
-    fn mouse(&mut self, code: u16, (column, row): (u16, u16), is_pressed: bool) {
+    fn push_mouse(&mut self, code: u16, (column, row): (u16, u16), is_pressed: bool) {
         const MODIFIERS: u16 = 4 | 8 | 16;
         let kind = match (code & !MODIFIERS, is_pressed) {
             (0, true) => MouseKind::Press,
@@ -62,13 +62,13 @@ impl KeyParser {
             (64, true) => MouseKind::WheelUp,
             (65, true) => MouseKind::WheelDown,
             // Other buttons are ignored.
-            _ => return self.answer(TerminalReply::Other),
+            _ => return self.push_reply(TerminalReply::Other),
         };
         let (column, row) = (column.saturating_sub(1), row.saturating_sub(1));
         self.found.push(DecodedInput::Mouse(Mouse { kind, column, row }));
     }
 
-    fn answer(&mut self, answer: TerminalReply) {
+    fn push_reply(&mut self, answer: TerminalReply) {
         self.found.push(DecodedInput::TerminalReply(answer));
     }
 }
@@ -82,17 +82,17 @@ impl Perform for KeyParser {
                     '\x7f' => KeyCode::Backspace,
                     character => KeyCode::Char(character),
                 };
-                self.key(key, KeyModifiers::NONE);
+                self.push_key(key, KeyModifiers::NONE);
             }
             NextCharacter::SingleShift => {
                 if let Some(code) = letter_key(character) {
-                    self.key(code, KeyModifiers::NONE);
+                    self.push_key(code, KeyModifiers::NONE);
                 }
             }
             NextCharacter::Console => {
                 if let Some(number @ 1..=5) = u8::try_from(character).ok().and_then(|it| it.checked_sub(b'@'))
                 {
-                    self.key(KeyCode::F(number), KeyModifiers::NONE);
+                    self.push_key(KeyCode::F(number), KeyModifiers::NONE);
                 }
             }
             NextCharacter::Mouse(left) => {
@@ -107,11 +107,13 @@ impl Perform for KeyParser {
     fn execute(&mut self, byte: u8) {
         self.next = NextCharacter::Character;
         match byte {
-            b'\r' => self.key(KeyCode::Enter, KeyModifiers::NONE),
-            b'\t' => self.key(KeyCode::Tab, KeyModifiers::NONE),
-            0 => self.key(KeyCode::Char(' '), KeyModifiers::CONTROL),
-            1..=0x1a => self.key(KeyCode::Char(char::from(byte - 1 + b'a')), KeyModifiers::CONTROL),
-            0x1c..=0x1f => self.key(KeyCode::Char(char::from(byte - 0x1c + b'4')), KeyModifiers::CONTROL),
+            b'\r' => self.push_key(KeyCode::Enter, KeyModifiers::NONE),
+            b'\t' => self.push_key(KeyCode::Tab, KeyModifiers::NONE),
+            0 => self.push_key(KeyCode::Char(' '), KeyModifiers::CONTROL),
+            1..=0x1a => self.push_key(KeyCode::Char(char::from(byte - 1 + b'a')), KeyModifiers::CONTROL),
+            0x1c..=0x1f => {
+                self.push_key(KeyCode::Char(char::from(byte - 0x1c + b'4')), KeyModifiers::CONTROL);
+            }
             _ => {}
         }
     }
@@ -133,27 +135,27 @@ impl Perform for KeyParser {
         let (first, second) = (number(0), number(1));
         self.has_ended = true;
         match (intermediates, action) {
-            ([], 'n') if first == 0 => self.answer(TerminalReply::Ready),
-            (b"<", 'M' | 'm') => self.mouse(first, (second, number(2)), action == 'M'),
+            ([], 'n') if first == 0 => self.push_reply(TerminalReply::Ready),
+            (b"<", 'M' | 'm') => self.push_mouse(first, (second, number(2)), action == 'M'),
             (b"?", 'c') => {
                 if params.iter().any(|param| param == [4]) {
-                    self.answer(TerminalReply::Images(Protocol::Sixel));
+                    self.push_reply(TerminalReply::Images(Protocol::Sixel));
                 }
-                self.answer(TerminalReply::Attributes);
+                self.push_reply(TerminalReply::Attributes);
             }
             (b"?$", 'y') if first == 2026 => {
                 // 1 means set and 2 means reset. Other values mean unknown or permanent.
-                self.answer(TerminalReply::Synchronized { is_known: matches!(second, 1 | 2) });
+                self.push_reply(TerminalReply::Synchronized { is_known: matches!(second, 1 | 2) });
             }
             ([], '~') if first == 200 => self.is_paste = true,
             // The end marker of a paste that has already expired.
             ([], '~') if first == 201 => {}
             ([], '~') => {
                 if let Some(code) = numbered_key(first) {
-                    self.key(code, modifiers(second));
+                    self.push_key(code, modifiers(second));
                 }
             }
-            ([], 'Z') => self.key(KeyCode::BackTab, KeyModifiers::SHIFT),
+            ([], 'Z') => self.push_key(KeyCode::BackTab, KeyModifiers::SHIFT),
             ([], '[') => {
                 self.next = NextCharacter::Console;
                 self.has_ended = false;
@@ -163,22 +165,22 @@ impl Perform for KeyParser {
                 self.has_ended = false;
             }
             // With two parameters, this is a cursor position report rather than F3.
-            ([], 'R') if params.len() > 1 => self.answer(TerminalReply::Other),
-            ([], 'I' | 'O') => self.answer(TerminalReply::Focus { is_here: action == 'I' }),
+            ([], 'R') if params.len() > 1 => self.push_reply(TerminalReply::Other),
+            ([], 'I' | 'O') => self.push_reply(TerminalReply::Focus { is_here: action == 'I' }),
             // Window size report.
-            ([], 't') => self.answer(TerminalReply::Other),
+            ([], 't') => self.push_reply(TerminalReply::Other),
             ([], letter) => {
                 if let Some(code) = letter_key(letter) {
-                    self.key(code, modifiers(second));
+                    self.push_key(code, modifiers(second));
                 }
             }
-            _ => self.answer(TerminalReply::Other),
+            _ => self.push_reply(TerminalReply::Other),
         }
     }
 
     fn osc_dispatch(&mut self, params: &[&[u8]], _bell_terminated: bool) {
         self.has_ended = true;
-        self.answer(control_strings::command(params));
+        self.push_reply(control_strings::parse_osc(params));
     }
 
     fn hook(&mut self, params: &Params, intermediates: &[u8], _ignore: bool, action: char) {
@@ -187,13 +189,13 @@ impl Perform for KeyParser {
     }
 
     fn put(&mut self, byte: u8) {
-        self.report.put(byte);
+        self.report.push_byte(byte);
     }
 
     fn unhook(&mut self) {
         self.has_ended = true;
-        let answer = std::mem::take(&mut self.report).answer();
-        self.answer(answer);
+        let answer = std::mem::take(&mut self.report).reply();
+        self.push_reply(answer);
     }
 }
 

@@ -29,7 +29,7 @@ use super::event::{Event, EventSource};
 ///
 /// # Errors
 /// The thread could not be created.
-pub(super) fn start(events: &Sender<Event>) -> io::Result<()> {
+pub(super) fn start_reader(events: &Sender<Event>) -> io::Result<()> {
     let events = events.clone();
     let read = move || {
         let mut decoder = Decoder::default();
@@ -66,11 +66,11 @@ fn wait_while_held() -> bool {
 /// Reads and decodes input. Empty after a timeout; `None` if the terminal was closed.
 fn next(decoder: &mut Decoder) -> Option<Vec<DecodedInput>> {
     let mut bytes = [0; 4096];
-    let waited = wait(decoder.deadline());
+    let waited = wait_for_input(decoder.deadline());
     if wait_while_held() {
         return Some(Vec::new());
     }
-    match waited.and_then(|is_readable| if is_readable { read(&mut bytes) } else { Ok(None) }) {
+    match waited.and_then(|is_readable| if is_readable { read_stdin(&mut bytes) } else { Ok(None) }) {
         Ok(Some(0)) => None,
         Ok(Some(count)) => Some(decoder.decode(&bytes[..count], Instant::now())),
         Ok(None) | Err(Errno::EINTR | Errno::EAGAIN) => Some(decoder.expire(Instant::now())),
@@ -78,12 +78,13 @@ fn next(decoder: &mut Decoder) -> Option<Vec<DecodedInput>> {
     }
 }
 
-fn read(bytes: &mut [u8]) -> nix::Result<Option<usize>> {
+fn read_stdin(bytes: &mut [u8]) -> nix::Result<Option<usize>> {
     nix::unistd::read(io::stdin().as_fd(), bytes).map(Some)
 }
 
-/// Waits for input until the deadline, if any. Returns whether input or end-of-file is available.
-fn wait(deadline: Option<Instant>) -> nix::Result<bool> {
+/// Waits for input until the deadline, or indefinitely if there is none. Returns whether input or end-of-file
+/// is available.
+fn wait_for_input(deadline: Option<Instant>) -> nix::Result<bool> {
     let stdin = io::stdin();
     let mut ends = [PollFd::new(stdin.as_fd(), PollFlags::POLLIN)];
     let timeout = deadline.map_or(PollTimeout::NONE, |deadline| {

@@ -195,7 +195,7 @@ fn image_replies_do_not_swallow_keys() {
     assert_eq!(bench.read(b"\\s"), [plain('s')]);
 }
 
-/// Alt is not used, so a character right after an escape character is a separate key press.
+/// No key binding uses alt, so a character right after an escape character is a separate key press.
 #[test]
 fn escape_and_immediate_key_are_two_keys() {
     for key in (b' '..0x7f).filter(|byte| !b"[]OPX^_\\".contains(byte)) {
@@ -371,7 +371,7 @@ fn invalid_text_does_not_swallow_keys() {
 }
 
 proptest! {
-    /// Splitting input differently does not change the result.
+    /// The result does not depend on where the input is split.
     #[test]
     fn splits_do_not_matter(parts in prop::collection::vec(0..10_usize, 0..40), cuts in prop::collection::vec(1..5_usize, 200)) {
         let words: [&[u8]; 10] =

@@ -13,28 +13,28 @@ pub(crate) struct FittedCell {
     pub(crate) pair: [[u8; 3]; 2],
 }
 
-/// Minimum reduction of the mean squared Oklab distance for choosing a tile other than halves. A smaller
-/// improvement is not visible, would flicker with the noise, and takes more bytes.
+/// A tile other than halves is chosen only if it reduces the mean squared Oklab distance by at least this
+/// much. A smaller improvement would be invisible, flicker with the noise and take more bytes.
 const WORTH: f32 = 1e-4;
 
 /// The cell with the smallest squared Oklab distance from its pixels. `pixels` are sRGB colors in row order.
 /// The chosen division minimizes the variance within the two parts.
-pub(crate) fn fit(grid: Grid, pixels: &[[u8; 3]]) -> FittedCell {
+pub(crate) fn fit_cell(grid: Grid, pixels: &[[u8; 3]]) -> FittedCell {
     if let ([first, second], Grid::Halves) = (pixels, grid) {
         return FittedCell { tile: Tile::HALVES, pair: [*first, *second] };
     }
     let pixels: Vec<Vec3> = pixels.iter().map(|pixel| srgb8_to_linear(*pixel)).collect();
-    let CellDivision { first, tile } = division(grid, &pixels);
+    let CellDivision { first, tile } = best_division(grid, &pixels);
     let mean = |is_first: bool| {
         let of_part = (0..pixels.len()).filter(|i| (first >> i & 1 == 1) == is_first);
         let count = of_part.clone().count().max(1);
-        bytes(of_part.map(|i| pixels[i]).sum::<Vec3>() / count as f32)
+        to_srgb_bytes(of_part.map(|i| pixels[i]).sum::<Vec3>() / count as f32)
     };
     FittedCell { tile, pair: [mean(true), mean(false)] }
 }
 
 /// The best division of a cell.
-fn division(grid: Grid, pixels: &[Vec3]) -> CellDivision {
+fn best_division(grid: Grid, pixels: &[Vec3]) -> CellDivision {
     let count = pixels.len() as f32;
     let labs: Vec<Vec3> = pixels.iter().map(|pixel| oklab(*pixel)).collect();
     let all: Vec3 = labs.iter().sum();
@@ -60,7 +60,7 @@ fn division(grid: Grid, pixels: &[Vec3]) -> CellDivision {
     best
 }
 
-fn bytes(linear: Vec3) -> [u8; 3] {
+fn to_srgb_bytes(linear: Vec3) -> [u8; 3] {
     linear.to_array().map(linear_to_srgb8)
 }
 
@@ -75,7 +75,7 @@ mod tests {
             for CellDivision { first, tile } in grid.divisions() {
                 let pixels: Vec<[u8; 3]> =
                     (0..2 * grid.rows()).map(|i| colors[usize::from(first >> i & 1 == 0)]).collect();
-                assert_eq!(fit(grid, &pixels), FittedCell { tile: *tile, pair: colors });
+                assert_eq!(fit_cell(grid, &pixels), FittedCell { tile: *tile, pair: colors });
             }
         }
     }
@@ -83,6 +83,6 @@ mod tests {
     #[test]
     fn nearly_uniform_cells_use_halves() {
         let pixels: Vec<[u8; 3]> = (0..4).map(|i| [150 + i % 3; 3]).collect();
-        assert_eq!(fit(Grid::Quadrants, &pixels).tile, Tile::HALVES);
+        assert_eq!(fit_cell(Grid::Quadrants, &pixels).tile, Tile::HALVES);
     }
 }

@@ -1,8 +1,8 @@
-//! Two-color cells: block characters, and fitting them to pixels.
+//! Two-color cells: block characters, and how they are fitted to pixels.
 
 mod fit;
 mod tile;
 
-pub(super) use self::fit::{FittedCell, fit};
+pub(super) use self::fit::{FittedCell, fit_cell};
 pub use self::tile::filled_squares;
 pub(super) use self::tile::{Grid, PLACES, Tile, from_symbol};

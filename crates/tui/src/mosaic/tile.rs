@@ -4,8 +4,8 @@
 use std::collections::HashMap;
 use std::sync::LazyLock;
 
-/// Number of grid rows for describing parts of a cell, divisible into halves, thirds and quarters. The grid
-/// has two columns.
+/// Number of rows of the two-column grid that describes parts of a cell. Divisible into halves, thirds and
+/// quarters.
 pub(crate) const GRID_ROWS: u32 = 12;
 /// Number of squares in the grid.
 pub(crate) const PLACES: u32 = 2 * GRID_ROWS;
@@ -31,7 +31,7 @@ impl Eq for Tile {}
 impl Tile {
     /// Upper and lower halves.
     pub(crate) const HALVES: Self = Self { first: (1 << GRID_ROWS) - 1, symbols: ['▀', '▄'] };
-    /// A quarter of the cell is filled with the foreground color. The pattern varies between fonts.
+    /// A pattern that fills a quarter of the cell with the foreground color. It varies between fonts.
     pub(crate) const LIGHT: Self = Self { first: 0x21_21_21, symbols: ['░', '▓'] };
 
     /// A fine pattern with equal amounts of both colors.
@@ -43,13 +43,13 @@ impl Tile {
     }
 
     /// Number of squares in each part.
-    pub(crate) fn sizes(self) -> [u32; 2] {
+    pub(crate) fn part_sizes(self) -> [u32; 2] {
         let first = self.first.count_ones();
         [first, PLACES - first]
     }
 
     /// Number of grid squares shared by each part of this tile with each part of the other.
-    pub(crate) fn shared(self, other: Self) -> [[u32; 2]; 2] {
+    pub(crate) fn shared_squares(self, other: Self) -> [[u32; 2]; 2] {
         let parts = |tile: Self| [tile.first, ALL & !tile.first];
         parts(self).map(|own| parts(other).map(|its| (own & its).count_ones()))
     }
@@ -122,7 +122,7 @@ static TABLE: LazyLock<TileTable> = LazyLock::new(|| {
     for mask in 0..256 {
         if let Some((_, symbol)) = OCTANTS_ELSEWHERE.iter().find(|(other, _)| *other == mask) {
             add(*symbol, expand_mask(mask, 4));
-        } else if quadrants(mask).is_none() {
+        } else if octants_as_quadrants(mask).is_none() {
             add(char::from_u32(next).unwrap_or(' '), expand_mask(mask, 4));
             next += 1;
         }
@@ -158,11 +158,11 @@ const OCTANTS_ELSEWHERE: [(u32, char); 10] = [
 
 /// Expands a mask with `rows` rows to the full grid.
 fn expand_mask(mask: u32, rows: u32) -> u32 {
-    widened(mask, rows, GRID_ROWS)
+    expand_rows(mask, rows, GRID_ROWS)
 }
 
 /// Expands a mask from `from` to `to` rows.
-fn widened(mask: u32, from: u32, to: u32) -> u32 {
+fn expand_rows(mask: u32, from: u32, to: u32) -> u32 {
     let each = to / from;
     (0..2 * to)
         .filter(|place| mask >> (place / 2 / each * 2 + place % 2) & 1 == 1)
@@ -170,7 +170,7 @@ fn widened(mask: u32, from: u32, to: u32) -> u32 {
 }
 
 /// The quadrants that fill the same area as these octants, if any.
-fn quadrants(mask: u32) -> Option<u32> {
+fn octants_as_quadrants(mask: u32) -> Option<u32> {
     (0..16).find(|quadrants| expand_mask(*quadrants, 2) == expand_mask(mask, 4))
 }
 
@@ -232,7 +232,7 @@ fn divisions(pixel_rows: u32, part_rows: &[u32]) -> Vec<CellDivision> {
             let of_tile = from_mask(expand_mask(mask, *rows)).map(|(tile, _)| tile);
             let is_new = |tile: &Tile| divisions.iter().all(|division: &CellDivision| division.tile != *tile);
             if let Some(tile) = of_tile.filter(is_new) {
-                divisions.push(CellDivision { first: widened(mask, *rows, pixel_rows), tile });
+                divisions.push(CellDivision { first: expand_rows(mask, *rows, pixel_rows), tile });
             }
         }
     }
@@ -249,7 +249,7 @@ mod tests {
             let divisions = grid.divisions();
             let mut seen = std::collections::HashSet::new();
             for CellDivision { first, tile } in divisions {
-                assert_eq!(tile.first, widened(*first, grid.rows(), GRID_ROWS), "{grid:?} {first:b}");
+                assert_eq!(tile.first, expand_rows(*first, grid.rows(), GRID_ROWS), "{grid:?} {first:b}");
                 let [front, back] = tile.symbols();
                 assert_eq!(from_symbol(front), Some((*tile, false)), "{front}");
                 assert_eq!(from_symbol(back), Some((*tile, true)), "{back}");
@@ -277,7 +277,7 @@ mod tests {
     fn shades_fill_one_two_or_three_quarters() {
         for (symbol, share) in [('░', 6), ('▒', 12), ('▓', 18)] {
             let (tile, is_second) = from_symbol(symbol).expect("a tile");
-            assert_eq!(tile.sizes()[usize::from(is_second)], share, "{symbol}");
+            assert_eq!(tile.part_sizes()[usize::from(is_second)], share, "{symbol}");
         }
         assert_eq!(from_symbol('▒').map(|(tile, _)| tile.symbols()), Some(['▒', '▒']));
         assert_eq!(from_symbol('a'), None);

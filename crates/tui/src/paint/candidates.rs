@@ -2,7 +2,7 @@
 
 use super::cell::Mosaic;
 use super::cost_model::CostModel;
-use super::terminal_color::{TerminalColor, digits};
+use super::terminal_color::{TerminalColor, decimal_digits};
 use crate::color::nearest_256;
 
 /// Maximum number of candidates for each part, and for both parts together.
@@ -27,13 +27,16 @@ pub(super) fn candidates(cells: &[Option<Mosaic>], model: CostModel) -> Candidat
     let column = |part: usize| cells.iter().map_while(move |cell| cell.map(|mosaic| mosaic.pair[part]));
     let both = cells.iter().map_while(|cell| cell.map(|mosaic| mosaic.pair)).flatten();
     CandidateColors {
-        first: shades(&column(0), model),
-        second: shades(&column(1), model),
-        both: shades(&both, model),
+        first: candidate_colors(&column(0), model),
+        second: candidate_colors(&column(1), model),
+        both: candidate_colors(&both, model),
     }
 }
 
-fn shades(wanted: &(impl Iterator<Item = TerminalColor> + Clone), model: CostModel) -> Vec<TerminalColor> {
+fn candidate_colors(
+    wanted: &(impl Iterator<Item = TerminalColor> + Clone),
+    model: CostModel,
+) -> Vec<TerminalColor> {
     let mut shades = Vec::with_capacity(MAX);
     let Some(first) = wanted.clone().next() else { return shades };
     let mut add = |shade| {
@@ -89,11 +92,11 @@ impl CommonColors {
         std::array::from_fn(|i| mean(i).clamp(self.low[i], self.high[i]))
     }
 
-    /// The color with the fewest decimal digits, and as close to the mean as that allows.
+    /// The color with the fewest decimal digits. If there are several, the one closest to the mean.
     fn shortest(&self) -> [u8; 3] {
         let mean = self.mean();
         std::array::from_fn(|i| {
-            let fewest = digits(self.low[i]);
+            let fewest = decimal_digits(self.low[i]);
             let most = [9, 99, u8::MAX][fewest as usize - 1];
             mean[i].min(most)
         })
@@ -122,7 +125,7 @@ mod tests {
         assert_eq!(found.first, [TerminalColor::Rgb([21, 50, 99])]);
         assert_eq!(found.second, [TerminalColor::Rgb([0, 0, 0])], "themes may replace color 16");
         assert_eq!(found.both.len(), 1, "no color fits both halves");
-        let grays = [Some(Mosaic::plain(TerminalColor::Rgb([8, 8, 8])))];
+        let grays = [Some(Mosaic::uniform(TerminalColor::Rgb([8, 8, 8])))];
         assert_eq!(
             candidates(&grays, CostModel::EXACT).first,
             [TerminalColor::Rgb([8, 8, 8]), TerminalColor::Palette(232)]

@@ -41,25 +41,28 @@ impl Mosaic {
     }
 
     /// A cell with a single color.
-    pub(super) fn plain(shade: TerminalColor) -> Self {
+    pub(super) fn uniform(shade: TerminalColor) -> Self {
         Self::halves([shade; 2])
     }
 
     /// The mosaic for a block character. `None` for other characters.
-    fn of(symbol: &str, fg: TerminalColor, bg: TerminalColor) -> Option<Self> {
+    fn from_symbol(symbol: &str, fg: TerminalColor, bg: TerminalColor) -> Option<Self> {
         match symbol {
-            " " => return Some(Self::plain(bg)),
-            "█" => return Some(Self::plain(fg)),
+            " " => return Some(Self::uniform(bg)),
+            "█" => return Some(Self::uniform(fg)),
             _ => {}
         }
         let (tile, is_second) = from_symbol(symbol.chars().next()?)?;
         Some(Self::new(tile, if is_second { [bg, fg] } else { [fg, bg] }))
     }
 
-    /// Pairs of colors that overlap when this cell is compared with `other`, each with twice the overlapping
-    /// fraction of the cell.
-    pub(super) fn against(self, other: Self) -> impl Iterator<Item = (TerminalColor, TerminalColor, f32)> {
-        let shared = self.tile.shared(other.tile);
+    /// Pairs of colors that overlap when this cell is laid over `other`. Each pair has a weight of twice the
+    /// fraction of the cell in which it overlaps.
+    pub(super) fn overlapping_colors(
+        self,
+        other: Self,
+    ) -> impl Iterator<Item = (TerminalColor, TerminalColor, f32)> {
+        let shared = self.tile.shared_squares(other.tile);
         let pairs = [(0, 0), (0, 1), (1, 0), (1, 1)].into_iter();
         pairs.filter(move |(own, its)| shared[*own][*its] > 0).map(move |(own, its)| {
             let part = 2.0 * shared[own][its] as f32 / PLACES as f32;
@@ -149,16 +152,16 @@ impl CellContent {
     pub(super) const BLANK: Self =
         Self::Mosaic(Mosaic { tile: Tile::HALVES, pair: [TerminalColor::DefaultBackground; 2] });
 
-    /// Converts a cell's content for a terminal with this color depth.
-    pub(super) fn of(cell: &Cell, depth: ColorDepth) -> Self {
+    /// Converts a ratatui cell for a terminal with this color depth.
+    pub(super) fn from_cell(cell: &Cell, depth: ColorDepth) -> Self {
         let shade = |color, layer| {
             let color = if depth == ColorDepth::None { ratatui::style::Color::Reset } else { color };
-            TerminalColor::of(color, layer)
+            TerminalColor::from_ratatui(color, layer)
         };
         let (fg, bg) = (shade(cell.fg, ColorLayer::Foreground), shade(cell.bg, ColorLayer::Background));
-        let (symbol, columns) = printable(cell.symbol());
+        let (symbol, columns) = printable_symbol(cell.symbol());
         let harmless = if symbol == " " { Modifier::all() - ON_BLANKS } else { Modifier::empty() };
-        let mosaic = harmless.contains(cell.modifier).then(|| Mosaic::of(symbol, fg, bg)).flatten();
+        let mosaic = harmless.contains(cell.modifier).then(|| Mosaic::from_symbol(symbol, fg, bg)).flatten();
         mosaic.map_or_else(
             || {
                 Self::Text(TextCell {
@@ -181,7 +184,7 @@ impl CellContent {
 }
 
 /// A cell's symbol and its width. A blank if the symbol would move the cursor or print nothing.
-fn printable(symbol: &str) -> (&str, u16) {
+fn printable_symbol(symbol: &str) -> (&str, u16) {
     let columns = symbol.width();
     if columns == 0 || columns > 2 || symbol.chars().any(char::is_control) {
         (" ", 1)
@@ -200,7 +203,7 @@ mod tests {
         let mut cell = Cell::default();
         cell.set_symbol(symbol).set_fg(fg).set_bg(bg);
         cell.modifier = modifier;
-        CellContent::of(&cell, ColorDepth::TrueColor)
+        CellContent::from_cell(&cell, ColorDepth::TrueColor)
     }
 
     #[test]
@@ -236,7 +239,9 @@ mod tests {
     fn monochrome_terminals_get_no_colors() {
         let mut cell = Cell::default();
         cell.set_symbol("x").set_fg(Color::Red).set_bg(Color::Blue);
-        let CellContent::Text(text) = CellContent::of(&cell, ColorDepth::None) else { panic!("a character") };
+        let CellContent::Text(text) = CellContent::from_cell(&cell, ColorDepth::None) else {
+            panic!("a character")
+        };
         assert_eq!(
             (text.pen.fg, text.pen.bg),
             (TerminalColor::DefaultForeground, TerminalColor::DefaultBackground)

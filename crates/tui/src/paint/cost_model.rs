@@ -22,11 +22,11 @@ impl CostModel {
     /// Exact colors.
     pub(super) const ALL: Self = Self { byte: 64.0, most: 0, spans: &[0] };
 
-    /// An error of 14/255 in every channel of a half costs about as much as a color change.
+    /// An error of 14/255 in every channel of half a cell costs about as much as a color change.
     pub(super) const MOVING: Self = Self { byte: 32.0, most: 255, spans: &[1, 4, 9] };
 
     /// Returns the model with a different cost per byte, but no less than that of [`CostModel::MOVING`].
-    pub(super) fn at(self, byte: f32) -> Self {
+    pub(super) fn with_byte_cost(self, byte: f32) -> Self {
         let byte = byte.max(Self::MOVING.byte);
         let spans: &[u8] = match byte {
             ..40.0 => Self::MOVING.spans,

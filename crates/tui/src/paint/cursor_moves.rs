@@ -11,13 +11,13 @@ pub(super) struct CellPosition {
 
 /// Appends the shortest movement. `from` is `None` if the cursor position is unknown, for example after
 /// writing to the last column. The movement never scrolls, wraps or depends on terminal modes.
-pub(super) fn go(from: Option<CellPosition>, to: CellPosition, out: &mut Vec<u8>) {
-    let Some(from) = from else { return absolute(to, out) };
+pub(super) fn push_shortest_move(from: Option<CellPosition>, to: CellPosition, out: &mut Vec<u8>) {
+    let Some(from) = from else { return push_absolute_move(to, out) };
     if from == to {
         return;
     }
     let mut best = Vec::new();
-    absolute(to, &mut best);
+    push_absolute_move(to, &mut best);
     let mut consider = |other: Vec<u8>| {
         if other.len() < best.len() {
             best = other;
@@ -25,24 +25,24 @@ pub(super) fn go(from: Option<CellPosition>, to: CellPosition, out: &mut Vec<u8>
     };
     if from.y == to.y {
         consider(horizontal_move(from.x, to.x));
-        consider(with_return(&[], to.x));
+        consider(move_with_return(&[], to.x));
     } else if from.y < to.y {
         let down = usize::from(to.y - from.y);
         // A line feed's effect depends on the tty's modes, so it always follows a carriage return.
         if down <= 8 {
-            consider(with_return(&vec![b'\n'; down], to.x));
+            consider(move_with_return(&vec![b'\n'; down], to.x));
         }
         if from.x == to.x {
-            consider(control(to.y - from.y, b'B'));
+            consider(counted_sequence(to.y - from.y, b'B'));
         }
     } else if from.x == to.x {
-        consider(control(from.y - to.y, b'A'));
+        consider(counted_sequence(from.y - to.y, b'A'));
     }
     out.extend_from_slice(&best);
 }
 
 /// Absolute position (CUP).
-fn absolute(to: CellPosition, out: &mut Vec<u8>) {
+fn push_absolute_move(to: CellPosition, out: &mut Vec<u8>) {
     out.extend_from_slice(b"\x1b[");
     if to.y > 0 || to.x > 0 {
         push_number(to.y + 1, out);
@@ -54,24 +54,24 @@ fn absolute(to: CellPosition, out: &mut Vec<u8>) {
     out.push(b'H');
 }
 
-/// Movement within a row (CUF or CUB). CHA is never needed, because it is never shorter than both CUP and
-/// this.
+/// Movement within a row (CUF or CUB). CHA is not used because it is never shorter than both CUP and these
+/// two.
 fn horizontal_move(from: u16, to: u16) -> Vec<u8> {
-    if to >= from { control(to - from, b'C') } else { control(from - to, b'D') }
+    if to >= from { counted_sequence(to - from, b'C') } else { counted_sequence(from - to, b'D') }
 }
 
 /// Carriage return, line feeds, then movement to the right.
-fn with_return(down: &[u8], column: u16) -> Vec<u8> {
+fn move_with_return(down: &[u8], column: u16) -> Vec<u8> {
     let mut bytes = vec![b'\r'];
     bytes.extend_from_slice(down);
     if column > 0 {
-        bytes.extend(control(column, b'C'));
+        bytes.extend(counted_sequence(column, b'C'));
     }
     bytes
 }
 
 /// A control sequence with a count. The count is omitted if it is 1.
-pub(super) fn control(count: u16, end: u8) -> Vec<u8> {
+pub(super) fn counted_sequence(count: u16, end: u8) -> Vec<u8> {
     let mut bytes = b"\x1b[".to_vec();
     if count != 1 {
         push_number(count, &mut bytes);
@@ -88,7 +88,11 @@ mod tests {
 
     fn bytes_of_move(from: (u16, u16), to: (u16, u16)) -> String {
         let mut out = Vec::new();
-        go(Some(CellPosition { x: from.0, y: from.1 }), CellPosition { x: to.0, y: to.1 }, &mut out);
+        push_shortest_move(
+            Some(CellPosition { x: from.0, y: from.1 }),
+            CellPosition { x: to.0, y: to.1 },
+            &mut out,
+        );
         String::from_utf8(out).expect("ASCII")
     }
 
@@ -112,9 +116,9 @@ mod tests {
             let mut parser = vt100::Parser::new(side(40), side(120), 0);
             let (mut start, mut out) = (Vec::new(), Vec::new());
             let from = CellPosition { x: from.0, y: from.1 };
-            absolute(from, &mut start);
+            push_absolute_move(from, &mut start);
             parser.process(&start);
-            go(known.then_some(from), CellPosition { x: to.0, y: to.1 }, &mut out);
+            push_shortest_move(known.then_some(from), CellPosition { x: to.0, y: to.1 }, &mut out);
             parser.process(&out);
             prop_assert_eq!(parser.screen().cursor_position(), (to.1, to.0));
             prop_assert!(out.len() <= "\x1b[40;120H".len());

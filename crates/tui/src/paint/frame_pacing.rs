@@ -45,7 +45,8 @@ const MOVING_BYTES: f64 = 6.0;
 const MORE_SAMPLES: f64 = 2.0;
 /// Minimum ratio while the previous preview is still being sent.
 const MANY_MORE_SAMPLES: f64 = 4.0;
-/// Fraction of a sample per pixel after which the preview is redrawn during the first sample.
+/// During the first sample per pixel, the preview is redrawn each time this fraction of a sample has been
+/// added.
 const FIRST_PASS: f64 = 0.25;
 /// Minimum time between previews, except for the first and last.
 const SHORTEST: Duration = Duration::from_millis(100);
@@ -65,10 +66,10 @@ pub fn advise(moment: &FrameTiming) -> PacingAdvice {
     }
     let Some(aimed) = moment.aimed_samples else { return PacingAdvice::Aim(Fidelity::First) };
     if moment.is_fast {
-        let is_due = moment.is_shown && moment.since_aim >= moment.shortest();
+        let is_due = moment.is_shown && moment.since_aim >= moment.min_interval();
         return if is_due { PacingAdvice::Aim(Fidelity::Following) } else { PacingAdvice::Wait };
     }
-    let frame = moment.frame();
+    let frame = moment.frame_send_time();
     let is_too_late = moment.final_in.is_some_and(|left| left < frame);
     let is_too_soon = moment.since_aim < SHORTEST.max(frame.div_f64(SHARE));
     if is_too_late || is_too_soon {
@@ -87,17 +88,17 @@ pub fn advise(moment: &FrameTiming) -> PacingAdvice {
 
 impl FrameTiming {
     /// Minimum time between previews on a fast terminal.
-    fn shortest(&self) -> Duration {
+    fn min_interval(&self) -> Duration {
         if self.is_in_pixels { SHORTEST_IN_PIXELS } else { SHORTEST }
     }
 
     /// Time when a fast terminal should get the next preview, if one is pending.
-    pub fn due(&self, aimed: Instant) -> Option<Instant> {
-        (self.is_fast && self.is_shown).then(|| aimed + self.shortest())
+    pub fn next_due_time(&self, aimed: Instant) -> Option<Instant> {
+        (self.is_fast && self.is_shown).then(|| aimed + self.min_interval())
     }
 
     /// Time to send an intermediate preview.
-    fn frame(&self) -> Duration {
+    fn frame_send_time(&self) -> Duration {
         let bytes = f64::from(self.cells) * MOVING_BYTES;
         self.bytes_per_second.map_or(Duration::ZERO, |rate| {
             Duration::try_from_secs_f64(bytes / rate.max(1.0))
@@ -111,7 +112,7 @@ impl FrameTiming {
 mod tests {
     use super::*;
 
-    /// One second after a preview with one sample was drawn.
+    /// Timing one second after a preview with one sample was drawn.
     const MOMENT: FrameTiming = FrameTiming {
         bytes_per_second: None,
         cells: 2500,

@@ -24,7 +24,7 @@ pub(super) struct Hyperlinks {
 
 impl Hyperlinks {
     /// The number of a URL. 0 if the URL is invalid or there are too many.
-    pub(super) fn number(&mut self, address: &str) -> u16 {
+    pub(super) fn url_number(&mut self, address: &str) -> u16 {
         if !address.bytes().all(|byte| byte.is_ascii_graphic()) {
             return 0;
         }
@@ -62,10 +62,10 @@ mod tests {
     fn hyperlinks_keep_their_numbers() {
         let mut links = Hyperlinks::default();
         assert_eq!(
-            [links.number("file:///a"), links.number("file:///b"), links.number("file:///a")],
+            [links.url_number("file:///a"), links.url_number("file:///b"), links.url_number("file:///a")],
             [1, 2, 1]
         );
-        assert_eq!([links.number("a b"), links.number("\x1b]"), links.number("ä")], [0; 3]);
+        assert_eq!([links.url_number("a b"), links.url_number("\x1b]"), links.url_number("ä")], [0; 3]);
         let mut out = Vec::new();
         links.open(2, &mut out);
         links.open(0, &mut out);

@@ -11,28 +11,28 @@ use super::terminal_color::{ColorLayer, TerminalColor};
 pub fn as_text_lines(buffer: &Buffer, is_colored: bool) -> String {
     let mut bytes = Vec::new();
     for row in buffer.content.chunks(usize::from(buffer.area.width.max(1))) {
-        let length = row.iter().rposition(is_seen).map_or(0, |last| last + 1);
+        let length = row.iter().rposition(is_visible).map_or(0, |last| last + 1);
         let mut pen = Pen::RESET;
         for cell in &row[..length] {
             if is_colored {
-                pen.switch_to(&pen_of(cell).exactly(), &mut bytes);
+                pen.switch_to(&pen_of(cell).exact_requirements(), &mut bytes);
             }
             bytes.extend_from_slice(cell.symbol().as_bytes());
         }
-        pen.switch_to(&Pen::RESET.exactly(), &mut bytes);
+        pen.switch_to(&Pen::RESET.exact_requirements(), &mut bytes);
         bytes.push(b'\n');
     }
     String::from_utf8_lossy(&bytes).into_owned()
 }
 
-fn is_seen(cell: &Cell) -> bool {
+fn is_visible(cell: &Cell) -> bool {
     cell.symbol() != " " || cell.bg != Color::Reset
 }
 
 fn pen_of(cell: &Cell) -> Pen {
     Pen {
-        fg: TerminalColor::of(cell.fg, ColorLayer::Foreground),
-        bg: TerminalColor::of(cell.bg, ColorLayer::Background),
+        fg: TerminalColor::from_ratatui(cell.fg, ColorLayer::Foreground),
+        bg: TerminalColor::from_ratatui(cell.bg, ColorLayer::Background),
         modifier: cell.modifier,
         link: 0,
     }

@@ -76,7 +76,7 @@ enum DrawStep {
     Words(u16),
     /// Draw a row of the preview.
     Picture(u16),
-    /// Draw the text of a row that is drawn after the preview.
+    /// Draw a row's text that is delayed until after the preview.
     Later(u16),
 }
 
@@ -106,7 +106,7 @@ impl Painter {
             can_repeat: false,
             screen: None,
             memory: StableCells::default(),
-            wanted: TargetScreen::nothing(depth),
+            wanted: TargetScreen::empty(depth),
             links: Hyperlinks::default(),
             budget: ByteBudget::default(),
             parts: Vec::new().into_iter(),
@@ -140,9 +140,10 @@ impl Painter {
         fidelity: Fidelity,
         extras: &FrameExtras,
     ) {
-        let mut wanted = TargetScreen::new(wanted, picture, fidelity, self.depth).with_later(extras.later);
+        let mut wanted =
+            TargetScreen::new(wanted, picture, fidelity, self.depth).with_delayed_text(extras.later);
         for Hyperlink { cells, address } in &extras.links {
-            wanted.link(*cells, self.links.number(address));
+            wanted.link(*cells, self.links.url_number(address));
         }
         let size = (wanted.columns, wanted.rows);
         if self.screen.as_ref().is_some_and(|screen| (screen.columns, screen.rows) != size) {
@@ -152,7 +153,7 @@ impl Painter {
             self.rows = vec![RowProgress::default(); usize::from(wanted.rows)];
         }
         for (y, row) in (0..wanted.rows).zip(&mut self.rows) {
-            row.is_done = row.is_done && self.wanted.satisfies(&wanted, y);
+            row.is_done = row.is_done && self.wanted.row_satisfies(&wanted, y);
             if fidelity == Fidelity::First && !row.is_done {
                 row.aim = 0;
             }
@@ -201,12 +202,12 @@ impl Painter {
                     return slice.bytes;
                 }
                 if let (Some(DrawStep::Picture(_)), Stroke::Mosaic { at, count, .. }) = (self.part, stroke) {
-                    self.memory.drawn(*at, *count);
+                    self.memory.record_drawn(*at, *count);
                 }
                 self.strokes.next();
             }
             if let Some(DrawStep::Picture(y)) = self.part {
-                self.memory.row_done(y);
+                self.memory.record_row_done(y);
                 self.rows[usize::from(y)] = RowProgress { aim: self.aim, is_done: true };
             }
             if !slice.bytes.is_empty() && is_late() {
@@ -215,23 +216,32 @@ impl Painter {
             }
             self.part = self.parts.next();
             let strokes = match self.part {
-                Some(DrawStep::Words(y)) => words::plan(screen, &self.wanted, y, ScreenRegion::Words),
-                Some(DrawStep::Later(y)) => words::plan(screen, &self.wanted, y, ScreenRegion::Later),
+                Some(DrawStep::Words(y)) => {
+                    words::plan_text_row(screen, &self.wanted, y, ScreenRegion::Words)
+                }
+                Some(DrawStep::Later(y)) => {
+                    words::plan_text_row(screen, &self.wanted, y, ScreenRegion::Later)
+                }
                 Some(DrawStep::Picture(y)) if self.rows[usize::from(y)].is_done && !screen.is_damaged(y) => {
                     Vec::new()
                 }
                 Some(DrawStep::Picture(y)) if self.wanted.is_ramp() => {
-                    words::plan(screen, &self.wanted, y, ScreenRegion::Picture)
+                    words::plan_text_row(screen, &self.wanted, y, ScreenRegion::Picture)
                 }
-                Some(DrawStep::Picture(y)) => {
-                    picture::plan(screen, &self.wanted, &self.memory, y, self.can_repeat, &mut self.budget)
-                }
+                Some(DrawStep::Picture(y)) => picture::plan_preview_row(
+                    screen,
+                    &self.wanted,
+                    &self.memory,
+                    y,
+                    self.can_repeat,
+                    &mut self.budget,
+                ),
                 None => break,
             };
             self.strokes = strokes.into_iter();
         }
         if self.wanted.fidelity == Fidelity::Still {
-            self.memory.finish();
+            self.memory.finish_request();
         }
         slice.bytes
     }

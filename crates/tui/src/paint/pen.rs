@@ -52,7 +52,7 @@ impl Pen {
     };
 
     /// Requirements met only by this pen.
-    pub(super) fn exactly(self) -> PenRequirements {
+    pub(super) fn exact_requirements(self) -> PenRequirements {
         PenRequirements {
             fg: Some(self.fg),
             bg: Some(self.bg),
@@ -66,12 +66,12 @@ impl Pen {
     /// Hyperlinks are handled by the screen model.
     pub(super) fn switch_to(&mut self, requirements: &PenRequirements, out: &mut Vec<u8>) {
         let mut list = Vec::new();
-        let changed = self.changed(requirements, &mut list);
+        let changed = self.push_changes(requirements, &mut list);
         if list.is_empty() {
             return;
         }
         let mut afresh = b"0".to_vec();
-        let reset = Self { link: self.link, ..Self::RESET }.changed(requirements, &mut afresh);
+        let reset = Self { link: self.link, ..Self::RESET }.push_changes(requirements, &mut afresh);
         let is_shorter = afresh.len() < list.len();
         out.extend_from_slice(b"\x1b[");
         out.extend_from_slice(if is_shorter { &afresh } else { &list });
@@ -80,7 +80,7 @@ impl Pen {
     }
 
     /// Appends SGR parameters that make this pen meet the requirements, and returns the new pen.
-    fn changed(mut self, requirements: &PenRequirements, list: &mut Vec<u8>) -> Self {
+    fn push_changes(mut self, requirements: &PenRequirements, list: &mut Vec<u8>) -> Self {
         let surplus = (self.modifier - requirements.modifier) & requirements.matters;
         for (modifier, _, off) in MODIFIERS {
             if surplus.contains(modifier) && self.modifier.contains(modifier) {
@@ -103,7 +103,7 @@ impl Pen {
             (&mut self.bg, requirements.bg, ColorLayer::Background),
         ] {
             if let Some(shade) = wished.filter(|shade| shade != own) {
-                separate(list);
+                push_separator(list);
                 shade.push(layer, list);
                 *own = shade;
             }
@@ -113,11 +113,11 @@ impl Pen {
 }
 
 fn push_parameter(number: u16, list: &mut Vec<u8>) {
-    separate(list);
+    push_separator(list);
     push_number(number, list);
 }
 
-fn separate(list: &mut Vec<u8>) {
+fn push_separator(list: &mut Vec<u8>) {
     if !list.is_empty() {
         list.push(b';');
     }
@@ -131,7 +131,7 @@ mod tests {
 
     fn bytes_of_switch(from: Pen, to: Pen) -> String {
         let (mut pen, mut out) = (from, Vec::new());
-        pen.switch_to(&to.exactly(), &mut out);
+        pen.switch_to(&to.exact_requirements(), &mut out);
         assert_eq!(pen, to);
         String::from_utf8(out).expect("ASCII")
     }
@@ -179,7 +179,7 @@ mod tests {
             let mut current = Pen::RESET;
             for pen in pens {
                 let mut out = Vec::new();
-                current.switch_to(&pen.exactly(), &mut out);
+                current.switch_to(&pen.exact_requirements(), &mut out);
                 parser.process(&out);
                 let screen = parser.screen();
                 let modifiers = [

@@ -13,9 +13,9 @@ use super::target_screen::TargetScreen;
 const FIRST_BYTES: u32 = 12;
 /// Bytes at the start of a row that the search does not count. They reset modifiers left over from text.
 const ROW_BYTES: u32 = 4;
-/// Ratio between the byte costs of successive attempts.
+/// Ratio between the costs per byte of successive attempts.
 const STEP: f32 = 1.6;
-/// Byte cost above which no further bytes can be saved.
+/// Cost per byte above which no further bytes can be saved.
 const DEAREST: f32 = 4000.0;
 
 /// Byte budget for a first preview.
@@ -32,13 +32,13 @@ impl Default for ByteBudget {
 }
 
 impl ByteBudget {
-    /// Plans a row with the smallest error that fits into the budget. The byte cost is lowered again after
-    /// rows that used less than their share.
-    fn use_budget(&mut self, targets: &[TargetCell], start: RowStart) -> PlannedRow {
+    /// Plans a row with the smallest error that fits into the budget. After a row that used less than its
+    /// share, the cost per byte is lowered again.
+    fn plan_row_in_budget(&mut self, targets: &[TargetCell], start: RowStart) -> PlannedRow {
         let share = FIRST_BYTES * targets.len() as u32;
         self.bytes += share;
         if self.bytes > 2 * share {
-            self.model = self.model.at(self.model.byte / STEP);
+            self.model = self.model.with_byte_cost(self.model.byte / STEP);
         }
         loop {
             let found = plan_row(targets, start, self.model);
@@ -47,13 +47,13 @@ impl ByteBudget {
                 self.bytes = self.bytes.saturating_sub(bytes);
                 return found;
             }
-            self.model = self.model.at(self.model.byte * STEP);
+            self.model = self.model.with_byte_cost(self.model.byte * STEP);
         }
     }
 }
 
 /// Plans the strokes for a row of the preview.
-pub(super) fn plan(
+pub(super) fn plan_preview_row(
     screen: &ScreenModel,
     wanted: &TargetScreen,
     memory: &StableCells,
@@ -63,7 +63,7 @@ pub(super) fn plan(
 ) -> Vec<Stroke> {
     let columns = wanted.picture.left()..wanted.picture.right();
     let targets: Vec<TargetCell> =
-        columns.clone().map(|x| target(screen, wanted, memory, CellPosition { x, y })).collect();
+        columns.clone().map(|x| target_cell(screen, wanted, memory, CellPosition { x, y })).collect();
     let start = RowStart {
         fg: screen.pen.fg,
         bg: screen.pen.bg,
@@ -73,7 +73,7 @@ pub(super) fn plan(
         Fidelity::Still => plan_row(&targets, start, CostModel::EXACT),
         Fidelity::Following => plan_row(&targets, start, CostModel::ALL),
         Fidelity::Moving => plan_row(&targets, start, CostModel::MOVING),
-        Fidelity::First => budget.use_budget(&targets, start),
+        Fidelity::First => budget.plan_row_in_budget(&targets, start),
     };
     let stroke = |op: DrawOp| Stroke::Mosaic {
         at: CellPosition { x: columns.start + op.column as u16, y },
@@ -82,14 +82,19 @@ pub(super) fn plan(
         count: 1,
     };
     let strokes: Vec<Stroke> = row.ops.into_iter().map(stroke).collect();
-    if can_repeat { Stroke::repeated(&strokes) } else { strokes }
+    if can_repeat { Stroke::merge_repeats(&strokes) } else { strokes }
 }
 
-fn target(screen: &ScreenModel, wanted: &TargetScreen, memory: &StableCells, at: CellPosition) -> TargetCell {
+fn target_cell(
+    screen: &ScreenModel,
+    wanted: &TargetScreen,
+    memory: &StableCells,
+    at: CellPosition,
+) -> TargetCell {
     let shown = match screen.content(at) {
         CellContent::Mosaic(mosaic) => Some(*mosaic),
         CellContent::Unknown | CellContent::Text(_) | CellContent::Covered => None,
     };
-    let wanted = wanted.mosaic(at.x, at.y).map(|wanted| memory.mosaic(at, wanted, shown));
+    let wanted = wanted.mosaic(at.x, at.y).map(|wanted| memory.stabilized_mosaic(at, wanted, shown));
     TargetCell { wanted, shown }
 }

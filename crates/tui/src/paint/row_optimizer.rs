@@ -7,7 +7,7 @@
 use super::candidates::{CandidateColors, candidates};
 use super::cell::{Glyph, Mosaic};
 use super::cost_model::CostModel;
-use super::terminal_color::{ColorLayer, TerminalColor, digits};
+use super::terminal_color::{ColorLayer, TerminalColor, decimal_digits};
 use crate::mosaic::{PLACES, Tile};
 
 /// Paths kept per cell.
@@ -61,8 +61,8 @@ struct DrawPath {
 }
 
 /// Packs two colors into one key.
-fn pen(fg: TerminalColor, bg: TerminalColor) -> u64 {
-    u64::from(fg.number()) << 32 | u64::from(bg.number())
+fn pen_key(fg: TerminalColor, bg: TerminalColor) -> u64 {
+    u64::from(fg.unique_number()) << 32 | u64::from(bg.unique_number())
 }
 
 /// Distance between the cursor and the next cell.
@@ -79,11 +79,11 @@ impl CursorGap {
             Self::Far => 8,
             Self::Cells(0) => 0,
             Self::Cells(1) => 3,
-            Self::Cells(count) => 3 + digits(count),
+            Self::Cells(count) => 3 + decimal_digits(count),
         }
     }
 
-    fn wider(self) -> Self {
+    fn widened_by_cell(self) -> Self {
         match self {
             Self::Far => Self::Far,
             Self::Cells(count) => Self::Cells(count.saturating_add(1)),
@@ -102,30 +102,36 @@ pub(super) struct PlannedRow {
 pub(super) fn plan_row(targets: &[TargetCell], start: RowStart, model: CostModel) -> PlannedRow {
     let gap = if start.is_at_start { CursorGap::Cells(0) } else { CursorGap::Far };
     let RowStart { fg, bg, .. } = start;
-    let first = DrawPath { fg, bg, pen: pen(fg, bg), gap, bytes: 0, cost: 0.0, parent: 0, glyph: None };
+    let first = DrawPath { fg, bg, pen: pen_key(fg, bg), gap, bytes: 0, cost: 0.0, parent: 0, glyph: None };
     let mut paths = vec![vec![first]];
     let wanted: Vec<_> = targets.iter().map(|target| target.wanted).collect();
     for (column, target) in targets.iter().enumerate() {
         let last = &paths[column];
-        paths.push(step(last, *target, &wanted[column..], model));
+        paths.push(extend_paths(last, *target, &wanted[column..], model));
     }
-    trace(&paths, &wanted)
+    trace_back(&paths, &wanted)
 }
 
 /// Extends the paths by one cell.
-fn step(last: &[DrawPath], target: TargetCell, wanted: &[Option<Mosaic>], model: CostModel) -> Vec<DrawPath> {
+fn extend_paths(
+    last: &[DrawPath],
+    target: TargetCell,
+    wanted: &[Option<Mosaic>],
+    model: CostModel,
+) -> Vec<DrawPath> {
     let mut beam = Beam { paths: Vec::with_capacity(BEAM), limit: MAX_BYTES * model.byte };
     let leave = match (target.wanted, target.shown) {
         (None, _) => 0.0,
-        (Some(wanted), Some(shown)) => {
-            shown.against(wanted).map(|(shown, wanted, part)| part * model.error(shown, wanted)).sum()
-        }
+        (Some(wanted), Some(shown)) => shown
+            .overlapping_colors(wanted)
+            .map(|(shown, wanted, part)| part * model.error(shown, wanted))
+            .sum(),
         (Some(_), None) => f32::INFINITY,
     };
     if leave.is_finite() {
         for (parent, path) in last.iter().enumerate() {
             beam.add(DrawPath {
-                gap: path.gap.wider(),
+                gap: path.gap.widened_by_cell(),
                 cost: path.cost + leave,
                 parent,
                 glyph: None,
@@ -210,7 +216,7 @@ impl ColorChanges {
             Self { mosaic, model, all: Vec::new(), first: first.len(), second: first.len() + second.len() };
         let change = |shade: &TerminalColor| ColorChange {
             shade: *shade,
-            bytes: shade.length(),
+            bytes: shade.sgr_length(),
             errors: changes.errors(*shade),
         };
         changes.all = first.iter().chain(second).chain(both).map(change).collect();
@@ -219,7 +225,7 @@ impl ColorChanges {
 
     /// Area-weighted errors of a color in both parts.
     fn errors(&self, shade: TerminalColor) -> [f32; 2] {
-        let sizes = self.mosaic.tile.sizes();
+        let sizes = self.mosaic.tile.part_sizes();
         std::array::from_fn(|part| {
             let share = 2.0 * sizes[part] as f32 / PLACES as f32;
             share * self.model.error(shade, self.mosaic.pair[part])
@@ -229,7 +235,7 @@ impl ColorChanges {
     /// Extends a path, using the current pen and each single color change. A color chosen for one part is
     /// used only there.
     fn change_one(&self, parent: usize, path: &DrawPath, beam: &mut Beam) {
-        let mut ends = PathEnd::new(self, parent, path, beam);
+        let mut ends = PathExtension::new(self, parent, path, beam);
         if !ends.is_near() {
             return;
         }
@@ -256,13 +262,13 @@ impl ColorChanges {
 
     /// Extends a path, changing both colors.
     fn change_both(&self, parent: usize, path: &DrawPath, beam: &mut Beam) {
-        let mut ends = PathEnd::new(self, parent, path, beam);
+        let mut ends = PathExtension::new(self, parent, path, beam);
         for first in &self.all[..self.first] {
             for second in &self.all[self.first..self.second] {
                 let bytes = first.bytes + second.bytes + 4;
                 for (fg, bg, glyph) in [(first, second, Glyph::First), (second, first, Glyph::Second)] {
                     if fg.shade.fits(ColorLayer::Foreground) && bg.shade.fits(ColorLayer::Background) {
-                        ends.add(PenErrors::of(fg, bg), bytes, glyph);
+                        ends.add(PenErrors::from_changes(fg, bg), bytes, glyph);
                     }
                 }
             }
@@ -271,7 +277,7 @@ impl ColorChanges {
 }
 
 /// Extends one path by a drawn cell.
-struct PathEnd<'a> {
+struct PathExtension<'a> {
     parent: usize,
     /// Number of bytes, including those that move the cursor to the cell.
     bytes: u32,
@@ -285,7 +291,7 @@ struct PathEnd<'a> {
     bound: f32,
 }
 
-impl<'a> PathEnd<'a> {
+impl<'a> PathExtension<'a> {
     fn new(changes: &ColorChanges, parent: usize, path: &DrawPath, beam: &'a mut Beam) -> Self {
         let byte = changes.model.byte;
         let error = path.cost - path.bytes as f32 * byte;
@@ -300,7 +306,7 @@ impl<'a> PathEnd<'a> {
     }
 
     fn add(&mut self, ends: PenErrors, sgr: u32, glyph: Glyph) {
-        // The inverse of the medium shade is a different pattern but the same character.
+        // Inverting the medium shade yields a different pattern but the same character.
         if glyph == Glyph::Second && self.tile == Tile::MEDIUM {
             return;
         }
@@ -309,7 +315,7 @@ impl<'a> PathEnd<'a> {
         if cost < self.bound {
             let PenErrors { fg, bg, .. } = ends;
             let parent = self.parent;
-            let (pen, gap, glyph) = (pen(fg, bg), CursorGap::Cells(0), Some(glyph));
+            let (pen, gap, glyph) = (pen_key(fg, bg), CursorGap::Cells(0), Some(glyph));
             self.beam.add(DrawPath { fg, bg, pen, gap, bytes, cost, parent, glyph });
             self.bound = self.beam.cost_bound();
         }
@@ -326,7 +332,7 @@ struct PenErrors {
 }
 
 impl PenErrors {
-    fn of(fg: &ColorChange, bg: &ColorChange) -> Self {
+    fn from_changes(fg: &ColorChange, bg: &ColorChange) -> Self {
         Self { fg: fg.shade, fg_errors: fg.errors, bg: bg.shade, bg_errors: bg.errors }
     }
 
@@ -348,7 +354,7 @@ impl PenErrors {
 }
 
 /// Traces the cheapest path back from the last cell.
-fn trace(paths: &[Vec<DrawPath>], wanted: &[Option<Mosaic>]) -> PlannedRow {
+fn trace_back(paths: &[Vec<DrawPath>], wanted: &[Option<Mosaic>]) -> PlannedRow {
     let last = paths.last().into_iter().flatten().enumerate();
     let best = last.min_by(|a, b| a.1.cost.total_cmp(&b.1.cost));
     let (mut index, bytes) = best.map_or((0, 0), |(index, path)| (index, path.bytes));
@@ -383,7 +389,7 @@ mod tests {
             .iter()
             .map(|halves| TargetCell {
                 wanted: Some(Mosaic::halves(*halves)),
-                shown: Some(Mosaic::plain(TerminalColor::DefaultBackground)),
+                shown: Some(Mosaic::uniform(TerminalColor::DefaultBackground)),
             })
             .collect()
     }
@@ -477,7 +483,7 @@ mod tests {
             for (shown, target) in screen.iter().zip(&targets) {
                 let Some(wanted) = target.wanted else { continue };
                 let shown = shown.expect("unknown cells should be drawn");
-                for (shown, wanted, part) in shown.against(wanted) {
+                for (shown, wanted, part) in shown.overlapping_colors(wanted) {
                     // Larger errors in a single channel should be avoided at any cost.
                     let most = if is_exact { 3.0 } else { CostModel::MOVING.byte * 120.0 };
                     prop_assert!(part * model.error(shown, wanted) <= most);

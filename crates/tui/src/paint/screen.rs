@@ -37,12 +37,12 @@ impl Stroke {
 
     /// Replaces runs of equal blanks with REP where this is shorter. Only blanks are repeated because some
     /// terminals support REP only for ASCII characters.
-    pub(super) fn repeated(strokes: &[Self]) -> Vec<Self> {
+    pub(super) fn merge_repeats(strokes: &[Self]) -> Vec<Self> {
         let mut shorter: Vec<Self> = Vec::with_capacity(strokes.len());
-        for run in strokes.chunk_by(Self::last_good_progress) {
+        for run in strokes.chunk_by(Self::is_repeated_by) {
             let count = run.len() as u16;
             if let [Self::Mosaic { at, glyph: Glyph::Blank, mosaic, .. }, _, ..] = run
-                && run.len() > 1 + cursor_moves::control(count - 1, b'b').len()
+                && run.len() > 1 + cursor_moves::counted_sequence(count - 1, b'b').len()
             {
                 shorter.push(Self::Mosaic { at: *at, glyph: Glyph::Blank, mosaic: *mosaic, count });
             } else {
@@ -53,7 +53,7 @@ impl Stroke {
     }
 
     /// Whether `next` draws the same content in the following cell.
-    fn last_good_progress(&self, next: &Self) -> bool {
+    fn is_repeated_by(&self, next: &Self) -> bool {
         if let (
             Self::Mosaic { at, glyph, mosaic, .. },
             Self::Mosaic { at: next_at, glyph: next_glyph, mosaic: next_mosaic, .. },
@@ -125,25 +125,25 @@ impl ScreenModel {
     /// Draws a stroke. Returns false and does nothing if it does not fit into the slice.
     pub(super) fn draw(&mut self, stroke: &Stroke, links: &Hyperlinks, slice: &mut OutputSlice) -> bool {
         let (start, pen) = (slice.bytes.len(), self.pen);
-        self.write(stroke, links, &mut slice.bytes);
+        self.push_stroke(stroke, links, &mut slice.bytes);
         if start > 0 && slice.bytes.len() > slice.most {
             slice.bytes.truncate(start);
             self.pen = pen;
             return false;
         }
-        self.keep(stroke);
+        self.record_stroke(stroke);
         true
     }
 
-    fn write(&mut self, stroke: &Stroke, links: &Hyperlinks, bytes: &mut Vec<u8>) {
+    fn push_stroke(&mut self, stroke: &Stroke, links: &Hyperlinks, bytes: &mut Vec<u8>) {
         let (at, requirements) = match stroke {
-            Stroke::Text { at, text } => (at, text.pen.exactly()),
+            Stroke::Text { at, text } => (at, text.pen.exact_requirements()),
             Stroke::Mosaic { at, glyph, mosaic, .. } => (at, glyph.requirements(mosaic.pair)),
             Stroke::Erase { at, .. } => {
                 (at, Glyph::Blank.requirements([TerminalColor::DefaultBackground; 2]))
             }
         };
-        cursor_moves::go(self.cursor, *at, bytes);
+        cursor_moves::push_shortest_move(self.cursor, *at, bytes);
         if self.pen.link != requirements.link {
             links.open(requirements.link, bytes);
             self.pen.link = requirements.link;
@@ -155,31 +155,33 @@ impl ScreenModel {
                 let symbol = glyph.symbol(mosaic.tile);
                 bytes.extend_from_slice(symbol.encode_utf8(&mut [0; 4]).as_bytes());
                 if *count > 1 {
-                    bytes.extend(cursor_moves::control(*count - 1, b'b'));
+                    bytes.extend(cursor_moves::counted_sequence(*count - 1, b'b'));
                 }
             }
-            Stroke::Erase { count: Some(count), .. } => bytes.extend(cursor_moves::control(*count, b'X')),
+            Stroke::Erase { count: Some(count), .. } => {
+                bytes.extend(cursor_moves::counted_sequence(*count, b'X'));
+            }
             Stroke::Erase { count: None, .. } => bytes.extend_from_slice(b"\x1b[K"),
         }
     }
 
     /// Updates the cells and cursor after a stroke.
-    fn keep(&mut self, stroke: &Stroke) {
+    fn record_stroke(&mut self, stroke: &Stroke) {
         match stroke {
             Stroke::Text { at, text } => {
-                self.put(*at, CellContent::Text(text.clone()), text.columns);
+                self.store_cell(*at, CellContent::Text(text.clone()), text.columns);
                 // Terminals differ in the width of other characters.
-                self.cursor = if text.is_plain() { self.after(*at, 1) } else { None };
+                self.cursor = if text.is_plain() { self.position_after(*at, 1) } else { None };
             }
             Stroke::Mosaic { at, mosaic, count, .. } => {
                 for x in at.x..at.x + count {
-                    self.put(CellPosition { x, ..*at }, CellContent::Mosaic(*mosaic), 1);
+                    self.store_cell(CellPosition { x, ..*at }, CellContent::Mosaic(*mosaic), 1);
                 }
-                self.cursor = self.after(*at, *count);
+                self.cursor = self.position_after(*at, *count);
             }
             Stroke::Erase { at, count } => {
                 for x in at.x..count.map_or(self.columns, |count| at.x + count) {
-                    self.put(CellPosition { x, ..*at }, CellContent::BLANK, 1);
+                    self.store_cell(CellPosition { x, ..*at }, CellContent::BLANK, 1);
                 }
                 self.cursor = Some(*at);
             }
@@ -187,12 +189,12 @@ impl ScreenModel {
     }
 
     /// The cursor position `columns` further right. `None` past the last column, where terminals differ.
-    fn after(&self, at: CellPosition, columns: u16) -> Option<CellPosition> {
+    fn position_after(&self, at: CellPosition, columns: u16) -> Option<CellPosition> {
         Some(CellPosition { x: at.x + columns, ..at }).filter(|next| next.x < self.columns)
     }
 
     /// Stores a drawn cell. Overwriting half of a wide character makes the other half unknown.
-    fn put(&mut self, at: CellPosition, look: CellContent, columns: u16) {
+    fn store_cell(&mut self, at: CellPosition, look: CellContent, columns: u16) {
         let start = self.index(at);
         let end = start + usize::from(columns);
         if self.contents[start] == CellContent::Covered && start > 0 {

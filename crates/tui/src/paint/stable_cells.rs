@@ -18,7 +18,7 @@ const ALIKE: u8 = 2;
 /// Upper limit of the noise threshold below which cells are not redrawn.
 const MAX_NOISE: u8 = 12;
 
-/// For each cell, the first preview of the request that the screen shows.
+/// Stores, for each cell, the first preview of the request whose result is on the screen.
 #[derive(Debug, Default)]
 pub(super) struct StableCells {
     columns: usize,
@@ -53,19 +53,19 @@ impl StableCells {
             };
         }
         match wanted.fidelity {
-            Fidelity::First => self.begin(wanted),
-            Fidelity::Moving => self.noise = noise(self.median(wanted, screen)),
-            Fidelity::Following => match self.median(wanted, screen) {
+            Fidelity::First => self.begin_request(wanted),
+            Fidelity::Moving => self.noise = noise_threshold(self.median_difference(wanted, screen)),
+            Fidelity::Following => match self.median_difference(wanted, screen) {
                 // There is hardly any noise left to hide, so redraw everything.
                 ..=1 => self.steady.fill(false),
-                median => self.noise = noise(median),
+                median => self.noise = noise_threshold(median),
             },
             Fidelity::Still => self.steady.fill(false),
         }
     }
 
     /// Compares the first preview of a new request with the previous one.
-    fn begin(&mut self, wanted: &TargetScreen) {
+    fn begin_request(&mut self, wanted: &TargetScreen) {
         let places = (0..wanted.rows).flat_map(|y| (0..wanted.columns).map(move |x| (x, y)));
         self.newest = places.map(|(x, y)| wanted.mosaic(x, y)).collect();
         self.noise = u8::MAX;
@@ -75,7 +75,7 @@ impl StableCells {
     }
 
     /// Median difference between the target and the stable cells on the screen.
-    fn median(&self, wanted: &TargetScreen, screen: Option<&ScreenModel>) -> usize {
+    fn median_difference(&self, wanted: &TargetScreen, screen: Option<&ScreenModel>) -> usize {
         let mut counts = [0_u32; 256];
         let Some(screen) = screen else { return 0 };
         for y in wanted.picture.top()..wanted.picture.bottom() {
@@ -99,7 +99,12 @@ impl StableCells {
     }
 
     /// The mosaic to draw. Returns the displayed one if it differs from the target only by noise.
-    pub(super) fn mosaic(&self, at: CellPosition, wanted: Mosaic, shown: Option<Mosaic>) -> Mosaic {
+    pub(super) fn stabilized_mosaic(
+        &self,
+        at: CellPosition,
+        wanted: Mosaic,
+        shown: Option<Mosaic>,
+    ) -> Mosaic {
         shown
             .filter(|shown| {
                 self.is_steady(at)
@@ -117,7 +122,7 @@ impl StableCells {
     }
 
     /// Records that cells were drawn for the current request.
-    pub(super) fn drawn(&mut self, at: CellPosition, count: u16) {
+    pub(super) fn record_drawn(&mut self, at: CellPosition, count: u16) {
         let first = self.index(at);
         for index in first..first + usize::from(count) {
             if let Some(kept) = self.firsts.get_mut(index) {
@@ -128,7 +133,7 @@ impl StableCells {
     }
 
     /// Records that a row is complete. Cells that were not redrawn also show the current request.
-    pub(super) fn row_done(&mut self, y: u16) {
+    pub(super) fn record_row_done(&mut self, y: u16) {
         for x in self.picture.left()..self.picture.right() {
             let index = self.index(CellPosition { x, y });
             if let Some(Some(newest)) = self.newest.get(index)
@@ -140,13 +145,13 @@ impl StableCells {
     }
 
     /// Ends the current request after its final preview has been drawn.
-    pub(super) fn finish(&mut self) {
+    pub(super) fn finish_request(&mut self) {
         self.newest.clear();
     }
 }
 
 /// Noise threshold for a median difference.
-fn noise(median: usize) -> u8 {
+fn noise_threshold(median: usize) -> u8 {
     u8::try_from(4 * median + 2).unwrap_or(u8::MAX).min(MAX_NOISE)
 }
 
@@ -157,5 +162,5 @@ fn color_difference(a: Mosaic, b: Mosaic) -> u8 {
         (Some(a), Some(b)) => a.iter().zip(b).map(|(a, b)| a.abs_diff(b)).max().unwrap_or(0),
         _ => u8::MAX,
     };
-    a.against(b).map(|(a, b, _)| one(a, b)).max().unwrap_or(0)
+    a.overlapping_colors(b).map(|(a, b, _)| one(a, b)).max().unwrap_or(0)
 }

@@ -31,14 +31,22 @@ pub(super) enum ScreenRegion {
 
 impl TargetScreen {
     /// An empty screen.
-    pub(super) fn nothing(depth: ColorDepth) -> Self {
+    pub(super) fn empty(depth: ColorDepth) -> Self {
         Self::new(&Buffer::empty(Rect::ZERO), Rect::ZERO, Fidelity::Still, depth)
     }
 
     pub(super) fn new(buffer: &Buffer, picture: Rect, fidelity: Fidelity, depth: ColorDepth) -> Self {
         let (columns, rows) = (buffer.area.width, buffer.area.height);
         let picture = picture.intersection(Rect::new(0, 0, columns, rows));
-        Self { columns, rows, contents: contents(buffer, depth), picture, later: Rect::ZERO, fidelity, depth }
+        Self {
+            columns,
+            rows,
+            contents: buffer_contents(buffer, depth),
+            picture,
+            later: Rect::ZERO,
+            fidelity,
+            depth,
+        }
     }
 
     pub(super) fn is_empty(&self) -> bool {
@@ -51,7 +59,7 @@ impl TargetScreen {
     }
 
     /// Whether a row drawn for this target also satisfies `other`.
-    pub(super) fn satisfies(&self, other: &Self, y: u16) -> bool {
+    pub(super) fn row_satisfies(&self, other: &Self, y: u16) -> bool {
         let is_as_near = self.fidelity == other.fidelity
             || (matches!(self.fidelity, Fidelity::Still | Fidelity::Following)
                 && other.fidelity == Fidelity::Moving);
@@ -72,7 +80,7 @@ impl TargetScreen {
     }
 
     /// Sets the cells whose text is drawn after the preview. Blank cells are not delayed.
-    pub(super) fn with_later(self, later: Rect) -> Self {
+    pub(super) fn with_delayed_text(self, later: Rect) -> Self {
         Self { later, ..self }
     }
 
@@ -126,10 +134,10 @@ impl TargetScreen {
 }
 
 /// Contents of a buffer's cells.
-pub(super) fn contents(buffer: &Buffer, depth: ColorDepth) -> Vec<CellContent> {
+pub(super) fn buffer_contents(buffer: &Buffer, depth: ColorDepth) -> Vec<CellContent> {
     let columns = usize::from(buffer.area.width.max(1));
     let mut contents: Vec<CellContent> =
-        buffer.content.iter().map(|cell| CellContent::of(cell, depth)).collect();
+        buffer.content.iter().map(|cell| CellContent::from_cell(cell, depth)).collect();
     for row in contents.chunks_mut(columns) {
         let mut x = 0;
         while x < row.len() {

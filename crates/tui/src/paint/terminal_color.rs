@@ -26,7 +26,7 @@ pub(super) enum ColorLayer {
 
 impl TerminalColor {
     /// Converts a ratatui color in this layer to a terminal color.
-    pub(super) fn of(color: Color, layer: ColorLayer) -> Self {
+    pub(super) fn from_ratatui(color: Color, layer: ColorLayer) -> Self {
         match color {
             Color::Reset => match layer {
                 ColorLayer::Foreground => Self::DefaultForeground,
@@ -63,7 +63,7 @@ impl TerminalColor {
     }
 
     /// A unique number for each color.
-    pub(super) fn number(self) -> u32 {
+    pub(super) fn unique_number(self) -> u32 {
         match self {
             Self::DefaultBackground => 1 << 24,
             Self::DefaultForeground => 2 << 24,
@@ -99,19 +99,19 @@ impl TerminalColor {
     }
 
     /// Number of bytes that [`TerminalColor::push`] appends.
-    pub(super) fn length(self) -> u32 {
+    pub(super) fn sgr_length(self) -> u32 {
         match self {
             Self::DefaultBackground | Self::DefaultForeground | Self::Palette(0..8) => 2,
             // Upper bound for 90 to 97 or 100 to 107, since the layer is not known here.
             Self::Palette(8..16) => 3,
-            Self::Palette(index) => 5 + digits(index),
-            Self::Rgb(rgb) => 7 + rgb.map(digits).iter().sum::<u32>(),
+            Self::Palette(index) => 5 + decimal_digits(index),
+            Self::Rgb(rgb) => 7 + rgb.map(decimal_digits).iter().sum::<u32>(),
         }
     }
 }
 
 /// Number of decimal digits.
-pub(super) fn digits(number: u8) -> u32 {
+pub(super) fn decimal_digits(number: u8) -> u32 {
     1 + u32::from(number > 9) + u32::from(number > 99)
 }
 
@@ -162,7 +162,7 @@ mod tests {
             .map(TerminalColor::Palette)
             .chain([TerminalColor::Rgb([0, 10, 100]), TerminalColor::Rgb([9, 99, 255])])
         {
-            assert_eq!(text(shade, ColorLayer::Foreground).len(), shade.length() as usize, "{shade:?}");
+            assert_eq!(text(shade, ColorLayer::Foreground).len(), shade.sgr_length() as usize, "{shade:?}");
         }
     }
 

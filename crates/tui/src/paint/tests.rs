@@ -6,7 +6,7 @@ use ratatui::layout::Rect;
 use ratatui::style::{Color, Modifier};
 
 use super::cell::CellContent;
-use super::target_screen::contents;
+use super::target_screen::buffer_contents;
 use super::terminal_color::TerminalColor;
 use super::*;
 
@@ -47,17 +47,17 @@ impl TestTerminal {
         self.sent - before
     }
 
-    /// The largest channel difference between the screen and a buffer. Panics if there are differences other
-    /// than preview colors.
+    /// The largest channel difference between the screen and a buffer. Panics if anything other than preview
+    /// colors differs.
     fn difference(&self, wanted: &Buffer, depth: ColorDepth) -> u32 {
         let mut largest = 0;
-        let contents = contents(wanted, depth);
+        let contents = buffer_contents(wanted, depth);
         for (i, look) in contents.iter().enumerate() {
             let (x, y) = (i as u16 % wanted.area.width, i as u16 / wanted.area.width);
             let cell = self.terminal.screen().cell(y, x).expect("a cell");
             match (look, cell_content(cell)) {
                 (CellContent::Mosaic(a), CellContent::Mosaic(b)) => {
-                    for (a, b, _) in a.against(b) {
+                    for (a, b, _) in a.overlapping_colors(b) {
                         largest =
                             largest.max(distance(a, b).unwrap_or_else(|| panic!("{x},{y}: {a:?} {b:?}")));
                     }
@@ -100,7 +100,7 @@ fn cell_content(cell: &vt100::Cell) -> CellContent {
     ] {
         as_buffer.modifier.set(modifier, is_on);
     }
-    CellContent::of(&as_buffer, ColorDepth::TrueColor)
+    CellContent::from_cell(&as_buffer, ColorDepth::TrueColor)
 }
 
 const COLUMNS: u16 = 24;

@@ -10,8 +10,14 @@ const ERASED: usize = 9;
 /// Minimum length of a run of blanks that is erased to the end of the row.
 const ERASED_TO_END: usize = 4;
 
-/// Plans the strokes for a region's text in a row, or for a preview consisting of characters.
-pub(super) fn plan(screen: &ScreenModel, wanted: &TargetScreen, y: u16, region: ScreenRegion) -> Vec<Stroke> {
+/// Plans the strokes that draw the text of one region in a row, or one row of a preview drawn with
+/// characters.
+pub(super) fn plan_text_row(
+    screen: &ScreenModel,
+    wanted: &TargetScreen,
+    y: u16,
+    region: ScreenRegion,
+) -> Vec<Stroke> {
     let mut strokes = Vec::new();
     for x in 0..wanted.columns {
         let at = CellPosition { x, y };
@@ -19,15 +25,15 @@ pub(super) fn plan(screen: &ScreenModel, wanted: &TargetScreen, y: u16, region: 
         if screen.content(at) == look || wanted.region(x, y) != region {
             continue;
         }
-        if let Some(stroke) = stroke(at, look) {
-            bridge(screen, &mut strokes, at);
+        if let Some(stroke) = stroke_for_cell(at, look) {
+            bridge_gap(screen, &mut strokes, at);
             strokes.push(stroke);
         }
     }
-    erased(wanted, y, &strokes)
+    replace_blanks_with_erase(wanted, y, &strokes)
 }
 
-fn stroke(at: CellPosition, look: &CellContent) -> Option<Stroke> {
+fn stroke_for_cell(at: CellPosition, look: &CellContent) -> Option<Stroke> {
     match look {
         CellContent::Text(text) => Some(Stroke::Text { at, text: text.clone() }),
         CellContent::Mosaic(mosaic) => {
@@ -39,10 +45,10 @@ fn stroke(at: CellPosition, look: &CellContent) -> Option<Stroke> {
 }
 
 /// Redraws the cells between the last stroke and `to` if this takes fewer bytes than moving the cursor.
-fn bridge(screen: &ScreenModel, strokes: &mut Vec<Stroke>, to: CellPosition) {
+fn bridge_gap(screen: &ScreenModel, strokes: &mut Vec<Stroke>, to: CellPosition) {
     let Some(Stroke::Text { at, text }) = strokes.last() else { return };
     let first = at.x + text.columns;
-    let jump = cursor_moves::control(to.x - first, b'C').len();
+    let jump = cursor_moves::counted_sequence(to.x - first, b'C').len();
     let (mut between, mut bytes) = (Vec::new(), 0);
     for x in first..to.x {
         let at = CellPosition { x, ..to };
@@ -69,7 +75,7 @@ fn bridge(screen: &ScreenModel, strokes: &mut Vec<Stroke>, to: CellPosition) {
 }
 
 /// Replaces long runs of blanks with erase sequences.
-fn erased(wanted: &TargetScreen, y: u16, strokes: &[Stroke]) -> Vec<Stroke> {
+fn replace_blanks_with_erase(wanted: &TargetScreen, y: u16, strokes: &[Stroke]) -> Vec<Stroke> {
     let mut shorter = Vec::with_capacity(strokes.len());
     for run in strokes.chunk_by(|a, b| is_blank(a) && is_blank(b) && a.at().x + 1 == b.at().x) {
         let at = run[0].at();

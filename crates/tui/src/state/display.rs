@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use super::Setup;
+use super::InitialState;
 use crate::color::{AnsiColors, ColorDepth, ColorMapper};
 use crate::event::{FrameReport, Window};
 use crate::graphics::Protocol;
@@ -39,11 +39,11 @@ pub(crate) struct DisplayState {
 }
 
 impl DisplayState {
-    pub(super) fn new(setup: &Setup, now: Instant) -> Self {
+    pub(super) fn new(setup: &InitialState, now: Instant) -> Self {
         let pixels = setup.ask.pixels.filter(|request| !request.is_known);
         Self {
             pixels,
-            pixels_until: pixels.map(|request| request.deadline(now)),
+            pixels_until: pixels.map(|request| request.reply_deadline(now)),
             window: setup.window,
             kind: setup.preview,
             depth: setup.depth,
@@ -60,7 +60,7 @@ impl DisplayState {
 
     /// Preview pixels per cell, horizontally.
     pub(crate) fn pixels_across(&self) -> u32 {
-        /// More pixels are not worth the bytes.
+        /// Further pixels are not worth the bytes.
         const MAX: u32 = 10;
         /// Maximum number of pixels in the window. Accumulating, developing and encoding a preview takes
         /// about 45 bytes of memory per pixel.

@@ -12,11 +12,11 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 pub(super) use self::display::DisplayState;
-pub(super) use self::overlays::{Message, OverlayState, Pane, Problems, ViewList};
+pub(super) use self::overlays::{BlockingErrors, Message, OverlayState, Pane, ViewList};
 pub(super) use self::picture::PictureState;
-pub(super) use self::request::{CameraStep, ImageOrigin, RequestState, Toggles, format_stops};
+pub(super) use self::request::{CameraStep, ImageOrigin, KeyOverrides, RequestState, format_stops};
 pub(super) use self::saving::{OwnImage, PendingChange, SavingState, WrittenFile};
-pub(super) use self::selection::{PickPurpose, Press, SelectionState};
+pub(super) use self::selection::{MousePress, PickPurpose, SelectionState};
 pub(super) use self::work::{Activity, AssetBar, Rendering, WorkState};
 use super::color::{AnsiColors, ColorDepth};
 use super::event::Window;
@@ -27,7 +27,7 @@ use crate::pipeline::settings::Overrides;
 use crate::scene::diagnostic::{Diagnostic, Severity};
 
 /// Initial state values.
-pub(super) struct Setup {
+pub(super) struct InitialState {
     pub scene: PathBuf,
     pub overrides: Overrides,
     pub window: Window,
@@ -65,7 +65,7 @@ pub(super) struct State {
 }
 
 impl State {
-    pub(super) fn new(setup: Setup, now: Instant) -> Self {
+    pub(super) fn new(setup: InitialState, now: Instant) -> Self {
         Self {
             display: DisplayState::new(&setup, now),
             request: RequestState::new(setup.scene, setup.overrides),
@@ -80,8 +80,8 @@ impl State {
         }
     }
 
-    /// Whether the last camera step is still without a preview.
-    pub(super) fn awaits_step(&self) -> bool {
+    /// Whether the last camera step has no preview yet.
+    pub(super) fn is_step_without_preview(&self) -> bool {
         let Self { request, work, picture, .. } = self;
         let is_shown = picture.shown.as_ref().is_some_and(|shown| shown.generation == request.generation);
         // While the scene is broken, the last valid one is being rendered.
@@ -95,7 +95,7 @@ impl State {
     }
 
     /// Diagnostics of a valid scene, and why its image could not be written.
-    pub(super) fn reported(&self) -> Vec<Diagnostic> {
+    pub(super) fn reported_diagnostics(&self) -> Vec<Diagnostic> {
         let warnings = &self.overlays.warnings;
         let failed = self.saving.write_failed.as_ref();
         let failed = failed.filter(|failed| self.saving.unwritten.is_some() && !failed.is_refused);
@@ -114,7 +114,7 @@ impl State {
         self.overlays.problems.as_ref().is_none_or(|problems| problems.work.is_none())
     }
 
-    /// Opens the view list, or keeps it open a while longer.
+    /// Opens the view list, or restarts its timeout if it is already open.
     pub(super) fn list_views(&mut self) {
         self.overlays.list_views(self.now);
         self.dirty = true;
@@ -130,11 +130,11 @@ impl State {
         const CLOCK: Duration = Duration::from_millis(250);
         const AGE: Duration = Duration::from_secs(1);
         let clock = (self.work.is_running() && !self.work.paused).then(|| self.now + CLOCK);
-        let bars = self.work.assets.iter().filter_map(AssetBar::end).min();
+        let bars = self.work.assets.iter().filter_map(AssetBar::disappears_at).min();
         let views = self.overlays.views.as_ref().map(|views| views.until);
         let notice = self.overlays.message.as_ref().and_then(|message| message.until);
         // The displayed age of an older render changes.
-        let age = self.picture.history.is_open().then(|| self.now + AGE);
+        let age = self.picture.history.is_older_open().then(|| self.now + AGE);
         let pixels = self.display.pixels_until;
         [clock, age, self.request.resize_due, bars, views, notice, pixels].into_iter().flatten().min()
     }

@@ -7,7 +7,7 @@ use crate::scene::is_absence;
 
 /// Errors that prevent the preview from showing the current file.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Problems {
+pub(crate) struct BlockingErrors {
     /// Diagnostics with source positions.
     pub diagnostics: Vec<Diagnostic>,
     /// A failure without a source position.
@@ -45,7 +45,7 @@ pub(crate) struct OverlayState {
     /// The last message, until a key is pressed.
     pub message: Option<Message>,
     /// Errors in the scene. `None` if it is valid.
-    pub problems: Option<Problems>,
+    pub problems: Option<BlockingErrors>,
     /// Errors in a file that may still be incomplete.
     pub unconfirmed: Option<Vec<Diagnostic>>,
     pub warnings: Vec<Diagnostic>,
@@ -63,7 +63,7 @@ impl OverlayState {
         self.problems.as_ref().is_some_and(|problems| problems.diagnostics.iter().any(is_absence))
     }
 
-    /// Opens the view list, or keeps it open a while longer.
+    /// Opens the view list, or restarts its timeout if it is already open.
     pub(crate) fn list_views(&mut self, now: Instant) {
         const MOMENT: Duration = Duration::from_secs(4);
         let name = self.views.take().and_then(|views| views.name);

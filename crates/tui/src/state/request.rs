@@ -8,14 +8,14 @@ use crate::choice::Choice;
 use crate::math::DVec3;
 use crate::pipeline::FileRead;
 use crate::pipeline::protocol::{PreviewSize, Section, Viewpoint};
-use crate::pipeline::settings::{CameraChange, Effective, Overrides, OwnSettings, View};
+use crate::pipeline::settings::{AdjustableSettings, CameraChange, EffectiveSettings, Overrides, View};
 use crate::scene::description::{Integrator, Pose, Shadows};
 use crate::scene::sanitize::visible;
-use crate::scene::{changes, is_mesh};
+use crate::scene::{is_mesh, list_changes};
 
 /// Settings changed with keys. They override the command line.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Toggles {
+pub(crate) struct KeyOverrides {
     pub shadows: Option<Shadows>,
     pub integrator: Option<Integrator>,
     pub dof: Option<bool>,
@@ -25,9 +25,9 @@ pub(crate) struct Toggles {
     pub exposure: Option<f32>,
 }
 
-impl Toggles {
-    /// The same settings as command-line options. If the camera position is set, it replaces the scene's
-    /// orbiter camera, `orbiter`.
+impl KeyOverrides {
+    /// The settings formatted as command-line options. `orbiter` is the scene's orbiter camera, if any. It is
+    /// replaced if the camera position is set.
     pub(crate) fn options(&self, orbiter: Option<Viewpoint>) -> Vec<String> {
         let on_off = |is_on: bool| if is_on { "on" } else { "off" };
         let vector = |key: &str, DVec3 { x, y, z }: DVec3| format!("--set 'camera.{key}=[{x},{y},{z}]'");
@@ -61,7 +61,7 @@ impl Toggles {
     /// because the scene now contains that camera.
     pub(crate) fn differences(&self, before: &Self, is_camera_written: bool) -> Vec<String> {
         let on_off = |is_on: bool| if is_on { "on" } else { "off" }.to_owned();
-        let camera = self.camera.is_any().then(|| "moved".to_owned());
+        let camera = self.camera.has_changes().then(|| "moved".to_owned());
         let name = |name: &str| name.to_owned();
         let all = [
             ("shadows", self.shadows != before.shadows, self.shadows.map(|it| name(it.name()))),
@@ -76,13 +76,13 @@ impl Toggles {
         let now = differing().filter_map(|(name, _, now)| Some(format!("{name} {}", now.as_ref()?)));
         // Settings that were reset are grouped together.
         let back: Vec<&str> = differing().filter(|it| it.2.is_none()).map(|it| it.0).collect();
-        let back = (!back.is_empty()).then(|| format!("{} reset", listed(&back)));
+        let back = (!back.is_empty()).then(|| format!("{} reset", join_names(&back)));
         now.chain(back).collect()
     }
 }
 
 /// Joins names: `a`, `a and b`, `a, b and c`.
-fn listed(names: &[&str]) -> String {
+fn join_names(names: &[&str]) -> String {
     match names {
         [rest @ .., last] if !rest.is_empty() => format!("{} and {last}", rest.join(", ")),
         _ => names.concat(),
@@ -93,7 +93,7 @@ fn listed(names: &[&str]) -> String {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct ImageOrigin {
     /// Settings changed with keys.
-    pub toggles: Toggles,
+    pub toggles: KeyOverrides,
     /// Text of the scene file. `None` for a model.
     pub text: Option<Arc<str>>,
     /// Other files used by the scene.
@@ -105,13 +105,13 @@ pub(crate) struct ImageOrigin {
 impl ImageOrigin {
     /// The origin without the exposure, which does not affect rendering.
     pub(crate) fn without_exposure(self) -> Self {
-        Self { toggles: Toggles { exposure: None, ..self.toggles }, ..self }
+        Self { toggles: KeyOverrides { exposure: None, ..self.toggles }, ..self }
     }
 
-    /// Origin of an image that a later request reproduced. This is `self`, because the later changes had no
-    /// effect. However, if the camera moved with keys has since been written to the scene, it is `later`.
+    /// Origin of an image that a later request reproduced. Returns `self` because the later changes had no
+    /// effect, or `later` if the camera moved with keys has since been written to the scene.
     pub(crate) fn for_same_image(&self, later: Self) -> Self {
-        if self.toggles.camera.is_any() && !later.toggles.camera.is_any() {
+        if self.toggles.camera.has_changes() && !later.toggles.camera.has_changes() {
             return later;
         }
         Self { is_unfinished: later.is_unfinished, ..self.clone() }
@@ -120,7 +120,7 @@ impl ImageOrigin {
     /// Describes changes in files since `before`.
     pub(crate) fn edits(&self, before: &Self) -> Vec<String> {
         let texts = before.text.as_deref().zip(self.text.as_deref());
-        let of_text = texts.map(|(old, new)| changes(old, new)).unwrap_or_default();
+        let of_text = texts.map(|(old, new)| list_changes(old, new)).unwrap_or_default();
         let is_changed = |file: &&FileRead| {
             before.files.iter().any(|old| old.path == file.path && old.content != file.content)
         };
@@ -150,17 +150,17 @@ pub(crate) struct CameraStep {
     pub is_waiting: bool,
 }
 
-/// The newest request: the scene, its settings, and what the worker has reported about them.
+/// The newest request: the scene, its settings, and the worker's reports about them.
 pub(crate) struct RequestState {
     pub scene: PathBuf,
     /// Overrides from the command line.
     pub command_line: Overrides,
-    pub toggles: Toggles,
+    pub toggles: KeyOverrides,
 
     /// Generation of the newest request.
     pub generation: u64,
-    /// Toggles sent with the newest request.
-    pub sent_toggles: Toggles,
+    /// Overrides sent with the newest request.
+    pub sent_toggles: KeyOverrides,
     /// Whether the newest request differs from the previous one only in exposure.
     pub is_exposure_only: bool,
     /// Preview size in the newest request.
@@ -180,13 +180,13 @@ pub(crate) struct RequestState {
     /// Other files used by the scene.
     pub files: Arc<[FileRead]>,
     /// Effective settings, as reported by the worker.
-    pub effective: Option<Effective>,
+    pub effective: Option<EffectiveSettings>,
     /// The scene's own camera for the newest valid request.
     pub camera: Option<Viewpoint>,
     /// The scene's own exposure in stops.
     pub exposure: Option<f32>,
     /// Other scene settings that keys can change.
-    pub own: Option<OwnSettings>,
+    pub own: Option<AdjustableSettings>,
 }
 
 impl RequestState {
@@ -194,9 +194,9 @@ impl RequestState {
         Self {
             scene,
             command_line,
-            toggles: Toggles::default(),
+            toggles: KeyOverrides::default(),
             generation: 0,
-            sent_toggles: Toggles::default(),
+            sent_toggles: KeyOverrides::default(),
             is_exposure_only: false,
             preview_size: None,
             resize_due: None,
@@ -214,7 +214,7 @@ impl RequestState {
     }
 
     /// Records the newest request's input files. The scene text is compared separately. Models have no text.
-    pub(crate) fn note_files(&mut self, files: Vec<FileRead>) {
+    pub(crate) fn record_input_files(&mut self, files: Vec<FileRead>) {
         let is_model = is_mesh(&self.scene);
         self.files = files.into_iter().filter(|file| is_model || file.path != self.scene).collect();
     }
@@ -243,8 +243,8 @@ impl RequestState {
     }
 
     /// Overrides for the scene's own image, if keys have changed the displayed image.
-    pub(crate) fn own_overrides(&self) -> Option<Box<Overrides>> {
-        (!self.is_own()).then(|| Box::new(self.command_line.clone()))
+    pub(crate) fn own_image_overrides(&self) -> Option<Box<Overrides>> {
+        (!self.is_own_image()).then(|| Box::new(self.command_line.clone()))
     }
 
     /// Drops changes made with keys that have been saved to the scene.
@@ -252,7 +252,7 @@ impl RequestState {
         let (shadows, integrator, photons) =
             (self.base_shadows(), self.base_integrator(), self.base_photons());
         let (exposure, own) = (self.command_line.exposure.or(self.exposure), self.camera);
-        let Toggles { camera, .. } = &mut self.toggles;
+        let KeyOverrides { camera, .. } = &mut self.toggles;
         camera.pose.take_if(|pose| own.is_some_and(|own| own.pose == *pose));
         camera.fov.take_if(|fov| own.is_some_and(|own| own.fov == *fov));
         self.toggles.shadows.take_if(|now| Some(*now) == shadows);
@@ -268,7 +268,7 @@ impl RequestState {
 
     /// Records the original values of camera parts that were moved with keys. Does not overwrite values
     /// recorded earlier.
-    pub(crate) fn note_moved_parts(&mut self) {
+    pub(crate) fn record_moved_parts(&mut self) {
         let Some(own) = self.camera else { return };
         let (moved, from) = (&self.toggles.camera, self.moved_from);
         self.moved_from = CameraChange {
@@ -278,14 +278,14 @@ impl RequestState {
         };
     }
 
-    /// Treats the scene's current camera as the one from which the user moved.
-    pub(crate) fn move_from_own(&mut self) {
+    /// Treats the scene's current camera as the starting point of the user's camera movement.
+    pub(crate) fn rebase_moves_on_scene(&mut self) {
         self.moved_from = CameraChange::default();
-        self.note_moved_parts();
+        self.record_moved_parts();
     }
 
-    /// Camera settings that were saved after the camera had been moved with keys, with their current values
-    /// in the scene.
+    /// Camera settings that the user saved in the scene after moving the camera with keys. Returns them with
+    /// their current values.
     pub(crate) fn saved_since_moved(&self) -> Vec<String> {
         let Some((own, moved)) = self.camera.zip(self.viewpoint()) else { return Vec::new() };
         let from = &self.moved_from;
@@ -311,7 +311,7 @@ impl RequestState {
     }
 
     /// Describes changes made with keys that are not obvious from the image.
-    pub(crate) fn changes(&self) -> Vec<String> {
+    pub(crate) fn key_changes(&self) -> Vec<String> {
         let CameraChange { pose, fov, focus } = self.toggles.camera;
         let is_moved = pose.is_some() || fov.is_some();
         let moved = is_moved.then(|| "camera".to_owned());
@@ -322,8 +322,8 @@ impl RequestState {
 
     /// Whether this is the scene's own image, with no changes made with keys. Only this image is written
     /// automatically.
-    pub(crate) fn is_own(&self) -> bool {
-        self.toggles == Toggles::default()
+    pub(crate) fn is_own_image(&self) -> bool {
+        self.toggles == KeyOverrides::default()
     }
 
     /// The initial view.

@@ -3,10 +3,10 @@
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-use super::request::Toggles;
+use super::request::KeyOverrides;
 use crate::event::WriteFailure;
 use crate::options::ExternalChange;
-use crate::pipeline::protocol::{CameraEdit, OwnState, Viewpoint};
+use crate::pipeline::protocol::{CameraEdit, OwnImageState, Viewpoint};
 
 /// A saved change that is not on the screen yet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -18,7 +18,7 @@ pub(crate) struct PendingChange {
 /// The scene's own image, rendered from the saved scene with command-line overrides.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct OwnImage {
-    pub state: OwnState,
+    pub state: OwnImageState,
     /// Progress of the render, from 0 to 1.
     pub fraction: f64,
 }
@@ -33,7 +33,7 @@ pub(crate) struct WrittenFile {
     /// Description of the file, if known.
     pub made: String,
     /// Changes made with keys that the file includes. `None` for the scene's own image.
-    pub shows: Option<Toggles>,
+    pub shows: Option<KeyOverrides>,
     /// Whether writing a later image to this file failed, so its content is unknown.
     pub is_stale: bool,
     /// How another program changed the file.
@@ -49,7 +49,7 @@ pub(crate) struct SavingState {
     /// First request that used the last saved files.
     pub saved_at: u64,
     pub own: OwnImage,
-    /// Whether no program is writing the scene's files.
+    /// Whether the scene's files are complete, meaning that no program is writing them.
     pub is_settled: bool,
     /// The last save. `None` once its first changed cell is on the screen.
     pub change: Option<PendingChange>,
@@ -66,15 +66,15 @@ pub(crate) struct SavingState {
     pub camera_edits: Vec<CameraEdit>,
     /// Whether there is a scene file next to the model. `c` does not overwrite it.
     pub has_scene_of_model: bool,
-    /// Camera in the scene that `c` wrote for the model.
+    /// Camera in the scene file that `c` wrote for the model.
     pub camera_of_model: Option<Viewpoint>,
     /// Time when glimt refused to write the camera into the scene file.
     pub camera_refused: Option<Instant>,
 
     /// Whether the next image to be written was requested with a key.
     pub is_write_requested: bool,
-    /// Changes made with keys when a write was last requested.
-    pub write_shows: Toggles,
+    /// Key changes in effect when a write was last requested.
+    pub write_shows: KeyOverrides,
     /// Why the current image was not written, if it should have been.
     pub unwritten: Option<String>,
     /// The last write failure, until a later image is written.
@@ -88,7 +88,7 @@ impl SavingState {
             edits: 0,
             last_edit: None,
             saved_at: 0,
-            own: OwnImage { state: OwnState::NotBegun, fraction: 0.0 },
+            own: OwnImage { state: OwnImageState::NotBegun, fraction: 0.0 },
             is_settled: true,
             change: None,
             editor_closed: None,
@@ -100,7 +100,7 @@ impl SavingState {
             camera_of_model: None,
             camera_refused: None,
             is_write_requested: false,
-            write_shows: Toggles::default(),
+            write_shows: KeyOverrides::default(),
             unwritten: None,
             write_failed: None,
             written: Vec::new(),

@@ -5,7 +5,7 @@ use crate::pipeline::protocol::ImagePosition;
 
 /// A left button press on the image.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Press {
+pub(crate) struct MousePress {
     /// Current column of the mouse.
     pub column: u16,
     /// Current row of the mouse.
@@ -26,7 +26,7 @@ pub(crate) enum PickPurpose {
 /// The mouse, the crosshair, and the inspected object.
 pub(crate) struct SelectionState {
     pub is_mouse_on: bool,
-    pub press: Option<Press>,
+    pub press: Option<MousePress>,
     /// Whether the next click sets the focus.
     pub is_focusing: bool,
     /// Whether the next drag selects the region to render first.

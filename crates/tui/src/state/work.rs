@@ -41,7 +41,7 @@ impl AssetBar {
     const LINGER: Duration = Duration::from_millis(400);
 
     /// Time when the bar disappears.
-    pub(crate) fn end(&self) -> Option<Instant> {
+    pub(crate) fn disappears_at(&self) -> Option<Instant> {
         self.finished.map(|finished| finished + Self::LINGER)
     }
 }
@@ -63,7 +63,8 @@ pub(crate) struct WorkState {
     pub curve: NoiseCurve,
     /// Noise over time for the last finished render.
     pub last_curve: NoiseCurve,
-    /// Curves of recent renders, from oldest to newest, in case a later request reproduces an image.
+    /// Curves of recent renders, from oldest to newest. They are restored if a later request reproduces an
+    /// image.
     curves: Vec<(ImageOrigin, NoiseCurve)>,
     /// Whether the request had no changes.
     pub unchanged: bool,
@@ -92,7 +93,7 @@ impl WorkState {
     }
 
     /// Stores a finished render's curve.
-    pub(crate) fn keep_curve(&mut self, origin: ImageOrigin) {
+    pub(crate) fn store_curve(&mut self, origin: ImageOrigin) {
         const MAX: usize = 16;
         self.curves.retain(|(other, _)| *other != origin);
         self.curves.push((origin, self.curve.clone()));

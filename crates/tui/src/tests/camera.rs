@@ -14,9 +14,9 @@ use crossterm::event::KeyCode;
 
 fn show(ui: &mut TestUi) -> Vec<crate::event::Effect> {
     let generation = ui.state.request.generation;
-    ui.event(Event::Picture {
+    ui.handle_event(Event::Picture {
         generation,
-        picture: plain_picture(50, 38, BLUE),
+        picture: uniform_picture(50, 38, BLUE),
         range: None,
         section: None,
         lacks_photons: false,
@@ -27,7 +27,7 @@ fn show(ui: &mut TestUi) -> Vec<crate::event::Effect> {
 #[test]
 fn moved_camera_is_shown_but_not_written() {
     let mut ui = TestUi::new();
-    ui.finish(RED);
+    ui.finish_render(RED);
     let effects = ui.press('l');
     let moved = request(&effects).expect("a request");
     assert_eq!((moved.write, moved.force), (Writing::No, false));
@@ -35,20 +35,20 @@ fn moved_camera_is_shown_but_not_written() {
     assert!(text.contains(messages::CAMERA_MOVED), "{text}");
     assert!(text.lines().last().is_some_and(|line| line.contains("reset camera")), "{text}");
     show(&mut ui);
-    let effects = ui.event(Event::Changed(Changed { noticed: ui.now }));
+    let effects = ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
     let edited = request(&effects).expect("a request");
     assert_eq!(edited.overrides.camera, moved.overrides.camera, "saving a file should not reset it");
     assert_eq!(edited.write, Writing::No);
     let effects = ui.press('0');
     let own = request(&effects).expect("a request");
-    assert_eq!((own.write, own.overrides.camera.is_any()), (Writing::Try, false));
+    assert_eq!((own.write, own.overrides.camera.has_changes()), (Writing::Try, false));
     assert!(!ui.text().contains(messages::CAMERA_MOVED));
 }
 
 #[test]
 fn newest_camera_step_waits_for_a_preview() {
     let mut ui = TestUi::new();
-    ui.finish(RED);
+    ui.finish_render(RED);
     let effects = ui.press('l');
     let first = request(&effects).expect("an immediate request").overrides.camera.pose.expect("a pose");
     for key in ['l', 'l', 'k', '<'] {
@@ -69,24 +69,24 @@ fn newest_camera_step_waits_for_a_preview() {
 }
 
 #[test]
-fn steps_without_previews_do_not_block_others() {
+fn missing_previews_do_not_block_steps() {
     let mut ui = TestUi::new();
-    ui.finish(RED);
+    ui.finish_render(RED);
     ui.press('l');
     ui.press('l');
     let generation = ui.state.request.generation;
     let diagnostics = vec![diagnostic(Severity::Error, "wrong")];
     let failure = protocol::Failure::Scene(diagnostics);
-    let effects = ui.worker(protocol::Event::Failed { generation, failure });
+    let effects = ui.worker_event(protocol::Event::Failed { generation, failure });
     assert!(request(&effects).is_none(), "the last valid scene is still being rendered");
     assert!(request(&show(&mut ui)).is_some(), "the preview should trigger the waiting step");
     ui.press('l');
     let generation = ui.state.request.generation;
     let failure = protocol::Failure::Work("no memory".to_owned());
-    let effects = ui.worker(protocol::Event::Failed { generation, failure });
+    let effects = ui.worker_event(protocol::Event::Failed { generation, failure });
     assert!(request(&effects).is_some(), "a failure should trigger the waiting step");
     let mut ui = TestUi::with(state(80, 1));
-    ui.finish(RED);
+    ui.finish_render(RED);
     for _ in 0..3 {
         assert!(request(&ui.press('l')).is_some(), "without space for a preview, steps should not wait");
     }
@@ -95,8 +95,8 @@ fn steps_without_previews_do_not_block_others() {
 #[test]
 fn arrows_scroll_open_diagnostics() {
     let mut ui = TestUi::new();
-    ui.finish(RED);
-    ui.fail((0..9).map(|i| diagnostic(Severity::Error, &format!("wrong {i}"))).collect());
+    ui.finish_render(RED);
+    ui.fail_render((0..9).map(|i| diagnostic(Severity::Error, &format!("wrong {i}"))).collect());
     let down = KeyPress::special(KeyCode::Down);
     assert!(ui.key(down).is_empty());
     assert!(ui.state.overlays.diagnostics.scroll > 0);
@@ -114,7 +114,7 @@ fn camera_keys_need_a_scene() {
 #[test]
 fn exposure_changes_start_from_scene_value() {
     let mut ui = TestUi::new();
-    ui.finish(RED);
+    ui.finish_render(RED);
     ui.state.request.exposure = Some(1.0);
     ui.press(']');
     show(&mut ui);
@@ -134,7 +134,7 @@ fn held_keys_stop_at_their_limits() {
         (']', messages::exposure_limit("+20")),
     ] {
         let mut ui = TestUi::new();
-        ui.finish(RED);
+        ui.finish_render(RED);
         for _ in 0..400 {
             ui.press(key);
             show(&mut ui);
@@ -151,7 +151,7 @@ fn held_keys_stop_at_their_limits() {
 fn reverted_changes_are_not_sent() {
     for keys in ["[]", "][", "<>", "><", "+-", "-+", "lh", "]]]]["] {
         let mut ui = TestUi::new();
-        ui.finish(RED);
+        ui.finish_render(RED);
         let mut last = None;
         for key in keys.chars() {
             let effects = ui.press(key);
@@ -175,7 +175,7 @@ fn reverted_changes_are_not_sent() {
 fn command_line_exposure_is_not_a_change() {
     let base = Overrides { exposure: Some(1.0), ..Overrides::default() };
     let mut ui = TestUi::with(state_with(80, 24, PreviewKind::HalfBlock, ColorDepth::TrueColor, base));
-    ui.finish(RED);
+    ui.finish_render(RED);
     ui.press('[');
     show(&mut ui);
     ui.press(']');
@@ -184,15 +184,15 @@ fn command_line_exposure_is_not_a_change() {
 
 #[test]
 fn model_scene_is_written_once() {
-    use crate::pipeline::protocol::{Event as WorkerEvent, KeptCamera};
+    use crate::pipeline::protocol::{Event as WorkerEvent, SavedCamera};
     let mut ui = TestUi::new();
     ui.state.request.scene = "assets/vase.obj".into();
-    ui.finish([200, 30, 30]);
+    ui.finish_render([200, 30, 30]);
     ui.press('l');
-    ui.finish([30, 30, 200]);
+    ui.finish_render([30, 30, 200]);
     ui.key(KeyPress::special(KeyCode::Esc));
     assert!(ui.text().contains("c keep") && !ui.text().contains("o edit"), "{}", ui.text());
-    let kept = KeptCamera {
+    let kept = SavedCamera {
         path: "assets/vase.toml".into(),
         is_new: true,
         is_own: false,
@@ -200,26 +200,29 @@ fn model_scene_is_written_once() {
         edit: None,
     };
     let generation = ui.state.request.generation;
-    ui.worker(WorkerEvent::CameraKept { generation, outcome: Ok(kept) });
+    ui.worker_event(WorkerEvent::CameraKept { generation, outcome: Ok(kept) });
     ui.key(KeyPress::special(KeyCode::Esc));
     assert!(!ui.text().contains("c keep"), "a scene file already exists: {}", ui.text());
-    assert_eq!(crate::exit_summary::not_kept(&ui.state), None);
+    assert_eq!(crate::exit_summary::unsaved_as_options(&ui.state), None);
     ui.press('l');
-    ui.finish([200, 30, 30]);
-    assert!(crate::exit_summary::not_kept(&ui.state).is_some(), "the camera moved again after saving");
+    ui.finish_render([200, 30, 30]);
+    assert!(
+        crate::exit_summary::unsaved_as_options(&ui.state).is_some(),
+        "the camera moved again after saving"
+    );
 }
 
 /// Simulates saving a scene with this camera.
 fn save(ui: &mut TestUi, camera: Viewpoint) {
-    ui.event(Event::Changed(Changed { noticed: ui.now }));
+    ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
     let generation = ui.state.request.generation;
-    ui.worker(protocol::Event::Started { generation });
-    ui.worker(protocol::Event::Settings {
+    ui.worker_event(protocol::Event::Started { generation });
+    ui.worker_event(protocol::Event::Settings {
         generation,
-        settings: settings().into(),
+        settings: effective_settings().into(),
         camera,
         exposure: 0.0,
-        own: own(),
+        own: own_settings(),
     });
     show(ui);
 }
@@ -251,7 +254,7 @@ fn conflicting_saves_are_listed_on_first_c() {
         ("h<", wide(25.0), "camera.fov = 25"),
     ] {
         let mut ui = TestUi::with(state(160, 40));
-        ui.finish(RED);
+        ui.finish_render(RED);
         for key in keys.chars() {
             ui.press(key);
             show(&mut ui);
@@ -268,7 +271,7 @@ fn conflicting_saves_are_listed_on_first_c() {
 #[test]
 fn later_saves_are_listed_again() {
     let mut ui = TestUi::with(state(160, 40));
-    ui.finish(RED);
+    ui.finish_render(RED);
     ui.press('h');
     show(&mut ui);
     for height in [2.0, 3.0] {
@@ -286,7 +289,7 @@ fn later_saves_are_listed_again() {
 fn unmoved_camera_settings_keep_saved_values() {
     let saved = Viewpoint { fov: 25.0, ..camera() };
     let mut ui = TestUi::with(state(160, 40));
-    ui.finish(RED);
+    ui.finish_render(RED);
     ui.press('h');
     show(&mut ui);
     save(&mut ui, saved);
@@ -294,7 +297,7 @@ fn unmoved_camera_settings_keep_saved_values() {
     assert_eq!(kept(&mut ui), Some(saved.changed(&moved)));
     // The focus follows `look_at`, so saving did not change it.
     let mut ui = TestUi::with(state(160, 40));
-    ui.finish(RED);
+    ui.finish_render(RED);
     ui.state.request.toggles.camera.focus = Some(2.5);
     ui.press('r');
     save(&mut ui, viewpoint_at([0.0, 1.0, 6.0]));
@@ -304,7 +307,7 @@ fn unmoved_camera_settings_keep_saved_values() {
 #[test]
 fn reset_camera_can_be_moved_without_conflict() {
     let mut ui = TestUi::with(state(160, 40));
-    ui.finish(RED);
+    ui.finish_render(RED);
     ui.press('h');
     show(&mut ui);
     save(&mut ui, viewpoint_at([0.0, 2.0, 4.0]));
@@ -317,7 +320,7 @@ fn reset_camera_can_be_moved_without_conflict() {
 fn model_cameras_have_no_conflicts() {
     let mut ui = TestUi::with(state(160, 40));
     ui.state.request.scene = "assets/vase.obj".into();
-    ui.finish(RED);
+    ui.finish_render(RED);
     ui.press('h');
     show(&mut ui);
     // The model's size has changed, so its default camera has moved.

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::fs;
 
 use crate::event::KeyPress;
-use crate::keymap::{KEYMAP, OVERLAY, action, overlay};
+use crate::keymap::{KEYMAP, OVERLAY, action_for, overlay_action_for};
 
 /// The keys listed in the first cells of a chapter's tables.
 fn documented() -> BTreeSet<String> {
@@ -32,7 +32,8 @@ fn documented_keys_match_key_bindings() {
     assert!(missing.is_empty(), "not documented: {missing:?}");
     for key in documented.difference(&written) {
         let press = key.chars().next().filter(|_| key.chars().count() == 1).map(KeyPress::plain);
-        let is_bound = press.is_some_and(|key| action(key).is_some() || overlay(key).is_some());
+        let is_bound =
+            press.is_some_and(|key| action_for(key).is_some() || overlay_action_for(key).is_some());
         assert!(is_bound, "not bound: {key}");
     }
 }

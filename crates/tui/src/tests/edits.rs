@@ -5,8 +5,8 @@ use crate::Changed;
 use crate::event::{Event, FrameReport};
 use crate::fixtures::*;
 use crate::messages;
-use crate::pipeline::protocol::{self, KeptCamera, LastGoodEnd, PreviewSource, Stage, Status};
-use crate::pipeline::settings::Effective;
+use crate::pipeline::protocol::{self, LastValidSceneEnd, PreviewSource, SavedCamera, Stage, Status};
+use crate::pipeline::settings::EffectiveSettings;
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::fingerprint::Fingerprint;
 
@@ -14,53 +14,59 @@ const GREEN: [u8; 3] = [10, 200, 20];
 
 /// Saves a scene with this text. The worker starts reading it.
 fn save(ui: &mut TestUi, text: &str) {
-    ui.event(Event::Changed(Changed { noticed: ui.now }));
+    ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
     let generation = ui.state.request.generation;
-    ui.worker(protocol::Event::Text { generation, text: text.into() });
+    ui.worker_event(protocol::Event::Text { generation, text: text.into() });
 }
 
 /// Saves a scene that contains an error.
 fn save_broken_scene(ui: &mut TestUi) {
-    ui.event(Event::Changed(Changed { noticed: ui.now }));
-    ui.fail(vec![diagnostic(Severity::Error, "unknown key `radus`")]);
-    ui.event(Event::Settled);
+    ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
+    ui.fail_render(vec![diagnostic(Severity::Error, "unknown key `radus`")]);
+    ui.handle_event(Event::Settled);
 }
 
 /// A preview of an image with all or some of its samples.
 fn preview(ui: &mut TestUi, name: &str, color: [u8; 3], is_finished: bool) {
     let generation = ui.state.request.generation;
     let source = Some(PreviewSource { image: Fingerprint::new(name).finish(), is_finished });
-    let picture = plain_picture(50, 38, color);
+    let picture = uniform_picture(50, 38, color);
     let (range, section, lacks_photons) = (None, None, false);
-    ui.event(Event::Picture { generation, picture, range, section, lacks_photons, source });
+    ui.handle_event(Event::Picture { generation, picture, range, section, lacks_photons, source });
 }
 
 /// Reports that the scene is valid.
 fn read(ui: &mut TestUi) {
     let generation = ui.state.request.generation;
-    ui.worker(protocol::Event::Started { generation });
-    let (settings, camera) = (Box::new(settings()), camera());
-    ui.worker(protocol::Event::Settings { generation, settings, camera, exposure: 0.0, own: own() });
+    ui.worker_event(protocol::Event::Started { generation });
+    let (settings, camera) = (Box::new(effective_settings()), camera());
+    ui.worker_event(protocol::Event::Settings {
+        generation,
+        settings,
+        camera,
+        exposure: 0.0,
+        own: own_settings(),
+    });
 }
 
 /// Finishes a request whose render stage took `seconds`. Rendering the image took `of_image` seconds in
 /// total.
 fn end(ui: &mut TestUi, unchanged: bool, seconds: f64, of_image: f64) {
     let generation = ui.state.request.generation;
-    let mut event = done(generation, Vec::new(), unchanged);
+    let mut event = done_event(generation, Vec::new(), unchanged);
     if let protocol::Event::Done { report, .. } = &mut event {
         let render = &mut report.stages[Stage::Render as usize];
         render.status = if unchanged { Status::Reused } else { Status::Done };
         (render.seconds, report.image.render_seconds, report.seconds) = (seconds, of_image, seconds);
     }
-    ui.worker(event);
+    ui.worker_event(event);
 }
 
 #[test]
 fn fixing_a_typo_is_not_an_edit() {
     let mut ui = TestUi::with(state(120, 40));
     save(&mut ui, "shininess = 60");
-    ui.finish(RED);
+    ui.finish_render(RED);
     save(&mut ui, "shininess = 6");
     read(&mut ui);
     preview(&mut ui, "dull", BLUE, true);
@@ -77,7 +83,7 @@ fn fixing_a_typo_is_not_an_edit() {
     ui.press('b');
     assert!(cells_of(&mut ui, RED) > 500, "{}", ui.text());
     let text = ui.text();
-    assert!(text.contains(&format!("{}, 0 s ago", messages::render_of(1, 2))), "{text}");
+    assert!(text.contains(&format!("{}, 0 s ago", messages::render_position(1, 2))), "{text}");
     assert!(text.contains(&format!("\n{}, shininess 60 → 6  ", messages::BEFORE_EDIT)), "{text}");
     assert!(text.contains("b newest") && !text.contains("b shows"), "{text}");
 }
@@ -113,11 +119,11 @@ fn editing_the_output_path_adds_no_entry() {
     read(&mut ui);
     show_preview(&mut ui, "wide", BLUE, true);
     let generation = ui.state.request.generation;
-    let mut event = done(generation, Vec::new(), false);
+    let mut event = done_event(generation, Vec::new(), false);
     if let protocol::Event::Done { report, .. } = &mut event {
         report.stages[Stage::Render as usize].status = Status::Reused;
     }
-    ui.worker(event);
+    ui.worker_event(event);
     let text = ui.text();
     // The image was written by another render but is the result of the same edit.
     assert!(text.contains("· render 3") && text.contains("▸3 camera.fov"), "{text}");
@@ -143,8 +149,8 @@ fn resumed_render_time_is_cumulative() {
     read(&mut ui);
     preview(&mut ui, "first", GREEN, false);
     let generation = ui.state.request.generation;
-    let progress = protocol::RenderProgress { earlier_seconds: 4.5, ..progress(0.5, None) };
-    ui.worker(protocol::Event::Progress { generation, progress });
+    let progress = protocol::RenderProgress { earlier_seconds: 4.5, ..render_progress(0.5, None) };
+    ui.worker_event(protocol::Event::Progress { generation, progress });
     assert!(ui.text().contains("32/64 samples · 4.5 s"), "time should be cumulative: {}", ui.text());
     preview(&mut ui, "first", BLUE, true);
     end(&mut ui, false, 4.23, 8.73);
@@ -158,22 +164,22 @@ fn resumed_render_time_is_cumulative() {
 fn show_preview(ui: &mut TestUi, name: &str, color: [u8; 3], is_finished: bool) {
     preview(ui, name, color, is_finished);
     let generation = ui.state.request.generation;
-    ui.event(Event::Shown { generation });
+    ui.handle_event(Event::Shown { generation });
 }
 
 /// Reports the end of rendering the last valid scene.
-fn last_good(ui: &mut TestUi, end: LastGoodEnd) {
+fn last_good(ui: &mut TestUi, end: LastValidSceneEnd) {
     let generation = ui.state.request.generation;
-    ui.worker(protocol::Event::LastGoodEnded { generation, end });
+    ui.worker_event(protocol::Event::LastGoodEnded { generation, end });
 }
 
-const FINISHED: LastGoodEnd = LastGoodEnd::Finished { unchanged: false };
+const FINISHED: LastValidSceneEnd = LastValidSceneEnd::Finished { unchanged: false };
 
 /// A finished render, followed by an edit and by a typo while the edit is being rendered.
 fn typo_during_a_render() -> TestUi {
     let mut ui = TestUi::with(state(120, 40));
     save(&mut ui, "shininess = 60");
-    ui.finish(RED);
+    ui.finish_render(RED);
     save(&mut ui, "shininess = 6");
     read(&mut ui);
     show_preview(&mut ui, "dull", BLUE, false);
@@ -214,13 +220,13 @@ fn render_of_last_valid_scene_is_counted_once() {
     show_preview(&mut ui, "duller", RED, true);
     end(&mut ui, false, 1.0, 1.0);
     ui.press('n');
-    assert!(ui.text().contains(&format!("{}, 0 s ago", messages::render_of(2, 3))), "{}", ui.text());
+    assert!(ui.text().contains(&format!("{}, 0 s ago", messages::render_position(2, 3))), "{}", ui.text());
 }
 
 #[test]
 fn stopped_render_of_last_valid_scene_is_marked() {
     let mut ui = typo_during_a_render();
-    last_good(&mut ui, LastGoodEnd::Stopped);
+    last_good(&mut ui, LastValidSceneEnd::Stopped);
     assert!(ui.text().contains(&format!("▸– {}:", messages::STOPPED)), "{}", ui.text());
     assert_eq!(ui.state.work.renders, 1);
 }
@@ -234,11 +240,11 @@ fn render_of_last_valid_scene_is_numbered() {
     end(&mut ui, false, 1.0, 1.0);
     save_broken_scene(&mut ui);
     show_preview(&mut ui, "bright", RED, true);
-    last_good(&mut ui, LastGoodEnd::Finished { unchanged: true });
+    last_good(&mut ui, LastValidSceneEnd::Finished { unchanged: true });
     assert_eq!((ui.state.picture.history.len(), ui.state.work.renders), (1, 1));
     for (run, name, words) in [(2, "hard", "shadows"), (3, "off", "shadows off")] {
         ui.press('s');
-        ui.fail(vec![diagnostic(Severity::Error, "unknown key `radus`")]);
+        ui.fail_render(vec![diagnostic(Severity::Error, "unknown key `radus`")]);
         for is_finished in [false, true] {
             show_preview(&mut ui, name, [7, run, u8::from(is_finished)], is_finished);
             assert!(ui.text().contains(&format!("▸{run} {words}")), "{}", ui.text());
@@ -249,19 +255,19 @@ fn render_of_last_valid_scene_is_numbered() {
         assert!(ui.text().contains(&format!("▸{run} {words}")), "{}", ui.text());
     }
     ui.press('n');
-    assert!(ui.text().contains(&format!("{}, 0 s ago", messages::render_of(2, 3))), "{}", ui.text());
+    assert!(ui.text().contains(&format!("{}, 0 s ago", messages::render_position(2, 3))), "{}", ui.text());
 }
 
 #[test]
 fn complete_image_is_not_listed_as_stopped() {
     let mut ui = TestUi::with(state(120, 40));
-    ui.finish(RED);
+    ui.finish_render(RED);
     ui.press('s');
     read(&mut ui);
     // All samples are rendered, but a key is pressed before the request is done.
     show_preview(&mut ui, "hard", GREEN, true);
     ui.press('s');
-    ui.finish(BLUE);
+    ui.finish_render(BLUE);
     ui.press('n');
     let text = ui.text();
     assert!(
@@ -274,13 +280,13 @@ fn complete_image_is_not_listed_as_stopped() {
 #[test]
 fn entries_are_numbered_by_render() {
     let mut ui = TestUi::with(state(120, 40));
-    ui.finish(RED);
+    ui.finish_render(RED);
     // Stopped renders are not counted.
     ui.press('s');
     read(&mut ui);
     preview(&mut ui, "hard", GREEN, false);
     ui.press('s');
-    ui.finish(BLUE);
+    ui.finish_render(BLUE);
     let text = ui.text();
     assert!(text.contains("· render 2") && text.contains("▸2 shadows off"), "{text}");
     assert!(
@@ -304,7 +310,7 @@ fn entries_are_numbered_by_render() {
         ui.text()
     );
     ui.press('n');
-    assert!(ui.text().contains(&format!("{}, 0 s ago", messages::render_of(1, 2))), "{}", ui.text());
+    assert!(ui.text().contains(&format!("{}, 0 s ago", messages::render_position(1, 2))), "{}", ui.text());
 }
 
 #[test]
@@ -313,24 +319,24 @@ fn age_is_measured_from_last_improvement() {
     save(&mut ui, "shininess = 60");
     read(&mut ui);
     show_preview(&mut ui, "bright", RED, false);
-    ui.wait(8000);
+    ui.advance_clock(8000);
     end(&mut ui, false, 8.0, 8.0);
-    ui.wait(3000);
+    ui.advance_clock(3000);
     // Showing it again, for example at a different size, does not change its age.
     show_preview(&mut ui, "bright", GREEN, true);
     save(&mut ui, "shininess = 6");
     read(&mut ui);
     show_preview(&mut ui, "dull", BLUE, false);
-    ui.wait(2000);
+    ui.advance_clock(2000);
     ui.press('n');
-    assert!(ui.text().contains(&format!("{}, 5 s ago", messages::render_of(1, 2))), "{}", ui.text());
+    assert!(ui.text().contains(&format!("{}, 5 s ago", messages::render_position(1, 2))), "{}", ui.text());
     // The same applies to a stopped render.
     ui.press('N');
     show_preview(&mut ui, "dull", GREEN, false);
-    ui.wait(4000);
+    ui.advance_clock(4000);
     ui.press('s');
-    ui.wait(1000);
-    ui.finish(RED);
+    ui.advance_clock(1000);
+    ui.finish_render(RED);
     ui.press('n');
     assert!(
         ui.text().contains(&format!("{}, 5 s ago", messages::unnumbered_render(messages::STOPPED))),
@@ -342,14 +348,14 @@ fn age_is_measured_from_last_improvement() {
 #[test]
 fn reset_settings_are_listed_together() {
     let mut ui = TestUi::with(state(120, 40));
-    ui.finish(RED);
+    ui.finish_render(RED);
     ui.press('s');
     ui.press('p');
-    ui.finish(BLUE);
+    ui.finish_render(BLUE);
     ui.press('0');
-    ui.finish(GREEN);
+    ui.finish_render(GREEN);
     ui.press('s');
-    ui.finish(RED);
+    ui.finish_render(RED);
     ui.press('n');
     let words = format!("shadows and photons reset · {}", messages::HISTORY_KEYS.join(" · "));
     assert!(ui.text().contains(&words), "{}", ui.text());
@@ -361,7 +367,7 @@ fn pinhole_is_reported_for_both_keys() {
         let mut ui = TestUi::new();
         save(&mut ui, text);
         read(&mut ui);
-        ui.state.request.effective = Some(Effective { dof: false, ..settings() });
+        ui.state.request.effective = Some(EffectiveSettings { dof: false, ..effective_settings() });
         ui.state.request.camera.as_mut().expect("a camera").aperture = 0.0;
         ui.press('d');
         assert!(ui.text().contains(messages::PINHOLE), "{}", ui.text());
@@ -373,10 +379,10 @@ fn pinhole_is_reported_for_both_keys() {
 #[test]
 fn creating_a_model_scene_cannot_be_undone() {
     let mut ui = TestUi::new();
-    ui.finish(RED);
+    ui.finish_render(RED);
     let (path, edit) = ("assets/knot.toml".into(), None);
-    let kept = KeptCamera { path, is_new: true, is_own: false, of_model: true, edit };
-    ui.worker(protocol::Event::CameraKept { generation: 1, outcome: Ok(kept) });
+    let kept = SavedCamera { path, is_new: true, is_own: false, of_model: true, edit };
+    ui.worker_event(protocol::Event::CameraKept { generation: 1, outcome: Ok(kept) });
     ui.press('u');
     let words = messages::NEW_SCENE_STAYS;
     assert!(ui.text().contains(words), "{}", ui.text());
@@ -386,13 +392,13 @@ fn creating_a_model_scene_cannot_be_undone() {
 fn unreadable_scene_has_no_save_hint() {
     let mut ui = TestUi::new();
     let folder = Diagnostic { place: None, ..diagnostic(Severity::Error, "a folder") };
-    ui.fail(vec![folder]);
+    ui.fail_render(vec![folder]);
     assert!(!ui.text().contains("save "), "{}", ui.text());
-    ui.event(Event::Settled);
+    ui.handle_event(Event::Settled);
     assert!(ui.text().contains("a folder") && !ui.text().contains("save "), "{}", ui.text());
     let mut ui = TestUi::new();
-    ui.fail(vec![diagnostic(Severity::Error, "unknown key `radus`")]);
-    ui.event(Event::Settled);
+    ui.fail_render(vec![diagnostic(Severity::Error, "unknown key `radus`")]);
+    ui.handle_event(Event::Settled);
     assert!(ui.text().contains(&messages::save_to_render("cornell.toml", false)), "{}", ui.text());
 }
 
@@ -400,7 +406,10 @@ fn unreadable_scene_has_no_save_hint() {
 fn eta_is_never_zero() {
     for (seconds, words) in [(0.0, "ETA under 1 s"), (0.04, "ETA under 1 s"), (0.06, "ETA 0.1 s")] {
         let mut ui = TestUi::new();
-        ui.worker(protocol::Event::Progress { generation: 1, progress: progress(0.5, Some(seconds)) });
+        ui.worker_event(protocol::Event::Progress {
+            generation: 1,
+            progress: render_progress(0.5, Some(seconds)),
+        });
         assert!(ui.text().contains(words), "{seconds}: {}", ui.text());
     }
 }
@@ -408,12 +417,12 @@ fn eta_is_never_zero() {
 #[test]
 fn status_line_items_are_separated() {
     let mut ui = TestUi::with(state(80, 24));
-    ui.finish(RED);
+    ui.finish_render(RED);
     ui.press('l');
-    ui.finish(BLUE);
+    ui.finish_render(BLUE);
     let settings = ui.state.request.effective.as_mut().expect("settings");
     (settings.width, settings.height) = (320, 180);
-    let reused = |name| stage(name, Status::Reused, 0.0, "");
+    let reused = |name| stage_report(name, Status::Reused, 0.0, "");
     for name in [Stage::Parse, Stage::Meshes, Stage::Lights] {
         ui.state.work.stages[name as usize] = Some(reused(name));
     }
@@ -424,7 +433,7 @@ fn status_line_items_are_separated() {
     ui.press('m');
     ui.state.overlays.message = None;
     assert!(
-        ui.text().contains(&format!("{}, {}", messages::cached("3 stages"), messages::NOT_SAVED)),
+        ui.text().contains(&format!("{}, {}", messages::cached_stages("3 stages"), messages::NOT_SAVED)),
         "{}",
         ui.text()
     );

@@ -23,20 +23,20 @@ fn first_request_includes_the_preview_size() {
 #[test]
 fn images_of_older_requests_are_dropped() {
     let mut ui = TestUi::new();
-    ui.finish(RED);
+    ui.finish_render(RED);
     let old = ui.state.request.generation;
     ui.press('r');
-    ui.screen();
-    ui.event(Event::Picture {
+    ui.draw_screen();
+    ui.handle_event(Event::Picture {
         generation: old,
-        picture: plain_picture(50, 38, BLUE),
+        picture: uniform_picture(50, 38, BLUE),
         range: None,
         section: None,
         lacks_photons: false,
         source: None,
     });
-    ui.worker(protocol::Event::Progress { generation: old, progress: progress(0.5, None) });
-    ui.worker(protocol::Event::Failed { generation: old, failure: Failure::Work("old".to_owned()) });
+    ui.worker_event(protocol::Event::Progress { generation: old, progress: render_progress(0.5, None) });
+    ui.worker_event(protocol::Event::Failed { generation: old, failure: Failure::Work("old".to_owned()) });
     assert!(!ui.state.dirty, "outdated events should not cause a redraw");
     assert!(ui.state.work.progress.is_none() && ui.state.overlays.problems.is_none());
     assert_eq!(cells_of(&mut ui, BLUE), 0);
@@ -46,28 +46,28 @@ fn images_of_older_requests_are_dropped() {
 #[test]
 fn first_change_is_measured_from_the_save() {
     let mut ui = TestUi::new();
-    ui.finish(RED);
+    ui.finish_render(RED);
     let noticed = ui.now;
     ui.now += Duration::from_millis(3);
-    let effects = ui.event(Event::Changed(Changed { noticed }));
+    let effects = ui.handle_event(Event::Changed(Changed { noticed }));
     assert_eq!(request(&effects).map(|it| it.generation), Some(2));
-    ui.event(Event::Shown { generation: 1 });
+    ui.handle_event(Event::Shown { generation: 1 });
     assert_eq!(ui.state.saving.first_change, None, "the old preview should not count");
-    ui.event(Event::Picture {
+    ui.handle_event(Event::Picture {
         generation: 2,
-        picture: plain_picture(50, 38, BLUE),
+        picture: uniform_picture(50, 38, BLUE),
         range: None,
         section: None,
         lacks_photons: false,
         source: None,
     });
     ui.now += Duration::from_millis(20);
-    ui.event(Event::Shown { generation: 2 });
-    ui.worker(done(2, Vec::new(), false));
-    assert!(ui.text().contains(&messages::on_screen("23 ms")), "{}", ui.text());
+    ui.handle_event(Event::Shown { generation: 2 });
+    ui.worker_event(done_event(2, Vec::new(), false));
+    assert!(ui.text().contains(&messages::save_to_screen_time("23 ms")), "{}", ui.text());
     ui.now += Duration::from_millis(20);
-    ui.event(Event::Shown { generation: 2 });
-    assert!(!ui.state.dirty && ui.text().contains(&messages::on_screen("23 ms")), "measured once");
+    ui.handle_event(Event::Shown { generation: 2 });
+    assert!(!ui.state.dirty && ui.text().contains(&messages::save_to_screen_time("23 ms")), "measured once");
 }
 
 #[test]
@@ -75,9 +75,9 @@ fn only_a_requests_first_preview_is_urgent() {
     let mut ui = TestUi::new();
     let picture = |ui: &mut TestUi, generation| {
         ui.state.urgent = false;
-        ui.event(Event::Picture {
+        ui.handle_event(Event::Picture {
             generation,
-            picture: plain_picture(50, 38, RED),
+            picture: uniform_picture(50, 38, RED),
             range: None,
             section: None,
             lacks_photons: false,
@@ -87,7 +87,7 @@ fn only_a_requests_first_preview_is_urgent() {
     };
     assert!(picture(&mut ui, 1));
     assert!(!picture(&mut ui, 1));
-    ui.event(Event::Changed(Changed { noticed: ui.now }));
+    ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
     assert!(!picture(&mut ui, 1), "an outdated preview is not urgent");
     assert!(picture(&mut ui, 2));
     assert!(!picture(&mut ui, 2));
@@ -96,12 +96,12 @@ fn only_a_requests_first_preview_is_urgent() {
 #[test]
 fn unchanged_state_is_not_redrawn() {
     let mut ui = TestUi::new();
-    ui.finish(RED);
-    ui.screen();
+    ui.finish_render(RED);
+    ui.draw_screen();
     ui.press('g');
-    ui.wait(10_000);
-    ui.event(Event::Shown { generation: 1 });
-    ui.worker(protocol::Event::Preview { generation: 1 });
+    ui.advance_clock(10_000);
+    ui.handle_event(Event::Shown { generation: 1 });
+    ui.worker_event(protocol::Event::Preview { generation: 1 });
     ui.key(KeyPress::special(crossterm::event::KeyCode::PageUp));
     assert!(!ui.state.dirty);
     assert_eq!(ui.state.next_tick(), None);
@@ -110,41 +110,41 @@ fn unchanged_state_is_not_redrawn() {
 #[test]
 fn clock_stops_while_paused() {
     let mut ui = TestUi::new();
-    ui.screen();
+    ui.draw_screen();
     assert!(ui.state.next_tick().is_some());
-    ui.wait(250);
+    ui.advance_clock(250);
     assert!(ui.state.dirty);
     ui.press(' ');
-    ui.screen();
+    ui.draw_screen();
     assert_eq!(ui.state.next_tick(), None);
 }
 
 #[test]
 fn preview_is_resized_after_a_delay() {
     let mut ui = TestUi::new();
-    ui.finish(RED);
-    assert!(ui.event(Event::Resize(window(120, 40))).is_empty());
+    ui.finish_render(RED);
+    assert!(ui.handle_event(Event::Resize(window(120, 40))).is_empty());
     assert!(cells_of(&mut ui, RED) > 56 * 21, "the current image should be scaled");
     ui.now += Duration::from_millis(50);
-    ui.event(Event::Resize(window(200, 60)));
-    assert!(ui.wait(50).is_empty());
-    let effects = ui.wait(50);
+    ui.handle_event(Event::Resize(window(200, 60)));
+    assert!(ui.advance_clock(50).is_empty());
+    let effects = ui.advance_clock(50);
     assert!(matches!(
         effects[..],
         [Effect::Send(Command::Preview(Some(PreviewSize { width: 152, height: 114, around: None })))]
     ));
-    ui.event(Event::Picture {
+    ui.handle_event(Event::Picture {
         generation: 1,
-        picture: plain_picture(149, 112, BLUE),
+        picture: uniform_picture(149, 112, BLUE),
         range: None,
         section: None,
         lacks_photons: false,
         source: None,
     });
     assert!(cells_of(&mut ui, BLUE) > 0, "the new preview should be shown");
-    ui.finish(RED);
-    ui.event(Event::Resize(window(200, 60)));
-    assert!(ui.wait(1000).is_empty(), "no request is needed if the size is unchanged");
+    ui.finish_render(RED);
+    ui.handle_event(Event::Resize(window(200, 60)));
+    assert!(ui.advance_clock(1000).is_empty(), "no request is needed if the size is unchanged");
 }
 
 #[test]
@@ -155,21 +155,21 @@ fn resize_does_not_restart_the_render() {
         if is_held {
             ui.press(' ');
         }
-        ui.event(Event::Resize(window(120, 40)));
-        let effects = ui.wait(200);
+        ui.handle_event(Event::Resize(window(120, 40)));
+        let effects = ui.advance_clock(200);
         assert!(matches!(effects[..], [Effect::Send(Command::Preview(Some(_)))]), "{effects:?}");
         assert_eq!((ui.state.request.generation, ui.state.work.paused), (1, is_held));
-        assert!(ui.worker(done(1, Vec::new(), false)).is_empty());
+        assert!(ui.worker_event(done_event(1, Vec::new(), false)).is_empty());
     }
 }
 
 #[test]
 fn editing_a_comment_reports_unchanged() {
     let mut ui = TestUi::new();
-    ui.finish(RED);
-    ui.event(Event::Changed(Changed { noticed: ui.now }));
-    ui.worker(protocol::Event::Started { generation: 2 });
-    ui.worker(done(2, Vec::new(), true));
+    ui.finish_render(RED);
+    ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
+    ui.worker_event(protocol::Event::Started { generation: 2 });
+    ui.worker_event(done_event(2, Vec::new(), true));
     assert!(ui.text().contains("unchanged"));
     assert!(cells_of(&mut ui, RED) > 0);
 }
@@ -177,7 +177,7 @@ fn editing_a_comment_reports_unchanged() {
 #[test]
 fn signals_quit_suspend_or_redraw() {
     let mut ui = TestUi::new();
-    let effect = |ui: &mut TestUi, signal| ui.event(Event::Signal(signal));
+    let effect = |ui: &mut TestUi, signal| ui.handle_event(Event::Signal(signal));
     assert!(matches!(effect(&mut ui, Signal::Interrupt)[..], [Effect::Quit(ExitStatus(130))]));
     assert!(matches!(effect(&mut ui, Signal::Terminate)[..], [Effect::Quit(ExitStatus(143))]));
     assert!(matches!(effect(&mut ui, Signal::Hangup)[..], [Effect::Quit(ExitStatus(129))]));
@@ -190,16 +190,19 @@ fn signals_quit_suspend_or_redraw() {
 #[test]
 fn lost_event_sources_are_handled() {
     let mut ui = TestUi::new();
-    assert!(matches!(ui.event(Event::Lost(EventSource::Worker))[..], [Effect::GiveUp]));
-    assert!(matches!(ui.event(Event::Lost(EventSource::Keys))[..], [Effect::Quit(ExitStatus::HANGUP)]));
-    assert!(ui.event(Event::Lost(EventSource::Watcher)).is_empty());
+    assert!(matches!(ui.handle_event(Event::Lost(EventSource::Worker))[..], [Effect::GiveUp]));
+    assert!(matches!(
+        ui.handle_event(Event::Lost(EventSource::Keys))[..],
+        [Effect::Quit(ExitStatus::HANGUP)]
+    ));
+    assert!(ui.handle_event(Event::Lost(EventSource::Watcher)).is_empty());
     assert!(ui.text().contains(messages::NOT_WATCHING));
 }
 
 #[test]
 fn cancelled_render_is_reported() {
     let mut ui = TestUi::new();
-    ui.worker(protocol::Event::Cancelled { generation: 1 });
+    ui.worker_event(protocol::Event::Cancelled { generation: 1 });
     assert_eq!(ui.state.work.activity, Activity::Cancelled);
     assert!(ui.text().contains("stopped"));
 }
@@ -217,7 +220,7 @@ fn pending_writes_are_known_at_exit() {
         assert!(!ui.state.saving.is_write_requested);
         ui.press('w');
         if let Some(event) = outcome {
-            ui.worker(event);
+            ui.worker_event(event);
         }
         assert!(matches!(ui.press('q')[..], [Effect::Quit(ExitStatus::QUIT)]));
         assert_eq!(ui.state.saving.is_write_requested, is_open);
@@ -226,7 +229,7 @@ fn pending_writes_are_known_at_exit() {
     ui.press('w');
     ui.press('r');
     assert!(ui.state.saving.is_write_requested, "the next request should still write the image");
-    ui.worker(written(ui.state.request.generation));
+    ui.worker_event(written(ui.state.request.generation));
     assert!(!ui.state.saving.is_write_requested);
 }
 
@@ -237,16 +240,16 @@ fn error_with(message: &str) -> Vec<Diagnostic> {
 #[test]
 fn errors_in_incomplete_files_are_deferred() {
     let mut ui = TestUi::new();
-    ui.finish(RED);
-    ui.event(Event::Changed(Changed { noticed: ui.now }));
-    ui.fail(error_with("half"));
+    ui.finish_render(RED);
+    ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
+    ui.fail_render(error_with("half"));
     let text = ui.text();
     assert!(!text.contains("half") && !text.contains("broken"), "{text}");
     assert!(text.contains("… waiting") && text.contains(messages::INCOMPLETE_FILE), "{text}");
-    ui.event(Event::Changed(Changed { noticed: ui.now }));
-    ui.fail(error_with("more"));
+    ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
+    ui.fail_render(error_with("more"));
     assert!(!ui.text().contains("more") && !ui.text().contains("broken"));
-    assert!(ui.event(Event::Settled).is_empty());
+    assert!(ui.handle_event(Event::Settled).is_empty());
     let text = ui.text();
     assert!(text.contains("error: more") && text.contains("broken"), "{text}");
     assert!(!text.contains("half"), "outdated error: {text}");
@@ -255,13 +258,13 @@ fn errors_in_incomplete_files_are_deferred() {
 #[test]
 fn file_saved_in_steps_shows_no_error() {
     let mut ui = TestUi::new();
-    ui.finish(RED);
-    ui.event(Event::Changed(Changed { noticed: ui.now }));
-    ui.fail(error_with("half"));
-    ui.event(Event::Changed(Changed { noticed: ui.now }));
-    ui.finish(BLUE);
-    ui.event(Event::Settled);
-    ui.wait(5000);
+    ui.finish_render(RED);
+    ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
+    ui.fail_render(error_with("half"));
+    ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
+    ui.finish_render(BLUE);
+    ui.handle_event(Event::Settled);
+    ui.advance_clock(5000);
     let text = ui.text();
     assert!(!text.contains("half") && text.contains("done"), "{text}");
     assert!(cells_of(&mut ui, BLUE) > 0 && cells_of(&mut ui, RED) == 0);
@@ -270,53 +273,53 @@ fn file_saved_in_steps_shows_no_error() {
 #[test]
 fn errors_in_stable_files_are_shown_immediately() {
     let mut ui = TestUi::new();
-    ui.fail(error_with("first"));
+    ui.fail_render(error_with("first"));
     assert!(ui.text().contains("error: first"), "no save");
-    ui.event(Event::Changed(Changed { noticed: ui.now }));
-    ui.event(Event::Settled);
-    ui.fail(error_with("late"));
+    ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
+    ui.handle_event(Event::Settled);
+    ui.fail_render(error_with("late"));
     assert!(ui.text().contains("error: late"));
     ui.press('r');
-    ui.fail(error_with("again"));
+    ui.fail_render(error_with("again"));
     assert!(ui.text().contains("error: again"));
 }
 
 #[test]
 fn errors_are_shown_if_the_watcher_is_lost() {
     let mut ui = TestUi::new();
-    ui.event(Event::Changed(Changed { noticed: ui.now }));
-    ui.fail(error_with("half"));
-    ui.event(Event::Lost(EventSource::Watcher));
+    ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
+    ui.fail_render(error_with("half"));
+    ui.handle_event(Event::Lost(EventSource::Watcher));
     assert!(ui.text().contains("error: half"), "{}", ui.text());
     ui.press('r');
-    ui.fail(error_with("again"));
+    ui.fail_render(error_with("again"));
     assert!(ui.text().contains("error: again"));
 }
 
 #[test]
 fn render_failures_are_shown_immediately() {
     let mut ui = TestUi::new();
-    ui.event(Event::Changed(Changed { noticed: ui.now }));
+    ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
     let failure = Failure::Work("no memory".to_owned());
-    ui.worker(protocol::Event::Failed { generation: ui.state.request.generation, failure });
+    ui.worker_event(protocol::Event::Failed { generation: ui.state.request.generation, failure });
     assert!(ui.text().contains("no memory"), "{}", ui.text());
 }
 
 #[test]
 fn time_spent_in_the_editor_is_not_counted() {
     let mut ui = TestUi::new();
-    ui.finish(RED);
+    ui.finish_render(RED);
     let noticed = ui.now;
     ui.now += Duration::from_secs(9);
-    ui.event(Event::Back);
+    ui.handle_event(Event::Back);
     ui.now += Duration::from_millis(2);
-    ui.event(Event::Changed(Changed { noticed }));
+    ui.handle_event(Event::Changed(Changed { noticed }));
     ui.now += Duration::from_millis(20);
-    ui.event(Event::Shown { generation: 2 });
+    ui.handle_event(Event::Shown { generation: 2 });
     assert_eq!(ui.state.saving.first_change, Some(Duration::from_millis(22)));
     let noticed = ui.now;
-    ui.event(Event::Changed(Changed { noticed }));
+    ui.handle_event(Event::Changed(Changed { noticed }));
     ui.now += Duration::from_millis(30);
-    ui.event(Event::Shown { generation: 3 });
+    ui.handle_event(Event::Shown { generation: 3 });
     assert_eq!(ui.state.saving.first_change, Some(Duration::from_millis(30)));
 }

@@ -53,7 +53,7 @@ struct SimulatedTerminal {
     /// Bytes received, and the number of bytes sent.
     bytes: Vec<u8>,
     sent: usize,
-    /// Unacknowledged bytes, and their maximum number.
+    /// Number of unacknowledged bytes, and its maximum so far.
     unanswered: VecDeque<(Instant, usize)>,
     most_unanswered: usize,
 }
@@ -156,14 +156,14 @@ impl WatchedRender {
         let mut ui = TestUi::with(state_with(COLUMNS, ROWS, preview, depth, Overrides::default()));
         let begin = ui.now;
         let generation = ui.state.request.generation;
-        ui.worker(protocol::Event::Started { generation });
-        let settings = Box::new(settings());
-        ui.worker(protocol::Event::Settings {
+        ui.worker_event(protocol::Event::Started { generation });
+        let settings = Box::new(effective_settings());
+        ui.worker_event(protocol::Event::Settings {
             generation,
             settings,
             camera: camera(),
             exposure: 0.0,
-            own: own(),
+            own: own_settings(),
         });
         let size = ui.state.request.preview_size.expect("a preview size");
         let (outbox, slot) = (Rc::<RefCell<Vec<Vec<u8>>>>::default(), PreviewSlot::default());
@@ -201,7 +201,7 @@ impl WatchedRender {
         const FIRST: Duration = Duration::from_millis(12);
         let end = self.ui.now + time;
         let (mut key, mut last) = (self.ui.now, self.ui.state.request.generation);
-        // The last step of an earlier key press may still be without a preview.
+        // The last step of an earlier key press may not have a preview yet.
         let mut asked = Some(self.ui.now);
         while self.ui.now < end {
             let next = asked.map_or(key, |asked: Instant| key.min(asked + FIRST));
@@ -226,7 +226,7 @@ impl WatchedRender {
     fn finish(&mut self) {
         let generation = self.ui.state.request.generation;
         self.put_picture(SAMPLES);
-        self.ui.worker(done(generation, Vec::new(), false));
+        self.ui.worker_event(done_event(generation, Vec::new(), false));
         self.advance(self.ui.now + Duration::from_secs(5), false);
     }
 
@@ -234,14 +234,14 @@ impl WatchedRender {
         loop {
             let now = self.ui.now;
             self.presenter.draw_if_due(&mut self.ui.state, now);
-            for event in self.presenter.pump(&self.ui.state, now, || false) {
+            for event in self.presenter.send_pending(&self.ui.state, now, || false) {
                 self.send_event(event);
             }
             for bytes in std::mem::take(&mut *self.outbox.borrow_mut()) {
-                self.presenter.display.written(bytes.len());
+                self.presenter.display.record_written(bytes.len());
                 self.terminal.send(bytes, now);
             }
-            let wake = self.presenter.wake(&self.ui.state, now);
+            let wake = self.presenter.next_action_time(&self.ui.state, now);
             let work = self.next.into_iter().filter(|_| is_at_work).min();
             let next = [wake, work, self.terminal.next()].into_iter().flatten().min().unwrap_or(end);
             if next >= end {
@@ -259,26 +259,26 @@ impl WatchedRender {
         let now = self.ui.now;
         self.terminal.deliver(now);
         while let Some((_, answer)) = self.terminal.answers.pop_front_if(|(when, _)| *when <= now) {
-            self.presenter.display.answered(answer, now);
+            self.presenter.display.handle_reply(answer, now);
         }
         let done = (now - self.begin).as_secs_f64() / SECONDS;
         let generation = self.ui.state.request.generation;
         if is_at_work && now >= self.next[0] {
             self.next[0] = now + PROGRESS;
-            let progress = progress(done, Some((1.0 - done) * SECONDS));
+            let progress = render_progress(done, Some((1.0 - done) * SECONDS));
             let progress = protocol::RenderProgress {
                 samples: (done * SAMPLES) as u32,
                 mean_samples: done * SAMPLES,
                 total_samples: SAMPLES as u32,
                 ..progress
             };
-            self.ui.worker(protocol::Event::Progress { generation, progress });
+            self.ui.worker_event(protocol::Event::Progress { generation, progress });
         }
         if is_at_work && now >= self.next[1] {
             self.next[1] = now + PICTURE;
             self.put_picture((done * SAMPLES).max(1.0));
         }
-        self.ui.event(Event::Tick);
+        self.ui.handle_event(Event::Tick);
     }
 
     fn put_picture(&mut self, samples: f64) {
@@ -292,14 +292,14 @@ impl WatchedRender {
             lacks_photons: false,
             source: None,
         });
-        if let Some(event) = self.presenter.preview(generation, &self.ui.state, self.ui.now) {
+        if let Some(event) = self.presenter.handle_preview(generation, &self.ui.state, self.ui.now) {
             self.send_event(event);
         }
     }
 
     fn send_event(&mut self, event: Event) {
         self.shown += usize::from(matches!(event, Event::Shown { .. }));
-        self.ui.event(event);
+        self.ui.handle_event(event);
     }
 }
 
@@ -405,7 +405,7 @@ fn only_cells_use_synchronized_output() {
         [(PreviewKind::HalfBlock, true), (PreviewKind::Pixels(Protocol::Kitty), false)]
     {
         let mut watch = WatchedRender::new(FAST, preview, ColorDepth::TrueColor);
-        watch.presenter.display.answered(TerminalReply::Synchronized { is_known: true }, watch.begin);
+        watch.presenter.display.handle_reply(TerminalReply::Synchronized { is_known: true }, watch.begin);
         watch.until(0.1);
         let sent = String::from_utf8_lossy(&watch.terminal.bytes).into_owned();
         let between: Vec<&str> =

@@ -7,15 +7,16 @@ use crate::Changed;
 use crate::event::{Effect, Event, KeyPress, Mouse, MouseKind};
 use crate::fixtures::*;
 use crate::messages;
-use crate::pipeline::protocol::{Command, Event as WorkerEvent, KeptCamera, Picked};
+use crate::pipeline::protocol::{Command, Event as WorkerEvent, Picked, SavedCamera};
 
-/// A beauty image, followed by a normal view with hard shadows. The beauty image is being viewed.
+/// A UI with two renders: the beauty view, then the normal view with hard shadows. The older one is being
+/// viewed.
 fn older() -> TestUi {
     let mut ui = TestUi::with(state(120, 40));
-    ui.finish(RED);
+    ui.finish_render(RED);
     ui.press('s');
     ui.press('v');
-    ui.finish(BLUE);
+    ui.finish_render(BLUE);
     ui.key(KeyPress::special(KeyCode::Esc));
     ui.press('n');
     ui
@@ -37,12 +38,12 @@ fn older_render_cannot_be_inspected() {
         assert!(!asks(&effects), "{keys:?}");
         assert!(ui.text().contains(messages::OLDER_RENDER), "{}", ui.text());
     }
-    ui.event(mouse(MouseKind::Press));
-    assert!(!asks(&ui.event(mouse(MouseKind::Release))));
+    ui.handle_event(mouse(MouseKind::Press));
+    assert!(!asks(&ui.handle_event(mouse(MouseKind::Release))));
     assert!(ui.text().contains(messages::OLDER_RENDER), "{}", ui.text());
     // A reply that arrives late is not shown for the older render.
     let picked = Picked { pixel: [3, 4], thing: None, color: None };
-    ui.worker(WorkerEvent::Picked { generation: 1, picked: Box::new(picked) });
+    ui.worker_event(WorkerEvent::Picked { generation: 1, picked: Box::new(picked) });
     assert!(!ui.text().contains("pixel 3, 4"), "{}", ui.text());
     ui.press('b');
     assert!(asks(&ui.key(KeyPress::special(KeyCode::Enter))), "the newest render can be inspected");
@@ -55,7 +56,7 @@ fn newest_settings_are_not_shown_for_older() {
     assert!(!line(&mut ui, 0).contains("view normal") && !keys.contains("hard"), "{}", ui.text());
     assert!(keys.contains("b newest") && keys.contains("N newer") && !keys.contains("older"), "{keys}");
     ui.press('i');
-    ui.finish(RED);
+    ui.finish_render(RED);
     ui.press('n');
     assert!(line(&mut ui, 0).contains("view normal"), "expected the view of this entry: {}", ui.text());
     assert!(line(&mut ui, 39).contains("n N older, newer"), "{}", ui.text());
@@ -67,27 +68,27 @@ fn w_writes_the_newest_image() {
     ui.press('w');
     assert!(ui.text().contains(messages::WRITING_NEWEST), "{}", ui.text());
     let generation = ui.state.request.generation;
-    ui.worker(WorkerEvent::WriteDone { generation, paths: vec!["ow.png".into()] });
+    ui.worker_event(WorkerEvent::WriteDone { generation, paths: vec!["ow.png".into()] });
     let words = format!("wrote ow.png{}", messages::WROTE_NEWEST);
     assert!(ui.text().contains(&words), "{}", ui.text());
 }
 
 #[test]
 fn c_saves_the_newest_camera() {
-    // The change is often detected before the reply arrives. This returns to the newest render.
+    // The file change is often detected before the reply arrives, which returns to the newest render.
     for (is_own, is_noticed) in [(true, false), (false, false), (true, true)] {
         let mut ui = older();
         ui.press('b');
         ui.press('h');
-        ui.finish(RED);
+        ui.finish_render(RED);
         ui.press('n');
         assert!(!ui.press('c').is_empty());
         if is_noticed {
-            ui.event(Event::Changed(crate::Changed { noticed: ui.now }));
+            ui.handle_event(Event::Changed(crate::Changed { noticed: ui.now }));
         }
-        let kept = KeptCamera { path: "a.toml".into(), is_new: true, is_own, of_model: false, edit: None };
+        let kept = SavedCamera { path: "a.toml".into(), is_new: true, is_own, of_model: false, edit: None };
         let generation = ui.state.request.generation;
-        ui.worker(WorkerEvent::CameraKept { generation, outcome: Ok(kept) });
+        ui.worker_event(WorkerEvent::CameraKept { generation, outcome: Ok(kept) });
         let words = messages::OF_NEWEST_RENDER.trim_end();
         assert!(ui.text().contains(words), "{}", ui.text());
     }
@@ -99,9 +100,9 @@ fn newest_render_progress_is_shown() {
     ui.press('b');
     ui.press('r');
     let generation = ui.state.request.generation;
-    ui.worker(WorkerEvent::Started { generation });
-    let picture = plain_picture(50, 38, RED);
-    ui.event(Event::Picture {
+    ui.worker_event(WorkerEvent::Started { generation });
+    let picture = uniform_picture(50, 38, RED);
+    ui.handle_event(Event::Picture {
         generation,
         picture,
         range: None,
@@ -109,16 +110,16 @@ fn newest_render_progress_is_shown() {
         lacks_photons: false,
         source: None,
     });
-    ui.worker(WorkerEvent::Progress { generation, progress: progress(0.25, Some(3.0)) });
+    ui.worker_event(WorkerEvent::Progress { generation, progress: render_progress(0.25, Some(3.0)) });
     ui.press('n');
-    let words = format!("{}, 0 s ago  newest 25 %  ETA 3.0 s", messages::render_of(2, 3));
+    let words = format!("{}, 0 s ago  newest 25 %  ETA 3.0 s", messages::render_position(2, 3));
     assert!(line(&mut ui, 0).contains(&words), "{}", ui.text());
     ui.press('m');
     ui.press('N');
     ui.press('n');
     // A stopped render is marked in the history.
     ui.press('s');
-    ui.finish(BLUE);
+    ui.finish_render(BLUE);
     assert!(ui.text().contains(&format!("{}:", messages::STOPPED)), "{}", ui.text());
     assert_eq!(ui.text().matches(messages::STOPPED).count(), 1, "{}", ui.text());
 }
@@ -126,8 +127,12 @@ fn newest_render_progress_is_shown() {
 #[test]
 fn age_is_shown_once_and_updated() {
     let mut ui = older();
-    ui.wait(3000);
-    assert!(line(&mut ui, 0).contains(&format!("{}, 3 s ago", messages::render_of(1, 2))), "{}", ui.text());
+    ui.advance_clock(3000);
+    assert!(
+        line(&mut ui, 0).contains(&format!("{}, 3 s ago", messages::render_position(1, 2))),
+        "{}",
+        ui.text()
+    );
     assert!(!ui.text().contains("0 s ago") && ui.text().contains("N newer"), "{}", ui.text());
     assert!(ui.state.next_tick().is_some(), "the age should be updated");
 }
@@ -135,13 +140,13 @@ fn age_is_shown_once_and_updated() {
 #[test]
 fn save_time_applies_only_to_its_image() {
     let mut ui = TestUi::new();
-    ui.finish(RED);
-    ui.event(Event::Changed(Changed { noticed: ui.now }));
-    ui.finish(BLUE);
+    ui.finish_render(RED);
+    ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
+    ui.finish_render(BLUE);
     let generation = ui.state.request.generation;
-    ui.event(Event::Shown { generation });
+    ui.handle_event(Event::Shown { generation });
     assert!(ui.state.saving.first_change.is_some(), "{}", ui.text());
     ui.press('s');
-    ui.finish(RED);
+    ui.finish_render(RED);
     assert!(ui.state.saving.first_change.is_none(), "not rendered after a save: {}", ui.text());
 }

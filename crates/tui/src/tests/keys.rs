@@ -10,7 +10,7 @@ use crate::keymap::{self, KEYMAP};
 use crate::math::DVec3;
 use crate::messages;
 use crate::pipeline::protocol::{self, CameraEdit, Command, ImagePosition, Writing};
-use crate::pipeline::settings::{Effective, Overrides, OwnSettings, View};
+use crate::pipeline::settings::{AdjustableSettings, EffectiveSettings, Overrides, View};
 use crate::preview_kind::PreviewKind;
 use crate::scene::description::{Integrator, Pose, Shadows};
 use crate::scene::diagnostic::Severity;
@@ -22,7 +22,7 @@ fn every_key_has_its_effect() {
     for binding in KEYMAP {
         for key in binding.keys {
             let mut ui = TestUi::new();
-            ui.finish(RED);
+            ui.finish_render(RED);
             check(binding.action, *key, &mut ui);
         }
     }
@@ -62,7 +62,7 @@ fn check(action: Action, key: KeyPress, ui: &mut TestUi) {
             }
             ui.press('i');
             assert!(ui.key(key).is_empty(), "the path integrator does not use photons");
-            assert!(ui.text().contains(&messages::no_photons("whitted")), "{}", ui.text());
+            assert!(ui.text().contains(&messages::photons_unsupported("whitted")), "{}", ui.text());
         }
         Action::CycleIntegrator => {
             for (wanted, by_key) in [(Integrator::Path, Some(Integrator::Path)), (Integrator::Whitted, None)]
@@ -74,14 +74,14 @@ fn check(action: Action, key: KeyPress, ui: &mut TestUi) {
             ui.key(key);
             assert!(ui.text().contains("path"), "{}", ui.text());
             assert!(ui.press('s').is_empty(), "the path integrator always has soft shadows");
-            assert!(ui.text().contains(&messages::soft_shadows("path", "whitted")), "{}", ui.text());
+            assert!(ui.text().contains(&messages::only_soft_shadows("path", "whitted")), "{}", ui.text());
         }
         Action::NextView | Action::PreviousView => {
             let effects = ui.key(key);
             let wanted = if action == Action::NextView { View::Normal } else { View::Error };
             let request = request(&effects).expect("a request");
             assert_eq!((request.overrides.view, request.write), (Some(wanted), Writing::No));
-            assert!(ui.text().contains(&messages::view(wanted.name())));
+            assert!(ui.text().contains(&messages::view_chosen(wanted.name())));
         }
         Action::OrbitLeft | Action::OrbitRight | Action::OrbitUp | Action::OrbitDown => {
             let moved = requested_pose(&ui.key(key)).position - DVec3::Y;
@@ -111,7 +111,7 @@ fn check(action: Action, key: KeyPress, ui: &mut TestUi) {
                 Some((Some(stops), Writing::No))
             );
             assert!(
-                ui.text().contains(&messages::exposure(&crate::state::format_stops(stops))),
+                ui.text().contains(&messages::exposure_changed(&crate::state::format_stops(stops))),
                 "{}",
                 ui.text()
             );
@@ -170,8 +170,8 @@ fn check(action: Action, key: KeyPress, ui: &mut TestUi) {
         }
         Action::Edit => assert!(matches!(ui.key(key)[..], [Effect::Edit(_)])),
         Action::CompareLastEdit => {
-            ui.event(Event::Changed(Changed { noticed: ui.now }));
-            ui.finish(BLUE);
+            ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
+            ui.finish_render(BLUE);
             for (color, other) in [(RED, BLUE), (BLUE, RED)] {
                 ui.key(key);
                 assert!(cells_of(ui, color) > 0 && cells_of(ui, other) == 0);
@@ -179,7 +179,7 @@ fn check(action: Action, key: KeyPress, ui: &mut TestUi) {
         }
         Action::OlderRender | Action::NewerRender => {
             ui.press('s');
-            ui.finish(BLUE);
+            ui.finish_render(BLUE);
             let is_older = action == Action::OlderRender;
             if !is_older {
                 ui.press('n');
@@ -202,7 +202,7 @@ fn check(action: Action, key: KeyPress, ui: &mut TestUi) {
             assert!(ui.key(key).is_empty(), "nothing left to reset");
         }
         Action::ToggleDiagnostics => {
-            ui.fail(vec![diagnostic(Severity::Error, "wrong")]);
+            ui.fail_render(vec![diagnostic(Severity::Error, "wrong")]);
             assert!(ui.key(key).is_empty());
             assert!(!ui.text().contains("error: wrong"));
         }
@@ -215,7 +215,7 @@ fn check(action: Action, key: KeyPress, ui: &mut TestUi) {
             assert_eq!(cells_of(ui, RED), cells);
         }
         Action::ToggleHelp => {
-            let help = keymap::of(action).expect("a binding").help;
+            let help = keymap::binding_of(action).expect("a binding").help;
             ui.key(key);
             assert!(ui.text().contains(help));
             ui.key(key);
@@ -236,23 +236,24 @@ fn bottom(ui: &mut TestUi) -> String {
 #[test]
 fn key_line_shows_toggles_and_values() {
     let mut ui = TestUi::new();
-    ui.finish(RED);
+    ui.finish_render(RED);
     assert!(bottom(&mut ui).starts_with("s soft  p off  d on  v beauty  i whitted  "), "{}", bottom(&mut ui));
     assert!(bottom(&mut ui).ends_with("q quit  ? help"));
-    let is_bold = |ui: &mut TestUi| ui.screen()[(2, 23)].modifier.contains(ratatui::style::Modifier::BOLD);
+    let is_bold =
+        |ui: &mut TestUi| ui.draw_screen()[(2, 23)].modifier.contains(ratatui::style::Modifier::BOLD);
     assert!(!is_bold(&mut ui));
     ui.press('s');
     assert!(bottom(&mut ui).starts_with("s hard"), "{}", bottom(&mut ui));
     assert!(is_bold(&mut ui), "changed settings should be bold");
     ui.press('i');
     assert!(bottom(&mut ui).starts_with("s –  p off  d on  v beauty  i path"), "{}", bottom(&mut ui));
-    ui.event(Event::Resize(window(140, 40)));
+    ui.handle_event(Event::Resize(window(140, 40)));
     ui.press('0');
     let long = "s shadows soft  p photons off  d dof on  v view beauty  i whitted  ";
     assert!(bottom(&mut ui).starts_with(long), "{}", bottom(&mut ui));
-    ui.event(Event::Resize(window(40, 12)));
+    ui.handle_event(Event::Resize(window(40, 12)));
     ui.press('g');
-    ui.finish(RED);
+    ui.finish_render(RED);
     ui.press('0');
     ui.press('?');
     ui.press('?');
@@ -265,19 +266,19 @@ fn key_line_shows_currently_useful_keys() {
     assert!(bottom(&mut ui).contains("space pause"), "{}", bottom(&mut ui));
     ui.press(' ');
     assert!(bottom(&mut ui).contains("space resume"), "{}", bottom(&mut ui));
-    ui.finish(RED);
+    ui.finish_render(RED);
     assert!(bottom(&mut ui).contains("tab image") && !bottom(&mut ui).contains("space"));
     ui.press('s');
-    ui.finish(RED);
-    ui.event(Event::Resize(window(200, 60)));
+    ui.finish_render(RED);
+    ui.handle_event(Event::Resize(window(200, 60)));
     for binding in KEYMAP.iter().filter(|it| !it.hint.is_empty() && it.action != Action::TogglePause) {
         let hint = format!("{} {}", binding.label, binding.hint);
         assert!(bottom(&mut ui).contains(&hint), "{hint:?} not found in {}", bottom(&mut ui));
     }
     let generation = ui.state.request.generation;
-    ui.worker(done(generation, vec![diagnostic(Severity::Warning, "unused")], false));
+    ui.worker_event(done_event(generation, vec![diagnostic(Severity::Warning, "unused")], false));
     assert!(bottom(&mut ui).contains("e 1 warning"));
-    ui.fail(vec![diagnostic(Severity::Error, "wrong")]);
+    ui.fail_render(vec![diagnostic(Severity::Error, "wrong")]);
     assert!(bottom(&mut ui).contains("esc close"), "{}", bottom(&mut ui));
     ui.key(KeyPress::special(crossterm::event::KeyCode::Esc));
     assert!(bottom(&mut ui).contains("e 1 error"), "{}", bottom(&mut ui));
@@ -286,7 +287,7 @@ fn key_line_shows_currently_useful_keys() {
 #[test]
 fn message_is_shown_until_a_key_is_pressed() {
     let mut ui = TestUi::new();
-    ui.finish(RED);
+    ui.finish_render(RED);
     let hints = bottom(&mut ui);
     ui.press('0');
     let text = ui.text();
@@ -297,7 +298,7 @@ fn message_is_shown_until_a_key_is_pressed() {
     assert!(!ui.text().contains(messages::NOTHING_TO_RESET));
     // If there is no separate line for messages, they replace the keys or the name in the header.
     for rows in [12, 5] {
-        ui.event(Event::Resize(window(60, rows)));
+        ui.handle_event(Event::Resize(window(60, rows)));
         ui.press('0');
         assert!(ui.text().contains(messages::NOTHING_TO_RESET), "{}", ui.text());
     }
@@ -322,13 +323,13 @@ fn toggles_start_from_the_command_line() {
 #[test]
 fn pinhole_has_no_depth_of_field() {
     let mut ui = TestUi::new();
-    let pinhole = || Box::new(Effective { dof: false, ..settings() });
-    ui.worker(protocol::Event::Settings {
+    let pinhole = || Box::new(EffectiveSettings { dof: false, ..effective_settings() });
+    ui.worker_event(protocol::Event::Settings {
         generation: 1,
         settings: pinhole(),
         camera: camera(),
         exposure: 0.0,
-        own: own(),
+        own: own_settings(),
     });
     assert!(ui.press('d').is_empty());
     assert!(ui.text().contains(messages::PINHOLE));
@@ -336,20 +337,20 @@ fn pinhole_has_no_depth_of_field() {
     let base = Overrides { dof: Some(false), ..Overrides::default() };
     let state = state_with(80, 24, PreviewKind::HalfBlock, ColorDepth::TrueColor, base);
     let mut ui = TestUi::with(state);
-    ui.worker(protocol::Event::Settings {
+    ui.worker_event(protocol::Event::Settings {
         generation: 1,
         settings: pinhole(),
         camera: camera(),
         exposure: 0.0,
-        own: own(),
+        own: own_settings(),
     });
     assert_eq!(request(&ui.press('d')).expect("a request").overrides.dof, Some(true));
-    ui.worker(protocol::Event::Settings {
+    ui.worker_event(protocol::Event::Settings {
         generation: 2,
         settings: pinhole(),
         camera: camera(),
         exposure: 0.0,
-        own: own(),
+        own: own_settings(),
     });
     assert!(ui.text().contains(messages::PINHOLE));
 }
@@ -358,7 +359,7 @@ fn pinhole_has_no_depth_of_field() {
 fn new_request_ends_a_pause() {
     let mut ui = TestUi::new();
     ui.press(' ');
-    let effects = ui.event(Event::Changed(Changed { noticed: ui.now }));
+    let effects = ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
     assert!(matches!(effects[..], [Effect::Send(Command::Pause(false)), Effect::Send(Command::Render(_))]));
     assert!(!ui.state.work.paused);
     assert!(ui.text().contains(messages::RESUMED), "{}", ui.text());
@@ -369,7 +370,7 @@ fn resuming_is_reported_with_other_messages() {
     for (key, words) in [
         ('s', messages::RESUMED.to_owned()),
         ('r', messages::RESUMED.to_owned()),
-        ('v', messages::view("normal")),
+        ('v', messages::view_chosen("normal")),
     ] {
         let mut ui = TestUi::new();
         ui.press(' ');
@@ -389,21 +390,21 @@ fn resuming_is_reported_with_other_messages() {
 #[test]
 fn clock_stops_while_paused() {
     let mut ui = TestUi::new();
-    ui.worker(protocol::Event::Progress { generation: 1, progress: progress(0.5, None) });
-    ui.wait(3000);
+    ui.worker_event(protocol::Event::Progress { generation: 1, progress: render_progress(0.5, None) });
+    ui.advance_clock(3000);
     ui.press(' ');
     assert!(ui.text().contains("32/64 samples · 3.0 s"), "{}", ui.text());
-    ui.wait(5000);
+    ui.advance_clock(5000);
     assert!(ui.text().contains("32/64 samples · 3.0 s"), "{}", ui.text());
     ui.press(' ');
-    ui.wait(1000);
+    ui.advance_clock(1000);
     assert!(ui.text().contains("32/64 samples · 4.0 s"), "{}", ui.text());
 }
 
 #[test]
 fn pausing_without_a_render_shows_a_message() {
     let mut ui = TestUi::new();
-    ui.finish(RED);
+    ui.finish_render(RED);
     assert!(ui.press(' ').is_empty());
     assert!(ui.text().contains(messages::NOT_RENDERING));
 }
@@ -412,17 +413,17 @@ fn pausing_without_a_render_shows_a_message() {
 fn postponed_write_is_reported_again_when_done() {
     let mut ui = TestUi::new();
     ui.press('w');
-    ui.worker(protocol::Event::WritePostponed { generation: 1 });
+    ui.worker_event(protocol::Event::WritePostponed { generation: 1 });
     assert!(ui.text().contains(messages::WRITE_POSTPONED), "{}", ui.text());
-    ui.worker(protocol::Event::WriteDone { generation: 1, paths: vec!["cornell.png".into()] });
-    assert!(ui.text().contains(&messages::wrote("cornell.png")), "{}", ui.text());
+    ui.worker_event(protocol::Event::WriteDone { generation: 1, paths: vec!["cornell.png".into()] });
+    assert!(ui.text().contains(&messages::files_written("cornell.png")), "{}", ui.text());
 }
 
 #[test]
 fn cancelled_render_is_not_paused() {
     let mut ui = TestUi::new();
     ui.press(' ');
-    ui.worker(protocol::Event::Cancelled { generation: 1 });
+    ui.worker_event(protocol::Event::Cancelled { generation: 1 });
     assert!(!ui.state.work.paused && !ui.text().contains("paused"), "{}", ui.text());
 }
 
@@ -438,7 +439,7 @@ fn reverted_toggle_is_not_a_change() {
     ] {
         let mut ui =
             TestUi::with(state_with(120, 40, PreviewKind::HalfBlock, ColorDepth::TrueColor, base.clone()));
-        ui.finish(RED);
+        ui.finish_render(RED);
         let mut requests = Vec::new();
         for key in keys.chars() {
             assert_eq!(ui.state.request.overrides() == base, requests.is_empty(), "{keys}");
@@ -450,7 +451,7 @@ fn reverted_toggle_is_not_a_change() {
         assert_eq!(first.overrides, requests[0].overrides, "{keys}");
     }
     let mut ui = TestUi::with(state(120, 40));
-    ui.finish(RED);
+    ui.finish_render(RED);
     "sssii".chars().for_each(|key| drop(ui.press(key)));
     assert!(ui.press('0').is_empty());
     assert!(ui.text().contains(messages::NOTHING_TO_RESET), "{}", ui.text());
@@ -459,14 +460,15 @@ fn reverted_toggle_is_not_a_change() {
 #[test]
 fn saved_settings_are_the_base_for_toggles() {
     let mut ui = TestUi::with(state(120, 40));
-    ui.finish(RED);
+    ui.finish_render(RED);
     ui.press('s');
-    ui.finish(BLUE);
+    ui.finish_render(BLUE);
     // The saved scene has hard shadows, as set with the key.
-    ui.event(Event::Changed(Changed { noticed: ui.now }));
-    let (generation, own) = (ui.state.request.generation, OwnSettings { shadows: Shadows::Hard, ..own() });
-    let settings = Box::new(Effective { shadows: Shadows::Hard, ..settings() });
-    ui.worker(protocol::Event::Settings { generation, settings, camera: camera(), exposure: 0.0, own });
+    ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
+    let (generation, own) =
+        (ui.state.request.generation, AdjustableSettings { shadows: Shadows::Hard, ..own_settings() });
+    let settings = Box::new(EffectiveSettings { shadows: Shadows::Hard, ..effective_settings() });
+    ui.worker_event(protocol::Event::Settings { generation, settings, camera: camera(), exposure: 0.0, own });
     let shadows: Vec<Option<Shadows>> = "sss"
         .chars()
         .map(|key| request(&ui.press(key)).and_then(|request| request.overrides.shadows))

@@ -8,7 +8,7 @@ use crate::fixtures::*;
 use crate::graphics::Protocol;
 use crate::messages;
 use crate::pipeline::protocol::{self, Command, PreviewSize, Stage, Status};
-use crate::pipeline::settings::{Effective, Overrides};
+use crate::pipeline::settings::{EffectiveSettings, Overrides};
 use crate::preview_kind::PreviewKind;
 use crate::scene::diagnostic::Severity;
 use crate::view::layout::Layout;
@@ -26,14 +26,14 @@ fn fitted_preview_size(size: (u32, u32), most: PreviewSize) -> (u32, u32) {
 /// Reports the settings of a scene with this size and shows its preview.
 fn rendered(ui: &mut TestUi, (width, height): (u32, u32)) {
     let generation = ui.state.request.generation;
-    ui.worker(protocol::Event::Started { generation });
-    let settings = Box::new(Effective { width, height, ..settings() });
-    ui.worker(protocol::Event::Settings {
+    ui.worker_event(protocol::Event::Started { generation });
+    let settings = Box::new(EffectiveSettings { width, height, ..effective_settings() });
+    ui.worker_event(protocol::Event::Settings {
         generation,
         settings,
         camera: camera(),
         exposure: 0.0,
-        own: own(),
+        own: own_settings(),
     });
     show(ui, (width, height));
 }
@@ -41,8 +41,8 @@ fn rendered(ui: &mut TestUi, (width, height): (u32, u32)) {
 fn show(ui: &mut TestUi, size: (u32, u32)) {
     let generation = ui.state.request.generation;
     let (width, height) = fitted_preview_size(size, ui.state.request.preview_size.expect("a preview"));
-    let picture = plain_picture(width, height, RED);
-    ui.event(Event::Picture {
+    let picture = uniform_picture(width, height, RED);
+    ui.handle_event(Event::Picture {
         generation,
         picture,
         range: None,
@@ -84,36 +84,46 @@ fn layout_is_stable_during_a_render() {
         let mut ui = TestUi::with(state(columns, rows));
         rendered(&mut ui, (640, 480));
         let place = |ui: &TestUi| {
-            let Layout { header, preview, panel, under, keys, pane } = Layout::of(&ui.state);
+            let Layout { header, preview, panel, under, keys, pane } = Layout::for_state(&ui.state);
             [header, preview, panel, under, keys, pane]
         };
         let before = place(&ui);
         let generation = ui.state.request.generation;
         for step in 0..10 {
             match step {
-                0 => ui.worker(protocol::Event::Stage {
+                0 => ui.worker_event(protocol::Event::Stage {
                     generation,
-                    stage: stage(Stage::Textures, Status::Running, 0.0, ""),
+                    stage: stage_report(Stage::Textures, Status::Running, 0.0, ""),
                 }),
-                1 => ui.worker(protocol::Event::Asset { generation, progress: asset("bricks", 3, 8) }),
-                2 => ui.worker(protocol::Event::Progress { generation, progress: progress(0.5, None) }),
+                1 => ui.worker_event(protocol::Event::Asset {
+                    generation,
+                    progress: asset_progress("bricks", 3, 8),
+                }),
+                2 => ui.worker_event(protocol::Event::Progress {
+                    generation,
+                    progress: render_progress(0.5, None),
+                }),
                 3 => ui.press(' '),
                 4 => ui.press('0'),
-                5 => ui.worker(protocol::Event::Written {
+                5 => ui.worker_event(protocol::Event::Written {
                     generation,
                     path: "cornell.png".into(),
                     bytes: 1,
                     is_own: true,
                 }),
-                6 => ui.worker(done(generation, vec![diagnostic(Severity::Warning, "unused")], false)),
-                7 => ui.event(Event::Changed(Changed { noticed: ui.now })),
+                6 => ui.worker_event(done_event(
+                    generation,
+                    vec![diagnostic(Severity::Warning, "unused")],
+                    false,
+                )),
+                7 => ui.handle_event(Event::Changed(Changed { noticed: ui.now })),
                 8 => {
-                    ui.fail(vec![diagnostic(Severity::Error, "wrong")]);
+                    ui.fail_render(vec![diagnostic(Severity::Error, "wrong")]);
                     Vec::new()
                 }
-                _ => ui.event(Event::Settled),
+                _ => ui.handle_event(Event::Settled),
             };
-            ui.screen();
+            ui.draw_screen();
             assert_eq!(place(&ui), before, "step {step} at {columns}×{rows}");
         }
     }
@@ -122,21 +132,21 @@ fn layout_is_stable_during_a_render() {
 #[test]
 fn new_aspect_ratio_requests_another_preview() {
     let mut ui = TestUi::new();
-    let settings = |width| Box::new(Effective { width, height: 480, ..settings() });
-    let same = ui.worker(protocol::Event::Settings {
+    let settings = |width| Box::new(EffectiveSettings { width, height: 480, ..effective_settings() });
+    let same = ui.worker_event(protocol::Event::Settings {
         generation: 1,
         settings: settings(640),
         camera: camera(),
         exposure: 0.0,
-        own: own(),
+        own: own_settings(),
     });
     assert!(same.is_empty(), "{same:?}");
-    let wide = ui.worker(protocol::Event::Settings {
+    let wide = ui.worker_event(protocol::Event::Settings {
         generation: 1,
         settings: settings(1200),
         camera: camera(),
         exposure: 0.0,
-        own: own(),
+        own: own_settings(),
     });
     assert!(
         matches!(wide[..], [Effect::Send(Command::Preview(Some(PreviewSize { width: 80, .. })))]),
@@ -148,16 +158,22 @@ fn new_aspect_ratio_requests_another_preview() {
 fn small_windows_are_usable() {
     for (columns, rows) in [(40, 12), (30, 8)] {
         let mut ui = TestUi::with(state(columns, rows));
-        ui.worker(protocol::Event::Progress { generation: 1, progress: progress(0.5, Some(9.0)) });
+        ui.worker_event(protocol::Event::Progress {
+            generation: 1,
+            progress: render_progress(0.5, Some(9.0)),
+        });
         let text = ui.text();
         assert!(text.contains("● rendering") && text.contains("50 %"), "{text}");
         assert!(text.contains("? help") && text.contains("s soft"), "{text}");
-        ui.worker(protocol::Event::Progress { generation: 1, progress: progress(0.5, Some(4567.0)) });
+        ui.worker_event(protocol::Event::Progress {
+            generation: 1,
+            progress: render_progress(0.5, Some(4567.0)),
+        });
         assert!(ui.text().contains("50 %"), "progress takes precedence over ETA: {}", ui.text());
         rendered(&mut ui, (640, 480));
         let share = cells_of(&mut ui, RED) as f64 / max_cells((columns, rows), (640, 480));
         assert!(share >= 0.7, "{share:.3}\n{}", ui.text());
-        ui.fail(vec![diagnostic(Severity::Error, "misspelled")]);
+        ui.fail_render(vec![diagnostic(Severity::Error, "misspelled")]);
         let text = ui.text();
         assert!(text.contains("✗ broken") && text.contains("error: misspelled"), "{text}");
         assert!(text.contains("cornell.toml:3:1"), "{text}");
@@ -170,17 +186,17 @@ fn status_line_shows_progress_then_results() {
     let under = |ui: &mut TestUi| ui.text().lines().nth(38).map(str::to_owned).unwrap_or_default();
     let of = |name, status, seconds| protocol::Event::Stage {
         generation: 1,
-        stage: stage(name, status, seconds, ""),
+        stage: stage_report(name, status, seconds, ""),
     };
-    ui.worker(of(Stage::Textures, Status::Running, 0.0));
-    ui.worker(protocol::Event::Asset { generation: 1, progress: asset("bricks", 1, 2) });
+    ui.worker_event(of(Stage::Textures, Status::Running, 0.0));
+    ui.worker_event(protocol::Event::Asset { generation: 1, progress: asset_progress("bricks", 1, 2) });
     assert!(under(&mut ui).starts_with("textures ━") && under(&mut ui).trim_end().ends_with("─ 0.0 s"));
-    ui.worker(of(Stage::Textures, Status::Done, 0.1));
-    ui.worker(of(Stage::Render, Status::Running, 0.0));
-    ui.worker(protocol::Event::Progress { generation: 1, progress: progress(0.5, None) });
+    ui.worker_event(of(Stage::Textures, Status::Done, 0.1));
+    ui.worker_event(of(Stage::Render, Status::Running, 0.0));
+    ui.worker_event(protocol::Event::Progress { generation: 1, progress: render_progress(0.5, None) });
     assert!(under(&mut ui).starts_with("render ━"), "{}", under(&mut ui));
     assert!(under(&mut ui).contains("─ 32/64 samples · 0.0 s"), "{}", under(&mut ui));
-    ui.worker(done(1, Vec::new(), false));
+    ui.worker_event(done_event(1, Vec::new(), false));
     assert!(under(&mut ui).starts_with("parse 250 ms, "), "{}", under(&mut ui));
 }
 
@@ -189,17 +205,17 @@ fn stage_times_are_compared_with_last_render() {
     let mut ui = TestUi::new();
     let render = |ui: &mut TestUi, seconds| {
         let generation = ui.state.request.generation;
-        ui.worker(protocol::Event::Started { generation });
-        let report = stage(Stage::Render, Status::Done, seconds, "");
-        ui.worker(protocol::Event::Stage { generation, stage: report });
+        ui.worker_event(protocol::Event::Started { generation });
+        let report = stage_report(Stage::Render, Status::Done, seconds, "");
+        ui.worker_event(protocol::Event::Stage { generation, stage: report });
     };
     render(&mut ui, 1.42);
     assert!(!ui.text().contains("1.42 s −") && !ui.text().contains("1.42 s +"));
-    ui.event(Event::Changed(Changed { noticed: ui.now }));
+    ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
     render(&mut ui, 1.12);
     assert!(ui.text().contains("render   1.12 s −.3 s"), "{}", ui.text());
     ui.press('r');
-    ui.worker(protocol::Event::Started { generation: ui.state.request.generation });
+    ui.worker_event(protocol::Event::Started { generation: ui.state.request.generation });
     ui.press('r');
     render(&mut ui, 2.24);
     assert!(ui.text().contains("render  2.24 s +1.1 s"), "cancelled renders should not count: {}", ui.text());
@@ -211,13 +227,21 @@ fn save_hint_is_shown_until_the_first_save() {
         for size in SIZES {
             let mut ui = TestUi::with(state(columns, rows));
             rendered(&mut ui, size);
-            ui.worker(done(1, Vec::new(), false));
+            ui.worker_event(done_event(1, Vec::new(), false));
             // If all stages are listed, a narrow window has no space for the hint.
             ui.state.work.stages = Default::default();
-            assert!(ui.words().contains(&messages::save_to_render("cornell.toml", false)), "{}", ui.text());
-            ui.event(Event::Changed(Changed { noticed: ui.now }));
-            ui.worker(done(2, Vec::new(), false));
-            assert!(!ui.words().contains(&messages::save_to_render("cornell.toml", false)), "{}", ui.text());
+            assert!(
+                ui.screen_words().contains(&messages::save_to_render("cornell.toml", false)),
+                "{}",
+                ui.text()
+            );
+            ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
+            ui.worker_event(done_event(2, Vec::new(), false));
+            assert!(
+                !ui.screen_words().contains(&messages::save_to_render("cornell.toml", false)),
+                "{}",
+                ui.text()
+            );
         }
     }
 }
@@ -228,21 +252,21 @@ fn status_line_lists_only_current_files() {
     let finish = |ui: &mut TestUi| {
         let generation = ui.state.request.generation;
         rendered(ui, (320, 200));
-        ui.worker(done(generation, Vec::new(), false));
+        ui.worker_event(done_event(generation, Vec::new(), false));
         let settings = ui.state.request.effective.as_mut().expect("settings");
         (settings.width, settings.height) = (320, 200);
         // If all stages are listed, there is no space for a file.
         ui.state.work.stages = Default::default();
     };
     finish(&mut ui);
-    ui.worker(protocol::Event::Written {
+    ui.worker_event(protocol::Event::Written {
         generation: 1,
         path: "dof.png".into(),
         bytes: 63_000,
         is_own: true,
     });
     assert!(
-        Layout::of(&ui.state).panel.is_empty() && ui.text().contains("→ dof.png 63.0 kB"),
+        Layout::for_state(&ui.state).panel.is_empty() && ui.text().contains("→ dof.png 63.0 kB"),
         "{}",
         ui.text()
     );
@@ -254,7 +278,7 @@ fn status_line_lists_only_current_files() {
     let text = ui.text();
     assert!(text.contains(messages::NOT_SAVED) && !text.contains("dof.png 63"), "{text}");
     ui.press('w');
-    ui.worker(protocol::Event::Written {
+    ui.worker_event(protocol::Event::Written {
         generation: 2,
         path: "dof.png".into(),
         bytes: 64_000,
@@ -270,16 +294,16 @@ fn status_line_lists_only_current_files() {
 fn hints_wrap_at_the_panel_width() {
     for (columns, rows, width) in [(80, 24, 480), (120, 40, 480), (160, 40, 480)] {
         let mut ui = TestUi::with(state(columns, rows));
-        ui.finish(RED);
-        let settings = Box::new(Effective { width, height: 480, ..settings() });
-        ui.worker(protocol::Event::Settings {
+        ui.finish_render(RED);
+        let settings = Box::new(EffectiveSettings { width, height: 480, ..effective_settings() });
+        ui.worker_event(protocol::Event::Settings {
             generation: 1,
             settings,
             camera: camera(),
             exposure: 0.0,
-            own: own(),
+            own: own_settings(),
         });
-        let panel = Layout::of(&ui.state).panel;
+        let panel = Layout::for_state(&ui.state).panel;
         let hint = messages::save_to_render("cornell.toml", true);
         assert_eq!(
             ui.text().contains(&hint),

@@ -26,5 +26,5 @@ pub(super) const BLUE: [u8; 3] = [10, 20, 200];
 
 fn cells_of(ui: &mut TestUi, rgb: [u8; 3]) -> usize {
     let color = Color::Rgb(rgb[0], rgb[1], rgb[2]);
-    ui.screen().content.iter().filter(|cell| cell.symbol() == "▀" && cell.fg == color).count()
+    ui.draw_screen().content.iter().filter(|cell| cell.symbol() == "▀" && cell.fg == color).count()
 }

@@ -8,21 +8,21 @@ use crate::pipeline::protocol::{self, NoiseProgress, RenderProgress};
 #[test]
 fn noise_is_shown_during_a_render() {
     let mut ui = TestUi::new();
-    ui.worker(protocol::Event::Started { generation: 1 });
+    ui.worker_event(protocol::Event::Started { generation: 1 });
     let noise = Some(NoiseProgress { now: 0.021, seconds: 1.0, next: Some((0.01, 14.0)) });
-    let progress = RenderProgress { noise, ..progress(0.5, Some(20.0)) };
-    ui.worker(protocol::Event::Progress { generation: 1, progress });
+    let progress = RenderProgress { noise, ..render_progress(0.5, Some(20.0)) };
+    ui.worker_event(protocol::Event::Progress { generation: 1, progress });
     for (columns, rows, words) in [
         (80, 24, "noise 2.1 % → 1 % in about 14 s · 32/64 samples"),
         (54, 20, "noise 2.1 % · 32/64 samples"),
         (36, 20, "32/64 samples"),
     ] {
-        ui.event(Event::Resize(window(columns, rows)));
+        ui.handle_event(Event::Resize(window(columns, rows)));
         assert!(ui.text().contains(words), "{words}: {}", ui.text());
     }
     assert!(!ui.text().contains("noise"), "{}", ui.text());
     // While paused, the remaining time is unknown.
-    ui.event(Event::Resize(window(80, 24)));
+    ui.handle_event(Event::Resize(window(80, 24)));
     ui.press(' ');
     assert!(ui.text().contains("noise 2.1 % · 32/64 samples"), "{}", ui.text());
 }
@@ -30,18 +30,19 @@ fn noise_is_shown_during_a_render() {
 #[test]
 fn noise_target_has_no_fixed_sample_count() {
     let mut ui = TestUi::new();
-    ui.worker(protocol::Event::Started { generation: 1 });
-    let settings = Box::new(crate::pipeline::settings::Effective { error: 0.02, ..settings() });
-    ui.worker(protocol::Event::Settings {
+    ui.worker_event(protocol::Event::Started { generation: 1 });
+    let settings =
+        Box::new(crate::pipeline::settings::EffectiveSettings { error: 0.02, ..effective_settings() });
+    ui.worker_event(protocol::Event::Settings {
         generation: 1,
         settings,
         camera: camera(),
         exposure: 0.0,
-        own: own(),
+        own: own_settings(),
     });
-    ui.worker(protocol::Event::Progress {
+    ui.worker_event(protocol::Event::Progress {
         generation: 1,
-        progress: RenderProgress { is_total_fixed: false, ..progress(0.5, None) },
+        progress: RenderProgress { is_total_fixed: false, ..render_progress(0.5, None) },
     });
     assert!(ui.text().contains("about 32 samples"), "{}", ui.text());
 }
@@ -52,7 +53,7 @@ fn ended(error: f32, time_seconds: Option<f64>, complete: bool, samples: u32) ->
     let overrides = crate::pipeline::settings::Overrides { time_seconds, ..Default::default() };
     let (kind, depth) = (crate::preview_kind::PreviewKind::HalfBlock, crate::color::ColorDepth::None);
     let mut ui = TestUi::with(state_with(80, 24, kind, depth, overrides));
-    ui.finish(RED);
+    ui.finish_render(RED);
     let report = ui.state.work.report.as_mut().expect("a report");
     (report.image.complete, report.image.samples.max) = (complete, samples);
     ui.state.request.effective.as_mut().expect("settings").error = error;
@@ -80,7 +81,7 @@ fn reason_for_stopping_is_shown() {
 #[test]
 fn noise_and_target_per_tile_are_shown() {
     let mut ui = TestUi::new();
-    ui.finish(RED);
+    ui.finish_render(RED);
     assert!(ui.text().contains("noise    0.81 %") && !ui.text().contains("per tile"), "{}", ui.text());
     for (samples, words) in [(64, "target   0.5 % per tile"), (256, "target ✓ 0.5 % per tile")] {
         ui.state.request.effective.as_mut().expect("settings").error = 0.005;
@@ -92,7 +93,7 @@ fn noise_and_target_per_tile_are_shown() {
 #[test]
 fn noise_has_two_digits() {
     let mut ui = TestUi::new();
-    ui.finish(RED);
+    ui.finish_render(RED);
     ui.state.work.report.as_mut().expect("a report").image.error = Some(0.4312);
     assert!(ui.text().contains("noise    43 %"), "{}", ui.text());
 }

@@ -15,11 +15,11 @@ const LONGER: &str = "camera.position = [0, 1, 4.5], camera.fov = 35, camera.foc
 /// A UI showing a notice while a render is half done.
 fn half_done(window: (u16, u16), notice: &str) -> TestUi {
     let mut ui = TestUi::with(state(window.0, window.1));
-    ui.finish(RED);
+    ui.finish_render(RED);
     ui.press('r');
     let generation = ui.state.request.generation;
-    ui.worker(protocol::Event::Started { generation });
-    ui.worker(protocol::Event::Progress { generation, progress: progress(0.5, Some(2.0)) });
+    ui.worker_event(protocol::Event::Started { generation });
+    ui.worker_event(protocol::Event::Progress { generation, progress: render_progress(0.5, Some(2.0)) });
     crate::update::show_notice(&mut ui.state, notice);
     ui
 }
@@ -28,20 +28,20 @@ fn half_done(window: (u16, u16), notice: &str) -> TestUi {
 fn notice_expires_after_four_seconds() {
     for window in WINDOWS {
         let mut ui = TestUi::with(state(window.0, window.1));
-        ui.finish(RED);
+        ui.finish_render(RED);
         ui.press(']');
-        ui.finish(BLUE);
+        ui.finish_render(BLUE);
         assert!(ui.text().contains(SHORT), "{}", ui.text());
-        ui.wait(3900);
+        ui.advance_clock(3900);
         assert!(ui.text().contains(SHORT), "{}", ui.text());
         // Since there are no other events, the event loop must wake up to clear it.
         let wake = ui.state.next_tick().expect("a tick");
         assert!(wake <= ui.now + std::time::Duration::from_millis(100));
         ui.state.dirty = false;
-        ui.wait(100);
+        ui.advance_clock(100);
         assert!(ui.state.dirty);
         let rows = ui.text();
-        // The text also appears in the key line, as the setting that `0` resets.
+        // The key line also contains this text, as the setting that `0` resets.
         let above = rows.lines().rev().skip(1).any(|row| row.contains(SHORT));
         assert!(!above, "{rows}");
         assert_eq!(ui.state.next_tick(), None);
@@ -51,13 +51,13 @@ fn notice_expires_after_four_seconds() {
 #[test]
 fn newer_notice_is_shown_for_four_seconds() {
     let mut ui = TestUi::new();
-    ui.finish(RED);
+    ui.finish_render(RED);
     ui.press(']');
-    ui.wait(3000);
+    ui.advance_clock(3000);
     ui.press(']');
-    ui.finish(BLUE);
-    ui.wait(3000);
-    assert!(ui.text().contains(&messages::exposure("+0.5")), "{}", ui.text());
+    ui.finish_render(BLUE);
+    ui.advance_clock(3000);
+    assert!(ui.text().contains(&messages::exposure_changed("+0.5")), "{}", ui.text());
 }
 
 #[test]
@@ -79,13 +79,13 @@ fn notice_does_not_hide_the_written_file() {
     for window in WINDOWS {
         for notice in [SHORT, LONG, LONGER] {
             let mut ui = TestUi::with(state(window.0, window.1));
-            ui.worker(protocol::Event::Written {
+            ui.worker_event(protocol::Event::Written {
                 generation: 1,
                 path: "cornell.png".into(),
                 bytes: 90_200,
                 is_own: true,
             });
-            ui.finish(RED);
+            ui.finish_render(RED);
             crate::update::show_notice(&mut ui.state, notice);
             assert!(ui.text().contains("→ cornell.png"), "{window:?} {}", ui.text());
         }
@@ -96,11 +96,11 @@ fn notice_does_not_hide_the_written_file() {
 #[test]
 fn small_window_shows_keys_after_a_notice() {
     let mut ui = TestUi::with(state(60, 8));
-    ui.finish(RED);
+    ui.finish_render(RED);
     ui.press(']');
-    ui.finish(BLUE);
+    ui.finish_render(BLUE);
     assert!(!ui.text().contains("q quit"), "{}", ui.text());
-    ui.wait(4000);
+    ui.advance_clock(4000);
     assert!(ui.text().contains("q quit"), "{}", ui.text());
 }
 
@@ -112,15 +112,15 @@ fn errors_and_prompts_stay_until_a_key_press() {
         message: "disk full".to_owned(),
     };
     let mut ui = TestUi::new();
-    ui.finish(RED);
-    ui.worker(failed);
-    ui.wait(60_000);
+    ui.finish_render(RED);
+    ui.worker_event(failed);
+    ui.advance_clock(60_000);
     assert!(ui.text().contains("disk full"), "{}", ui.text());
     ui.press('f');
-    ui.wait(60_000);
+    ui.advance_clock(60_000);
     assert!(ui.text().contains(messages::CLICK_TO_FOCUS), "{}", ui.text());
     ui.press('f');
-    ui.event(Event::Lost(crate::event::EventSource::Watcher));
-    ui.wait(60_000);
+    ui.handle_event(Event::Lost(crate::event::EventSource::Watcher));
+    ui.advance_clock(60_000);
     assert!(ui.text().contains(messages::NOT_WATCHING), "{}", ui.text());
 }

@@ -9,7 +9,7 @@ use crate::fixtures::*;
 use crate::keymap::{KEYMAP, OVERLAY};
 use crate::messages;
 use crate::pipeline::protocol::{self, Failure};
-use crate::pipeline::settings::{Effective, View};
+use crate::pipeline::settings::{EffectiveSettings, View};
 use crate::scene::diagnostic::{Diagnostic, Severity, SourceSpan};
 
 /// Number of views.
@@ -61,7 +61,7 @@ fn help_scrolls_to_both_ends_with_every_key() {
     for _ in 0..60 {
         ui.press('j');
     }
-    ui.screen();
+    ui.draw_screen();
     ui.press('j');
     assert!(!ui.state.dirty, "at the end");
     ui.press('?');
@@ -100,7 +100,9 @@ fn scroll_keys_are_shown_only_when_needed() {
     }
     for (faults, is_long) in [(9, true), (1, false)] {
         let mut ui = TestUi::new();
-        ui.fail((0..faults).map(|i| diagnostic(Severity::Error, &format!("wrong number {i}"))).collect());
+        ui.fail_render(
+            (0..faults).map(|i| diagnostic(Severity::Error, &format!("wrong number {i}"))).collect(),
+        );
         assert!(ui.text().contains("esc close"), "{}", ui.text());
         assert_eq!(ui.text().contains("j k scroll"), is_long, "{}", ui.text());
     }
@@ -109,7 +111,7 @@ fn scroll_keys_are_shown_only_when_needed() {
 #[test]
 fn help_leaves_no_partial_words_beside_it() {
     let mut ui = TestUi::with(state(120, 40));
-    ui.finish(RED);
+    ui.finish_render(RED);
     ui.press('?');
     let text = ui.text();
     let beside = |line: &str| line.split(['╭', '╰']).next().is_some_and(|left| left.trim().is_empty());
@@ -128,7 +130,7 @@ fn help_shows_how_to_close_it() {
 fn digits_select_views() {
     for (columns, rows) in [(80, 24), (120, 40), (120, 24), (40, 12), (30, 8)] {
         let mut ui = TestUi::with(state(columns, rows));
-        ui.finish(RED);
+        ui.finish_render(RED);
         ui.press('5');
         assert_eq!(ui.state.request.view(), View::Beauty, "digits should only work in the list");
         ui.press('v');
@@ -159,13 +161,13 @@ fn digits_select_views() {
 fn keys_navigate_the_open_view_list() {
     for (columns, rows) in [(80, 24), (120, 40), (200, 60), (30, 8)] {
         let mut ui = TestUi::with(state(columns, rows));
-        ui.finish(RED);
+        ui.finish_render(RED);
         ui.press('v');
         let down = KeyPress::special(KeyCode::Down);
         for (number, view) in View::ALL.iter().enumerate().skip(2) {
             let effects = ui.key(if number % 2 == 0 { down } else { KeyPress::plain('j') });
             let overrides = request(&effects).expect("a request").overrides.clone();
-            assert_eq!((overrides.view, overrides.camera.is_any()), (Some(*view), false));
+            assert_eq!((overrides.view, overrides.camera.has_changes()), (Some(*view), false));
             let text = ui.text();
             let is_marked = |line: &str| line.contains('▸') && line.contains(view.name());
             assert!(text.lines().any(is_marked), "{} at {columns}×{rows}:\n{text}", view.name());
@@ -174,19 +176,22 @@ fn keys_navigate_the_open_view_list() {
         assert_eq!(request(&ui.press('k')).and_then(|it| it.overrides.view), Some(View::Samples));
         for key in [KeyCode::Left, KeyCode::Right, KeyCode::Up] {
             ui.key(KeyPress::special(key));
-            assert!(!ui.state.request.toggles.camera.is_any(), "{key:?} should only affect the list");
+            assert!(!ui.state.request.toggles.camera.has_changes(), "{key:?} should only affect the list");
         }
         ui.key(KeyPress::special(KeyCode::Enter));
         assert!(!ui.text().contains('▸'), "{}", ui.text());
         ui.press('j');
-        assert!(ui.state.request.toggles.camera.is_any(), "the list is closed, so the camera should move");
+        assert!(
+            ui.state.request.toggles.camera.has_changes(),
+            "the list is closed, so the camera should move"
+        );
     }
 }
 
 #[test]
 fn views_are_found_by_name() {
     let mut ui = TestUi::new();
-    ui.finish(RED);
+    ui.finish_render(RED);
     ui.press('v');
     assert!(ui.press('/').is_empty());
     ui.press('d');
@@ -208,21 +213,21 @@ fn views_are_found_by_name() {
 #[test]
 fn view_list_leaves_no_partial_lines_below() {
     let mut ui = TestUi::with(state(120, 40));
-    ui.finish(RED);
-    let settings = Box::new(Effective { width: 480, height: 480, ..settings() });
-    ui.worker(protocol::Event::Settings {
+    ui.finish_render(RED);
+    let settings = Box::new(EffectiveSettings { width: 480, height: 480, ..effective_settings() });
+    ui.worker_event(protocol::Event::Settings {
         generation: 1,
         settings,
         camera: camera(),
         exposure: 0.0,
-        own: own(),
+        own: own_settings(),
     });
     ui.press('v');
     let generation = ui.state.request.generation;
-    ui.worker(protocol::Event::Started { generation });
-    let panel = crate::view::layout::Layout::of(&ui.state).panel;
+    ui.worker_event(protocol::Event::Started { generation });
+    let panel = crate::view::layout::Layout::for_state(&ui.state).panel;
     assert!(panel.height > VIEWS, "{panel:?}");
-    let screen = ui.screen();
+    let screen = ui.draw_screen();
     for row in panel.y + VIEWS..panel.bottom() {
         let line: String = (panel.x..panel.right()).map(|column| screen[(column, row)].symbol()).collect();
         assert_eq!(line.trim(), "", "row {row}");
@@ -232,18 +237,18 @@ fn view_list_leaves_no_partial_lines_below() {
 #[test]
 fn view_list_closes_automatically() {
     let mut ui = TestUi::new();
-    ui.finish(RED);
+    ui.finish_render(RED);
     ui.press('v');
-    ui.finish(RED);
+    ui.finish_render(RED);
     let wake = ui.state.next_tick().expect("a wakeup to close the list");
     assert!(wake > ui.now);
-    ui.wait(3000);
+    ui.advance_clock(3000);
     ui.press('v');
-    ui.wait(3000);
+    ui.advance_clock(3000);
     assert!(ui.text().contains("▸3 depth"), "each key press should keep it open");
-    ui.wait(2000);
+    ui.advance_clock(2000);
     assert!(ui.state.dirty && !ui.text().contains("▸"));
-    ui.finish(RED);
+    ui.finish_render(RED);
     assert_eq!(ui.state.next_tick(), None);
 }
 
@@ -251,7 +256,7 @@ fn view_list_closes_automatically() {
 fn partly_visible_view_list_is_marked() {
     for (columns, rows, is_cut) in [(40, 10, true), (30, 8, true), (40, 16, false)] {
         let mut ui = TestUi::with(state(columns, rows));
-        ui.finish(RED);
+        ui.finish_render(RED);
         ui.press('v');
         let text = ui.text();
         assert!(text.contains('▾') == is_cut && !text.contains('▴'), "{columns}×{rows}\n{text}");
@@ -267,16 +272,16 @@ fn partly_visible_view_list_is_marked() {
         assert!(ui.text().contains("(preview only)"), "{columns}×{rows}\n{}", ui.text());
     }
     let mut ui = TestUi::new();
-    ui.finish(RED);
+    ui.finish_render(RED);
     ui.press('v');
     let text = ui.text();
-    assert!(!text.contains(['▴', '▾']) && text.contains(&messages::view("normal")), "{text}");
+    assert!(!text.contains(['▴', '▾']) && text.contains(&messages::view_chosen("normal")), "{text}");
 }
 
 #[test]
 fn only_ten_positions_of_an_error_are_shown() {
     let mut ui = TestUi::with(state(120, 40));
-    ui.fail((1..=20).map(|line| at(Severity::Error, "unknown `wal`", line)).collect());
+    ui.fail_render((1..=20).map(|line| at(Severity::Error, "unknown `wal`", line)).collect());
     let text = ui.text();
     let words = ": 2:1, 3:1, 4:1, 5:1, 6:1, 7:1, 8:1, 9:1, 10:1 and 10 more";
     assert!(text.split_whitespace().collect::<Vec<_>>().join(" ").contains(words), "{text}");
@@ -292,7 +297,7 @@ fn at(severity: Severity, message: &str, line: usize) -> Diagnostic {
 fn errors_come_first_and_duplicates_are_merged() {
     let mut ui = TestUi::with(state(120, 40));
     let material = |line| at(Severity::Error, "unknown `wal`", line);
-    ui.fail(vec![
+    ui.fail_render(vec![
         at(Severity::Warning, "texture `b` is not used", 1),
         material(12),
         material(5),
@@ -313,17 +318,17 @@ fn diagnostics_are_beside_the_image_if_possible() {
         [(160, 40, 640, true), (80, 60, 640, true), (80, 24, 480, true), (80, 24, 640, false)]
     {
         let mut ui = TestUi::with(state(columns, rows));
-        ui.finish(RED);
-        let settings = Box::new(Effective { width, height: 480, ..settings() });
-        ui.worker(protocol::Event::Settings {
+        ui.finish_render(RED);
+        let settings = Box::new(EffectiveSettings { width, height: 480, ..effective_settings() });
+        ui.worker_event(protocol::Event::Settings {
             generation: 1,
             settings,
             camera: camera(),
             exposure: 0.0,
-            own: own(),
+            own: own_settings(),
         });
         let before = cells_of(&mut ui, RED);
-        ui.fail(vec![diagnostic(Severity::Error, "misspelled")]);
+        ui.fail_render(vec![diagnostic(Severity::Error, "misspelled")]);
         assert!(ui.text().contains("error: misspelled"), "{}", ui.text());
         let after = cells_of(&mut ui, RED);
         assert_eq!(after == before, is_beside, "{after} of {before} at {columns}×{rows}\n{}", ui.text());
@@ -333,29 +338,29 @@ fn diagnostics_are_beside_the_image_if_possible() {
 #[test]
 fn closed_diagnostics_stay_closed_until_new_ones() {
     let mut ui = TestUi::new();
-    ui.finish(RED);
+    ui.finish_render(RED);
     let fault = || vec![diagnostic(Severity::Error, "misspelled")];
-    ui.fail(fault());
+    ui.fail_render(fault());
     ui.key(ESCAPE);
     ui.press('v');
-    ui.fail(fault());
+    ui.fail_render(fault());
     assert!(!ui.state.overlays.diagnostics.open, "{}", ui.text());
-    ui.fail(vec![diagnostic(Severity::Error, "another one")]);
+    ui.fail_render(vec![diagnostic(Severity::Error, "another one")]);
     assert!(ui.state.overlays.diagnostics.open, "new errors should open the pane");
 }
 
 #[test]
 fn camera_steps_wait_while_the_scene_is_broken() {
     let mut ui = TestUi::new();
-    ui.finish(RED);
-    ui.fail(vec![diagnostic(Severity::Error, "misspelled")]);
+    ui.finish_render(RED);
+    ui.fail_render(vec![diagnostic(Severity::Error, "misspelled")]);
     let first = ui.press('h');
     assert!(request(&first).is_some());
-    ui.fail(vec![diagnostic(Severity::Error, "misspelled")]);
+    ui.fail_render(vec![diagnostic(Severity::Error, "misspelled")]);
     assert!(request(&ui.press('h')).is_none(), "the step should wait for the first step's preview");
     let generation = ui.state.request.generation;
-    let picture = plain_picture(50, 38, RED);
-    let effects = ui.event(Event::Picture {
+    let picture = uniform_picture(50, 38, RED);
+    let effects = ui.handle_event(Event::Picture {
         generation,
         picture,
         range: None,
@@ -369,7 +374,7 @@ fn camera_steps_wait_while_the_scene_is_broken() {
 #[test]
 fn number_of_displayed_errors_is_limited() {
     let mut ui = TestUi::with(state(120, 40));
-    ui.fail((0..20_000).map(|i| diagnostic(Severity::Error, &format!("wrong number {i}"))).collect());
+    ui.fail_render((0..20_000).map(|i| diagnostic(Severity::Error, &format!("wrong number {i}"))).collect());
     for _ in 0..100 {
         ui.key(KeyPress::special(KeyCode::PageDown));
     }
@@ -379,7 +384,7 @@ fn number_of_displayed_errors_is_limited() {
 #[test]
 fn diagnostics_scroll_with_every_key() {
     let mut ui = TestUi::new();
-    ui.fail((0..9).map(|i| diagnostic(Severity::Error, &format!("wrong number {i}"))).collect());
+    ui.fail_render((0..9).map(|i| diagnostic(Severity::Error, &format!("wrong number {i}"))).collect());
     let top = ui.text();
     ui.press('j');
     assert_ne!(ui.text(), top);
@@ -393,7 +398,7 @@ fn diagnostics_scroll_with_every_key() {
     }
     ui.key(ESCAPE);
     assert!(!ui.text().contains("wrong number"));
-    ui.screen();
+    ui.draw_screen();
     ui.key(ESCAPE);
     assert!(!ui.state.dirty, "nothing was open, so nothing should be redrawn");
 }
@@ -403,7 +408,7 @@ fn long_failure_is_wrapped_between_words() {
     let mut ui = TestUi::with(state(40, 12));
     let failure =
         Failure::Work("cannot write /a/rather/long/name/of/a/folder/image.png: no such folder".to_owned());
-    ui.worker(protocol::Event::Failed { generation: 1, failure });
+    ui.worker_event(protocol::Event::Failed { generation: 1, failure });
     assert!(ui.text().contains("such folder"), "{}", ui.text());
 }
 
@@ -412,11 +417,11 @@ fn resize_keeps_overlays_open() {
     let mut ui = TestUi::new();
     ui.press('?');
     for (columns, rows) in [(30, 8), (200, 60), (10, 2), (1, 1), (80, 24)] {
-        ui.event(Event::Resize(window(columns, rows)));
+        ui.handle_event(Event::Resize(window(columns, rows)));
         for _ in 0..5 {
             ui.press('j');
         }
-        ui.screen();
+        ui.draw_screen();
     }
     assert!(ui.text().contains(" keys "), "{}", ui.text());
 }

@@ -9,7 +9,7 @@ use crate::event::{Effect, Event, KeyPress, Mouse, MouseKind};
 use crate::fixtures::*;
 use crate::messages;
 use crate::pipeline::protocol::{
-    self, CameraEdit, Command, ImagePosition, KeptCamera, Picked, PickedObject, Section, Writing,
+    self, CameraEdit, Command, ImagePosition, Picked, PickedObject, SavedCamera, Section, Writing,
 };
 use crate::pipeline::settings::Overrides;
 use crate::preview_kind::PreviewKind;
@@ -19,12 +19,12 @@ use crate::terminals::{Brand, TerminalId};
 /// An 80×24 UI with an image in 55×21 cells at (0, 1).
 fn ui() -> TestUi {
     let mut ui = TestUi::new();
-    ui.finish(RED);
+    ui.finish_render(RED);
     ui
 }
 
 fn mouse(ui: &mut TestUi, kind: MouseKind, column: u16, row: u16) -> Vec<Effect> {
-    ui.event(Event::Mouse(Mouse { kind, column, row }))
+    ui.handle_event(Event::Mouse(Mouse { kind, column, row }))
 }
 
 fn click(ui: &mut TestUi, column: u16, row: u16) -> Vec<Effect> {
@@ -56,7 +56,7 @@ fn thing() -> PickedObject {
 
 fn answer(ui: &mut TestUi, thing: Option<PickedObject>) -> Vec<Effect> {
     let picked = Box::new(Picked { pixel: [1, 2], thing, color: Some([0.5; 3]) });
-    ui.worker(protocol::Event::Picked { generation: 0, picked })
+    ui.worker_event(protocol::Event::Picked { generation: 0, picked })
 }
 
 #[test]
@@ -80,7 +80,7 @@ fn wheel_zooms_and_scrolls_diagnostics() {
     let mut ui = ui();
     let effects = mouse(&mut ui, MouseKind::WheelUp, 20, 10);
     assert!(request(&effects).expect("a request").overrides.camera.pose.expect("a pose").distance() < 4.0);
-    ui.fail((0..9).map(|i| diagnostic(Severity::Error, &format!("wrong {i}"))).collect());
+    ui.fail_render((0..9).map(|i| diagnostic(Severity::Error, &format!("wrong {i}"))).collect());
     assert!(mouse(&mut ui, MouseKind::WheelDown, 20, 15).is_empty());
     assert!(ui.state.overlays.diagnostics.scroll > 0);
     mouse(&mut ui, MouseKind::WheelUp, 20, 15);
@@ -92,24 +92,24 @@ fn clicked_object_is_shown_and_can_be_edited() {
     let mut ui = ui();
     click(&mut ui, 12, 10);
     assert!(answer(&mut ui, Some(thing())).is_empty());
-    let text = ui.words();
+    let text = ui.screen_words();
     for words in
         ["sphere \"ball\"", "cornell.toml:47", "glass crystal", "distance 3.9", "position (0.2, 0.5, -0.3)"]
     {
         assert!(text.contains(words), "{words}: {text}");
     }
     // The mark is at the clicked cell.
-    assert_eq!(ui.screen()[(12, 10)].symbol(), "┼");
+    assert_eq!(ui.draw_screen()[(12, 10)].symbol(), "┼");
     let place = |effects: &[Effect]| match effects {
         [Effect::Edit(place)] => (place.path.to_string_lossy().into_owned(), place.line, place.column),
         other => panic!("{other:?}"),
     };
     assert_eq!(place(&ui.press('o')), ("scenes/cornell.toml".to_owned(), 47, 1));
-    ui.fail(vec![diagnostic(Severity::Error, "wrong")]);
+    ui.fail_render(vec![diagnostic(Severity::Error, "wrong")]);
     assert_eq!(place(&ui.press('o')), ("scenes/cornell.toml".to_owned(), 3, 1), "errors take precedence");
     let mut fresh = self::ui();
     assert_eq!(place(&fresh.press('o')).1, 1, "without errors, the scene file should be opened");
-    fresh.event(Event::NoEditor("no editor `x`".to_owned()));
+    fresh.handle_event(Event::NoEditor("no editor `x`".to_owned()));
     assert!(fresh.text().contains("no editor `x`"));
 }
 
@@ -142,8 +142,8 @@ fn click_after_f_sets_the_focus() {
 
 fn kept(ui: &mut TestUi, is_new: bool, is_own: bool) -> Vec<Effect> {
     let outcome =
-        Ok(KeptCamera { path: "scenes/cornell.toml".into(), is_new, is_own, of_model: false, edit: None });
-    ui.worker(protocol::Event::CameraKept { generation: 0, outcome })
+        Ok(SavedCamera { path: "scenes/cornell.toml".into(), is_new, is_own, of_model: false, edit: None });
+    ui.worker_event(protocol::Event::CameraKept { generation: 0, outcome })
 }
 
 #[test]
@@ -153,7 +153,7 @@ fn saved_camera_becomes_the_scene_camera() {
     ui.press('c');
     let effects = kept(&mut ui, true, true);
     let own = request(&effects).expect("a request");
-    assert_eq!((own.overrides.camera.is_any(), own.write), (false, Writing::Try));
+    assert_eq!((own.overrides.camera.has_changes(), own.write), (false, Writing::Try));
     let text = ui.text();
     assert!(
         text.contains(&messages::camera_saved("scenes/cornell.toml"))
@@ -161,21 +161,21 @@ fn saved_camera_becomes_the_scene_camera() {
         "{text}"
     );
     // The watcher also reports this save.
-    ui.event(Event::Changed(Changed { noticed: ui.now }));
+    ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
     assert!(ui.text().contains(&messages::camera_saved("scenes/cornell.toml")), "{}", ui.text());
-    ui.event(Event::Changed(Changed { noticed: ui.now }));
+    ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
     assert!(!ui.text().contains(&messages::camera_saved("scenes/cornell.toml")), "{}", ui.text());
 
     ui.press('l');
     ui.press('c');
     let outcome = Err("outdated".to_owned());
-    assert!(ui.worker(protocol::Event::CameraKept { generation: 0, outcome }).is_empty());
+    assert!(ui.worker_event(protocol::Event::CameraKept { generation: 0, outcome }).is_empty());
     let text = ui.text();
     assert!(text.contains("error: outdated") && text.contains("reset camera"), "{text}");
     // The watcher reports this save slightly later.
-    ui.event(Event::Changed(Changed { noticed: ui.now }));
+    ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
     assert!(ui.text().contains("error: outdated"), "{}", ui.text());
-    ui.event(Event::Changed(Changed { noticed: ui.now }));
+    ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
     assert!(!ui.text().contains("error: outdated"), "{}", ui.text());
 }
 
@@ -186,17 +186,17 @@ fn undo_can_be_repeated_until_nothing_is_left() {
     assert!(ui.text().contains(messages::NOTHING_TO_UNDO), "{}", ui.text());
     let edit = |after: &str| CameraEdit { path: "a.toml".into(), before: "".into(), after: after.into() };
     for after in ["one", "two"] {
-        let kept = KeptCamera {
+        let kept = SavedCamera {
             path: "a.toml".into(),
             is_new: true,
             is_own: true,
             of_model: false,
             edit: Some(edit(after)),
         };
-        ui.worker(protocol::Event::CameraKept { generation: 0, outcome: Ok(kept) });
+        ui.worker_event(protocol::Event::CameraKept { generation: 0, outcome: Ok(kept) });
     }
     let undone = |ui: &mut TestUi, outcome: Result<std::path::PathBuf, String>| {
-        ui.worker(protocol::Event::CameraUndone { generation: 0, outcome })
+        ui.worker_event(protocol::Event::CameraUndone { generation: 0, outcome })
     };
     let asks = |ui: &mut TestUi, after| matches!(&ui.press('u')[..], [Effect::Send(Command::UndoCamera(asked))] if *asked == edit(after));
     assert!(asks(&mut ui, "two"));
@@ -204,7 +204,7 @@ fn undo_can_be_repeated_until_nothing_is_left() {
     assert!(ui.text().contains("error: outdated"), "{}", ui.text());
     assert!(asks(&mut ui, "two"), "a failed undo can be retried");
     assert!(request(&undone(&mut ui, Ok("a.toml".into()))).is_some(), "the file is rendered");
-    assert!(ui.text().contains(&messages::undone("a.toml")), "{}", ui.text());
+    assert!(ui.text().contains(&messages::camera_undone("a.toml")), "{}", ui.text());
     assert!(asks(&mut ui, "one"));
     undone(&mut ui, Ok("a.toml".into()));
     assert!(ui.press('u').is_empty());
@@ -225,7 +225,9 @@ fn y_copies_if_the_terminal_supports_it() {
     let effects = ui.press('y');
     let words = "sphere \"ball\" · cornell.toml:47 · glass crystal · distance 3.9 · position (0.2, 0.5, -0.3) · \
                  radiance (0.5, 0.5, 0.5) · normal (0, 1, 0) · pixel 1, 2";
-    assert!(matches!(&effects[..], [Effect::Aside(bytes)] if *bytes == crate::window_title::copy(words)));
+    assert!(
+        matches!(&effects[..], [Effect::Aside(bytes)] if *bytes == crate::window_title::clipboard_bytes(words))
+    );
     // The clicked object can still be copied after other key presses.
     ui.press('s');
     assert!(matches!(ui.press('y')[..], [Effect::Aside(_)]));
@@ -236,7 +238,7 @@ fn command_line_camera_overrides_the_file() {
     let sets = vec!["camera.fov=30".to_owned()];
     let base = Overrides { sets, ..Overrides::default() };
     let mut ui = TestUi::with(state_with(80, 24, PreviewKind::HalfBlock, ColorDepth::TrueColor, base));
-    ui.finish(RED);
+    ui.finish_render(RED);
     assert!(matches!(ui.press('c')[..], [Effect::Send(Command::KeepCamera(_))]), "saved without moving it");
     ui.press('>');
     ui.press('c');
@@ -258,14 +260,14 @@ fn older_render_is_shown_until_the_next_render() {
     ui.press('n');
     assert!(ui.text().contains(messages::OLDEST_RENDER), "{}", ui.text());
     ui.press('s');
-    ui.finish(BLUE);
-    ui.wait(61_000);
+    ui.finish_render(BLUE);
+    ui.advance_clock(61_000);
     ui.press('n');
-    assert!(ui.text().contains(&format!("{}, 61 s ago", messages::render_of(1, 2))), "{}", ui.text());
+    assert!(ui.text().contains(&format!("{}, 61 s ago", messages::render_position(1, 2))), "{}", ui.text());
     let generation = ui.state.request.generation;
-    ui.event(Event::Picture {
+    ui.handle_event(Event::Picture {
         generation,
-        picture: plain_picture(50, 38, [10, 200, 10]),
+        picture: uniform_picture(50, 38, [10, 200, 10]),
         range: None,
         section: None,
         lacks_photons: false,
@@ -274,7 +276,7 @@ fn older_render_is_shown_until_the_next_render() {
     assert!(super::cells_of(&mut ui, RED) > 0, "the older render should stay visible");
     ui.press('N');
     assert!(
-        !ui.state.picture.history.is_open() && ui.text().contains(messages::NEWEST_RENDER),
+        !ui.state.picture.history.is_older_open() && ui.text().contains(messages::NEWEST_RENDER),
         "{}",
         ui.text()
     );
@@ -288,7 +290,7 @@ fn older_render_is_shown_until_the_next_render() {
 fn small_windows_show_all_inspected_values() {
     for (columns, rows) in [(40, 12), (30, 8), (80, 5)] {
         let mut ui = TestUi::with(state(columns, rows));
-        ui.finish(RED);
+        ui.finish_render(RED);
         ui.key(crate::event::KeyPress::special(crossterm::event::KeyCode::Enter));
         answer(&mut ui, Some(thing()));
         let text = ui.text().replace('\n', " ");
@@ -309,7 +311,7 @@ fn small_windows_show_all_inspected_values() {
 fn small_windows_show_how_to_copy() {
     for (columns, rows) in [(80, 24), (30, 8), (20, 6), (40, 12)] {
         let mut ui = TestUi::with(state(columns, rows));
-        ui.finish(RED);
+        ui.finish_render(RED);
         ui.key(crate::event::KeyPress::special(crossterm::event::KeyCode::Enter));
         answer(&mut ui, Some(thing()));
         ui.press('y');
@@ -331,17 +333,17 @@ fn drag_after_z_selects_the_first_region() {
     assert!(ui.text().contains(messages::DRAG_REGION), "{}", ui.text());
     mouse(&mut ui, MouseKind::Press, 10, 5);
     assert!(mouse(&mut ui, MouseKind::Drag, 30, 12).is_empty(), "the camera should not move");
-    assert_eq!(ui.screen()[(10, 5)].symbol(), "┌");
-    assert_eq!(ui.screen()[(30, 12)].symbol(), "┘");
+    assert_eq!(ui.draw_screen()[(10, 5)].symbol(), "┌");
+    assert_eq!(ui.draw_screen()[(30, 12)].symbol(), "┘");
     let effects = mouse(&mut ui, MouseKind::Release, 30, 12);
     let marked = request(&effects).expect("a request");
     let section = marked.first.expect("a region");
     assert!((section.left - 10.5 / 55.0).abs() < 1e-9 && (section.width - 20.0 / 55.0).abs() < 1e-9);
-    assert!(!marked.overrides.camera.is_any());
+    assert!(!marked.overrides.camera.has_changes());
     // The region applies to all renders until `z` is pressed again.
     assert_eq!(request(&ui.press('s')).expect("a request").first, Some(section));
     assert_eq!(request(&ui.press('z')).expect("a request").first, None);
-    ui.finish(BLUE);
+    ui.finish_render(BLUE);
     ui.press('z');
     mouse(&mut ui, MouseKind::Press, 30, 12);
     assert!(mouse(&mut ui, MouseKind::Release, 30, 12).is_empty(), "no render is running");
@@ -359,8 +361,8 @@ fn clicks_in_a_close_up_select_the_right_pixel() {
     // 20 × 10 image pixels, fewer than would fit.
     let section = Some(Section { left: 0.2, top: 0.4, width: 0.1, height: 0.2 });
     let generation = ui.state.request.generation;
-    let picture = plain_picture(20, 10, BLUE);
-    ui.event(Event::Picture {
+    let picture = uniform_picture(20, 10, BLUE);
+    ui.handle_event(Event::Picture {
         generation,
         picture,
         range: None,
@@ -379,19 +381,19 @@ fn clicks_in_a_close_up_select_the_right_pixel() {
 #[test]
 fn header_marks_an_older_render() {
     let mut ui = ui();
-    ui.event(Event::Changed(Changed { noticed: ui.now }));
-    ui.finish(BLUE);
+    ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
+    ui.finish_render(BLUE);
     ui.press('b');
     let first = |ui: &mut TestUi| ui.text().lines().next().map(str::to_owned).unwrap_or_default();
-    assert!(first(&mut ui).contains("◂ older") && first(&mut ui).contains(&messages::render_of(1, 2)));
+    assert!(first(&mut ui).contains("◂ older") && first(&mut ui).contains(&messages::render_position(1, 2)));
     // A key that has no effect clears the message.
     ui.press('y');
     let text = ui.text();
     assert!(text.contains("b newest") && text.contains("N newer"), "expected the keys: {text}");
     assert!(!text.contains("samples") && !text.contains("render  "), "expected no newest values: {text}");
-    ui.event(Event::Resize(window(30, 8)));
+    ui.handle_event(Event::Resize(window(30, 8)));
     assert!(first(&mut ui).contains("1 of 2"), "{}", ui.text());
-    ui.event(Event::Resize(window(80, 24)));
+    ui.handle_event(Event::Resize(window(80, 24)));
     ui.press('b');
     assert!(first(&mut ui).contains("✓ done") && ui.text().contains("samples"), "{}", ui.text());
 }
@@ -400,19 +402,19 @@ fn header_marks_an_older_render() {
 fn before_and_after_differ_for_a_saved_camera() {
     let mut ui = ui();
     ui.press('l');
-    ui.finish(BLUE);
+    ui.finish_render(BLUE);
     ui.press('c');
     kept(&mut ui, true, true);
-    ui.event(Event::Changed(Changed { noticed: ui.now }));
-    ui.finish(BLUE);
+    ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
+    ui.finish_render(BLUE);
     ui.press('b');
     assert!(super::cells_of(&mut ui, RED) > 0, "expected the previous camera: {}", ui.text());
 }
 
 #[test]
-fn escape_cancels_gestures_values_and_history() {
+fn escape_closes_gestures_values_and_history() {
     let mut ui = ui();
-    let escape = |ui: &mut TestUi| ui.event(Event::Key(KeyPress::special(KeyCode::Esc)));
+    let escape = |ui: &mut TestUi| ui.handle_event(Event::Key(KeyPress::special(KeyCode::Esc)));
     for (key, waits) in [('z', messages::DRAG_REGION), ('f', messages::CLICK_TO_FOCUS)] {
         ui.press(key);
         assert!(ui.text().contains(waits), "{}", ui.text());
@@ -423,13 +425,13 @@ fn escape_cancels_gestures_values_and_history() {
     ui.state.selection.facts = Some(vec!["sphere".to_owned()]);
     escape(&mut ui);
     assert_eq!(ui.state.selection.facts, None);
-    ui.event(Event::Changed(Changed { noticed: ui.now }));
-    ui.finish(BLUE);
+    ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
+    ui.finish_render(BLUE);
     ui.press('b');
-    assert!(ui.state.picture.history.is_open());
+    assert!(ui.state.picture.history.is_older_open());
     escape(&mut ui);
     assert!(
-        !ui.state.picture.history.is_open() && ui.text().contains(messages::NEWEST_RENDER),
+        !ui.state.picture.history.is_older_open() && ui.text().contains(messages::NEWEST_RENDER),
         "{}",
         ui.text()
     );
@@ -453,7 +455,7 @@ fn cancelled_region_drag_has_no_effect() {
 #[test]
 fn digit_without_the_view_list_shows_a_hint() {
     let mut ui = TestUi::new();
-    ui.finish(RED);
+    ui.finish_render(RED);
     ui.press('3');
     assert!(ui.text().contains(messages::VIEWS_FIRST), "{}", ui.text());
 }
@@ -470,21 +472,21 @@ fn f_needs_an_aperture() {
 #[test]
 fn exposure_changes_add_no_history_entry() {
     let mut ui = ui();
-    ui.event(Event::Changed(Changed { noticed: ui.now }));
-    ui.finish(BLUE);
+    ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
+    ui.finish_render(BLUE);
     for color in [[1, 2, 3], [4, 5, 6], [7, 8, 9]] {
         ui.press(']');
-        ui.finish(color);
+        ui.finish_render(color);
     }
     assert_eq!(ui.state.work.renders, 2, "exposure changes should not be counted");
     ui.press('n');
-    assert!(ui.text().contains(&messages::render_of(1, 2)), "{}", ui.text());
+    assert!(ui.text().contains(&messages::render_position(1, 2)), "{}", ui.text());
     ui.press('N');
     // Toggling a setting adds an entry.
     ui.press('s');
-    ui.finish(BLUE);
+    ui.finish_render(BLUE);
     ui.press('n');
-    assert!(ui.text().contains(&messages::render_of(2, 3)), "{}", ui.text());
+    assert!(ui.text().contains(&messages::render_position(2, 3)), "{}", ui.text());
 }
 
 #[test]
@@ -492,14 +494,14 @@ fn older_render_is_shown_with_its_changes() {
     use crate::pipeline::protocol;
     let mut ui = TestUi::with(state(120, 40));
     for (color, text) in [(RED, "r = 1\nfov = 40"), (BLUE, "r = 2\nfov = 40"), (RED, "r = 2\nfov = 30")] {
-        ui.event(Event::Changed(Changed { noticed: ui.now }));
+        ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
         let generation = ui.state.request.generation;
-        ui.worker(protocol::Event::Text { generation, text: text.into() });
-        ui.finish(color);
+        ui.worker_event(protocol::Event::Text { generation, text: text.into() });
+        ui.finish_render(color);
     }
     ui.press('n');
     assert!(
-        ui.text().contains(&format!("{}, 0 s ago", messages::render_of(2, 3)))
+        ui.text().contains(&format!("{}, 0 s ago", messages::render_position(2, 3)))
             && ui.text().contains(&format!("\nr 1 → 2 · {}", messages::HISTORY_KEYS.join(" · "))),
         "{}",
         ui.text()

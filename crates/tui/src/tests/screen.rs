@@ -21,9 +21,9 @@ use crate::scene::diagnostic::Severity;
 #[test]
 fn preview_uses_half_blocks_in_the_middle() {
     let mut ui = TestUi::new();
-    ui.finish(RED);
-    let screen = ui.screen();
-    // 56 × 21 cells would be the largest size for an aspect ratio of 50:38 in 21 rows, but one column is left
+    ui.finish_render(RED);
+    let screen = ui.draw_screen();
+    // In 21 rows, an image with an aspect ratio of 50:38 could be 56 columns wide, but one column is left
     // blank. The area starts in row 1.
     let cell = &screen[(25, 10)];
     assert_eq!((cell.symbol(), cell.fg, cell.bg), ("▀", Color::Rgb(200, 20, 10), Color::Rgb(200, 20, 10)));
@@ -35,13 +35,13 @@ fn preview_uses_half_blocks_in_the_middle() {
 fn half_blocks_show_two_pixels() {
     let mut ui = TestUi::new();
     let generation = ui.state.request.generation;
-    let mut picture = (*plain_picture(56, 42, RED)).clone();
+    let mut picture = (*uniform_picture(56, 42, RED)).clone();
     for (i, pixel) in picture.pixels.iter_mut().enumerate() {
         if (i / 56) % 2 == 1 {
             *pixel = BLUE;
         }
     }
-    ui.event(Event::Picture {
+    ui.handle_event(Event::Picture {
         generation,
         picture: picture.into(),
         range: None,
@@ -49,7 +49,7 @@ fn half_blocks_show_two_pixels() {
         lacks_photons: false,
         source: None,
     });
-    let screen = ui.screen();
+    let screen = ui.draw_screen();
     for place in [(0, 1), (55, 21), (17, 9)] {
         assert_eq!((screen[place].fg, screen[place].bg), (Color::Rgb(200, 20, 10), Color::Rgb(10, 20, 200)));
     }
@@ -59,9 +59,9 @@ fn half_blocks_show_two_pixels() {
 fn preview_without_colors_is_a_character_ramp() {
     let state = state_with(80, 24, PreviewKind::Ascii, ColorDepth::None, Overrides::default());
     let mut ui = TestUi::with(state);
-    ui.finish([255; 3]);
-    ui.fail(vec![diagnostic(Severity::Error, "unknown key `heigth`")]);
-    let screen = ui.screen();
+    ui.finish_render([255; 3]);
+    ui.fail_render(vec![diagnostic(Severity::Error, "unknown key `heigth`")]);
+    let screen = ui.draw_screen();
     assert_eq!(screen[(25, 5)].symbol(), "@");
     assert!(screen.content.iter().all(|cell| cell.fg == Color::Reset && cell.bg == Color::Reset));
 }
@@ -78,9 +78,9 @@ fn value_range_is_shown_with_the_view() {
         (None, "view depth  "),
     ] {
         let generation = ui.state.request.generation;
-        ui.event(Event::Picture {
+        ui.handle_event(Event::Picture {
             generation,
-            picture: plain_picture(51, 40, RED),
+            picture: uniform_picture(51, 40, RED),
             range,
             section: None,
             lacks_photons: false,
@@ -93,9 +93,9 @@ fn value_range_is_shown_with_the_view() {
 #[test]
 fn image_with_the_wrong_size_is_not_shown() {
     let mut ui = TestUi::new();
-    let mut picture = (*plain_picture(4, 4, RED)).clone();
+    let mut picture = (*uniform_picture(4, 4, RED)).clone();
     picture.pixels.truncate(3);
-    ui.event(Event::Picture {
+    ui.handle_event(Event::Picture {
         generation: 1,
         picture: picture.into(),
         range: None,
@@ -110,12 +110,12 @@ fn image_with_the_wrong_size_is_not_shown() {
 fn table_shows_the_status_of_each_stage() {
     let mut ui = TestUi::new();
     for report in [
-        stage(Stage::Parse, Status::Done, 0.0004, ""),
-        stage(Stage::Meshes, Status::Reused, 0.0, ""),
-        stage(Stage::Photons, Status::Skipped, 0.0, "off"),
-        stage(Stage::Render, Status::Running, 0.0, ""),
+        stage_report(Stage::Parse, Status::Done, 0.0004, ""),
+        stage_report(Stage::Meshes, Status::Reused, 0.0, ""),
+        stage_report(Stage::Photons, Status::Skipped, 0.0, "off"),
+        stage_report(Stage::Render, Status::Running, 0.0, ""),
     ] {
-        ui.worker(protocol::Event::Stage { generation: 1, stage: report });
+        ui.worker_event(protocol::Event::Stage { generation: 1, stage: report });
     }
     let text = ui.text();
     for line in ["✓ parse    0.40 ms", "= meshes    reused", "· accel", "- photons  skipped", "> render"] {
@@ -126,15 +126,15 @@ fn table_shows_the_status_of_each_stage() {
 #[test]
 fn asset_bar_stays_briefly_when_full() {
     let mut ui = TestUi::new();
-    let asset = |done| protocol::Event::Asset { generation: 1, progress: asset("bricks", done, 8) };
-    ui.worker(asset(3));
+    let asset = |done| protocol::Event::Asset { generation: 1, progress: asset_progress("bricks", done, 8) };
+    ui.worker_event(asset(3));
     let text = ui.text();
     assert!(text.contains("bricks") && text.contains("━━━─────  37 %"), "{text}");
-    ui.worker(asset(8));
-    ui.wait(100);
+    ui.worker_event(asset(8));
+    ui.advance_clock(100);
     assert!(ui.text().contains("━━━━━━━━ 100 %"));
     assert_eq!(ui.text().matches("bricks").count(), 1);
-    ui.wait(400);
+    ui.advance_clock(400);
     assert!(ui.state.dirty);
     assert!(!ui.text().contains("bricks"));
 }
@@ -142,18 +142,19 @@ fn asset_bar_stays_briefly_when_full() {
 #[test]
 fn asset_bar_disappears_with_its_stage() {
     let mut ui = TestUi::new();
-    let of = |name, status| protocol::Event::Stage { generation: 1, stage: stage(name, status, 0.1, "") };
+    let of =
+        |name, status| protocol::Event::Stage { generation: 1, stage: stage_report(name, status, 0.1, "") };
     let row = |ui: &mut TestUi, words: &str| ui.text().lines().position(|line| line.contains(words));
-    ui.worker(of(Stage::Photons, Status::Running));
+    ui.worker_event(of(Stage::Photons, Status::Running));
     let hint = row(&mut ui, "save cornell.toml");
     assert!(hint.is_some(), "{}", ui.text());
-    ui.worker(protocol::Event::Asset { generation: 1, progress: asset("photons", 2, 2) });
+    ui.worker_event(protocol::Event::Asset { generation: 1, progress: asset_progress("photons", 2, 2) });
     assert!(ui.text().contains("━━━━━━━━ 100 %") && row(&mut ui, "save cornell.toml") == hint);
-    ui.worker(of(Stage::Photons, Status::Done));
+    ui.worker_event(of(Stage::Photons, Status::Done));
     assert!(!ui.text().contains("100 %") && row(&mut ui, "save cornell.toml") == hint, "{}", ui.text());
     // Bars disappear when the render ends.
-    ui.worker(protocol::Event::Asset { generation: 1, progress: asset("knot.obj", 2, 2) });
-    ui.worker(done(1, Vec::new(), false));
+    ui.worker_event(protocol::Event::Asset { generation: 1, progress: asset_progress("knot.obj", 2, 2) });
+    ui.worker_event(done_event(1, Vec::new(), false));
     assert!(!ui.text().contains("knot.obj"), "{}", ui.text());
     assert_eq!(ui.state.next_tick(), None);
 }
@@ -162,32 +163,32 @@ fn asset_bar_disappears_with_its_stage() {
 fn eta_is_shown_only_if_plausible() {
     let mut ui = TestUi::new();
     let mut eta = |progress: RenderProgress| {
-        ui.worker(protocol::Event::Progress { generation: 1, progress });
+        ui.worker_event(protocol::Event::Progress { generation: 1, progress });
         ui.text().lines().next().and_then(|row| Some(row.split_once("ETA ")?.1.trim().to_owned()))
     };
-    assert_eq!(eta(progress(0.004, Some(16_686_900.0))).as_deref(), Some("…"));
+    assert_eq!(eta(render_progress(0.004, Some(16_686_900.0))).as_deref(), Some("…"));
     assert_eq!(
-        eta(RenderProgress { elapsed_seconds: 0.3, ..progress(0.4, Some(2e9)) }).as_deref(),
+        eta(RenderProgress { elapsed_seconds: 0.3, ..render_progress(0.4, Some(2e9)) }).as_deref(),
         Some("…")
     );
-    assert_eq!(eta(progress(0.02, Some(16_686_900.0))).as_deref(), Some("over a day"));
-    assert_eq!(eta(progress(0.02, Some(7200.0))).as_deref(), Some("2 h 00 min"));
+    assert_eq!(eta(render_progress(0.02, Some(16_686_900.0))).as_deref(), Some("over a day"));
+    assert_eq!(eta(render_progress(0.02, Some(7200.0))).as_deref(), Some("2 h 00 min"));
 }
 
 #[test]
 fn render_bar_shows_percent_samples_and_eta() {
     let mut ui = TestUi::new();
     ui.now += Duration::from_millis(1200);
-    ui.worker(protocol::Event::Progress { generation: 1, progress: progress(0.25, None) });
+    ui.worker_event(protocol::Event::Progress { generation: 1, progress: render_progress(0.25, None) });
     assert!(
         ui.text().contains("25 %  ETA …") && ui.text().contains("16/64 samples · 1.2 s"),
         "{}",
         ui.text()
     );
-    ui.worker(protocol::Event::Progress { generation: 1, progress: progress(0.5, Some(125.0)) });
+    ui.worker_event(protocol::Event::Progress { generation: 1, progress: render_progress(0.5, Some(125.0)) });
     assert!(ui.text().contains("50 %  ETA 2 min 05 s"), "{}", ui.text());
-    ui.worker(protocol::Event::Progress { generation: 1, progress: progress(1.0, Some(0.0)) });
-    ui.worker(done(1, Vec::new(), false));
+    ui.worker_event(protocol::Event::Progress { generation: 1, progress: render_progress(1.0, Some(0.0)) });
+    ui.worker_event(done_event(1, Vec::new(), false));
     let text = ui.text();
     assert!(text.contains("1.93 s · render 1\n") && !text.contains(['━', '─']), "{text}");
 }
@@ -195,8 +196,8 @@ fn render_bar_shows_percent_samples_and_eta() {
 #[test]
 fn written_file_is_shown_with_its_size() {
     let mut ui = TestUi::new();
-    ui.finish(RED);
-    ui.worker(protocol::Event::Written {
+    ui.finish_render(RED);
+    ui.worker_event(protocol::Event::Written {
         generation: 1,
         path: "out/cornell.png".into(),
         bytes: 210_400,
@@ -212,25 +213,25 @@ fn written_file_is_shown_with_its_size() {
 #[test]
 fn write_is_confirmed_after_all_files() {
     let mut ui = TestUi::new();
-    ui.finish(RED);
+    ui.finish_render(RED);
     let written =
         |path: &str| protocol::Event::Written { generation: 1, path: path.into(), bytes: 1, is_own: true };
     let done = || protocol::Event::WriteDone { generation: 1, paths: vec!["a.png".into(), "b.ppm".into()] };
     ui.press('w');
-    ui.worker(written("a.png"));
+    ui.worker_event(written("a.png"));
     // The key is pressed again before the first write has written its second file.
     ui.press('w');
-    ui.worker(written("b.ppm"));
+    ui.worker_event(written("b.ppm"));
     assert!(!ui.text().contains("wrote"), "{}", ui.text());
     for _ in 0..2 {
-        ui.worker(done());
-        assert!(ui.text().contains(&messages::wrote("a.png, b.ppm")), "{}", ui.text());
+        ui.worker_event(done());
+        assert!(ui.text().contains(&messages::files_written("a.png, b.ppm")), "{}", ui.text());
     }
     // An intervening request does not prevent the confirmation.
     ui.press('w');
     ui.press('r');
-    ui.worker(done());
-    assert!(ui.text().contains(&messages::wrote("a.png, b.ppm")), "{}", ui.text());
+    ui.worker_event(done());
+    assert!(ui.text().contains(&messages::files_written("a.png, b.ppm")), "{}", ui.text());
 }
 
 #[test]
@@ -244,20 +245,20 @@ fn stage_reasons_are_wrapped_between_words() {
         why: why.to_owned(),
     };
     let (short, long) = ("not in the scene", "not needed in this scene");
-    ui.worker(protocol::Event::Stage { generation: 1, stage: stage("unneeded") });
-    ui.event(Event::Resize(window(100, 24)));
+    ui.worker_event(protocol::Event::Stage { generation: 1, stage: stage("unneeded") });
+    ui.handle_event(Event::Resize(window(100, 24)));
     assert!(ui.text().contains("skipped  unneeded"), "{}", ui.text());
-    ui.event(Event::Resize(window(80, 24)));
-    ui.worker(protocol::Event::Stage { generation: 1, stage: stage(short) });
+    ui.handle_event(Event::Resize(window(80, 24)));
+    ui.worker_event(protocol::Event::Stage { generation: 1, stage: stage(short) });
     assert!(ui.text().contains(&format!("  {short}")), "{}", ui.text());
-    ui.worker(protocol::Event::Stage { generation: 1, stage: stage(long) });
+    ui.worker_event(protocol::Event::Stage { generation: 1, stage: stage(long) });
     let text = ui.text();
     assert!(text.contains(&format!("  {}", &long[..18])) && text.contains("  scene"), "{text}");
     // Below the image, each stage takes a single row.
-    ui.event(Event::Resize(window(80, 37)));
+    ui.handle_event(Event::Resize(window(80, 37)));
     assert!(!ui.text().contains(long) && ui.text().contains("skipped"), "{}", ui.text());
-    ui.worker(protocol::Event::Stage { generation: 1, stage: stage(short) });
-    ui.event(Event::Resize(window(200, 60)));
+    ui.worker_event(protocol::Event::Stage { generation: 1, stage: stage(short) });
+    ui.handle_event(Event::Resize(window(200, 60)));
     assert!(ui.text().contains(short), "{}", ui.text());
 }
 
@@ -271,50 +272,50 @@ fn failed_stage_is_not_shown_as_running() {
         processor_seconds: 0.0,
         why: String::new(),
     };
-    ui.worker(protocol::Event::Stage { generation: 1, stage });
+    ui.worker_event(protocol::Event::Stage { generation: 1, stage });
     assert!(ui.text().contains("> parse"));
     let failure = Failure::Scene(vec![diagnostic(Severity::Error, "wrong")]);
-    ui.worker(protocol::Event::Failed { generation: 1, failure });
+    ui.worker_event(protocol::Event::Failed { generation: 1, failure });
     assert!(!ui.text().contains("parse"), "stages of a broken scene should be hidden: {}", ui.text());
 }
 
 #[test]
 fn only_renders_with_changes_are_counted() {
     let mut ui = TestUi::new();
-    ui.finish(RED);
+    ui.finish_render(RED);
     assert!(ui.text().contains("· render 1"), "{}", ui.text());
     ui.press('0');
-    ui.event(Event::Changed(Changed { noticed: ui.now }));
-    ui.worker(done(2, Vec::new(), true));
+    ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
+    ui.worker_event(done_event(2, Vec::new(), true));
     assert!(ui.text().contains("unchanged · render 1"), "{}", ui.text());
     ui.press('r');
-    ui.worker(done(3, Vec::new(), false));
+    ui.worker_event(done_event(3, Vec::new(), false));
     assert!(ui.text().contains("· render 2"), "{}", ui.text());
 }
 
 #[test]
 fn deleted_file_is_reported_as_missing() {
     let mut ui = TestUi::with(state(120, 30));
-    ui.finish(RED);
+    ui.finish_render(RED);
     let absent = *crate::scene::text_now("no-such-folder/cornell.toml".as_ref()).expect_err("an error");
-    ui.event(Event::Changed(Changed { noticed: ui.now }));
-    ui.fail(vec![absent]);
-    ui.event(Event::Settled);
+    ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
+    ui.fail_render(vec![absent]);
+    ui.handle_event(Event::Settled);
     let text = ui.text();
     assert!(text.starts_with(" ✗ missing "), "{text}");
     assert!(!text.contains("broken") && text.contains(messages::LAST_GOOD_RENDER), "{text}");
-    ui.fail(vec![diagnostic(Severity::Error, "unknown key")]);
+    ui.fail_render(vec![diagnostic(Severity::Error, "unknown key")]);
     assert!(ui.text().starts_with(" ✗ broken "), "{}", ui.text());
 }
 
 #[test]
 fn broken_file_keeps_the_image() {
     let mut ui = TestUi::new();
-    ui.finish(RED);
+    ui.finish_render(RED);
     let before = cells_of(&mut ui, RED);
-    ui.event(Event::Changed(Changed { noticed: ui.now }));
-    ui.fail(vec![diagnostic(Severity::Error, "unknown `heigth`")]);
-    ui.event(Event::Settled);
+    ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
+    ui.fail_render(vec![diagnostic(Severity::Error, "unknown `heigth`")]);
+    ui.handle_event(Event::Settled);
     let text = ui.text();
     for words in [
         "error: unknown `heigth`",
@@ -330,9 +331,9 @@ fn broken_file_keeps_the_image() {
     let after = cells_of(&mut ui, RED);
     assert!(after >= before / 2, "{after} of {before} cells");
 
-    ui.event(Event::Changed(Changed { noticed: ui.now }));
+    ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
     assert!(ui.text().contains("heigth"), "the pane should stay open until the file is read");
-    ui.finish(BLUE);
+    ui.finish_render(BLUE);
     assert!(!ui.text().contains("heigth"));
     assert_eq!((cells_of(&mut ui, BLUE), cells_of(&mut ui, RED)), (before, 0));
 }
@@ -340,7 +341,7 @@ fn broken_file_keeps_the_image() {
 #[test]
 fn long_diagnostics_scroll_to_their_ends() {
     let mut ui = TestUi::new();
-    ui.fail((0..9).map(|i| diagnostic(Severity::Error, &format!("wrong number {i}"))).collect());
+    ui.fail_render((0..9).map(|i| diagnostic(Severity::Error, &format!("wrong number {i}"))).collect());
     assert!(ui.text().contains("wrong number 0") && !ui.text().contains("wrong number 8"));
     assert!(ui.text().contains("9 errors"));
     let down = KeyPress::special(crossterm::event::KeyCode::PageDown);
@@ -350,7 +351,7 @@ fn long_diagnostics_scroll_to_their_ends() {
     }
     let text = ui.text();
     assert!(text.contains("wrong number 8") && !text.contains("wrong number 0"), "{text}");
-    ui.screen();
+    ui.draw_screen();
     ui.key(down);
     assert!(!ui.state.dirty, "at the end");
     for _ in 0..100 {
@@ -363,7 +364,7 @@ fn long_diagnostics_scroll_to_their_ends() {
 fn render_failure_is_shown_in_the_pane() {
     let mut ui = TestUi::new();
     let failure = Failure::Work("unwritable".to_owned());
-    ui.worker(protocol::Event::Failed { generation: 1, failure });
+    ui.worker_event(protocol::Event::Failed { generation: 1, failure });
     assert!(ui.text().contains("error: unwritable"), "{}", ui.text());
 }
 
@@ -372,20 +373,20 @@ fn conflict_opens_the_pane_once() {
     let mut ui = TestUi::new();
     let conflict = || vec![diagnostic(Severity::Error, "readonly a.png")];
     let refused = || protocol::Event::Refused { generation: 1, conflicts: conflict() };
-    ui.worker(refused());
+    ui.worker_event(refused());
     assert!(ui.text().contains("error: readonly") && ui.text().contains("1 error"), "{}", ui.text());
     assert!(ui.state.saving.unwritten.is_some() && ui.text().contains(messages::NOT_WRITTEN));
     assert!(ui.state.work.is_running(), "the render should continue");
     ui.key(KeyPress::special(crossterm::event::KeyCode::Esc));
     assert!(!ui.text().contains("readonly a.png"));
-    ui.worker(refused());
+    ui.worker_event(refused());
     assert!(!ui.text().contains("readonly a.png"), "the user closed the pane");
     let warning = diagnostic(Severity::Warning, "texture `b` is not used");
-    ui.worker(done(1, [conflict(), vec![warning]].concat(), false));
+    ui.worker_event(done_event(1, [conflict(), vec![warning]].concat(), false));
     assert!(ui.text().contains("e 1 error, 1 warning"), "{}", ui.text());
     ui.press('e');
     assert!(ui.text().contains("readonly a.png"));
-    ui.worker(done(1, Vec::new(), false));
+    ui.worker_event(done_event(1, Vec::new(), false));
     assert!(!ui.text().contains("error"), "{}", ui.text());
 }
 
@@ -394,9 +395,12 @@ fn escape_sequences_in_names_are_harmless() {
     let evil = "a\u{1b}]52;c;eA==\u{7}\u{9b}31m\u{202e}b\rc";
     let mut ui = TestUi::new();
     ui.state.request.scene = evil.into();
-    ui.worker(protocol::Event::Asset { generation: 1, progress: asset(evil, 1, 2) });
-    ui.worker(protocol::Event::Stage { generation: 1, stage: stage(Stage::Parse, Status::Done, 0.1, evil) });
-    ui.worker(protocol::Event::Written { generation: 1, path: evil.into(), bytes: 1, is_own: true });
+    ui.worker_event(protocol::Event::Asset { generation: 1, progress: asset_progress(evil, 1, 2) });
+    ui.worker_event(protocol::Event::Stage {
+        generation: 1,
+        stage: stage_report(Stage::Parse, Status::Done, 0.1, evil),
+    });
+    ui.worker_event(protocol::Event::Written { generation: 1, path: evil.into(), bytes: 1, is_own: true });
     let harmless = |text: &str| {
         assert!(text.contains('␛'), "{text}");
         assert!(text.chars().all(|c| c == '\n' || !(c.is_control() || c == '\u{202e}')), "{text:?}");
@@ -405,9 +409,9 @@ fn escape_sequences_in_names_are_harmless() {
     let mut broken = diagnostic(Severity::Error, evil);
     broken.path = evil.into();
     broken.help = Some(evil.to_owned());
-    ui.fail(vec![broken]);
+    ui.fail_render(vec![broken]);
     harmless(&ui.text());
-    ui.worker(protocol::Event::Failed { generation: 1, failure: Failure::Work(evil.to_owned()) });
+    ui.worker_event(protocol::Event::Failed { generation: 1, failure: Failure::Work(evil.to_owned()) });
     harmless(&ui.text());
 }
 
@@ -440,25 +444,25 @@ proptest! {
         for step in script {
             let generation = ui.state.request.generation;
             match step {
-                0 => ui.fail(vec![diagnostic(Severity::Error, "a rather long message that has to be wrapped"); 3]),
-                1 => ui.finish(RED),
-                2 => { ui.worker(protocol::Event::Asset { generation, progress: asset("long name of a texture", 1, 2) }); }
-                3 => { ui.worker(protocol::Event::Progress { generation, progress: progress(0.3, Some(9.0)) }); }
+                0 => ui.fail_render(vec![diagnostic(Severity::Error, "a rather long message that has to be wrapped"); 3]),
+                1 => ui.finish_render(RED),
+                2 => { ui.worker_event(protocol::Event::Asset { generation, progress: asset_progress("long name of a texture", 1, 2) }); }
+                3 => { ui.worker_event(protocol::Event::Progress { generation, progress: render_progress(0.3, Some(9.0)) }); }
                 4 => {
-                    let picture = plain_picture(picture.0, picture.1, BLUE);
-                    ui.event(Event::Picture { generation, picture, range: None, section: None, lacks_photons: false, source: None });
+                    let picture = uniform_picture(picture.0, picture.1, BLUE);
+                    ui.handle_event(Event::Picture { generation, picture, range: None, section: None, lacks_photons: false, source: None });
                 }
-                5 => { ui.event(Event::Resize(window(rows, columns.min(80)))); }
-                6 => { ui.wait(300); }
+                5 => { ui.handle_event(Event::Resize(window(rows, columns.min(80)))); }
+                6 => { ui.advance_clock(300); }
                 _ => {
                     if let Some(key) = keys.next() {
                         ui.key(KEYMAP[*key].keys[0]);
                     }
                 }
             }
-            ui.screen();
+            ui.draw_screen();
         }
-        ui.screen();
+        ui.draw_screen();
     }
 }
 
@@ -466,12 +470,12 @@ proptest! {
 fn unwritten_image_is_not_shown_as_done() {
     let mut ui = TestUi::new();
     let generation = ui.state.request.generation;
-    ui.worker(protocol::Event::WriteFailed {
+    ui.worker_event(protocol::Event::WriteFailed {
         generation,
         path: None,
         message: "a.png: disk full".to_owned(),
     });
-    ui.worker(done(generation, Vec::new(), false));
+    ui.worker_event(done_event(generation, Vec::new(), false));
     let first = |ui: &mut TestUi| ui.text().lines().next().map(str::to_owned).unwrap_or_default();
     assert!(first(&mut ui).contains("! unwritten") && !ui.text().contains("✓ done"), "{}", ui.text());
     ui.press('y');
@@ -481,7 +485,7 @@ fn unwritten_image_is_not_shown_as_done() {
     assert!(ui.text().contains("─ 1 error ─") && ui.text().contains("error: a.png"));
     ui.press('e');
     assert!(!ui.text().contains("disk full"), "{}", ui.text());
-    ui.worker(protocol::Event::Written { generation, path: "a.png".into(), bytes: 1, is_own: true });
+    ui.worker_event(protocol::Event::Written { generation, path: "a.png".into(), bytes: 1, is_own: true });
     assert!(first(&mut ui).contains("✓ done"), "{}", ui.text());
 }
 
@@ -507,19 +511,19 @@ fn files_of_other_images_are_not_listed() {
             path: Some("a.png".into()),
             message: message.to_owned(),
         };
-        ui.worker(written(1));
-        ui.finish(super::RED);
+        ui.worker_event(written(1));
+        ui.finish_render(super::RED);
         assert!(text_below_header(&mut ui).contains("→ a.png"), "{}", ui.text());
         // The next image could not be written, so the file still contains the previous one.
-        ui.event(Event::Changed(crate::Changed { noticed: ui.now }));
-        ui.worker(protocol::Event::Started { generation: 2 });
-        ui.worker(failed(2, "a.png: denied"));
-        ui.worker(done(2, Vec::new(), false));
+        ui.handle_event(Event::Changed(crate::Changed { noticed: ui.now }));
+        ui.worker_event(protocol::Event::Started { generation: 2 });
+        ui.worker_event(failed(2, "a.png: denied"));
+        ui.worker_event(done_event(2, Vec::new(), false));
         ui.key(KeyPress::special(crossterm::event::KeyCode::Esc));
         assert!(!text_below_header(&mut ui).contains("→ a.png"), "{}", ui.text());
         // Writing succeeds again.
         ui.press('w');
-        ui.worker(written(2));
+        ui.worker_event(written(2));
         ui.key(KeyPress::special(crossterm::event::KeyCode::Esc));
         assert!(
             text_below_header(&mut ui).contains("→ a.png") && !ui.text().contains("unwritten"),
@@ -528,7 +532,7 @@ fn files_of_other_images_are_not_listed() {
         );
         // Another write, requested with a key, fails. The file's content is now unknown.
         ui.press('w');
-        ui.worker(failed(2, "a.png: gone"));
+        ui.worker_event(failed(2, "a.png: gone"));
         ui.key(KeyPress::special(crossterm::event::KeyCode::Esc));
         let first = ui.text().lines().next().map(str::to_owned).unwrap_or_default();
         assert!(
@@ -539,19 +543,19 @@ fn files_of_other_images_are_not_listed() {
         ui.press('e');
         assert!(ui.text().contains("a.png: gone"), "{}", ui.text());
         let words = "not written: a.png: gone; before that, wrote a.png";
-        assert_eq!(crate::exit_summary::words(&ui.state), words);
+        assert_eq!(crate::exit_summary::summary_text(&ui.state), words);
     }
 }
 
 #[test]
 fn write_failure_is_cleared_by_a_later_write() {
     let mut ui = TestUi::new();
-    ui.worker(protocol::Event::Started { generation: 1 });
+    ui.worker_event(protocol::Event::Started { generation: 1 });
     ui.press('w');
     let message = "cannot write a.png: full".to_owned();
-    ui.worker(protocol::Event::WriteFailed { generation: 1, path: Some("a.png".into()), message });
-    ui.worker(protocol::Event::Written { generation: 1, path: "a.png".into(), bytes: 1, is_own: true });
-    ui.finish(super::RED);
+    ui.worker_event(protocol::Event::WriteFailed { generation: 1, path: Some("a.png".into()), message });
+    ui.worker_event(protocol::Event::Written { generation: 1, path: "a.png".into(), bytes: 1, is_own: true });
+    ui.finish_render(super::RED);
     ui.key(KeyPress::special(crossterm::event::KeyCode::Esc));
     assert!(ui.text().contains("✓ done") && text_below_header(&mut ui).contains("→ a.png"), "{}", ui.text());
 }
@@ -559,14 +563,14 @@ fn write_failure_is_cleared_by_a_later_write() {
 #[test]
 fn reset_is_offered_once_after_a_change() {
     let mut ui = TestUi::with(state(200, 60));
-    ui.finish(RED);
+    ui.finish_render(RED);
     let keys = |ui: &mut TestUi| ui.text().lines().last().map(str::to_owned).unwrap_or_default();
     assert!(!keys(&mut ui).contains("0 "), "{}", keys(&mut ui));
     ui.press('s');
-    ui.finish(RED);
+    ui.finish_render(RED);
     assert!(keys(&mut ui).contains("0 reset"), "{}", keys(&mut ui));
     ui.press('l');
-    ui.finish(RED);
+    ui.finish_render(RED);
     let keys = keys(&mut ui);
     assert!(keys.contains("reset camera") && keys.matches("0 reset").count() == 1, "{keys}");
 }
@@ -574,38 +578,38 @@ fn reset_is_offered_once_after_a_change() {
 #[test]
 fn preview_cost_is_shown_if_it_fits() {
     let mut ui = TestUi::with(state(120, 40));
-    ui.finish(RED);
+    ui.finish_render(RED);
     // If all stages are listed, there is no space for it.
     ui.state.work.stages = Default::default();
     ui.state.saving.edits = 1;
     ui.state.display.frame =
         Some(FrameReport { bytes: 30_500, round_trip: Some(Duration::from_millis(150)) });
     assert!(ui.text().contains(&messages::preview_cost(31, Some(150))), "{}", ui.text());
-    ui.event(Event::Resize(window(30, 20)));
+    ui.handle_event(Event::Resize(window(30, 20)));
     assert!(ui.text().contains("31 kB sent") && !ui.text().contains("150 ms"), "{}", ui.text());
-    ui.event(Event::Resize(window(9, 20)));
+    ui.handle_event(Event::Resize(window(9, 20)));
     assert!(!ui.text().contains("kB"), "{}", ui.text());
 }
 
 #[test]
 fn folder_precedes_the_name() {
     let mut ui = TestUi::new();
-    ui.finish(RED);
+    ui.finish_render(RED);
     assert!(ui.text().contains("/cornell.toml  640×480"), "{}", ui.text());
-    ui.event(Event::Resize(window(40, 12)));
+    ui.handle_event(Event::Resize(window(40, 12)));
     assert!(!ui.text().contains("scenes"), "{}", ui.text());
 }
 
 #[test]
 fn time_differences_are_omitted_if_too_wide() {
     let mut ui = TestUi::with(state(100, 24));
-    ui.finish(RED);
+    ui.finish_render(RED);
     ui.state.work.last_seconds[Stage::Render as usize] = Some(4.0);
     ui.press('r');
-    ui.state.work.stages[Stage::Render as usize] = Some(stage(Stage::Render, Status::Done, 0.35, ""));
+    ui.state.work.stages[Stage::Render as usize] = Some(stage_report(Stage::Render, Status::Done, 0.35, ""));
     assert!(ui.text().contains("render    350 ms −3.65 s"), "{}", ui.text());
     // The gap before the time is dropped first.
-    ui.event(Event::Resize(window(80, 24)));
+    ui.handle_event(Event::Resize(window(80, 24)));
     assert!(ui.text().contains("✓ render 350 ms −3.65 s"), "{}", ui.text());
     ui.state.work.last_seconds[Stage::Render as usize] = Some(200.0);
     let text = ui.text();
@@ -615,24 +619,24 @@ fn time_differences_are_omitted_if_too_wide() {
 #[test]
 fn preview_without_photons_is_marked() {
     let mut ui = TestUi::new();
-    ui.worker(protocol::Event::Started { generation: 1 });
-    ui.worker(protocol::Event::Stage {
+    ui.worker_event(protocol::Event::Started { generation: 1 });
+    ui.worker_event(protocol::Event::Stage {
         generation: 1,
-        stage: stage(Stage::Photons, Status::Running, 0.0, ""),
+        stage: stage_report(Stage::Photons, Status::Running, 0.0, ""),
     });
     assert!(!ui.text().contains(messages::WITHOUT_PHOTONS), "no preview yet");
     let picture = |lacks_photons| Event::Picture {
         generation: 1,
-        picture: plain_picture(50, 38, RED),
+        picture: uniform_picture(50, 38, RED),
         range: None,
         section: None,
         lacks_photons,
         source: None,
     };
-    ui.event(picture(true));
+    ui.handle_event(picture(true));
     assert!(ui.text().contains(messages::WITHOUT_PHOTONS), "{}", ui.text());
-    ui.worker(protocol::Event::Progress { generation: 1, progress: progress(0.1, None) });
+    ui.worker_event(protocol::Event::Progress { generation: 1, progress: render_progress(0.1, None) });
     assert!(ui.text().contains(messages::WITHOUT_PHOTONS), "marked as long as that preview is shown");
-    ui.event(picture(false));
+    ui.handle_event(picture(false));
     assert!(!ui.text().contains(messages::WITHOUT_PHOTONS), "{}", ui.text());
 }

@@ -10,7 +10,7 @@ use crate::fixtures::*;
 use crate::graphics::Protocol;
 use crate::messages;
 use crate::pipeline::protocol::{self, NoiseProgress, RenderProgress};
-use crate::pipeline::settings::{Effective, Overrides};
+use crate::pipeline::settings::{EffectiveSettings, Overrides};
 use crate::preview_kind::PreviewKind;
 use crate::terminal_replies::TerminalReply;
 use crate::terminals::{Brand, TerminalId};
@@ -20,17 +20,17 @@ use crate::view::layout::Layout;
 /// Simulates a render with the target `error`, whose noise falls from 10 % after one second.
 fn rendered(ui: &mut TestUi, error: f32) {
     let generation = ui.state.request.generation;
-    ui.worker(protocol::Event::Started { generation });
-    let settings = Box::new(Effective { error, ..settings() });
-    ui.worker(protocol::Event::Settings {
+    ui.worker_event(protocol::Event::Started { generation });
+    let settings = Box::new(EffectiveSettings { error, ..effective_settings() });
+    ui.worker_event(protocol::Event::Settings {
         generation,
         settings: settings.clone(),
         camera: camera(),
         exposure: 0.0,
-        own: own(),
+        own: own_settings(),
     });
-    let picture = plain_picture(90, 68, RED);
-    ui.event(Event::Picture {
+    let picture = uniform_picture(90, 68, RED);
+    ui.handle_event(Event::Picture {
         generation,
         picture,
         range: None,
@@ -41,32 +41,32 @@ fn rendered(ui: &mut TestUi, error: f32) {
     for step in 0..=40 {
         let seconds = 10_f64.powf(f64::from(step) / 20.0);
         let noise = Some(NoiseProgress { now: 0.1 / seconds.sqrt(), seconds, next: None });
-        let progress = RenderProgress { elapsed_seconds: seconds, noise, ..progress(0.5, None) };
-        ui.worker(protocol::Event::Progress { generation, progress });
+        let progress = RenderProgress { elapsed_seconds: seconds, noise, ..render_progress(0.5, None) };
+        ui.worker_event(protocol::Event::Progress { generation, progress });
     }
-    let mut event = done(generation, Vec::new(), false);
+    let mut event = done_event(generation, Vec::new(), false);
     if let protocol::Event::Done { report, .. } = &mut event {
         report.stages[protocol::Stage::Render as usize].seconds = 110.0;
         report.image.error = Some(0.0095);
         report.settings = *settings;
     }
-    ui.worker(event);
+    ui.worker_event(event);
 }
 
 /// Saves the scene with each of these texts in turn.
 fn edited(ui: &mut TestUi, edits: &[(&str, [u8; 3])]) {
     for (text, color) in edits {
-        ui.event(Event::Changed(Changed { noticed: ui.now }));
+        ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
         let generation = ui.state.request.generation;
-        ui.worker(protocol::Event::Text { generation, text: (*text).into() });
-        ui.finish(*color);
+        ui.worker_event(protocol::Event::Text { generation, text: (*text).into() });
+        ui.finish_render(*color);
     }
 }
 
 /// The panel's text in one line, without thumbnails.
 fn panel(ui: &mut TestUi) -> String {
-    let panel = Layout::of(&ui.state).panel;
-    let buffer = ui.screen();
+    let panel = Layout::for_state(&ui.state).panel;
+    let buffer = ui.draw_screen();
     let row = |y: u16| {
         (panel.left()..panel.right()).map(|x| buffer[(x, y)].symbol().to_owned()).collect::<String>()
     };
@@ -83,32 +83,32 @@ fn finished_render_has_a_noise_curve() {
     assert!(text.contains(messages::NOISE_OVER_TIME), "{}", ui.text());
     let words = format!("10 % after 1.00 s, 0.95 % after 1 min 50 s; {}", messages::noise_target("1 %"));
     assert!(text.contains(&words), "{text}");
-    // The target line is horizontal: a row of equal dots from the axis to the edge.
+    // The target line is a row of identical dots from the axis to the edge.
     let is_line = |line: &str| line.chars().filter(|c| ('⠁'..='⣿').contains(c)).count() >= 12;
     assert!(ui.text().lines().any(is_line), "{}", ui.text());
     // Changing the exposure reuses the render and its curve, unlike changing the lighting.
     ui.press(']');
     let generation = ui.state.request.generation;
-    ui.worker(protocol::Event::Started { generation });
+    ui.worker_event(protocol::Event::Started { generation });
     assert!(!panel(&mut ui).contains(messages::NOISE_OVER_TIME), "the curve is hidden during a render");
-    let mut event = done(generation, Vec::new(), false);
+    let mut event = done_event(generation, Vec::new(), false);
     if let protocol::Event::Done { report, .. } = &mut event {
         report.stages[protocol::Stage::Render as usize].status = protocol::Status::Reused;
     }
-    ui.worker(event);
+    ui.worker_event(event);
     assert!(panel(&mut ui).contains(messages::NOISE_OVER_TIME), "{}", ui.text());
     ui.press('s');
-    ui.finish(BLUE);
+    ui.finish_render(BLUE);
     assert!(!panel(&mut ui).contains(messages::NOISE_OVER_TIME), "a single point is not drawn as a curve");
     // An image that has been rendered before has its curve restored.
     ui.press('0');
     let generation = ui.state.request.generation;
-    ui.worker(protocol::Event::Started { generation });
-    let mut event = done(generation, Vec::new(), false);
+    ui.worker_event(protocol::Event::Started { generation });
+    let mut event = done_event(generation, Vec::new(), false);
     if let protocol::Event::Done { report, .. } = &mut event {
         report.stages[protocol::Stage::Render as usize].status = protocol::Status::Reused;
     }
-    ui.worker(event);
+    ui.worker_event(event);
     assert!(panel(&mut ui).contains(messages::NOISE_OVER_TIME), "{}", ui.text());
     // Without a target `error`, there is no target line.
     let mut ui = TestUi::with(state(120, 40));
@@ -129,38 +129,48 @@ fn history_lists_changes_and_opens_on_click() {
     );
     assert!(text.contains(&format!("1 {}", messages::OPENED)), "{text}");
     ui.press('s');
-    ui.finish(RED);
+    ui.finish_render(RED);
     assert!(panel(&mut ui).contains("▸3 shadows hard"), "{}", ui.text());
     let all = cells_of(&mut ui, BLUE);
     assert!(all > 5 && all < 100, "expected a thumbnail: {all}");
     // Find a cell of the blue thumbnail.
-    let buffer = ui.screen();
+    let buffer = ui.draw_screen();
     let blue = ratatui::style::Color::Rgb(BLUE[0], BLUE[1], BLUE[2]);
     let places = buffer.area.positions();
     let place = places.into_iter().find(|place| buffer[*place].fg == blue).expect("a thumbnail");
     let mouse = Mouse { kind: MouseKind::Press, column: place.x, row: place.y };
-    ui.event(Event::Mouse(mouse));
-    ui.event(Event::Mouse(Mouse { kind: MouseKind::Release, ..mouse }));
+    ui.handle_event(Event::Mouse(mouse));
+    ui.handle_event(Event::Mouse(Mouse { kind: MouseKind::Release, ..mouse }));
     assert!(cells_of(&mut ui, BLUE) > 500, "{}", ui.text());
-    assert!(ui.text().contains(&messages::render_of(2, 3)) && panel(&mut ui).contains("▸2"), "{}", ui.text());
+    assert!(
+        ui.text().contains(&messages::render_position(2, 3)) && panel(&mut ui).contains("▸2"),
+        "{}",
+        ui.text()
+    );
     ui.press('N');
     assert!(panel(&mut ui).contains("▸3") && cells_of(&mut ui, RED) > 500);
 }
 
-/// Saves the scene and starts its render. If there is a color, shows a preview in that color.
+/// Saves the scene and starts its render. If a color is given, shows a preview in that color.
 fn start_render(ui: &mut TestUi, text: &str, color: Option<[u8; 3]>) {
-    ui.event(Event::Changed(Changed { noticed: ui.now }));
+    ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
     let generation = ui.state.request.generation;
-    ui.worker(protocol::Event::Started { generation });
-    ui.worker(protocol::Event::Text { generation, text: text.into() });
-    let (settings, camera) = (Box::new(settings()), camera());
-    ui.worker(protocol::Event::Settings { generation, settings, camera, exposure: 0.0, own: own() });
+    ui.worker_event(protocol::Event::Started { generation });
+    ui.worker_event(protocol::Event::Text { generation, text: text.into() });
+    let (settings, camera) = (Box::new(effective_settings()), camera());
+    ui.worker_event(protocol::Event::Settings {
+        generation,
+        settings,
+        camera,
+        exposure: 0.0,
+        own: own_settings(),
+    });
     color.into_iter().for_each(|color| show(ui, color));
 }
 
 /// Shows a preview of the current request on the terminal.
 fn show(ui: &mut TestUi, color: [u8; 3]) {
-    let (generation, picture) = (ui.state.request.generation, plain_picture(50, 38, color));
+    let (generation, picture) = (ui.state.request.generation, uniform_picture(50, 38, color));
     let picture = Event::Picture {
         generation,
         picture,
@@ -169,9 +179,9 @@ fn show(ui: &mut TestUi, color: [u8; 3]) {
         lacks_photons: false,
         source: None,
     };
-    ui.event(picture);
+    ui.handle_event(picture);
     // The preview's first bytes have been sent.
-    ui.event(Event::Shown { generation });
+    ui.handle_event(Event::Shown { generation });
 }
 
 #[test]
@@ -180,8 +190,8 @@ fn preview_does_not_wait_for_the_history() {
     edited(&mut ui, &[("camera.fov = 40", RED)]);
     start_render(&mut ui, "camera.fov = 30", None);
     let (generation, before) = (ui.state.request.generation, ui.state.picture.history.len());
-    let picture = plain_picture(50, 38, BLUE);
-    ui.event(Event::Picture {
+    let picture = uniform_picture(50, 38, BLUE);
+    ui.handle_event(Event::Picture {
         generation,
         picture,
         range: None,
@@ -192,7 +202,7 @@ fn preview_does_not_wait_for_the_history() {
     assert!(ui.state.dirty && ui.state.urgent);
     assert_eq!(ui.state.picture.history.len(), before);
     ui.state.dirty = false;
-    ui.event(Event::Shown { generation });
+    ui.handle_event(Event::Shown { generation });
     assert_eq!(ui.state.picture.history.len(), before + 1);
     assert!(ui.state.dirty, "the history should have a new entry");
 }
@@ -210,15 +220,15 @@ fn entry_shows_a_preview_drawn_after_the_end() {
     start_render(&mut ui, "camera.fov = 30", Some([0, 0, 0]));
     let generation = ui.state.request.generation;
     // The last preview is taken from its slot only when bandwidth is available.
-    ui.worker(done(generation, Vec::new(), false));
-    ui.screen();
+    ui.worker_event(done_event(generation, Vec::new(), false));
+    ui.draw_screen();
     show(&mut ui, BLUE);
     assert_eq!(small_color(&ui), BLUE);
     assert!(ui.state.dirty, "the history should be redrawn");
     assert!(panel(&mut ui).contains("▸2 camera.fov 40 → 30"), "{}", ui.text());
     assert_eq!(ui.state.picture.history.len(), 2);
     // A preview that is already shown is not redrawn.
-    ui.event(Event::Shown { generation });
+    ui.handle_event(Event::Shown { generation });
     assert!(!ui.state.dirty);
 }
 
@@ -229,8 +239,8 @@ fn hidden_entry_shows_preview_drawn_after_end() {
     start_render(&mut ui, "camera.fov = 30", Some([0, 0, 0]));
     let generation = ui.state.request.generation;
     ui.press('n');
-    ui.worker(done(generation, Vec::new(), false));
-    ui.screen();
+    ui.worker_event(done_event(generation, Vec::new(), false));
+    ui.draw_screen();
     show(&mut ui, BLUE);
     assert_eq!(small_color(&ui), BLUE);
     assert!(ui.state.dirty, "the history should be redrawn");
@@ -240,11 +250,11 @@ fn hidden_entry_shows_preview_drawn_after_end() {
 fn actual_pixels_are_not_used_as_a_thumbnail() {
     let mut ui = TestUi::with(state(120, 40));
     edited(&mut ui, &[("camera.fov = 40", RED), ("camera.fov = 30", BLUE)]);
-    let (generation, picture) = (ui.state.request.generation, plain_picture(50, 38, RED));
+    let (generation, picture) = (ui.state.request.generation, uniform_picture(50, 38, RED));
     let section = Some(protocol::Section { left: 0.4, top: 0.4, width: 0.2, height: 0.2 });
     let (range, lacks_photons, source) = (None, false, None);
-    ui.event(Event::Picture { generation, picture, range, section, lacks_photons, source });
-    ui.event(Event::Shown { generation });
+    ui.handle_event(Event::Picture { generation, picture, range, section, lacks_photons, source });
+    ui.handle_event(Event::Shown { generation });
     assert_eq!(small_color(&ui), BLUE);
 }
 
@@ -279,7 +289,7 @@ fn running_render_is_the_newest_entry() {
     // A running render is added even while an older one is being viewed.
     edited(&mut ui, &[]);
     let generation = ui.state.request.generation;
-    ui.worker(done(generation, Vec::new(), false));
+    ui.worker_event(done_event(generation, Vec::new(), false));
     ui.press('n');
     let before = ui.state.picture.history.len();
     start_render(&mut ui, "camera.fov = 10", None);
@@ -311,17 +321,17 @@ fn unchanged_image_keeps_its_curve() {
     let mut ui = TestUi::with(state(120, 40));
     rendered(&mut ui, 0.01);
     // A typo is introduced and fixed, so the image is unchanged.
-    ui.event(Event::Changed(Changed { noticed: ui.now }));
-    ui.fail(vec![diagnostic(crate::scene::diagnostic::Severity::Error, "wrong")]);
-    ui.event(Event::Settled);
-    ui.event(Event::Changed(Changed { noticed: ui.now }));
+    ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
+    ui.fail_render(vec![diagnostic(crate::scene::diagnostic::Severity::Error, "wrong")]);
+    ui.handle_event(Event::Settled);
+    ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
     let generation = ui.state.request.generation;
-    ui.worker(protocol::Event::Started { generation });
-    let mut event = done(generation, Vec::new(), true);
+    ui.worker_event(protocol::Event::Started { generation });
+    let mut event = done_event(generation, Vec::new(), true);
     if let protocol::Event::Done { report, .. } = &mut event {
         report.stages[protocol::Stage::Render as usize].status = protocol::Status::Reused;
     }
-    ui.worker(event);
+    ui.worker_event(event);
     assert!(ui.text().contains("unchanged"), "{}", ui.text());
     assert!(panel(&mut ui).contains(messages::NOISE_OVER_TIME), "{}", ui.text());
 }
@@ -331,8 +341,8 @@ fn numbers_are_not_separated_from_their_units() {
     for columns in 120..200 {
         let mut ui = TestUi::with(state(columns, 40));
         rendered(&mut ui, 0.01);
-        let panel = Layout::of(&ui.state).panel;
-        let buffer = ui.screen();
+        let panel = Layout::for_state(&ui.state).panel;
+        let buffer = ui.draw_screen();
         let line = |y: u16| {
             (panel.left()..panel.right()).map(|x| buffer[(x, y)].symbol().to_owned()).collect::<String>()
         };
@@ -349,19 +359,19 @@ fn history_heading_is_not_shown_without_entries() {
     // The panel is too narrow for diagnostics, then not tall enough, then large enough.
     for (width, height) in [(640, 400), (640, 320), (640, 480)] {
         let mut ui = TestUi::with(state(200, 60));
-        ui.state.request.effective = Some(Effective { width, height, ..settings() });
-        ui.event(Event::Resize(window(200, 60)));
+        ui.state.request.effective = Some(EffectiveSettings { width, height, ..effective_settings() });
+        ui.handle_event(Event::Resize(window(200, 60)));
         for (number, color) in [RED, BLUE, [1, 2, 3]].into_iter().enumerate() {
-            ui.event(Event::Changed(Changed { noticed: ui.now }));
+            ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
             let generation = ui.state.request.generation;
-            ui.worker(protocol::Event::Started { generation });
-            ui.worker(protocol::Event::Text { generation, text: format!("seed = {number}").into() });
+            ui.worker_event(protocol::Event::Started { generation });
+            ui.worker_event(protocol::Event::Text { generation, text: format!("seed = {number}").into() });
             show(&mut ui, color);
-            let mut event = done(generation, Vec::new(), false);
+            let mut event = done_event(generation, Vec::new(), false);
             if let protocol::Event::Done { report, .. } = &mut event {
                 (report.settings.width, report.settings.height) = (width, height);
             }
-            ui.worker(event);
+            ui.worker_event(event);
         }
         let entries = |text: &str| {
             [&*format!("1 {}", messages::OPENED), "2 seed", "3 seed"]
@@ -375,8 +385,8 @@ fn history_heading_is_not_shown_without_entries() {
         for count in 1..8 {
             let errors = (0..count)
                 .map(|number| diagnostic(crate::scene::diagnostic::Severity::Error, &format!("{number}")));
-            ui.fail(errors.collect());
-            ui.event(Event::Settled);
+            ui.fail_render(errors.collect());
+            ui.handle_event(Event::Settled);
             let text = ui.text();
             assert!(text.contains("error: 0"), "{text}");
             assert_eq!(has_heading(&text), entries(&text) > 1, "{width}×{height}, {count} errors:\n{text}");
@@ -407,16 +417,16 @@ fn side_panel_fits_every_window_size() {
         let mut ui = TestUi::with(state_with(120, 40, kind, depth, Overrides::default()));
         let all: Vec<_> =
             (1_u8..).zip(edits).map(|(index, what)| (what, [40 * (index % 5), 10 * index, 7])).collect();
-        ui.finish(RED);
+        ui.finish_render(RED);
         edited(&mut ui, &all);
-        ui.event(Event::Changed(Changed { noticed: ui.now }));
+        ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
         rendered(&mut ui, 0.01);
         for columns in [100, 119, 120, 140, 200] {
             for rows in [1, 5, 12, 24, 40, 60, 90] {
-                ui.event(Event::Resize(window(columns, rows)));
+                ui.handle_event(Event::Resize(window(columns, rows)));
                 for key in ['n', 'N', '?', '?'] {
                     ui.press(key);
-                    let layout = Layout::of(&ui.state);
+                    let layout = Layout::for_state(&ui.state);
                     let mut buffer = ratatui::buffer::Buffer::empty(Rect::new(0, 0, columns, rows));
                     let drawn = view::draw(&ui.state, &mut buffer);
                     let is_inside = drawn.later.intersection(layout.panel) == drawn.later;
@@ -441,14 +451,14 @@ fn fixtures_text(buffer: &ratatui::buffer::Buffer) -> String {
 fn written_files_are_hyperlinks() {
     for (columns, rows) in [(120, 40), (80, 20)] {
         let mut ui = TestUi::with(state(columns, rows));
-        ui.worker(protocol::Event::Written {
+        ui.worker_event(protocol::Event::Written {
             generation: 1,
             path: "cornell.png".into(),
             bytes: 107_000,
             is_own: true,
         });
-        ui.finish(RED);
-        let mut buffer = ui.screen();
+        ui.finish_render(RED);
+        let mut buffer = ui.draw_screen();
         let drawn = view::draw(&ui.state, &mut buffer);
         let [(cells, path)] = &drawn.files[..] else { panic!("{drawn:?}\n{}", ui.text()) };
         let name: String = cells.positions().map(|place| buffer[place].symbol().to_owned()).collect();
@@ -463,8 +473,8 @@ fn notification(seconds: u64, prepare: impl Fn(&mut TestUi)) -> Option<String> {
     let mut ui = TestUi::new();
     ui.state.display.capabilities = TerminalId { brand: Brand::Kitty, version: [0, 40] }.capabilities();
     prepare(&mut ui);
-    ui.wait(1000 * seconds);
-    let effects = ui.worker(done(1, Vec::new(), false));
+    ui.advance_clock(1000 * seconds);
+    let effects = ui.worker_event(done_event(1, Vec::new(), false));
     effects.into_iter().find_map(|effect| match effect {
         Effect::Aside(bytes) => String::from_utf8(bytes).ok(),
         _ => None,
@@ -474,7 +484,7 @@ fn notification(seconds: u64, prepare: impl Fn(&mut TestUi)) -> Option<String> {
 #[test]
 fn long_renders_send_a_notification_at_the_end() {
     let focus = |is_here| {
-        move |ui: &mut TestUi| drop(ui.event(Event::TerminalReply(TerminalReply::Focus { is_here })))
+        move |ui: &mut TestUi| drop(ui.handle_event(Event::TerminalReply(TerminalReply::Focus { is_here })))
     };
     let words = "\u{1b}]99;;glimt: cornell.toml: done after 31.0 s\u{1b}\\";
     assert_eq!(notification(31, focus(false)).as_deref(), Some(words));
@@ -486,7 +496,7 @@ fn long_renders_send_a_notification_at_the_end() {
     let held = |ui: &mut TestUi| {
         focus(false)(ui);
         ui.key(KeyPress::plain(' '));
-        ui.wait(60_000);
+        ui.advance_clock(60_000);
         ui.key(KeyPress::plain(' '));
     };
     assert_eq!(notification(5, held), None);

@@ -10,7 +10,7 @@ use crate::scene::diagnostic::Severity;
 #[test]
 fn warnings_are_counted_and_shown_on_demand() {
     let mut ui = TestUi::new();
-    ui.worker(done(1, vec![diagnostic(Severity::Warning, "unused `b`")], false));
+    ui.worker_event(done_event(1, vec![diagnostic(Severity::Warning, "unused `b`")], false));
     assert!(ui.text().contains("1 warning") && !ui.text().contains("unused"));
     ui.press('e');
     assert!(ui.text().contains("warning: unused `b`"));
@@ -22,7 +22,7 @@ fn warnings_are_counted_and_shown_on_demand() {
 fn warnings_are_counted_in_only_one_place() {
     for (columns, rows) in [(60, 20), (80, 24), (120, 40), (200, 60)] {
         let mut ui = TestUi::with(state(columns, rows));
-        ui.worker(done(1, vec![diagnostic(Severity::Warning, "odd")], false));
+        ui.worker_event(done_event(1, vec![diagnostic(Severity::Warning, "odd")], false));
         let text = ui.text();
         assert_eq!(text.matches("1 warning").count(), 1, "{text}");
         assert!(text.contains("e 1 warning"), "{text}");
@@ -32,17 +32,17 @@ fn warnings_are_counted_in_only_one_place() {
 #[test]
 fn warnings_are_shown_during_the_render() {
     let mut ui = TestUi::new();
-    ui.worker(protocol::Event::Started { generation: 1 });
+    ui.worker_event(protocol::Event::Started { generation: 1 });
     ui.press('e');
     assert!(ui.text().contains(messages::STILL_READING), "{}", ui.text());
     let warnings = vec![diagnostic(Severity::Warning, "unused `b`")];
-    ui.worker(protocol::Event::Warnings { generation: 1, warnings });
-    ui.worker(protocol::Event::Progress { generation: 1, progress: progress(0.5, None) });
+    ui.worker_event(protocol::Event::Warnings { generation: 1, warnings });
+    ui.worker_event(protocol::Event::Progress { generation: 1, progress: render_progress(0.5, None) });
     assert!(ui.text().contains("1 warning"), "{}", ui.text());
     ui.press('e');
     assert!(ui.text().contains("warning: unused `b`"), "{}", ui.text());
-    ui.event(Event::Changed(Changed { noticed: ui.now }));
-    ui.worker(protocol::Event::Warnings { generation: 2, warnings: Vec::new() });
+    ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
+    ui.worker_event(protocol::Event::Warnings { generation: 2, warnings: Vec::new() });
     assert!(!ui.text().contains("unused"), "expected no more warnings: {}", ui.text());
     ui.press('e');
     assert!(ui.text().contains(messages::NO_DIAGNOSTICS), "{}", ui.text());
@@ -51,7 +51,7 @@ fn warnings_are_shown_during_the_render() {
 #[test]
 fn warnings_are_counted_with_errors() {
     let mut ui = TestUi::new();
-    ui.fail(vec![diagnostic(Severity::Error, "wrong"), diagnostic(Severity::Warning, "odd")]);
-    ui.event(Event::Settled);
+    ui.fail_render(vec![diagnostic(Severity::Error, "wrong"), diagnostic(Severity::Warning, "odd")]);
+    ui.handle_event(Event::Settled);
     assert!(ui.text().contains("─ 1 error, 1 warning ─"), "{}", ui.text());
 }

@@ -20,26 +20,26 @@ fn last_line(ui: &mut TestUi) -> String {
 #[test]
 fn click_result_is_shown_with_warnings_open() {
     let mut ui = TestUi::with(state(140, 40));
-    ui.finish(RED);
-    ui.worker(done(1, vec![diagnostic(Severity::Warning, "a warning")], false));
+    ui.finish_render(RED);
+    ui.worker_event(done_event(1, vec![diagnostic(Severity::Warning, "a warning")], false));
     ui.press('e');
     let picked = Picked { pixel: [3, 4], thing: None, color: None };
-    ui.worker(protocol::Event::Picked { generation: 1, picked: Box::new(picked) });
+    ui.worker_event(protocol::Event::Picked { generation: 1, picked: Box::new(picked) });
     assert!(ui.text().contains("pixel 3, 4"), "{}", ui.text());
 }
 
 #[test]
 fn reset_lists_all_changes_once() {
     let mut ui = TestUi::with(state(200, 40));
-    ui.finish(RED);
+    ui.finish_render(RED);
     ui.state.request.toggles.camera.focus = Some(2.0);
     ui.press(']');
-    ui.finish(BLUE);
+    ui.finish_render(BLUE);
     ui.key(KeyPress::special(KeyCode::Esc));
-    assert_eq!(ui.state.request.changes(), ["focus", "exposure (+0.25)"]);
+    assert_eq!(ui.state.request.key_changes(), ["focus", "exposure (+0.25)"]);
     assert!(last_line(&mut ui).contains("reset focus, "), "{}", ui.text());
     ui.press('l');
-    ui.finish(RED);
+    ui.finish_render(RED);
     ui.key(KeyPress::special(KeyCode::Esc));
     let keys = last_line(&mut ui);
     assert!(keys.contains("reset camera, ") && !keys.contains("focus"), "{keys}");
@@ -50,7 +50,7 @@ fn reset_lists_all_changes_once() {
 #[test]
 fn photon_view_without_photons_shows_a_hint() {
     let mut ui = TestUi::new();
-    ui.finish(RED);
+    ui.finish_render(RED);
     for key in ['v', '/'].into_iter().chain("photons".chars()) {
         ui.press(key);
     }
@@ -61,7 +61,7 @@ fn photon_view_without_photons_shows_a_hint() {
 fn image_keys_are_hidden_without_a_preview() {
     let kind = |kind| TestUi::with(state_with(200, 24, kind, ColorDepth::TrueColor, Overrides::default()));
     for (mut ui, is_offered) in [(kind(PreviewKind::None), false), (kind(PreviewKind::HalfBlock), true)] {
-        ui.finish(RED);
+        ui.finish_render(RED);
         assert_eq!(last_line(&mut ui).contains("tab image"), is_offered, "{}", ui.text());
     }
 }
@@ -70,19 +70,19 @@ fn image_keys_are_hidden_without_a_preview() {
 fn resume_message_disappears_after_the_render() {
     let mut ui = TestUi::new();
     let news = CheckpointNews::Resumed { path: "cornell.png.checkpoint".into(), samples: 16 };
-    ui.worker(protocol::Event::Checkpoint { generation: 1, news });
+    ui.worker_event(protocol::Event::Checkpoint { generation: 1, news });
     assert!(ui.text().contains(messages::RESUMING), "{}", ui.text());
-    ui.finish(RED);
+    ui.finish_render(RED);
     assert!(!ui.text().contains(messages::RESUMING), "{}", ui.text());
 }
 
 #[test]
 fn first_render_hint_does_not_say_again() {
     let mut ui = TestUi::with(state(120, 40));
-    ui.fail(vec![diagnostic(Severity::Error, "unknown key `heigth`")]);
+    ui.fail_render(vec![diagnostic(Severity::Error, "unknown key `heigth`")]);
     assert!(!ui.text().contains("render again"), "{}", ui.text());
-    assert_eq!(exit_summary::words(&ui.state), "no image written; cornell.toml has errors");
-    ui.finish(RED);
+    assert_eq!(exit_summary::summary_text(&ui.state), "no image written; cornell.toml has errors");
+    ui.finish_render(RED);
     assert!(ui.text().contains("render again"), "{}", ui.text());
 }
 
@@ -90,7 +90,7 @@ fn first_render_hint_does_not_say_again() {
 fn scene_name_is_visible_in_small_windows() {
     for columns in 26..60 {
         let mut ui = TestUi::with(state(columns, 8));
-        ui.finish(RED);
+        ui.finish_render(RED);
         assert!(ui.text().contains("corn"), "{columns}: {}", ui.text());
     }
 }
@@ -98,13 +98,13 @@ fn scene_name_is_visible_in_small_windows() {
 #[test]
 fn stage_reason_in_a_wide_panel_is_not_wrapped() {
     let mut ui = TestUi::with(state(200, 60));
-    ui.finish(RED);
+    ui.finish_render(RED);
     ui.press('r');
     let generation = ui.state.request.generation;
-    ui.worker(protocol::Event::Started { generation });
-    let stage = stage(Stage::Meshes, Status::Skipped, 0.0, "unneeded");
-    ui.worker(protocol::Event::Stage { generation, stage });
-    ui.event(Event::Tick);
+    ui.worker_event(protocol::Event::Started { generation });
+    let stage = stage_report(Stage::Meshes, Status::Skipped, 0.0, "unneeded");
+    ui.worker_event(protocol::Event::Stage { generation, stage });
+    ui.handle_event(Event::Tick);
     assert!(ui.text().contains("skipped  unneeded"), "{}", ui.text());
 }
 
@@ -113,8 +113,8 @@ fn stage_reason_in_a_wide_panel_is_not_wrapped() {
 fn save_hint_is_on_a_line_of_its_own() {
     for (columns, rows) in [(80, 24), (100, 30), (120, 40), (200, 60)] {
         let mut ui = TestUi::with(state(columns, rows));
-        ui.fail(vec![diagnostic(Severity::Error, "unknown key `heigth`")]);
-        ui.event(Event::Settled);
+        ui.fail_render(vec![diagnostic(Severity::Error, "unknown key `heigth`")]);
+        ui.handle_event(Event::Settled);
         let text = ui.text();
         let hint = messages::save_to_render("cornell.toml", false);
         let lines: Vec<&str> = text.lines().filter(|line| line.contains(&hint)).collect();
@@ -128,7 +128,7 @@ fn models_have_no_save_hint() {
     let mut state = state(120, 40);
     state.request.scene = "toy.glb".into();
     let mut ui = TestUi::with(state);
-    ui.finish(RED);
+    ui.finish_render(RED);
     let text = ui.text();
     assert!(text.contains("toy.glb") && !text.contains("save "), "{text}");
     let words: Vec<&str> = text.split_whitespace().filter(|word| !word.contains('▀')).collect();

@@ -4,11 +4,11 @@
 use std::path::PathBuf;
 
 use super::notices::{notify, prompt, show_notice};
-use super::request::render;
+use super::request::request_render;
 use crate::camera::{dollied, orbited, zoomed};
 use crate::event::Effect;
 use crate::messages;
-use crate::pipeline::protocol::{Command, KeptCamera, MovedCamera};
+use crate::pipeline::protocol::{Command, MovedCamera, SavedCamera};
 use crate::pipeline::settings::CameraChange;
 use crate::scene::description::Pose;
 use crate::scene::is_mesh;
@@ -21,8 +21,8 @@ const TURN: f64 = 3.0;
 const NEARER: f64 = 0.95;
 /// Factor by which a zoom step changes the field of view.
 const WIDER: f64 = 1.05;
-/// Maximum difference from the original field of view that is considered equal. Needed because each step is
-/// rounded. Steps are larger than this.
+/// A field of view that differs from the original by no more than this is considered equal, because each step
+/// is rounded. Steps are larger than this.
 const ROUNDING: f64 = 0.015;
 /// Size of an exposure step in stops.
 const STOPS: f32 = 0.25;
@@ -42,7 +42,7 @@ pub(super) fn orbit_by(state: &mut State, right: f64, up: f64) -> Vec<Effect> {
 /// Moves the camera closer by a number of steps.
 pub(super) fn dolly(state: &mut State, steps: f64) -> Vec<Effect> {
     let Some((view, own)) = state.request.viewpoint().zip(state.request.camera) else {
-        return unknown(state);
+        return report_unknown_camera(state);
     };
     let pose = dollied(&view.pose, libm::pow(NEARER, steps), own.pose.distance());
     if pose == view.pose {
@@ -53,18 +53,18 @@ pub(super) fn dolly(state: &mut State, steps: f64) -> Vec<Effect> {
 
 /// Widens the field of view by a number of steps.
 pub(super) fn zoom(state: &mut State, steps: f64) -> Vec<Effect> {
-    let Some(view) = state.request.viewpoint() else { return unknown(state) };
+    let Some(view) = state.request.viewpoint() else { return report_unknown_camera(state) };
     let fov = zoomed(&view, libm::pow(WIDER, steps));
     if fov == view.fov {
         return notify(state, &messages::field_limit(fov));
     }
     state.request.toggles.camera.fov = Some(fov);
-    camera_step(state)
+    handle_camera_step(state)
 }
 
 /// Increases the exposure by a number of steps.
 pub(super) fn change_exposure(state: &mut State, steps: f32) -> Vec<Effect> {
-    let Some(scene) = state.request.exposure else { return unknown(state) };
+    let Some(scene) = state.request.exposure else { return report_unknown_camera(state) };
     let own = state.request.command_line.exposure.unwrap_or(scene);
     let before = state.request.toggles.exposure.unwrap_or(own);
     let stops = (before + steps * STOPS).clamp((-MAX_STOPS).min(before), MAX_STOPS.max(before));
@@ -72,27 +72,31 @@ pub(super) fn change_exposure(state: &mut State, steps: f32) -> Vec<Effect> {
         return notify(state, &messages::exposure_limit(&format_stops(stops)));
     }
     state.request.toggles.exposure = (stops != own).then_some(stops);
-    let effects = step(state);
-    show_notice(state, messages::exposure(&format_stops(stops)));
+    let effects = render_or_delay_step(state);
+    show_notice(state, messages::exposure_changed(&format_stops(stops)));
     effects
 }
 
 fn move_camera(state: &mut State, how: impl FnOnce(&Pose) -> Pose) -> Vec<Effect> {
-    let Some(view) = state.request.viewpoint() else { return unknown(state) };
+    let Some(view) = state.request.viewpoint() else { return report_unknown_camera(state) };
     state.request.toggles.camera.pose = Some(how(&view.pose));
-    camera_step(state)
+    handle_camera_step(state)
 }
 
-fn unknown(state: &mut State) -> Vec<Effect> {
+fn report_unknown_camera(state: &mut State) -> Vec<Effect> {
     notify(state, messages::NO_SCENE)
 }
 
-pub(super) fn camera_step(state: &mut State) -> Vec<Effect> {
+pub(super) fn handle_camera_step(state: &mut State) -> Vec<Effect> {
     drop_restored_values(state);
-    let effects = step(state);
+    let effects = render_or_delay_step(state);
     show_notice(
         state,
-        if state.request.toggles.camera.is_any() { messages::CAMERA_MOVED } else { messages::CAMERA_RESET },
+        if state.request.toggles.camera.has_changes() {
+            messages::CAMERA_MOVED
+        } else {
+            messages::CAMERA_RESET
+        },
     );
     effects
 }
@@ -108,31 +112,31 @@ fn drop_restored_values(state: &mut State) {
 }
 
 /// Asks the worker to write the current camera into the scene file.
-pub(super) fn keep(state: &mut State) -> Vec<Effect> {
+pub(super) fn save_camera(state: &mut State) -> Vec<Effect> {
     let Some((camera, own)) = state.request.viewpoint().zip(state.request.camera) else {
-        return unknown(state);
+        return report_unknown_camera(state);
     };
     let is_set = state.request.command_line.sets.iter().any(|set| set.trim_start().starts_with("camera"));
     // For models, `c` writes a new scene file, even with the default camera.
-    if !state.request.toggles.camera.is_any() && !is_set && !is_mesh(&state.request.scene) {
+    if !state.request.toggles.camera.has_changes() && !is_set && !is_mesh(&state.request.scene) {
         return notify(state, messages::NOTHING_TO_KEEP);
     }
     let saved = state.request.saved_since_moved();
     // Models do not contain a camera that could be overwritten.
     if !saved.is_empty() && !is_mesh(&state.request.scene) {
-        // The user is told about the saved values now, so they no longer cause a conflict.
-        state.request.move_from_own();
+        // The message below lists the saved values, so they no longer cause a conflict.
+        state.request.rebase_moves_on_scene();
         let saved = saved.join(", ");
         return prompt(state, &format!("error: {saved} {}", messages::CAMERA_CONFLICT));
     }
-    state.saving.is_camera_of_newest = state.picture.history.is_open();
+    state.saving.is_camera_of_newest = state.picture.history.is_older_open();
     vec![Effect::Send(Command::KeepCamera(MovedCamera { camera, own }))]
 }
 
 /// Handles the result of writing the camera. If the scene now uses this camera, it is no longer treated as
 /// moved.
-pub(super) fn kept(state: &mut State, outcome: Result<KeptCamera, String>) -> Vec<Effect> {
-    let KeptCamera { path, is_new, is_own, of_model, edit } = match outcome {
+pub(super) fn handle_saved_camera(state: &mut State, outcome: Result<SavedCamera, String>) -> Vec<Effect> {
+    let SavedCamera { path, is_new, is_own, of_model, edit } = match outcome {
         Ok(kept) => kept,
         Err(why) => {
             state.saving.camera_refused = Some(state.now);
@@ -145,20 +149,20 @@ pub(super) fn kept(state: &mut State, outcome: Result<KeptCamera, String>) -> Ve
     }
     let name = visible(&path.to_string_lossy()).into_owned();
     let words = match (is_new, is_own) {
-        _ if of_model => messages::model_scene(&name),
+        _ if of_model => messages::model_scene_written(&name),
         (true, true) => messages::camera_saved(&name),
         (true, false) => messages::camera_overridden(&name),
-        (false, _) => messages::camera_known(&name),
+        (false, _) => messages::camera_already_in_scene(&name),
     };
     let which = if state.saving.is_camera_of_newest { messages::OF_NEWEST_RENDER } else { "" };
     state.saving.camera_edits.extend(edit);
     let mut effects = Vec::new();
     if let Some(since) = state.request.moved_since.filter(|_| is_new) {
-        state.picture.history.kept_camera(since);
+        state.picture.history.record_saved_camera(since);
     }
-    if is_own && state.request.toggles.camera.is_any() {
+    if is_own && state.request.toggles.camera.has_changes() {
         state.request.toggles.camera = CameraChange::default();
-        effects = render(state, false);
+        effects = request_render(state, false);
     }
     state.saving.camera_kept = is_new.then_some(state.now);
     show_notice(state, words + which);
@@ -166,7 +170,7 @@ pub(super) fn kept(state: &mut State, outcome: Result<KeptCamera, String>) -> Ve
 }
 
 /// Asks the worker to undo the last camera written into the scene file.
-pub(super) fn undo(state: &mut State) -> Vec<Effect> {
+pub(super) fn undo_saved_camera(state: &mut State) -> Vec<Effect> {
     match state.saving.camera_edits.last() {
         Some(edit) => vec![Effect::Send(Command::UndoCamera(edit.clone()))],
         None if state.saving.camera_of_model.is_some() => notify(state, messages::NEW_SCENE_STAYS),
@@ -175,7 +179,7 @@ pub(super) fn undo(state: &mut State) -> Vec<Effect> {
 }
 
 /// Handles the result of undoing a written camera.
-pub(super) fn undone(state: &mut State, outcome: Result<PathBuf, String>) -> Vec<Effect> {
+pub(super) fn handle_undone_camera(state: &mut State, outcome: Result<PathBuf, String>) -> Vec<Effect> {
     let path = match outcome {
         Ok(path) => path,
         Err(why) => {
@@ -184,27 +188,31 @@ pub(super) fn undone(state: &mut State, outcome: Result<PathBuf, String>) -> Vec
         }
     };
     state.saving.camera_edits.pop();
-    state.picture.history.edited();
-    let effects = render(state, false);
+    state.picture.history.record_edit();
+    let effects = request_render(state, false);
     state.saving.camera_kept = Some(state.now);
     let name = visible(&path.to_string_lossy()).into_owned();
-    show_notice(state, messages::undone(&name));
+    show_notice(state, messages::camera_undone(&name));
     effects
 }
 
 /// Renders the newest step immediately if the previous one has a preview. Otherwise the step waits.
-fn step(state: &mut State) -> Vec<Effect> {
+fn render_or_delay_step(state: &mut State) -> Vec<Effect> {
     state.dirty = true;
-    if state.awaits_step() {
+    if state.is_step_without_preview() {
         state.request.camera_step.is_waiting = true;
         return Vec::new();
     }
-    let effects = render(state, false);
+    let effects = request_render(state, false);
     state.request.camera_step.generation = Some(state.request.generation);
     effects
 }
 
 /// Renders the waiting step if the previous one has a preview.
 pub(super) fn render_waiting_step(state: &mut State) -> Vec<Effect> {
-    if state.request.camera_step.is_waiting && !state.awaits_step() { step(state) } else { Vec::new() }
+    if state.request.camera_step.is_waiting && !state.is_step_without_preview() {
+        render_or_delay_step(state)
+    } else {
+        Vec::new()
+    }
 }

@@ -4,17 +4,22 @@ use crate::event::FilePosition;
 use crate::scene::diagnostic::{Diagnostic, SourceSpan};
 use crate::state::State;
 
-/// Position of the first error. If there is none, the clicked object, the first warning or the start of the
+/// Position to open: the first error, or else the clicked object, the first warning or the start of the
 /// scene.
-pub(super) fn to_edit(state: &State) -> FilePosition {
-    let errors = state.overlays.problems.iter().flat_map(|problems| &problems.diagnostics).find_map(in_file);
-    let warnings = || state.overlays.warnings.iter().find_map(in_file);
+pub(super) fn position_to_edit(state: &State) -> FilePosition {
+    let errors = state
+        .overlays
+        .problems
+        .iter()
+        .flat_map(|problems| &problems.diagnostics)
+        .find_map(diagnostic_position);
+    let warnings = || state.overlays.warnings.iter().find_map(diagnostic_position);
     let scene = || FilePosition { path: state.request.scene.clone(), line: 1, column: 1 };
     errors.or_else(|| state.selection.picked.clone()).or_else(warnings).unwrap_or_else(scene)
 }
 
 /// A diagnostic's position, if it refers to a file.
-fn in_file(diagnostic: &Diagnostic) -> Option<FilePosition> {
+fn diagnostic_position(diagnostic: &Diagnostic) -> Option<FilePosition> {
     let SourceSpan { source, span, .. } = diagnostic.place.as_ref()?;
     let before = source.get(..span.start)?;
     let start = before.rfind('\n').map_or(0, |end| end + 1);

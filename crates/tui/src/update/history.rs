@@ -8,8 +8,8 @@ use crate::messages;
 use crate::state::{Rendering, State};
 
 /// Adds the current image to the history.
-pub(super) fn record(state: &mut State) {
-    if let Some(shown) = newest(state).filter(|shown| shown.generation == state.request.generation) {
+pub(super) fn record_image(state: &mut State) {
+    if let Some(shown) = newest_image(state).filter(|shown| shown.generation == state.request.generation) {
         let is_finished = state.work.rendering == Rendering::Finished || shown.is_finished();
         let origin = state.request.origin(!is_finished);
         state.picture.history.record(shown, state.now, origin);
@@ -20,11 +20,11 @@ pub(super) fn record(state: &mut State) {
 /// arrives after the render has ended. A section shown 1:1 never replaces a finished image.
 pub(super) fn record_newest(state: &mut State) {
     let is_over = !state.work.is_under_way();
-    if is_over && newest(state).is_some_and(|shown| shown.section.is_some()) {
+    if is_over && newest_image(state).is_some_and(|shown| shown.section.is_some()) {
         return;
     }
     let (count, last) = (state.picture.history.len(), state.picture.history.last_picture().cloned());
-    record(state);
+    record_image(state);
     let history = &state.picture.history;
     let is_new = history.len() != count;
     let is_other = history.last_picture().zip(last).is_some_and(|(now, before)| !Arc::ptr_eq(now, &before));
@@ -33,12 +33,12 @@ pub(super) fn record_newest(state: &mut State) {
 
 /// Moves back by `steps` renders, or forward if `steps` is negative.
 pub(super) fn browse(state: &mut State, steps: isize) -> Vec<Effect> {
-    record(state);
-    let Some(newest) = newest(state) else { return notify(state, messages::NO_IMAGE) };
+    record_image(state);
+    let Some(newest) = newest_image(state) else { return notify(state, messages::NO_IMAGE) };
     if state.picture.history.returns_to_newest(steps) {
-        return close(state, messages::NEWEST_RENDER);
+        return return_to_newest(state, messages::NEWEST_RENDER);
     }
-    match state.picture.history.step(steps, newest) {
+    match state.picture.history.step_back(steps, newest) {
         Some(shown) => show_image(state, shown),
         None => notify(state, if steps > 0 { messages::OLDEST_RENDER } else { messages::NEWEST_RENDER }),
     }
@@ -46,10 +46,10 @@ pub(super) fn browse(state: &mut State, steps: isize) -> Vec<Effect> {
 
 /// Opens a render from the history strip.
 pub(super) fn open_at(state: &mut State, at: usize) -> Vec<Effect> {
-    record(state);
-    let Some(newest) = newest(state) else { return Vec::new() };
+    record_image(state);
+    let Some(newest) = newest_image(state) else { return Vec::new() };
     if at + 1 >= state.picture.history.len() {
-        return close(state, messages::NEWEST_RENDER);
+        return return_to_newest(state, messages::NEWEST_RENDER);
     }
     match state.picture.history.open_at(at, newest) {
         Some(shown) => show_image(state, shown),
@@ -57,13 +57,13 @@ pub(super) fn open_at(state: &mut State, at: usize) -> Vec<Effect> {
     }
 }
 
-/// Shows the render before the last edit or returns to the newest one.
-pub(super) fn before_and_after(state: &mut State) -> Vec<Effect> {
-    if state.picture.history.is_open() {
-        return close(state, messages::AFTER_EDIT);
+/// Toggles between the render before the last edit and the newest one.
+pub(super) fn toggle_before_edit(state: &mut State) -> Vec<Effect> {
+    if state.picture.history.is_older_open() {
+        return return_to_newest(state, messages::AFTER_EDIT);
     }
-    record(state);
-    let Some(newest) = newest(state) else { return notify(state, messages::NO_IMAGE) };
+    record_image(state);
+    let Some(newest) = newest_image(state) else { return notify(state, messages::NO_IMAGE) };
     match state.picture.history.open_before_edit(newest) {
         Some(shown) => {
             let effects = show_image(state, shown);
@@ -77,7 +77,7 @@ pub(super) fn before_and_after(state: &mut State) -> Vec<Effect> {
 }
 
 /// Returns to the newest render.
-pub(super) fn close(state: &mut State, words: &str) -> Vec<Effect> {
+pub(super) fn return_to_newest(state: &mut State, words: &str) -> Vec<Effect> {
     if let Some(newest) = state.picture.history.close() {
         state.picture.shown = Some(newest);
         show_notice(state, words);
@@ -85,14 +85,18 @@ pub(super) fn close(state: &mut State, words: &str) -> Vec<Effect> {
     Vec::new()
 }
 
-fn newest(state: &State) -> Option<crate::history::ShownImage> {
-    if state.picture.history.is_open() { state.picture.history.newest() } else { state.picture.shown.clone() }
+fn newest_image(state: &State) -> Option<crate::history::ShownImage> {
+    if state.picture.history.is_older_open() {
+        state.picture.history.newest_behind_open()
+    } else {
+        state.picture.shown.clone()
+    }
 }
 
 fn show_image(state: &mut State, shown: crate::history::ShownImage) -> Vec<Effect> {
     state.picture.shown = Some(shown);
     // The header shows the render's number and age.
-    let keys = &messages::HISTORY_KEYS[usize::from(state.picture.history.is_oldest_open())..];
+    let keys = &messages::HISTORY_KEYS[usize::from(state.picture.history.is_oldest_shown())..];
     let words = [&[&*state.picture.history.reason_of_open()], keys].concat().join(" · ");
     show_until_key(state, words);
     Vec::new()

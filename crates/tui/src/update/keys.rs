@@ -3,7 +3,7 @@
 use crossterm::event::{KeyCode, KeyModifiers};
 
 use super::notices::{notify, show_notice};
-use super::request::{render, resized_preview};
+use super::request::{request_render, request_resized_preview};
 use super::views::choose_view;
 use super::{camera, edit_position, history, overlay, pointer, region};
 use crate::ExitStatus;
@@ -17,13 +17,13 @@ use crate::pipeline::settings::View;
 use crate::preview_kind::PreviewKind;
 use crate::scene::description::{Integrator, Method, Shadows};
 use crate::scene::is_mesh;
-use crate::state::{Pane, State, Toggles};
+use crate::state::{KeyOverrides, Pane, State};
 
-pub(super) fn update(state: &mut State, key: KeyPress) -> Vec<Effect> {
-    if let Some(effects) = overlay::update(state, key) {
+pub(super) fn handle_key(state: &mut State, key: KeyPress) -> Vec<Effect> {
+    if let Some(effects) = overlay::handle_key(state, key) {
         return effects;
     }
-    let Some(action) = keymap::action(key) else {
+    let Some(action) = keymap::action_for(key) else {
         let is_digit = key == KeyPress { code: key.code, modifiers: KeyModifiers::NONE }
             && matches!(key.code, KeyCode::Char('1'..='9'));
         return if is_digit { notify(state, messages::VIEWS_FIRST) } else { Vec::new() };
@@ -31,12 +31,12 @@ pub(super) fn update(state: &mut State, key: KeyPress) -> Vec<Effect> {
     state.dirty |= state.overlays.message.take().is_some() | state.selection.facts.take().is_some();
     state.selection.is_focusing &= action == Action::Focus;
     if action != Action::RenderRegionFirst {
-        region::leave(state);
+        region::cancel_selection(state);
     }
-    act(state, action)
+    perform_action(state, action)
 }
 
-pub(super) fn act(state: &mut State, action: Action) -> Vec<Effect> {
+pub(super) fn perform_action(state: &mut State, action: Action) -> Vec<Effect> {
     match action {
         Action::CycleShadows => cycle_shadows(state),
         Action::ToggleDepthOfField => toggle_depth_of_field(state),
@@ -45,8 +45,8 @@ pub(super) fn act(state: &mut State, action: Action) -> Vec<Effect> {
         Action::NextView => step_view(state, 1),
         Action::PreviousView => step_view(state, View::ALL.len() - 1),
         Action::TogglePause => toggle_pause(state),
-        Action::RenderAgain => render(state, true),
-        Action::WriteImage => write_now(state),
+        Action::RenderAgain => request_render(state, true),
+        Action::WriteImage => write_image_now(state),
         Action::OrbitLeft => camera::orbit(state, -1.0, 0.0),
         Action::OrbitRight => camera::orbit(state, 1.0, 0.0),
         Action::OrbitUp => camera::orbit(state, 0.0, 1.0),
@@ -57,22 +57,22 @@ pub(super) fn act(state: &mut State, action: Action) -> Vec<Effect> {
         Action::WidenField => camera::zoom(state, 1.0),
         Action::Darken => camera::change_exposure(state, -1.0),
         Action::Brighten => camera::change_exposure(state, 1.0),
-        Action::KeepCamera => camera::keep(state),
-        Action::UndoCamera => camera::undo(state),
+        Action::KeepCamera => camera::save_camera(state),
+        Action::UndoCamera => camera::undo_saved_camera(state),
         Action::Inspect => pointer::inspect(state),
-        Action::Copy => pointer::copy(state),
-        Action::Focus => pointer::focus(state),
-        Action::ActualPixels => close_up(state),
-        Action::RenderRegionFirst => region::press(state),
+        Action::Copy => pointer::copy_values(state),
+        Action::Focus => pointer::focus_on_click(state),
+        Action::ActualPixels => toggle_close_up(state),
+        Action::RenderRegionFirst => region::handle_region_key(state),
         Action::ToggleMouse => pointer::toggle_mouse(state),
         Action::Edit if is_mesh(&state.request.scene) => notify(state, messages::NO_EDITOR_FOR_MODELS),
-        Action::Edit => vec![Effect::Edit(edit_position::to_edit(state))],
-        Action::CompareLastEdit => history::before_and_after(state),
+        Action::Edit => vec![Effect::Edit(edit_position::position_to_edit(state))],
+        Action::CompareLastEdit => history::toggle_before_edit(state),
         Action::OlderRender => history::browse(state, 1),
         Action::NewerRender => history::browse(state, -1),
-        Action::ResetSettings => scene_settings(state),
+        Action::ResetSettings => reset_to_scene_settings(state),
         Action::ToggleDiagnostics => toggle_diagnostics(state),
-        Action::ToggleHelp => change(state, |state| {
+        Action::ToggleHelp => change_and_render(state, |state| {
             state.overlays.help = Pane { open: !state.overlays.help.open, ..Pane::default() }
         }),
         Action::ShowImageOnly => show_image_only(state),
@@ -83,14 +83,14 @@ pub(super) fn act(state: &mut State, action: Action) -> Vec<Effect> {
     }
 }
 
-fn change(state: &mut State, how: impl FnOnce(&mut State)) -> Vec<Effect> {
+fn change_and_render(state: &mut State, how: impl FnOnce(&mut State)) -> Vec<Effect> {
     how(state);
     state.dirty = true;
     Vec::new()
 }
 
-/// Whether a setting differs from its value without changes made with keys.
-fn is_change<T: PartialEq>(next: &T, base: Option<T>) -> bool {
+/// Whether a setting differs from `base`, its value before any key changed it.
+fn differs_from_base<T: PartialEq>(next: &T, base: Option<T>) -> bool {
     base.is_none_or(|base| *next != base)
 }
 
@@ -98,8 +98,8 @@ fn cycle_integrator(state: &mut State) -> Vec<Effect> {
     let (all, own) = (Integrator::ALL, state.request.integrator());
     let next = all.iter().skip_while(|one| **one != own).nth(1).or(all.first());
     state.request.toggles.integrator =
-        next.copied().filter(|next| is_change(next, state.request.base_integrator()));
-    render(state, false)
+        next.copied().filter(|next| differs_from_base(next, state.request.base_integrator()));
+    request_render(state, false)
 }
 
 /// Name of an integrator that supports a setting. `None` if the current one supports it.
@@ -112,18 +112,19 @@ fn other_integrator(state: &State, supports: impl Fn(Method) -> bool) -> Option<
 
 fn cycle_shadows(state: &mut State) -> Vec<Effect> {
     if let Some(other) = other_integrator(state, |method| method.honors_shadows) {
-        return notify(state, &messages::soft_shadows(state.request.integrator().name(), other));
+        return notify(state, &messages::only_soft_shadows(state.request.integrator().name(), other));
     }
     let next = match state.request.shadows() {
         Shadows::Soft => Shadows::Hard,
         Shadows::Hard => Shadows::Off,
         Shadows::Off => Shadows::Soft,
     };
-    state.request.toggles.shadows = Some(next).filter(|next| is_change(next, state.request.base_shadows()));
-    render(state, false)
+    state.request.toggles.shadows =
+        Some(next).filter(|next| differs_from_base(next, state.request.base_shadows()));
+    request_render(state, false)
 }
 
-/// If depth of field is off although no setting turned it off, the camera is a pinhole.
+/// Toggles depth of field. If it is off although no setting turned it off, the camera is a pinhole.
 fn toggle_depth_of_field(state: &mut State) -> Vec<Effect> {
     let switched_off = state.request.overrides().dof == Some(false);
     match &state.request.effective {
@@ -135,17 +136,18 @@ fn toggle_depth_of_field(state: &mut State) -> Vec<Effect> {
     }
     // Unless depth of field is turned off, it depends on the lens.
     let base = state.request.command_line.dof.or(Some(true));
-    state.request.toggles.dof = Some(switched_off).filter(|next| is_change(next, base));
-    render(state, false)
+    state.request.toggles.dof = Some(switched_off).filter(|next| differs_from_base(next, base));
+    request_render(state, false)
 }
 
 fn toggle_photons(state: &mut State) -> Vec<Effect> {
     if let Some(other) = other_integrator(state, |method| method.gathers) {
-        return notify(state, &messages::no_photons(other));
+        return notify(state, &messages::photons_unsupported(other));
     }
     let next = !state.request.photons();
-    state.request.toggles.photons = Some(next).filter(|next| is_change(next, state.request.base_photons()));
-    render(state, false)
+    state.request.toggles.photons =
+        Some(next).filter(|next| differs_from_base(next, state.request.base_photons()));
+    request_render(state, false)
 }
 
 fn step_view(state: &mut State, steps: usize) -> Vec<Effect> {
@@ -165,15 +167,15 @@ fn show_image_only(state: &mut State) -> Vec<Effect> {
     }
     state.picture.is_alone = !state.picture.is_alone;
     state.dirty = true;
-    resized_preview(state)
+    request_resized_preview(state)
 }
 
 /// Toggles between actual pixels around the crosshair and the whole image.
-fn close_up(state: &mut State) -> Vec<Effect> {
+fn toggle_close_up(state: &mut State) -> Vec<Effect> {
     if state.request.preview_size.is_none() {
         return notify(state, messages::NO_PREVIEW);
     }
-    history::close(state, "");
+    history::return_to_newest(state, "");
     state.picture.close_up =
         if state.picture.close_up.is_some() { None } else { Some(state.selection.crosshair) };
     match state.picture.close_up {
@@ -181,7 +183,7 @@ fn close_up(state: &mut State) -> Vec<Effect> {
         None => state.overlays.message = None,
     }
     state.dirty = true;
-    resized_preview(state)
+    request_resized_preview(state)
 }
 
 fn toggle_pause(state: &mut State) -> Vec<Effect> {
@@ -193,29 +195,29 @@ fn toggle_pause(state: &mut State) -> Vec<Effect> {
     vec![Effect::Send(Command::Pause(state.work.paused))]
 }
 
-fn write_now(state: &mut State) -> Vec<Effect> {
-    let is_open = state.picture.history.is_open();
+fn write_image_now(state: &mut State) -> Vec<Effect> {
+    let is_open = state.picture.history.is_older_open();
     show_notice(state, if is_open { messages::WRITING_NEWEST } else { messages::WRITING });
     (state.saving.is_write_requested, state.saving.write_shows) = (true, state.request.sent_toggles);
     vec![Effect::Send(Command::Write)]
 }
 
-fn scene_settings(state: &mut State) -> Vec<Effect> {
-    if state.request.toggles == Toggles::default() {
+fn reset_to_scene_settings(state: &mut State) -> Vec<Effect> {
+    if state.request.toggles == KeyOverrides::default() {
         return notify(state, messages::NOTHING_TO_RESET);
     }
-    state.request.toggles = Toggles::default();
-    let effects = render(state, false);
+    state.request.toggles = KeyOverrides::default();
+    let effects = request_render(state, false);
     show_notice(state, messages::RESET);
     effects
 }
 
 fn toggle_diagnostics(state: &mut State) -> Vec<Effect> {
-    if state.overlays.problems.is_none() && state.reported().is_empty() {
+    if state.overlays.problems.is_none() && state.reported_diagnostics().is_empty() {
         let is_read = state.overlays.are_warnings_known || !state.work.is_running();
         return notify(state, if is_read { messages::NO_DIAGNOSTICS } else { messages::STILL_READING });
     }
-    change(state, |state| {
+    change_and_render(state, |state| {
         state.overlays.diagnostics.open = !state.overlays.diagnostics.open;
         state.overlays.diagnostics.scroll = 0;
     })

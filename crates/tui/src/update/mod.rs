@@ -17,7 +17,7 @@ use std::time::{Duration, Instant};
 
 pub(super) use self::notices::show_notice;
 use self::notices::show_until_key;
-use self::request::{render, resized_preview};
+use self::request::{request_render, request_resized_preview};
 use super::ExitStatus;
 use super::event::{Effect, Event, EventSource, Signal, Window};
 use super::history::ShownImage;
@@ -27,14 +27,14 @@ use super::preview_kind::PreviewKind;
 use super::state::{Message, OwnImage, PendingChange, State};
 use super::view::layout::Layout;
 use crate::film::Picture;
-use crate::pipeline::protocol::{Command, OwnState};
+use crate::pipeline::protocol::{Command, OwnImageState};
 
 /// How long the window size must be unchanged before a new preview is requested.
 const RESIZE_QUIET: Duration = Duration::from_millis(60);
 
 /// Creates the first request.
 pub(super) fn start(state: &mut State) -> Vec<Effect> {
-    render(state, false)
+    request_render(state, false)
 }
 
 /// Handles an event and returns its effects.
@@ -54,8 +54,8 @@ pub(super) fn update(state: &mut State, event: Event, now: Instant) -> Vec<Effec
 
 fn handle(state: &mut State, event: Event) -> Vec<Effect> {
     match event {
-        Event::Key(key) => keys::update(state, key),
-        Event::Mouse(mouse) => pointer::update(state, mouse),
+        Event::Key(key) => keys::handle_key(state, key),
+        Event::Mouse(mouse) => pointer::handle_mouse(state, mouse),
         // Pasted text is ignored. The other events are handled by the event loop.
         Event::Paste | Event::Written { .. } | Event::Unwritable(_) => Vec::new(),
         Event::TerminalReply(answer) => replies::handle_reply(state, answer),
@@ -65,29 +65,29 @@ fn handle(state: &mut State, event: Event) -> Vec<Effect> {
             Vec::new()
         }
         Event::Resize(window) => resize(state, window),
-        Event::Worker(event) => worker::update(state, event),
+        Event::Worker(event) => worker::handle_worker_event(state, event),
         Event::Picture { generation, picture, range, section, lacks_photons, source } => {
-            show(state, ShownImage { generation, picture, range, section, lacks_photons, source })
+            show_image(state, ShownImage { generation, picture, range, section, lacks_photons, source })
         }
         Event::Changed(Changed { noticed }) => {
-            // If glimt caused the change by writing the camera, or refused to write it because of the change,
-            // a message about that is shown. Keep it.
+            // Keep the message if glimt wrote the camera and thereby caused the change, or refused to write
+            // it because of the change.
             const OWN: Duration = Duration::from_secs(1);
             let is_of = |said: Option<Instant>| said.is_some_and(|said| state.now <= said + OWN);
             let (is_own, is_known) = (is_of(state.saving.camera_kept), is_of(state.saving.camera_refused));
             (state.saving.camera_kept, state.saving.camera_refused) = (None, None);
             state.saving.is_settled = false;
-            history::record(state);
+            history::record_image(state);
             if !is_own && !is_known {
                 (state.overlays.message, state.selection.facts) = (None, None);
             }
             if !is_own {
-                state.picture.history.edited();
+                state.picture.history.record_edit();
             }
             state.saving.edits += 1;
-            let effects = render(state, false);
+            let effects = request_render(state, false);
             state.saving.saved_at = state.request.generation;
-            state.saving.own = OwnImage { state: OwnState::NotBegun, fraction: 0.0 };
+            state.saving.own = OwnImage { state: OwnImageState::NotBegun, fraction: 0.0 };
             state.saving.last_edit = (!is_own).then_some(state.request.generation);
             // A change saved from the editor is visible only after the editor has exited.
             let noticed = state.saving.editor_closed.map_or(noticed, |back| noticed.max(back));
@@ -98,15 +98,15 @@ fn handle(state: &mut State, event: Event) -> Vec<Effect> {
             worker::show_delayed_errors(state);
             Vec::new()
         }
-        Event::Output(change) => worker::output_changed(state, &change),
+        Event::Output(change) => worker::handle_output_change(state, &change),
         Event::Signal(signal) => vec![effect_of_signal(signal)],
         Event::Shown { generation } => {
-            // The preview has been sent, so now update the history.
+            // The preview has been sent, so the history can be updated now.
             history::record_newest(state);
             handle_first_change(state, generation)
         }
         Event::Tick => tick(state),
-        Event::Lost(source) => lost(state, source),
+        Event::Lost(source) => handle_lost_source(state, source),
         Event::Back => {
             state.saving.editor_closed = Some(state.now);
             Vec::new()
@@ -122,12 +122,12 @@ fn handle(state: &mut State, event: Event) -> Vec<Effect> {
     }
 }
 
-fn show(state: &mut State, shown: ShownImage) -> Vec<Effect> {
+fn show_image(state: &mut State, shown: ShownImage) -> Vec<Effect> {
     if shown.generation == state.request.generation
         && is_whole(&shown.picture)
         && state.display.kind != PreviewKind::None
     {
-        if state.picture.history.hides_newer(&shown) {
+        if state.picture.history.store_behind_open(&shown) {
             history::record_newest(state);
             return Vec::new();
         }
@@ -184,9 +184,9 @@ fn resize(state: &mut State, window: Window) -> Vec<Effect> {
 }
 
 fn tick(state: &mut State) -> Vec<Effect> {
-    state.dirty |= state.work.is_running() && !state.work.paused || state.picture.history.is_open();
+    state.dirty |= state.work.is_running() && !state.work.paused || state.picture.history.is_older_open();
     let (now, bars) = (state.now, state.work.assets.len());
-    state.work.assets.retain(|asset| asset.end().is_none_or(|end| now < end));
+    state.work.assets.retain(|asset| asset.disappears_at().is_none_or(|end| now < end));
     state.dirty |= state.work.assets.len() != bars;
     state.dirty |= state.overlays.views.take_if(|views| now >= views.until).is_some();
     let is_over = |message: &mut Message| message.until.is_some_and(|until| now >= until);
@@ -198,7 +198,7 @@ fn tick(state: &mut State) -> Vec<Effect> {
         return Vec::new();
     }
     state.request.resize_due = None;
-    resized_preview(state)
+    request_resized_preview(state)
 }
 
 fn effect_of_signal(signal: Signal) -> Effect {
@@ -207,14 +207,14 @@ fn effect_of_signal(signal: Signal) -> Effect {
         Signal::Terminate => Effect::Quit(ExitStatus::TERMINATED),
         Signal::Quit => Effect::Quit(ExitStatus::ABORTED),
         Signal::Hangup => Effect::Quit(ExitStatus::HANGUP),
-        Signal::Other(number) => Effect::Quit(ExitStatus::signal(number)),
+        Signal::Other(number) => Effect::Quit(ExitStatus::from_signal(number)),
         Signal::Suspend => Effect::Suspend,
         Signal::Continue => Effect::Redraw,
         Signal::Resize => Effect::Measure,
     }
 }
 
-fn lost(state: &mut State, source: EventSource) -> Vec<Effect> {
+fn handle_lost_source(state: &mut State, source: EventSource) -> Vec<Effect> {
     match source {
         EventSource::Worker => vec![Effect::GiveUp],
         EventSource::Watcher => {

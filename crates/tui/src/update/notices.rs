@@ -11,15 +11,15 @@ const NOTICE: Duration = Duration::from_secs(4);
 /// Shows a notice for four seconds or until a key is pressed.
 pub(crate) fn show_notice(state: &mut State, words: impl Into<String>) {
     let until = Some(state.now + NOTICE);
-    show(state, Message { words: words.into(), until });
+    set_message(state, Message { words: words.into(), until });
 }
 
 /// Shows an error or prompt until a key is pressed.
 pub(super) fn show_until_key(state: &mut State, words: impl Into<String>) {
-    show(state, Message { words: words.into(), until: None });
+    set_message(state, Message { words: words.into(), until: None });
 }
 
-fn show(state: &mut State, message: Message) {
+fn set_message(state: &mut State, message: Message) {
     (state.overlays.message, state.selection.facts) = (Some(message), None);
     state.dirty = true;
 }

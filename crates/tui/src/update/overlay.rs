@@ -13,7 +13,7 @@ use crate::state::State;
 use crate::view::{diagnostics, help};
 
 /// Handles a key. `None` if it is not used by an open overlay.
-pub(super) fn update(state: &mut State, key: KeyPress) -> Option<Vec<Effect>> {
+pub(super) fn handle_key(state: &mut State, key: KeyPress) -> Option<Vec<Effect>> {
     if let Some(effects) = views::handle_search_key(state, key) {
         return Some(effects);
     }
@@ -21,17 +21,17 @@ pub(super) fn update(state: &mut State, key: KeyPress) -> Option<Vec<Effect>> {
         state.overlays.message = None;
         return Some(choose_view(state, view));
     }
-    let action = keymap::overlay(key)?;
-    if let Some(effects) = views::update(state, action) {
+    let action = keymap::overlay_action_for(key)?;
+    if let Some(effects) = views::handle_action(state, action) {
         return Some(effects);
     }
-    act(state, action).then(Vec::new)
+    perform_action(state, action).then(Vec::new)
 }
 
 /// Performs the action if an open overlay uses it. Returns whether one did.
-pub(super) fn act(state: &mut State, action: OverlayAction) -> bool {
+pub(super) fn perform_action(state: &mut State, action: OverlayAction) -> bool {
     match action {
-        OverlayAction::Close => close(state),
+        OverlayAction::Close => close_topmost(state),
         OverlayAction::LineUp => scroll(state, |line, _| line.saturating_sub(1)),
         OverlayAction::LineDown => scroll(state, |line, _| line + 1),
         OverlayAction::PageUp => scroll(state, |line, page| line.saturating_sub(page)),
@@ -51,9 +51,9 @@ fn view_of_digit(state: &State, key: KeyPress) -> Option<View> {
     View::ALL.get(digit.to_digit(10)? as usize - 1).copied()
 }
 
-/// Closes or cancels the topmost item, in this order: panes, waiting for a click or drag, inspected values,
-/// an older render.
-fn close(state: &mut State) -> bool {
+/// Closes or cancels the first of these that is active: a pane, waiting for a click or drag, inspected
+/// values, viewing an older render.
+fn close_topmost(state: &mut State) -> bool {
     let is_open = if state.overlays.help.open {
         state.overlays.help.open = false;
         true
@@ -64,12 +64,12 @@ fn close(state: &mut State) -> bool {
         true
     } else if state.selection.is_focusing || state.selection.is_marking {
         (state.selection.is_focusing, state.overlays.message) = (false, None);
-        region::leave(state);
+        region::cancel_selection(state);
         true
     } else if state.selection.facts.take().is_some() {
         true
-    } else if state.picture.history.is_open() {
-        history::close(state, messages::NEWEST_RENDER);
+    } else if state.picture.history.is_older_open() {
+        history::return_to_newest(state, messages::NEWEST_RENDER);
         true
     } else {
         false
@@ -78,12 +78,12 @@ fn close(state: &mut State) -> bool {
     is_open
 }
 
-/// Scrolls the help, or the diagnostics pane if its content does not fit. Otherwise the keys have their usual
-/// function.
+/// Scrolls the help, or the diagnostics pane if its content does not fit. Returns false if nothing scrolls,
+/// in which case the key has its usual function.
 fn scroll(state: &mut State, step: impl FnOnce(usize, usize) -> usize) -> bool {
     let (is_help, (page, last)) = match () {
-        () if state.overlays.help.open => (true, help::extent(state)),
-        () if state.overlays.diagnostics.open => (false, diagnostics::extent(state)),
+        () if state.overlays.help.open => (true, help::scroll_extent(state)),
+        () if state.overlays.diagnostics.open => (false, diagnostics::scroll_extent(state)),
         () => return false,
     };
     let pane = if is_help { &mut state.overlays.help } else { &mut state.overlays.diagnostics };

@@ -10,35 +10,36 @@ use crate::messages;
 use crate::pipeline::protocol::{Command, Picked, PickedObject};
 use crate::scene::is_mesh;
 use crate::scene::sanitize::visible;
-use crate::state::{PickPurpose, Press, State};
+use crate::state::{MousePress, PickPurpose, State};
 use crate::view;
 use crate::view::layout::Layout;
-use crate::view::preview::spot_at;
+use crate::view::preview::image_position_at;
 use crate::window_title;
 
 /// Rotation in degrees when dragging across the width of the preview.
 const TURN_ACROSS: f64 = 180.0;
 
 /// Handles a mouse event.
-pub(super) fn update(state: &mut State, mouse: Mouse) -> Vec<Effect> {
+pub(super) fn handle_mouse(state: &mut State, mouse: Mouse) -> Vec<Effect> {
     match mouse.kind {
         MouseKind::Press => {
-            let is_on_picture = Layout::of(state).preview.contains((mouse.column, mouse.row).into());
+            let is_on_picture = Layout::for_state(state).preview.contains((mouse.column, mouse.row).into());
             let Mouse { column, row, .. } = mouse;
-            if let Some(at) = view::picture_at(state, column, row) {
+            if let Some(at) = view::history_entry_at(state, column, row) {
                 return history::open_at(state, at);
             }
-            let from = spot_at(state, column, row);
-            state.selection.press = is_on_picture.then_some(Press { column, row, has_moved: false, from });
+            let from = image_position_at(state, column, row);
+            state.selection.press =
+                is_on_picture.then_some(MousePress { column, row, has_moved: false, from });
             Vec::new()
         }
-        MouseKind::Drag => drag(state, mouse),
+        MouseKind::Drag => drag_to_orbit(state, mouse),
         MouseKind::Release if state.selection.is_marking && state.selection.press.take().is_some() => {
-            let spot = spot_at(state, mouse.column, mouse.row);
-            region::release(state, spot)
+            let spot = image_position_at(state, mouse.column, mouse.row);
+            region::end_drag(state, spot)
         }
         MouseKind::Release => match state.selection.press.take() {
-            Some(press) if !press.has_moved => click(state, mouse),
+            Some(press) if !press.has_moved => handle_click(state, mouse),
             Some(_) | None => Vec::new(),
         },
         MouseKind::WheelUp | MouseKind::WheelDown if is_on_pane(state, mouse) => {
@@ -47,7 +48,7 @@ pub(super) fn update(state: &mut State, mouse: Mouse) -> Vec<Effect> {
             } else {
                 OverlayAction::LineDown
             };
-            overlay::act(state, line);
+            overlay::perform_action(state, line);
             Vec::new()
         }
         MouseKind::WheelUp => camera::dolly(state, 1.0),
@@ -56,15 +57,15 @@ pub(super) fn update(state: &mut State, mouse: Mouse) -> Vec<Effect> {
 }
 
 fn is_on_pane(state: &State, mouse: Mouse) -> bool {
-    let is_on_errors = || Layout::of(state).pane.contains((mouse.column, mouse.row).into());
+    let is_on_errors = || Layout::for_state(state).pane.contains((mouse.column, mouse.row).into());
     state.overlays.help.open || state.overlays.diagnostics.open && is_on_errors()
 }
 
 /// Orbits the camera so that the scene follows the mouse.
-fn drag(state: &mut State, mouse: Mouse) -> Vec<Effect> {
+fn drag_to_orbit(state: &mut State, mouse: Mouse) -> Vec<Effect> {
     let Some(press) = state.selection.press else { return Vec::new() };
     if state.selection.is_marking {
-        if let Some((from, to)) = press.from.zip(spot_at(state, mouse.column, mouse.row)) {
+        if let Some((from, to)) = press.from.zip(image_position_at(state, mouse.column, mouse.row)) {
             region::drag(state, from, to);
         }
         return Vec::new();
@@ -74,33 +75,34 @@ fn drag(state: &mut State, mouse: Mouse) -> Vec<Effect> {
     if right == 0.0 && down == 0.0 {
         return Vec::new();
     }
-    state.selection.press = Some(Press { column: mouse.column, row: mouse.row, has_moved: true, ..press });
-    let degrees = TURN_ACROSS / f64::from(Layout::of(state).preview.width.max(1));
+    state.selection.press =
+        Some(MousePress { column: mouse.column, row: mouse.row, has_moved: true, ..press });
+    let degrees = TURN_ACROSS / f64::from(Layout::for_state(state).preview.width.max(1));
     camera::orbit_by(state, -right * degrees, down * f64::from(state.display.window.cell_aspect) * degrees)
 }
 
-fn click(state: &mut State, mouse: Mouse) -> Vec<Effect> {
-    if state.picture.history.is_open() {
+fn handle_click(state: &mut State, mouse: Mouse) -> Vec<Effect> {
+    if state.picture.history.is_older_open() {
         return notify(state, messages::OLDER_RENDER);
     }
-    let Some(spot) = spot_at(state, mouse.column, mouse.row) else { return Vec::new() };
+    let Some(spot) = image_position_at(state, mouse.column, mouse.row) else { return Vec::new() };
     state.selection.crosshair = spot;
     let purpose = if std::mem::take(&mut state.selection.is_focusing) {
         PickPurpose::Focus
     } else {
         PickPurpose::Inspect
     };
-    ask(state, purpose)
+    send_pick_query(state, purpose)
 }
 
 /// Queries the object at the crosshair.
 pub(super) fn inspect(state: &mut State) -> Vec<Effect> {
-    ask(state, PickPurpose::Inspect)
+    send_pick_query(state, PickPurpose::Inspect)
 }
 
 /// Waits for a click. If already waiting, focuses at the crosshair.
-pub(super) fn focus(state: &mut State) -> Vec<Effect> {
-    if state.picture.history.is_open() {
+pub(super) fn focus_on_click(state: &mut State) -> Vec<Effect> {
+    if state.picture.history.is_older_open() {
         return notify(state, messages::OLDER_RENDER);
     }
     if state.request.viewpoint().is_some_and(|view| view.aperture == 0.0) {
@@ -112,11 +114,11 @@ pub(super) fn focus(state: &mut State) -> Vec<Effect> {
         return prompt(state, messages::CLICK_TO_FOCUS);
     }
     state.selection.is_focusing = false;
-    ask(state, PickPurpose::Focus)
+    send_pick_query(state, PickPurpose::Focus)
 }
 
-fn ask(state: &mut State, purpose: PickPurpose) -> Vec<Effect> {
-    if state.picture.history.is_open() {
+fn send_pick_query(state: &mut State, purpose: PickPurpose) -> Vec<Effect> {
+    if state.picture.history.is_older_open() {
         return notify(state, messages::OLDER_RENDER);
     }
     if state.request.camera.is_none() {
@@ -135,9 +137,9 @@ pub(super) fn toggle_mouse(state: &mut State) -> Vec<Effect> {
 }
 
 /// Handles the reply to a pick query.
-pub(super) fn picked(state: &mut State, picked: &Picked) -> Vec<Effect> {
+pub(super) fn handle_pick(state: &mut State, picked: &Picked) -> Vec<Effect> {
     // An older render was opened after the click.
-    if state.picture.history.is_open() {
+    if state.picture.history.is_older_open() {
         return Vec::new();
     }
     let in_text = picked.thing.as_ref().filter(|thing| !is_mesh(&thing.path));
@@ -146,7 +148,7 @@ pub(super) fn picked(state: &mut State, picked: &Picked) -> Vec<Effect> {
     match (state.selection.purpose, &picked.thing) {
         (PickPurpose::Inspect, _) => {
             state.overlays.message = None;
-            let facts = facts(picked);
+            let facts = inspected_values(picked);
             state.selection.clicked = Some(values_with_pixel(picked, &facts));
             state.selection.facts = Some(facts);
             state.dirty = true;
@@ -167,7 +169,7 @@ fn focus_at(state: &mut State, depth: f64) -> Vec<Effect> {
         return notify(state, messages::PINHOLE);
     }
     state.request.toggles.camera.focus = Some(distance);
-    let effects = camera::camera_step(state);
+    let effects = camera::handle_camera_step(state);
     if state.request.toggles.camera.focus.is_some() {
         show_notice(state, messages::focus_moved(distance));
     }
@@ -181,8 +183,8 @@ fn values_with_pixel(Picked { thing, pixel: [x, y], .. }: &Picked, facts: &[Stri
 }
 
 /// Copies the inspected values if the terminal supports it.
-pub(super) fn copy(state: &mut State) -> Vec<Effect> {
-    if state.picture.history.is_open() {
+pub(super) fn copy_values(state: &mut State) -> Vec<Effect> {
+    if state.picture.history.is_older_open() {
         return notify(state, messages::OLDER_RENDER);
     }
     let Some(clicked) = state.selection.clicked.clone() else {
@@ -193,12 +195,12 @@ pub(super) fn copy(state: &mut State) -> Vec<Effect> {
         return notify(state, &format!("{} {clicked}", messages::SELECT_TO_COPY));
     }
     show_notice(state, format!("{} {clicked}", messages::COPIED));
-    vec![Effect::Aside(window_title::copy(&clicked))]
+    vec![Effect::Aside(window_title::clipboard_bytes(&clicked))]
 }
 
 /// Shape and name, line, material, distance, position, radiance and normal.
-fn facts(Picked { thing, color, pixel: [x, y] }: &Picked) -> Vec<String> {
-    let light = color.map(|color| format!("radiance {}", numbers(color.map(f64::from))));
+fn inspected_values(Picked { thing, color, pixel: [x, y] }: &Picked) -> Vec<String> {
+    let light = color.map(|color| format!("radiance {}", format_vector(color.map(f64::from))));
     let Some(thing) = thing else {
         return [format!("nothing at pixel {x}, {y}")].into_iter().chain(light).collect();
     };
@@ -211,20 +213,20 @@ fn facts(Picked { thing, color, pixel: [x, y] }: &Picked) -> Vec<String> {
     facts.extend((!is_mesh(path)).then(|| format!("{}:{line}", visible(&file))));
     facts.extend([
         visible(material).into_owned(),
-        format!("distance {}", number(*distance)),
-        format!("position {}", numbers(*position)),
+        format!("distance {}", format_number(*distance)),
+        format!("position {}", format_vector(*position)),
     ]);
     facts.extend(light);
-    facts.push(format!("normal {}{back}", numbers(normal.map(f64::from))));
+    facts.push(format!("normal {}{back}", format_vector(normal.map(f64::from))));
     facts
 }
 
-fn numbers(all: [f64; 3]) -> String {
-    format!("({})", all.map(number).join(", "))
+fn format_vector(all: [f64; 3]) -> String {
+    format!("({})", all.map(format_number).join(", "))
 }
 
 /// Formats a number with three significant digits, or with all digits before the decimal point.
-fn number(number: f64) -> String {
+fn format_number(number: f64) -> String {
     let digits = if number == 0.0 { 0.0 } else { 2.0 - libm::floor(libm::log10(number.abs())) };
     rounded(number, libm::pow(10.0, -digits.clamp(0.0, 3.0))).to_string()
 }
@@ -249,7 +251,7 @@ mod tests {
         };
         let picked = Picked { pixel: [3, 4], thing: Some(thing), color: Some([0.61, 1234.56, 1e-6]) };
         assert_eq!(
-            facts(&picked),
+            inspected_values(&picked),
             [
                 "sphere \"ball\"",
                 "still.toml:47",
@@ -262,8 +264,11 @@ mod tests {
         );
         let of_model =
             picked.thing.clone().map(|thing| PickedObject { path: "scenes/vase.obj".into(), ..thing });
-        let of_model = facts(&Picked { thing: of_model, ..picked });
+        let of_model = inspected_values(&Picked { thing: of_model, ..picked });
         assert_eq!(of_model[..2], ["sphere \"ball\"", "glass crystal"], "models should have no line numbers");
-        assert_eq!(facts(&Picked { thing: None, color: None, ..picked }), ["nothing at pixel 3, 4"]);
+        assert_eq!(
+            inspected_values(&Picked { thing: None, color: None, ..picked }),
+            ["nothing at pixel 3, 4"]
+        );
     }
 }

@@ -1,7 +1,7 @@
 //! The image region to render first.
 
 use super::notices::{prompt, show_notice};
-use super::request::render;
+use super::request::request_render;
 use crate::event::Effect;
 use crate::messages;
 use crate::pipeline::protocol::{ImagePosition, Section};
@@ -12,10 +12,10 @@ const SIDE: f64 = 1.0 / 3.0;
 
 /// Handles the key. The first press waits for a drag, the second selects the region around the crosshair, and
 /// the third clears the region.
-pub(super) fn press(state: &mut State) -> Vec<Effect> {
+pub(super) fn handle_region_key(state: &mut State) -> Vec<Effect> {
     if state.request.first_section.take().is_some() {
         (state.selection.is_marking, state.selection.press) = (false, None);
-        let effects = again(state);
+        let effects = restart_render(state);
         show_notice(state, messages::REGION_CLEARED);
         return effects;
     }
@@ -23,11 +23,11 @@ pub(super) fn press(state: &mut State) -> Vec<Effect> {
         state.selection.is_marking = true;
         return prompt(state, messages::DRAG_REGION);
     }
-    take(state, around(state.selection.crosshair))
+    render_section(state, section_around(state.selection.crosshair))
 }
 
 /// Stops waiting for a drag, cancelling any drag in progress.
-pub(super) fn leave(state: &mut State) {
+pub(super) fn cancel_selection(state: &mut State) {
     if std::mem::take(&mut state.selection.is_marking) {
         (state.request.first_section, state.selection.press) = (None, None);
     }
@@ -40,30 +40,30 @@ pub(super) fn drag(state: &mut State, from: ImagePosition, to: ImagePosition) {
 }
 
 /// Ends the drag and uses the selected region, or a region around the position if there was no drag.
-pub(super) fn release(state: &mut State, spot: Option<ImagePosition>) -> Vec<Effect> {
+pub(super) fn end_drag(state: &mut State, spot: Option<ImagePosition>) -> Vec<Effect> {
     match (state.request.first_section, spot) {
-        (Some(marked), _) => take(state, marked),
-        (None, Some(spot)) => take(state, around(spot)),
+        (Some(marked), _) => render_section(state, marked),
+        (None, Some(spot)) => render_section(state, section_around(spot)),
         (None, None) => Vec::new(),
     }
 }
 
-fn around(spot: ImagePosition) -> Section {
+fn section_around(spot: ImagePosition) -> Section {
     let start = |middle: f64| (middle - SIDE / 2.0).clamp(0.0, 1.0 - SIDE);
     Section { left: start(spot.x), top: start(spot.y), width: SIDE, height: SIDE }
 }
 
-fn take(state: &mut State, section: Section) -> Vec<Effect> {
+fn render_section(state: &mut State, section: Section) -> Vec<Effect> {
     state.selection.is_marking = false;
     state.request.first_section = Some(section);
     let words = if state.work.is_running() { messages::REGION_FIRST } else { messages::REGION_NEXT };
-    let effects = again(state);
+    let effects = restart_render(state);
     show_notice(state, words);
     effects
 }
 
 /// Restarts a running render to change the order of rendering. Samples are kept.
-fn again(state: &mut State) -> Vec<Effect> {
+fn restart_render(state: &mut State) -> Vec<Effect> {
     state.dirty = true;
-    if state.work.is_running() && !state.work.paused { render(state, false) } else { Vec::new() }
+    if state.work.is_running() && !state.work.paused { request_render(state, false) } else { Vec::new() }
 }

@@ -1,7 +1,7 @@
 //! Handles terminal replies that report capabilities.
 
 use super::notices::show_until_key;
-use super::request::resized_preview;
+use super::request::request_resized_preview;
 use crate::color::{ColorDepth, ColorMapper};
 use crate::event::Effect;
 use crate::graphics::Protocol;
@@ -13,17 +13,19 @@ use crate::terminal_replies::TerminalReply;
 use crate::terminals::TerminalId;
 use crate::view::ramp;
 
-/// Enables newly confirmed capabilities if they were queried.
+/// Enables the capability that a reply confirms, if it was queried.
 pub(super) fn handle_reply(state: &mut State, answer: TerminalReply) -> Vec<Effect> {
     let mut effects = check_pixel_support(state, answer);
     match answer {
-        TerminalReply::Name(terminal) => effects.extend(name(state, terminal)),
+        TerminalReply::Name(terminal) => effects.extend(handle_terminal_name(state, terminal)),
         TerminalReply::Focus { is_here } => state.display.has_focus = is_here,
-        TerminalReply::TrueColor if state.display.ask.true_color => show(state, ColorDepth::TrueColor),
+        TerminalReply::TrueColor if state.display.ask.true_color => {
+            set_color_depth(state, ColorDepth::TrueColor);
+        }
         TerminalReply::Ink { index, rgb } if state.display.ask.palette => {
             if let Some(ink) = state.display.ansi.get_mut(usize::from(index)).filter(|ink| **ink != rgb) {
                 *ink = rgb;
-                show(state, state.display.depth);
+                set_color_depth(state, state.display.depth);
             }
         }
         TerminalReply::Background(rgb) if state.display.ask.background => {
@@ -82,10 +84,10 @@ fn check_pixel_support(state: &mut State, answer: TerminalReply) -> Vec<Effect> 
         }
         PixelSupport::Has => {
             (state.display.pixels, state.display.pixels_until) = (None, None);
-            state.overlays.message.take_if(|message| message.words == request.refusal());
+            state.overlays.message.take_if(|message| message.words == request.refusal_message());
             state.display.kind = PreviewKind::Pixels(request.protocol);
             state.dirty = true;
-            resized_preview(state)
+            request_resized_preview(state)
         }
     }
 }
@@ -94,18 +96,18 @@ fn check_pixel_support(state: &mut State, answer: TerminalReply) -> Vec<Effect> 
 pub(super) fn report_missing_pixels(state: &mut State) {
     let asked = state.display.pixels_until.take().and(state.display.pixels);
     if let Some(request) = asked {
-        show_until_key(state, request.refusal());
+        show_until_key(state, request.refusal_message());
     }
 }
 
-fn show(state: &mut State, depth: ColorDepth) {
+fn set_color_depth(state: &mut State, depth: ColorDepth) {
     state.display.depth = depth;
     state.display.shades = ColorMapper::new(depth, &state.display.ansi);
     state.dirty = true;
 }
 
 /// If the terminal's name was queried, uses it to determine block characters and other capabilities.
-fn name(state: &mut State, terminal: TerminalId) -> Vec<Effect> {
+fn handle_terminal_name(state: &mut State, terminal: TerminalId) -> Vec<Effect> {
     let ask = state.display.ask;
     let mut effects = Vec::new();
     if ask.name {
@@ -114,7 +116,7 @@ fn name(state: &mut State, terminal: TerminalId) -> Vec<Effect> {
         state.dirty = true;
     }
     if ask.blocks {
-        effects.extend(use_blocks(state, BlockGlyphs::of(terminal)));
+        effects.extend(use_blocks(state, BlockGlyphs::supported_by(terminal)));
     }
     effects
 }
@@ -129,7 +131,7 @@ fn use_blocks(state: &mut State, blocks: BlockGlyphs) -> Vec<Effect> {
         state.display.kind = kind;
         state.dirty = true;
     }
-    resized_preview(state)
+    request_resized_preview(state)
 }
 
 #[cfg(test)]
@@ -151,7 +153,7 @@ mod tests {
         let mut state = state(80, 24);
         let request = PixelRequest { protocol: Protocol::Kitty, route, is_known: false };
         state.display.pixels = Some(request);
-        state.display.pixels_until = Some(request.deadline(state.now));
+        state.display.pixels_until = Some(request.reply_deadline(state.now));
         TestUi::with(state)
     }
 
@@ -159,10 +161,10 @@ mod tests {
     fn pixels_are_drawn_once_confirmed() {
         let mut ui = ui_requesting_pixels(ImageRoute::Direct);
         assert_eq!(ui.state.display.kind, PreviewKind::HalfBlock);
-        let effects = ui.event(Event::TerminalReply(TerminalReply::Images(Protocol::Kitty)));
+        let effects = ui.handle_event(Event::TerminalReply(TerminalReply::Images(Protocol::Kitty)));
         assert!(matches!(&effects[..], [Effect::Send(Command::Preview(Some(_)))]), "{effects:?}");
-        ui.event(Event::TerminalReply(TerminalReply::Attributes));
-        ui.wait(2000);
+        ui.handle_event(Event::TerminalReply(TerminalReply::Attributes));
+        ui.advance_clock(2000);
         assert_eq!(ui.state.display.kind, PreviewKind::Pixels(Protocol::Kitty));
         assert_eq!(ui.state.overlays.message, None);
     }
@@ -170,27 +172,27 @@ mod tests {
     #[test]
     fn missing_pixel_support_is_reported_once() {
         let mut ui = ui_requesting_pixels(ImageRoute::Direct);
-        ui.event(Event::TerminalReply(TerminalReply::Attributes));
+        ui.handle_event(Event::TerminalReply(TerminalReply::Attributes));
         assert!(ui.text().contains("kitty images"), "{}", ui.text());
-        let refusal = ui.state.display.pixels.map(PixelRequest::refusal);
+        let refusal = ui.state.display.pixels.map(PixelRequest::refusal_message);
         assert_eq!(ui.state.overlays.message.as_ref().map(|message| message.words.clone()), refusal);
         assert_eq!(ui.state.display.kind, PreviewKind::HalfBlock);
         ui.press('s');
-        ui.event(Event::TerminalReply(TerminalReply::Attributes));
-        ui.wait(2000);
+        ui.handle_event(Event::TerminalReply(TerminalReply::Attributes));
+        ui.advance_clock(2000);
         assert!(!ui.text().contains("kitty images"), "should be reported only once: {}", ui.text());
     }
 
     #[test]
     fn tmux_without_passthrough_is_reported() {
         let mut ui = ui_requesting_pixels(ImageRoute::Tmux);
-        ui.event(Event::TerminalReply(TerminalReply::Attributes));
-        ui.wait(900);
+        ui.handle_event(Event::TerminalReply(TerminalReply::Attributes));
+        ui.advance_clock(900);
         assert_eq!(ui.state.overlays.message, None);
         assert!(ui.state.next_tick().is_some_and(|tick| tick <= ui.now + Duration::from_millis(100)));
-        ui.wait(100);
+        ui.advance_clock(100);
         assert!(ui.text().contains("allow-passthrough on"), "{}", ui.text());
-        ui.event(Event::TerminalReply(TerminalReply::Images(Protocol::Kitty)));
+        ui.handle_event(Event::TerminalReply(TerminalReply::Images(Protocol::Kitty)));
         assert_eq!(ui.state.display.kind, PreviewKind::Pixels(Protocol::Kitty));
         assert!(!ui.text().contains("allow-passthrough"), "{}", ui.text());
     }

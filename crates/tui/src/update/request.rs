@@ -3,35 +3,35 @@
 use super::history;
 use crate::event::Effect;
 use crate::pipeline::protocol::{Command, Request, Writing};
-use crate::state::{Activity, CameraStep, Rendering, State, Toggles};
+use crate::state::{Activity, CameraStep, KeyOverrides, Rendering, State};
 use crate::view::layout::Layout;
 
 /// Creates a request with the current settings. The stage table is unchanged until the worker starts on the
 /// request.
-pub(super) fn render(state: &mut State, force: bool) -> Vec<Effect> {
+pub(super) fn request_render(state: &mut State, force: bool) -> Vec<Effect> {
     // Do not fill the history while the camera is moving.
     if state.request.camera_step.generation == Some(state.request.generation) {
         state.picture.history.drop_unfinished(state.request.generation);
     } else {
-        history::record(state);
+        history::record_image(state);
     }
     state.picture.shown = state.picture.history.close().or_else(|| state.picture.shown.take());
     let before = std::mem::replace(&mut state.request.sent_toggles, state.request.toggles);
-    let now = Toggles { exposure: before.exposure, ..state.request.toggles };
+    let now = KeyOverrides { exposure: before.exposure, ..state.request.toggles };
     state.request.is_exposure_only = before == now && before != state.request.toggles;
     if state.request.is_exposure_only {
         // Exposure only affects how the image is displayed.
         state.picture.history.transfer_to_next(state.request.generation);
     }
     state.request.generation += 1;
-    let is_moved = state.request.toggles.camera.is_any();
+    let is_moved = state.request.toggles.camera.has_changes();
     state.request.moved_since =
         is_moved.then_some(state.request.moved_since.unwrap_or(state.request.generation));
-    state.request.note_moved_parts();
+    state.request.record_moved_parts();
     state.request.preview_size = Layout::preview_size(state);
     state.request.resize_due = None;
     state.request.camera_step = CameraStep::default();
-    // Set again if this request turns out to be for a saved change.
+    // Set again later if this request is for a saved change.
     (state.saving.change, state.saving.first_change) = (None, None);
     state.overlays.unconfirmed = None;
     state.overlays.are_warnings_known = false;
@@ -41,8 +41,8 @@ pub(super) fn render(state: &mut State, force: bool) -> Vec<Effect> {
         scene: state.request.scene.clone(),
         overrides: state.request.overrides(),
         preview: state.request.preview_size,
-        write: if state.request.is_own() { Writing::Try } else { Writing::No },
-        own: state.request.own_overrides(),
+        write: if state.request.is_own_image() { Writing::Try } else { Writing::No },
+        own: state.request.own_image_overrides(),
         force,
         first: state.request.first_section,
     };
@@ -59,7 +59,7 @@ pub(super) fn render(state: &mut State, force: bool) -> Vec<Effect> {
 
 /// If the window size has changed, requests a preview of the same image at the new size, without restarting
 /// the render.
-pub(super) fn resized_preview(state: &mut State) -> Vec<Effect> {
+pub(super) fn request_resized_preview(state: &mut State) -> Vec<Effect> {
     let size = Layout::preview_size(state);
     if size == state.request.preview_size || size.is_none() {
         return Vec::new();

@@ -3,23 +3,23 @@
 use crossterm::event::{KeyCode, KeyModifiers};
 
 use super::notices::show_notice;
-use super::request::render;
+use super::request::request_render;
 use crate::choice::Choice;
 use crate::event::{Effect, KeyPress};
 use crate::keymap::OverlayAction;
 use crate::messages;
 use crate::pipeline::settings::View;
 use crate::state::State;
-use crate::view::views::rows;
+use crate::view::views::rows_per_column;
 
 /// Handles an overlay action. `None` if the list is closed or covered by the help.
-pub(super) fn update(state: &mut State, action: OverlayAction) -> Option<Vec<Effect>> {
+pub(super) fn handle_action(state: &mut State, action: OverlayAction) -> Option<Vec<Effect>> {
     if state.overlays.views.is_none() || state.overlays.help.open {
         return None;
     }
     let current = View::ALL.iter().position(|view| *view == state.request.view()).unwrap_or(0);
     let last = View::ALL.len() - 1;
-    let column = rows(state);
+    let column = rows_per_column(state);
     let chosen = match action {
         OverlayAction::LineUp => current.saturating_sub(1),
         OverlayAction::LineDown => (current + 1).min(last),
@@ -29,16 +29,16 @@ pub(super) fn update(state: &mut State, action: OverlayAction) -> Option<Vec<Eff
         OverlayAction::PageUp => 0,
         OverlayAction::PageDown => last,
         OverlayAction::Find => {
-            search(state, String::new());
+            search_view(state, String::new());
             return Some(Vec::new());
         }
         OverlayAction::Take => {
-            close(state);
+            close_list(state);
             return Some(Vec::new());
         }
         OverlayAction::Close => return None,
     };
-    Some(choose(state, View::ALL[chosen]))
+    Some(select_if_changed(state, View::ALL[chosen]))
 }
 
 /// Handles a key while the user types a search text. `None` if no search is active.
@@ -49,25 +49,28 @@ pub(super) fn handle_search_key(state: &mut State, key: KeyPress) -> Option<Vec<
         KeyCode::Char(letter) if !is_held => name.extend(letter.to_lowercase()),
         KeyCode::Backspace => drop(name.pop()),
         KeyCode::Enter | KeyCode::Esc => {
-            close(state);
+            close_list(state);
             return Some(Vec::new());
         }
         _ => return None,
     }
     let found = find_view(&name);
-    search(state, name);
-    Some(found.map_or_else(Vec::new, |view| choose(state, view)))
+    search_view(state, name);
+    Some(found.map_or_else(Vec::new, |view| select_if_changed(state, view)))
 }
 
 /// Selects a view and opens the list.
 pub(super) fn choose_view(state: &mut State, view: View) -> Vec<Effect> {
     state.list_views();
     state.request.toggles.view = (view != state.request.base_view()).then_some(view);
-    let effects = render(state, false);
+    let effects = request_render(state, false);
     if state.request.toggles.view.is_some() {
         let is_empty = view == View::Photons && !state.request.photons();
-        let words =
-            if is_empty { messages::VIEW_WITHOUT_PHOTONS.to_owned() } else { messages::view(view.name()) };
+        let words = if is_empty {
+            messages::VIEW_WITHOUT_PHOTONS.to_owned()
+        } else {
+            messages::view_chosen(view.name())
+        };
         show_notice(state, words);
     }
     effects
@@ -81,20 +84,20 @@ fn find_view(name: &str) -> Option<View> {
     all().find(begins).or_else(|| all().find(has)).copied()
 }
 
-fn search(state: &mut State, name: String) {
+fn search_view(state: &mut State, name: String) {
     state.list_views();
     if let Some(views) = &mut state.overlays.views {
         views.name = Some(name);
     }
 }
 
-fn close(state: &mut State) {
+fn close_list(state: &mut State) {
     state.overlays.views = None;
     state.dirty = true;
 }
 
 /// Selects a view unless it is already selected.
-fn choose(state: &mut State, view: View) -> Vec<Effect> {
+fn select_if_changed(state: &mut State, view: View) -> Vec<Effect> {
     state.list_views();
     if view == state.request.view() {
         return Vec::new();

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use super::notices::{show_notice, show_until_key};
-use super::request::resized_preview;
+use super::request::request_resized_preview;
 use super::{camera, history, pointer};
 use crate::event::{Effect, WriteFailure};
 use crate::exit_summary;
@@ -12,20 +12,21 @@ use crate::messages;
 use crate::noise_curve::NoiseCurve;
 use crate::options::OutputChange;
 use crate::pipeline::protocol::{
-    AssetProgress, CheckpointNews, Event, Failure, LastGoodEnd, OwnState, Report, Stage, StageReport, Status,
+    AssetProgress, CheckpointNews, Event, Failure, LastValidSceneEnd, OwnImageState, Report, Stage,
+    StageReport, Status,
 };
 use crate::scene::MOST_COMPARED_BYTES;
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::sanitize::visible;
-use crate::state::{Activity, AssetBar, OwnImage, Pane, Problems, Rendering, State, WrittenFile};
+use crate::state::{Activity, AssetBar, BlockingErrors, OwnImage, Pane, Rendering, State, WrittenFile};
 use crate::window_title;
 
-pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
+pub(super) fn handle_worker_event(state: &mut State, event: Event) -> Vec<Effect> {
     let event = match event {
         // Replies to user actions are never outdated.
-        Event::CameraKept { outcome, .. } => return camera::kept(state, outcome),
-        Event::CameraUndone { outcome, .. } => return camera::undone(state, outcome),
-        Event::Picked { picked, .. } => return pointer::picked(state, &picked),
+        Event::CameraKept { outcome, .. } => return camera::handle_saved_camera(state, outcome),
+        Event::CameraUndone { outcome, .. } => return camera::handle_undone_camera(state, outcome),
+        Event::Picked { picked, .. } => return pointer::handle_pick(state, &picked),
         Event::WriteDone { paths, .. } => {
             report_written(state, &paths);
             return Vec::new();
@@ -36,21 +37,21 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
             return Vec::new();
         }
         Event::Done { generation, report, .. } if generation != state.request.generation => {
-            describe(state, generation, &report);
+            describe_files(state, generation, &report);
             return Vec::new();
         }
         event => event,
     };
-    if generation(&event) != state.request.generation {
+    if event_generation(&event) != state.request.generation {
         return Vec::new();
     }
     // Previews are taken from their slot, and files are handled by the watcher.
     let shows_nothing = matches!(event, Event::Preview { .. } | Event::Files { .. });
     state.dirty |= !shows_nothing;
     match event {
-        Event::Started { .. } => started(state),
-        Event::Stage { stage, .. } => record(state, stage),
-        Event::Asset { progress, .. } => asset(state, progress),
+        Event::Started { .. } => handle_started(state),
+        Event::Stage { stage, .. } => record_stage(state, stage),
+        Event::Asset { progress, .. } => update_asset_bar(state, progress),
         Event::Settings { settings, camera, exposure, own, .. } => {
             state.request.own = Some(own);
             (state.request.camera, state.request.exposure) = (Some(camera), Some(exposure));
@@ -58,35 +59,35 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
             let pinhole = state.request.overrides().dof == Some(true) && !settings.dof;
             state.request.effective = Some(*settings);
             clear_problems(state);
-            state.picture.history.read();
+            state.picture.history.record_scene_read();
             if pinhole {
                 show_notice(state, messages::PINHOLE);
             }
             // The preview size depends on the image's aspect ratio.
-            return resized_preview(state);
+            return request_resized_preview(state);
         }
-        Event::Warnings { warnings, .. } => warn(state, warnings),
+        Event::Warnings { warnings, .. } => set_warnings(state, warnings),
         Event::Progress { progress, .. } => {
             if let Some(noise) = progress.noise {
                 state.work.curve.record(progress.earlier_seconds + noise.seconds, noise.now);
             }
             state.work.progress = Some(progress);
-            let is_rendering = OwnState::Begun { is_rendering: true };
-            if state.request.is_own() {
+            let is_rendering = OwnImageState::Begun { is_rendering: true };
+            if state.request.is_own_image() {
                 state.saving.own.state = is_rendering;
             }
             if state.saving.own.state == is_rendering {
                 state.saving.own.fraction = progress.fraction;
             }
         }
-        Event::Files { files, .. } => state.request.note_files(files),
+        Event::Files { files, .. } => state.request.record_input_files(files),
         Event::Preview { .. }
         | Event::WriteDone { .. }
         | Event::CameraKept { .. }
         | Event::CameraUndone { .. }
         | Event::Picked { .. } => {}
         Event::Written { path, bytes, generation, is_own } => {
-            written(state, path, bytes, (generation, is_own));
+            record_own_written(state, path, bytes, (generation, is_own));
         }
         Event::OwnImage { state: own, .. } => state.saving.own.state = own,
         Event::WriteFailed { path, message, .. } => {
@@ -128,15 +129,15 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
         }
         Event::Done { report, warnings, unchanged, .. } => {
             let time = state.work.rendering_time(state.now);
-            done(state, report, warnings, unchanged);
-            return notice(state, time);
+            handle_done(state, report, warnings, unchanged);
+            return notify_render_ended(state, time);
         }
         Event::Failed { failure, .. } => {
             let time = state.work.rendering_time(state.now);
-            failed(state, failure);
-            return notice(state, time);
+            handle_failure(state, failure);
+            return notify_render_ended(state, time);
         }
-        Event::LastGoodEnded { end, .. } => last_good_ended(state, end),
+        Event::LastGoodEnded { end, .. } => handle_last_valid_end(state, end),
         Event::Cancelled { .. } => {
             (state.work.activity, state.work.rendering) = (Activity::Cancelled, Rendering::Stopped);
             state.set_paused(false);
@@ -148,15 +149,18 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
 
 /// Sends a notification that a long render has ended, if the user is in another window and the terminal
 /// supports notifications.
-fn notice(state: &State, time: Option<Duration>) -> Vec<Effect> {
+fn notify_render_ended(state: &State, time: Option<Duration>) -> Vec<Effect> {
     let is_over = matches!(state.work.activity, Activity::Done | Activity::Broken);
     let is_long = |time: &Duration| state.display.notify_after.is_some_and(|least| *time > least);
     let time = time.filter(is_long).filter(|_| is_over && !state.display.has_focus);
     let notice = time.zip(state.display.capabilities.notice);
-    notice.map(|(time, way)| Effect::Aside(window_title::notice(state, way, time))).into_iter().collect()
+    notice
+        .map(|(time, way)| Effect::Aside(window_title::notification_bytes(state, way, time)))
+        .into_iter()
+        .collect()
 }
 
-fn generation(event: &Event) -> u64 {
+fn event_generation(event: &Event) -> u64 {
     match event {
         Event::Started { generation }
         | Event::Stage { generation, .. }
@@ -185,7 +189,7 @@ fn generation(event: &Event) -> u64 {
     }
 }
 
-fn started(state: &mut State) {
+fn handle_started(state: &mut State) {
     for (before, stage) in state.work.last_seconds.iter_mut().zip(&state.work.stages) {
         let done = stage.as_ref().filter(|stage| stage.status == Status::Done);
         *before = done.map(|stage| stage.seconds).or(*before);
@@ -196,15 +200,15 @@ fn started(state: &mut State) {
     state.work.curve = NoiseCurve::default();
     state.work.report = None;
     state.saving.unwritten = None;
-    // A written image stays up to date until samples of another image are traced.
-    if state.request.is_own() && state.saving.own.state != OwnState::Written {
-        state.saving.own = OwnImage { state: OwnState::Begun { is_rendering: true }, fraction: 0.0 };
+    // A written image remains up to date until rendering of another image begins.
+    if state.request.is_own_image() && state.saving.own.state != OwnImageState::Written {
+        state.saving.own = OwnImage { state: OwnImageState::Begun { is_rendering: true }, fraction: 0.0 };
     }
     close_empty_pane(state);
     state.work.unchanged = false;
 }
 
-fn record(state: &mut State, stage: StageReport) {
+fn record_stage(state: &mut State, stage: StageReport) {
     // Progress bars disappear when their stage ends.
     if stage.status != Status::Running {
         state.work.assets.clear();
@@ -215,7 +219,7 @@ fn record(state: &mut State, stage: StageReport) {
 }
 
 /// Updates an asset's progress bar. Each name has one bar.
-fn asset(state: &mut State, progress: AssetProgress) {
+fn update_asset_bar(state: &mut State, progress: AssetProgress) {
     let finished = (progress.done >= progress.total).then_some(state.now);
     let bar = AssetBar { progress, finished };
     match state.work.assets.iter_mut().find(|asset| asset.progress.name == bar.progress.name) {
@@ -227,15 +231,15 @@ fn asset(state: &mut State, progress: AssetProgress) {
 /// Reports the files written at the user's request.
 fn report_written(state: &mut State, paths: &[PathBuf]) {
     state.saving.is_write_requested = false;
-    let is_open = state.picture.history.is_open();
+    let is_open = state.picture.history.is_older_open();
     let which = if is_open { messages::WROTE_NEWEST } else { "" };
     let names: Vec<String> = paths.iter().map(|path| visible(&path.to_string_lossy()).into_owned()).collect();
-    show_notice(state, messages::wrote(&names.join(", ")) + which);
+    show_notice(state, messages::files_written(&names.join(", ")) + which);
 }
 
 /// Records a written file. It is listed next to the image because a message would cover the keys.
-fn written(state: &mut State, path: PathBuf, bytes: u64, (generation, is_own): (u64, bool)) {
-    // During the render, other outputs may still have failed.
+fn record_own_written(state: &mut State, path: PathBuf, bytes: u64, (generation, is_own): (u64, bool)) {
+    // If the render is still running, writing another output may have failed.
     let is_by_hand = state.work.activity == Activity::Done;
     if is_by_hand {
         (state.saving.unwritten, state.saving.write_failed) = (None, None);
@@ -250,20 +254,20 @@ fn record_file(state: &mut State, path: PathBuf, bytes: u64, (generation, is_own
     let view = if is_own { state.request.base_view() } else { state.request.view() };
     let made = match &state.work.report {
         Some(report) => exit_summary::describe_image(report, view),
-        None if generation == state.request.generation => exit_summary::view(view),
+        None if generation == state.request.generation => exit_summary::view_label(view),
         None => String::new(),
     };
     state.saving.written.retain(|other| other.path != path);
     let shows = (!is_own).then_some(state.saving.write_shows);
-    if !is_own && state.saving.own.state == OwnState::Written {
-        state.saving.own.state = OwnState::Begun { is_rendering: false };
+    if !is_own && state.saving.own.state == OwnImageState::Written {
+        state.saving.own.state = OwnImageState::Begun { is_rendering: false };
     }
     let written = WrittenFile { path, bytes, generation, made, shows, is_stale: false, lost: None };
     state.saving.written.push(written);
 }
 
 /// Adds a description to the files of a finished request.
-fn describe(state: &mut State, generation: u64, report: &Report) {
+fn describe_files(state: &mut State, generation: u64, report: &Report) {
     let (is_written, base) = (report.image.path.is_some(), state.request.base_view());
     for written in state.saving.written.iter_mut().filter(|written| written.generation == generation) {
         if is_written || written.shows.is_none() {
@@ -274,7 +278,10 @@ fn describe(state: &mut State, generation: u64, report: &Report) {
 }
 
 /// Handles a change to an output file made by another program.
-pub(super) fn output_changed(state: &mut State, OutputChange { path, lost }: &OutputChange) -> Vec<Effect> {
+pub(super) fn handle_output_change(
+    state: &mut State,
+    OutputChange { path, lost }: &OutputChange,
+) -> Vec<Effect> {
     let Some(written) = state.saving.written.iter_mut().find(|written| written.path == *path) else {
         return Vec::new();
     };
@@ -308,12 +315,12 @@ fn clear_problems(state: &mut State) {
     }
 }
 
-fn done(state: &mut State, mut report: Box<Report>, warnings: Vec<Diagnostic>, unchanged: bool) {
+fn handle_done(state: &mut State, mut report: Box<Report>, warnings: Vec<Diagnostic>, unchanged: bool) {
     add_earlier_seconds(&mut report);
     state.overlays.message.take_if(|message| message.words.starts_with(messages::RESUMING));
     clear_problems(state);
     for stage in &report.stages {
-        record(state, stage.clone());
+        record_stage(state, stage.clone());
     }
     state.request.effective = Some(report.settings.clone());
     (state.work.activity, state.work.rendering) = (Activity::Done, Rendering::Finished);
@@ -321,17 +328,17 @@ fn done(state: &mut State, mut report: Box<Report>, warnings: Vec<Diagnostic>, u
     state.work.assets.clear();
     // This request's image has been written, so earlier write failures no longer matter.
     let is_on_disk = report.stages[Stage::Write as usize].status != Status::Skipped;
-    if state.request.is_own() && is_on_disk && state.saving.unwritten.is_none() {
+    if state.request.is_own_image() && is_on_disk && state.saving.unwritten.is_none() {
         state.saving.write_failed = None;
-        state.saving.own = OwnImage { state: OwnState::Written, fraction: 1.0 };
+        state.saving.own = OwnImage { state: OwnImageState::Written, fraction: 1.0 };
     }
-    note_noise(state, &report, unchanged);
-    describe(state, state.request.generation, &report);
+    complete_noise_curve(state, &report, unchanged);
+    describe_files(state, state.request.generation, &report);
     state.work.report = Some(report);
     state.work.unchanged = unchanged;
-    warn(state, warnings);
-    history::record(state);
-    count(state, unchanged);
+    set_warnings(state, warnings);
+    history::record_image(state);
+    count_render(state, unchanged);
     if unchanged {
         state.saving.last_edit.take_if(|edit| *edit == state.request.generation);
     }
@@ -352,28 +359,28 @@ fn add_earlier_seconds(report: &mut Report) {
 }
 
 /// Counts a finished render, unless it did not change the newest image.
-fn count(state: &mut State, unchanged: bool) {
+fn count_render(state: &mut State, unchanged: bool) {
     let is_new = !unchanged && !state.request.is_exposure_only;
     let is_shown = state.picture.history.is_newest(state.request.generation);
-    if is_new || is_shown && state.picture.history.awaits_run() {
+    if is_new || is_shown && state.picture.history.is_newest_unfinished() {
         state.work.renders += 1;
         if is_shown {
-            state.picture.history.finish(state.work.renders);
+            state.picture.history.finish_newest(state.work.renders);
         }
     }
 }
 
 /// Completes the noise curve with the final measurement. If the image is unchanged or only its exposure
 /// differs, its curve is kept.
-fn note_noise(state: &mut State, report: &Report, unchanged: bool) {
+fn complete_noise_curve(state: &mut State, report: &Report, unchanged: bool) {
     let render = &report.stages[Stage::Render as usize];
     let origin = state.request.origin(false).without_exposure();
     match render.status {
         Status::Done => {
             if let Some(error) = report.image.error {
-                state.work.curve.end(render.seconds, error);
+                state.work.curve.record_final(render.seconds, error);
             }
-            state.work.keep_curve(origin);
+            state.work.store_curve(origin);
         }
         Status::Reused if unchanged || state.request.is_exposure_only => {
             state.work.curve = state.work.last_curve.clone();
@@ -384,26 +391,27 @@ fn note_noise(state: &mut State, report: &Report, unchanged: bool) {
     state.work.last_curve = state.work.curve.clone();
 }
 
-fn warn(state: &mut State, warnings: Vec<Diagnostic>) {
+fn set_warnings(state: &mut State, warnings: Vec<Diagnostic>) {
     state.overlays.warnings = warnings;
-    state.overlays.diagnostics.open &= !state.reported().is_empty();
+    state.overlays.diagnostics.open &= !state.reported_diagnostics().is_empty();
     state.overlays.are_warnings_known = true;
 }
 
 /// Closes the diagnostics pane if it is empty.
 fn close_empty_pane(state: &mut State) {
-    state.overlays.diagnostics.open &= state.overlays.problems.is_some() || !state.reported().is_empty();
+    state.overlays.diagnostics.open &=
+        state.overlays.problems.is_some() || !state.reported_diagnostics().is_empty();
 }
 
 /// Handles a failure. Errors in a file that may be incomplete are withheld until the file has stopped
 /// changing.
-fn failed(state: &mut State, failure: Failure) {
+fn handle_failure(state: &mut State, failure: Failure) {
     state.set_paused(false);
     state.work.assets.clear();
     state.saving.change = None;
     match failure {
         // The last valid scene is being rendered.
-        Failure::Scene(_) => state.picture.history.broken(),
+        Failure::Scene(_) => state.picture.history.record_invalid_scene(),
         Failure::Work(_) => state.work.rendering = Rendering::Stopped,
     }
     match failure {
@@ -411,25 +419,27 @@ fn failed(state: &mut State, failure: Failure) {
             state.work.activity = Activity::Waiting;
             state.overlays.unconfirmed = Some(diagnostics);
         }
-        Failure::Scene(diagnostics) => broken(state, Problems { diagnostics, work: None }),
-        Failure::Work(message) => broken(state, Problems { diagnostics: Vec::new(), work: Some(message) }),
+        Failure::Scene(diagnostics) => show_errors(state, BlockingErrors { diagnostics, work: None }),
+        Failure::Work(message) => {
+            show_errors(state, BlockingErrors { diagnostics: Vec::new(), work: Some(message) });
+        }
     }
 }
 
 /// Handles the end of a render of the last valid scene, which runs while the file is broken.
-fn last_good_ended(state: &mut State, end: LastGoodEnd) {
+fn handle_last_valid_end(state: &mut State, end: LastValidSceneEnd) {
     match end {
-        LastGoodEnd::Finished { unchanged } => {
+        LastValidSceneEnd::Finished { unchanged } => {
             state.work.rendering = Rendering::Finished;
-            history::record(state);
-            count(state, unchanged);
+            history::record_image(state);
+            count_render(state, unchanged);
         }
-        LastGoodEnd::Stopped => state.work.rendering = Rendering::Stopped,
+        LastValidSceneEnd::Stopped => state.work.rendering = Rendering::Stopped,
     }
 }
 
 /// Shows new errors. If the user has closed the pane, only new errors reopen it.
-fn broken(state: &mut State, problems: Problems) {
+fn show_errors(state: &mut State, problems: BlockingErrors) {
     state.work.activity = Activity::Broken;
     if state.overlays.problems.as_ref() != Some(&problems) {
         state.overlays.problems = Some(problems);
@@ -442,6 +452,6 @@ fn broken(state: &mut State, problems: Problems) {
 pub(super) fn show_delayed_errors(state: &mut State) {
     state.saving.is_settled = true;
     if let Some(diagnostics) = state.overlays.unconfirmed.take() {
-        broken(state, Problems { diagnostics, work: None });
+        show_errors(state, BlockingErrors { diagnostics, work: None });
     }
 }

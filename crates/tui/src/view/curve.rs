@@ -7,7 +7,7 @@ use ratatui::symbols::Marker;
 use ratatui::text::Span;
 use ratatui::widgets::{Axis, Chart, Dataset, GraphType, Widget};
 
-use super::text::{Tone, put, row, seconds, two_digit_percent, wrapped};
+use super::text::{Tone, put_text, row_of, seconds, two_digit_percent, wrapped};
 use crate::color::ColorDepth;
 use crate::messages;
 use crate::preview_kind::PreviewKind;
@@ -18,7 +18,7 @@ const MIN_ROWS: u16 = 6;
 const MAX_ROWS: u16 = 12;
 /// Maximum width. More columns would not add detail.
 const MAX_COLUMNS: u16 = 60;
-/// Minimum number of points in a curve, and minimum ratio between the last and first times.
+/// Minimum number of points in a curve, and minimum ratio of its last time to its first.
 const MIN_POINTS: usize = 3;
 const MIN_RATIO: f64 = 1.5;
 
@@ -26,34 +26,34 @@ const MIN_RATIO: f64 = 1.5;
 /// little space.
 pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) -> u16 {
     let area = Rect { width: area.width.min(MAX_COLUMNS), ..area }.intersection(buffer.area);
-    let (Some(rows), Some(points)) = (rows(state, area), points(state)) else { return 0 };
+    let (Some(rows), Some(points)) = (chart_rows(state, area), curve_points(state)) else { return 0 };
     let depth = state.display.depth;
-    put(buffer, row(area, 0), &[(messages::NOISE_OVER_TIME, Tone::Strong)], depth);
+    put_text(buffer, row_of(area, 0), &[(messages::NOISE_OVER_TIME, Tone::Strong)], depth);
     let caption = caption(state, points, area.width);
     let chart = Rect { y: area.y + 1, height: rows - 1 - caption.len() as u16, ..area };
     plot(state, points, chart, buffer);
     for (index, line) in (chart.bottom() - area.y..).zip(&caption) {
-        put(buffer, row(area, index), &[(line, Tone::Faint)], depth);
+        put_text(buffer, row_of(area, index), &[(line, Tone::Faint)], depth);
     }
     rows
 }
 
 /// Number of rows used by the chart and its caption. `None` if they do not fit.
-pub(super) fn rows(state: &State, area: Rect) -> Option<u16> {
-    let words = 1 + caption(state, points(state)?, area.width.min(MAX_COLUMNS)).len() as u16;
+pub(super) fn chart_rows(state: &State, area: Rect) -> Option<u16> {
+    let words = 1 + caption(state, curve_points(state)?, area.width.min(MAX_COLUMNS)).len() as u16;
     let chart = area.height.checked_sub(words)?.min(MAX_ROWS);
     (chart >= MIN_ROWS && area.width >= 20).then_some(words + chart)
 }
 
 /// The current image's points, if there are enough for a curve.
-fn points(state: &State) -> Option<&[(f64, f64)]> {
+fn curve_points(state: &State) -> Option<&[(f64, f64)]> {
     let points = state.work.curve.points();
     let [(first, _), .., (last, _)] = points else { return None };
     (points.len() >= MIN_POINTS && *last >= first * MIN_RATIO).then_some(points)
 }
 
 /// The requested noise per tile.
-fn target(state: &State) -> Option<f64> {
+fn requested_noise(state: &State) -> Option<f64> {
     state.request.effective.as_ref().map(|it| f64::from(it.error)).filter(|error| *error > 0.0)
 }
 
@@ -67,7 +67,7 @@ fn caption(state: &State, points: &[(f64, f64)], width: u16) -> Vec<String> {
     let (from, first) = (whole(two_digit_percent(*from)), whole(seconds(*first)));
     let (to, last) = (whole(two_digit_percent(*to)), whole(seconds(*last)));
     let fell = format!("{from} after {first}, {to} after {last}");
-    let line = match target(state) {
+    let line = match requested_noise(state) {
         Some(target) => {
             let share = whole(two_digit_percent(f64::from((target * 1e6).round() as f32) / 1e6));
             format!("; {}", messages::noise_target(&share))
@@ -85,7 +85,7 @@ fn plot(state: &State, points: &[(f64, f64)], area: Rect, buffer: &mut Buffer) {
         let all = || curve.iter().map(of).chain(more);
         [all().fold(f64::INFINITY, f64::min), all().fold(f64::NEG_INFINITY, f64::max)]
     };
-    let target = target(state).map(f64::log10);
+    let target = requested_noise(state).map(f64::log10);
     let (x, y) = (ends(&|point| point.0, None), ends(&|point| point.1, target));
     let line = target.map(|target| [(x[0], target), (x[1], target)]);
     // Add a margin, since a line at the very edge would not be visible.

@@ -8,13 +8,13 @@ use ratatui::widgets::{Clear, Widget};
 
 use super::layout::Layout;
 use super::stages::StyledLine;
-use super::text::{Tone, counted, put, put_right, row, wrapped};
+use super::text::{Tone, format_count, put_text, put_text_right, row_of, wrapped};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::report::{self, Role};
 use crate::scene::sanitize::visible;
 use crate::state::State;
 
-/// Maximum number of distinct diagnostics shown. More are shown once these are fixed.
+/// Maximum number of distinct diagnostics shown. The others appear once these are fixed.
 const MAX: usize = 100;
 
 /// Maximum number of positions shown per diagnostic.
@@ -23,23 +23,23 @@ const MAX_PLACES: usize = 10;
 /// Draws the pane, starting at its scroll position.
 pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
     let area = area.intersection(buffer.area);
-    let text = text(state, area);
-    let area = fitting(area, text.len(), area == Layout::of(state).panel);
-    let (page, last) = span(&text, area);
+    let text = pane_lines(state, area);
+    let area = pane_area(area, text.len(), area == Layout::for_state(state).panel);
+    let (page, last) = page_and_max_scroll(&text, area);
     let first = state.overlays.diagnostics.scroll.min(last);
     Clear.render(area, buffer);
-    title(state, row(area, 0), (last > 0).then_some((first, page, text.len())), buffer);
+    draw_title(state, row_of(area, 0), (last > 0).then_some((first, page, text.len())), buffer);
     for (index, line) in (1..area.height).zip(text.iter().skip(first)) {
         let pieces: Vec<(&str, Tone)> = line.iter().map(|(text, tone)| (text.as_str(), *tone)).collect();
-        put(buffer, row(area, index), &pieces, state.display.depth);
+        put_text(buffer, row_of(area, index), &pieces, state.display.depth);
     }
 }
 
 /// The cells covered by the pane. Empty if it is closed.
-pub(super) fn covered(state: &State) -> Rect {
-    let Layout { pane, panel, .. } = Layout::of(state);
+pub(super) fn covered_cells(state: &State) -> Rect {
+    let Layout { pane, panel, .. } = Layout::for_state(state);
     if state.overlays.diagnostics.open {
-        fitting(pane, text(state, pane).len(), pane == panel)
+        pane_area(pane, pane_lines(state, pane).len(), pane == panel)
     } else {
         Rect::ZERO
     }
@@ -47,7 +47,7 @@ pub(super) fn covered(state: &State) -> Rect {
 
 /// The lower part of an area, large enough for the lines and the title. Returns the whole area if it is the
 /// panel.
-fn fitting(area: Rect, lines: usize, is_panel: bool) -> Rect {
+fn pane_area(area: Rect, lines: usize, is_panel: bool) -> Rect {
     if is_panel {
         return area;
     }
@@ -56,50 +56,52 @@ fn fitting(area: Rect, lines: usize, is_panel: bool) -> Rect {
 }
 
 /// Draws a horizontal rule with the number of errors and, if not all lines fit, the range of visible lines.
-fn title(state: &State, area: Rect, shown: Option<(usize, usize, usize)>, buffer: &mut Buffer) {
-    let reported = state.reported();
+fn draw_title(state: &State, area: Rect, shown: Option<(usize, usize, usize)>, buffer: &mut Buffer) {
+    let reported = state.reported_diagnostics();
     let has_error = reported.iter().any(|one| one.severity == Severity::Error);
     let tone = if state.overlays.problems.is_some() || has_error { Tone::Error } else { Tone::Warning };
     let rule = "─".repeat(usize::from(area.width));
-    put(buffer, area, &[(&rule, tone)], state.display.depth);
+    put_text(buffer, area, &[(&rule, tone)], state.display.depth);
     let words = match &state.overlays.problems {
-        Some(_) => super::header::errors(state),
+        Some(_) => super::header::format_error_count(state),
         None => report::summary(&reported),
     };
     let mut room = area;
     if let Some((first, page, all)) = shown {
         let lines = format!(" lines {}-{} of {all} ", first + 1, first + page);
-        room.width -= put_right(buffer, area, &lines, tone, state.display.depth);
+        room.width -= put_text_right(buffer, area, &lines, tone, state.display.depth);
     }
     let room = super::text::right_part(room, 1);
-    put(buffer, room, &[(" ", tone), (&words, tone), (" ", tone)], state.display.depth);
+    put_text(buffer, room, &[(" ", tone), (&words, tone), (" ", tone)], state.display.depth);
 }
 
 /// Number of lines per page, and the maximum scroll position.
-pub(crate) fn extent(state: &State) -> (usize, usize) {
-    let area = Layout::of(state).pane;
-    let text = text(state, area);
-    span(&text, area)
+pub(crate) fn scroll_extent(state: &State) -> (usize, usize) {
+    let area = Layout::for_state(state).pane;
+    let text = pane_lines(state, area);
+    page_and_max_scroll(&text, area)
 }
 
-fn span(text: &[StyledLine], area: Rect) -> (usize, usize) {
+fn page_and_max_scroll(text: &[StyledLine], area: Rect) -> (usize, usize) {
     let page = usize::from(area.height.saturating_sub(1)).max(1);
     (page, text.len().saturating_sub(page))
 }
 
-fn text(state: &State, area: Rect) -> Vec<StyledLine> {
+fn pane_lines(state: &State, area: Rect) -> Vec<StyledLine> {
     let width = usize::from(area.width);
-    let Some(problems) = &state.overlays.problems else { return reported(&state.reported(), width) };
+    let Some(problems) = &state.overlays.problems else {
+        return format_diagnostics(&state.reported_diagnostics(), width);
+    };
     let mut text = Vec::new();
     if let Some(work) = &problems.work {
         text.extend(styled_lines(&format!("error: {}", visible(work)), width, Tone::Error));
     }
-    text.extend(reported(&problems.diagnostics, width));
+    text.extend(format_diagnostics(&problems.diagnostics, width));
     text
 }
 
 /// Formats the diagnostics, errors first. A diagnostic reported at several positions is listed once.
-fn reported(diagnostics: &[Diagnostic], width: usize) -> Vec<StyledLine> {
+fn format_diagnostics(diagnostics: &[Diagnostic], width: usize) -> Vec<StyledLine> {
     let mut numbers = HashMap::new();
     let mut faults: Vec<Vec<&Diagnostic>> = Vec::new();
     for one in diagnostics {
@@ -118,17 +120,17 @@ fn reported(diagnostics: &[Diagnostic], width: usize) -> Vec<StyledLine> {
     }
     faults.sort_by_key(|fault| (fault[0].severity != Severity::Error, &fault[0].path, start(fault[0])));
     let mut lines: Vec<StyledLine> =
-        faults.iter().take(MAX).flat_map(|fault| one_fault(fault, width)).collect();
+        faults.iter().take(MAX).flat_map(|fault| format_fault(fault, width)).collect();
     lines.pop();
     if let Some(more @ 1..) = faults.len().checked_sub(MAX) {
         lines.push(StyledLine::new());
-        lines.push(vec![(format!("… {} are not shown", counted(more, "more fault")), Tone::Plain)]);
+        lines.push(vec![(format!("… {} are not shown", format_count(more, "more fault")), Tone::Plain)]);
     }
     lines
 }
 
 /// Formats the first position in full and the others as line and column, followed by an empty line.
-fn one_fault(fault: &[&Diagnostic], width: usize) -> Vec<StyledLine> {
+fn format_fault(fault: &[&Diagnostic], width: usize) -> Vec<StyledLine> {
     let tone = |role| match role {
         Role::Text => Tone::Plain,
         Role::Error => Tone::Error,
@@ -142,14 +144,14 @@ fn one_fault(fault: &[&Diagnostic], width: usize) -> Vec<StyledLine> {
     // Drop the empty line and the count at the end of the report. The title contains the count.
     lines.truncate(lines.len().saturating_sub(2));
     let mut lines: Vec<StyledLine> = lines.into_iter().map(line).collect();
-    let places: Vec<String> = fault[1..].iter().filter_map(|one| position_words(one)).collect();
+    let places: Vec<String> = fault[1..].iter().filter_map(|one| format_position(one)).collect();
     if !places.is_empty() {
         let shown = places.len().min(MAX_PLACES - 1);
         let more = match places.len() - shown {
             0 => String::new(),
             more => format!(" and {more} more"),
         };
-        let number = counted(places.len(), "place");
+        let number = format_count(places.len(), "place");
         let text = format!("  = also in {number}: {}{more}", places[..shown].join(", "));
         lines.extend(styled_lines(&text, width, Tone::Plain));
     }
@@ -158,7 +160,7 @@ fn one_fault(fault: &[&Diagnostic], width: usize) -> Vec<StyledLine> {
 }
 
 /// `line:column`.
-fn position_words(one: &Diagnostic) -> Option<String> {
+fn format_position(one: &Diagnostic) -> Option<String> {
     let place = one.place.as_ref()?;
     let (line, column) = report::line_and_column(&place.source, place.span.start);
     Some(format!("{line}:{column}"))

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-use super::text::{Tone, columns, put};
+use super::text::{Tone, put_text, text_columns};
 use crate::scene::sanitize::visible;
 use crate::state::State;
 
@@ -20,7 +20,7 @@ pub(crate) struct ViewExtras {
 
 impl ViewExtras {
     /// Writes a line and records which cells contain file names. Returns the number of columns used.
-    pub(super) fn put(
+    pub(super) fn put_line(
         &mut self,
         state: &State,
         area: Rect,
@@ -29,7 +29,7 @@ impl ViewExtras {
     ) -> u16 {
         let mut x = area.x;
         for (text, tone) in line {
-            let end = x.saturating_add(columns(text)).min(area.right());
+            let end = x.saturating_add(text_columns(text)).min(area.right());
             let cells = Rect { x, width: end.saturating_sub(x), ..area };
             let is_its = |path: &&PathBuf| visible(&path.to_string_lossy()) == *text;
             let written = state.saving.written.iter().map(|written| &written.path);
@@ -38,6 +38,6 @@ impl ViewExtras {
             x = end;
         }
         let pieces: Vec<(&str, Tone)> = line.iter().map(|(text, tone)| (text.as_str(), *tone)).collect();
-        put(buffer, area, &pieces, state.display.depth)
+        put_text(buffer, area, &pieces, state.display.depth)
     }
 }

@@ -8,7 +8,10 @@ use ratatui::layout::Rect;
 use super::layout::{BLOCK, Layout};
 use super::message;
 use super::stages::running_stage;
-use super::text::{Tone, columns, counted, number, percent, put, put_right, right_part, running, seconds};
+use super::text::{
+    Tone, floor_percent, format_count, format_number, format_running_time, put_text, put_text_right,
+    right_part, seconds, text_columns,
+};
 use crate::action::Action;
 use crate::choice::Choice;
 use crate::history::age_in_words;
@@ -28,33 +31,33 @@ const MIN_NAME: u16 = 6;
 
 pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
     let area = layout.header;
-    let used = block(state, area, buffer);
+    let used = draw_activity_block(state, area, buffer);
     let mut room = right_part(area, used + 1);
     // If there is no other line, a message takes the whole header.
     if layout.keys.is_empty() && message::replaces_line(state, layout) {
         return;
     }
     if state.picture.is_alone {
-        let back =
-            keymap::of(Action::ShowImageOnly).map_or(String::new(), |it| format!("  {} back", it.label));
-        room.width -= put_right(buffer, room, &back, Tone::Faint, state.display.depth);
+        let back = keymap::binding_of(Action::ShowImageOnly)
+            .map_or(String::new(), |it| format!("  {} back", it.label));
+        room.width -= put_text_right(buffer, room, &back, Tone::Faint, state.display.depth);
     }
     let figures = progress_or_result(state);
-    // Leave some space for the name if the shortest variant is short enough.
+    // Choose a variant that leaves some space for the name, if possible.
     let fitting = [MIN_NAME + 1, 0]
         .into_iter()
-        .find_map(|name| figures.iter().find(|words| columns(words) + name <= room.width));
+        .find_map(|name| figures.iter().find(|words| text_columns(words) + name <= room.width));
     room.width -=
-        put_right(buffer, room, fitting.map_or("", String::as_str), Tone::Strong, state.display.depth);
+        put_text_right(buffer, room, fitting.map_or("", String::as_str), Tone::Strong, state.display.depth);
     room.width = room.width.saturating_sub(1);
     if room.width >= MIN_NAME {
-        name(state, room, buffer);
+        draw_scene_info(state, room, buffer);
     }
 }
 
 /// Draws the state block. Returns the number of columns used.
-fn block(state: &State, area: Rect, buffer: &mut Buffer) -> u16 {
-    let (sign, word, tone) = activity(state);
+fn draw_activity_block(state: &State, area: Rect, buffer: &mut Buffer) -> u16 {
+    let (sign, word, tone) = activity_label(state);
     let mut text = format!(" {sign} {word} ");
     if area.width >= WIDE {
         text = format!("{text:<BLOCK$}");
@@ -68,12 +71,12 @@ fn block(state: &State, area: Rect, buffer: &mut Buffer) -> u16 {
     end - area.x
 }
 
-/// Symbol, word and color for the state. Each of them alone identifies the state.
-pub(super) fn activity(state: &State) -> (&'static str, &'static str, Tone) {
-    if state.picture.history.is_open() { ("◂", "older", Tone::Warning) } else { work(state) }
+/// Symbol, word and color for the state. Each identifies the state on its own.
+pub(super) fn activity_label(state: &State) -> (&'static str, &'static str, Tone) {
+    if state.picture.history.is_older_open() { ("◂", "older", Tone::Warning) } else { work_label(state) }
 }
 
-fn work(state: &State) -> (&'static str, &'static str, Tone) {
+fn work_label(state: &State) -> (&'static str, &'static str, Tone) {
     match state.work.activity {
         _ if state.work.paused => ("‖", "paused", Tone::Warning),
         Activity::Running { .. } => ("●", "rendering", Tone::Working),
@@ -86,36 +89,36 @@ fn work(state: &State) -> (&'static str, &'static str, Tone) {
     }
 }
 
-/// A word for the state of the work, regardless of the displayed image.
-pub(super) fn word(state: &State) -> &'static str {
-    work(state).1
+/// A word for the worker's state, regardless of the displayed image.
+pub(super) fn work_word(state: &State) -> &'static str {
+    work_label(state).1
 }
 
 /// Draws the scene path, the view and the image size.
-fn name(state: &State, area: Rect, buffer: &mut Buffer) {
+fn draw_scene_info(state: &State, area: Rect, buffer: &mut Buffer) {
     let path = state.request.scene.to_string_lossy();
     let (folder, file) = path.rsplit_once('/').map_or(("", &*path), |(folder, file)| (folder, file));
     let (folder, file) = (visible(folder), visible(file));
     // The image size of older renders is unknown.
-    let effective = state.request.effective.as_ref().filter(|_| !state.picture.history.is_open());
+    let effective = state.request.effective.as_ref().filter(|_| !state.picture.history.is_older_open());
     let size = effective.map_or(String::new(), |it| format!("  {}×{}", it.width, it.height));
     let folder = if folder.is_empty() { String::new() } else { format!("{folder}/") };
-    let view = close_up(state) + &view(state);
+    let view = close_up_label(state) + &view_label(state);
     let view = (&*view, Tone::Strong);
     let mut pieces = vec![(&*folder, Tone::Faint), (&*file, Tone::Strong), view, (&*size, Tone::Faint)];
     // Omit parts before truncating the name.
-    let width = |pieces: &[(&str, Tone)]| pieces.iter().map(|(text, _)| columns(text)).sum::<u16>();
+    let width = |pieces: &[(&str, Tone)]| pieces.iter().map(|(text, _)| text_columns(text)).sum::<u16>();
     if width(&pieces) > area.width {
         pieces.remove(0);
     }
     while pieces.len() > 1 && width(&pieces) > area.width {
         pieces.pop();
     }
-    put(buffer, area, &pieces, state.display.depth);
+    put_text(buffer, area, &pieces, state.display.depth);
 }
 
 /// The view and its range of values, or nothing for the beauty view.
-fn view(state: &State) -> String {
+fn view_label(state: &State) -> String {
     let open = state.picture.history.origin_of_open();
     let of_open = open.map(|origin| origin.toggles.view.unwrap_or_else(|| state.request.base_view()));
     let view = of_open.unwrap_or_else(|| state.request.view());
@@ -125,8 +128,9 @@ fn view(state: &State) -> String {
     let is_at_hand = |generation: u64| open.is_some() || generation == state.request.generation;
     let shown = state.picture.shown.as_ref().filter(|shown| is_at_hand(shown.generation));
     let range = shown.and_then(|shown| shown.range);
-    let range =
-        range.map_or(String::new(), |[least, most]| format!(" {} to {}", number(least), number(most)));
+    let range = range.map_or(String::new(), |[least, most]| {
+        format!(" {} to {}", format_number(least), format_number(most))
+    });
     format!("  view {}{range}", view.name())
 }
 
@@ -140,19 +144,19 @@ fn lacks_photons(state: &State) -> bool {
 }
 
 /// Label for a preview that shows actual pixels.
-fn close_up(state: &State) -> String {
+fn close_up_label(state: &State) -> String {
     let is_close = state.picture.shown.as_ref().is_some_and(|shown| shown.section.is_some());
     if is_close { "  1:1".to_owned() } else { String::new() }
 }
 
 /// Progress or result, in variants from long to short.
 fn progress_or_result(state: &State) -> Vec<String> {
-    if let Some((run, time)) = state.picture.history.place() {
+    if let Some((run, time)) = state.picture.history.run_and_time_of_open() {
         let is_unfinished = state.picture.history.origin_of_open().is_some_and(|origin| origin.is_unfinished);
         let (place, words) = match run {
             Some(run) => {
-                let place = format!("{run} of {}", last_run(state));
-                (place, messages::render_of(run, last_run(state)))
+                let place = format!("{run} of {}", newest_render_number(state));
+                (place, messages::render_position(run, newest_render_number(state)))
             }
             None => {
                 let place = if is_unfinished { messages::STOPPED } else { messages::OLDER };
@@ -163,8 +167,8 @@ fn progress_or_result(state: &State) -> Vec<String> {
         let mut figures = vec![format!("{words}, {age}"), place.clone()];
         // The newest render is still running in the background.
         if let Some(progress) = state.work.progress.as_ref().filter(|_| state.work.is_under_way()) {
-            let done = format!("newest {} %", percent(progress.fraction));
-            let eta = eta(state, progress);
+            let done = format!("newest {} %", floor_percent(progress.fraction));
+            let eta = format_eta(state, progress);
             figures = [
                 format!("{words}, {age}  {done}{eta}"),
                 format!("{place}  {done}{eta}"),
@@ -180,56 +184,60 @@ fn progress_or_result(state: &State) -> Vec<String> {
     }
     match (state.work.activity, &state.work.report, &state.work.progress) {
         (Activity::Running { .. }, _, Some(progress)) => {
-            let done = format!("{} %", percent(progress.fraction));
-            vec![format!("{done}{}", eta(state, progress)), done]
+            let done = format!("{} %", floor_percent(progress.fraction));
+            vec![format!("{done}{}", format_eta(state, progress)), done]
         }
         (Activity::Running { .. }, _, None) => {
             running_stage(state).map(|name| format!("{name}…")).into_iter().collect()
         }
         (Activity::Done, _, _) if state.work.unchanged => {
-            vec![format!("unchanged · {}", messages::render(state.work.renders)), "unchanged".to_owned()]
+            vec![
+                format!("unchanged · {}", messages::render_number(state.work.renders)),
+                "unchanged".to_owned(),
+            ]
         }
         (Activity::Done, Some(report), _) => {
             let time = seconds(report.seconds);
-            vec![format!("{time} · {}", messages::render(state.work.renders)), time]
+            vec![format!("{time} · {}", messages::render_number(state.work.renders)), time]
         }
         (Activity::Waiting, _, _) => vec![messages::INCOMPLETE_FILE.to_owned()],
         (Activity::Broken, _, _) if state.overlays.is_scene_missing() => {
             vec![messages::WAITING_FOR_FILE.to_owned()]
         }
-        (Activity::Broken, _, _) => vec![errors(state)],
+        (Activity::Broken, _, _) => vec![format_error_count(state)],
         (Activity::Done | Activity::Cancelled, _, _) => Vec::new(),
     }
 }
 
 /// Number of the newest render. A running render is included if it has an image.
-fn last_run(state: &State) -> u64 {
+fn newest_render_number(state: &State) -> u64 {
     let history = &state.picture.history;
-    let is_under_way =
-        state.work.is_under_way() && history.is_newest(state.request.generation) && history.awaits_run();
+    let is_under_way = state.work.is_under_way()
+        && history.is_newest(state.request.generation)
+        && history.is_newest_unfinished();
     state.work.renders + u64::from(is_under_way)
 }
 
 /// Remaining time. Empty if the render is paused.
-fn eta(state: &State, progress: &RenderProgress) -> String {
+fn format_eta(state: &State, progress: &RenderProgress) -> String {
     /// Shorter times would round to zero.
     const MIN: f64 = 0.05;
     let eta = match Eta::of(progress) {
         None => "…".to_owned(),
         Some(Eta::OverADay) => Eta::OverADay.words(),
         Some(Eta::Seconds(eta)) if eta < MIN => "under 1 s".to_owned(),
-        Some(Eta::Seconds(eta)) => running(Duration::try_from_secs_f64(eta).unwrap_or_default()),
+        Some(Eta::Seconds(eta)) => format_running_time(Duration::try_from_secs_f64(eta).unwrap_or_default()),
     };
     if state.work.paused { String::new() } else { format!("  ETA {eta}") }
 }
 
 /// Number of errors and warnings, in words.
-pub(super) fn errors(state: &State) -> String {
+pub(super) fn format_error_count(state: &State) -> String {
     let Some(problems) = &state.overlays.problems else { return String::new() };
     let count = |severity| problems.diagnostics.iter().filter(|it| it.severity == severity).count();
-    let errors = counted(count(Severity::Error) + usize::from(problems.work.is_some()), "error");
+    let errors = format_count(count(Severity::Error) + usize::from(problems.work.is_some()), "error");
     match count(Severity::Warning) {
         0 => errors,
-        warnings => format!("{errors}, {}", counted(warnings, "warning")),
+        warnings => format!("{errors}, {}", format_count(warnings, "warning")),
     }
 }

@@ -5,7 +5,7 @@ use ratatui::layout::Rect;
 use ratatui::widgets::{Block, BorderType, Clear, Widget};
 
 use super::layout::Layout;
-use super::text::{Tone, columns, put, row, wrapped};
+use super::text::{Tone, put_text, row_of, text_columns, wrapped};
 use crate::keymap::{KEYMAP, OVERLAY};
 use crate::messages;
 use crate::state::State;
@@ -23,18 +23,18 @@ const NOTES: &[(&str, &str)] = &[
 
 /// Draws the help at the center of the screen.
 pub(super) fn draw(state: &State, buffer: &mut Buffer) {
-    let area = area(state);
-    let inner = inner(area);
-    let (page, last) = extent(state);
+    let area = help_area(state);
+    let inner = inside_border(area);
+    let (page, last) = scroll_extent(state);
     let first = state.overlays.help.scroll.min(last);
-    let lines = lines(inner.width);
+    let lines = help_lines(inner.width);
     let mut title = " keys ".to_owned();
     if last > 0 {
         title = format!(" keys · lines {}–{} of {} · j k ", first + 1, first + page, lines.len());
     }
     Clear.render(area, buffer);
     // Clear lines that are partly covered by the help, which would look truncated.
-    let Layout { header, under, .. } = Layout::of(state);
+    let Layout { header, under, .. } = Layout::for_state(state);
     for line in [header, under].into_iter().filter(|line| line.intersects(area)) {
         Clear.render(line.intersection(buffer.area), buffer);
     }
@@ -44,12 +44,12 @@ pub(super) fn draw(state: &State, buffer: &mut Buffer) {
         let block = Block::bordered().border_type(BorderType::Rounded).border_style(border);
         block.title_style(title_style).title(title).render(area, buffer);
     }
-    let labels = labels(inner.width);
+    let labels = label_width(inner.width);
     for (index, (label, help)) in (0..inner.height).zip(lines.iter().skip(first)) {
-        let line = row(inner, index);
+        let line = row_of(inner, index);
         let place = Rect { x: line.x + 1, width: labels.min(line.width), ..line };
-        put(buffer, place, &[(label, Tone::Strong)], state.display.depth);
-        put(
+        put_text(buffer, place, &[(label, Tone::Strong)], state.display.depth);
+        put_text(
             buffer,
             super::text::right_part(line, labels + BESIDE),
             &[(help, Tone::Plain)],
@@ -62,14 +62,14 @@ pub(super) fn draw(state: &State, buffer: &mut Buffer) {
 const BESIDE: u16 = 3;
 
 /// Label width for help text of this width.
-fn labels(width: u16) -> u16 {
+fn label_width(width: u16) -> u16 {
     const MIN: u16 = 9;
-    widest(|(label, _)| label).min(MIN.max(width / 3))
+    widest_entry(|(label, _)| label).min(MIN.max(width / 3))
 }
 
 /// The help entries, wrapped into lines.
-fn lines(width: u16) -> Vec<(String, String)> {
-    let labels = labels(width);
+fn help_lines(width: u16) -> Vec<(String, String)> {
+    let labels = label_width(width);
     let both = |(label, help)| {
         let label = wrapped(label, usize::from(labels));
         let help = wrapped(help, usize::from(width.saturating_sub(labels + BESIDE)));
@@ -77,41 +77,42 @@ fn lines(width: u16) -> Vec<(String, String)> {
         let count = label.len().max(help.len());
         (0..count).map(|index| (line(&label, index), line(&help, index))).collect::<Vec<_>>()
     };
-    entries().flat_map(both).collect()
+    help_entries().flat_map(both).collect()
 }
 
 /// Number of lines per page, and the maximum scroll position.
-pub(crate) fn extent(state: &State) -> (usize, usize) {
-    let inner = inner(area(state));
+pub(crate) fn scroll_extent(state: &State) -> (usize, usize) {
+    let inner = inside_border(help_area(state));
     let page = usize::from(inner.height).max(1);
-    (page, lines(inner.width).len().saturating_sub(page))
+    (page, help_lines(inner.width).len().saturating_sub(page))
 }
 
-fn entries() -> impl Iterator<Item = (&'static str, &'static str)> {
+fn help_entries() -> impl Iterator<Item = (&'static str, &'static str)> {
     let keys = KEYMAP.iter().filter(|it| !it.help.is_empty()).map(|it| (it.label, it.help));
     let overlay = OVERLAY.iter().filter(|it| !it.help.is_empty()).map(|it| (it.label, it.help));
     keys.chain(overlay).chain(NOTES.iter().copied())
 }
 
-fn widest(part: impl Fn((&'static str, &'static str)) -> &'static str) -> u16 {
-    entries().map(|entry| columns(part(entry))).max().unwrap_or(0)
+fn widest_entry(part: impl Fn((&'static str, &'static str)) -> &'static str) -> u16 {
+    help_entries().map(|entry| text_columns(part(entry))).max().unwrap_or(0)
 }
 
-fn area(state: &State) -> Rect {
+fn help_area(state: &State) -> Rect {
     let window = Rect::new(0, 0, state.display.window.columns, state.display.window.rows);
-    // Leave the key line visible, since it shows how to scroll and close the help.
+    // Leave the key line visible, because it shows how to scroll and close the help.
     let above = Rect { height: window.height.saturating_sub(u16::from(window.height > 3)), ..window };
-    let width = widest(|(label, _)| label) + widest(|(_, help)| help) + BESIDE + 3;
-    let wide = centered(above, width, above.height);
-    let height = u16::try_from(lines(inner(wide).width).len()).unwrap_or(u16::MAX).saturating_add(2);
-    centered(above, width, height)
+    let width = widest_entry(|(label, _)| label) + widest_entry(|(_, help)| help) + BESIDE + 3;
+    let wide = centered_area(above, width, above.height);
+    let height =
+        u16::try_from(help_lines(inside_border(wide).width).len()).unwrap_or(u16::MAX).saturating_add(2);
+    centered_area(above, width, height)
 }
 
-fn inner(area: Rect) -> Rect {
+fn inside_border(area: Rect) -> Rect {
     if area.height > 3 && area.width > 3 { Block::bordered().inner(area) } else { area }
 }
 
-fn centered(area: Rect, width: u16, height: u16) -> Rect {
+fn centered_area(area: Rect, width: u16, height: u16) -> Rect {
     let (width, height) = (width.min(area.width), height.min(area.height));
     Rect { x: area.x + (area.width - width) / 2, y: area.y + (area.height - height) / 2, width, height }
 }

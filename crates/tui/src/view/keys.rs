@@ -3,17 +3,17 @@
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-use super::header::activity;
+use super::header::activity_label;
 use super::layout::Layout;
 use super::message;
-use super::text::{Tone, columns, put, right_part};
+use super::text::{Tone, put_text, right_part, text_columns};
 use crate::action::Action;
 use crate::choice::Choice;
 use crate::keymap::{self, Binding, KEYMAP, OVERLAY, OverlayAction};
 use crate::preview_kind::PreviewKind;
 use crate::scene::is_mesh;
 use crate::scene::report::summary;
-use crate::state::{Activity, State, Toggles, ViewList};
+use crate::state::{Activity, KeyOverrides, State, ViewList};
 
 /// A key with long and short descriptions.
 struct KeyHint {
@@ -29,12 +29,12 @@ impl KeyHint {
         Self { key, short: words.clone(), words, tone: Tone::Faint }
     }
 
-    fn of(action: Action) -> Option<Self> {
-        keymap::of(action).map(|it| Self::new(it.label, it.hint))
+    fn for_action(action: Action) -> Option<Self> {
+        keymap::binding_of(action).map(|it| Self::new(it.label, it.hint))
     }
 
     fn width(&self, is_long: bool) -> u16 {
-        columns(self.key) + 1 + columns(self.label(is_long)) + GAP
+        text_columns(self.key) + 1 + text_columns(self.label(is_long)) + GAP
     }
 
     fn label(&self, is_long: bool) -> &str {
@@ -52,28 +52,28 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
     if layout.under.is_empty() && message::replaces_line(state, layout) {
         return;
     }
-    let ways = [KeyHint::of(Action::Quit), KeyHint::of(Action::ToggleHelp)];
+    let ways = [KeyHint::for_action(Action::Quit), KeyHint::for_action(Action::ToggleHelp)];
     let ways: Vec<KeyHint> = ways.into_iter().flatten().collect();
     let width = |hints: &[KeyHint], is_long| hints.iter().map(|hint| hint.width(is_long)).sum::<u16>();
     // The help key is always shown, even if `q` does not fit.
     let skipped = usize::from(area.width < 44 && ways.len() > 1);
     let ways = &ways[skipped..];
-    let toggles = if state.overlays.help.open { Vec::new() } else { toggles(state) };
+    let toggles = if state.overlays.help.open { Vec::new() } else { toggle_hints(state) };
     let room = area.width.saturating_sub(width(ways, true).saturating_sub(GAP));
     let is_long = width(&toggles, true) + OF_USE <= room;
     let mut left = Rect { width: room, ..area };
-    for hint in fitting(current_hints(state), toggles, room, is_long) {
-        left = right_part(left, show(&hint, left, is_long, state, buffer));
+    for hint in fit_hints(current_hints(state), toggles, room, is_long) {
+        left = right_part(left, draw_hint(&hint, left, is_long, state, buffer));
     }
     let mut right = right_part(area, room);
     for hint in ways {
-        right = right_part(right, show(hint, right, true, state, buffer));
+        right = right_part(right, draw_hint(hint, right, true, state, buffer));
     }
 }
 
 /// Combines toggles and other hints. Space is assigned first to urgent hints, then to toggles, then to the
 /// others.
-fn fitting(
+fn fit_hints(
     (urgent, useful): (Vec<KeyHint>, Vec<KeyHint>),
     toggles: Vec<KeyHint>,
     room: u16,
@@ -94,16 +94,16 @@ fn fitting(
     toggles.into_iter().chain(urgent).chain(take(useful)).collect()
 }
 
-fn show(hint: &KeyHint, area: Rect, is_long: bool, state: &State, buffer: &mut Buffer) -> u16 {
+fn draw_hint(hint: &KeyHint, area: Rect, is_long: bool, state: &State, buffer: &mut Buffer) -> u16 {
     let pieces = [(hint.key, Tone::Strong), (" ", Tone::Plain), (hint.label(is_long), hint.tone)];
-    put(buffer, area, &pieces, state.display.depth);
+    put_text(buffer, area, &pieces, state.display.depth);
     hint.width(is_long)
 }
 
 /// Toggles with their values. Those changed with keys are bold.
-fn toggles(state: &State) -> Vec<KeyHint> {
-    // The values would be those of the newest render.
-    if state.picture.history.is_open() {
+fn toggle_hints(state: &State) -> Vec<KeyHint> {
+    // The values belong to the newest render, not to the one being viewed.
+    if state.picture.history.is_older_open() {
         return Vec::new();
     }
     let honors_shadows = state.request.integrator().method().honors_shadows;
@@ -114,7 +114,7 @@ fn toggles(state: &State) -> Vec<KeyHint> {
     let all = [
         (Action::CycleShadows, "shadows", shadows.to_owned(), keys.shadows.is_some()),
         (Action::TogglePhotons, "photons", photons.to_owned(), keys.photons.is_some()),
-        (Action::ToggleDepthOfField, "dof", on_off(depth_of_field(state)).to_owned(), keys.dof.is_some()),
+        (Action::ToggleDepthOfField, "dof", on_off(has_depth_of_field(state)).to_owned(), keys.dof.is_some()),
         (Action::NextView, "view", state.request.view().name().to_owned(), keys.view.is_some()),
         (
             Action::CycleIntegrator,
@@ -124,7 +124,7 @@ fn toggles(state: &State) -> Vec<KeyHint> {
         ),
     ];
     let hint = |(action, name, value, is_changed): (Action, &str, String, bool)| {
-        let key = keymap::of(action)?.label.split(' ').next()?;
+        let key = keymap::binding_of(action)?.label.split(' ').next()?;
         let words = format!("{name} {value}").trim_start().to_owned();
         Some(KeyHint { key, words, short: value, tone: if is_changed { Tone::Strong } else { Tone::Faint } })
     };
@@ -141,7 +141,7 @@ fn current_hints(state: &State) -> (Vec<KeyHint>, Vec<KeyHint>) {
     // Scroll keys, if some lines are not visible.
     let scrolling = |last: usize, keys: &[OverlayAction]| if last > 0 { overlay(keys) } else { Vec::new() };
     if state.overlays.help.open {
-        let (_, last) = super::help::extent(state);
+        let (_, last) = super::help::scroll_extent(state);
         let lines = scrolling(last, &[OverlayAction::LineDown]).into_iter().chain(closing());
         return (lines.chain(scrolling(last, &[OverlayAction::PageDown])).collect(), Vec::new());
     }
@@ -149,27 +149,27 @@ fn current_hints(state: &State) -> (Vec<KeyHint>, Vec<KeyHint>) {
     if let Some(views) = &state.overlays.views {
         urgent.extend(view_list_hints(views).into_iter().chain(closing()));
     } else if state.overlays.diagnostics.open {
-        let (_, last) = super::diagnostics::extent(state);
+        let (_, last) = super::diagnostics::scroll_extent(state);
         urgent.extend(scrolling(last, &[OverlayAction::LineDown]).into_iter().chain(closing()));
     }
-    urgent.extend(hidden_diagnostics(state));
-    let named = |action, words| keymap::of(action).map(|it| KeyHint::new(it.label, words));
+    urgent.extend(hidden_diagnostics_hint(state));
+    let named = |action, words| keymap::binding_of(action).map(|it| KeyHint::new(it.label, words));
     let has_place = state.overlays.problems.is_some() || state.selection.picked.is_some();
     if has_place && !is_mesh(&state.request.scene) {
         urgent.extend(named(Action::Edit, "edit"));
     }
-    if state.picture.history.is_open() {
+    if state.picture.history.is_older_open() {
         urgent.extend(named(Action::CompareLastEdit, "newest"));
-        let both = if state.picture.history.is_oldest_open() {
+        let both = if state.picture.history.is_oldest_shown() {
             named(Action::NewerRender, "newer")
         } else {
             named(Action::OlderRender, "older, newer")
         };
         urgent.extend(both);
         // All other keys affect the newest render.
-        return (urgent, KeyHint::of(Action::ShowImageOnly).into_iter().collect());
+        return (urgent, KeyHint::for_action(Action::ShowImageOnly).into_iter().collect());
     }
-    if state.request.toggles.camera.is_any() && !state.saving.has_scene_of_model {
+    if state.request.toggles.camera.has_changes() && !state.saving.has_scene_of_model {
         urgent.extend(named(Action::KeepCamera, "keep"));
     }
     if state.picture.close_up.is_some() {
@@ -179,16 +179,17 @@ fn current_hints(state: &State) -> (Vec<KeyHint>, Vec<KeyHint>) {
         let first = named(Action::RenderRegionFirst, "region first");
         urgent.extend(first.map(|hint| KeyHint { tone: Tone::Strong, ..hint }));
     }
-    let reset = keymap::of(Action::ResetSettings).map_or("", |it| it.label);
+    let reset = keymap::binding_of(Action::ResetSettings).map_or("", |it| it.label);
     let changed = |words| KeyHint { tone: Tone::Strong, ..KeyHint::new(reset, words) };
-    let changes = state.request.changes().join(", ");
+    let changes = state.request.key_changes().join(", ");
     urgent.extend((!changes.is_empty()).then(|| changed(format!("reset {changes}"))));
     let now: &[Action] = match state.work.activity {
         _ if state.work.paused => &[Action::TogglePause, Action::WriteImage],
         Activity::Running { .. } => &[Action::TogglePause],
         Activity::Done | Activity::Waiting | Activity::Broken | Activity::Cancelled => &[],
     };
-    let first = now.iter().filter_map(|action| KeyHint::of(*action)).map(|hint| pause_hint(hint, state));
+    let first =
+        now.iter().filter_map(|action| KeyHint::for_action(*action)).map(|hint| pause_hint(hint, state));
     let (held, first): (Vec<KeyHint>, Vec<KeyHint>) = first.partition(|_| state.work.paused);
     urgent.extend(held);
     let is_other =
@@ -196,8 +197,9 @@ fn current_hints(state: &State) -> (Vec<KeyHint>, Vec<KeyHint>) {
     let has_picture = state.display.kind != PreviewKind::None;
     let is_shown = |it: &&Binding| it.action != Action::ShowImageOnly || has_picture;
     let is_idle = |it: &&Binding| it.action != Action::TogglePause || state.work.is_running();
-    // If there are changes to list, a hint above shows them next to this key.
-    let is_of_use = state.request.toggles != Toggles::default() && state.request.changes().is_empty();
+    // If there are changes to list, a hint added above already shows this key with them.
+    let is_of_use =
+        state.request.toggles != KeyOverrides::default() && state.request.key_changes().is_empty();
     let is_back = |it: &&Binding| it.action != Action::ResetSettings || is_of_use;
     let others = KEYMAP
         .iter()
@@ -232,17 +234,17 @@ const ELSEWHERE: [Action; 8] = [
 ];
 
 fn pause_hint(hint: KeyHint, state: &State) -> KeyHint {
-    let is_pause = keymap::of(Action::TogglePause).is_some_and(|it| it.label == hint.key);
+    let is_pause = keymap::binding_of(Action::TogglePause).is_some_and(|it| it.label == hint.key);
     if is_pause && state.work.paused { KeyHint::new(hint.key, "resume") } else { hint }
 }
 
 /// Number of errors and warnings, if the pane is closed.
-fn hidden_diagnostics(state: &State) -> Option<KeyHint> {
-    let key = keymap::of(Action::ToggleDiagnostics)?.label;
+fn hidden_diagnostics_hint(state: &State) -> Option<KeyHint> {
+    let key = keymap::binding_of(Action::ToggleDiagnostics)?.label;
     let (words, tone) = match &state.overlays.problems {
         _ if state.overlays.diagnostics.open => return None,
-        Some(_) => (super::header::errors(state), activity(state).2),
-        None => match state.reported() {
+        Some(_) => (super::header::format_error_count(state), activity_label(state).2),
+        None => match state.reported_diagnostics() {
             none if none.is_empty() => return None,
             reported => (summary(&reported), Tone::Warning),
         },
@@ -250,6 +252,6 @@ fn hidden_diagnostics(state: &State) -> Option<KeyHint> {
     Some(KeyHint { tone, ..KeyHint::new(key, words) })
 }
 
-fn depth_of_field(state: &State) -> bool {
+fn has_depth_of_field(state: &State) -> bool {
     state.request.effective.as_ref().is_some_and(|it| it.dof) && state.request.overrides().dof != Some(false)
 }

@@ -12,7 +12,8 @@ use crate::state::State;
 /// Areas of the screen. An area is empty if there is no space for it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Layout {
-    /// State and name. The only line if just the image is shown.
+    /// The header with state and name. If `tab` hides everything but the image, this is the only line of
+    /// text.
     pub header: Rect,
     pub preview: Rect,
     /// Stages and results, next to or below the image. If the panel is empty, the status line shows them.
@@ -37,16 +38,17 @@ const SIDE_WIDTH: u16 = 23;
 pub(super) const ENTRY_WIDTH: u16 = 26;
 /// Minimum height of a panel next to the image, enough for half of the stages.
 const SIDE_HEIGHT: u16 = 4;
-/// Minimum fraction of its cells that the image must keep next to a panel. Otherwise the panel is omitted.
+/// Minimum fraction of the image's cells that must remain when a panel is added. Otherwise the panel is
+/// omitted.
 const KEPT: f32 = 0.9;
-/// Minimum sizes of a panel that can show diagnostics. A narrow panel must be taller.
+/// Minimum sizes of a panel that shows diagnostics. A narrower panel must be taller.
 const TEXT_SIZES: [(u16, u16); 2] = [(44, 8), (34, 16)];
 /// Maximum height of a diagnostics pane over the image.
 const PANE_HEIGHT: u16 = 12;
 
 impl Layout {
     /// Computes the layout for the state's window and image.
-    pub(crate) fn of(state: &State) -> Self {
+    pub(crate) fn for_state(state: &State) -> Self {
         let shape = state.request.aspect() * state.display.window.cell_aspect;
         let shape = (state.display.kind != PreviewKind::None).then_some(shape);
         Self::new(state.display.window.columns, state.display.window.rows, shape, state.picture.is_alone)
@@ -54,7 +56,7 @@ impl Layout {
 
     /// The size of the preview that fits into the window, in square pixels.
     pub(crate) fn preview_size(state: &State) -> Option<PreviewSize> {
-        let area = Self::of(state).preview;
+        let area = Self::for_state(state).preview;
         let across = state.display.pixels_across();
         let height =
             (f32::from(area.height) * state.display.window.cell_aspect * across as f32).round() as u32;
@@ -80,7 +82,7 @@ impl Layout {
         (layout.preview, layout.panel) = match shape {
             None => (Rect::ZERO, rest),
             Some(_) if is_alone => (rest, Rect::ZERO),
-            Some(shape) => divide(rest, shape),
+            Some(shape) => divide_image_and_panel(rest, shape),
         };
         let holds = |(width, height)| layout.panel.width >= width && layout.panel.height >= height;
         let has_room = TEXT_SIZES.into_iter().any(holds);
@@ -91,9 +93,9 @@ impl Layout {
 
 /// Divides the space between image and panel to make the image as large as possible. The panel is omitted if
 /// it would take too much space.
-fn divide(rest: Rect, shape: f32) -> (Rect, Rect) {
+fn divide_image_and_panel(rest: Rect, shape: f32) -> (Rect, Rect) {
     let cells = |area| {
-        let (width, height) = fit(area, shape);
+        let (width, height) = fit_image(area, shape);
         u32::from(width) * u32::from(height)
     };
     let panels = [stacked(rest, shape), side_by_side(rest, shape)].into_iter().flatten();
@@ -104,7 +106,7 @@ fn divide(rest: Rect, shape: f32) -> (Rect, Rect) {
 
 fn side_by_side(rest: Rect, shape: f32) -> Option<(Rect, Rect)> {
     let room = Rect { width: rest.width.checked_sub(SIDE_WIDTH + 1)?, ..rest };
-    let (width, _) = fit(room, shape);
+    let (width, _) = fit_image(room, shape);
     let panel = Rect { x: rest.x + width + 1, width: rest.width - width - 1, ..rest };
     (rest.height >= SIDE_HEIGHT).then_some((Rect { width, ..rest }, panel))
 }
@@ -114,13 +116,13 @@ fn stacked(rest: Rect, shape: f32) -> Option<(Rect, Rect)> {
     // Rows for the stages and one line of results.
     let rows = u16::try_from(Stage::ALL.len().div_ceil(columns.max(1)) + 1).unwrap_or(u16::MAX);
     let room = Rect { height: rest.height.checked_sub(rows)?, ..rest };
-    let (_, height) = fit(room, shape);
+    let (_, height) = fit_image(room, shape);
     let panel = Rect { y: rest.y + height, height: rest.height - height, ..rest };
     (columns > 0).then_some((Rect { height, ..rest }, panel))
 }
 
 /// Columns and rows of the largest image with this aspect ratio that fits into an area.
-fn fit(area: Rect, shape: f32) -> (u16, u16) {
+fn fit_image(area: Rect, shape: f32) -> (u16, u16) {
     let rows = (f32::from(area.width) / shape).ceil();
     if rows <= f32::from(area.height) {
         (area.width, rows as u16)

@@ -9,7 +9,7 @@ use crate::preview_kind::PreviewKind;
 use crate::state::State;
 
 /// Draws the marks over an image that covers these cells.
-pub(super) fn draw(state: &State, cells: Rect, buffer: &mut Buffer) {
+pub(super) fn draw_marks(state: &State, cells: Rect, buffer: &mut Buffer) {
     let mut mark = |spot: ImagePosition, symbols: [&str; 2]| {
         let symbol = symbols[usize::from(state.display.kind == PreviewKind::Ascii)];
         let cell = cell_of(state, spot, cells).and_then(|place| buffer.cell_mut(place));
@@ -19,7 +19,7 @@ pub(super) fn draw(state: &State, cells: Rect, buffer: &mut Buffer) {
         }
     };
     if let Some(Section { left, top, width, height }) =
-        state.request.first_section.filter(|_| is_marked(state))
+        state.request.first_section.filter(|_| is_region_marked(state))
     {
         // Keep the marks inside the region.
         let (right, bottom) = (left + width * 0.999, top + height * 0.999);
@@ -37,7 +37,7 @@ pub(super) fn draw(state: &State, cells: Rect, buffer: &mut Buffer) {
 }
 
 /// Whether to mark the region, which is the case while it is being selected or rendered.
-fn is_marked(state: &State) -> bool {
+fn is_region_marked(state: &State) -> bool {
     state.selection.is_marking || state.work.is_running()
 }
 

@@ -8,7 +8,7 @@ use ratatui::widgets::{Clear, Widget};
 
 use super::layout::Layout;
 use super::status_line;
-use super::text::{Tone, columns, put, right_part, row, wrapped};
+use super::text::{Tone, put_text, right_part, row_of, text_columns, wrapped};
 use crate::scene::sanitize::visible;
 use crate::state::State;
 
@@ -26,11 +26,11 @@ enum MessagePosition {
 }
 
 pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
-    let Some((words, tone)) = words(state, layout) else { return };
+    let Some((words, tone)) = message_text(state, layout) else { return };
     let room = match message_position(state, layout, &words) {
         MessagePosition::Line(line) => {
             Clear.render(line.intersection(buffer.area), buffer);
-            put(buffer, line, &[(&words, tone)], state.display.depth);
+            put_text(buffer, line, &[(&words, tone)], state.display.depth);
             return;
         }
         MessagePosition::Over(room) => room,
@@ -43,18 +43,18 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
         // Lines that do not fit are truncated with an ellipsis.
         let is_cut = index + 1 == height && lines.len() > usize::from(height);
         let rest = if is_cut { lines[usize::from(index)..].join(" ") } else { line.clone() };
-        put(buffer, row(area, index), &[(&rest, tone)], state.display.depth);
+        put_text(buffer, row_of(area, index), &[(&rest, tone)], state.display.depth);
     }
 }
 
 /// Whether a message replaces a whole line. The status line is shared, not replaced.
 pub(super) fn replaces_line(state: &State, layout: &Layout) -> bool {
-    words(state, layout).is_some()
+    message_text(state, layout).is_some()
 }
 
 /// The part of the status line not used by a message.
 pub(super) fn status_line_rest(state: &State, layout: &Layout) -> Rect {
-    let spot = words(state, layout).map(|(words, _)| message_position(state, layout, &words));
+    let spot = message_text(state, layout).map(|(words, _)| message_position(state, layout, &words));
     let used = match spot {
         Some(MessagePosition::Line(line)) if line.y == layout.under.y => line.width + GAP,
         Some(MessagePosition::Over(room)) if room.bottom() > layout.under.y => layout.under.width,
@@ -65,8 +65,8 @@ pub(super) fn status_line_rest(state: &State, layout: &Layout) -> Rect {
 
 /// Whether the message covers the image.
 pub(super) fn is_over_picture(state: &State) -> bool {
-    let layout = Layout::of(state);
-    words(state, &layout).is_some_and(|(words, _)| {
+    let layout = Layout::for_state(state);
+    message_text(state, &layout).is_some_and(|(words, _)| {
         matches!(message_position(state, &layout, &words), MessagePosition::Over(_))
     })
 }
@@ -77,14 +77,13 @@ pub(super) fn is_in_panel(state: &State, layout: &Layout) -> bool {
     layout.panel.height >= FACTS && !is_covered
 }
 
-fn words(state: &State, layout: &Layout) -> Option<(String, Tone)> {
+fn message_text(state: &State, layout: &Layout) -> Option<(String, Tone)> {
     if let Some(facts) = state.selection.facts.as_ref().filter(|_| !is_in_panel(state, layout)) {
         return Some((facts.join(" · "), Tone::Strong));
     }
     let message = state.overlays.message.as_ref().filter(|message| !message.words.is_empty())?;
     let words = visible(&message.words).into_owned();
-    // The view list replaces a long message. Its keys replace a short message if there is no separate line
-    // for it.
+    // The view list hides a long message. The list's keys hide a short message that has no line of its own.
     let has_place = !layout.under.is_empty()
         && matches!(message_position(state, layout, &words), MessagePosition::Line(_));
     if state.overlays.views.is_some() && !has_place {
@@ -95,7 +94,7 @@ fn words(state: &State, layout: &Layout) -> Option<(String, Tone)> {
 }
 
 fn message_position(state: &State, layout: &Layout, words: &str) -> MessagePosition {
-    let width = columns(words);
+    let width = text_columns(words);
     let under = layout.under;
     if under.is_empty() {
         // Do not cover the state block.

@@ -27,20 +27,20 @@ use self::layout::Layout;
 use super::state::State;
 
 /// The state as a single word.
-pub(super) fn state_word(state: &State) -> &'static str {
-    header::word(state)
+pub(super) fn activity_word(state: &State) -> &'static str {
+    header::work_word(state)
 }
 
 /// The history entry at a cell of the history strip, as an index.
-pub(super) fn picture_at(state: &State, column: u16, row: u16) -> Option<usize> {
-    let layout = Layout::of(state);
+pub(super) fn history_entry_at(state: &State, column: u16, row: u16) -> Option<usize> {
+    let layout = Layout::for_state(state);
     let is_open = state.overlays.help.open || layout.panel.is_empty();
-    (!is_open).then(|| panel::picture_at(state, layout.panel, (column, row))).flatten()
+    (!is_open).then(|| panel::history_entry_at(state, layout.panel, (column, row))).flatten()
 }
 
 /// Draws the whole screen.
 pub(super) fn draw(state: &State, buffer: &mut Buffer) -> ViewExtras {
-    let layout = Layout::of(state);
+    let layout = Layout::for_state(state);
     header::draw(state, &layout, buffer);
     preview::draw(state, layout.preview, buffer);
     let mut drawn = panel::draw(state, layout.panel, buffer);

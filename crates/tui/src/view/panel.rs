@@ -10,7 +10,10 @@ use super::message;
 use super::side_panel;
 use super::stages::{self, StyledLine};
 use super::status_line;
-use super::text::{Tone, bytes, columns, gauge, percent, row, shortened, two_digit_percent, wrapped};
+use super::text::{
+    Tone, floor_percent, format_bytes, progress_bar_parts, row_of, text_columns, truncated_text,
+    two_digit_percent, wrapped,
+};
 use crate::pipeline::protocol::Stage;
 use crate::preview_kind::PreviewKind;
 use crate::scene::sanitize::visible;
@@ -36,16 +39,16 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) -> ViewExtras
         }
         let gap = u16::from(column + 1 < columns);
         let place = Rect { x: room.x + column * width, width: width - gap, ..room };
-        drawn.put(state, row(place, line_of), line, buffer);
+        drawn.put_line(state, row_of(place, line_of), line, buffer);
     }
-    drawn.later = side_panel::draw(state, area, rows(&lines, columns, room), buffer);
+    drawn.later = side_panel::draw(state, area, rows_used(&lines, columns, room), buffer);
     drawn
 }
 
 /// The history entry at a cell of the history strip.
-pub(super) fn picture_at(state: &State, area: Rect, place: (u16, u16)) -> Option<usize> {
+pub(super) fn history_entry_at(state: &State, area: Rect, place: (u16, u16)) -> Option<usize> {
     let PanelLayout { lines, columns, room } = panel_layout(state, area);
-    side_panel::picture_at(state, area, rows(&lines, columns, room), place)
+    side_panel::history_entry_at(state, area, rows_used(&lines, columns, room), place)
 }
 
 /// The panel's lines, the number of columns, and the area available for them.
@@ -58,52 +61,56 @@ struct PanelLayout {
 fn panel_layout(state: &State, area: Rect) -> PanelLayout {
     let room = Rect { width: side_panel::columns_of_lines(state, area), ..area };
     let is_one_column = |lines: &[StyledLine]| lines.len() <= usize::from(room.height);
-    let mut lines = lines(state, (room.width, room.width), true);
+    let mut lines = panel_lines(state, (room.width, room.width), true);
     if !is_one_column(&lines) {
-        lines = self::lines(state, (room.width, room.width), false);
+        lines = self::panel_lines(state, (room.width, room.width), false);
     }
     let mut room = room;
     if !is_one_column(&lines) {
         room = area;
-        lines = self::lines(state, (room.width, room.width.min(ENTRY_WIDTH)), false);
+        lines = self::panel_lines(state, (room.width, room.width.min(ENTRY_WIDTH)), false);
     }
     let wanted = lines.len().div_ceil(usize::from(room.height.max(1)));
     let columns = u16::try_from(wanted).unwrap_or(u16::MAX).clamp(1, (room.width / ENTRY_WIDTH).max(1));
     PanelLayout { lines, columns, room }
 }
 
-/// Number of rows used by the lines. With several columns, all rows are used.
-fn rows(lines: &[StyledLine], columns: u16, room: Rect) -> u16 {
+/// Number of rows used by the lines. If there are several columns, all rows are used.
+fn rows_used(lines: &[StyledLine], columns: u16, room: Rect) -> u16 {
     if columns > 1 { room.height } else { u16::try_from(lines.len()).unwrap_or(u16::MAX).min(room.height) }
 }
 
-/// The lines of a panel with this width, with hints wrapped to the column width. The reasons for stages are
-/// shown in full or shortened to fit next to the stages.
-fn lines(state: &State, (width, column): (u16, u16), is_in_full: bool) -> Vec<StyledLine> {
+/// The panel's lines for this width. Hints are wrapped to the column width. Stage reasons are shown in full,
+/// or shortened to fit next to the stages.
+fn panel_lines(state: &State, (width, column): (u16, u16), is_in_full: bool) -> Vec<StyledLine> {
     let is_done = matches!(state.work.activity, Activity::Done);
-    let mut lines = inspected(state, width);
+    let mut lines = inspected_lines(state, width);
     // Stages and results describe the newest render.
-    if state.picture.history.is_open() {
+    if state.picture.history.is_older_open() {
         return lines;
     }
     // If the scene is broken, its stages have no visible result.
-    if !is_done && !is_broken(state) {
-        let of = |stage| if is_in_full { stages::lines } else { stages::short }(state, stage, width);
+    if !is_done && !is_scene_broken(state) {
+        let of = |stage| if is_in_full { stages::stage_lines } else { stages::stage_line_with_reason }(state, stage, width);
         lines.extend(Stage::ALL.into_iter().flat_map(of));
     }
     if is_done {
-        lines.extend(results(state, column));
+        lines.extend(result_lines(state, column));
     }
-    lines.extend(hint(state, column));
+    lines.extend(save_hint_lines(state, column));
     // Progress bars are last because they appear and disappear.
     lines.extend(state.work.assets.iter().map(|asset| asset_line(state, asset, width)));
     lines
 }
 
 /// The inspected values.
-fn inspected(state: &State, width: u16) -> Vec<StyledLine> {
-    let facts =
-        state.selection.facts.iter().filter(|_| message::is_in_panel(state, &Layout::of(state))).flatten();
+fn inspected_lines(state: &State, width: u16) -> Vec<StyledLine> {
+    let facts = state
+        .selection
+        .facts
+        .iter()
+        .filter(|_| message::is_in_panel(state, &Layout::for_state(state)))
+        .flatten();
     let lines = facts.flat_map(|fact| wrapped(fact, usize::from(width.min(2 * ENTRY_WIDTH))));
     let mut lines: Vec<StyledLine> = lines.map(|line| vec![(line, Tone::Strong)]).collect();
     if !lines.is_empty() {
@@ -113,7 +120,7 @@ fn inspected(state: &State, width: u16) -> Vec<StyledLine> {
 }
 
 /// Whether the current scene is invalid.
-fn is_broken(state: &State) -> bool {
+fn is_scene_broken(state: &State) -> bool {
     let is_at_rest = match state.work.activity {
         Activity::Waiting | Activity::Broken => true,
         Activity::Running { .. } | Activity::Done | Activity::Cancelled => false,
@@ -122,18 +129,18 @@ fn is_broken(state: &State) -> bool {
 }
 
 fn asset_line(state: &State, asset: &AssetBar, width: u16) -> StyledLine {
-    let fraction = stages::fraction(asset);
-    let (filled_squares, empty) = gauge(fraction, BAR, state.display.kind == PreviewKind::Ascii);
-    let percent = format!(" {:3} %", percent(fraction));
-    let room = width.min(2 * ENTRY_WIDTH).saturating_sub(BAR + columns(&percent) + 1);
-    let name = shortened(&visible(&asset.progress.name), room);
-    let pad = usize::from(room - columns(&name).min(room)) + 1;
+    let fraction = stages::loaded_fraction(asset);
+    let (filled_squares, empty) = progress_bar_parts(fraction, BAR, state.display.kind == PreviewKind::Ascii);
+    let percent = format!(" {:3} %", floor_percent(fraction));
+    let room = width.min(2 * ENTRY_WIDTH).saturating_sub(BAR + text_columns(&percent) + 1);
+    let name = truncated_text(&visible(&asset.progress.name), room);
+    let pad = usize::from(room - text_columns(&name).min(room)) + 1;
     let name = name + &" ".repeat(pad);
     vec![(name, Tone::Plain), (filled_squares, Tone::Working), (empty, Tone::Faint), (percent, Tone::Plain)]
 }
 
 /// The results, with one label and value per line.
-fn results(state: &State, width: u16) -> Vec<StyledLine> {
+fn result_lines(state: &State, width: u16) -> Vec<StyledLine> {
     let fact =
         |label: &str, value: String| vec![(format!("{label:<LABEL$} "), Tone::Faint), (value, Tone::Plain)];
     let mut lines = Vec::new();
@@ -141,13 +148,16 @@ fn results(state: &State, width: u16) -> Vec<StyledLine> {
     let mut add = |words: &str, tone| {
         lines.extend(wrapped(words, usize::from(width)).into_iter().map(|line| vec![(line, tone)]));
     };
-    status_line::not_saved(state).iter().for_each(|words| add(words, Tone::Faint));
-    status_line::lost(state).for_each(|words| add(&words, Tone::Warning));
-    for written in status_line::files(state) {
+    status_line::unsaved_messages(state).iter().for_each(|words| add(words, Tone::Faint));
+    status_line::lost_file_messages(state).for_each(|words| add(&words, Tone::Warning));
+    for written in status_line::current_image_files(state) {
         let name = visible(&written.path.to_string_lossy()).into_owned();
         lines.push(vec![("→ ".to_owned(), Tone::Good), (name, Tone::File)]);
         let size = state.request.effective.as_ref().map(|it| format!(", {}×{}", it.width, it.height));
-        lines.push(vec![(format!("  {}{}", bytes(written.bytes), size.unwrap_or_default()), Tone::Faint)]);
+        lines.push(vec![(
+            format!("  {}{}", format_bytes(written.bytes), size.unwrap_or_default()),
+            Tone::Faint,
+        )]);
     }
     if let Some(report) = &state.work.report {
         let samples = report.image.samples;
@@ -161,11 +171,11 @@ fn results(state: &State, width: u16) -> Vec<StyledLine> {
         ));
         lines.extend(report.image.error.map(|error| fact("noise", two_digit_percent(error))));
         lines.extend(state.request.effective.as_ref().filter(|it| it.error > 0.0).map(|it| {
-            let label = if end(state) == Some(RenderEnd::Error) { "target ✓" } else { "target" };
+            let label = if render_end(state) == Some(RenderEnd::Error) { "target ✓" } else { "target" };
             fact(label, format!("{} % per tile", f64::from((it.error * 1e4).round()) / 100.0))
         }));
     }
-    match end(state) {
+    match render_end(state) {
         Some(RenderEnd::Time) => lines.push(fact("stopped", "at time limit".to_owned())),
         Some(RenderEnd::Samples) => lines.push(fact("stopped", "at max samples".to_owned())),
         Some(RenderEnd::Error) | None => {}
@@ -184,7 +194,7 @@ enum RenderEnd {
 }
 
 /// The limit that ended the render. `None` if only one limit was set.
-fn end(state: &State) -> Option<RenderEnd> {
+fn render_end(state: &State) -> Option<RenderEnd> {
     let (image, effective) = (&state.work.report.as_ref()?.image, state.request.effective.as_ref()?);
     let is_by_error = effective.error > 0.0;
     match () {
@@ -196,16 +206,16 @@ fn end(state: &State) -> Option<RenderEnd> {
     }
 }
 
-/// A hint for users who have not saved yet, wrapped. If the scene is broken and there is no image, the status
+/// A wrapped hint for users who have not saved yet. If the scene is broken and there is no image, the status
 /// line shows the hint instead.
-fn hint(state: &State, width: u16) -> Vec<StyledLine> {
-    if is_broken(state) && state.picture.shown.is_none() {
+fn save_hint_lines(state: &State, width: u16) -> Vec<StyledLine> {
+    if is_scene_broken(state) && state.picture.shown.is_none() {
         return Vec::new();
     }
     let mut lines: Vec<String> = Vec::new();
-    for word in status_line::hint(state).split_whitespace() {
+    for word in status_line::save_hint(state).split_whitespace() {
         match lines.last_mut() {
-            Some(line) if columns(line) + 1 + columns(word) <= width => {
+            Some(line) if text_columns(line) + 1 + text_columns(word) <= width => {
                 *line += &format!(" {word}");
             }
             Some(_) | None => lines.push(word.to_owned()),

@@ -1,4 +1,4 @@
-//! Draws the preview using block or other characters. Only this module converts pixels to cells.
+//! Draws the preview using block characters or ASCII. Only this module converts pixels to cells.
 
 use ratatui::buffer::{Buffer, Cell};
 use ratatui::layout::Rect;
@@ -8,17 +8,17 @@ use super::layout::Layout;
 use super::marks;
 use super::message;
 use super::ramp::Ramp;
-use super::text::{Tone, put};
+use super::text::{Tone, put_text};
 use crate::color::{ColorDepth, ColorMapper, XTERM};
 use crate::film::Picture;
 use crate::graphics::PixelPlacement;
 use crate::history::ShownImage;
 use crate::messages;
-use crate::mosaic::{Grid, fit};
+use crate::mosaic::{Grid, fit_cell};
 use crate::options::PreviewChoice;
 use crate::pipeline::protocol::ImagePosition;
 use crate::preview_kind::PreviewKind;
-use crate::rescale::rescaled;
+use crate::rescale::resized_pixels;
 use crate::state::State;
 
 /// Draws the preview, or a message if there is none.
@@ -27,50 +27,52 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
     match &state.picture.shown {
         Some(_) if is_in_pixels(state) => {}
         Some(shown) => {
-            let kind = in_cells(state.display.kind, state.display.depth);
-            let placed = PlacedImage::of(state, shown, area, kind);
-            placed.draw(&shown.picture, kind, PreviewColors::of(state), buffer);
-            marks::draw(state, placed.cells, buffer);
+            let kind = kind_in_cells(state.display.kind, state.display.depth);
+            let placed = PlacedImage::for_preview(state, shown, area, kind);
+            placed.draw(&shown.picture, kind, PreviewColors::for_state(state), buffer);
+            marks::draw_marks(state, placed.cells, buffer);
         }
         None if state.overlays.problems.is_none() && area.height > 0 => {
             let text = messages::NO_IMAGE;
             let middle = Rect { y: area.y + area.height / 2, height: 1, ..area };
-            let indent = area.width.saturating_sub(super::text::columns(text)) / 2;
+            let indent = area.width.saturating_sub(super::text::text_columns(text)) / 2;
             let line = Rect { x: middle.x + indent, width: middle.width - indent, ..middle };
-            put(buffer, line, &[(text, Tone::Faint)], state.display.depth);
+            put_text(buffer, line, &[(text, Tone::Faint)], state.display.depth);
         }
         None => {}
     }
 }
 
 /// Draws a thumbnail.
-pub(super) fn draw_small(state: &State, picture: &Picture, area: Rect, buffer: &mut Buffer) {
+pub(super) fn draw_thumbnail(state: &State, picture: &Picture, area: Rect, buffer: &mut Buffer) {
     let area = area.intersection(buffer.area);
     if !area.is_empty() {
-        let kind = in_cells(state.display.kind, state.display.depth);
+        let kind = kind_in_cells(state.display.kind, state.display.depth);
         let placed = PlacedImage::fit(picture, area, kind, state.display.window.cell_aspect, f32::INFINITY);
-        placed.draw(picture, kind, PreviewColors::of(state), buffer);
+        placed.draw(picture, kind, PreviewColors::for_state(state), buffer);
     }
 }
 
 /// The image position shown by a cell.
-pub(crate) fn spot_at(state: &State, column: u16, row: u16) -> Option<ImagePosition> {
+pub(crate) fn image_position_at(state: &State, column: u16, row: u16) -> Option<ImagePosition> {
     let shown = state.picture.shown.as_ref()?;
-    let area = Layout::of(state).preview;
-    let cells = PlacedImage::of(state, shown, area, in_cells(state.display.kind, state.display.depth)).cells;
+    let area = Layout::for_state(state).preview;
+    let cells =
+        PlacedImage::for_preview(state, shown, area, kind_in_cells(state.display.kind, state.display.depth))
+            .cells;
     let share = |at: u16, start: u16, length: u16| (f64::from(at - start) + 0.5) / f64::from(length);
     let spot = || {
         let spot =
             ImagePosition { x: share(column, cells.x, cells.width), y: share(row, cells.y, cells.height) };
-        shown.section.map_or(spot, |section| section.place(spot))
+        shown.section.map_or(spot, |section| section.to_image_position(spot))
     };
     cells.contains((column, row).into()).then(spot)
 }
 
 /// The kind of preview to use if it must be drawn with cells.
-fn in_cells(kind: PreviewKind, depth: ColorDepth) -> PreviewKind {
+fn kind_in_cells(kind: PreviewKind, depth: ColorDepth) -> PreviewKind {
     match kind {
-        PreviewKind::Pixels(_) => PreviewKind::of(PreviewChoice::Auto, depth),
+        PreviewKind::Pixels(_) => PreviewKind::from_choice(PreviewChoice::Auto, depth),
         kind => kind,
     }
 }
@@ -87,7 +89,7 @@ fn is_in_pixels(state: &State) -> bool {
 /// Placement of the preview in pixels. `None` if it is drawn using cells.
 pub(crate) fn placement(state: &State, area: Rect) -> Option<PixelPlacement> {
     let shown = state.picture.shown.as_ref().filter(|_| is_in_pixels(state))?;
-    let placed = PlacedImage::of(state, shown, area, state.display.kind);
+    let placed = PlacedImage::for_preview(state, shown, area, state.display.kind);
     let (picture, cells) = (shown.picture.clone(), placed.cells);
     (!cells.is_empty()).then_some(PixelPlacement { picture, cells, cell: state.display.window.cell_pixels })
 }
@@ -102,14 +104,19 @@ pub(crate) struct PreviewColors<'a> {
 }
 
 impl<'a> PreviewColors<'a> {
-    fn of(state: &'a State) -> Self {
+    fn for_state(state: &'a State) -> Self {
         Self { depth: state.display.depth, shades: &state.display.shades, is_light: state.display.is_light }
     }
 }
 
 /// Draws an image into these cells for a dark terminal that has xterm's colors and cells twice as high as
 /// wide.
-pub fn shown(picture: &Picture, choice: PreviewChoice, depth: ColorDepth, area: Rect) -> Buffer {
+pub fn draw_for_dark_xterm(
+    picture: &Picture,
+    choice: PreviewChoice,
+    depth: ColorDepth,
+    area: Rect,
+) -> Buffer {
     let shades = ColorMapper::new(depth, &XTERM);
     let inks = PreviewColors { depth, shades: &shades, is_light: false };
     draw_image(picture, choice, inks, (area, 2.0))
@@ -123,7 +130,7 @@ pub(crate) fn draw_image(
     (area, cell_aspect): (Rect, f32),
 ) -> Buffer {
     let mut buffer = Buffer::empty(area);
-    let kind = in_cells(PreviewKind::of(choice, inks.depth), inks.depth);
+    let kind = kind_in_cells(PreviewKind::from_choice(choice, inks.depth), inks.depth);
     PlacedImage::fit(picture, area, kind, cell_aspect, f32::INFINITY).draw(picture, kind, inks, &mut buffer);
     buffer
 }
@@ -135,7 +142,7 @@ pub(crate) fn size_in_cells(
     (columns, rows): (u16, u16),
     cell_aspect: f32,
 ) -> (u16, u16) {
-    let kind = PreviewKind::of(PreviewChoice::HalfBlock, depth);
+    let kind = PreviewKind::from_choice(PreviewChoice::HalfBlock, depth);
     let area = Rect::new(0, 0, columns, rows);
     let cells = PlacedImage::fit(picture, area, kind, cell_aspect, f32::INFINITY).cells;
     (cells.width, cells.height)
@@ -151,7 +158,7 @@ struct PlacedImage {
 
 impl PlacedImage {
     /// Placement of the current preview, either as large as possible or showing actual pixels.
-    fn of(state: &State, shown: &ShownImage, area: Rect, kind: PreviewKind) -> Self {
+    fn for_preview(state: &State, shown: &ShownImage, area: Rect, kind: PreviewKind) -> Self {
         let across = kind.grid().map_or(1, Grid::columns);
         let one_to_one = across as f32 / state.display.pixels_across() as f32;
         let most = if shown.section.is_some() { one_to_one } else { f32::INFINITY };
@@ -159,7 +166,7 @@ impl PlacedImage {
     }
 
     /// The largest centered placement with the image's aspect ratio. `cell_aspect` is a cell's height divided
-    /// by its width. The width of a pixel is limited to `most` parts of a cell.
+    /// by its width. A pixel is at most `most` cell parts wide.
     fn fit(picture: &Picture, area: Rect, kind: PreviewKind, cell_aspect: f32, most: f32) -> Self {
         let (across, down) = kind.grid().map_or((1, 1), |grid| (grid.columns() as u16, grid.rows() as u16));
         let pixel_aspect = cell_aspect * f32::from(across) / f32::from(down);
@@ -169,7 +176,7 @@ impl PlacedImage {
         let whole = |length: f32, room: f32| (length * scale).round().clamp(room.min(1.0), room) as u16;
         let (width, height) = (whole(size.0, room.0), whole(size.1, room.1));
         let (columns, rows) = (width.div_ceil(across), height.div_ceil(down));
-        // If cells consist of several pixels horizontally, round up to whole cells.
+        // If a cell is several pixels wide, round up to whole cells.
         let (width, height) = if across > 1 { (columns * across, rows * down) } else { (width, height) };
         let cells = Rect {
             x: area.x + (area.width - columns.min(area.width)) / 2,
@@ -181,7 +188,7 @@ impl PlacedImage {
     }
 
     fn draw(self, picture: &Picture, kind: PreviewKind, inks: PreviewColors<'_>, buffer: &mut Buffer) {
-        let pixels = rescaled(picture, self.width, self.height);
+        let pixels = resized_pixels(picture, self.width, self.height);
         let scaled = ScaledImage { width: self.width, height: self.height, pixels: &pixels };
         let mut each = |draw: &dyn Fn(usize, usize, &mut Cell)| {
             for row in 0..self.cells.height {
@@ -193,11 +200,11 @@ impl PlacedImage {
             }
         };
         match kind.grid() {
-            Some(grid) => each(&|x, y, cell| mosaic(&scaled, grid, inks.shades, (x, y), cell)),
+            Some(grid) => each(&|x, y, cell| draw_mosaic_cell(&scaled, grid, inks.shades, (x, y), cell)),
             None if kind == PreviewKind::None => {}
             None => {
-                let ramp = Ramp::of(picture, inks.is_light);
-                each(&|x, y, cell| character(&scaled, ramp, inks, (x, y), cell));
+                let ramp = Ramp::for_picture(picture, inks.is_light);
+                each(&|x, y, cell| draw_character_cell(&scaled, ramp, inks, (x, y), cell));
             }
         }
     }
@@ -218,7 +225,7 @@ impl ScaledImage<'_> {
 }
 
 /// Draws a cell with two colors.
-fn mosaic(
+fn draw_mosaic_cell(
     scaled: &ScaledImage<'_>,
     grid: Grid,
     shades: &ColorMapper,
@@ -231,17 +238,17 @@ fn mosaic(
     let colors: Vec<[u8; 3]> = parts.iter().copied().flatten().collect();
     if colors.len() < parts.len() {
         // The last row of cells may lack pixels in its lower half.
-        let color = parts[0].map_or(Color::Reset, |rgb| shades.color(rgb, x, 2 * y));
+        let color = parts[0].map_or(Color::Reset, |rgb| shades.map_color(rgb, x, 2 * y));
         cell.set_symbol("▀").set_style(Style::new().fg(color).bg(Color::Reset));
         return;
     }
-    let shown = shades.cell(fit(grid, &colors), x, y);
+    let shown = shades.map_cell(fit_cell(grid, &colors), x, y);
     let [first, second] = shown.pair;
     cell.set_char(shown.tile.symbols()[0]).set_style(Style::new().fg(first).bg(second));
 }
 
 /// Draws a cell as a character.
-fn character(
+fn draw_character_cell(
     scaled: &ScaledImage<'_>,
     ramp: Ramp,
     inks: PreviewColors<'_>,
@@ -252,8 +259,8 @@ fn character(
     if inks.depth == ColorDepth::None {
         cell.set_char(ramp.glyph(rgb));
     } else {
-        let (symbol, ink) = ramp.tinted(rgb);
-        cell.set_char(symbol).set_style(Style::new().fg(inks.shades.color(ink, x, y)));
+        let (symbol, ink) = ramp.tinted_glyph(rgb);
+        cell.set_char(symbol).set_style(Style::new().fg(inks.shades.map_color(ink, x, y)));
     }
 }
 
@@ -303,8 +310,8 @@ mod tests {
                         let placed = fit(width, height, (columns, rows), kind, aspect);
                         let shown_height = placed.height as f32 * aspect / per_cell;
                         let shown_width = placed.width as f32 / across;
-                        // Rounding adds up to half a pixel per side, or up to a cell if there are several
-                        // pixels per cell.
+                        // Rounding adds up to half a pixel per side, or up to one cell if a cell has several
+                        // pixels.
                         let is_fine = across > 1.0;
                         let (off_x, off_y) =
                             if is_fine { (1.0, aspect) } else { (0.5, 0.5 * aspect / per_cell) };
@@ -330,7 +337,7 @@ mod tests {
         PlacedImage::fit(&one, buffer.area, PreviewKind::HalfBlock, 2.0, f32::INFINITY).draw(
             &one,
             PreviewKind::HalfBlock,
-            PreviewColors::of(&state),
+            PreviewColors::for_state(&state),
             &mut buffer,
         );
         let cell = &buffer[(0, 1)];
@@ -348,7 +355,7 @@ mod tests {
             PlacedImage::fit(&sharp, buffer.area, kind, 2.0, f32::INFINITY).draw(
                 &sharp,
                 kind,
-                PreviewColors::of(&state),
+                PreviewColors::for_state(&state),
                 &mut buffer,
             );
             let cell = &buffer[(1, 1)];

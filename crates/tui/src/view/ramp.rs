@@ -39,7 +39,7 @@ impl Ramp {
     /// Creates a ramp from an image's darkest to its brightest values, ignoring a thirtieth of the pixels at
     /// each end. The limits are quantized to keep most characters stable under noise. Contrast is increased
     /// by no more than a factor of four.
-    pub(super) fn of(picture: &Picture, is_light: bool) -> Self {
+    pub(super) fn for_picture(picture: &Picture, is_light: bool) -> Self {
         const STEPS: f32 = 16.0;
         const MIN: f32 = 0.25;
         let mut counts = [0_usize; 256];
@@ -48,42 +48,42 @@ impl Ramp {
             counts[usize::from(level)] += 1;
         }
         let beyond = picture.pixels.len() / 30;
-        let low = (end(&counts, 0..256, beyond) * STEPS).floor() / STEPS;
-        let high = (end(&counts, (0..256).rev(), beyond) * STEPS).ceil() / STEPS;
+        let low = (level_after(&counts, 0..256, beyond) * STEPS).floor() / STEPS;
+        let high = (level_after(&counts, (0..256).rev(), beyond) * STEPS).ceil() / STEPS;
         let (low, high) = if high - low < MIN { (high.min(1.0) - MIN, high.min(1.0)) } else { (low, high) };
         Self { low: low.max(0.0), high, is_light }
     }
 
     /// Maps an sRGB brightness to the ramp's range.
-    fn stretched(self, brightness: f32) -> f32 {
+    fn stretch(self, brightness: f32) -> f32 {
         ((brightness - self.low) / (self.high - self.low).max(1e-3)).clamp(0.0, 1.0)
     }
 
     /// The character for a color on a monochrome terminal.
     pub(super) fn glyph(self, rgb: [u8; 3]) -> char {
-        self.nearest(self.stretched(linear_to_srgb(luminance(srgb8_to_linear(rgb)).clamp(0.0, 1.0))))
+        self.nearest_glyph(self.stretch(linear_to_srgb(luminance(srgb8_to_linear(rgb)).clamp(0.0, 1.0))))
     }
 
     /// The character for a color and the color of its ink. The ink is as saturated as possible, which
     /// maximizes the area covered by the character.
-    pub(super) fn tinted(self, rgb: [u8; 3]) -> (char, [u8; 3]) {
+    pub(super) fn tinted_glyph(self, rgb: [u8; 3]) -> (char, [u8; 3]) {
         let linear = srgb8_to_linear(rgb);
         if self.is_light {
             let ink = (1.0 - linear.min_element()).max(1e-3);
-            let brightness = self.stretched(linear_to_srgb(1.0 - ink));
-            (self.nearest(brightness), quantize(Vec3::ONE - (Vec3::ONE - linear) / ink))
+            let brightness = self.stretch(linear_to_srgb(1.0 - ink));
+            (self.nearest_glyph(brightness), quantize(Vec3::ONE - (Vec3::ONE - linear) / ink))
         } else {
             let brightest = linear.max_element().max(1e-3);
-            (self.nearest(self.stretched(linear_to_srgb(brightest))), quantize(linear / brightest))
+            (self.nearest_glyph(self.stretch(linear_to_srgb(brightest))), quantize(linear / brightest))
         }
     }
 
     /// The character closest to an sRGB brightness. The range extends from the bare background to the densest
     /// character.
-    fn nearest(self, brightness: f32) -> char {
+    fn nearest_glyph(self, brightness: f32) -> char {
         let off = |ink: f32| {
             let covered = ink / MAX_INK;
-            // Near white, the loss of brightness is roughly proportional to the ink coverage.
+            // Near white, brightness decreases roughly in proportion to the ink coverage.
             let seen = if self.is_light { 1.0 - covered } else { linear_to_srgb(covered) };
             (seen - brightness).abs()
         };
@@ -92,7 +92,7 @@ impl Ramp {
 }
 
 /// The first level at which more than `beyond` pixels have been counted.
-fn end(counts: &[usize; 256], mut levels: impl Iterator<Item = usize>, beyond: usize) -> f32 {
+fn level_after(counts: &[usize; 256], mut levels: impl Iterator<Item = usize>, beyond: usize) -> f32 {
     let mut seen = 0;
     let level = levels.find(|level| {
         seen += counts[*level];
@@ -143,20 +143,20 @@ mod tests {
             let pixels = (0..1000).map(|i| [80 + (i % 60) as u8 + noise * (i % 2) as u8; 3]).collect();
             Picture { width: 100, height: 10, pixels }
         };
-        let ramp = Ramp::of(&dull(0), false);
+        let ramp = Ramp::for_picture(&dull(0), false);
         assert!(rank(ramp.glyph([80; 3])) < 3 && rank(ramp.glyph([139; 3])) > 11, "{ramp:?}");
-        assert_eq!(ramp, Ramp::of(&dull(2), false));
-        let flat = Ramp::of(&Picture { width: 10, height: 1, pixels: vec![[128; 3]; 10] }, false);
+        assert_eq!(ramp, Ramp::for_picture(&dull(2), false));
+        let flat = Ramp::for_picture(&Picture { width: 10, height: 1, pixels: vec![[128; 3]; 10] }, false);
         assert!((flat.high - flat.low - 0.25).abs() < 1e-6);
     }
 
     #[test]
     fn ink_and_character_reproduce_the_color() {
-        assert_eq!(FULL.tinted([128, 0, 0]).1, [255, 0, 0]);
-        assert!(rank(FULL.tinted([128, 0, 0]).0) < rank(FULL.tinted([255, 0, 0]).0));
+        assert_eq!(FULL.tinted_glyph([128, 0, 0]).1, [255, 0, 0]);
+        assert!(rank(FULL.tinted_glyph([128, 0, 0]).0) < rank(FULL.tinted_glyph([255, 0, 0]).0));
         let light = Ramp { is_light: true, ..FULL };
         // Pale red is drawn as a sparse character in pure red.
-        let (symbol, ink) = light.tinted([255, 200, 200]);
+        let (symbol, ink) = light.tinted_glyph([255, 200, 200]);
         assert_eq!(ink, [255, 0, 0]);
         assert!(rank(symbol) < 11 && rank(symbol) > 0, "{symbol}");
     }

@@ -14,7 +14,8 @@ const COLUMN: u16 = 44;
 /// Minimum panel width for placing the lines next to the curve and the history.
 const DIVIDED: u16 = 3 * ENTRY_WIDTH;
 
-/// Number of columns available for the panel's lines. The others are used for the curve and the history.
+/// Number of columns available for the panel's lines. The remaining columns are used for the curve and the
+/// history.
 pub(super) fn columns_of_lines(state: &State, panel: Rect) -> u16 {
     let is_divided = is_wide(state) && panel.width >= DIVIDED;
     if is_divided { COLUMN } else { panel.width }
@@ -25,7 +26,7 @@ fn is_wide(state: &State) -> bool {
 }
 
 /// The area left over next to or below the lines.
-fn area(state: &State, panel: Rect, lines: u16) -> Rect {
+fn free_area(state: &State, panel: Rect, lines: u16) -> Rect {
     if !is_wide(state) || state.overlays.views.is_some() {
         return Rect::ZERO;
     }
@@ -38,7 +39,7 @@ fn area(state: &State, panel: Rect, lines: u16) -> Rect {
         Rect { y: panel.y + used, height: panel.height - used, ..panel }
     };
     // Stay above the diagnostics pane.
-    let over = diagnostics::covered(state);
+    let over = diagnostics::covered_cells(state);
     if over.intersects(area) {
         return Rect { height: over.y.saturating_sub(area.y), ..area };
     }
@@ -47,7 +48,7 @@ fn area(state: &State, panel: Rect, lines: u16) -> Rect {
 
 /// Draws the parts that fit. Returns the cells used.
 pub(super) fn draw(state: &State, panel: Rect, lines: u16, buffer: &mut Buffer) -> Rect {
-    let (curve, strip) = divided(state, panel, lines);
+    let (curve, strip) = divide_curve_and_strip(state, panel, lines);
     curve::draw(state, curve, buffer);
     strip::draw(state, strip, buffer);
     // Skip empty areas, since their origin would extend the union.
@@ -55,17 +56,17 @@ pub(super) fn draw(state: &State, panel: Rect, lines: u16, buffer: &mut Buffer) 
 }
 
 /// The history entry at a cell of the history strip.
-pub(super) fn picture_at(state: &State, panel: Rect, lines: u16, place: (u16, u16)) -> Option<usize> {
-    let (_, strip) = divided(state, panel, lines);
-    strip::at(state, strip, place)
+pub(super) fn history_entry_at(state: &State, panel: Rect, lines: u16, place: (u16, u16)) -> Option<usize> {
+    let (_, strip) = divide_curve_and_strip(state, panel, lines);
+    strip::entry_at(state, strip, place)
 }
 
 /// Divides the area between the curve and the strip. The strip is placed at the bottom so that it does not
 /// move when the results change.
-fn divided(state: &State, panel: Rect, lines: u16) -> (Rect, Rect) {
-    let area = area(state, panel, lines);
-    let is_over = state.work.activity == Activity::Done && !state.picture.history.is_open();
-    let wants_curve = |area| is_over && curve::rows(state, area).is_some();
+fn divide_curve_and_strip(state: &State, panel: Rect, lines: u16) -> (Rect, Rect) {
+    let area = free_area(state, panel, lines);
+    let is_over = state.work.activity == Activity::Done && !state.picture.history.is_older_open();
+    let wants_curve = |area| is_over && curve::chart_rows(state, area).is_some();
     if area.width >= DIVIDED {
         // Place them side by side.
         let half = if wants_curve(area) { area.width / 3 } else { 0 };
@@ -77,10 +78,10 @@ fn divided(state: &State, panel: Rect, lines: u16) -> (Rect, Rect) {
     }
     // The curve is at the top and the strip gets the remaining space. If the strip would not fit, the curve
     // is omitted.
-    let rows = curve::rows(state, area).unwrap_or(0);
+    let rows = curve::chart_rows(state, area).unwrap_or(0);
     let rest = area.height.saturating_sub(rows + 1);
     let below = Rect { y: area.bottom() - rest, height: rest, ..area };
-    if strip::rows(state, below) > 0 || strip::rows(state, area) == 0 {
+    if strip::strip_rows(state, below) > 0 || strip::strip_rows(state, area) == 0 {
         return (Rect { height: rows, ..area }, below);
     }
     (Rect::ZERO, area)

@@ -1,6 +1,8 @@
 //! The stages, with one line per stage during a render and a single line for all of them afterwards.
 
-use super::text::{Tone, columns, counted, delta, seconds, shortened, wrapped};
+use super::text::{
+    Tone, format_count, format_time_difference, seconds, text_columns, truncated_text, wrapped,
+};
 use crate::messages;
 use crate::pipeline::protocol::{Stage, StageReport, Status};
 use crate::scene::sanitize::visible;
@@ -18,13 +20,13 @@ const MIN_WHY: u16 = 12;
 
 /// Symbol, name, time, time difference and reason. If there is no space for the reason, it follows on
 /// separate lines.
-pub(super) fn lines(state: &State, stage: Stage, room: u16) -> Vec<StyledLine> {
+pub(super) fn stage_lines(state: &State, stage: Stage, room: u16) -> Vec<StyledLine> {
     let mut line = stage_line(state, stage, room);
-    let why = why(state, stage);
+    let why = stage_reason(state, stage);
     if why.is_empty() {
         return vec![line];
     }
-    if columns(&why) <= reason_columns(&line, room) {
+    if text_columns(&why) <= reason_columns(&line, room) {
         line.push((format!("  {why}"), Tone::Faint));
         return vec![line];
     }
@@ -34,25 +36,25 @@ pub(super) fn lines(state: &State, stage: Stage, room: u16) -> Vec<StyledLine> {
 }
 
 /// Symbol, name, time, time difference and as much of the reason as fits on the same line.
-pub(super) fn short(state: &State, stage: Stage, room: u16) -> Vec<StyledLine> {
+pub(super) fn stage_line_with_reason(state: &State, stage: Stage, room: u16) -> Vec<StyledLine> {
     let mut line = stage_line(state, stage, room);
-    let (why, room) = (why(state, stage), reason_columns(&line, room));
-    if !why.is_empty() && (room >= MIN_WHY || columns(&why) <= room) {
-        line.push((format!("  {}", shortened(&why, room)), Tone::Faint));
+    let (why, room) = (stage_reason(state, stage), reason_columns(&line, room));
+    if !why.is_empty() && (room >= MIN_WHY || text_columns(&why) <= room) {
+        line.push((format!("  {}", truncated_text(&why, room)), Tone::Faint));
     }
     vec![line]
 }
 
 /// Number of columns available for a reason next to a stage.
 fn reason_columns(line: &StyledLine, room: u16) -> u16 {
-    room.saturating_sub(width(line) + 2)
+    room.saturating_sub(line_width(line) + 2)
 }
 
-fn width(line: &StyledLine) -> u16 {
-    line.iter().map(|(text, _)| columns(text)).sum()
+fn line_width(line: &StyledLine) -> u16 {
+    line.iter().map(|(text, _)| text_columns(text)).sum()
 }
 
-fn why(state: &State, stage: Stage) -> String {
+fn stage_reason(state: &State, stage: Stage) -> String {
     let report = state.work.stages.get(stage as usize).and_then(Option::as_ref);
     visible(report.map_or("", |report| report.why.as_str())).into_owned()
 }
@@ -75,11 +77,11 @@ fn stage_line(state: &State, stage: Stage, room: u16) -> StyledLine {
         vec![(sign.to_owned(), tone), (format!(" {name}{:gap$}{time}", ""), text_tone)]
     };
     // Align the times unless the gap is needed for the time difference.
-    let used = columns(stage.name()) + columns(&time);
+    let used = text_columns(stage.name()) + text_columns(&time);
     let usual = TIME_ENDS.saturating_sub(used).max(1);
-    let change = report.map_or(String::new(), |report| change(state, report));
+    let change = report.map_or(String::new(), |report| time_change(state, report));
     let change = if change.is_empty() { change } else { format!(" {change}") };
-    let least = 2 + used + 1 + columns(&change);
+    let least = 2 + used + 1 + text_columns(&change);
     if change.is_empty() || least > room {
         return line(usual);
     }
@@ -95,17 +97,18 @@ fn tone_of_stage(state: &State, report: Option<&StageReport>) -> Tone {
 }
 
 /// Difference from the stage's previous time.
-fn change(state: &State, report: &StageReport) -> String {
+fn time_change(state: &State, report: &StageReport) -> String {
     match report.status {
-        Status::Done => {
-            delta(report.seconds, state.work.last_seconds.get(report.name as usize).copied().flatten())
-        }
+        Status::Done => format_time_difference(
+            report.seconds,
+            state.work.last_seconds.get(report.name as usize).copied().flatten(),
+        ),
         Status::Running | Status::Reused | Status::Skipped => String::new(),
     }
 }
 
-/// The stages that took a significant part of the time and the number of cached stages, shortened to fit.
-/// Empty if even the longest stage does not fit.
+/// One line with the stages that took a significant part of the time, followed by the number of cached
+/// stages. Shortened to fit, and empty if even the longest stage does not fit.
 pub(super) fn summary_line(state: &State, room: u16) -> StyledLine {
     let done = || state.work.stages.iter().flatten().filter(|it| it.status == Status::Done);
     let total: f64 = done().map(|it| it.seconds).sum();
@@ -117,7 +120,7 @@ pub(super) fn summary_line(state: &State, room: u16) -> StyledLine {
         summary_line_with(state, false, counts),
         summary_line_with(state, false, |it| Some(it.name) == first),
     ];
-    forms.into_iter().find(|line| width(line) <= room).unwrap_or_default()
+    forms.into_iter().find(|line| line_width(line) <= room).unwrap_or_default()
 }
 
 fn summary_line_with(state: &State, is_long: bool, counts: impl Fn(&StageReport) -> bool) -> StyledLine {
@@ -131,7 +134,7 @@ fn summary_line_with(state: &State, is_long: bool, counts: impl Fn(&StageReport)
                 format!("{comma}{} {}", report.name.name(), seconds(report.seconds)),
                 tone_of_stage(state, Some(report)),
             ));
-            let change = change(state, report);
+            let change = time_change(state, report);
             if !change.is_empty() {
                 line.push((format!(" {change}"), Tone::Strong));
             }
@@ -139,8 +142,8 @@ fn summary_line_with(state: &State, is_long: bool, counts: impl Fn(&StageReport)
     }
     if reused > 0 {
         let comma = if line.is_empty() { "" } else { ", " };
-        let stages = if is_long { counted(reused, "stage") } else { reused.to_string() };
-        line.push((comma.to_owned() + &messages::cached(&stages), Tone::Faint));
+        let stages = if is_long { format_count(reused, "stage") } else { reused.to_string() };
+        line.push((comma.to_owned() + &messages::cached_stages(&stages), Tone::Faint));
     }
     line
 }
@@ -152,7 +155,7 @@ pub(super) fn running_stage(state: &State) -> Option<&'static str> {
 }
 
 /// Fraction of an asset that has been loaded.
-pub(super) fn fraction(asset: &AssetBar) -> f64 {
+pub(super) fn loaded_fraction(asset: &AssetBar) -> f64 {
     let progress = &asset.progress;
     if progress.total == 0 { 1.0 } else { progress.done as f64 / progress.total as f64 }
 }

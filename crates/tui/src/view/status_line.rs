@@ -8,13 +8,13 @@ use super::extras::ViewExtras;
 use super::layout::Layout;
 use super::stages::{self, running_stage};
 use super::text::{
-    Tone, approximate_time, bytes, columns, duration, gauge, percent, put, put_right, right_part, running,
-    two_digit_percent,
+    Tone, approximate_time, floor_percent, format_bytes, format_duration, format_running_time,
+    progress_bar_parts, put_text, put_text_right, right_part, text_columns, two_digit_percent,
 };
 use crate::exit_summary;
 use crate::messages;
-use crate::pipeline::protocol::{NoiseProgress, OwnState, RenderProgress};
-use crate::pipeline::words::samples_so_far;
+use crate::pipeline::protocol::{NoiseProgress, OwnImageState, RenderProgress};
+use crate::pipeline::words::format_mean_samples;
 use crate::preview_kind::PreviewKind;
 use crate::scene::is_mesh;
 use crate::scene::sanitize::visible;
@@ -28,12 +28,12 @@ const MIN_BAR: u16 = 6;
 
 /// Draws the status line in the part that is not used by a message.
 pub(super) fn draw(state: &State, layout: &Layout, area: Rect, buffer: &mut Buffer, drawn: &mut ViewExtras) {
-    match content(state) {
+    match status_content(state) {
         StatusContent::Nothing => {}
-        StatusContent::ProgressBar => bar(state, layout, area, buffer),
-        StatusContent::Summary => summary(state, layout, area, buffer, drawn),
+        StatusContent::ProgressBar => draw_progress_bar(state, layout, area, buffer),
+        StatusContent::Summary => draw_summary(state, layout, area, buffer, drawn),
         StatusContent::Words(words) => {
-            put(buffer, area, &[(&words, Tone::Faint)], state.display.depth);
+            put_text(buffer, area, &[(&words, Tone::Faint)], state.display.depth);
         }
     }
 }
@@ -46,34 +46,36 @@ enum StatusContent {
     Words(String),
 }
 
-fn content(state: &State) -> StatusContent {
+fn status_content(state: &State) -> StatusContent {
     // The results are those of the newest render.
-    if state.picture.history.is_open() && !state.work.is_running() {
+    if state.picture.history.is_older_open() && !state.work.is_running() {
         return StatusContent::Nothing;
     }
     match state.work.activity {
         Activity::Running { .. } => StatusContent::ProgressBar,
         Activity::Done => StatusContent::Summary,
         Activity::Waiting | Activity::Cancelled => StatusContent::Nothing,
-        Activity::Broken if let Some(progress) = last_good_progress(state) => {
-            StatusContent::Words(format!("{}: {} %", messages::LAST_GOOD_SCENE, percent(progress.fraction)))
-        }
+        Activity::Broken if let Some(progress) = last_good_progress(state) => StatusContent::Words(format!(
+            "{}: {} %",
+            messages::LAST_GOOD_SCENE,
+            floor_percent(progress.fraction)
+        )),
         Activity::Broken if state.picture.shown.is_some() => {
             StatusContent::Words(messages::LAST_GOOD_RENDER.to_owned())
         }
-        Activity::Broken => StatusContent::Words(hint(state)),
+        Activity::Broken => StatusContent::Words(save_hint(state)),
     }
 }
 
 /// Number of columns of the status line that a message must not use.
 pub(super) fn min_columns(state: &State, layout: &Layout) -> u16 {
-    match content(state) {
+    match status_content(state) {
         StatusContent::Nothing => 0,
-        StatusContent::ProgressBar => columns(&bar_words(state, layout).1),
+        StatusContent::ProgressBar => text_columns(&bar_words(state, layout).1),
         StatusContent::Summary => {
-            file_pieces(state, layout).iter().flatten().map(|(text, _)| columns(text)).sum()
+            file_pieces(state, layout).iter().flatten().map(|(text, _)| text_columns(text)).sum()
         }
-        StatusContent::Words(words) => columns(&words),
+        StatusContent::Words(words) => text_columns(&words),
     }
 }
 
@@ -85,11 +87,11 @@ pub(crate) fn last_good_progress(state: &State) -> Option<&RenderProgress> {
 
 /// Fraction and text for the asset being loaded or the render.
 fn bar_words(state: &State, layout: &Layout) -> (f64, String) {
-    let time = state.work.rendering_time(state.now).map_or(String::new(), running);
+    let time = state.work.rendering_time(state.now).map_or(String::new(), format_running_time);
     match (&state.work.progress, state.work.assets.last()) {
         (Some(progress), _) => {
             let samples = if progress.is_total_fixed {
-                format!("{}/{} samples", samples_so_far(progress), progress.total_samples)
+                format!("{}/{} samples", format_mean_samples(progress), progress.total_samples)
             } else {
                 // The total is only an estimate.
                 format!("about {:.0} samples per pixel", progress.mean_samples.floor())
@@ -97,29 +99,30 @@ fn bar_words(state: &State, layout: &Layout) -> (f64, String) {
             (progress.fraction, format!("{samples} · {time}"))
         }
         (None, Some(asset)) if layout.panel.is_empty() => {
-            (stages::fraction(asset), visible(&asset.progress.name).into_owned())
+            (stages::loaded_fraction(asset), visible(&asset.progress.name).into_owned())
         }
-        (None, asset) => (asset.map_or(0.0, stages::fraction), time),
+        (None, asset) => (asset.map_or(0.0, stages::loaded_fraction), time),
     }
 }
 
 /// Draws the progress bar for the asset being loaded or the render.
-fn bar(state: &State, layout: &Layout, area: Rect, buffer: &mut Buffer) {
+fn draw_progress_bar(state: &State, layout: &Layout, area: Rect, buffer: &mut Buffer) {
     let name = running_stage(state).unwrap_or_default();
     let (fraction, words) = bar_words(state, layout);
-    let room = area.width.saturating_sub(columns(name) + columns(&words) + 2);
+    let room = area.width.saturating_sub(text_columns(name) + text_columns(&words) + 2);
     let noise = state.work.progress.and_then(|progress| progress.noise);
     // While paused, the remaining time is unknown.
     let noise = noise.map(|noise| NoiseProgress { next: noise.next.filter(|_| !state.work.paused), ..noise });
-    let fits = |noise: &String| room >= columns(noise) + 3 + MIN_BAR;
+    let fits = |noise: &String| room >= text_columns(noise) + 3 + MIN_BAR;
     let noise = noise.and_then(|noise| noise_words(&noise).into_iter().find(fits));
     let words = noise.map_or(words.clone(), |noise| format!("{noise} · {words}"));
-    let room = area.width.saturating_sub(columns(name) + columns(&words) + 2);
+    let room = area.width.saturating_sub(text_columns(name) + text_columns(&words) + 2);
     if room < MIN_BAR {
-        put(buffer, area, &[(&words, Tone::Plain)], state.display.depth);
+        put_text(buffer, area, &[(&words, Tone::Plain)], state.display.depth);
         return;
     }
-    let (filled_squares, empty) = gauge(fraction, room, state.display.kind == PreviewKind::Ascii);
+    let (filled_squares, empty) =
+        progress_bar_parts(fraction, room, state.display.kind == PreviewKind::Ascii);
     let (tone, gap) = (if state.work.paused { Tone::Warning } else { Tone::Working }, (" ", Tone::Plain));
     let pieces = [
         (name, Tone::Faint),
@@ -129,7 +132,7 @@ fn bar(state: &State, layout: &Layout, area: Rect, buffer: &mut Buffer) {
         gap,
         (&*words, Tone::Plain),
     ];
-    put(buffer, area, &pieces, state.display.depth);
+    put_text(buffer, area, &pieces, state.display.depth);
 }
 
 /// `noise 2.1 % → 1 % in about 14 s`, and a shorter variant. It is called noise rather than error because a
@@ -143,63 +146,63 @@ fn noise_words(noise: &NoiseProgress) -> [String; 2] {
 }
 
 /// Draws the stages on one line, followed by other information that the panel does not show.
-fn summary(state: &State, layout: &Layout, area: Rect, buffer: &mut Buffer, drawn: &mut ViewExtras) {
+fn draw_summary(state: &State, layout: &Layout, area: Rect, buffer: &mut Buffer, drawn: &mut ViewExtras) {
     let of_files = file_pieces(state, layout);
     // Files take precedence if there is not enough space.
     let room = area.width.saturating_sub(min_columns(state, layout));
     let mut pieces = stages::summary_line(state, room);
     let comma = if pieces.is_empty() { "" } else { ", " };
     let mut is_room = |more: Vec<(String, Tone)>| {
-        let width: u16 = pieces.iter().chain(&more).map(|(text, _)| columns(text)).sum();
+        let width: u16 = pieces.iter().chain(&more).map(|(text, _)| text_columns(text)).sum();
         if width <= area.width {
             pieces.extend(more);
         }
     };
     if layout.panel.is_empty() {
         let mut comma = comma;
-        for words in not_saved(state) {
+        for words in unsaved_messages(state) {
             is_room(vec![(format!("{comma}{words}"), Tone::Faint)]);
             comma = " · ";
         }
     }
     if layout.panel.is_empty() {
-        for words in lost(state) {
+        for words in lost_file_messages(state) {
             is_room(vec![(format!(" {words}"), Tone::Warning)]);
         }
     }
     for file in of_files {
         is_room(file);
     }
-    let used = drawn.put(state, area, &pieces, buffer);
+    let used = drawn.put_line(state, area, &pieces, buffer);
     let free = right_part(area, used + 2);
     let short = if is_mesh(&state.request.scene) { SHORT_HINT_OF_MODEL } else { SHORT_HINT };
-    let words = [hint(state), short.to_owned()];
+    let words = [save_hint(state), short.to_owned()];
     if layout.panel.is_empty() && state.saving.edits == 0 {
-        let fitting = words.into_iter().find(|words| columns(words) <= free.width);
-        put_right(buffer, free, &fitting.unwrap_or_default(), Tone::Faint, state.display.depth);
+        let fitting = words.into_iter().find(|words| text_columns(words) <= free.width);
+        put_text_right(buffer, free, &fitting.unwrap_or_default(), Tone::Faint, state.display.depth);
         return;
     }
-    let fitting = frame(state).into_iter().find(|words| columns(words) <= free.width);
-    let used = put_right(buffer, free, &fitting.unwrap_or_default(), Tone::Faint, state.display.depth);
+    let fitting = preview_cost_variants(state).into_iter().find(|words| text_columns(words) <= free.width);
+    let used = put_text_right(buffer, free, &fitting.unwrap_or_default(), Tone::Faint, state.display.depth);
     let free = Rect { width: free.width.saturating_sub(used + 2), ..free };
     let seen = save_to_screen_time(state).filter(|_| layout.panel.is_empty()).unwrap_or_default();
-    put_right(buffer, free, &seen, Tone::Faint, state.display.depth);
+    put_text_right(buffer, free, &seen, Tone::Faint, state.display.depth);
 }
 
 /// Name and size of each written file. Empty if the panel lists the files.
 fn file_pieces(state: &State, layout: &Layout) -> Vec<Vec<(String, Tone)>> {
     let pieces = |written: &WrittenFile| {
         let name = visible(&written.path.to_string_lossy()).into_owned();
-        let size = format!(" {}", bytes(written.bytes));
+        let size = format!(" {}", format_bytes(written.bytes));
         vec![(" → ".to_owned(), Tone::Faint), (name, Tone::File), (size, Tone::Faint)]
     };
-    files(state).filter(|_| layout.panel.is_empty()).map(pieces).collect()
+    current_image_files(state).filter(|_| layout.panel.is_empty()).map(pieces).collect()
 }
 
 /// The files that contain the current image.
-pub(super) fn files(state: &State) -> impl Iterator<Item = &WrittenFile> {
+pub(super) fn current_image_files(state: &State) -> impl Iterator<Item = &WrittenFile> {
     // If the scene's own image has not changed, it may have been written by an earlier request.
-    let is_own = state.request.is_own();
+    let is_own = state.request.is_own_image();
     let of_any_request = is_own && state.saving.unwritten.is_none();
     state
         .saving
@@ -211,28 +214,29 @@ pub(super) fn files(state: &State) -> impl Iterator<Item = &WrittenFile> {
 }
 
 /// Messages about an unsaved image and the state of the scene's own image.
-pub(crate) fn not_saved(state: &State) -> Vec<String> {
-    if state.request.is_own() || files(state).next().is_some() {
+pub(crate) fn unsaved_messages(state: &State) -> Vec<String> {
+    if state.request.is_own_image() || current_image_files(state).next().is_some() {
         return Vec::new();
     }
     let mut words = vec![messages::NOT_SAVED.to_owned()];
     if let Some(name) = exit_summary::image_name(state) {
         let OwnImage { state: own, fraction } = state.saving.own;
         match own {
-            OwnState::Written => {}
-            OwnState::Begun { .. } if state.saving.written.iter().any(|written| written.shows.is_some()) => {}
-            OwnState::Begun { .. } => {
-                words.push(messages::own_unfinished(&name, percent(fraction)));
+            OwnImageState::Written => {}
+            OwnImageState::Begun { .. }
+                if state.saving.written.iter().any(|written| written.shows.is_some()) => {}
+            OwnImageState::Begun { .. } => {
+                words.push(messages::own_image_unfinished(&name, floor_percent(fraction)));
             }
-            OwnState::NotBegun if state.saving.written.is_empty() => {}
-            OwnState::NotBegun => words.push(messages::own_outdated(&name)),
+            OwnImageState::NotBegun if state.saving.written.is_empty() => {}
+            OwnImageState::NotBegun => words.push(messages::own_image_outdated(&name)),
         }
     }
     words
 }
 
 /// A message about each written file that another program has changed.
-pub(super) fn lost(state: &State) -> impl Iterator<Item = String> {
+pub(super) fn lost_file_messages(state: &State) -> impl Iterator<Item = String> {
     let words = |written: &WrittenFile| {
         let name = visible(&written.path.to_string_lossy()).into_owned();
         written.lost.map(|lost| messages::output_changed(&name, lost.words()))
@@ -242,11 +246,11 @@ pub(super) fn lost(state: &State) -> impl Iterator<Item = String> {
 
 /// Time between saving the file and drawing the first changed cell.
 pub(super) fn save_to_screen_time(state: &State) -> Option<String> {
-    state.saving.first_change.map(|time| messages::on_screen(&duration(time)))
+    state.saving.first_change.map(|time| messages::save_to_screen_time(&format_duration(time)))
 }
 
 /// A hint for users who have not saved yet. Empty if there is nothing to save.
-pub(super) fn hint(state: &State) -> String {
+pub(super) fn save_hint(state: &State) -> String {
     if state.saving.edits > 0 || is_unreadable(state) {
         return String::new();
     }
@@ -268,8 +272,9 @@ fn is_unreadable(state: &State) -> bool {
     diagnostics.is_some_and(|all| all.iter().all(|one| one.place.is_none()))
 }
 
-/// Cost of sending the last preview: the number of bytes with and without the round-trip time.
-fn frame(state: &State) -> Vec<String> {
+/// Cost of sending the last preview in two variants: the number of bytes with the round-trip time, and
+/// without it.
+fn preview_cost_variants(state: &State) -> Vec<String> {
     let Some(frame) = state.display.frame else { return Vec::new() };
     let cost = |time| messages::preview_cost(frame.bytes.div_ceil(1000), time);
     let time = frame.round_trip.map(|time| time.as_millis().max(1));

@@ -1,8 +1,8 @@
 //! The history strip: recent renders from newest to oldest, each with the changes since the previous one.
 
 use super::preview;
-use super::strip_words::{EntryText, fitting};
-use super::text::{Tone, put, right_part, row};
+use super::strip_words::{EntryText, fit_text};
+use super::text::{Tone, put_text, right_part, row_of};
 use crate::action::Action;
 use crate::film::Picture;
 use crate::keymap;
@@ -39,70 +39,71 @@ struct StripEntry {
 
 /// Draws the strip at the bottom of an area.
 pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
-    let items = items(state, area);
+    let items = visible_entries(state, area);
     let Some(top) = items.iter().map(|item| item.cells.y).min() else { return };
     let depth = state.display.depth;
-    let keys = keymap::of(Action::OlderRender).map_or("", |binding| binding.label).replace(' ', " / ");
+    let keys =
+        keymap::binding_of(Action::OlderRender).map_or("", |binding| binding.label).replace(' ', " / ");
     let title = Rect { y: top - 1, height: 1, ..area };
-    put(
+    put_text(
         buffer,
         title,
         &[(messages::HISTORY, Tone::Strong), ("  (", Tone::Faint), (&keys, Tone::Faint), (")", Tone::Faint)],
         depth,
     );
     for item in items {
-        draw_item(state, &item, buffer);
+        draw_entry(state, &item, buffer);
     }
 }
 
-fn draw_item(state: &State, StripEntry { index, cells, rows }: &StripEntry, buffer: &mut Buffer) {
+fn draw_entry(state: &State, StripEntry { index, cells, rows }: &StripEntry, buffer: &mut Buffer) {
     let history = &state.picture.history;
     let Some(picture) = history.thumbnail(*index) else { return };
     let place = Rect { height: rows.picture, ..*cells };
-    let place = Rect { width: width(state, picture, place), ..place };
-    preview::draw_small(state, picture, place, buffer);
+    let place = Rect { width: thumbnail_width(state, picture, place), ..place };
+    preview::draw_thumbnail(state, picture, place, buffer);
     let is_looked_at = history.shown_index() == Some(*index);
     let (mark, tone) = if is_looked_at { ("▸", Tone::Strong) } else { (" ", Tone::Plain) };
-    // The text is next to the thumbnail. It starts at the same column with and without a mark.
+    // The text is next to the thumbnail and starts at the same column whether or not there is a mark.
     let words = EntryText {
-        head: format!("{mark}{} ", number(state, *index)),
+        head: format!("{mark}{} ", render_label(state, *index)),
         changes: history.changes(*index, is_under_way(state, *index)),
     };
     let beside = right_part(*cells, place.width + 1);
-    let lines = fitting(&words, usize::from(beside.width), [rows.picture, rows.entry].map(usize::from));
+    let lines = fit_text(&words, usize::from(beside.width), [rows.picture, rows.entry].map(usize::from));
     for (y, line) in (0..rows.entry).zip(&lines) {
-        put(buffer, row(beside, y), &[(line, tone)], state.display.depth);
+        put_text(buffer, row_of(beside, y), &[(line, tone)], state.display.depth);
     }
 }
 
 /// Number of the render that produced an entry, or a dash if it was stopped.
-fn number(state: &State, index: usize) -> String {
+fn render_label(state: &State, index: usize) -> String {
     let under_way = is_under_way(state, index).then_some(state.work.renders + 1);
     state.picture.history.run(index).or(under_way).map_or("–".to_owned(), |run| run.to_string())
 }
 
 /// Whether an entry's render is still running.
 fn is_under_way(state: &State, index: usize) -> bool {
-    state.work.is_under_way() && state.picture.history.is_of(index, state.request.generation)
+    state.work.is_under_way() && state.picture.history.belongs_to_request(index, state.request.generation)
 }
 
 /// Width of a thumbnail with this height, limited to leave space for text.
-fn width(state: &State, picture: &Picture, cells: Rect) -> u16 {
+fn thumbnail_width(state: &State, picture: &Picture, cells: Rect) -> u16 {
     let shape = picture.width as f32 / picture.height.max(1) as f32 * state.display.window.cell_aspect;
     let width = (f32::from(cells.height) * shape).round() as u16;
     width.clamp(1, cells.width.saturating_sub(MIN_WORDS + 1).max(1))
 }
 
 /// Number of rows used by the strip in an area. 0 if there are too few entries or too little space.
-pub(super) fn rows(state: &State, area: Rect) -> u16 {
-    let items = items(state, area);
+pub(super) fn strip_rows(state: &State, area: Rect) -> u16 {
+    let items = visible_entries(state, area);
     let top = items.iter().map(|item| item.cells.y).min();
     top.map_or(0, |top| area.bottom() - top + 1)
 }
 
 /// The entries that fit at the bottom of an area. The newest is first. The one being viewed is always
 /// included.
-fn items(state: &State, area: Rect) -> Vec<StripEntry> {
+fn visible_entries(state: &State, area: Rect) -> Vec<StripEntry> {
     let count = state.picture.history.len();
     let rows = if area.width >= WIDE { WIDE_ROWS } else { NARROW_ROWS };
     let columns = (area.width / COLUMN).max(1);
@@ -131,7 +132,7 @@ fn items(state: &State, area: Rect) -> Vec<StripEntry> {
 }
 
 /// The entry at a cell.
-pub(super) fn at(state: &State, area: Rect, (column, row): (u16, u16)) -> Option<usize> {
+pub(super) fn entry_at(state: &State, area: Rect, (column, row): (u16, u16)) -> Option<usize> {
     let is_there = |item: &StripEntry| item.cells.contains((column, row).into());
-    items(state, area).into_iter().find(is_there).map(|item| item.index)
+    visible_entries(state, area).into_iter().find(is_there).map(|item| item.index)
 }

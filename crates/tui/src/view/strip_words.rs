@@ -22,22 +22,22 @@ enum ChangeForm {
     New,
     /// The last parts of the key, which identify an object and its property, and the new value.
     Short,
-    /// Like `Short`, but only the given number of changes.
+    /// Like `Short`, but with only the given number of changes.
     First(usize),
     /// The first change, with the property shortened to one line.
     Cut,
 }
 
 /// Formats the text as lines of `width` columns. Tries to fit it into the first number of rows, then into the
-/// second. If it still does not fit, the excess is appended to the last line.
-pub(super) fn fitting(words: &EntryText, width: usize, rows: [usize; 2]) -> Vec<String> {
+/// second. If it fits neither, the excess is appended to the last line.
+pub(super) fn fit_text(words: &EntryText, width: usize, rows: [usize; 2]) -> Vec<String> {
     let [few, most] = rows;
     let all = [ChangeForm::Full, ChangeForm::New, ChangeForm::Short];
     let count = words.changes.len();
     let fewer = (1..count).rev().map(ChangeForm::First).chain([ChangeForm::Cut]);
     let in_few = all.map(|form| (form, few));
     let in_most = all.into_iter().chain(fewer).map(|form| (form, most));
-    let lines = |form| filled(&words.head, &pieces(words, form, width), width);
+    let lines = |form| fill_lines(&words.head, &all_pieces(words, form, width), width);
     let is_lone =
         |lines: &[String]| lines.first().is_some_and(|line| line.trim_end() == words.head.trim_end());
     let fits = |(form, rows): (ChangeForm, usize)| {
@@ -55,7 +55,7 @@ pub(super) fn fitting(words: &EntryText, width: usize, rows: [usize; 2]) -> Vec<
 }
 
 /// The pieces of all changes that are shown.
-fn pieces(words: &EntryText, form: ChangeForm, width: usize) -> Vec<ChangePiece> {
+fn all_pieces(words: &EntryText, form: ChangeForm, width: usize) -> Vec<ChangePiece> {
     let changes = &words.changes;
     let told = match form {
         ChangeForm::Full | ChangeForm::New | ChangeForm::Short => changes.len(),
@@ -92,7 +92,7 @@ impl ChangePiece {
     }
 
     /// The parts after which a line may be broken: parts of the key, or words.
-    fn parts(&self) -> Vec<String> {
+    fn breakable_parts(&self) -> Vec<String> {
         if !self.is_key {
             return self.text.split(' ').map(str::to_owned).collect();
         }
@@ -144,15 +144,15 @@ fn last_parts(key: &str) -> String {
     parts[first.saturating_sub(usize::from(is_number))..].join(".")
 }
 
-/// Fills lines with pieces, after a head. Pieces that are too long are broken. Keys are broken after a dot,
-/// and other pieces between words.
-fn filled(head: &str, pieces: &[ChangePiece], width: usize) -> Vec<String> {
+/// Fills lines with pieces. The first line starts with `head`. Pieces that are too long are broken. Keys are
+/// broken after a dot, and other pieces between words.
+fn fill_lines(head: &str, pieces: &[ChangePiece], width: usize) -> Vec<String> {
     let mut lines = vec![head.to_owned()];
     let mut is_behind_head = true;
     for piece in pieces {
         let room = if is_behind_head { width.saturating_sub(head.width()) } else { width };
         let is_whole = piece.text.width() <= room;
-        let parts = if is_whole { vec![piece.text.clone()] } else { piece.parts() };
+        let parts = if is_whole { vec![piece.text.clone()] } else { piece.breakable_parts() };
         for (number, part) in parts.iter().enumerate() {
             let Some(line) = lines.last_mut() else { return lines };
             let gap = if is_behind_head || number > 0 && piece.is_key { "" } else { " " };
@@ -174,7 +174,7 @@ mod tests {
 
     fn lines(number: &str, changes: &[&str], width: usize) -> Vec<String> {
         let changes = changes.iter().map(|change| (*change).to_owned()).collect();
-        fitting(&EntryText { head: format!("{number} "), changes }, width, [3, 4])
+        fit_text(&EntryText { head: format!("{number} "), changes }, width, [3, 4])
     }
 
     #[test]

@@ -59,7 +59,7 @@ impl Tone {
                 (Color::Reset, Color::Reset)
             }
         };
-        // xterm and others draw bold black as gray, using the bright half of the palette.
+        // xterm and some other terminals draw bold black as gray, using the bright half of the palette.
         let reversed = Modifier::REVERSED.union(Modifier::BOLD);
         let modifier = if bg == Color::Reset { reversed } else { Modifier::empty() };
         Style::new().fg(fg).bg(bg).add_modifier(modifier)
@@ -68,7 +68,7 @@ impl Tone {
 
 /// Writes text into the first row of an area, truncated with an ellipsis if necessary. Returns the number of
 /// columns used.
-pub(super) fn put(buffer: &mut Buffer, area: Rect, pieces: &[(&str, Tone)], depth: ColorDepth) -> u16 {
+pub(super) fn put_text(buffer: &mut Buffer, area: Rect, pieces: &[(&str, Tone)], depth: ColorDepth) -> u16 {
     let area = area.intersection(buffer.area);
     if area.is_empty() {
         return 0;
@@ -80,7 +80,7 @@ pub(super) fn put(buffer: &mut Buffer, area: Rect, pieces: &[(&str, Tone)], dept
     for (text, tone) in pieces {
         let style = tone.style(depth);
         x = buffer.set_stringn(x, area.y, text, usize::from(end - x), style).0;
-        if is_cut && x + 1 >= end && columns(text) > 0 {
+        if is_cut && x + 1 >= end && text_columns(text) > 0 {
             // A wide character may leave one column unused.
             buffer.set_stringn(x, area.y, "…", 1, style);
         }
@@ -89,21 +89,27 @@ pub(super) fn put(buffer: &mut Buffer, area: Rect, pieces: &[(&str, Tone)], dept
 }
 
 /// Writes text at the right edge of the first row, if it fits.
-pub(super) fn put_right(buffer: &mut Buffer, area: Rect, text: &str, tone: Tone, depth: ColorDepth) -> u16 {
-    let width = columns(text);
+pub(super) fn put_text_right(
+    buffer: &mut Buffer,
+    area: Rect,
+    text: &str,
+    tone: Tone,
+    depth: ColorDepth,
+) -> u16 {
+    let width = text_columns(text);
     if width > area.width {
         return 0;
     }
-    put(buffer, Rect { x: area.right() - width, width, ..area }, &[(text, tone)], depth)
+    put_text(buffer, Rect { x: area.right() - width, width, ..area }, &[(text, tone)], depth)
 }
 
 /// Width of a text in columns.
-pub(crate) fn columns(text: &str) -> u16 {
+pub(crate) fn text_columns(text: &str) -> u16 {
     u16::try_from(text.width()).unwrap_or(u16::MAX)
 }
 
 /// A row of an area, counted from the top. Empty if out of range.
-pub(super) fn row(area: Rect, index: u16) -> Rect {
+pub(super) fn row_of(area: Rect, index: u16) -> Rect {
     if index < area.height { Rect { y: area.y + index, height: 1, ..area } } else { Rect::ZERO }
 }
 
@@ -114,8 +120,8 @@ pub(super) fn right_part(area: Rect, used: u16) -> Rect {
 }
 
 /// Truncates text to fit, adding an ellipsis.
-pub(crate) fn shortened(text: &str, room: u16) -> String {
-    if columns(text) <= room {
+pub(crate) fn truncated_text(text: &str, room: u16) -> String {
+    if text_columns(text) <= room {
         return text.to_owned();
     }
     let mut short = String::new();
@@ -155,18 +161,18 @@ pub fn wrapped(text: &str, width: usize) -> Vec<String> {
 }
 
 /// Formats a duration in a few characters.
-pub(crate) fn duration(time: Duration) -> String {
+pub(crate) fn format_duration(time: Duration) -> String {
     seconds(time.as_secs_f64())
 }
 
-/// Formats a running time. Up to a minute, it is shown in tenths of a second, so that the format does not
+/// Formats a running time. Up to a minute, tenths of a second are always shown, so that the format does not
 /// keep changing.
-pub(super) fn running(time: Duration) -> String {
-    if time.as_secs() < 60 { format!("{:.1} s", time.as_secs_f64()) } else { duration(time) }
+pub(super) fn format_running_time(time: Duration) -> String {
+    if time.as_secs() < 60 { format!("{:.1} s", time.as_secs_f64()) } else { format_duration(time) }
 }
 
 /// Formats a file size.
-pub(super) fn bytes(bytes: u64) -> String {
+pub(super) fn format_bytes(bytes: u64) -> String {
     match bytes {
         0..1000 => format!("{bytes} B"),
         1000..1_000_000 => format!("{:.1} kB", bytes as f64 / 1e3),
@@ -186,10 +192,10 @@ pub(super) fn approximate_time(seconds: f64) -> String {
     }
 }
 
-/// Formats the difference between a stage's time and its previous time, using the unit of the time unless the
-/// difference is far larger. Empty if insignificant.
-pub(super) fn delta(seconds: f64, before: Option<f64>) -> String {
-    /// Relative variation in the time taken by identical work.
+/// Formats the difference between a stage's time and its previous time, in the same unit as the time unless
+/// the difference is far larger. Empty if insignificant.
+pub(super) fn format_time_difference(seconds: f64, before: Option<f64>) -> String {
+    /// Relative variation in time between runs of identical work.
     const NOISE: f64 = 0.05;
     let Some(before) = before else { return String::new() };
     let change = seconds - before;
@@ -212,7 +218,7 @@ pub(super) fn delta(seconds: f64, before: Option<f64>) -> String {
 }
 
 /// A thin progress bar, `columns` wide, as its filled and empty parts.
-pub(super) fn gauge(fraction: f64, columns: u16, ascii: bool) -> (String, String) {
+pub(super) fn progress_bar_parts(fraction: f64, columns: u16, ascii: bool) -> (String, String) {
     let (full, empty) = if ascii { ("#", "-") } else { ("━", "─") };
     let columns = usize::from(columns);
     let filled_squares = ((fraction.clamp(0.0, 1.0) * columns as f64).floor() as usize).min(columns);
@@ -220,7 +226,7 @@ pub(super) fn gauge(fraction: f64, columns: u16, ascii: bool) -> (String, String
 }
 
 /// Percentage rounded down, so 100 is shown only when finished.
-pub(crate) fn percent(fraction: f64) -> u32 {
+pub(crate) fn floor_percent(fraction: f64) -> u32 {
     (fraction.clamp(0.0, 1.0) * 100.0).floor() as u32
 }
 
@@ -234,7 +240,7 @@ pub(super) fn two_digit_percent(part: f64) -> String {
 }
 
 /// Formats a number with at least three digits.
-pub(super) fn number(x: f32) -> String {
+pub(super) fn format_number(x: f32) -> String {
     let digits = match x.abs() {
         x if x >= 100.0 => 0,
         x if x >= 10.0 => 1,
@@ -247,7 +253,7 @@ pub(super) fn number(x: f32) -> String {
 }
 
 /// `1 error`, `2 errors`.
-pub(super) fn counted(count: usize, what: &str) -> String {
+pub(super) fn format_count(count: usize, what: &str) -> String {
     format!("{count} {what}{}", if count == 1 { "" } else { "s" })
 }
 
@@ -274,13 +280,13 @@ mod tests {
     #[test]
     fn bar_is_full_only_at_the_end() {
         let bar = |fraction, ascii| {
-            let (filled_squares, rest) = gauge(fraction, 4, ascii);
+            let (filled_squares, rest) = progress_bar_parts(fraction, 4, ascii);
             filled_squares + &rest
         };
         assert_eq!(bar(0.999, false), "━━━─");
         assert_eq!(bar(1.0, false), "━━━━");
         assert_eq!(bar(f64::NAN, true), "----");
-        assert_eq!((percent(0.999), percent(1.0)), (99, 100));
+        assert_eq!((floor_percent(0.999), floor_percent(1.0)), (99, 100));
     }
 
     #[test]
@@ -298,7 +304,7 @@ mod tests {
             (0.000_02, Some(0.000_01), ""),
             (1.0, None, ""),
         ] {
-            assert_eq!(delta(seconds, before), words, "{seconds} {before:?}");
+            assert_eq!(format_time_difference(seconds, before), words, "{seconds} {before:?}");
         }
     }
 
@@ -328,12 +334,12 @@ mod tests {
             ("日本語", 4, "日…"),
             ("ab", 1, "…"),
         ] {
-            assert_eq!(shortened(text, room), shown);
+            assert_eq!(truncated_text(text, room), shown);
             for split in text.char_indices().map(|(at, _)| at) {
                 let area = Rect::new(0, 0, room, 1);
                 let mut buffer = Buffer::empty(area);
                 let (first, second) = text.split_at(split);
-                put(&mut buffer, area, &[(first, Tone::Plain), (second, Tone::Faint)], ColorDepth::None);
+                put_text(&mut buffer, area, &[(first, Tone::Plain), (second, Tone::Faint)], ColorDepth::None);
                 let seen: String = buffer.content.iter().map(|cell| cell.symbol()).collect();
                 // The cell after a wide character is blank in the buffer.
                 assert_eq!(seen.replace(' ', ""), shown, "{text} {room} {split}");

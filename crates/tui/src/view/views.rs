@@ -5,7 +5,7 @@ use ratatui::layout::Rect;
 use ratatui::widgets::{Clear, Widget};
 
 use super::layout::Layout;
-use super::text::{Tone, put};
+use super::text::{Tone, put_text};
 use crate::choice::Choice;
 use crate::pipeline::settings::View;
 use crate::state::State;
@@ -17,7 +17,7 @@ pub(crate) const DIGITS: usize = 9;
 
 pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
     let current = View::ALL.iter().position(|view| *view == state.request.view()).unwrap_or(0);
-    let area = area(layout).intersection(buffer.area);
+    let area = list_area(layout).intersection(buffer.area);
     if area.is_empty() {
         return;
     }
@@ -40,17 +40,23 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
         } else {
             "▾"
         };
-        line(state, number, (current, more), place, buffer);
+        draw_view_line(state, number, (current, more), place, buffer);
     }
 }
 
 /// Number of views per column.
-pub(crate) fn rows(state: &State) -> usize {
-    usize::from(area(&Layout::of(state)).height).max(1)
+pub(crate) fn rows_per_column(state: &State) -> usize {
+    usize::from(list_area(&Layout::for_state(state)).height).max(1)
 }
 
 /// Draws a view and its digit, and a mark if more views are hidden above or below.
-fn line(state: &State, number: usize, (current, more): (usize, &str), place: Rect, buffer: &mut Buffer) {
+fn draw_view_line(
+    state: &State,
+    number: usize,
+    (current, more): (usize, &str),
+    place: Rect,
+    buffer: &mut Buffer,
+) {
     let digit = if number < DIGITS { (number + 1).to_string() } else { " ".to_owned() };
     let is_current = number == current;
     let sign = if is_current { "▸" } else { " " };
@@ -58,12 +64,12 @@ fn line(state: &State, number: usize, (current, more): (usize, &str), place: Rec
     let tone = if is_current { Tone::Chosen } else { Tone::Plain };
     let more = format!(" {more}");
     let pieces = [(sign, Tone::Strong), (&*digit, Tone::Strong), (&*name, tone), (&*more, Tone::Strong)];
-    put(buffer, place, &pieces, state.display.depth);
+    put_text(buffer, place, &pieces, state.display.depth);
 }
 
-/// The area of the list. It has one column in a panel of sufficient height, and otherwise as many columns as
+/// The area of the list. It has one column if the panel is tall enough, and otherwise as many columns as
 /// necessary.
-fn area(layout: &Layout) -> Rect {
+fn list_area(layout: &Layout) -> Rect {
     let all = View::ALL.len() as u16;
     let panel = layout.panel;
     if panel.width >= WIDTH && panel.height >= all {

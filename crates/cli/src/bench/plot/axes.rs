@@ -12,8 +12,8 @@ pub(super) struct LogAxis {
 }
 
 impl LogAxis {
-    /// Creates an axis that spans the positive values, after an empty fraction `free` at the start.
-    pub(super) fn around(values: impl Iterator<Item = f64>, free: f64) -> Self {
+    /// Creates an axis that spans the positive values and leaves the fraction `free` empty at the start.
+    pub(super) fn spanning(values: impl Iterator<Item = f64>, free: f64) -> Self {
         let logs = values.filter(|value| *value > 0.0 && value.is_finite()).map(libm::log10);
         let (low, high) =
             logs.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), log| (low.min(log), high.max(log)));
@@ -52,8 +52,8 @@ impl Ranged for LogAxis {
 }
 
 /// Formats a mark as `10⁻³`, `2·10⁻³` or `5`.
-pub(super) fn power(mark: f64) -> String {
-    let (factor, whole) = parts(mark);
+pub(super) fn format_power_of_ten(mark: f64) -> String {
+    let (factor, whole) = digit_and_exponent(mark);
     if whole == 0 {
         return factor.to_string();
     }
@@ -62,18 +62,18 @@ pub(super) fn power(mark: f64) -> String {
 }
 
 /// Formats a mark as `0.02`, `5` or `200`.
-pub(super) fn plain(mark: f64) -> String {
-    let (factor, whole) = parts(mark);
+pub(super) fn format_decimal(mark: f64) -> String {
+    let (factor, whole) = digit_and_exponent(mark);
     if (-3..=5).contains(&whole) {
         let decimals = (-whole).max(0) as usize;
         format!("{:.decimals$}", f64::from(factor) * libm::pow(10.0, f64::from(whole)))
     } else {
-        power(mark)
+        format_power_of_ten(mark)
     }
 }
 
 /// A mark's leading digit and exponent.
-fn parts(mark: f64) -> (i32, i32) {
+fn digit_and_exponent(mark: f64) -> (i32, i32) {
     let whole = (mark + 1e-9).floor();
     (libm::pow(10.0, mark - whole).round() as i32, whole as i32)
 }
@@ -100,17 +100,17 @@ mod tests {
 
     #[test]
     fn marks_are_powers_or_simple_numbers() {
-        let far = LogAxis::around([1e-5, 0.3].into_iter(), 0.0);
+        let far = LogAxis::spanning([1e-5, 0.3].into_iter(), 0.0);
         assert_eq!(far.marks, [-5.0, -4.0, -3.0, -2.0, -1.0]);
-        let near = LogAxis::around([0.02, 0.3, -1.0, f64::NAN].into_iter(), 0.0);
-        let names: Vec<String> = near.marks.iter().map(|mark| plain(*mark)).collect();
+        let near = LogAxis::spanning([0.02, 0.3, -1.0, f64::NAN].into_iter(), 0.0);
+        let names: Vec<String> = near.marks.iter().map(|mark| format_decimal(*mark)).collect();
         assert_eq!(names, ["0.02", "0.05", "0.1", "0.2"]);
-        let names: Vec<String> = near.marks.iter().map(|mark| power(*mark)).collect();
+        let names: Vec<String> = near.marks.iter().map(|mark| format_power_of_ten(*mark)).collect();
         assert_eq!(names, ["2·10⁻²", "5·10⁻²", "10⁻¹", "2·10⁻¹"]);
-        assert_eq!(LogAxis::around([].into_iter(), 0.0).marks, [-1.0, 0.0, 1.0]);
-        let half = LogAxis::around([1e-2, 1.0].into_iter(), 0.5).range;
+        assert_eq!(LogAxis::spanning([].into_iter(), 0.0).marks, [-1.0, 0.0, 1.0]);
+        let half = LogAxis::spanning([1e-2, 1.0].into_iter(), 0.5).range;
         assert!((half.start + 4.36).abs() < 1e-9 && (half.end - 0.12).abs() < 1e-9, "{half:?}");
-        assert_eq!(power(libm::log10(5.0)), "5");
-        assert_eq!((plain(2.0).as_str(), plain(-12.0).as_str()), ("100", "10⁻¹²"));
+        assert_eq!(format_power_of_ten(libm::log10(5.0)), "5");
+        assert_eq!((format_decimal(2.0).as_str(), format_decimal(-12.0).as_str()), ("100", "10⁻¹²"));
     }
 }

@@ -4,8 +4,8 @@ use plotters::coord::Shift;
 use plotters::prelude::*;
 
 use super::AXES;
-use super::axes::{LogAxis, plain, power};
-use crate::bench::results::{MethodResult, SceneResult, StepResult, Verdict};
+use super::axes::{LogAxis, format_decimal, format_power_of_ten};
+use crate::bench::results::{BiasVerdict, MethodResult, SceneResult, StepResult};
 use crate::bench::slope::Slope;
 use crate::scene::sanitize::visible;
 
@@ -31,12 +31,12 @@ type DrawError<'a> = DrawingAreaErrorKind<<SVGBackend<'a> as DrawingBackend>::Er
 type Chart<'c, 'a> = ChartContext<'c, SVGBackend<'a>, Cartesian2d<LogAxis, LogAxis>>;
 
 /// Draws a panel.
-pub(super) fn draw<'a>(scene: &SceneResult, place: &PanelArea<'a>) -> Result<(), DrawError<'a>> {
+pub(super) fn draw_panel<'a>(scene: &SceneResult, place: &PanelArea<'a>) -> Result<(), DrawError<'a>> {
     let steps = || scene.methods.iter().flat_map(|method| &method.steps);
     let noise = scene.reference.noise;
-    let across = LogAxis::around(steps().map(|step| step.seconds), 0.0);
+    let across = LogAxis::spanning(steps().map(|step| step.seconds), 0.0);
     let errors = steps().flat_map(|step| [step.relmse, step.spread[0], step.spread[1]]);
-    let up = LogAxis::around(errors.chain([noise]), of_legend(scene.methods.len()));
+    let up = LogAxis::spanning(errors.chain([noise]), legend_height_fraction(scene.methods.len()));
     let mut chart = ChartBuilder::on(place)
         .caption(caption(scene), ("sans-serif", 20))
         .margin(14)
@@ -52,17 +52,17 @@ pub(super) fn draw<'a>(scene: &SceneResult, place: &PanelArea<'a>) -> Result<(),
         .axis_desc_style(("sans-serif", 16))
         .x_desc(AXES[0])
         .y_desc(AXES[1])
-        .x_label_formatter(&|mark| plain(*mark))
-        .y_label_formatter(&|mark| power(*mark))
+        .x_label_formatter(&|mark| format_decimal(*mark))
+        .y_label_formatter(&|mark| format_power_of_ten(*mark))
         .draw()?;
     if noise > 0.0 {
-        floor(&mut chart, libm::log10(noise), &across)?;
+        draw_reference_noise(&mut chart, libm::log10(noise), &across)?;
     }
     for (number, method) in scene.methods.iter().enumerate() {
-        bars(&mut chart, method, color(number), &up)?;
-        line(&mut chart, method, number)?;
+        draw_error_bars(&mut chart, method, method_color(number), &up)?;
+        draw_medians(&mut chart, method, number)?;
     }
-    legend(&mut chart)
+    draw_legend(&mut chart)
 }
 
 /// The caption, without characters that are invalid in XML.
@@ -71,15 +71,15 @@ fn caption(scene: &SceneResult) -> String {
 }
 
 /// Fraction of the height reserved for the legend.
-fn of_legend(methods: usize) -> f64 {
+fn legend_height_fraction(methods: usize) -> f64 {
     (0.05 * (methods as f64 + 1.0) + 0.08).min(0.6)
 }
 
-fn color(number: usize) -> RGBColor {
+fn method_color(number: usize) -> RGBColor {
     COLORS[number % COLORS.len()]
 }
 
-fn legend<'c, 'a: 'c>(chart: &mut Chart<'c, 'a>) -> Result<(), DrawError<'a>> {
+fn draw_legend<'c, 'a: 'c>(chart: &mut Chart<'c, 'a>) -> Result<(), DrawError<'a>> {
     chart
         .configure_series_labels()
         .position(SeriesLabelPosition::LowerLeft)
@@ -91,7 +91,11 @@ fn legend<'c, 'a: 'c>(chart: &mut Chart<'c, 'a>) -> Result<(), DrawError<'a>> {
 }
 
 /// Draws the noise of the references as a dashed line.
-fn floor<'c, 'a: 'c>(chart: &mut Chart<'c, 'a>, level: f64, across: &LogAxis) -> Result<(), DrawError<'a>> {
+fn draw_reference_noise<'c, 'a: 'c>(
+    chart: &mut Chart<'c, 'a>,
+    level: f64,
+    across: &LogAxis,
+) -> Result<(), DrawError<'a>> {
     let dashes = |points: Vec<(f64, f64)>| DashedLineSeries::new(points, 5, 5, GRAY.stroke_width(1));
     let ends = vec![(across.range.start, level), (across.range.end, level)];
     let sample = |(x, y): (i32, i32)| PathElement::new([(x, y), (x + 8, y)], GRAY);
@@ -100,7 +104,7 @@ fn floor<'c, 'a: 'c>(chart: &mut Chart<'c, 'a>, level: f64, across: &LogAxis) ->
 }
 
 /// Draws the error range of each step.
-fn bars<'c, 'a: 'c>(
+fn draw_error_bars<'c, 'a: 'c>(
     chart: &mut Chart<'c, 'a>,
     method: &MethodResult,
     color: RGBColor,
@@ -118,28 +122,28 @@ fn bars<'c, 'a: 'c>(
 }
 
 /// Draws the medians and adds the method to the legend.
-fn line<'c, 'a: 'c>(
+fn draw_medians<'c, 'a: 'c>(
     chart: &mut Chart<'c, 'a>,
     method: &MethodResult,
     number: usize,
 ) -> Result<(), DrawError<'a>> {
-    let color = color(number);
+    let color = method_color(number);
     let seen = method.steps.iter().filter(|step| step.relmse > 0.0);
     let points: Vec<(f64, f64)> =
         seen.map(|step| (libm::log10(step.seconds), libm::log10(step.relmse))).collect();
     let sample = move |(x, y): (i32, i32)| {
         let line = PathElement::new([(x, y), (x + 20, y)], color.stroke_width(2));
-        EmptyElement::at((0, 0)) + line + marker((x + 10, y), number)
+        EmptyElement::at((0, 0)) + line + method_marker((x + 10, y), number)
     };
     let drawn = chart.draw_series(LineSeries::new(points.clone(), color.stroke_width(2)))?;
-    drawn.label(label(method)).legend(sample);
-    let at = |point: (f64, f64)| EmptyElement::at(point) + marker((0, 0), number);
+    drawn.label(legend_label(method)).legend(sample);
+    let at = |point: (f64, f64)| EmptyElement::at(point) + method_marker((0, 0), number);
     chart.draw_series(points.into_iter().map(at))?;
     Ok(())
 }
 
 /// A filled marker centered on a pixel. The shape depends on the method's number.
-fn marker(at: (i32, i32), number: usize) -> Polygon<(i32, i32)> {
+fn method_marker(at: (i32, i32), number: usize) -> Polygon<(i32, i32)> {
     let corners: &[(i32, i32)] = match number % 4 {
         0 => &[(-1, -1), (1, -1), (1, 1), (-1, 1)],
         1 => &[(0, -1), (1, 1), (-1, 1)],
@@ -148,18 +152,18 @@ fn marker(at: (i32, i32), number: usize) -> Polygon<(i32, i32)> {
     };
     let size = if number.is_multiple_of(4) { MARKER - 1 } else { MARKER + 1 };
     let corner = |(x, y): &(i32, i32)| (at.0 + x * size, at.1 + y * size);
-    Polygon::new(corners.iter().map(corner).collect::<Vec<_>>(), color(number).filled())
+    Polygon::new(corners.iter().map(corner).collect::<Vec<_>>(), method_color(number).filled())
 }
 
 /// A method's legend entry, such as `path, slope −0.98`.
-fn label(method: &MethodResult) -> String {
+fn legend_label(method: &MethodResult) -> String {
     let slope = method.slope.map_or(String::new(), |Slope { value, .. }| {
         format!(", slope {}{:.2}", if value < 0.0 { "−" } else { "" }, value.abs())
     });
     let bias = match method.verdict {
-        Verdict::Stays { size, .. } => format!(", BIAS {size:.1e}"),
-        Verdict::Falls { size, .. } => format!(", bias {size:.1e}, falling"),
-        Verdict::Unknown | Verdict::NoneFound { .. } => String::new(),
+        BiasVerdict::Stays { size, .. } => format!(", BIAS {size:.1e}"),
+        BiasVerdict::Falls { size, .. } => format!(", bias {size:.1e}, falling"),
+        BiasVerdict::Unknown | BiasVerdict::NoneFound { .. } => String::new(),
     };
     format!("{}{slope}{bias}", method.name)
 }

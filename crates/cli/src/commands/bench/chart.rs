@@ -17,7 +17,7 @@ use crate::tui::paint::as_text_lines;
 /// Method colors, from the terminal's palette.
 const COLORS: [Color; 6] =
     [Color::Blue, Color::Red, Color::Green, Color::Magenta, Color::Yellow, Color::Cyan];
-/// Method markers. Combinations of marker and color repeat after thirty methods.
+/// Method markers. The combinations of marker and color repeat after 30 methods.
 const MARKERS: [char; 5] = ['o', 'x', '+', '*', '#'];
 /// Rows of a chart.
 const ROWS: u16 = 16;
@@ -43,7 +43,7 @@ struct MethodCurve {
 }
 
 impl ConvergenceChart {
-    fn of(scene: &SceneResult) -> Self {
+    fn from_scene(scene: &SceneResult) -> Self {
         let methods = scene.methods.iter().map(|method| MethodCurve {
             name: method.name.clone(),
             points: method.steps.iter().map(|step| (step.seconds, step.relmse)).collect(),
@@ -64,28 +64,28 @@ impl ConvergenceChart {
 
     /// The chart as text, for a terminal of this size. Empty if there are no points or if the chart does not
     /// fit.
-    pub(super) fn text(&self, (columns, rows): (u16, u16), is_colored: bool) -> String {
+    pub(super) fn render_text(&self, (columns, rows): (u16, u16), is_colored: bool) -> String {
         // Some terminals wrap lines that fill the whole width.
         let size = (columns.saturating_sub(1).min(MAX_COLUMNS), rows.saturating_sub(RESERVED_ROWS).min(ROWS));
         if self.methods.is_empty() || size.0 < MIN_SIZE.0 || size.1 < MIN_SIZE.1 {
             return String::new();
         }
-        as_text_lines(&self.drawn(size), is_colored)
+        as_text_lines(&self.draw(size), is_colored)
     }
 
-    fn drawn(&self, (columns, rows): (u16, u16)) -> Buffer {
+    fn draw(&self, (columns, rows): (u16, u16)) -> Buffer {
         let points: Vec<Vec<(f64, f64)>> = self.methods.iter().map(MethodCurve::log_points).collect();
         let styles = MARKERS.iter().cycle().zip(COLORS.iter().cycle());
         let lines = self.methods.iter().zip(&points).zip(styles);
         let (trends, signs): (Vec<_>, Vec<_>) =
             lines.map(|((line, points), style)| datasets(&line.name, points, style)).unzip();
-        let across = bounds(points.iter().flatten().map(|point| point.0));
-        let up = bounds(points.iter().flatten().map(|point| point.1));
+        let across = axis_bounds(points.iter().flatten().map(|point| point.0));
+        let up = axis_bounds(points.iter().flatten().map(|point| point.1));
         // Draw markers on top of all lines.
         let chart = Chart::new(trends.into_iter().chain(signs).collect())
             .hidden_legend_constraints((Constraint::Percentage(70), Constraint::Percentage(70)))
-            .x_axis(Axis::default().bounds(across).labels(labels(across, seconds)))
-            .y_axis(Axis::default().bounds(up).labels(labels(up, |error| format!("{error:.0e}"))));
+            .x_axis(Axis::default().bounds(across).labels(axis_labels(across, seconds)))
+            .y_axis(Axis::default().bounds(up).labels(axis_labels(up, |error| format!("{error:.0e}"))));
         let area = Rect::new(0, 0, columns, rows);
         let mut buffer = Buffer::empty(area);
         chart.render(area, &mut buffer);
@@ -93,7 +93,7 @@ impl ConvergenceChart {
     }
 }
 
-/// The line through the points, and the markers, which are labeled with the name.
+/// The line through the points, and the markers with the method's name.
 fn datasets<'a>(
     name: &str,
     points: &'a [(f64, f64)],
@@ -114,28 +114,30 @@ impl MethodCurve {
 }
 
 /// Draws every scene if stdout is a terminal.
-pub(super) fn show(results: &Results, console: &Console) {
+pub(super) fn print_charts(results: &Results, console: &Console) {
     if !std::io::stdout().is_terminal() {
         return;
     }
     let columns =
         crossterm::terminal::size().map_or(80, |(columns, _)| columns.clamp(MIN_SIZE.0, MAX_COLUMNS));
     for scene in &results.scenes {
-        console.answer(&format!("{}: relMSE over seconds (log–log)", scene.scene));
-        console
-            .text(&as_text_lines(&ConvergenceChart::of(scene).drawn((columns, ROWS)), console.is_colored()));
+        console.print_line(&format!("{}: relMSE over seconds (log–log)", scene.scene));
+        console.print_text(&as_text_lines(
+            &ConvergenceChart::from_scene(scene).draw((columns, ROWS)),
+            console.is_colored(),
+        ));
     }
 }
 
 /// The range of the values, with a margin.
-fn bounds(values: impl Iterator<Item = f64>) -> [f64; 2] {
+fn axis_bounds(values: impl Iterator<Item = f64>) -> [f64; 2] {
     let (low, high) = values
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
     if low > high { [-1.0, 1.0] } else { [low - 0.1, high + 0.1] }
 }
 
 /// Axis labels at both ends and in the middle.
-fn labels([low, high]: [f64; 2], word: impl Fn(f64) -> String) -> Vec<String> {
+fn axis_labels([low, high]: [f64; 2], word: impl Fn(f64) -> String) -> Vec<String> {
     [low, (low + high) / 2.0, high].map(|power| word(libm::pow(10.0, power))).to_vec()
 }
 
@@ -163,7 +165,7 @@ mod tests {
             slope: None,
             last_slope: None,
             time_to: [None; 3],
-            verdict: crate::bench::Verdict::Unknown,
+            verdict: crate::bench::BiasVerdict::Unknown,
         };
         let reference =
             ReferenceResult { samples: None, noise: 0.0, seconds: None, is_cached: false, files: Vec::new() };
@@ -172,7 +174,7 @@ mod tests {
 
     #[test]
     fn charts_have_lines_names_and_labels() {
-        let buffer = ConvergenceChart::of(&scene()).drawn((60, ROWS));
+        let buffer = ConvergenceChart::from_scene(&scene()).draw((60, ROWS));
         let plain = as_text_lines(&buffer, false);
         assert!(plain.chars().any(|c| ('\u{2801}'..='\u{28ff}').contains(&c)), "{plain}");
         assert!(plain.contains("o path") && plain.contains("201 ms") && plain.contains("1e-1"), "{plain}");
@@ -187,22 +189,25 @@ mod tests {
     fn empty_charts_are_drawn() {
         let mut empty = scene();
         empty.methods.clear();
-        assert!(!as_text_lines(&ConvergenceChart::of(&empty).drawn((30, ROWS)), true).is_empty());
+        assert!(!as_text_lines(&ConvergenceChart::from_scene(&empty).draw((30, ROWS)), true).is_empty());
     }
 
     #[test]
     fn progress_charts_show_one_scene() {
         let mut lines = ConvergenceChart::default();
-        assert_eq!(lines.text((80, 24), false), "");
+        assert_eq!(lines.render_text((80, 24), false), "");
         lines.add("a.toml", "path", (0.1, 0.5));
         lines.add("a.toml", "path", (0.4, 0.1));
         lines.add("a.toml", "whitted", (0.1, 0.01));
-        let text = lines.text((80, 24), false);
+        let text = lines.render_text((80, 24), false);
         assert!(text.contains("o path") && text.contains("x whitted"), "{text}");
         assert!(text.lines().count() == 16 && text.lines().all(|line| line.chars().count() < 80), "{text}");
-        assert_eq!(lines.text((80, 18), false).lines().count(), 12);
-        assert_eq!((lines.text((80, 13), false), lines.text((30, 24), false)), Default::default());
+        assert_eq!(lines.render_text((80, 18), false).lines().count(), 12);
+        assert_eq!(
+            (lines.render_text((80, 13), false), lines.render_text((30, 24), false)),
+            Default::default()
+        );
         lines.add("b.toml", "path", (0.1, 0.5));
-        assert!(!lines.text((80, 24), false).contains("whitted"));
+        assert!(!lines.render_text((80, 24), false).contains("whitted"));
     }
 }

@@ -12,7 +12,8 @@ use crate::exit::Exit;
 use crate::lower::STDOUT_NAME;
 use crate::output::write::{self, Guard};
 use crate::output::{
-    self, FileIdentity, Losses, OutputError, is_same_file, replaced_json, replaced_plot, replaced_table,
+    self, FileIdentity, Losses, OutputError, is_same_file, may_replace_json, may_replace_plot,
+    may_replace_table,
 };
 use crate::system::{describe_error, file};
 
@@ -37,7 +38,7 @@ enum OutputKind {
 
 impl BenchOutputs {
     /// Checks the outputs before measuring and reports errors.
-    pub(super) fn of(args: &BenchArgs, scenes: &[PathBuf], console: &Console) -> Result<Self, Exit> {
+    pub(super) fn check_args(args: &BenchArgs, scenes: &[PathBuf], console: &Console) -> Result<Self, Exit> {
         let all = [
             ("--csv", &args.csv, OutputKind::Csv),
             ("--json", &args.json, OutputKind::Json),
@@ -61,7 +62,7 @@ impl BenchOutputs {
     }
 
     fn check(&self, index: usize, path: &Path, kind: OutputKind) -> Result<(), OutputError> {
-        self.may_replace(index, path)?;
+        self.check_replaceable(index, path)?;
         let is_svg = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("svg"));
         if path == Path::new(STDOUT_NAME) && !matches!(kind, OutputKind::Plot) {
             let (option, ..) = self.files[index];
@@ -78,7 +79,7 @@ impl BenchOutputs {
     }
 
     /// Checks that output `index`, which resolves to `real`, is neither an input nor another output.
-    fn may_replace(&self, index: usize, real: &Path) -> Result<(), OutputError> {
+    fn check_replaceable(&self, index: usize, real: &Path) -> Result<(), OutputError> {
         if FileIdentity::of(real).is_none() {
             return Ok(());
         }
@@ -97,20 +98,20 @@ impl BenchOutputs {
         if let Some((other, ..)) = self.files[..index].iter().find(|(_, other, _)| is_it(other)) {
             return refused(&format!("the output of {other}"));
         }
-        if self.replaces_foreign { Ok(()) } else { self.check_foreign(index, real) }
+        if self.replaces_foreign { Ok(()) } else { self.check_written_by_glimt(index, real) }
     }
 
-    /// Rejects files not written by glimt, such as the scene in `--csv scene.toml` if the name of the CSV
-    /// file is missing.
-    fn check_foreign(&self, index: usize, real: &Path) -> Result<(), OutputError> {
+    /// Rejects files not written by glimt. For example, `--csv scene.toml` would overwrite the scene if the
+    /// user forgot the name of the CSV file.
+    fn check_written_by_glimt(&self, index: usize, real: &Path) -> Result<(), OutputError> {
         let (option, path, kind) = &self.files[index];
         let replaced = match kind {
-            OutputKind::Csv => replaced_table(real, csv::HEAD),
+            OutputKind::Csv => may_replace_table(real, csv::HEAD),
             // Accept valid baselines, which all have scenes.
             OutputKind::Json => {
-                replaced_json(real, "a results file", |found: &Results| !found.scenes.is_empty())
+                may_replace_json(real, "a results file", |found: &Results| !found.scenes.is_empty())
             }
-            OutputKind::Plot => replaced_plot(real, &plot::AXES),
+            OutputKind::Plot => may_replace_plot(real, &plot::AXES),
         };
         let Some(why) = replaced.reason_to_keep() else { return Ok(()) };
         let way_out = format!("choose another file with {option} FILE, or use --force");
@@ -118,11 +119,11 @@ impl BenchOutputs {
     }
 
     /// Reads the baseline and returns its name and results.
-    pub(super) fn baseline(&self, console: &Console) -> Result<Option<(String, Results)>, Exit> {
+    pub(super) fn read_baseline(&self, console: &Console) -> Result<Option<(String, Results)>, Exit> {
         let Some(path) = &self.baseline else { return Ok(None) };
         let name = path.display().to_string();
-        let read =
-            bytes_of(path).map_err(|why| console.fail(Exit::WRONG, &format!("cannot read {name}: {why}")))?;
+        let read = read_baseline_bytes(path)
+            .map_err(|why| console.fail(Exit::WRONG, &format!("cannot read {name}: {why}")))?;
         let results = serde_json::from_slice(&read).map_err(|error| {
             let way_out = "pass a file written by `glimt bench --json FILE`";
             console.fail(Exit::WRONG, &format!("{name} is not a baseline: {error}; {way_out}"))
@@ -131,7 +132,7 @@ impl BenchOutputs {
     }
 
     /// Writes all files, even if some fail.
-    pub(super) fn write(
+    pub(super) fn write_all(
         &self,
         results: &Results,
         progress: &BenchProgress,
@@ -142,7 +143,7 @@ impl BenchOutputs {
             let (_, path, _) = &self.files[index];
             let written = self.write_one(index, results, progress, token);
             let bytes = written.map_err(|why| console.fail(Exit::FAILED, &why))?;
-            progress.written(path, bytes);
+            progress.report_written(path, bytes);
             Ok(())
         });
         written.collect::<Vec<_>>().into_iter().collect()
@@ -157,19 +158,19 @@ impl BenchOutputs {
         token: &CancelToken,
     ) -> Result<usize, String> {
         let (_, path, kind) = &self.files[index];
-        let bytes =
-            content(*kind, results).map_err(|why| format!("cannot write {}: {why}", path.display()))?;
-        let may_replace = |real: &Path| self.may_replace(index, real);
+        let bytes = format_content(*kind, results)
+            .map_err(|why| format!("cannot write {}: {why}", path.display()))?;
+        let may_replace = |real: &Path| self.check_replaceable(index, real);
         let is_kept = |path: &Path| self.inputs.iter().any(|(_, input)| input == path);
-        let losses = Losses::Report(&|what| progress.warned(&what));
+        let losses = Losses::Report(&|what| progress.report_warning(&what));
         let guard = Guard { is_kept: &is_kept, may_replace: &may_replace, sweep: None, losses };
         let written = write::atomic_guarded(path, &bytes, &guard, token);
         written.map(|()| bytes.len()).map_err(|error| error.to_string())
     }
 }
 
-/// Reads a baseline. Rejects very large files and anything but regular files.
-fn bytes_of(path: &Path) -> Result<Vec<u8>, String> {
+/// Reads a baseline. Rejects very large files and files that are not regular.
+fn read_baseline_bytes(path: &Path) -> Result<Vec<u8>, String> {
     /// Enough for the results of a million images.
     const MAX_BYTES: u64 = 256 << 20;
     let words = |error: std::io::Error| describe_error(&error);
@@ -184,10 +185,10 @@ fn bytes_of(path: &Path) -> Result<Vec<u8>, String> {
     Ok(bytes)
 }
 
-fn content(kind: OutputKind, results: &Results) -> Result<Vec<u8>, String> {
+fn format_content(kind: OutputKind, results: &Results) -> Result<Vec<u8>, String> {
     match kind {
-        OutputKind::Csv => Ok(csv::csv(results).into_bytes()),
+        OutputKind::Csv => Ok(csv::format_csv(results).into_bytes()),
         OutputKind::Json => Ok(output::json::file(results).map_err(|error| error.to_string())?.into_bytes()),
-        OutputKind::Plot => Ok(plot::svg(results)?.into_bytes()),
+        OutputKind::Plot => Ok(plot::draw_svg(results)?.into_bytes()),
     }
 }

@@ -10,7 +10,7 @@ use super::chart::ConvergenceChart;
 use crate::args::Progress;
 use crate::bench::{BenchEvent, Results};
 use crate::console::Console;
-use crate::progress::{json_line, seconds, style};
+use crate::progress::{bar_style, json_line, seconds};
 use crate::scene::sanitize::visible;
 
 /// Maximum time between plain lines.
@@ -47,7 +47,7 @@ impl BenchProgress {
             Progress::Auto if console.is_terminal => {
                 let target = ProgressDrawTarget::stderr_with_hz(FRAMES);
                 let bar = ProgressBar::with_draw_target(Some(STEPS), target);
-                let bar = bar.with_style(style("{msg}\n  {wide_bar} {percent:>3}% {prefix}"));
+                let bar = bar.with_style(bar_style("{msg}\n  {wide_bar} {percent:>3}% {prefix}"));
                 ProgressFormat::Bar(bar, ConvergenceChart::default())
             }
             Progress::Auto | Progress::Plain => ProgressFormat::Plain,
@@ -65,12 +65,12 @@ impl BenchProgress {
             BenchEvent::Begins { what, left } => {
                 self.what = what;
                 self.left = left.map(|left| (left, Instant::now()));
-                self.show(matches!(self.format, ProgressFormat::Json));
+                self.redraw(matches!(self.format, ProgressFormat::Json));
             }
             BenchEvent::Done(line) => {
                 self.last = Instant::now();
                 match &self.format {
-                    ProgressFormat::Plain => self.console.say(&line),
+                    ProgressFormat::Plain => self.console.print_message(&line),
                     ProgressFormat::Json => json_line(&json!({ "event": "step", "what": line })),
                     ProgressFormat::Bar(..) | ProgressFormat::Silent => {}
                 }
@@ -78,12 +78,12 @@ impl BenchProgress {
             BenchEvent::Point { scene, method, seconds, relmse } => {
                 if let ProgressFormat::Bar(_, lines) = &mut self.format {
                     lines.add(&scene, &method, (seconds, relmse));
-                    self.show(false);
+                    self.redraw(false);
                 }
             }
             BenchEvent::Warnings(warnings) => match &self.format {
-                ProgressFormat::Bar(bar, _) => bar.suspend(|| self.console.diagnostics(&warnings)),
-                ProgressFormat::Plain | ProgressFormat::Silent => self.console.diagnostics(&warnings),
+                ProgressFormat::Bar(bar, _) => bar.suspend(|| self.console.print_diagnostics(&warnings)),
+                ProgressFormat::Plain | ProgressFormat::Silent => self.console.print_diagnostics(&warnings),
                 ProgressFormat::Json => {
                     let messages: Vec<&str> = warnings.iter().map(|one| one.message.as_str()).collect();
                     json_line(&json!({ "event": "warnings", "messages": messages }));
@@ -95,10 +95,10 @@ impl BenchProgress {
     /// Updates the report as time passes.
     pub(super) fn tick(&mut self) {
         let is_due = self.last.elapsed() >= INTERVAL;
-        self.show(is_due);
+        self.redraw(is_due);
     }
 
-    fn show(&mut self, is_due: bool) {
+    fn redraw(&mut self, is_due: bool) {
         let elapsed = self.begin.elapsed().as_secs_f64();
         let left = self.left.map(|(left, at)| (left - at.elapsed().as_secs_f64()).max(0.0));
         if let Some(left) = left {
@@ -109,14 +109,14 @@ impl BenchProgress {
             ProgressFormat::Bar(bar, lines) => {
                 // Query the size every time, because the terminal may be resized.
                 let size = crossterm::terminal::size().unwrap_or_default();
-                let plot = lines.text(size, self.console.is_colored());
+                let plot = lines.render_text(size, self.console.is_colored());
                 bar.set_message(plot + &visible(&self.what));
                 bar.set_prefix(to_go);
                 bar.set_position((self.fraction * STEPS as f64) as u64);
             }
             ProgressFormat::Plain if is_due => {
                 let percent = self.fraction * 100.0;
-                self.console.say(&format!("{percent:3.0}% {} {to_go}", self.what));
+                self.console.print_message(&format!("{percent:3.0}% {} {to_go}", self.what));
             }
             ProgressFormat::Json if is_due => json_line(&json!({
                 "event": "progress", "stage": "bench", "what": self.what, "fraction": self.fraction,
@@ -130,7 +130,7 @@ impl BenchProgress {
     }
 
     /// Clears temporary output.
-    pub(super) fn end(&mut self) {
+    pub(super) fn clear(&mut self) {
         if let ProgressFormat::Bar(bar, _) = &self.format {
             bar.finish_and_clear();
         }
@@ -141,35 +141,35 @@ impl BenchProgress {
         !matches!(self.format, ProgressFormat::Json)
     }
 
-    pub(super) fn failed(&self, kind: &str, message: &str) {
+    pub(super) fn report_failure(&self, kind: &str, message: &str) {
         if self.is_text() {
-            self.console.say(message);
+            self.console.print_message(message);
         } else {
             json_line(&json!({ "event": "failed", "kind": kind, "message": message }));
         }
     }
 
-    pub(super) fn cancelled(&self, message: &str) {
+    pub(super) fn report_cancelled(&self, message: &str) {
         if self.is_text() {
-            self.console.say(message);
+            self.console.print_message(message);
         } else {
             json_line(&json!({ "event": "cancelled" }));
         }
     }
 
     /// Reports a warning about a written file.
-    pub(super) fn warned(&self, message: &str) {
+    pub(super) fn report_warning(&self, message: &str) {
         if self.is_text() {
-            self.console.say(&format!("warning: {message}"));
+            self.console.print_message(&format!("warning: {message}"));
         } else {
             json_line(&json!({ "event": "warnings", "messages": [message] }));
         }
     }
 
-    pub(super) fn written(&self, path: &Path, bytes: usize) {
+    pub(super) fn report_written(&self, path: &Path, bytes: usize) {
         match self.format {
             ProgressFormat::Bar(..) | ProgressFormat::Plain => {
-                self.console.say(&format!("wrote {}", path.display()));
+                self.console.print_message(&format!("wrote {}", path.display()));
             }
             ProgressFormat::Json => {
                 json_line(&json!({ "event": "written", "path": path.to_string_lossy(), "bytes": bytes }));
@@ -178,7 +178,7 @@ impl BenchProgress {
         }
     }
 
-    pub(super) fn done(&self, results: &Results) {
+    pub(super) fn report_done(&self, results: &Results) {
         if !self.is_text() {
             json_line(&json!({ "event": "done", "seconds": results.seconds }));
         }

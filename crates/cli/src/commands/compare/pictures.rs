@@ -3,9 +3,9 @@
 use std::io::IsTerminal;
 use std::path::Path;
 
-use super::figure;
+use super::format_significant_digits;
 use crate::args::{CompareArgs, Pictures};
-use crate::compare::{self, Measured, Pair};
+use crate::compare::{self, Pair, PairMeasurements};
 use crate::console::Console;
 use crate::film::RadianceImage;
 use crate::film::tone::{ToneMapping, develop};
@@ -16,7 +16,7 @@ use crate::tui::{NamedImage, images_as_text};
 const MIN_VISIBLE_FLIP: f32 = 0.1;
 
 /// Renders the images as text. Empty if the terminal is too small.
-pub(super) fn lines(args: &CompareArgs, pair: &Pair, measured: &Measured) -> String {
+pub(super) fn render_images(args: &CompareArgs, pair: &Pair, measured: &PairMeasurements) -> String {
     let is_terminal = std::io::stdout().is_terminal();
     let is_wanted = match args.pictures {
         Pictures::Auto => is_terminal,
@@ -26,40 +26,40 @@ pub(super) fn lines(args: &CompareArgs, pair: &Pair, measured: &Measured) -> Str
     if !is_wanted {
         return String::new();
     }
-    let (difference, description) = difference(pair, measured);
+    let (difference, description) = difference_image(pair, measured);
     let pictures = [
-        named(&name(&args.a), pair.a()),
-        named(&format!("{}, the reference", name(&args.b)), pair.b()),
-        named(&description, &difference),
+        tone_mapped(&file_name(&args.a), pair.a()),
+        tone_mapped(&format!("{}, the reference", file_name(&args.b)), pair.b()),
+        tone_mapped(&description, &difference),
     ];
     images_as_text(&pictures, args.color, is_terminal)
 }
 
-pub(super) fn show(lines: &str, console: &Console) {
+pub(super) fn print_images(lines: &str, console: &Console) {
     if !lines.is_empty() {
-        console.text(&format!("{lines}\n"));
+        console.print_text(&format!("{lines}\n"));
     }
 }
 
-fn name(path: &Path) -> String {
+fn file_name(path: &Path) -> String {
     path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
 }
 
 /// Tone maps an image for display.
-fn named(name: &str, image: &RadianceImage) -> NamedImage {
+fn tone_mapped(name: &str, image: &RadianceImage) -> NamedImage {
     NamedImage { name: visible(name).into_owned(), picture: develop(image, &ToneMapping::default()) }
 }
 
 /// FLIP in false color, or |a - b| scaled to its maximum if FLIP is too small to see.
-fn difference(pair: &Pair, measured: &Measured) -> (RadianceImage, String) {
+fn difference_image(pair: &Pair, measured: &PairMeasurements) -> (RadianceImage, String) {
     let errors = &measured.errors;
     if errors.max == 0.0 || measured.flip.iter().any(|error| *error >= MIN_VISIBLE_FLIP) {
-        return (compare::heat(pair, &measured.flip), "FLIP".to_owned());
+        return (compare::flip_heat_map(pair, &measured.flip), "FLIP".to_owned());
     }
-    let mut image = compare::absolute(pair);
+    let mut image = compare::absolute_difference(pair);
     let scale = (1.0 / errors.max) as f32;
     image.pixels.iter_mut().for_each(|pixel| *pixel *= scale);
-    (image, format!("|a - b|, white is {}", figure(errors.max)))
+    (image, format!("|a - b|, white is {}", format_significant_digits(errors.max)))
 }
 
 #[cfg(test)]
@@ -71,7 +71,7 @@ mod tests {
         let image =
             |value| RadianceImage { width: 2, height: 1, pixels: vec![Vec3::splat(0.5), Vec3::splat(value)] };
         let pair = Pair::new([Path::new("a"), Path::new("b")], image(0.5), image(b)).expect("a pair");
-        difference(&pair, &compare::measure(&pair))
+        difference_image(&pair, &compare::measure(&pair))
     }
 
     #[test]

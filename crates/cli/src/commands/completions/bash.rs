@@ -1,8 +1,8 @@
 //! Bash completion with quoted candidates.
 //!
-//! Bash inserts candidates as they are, and `clap_complete`'s adapter does not quote them. Running the
-//! command would then execute a name such as `$(…)`. This adapter receives the whole line, splits it into
-//! words like bash but without expansions, and quotes the candidates.
+//! Bash inserts candidates as they are, and `clap_complete`'s adapter does not quote them. A name such as
+//! `$(…)` would then be executed with the command. This adapter receives the whole line, splits it into words
+//! like bash but without expansions, and quotes the candidates.
 
 use std::ffi::OsString;
 use std::io::{Error, Write};
@@ -11,7 +11,7 @@ use std::path::Path;
 use clap_complete::engine::complete;
 use clap_complete::env::EnvCompleter;
 
-use crate::args::candidates::remember;
+use crate::args::candidates::store_command_line;
 
 /// The script. Candidates replace `$2`, the end of the line after the last space, `=`, `:` or open quote.
 const SCRIPT: &str = r#"_glimt_complete() {
@@ -34,11 +34,11 @@ else
 fi
 "#;
 
-/// The bash adapter. The script passes the line up to the cursor, and the end of that line, which candidates
+/// The bash adapter. The script passes the line up to the cursor and the part at its end that candidates
 /// replace.
-pub(super) struct Bash;
+pub(super) struct BashCompleter;
 
-impl EnvCompleter for Bash {
+impl EnvCompleter for BashCompleter {
     fn name(&self) -> &'static str {
         "bash"
     }
@@ -69,19 +69,19 @@ impl EnvCompleter for Bash {
         let (Some(line), Some(replaced)) = (text(0), text(1)) else { return Ok(()) };
         let Some(before) = line.strip_suffix(replaced) else { return Ok(()) };
         // Split the line and determine the quoting at the cursor.
-        let words: Vec<OsString> = read(line).words.into_iter().map(OsString::from).collect();
-        let kept = read(before);
+        let words: Vec<OsString> = split_command_line(line).words.into_iter().map(OsString::from).collect();
+        let kept = split_command_line(before);
         let begun = if before.ends_with(is_blank) && kept.quote == Quote::None {
             ""
         } else {
             kept.words.last().map_or("", String::as_str)
         };
         let keeps_home = kept.quote == Quote::None && replaced.starts_with("~/");
-        remember(&words);
+        store_command_line(&words);
         let last = words.len().saturating_sub(1);
         for candidate in complete(command, words, last, folder)? {
             let rest = candidate.get_value().to_str().and_then(|value| value.strip_prefix(begun));
-            if let Some(quoted) = rest.and_then(|rest| quoted(rest, kept.quote, keeps_home)) {
+            if let Some(quoted) = rest.and_then(|rest| quote_candidate(rest, kept.quote, keeps_home)) {
                 writeln!(out, "{quoted}")?;
             }
         }
@@ -89,7 +89,7 @@ impl EnvCompleter for Bash {
     }
 }
 
-/// The open quote at the end of a line.
+/// The quote left open at the end of a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Quote {
     None,
@@ -97,7 +97,8 @@ enum Quote {
     Double,
 }
 
-/// A line's unquoted words, and the open quote at its end. After a space, the last word is empty.
+/// The unquoted words of a line and the quote left open at its end. The last word is empty if the line ends
+/// with a space.
 struct CommandLine {
     words: Vec<String>,
     quote: Quote,
@@ -108,7 +109,7 @@ fn is_blank(character: char) -> bool {
 }
 
 /// Splits a line like bash, but without expansions.
-fn read(line: &str) -> CommandLine {
+fn split_command_line(line: &str) -> CommandLine {
     let mut words = vec![String::new()];
     let mut quote = Quote::None;
     let mut characters = line.trim_start_matches(is_blank).chars().peekable();
@@ -137,12 +138,12 @@ fn read(line: &str) -> CommandLine {
 }
 
 /// Quotes a candidate that follows the open quote `quote`. `None` if this is impossible.
-fn quoted(text: &str, quote: Quote, keeps_home: bool) -> Option<String> {
+fn quote_candidate(text: &str, quote: Quote, keeps_home: bool) -> Option<String> {
     let is_plain = |c: char| c.is_alphanumeric() || "_./,:=@%+-".contains(c);
     if text.chars().any(char::is_control) {
         // Control characters cannot be written inside quotes.
         return (quote == Quote::None)
-            .then(|| format!("$'{}'", text.chars().map(escaped).collect::<String>()));
+            .then(|| format!("$'{}'", text.chars().map(escape_for_dollar_quotes).collect::<String>()));
     }
     let mut out = String::new();
     for (at, character) in text.chars().enumerate() {
@@ -168,7 +169,7 @@ fn quoted(text: &str, quote: Quote, keeps_home: bool) -> Option<String> {
 }
 
 /// Escapes a character for `$'…'`.
-fn escaped(character: char) -> String {
+fn escape_for_dollar_quotes(character: char) -> String {
     match character {
         '\'' | '\\' => format!("\\{character}"),
         // Write all three octal digits, because the next character may be a digit.
@@ -210,7 +211,7 @@ mod tests {
             [("", "", Quote::None), ("'", "'", Quote::Single), ("\"", "\"", Quote::Double)]
         {
             for name in names {
-                let Some(text) = quoted(name, quote, false) else {
+                let Some(text) = quote_candidate(name, quote, false) else {
                     assert!(quote != Quote::None && name.chars().any(char::is_control), "{name:?}");
                     continue;
                 };
@@ -220,7 +221,11 @@ mod tests {
                     bash.args(["--norc", "-c", &line]).env("LC_ALL", "C.UTF-8").output().expect("bash");
                 assert_eq!(String::from_utf8(output.stdout).expect("UTF-8"), format!("{name}\0"), "{line}");
                 if !name.chars().any(char::is_control) {
-                    assert_eq!(read(&line).words.last().map(String::as_str), Some(name), "{line}");
+                    assert_eq!(
+                        split_command_line(&line).words.last().map(String::as_str),
+                        Some(name),
+                        "{line}"
+                    );
                 }
             }
         }
@@ -228,11 +233,11 @@ mod tests {
 
     #[test]
     fn lines_are_split_like_bash() {
-        let line = read("glimt  --set a=\"b c\"\\ d 'e\\' \"f\\$\\g ");
+        let line = split_command_line("glimt  --set a=\"b c\"\\ d 'e\\' \"f\\$\\g ");
         assert_eq!(line.words, ["glimt", "--set", "a=b c d", "e\\", "f$\\g "]);
         assert_eq!(line.quote, Quote::Double);
-        assert_eq!(read("glimt ").words, ["glimt", ""]);
-        assert_eq!(read("glimt 'x").quote, Quote::Single);
-        assert_eq!(quoted("~/a b", Quote::None, true).as_deref(), Some("~/a\\ b"));
+        assert_eq!(split_command_line("glimt ").words, ["glimt", ""]);
+        assert_eq!(split_command_line("glimt 'x").quote, Quote::Single);
+        assert_eq!(quote_candidate("~/a b", Quote::None, true).as_deref(), Some("~/a\\ b"));
     }
 }

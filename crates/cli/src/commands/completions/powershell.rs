@@ -7,7 +7,7 @@ use std::path::Path;
 use clap_complete::engine::complete;
 use clap_complete::env::EnvCompleter;
 
-use crate::args::candidates::remember;
+use crate::args::candidates::store_command_line;
 
 /// The script. Unlike `clap_complete`'s script, which executes `$(…)` on completion, it does not evaluate the
 /// line. The last word is prefixed with `+` because some versions do not pass empty arguments.
@@ -42,9 +42,9 @@ const SCRIPT: &str = r#"Register-ArgumentCompleter -Native -CommandName glimt -S
 
 /// The PowerShell adapter. Prints one line per candidate: the quoted candidate, the unquoted candidate and
 /// the description, separated by tabs.
-pub(super) struct Powershell;
+pub(super) struct PowershellCompleter;
 
-impl EnvCompleter for Powershell {
+impl EnvCompleter for PowershellCompleter {
     fn name(&self) -> &'static str {
         "powershell"
     }
@@ -76,7 +76,7 @@ impl EnvCompleter for Powershell {
             return Ok(());
         };
         args.push(last);
-        remember(&args);
+        store_command_line(&args);
         let index = args.len() - 1;
         for candidate in complete(command, args, index, folder)? {
             let Some(value) =
@@ -86,14 +86,14 @@ impl EnvCompleter for Powershell {
             };
             let help = candidate.get_help().map(ToString::to_string).unwrap_or_default();
             let help = help.lines().next().filter(|line| !line.is_empty()).unwrap_or(value);
-            writeln!(out, "{}\t{value}\t{}", quoted(value), help.replace('\t', " "))?;
+            writeln!(out, "{}\t{value}\t{}", quote_word(value), help.replace('\t', " "))?;
         }
         Ok(())
     }
 }
 
 /// Quotes a word for PowerShell.
-fn quoted(text: &str) -> String {
+fn quote_word(text: &str) -> String {
     let is_plain = |c: char| c.is_alphanumeric() || "_./\\:=+-".contains(c);
     if text.chars().all(is_plain) {
         return text.to_owned();
@@ -109,9 +109,9 @@ mod tests {
 
     #[test]
     fn special_characters_are_quoted() {
-        assert_eq!(quoted("render.integrator=path"), "render.integrator=path");
-        assert_eq!(quoted("x$(touch y).toml"), "'x$(touch y).toml'");
-        assert_eq!(quoted("it's"), "'it''s'");
+        assert_eq!(quote_word("render.integrator=path"), "render.integrator=path");
+        assert_eq!(quote_word("x$(touch y).toml"), "'x$(touch y).toml'");
+        assert_eq!(quote_word("it's"), "'it''s'");
         assert!(!SCRIPT.contains("Invoke-Expression"));
     }
 }

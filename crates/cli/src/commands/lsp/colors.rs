@@ -1,4 +1,4 @@
-//! Color swatches in the editor. Converts linear numbers to sRGB.
+//! Color swatches in the editor, with linear numbers converted to sRGB.
 
 use lsp_types::{Color, ColorInformation, ColorPresentation};
 use serde_json::{Value, json};
@@ -10,17 +10,17 @@ use crate::scene::keys::key::ValueKind;
 use crate::scene::outline::OutlineKey;
 
 /// Returns all colors in a document.
-pub(super) fn all(document: &OpenDocument) -> Value {
+pub(super) fn document_colors(document: &OpenDocument) -> Value {
     let mut found = Vec::new();
     for table in &document.tables {
-        let known = table.known();
+        let known = table.known_keys();
         for key in &table.keys {
             let kind = known.iter().find(|info| info.name == key.name.text).map(|info| info.kind);
             let is_color = matches!(
                 kind,
                 Some(ValueKind::Color(_) | ValueKind::ColorOrTexture(_) | ValueKind::Emission(_))
             );
-            if let Some(color) = color(&document.text, key).filter(|_| is_color) {
+            if let Some(color) = parse_color(&document.text, key).filter(|_| is_color) {
                 found.push(ColorInformation { range: document.span(&key.value), color });
             }
         }
@@ -29,7 +29,7 @@ pub(super) fn all(document: &OpenDocument) -> Value {
 }
 
 /// Parses a value as a color. Numbers are clamped to 1.
-fn color(text: &str, key: &OutlineKey) -> Option<Color> {
+fn parse_color(text: &str, key: &OutlineKey) -> Option<Color> {
     let bytes = match &key.text {
         Some(text) => color_bytes(text)?,
         None => {
@@ -49,7 +49,7 @@ fn color(text: &str, key: &OutlineKey) -> Option<Color> {
 }
 
 /// Formats a color picked in the editor as `#rrggbb` and as linear numbers.
-pub(super) fn presentations(params: &Value) -> Option<Value> {
+pub(super) fn color_presentations(params: &Value) -> Option<Value> {
     let color: Color = serde_json::from_value(params["color"].clone()).ok()?;
     let bytes = [color.red, color.green, color.blue].map(|part| (part.clamp(0.0, 1.0) * 255.0).round() as u8);
     let [red, green, blue] = bytes;

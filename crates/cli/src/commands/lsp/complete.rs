@@ -7,29 +7,31 @@ use lsp_types::{
 use serde_json::{Value, json};
 
 use super::document::OpenDocument;
-use super::look::{described, texture_keys};
-use super::place::{CursorContext, Section, place};
-use crate::scene::keys::key::{Form, KeyInfo, ValueKind, Word};
+use super::look::{describe_key, texture_keys};
+use super::place::{CursorContext, Section, cursor_context};
+use crate::scene::keys::key::{KeyInfo, TableSyntax, ValueKind, Word};
 use crate::scene::keys::{color_names, tables};
 
 /// The candidates at a byte offset. `None` if nothing can be completed there.
 pub(super) fn complete(document: &OpenDocument, offset: usize) -> Option<Value> {
-    let items = match place(&document.text, offset)? {
-        CursorContext::Header => headers(document, offset),
-        CursorContext::Key { of, given, is_assigned } => keys(of, &given, is_assigned),
-        CursorContext::Value { of, key, is_quoted } if key == "type" => types(of, is_quoted),
+    let items = match cursor_context(&document.text, offset)? {
+        CursorContext::Header => header_items(document, offset),
+        CursorContext::Key { of, given, is_assigned } => missing_key_items(of, &given, is_assigned),
+        CursorContext::Value { of, key, is_quoted } if key == "type" => type_items(of, is_quoted),
         CursorContext::Value { of, key, is_quoted } => {
-            of.key(&key).map(|key| values(document, key.kind, is_quoted))?
+            of.key(&key).map(|key| value_items(document, key.kind, is_quoted))?
         }
         CursorContext::InnerKey { given } => {
             let keys = texture_keys().into_iter().filter(|(name, _)| !given.iter().any(|one| one == name));
-            keys.map(|(name, doc)| item(name, CompletionItemKind::PROPERTY, doc, format!("{name} = ")))
-                .collect()
+            keys.map(|(name, doc)| {
+                completion_item(name, CompletionItemKind::PROPERTY, doc, format!("{name} = "))
+            })
+            .collect()
         }
         CursorContext::InnerValue { key, is_quoted } => match key.as_str() {
-            "texture" => names(document, "textures", is_quoted),
+            "texture" => table_name_items(document, "textures", is_quoted),
             "channel" => {
-                words(&crate::scene::keys::key::words::<crate::scene::description::Channel>(), is_quoted)
+                word_items(&crate::scene::keys::key::words::<crate::scene::description::Channel>(), is_quoted)
             }
             _ => Vec::new(),
         },
@@ -37,7 +39,7 @@ pub(super) fn complete(document: &OpenDocument, offset: usize) -> Option<Value> 
     Some(json!(items))
 }
 
-fn item(label: &str, kind: CompletionItemKind, doc: &str, insert: String) -> CompletionItem {
+fn completion_item(label: &str, kind: CompletionItemKind, doc: &str, insert: String) -> CompletionItem {
     let documentation = MarkupContent { kind: MarkupKind::Markdown, value: doc.to_owned() };
     CompletionItem {
         label: label.to_owned(),
@@ -49,14 +51,14 @@ fn item(label: &str, kind: CompletionItemKind, doc: &str, insert: String) -> Com
 }
 
 /// Table headers. A candidate replaces the partial header, including closing brackets inserted by the editor.
-fn headers(document: &OpenDocument, offset: usize) -> Vec<CompletionItem> {
+fn header_items(document: &OpenDocument, offset: usize) -> Vec<CompletionItem> {
     let before = &document.text[..offset];
     let line = before.rsplit('\n').next().unwrap_or_default().trim_start();
     let rest = &document.text[offset..];
     let closed = rest.len() - rest.trim_start_matches(']').len();
     let [start, end] = [offset - line.len(), offset + closed].map(|at| document.position(at));
     let is_there = |table: &str| document.tables.iter().any(|one| one.info.name == table);
-    let open = tables().iter().filter(|table| table.form != Form::Single || !is_there(table.name));
+    let open = tables().iter().filter(|table| table.form != TableSyntax::Single || !is_there(table.name));
     open.map(|table| {
         let head = table.head();
         let edit = TextEdit { range: Range { start, end }, new_text: head.clone() };
@@ -64,25 +66,34 @@ fn headers(document: &OpenDocument, offset: usize) -> Vec<CompletionItem> {
             text_edit: Some(CompletionTextEdit::Edit(edit)),
             filter_text: Some(head.clone()),
             insert_text: None,
-            ..item(&head, CompletionItemKind::MODULE, table.doc, String::new())
+            ..completion_item(&head, CompletionItemKind::MODULE, table.doc, String::new())
         }
     })
     .collect()
 }
 
 /// Missing keys of a table, with example values unless a `=` follows.
-fn keys(of: Section, given: &[String], is_assigned: bool) -> Vec<CompletionItem> {
+fn missing_key_items(of: Section, given: &[String], is_assigned: bool) -> Vec<CompletionItem> {
     let whole =
         |name: &str, value: &str| if is_assigned { name.to_owned() } else { format!("{name} = {value}") };
     let mut items: Vec<CompletionItem> = Vec::new();
     let is_given = |name: &str| given.iter().any(|one| one == name);
     if !of.info.types.is_empty() && !is_given("type") {
         let default = of.info.types.first().map_or("", |kind| kind.name);
-        items.push(item("type", CompletionItemKind::PROPERTY, "", whole("type", &format!("\"{default}\""))));
+        items.push(completion_item(
+            "type",
+            CompletionItemKind::PROPERTY,
+            "",
+            whole("type", &format!("\"{default}\"")),
+        ));
     }
     let key = |key: &&KeyInfo| {
-        let mut item =
-            item(key.name, CompletionItemKind::PROPERTY, &described(key), whole(key.name, &key.example()));
+        let mut item = completion_item(
+            key.name,
+            CompletionItemKind::PROPERTY,
+            &describe_key(key),
+            whole(key.name, &key.example()),
+        );
         item.detail = Some(key.kind().replace('`', ""));
         item
     };
@@ -90,27 +101,34 @@ fn keys(of: Section, given: &[String], is_assigned: bool) -> Vec<CompletionItem>
     items
 }
 
-fn types(of: Section, is_quoted: bool) -> Vec<CompletionItem> {
+fn type_items(of: Section, is_quoted: bool) -> Vec<CompletionItem> {
     let list: Vec<Word> =
         of.info.types.iter().map(|kind| Word { name: kind.name, meaning: kind.doc }).collect();
-    words(&list, is_quoted)
+    word_items(&list, is_quoted)
 }
 
-fn values(document: &OpenDocument, kind: ValueKind, is_quoted: bool) -> Vec<CompletionItem> {
+fn value_items(document: &OpenDocument, kind: ValueKind, is_quoted: bool) -> Vec<CompletionItem> {
     let texture = |more: &str| {
-        item("{ texture = … }", CompletionItemKind::STRUCT, "", format!("{{ texture = \"\"{more} }}"))
+        completion_item(
+            "{ texture = … }",
+            CompletionItemKind::STRUCT,
+            "",
+            format!("{{ texture = \"\"{more} }}"),
+        )
     };
     let colors = || {
-        let color = |name: &str| item(name, CompletionItemKind::COLOR, "", in_quotes(name, is_quoted));
+        let color = |name: &str| {
+            completion_item(name, CompletionItemKind::COLOR, "", quote_if_needed(name, is_quoted))
+        };
         color_names().map(color).collect::<Vec<_>>()
     };
     match kind {
-        ValueKind::Words(list) => words(&list(), is_quoted),
-        ValueKind::Flag => {
-            ["true", "false"].map(|flag| item(flag, CompletionItemKind::VALUE, "", flag.to_owned())).to_vec()
-        }
+        ValueKind::Words(list) => word_items(&list(), is_quoted),
+        ValueKind::Flag => ["true", "false"]
+            .map(|flag| completion_item(flag, CompletionItemKind::VALUE, "", flag.to_owned()))
+            .to_vec(),
         ValueKind::Material | ValueKind::Texture | ValueKind::Heights => {
-            kind.named_in().map_or_else(Vec::new, |table| names(document, table, is_quoted))
+            kind.named_in().map_or_else(Vec::new, |table| table_name_items(document, table, is_quoted))
         }
         ValueKind::Color(_) => colors(),
         ValueKind::ColorOrTexture(_) | ValueKind::Emission(_) if is_quoted => colors(),
@@ -127,22 +145,34 @@ fn values(document: &OpenDocument, kind: ValueKind, is_quoted: bool) -> Vec<Comp
     }
 }
 
-fn words(list: &[Word], is_quoted: bool) -> Vec<CompletionItem> {
+fn word_items(list: &[Word], is_quoted: bool) -> Vec<CompletionItem> {
     let word = |word: &Word| {
-        item(word.name, CompletionItemKind::ENUM_MEMBER, word.meaning, in_quotes(word.name, is_quoted))
+        completion_item(
+            word.name,
+            CompletionItemKind::ENUM_MEMBER,
+            word.meaning,
+            quote_if_needed(word.name, is_quoted),
+        )
     };
     list.iter().map(word).collect()
 }
 
 /// Names of tables defined in the document.
-fn names(document: &OpenDocument, table: &str, is_quoted: bool) -> Vec<CompletionItem> {
+fn table_name_items(document: &OpenDocument, table: &str, is_quoted: bool) -> Vec<CompletionItem> {
     let named =
         document.tables.iter().filter(|one| one.info.name == table).filter_map(|one| one.name.as_ref());
     named
-        .map(|name| item(&name.text, CompletionItemKind::REFERENCE, "", in_quotes(&name.text, is_quoted)))
+        .map(|name| {
+            completion_item(
+                &name.text,
+                CompletionItemKind::REFERENCE,
+                "",
+                quote_if_needed(&name.text, is_quoted),
+            )
+        })
         .collect()
 }
 
-fn in_quotes(text: &str, is_quoted: bool) -> String {
-    if is_quoted { text.to_owned() } else { crate::scene::quoted(text) }
+fn quote_if_needed(text: &str, is_quoted: bool) -> String {
+    if is_quoted { text.to_owned() } else { crate::scene::toml_string(text) }
 }

@@ -6,22 +6,22 @@ use lsp_types::{Diagnostic, DiagnosticSeverity, Range};
 
 use super::document::OpenDocument;
 use crate::control::CancelToken;
-use crate::pipeline::Checker;
+use crate::pipeline::IncrementalChecker;
 use crate::pipeline::protocol::Failure;
 use crate::scene::diagnostic::{self, Severity};
 use crate::scene::parse;
 
 /// Diagnostics of a document's text.
-pub(super) fn of_text(document: &OpenDocument) -> Vec<Diagnostic> {
+pub(super) fn text_diagnostics(document: &OpenDocument) -> Vec<Diagnostic> {
     let found = parse(document.text.as_str().into(), &document.path).diagnostics;
-    found.iter().map(|one| diagnostic(document, one)).collect()
+    found.iter().map(|one| to_lsp_diagnostic(document, one)).collect()
 }
 
 /// Diagnostics of the file and its referenced files, as in `glimt check`. `None` if the file differs from the
 /// open document, if it cannot be read, or if the token is cancelled.
-pub(super) fn of_files(
+pub(super) fn file_diagnostics(
     document: &OpenDocument,
-    checker: &mut Checker,
+    checker: &mut IncrementalChecker,
     token: &CancelToken,
 ) -> Option<Vec<Diagnostic>> {
     if std::fs::read_to_string(&document.path).ok()? != document.text {
@@ -32,16 +32,16 @@ pub(super) fn of_files(
         Err(Failure::Scene(diagnostics)) => diagnostics,
         Err(Failure::Work(_)) => return None,
     };
-    Some(found.iter().map(|one| diagnostic(document, one)).collect())
+    Some(found.iter().map(|one| to_lsp_diagnostic(document, one)).collect())
 }
 
-fn diagnostic(document: &OpenDocument, one: &diagnostic::Diagnostic) -> Diagnostic {
+fn to_lsp_diagnostic(document: &OpenDocument, one: &diagnostic::Diagnostic) -> Diagnostic {
     let is_here = one.path == document.path;
     let place = one.place.as_ref();
     let range = place.filter(|_| is_here).map_or(Range::default(), |place| document.span(&place.span));
     let label = place.map(|place| place.label.as_str()).filter(|label| !label.is_empty());
     let mut message =
-        if is_here { one.message.clone() } else { format!("{}: {}", name(&one.path), one.message) };
+        if is_here { one.message.clone() } else { format!("{}: {}", file_name(&one.path), one.message) };
     for (more, between) in [(label, ": "), (one.help.as_deref(), "\n")] {
         if let Some(more) = more {
             message.push_str(between);
@@ -56,6 +56,6 @@ fn diagnostic(document: &OpenDocument, one: &diagnostic::Diagnostic) -> Diagnost
     Diagnostic { range, severity: Some(severity), source, message, ..Diagnostic::default() }
 }
 
-fn name(path: &Path) -> String {
+fn file_name(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }

@@ -12,41 +12,41 @@ use lsp_types::{Diagnostic, Uri};
 use super::diagnostics;
 use super::document::OpenDocument;
 use crate::control::CancelToken;
-use crate::pipeline::Checker;
+use crate::pipeline::IncrementalChecker;
 
 /// A thread that checks files until the handle is dropped.
-pub(super) struct FileThread {
-    shared: Arc<RequestQueue>,
+pub(super) struct FileCheckThread {
+    shared: Arc<CheckQueue>,
     thread: Option<JoinHandle<()>>,
 }
 
 /// The requests, with a condition variable that signals changes.
 #[derive(Default)]
-struct RequestQueue {
-    requests: Mutex<Requests>,
+struct CheckQueue {
+    requests: Mutex<CheckRequests>,
     changed: Condvar,
 }
 
 /// The pending requests and the running request.
 #[derive(Default)]
-struct Requests {
+struct CheckRequests {
     /// At most one per document, in order of arrival.
     waiting: VecDeque<(Uri, OpenDocument)>,
     running: Option<(Uri, CancelToken)>,
     is_over: bool,
 }
 
-impl FileThread {
+impl FileCheckThread {
     /// Starts a thread that passes diagnostics to `publish`. `None` if no thread can be created.
     pub(super) fn start(
         publish: impl Fn(Uri, &OpenDocument, Vec<Diagnostic>) + Send + 'static,
     ) -> Option<Self> {
-        let shared = Arc::<RequestQueue>::default();
+        let shared = Arc::<CheckQueue>::default();
         let work = Arc::clone(&shared);
         let read = move || {
-            let mut checker = Checker::default();
+            let mut checker = IncrementalChecker::default();
             while let Some((uri, document, token)) = work.next() {
-                if let Some(found) = diagnostics::of_files(&document, &mut checker, &token) {
+                if let Some(found) = diagnostics::file_diagnostics(&document, &mut checker, &token) {
                     publish(uri, &document, found);
                 }
             }
@@ -62,7 +62,7 @@ impl FileThread {
     }
 }
 
-impl Drop for FileThread {
+impl Drop for FileCheckThread {
     fn drop(&mut self) {
         self.shared.lock().end();
         self.shared.changed.notify_one();
@@ -73,22 +73,22 @@ impl Drop for FileThread {
     }
 }
 
-impl RequestQueue {
-    fn lock(&self) -> MutexGuard<'_, Requests> {
+impl CheckQueue {
+    fn lock(&self) -> MutexGuard<'_, CheckRequests> {
         self.requests.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Waits for the next request. `None` after [`Requests::end`].
+    /// Waits for the next request. `None` after [`CheckRequests::end`].
     fn next(&self) -> Option<(Uri, OpenDocument, CancelToken)> {
         let mut requests = self.lock();
         requests.running = None;
-        let is_idle = |requests: &mut Requests| requests.waiting.is_empty() && !requests.is_over;
+        let is_idle = |requests: &mut CheckRequests| requests.waiting.is_empty() && !requests.is_over;
         let mut requests = self.changed.wait_while(requests, is_idle).unwrap_or_else(PoisonError::into_inner);
         requests.take()
     }
 }
 
-impl Requests {
+impl CheckRequests {
     fn put(&mut self, uri: Uri, document: OpenDocument) {
         if let Some((_, token)) = self.running.as_ref().filter(|(running, _)| *running == uri) {
             token.cancel();
@@ -120,7 +120,7 @@ mod tests {
     fn only_the_newest_request_per_document_is_kept() {
         let uri = |name: &str| name.parse::<Uri>().expect("an address");
         let document = |version| OpenDocument::new("a.toml".into(), version, String::new());
-        let mut requests = Requests::default();
+        let mut requests = CheckRequests::default();
         requests.put(uri("file:///a"), document(1));
         let (_, _, first) = requests.take().expect("a request");
         for (name, version) in [("file:///b", 1), ("file:///a", 2), ("file:///a", 3)] {

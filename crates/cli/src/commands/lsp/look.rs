@@ -18,7 +18,7 @@ struct KeyAtCursor<'d> {
 }
 
 /// Finds the key whose name or value contains a byte offset.
-fn found(document: &OpenDocument, offset: usize) -> Option<KeyAtCursor<'_>> {
+fn key_at(document: &OpenDocument, offset: usize) -> Option<KeyAtCursor<'_>> {
     let holds = |key: &&OutlineKey| {
         let reach = |range: &Range<usize>| range.start <= offset && offset <= range.end;
         reach(&key.name.span) || reach(&key.value)
@@ -32,11 +32,11 @@ fn found(document: &OpenDocument, offset: usize) -> Option<KeyAtCursor<'_>> {
 
 /// Hover text for the key under the cursor.
 pub(super) fn hover(document: &OpenDocument, offset: usize) -> Option<Value> {
-    let KeyAtCursor { table, outer, key } = found(document, offset)?;
+    let KeyAtCursor { table, outer, key } = key_at(document, offset)?;
     let name = key.name.text.as_str();
     let text = if std::ptr::eq(key, outer) {
-        match table.known().into_iter().find(|one| one.name == name) {
-            Some(info) => format!("**{name}**: {}\n\n{}", info.kind(), described(info)),
+        match table.known_keys().into_iter().find(|one| one.name == name) {
+            Some(info) => format!("**{name}**: {}\n\n{}", info.kind(), describe_key(info)),
             None if name == "type" => {
                 let types =
                     table.info.types.iter().map(|kind| format!("- `\"{}\"`: {}", kind.name, kind.doc));
@@ -52,7 +52,7 @@ pub(super) fn hover(document: &OpenDocument, offset: usize) -> Option<Value> {
 }
 
 /// Description, unit, range and default, in Markdown.
-pub(super) fn described(key: &KeyInfo) -> String {
+pub(super) fn describe_key(key: &KeyInfo) -> String {
     let mut text = format!("{}.", key.doc);
     let mut row = |name: &str, value: String| {
         if !value.is_empty() {
@@ -85,9 +85,9 @@ pub(super) fn texture_keys() -> [(&'static str, &'static str); 3] {
 
 /// The range where the name under the cursor is defined.
 pub(super) fn definition(document: &OpenDocument, offset: usize) -> Option<Value> {
-    let KeyAtCursor { table, outer, key } = found(document, offset)?;
+    let KeyAtCursor { table, outer, key } = key_at(document, offset)?;
     let group = if std::ptr::eq(key, outer) {
-        table.known().into_iter().find(|one| one.name == key.name.text)?.kind.named_in()?
+        table.known_keys().into_iter().find(|one| one.name == key.name.text)?.kind.named_in()?
     } else if key.name.text == "texture" {
         "textures"
     } else {

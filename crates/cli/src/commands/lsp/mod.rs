@@ -35,13 +35,13 @@ use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
 
 use self::document::OpenDocument;
-use self::files::FileThread;
+use self::files::FileCheckThread;
 use self::wire::{Client, Received};
 use crate::console::Console;
 use crate::exit::Exit;
 
-/// Serves until the client sends `exit` or closes stdin. The protocol requires `exit` without `shutdown` to
-/// be a failure.
+/// Serves until the client sends `exit` or closes stdin. `exit` without a preceding `shutdown` is a failure,
+/// as the protocol requires.
 pub(crate) fn run(console: &Console) -> Exit {
     match serve(&mut std::io::stdin().lock(), &Client::new(std::io::stdout())) {
         Ok(exit) => exit,
@@ -64,7 +64,7 @@ fn capabilities() -> Value {
 
 /// The server's lifecycle phase.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Phase {
+enum ServerPhase {
     /// Before `initialize`.
     New,
     /// Serving requests.
@@ -79,21 +79,21 @@ fn serve(from: &mut impl BufRead, client: &Client) -> Result<Exit, String> {
     let publish = move |uri, document: &OpenDocument, found| {
         publish_if_current(&open, |message| to.send(&message), uri, document, found);
     };
-    let files = FileThread::start(publish);
+    let files = FileCheckThread::start(publish);
     let mut server = Server { client, documents, files };
-    let mut phase = Phase::New;
-    while let Some(received) = wire::read(from)? {
+    let mut phase = ServerPhase::New;
+    while let Some(received) = wire::read_frame(from)? {
         match received {
-            Received::Invalid(answer) => client.refuse(&answer),
+            Received::Invalid(answer) => client.send_error(&answer),
             Received::Message(Message::Request(request)) => {
                 let response = server.respond(request, &mut phase);
                 server.send(&response.into());
             }
             Received::Message(Message::Notification(one)) => match (one.method.as_str(), phase) {
-                (Exited::METHOD, Phase::ShutDown) => return Ok(Exit::DONE),
-                (Exited::METHOD, Phase::New | Phase::Serving) => return Ok(Exit::FAILED),
-                (_, Phase::Serving) => server.hear(one),
-                (_, Phase::New | Phase::ShutDown) => {}
+                (Exited::METHOD, ServerPhase::ShutDown) => return Ok(Exit::DONE),
+                (Exited::METHOD, ServerPhase::New | ServerPhase::Serving) => return Ok(Exit::FAILED),
+                (_, ServerPhase::Serving) => server.handle_notification(one),
+                (_, ServerPhase::New | ServerPhase::ShutDown) => {}
             },
             // The server sends no requests, so it expects no responses.
             Received::Message(Message::Response(_)) => {}
@@ -110,7 +110,7 @@ struct Server<'c> {
     documents: Documents,
     /// Checks referenced files. `None` if the thread could not be started. In that case, only the documents
     /// themselves are checked.
-    files: Option<FileThread>,
+    files: Option<FileCheckThread>,
 }
 
 impl Server<'_> {
@@ -123,25 +123,25 @@ impl Server<'_> {
     }
 
     /// Responds to a request and updates the phase.
-    fn respond(&self, request: Request, phase: &mut Phase) -> Response {
+    fn respond(&self, request: Request, phase: &mut ServerPhase) -> Response {
         let refused = |id, code: ErrorCode, why: &str| Response::new_err(id, code as i32, why.to_owned());
         match (request.method.as_str(), *phase) {
-            (Initialize::METHOD, Phase::New) => {
-                *phase = Phase::Serving;
+            (Initialize::METHOD, ServerPhase::New) => {
+                *phase = ServerPhase::Serving;
                 Response::new_ok(request.id, capabilities())
             }
-            (_, Phase::New) => {
+            (_, ServerPhase::New) => {
                 refused(request.id, ErrorCode::ServerNotInitialized, "`initialize` must be the first request")
             }
-            (Initialize::METHOD, Phase::Serving) => {
+            (Initialize::METHOD, ServerPhase::Serving) => {
                 refused(request.id, ErrorCode::InvalidRequest, "the server is already initialized")
             }
-            (Shutdown::METHOD, Phase::Serving) => {
-                *phase = Phase::ShutDown;
+            (Shutdown::METHOD, ServerPhase::Serving) => {
+                *phase = ServerPhase::ShutDown;
                 Response::new_ok(request.id, Value::Null)
             }
-            (_, Phase::Serving) => self.answer(request),
-            (_, Phase::ShutDown) => refused(
+            (_, ServerPhase::Serving) => self.answer(request),
+            (_, ServerPhase::ShutDown) => refused(
                 request.id,
                 ErrorCode::InvalidRequest,
                 "the server is shut down; only `exit` is allowed",
@@ -152,15 +152,16 @@ impl Server<'_> {
     fn answer(&self, request: Request) -> Response {
         let Request { id, method, params } = request;
         let found = match method.as_str() {
-            Completion::METHOD => self.at(params, complete::complete),
-            HoverRequest::METHOD => self.at(params, look::hover),
+            Completion::METHOD => self.with_document_at(params, complete::complete),
+            HoverRequest::METHOD => self.with_document_at(params, look::hover),
             GotoDefinition::METHOD => {
                 let uri = params["textDocument"]["uri"].clone();
-                self.at(params, look::definition).map(|range| json!({ "uri": uri, "range": range }))
+                self.with_document_at(params, look::definition)
+                    .map(|range| json!({ "uri": uri, "range": range }))
             }
-            DocumentColor::METHOD => self.on(&params, colors::all),
-            ColorPresentationRequest::METHOD => colors::presentations(&params),
-            _ => return unknown(id, &method),
+            DocumentColor::METHOD => self.with_document(&params, colors::document_colors),
+            ColorPresentationRequest::METHOD => colors::color_presentations(&params),
+            _ => return unknown_method_response(id, &method),
         };
         match found {
             Some(value) => Response::new_ok(id, value),
@@ -169,7 +170,11 @@ impl Server<'_> {
     }
 
     /// Calls a function with a document and a byte offset. `None` if the document is not open.
-    fn at(&self, params: Value, look: impl FnOnce(&OpenDocument, usize) -> Option<Value>) -> Option<Value> {
+    fn with_document_at(
+        &self,
+        params: Value,
+        look: impl FnOnce(&OpenDocument, usize) -> Option<Value>,
+    ) -> Option<Value> {
         let TextDocumentPositionParams { text_document, position } = serde_json::from_value(params).ok()?;
         let documents = self.documents();
         let document = documents.get(text_document.uri.as_str())?;
@@ -177,41 +182,42 @@ impl Server<'_> {
     }
 
     /// Calls a function with a document. `None` if the document is not open.
-    fn on(&self, params: &Value, look: impl FnOnce(&OpenDocument) -> Value) -> Option<Value> {
+    fn with_document(&self, params: &Value, look: impl FnOnce(&OpenDocument) -> Value) -> Option<Value> {
         let uri = params["textDocument"]["uri"].as_str()?;
         self.documents().get(uri).map(look)
     }
 
-    fn hear(&mut self, notification: Notification) {
+    fn handle_notification(&mut self, notification: Notification) {
         let Notification { method, params } = notification;
         match method.as_str() {
             DidOpenTextDocument::METHOD => {
-                if let Some(DidOpenTextDocumentParams { text_document: one }) = read(params) {
-                    self.put(&one.uri, one.version, one.text);
-                    self.read_files(&one.uri);
+                if let Some(DidOpenTextDocumentParams { text_document: one }) = parse_params(params) {
+                    self.store_document(&one.uri, one.version, one.text);
+                    self.queue_file_check(&one.uri);
                 }
             }
             DidChangeTextDocument::METHOD => {
-                if let Some(DidChangeTextDocumentParams { text_document, mut content_changes }) = read(params)
+                if let Some(DidChangeTextDocumentParams { text_document, mut content_changes }) =
+                    parse_params(params)
                 {
                     if content_changes.iter().any(|change| change.range.is_some()) {
-                        self.note(
+                        self.log_error(
                             "ignored an incremental change: this server needs full text synchronization",
                         );
                     } else if let Some(last) = content_changes.pop() {
-                        self.put(&text_document.uri, text_document.version, last.text);
+                        self.store_document(&text_document.uri, text_document.version, last.text);
                     }
                 }
             }
             DidSaveTextDocument::METHOD => {
-                if let Some(DidSaveTextDocumentParams { text_document, .. }) = read(params) {
-                    self.read_files(&text_document.uri);
+                if let Some(DidSaveTextDocumentParams { text_document, .. }) = parse_params(params) {
+                    self.queue_file_check(&text_document.uri);
                 }
             }
             DidCloseTextDocument::METHOD => {
-                if let Some(DidCloseTextDocumentParams { text_document }) = read(params) {
+                if let Some(DidCloseTextDocumentParams { text_document }) = parse_params(params) {
                     self.documents().remove(text_document.uri.as_str());
-                    self.send(&published(text_document.uri, None, Vec::new()));
+                    self.send(&diagnostics_notification(text_document.uri, None, Vec::new()));
                 }
             }
             _ => {}
@@ -219,21 +225,21 @@ impl Server<'_> {
     }
 
     /// Writes an error to the client's log.
-    fn note(&self, message: &str) {
+    fn log_error(&self, message: &str) {
         let params = LogMessageParams { typ: MessageType::ERROR, message: message.to_owned() };
         self.send(&Notification::new(LogMessage::METHOD.to_owned(), params).into());
     }
 
     /// Stores a document and publishes its diagnostics.
-    fn put(&self, uri: &Uri, version: i32, text: String) {
-        let document = OpenDocument::new(path(uri), version, text);
-        let found = diagnostics::of_text(&document);
+    fn store_document(&self, uri: &Uri, version: i32, text: String) {
+        let document = OpenDocument::new(uri_to_path(uri), version, text);
+        let found = diagnostics::text_diagnostics(&document);
         self.documents().insert(uri.as_str().to_owned(), document);
-        self.send(&published(uri.clone(), Some(version), found));
+        self.send(&diagnostics_notification(uri.clone(), Some(version), found));
     }
 
     /// Queues a check of the files referenced by a document.
-    fn read_files(&self, uri: &Uri) {
+    fn queue_file_check(&self, uri: &Uri) {
         let document = self.documents().get(uri.as_str()).cloned();
         if let (Some(files), Some(document)) = (&self.files, document) {
             files.check(uri.clone(), document);
@@ -251,26 +257,26 @@ fn publish_if_current(
 ) {
     let documents = documents.lock().unwrap_or_else(PoisonError::into_inner);
     if documents.get(uri.as_str()).is_some_and(|now| now.version == document.version) {
-        send(published(uri, Some(document.version), found));
+        send(diagnostics_notification(uri, Some(document.version), found));
     }
 }
 
-fn read<P: DeserializeOwned>(params: Value) -> Option<P> {
+fn parse_params<P: DeserializeOwned>(params: Value) -> Option<P> {
     serde_json::from_value(params).ok()
 }
 
 /// The notification with a document's diagnostics.
-fn published(uri: Uri, version: Option<i32>, diagnostics: Vec<Diagnostic>) -> Message {
+fn diagnostics_notification(uri: Uri, version: Option<i32>, diagnostics: Vec<Diagnostic>) -> Message {
     let params = PublishDiagnosticsParams { uri, diagnostics, version };
     Notification::new(PublishDiagnostics::METHOD.to_owned(), params).into()
 }
 
-fn unknown(id: RequestId, method: &str) -> Response {
+fn unknown_method_response(id: RequestId, method: &str) -> Response {
     Response::new_err(id, ErrorCode::MethodNotFound as i32, format!("unsupported method {method}"))
 }
 
 /// The path in a file URI. For other URIs, a path that does not exist.
-fn path(uri: &Uri) -> PathBuf {
+fn uri_to_path(uri: &Uri) -> PathBuf {
     let decoded = uri.path().as_estr().decode().into_string();
     decoded.map_or_else(|_| PathBuf::from(uri.as_str()), |path| PathBuf::from(path.into_owned()))
 }

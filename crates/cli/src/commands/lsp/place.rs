@@ -3,12 +3,12 @@
 use crate::scene::keys::key::{KeyInfo, TableInfo, TypeInfo};
 use crate::scene::keys::table;
 
-/// Kind of completion at the cursor.
+/// The kind of text to complete at the cursor.
 #[derive(Debug)]
 pub(super) enum CursorContext {
     /// A header, or a line where a header can start.
     Header,
-    /// A key of a table, with the table's other keys and whether `=` follows.
+    /// A key of a table. Contains the table's other keys and whether `=` follows.
     Key { of: Section, given: Vec<String>, is_assigned: bool },
     /// The value of a key.
     Value { of: Section, key: String, is_quoted: bool },
@@ -37,12 +37,12 @@ impl Section {
 }
 
 /// The context at a byte offset. `None` in comments, arrays and unknown tables.
-pub(super) fn place(text: &str, offset: usize) -> Option<CursorContext> {
+pub(super) fn cursor_context(text: &str, offset: usize) -> Option<CursorContext> {
     let before = text.get(..offset)?;
     let line = &before[before.rfind('\n').map_or(0, |at| at + 1)..];
     let trimmed = line.trim_start();
-    let around = Surroundings::of(text, offset);
-    if Scan::of(line).is_comment || around.is_in_array {
+    let around = EnclosingTable::at(text, offset);
+    if LineEndState::after(line).is_comment || around.is_in_array {
         return None;
     }
     if trimmed.starts_with('[') && !trimmed.contains(']') {
@@ -54,46 +54,46 @@ pub(super) fn place(text: &str, offset: usize) -> Option<CursorContext> {
     let after = text[offset..].split('\n').next().unwrap_or_default();
     let mut parts = header.split('.');
     let info = table(parts.next().unwrap_or_default().trim())?;
-    if parts.next().is_none() && info.form == crate::scene::keys::key::Form::Named {
+    if parts.next().is_none() && info.form == crate::scene::keys::key::TableSyntax::Named {
         // `[materials]` followed by `wall = { … }`.
         let (_, braces) = line.split_once('{')?;
         let items = format!("{braces}{after}").replace(',', "\n");
-        return in_table(info, &items, (braces, after), true);
+        return context_in_table(info, &items, (braces, after), true);
     }
-    in_table(info, body, (line, after), false)
+    context_in_table(info, body, (line, after), false)
 }
 
-/// The context in a table. `body` contains the table's lines, or an inline table's items. The tuple is the
-/// text before and after the cursor. `None` in arrays and after complete values.
-fn in_table(
+/// The context in a table. `body` contains the table's lines, or an inline table's items. The tuple contains
+/// the text before and after the cursor. `None` in arrays and after complete values.
+fn context_in_table(
     info: &'static TableInfo,
     body: &str,
     (typed, after): (&str, &str),
     is_inline: bool,
 ) -> Option<CursorContext> {
-    let of = Section { info, kind: kind(info, body) };
+    let of = Section { info, kind: table_type(info, body) };
     let (opened, closed) = (typed.matches('{').count(), typed.matches('}').count());
     if opened > closed {
-        return Some(inner(typed.rsplit('{').next().unwrap_or_default()));
+        return Some(context_in_inline_table(typed.rsplit('{').next().unwrap_or_default()));
     }
     let current = if is_inline { last_item(typed) } else { typed };
     let Some((key, value)) = current.split_once('=') else {
         let is_assigned =
             after.trim_start_matches(|c: char| c.is_alphanumeric() || c == '_').trim_start().starts_with('=');
-        return Some(CursorContext::Key { of, given: given(body, current.trim()), is_assigned });
+        return Some(CursorContext::Key { of, given: keys_present(body, current.trim()), is_assigned });
     };
     let is_whole = !is_in_quotes(value) && value.contains(['"', '\'']);
     let is_open = !(is_whole || value.contains('['));
     is_open.then(|| CursorContext::Value { of, key: key.trim().to_owned(), is_quoted: is_in_quotes(value) })
 }
 
-fn inner(typed: &str) -> CursorContext {
+fn context_in_inline_table(typed: &str) -> CursorContext {
     let current = last_item(typed);
     match current.split_once('=') {
         Some((key, value)) => {
             CursorContext::InnerValue { key: key.trim().to_owned(), is_quoted: is_in_quotes(value) }
         }
-        None => CursorContext::InnerKey { given: given(&typed.replace(',', "\n"), current.trim()) },
+        None => CursorContext::InnerKey { given: keys_present(&typed.replace(',', "\n"), current.trim()) },
     }
 }
 
@@ -113,12 +113,12 @@ fn last_item(typed: &str) -> &str {
 }
 
 fn is_in_quotes(value: &str) -> bool {
-    Scan::of(value).quote.is_some()
+    LineEndState::after(value).quote.is_some()
 }
 
 /// State at the end of a line: open string, comment and brackets.
 #[derive(Clone, Copy, Debug, Default)]
-struct Scan {
+struct LineEndState {
     /// The opening quote, if a string is open.
     quote: Option<char>,
     is_comment: bool,
@@ -126,8 +126,8 @@ struct Scan {
     brackets: i32,
 }
 
-impl Scan {
-    fn of(line: &str) -> Self {
+impl LineEndState {
+    fn after(line: &str) -> Self {
         let mut scan = Self::default();
         let mut is_escaped = false;
         for character in line.chars() {
@@ -152,15 +152,15 @@ impl Scan {
 
 /// The table around a byte offset, and whether the offset is in an array.
 #[derive(Debug, Default)]
-struct Surroundings<'t> {
+struct EnclosingTable<'t> {
     /// The previous header without its brackets, and the lines of its table. `None` before the first header.
     table: Option<(&'t str, &'t str)>,
     /// Whether the line continues an array.
     is_in_array: bool,
 }
 
-impl<'t> Surroundings<'t> {
-    fn of(text: &'t str, offset: usize) -> Self {
+impl<'t> EnclosingTable<'t> {
+    fn at(text: &'t str, offset: usize) -> Self {
         let (mut around, mut header) = (Self::default(), None);
         let (mut at, mut open) = (0, 0);
         for line in text.split_inclusive('\n') {
@@ -175,7 +175,7 @@ impl<'t> Surroundings<'t> {
                 // Stop at the next table.
                 Some(_) if offset < start => break,
                 Some(name) => header = Some((name, end)),
-                None => open = (open + Scan::of(line).brackets).max(0),
+                None => open = (open + LineEndState::after(line).brackets).max(0),
             }
             at = end;
         }
@@ -204,22 +204,22 @@ fn header_name(line: &str) -> Option<&str> {
 }
 
 /// The type from the key `type`, or the default type.
-fn kind(info: &'static TableInfo, body: &str) -> Option<&'static TypeInfo> {
+fn table_type(info: &'static TableInfo, body: &str) -> Option<&'static TypeInfo> {
     let named = body.split(['\n', ',', '{', '}']).find_map(|item| {
         let (key, value) = item.split_once('=')?;
-        (key.trim() == "type").then(|| in_quotes(value)).flatten()
+        (key.trim() == "type").then(|| first_string(value)).flatten()
     });
     info.type_of(named).or_else(|| info.type_of(None))
 }
 
 /// Contents of the first string in a value.
-fn in_quotes(value: &str) -> Option<&str> {
+fn first_string(value: &str) -> Option<&str> {
     let (_, rest) = value.split_once(['"', '\''])?;
     Some(rest.split(['"', '\'']).next().unwrap_or(rest))
 }
 
 /// The keys in `body`, except the key being typed.
-fn given(body: &str, typed: &str) -> Vec<String> {
+fn keys_present(body: &str, typed: &str) -> Vec<String> {
     let keys = body.lines().filter_map(|line| line.split_once('=')).map(|(key, _)| key.trim().to_owned());
     keys.filter(|key| key != typed).collect()
 }
@@ -231,7 +231,7 @@ mod tests {
     /// The context at `|` in the text.
     fn at(text: &str) -> Option<CursorContext> {
         let offset = text.find('|').expect("a cursor");
-        place(&text.replace('|', ""), offset)
+        cursor_context(&text.replace('|', ""), offset)
     }
 
     #[test]

@@ -27,8 +27,8 @@ pub(super) enum Received {
 ///
 /// # Errors
 /// The stream cannot be read, or its framing is lost.
-pub(super) fn read(from: &mut impl BufRead) -> Result<Option<Received>, String> {
-    let Some(length) = length(from)? else { return Ok(None) };
+pub(super) fn read_frame(from: &mut impl BufRead) -> Result<Option<Received>, String> {
+    let Some(length) = read_content_length(from)? else { return Ok(None) };
     if length > MAX_MESSAGE_BYTES {
         return Err(format!("a message of {length} bytes is too long; the limit is {MAX_MESSAGE_BYTES}"));
     }
@@ -38,11 +38,11 @@ pub(super) fn read(from: &mut impl BufRead) -> Result<Option<Received>, String> 
     if (bytes.len() as u64) < length {
         return Err(format!("stdin ended within a message: {} of {length} bytes", bytes.len()));
     }
-    Ok(Some(message(bytes)))
+    Ok(Some(parse_message(bytes)))
 }
 
 /// Reads a header. `None` if the stream ends before it.
-fn length(from: &mut impl BufRead) -> Result<Option<u64>, String> {
+fn read_content_length(from: &mut impl BufRead) -> Result<Option<u64>, String> {
     let mut header = from.by_ref().take(MAX_HEADER_BYTES);
     let mut length = None;
     let mut is_first = true;
@@ -72,34 +72,36 @@ fn length(from: &mut impl BufRead) -> Result<Option<u64>, String> {
 }
 
 /// Parses the contents of a frame.
-fn message(bytes: Vec<u8>) -> Received {
+fn parse_message(bytes: Vec<u8>) -> Received {
     let text = String::from_utf8(bytes).map_err(|_| "the message is not UTF-8".to_owned());
     let json = text.and_then(|text| {
         serde_json::from_str::<Value>(&text)
-            .or_else(|_| serde_json::from_str(&paired(&text)))
+            .or_else(|_| serde_json::from_str(&replace_unpaired_surrogates(&text)))
             .map_err(|error| format!("the message is not JSON: {error}"))
     });
     let json = match json {
         Ok(json) => json,
-        Err(why) => return Received::Invalid(refusal(&Value::Null, ErrorCode::ParseError, &why)),
+        Err(why) => return Received::Invalid(error_response(&Value::Null, ErrorCode::ParseError, &why)),
     };
     let id = json.get("id").filter(|id| id.is_string() || id.is_number()).cloned().unwrap_or_default();
     match serde_json::from_value(json) {
         Ok(message) => Received::Message(message),
-        Err(_) => {
-            Received::Invalid(refusal(&id, ErrorCode::InvalidRequest, "neither a request nor a notification"))
-        }
+        Err(_) => Received::Invalid(error_response(
+            &id,
+            ErrorCode::InvalidRequest,
+            "neither a request nor a notification",
+        )),
     }
 }
 
 /// An error response. `id` is null if it is unknown.
-fn refusal(id: &Value, code: ErrorCode, why: &str) -> Value {
+fn error_response(id: &Value, code: ErrorCode, why: &str) -> Value {
     json!({ "jsonrpc": "2.0", "id": id, "error": { "code": code as i32, "message": why } })
 }
 
 /// Replaces unpaired escaped surrogates with U+FFFD. Editors send unpaired surrogates while a character is
 /// being typed.
-fn paired(text: &str) -> String {
+fn replace_unpaired_surrogates(text: &str) -> String {
     let surrogate = |at: usize| {
         let digits = text.get(at..)?.strip_prefix("\\u")?.get(..4)?;
         u32::from_str_radix(digits, 16).ok().filter(|unit| (0xd800..0xe000).contains(unit))
@@ -140,7 +142,7 @@ impl Client {
     }
 
     /// Sends an error response.
-    pub(super) fn refuse(&self, answer: &Value) {
+    pub(super) fn send_error(&self, answer: &Value) {
         let mut to = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let text = answer.to_string();
         let written: io::Result<()> =
@@ -163,18 +165,21 @@ mod tests {
             (r#""\\ud83d""#, "\\ud83d"),
             (r#""\ud83d\ud83d\ude00é\n""#, "\u{fffd}😀é\n"),
         ] {
-            assert_eq!(serde_json::from_str::<String>(&paired(text)).expect(text), wanted);
+            assert_eq!(
+                serde_json::from_str::<String>(&replace_unpaired_surrogates(text)).expect(text),
+                wanted
+            );
         }
-        assert_eq!(paired("\\"), "\\");
-        assert_eq!(paired("\\u12"), "\\u12");
+        assert_eq!(replace_unpaired_surrogates("\\"), "\\");
+        assert_eq!(replace_unpaired_surrogates("\\u12"), "\\u12");
     }
 
     #[test]
     fn too_long_messages_are_rejected() {
         let mut far = &b"Content-Length: 1000000000000\r\n\r\n{}"[..];
-        assert!(read(&mut far).expect_err("too long").contains("1000000000000 bytes"));
+        assert!(read_frame(&mut far).expect_err("too long").contains("1000000000000 bytes"));
         let mut cut = &b"Content-Length: 500000000\r\n\r\n{}"[..];
-        assert!(read(&mut cut).expect_err("cut").contains("2 of 500000000 bytes"));
-        assert!(read(&mut &b""[..]).expect("the end").is_none());
+        assert!(read_frame(&mut cut).expect_err("cut").contains("2 of 500000000 bytes"));
+        assert!(read_frame(&mut &b""[..]).expect("the end").is_none());
     }
 }

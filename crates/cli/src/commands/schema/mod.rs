@@ -8,11 +8,11 @@ mod value;
 
 use serde_json::{Map, Value, json};
 
-use self::value::{value, written_color};
+use self::value::{color_string_schema, value_schema};
 use crate::args::Draft;
 use crate::console::Console;
 use crate::exit::Exit;
-use crate::scene::keys::key::{Default, Form, KeyInfo, TableInfo, TypeInfo};
+use crate::scene::keys::key::{Default, KeyInfo, TableInfo, TableSyntax, TypeInfo};
 use crate::scene::keys::tables;
 
 /// The file name of the schema.
@@ -23,19 +23,19 @@ pub const LINE: &str = "#:schema glimt.schema.json\n";
 
 /// Prints the schema.
 pub(crate) fn run(draft: Draft, console: &Console) -> Exit {
-    console.text(&text(draft));
+    console.print_text(&schema_text(draft));
     Exit::DONE
 }
 
 /// The schema as formatted text.
-pub fn text(draft: Draft) -> String {
+pub fn schema_text(draft: Draft) -> String {
     format!("{:#}\n", schema(draft))
 }
 
 /// Generates the schema.
 pub fn schema(draft: Draft) -> Value {
     let properties: Map<String, Value> =
-        tables().iter().map(|info| (info.name.to_owned(), in_file(info, draft))).collect();
+        tables().iter().map(|info| (info.name.to_owned(), top_level_key_schema(info, draft))).collect();
     let mut schema = json!({
         "$schema": draft.uri(),
         "title": "glimt scene",
@@ -45,36 +45,38 @@ pub fn schema(draft: Draft) -> Value {
         "required": ["camera"],
         "additionalProperties": false,
     });
-    schema[draft.definitions()] = json!({ "color": written_color() });
+    schema[draft.definitions()] = json!({ "color": color_string_schema() });
     schema
 }
 
 /// The schema of a top-level key: a table, named tables or a list of tables.
-fn in_file(info: &'static TableInfo, draft: Draft) -> Value {
-    let one = table(info, draft);
+fn top_level_key_schema(info: &'static TableInfo, draft: Draft) -> Value {
+    let one = table_schema(info, draft);
     let mut all = match info.form {
-        Form::Single => one,
-        Form::Named => json!({ "type": "object", "additionalProperties": one }),
-        Form::List => json!({ "type": "array", "items": one }),
+        TableSyntax::Single => one,
+        TableSyntax::Named => json!({ "type": "object", "additionalProperties": one }),
+        TableSyntax::List => json!({ "type": "array", "items": one }),
     };
     all["description"] = info.doc.into();
     all
 }
 
-fn table(info: &'static TableInfo, draft: Draft) -> Value {
+fn table_schema(info: &'static TableInfo, draft: Draft) -> Value {
     let mut table = match (info.types.is_empty(), draft) {
-        (true, _) => object(&info.keys.iter().collect::<Vec<_>>(), draft, |key| described(key, draft)),
-        (false, Draft::Four) => of_all_types(info),
-        (false, Draft::Latest) => by_type(info),
+        (true, _) => {
+            object_schema(&info.keys.iter().collect::<Vec<_>>(), draft, |key| key_schema(key, draft))
+        }
+        (false, Draft::Four) => all_types_schema(info),
+        (false, Draft::Latest) => schema_by_type(info),
     };
-    for (name, condition) in conditions(info.name, draft) {
+    for (name, condition) in table_key_conditions(info.name, draft) {
         table[name] = condition;
     }
     table
 }
 
 /// The schema of an object that allows only these keys.
-fn object(keys: &[&'static KeyInfo], draft: Draft, of: impl Fn(&'static KeyInfo) -> Value) -> Value {
+fn object_schema(keys: &[&'static KeyInfo], draft: Draft, of: impl Fn(&'static KeyInfo) -> Value) -> Value {
     let properties: Map<String, Value> = keys.iter().map(|key| (key.name.to_owned(), of(key))).collect();
     let is_required = |key: &&&KeyInfo| matches!(key.default, Default::Required(_)) && !is_conditional(key);
     let required: Vec<&str> = keys.iter().filter(is_required).map(|key| key.name).collect();
@@ -86,14 +88,14 @@ fn object(keys: &[&'static KeyInfo], draft: Draft, of: impl Fn(&'static KeyInfo)
     object
 }
 
-/// Whether a key can be omitted because another key replaces it.
+/// Whether a key can be omitted if another key is present instead.
 fn is_conditional(key: &KeyInfo) -> bool {
     matches!(key.name, "position" | "look_at")
 }
 
 /// The schema of a key's value, with its description and default.
-fn described(key: &KeyInfo, draft: Draft) -> Value {
-    let mut schema = value(key.kind, draft);
+fn key_schema(key: &KeyInfo, draft: Draft) -> Value {
+    let mut schema = value_schema(key.kind, draft);
     schema["description"] = description(key).into();
     if let Default::Is(default) = key.default
         && let Ok(default) = serde_json::from_str(default)
@@ -116,52 +118,53 @@ fn description(key: &KeyInfo) -> String {
 }
 
 /// The schema of a table with types, with one condition per type.
-fn by_type(info: &'static TableInfo) -> Value {
+fn schema_by_type(info: &'static TableInfo) -> Value {
     let draft = Draft::Latest;
     let conditions: Vec<Value> = info
         .types
         .iter()
         .map(|kind| {
-            let mut then =
-                object(&info.keys_of(Some(kind)).collect::<Vec<_>>(), draft, |key| described(key, draft));
+            let mut then = object_schema(&info.keys_of(Some(kind)).collect::<Vec<_>>(), draft, |key| {
+                key_schema(key, draft)
+            });
             then["properties"]["type"] = json!(true);
-            for (name, condition) in of_type(kind.name) {
+            for (name, condition) in type_key_conditions(kind.name) {
                 then[name] = condition;
             }
-            json!({ "if": is_of(info, kind), "then": then })
+            json!({ "if": type_condition(info, kind), "then": then })
         })
         .collect();
-    json!({ "type": "object", "properties": { "type": types(info) }, "allOf": conditions })
+    json!({ "type": "object", "properties": { "type": type_key_schema(info) }, "allOf": conditions })
 }
 
-/// The condition that a table has a type. The key `type` is optional for the default type.
-fn is_of(info: &TableInfo, kind: &TypeInfo) -> Value {
+/// The condition that a table is of a given type. The key `type` is optional for the default type.
+fn type_condition(info: &TableInfo, kind: &TypeInfo) -> Value {
     let is_default = info.types.first().is_some_and(|first| first.name == kind.name);
     let required: &[&str] = if is_default { &[] } else { &["type"] };
     json!({ "properties": { "type": { "enum": [kind.name] } }, "required": required })
 }
 
 /// The schema of the key `type`.
-fn types(info: &TableInfo) -> Value {
+fn type_key_schema(info: &TableInfo) -> Value {
     let names: Vec<&str> = info.types.iter().map(|kind| kind.name).collect();
     let docs: Vec<String> = info.types.iter().map(|kind| format!("`{}`: {}", kind.name, kind.doc)).collect();
     json!({ "type": "string", "enum": names, "default": names.first(), "description": docs.join("\n\n") })
 }
 
 /// The schema of a table that accepts the keys of all types. Dependencies restrict each key to its types.
-fn of_all_types(info: &'static TableInfo) -> Value {
+fn all_types_schema(info: &'static TableInfo) -> Value {
     let draft = Draft::Four;
     let (mut properties, mut dependencies) = (Map::new(), Map::new());
-    properties.insert("type".to_owned(), types(info));
+    properties.insert("type".to_owned(), type_key_schema(info));
     for key in info.keys {
-        properties.insert(key.name.to_owned(), described(key, draft));
+        properties.insert(key.name.to_owned(), key_schema(key, draft));
     }
     let own = || info.types.iter().flat_map(|kind| kind.keys.iter().map(move |key| (kind, key)));
     for (_, key) in own() {
         let of_name: Vec<_> = own().filter(|(_, other)| other.name == key.name).collect();
-        properties.insert(key.name.to_owned(), merged(&of_name));
+        properties.insert(key.name.to_owned(), shared_key_schema(&of_name));
         if of_name.len() < info.types.len() {
-            dependencies.insert(key.name.to_owned(), dependency(info, &of_name));
+            dependencies.insert(key.name.to_owned(), type_dependency(info, &of_name));
         }
     }
     let mut table = json!({ "type": "object", "properties": properties, "additionalProperties": false });
@@ -170,9 +173,9 @@ fn of_all_types(info: &'static TableInfo) -> Value {
 }
 
 /// The schema of a key shared by several types. Accepts the values of any of these types.
-fn merged(keys: &[(&'static TypeInfo, &'static KeyInfo)]) -> Value {
+fn shared_key_schema(keys: &[(&'static TypeInfo, &'static KeyInfo)]) -> Value {
     let draft = Draft::Four;
-    let mut values: Vec<Value> = keys.iter().map(|(_, key)| value(key.kind, draft)).collect();
+    let mut values: Vec<Value> = keys.iter().map(|(_, key)| value_schema(key.kind, draft)).collect();
     values.dedup();
     let mut schema = match values.as_slice() {
         [one] => one.clone(),
@@ -185,7 +188,7 @@ fn merged(keys: &[(&'static TypeInfo, &'static KeyInfo)]) -> Value {
 }
 
 /// The dependency that restricts a key to its types.
-fn dependency(info: &TableInfo, keys: &[(&'static TypeInfo, &'static KeyInfo)]) -> Value {
+fn type_dependency(info: &TableInfo, keys: &[(&'static TypeInfo, &'static KeyInfo)]) -> Value {
     let names: Vec<&str> = keys.iter().map(|(kind, _)| kind.name).collect();
     let has_default = info.types.first().is_some_and(|first| names.contains(&first.name));
     let mut schema = json!({ "properties": { "type": { "enum": names } } });
@@ -196,7 +199,7 @@ fn dependency(info: &TableInfo, keys: &[(&'static TypeInfo, &'static KeyInfo)]) 
 }
 
 /// Conditions on combinations of keys in a table.
-fn conditions(table: &str, draft: Draft) -> Vec<(&'static str, Value)> {
+fn table_key_conditions(table: &str, draft: Draft) -> Vec<(&'static str, Value)> {
     let none_of = |names: &[&str]| {
         let each: Vec<Value> = names.iter().map(|name| json!({ "required": [name] })).collect();
         json!({ "not": { "anyOf": each } })
@@ -215,7 +218,9 @@ fn conditions(table: &str, draft: Draft) -> Vec<(&'static str, Value)> {
             let is_other =
                 json!({ "not": { "properties": { "type": { "enum": ["metal"] } }, "required": ["type"] } });
             let mut any = vec![is_other];
-            any.extend(of_type("metal").into_iter().map(|(name, condition)| json!({ name: condition })));
+            any.extend(
+                type_key_conditions("metal").into_iter().map(|(name, condition)| json!({ name: condition })),
+            );
             vec![("anyOf", any.into())]
         }
         _ => Vec::new(),
@@ -223,7 +228,7 @@ fn conditions(table: &str, draft: Draft) -> Vec<(&'static str, Value)> {
 }
 
 /// Conditions on combinations of keys in a type.
-fn of_type(kind: &str) -> Vec<(&'static str, Value)> {
+fn type_key_conditions(kind: &str) -> Vec<(&'static str, Value)> {
     match kind {
         // Exactly one of three groups.
         "metal" => vec![(

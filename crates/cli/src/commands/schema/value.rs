@@ -11,10 +11,10 @@ use crate::scene::keys::key::ValueKind;
 use crate::scene::keys::limits::Limits;
 
 /// The schema of a value type.
-pub(super) fn value(kind: ValueKind, draft: Draft) -> Value {
+pub(super) fn value_schema(kind: ValueKind, draft: Draft) -> Value {
     match kind {
         ValueKind::Whole(least, most) => json!({ "type": "integer", "minimum": least, "maximum": most }),
-        ValueKind::Number(limits) => number(limits, draft),
+        ValueKind::Number(limits) => number_schema(limits, draft),
         ValueKind::Flag => json!({ "type": "boolean" }),
         ValueKind::Words(list) => {
             let words = list();
@@ -28,27 +28,29 @@ pub(super) fn value(kind: ValueKind, draft: Draft) -> Value {
         }
         // Names must not be numbers, because shapes can also be referenced by number.
         ValueKind::Text => json!({ "type": "string", "pattern": "[^0-9]" }),
-        ValueKind::File(endings) => file(endings),
-        ValueKind::Color(limits) => json!({ "anyOf": colors(limits, draft) }),
-        ValueKind::ColorOrTexture(limits) => any(colors(limits, draft), texture(json!({}))),
+        ValueKind::File(endings) => path_schema(endings),
+        ValueKind::Color(limits) => json!({ "anyOf": color_schemas(limits, draft) }),
+        ValueKind::ColorOrTexture(limits) => any_of(color_schemas(limits, draft), texture_schema(json!({}))),
         ValueKind::Emission(limits) => {
-            let scale = json!({ "anyOf": colors(Limits::AtLeast(0.0), draft) });
-            any(colors(limits, draft), texture(json!({ "scale": scale })))
+            let scale = json!({ "anyOf": color_schemas(Limits::AtLeast(0.0), draft) });
+            any_of(color_schemas(limits, draft), texture_schema(json!({ "scale": scale })))
         }
-        ValueKind::NumberOrTexture(limits) => any(vec![number(limits, draft)], channel()),
-        ValueKind::Numbers(count, _, limits) => numbers(count, limits, draft),
-        ValueKind::Scale(limits) => json!({ "anyOf": [number(limits, draft), numbers(3, limits, draft)] }),
+        ValueKind::NumberOrTexture(limits) => any_of(vec![number_schema(limits, draft)], channel_schema()),
+        ValueKind::Numbers(count, _, limits) => number_array_schema(count, limits, draft),
+        ValueKind::Scale(limits) => {
+            json!({ "anyOf": [number_schema(limits, draft), number_array_schema(3, limits, draft)] })
+        }
         ValueKind::Texture | ValueKind::Material => json!({ "type": "string", "minLength": 1 }),
-        ValueKind::Heights => any(vec![json!({ "type": "string", "minLength": 1 })], channel()),
+        ValueKind::Heights => any_of(vec![json!({ "type": "string", "minLength": 1 })], channel_schema()),
     }
 }
 
-fn any(mut values: Vec<Value>, more: Value) -> Value {
+fn any_of(mut values: Vec<Value>, more: Value) -> Value {
     values.push(more);
     json!({ "anyOf": values })
 }
 
-fn number(limits: Limits, draft: Draft) -> Value {
+fn number_schema(limits: Limits, draft: Draft) -> Value {
     let between = |least: f64, most: f64| json!({ "type": "number", "minimum": least, "maximum": most });
     match limits {
         Limits::Any => between(-LARGEST, LARGEST),
@@ -73,18 +75,18 @@ fn number(limits: Limits, draft: Draft) -> Value {
     }
 }
 
-fn numbers(count: usize, limits: Limits, draft: Draft) -> Value {
-    json!({ "type": "array", "items": number(limits, draft), "minItems": count, "maxItems": count })
+fn number_array_schema(count: usize, limits: Limits, draft: Draft) -> Value {
+    json!({ "type": "array", "items": number_schema(limits, draft), "minItems": count, "maxItems": count })
 }
 
 /// The schemas of a color.
-fn colors(limits: Limits, draft: Draft) -> Vec<Value> {
+fn color_schemas(limits: Limits, draft: Draft) -> Vec<Value> {
     let written = json!({ "$ref": format!("#/{}/color", draft.definitions()) });
-    vec![number(limits, draft), numbers(3, limits, draft), written]
+    vec![number_schema(limits, draft), number_array_schema(3, limits, draft), written]
 }
 
 /// The schema of a color string.
-pub(super) fn written_color() -> Value {
+pub(super) fn color_string_schema() -> Value {
     let mut names: Vec<&str> = color_names().collect();
     names.sort_unstable();
     json!({
@@ -102,7 +104,7 @@ fn color_pattern(names: &[&str]) -> String {
 }
 
 /// The schema of a path with one of these extensions, ignoring case.
-fn file(endings: &[&str]) -> Value {
+fn path_schema(endings: &[&str]) -> Value {
     let in_any_case = |ending: &&str| {
         ending
             .chars()
@@ -123,7 +125,7 @@ fn file(endings: &[&str]) -> Value {
 }
 
 /// The schema of `{ texture = "name" }` with additional keys.
-fn texture(more: Value) -> Value {
+fn texture_schema(more: Value) -> Value {
     let mut properties = more;
     properties["texture"] =
         json!({ "type": "string", "minLength": 1, "description": "The name of a texture." });
@@ -131,8 +133,8 @@ fn texture(more: Value) -> Value {
 }
 
 /// The schema of `{ texture = "name", channel = "r" }`.
-fn channel() -> Value {
+fn channel_schema() -> Value {
     let names: Vec<&str> = Channel::ALL.iter().map(|channel| channel.name()).collect();
     let doc = "The channel to read. The default is luminance, or alpha for opacity.";
-    texture(json!({ "channel": { "type": "string", "enum": names, "description": doc } }))
+    texture_schema(json!({ "channel": { "type": "string", "enum": names, "description": doc } }))
 }

@@ -3,7 +3,7 @@
 use super::json::{Accessor, BufferView};
 use super::{Container, GltfError};
 
-/// Maximum element count of an accessor without a buffer view. All its elements are zero.
+/// Maximum element count of an accessor without a buffer view, whose elements are all zero.
 const MAX_ZEROS: u64 = 1 << 22;
 
 /// Component type.
@@ -39,7 +39,7 @@ impl ComponentType {
     }
 
     /// Decodes a component. Normalized integers are in [0, 1] or [-1, 1] (3.6.2.2).
-    fn number(self, bytes: &[u8], normalized: bool) -> f32 {
+    fn decode_number(self, bytes: &[u8], normalized: bool) -> f32 {
         let word = || [bytes[0], bytes[1]];
         let long = || [bytes[0], bytes[1], bytes[2], bytes[3]];
         let (value, max) = match self {
@@ -65,7 +65,7 @@ impl ComponentType {
 }
 
 /// Number of components of an element type.
-fn components(kind: &str) -> Option<usize> {
+fn component_count(kind: &str) -> Option<usize> {
     match kind {
         "SCALAR" => Some(1),
         "VEC2" => Some(2),
@@ -104,21 +104,22 @@ impl<'a> AccessorReader<'a> {
         let accessor = container.root.accessors.get(number);
         let accessor =
             accessor.ok_or_else(|| GltfError::index("accessors", number, container.root.accessors.len()))?;
-        Self::new(container, accessor).map_err(|wrong| wrong.inside(format!("accessors[{number}]")))
+        Self::new(container, accessor).map_err(|wrong| wrong.add_location(format!("accessors[{number}]")))
     }
 
     fn new(container: &'a Container, accessor: &Accessor) -> Result<Self, GltfError> {
         let component = ComponentType::from_number(accessor.component_type)
             .ok_or_else(|| GltfError::new(format!("unknown component type {}", accessor.component_type)))?;
-        let width = components(&accessor.kind)
-            .ok_or_else(|| GltfError::new(format!("unknown type {:?}", super::shown(&accessor.kind))))?;
+        let width = component_count(&accessor.kind).ok_or_else(|| {
+            GltfError::new(format!("unknown type {:?}", super::truncate_for_message(&accessor.kind)))
+        })?;
         let size = width * component.size();
         if accessor.count > u64::from(u32::MAX) {
             return Err(GltfError::new(format!("too many elements: {}", accessor.count)));
         }
         let count = accessor.count as usize;
         let elements_of_view = match accessor.buffer_view {
-            Some(view) => Some(elements(container, view, accessor.byte_offset, size, count)?),
+            Some(view) => Some(locate_elements(container, view, accessor.byte_offset, size, count)?),
             None if accessor.count <= MAX_ZEROS => None,
             None => {
                 return Err(GltfError::new(too_many_zeros(accessor.count)));
@@ -138,8 +139,13 @@ impl<'a> AccessorReader<'a> {
                 let index_type = index_type.filter(|component| component.index(&[0; 4]).is_some());
                 let index_type =
                     index_type.ok_or_else(|| GltfError::new("sparse indices must be integers"))?;
-                let indices =
-                    elements(container, json.buffer_view, json.byte_offset, index_type.size(), replaced)?;
+                let indices = locate_elements(
+                    container,
+                    json.buffer_view,
+                    json.byte_offset,
+                    index_type.size(),
+                    replaced,
+                )?;
                 let indices: Vec<u32> = (0..replaced)
                     .filter_map(|element| index_type.index(&indices.bytes[element * indices.stride..]))
                     .collect();
@@ -147,7 +153,10 @@ impl<'a> AccessorReader<'a> {
                     return Err(GltfError::new("sparse indices are out of range or not sorted"));
                 }
                 let values = &sparse.values;
-                Some((indices, elements(container, values.buffer_view, values.byte_offset, size, replaced)?))
+                Some((
+                    indices,
+                    locate_elements(container, values.buffer_view, values.byte_offset, size, replaced)?,
+                ))
             }
             None => None,
         };
@@ -162,7 +171,7 @@ impl<'a> AccessorReader<'a> {
     }
 
     /// Bytes of an element. `None` if it is zero.
-    fn element(&self, index: usize) -> Option<&'a [u8]> {
+    fn element_bytes(&self, index: usize) -> Option<&'a [u8]> {
         if let Some((indices, values)) = &self.sparse
             && let Ok(element) = indices.binary_search(&(index as u32))
         {
@@ -172,11 +181,11 @@ impl<'a> AccessorReader<'a> {
     }
 
     /// First `N` components of an element. Missing components are set to `missing`. The element must exist.
-    pub(super) fn floats<const N: usize>(&self, index: usize, missing: f32) -> [f32; N] {
-        let (size, element) = (self.component.size(), self.element(index));
+    pub(super) fn element_floats<const N: usize>(&self, index: usize, missing: f32) -> [f32; N] {
+        let (size, element) = (self.component.size(), self.element_bytes(index));
         std::array::from_fn(|component| match element {
             _ if component >= self.width => missing,
-            Some(bytes) => self.component.number(&bytes[component * size..], self.normalized),
+            Some(bytes) => self.component.decode_number(&bytes[component * size..], self.normalized),
             None => 0.0,
         })
     }
@@ -186,14 +195,14 @@ impl<'a> AccessorReader<'a> {
         self.width == 1 && self.component.index(&[0; 4]).is_some()
     }
 
-    /// Index stored in `element`, which must exist.
+    /// The index stored as element number `element`, which must exist.
     pub(super) fn index(&self, element: usize) -> u32 {
-        self.element(element).and_then(|bytes| self.component.index(bytes)).unwrap_or_default()
+        self.element_bytes(element).and_then(|bytes| self.component.index(bytes)).unwrap_or_default()
     }
 }
 
 /// Locates `count` elements of `size` bytes each in a buffer view.
-fn elements<'a>(
+fn locate_elements<'a>(
     container: &'a Container,
     view: usize,
     offset: u64,
@@ -203,11 +212,11 @@ fn elements<'a>(
     let views = &container.root.buffer_views;
     let place = format!("bufferViews[{view}]");
     let json = views.get(view).ok_or_else(|| GltfError::index("bufferViews", view, views.len()))?;
-    let bytes = view_bytes(container, json).map_err(|wrong| wrong.inside(place.clone()))?;
+    let bytes = view_bytes(container, json).map_err(|wrong| wrong.add_location(place.clone()))?;
     let stride = json.byte_stride.unwrap_or(size as u64);
     if stride < size as u64 || stride > 1 << 16 {
         return Err(GltfError::new(format!("invalid stride of {stride} bytes for elements of {size} bytes"))
-            .inside(place));
+            .add_location(place));
     }
     let stride = stride as usize;
     let needed = if count == 0 { 0 } else { (count as u64 - 1) * stride as u64 + size as u64 };
@@ -224,7 +233,7 @@ pub(super) fn view_bytes<'a>(container: &'a Container, view: &BufferView) -> Res
     let buffer =
         buffers.get(view.buffer).ok_or_else(|| GltfError::index("buffers", view.buffer, buffers.len()))?;
     let end = view.byte_offset.checked_add(view.byte_length).filter(|end| *end <= buffer.len() as u64);
-    let end = end.ok_or_else(|| GltfError::new(beyond_buffer(view, buffer.len())))?;
+    let end = end.ok_or_else(|| GltfError::new(view_exceeds_buffer(view, buffer.len())))?;
     Ok(&buffer[view.byte_offset as usize..end as usize])
 }
 
@@ -238,7 +247,7 @@ pub(super) fn view_too_short(count: usize, offset: u64, needed: u64, view: &str,
 }
 
 /// Error message for a view that extends past its buffer.
-fn beyond_buffer(view: &BufferView, has: usize) -> String {
+fn view_exceeds_buffer(view: &BufferView, has: usize) -> String {
     let BufferView { buffer, byte_offset, byte_length, .. } = view;
     format!("bytes {byte_offset} + {byte_length} exceed buffers[{buffer}], which has {has} bytes")
 }

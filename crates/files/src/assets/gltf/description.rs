@@ -1,4 +1,4 @@
-//! Contents of a glTF file, described with glimt's scene parameters.
+//! Contents of a glTF file in terms of glimt's scene parameters.
 
 use crate::math::{DMat3, DVec3, Vec2};
 
@@ -36,7 +36,7 @@ impl AffineMap {
     pub(super) const IDENTITY: Self = Self { linear: DMat3::IDENTITY, translate: DVec3::ZERO };
 
     /// Composition that applies `inner` first.
-    pub(super) fn after(self, inner: Self) -> Self {
+    pub(super) fn compose(self, inner: Self) -> Self {
         Self { linear: self.linear * inner.linear, translate: self.point(inner.translate) }
     }
 
@@ -88,7 +88,7 @@ pub enum TextureWrap {
     Repeat,
     /// Repeats the edge texels.
     Clamp,
-    /// Repeats the texture, mirroring every other tile.
+    /// Repeats the texture. Every other copy is mirrored.
     Mirror,
 }
 
@@ -134,7 +134,7 @@ pub struct Glass {
     pub tint: DVec3,
 }
 
-/// A material with the parameters of `principled`.
+/// A material, described by the parameters of `principled`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModelMaterial {
     /// Name, possibly empty.
@@ -202,7 +202,7 @@ pub struct ModelLight {
     pub name: String,
     /// Type of the light.
     pub kind: ModelLightKind,
-    /// Intensity in cd, or illuminance in lx for directional lights, for red, green and blue.
+    /// RGB intensity in cd, or RGB illuminance in lx for directional lights.
     pub intensity: DVec3,
     /// Position.
     pub position: DVec3,
@@ -245,9 +245,9 @@ pub struct ModelCamera {
 
 /// Deduplicated notes.
 #[derive(Debug, Default)]
-pub(super) struct Notes(pub(super) Vec<String>);
+pub(super) struct ImportNotes(pub(super) Vec<String>);
 
-impl Notes {
+impl ImportNotes {
     /// Maximum number of notes per file.
     const LIMIT: usize = 200;
 

@@ -155,7 +155,7 @@ pub(super) struct Primitive {
     pub(super) extensions: BTreeMap<String, IgnoredAny>,
 }
 
-/// Primitive mode of separate triangles.
+/// Primitive mode for separate triangles.
 pub(super) const TRIANGLES: u32 = 4;
 
 impl Default for Primitive {
@@ -263,7 +263,7 @@ impl<'de> Deserialize<'de> for Uri {
     }
 }
 
-/// Base64 of data URIs (RFC 4648, section 4). Padding is optional.
+/// Base64 decoder for data URIs (RFC 4648, section 4). Padding is optional.
 const BASE64: GeneralPurpose = GeneralPurpose::new(
     &STANDARD,
     GeneralPurposeConfig::new().with_decode_padding_mode(DecodePaddingMode::Indifferent),
@@ -317,7 +317,7 @@ impl Default for Sampler {
     }
 }
 
-/// OpenGL constants for the wrap modes and the nearest filter.
+/// OpenGL constants for wrap modes and nearest-neighbor filtering.
 pub(super) const REPEAT: u32 = 10497;
 pub(super) const CLAMP: u32 = 33071;
 pub(super) const MIRROR: u32 = 33648;
@@ -374,7 +374,7 @@ pub(super) struct JsonMaterial {
     pub(super) alpha_cutoff: f64,
     pub(super) double_sided: bool,
     #[serde(deserialize_with = "material_extensions")]
-    pub(super) extensions: Extensions,
+    pub(super) extensions: MaterialExtensions,
 }
 
 impl Default for JsonMaterial {
@@ -388,7 +388,7 @@ impl Default for JsonMaterial {
             alpha_mode: "OPAQUE".to_owned(),
             alpha_cutoff: 0.5,
             double_sided: false,
-            extensions: Extensions::default(),
+            extensions: MaterialExtensions::default(),
         }
     }
 }
@@ -417,7 +417,7 @@ impl Default for Pbr {
 
 /// Material extensions: the supported ones, and the names of all others.
 #[derive(Debug, Default)]
-pub(super) struct Extensions {
+pub(super) struct MaterialExtensions {
     pub(super) ior: Option<Ior>,
     pub(super) transmission: Option<Transmission>,
     pub(super) volume: Option<Volume>,
@@ -429,17 +429,17 @@ pub(super) struct Extensions {
     pub(super) others: Vec<String>,
 }
 
-fn material_extensions<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Extensions, D::Error> {
+fn material_extensions<'de, D: Deserializer<'de>>(deserializer: D) -> Result<MaterialExtensions, D::Error> {
     struct ExtensionsVisitor;
     impl<'de> Visitor<'de> for ExtensionsVisitor {
-        type Value = Extensions;
+        type Value = MaterialExtensions;
 
         fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
             f.write_str("a table of extensions")
         }
 
-        fn visit_map<A: de::MapAccess<'de>>(self, mut map: A) -> Result<Extensions, A::Error> {
-            let mut all = Extensions::default();
+        fn visit_map<A: de::MapAccess<'de>>(self, mut map: A) -> Result<MaterialExtensions, A::Error> {
+            let mut all = MaterialExtensions::default();
             while let Some(name) = map.next_key::<String>()? {
                 match name.as_str() {
                     "KHR_materials_ior" => all.ior = Some(map.next_value()?),

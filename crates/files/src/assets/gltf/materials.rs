@@ -1,7 +1,7 @@
 //! Converts glTF materials to `principled` and `glass` parameters (glTF 2.0, 3.9, and the extensions
 //! `KHR_materials_*`).
 
-use super::description::{Alpha, Glass, ModelMaterial, Notes, TextureRef, TextureWrap, TexturedValue};
+use super::description::{Alpha, Glass, ImportNotes, ModelMaterial, TextureRef, TextureWrap, TexturedValue};
 use super::json::{
     CLAMP, InfoExtensions, JsonMaterial, MIRROR, NEAREST, REPEAT, TextureInfo, TextureTransform,
 };
@@ -10,7 +10,7 @@ use crate::math::{DVec3, Vec2};
 
 impl JsonMaterial {
     /// Textures that glimt uses.
-    fn textures(&self) -> Vec<&TextureInfo> {
+    fn supported_textures(&self) -> Vec<&TextureInfo> {
         let (pbr, extensions) = (&self.pbr_metallic_roughness, &self.extensions);
         let base = [
             &pbr.base_color_texture,
@@ -36,13 +36,13 @@ impl JsonMaterial {
 
     /// Texture coordinate sets of all textures, starting with the base color.
     pub(super) fn coordinate_sets(&self) -> Vec<usize> {
-        self.textures().into_iter().map(TextureInfo::set).collect()
+        self.supported_textures().into_iter().map(TextureInfo::coordinate_set).collect()
     }
 }
 
 impl TextureInfo {
     /// Index of the texture coordinate set.
-    fn set(&self) -> usize {
+    fn coordinate_set(&self) -> usize {
         let InfoExtensions { transform } = &self.extensions;
         transform.as_ref().and_then(|transform| transform.tex_coord).unwrap_or(self.tex_coord)
     }
@@ -60,19 +60,19 @@ const UNSUPPORTED: [(&str, &str); 6] = [
 
 /// Note about an unknown extension.
 pub(super) fn extension_ignored(name: &str) -> String {
-    format!("extension {} is ignored", super::shown(name))
+    format!("extension {} is ignored", super::truncate_for_message(name))
 }
 
 /// Converts a material. Adds notes about features without an equivalent.
-pub(super) fn material(
+pub(super) fn convert_material(
     container: &Container,
     number: usize,
     sets: [usize; 2],
-    notes: &mut Notes,
+    notes: &mut ImportNotes,
 ) -> Result<ModelMaterial, GltfError> {
     let json = &container.root.materials[number];
     let mut reader = MaterialReader { container, place: format!("materials[{number}]"), sets, notes };
-    reader.material(json).map_err(|wrong| wrong.inside(format!("materials[{number}]")))
+    reader.convert_material(json).map_err(|wrong| wrong.add_location(format!("materials[{number}]")))
 }
 
 struct MaterialReader<'a> {
@@ -80,7 +80,7 @@ struct MaterialReader<'a> {
     place: String,
     /// Texture coordinate sets of the mesh.
     sets: [usize; 2],
-    notes: &'a mut Notes,
+    notes: &'a mut ImportNotes,
 }
 
 impl MaterialReader<'_> {
@@ -88,7 +88,7 @@ impl MaterialReader<'_> {
         self.notes.add(&self.place, what);
     }
 
-    fn material(&mut self, json: &JsonMaterial) -> Result<ModelMaterial, GltfError> {
+    fn convert_material(&mut self, json: &JsonMaterial) -> Result<ModelMaterial, GltfError> {
         let (pbr, extensions) = (&json.pbr_metallic_roughness, &json.extensions);
         let mut material = ModelMaterial::named(&json.name);
         // Convert the core parameters.
@@ -101,7 +101,7 @@ impl MaterialReader<'_> {
             let [red, green, blue, alpha] = old.diffuse_factor;
             base = (DVec3::new(red, green, blue), alpha, &old.diffuse_texture);
             material.metallic = TexturedValue::number(0.0);
-            material.roughness = TexturedValue::number(1.0 - unit(old.glossiness_factor));
+            material.roughness = TexturedValue::number(1.0 - clamp_to_unit(old.glossiness_factor));
         }
         let (color, alpha, texture) = base;
         material.color = self.slot(color, texture)?;
@@ -109,7 +109,7 @@ impl MaterialReader<'_> {
         material.is_two_sided = json.double_sided;
         if let Some(map) = &json.normal_texture {
             material.normal_strength = map.scale.max(0.0);
-            material.normal = self.texture(map)?;
+            material.normal = self.convert_texture(map)?;
         }
         let strength =
             extensions.emissive_strength.as_ref().map_or(1.0, |extension| extension.emissive_strength);
@@ -119,7 +119,8 @@ impl MaterialReader<'_> {
         }
         // Convert the extensions.
         if let Some(ior) = &extensions.ior {
-            // Converted specular-glossiness materials use an index of 0 for full reflection.
+            // Converted specular-glossiness materials have an index of refraction of 0, which means full
+            // reflection.
             if ior.ior == 0.0 {
                 self.note("an index of refraction of 0 (full reflection) is replaced by 10");
             }
@@ -145,7 +146,8 @@ impl MaterialReader<'_> {
         if let Some(volume) = extensions.volume.as_ref().filter(|volume| volume.thickness_factor > 0.0)
             && material.transmission.factor.x > 0.0
         {
-            material.glass = self.glass(&material, volume.attenuation_color, volume.attenuation_distance);
+            material.glass =
+                self.solid_glass(&material, volume.attenuation_color, volume.attenuation_distance);
         }
         if extensions.unlit {
             self.note("unlit: the color is emitted, which also lights other surfaces");
@@ -165,7 +167,12 @@ impl MaterialReader<'_> {
     }
 
     /// Solid glass. The attenuation color becomes the transmittance per unit of distance.
-    fn glass(&mut self, material: &ModelMaterial, color: [f64; 3], distance: Option<f64>) -> Option<Glass> {
+    fn solid_glass(
+        &mut self,
+        material: &ModelMaterial,
+        color: [f64; 3],
+        distance: Option<f64>,
+    ) -> Option<Glass> {
         if material.transmission.texture.is_some() || material.transmission.factor.x < 0.5 {
             self.note("the volume is ignored because the material does not transmit everywhere");
             return None;
@@ -175,30 +182,32 @@ impl MaterialReader<'_> {
         }
         let distance = distance.filter(|distance| *distance > 0.0 && distance.is_finite());
         let transmittance =
-            |part: f64| distance.map_or(1.0, |distance| libm::pow(unit(part), 1.0 / distance));
+            |part: f64| distance.map_or(1.0, |distance| libm::pow(clamp_to_unit(part), 1.0 / distance));
         Some(Glass { tint: DVec3::from(color.map(transmittance)) })
     }
 
     fn alpha(&mut self, json: &JsonMaterial, alpha: f64, color: &TexturedValue) -> Result<Alpha, GltfError> {
         let texture = match &color.texture {
-            Some(texture) if self.has_alpha(texture.image) => color.texture.clone(),
+            Some(texture) if self.may_have_alpha(texture.image) => color.texture.clone(),
             Some(_) | None => None,
         };
-        let value = TexturedValue { factor: DVec3::splat(unit(alpha)), texture };
+        let value = TexturedValue { factor: DVec3::splat(clamp_to_unit(alpha)), texture };
         match json.alpha_mode.as_str() {
             "OPAQUE" => Ok(Alpha::Opaque),
             "MASK" if json.alpha_cutoff > 1.0 => {
                 self.note("an alpha cutoff above 1 makes the surface invisible");
                 Ok(Alpha::Blend(TexturedValue::number(0.0)))
             }
-            "MASK" => Ok(Alpha::Mask { value, cutoff: unit(json.alpha_cutoff) }),
+            "MASK" => Ok(Alpha::Mask { value, cutoff: clamp_to_unit(json.alpha_cutoff) }),
             "BLEND" => Ok(Alpha::Blend(value)),
-            other => Err(GltfError::new(format!("unknown alpha mode {:?}", super::shown(other)))),
+            other => {
+                Err(GltfError::new(format!("unknown alpha mode {:?}", super::truncate_for_message(other))))
+            }
         }
     }
 
     /// Whether an image may have alpha. Only the first bytes of PNG and JPEG files are checked.
-    fn has_alpha(&self, image: usize) -> bool {
+    fn may_have_alpha(&self, image: usize) -> bool {
         const COLOR_TYPE: usize = 25;
         match self.container.image(image) {
             Ok(ImageBytes::Inside(bytes)) if bytes.starts_with(b"\xff\xd8") => false,
@@ -217,21 +226,21 @@ impl MaterialReader<'_> {
     }
 
     fn number(&mut self, factor: f64, texture: &Option<TextureInfo>) -> Result<TexturedValue, GltfError> {
-        self.slot(DVec3::splat(unit(factor)), texture)
+        self.slot(DVec3::splat(clamp_to_unit(factor)), texture)
     }
 
     fn slot(&mut self, factor: DVec3, texture: &Option<TextureInfo>) -> Result<TexturedValue, GltfError> {
         let finite = |part: f64| if part.is_finite() { part.clamp(0.0, 1e18) } else { 0.0 };
         let factor = DVec3::from(factor.to_array().map(finite));
         let texture = match texture {
-            Some(info) if factor != DVec3::ZERO => self.texture(info)?,
+            Some(info) if factor != DVec3::ZERO => self.convert_texture(info)?,
             Some(_) | None => None,
         };
         Ok(TexturedValue { factor, texture })
     }
 
     /// Converts a texture reference. Adds notes about unsupported features.
-    fn texture(&mut self, info: &TextureInfo) -> Result<Option<TextureRef>, GltfError> {
+    fn convert_texture(&mut self, info: &TextureInfo) -> Result<Option<TextureRef>, GltfError> {
         let root = &self.container.root;
         let texture = root.textures.get(info.index);
         let texture = texture.ok_or_else(|| GltfError::index("textures", info.index, root.textures.len()))?;
@@ -245,9 +254,9 @@ impl MaterialReader<'_> {
         };
         if image >= root.images.len() {
             return Err(GltfError::index("images", image, root.images.len())
-                .inside(format!("textures[{}]", info.index)));
+                .add_location(format!("textures[{}]", info.index)));
         }
-        let set = self.sets.iter().position(|used| *used == info.set());
+        let set = self.sets.iter().position(|used| *used == info.coordinate_set());
         if set.is_none() {
             self.note("a texture uses the wrong coordinates: only two coordinate sets are supported");
         }
@@ -309,7 +318,7 @@ impl UvTransform {
 }
 
 /// Clamps to [0, 1]. NaN becomes 0.
-fn unit(number: f64) -> f64 {
+fn clamp_to_unit(number: f64) -> f64 {
     if number.is_finite() { number.clamp(0.0, 1.0) } else { 0.0 }
 }
 

@@ -11,7 +11,7 @@ use crate::geometry::mesh::TriangleMesh;
 use crate::math::Vec3;
 use crate::math::origin::origin_near;
 
-/// Maximum number of triangles, counting every instance.
+/// Maximum number of triangles, summed over all instances.
 const MAX_TRIANGLES: usize = 1 << 25;
 
 impl Container {
@@ -32,7 +32,7 @@ impl Container {
         merged.material_warnings = self.material_warnings(&scene);
         merged.warnings = scene.notes;
         merged.materials = scene.materials.iter().map(file_material).collect();
-        // Add all instances. Each attribute is present for all vertices or none.
+        // Add all instances. The merged mesh has each attribute for either all vertices or none.
         let mut parts: HashMap<usize, TriangleMesh> = HashMap::new();
         for instance in &scene.instances {
             let part = match parts.entry(instance.part) {
@@ -50,7 +50,7 @@ impl Container {
                     "more than {MAX_TRIANGLES} triangles including instances; use `glimt import` to keep the instances"
                 ))));
             }
-            append(&mut merged.mesh, part, &instance.placed, instance.material as u32);
+            append_part(&mut merged.mesh, part, &instance.placed, instance.material as u32);
             token.check()?;
         }
         Ok(merged)
@@ -68,19 +68,33 @@ impl Container {
 }
 
 /// Appends a transformed part.
-fn append(merged: &mut TriangleMesh, part: &TriangleMesh, placed: &AffineMap, material: u32) {
+fn append_part(merged: &mut TriangleMesh, part: &TriangleMesh, placed: &AffineMap, material: u32) {
     let first = merged.positions.len() as u32;
     let positions = part.positions.iter().map(|at| at.as_dvec3() + part.origin);
     merged.positions.extend(positions.map(|at| (placed.point(at) - merged.origin).as_vec3()));
-    // Fill in attributes that only some parts have.
-    fill(&mut merged.normals, first, &part.normals, part.positions.len(), Vec3::ZERO, |normal| {
+    // Fill in attributes that this part or earlier parts lack.
+    append_attribute(&mut merged.normals, first, &part.normals, part.positions.len(), Vec3::ZERO, |normal| {
         let transformed = placed.linear.inverse().transpose() * normal.as_dvec3();
         transformed.normalize_or_zero().as_vec3()
     });
-    fill(&mut merged.uvs, first, &part.uvs, part.positions.len(), crate::math::Vec2::ZERO, |uv| uv);
+    append_attribute(
+        &mut merged.uvs,
+        first,
+        &part.uvs,
+        part.positions.len(),
+        crate::math::Vec2::ZERO,
+        |uv| uv,
+    );
     let second = &part.second_uvs;
-    fill(&mut merged.second_uvs, first, second, part.positions.len(), crate::math::Vec2::ZERO, |uv| uv);
-    fill(&mut merged.colors, first, &part.colors, part.positions.len(), [255; 3], |color| color);
+    append_attribute(
+        &mut merged.second_uvs,
+        first,
+        second,
+        part.positions.len(),
+        crate::math::Vec2::ZERO,
+        |uv| uv,
+    );
+    append_attribute(&mut merged.colors, first, &part.colors, part.positions.len(), [255; 3], |color| color);
     // Swap two corners in mirrored parts to keep their orientation.
     let is_mirrored = placed.linear.determinant() < 0.0;
     let oriented = |[a, b, c]: [u32; 3]| if is_mirrored { [a, c, b] } else { [a, b, c] };
@@ -91,7 +105,14 @@ fn append(merged: &mut TriangleMesh, part: &TriangleMesh, placed: &AffineMap, ma
 }
 
 /// Appends vertex attributes. The list stays empty until a part has the attribute.
-fn fill<T: Copy>(all: &mut Vec<T>, first: u32, more: &[T], count: usize, missing: T, map: impl Fn(T) -> T) {
+fn append_attribute<T: Copy>(
+    all: &mut Vec<T>,
+    first: u32,
+    more: &[T],
+    count: usize,
+    missing: T,
+    map: impl Fn(T) -> T,
+) {
     if all.is_empty() && more.is_empty() {
         return;
     }

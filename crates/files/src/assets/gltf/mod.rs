@@ -4,10 +4,10 @@
 //!
 //! `serde_json` parses the JSON into the types of `json`; `base64` decodes data URIs. The crate `gltf` 1.4 is
 //! not used. Without validation, it panics on out-of-range indices; with validation, it rejects every
-//! required extension it does not know. Its types alone (`gltf-json`) would replace only the simple half of
-//! `json`. Clear coats, WebP and Basis images and instancing would still have to be parsed from raw values,
-//! errors in flattened extensions would lose their line numbers, and the text of data URIs would stay in
-//! memory.
+//! required extension it does not know. Its types alone (`gltf-json`) would only replace the simple half of
+//! `json`: clear coats, WebP images, Basis images and instancing would still have to be parsed from raw
+//! values. In addition, errors in flattened extensions would lose their line numbers, and data URIs would
+//! stay in memory as text.
 
 mod accessor;
 mod description;
@@ -63,13 +63,13 @@ pub fn referenced_files(path: &Path) -> Result<Vec<PathBuf>, AssetError> {
     let text = bytes.get(before..).unwrap_or_default();
     let root: Root = serde_json::from_slice(text.strip_prefix(BOM).unwrap_or(text))
         .map_err(|error| AssetError::malformed(path, Some(error.line()), "not a glTF file"))?;
-    let mut files = paths_of(path, root.buffers.iter().map(|buffer| &buffer.uri));
-    files.extend(paths_of(path, root.images.iter().map(|image| &image.uri)));
+    let mut files = uri_paths(path, root.buffers.iter().map(|buffer| &buffer.uri));
+    files.extend(uri_paths(path, root.images.iter().map(|image| &image.uri)));
     Ok(files)
 }
 
 /// Paths of the files referenced by URIs.
-fn paths_of<'u>(path: &Path, uris: impl Iterator<Item = &'u Option<Uri>>) -> Vec<PathBuf> {
+fn uri_paths<'u>(path: &Path, uris: impl Iterator<Item = &'u Option<Uri>>) -> Vec<PathBuf> {
     let file = |uri: &Option<Uri>| match uri {
         Some(Uri::File(uri)) => resolve_uri(path, uri).ok(),
         Some(Uri::Data(_)) | None => None,
@@ -77,7 +77,7 @@ fn paths_of<'u>(path: &Path, uris: impl Iterator<Item = &'u Option<Uri>>) -> Vec
     uris.filter_map(file).collect()
 }
 
-/// An error in a file: location in the JSON, and reason.
+/// An error in a file: its location in the JSON, and the reason.
 #[derive(Debug)]
 struct GltfError(String);
 
@@ -92,13 +92,13 @@ impl GltfError {
     }
 
     /// Adds the enclosing location.
-    fn inside(self, place: impl Into<String>) -> Self {
+    fn add_location(self, place: impl Into<String>) -> Self {
         Self(format!("{}: {}", place.into(), self.0))
     }
 }
 
 /// Truncates a string from the file for a message.
-fn shown(text: &str) -> String {
+fn truncate_for_message(text: &str) -> String {
     text.chars().take(60).collect()
 }
 
@@ -112,7 +112,7 @@ pub struct Container {
     companions: Vec<Companion>,
     hash: FileHash,
     /// For each part, the first part with the same mesh. Only this first part is built.
-    built_as: Vec<usize>,
+    first_part_with_same_mesh: Vec<usize>,
 }
 
 /// Location of an image's bytes.
@@ -136,7 +136,7 @@ impl Container {
         let (length, hash) = (bytes.len(), read::hash(&bytes));
         let wrong = |wrong: GltfError| AssetError::malformed(path, None, wrong.0);
         let (json, binary) =
-            if bytes.starts_with(b"glTF") { chunks(&bytes).map_err(wrong)? } else { (0..length, None) };
+            if bytes.starts_with(b"glTF") { glb_chunks(&bytes).map_err(wrong)? } else { (0..length, None) };
         // Parse the JSON.
         let text = &bytes[json];
         if text.len() > JSON_LIMIT {
@@ -157,7 +157,7 @@ impl Container {
             return Err(AssetError::malformed(path, None, reason));
         }
         let mut root: Root = serde_json::from_slice(text).map_err(|error| {
-            if let Some(version) = old_version(text) {
+            if let Some(version) = pre_2_0_version(text) {
                 return wrong(GltfError::new(unsupported_version(&version)));
             }
             let what = error.to_string();
@@ -165,11 +165,11 @@ impl Container {
             AssetError::malformed(
                 path,
                 Some(error.line()),
-                format!("column {}: {}", error.column(), shown_long(&what)),
+                format!("column {}: {}", error.column(), truncate_parser_message(&what)),
             )
         })?;
         check_version(&root).map_err(wrong)?;
-        check_required(&root).map_err(wrong)?;
+        check_required_extensions(&root).map_err(wrong)?;
         // Extract the binary chunk, then read the buffers.
         let binary = binary.map(|range| {
             let mut bytes = bytes;
@@ -177,10 +177,16 @@ impl Container {
             bytes.drain(..range.start);
             bytes
         });
-        let (buffers, companions) = buffers(path, &mut root, binary, monitor)?;
-        let mut container =
-            Self { path: path.to_owned(), hash, root, buffers, companions, built_as: Vec::new() };
-        container.built_as = container.shared_parts().map_err(wrong)?;
+        let (buffers, companions) = read_buffers(path, &mut root, binary, monitor)?;
+        let mut container = Self {
+            path: path.to_owned(),
+            hash,
+            root,
+            buffers,
+            companions,
+            first_part_with_same_mesh: Vec::new(),
+        };
+        container.first_part_with_same_mesh = container.shared_parts().map_err(wrong)?;
         monitor.tick(2 * length, 2 * length)?;
         Ok(container)
     }
@@ -202,7 +208,7 @@ impl Container {
 
     /// Image files referenced by the file, used or not.
     pub fn pictures(&self) -> Vec<PathBuf> {
-        paths_of(&self.path, self.root.images.iter().map(|image| &image.uri))
+        uri_paths(&self.path, self.root.images.iter().map(|image| &image.uri))
     }
 
     /// Locates an image's bytes.
@@ -210,7 +216,7 @@ impl Container {
     /// # Errors
     /// The image does not exist, or its bytes are out of range.
     pub fn image(&self, number: usize) -> Result<ImageBytes<'_>, AssetError> {
-        self.image_bytes(number).map_err(|wrong| self.wrong(wrong.inside(format!("images[{number}]"))))
+        self.image_bytes(number).map_err(|wrong| self.wrong(wrong.add_location(format!("images[{number}]"))))
     }
 
     /// An image's bytes, read from a separate file if necessary.
@@ -247,29 +253,29 @@ impl Container {
     }
 
     /// First part with the same mesh as `part`. It is built instead of `part`.
-    pub(super) fn built_as(&self, part: usize) -> usize {
-        self.built_as.get(part).copied().unwrap_or(part)
+    pub(super) fn first_part_with_same_mesh(&self, part: usize) -> usize {
+        self.first_part_with_same_mesh.get(part).copied().unwrap_or(part)
     }
 
-    /// For each part, finds the first part with the same mesh. Rejects files that reuse buffer bytes in so
-    /// many meshes that these would take many times the file's size in memory.
+    /// For each part, finds the first part with the same mesh. Rejects files that reuse the same buffer bytes
+    /// in many meshes if the meshes would take many times the file's size in memory.
     fn shared_parts(&self) -> Result<Vec<usize>, GltfError> {
         /// Number of corners allowed regardless of the buffer size.
         const FREE: u64 = 1 << 20;
         let mut first = HashMap::new();
-        let mut built_as = Vec::new();
+        let mut first_part_with_same_mesh = Vec::new();
         let mut corners: u64 = 0;
         for primitive in self.root.meshes.iter().flat_map(|mesh| &mesh.primitives) {
-            let part = built_as.len();
+            let part = first_part_with_same_mesh.len();
             let is_compressed = primitive.extensions.contains_key(DRACO);
             let sets = self.coordinate_sets(primitive);
             let mesh = (primitive.indices, primitive.mode, is_compressed, sets, &primitive.attributes);
             let first = *first.entry(mesh).or_insert(part);
-            built_as.push(first);
+            first_part_with_same_mesh.push(first);
             if first == part {
                 let list = primitive.indices.or_else(|| primitive.attributes.get("POSITION").copied());
                 let count = list.and_then(|list| self.root.accessors.get(list)).map_or(0, |list| list.count);
-                corners = corners.saturating_add(primitive.corners_built(count));
+                corners = corners.saturating_add(primitive.triangle_corner_count(count));
             }
         }
         let bytes: u64 = self.buffers.iter().map(|buffer| buffer.len() as u64).sum();
@@ -277,18 +283,18 @@ impl Container {
         if corners > limit {
             return Err(GltfError::new(too_many_corners(corners, bytes, limit)));
         }
-        Ok(built_as)
+        Ok(first_part_with_same_mesh)
     }
 
     /// Adds the image's index and this file's path to an image error.
-    fn about_image(&self, number: usize, error: AssetError) -> AssetError {
+    fn add_image_context(&self, number: usize, error: AssetError) -> AssetError {
         let place = format!("images[{number}]");
         match error {
             AssetError::Malformed { path, reason, .. } if path == self.path => {
-                self.wrong(GltfError::new(reason).inside(place))
+                self.wrong(GltfError::new(reason).add_location(place))
             }
             error @ (AssetError::Malformed { .. } | AssetError::Unreadable { .. }) => {
-                self.wrong(GltfError::new(error.to_string()).inside(place))
+                self.wrong(GltfError::new(error.to_string()).add_location(place))
             }
             other @ (AssetError::OutOfMemory { .. } | AssetError::Cancelled(_)) => other,
         }
@@ -307,7 +313,7 @@ impl Container {
                 image::size_embedded(image, encoding, limits, token)
             }
         };
-        size.map(drop).map_err(|error| self.about_image(number, error))
+        size.map(drop).map_err(|error| self.add_image_context(number, error))
     }
 
     /// Checks that an image can be decoded.
@@ -323,7 +329,7 @@ impl Container {
                 image::load_embedded(image, encoding, limits, &ignore_progress, token)
             }
         };
-        texels.map(drop).map_err(|error| self.about_image(number, error))
+        texels.map(drop).map_err(|error| self.add_image_context(number, error))
     }
 }
 
@@ -338,7 +344,7 @@ const EMPTY_FILE: &str = "the file is empty";
 const NEITHER_GLB_NOR_JSON: &str = "not a glTF file: neither GLB nor a JSON object";
 
 fn unsupported_version(version: &str) -> String {
-    format!("glTF {} is not supported; version 2 is required", shown(version))
+    format!("glTF {} is not supported; version 2 is required", truncate_for_message(version))
 }
 
 fn unsupported_glb(version: u32) -> String {
@@ -350,16 +356,19 @@ fn newer_version(required: &str) -> String {
 }
 
 fn invalid_version(text: &str) -> String {
-    format!("asset.minVersion is not a version: {:?}", shown(text))
+    format!("asset.minVersion is not a version: {:?}", truncate_for_message(text))
 }
 
 /// Error message for a file whose meshes or images need an unsupported extension.
-fn unsupported(extension: &str, help: &str) -> String {
+fn unsupported_extension(extension: &str, help: &str) -> String {
     format!("{extension} is not supported; {help}")
 }
 
 fn unknown_required(extension: &str) -> String {
-    format!("the required extension {} is not supported (extensionsRequired)", shown(extension))
+    format!(
+        "the required extension {} is not supported (extensionsRequired)",
+        truncate_for_message(extension)
+    )
 }
 
 fn short_buffer(claimed: u64, has: usize) -> String {
@@ -371,7 +380,7 @@ fn missing_buffer(reason: &str, number: usize, name: &str) -> String {
 }
 
 fn not_relative(uri: &str) -> String {
-    format!("{:?} is not a relative URI", shown(uri))
+    format!("{:?} is not a relative URI", truncate_for_message(uri))
 }
 
 /// An unsupported mesh compression extension.
@@ -379,7 +388,7 @@ const DRACO: &str = "KHR_draco_mesh_compression";
 
 /// Version of a file older than glTF 2.0. `None` for other files. The older JSON has objects instead of
 /// arrays.
-fn old_version(text: &[u8]) -> Option<String> {
+fn pre_2_0_version(text: &[u8]) -> Option<String> {
     #[derive(serde::Deserialize)]
     struct Old {
         asset: json::JsonAsset,
@@ -409,14 +418,14 @@ fn with_json_terms(message: &str) -> String {
 }
 
 /// Truncates long parser messages.
-fn shown_long(text: &str) -> String {
+fn truncate_parser_message(text: &str) -> String {
     text.chars().take(200).collect()
 }
 
 type Range = std::ops::Range<usize>;
 
 /// Byte ranges of the JSON and the binary chunk of a GLB file (4.4).
-fn chunks(bytes: &[u8]) -> Result<(Range, Option<Range>), GltfError> {
+fn glb_chunks(bytes: &[u8]) -> Result<(Range, Option<Range>), GltfError> {
     const JSON: u32 = 0x4e4f_534a;
     const BINARY: u32 = 0x004e_4942;
     let word = |at: usize| bytes.get(at..at + 4)?.first_chunk().copied().map(u32::from_le_bytes);
@@ -514,10 +523,10 @@ const KNOWN: [&str; 21] = [
 ];
 
 /// Rejects files that require unsupported extensions (3.12).
-fn check_required(root: &Root) -> Result<(), GltfError> {
+fn check_required_extensions(root: &Root) -> Result<(), GltfError> {
     for name in &root.extensions_required {
         if let Some((_, help)) = MISSING.iter().find(|(known, _)| known == name) {
-            return Err(GltfError::new(unsupported(name, help)));
+            return Err(GltfError::new(unsupported_extension(name, help)));
         }
         if !KNOWN.contains(&name.as_str()) {
             return Err(GltfError::new(unknown_required(name)));
@@ -527,7 +536,7 @@ fn check_required(root: &Root) -> Result<(), GltfError> {
 }
 
 /// Reads all buffers, and lists the buffer files.
-fn buffers(
+fn read_buffers(
     path: &Path,
     root: &mut Root,
     mut binary: Option<Vec<u8>>,
@@ -536,7 +545,7 @@ fn buffers(
     let (mut all, mut files, mut total) = (Vec::new(), Vec::new(), 0);
     for (number, buffer) in root.buffers.iter_mut().enumerate() {
         let wrong = |wrong: GltfError| {
-            AssetError::malformed(path, None, wrong.inside(format!("buffers[{number}]")).0)
+            AssetError::malformed(path, None, wrong.add_location(format!("buffers[{number}]")).0)
         };
         let bytes = match buffer.uri.take() {
             Some(Uri::Data(bytes)) => bytes,
@@ -595,7 +604,7 @@ fn resolve_uri(path: &Path, uri: &str) -> Result<PathBuf, GltfError> {
         }
     }
     let name = String::from_utf8(bytes)
-        .map_err(|_| GltfError::new(format!("{:?} is not a valid file name", shown(uri))))?;
+        .map_err(|_| GltfError::new(format!("{:?} is not a valid file name", truncate_for_message(uri))))?;
     if name.contains('\0') {
         return Err(GltfError::new("a file name contains a zero byte"));
     }

@@ -5,21 +5,21 @@ use std::collections::hash_map::Entry;
 
 use super::accessor::AccessorReader;
 use super::description::{
-    AffineMap, Alpha, ModelCamera, ModelInstance, ModelLight, ModelLightKind, ModelMaterial, ModelScene,
-    Notes,
+    AffineMap, Alpha, ImportNotes, ModelCamera, ModelInstance, ModelLight, ModelLightKind, ModelMaterial,
+    ModelScene,
 };
 use super::json::{JsonCamera, JsonLight, JsonNode, Primitive};
-use super::materials::material;
+use super::materials::convert_material;
 use super::{Container, GltfError};
 use crate::assets::AssetError;
 use crate::control::{CancelToken, ignore_progress};
 use crate::geometry::mesh::TriangleMesh;
 use crate::math::{DMat3, DVec3};
 
-/// Maximum number of vertices, counting every instance, for computing exact bounds.
+/// Exact bounds are computed for up to this many vertices, summed over all instances.
 const MAX_MEASURED: usize = 20_000_000;
-/// Limit on coordinates, transform entries and light intensities. Scenes are limited to 10¹⁸, and cameras are
-/// placed at several times the model's size.
+/// Limit on coordinates, transform entries and light intensities. The limit for scenes is 10¹⁸, and cameras
+/// are placed at a distance of several times the model's size.
 const LIMIT: f64 = 1e15;
 /// Maximum number of instances per file.
 const MAX_INSTANCES: usize = 1 << 20;
@@ -33,20 +33,20 @@ impl Container {
         let mut walk = SceneWalk {
             container: self,
             scene: ModelScene::default(),
-            notes: Notes::default(),
+            notes: ImportNotes::default(),
             materials: HashMap::new(),
         };
         walk.run().map_err(|wrong| self.wrong(wrong))?;
         let SceneWalk { mut scene, notes, .. } = walk;
         scene.notes = notes.0;
         scene.images = self.root.images.iter().map(|image| image.name.clone()).collect();
-        self.measure(&mut scene, token)?;
+        self.measure_bounds(&mut scene, token)?;
         Ok(scene)
     }
 
-    /// Computes the bounds and outline of the instances. Ignores errors in parts unless no part is valid.
-    /// Loading a part reports its errors.
-    fn measure(&self, scene: &mut ModelScene, token: &CancelToken) -> Result<(), AssetError> {
+    /// Computes the bounds and outline of the instances. Ignores errors in parts, which are reported when the
+    /// parts are loaded, unless no part is valid.
+    fn measure_bounds(&self, scene: &mut ModelScene, token: &CancelToken) -> Result<(), AssetError> {
         let mut parts: HashMap<usize, (TriangleMesh, Vec<DVec3>)> = HashMap::new();
         let (mut vertices, mut first_wrong) = (0, None);
         for instance in &scene.instances {
@@ -83,7 +83,7 @@ impl Container {
                 let wrong = GltfError::new(format!(
                     "its mesh extends to {farthest:e}, but must stay below {LIMIT:e}"
                 ));
-                return Err(self.wrong(wrong.inside(format!("nodes[{}]", instance.node))));
+                return Err(self.wrong(wrong.add_location(format!("nodes[{}]", instance.node))));
             }
             token.check()?;
         }
@@ -98,7 +98,7 @@ impl Container {
 struct SceneWalk<'a> {
     container: &'a Container,
     scene: ModelScene,
-    notes: Notes,
+    notes: ImportNotes,
     /// Maps a material's index in the file and its texture coordinate sets to the index of the converted
     /// material. Primitives without a material share a default material.
     materials: HashMap<(Option<usize>, [usize; 2]), usize>,
@@ -132,8 +132,8 @@ impl SceneWalk<'_> {
         // Place all nodes. Visiting a node twice means a cycle or a second parent.
         let worlds = self.world_transforms(&roots)?;
         for &(node, placed, is_visible) in &worlds.order {
-            self.node(node, placed, is_visible, &worlds)
-                .map_err(|wrong| wrong.inside(format!("nodes[{node}]")))?;
+            self.add_node(node, placed, is_visible, &worlds)
+                .map_err(|wrong| wrong.add_location(format!("nodes[{node}]")))?;
         }
         Ok(())
     }
@@ -146,9 +146,9 @@ impl SceneWalk<'_> {
         while let Some((number, parent, is_parent_visible)) = pending.pop() {
             let node = nodes.get(number).ok_or_else(|| GltfError::index("nodes", number, nodes.len()))?;
             if worlds.of_node[number].is_some() {
-                return Err(GltfError::new(not_a_tree(number)));
+                return Err(GltfError::new(node_visited_twice(number)));
             }
-            let placed = parent.after(local(node));
+            let placed = parent.compose(local_transform(node));
             worlds.of_node[number] = Some(placed);
             let hides = node.extensions.visibility.as_ref().is_some_and(|visibility| !visibility.visible);
             let is_visible = is_parent_visible && !hides;
@@ -159,7 +159,7 @@ impl SceneWalk<'_> {
     }
 
     /// Adds the contents of a node. A hidden node contributes only its camera.
-    fn node(
+    fn add_node(
         &mut self,
         number: usize,
         placed: AffineMap,
@@ -172,7 +172,7 @@ impl SceneWalk<'_> {
         let place = format!("nodes[{number}]");
         let shows = node.mesh.is_some() || node.extensions.light.is_some();
         if node.camera.is_some() || (is_visible && shows) {
-            check_reach(node, &placed)?;
+            check_transform_limit(node, &placed)?;
         }
         if let Some(camera) = node.camera {
             let json = root
@@ -221,7 +221,7 @@ impl SceneWalk<'_> {
             if self.scene.instances.len() >= MAX_INSTANCES {
                 return Err(GltfError::new(format!("more than {MAX_INSTANCES} primitive instances")));
             }
-            let material = self.material(primitive.material, container.coordinate_sets(primitive))?;
+            let material = self.material_index(primitive.material, container.coordinate_sets(primitive))?;
             let colors = container.attribute(primitive, "COLOR_0")?;
             self.note_attributes(
                 &format!("meshes[{mesh}].primitives[{index}]"),
@@ -232,7 +232,7 @@ impl SceneWalk<'_> {
             self.scene.instances.push(ModelInstance {
                 name: name.clone(),
                 node: number,
-                part: container.built_as(first + index),
+                part: container.first_part_with_same_mesh(first + index),
                 placed,
                 material,
                 has_normals: primitive.attributes.contains_key("NORMAL"),
@@ -252,7 +252,8 @@ impl SceneWalk<'_> {
     ) {
         let material = &self.scene.materials[material];
         let has_alpha = |colors: &AccessorReader<'_>| {
-            colors.width == 4 && (0..colors.count).any(|vertex| colors.floats::<4>(vertex, 1.0)[3] < 1.0)
+            colors.width == 4
+                && (0..colors.count).any(|vertex| colors.element_floats::<4>(vertex, 1.0)[3] < 1.0)
         };
         if material.alpha != Alpha::Opaque && colors.as_ref().is_some_and(has_alpha) {
             self.notes.add(place, "vertex color alpha is ignored");
@@ -263,14 +264,14 @@ impl SceneWalk<'_> {
     }
 
     /// Returns the index of a material. Converts the material on first use.
-    fn material(&mut self, number: Option<usize>, sets: [usize; 2]) -> Result<usize, GltfError> {
+    fn material_index(&mut self, number: Option<usize>, sets: [usize; 2]) -> Result<usize, GltfError> {
         if let Some(known) = self.materials.get(&(number, sets)) {
             return Ok(*known);
         }
         let materials = &self.container.root.materials;
         let read = match number {
             Some(number) if number < materials.len() => {
-                material(self.container, number, sets, &mut self.notes)?
+                convert_material(self.container, number, sets, &mut self.notes)?
             }
             Some(number) => return Err(GltfError::index("materials", number, materials.len())),
             None => ModelMaterial::named("default"),
@@ -299,13 +300,15 @@ impl SceneWalk<'_> {
             Some(accessor) => {
                 let numbers = AccessorReader::open(self.container, accessor)?;
                 if numbers.count == 0 || numbers.width != 16 {
-                    return Err(GltfError::new("expected a matrix").inside(format!("accessors[{accessor}]")));
+                    return Err(
+                        GltfError::new("expected a matrix").add_location(format!("accessors[{accessor}]"))
+                    );
                 }
-                from_columns(numbers.floats::<16>(0, 0.0).map(f64::from))
+                from_columns(numbers.element_floats::<16>(0, 0.0).map(f64::from))
             }
             None => AffineMap::IDENTITY,
         };
-        Ok(Some(joint.after(bind)))
+        Ok(Some(joint.compose(bind)))
     }
 
     fn light(&mut self, json: &JsonLight, node: &str, placed: AffineMap, place: &str) {
@@ -322,8 +325,10 @@ impl SceneWalk<'_> {
                 ModelLightKind::Spot { angle: 2.0 * outer.to_degrees(), blend: 1.0 - inner / outer }
             }
             other => {
-                self.notes
-                    .add(place, &format!("a light of unknown type {:?} is skipped", super::shown(other)));
+                self.notes.add(
+                    place,
+                    &format!("a light of unknown type {:?} is skipped", super::truncate_for_message(other)),
+                );
                 return;
             }
         };
@@ -384,16 +389,16 @@ impl SceneWalk<'_> {
 }
 
 /// Error message for a node that is visited twice.
-pub(super) fn not_a_tree(node: usize) -> String {
+pub(super) fn node_visited_twice(node: usize) -> String {
     format!("nodes[{node}] is its own ancestor or has two parents")
 }
 
 /// Note about a camera of unknown type.
 pub(super) const UNKNOWN_CAMERA: &str = "the camera is skipped: it is neither perspective nor orthographic";
 
-/// Rejects transforms with entries above the limit. If a property of the node itself exceeds the limit, the
-/// error names it.
-fn check_reach(node: &JsonNode, placed: &AffineMap) -> Result<(), GltfError> {
+/// Rejects transforms with entries above the limit. If one of the node's own properties exceeds the limit,
+/// the error names this property.
+fn check_transform_limit(node: &JsonNode, placed: &AffineMap) -> Result<(), GltfError> {
     let largest = |numbers: &[f64]| numbers.iter().fold(0.0_f64, |largest, number| largest.max(number.abs()));
     let all = |placed: &AffineMap| {
         largest(&placed.linear.to_cols_array()).max(largest(&placed.translate.to_array()))
@@ -424,7 +429,11 @@ fn check_intensity(json: &JsonLight, number: usize) -> Result<(), GltfError> {
     if brightest < LIMIT || !(json.intensity > 0.0) {
         return Ok(());
     }
-    let name = if json.name.is_empty() { String::new() } else { format!(" {:?}", super::shown(&json.name)) };
+    let name = if json.name.is_empty() {
+        String::new()
+    } else {
+        format!(" {:?}", super::truncate_for_message(&json.name))
+    };
     let intensity = json.intensity;
     Err(GltfError::new(format!(
         "its light lights[{number}]{name} has intensity {intensity:e}, but must stay below {LIMIT:e}"
@@ -447,7 +456,7 @@ fn is_invertible(linear: &DMat3) -> bool {
 }
 
 /// Transform of a node relative to its parent.
-fn local(node: &JsonNode) -> AffineMap {
+fn local_transform(node: &JsonNode) -> AffineMap {
     if let Some(matrix) = node.matrix {
         return from_columns(matrix);
     }

@@ -23,7 +23,7 @@ impl Primitive {
     }
 
     /// Number of triangle corners for `count` vertices in this mode.
-    pub(super) fn corners_built(&self, count: u64) -> u64 {
+    pub(super) fn triangle_corner_count(&self, count: u64) -> u64 {
         match self.mode {
             TRIANGLES => count,
             STRIP | FAN => count.saturating_sub(2).saturating_mul(3),
@@ -63,7 +63,7 @@ impl Container {
         let Some((place, primitive)) = self.primitive(part) else {
             return Err(self.wrong(GltfError::index("part", part, self.parts())));
         };
-        let parsed = self.parsed(primitive).map_err(|wrong| self.wrong(wrong.inside(place.clone())))?;
+        let parsed = self.parsed(primitive).map_err(|wrong| self.wrong(wrong.add_location(place.clone())))?;
         let source = MeshSource { path: &self.path, bytes: &[], monitor: Monitor { progress, token } };
         let mut loaded = assemble(&source, parsed).map_err(|error| match error {
             AssetError::Malformed { path, line, reason } => {
@@ -89,9 +89,9 @@ impl Container {
         if positions.width != 3 {
             let width = positions.width;
             let reason = wrong_width(width);
-            return Err(GltfError::new(reason).inside("POSITION"));
+            return Err(GltfError::new(reason).add_location("POSITION"));
         }
-        let (corners, vertices) = self.corners(primitive, positions.count)?;
+        let (corners, vertices) = self.corner_indices(primitive, positions.count)?;
         // Read the vertex attributes.
         let is_complete = |numbers: &AccessorReader<'_>| numbers.count >= positions.count;
         let normals = self.attribute(primitive, "NORMAL")?.filter(is_complete);
@@ -101,23 +101,25 @@ impl Container {
         }
         let colors = self.attribute(primitive, "COLOR_0")?.filter(is_complete);
         let each = || vertices.iter().map(|vertex| *vertex as usize);
-        let mut parsed = ParsedMesh { faces: faces(primitive.mode, &corners), ..ParsedMesh::default() };
-        parsed.positions =
-            each().map(|vertex| DVec3::from(positions.floats::<3>(vertex, 0.0).map(f64::from))).collect();
+        let mut parsed = ParsedMesh { faces: triangulate(primitive.mode, &corners), ..ParsedMesh::default() };
+        parsed.positions = each()
+            .map(|vertex| DVec3::from(positions.element_floats::<3>(vertex, 0.0).map(f64::from)))
+            .collect();
         if let Some(normals) = normals {
             let finite = |normal: Vec3| if normal.is_finite() { normal } else { Vec3::ZERO };
-            parsed.normals = each().map(|vertex| finite(Vec3::from(normals.floats(vertex, 0.0)))).collect();
+            parsed.normals =
+                each().map(|vertex| finite(Vec3::from(normals.element_floats(vertex, 0.0)))).collect();
         }
         // glTF measures v from the top.
         let upright = |[u, v]: [f32; 2]| Vec2::new(u, 1.0 - v);
         for (uvs, all) in sets.iter().zip([&mut parsed.uvs, &mut parsed.second_uvs]) {
             if let Some(uvs) = uvs {
-                *all = each().map(|vertex| upright(uvs.floats(vertex, 0.0))).collect();
+                *all = each().map(|vertex| upright(uvs.element_floats(vertex, 0.0))).collect();
             }
         }
         if let Some(colors) = colors {
             parsed.colors =
-                each().map(|vertex| colors.floats::<3>(vertex, 1.0).map(linear_to_srgb8)).collect();
+                each().map(|vertex| colors.element_floats::<3>(vertex, 1.0).map(linear_to_srgb8)).collect();
         }
         Ok(parsed)
     }
@@ -129,11 +131,11 @@ impl Container {
         name: &str,
     ) -> Result<Option<AccessorReader<'_>>, GltfError> {
         let Some(&number) = primitive.attributes.get(name) else { return Ok(None) };
-        AccessorReader::open(self, number).map(Some).map_err(|wrong| wrong.inside(name))
+        AccessorReader::open(self, number).map(Some).map_err(|wrong| wrong.add_location(name))
     }
 
     /// The two texture coordinate sets of a primitive's mesh: the first two used by its material's textures,
-    /// in ascending order. If the textures use only one set, it is listed first.
+    /// in ascending order. If the textures use only one set, this set comes first.
     pub(super) fn coordinate_sets(&self, primitive: &Primitive) -> [usize; 2] {
         let material = primitive.material.and_then(|material| self.root.materials.get(material));
         let used = material.map(|material| material.coordinate_sets()).unwrap_or_default();
@@ -146,12 +148,16 @@ impl Container {
 
     /// Returns the vertex index of each corner, and the list of vertices that these indices refer to. The
     /// list contains all vertices, or only the used ones if there are few corners.
-    fn corners(&self, primitive: &Primitive, vertices: usize) -> Result<(Vec<u32>, Vec<u32>), GltfError> {
+    fn corner_indices(
+        &self,
+        primitive: &Primitive,
+        vertices: usize,
+    ) -> Result<(Vec<u32>, Vec<u32>), GltfError> {
         let all = || (0..vertices as u32).collect();
         let Some(number) = primitive.indices else { return Ok((all(), all())) };
-        let indices = AccessorReader::open(self, number).map_err(|wrong| wrong.inside("indices"))?;
+        let indices = AccessorReader::open(self, number).map_err(|wrong| wrong.add_location("indices"))?;
         if !indices.are_indices() {
-            return Err(GltfError::new("indices must be integers").inside("indices"));
+            return Err(GltfError::new("indices must be integers").add_location("indices"));
         }
         let mut corners: Vec<u32> = (0..indices.count).map(|place| indices.index(place)).collect();
         if let Some(vertex) = corners.iter().find(|corner| **corner as usize >= vertices) {
@@ -175,11 +181,11 @@ pub(super) fn wrong_width(width: usize) -> String {
 }
 
 /// Triangulates corners according to the primitive mode. Drops incomplete triangles.
-fn faces(mode: u32, corners: &[u32]) -> Faces {
+fn triangulate(mode: u32, corners: &[u32]) -> Faces {
     let mut faces = Faces::default();
     let mut add = |triangle: [u32; 3]| {
         triangle.iter().for_each(|corner| faces.corner(*corner));
-        faces.close(3);
+        faces.end_face(3);
     };
     match mode {
         STRIP => {

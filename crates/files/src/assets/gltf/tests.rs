@@ -358,11 +358,14 @@ fn errors_include_their_location() {
     for (pointer, value, reason) in [
         ("/asset/version", json!("1.0"), unsupported_version("1.0")),
         ("/scenes/0/nodes/0", json!(7), GltfError::index("nodes", 7, 1).0),
-        ("/nodes/0/mesh", json!(3), GltfError::index("meshes", 3, 1).inside("nodes[0]").0),
+        ("/nodes/0/mesh", json!(3), GltfError::index("meshes", 3, 1).add_location("nodes[0]").0),
         (
             "/meshes/0/primitives/0/indices",
             json!(9),
-            GltfError::index("accessors", 9, 3).inside("indices").inside("meshes[0].primitives[0]").0,
+            GltfError::index("accessors", 9, 3)
+                .add_location("indices")
+                .add_location("meshes[0].primitives[0]")
+                .0,
         ),
         ("/accessors/0/count", json!(5), vertex_view(5, 60)),
         ("/accessors/0/count", json!(4_000_000_000_u32), vertex_view(4_000_000_000, 48_000_000_000)),
@@ -389,11 +392,11 @@ fn errors_include_their_location() {
         assert!(found.contains(part), "{pointer}: {found}");
     }
     let nodes = |nodes: Value| with(&|json| json["nodes"] = nodes.clone());
-    assert_eq!(nodes(json!([{"children": [0]}])), model::not_a_tree(0));
-    assert_eq!(nodes(json!([{"children": [1, 1]}, {"mesh": 0}])), model::not_a_tree(1));
+    assert_eq!(nodes(json!([{"children": [0]}])), model::node_visited_twice(0));
+    assert_eq!(nodes(json!([{"children": [1, 1]}, {"mesh": 0}])), model::node_visited_twice(1));
     for (name, help) in &MISSING[..4] {
         let found = with(&|json| json["extensionsRequired"] = json!([name]));
-        assert_eq!(found, unsupported(name, help));
+        assert_eq!(found, unsupported_extension(name, help));
     }
     let mut external = square();
     external["buffers"][0]["uri"] = json!("none.bin");
@@ -570,7 +573,7 @@ fn truncated_and_invalid_glbs_are_rejected() {
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(400))]
-    /// Mutated files are either read or rejected, without panics.
+    /// Mutated files are either read or rejected and never cause a panic.
     #[test]
     fn mutated_files_never_panic(changes in proptest::collection::vec((any::<u16>(), any::<u8>()), 1..8), cut in any::<u16>()) {
         let mut json = square();

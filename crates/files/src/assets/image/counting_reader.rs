@@ -29,7 +29,7 @@ impl<R: Read> Read for CountingReader<R> {
         let got = self.inner.read(&mut buffer[..most])?;
         self.at += got as u64;
         self.reached = self.reached.max(self.at.min(self.length));
-        self.report.reached(self.reached)?;
+        self.report.report_bytes_read(self.reached)?;
         Ok(got)
     }
 }

@@ -26,7 +26,7 @@ pub(super) struct ProgressReporter(Option<SyncSender<u64>>);
 impl ProgressReporter {
     /// Reports that `done` bytes were read. Returns an error if the call was cancelled, so the decoder can
     /// stop early.
-    pub(super) fn reached(&self, done: u64) -> io::Result<()> {
+    pub(super) fn report_bytes_read(&self, done: u64) -> io::Result<()> {
         match &self.0 {
             Some(receiver) => receiver.send(done).map_err(|_| io::Error::other(Cancelled)),
             None => Ok(()),
@@ -38,7 +38,7 @@ impl ProgressReporter {
 /// panics. If no thread can be started, runs `work` on the calling thread, without progress reports or
 /// cancellation.
 ///
-/// Abandoned work still uses memory, so new work waits for all of it to finish.
+/// Abandoned work still uses memory, so new work starts only after all abandoned work has finished.
 pub(super) fn run<T: Send + 'static>(
     monitor: Monitor<'_>,
     total: u64,
@@ -119,10 +119,10 @@ mod tests {
         let cancel = token.clone();
         let stuck = move |report: ProgressReporter| {
             cancel.cancel();
-            // The work is released after the call has returned. If the call does not return, this times out
-            // after 20 s.
+            // The test unblocks the work after the call has returned. If the call does not return, the wait
+            // times out after 20 s.
             let in_time = released.recv_timeout(Duration::from_secs(20)).is_ok();
-            let _ = send.send((in_time, report.reached(1).is_err()));
+            let _ = send.send((in_time, report.report_bytes_read(1).is_err()));
         };
         let monitor = Monitor { progress: &ignore_progress, token: &token };
         assert_eq!(run(monitor, 1, stuck).err(), Some(Cancelled));
@@ -140,7 +140,9 @@ mod tests {
         let seen = Mutex::new(Vec::new());
         let note = |done, total| seen.lock().expect("no panic").push((done, total));
         let monitor = Monitor { progress: &note, token: &token };
-        let work = |report: ProgressReporter| (1..=3).map(|i| report.reached(i).is_ok()).collect::<Vec<_>>();
+        let work = |report: ProgressReporter| {
+            (1..=3).map(|i| report.report_bytes_read(i).is_ok()).collect::<Vec<_>>()
+        };
         assert_eq!(run(monitor, 3, work), Ok(Some(vec![true; 3])));
         assert_eq!(*seen.lock().expect("no panic"), [(1, 3), (2, 3), (3, 3)]);
         let panics = |_| crate::assets::catch_panic::catch_panic(|| panic!("broken"));

@@ -12,7 +12,7 @@ use super::png::PngDecoder;
 use super::{ImageEncoding, ImageLimits, tga};
 use super::{empty_image, exceeds_memory, implausible_size, side_too_long};
 
-/// A decoder, and the metadata it does not apply itself.
+/// A decoder, and the metadata that the decoder itself does not apply.
 pub(super) struct OpenedImage {
     pub(super) decoder: Box<dyn ImageDecoder>,
     pub(super) metadata: ImageMetadata,
@@ -21,7 +21,7 @@ pub(super) struct OpenedImage {
 }
 
 /// Creates the decoder for the detected format.
-pub(super) fn choose<R: BufRead + Seek + 'static>(
+pub(super) fn create_decoder<R: BufRead + Seek + 'static>(
     mut reader: ImageReader<R>,
     encoding: ImageEncoding,
     memory_bytes: u64,
@@ -64,7 +64,7 @@ pub(super) fn choose<R: BufRead + Seek + 'static>(
             limits.max_alloc = Some(memory_bytes);
             reader.limits(limits);
             let mut decoder = reader.into_decoder()?;
-            if encoding.is_declared()
+            if encoding.uses_file_color_space()
                 && let Some(profile) = decoder.icc_profile()?
             {
                 metadata.add_profile(Some(&profile), !decoder.color_type().has_color());
@@ -74,8 +74,8 @@ pub(super) fn choose<R: BufRead + Seek + 'static>(
     }
 }
 
-/// Orientation of an image. Some programs write the JPEG prefix of Exif data in other formats, where `image`
-/// does not support it.
+/// Orientation of an image. Some programs write the JPEG prefix before the Exif data in other formats as
+/// well, which `image` does not support.
 pub(super) fn orientation(decoder: &mut dyn ImageDecoder) -> Result<Orientation, ImageError> {
     let orientation = decoder.orientation()?;
     let exif = if orientation == Orientation::NoTransforms { decoder.exif_metadata()? } else { None };

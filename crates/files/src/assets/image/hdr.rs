@@ -14,7 +14,7 @@ use super::space::ColorSpace;
 const HEADER_BYTES: u64 = 1 << 20;
 /// Luminous efficacy of white light in lm/W. XYZE values are scaled by it (`WHTEFFICACY` in Radiance).
 const WHITE_EFFICACY: f64 = 179.0;
-/// First bytes of a file. A program name follows.
+/// First bytes of a file, before the program name.
 pub(super) const MAGIC: &[u8] = b"#?";
 
 /// Decoder of an HDR file.
@@ -58,10 +58,10 @@ impl<R: BufRead> ImageDecoder for HdrDecoder<R> {
         let Self { mut file, header: HdrHeader { scan, scales, .. } } = self;
         let mut pixels = Vec::new();
         for line in 0..scan.slow.count {
-            read_line(&mut file, scan.fast.count as usize, &mut pixels)?;
+            read_scanline(&mut file, scan.fast.count as usize, &mut pixels)?;
             for (along, pixel) in pixels.iter().enumerate() {
                 let start = PIXEL_BYTES * scan.index(line as usize, along);
-                let values = radiance(*pixel, scales).map(f32::to_ne_bytes);
+                let values = decode_rgbe(*pixel, scales).map(f32::to_ne_bytes);
                 samples[start..start + PIXEL_BYTES].copy_from_slice(values.as_flattened());
             }
         }
@@ -136,7 +136,7 @@ struct HeaderVariables {
 }
 
 impl HeaderVariables {
-    /// Adds a line. Ignores indented lines, which are quotes of other headers.
+    /// Adds a line. Ignores indented lines, which are quoted from other headers.
     fn add(&mut self, line: &str, number: usize) -> Result<(), String> {
         let Some((name, value)) = line.split_once('=').filter(|_| !line.starts_with(['#', ' ', '\t'])) else {
             return Ok(());
@@ -152,21 +152,21 @@ impl HeaderVariables {
                     return Err(unsupported_encoding(other));
                 }
             },
-            "EXPOSURE" => numbers(value).filter(positive).is_some_and(|[factor]: [f64; 1]| {
+            "EXPOSURE" => parse_numbers(value).filter(are_positive).is_some_and(|[factor]: [f64; 1]| {
                 self.exposure = Some(self.exposure.unwrap_or(1.0) * factor);
                 true
             }),
-            "COLORCORR" => numbers(value).filter(positive).is_some_and(|factors: [f64; 3]| {
+            "COLORCORR" => parse_numbers(value).filter(are_positive).is_some_and(|factors: [f64; 3]| {
                 let previous = self.correction.unwrap_or([1.0; 3]);
                 self.correction = Some(std::array::from_fn(|i| previous[i] * factors[i]));
                 true
             }),
             "PRIMARIES" => {
-                let primaries = numbers(value).map(Primaries::from_numbers);
+                let primaries = parse_numbers(value).map(Primaries::from_numbers);
                 self.primaries = primaries.filter(|primaries| primaries.to_rec_709().is_some());
                 self.primaries.is_some()
             }
-            "GAMMA" => numbers(value) == Some([1.0]),
+            "GAMMA" => parse_numbers(value) == Some([1.0]),
             _ => true,
         };
         if !is_known {
@@ -185,7 +185,7 @@ impl HeaderVariables {
         HdrHeader {
             scan,
             scales: correction.map(|correction| 1.0 / (exposure * correction)),
-            space: matrix.map_or_else(ColorSpace::default, ColorSpace::of_matrix),
+            space: matrix.map_or_else(ColorSpace::default, ColorSpace::from_rec_709_matrix),
             warnings: self.warnings,
         }
     }
@@ -208,13 +208,13 @@ pub(super) const WRONG_LENGTH: &str = "a scanline's length differs from the head
 pub(super) const RUN_TOO_LONG: &str = "a run exceeds its scanline";
 
 /// Parses exactly `N` numbers.
-fn numbers<const N: usize>(value: &str) -> Option<[f64; N]> {
+fn parse_numbers<const N: usize>(value: &str) -> Option<[f64; N]> {
     let numbers: Option<Vec<f64>> = value.split_whitespace().map(|word| word.parse().ok()).collect();
     numbers?.try_into().ok()
 }
 
 /// Whether all numbers are finite and positive.
-fn positive<const N: usize>(numbers: &[f64; N]) -> bool {
+fn are_positive<const N: usize>(numbers: &[f64; N]) -> bool {
     numbers.iter().all(|number| number.is_finite() && *number > 0.0)
 }
 
@@ -274,7 +274,7 @@ impl ScanOrder {
 }
 
 /// Decodes red, green and blue with a shared exponent.
-fn radiance([red, green, blue, exponent]: [u8; 4], scales: [f64; 3]) -> [f32; 3] {
+fn decode_rgbe([red, green, blue, exponent]: [u8; 4], scales: [f64; 3]) -> [f32; 3] {
     if exponent == 0 {
         return [0.0; 3];
     }
@@ -285,23 +285,23 @@ fn radiance([red, green, blue, exponent]: [u8; 4], scales: [f64; 3]) -> [f32; 3]
 }
 
 /// Reads a scanline of `count` pixels.
-fn read_line(file: &mut impl Read, count: usize, pixels: &mut Vec<[u8; 4]>) -> ImageResult<()> {
+fn read_scanline(file: &mut impl Read, count: usize, pixels: &mut Vec<[u8; 4]>) -> ImageResult<()> {
     const RUNS: std::ops::RangeInclusive<usize> = 8..=0x7fff;
     pixels.clear();
     let first = read_pixel(file)?;
-    let [2, 2, high, low] = first else { return read_flat(file, first, count, pixels) };
+    let [2, 2, high, low] = first else { return read_flat_scanline(file, first, count, pixels) };
     if !RUNS.contains(&count) || high > 0x7f {
-        return read_flat(file, first, count, pixels);
+        return read_flat_scanline(file, first, count, pixels);
     }
     if usize::from(u16::from_be_bytes([high, low])) != count {
         return Err(error(WRONG_LENGTH.to_owned()));
     }
     pixels.resize(count, [0; 4]);
-    (0..4).try_for_each(|channel| read_runs(file, channel, pixels))
+    (0..4).try_for_each(|channel| read_run_length_channel(file, channel, pixels))
 }
 
 /// Reads one run-length encoded channel of a scanline.
-fn read_runs(file: &mut impl Read, channel: usize, pixels: &mut [[u8; 4]]) -> ImageResult<()> {
+fn read_run_length_channel(file: &mut impl Read, channel: usize, pixels: &mut [[u8; 4]]) -> ImageResult<()> {
     let mut done = 0;
     while done < pixels.len() {
         let [code] = read_bytes(file)?;
@@ -322,7 +322,7 @@ fn read_runs(file: &mut impl Read, channel: usize, pixels: &mut [[u8; 4]]) -> Im
 }
 
 /// Reads a scanline stored pixel by pixel. A pixel of (1, 1, 1, n) repeats the previous pixel.
-fn read_flat(
+fn read_flat_scanline(
     file: &mut impl Read,
     first: [u8; 4],
     count: usize,

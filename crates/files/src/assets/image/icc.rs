@@ -8,8 +8,8 @@ use crate::math::{DMat3, DVec3};
 /// Maximum length of a curve's table.
 const MAX_VALUES: usize = 1 << 16;
 
-/// Returns the color space of a profile for a gray or RGB image, or the reason why the profile is ignored.
-pub(super) fn space(profile: &[u8], is_gray: bool) -> Result<ColorSpace, String> {
+/// Returns the color space of a profile for a gray or RGB image, or the reason for ignoring the profile.
+pub(super) fn profile_color_space(profile: &[u8], is_gray: bool) -> Result<ColorSpace, String> {
     let profile = IccProfile::parse(profile).ok_or(MALFORMED)?;
     match (profile.field(16), profile.field(20)) {
         (Some(b"RGB "), Some(b"XYZ ")) if !is_gray => profile.rgb(),
@@ -81,12 +81,12 @@ impl<'a> IccProfile<'a> {
     fn xyz(&self, name: &[u8; 4]) -> Option<DVec3> {
         let data = Self(self.tag(name)?);
         (data.field(0)? == b"XYZ ").then_some(())?;
-        let [x, y, z] = [8, 12, 16].map(|at| data.fixed(at));
+        let [x, y, z] = [8, 12, 16].map(|at| data.s15_fixed_16(at));
         Some(DVec3::new(x?, y?, z?))
     }
 
     /// An s15Fixed16 number.
-    fn fixed(&self, at: usize) -> Option<f64> {
+    fn s15_fixed_16(&self, at: usize) -> Option<f64> {
         self.field(at).map(|bytes| f64::from(i32::from_be_bytes(*bytes)) / 65536.0)
     }
 
@@ -113,7 +113,7 @@ impl<'a> IccProfile<'a> {
 
     fn parametric(&self) -> Option<Curve> {
         let kind = u16::from_be_bytes(*self.0.get(8..)?.first_chunk()?);
-        let number = |index: usize| self.fixed(12 + 4 * index);
+        let number = |index: usize| self.s15_fixed_16(12 + 4 * index);
         let g = number(0)?;
         let (mut a, mut b, mut c, mut d, mut e, mut f) = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0);
         if kind >= 1 {

@@ -43,9 +43,9 @@ fn check_kind(bytes: &[u8]) -> Result<(), String> {
     Err(format!("it is {kind}; save it as a baseline or progressive JPEG, or as PNG"))
 }
 
-/// Offset of the transform byte of an Adobe segment that specifies RGB although there is a JFIF segment,
-/// which implies YCbCr. Readers follow the JFIF segment.
-pub(super) fn misleading_transform(bytes: &[u8]) -> Option<usize> {
+/// Offset of the transform byte of a misleading Adobe segment: it specifies RGB, but the file also has a JFIF
+/// segment, which implies YCbCr and takes precedence in other readers.
+pub(super) fn misleading_transform_offset(bytes: &[u8]) -> Option<usize> {
     const ADOBE: &[u8] = b"Adobe";
     const TRANSFORM: usize = 11;
     let find = |marker: u8, name: &[u8]| {
@@ -59,8 +59,8 @@ pub(super) fn misleading_transform(bytes: &[u8]) -> Option<usize> {
 }
 
 /// Changes a misleading Adobe segment to YCbCr.
-pub(super) fn correct_transform(bytes: &mut [u8]) {
-    if let Some(transform) = misleading_transform(bytes) {
+pub(super) fn fix_misleading_transform(bytes: &mut [u8]) {
+    if let Some(transform) = misleading_transform_offset(bytes) {
         bytes[transform] = 1;
     }
 }
@@ -137,11 +137,11 @@ mod tests {
             (b"\xe0JFIF\0\x01\x02", b"\xeeAdobe\0d\0\0\0\0\0", b"\xeeAdobe\0d\0\0\0\0\x01");
         for segments in [&[jfif.as_slice(), rgb][..], &[rgb, jfif]] {
             let file = file(segments);
-            let at = misleading_transform(&file).expect("both");
+            let at = misleading_transform_offset(&file).expect("both");
             assert_eq!(file[at - 11..=at], rgb[1..]);
         }
         for segments in [&[jfif.as_slice(), ycc][..], &[rgb], &[jfif], &[]] {
-            assert_eq!(misleading_transform(&file(segments)), None);
+            assert_eq!(misleading_transform_offset(&file(segments)), None);
         }
     }
 }

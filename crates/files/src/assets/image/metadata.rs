@@ -1,4 +1,4 @@
-//! Image metadata that the decoder does not apply to the pixels.
+//! Image metadata that decoders do not apply to the pixels.
 
 use super::icc;
 use super::space::ColorSpace;
@@ -51,7 +51,9 @@ impl ImageMetadata {
 
     /// Applies an ICC profile. `None` means that the profile could not be decompressed.
     pub(super) fn add_profile(&mut self, profile: Option<&[u8]>, is_gray: bool) {
-        match profile.map_or(Err(icc::MALFORMED.to_owned()), |profile| icc::space(profile, is_gray)) {
+        match profile
+            .map_or(Err(icc::MALFORMED.to_owned()), |profile| icc::profile_color_space(profile, is_gray))
+        {
             Ok(space) => self.space = space,
             Err(reason) => self.warn(profile_ignored(&reason)),
         }

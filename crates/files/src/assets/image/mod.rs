@@ -32,7 +32,7 @@ use crate::materials::texels::Texels;
 use crate::materials::{Mipmaps, PixelValue};
 use counting_reader::CountingReader;
 use decode_thread::ProgressReporter;
-use decoder::{OpenedImage, check_size, choose, max_expansion, orientation, texel_bytes};
+use decoder::{OpenedImage, check_size, create_decoder, max_expansion, orientation, texel_bytes};
 use metadata::{ImageMetadata, ImageWarning};
 use pfm::PfmDecoder;
 use space::ColorSpace;
@@ -110,11 +110,11 @@ impl ImageEncoding {
 
     /// Color space of a file's samples.
     fn space(self, metadata: &ImageMetadata) -> ColorSpace {
-        if self.is_declared() { metadata.space.clone() } else { ColorSpace::default() }
+        if self.uses_file_color_space() { metadata.space.clone() } else { ColorSpace::default() }
     }
 
     /// Whether the file rather than the scene determines the color space.
-    fn is_declared(self) -> bool {
+    fn uses_file_color_space(self) -> bool {
         match self {
             Self::Color | Self::Raw | Self::CutOut(ColorCurve::Auto) => true,
             Self::Srgb | Self::Linear | Self::Number { .. } | Self::CutOut(_) => false,
@@ -152,7 +152,7 @@ impl Default for ImageLimits {
 ///
 /// Gray becomes RGB, alpha is dropped except for scalars and cutouts, and the EXIF orientation is applied.
 /// Negative and nonfinite texels become 0 (except for [`ImageEncoding::Raw`]). A truncated JPEG is an error.
-/// 16-bit and float files are converted to linear floats. Progress is measured in bytes of the file.
+/// 16-bit and float samples are converted to linear floats. Progress is measured in bytes of the file.
 ///
 /// # Errors
 /// [`AssetError::Unreadable`], [`AssetError::Malformed`] if the content contradicts the header or exceeds the
@@ -189,7 +189,7 @@ fn load_source(
 ) -> Result<LoadedImage, AssetError> {
     let (path, length) = (file.path.clone(), file.length as usize);
     monitor.tick(0, length)?;
-    let (texels, warnings) = file.decode_apart(monitor, move |file, report| {
+    let (texels, warnings) = file.decode_on_thread(monitor, move |file, report| {
         let (image, mut metadata) = file.decode(encoding, report)?;
         if let Some(words) = convert::constant_alpha(&image, encoding, &metadata) {
             metadata.warn(words);
@@ -204,7 +204,7 @@ fn load_source(
     Ok(LoadedImage { texels, warnings: warnings.into_iter().map(warning).collect() })
 }
 
-/// Width and height of an image, and the size of its texels in bytes, from its header.
+/// Reads an image's width and height from its header, and returns them with the size of the texels in bytes.
 ///
 /// # Errors
 /// The errors of [`load`] that can be detected from the start of the file.
@@ -226,7 +226,7 @@ fn size_of_source(
     encoding: ImageEncoding,
     monitor: Monitor<'_>,
 ) -> Result<(u32, u32, u64), AssetError> {
-    file.decode_apart(monitor, move |file, report| {
+    file.decode_on_thread(monitor, move |file, report| {
         let OpenedImage { decoder, texel_bytes, .. } = file.open_decoder(encoding, report)?;
         let (width, height) = decoder.dimensions();
         Ok((width, height, texel_bytes))
@@ -283,7 +283,7 @@ pub fn mipmaps(texels: &Texels, token: &CancelToken) -> Result<Mipmaps, Cancelle
         let mut rows = halving.start();
         for y in 0..halving.rows() {
             token.check()?;
-            halving.row(y, &mut rows);
+            halving.append_row(y, &mut rows);
         }
         Ok(halving.texels(rows))
     })
@@ -294,7 +294,7 @@ pub fn mipmaps(texels: &Texels, token: &CancelToken) -> Result<Mipmaps, Cancelle
 /// # Errors
 /// [`Cancelled`].
 pub fn coverage(texels: &Texels, cutoff: f32, token: &CancelToken) -> Result<Mipmaps, Cancelled> {
-    mipmaps(&texels.cut(cutoff), token)
+    mipmaps(&texels.threshold(cutoff), token)
 }
 
 /// Bytes of an image: an open file, a file in memory, or an embedded image.
@@ -342,7 +342,7 @@ impl ImageSource {
         Ok(Self { path: path.to_owned(), file: ImageBytes::File(file), length, limits, token: token.clone() })
     }
 
-    /// Reads a file into memory and hashes it. The hash always matches the decoded bytes, even if the file is
+    /// Reads a file into memory and hashes it. The hash matches the decoded bytes even if the file is
     /// replaced in the meantime.
     fn read(
         path: &Path,
@@ -357,7 +357,7 @@ impl ImageSource {
         }
         let unreadable = |error: io::Error| AssetError::unreadable(path, describe_error(&error));
         let without_text = match length > CHECKED_FIRST {
-            true => png::without_text(&file, token),
+            true => png::read_without_text_chunks(&file, token),
             false => Ok(None),
         };
         token.check()?;
@@ -365,7 +365,7 @@ impl ImageSource {
             Some(found) => found,
             None => {
                 let monitor = Monitor { progress: &ignore_progress, token };
-                let bytes = read::rest(path, file, (length, FILE_LIMIT), monitor)?;
+                let bytes = read::read_rest(path, file, (length, FILE_LIMIT), monitor)?;
                 let hash = read::hash(&bytes);
                 (bytes, hash)
             }
@@ -392,7 +392,7 @@ impl ImageSource {
     }
 
     /// Runs a decoder on a separate thread, catching panics.
-    fn decode_apart<T: Send + 'static>(
+    fn decode_on_thread<T: Send + 'static>(
         self,
         monitor: Monitor<'_>,
         work: impl FnOnce(Self, ProgressReporter) -> Result<T, String> + Send + 'static,
@@ -412,9 +412,9 @@ impl ImageSource {
     ) -> Result<(DynamicImage, ImageMetadata), String> {
         let OpenedImage { mut decoder, metadata, .. } = self.open_decoder(encoding, report)?;
         let (width, height) = decoder.dimensions();
-        let orientation = orientation(&mut *decoder).map_err(|error| reason(&error))?;
+        let orientation = orientation(&mut *decoder).map_err(|error| shorten_decoder_error(&error))?;
         let image = DynamicImage::from_decoder(decoder);
-        let mut image = image.map_err(|error| claimed_size(width, height, &reason(&error)))?;
+        let mut image = image.map_err(|error| claimed_size(width, height, &shorten_decoder_error(&error)))?;
         image.apply_orientation(orientation);
         Ok((image, metadata))
     }
@@ -433,14 +433,14 @@ impl ImageSource {
                 in_memory = self.length;
                 if start(bytes.get_ref()) == Some(ImageFormat::Jpeg) {
                     jpeg::check_bytes(bytes.get_ref())?;
-                    jpeg::correct_transform(bytes.get_mut());
+                    jpeg::fix_misleading_transform(bytes.get_mut());
                 }
             }
             ImageBytes::Embedded(bytes) if start(bytes.get_ref()) == Some(ImageFormat::Jpeg) => {
                 jpeg::check_bytes(bytes.get_ref())?;
-                if jpeg::misleading_transform(bytes.get_ref()).is_some() {
+                if jpeg::misleading_transform_offset(bytes.get_ref()).is_some() {
                     let mut copy = bytes.get_ref().to_vec();
-                    jpeg::correct_transform(&mut copy);
+                    jpeg::fix_misleading_transform(&mut copy);
                     self.file = ImageBytes::InMemory(Cursor::new(copy));
                 }
             }
@@ -471,9 +471,9 @@ impl ImageSource {
             PfmDecoder::new(reader.into_inner())
                 .map(|decoder| (Box::new(decoder) as _, ImageMetadata::default()))
         } else {
-            choose(reader, encoding, self.limits.memory_bytes)
+            create_decoder(reader, encoding, self.limits.memory_bytes)
         };
-        let (decoder, metadata) = chosen.map_err(|error| reason(&error))?;
+        let (decoder, metadata) = chosen.map_err(|error| shorten_decoder_error(&error))?;
         let held_bytes = if is_jpeg { self.length } else { 0 };
         let texel = texel_bytes(decoder.color_type(), encoding, &metadata);
         let texel_bytes =
@@ -521,7 +521,7 @@ pub(crate) fn unknown_format() -> String {
 }
 
 /// Shortens a decoder's error message, which may quote large parts of the file.
-fn reason(error: &ImageError) -> String {
+fn shorten_decoder_error(error: &ImageError) -> String {
     const MAX_LENGTH: usize = 200;
     let words = match error {
         ImageError::Unsupported(_) => format!("{}: {error}", unknown_format()),
@@ -532,7 +532,7 @@ fn reason(error: &ImageError) -> String {
         ImageError::Limits(error) if error.kind() == LimitErrorKind::InsufficientMemory => {
             "it needs more memory than the limit for images".to_owned()
         }
-        _ => without_chunk_types(&error.to_string()),
+        _ => name_png_chunks(&error.to_string()),
     };
     if words.chars().count() <= MAX_LENGTH {
         words
@@ -542,7 +542,7 @@ fn reason(error: &ImageError) -> String {
 }
 
 /// Replaces a PNG chunk type, printed by the decoder in debug format, with the chunk's name.
-fn without_chunk_types(words: &str) -> String {
+fn name_png_chunks(words: &str) -> String {
     const OPENING: &str = "ChunkType { type: ";
     let Some((before, rest)) = words.split_once(OPENING) else { return words.to_owned() };
     let Some((chunk, after)) = rest.split_once(" }") else { return words.to_owned() };

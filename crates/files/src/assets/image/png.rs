@@ -20,9 +20,9 @@ const PROFILE_BYTES: u32 = 16 << 20;
 /// Number of bytes to skip between two polls of the cancel token.
 const SKIPPED_BYTES: usize = 1 << 16;
 
-/// Reads a PNG without its text chunks, so they take no memory. The hash covers the whole file. If the file
-/// is not a PNG, rewinds it and returns `None`.
-pub(super) fn without_text(
+/// Reads a PNG into memory, skipping its text chunks. The hash covers the whole file. If the file is not a
+/// PNG, rewinds it and returns `None`.
+pub(super) fn read_without_text_chunks(
     mut file: impl Read + Seek,
     token: &CancelToken,
 ) -> io::Result<Option<(Vec<u8>, FileHash)>> {
@@ -78,7 +78,7 @@ type ProfileChunk = Option<Vec<u8>>;
 impl<R: BufRead + Seek> PngDecoder<R> {
     /// Creates a decoder that allocates at most `memory_bytes` in addition to the pixels.
     pub(super) fn new(mut file: R, memory_bytes: u64) -> ImageResult<Self> {
-        let profile = profile(&mut file).map_err(ImageError::IoError)?;
+        let profile = read_profile(&mut file).map_err(ImageError::IoError)?;
         let limits = png::Limits { bytes: usize::try_from(memory_bytes).unwrap_or(usize::MAX) };
         let mut decoder = png::Decoder::new_with_limits(file, limits);
         decoder.set_ignore_text_chunk(true);
@@ -124,7 +124,7 @@ impl<R: BufRead + Seek> PngDecoder<R> {
     /// Color space of the chunks `gAMA` and `cHRM`.
     fn space_of_gama_and_chrm(&self, metadata: &mut ImageMetadata, is_gray: bool) -> ColorSpace {
         let info = self.reader.info();
-        let curve = info.gama_chunk.map_or(Curve::Srgb, |gamma| curve(gamma.into_scaled()));
+        let curve = info.gama_chunk.map_or(Curve::Srgb, |gamma| gamma_curve(gamma.into_scaled()));
         let number = |number: png::ScaledFloat| f64::from(number.into_scaled()) / 100_000.0;
         let matrix = info.chrm_chunk.filter(|_| !is_gray).map_or(Some(DMat3::IDENTITY), |chunk| {
             let [red, green, blue, white] =
@@ -168,7 +168,7 @@ impl<R: BufRead + Seek> ImageDecoder for PngDecoder<R> {
 
 /// Transfer function for a `gAMA` value in units of 1/100000. A gamma of 1/2.2 usually means sRGB (PNG,
 /// 11.3.2.5).
-fn curve(gamma: u32) -> Curve {
+fn gamma_curve(gamma: u32) -> Curve {
     const SRGB: u32 = 45_455;
     const TOLERANCE: u32 = 500;
     match gamma {
@@ -224,8 +224,8 @@ fn unsupported_code_points(points: png::CodingIndependentCodePoints) -> String {
     )
 }
 
-/// Reads the color profile of a file, then rewinds the file.
-fn profile(file: &mut (impl Read + Seek)) -> io::Result<Option<ProfileChunk>> {
+/// Reads a file's color profile, then rewinds the file.
+fn read_profile(file: &mut (impl Read + Seek)) -> io::Result<Option<ProfileChunk>> {
     let profile = find_profile(file);
     file.seek(SeekFrom::Start(0))?;
     match profile {
@@ -250,15 +250,15 @@ fn find_profile(file: &mut (impl Read + Seek)) -> io::Result<Option<ProfileChunk
             b"iCCP" => {
                 let mut chunk = vec![0; length as usize];
                 file.read_exact(&mut chunk)?;
-                return Ok(Some(decompressed(&chunk)));
+                return Ok(Some(decompress_profile(&chunk)));
             }
             _ => file.seek(SeekFrom::Current(i64::from(length) + CHECKSUM))?,
         };
     }
 }
 
-/// Decompresses the profile in a chunk. Its name and a compression method of 0 precede the data.
-fn decompressed(chunk: &[u8]) -> Option<Vec<u8>> {
+/// Decompresses the profile in a chunk. The data follows the profile's name and a compression method of 0.
+fn decompress_profile(chunk: &[u8]) -> Option<Vec<u8>> {
     let name = memchr::memchr(0, chunk)?;
     let packed = chunk[name + 1..].strip_prefix(&[0])?;
     fdeflate::decompress_to_vec_bounded(packed, PROFILE_BYTES as usize).ok()

@@ -2,7 +2,8 @@
 
 use crate::math::{DMat3, DVec3};
 
-/// Maximum difference from the identity matrix for skipping a conversion. Primaries in files are rounded.
+/// Conversions that differ from the identity matrix by at most this much are skipped, because primaries in
+/// files are rounded.
 const TOLERANCE: f64 = 2e-3;
 
 /// XYZ of D50, the white point of ICC profiles (ICC.1, 6.3.4.3).
@@ -37,14 +38,14 @@ impl Primaries {
     }
 
     /// XYZ of the white point, with Y = 1.
-    fn white(&self) -> DVec3 {
+    fn white_xyz(&self) -> DVec3 {
         xyz(self.white) / self.white[1]
     }
 
     /// Matrix to XYZ, scaled to map (1, 1, 1) to white. `None` for degenerate primaries.
     fn to_xyz(self) -> Option<DMat3> {
         let primaries = DMat3::from_cols(xyz(self.red), xyz(self.green), xyz(self.blue));
-        let scales = inverse(primaries)? * self.white();
+        let scales = inverse(primaries)? * self.white_xyz();
         let matrix = primaries * DMat3::from_diagonal(scales);
         inverse(matrix).is_some().then_some(matrix)
     }
@@ -56,7 +57,7 @@ impl Primaries {
 
     /// Matrix to linear Rec. 709 with Bradford chromatic adaptation. `None` for degenerate primaries.
     pub(super) fn to_rec_709(self) -> Option<DMat3> {
-        Some(rec_709_from_xyz(self.white())? * self.to_xyz()?)
+        Some(rec_709_from_xyz(self.white_xyz())? * self.to_xyz()?)
     }
 }
 
@@ -72,15 +73,15 @@ pub(super) fn is_identity(matrix: &DMat3) -> bool {
 
 /// Matrix from XYZ with this white point to linear Rec. 709.
 fn rec_709_from_xyz(white: DVec3) -> Option<DMat3> {
-    let to_cones = bradford();
-    let [from, to] = [white, Primaries::REC_709.white()].map(|white| to_cones * white);
+    let to_cones = bradford_matrix();
+    let [from, to] = [white, Primaries::REC_709.white_xyz()].map(|white| to_cones * white);
     let adapted = inverse(to_cones)? * DMat3::from_diagonal(to / from) * to_cones;
     let matrix = inverse(Primaries::REC_709.to_xyz()?)? * adapted;
     matrix.is_finite().then_some(matrix)
 }
 
 /// Bradford cone response matrix (Lam, *Metamerism and Colour Constancy*, University of Bradford, 1985).
-fn bradford() -> DMat3 {
+fn bradford_matrix() -> DMat3 {
     DMat3::from_cols_array(&[0.8951, -0.7502, 0.0389, 0.2664, 1.7135, -0.0685, -0.1614, 0.0367, 1.0296])
 }
 

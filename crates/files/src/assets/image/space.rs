@@ -68,8 +68,8 @@ impl Curve {
                 }
             }
             Self::Table(values) => interpolated(values, x),
-            Self::Pq => pq(x),
-            Self::Hlg => hlg(x) / hlg(0.75),
+            Self::Pq => decode_pq(x),
+            Self::Hlg => decode_hlg(x) / decode_hlg(0.75),
         }
     }
 
@@ -94,7 +94,7 @@ fn power(x: f64, exponent: f64) -> f64 {
 }
 
 /// Decodes a PQ signal relative to the reference white (ITU-R BT.2408, 2.2).
-fn pq(x: f64) -> f64 {
+fn decode_pq(x: f64) -> f64 {
     const MOST: f64 = 10_000.0 / 203.0;
     const M1: f64 = 2610.0 / 16384.0;
     const M2: f64 = 2523.0 / 32.0;
@@ -106,7 +106,7 @@ fn pq(x: f64) -> f64 {
 }
 
 /// Decodes an HLG signal to [0, 1].
-fn hlg(x: f64) -> f64 {
+fn decode_hlg(x: f64) -> f64 {
     const A: f64 = 0.178_832_77;
     const B: f64 = 1.0 - 4.0 * A;
     // 0.5 − A·ln(4·A)
@@ -130,7 +130,7 @@ pub(super) struct ColorSpace {
 }
 
 impl ColorSpace {
-    /// A color space with these curves (`None` for the default) and a matrix to linear Rec. 709.
+    /// Creates a color space from its curves (`None` for the default) and its matrix to linear Rec. 709.
     pub(super) fn new(curves: Option<[Curve; 3]>, matrix: DMat3) -> Self {
         Self {
             curves: curves.filter(|curves| !curves.iter().all(Curve::is_srgb)),
@@ -139,7 +139,7 @@ impl ColorSpace {
     }
 
     /// A color space that differs from the default only in its primaries.
-    pub(super) fn of_matrix(matrix: DMat3) -> Self {
+    pub(super) fn from_rec_709_matrix(matrix: DMat3) -> Self {
         Self::new(None, matrix)
     }
 
@@ -159,7 +159,7 @@ impl ColorSpace {
     }
 
     /// Converts linear light in this space to linear Rec. 709.
-    pub(super) fn converted(&self, linear: [f32; 3]) -> [f32; 3] {
+    pub(super) fn to_rec_709_color(&self, linear: [f32; 3]) -> [f32; 3] {
         let Some(matrix) = &self.matrix else { return linear };
         (*matrix * DVec3::from_array(linear.map(f64::from))).as_vec3().to_array()
     }
@@ -200,7 +200,7 @@ mod tests {
             assert!(is_near(Curve::Hlg.decode(signal), light / 0.264_963), "{signal}");
         }
         // HLG is continuous.
-        assert!(is_near(hlg(0.5), hlg(0.5 + 1e-9)));
+        assert!(is_near(decode_hlg(0.5), decode_hlg(0.5 + 1e-9)));
     }
 
     #[test]

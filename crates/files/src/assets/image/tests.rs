@@ -30,7 +30,7 @@ fn load_bytes(name: &str, bytes: &[u8], encoding: ImageEncoding) -> Result<Texel
     load_with(&path, encoding)
 }
 
-/// Warnings about a file, with the folder removed.
+/// Warnings about a file, with the directory stripped from its path.
 fn warnings_of(name: &str, bytes: &[u8], encoding: ImageEncoding) -> Vec<String> {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join(name);

@@ -1,5 +1,5 @@
-//! Handles TGA features that `image` does not: the meaning of alpha, and some headers that it rejects
-//! (Truevision, *TGA File Format Specification*, version 2.0).
+//! Handles TGA features that `image` does not support: the meaning of alpha, and some headers that `image`
+//! rejects (Truevision, *TGA File Format Specification*, version 2.0).
 
 use std::io::{self, Chain, Cursor, Read, Seek, SeekFrom};
 
@@ -30,7 +30,7 @@ pub(super) fn open<R: Read + Seek>(mut file: R) -> ImageResult<(TgaDecoder<Patch
     let mut header = [0; HEADER];
     file.read_exact(&mut header)?;
     let alpha_bits = header[DESCRIPTOR] & ALPHA_BITS;
-    let alpha = match attributes(&mut file) {
+    let alpha = match attribute_type(&mut file) {
         Ok(Some(0..=2)) => AlphaUsage::Unused,
         Ok(Some(4)) => AlphaUsage::Premultiplied,
         Ok(Some(3)) => AlphaUsage::Straight,
@@ -66,7 +66,7 @@ fn decoding_error(reason: String) -> ImageError {
 }
 
 /// Attribute type in the extension area, if the file has one.
-fn attributes(file: &mut (impl Read + Seek)) -> io::Result<Option<u8>> {
+fn attribute_type(file: &mut (impl Read + Seek)) -> io::Result<Option<u8>> {
     file.seek(SeekFrom::End(-FOOTER))?;
     let mut offset = [0; 4];
     file.read_exact(&mut offset)?;

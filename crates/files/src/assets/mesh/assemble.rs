@@ -27,7 +27,7 @@ pub(super) fn assemble_text(
     mut parsed: ParsedMesh,
     start_of: impl Fn(usize) -> Option<usize>,
 ) -> Result<LoadedMesh, AssetError> {
-    corners::split(&mut parsed, source.monitor.token)?;
+    corners::split_vertices(&mut parsed, source.monitor.token)?;
     let ParsedMesh {
         positions,
         normals,
@@ -46,16 +46,16 @@ pub(super) fn assemble_text(
         companions,
         pictures,
     } = parsed;
-    let (origin, positions) = around_origin(positions, &faces);
+    let (origin, positions) = relative_to_origin(positions, &faces);
     if has_separate_corners {
         faces.join(&positions, source.monitor.token)?;
     }
     let most_triangles = TriangleMesh::MOST_TRIANGLES as usize;
     let mut cutter = Cutter::new(&positions, &face_materials, most_triangles);
-    cutter.cut_all(source, &faces)?;
+    cutter.add_all_faces(source, &faces)?;
     let Cutter { triangles, triangle_materials, dropped, crossing, .. } = cutter;
     let line_of = |face: usize| start_of(face).map(|start| source.line(start));
-    warnings.extend(crossing_faces(crossing, line_of));
+    warnings.extend(self_intersection_warning(crossing, line_of));
     if triangles.is_empty() {
         return Err(source.wrong(no_usable_face(faces.len(), dropped)));
     }
@@ -82,7 +82,7 @@ pub(super) fn assemble_text(
 
 /// Returns positions relative to an origin near the vertices used by faces. Numbers too large for `f32`
 /// become infinite.
-fn around_origin(positions: Vec<DVec3>, faces: &Faces) -> (DVec3, Vec<Vec3>) {
+fn relative_to_origin(positions: Vec<DVec3>, faces: &Faces) -> (DVec3, Vec<Vec3>) {
     let least = DVec3::splat(f64::from(f32::MIN));
     let place = |corner: &u32| positions.get(*corner as usize).copied().unwrap_or(DVec3::NAN);
     let held = |place: &DVec3| place.cmpge(least).all() && place.cmple(-least).all();
@@ -114,7 +114,10 @@ fn no_usable_face(faces: usize, dropped: Dropped) -> String {
 }
 
 /// Warns about self-intersecting polygons.
-fn crossing_faces((count, first): (u64, usize), line_of: impl Fn(usize) -> Option<usize>) -> Option<String> {
+fn self_intersection_warning(
+    (count, first): (u64, usize),
+    line_of: impl Fn(usize) -> Option<usize>,
+) -> Option<String> {
     let first_face = || match line_of(first) {
         Some(line) => format!("line {line}: face {}", first + 1),
         None => format!("face {}", first + 1),
@@ -155,8 +158,8 @@ impl<'a> Cutter<'a> {
         }
     }
 
-    fn cut_all(&mut self, source: &MeshSource<'_>, faces: &Faces) -> Result<(), AssetError> {
-        if self.take_as_they_are(faces) {
+    fn add_all_faces(&mut self, source: &MeshSource<'_>, faces: &Faces) -> Result<(), AssetError> {
+        if self.copy_valid_triangles(faces) {
             return Ok(());
         }
         self.triangles.reserve(faces.len());
@@ -171,7 +174,7 @@ impl<'a> Cutter<'a> {
             if corners.iter().any(|&corner| corner as usize >= self.positions.len()) {
                 return Err(source.wrong(index_out_of_range(face + 1)));
             }
-            self.cut(corners, face);
+            self.add_face(corners, face);
             if self.triangles.len() > self.most_triangles {
                 return Err(source.wrong(too_many_triangles(self.most_triangles)));
             }
@@ -184,7 +187,7 @@ impl<'a> Cutter<'a> {
 
     /// Fast path for meshes with only valid triangles: copies all faces in parallel. Returns false for other
     /// meshes.
-    fn take_as_they_are(&mut self, faces: &Faces) -> bool {
+    fn copy_valid_triangles(&mut self, faces: &Faces) -> bool {
         let (triangles, _) = faces.corners.as_chunks();
         let in_range = |corner: &u32| (*corner as usize) < self.positions.len();
         let good = |triangle: &[u32; 3]| {
@@ -203,8 +206,8 @@ impl<'a> Cutter<'a> {
         all
     }
 
-    /// Adds the triangles of a face, or counts it as dropped.
-    fn cut(&mut self, corners: &[u32], face: usize) {
+    /// Adds the triangles of a face, or counts the face as dropped.
+    fn add_face(&mut self, corners: &[u32], face: usize) {
         let before = self.triangles.len();
         if corners.iter().any(|&corner| !self.positions[corner as usize].is_finite()) {
             self.dropped.non_finite += 1;
@@ -212,7 +215,7 @@ impl<'a> Cutter<'a> {
         }
         match *corners {
             [a, b, c] => self.keep([a, b, c]),
-            _ => self.cut_polygon(corners, face),
+            _ => self.triangulate_polygon(corners, face),
         }
         if self.triangles.len() == before {
             self.dropped.degenerate += 1;
@@ -220,7 +223,7 @@ impl<'a> Cutter<'a> {
     }
 
     /// Triangulates a polygon. Drops repeated corners, as in quads at a pole.
-    fn cut_polygon(&mut self, corners: &[u32], face: usize) {
+    fn triangulate_polygon(&mut self, corners: &[u32], face: usize) {
         let place = |corner: u32| self.positions[corner as usize];
         let mut distinct = corners.to_vec();
         distinct.dedup_by(|a, b| place(*a) == place(*b));
@@ -252,7 +255,7 @@ fn has_area([a, b, c]: [Vec3; 3]) -> bool {
     (b - a).cross(c - a) != DVec3::ZERO
 }
 
-/// Removes unused vertices. They may contain arbitrary values and would enlarge the bounds.
+/// Removes unused vertices, which may have arbitrary coordinates and would enlarge the bounds.
 fn drop_unused_vertices(mesh: &mut TriangleMesh) {
     let mut new_index = vec![u32::MAX; mesh.positions.len()];
     for &corner in mesh.triangles.as_flattened() {
@@ -310,7 +313,7 @@ mod tests {
         let mut faces = Faces::default();
         for face in list {
             face.iter().for_each(|&corner| faces.corner(corner));
-            faces.close(face.len());
+            faces.end_face(face.len());
         }
         faces
     }
@@ -376,8 +379,8 @@ mod tests {
         let monitor = Monitor { progress: &ignore_progress, token: &token };
         let source = MeshSource { path: Path::new("a.off"), bytes: &[], monitor };
         for list in [&[&[0, 1, 2][..], &[0, 2, 3]][..], &[&[0, 1, 2, 3]]] {
-            assert!(Cutter::new(&SQUARE, &[], 2).cut_all(&source, &faces(list)).is_ok());
-            let result = Cutter::new(&SQUARE, &[], 1).cut_all(&source, &faces(list));
+            assert!(Cutter::new(&SQUARE, &[], 2).add_all_faces(&source, &faces(list)).is_ok());
+            let result = Cutter::new(&SQUARE, &[], 1).add_all_faces(&source, &faces(list));
             assert_eq!(rejection(result), (None, super::too_many_triangles(1)));
         }
     }
@@ -391,10 +394,13 @@ mod tests {
             assembled(parsed).expect("has area").warnings
         };
         assert!(warnings(&[&[0, 1, 3, 2]]).is_empty());
-        assert_eq!(warnings(&[&[0, 1, 2], &[0, 1, 2, 3]]), Vec::from_iter(crossing_faces((1, 1), |_| None)));
+        assert_eq!(
+            warnings(&[&[0, 1, 2], &[0, 1, 2, 3]]),
+            Vec::from_iter(self_intersection_warning((1, 1), |_| None))
+        );
         assert_eq!(
             warnings(&[&[0, 1, 2, 3], &[0, 1, 3, 2], &[2, 3, 0, 1]]),
-            Vec::from_iter(crossing_faces((2, 0), |_| None))
+            Vec::from_iter(self_intersection_warning((2, 0), |_| None))
         );
     }
 

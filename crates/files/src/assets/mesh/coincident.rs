@@ -17,37 +17,40 @@ type HashedVertex = (u32, u32);
 
 /// Finds sets of coincident vertices, each in ascending order. The order of the sets is arbitrary but
 /// deterministic.
-pub(super) fn find(positions: &[Vec3], token: &CancelToken) -> Result<Vec<Vec<u32>>, Cancelled> {
+pub(super) fn find_coincident_vertices(
+    positions: &[Vec3],
+    token: &CancelToken,
+) -> Result<Vec<Vec<u32>>, Cancelled> {
     let bits = positions.len().div_ceil(BUCKET).next_power_of_two().ilog2();
     let mut hashes = vec![0; positions.len()];
     for (hashes, positions) in hashes.chunks_mut(BATCH).zip(positions.chunks(BATCH)) {
         token.check()?;
         hashes.par_iter_mut().zip(positions).for_each(|(hash, position)| *hash = hash_of(*position));
     }
-    let (entries, ends) = scatter(&hashes, bits, token)?;
+    let (entries, ends) = sort_into_buckets(&hashes, bits, token)?;
     let starts = std::iter::once(0).chain(ends.iter().copied());
     let buckets: Vec<_> = starts.zip(&ends).map(|(start, end)| &entries[start..*end]).collect();
     let found: Result<Vec<_>, Cancelled> =
-        buckets.par_iter().map(|bucket| in_bucket(bucket, positions, token)).collect();
+        buckets.par_iter().map(|bucket| find_in_bucket(bucket, positions, token)).collect();
     Ok(found?.into_iter().flatten().collect())
 }
 
 /// Bit pattern of a position. Adding 0 converts −0 to 0.
-fn place(position: Vec3) -> [u32; 3] {
+fn position_bits(position: Vec3) -> [u32; 3] {
     (position + Vec3::ZERO).to_array().map(f32::to_bits)
 }
 
 /// Multiplicative hash (Knuth, *The Art of Computer Programming*, vol. 3, section 6.4). The upper bits are
-/// the best mixed.
+/// mixed best.
 fn hash_of(position: Vec3) -> u32 {
-    let [x, y, z] = place(position).map(u64::from);
+    let [x, y, z] = position_bits(position).map(u64::from);
     let mixed = (x | y << 32).wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ z.wrapping_mul(0xc2b2_ae3d_27d4_eb4f);
     ((mixed ^ mixed >> 29).wrapping_mul(0xbf58_476d_1ce4_e5b9) >> 32) as u32
 }
 
 /// Sorts vertices into buckets by the upper bits of their hashes. Returns the vertices and the end of each
 /// bucket.
-fn scatter(
+fn sort_into_buckets(
     hashes: &[u32],
     bits: u32,
     token: &CancelToken,
@@ -75,7 +78,7 @@ fn scatter(
 }
 
 /// Finds the coincident vertices in a bucket by grouping by hash, then by position.
-fn in_bucket(
+fn find_in_bucket(
     bucket: &[HashedVertex],
     positions: &[Vec3],
     token: &CancelToken,
@@ -85,8 +88,10 @@ fn in_bucket(
     entries.sort_unstable();
     let mut found = Vec::new();
     for same_hash in entries.chunk_by(|a, b| a.0 == b.0).filter(|group| group.len() > 1) {
-        let mut order: Vec<_> =
-            same_hash.iter().map(|&(_, vertex)| (place(positions[vertex as usize]), vertex)).collect();
+        let mut order: Vec<_> = same_hash
+            .iter()
+            .map(|&(_, vertex)| (position_bits(positions[vertex as usize]), vertex))
+            .collect();
         order.sort_unstable();
         let groups = order.chunk_by(|a, b| a.0 == b.0).filter(|group| group.len() > 1);
         found.extend(groups.map(|group| group.iter().map(|(_, vertex)| *vertex).collect()));
@@ -103,12 +108,12 @@ mod tests {
         // Positions repeat after 5000 vertices; −0 equals 0.
         let at = |i: u32| Vec3::new((i % 5000) as f32, 0.25, if i < 5000 { 0.0 } else { -0.0 });
         let positions: Vec<_> = (0..20_000).map(at).chain([Vec3::splat(9.0), Vec3::splat(8.0)]).collect();
-        let mut found = find(&positions, &CancelToken::new()).expect("not cancelled");
+        let mut found = find_coincident_vertices(&positions, &CancelToken::new()).expect("not cancelled");
         found.sort_unstable();
         let expected: Vec<Vec<u32>> =
             (0..5000).map(|i| (0..4).map(|turn| i + 5000 * turn).collect()).collect();
         assert_eq!(found, expected);
-        assert_eq!(find(&[], &CancelToken::new()), Ok(Vec::new()));
+        assert_eq!(find_coincident_vertices(&[], &CancelToken::new()), Ok(Vec::new()));
     }
 
     #[test]

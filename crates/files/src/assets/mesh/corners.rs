@@ -15,11 +15,11 @@ type CornerKey = (u32, [u32; 2], [u8; 3]);
 
 /// Creates a vertex for each distinct combination of vertex, texture coordinates and color among the corners.
 /// New vertices keep the original vertex's normal.
-pub(super) fn split(parsed: &mut ParsedMesh, token: &CancelToken) -> Result<(), Cancelled> {
+pub(super) fn split_vertices(parsed: &mut ParsedMesh, token: &CancelToken) -> Result<(), Cancelled> {
     let (uvs, colors) = (std::mem::take(&mut parsed.corner_uvs), std::mem::take(&mut parsed.corner_colors));
     let vertices = parsed.positions.len();
     let is_in_range = |corner: &u32| (*corner as usize) < vertices;
-    // Do not report out-of-range indices here. `assemble` reports them with the face.
+    // Do not report out-of-range indices here. `assemble` reports them together with the face.
     if (uvs.is_empty() && colors.is_empty()) || !parsed.faces.corners.iter().all(is_in_range) {
         return Ok(());
     }
@@ -42,11 +42,11 @@ pub(super) fn split(parsed: &mut ParsedMesh, token: &CancelToken) -> Result<(), 
             new_colors.push(color);
         }
     }
-    take(&mut parsed.positions, &sources);
-    take(&mut parsed.normals, &sources);
-    take(&mut parsed.uvs, &sources);
-    take(&mut parsed.second_uvs, &sources);
-    take(&mut parsed.colors, &sources);
+    gather_values(&mut parsed.positions, &sources);
+    gather_values(&mut parsed.normals, &sources);
+    gather_values(&mut parsed.uvs, &sources);
+    gather_values(&mut parsed.second_uvs, &sources);
+    gather_values(&mut parsed.colors, &sources);
     if !uvs.is_empty() {
         parsed.uvs = new_uvs;
     }
@@ -59,7 +59,7 @@ pub(super) fn split(parsed: &mut ParsedMesh, token: &CancelToken) -> Result<(), 
 }
 
 /// Replaces `values` with the value of each source. An empty list stays empty.
-fn take<T: Copy>(values: &mut Vec<T>, sources: &[usize]) {
+fn gather_values<T: Copy>(values: &mut Vec<T>, sources: &[usize]) {
     if !values.is_empty() {
         *values = sources.iter().map(|vertex| values[*vertex]).collect();
     }

@@ -1,5 +1,5 @@
-//! Mesh files: OBJ with MTL, OFF, PLY and STL. Each parser returns the numbers in the file, from which
-//! `assemble` builds a valid [`TriangleMesh`](crate::geometry::mesh::TriangleMesh).
+//! Mesh files: OBJ with MTL, OFF, PLY and STL. Each parser returns the numbers in the file. `assemble` then
+//! builds a valid [`TriangleMesh`](crate::geometry::mesh::TriangleMesh).
 
 pub(crate) mod assemble;
 mod coincident;
@@ -32,8 +32,8 @@ pub const EXTENSIONS: [&str; 4] = ["obj", "off", "ply", "stl"];
 ///
 /// Polygons are triangulated. Unusable faces are skipped and counted. Unused vertices are removed. Normals
 /// have unit length. Missing normals are computed, except that a file without any normals produces a mesh
-/// without normals. The texture coordinate v is 0 at the bottom, as in the file. Progress is in bytes, and
-/// counts every byte twice: when it is read and when it is parsed.
+/// without normals. The texture coordinate v is 0 at the bottom, as in the file. Progress is measured in
+/// bytes. Every byte is counted twice: when it is read and when it is parsed.
 ///
 /// # Errors
 /// - [`AssetError::Unreadable`] if the file is not a regular file with a known extension and at most 4 GiB.
@@ -52,7 +52,7 @@ pub fn load(path: &Path, progress: Progress<'_>, token: &CancelToken) -> Result<
     };
     let monitor = Monitor { progress, token };
     let bytes = read(path, FILE_LIMIT, monitor)?;
-    let source = MeshSource { path, bytes: text::without_mark(&bytes), monitor };
+    let source = MeshSource { path, bytes: text::strip_byte_order_mark(&bytes), monitor };
     if source.bytes.is_empty() {
         return Err(source.wrong(EMPTY_FILE));
     }

@@ -11,33 +11,33 @@ use crate::control::{CancelToken, Cancelled};
 use crate::geometry::mesh::{NormalGroup, TriangleMesh};
 use crate::math::{DVec3, Vec3};
 
-/// Minimum cosine between normals that are merged. Coincident vertices are joined if their normals differ by
-/// at most 45 degrees (a texture seam). Otherwise they form a sharp edge (a box with separate sides).
+/// Minimum cosine between normals to merge. Coincident vertices are merged if their normals differ by at most
+/// 45 degrees, as at a texture seam. Otherwise, they form a sharp edge, as in a box with separate sides.
 const SEAM_COSINE: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
-/// Maximum number of coincident vertices to compare pairwise, which takes quadratic time. Larger sets are
-/// merged without comparing normals.
+/// Maximum number of coincident vertices whose normals are compared pairwise, which takes quadratic time.
+/// Larger sets are merged without comparing normals.
 const COMPARED: usize = 64;
 
 /// Number of triangles or vertices between two polls of the cancel token.
 const BATCH: usize = 1 << 16;
 
-/// Computes a unit normal for each vertex, weighted by angle, on the front side of its faces. Coincident
-/// vertices share a normal if they are in the same [`NormalGroup`] and their normals differ by at most 45
-/// degrees. If the face normals cancel out, the normal of one face is used. The result does not depend on the
-/// number of threads.
+/// Computes a unit normal for each vertex, which points to the front side of its faces. Each face is weighted
+/// by its angle at the vertex. Coincident vertices share a normal if they are in the same [`NormalGroup`] and
+/// their normals differ by at most 45 degrees. If the face normals cancel out, the normal of one face is
+/// used. The result does not depend on the number of threads.
 ///
 /// # Errors
 /// [`Cancelled`].
 pub fn vertex_normals(mesh: &TriangleMesh, token: &CancelToken) -> Result<Vec<Vec3>, Cancelled> {
     let mut sums = weighted_sums(mesh, token)?;
     let groups = &mesh.normal_groups;
-    let firsts = first_of_each_normal(groups);
+    let firsts = first_vertex_with_same_normal(groups);
     for (vertex, first) in firsts.iter().enumerate().filter(|(vertex, first)| vertex != *first) {
         let own = std::mem::take(&mut sums[vertex]);
         sums[*first] += own;
     }
-    let places = coincident::find(&mesh.positions, token)?;
+    let places = coincident::find_coincident_vertices(&mesh.positions, token)?;
     let mut joined = sums.clone();
     for place in &places {
         token.check()?;
@@ -63,13 +63,13 @@ pub fn vertex_normals(mesh: &TriangleMesh, token: &CancelToken) -> Result<Vec<Ve
         normals.par_iter_mut().zip(sums).for_each(|(normal, sum)| *normal = unit(sum));
     }
     if normals.contains(&Vec3::ZERO) {
-        take_face_normals(mesh, &mut normals, token)?;
+        replace_canceled_normals(mesh, &mut normals, token)?;
     }
     Ok(normals)
 }
 
 /// For each vertex, the first vertex with the same normal. Empty if there are no groups.
-fn first_of_each_normal(groups: &[NormalGroup]) -> Vec<usize> {
+fn first_vertex_with_same_normal(groups: &[NormalGroup]) -> Vec<usize> {
     let numbers = groups.iter().map(|group| group.normal as usize + 1).max().unwrap_or(0);
     let mut firsts = vec![usize::MAX; numbers];
     let first_of = |(vertex, group): (usize, &NormalGroup)| {
@@ -80,8 +80,8 @@ fn first_of_each_normal(groups: &[NormalGroup]) -> Vec<usize> {
     groups.iter().enumerate().map(first_of).collect()
 }
 
-/// Whether a mesh without normals consists of flat faces, like a box. In such a mesh, the face normals around
-/// most vertices partly cancel.
+/// Whether a mesh without normals consists of flat faces, like a box. In a faceted mesh, the face normals
+/// around most vertices partly cancel out.
 pub(crate) fn is_faceted(mesh: &TriangleMesh) -> bool {
     /// Minimum length of the mean unit normal around a vertex of a smooth surface. A cone with a half-angle
     /// of 32 degrees has this length.
@@ -90,7 +90,7 @@ pub(crate) fn is_faceted(mesh: &TriangleMesh) -> bool {
     if !mesh.normals.is_empty() || groups.iter().any(|group| group.group != NormalGroup::BY_ANGLE) {
         return false;
     }
-    let firsts = first_of_each_normal(groups);
+    let firsts = first_vertex_with_same_normal(groups);
     let mut sums = vec![(Vec3::ZERO, 0_u32); mesh.positions.len()];
     for corners in &mesh.triangles {
         let [a, b, c] = corners.map(|corner| mesh.positions[corner as usize]);
@@ -157,14 +157,14 @@ fn corner_weights([a, b, c]: [Vec3; 3]) -> (DVec3, [f64; 3]) {
     if doubled_area == 0.0 {
         return (DVec3::ZERO, [0.0; 3]);
     }
-    let angle = |from: DVec3, to: DVec3| angle(-from.dot(to), doubled_area);
+    let angle = |from: DVec3, to: DVec3| fast_atan2(-from.dot(to), doubled_area);
     (cross / doubled_area, [angle(ca, ab), angle(ab, bc), angle(bc, ca)])
 }
 
 /// Computes `atan2(y, x)` for y > 0 with a relative error of at most 2e-8 (Abramowitz and Stegun, *Handbook
 /// of Mathematical Functions*, 4.4.49). This is accurate enough for weights and avoids unpredictable
 /// branches.
-fn angle(x: f64, y: f64) -> f64 {
+fn fast_atan2(x: f64, y: f64) -> f64 {
     const STARTS: [f64; 4] = [0.0, FRAC_PI_2, PI, FRAC_PI_2];
     const SIGNS: [f64; 4] = [1.0, -1.0, -1.0, 1.0];
     let octant = usize::from(y > x.abs()) | usize::from(x < 0.0) << 1;
@@ -194,7 +194,7 @@ fn join(group: &[u32], sums: &[DVec3], joined: &mut [DVec3]) {
 
 /// Assigns a normal to vertices whose face normals cancel out: the normal of one of the faces, or +y for
 /// vertices without faces.
-fn take_face_normals(
+fn replace_canceled_normals(
     mesh: &TriangleMesh,
     normals: &mut [Vec3],
     token: &CancelToken,
@@ -292,7 +292,7 @@ mod tests {
         for i in 0..1000 {
             let (x, y) = ((f64::from(i) * 0.7).sin() * 3.0, (0.02 * f64::from(i) - 15.0).exp());
             let exact = y.atan2(x);
-            assert!((angle(x, y) - exact).abs() <= 3e-8 * exact, "({x}, {y})");
+            assert!((fast_atan2(x, y) - exact).abs() <= 3e-8 * exact, "({x}, {y})");
         }
     }
 

@@ -17,7 +17,7 @@ struct OffHeader {
     uvs: bool,
     normals: bool,
     colors: bool,
-    /// Whether coordinates are homogeneous: the first three are divided by a fourth.
+    /// Whether coordinates are homogeneous. If so, the first three are divided by the fourth.
     homogeneous: bool,
 }
 
@@ -154,8 +154,8 @@ impl OffReader<'_> {
         let header = self.header()?;
         let vertices = self.count("vertices")?;
         let faces = self.count("faces")?;
-        self.end_counts()?;
-        self.plausible(vertices, faces)?;
+        self.skip_edge_count()?;
+        self.check_plausible_counts(vertices, faces)?;
         let mut parsed = ParsedMesh::default();
         self.vertices(header, vertices, &mut parsed)?;
         let before_faces = self;
@@ -175,7 +175,7 @@ impl OffReader<'_> {
     fn start_of_face(&self, vertices: u64, face: usize) -> Option<usize> {
         let mut ahead = *self;
         ahead.faces(vertices, face as u64, &mut ParsedMesh::default()).ok()?;
-        ahead.cursor.skip_blank();
+        ahead.cursor.skip_to_word();
         Some(ahead.cursor.at())
     }
 
@@ -190,7 +190,7 @@ impl OffReader<'_> {
 
     /// Reads the optional header keyword `[ST][C][N][4]OFF`. A count may follow without whitespace.
     fn header(&mut self) -> Result<OffHeader, AssetError> {
-        if !self.cursor.skip_blank() {
+        if !self.cursor.skip_to_word() {
             return self.wrong(EMPTY_FILE);
         }
         let start = self.cursor;
@@ -216,14 +216,14 @@ impl OffReader<'_> {
 
     fn refuse_binary(&mut self) -> Result<(), AssetError> {
         let mut ahead = self.cursor;
-        if ahead.skip_in_line() && ahead.word() == b"BINARY" {
+        if ahead.skip_to_word_in_line() && ahead.word() == b"BINARY" {
             return self.wrong(BINARY_OFF);
         }
         Ok(())
     }
 
     fn count(&mut self, of: &str) -> Result<u64, AssetError> {
-        if !self.cursor.skip_blank() {
+        if !self.cursor.skip_to_word() {
             let end = self.source.bytes.trim_ascii_end().len();
             return Err(self.source.wrong_at(end, missing_count(of)));
         }
@@ -241,12 +241,12 @@ impl OffReader<'_> {
         }
     }
 
-    /// Reads the optional number of edges and the end of the line. Ignores the number.
-    fn end_counts(&mut self) -> Result<(), AssetError> {
-        if self.cursor.skip_in_line() {
+    /// Skips the optional number of edges and the end of the line.
+    fn skip_edge_count(&mut self) -> Result<(), AssetError> {
+        if self.cursor.skip_to_word_in_line() {
             self.number("edges")?;
         }
-        if self.cursor.skip_in_line() {
+        if self.cursor.skip_to_word_in_line() {
             let mut ahead = self.cursor;
             return self.wrong(counts_not_alone(ahead.word()));
         }
@@ -255,7 +255,7 @@ impl OffReader<'_> {
     }
 
     /// Checks the counts against the file size. A vertex takes at least 6 bytes, a face at least 2.
-    fn plausible(&self, vertices: u64, faces: u64) -> Result<(), AssetError> {
+    fn check_plausible_counts(&self, vertices: u64, faces: u64) -> Result<(), AssetError> {
         let needed = vertices.saturating_mul(6).saturating_add(faces.saturating_mul(2));
         let remaining = self.cursor.remaining() as u64;
         if needed > remaining + 1 || vertices > u64::from(u32::MAX) {
@@ -272,7 +272,7 @@ impl OffReader<'_> {
             if index % BATCH == 0 {
                 self.source.tick(self.cursor.at())?;
             }
-            if !self.cursor.skip_blank() {
+            if !self.cursor.skip_to_word() {
                 return self.wrong(truncated(index, count, "vertices"));
             }
             let position = self.triple("a coordinate")?;
@@ -292,8 +292,8 @@ impl OffReader<'_> {
                 }
                 self.color(color, 1, &mut colors);
             } else if header.uvs {
-                parsed.uvs.push(self.last_two()?);
-            } else if self.cursor.skip_in_line() {
+                parsed.uvs.push(self.read_uv()?);
+            } else if self.cursor.skip_to_word_in_line() {
                 self.excess.add(self.cursor.at());
             }
             self.cursor.end_line();
@@ -318,7 +318,7 @@ impl OffReader<'_> {
     }
 
     fn float(&mut self, what: &str) -> Result<f64, AssetError> {
-        if !self.cursor.skip_in_line() {
+        if !self.cursor.skip_to_word_in_line() {
             return self.wrong(expected_at_line_end(what));
         }
         match self.cursor.float() {
@@ -330,16 +330,16 @@ impl OffReader<'_> {
     /// Reads the remaining numbers of the line: a color of any length, and texture coordinates.
     fn rest_of_line(&mut self) -> Result<Vec<f64>, AssetError> {
         let mut rest = Vec::new();
-        while self.cursor.skip_in_line() {
+        while self.cursor.skip_to_word_in_line() {
             rest.push(self.float("a number")?);
         }
         Ok(rest)
     }
 
-    /// Reads texture coordinates, which are the last two numbers of a line, after a color of any length.
-    fn last_two(&mut self) -> Result<Vec2, AssetError> {
+    /// Reads texture coordinates: the last two numbers of the line, possibly after a color of any length.
+    fn read_uv(&mut self) -> Result<Vec2, AssetError> {
         let mut last = DVec2::new(self.float("u")?, self.float("v")?);
-        while self.cursor.skip_in_line() {
+        while self.cursor.skip_to_word_in_line() {
             last = DVec2::new(last.y, self.float("a number")?);
         }
         Ok(last.as_vec2())
@@ -352,7 +352,7 @@ impl OffReader<'_> {
             if index % BATCH == 0 {
                 self.source.tick(self.cursor.at())?;
             }
-            if !self.cursor.skip_blank() {
+            if !self.cursor.skip_to_word() {
                 return self.wrong(truncated(index, count, "faces"));
             }
             self.face(vertices, parsed, &mut colors)?;
@@ -371,7 +371,7 @@ impl OffReader<'_> {
             return self.wrong(too_many_corners(arity));
         }
         for corner in 0..arity {
-            if !self.cursor.skip_in_line() && (corner == 0 || !self.cursor.skip_blank()) {
+            if !self.cursor.skip_to_word_in_line() && (corner == 0 || !self.cursor.skip_to_word()) {
                 return self.wrong(short_face(corner, arity));
             }
             match self.cursor.integer() {
@@ -380,9 +380,9 @@ impl OffReader<'_> {
                 None => return self.unexpected("a vertex"),
             }
         }
-        parsed.faces.close(arity);
+        parsed.faces.end_face(arity);
         let (mut color, mut count) = ([0.0; 5], 0);
-        while count < color.len() && self.cursor.skip_in_line() {
+        while count < color.len() && self.cursor.skip_to_word_in_line() {
             let Some(number) = self.cursor.float() else {
                 self.excess.add(self.cursor.at());
                 break;

@@ -14,18 +14,18 @@ use crate::math::{DVec3, Vec2, Vec3};
 #[derive(Debug, Default)]
 pub(crate) struct Faces {
     pub(super) corners: Vec<u32>,
-    /// Number of corners of each face. Empty if all faces are triangles.
+    /// Number of corners per face. Empty if all faces are triangles.
     pub(super) arities: Vec<u32>,
 }
 
 impl Faces {
-    /// Adds a corner to the current face. Call [`Faces::close`] to end the face.
+    /// Adds a corner to the current face. Call [`Faces::end_face`] after the last corner.
     pub(crate) fn corner(&mut self, vertex: u32) {
         self.corners.push(vertex);
     }
 
     /// Ends the current face, which has `arity` corners.
-    pub(crate) fn close(&mut self, arity: usize) {
+    pub(crate) fn end_face(&mut self, arity: usize) {
         if self.arities.is_empty() && arity == 3 {
             return;
         }
@@ -43,7 +43,7 @@ impl Faces {
     /// Replaces coincident vertices with the first one.
     pub(super) fn join(&mut self, positions: &[Vec3], token: &CancelToken) -> Result<(), Cancelled> {
         let mut first: Vec<u32> = (0..positions.len() as u32).collect();
-        for place in coincident::find(positions, token)? {
+        for place in coincident::find_coincident_vertices(positions, token)? {
             place.iter().for_each(|&vertex| first[vertex as usize] = place[0]);
         }
         self.corners.par_iter_mut().for_each(|corner| *corner = first[*corner as usize]);
@@ -76,7 +76,7 @@ pub(crate) struct ParsedMesh {
     pub(crate) corner_uvs: Vec<Vec2>,
     /// Color of each face corner, or empty.
     pub(crate) corner_colors: Vec<[u8; 3]>,
-    /// Whether faces do not share vertices, in which case coincident vertices must be joined.
+    /// Whether every corner is a separate vertex. If so, coincident vertices must be merged.
     pub(crate) has_separate_corners: bool,
     pub(crate) face_materials: Vec<u32>,
     pub(crate) materials: Vec<FileMaterial>,

@@ -1,9 +1,9 @@
 //! STL: facets defined by their corners, as text or binary (3D Systems, *StereoLithography Interface
 //! Specification*, 1989). Many files deviate from the specification: binary headers may begin with "solid",
 //! counts may be too small, facets may be polygons, there may be several solids, normals may be zero or
-//! wrong, and keywords may be in any case. The normals in the file are ignored and determined from the order
-//! of the corners. Coincident corners are merged into one vertex. The format has no units and no standard
-//! colors.
+//! wrong, and keywords may be in any case. Normals in the file are ignored. They are computed from the order
+//! of the corners instead. Coincident corners are merged into one vertex. The format has no units and no
+//! standard colors.
 
 use super::assemble::{assemble, assemble_text};
 use super::parsed::{Faces, ParsedMesh};
@@ -16,16 +16,16 @@ use crate::math::DVec3;
 const HEADER: usize = 80;
 /// Offset of the first facet.
 const START: usize = HEADER + 4;
-/// Size of a facet: a normal and three corners with three floats each, and a two-byte attribute.
+/// Size of a facet: a normal and three corners (three floats each), followed by a two-byte attribute.
 const FACET: usize = 50;
 /// Number of facets (binary) or words (text) between two polls of the cancel token.
 const BATCH: usize = 1 << 13;
 
 pub(super) fn parse(source: &MeshSource<'_>) -> Result<LoadedMesh, AssetError> {
-    if !fits_claim(source.bytes) {
+    if !has_binary_size(source.bytes) {
         read::refuse_utf16(source.path, source.bytes)?;
     }
-    match encoding(source.bytes) {
+    match detect_encoding(source.bytes) {
         StlEncoding::Text => {
             let bytes = with_line_feeds(source.bytes);
             let source = MeshSource { bytes: &bytes, ..*source };
@@ -34,7 +34,9 @@ pub(super) fn parse(source: &MeshSource<'_>) -> Result<LoadedMesh, AssetError> {
             let parsed = ParsedMesh { has_separate_corners: true, ..reader.read()? };
             assemble_text(&source, parsed, |face| reader.start_of(face))
         }
-        StlEncoding::Binary => assemble(source, ParsedMesh { has_separate_corners: true, ..binary(source)? }),
+        StlEncoding::Binary => {
+            assemble(source, ParsedMesh { has_separate_corners: true, ..read_binary(source)? })
+        }
     }
 }
 
@@ -46,29 +48,29 @@ enum StlEncoding {
 
 /// Detects the encoding. If the file size matches the number of facets in a binary header, the file is
 /// binary, regardless of what the header contains.
-fn encoding(bytes: &[u8]) -> StlEncoding {
+fn detect_encoding(bytes: &[u8]) -> StlEncoding {
     let word = bytes.trim_ascii_start().get(..5);
     let says_solid = word.is_some_and(|word| word.eq_ignore_ascii_case(b"solid"));
     // Text has no zero bytes. Binary files contain zeros in the header, or in the facets if the header is
     // padded with blanks.
     let is_text = says_solid && memchr::memchr(0, bytes).is_none();
-    if is_text && !fits_claim(bytes) { StlEncoding::Text } else { StlEncoding::Binary }
+    if is_text && !has_binary_size(bytes) { StlEncoding::Text } else { StlEncoding::Binary }
 }
 
 /// Whether the file size matches the number of facets, assuming a binary file.
-fn fits_claim(bytes: &[u8]) -> bool {
-    claimed(bytes).is_some_and(|count| bytes.len() as u64 == START as u64 + FACET as u64 * count)
+fn has_binary_size(bytes: &[u8]) -> bool {
+    claimed_facets(bytes).is_some_and(|count| bytes.len() as u64 == START as u64 + FACET as u64 * count)
 }
 
 /// Number of facets according to a binary header. `None` if the file is too short.
-fn claimed(bytes: &[u8]) -> Option<u64> {
+fn claimed_facets(bytes: &[u8]) -> Option<u64> {
     let count = bytes.get(HEADER..START)?.first_chunk()?;
     Some(u64::from(u32::from_le_bytes(*count)))
 }
 
 /// Reads a binary file.
-fn binary(source: &MeshSource<'_>) -> Result<ParsedMesh, AssetError> {
-    let Some(claimed) = claimed(source.bytes) else {
+fn read_binary(source: &MeshSource<'_>) -> Result<ParsedMesh, AssetError> {
+    let Some(claimed) = claimed_facets(source.bytes) else {
         return Err(source.wrong(not_stl(source.bytes.trim_ascii_start())));
     };
     let facets = source.bytes[START..].chunks_exact(FACET);
@@ -100,7 +102,7 @@ fn binary(source: &MeshSource<'_>) -> Result<ParsedMesh, AssetError> {
         for corner in 1..=3 {
             add(&mut parsed, DVec3::new(float(3 * corner), float(3 * corner + 1), float(3 * corner + 2)));
         }
-        parsed.faces.close(3);
+        parsed.faces.end_face(3);
     }
     Ok(parsed)
 }
@@ -137,7 +139,7 @@ fn add(parsed: &mut ParsedMesh, position: DVec3) {
 struct TextReader<'a> {
     source: MeshSource<'a>,
     cursor: Cursor<'a>,
-    /// Indices and loop byte offsets of faces with more than 3 corners.
+    /// Index of each face with more than 3 corners, and the byte offset of its loop.
     polygons: Vec<(usize, usize)>,
 }
 
@@ -152,7 +154,7 @@ impl TextReader<'_> {
         let mut corners: Option<usize> = None;
         let (mut loop_start, mut faces) = (0, 0);
         let mut words = 0;
-        while self.cursor.skip_blank() {
+        while self.cursor.skip_to_word() {
             if words % BATCH == 0 {
                 self.source.tick(self.cursor.at())?;
             }
@@ -179,7 +181,7 @@ impl TextReader<'_> {
                             self.polygons.push((faces, loop_start));
                         }
                         faces += 1;
-                        parsed.faces.close(count);
+                        parsed.faces.end_face(count);
                     }
                     Some(count) => return self.wrong(start, short_loop(count)),
                     None => return self.wrong(start, "\"endloop\" without \"outer loop\""),
@@ -207,7 +209,7 @@ impl TextReader<'_> {
     }
 
     fn float(&mut self) -> Result<f64, AssetError> {
-        if !self.cursor.skip_blank() {
+        if !self.cursor.skip_to_word() {
             return self.wrong(self.cursor, "the file ends inside a vertex");
         }
         let mut start = self.cursor;
@@ -227,7 +229,7 @@ impl TextReader<'_> {
             let word = bytes[at..].iter().position(is_blank).map_or(&bytes[at..], |end| &bytes[at..at + end]);
             if word.eq_ignore_ascii_case(b"facet") {
                 let mut ahead = Cursor::new(bytes, at + word.len());
-                if ahead.skip_blank() && ahead.word().eq_ignore_ascii_case(b"normal") {
+                if ahead.skip_to_word() && ahead.word().eq_ignore_ascii_case(b"normal") {
                     break;
                 }
             }
@@ -240,7 +242,7 @@ impl TextReader<'_> {
     fn skip_normal(&mut self) {
         for _ in 0..3 {
             let mut ahead = self.cursor;
-            if ahead.skip_blank() && !ahead.word().eq_ignore_ascii_case(b"outer") {
+            if ahead.skip_to_word() && !ahead.word().eq_ignore_ascii_case(b"outer") {
                 self.cursor = ahead;
             }
         }

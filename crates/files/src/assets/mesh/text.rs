@@ -13,7 +13,7 @@ pub(super) fn with_line_feeds(bytes: &[u8]) -> Cow<'_, [u8]> {
 }
 
 /// Strips a UTF-8 byte order mark.
-pub(super) fn without_mark(bytes: &[u8]) -> &[u8] {
+pub(super) fn strip_byte_order_mark(bytes: &[u8]) -> &[u8] {
     bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes)
 }
 
@@ -48,7 +48,7 @@ impl<'a> Cursor<'a> {
     }
 
     /// Moves to the next word, skipping line ends and comments. Returns false at the end of the text.
-    pub(super) fn skip_blank(&mut self) -> bool {
+    pub(super) fn skip_to_word(&mut self) -> bool {
         loop {
             match self.bytes.get(self.at) {
                 None => return false,
@@ -60,7 +60,7 @@ impl<'a> Cursor<'a> {
     }
 
     /// Moves to the next word on this line. Returns false at the end of the line or at a comment.
-    pub(super) fn skip_in_line(&mut self) -> bool {
+    pub(super) fn skip_to_word_in_line(&mut self) -> bool {
         loop {
             match self.bytes.get(self.at) {
                 None | Some(b'\n' | b'#') => return false,
@@ -139,12 +139,12 @@ mod tests {
     #[test]
     fn blanks_and_comments_separate_words() {
         let mut cursor = Cursor::new(b" ab#c d\n\r\n # e\nf", 0);
-        assert!(cursor.skip_blank());
+        assert!(cursor.skip_to_word());
         assert_eq!(cursor.word(), b"ab");
-        assert!(!cursor.skip_in_line());
-        assert!(cursor.skip_blank());
+        assert!(!cursor.skip_to_word_in_line());
+        assert!(cursor.skip_to_word());
         assert_eq!(cursor.word(), b"f");
-        assert!(!cursor.skip_blank());
+        assert!(!cursor.skip_to_word());
     }
 
     #[test]

@@ -20,9 +20,9 @@ const WHITE: DVec3 = DVec3::new(
     (1_425_312.0 + 8_788_810.0 + 70_074_185.0) / 73_733_382.0,
 );
 
-/// YCxCz, a linear form of CIELAB. Used for simulating the blur of the eye.
+/// YCxCz, a linear variant of CIELAB. Used for simulating the eye's blur.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Opponent {
+pub(super) struct OpponentColor {
     /// Lightness, −16 to 100.
     pub(super) y: f64,
     /// Green to red.
@@ -31,30 +31,30 @@ pub(super) struct Opponent {
     pub(super) cz: f64,
 }
 
-impl Opponent {
+impl OpponentColor {
     /// Converts a linear color.
     pub(super) fn from_linear(rgb: DVec3) -> Self {
         let xyz = XYZ_OF_RGB * rgb / WHITE;
         Self { y: 116.0 * xyz.y - 16.0, cx: 500.0 * (xyz.x - xyz.y), cz: 200.0 * (xyz.y - xyz.z) }
     }
 
-    /// Clamps to the display's gamut and converts to [`Perceived`].
-    pub(super) fn perceived(self) -> Perceived {
+    /// Clamps to the display's gamut and converts to [`PerceivedColor`].
+    pub(super) fn perceived(self) -> PerceivedColor {
         let y = (self.y + 16.0) / 116.0;
         let xyz = DVec3::new(y + self.cx / 500.0, y, y - self.cz / 200.0) * WHITE;
-        Perceived::from_linear((*RGB_OF_XYZ * xyz).clamp(DVec3::ZERO, DVec3::ONE))
+        PerceivedColor::from_linear((*RGB_OF_XYZ * xyz).clamp(DVec3::ZERO, DVec3::ONE))
     }
 }
 
 /// CIELAB with the Hunt effect: chroma increases with lightness.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Perceived {
+pub(super) struct PerceivedColor {
     lightness: f64,
     a: f64,
     b: f64,
 }
 
-impl Perceived {
+impl PerceivedColor {
     /// Converts a linear color.
     pub(super) fn from_linear(rgb: DVec3) -> Self {
         let [x, y, z] = (XYZ_OF_RGB * rgb / WHITE).to_array().map(lightness);
@@ -76,8 +76,8 @@ fn lightness(t: f64) -> f64 {
 }
 
 /// Distance between green and blue, the two display colors that are furthest apart.
-pub(super) fn largest_distance() -> f64 {
-    Perceived::from_linear(DVec3::Y).distance(&Perceived::from_linear(DVec3::Z))
+pub(super) fn max_display_color_distance() -> f64 {
+    PerceivedColor::from_linear(DVec3::Y).distance(&PerceivedColor::from_linear(DVec3::Z))
 }
 
 #[cfg(test)]
@@ -86,16 +86,18 @@ mod tests {
 
     #[test]
     fn white_and_black_have_known_coordinates() {
-        let white = Opponent::from_linear(DVec3::ONE);
+        let white = OpponentColor::from_linear(DVec3::ONE);
         assert!((white.y - 100.0).abs() < 1e-12 && white.cx.abs() < 1e-12 && white.cz.abs() < 1e-12);
-        let distance = Perceived::from_linear(DVec3::ONE).distance(&Perceived::from_linear(DVec3::ZERO));
+        let distance =
+            PerceivedColor::from_linear(DVec3::ONE).distance(&PerceivedColor::from_linear(DVec3::ZERO));
         assert!((distance - 100.0).abs() < 1e-9, "{distance}");
     }
 
     #[test]
     fn display_colors_round_trip() {
         for rgb in [DVec3::X, DVec3::Y, DVec3::Z, DVec3::new(0.2, 0.5, 0.9), DVec3::splat(1e-4)] {
-            let distance = Opponent::from_linear(rgb).perceived().distance(&Perceived::from_linear(rgb));
+            let distance =
+                OpponentColor::from_linear(rgb).perceived().distance(&PerceivedColor::from_linear(rgb));
             assert!(distance < 1e-9, "{rgb}: {distance}");
         }
     }

@@ -7,16 +7,16 @@ use super::super::plane::{Plane, gaussian, normalized, offsets};
 
 /// A Gaussian term of a contrast sensitivity function: amplitude, and width in square degrees.
 #[derive(Clone, Copy)]
-struct Term {
+struct SensitivityTerm {
     a: f64,
     b: f64,
 }
 
 /// Achromatic, red–green and blue–yellow (table 1 of the paper; second terms of 0 are omitted).
-const SENSITIVITY: [&[Term]; 3] = [
-    &[Term { a: 1.0, b: 0.0047 }],
-    &[Term { a: 1.0, b: 0.0053 }],
-    &[Term { a: 34.1, b: 0.04 }, Term { a: 13.5, b: 0.025 }],
+const SENSITIVITY: [&[SensitivityTerm]; 3] = [
+    &[SensitivityTerm { a: 1.0, b: 0.0047 }],
+    &[SensitivityTerm { a: 1.0, b: 0.0053 }],
+    &[SensitivityTerm { a: 34.1, b: 0.04 }, SensitivityTerm { a: 13.5, b: 0.025 }],
 ];
 /// Width of the widest Gaussian.
 const WIDEST: f64 = 0.04;
@@ -26,7 +26,7 @@ const FEATURE_DEGREES: f64 = 0.082;
 const REACH: f64 = 3.0;
 
 /// A separable blur with a weight.
-struct Blur {
+struct WeightedBlur {
     weight: f64,
     taps: Vec<f64>,
 }
@@ -34,7 +34,7 @@ struct Blur {
 /// All filters for a number of pixels per degree, padded to the same length.
 pub(super) struct Filters {
     radius: usize,
-    blurs: [Vec<Blur>; 3],
+    blurs: [Vec<WeightedBlur>; 3],
     smooth: Vec<f64>,
     edge: Vec<f64>,
     point: Vec<f64>,
@@ -63,8 +63,8 @@ impl Filters {
             radius,
             blurs,
             smooth: padded(&normalized(&bell), feature_radius),
-            edge: padded(&balanced(&slope), feature_radius),
-            point: padded(&balanced(&curvature), feature_radius),
+            edge: padded(&normalize_signs_separately(&slope), feature_radius),
+            point: padded(&normalize_signs_separately(&curvature), feature_radius),
         }
     }
 
@@ -73,7 +73,7 @@ impl Filters {
         self.radius
     }
 
-    /// Blurs the opponent channels like the eye at the viewing distance.
+    /// Blurs the opponent channels as the eye does at the viewing distance.
     pub(super) fn blurred(&self, planes: &[Plane; 3]) -> [Plane; 3] {
         [0, 1, 2].map(|channel| {
             let parts = self.blurs[channel].iter().map(|blur| {
@@ -90,7 +90,7 @@ impl Filters {
     }
 
     /// Detects edges and points in the achromatic channel.
-    pub(super) fn features(&self, y: &Plane) -> Features {
+    pub(super) fn detect_features(&self, y: &Plane) -> Features {
         let lightness = Plane { values: y.values.iter().map(|y| (y + 16.0) / 116.0).collect(), ..*y };
         let smooth = lightness.along_rows(&self.smooth);
         let strengths = |taps: &[f64]| {
@@ -102,14 +102,14 @@ impl Filters {
     }
 }
 
-/// Gaussians of a channel. Their weights make the sum of all 2D taps 1.
-fn blurs(terms: &[Term], radius: usize, pixels_per_degree: f64) -> Vec<Blur> {
+/// Gaussians of a channel. Their weights are chosen so that all 2D taps sum to 1.
+fn blurs(terms: &[SensitivityTerm], radius: usize, pixels_per_degree: f64) -> Vec<WeightedBlur> {
     let volumes = terms.iter().map(|term| {
         // exp(−π²d²/b) with d in degrees.
         let sigma = (term.b / 2.0).sqrt() / PI * pixels_per_degree;
         let taps = gaussian(sigma, radius);
         let sum: f64 = taps.iter().sum();
-        Blur { weight: term.a * (PI / term.b).sqrt() * sum * sum, taps: normalized(&taps) }
+        WeightedBlur { weight: term.a * (PI / term.b).sqrt() * sum * sum, taps: normalized(&taps) }
     });
     let mut blurs: Vec<_> = volumes.collect();
     let total: f64 = blurs.iter().map(|blur| blur.weight).sum();
@@ -118,7 +118,7 @@ fn blurs(terms: &[Term], radius: usize, pixels_per_degree: f64) -> Vec<Blur> {
 }
 
 /// Scales positive taps to a sum of 1, and negative taps to a sum of −1.
-fn balanced(taps: &[f64]) -> Vec<f64> {
+fn normalize_signs_separately(taps: &[f64]) -> Vec<f64> {
     let positive: f64 = taps.iter().filter(|tap| **tap > 0.0).sum();
     let negative: f64 = -taps.iter().filter(|tap| **tap < 0.0).sum::<f64>();
     taps.iter().map(|tap| tap / if *tap > 0.0 { positive } else { negative }).collect()

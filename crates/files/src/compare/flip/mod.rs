@@ -6,7 +6,7 @@ mod filters;
 
 use rayon::prelude::*;
 
-use self::color::{Opponent, Perceived};
+use self::color::{OpponentColor, PerceivedColor};
 use self::filters::{Features, Filters};
 use super::plane::Plane;
 use super::{Pair, tiles};
@@ -25,13 +25,13 @@ const PC: f64 = 0.4;
 const PT: f64 = 0.95;
 
 /// Computes the error of each pixel, in [0, 1].
-pub(super) fn map(pair: &Pair) -> Vec<f32> {
+pub(super) fn error_map(pair: &Pair) -> Vec<f32> {
     let (width, height) = (pair.width(), pair.height());
     let filters = Filters::new(PIXELS_PER_DEGREE);
-    let max = libm::pow(color::largest_distance(), QC);
+    let max = libm::pow(color::max_display_color_distance(), QC);
     let mut map = vec![0.0; width * height];
     map.par_chunks_mut(width * tiles::SIDE).enumerate().for_each(|(band, out)| {
-        for tile in tiles::of_band(band, width, height) {
+        for tile in tiles::tiles_in_band(band, width, height) {
             let errors = tile_errors(pair, tile, &filters, max);
             let rows = errors.chunks_exact(tile.width as usize);
             for (row, out) in rows.zip(out.chunks_exact_mut(width)) {
@@ -50,12 +50,17 @@ fn tile_errors(pair: &Pair, tile: Rect, filters: &Filters, max: f64) -> Vec<f32>
 }
 
 /// Perceived colors and features of a tile of one image.
-fn tile_features(pair: &Pair, which: usize, tile: Rect, filters: &Filters) -> (Vec<Perceived>, Features) {
+fn tile_features(
+    pair: &Pair,
+    which: usize,
+    tile: Rect,
+    filters: &Filters,
+) -> (Vec<PerceivedColor>, Features) {
     let planes = opponents(pair, which, tile, filters.radius());
-    let features = filters.features(&planes[0]);
+    let features = filters.detect_features(&planes[0]);
     let [y, cx, cz] = filters.blurred(&planes);
     let blurred = y.values.iter().zip(&cx.values).zip(&cz.values);
-    let perceived = blurred.map(|((&y, &cx), &cz)| Opponent { y, cx, cz }.perceived()).collect();
+    let perceived = blurred.map(|((&y, &cx), &cz)| OpponentColor { y, cx, cz }.perceived()).collect();
     (perceived, features)
 }
 
@@ -70,7 +75,8 @@ fn opponents(pair: &Pair, which: usize, tile: Rect, margin: usize) -> [Plane; 3]
         let y = position(tile.y, row, pair.height());
         for column in 0..width {
             let pixel = pair.at(position(tile.x, column, pair.width()), y)[which];
-            let Opponent { y, cx, cz } = Opponent::from_linear(pixel.clamp(Vec3::ZERO, Vec3::ONE).as_dvec3());
+            let OpponentColor { y, cx, cz } =
+                OpponentColor::from_linear(pixel.clamp(Vec3::ZERO, Vec3::ONE).as_dvec3());
             for (plane, value) in planes.iter_mut().zip([y, cx, cz]) {
                 plane.values[row * width + column] = value;
             }

@@ -26,13 +26,17 @@ impl Dither {
     }
 
     /// Palette index of each pixel.
-    pub(super) fn indices(&self, picture: &Picture, token: &CancelToken) -> Result<Vec<u8>, Cancelled> {
+    pub(super) fn palette_indices(
+        &self,
+        picture: &Picture,
+        token: &CancelToken,
+    ) -> Result<Vec<u8>, Cancelled> {
         let mut known: HashMap<[u8; 3], [u8; MIXED]> = HashMap::new();
         let mut indices = Vec::with_capacity(picture.pixels.len());
         for (y, row) in picture.pixels.chunks(picture.width.max(1) as usize).enumerate() {
             token.check()?;
             for (x, color) in row.iter().enumerate() {
-                let mixed = known.entry(*color).or_insert_with(|| self.mixed(*color));
+                let mixed = known.entry(*color).or_insert_with(|| self.mixed_colors(*color));
                 indices.push(mixed[RANKS[y % SIDE * SIDE + x % SIDE]]);
             }
         }
@@ -40,7 +44,7 @@ impl Dither {
     }
 
     /// Palette colors whose mean approximates a color, in order of brightness.
-    fn mixed(&self, color: [u8; 3]) -> [u8; MIXED] {
+    fn mixed_colors(&self, color: [u8; 3]) -> [u8; MIXED] {
         let color = color.map(i32::from);
         let (mut mixed, mut error) = ([0; MIXED], [0; 3]);
         for entry in &mut mixed {

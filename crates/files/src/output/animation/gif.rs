@@ -40,7 +40,7 @@ pub(super) fn encode(
     let delay = frame_time(frames.len(), 100.0).round() as u16;
     let dither = Dither::new(&palette);
     let compress = |picture: &Picture| {
-        let buffer = dither.indices(picture, token)?;
+        let buffer = dither.palette_indices(picture, token)?;
         let mut frame = Frame { delay, width, height, buffer: buffer.into(), ..Frame::default() };
         frame.make_lzw_pre_encoded();
         Ok(frame)
@@ -68,7 +68,7 @@ fn palette(frames: &[Picture]) -> Vec<u8> {
     let samples: Vec<[u8; 4]> =
         all.step_by(step).map(|&[red, green, blue]| [red, green, blue, 255]).collect();
     // If there are few colors, use them all instead of quantizing.
-    let mut colors: Vec<[u8; 4]> = frames.iter().flat_map(|frame| some_colors(&frame.pixels)).collect();
+    let mut colors: Vec<[u8; 4]> = frames.iter().flat_map(|frame| distinct_colors(&frame.pixels)).collect();
     colors.sort_unstable();
     colors.dedup();
     if colors.len() <= COLORS {
@@ -78,7 +78,7 @@ fn palette(frames: &[Picture]) -> Vec<u8> {
 }
 
 /// Distinct colors of a frame, at most one more than the palette size.
-fn some_colors(pixels: &[[u8; 3]]) -> Vec<[u8; 4]> {
+fn distinct_colors(pixels: &[[u8; 3]]) -> Vec<[u8; 4]> {
     let mut colors = std::collections::BTreeSet::new();
     for &[red, green, blue] in pixels {
         colors.insert([red, green, blue, 255]);

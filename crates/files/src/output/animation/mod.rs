@@ -13,8 +13,7 @@ const TURN_SECONDS: f64 = 4.0;
 /// Minimum duration of a frame in seconds. Players show shorter frames for a tenth of a second.
 const SHORTEST_FRAME: f64 = 0.02;
 
-/// Encodes an endless animation from frames of the same size. The output for the same frames is always
-/// identical.
+/// Encodes frames of the same size as an animation that loops forever. Encoding is deterministic.
 ///
 /// # Errors
 /// The format does not support the frames, the encoder fails, or the work is cancelled

@@ -9,7 +9,7 @@ use crate::system::describe_error;
 
 /// Index of a part, and the number of parts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct WhichPart {
+pub struct PartIndex {
     /// Index of the part, starting at 1.
     pub index: u32,
     /// Number of parts.

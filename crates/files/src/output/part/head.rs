@@ -1,4 +1,5 @@
-//! Header of a part: the image, which part of it the file contains, and the encoding settings.
+//! Header of a part: properties of the image, the share of it that the file contains, and the encoding
+//! settings.
 
 use std::path::Path;
 
@@ -58,7 +59,7 @@ pub struct Dependency {
 
 impl Head {
     /// Whether all numbers are in range.
-    pub(super) fn is_possible(&self) -> bool {
+    pub(super) fn has_valid_numbers(&self) -> bool {
         /// Maximum width, height and number of parts.
         const LIMIT: u32 = 1 << 17;
         let Self { share, picture, .. } = self;
@@ -75,14 +76,14 @@ impl Head {
     }
 
     /// Returns the name of the image's input file with this hash (hexadecimal). `None` if there is none.
-    pub(super) fn input_of_hash(&self, hash: &str) -> Option<&str> {
+    pub(super) fn input_with_hash(&self, hash: &str) -> Option<&str> {
         let matches = |input: &&Dependency| input.name.starts_with(FILE) && input.value == hash;
         self.identity.iter().find(matches).map(|input| name_of(&input.name))
     }
 
     /// Finds an input file, existing or not, whose name is the end of this path. Returns the name, relative
     /// to the scene's folder.
-    pub(super) fn input_of_name(&self, path: &Path) -> Option<&str> {
+    pub(super) fn input_matching_path(&self, path: &Path) -> Option<&str> {
         let files = self.identity.iter().filter(|input| input.name.starts_with(FILE));
         files.map(|input| name_of(&input.name)).find(|name| !name.is_empty() && path.ends_with(name))
     }

@@ -21,8 +21,8 @@ pub struct Merged {
 /// Checks that parts belong to the same image. Returns the indices of missing parts.
 ///
 /// # Errors
-/// A file is not a part, belongs to another image, or is given twice. The error contains the first of these
-/// files.
+/// A file is not a part, belongs to another image, or is given twice. The error names the first file with a
+/// problem.
 pub fn check(parts: &[PartFile]) -> Result<Vec<u32>, PartError> {
     let Some(first) = parts.first() else { return Ok(Vec::new()) };
     let mut found = BTreeMap::new();
@@ -43,7 +43,7 @@ pub fn check(parts: &[PartFile]) -> Result<Vec<u32>, PartError> {
     Ok((1..=count).filter(|index| !found.contains_key(index)).collect())
 }
 
-/// Differences between the images of two headers or their division into parts.
+/// Describes how two headers differ in their image or in its division into parts.
 fn head_differences(a: &Head, b: &Head) -> Vec<String> {
     let mut found = differences(&a.identity, &b.identity, ("here", "there"));
     let counts = (a.share.count, b.share.count);
@@ -95,7 +95,7 @@ pub fn merge(
         token.check()?;
         let area = film.tile_rect(tile).map_or(0, |rect| rect.area());
         let stored = match first.head.share.block_count {
-            0 => unsplit_tile(parts, tile, area)?,
+            0 => whole_tile(parts, tile, area)?,
             blocks => sum_blocks(parts, blocks, tile, area)?,
         };
         let is_complete = stored.as_ref().is_some_and(|(_, is_complete)| *is_complete);
@@ -115,11 +115,7 @@ pub fn merge(
 }
 
 /// Returns a tile contained in a single part, and whether it has all samples.
-fn unsplit_tile(
-    parts: &[PartFile],
-    tile: usize,
-    area: usize,
-) -> Result<Option<(StoredTile, bool)>, PartError> {
+fn whole_tile(parts: &[PartFile], tile: usize, area: usize) -> Result<Option<(StoredTile, bool)>, PartError> {
     let mut found: Option<(StoredTile, &PartFile)> = None;
     for part in parts {
         let Some(stored) = part.tile(tile, area)? else { continue };

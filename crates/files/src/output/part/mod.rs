@@ -19,13 +19,13 @@ mod merge;
 mod read;
 mod save;
 
-pub use error::{PartError, WhichPart, missing_parts};
+pub use error::{PartError, PartIndex, missing_parts};
 pub use head::{Dependency, Head, ImageHead, PartKind, ShareHead, ToneHead, differences};
 pub use merge::{Merged, check, merge};
 pub use read::{PartFile, input_with_content, input_with_name, is_part};
 pub use save::save;
 
-/// Magic number. As in PNG, text file conversions corrupt it, which makes them detectable.
+/// Magic number. As in PNG, text conversions of the file corrupt this number and can be detected.
 const MARK: [u8; 12] = crate::system::file::PART_MARK;
 
 /// Version of the format.

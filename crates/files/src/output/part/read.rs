@@ -38,14 +38,14 @@ pub fn is_part(path: &Path) -> bool {
     open(path).and_then(|mut file| file.read_exact(&mut mark)).is_ok() && mark == MARK
 }
 
-/// Finds an input file of these images with the same content as the file at `path`, and returns its name. The
-/// file must not be overwritten, even if the parts were rendered on another machine. `None` if there is no
-/// such input or the file cannot be read.
+/// Finds an input file of these images with the same content as the file at `path`, and returns its name.
+/// Such a file must not be overwritten, even if the parts were rendered on another machine. `None` if there
+/// is no such input or the file cannot be read.
 pub fn input_with_content<'a>(parts: &'a [PartFile], path: &Path) -> Option<&'a str> {
     let mut hasher = blake3::Hasher::new();
     hasher.update_reader(open(path).ok()?).ok()?;
     let hash = hasher.finalize().to_hex();
-    parts.iter().find_map(|part| part.head.input_of_hash(&hash))
+    parts.iter().find_map(|part| part.head.input_with_hash(&hash))
 }
 
 /// Finds an input file of these images whose name is the end of `path`, and returns the name. Unlike
@@ -55,7 +55,7 @@ pub fn input_with_name<'a>(parts: &'a [PartFile], path: &Path) -> Option<&'a str
     let real = path.canonicalize().unwrap_or_else(|_| absolute.clone());
     parts
         .iter()
-        .find_map(|part| [&absolute, &real].into_iter().find_map(|path| part.head.input_of_name(path)))
+        .find_map(|part| [&absolute, &real].into_iter().find_map(|path| part.head.input_matching_path(path)))
 }
 
 impl PartFile {
@@ -249,7 +249,7 @@ impl PartReader<'_> {
         }
         let head: Head =
             serde_json::from_slice(&text).map_err(|_| self.damaged("the header is malformed"))?;
-        if !head.is_possible() {
+        if !head.has_valid_numbers() {
             return Err(self.damaged(IMPOSSIBLE_HEADER));
         }
         Ok((head, found))

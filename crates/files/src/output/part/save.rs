@@ -14,7 +14,7 @@ use crate::control::CancelToken;
 use crate::film::Film;
 
 /// Writes a film with its header atomically. `state` is opaque data for resuming the render. Other threads
-/// may add samples to the film in the meantime. Each tile is written in its current state. Returns the file,
+/// may keep adding samples to the film. Each tile is written in its state at that moment. Returns the file,
 /// like [`atomic_with`].
 ///
 /// # Errors

@@ -209,8 +209,7 @@ fn read_part(path: &Path) -> Result<ImageInfo, String> {
             name => info.add(name, &input.value),
         }
     }
-    // If the version is missing, the file is from this version, because files from other versions are
-    // rejected.
+    // If the version is missing, use this version, because files from other versions are rejected.
     info.program.get_or_insert_with(|| SOFTWARE.to_owned());
     Ok(info)
 }

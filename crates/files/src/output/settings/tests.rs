@@ -60,7 +60,7 @@ fn foreign_images_have_no_settings() {
     assert_eq!(read_header(b"[camera]\n"), Err(None));
 }
 
-/// Truncated or corrupted headers are errors or images without settings.
+/// A truncated or corrupted header is either an error or read as an image without settings.
 #[test]
 fn corrupt_headers_do_not_panic() {
     let options = EncodeOptions { metadata: settings(), ..EncodeOptions::default() };

@@ -24,9 +24,9 @@ pub(super) fn read_webp(mut file: impl Read + Seek) -> Option<ImageInfo> {
         };
         (&mut file).take(length.min(kept).into()).read_to_end(&mut content).ok()?;
         match &kind {
-            b"VP8X" => info.size = Some((canvas(&content, 4)?, canvas(&content, 7)?)),
-            b"VP8L" if info.size.is_none() => info.size = Some(lossless(&content)?),
-            b"XMP " => add_packet(&mut info, &String::from_utf8_lossy(&content)),
+            b"VP8X" => info.size = Some((canvas_side(&content, 4)?, canvas_side(&content, 7)?)),
+            b"VP8L" if info.size.is_none() => info.size = Some(lossless_size(&content)?),
+            b"XMP " => add_xmp_packet(&mut info, &String::from_utf8_lossy(&content)),
             _ => {}
         }
         file.seek(SeekFrom::Start(next)).ok()?;
@@ -35,22 +35,22 @@ pub(super) fn read_webp(mut file: impl Read + Seek) -> Option<ImageInfo> {
 }
 
 /// Canvas width or height in an extended file, stored as 24 bits, minus one.
-fn canvas(content: &[u8], at: usize) -> Option<u32> {
+fn canvas_side(content: &[u8], at: usize) -> Option<u32> {
     let [a, b, c] = *content.get(at..)?.first_chunk()?;
     Some(u32::from_le_bytes([a, b, c, 0]) + 1)
 }
 
 /// Size of a lossless image. Width and height are stored as 14 bits each, minus one.
-fn lossless(content: &[u8]) -> Option<(u32, u32)> {
+fn lossless_size(content: &[u8]) -> Option<(u32, u32)> {
     let bits = u32::from_le_bytes(*content.get(1..)?.first_chunk()?);
     Some(((bits & 0x3fff) + 1, (bits >> 14 & 0x3fff) + 1))
 }
 
 /// Adds the program and the description lines of an XMP packet.
-fn add_packet(info: &mut ImageInfo, packet: &str) {
+fn add_xmp_packet(info: &mut ImageInfo, packet: &str) {
     let between = |start: &str, end: &str| {
         let (_, rest) = packet.split_once(start)?;
-        Some(plain(rest.split_once(end)?.0))
+        Some(unescape_xml(rest.split_once(end)?.0))
     };
     if let Some(program) = between("xmp:CreatorTool=\"", "\"") {
         info.add("Software", &program);
@@ -61,6 +61,6 @@ fn add_packet(info: &mut ImageInfo, packet: &str) {
 }
 
 /// Unescapes XML text.
-fn plain(text: &str) -> String {
+fn unescape_xml(text: &str) -> String {
     text.replace("&quot;", "\"").replace("&gt;", ">").replace("&lt;", "<").replace("&amp;", "&")
 }

@@ -19,7 +19,7 @@ const TRAVERSAL_COST: f32 = 1.0;
 /// Minimum number of nested primitives that makes shells worthwhile.
 const NESTED_SIZE: usize = 64;
 
-/// The boxes may be nested if the best plane costs at least this fraction of not splitting.
+/// The boxes may be nested if the best plane costs at least this fraction of the cost of not splitting.
 const NESTED_COST: f32 = 0.9;
 
 /// Nested boxes are split by size if that costs less than this fraction of the best plane's cost.
@@ -103,7 +103,7 @@ struct OutputPosition {
     depth: usize,
 }
 
-/// Builds a subtree. It has fewer nodes than references.
+/// Builds a subtree, which has fewer nodes than references.
 fn build_subtree(
     references: &mut [Reference],
     nodes: &mut [BinaryNode],
@@ -207,7 +207,7 @@ struct Split {
     bins_per_length: f32,
     /// Bins below this one are on the left.
     bin: usize,
-    /// Sum over both sides of the primitive count times the surface area.
+    /// Sum of primitive count × surface area over both sides.
     cost: f32,
 }
 

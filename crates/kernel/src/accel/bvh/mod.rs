@@ -9,7 +9,7 @@ mod traverse;
 use crate::geometry::Aabb;
 
 pub use packet::{AnyTest, ClosestTest};
-pub use shell::{Met, Shell};
+pub use shell::{OverlappingItem, Shell};
 use top_node::TopNode;
 
 /// Maximum number of primitives in a leaf chosen by the surface area heuristic.

@@ -34,7 +34,7 @@ struct SlabPacket<'a> {
     inverse: [F32x16; 3],
 }
 
-/// Interval of distances in which each ray is inside a box; empty if `near` > `far`.
+/// Distance interval in which each ray is inside a box. Empty if `near` > `far`.
 #[repr(align(64))]
 struct SlabIntervals {
     near: F32x16,
@@ -75,7 +75,7 @@ impl SlabIntervals {
     /// Smallest distance at which a ray that hits the box enters it. Compares bit patterns, which order
     /// nonnegative floats correctly and ignore NaN.
     #[inline(always)]
-    fn first(&self) -> f32 {
+    fn nearest_entry(&self) -> f32 {
         let mut entries = [0; PACKET_SIZE];
         for lane in 0..PACKET_SIZE {
             let (near, far) = (self.near[lane], self.far[lane]);
@@ -87,7 +87,7 @@ impl SlabIntervals {
 
 /// Mask of the rays that hit a box before their end.
 #[inline(always)]
-fn met(stretches: &SlabIntervals, simd: impl Simd) -> u32 {
+fn hit_mask(stretches: &SlabIntervals, simd: impl Simd) -> u32 {
     let mut met = [0; PACKET_SIZE];
     for lane in 0..PACKET_SIZE {
         met[lane] = if stretches.near[lane] <= stretches.far[lane] { TRUE } else { 0 };
@@ -95,9 +95,10 @@ fn met(stretches: &SlabIntervals, simd: impl Simd) -> u32 {
     simd.movemask(&met)
 }
 
-/// Largest end of all rays; negative if no ray is traced. Compares bits as in [`SlabIntervals::first`].
+/// Largest end of all rays; negative if no ray is traced. Compares bits as in
+/// [`SlabIntervals::nearest_entry`].
 #[inline(always)]
-fn greatest(ends: &F32x16) -> f32 {
+fn largest_end(ends: &F32x16) -> f32 {
     let mut all = [0; PACKET_SIZE];
     for lane in 0..PACKET_SIZE {
         all[lane] = ends[lane].to_bits() as i32;
@@ -109,7 +110,7 @@ fn greatest(ends: &F32x16) -> f32 {
 /// child.
 type PacketStack = ArrayVec<(f32, u32, ChildRef), DEEP_STACK>;
 
-/// Subtrees of the top node that are still to be visited, nearest last.
+/// Subtrees of the top node that have not been visited yet, nearest last.
 struct PendingSubtrees {
     entry: F32x16,
     order: [u8; PACKET_SIZE],
@@ -118,7 +119,7 @@ struct PendingSubtrees {
 
 impl PendingSubtrees {
     #[inline(always)]
-    fn sorted((met, entry): (u32, F32x16)) -> Self {
+    fn sorted_by_entry((met, entry): (u32, F32x16)) -> Self {
         let mut near = Self { entry, order: [0; PACKET_SIZE], count: 0 };
         for i in lanes(met) {
             let mut place = near.count;
@@ -143,11 +144,17 @@ impl PendingSubtrees {
 impl Bvh {
     /// Mask of the top node's subtrees that the packet may hit, with lower bounds on their entry distances.
     #[inline(always)]
-    fn top_met(&self, slabs: &SlabPacket<'_>, ends: &F32x16, traced: u32, simd: impl Simd) -> (u32, F32x16) {
+    fn hit_top_subtrees(
+        &self,
+        slabs: &SlabPacket<'_>,
+        ends: &F32x16,
+        traced: u32,
+        simd: impl Simd,
+    ) -> (u32, F32x16) {
         if traced == 0 {
             return (0, [0.0; PACKET_SIZE]);
         }
-        self.top.met(&Beam::around(slabs.origin, &slabs.inverse, (ends, traced), simd), simd)
+        self.top.hit_subtrees(&Beam::around(slabs.origin, &slabs.inverse, (ends, traced), simd), simd)
     }
 
     /// Tests the primitives outside the tree, then visits the leaves that any ray of the packet may hit,
@@ -164,7 +171,7 @@ impl Bvh {
     ) {
         let slabs = SlabPacket::new(rays, simd);
         let (mut leaf, mut in_leaf) = (outside, traced);
-        let mut near = PendingSubtrees::sorted(self.top_met(&slabs, ends, traced, simd));
+        let mut near = PendingSubtrees::sorted_by_entry(self.hit_top_subtrees(&slabs, ends, traced, simd));
         let mut stack = PacketStack::new();
         loop {
             for &id in leaf {
@@ -173,7 +180,7 @@ impl Bvh {
             if stack.is_empty() && near.count == 0 {
                 return;
             }
-            let end = greatest(ends) * SLAB_PAD;
+            let end = largest_end(ends) * SLAB_PAD;
             loop {
                 let (entry, in_it, child) = match stack.pop() {
                     Some(waiting) => waiting,
@@ -183,7 +190,7 @@ impl Bvh {
                             return;
                         }
                         let (bounds, child) = self.top.subtree(i);
-                        (entry, met(&slabs.enter(&bounds, ends), simd), child)
+                        (entry, hit_mask(&slabs.enter(&bounds, ends), simd), child)
                     }
                 };
                 if entry > end || in_it == 0 {
@@ -196,13 +203,13 @@ impl Bvh {
                 }
                 let node = &self.nodes[child.first as usize];
                 let (left, right) = (slabs.enter(&node.bounds[0], ends), slabs.enter(&node.bounds[1], ends));
-                let (left_met, right_met) = (met(&left, simd), met(&right, simd));
+                let (left_met, right_met) = (hit_mask(&left, simd), hit_mask(&right, simd));
                 if left_met == 0 || right_met == 0 {
                     let side = usize::from(left_met == 0);
                     stack.push((0.0, left_met | right_met, node.child[side]));
                     continue;
                 }
-                let (left_first, right_first) = (left.first(), right.first());
+                let (left_first, right_first) = (left.nearest_entry(), right.nearest_entry());
                 let near = usize::from(right_first < left_first);
                 let children =
                     [(left_first, left_met, node.child[0]), (right_first, right_met, node.child[1])];
@@ -227,7 +234,7 @@ impl Bvh {
         let slabs = SlabPacket::new(rays, simd);
         let mut free = traced;
         let (mut leaf, mut in_leaf) = (outside, traced);
-        let (mut subtrees, _) = self.top_met(&slabs, ends, traced, simd);
+        let (mut subtrees, _) = self.hit_top_subtrees(&slabs, ends, traced, simd);
         let mut stack = PacketStack::new();
         loop {
             for &id in leaf {
@@ -247,7 +254,7 @@ impl Bvh {
                         let (bounds, child) =
                             self.top.subtree(subtrees.trailing_zeros() as usize % PACKET_SIZE);
                         subtrees &= subtrees - 1;
-                        (met(&slabs.enter(&bounds, ends), simd), child)
+                        (hit_mask(&slabs.enter(&bounds, ends), simd), child)
                     }
                 };
                 if in_it & free == 0 {
@@ -260,7 +267,7 @@ impl Bvh {
                 }
                 let node = &self.nodes[child.first as usize];
                 for (bounds, child) in node.bounds.iter().zip(node.child) {
-                    let met = met(&slabs.enter(bounds, ends), simd);
+                    let met = hit_mask(&slabs.enter(bounds, ends), simd);
                     if met & free != 0 {
                         stack.push((0.0, met, child));
                     }

@@ -1,6 +1,6 @@
 //! Spherical shells around nested surfaces. A ray that starts between concentric spheres is inside all of
-//! their boxes, so boxes cannot tell which spheres it hits. The shell between the smallest and the largest
-//! sphere of a subtree can.
+//! their boxes, so the boxes do not show which spheres the ray hits. The shell between a subtree's smallest
+//! and largest spheres does.
 
 use arrayvec::ArrayVec;
 
@@ -25,10 +25,10 @@ pub struct Shell {
 }
 
 /// Position of a box relative to a shell.
-enum Position {
+enum ShellPosition {
     /// All primitives enclose the box.
     Enclosed,
-    /// The box may meet a surface.
+    /// The box may intersect a surface.
     Near,
     Outside,
 }
@@ -66,7 +66,7 @@ impl Shell {
     }
 
     /// Lower bound on the distance at which a ray hits a surface in the shell. `None` if it misses the shell.
-    fn entry(&self, ray: &RayF64) -> Option<f32> {
+    fn entry_distance(&self, ray: &RayF64) -> Option<f32> {
         let to_origin = ray.origin - self.center;
         let distance = to_origin.length_squared();
         let is_inside = self.inner > 0.0 && distance < self.inner * self.inner;
@@ -87,26 +87,26 @@ impl Shell {
         Some((t / a * (1.0 - ROUNDING)) as f32)
     }
 
-    fn position(&self, bounds: &Aabb) -> Position {
+    fn box_position(&self, bounds: &Aabb) -> ShellPosition {
         let (min, max) = (bounds.min.as_dvec3(), bounds.max.as_dvec3());
         let nearest = self.center.clamp(min, max).distance_squared(self.center);
         let farthest = (self.center - min).abs().max((self.center - max).abs()).length_squared();
         if self.inner > 0.0 && farthest < self.inner * self.inner {
-            Position::Enclosed
+            ShellPosition::Enclosed
         } else if nearest > self.outer * self.outer {
-            Position::Outside
+            ShellPosition::Outside
         } else {
-            Position::Near
+            ShellPosition::Near
         }
     }
 }
 
-/// A primitive or subtree reported by [`Bvh::meeting_surfaces`].
+/// A primitive or subtree reported by [`Bvh::visit_overlapping_surfaces`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Met {
-    /// A primitive that may meet the box.
+pub enum OverlappingItem {
+    /// A primitive whose surface may intersect the box.
     Primitive(u32),
-    /// A subtree whose primitives all enclose the box, as an index into [`Bvh::last_of_subtrees`].
+    /// A subtree whose primitives all enclose the box, as an index into [`Bvh::last_primitives_of_subtrees`].
     Enclosing(usize),
 }
 
@@ -122,14 +122,17 @@ impl Bvh {
         if !self.is_nested {
             return self;
         }
-        let shells = self.of_subtrees(Shell::EMPTY, shell, Shell::union);
+        let shells = self.fold_subtrees(Shell::EMPTY, shell, Shell::union);
         let shells = shells.into_iter().map(|both| both.map(Shell::padded)).collect();
         Self { shells: Some(shells), ..self }
     }
 
     /// For each subtree, the last `N` primitives that satisfy `counts`, in descending order. Empty without
     /// shells.
-    pub fn last_of_subtrees<const N: usize>(&self, counts: impl Fn(u32) -> bool) -> Vec<ArrayVec<u32, N>> {
+    pub fn last_primitives_of_subtrees<const N: usize>(
+        &self,
+        counts: impl Fn(u32) -> bool,
+    ) -> Vec<ArrayVec<u32, N>> {
         if self.shells.is_none() {
             return Vec::new();
         }
@@ -139,11 +142,11 @@ impl Bvh {
             all.sort_unstable_by(|a, b| b.cmp(a));
             all.into_iter().take(N).collect()
         };
-        self.of_subtrees(ArrayVec::new(), own, join).into_iter().flatten().collect()
+        self.fold_subtrees(ArrayVec::new(), own, join).into_iter().flatten().collect()
     }
 
     /// Folds a value over the primitives of every subtree.
-    fn of_subtrees<T: Clone>(
+    fn fold_subtrees<T: Clone>(
         &self,
         empty: T,
         own: impl Fn(u32) -> T,
@@ -167,35 +170,39 @@ impl Bvh {
     }
 
     /// Visits every primitive whose surface may intersect a box, until `visit` returns false. A subtree whose
-    /// primitives all enclose the box is visited as a whole. Equivalent to [`Bvh::meeting`] without shells.
-    pub fn meeting_surfaces(&self, other: &Aabb, mut visit: impl FnMut(Met) -> bool) {
+    /// primitives all enclose the box is visited as a whole. Equivalent to [`Bvh::visit_overlapping`] without
+    /// shells.
+    pub fn visit_overlapping_surfaces(&self, other: &Aabb, mut visit: impl FnMut(OverlappingItem) -> bool) {
         let Some(shells) = &self.shells else {
             let mut goes_on = true;
-            return self.meeting(other, |id| goes_on = goes_on && visit(Met::Primitive(id)));
+            return self
+                .visit_overlapping(other, |id| goes_on = goes_on && visit(OverlappingItem::Primitive(id)));
         };
         let mut stack = ArrayVec::<ChildRef, { DEEP_STACK + 1 }>::new();
         stack.push(ChildRef { first: 0, count: 0 });
         while let Some(ChildRef { first, count }) = stack.pop() {
             if count > 0 {
                 let ids = &self.order[first as usize..(first + count) as usize];
-                if !ids.iter().all(|&id| visit(Met::Primitive(id))) {
+                if !ids.iter().all(|&id| visit(OverlappingItem::Primitive(id))) {
                     return;
                 }
                 continue;
             }
             let (node, shells) = (&self.nodes[first as usize], &shells[first as usize]);
             for side in (0..2).filter(|&side| node.bounds[side].meets(other)) {
-                match shells[side].position(other) {
-                    Position::Outside => {}
-                    Position::Near => stack.push(node.child[side]),
-                    Position::Enclosed if visit(Met::Enclosing(2 * first as usize + side)) => {}
-                    Position::Enclosed => return,
+                match shells[side].box_position(other) {
+                    ShellPosition::Outside => {}
+                    ShellPosition::Near => stack.push(node.child[side]),
+                    ShellPosition::Enclosed
+                        if visit(OverlappingItem::Enclosing(2 * first as usize + side)) => {}
+                    ShellPosition::Enclosed => return,
                 }
             }
         }
     }
 
-    /// [`Bvh::closest`] with shells. The callback is `dyn` because a copy per caller would not be faster.
+    /// [`Bvh::closest`] with shells. The callback is `dyn` because a separate copy of this function for every
+    /// caller would not be faster.
     #[cold]
     #[inline(never)]
     pub(super) fn closest_nested(
@@ -219,7 +226,8 @@ impl Bvh {
                 continue;
             }
             let (node, shells) = (&self.nodes[first as usize], &shells[first as usize]);
-            let [left, right] = [0, 1].map(|side| enter.entry(&node.bounds[side], &shells[side], t_max));
+            let [left, right] =
+                [0, 1].map(|side| enter.entry_distance(&node.bounds[side], &shells[side], t_max));
             let children = [(left, node.child[0]), (right, node.child[1])];
             let far_first = if right < left { children } else { [children[1], children[0]] };
             stack.extend(far_first.into_iter().filter_map(|(entry, child)| Some((entry?, child))));
@@ -247,7 +255,8 @@ impl Bvh {
                 continue;
             }
             let (node, shells) = (&self.nodes[first as usize], &shells[first as usize]);
-            let is_met = |side: &usize| enter.entry(&node.bounds[*side], &shells[*side], ray.t_max).is_some();
+            let is_met =
+                |side: &usize| enter.entry_distance(&node.bounds[*side], &shells[*side], ray.t_max).is_some();
             stack.extend((0..2).filter(is_met).map(|side| node.child[side]));
         }
         false
@@ -266,9 +275,9 @@ impl NestedRay {
     }
 
     /// Lower bound on the distance at which the ray hits a surface. `None` if it misses the box or the shell.
-    fn entry(&self, bounds: &Aabb, shell: &Shell, t_max: f32) -> Option<f32> {
+    fn entry_distance(&self, bounds: &Aabb, shell: &Shell, t_max: f32) -> Option<f32> {
         let of_box = self.slabs.enter(bounds.min, bounds.max, t_max)?;
-        let of_shell = shell.entry(&self.line)?;
+        let of_shell = shell.entry_distance(&self.line)?;
         let entry = if of_shell > of_box { of_shell } else { of_box };
         (entry <= t_max * SLAB_PAD).then_some(entry)
     }

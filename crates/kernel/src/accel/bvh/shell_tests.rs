@@ -74,16 +74,16 @@ fn nested_box_queries_match_brute_force() {
     for spread in [0.0, 1e-4, 0.02] {
         let spheres = spheres(200, spread);
         let tree = tree(&spheres);
-        let last = tree.last_of_subtrees::<3>(|id| id.is_multiple_of(2));
+        let last = tree.last_primitives_of_subtrees::<3>(|id| id.is_multiple_of(2));
         let mut next = random(3);
         for i in 0..500 {
             let at = Vec3::X + Vec3::new(next(), next(), next()) * 2.0;
             let near = Aabb { min: at, max: at }.grown(Vec3::splat([1e-5, 0.1][i % 2]));
             let (mut visited, mut enclosing) = (Vec::new(), Vec::new());
-            tree.meeting_surfaces(&near, |met| {
+            tree.visit_overlapping_surfaces(&near, |met| {
                 match met {
-                    Met::Primitive(id) => visited.push(id),
-                    Met::Enclosing(subtree) => enclosing.extend(&last[subtree]),
+                    OverlappingItem::Primitive(id) => visited.push(id),
+                    OverlappingItem::Enclosing(subtree) => enclosing.extend(&last[subtree]),
                 }
                 true
             });
@@ -116,7 +116,7 @@ fn nested_sphere_work_is_logarithmic() {
         for ray in rays(600) {
             let near = Aabb { min: ray.origin, max: ray.origin };
             let mut met = 0;
-            tree.meeting_surfaces(&near, |_| {
+            tree.visit_overlapping_surfaces(&near, |_| {
                 met += 1;
                 true
             });

@@ -1,7 +1,7 @@
-//! The upper levels of a tree, flattened into one packet of boxes. Intervals around the packet's coordinates
-//! are tested against all boxes in one step, to skip the boxes that all rays miss. Rounding is monotonic, so
-//! bounds on the inputs of [`SlabRay::enter`] also bound its results: a box that any single ray would hit is
-//! never skipped.
+//! The upper levels of a tree, flattened into one packet of boxes. Intervals that bound the coordinates of
+//! all rays in a packet are tested against all boxes in one step. This skips the boxes that all rays miss.
+//! Rounding is monotonic, so bounds on the inputs of [`SlabRay::enter`] also bound its results: a box that
+//! any single ray would hit is never skipped.
 //!
 //! [`SlabRay::enter`]: crate::geometry::aabb::SlabRay::enter
 
@@ -36,13 +36,13 @@ impl TopNode {
     /// Replaces the largest nodes, then the largest leaves, with their children while slots are free.
     pub(super) fn new(root: (Aabb, ChildRef), nodes: &[BinaryNode], references: &[Reference]) -> Self {
         let mut open = vec![root];
-        while let Some(place) = largest(&open, |child, room| child.count == 0 && room > 0) {
+        while let Some(place) = largest_replaceable(&open, |child, room| child.count == 0 && room > 0) {
             let node = &nodes[open.swap_remove(place).1.first as usize];
             let both = node.bounds.into_iter().zip(node.child);
             open.extend(both.filter(|(bounds, _)| !bounds.is_empty()));
         }
         while let Some(place) =
-            largest(&open, |child, room| child.count > 1 && room + 1 >= child.count as usize)
+            largest_replaceable(&open, |child, room| child.count > 1 && room + 1 >= child.count as usize)
         {
             let ChildRef { first, count } = open.swap_remove(place).1;
             let each = |first: u32| (references[first as usize].bounds, ChildRef { first, count: 1 });
@@ -68,7 +68,7 @@ impl TopNode {
 
     /// Mask of the subtrees whose boxes overlap `other`.
     #[inline]
-    pub(super) fn meeting(&self, other: &Aabb) -> u32 {
+    pub(super) fn overlap_mask(&self, other: &Aabb) -> u32 {
         let mut met = [TRUE; PACKET_SIZE];
         for axis in 0..3 {
             let (least, greatest) = (other.min[axis], other.max[axis]);
@@ -82,7 +82,7 @@ impl TopNode {
 
     /// Mask of the subtrees that the rays of a beam may hit, with lower bounds on the entry distances.
     #[inline(always)]
-    pub(super) fn met(&self, beam: &Beam, simd: impl Simd) -> (u32, F32x16) {
+    pub(super) fn hit_subtrees(&self, beam: &Beam, simd: impl Simd) -> (u32, F32x16) {
         let (mut near, mut far) = ([0.0_f32; PACKET_SIZE], [beam.end * SLAB_PAD; PACKET_SIZE]);
         for axis in 0..3 {
             let [low, high] = beam.inverse[axis];
@@ -115,7 +115,10 @@ impl TopNode {
 
 /// Index of the largest box that may be replaced with its children. `may_open` receives the child and the
 /// number of free slots.
-fn largest(open: &[(Aabb, ChildRef)], may_open: impl Fn(ChildRef, usize) -> bool) -> Option<usize> {
+fn largest_replaceable(
+    open: &[(Aabb, ChildRef)],
+    may_open: impl Fn(ChildRef, usize) -> bool,
+) -> Option<usize> {
     let room = PACKET_SIZE - open.len();
     let each = open.iter().enumerate().filter(|(_, (_, child))| may_open(*child, room));
     each.max_by(|(_, (a, _)), (_, (b, _))| a.half_area().total_cmp(&b.half_area())).map(|(place, _)| place)

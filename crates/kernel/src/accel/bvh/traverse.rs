@@ -95,7 +95,7 @@ impl Bvh {
 
     /// Visits the nodes whose boxes a ray hits, parents first, in an order that depends only on the tree.
     /// `visit` returns whether to descend. `own` receives the id and depth of each leaf entry.
-    pub fn along(
+    pub fn visit_along_ray(
         &self,
         ray: &Ray,
         mut visit: impl FnMut(&TreeNode, &RayInterval) -> bool,
@@ -120,9 +120,9 @@ impl Bvh {
     }
 
     /// Visits every primitive in leaves whose boxes overlap `other`.
-    pub fn meeting(&self, other: &Aabb, mut visit: impl FnMut(u32)) {
+    pub fn visit_overlapping(&self, other: &Aabb, mut visit: impl FnMut(u32)) {
         let mut stack = ArrayVec::<ChildRef, DEEP_STACK>::new();
-        for subtree in lanes(self.top.meeting(other)) {
+        for subtree in lanes(self.top.overlap_mask(other)) {
             stack.push(self.top.subtree(subtree).1);
             while let Some(current) = stack.pop() {
                 if current.count > 0 {
@@ -214,7 +214,7 @@ mod tests {
         for center in boxes.iter().map(|own| own.min + Vec3::splat(0.25)) {
             let other = Aabb { min: center, max: center }.grown(Vec3::new(0.1, 0.8, 0.5));
             let mut found = vec![0; boxes.len()];
-            tree.meeting(&other, |id| found[id as usize] += 1);
+            tree.visit_overlapping(&other, |id| found[id as usize] += 1);
             assert!(
                 found
                     .iter()

@@ -74,16 +74,16 @@ impl KdTree {
 
     /// Visits every triangle that overlaps a box, and possibly some nearby. A triangle in several leaves may
     /// be visited more than once.
-    pub fn meeting(&self, other: &Aabb, mut visit: impl FnMut(u32)) {
-        self.meeting_while(other, |triangle| {
+    pub fn visit_overlapping(&self, other: &Aabb, mut visit: impl FnMut(u32)) {
+        self.visit_overlapping_while(other, |triangle| {
             visit(triangle);
             true
         });
     }
 
-    /// Like [`KdTree::meeting`], but stops when `visit` returns false. Returns whether all triangles were
-    /// visited.
-    pub fn meeting_while(&self, other: &Aabb, mut visit: impl FnMut(u32) -> bool) -> bool {
+    /// Like [`KdTree::visit_overlapping`], but stops when `visit` returns false. Returns whether all
+    /// triangles were visited.
+    pub fn visit_overlapping_while(&self, other: &Aabb, mut visit: impl FnMut(u32) -> bool) -> bool {
         let mut pending = [0_u32; traverse::STACK_SIZE];
         let mut size = usize::from(!self.nodes.is_empty() && self.bounds.meets(other));
         while size > 0 {
@@ -113,7 +113,7 @@ impl KdTree {
 
     /// Visits the nodes whose cells the ray hits, parents first, in an order that depends only on the tree.
     /// `visit` returns whether to descend.
-    pub fn along(&self, ray: &Ray, mut visit: impl FnMut(&TreeNode, &RayInterval) -> bool) {
+    pub fn visit_along_ray(&self, ray: &Ray, mut visit: impl FnMut(&TreeNode, &RayInterval) -> bool) {
         let mut pending = if self.nodes.is_empty() { Vec::new() } else { vec![(self.bounds, 0_u32, 0)] };
         while let Some((bounds, place, depth)) = pending.pop() {
             let Some(stretch) = RayInterval::new(&bounds, ray) else { continue };

@@ -47,7 +47,7 @@ impl PlaneRay {
     /// Lower and upper bounds on the ray's distance to a plane. They include all distances for a ray within
     /// the plane, up to rounding. For other parallel rays, both are −∞ or both are ∞. NaN means unbounded.
     #[inline(always)]
-    fn meets(&self, axis: usize, at: f32) -> (f32, f32) {
+    fn plane_distance(&self, axis: usize, at: f32) -> (f32, f32) {
         let distance = at - self.origin[axis];
         let low = (distance - self.pad) * self.inverse[axis];
         let high = (distance + self.pad) * self.inverse[axis];
@@ -55,10 +55,11 @@ impl PlaneRay {
     }
 
     /// Interval of the ray inside a box.
-    fn inside(&self, bounds: &Aabb, t_max: f32) -> Option<(f32, f32)> {
-        let (mut near, mut far) = (0.0_f32, self.end(t_max));
+    fn box_interval(&self, bounds: &Aabb, t_max: f32) -> Option<(f32, f32)> {
+        let (mut near, mut far) = (0.0_f32, self.scaled_end(t_max));
         for axis in 0..3 {
-            let (low, high) = (self.meets(axis, bounds.min[axis]), self.meets(axis, bounds.max[axis]));
+            let (low, high) =
+                (self.plane_distance(axis, bounds.min[axis]), self.plane_distance(axis, bounds.max[axis]));
             let (enter, leave) = if self.backward[axis] { (high.0, low.1) } else { (low.0, high.1) };
             near = if enter > near { enter } else { near };
             far = if leave < far { leave } else { far };
@@ -68,7 +69,7 @@ impl PlaneRay {
 
     /// Upper end, in the scaled parameter, of a ray that ends at `t_max`.
     #[inline(always)]
-    fn end(&self, t_max: f32) -> f32 {
+    fn scaled_end(&self, t_max: f32) -> f32 {
         t_max * self.steps + self.pad
     }
 }
@@ -122,14 +123,14 @@ impl KdTree {
             return;
         }
         let planes = PlaneRay::new(ray, &self.bounds);
-        let Some((mut near, mut far)) = planes.inside(&self.bounds, ray.t_max) else { return };
+        let Some((mut near, mut far)) = planes.box_interval(&self.bounds, ray.t_max) else { return };
         let mut stack: [Pending; STACK_SIZE] = [(0, 0.0, 0.0); STACK_SIZE];
         let mut size = 0;
         let mut place = 0;
         loop {
             match self.nodes[place as usize].kind() {
                 NodeKind::Inner { axis, at, right } => {
-                    let (low, high) = planes.meets(axis, at);
+                    let (low, high) = planes.plane_distance(axis, at);
                     let (first, second) =
                         if planes.backward[axis] { (right, place + 1) } else { (place + 1, right) };
                     if low > far {
@@ -147,7 +148,7 @@ impl KdTree {
                 NodeKind::Leaf { first, count } => {
                     let references = &self.references[first as usize..][..count as usize];
                     let Some(t_max) = test(references) else { return };
-                    let end = planes.end(t_max);
+                    let end = planes.scaled_end(t_max);
                     loop {
                         if size == 0 {
                             return;

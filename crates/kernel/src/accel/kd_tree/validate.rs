@@ -8,7 +8,7 @@ use crate::geometry::Aabb;
 use crate::math::{DVec3, Vec3};
 
 /// Traversal state at a node.
-struct Visit {
+struct NodeVisit {
     place: u32,
     cell: Aabb,
     depth: u32,
@@ -41,10 +41,10 @@ impl KdTree {
             return Err("the bounding box does not match the triangles".to_owned());
         }
         let limit = depth_limit(all.len());
-        let mut named = Named::new(&all, &corners);
+        let mut named = SamplePointCoverage::new(&all, &corners);
         let mut reached = 0;
-        let mut pending = vec![Visit { place: 0, cell: self.bounds, depth: 0, inside: all }];
-        while let Some(Visit { place, cell, depth, inside }) = pending.pop() {
+        let mut pending = vec![NodeVisit { place: 0, cell: self.bounds, depth: 0, inside: all }];
+        while let Some(NodeVisit { place, cell, depth, inside }) = pending.pop() {
             if depth > limit {
                 return Err(format!("node {place} has depth {depth}, which exceeds the limit"));
             }
@@ -61,14 +61,14 @@ impl KdTree {
                     for (place, cell) in [(right, above), (place + 1, below)] {
                         let touches = |id: &&u32| !Polygon::clipped(corners(**id), &cell).points().is_empty();
                         let inside = inside.iter().filter(touches).copied().collect();
-                        pending.push(Visit { place, cell, depth: depth + 1, inside });
+                        pending.push(NodeVisit { place, cell, depth: depth + 1, inside });
                     }
                 }
                 NodeKind::Leaf { first, count } => {
                     let ids = self.references[first as usize..][..count as usize].iter();
                     let ids: Vec<u32> = ids.map(|&at| self.triangles[at as usize].id).collect();
-                    leaf(place, &cell, &inside, &ids, &corners)?;
-                    named.note(&cell, &inside, &ids);
+                    check_leaf(place, &cell, &inside, &ids, &corners)?;
+                    named.mark_covered(&cell, &inside, &ids);
                 }
             }
         }
@@ -78,12 +78,12 @@ impl KdTree {
         if let Some(triangle) = self.triangles.iter().find(|own| own.corners != corners(own.id)) {
             return Err(format!("triangle {} has different corners", triangle.id));
         }
-        named.missing()
+        named.check_complete()
     }
 }
 
 /// Checks that a leaf refers to the right triangles.
-fn leaf(
+fn check_leaf(
     place: u32,
     cell: &Aabb,
     inside: &[u32],
@@ -109,7 +109,7 @@ fn overlap(a: &Aabb, b: &Aabb) -> bool {
     a.min.cmple(b.max).all() && b.min.cmple(a.max).all()
 }
 
-/// Whether a triangle extends into a cell, beyond a part that lies within a face of the cell.
+/// Whether a triangle extends into a cell, not counting any part that lies in a face of the cell.
 fn reaches_into(cell: &Aabb, corners: [Vec3; 3]) -> bool {
     let (min, max) = Polygon::clipped(corners, cell).extent();
     (0..3).all(|axis| {
@@ -119,12 +119,13 @@ fn reaches_into(cell: &Aabb, corners: [Vec3; 3]) -> bool {
     })
 }
 
-/// Sample points on every triangle. Each has a flag for whether a leaf at that point refers to the triangle.
-struct Named {
+/// Sample points on every triangle. Each point has a flag that is set once a leaf at that point refers to the
+/// triangle.
+struct SamplePointCoverage {
     points: Vec<(u32, Vec<(DVec3, bool)>)>,
 }
 
-impl Named {
+impl SamplePointCoverage {
     fn new(ids: &[u32], corners: &impl Fn(u32) -> [Vec3; 3]) -> Self {
         let points = |&id: &u32| {
             let [a, b, c] = corners(id).map(|corner| corner.as_dvec3());
@@ -135,7 +136,7 @@ impl Named {
         Self { points: ids.iter().map(points).collect() }
     }
 
-    fn note(&mut self, cell: &Aabb, inside: &[u32], ids: &[u32]) {
+    fn mark_covered(&mut self, cell: &Aabb, inside: &[u32], ids: &[u32]) {
         let size = cell.min.abs().max(cell.max.abs()).as_dvec3() * 1e-12;
         let (min, max) = (cell.min.as_dvec3() - size, cell.max.as_dvec3() + size);
         for id in inside.iter().filter(|id| ids.contains(id)) {
@@ -146,7 +147,7 @@ impl Named {
         }
     }
 
-    fn missing(&self) -> Result<(), String> {
+    fn check_complete(&self) -> Result<(), String> {
         let lost = self.points.iter().find(|(_, points)| points.iter().any(|(_, named)| !named));
         lost.map_or(Ok(()), |(id, _)| Err(format!("part of triangle {id} is not in any leaf")))
     }

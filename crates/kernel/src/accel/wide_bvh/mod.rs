@@ -62,7 +62,7 @@ impl WideBvh {
         corners: impl Fn(u32) -> [Vec3; 3] + Sync,
         token: &CancelToken,
     ) -> Result<Self, Cancelled> {
-        let build::Built { nodes, packs, bounds } = build::build(count, corners, quality, token)?;
+        let build::BuiltWideBvh { nodes, packs, bounds } = build::build(count, corners, quality, token)?;
         Ok(Self { nodes, packs, bounds, instructions: InstructionSet::best(), quality })
     }
 
@@ -108,7 +108,7 @@ impl WideBvh {
 
     /// Visits the nodes whose boxes the ray hits, parents first, in an order that depends only on the tree.
     /// `visit` returns whether to descend.
-    pub fn along(&self, ray: &Ray, mut visit: impl FnMut(&TreeNode, &RayInterval) -> bool) {
+    pub fn visit_along_ray(&self, ray: &Ray, mut visit: impl FnMut(&TreeNode, &RayInterval) -> bool) {
         let root = (self.bounds, node::Child::Inner(0), 0);
         let mut pending = if self.nodes.is_empty() { Vec::new() } else { vec![root] };
         while let Some((bounds, child, depth)) = pending.pop() {
@@ -182,23 +182,23 @@ impl WideBvh {
 
     /// Visits every triangle that overlaps a box, and possibly some nearby. A split triangle may be visited
     /// more than once.
-    pub fn meeting(&self, other: &Aabb, mut visit: impl FnMut(u32)) {
-        self.meeting_while(other, |triangle| {
+    pub fn visit_overlapping(&self, other: &Aabb, mut visit: impl FnMut(u32)) {
+        self.visit_overlapping_while(other, |triangle| {
             visit(triangle);
             true
         });
     }
 
-    /// Like [`WideBvh::meeting`], but stops when `visit` returns false. Returns whether all triangles were
-    /// visited.
-    pub fn meeting_while(&self, other: &Aabb, mut visit: impl FnMut(u32) -> bool) -> bool {
-        self.nodes.is_empty() || self.meeting_below(0, other, &mut visit)
+    /// Like [`WideBvh::visit_overlapping`], but stops when `visit` returns false. Returns whether all
+    /// triangles were visited.
+    pub fn visit_overlapping_while(&self, other: &Aabb, mut visit: impl FnMut(u32) -> bool) -> bool {
+        self.nodes.is_empty() || self.visit_overlapping_below(0, other, &mut visit)
     }
 
-    fn meeting_below(&self, place: u32, other: &Aabb, visit: &mut impl FnMut(u32) -> bool) -> bool {
+    fn visit_overlapping_below(&self, place: u32, other: &Aabb, visit: &mut impl FnMut(u32) -> bool) -> bool {
         let node = &self.nodes[place as usize];
-        lanes(node.meeting(other)).all(|slot| match node.child(slot) {
-            node::Child::Inner(child) => self.meeting_below(child, other, visit),
+        lanes(node.overlap_mask(other)).all(|slot| match node.child(slot) {
+            node::Child::Inner(child) => self.visit_overlapping_below(child, other, visit),
             node::Child::Leaf { first, count } => {
                 let packs = &self.packs[first as usize..(first + count) as usize];
                 packs.iter().flat_map(TrianglePack::ids).all(&mut *visit)
@@ -288,7 +288,7 @@ fn for_each_group(rays: &[Ray], ends: &F32x16, mut take: impl FnMut(&F32x16, usi
 mod tests {
     use super::*;
     use crate::accel::ends;
-    use crate::accel::pathological::{bits, brute, meshes, rays};
+    use crate::accel::pathological::{bits, closest_by_brute_force, difficult_meshes, rays};
     use crate::geometry::watertight::ShearedRay;
     use crate::math::random::signed as random;
 
@@ -308,13 +308,13 @@ mod tests {
     fn traversals_match_brute_force_bit_for_bit() {
         let of_each =
             |mesh: &[[Vec3; 3]]| [Quality::Medium, Quality::High].map(|quality| built_with(quality, mesh));
-        for (number, mesh) in meshes().iter().enumerate() {
+        for (number, mesh) in difficult_meshes().iter().enumerate() {
             for (tree, instructions) in
                 of_each(mesh).iter().flat_map(|tree| InstructionSet::ALL.map(|one| (tree, one)))
             {
                 let tree = tree.clone().with(instructions);
                 for ray in rays(mesh) {
-                    let expected = brute(mesh, &ray);
+                    let expected = closest_by_brute_force(mesh, &ray);
                     let found = tree.closest(&ray);
                     assert_eq!(bits(found), bits(expected), "mesh {number}, {instructions:?}, {ray:?}");
                     assert_eq!(
@@ -349,14 +349,14 @@ mod tests {
 
     #[test]
     fn packets_match_single_rays() {
-        for (number, mesh) in meshes().iter().enumerate() {
+        for (number, mesh) in difficult_meshes().iter().enumerate() {
             let mut tree = built(mesh);
             for instructions in InstructionSet::ALL {
                 tree = tree.with(instructions);
                 for rays in packets(mesh) {
                     let mut found = vec![None; rays.len()];
                     tree.closest_packet(&rays, &ends(&rays), &mut found);
-                    let expected: Vec<_> = rays.iter().map(|ray| brute(mesh, ray)).collect();
+                    let expected: Vec<_> = rays.iter().map(|ray| closest_by_brute_force(mesh, ray)).collect();
                     let bits = |hits: &[Option<ShapeHit>]| -> Vec<_> {
                         let bits = |hit: &ShapeHit| {
                             (hit.t.to_bits(), hit.primitive, hit.u.to_bits(), hit.v.to_bits())
@@ -422,14 +422,14 @@ mod tests {
         let tree = built(&mesh);
         for direction in [Vec3::Z, Vec3::Z * 1e-20, Vec3::new(-0.0, 0.0, 1e-20), Vec3::Z * 1e-30] {
             let ray = Ray::new(at, direction);
-            let expected = brute(&mesh, &ray);
+            let expected = closest_by_brute_force(&mesh, &ray);
             for instructions in InstructionSet::ALL {
                 let tree = tree.clone().with(instructions);
                 assert_eq!(bits(tree.closest(&ray)), bits(expected), "{instructions:?}, {direction:?}");
                 assert_eq!(tree.any(&ray, None), expected.is_some(), "{instructions:?}, {direction:?}");
             }
         }
-        assert!(brute(&mesh, &Ray::new(at, Vec3::Z * 1e-20)).is_some());
+        assert!(closest_by_brute_force(&mesh, &Ray::new(at, Vec3::Z * 1e-20)).is_some());
     }
 
     #[test]

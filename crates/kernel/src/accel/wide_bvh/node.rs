@@ -14,7 +14,7 @@ pub const PACK: usize = 4;
 pub const MOST_PACKS: u32 = 8;
 
 /// Bit that marks a leaf in [`WideNode::children`]. The next three bits contain the number of packs minus
-/// one, the rest the index of the first pack.
+/// one. The remaining bits contain the index of the first pack.
 const LEAF: u32 = 1 << 31;
 
 const FIRST_BITS: u32 = 28;
@@ -105,7 +105,7 @@ impl WideNode {
 
     /// Mask of the slots whose boxes overlap `other`.
     #[inline]
-    pub fn meeting(&self, other: &Aabb) -> u32 {
+    pub fn overlap_mask(&self, other: &Aabb) -> u32 {
         let mut met = [true; WIDTH];
         for axis in 0..3 {
             let (least, greatest) = (&self.rows[2 * axis], &self.rows[2 * axis + 1]);

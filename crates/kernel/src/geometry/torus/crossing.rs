@@ -36,7 +36,7 @@ pub(super) struct UnitLine {
 
 /// Value and derivative of g at a point of the line.
 #[derive(Clone, Copy)]
-struct Sample {
+struct LineSample {
     s: f64,
     value: f64,
     slope: f64,
@@ -45,7 +45,7 @@ struct Sample {
 impl UnitLine {
     /// Interval of the line inside the torus's bounding ball and bounding planes. Both are expanded by a
     /// margin in units of the tube.
-    pub(super) fn surroundings(&self, room: f64) -> Option<(f64, f64)> {
+    pub(super) fn nearby_interval(&self, room: f64) -> Option<(f64, f64)> {
         let height = self.tube * (1.0 + room);
         let ball = 1.0 + height;
         let half = ((ball - self.foot.length()) * (ball + self.foot.length())).sqrt();
@@ -69,17 +69,17 @@ impl UnitLine {
         }
         let within = |s: f64| s.max(from).min(to);
         let inflections = self.inflections().map_or([to; 2], |cuts| cuts.map(within));
-        let mut low = self.at(from);
+        let mut low = self.evaluate(from);
         if low.value.abs() <= ROUNDING * self.tube {
             low.value = 0.0;
         }
         let is_inside = low.value < 0.0 || low.value == 0.0 && low.slope < 0.0;
-        if !is_inside && self.goes_away(from) {
+        if !is_inside && self.moves_away(from) {
             return None;
         }
         for (end, is_convex) in [(inflections[0], true), (inflections[1], false), (to, true)] {
             if end > low.s {
-                let high = self.at(end);
+                let high = self.evaluate(end);
                 let crossing = self.crossing_of_piece(low, high, is_inside, is_convex);
                 if crossing.is_some() {
                     return crossing;
@@ -92,7 +92,7 @@ impl UnitLine {
 
     /// Whether the line moves away from the circle on its outer side: from here on, both components of the
     /// distance increase.
-    fn goes_away(&self, from: f64) -> bool {
+    fn moves_away(&self, from: f64) -> bool {
         let p = self.foot + self.direction * from;
         let (across, d) = (p.truncate(), self.direction.truncate());
         across.length_squared() >= 1.0 && across.dot(d) >= 0.0 && p.z * self.direction.z >= 0.0
@@ -116,13 +116,13 @@ impl UnitLine {
         found
     }
 
-    fn at(&self, s: f64) -> Sample {
+    fn evaluate(&self, s: f64) -> LineSample {
         let p = self.foot + self.direction * s;
         let ring = p.truncate().length();
         let (across, z) = (ring - 1.0, p.z);
         let distance = (across * across + z * z).sqrt();
         let outwards = if ring > 0.0 { p.truncate().dot(self.direction.truncate()) / ring } else { 0.0 };
-        Sample {
+        LineSample {
             s,
             value: (distance - self.tube) * (distance + self.tube),
             slope: 2.0 * (across * outwards + z * self.direction.z),
@@ -143,19 +143,27 @@ impl UnitLine {
     }
 
     /// First crossing in an interval. `is_inside` is the side at its start.
-    fn crossing_of_piece(&self, low: Sample, high: Sample, is_inside: bool, is_convex: bool) -> Option<f64> {
+    fn crossing_of_piece(
+        &self,
+        low: LineSample,
+        high: LineSample,
+        is_inside: bool,
+        is_convex: bool,
+    ) -> Option<f64> {
         if (high.value <= 0.0) != is_inside {
             let start = if is_inside == is_convex { high } else { low };
-            return Some(self.between(low.s, high.s, start, is_inside));
+            return Some(self.refine_crossing(low.s, high.s, start, is_inside));
         }
         // If both ends are on the same side, a convex g may dip below 0 in between, and a concave g may rise
         // above 0.
-        (is_inside != is_convex).then(|| self.dip(low, high, if is_inside { -1.0 } else { 1.0 })).flatten()
+        (is_inside != is_convex)
+            .then(|| self.first_root_of_dip(low, high, if is_inside { -1.0 } else { 1.0 }))
+            .flatten()
     }
 
     /// The only crossing between two points. Uses Newton's method, and bisection when a Newton step would
     /// leave the interval.
-    fn between(&self, mut low: f64, mut high: f64, start: Sample, is_inside: bool) -> f64 {
+    fn refine_crossing(&self, mut low: f64, mut high: f64, start: LineSample, is_inside: bool) -> f64 {
         let mut x = start;
         for _ in 0..MOST_STEPS {
             let newton = x.s - x.value / x.slope;
@@ -166,7 +174,7 @@ impl UnitLine {
             if !(low < next && next < high) {
                 break;
             }
-            x = self.at(next);
+            x = self.evaluate(next);
             if (x.value <= 0.0) == is_inside { low = next } else { high = next }
         }
         x.s
@@ -174,7 +182,7 @@ impl UnitLine {
 
     /// First root after `low` in an interval where sign·g is convex and positive at both ends. A Newton step
     /// on a convex function never passes its root. If the steps pass the minimum, there is no root.
-    fn dip(&self, low: Sample, high: Sample, sign: f64) -> Option<f64> {
+    fn first_root_of_dip(&self, low: LineSample, high: LineSample, sign: f64) -> Option<f64> {
         if !(high.slope * sign > 0.0) {
             return None;
         }
@@ -191,10 +199,10 @@ impl UnitLine {
                 return None;
             }
             let before = x;
-            x = self.at(next);
+            x = self.evaluate(next);
             if x.value * sign <= 0.0 {
                 // The step overshot the root because of rounding.
-                return Some(self.between(before.s, x.s, before, sign < 0.0));
+                return Some(self.refine_crossing(before.s, x.s, before, sign < 0.0));
             }
         }
         Some(x.s)
@@ -233,7 +241,7 @@ mod tests {
         for tube in [1e-6, 1e-3, 0.3, 0.99] {
             let mut found = 0;
             for line in lines(tube) {
-                let Some((from, to)) = line.surroundings(0.01) else { continue };
+                let Some((from, to)) = line.nearby_interval(0.01) else { continue };
                 let Some(s) = line.first_crossing(from, to) else { continue };
                 found += 1;
                 let p = line.foot + line.direction * s;
@@ -248,7 +256,7 @@ mod tests {
     fn slope_is_monotonic_between_inflections() {
         for line in lines(0.4) {
             let Some([first, second]) = line.inflections() else { continue };
-            let slope = |s: f64| line.at(s).slope;
+            let slope = |s: f64| line.evaluate(s).slope;
             for (low, high, is_convex) in
                 [(first - 1.0, first, true), (first, second, false), (second, second + 1.0, true)]
             {

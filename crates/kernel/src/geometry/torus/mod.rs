@@ -6,9 +6,9 @@ use std::f64::consts::{PI, TAU};
 
 use super::surface::SurfacePoint;
 use super::surface_of_revolution::{
-    self, AxialFrame, LocalLine, angle_to_u, direction_at_u, exact_t, radial,
+    self, AxialFrame, LocalLine, angle_to_u, direction_at_u, exact_t, radial_direction,
 };
-use super::surface_packet::{Exact, ExactPoint};
+use super::surface_packet::{ExactPoint, ExactSurface};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit};
 use crate::math::{DVec2, DVec3, Vec2};
 use crossing::UnitLine;
@@ -27,9 +27,9 @@ pub struct Torus {
     tube: f64,
 }
 
-impl Exact for Torus {
+impl ExactSurface for Torus {
     fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> ExactPoint {
-        let (out, from_circle) = self.chart(ray.at(exact_t(hit, self.nearest(ray))));
+        let (out, from_circle) = self.circle_directions(ray.at(exact_t(hit, self.nearest(ray))));
         self.exact_at(out, from_circle)
     }
 }
@@ -43,12 +43,12 @@ impl Torus {
 
     /// Finds the nearest hit, from outside or inside.
     pub fn intersect(&self, ray: &RayF64) -> Option<ShapeHit> {
-        self.nearest(ray).map(surface_of_revolution::hit)
+        self.nearest(ray).map(surface_of_revolution::to_shape_hit)
     }
 
     fn nearest(&self, ray: &RayF64) -> Option<(f64, u32)> {
         let (line, unit_line, unit) = self.unit_line(ray);
-        let (enter, leave) = unit_line.surroundings(ROOM)?;
+        let (enter, leave) = unit_line.nearby_interval(ROOM)?;
         let from = enter.max(-line.start / unit);
         if !(line.start + from * unit <= ray.t_max) {
             return None;
@@ -60,7 +60,7 @@ impl Torus {
     /// The line through a ray, the same line in units of the circle's radius, and the length of that unit in
     /// terms of the ray's t.
     fn unit_line(&self, ray: &RayF64) -> (LocalLine, UnitLine, f64) {
-        let line = self.frame.line(ray);
+        let line = self.frame.line_to_local(ray);
         let length = line.direction.length();
         let unit_line = UnitLine {
             foot: line.foot / self.radius,
@@ -73,33 +73,33 @@ impl Torus {
     /// Values of t (at most two) at which a ray that starts outside enters the torus.
     pub fn entries(&self, ray: &RayF64) -> [Option<f64>; 2] {
         let (line, unit_line, unit) = self.unit_line(ray);
-        let Some((enter, leave)) = unit_line.surroundings(ROOM) else { return [None; 2] };
+        let Some((enter, leave)) = unit_line.nearby_interval(ROOM) else { return [None; 2] };
         let from = enter.max(-line.start / unit);
         unit_line.entries(from, leave).map(|entry| entry.map(|s| line.start + s * unit))
     }
 
     /// Surface point at a hit.
     pub fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
-        let (out, from_circle) = self.chart(ray.at(exact_t(hit, self.nearest(ray))));
+        let (out, from_circle) = self.circle_directions(ray.at(exact_t(hit, self.nearest(ray))));
         self.surface_at(out, from_circle)
     }
 
     /// Direction of a point from the axis, and its direction from the circle in the plane through the axis.
-    fn chart(&self, point: DVec3) -> (DVec2, DVec2) {
-        let local = self.frame.local(point);
-        let out = radial(local.truncate());
-        (out, radial(DVec2::new(local.truncate().length() - self.radius, local.z)))
+    fn circle_directions(&self, point: DVec3) -> (DVec2, DVec2) {
+        let local = self.frame.point_to_local(point);
+        let out = radial_direction(local.truncate());
+        (out, radial_direction(DVec2::new(local.truncate().length() - self.radius, local.z)))
     }
 
     /// Texture coordinates of a point on the surface.
     pub fn uv_at(&self, point: DVec3) -> DVec2 {
-        let (out, from_circle) = self.chart(point);
+        let (out, from_circle) = self.circle_directions(point);
         DVec2::new(angle_to_u(out), angle_to_u(from_circle))
     }
 
     /// Mean curvature at a point of the surface.
     pub fn curvature(&self, point: DVec3) -> f64 {
-        let across = self.chart(point).1.x;
+        let across = self.circle_directions(point).1.x;
         0.5 * (1.0 / self.tube + across / (self.radius + self.tube * across))
     }
 
@@ -113,8 +113,8 @@ impl Torus {
             point,
             normal,
             Vec2::new(angle_to_u(out) as f32, angle_to_u(from_circle) as f32),
-            self.frame.vector((out.perp() * (TAU * ring)).extend(0.0)),
-            self.frame.vector((out * -up).extend(across) * (TAU * self.tube)),
+            self.frame.vector_to_world((out.perp() * (TAU * ring)).extend(0.0)),
+            self.frame.vector_to_world((out * -up).extend(across) * (TAU * self.tube)),
             reach,
         )
     }
@@ -124,8 +124,8 @@ impl Torus {
         let (across, up) = (from_circle.x, from_circle.y);
         let ring = self.radius + self.tube * across;
         ExactPoint {
-            point: self.frame.point((out * ring).extend(self.tube * up)),
-            normal: self.frame.vector((out * across).extend(up)),
+            point: self.frame.point_to_world((out * ring).extend(self.tube * up)),
+            normal: self.frame.vector_to_world((out * across).extend(up)),
             reach: self.reach(),
         }
     }
@@ -134,7 +134,10 @@ impl Torus {
     pub fn at(&self, u: f64, v: f64) -> (DVec3, DVec3) {
         let (out, from_circle) = (direction_at_u(u), direction_at_u(v));
         let normal = (out * from_circle.x).extend(from_circle.y);
-        (self.frame.point((out * self.radius).extend(0.0) + normal * self.tube), self.frame.vector(normal))
+        (
+            self.frame.point_to_world((out * self.radius).extend(0.0) + normal * self.tube),
+            self.frame.vector_to_world(normal),
+        )
     }
 
     fn reach(&self) -> f64 {
@@ -155,7 +158,7 @@ impl Torus {
 
     /// Distance from the surface, negative inside.
     pub fn signed_distance(&self, point: DVec3) -> f64 {
-        let p = self.frame.local(point);
+        let p = self.frame.point_to_local(point);
         DVec2::new(p.truncate().length() - self.radius, p.z).length() - self.tube
     }
 
@@ -176,7 +179,7 @@ impl Torus {
 
     /// Distance of a point from the surface.
     pub fn distance(&self, point: DVec3) -> f64 {
-        let local = self.frame.local(point);
+        let local = self.frame.point_to_local(point);
         let from_circle = DVec2::new(local.truncate().length() - self.radius, local.z).length();
         (from_circle - self.tube).abs()
     }

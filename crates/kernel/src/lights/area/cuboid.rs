@@ -20,7 +20,8 @@ pub struct BoxEmitter {
 struct BoxView {
     /// Signs of the point's coordinates.
     signs: [f32; 3],
-    /// The positive faces. The coordinates of each face are along the two cyclically following axes.
+    /// The faces on the positive sides of the axes. Each face's coordinates are along the next two axes in
+    /// cyclic order.
     faces: [BoxFace; 3],
 }
 
@@ -48,7 +49,7 @@ impl ShapeEmitter for BoxEmitter {
             if is_first { values[0] } else { rest }
         };
         let face = BoxFace {
-            rectangle: SphericalRectangle::each(faces.map(|face| face.rectangle), of),
+            rectangle: SphericalRectangle::combine_three(faces.map(|face| face.rectangle), of),
             solid_angle: of([a, b, c]),
         };
         let rest = (target - of([0.0, a, a + b])) / face.solid_angle;
@@ -81,7 +82,7 @@ impl ShapeEmitter for BoxEmitter {
         }
     }
 
-    fn middle(&self) -> DVec3 {
+    fn center(&self) -> DVec3 {
         self.center
     }
 }
@@ -92,7 +93,7 @@ impl BoxEmitter {
         let axes = cuboid.axes();
         Self {
             center: cuboid.centroid(),
-            half: cuboid.half().as_vec3().to_array(),
+            half: cuboid.half_extent().as_vec3().to_array(),
             axes: [axes.x_axis, axes.y_axis, axes.z_axis].map(DVec3::as_vec3),
         }
     }
@@ -115,7 +116,7 @@ impl BoxFace {
     #[inline(always)]
     fn new(x: [f32; 2], y: [f32; 2], z: f32) -> Self {
         let rectangle = SphericalRectangle::new(x, y, z);
-        let (_, _, by_area) = rectangle.by_area([0.5; 2]);
+        let (_, _, by_area) = rectangle.sample_by_area([0.5; 2]);
         let solid_angle = if rectangle.is_accurate() { rectangle.solid_angle() } else { by_area };
         Self { rectangle, solid_angle: if z < 0.0 { solid_angle } else { 0.0 } }
     }
@@ -124,7 +125,7 @@ impl BoxFace {
     #[inline(always)]
     fn sample(&self, u: [f32; 2]) -> (f32, f32, f32) {
         let rectangle = &self.rectangle;
-        let (by_area, [x, y]) = (rectangle.by_area(u), rectangle.sample(u));
+        let (by_area, [x, y]) = (rectangle.sample_by_area(u), rectangle.sample(u));
         let is_accurate = rectangle.is_accurate();
         (
             if is_accurate { x } else { by_area.0 },

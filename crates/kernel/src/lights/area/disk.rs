@@ -52,7 +52,7 @@ impl ShapeEmitter for DiskEmitter {
         if view.is_front() { view.pdf(met.direction) as f32 } else { 0.0 }
     }
 
-    fn middle(&self) -> DVec3 {
+    fn center(&self) -> DVec3 {
         self.center
     }
 }
@@ -152,12 +152,12 @@ impl DiskView {
         let direction = axis * (1.0 - versine) + (along * x + beside * y) * across;
         let distance = self.height / -direction.dot(normal);
         let distance = if (distance > 0.0) & (distance < self.farthest) { distance } else { self.farthest };
-        (direction, distance, self.factor(cos * cos, q + root))
+        (direction, distance, self.inverse_pdf(cos * cos, q + root))
     }
 
     /// Inverse pdf, given cos²φ and Q + √Q.
     #[inline(always)]
-    fn factor(&self, cos2: f64, slice: f64) -> f64 {
+    fn inverse_pdf(&self, cos2: f64, slice: f64) -> f64 {
         self.solid_angle() * (self.p * cos2 + self.q * (1.0 - cos2)) / slice
     }
 
@@ -168,7 +168,7 @@ impl DiskView {
         let (x, y) = (direction.dot(along) / self.a, direction.dot(beside) / self.b);
         let cos2 = if x == 0.0 && y == 0.0 { 1.0 } else { x * x / (x * x + y * y) };
         let q = 1.0 + self.a * self.a * cos2 + self.b * self.b * (1.0 - cos2);
-        1.0 / self.factor(cos2, q + q.sqrt())
+        1.0 / self.inverse_pdf(cos2, q + q.sqrt())
     }
 }
 

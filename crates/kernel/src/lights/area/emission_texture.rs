@@ -6,7 +6,7 @@
 
 use std::sync::Arc;
 
-use crate::geometry::triangle::weights;
+use crate::geometry::triangle::barycentric_weights;
 use crate::geometry::{RayF64, Shape};
 use crate::materials::texture::Texture;
 use crate::materials::{EmissionCoat, Footprint, Opacity, SecondUvPoint, TexturePoint};
@@ -63,7 +63,7 @@ impl EmissionTexture {
     }
 
     /// Whether the factor varies with position.
-    pub fn has_places(&self) -> bool {
+    pub fn varies_with_position(&self) -> bool {
         self.texture.is_some() || self.opacity.is_some()
     }
 
@@ -82,12 +82,12 @@ impl EmissionTexture {
         }
     }
 
-    /// Number of texels per unit of u and v. The maximum of both if there are a texture and an opacity
-    /// texture.
-    pub fn texels_across(&self) -> [f64; 2] {
+    /// Number of texels per unit of u and v. If there are both a color texture and an opacity texture, this
+    /// is the maximum of their numbers.
+    pub fn texels_per_unit(&self) -> [f64; 2] {
         let of_opacity = self.opacity.as_ref().and_then(|opacity| opacity.value.texture());
         let across =
-            [self.texture.as_ref(), of_opacity].map(|texture| texture.map(|one| one.texels_across()));
+            [self.texture.as_ref(), of_opacity].map(|texture| texture.map(|one| one.texels_per_unit()));
         let finer = |[u, v]: [f64; 2], [own_u, own_v]: [f64; 2]| [u.max(own_u), v.max(own_v)];
         across.into_iter().flatten().reduce(finer).unwrap_or([1.0; 2])
     }
@@ -96,11 +96,11 @@ impl EmissionTexture {
     /// triangle that contains the point.
     #[inline]
     pub fn at(&self, point: Vec3, primitive: u32, direction: Vec3) -> Vec3 {
-        self.at_place(point, primitive) * self.coat_transmittance(point, primitive, direction)
+        self.at_position(point, primitive) * self.coat_transmittance(point, primitive, direction)
     }
 
     /// [`EmissionTexture::at`] without the coat.
-    pub fn at_place(&self, point: Vec3, primitive: u32) -> Vec3 {
+    pub fn at_position(&self, point: Vec3, primitive: u32) -> Vec3 {
         self.lookup_at(&self.chart.texture_point(point.as_dvec3(), primitive))
     }
 
@@ -111,7 +111,7 @@ impl EmissionTexture {
         let at = self.chart.texture_point(point, primitive);
         // At a shape's edge, rounding errors may prevent finding a normal.
         let normal = self.chart.normal(point, primitive, direction);
-        coat.left(&at, normal.map_or(1.0, |normal| normal.dot(direction)) as f32, &mut 0)
+        coat.transmittance(&at, normal.map_or(1.0, |normal| normal.dot(direction)) as f32, &mut 0)
     }
 }
 
@@ -148,7 +148,7 @@ impl UvChart {
         let Ok(UvTriangle { corners, uvs, second_uvs, .. }) = found.map(|index| patches[index]) else {
             return TexturePoint::sharp(DVec2::ZERO);
         };
-        let weights = weights(corners, point);
+        let weights = barycentric_weights(corners, point);
         let between = |uvs: [Vec2; 3]| {
             let [a, b, c] = uvs.map(|uv| uv.as_dvec2());
             a + (b - a) * weights.x + (c - a) * weights.y

@@ -20,9 +20,9 @@ pub struct InsideEmitter {
 impl ShapeEmitter for InsideEmitter {
     fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
         match self.shape.encloses(point.as_dvec3()) {
-            Some(true) => self.around(point, u),
+            Some(true) => self.sample_directions(point, u),
             Some(false) => LightSamplePoint::NOTHING,
-            None => self.by_area(point, u),
+            None => self.sample_by_area(point, u),
         }
     }
 
@@ -30,12 +30,14 @@ impl ShapeEmitter for InsideEmitter {
         match self.shape.encloses(from.as_dvec3()) {
             Some(true) => 1.0 / ALL_AROUND,
             Some(false) => 0.0,
-            None if self.is_first(from, met.direction, met.distance) => met.pdf_by_area(self.by_area.total()),
+            None if self.is_first_hit(from, met.direction, met.distance) => {
+                met.pdf_by_area(self.by_area.total())
+            }
             None => 0.0,
         }
     }
 
-    fn middle(&self) -> DVec3 {
+    fn center(&self) -> DVec3 {
         self.shape.centroid()
     }
 }
@@ -50,20 +52,18 @@ impl InsideEmitter {
     }
 
     /// Samples a direction from a point inside.
-    fn around(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
+    fn sample_directions(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
         let cos = 1.0 - 2.0 * u[0];
         let sin = ((1.0 - cos) * (1.0 + cos)).max(0.0).sqrt();
         let (sin_around, cos_around) = sin_cos(TAU * u[1]);
         let direction = Vec3::new(sin * cos_around, sin * sin_around, cos);
-        self.first(point, direction).map_or(LightSamplePoint::NOTHING, |distance| LightSamplePoint {
-            direction,
-            target: point + direction * distance,
-            factor: ALL_AROUND,
+        self.first_hit_distance(point, direction).map_or(LightSamplePoint::NOTHING, |distance| {
+            LightSamplePoint { direction, target: point + direction * distance, factor: ALL_AROUND }
         })
     }
 
     /// Samples a point by area. The sample is black if another part of the shape occludes it.
-    fn by_area(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
+    fn sample_by_area(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
         let (part, rest) = self.by_area.sample(u[0]);
         let AreaPoint { point: place, normal } = self.shape.sample(part as u32, Vec2::new(rest, u[1]));
         let offset = place - point.as_dvec3();
@@ -71,7 +71,7 @@ impl InsideEmitter {
         let direction = offset / distance;
         let cosine = direction.dot(normal);
         let direction = direction.as_vec3();
-        if !(cosine > 0.0 && self.is_first(point, direction, distance as f32)) {
+        if !(cosine > 0.0 && self.is_first_hit(point, direction, distance as f32)) {
             return LightSamplePoint::NOTHING;
         }
         let factor = cosine * self.by_area.total() / (distance * distance);
@@ -79,12 +79,13 @@ impl InsideEmitter {
     }
 
     /// Whether no part of the shape occludes the point at `distance`.
-    fn is_first(&self, point: Vec3, direction: Vec3, distance: f32) -> bool {
-        self.first(point, direction).is_some_and(|first| first > distance * (1.0 - SAME_DISTANCE))
+    fn is_first_hit(&self, point: Vec3, direction: Vec3, distance: f32) -> bool {
+        self.first_hit_distance(point, direction)
+            .is_some_and(|first| first > distance * (1.0 - SAME_DISTANCE))
     }
 
     /// Distance to the first intersection with the shape.
-    fn first(&self, point: Vec3, direction: Vec3) -> Option<f32> {
+    fn first_hit_distance(&self, point: Vec3, direction: Vec3) -> Option<f32> {
         let (origin, direction) = (point.as_dvec3(), direction.as_dvec3());
         let ray = RayF64 { origin, direction, t_max: f64::INFINITY };
         self.shape.intersect(&ray).map(|hit| hit.t)

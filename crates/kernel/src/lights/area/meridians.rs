@@ -26,14 +26,14 @@ pub struct SinCos {
 
 impl SinCos {
     /// Sine and cosine of half of an angle in [0, π].
-    fn half(self) -> Self {
+    fn half_angle(self) -> Self {
         let cos = (0.5 * (1.0 + self.cos)).max(0.0).sqrt();
         // A cosine of 0 corresponds to an angle of π.
         let sin = if cos > 0.5 { 0.5 * self.sin / cos } else { (0.5 * (1.0 - self.cos)).max(0.0).sqrt() };
         Self { sin, cos }
     }
 
-    fn and(self, other: Self) -> Self {
+    fn plus(self, other: Self) -> Self {
         Self {
             sin: self.sin * other.cos + self.cos * other.sin,
             cos: self.cos * other.cos - self.sin * other.sin,
@@ -50,11 +50,11 @@ impl SinCos {
 impl MeridianDistribution {
     /// A distribution over angles up to `reach` in [0, π], with density proportional to `weight`.
     pub fn new(reach: SinCos, weight: impl Fn(SinCos) -> f64) -> Self {
-        let step = reach.half().half().half();
+        let step = reach.half_angle().half_angle().half_angle();
         let mut turn = SinCos { sin: 0.0, cos: 1.0 };
         let weights = std::array::from_fn(|_| {
             let own = weight(turn);
-            turn = turn.and(step);
+            turn = turn.plus(step);
             own
         });
         Self { reach: libm::atan2(reach.sin, reach.cos), share: PiecewiseLinear(weights) }
@@ -101,7 +101,7 @@ impl PolarFrame {
     }
 
     /// Angle of a direction around the pole.
-    pub fn around(&self, direction: Vec3) -> f64 {
+    pub fn azimuth(&self, direction: Vec3) -> f64 {
         let direction = direction.as_dvec3();
         libm::atan2(direction.dot(self.side), direction.dot(self.front))
     }

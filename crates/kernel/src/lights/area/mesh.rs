@@ -101,7 +101,7 @@ impl MeshEmitter {
 
     /// Samples a point uniformly on one triangle. Returns the point, the triangle's area, and its primitive
     /// index.
-    pub fn place(&self, index: usize, u: Vec2) -> (AreaPoint, f64, u32) {
+    pub fn sample_triangle(&self, index: usize, u: Vec2) -> (AreaPoint, f64, u32) {
         let ([a, b, c], primitive) = &self.triangles[index];
         let weights = warp::triangle(u).as_dvec3();
         let point = *a * weights.x + *b * weights.y + *c * weights.z;
@@ -123,7 +123,7 @@ impl MeshEmitter {
 
     /// The triangles, if they are sampled by area.
     #[inline(always)]
-    pub fn facets(&self) -> Option<&AreaSampledTriangles> {
+    pub fn area_sampled(&self) -> Option<&AreaSampledTriangles> {
         if let MeshSampling::Area(facets) = &self.sampling { Some(facets) } else { None }
     }
 
@@ -194,7 +194,7 @@ impl MeshEmitter {
     }
 
     /// Centroid of the area.
-    pub fn middle(&self) -> DVec3 {
+    pub fn center(&self) -> DVec3 {
         self.center
     }
 }
@@ -221,7 +221,7 @@ impl TrianglePairQuad {
             return None;
         }
         let quad = QuadEmitter::new(p, u, v);
-        let [along_u, along_v] = quad.along();
+        let [along_u, along_v] = quad.coordinate_vectors();
         Some(Self { quad, across: along_u + along_v, primitives: [*one, *two] })
     }
 

@@ -54,7 +54,7 @@ pub trait ShapeEmitter {
     fn pdf(&self, from: Vec3, met: &LightHit) -> f32;
 
     /// Centroid of the area.
-    fn middle(&self) -> DVec3;
+    fn center(&self) -> DVec3;
 }
 
 /// A surface that emits uniformly from one side. A two-sided emitter is represented by two lights.
@@ -250,14 +250,14 @@ fn bounds(shape: &Shape, radiance: Vec3) -> Option<LightBounds> {
 impl AreaLight {
     /// Adds an emission texture. Quads are then importance sampled according to the texture.
     pub fn with_texture(mut self, texture: EmissionTexture) -> Self {
-        if let (Emitter::Quad(quad), true) = (&self.shape, texture.has_places()) {
+        if let (Emitter::Quad(quad), true) = (&self.shape, texture.varies_with_position()) {
             // The back has swapped edges.
             let ordered = |[u, v]: [f64; 2]| match self.side {
                 Side::Front => [u, v],
                 Side::Back => [v, u],
             };
             let color = |at: [f64; 2]| texture.lookup(DVec2::from_array(ordered(at)));
-            let across = ordered(texture.texels_across());
+            let across = ordered(texture.texels_per_unit());
             let picture = TexturedQuadEmitter::new(*quad, across, color);
             if let Some(picture) = picture {
                 self.shape = Emitter::TexturedQuad(Box::new(picture));
@@ -314,7 +314,7 @@ impl AreaLight {
     }
 
     /// Centroid of the area.
-    pub fn middle(&self) -> DVec3 {
-        of_any!(&self.shape, it => it.middle(), mesh => mesh.middle())
+    pub fn center(&self) -> DVec3 {
+        of_any!(&self.shape, it => it.center(), mesh => mesh.center())
     }
 }

@@ -61,7 +61,7 @@ impl AreaLight {
             }
             return row;
         }
-        if let Some(facets) = self.shape.as_mesh().and_then(MeshEmitter::facets) {
+        if let Some(facets) = self.shape.as_mesh().and_then(MeshEmitter::area_sampled) {
             return triangle_packet_of!(i => (facets, self), points, u);
         }
         if let Emitter::TexturedQuad(picture) = &self.shape {
@@ -77,7 +77,7 @@ impl AreaLight {
             return packet_from!(cuboid);
         }
         // Other shapes do not have a vectorized loop.
-        LightSamplePacket::lane_by_lane(points, used, |i, point| {
+        LightSamplePacket::sample_one_by_one(points, used, |i, point| {
             self.sample_untextured(point, lane(normals, i), [u[0][i], u[1][i]])
         })
     }

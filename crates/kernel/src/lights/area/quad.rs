@@ -48,7 +48,7 @@ impl ShapeEmitter for QuadEmitter {
         self.density(to_corner).unwrap_or_else(|| met.pdf_by_area(f64::from(self.area)))
     }
 
-    fn middle(&self) -> DVec3 {
+    fn center(&self) -> DVec3 {
         self.corner + ((self.u + self.v) * 0.5).as_dvec3()
     }
 }
@@ -57,7 +57,7 @@ impl QuadEmitter {
     /// [`ShapeEmitter::sample`] with a precomputed offset from the point to the corner.
     #[inline(always)]
     pub(super) fn sample_from(&self, point: Vec3, to_corner: Vec3, u: [f32; 2]) -> LightSamplePoint {
-        let by_area = self.by_area(to_corner, u);
+        let by_area = self.sample_by_area(to_corner, u);
         let (offset, factor) = match &self.rectangle {
             Some(rectangle) => {
                 let spherical = rectangle.seen_from(to_corner, self.normal);
@@ -104,7 +104,7 @@ impl QuadEmitter {
 
     /// Samples uniformly over the area. Returns the offset from the point and the inverse solid-angle pdf.
     #[inline(always)]
-    pub(super) fn by_area(&self, to_corner: Vec3, u: [f32; 2]) -> (Vec3, f32) {
+    pub(super) fn sample_by_area(&self, to_corner: Vec3, u: [f32; 2]) -> (Vec3, f32) {
         let offset = to_corner + self.u * u[0] + self.v * u[1];
         (offset, self.projected_solid_angle(offset))
     }
@@ -127,7 +127,7 @@ impl QuadEmitter {
     }
 
     /// Vectors whose dot products with an offset from the corner are the coordinates along the edges.
-    pub(super) fn along(&self) -> [Vec3; 2] {
+    pub(super) fn coordinate_vectors(&self) -> [Vec3; 2] {
         let (u, v, n) = (self.u.as_dvec3(), self.v.as_dvec3(), self.normal.as_dvec3());
         let (across_v, across_u) = (v.cross(n), n.cross(u));
         [(across_v / across_v.dot(u)).as_vec3(), (across_u / across_u.dot(v)).as_vec3()]
@@ -159,13 +159,13 @@ impl PlanarRectangle {
 
 /// In-plane component of the unit vector from a line toward a side. `d2` is the line's squared distance.
 #[inline(always)]
-fn towards(side: f32, d2: f32) -> f32 {
+fn in_plane_component(side: f32, d2: f32) -> f32 {
     side / (d2 + side * side).sqrt()
 }
 
 /// Angle between the planes through two sides.
 #[inline(always)]
-fn angle(a: f32, b: f32) -> f32 {
+fn dihedral_angle(a: f32, b: f32) -> f32 {
     acos((-a * b).max(-1.0).min(1.0))
 }
 
@@ -174,10 +174,10 @@ impl SphericalRectangle {
     #[inline(always)]
     pub fn new([x0, x1]: [f32; 2], [y0, y1]: [f32; 2], z: f32) -> Self {
         let z2 = z * z;
-        let (lower, right) = (-towards(y0, z2), towards(x1, z2));
-        let (upper, left) = (towards(y1, z2), -towards(x0, z2));
-        let (g0, g1) = (angle(lower, right), angle(right, upper));
-        let (g2, g3) = (angle(upper, left), angle(left, lower));
+        let (lower, right) = (-in_plane_component(y0, z2), in_plane_component(x1, z2));
+        let (upper, left) = (in_plane_component(y1, z2), -in_plane_component(x0, z2));
+        let (g0, g1) = (dihedral_angle(lower, right), dihedral_angle(right, upper));
+        let (g2, g3) = (dihedral_angle(upper, left), dihedral_angle(left, lower));
         Self {
             x: [x0, x1],
             y: [y0, y1],
@@ -191,7 +191,7 @@ impl SphericalRectangle {
 
     /// Combines three rectangles field by field. `of` maps the three values to one.
     #[inline(always)]
-    pub fn each(three: [Self; 3], of: impl Fn([f32; 3]) -> f32) -> Self {
+    pub fn combine_three(three: [Self; 3], of: impl Fn([f32; 3]) -> f32) -> Self {
         Self {
             x: [of(three.map(|one| one.x[0])), of(three.map(|one| one.x[1]))],
             y: [of(three.map(|one| one.y[0])), of(three.map(|one| one.y[1]))],
@@ -217,7 +217,7 @@ impl SphericalRectangle {
 
     /// Samples uniformly over the area. Returns the point and the inverse solid-angle pdf.
     #[inline(always)]
-    pub fn by_area(&self, u: [f32; 2]) -> (f32, f32, f32) {
+    pub fn sample_by_area(&self, u: [f32; 2]) -> (f32, f32, f32) {
         let (width, height) = (self.x[1] - self.x[0], self.y[1] - self.y[0]);
         let (x, y) = (self.x[0] + width * u[0], self.y[0] + height * u[1]);
         let nearness = 1.0 / (x * x + y * y + self.z * self.z).sqrt();
@@ -244,7 +244,7 @@ impl SphericalRectangle {
         let x = (-self.z * sin / root).max(self.x[0]).min(self.x[1]);
         // For this x, heights on the unit circle are uniformly distributed.
         let d2 = x * x + self.z * self.z;
-        let (h0, h1) = (towards(self.y[0], d2), towards(self.y[1], d2));
+        let (h0, h1) = (in_plane_component(self.y[0], d2), in_plane_component(self.y[1], d2));
         let h = h0 + u[1] * (h1 - h0);
         let rest = (1.0 - h * h).max(f32::MIN_POSITIVE);
         let y = (h * (d2 / rest).sqrt()).max(self.y[0]).min(self.y[1]);

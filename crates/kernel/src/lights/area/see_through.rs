@@ -45,7 +45,7 @@ impl ShapeEmitter for SeeThroughEmitter {
         met.pdf_by_area(self.by_area.total())
     }
 
-    fn middle(&self) -> DVec3 {
+    fn center(&self) -> DVec3 {
         self.shape.centroid()
     }
 }

@@ -31,14 +31,14 @@ pub trait RevolutionSideView {
     fn pole(&self) -> &PolarFrame;
 
     /// Largest angle around the pole at which the side is visible.
-    fn reach(&self) -> SinCos;
+    fn max_angle(&self) -> SinCos;
 
     /// Difference between the cosines at the ends of the visible interval, for an angle around the pole.
-    fn stretch(&self, around: SinCos) -> f64;
+    fn cosine_extent(&self, around: SinCos) -> f64;
 
     /// The point at a fraction `share` of the interval of cosines. Returns its angle from the pole and its
     /// distance.
-    fn place(&self, around: SinCos, share: f64) -> (SinCos, f64);
+    fn point_at(&self, around: SinCos, share: f64) -> (SinCos, f64);
 }
 
 /// The visible part of a light.
@@ -59,8 +59,8 @@ impl<S: RevolutionSide> ShapeEmitter for RevolutionEmitter<S> {
             (Some((side, meridians)), _) if u[0] < share => {
                 let (angle, density) = meridians.sample(u[1]);
                 let around = SinCos::of(angle);
-                let (from_pole, distance) = side.place(around, f64::from(u[0] / share));
-                let factor = side.stretch(around) / (density * f64::from(share));
+                let (from_pole, distance) = side.point_at(around, f64::from(u[0] / share));
+                let factor = side.cosine_extent(around) / (density * f64::from(share));
                 (side.pole().direction(from_pole, around), distance, factor)
             }
             (_, Some((cap, normal))) => {
@@ -81,15 +81,15 @@ impl<S: RevolutionSide> ShapeEmitter for RevolutionEmitter<S> {
         let density = match (view.side, view.cap) {
             (_, Some((cap, normal))) if is_cap(normal) => (1.0 - share) * cap.pdf(met.direction),
             (Some((side, meridians)), _) => {
-                let angle = side.pole().around(met.direction);
-                share * meridians.pdf(angle) / side.stretch(SinCos::of(angle.abs()))
+                let angle = side.pole().azimuth(met.direction);
+                share * meridians.pdf(angle) / side.cosine_extent(SinCos::of(angle.abs()))
             }
             (None, _) => 0.0,
         };
         density as f32
     }
 
-    fn middle(&self) -> DVec3 {
+    fn center(&self) -> DVec3 {
         self.middle
     }
 }
@@ -97,7 +97,7 @@ impl<S: RevolutionSide> ShapeEmitter for RevolutionEmitter<S> {
 impl<S: RevolutionSide> RevolutionEmitter<S> {
     fn view(&self, point: Vec3) -> RevolutionView<S::RevolutionView> {
         let side = self.side.seen_from(point).map(|view| {
-            let meridians = MeridianDistribution::new(view.reach(), |turn| view.stretch(turn));
+            let meridians = MeridianDistribution::new(view.max_angle(), |turn| view.cosine_extent(turn));
             (view, meridians)
         });
         let side = side.filter(|(_, meridians)| meridians.total() > 0.0);
@@ -188,16 +188,16 @@ impl RevolutionSideView for CylinderView {
         &self.pole
     }
 
-    fn reach(&self) -> SinCos {
+    fn max_angle(&self) -> SinCos {
         self.reach
     }
 
-    fn stretch(&self, around: SinCos) -> f64 {
+    fn cosine_extent(&self, around: SinCos) -> f64 {
         let [low, high] = self.cosines(self.to_circle(SinCos { sin: around.sin.abs(), ..around }));
         high - low
     }
 
-    fn place(&self, around: SinCos, share: f64) -> (SinCos, f64) {
+    fn point_at(&self, around: SinCos, share: f64) -> (SinCos, f64) {
         let to_circle = self.to_circle(SinCos { sin: around.sin.abs(), ..around });
         let [low, high] = self.cosines(to_circle);
         let cos = low + (high - low) * share;
@@ -278,7 +278,7 @@ impl RevolutionSide for ConeSide {
 
 impl ConeView {
     /// Angle at the tip between the point and the line on the side in a half plane.
-    fn at_tip(&self, around: SinCos) -> SinCos {
+    fn angle_at_tip(&self, around: SinCos) -> SinCos {
         let ((m, sin), c) = (self.off_axis, self.cos_opening);
         let q = sin * around.cos;
         let square = m * m + q * q;
@@ -294,20 +294,20 @@ impl RevolutionSideView for ConeView {
         &self.pole
     }
 
-    fn reach(&self) -> SinCos {
+    fn max_angle(&self) -> SinCos {
         self.reach
     }
 
-    fn stretch(&self, around: SinCos) -> f64 {
-        let at_tip = self.at_tip(around);
+    fn cosine_extent(&self, around: SinCos) -> f64 {
+        let at_tip = self.angle_at_tip(around);
         let (along, across) = (self.distance - self.slant * at_tip.cos, self.slant * at_tip.sin);
         let length = (along * along + across * across).sqrt();
         if along > 0.0 { across * across / (length * (length + along)) } else { 1.0 - along / length }
     }
 
-    fn place(&self, around: SinCos, share: f64) -> (SinCos, f64) {
-        let at_tip = self.at_tip(around);
-        let versine = share * self.stretch(around);
+    fn point_at(&self, around: SinCos, share: f64) -> (SinCos, f64) {
+        let at_tip = self.angle_at_tip(around);
+        let versine = share * self.cosine_extent(around);
         let from_pole = SinCos { sin: (versine * (2.0 - versine)).max(0.0).sqrt(), cos: 1.0 - versine };
         let sin = at_tip.sin * from_pole.cos + at_tip.cos * from_pole.sin;
         let farthest = self.distance + self.slant;

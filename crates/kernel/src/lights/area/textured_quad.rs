@@ -46,7 +46,7 @@ impl ShapeEmitter for TexturedQuadEmitter {
         let GridSample { column, row, rest } = self.cells.sample(u);
         let at =
             [(column as f32 + rest[0]) / self.size[0] as f32, (row as f32 + rest[1]) / self.size[1] as f32];
-        let (offset, by_area) = self.quad.by_area(to_corner, at);
+        let (offset, by_area) = self.quad.sample_by_area(to_corner, at);
         let cell_factor = self.cell_density(column, row);
         let own = self.quad.sample(point, u);
         if by_texture {
@@ -69,8 +69,8 @@ impl ShapeEmitter for TexturedQuadEmitter {
         if quad_pdf > 0.0 { self.density(met.direction * met.distance, to_corner, quad_pdf) } else { 0.0 }
     }
 
-    fn middle(&self) -> DVec3 {
-        self.quad.middle()
+    fn center(&self) -> DVec3 {
+        self.quad.center()
     }
 }
 
@@ -102,7 +102,7 @@ impl TexturedQuadEmitter {
         let share = (MAX_TEXTURE_SHARE * contrast) as f32;
         let cells =
             PiecewiseConstant2D::new(size[0], rows.into_iter()).filter(|_| share > MIN_TEXTURE_SHARE)?;
-        Some(Self { along: quad.along(), quad, size, cells, share })
+        Some(Self { along: quad.coordinate_vectors(), quad, size, cells, share })
     }
 
     /// Pdf in sr⁻¹ at an offset from the point, given the untextured quad's pdf.

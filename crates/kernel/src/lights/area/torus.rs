@@ -87,7 +87,7 @@ impl ShapeEmitter for TorusEmitter {
     /// includes both hits, and the sample is the nearer one, so it is never occluded by the torus.
     fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
         let Some(view) = TorusView::new(&self.torus, point) else { return LightSamplePoint::NOTHING };
-        let slices = view.slices();
+        let slices = view.slice_density();
         let side = 2.0 * f64::from(u[0]) - 1.0;
         let (share, density) = slices.sample(side.abs());
         let tau = share * view.reach;
@@ -95,9 +95,9 @@ impl ShapeEmitter for TorusEmitter {
         let Some(slice) = view.slice(SinCos::of(turn.copysign(side))) else {
             return LightSamplePoint::NOTHING;
         };
-        let (sine, in_slice) = slice.sines(&view).sample(f64::from(u[1]));
-        let place = slice.place(&view, slice.tangent(2.0 * sine - 1.0));
-        let own = view.per_turn(density, tau) * 0.5 * in_slice / place.factor;
+        let (sine, in_slice) = slice.elevation_density(&view).sample(f64::from(u[1]));
+        let place = slice.near_point(&view, slice.tangent(2.0 * sine - 1.0));
+        let own = view.to_density_over_angle(density, tau) * 0.5 * in_slice / place.factor;
         if !(own > 0.0) {
             return LightSamplePoint::NOTHING;
         }
@@ -117,7 +117,7 @@ impl ShapeEmitter for TorusEmitter {
 
     fn pdf(&self, from: Vec3, met: &LightHit) -> f32 {
         TorusView::new(&self.torus, from).map_or(0.0, |view| {
-            let slices = view.slices();
+            let slices = view.slice_density();
             let (density, first) = view.densities(&self.torus, &slices, met.direction.as_dvec3());
             // A ray may continue through the first surface and hit another one, which is never sampled.
             let is_later = first.is_some_and(|first| f64::from(met.distance) > first * (1.0 + SAME_DISTANCE));
@@ -125,7 +125,7 @@ impl ShapeEmitter for TorusEmitter {
         })
     }
 
-    fn middle(&self) -> DVec3 {
+    fn center(&self) -> DVec3 {
         self.torus.centroid()
     }
 }
@@ -178,7 +178,7 @@ impl TorusView {
     }
 
     /// Density of the slices on one side over τ, relative to its maximum.
-    fn slices(&self) -> PiecewiseLinear<SLICES> {
+    fn slice_density(&self) -> PiecewiseLinear<SLICES> {
         // Compute sinh and cosh from powers of e^step.
         let step = libm::exp(self.reach / (SLICES - 1) as f64);
         let mut power = 1.0;
@@ -187,12 +187,12 @@ impl TorusView {
             power *= step;
             let (sin, cos) = sin_cos((sinh / self.closeness) as f32);
             let slice = self.slice(SinCos { sin: f64::from(sin), cos: f64::from(cos) });
-            slice.map_or(0.0, |slice| slice.place(self, slice.tangent(0.0)).factor) * cosh
+            slice.map_or(0.0, |slice| slice.near_point(self, slice.tangent(0.0)).factor) * cosh
         }))
     }
 
     /// Converts a density over τ/τ_max on one side to a density over φ on both sides.
-    fn per_turn(&self, density: f64, tau: f64) -> f64 {
+    fn to_density_over_angle(&self, density: f64, tau: f64) -> f64 {
         0.5 * density * self.closeness / (libm::cosh(tau) * self.reach)
     }
 
@@ -249,12 +249,13 @@ impl TorusView {
         let [u, v] = slice.to_middle;
         let (ahead, beside) = (outwards * u + upwards * v, upwards * u - outwards * v);
         let tangent = beside / ahead;
-        let factor = slice.place(self, tangent).factor;
+        let factor = slice.near_point(self, tangent).factor;
         if !(ahead > 0.0 && factor > 0.0) {
             return 0.0;
         }
-        let in_slice = slice.sines(self).pdf((0.5 + 0.5 * slice.sine_of(tangent)).clamp(0.0, 1.0));
-        self.per_turn(slices.pdf(share), share * self.reach) * 0.5 * in_slice / factor
+        let in_slice =
+            slice.elevation_density(self).pdf((0.5 + 0.5 * slice.sine_of(tangent)).clamp(0.0, 1.0));
+        self.to_density_over_angle(slices.pdf(share), share * self.reach) * 0.5 * in_slice / factor
     }
 }
 
@@ -273,13 +274,13 @@ impl TorusSlice {
     }
 
     /// Density over the relative sine, from minimum to maximum.
-    fn sines(&self, view: &TorusView) -> PiecewiseLinear<PLACES> {
+    fn elevation_density(&self, view: &TorusView) -> PiecewiseLinear<PLACES> {
         let sine = |i: usize| 2.0 * i as f64 / (PLACES - 1) as f64 - 1.0;
-        PiecewiseLinear(std::array::from_fn(|i| self.place(view, self.tangent(sine(i))).factor))
+        PiecewiseLinear(std::array::from_fn(|i| self.near_point(view, self.tangent(sine(i))).factor))
     }
 
     /// Near point on the circle, given the tangent of the angle to the circle's center.
-    fn place(&self, view: &TorusView, tangent: f64) -> SlicePoint {
+    fn near_point(&self, view: &TorusView, tangent: f64) -> SlicePoint {
         let cos = 1.0 / (1.0 + tangent * tangent).sqrt();
         let sin = tangent * cos;
         let middle = self.gap + view.tube;

@@ -61,7 +61,7 @@ impl ShapeEmitter for TriangleEmitter {
         }
     }
 
-    fn middle(&self) -> DVec3 {
+    fn center(&self) -> DVec3 {
         let [a, b, c] = self.corners;
         (a + b + c) / 3.0
     }

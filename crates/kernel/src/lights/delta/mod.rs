@@ -18,13 +18,13 @@ pub trait DeltaLight {
     fn isotropic(&self) -> &PointLight;
 
     /// Intensity in a unit direction away from the light, relative to the peak intensity, in [0, 1].
-    fn share(&self, away: Vec3) -> f32;
+    fn relative_intensity(&self, away: Vec3) -> f32;
 
-    /// Power divided by the peak intensity, in sr: the integral of [`DeltaLight::share`].
+    /// Power divided by the peak intensity, in sr: the integral of [`DeltaLight::relative_intensity`].
     fn solid_angle(&self) -> f64;
 
     /// Samples a unit direction away from the light, proportionally to the intensity. `u` is in [0, 1)².
-    fn direction(&self, u: [f32; 2]) -> Vec3;
+    fn sample_direction(&self, u: [f32; 2]) -> Vec3;
 
     /// Bounds of the light's position and emission. Nothing is emitted outside the cone.
     fn bounds(&self) -> LightBounds;
@@ -32,14 +32,14 @@ pub trait DeltaLight {
     /// Unit direction from a point to the light, and irradiance at normal incidence (0 at the light's
     /// position).
     #[inline(always)]
-    fn arriving(&self, point: Vec3) -> (Vec3, Vec3) {
+    fn direction_and_irradiance(&self, point: Vec3) -> (Vec3, Vec3) {
         let (direction, weight) = self.isotropic().irradiance(point);
-        (direction, weight * self.share(-direction))
+        (direction, weight * self.relative_intensity(-direction))
     }
 
     /// [`Light::sample`](super::Light::sample). There is only one direction.
     fn sample(&self, point: Vec3) -> Option<LightSample> {
-        let (direction, weight) = self.arriving(point);
+        let (direction, weight) = self.direction_and_irradiance(point);
         let end = ShadowRayEnd::At(self.isotropic().position.as_vec3());
         (weight != Vec3::ZERO).then_some(LightSample { end, direction, weight, source: LightObject::Nothing })
     }
@@ -49,7 +49,7 @@ pub trait DeltaLight {
     fn sample_row(&self, points: &Vec3x16) -> LightSamplePacket {
         let target = self.isotropic().position.as_vec3();
         packet_of!(LightObject::Nothing, i => {
-            let (direction, weight) = self.arriving(lane(points, i));
+            let (direction, weight) = self.direction_and_irradiance(lane(points, i));
             (direction, target, weight)
         })
     }

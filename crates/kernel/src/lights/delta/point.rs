@@ -49,7 +49,7 @@ impl DeltaLight for PointLight {
         self
     }
 
-    fn share(&self, _: Vec3) -> f32 {
+    fn relative_intensity(&self, _: Vec3) -> f32 {
         1.0
     }
 
@@ -57,7 +57,7 @@ impl DeltaLight for PointLight {
         4.0 * PI
     }
 
-    fn direction(&self, u: [f32; 2]) -> Vec3 {
+    fn sample_direction(&self, u: [f32; 2]) -> Vec3 {
         warp::cone(u, 2.0)
     }
 
@@ -71,7 +71,7 @@ impl DeltaLight for PointLight {
     }
 
     #[inline(always)]
-    fn arriving(&self, point: Vec3) -> (Vec3, Vec3) {
+    fn direction_and_irradiance(&self, point: Vec3) -> (Vec3, Vec3) {
         self.irradiance(point)
     }
 }

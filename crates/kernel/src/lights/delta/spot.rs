@@ -28,7 +28,7 @@ impl DeltaLight for SpotLight {
     }
 
     #[inline(always)]
-    fn share(&self, away: Vec3) -> f32 {
+    fn relative_intensity(&self, away: Vec3) -> f32 {
         // Use the sine of half the angle, which is accurate even for small angles, unlike the cosine.
         let half_sine = (away - self.axis).length() * 0.5;
         let half_sine = if half_sine < 1.0 { half_sine } else { 1.0 };
@@ -47,7 +47,7 @@ impl DeltaLight for SpotLight {
         inner + faded
     }
 
-    fn direction(&self, u: [f32; 2]) -> Vec3 {
+    fn sample_direction(&self, u: [f32; 2]) -> Vec3 {
         let SpotCone { half, width, inner, faded } = self.cones();
         let goal = f64::from(u[0]) * (inner + faded);
         let local = if goal < inner {
@@ -55,7 +55,7 @@ impl DeltaLight for SpotLight {
             warp::cone([1.0, u[1]], one_minus_cos)
         } else {
             let part = ((inner + faded - goal) / faded).clamp(0.0, 1.0);
-            let angle = half - from_edge(half, width, part);
+            let angle = half - invert_edge_integral(half, width, part);
             let (sin, cos) = libm::sincos(angle);
             let (sin_phi, cos_phi) = sin_cos(2.0 * PI * u[1]);
             Vec3::new(sin as f32 * cos_phi, sin as f32 * sin_phi, cos as f32)
@@ -64,7 +64,7 @@ impl DeltaLight for SpotLight {
     }
 
     fn bounds(&self) -> LightBounds {
-        let cone = EmissionCone::within(self.axis.as_dvec3(), f64::from(self.half_angle));
+        let cone = EmissionCone::into_cone(self.axis.as_dvec3(), f64::from(self.half_angle));
         LightBounds { cone, ..self.point.bounds() }
     }
 }
@@ -74,7 +74,7 @@ impl SpotLight {
         let half = f64::from(self.half_angle);
         let width = f64::from(self.blend) * half;
         let sin = libm::sin((half - width) * 0.5);
-        let faded = if width > 0.0 { edge(half, width) / width } else { 0.0 };
+        let faded = if width > 0.0 { edge_integral(half, width) / width } else { 0.0 };
         let full = 2.0 * std::f64::consts::PI;
         SpotCone { half, width, inner: full * 2.0 * sin * sin, faded: full * faded }
     }
@@ -94,7 +94,7 @@ struct SpotCone {
 
 /// ∫ t·sin(H − t) dt from the edge of a cone (t = 0) inward to t = δ. For small angles, uses the first terms
 /// of the sine series, with a relative error below 1e-9.
-fn edge(half: f64, delta: f64) -> f64 {
+fn edge_integral(half: f64, delta: f64) -> f64 {
     if half < 0.02 {
         let (h2, d2) = (half * half, delta * delta);
         let third = h2 * half / 2.0 - h2 * delta + 0.75 * half * d2 - d2 * delta / 5.0;
@@ -104,15 +104,15 @@ fn edge(half: f64, delta: f64) -> f64 {
     delta * cos - 2.0 * sin_half * (cos * cos_half - sin * sin_half)
 }
 
-/// Inverts [`edge`]. Returns the δ in [0, width] at which the integral reaches a fraction `part` of its
-/// total. Uses a bracketed Newton iteration.
-fn from_edge(half: f64, width: f64, part: f64) -> f64 {
-    let goal = part * edge(half, width);
+/// Inverts [`edge_integral`]. Returns the δ in [0, width] at which the integral reaches a fraction `part` of
+/// its total. Uses a bracketed Newton iteration.
+fn invert_edge_integral(half: f64, width: f64, part: f64) -> f64 {
+    let goal = part * edge_integral(half, width);
     let (mut low, mut high) = (0.0, width);
     // Near the edge, the integral is quadratic in δ, or cubic for the widest cone.
     let mut delta = width * part.sqrt();
     for _ in 0..60 {
-        let off = edge(half, delta) - goal;
+        let off = edge_integral(half, delta) - goal;
         (low, high) = if off > 0.0 { (low, delta) } else { (delta, high) };
         let next = delta - off / (delta * libm::sin(half - delta));
         let next = if next > low && next < high { next } else { 0.5 * (low + high) };
@@ -137,7 +137,7 @@ mod tests {
         let point = PointLight { position, intensity: Vec3::ONE, falloff: Falloff::None };
         let spot = SpotLight { point, axis: Vec3::NEG_Y, half_angle: half_angle.to_radians() as f32, blend };
         let (sin, cos) = angle.to_radians().sin_cos();
-        spot.arriving((position + DVec3::new(sin, -cos, 0.0)).as_vec3()).1.x
+        spot.direction_and_irradiance((position + DVec3::new(sin, -cos, 0.0)).as_vec3()).1.x
     }
 
     #[test]

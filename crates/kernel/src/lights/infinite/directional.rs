@@ -38,7 +38,7 @@ impl DirectionalLight {
 
     /// Samples the disk uniformly over its solid angle.
     pub fn sample(&self, u: [f32; 2]) -> Option<LightSample> {
-        let (direction, weight) = self.arriving(u);
+        let (direction, weight) = self.direction_and_irradiance(u);
         (weight != Vec3::ZERO).then_some(LightSample {
             end: ShadowRayEnd::Beyond,
             direction,
@@ -50,14 +50,14 @@ impl DirectionalLight {
     /// [`DirectionalLight::sample`] for a packet.
     #[inline(always)]
     pub fn sample_row(&self, u: &[F32x16; 2]) -> LightSamplePacket {
-        infinite_packet_of!(i => self.arriving([u[0][i], u[1][i]]))
+        infinite_packet_of!(i => self.direction_and_irradiance([u[0][i], u[1][i]]))
     }
 
-    /// A unit direction to the light, and the radiance divided by the pdf. The irradiance instead if the
-    /// light has no extent.
+    /// A unit direction to the light, and the radiance divided by the pdf, or the irradiance if the light has
+    /// no extent.
     #[inline(always)]
-    pub fn arriving(&self, u: [f32; 2]) -> (Vec3, Vec3) {
-        if self.is_sharp() {
+    pub fn direction_and_irradiance(&self, u: [f32; 2]) -> (Vec3, Vec3) {
+        if self.is_single_direction() {
             return (self.to_light, self.irradiance);
         }
         let direction = Frame::from_normal(self.to_light).to_world(warp::cone(u, self.one_minus_cos));
@@ -82,17 +82,18 @@ impl DirectionalLight {
 
     /// Whether a unit direction is inside the disk. Compares chords, which is accurate even for small disks.
     fn contains(&self, direction: Vec3) -> bool {
-        !self.is_sharp() && (direction - self.to_light).length_squared() <= 2.0 * self.one_minus_cos
+        !self.is_single_direction()
+            && (direction - self.to_light).length_squared() <= 2.0 * self.one_minus_cos
     }
 }
 
 impl InfiniteLight for DirectionalLight {
     fn sample_direction(&self, u: [f32; 2]) -> (Vec3, Vec3) {
-        self.arriving(u)
+        self.direction_and_irradiance(u)
     }
 
     fn power_through(&self, area: f64) -> Vec3 {
-        (self.arriving([0.5; 2]).1.as_dvec3() * area).as_vec3()
+        (self.direction_and_irradiance([0.5; 2]).1.as_dvec3() * area).as_vec3()
     }
 
     fn bounds(&self) -> LightBounds {
@@ -106,12 +107,12 @@ impl InfiniteLight for DirectionalLight {
         }
     }
 
-    fn middle(&self) -> Option<Vec3> {
+    fn center(&self) -> Option<Vec3> {
         Some(self.to_light)
     }
 
     #[inline]
-    fn is_sharp(&self) -> bool {
+    fn is_single_direction(&self) -> bool {
         self.one_minus_cos == 0.0
     }
 }

@@ -41,7 +41,7 @@ impl Environment {
     /// Radiance from a unit direction, and pdf of [`Environment::sample`] in sr⁻¹. The pdf is for directions
     /// above the surface.
     #[inline(always)]
-    pub fn arriving(&self, direction: Vec3) -> (Vec3, f32) {
+    pub fn radiance_and_pdf(&self, direction: Vec3) -> (Vec3, f32) {
         match self {
             Self::Constant(radiance) => (*radiance, HEMISPHERE_PDF),
             Self::Map { sky, factor, turn } => {
@@ -51,9 +51,9 @@ impl Environment {
         }
     }
 
-    /// [`Environment::arriving`] for a packet of directions.
+    /// [`Environment::radiance_and_pdf`] for a packet of directions.
     #[inline(always)]
-    pub fn arriving_row(&self, directions: &Vec3x16) -> (Vec3x16, F32x16) {
+    pub fn radiance_and_pdf_row(&self, directions: &Vec3x16) -> (Vec3x16, F32x16) {
         match self {
             Self::Constant(Vec3 { x, y, z }) => {
                 ([[*x; PACKET_SIZE], [*y; PACKET_SIZE], [*z; PACKET_SIZE]], [HEMISPHERE_PDF; PACKET_SIZE])
@@ -79,7 +79,7 @@ impl Environment {
                     let frame = Frame::from_normal(lane(normals, i));
                     set_lane(&mut directions, i, frame.to_world(warp::cone([u[0][i], u[1][i]], 1.0)));
                 }
-                let (radiance, pdfs) = self.arriving_row(&directions);
+                let (radiance, pdfs) = self.radiance_and_pdf_row(&directions);
                 (directions, radiance, pdfs)
             }
             Self::Map { sky, factor, turn } => {
@@ -98,7 +98,7 @@ impl Environment {
             let weight = lane(&weights, i) * inverse_pdfs[i];
             set_lane(&mut weights, i, weight);
         }
-        let dark = LightSamplePacket::dark(LightObject::Nothing);
+        let dark = LightSamplePacket::without_light(LightObject::Nothing);
         LightSamplePacket {
             directions,
             weights,
@@ -111,7 +111,7 @@ impl Environment {
     /// Inverse sampling pdf of a direction, in sr.
     #[inline(always)]
     pub fn inverse_pdf(&self, direction: Vec3) -> f32 {
-        let (_, pdf) = self.arriving(direction);
+        let (_, pdf) = self.radiance_and_pdf(direction);
         if pdf > 0.0 { 1.0 / pdf } else { 0.0 }
     }
 
@@ -177,11 +177,11 @@ impl InfiniteLight for Environment {
         }
     }
 
-    fn middle(&self) -> Option<Vec3> {
+    fn center(&self) -> Option<Vec3> {
         None
     }
 
-    fn is_sharp(&self) -> bool {
+    fn is_single_direction(&self) -> bool {
         false
     }
 }

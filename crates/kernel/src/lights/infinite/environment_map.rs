@@ -100,10 +100,10 @@ impl EnvironmentMap {
     /// fraction of 360°, counterclockwise when seen from above.
     #[inline(always)]
     pub fn lookup(&self, direction: Vec3, turn: f32) -> (Vec3, f32) {
-        let place = self.place(direction, turn);
+        let place = self.texel_position(direction, turn);
         let corners = self.corners(place.column, place.row);
         let density = self.density(place.column, place.row);
-        (color(&corners, place.between), density * share(&luminances(&corners), place.along))
+        (color(&corners, place.between), density * relative_pdf(&luminances(&corners), place.along))
     }
 
     /// Samples a unit direction. Returns the direction, and the color and pdf that [`EnvironmentMap::lookup`]
@@ -114,23 +114,29 @@ impl EnvironmentMap {
         let corners = self.corners(column as u32, row as u32);
         let luminances = luminances(&corners);
         let along = warp::bilinear(rest, &luminances);
-        let (direction, down) = self.towards(column as f32, row, along, turn);
+        let (direction, down) = self.direction_in_cell(column as f32, row, along, turn);
         let density = self.density(column as u32, row as u32);
-        (direction, color(&corners, [along[0], down]), density * share(&luminances, along))
+        (direction, color(&corners, [along[0], down]), density * relative_pdf(&luminances, along))
     }
 
     /// Unit direction at the fractions `along` of a cell, in azimuth and height. Also returns the vertical
     /// fraction in terms of angle.
     #[inline(always)]
-    fn towards(&self, column: f32, row: usize, along: [f32; 2], turn: f32) -> (Vec3, f32) {
+    fn direction_in_cell(&self, column: f32, row: usize, along: [f32; 2], turn: f32) -> (Vec3, f32) {
         let extent = self.heights[row + 1] - self.heights[row];
-        self.by_height(column, row as f32, self.heights[row] + extent * f64::from(along[1]), along[0], turn)
+        self.direction_at_height(
+            column,
+            row as f32,
+            self.heights[row] + extent * f64::from(along[1]),
+            along[0],
+            turn,
+        )
     }
 
     /// Unit direction at height `y` in a cell and at a fraction of its azimuth. Also returns the vertical
     /// fraction in terms of angle.
     #[inline(always)]
-    fn by_height(&self, column: f32, row: f32, y: f64, along: f32, turn: f32) -> (Vec3, f32) {
+    fn direction_at_height(&self, column: f32, row: f32, y: f64, along: f32, turn: f32) -> (Vec3, f32) {
         let across = ((1.0 - y) * (1.0 + y)).max(0.0).sqrt() as f32;
         let turns = (column + 0.5 + along) / self.texels.width as f32 - 0.5 - turn;
         let (sin, cos) = sin_cos(2.0 * PI * turns);
@@ -162,10 +168,10 @@ impl EnvironmentMap {
             let along = warp::bilinear([rest[0][i], rest[1][i]], &luminances);
             let y = tops[i] + extents[i] * f64::from(along[1]);
             let (direction, down) =
-                self.by_height(columns[i] as i32 as f32, rows[i] as i32 as f32, y, along[0], turn);
+                self.direction_at_height(columns[i] as i32 as f32, rows[i] as i32 as f32, y, along[0], turn);
             set_lane(&mut directions, i, direction);
             set_lane(&mut colors, i, color(&corners, [along[0], down]));
-            pdfs[i] *= share(&luminances, along);
+            pdfs[i] *= relative_pdf(&luminances, along);
         }
         (directions, colors, pdfs)
     }
@@ -185,23 +191,23 @@ impl EnvironmentMap {
         let (mut heights, mut pdfs) = ([0.0; PACKET_SIZE], [0.0; PACKET_SIZE]);
         for i in 0..PACKET_SIZE {
             pdfs[i] = self.density(columns[i], rows[i]);
-            heights[i] = self.part_of_height(rows[i], directions[1][i]);
+            heights[i] = self.height_fraction(rows[i], directions[1][i]);
         }
         let mut colors = [[0.0; PACKET_SIZE]; 3];
         for i in 0..PACKET_SIZE {
             let corners = [0, 1, 2, 3].map(|corner| lane(&corners[corner], i));
             set_lane(&mut colors, i, color(&corners, [between[i], angles[i]]));
-            pdfs[i] *= share(&luminances(&corners), [between[i], heights[i]]);
+            pdfs[i] *= relative_pdf(&luminances(&corners), [between[i], heights[i]]);
         }
         (colors, pdfs)
     }
 
     #[inline(always)]
-    fn place(&self, direction: Vec3, turn: f32) -> TexelPosition {
+    fn texel_position(&self, direction: Vec3, turn: f32) -> TexelPosition {
         let (x, y) = self.coordinates(direction, turn);
         let (column, row) = self.cell(x, y);
         let between = [x - column as f32, y - row as f32];
-        TexelPosition { column, row, between, along: [between[0], self.part_of_height(row, direction.y)] }
+        TexelPosition { column, row, between, along: [between[0], self.height_fraction(row, direction.y)] }
     }
 
     /// Cell coordinates of a unit direction.
@@ -224,14 +230,14 @@ impl EnvironmentMap {
 
     /// Fraction of a cell row's height that is above a direction.
     #[inline(always)]
-    fn part_of_height(&self, row: u32, y: f32) -> f32 {
+    fn height_fraction(&self, row: u32, y: f32) -> f32 {
         let (top, bottom) = (self.heights[row as usize], self.heights[row as usize + 1]);
         (((top - f64::from(y)) / (top - bottom)) as f32).max(0.0).min(1.0)
     }
 
     /// Indices of the texels around a cell: upper left, upper right, lower left, lower right.
     #[inline(always)]
-    fn corner_places(&self, column: u32, row: u32) -> [usize; 4] {
+    fn corner_indices(&self, column: u32, row: u32) -> [usize; 4] {
         let (width, column) = (self.texels.width as usize, column as usize);
         let right = if column + 1 == width { 0 } else { column + 1 };
         let upper = row.saturating_sub(1) as usize * width;
@@ -243,7 +249,7 @@ impl EnvironmentMap {
     #[inline(always)]
     fn corners(&self, column: u32, row: u32) -> [Vec3; 4] {
         // Avoid `map` because it may not be inlined.
-        let [a, b, c, d] = self.corner_places(column, row);
+        let [a, b, c, d] = self.corner_indices(column, row);
         [self.texels.at(a), self.texels.at(b), self.texels.at(c), self.texels.at(d)]
     }
 
@@ -252,7 +258,7 @@ impl EnvironmentMap {
     fn corner_rows(&self, columns: &[u32; PACKET_SIZE], rows: &[u32; PACKET_SIZE]) -> [Vec3x16; 4] {
         let mut places = [[0; PACKET_SIZE]; 4];
         for i in 0..PACKET_SIZE {
-            let own = self.corner_places(columns[i], rows[i]);
+            let own = self.corner_indices(columns[i], rows[i]);
             for corner in 0..4 {
                 places[corner][i] = own[corner];
             }
@@ -282,7 +288,7 @@ fn luminances(corners: &[Vec3; 4]) -> [f32; 4] {
 
 /// Pdf at a position in a cell, relative to the mean pdf in the cell.
 #[inline(always)]
-fn share(luminances: &[f32; 4], along: [f32; 2]) -> f32 {
+fn relative_pdf(luminances: &[f32; 4], along: [f32; 2]) -> f32 {
     let [a, b, c, d] = *luminances;
     let upper = a + (b - a) * along[0];
     let lower = c + (d - c) * along[0];

@@ -74,7 +74,7 @@ fn lookups_match_the_reference() {
             for direction in directions(4000).filter(|direction| direction.y.abs() < 1.0) {
                 let expected =
                     (reference(&texels, direction.as_dvec3(), degrees) + 1.0) * DVec3::new(1.0, 2.0, 3.0);
-                let found = environment.arriving(direction).0.as_dvec3();
+                let found = environment.radiance_and_pdf(direction).0.as_dvec3();
                 assert!(
                     (found - expected).length() < 2e-4 * f64::from(width.max(8)),
                     "{direction}: {found} {expected}"
@@ -92,7 +92,7 @@ fn sample_pdfs_equal_direction_pdfs() {
         let (mut found, mut off) = (0, 0);
         for i in 0..20_000 {
             let Some(sample) = environment.sample(Vec3::Y, random(i)) else { continue };
-            let (radiance, density) = environment.arriving(sample.direction);
+            let (radiance, density) = environment.radiance_and_pdf(sample.direction);
             // Rounding the direction changes the result near a black corner of a cell and at cell borders.
             let expected = radiance * (1.0 / density);
             off += u32::from(!((sample.weight - expected).length() <= 2e-3 * expected.length()));
@@ -138,7 +138,7 @@ fn pdfs_integrate_to_one_and_cover_all_light() {
             let phi = (f64::from(i) + 0.5) / f64::from(columns) * TAU;
             let (sin, cos) = ((f64::from(j) + 0.5) / f64::from(rows) * PI).sin_cos();
             let direction = DVec3::new(sin * phi.sin(), cos, -sin * phi.cos()).as_vec3();
-            let (radiance, density) = environment.arriving(direction);
+            let (radiance, density) = environment.radiance_and_pdf(direction);
             assert!(density > 0.0 || radiance == Vec3::ZERO, "{direction}: {radiance}");
             whole += f64::from(density) * sin * PI / f64::from(rows) * TAU / f64::from(columns);
         }
@@ -179,7 +179,7 @@ fn sample_frequencies_match_the_pdf() {
                 let y = 1.0 - 2.0 * at(cell / columns, j) / rows as f64;
                 let sin = (1.0 - y * y).sqrt();
                 let direction = DVec3::new(sin * phi.sin(), y, -sin * phi.cos()).as_vec3();
-                sum += f64::from(environment.arriving(direction).1);
+                sum += f64::from(environment.radiance_and_pdf(direction).1);
             }
             sum / (steps * steps) as f64 * 2.0 * TAU / (columns * rows) as f64 * f64::from(count)
         };
@@ -214,7 +214,7 @@ fn constant_light_is_sampled_above_the_surface() {
         let sample = environment.sample(normal, random(i)).expect("light");
         let cosine = sample.direction.dot(normal);
         assert!(cosine > -1e-6);
-        let (radiance, density) = environment.arriving(sample.direction);
+        let (radiance, density) = environment.radiance_and_pdf(sample.direction);
         assert_eq!(sample.weight, radiance * (1.0 / density));
         irradiance += sample.weight * cosine / 4096.0;
     }

@@ -27,8 +27,8 @@ pub trait InfiniteLight {
     fn bounds(&self) -> LightBounds;
 
     /// Unit direction to the light's center. `None` if the light surrounds the scene.
-    fn middle(&self) -> Option<Vec3>;
+    fn center(&self) -> Option<Vec3>;
 
     /// Whether the light has no angular extent.
-    fn is_sharp(&self) -> bool;
+    fn is_single_direction(&self) -> bool;
 }

@@ -15,7 +15,7 @@ use crate::sampling::warp;
 /// Spheres that photons are aimed at. A sphere is chosen proportionally to the expected light that reaches
 /// it. Then a direction or a point is sampled uniformly over its visible part.
 #[derive(Clone, Debug)]
-pub struct Targets {
+pub struct PhotonTargets {
     balls: Vec<BoundingSphere>,
     /// Distribution of the spheres by squared radius.
     pick_by_disk: Discrete,
@@ -39,7 +39,7 @@ pub enum EmissionProfile<'a> {
 
 impl EmissionProfile<'_> {
     /// Power divided by peak intensity, in sr.
-    pub fn spread(&self) -> f64 {
+    pub fn effective_solid_angle(&self) -> f64 {
         match self {
             Self::Light { spread, .. } => *spread,
             Self::Front(_) => PI,
@@ -47,15 +47,16 @@ impl EmissionProfile<'_> {
     }
 
     /// Intensity in a direction, relative to the peak intensity.
-    pub fn share(&self, direction: Vec3) -> f64 {
+    pub fn relative_intensity(&self, direction: Vec3) -> f64 {
         match self {
-            Self::Light { light, .. } => f64::from(light.share(direction)),
+            Self::Light { light, .. } => f64::from(light.relative_intensity(direction)),
             Self::Front(normal) => direction.as_dvec3().dot(*normal).max(0.0),
         }
     }
 
-    /// Upper bound on [`EmissionProfile::share`] over a cone of directions with a half angle of up to 90°, given its sine.
-    fn max_share(&self, axis: DVec3, sin: f64) -> f64 {
+    /// Upper bound on [`EmissionProfile::relative_intensity`] over a cone of directions with a half angle of
+    /// up to 90°, given its sine.
+    fn max_relative_intensity(&self, axis: DVec3, sin: f64) -> f64 {
         let cos = ((1.0 - sin) * (1.0 + sin)).max(0.0).sqrt();
         // Cosine of the smallest angle between a direction and the cone.
         let nearest = |direction: DVec3| {
@@ -74,7 +75,7 @@ impl EmissionProfile<'_> {
     }
 }
 
-impl Targets {
+impl PhotonTargets {
     /// Creates targets from spheres. `None` if no sphere has a positive radius.
     pub fn new(balls: &[BoundingSphere]) -> Option<Self> {
         let balls: Vec<BoundingSphere> = balls.iter().copied().filter(|ball| ball.radius > 0.0).collect();
@@ -99,8 +100,8 @@ impl Targets {
         PI * self.pick_by_disk.total()
     }
 
-    /// Area density at a point if points are sampled uniformly on the disks of [`Targets::pick_by_disk`].
-    /// `is_on` returns whether the point is on a disk.
+    /// Area density at a point if points are sampled uniformly on the disks of
+    /// [`PhotonTargets::pick_by_disk`]. `is_on` returns whether the point is on a disk.
     pub fn disk_density(&self, is_on: impl Fn(&BoundingSphere) -> bool) -> f64 {
         // Disks are chosen proportionally to their area, so each one contributes the same density.
         self.balls.iter().filter(|ball| is_on(ball)).count() as f64 / self.disk_area()
@@ -113,8 +114,8 @@ impl Targets {
         for ball in &self.balls {
             let cone = TargetCone::around(ball, from);
             let weight = match &cone {
-                Some(cone) => cone.solid_angle() * sends.max_share(cone.axis, cone.sin),
-                None => sends.spread(),
+                Some(cone) => cone.solid_angle() * sends.max_relative_intensity(cone.axis, cone.sin),
+                None => sends.effective_solid_angle(),
             };
             if weight > 0.0 {
                 view.total += weight;
@@ -181,8 +182,11 @@ impl TargetView<'_> {
                 None => by_others += weight,
             }
         }
-        let by_cones =
-            if by_cones > 0.0 { by_cones * self.sends.spread() / self.sends.share(direction) } else { 0.0 };
+        let by_cones = if by_cones > 0.0 {
+            by_cones * self.sends.effective_solid_angle() / self.sends.relative_intensity(direction)
+        } else {
+            0.0
+        };
         (by_cones + by_others) / self.total
     }
 }

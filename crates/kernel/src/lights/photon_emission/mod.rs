@@ -29,7 +29,7 @@ use crate::math::{DVec3, Vec2, Vec3};
 use crate::sampling::distribution::Discrete;
 use crate::sampling::warp;
 
-use aim::{EmissionProfile, Targets};
+use aim::{EmissionProfile, PhotonTargets};
 use surface::EmissiveSurface;
 
 /// A bounding sphere, in the same coordinates as the lights.
@@ -42,7 +42,7 @@ pub struct BoundingSphere {
 }
 
 impl BoundingSphere {
-    /// A sphere that contains all given spheres. Its center is that of their bounding box.
+    /// A sphere that contains all given spheres. It has the same center as their bounding box.
     pub fn around(balls: &[Self]) -> Self {
         let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         for Self { center, radius } in balls {
@@ -68,7 +68,7 @@ pub enum EmitterGeometry {
 
 /// Random numbers in [0, 1) for one photon.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PhotonNumbers {
+pub struct PhotonRandomNumbers {
     /// Chooses the light and a piece of it.
     pub light: [f32; 2],
     /// Chooses whether to aim, and the target.
@@ -151,7 +151,7 @@ struct LightEmission {
 /// How photons are aimed.
 #[derive(Clone, Debug)]
 struct PhotonAim {
-    targets: Targets,
+    targets: PhotonTargets,
     /// Fraction of photons to aim.
     share: f32,
     /// Distribution of the lights, weighted by their estimated power toward the targets.
@@ -181,7 +181,7 @@ impl PhotonSource {
     /// their mean flux is the power that reaches the targets.
     #[must_use]
     pub fn aimed_at(self, targets: &[BoundingSphere], share: f32) -> Self {
-        let targets = Targets::new(targets).filter(|_| share > 0.0);
+        let targets = PhotonTargets::new(targets).filter(|_| share > 0.0);
         let aim = targets.and_then(|targets| {
             let power_toward = |(number, light)| self.power_toward(number, light, &targets);
             let power_toward: Vec<f64> = self.lights.iter().map(power_toward).collect();
@@ -197,7 +197,7 @@ impl PhotonSource {
     }
 
     /// Bounding sphere of all finite objects.
-    pub fn around(&self) -> BoundingSphere {
+    pub fn finite_scene_bounds(&self) -> BoundingSphere {
         self.around
     }
 
@@ -217,7 +217,7 @@ impl PhotonSource {
     }
 
     /// Emits a photon, or returns `None` if the sample carries no flux.
-    pub fn emit(&self, u: &PhotonNumbers) -> Option<EmittedPhoton> {
+    pub fn emit(&self, u: &PhotonRandomNumbers) -> Option<EmittedPhoton> {
         let aim = self.aim.as_ref().filter(|aim| u.aim[0] < aim.share);
         let by_light = aim.map_or(&self.by_power, |aim| &aim.by_light);
         let (number, _) = by_light.sample(u.light[0]);
@@ -225,7 +225,7 @@ impl PhotonSource {
         let sample_photon = self
             .sample_photon(number, targets, u)
             .filter(|sample_photon| sample_photon.flux != Vec3::ZERO)?;
-        let (all, of_light) = (f64::from(self.aimed_share()), |by: &Discrete| by.share(number));
+        let (all, of_light) = (f64::from(self.aimed_share()), |by: &Discrete| by.probability(number));
         let aimed = self.aim.as_ref().map_or(0.0, |aim| all * of_light(&aim.by_light) * sample_photon.ratio);
         let density = (1.0 - all) * of_light(&self.by_power) + aimed;
         let flux = (sample_photon.flux.as_dvec3() / density).as_vec3();
@@ -239,16 +239,17 @@ impl PhotonSource {
     fn sample_photon(
         &self,
         number: usize,
-        targets: Option<&Targets>,
-        u: &PhotonNumbers,
+        targets: Option<&PhotonTargets>,
+        u: &PhotonRandomNumbers,
     ) -> Option<PhotonSample> {
         let source = &self.sources[number];
         match self.lights.get(number as u32).family() {
             LightFamily::Delta(light) => {
                 let sends = EmissionProfile::Light { light, spread: source.spread };
                 let PointLight { position, intensity, .. } = *light.isotropic();
-                let (direction, ratio) =
-                    self.sample_direction_from(position, &sends, targets, u, || light.direction(u.direction));
+                let (direction, ratio) = self.sample_direction_from(position, &sends, targets, u, || {
+                    light.sample_direction(u.direction)
+                });
                 let flux = intensity * source.spread as f32;
                 Some(PhotonSample { start: PhotonOrigin::Point(position.as_vec3()), direction, flux, ratio })
             }
@@ -257,7 +258,8 @@ impl PhotonSource {
                 self.photon_from_infinity(to_light, irradiance, targets, u)
             }
             LightFamily::Area(light) => {
-                let place = source.surface.as_ref()?.place(light, u.light[1], Vec2::from_array(u.position));
+                let place =
+                    source.surface.as_ref()?.sample_point(light, u.light[1], Vec2::from_array(u.position));
                 let normal = place.normal.as_vec3();
                 let by_cosine = || Frame::from_normal(normal).to_world(warp::cosine(u.direction));
                 let (direction, ratio) = self.sample_direction_from(
@@ -297,8 +299,8 @@ impl PhotonSource {
         &self,
         from: DVec3,
         sends: &EmissionProfile<'_>,
-        targets: Option<&Targets>,
-        u: &PhotonNumbers,
+        targets: Option<&PhotonTargets>,
+        u: &PhotonRandomNumbers,
         unaimed: impl FnOnce() -> Vec3,
     ) -> (Vec3, f64) {
         let Some(aim) = &self.aim else { return (unaimed(), 0.0) };
@@ -317,8 +319,8 @@ impl PhotonSource {
         &self,
         to_light: Vec3,
         irradiance: Vec3,
-        targets: Option<&Targets>,
-        u: &PhotonNumbers,
+        targets: Option<&PhotonTargets>,
+        u: &PhotonRandomNumbers,
     ) -> Option<PhotonSample> {
         let Frame { s, t, n } = Frame::from_normal(to_light);
         let (s, t, n) = (s.as_dvec3(), t.as_dvec3(), n.as_dvec3());
@@ -348,7 +350,7 @@ impl PhotonSource {
     }
 
     /// Estimated power that a light emits toward the targets, used for choosing a light.
-    fn power_toward(&self, number: u32, light: &Light, targets: &Targets) -> f64 {
+    fn power_toward(&self, number: u32, light: &Light, targets: &PhotonTargets) -> f64 {
         let source = &self.sources[number as usize];
         let power = mean_channel(source.power);
         if !(power > 0.0) {
@@ -363,8 +365,8 @@ impl PhotonSource {
             LightFamily::Infinite(_) => targets.disk_area() / disk,
             LightFamily::Area(light) => source.surface.as_ref().map_or(0.0, |surface| {
                 let of = |i: u32| {
-                    let (u, piece) = (places(i), (i as f32 + 0.5) / PLACES as f32);
-                    let place = surface.place(light, piece, u);
+                    let (u, piece) = (low_discrepancy_point(i), (i as f32 + 0.5) / PLACES as f32);
+                    let place = surface.sample_point(light, piece, u);
                     let part =
                         targets.seen_from(place.from, &EmissionProfile::Front(place.normal)).total() / PI;
                     part.min(1.0) * mean_channel(place.flux)
@@ -379,8 +381,9 @@ impl PhotonSource {
 /// Number of points on an area light from which the power toward the targets is estimated.
 const PLACES: u32 = 16;
 
-/// A low-discrepancy sequence in the unit square (Roberts, *The Unreasonable Effectiveness of Quasirandom Sequences*, 2018).
-fn places(i: u32) -> Vec2 {
+/// A low-discrepancy sequence in the unit square (Roberts, *The Unreasonable Effectiveness of Quasirandom
+/// Sequences*, 2018).
+fn low_discrepancy_point(i: u32) -> Vec2 {
     let along = |step: f64| ((f64::from(i) + 0.5) * step).fract() as f32;
     Vec2::new(along(0.754_877_666_246_693), along(0.569_840_290_998_053_3))
 }

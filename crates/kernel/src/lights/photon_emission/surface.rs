@@ -119,11 +119,11 @@ impl EmissiveSurface {
     }
 
     /// Samples a point from random numbers in [0, 1).
-    pub fn place(&self, light: &AreaLight, piece: f32, u: Vec2) -> EmissionPoint {
+    pub fn sample_point(&self, light: &AreaLight, piece: f32, u: Vec2) -> EmissionPoint {
         let (index, _) = self.pieces.sample(piece);
         let place = self.on.at(light, index, u);
         let PiecePoint { point, normal, area, .. } = place;
-        let factor = PI * area / self.pieces.share(index);
+        let factor = PI * area / self.pieces.probability(index);
         let flux = (radiance(light, &place).as_dvec3() * factor).as_vec3();
         let rounded = point.as_vec3();
         let error = match self.on {
@@ -151,7 +151,7 @@ impl PieceGeometry {
                 PiecePoint { point, normal, area: areas[part] / (all * all) as f64, primitive: part as u32 }
             }
             (Self::Mesh { .. }, Some(mesh)) => {
-                let (place, area, primitive) = mesh.place(index, u);
+                let (place, area, primitive) = mesh.sample_triangle(index, u);
                 PiecePoint { point: place.point, normal: place.normal, area, primitive }
             }
             (Self::Mesh { .. }, None) => {
@@ -165,7 +165,7 @@ impl PieceGeometry {
 fn radiance(light: &AreaLight, place: &PiecePoint) -> Vec3 {
     let texture = light.texture.as_ref();
     light.radiance
-        * texture.map_or(Vec3::ONE, |texture| texture.at_place(place.point.as_vec3(), place.primitive))
+        * texture.map_or(Vec3::ONE, |texture| texture.at_position(place.point.as_vec3(), place.primitive))
 }
 
 /// Upper bound on the lengths from which points on the shape are computed. `None` if the shape is infinite.

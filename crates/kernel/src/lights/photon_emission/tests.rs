@@ -30,10 +30,10 @@ const SCENE: BoundingSphere = BoundingSphere { center: DVec3::new(0.5, 1.0, -0.5
 const COLOR: Vec3 = Vec3::new(2.0, 1.0, 0.5);
 
 /// Generates random numbers for photons.
-fn numbers(mut next: impl FnMut() -> f32) -> impl FnMut() -> PhotonNumbers {
+fn numbers(mut next: impl FnMut() -> f32) -> impl FnMut() -> PhotonRandomNumbers {
     move || {
         let mut pair = || [next(), next()];
-        PhotonNumbers { light: pair(), aim: pair(), position: pair(), direction: pair() }
+        PhotonRandomNumbers { light: pair(), aim: pair(), position: pair(), direction: pair() }
     }
 }
 
@@ -125,7 +125,8 @@ fn mean(source: &PhotonSource, count: u32, of: impl Fn(&EmittedPhoton) -> f64) -
         let one = |i: u32| {
             let sampler = PixelSampler::new(3, group, 5, i);
             let pair = |k: u32| sampler.pair(1, Dimension::Light(k)).to_array();
-            let u = PhotonNumbers { light: pair(0), aim: pair(1), position: pair(2), direction: pair(3) };
+            let u =
+                PhotonRandomNumbers { light: pair(0), aim: pair(1), position: pair(2), direction: pair(3) };
             source.emit(&u).map_or(0.0, |photon| of(&photon))
         };
         (0..count).map(one).sum::<f64>() / f64::from(count)
@@ -365,7 +366,7 @@ fn aimed_pdfs_integrate_to_one() {
     let sends = [everywhere, cone, EmissionProfile::Front(DVec3::new(0.0, 0.6, 0.8))];
     for sends in sends {
         for balls in [&all[..3], &all[..], &all[..1]] {
-            let targets = Targets::new(balls).expect("targets");
+            let targets = PhotonTargets::new(balls).expect("targets");
             let view = targets.seen_from(from, &sends);
             // Integrate the aimed pdf (the ratio times the emission pdf) over all directions. The integral
             // lacks directions without emission, so estimate their fraction among aimed photons by sampling.
@@ -375,9 +376,10 @@ fn aimed_pdfs_integrate_to_one() {
                 let u =
                     [(i as f32 + 0.5) / n as f32, ((f64::from(i) * 0.618_033_988_749_894_8).fract()) as f32];
                 let direction = warp::cone(u, 2.0);
-                let share = sends.share(direction);
+                let share = sends.relative_intensity(direction);
                 if share > 0.0 {
-                    whole += view.ratio(direction, None) * share / sends.spread() * 4.0 * PI / f64::from(n);
+                    whole += view.ratio(direction, None) * share / sends.effective_solid_angle() * 4.0 * PI
+                        / f64::from(n);
                 }
             }
             let mut next = numbers(random::unit(6));
@@ -385,7 +387,7 @@ fn aimed_pdfs_integrate_to_one() {
             for _ in 0..tries {
                 let u = next();
                 useful += match view.sample(u.aim[1], u.direction) {
-                    Some((direction, _)) => f64::from(u8::from(sends.share(direction) > 0.0)),
+                    Some((direction, _)) => f64::from(u8::from(sends.relative_intensity(direction) > 0.0)),
                     None => 1.0,
                 };
             }
@@ -467,7 +469,7 @@ fn many_targets_are_merged() {
             radius: f64::from(next().abs()) * 0.1,
         })
         .collect();
-    let targets = Targets::new(&balls).expect("targets");
+    let targets = PhotonTargets::new(&balls).expect("targets");
     assert_eq!(targets.balls().len(), aim::MAX_TARGETS);
     for ball in &balls {
         let holds = |other: &BoundingSphere| {

@@ -62,7 +62,7 @@ impl EmissionCone {
     }
 
     /// Emission into a cone with a half angle of up to π.
-    pub fn within(axis: DVec3, half_angle: f64) -> Self {
+    pub fn into_cone(axis: DVec3, half_angle: f64) -> Self {
         Self { axis, cos: libm::cos(half_angle), edge: ConeEdge::Sharp }
     }
 
@@ -77,19 +77,19 @@ impl EmissionCone {
     /// Cosine of the largest angle between `axis` and any direction in the cone.
     fn widest_from(&self, axis: DVec3) -> f64 {
         let cos = self.axis.dot(axis).clamp(-1.0, 1.0);
-        let (sin, own_sin) = (sine(cos), sine(self.cos));
+        let (sin, own_sin) = (sine_from_cosine(cos), sine_from_cosine(self.cos));
         // The sum of the angles exceeds 180°.
         if cos <= -self.cos { -1.0 } else { cos * self.cos - sin * own_sin }
     }
 }
 
-fn sine(cos: f64) -> f64 {
+fn sine_from_cosine(cos: f64) -> f64 {
     ((1.0 - cos) * (1.0 + cos)).max(0.0).sqrt()
 }
 
 impl LightBounds {
     /// The bounds scaled by a color.
-    pub fn times(self, color: Vec3) -> Self {
+    pub fn scaled_by(self, color: Vec3) -> Self {
         Self { power: self.power * mean_channel(color), ..self }
     }
 

@@ -66,7 +66,7 @@ impl LightTreeBuilder<'_> {
         let number = self.nodes.len() as u32;
         self.nodes.push(LightTreeNode::empty(self.leaves));
         let is_over_lights = leaves.len() <= PACKET_SIZE;
-        let groups = groups(leaves, self.token)?;
+        let groups = partition_into_groups(leaves, self.token)?;
         let mut node = LightTreeNode::empty(self.leaves);
         let (mut rest, mut first) = (leaves, before);
         for (i, count) in groups.into_iter().enumerate() {
@@ -89,7 +89,7 @@ impl LightTreeBuilder<'_> {
 
 /// Partitions the leaves into at most one group per child, and returns the group sizes. Uses as few groups as
 /// possible to fill the nodes.
-fn groups(leaves: &mut [LightLeaf], token: &CancelToken) -> Result<Vec<usize>, Cancelled> {
+fn partition_into_groups(leaves: &mut [LightLeaf], token: &CancelToken) -> Result<Vec<usize>, Cancelled> {
     token.check()?;
     if leaves.len() <= PACKET_SIZE {
         return Ok(vec![1; leaves.len()]);
@@ -165,7 +165,7 @@ impl LeafSums {
         self.axes += axis * (power * 0.5 * (1.0 + cos));
     }
 
-    fn and(mut self, other: &Self) -> Self {
+    fn plus(mut self, other: &Self) -> Self {
         self.count += other.count;
         self.power += other.power;
         (self.min, self.max) = (self.min.min(other.min), self.max.max(other.max));
@@ -227,11 +227,11 @@ fn split(leaves: &mut [LightLeaf], unit: usize) -> usize {
 fn cheapest_split(parts: &[LeafSums]) -> usize {
     let mut right = parts.to_vec();
     for i in (0..parts.len() - 1).rev() {
-        right[i] = right[i].and(&right[i + 1]);
+        right[i] = right[i].plus(&right[i + 1]);
     }
     let (mut left, mut best) = (LeafSums::NOTHING, (f64::INFINITY, 1));
     for i in 1..parts.len() {
-        left = left.and(&parts[i - 1]);
+        left = left.plus(&parts[i - 1]);
         let cost = left.cost() + right[i].cost();
         if left.count > 0 && right[i].count > 0 && cost < best.0 {
             best = (cost, i);

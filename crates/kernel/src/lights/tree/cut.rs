@@ -6,7 +6,9 @@
 use arrayvec::ArrayVec;
 
 use super::node::{ExpectedContributions, NodeChild, Receiver};
-use super::{CumulativeImportance, LightPick, LightTree, NOT_IN_TREE, PathCache, ROOT, below, target};
+use super::{
+    CumulativeImportance, LightPick, LightTree, NOT_IN_TREE, PathCache, ROOT, clamp_below, scale_to_total,
+};
 use crate::math::Vec3;
 use crate::math::lanes::F32x16;
 
@@ -106,7 +108,7 @@ impl<'a> LightTreeCut<'a> {
         // over the children, divided by the node's share of the rounded total.
         let (mut before, mut scale) = (0.0, 0.0);
         for (place, u) in u.enumerate() {
-            let target = target(u, all);
+            let target = scale_to_total(u, all);
             while self.sums[index] <= target {
                 index += 1;
             }
@@ -116,14 +118,14 @@ impl<'a> LightTreeCut<'a> {
                 scale = shares.total() / (self.sums[index] - before);
             }
             // Stay below the sum over the children. It is positive because the node's share is.
-            let part = below((target - before) * scale, shares.total());
+            let part = clamp_below((target - before) * scale, shares.total());
             let child = shares.find(part);
             let probability = self.share(index, child, inverse);
             match self.tree.nodes[self.nodes[index] as usize].children[child] {
                 NodeChild::Light(light) => picked(place, light, probability),
                 NodeChild::LightTreeNode(node) => {
                     let so_far = LightPick { light: 0, probability, rest: shares.rest(part, child) };
-                    if let Some(pick) = self.tree.pick_under(node, &self.receiver, so_far, &mut way) {
+                    if let Some(pick) = self.tree.pick_below(node, &self.receiver, so_far, &mut way) {
                         picked(place, pick.light, pick.probability);
                     }
                 }
@@ -148,7 +150,7 @@ impl<'a> LightTreeCut<'a> {
         let (mut node, mut last) = (ROOT, None);
         loop {
             let one = &self.tree.nodes[node as usize];
-            let child = one.child_above(place);
+            let child = one.child_containing(place);
             if let Some(index) = self.nodes.iter().position(|&other| other == node) {
                 last = Some((index, child));
             }
@@ -161,7 +163,7 @@ impl<'a> LightTreeCut<'a> {
         let share = self.share(index, child, 1.0 / self.total());
         match self.tree.nodes[self.nodes[index] as usize].children[child] {
             NodeChild::LightTreeNode(below) if share > 0.0 => {
-                self.tree.probability_under(below, &self.receiver, place, share)
+                self.tree.probability_below(below, &self.receiver, place, share)
             }
             NodeChild::LightTreeNode(_) | NodeChild::Light(_) => share,
         }

@@ -51,21 +51,21 @@ impl LightTree {
     #[inline(always)]
     pub fn pick(&self, receiver: &Receiver, u: f64) -> Option<LightPick> {
         let mut way = PathCache::NEW;
-        self.pick_under(ROOT, receiver, LightPick { light: 0, probability: 1.0, rest: u }, &mut way)
+        self.pick_below(ROOT, receiver, LightPick { light: 0, probability: 1.0, rest: u }, &mut way)
     }
 
     /// Probability that [`LightTree::pick`] picks this light.
     pub fn probability(&self, receiver: &Receiver, light: u32) -> f32 {
         match self.positions[light as usize] {
             NOT_IN_TREE => 0.0,
-            place => self.probability_under(ROOT, receiver, place, 1.0),
+            place => self.probability_below(ROOT, receiver, place, 1.0),
         }
     }
 
     /// Picks a light below `node`. `pick` is the pick so far, and `way` caches the path of the previous pick
     /// for the same point.
     #[inline(always)]
-    fn pick_under(
+    fn pick_below(
         &self,
         mut node: u32,
         receiver: &Receiver,
@@ -84,7 +84,7 @@ impl LightTree {
             if !(total > 0.0) {
                 return None;
             }
-            let target = target(pick.rest, total);
+            let target = scale_to_total(pick.rest, total);
             let child = shares.find(target);
             pick.probability *= shares.share(child);
             pick.rest = shares.rest(target, child);
@@ -97,10 +97,10 @@ impl LightTree {
     }
 
     /// Probability of the light at `place` in tree order, given the probability of an ancestor node.
-    fn probability_under(&self, mut node: u32, receiver: &Receiver, place: u32, mut probability: f32) -> f32 {
+    fn probability_below(&self, mut node: u32, receiver: &Receiver, place: u32, mut probability: f32) -> f32 {
         loop {
             let one = &self.nodes[node as usize];
-            let child = one.child_above(place);
+            let child = one.child_containing(place);
             probability *= CumulativeImportance::new(&one.expected(receiver).importance).share(child);
             match one.children[child] {
                 NodeChild::LightTreeNode(below) if probability > 0.0 => node = below,
@@ -111,7 +111,7 @@ impl LightTree {
 
     /// Whether a light is in the tree.
     #[inline(always)]
-    pub fn has(&self, light: u32) -> bool {
+    pub fn contains(&self, light: u32) -> bool {
         self.positions[light as usize] != NOT_IN_TREE
     }
 
@@ -211,13 +211,13 @@ fn add_shifted<const STEP: usize>(sums: &[f64; PACKET_SIZE]) -> [f64; PACKET_SIZ
 /// Scales `u` in [0, 1) to a total. The result is always below the total, so rounding cannot go past the last
 /// interval.
 #[inline(always)]
-fn target(u: f64, total: f64) -> f64 {
-    below(u * total, total)
+fn scale_to_total(u: f64, total: f64) -> f64 {
+    clamp_below(u * total, total)
 }
 
 /// Limits `part` to less than `total`.
 #[inline(always)]
-fn below(part: f64, total: f64) -> f64 {
+fn clamp_below(part: f64, total: f64) -> f64 {
     let last = total.next_down();
     if part < last { part } else { last }
 }

@@ -267,7 +267,7 @@ impl LightTreeNode {
     }
 
     /// The child that contains the leaf at `place` in tree order.
-    pub fn child_above(&self, place: u32) -> usize {
+    pub fn child_containing(&self, place: u32) -> usize {
         let after = self.first[1..].iter().position(|&first| first > place);
         after.unwrap_or(PACKET_SIZE - 1)
     }
@@ -331,7 +331,7 @@ fn expected_as<const IS_PLAIN: bool, const HAS_LOBE: bool>(
     let (mut value, mut away) = ([0.0; PACKET_SIZE], [1.0; PACKET_SIZE]);
     if IS_PLAIN {
         for i in 0..PACKET_SIZE {
-            value[i] = bounds.power[i] * cosine(mean[i]) * (inverse[i] * inverse[i]);
+            value[i] = bounds.power[i] * clamp_cosine(mean[i]) * (inverse[i] * inverse[i]);
         }
     } else {
         let [mut cos, mut without] = [[0.0; PACKET_SIZE]; 2];
@@ -346,7 +346,7 @@ fn expected_as<const IS_PLAIN: bool, const HAS_LOBE: bool>(
             let is_within = (cos[i] >= bounds.cos[i]) | (square[i] <= least[i]);
             away[i] = (if is_within { 1.0 } else { beyond }) + sin[i];
             let weakened = if bounds.weakens[i] > 0.0 { inverse[i] * inverse[i] } else { 1.0 };
-            value[i] = bounds.power[i] * cosine(mean[i]) * weakened * cosine(away[i]);
+            value[i] = bounds.power[i] * clamp_cosine(mean[i]) * weakened * clamp_cosine(away[i]);
         }
     }
     if HAS_LOBE {
@@ -382,7 +382,7 @@ fn inverse_roots(x: &mut F32x16) {
 
 /// Clamps a bound on a cosine.
 #[inline(always)]
-fn cosine(bound: f32) -> f32 {
+fn clamp_cosine(bound: f32) -> f32 {
     at_most(at_least(bound, MIN_COSINE), 1.0)
 }
 

@@ -77,7 +77,7 @@ impl SingleNodeImportance<'_> {
         let mut targets = [0.0; PACKET_SIZE];
         for i in 0..PACKET_SIZE {
             // Stay below the total to prevent rounding past the last child with nonzero importance.
-            let (target, last) = (u[i] * self.totals[i], before(self.totals[i]));
+            let (target, last) = (u[i] * self.totals[i], largest_below(self.totals[i]));
             targets[i] = if target < last { target } else { last };
         }
         let (mut sums, mut children, mut values) = ([0.0; PACKET_SIZE], [0; PACKET_SIZE], [0.0; PACKET_SIZE]);
@@ -122,6 +122,6 @@ impl SingleNodeImportance<'_> {
 
 /// The largest number below `total` > 0. Returns 0 for 0.
 #[inline(always)]
-fn before(total: f64) -> f64 {
+fn largest_below(total: f64) -> f64 {
     f64::from_bits(total.to_bits().saturating_sub(1))
 }

@@ -133,7 +133,7 @@ proptest! {
         for _ in 0..4 {
             let (mut point, normal) = place(&mut next);
             // Also test points close to a light.
-            if let (true, Some((crate::lights::LightCenter::At(middle), _))) = (next() < 0.5, lights[0].middle()) {
+            if let (true, Some((crate::lights::LightCenter::At(middle), _))) = (next() < 0.5, lights[0].center()) {
                 point = middle + point * 0.01;
             }
             let cut = cut_for(&tree, point, normal, NODES);

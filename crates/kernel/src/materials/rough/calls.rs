@@ -9,16 +9,25 @@ pub(super) trait RoughCalls: RoughRow {
     /// [`RoughRow::f`].
     #[inline(always)]
     fn call_f(&self, directions: &Vec3x16, simd: impl Simd) -> BsdfValues {
-        if Self::IS_COPIED { self.f(directions) } else { simd.call(Evaluation { row: self, directions }) }
+        if Self::IS_COPIED {
+            self.f(directions)
+        } else {
+            simd.call(EvaluationKernel { row: self, directions })
+        }
     }
 
-    /// [`RoughRow::parts`].
+    /// [`RoughRow::wide_and_narrow`].
     #[inline(always)]
-    fn call_parts(&self, directions: &Vec3x16, values: &BsdfValues, simd: impl Simd) -> [Vec3x16; 2] {
+    fn call_wide_and_narrow(
+        &self,
+        directions: &Vec3x16,
+        values: &BsdfValues,
+        simd: impl Simd,
+    ) -> [Vec3x16; 2] {
         if Self::IS_COPIED {
-            self.parts(directions, values)
+            self.wide_and_narrow(directions, values)
         } else {
-            simd.call(Division { row: self, directions, values })
+            simd.call(PartsKernel { row: self, directions, values })
         }
     }
 
@@ -35,7 +44,7 @@ pub(super) trait RoughCalls: RoughRow {
         if Self::IS_COPIED {
             self.pdf(lobes, normals, directions, values)
         } else {
-            simd.call(Density { row: self, lobes, normals, directions, values })
+            simd.call(PdfKernel { row: self, lobes, normals, directions, values })
         }
     }
 
@@ -52,7 +61,7 @@ pub(super) trait RoughCalls: RoughRow {
         if Self::IS_COPIED {
             self.sample(lobes, normals, choices, u)
         } else {
-            simd.call(Sampling { row: self, lobes, normals, choices, u })
+            simd.call(SamplingKernel { row: self, lobes, normals, choices, u })
         }
     }
 }
@@ -60,12 +69,12 @@ pub(super) trait RoughCalls: RoughRow {
 impl<R: RoughRow> RoughCalls for R {}
 
 /// Kernel of [`RoughRow::f`].
-struct Evaluation<'a, R> {
+struct EvaluationKernel<'a, R> {
     row: &'a R,
     directions: &'a Vec3x16,
 }
 
-impl<R: RoughRow> SimdKernel for Evaluation<'_, R> {
+impl<R: RoughRow> SimdKernel for EvaluationKernel<'_, R> {
     type Output = BsdfValues;
 
     #[inline(always)]
@@ -74,24 +83,24 @@ impl<R: RoughRow> SimdKernel for Evaluation<'_, R> {
     }
 }
 
-/// Kernel of [`RoughRow::parts`].
-struct Division<'a, R> {
+/// Kernel of [`RoughRow::wide_and_narrow`].
+struct PartsKernel<'a, R> {
     row: &'a R,
     directions: &'a Vec3x16,
     values: &'a BsdfValues,
 }
 
-impl<R: RoughRow> SimdKernel for Division<'_, R> {
+impl<R: RoughRow> SimdKernel for PartsKernel<'_, R> {
     type Output = [Vec3x16; 2];
 
     #[inline(always)]
     fn run(self, _: impl Simd) -> [Vec3x16; 2] {
-        self.row.parts(self.directions, self.values)
+        self.row.wide_and_narrow(self.directions, self.values)
     }
 }
 
 /// Kernel of [`RoughRow::pdf`].
-struct Density<'a, R> {
+struct PdfKernel<'a, R> {
     row: &'a R,
     lobes: LobeSet,
     normals: &'a Vec3x16,
@@ -99,7 +108,7 @@ struct Density<'a, R> {
     values: &'a BsdfValues,
 }
 
-impl<R: RoughRow> SimdKernel for Density<'_, R> {
+impl<R: RoughRow> SimdKernel for PdfKernel<'_, R> {
     type Output = F32x16;
 
     #[inline(always)]
@@ -109,7 +118,7 @@ impl<R: RoughRow> SimdKernel for Density<'_, R> {
 }
 
 /// Kernel of [`RoughRow::sample`].
-struct Sampling<'a, R> {
+struct SamplingKernel<'a, R> {
     row: &'a R,
     lobes: LobeSet,
     normals: &'a Vec3x16,
@@ -117,7 +126,7 @@ struct Sampling<'a, R> {
     u: &'a [F32x16; 2],
 }
 
-impl<R: RoughRow> SimdKernel for Sampling<'_, R> {
+impl<R: RoughRow> SimdKernel for SamplingKernel<'_, R> {
     type Output = Vec3x16;
 
     #[inline(always)]

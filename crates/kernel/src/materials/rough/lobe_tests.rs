@@ -1,7 +1,7 @@
 //! Checks for microfacet lobes, used in the tests of each kind. Compares values with an `f64` reference,
 //! samples with pdfs, and albedos.
 
-use crate::materials::bsdf::{LobeSet, Place, RoughRow, ShownLobes, SideSamples};
+use crate::materials::bsdf::{LobeSet, RoughRow, ShownLobes, SideSamples, SurfaceDirections};
 use crate::math::lanes::{F32x16, PACKET_SIZE, Vec3x16, lane, set_lane};
 use crate::math::random::unit as random;
 use crate::math::{DVec3, Vec3};
@@ -108,7 +108,7 @@ impl<R: RoughRow> Subject<R> {
         row.reset();
         for i in 0..PACKET_SIZE {
             let normal = Vec3::Z * light.side() as f32;
-            let place = Place { normal, to_eye: to_eye.as_vec3(), tangent: TANGENT };
+            let place = SurfaceDirections { normal, to_eye: to_eye.as_vec3(), tangent: TANGENT };
             row.put(i, point, ShownLobes::ALL, &place);
         }
         Self { row, to_eye, alphas: alphas.map(f64::from), light }
@@ -134,7 +134,7 @@ impl<R: RoughRow> Subject<R> {
             }
             let values = self.row.f(&rows);
             let pdf = self.row.pdf(lobes, &self.normals(), &rows, &values);
-            let [wide, narrow] = self.row.parts(&rows, &values);
+            let [wide, narrow] = self.row.wide_and_narrow(&rows, &values);
             for i in 0..some.len() {
                 let (wide, narrow) = (lane(&wide, i).as_dvec3(), lane(&narrow, i).as_dvec3());
                 let f = lane(&values.f, i).as_dvec3();
@@ -420,8 +420,11 @@ pub fn check_neighbors_lit<R: RoughRow>(points: &[R::Point], lit: LitFrom) {
             let mut row = R::EMPTY;
             row.reset();
             for i in (0..PACKET_SIZE).filter(|i| of(*i)) {
-                let place =
-                    Place { normal: Vec3::Z * lit.side() as f32, to_eye: to_eye[i], tangent: TANGENT };
+                let place = SurfaceDirections {
+                    normal: Vec3::Z * lit.side() as f32,
+                    to_eye: to_eye[i],
+                    tangent: TANGENT,
+                };
                 row.put(i, &points[(first + i) % points.len()], ShownLobes::ALL, &place);
             }
             row
@@ -465,8 +468,11 @@ pub fn check_shown_lobes<R: RoughRow>(points: &[R::Point], lit: LitFrom) {
             let near_mirror = DVec3::new(-to_eye.x, -to_eye.y, to_eye.z) + any * 0.1_f64.powi(round % 5);
             let way = if round % 2 == 0 { any } else { near_mirror.normalize() };
             let way = DVec3::new(way.x, way.y, way.z * lit.side()).as_vec3();
-            let place =
-                Place { normal: Vec3::Z * lit.side() as f32, to_eye: to_eye.as_vec3(), tangent: TANGENT };
+            let place = SurfaceDirections {
+                normal: Vec3::Z * lit.side() as f32,
+                to_eye: to_eye.as_vec3(),
+                tangent: TANGENT,
+            };
             let shown = |diffuse: bool, specular: bool| {
                 let mut row = R::EMPTY;
                 row.reset();
@@ -474,7 +480,7 @@ pub fn check_shown_lobes<R: RoughRow>(points: &[R::Point], lit: LitFrom) {
                 let mut light = [[0.0; PACKET_SIZE], [0.0; PACKET_SIZE], [1.0; PACKET_SIZE]];
                 set_lane(&mut light, 0, way);
                 let values = row.f(&light);
-                let [wide, narrow] = row.parts(&light, &values);
+                let [wide, narrow] = row.wide_and_narrow(&light, &values);
                 [lane(&values.f, 0), lane(&wide, 0), lane(&narrow, 0)]
             };
             let ([f, wide, narrow], of_wide, of_narrow) =

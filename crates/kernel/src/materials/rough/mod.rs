@@ -16,8 +16,8 @@ pub use plastic::Plastic;
 pub use principled::{EmissionCoat, Principled, PrincipledInputs};
 
 use crate::materials::bsdf::{
-    BsdfValues, LobeSet, MaterialRow, NarrowLobe, Place, RoughMaterial, RoughPoint, RoughRow, ShownLobes,
-    SideSamples, UvRow,
+    BsdfValues, LobeSet, MaterialRow, NarrowLobe, RoughMaterial, RoughPoint, RoughRow, ShownLobes,
+    SideSamples, SurfaceDirections, UvRow,
 };
 use crate::materials::footprint::TexturePoint;
 use crate::materials::texture::Texture;
@@ -113,10 +113,10 @@ macro_rules! kinds {
                 match self { $(Self::$kind(own) => own.textures().next().is_some()),+ }
             }
 
-            /// [`RoughMaterial::fills_rows`].
+            /// [`RoughMaterial::supports_packets`].
             #[inline]
-            pub fn fills_rows(&self) -> bool {
-                match self { $(Self::$kind(own) => own.fills_rows()),+ }
+            pub fn supports_packets(&self) -> bool {
+                match self { $(Self::$kind(own) => own.supports_packets()),+ }
             }
 
             /// [`RoughMaterial::has_direction`].
@@ -142,12 +142,12 @@ macro_rules! kinds {
                 }
             }
 
-            /// [`RoughRow::turned`].
+            /// [`RoughRow::normal_facing_viewer`].
             #[inline(always)]
-            pub fn turned(&self, normal: Vec3, to_eye: Vec3) -> Vec3 {
+            pub fn normal_facing_viewer(&self, normal: Vec3, to_eye: Vec3) -> Vec3 {
                 match self {
-                    $(Self::$kind(_) => <$row as RoughRow>::turned(normal, to_eye),)+
-                    $(Self::$part(_) => <$part_row as RoughRow>::turned(normal, to_eye)),+
+                    $(Self::$kind(_) => <$row as RoughRow>::normal_facing_viewer(normal, to_eye),)+
+                    $(Self::$part(_) => <$part_row as RoughRow>::normal_facing_viewer(normal, to_eye)),+
                 }
             }
 
@@ -219,7 +219,7 @@ macro_rules! kinds {
 
             /// [`RoughRow::put`] for a BSDF of the same kind as the packet.
             #[inline(always)]
-            pub fn put(&mut self, i: usize, bsdf: &RoughBsdf, shown: ShownLobes, place: &Place) {
+            pub fn put(&mut self, i: usize, bsdf: &RoughBsdf, shown: ShownLobes, place: &SurfaceDirections) {
                 $(if let (Self::$kind(row), RoughBsdf::$kind(bsdf)) = (&mut *self, bsdf) {
                     row.put(i, bsdf, shown, place);
                 })+
@@ -272,17 +272,17 @@ macro_rules! kinds {
                 }
             }
 
-            /// [`RoughRow::parts`].
+            /// [`RoughRow::wide_and_narrow`].
             #[inline(always)]
-            pub fn parts(
+            pub fn wide_and_narrow(
                 &self,
                 directions: &Vec3x16,
                 values: &BsdfValues,
                 simd: impl Simd,
             ) -> [Vec3x16; 2] {
                 match self {
-                    $(Self::$kind(row) => row.call_parts(directions, values, simd),)+
-                    $(Self::$part(row) => row.call_parts(directions, values, simd)),+
+                    $(Self::$kind(row) => row.call_wide_and_narrow(directions, values, simd),)+
+                    $(Self::$part(row) => row.call_wide_and_narrow(directions, values, simd)),+
                 }
             }
 

@@ -34,7 +34,7 @@ const TIME_SHARE: u32 = 100;
 const ENDING: &str = ".checkpoint";
 
 /// Creates the header of a part or checkpoint file.
-pub(crate) fn head(
+pub(crate) fn create_header(
     kind: PartKind,
     state: &FilmState,
     identity: Vec<Dependency>,
@@ -60,7 +60,7 @@ fn share_head(share: Option<&Share>) -> ShareHead {
 const ASIDE: &str = ".before";
 
 /// Returns the checkpoint path for an output file.
-pub(crate) fn path_of(output: &Path) -> PathBuf {
+pub(crate) fn checkpoint_path(output: &Path) -> PathBuf {
     let mut name = output.as_os_str().to_owned();
     name.push(ENDING);
     name.into()
@@ -97,7 +97,7 @@ impl<'a> Checkpointer<'a> {
     pub(crate) fn new(output: &Path, settings: Checkpoints, around: CheckpointContext<'a>) -> Self {
         Self {
             output: output.to_owned(),
-            path: path_of(output),
+            path: checkpoint_path(output),
             settings,
             around,
             identity: OnceCell::new(),
@@ -120,33 +120,34 @@ impl<'a> Checkpointer<'a> {
     pub(crate) fn resume(&self, state: &mut FilmState, samples: u32) -> Result<bool, Stop> {
         let resume = self.settings.resume;
         let is_there = self.path.symlink_metadata().is_ok();
-        if resume == Resume::Asked && self.take_finished_part(state)? {
+        if resume == Resume::Asked && self.restore_finished_part(state)? {
             return Ok(true);
         }
         match resume {
             Resume::No | Resume::IfSame if !is_there => return Ok(true),
             Resume::Asked if !is_there => {
-                self.tell(CheckpointNews::Absent { path: self.path.clone() });
+                self.send_update(CheckpointNews::Absent { path: self.path.clone() });
                 return Ok(true);
             }
             Resume::No | Resume::Asked | Resume::IfSame => {}
         }
         if resume != Resume::Asked && !part::is_part(&self.path) {
-            self.tell_failure(&format!("{} {}", self.path.display(), messages::NOT_A_CHECKPOINT));
+            self.report_failure(&format!("{} {}", self.path.display(), messages::NOT_A_CHECKPOINT));
             return Ok(true);
         }
         if resume == Resume::No {
-            let is_same = PartFile::head(&self.path).is_ok_and(|head| self.unlike(&head, state).is_empty());
+            let is_same =
+                PartFile::head(&self.path).is_ok_and(|head| self.differences_from(&head, state).is_empty());
             if is_same {
-                self.tell(CheckpointNews::Ignored { path: self.path.clone() });
+                self.send_update(CheckpointNews::Ignored { path: self.path.clone() });
             }
             return Ok(true);
         }
         let Err(error) = self.restore(state, samples) else {
-            self.around.lock.borrow_mut().take_over(&self.path);
+            self.around.lock.borrow_mut().lock_abandoned(&self.path);
             self.is_own.set(true);
             let (path, samples) = (self.path.clone(), state.samples(samples));
-            self.tell(CheckpointNews::Resumed { path, samples });
+            self.send_update(CheckpointNews::Resumed { path, samples });
             return Ok(true);
         };
         if resume == Resume::Asked {
@@ -155,17 +156,20 @@ impl<'a> Checkpointer<'a> {
                 "remove --resume to start over, or name another file with -o",
             ));
         }
-        if self.around.lock.borrow_mut().is_news(&self.path) {
-            self.tell(CheckpointNews::Unused { path: self.path.clone(), why: why(&error) });
+        if self.around.lock.borrow_mut().mark_reported(&self.path) {
+            self.send_update(CheckpointNews::Unused {
+                path: self.path.clone(),
+                why: rejection_reason(&error),
+            });
         }
-        Ok(!state.is_begun())
+        Ok(!state.has_samples())
     }
 
     /// Restores the film from the output file if it already contains this part. Returns whether it does.
     ///
     /// # Errors
     /// The output file is a part of another render.
-    fn take_finished_part(&self, state: &mut FilmState) -> Result<bool, Stop> {
+    fn restore_finished_part(&self, state: &mut FilmState) -> Result<bool, Stop> {
         if state.share.is_none() || !part::is_part(&self.output) {
             return Ok(false);
         }
@@ -175,12 +179,12 @@ impl<'a> Checkpointer<'a> {
             // Earlier checks ensure that a part never replaces a checkpoint.
             Ok(_) => return Ok(false),
             Err(error) => {
-                self.tell(CheckpointNews::Unused { path, why: why(&error) });
+                self.send_update(CheckpointNews::Unused { path, why: rejection_reason(&error) });
                 return Ok(false);
             }
         };
-        let mut differences = self.unlike(&file.head, state);
-        let head = Head { scene: file.head.scene.clone(), ..self.head(PartKind::Part, state) };
+        let mut differences = self.differences_from(&file.head, state);
+        let head = Head { scene: file.head.scene.clone(), ..self.create_header(PartKind::Part, state) };
         if differences.is_empty() && file.head != head {
             differences.push("the output settings differ".to_owned());
         }
@@ -194,29 +198,29 @@ impl<'a> Checkpointer<'a> {
         if let Err(error) = file.restore(&state.film) {
             return refused(error);
         }
-        state.count_again();
+        state.recount_samples();
         state.is_finished_part = true;
-        self.tell(CheckpointNews::Finished { path });
+        self.send_update(CheckpointNews::Finished { path });
         Ok(true)
     }
 
     /// Moves another render's checkpoint aside, unless this render includes all its samples. If another
-    /// checkpoint was moved aside before, keeps the one with the longer render time.
+    /// checkpoint was moved aside before, keeps whichever has the longer render time.
     ///
     /// # Errors
     /// Returns why it cannot be moved, for example because another process holds it.
-    fn make_way(&self, state: &FilmState, rays: RayCounters) -> Result<(), String> {
-        let is_held = self.around.lock.borrow().holds(&self.path);
+    fn set_other_aside(&self, state: &FilmState, rays: RayCounters) -> Result<(), String> {
+        let is_held = self.around.lock.borrow().is_held_by_this_process(&self.path);
         if is_held && self.is_own.get() {
             return Ok(());
         }
-        if self.around.lock.borrow().is_of_another(&self.path) {
-            return Err(held_by_another(&self.path));
+        if self.around.lock.borrow().is_held_by_another_process(&self.path) {
+            return Err(held_by_another_message(&self.path));
         }
-        let Some((head, there)) = kept_in(&self.path) else {
+        let Some((head, there)) = read_valid_checkpoint(&self.path) else {
             return match PartFile::head(&self.path) {
                 Err(PartError::Version { .. }) => self.move_aside(|_| false),
-                Ok(head) if head.kind == PartKind::Part => Err(is_finished_part(&self.path)),
+                Ok(head) if head.kind == PartKind::Part => Err(finished_part_message(&self.path)),
                 Ok(_)
                 | Err(
                     PartError::Unreadable { .. }
@@ -232,15 +236,17 @@ impl<'a> Checkpointer<'a> {
                 ) => Ok(()),
             };
         };
-        if self.has_all_of(&head, &there, state, rays) {
+        if self.is_superseded(&head, &there, state, rays) {
             return Ok(());
         }
-        let is_longer =
-            |aside: &Path| kept_in(aside).is_some_and(|(_, before)| before.seconds >= there.seconds);
+        let is_longer = |aside: &Path| {
+            read_valid_checkpoint(aside).is_some_and(|(_, before)| before.seconds >= there.seconds)
+        };
         self.move_aside(is_longer)
     }
 
-    /// Moves the checkpoint aside, unless `is_longer` returns true for the one already there.
+    /// Moves the checkpoint aside, unless `is_longer` returns true for a checkpoint that was moved aside
+    /// before.
     ///
     /// # Errors
     /// Returns why it cannot be moved.
@@ -251,28 +257,28 @@ impl<'a> Checkpointer<'a> {
         if is_longer(&aside) {
             return Ok(());
         }
-        if aside.symlink_metadata().is_ok() && kept_in(&aside).is_none() {
+        if aside.symlink_metadata().is_ok() && read_valid_checkpoint(&aside).is_none() {
             return Err(format!(
                 "cannot move the existing checkpoint aside: {} exists and is not a checkpoint",
                 aside.display()
             ));
         }
         std::fs::rename(&self.path, &aside).map_err(|error| format!("{}: {error}", self.path.display()))?;
-        self.tell(CheckpointNews::SetAside { path: aside });
+        self.send_update(CheckpointNews::SetAside { path: aside });
         Ok(())
     }
 
     /// Whether a checkpoint belongs to this image and contains no more work than this render.
-    fn has_all_of(&self, head: &Head, there: &State, state: &FilmState, rays: RayCounters) -> bool {
+    fn is_superseded(&self, head: &Head, there: &State, state: &FilmState, rays: RayCounters) -> bool {
         let has_rays = state.is_finished_part || there.camera_rays() <= rays.camera_rays;
-        self.unlike(head, state).is_empty() && has_rays
+        self.differences_from(head, state).is_empty() && has_rays
     }
 
     fn restore(&self, state: &mut FilmState, samples: u32) -> Result<(), PartError> {
         let path = self.path.clone();
         let other =
             |differences| PartError::Other { path: path.clone(), other: "this call".to_owned(), differences };
-        let unlike = self.unlike(&PartFile::head(&self.path)?, state);
+        let unlike = self.differences_from(&PartFile::head(&self.path)?, state);
         if !unlike.is_empty() {
             return Err(other(unlike));
         }
@@ -282,27 +288,27 @@ impl<'a> Checkpointer<'a> {
         let damaged = |why: &str| PartError::Damaged { path: path.clone(), why: why.to_owned() };
         let read: State =
             serde_json::from_value(file.state.clone()).map_err(|_| damaged("its state is invalid"))?;
-        if !read.is_possible() {
+        if !read.is_plausible() {
             return Err(damaged("its state contains implausible numbers"));
         }
         if !read.fits(state) {
             return Err(damaged("its state does not match the film"));
         }
         file.restore(&state.film)?;
-        read.put(state).ok_or_else(|| damaged("its state does not match the film"))?;
-        state.count_again();
+        read.restore_into(state).ok_or_else(|| damaged("its state does not match the film"))?;
+        state.recount_samples();
         if !state.has_at_most(samples) {
-            return Err(other(vec![messages::has_more_samples(samples)]));
+            return Err(other(vec![messages::too_many_samples_message(samples)]));
         }
         Ok(())
     }
 
-    fn head(&self, kind: PartKind, state: &FilmState) -> Head {
-        head(kind, state, self.identity().to_vec(), self.around.finish)
+    fn create_header(&self, kind: PartKind, state: &FilmState) -> Head {
+        create_header(kind, state, self.identity().to_vec(), self.around.finish)
     }
 
     /// Returns the differences between a file header and this render.
-    fn unlike(&self, head: &Head, state: &FilmState) -> Vec<String> {
+    fn differences_from(&self, head: &Head, state: &FilmState) -> Vec<String> {
         let mut unlike = differences(&head.identity, self.identity(), ("there", "here"));
         let share = share_head(state.share.as_ref());
         let name = |share: &ShareHead| match share.count {
@@ -328,7 +334,7 @@ impl<'a> Checkpointer<'a> {
 
     /// When a render is cancelled, saves a checkpoint if it will be resumed later. Returns whether one was
     /// saved.
-    pub(crate) fn at_the_end(&self, state: &FilmState, rays: RayCounters, seconds: f64) -> bool {
+    pub(crate) fn save_if_cancelled(&self, state: &FilmState, rays: RayCounters, seconds: f64) -> bool {
         let is_kept = match (self.around.interruption)() {
             Interruption::Replaced => false,
             // Update an existing checkpoint even after a short render.
@@ -336,14 +342,14 @@ impl<'a> Checkpointer<'a> {
             Interruption::Ended => true,
         };
         // Do not wait for the disk, because the process is being terminated.
-        is_kept && state.is_begun() && self.write(state, rays, seconds, Durability::Process)
+        is_kept && state.has_samples() && self.write(state, rays, seconds, Durability::Process)
     }
 
     /// Checks whether this process has already saved a checkpoint of this render for an earlier request.
-    pub(crate) fn recognize(&self, state: &FilmState) {
-        let is_held = self.around.lock.borrow().holds(&self.path);
-        let is_own =
-            is_held && PartFile::head(&self.path).is_ok_and(|head| self.unlike(&head, state).is_empty());
+    pub(crate) fn check_already_saved(&self, state: &FilmState) {
+        let is_held = self.around.lock.borrow().is_held_by_this_process(&self.path);
+        let is_own = is_held
+            && PartFile::head(&self.path).is_ok_and(|head| self.differences_from(&head, state).is_empty());
         self.is_own.set(is_own);
     }
 
@@ -366,12 +372,15 @@ impl<'a> Checkpointer<'a> {
             (true, false) => {}
         }
         // Keep the checkpoint if it belongs to another image or running process, or has more samples.
-        let is_done = |(head, there)| self.has_all_of(&head, &there, state, rays);
+        let is_done = |(head, there)| self.is_superseded(&head, &there, state, rays);
         let mut lock = self.around.lock.borrow_mut();
-        let is_own = self.is_own.get() && lock.holds(&self.path);
-        if is_own || !lock.is_of_another(&self.path) && kept_in(&self.path).is_some_and(is_done) {
+        let is_own = self.is_own.get() && lock.is_held_by_this_process(&self.path);
+        if is_own
+            || !lock.is_held_by_another_process(&self.path)
+                && read_valid_checkpoint(&self.path).is_some_and(is_done)
+        {
             lock.release();
-            // Failing to remove a checkpoint does no harm.
+            // It does not matter if the checkpoint cannot be removed.
             let _ = std::fs::remove_file(&self.path);
         }
     }
@@ -382,20 +391,20 @@ impl<'a> Checkpointer<'a> {
         if self.settings.seconds <= 0.0 {
             return false;
         }
-        if let Err(why) = self.make_way(state, rays) {
-            self.tell_failure(&why);
+        if let Err(why) = self.set_other_aside(state, rays) {
+            self.report_failure(&why);
             return false;
         }
-        let head = self.head(PartKind::Checkpoint, state);
-        let written = serde_json::to_value(State::of(state, rays, seconds))
+        let head = self.create_header(PartKind::Checkpoint, state);
+        let written = serde_json::to_value(State::from_film(state, rays, seconds))
             .map_err(|error| OutputError::File { path: self.path.clone(), source: error.into() })
             .and_then(|value| self.save(&head, &state.film, &value, durability));
         match &written {
             Ok(()) => {
                 self.is_own.set(true);
-                self.tell(CheckpointNews::Written { path: self.path.clone() });
+                self.send_update(CheckpointNews::Written { path: self.path.clone() });
             }
-            Err(error) => self.tell_failure(&error.to_string()),
+            Err(error) => self.report_failure(&error.to_string()),
         }
         written.is_ok()
     }
@@ -418,10 +427,12 @@ impl<'a> Checkpointer<'a> {
                     messages::NOT_A_CHECKPOINT
                 )),
                 Ok(_) if PartFile::head(at).is_ok_and(|head| head.kind == PartKind::Part) => {
-                    Err(OutputError::Refused { reason: is_finished_part(path) })
+                    Err(OutputError::Refused { reason: finished_part_message(path) })
                 }
                 // Another process may have locked the file since the last check.
-                Ok(_) if lock.borrow().is_of_another(at) => refused(held_by_another(path)),
+                Ok(_) if lock.borrow().is_held_by_another_process(at) => {
+                    refused(held_by_another_message(path))
+                }
                 Ok(_) | Err(_) => Ok(()),
             }
         };
@@ -433,32 +444,32 @@ impl<'a> Checkpointer<'a> {
         };
         // This write is short and never cancelled, because it may have been triggered by a signal.
         let file = part::save(path, head, film, state, &guard, (&CancelToken::new(), durability))?;
-        lock.borrow_mut().hold(path, file);
+        lock.borrow_mut().keep_open(path, file);
         Ok(())
     }
 
-    fn tell_failure(&self, why: &str) {
+    fn report_failure(&self, why: &str) {
         let CheckpointContext { sink, lock, .. } = self.around;
-        if lock.borrow_mut().is_first_failure(sink.generation) {
-            self.tell(CheckpointNews::Failed { message: format!("no checkpoint: {why}") });
+        if lock.borrow_mut().record_first_failure(sink.generation) {
+            self.send_update(CheckpointNews::Failed { message: format!("no checkpoint: {why}") });
         }
     }
 
-    fn tell(&self, news: CheckpointNews) {
+    fn send_update(&self, news: CheckpointNews) {
         self.around.sink.checkpoint(news);
     }
 }
 
-fn is_finished_part(path: &Path) -> String {
+fn finished_part_message(path: &Path) -> String {
     format!("{} is a finished part; name another file with -o", path.display())
 }
 
-fn held_by_another(path: &Path) -> String {
+fn held_by_another_message(path: &Path) -> String {
     format!("another running glimt uses {}; name another file with -o", path.display())
 }
 
 /// Returns why a file is not used, without the file name.
-fn why(error: &PartError) -> String {
+fn rejection_reason(error: &PartError) -> String {
     match error {
         PartError::Other { differences, .. } => differences.join("; "),
         PartError::Damaged { why, .. } => format!("{}: {why}", messages::DAMAGED),
@@ -477,9 +488,9 @@ fn why(error: &PartError) -> String {
 }
 
 /// Reads the header and state of a valid checkpoint.
-fn kept_in(path: &Path) -> Option<(Head, State)> {
+fn read_valid_checkpoint(path: &Path) -> Option<(Head, State)> {
     let file = PartFile::open(path, &CancelToken::new()).ok()?;
     file.check_kind(PartKind::Checkpoint).ok()?;
     let state: State = serde_json::from_value(file.state).ok()?;
-    state.is_possible().then_some((file.head, state))
+    state.is_plausible().then_some((file.head, state))
 }

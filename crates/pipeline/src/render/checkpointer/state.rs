@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::integrators::RayCounters;
-use crate::render::film_state::{Before, FilmState};
+use crate::render::film_state::{EarlierWork, FilmState};
 
 /// Render state that is not part of the film.
 #[derive(Debug, Serialize, Deserialize)]
@@ -16,7 +16,8 @@ pub(super) struct State {
     brightness: Option<f64>,
     /// Number of rays traced in each cell.
     cell_rays: Vec<u64>,
-    /// Numbers of camera, shadow, reflected, refracted and scattered rays, and of texture lookups.
+    /// Counts of camera, shadow, reflected, refracted and scattered rays, followed by the count of texture
+    /// lookups.
     rays: [u64; 6],
     /// Render time in seconds.
     pub(super) seconds: f64,
@@ -25,7 +26,7 @@ pub(super) struct State {
 }
 
 impl State {
-    pub(super) fn of(state: &FilmState, rays: RayCounters, seconds: f64) -> Self {
+    pub(super) fn from_film(state: &FilmState, rays: RayCounters, seconds: f64) -> Self {
         let RayCounters {
             camera_rays,
             shadow_rays,
@@ -51,8 +52,9 @@ impl State {
         camera_rays
     }
 
-    /// Whether the numbers are plausible. Others could overflow sums or keep a render from ending.
-    pub(super) fn is_possible(&self) -> bool {
+    /// Whether the numbers are plausible. Implausible numbers could overflow sums or keep a render from
+    /// ending.
+    pub(super) fn is_plausible(&self) -> bool {
         /// About 30,000 years.
         const MAX_SECONDS: f64 = 1e12;
         const MAX_RAYS: u64 = 1 << 56;
@@ -74,7 +76,7 @@ impl State {
     }
 
     /// Restores a film's state. Returns `None` and changes nothing if the size does not match.
-    pub(super) fn put(self, state: &mut FilmState) -> Option<()> {
+    pub(super) fn restore_into(self, state: &mut FilmState) -> Option<()> {
         if !self.fits(state) {
             return None;
         }
@@ -92,7 +94,7 @@ impl State {
         state.goals.judged = self.judged;
         state.goals.brightness = self.brightness;
         state.rays = self.cell_rays;
-        state.before = Before { rays, seconds: self.seconds };
+        state.before = EarlierWork { rays, seconds: self.seconds };
         state.render_seconds = self.seconds;
         state.seconds = self.processor_seconds;
         Some(())
@@ -117,15 +119,15 @@ mod tests {
 
     #[test]
     fn implausible_numbers_are_detected() {
-        assert!(state().is_possible());
+        assert!(state().is_plausible());
         for seconds in [-1e300, -1e-9, 1e300, f64::NAN, f64::INFINITY] {
-            assert!(!State { seconds, ..state() }.is_possible(), "{seconds}");
-            assert!(!State { processor_seconds: seconds, ..state() }.is_possible(), "{seconds}");
+            assert!(!State { seconds, ..state() }.is_plausible(), "{seconds}");
+            assert!(!State { processor_seconds: seconds, ..state() }.is_plausible(), "{seconds}");
         }
         for brightness in [-1.0, f64::NAN, f64::INFINITY] {
-            assert!(!State { brightness: Some(brightness), ..state() }.is_possible(), "{brightness}");
+            assert!(!State { brightness: Some(brightness), ..state() }.is_plausible(), "{brightness}");
         }
-        assert!(!State { rays: [u64::MAX, 1, 0, 0, 0, 0], ..state() }.is_possible());
-        assert!(!State { cell_rays: vec![1 << 57], ..state() }.is_possible());
+        assert!(!State { rays: [u64::MAX, 1, 0, 0, 0, 0], ..state() }.is_plausible());
+        assert!(!State { cell_rays: vec![1 << 57], ..state() }.is_plausible());
     }
 }

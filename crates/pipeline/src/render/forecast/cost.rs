@@ -25,8 +25,8 @@ impl CellCost {
     /// later ones.
     const KEPT: f64 = 0.25;
 
-    pub(crate) fn note(&mut self, job: JobCost, share: &mut PixelShare) {
-        share.note(self.last, job);
+    pub(crate) fn record(&mut self, job: JobCost, share: &mut PixelOverhead) {
+        share.record(self.last, job);
         self.seconds = Self::KEPT * self.seconds + job.seconds;
         self.units = Self::KEPT * self.units + job.pixels * job.samples;
         self.pixels = Self::KEPT * self.pixels + job.pixels;
@@ -42,15 +42,15 @@ impl CellCost {
         self.seconds
     }
 
-    /// The cell's cost in samples, including the pixel overhead.
-    pub(crate) fn worth(&self, share: PixelShare) -> f64 {
-        share.worth(self.units, self.pixels)
+    /// The cell's cost expressed in samples, including the pixel overhead.
+    pub(crate) fn equivalent_samples(&self, share: PixelOverhead) -> f64 {
+        share.equivalent_samples(self.units, self.pixels)
     }
 }
 
 /// Per-pixel overhead of a job, excluding its samples.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct PixelShare {
+pub(crate) struct PixelOverhead {
     /// Sum of the numerators of b, the overhead of a pixel in samples. If a cell takes s' seconds for n'
     /// samples, then s seconds for n > n' samples, s/s' = (n + b)/(n' + b) and b = (s'n − sn')/(s − s').
     of_pixels: f64,
@@ -58,11 +58,11 @@ pub(crate) struct PixelShare {
     of_samples: f64,
 }
 
-impl PixelShare {
+impl PixelOverhead {
     /// Maximum overhead of a pixel, in samples.
     const MOST: f64 = 4.0;
 
-    fn note(&mut self, before: Option<JobCost>, now: JobCost) {
+    fn record(&mut self, before: Option<JobCost>, now: JobCost) {
         if let Some(before) =
             before.filter(|before| before.pixels == now.pixels && before.samples < now.samples)
         {
@@ -73,7 +73,7 @@ impl PixelShare {
 
     /// Converts the cost of `units` samples plus the overhead of `pixels` pixels to an equivalent number of
     /// samples.
-    pub(crate) fn worth(self, units: f64, pixels: f64) -> f64 {
+    pub(crate) fn equivalent_samples(self, units: f64, pixels: f64) -> f64 {
         let share = if self.of_samples > 0.0 { self.of_pixels / self.of_samples } else { 0.0 };
         units + share.clamp(0.0, Self::MOST) * pixels
     }
@@ -86,52 +86,52 @@ mod tests {
     #[test]
     fn pixel_and_sample_costs_are_separated() {
         // Cells of 100 pixels. A sample takes 1 or 3 seconds, and the pixel overhead is half a sample.
-        let (mut share, mut cells) = (PixelShare::default(), [CellCost::default(); 2]);
+        let (mut share, mut cells) = (PixelOverhead::default(), [CellCost::default(); 2]);
         for samples in [1.0, 1.0, 2.0, 4.0] {
             for (cell, rate) in cells.iter_mut().zip([1.0, 3.0]) {
                 let seconds = 100.0 * rate * (samples + 0.5);
-                cell.note(JobCost { seconds, pixels: 100.0, samples }, &mut share);
+                cell.record(JobCost { seconds, pixels: 100.0, samples }, &mut share);
             }
         }
         for (cell, rate) in cells.iter().zip([1.0, 3.0]) {
-            assert!((share.worth(800.0, 100.0) - 850.0).abs() < 1e-9);
-            assert!((cell.seconds() / cell.worth(share) - rate).abs() < 1e-9);
+            assert!((share.equivalent_samples(800.0, 100.0) - 850.0).abs() < 1e-9);
+            assert!((cell.seconds() / cell.equivalent_samples(share) - rate).abs() < 1e-9);
         }
     }
 
     #[test]
     fn implausible_times_are_clamped() {
         let of = |seconds: [f64; 2]| {
-            let (mut share, mut cell) = (PixelShare::default(), CellCost::default());
+            let (mut share, mut cell) = (PixelOverhead::default(), CellCost::default());
             for (seconds, samples) in seconds.into_iter().zip([1.0, 2.0]) {
-                cell.note(JobCost { seconds, pixels: 1.0, samples }, &mut share);
+                cell.record(JobCost { seconds, pixels: 1.0, samples }, &mut share);
             }
-            share.worth(0.0, 1.0)
+            share.equivalent_samples(0.0, 1.0)
         };
         assert_eq!(of([1.0, 2.0]), 0.0);
         assert_eq!(of([1.0, 4.0]), 0.0, "the overhead should not be negative");
         assert_eq!(of([1.0, 0.5]), 0.0, "more samples in less time should be ignored");
-        assert_eq!(of([1.0, 1.001]), PixelShare::MOST);
+        assert_eq!(of([1.0, 1.001]), PixelOverhead::MOST);
     }
 
     #[test]
     fn jobs_of_different_sizes_are_not_compared() {
-        let (mut share, mut cell) = (PixelShare::default(), CellCost::default());
+        let (mut share, mut cell) = (PixelOverhead::default(), CellCost::default());
         // A cell, then half of it with twice the samples.
         for (pixels, samples) in [(2.0, 1.0), (1.0, 2.0)] {
-            cell.note(JobCost { seconds: pixels * (samples + 1.0), pixels, samples }, &mut share);
+            cell.record(JobCost { seconds: pixels * (samples + 1.0), pixels, samples }, &mut share);
         }
-        assert_eq!(share.worth(0.0, 1.0), 0.0);
+        assert_eq!(share.equivalent_samples(0.0, 1.0), 0.0);
     }
 
     #[test]
     fn cell_without_pixels_has_unknown_cost() {
-        let (mut share, mut cell) = (PixelShare::default(), CellCost::default());
-        cell.note(JobCost { seconds: 1e-6, pixels: 1.0, samples: 1.0 }, &mut share);
+        let (mut share, mut cell) = (PixelOverhead::default(), CellCost::default());
+        cell.record(JobCost { seconds: 1e-6, pixels: 1.0, samples: 1.0 }, &mut share);
         assert!(!cell.is_unknown());
-        // Halves without pixels also have jobs.
+        // Halves without pixels have jobs too.
         for _ in 0..2000 {
-            cell.note(JobCost { seconds: 1e-9, pixels: 0.0, samples: 32.0 }, &mut share);
+            cell.record(JobCost { seconds: 1e-9, pixels: 0.0, samples: 32.0 }, &mut share);
         }
         assert!(cell.is_unknown(), "{cell:?}");
     }

@@ -34,7 +34,7 @@ use crate::trace::remaining_jobs;
 const EXPECTATION_SHARE: u32 = 100;
 
 /// The most recent estimate of the total work.
-struct Expectation {
+struct WorkEstimate {
     /// When to compute the next estimate.
     due: Instant,
     /// CPU seconds for the whole render. `None` while the end is unknown.
@@ -47,7 +47,7 @@ struct Expectation {
 pub(crate) struct Forecast {
     rate: WorkRate,
     noise: NoiseForecast,
-    expectation: Expectation,
+    expectation: WorkEstimate,
     /// Last reported fraction.
     fraction: f64,
     /// Expected total number of pixels times samples.
@@ -59,7 +59,7 @@ pub(crate) struct Forecast {
 }
 
 /// State of a render at some point in time.
-pub(crate) struct Moment<'a> {
+pub(crate) struct RenderSnapshot<'a> {
     pub(crate) state: &'a FilmState,
     pub(crate) plan: &'a Plan,
     pub(crate) photons: Option<&'a PhotonStore>,
@@ -77,19 +77,19 @@ impl Forecast {
     /// Creates a forecast for a render with at most `most` samples per pixel.
     pub(crate) fn new(state: &FilmState, most: u32) -> Self {
         Self {
-            rate: WorkRate::new(state.seconds()),
+            rate: WorkRate::new(state.cpu_seconds()),
             noise: NoiseForecast::new(),
-            expectation: Expectation { due: Instant::now(), total: None, passes: [0; 2] },
+            expectation: WorkEstimate { due: Instant::now(), total: None, passes: [0; 2] },
             fraction: 0.0,
-            total_units: state.units_to_come(most),
+            total_units: state.expected_pixel_samples(most),
             photon_seconds: 0.0,
             photons_since: None,
         }
     }
 
     /// Updates the total work after goals have changed.
-    pub(crate) fn expect_again(&mut self, state: &FilmState, most: u32) {
-        self.total_units = state.units_to_come(most);
+    pub(crate) fn update_work_estimate(&mut self, state: &FilmState, most: u32) {
+        self.total_units = state.expected_pixel_samples(most);
         self.expectation.due = Instant::now();
     }
 
@@ -106,13 +106,13 @@ impl Forecast {
     }
 
     /// Measures the film's noise if a measurement is due. `seconds` is the time since the stage started.
-    pub(crate) fn look_at_noise(&mut self, state: &FilmState, pool: &ThreadPool, seconds: f64) {
+    pub(crate) fn measure_noise_if_due(&mut self, state: &FilmState, pool: &ThreadPool, seconds: f64) {
         let least = state.samples(u32::MAX);
-        pool.install(|| self.noise.look(&state.film, least, (state.seconds(), seconds)));
+        pool.install(|| self.noise.measure_if_due(&state.film, least, (state.cpu_seconds(), seconds)));
     }
 
     /// Returns the progress, including the predicted time and noise.
-    pub(crate) fn progress(&mut self, moment: &Moment<'_>) -> RenderProgress {
+    pub(crate) fn progress(&mut self, moment: &RenderSnapshot<'_>) -> RenderProgress {
         let elapsed_seconds = moment.elapsed_seconds;
         // Predict the end from the remaining work.
         let work = self.work(moment);
@@ -120,15 +120,15 @@ impl Forecast {
         // Apply the time limit if it ends the render earlier.
         if let Some(budget) = moment.plan.time_seconds {
             // The first pass always completes, even after the time limit.
-            let of_first = eta_seconds.map_or(0.0, |eta| eta * self.share_of_first(moment));
+            let of_first = eta_seconds.map_or(0.0, |eta| eta * self.first_pass_share(moment));
             let left = (budget - elapsed_seconds).max(of_first);
             eta_seconds = Some(eta_seconds.unwrap_or(left).min(left));
-            // Elapsed time is progress even if no work is done.
+            // Elapsed time counts as progress even if no work was done.
             fraction = fraction.max(elapsed_seconds / (elapsed_seconds + left)).min(1.0);
         }
         self.fraction = if moment.is_last { 1.0 } else { self.fraction.max(fraction) };
         let pixels = moment.state.film.crop().area() as u64;
-        let left = eta_seconds.filter(|_| falls_evenly(moment));
+        let left = eta_seconds.filter(|_| can_predict_noise(moment));
         RenderProgress {
             fraction: self.fraction,
             elapsed_seconds,
@@ -138,18 +138,18 @@ impl Forecast {
             mean_samples: moment.units as f64 / pixels as f64,
             total_samples: self.total_units.div_ceil(pixels) as u32,
             is_total_fixed: !(moment.plan.settings.render.error > 0.0) && moment.plan.time_seconds.is_none(),
-            noise: self.noise.at(work, self.rate.rate(), left),
+            noise: self.noise.progress(work, self.rate.rate(), left),
         }
     }
 
     /// Returns the work done so far and the total work. With a noise target, the total is unknown until the
-    /// noise is judged.
-    fn work(&mut self, moment: &Moment<'_>) -> Work {
+    /// noise has been judged.
+    fn work(&mut self, moment: &RenderSnapshot<'_>) -> Work {
         if Instant::now() >= self.expectation.due {
-            self.expectation = expectation(moment);
+            self.expectation = estimate_work(moment);
         }
-        let Expectation { total, passes: [passes, all_passes], .. } = self.expectation;
-        let done = moment.state.seconds();
+        let WorkEstimate { total, passes: [passes, all_passes], .. } = self.expectation;
+        let done = moment.state.cpu_seconds();
         let of_pass = moment.photons.map_or(0.0, PhotonStore::seconds_of_pass);
         let of_this = self.photons_since.map_or(0.0, |since| moment.elapsed_seconds - since);
         let to_come = f64::from(all_passes.saturating_sub(passes)) * of_pass - of_this;
@@ -161,7 +161,7 @@ impl Forecast {
     }
 
     /// Returns the first pass's share of the remaining work.
-    fn share_of_first(&self, moment: &Moment<'_>) -> f64 {
+    fn first_pass_share(&self, moment: &RenderSnapshot<'_>) -> f64 {
         if !moment.is_first {
             return 0.0;
         }
@@ -171,25 +171,25 @@ impl Forecast {
     }
 }
 
-/// Whether future noise can be predicted from past noise. With `error`, fewer and fewer tiles receive
-/// samples. With photons, the radius shrinks from pass to pass.
-fn falls_evenly(moment: &Moment<'_>) -> bool {
+/// Whether future noise can be predicted from past noise. It cannot with `error`, because fewer and fewer
+/// tiles receive samples, nor with photons, because the radius shrinks from pass to pass.
+fn can_predict_noise(moment: &RenderSnapshot<'_>) -> bool {
     match moment.state.film.convergence() {
         Convergence::Stratified => !(moment.plan.settings.render.error > 0.0),
         Convergence::Photons => false,
     }
 }
 
-/// Sums up the work of all cells.
-fn expectation(moment: &Moment<'_>) -> Expectation {
-    let Moment { state, plan, photons, .. } = moment;
+/// Estimates the total work as a sum over all cells.
+fn estimate_work(moment: &RenderSnapshot<'_>) -> WorkEstimate {
+    let RenderSnapshot { state, plan, photons, .. } = moment;
     let Render { samples: most, error, .. } = plan.settings.render;
     let begin = Instant::now();
-    let is_known = !(error > 0.0) || state.is_foreseen();
+    let is_known = !(error > 0.0) || state.can_predict_samples();
     let pixels = state.film.crop().area();
     let at_once = photons.map_or(u32::MAX, PhotonStore::max_passes_at_once);
     let jobs = |done, end| remaining_jobs(done, end, pixels, at_once);
-    let total = is_known.then(|| state.seconds() + state.seconds_to_come(most, jobs));
-    let passes = photons.map_or([0; 2], |_| state.passes(most));
-    Expectation { due: Instant::now() + EXPECTATION_SHARE * begin.elapsed(), total, passes }
+    let total = is_known.then(|| state.cpu_seconds() + state.remaining_cpu_seconds(most, jobs));
+    let passes = photons.map_or([0; 2], |_| state.photon_passes(most));
+    WorkEstimate { due: Instant::now() + EXPECTATION_SHARE * begin.elapsed(), total, passes }
 }

@@ -9,19 +9,19 @@ use crate::render::noise_goals::LEAST;
 
 /// Minimum time before the first measurement and between measurements. Each is a sum over all pixels.
 const INTERVAL: Duration = Duration::from_millis(500);
-/// Minimum ratio of the current noise to the next level reported.
+/// Minimum ratio of the current noise to the next reported level.
 const STEP: f64 = 1.5;
 
 /// The last noise measurement and the time of the next one.
 #[derive(Debug)]
 pub(crate) struct NoiseForecast {
     due: Instant,
-    told: Option<Measured>,
+    told: Option<NoiseMeasurement>,
 }
 
 /// A noise measurement.
 #[derive(Clone, Copy, Debug)]
-struct Measured {
+struct NoiseMeasurement {
     noise: ImageNoise,
     /// Work done when the noise was measured.
     done: f64,
@@ -35,18 +35,18 @@ impl NoiseForecast {
     }
 
     /// Measures the noise if a measurement is due. `samples` is the minimum number of samples per pixel.
-    pub(crate) fn look(&mut self, film: &Film, samples: u32, (done, seconds): (f64, f64)) {
+    pub(crate) fn measure_if_due(&mut self, film: &Film, samples: u32, (done, seconds): (f64, f64)) {
         if samples < LEAST || Instant::now() < self.due {
             return;
         }
-        self.told = film.noise().map(|noise| Measured { noise, done, seconds });
+        self.told = film.noise().map(|noise| NoiseMeasurement { noise, done, seconds });
         self.due = Instant::now() + INTERVAL;
     }
 
     /// Returns the last measured noise and its predicted decrease. `rate` is the work per second, and `left`
     /// the seconds until the end. Returns `None` before the first measurement.
-    pub(crate) fn at(&self, work: Work, rate: Option<f64>, left: Option<f64>) -> Option<NoiseProgress> {
-        let Measured { noise: ImageNoise { relative_error, power }, done, seconds } = self.told?;
+    pub(crate) fn progress(&self, work: Work, rate: Option<f64>, left: Option<f64>) -> Option<NoiseProgress> {
+        let NoiseMeasurement { noise: ImageNoise { relative_error, power }, done, seconds } = self.told?;
         // Returns the fraction of the noise that remains with `times` as many samples.
         let fall = |times: f64| libm::pow(times, -0.5 * power);
         let by_now = if done > 0.0 { relative_error * fall(work.done / done) } else { relative_error };
@@ -90,28 +90,31 @@ mod tests {
     /// Noise of independent samples: 2.1 % after 100 units of work and 9 seconds.
     fn measured() -> NoiseForecast {
         let noise = ImageNoise { relative_error: 0.021, power: 1.0 };
-        NoiseForecast { due: Instant::now(), told: Some(Measured { noise, done: 100.0, seconds: 9.0 }) }
+        NoiseForecast {
+            due: Instant::now(),
+            told: Some(NoiseMeasurement { noise, done: 100.0, seconds: 9.0 }),
+        }
     }
 
     #[test]
     fn next_level_is_predicted_from_sample_count() {
-        // Reaching 1 % takes 4.41 times as many samples, at 10 units per second.
+        // Reaching 1 % takes 4.41 times as many samples. The rate is 10 units per second.
         let work = Work { done: 100.0, total: Some(10_000.0), aside: [0.0; 2] };
-        let told = measured().at(work, Some(10.0), Some(100.0)).expect("noise");
+        let told = measured().progress(work, Some(10.0), Some(100.0)).expect("noise");
         let (level, seconds) = told.next.expect("a level");
         assert!((level - 0.01).abs() < 1e-12 && (seconds - 34.1).abs() < 1e-6, "{level} {seconds}");
         assert_eq!((told.now, told.seconds), (0.021, 9.0));
         // Half of the time is spent on other activities.
         let half = Work { aside: [10.0, 10.0], ..work };
         let (_, seconds) =
-            measured().at(half, Some(10.0), Some(100.0)).expect("noise").next.expect("a level");
+            measured().progress(half, Some(10.0), Some(100.0)).expect("noise").next.expect("a level");
         assert!((seconds - 68.2).abs() < 1e-6, "{seconds}");
     }
 
     #[test]
     fn prediction_accounts_for_work_since_measurement() {
         let work = Work { done: 400.0, total: Some(10_000.0), aside: [0.0; 2] };
-        let told = measured().at(work, Some(10.0), Some(1000.0)).expect("noise");
+        let told = measured().progress(work, Some(10.0), Some(1000.0)).expect("noise");
         assert_eq!(told.now, 0.021);
         // The expected current noise is 1.05 %, so reaching 0.5 % takes 4.41 times as many samples.
         let (level, seconds) = told.next.expect("a level");
@@ -122,8 +125,8 @@ mod tests {
     fn no_level_is_predicted_after_render_end() {
         let work = Work { done: 100.0, total: Some(200.0), aside: [0.0; 2] };
         for left in [Some(10.0), Some(34.0), None] {
-            assert_eq!(measured().at(work, Some(10.0), left).expect("noise").next, None, "{left:?}");
+            assert_eq!(measured().progress(work, Some(10.0), left).expect("noise").next, None, "{left:?}");
         }
-        assert_eq!(measured().at(work, None, Some(100.0)).expect("noise").next, None);
+        assert_eq!(measured().progress(work, None, Some(100.0)).expect("noise").next, None);
     }
 }

@@ -30,18 +30,18 @@ impl ExpectedSamples {
         size_of_val(self.0.as_slice())
     }
 
-    /// Updates the predictions from the noise in both halves of each tile and its rate of decrease. The
-    /// judgement's sample count is a power of two. `done` is the number of samples in each half. Halves with
-    /// a goal keep their predictions.
+    /// Updates the predictions from the noise in both halves of each tile and its rate of decrease.
+    /// `judgement` has a sample count that is a power of two. `done` is the number of samples in each half.
+    /// Predictions for halves with a goal do not change.
     pub(crate) fn predict(&mut self, judgement: &Judgement, goals: &Goals, done: &[[u32; 2]]) {
         let Judgement { noise, samples, aim } = judgement;
         // Collect the tiles without goals and the overall rate at which their noise decreases.
         let open = |(tile, noise): (usize, &Option<TileNoise>)| {
-            noise.filter(|_| goals.is_open(tile, done, *samples)).map(|noise| (tile, noise))
+            noise.filter(|_| goals.is_undecided(tile, done, *samples)).map(|noise| (tile, noise))
         };
         let tiles: Vec<(usize, TileNoise)> = noise.iter().enumerate().filter_map(open).collect();
         let falls = tiles.iter().filter_map(|(_, noise)| noise.fall).collect();
-        let law = NoiseFall::of(aim.convergence, falls, *samples);
+        let law = NoiseDecay::of(aim.convergence, falls, *samples);
         for (tile, TileNoise { halves, fall }) in tiles {
             // Average the noise of both halves of the tile.
             let squares = halves.iter().flatten().map(|half| {
@@ -53,7 +53,7 @@ impl ExpectedSamples {
                 continue;
             }
             // Extrapolate to the noise target.
-            let wanted = law.samples_to(AIM * aim.error, mean.sqrt(), fall);
+            let wanted = law.samples_to_reach(AIM * aim.error, mean.sqrt(), fall);
             let cells = self.0.iter_mut().zip(done).enumerate().skip(CELLS * tile).take(CELLS);
             for (cell, (expected, done)) in cells {
                 for half in (0..2).filter(|half| goals.of(cell, *half) == u32::MAX) {
@@ -67,18 +67,20 @@ impl ExpectedSamples {
 /// Model of how noise decreases with the number of samples. Smooth parts converge fast, so their noise soon
 /// becomes negligible. Afterwards, noise decreases as fast as at edges and in penumbras, or more slowly.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct NoiseFall {
+struct NoiseDecay {
     samples: u32,
-    /// Number of doublings that each reduce the variance by a factor of `fall`. After that, `power` applies.
+    /// Number of sample doublings that each reduce the variance by a factor of `fall`. After these, `power`
+    /// applies.
     doublings: u32,
     /// Ratio of variances before and after the last doubling of samples, for all tiles. `None` below
     /// [`LEAST`] samples, in which case each tile uses its own ratio.
     fall: Option<f64>,
-    /// Exponent p: later, the variance is proportional to the number of samples to the power −p.
+    /// Exponent p. After the doublings, the variance is proportional to the number of samples to the power
+    /// −p.
     power: f64,
 }
 
-impl NoiseFall {
+impl NoiseDecay {
     /// Fits the model to each tile's ratio of variances before and after the last doubling of samples.
     fn of(convergence: Convergence, mut falls: Vec<f64>, samples: u32) -> Self {
         let doublings = (LEAST.ilog2().saturating_sub(samples.ilog2())).max(1);
@@ -99,9 +101,9 @@ impl NoiseFall {
         Self { samples, doublings, fall: Some(fall), power: libm::log2(fall).min(convergence.usual_power()) }
     }
 
-    /// Returns the number of samples with which a tile's noise reaches `bound`. `fall` is the tile's ratio of
-    /// variances at the last doubling.
-    fn samples_to(&self, bound: f64, noise: f64, fall: Option<f64>) -> u32 {
+    /// Returns the number of samples that a tile needs for its noise to reach `bound`. `fall` is the tile's
+    /// ratio of variances at the last doubling.
+    fn samples_to_reach(&self, bound: f64, noise: f64, fall: Option<f64>) -> u32 {
         let of_tile = || {
             // Each doubling beyond two samples provides another ratio for the tile.
             let known = fall.map_or(0.0, |_| 1.0 - 1.0 / f64::from(self.samples.ilog2()));
@@ -127,7 +129,7 @@ mod tests {
     fn judged(halves: [(f32, f32); 2], samples: u32, error: f64) -> (Goals, ExpectedSamples) {
         let (mut goals, mut expected) = (Goals::none(1), ExpectedSamples::unknown(1));
         let done = [[samples; 2]];
-        let judgement = goals.judge(&film(halves, samples), &done, samples, error).expect("samples");
+        let judgement = goals.decide_goals(&film(halves, samples), &done, samples, error).expect("samples");
         expected.predict(&judgement, &goals, &done);
         (goals, expected)
     }
@@ -156,7 +158,7 @@ mod tests {
     #[test]
     fn recent_noise_decrease_is_extrapolated() {
         let (stratified, usual) = (Convergence::Stratified, Convergence::Stratified.usual_power());
-        let of = |falls: &[f64]| NoiseFall::of(stratified, falls.to_vec(), 64);
+        let of = |falls: &[f64]| NoiseDecay::of(stratified, falls.to_vec(), 64);
         for (falls, fall, power) in [
             (vec![], libm::exp2(usual), usual),
             (vec![2.0, 1.0, 2.0], 2.0, 1.0),
@@ -165,18 +167,18 @@ mod tests {
         ] {
             assert_eq!(
                 of(&falls),
-                NoiseFall { samples: 64, doublings: 1, fall: Some(fall), power },
+                NoiseDecay { samples: 64, doublings: 1, fall: Some(fall), power },
                 "{falls:?}"
             );
         }
-        // Predict half or a quarter of the noise of 64 samples. The variance decreases by factors of 4 and
-        // then 2.7 per doubling, or like that of independent samples.
+        // Predict half or a quarter of the noise of 64 samples. Per doubling, the variance decreases by a
+        // factor of 4 and then 2.7, or as with independent samples.
         let near = |samples: u32, of: f64| (f64::from(samples) / of - 1.0).abs() < 0.02;
-        assert!(near(of(&[4.0]).samples_to(0.5, 1.0, None), 128.0));
-        assert!(near(of(&[4.0]).samples_to(0.25, 1.0, None), 128.0 * libm::pow(4.0, 1.0 / usual)));
-        assert!(near(of(&[1.0]).samples_to(0.25, 1.0, None), 16.0 * 64.0));
+        assert!(near(of(&[4.0]).samples_to_reach(0.5, 1.0, None), 128.0));
+        assert!(near(of(&[4.0]).samples_to_reach(0.25, 1.0, None), 128.0 * libm::pow(4.0, 1.0 / usual)));
+        assert!(near(of(&[1.0]).samples_to_reach(0.25, 1.0, None), 16.0 * 64.0));
         assert!(near(
-            NoiseFall::of(Convergence::Photons, vec![9.0], 4).samples_to(0.25, 1.0, Some(9.0)),
+            NoiseDecay::of(Convergence::Photons, vec![9.0], 4).samples_to_reach(0.25, 1.0, Some(9.0)),
             64.0
         ));
     }
@@ -191,10 +193,10 @@ mod tests {
 
     #[test]
     fn smooth_tiles_need_few_samples() {
-        let law = NoiseFall::of(Convergence::Stratified, vec![], 4);
+        let law = NoiseDecay::of(Convergence::Stratified, vec![], 4);
         assert_eq!((law.doublings, law.fall), (2, None));
         let [smooth, unknown, rough] =
-            [Some(8.0), None, Some(1.0)].map(|fall| law.samples_to(0.2, 1.0, fall));
+            [Some(8.0), None, Some(1.0)].map(|fall| law.samples_to_reach(0.2, 1.0, fall));
         assert!(smooth < unknown && unknown < rough, "{smooth} {unknown} {rough}");
         // The variance decreases by factors of √(8 · 4) and √(2 · 4).
         assert!((12..17).contains(&smooth) && (30..55).contains(&rough), "{smooth} {rough}");

@@ -69,7 +69,7 @@ mod tests {
 
     #[test]
     fn time_for_other_activities_is_separate() {
-        // Two seconds for other activities and one second of work for 100 of 400 units.
+        // Two seconds are spent on other activities and one second on the first 100 of 400 units of work.
         let mut pace = WorkRate::new(0.0);
         let work = Work { done: 100.0, total: Some(400.0), aside: [2.0, 6.0] };
         let (fraction, eta) = pace.at(3.0, work);

@@ -7,14 +7,15 @@ use super::super::super::keys::{color_bytes, color_names, hex_digits};
 use super::super::super::nearest::nearest;
 use super::super::context::Issue;
 use super::super::limits::Limits;
-use super::super::names::Names;
-use super::super::value::{TomlValue, Value, limited, whole, wrong_type};
+use super::super::names::DefinedNames;
+use super::super::value::{TomlValue, Value, number_within, parse_integer, report_wrong_type};
 use super::TableKey;
 use crate::math::color::srgb8_to_linear;
 use crate::math::{DVec3, Vec3};
 
 const COLOR: &str = "a color: [r, g, b], a number, \"#rrggbb\" or a name";
-/// An integer of at least this value is taken for a component in 0–255, because no reflectance is this large.
+/// Integers of at least this value are assumed to be components in 0–255, because no reflectance is this
+/// large.
 const MIN_BYTE: u8 = 10;
 const COLOR_OR_TEXTURE: &str =
     "a color, [r, g, b], a number, \"#rrggbb\" or a name, or { texture = \"name\" }";
@@ -29,42 +30,47 @@ impl TableKey<'_> {
 
     /// A color in double precision, for values that `f32` would round to 0 or 1.
     pub(in super::super) fn exact_color(&self, limits: Limits) -> Option<DVec3> {
-        self.color_of(limits, COLOR)
+        self.color_in_limits(limits, COLOR)
     }
 
     /// A color or a texture.
-    pub(in super::super) fn color_or_texture(&self, textures: &Names, limits: Limits) -> Option<ColorSource> {
+    pub(in super::super) fn color_or_texture(
+        &self,
+        textures: &DefinedNames,
+        limits: Limits,
+    ) -> Option<ColorSource> {
         if self.is_table() {
-            return self.texture(textures).map(ColorSource::Texture);
+            return self.texture_reference(textures).map(ColorSource::Texture);
         }
         self.reject_texture_name(textures, COLOR_OR_TEXTURE)?;
-        self.color_of(limits, COLOR_OR_TEXTURE).map(|color| ColorSource::Constant(color.as_vec3()))
+        self.color_in_limits(limits, COLOR_OR_TEXTURE).map(|color| ColorSource::Constant(color.as_vec3()))
     }
 
     /// The texture in `{ texture = "name" }`.
-    fn texture(&self, textures: &Names) -> Option<usize> {
+    fn texture_reference(&self, textures: &DefinedNames) -> Option<usize> {
         let table = self.inline_table()?;
-        let texture = table.required("texture", "\"name\"").name_in(textures);
+        let texture = table.required("texture", "\"name\"").index_by_name(textures);
         table.finish();
         texture
     }
 
     /// Emitted radiance: a non-negative color, or a texture with a scale.
-    pub(in super::super) fn emission(&self, textures: &Names) -> Option<EmissionSource> {
+    pub(in super::super) fn emission(&self, textures: &DefinedNames) -> Option<EmissionSource> {
         if self.is_table() {
             let table = self.inline_table()?;
-            let texture = table.required("texture", "\"name\"").name_in(textures);
+            let texture = table.required("texture", "\"name\"").index_by_name(textures);
             let scale = table.optional("scale");
-            let scale = if scale.is_given() { scale.color() } else { Some(Vec3::ONE) };
+            let scale = if scale.is_present() { scale.color() } else { Some(Vec3::ONE) };
             table.finish();
             return Some(EmissionSource { texture: Some(texture?), ..EmissionSource::constant(scale?) });
         }
         self.reject_texture_name(textures, EMISSION)?;
-        self.color_of(Limits::AtLeast(0.0), EMISSION).map(|color| EmissionSource::constant(color.as_vec3()))
+        self.color_in_limits(Limits::AtLeast(0.0), EMISSION)
+            .map(|color| EmissionSource::constant(color.as_vec3()))
     }
 
     /// Returns `None` and reports an error if the value is a bare texture name.
-    fn reject_texture_name(&self, textures: &Names, expected: &str) -> Option<()> {
+    fn reject_texture_name(&self, textures: &DefinedNames, expected: &str) -> Option<()> {
         if let TomlValue::String(text) = self.value?.item()
             && color_bytes(text).is_none()
             && textures.find(text).is_some()
@@ -78,17 +84,17 @@ impl TableKey<'_> {
         Some(())
     }
 
-    fn color_of(&self, limits: Limits, expected: &str) -> Option<DVec3> {
+    fn color_in_limits(&self, limits: Limits, expected: &str) -> Option<DVec3> {
         let value = self.value?;
         if let Limits::Between(..) = limits
-            && self.reports_bytes(|span| Issue::error(span, format!("`{}` must be {COLOR}", self.name)))
+            && self.rejects_byte_color(|span| Issue::error(span, format!("`{}` must be {COLOR}", self.name)))
         {
             return None;
         }
         match value.item() {
             TomlValue::String(text) => return self.parse_color(text).map(Vec3::as_dvec3),
             TomlValue::Integer { .. } | TomlValue::Float(_) => {
-                return limited(self.context, self.name, value, limits, expected).map(DVec3::splat);
+                return number_within(self.context, self.name, value, limits, expected).map(DVec3::splat);
             }
             TomlValue::Boolean(_) | TomlValue::Datetime | TomlValue::Array(_) | TomlValue::Table(_) => {}
         }
@@ -96,23 +102,23 @@ impl TableKey<'_> {
             let rgb: [f64; 3] = self.numbers(limits, "three numbers, [r, g, b]")?;
             return Some(DVec3::from_array(rgb));
         }
-        wrong_type(self.context, self.name, value, expected);
+        report_wrong_type(self.context, self.name, value, expected);
         None
     }
 
     /// Whether the value looks like a color in 0–255. If so, reports `issue` at the value's span and suggests
     /// the equivalent `#rrggbb`.
-    pub(in super::super) fn reports_bytes(&self, issue: impl FnOnce(Range<usize>) -> Issue) -> bool {
-        let (Some(span), Some(color)) = (self.span(), self.as_hex()) else { return false };
+    pub(in super::super) fn rejects_byte_color(&self, issue: impl FnOnce(Range<usize>) -> Issue) -> bool {
+        let (Some(span), Some(color)) = (self.span(), self.suggested_hex()) else { return false };
         let help = format!("write \"{color}\"; linear components range from 0 to 1");
         self.context.report(issue(span).label("this looks like 0–255").help(help));
         true
     }
 
     /// The string `#rrggbb` for one or three integers up to 255, if any is too large for a linear component.
-    fn as_hex(&self) -> Option<String> {
+    fn suggested_hex(&self) -> Option<String> {
         let byte = |value: Value<'_>| match value.item() {
-            TomlValue::Integer { digits, radix } => u8::try_from(whole(digits, radix)?).ok(),
+            TomlValue::Integer { digits, radix } => u8::try_from(parse_integer(digits, radix)?).ok(),
             TomlValue::String(_)
             | TomlValue::Float(_)
             | TomlValue::Boolean(_)
@@ -136,7 +142,7 @@ impl TableKey<'_> {
         }
         let issue = Issue::error(self.span()?, format!("`{}` must be {COLOR}", self.name));
         let small = text.to_ascii_lowercase();
-        let issue = match (long_form(text), nearest(&small, color_names())) {
+        let issue = match (complete_hex(text), nearest(&small, color_names())) {
             (Some(long), _) => {
                 issue.label("not of the form #rrggbb").help(format!("write all six digits: \"{long}\""))
             }
@@ -152,7 +158,7 @@ impl TableKey<'_> {
 }
 
 /// Converts `#rgb` and `rrggbb` to `#rrggbb`.
-fn long_form(text: &str) -> Option<String> {
+fn complete_hex(text: &str) -> Option<String> {
     match hex_digits(text) {
         Some(digits) if digits.len() == 3 => {
             Some(digits.chars().fold("#".to_owned(), |long, digit| format!("{long}{digit}{digit}")))
@@ -168,8 +174,8 @@ mod tests {
 
     #[test]
     fn short_and_bare_hex_colors_are_completed() {
-        assert_eq!(long_form("#f80").as_deref(), Some("#ff8800"));
-        assert_eq!(long_form("ff8000").as_deref(), Some("#ff8000"));
-        assert_eq!(long_form("red"), None);
+        assert_eq!(complete_hex("#f80").as_deref(), Some("#ff8800"));
+        assert_eq!(complete_hex("ff8000").as_deref(), Some("#ff8000"));
+        assert_eq!(complete_hex("red"), None);
     }
 }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::super::super::description::Located;
 use super::super::super::nearest::nearest;
-use super::super::super::read::{MAX_FOLDER_FILES, is_link, neighbor};
+use super::super::super::read::{MAX_FOLDER_FILES, is_symlink, similar_file};
 use super::super::super::sanitize::{shortened, visible};
 use super::super::context::Issue;
 use super::TableKey;
@@ -22,16 +22,18 @@ impl TableKey<'_> {
                 .report(Issue::error(span, format!("`{}` is empty; expected the path of a file", self.name)));
             return None;
         }
-        if !endings.is_empty() && !self.has_ending(text, endings) {
+        if !endings.is_empty() && !self.check_extension(text, endings) {
             return None;
         }
         let path = self.context.resolve(text);
-        let may_be_meant =
-            |found: &Path| endings.is_empty() || endings.contains(&ending(&found.to_string_lossy()).as_str());
-        if let Err((message, is_missing)) = regular_file(&path) {
+        let may_be_meant = |found: &Path| {
+            endings.is_empty() || endings.contains(&lowercase_extension(&found.to_string_lossy()).as_str())
+        };
+        if let Err((message, is_missing)) = check_regular_file(&path) {
             let help = is_missing.then(|| {
-                match self.context.search(MAX_FOLDER_FILES, || neighbor(&path, may_be_meant)) {
-                    Some(near) => format!("did you mean {}?", visible(&as_written(text, &near))),
+                match self.context.search_similar_name(MAX_FOLDER_FILES, || similar_file(&path, may_be_meant))
+                {
+                    Some(near) => format!("did you mean {}?", visible(&relative_to_scene(text, &near))),
                     None => "paths are relative to the scene file".to_owned(),
                 }
             });
@@ -42,8 +44,8 @@ impl TableKey<'_> {
     }
 
     /// Checks the extension of a path, and reports an error if it is wrong.
-    pub(in super::super) fn has_ending(&self, text: &str, endings: &[&str]) -> bool {
-        let ending = ending(text);
+    pub(in super::super) fn check_extension(&self, text: &str, endings: &[&str]) -> bool {
+        let ending = lowercase_extension(text);
         if endings.contains(&ending.as_str()) {
             return true;
         }
@@ -64,23 +66,23 @@ impl TableKey<'_> {
 }
 
 /// The path of a suggested file in the form used in the scene, relative to the scene's folder.
-fn as_written(text: &str, near: &Path) -> String {
+fn relative_to_scene(text: &str, near: &Path) -> String {
     let name = near.file_name().unwrap_or(near.as_os_str());
     Path::new(text).with_file_name(name).to_string_lossy().into_owned()
 }
 
 /// The extension of a path in lower case, possibly empty.
-fn ending(text: &str) -> String {
+fn lowercase_extension(text: &str) -> String {
     Path::new(text).extension().unwrap_or_default().to_string_lossy().to_lowercase()
 }
 
 /// Checks that a file is a regular file. The error contains a message and whether the file is missing.
-fn regular_file(path: &Path) -> Result<(), (String, bool)> {
+fn check_regular_file(path: &Path) -> Result<(), (String, bool)> {
     let shown = shortened(&path.to_string_lossy(), 200);
     match file::kind(path) {
         Ok((FileKind::Regular, _)) => Ok(()),
         Ok((kind, _)) => Err((format!("{shown} is {}, not a file", kind.words()), false)),
-        Err(error) if error.kind() == io::ErrorKind::NotFound && is_link(path) => {
+        Err(error) if error.kind() == io::ErrorKind::NotFound && is_symlink(path) => {
             Err((format!("{shown} is a symbolic link to a file that does not exist"), false))
         }
         Err(error) if error.kind() == io::ErrorKind::NotFound => {
@@ -97,7 +99,7 @@ mod tests {
     #[test]
     fn suggestions_are_relative_to_the_scene() {
         let near = Path::new("scenes/../assets/textures/bricks.png");
-        assert_eq!(as_written("../assets/textures/brick.png", near), "../assets/textures/bricks.png");
-        assert_eq!(as_written("brick.png", Path::new("scenes/bricks.png")), "bricks.png");
+        assert_eq!(relative_to_scene("../assets/textures/brick.png", near), "../assets/textures/bricks.png");
+        assert_eq!(relative_to_scene("brick.png", Path::new("scenes/bricks.png")), "bricks.png");
     }
 }

@@ -3,8 +3,8 @@
 use super::super::super::description::{Channel, NumberSource};
 use super::super::context::Issue;
 use super::super::limits::Limits;
-use super::super::names::Names;
-use super::super::value::{TomlValue, limited};
+use super::super::names::DefinedNames;
+use super::super::value::{TomlValue, number_within};
 use super::TableKey;
 
 const NUMBER_OR_TEXTURE: &str = "a number, or { texture = \"name\" }";
@@ -14,7 +14,7 @@ impl TableKey<'_> {
     /// A number, or a texture with an optional channel.
     pub(in super::super) fn number_or_texture(
         &self,
-        textures: &Names,
+        textures: &DefinedNames,
         limits: Limits,
     ) -> Option<NumberSource> {
         if self.is_table() {
@@ -31,25 +31,28 @@ impl TableKey<'_> {
             self.context.report(issue);
             return None;
         }
-        let number = limited(self.context, self.name, value, limits, NUMBER_OR_TEXTURE);
+        let number = number_within(self.context, self.name, value, limits, NUMBER_OR_TEXTURE);
         number.map(|number| NumberSource::Constant(number as f32))
     }
 
     /// The name of a texture, or `{ texture = "name", channel = "r" }`.
-    pub(in super::super) fn texture_of_numbers(&self, textures: &Names) -> Option<(usize, Option<Channel>)> {
+    pub(in super::super) fn texture_of_numbers(
+        &self,
+        textures: &DefinedNames,
+    ) -> Option<(usize, Option<Channel>)> {
         if self.is_table() {
             return self.texture_with_channel(textures);
         }
-        let name = self.text_or(|| NAME_OR_TEXTURE.to_owned())?;
+        let name = self.text_described_by(|| NAME_OR_TEXTURE.to_owned())?;
         Some((self.find(textures, name)?, None))
     }
 
     /// The texture and the channel in `{ texture = "name", channel = "r" }`.
-    fn texture_with_channel(&self, textures: &Names) -> Option<(usize, Option<Channel>)> {
+    fn texture_with_channel(&self, textures: &DefinedNames) -> Option<(usize, Option<Channel>)> {
         let table = self.inline_table()?;
-        let texture = table.required("texture", "\"name\"").name_in(textures);
+        let texture = table.required("texture", "\"name\"").index_by_name(textures);
         let key = table.optional("channel");
-        let channel = if key.is_given() { key.choice().map(Some) } else { Some(None) };
+        let channel = if key.is_present() { key.choice().map(Some) } else { Some(None) };
         table.finish();
         Some((texture?, channel?))
     }

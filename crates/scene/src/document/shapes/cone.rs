@@ -2,12 +2,12 @@
 
 use super::super::super::description::Shape;
 use super::super::table::TableReader;
-use super::{axis_ends, length};
+use super::{read_axis_ends, read_length};
 
 pub(super) fn read(table: &TableReader<'_>) -> Option<Shape> {
-    let ends = axis_ends(table, ["base", "tip"], "cone");
-    let radius = length(table, "radius", 0.5);
-    let cap = table.optional("cap").flag().unwrap_or(true);
+    let ends = read_axis_ends(table, ["base", "tip"], "cone");
+    let radius = read_length(table, "radius", 0.5);
+    let cap = table.optional("cap").boolean().unwrap_or(true);
     let [base, tip] = ends?;
     Some(Shape::Cone { base, tip, radius: radius?, cap })
 }

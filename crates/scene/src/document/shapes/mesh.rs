@@ -12,7 +12,7 @@ use super::super::table::TableReader;
 use crate::math::DVec3;
 use crate::math::limits::{SHORTEST, is_too_short, length};
 
-/// The mesh files referenced so far. Different paths to the same file are not duplicated.
+/// The mesh files referenced so far. A file referenced through different paths is listed once.
 #[derive(Default)]
 pub(super) struct MeshFiles {
     list: Vec<MeshFile>,
@@ -20,7 +20,7 @@ pub(super) struct MeshFiles {
 }
 
 impl MeshFiles {
-    fn index(&mut self, file: Located<PathBuf>, part: Option<u32>) -> usize {
+    fn add_file(&mut self, file: Located<PathBuf>, part: Option<u32>) -> usize {
         let identity = file.value.canonicalize().unwrap_or_else(|_| file.value.clone());
         *self.indices.entry((identity, part)).or_insert_with(|| {
             let Located { value, span } = file;
@@ -36,18 +36,18 @@ impl MeshFiles {
 
 pub(super) fn read(table: &TableReader<'_>, files: &mut MeshFiles) -> Option<Shape> {
     let file = table.required("file", "\"mesh.obj\"").file(MESHES);
-    let part = part(table, file.as_ref());
-    let placed = placement(table);
-    let smooth = table.optional("smooth").flag().unwrap_or(true);
-    let vertex_colors = table.optional("vertex_colors").flag().unwrap_or(false);
-    Some(Shape::Mesh(Mesh { file: files.index(file?, part?), placed: placed?, smooth, vertex_colors }))
+    let part = read_part_index(table, file.as_ref());
+    let placed = read_placement(table);
+    let smooth = table.optional("smooth").boolean().unwrap_or(true);
+    let vertex_colors = table.optional("vertex_colors").boolean().unwrap_or(false);
+    Some(Shape::Mesh(Mesh { file: files.add_file(file?, part?), placed: placed?, smooth, vertex_colors }))
 }
 
 /// Reads the index of a part in a glTF file.
-fn part(table: &TableReader<'_>, file: Option<&Located<PathBuf>>) -> Option<Option<u32>> {
+fn read_part_index(table: &TableReader<'_>, file: Option<&Located<PathBuf>>) -> Option<Option<u32>> {
     let key = table.optional("part");
     let Some(span) = key.span() else { return Some(None) };
-    let number = key.whole(table.range("part")).map(Some);
+    let number = key.integer(table.range("part")).map(Some);
     let ending = file.and_then(|file| file.value.extension()).unwrap_or_default().to_ascii_lowercase();
     if file.is_some() && !GLTF.iter().any(|known| ending == *known) {
         key.context.report(Issue::error(span, "`part` needs a .glb or .gltf file"));
@@ -57,17 +57,17 @@ fn part(table: &TableReader<'_>, file: Option<&Located<PathBuf>>) -> Option<Opti
 }
 
 /// `matrix`, or `scale`, `rotate` and `translate`.
-fn placement(table: &TableReader<'_>) -> Option<Placement> {
+fn read_placement(table: &TableReader<'_>) -> Option<Placement> {
     let (matrix, steps) =
         (table.optional("matrix"), ["scale", "rotate", "translate"].map(|name| table.optional(name)));
-    if matrix.is_given() {
+    if matrix.is_present() {
         for key in &steps {
             if let Some(span) = key.key_span() {
                 let message = format!("`{}` conflicts with `matrix`", key.name);
                 key.context.report(Issue::error(span, message));
             }
         }
-        return affine(&matrix);
+        return read_affine_matrix(&matrix);
     }
     let [scale, rotate, translate] = steps;
     Some(Placement::Steps {
@@ -82,7 +82,7 @@ fn placement(table: &TableReader<'_>) -> Option<Placement> {
 const MIN_VOLUME_RATIO: f64 = 1e-12;
 
 /// Reads an invertible affine transform in row-major order.
-fn affine(key: &TableKey<'_>) -> Option<Placement> {
+fn read_affine_matrix(key: &TableKey<'_>) -> Option<Placement> {
     let numbers: [f64; 16] = key.numbers(Limits::Any, "16 numbers, row by row")?;
     let [x, y, z, translate] =
         std::array::from_fn(|column| DVec3::from_array(std::array::from_fn(|row| numbers[4 * row + column])));

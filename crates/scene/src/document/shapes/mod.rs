@@ -40,7 +40,7 @@ const KINDS: [(&str, ShapeReader); 10] = [
 ];
 
 /// Whether `[[name]]` is a shape.
-pub(super) fn is_kind(name: &str) -> bool {
+pub(super) fn is_shape_table(name: &str) -> bool {
     KINDS.iter().any(|(kind, _)| *kind == name)
 }
 
@@ -51,7 +51,7 @@ pub(super) fn read(root: &TableReader<'_>, materials: &MaterialList) -> (Option<
     let mut is_valid = true;
     for (kind, reader) in KINDS {
         for table in root.tables(kind) {
-            match object(kind, &table, reader, materials, &mut files) {
+            match read_object(kind, &table, reader, materials, &mut files) {
                 Some(object) => objects.push(object),
                 None => is_valid = false,
             }
@@ -61,7 +61,7 @@ pub(super) fn read(root: &TableReader<'_>, materials: &MaterialList) -> (Option<
     (is_valid.then_some(objects), files.into_list())
 }
 
-fn object(
+fn read_object(
     kind: &str,
     table: &TableReader<'_>,
     reader: ShapeReader,
@@ -73,7 +73,7 @@ fn object(
         "mesh" => table.optional("material"),
         _ => table.required("material", "\"name\""),
     };
-    let material = key.name_in(&materials.names);
+    let material = key.index_by_name(&materials.names);
     let name = table.optional("name").shape_name();
     table.finish();
     if kind == "plane" && material.is_some_and(|index| materials.is_emissive(index)) {
@@ -83,7 +83,7 @@ fn object(
         table.context.report(issue);
         return None;
     }
-    if key.is_given() && material.is_none() || kind != "mesh" && material.is_none() {
+    if key.is_present() && material.is_none() || kind != "mesh" && material.is_none() {
         return None;
     }
     let shape = shape?;
@@ -91,7 +91,7 @@ fn object(
 }
 
 /// Reads a direction with any nonzero length. Errors refer to the shape or light as `what`.
-pub(super) fn direction(
+pub(super) fn read_direction(
     table: &TableReader<'_>,
     name: &'static str,
     what: &str,
@@ -99,7 +99,7 @@ pub(super) fn direction(
 ) -> Option<DVec3> {
     let key = table.optional(name);
     let direction = key.vector_or(Limits::Any, default)?;
-    if !key.is_long(direction) {
+    if !key.check_vector_length(direction) {
         return None;
     }
     if direction == DVec3::ZERO {
@@ -113,12 +113,12 @@ pub(super) fn direction(
 }
 
 /// Reads both ends of an axis, by default (0, 0, 0) and (0, 1, 0).
-fn axis_ends(table: &TableReader<'_>, names: [&'static str; 2], what: &str) -> Option<[DVec3; 2]> {
+fn read_axis_ends(table: &TableReader<'_>, names: [&'static str; 2], what: &str) -> Option<[DVec3; 2]> {
     let keys = names.map(|name| table.optional(name));
     let (first, second) =
         (keys[0].vector_or(Limits::Any, DVec3::ZERO), keys[1].vector_or(Limits::Any, DVec3::Y));
     let (first, second) = (first?, second?);
-    if !keys[0].is_apart(first, &keys[1], second) {
+    if !keys[0].check_distance(first, &keys[1], second) {
         return None;
     }
     if first == second {
@@ -134,14 +134,14 @@ fn axis_ends(table: &TableReader<'_>, names: [&'static str; 2], what: &str) -> O
 }
 
 /// Reads a length, or returns the default.
-fn length(table: &TableReader<'_>, name: &'static str, default: f64) -> Option<f64> {
+fn read_length(table: &TableReader<'_>, name: &'static str, default: f64) -> Option<f64> {
     let key = table.optional(name);
-    if key.is_given() { key.number(table.limits(name)) } else { Some(default) }
+    if key.is_present() { key.number(table.limits(name)) } else { Some(default) }
 }
 
 /// Whether two edges span an area: both are nonzero, and the sine of the angle between them exceeds rounding
 /// errors.
-fn span_area(u: DVec3, v: DVec3) -> bool {
+fn edges_span_area(u: DVec3, v: DVec3) -> bool {
     const MIN_SINE: f64 = 1e-10;
     match (u.try_normalize(), v.try_normalize()) {
         (Some(u), Some(v)) => u.cross(v).length() > MIN_SINE,
@@ -150,7 +150,7 @@ fn span_area(u: DVec3, v: DVec3) -> bool {
 }
 
 /// Whether a file has a mesh extension.
-pub(crate) fn is_mesh(path: &Path) -> bool {
+pub(crate) fn has_mesh_extension(path: &Path) -> bool {
     let ending = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
     MESHES.iter().any(|known| *known == ending)
 }

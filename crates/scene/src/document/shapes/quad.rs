@@ -5,7 +5,7 @@ use super::super::NO_AREA;
 use super::super::context::Issue;
 use super::super::limits::Limits;
 use super::super::table::TableReader;
-use super::span_area;
+use super::edges_span_area;
 use crate::math::DVec3;
 
 pub(super) fn read(table: &TableReader<'_>) -> Option<Shape> {
@@ -14,10 +14,10 @@ pub(super) fn read(table: &TableReader<'_>) -> Option<Shape> {
     let u = u_key.vector_or(Limits::Any, DVec3::new(2.0, 0.0, 0.0));
     let v = v_key.vector_or(Limits::Any, DVec3::new(0.0, 0.0, -2.0));
     let (corner, u, v) = (corner?, u?, v?);
-    if !(u_key.is_long(u) & v_key.is_long(v)) {
+    if !(u_key.check_vector_length(u) & v_key.check_vector_length(v)) {
         return None;
     }
-    if !span_area(u, v) {
+    if !edges_span_area(u, v) {
         let wrong = if u == DVec3::ZERO { u_key.span() } else { v_key.span() };
         let span = wrong.or(u_key.span())?;
         let issue = Issue::error(span, format!("the quad {NO_AREA}"))

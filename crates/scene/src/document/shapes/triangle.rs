@@ -6,7 +6,7 @@ use super::super::context::Issue;
 use super::super::key::TableKey;
 use super::super::limits::Limits;
 use super::super::table::TableReader;
-use super::span_area;
+use super::edges_span_area;
 use crate::math::DVec3;
 
 /// Default corners.
@@ -17,10 +17,13 @@ pub(super) fn read(table: &TableReader<'_>) -> Option<Shape> {
     let [a, b, c] = [0, 1, 2].map(|i| keys[i].vector_or(Limits::Any, CORNERS[i]));
     let (a, b, c) = (a?, b?, c?);
     let [a_key, b_key, c_key] = &keys;
-    if !(a_key.is_apart(a, b_key, b) && a_key.is_apart(a, c_key, c) && b_key.is_apart(b, c_key, c)) {
+    if !(a_key.check_distance(a, b_key, b)
+        && a_key.check_distance(a, c_key, c)
+        && b_key.check_distance(b, c_key, c))
+    {
         return None;
     }
-    if !span_area(b - a, c - a) {
+    if !edges_span_area(b - a, c - a) {
         let span = keys.iter().rev().find_map(TableKey::span)?;
         let issue = Issue::error(span, format!("the triangle {NO_AREA}"))
             .label("`a`, `b` and `c` are collinear")

@@ -1,10 +1,10 @@
-//! Next-event estimation at packets of vertices with samples of every light.
+//! Next-event estimation that samples every light at each vertex of a packet.
 
 use super::mis::CompetingTechnique;
 use crate::geometry::Ray;
 use crate::geometry::packet::{F32x16, RayPacket, lanes};
-use crate::integrators::transport::batch::{Response, VertexBatch};
-use crate::integrators::transport::interiors::{InteriorLists, absorption};
+use crate::integrators::transport::batch::{BsdfResponse, VertexBatch};
+use crate::integrators::transport::interiors::{InteriorLists, medium_transmittance};
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::view::LightAov;
 use crate::lights::{EmissionTexture, Light, LightCenter, LightObject, LightObjectPacket, LightSamplePacket};
@@ -50,7 +50,7 @@ impl std::ops::AddAssign for LightRayCounts {
     }
 }
 
-/// Direct light reflected toward the viewer at a packet of vertices.
+/// Direct light that a packet of vertices reflects toward the viewer.
 #[repr(align(64))]
 pub struct ReflectedLight {
     /// Reflected radiance, before multiplication by the path throughput.
@@ -111,7 +111,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
     #[inline(always)]
     fn sample_all(&self, sums: &mut LightSums, simd: impl Simd) {
         let render = &self.tile.settings.render;
-        let takes = |light: &Light| !self.only_infinite || light.is_beyond();
+        let takes = |light: &Light| !self.only_infinite || light.is_infinite();
         let mut sampler = None;
         for (number, light) in self.tile.world.lights.iter().filter(|(_, light)| takes(light)) {
             if MIS && self.tile.paths_find_sky && light.is_environment() {
@@ -122,7 +122,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
             let mut pending = PendingLight { light: [[0.0; PACKET_SIZE]; 3], active: 0 };
             let is_deferred = match render.shadows {
                 Shadows::Soft => false,
-                Shadows::Hard => light.middle().is_some(),
+                Shadows::Hard => light.center().is_some(),
                 Shadows::Off => true,
             };
             // Take the only possible sample, or the requested number of samples.
@@ -142,7 +142,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
                 let (mut values, active, response) = self.contributions(&samples, 1.0 / count as f32, simd);
                 // Multiply by the emission texture.
                 if let Some(pattern) = light.emission_texture() {
-                    values = self.textured(pattern, &samples, active, values);
+                    values = self.apply_emission_texture(pattern, &samples, active, values);
                     sums.rays.lookups += u64::from(active.count_ones());
                 }
                 // Apply the MIS weight, unless the light has no extent and is found only by light samples.
@@ -155,7 +155,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
                         light.inverse_pdfs(&samples)
                     };
                     let competing = self.competing.rays_per_sample(count);
-                    values = self.competing.weighted(
+                    values = self.competing.apply_mis_weights(
                         self.row,
                         (&samples, &response),
                         values,
@@ -163,11 +163,18 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
                         simd,
                     );
                 }
-                self.add(&samples, &values, active, sums, is_deferred.then_some(&mut pending), simd);
+                self.add_light_samples(
+                    &samples,
+                    &values,
+                    active,
+                    sums,
+                    is_deferred.then_some(&mut pending),
+                    simd,
+                );
             }
             // Trace the single ray to the center of the light.
             if pending.active != 0 {
-                self.add_pending(light.middle(), &pending, sums, simd);
+                self.add_pending(light.center(), &pending, sums, simd);
             }
         }
     }
@@ -185,7 +192,8 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
             let way = lane(&samples.targets, i) - lane(&self.row.from, i);
             let is_beyond = samples.beyond & 1 << i != 0;
             let distance = if is_beyond { f32::MAX } else { way.length() };
-            let left = absorption(self.tile.world, &interior_lists.get(self.row.interiors[i]), distance);
+            let left =
+                medium_transmittance(self.tile.world, &interior_lists.get(self.row.interiors[i]), distance);
             let value = lane(&values, i) * left;
             set_lane(&mut values, i, value);
         }
@@ -195,7 +203,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
     /// Multiplies values by the emission texture at the sampled points.
     #[cold]
     #[inline(never)]
-    fn textured(
+    fn apply_emission_texture(
         &self,
         pattern: &EmissionTexture,
         samples: &LightSamplePacket,
@@ -219,7 +227,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
     /// Adds the contributions of samples of one light. With `pending`, defers them until the light's shadow
     /// ray is traced.
     #[inline(always)]
-    fn add(
+    fn add_light_samples(
         &self,
         samples: &LightSamplePacket,
         values: &Vec3x16,
@@ -277,7 +285,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         for i in 0..PACKET_SIZE {
             ends[i] = if traced & 1 << i != 0 { ends[i] } else { -1.0 };
         }
-        let rays = RayPacket::of(self.row.from, direction).leaving(self.row.starts(&direction));
+        let rays = RayPacket::of(self.row.from, direction).with_start_triangle(self.row.starts(&direction));
         self.add_unoccluded(
             (&rays, &ends, traced),
             &LightObjectPacket::of(source),
@@ -325,7 +333,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         let mut values = *values;
         let arriving = traced & !weakened.occluded;
         for i in lanes(arriving) {
-            let value = lane(&values, i) * transmitted(lane(&weakened.left, i), self.aov);
+            let value = lane(&values, i) * null_transmittance(lane(&weakened.left, i), self.aov);
             set_lane(&mut values, i, value);
         }
         add_where(arriving, &values, &mut sums.light);
@@ -339,9 +347,9 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         samples: &LightSamplePacket,
         share: f32,
         simd: impl Simd,
-    ) -> (Vec3x16, u32, Response) {
+    ) -> (Vec3x16, u32, BsdfResponse) {
         let response = self.row.response(&samples.directions, simd);
-        let Response { bsdf: BsdfValues { f, .. }, cosines } = &response;
+        let BsdfResponse { bsdf: BsdfValues { f, .. }, cosines } = &response;
         let mut arriving = samples.weights;
         if self.aov == LightAov::LitFraction {
             for i in 0..PACKET_SIZE {
@@ -375,7 +383,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
             set_lane(&mut direction, i, lane(&samples.directions, i));
             ends[i] = f32::INFINITY;
         }
-        (RayPacket::of(self.row.from, direction).leaving(self.row.starts(&direction)), ends)
+        (RayPacket::of(self.row.from, direction).with_start_triangle(self.row.starts(&direction)), ends)
     }
 }
 
@@ -409,7 +417,7 @@ pub fn add_where(bits: u32, values: &Vec3x16, sums: &mut Vec3x16) {
 }
 
 /// Transmittance of null interactions for a light AOV.
-pub fn transmitted(left: Vec3, aov: LightAov) -> Vec3 {
+pub fn null_transmittance(left: Vec3, aov: LightAov) -> Vec3 {
     match aov {
         LightAov::Radiance(_) | LightAov::TraversalCost => left,
         LightAov::LitFraction => Vec3::splat(luminance(left)),

@@ -1,5 +1,5 @@
-//! Next-event estimation with too many lights to sample them all at each vertex. Lights are picked from a
-//! tree.
+//! Next-event estimation for scenes with too many lights to sample all of them at each vertex. Lights are
+//! picked from a tree.
 
 use std::ops::Range;
 
@@ -62,7 +62,8 @@ impl<const MIS: bool> SimdKernel for SampleLightTree<'_, MIS> {
         let mut pool = (samples <= PICK_BLOCK).then_some(pool);
         // Pick lights for several samples together, and sample the picked lights.
         for first in (0..samples).step_by(PICK_BLOCK as usize) {
-            let picks = lighting.picks(selection, &sampler, first..(first + PICK_BLOCK).min(samples), simd);
+            let picks =
+                lighting.pick_lights(selection, &sampler, first..(first + PICK_BLOCK).min(samples), simd);
             for (k, pick) in (first * each..).zip(&picks) {
                 let mut sink = PickSink { tree, row: number, pool: pool.as_deref_mut(), sums: &mut sums };
                 lighting.sample_pick(pick, &sampler, (k, samples * each), &mut sink, simd);
@@ -87,7 +88,7 @@ impl LightPicks {
 
     /// Replaces probabilities with the reciprocals of expected sample counts, or 0 for a probability of 0.
     #[inline(always)]
-    fn invert(&mut self, count: f32, is_weighed: bool) {
+    fn invert_probabilities(&mut self, count: f32, is_weighed: bool) {
         for i in 0..PACKET_SIZE {
             let is_picked = self.shares[i] > 0.0;
             let [share, weighed] = [self.shares[i], self.weighed[i]].map(|share| 1.0 / (share * count));
@@ -118,7 +119,7 @@ const LOW_DIGITS: f64 = 1.0 / (1 << 24) as f64;
 impl<const MIS: bool> SampleAllLights<'_, MIS> {
     /// Picks lights at each vertex for the given samples.
     #[inline(always)]
-    fn picks(
+    fn pick_lights(
         &self,
         LightSampler { tree, picks: way, .. }: LightSampler<'_>,
         sampler: &SamplerPacket<PACKET_SIZE>,
@@ -155,7 +156,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
             self.pick_by_cuts(tree, way, &numbers, &mut picks);
         }
         for row in &mut picks {
-            row.invert(count as f32, MIS);
+            row.invert_probabilities(count as f32, MIS);
         }
         picks
     }
@@ -174,7 +175,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         let plain = ReceiverPacket::plain(&row.from, &row.normal);
         let mut glossy = plain.clone();
         for i in lanes(if row.bsdf.has_narrow_lobes() { self.used } else { 0 }) {
-            if let Some(lobe) = self.lobe(i) {
+            if let Some(lobe) = self.receiver_lobe(i) {
                 glossy.set_lobe(i, &lobe);
             }
         }
@@ -214,7 +215,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         let (mut cut, mut without) = (way.cut(tree), MIS.then(|| way.cut(tree)));
         for i in lanes(self.used) {
             let plain = Receiver::plain(lane(&row.from, i), lane(&row.normal, i));
-            let lobe = self.lobe(i);
+            let lobe = self.receiver_lobe(i);
             cut.move_to(&Receiver { lobe, ..plain });
             let without = without.as_mut().filter(|_| lobe.is_some()).map(|without| {
                 without.move_to(&plain);
@@ -235,7 +236,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
 
     /// Narrow lobe of a vertex, relative to the wide lobes.
     #[inline(always)]
-    fn lobe(&self, i: usize) -> Option<ReceiverLobe> {
+    fn receiver_lobe(&self, i: usize) -> Option<ReceiverLobe> {
         let NarrowLobe { axis, exponent, peak, wide } = self.row.bsdf.narrow_lobe(i)?;
         let is_both = wide > 0.0;
         Some(ReceiverLobe {
@@ -277,7 +278,13 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
             // Each group of picks has its own pdf, and each group competes with all requested BSDF samples.
             let competing =
                 self.competing.rays_per_sample(render.shadow_samples) * render.shadow_samples as f32;
-            values = self.competing.weighted(row, (&samples, &response), values, (&inverse, competing), simd);
+            values = self.competing.apply_mis_weights(
+                row,
+                (&samples, &response),
+                values,
+                (&inverse, competing),
+                simd,
+            );
         }
         if active == 0 {
             return;
@@ -314,7 +321,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
     /// Aims rays at the centers of all lights that have a center.
     fn aim_at_centers(&self, samples: &mut LightSamplePacket, lights: &[u32; PACKET_SIZE], active: u32) {
         for i in lanes(active) {
-            let Some((middle, source)) = self.tile.world.lights.get(lights[i]).middle() else { continue };
+            let Some((middle, source)) = self.tile.world.lights.get(lights[i]).center() else { continue };
             let direction = match middle {
                 LightCenter::At(middle) => {
                     set_lane(&mut samples.targets, i, middle);

@@ -3,8 +3,8 @@
 use super::all_lights::{ReflectedLight, add_traversal_cost};
 use super::unshadowed::UnshadowedLobeRay;
 use crate::geometry::packet::{RayPacket, lanes};
-use crate::integrators::transport::batch::{Response, VertexBatch};
-use crate::integrators::transport::interiors::{InteriorLists, absorption};
+use crate::integrators::transport::batch::{BsdfResponse, VertexBatch};
+use crate::integrators::transport::interiors::{InteriorLists, medium_transmittance};
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::view::LightAov;
 use crate::materials::bsdf::LobeSet;
@@ -37,7 +37,7 @@ impl SimdKernel for LobeRays<'_> {
         let sampler = row.sampler(tile);
         let transmittance = |i: usize, distance: f32| {
             interior_lists.map_or(Vec3::ONE, |interior_lists| {
-                absorption(tile.world, &interior_lists.get(row.interiors[i]), distance)
+                medium_transmittance(tile.world, &interior_lists.get(row.interiors[i]), distance)
             })
         };
         for repetition in 0..count {
@@ -48,9 +48,9 @@ impl SimdKernel for LobeRays<'_> {
                 [choices, _] = sampler.pairs(&row.path, Dimension::Lobe, repetition, count);
             }
             let wi = row.bsdf.sample(LobeSet::Narrow, &row.normal, &choices, &u, simd);
-            let Response { bsdf, cosines } = row.response(&wi, simd);
+            let BsdfResponse { bsdf, cosines } = row.response(&wi, simd);
             let pdfs = row.bsdf.pdf(LobeSet::Narrow, &row.normal, &wi, &bsdf, simd);
-            let [_, narrow] = row.bsdf.parts(&wi, &bsdf, simd);
+            let [_, narrow] = row.bsdf.wide_and_narrow(&wi, &bsdf, simd);
             // Select the rays above the horizon.
             let mut sent = sharp & !row.below_horizon(&wi, simd);
             let mut ends = [-1.0; PACKET_SIZE];
@@ -59,7 +59,7 @@ impl SimdKernel for LobeRays<'_> {
                 sent &= if (cosines[i] > 0.0) & (pdfs[i] > 0.0) { !0 } else { !bit };
                 ends[i] = if sent & bit != 0 { f32::INFINITY } else { -1.0 };
             }
-            let rays = RayPacket::of(row.from, wi).leaving(row.starts(&wi));
+            let rays = RayPacket::of(row.from, wi).with_start_triangle(row.starts(&wi));
             arrived.rays.scattered += u64::from(sent.count_ones());
             // Without soft shadows, add the light from every emitter along the rays, even if it is occluded.
             if tile.settings.render.shadows != Shadows::Soft {

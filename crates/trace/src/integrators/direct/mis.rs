@@ -2,7 +2,7 @@
 //! *Robust Monte Carlo Methods for Light Transport Simulation*, 1997, section 9.2).
 
 use crate::geometry::{Ray, ShapeHit};
-use crate::integrators::transport::batch::{Response, VertexBatch};
+use crate::integrators::transport::batch::{BsdfResponse, VertexBatch};
 use crate::integrators::transport::ray::PathRay;
 use crate::integrators::transport::tile::TileContext;
 use crate::lights::{LightHit, LightObject, LightSamplePacket, Side};
@@ -53,10 +53,10 @@ impl CompetingTechnique {
     /// power-heuristic weights. `of_light` contains the inverse pdfs of the samples. `competing` is the
     /// number of BSDF samples per light sample.
     #[inline(always)]
-    pub fn weighted(
+    pub fn apply_mis_weights(
         self,
         row: &VertexBatch,
-        (samples, response): (&LightSamplePacket, &Response),
+        (samples, response): (&LightSamplePacket, &BsdfResponse),
         mut values: Vec3x16,
         (of_light, competing): (&F32x16, f32),
         simd: impl Simd,
@@ -71,7 +71,7 @@ impl CompetingTechnique {
         let pdfs = row.bsdf.pdf(lobes, &row.normal, &samples.directions, &response.bsdf, simd);
         let mut weights = [1.0; PACKET_SIZE];
         for i in 0..PACKET_SIZE {
-            let weight = weight(pdfs[i] * of_light[i] * competing);
+            let weight = power_heuristic(pdfs[i] * of_light[i] * competing);
             weights[i] = if start & 1 << i != 0 { weight } else { 1.0 };
         }
         // Apply the weights to the light reflected by these lobes.
@@ -83,7 +83,7 @@ impl CompetingTechnique {
                 }
             }
             LobeSet::Narrow => {
-                let [wide, narrow] = row.bsdf.parts(&samples.directions, &response.bsdf, simd);
+                let [wide, narrow] = row.bsdf.wide_and_narrow(&samples.directions, &response.bsdf, simd);
                 for i in 0..PACKET_SIZE {
                     let left = weight_narrow_part(lane(&wide, i), lane(&narrow, i), weights[i]);
                     let value = lane(&values, i) * left;
@@ -95,8 +95,8 @@ impl CompetingTechnique {
     }
 }
 
-/// Factor applied to reflected light if only the narrow lobe's part is weighted, because rays in a narrow
-/// lobe do not account for wide lobes. With it, the AOVs still sum to the beauty image.
+/// Factor for reflected light if the MIS weight applies only to the narrow lobe, because rays in a narrow
+/// lobe do not account for wide lobes. With this factor, the AOVs still sum to the beauty image.
 #[inline(always)]
 fn weight_narrow_part(wide: Vec3, narrow: Vec3, weight: f32) -> Vec3 {
     let part = |wide: f32, narrow: f32| {
@@ -108,7 +108,7 @@ fn weight_narrow_part(wide: Vec3, narrow: Vec3, weight: f32) -> Vec3 {
 
 /// Power-heuristic weight of a sample. `ratio` is the other technique's pdf divided by the sample's own.
 #[inline(always)]
-pub fn weight(ratio: f32) -> f32 {
+pub fn power_heuristic(ratio: f32) -> f32 {
     1.0 / (1.0 + ratio * ratio)
 }
 
@@ -121,14 +121,14 @@ impl TileContext<'_> {
         }
         let normal = self.world.geometry.surface(&path.ray, hit).normal;
         let samples = self.settings.render.shadow_samples as f32;
-        weight(self.light_pdf(&path.ray, path.state.normal, (hit, normal)) * samples / pdf)
+        power_heuristic(self.light_pdf(&path.ray, path.state.normal, (hit, normal)) * samples / pdf)
     }
 
     /// MIS-weighted radiance of infinite lights along a path. Light samples contribute the rest.
     pub fn infinite_light(&self, path: &PathRay) -> Vec3 {
         let environment = self.world.lights.environment();
         self.infinite_light_with_sky(
-            environment.map(|environment| environment.arriving(path.ray.direction)),
+            environment.map(|environment| environment.radiance_and_pdf(path.ray.direction)),
             path,
         )
     }
@@ -142,7 +142,7 @@ impl TileContext<'_> {
         }
         // If light samples skip the environment, its light-sampling pdf is 0.
         let sky = sky.map(|(radiance, of_sky)| (radiance, if self.paths_find_sky { 0.0 } else { of_sky }));
-        let share = |of_light: f32| weight(of_light * samples / pdf);
+        let share = |of_light: f32| power_heuristic(of_light * samples / pdf);
         self.weighted_infinite_light((None, sky), &path.ray, path.state.normal, share)
     }
 
@@ -153,10 +153,11 @@ impl TileContext<'_> {
 
     /// Like [`TileContext::infinite_radiance`], restricted to the light `number` unless it is `None`.
     pub fn infinite_radiance_of(&self, number: Option<u32>, ray: &Ray, normal: Vec3, pdf: f32) -> Vec3 {
-        let sky = self.world.lights.environment().map(|environment| environment.arriving(ray.direction));
+        let sky =
+            self.world.lights.environment().map(|environment| environment.radiance_and_pdf(ray.direction));
         // If lobe rays account for the environment, light samples skip it, and its light-sampling pdf is 0.
         let sky = sky.map(|(radiance, of_sky)| (radiance, if self.lobes_find_sky { 0.0 } else { of_sky }));
-        self.weighted_infinite_light((number, sky), ray, normal, |of_light| weight(of_light / pdf))
+        self.weighted_infinite_light((number, sky), ray, normal, |of_light| power_heuristic(of_light / pdf))
     }
 
     /// Weighted radiance of one infinite light, or all of them, along a ray that leaves the scene from a
@@ -218,7 +219,7 @@ impl TileContext<'_> {
         if let Some(opacity) = &material.opacity {
             radiance *= opacity.at(&at, lookups);
         }
-        radiance * weight(self.light_pdf(ray, from_normal, (hit, normal)) / pdf)
+        radiance * power_heuristic(self.light_pdf(ray, from_normal, (hit, normal)) / pdf)
     }
 
     /// MIS-weighted radiance along a lobe ray, including null interactions, starting at its first hit.
@@ -249,7 +250,7 @@ impl TileContext<'_> {
             if !self.world.materials[self.world.material_index(&hit)].has_null_interaction() {
                 return sum;
             }
-            let (part, beyond) = self.world.beyond(&along, &hit, lookups);
+            let (part, beyond) = self.world.continue_past(&along, &hit, lookups);
             (left, along, passed) = (left * part, beyond, distance);
             if left == Vec3::ZERO {
                 return sum;
@@ -264,7 +265,7 @@ impl TileContext<'_> {
     pub fn touching_emitter_weight(&self, path: &PathRay, hit: &Hit) -> f32 {
         let Ray { origin, direction, .. } = path.ray;
         let shadow = Ray::segment(origin, origin + direction * hit.shape.t);
-        if path.state.pdf > 0.0 && !self.world.is_dark(&shadow, LightObject::Object(hit.object)) {
+        if path.state.pdf > 0.0 && !self.world.is_fully_occluded(&shadow, LightObject::Object(hit.object)) {
             self.emitter_weight(path, hit)
         } else {
             1.0

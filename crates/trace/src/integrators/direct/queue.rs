@@ -1,4 +1,4 @@
-//! Queue of vertices that await direct lighting, in packets, and the light they reflect.
+//! Queue of vertex packets that await direct lighting, and the light that the vertices reflect.
 
 use arrayvec::ArrayVec;
 
@@ -27,14 +27,15 @@ use crate::math::lanes::{PACKET_SIZE, Simd, Vec3x16, lane};
 use crate::scene::description::Shadows;
 use crate::world::{Geometry, SimdKernel};
 
-/// Vertices that await direct lighting. The result for a vertex does not depend on which vertices share its packet.
+/// Vertices that await direct lighting. The result for a vertex does not depend on which vertices share its
+/// packet.
 #[derive(Default)]
 pub struct DirectLightQueue {
     rows: Vec<VertexBatch>,
     /// Number of packets in use. The remaining packets are kept for reuse.
     count: usize,
-    /// Index of the packet to which single vertices are added, per combination of BSDF kind, dark or not, and
-    /// one or two sides. The packet may be full or unused.
+    /// Index of the packet to which single vertices are added, for each combination of BSDF kind, dark or
+    /// lit, and one-sided or two-sided. The packet may be full or unused.
     open: [[usize; RoughKind::ALL.len()]; 4],
     /// Direct light reflected at the vertices of each path in this bounce.
     arrived: Vec<Vec3>,
@@ -123,7 +124,7 @@ impl DirectLightQueue {
     pub fn keep_spare(&mut self) {
         let (kept, spare) = self.rows.split_at_mut(self.count);
         let Some(row) = spare.first_mut().filter(|row| row.used != 0) else { return };
-        row.keep(row.used);
+        row.retain_lanes(row.used);
         if row.used.count_ones() >= Self::MIN_OWN_ROW {
             self.count += 1;
             return;
@@ -131,14 +132,14 @@ impl DirectLightQueue {
         // Merge a small packet with other packets of the same kind.
         let mut left = row.used;
         let open = &mut self.open[0][row.bsdf.kind() as usize];
-        if let Some(open) = kept.get_mut(*open).filter(|open| open.is_for(row.bsdf.kind(), (false, false))) {
+        if let Some(open) = kept.get_mut(*open).filter(|open| open.accepts(row.bsdf.kind(), (false, false))) {
             for lane in lanes(row.used).take((ALL & !open.used).count_ones() as usize) {
                 open.copy(open.used.trailing_ones() as usize, row, lane);
                 left &= !(1 << lane);
             }
         }
         if left != 0 {
-            row.keep(left);
+            row.retain_lanes(left);
             *open = self.count;
             self.count += 1;
         }
@@ -154,26 +155,26 @@ impl DirectLightQueue {
         sides: ShadingSides<'_>,
     ) {
         self.store_cone(lit.place, lit.vertex.cone);
-        let interiors = self.interior_lists.number(lit.interiors);
+        let interiors = self.interior_lists.insert(lit.interiors);
         let (row, lane) = match sides {
-            ShadingSides::OneSide { is_dark } => self.open_row(lit.bsdf.kind(), (is_dark, false)),
+            ShadingSides::OneSide { is_dark } => self.open_packet(lit.bsdf.kind(), (is_dark, false)),
             ShadingSides::TwoSides { is_dark, beyond, interiors } => {
-                let interiors = self.interior_lists.number(interiors);
-                let (row, lane) = self.open_row(lit.bsdf.kind(), (is_dark, true));
-                row.put_beyond(lane, beyond, interiors);
+                let interiors = self.interior_lists.insert(interiors);
+                let (row, lane) = self.open_packet(lit.bsdf.kind(), (is_dark, true));
+                row.set_far_side(lane, beyond, interiors);
                 (row, lane)
             }
         };
         row.put(lane, tile, lit, aov, interiors);
     }
 
-    /// Returns a packet with a free lane for this kind of BSDF, and the lane. `which` contains whether the
+    /// Returns a packet with a free lane for this kind of BSDF, and the lane. `which` specifies whether the
     /// vertex is dark and whether it is two-sided.
-    fn open_row(&mut self, kind: RoughKind, which: (bool, bool)) -> (&mut VertexBatch, usize) {
+    fn open_packet(&mut self, kind: RoughKind, which: (bool, bool)) -> (&mut VertexBatch, usize) {
         let (is_dark, has_two_sides) = which;
         let table = usize::from(is_dark) + 2 * usize::from(has_two_sides);
         let mut number = self.open[table][kind as usize];
-        let is_open = |row: &VertexBatch| row.used != ALL && row.is_for(kind, which);
+        let is_open = |row: &VertexBatch| row.used != ALL && row.accepts(kind, which);
         if number >= self.count || !is_open(&self.rows[number]) {
             let row = self.spare_batch();
             row.reset();
@@ -198,7 +199,7 @@ impl DirectLightQueue {
     /// Computes direct lighting at all queued vertices, removes the vertices, and returns the number of rays
     /// traced. `gather` returns light from another technique at a packet. Rays of continuing paths are added
     /// to `next`, either with the given continuation or in microfacet lobes after `depth` bounces.
-    pub fn light(
+    pub fn compute_direct_light(
         &mut self,
         tile: &TileContext<'_>,
         aov: LightAov,
@@ -423,7 +424,7 @@ impl SimdKernel for LiftOrigins<'_> {
         for i in 0..PACKET_SIZE {
             ends[i] = if row.may_lift & 1 << i != 0 { row.lift_end[i] } else { -1.0 };
         }
-        let rays = RayPacket::of(row.from, direction).leaving(row.start);
+        let rays = RayPacket::of(row.from, direction).with_start_triangle(row.start);
         // Find the occluded rays.
         let blocked = {
             let (traced, nothing) = (traced(&ends, simd), LightObjectPacket::of(LightObject::Nothing));

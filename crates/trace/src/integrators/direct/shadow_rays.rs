@@ -1,7 +1,7 @@
 //! Shadow rays of many packets of vertices, regrouped by light. Rays to nearby lights visit the same bounding
 //! boxes, whereas the rays of one packet diverge.
 
-use super::all_lights::{LightSums, add_where, transmitted};
+use super::all_lights::{LightSums, add_where, null_transmittance};
 use crate::geometry::packet::{F32x16, RayPacket, lanes};
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::view::LightAov;
@@ -45,7 +45,8 @@ impl ShadowRayQueue {
         self.rows.len() >= Self::FULL
     }
 
-    /// Queues the rays of a vertex packet selected by `traced`, with the tree positions of their lights.
+    /// Queues the rays of a vertex packet that are selected by `traced`, with the tree positions of their
+    /// lights.
     #[inline(always)]
     pub fn push(
         &mut self,
@@ -165,7 +166,7 @@ fn attenuate(
 ) -> u32 {
     let weakened = world.transmittance_packet(packet, ends, traced, sources);
     for from in lanes(traced & !weakened.occluded) {
-        let left = transmitted(lane(&weakened.left, from), aov);
+        let left = null_transmittance(lane(&weakened.left, from), aov);
         let (row, to) = (&mut rows[rays[from] as usize / PACKET_SIZE], rays[from] as usize % PACKET_SIZE);
         let value = lane(&row.values, to) * left;
         set_lane(&mut row.values, to, value);

@@ -45,29 +45,29 @@ impl UnshadowedLobeRay<'_> {
                 let front = world.geometry.surface(ray, &met).normal;
                 let side = if front.dot(ray.direction) > 0.0 { Side::Back } else { Side::Front };
                 let light = world.lights.light_at(hit.object, hit.shape.primitive, side);
-                let arriving = light.map_or(Vec3::ZERO, |(_, light)| self.arriving(light, rays));
+                let arriving = light.map_or(Vec3::ZERO, |(_, light)| self.unoccluded_fraction(light, rays));
                 sum += radiance * transmittance(distance) * arriving;
             }
-            (along, passed) = (world.beyond(&along, &hit, &mut 0).1, distance);
+            (along, passed) = (world.continue_past(&along, &hit, &mut 0).1, distance);
         }
         // Add the infinite lights.
-        for (number, light) in world.lights.iter().filter(|(_, light)| light.is_beyond()) {
+        for (number, light) in world.lights.iter().filter(|(_, light)| light.is_infinite()) {
             let radiance = tile.infinite_radiance_of(Some(number), ray, normal, *pdf);
             if radiance != Vec3::ZERO {
-                sum += radiance * transmittance(f32::MAX) * self.arriving(light, rays);
+                sum += radiance * transmittance(f32::MAX) * self.unoccluded_fraction(light, rays);
             }
         }
         sum
     }
 
     /// Unoccluded fraction of a light.
-    fn arriving(&self, light: &Light, rays: &mut LightRayCounts) -> Vec3 {
+    fn unoccluded_fraction(&self, light: &Light, rays: &mut LightRayCounts) -> Vec3 {
         match self.tile.settings.render.shadows {
             Shadows::Off => return Vec3::ONE,
             Shadows::Hard | Shadows::Soft => {}
         }
         // An environment has no center, so test the ray itself.
-        let (segment, source) = match light.middle() {
+        let (segment, source) = match light.center() {
             Some((LightCenter::At(middle), source)) => (Ray::segment(self.ray.origin, middle), source),
             Some((LightCenter::Towards(direction), source)) => (Ray::new(self.ray.origin, direction), source),
             None => (self.ray, LightObject::Nothing),
@@ -76,7 +76,7 @@ impl UnshadowedLobeRay<'_> {
             return Vec3::ZERO;
         }
         rays.shadow += 1;
-        let segment = segment.leaving(self.row.start_of(self.lane, segment.direction));
+        let segment = segment.with_start_triangle(self.row.start_of(self.lane, segment.direction));
         self.tile.world.transmittance(&segment, source, &mut rays.lookups)
     }
 }

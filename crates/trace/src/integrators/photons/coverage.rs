@@ -4,9 +4,9 @@
 
 use arrayvec::ArrayVec;
 
-use super::kernel::weight_over;
+use super::kernel::polygon_weight;
 use super::map::{GatherPoint, MIN_COSINE, REACH};
-use crate::geometry::kernel_domain::{Extent, FlatPolygon, Ground};
+use crate::geometry::kernel_domain::{Extent, FlatPolygon, SurfaceBelow};
 use crate::geometry::{Aabb, KernelDomain, Shape, ShapeHit};
 use crate::materials::{Material, Rough};
 use crate::math::frame::Frame;
@@ -45,7 +45,7 @@ const WIDE: f64 = 2.0;
 /// Minimum coverage for the closed form. Below it, rounding errors are significant.
 const MIN_COVERAGE: f64 = 1e-3;
 
-/// Maximum numbers of mesh triangles near a kernel, pieces of its plane, and walls.
+/// Maximum numbers of mesh triangles near a kernel, of pieces of the kernel's plane, and of walls.
 const TRIANGLES: usize = 32;
 const PIECES: usize = 8;
 const WALLS: usize = 4;
@@ -56,7 +56,7 @@ pub fn kernel_coverage(world: &World, look: &GatherPoint, radius: f32) -> Kernel
     let mut is_crowded = false;
     let bounds = look.kernel_box(radius);
     let is_exact = world.geometry.visit_box(&bounds, |id, object| match object {
-        Object::Shape(shape) => around.add_shape(shape, || receives(material(world, id, 0))),
+        Object::Shape(shape) => around.add_shape(shape, || can_store_photons(material(world, id, 0))),
         Object::Mesh(mesh) => around.add_mesh((world, id), mesh, &bounds, &mut is_crowded),
     });
     match around.coverage().filter(|_| is_exact) {
@@ -73,7 +73,7 @@ pub fn material(world: &World, object: u32, primitive: u32) -> &Material {
 }
 
 /// Whether photons are stored on a material.
-pub fn receives(material: &Material) -> bool {
+pub fn can_store_photons(material: &Material) -> bool {
     let is_lit = |rough: &Rough| rough.constant().is_none_or(|bsdf| !bsdf.is_black());
     let is_rough_glass = || material.bsdf.glass().is_some_and(|glass| !glass.is_smooth());
     material.bsdf.rough().is_some_and(is_lit) || is_rough_glass()
@@ -88,7 +88,7 @@ struct Wall {
 
 impl Wall {
     /// Whether all corners are on the center's side.
-    fn is_beyond(&self, corners: &[DVec2]) -> bool {
+    fn has_all_on_inner_side(&self, corners: &[DVec2]) -> bool {
         corners
             .iter()
             .all(|corner| self.normal.dot(*corner) <= self.distance + BORDER + 1e-6 * corner.length())
@@ -144,10 +144,10 @@ impl KernelNeighborhood {
         let mut part = f64::from(self.whole);
         for piece in &self.pieces {
             let corners = self.project_piece(piece);
-            if !self.walls.iter().all(|wall| wall.is_beyond(&corners)) {
+            if !self.walls.iter().all(|wall| wall.has_all_on_inner_side(&corners)) {
                 return None;
             }
-            part += weight_over(&corners);
+            part += polygon_weight(&corners);
         }
         (MIN_COVERAGE..=1.0 + FLAT).contains(&part).then_some(part.min(1.0))
     }
@@ -165,9 +165,9 @@ impl KernelNeighborhood {
         }
     }
 
-    /// Adds a surface if it extends over the whole kernel and has the kernel's normal, and returns whether it
-    /// does.
-    fn add_ground(&mut self, ground: &Ground, receives: impl Fn() -> bool) -> bool {
+    /// Adds a surface if it extends over the whole kernel and has the kernel's normal. Otherwise, returns
+    /// false.
+    fn add_ground(&mut self, ground: &SurfaceBelow, receives: impl Fn() -> bool) -> bool {
         let is_wide = match ground.extent {
             Extent::Flat(reach) => reach > FAR * self.radius,
             Extent::Round(radius) => radius > WIDE * self.radius,
@@ -201,7 +201,7 @@ impl KernelNeighborhood {
         near.sort_unstable();
         near.iter().all(|&triangle| {
             let piece = mesh.world_corners(triangle).into_iter().collect();
-            self.add_piece(&piece, || receives(material(world, id, triangle)))
+            self.add_piece(&piece, || can_store_photons(material(world, id, triangle)))
         })
     }
 
@@ -226,7 +226,7 @@ impl KernelNeighborhood {
         if high < -reach
             || low > reach
             || !rises && (is_steep || !receives())
-            || !meets_disc(&self.project_piece(piece))
+            || !overlaps_unit_disk(&self.project_piece(piece))
         {
             return true;
         }
@@ -243,7 +243,7 @@ impl KernelNeighborhood {
 }
 
 /// Whether a polygon overlaps the unit disk.
-fn meets_disc(corners: &[DVec2]) -> bool {
+fn overlaps_unit_disk(corners: &[DVec2]) -> bool {
     let edges = || corners.iter().zip(corners.iter().cycle().skip(1));
     let is_near = |a: DVec2, b: DVec2| {
         let way = b - a;

@@ -15,8 +15,10 @@ use crate::geometry::{Ray, SurfacePoint};
 use crate::integrators::transport::batch::{ALL, UNPERTURBED, VertexBatch};
 use crate::integrators::transport::cone::RayCone;
 use crate::integrators::transport::crossing::CrossingMemory;
-use crate::integrators::transport::interface::{FresnelSplit, fresnel_split, reflected, through_sheet};
-use crate::integrators::transport::interiors::{Interior, InteriorList, InteriorLists, ior};
+use crate::integrators::transport::interface::{
+    FresnelSplit, fresnel_split, reflected_path, sheet_transmission,
+};
+use crate::integrators::transport::interiors::{Interior, InteriorList, InteriorLists, medium_ior};
 use crate::integrators::transport::packet::PacketSource;
 use crate::integrators::transport::ray::{PathRay, PathState};
 use crate::integrators::transport::scatter::{Continuation, SampleBsdf};
@@ -27,7 +29,7 @@ use crate::integrators::transport::walk::{
 };
 use crate::integrators::view::LightAov;
 use crate::integrators::{PACKET_SIZE, RayCounters};
-use crate::lights::{EmittedPhoton, PhotonNumbers, PhotonOrigin, PhotonSource};
+use crate::lights::{EmittedPhoton, PhotonOrigin, PhotonRandomNumbers, PhotonSource};
 use crate::materials::bsdf::LobeSet;
 use crate::materials::{Bsdf, Coated, Rough, RoughBsdf, ThinDielectric};
 use crate::math::Vec3;
@@ -94,7 +96,7 @@ impl PhotonTracing<'_> {
                 wavefront.intersect(packet, &mut row, &mut surfaces);
             }
             // Scatter the individually queued vertices, and apply Russian roulette.
-            wavefront.scatter_open();
+            wavefront.scatter_queued_vertices();
             wavefront.interior_lists.clear();
             wavefront.russian_roulette();
             std::mem::swap(&mut rays, &mut wavefront.next);
@@ -130,7 +132,7 @@ impl PhotonTracing<'_> {
         let world = self.tile.world;
         let emitter = || Some(world.lights.get(emitted.light).as_area()?.object);
         let around = |glass: &&Interior| world.encloses(glass.body, point);
-        let in_parts = self.bodies.iter().filter(|_| !is_beyond(emitted)).filter_map(|body| {
+        let in_parts = self.bodies.iter().filter(|_| !is_from_infinite_light(emitted)).filter_map(|body| {
             let material = world.material_around(body, point, emitter())?;
             Some(Interior { body: body.body, material })
         });
@@ -192,7 +194,7 @@ impl<'a> PathStepper<'a> for PhotonWavefront<'a> {
         }
     }
 
-    fn lookups(&mut self) -> &mut u64 {
+    fn texture_lookups(&mut self) -> &mut u64 {
         &mut self.counters.texture_lookups
     }
 
@@ -212,7 +214,7 @@ impl<'a> PathStepper<'a> for PhotonWavefront<'a> {
             return NullInteraction::Passed(tint);
         }
         let shading = vertex.shading(&mut self.counters);
-        let ray = reflected(path, vertex, &shading, Vec3::ONE);
+        let ray = reflected_path(path, vertex, &shading, Vec3::ONE);
         self.push(path, vertex, (shading.normal, 1.0), ray);
         NullInteraction::Ended
     }
@@ -229,7 +231,7 @@ impl PhotonWavefront<'_> {
             for (i, numbers) in numbers.iter().enumerate().take((count - begin) as usize) {
                 // Emit a photon, and start it in front of all infinite planes it may pass through.
                 let Some(emitted) = tracing.emission.emit(numbers) else { continue };
-                let past_planes = is_beyond(&emitted) && has_planes;
+                let past_planes = is_from_infinite_light(&emitted) && has_planes;
                 let ray = emitted.ray();
                 let Some(ray) = (if past_planes { tracing.skip_planes(ray) } else { Some(ray) }) else {
                     continue;
@@ -244,7 +246,7 @@ impl PhotonWavefront<'_> {
                     state: PathState::CAMERA,
                     cone: RayCone::default(),
                 };
-                self.references[offset] = flux(tile.world, &path);
+                self.references[offset] = max_flux_component(tile.world, &path);
                 rays.push(path);
             }
         }
@@ -266,7 +268,7 @@ impl PhotonWavefront<'_> {
                 let (point, normal) = row.surface_of(i);
                 self.store(&rays[i], point, normal);
             }
-            row.keep(row.only_specular_before);
+            row.retain_lanes(row.only_specular_before);
             for i in lanes(row.used & row.has_facet) {
                 let counts = row.photon_weight(i, -rays[i].ray.direction);
                 set_lane(&mut row.throughput, i, rays[i].throughput * counts);
@@ -304,7 +306,7 @@ impl PhotonWavefront<'_> {
             Bsdf::Mirror(mirror) if self.may_scatter() => {
                 let shading = vertex.shading(&mut self.counters);
                 let reflectance = vertex.mirror_reflectance(mirror, &shading, true, &mut self.counters);
-                let ray = reflected(path, vertex, &shading, reflectance);
+                let ray = reflected_path(path, vertex, &shading, reflectance);
                 self.push(path, vertex, (shading.normal, 1.0), ray);
             }
             Bsdf::Mirror(_) | Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) => {}
@@ -331,13 +333,13 @@ impl PhotonWavefront<'_> {
         }
         if is_reflected && self.may_scatter() {
             let specular = coated.specular(&vertex.texture_point, &mut self.counters.texture_lookups);
-            let ray = reflected(path, vertex, &shading, specular * if chooses { 1.0 } else { fresnel });
+            let ray = reflected_path(path, vertex, &shading, specular * if chooses { 1.0 } else { fresnel });
             self.push(path, vertex, (shading.normal, 1.0), ray);
         }
     }
 
-    /// Stores a photon at a non-specular surface with the medium `far` behind it. A caustic photon is
-    /// scattered if `scattered` is a number, by which its flux is multiplied.
+    /// Stores a photon at a non-specular surface with the medium `far` behind it. If `scattered` is a number,
+    /// a caustic photon is also scattered, with its flux multiplied by this number.
     fn shade_rough(
         &mut self,
         path: &PathRay,
@@ -372,9 +374,9 @@ impl PhotonWavefront<'_> {
         // Queue the photon for scattering.
         let shading = vertex.shading(&mut self.counters);
         let behind = bsdf.behind().map(|bsdf| (bsdf, shading.behind()));
-        let interiors = self.interior_lists.number(&path.interiors);
+        let interiors = self.interior_lists.insert(&path.interiors);
         if self.open.used == ALL || self.open.bsdf.kind() != bsdf.kind() {
-            self.scatter_open();
+            self.scatter_queued_vertices();
             self.open.bsdf.prepare(bsdf.kind());
         }
         let i = self.open.used.trailing_ones() as usize;
@@ -385,15 +387,15 @@ impl PhotonWavefront<'_> {
         // Queue the transmitted photon. The medium behind the surface changes its basic flux.
         let Some((bsdf, shading)) = behind else { return };
         let part = if vertex.material.bsdf.glass().is_some() {
-            let eta = ior(tile.world, far) / ior(tile.world, &path.interiors);
+            let eta = medium_ior(tile.world, far) / medium_ior(tile.world, &path.interiors);
             1.0 / (eta * eta)
         } else {
             // For a camera path, this is transmission from the other side.
-            through_sheet(tile.world, far, &path.interiors)
+            sheet_transmission(tile.world, far, &path.interiors)
         };
-        let interiors = self.interior_lists.number(far);
+        let interiors = self.interior_lists.insert(far);
         if self.open_behind.used == ALL || self.open_behind.bsdf.kind() != bsdf.kind() {
-            self.scatter_open();
+            self.scatter_queued_vertices();
             self.open_behind.bsdf.prepare(bsdf.kind());
         }
         let i = self.open_behind.used.trailing_ones() as usize;
@@ -412,12 +414,12 @@ impl PhotonWavefront<'_> {
         let FresnelSplit { reflectance, refracted } = fresnel_split(tile.world, path, vertex, &shading, far);
         match refracted {
             Some(mut ray) if !tile.chooses_reflection(path, reflectance) => {
-                let eta = ior(tile.world, far) / ior(tile.world, &path.interiors);
+                let eta = medium_ior(tile.world, far) / medium_ior(tile.world, &path.interiors);
                 ray.throughput *= 1.0 / (eta * eta);
                 self.push(path, vertex, (shading.normal, eta), ray);
             }
             Some(_) | None => {
-                let ray = reflected(path, vertex, &shading, Vec3::ONE);
+                let ray = reflected_path(path, vertex, &shading, Vec3::ONE);
                 self.push(path, vertex, (shading.normal, 1.0), ray);
             }
         }
@@ -442,7 +444,7 @@ impl PhotonWavefront<'_> {
     }
 
     /// Scatters photons at the individually queued vertices.
-    fn scatter_open(&mut self) {
+    fn scatter_queued_vertices(&mut self) {
         let mut open = std::mem::replace(&mut self.open, VertexBatch::EMPTY);
         self.scatter(&mut open);
         open.reset();
@@ -488,7 +490,7 @@ impl PhotonWavefront<'_> {
                 .run(RouletteNumbers { tile, rays: &self.next[begin..end] });
             for (place, risk) in (begin..end).zip(risks) {
                 let mut ray = self.next[place];
-                let flux = flux(tile.world, &ray);
+                let flux = max_flux_component(tile.world, &ray);
                 let chance = flux / self.references[ray.slot as usize];
                 if !(flux > 0.0 && risk < chance) {
                     continue;
@@ -505,12 +507,12 @@ impl PhotonWavefront<'_> {
 }
 
 /// Largest component of a photon's flux in W. Unlike basic flux, it does not depend on the medium.
-fn flux(world: &World, path: &PathRay) -> f32 {
-    let index = ior(world, &path.interiors);
+fn max_flux_component(world: &World, path: &PathRay) -> f32 {
+    let index = medium_ior(world, &path.interiors);
     path.throughput.max_element() * index * index
 }
 
-fn is_beyond(emitted: &EmittedPhoton) -> bool {
+fn is_from_infinite_light(emitted: &EmittedPhoton) -> bool {
     match emitted.start {
         PhotonOrigin::Beyond(_) => true,
         PhotonOrigin::Point(_) | PhotonOrigin::Surface { .. } => false,
@@ -524,7 +526,7 @@ struct EmissionNumbers<'a> {
 }
 
 impl SimdKernel for EmissionNumbers<'_> {
-    type Output = [PhotonNumbers; PACKET_SIZE];
+    type Output = [PhotonRandomNumbers; PACKET_SIZE];
 
     #[inline(always)]
     fn run(self, _: impl Simd) -> Self::Output {
@@ -534,7 +536,7 @@ impl SimdKernel for EmissionNumbers<'_> {
         let pairs = |decision| sampler.pairs(&[CAMERA_PATH; PACKET_SIZE], decision, 0, 1);
         let (light, aim) = (pairs(Dimension::PhotonLight), pairs(Dimension::PhotonTarget));
         let (position, direction) = (pairs(Dimension::PhotonPosition), pairs(Dimension::PhotonDirection));
-        std::array::from_fn(|i| PhotonNumbers {
+        std::array::from_fn(|i| PhotonRandomNumbers {
             light: light.map(|row| row[i]),
             aim: aim.map(|row| row[i]),
             position: position.map(|row| row[i]),

@@ -17,7 +17,7 @@ use crate::sampling::Dimension;
 use crate::world::SimdKernel;
 
 /// Probability of a lookup at a vertex that the camera does not see. A path has many of these vertices, and
-/// the photons there contribute little noise.
+/// photon lookups at them contribute little noise.
 const INDIRECT_LOOKUP_PROBABILITY: f32 = 0.25;
 
 /// Probability of looking up bounced photons at a vertex that the camera sees. Their light is weak and
@@ -144,7 +144,7 @@ fn reflected_kernel_sum(
     simd: impl Simd,
 ) -> (Vec3, Option<PhotonPosition>) {
     let (mut sum, mut total, mut left, mut chosen) = (Vec3::ZERO, 0.0, random[0], None);
-    map.visit(look, simd, |photon, density| {
+    map.visit_photons(look, simd, |photon, density| {
         let f = row.bsdf.f_at(i, photon.direction);
         let light = f * photon.flux * (density * row.photon_weight(i, photon.direction));
         sum += light;

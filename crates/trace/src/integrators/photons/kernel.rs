@@ -7,7 +7,7 @@ use crate::math::{DVec2, Vec2};
 
 /// Integral of the kernel (2/π)·(1 − ρ²) over a convex polygon with the given corners in order. It is 1 if
 /// the polygon contains the disk.
-pub fn weight_over(corners: &[DVec2]) -> f64 {
+pub fn polygon_weight(corners: &[DVec2]) -> f64 {
     let edges = || corners.iter().zip(corners.iter().cycle().skip(1)).map(|(&a, &b)| (a, b));
     let turn = edges().map(|(a, b)| a.perp_dot(b)).sum::<f64>().signum();
     let (mut is_around, mut is_beside) = (true, false);
@@ -20,7 +20,7 @@ pub fn weight_over(corners: &[DVec2]) -> f64 {
     match (is_around, is_beside) {
         (_, true) => 0.0,
         (true, false) => 1.0,
-        (false, false) => FRAC_2_PI * edges().map(|(a, b)| below_edge(a, b)).sum::<f64>().abs(),
+        (false, false) => FRAC_2_PI * edges().map(|(a, b)| edge_triangle_weight(a, b)).sum::<f64>().abs(),
     }
 }
 
@@ -31,7 +31,7 @@ pub fn weight_over(corners: &[DVec2]) -> f64 {
 /// the edge. Where the edge is outside the disk, this is a quarter of the angle. For a point on an edge at
 /// distance d from the center, at arc length s along the edge, R² = d² + s² and dφ = d/R² ds, so the integral
 /// is d·∫ 1/2 − (d² + s²)/4 ds.
-fn below_edge(a: DVec2, b: DVec2) -> f64 {
+fn edge_triangle_weight(a: DVec2, b: DVec2) -> f64 {
     let length = (b - a).length();
     if !(length > 0.0) {
         return 0.0;
@@ -60,8 +60,8 @@ fn angle(from: DVec2, to: DVec2) -> f64 {
 /// 2ρ² − ρ⁴ of the kernel's weight and ρ² of the disk's area.
 pub fn sample(on_disk: Vec2) -> Vec2 {
     let squared = on_disk.length_squared().min(1.0);
-    // ρ² = 1 − √(1 − u), where u is the squared radius on the disk, rewritten to avoid cancellation: ρ²/u = 1/(1 + √(1
-    // − u)).
+    // ρ² = 1 − √(1 − u), where u is the squared radius on the disk, rewritten to avoid cancellation: ρ²/u =
+    // 1/(1 + √(1 − u)).
     on_disk * (1.0 + (1.0 - squared).sqrt()).recip().sqrt()
 }
 
@@ -84,11 +84,11 @@ mod tests {
             let at = |i: i32| (1.0 - (d + (f64::from(i) + 0.5) * step).powi(2)).powf(1.5);
             let exact = 8.0 / (3.0 * std::f64::consts::PI) * (0..steps).map(at).sum::<f64>() * step;
             let far = [(d, -9.0), (40.0, -9.0), (40.0, 9.0), (d, 9.0)].map(|(x, y)| DVec2::new(x, y));
-            let weight = weight_over(&far);
+            let weight = polygon_weight(&far);
             assert!((weight - exact).abs() < 1e-6, "{d}: got {weight}, expected {exact}");
             let mut mirrored = far;
             mirrored.reverse();
-            assert_eq!(weight_over(&mirrored), weight, "for either orientation");
+            assert_eq!(polygon_weight(&mirrored), weight, "for either orientation");
         }
     }
 
@@ -102,14 +102,14 @@ mod tests {
             let of_cell = |i: i32, j: i32| {
                 let at = corner + DVec2::new(f64::from(i), f64::from(j)) * side;
                 let [a, b, c, d] = square(at, side);
-                weight_over(&[a, b, c]) + weight_over(&[c, d, a])
+                polygon_weight(&[a, b, c]) + polygon_weight(&[c, d, a])
             };
             let cells = || -cells..=cells;
             let sum: f64 = cells().flat_map(|i| cells().map(move |j| of_cell(i, j))).sum();
             assert!((sum - 1.0).abs() < 2e-5, "{side}: {sum}");
         }
-        assert_eq!(weight_over(&square(DVec2::splat(-1.5), 3.0)), 1.0);
-        assert_eq!(weight_over(&square(DVec2::new(1.0, -4.0), 8.0)), 0.0);
+        assert_eq!(polygon_weight(&square(DVec2::splat(-1.5), 3.0)), 1.0);
+        assert_eq!(polygon_weight(&square(DVec2::new(1.0, -4.0), 8.0)), 0.0);
     }
 
     #[test]
@@ -124,7 +124,7 @@ mod tests {
             let from = (place.as_dvec2() - part[0]) / 0.8;
             inside += u32::from(from.min_element() > 0.0 && from.max_element() < 1.0);
         }
-        let (found, exact) = (f64::from(inside) / f64::from(DRAWS), weight_over(&part));
+        let (found, exact) = (f64::from(inside) / f64::from(DRAWS), polygon_weight(&part));
         assert!(
             (found - exact).abs() < 4.0 * (exact / f64::from(DRAWS)).sqrt(),
             "got {found}, expected {exact}"

@@ -68,8 +68,8 @@ pub(super) const MIN_COSINE: f32 = 0.7;
 /// Maximum distance of photons from the tangent plane, in radii.
 pub(super) const REACH: f32 = 0.3;
 
-/// Cell size in radii: larger than the bounding box of any kernel, 2·√(1 + REACH²), so that a kernel overlaps at most
-/// two cells along each axis.
+/// Cell size in radii: larger than the bounding box of any kernel, 2·√(1 + REACH²), so that a kernel overlaps
+/// at most two cells along each axis.
 const CELL: f32 = 2.1;
 
 /// A query for photons near a surface point.
@@ -86,13 +86,13 @@ pub struct GatherPoint {
 impl GatherPoint {
     /// The bounding box of a kernel with this radius.
     pub fn kernel_box(&self, radius: f32) -> Aabb {
-        let half = self.half_box() * radius;
+        let half = self.half_extents() * radius;
         Aabb { min: self.point - half, max: self.point + half }
     }
 
     /// Half the extents of the bounding box of a kernel with radius 1.
     #[inline(always)]
-    fn half_box(&self) -> Vec3 {
+    fn half_extents(&self) -> Vec3 {
         let own = self.normal.abs();
         let along = (Vec3::ONE - own * own).max(Vec3::ZERO);
         Vec3::new(along.x.sqrt(), along.y.sqrt(), along.z.sqrt()) + own * REACH
@@ -194,9 +194,9 @@ impl PhotonMap {
         let PhotonBlock { point, normal, direction, flux } = &self.blocks[block];
         Photon {
             point: lane(point, i),
-            direction: packed::unit(direction[i]),
+            direction: packed::unpack_unit(direction[i]),
             flux: lane(flux, i),
-            normal: packed::unit(normal[i]),
+            normal: packed::unpack_unit(normal[i]),
             depth: self.depths[block][i],
         }
     }
@@ -245,18 +245,19 @@ impl PhotonMap {
                         brought[i] += weighed;
                     }
                 }
-                choices.offer(block as u32, &brought);
+                choices.add_item(block as u32, &brought);
             }
         }
-        let chosen = choices.chosen(random[1]).map(|(block, i)| self.place(block as usize, i));
-        (Vec3::from(sums.map(sum_lanes)) * self.peak(), chosen)
+        let chosen =
+            choices.choose_lane(random[1]).map(|(block, i)| self.position_and_normal(block as usize, i));
+        (Vec3::from(sums.map(sum_lanes)) * self.peak_weight(), chosen)
     }
 
     /// Position and normal of a photon.
     #[inline(always)]
-    fn place(&self, block: usize, i: usize) -> PhotonPosition {
+    fn position_and_normal(&self, block: usize, i: usize) -> PhotonPosition {
         let PhotonBlock { point, normal, .. } = &self.blocks[block];
-        PhotonPosition { point: lane(point, i), normal: packed::unit(normal[i]) }
+        PhotonPosition { point: lane(point, i), normal: packed::unpack_unit(normal[i]) }
     }
 
     /// Number of photons in the kernel around a point.
@@ -267,7 +268,7 @@ impl PhotonMap {
         for range in &ranges.of[..ranges.count] {
             for block in blocks(*range) {
                 let Some(weights) = self.weights(look, *range, block, simd) else { continue };
-                count += above_zero(&weights, simd).count_ones();
+                count += positive_lanes(&weights, simd).count_ones();
             }
         }
         count
@@ -277,13 +278,13 @@ impl PhotonMap {
     /// kernel with an integral of 1 over the tangent plane (Silverman, *Density Estimation for Statistics and
     /// Data Analysis*, 1986).
     #[inline(always)]
-    pub fn visit(&self, look: &GatherPoint, simd: impl Simd, mut visit: impl FnMut(&Photon, f32)) {
-        let peak = self.peak();
+    pub fn visit_photons(&self, look: &GatherPoint, simd: impl Simd, mut visit: impl FnMut(&Photon, f32)) {
+        let peak = self.peak_weight();
         let ranges = self.ranges(look);
         for range in &ranges.of[..ranges.count] {
             for block in blocks(*range) {
                 let Some(weights) = self.weights(look, *range, block, simd) else { continue };
-                for i in lanes(above_zero(&weights, simd)) {
+                for i in lanes(positive_lanes(&weights, simd)) {
                     visit(&self.photon(block, i), peak * weights[i]);
                 }
             }
@@ -292,7 +293,7 @@ impl PhotonMap {
 
     /// Kernel value at the center.
     #[inline(always)]
-    fn peak(&self) -> f32 {
+    fn peak_weight(&self) -> f32 {
         2.0 / (std::f32::consts::PI * (self.radius * self.radius))
     }
 
@@ -303,7 +304,7 @@ impl PhotonMap {
         if self.count == 0 {
             return ranges;
         }
-        let half = look.half_box() * self.radius;
+        let half = look.half_extents() * self.radius;
         let first = cell_of(look.point - half, self.cells);
         let last = cell_of(look.point + half, self.cells);
         let more = |axis: usize| u32::from(first[axis] != last[axis]);
@@ -351,7 +352,7 @@ impl PhotonMap {
             return None;
         }
         // Reject photons on other surfaces and photons from behind.
-        let (own, from) = (packed::lanes(&block.normal), packed::lanes(&block.direction));
+        let (own, from) = (packed::unpack_lanes(&block.normal), packed::unpack_lanes(&block.direction));
         for i in 0..PACKET_SIZE {
             let cosine = own[0][i] * normal.x + own[1][i] * normal.y + own[2][i] * normal.z;
             let squared = own[0][i] * own[0][i] + own[1][i] * own[1][i] + own[2][i] * own[2][i];
@@ -381,8 +382,8 @@ impl PhotonBlock {
     fn put(&mut self, i: usize, photon: &Photon) -> u32 {
         set_lane(&mut self.point, i, photon.point);
         set_lane(&mut self.flux, i, photon.flux);
-        self.normal[i] = packed::pack(photon.normal);
-        self.direction[i] = packed::pack(photon.direction);
+        self.normal[i] = packed::pack_direction(photon.normal);
+        self.direction[i] = packed::pack_direction(photon.direction);
         photon.depth
     }
 }
@@ -395,7 +396,7 @@ fn blocks([start, end]: [u32; 2]) -> std::ops::Range<usize> {
 
 /// Mask of lanes with values above 0.
 #[inline(always)]
-fn above_zero(weights: &F32x16, simd: impl Simd) -> u32 {
+fn positive_lanes(weights: &F32x16, simd: impl Simd) -> u32 {
     let mut above: Mask = [0; PACKET_SIZE];
     for i in 0..PACKET_SIZE {
         above[i] = if weights[i] > 0.0 { TRUE } else { 0 };
@@ -468,7 +469,7 @@ mod tests {
                         None => place(&mut next),
                     };
                     let mut found = Vec::new();
-                    map.visit(
+                    map.visit_photons(
                         &GatherPoint { point, normal, most_depth: 1 },
                         PortableSimd,
                         |photon, density| {
@@ -511,7 +512,7 @@ mod tests {
         let sum = |most_depth: u32, normal: Vec3| {
             let mut sum = 0.0;
             let look = GatherPoint { point: Vec3::new(0.1, 0.5, -0.2), normal, most_depth };
-            map.visit(&look, PortableSimd, |_, density| sum += density * step * step);
+            map.visit_photons(&look, PortableSimd, |_, density| sum += density * step * step);
             let flux = f64::from(map.irradiance(&look, [0.5; 2], PortableSimd).0.x * step * step);
             assert!((flux - f64::from(sum)).abs() < 1e-4, "got {flux}, expected {sum}");
             sum

@@ -72,8 +72,8 @@ const ALPHA: f64 = 2.0 / 3.0;
 /// Median number of photons that the first pass's kernels should contain, for caustic and bounced photons.
 const WANTED: [f32; 2] = [12.0, 8.0];
 
-/// Fraction of photons aimed at mirrors and glass: if all of these objects are bounded, and if some are
-/// unbounded.
+/// Fractions of photons aimed at mirrors and glass: the first if all of these objects are bounded, the second
+/// if some are unbounded.
 const AIMED: [f32; 2] = [0.9, 0.5];
 
 /// Photon emission for an image, shared by all passes.
@@ -134,8 +134,8 @@ impl PhotonMaps {
 }
 
 impl Photons {
-    /// Prepares photon emission for a world and traces pass 0, whose photons determine the radii. `progress` receives
-    /// the number of photons traced so far and in total.
+    /// Prepares photon emission for a world and traces pass 0, whose photons determine the radii. `progress`
+    /// receives the number of photons traced so far and in total.
     ///
     /// # Errors
     /// [`Cancelled`].
@@ -148,7 +148,7 @@ impl Photons {
     ) -> Result<(Self, PhotonPass), Cancelled> {
         // Aim photons at the mirrors and glass.
         let specular = SpecularObjects::of(world);
-        let emission = photon_source(&world.geometry, &world.lights).filter(|_| specular.exists());
+        let emission = photon_source(&world.geometry, &world.lights).filter(|_| specular.is_present());
         let aimed = AIMED[usize::from(specular.is_unbounded)];
         let emission = emission.map(|emission| emission.aimed_at(&specular.balls, aimed));
         let (glasses, bodies) = glasses_at_lights(world);
@@ -159,7 +159,8 @@ impl Photons {
         let sent = own.trace_photons((world, settings), 0, progress, token)?;
         if photons.radius == 0.0 {
             let kinds = [&sent.caustic, &sent.bounced];
-            let size = own.emission.as_ref().map_or(1.0, |emission| emission.around().radius as f32);
+            let size =
+                own.emission.as_ref().map_or(1.0, |emission| emission.finite_scene_bounds().radius as f32);
             let radii = kinds.into_par_iter().zip(WANTED);
             let radii = radii.map(|(of, wanted)| radius_for_count(of, wanted, size, token));
             let radii = radii.collect::<Result<Vec<_>, _>>()?;
@@ -356,8 +357,8 @@ fn glasses_at_lights(world: &World) -> (Vec<u32>, Vec<CompoundSolid>) {
         bounds.is_none_or(|bounds| lamps.iter().any(|lamp| lamp.meets(&bounds)))
     };
     let closed = world.closed_glasses().map(|(object, _)| object).filter(may_hold_light).collect();
-    // A solid closed by opaque surfaces may extend beyond its bounding box, so test the center and corners of each
-    // light.
+    // A solid closed by opaque surfaces may extend beyond its bounding box, so test the center and corners of
+    // each light.
     let is_around = |body: &CompoundSolid, lamp: &LightBox| {
         lamp.points().any(|point| world.material_around(body, point, lamp.object).is_some())
     };
@@ -382,7 +383,7 @@ impl GlassObjects {
 
     /// Whether an object's surface may have no effect on light. True if its index of refraction is 1, or if
     /// it may touch or overlap glass with the same index.
-    fn may_vanish(&self, id: u32, ior: f32) -> bool {
+    fn may_have_no_effect(&self, id: u32, ior: f32) -> bool {
         let own = self.0.iter().find(|(other, ..)| *other == id).and_then(|(_, bounds, _)| *bounds);
         let meets = |other: &Aabb| own.is_none_or(|own| own.grown(own.extent() * NEAR).meets(other));
         let is_met = |(other, bounds, index): &(u32, Option<Aabb>, f32)| {
@@ -411,7 +412,7 @@ impl SpecularObjects {
             // Between equal indices of refraction, light passes through rough glass unchanged, but light
             // samples cannot.
             let is_specular = |material: &Material| {
-                let is_passed = |glass: &Dielectric| glasses.may_vanish(id, glass.ior);
+                let is_passed = |glass: &Dielectric| glasses.may_have_no_effect(id, glass.ior);
                 material.bsdf.has_delta() || material.bsdf.glass().is_some_and(is_passed)
             };
             if world.materials_of(id).any(is_specular) {
@@ -422,7 +423,7 @@ impl SpecularObjects {
         own
     }
 
-    fn exists(&self) -> bool {
+    fn is_present(&self) -> bool {
         self.is_unbounded || !self.balls.is_empty()
     }
 }

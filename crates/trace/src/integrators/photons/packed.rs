@@ -11,7 +11,7 @@ pub type Packed = [u32; PACKET_SIZE];
 const SIDE: f32 = 32767.0;
 
 /// Encodes a direction. The result may differ from the nearest code in the last bit.
-pub fn pack(direction: Vec3) -> u32 {
+pub fn pack_direction(direction: Vec3) -> u32 {
     let Vec3 { x, y, z } = direction * (SIDE / (direction.x.abs() + direction.y.abs() + direction.z.abs()));
     let (u, v) = if z < 0.0 { ((SIDE - y.abs()).copysign(x), (SIDE - x.abs()).copysign(y)) } else { (x, y) };
     let whole = |x: f32| (x + 0.5_f32.copysign(x)) as i32 as u32 & 0xffff;
@@ -20,24 +20,24 @@ pub fn pack(direction: Vec3) -> u32 {
 
 /// Decodes a unit vector.
 #[inline(always)]
-pub fn unit(packed: u32) -> Vec3 {
-    let [x, y, z] = vector(packed);
+pub fn unpack_unit(packed: u32) -> Vec3 {
+    let [x, y, z] = unpack_vector(packed);
     Vec3::new(x, y, z).normalize()
 }
 
 /// Decodes vectors without normalizing them. Their lengths are between SIDE/√3 and SIDE.
 #[inline(always)]
-pub fn lanes(packed: &Packed) -> Vec3x16 {
+pub fn unpack_lanes(packed: &Packed) -> Vec3x16 {
     let mut vectors = [[0.0; PACKET_SIZE]; 3];
     for i in 0..PACKET_SIZE {
-        let [x, y, z] = vector(packed[i]);
+        let [x, y, z] = unpack_vector(packed[i]);
         (vectors[0][i], vectors[1][i], vectors[2][i]) = (x, y, z);
     }
     vectors
 }
 
 #[inline(always)]
-fn vector(packed: u32) -> [f32; 3] {
+fn unpack_vector(packed: u32) -> [f32; 3] {
     let u = ((packed << 16) as i32 >> 16) as f32;
     let v = (packed as i32 >> 16) as f32;
     let z = SIDE - u.abs() - v.abs();
@@ -60,9 +60,13 @@ mod tests {
             }
         }
         for direction in some.into_iter().filter_map(Vec3::try_normalize) {
-            let packed = pack(direction);
-            assert!((unit(packed) - direction).length() < 7e-5, "{direction}: {}", unit(packed));
-            let long = lanes(&[packed; PACKET_SIZE]);
+            let packed = pack_direction(direction);
+            assert!(
+                (unpack_unit(packed) - direction).length() < 7e-5,
+                "{direction}: {}",
+                unpack_unit(packed)
+            );
+            let long = unpack_lanes(&[packed; PACKET_SIZE]);
             let first = Vec3::new(long[0][0], long[1][0], long[2][0]);
             assert!((first.normalize() - direction).length() < 7e-5, "{direction}: {first}");
         }

@@ -41,7 +41,7 @@ impl LaneReservoirs {
 
     /// Adds item `number` with nonnegative weights to the stream.
     #[inline(always)]
-    pub fn offer(&mut self, number: u32, weights: &F32x16) {
+    pub fn add_item(&mut self, number: u32, weights: &F32x16) {
         for i in 0..PACKET_SIZE {
             self.totals[i] += weights[i];
             let part = if weights[i] > 0.0 { weights[i] / self.totals[i] } else { 0.0 };
@@ -58,7 +58,7 @@ impl LaneReservoirs {
     /// Chooses a lane in proportion to its total weight and returns the lane's item and index. `None` if all
     /// weights are 0.
     #[inline(always)]
-    pub fn chosen(&self, random: f32) -> Option<(u32, usize)> {
+    pub fn choose_lane(&self, random: f32) -> Option<(u32, usize)> {
         let mut left = random * self.totals.iter().sum::<f32>();
         let mut last = None;
         for i in 0..PACKET_SIZE {
@@ -91,8 +91,8 @@ mod tests {
         const DRAWS: u32 = 400_000;
         for _ in 0..DRAWS {
             let mut choices = LaneReservoirs::new(next());
-            (0..ITEMS).for_each(|number| choices.offer(number as u32, &weights[number]));
-            let (number, lane) = choices.chosen(next()).expect("some weights should be positive");
+            (0..ITEMS).for_each(|number| choices.add_item(number as u32, &weights[number]));
+            let (number, lane) = choices.choose_lane(next()).expect("some weights should be positive");
             counts[number as usize][lane] += 1;
         }
         for (weight, count) in weights.as_flattened().iter().zip(counts.as_flattened()) {
@@ -100,6 +100,6 @@ mod tests {
             let difference = (f64::from(*count) - expected).abs();
             assert!(difference <= 5.0 * expected.sqrt(), "got {count}, expected {expected}");
         }
-        assert_eq!(LaneReservoirs::new(0.3).chosen(0.5), None);
+        assert_eq!(LaneReservoirs::new(0.3).choose_lane(0.5), None);
     }
 }

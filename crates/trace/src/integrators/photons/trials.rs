@@ -1,6 +1,6 @@
 //! Unbiased estimate of the reciprocal of a kernel's coverage, from random trials.
 
-use super::coverage::{KernelCoverage, material, receives};
+use super::coverage::{KernelCoverage, can_store_photons, material};
 use super::kernel::sample;
 use super::map::{GatherPoint, MIN_COSINE, REACH};
 use super::occlusion::is_occluded;
@@ -73,7 +73,7 @@ fn receives_photons(world: &World, look: &GatherPoint, place: Vec3, radius: f32)
     let above = REACH * radius * look.normal;
     let end = place - above;
     let mut start = place + above;
-    let may_receive = |id: u32| world.materials_of(id).any(receives);
+    let may_receive = |id: u32| world.materials_of(id).any(can_store_photons);
     for _ in 0..LAYERS {
         let ray = Ray::segment(start, end);
         // Find the next surface below that may receive photons.
@@ -85,7 +85,7 @@ fn receives_photons(world: &World, look: &GatherPoint, place: Vec3, radius: f32)
         let normal = if cosine < 0.0 { -surface.normal } else { surface.normal };
         let photon = PhotonPosition { point: surface.point, normal };
         if cosine.abs() > MIN_COSINE
-            && receives(material(world, hit.object, hit.shape.primitive))
+            && can_store_photons(material(world, hit.object, hit.shape.primitive))
             && !is_occluded(&world.geometry, look, &photon, radius)
         {
             return true;

@@ -37,7 +37,7 @@ impl Accumulator<'_> {
         }
     }
 
-    /// Adds the light of a source hit by a path after the path's first diffuse or glossy surface.
+    /// Adds the light of a source that a path hits after its first diffuse or glossy surface.
     pub fn add_hit_light(&mut self, path: &PathRay, radiance: Vec3) {
         match self.aov {
             LightAov::Radiance(parts) if path.state.contributes(parts.paths) => {

@@ -5,7 +5,7 @@ use super::vertex::{Lift, ShadingVertex};
 use crate::geometry::Ray;
 use crate::geometry::packet::lanes;
 use crate::integrators::view::{Components, LightAov};
-use crate::materials::bsdf::{BsdfValues, Place};
+use crate::materials::bsdf::{BsdfValues, SurfaceDirections};
 use crate::materials::{BsdfRow, RoughKind};
 use crate::math::Vec3;
 use crate::math::lanes::{F32x16, PACKET_SIZE, Simd, TRUE, Vec3x16, lane, mask_from_bits, set_lane};
@@ -25,8 +25,9 @@ pub struct VertexBatch {
     /// Horizon normals. In lanes whose bits are set, directions behind the horizon normal are occluded.
     pub horizon: Vec3x16,
     pub has_horizon: u32,
-    /// Origins lifted above the facets, from which lights in all directions are visible, and `t_max` of the
-    /// rays from the facets to them. Only valid in lanes whose bits are set and whose rays are unoccluded.
+    /// Origins lifted above the facets, and `t_max` of the rays from the facets to these origins. Lights in
+    /// all directions are visible from a lifted origin. Only valid in lanes whose bits are set and whose rays
+    /// are unoccluded.
     pub lifted: Vec3x16,
     pub lift_end: F32x16,
     pub may_lift: u32,
@@ -158,12 +159,12 @@ impl VertexBatch {
     /// Whether the packet is for vertices with this kind of BSDF and these values of `is_dark` and
     /// `has_two_sides`.
     #[inline(always)]
-    pub fn is_for(&self, kind: RoughKind, (is_dark, has_two_sides): (bool, bool)) -> bool {
+    pub fn accepts(&self, kind: RoughKind, (is_dark, has_two_sides): (bool, bool)) -> bool {
         self.bsdf.kind() == kind && self.is_dark == is_dark && self.has_two_sides == has_two_sides
     }
 
     /// Keeps only the vertices in the mask `these`.
-    pub fn keep(&mut self, these: u32) {
+    pub fn retain_lanes(&mut self, these: u32) {
         let Self { used, has_horizon, may_lift, has_facet, only_specular_before, after_gloss, .. } = self;
         for bits in [used, has_horizon, may_lift, has_facet, only_specular_before, after_gloss] {
             *bits &= these;
@@ -227,12 +228,12 @@ impl VertexBatch {
         self.has_facet |= 1 << i;
         self.only_specular_before |= u32::from(path.state.only_specular_before) << i;
         self.after_gloss |= u32::from(path.state.is_after_gloss) << i;
-        let normal = bsdf.turned(shading.normal, vertex.wo);
+        let normal = bsdf.normal_facing_viewer(shading.normal, vertex.wo);
         set_lane(&mut self.normal, i, normal);
         set_lane(&mut self.smooth_normal, i, shading.smooth_normal);
         self.shading_normal_cosine[i] = shading.shading_normal_cosine.unwrap_or(UNPERTURBED);
         // Set the BSDF.
-        let frame = Place { normal, to_eye: vertex.wo, tangent: vertex.tangent() };
+        let frame = SurfaceDirections { normal, to_eye: vertex.wo, tangent: vertex.tangent() };
         self.bsdf.put(i, bsdf, aov.lobes(), &frame);
         // Copy the path state.
         (self.roulette_throughput[i], self.interiors[i]) = (path.state.roulette_throughput, interiors);
@@ -243,14 +244,14 @@ impl VertexBatch {
     }
 
     /// Stores the ray origin on the other side of a vertex and the index of the glass around it.
-    pub fn put_beyond(&mut self, i: usize, beyond: Vec3, interiors: u32) {
+    pub fn set_far_side(&mut self, i: usize, beyond: Vec3, interiors: u32) {
         set_lane(&mut self.beyond, i, beyond);
         self.interiors_beyond[i] = interiors;
     }
 
     /// Evaluates the BSDFs and cosines for light from the directions `wi`.
     #[inline(always)]
-    pub fn response(&self, wi: &Vec3x16, simd: impl Simd) -> Response {
+    pub fn response(&self, wi: &Vec3x16, simd: impl Simd) -> BsdfResponse {
         let mut cosines = [0.0; PACKET_SIZE];
         for i in 0..PACKET_SIZE {
             cosines[i] = lane(&self.normal, i).dot(lane(wi, i));
@@ -258,10 +259,10 @@ impl VertexBatch {
         if self.is_perturbed {
             for i in 0..PACKET_SIZE {
                 let smooth = lane(&self.smooth_normal, i).dot(lane(wi, i));
-                cosines[i] *= terminator(cosines[i], smooth, self.shading_normal_cosine[i]);
+                cosines[i] *= terminator_factor(cosines[i], smooth, self.shading_normal_cosine[i]);
             }
         }
-        Response { bsdf: self.bsdf.f(wi, simd), cosines }
+        BsdfResponse { bsdf: self.bsdf.f(wi, simd), cosines }
     }
 
     /// Shadow-terminator factors for light from the directions `wi`, on the viewer's side in lanes where
@@ -275,7 +276,7 @@ impl VertexBatch {
                 let direction = lane(wi, i) * sides[i];
                 let cosine = lane(&self.normal, i).dot(direction);
                 let smooth = lane(&self.smooth_normal, i).dot(direction);
-                left[i] = terminator(cosine, smooth, self.shading_normal_cosine[i]);
+                left[i] = terminator_factor(cosine, smooth, self.shading_normal_cosine[i]);
             }
         }
         left
@@ -332,7 +333,7 @@ impl VertexBatch {
         }
         let cosine = lane(&self.normal, i).dot(direction);
         let smooth = lane(&self.smooth_normal, i).dot(direction);
-        let left = cosine * terminator(cosine, smooth, self.shading_normal_cosine[i]);
+        let left = cosine * terminator_factor(cosine, smooth, self.shading_normal_cosine[i]);
         let arriving = lane(&self.facet, i).dot(direction);
         if (left > 0.0) & (arriving > 0.0) { left / arriving } else { 0.0 }
     }
@@ -381,7 +382,7 @@ impl VertexBatch {
 
 /// BSDF values and cosines of a packet of vertices, for one direction per vertex.
 #[repr(align(64))]
-pub struct Response {
+pub struct BsdfResponse {
     /// BSDF values.
     pub bsdf: BsdfValues,
     /// Cosines times the terminator factors. Not positive if the light is on the wrong side of a normal.
@@ -395,7 +396,7 @@ pub const ALL: u32 = ((1_u64 << PACKET_SIZE) - 1) as u32;
 /// the unperturbed surface and 1 without perturbation (Chiang, Li, Burley, *Taming the Shadow Terminator*,
 /// 2019).
 #[inline(always)]
-fn terminator(cosine: f32, smooth: f32, shading_normal_cosine: f32) -> f32 {
+fn terminator_factor(cosine: f32, smooth: f32, shading_normal_cosine: f32) -> f32 {
     let g = smooth / (cosine * shading_normal_cosine);
     let g = if g < 1.0 { g } else { 1.0 };
     // Light behind the shading normal must not contribute. Clamp g to 0, because for g < 0 the polynomial and
@@ -423,7 +424,7 @@ mod tests {
         };
         let plain = VertexBatch { used: ALL, ..VertexBatch::EMPTY };
         let mut row = noisy;
-        row.keep(0b11);
+        row.retain_lanes(0b11);
         row.copy(2, &plain, 7);
         row.copy(3, &VertexBatch { only_specular_before: 1 << 9, ..plain }, 9);
         let bits = [

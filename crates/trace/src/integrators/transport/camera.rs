@@ -19,7 +19,7 @@ pub const CAMERA_ROWS: usize = 8;
 
 /// A packet of camera rays.
 #[derive(Clone)]
-pub struct CameraRow {
+pub struct CameraRayPacket {
     /// The rays.
     pub rays: RayPacket,
     /// Mask of rays whose filter weight is negative.
@@ -38,7 +38,7 @@ impl TileContext<'_> {
         queue.clear();
         let mut rows = Vec::new();
         for first in slots.clone().step_by(CAMERA_ROWS * PACKET_SIZE) {
-            self.camera_rows(first..slots.end, &mut rows);
+            self.camera_packets(first..slots.end, &mut rows);
             for (first, row) in (first..).step_by(PACKET_SIZE).zip(&rows) {
                 negative(first, row.negative);
                 let slots = first..slots.end.min(first + PACKET_SIZE as u32);
@@ -48,7 +48,7 @@ impl TileContext<'_> {
     }
 
     /// Replaces the content of `rows` with camera rays for the first slots, at most [`CAMERA_ROWS`] packets.
-    pub fn camera_rows(&self, slots: Range<u32>, rows: &mut Vec<CameraRow>) {
+    pub fn camera_packets(&self, slots: Range<u32>, rows: &mut Vec<CameraRayPacket>) {
         rows.clear();
         let count = slots.len().div_ceil(PACKET_SIZE).min(CAMERA_ROWS);
         self.world.geometry.instructions().run(GenerateCameraRays {
@@ -83,7 +83,7 @@ impl TileContext<'_> {
     /// Rays of the sixteen slots starting at `first`, even past the last slot. Must be called inside a kernel
     /// that is compiled for each instruction set.
     #[inline(always)]
-    fn camera_row(&self, first: u32) -> CameraRow {
+    fn camera_packet(&self, first: u32) -> CameraRayPacket {
         let paths = [CAMERA_PATH; PACKET_SIZE];
         let (settings, camera) = (self.settings, &self.world.camera);
         let (xs, ys, samples) = self.block.samples_from(first);
@@ -118,16 +118,16 @@ impl TileContext<'_> {
                 set_lane(&mut direction, lane, ray.direction);
             }
         }
-        CameraRow { rays: RayPacket::of(origin, direction), negative }
+        CameraRayPacket { rays: RayPacket::of(origin, direction), negative }
     }
 }
 
-/// [`TileContext::camera_row`].
+/// [`TileContext::camera_packet`].
 struct GenerateCameraRays<'a> {
     tile: &'a TileContext<'a>,
     first: u32,
     count: usize,
-    rows: &'a mut Vec<CameraRow>,
+    rows: &'a mut Vec<CameraRayPacket>,
 }
 
 impl SimdKernel for GenerateCameraRays<'_> {
@@ -136,7 +136,7 @@ impl SimdKernel for GenerateCameraRays<'_> {
     #[inline(always)]
     fn run(self, _: impl Simd) {
         for number in 0..self.count as u32 {
-            self.rows.push(self.tile.camera_row(self.first + number * PACKET_SIZE as u32));
+            self.rows.push(self.tile.camera_packet(self.first + number * PACKET_SIZE as u32));
         }
     }
 }

@@ -23,7 +23,7 @@ pub struct Crossing {
 /// The glass whose surface separates two media: the glass with the higher priority, which is later in the
 /// scene file.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Boundary {
+pub struct GlassBoundary {
     /// Material of the glass at this point.
     pub material: u32,
     /// Hit on the glass surface, along the ray between the two origins. `None` if the path itself hits this
@@ -51,7 +51,7 @@ impl TileContext<'_> {
         found.clear();
         let lead = hit.shape.t * f32::EPSILON * path.ray.direction.dot(vertex.normal).abs();
         let meeting = ContactQuery { hit, surface: &vertex.surface, normal: vertex.normal, lead };
-        let sides = self.world.contact(&meeting, around, |near| found.push(near));
+        let sides = self.world.find_contact(&meeting, around, |near| found.push(near));
         let (before, far) = self.crossing_interiors(&path.interiors, found);
         let opaque = found.iter().filter_map(|near| self.opaque(near));
         let opaque = opaque.min_by(|a, b| a.shape.t.total_cmp(&b.shape.t).then(a.object.cmp(&b.object)));
@@ -87,7 +87,7 @@ impl TileContext<'_> {
         let crossed = |as_front: bool| {
             found.iter().filter_map(move |thing| match *thing {
                 CoincidentSurface::Surface { hit, material, is_front } if is_front == as_front => {
-                    let glass = Interior { body: self.world.body(hit.object), material };
+                    let glass = Interior { body: self.world.solid_id(hit.object), material };
                     self.world.is_glass(material).then_some(glass)
                 }
                 CoincidentSurface::Surface { .. } | CoincidentSurface::Around { .. } => None,
@@ -101,10 +101,10 @@ impl TileContext<'_> {
         for glass in crossed(false) {
             if self.world.is_open(glass.body) {
                 near = near.entered(glass);
-                arrived = if arrived.left(glass).is_none() { arrived.entered(glass) } else { arrived };
+                arrived = if arrived.exited(glass).is_none() { arrived.entered(glass) } else { arrived };
                 continue;
             }
-            match far.left(glass) {
+            match far.exited(glass) {
                 Some(left) => far = left,
                 None => (arrived, near) = (arrived.entered(glass), near.entered(glass)),
             }
@@ -114,27 +114,28 @@ impl TileContext<'_> {
         (Some([arrived, near]), far)
     }
 
-    /// The surface that separates two media at a hit, after [`TileContext::crossing`]. `None` if both media are air.
+    /// The surface that separates two media at a hit, after [`TileContext::crossing`]. `None` if both media
+    /// are air.
     pub fn boundary(
         &self,
         hit: &Hit,
         [near, far]: [&InteriorList; 2],
         memory: &CrossingMemory,
-    ) -> Option<Boundary> {
+    ) -> Option<GlassBoundary> {
         let later = near.glass().max(far.glass())?;
         let own = self.world.material_index(hit) as u32;
-        if self.world.body(hit.object) == later.body && self.world.is_glass(own) {
-            return Some(Boundary { material: own, hit: None });
+        if self.world.solid_id(hit.object) == later.body && self.world.is_glass(own) {
+            return Some(GlassBoundary { material: own, hit: None });
         }
         // The path hits a different coincident surface.
         let of_body = memory.near.iter().find_map(|thing| match *thing {
             CoincidentSurface::Surface { hit, material, .. } => {
-                let is_later = self.world.body(hit.object) == later.body && self.world.is_glass(material);
-                is_later.then_some(Boundary { material, hit: Some(hit) })
+                let is_later = self.world.solid_id(hit.object) == later.body && self.world.is_glass(material);
+                is_later.then_some(GlassBoundary { material, hit: Some(hit) })
             }
             CoincidentSurface::Around { .. } => None,
         });
-        Some(of_body.unwrap_or(Boundary { material: later.material, hit: None }))
+        Some(of_body.unwrap_or(GlassBoundary { material: later.material, hit: None }))
     }
 
     /// Removes the open solids from a medium.

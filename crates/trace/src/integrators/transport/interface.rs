@@ -1,7 +1,7 @@
 //! Specular reflection and refraction.
 
 use super::cone::SpecularEvent;
-use super::interiors::{InteriorList, ior};
+use super::interiors::{InteriorList, medium_ior};
 use super::ray::PathRay;
 use super::vertex::{Shading, Vertex};
 use crate::materials::fresnel::{dielectric, refract};
@@ -19,7 +19,7 @@ pub const PASSED: u32 = 4;
 
 /// Path after specular reflection. If the shading normal would reflect the path below the surface, the
 /// geometric normal is used.
-pub fn reflected(path: &PathRay, vertex: &Vertex<'_>, shading: &Shading, reflectance: Vec3) -> PathRay {
+pub fn reflected_path(path: &PathRay, vertex: &Vertex<'_>, shading: &Shading, reflectance: Vec3) -> PathRay {
     let incident = path.ray.direction;
     let side = -incident.dot(vertex.normal);
     let mut direction = reflect(incident, shading.normal);
@@ -40,8 +40,8 @@ pub fn reflected(path: &PathRay, vertex: &Vertex<'_>, shading: &Shading, reflect
 /// In the denser medium, light spreads over fewer directions and would gain energy without this factor. In
 /// the opposite direction, radiance is unchanged (Veach, *Robust Monte Carlo Methods for Light Transport
 /// Simulation*, 1997, section 5.2).
-pub fn through_sheet(world: &World, near: &InteriorList, far: &InteriorList) -> f32 {
-    let eta = ior(world, far) / ior(world, near);
+pub fn sheet_transmission(world: &World, near: &InteriorList, far: &InteriorList) -> f32 {
+    let eta = medium_ior(world, far) / medium_ior(world, near);
     (eta * eta).min(1.0)
 }
 
@@ -61,7 +61,7 @@ pub fn fresnel_split(
     shading: &Shading,
     far: &InteriorList,
 ) -> FresnelSplit {
-    let eta = ior(world, far) / ior(world, &path.interiors);
+    let eta = medium_ior(world, far) / medium_ior(world, &path.interiors);
     let (reflectance, direction) = refract_at(vertex, shading, path.ray.direction, eta);
     // Path throughput applies to basic radiance, L/n², which refraction does not change.
     let refracted = direction.map(|direction| PathRay {

@@ -24,7 +24,7 @@ pub struct InteriorList {
 }
 
 impl InteriorList {
-    fn known(&self) -> &[Interior] {
+    fn solids(&self) -> &[Interior] {
         &self.inside[..self.count as usize]
     }
 
@@ -35,7 +35,7 @@ impl InteriorList {
 
     /// The glass that determines the medium.
     pub fn glass(&self) -> Option<Interior> {
-        self.known().last().copied()
+        self.solids().last().copied()
     }
 
     /// Returns the list after entering a solid.
@@ -60,9 +60,9 @@ impl InteriorList {
     /// Returns the list after leaving a solid, or `None` if the ray was not recorded as inside it. A surface
     /// made of several glasses may be entered through one glass and left through another. In that case, the
     /// solid's last entry is removed.
-    pub fn left(self, glass: Interior) -> Option<Self> {
-        let same = self.known().iter().rposition(|&own| own == glass);
-        same.or_else(|| self.known().iter().rposition(|own| own.body == glass.body))
+    pub fn exited(self, glass: Interior) -> Option<Self> {
+        let same = self.solids().iter().rposition(|&own| own == glass);
+        same.or_else(|| self.solids().iter().rposition(|own| own.body == glass.body))
             .map(|place| self.without(place))
     }
 
@@ -76,7 +76,7 @@ impl InteriorList {
     /// Keeps only the solids for which `holds` is true.
     pub fn retained(self, holds: impl Fn(Interior) -> bool) -> Self {
         let mut left = Self::default();
-        for &glass in self.known() {
+        for &glass in self.solids() {
             if holds(glass) {
                 left.inside[left.count as usize] = glass;
                 left.count += 1;
@@ -105,7 +105,7 @@ impl InteriorLists {
     }
 
     /// Stores a list and returns its index.
-    pub fn number(&mut self, interiors: &InteriorList) -> u32 {
+    pub fn insert(&mut self, interiors: &InteriorList) -> u32 {
         if interiors.is_air() {
             return 0;
         }
@@ -122,13 +122,13 @@ impl InteriorLists {
 
 /// Transmittance of a ray's medium over a distance.
 #[inline]
-pub fn absorption(world: &World, interiors: &InteriorList, distance: f32) -> Vec3 {
+pub fn medium_transmittance(world: &World, interiors: &InteriorList, distance: f32) -> Vec3 {
     let glass = interiors.glass().and_then(|inside| glass_of(world, inside));
     glass.map_or(Vec3::ONE, |glass| glass.transmittance(distance))
 }
 
 /// Index of refraction of a ray's medium.
-pub fn ior(world: &World, interiors: &InteriorList) -> f32 {
+pub fn medium_ior(world: &World, interiors: &InteriorList) -> f32 {
     interiors.glass().and_then(|inside| glass_of(world, inside)).map_or(1.0, |glass| glass.ior)
 }
 
@@ -150,33 +150,33 @@ mod tests {
         let air = InteriorList::default();
         for in_both in [air.entered(seven).entered(nine), air.entered(nine).entered(seven)] {
             assert_eq!(in_both.glass(), Some(nine));
-            assert_eq!(in_both.left(seven), Some(air.entered(nine)));
-            assert_eq!(in_both.left(nine), Some(air.entered(seven)));
-            assert_eq!(in_both.left(nine).and_then(|one| one.left(seven)), Some(air));
+            assert_eq!(in_both.exited(seven), Some(air.entered(nine)));
+            assert_eq!(in_both.exited(nine), Some(air.entered(seven)));
+            assert_eq!(in_both.exited(nine).and_then(|one| one.exited(seven)), Some(air));
         }
-        assert_eq!(air.left(part(3, 0)), None);
+        assert_eq!(air.exited(part(3, 0)), None);
         for deep in [
             (0..6).fold(air, |interiors, object| interiors.entered(part(object, 0))),
             (0..6).rev().fold(air, |interiors, object| interiors.entered(part(object, 0))),
         ] {
             assert_eq!(deep.glass(), Some(part(5, 0)));
-            assert_eq!(deep.left(part(0, 0)), None);
-            assert_eq!(deep.left(part(5, 0)).and_then(|interiors| interiors.glass()), Some(part(4, 0)));
+            assert_eq!(deep.exited(part(0, 0)), None);
+            assert_eq!(deep.exited(part(5, 0)).and_then(|interiors| interiors.glass()), Some(part(4, 0)));
         }
     }
 
     #[test]
     fn parts_of_a_solid_may_differ_in_material() {
         let both = InteriorList::default().entered(part(1, 0)).entered(part(1, 5));
-        assert_eq!(both.left(part(1, 0)), Some(InteriorList::default().entered(part(1, 5))));
+        assert_eq!(both.exited(part(1, 0)), Some(InteriorList::default().entered(part(1, 5))));
         // Enter through material 0, leave through material 2.
         assert_eq!(
-            InteriorList::default().entered(part(1, 0)).left(part(1, 2)),
+            InteriorList::default().entered(part(1, 0)).exited(part(1, 2)),
             Some(InteriorList::default())
         );
         // Enter one solid twice.
         let twice = InteriorList::default().entered(part(1, 0)).entered(part(1, 0));
-        assert_eq!(twice.left(part(1, 0)), Some(InteriorList::default().entered(part(1, 0))));
+        assert_eq!(twice.exited(part(1, 0)), Some(InteriorList::default().entered(part(1, 0))));
     }
 
     #[test]

@@ -4,7 +4,7 @@
 use arrayvec::ArrayVec;
 
 use super::batch::{UNPERTURBED, VertexBatch};
-use super::camera::CameraRow;
+use super::camera::CameraRayPacket;
 use super::ray::PathRay;
 use super::tile::TileContext;
 use super::vertex::lift_segment;
@@ -25,7 +25,7 @@ use crate::world::{Hit, Object, PACKET_SIZE, PacketMaterial, SimdKernel};
 #[derive(Clone, Copy)]
 pub enum PacketSource<'a> {
     /// Camera rays: the packet, its first slot, the number of rays, and the queue index of the first ray.
-    Camera(&'a CameraRow, u32, usize, u32),
+    Camera(&'a CameraRayPacket, u32, usize, u32),
     /// Rays of a queue, and the queue index of the first ray.
     Paths(&'a [PathRay], u32),
     /// Rays at the given queue indices, with known hits.
@@ -62,8 +62,8 @@ impl PacketSource<'_> {
     }
 }
 
-/// Hits of a packet. A surface is plain if its ray is in air, its shape and the textures of its non-specular material
-/// can be evaluated in packets, and all plain surfaces of the packet have the same kind of BSDF.
+/// Hits of a packet. A surface is plain if its ray is in air, its shape and the textures of its non-specular
+/// material can be evaluated in packets, and all plain surfaces of the packet have the same kind of BSDF.
 #[repr(align(64))]
 pub struct PacketHits {
     hits: HitPacket,
@@ -78,7 +78,8 @@ pub struct PacketHits {
     found: u32,
     /// Number of texture lookups for plain surfaces.
     pub lookups: u64,
-    /// [`Environment::arriving_row`](crate::lights::infinite::Environment::arriving_row), if any ray leaves the scene.
+    /// [`Environment::radiance_and_pdf_row`](crate::lights::infinite::Environment::radiance_and_pdf_row), if any ray leaves
+    /// the scene.
     sky: (Vec3x16, F32x16),
 }
 
@@ -158,7 +159,7 @@ impl TileContext<'_> {
 
     /// Material and non-specular BSDF of plain surfaces. `None` if the material's surfaces are not plain.
     #[inline(always)]
-    pub fn plain(&self, material: usize) -> Option<(&PacketMaterial, &Rough)> {
+    pub fn plain_material(&self, material: usize) -> Option<(&PacketMaterial, &Rough)> {
         let (plain, rough) = self.world.packet_material(material)?;
         // A textured ambient color needs a lookup per surface.
         let has_ambient = self.settings.render.ambient != Vec3::ZERO;
@@ -214,7 +215,7 @@ impl SimdKernel for PacketIntersection<'_> {
                     (start[lane], ends[lane]) = (path.ray.start, path.ray.t_max);
                 }
                 traced = packet::traced(&ends, simd);
-                of_paths = RayPacket::of(origin, direction).leaving(start);
+                of_paths = RayPacket::of(origin, direction).with_start_triangle(start);
                 &of_paths
             }
         };
@@ -254,7 +255,7 @@ impl SimdKernel for PacketIntersection<'_> {
         let found = tile.fill_other_surfaces(self.surface, rows, (&hits, &object), any & !plain.all, simd);
         let all = ((1_u64 << rays.count()) - 1) as u32;
         let sky = match world.lights.environment() {
-            Some(environment) if any & all != all => environment.arriving_row(&rows.direction),
+            Some(environment) if any & all != all => environment.radiance_and_pdf_row(&rows.direction),
             Some(_) | None => ([[0.0; PACKET_SIZE]; 3], [0.0; PACKET_SIZE]),
         };
         let (shining, lookups) = (plain.shining & (front | plain.two_sided), plain.lookups);
@@ -276,7 +277,7 @@ impl PacketIntersection<'_> {
         let Self { tile, aov, are_lit, row, surface, .. } = self;
         let mut plain = PlainSurfaces { all: 0, shining: 0, two_sided: 0, lookups: 0 };
         while left != 0 {
-            let (id, of_object) = group_first(object, left, simd);
+            let (id, of_object) = first_group(object, left, simd);
             left &= !of_object;
             if tile.world.is_colored(id) {
                 continue;
@@ -287,9 +288,9 @@ impl PacketIntersection<'_> {
             let mut groups = ArrayVec::<(&Rough, bool, u32), PACKET_SIZE>::new();
             let mut waiting = of_object;
             while waiting != 0 {
-                let (material, alike) = group_first(&materials, waiting, simd);
+                let (material, alike) = first_group(&materials, waiting, simd);
                 waiting &= !alike;
-                let Some((material, rough)) = tile.plain(material as usize) else { continue };
+                let Some((material, rough)) = tile.plain_material(material as usize) else { continue };
                 if plain.all | of == 0 {
                     row.bsdf.prepare(material.kind);
                 } else if row.bsdf.kind() != material.kind {
@@ -342,7 +343,7 @@ impl PacketIntersection<'_> {
 
 /// Returns the index in the first lane of `left`, and the mask of lanes in `left` with the same index.
 #[inline(always)]
-fn group_first(indices: &[u32; PACKET_SIZE], left: u32, simd: impl Simd) -> (u32, u32) {
+fn first_group(indices: &[u32; PACKET_SIZE], left: u32, simd: impl Simd) -> (u32, u32) {
     let index = indices[left.trailing_zeros() as usize % PACKET_SIZE];
     let mut of = [0; PACKET_SIZE];
     for lane in 0..PACKET_SIZE {
@@ -377,7 +378,7 @@ impl TileContext<'_> {
     ) -> u32 {
         let mut found = 0;
         while left != 0 {
-            let (id, of_object) = group_first(object, left, simd);
+            let (id, of_object) = first_group(object, left, simd);
             left &= !of_object;
             let thing = &self.world.geometry.objects()[id as usize];
             // A single hit on a shape is cheaper to evaluate separately.
@@ -387,7 +388,7 @@ impl TileContext<'_> {
             let materials = self.world.packet_materials(id, of_object, &hits.primitive);
             let (mut of, mut waiting) = (0, of_object);
             while waiting != 0 {
-                let (material, alike) = group_first(&materials, waiting, simd);
+                let (material, alike) = first_group(&materials, waiting, simd);
                 waiting &= !alike;
                 of |= if self.fits_surface_row(material as usize) { alike } else { 0 };
             }

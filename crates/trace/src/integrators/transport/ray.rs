@@ -61,7 +61,7 @@ impl PathState {
 
     /// Returns the state after a null interaction with transmittance `part`. Light samples still find the
     /// light behind the surface.
-    pub fn passed_through(self, part: f32) -> Self {
+    pub fn after_null_interaction(self, part: f32) -> Self {
         Self { roulette_throughput: self.roulette_throughput * part, ..self }
     }
 

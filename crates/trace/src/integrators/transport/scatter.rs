@@ -1,6 +1,6 @@
 //! BSDF sampling at diffuse and glossy surfaces, sixteen at a time, and Russian roulette.
 
-use super::batch::{Response, VertexBatch};
+use super::batch::{BsdfResponse, VertexBatch};
 use super::cone::RayCone;
 use super::interface::SCATTERED;
 use super::interiors::InteriorLists;
@@ -77,7 +77,7 @@ pub struct SampleBsdf<'a> {
 
 /// Sampled directions at a packet of vertices.
 #[repr(align(64))]
-pub struct Scattered {
+pub struct ScatteredDirections {
     /// Mask of paths that continue.
     alive: u32,
     /// Unit directions.
@@ -112,7 +112,7 @@ impl SampleBsdf<'_> {
                 (&row.beyond, row.interiors_beyond[i], -lane(&row.normal, i))
             };
             let mut path = PathRay {
-                ray: Ray::new(lane(from, i), lane(&scattered.wi, i)).leaving(scattered.starts[i]),
+                ray: Ray::new(lane(from, i), lane(&scattered.wi, i)).with_start_triangle(scattered.starts[i]),
                 throughput: lane(&row.throughput, i) * lane(&scattered.factors, i),
                 slot: row.slot[i],
                 path: row.path[i],
@@ -134,10 +134,10 @@ impl SampleBsdf<'_> {
 }
 
 impl SimdKernel for SampleBsdf<'_> {
-    type Output = Scattered;
+    type Output = ScatteredDirections;
 
     #[inline(always)]
-    fn run(self, simd: impl Simd) -> Scattered {
+    fn run(self, simd: impl Simd) -> ScatteredDirections {
         let Self { tile, row, used, continuation } = self;
         let sampler = row.sampler(tile);
         // Sample a direction at each vertex.
@@ -173,17 +173,17 @@ impl SimdKernel for SampleBsdf<'_> {
 impl SampleBsdf<'_> {
     /// Samples directions on the viewer's side of the vertices.
     #[inline(always)]
-    fn sample_one_side(&self, lobe: &F32x16, u: &[F32x16; 2], simd: impl Simd) -> Scattered {
+    fn sample_one_side(&self, lobe: &F32x16, u: &[F32x16; 2], simd: impl Simd) -> ScatteredDirections {
         let Self { row, continuation, .. } = *self;
         let wi = row.bsdf.sample(continuation.lobes, &row.normal, lobe, u, simd);
         // Evaluate the BSDF and the pdf.
-        let Response { bsdf, cosines } = row.response(&wi, simd);
+        let BsdfResponse { bsdf, cosines } = row.response(&wi, simd);
         let pdfs = row.bsdf.pdf(continuation.lobes, &row.normal, &wi, &bsdf, simd);
         let gray = row.bsdf.max_component(&bsdf);
         let mut roulette_throughput = [0.0; PACKET_SIZE];
         let f = match continuation.lobes {
             LobeSet::All => bsdf.f,
-            LobeSet::Narrow => row.bsdf.parts(&wi, &bsdf, simd)[1],
+            LobeSet::Narrow => row.bsdf.wide_and_narrow(&wi, &bsdf, simd)[1],
         };
         let mut factors = f;
         let mut alive = 0_u32;
@@ -200,12 +200,12 @@ impl SampleBsdf<'_> {
         alive &= !row.below_horizon(&wi, simd);
         let starts = row.starts(&wi);
         let narrow = row.bsdf.narrow_lobes();
-        Scattered { alive, wi, starts, beyond: 0, narrow, pdfs, factors, roulette_throughput }
+        ScatteredDirections { alive, wi, starts, beyond: 0, narrow, pdfs, factors, roulette_throughput }
     }
 
-    /// Uses directions sampled on both sides of the surfaces.
+    /// Scatters paths in directions sampled on both sides of the surfaces.
     #[inline(always)]
-    fn sample_both_sides(&self, samples: &SideSamples, simd: impl Simd) -> Scattered {
+    fn sample_both_sides(&self, samples: &SideSamples, simd: impl Simd) -> ScatteredDirections {
         let row = self.row;
         let SideSamples { directions: wi, densities: pdfs, shares, shown, beyond } = samples;
         // Apply the terminator factors of perturbed normals, on the side of each direction.
@@ -223,14 +223,15 @@ impl SampleBsdf<'_> {
             set_lane(&mut factors, i, Vec3::splat(factor));
             alive |= if (pdfs[i] > 0.0) & (factor > 0.0) { 1 << i } else { 0 };
         }
-        // Drop directions behind the facets. Rays with an offset origin on both sides do not start on a triangle.
+        // Drop directions behind the facets. Rays with an offset origin on both sides do not start on a
+        // triangle.
         let mut hidden = [0; PACKET_SIZE];
         for i in 0..PACKET_SIZE {
             let cosine = lane(&row.horizon, i).dot(lane(wi, i)) * sides[i];
             hidden[i] = if cosine > 0.0 { 0 } else { TRUE };
         }
         alive &= !(simd.movemask(&hidden) & row.has_horizon);
-        Scattered {
+        ScatteredDirections {
             alive,
             wi: *wi,
             starts: [Ray::NO_TRIANGLE; PACKET_SIZE],

@@ -1,6 +1,6 @@
 //! Buffers for queues of rays and hits.
 
-use super::camera::CameraRow;
+use super::camera::CameraRayPacket;
 use super::crossing::CrossingMemory;
 use super::ray::PathRay;
 use crate::geometry::surface_packet::SurfacePacket;
@@ -14,7 +14,7 @@ pub struct TraceBuffers {
     /// Rays of the next bounce.
     pub next: Vec<PathRay>,
     /// Packets of camera rays.
-    pub camera: Vec<CameraRow>,
+    pub camera: Vec<CameraRayPacket>,
     /// Surfaces at the hits of a packet.
     pub surfaces: SurfacePacket,
     /// Hits of the rays of this bounce.

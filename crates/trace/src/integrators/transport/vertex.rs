@@ -62,7 +62,7 @@ impl<'a> Vertex<'a> {
 
     /// Creates the vertex on a surface that coincides with the surface hit at this distance. `hit` is along
     /// the segment between the two origins.
-    pub fn touching(
+    pub fn at_coincident_surface(
         tile: &TileContext<'a>,
         path: &PathRay,
         (sides, hit): (OffsetPoints, &Hit),
@@ -73,7 +73,7 @@ impl<'a> Vertex<'a> {
 
     fn shaded(tile: &TileContext<'a>, path: &PathRay, (by, hit): (&Ray, &Hit), distance: f32) -> Self {
         let index = tile.world.material_index(hit);
-        let is_lit = tile.world.materials[index].bsdf.is_lit();
+        let is_lit = tile.world.materials[index].bsdf.has_non_delta_lobes();
         let asked = SurfaceRequest { uv: tile.world.is_textured(index), shadow_point: is_lit };
         let surface = tile.world.geometry.requested_surface(by, hit, asked);
         Self::at_surface(tile, path, index, surface, hit, distance)
@@ -137,14 +137,14 @@ impl<'a> Vertex<'a> {
     /// Point for texture lookups, without the footprint if light samples compete with the path.
     pub fn lookup_point(&self, is_shared: bool) -> Cow<'_, TexturePoint> {
         match is_shared {
-            true => Cow::Owned(self.texture_point.without_extent()),
+            true => Cow::Owned(self.texture_point.without_footprint()),
             false => Cow::Borrowed(&self.texture_point),
         }
     }
 
     /// Multiplies a material color by the vertex color.
     #[inline]
-    pub fn tinted(&self, color: Vec3) -> Vec3 {
+    pub fn times_vertex_color(&self, color: Vec3) -> Vec3 {
         self.color.map_or(color, |own| color * own)
     }
 
@@ -153,7 +153,7 @@ impl<'a> Vertex<'a> {
     pub fn pane_transmittance(&self, path: &PathRay, pane: &ThinDielectric, lookups: &mut u64) -> Vec3 {
         let is_shared = path.state.pdf > 0.0;
         let at = self.lookup_point(is_shared);
-        self.tinted(pane.tint.at(&at, lookups).min(Vec3::ONE))
+        self.times_vertex_color(pane.tint.at(&at, lookups).min(Vec3::ONE))
     }
 
     /// Multiplies a BSDF by the vertex color.
@@ -243,7 +243,8 @@ impl<'a> Vertex<'a> {
         match self.sides {
             Some(sides) if direction.dot(self.normal) < 0.0 => Ray::new(sides.beyond, direction),
             Some(sides) => Ray::new(sides.before, direction),
-            None => Ray::new(offset_origin(point, error, normal, direction), direction).leaving(self.start),
+            None => Ray::new(offset_origin(point, error, normal, direction), direction)
+                .with_start_triangle(self.start),
         }
     }
 
@@ -279,7 +280,7 @@ impl<'a> Vertex<'a> {
 pub fn lift_segment(on_facet: Vec3, to: Vec3, normal: Vec3, error: Vec3) -> (bool, f32) {
     let lift = Ray { t_max: 1.0, ..Ray::new(on_facet, to - on_facet) };
     let is_above = lift.direction.dot(normal) > MIN_LIFT * normal.abs().dot(error);
-    (is_above, lift.beyond(error).t_max)
+    (is_above, lift.extended_by(error).t_max)
 }
 
 /// Minimum lift, in units of the point's error. Below it, the point on the facet is used.

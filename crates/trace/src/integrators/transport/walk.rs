@@ -6,7 +6,7 @@
 
 use super::crossing::{Crossing, CrossingMemory};
 use super::interface::PASSED;
-use super::interiors::{InteriorList, absorption, ior};
+use super::interiors::{InteriorList, medium_ior, medium_transmittance};
 use super::ray::PathRay;
 use super::tile::TileContext;
 use super::vertex::Vertex;
@@ -58,7 +58,7 @@ pub trait PathStepper<'a> {
     fn interact(&mut self, path: &PathRay, reached: Interaction<'_, 'a>, has_passed: bool);
 
     /// Texture lookup counter.
-    fn lookups(&mut self) -> &mut u64;
+    fn texture_lookups(&mut self) -> &mut u64;
 
     /// Handles a thin pane. The path has the same state as in [`PathStepper::interact`].
     fn hit_pane(
@@ -70,7 +70,7 @@ pub trait PathStepper<'a> {
     ) -> NullInteraction;
 }
 
-/// Outcome at a surface that light may pass without changing direction.
+/// Result of reaching a surface that light may pass without changing direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum NullInteraction {
     /// The path passes, and its throughput is multiplied by this factor.
@@ -97,7 +97,7 @@ impl Segment {
     const DIRECT: Self = Self { origin: Vec3::ZERO, distance: 0.0, count: 0 };
 
     /// Extends the segment past another surface, which the path hits at this distance.
-    fn behind(self, path: &PathRay, distance: f32) -> Self {
+    fn extended(self, path: &PathRay, distance: f32) -> Self {
         let origin = if self.count == 0 { path.ray.origin } else { self.origin };
         Self { origin, distance: self.distance + distance, count: self.count + 1 }
     }
@@ -141,13 +141,13 @@ pub fn walk<'a, W: PathStepper<'a>>(
         };
         // Stop at an opaque surface, or pass the surface as a null interaction.
         if vertex.material.bsdf.glass().is_none() {
-            path.throughput *= absorption(tile.world, &path.interiors, hit.shape.t);
+            path.throughput *= medium_transmittance(tile.world, &path.interiors, hit.shape.t);
             if vertex.material.has_null_interaction() {
                 match null_interaction(stepper, path, &vertex, (way, hit)) {
                     NullInteraction::Passed(_) if way.count == MAX_NULL_INTERACTIONS => return,
                     NullInteraction::Passed(part) => {
-                        way = way.behind(path, hit.shape.t);
-                        *path = past_surface(*path, &vertex, part);
+                        way = way.extended(path, hit.shape.t);
+                        *path = path_past_surface(*path, &vertex, part);
                         match tile.world.geometry.closest(&path.ray) {
                             Some(next) => {
                                 stepper.record_pass(path, Some(next));
@@ -188,12 +188,12 @@ pub fn walk<'a, W: PathStepper<'a>>(
         // At glass, find all coincident surfaces.
         let Crossing { sides, before, far, opaque } = tile.crossing(path, &vertex, &hit, stepper.crossing());
         let arrived = before.as_ref().map_or(&path.interiors, |[arrived, _]| arrived);
-        path.throughput *= absorption(tile.world, arrived, hit.shape.t);
+        path.throughput *= medium_transmittance(tile.world, arrived, hit.shape.t);
         if let Some([_, near]) = before {
             path.interiors = near;
         }
         if let Some(touching) = opaque {
-            let vertex = Vertex::touching(tile, path, (sides, &touching), hit.shape.t);
+            let vertex = Vertex::at_coincident_surface(tile, path, (sides, &touching), hit.shape.t);
             if !vertex.material.has_null_interaction() || stops_at_touching(stepper, path, &vertex) {
                 let touched = Hit { shape: ShapeHit { t: hit.shape.t, ..touching.shape }, ..touching };
                 let touched = way.straighten(path, touched);
@@ -204,7 +204,7 @@ pub fn walk<'a, W: PathStepper<'a>>(
         }
         // Stop at a boundary between media with different indices of refraction.
         let near = &path.interiors;
-        if near.glass() != far.glass() && ior(tile.world, near) != ior(tile.world, &far) {
+        if near.glass() != far.glass() && medium_ior(tile.world, near) != medium_ior(tile.world, &far) {
             vertex.set_sides(sides);
             let rough = if tile.world.has_rough_glass() {
                 rough_boundary(stepper, path, (&vertex, &hit), (sides, &far))
@@ -244,13 +244,14 @@ fn rough_boundary<'a, W: PathStepper<'a>>(
 ) -> Option<GlassPoint> {
     let tile = stepper.tile();
     let interior_lists = [&path.interiors, far];
-    let indices = interior_lists.map(|interiors| ior(tile.world, interiors));
+    let indices = interior_lists.map(|interiors| medium_ior(tile.world, interiors));
     let boundary = tile.boundary(hit, interior_lists, stepper.crossing())?;
     let glass = tile.world.materials[boundary.material as usize].bsdf.glass()?;
     let touching = boundary.hit.filter(|_| glass.roughness.texture().is_some());
-    let touching = touching.map(|other| Vertex::touching(tile, path, (sides, &other), hit.shape.t));
+    let touching =
+        touching.map(|other| Vertex::at_coincident_surface(tile, path, (sides, &other), hit.shape.t));
     let at = touching.as_ref().map_or(&vertex.texture_point, |other| &other.texture_point);
-    let alpha = glass.alpha(at, stepper.lookups())?;
+    let alpha = glass.alpha(at, stepper.texture_lookups())?;
     Some(GlassPoint { near: indices[0], far: indices[1], alpha })
 }
 
@@ -263,7 +264,7 @@ fn null_interaction<'a, W: PathStepper<'a>>(
     vertex: &Vertex<'a>,
     (way, hit): (Segment, Hit),
 ) -> NullInteraction {
-    if !is_opaque(stepper.tile(), path, vertex, stepper.lookups()) {
+    if !is_opaque(stepper.tile(), path, vertex, stepper.texture_lookups()) {
         return NullInteraction::Passed(Vec3::ONE);
     }
     match &vertex.material.bsdf {
@@ -277,14 +278,15 @@ fn null_interaction<'a, W: PathStepper<'a>>(
     }
 }
 
-/// Whether a partially transparent surface coincident with glass stops a path. Thin panes have no effect on glass.
+/// Whether a partially transparent surface coincident with glass stops a path. Thin panes have no effect on
+/// glass.
 #[cold]
 #[inline(never)]
 fn stops_at_touching<'a, W: PathStepper<'a>>(stepper: &mut W, path: &PathRay, vertex: &Vertex<'a>) -> bool {
     match &vertex.material.bsdf {
         Bsdf::ThinDielectric(_) => false,
         Bsdf::Rough(_) | Bsdf::Mirror(_) | Bsdf::Dielectric(_) | Bsdf::Coated(_) => {
-            is_opaque(stepper.tile(), path, vertex, stepper.lookups())
+            is_opaque(stepper.tile(), path, vertex, stepper.texture_lookups())
         }
     }
 }
@@ -305,12 +307,12 @@ fn is_opaque(tile: &TileContext<'_>, path: &PathRay, vertex: &Vertex<'_>, lookup
 }
 
 /// Path after a null interaction.
-fn past_surface(path: PathRay, vertex: &Vertex<'_>, part: Vec3) -> PathRay {
+fn path_past_surface(path: PathRay, vertex: &Vertex<'_>, part: Vec3) -> PathRay {
     PathRay {
         ray: vertex.spawn_ray(path.ray.direction),
         throughput: path.throughput * part,
         path: path.next_path(PASSED),
-        state: path.state.passed_through(part.max_element()),
+        state: path.state.after_null_interaction(part.max_element()),
         cone: vertex.cone,
         ..path
     }
@@ -331,7 +333,7 @@ impl TileContext<'_> {
             if is_opaque(self, &path, &vertex, &mut counters.texture_lookups) {
                 return Some((path, hit));
             }
-            path = past_surface(path, &vertex, Vec3::ONE);
+            path = path_past_surface(path, &vertex, Vec3::ONE);
             hit = self.world.geometry.closest(&path.ray)?;
         }
         None

@@ -6,7 +6,7 @@ use crate::assets::LoadedMesh;
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::{Aabb, RayF64, Shape};
 use crate::math::DVec3;
-use crate::scene::description::{Lowered, Mesh, Scene};
+use crate::scene::description::{LoweredShape, Mesh, Scene};
 
 /// Maximum number of edges examined per hole.
 const MAX_RIM_EDGES: usize = 64;
@@ -31,14 +31,14 @@ enum OpaqueQuery {
 /// An edge is covered if a ray toward its midpoint, from its triangle or from the center of the hole, hits an
 /// opaque surface at the midpoint or slightly beyond. It is also covered if both endpoints are on opaque
 /// surfaces. If these surfaces are curved, the chord between the endpoints may not touch them.
-pub(super) fn covered(
+pub(super) fn covered_rim_fractions(
     scene: &Scene,
     meshes: &[&LoadedMesh],
     parts: &GlassParts,
     holes: &[&[RimEdge]],
     token: &CancelToken,
 ) -> Result<Vec<f64>, Cancelled> {
-    let examined: Vec<Vec<&RimEdge>> = holes.iter().map(|rims| examined(rims)).collect();
+    let examined: Vec<Vec<&RimEdge>> = holes.iter().map(|rims| select_rim_edges(rims)).collect();
     let queries: Vec<OpaqueQuery> = examined.iter().flat_map(|rims| queries(parts, rims)).collect();
     if queries.is_empty() {
         return Ok(vec![0.0; holes.len()]);
@@ -58,7 +58,7 @@ pub(super) fn covered(
 }
 
 /// Returns a uniform selection of a hole's edges.
-fn examined(rims: &[RimEdge]) -> Vec<&RimEdge> {
+fn select_rim_edges(rims: &[RimEdge]) -> Vec<&RimEdge> {
     let step = rims.len().div_ceil(MAX_RIM_EDGES).max(1);
     rims.iter().step_by(step).collect()
 }
@@ -132,18 +132,18 @@ fn evaluate(
         }
         token.check()?;
         match object.shape.lowered(origin) {
-            Lowered::Shape(shape) => {
+            LoweredShape::Shape(shape) => {
                 let around = shape.bounds().unwrap_or(all);
-                tree.meeting(&around, |id| {
+                tree.visit_overlapping(&around, |id| {
                     let id = id as usize;
                     evaluate[id] = evaluate[id] || queries[id].meets_shape(&shape);
                 });
             }
-            Lowered::Mesh(placed) => {
+            LoweredShape::Mesh(placed) => {
                 for corners in triangles(placed, meshes[placed.file], origin) {
                     let around = Aabb::around_f64(corners);
                     if around.meets(&all) {
-                        tree.meeting(&around, |id| {
+                        tree.visit_overlapping(&around, |id| {
                             let id = id as usize;
                             evaluate[id] = evaluate[id] || queries[id].meets_triangle(corners);
                         });
@@ -167,7 +167,8 @@ pub(super) fn triangles<'a>(
     (0..own.triangles.len() as u32).map(corners)
 }
 
-/// Whether a ray hits a triangle (Möller and Trumbore, *Fast, Minimum Storage Ray/Triangle Intersection*, 1997).
+/// Whether a ray hits a triangle (Möller and Trumbore, *Fast, Minimum Storage Ray/Triangle Intersection*,
+/// 1997).
 fn crosses(way: &RayF64, [a, b, c]: [DVec3; 3]) -> bool {
     let (ab, ac) = (b - a, c - a);
     let p = way.direction.cross(ac);

@@ -24,7 +24,7 @@ use std::collections::{BTreeMap, HashMap};
 
 use cavities::{ClosedSolid, cavities};
 use parts::{GlassPart, GlassParts, RimEdge};
-use shared_edges::{OpenEdge, SharedEdge, SharedEdges, root};
+use shared_edges::{OpenEdge, SharedEdge, SharedEdges, find_set_root};
 
 use crate::assets::LoadedMesh;
 use crate::control::{CancelToken, Cancelled};
@@ -91,7 +91,7 @@ impl GlassSolids {
         let mut shared_edges = SharedEdges::between(&parts.list, &parts.rims, token)?;
         let groups = PartGroups::of(&parts, &shared_edges);
         // Reopen edges where the orientations of two parts differ from the rest of their common border.
-        let is_odd = |seam: &&SharedEdge| groups.disagree(seam.parts()) != seam.disagrees;
+        let is_odd = |seam: &&SharedEdge| groups.have_opposite_orientations(seam.parts()) != seam.disagrees;
         let odd: Vec<OpenEdge> =
             shared_edges.joined.iter().filter(is_odd).flat_map(|seam| seam.rims).collect();
         shared_edges.open.extend(odd);
@@ -100,7 +100,7 @@ impl GlassSolids {
         solids.parts = (0..scene.objects.len() as u32).map(alone).collect();
         let all = groups.members();
         let holes = Hole::of_all(&parts, &groups, &all, &shared_edges);
-        let covered = covered(scene, meshes, &parts, &holes, token)?;
+        let covered = are_holes_covered(scene, meshes, &parts, &holes, token)?;
         let mut closed: Vec<ClosedSolid> = Vec::new();
         for ((members, hole), &is_covered) in all.iter().zip(&holes).zip(&covered) {
             let is_open = hole.part > SMALL_HOLE && !is_covered;
@@ -147,7 +147,7 @@ impl GlassSolids {
     }
 
     /// Object that identifies an object's solid.
-    pub fn place(&self, object: u32) -> u32 {
+    pub fn solid_id(&self, object: u32) -> u32 {
         self.parts.get(object as usize).map_or(object, |part| part.place)
     }
 
@@ -179,7 +179,7 @@ impl GlassSolids {
 }
 
 /// Whether opaque surfaces surround each hole.
-fn covered(
+fn are_holes_covered(
     scene: &Scene,
     meshes: &[&LoadedMesh],
     parts: &GlassParts,
@@ -188,7 +188,7 @@ fn covered(
 ) -> Result<Vec<bool>, Cancelled> {
     let is_large = |hole: &&Hole| hole.part > SMALL_HOLE;
     let rims: Vec<&[RimEdge]> = holes.iter().filter(is_large).map(|hole| &*hole.rims).collect();
-    let mut parts = caps::covered(scene, meshes, parts, &rims, token)?.into_iter();
+    let mut parts = caps::covered_rim_fractions(scene, meshes, parts, &rims, token)?.into_iter();
     let is_covered = |hole: &Hole| is_large(&hole) && parts.next().is_some_and(|part| part >= COVERED);
     Ok(holes.iter().map(is_covered).collect())
 }
@@ -205,11 +205,11 @@ impl PartGroups {
     fn of(parts: &GlassParts, shared_edges: &SharedEdges) -> Self {
         let mut same: Vec<u32> = (0..parts.list.len() as u32).collect();
         for seam in &shared_edges.joined {
-            let [one, other] = seam.parts().map(|part| root(&mut same, part));
+            let [one, other] = seam.parts().map(|part| find_set_root(&mut same, part));
             same[one.max(other) as usize] = one.min(other);
         }
-        let roots: Vec<u32> = (0..same.len() as u32).map(|part| root(&mut same, part)).collect();
-        // Two parts have the same orientation if this is the case for most of their common border.
+        let roots: Vec<u32> = (0..same.len() as u32).map(|part| find_set_root(&mut same, part)).collect();
+        // Two parts have the same orientation if their orientations agree along most of their common border.
         let mut borders = BTreeMap::new();
         for seam in &shared_edges.joined {
             let [one, other] = seam.parts();
@@ -244,7 +244,7 @@ impl PartGroups {
     }
 
     /// Whether two parts of one solid have different orientations.
-    fn disagree(&self, [one, other]: [u32; 2]) -> bool {
+    fn have_opposite_orientations(&self, [one, other]: [u32; 2]) -> bool {
         self.flips[one as usize] != self.flips[other as usize]
     }
 
@@ -286,8 +286,8 @@ impl PartGroups {
         members
     }
 
-    /// Whether the front of a solid's first part faces inward, based on the volume of a closed solid or on
-    /// most of the surface of an open solid.
+    /// Whether the front of a solid's first part faces inward. Determined from the volume of a closed solid,
+    /// or from the majority of an open solid's surface.
     fn is_first_part_flipped(&self, parts: &GlassParts, members: &[u32], is_closed: bool) -> bool {
         if is_closed {
             // Smaller volumes are attributed to rounding.
@@ -349,13 +349,14 @@ impl Hole {
         let number = |site: u32| sites.partition_point(|&other| other < site) as u32;
         let mut same: Vec<u32> = (0..sites.len() as u32).collect();
         for &(_, [from, to]) in &own {
-            let [one, other] = [from, to].map(|site| root(&mut same, number(site)));
+            let [one, other] = [from, to].map(|site| find_set_root(&mut same, number(site)));
             same[one.max(other) as usize] = one.min(other);
         }
         let mut spans: Vec<Option<(DVec3, DVec3)>> = vec![None; sites.len()];
         for &(rim, [from, _]) in &own {
             let [p, q] = rim.ends;
-            let (start, sum) = spans[root(&mut same, number(from)) as usize].get_or_insert((p, DVec3::ZERO));
+            let (start, sum) =
+                spans[find_set_root(&mut same, number(from)) as usize].get_or_insert((p, DVec3::ZERO));
             *sum += (p - *start).cross(q - *start);
         }
         let missing: f64 = spans.iter().flatten().map(|(_, sum)| sum.length() * 0.5).sum();

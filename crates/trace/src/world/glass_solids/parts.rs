@@ -76,7 +76,7 @@ impl GlassParts {
                 parts.add_sheet(number, &sheet);
             }
             for part in &mut parts.list[first..] {
-                part.substance = substance_of(scene, meshes, object);
+                part.substance = glass_id_of(scene, meshes, object);
             }
         }
         Ok(parts)
@@ -91,13 +91,13 @@ impl GlassParts {
                 let normal = normal.normalize();
                 let area = std::f64::consts::PI * radius * radius;
                 let volume = area * (center - self.origin).dot(normal) / 3.0;
-                self.begin(number, (area, volume), radius);
+                self.begin_part(number, (area, volume), radius);
                 self.add_circle(center, normal, radius, center);
             }
             Sheet::Cylinder { a, b, radius } => {
                 let axis = (b - a).normalize();
                 let area = std::f64::consts::TAU * radius * a.distance(b);
-                self.begin(number, (area, area * radius / 3.0), radius.max(a.distance(b)));
+                self.begin_part(number, (area, area * radius / 3.0), radius.max(a.distance(b)));
                 self.add_circle(b, -axis, radius, a);
                 self.add_circle(a, axis, radius, b);
             }
@@ -107,13 +107,13 @@ impl GlassParts {
                     std::f64::consts::PI * radius * (radius * radius + tip.distance_squared(base)).sqrt();
                 let shown = axis * (std::f64::consts::PI * radius * radius);
                 let volume = (tip - self.origin).dot(shown) / 3.0;
-                self.begin(number, (area, volume), radius.max(tip.distance(base)));
+                self.begin_part(number, (area, volume), radius.max(tip.distance(base)));
                 self.add_circle(base, axis, radius, tip);
             }
         }
     }
 
-    fn begin(&mut self, object: u32, (area, volume): (f64, f64), reach: f64) -> u32 {
+    fn begin_part(&mut self, object: u32, (area, volume): (f64, f64), reach: f64) -> u32 {
         self.list.push(GlassPart { object, area, volume, tolerance: ROUNDING * reach, substance: None });
         self.list.len() as u32 - 1
     }
@@ -124,7 +124,7 @@ impl GlassParts {
         let halves = (1..own.len() - 1).map(|i| (own[i] - own[0]).cross(own[i + 1] - own[0]) * 0.5);
         let normal: DVec3 = halves.sum();
         let reach = own.iter().map(|corner| corner.distance(own[0])).fold(0.0, f64::max);
-        let part = self.begin(object, (normal.length(), normal.dot(own[0]) / 3.0), reach);
+        let part = self.begin_part(object, (normal.length(), normal.dot(own[0]) / 3.0), reach);
         let middle = own.iter().sum::<DVec3>() / own.len() as f64;
         for i in 0..own.len() {
             self.rims.push(RimEdge { part, ends: [own[i], own[(i + 1) % own.len()]], inner: middle });
@@ -186,7 +186,7 @@ impl GlassParts {
             return;
         }
         let volume = if mirrors { -volume } else { volume };
-        let part = self.begin(object, (area, volume), place.reach(reach).max_element());
+        let part = self.begin_part(object, (area, volume), place.abs_bound(reach).max_element());
         for &[triangle, edge] in open.iter().filter(|open| is_glass(open[0] as usize)) {
             let corner = |i: u32| {
                 let vertex = mesh.triangles[triangle as usize][(i % 3) as usize];
@@ -212,7 +212,7 @@ fn reference_point(shape: &Shape, meshes: &[&LoadedMesh]) -> DVec3 {
 /// Which of a mesh's triangles are glass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum MeshGlass {
-    /// All triangles, or the object is not a mesh.
+    /// All triangles, or the whole object if it is not a mesh.
     All,
     /// Triangles whose material in the mesh file is glass.
     Some,
@@ -230,12 +230,12 @@ pub(super) fn glass_of(scene: &Scene, meshes: &[&LoadedMesh], object: &Object) -
 }
 
 /// Type of glass of an object.
-fn substance_of(scene: &Scene, meshes: &[&LoadedMesh], object: &Object) -> GlassId {
+fn glass_id_of(scene: &Scene, meshes: &[&LoadedMesh], object: &Object) -> GlassId {
     match (object.material, object.shape.mesh()) {
-        (Some(index), _) => scene.materials[index].kind.substance(),
+        (Some(index), _) => scene.materials[index].kind.glass_medium_bits(),
         (None, Some(mesh)) => {
             let roughness = NumberSource::Constant(0.0);
-            let of = |(ior, tint)| MaterialKind::Glass { ior, tint, roughness }.substance();
+            let of = |(ior, tint)| MaterialKind::Glass { ior, tint, roughness }.glass_medium_bits();
             let mut each = meshes[mesh.file].materials.iter().filter_map(file_glass).filter_map(of);
             let first = each.next()?;
             each.all(|other| other == first).then_some(first)
@@ -248,7 +248,7 @@ fn substance_of(scene: &Scene, meshes: &[&LoadedMesh], object: &Object) -> Glass
 /// with equal endpoints close each other in pairs of opposite direction.
 fn open_edges(mesh: &TriangleMesh) -> Vec<[u32; 2]> {
     let all = (0..mesh.triangles.len() as u32).flat_map(|triangle| (0..3).map(move |edge| [triangle, edge]));
-    let open = unmatched(mesh, all, |vertex| vertex);
+    let open = unmatched_edges(mesh, all, |vertex| vertex);
     if open.is_empty() {
         return open;
     }
@@ -269,12 +269,12 @@ fn open_edges(mesh: &TriangleMesh) -> Vec<[u32; 2]> {
         last = Some((bits(vertex), own));
         first.insert(vertex, own);
     }
-    unmatched(mesh, open.into_iter(), |vertex| first.get(&vertex).copied().unwrap_or(vertex))
+    unmatched_edges(mesh, open.into_iter(), |vertex| first.get(&vertex).copied().unwrap_or(vertex))
 }
 
 /// Returns the edges in `edges` that are not closed by another edge. `place` maps coincident vertices to one
 /// representative.
-fn unmatched(
+fn unmatched_edges(
     mesh: &TriangleMesh,
     edges: impl Iterator<Item = [u32; 2]> + Clone,
     place: impl Fn(u32) -> u32,

@@ -66,7 +66,7 @@ impl SharedEdges {
         let open = edges.join(parts, halves.collect());
         token.check()?;
         // Split the remaining edges at the endpoints of other edges, and match again.
-        let split = sites.cut(parts, &open, token)?;
+        let split = sites.split_at_endpoints(parts, &open, token)?;
         edges.open = edges.join(parts, split);
         Ok(edges)
     }
@@ -96,7 +96,7 @@ impl SharedEdges {
                 [one, other] if one.is_back != other.is_back => close(0, 1, false),
                 [one, other] if one.rim.part != other.rim.part => close(0, 1, true),
                 [_] | [_, _] => {}
-                _ => around(same).for_each(|[i, j]| close(i, j, false)),
+                _ => pairs_with_glass_between(same).for_each(|[i, j]| close(i, j, false)),
             }
             let left = same.iter().zip(is_closed).filter(|(_, is_closed)| !is_closed);
             open.extend(left.map(|(half, _)| half.open()));
@@ -107,7 +107,7 @@ impl SharedEdges {
 
 /// Returns pairs of edges with glass between them. In the order of angles around the common edge, a surface
 /// whose back faces forward is paired with the next surface if its back faces backward.
-fn around(same: &[HalfEdge]) -> impl Iterator<Item = [usize; 2]> {
+fn pairs_with_glass_between(same: &[HalfEdge]) -> impl Iterator<Item = [usize; 2]> {
     let ends =
         |half: &HalfEdge| if half.is_back { [half.rim.ends[1], half.rim.ends[0]] } else { half.rim.ends };
     let [from, to] = ends(&same[0]);
@@ -171,17 +171,17 @@ impl EdgeEndpoints {
         }
         // Then merge points within tolerance of each other.
         let mut same: Vec<u32> = (0..points.len() as u32).collect();
-        let tree = Bvh::build(&boxes(&points, &tolerances), token)?;
+        let tree = Bvh::build(&endpoint_boxes(&points, &tolerances), token)?;
         for (i, (own, tolerance)) in points.iter().zip(&tolerances).enumerate() {
-            tree.meeting(&around_point(*own, *tolerance), |j| {
+            tree.visit_overlapping(&around_point(*own, *tolerance), |j| {
                 let reach = tolerance + tolerances[j as usize];
                 if (j as usize) < i && own.distance_squared(points[j as usize]) <= reach * reach {
-                    let (one, other) = (root(&mut same, i as u32), root(&mut same, j));
+                    let (one, other) = (find_set_root(&mut same, i as u32), find_set_root(&mut same, j));
                     same[one.max(other) as usize] = one.min(other);
                 }
             });
         }
-        let mut site = |end: usize| root(&mut same, number[end] as u32);
+        let mut site = |end: usize| find_set_root(&mut same, number[end] as u32);
         let ends = (0..rims.len()).map(|rim| [site(2 * rim), site(2 * rim + 1)]).collect();
         Ok(Self { points, tolerances, ends })
     }
@@ -191,7 +191,7 @@ impl EdgeEndpoints {
     }
 
     /// Splits edges at other edges' endpoints that are on them.
-    fn cut(
+    fn split_at_endpoints(
         &self,
         parts: &[GlassPart],
         rims: &[OpenEdge],
@@ -202,14 +202,14 @@ impl EdgeEndpoints {
         ends.dedup();
         let points: Vec<DVec3> = ends.iter().map(|&end| self.points[end as usize]).collect();
         let tolerances: Vec<f64> = ends.iter().map(|&end| self.tolerances[end as usize]).collect();
-        let tree = Bvh::build(&boxes(&points, &tolerances), token)?;
+        let tree = Bvh::build(&endpoint_boxes(&points, &tolerances), token)?;
         let mut split = Vec::with_capacity(rims.len());
         for &(rim, [first, last]) in rims {
             let [from, to] = rim.ends;
             let tolerance = parts[rim.part as usize].tolerance;
             let way = to - from;
             let mut cuts = Vec::new();
-            tree.meeting(
+            tree.visit_overlapping(
                 &Aabb::around_f64([from, to]).grown(crate::math::Vec3::splat(tolerance as f32)),
                 |i| {
                     let (site, point) = (ends[i as usize], points[i as usize]);
@@ -233,7 +233,7 @@ impl EdgeEndpoints {
     }
 }
 
-fn boxes(points: &[DVec3], tolerances: &[f64]) -> Vec<Aabb> {
+fn endpoint_boxes(points: &[DVec3], tolerances: &[f64]) -> Vec<Aabb> {
     points.iter().zip(tolerances).map(|(&point, &tolerance)| around_point(point, tolerance)).collect()
 }
 
@@ -242,7 +242,7 @@ fn around_point(point: DVec3, tolerance: f64) -> Aabb {
 }
 
 /// Finds the lowest number in a set of joined items, using union-find with path halving.
-pub(super) fn root(same: &mut [u32], of: u32) -> u32 {
+pub(super) fn find_set_root(same: &mut [u32], of: u32) -> u32 {
     let mut at = of;
     while same[at as usize] != at {
         same[at as usize] = same[same[at as usize] as usize];

@@ -2,7 +2,7 @@
 
 use ::image::DynamicImage;
 
-use super::{Sample, alpha, clean, is_everywhere, linear, rgb, with_samples};
+use super::{Sample, alpha, is_channel_constant, linearize_pixel, rgb, sanitize, with_samples};
 use crate::assets::image::metadata::{AlphaUsage, ImageMetadata};
 use crate::assets::image::space::ColorSpace;
 use crate::assets::image::{ColorCurve, ImageEncoding};
@@ -11,8 +11,13 @@ use crate::math::Vec3;
 use crate::math::color::srgb_to_linear;
 
 /// Alpha-weighted texels, or plain texels if the image is opaque.
-pub(super) fn texels(image: DynamicImage, curve: ColorCurve, metadata: &ImageMetadata) -> Texels {
-    let Some(alpha) = alpha(&image, metadata).filter(|alpha| !is_everywhere(&image, *alpha, 1.0)) else {
+pub(super) fn alpha_weighted_texels(
+    image: DynamicImage,
+    curve: ColorCurve,
+    metadata: &ImageMetadata,
+) -> Texels {
+    let Some(alpha) = alpha(&image, metadata).filter(|alpha| !is_channel_constant(&image, *alpha, 1.0))
+    else {
         return super::texels(image, curve.encoding(), metadata);
     };
     let (width, height) = (image.width(), image.height());
@@ -29,7 +34,7 @@ pub(super) fn texels(image: DynamicImage, curve: ColorCurve, metadata: &ImageMet
                 space,
                 is_premultiplied: metadata.alpha == AlphaUsage::Premultiplied,
             };
-            with_samples!(image, samples => floats(samples, &options, &mut unusable))
+            with_samples!(image, samples => alpha_weighted_floats(samples, &options, &mut unusable))
         }
     };
     Texels { width, height, data, unusable }
@@ -77,19 +82,19 @@ impl CutoutOptions {
 }
 
 /// Converts samples to linear colors multiplied by alpha.
-fn floats<T: Sample>(samples: &[T], options: &CutoutOptions, unusable: &mut u64) -> TexelData {
+fn alpha_weighted_floats<T: Sample>(samples: &[T], options: &CutoutOptions, unusable: &mut u64) -> TexelData {
     let decoding = options.decoding::<T>();
     let texel = |pixel: &[T]| {
-        let alpha = clean(pixel[options.alpha].unit()).min(1.0);
-        let encoded = rgb(pixel).map(T::unit);
-        *unusable += u64::from(encoded.map(clean) != encoded);
+        let alpha = sanitize(pixel[options.alpha].to_unit_float()).min(1.0);
+        let encoded = rgb(pixel).map(T::to_unit_float);
+        *unusable += u64::from(encoded.map(sanitize) != encoded);
         let divisor = if options.is_premultiplied && alpha > 0.0 { alpha } else { 1.0 };
         let linear = match &decoding {
             Linearization::Linear => encoded.map(|value| value / divisor),
-            Linearization::Srgb => encoded.map(|value| srgb_to_linear(clean(value / divisor))),
-            Linearization::Tables(tables) => linear(pixel, Some(tables)),
+            Linearization::Srgb => encoded.map(|value| srgb_to_linear(sanitize(value / divisor))),
+            Linearization::Tables(tables) => linearize_pixel(pixel, Some(tables)),
         };
-        let color = Vec3::from_array(options.space.converted(linear).map(clean));
+        let color = Vec3::from_array(options.space.to_rec_709_color(linear).map(sanitize));
         (color * alpha).extend(alpha)
     };
     TexelData::FloatAlpha(samples.chunks_exact(options.alpha + 1).map(texel).collect())

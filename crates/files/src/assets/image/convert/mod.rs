@@ -41,7 +41,7 @@ use with_samples;
 /// Sample type of an image.
 trait Sample: Copy + PartialEq {
     /// The sample as a float. The largest integer becomes 1.
-    fn unit(self) -> f32;
+    fn to_unit_float(self) -> f32;
 
     /// Linear values of all integers in this color space. `None` for floats, which are linear.
     fn tables(_: &ColorSpace) -> Option<[Vec<f32>; 3]> {
@@ -55,7 +55,7 @@ trait Sample: Copy + PartialEq {
 }
 
 impl Sample for u8 {
-    fn unit(self) -> f32 {
+    fn to_unit_float(self) -> f32 {
         f32::from(self) / f32::from(Self::MAX)
     }
 
@@ -69,7 +69,7 @@ impl Sample for u8 {
 }
 
 impl Sample for u16 {
-    fn unit(self) -> f32 {
+    fn to_unit_float(self) -> f32 {
         f32::from(self) / f32::from(Self::MAX)
     }
 
@@ -83,19 +83,19 @@ impl Sample for u16 {
 }
 
 impl Sample for f32 {
-    fn unit(self) -> f32 {
+    fn to_unit_float(self) -> f32 {
         self
     }
 }
 
 /// Number of samples per pixel.
-fn channels(image: &DynamicImage) -> usize {
+fn channel_count(image: &DynamicImage) -> usize {
     usize::from(image.color().channel_count())
 }
 
 /// Index of the alpha sample, if the image has alpha.
 fn alpha(image: &DynamicImage, metadata: &ImageMetadata) -> Option<usize> {
-    let index = match channels(image) {
+    let index = match channel_count(image) {
         2 => 1,
         4 => 3,
         _ => return None,
@@ -103,16 +103,16 @@ fn alpha(image: &DynamicImage, metadata: &ImageMetadata) -> Option<usize> {
     match metadata.alpha {
         AlphaUsage::Straight | AlphaUsage::Premultiplied => Some(index),
         AlphaUsage::Unused => None,
-        AlphaUsage::UnusedIfZero => (!is_everywhere(image, index, 0.0)).then_some(index),
+        AlphaUsage::UnusedIfZero => (!is_channel_constant(image, index, 0.0)).then_some(index),
     }
 }
 
 /// Whether a sample has this value in all pixels.
-fn is_everywhere(image: &DynamicImage, index: usize, value: f32) -> bool {
+fn is_channel_constant(image: &DynamicImage, index: usize, value: f32) -> bool {
     fn all<T: Sample>(samples: &[T], (channels, index): (usize, usize), value: f32) -> bool {
-        samples.chunks_exact(channels).all(|pixel| pixel[index].unit() == value)
+        samples.chunks_exact(channels).all(|pixel| pixel[index].to_unit_float() == value)
     }
-    with_samples!(image, samples => all(samples, (channels(image), index), value))
+    with_samples!(image, samples => all(samples, (channel_count(image), index), value))
 }
 
 /// Warning about a constant alpha channel that is used as opacity.
@@ -125,12 +125,12 @@ pub(super) fn constant_alpha(
         return None;
     };
     let alpha = alpha(image, metadata)?;
-    if is_everywhere(image, alpha, 0.0) {
+    if is_channel_constant(image, alpha, 0.0) {
         return Some(INVISIBLE);
     }
     match encoding {
         ImageEncoding::Number { of: PixelValue::Mask { of_any_color }, .. }
-            if is_everywhere(image, alpha, 1.0) =>
+            if is_channel_constant(image, alpha, 1.0) =>
         {
             Some(if scalars::is_gray_mask(image, of_any_color) { LUMINANCE_USED } else { OPAQUE })
         }
@@ -154,15 +154,17 @@ pub(super) fn texels(image: DynamicImage, encoding: ImageEncoding, metadata: &Im
         _ => image.into_rgba32f().into(),
     };
     match encoding {
-        ImageEncoding::Number { of, is_srgb } => return scalars::texels(&image, (of, is_srgb), metadata),
-        ImageEncoding::CutOut(curve) => return cutout::texels(image, curve, metadata),
+        ImageEncoding::Number { of, is_srgb } => {
+            return scalars::scalar_texels(&image, (of, is_srgb), metadata);
+        }
+        ImageEncoding::CutOut(curve) => return cutout::alpha_weighted_texels(image, curve, metadata),
         ImageEncoding::Color | ImageEncoding::Srgb | ImageEncoding::Linear | ImageEncoding::Raw => {}
     }
     let (width, height) = (image.width(), image.height());
-    let channels = channels(&image);
+    let channels = channel_count(&image);
     let mut unusable = 0;
     if !encoding.space(metadata).is_default() {
-        let data = converted(&image, encoding, metadata, &mut unusable);
+        let data = convert_colors(&image, encoding, metadata, &mut unusable);
         return Texels { width, height, data, unusable };
     }
     let data = match image {
@@ -231,7 +233,7 @@ fn floats(samples: &[f32], channels: usize, encoding: ImageEncoding, unusable: &
 
 /// Converts colors from a nonstandard color space. Colors outside Rec. 709 are clipped, except for
 /// [`ImageEncoding::Raw`].
-fn converted(
+fn convert_colors(
     image: &DynamicImage,
     encoding: ImageEncoding,
     metadata: &ImageMetadata,
@@ -245,31 +247,31 @@ fn converted(
     ) -> TexelData {
         let tables = T::tables(space);
         let mut texel = |pixel| {
-            let linear = linear(pixel, tables.as_ref());
-            let color = space.converted(linear);
+            let linear = linearize_pixel(pixel, tables.as_ref());
+            let color = space.to_rec_709_color(linear);
             if is_raw {
                 return Vec3::from_array(color);
             }
             *unusable += u64::from(!linear.iter().all(|value| value.abs() <= LARGEST as f32));
-            Vec3::from_array(color.map(clean))
+            Vec3::from_array(color.map(sanitize))
         };
         TexelData::Float(samples.chunks_exact(channels).map(&mut texel).collect())
     }
     let space = encoding.space(metadata);
     let options = (&space, encoding == ImageEncoding::Raw);
-    with_samples!(image, samples => each(samples, channels(image), options, unusable))
+    with_samples!(image, samples => each(samples, channel_count(image), options, unusable))
 }
 
 /// Linearizes a pixel, using tables for integers.
-fn linear<T: Sample>(pixel: &[T], tables: Option<&[Vec<f32>; 3]>) -> [f32; 3] {
+fn linearize_pixel<T: Sample>(pixel: &[T], tables: Option<&[Vec<f32>; 3]>) -> [f32; 3] {
     let rgb = rgb(pixel);
     match tables {
         Some(tables) => std::array::from_fn(|i| tables[i][rgb[i].index()]),
-        None => rgb.map(T::unit),
+        None => rgb.map(T::to_unit_float),
     }
 }
 
 /// Clamps negative values, and replaces NaN, infinity and excessively large values with 0.
-fn clean(value: f32) -> f32 {
+fn sanitize(value: f32) -> f32 {
     if (0.0..=LARGEST as f32).contains(&value) { value } else { 0.0 }
 }

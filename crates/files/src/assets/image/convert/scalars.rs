@@ -2,7 +2,7 @@
 
 use ::image::DynamicImage;
 
-use super::{Sample, alpha, channels, clean, is_everywhere, rgb, with_samples};
+use super::{Sample, alpha, channel_count, is_channel_constant, rgb, sanitize, with_samples};
 use crate::assets::image::metadata::ImageMetadata;
 use crate::materials::texels::{TexelData, Texels};
 use crate::materials::{Channel, PixelValue};
@@ -21,12 +21,12 @@ enum ScalarSamples {
 }
 
 /// Selects the samples for a scalar.
-fn samples_of(
+fn select_samples(
     image: &DynamicImage,
     (of, is_srgb): (PixelValue, bool),
     metadata: &ImageMetadata,
 ) -> ScalarSamples {
-    let is_gray = channels(image) < 3;
+    let is_gray = channel_count(image) < 3;
     let alpha = alpha(image, metadata);
     let of_color = |place: usize| ScalarSamples::Sample(if is_gray { 0 } else { place }, is_srgb);
     let luminance = if is_gray { of_color(0) } else { ScalarSamples::Luminance };
@@ -35,8 +35,9 @@ fn samples_of(
         PixelValue::Luminance => luminance,
         PixelValue::Opacity => alpha.map_or(luminance, of_alpha),
         PixelValue::Mask { of_any_color } => {
-            let is_alpha =
-                |alpha: &usize| !is_everywhere(image, *alpha, 1.0) || !is_gray_mask(image, of_any_color);
+            let is_alpha = |alpha: &usize| {
+                !is_channel_constant(image, *alpha, 1.0) || !is_gray_mask(image, of_any_color)
+            };
             alpha.filter(is_alpha).map_or(luminance, of_alpha)
         }
         PixelValue::Channel(Channel::Red) => of_color(0),
@@ -56,33 +57,37 @@ fn has_gray_pixels(image: &DynamicImage) -> bool {
     fn all<T: Sample>(samples: &[T], channels: usize) -> bool {
         samples.chunks_exact(channels).map(rgb).all(|[r, g, b]| r == g && g == b)
     }
-    with_samples!(image, samples => all(samples, channels(image)))
+    with_samples!(image, samples => all(samples, channel_count(image)))
 }
 
 /// Converts an image to texels that contain the scalar in all channels.
-pub(super) fn texels(image: &DynamicImage, of: (PixelValue, bool), metadata: &ImageMetadata) -> Texels {
+pub(super) fn scalar_texels(
+    image: &DynamicImage,
+    of: (PixelValue, bool),
+    metadata: &ImageMetadata,
+) -> Texels {
     let (width, height) = (image.width(), image.height());
-    let (channels, samples) = (channels(image), samples_of(image, of, metadata));
+    let (channels, samples) = (channel_count(image), select_samples(image, of, metadata));
     let mut unusable = 0;
     let data = match (image, samples) {
         (_, ScalarSamples::One) => TexelData::Linear8(vec![[u8::MAX; 3]; width as usize * height as usize]),
         (DynamicImage::ImageLuma8(pixels), ScalarSamples::Sample(place, is_srgb)) => {
-            bytes(pixels, (channels, place), is_srgb)
+            scalar_texels_from_bytes(pixels, (channels, place), is_srgb)
         }
         (DynamicImage::ImageLumaA8(pixels), ScalarSamples::Sample(place, is_srgb)) => {
-            bytes(pixels, (channels, place), is_srgb)
+            scalar_texels_from_bytes(pixels, (channels, place), is_srgb)
         }
         (DynamicImage::ImageRgb8(pixels), ScalarSamples::Sample(place, is_srgb)) => {
-            bytes(pixels, (channels, place), is_srgb)
+            scalar_texels_from_bytes(pixels, (channels, place), is_srgb)
         }
         (DynamicImage::ImageRgba8(pixels), ScalarSamples::Sample(place, is_srgb)) => {
-            bytes(pixels, (channels, place), is_srgb)
+            scalar_texels_from_bytes(pixels, (channels, place), is_srgb)
         }
         (image, samples) => {
             let is_srgb = of.1;
             with_samples!(image, pixels => {
                 unusable = unusable_pixels(pixels, channels, samples);
-                floats(pixels, channels, samples, is_srgb)
+                scalar_texels_from_samples(pixels, channels, samples, is_srgb)
             })
         }
     };
@@ -96,22 +101,28 @@ fn unusable_pixels<T: Sample>(pixels: &[T], channels: usize, samples: ScalarSamp
         ScalarSamples::Luminance => 0..3,
         ScalarSamples::One => 0..0,
     };
-    let is_broken =
-        |pixel: &&[T]| !pixel[used.clone()].iter().all(|value| clean(value.unit()) == value.unit());
+    let is_broken = |pixel: &&[T]| {
+        !pixel[used.clone()].iter().all(|value| sanitize(value.to_unit_float()) == value.to_unit_float())
+    };
     pixels.chunks_exact(channels).filter(is_broken).count() as u64
 }
 
 /// Converts 8-bit samples to texels, given the number of samples per pixel and the index of the sample to
 /// use.
-fn bytes(samples: &[u8], (channels, index): (usize, usize), is_srgb: bool) -> TexelData {
+fn scalar_texels_from_bytes(samples: &[u8], (channels, index): (usize, usize), is_srgb: bool) -> TexelData {
     let texels = samples.chunks_exact(channels).map(|pixel| [pixel[index]; 3]).collect();
     if is_srgb { TexelData::Srgb8(texels) } else { TexelData::Linear8(texels) }
 }
 
 /// Converts samples of all other types to texels.
-fn floats<T: Sample>(all: &[T], channels: usize, samples: ScalarSamples, is_srgb: bool) -> TexelData {
+fn scalar_texels_from_samples<T: Sample>(
+    all: &[T],
+    channels: usize,
+    samples: ScalarSamples,
+    is_srgb: bool,
+) -> TexelData {
     let decoded = |sample: T, is_srgb: bool| {
-        let value = clean(sample.unit());
+        let value = sanitize(sample.to_unit_float());
         if is_srgb { srgb_to_linear(value) } else { value }
     };
     let number = |pixel: &[T]| match samples {

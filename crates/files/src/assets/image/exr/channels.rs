@@ -29,7 +29,7 @@ pub(super) enum ColorChannels {
 
 impl ChosenChannels {
     /// Source channel for each pixel component: red, green, blue, alpha. Chroma channels are not included.
-    pub(super) fn slots(self) -> [Option<ChannelIndex>; 4] {
+    pub(super) fn component_channels(self) -> [Option<ChannelIndex>; 4] {
         match self.color {
             ColorChannels::Rgb([red, green, blue]) => [Some(red), Some(green), Some(blue), self.alpha],
             ColorChannels::Gray(y) | ColorChannels::LuminanceChroma(y, _) => {
@@ -39,7 +39,7 @@ impl ChosenChannels {
     }
 
     /// Y, RY and BY.
-    pub(super) fn planes(self) -> Option<[ChannelIndex; 3]> {
+    pub(super) fn luminance_chroma_channels(self) -> Option<[ChannelIndex; 3]> {
         match self.color {
             ColorChannels::Rgb(_) | ColorChannels::Gray(_) => None,
             ColorChannels::LuminanceChroma(y, [ry, by]) => Some([y, ry, by]),
@@ -48,7 +48,10 @@ impl ChosenChannels {
 
     /// All channels to decode.
     pub(super) fn all(self) -> impl Iterator<Item = ChannelIndex> {
-        self.slots().into_iter().flatten().chain(self.planes().into_iter().flatten())
+        self.component_channels()
+            .into_iter()
+            .flatten()
+            .chain(self.luminance_chroma_channels().into_iter().flatten())
     }
 }
 
@@ -100,13 +103,13 @@ impl LayerChannels {
 
 type LayerMap = BTreeMap<String, LayerChannels>;
 
-/// Selects the channels. Unnamed layers are preferred to named ones. Within each group, RGB is preferred to
-/// gray, then layers within one part to layers across parts, then earlier layers to later ones. The fallback
-/// is a part's only channel, whatever its name.
-pub(super) fn choose(headers: &[Header]) -> Option<ChosenChannels> {
+/// Selects the channels. Unnamed layers are preferred to named ones. Within each of these groups, RGB is
+/// preferred to gray, then layers in a single part to layers across parts, then earlier layers to later
+/// layers. The fallback is a part's only channel, whatever its name.
+pub(super) fn choose_channels(headers: &[Header]) -> Option<ChosenChannels> {
     let mut parts: Vec<LayerMap> =
-        headers.iter().enumerate().map(|(part, header)| layers(part, header)).collect();
-    let across = across_parts(headers);
+        headers.iter().enumerate().map(|(part, header)| layers_by_name(part, header)).collect();
+    let across = layers_across_parts(headers);
     // The X channel that matches a Y channel may be in another part.
     for layers in &mut parts {
         for (name, layer) in layers {
@@ -126,7 +129,7 @@ pub(super) fn choose(headers: &[Header]) -> Option<ChosenChannels> {
 }
 
 /// Layers of a part by name. The layer name is the channel name up to its last dot.
-fn layers(part: usize, header: &Header) -> LayerMap {
+fn layers_by_name(part: usize, header: &Header) -> LayerMap {
     let mut layers = LayerMap::new();
     if !header.deep {
         add_channels(part, header, &mut layers);
@@ -143,7 +146,7 @@ fn add_channels(part: usize, header: &Header, layers: &mut LayerMap) {
 }
 
 /// Layers assembled from single-channel parts.
-fn across_parts(headers: &[Header]) -> LayerMap {
+fn layers_across_parts(headers: &[Header]) -> LayerMap {
     let mut layers = LayerMap::new();
     for (part, header) in single_channel_parts(headers) {
         add_channels(part, header, &mut layers);

@@ -31,7 +31,7 @@ impl LuminanceChroma {
         Self { channels, size, step, luminance: vec![0.0; size.area()], chroma: [chroma(), chroma()] }
     }
 
-    /// Memory size of the planes after chroma is interpolated along rows.
+    /// Memory size of the planes after interpolating chroma along rows.
     pub(super) fn memory_bytes(headers: &[Header], [_, ry, _]: [ChannelIndex; 3]) -> u64 {
         let size = headers[ry.part].layer_size;
         let rows = size.height() / description(headers, ry).sampling.y();
@@ -47,28 +47,28 @@ impl LuminanceChroma {
             [&mut self.luminance, ry, by].into_iter().zip(widths).zip(self.channels)
         {
             if let Some(row) = plane.chunks_exact_mut(width).nth(row).filter(|_| plane_channel == channel) {
-                line.values(0, row.iter_mut(), |target, value| *target = value);
+                line.for_each_value(0, row.iter_mut(), |target, value| *target = value);
             }
         }
     }
 
     /// Calls `put` with the column, row and color of each pixel. `weights` are the luminance weights of red, green and
     /// blue.
-    pub(super) fn colors(mut self, weights: DVec3, mut put: impl FnMut([usize; 2], [f32; 3])) {
+    pub(super) fn for_each_color(mut self, weights: DVec3, mut put: impl FnMut([usize; 2], [f32; 3])) {
         let (width, height) = (self.size.width(), self.size.height());
         let is_filtered = self.step == Vec2(2, 2);
         self.interpolate_rows();
         if !is_filtered {
             for (index, luminance) in self.luminance.iter().enumerate() {
                 let at = [index % width, index / width];
-                put(at, rgb(*luminance, self.interpolated(at), weights));
+                put(at, luminance_chroma_to_rgb(*luminance, self.interpolated(at), weights));
             }
             return;
         }
         let mut rows = [-1, 0, 1].map(|row| self.row(row, weights));
         for y in 0..height {
             for x in 0..width {
-                put([x, y], saturation_limited([&rows[0], &rows[1], &rows[2]], x, weights));
+                put([x, y], limit_saturation([&rows[0], &rows[1], &rows[2]], x, weights));
             }
             rows.rotate_left(1);
             rows[2] = self.row(y as i64 + 2, weights);
@@ -80,7 +80,8 @@ impl LuminanceChroma {
         let (width, step) = (self.size.width(), self.step.x());
         let interpolated = |plane: &Vec<f32>| -> Vec<f32> {
             let rows = plane.chunks_exact(width / step);
-            rows.flat_map(|row| (0..width).map(|x| in_row(x, self.step, row.len(), |at| row[at]))).collect()
+            rows.flat_map(|row| (0..width).map(|x| interpolate_in_row(x, self.step, row.len(), |at| row[at])))
+                .collect()
         };
         let chroma = [interpolated(&self.chroma[0]), interpolated(&self.chroma[1])];
         self.chroma = chroma;
@@ -96,9 +97,13 @@ impl LuminanceChroma {
                     let row = row.clamp(0, height / 2 - 1) as usize;
                     self.chroma[plane][row * width + x]
                 };
-                if y % 2 == 0 { sample(inside as i64 / 2) } else { filtered((y - 1).div_euclid(2), sample) }
+                if y % 2 == 0 {
+                    sample(inside as i64 / 2)
+                } else {
+                    filter_between((y - 1).div_euclid(2), sample)
+                }
             });
-            rgb(self.luminance[inside * width + x], chroma, weights)
+            luminance_chroma_to_rgb(self.luminance[inside * width + x], chroma, weights)
         };
         (0..width).map(color).collect()
     }
@@ -106,38 +111,40 @@ impl LuminanceChroma {
     /// Chroma of a pixel, interpolated linearly between rows that have samples.
     fn interpolated(&self, [x, y]: [usize; 2]) -> [f32; 2] {
         let (width, rows) = (self.size.width(), self.size.height() / self.step.y());
-        [0, 1].map(|plane| linear(y, self.step.y(), rows, |row| self.chroma[plane][row * width + x]))
+        [0, 1].map(|plane| {
+            interpolate_linearly(y, self.step.y(), rows, |row| self.chroma[plane][row * width + x])
+        })
     }
 }
 
 /// Interpolates chroma at a column, using the filter for 2 × 2 subsampling and linear interpolation for other
 /// factors.
-fn in_row(x: usize, step: Vec2<usize>, count: usize, sample: impl Fn(usize) -> f32) -> f32 {
+fn interpolate_in_row(x: usize, step: Vec2<usize>, count: usize, sample: impl Fn(usize) -> f32) -> f32 {
     if step != Vec2(2, 2) {
-        return linear(x, step.x(), count, sample);
+        return interpolate_linearly(x, step.x(), count, sample);
     }
     let last = count as i64 - 1;
     match x % 2 {
         0 => sample(x / 2),
-        _ => filtered(x as i64 / 2, |at| sample(at.clamp(0, last) as usize)),
+        _ => filter_between(x as i64 / 2, |at| sample(at.clamp(0, last) as usize)),
     }
 }
 
 /// Filtered value between the samples `left` and `left + 1`.
-fn filtered(left: i64, sample: impl Fn(i64) -> f32) -> f32 {
+fn filter_between(left: i64, sample: impl Fn(i64) -> f32) -> f32 {
     let pairs = (0..).zip(WEIGHTS);
     pairs.map(|(away, weight)| weight * (sample(left - away) + sample(left + 1 + away))).sum()
 }
 
 /// Interpolates linearly between samples that are `step` pixels apart. The last sample is repeated.
-fn linear(pixel: usize, step: usize, count: usize, sample: impl Fn(usize) -> f32) -> f32 {
+fn interpolate_linearly(pixel: usize, step: usize, count: usize, sample: impl Fn(usize) -> f32) -> f32 {
     let first = (pixel / step).min(count - 1);
     let (low, fraction) = (sample(first), (pixel % step) as f32 / step as f32);
     if fraction == 0.0 { low } else { low + (sample((first + 1).min(count - 1)) - low) * fraction }
 }
 
 /// Converts luminance and chroma to red, green and blue. Gray is preserved exactly.
-fn rgb(luminance: f32, [ry, by]: [f32; 2], weights: DVec3) -> [f32; 3] {
+fn luminance_chroma_to_rgb(luminance: f32, [ry, by]: [f32; 2], weights: DVec3) -> [f32; 3] {
     if ry == 0.0 && by == 0.0 {
         return [luminance; 3];
     }
@@ -149,7 +156,7 @@ fn rgb(luminance: f32, [ry, by]: [f32; 2], weights: DVec3) -> [f32; 3] {
 
 /// Limits a pixel's saturation based on its neighbors' saturation, preserving luminance
 /// (`RgbaYca::fixSaturation`).
-fn saturation_limited([above, row, below]: [&[[f32; 3]]; 3], x: usize, weights: DVec3) -> [f32; 3] {
+fn limit_saturation([above, row, below]: [&[[f32; 3]]; 3], x: usize, weights: DVec3) -> [f32; 3] {
     let (left, right) = (x.saturating_sub(1), (x + 1).min(row.len() - 1));
     let corners = [above[left], above[right], below[left], below[right]].map(saturation);
     let mean = (0.25 * corners.iter().sum::<f32>()).min(1.0);

@@ -19,15 +19,15 @@ use ::image::{ColorType, ImageDecoder, ImageError, ImageFormat, ImageResult};
 use super::metadata::{AlphaUsage, ImageMetadata};
 use super::primaries::Primaries;
 use super::space::ColorSpace;
-use channels::{ChannelIndex, ChosenChannels, choose, no_color};
+use channels::{ChannelIndex, ChosenChannels, choose_channels, no_color};
 use chroma::LuminanceChroma;
 use sampling::{BlockDecompressor, ChannelSampling, FullSamplingReader};
 
 /// Size of a decoded sample.
 const SAMPLE_BYTES: usize = 4;
 
-/// Decodes color or gray, and alpha, from one layer. The image is the display window at the highest
-/// resolution, black outside the data window.
+/// Decodes one layer: color or gray, and alpha if present. The image covers the display window at the highest
+/// resolution and is black outside the data window.
 pub(super) struct ExrDecoder<R> {
     reader: Reader<FullSamplingReader<R>>,
     channels: ChosenChannels,
@@ -37,17 +37,17 @@ pub(super) struct ExrDecoder<R> {
 impl<R: BufRead + Seek> ExrDecoder<R> {
     /// Creates a decoder that allocates at most `memory_bytes` in addition to the pixels.
     pub(super) fn new(mut file: R, memory_bytes: u64) -> ImageResult<Self> {
-        let samplings = sampling::find(&mut file).map_err(ImageError::IoError)?;
+        let samplings = sampling::read_samplings(&mut file).map_err(ImageError::IoError)?;
         let file = FullSamplingReader::new(file, &samplings);
         let reader = ::exr::block::read(file, false).map_err(image_error)?;
-        let Some(channels) = choose(reader.headers()) else {
+        let Some(channels) = choose_channels(reader.headers()) else {
             return Err(decoding_error(no_color(reader.headers())));
         };
         let decompressor = BlockDecompressor::new(reader.meta_data(), &samplings);
         check_samplings(decompressor.headers(), channels).map_err(decoding_error)?;
         let needed = channels.all().map(|channel| block_bytes(&reader.headers()[channel.part])).max();
         let chroma_bytes = channels
-            .planes()
+            .luminance_chroma_channels()
             .map_or(0, |planes| LuminanceChroma::memory_bytes(decompressor.headers(), planes));
         if needed.unwrap_or_default().saturating_add(chroma_bytes) > memory_bytes {
             return Err(ImageError::Limits(LimitError::from_kind(LimitErrorKind::InsufficientMemory)));
@@ -60,7 +60,7 @@ impl<R: BufRead + Seek> ExrDecoder<R> {
         let mut metadata = ImageMetadata { alpha: AlphaUsage::Premultiplied, ..ImageMetadata::default() };
         if let Some(primaries) = primaries(self.header()) {
             match primaries.to_rec_709() {
-                Some(matrix) => metadata.space = ColorSpace::of_matrix(matrix),
+                Some(matrix) => metadata.space = ColorSpace::from_rec_709_matrix(matrix),
                 None => metadata.warn(DEGENERATE_CHROMATICITIES),
             }
         }
@@ -68,7 +68,7 @@ impl<R: BufRead + Seek> ExrDecoder<R> {
     }
 
     fn header(&self) -> &Header {
-        let [red, ..] = self.channels.slots();
+        let [red, ..] = self.channels.component_channels();
         &self.reader.headers()[red.map_or(0, |channel| channel.part)]
     }
 }
@@ -116,9 +116,10 @@ fn check_samplings(headers: &[Header], channels: ChosenChannels) -> Result<(), S
     if !channels.all().all(|channel| is_divided(&channel)) {
         return Err(SIZE_NOT_DIVISIBLE.to_owned());
     }
-    match channels.slots().into_iter().flatten().find(|channel| sampling(*channel) != Vec2(1, 1)) {
+    match channels.component_channels().into_iter().flatten().find(|channel| sampling(*channel) != Vec2(1, 1))
+    {
         Some(channel) => Err(subsampled(&description(headers, channel).name.to_string())),
-        None => match channels.planes() {
+        None => match channels.luminance_chroma_channels() {
             Some([_, ry, by]) if sampling(ry) != sampling(by) => Err(CHROMA_DIFFERS.to_owned()),
             Some(_) | None => Ok(()),
         },
@@ -143,7 +144,7 @@ impl<R: BufRead + Seek> ImageDecoder for ExrDecoder<R> {
         let mut image = PartialImage {
             headers: &headers,
             channels,
-            planes: channels.planes().map(|planes| LuminanceChroma::new(&headers, planes)),
+            planes: channels.luminance_chroma_channels().map(|planes| LuminanceChroma::new(&headers, planes)),
         };
         samples.fill(0);
         let is_read = |part: usize| channels.all().any(|channel| channel.part == part);
@@ -191,17 +192,24 @@ impl PartialImage<'_> {
                 if let Some(planes) = &mut self.planes {
                     planes.add(channel, row / down, line);
                 }
-                self.copy(channel, [left, row], line, samples);
+                self.copy_channel_row(channel, [left, row], line, samples);
             }
         }
     }
 
-    /// Copies a row of a channel to its slots. `left` and `row` are relative to the data window.
-    fn copy(&self, channel: ChannelIndex, [left, row]: [usize; 2], line: ChannelRow<'_>, samples: &mut [u8]) {
+    /// Copies a row of a channel to the pixel components read from it. `left` and `row` are relative to the
+    /// data window.
+    fn copy_channel_row(
+        &self,
+        channel: ChannelIndex,
+        [left, row]: [usize; 2],
+        line: ChannelRow<'_>,
+        samples: &mut [u8],
+    ) {
         let header = &self.headers[channel.part];
         let window = header.shared_attributes.display_window;
         let offset = header.own_attributes.layer_position - window.position;
-        let slots = self.channels.slots();
+        let slots = self.channels.component_channels();
         let pixel_bytes = pixel_bytes(self.channels);
         let Ok(row) = usize::try_from(row as i64 + i64::from(offset.y())) else { return };
         let width = window.size.width() * pixel_bytes;
@@ -211,7 +219,7 @@ impl PartialImage<'_> {
             let (skipped, start) =
                 if start < 0 { (start.unsigned_abs() as usize, 0) } else { (0, start as usize) };
             let pixels = row.chunks_exact_mut(pixel_bytes).skip(start);
-            line.values(skipped, pixels, |pixel, value| {
+            line.for_each_value(skipped, pixels, |pixel, value| {
                 pixel[SAMPLE_BYTES * slot..][..SAMPLE_BYTES].copy_from_slice(&value.to_ne_bytes());
             });
         }
@@ -219,7 +227,9 @@ impl PartialImage<'_> {
 
     /// Computes colors from luminance and chroma.
     fn add_chroma(self, samples: &mut [u8]) {
-        let (Some([y, ..]), Some(planes)) = (self.channels.planes(), self.planes) else { return };
+        let (Some([y, ..]), Some(planes)) = (self.channels.luminance_chroma_channels(), self.planes) else {
+            return;
+        };
         let header = &self.headers[y.part];
         let window = header.shared_attributes.display_window;
         let weights = primaries(header).unwrap_or(Primaries::REC_709).luminance_weights();
@@ -227,7 +237,7 @@ impl PartialImage<'_> {
         let offset = header.own_attributes.layer_position - window.position;
         let (width, height) = (window.size.width() as i64, window.size.height() as i64);
         let bytes = pixel_bytes(self.channels);
-        planes.colors(weights, |[x, y], color| {
+        planes.for_each_color(weights, |[x, y], color| {
             let (x, y) = (x as i64 + i64::from(offset.x()), y as i64 + i64::from(offset.y()));
             if !(0..width).contains(&x) || !(0..height).contains(&y) {
                 return;
@@ -254,7 +264,7 @@ struct ChannelRow<'a> {
 impl ChannelRow<'_> {
     /// Skips the first `skipped` values, then passes each remaining value to `put` with the next item of
     /// `targets`.
-    fn values<T>(self, skipped: usize, targets: impl Iterator<Item = T>, put: impl Fn(T, f32)) {
+    fn for_each_value<T>(self, skipped: usize, targets: impl Iterator<Item = T>, put: impl Fn(T, f32)) {
         fn each<const N: usize, T>(
             bytes: &[u8],
             skipped: usize,

@@ -16,16 +16,16 @@ const HEADER_BYTES: u64 = 1 << 20;
 /// Offset of the first header, after the magic number and version.
 const START: usize = 8;
 
-/// Sampling of a channel, and the byte offset in the file of the two integers that store it.
+/// Sampling of a channel, and the file offset of the two integers that contain it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct ChannelSampling {
     at: u64,
     step: Vec2<usize>,
 }
 
-/// Reads the sampling of all channels of each part. Returns an empty list if no channel is subsampled, or if
-/// the headers are malformed, because `exr` reports malformed headers.
-pub(super) fn find(file: &mut (impl Read + Seek)) -> io::Result<Vec<Vec<ChannelSampling>>> {
+/// Reads the sampling of all channels of each part. Returns an empty list if no channel is subsampled or the
+/// headers are malformed. `exr` reports malformed headers.
+pub(super) fn read_samplings(file: &mut (impl Read + Seek)) -> io::Result<Vec<Vec<ChannelSampling>>> {
     let mut bytes = Vec::new();
     file.by_ref().take(HEADER_BYTES).read_to_end(&mut bytes)?;
     file.seek(SeekFrom::Start(0))?;
@@ -92,7 +92,7 @@ impl<'a> HeaderParser<'a> {
     }
 }
 
-/// A file whose headers appear to have no subsampled channels.
+/// Wraps a file, and patches its headers when read, so that no channel appears to be subsampled.
 pub(super) struct FullSamplingReader<R> {
     file: R,
     at: u64,

@@ -165,7 +165,7 @@ fn unusable_channels_are_rejected() {
         let _ = load_bytes("a.exr", &whole[..length], ImageEncoding::Color);
     }
     assert!(load_bytes("a.exr", &whole[..whole.len() - 3], ImageEncoding::Color).is_err());
-    // Declare in the header that the channel is sampled only at every other pixel.
+    // Patch the header to sample the channel at every other pixel.
     let mut sampled = whole;
     let at = sampled.windows(8).position(|sampling| sampling == [1, 0, 0, 0, 1, 0, 0, 0]).expect("a channel");
     sampled[at] = 2;

@@ -44,7 +44,7 @@ fn header_variants_are_read() {
     }
 }
 
-/// Indices (from the top left) of the pixels of a 3 × 2 image, in file order.
+/// Pixel indices of a 3 × 2 image in file order, numbered from the top left.
 #[test]
 fn all_orientations_decode_to_the_same_image() {
     for (size, order) in [
@@ -152,7 +152,7 @@ fn scanline_encodings_decode_to_the_same_pixels() {
     let found = texels(&file("", size, &old), ImageEncoding::Color);
     assert_eq!(found[..516], vec![Vec3::new(5.0, 6.0, 7.0); 516]);
     assert_eq!(found[516..], [Vec3::new(8.0, 0.0, 0.0); 2]);
-    // This line starts like a run-length encoded line but has too few pixels to be one.
+    // This line starts like a run-length encoded line, but is too short for this encoding.
     assert_eq!(texels(&file("", "-Y 1 +X 1", &[2, 2, 0, 1]), ImageEncoding::Color).len(), 1);
 }
 

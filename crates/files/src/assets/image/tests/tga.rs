@@ -45,7 +45,7 @@ fn tga_alpha_is_set_by_header_or_extension() {
     };
     assert!((cut_out(&file(8, [51, 0, 102, 102], Some(4))) - Vec3::new(1.0, 0.0, 0.5)).length() < 1e-6);
     assert!((cut_out(&file(8, [51, 0, 102, 102], None)) - Vec3::new(0.4, 0.0, 0.2)).length() < 1e-6);
-    // A footer with an extension area past the end of the file.
+    // A footer that points to an extension area past the end of the file.
     let mut broken = file(8, white, Some(3));
     broken.truncate(18 + 4);
     broken.extend([255, 255, 255, 127, 0, 0, 0, 0]);

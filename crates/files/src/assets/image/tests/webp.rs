@@ -18,7 +18,7 @@ fn animation(colors: &[[u8; 3]]) -> Vec<u8> {
     for color in colors {
         let mut still = Vec::new();
         WebPEncoder::new(&mut still).encode(color, 1, 1, ColorType::Rgb8).expect("written");
-        // Position, size, duration, and the flag for no blending, followed by the image chunk.
+        // Position, size, duration and the no-blending flag, followed by the image chunk.
         let mut frame = vec![0; 12];
         frame.extend([100, 0, 0, 0x02]);
         frame.extend(&still[12..]);

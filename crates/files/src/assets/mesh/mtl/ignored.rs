@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::map::{Map, MapKind};
-use super::material::{is_hidden_by_tr, material};
+use super::material::{is_opaque_despite_tr, material};
 use super::statements::{MtlColor, MtlNumber};
 use super::{MtlMaterial, WithLine};
 use crate::assets::FileMaterial;
@@ -58,7 +58,7 @@ fn material_warnings(found: &MtlMaterial) -> Vec<IgnoredStatement> {
     if is_glass && converted.ior <= 1.0 {
         add(line_of_model, INVISIBLE_GLASS);
     }
-    if is_hidden_by_tr(found) && converted.opacity_texture.is_none() && !is_glass {
+    if is_opaque_despite_tr(found) && converted.opacity_texture.is_none() && !is_glass {
         let line = found.numbers[MtlNumber::Transparency as usize].map(|at| at.line);
         add(line, OPAQUE_TR);
     }
@@ -68,10 +68,10 @@ fn material_warnings(found: &MtlMaterial) -> Vec<IgnoredStatement> {
     {
         add(Some(at.line), FILTER_IGNORED);
     }
-    add_reflection(found, &converted, model, &mut add);
-    add_physical(found, &mut add);
+    warn_about_reflectance(found, &converted, model, &mut add);
+    warn_about_pbr(found, &mut add);
     for (kind, map) in &found.maps {
-        add_map(found, (*kind, map), &mut add);
+        warn_about_map(found, (*kind, map), &mut add);
     }
     ignored
 }
@@ -107,7 +107,7 @@ fn line<T>(at: Option<WithLine<T>>) -> Option<usize> {
 }
 
 /// Warns about reflectances that cannot be rendered as specified.
-fn add_reflection(
+fn warn_about_reflectance(
     found: &MtlMaterial,
     converted: &FileMaterial,
     model: u8,
@@ -142,7 +142,7 @@ fn add_reflection(
 }
 
 /// Warns about parameters of the PBR extension that have no effect.
-fn add_physical(found: &MtlMaterial, add: &mut impl FnMut(Option<usize>, &str)) {
+fn warn_about_pbr(found: &MtlMaterial, add: &mut impl FnMut(Option<usize>, &str)) {
     for number in [MtlNumber::Sheen, MtlNumber::Anisotropy, MtlNumber::AnisotropyRotation] {
         let given = found.numbers[number as usize].filter(|at| at.value != 0.0);
         if let Some(at) = given {
@@ -152,12 +152,17 @@ fn add_physical(found: &MtlMaterial, add: &mut impl FnMut(Option<usize>, &str)) 
 }
 
 /// Warns about an unsupported map or unsupported options of a map.
-fn add_map(found: &MtlMaterial, (kind, map): (MapKind, &Map), add: &mut impl FnMut(Option<usize>, &str)) {
+fn warn_about_map(
+    found: &MtlMaterial,
+    (kind, map): (MapKind, &Map),
+    add: &mut impl FnMut(Option<usize>, &str),
+) {
     match kind {
         MapKind::Other(name) => return add(Some(map.line), &map_unsupported(name)),
         MapKind::Ambient => {
-            let is_diffuse =
-                found.map(MapKind::Diffuse).is_some_and(|diffuse| diffuse.files().eq(map.files()));
+            let is_diffuse = found
+                .map(MapKind::Diffuse)
+                .is_some_and(|diffuse| diffuse.candidate_paths().eq(map.candidate_paths()));
             if !is_diffuse {
                 add(Some(map.line), AMBIENT_MAP);
             }
@@ -172,7 +177,7 @@ fn add_map(found: &MtlMaterial, (kind, map): (MapKind, &Map), add: &mut impl FnM
         | MapKind::Roughness
         | MapKind::Metallic => {}
     }
-    for option in map.ignored(kind) {
+    for option in map.ignored_options(kind) {
         add(Some(map.line), &option_ignored(&option));
     }
 }

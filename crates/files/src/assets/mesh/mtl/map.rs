@@ -150,7 +150,7 @@ impl Map {
                     self.strength = strength;
                 }
             }
-            "-clamp" => self.is_clamped = rest.switch().unwrap_or(false),
+            "-clamp" => self.is_clamped = rest.next_switch().unwrap_or(false),
             "-imfchan" => self.add_channel(rest),
             "-boost" | "-texres" => {
                 if rest.numbers([0.0]) != [0.0] {
@@ -158,12 +158,12 @@ impl Map {
                 }
             }
             "-blendu" | "-blendv" => {
-                if rest.switch() == Some(false) {
+                if rest.next_switch() == Some(false) {
                     self.ignored.push(format!("{option} off"));
                 }
             }
             "-cc" => {
-                if rest.switch() == Some(true) {
+                if rest.next_switch() == Some(true) {
                     self.ignored.push("-cc on".to_owned());
                 }
             }
@@ -190,8 +190,8 @@ impl Map {
         };
     }
 
-    /// Options that have no effect on a map of this kind.
-    pub(super) fn ignored(&self, kind: MapKind) -> impl Iterator<Item = String> {
+    /// Options that have no effect on this kind of map.
+    pub(super) fn ignored_options(&self, kind: MapKind) -> impl Iterator<Item = String> {
         let channel =
             (self.number.is_some() && (kind.is_color() || kind.is_normal())).then(|| "-imfchan".to_owned());
         let range = (self.range != [0.0, 1.0] && kind.is_normal()).then(|| "-mm".to_owned());
@@ -201,8 +201,8 @@ impl Map {
 
     /// Candidate paths of the image file, relative to the MTL file's folder: the whole name, then the name
     /// with possible comments removed.
-    pub(super) fn files(&self) -> impl Iterator<Item = PathBuf> {
-        cut_at_comments(&self.name).flat_map(|name| spellings(&name.replace('\\', "/")))
+    pub(super) fn candidate_paths(&self) -> impl Iterator<Item = PathBuf> {
+        without_trailing_comments(&self.name).flat_map(|name| decoded_paths(&name.replace('\\', "/")))
     }
 
     /// Texture for this map. Its path is the first candidate that exists, or the first candidate if none
@@ -216,7 +216,7 @@ impl Map {
             is_clamped: self.is_clamped,
             range: (base, gain),
             number: self.number,
-            ..FileTexture::new(first_existing(folder, self.files())?)
+            ..FileTexture::new(first_existing(folder, self.candidate_paths())?)
         })
     }
 }
@@ -262,7 +262,7 @@ impl<'a> MapArguments<'a> {
     }
 
     /// Consumes `on` or `off`.
-    fn switch(&mut self) -> Option<bool> {
+    fn next_switch(&mut self) -> Option<bool> {
         let (word, _) = self.0.split_once(char::is_whitespace)?;
         let value = [("on", true), ("off", false)];
         let (_, is_on) = value.into_iter().find(|(name, _)| word.eq_ignore_ascii_case(name))?;
@@ -271,21 +271,21 @@ impl<'a> MapArguments<'a> {
     }
 }
 
-/// Returns the text, then the text without its last comment, and so on.
-pub(in crate::assets::mesh) fn cut_at_comments(text: &str) -> impl Iterator<Item = &str> {
+/// Yields the whole text, then the text without its last comment, and so on.
+pub(in crate::assets::mesh) fn without_trailing_comments(text: &str) -> impl Iterator<Item = &str> {
     let is_comment = |(at, _): &(usize, &str)| text[..*at].ends_with([' ', '\t']);
     let cuts = text.rmatch_indices('#').filter(is_comment).map(|(at, _)| text[..at].trim_end());
     std::iter::once(text).chain(cuts).filter(|text| !text.is_empty())
 }
 
-/// Returns the name in UTF-8, and also in Latin-1 if it has non-ASCII letters.
-pub(in crate::assets::mesh) fn spellings(name: &str) -> impl Iterator<Item = PathBuf> + use<> {
+/// Yields the name encoded as UTF-8, and also as Latin-1 if it has non-ASCII letters.
+pub(in crate::assets::mesh) fn decoded_paths(name: &str) -> impl Iterator<Item = PathBuf> + use<> {
     let latin1: Option<Vec<u8>> = name.chars().map(|letter| u8::try_from(u32::from(letter)).ok()).collect();
     let latin1 = latin1.filter(|_| !name.is_ascii()).map(|bytes| PathBuf::from(OsStr::from_bytes(&bytes)));
     std::iter::once(PathBuf::from(name)).chain(latin1)
 }
 
-/// The first of these files that exists, or the first one if none exists.
+/// Returns the first file that exists, or the first file in the list if none exists.
 pub(in crate::assets::mesh) fn first_existing(
     folder: &Path,
     names: impl Iterator<Item = PathBuf>,

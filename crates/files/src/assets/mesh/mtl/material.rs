@@ -39,7 +39,7 @@ pub(in crate::assets::mesh) fn material(found: &MtlMaterial, folder: &Path) -> F
         emission_texture,
         normal_texture: normals.and_then(|map| map.texture(folder)),
         normal_strength: normals.map_or(1.0, |map| map.strength as f32),
-        physical: physical(found, folder),
+        physical: pbr_extension(found, folder),
     }
 }
 
@@ -53,17 +53,18 @@ fn color(found: &MtlMaterial, color: MtlColor, default: f32) -> Vec3 {
 fn opacity(found: &MtlMaterial) -> f32 {
     let transparency = found.number(MtlNumber::Transparency).map(|part| 1.0 - part);
     let opacity = found.number(MtlNumber::Dissolve).or(transparency);
-    if is_hidden_by_tr(found) { 1.0 } else { opacity.unwrap_or(1.0).clamp(0.0, 1.0) as f32 }
+    if is_opaque_despite_tr(found) { 1.0 } else { opacity.unwrap_or(1.0).clamp(0.0, 1.0) as f32 }
 }
 
-/// Whether the material has `Tr` 1 but no `d`. MeshLab and other programs write opaque materials this way.
-pub(super) fn is_hidden_by_tr(found: &MtlMaterial) -> bool {
+/// Whether the material has `Tr` 1 but no `d`, which is how MeshLab and other programs write opaque
+/// materials.
+pub(super) fn is_opaque_despite_tr(found: &MtlMaterial) -> bool {
     let transparency = found.number(MtlNumber::Transparency);
     found.number(MtlNumber::Dissolve).is_none() && transparency.is_some_and(|part| part >= 1.0)
 }
 
 /// The PBR extension, if the material uses it.
-fn physical(found: &MtlMaterial, folder: &Path) -> Option<PhysicalMaterial> {
+fn pbr_extension(found: &MtlMaterial, folder: &Path) -> Option<PhysicalMaterial> {
     const NUMBERS: [MtlNumber; 7] = [
         MtlNumber::Roughness,
         MtlNumber::Metallic,

@@ -7,11 +7,11 @@ mod statements;
 
 use std::path::{Path, PathBuf};
 
-use super::text::{decoded, with_line_feeds, without_mark};
+use super::text::{decoded, strip_byte_order_mark, with_line_feeds};
 use crate::assets::read::{self, Monitor};
 use crate::assets::{AssetError, FileHash};
 pub(super) use ignored::{IgnoredStatement, warnings};
-pub(super) use map::{cut_at_comments, first_existing, spellings};
+pub(super) use map::{decoded_paths, first_existing, without_trailing_comments};
 pub(super) use material::material;
 use statements::{MtlColor, MtlNumber, Statement};
 
@@ -27,7 +27,7 @@ pub(super) struct MtlLibrary {
     pub(super) hash: FileHash,
 }
 
-/// Statements of a material. The last of several equal statements is used.
+/// Statements of a material. If a statement is repeated, the last one is used.
 #[derive(Clone, Debug, Default)]
 pub(super) struct MtlMaterial {
     pub(super) name: String,
@@ -64,7 +64,7 @@ impl MtlMaterial {
 
     /// Files of all maps, including unsupported ones.
     pub(super) fn image_paths(&self, folder: &Path) -> impl Iterator<Item = PathBuf> {
-        self.maps.iter().flat_map(|(_, map)| map.files()).map(move |file| folder.join(file))
+        self.maps.iter().flat_map(|(_, map)| map.candidate_paths()).map(move |file| folder.join(file))
     }
 }
 
@@ -76,7 +76,7 @@ pub(super) fn load(path: &Path, monitor: Monitor<'_>) -> Result<MtlLibrary, Asse
     let quiet = Monitor { progress: &crate::control::ignore_progress, ..monitor };
     let bytes = read::text(path, FILE_LIMIT, quiet)?;
     let hash = read::hash(&bytes);
-    let bytes = with_line_feeds(without_mark(&bytes));
+    let bytes = with_line_feeds(strip_byte_order_mark(&bytes));
     let mut library = MtlLibrary { materials: Vec::new(), ignored: Vec::new(), hash };
     for (index, line) in bytes.split(|byte| *byte == b'\n').enumerate() {
         let line = decoded(line);

@@ -89,10 +89,10 @@ pub(super) fn parse(line: &str) -> Result<Statement, String> {
         return name.map(Statement::New).ok_or_else(|| expected_after("newmtl", "a name"));
     }
     if let Some((color, _)) = MtlColor::ALL.into_iter().find(|(_, name)| is(name)) {
-        return self::color(keyword, color, rest);
+        return parse_color(keyword, color, rest);
     }
     if let Some((number, _)) = MtlNumber::ALL.into_iter().find(|(_, name)| is(name)) {
-        return self::number(keyword, number, rest);
+        return parse_number(keyword, number, rest);
     }
     if let Some(kind) = MapKind::from_keyword(keyword) {
         return match Map::parse(rest) {
@@ -118,7 +118,7 @@ pub(super) const ONE_NUMBER: &str = "a finite number";
 pub(super) const INTEGER: &str = "an integer";
 
 pub(super) fn unknown_statement(keyword: &str) -> String {
-    format!("unknown statement `{}` is ignored", truncated(keyword))
+    format!("unknown statement `{}` is ignored", truncate_word(keyword))
 }
 
 pub(super) fn spectrum_unsupported(keyword: &str) -> String {
@@ -126,12 +126,12 @@ pub(super) fn spectrum_unsupported(keyword: &str) -> String {
 }
 
 /// The first 20 characters of a word.
-fn truncated(word: &str) -> String {
+fn truncate_word(word: &str) -> String {
     word.chars().take(20).collect()
 }
 
 /// Words before a comment.
-fn words(rest: &str) -> Vec<&str> {
+fn words_before_comment(rest: &str) -> Vec<&str> {
     rest.split('#').next().unwrap_or_default().split_whitespace().collect()
 }
 
@@ -140,8 +140,8 @@ fn finite<T: std::str::FromStr + Into<f64>>(word: &str) -> Option<f64> {
 }
 
 /// Parses a color: three numbers or a single gray value.
-fn color(keyword: &str, color: MtlColor, rest: &str) -> Result<Statement, String> {
-    let words = words(rest);
+fn parse_color(keyword: &str, color: MtlColor, rest: &str) -> Result<Statement, String> {
+    let words = words_before_comment(rest);
     let (is_xyz, words) = match words.as_slice() {
         ["spectral", ..] => {
             return Ok(Statement::Ignored(spectrum_unsupported(keyword)));
@@ -155,11 +155,11 @@ fn color(keyword: &str, color: MtlColor, rest: &str) -> Result<Statement, String
         Some([red, green, blue]) => [*red, *green, *blue],
         Some(_) | None => return Err(expected_after(keyword, THREE_NUMBERS)),
     };
-    Ok(Statement::Color(color, if is_xyz { rgb(values) } else { values }))
+    Ok(Statement::Color(color, if is_xyz { xyz_to_rgb(values) } else { values }))
 }
 
 /// Converts CIE XYZ to linear Rec. 709 (ITU-R BT.709 primaries, D65 white).
-fn rgb([x, y, z]: [f64; 3]) -> [f64; 3] {
+fn xyz_to_rgb([x, y, z]: [f64; 3]) -> [f64; 3] {
     [
         3.240_97 * x - 1.537_38 * y - 0.498_61 * z,
         -0.969_24 * x + 1.875_97 * y + 0.041_56 * z,
@@ -168,8 +168,8 @@ fn rgb([x, y, z]: [f64; 3]) -> [f64; 3] {
 }
 
 /// Parses a number. Treats `d -halo` like `d`.
-fn number(keyword: &str, number: MtlNumber, rest: &str) -> Result<Statement, String> {
-    let words = words(rest);
+fn parse_number(keyword: &str, number: MtlNumber, rest: &str) -> Result<Statement, String> {
+    let words = words_before_comment(rest);
     let word = match words.as_slice() {
         ["-halo", word, ..] if number == MtlNumber::Dissolve => Some(word),
         words => words.first(),
@@ -179,6 +179,6 @@ fn number(keyword: &str, number: MtlNumber, rest: &str) -> Result<Statement, Str
 }
 
 fn illumination(rest: &str) -> Result<Statement, String> {
-    let number = words(rest).first().and_then(|word| word.parse().ok());
+    let number = words_before_comment(rest).first().and_then(|word| word.parse().ok());
     number.map(Statement::Illumination).ok_or_else(|| expected_after("illum", INTEGER))
 }

@@ -68,7 +68,7 @@ impl VertexBuilder<'_> {
                 let vertex = self.vertex(*corner, run.smoothing);
                 self.parsed.faces.corner(vertex);
             }
-            self.parsed.faces.close(arity);
+            self.parsed.faces.end_face(arity);
             self.corner += arity;
         }
         if self.has_materials {

@@ -3,12 +3,12 @@
 use std::collections::{BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 
-use super::super::mtl::{self, MtlLibrary, cut_at_comments, spellings};
+use super::super::mtl::{self, MtlLibrary, decoded_paths, without_trailing_comments};
 use super::super::{AssetError, MeshSource};
 use crate::assets::{Companion, FileMaterial};
 
 /// Loads the libraries referenced by an OBJ file, in order of occurrence.
-pub(super) struct Libraries<'a> {
+pub(super) struct MtlLibraries<'a> {
     pub(super) source: &'a MeshSource<'a>,
     /// Names of the materials used by the OBJ file.
     pub(super) used: &'a BTreeSet<String>,
@@ -28,20 +28,22 @@ pub(super) struct LibraryContents {
     pub(super) images: Vec<PathBuf>,
 }
 
-impl Libraries<'_> {
+impl MtlLibraries<'_> {
     /// Loads the libraries in a statement and returns the material index of each used name they define.
     /// Missing files only cause warnings.
     pub(super) fn load(&mut self, statement: &str) -> Result<HashMap<String, usize>, AssetError> {
         let folder = self.source.path.parent().unwrap_or(Path::new(""));
-        let readings = cut_at_comments(statement).flat_map(|name| [name.to_owned(), name.replace('\\', "/")]);
-        let readings = readings.flat_map(|name| spellings(&name));
+        let readings =
+            without_trailing_comments(statement).flat_map(|name| [name.to_owned(), name.replace('\\', "/")]);
+        let readings = readings.flat_map(|name| decoded_paths(&name));
         let single = readings.map(|name| folder.join(name)).find(|path| path.exists());
         let names = single.map_or_else(
             || {
-                let names = cut_at_comments(statement).last().unwrap_or(statement).replace('\\', "/");
+                let names =
+                    without_trailing_comments(statement).last().unwrap_or(statement).replace('\\', "/");
                 names
                     .split_whitespace()
-                    .filter_map(|name| mtl::first_existing(folder, spellings(name)))
+                    .filter_map(|name| mtl::first_existing(folder, decoded_paths(name)))
                     .collect()
             },
             |path| vec![path],
@@ -54,17 +56,17 @@ impl Libraries<'_> {
         Ok(indices)
     }
 
-    /// Returns the material index of each used name. In both file formats, names may contain `#` (`Material
-    /// #25`) and may be followed by comments, so the longest match is used.
+    /// Returns the material index of each used name. In both OBJ and MTL files, a name may contain `#`
+    /// (`Material #25`) or be followed by a comment, so the longest match is used.
     fn resolve<'n>(&self, names: impl Iterator<Item = &'n str>) -> HashMap<String, usize> {
         let all: Vec<_> = names.enumerate().map(|(index, name)| (name, index)).collect();
         let mut known: HashMap<&str, usize> = all.iter().copied().collect();
         for (name, index) in all {
-            for name in cut_at_comments(name) {
+            for name in without_trailing_comments(name) {
                 known.entry(name).or_insert(index);
             }
         }
-        let index = |name: &String| cut_at_comments(name).find_map(|name| known.get(name).copied());
+        let index = |name: &String| without_trailing_comments(name).find_map(|name| known.get(name).copied());
         self.used.iter().filter_map(|name| Some((name.clone(), index(name)?))).collect()
     }
 

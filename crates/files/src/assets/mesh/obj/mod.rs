@@ -1,5 +1,5 @@
-//! OBJ (Wavefront, *Object Files*, 1995). Its polygons have separate indices for position, texture
-//! coordinates and normal, which are converted to single-index vertices.
+//! OBJ (Wavefront, *Object Files*, 1995). Each polygon corner has separate indices for its position, texture
+//! coordinates and normal. The indices are converted to single-index vertices.
 
 mod build;
 mod libraries;
@@ -15,7 +15,7 @@ use super::text::with_line_feeds;
 use super::{AssetError, LoadedMesh, MeshSource};
 use crate::assets::FileMaterial;
 use build::{FaceRun, build};
-use libraries::{Libraries, LibraryContents};
+use libraries::{LibraryContents, MtlLibraries};
 use statements::{CornerIndices, NONE, Smoothing, StateChange, Statements, face_start};
 
 pub(super) fn parse(source: &MeshSource<'_>) -> Result<LoadedMesh, AssetError> {
@@ -25,7 +25,7 @@ pub(super) fn parse(source: &MeshSource<'_>) -> Result<LoadedMesh, AssetError> {
 fn parse_lines(source: &MeshSource<'_>) -> Result<LoadedMesh, AssetError> {
     let mut statements = Statements::read(source)?;
     let materials = ObjMaterials::load(source, &statements.changes)?;
-    let runs = runs(&statements, &materials.used);
+    let runs = split_into_runs(&statements, &materials.used);
     let mut parsed = ParsedMesh {
         materials: materials.all,
         material_warnings: materials.warnings,
@@ -35,7 +35,7 @@ fn parse_lines(source: &MeshSource<'_>) -> Result<LoadedMesh, AssetError> {
         ..ParsedMesh::default()
     };
     build(&statements, &runs, &mut parsed);
-    parsed.warnings.extend(missing_uvs(source, &statements, &runs));
+    parsed.warnings.extend(partial_uvs_warning(source, &statements, &runs));
     drop(statements);
     assemble_text(source, parsed, |face| Some(face_start(source, face)))
 }
@@ -61,7 +61,7 @@ impl ObjMaterials {
             | StateChange::Smoothing(_) => None,
         };
         let names: BTreeSet<String> = changes.iter().filter_map(|(_, change)| name_of(change)).collect();
-        let mut libraries = Libraries { source, used: &names, found: LibraryContents::default() };
+        let mut libraries = MtlLibraries { source, used: &names, found: LibraryContents::default() };
         let mut known = HashMap::new();
         let mut used = Vec::new();
         for (_, change) in changes {
@@ -89,7 +89,7 @@ fn unknown_material(name: &str) -> String {
 }
 
 /// Splits the faces into runs between state changes.
-fn runs(statements: &Statements, materials: &[u32]) -> Vec<FaceRun> {
+fn split_into_runs(statements: &Statements, materials: &[u32]) -> Vec<FaceRun> {
     let mut materials = materials.iter();
     let mut runs =
         vec![FaceRun { faces: 0, material: NONE, smoothing: Smoothing::Unspecified, is_object: false }];
@@ -117,7 +117,7 @@ fn runs(statements: &Statements, materials: &[u32]) -> Vec<FaceRun> {
 }
 
 /// Warns about objects in which only some corners have texture coordinates.
-fn missing_uvs(source: &MeshSource<'_>, statements: &Statements, runs: &[FaceRun]) -> Option<String> {
+fn partial_uvs_warning(source: &MeshSource<'_>, statements: &Statements, runs: &[FaceRun]) -> Option<String> {
     let (mut face, mut corner) = (0, 0);
     let (mut first, mut count) = (None, 0);
     for object in runs.chunk_by(|_, next| !next.is_object) {

@@ -10,13 +10,13 @@ use crate::math::{DVec2, DVec3, Vec2, Vec3};
 /// Number of statements between two polls of the cancel token.
 const BATCH: u64 = 1 << 13;
 
-/// Index of an attribute missing from a corner.
+/// Index used for an attribute that a corner lacks.
 pub(super) const NONE: u32 = u32::MAX;
 
 /// Position, texture coordinate and normal index of a corner, starting at 0.
 pub(super) type CornerIndices = [u32; 3];
 
-/// Smoothing of faces without normals.
+/// How faces without normals are smoothed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Smoothing {
     /// No `s` statement precedes the face.
@@ -88,7 +88,7 @@ impl Statements {
         let start = words.at();
         let Some(keyword) = words.word() else {
             if let Some(paint) = words.line().strip_prefix(b"#MRGB ") {
-                self.vertices.read_paint(paint);
+                self.vertices.read_mrgb_colors(paint);
             }
             return Ok(());
         };
@@ -96,13 +96,15 @@ impl Statements {
         match lower_case(keyword, &mut lower) {
             b"v" => self.vertices.read(words)?,
             b"vt" => {
-                let [u, v, _] = numbers(words, 1, 2, "texture coordinates")?;
+                let [u, v, _] = parse_numbers(words, 1, 2, "texture coordinates")?;
                 self.uvs.push(DVec2::new(u, v).as_vec2());
             }
-            b"vn" => self.normals.push(DVec3::from(numbers(words, 3, 3, "normal coordinates")?).as_vec3()),
+            b"vn" => {
+                self.normals.push(DVec3::from(parse_numbers(words, 3, 3, "normal coordinates")?).as_vec3());
+            }
             b"f" => self.face(words)?,
             b"o" | b"g" => self.change(StateChange::Object),
-            b"s" => self.smoothing(source, words, start),
+            b"s" => self.parse_smoothing(source, words, start),
             b"mtllib" => {
                 let name = words.name();
                 self.change(StateChange::Library(name));
@@ -124,7 +126,7 @@ impl Statements {
     }
 
     /// Parses a smoothing group. Ignores invalid groups with a warning.
-    fn smoothing(&mut self, source: &MeshSource<'_>, words: &mut Words<'_>, start: usize) {
+    fn parse_smoothing(&mut self, source: &MeshSource<'_>, words: &mut Words<'_>, start: usize) {
         let group = words.word().unwrap_or(b"off");
         let smoothing = match integer(group).map(u32::try_from) {
             Some(Ok(0)) => Smoothing::Flat,
@@ -143,7 +145,7 @@ impl Statements {
         let counts = [self.vertices.positions.len(), self.uvs.len(), self.normals.len()];
         let before = self.corners.len();
         while let Some(word) = words.word() {
-            self.corners.push(corner(word, counts)?);
+            self.corners.push(parse_corner(word, counts)?);
         }
         self.arities.push((self.corners.len() - before) as u32);
         Ok(())
@@ -157,7 +159,7 @@ impl Statements {
         {
             let Some(first) = self.corners.iter().position(|corner| corner[part] != NONE) else { continue };
             if count == 0 {
-                let line = source.line(face_start(source, self.face_of(first)));
+                let line = source.line(face_start(source, self.face_of_corner(first)));
                 self.warnings.push(attribute_missing(line, name));
                 self.corners.iter_mut().for_each(|corner| corner[part] = NONE);
             }
@@ -165,7 +167,7 @@ impl Statements {
     }
 
     /// Index of the face that contains a corner.
-    fn face_of(&self, corner: usize) -> usize {
+    fn face_of_corner(&self, corner: usize) -> usize {
         let mut end = 0;
         let is_before = |arity: &&u32| {
             end += **arity as usize;
@@ -174,7 +176,8 @@ impl Statements {
         self.arities.iter().take_while(is_before).count()
     }
 
-    /// Checks the indices of all corners. Called at the end because faces may precede their vertices.
+    /// Checks the indices of all corners. Must be called after all statements are parsed, because faces may
+    /// precede their vertices.
     fn check_ranges(&self, source: &MeshSource<'_>) -> Result<(), AssetError> {
         let counts = [self.vertices.positions.len(), self.uvs.len(), self.normals.len()];
         let wrong = |corner: &CornerIndices| {
@@ -186,7 +189,10 @@ impl Statements {
             return Ok(());
         };
         let index = i64::from(self.corners[place][part]) + 1;
-        Err(source.wrong_at(face_start(source, self.face_of(place)), out_of_range(part, index, counts[part])))
+        Err(source.wrong_at(
+            face_start(source, self.face_of_corner(place)),
+            out_of_range(part, index, counts[part]),
+        ))
     }
 
     fn warn(&mut self, source: &MeshSource<'_>) {
@@ -194,7 +200,7 @@ impl Statements {
             let line = source.line(start);
             self.warnings.push(excess_words(line));
         }
-        if let Some(start) = self.vertices.transparent() {
+        if let Some(start) = self.vertices.most_transparent_vertex() {
             self.warnings.push(alpha_ignored(source.line(start)));
         }
         if let Some((start, keyword)) = &self.free_form {
@@ -241,7 +247,7 @@ pub(super) fn face_start(source: &MeshSource<'_>, face: usize) -> usize {
 }
 
 /// Parses between `min` and `max` numbers in a statement. Missing numbers are 0.
-fn numbers(words: &mut Words<'_>, min: usize, max: usize, what: &str) -> Result<[f64; 3], String> {
+fn parse_numbers(words: &mut Words<'_>, min: usize, max: usize, what: &str) -> Result<[f64; 3], String> {
     let mut values = [0.0; 3];
     let mut count = 0;
     while let Some(word) = words.word().filter(|_| count < max) {
@@ -253,7 +259,7 @@ fn numbers(words: &mut Words<'_>, min: usize, max: usize, what: &str) -> Result<
 }
 
 /// Parses a corner such as `1`, `1/2`, `1//3` or `1/2/3`, ignoring trailing slashes.
-fn corner(word: &[u8], counts: [usize; 3]) -> Result<CornerIndices, String> {
+fn parse_corner(word: &[u8], counts: [usize; 3]) -> Result<CornerIndices, String> {
     let wrong = || expected(CORNER_FORM, word);
     let end = word.iter().rposition(|byte| *byte != b'/').map_or(0, |last| last + 1);
     let mut corner = [NONE; 3];
@@ -263,13 +269,13 @@ fn corner(word: &[u8], counts: [usize; 3]) -> Result<CornerIndices, String> {
         }
         let index = integer(digits).filter(|_| part < 3).ok_or_else(wrong)?;
         corner[part] =
-            absolute(index, counts[part]).ok_or_else(|| out_of_range(part, index, counts[part]))?;
+            absolute_index(index, counts[part]).ok_or_else(|| out_of_range(part, index, counts[part]))?;
     }
     Ok(corner)
 }
 
 /// Converts a one-based index, or a negative index relative to the end, to a zero-based index.
-fn absolute(index: i64, count: usize) -> Option<u32> {
+fn absolute_index(index: i64, count: usize) -> Option<u32> {
     let from_zero = if index < 0 { count as i64 + index } else { index - 1 };
     u32::try_from(from_zero).ok().filter(|index| *index != NONE)
 }

@@ -84,9 +84,8 @@ impl Vertices {
         Ok(())
     }
 
-    /// Parses an `#MRGB` comment. Each vertex has a mask, red, green and blue, as two hexadecimal digits
-    /// each.
-    pub(super) fn read_paint(&mut self, line: &[u8]) {
+    /// Parses an `#MRGB` comment: for each vertex, two hexadecimal digits each for mask, red, green and blue.
+    pub(super) fn read_mrgb_colors(&mut self, line: &[u8]) {
         let digits = line.trim_ascii().chunks_exact(8);
         let painted = digits.map_while(|digits| {
             let value = u32::from_str_radix(std::str::from_utf8(digits).ok()?, 16).ok()?;
@@ -103,7 +102,7 @@ impl Vertices {
 
     /// Byte offset of the vertex with the minimum alpha. `None` if all alphas are 1. Alpha has the same range
     /// as the colors.
-    pub(super) fn transparent(&self) -> Option<usize> {
+    pub(super) fn most_transparent_vertex(&self) -> Option<usize> {
         self.least_alpha.filter(|(least, _)| *least < self.range.one()).map(|(_, start)| start)
     }
 

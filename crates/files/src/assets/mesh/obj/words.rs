@@ -33,7 +33,7 @@ impl<'a> Words<'a> {
         loop {
             match self.bytes.get(self.at)? {
                 b'\n' | b'#' => return None,
-                b'\\' => match self.continuation(self.at) {
+                b'\\' => match self.continuation_line(self.at) {
                     Some(next) => self.at = next,
                     None => break,
                 },
@@ -43,7 +43,7 @@ impl<'a> Words<'a> {
         }
         let ends = |at: usize| match self.bytes[at] {
             b'#' => true,
-            b'\\' => self.continuation(at).is_some(),
+            b'\\' => self.continuation_line(at).is_some(),
             byte => byte.is_ascii_whitespace(),
         };
         let end = (self.at + 1..self.bytes.len()).find(|at| ends(*at)).unwrap_or(self.bytes.len());
@@ -77,7 +77,7 @@ impl<'a> Words<'a> {
     }
 
     /// Offset of the next line if only blanks follow the backslash at `at`.
-    fn continuation(&self, at: usize) -> Option<usize> {
+    fn continuation_line(&self, at: usize) -> Option<usize> {
         let rest = &self.bytes[at + 1..];
         let blanks = rest.iter().take_while(|byte| byte.is_ascii_whitespace() && **byte != b'\n').count();
         (rest.get(blanks) == Some(&b'\n')).then_some(at + blanks + 2)

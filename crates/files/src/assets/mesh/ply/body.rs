@@ -4,7 +4,7 @@ use super::super::text::{Cursor, expected};
 use super::header::Scalar;
 
 /// Reads numbers in file order. Errors do not include the position in the file.
-pub(super) trait Numbers: Clone {
+pub(super) trait NumberReader: Clone {
     fn float(&mut self, scalar: Scalar) -> Result<f64, String>;
     fn integer(&mut self, scalar: Scalar) -> Result<i64, String>;
     fn skip(&mut self, scalar: Scalar, count: usize) -> Result<(), String>;
@@ -36,18 +36,18 @@ pub(super) struct Ascii<'a>(pub(super) Cursor<'a>, pub(super) LineEnds);
 pub(super) enum LineEnds {
     /// As whitespace.
     Blank,
-    /// As the end of an item. Extra values on a line are skipped. Contains the number of lines with extra
-    /// values, and the byte offset of the first.
+    /// A line end is the end of an item, and extra values on a line are skipped. Contains the number of lines
+    /// with extra values, and the byte offset of the first such line.
     EndItems(u64, Option<usize>),
 }
 
 impl Ascii<'_> {
     fn seek_word(&mut self) -> Result<(), String> {
-        if self.0.skip_blank() { Ok(()) } else { Err(END_OF_FILE.to_owned()) }
+        if self.0.skip_to_word() { Ok(()) } else { Err(END_OF_FILE.to_owned()) }
     }
 }
 
-impl Numbers for Ascii<'_> {
+impl NumberReader for Ascii<'_> {
     fn float(&mut self, _: Scalar) -> Result<f64, String> {
         self.seek_word()?;
         self.0.float().ok_or_else(|| expected("a number", self.0.word()))
@@ -68,7 +68,7 @@ impl Numbers for Ascii<'_> {
 
     fn end_item(&mut self) {
         match &mut self.1 {
-            LineEnds::EndItems(count, first) if self.0.skip_in_line() => {
+            LineEnds::EndItems(count, first) if self.0.skip_to_word_in_line() => {
                 *count += 1;
                 first.get_or_insert(self.0.at());
                 self.0.end_line();
@@ -83,7 +83,7 @@ impl Numbers for Ascii<'_> {
 
     fn start(&self) -> usize {
         let mut ahead = self.0;
-        ahead.skip_blank();
+        ahead.skip_to_word();
         ahead.at()
     }
 
@@ -112,7 +112,7 @@ impl<const BIG_ENDIAN: bool> Binary<'_, BIG_ENDIAN> {
     }
 }
 
-impl<const BIG_ENDIAN: bool> Numbers for Binary<'_, BIG_ENDIAN> {
+impl<const BIG_ENDIAN: bool> NumberReader for Binary<'_, BIG_ENDIAN> {
     #[inline]
     fn float(&mut self, scalar: Scalar) -> Result<f64, String> {
         match scalar {

@@ -38,7 +38,7 @@ impl PlyColors {
     }
 
     /// Returns the colors as bytes. If any alpha is less than 1, also returns a byte offset in the vertex
-    /// with the minimum alpha, for a warning that alpha is ignored.
+    /// with the minimum alpha, to be used in a warning that alpha is ignored.
     pub(super) fn finish(self) -> (Vec<[u8; 3]>, Option<usize>) {
         let one = |scalar: Scalar| match scalar {
             Scalar::U8 | Scalar::I8 => scalar.full_intensity(),

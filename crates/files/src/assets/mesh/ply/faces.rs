@@ -1,20 +1,20 @@
 //! Reads faces with per-face or per-corner texture coordinates or colors.
 
 use super::super::parsed::{FACE_COLORS_IGNORED, ParsedMesh};
-use super::body::Numbers;
+use super::body::NumberReader;
 use super::colors::PlyColors;
 use super::header::{Element, PropertyType, Scalar};
-use super::{ErrorContext, corner, each, list_length, skip, slot};
+use super::{ErrorContext, checked_vertex_index, list_length, read_items, skip, vertex_property_slot};
 use crate::assets::AssetError;
 use crate::math::DVec2;
 
 /// How a property of a face is used.
 #[derive(Clone, Copy, PartialEq)]
-enum Role {
+enum PropertyRole {
     Corners,
-    /// List of texture coordinates for the corners or the face.
+    /// List of texture coordinates, either per corner or for the whole face.
     Uvs,
-    /// List of colors for the corners or the face.
+    /// List of colors, either per corner or for the whole face.
     Colors,
     /// Scalar value of the face (texture coordinate, color component or texture number), identified by its
     /// index into `FaceReader::values`.
@@ -28,21 +28,21 @@ const COLOR: [usize; 3] = [2, 3, 4];
 const TEXTURE: usize = 5;
 
 /// Returns the type and role of each property. `corners` is the index of the vertex list.
-fn roles(element: &Element, corners: usize) -> Vec<(PropertyType, Role)> {
+fn property_roles(element: &Element, corners: usize) -> Vec<(PropertyType, PropertyRole)> {
     let role = |(index, kind, name): (usize, PropertyType, &str)| match (kind, name) {
-        _ if index == corners => Role::Corners,
+        _ if index == corners => PropertyRole::Corners,
         (
             PropertyType::List { .. },
             "texcoord" | "texcoords" | "texture_coordinates" | "uv" | "uvs" | "st",
-        ) => Role::Uvs,
-        (PropertyType::List { .. }, "color" | "colors") => Role::Colors,
-        (PropertyType::Scalar(_), "texnumber") => Role::Value(TEXTURE),
-        (PropertyType::Scalar(_), _) => match slot(name) {
-            Some(uv @ 6..=7) => Role::Value(UV[uv - 6]),
-            Some(color @ 8..=10) => Role::Value(COLOR[color - 8]),
-            Some(_) | None => Role::Unused,
+        ) => PropertyRole::Uvs,
+        (PropertyType::List { .. }, "color" | "colors") => PropertyRole::Colors,
+        (PropertyType::Scalar(_), "texnumber") => PropertyRole::Value(TEXTURE),
+        (PropertyType::Scalar(_), _) => match vertex_property_slot(name) {
+            Some(uv @ 6..=7) => PropertyRole::Value(UV[uv - 6]),
+            Some(color @ 8..=10) => PropertyRole::Value(COLOR[color - 8]),
+            Some(_) | None => PropertyRole::Unused,
         },
-        (PropertyType::List { .. }, _) => Role::Unused,
+        (PropertyType::List { .. }, _) => PropertyRole::Unused,
     };
     let properties = element.properties.iter().enumerate();
     properties
@@ -52,7 +52,9 @@ fn roles(element: &Element, corners: usize) -> Vec<(PropertyType, Role)> {
 
 /// Whether faces have texture coordinates, colors or texture numbers.
 pub(super) fn has_attributes(element: &Element, corners: usize) -> bool {
-    roles(element, corners).iter().any(|(_, role)| ![Role::Corners, Role::Unused].contains(role))
+    property_roles(element, corners)
+        .iter()
+        .any(|(_, role)| ![PropertyRole::Corners, PropertyRole::Unused].contains(role))
 }
 
 /// Reads faces with texture coordinates or colors.
@@ -60,13 +62,13 @@ pub(super) fn read(
     context: &ErrorContext<'_>,
     element: &Element,
     corners: usize,
-    numbers: &mut impl Numbers,
+    numbers: &mut impl NumberReader,
     vertices: u64,
     parsed: &mut ParsedMesh,
 ) -> Result<(), AssetError> {
-    let roles = roles(element, corners);
+    let roles = property_roles(element, corners);
     let mut faces = FaceReader::new(&roles);
-    each(context, element, numbers, |numbers| {
+    read_items(context, element, numbers, |numbers| {
         let start = numbers.at();
         faces.read(&roles, numbers, vertices)?;
         faces.add(parsed, start);
@@ -95,25 +97,25 @@ struct FaceReader {
 }
 
 impl FaceReader {
-    fn new(roles: &[(PropertyType, Role)]) -> Self {
-        let has = |wanted: Role| roles.iter().any(|(_, role)| *role == wanted);
-        let has_value = |index: &usize| has(Role::Value(*index));
-        let scalar = |wanted: Role| {
+    fn new(roles: &[(PropertyType, PropertyRole)]) -> Self {
+        let has = |wanted: PropertyRole| roles.iter().any(|(_, role)| *role == wanted);
+        let has_value = |index: &usize| has(PropertyRole::Value(*index));
+        let scalar = |wanted: PropertyRole| {
             roles.iter().find(|(_, role)| *role == wanted).map(|(kind, _)| match *kind {
                 PropertyType::Scalar(scalar) | PropertyType::List { item: scalar, .. } => scalar,
             })
         };
         let has_color = COLOR.iter().all(has_value);
-        let scalars = COLOR.map(|index| scalar(Role::Value(index)).unwrap_or(Scalar::U8));
-        let colors = match scalar(Role::Colors) {
+        let scalars = COLOR.map(|index| scalar(PropertyRole::Value(index)).unwrap_or(Scalar::U8));
+        let colors = match scalar(PropertyRole::Colors) {
             Some(scalar) => Some(PlyColors::new([scalar; 3])),
             None => has_color.then(|| PlyColors::new(scalars)),
         };
         let has_uv = UV.iter().all(has_value);
         Self {
-            has_uvs: has_uv || has(Role::Uvs),
+            has_uvs: has_uv || has(PropertyRole::Uvs),
             has_uv,
-            has_color: has_color && !has(Role::Colors),
+            has_color: has_color && !has(PropertyRole::Colors),
             corners: Vec::new(),
             uvs: Vec::new(),
             parts: Vec::new(),
@@ -126,9 +128,9 @@ impl FaceReader {
         }
     }
 
-    fn read<N: Numbers>(
+    fn read<N: NumberReader>(
         &mut self,
-        roles: &[(PropertyType, Role)],
+        roles: &[(PropertyType, PropertyRole)],
         numbers: &mut N,
         vertices: u64,
     ) -> Result<(), String> {
@@ -137,21 +139,28 @@ impl FaceReader {
         self.parts.clear();
         for &(kind, role) in roles {
             match (kind, role) {
-                (PropertyType::List { count, item }, Role::Corners) => {
+                (PropertyType::List { count, item }, PropertyRole::Corners) => {
                     for _ in 0..list_length(numbers, count, item)? {
-                        self.corners.push(corner(numbers.integer(item)?, vertices)?);
+                        self.corners.push(checked_vertex_index(numbers.integer(item)?, vertices)?);
                     }
                 }
-                (PropertyType::List { count, item }, Role::Uvs | Role::Colors) => {
-                    let list = if role == Role::Uvs { &mut self.uvs } else { &mut self.parts };
+                (PropertyType::List { count, item }, PropertyRole::Uvs | PropertyRole::Colors) => {
+                    let list = if role == PropertyRole::Uvs { &mut self.uvs } else { &mut self.parts };
                     for _ in 0..list_length(numbers, count, item)? {
                         list.push(numbers.float(item)?);
                     }
                 }
-                (PropertyType::Scalar(scalar), Role::Value(index)) => {
+                (PropertyType::Scalar(scalar), PropertyRole::Value(index)) => {
                     self.values[index] = numbers.float(scalar)?;
                 }
-                (_, Role::Corners | Role::Uvs | Role::Colors | Role::Value(_) | Role::Unused) => {
+                (
+                    _,
+                    PropertyRole::Corners
+                    | PropertyRole::Uvs
+                    | PropertyRole::Colors
+                    | PropertyRole::Value(_)
+                    | PropertyRole::Unused,
+                ) => {
                     skip(numbers, kind)?;
                 }
             }
@@ -188,7 +197,7 @@ impl FaceReader {
                 colors.push(*of_corner.unwrap_or(&of_face));
             }
         }
-        parsed.faces.close(arity);
+        parsed.faces.end_face(arity);
         let texture = self.values[TEXTURE];
         self.has_several_textures |= *self.texture.get_or_insert(texture) != texture;
     }

@@ -89,7 +89,7 @@ pub(super) struct Element {
 
 impl Element {
     /// Minimum size of one item. In text, a number takes at least a digit and a space.
-    pub(super) fn least_bytes(&self, encoding: Encoding) -> u64 {
+    pub(super) fn min_item_bytes(&self, encoding: Encoding) -> u64 {
         let least = |property: &Property| match (encoding, property.kind) {
             (Encoding::Ascii, _) => 2,
             (_, PropertyType::Scalar(scalar) | PropertyType::List { count: scalar, .. }) => {

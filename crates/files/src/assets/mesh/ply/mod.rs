@@ -12,7 +12,7 @@ use super::parsed::{ALPHA_IGNORED, ParsedMesh};
 use super::text::Cursor;
 use super::{AssetError, LoadedMesh, MeshSource, vertex_out_of_range};
 use crate::math::{DVec2, DVec3};
-use body::{Ascii, Binary, LineEnds, Numbers};
+use body::{Ascii, Binary, LineEnds, NumberReader};
 use colors::PlyColors;
 use header::{Element, Encoding, PlyHeader, PropertyType, Scalar};
 
@@ -30,14 +30,14 @@ pub(super) fn parse(source: &MeshSource<'_>) -> Result<LoadedMesh, AssetError> {
     }
 }
 
-/// Reads a text file, ignoring line ends. If this fails or does not read all words, lines may have undeclared
+/// Reads a text file, ignoring line ends. If this fails or leaves words unread, lines may have undeclared
 /// values, so the file is read again with one item per line.
 fn read_text(source: &MeshSource<'_>, header: &PlyHeader) -> Result<LoadedMesh, AssetError> {
     let cursor = Cursor::new(source.bytes, header.body);
     let mut words = Ascii(cursor, LineEnds::Blank);
     let by_words = read(source, header, &mut words);
     source.monitor.token.check()?;
-    if by_words.is_ok() && !words.0.skip_blank() {
+    if by_words.is_ok() && !words.0.skip_to_word() {
         return by_words;
     }
     let mut lines = Ascii(cursor, LineEnds::EndItems(0, None));
@@ -87,7 +87,7 @@ impl ErrorContext<'_> {
 fn read(
     source: &MeshSource<'_>,
     header: &PlyHeader,
-    numbers: &mut impl Numbers,
+    numbers: &mut impl NumberReader,
 ) -> Result<LoadedMesh, AssetError> {
     let context = ErrorContext { source, encoding: header.encoding };
     let count_of =
@@ -102,7 +102,7 @@ fn read(
         ParsedMesh { warnings: header.warning.iter().cloned().collect(), ..ParsedMesh::default() };
     let mut before_faces = None;
     for element in &header.elements {
-        plausible(source, element, header.encoding, numbers.at())?;
+        check_plausible_counts(source, element, header.encoding, numbers.at())?;
         match element.name.as_str() {
             "vertex" => read_vertices(&context, element, numbers, &mut parsed)?,
             "face" => {
@@ -111,7 +111,7 @@ fn read(
             }
             "tristrips" if !has_faces => read_strips(&context, element, numbers, vertices, &mut parsed)?,
             _ if element.properties.is_empty() => {}
-            _ => each(&context, element, numbers, |numbers| {
+            _ => read_items(&context, element, numbers, |numbers| {
                 element.properties.iter().try_for_each(|property| skip(numbers, property.kind))
             })?,
         }
@@ -126,13 +126,13 @@ fn read(
 }
 
 /// Rejects element counts that are too large for the file size, before any memory is allocated.
-fn plausible(
+fn check_plausible_counts(
     source: &MeshSource<'_>,
     element: &Element,
     encoding: Encoding,
     at: usize,
 ) -> Result<(), AssetError> {
-    let needed = element.count.saturating_mul(element.least_bytes(encoding));
+    let needed = element.count.saturating_mul(element.min_item_bytes(encoding));
     let remaining = (source.bytes.len() - at) as u64;
     if needed > remaining + 1 {
         return Err(source.wrong(implausible(&element.name, element.count, remaining)));
@@ -172,7 +172,7 @@ fn no_vertex_list(element: &str) -> String {
 }
 
 /// Reads all items of an element.
-fn each<N: Numbers>(
+fn read_items<N: NumberReader>(
     context: &ErrorContext<'_>,
     element: &Element,
     numbers: &mut N,
@@ -188,7 +188,7 @@ fn each<N: Numbers>(
     Ok(())
 }
 
-fn skip(numbers: &mut impl Numbers, kind: PropertyType) -> Result<(), String> {
+fn skip(numbers: &mut impl NumberReader, kind: PropertyType) -> Result<(), String> {
     match kind {
         PropertyType::Scalar(scalar) => numbers.skip(scalar, 1),
         PropertyType::List { count, item } => {
@@ -198,7 +198,7 @@ fn skip(numbers: &mut impl Numbers, kind: PropertyType) -> Result<(), String> {
     }
 }
 
-fn list_length(numbers: &mut impl Numbers, count: Scalar, item: Scalar) -> Result<usize, String> {
+fn list_length(numbers: &mut impl NumberReader, count: Scalar, item: Scalar) -> Result<usize, String> {
     let length = numbers.integer(count)?;
     match u64::try_from(length) {
         Ok(fits) if numbers.can_hold(item, fits) => Ok(fits as usize),
@@ -210,9 +210,9 @@ fn list_length(numbers: &mut impl Numbers, count: Scalar, item: Scalar) -> Resul
 /// Slot of a vertex's alpha.
 const ALPHA: usize = 13;
 
-/// Slot of a vertex property: position, normal, texture coordinates, color, second texture coordinates or
-/// alpha. `None` for unknown properties.
-fn slot(name: &str) -> Option<usize> {
+/// Slot of a vertex property by name: position, normal, texture coordinates, color, second texture
+/// coordinates or alpha. `None` for unknown properties.
+fn vertex_property_slot(name: &str) -> Option<usize> {
     Some(match name {
         "x" => 0,
         "y" => 1,
@@ -235,11 +235,11 @@ fn slot(name: &str) -> Option<usize> {
 fn read_vertices(
     context: &ErrorContext<'_>,
     element: &Element,
-    numbers: &mut impl Numbers,
+    numbers: &mut impl NumberReader,
     parsed: &mut ParsedMesh,
 ) -> Result<(), AssetError> {
     let target = |kind: PropertyType, name: &str| {
-        if matches!(kind, PropertyType::Scalar(_)) { slot(name) } else { None }
+        if matches!(kind, PropertyType::Scalar(_)) { vertex_property_slot(name) } else { None }
     };
     let layout: Vec<(PropertyType, Option<usize>)> = element
         .properties
@@ -266,7 +266,7 @@ fn read_vertices(
     parsed.normals.reserve(if has_normals { count } else { 0 });
     parsed.uvs.reserve(if has_uvs { count } else { 0 });
     parsed.second_uvs.reserve(if has_second_uvs { count } else { 0 });
-    each(context, element, numbers, |numbers| {
+    read_items(context, element, numbers, |numbers| {
         let mut values = [0.0; 14];
         for &(kind, slot) in &layout {
             match (kind, slot) {
@@ -304,11 +304,11 @@ fn read_vertices(
 fn read_faces(
     context: &ErrorContext<'_>,
     element: &Element,
-    numbers: &mut impl Numbers,
+    numbers: &mut impl NumberReader,
     vertices: u64,
     parsed: &mut ParsedMesh,
 ) -> Result<(), AssetError> {
-    let Some(corners) = corners_of(element) else {
+    let Some(corners) = vertex_list_index(element) else {
         return Err(context.source.wrong(no_vertex_list(&element.name)));
     };
     if faces::has_attributes(element, corners) {
@@ -316,11 +316,11 @@ fn read_faces(
     }
     let faces = &mut parsed.faces;
     faces.reserve(element.count as usize);
-    each_list(context, element, corners, numbers, |numbers, item, length| {
+    read_lists(context, element, corners, numbers, |numbers, item, length| {
         for _ in 0..length {
-            faces.corner(corner(numbers.integer(item)?, vertices)?);
+            faces.corner(checked_vertex_index(numbers.integer(item)?, vertices)?);
         }
-        faces.close(length);
+        faces.end_face(length);
         Ok(())
     })
 }
@@ -330,15 +330,15 @@ fn read_faces(
 fn read_strips(
     context: &ErrorContext<'_>,
     element: &Element,
-    numbers: &mut impl Numbers,
+    numbers: &mut impl NumberReader,
     vertices: u64,
     parsed: &mut ParsedMesh,
 ) -> Result<(), AssetError> {
-    let Some(corners) = corners_of(element) else {
+    let Some(corners) = vertex_list_index(element) else {
         return Err(context.source.wrong(no_vertex_list(&element.name)));
     };
     let faces = &mut parsed.faces;
-    each_list(context, element, corners, numbers, |numbers, item, length| {
+    read_lists(context, element, corners, numbers, |numbers, item, length| {
         let (mut before, mut count) = ([0; 2], 0_usize);
         for _ in 0..length {
             let vertex = numbers.integer(item)?;
@@ -346,12 +346,12 @@ fn read_strips(
                 count = 0;
                 continue;
             }
-            let next = corner(vertex, vertices)?;
+            let next = checked_vertex_index(vertex, vertices)?;
             let [first, second] = before;
             if count >= 2 && first != second && second != next && next != first {
                 let triangle = if count % 2 == 0 { [first, second, next] } else { [second, first, next] };
                 triangle.into_iter().for_each(|vertex| faces.corner(vertex));
-                faces.close(3);
+                faces.end_face(3);
             }
             (before, count) = ([second, next], count + 1);
         }
@@ -360,7 +360,7 @@ fn read_strips(
 }
 
 /// Index of the property that lists the vertices of a face or a strip.
-fn corners_of(element: &Element) -> Option<usize> {
+fn vertex_list_index(element: &Element) -> Option<usize> {
     let is_named = |name: &str| ["vertex_indices", "vertex_index"].contains(&name);
     let corners = element.properties.iter().position(|property| is_named(&property.name));
     corners
@@ -368,7 +368,7 @@ fn corners_of(element: &Element) -> Option<usize> {
 }
 
 /// Converts a vertex index to `u32` and checks its range.
-fn corner(vertex: i64, vertices: u64) -> Result<u32, String> {
+fn checked_vertex_index(vertex: i64, vertices: u64) -> Result<u32, String> {
     match u32::try_from(vertex) {
         Ok(fits) if u64::from(fits) < vertices => Ok(fits),
         Ok(_) | Err(_) => Err(vertex_out_of_range(vertex, vertices)),
@@ -377,14 +377,14 @@ fn corner(vertex: i64, vertices: u64) -> Result<u32, String> {
 
 /// Reads all items of an element. `read` receives the type and length of the list with property index
 /// `corners`.
-fn each_list<N: Numbers>(
+fn read_lists<N: NumberReader>(
     context: &ErrorContext<'_>,
     element: &Element,
     corners: usize,
     numbers: &mut N,
     mut read: impl FnMut(&mut N, Scalar, usize) -> Result<(), String>,
 ) -> Result<(), AssetError> {
-    each(context, element, numbers, |numbers| {
+    read_items(context, element, numbers, |numbers| {
         for (index, property) in element.properties.iter().enumerate() {
             let PropertyType::List { count, item } = property.kind else {
                 skip(numbers, property.kind)?;

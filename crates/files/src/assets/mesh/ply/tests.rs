@@ -179,7 +179,7 @@ fn the_header_size_is_limited() {
     assert_eq!(error(long.as_bytes()).1, too_long());
     let line = format!("ply\ncomment {}", "x".repeat(2 << 20));
     assert_eq!(error(line.as_bytes()).1, too_long());
-    // This header is just below the limit. The limit cuts off a line after the header.
+    // This header is just below the size limit, which falls within a line after the header.
     let comments = format!("comment {}\n", "x".repeat(100)).repeat(9_000);
     let fits = format!("ply\nformat ascii 1.0\n{comments}{VERTEX}{FACE}{SQUARE}4 0 1 2 3\n");
     assert!(read_bytes(fits.as_bytes()).is_ok());
@@ -250,7 +250,7 @@ fn unknown_header_lines_are_skipped_with_warning() {
     assert_eq!(replaced("property float z", "porperty float z").1, invalid_statement("porperty"));
     let misspelled = skipped_lines(&format!("line 2: {}", unknown_keyword("frmat")), 1);
     assert_eq!(replaced("format", "frmat").1, format!("{NO_FORMAT}; {misspelled}"));
-    // An incomplete statement could mean anything.
+    // Incomplete statements are ambiguous, so they are errors.
     assert_eq!(replaced("comment made here", "element box").1, invalid_statement("element"));
     assert_eq!(replaced("comment made here", "format").1, invalid_statement("format"));
     assert_eq!(error(&[b"ply\n".as_slice(), &[7; 3000]].concat()).1, NO_END);

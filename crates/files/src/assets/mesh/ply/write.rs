@@ -4,7 +4,7 @@ use crate::geometry::mesh::TriangleMesh;
 use crate::math::DVec3;
 
 /// Encodes a mesh as PLY, without materials.
-pub fn bytes(mesh: &TriangleMesh) -> Vec<u8> {
+pub fn encode_ply(mesh: &TriangleMesh) -> Vec<u8> {
     let is_far = mesh.origin != DVec3::ZERO;
     let place = if is_far { "double" } else { "float" };
     let (normals, uvs, colors) = (!mesh.normals.is_empty(), !mesh.uvs.is_empty(), !mesh.colors.is_empty());

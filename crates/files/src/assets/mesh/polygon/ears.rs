@@ -1,15 +1,15 @@
 //! Ear clipping (Meisters, *Polygons Have Ears*, American Mathematical Monthly 1975) for polygons that may
-//! touch themselves. They may have holes connected to the outline by a double edge, repeated corners, and
-//! corners on other edges.
+//! touch themselves. Corners may be repeated or lie on other edges, and holes may be connected to the outline
+//! by a double edge.
 
 use std::collections::VecDeque;
 
-use super::tree::{CornerTree, turn};
+use super::tree::{CornerTree, twice_signed_area};
 use crate::math::DVec2;
 
-/// Limit on the number of visited corners and tree nodes: a number per corner, plus a constant. Simple
-/// polygons need about 50 visits per corner. Polygons that wind around the same corners many times may exceed
-/// the limit. Corners are then clipped without testing them.
+/// Limit on the number of visited corners and tree nodes: a number of visits per corner, plus a constant.
+/// Simple polygons need about 50 visits per corner. Polygons that wind around the same corners many times may
+/// exceed the limit. Corners are then clipped without testing them.
 const VISITS_PER_CORNER: u64 = 200;
 const EXTRA_VISITS: u64 = 1_000_000;
 
@@ -124,13 +124,13 @@ impl<'a, F: FnMut([usize; 3])> Clipper<'a, F> {
 
     fn is_convex(&self, corner: u32) -> bool {
         let [a, b, c] = self.around(corner).map(|corner| self.point(corner));
-        turn(a, b, c) > 0.0
+        twice_signed_area(a, b, c) > 0.0
     }
 
     /// Whether the outline reverses direction at a corner.
     fn is_spike(&self, corner: u32) -> bool {
         let [a, b, c] = self.around(corner).map(|corner| self.point(corner));
-        turn(a, b, c) == 0.0 && (a - b).dot(c - b) >= 0.0
+        twice_signed_area(a, b, c) == 0.0 && (a - b).dot(c - b) >= 0.0
     }
 
     /// Removes a corner, and emits its triangle unless the triangle has zero area.
@@ -179,9 +179,9 @@ impl<'a, F: FnMut([usize; 3])> Clipper<'a, F> {
         }
     }
 
-    /// Finds a corner at which the outline enters the triangle of a convex corner, which is then not an ear.
-    /// Unless `may_touch`, corners on the diagonal also block, because the triangles on its two sides would
-    /// not share these vertices.
+    /// Finds a corner at which the outline enters the triangle of a convex corner. If there is one, the
+    /// convex corner is not an ear. Unless `may_touch`, corners on the diagonal also block it, because the
+    /// triangles on the two sides of the diagonal would not share these vertices.
     fn blocker(&mut self, corner: u32, may_touch: bool) -> Option<u32> {
         if self.visits > self.max_visits {
             return None;
@@ -219,7 +219,7 @@ impl<'a, F: FnMut([usize; 3])> Clipper<'a, F> {
     }
 }
 
-/// For each side of a triangle, which side of it the point is on (positive: inside).
+/// For each edge of a triangle, the side on which the point lies (positive: inside).
 fn turns([a, b, c]: [DVec2; 3], point: DVec2) -> [f64; 3] {
-    [turn(a, b, point), turn(b, c, point), turn(c, a, point)]
+    [twice_signed_area(a, b, point), twice_signed_area(b, c, point), twice_signed_area(c, a, point)]
 }

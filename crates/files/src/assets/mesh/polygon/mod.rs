@@ -22,12 +22,12 @@ pub(super) fn triangulate(points: &[Vec3], mut emit: impl FnMut([usize; 3])) -> 
         (1..count - 1).for_each(|i| emit([0, i, i + 1]));
         normal != DVec3::ZERO && (1..count - 1).all(|i| turns(0, i, i + 1) >= 0.0)
     } else {
-        ears::clip(&projected(&points, normal), emit)
+        ears::clip(&project_points(&points, normal), emit)
     }
 }
 
 /// Projects the points along the largest component of the normal, in counterclockwise order. This is exact.
-fn projected(points: &[DVec3], normal: DVec3) -> Vec<DVec2> {
+fn project_points(points: &[DVec3], normal: DVec3) -> Vec<DVec2> {
     let axis = normal.abs().max_position();
     let (first, second) = ((axis + 1) % 3, (axis + 2) % 3);
     let (x, y) = if normal[axis] > 0.0 { (first, second) } else { (second, first) };

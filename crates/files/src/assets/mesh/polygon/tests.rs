@@ -38,7 +38,11 @@ fn layers(points: &[(f32, f32)], triangles: &[[usize; 3]], x: f64, y: f64) -> us
     let holds = |triangle: &&[usize; 3]| {
         let [a, b, c] = triangle.map(at);
         let p = DVec2::new(x, y);
-        let turns = [tree::turn(a, b, p), tree::turn(b, c, p), tree::turn(c, a, p)];
+        let turns = [
+            tree::twice_signed_area(a, b, p),
+            tree::twice_signed_area(b, c, p),
+            tree::twice_signed_area(c, a, p),
+        ];
         turns.iter().all(|turn| *turn > 0.0) || turns.iter().all(|turn| *turn < 0.0)
     };
     triangles.iter().filter(holds).count()
@@ -156,7 +160,7 @@ fn sieve(side: usize) -> Points {
     for hole in 0..side * side {
         let (x, y) = (3.0 * (hole % side) as f32 + 1.0, 3.0 * (hole / side) as f32 + 1.0);
         let corners = [(x, y), (x, y + 2.0), (x + 2.0, y + 2.0), (x + 2.0, y)];
-        // Start at the outline's corner, or at a corner of the hole below or to the left.
+        // Start the double edge at a corner of the outline, or of the hole below or to the left.
         let from = match (hole % side, hole / side) {
             (0, 0) => (0.0, 0.0),
             (0, _) => (x, y - 1.0),

@@ -5,7 +5,7 @@ use crate::math::DVec2;
 /// Maximum number of corners per leaf.
 const LEAF: usize = 8;
 
-/// Corners in the plane, ordered to make each node a contiguous range.
+/// Corners in the plane, ordered so that each node is a contiguous range.
 pub(super) struct CornerTree {
     order: Vec<u32>,
     /// Index of each corner in `order`.
@@ -111,12 +111,12 @@ fn is_outside([a, b, c]: [DVec2; 3], low: DVec2, high: DVec2) -> bool {
         // Test the innermost corner of the box.
         let x = if to.y > from.y { low.x } else { high.x };
         let y = if to.x > from.x { high.y } else { low.y };
-        turn(from, to, DVec2::new(x, y)) < 0.0
+        twice_signed_area(from, to, DVec2::new(x, y)) < 0.0
     })
 }
 
 /// Twice the signed area of a triangle, positive if it is counterclockwise. The sign is exact for `f32`
 /// points of similar magnitude.
-pub(super) fn turn(a: DVec2, b: DVec2, c: DVec2) -> f64 {
+pub(super) fn twice_signed_area(a: DVec2, b: DVec2, c: DVec2) -> f64 {
     (b - a).perp_dot(c - a)
 }

@@ -7,7 +7,7 @@ use std::array;
 
 use rayon::prelude::*;
 
-use super::cost::{Planes, Search, SplitPlane};
+use super::cost::{CandidatePlanes, PlaneSearch, SplitPlane};
 use crate::accel::reference::{Bounds, Reference};
 use crate::math::Vec4;
 
@@ -26,7 +26,7 @@ struct Histogram {
     ends: [[u32; PLANES]; 3],
 }
 
-/// Added to a number between −½ and 2²², puts the nearest integer into the low bits.
+/// Adding this to a number between −½ and 2²² puts the nearest integer into the low bits.
 const ROUND: f32 = 12_582_912.0;
 
 impl Histogram {
@@ -73,7 +73,7 @@ pub fn cheapest(references: &[Reference], cell: &Bounds) -> Option<SplitPlane> {
     } else {
         Histogram::of(references, around.min, per_length)
     };
-    let mut search = Search::<{ PLANES / 4 }>::new(cell, references.len());
+    let mut search = PlaneSearch::<{ PLANES / 4 }>::new(cell, references.len());
     for axis in 0..3 {
         let (min, max) = (around.min.to_array()[axis], around.max().to_array()[axis]);
         let (mut at, mut left, mut right) = ([min; PLANES], [0; PLANES], [references.len() as u32; PLANES]);
@@ -85,7 +85,11 @@ pub fn cheapest(references: &[Reference], cell: &Bounds) -> Option<SplitPlane> {
         (at[BINS], left[BINS], right[BINS]) = (max, references.len() as u32, 0);
         let four = |from: [f32; PLANES]| array::from_fn(|i| Vec4::from_slice(&from[4 * i..]));
         let counts = |counts: [u32; PLANES]| four(counts.map(|count| count as f32));
-        search.offer(axis, false, &Planes { at: four(at), left: counts(left), right: counts(right) });
+        search.add_planes(
+            axis,
+            false,
+            &CandidatePlanes { at: four(at), left: counts(left), right: counts(right) },
+        );
     }
     // Keep references within the plane out of the side that should be empty.
     search.cheapest().map(|plane| SplitPlane { planar_right: plane.at <= around.min[plane.axis], ..plane })

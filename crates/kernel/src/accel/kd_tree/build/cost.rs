@@ -28,14 +28,14 @@ pub struct SplitPlane {
 /// 4·`N` planes across one axis, with triangle counts on either side of each. Triangles on both sides are
 /// counted twice.
 #[derive(Clone, Copy)]
-pub struct Planes<const N: usize> {
+pub struct CandidatePlanes<const N: usize> {
     pub at: [Vec4; N],
     pub left: [Vec4; N],
     pub right: [Vec4; N],
 }
 
 /// Searches the planes of a cell, 4·`N` at a time. Each lane keeps its cheapest plane.
-pub struct Search<const N: usize> {
+pub struct PlaneSearch<const N: usize> {
     min: [f32; 4],
     max: [f32; 4],
     /// Edge lengths of the cell. Flat cells are slightly thickened to allow splitting cells without area.
@@ -47,7 +47,7 @@ pub struct Search<const N: usize> {
     tag: [Vec4; N],
 }
 
-impl<const N: usize> Search<N> {
+impl<const N: usize> PlaneSearch<N> {
     /// Starts a search for planes that are cheaper than a leaf with `count` triangles.
     #[inline(always)]
     pub fn new(cell: &Bounds, count: usize) -> Self {
@@ -67,7 +67,7 @@ impl<const N: usize> Search<N> {
 
     /// Adds candidate planes. Planes outside the cell are ignored.
     #[inline(always)]
-    pub fn offer(&mut self, axis: usize, planar_right: bool, planes: &Planes<N>) {
+    pub fn add_planes(&mut self, axis: usize, planar_right: bool, planes: &CandidatePlanes<N>) {
         let (u, v) = (self.extent[(axis + 1) % 3], self.extent[(axis + 2) % 3]);
         // Area of the plane within the cell and area per unit length along the axis, both relative to the
         // cell's area.
@@ -82,13 +82,13 @@ impl<const N: usize> Search<N> {
             let is_empty = left.min(right).cmpeq(Vec4::ZERO);
             let factor = Vec4::select(is_empty, Vec4::splat(EMPTY_FACTOR), Vec4::ONE);
             let cost = factor * (Vec4::splat(TRAVERSAL_COST) + below + above);
-            self.take(i, Vec4::select(at.cmpgt(min) & at.cmplt(max), cost, Vec4::INFINITY), at, tag);
+            self.update_lanes(i, Vec4::select(at.cmpgt(min) & at.cmplt(max), cost, Vec4::INFINITY), at, tag);
         }
     }
 
     /// Updates the lanes that improve on their best cost so far.
     #[inline(always)]
-    fn take(&mut self, i: usize, cost: Vec4, at: Vec4, tag: Vec4) {
+    fn update_lanes(&mut self, i: usize, cost: Vec4, at: Vec4, tag: Vec4) {
         let is_cheaper = cost.cmplt(self.cost[i]);
         self.cost[i] = Vec4::select(is_cheaper, cost, self.cost[i]);
         self.at[i] = Vec4::select(is_cheaper, at, self.at[i]);
@@ -100,7 +100,7 @@ impl<const N: usize> Search<N> {
     pub fn cheapest(mut self) -> Option<SplitPlane> {
         for i in 1..N {
             let (cost, at, tag) = (self.cost[i], self.at[i], self.tag[i]);
-            self.take(0, cost, at, tag);
+            self.update_lanes(0, cost, at, tag);
         }
         let cost = self.cost[0].to_array();
         let lane = (1..4).fold(0, |best, lane| if cost[lane] < cost[best] { lane } else { best });

@@ -10,14 +10,14 @@ use crate::accel::wide_bvh::pages;
 /// A part of the tree: an upper node or a subtree.
 pub enum TreePart {
     /// A plane with the parts below and above it.
-    Halves { plane: SplitPlane, size: Size, halves: Box<[TreePart; 2]> },
+    Halves { plane: SplitPlane, size: SubtreeSize, halves: Box<[TreePart; 2]> },
     /// A subtree built by a single thread.
     Built(KdSubtree),
 }
 
 /// Number of nodes and number of triangle references.
 #[derive(Clone, Copy)]
-pub struct Size {
+pub struct SubtreeSize {
     nodes: usize,
     ids: usize,
 }
@@ -26,13 +26,13 @@ impl TreePart {
     /// Creates an upper node from its plane and its two parts.
     pub fn halves(plane: SplitPlane, halves: [Self; 2]) -> Self {
         let [left, right] = halves.each_ref().map(Self::size);
-        let size = Size { nodes: 1 + left.nodes + right.nodes, ids: left.ids + right.ids };
+        let size = SubtreeSize { nodes: 1 + left.nodes + right.nodes, ids: left.ids + right.ids };
         Self::Halves { plane, size, halves: Box::new(halves) }
     }
 
-    fn size(&self) -> Size {
+    fn size(&self) -> SubtreeSize {
         match self {
-            Self::Built(subtree) => Size { nodes: subtree.nodes.len(), ids: subtree.ids.len() },
+            Self::Built(subtree) => SubtreeSize { nodes: subtree.nodes.len(), ids: subtree.ids.len() },
             Self::Halves { size, .. } => *size,
         }
     }
@@ -40,22 +40,23 @@ impl TreePart {
     /// Joins all parts into one subtree, with nodes before their children and left before right.
     pub fn join(self) -> KdSubtree {
         let size = self.size();
-        let mut all = KdSubtree { nodes: pages::large(size.nodes), ids: pages::large(size.ids) };
+        let mut all =
+            KdSubtree { nodes: pages::with_huge_pages(size.nodes), ids: pages::with_huge_pages(size.ids) };
         let nothing = KdNode::new(NodeKind::Leaf { first: 0, count: 0 });
         rayon::join(
             || (0..size.nodes).into_par_iter().map(|_| nothing).collect_into_vec(&mut all.nodes),
             || (0..size.ids).into_par_iter().map(|_| 0).collect_into_vec(&mut all.ids),
         );
-        self.write(&mut all.nodes, &mut all.ids, Size { nodes: 0, ids: 0 });
+        self.write(&mut all.nodes, &mut all.ids, SubtreeSize { nodes: 0, ids: 0 });
         all
     }
 
     /// Writes the part, given the number of nodes and references that precede it.
-    fn write(self, nodes: &mut [KdNode], ids: &mut [u32], before: Size) {
+    fn write(self, nodes: &mut [KdNode], ids: &mut [u32], before: SubtreeSize) {
         match self {
             Self::Built(subtree) => {
                 for (node, own) in nodes.iter_mut().zip(&subtree.nodes) {
-                    *node = own.moved(before.nodes as u32, before.ids as u32);
+                    *node = own.offset_indices(before.nodes as u32, before.ids as u32);
                 }
                 ids.copy_from_slice(&subtree.ids);
             }
@@ -65,8 +66,9 @@ impl TreePart {
                 let (node, nodes) = nodes.split_at_mut(1);
                 let (left_nodes, right_nodes) = nodes.split_at_mut(size.nodes);
                 let (left_ids, right_ids) = ids.split_at_mut(size.ids);
-                let before_left = Size { nodes: before.nodes + 1, ..before };
-                let before_right = Size { nodes: before_left.nodes + size.nodes, ids: before.ids + size.ids };
+                let before_left = SubtreeSize { nodes: before.nodes + 1, ..before };
+                let before_right =
+                    SubtreeSize { nodes: before_left.nodes + size.nodes, ids: before.ids + size.ids };
                 let right_place = before_right.nodes as u32;
                 node[0] = KdNode::new(NodeKind::Inner { axis: plane.axis, at: plane.at, right: right_place });
                 rayon::join(

@@ -36,8 +36,8 @@ const MOST_ROOM: u64 = node::MOST as u64 / 2;
 /// A single leaf must have room for all triangles.
 const _: () = assert!((TriangleMesh::MOST_TRIANGLES as u64) < MOST_ROOM);
 
-/// Maximum number of leaves plus references per triangle. This is several times what meshes need, and a small
-/// fraction of what triangles around a single vertex could use.
+/// Maximum number of leaves plus references per triangle. This is several times what typical meshes need, but
+/// a small fraction of what many triangles around a single vertex could use.
 const MOST_PER_TRIANGLE: u64 = 24;
 
 /// Added to the triangle count to give small meshes enough room.
@@ -87,16 +87,16 @@ fn build_within(
     }
     let bounds = Bounds::around(&references);
     let levels = depth_limit(references.len());
-    let part = part(&Cell { bounds, levels, room }, references, &corners, token)?;
+    let part = build_part(&Cell { bounds, levels, room }, references, &corners, token)?;
     let all = part.join();
     token.check()?;
-    let (references, order) = by_first_use(all.ids, count);
+    let (references, order) = order_by_first_use(all.ids, count);
     let triangles = order.into_par_iter().map(|id| LeafTriangle { corners: corners(id), id }).collect();
     Ok(BuiltKdTree { nodes: all.nodes, references, triangles, bounds: bounds.aabb() })
 }
 
 /// Orders the triangles by their first use in a leaf and rewrites `ids` as indices into that order.
-fn by_first_use(mut ids: Vec<u32>, count: u32) -> (Vec<u32>, Vec<u32>) {
+fn order_by_first_use(mut ids: Vec<u32>, count: u32) -> (Vec<u32>, Vec<u32>) {
     let mut places = vec![NOWHERE; count as usize];
     let mut order = Vec::with_capacity(count as usize);
     for id in &mut ids {
@@ -124,7 +124,7 @@ impl Cell {
     /// Chooses the splitting plane. `None` makes a leaf.
     fn plane(&self, references: &[Reference]) -> Option<SplitPlane> {
         // In the worst case, every triangle straddles the plane.
-        let has_room = 2 * leaf_room(references.len()) <= self.room;
+        let has_room = 2 * leaf_slots(references.len()) <= self.room;
         if self.levels == 0 || references.is_empty() || !has_room {
             None
         } else if references.len() <= sweep::SWEPT {
@@ -136,8 +136,9 @@ impl Cell {
 
     /// The two halves of the cell, given the number of references in each.
     fn halves(&self, plane: &SplitPlane, counts: [usize; 2]) -> [Self; 2] {
-        let [left, right] = counts.map(leaf_room);
-        // Divide the room proportionally. If it is enough for both together, each share is enough.
+        let [left, right] = counts.map(leaf_slots);
+        // Divide the room proportionally. If there is enough room for both halves together, each half gets
+        // enough.
         let room = self.room * left / (left + right);
         let levels = self.levels - 1;
         let [below, above] = self.bounds.halves(plane.axis, plane.at);
@@ -146,12 +147,12 @@ impl Cell {
 }
 
 /// Room needed by a leaf with `count` references.
-fn leaf_room(count: usize) -> u64 {
+fn leaf_slots(count: usize) -> u64 {
     count as u64 + 1
 }
 
 /// Splits cells in parallel until they are small enough for a single thread.
-fn part(
+fn build_part(
     cell: &Cell,
     mut references: Vec<Reference>,
     corners: &(impl Fn(u32) -> [Vec3; 3] + Sync),
@@ -166,8 +167,8 @@ fn part(
     references.shrink_to_fit();
     let [left_cell, right_cell] = cell.halves(&plane, [left.len(), references.len()]);
     let (left, right) = rayon::join(
-        || part(&left_cell, left, corners, token),
-        || part(&right_cell, references, corners, token),
+        || build_part(&left_cell, left, corners, token),
+        || build_part(&right_cell, references, corners, token),
     );
     Ok(TreePart::halves(plane, [left?, right?]))
 }

@@ -25,15 +25,20 @@ impl KdSubtree {
         corners: &impl Fn(u32) -> [Vec3; 3],
         token: &CancelToken,
     ) -> Result<Self, Cancelled> {
-        let mut builder =
-            Builder { built: Self::default(), references, scratch: Scratch::default(), corners, token };
+        let mut builder = KdSubtreeBuilder {
+            built: Self::default(),
+            references,
+            scratch: Scratch::default(),
+            corners,
+            token,
+        };
         builder.add(0, cell)?;
         Ok(builder.built)
     }
 }
 
 /// Builds a subtree, reusing the same buffers for all cells.
-struct Builder<'a, C> {
+struct KdSubtreeBuilder<'a, C> {
     built: KdSubtree,
     /// References of all pending cells, with the next cell's references last.
     references: Vec<Reference>,
@@ -42,7 +47,7 @@ struct Builder<'a, C> {
     token: &'a CancelToken,
 }
 
-impl<C: Fn(u32) -> [Vec3; 3]> Builder<'_, C> {
+impl<C: Fn(u32) -> [Vec3; 3]> KdSubtreeBuilder<'_, C> {
     /// Adds a cell and removes its references, which begin at `first`. The recursion depth is limited by the
     /// tree depth.
     fn add(&mut self, first: usize, cell: &Cell) -> Result<(), Cancelled> {

@@ -2,7 +2,7 @@
 //! Havran, *On building fast kd-trees for ray tracing, and on doing that in O(N log N)*, 2006). For so few
 //! triangles, counting both sides of every plane with SIMD is faster than keeping the faces sorted.
 
-use super::cost::{Planes, Search, SplitPlane};
+use super::cost::{CandidatePlanes, PlaneSearch, SplitPlane};
 use crate::accel::reference::{Bounds, Reference};
 use crate::math::Vec4;
 
@@ -19,12 +19,12 @@ pub fn cheapest(references: &[Reference], cell: &Bounds) -> Option<SplitPlane> {
     }
 }
 
-/// One number for each of 4·`N` references.
+/// A number for each of 4·`N` references.
 type Values<const N: usize> = [[f32; 4]; N];
 
 /// [`cheapest`] for at most 4·`N` references.
 fn cheapest_of<const N: usize>(references: &[Reference], cell: &Bounds) -> Option<SplitPlane> {
-    let mut search = Search::<N>::new(cell, references.len());
+    let mut search = PlaneSearch::<N>::new(cell, references.len());
     // Starts and ends of the boxes along each axis. Unused lanes start above every plane and end below it.
     let (mut starts, mut ends) = ([[[f32::INFINITY; 4]; N]; 3], [[[f32::NEG_INFINITY; 4]; N]; 3]);
     for (place, reference) in references.iter().take(4 * N).enumerate() {
@@ -38,7 +38,7 @@ fn cheapest_of<const N: usize>(references: &[Reference], cell: &Bounds) -> Optio
         let (starts, ends) = (&starts[axis], &ends[axis]);
         let has_planar = (0..N).any(|i| Vec4::from(starts[i]).cmpeq(Vec4::from(ends[i])).any());
         for at in [starts, ends] {
-            offer(axis, at, [starts, ends], references.len(), has_planar, &mut search);
+            add_planes_across(axis, at, [starts, ends], references.len(), has_planar, &mut search);
         }
     }
     search.cheapest()
@@ -46,15 +46,16 @@ fn cheapest_of<const N: usize>(references: &[Reference], cell: &Bounds) -> Optio
 
 /// Evaluates the planes at `at` across an axis.
 #[inline(always)]
-fn offer<const N: usize>(
+fn add_planes_across<const N: usize>(
     axis: usize,
     at: &Values<N>,
     [starts, ends]: [&Values<N>; 2],
     count: usize,
     has_planar: bool,
-    search: &mut Search<N>,
+    search: &mut PlaneSearch<N>,
 ) {
-    let mut planes = Planes { at: at.map(Vec4::from), left: [Vec4::ZERO; N], right: [Vec4::ZERO; N] };
+    let mut planes =
+        CandidatePlanes { at: at.map(Vec4::from), left: [Vec4::ZERO; N], right: [Vec4::ZERO; N] };
     let mut planar = [Vec4::ZERO; N];
     for place in 0..count.min(4 * N) {
         let start = Vec4::splat(starts[place / 4][place % 4]);
@@ -74,9 +75,9 @@ fn offer<const N: usize>(
             to_right.right[i] += planar;
             planes.left[i] += planar;
         }
-        search.offer(axis, true, &to_right);
+        search.add_planes(axis, true, &to_right);
     }
-    search.offer(axis, false, &planes);
+    search.add_planes(axis, false, &planes);
 }
 
 #[cfg(test)]

@@ -10,12 +10,14 @@ use crate::accel::wide_bvh::simd::pages;
 
 /// Joins all nodes (root first) and the contents of all packs.
 pub fn join(root: TreePart) -> (Vec<WideNode>, Vec<Pack>) {
-    let mut top = Top::default();
+    let mut top = UpperNodes::default();
     match root {
-        TreePart::Built(subtree) if matches!(subtree.root, Child::Inner(0)) => top.subtrees.push(subtree),
+        TreePart::BuiltWideBvh(subtree) if matches!(subtree.root, Child::Inner(0)) => {
+            top.subtrees.push(subtree);
+        }
         root => {
             let bounds = root.bounds();
-            top.node(bounds, root);
+            top.add_part(bounds, root);
         }
     }
     top.finish()
@@ -24,7 +26,7 @@ pub fn join(root: TreePart) -> (Vec<WideNode>, Vec<Pack>) {
 impl TreePart {
     fn bounds(&self) -> Bounds {
         match self {
-            Self::Built(subtree) => subtree.bounds,
+            Self::BuiltWideBvh(subtree) => subtree.bounds,
             Self::Halves(halves) => {
                 let mut bounds = halves[0].0;
                 bounds.grow(&halves[1].0);
@@ -36,21 +38,21 @@ impl TreePart {
 
 /// A child of a node above the subtrees.
 #[derive(Clone, Copy)]
-enum Below {
-    Top(usize),
+enum UpperChild {
+    UpperNodes(usize),
     Subtree(usize),
 }
 
 /// The nodes above the subtrees.
 #[derive(Default)]
-struct Top {
-    nodes: Vec<Vec<(Bounds, Below)>>,
+struct UpperNodes {
+    nodes: Vec<Vec<(Bounds, UpperChild)>>,
     subtrees: Vec<WideSubtree>,
 }
 
-impl Top {
+impl UpperNodes {
     /// Creates the node of a part and all nodes below it. Returns its index.
-    fn node(&mut self, bounds: Bounds, part: TreePart) -> usize {
+    fn add_part(&mut self, bounds: Bounds, part: TreePart) -> usize {
         let place = self.nodes.len();
         self.nodes.push(Vec::new());
         let mut children = vec![(bounds, part)];
@@ -65,11 +67,11 @@ impl Top {
         }
         for (bounds, part) in children {
             let below = match part {
-                TreePart::Built(subtree) => {
+                TreePart::BuiltWideBvh(subtree) => {
                     self.subtrees.push(subtree);
-                    Below::Subtree(self.subtrees.len() - 1)
+                    UpperChild::Subtree(self.subtrees.len() - 1)
                 }
-                halves @ TreePart::Halves(_) => Below::Top(self.node(bounds, halves)),
+                halves @ TreePart::Halves(_) => UpperChild::UpperNodes(self.add_part(bounds, halves)),
             };
             self.nodes[place].push((bounds, below));
         }
@@ -77,17 +79,17 @@ impl Top {
     }
 
     fn finish(self) -> (Vec<WideNode>, Vec<Pack>) {
-        let starts = self.starts();
+        let starts = self.subtree_starts();
         let nodes_of_top: Vec<WideNode> =
             self.nodes.iter().map(|children| self.top_node(children, &starts)).collect();
         let total = starts.last().map_or(0, |end| end.node);
-        let mut nodes = pages::large(total as usize);
+        let mut nodes = pages::with_huge_pages(total as usize);
         let node = |place: u32| match nodes_of_top.get(place as usize) {
             Some(node) => *node,
             None => {
                 let subtree = starts.partition_point(|start| start.node <= place) - 1;
                 let start = &starts[subtree];
-                start.moved(&self.subtrees[subtree].nodes[(place - start.node) as usize])
+                start.offset_node(&self.subtrees[subtree].nodes[(place - start.node) as usize])
             }
         };
         (0..total).into_par_iter().map(node).collect_into_vec(&mut nodes);
@@ -95,7 +97,7 @@ impl Top {
     }
 
     /// Start of each subtree, followed by the end of the last one.
-    fn starts(&self) -> Vec<SubtreeStart> {
+    fn subtree_starts(&self) -> Vec<SubtreeStart> {
         let mut start = SubtreeStart { node: self.nodes.len() as u32, pack: 0 };
         let mut starts = vec![start];
         for subtree in &self.subtrees {
@@ -106,12 +108,12 @@ impl Top {
         starts
     }
 
-    fn top_node(&self, children: &[(Bounds, Below)], starts: &[SubtreeStart]) -> WideNode {
+    fn top_node(&self, children: &[(Bounds, UpperChild)], starts: &[SubtreeStart]) -> WideNode {
         let mut node = WideNode::EMPTY;
         for (slot, &(bounds, below)) in children.iter().enumerate() {
             let child = match below {
-                Below::Top(place) => Child::Inner(place as u32),
-                Below::Subtree(subtree) => starts[subtree].moved_child(self.subtrees[subtree].root),
+                UpperChild::UpperNodes(place) => Child::Inner(place as u32),
+                UpperChild::Subtree(subtree) => starts[subtree].offset_child(self.subtrees[subtree].root),
             };
             node.set(slot, bounds.aabb(), child);
         }
@@ -127,18 +129,18 @@ struct SubtreeStart {
 }
 
 impl SubtreeStart {
-    fn moved_child(&self, child: Child) -> Child {
+    fn offset_child(&self, child: Child) -> Child {
         match child {
             Child::Inner(node) => Child::Inner(node + self.node),
             Child::Leaf { first, count } => Child::Leaf { first: first + self.pack, count },
         }
     }
 
-    fn moved(&self, node: &WideNode) -> WideNode {
+    fn offset_node(&self, node: &WideNode) -> WideNode {
         let mut moved = *node;
         for slot in 0..WIDTH {
             if node.bounds(slot).is_some() {
-                moved.set_child(slot, self.moved_child(node.child(slot)));
+                moved.set_child(slot, self.offset_child(node.child(slot)));
             }
         }
         moved

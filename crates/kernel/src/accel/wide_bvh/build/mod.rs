@@ -24,7 +24,7 @@ use subtree::WideSubtree;
 const TASK_SIZE: usize = 8192;
 
 /// Result of construction.
-pub struct Built {
+pub struct BuiltWideBvh {
     pub nodes: Vec<WideNode>,
     pub packs: Vec<TrianglePack>,
     pub bounds: Aabb,
@@ -39,17 +39,17 @@ pub fn build(
     corners: impl Fn(u32) -> [Vec3; 3] + Sync,
     quality: Quality,
     token: &CancelToken,
-) -> Result<Built, Cancelled> {
+) -> Result<BuiltWideBvh, Cancelled> {
     let mut references = Reference::usable(count, &corners, token)?;
     if references.is_empty() {
-        return Ok(Built { nodes: Vec::new(), packs: Vec::new(), bounds: Aabb::EMPTY });
+        return Ok(BuiltWideBvh { nodes: Vec::new(), packs: Vec::new(), bounds: Aabb::EMPTY });
     }
     if quality == Quality::High {
         references = triangle_splits::split_large(&references, &corners, token)?;
     }
     let whole = Segment::whole(&references);
     let bounds = whole.bounds.aabb();
-    let part = part(&mut references, 0, whole, token)?;
+    let part = build_part(&mut references, 0, whole, token)?;
     token.check()?;
     let (nodes, leaves) = join::join(part);
     token.check()?;
@@ -57,9 +57,9 @@ pub fn build(
         let members = &references[leaf.first as usize..][..leaf.count as usize];
         TrianglePack::new(members.iter().map(|member| (member.id(), corners(member.id()))))
     };
-    let mut packs = super::simd::pages::large(leaves.len());
+    let mut packs = super::simd::pages::with_huge_pages(leaves.len());
     leaves.par_iter().map(pack).collect_into_vec(&mut packs);
-    Ok(Built { nodes, packs, bounds })
+    Ok(BuiltWideBvh { nodes, packs, bounds })
 }
 
 /// A part of the tree: an upper node or a subtree.
@@ -67,12 +67,12 @@ enum TreePart {
     /// Two halves to be collapsed into a wide node.
     Halves(Box<[(Bounds, TreePart); 2]>),
     /// A subtree built by a single thread.
-    Built(WideSubtree),
+    BuiltWideBvh(WideSubtree),
 }
 
 /// Splits parts in parallel until they are small enough for a single thread. `start` is the overall index of
 /// the part's first reference.
-fn part(
+fn build_part(
     references: &mut [Reference],
     start: usize,
     segment: Segment,
@@ -80,15 +80,15 @@ fn part(
 ) -> Result<TreePart, Cancelled> {
     token.check()?;
     let Some(split) = segment.split.as_ref().filter(|_| segment.count > TASK_SIZE) else {
-        return Ok(TreePart::Built(WideSubtree::build(references, start, segment)));
+        return Ok(TreePart::BuiltWideBvh(WideSubtree::build(references, start, segment)));
     };
     let (left, right) = partition(references, &segment, split);
     let (left_bounds, right_bounds) = (left.bounds, right.bounds);
     let middle = left.count;
     let (left_references, right_references) = references.split_at_mut(middle);
     let (left, right) = rayon::join(
-        || part(left_references, start, left, token),
-        || part(right_references, start + middle, right, token),
+        || build_part(left_references, start, left, token),
+        || build_part(right_references, start + middle, right, token),
     );
     Ok(TreePart::Halves(Box::new([(left_bounds, left?), (right_bounds, right?)])))
 }

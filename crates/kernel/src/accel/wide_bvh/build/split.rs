@@ -52,25 +52,26 @@ pub enum Split {
 impl Segment {
     /// The segment of all references.
     pub fn whole(references: &[Reference]) -> Self {
-        let chunks = references.par_chunks(PARALLEL_SIZE / 4).map(Boxes::around);
-        Self::new(references, chunks.reduce(|| Boxes::EMPTY, Boxes::union), 0)
+        let chunks = references.par_chunks(PARALLEL_SIZE / 4).map(SegmentBounds::around);
+        Self::new(references, chunks.reduce(|| SegmentBounds::EMPTY, SegmentBounds::union), 0)
     }
 
-    fn new(references: &[Reference], boxes: Boxes, level: u32) -> Self {
+    fn new(references: &[Reference], boxes: SegmentBounds, level: u32) -> Self {
         let count = references.len();
-        let (split, is_node) = if count <= PACK { (None, false) } else { choose(references, &boxes, level) };
+        let (split, is_node) =
+            if count <= PACK { (None, false) } else { choose_split(references, &boxes, level) };
         Self { count, bounds: boxes.bounds, level, split, is_node }
     }
 }
 
 /// Bounding boxes of some references and of their centroids.
 #[derive(Clone, Copy)]
-struct Boxes {
+struct SegmentBounds {
     bounds: Bounds,
     centroids: Bounds,
 }
 
-impl Boxes {
+impl SegmentBounds {
     const EMPTY: Self = Self { bounds: Bounds::EMPTY, centroids: Bounds::EMPTY };
 
     fn around(references: &[Reference]) -> Self {
@@ -95,10 +96,10 @@ impl Boxes {
 }
 
 /// Chooses the best split of a segment, and whether the segment is worth a separate node.
-fn choose(references: &[Reference], boxes: &Boxes, level: u32) -> (Option<Split>, bool) {
+fn choose_split(references: &[Reference], boxes: &SegmentBounds, level: u32) -> (Option<Split>, bool) {
     let count = references.len();
     let must = count > PACK * MOST_PACKS as usize;
-    let Boxes { bounds, centroids } = boxes;
+    let SegmentBounds { bounds, centroids } = boxes;
     let bins = Bins::new(centroids, count);
     let best = if level >= SURFACE_AREA_LEVELS {
         None
@@ -109,9 +110,9 @@ fn choose(references: &[Reference], boxes: &Boxes, level: u32) -> (Option<Split>
     } else {
         Histogram::<BINS>::in_parallel(references, &bins).cheapest(&bins)
     };
-    let leaf_cost = blocks(count as u32) as f32 * bounds.half_area();
+    let leaf_cost = pack_count(count as u32) as f32 * bounds.half_area();
     match best {
-        Some(Cheapest { axis, bin, cost, sides }) if must || cost < leaf_cost => {
+        Some(CheapestBinSplit { axis, bin, cost, sides }) if must || cost < leaf_cost => {
             let is_node = must || cost + TRAVERSAL_COST * bounds.half_area() < leaf_cost;
             (Some(Split::Plane { axis, bin, bins, sides }), is_node)
         }
@@ -122,7 +123,7 @@ fn choose(references: &[Reference], boxes: &Boxes, level: u32) -> (Option<Split>
 
 /// Number of packs for `count` triangles.
 #[inline(always)]
-fn blocks(count: u32) -> u32 {
+fn pack_count(count: u32) -> u32 {
     count.div_ceil(PACK as u32)
 }
 
@@ -136,7 +137,7 @@ pub struct Bins {
     count: usize,
 }
 
-/// Added to a number between −½ and 2²², puts the nearest integer into the low bits.
+/// Adding this to a number between −½ and 2²² puts the nearest integer into the low bits.
 pub const ROUND: f32 = 12_582_912.0;
 
 impl Bins {
@@ -154,13 +155,13 @@ impl Bins {
 
     /// Bin numbers plus [`ROUND`].
     #[inline(always)]
-    fn place(&self, centroid: Vec4) -> Vec4 {
+    fn bin_coordinates(&self, centroid: Vec4) -> Vec4 {
         (centroid - self.start) * self.per_length - Vec4::splat(0.5) + Vec4::splat(ROUND)
     }
 
     #[inline(always)]
     fn of(&self, reference: &Reference) -> [usize; 3] {
-        let [x, y, z, _] = self.place(reference.centroid()).to_array();
+        let [x, y, z, _] = self.bin_coordinates(reference.centroid()).to_array();
         [x, y, z].map(|place| place.to_bits() as usize & (BINS - 1))
     }
 }
@@ -172,11 +173,11 @@ pub struct Histogram<const N: usize> {
 }
 
 /// The cheapest split.
-struct Cheapest {
+struct CheapestBinSplit {
     axis: usize,
     /// First bin on the right.
     bin: usize,
-    /// Sum over both sides of the number of packs times the surface area.
+    /// Sum of pack count × surface area over both sides.
     cost: f32,
     sides: [Bounds; 2],
 }
@@ -217,7 +218,7 @@ impl<const N: usize> Histogram<N> {
     }
 
     /// Finds the cheapest plane between bins by sweeping from both ends.
-    fn cheapest(&self, bins: &Bins) -> Option<Cheapest> {
+    fn cheapest(&self, bins: &Bins) -> Option<CheapestBinSplit> {
         let mut best: Option<(usize, usize, f32)> = None;
         let count = bins.count.min(N);
         for axis in (0..3).filter(|&axis| bins.per_length[axis] > 0.0) {
@@ -228,7 +229,7 @@ impl<const N: usize> Histogram<N> {
                 bounds.grow(own);
                 members += self.counts[bin][axis];
                 if members > 0 {
-                    right_cost[bin] = bounds.half_area() * blocks(members) as f32;
+                    right_cost[bin] = bounds.half_area() * pack_count(members) as f32;
                 }
             }
             (bounds, members) = (Bounds::EMPTY, 0);
@@ -236,7 +237,7 @@ impl<const N: usize> Histogram<N> {
                 let own = &self.bounds[bin - 1][axis];
                 bounds.grow(own);
                 members += self.counts[bin - 1][axis];
-                let cost = bounds.half_area() * blocks(members) as f32 + right_cost;
+                let cost = bounds.half_area() * pack_count(members) as f32 + right_cost;
                 if members > 0 && cost < best.map_or(f32::INFINITY, |(_, _, least)| least) {
                     best = Some((axis, bin, cost));
                 }
@@ -250,7 +251,7 @@ impl<const N: usize> Histogram<N> {
             })
         };
         let (left, right) = self.bounds[..count].split_at(bin);
-        Some(Cheapest { axis, bin, cost, sides: [around(left), around(right)] })
+        Some(CheapestBinSplit { axis, bin, cost, sides: [around(left), around(right)] })
     }
 }
 
@@ -259,17 +260,17 @@ pub fn partition(references: &mut [Reference], segment: &Segment, split: &Split)
     let (middle, left, right) = match split {
         Split::Plane { axis, bin, bins, sides } => {
             let (middle, [left, right]) = match axis {
-                0 => partitioned::<0>(references, *bin, bins),
-                1 => partitioned::<1>(references, *bin, bins),
-                _ => partitioned::<2>(references, *bin, bins),
+                0 => partition_along_axis::<0>(references, *bin, bins),
+                1 => partition_along_axis::<1>(references, *bin, bins),
+                _ => partition_along_axis::<2>(references, *bin, bins),
             };
-            let boxes = |side: usize, centroids| Boxes { bounds: sides[side], centroids };
+            let boxes = |side: usize, centroids| SegmentBounds { bounds: sides[side], centroids };
             (middle, boxes(0, left), boxes(1, right))
         }
         Split::Middle => {
             let middle = references.len() / 2;
             let (left, right) = references.split_at(middle);
-            (middle, Boxes::around(left), Boxes::around(right))
+            (middle, SegmentBounds::around(left), SegmentBounds::around(right))
         }
     };
     let level = segment.level + 1;
@@ -278,7 +279,7 @@ pub fn partition(references: &mut [Reference], segment: &Segment, split: &Split)
     (left, Segment::new(right_references, right, level))
 }
 
-fn partitioned<const AXIS: usize>(
+fn partition_along_axis<const AXIS: usize>(
     references: &mut [Reference],
     bin: usize,
     bins: &Bins,
@@ -344,9 +345,9 @@ mod tests {
 
     /// SIMD and scalar partition functions for each axis.
     const PARTITIONS: [[Partition; 2]; 3] = [
-        [partitioned::<0>, partition_by_plane::<0>],
-        [partitioned::<1>, partition_by_plane::<1>],
-        [partitioned::<2>, partition_by_plane::<2>],
+        [partition_along_axis::<0>, partition_by_plane::<0>],
+        [partition_along_axis::<1>, partition_by_plane::<1>],
+        [partition_along_axis::<2>, partition_by_plane::<2>],
     ];
 
     #[test]
@@ -373,7 +374,7 @@ mod tests {
         }
         for count in [1, 2, 5, 24, FEW, FEW + 1, 1000] {
             let references = references(count as u32);
-            let bins = Bins::new(&Boxes::around(&references).centroids, references.len());
+            let bins = Bins::new(&SegmentBounds::around(&references).centroids, references.len());
             if count <= FEW {
                 assert!(bins.count <= FEW_BINS, "{} bins", bins.count);
                 counts::<FEW_BINS>(&references, &bins);
@@ -386,7 +387,7 @@ mod tests {
     fn simd_partitions_match_scalar_partitions() {
         for count in [1, 2, 5, 33, 1000] {
             let references = references(count);
-            let bins = Bins::new(&Boxes::around(&references).centroids, references.len());
+            let bins = Bins::new(&SegmentBounds::around(&references).centroids, references.len());
             for (axis, [by_vectors, plainly]) in PARTITIONS.into_iter().enumerate() {
                 for bin in 1..bins.count {
                     let (mut own, mut plain) = (references.clone(), references.clone());
@@ -402,7 +403,7 @@ mod tests {
                         own[..middle].iter().all(is_left) && !own[middle..].iter().any(is_left),
                         "{axis}"
                     );
-                    let around = |side: &[Reference]| bits(&Boxes::around(side).centroids);
+                    let around = |side: &[Reference]| bits(&SegmentBounds::around(side).centroids);
                     assert_eq!(sides.each_ref().map(bits), [around(&own[..middle]), around(&own[middle..])]);
                 }
             }

@@ -35,7 +35,12 @@ pub fn split_large(
         token.check()?;
         let mut pieces = Vec::new();
         for (reference, &priority) in references.iter().zip(priorities) {
-            grid.cut(*reference, cuts(priority, factor), corners(reference.id()), &mut pieces);
+            grid.cut_into_pieces(
+                *reference,
+                cut_count(priority, factor),
+                corners(reference.id()),
+                &mut pieces,
+            );
         }
         Ok(pieces)
     };
@@ -44,14 +49,15 @@ pub fn split_large(
 }
 
 /// Number of times to cut a triangle.
-fn cuts(priority: f32, factor: f32) -> u32 {
+fn cut_count(priority: f32, factor: f32) -> u32 {
     (priority * factor) as u32
 }
 
 /// Finds, by bisection, the largest factor for which the total number of cuts is at most `most`.
 fn largest_factor(priorities: &[f32], most: u64) -> f32 {
-    let total =
-        |factor: f32| priorities.par_iter().map(|&priority| u64::from(cuts(priority, factor))).sum::<u64>();
+    let total = |factor: f32| {
+        priorities.par_iter().map(|&priority| u64::from(cut_count(priority, factor))).sum::<u64>()
+    };
     let sum: f64 = priorities.iter().map(|&priority| f64::from(priority)).sum();
     if !(sum > 0.0 && sum.is_finite()) {
         return 0.0;
@@ -113,14 +119,20 @@ impl Grid {
     }
 
     /// Cuts a triangle `cuts` times. Larger parts are cut more often.
-    fn cut(&self, reference: Reference, cuts: u32, corners: [Vec3; 3], pieces: &mut Vec<Reference>) {
+    fn cut_into_pieces(
+        &self,
+        reference: Reference,
+        cuts: u32,
+        corners: [Vec3; 3],
+        pieces: &mut Vec<Reference>,
+    ) {
         let plane = if cuts == 0 { None } else { self.plane(&reference.bounds) };
         let Some(GridPlane { axis, at, .. }) = plane else { return pieces.push(reference) };
         let halves = reference.split(axis, at, corners);
         let [left, right] = halves.map(|half| half.bounds.extent().truncate().max_element());
         let of_left = ((cuts - 1) as f32 * (left / (left + right)) + 0.5) as u32;
-        self.cut(halves[0], of_left, corners, pieces);
-        self.cut(halves[1], cuts - 1 - of_left.min(cuts - 1), corners, pieces);
+        self.cut_into_pieces(halves[0], of_left, corners, pieces);
+        self.cut_into_pieces(halves[1], cuts - 1 - of_left.min(cuts - 1), corners, pieces);
     }
 }
 

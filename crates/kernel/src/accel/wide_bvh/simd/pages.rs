@@ -3,18 +3,18 @@
 /// Minimum allocation size in bytes for using huge pages.
 const LARGE: usize = 1 << 21;
 
-/// An empty vector with room for `count` items.
-pub fn large<T>(count: usize) -> Vec<T> {
+/// An empty vector with capacity for `count` items, in huge pages if it is large.
+pub fn with_huge_pages<T>(count: usize) -> Vec<T> {
     let items = Vec::with_capacity(count);
     let bytes = count * size_of::<T>();
     if bytes >= LARGE {
-        ask(items.as_ptr() as usize, bytes);
+        request_huge_pages(items.as_ptr() as usize, bytes);
     }
     items
 }
 
 #[cfg(target_os = "linux")]
-fn ask(start: usize, bytes: usize) {
+fn request_huge_pages(start: usize, bytes: usize) {
     use nix::sys::mman::{MmapAdvise, madvise};
     const PAGE: usize = 4096;
     let first = start.next_multiple_of(PAGE);
@@ -27,4 +27,4 @@ fn ask(start: usize, bytes: usize) {
 }
 
 #[cfg(not(target_os = "linux"))]
-fn ask(_start: usize, _bytes: usize) {}
+fn request_huge_pages(_start: usize, _bytes: usize) {}

@@ -32,13 +32,13 @@ pub fn closest(tree: &WideBvh, ray: &Ray) -> Option<ShapeHit> {
         match child {
             Child::Inner(index) => {
                 let start = stack.len();
-                stack.extend(met(&tree.nodes[index as usize], &slabs, t_max));
+                stack.extend(hit_children(&tree.nodes[index as usize], &slabs, t_max));
                 stack[start..].sort_by(|a, b| b.0.total_cmp(&a.0));
             }
             Child::Leaf { first, count } => {
                 for pack in &tree.packs[first as usize..(first + count) as usize] {
                     for lane in (0..PACK).filter(|&lane| pack.ids[lane] != ray.start) {
-                        nearer(pack, lane, &sheared, t_max, &mut best);
+                        update_nearest(pack, lane, &sheared, t_max, &mut best);
                         t_max = best.map_or(t_max, |best| best.t);
                     }
                 }
@@ -61,7 +61,9 @@ pub fn any(tree: &WideBvh, ray: &Ray, except: Option<u32>) -> bool {
     while let Some(child) = stack.pop() {
         match child {
             Child::Inner(index) => {
-                stack.extend(met(&tree.nodes[index as usize], &slabs, ray.t_max).map(|(_, child)| child));
+                stack.extend(
+                    hit_children(&tree.nodes[index as usize], &slabs, ray.t_max).map(|(_, child)| child),
+                );
             }
             Child::Leaf { first, count } => {
                 let packs = &tree.packs[first as usize..(first + count) as usize];
@@ -80,7 +82,7 @@ pub fn any(tree: &WideBvh, ray: &Ray, except: Option<u32>) -> bool {
 }
 
 /// Children that the ray hits, with their entry distances.
-fn met(node: &WideNode, slabs: &SlabRay, t_max: f32) -> impl Iterator<Item = (f32, Child)> {
+fn hit_children(node: &WideNode, slabs: &SlabRay, t_max: f32) -> impl Iterator<Item = (f32, Child)> {
     (0..WIDTH).filter_map(move |slot| {
         let corner = |side: usize| {
             Vec3::new(node.rows[side][slot], node.rows[2 + side][slot], node.rows[4 + side][slot])
@@ -89,9 +91,16 @@ fn met(node: &WideNode, slabs: &SlabRay, t_max: f32) -> impl Iterator<Item = (f3
     })
 }
 
-/// Updates the best hit with the hit in a lane if it is nearer, or equally near with a lower index.
+/// Replaces the best hit with the hit on a lane's triangle if that hit is nearer, or equally near with a
+/// lower index.
 #[inline]
-pub fn nearer(pack: &TrianglePack, lane: usize, ray: &ShearedRay, t_max: f32, best: &mut Option<ShapeHit>) {
+pub fn update_nearest(
+    pack: &TrianglePack,
+    lane: usize,
+    ray: &ShearedRay,
+    t_max: f32,
+    best: &mut Option<ShapeHit>,
+) {
     if let Some(hit) = ray.intersect(&pack.corners(lane), t_max) {
         let id = pack.ids[lane];
         if best.is_none_or(|best| (hit.t, id) < (best.t, best.primitive)) {

@@ -91,7 +91,7 @@ fn corners(bounds: &Aabb) -> (__m128, __m128) {
 /// Mask of the lanes that are ∞ or −∞.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
-fn overflows(v: __m128) -> __m128 {
+fn infinite_lanes(v: __m128) -> __m128 {
     let unsigned = _mm_and_ps(v, _mm_castsi128_ps(_mm_set1_epi32(i32::MAX)));
     _mm_cmpeq_ps(unsigned, _mm_set1_ps(f32::INFINITY))
 }
@@ -99,7 +99,7 @@ fn overflows(v: __m128) -> __m128 {
 /// Broadcasts the maximum of the first three lanes, which must be nonnegative.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
-fn greatest(v: __m128) -> __m128 {
+fn max_of_three(v: __m128) -> __m128 {
     let v = _mm_max_ps(v, _mm_permute_ps::<0b11_01_00_10>(v));
     _mm_permute_ps::<0>(_mm_max_ps(v, _mm_permute_ps::<0b01>(v)))
 }
@@ -107,15 +107,15 @@ fn greatest(v: __m128) -> __m128 {
 /// Broadcasts each of the first three lanes to eight lanes.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
-fn in_eight(v: __m128) -> [F8; 3] {
-    let [x, y, z] = in_four(v);
+fn broadcast_to_eight(v: __m128) -> [F8; 3] {
+    let [x, y, z] = broadcast_to_four(v);
     [F8(_mm256_broadcastss_ps(x.0)), F8(_mm256_broadcastss_ps(y.0)), F8(_mm256_broadcastss_ps(z.0))]
 }
 
 /// Broadcasts each of the first three lanes to four lanes.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
-fn in_four(v: __m128) -> [F4; 3] {
+fn broadcast_to_four(v: __m128) -> [F4; 3] {
     [F4(_mm_permute_ps::<0x00>(v)), F4(_mm_permute_ps::<0x55>(v)), F4(_mm_permute_ps::<0xaa>(v))]
 }
 
@@ -131,14 +131,14 @@ impl SimdRay {
         // products.
         let below = _mm_and_ps(_mm_sub_ps(min, origin), unsigned);
         let above = _mm_and_ps(_mm_sub_ps(max, origin), unsigned);
-        let farthest = greatest(_mm_max_ps(below, above));
+        let farthest = max_of_three(_mm_max_ps(below, above));
         let margin = _mm_mul_ps(farthest, _mm_set1_ps(TRIANGLE_ERROR));
         let reach = _mm_add_ps(margin, _mm_mul_ps(_mm_and_ps(origin, unsigned), _mm_set1_ps(f32::EPSILON)));
         // Prepare the box tests. Near-zero direction components are increased slightly, which moves the ray
         // by less than a margin inside the boxes. This keeps the inverse finite unless the direction is
         // extremely short.
         let size = _mm_and_ps(direction, unsigned);
-        let least = _mm_mul_ps(greatest(size), _mm_set1_ps(LEAST_PART));
+        let least = _mm_mul_ps(max_of_three(size), _mm_set1_ps(LEAST_PART));
         let moving = _mm_or_ps(_mm_max_ps(size, least), _mm_andnot_ps(unsigned, direction));
         let inverse = _mm_div_ps(_mm_set1_ps(1.0), moving);
         let is_down = _mm_cmplt_ps(inverse, _mm_setzero_ps());
@@ -153,18 +153,18 @@ impl SimdRay {
         let places = unsafe { _mm_loadu_si128(axes.as_ptr().cast()) };
         let scale = _mm_permute_ps::<0xaa>(_mm_permutevar_ps(inverse, places));
         let shear = _mm_mul_ps(_mm_permutevar_ps(direction, places), scale);
-        let [shear_x, shear_y, _] = in_four(shear);
+        let [shear_x, shear_y, _] = broadcast_to_four(shear);
         // Ignore the planes of an axis if the arithmetic overflows.
         let (endless, minus_endless) = (_mm_set1_ps(f32::INFINITY), _mm_set1_ps(f32::NEG_INFINITY));
         let from_near = _mm_mul_ps(inverse, _mm_blendv_ps(after, before, is_down));
         let from_far = _mm_mul_ps(padded, _mm_blendv_ps(before, after, is_down));
         Self {
-            from_near: in_eight(_mm_blendv_ps(from_near, endless, overflows(from_near))),
-            from_far: in_eight(_mm_blendv_ps(from_far, minus_endless, overflows(from_far))),
-            to_near: in_eight(inverse),
-            to_far: in_eight(padded),
+            from_near: broadcast_to_eight(_mm_blendv_ps(from_near, endless, infinite_lanes(from_near))),
+            from_far: broadcast_to_eight(_mm_blendv_ps(from_far, minus_endless, infinite_lanes(from_far))),
+            to_near: broadcast_to_eight(inverse),
+            to_far: broadcast_to_eight(padded),
             near: [downs & 1, 2 + (downs >> 1 & 1), 4 + (downs >> 2 & 1)],
-            origin: in_four(_mm_permutevar_ps(origin, places)),
+            origin: broadcast_to_four(_mm_permutevar_ps(origin, places)),
             shear: [shear_x, shear_y, F4(scale)],
             axes: [axes[0] as usize, axes[1] as usize, axes[2] as usize],
             start: ray.start,
@@ -175,7 +175,7 @@ impl SimdRay {
     /// `end`. NaN distances do not affect the interval, as in `SlabRay::enter`.
     #[inline(always)]
     pub fn enter(&self, node: &WideNode, end: F8) -> (F8, u32) {
-        let (mut near, mut far) = (end.like(0.0), end);
+        let (mut near, mut far) = (end.splat_like(0.0), end);
         for axis in 0..3 {
             // SAFETY: values of this type exist, so the processor has the instructions. Both rows exist: they
             // are a row with an even index and the next one.
@@ -183,8 +183,8 @@ impl SimdRay {
                 let row = node.rows.as_ptr().add(self.near[axis]);
                 let other = node.rows.as_ptr().add(self.near[axis] ^ 1);
                 (
-                    F8::load(row.cast()).times_less(self.to_near[axis], self.from_near[axis]),
-                    F8::load(other.cast()).times_less(self.to_far[axis], self.from_far[axis]),
+                    F8::load(row.cast()).mul_sub(self.to_near[axis], self.from_near[axis]),
+                    F8::load(other.cast()).mul_sub(self.to_far[axis], self.from_far[axis]),
                 )
             };
             near = to_near.max(near);
@@ -197,14 +197,14 @@ impl SimdRay {
     #[inline(always)]
     pub fn hits(&self, pack: &TrianglePack, t_max: f32) -> Hits<F4> {
         let corners = [self.corner(pack, 0), self.corner(pack, 3), self.corner(pack, 6)];
-        let hits = triangle::hits(&corners, self.shear[2], self.shear[2].like(t_max), true);
-        let others = !self.own_lane(pack);
+        let hits = triangle::hits(&corners, self.shear[2], self.shear[2].splat_like(t_max), true);
+        let others = !self.start_triangle_lane(pack);
         Hits { hit: hits.hit & others, doubtful: hits.doubtful & others, ..hits }
     }
 
     /// Mask of the lane that contains the ray's start triangle.
     #[inline(always)]
-    fn own_lane(&self, pack: &TrianglePack) -> u32 {
+    fn start_triangle_lane(&self, pack: &TrianglePack) -> u32 {
         // SAFETY: values of `F4` exist, so the processor has the instructions. Reads four numbers.
         unsafe {
             let ids = _mm_loadu_si128(pack.ids.as_ptr().cast());

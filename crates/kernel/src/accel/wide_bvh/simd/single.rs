@@ -2,7 +2,7 @@
 
 use std::arch::x86_64::*;
 
-use super::portable::nearer;
+use super::portable::update_nearest;
 use super::ray::{SimdRay, may_hit};
 use super::stack::{Stack, entry, key};
 use super::triangle::Hits;
@@ -24,7 +24,7 @@ pub fn closest(tree: &WideBvh, ray: &Ray) -> Option<ShapeHit> {
     let lines = SimdRay::new(ray, &tree.bounds);
     let mut best: Option<ShapeHit> = None;
     let mut t_max = ray.t_max;
-    let mut end = like8.like(t_max * SLAB_PAD);
+    let mut end = like8.splat_like(t_max * SLAB_PAD);
     let mut stack: Stack<u64> = Stack::new();
     let mut code = 0;
     loop {
@@ -41,11 +41,11 @@ pub fn closest(tree: &WideBvh, ray: &Ray) -> Option<ShapeHit> {
                 for pack in &tree.packs[first as usize..(first + count) as usize] {
                     let hits = lines.hits(pack, t_max);
                     if hits.hit | hits.doubtful != 0 {
-                        nearest(pack, &hits, ray, &mut best, t_max);
+                        update_nearest_of_pack(pack, &hits, ray, &mut best, t_max);
                         t_max = best.map_or(t_max, |best| best.t);
                     }
                 }
-                end = end.like(t_max * SLAB_PAD);
+                end = end.splat_like(t_max * SLAB_PAD);
             }
         }
         loop {
@@ -61,7 +61,13 @@ pub fn closest(tree: &WideBvh, ray: &Ray) -> Option<ShapeHit> {
 /// Updates the best hit with the nearest hit in a pack.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
-fn nearest(pack: &TrianglePack, hits: &Hits<F4>, ray: &Ray, best: &mut Option<ShapeHit>, t_max: f32) {
+fn update_nearest_of_pack(
+    pack: &TrianglePack,
+    hits: &Hits<F4>,
+    ray: &Ray,
+    best: &mut Option<ShapeHit>,
+    t_max: f32,
+) {
     let mut t = [0.0; PACK];
     hits.t.store(&mut t);
     let (mut u, mut v) = ([0.0; PACK], [0.0; PACK]);
@@ -80,15 +86,21 @@ fn nearest(pack: &TrianglePack, hits: &Hits<F4>, ray: &Ray, best: &mut Option<Sh
     while lanes != 0 {
         let lane = lanes.trailing_zeros() as usize % PACK;
         lanes &= lanes - 1;
-        nearer_of(pack, lane, ray, t_max, best);
+        update_nearest_uninlined(pack, lane, ray, t_max, best);
     }
 }
 
-/// [`nearer`] as an outlined call, since it is rarely needed.
+/// [`update_nearest`] as an outlined call, since it is rarely needed.
 #[cold]
 #[inline(never)]
-fn nearer_of(pack: &TrianglePack, lane: usize, ray: &Ray, t_max: f32, best: &mut Option<ShapeHit>) {
-    nearer(pack, lane, &ShearedRay::new(ray.origin, ray.direction), t_max, best);
+fn update_nearest_uninlined(
+    pack: &TrianglePack,
+    lane: usize,
+    ray: &Ray,
+    t_max: f32,
+    best: &mut Option<ShapeHit>,
+) {
+    update_nearest(pack, lane, &ShearedRay::new(ray.origin, ray.direction), t_max, best);
 }
 
 /// Pushes the children that the ray hits, farthest first, except for the nearest. Returns the nearest.
@@ -151,7 +163,7 @@ pub fn any(tree: &WideBvh, ray: &Ray, except: Option<u32>) -> bool {
     // SAFETY: this function is compiled with the required instructions.
     let like8 = unsafe { F8::splat(0.0) };
     let lines = SimdRay::new(ray, &tree.bounds);
-    let end = like8.like(ray.t_max * SLAB_PAD);
+    let end = like8.splat_like(ray.t_max * SLAB_PAD);
     let mut stack: Stack<u32> = Stack::new();
     stack.push(0);
     while let Some(code) = stack.pop() {

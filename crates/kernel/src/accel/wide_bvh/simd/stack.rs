@@ -42,7 +42,7 @@ impl<T: Copy> Stack<T> {
 
     /// The entry that is `back` positions below the top.
     #[inline(always)]
-    fn below(&mut self, back: usize) -> &mut T {
+    fn nth_from_top(&mut self, back: usize) -> &mut T {
         debug_assert!(back < self.size);
         // SAFETY: as in `pop`.
         unsafe { self.entries[self.size - 1 - back].assume_init_mut() }
@@ -68,9 +68,9 @@ impl Stack<u64> {
     pub fn insert(&mut self, key: u64, count: usize) {
         self.push(key);
         let mut back = 0;
-        while back < count && *self.below(back + 1) < *self.below(back) {
-            let lower = *self.below(back + 1);
-            *self.below(back + 1) = std::mem::replace(self.below(back), lower);
+        while back < count && *self.nth_from_top(back + 1) < *self.nth_from_top(back) {
+            let lower = *self.nth_from_top(back + 1);
+            *self.nth_from_top(back + 1) = std::mem::replace(self.nth_from_top(back), lower);
             back += 1;
         }
     }

@@ -27,7 +27,7 @@ pub struct Hits<V: SimdVector> {
 pub fn hits<V: SimdVector>(corners: &Corners<V>, shear_z: V, t_max: V, is_single: bool) -> Hits<V> {
     let [[ax, ay, az], [bx, by, bz], [cx, cy, cz]] = *corners;
     let (wa, wb, wc) = (cx * by - cy * bx, ax * cy - ay * cx, bx * ay - by * ax);
-    let zero = ax.like(0.0);
+    let zero = ax.splat_like(0.0);
     let (least, greatest) = (wa.min(wb.min(wc)), wa.max(wb.max(wc)));
     let outside = least.lt(zero) & zero.lt(greatest);
     let on_edge = least.eq(zero) | greatest.eq(zero);
@@ -35,25 +35,25 @@ pub fn hits<V: SimdVector>(corners: &Corners<V>, shear_z: V, t_max: V, is_single
     let along = (wa * az + wb * bz + wc * cz) * shear_z;
     let none = Hits { hit: 0, doubtful: 0, t: zero, u: zero, v: zero };
     let candidate = if is_single {
-        on_edge | may_count(corners, determinant, shear_z, along, t_max)
+        on_edge | may_be_hit(corners, determinant, shear_z, along, t_max)
     } else {
         zero.le(zero)
     };
-    if V::movemask(V::without(candidate, outside)) == 0 {
+    if V::movemask(V::and_not(candidate, outside)) == 0 {
         return none;
     }
-    let inverse = ax.like(1.0).over(determinant);
+    let inverse = ax.splat_like(1.0).div(determinant);
     let t = along * inverse;
     let ahead = zero.lt(t) & t.le(t_max);
     let (error, reach) = distance_error(corners, shear_z, inverse);
-    let needle = (reach * reach.like(ILL_CONDITIONED)).lt(error);
+    let needle = (reach * reach.splat_like(ILL_CONDITIONED)).lt(error);
     let at_start = t.abs().le(error);
-    let doubtful = V::movemask(V::without(needle | at_start | on_edge, outside));
-    let hit = V::movemask(V::without(ahead, outside)) & !doubtful;
+    let doubtful = V::movemask(V::and_not(needle | at_start | on_edge, outside));
+    let hit = V::movemask(V::and_not(ahead, outside)) & !doubtful;
     Hits { hit, doubtful, t, u: wb * inverse, v: wc * inverse }
 }
 
-/// Unit roundoff divided by the needle ratio, slightly enlarged to account for rounding in [`may_count`]
+/// Unit roundoff divided by the needle ratio, slightly enlarged to account for rounding in [`may_be_hit`]
 /// itself.
 const UNITS: f32 = 1.05 * 0.5 * f32::EPSILON / ILL_CONDITIONED;
 
@@ -63,31 +63,41 @@ const UNITS: f32 = 1.05 * 0.5 * f32::EPSILON / ILL_CONDITIONED;
 /// 30·s·(s + d) unit roundoffs of the reach, divided by the determinant. If the inverse of the determinant
 /// may be infinite, the triangle counts as a needle. `along` is t times the determinant.
 #[inline(always)]
-fn may_count<V: SimdVector>(corners: &Corners<V>, determinant: V, shear_z: V, along: V, t_max: V) -> V::Mask {
-    let (sum, deepest) = (greatest(corners, 0) + greatest(corners, 1), greatest(corners, 2));
-    let bound = sum * ((sum + deepest) * sum.like(30.0 * UNITS)) + sum.like(1e-37);
-    let (size, reach) = (determinant.abs(), deepest * (shear_z.abs() * sum.like(ILL_CONDITIONED)));
-    let (ahead, error) = (along.signed_by(determinant), bound * reach);
-    let is_ahead = sum.like(0.0).le(error + ahead) & ahead.le(size * (t_max * sum.like(1.000_001)) + error);
+fn may_be_hit<V: SimdVector>(
+    corners: &Corners<V>,
+    determinant: V,
+    shear_z: V,
+    along: V,
+    t_max: V,
+) -> V::Mask {
+    let (sum, deepest) =
+        (max_abs_corner(corners, 0) + max_abs_corner(corners, 1), max_abs_corner(corners, 2));
+    let bound = sum * ((sum + deepest) * sum.splat_like(30.0 * UNITS)) + sum.splat_like(1e-37);
+    let (size, reach) = (determinant.abs(), deepest * (shear_z.abs() * sum.splat_like(ILL_CONDITIONED)));
+    let (ahead, error) = (along.xor_sign(determinant), bound * reach);
+    let is_ahead =
+        sum.splat_like(0.0).le(error + ahead) & ahead.le(size * (t_max * sum.splat_like(1.000_001)) + error);
     size.le(bound) | is_ahead
 }
 
 /// SIMD version of `ShearedRay::distance_error`.
 #[inline(always)]
 fn distance_error<V: SimdVector>(corners: &Corners<V>, shear_z: V, inverse_determinant: V) -> (V, V) {
-    let (x, y, depth) = (greatest(corners, 0), greatest(corners, 1), greatest(corners, 2));
+    let (x, y, depth) = (max_abs_corner(corners, 0), max_abs_corner(corners, 1), max_abs_corner(corners, 2));
     let z = depth * shear_z.abs();
-    let error_z = shear_z.like(gamma(3)) * z;
-    let (error_x, error_y) = (shear_z.like(gamma(5)) * (x + depth), shear_z.like(gamma(5)) * (y + depth));
-    let error_edge = shear_z.like(2.0) * (shear_z.like(gamma(2)) * x * y + error_y * x + error_x * y);
-    let edge = shear_z.like(2.0) * x * y;
-    let sum = shear_z.like(gamma(3)) * edge * z + error_edge * z + error_z * edge;
-    (shear_z.like(3.0) * sum * inverse_determinant.abs(), z)
+    let error_z = shear_z.splat_like(gamma(3)) * z;
+    let (error_x, error_y) =
+        (shear_z.splat_like(gamma(5)) * (x + depth), shear_z.splat_like(gamma(5)) * (y + depth));
+    let error_edge =
+        shear_z.splat_like(2.0) * (shear_z.splat_like(gamma(2)) * x * y + error_y * x + error_x * y);
+    let edge = shear_z.splat_like(2.0) * x * y;
+    let sum = shear_z.splat_like(gamma(3)) * edge * z + error_edge * z + error_z * edge;
+    (shear_z.splat_like(3.0) * sum * inverse_determinant.abs(), z)
 }
 
 /// Largest absolute value of the corners' coordinates along an axis.
 #[inline(always)]
-fn greatest<V: SimdVector>(corners: &Corners<V>, axis: usize) -> V {
+fn max_abs_corner<V: SimdVector>(corners: &Corners<V>, axis: usize) -> V {
     corners[0][axis].abs().max(corners[1][axis].abs()).max(corners[2][axis].abs())
 }
 
@@ -121,23 +131,23 @@ mod tests {
                 [at(0, next()), at(1, next()), z]
             };
             let scalar = [corner(1.0, 1.0), corner(-1.0, -1.0), corner(0.0, 0.0)];
-            let corners: Corners<F4> = scalar.map(|corner| corner.map(|x| like.like(x)));
+            let corners: Corners<F4> = scalar.map(|corner| corner.map(|x| like.splat_like(x)));
             let [[ax, ay, az], [bx, by, bz], [cx, cy, cz]] = corners;
             let (wa, wb, wc) = (cx * by - cy * bx, ax * cy - ay * cx, bx * ay - by * ax);
             let determinant = wa + wb + wc;
-            let shear_z = like.like(2.0_f32.powf(next() * 8.0));
-            let inverse = like.like(1.0).over(determinant);
+            let shear_z = like.splat_like(2.0_f32.powf(next() * 8.0));
+            let inverse = like.splat_like(1.0).div(determinant);
             let along = (wa * az + wb * bz + wc * cz) * shear_z;
             let t = along * inverse;
             let (error, reach) = distance_error(&corners, shear_z, inverse);
-            let is_needle = F4::movemask((reach * like.like(ILL_CONDITIONED)).lt(error)) != 0;
+            let is_needle = F4::movemask((reach * like.splat_like(ILL_CONDITIONED)).lt(error)) != 0;
             let is_at_start = F4::movemask(t.abs().le(error)) != 0;
             // End the ray in front of the triangle, on it, behind it, or at infinity.
             let mut distance = [0.0; 4];
             t.store(&mut distance);
             let part = [0.5, 1.0, 1.0 + f32::EPSILON, 2.0, f32::INFINITY][round % 5];
-            let end = like.like((distance[0] * part).max(0.0));
-            let passes = F4::movemask(may_count(&corners, determinant, shear_z, along, end)) != 0;
+            let end = like.splat_like((distance[0] * part).max(0.0));
+            let passes = F4::movemask(may_be_hit(&corners, determinant, shear_z, along, end)) != 0;
             let is_ahead = F4::movemask(like.lt(t) & t.le(end)) != 0;
             let is_beyond = F4::movemask(end.lt(t)) != 0;
             assert!(passes || !(is_ahead || is_needle || is_at_start), "{scalar:?}");

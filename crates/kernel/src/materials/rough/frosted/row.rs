@@ -1,10 +1,12 @@
 //! Rough glass in packets of 16.
 
 use super::GlassPoint;
-use crate::materials::bsdf::{BsdfValues, LobeSet, NarrowLobe, Place, RoughRow, ShownLobes, SideSamples};
+use crate::materials::bsdf::{
+    BsdfValues, LobeSet, NarrowLobe, RoughRow, ShownLobes, SideSamples, SurfaceDirections,
+};
 use crate::materials::fresnel::{dielectric_either, transmittance};
 use crate::materials::microfacet::{
-    Half, SmithTerms, facing_single, reflect_at, refract_at, sample_visible_normal,
+    HalfVector, SmithTerms, reflect_at, refract_at, rotate_single_toward_viewer, sample_visible_normal,
 };
 use crate::math::Vec3;
 use crate::math::frame::Frame;
@@ -43,7 +45,7 @@ fn shown_parts(shown: ShownLobes) -> [f32; 2] {
 impl<const THROUGH: bool> GlassRow<THROUGH> {
     /// Smith terms of the directions to the viewer and to the light, each with the normal on its side.
     #[inline(always)]
-    fn legs(&self, i: usize, direction: Vec3) -> [SmithTerms; 2] {
+    fn smith_terms(&self, i: usize, direction: Vec3) -> [SmithTerms; 2] {
         let normal = lane(&self.normal, i);
         let lit = if THROUGH { -normal } else { normal };
         let eye = SmithTerms::isotropic(normal, lane(&self.to_eye, i), self.alpha[i]);
@@ -53,15 +55,15 @@ impl<const THROUGH: bool> GlassRow<THROUGH> {
     /// f of the lobe.
     #[inline(always)]
     fn lobe(&self, i: usize, direction: Vec3) -> f32 {
-        let [eye, light] = self.legs(i, direction);
+        let [eye, light] = self.smith_terms(i, direction);
         let (normal, to_eye) = (lane(&self.normal, i), lane(&self.to_eye, i));
         if !THROUGH {
-            let half = Half::of(normal, to_eye, direction);
+            let half = HalfVector::between(normal, to_eye, direction);
             let reflectance = dielectric_either(half.cosine(), self.far[i] / self.near[i]);
             return reflectance * eye.reflected(&light, half.isotropic(self.alpha[i]));
         }
         let indices = [self.near[i], self.far[i]];
-        let (half, sum) = Half::refracted(normal, [to_eye, direction], indices);
+        let (half, sum) = HalfVector::refracted(normal, [to_eye, direction], indices);
         // The facet must face the viewer if the surface does, and light must come from behind both.
         let scale = if half.along > 0.0 { 1.0 } else { -1.0 } / half.squared.sqrt();
         let cosines = [scale * to_eye.dot(sum), -scale * direction.dot(sum)];
@@ -83,7 +85,7 @@ impl<const THROUGH: bool> GlassRow<THROUGH> {
         u: &[F32x16; 2],
         simd: impl Simd,
     ) -> SideSamples {
-        simd.call(SideSampling { row: self, choices, u })
+        simd.call(SideSamplingKernel { row: self, choices, u })
     }
 
     /// Samples a facet of each surface, and randomly chooses reflection or refraction. All formulas use the
@@ -121,10 +123,12 @@ impl<const THROUGH: bool> GlassRow<THROUGH> {
             let side = choose(1.0, -1.0);
             let light = SmithTerms::isotropic(normal * side, direction, alpha);
             let along = normal.dot(half);
-            let half = Half { squared: 1.0, along, across: half - normal * along };
+            let half = HalfVector { squared: 1.0, along, across: half - normal * along };
             let density = by_facet * eye.pdf(half.isotropic(alpha));
-            let is_seen =
-                light.is_ahead() & eye.is_ahead() & (is_mirrored | is_through) & (density < f32::MAX);
+            let is_seen = light.is_above_surface()
+                & eye.is_above_surface()
+                & (is_mirrored | is_through)
+                & (density < f32::MAX);
             densities[i] = if is_seen { density } else { 0.0 };
             let share = light.cosine * (eye.cosine + eye.slope)
                 / (eye.cosine * light.slope + light.cosine * eye.slope);
@@ -135,13 +139,13 @@ impl<const THROUGH: bool> GlassRow<THROUGH> {
 }
 
 /// Kernel of [`GlassRow::sample_sides`].
-struct SideSampling<'a, const THROUGH: bool> {
+struct SideSamplingKernel<'a, const THROUGH: bool> {
     row: &'a GlassRow<THROUGH>,
     choices: &'a F32x16,
     u: &'a [F32x16; 2],
 }
 
-impl<const THROUGH: bool> SimdKernel for SideSampling<'_, THROUGH> {
+impl<const THROUGH: bool> SimdKernel for SideSamplingKernel<'_, THROUGH> {
     type Output = SideSamples;
 
     #[inline(always)]
@@ -169,15 +173,19 @@ impl<const THROUGH: bool> RoughRow for GlassRow<THROUGH> {
     };
 
     #[inline(always)]
-    fn turned(normal: Vec3, to_eye: Vec3) -> Vec3 {
-        if THROUGH { -facing_single(-normal, to_eye) } else { facing_single(normal, to_eye) }
+    fn normal_facing_viewer(normal: Vec3, to_eye: Vec3) -> Vec3 {
+        if THROUGH {
+            -rotate_single_toward_viewer(-normal, to_eye)
+        } else {
+            rotate_single_toward_viewer(normal, to_eye)
+        }
     }
 
     #[inline(always)]
     fn reset(&mut self) {}
 
     #[inline(always)]
-    fn put(&mut self, i: usize, bsdf: &GlassPoint, shown: ShownLobes, place: &Place) {
+    fn put(&mut self, i: usize, bsdf: &GlassPoint, shown: ShownLobes, place: &SurfaceDirections) {
         let normal = if THROUGH { -place.normal } else { place.normal };
         set_lane(&mut self.normal, i, normal);
         set_lane(&mut self.to_eye, i, place.to_eye);
@@ -214,7 +222,7 @@ impl<const THROUGH: bool> RoughRow for GlassRow<THROUGH> {
     }
 
     #[inline(always)]
-    fn parts(&self, _: &Vec3x16, values: &BsdfValues) -> [Vec3x16; 2] {
+    fn wide_and_narrow(&self, _: &Vec3x16, values: &BsdfValues) -> [Vec3x16; 2] {
         [[[0.0; PACKET_SIZE]; 3], values.f]
     }
 
@@ -227,7 +235,7 @@ impl<const THROUGH: bool> RoughRow for GlassRow<THROUGH> {
     fn pdf(&self, _: LobeSet, _: &Vec3x16, directions: &Vec3x16, values: &BsdfValues) -> F32x16 {
         let mut densities = [0.0; PACKET_SIZE];
         for i in 0..PACKET_SIZE {
-            let [eye, light] = self.legs(i, lane(directions, i));
+            let [eye, light] = self.smith_terms(i, lane(directions, i));
             densities[i] = eye.pdf_from_reflected(&light, values.shared[1][i]);
         }
         densities

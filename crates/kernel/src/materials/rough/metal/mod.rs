@@ -177,7 +177,7 @@ impl RoughMaterial for Conductor {
     }
 
     #[inline]
-    fn fills_rows(&self) -> bool {
+    fn supports_packets(&self) -> bool {
         !self.has_direction() && self.constant().is_some()
     }
 

@@ -2,11 +2,12 @@
 
 use super::{Conductor, ConductorPoint, FresnelPoint, reflectance};
 use crate::materials::bsdf::{
-    BsdfValues, LobeSet, MaterialRow, NarrowLobe, Place, RoughMaterial, RoughRow, ShownLobes, UvRow,
+    BsdfValues, LobeSet, MaterialRow, NarrowLobe, RoughMaterial, RoughRow, ShownLobes, SurfaceDirections,
+    UvRow,
 };
 use crate::materials::fresnel::schlick_weight;
 use crate::materials::microfacet::{
-    Half, SmithTerms, facing_single, frame_along, orient_to_viewers, sample_reflection,
+    HalfVector, SmithTerms, frame_along, orient_to_viewers, rotate_single_toward_viewer, sample_reflection,
 };
 use crate::math::Vec3;
 use crate::math::frame::Frame;
@@ -59,7 +60,7 @@ impl<const BRUSHED: bool> ConductorRow<BRUSHED> {
 
     /// Smith terms of the directions to the viewer and to the light.
     #[inline(always)]
-    fn legs(&self, i: usize, direction: Vec3) -> [SmithTerms; 2] {
+    fn smith_terms(&self, i: usize, direction: Vec3) -> [SmithTerms; 2] {
         let to_eye = lane(&self.to_eye, i);
         // Avoid `map` because it may not be inlined, which would keep the surrounding loops scalar.
         if BRUSHED {
@@ -77,13 +78,13 @@ impl<const BRUSHED: bool> ConductorRow<BRUSHED> {
     /// f for a reflectance of 1, and the cosine between a direction and the half vector.
     #[inline(always)]
     fn lobe(&self, i: usize, direction: Vec3) -> [f32; 2] {
-        let half = Half::of(lane(&self.normal, i), lane(&self.to_eye, i), direction);
+        let half = HalfVector::between(lane(&self.normal, i), lane(&self.to_eye, i), direction);
         let distribution = if BRUSHED {
             half.anisotropic(&self.frame(i), self.alphas(i))
         } else {
             half.isotropic(self.alphas[0][i])
         };
-        let [eye, light] = self.legs(i, direction);
+        let [eye, light] = self.smith_terms(i, direction);
         [eye.reflected(&light, distribution), half.cosine()]
     }
 
@@ -113,8 +114,8 @@ impl<const BRUSHED: bool> RoughRow for ConductorRow<BRUSHED> {
     };
 
     #[inline(always)]
-    fn turned(normal: Vec3, to_eye: Vec3) -> Vec3 {
-        facing_single(normal, to_eye)
+    fn normal_facing_viewer(normal: Vec3, to_eye: Vec3) -> Vec3 {
+        rotate_single_toward_viewer(normal, to_eye)
     }
 
     #[inline(always)]
@@ -123,13 +124,14 @@ impl<const BRUSHED: bool> RoughRow for ConductorRow<BRUSHED> {
     }
 
     #[inline(always)]
-    fn put(&mut self, i: usize, bsdf: &ConductorPoint, shown: ShownLobes, place: &Place) {
-        let &Place { normal, to_eye, tangent } = place;
+    fn put(&mut self, i: usize, bsdf: &ConductorPoint, shown: ShownLobes, place: &SurfaceDirections) {
+        let &SurfaceDirections { normal, to_eye, tangent } = place;
         set_lane(&mut self.normal, i, normal);
         set_lane(&mut self.to_eye, i, to_eye);
         set_lane(&mut self.tangent, i, tangent);
         self.set_fresnel(i, &bsdf.fresnel);
-        // Without texture coordinates, the surface is isotropic, with the geometric mean of both α.
+        // Without texture coordinates, the surface is isotropic. Its α is the geometric mean of the two α
+        // values.
         let [u, v] = bsdf.alphas;
         let mean = (u * v).sqrt();
         let [u, v] = if tangent == Vec3::ZERO { [mean; 2] } else { [u, v] };
@@ -190,7 +192,7 @@ impl<const BRUSHED: bool> RoughRow for ConductorRow<BRUSHED> {
     }
 
     #[inline(always)]
-    fn parts(&self, _: &Vec3x16, values: &BsdfValues) -> [Vec3x16; 2] {
+    fn wide_and_narrow(&self, _: &Vec3x16, values: &BsdfValues) -> [Vec3x16; 2] {
         [[[0.0; PACKET_SIZE]; 3], values.f]
     }
 
@@ -203,7 +205,7 @@ impl<const BRUSHED: bool> RoughRow for ConductorRow<BRUSHED> {
     fn pdf(&self, _: LobeSet, _: &Vec3x16, directions: &Vec3x16, values: &BsdfValues) -> F32x16 {
         let mut densities = [0.0; PACKET_SIZE];
         for i in 0..PACKET_SIZE {
-            let [eye, light] = self.legs(i, lane(directions, i));
+            let [eye, light] = self.smith_terms(i, lane(directions, i));
             densities[i] = eye.pdf_from_reflected(&light, values.shared[1][i]);
         }
         densities

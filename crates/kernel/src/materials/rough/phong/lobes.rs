@@ -40,13 +40,13 @@ impl Lobes {
         let x = if is_diffuse { self.normal.x } else { self.mirrored_eye.x };
         let y = if is_diffuse { self.normal.y } else { self.mirrored_eye.y };
         let z = if is_diffuse { self.normal.z } else { self.mirrored_eye.z };
-        about(Vec3::new(x, y, z), sine, cosine, u[1])
+        direction_about_axis(Vec3::new(x, y, z), sine, cosine, u[1])
     }
 
     /// [`Lobes::sample`] using only the diffuse lobe.
     #[inline(always)]
     pub fn sample_diffuse(&self, u: [f32; 2]) -> Vec3 {
-        about(self.normal, u[0].sqrt(), (1.0 - u[0]).sqrt(), u[1])
+        direction_about_axis(self.normal, u[0].sqrt(), (1.0 - u[0]).sqrt(), u[1])
     }
 
     /// Pdf in sr⁻¹ of a sampled direction with the given [`gloss`].
@@ -74,7 +74,7 @@ impl Lobes {
 
 /// A unit direction, from the angle to an axis and a number in [0, 1) for the angle around the axis.
 #[inline(always)]
-pub fn about(axis: Vec3, sine: f32, cosine: f32, turn: f32) -> Vec3 {
+pub fn direction_about_axis(axis: Vec3, sine: f32, cosine: f32, turn: f32) -> Vec3 {
     let (sin_phi, cos_phi) = sin_cos(2.0 * PI * turn);
     let local = Vec3::new(sine * cos_phi, sine * sin_phi, cosine);
     let direction = Frame::from_normal(axis).to_world(local);

@@ -90,7 +90,7 @@ impl RoughMaterial for Phong {
     }
 
     #[inline]
-    fn fills_rows(&self) -> bool {
+    fn supports_packets(&self) -> bool {
         let has_no_levels = self.diffuse.texture().is_none_or(|texture| texture.mipmaps.is_none());
         has_no_levels && self.specular.texture().is_none()
     }

@@ -3,7 +3,7 @@
 use super::lobes::{Lobes, gloss};
 use super::{Phong, PhongBsdf};
 use crate::materials::bsdf::{
-    BsdfValues, LobeSet, MaterialRow, NarrowLobe, Place, RoughRow, ShownLobes, UvRow,
+    BsdfValues, LobeSet, MaterialRow, NarrowLobe, RoughRow, ShownLobes, SurfaceDirections, UvRow,
 };
 use crate::math::Vec3;
 use crate::math::lanes::{
@@ -87,7 +87,7 @@ fn shown_parts(bsdf: &PhongBsdf, shown: ShownLobes) -> [Vec3; 2] {
 
 /// Mask of black colors.
 #[inline(always)]
-fn black(colors: &Vec3x16, simd: impl Simd) -> u32 {
+fn black_mask(colors: &Vec3x16, simd: impl Simd) -> u32 {
     let mut black = [0; PACKET_SIZE];
     for i in 0..PACKET_SIZE {
         let Vec3 { x, y, z } = lane(colors, i);
@@ -118,7 +118,7 @@ impl RoughRow for PhongRow {
     }
 
     #[inline(always)]
-    fn put(&mut self, i: usize, bsdf: &PhongBsdf, shown: ShownLobes, place: &Place) {
+    fn put(&mut self, i: usize, bsdf: &PhongBsdf, shown: ShownLobes, place: &SurfaceDirections) {
         set_lane(&mut self.mirrored_eye, i, mirrored(place.normal, place.to_eye));
         let [diffuse, specular] = shown_parts(bsdf, shown);
         set_lane(&mut self.diffuse, i, diffuse);
@@ -155,7 +155,7 @@ impl RoughRow for PhongRow {
     }
 
     #[inline(always)]
-    fn parts(&self, _: &Vec3x16, values: &BsdfValues) -> [Vec3x16; 2] {
+    fn wide_and_narrow(&self, _: &Vec3x16, values: &BsdfValues) -> [Vec3x16; 2] {
         let mut glossy = self.specular;
         for axis in 0..3 {
             for i in 0..PACKET_SIZE {
@@ -280,7 +280,7 @@ impl MaterialRow for PhongRow {
         for &(of, shown) in shown {
             self.set(of, shown, &diffuse, specular, material.shininess);
         }
-        if specular == Vec3::ZERO { black(&diffuse, simd) } else { 0 }
+        if specular == Vec3::ZERO { black_mask(&diffuse, simd) } else { 0 }
     }
 
     #[inline(always)]

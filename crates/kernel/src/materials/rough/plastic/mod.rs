@@ -54,7 +54,7 @@ impl Plastic {
         let fresnel = |cosine: f64| dielectric(cosine, ior.into());
         let is_smooth = roughness.constant() == Some(0.0);
         let albedos = if is_smooth {
-            AlbedoTable::single(LobeAlbedo::known(fresnel))
+            AlbedoTable::single(LobeAlbedo::fit_with_exact_mean(fresnel))
         } else {
             AlbedoTable::new(roughness.constant(), |one| microfacet::alphas(one, 0.0)[0], fresnel)
         };
@@ -122,7 +122,7 @@ impl RoughMaterial for Plastic {
     }
 
     #[inline]
-    fn fills_rows(&self) -> bool {
+    fn supports_packets(&self) -> bool {
         let has_no_levels = self.diffuse.texture().is_none_or(|texture| texture.mipmaps.is_none());
         has_no_levels && self.specular.texture().is_none() && self.roughness.texture().is_none()
     }

@@ -4,12 +4,15 @@ use std::f32::consts::{FRAC_1_PI, PI};
 
 use super::{Plastic, PlasticPoint};
 use crate::materials::bsdf::{
-    BsdfValues, LobeSet, MaterialRow, NarrowLobe, Place, RoughMaterial, RoughRow, ShownLobes, UvRow,
+    BsdfValues, LobeSet, MaterialRow, NarrowLobe, RoughMaterial, RoughRow, ShownLobes, SurfaceDirections,
+    UvRow,
 };
 use crate::materials::fresnel::dielectric_outside;
 use crate::materials::lobe_albedo::{TERMS, evaluate, under_coat};
-use crate::materials::microfacet::{Half, SmithTerms, facing_single, orient_to_viewers, sample_reflection};
-use crate::materials::phong::lobes::about;
+use crate::materials::microfacet::{
+    HalfVector, SmithTerms, orient_to_viewers, rotate_single_toward_viewer, sample_reflection,
+};
+use crate::materials::phong::lobes::direction_about_axis;
 use crate::math::Vec3;
 use crate::math::frame::Frame;
 use crate::math::lanes::{
@@ -41,7 +44,7 @@ pub struct PlasticRow {
     left: F32x16,
     /// Probability of choosing the coat's lobe.
     share: F32x16,
-    /// 1 if the diffuse lobe is shown, otherwise 0. Then the same for the coat's lobe.
+    /// 1 if the diffuse lobe is shown, otherwise 0, followed by the same for the coat's lobe.
     shown: [F32x16; 2],
     /// f in sr⁻¹ to show instead of the lobes.
     unit: F32x16,
@@ -76,7 +79,7 @@ impl PlasticRow {
 
     /// The coat's transmittance in both directions. 0 for light from behind.
     #[inline(always)]
-    fn through(&self, i: usize, direction: Vec3) -> f32 {
+    fn coat_transmittance(&self, i: usize, direction: Vec3) -> f32 {
         let cosine = lane(&self.normal, i).dot(direction);
         let is_ahead = cosine > 0.0;
         let left = 1.0 - self.albedo(i, if is_ahead { cosine } else { 0.0 });
@@ -84,15 +87,15 @@ impl PlasticRow {
     }
 
     #[inline(always)]
-    fn legs(&self, i: usize, direction: Vec3) -> [SmithTerms; 2] {
+    fn smith_terms(&self, i: usize, direction: Vec3) -> [SmithTerms; 2] {
         let normal = lane(&self.normal, i);
         [lane(&self.to_eye, i), direction].map(|one| SmithTerms::isotropic(normal, one, self.alpha[i]))
     }
 
     /// D of the coat for a direction, and the reflectance of the coat's facets.
     #[inline(always)]
-    fn facets(&self, i: usize, direction: Vec3) -> [f32; 2] {
-        let half = Half::of(lane(&self.normal, i), lane(&self.to_eye, i), direction);
+    fn distribution_and_fresnel(&self, i: usize, direction: Vec3) -> [f32; 2] {
+        let half = HalfVector::between(lane(&self.normal, i), lane(&self.to_eye, i), direction);
         let alpha = self.alpha[i];
         let distribution = half.isotropic(if alpha > 0.0 { alpha } else { 1.0 });
         let fresnel = dielectric_outside(half.cosine(), self.ior[i]);
@@ -101,15 +104,15 @@ impl PlasticRow {
 
     /// f of the coat for a factor of 1.
     #[inline(always)]
-    fn coat(&self, i: usize, direction: Vec3) -> f32 {
-        let [distribution, fresnel] = self.facets(i, direction);
-        let [eye, light] = self.legs(i, direction);
+    fn coat_f(&self, i: usize, direction: Vec3) -> f32 {
+        let [distribution, fresnel] = self.distribution_and_fresnel(i, direction);
+        let [eye, light] = self.smith_terms(i, direction);
         fresnel * eye.reflected(&light, distribution)
     }
 
     /// Updates all values that depend on the view direction.
     #[inline(always)]
-    fn look(&mut self, i: usize) {
+    fn update_view_terms(&mut self, i: usize) {
         let cosine = lane(&self.normal, i).dot(lane(&self.to_eye, i));
         let albedo = self.albedo(i, if cosine > 0.0 { cosine } else { 0.0 });
         self.left[i] = 1.0 - albedo;
@@ -155,8 +158,8 @@ impl RoughRow for PlasticRow {
     };
 
     #[inline(always)]
-    fn turned(normal: Vec3, to_eye: Vec3) -> Vec3 {
-        facing_single(normal, to_eye)
+    fn normal_facing_viewer(normal: Vec3, to_eye: Vec3) -> Vec3 {
+        rotate_single_toward_viewer(normal, to_eye)
     }
 
     #[inline(always)]
@@ -165,12 +168,12 @@ impl RoughRow for PlasticRow {
     }
 
     #[inline(always)]
-    fn put(&mut self, i: usize, bsdf: &PlasticPoint, shown: ShownLobes, place: &Place) {
+    fn put(&mut self, i: usize, bsdf: &PlasticPoint, shown: ShownLobes, place: &SurfaceDirections) {
         set_lane(&mut self.normal, i, place.normal);
         set_lane(&mut self.to_eye, i, place.to_eye);
         self.set(i, bsdf);
         [self.shown[0][i], self.shown[1][i], self.unit[i]] = shown_parts(shown);
-        self.look(i);
+        self.update_view_terms(i);
     }
 
     #[inline(always)]
@@ -206,11 +209,11 @@ impl RoughRow for PlasticRow {
     fn f(&self, directions: &Vec3x16) -> BsdfValues {
         let (mut coat, mut through) = ([0.0; PACKET_SIZE], [0.0; PACKET_SIZE]);
         for i in 0..PACKET_SIZE {
-            through[i] = self.through(i, lane(directions, i));
+            through[i] = self.coat_transmittance(i, lane(directions, i));
         }
         if self.is_rough {
             for i in 0..PACKET_SIZE {
-                coat[i] = self.coat(i, lane(directions, i));
+                coat[i] = self.coat_f(i, lane(directions, i));
             }
         }
         let (mut f, mut gray) = ([[0.0; PACKET_SIZE]; 3], [0.0; PACKET_SIZE]);
@@ -224,7 +227,7 @@ impl RoughRow for PlasticRow {
     }
 
     #[inline(always)]
-    fn parts(&self, _: &Vec3x16, values: &BsdfValues) -> [Vec3x16; 2] {
+    fn wide_and_narrow(&self, _: &Vec3x16, values: &BsdfValues) -> [Vec3x16; 2] {
         let (mut wide, mut narrow) = ([[0.0; PACKET_SIZE]; 3], [[0.0; PACKET_SIZE]; 3]);
         for axis in 0..3 {
             for i in 0..PACKET_SIZE {
@@ -251,10 +254,10 @@ impl RoughRow for PlasticRow {
         if self.is_rough {
             for i in 0..PACKET_SIZE {
                 let direction = lane(directions, i);
-                let [distribution, _] = self.facets(i, direction);
-                let [eye, light] = self.legs(i, direction);
+                let [distribution, _] = self.distribution_and_fresnel(i, direction);
+                let [eye, light] = self.smith_terms(i, direction);
                 let density = eye.pdf(distribution);
-                narrow[i] = if light.is_ahead() { density } else { 0.0 };
+                narrow[i] = if light.is_above_surface() { density } else { 0.0 };
             }
         }
         match lobes {
@@ -275,7 +278,7 @@ impl RoughRow for PlasticRow {
         let mut directions = [[0.0; PACKET_SIZE]; 3];
         for i in 0..PACKET_SIZE {
             let u = [u[0][i], u[1][i]];
-            let wide = about(lane(normals, i), u[0].sqrt(), (1.0 - u[0]).sqrt(), u[1]);
+            let wide = direction_about_axis(lane(normals, i), u[0].sqrt(), (1.0 - u[0]).sqrt(), u[1]);
             set_lane(&mut directions, i, wide);
         }
         if self.is_rough {
@@ -329,10 +332,10 @@ impl RoughRow for PlasticRow {
 
     #[inline(always)]
     fn f_at(&self, i: usize, direction: Vec3) -> Vec3 {
-        let wide = lane(&self.base, i) * (self.through(i, direction) * self.shown[0][i]);
+        let wide = lane(&self.base, i) * (self.coat_transmittance(i, direction) * self.shown[0][i]);
         let mut narrow = Vec3::ZERO;
         if self.is_rough {
-            narrow = lane(&self.specular, i) * (self.coat(i, direction) * self.shown[1][i]);
+            narrow = lane(&self.specular, i) * (self.coat_f(i, direction) * self.shown[1][i]);
         }
         wide + narrow + Vec3::splat(self.unit[i])
     }
@@ -395,7 +398,7 @@ impl MaterialRow for PlasticRow {
     fn orient(&mut self, of: Option<&Mask>, normals: &mut Vec3x16, directions: &Vec3x16) {
         orient_to_viewers(of, normals, directions, &mut self.normal, &mut self.to_eye);
         for i in 0..PACKET_SIZE {
-            self.look(i);
+            self.update_view_terms(i);
         }
     }
 }

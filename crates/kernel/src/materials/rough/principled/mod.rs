@@ -109,13 +109,13 @@ pub struct SchlickAlbedo {
 impl SchlickAlbedo {
     /// The albedos for a constant roughness.
     fn of(roughness: f32) -> Self {
-        let [normal, grazing] = tables(Some(roughness));
+        let [normal, grazing] = albedo_tables(Some(roughness));
         Self { normal: normal.at(roughness), grazing: grazing.at(roughness) }
     }
 
     /// The albedos for any roughness, interpolated from tables.
     fn between(roughness: f32) -> Self {
-        static TABLES: LazyLock<[AlbedoTable; 2]> = LazyLock::new(|| tables(None));
+        static TABLES: LazyLock<[AlbedoTable; 2]> = LazyLock::new(|| albedo_tables(None));
         let [normal, grazing] = &*TABLES;
         Self { normal: normal.at(roughness), grazing: grazing.at(roughness) }
     }
@@ -152,7 +152,7 @@ impl EmissionCoat {
     }
 
     /// Transmittance for light that leaves the surface with this cosine. Adds to `lookups`.
-    pub fn left(&self, at: &TexturePoint, cosine: f32, lookups: &mut u64) -> f32 {
+    pub fn transmittance(&self, at: &TexturePoint, cosine: f32, lookups: &mut u64) -> f32 {
         let weight = self.weight.at(at, lookups).clamp(0.0, 1.0);
         let between = |roughness: f32| SchlickAlbedo::between(roughness.clamp(0.0, 1.0));
         let albedo = match self.albedo {
@@ -169,7 +169,7 @@ impl EmissionCoat {
 }
 
 /// The two tables of [`SchlickAlbedo`].
-fn tables(roughness: Option<f32>) -> [AlbedoTable; 2] {
+fn albedo_tables(roughness: Option<f32>) -> [AlbedoTable; 2] {
     let alpha = |roughness: f32| microfacet::alphas(roughness, 0.0)[0];
     let weight = |cosine: f64| {
         let rest = 1.0 - cosine;
@@ -181,7 +181,7 @@ fn tables(roughness: Option<f32>) -> [AlbedoTable; 2] {
 
 /// The parameters at a point.
 #[derive(Clone, Copy)]
-struct Inputs {
+struct PointInputs {
     color: Vec3,
     metallic: f32,
     roughness: f32,
@@ -208,7 +208,7 @@ impl Principled {
         Self { inputs, albedos: [specular, if has_coat { coat } else { specular }] }
     }
 
-    fn point(&self, inputs: &Inputs) -> PrincipledPoint {
+    fn point(&self, inputs: &PointInputs) -> PrincipledPoint {
         let unit = |number: f32| number.clamp(0.0, 1.0);
         let (color, metallic) = (inputs.color.min(Vec3::ONE), unit(inputs.metallic));
         let specular = unit(inputs.specular);
@@ -244,7 +244,7 @@ impl RoughMaterial for Principled {
 
     #[inline]
     fn at(&self, at: &TexturePoint, lookups: &mut u64) -> PrincipledPoint {
-        let inputs = Inputs {
+        let inputs = PointInputs {
             color: self.inputs.color.at(at, lookups),
             metallic: self.inputs.metallic.at(at, lookups),
             roughness: self.inputs.roughness.at(at, lookups),
@@ -260,7 +260,7 @@ impl RoughMaterial for Principled {
     fn with_white_textures(&self) -> PrincipledPoint {
         let color = |color: &Color| color.constant().unwrap_or(Vec3::ONE);
         let number = |number: &Number| number.constant().unwrap_or(1.0);
-        self.point(&Inputs {
+        self.point(&PointInputs {
             color: color(&self.inputs.color),
             metallic: number(&self.inputs.metallic),
             roughness: number(&self.inputs.roughness),
@@ -273,7 +273,7 @@ impl RoughMaterial for Principled {
     }
 
     fn constant(&self) -> Option<PrincipledPoint> {
-        Some(self.point(&Inputs {
+        Some(self.point(&PointInputs {
             color: self.inputs.color.constant()?,
             metallic: self.inputs.metallic.constant()?,
             roughness: self.inputs.roughness.constant()?,
@@ -305,7 +305,7 @@ impl RoughMaterial for Principled {
     }
 
     #[inline]
-    fn fills_rows(&self) -> bool {
+    fn supports_packets(&self) -> bool {
         // Packets only have light on one side.
         !self.is_transmissive() && self.textures().next().is_none()
     }

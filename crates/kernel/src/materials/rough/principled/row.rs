@@ -4,12 +4,15 @@ use std::f32::consts::FRAC_1_PI;
 
 use super::{COAT_REFLECTANCE, Principled, PrincipledPoint};
 use crate::materials::bsdf::{
-    BsdfValues, LobeSet, MaterialRow, NarrowLobe, Place, RoughMaterial, RoughRow, ShownLobes, UvRow,
+    BsdfValues, LobeSet, MaterialRow, NarrowLobe, RoughMaterial, RoughRow, ShownLobes, SurfaceDirections,
+    UvRow,
 };
 use crate::materials::fresnel::schlick_weight;
 use crate::materials::lobe_albedo::{TERMS, evaluate};
-use crate::materials::microfacet::{Half, SmithTerms, facing_single, orient_to_viewers, sample_reflection};
-use crate::materials::phong::lobes::about;
+use crate::materials::microfacet::{
+    HalfVector, SmithTerms, orient_to_viewers, rotate_single_toward_viewer, sample_reflection,
+};
+use crate::materials::phong::lobes::direction_about_axis;
 use crate::math::Vec3;
 use crate::math::frame::Frame;
 use crate::math::lanes::{F32x16, Mask, PACKET_SIZE, Simd, Vec3x16, lane, mask_from_bits, select, set_lane};
@@ -53,7 +56,7 @@ pub struct PrincipledRow<const THROUGH: bool> {
     shares: [F32x16; 2],
     /// Probability of choosing transmission.
     through_share: F32x16,
-    /// 1 if the diffuse lobe is shown, otherwise 0. Then the same for the other lobes.
+    /// 1 if the diffuse lobe is shown, otherwise 0, followed by the same for the other lobes.
     shown: [F32x16; 2],
     /// f in sr⁻¹ to show instead of the lobes.
     unit: F32x16,
@@ -66,10 +69,10 @@ pub struct PrincipledRow<const THROUGH: bool> {
 }
 
 /// Values that depend on the view direction.
-struct Seen {
+struct ViewTerms {
     /// [`PrincipledRow::left`].
     left: Vec3,
-    /// [`PrincipledRow::through`].
+    /// [`PrincipledRow::coat_transmittance`].
     through: f32,
     /// [`PrincipledRow::shares`].
     shares: [f32; 2],
@@ -89,7 +92,7 @@ fn shown_parts(shown: ShownLobes) -> [f32; 3] {
 
 /// Limits a cosine to at least 0.
 #[inline(always)]
-fn ahead(cosine: f32) -> f32 {
+fn nonnegative(cosine: f32) -> f32 {
     if cosine > 0.0 { cosine } else { 0.0 }
 }
 
@@ -111,16 +114,16 @@ impl<const THROUGH: bool> PrincipledRow<THROUGH> {
 
     /// Fraction of light that passes through the dielectric's specular lobe at a cosine ≥ 0.
     #[inline(always)]
-    fn left_by_specular(&self, i: usize, cosine: f32) -> Vec3 {
+    fn transmittance_of_specular(&self, i: usize, cosine: f32) -> Vec3 {
         let [normal, grazing] = self.albedos(i, cosine);
         let (reflectance, of_grazing) = (lane(&self.dielectric.0, i), self.dielectric.1[i]);
         let left = Vec3::ONE - reflectance * normal - Vec3::splat(of_grazing * grazing);
         // If the facets reflect everything, no light passes. Clamp because of rounding.
-        Vec3::new(ahead(left.x), ahead(left.y), ahead(left.z))
+        Vec3::new(nonnegative(left.x), nonnegative(left.y), nonnegative(left.z))
     }
 
     #[inline(always)]
-    fn legs(&self, i: usize, direction: Vec3, alpha: f32) -> [SmithTerms; 2] {
+    fn smith_terms(&self, i: usize, direction: Vec3, alpha: f32) -> [SmithTerms; 2] {
         let normal = lane(&self.normal, i);
         [lane(&self.to_eye, i), direction].map(|one| SmithTerms::isotropic(normal, one, alpha))
     }
@@ -128,30 +131,30 @@ impl<const THROUGH: bool> PrincipledRow<THROUGH> {
     /// The coat's transmittance in both directions.
     #[inline(always)]
     fn through_coat(&self, i: usize, cosine: f32) -> f32 {
-        if self.is_coated { self.through[i] * (1.0 - self.coat_albedo(i, ahead(cosine))) } else { 1.0 }
+        if self.is_coated { self.through[i] * (1.0 - self.coat_albedo(i, nonnegative(cosine))) } else { 1.0 }
     }
 
     /// f of the diffuse lobe. 0 for light from behind.
     #[inline(always)]
-    fn wide(&self, i: usize, direction: Vec3) -> Vec3 {
+    fn diffuse_f(&self, i: usize, direction: Vec3) -> Vec3 {
         let cosine = lane(&self.normal, i).dot(direction);
-        let left = self.left_by_specular(i, ahead(cosine)) * lane(&self.left, i);
+        let left = self.transmittance_of_specular(i, nonnegative(cosine)) * lane(&self.left, i);
         let through = if cosine > 0.0 { self.through_coat(i, cosine) } else { 0.0 };
         lane(&self.base, i) * left * through
     }
 
     /// f of the specular lobe and of the coat. 0 for light from behind.
     #[inline(always)]
-    fn narrow(&self, i: usize, direction: Vec3) -> Vec3 {
-        let half = Half::of(lane(&self.normal, i), lane(&self.to_eye, i), direction);
+    fn specular_and_coat_f(&self, i: usize, direction: Vec3) -> Vec3 {
+        let half = HalfVector::between(lane(&self.normal, i), lane(&self.to_eye, i), direction);
         let weight = schlick_weight(half.cosine());
-        let [eye, light] = self.legs(i, direction, self.alpha[i]);
+        let [eye, light] = self.smith_terms(i, direction, self.alpha[i]);
         let facets = lane(&self.facets, i);
         let reflectance = facets + (Vec3::splat(self.grazing[i]) - facets) * weight;
         let white = eye.reflected(&light, half.isotropic(self.alpha[i]));
         let specular = reflectance * (white * self.through_coat(i, light.cosine));
         if self.is_coated {
-            let [eye, light] = self.legs(i, direction, self.coat_alpha[i]);
+            let [eye, light] = self.smith_terms(i, direction, self.coat_alpha[i]);
             let white = eye.reflected(&light, half.isotropic(self.coat_alpha[i]));
             let reflectance = COAT_REFLECTANCE + (1.0 - COAT_REFLECTANCE) * weight;
             specular + Vec3::splat(self.coat[i] * reflectance * white)
@@ -163,9 +166,9 @@ impl<const THROUGH: bool> PrincipledRow<THROUGH> {
     /// f of transmitted light.
     #[inline(always)]
     fn transmitted(&self, i: usize, direction: Vec3) -> Vec3 {
-        let half = Half::of(lane(&self.normal, i), lane(&self.to_eye, i), direction);
+        let half = HalfVector::between(lane(&self.normal, i), lane(&self.to_eye, i), direction);
         let weight = schlick_weight(half.cosine());
-        let [eye, light] = self.legs(i, direction, self.alpha[i]);
+        let [eye, light] = self.smith_terms(i, direction, self.alpha[i]);
         let (facets, grazing) = (lane(&self.dielectric.0, i), self.dielectric.1[i]);
         let left = Vec3::ONE - (facets + (Vec3::splat(grazing) - facets) * weight);
         let white = eye.reflected(&light, half.isotropic(self.alpha[i]));
@@ -175,21 +178,21 @@ impl<const THROUGH: bool> PrincipledRow<THROUGH> {
     /// Pdfs of a direction for the specular lobe and for the coat's lobe.
     #[inline(always)]
     fn densities(&self, i: usize, direction: Vec3) -> [f32; 2] {
-        let half = Half::of(lane(&self.normal, i), lane(&self.to_eye, i), direction);
+        let half = HalfVector::between(lane(&self.normal, i), lane(&self.to_eye, i), direction);
         let of = |alpha: f32| {
-            let [eye, light] = self.legs(i, direction, alpha);
+            let [eye, light] = self.smith_terms(i, direction, alpha);
             let density = eye.pdf(half.isotropic(alpha));
-            if light.is_ahead() { density } else { 0.0 }
+            if light.is_above_surface() { density } else { 0.0 }
         };
         [of(self.alpha[i]), if self.is_coated { of(self.coat_alpha[i]) } else { 0.0 }]
     }
 
     /// Computes the values that depend on the view direction.
     #[inline(always)]
-    fn seen(&self, i: usize) -> Seen {
-        let cosine = ahead(lane(&self.normal, i).dot(lane(&self.to_eye, i)));
+    fn view_terms(&self, i: usize) -> ViewTerms {
+        let cosine = nonnegative(lane(&self.normal, i).dot(lane(&self.to_eye, i)));
         let coat = self.coat_albedo(i, cosine);
-        let left = self.left_by_specular(i, cosine);
+        let left = self.transmittance_of_specular(i, cosine);
         let [normal, grazing] = self.albedos(i, cosine);
         let specular = lane(&self.facets, i).max_element() * normal + self.grazing[i] * grazing;
         let diffuse = self.diffuse[i] * left.max_element();
@@ -197,13 +200,14 @@ impl<const THROUGH: bool> PrincipledRow<THROUGH> {
         let mut through = 0.0;
         if self.transmits {
             let left = lane(&self.transmission, i) * (left + Vec3::splat(normal + grazing - 1.0));
-            through = ahead(left.max_element());
+            through = nonnegative(left.max_element());
             all += through;
         }
         let below = (1.0 - coat) / all.max(f32::MIN_POSITIVE);
-        // The coat gets at least its fraction of the light. The rest is split among the other lobes.
+        // The probability of the coat is at least its fraction of the light. The rest is split among the
+        // other lobes.
         let of_coat = if self.coat[i] > 0.0 { 1.0 - below * all } else { 0.0 };
-        Seen {
+        ViewTerms {
             left,
             through: 1.0 - coat,
             shares: [below * specular, of_coat],
@@ -212,8 +216,8 @@ impl<const THROUGH: bool> PrincipledRow<THROUGH> {
     }
 
     #[inline(always)]
-    fn look(&mut self, i: usize) {
-        let seen = self.seen(i);
+    fn update_view_terms(&mut self, i: usize) {
+        let seen = self.view_terms(i);
         set_lane(&mut self.left, i, seen.left);
         (self.through[i], self.through_share[i]) = (seen.through, seen.through_share);
         [self.shares[0][i], self.shares[1][i]] = seen.shares;
@@ -221,13 +225,13 @@ impl<const THROUGH: bool> PrincipledRow<THROUGH> {
 
     /// Updates all surfaces.
     #[inline(always)]
-    fn look_all(&mut self) {
+    fn update_all_view_terms(&mut self) {
         // Write to separate arrays, because the loop is not vectorized if it writes to the arrays that it
         // reads.
         let (mut left, mut shares) = ([[0.0; PACKET_SIZE]; 3], [[0.0; PACKET_SIZE]; 2]);
         let (mut through, mut through_share) = ([0.0; PACKET_SIZE], [0.0; PACKET_SIZE]);
         for i in 0..PACKET_SIZE {
-            let seen = self.seen(i);
+            let seen = self.view_terms(i);
             set_lane(&mut left, i, seen.left);
             (through[i], through_share[i]) = (seen.through, seen.through_share);
             [shares[0][i], shares[1][i]] = seen.shares;
@@ -267,8 +271,12 @@ impl<const THROUGH: bool> RoughRow for PrincipledRow<THROUGH> {
     };
 
     #[inline(always)]
-    fn turned(normal: Vec3, to_eye: Vec3) -> Vec3 {
-        if THROUGH { -facing_single(-normal, to_eye) } else { facing_single(normal, to_eye) }
+    fn normal_facing_viewer(normal: Vec3, to_eye: Vec3) -> Vec3 {
+        if THROUGH {
+            -rotate_single_toward_viewer(-normal, to_eye)
+        } else {
+            rotate_single_toward_viewer(normal, to_eye)
+        }
     }
 
     #[inline(always)]
@@ -277,7 +285,7 @@ impl<const THROUGH: bool> RoughRow for PrincipledRow<THROUGH> {
     }
 
     #[inline(always)]
-    fn put(&mut self, i: usize, bsdf: &PrincipledPoint, shown: ShownLobes, place: &Place) {
+    fn put(&mut self, i: usize, bsdf: &PrincipledPoint, shown: ShownLobes, place: &SurfaceDirections) {
         let normal = if THROUGH { -place.normal } else { place.normal };
         let mirrored = place.to_eye - normal * (2.0 * normal.dot(place.to_eye));
         set_lane(&mut self.normal, i, if THROUGH { -normal } else { normal });
@@ -299,7 +307,7 @@ impl<const THROUGH: bool> RoughRow for PrincipledRow<THROUGH> {
         self.is_coated |= bsdf.coat > 0.0;
         self.is_diffuse |= bsdf.base != Vec3::ZERO;
         self.transmits |= bsdf.transmits();
-        self.look(i);
+        self.update_view_terms(i);
     }
 
     #[inline(always)]
@@ -344,13 +352,14 @@ impl<const THROUGH: bool> RoughRow for PrincipledRow<THROUGH> {
         let (mut f, mut gray) = ([[0.0; PACKET_SIZE]; 3], [0.0; PACKET_SIZE]);
         for i in 0..PACKET_SIZE {
             let direction = lane(directions, i);
-            let narrow = if THROUGH { self.transmitted(i, direction) } else { self.narrow(i, direction) };
+            let narrow =
+                if THROUGH { self.transmitted(i, direction) } else { self.specular_and_coat_f(i, direction) };
             set_lane(&mut f, i, narrow * self.shown[1][i] + Vec3::splat(self.unit[i]));
             gray[i] = narrow.max_element();
         }
         if self.is_diffuse && !THROUGH {
             for i in 0..PACKET_SIZE {
-                let wide = self.wide(i, lane(directions, i));
+                let wide = self.diffuse_f(i, lane(directions, i));
                 let sum = lane(&f, i) + wide * self.shown[0][i];
                 set_lane(&mut f, i, sum);
                 gray[i] += wide.max_element();
@@ -360,15 +369,15 @@ impl<const THROUGH: bool> RoughRow for PrincipledRow<THROUGH> {
     }
 
     #[inline(always)]
-    fn parts(&self, directions: &Vec3x16, values: &BsdfValues) -> [Vec3x16; 2] {
+    fn wide_and_narrow(&self, directions: &Vec3x16, values: &BsdfValues) -> [Vec3x16; 2] {
         if THROUGH {
             return [[[0.0; PACKET_SIZE]; 3], values.f];
         }
         let (mut wide, mut narrow) = ([[0.0; PACKET_SIZE]; 3], [[0.0; PACKET_SIZE]; 3]);
         for i in 0..PACKET_SIZE {
             let direction = lane(directions, i);
-            set_lane(&mut wide, i, self.wide(i, direction) * self.shown[0][i]);
-            let value = self.narrow(i, direction) * self.shown[1][i] + Vec3::splat(self.unit[i]);
+            set_lane(&mut wide, i, self.diffuse_f(i, direction) * self.shown[0][i]);
+            let value = self.specular_and_coat_f(i, direction) * self.shown[1][i] + Vec3::splat(self.unit[i]);
             set_lane(&mut narrow, i, value);
         }
         [wide, narrow]
@@ -393,7 +402,7 @@ impl<const THROUGH: bool> RoughRow for PrincipledRow<THROUGH> {
                 LobeSet::All if THROUGH => narrow,
                 LobeSet::All => {
                     let cosine = lane(normals, i).dot(direction);
-                    narrow + (1.0 - of_specular - of_coat - of_through) * ahead(cosine) * FRAC_1_PI
+                    narrow + (1.0 - of_specular - of_coat - of_through) * nonnegative(cosine) * FRAC_1_PI
                 }
                 LobeSet::Narrow => narrow / (of_specular + of_coat + of_through).max(f32::MIN_POSITIVE),
             };
@@ -425,7 +434,7 @@ impl<const THROUGH: bool> RoughRow for PrincipledRow<THROUGH> {
             };
             let frame = Frame::from_normal(lane(&self.normal, i));
             let narrow = sample_reflection(&frame, lane(&self.to_eye, i), [alpha; 2], u);
-            let wide = about(lane(normals, i), u[0].sqrt(), (1.0 - u[0]).sqrt(), u[1]);
+            let wide = direction_about_axis(lane(normals, i), u[0].sqrt(), (1.0 - u[0]).sqrt(), u[1]);
             let is_wide = is_wide & !THROUGH;
             let choose = |wide: f32, narrow: f32| if is_wide { wide } else { narrow };
             let chosen =
@@ -470,10 +479,11 @@ impl<const THROUGH: bool> RoughRow for PrincipledRow<THROUGH> {
 
     #[inline(always)]
     fn f_at(&self, i: usize, direction: Vec3) -> Vec3 {
-        let narrow = if THROUGH { self.transmitted(i, direction) } else { self.narrow(i, direction) };
+        let narrow =
+            if THROUGH { self.transmitted(i, direction) } else { self.specular_and_coat_f(i, direction) };
         let mut f = narrow * self.shown[1][i] + Vec3::splat(self.unit[i]);
         if self.is_diffuse && !THROUGH {
-            f += self.wide(i, direction) * self.shown[0][i];
+            f += self.diffuse_f(i, direction) * self.shown[0][i];
         }
         f
     }
@@ -525,6 +535,6 @@ impl MaterialRow for PrincipledRow<false> {
     #[inline(always)]
     fn orient(&mut self, of: Option<&Mask>, normals: &mut Vec3x16, directions: &Vec3x16) {
         orient_to_viewers(of, normals, directions, &mut self.normal, &mut self.to_eye);
-        self.look_all();
+        self.update_all_view_terms();
     }
 }

@@ -1,8 +1,8 @@
 //! Any-hit packet traversal. Visits children in any order.
 
 use super::frustum::Frustum;
-use super::rays::Packet;
-use super::rows::Rows;
+use super::rays::SimdRayPacket;
+use super::rows::RayRows;
 use crate::accel::wide_bvh::WideBvh;
 use crate::accel::wide_bvh::node::{Child, PACK, TrianglePack};
 use crate::accel::wide_bvh::simd::single::prefetch;
@@ -23,12 +23,12 @@ pub fn any<V: SimdVector>(
     like: V,
     like8: F8,
 ) -> Option<u32> {
-    let Some(rows) = Rows::new(rays, ends) else { return Some(0) };
-    let packet = Packet::new(&rows, &tree.bounds, like)?;
+    let Some(rows) = RayRows::new(rays, ends) else { return Some(0) };
+    let packet = SimdRayPacket::new(&rows, &tree.bounds, like)?;
     let frustum = Frustum::new(&packet, like8);
     let mut t_max = like.gather(&rows.ends);
-    let pad = like.like(SLAB_PAD);
-    let mut end = t_max.greatest() * SLAB_PAD;
+    let pad = like.splat_like(SLAB_PAD);
+    let mut end = t_max.max_lane() * SLAB_PAD;
     let all = rows.traced;
     let mut found = 0_u32;
     let mut stack: Stack<u32> = Stack::new();
@@ -37,7 +37,7 @@ pub fn any<V: SimdVector>(
         match Child::decode(code) {
             Child::Inner(index) => {
                 let node = &tree.nodes[index as usize];
-                let (_, mut met) = frustum.enter(node, like8.like(end));
+                let (_, mut met) = frustum.enter(node, like8.splat_like(end));
                 while met != 0 {
                     let slot = met.trailing_zeros() as usize % 8;
                     met &= met - 1;
@@ -55,7 +55,7 @@ pub fn any<V: SimdVector>(
                         let hits = packet.hits(pack, lane, t_max);
                         let mut rest = (hits.hit | hits.doubtful) & all & !found;
                         if rest != 0 {
-                            rest &= !packet.starting_on(pack.ids[lane]);
+                            rest &= !packet.lanes_starting_on(pack.ids[lane]);
                         }
                         while rest != 0 {
                             let ray = rest.trailing_zeros() as usize % SIZE;
@@ -64,7 +64,9 @@ pub fn any<V: SimdVector>(
                                 continue;
                             }
                             let sure = hits.hit & 1 << ray != 0;
-                            if sure || doubtful_hit(&Ray { t_max: ends[ray], ..rays[ray] }, pack, lane) {
+                            if sure
+                                || recheck_doubtful_hit(&Ray { t_max: ends[ray], ..rays[ray] }, pack, lane)
+                            {
                                 found |= 1 << ray;
                             }
                         }
@@ -74,8 +76,8 @@ pub fn any<V: SimdVector>(
                     return Some(found);
                 }
                 if before != found {
-                    t_max = like.like(-1.0).or_else(V::mask(found, t_max), t_max);
-                    end = t_max.greatest() * SLAB_PAD;
+                    t_max = like.splat_like(-1.0).select(V::mask(found, t_max), t_max);
+                    end = t_max.max_lane() * SLAB_PAD;
                 }
             }
         }
@@ -85,6 +87,6 @@ pub fn any<V: SimdVector>(
 
 #[cold]
 #[inline(never)]
-fn doubtful_hit(ray: &Ray, pack: &TrianglePack, lane: usize) -> bool {
+fn recheck_doubtful_hit(ray: &Ray, pack: &TrianglePack, lane: usize) -> bool {
     ShearedRay::new(ray.origin, ray.direction).intersect(&pack.corners(lane), ray.t_max).is_some()
 }

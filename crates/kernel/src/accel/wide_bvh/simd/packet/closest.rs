@@ -2,8 +2,8 @@
 
 use super::frustum::Frustum;
 use super::nearest::Nearest;
-use super::rays::Packet;
-use super::rows::Rows;
+use super::rays::SimdRayPacket;
+use super::rows::RayRows;
 use crate::accel::F32x16;
 use crate::accel::wide_bvh::WideBvh;
 use crate::accel::wide_bvh::node::{Child, PACK, WideNode};
@@ -23,13 +23,13 @@ pub fn closest<V: SimdVector>(
     like: V,
     like8: F8,
 ) -> bool {
-    let Some(rows) = Rows::new(rays, ends) else { return true };
-    let Some(packet) = Packet::new(&rows, &tree.bounds, like) else { return false };
+    let Some(rows) = RayRows::new(rays, ends) else { return true };
+    let Some(packet) = SimdRayPacket::new(&rows, &tree.bounds, like) else { return false };
     let frustum = Frustum::new(&packet, like8);
     let t_max = like.gather(&rows.ends);
-    let pad = like.like(SLAB_PAD);
+    let pad = like.splat_like(SLAB_PAD);
     let mut best = Nearest::new(t_max);
-    let mut end = t_max.greatest() * SLAB_PAD;
+    let mut end = t_max.max_lane() * SLAB_PAD;
     let mut stack: Stack<u64> = Stack::new();
     stack.push(key(0.0, 0));
     while let Some(key) = stack.pop() {
@@ -39,7 +39,7 @@ pub fn closest<V: SimdVector>(
         match Child::decode(key as u32) {
             Child::Inner(index) => {
                 let node = &tree.nodes[index as usize];
-                let (near, met) = frustum.enter(node, like8.like(end));
+                let (near, met) = frustum.enter(node, like8.splat_like(end));
                 push_ordered(tree, node, near, met, &mut stack, &packet, best.t * pad);
             }
             Child::Leaf { first, count } => {
@@ -49,11 +49,11 @@ pub fn closest<V: SimdVector>(
                         if pack.ids[lane] == u32::MAX {
                             break;
                         }
-                        any |= best.take(&packet, pack, lane, rays);
+                        any |= best.test_triangle(&packet, pack, lane, rays);
                     }
                 }
                 if any != 0 {
-                    end = best.t.greatest() * SLAB_PAD;
+                    end = best.t.max_lane() * SLAB_PAD;
                 }
             }
         }
@@ -70,7 +70,7 @@ fn push_ordered<V: SimdVector>(
     near: F8,
     met: u32,
     stack: &mut Stack<u64>,
-    packet: &Packet<V>,
+    packet: &SimdRayPacket<V>,
     end: V,
 ) {
     let mut entries = [0.0_f32; 8];

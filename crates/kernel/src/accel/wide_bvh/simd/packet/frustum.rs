@@ -1,6 +1,6 @@
 //! A frustum around the rays of a packet.
 
-use super::rays::Packet;
+use super::rays::SimdRayPacket;
 use crate::accel::wide_bvh::node::WideNode;
 use crate::accel::wide_bvh::simd::vector::{F8, SimdVector};
 use crate::geometry::aabb::SLAB_PAD;
@@ -18,17 +18,17 @@ pub struct Frustum {
 
 impl Frustum {
     #[inline(always)]
-    pub fn new<V: SimdVector>(packet: &Packet<V>, like: F8) -> Self {
+    pub fn new<V: SimdVector>(packet: &SimdRayPacket<V>, like: F8) -> Self {
         let (mut near_origin, mut far_origin) = ([like; 3], [like; 3]);
         let mut inverse = [[like; 2]; 3];
         for axis in 0..3 {
             let ends = packet.origins[axis];
             let negative = packet.near[axis] & 1;
             let margin = if negative == 1 { -packet.margin } else { packet.margin };
-            near_origin[axis] = like.like(ends[1 - negative] + margin);
-            far_origin[axis] = like.like(ends[negative] - margin);
+            near_origin[axis] = like.splat_like(ends[1 - negative] + margin);
+            far_origin[axis] = like.splat_like(ends[negative] - margin);
             let row = packet.inverse[axis];
-            inverse[axis] = [like.like(row.least()), like.like(row.greatest())];
+            inverse[axis] = [like.splat_like(row.min_lane()), like.splat_like(row.max_lane())];
         }
         Self { near_origin, far_origin, inverse, near: packet.near }
     }
@@ -37,8 +37,8 @@ impl Frustum {
     /// hit before `end`.
     #[inline(always)]
     pub fn enter(&self, node: &WideNode, end: F8) -> (F8, u32) {
-        let pad = end.like(SLAB_PAD);
-        let (mut near, mut far) = (end.like(0.0), end);
+        let pad = end.splat_like(SLAB_PAD);
+        let (mut near, mut far) = (end.splat_like(0.0), end);
         for axis in 0..3 {
             let [least, greatest] = self.inverse[axis];
             let to_near = end.gather(&node.rows[self.near[axis]]) - self.near_origin[axis];

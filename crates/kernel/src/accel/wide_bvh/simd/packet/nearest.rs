@@ -1,6 +1,6 @@
 //! Nearest hits of a packet.
 
-use super::rays::Packet;
+use super::rays::SimdRayPacket;
 use crate::accel::PACKET_SIZE as SIZE;
 use crate::accel::wide_bvh::node::TrianglePack;
 use crate::accel::wide_bvh::simd::triangle;
@@ -22,47 +22,60 @@ impl<V: SimdVector> Nearest<V> {
     /// Starts with the given ends and no hits.
     #[inline(always)]
     pub fn new(ends: V) -> Self {
-        Self { t: ends, u: ends, v: ends, id: ends.like(f32::from_bits(u32::MAX)), found: 0 }
+        Self { t: ends, u: ends, v: ends, id: ends.splat_like(f32::from_bits(u32::MAX)), found: 0 }
     }
 
-    /// Takes hits that are nearer, or equally near with a lower index. Returns the mask of the updated rays.
+    /// Updates the rays whose hit on a triangle is nearer than their best hit, or equally near with a lower
+    /// index. Returns the mask of the updated rays.
     #[inline(always)]
-    pub fn take(&mut self, packet: &Packet<V>, pack: &TrianglePack, lane: usize, rays: &[Ray]) -> u32 {
+    pub fn test_triangle(
+        &mut self,
+        packet: &SimdRayPacket<V>,
+        pack: &TrianglePack,
+        lane: usize,
+        rays: &[Ray],
+    ) -> u32 {
         let hits = packet.hits(pack, lane, self.t);
         if hits.hit | hits.doubtful == 0 {
             return 0;
         }
-        let others = !packet.starting_on(pack.ids[lane]);
+        let others = !packet.lanes_starting_on(pack.ids[lane]);
         let hits = triangle::Hits { hit: hits.hit & others, doubtful: hits.doubtful & others, ..hits };
-        self.keep(&hits, pack, lane, rays)
+        self.update_rays(&hits, pack, lane, rays)
     }
 
     #[inline(always)]
-    fn keep(&mut self, hits: &triangle::Hits<V>, pack: &TrianglePack, lane: usize, rays: &[Ray]) -> u32 {
+    fn update_rays(
+        &mut self,
+        hits: &triangle::Hits<V>,
+        pack: &TrianglePack,
+        lane: usize,
+        rays: &[Ray],
+    ) -> u32 {
         let own = pack.ids[lane];
         let as_near = hits.hit & V::movemask(hits.t.eq(self.t));
         let mut taken = hits.hit & !as_near;
         if taken != 0 {
             let mask = V::mask(taken, self.t);
-            self.t = hits.t.or_else(mask, self.t);
-            self.u = hits.u.or_else(mask, self.u);
-            self.v = hits.v.or_else(mask, self.v);
-            self.id = self.t.like(f32::from_bits(own)).or_else(mask, self.id);
+            self.t = hits.t.select(mask, self.t);
+            self.u = hits.u.select(mask, self.u);
+            self.v = hits.v.select(mask, self.v);
+            self.id = self.t.splat_like(f32::from_bits(own)).select(mask, self.id);
             self.found |= taken;
         }
         let mut singly = as_near | hits.doubtful;
         while singly != 0 {
             let ray = singly.trailing_zeros() as usize;
             singly &= singly - 1;
-            taken |= self.keep_one(ray, pack, lane, rays);
+            taken |= self.update_ray(ray, pack, lane, rays);
         }
         taken
     }
 
-    /// [`Nearest::take`] for one ray, with the scalar test.
+    /// [`Nearest::test_triangle`] for one ray, with the scalar test.
     #[cold]
     #[inline(never)]
-    fn keep_one(&mut self, ray: usize, pack: &TrianglePack, lane: usize, rays: &[Ray]) -> u32 {
+    fn update_ray(&mut self, ray: usize, pack: &TrianglePack, lane: usize, rays: &[Ray]) -> u32 {
         let Some(own) = rays.get(ray) else { return 0 };
         let [mut t, mut u, mut v, mut id] = [[0.0; SIZE]; 4];
         self.t.store(&mut t);

@@ -1,6 +1,6 @@
 //! The rays of a packet in registers, tested against one box or triangle at a time.
 
-use super::rows::Rows;
+use super::rows::RayRows;
 use crate::accel::wide_bvh::node::{TrianglePack, WideNode};
 use crate::accel::wide_bvh::simd::triangle;
 use crate::accel::wide_bvh::simd::vector::SimdVector;
@@ -10,7 +10,7 @@ use crate::geometry::watertight::ShearedRay;
 use crate::math::Vec3;
 
 /// Rays in registers, preprocessed for box and triangle tests.
-pub struct Packet<V: SimdVector> {
+pub struct SimdRayPacket<V: SimdVector> {
     /// Origins for near and far planes, offset by the margin.
     near_origin: [V; 3],
     far_origin: [V; 3],
@@ -30,11 +30,11 @@ pub struct Packet<V: SimdVector> {
     pub margin: f32,
 }
 
-impl<V: SimdVector> Packet<V> {
+impl<V: SimdVector> SimdRayPacket<V> {
     /// Loads a packet, or returns `None` if the rays are not coherent. Their directions must have the same
     /// signs and the same longest axis.
     #[inline(always)]
-    pub fn new(rows: &Rows, whole: &Aabb, like: V) -> Option<Self> {
+    pub fn new(rows: &RayRows, whole: &Aabb, like: V) -> Option<Self> {
         let axes = ShearedRay::new(rows.first.origin, rows.first.direction).axes();
         let mut own = Self {
             near_origin: [like; 3],
@@ -51,21 +51,24 @@ impl<V: SimdVector> Packet<V> {
         let (mut origin, mut direction, mut size) = ([like; 3], [like; 3], [like; 3]);
         for (axis, origin) in origin.iter_mut().enumerate() {
             *origin = like.gather(&rows.origin[axis]);
-            own.origins[axis] = [origin.least(), origin.greatest()];
+            own.origins[axis] = [origin.min_lane(), origin.max_lane()];
         }
         let corner = |side: usize| Vec3::from_array(own.origins.map(|ends| ends[side]));
         own.margin = triangle_margin(corner(0), whole).max(triangle_margin(corner(1), whole));
-        let margin = like.like(own.margin);
-        let (zero, one) = (like.like(0.0), like.like(1.0));
+        let margin = like.splat_like(own.margin);
+        let (zero, one) = (like.splat_like(0.0), like.splat_like(1.0));
         let all = V::movemask(zero.eq(zero));
         for axis in 0..3 {
             direction[axis] = like.gather(&rows.direction[axis]);
             size[axis] = direction[axis].abs();
-            own.inverse[axis] = one.over(direction[axis]);
-            let up = V::movemask(zero.lt(own.inverse[axis]) & own.inverse[axis].lt(like.like(f32::INFINITY)));
-            let down =
-                V::movemask(own.inverse[axis].lt(zero) & like.like(f32::NEG_INFINITY).lt(own.inverse[axis]));
-            let finite = V::movemask(origin[axis].abs().lt(like.like(f32::INFINITY)));
+            own.inverse[axis] = one.div(direction[axis]);
+            let up = V::movemask(
+                zero.lt(own.inverse[axis]) & own.inverse[axis].lt(like.splat_like(f32::INFINITY)),
+            );
+            let down = V::movemask(
+                own.inverse[axis].lt(zero) & like.splat_like(f32::NEG_INFINITY).lt(own.inverse[axis]),
+            );
+            let finite = V::movemask(origin[axis].abs().lt(like.splat_like(f32::INFINITY)));
             if (up != all && down != all) || finite != all {
                 return None;
             }
@@ -95,11 +98,12 @@ impl<V: SimdVector> Packet<V> {
     /// Whether any ray hits the box in a slot before its end. SIMD version of `SlabRay::enter`.
     #[inline(always)]
     pub fn meets(&self, node: &WideNode, slot: usize, end: V) -> bool {
-        let pad = end.like(SLAB_PAD);
-        let (mut near, mut far) = (end.like(0.0), end);
+        let pad = end.splat_like(SLAB_PAD);
+        let (mut near, mut far) = (end.splat_like(0.0), end);
         for axis in 0..3 {
             let row = self.near[axis] % 6;
-            let (to_near, to_far) = (end.like(node.rows[row][slot]), end.like(node.rows[row ^ 1][slot]));
+            let (to_near, to_far) =
+                (end.splat_like(node.rows[row][slot]), end.splat_like(node.rows[row ^ 1][slot]));
             near = ((to_near - self.near_origin[axis]) * self.inverse[axis]).max(near);
             far = ((to_far - self.far_origin[axis]) * self.inverse[axis] * pad).min(far);
         }
@@ -115,8 +119,8 @@ impl<V: SimdVector> Packet<V> {
 
     /// Mask of the rays that start on the triangle with this index.
     #[inline(always)]
-    pub fn starting_on(&self, triangle: u32) -> u32 {
-        V::movemask(self.start.eq(self.start.like(f32::from_bits(triangle))))
+    pub fn lanes_starting_on(&self, triangle: u32) -> u32 {
+        V::movemask(self.start.eq(self.start.splat_like(f32::from_bits(triangle))))
     }
 
     /// A corner in each ray's sheared coordinates. `row` is the corner's first row.
@@ -131,6 +135,6 @@ impl<V: SimdVector> Packet<V> {
     #[inline(always)]
     fn coordinate(&self, pack: &TrianglePack, row: usize, i: usize, lane: usize) -> V {
         let axis = self.axes[i] % 3;
-        self.shear[0].like(pack.rows[row + axis][lane]) - self.sheared_origin[i]
+        self.shear[0].splat_like(pack.rows[row + axis][lane]) - self.sheared_origin[i]
     }
 }

@@ -40,7 +40,7 @@ impl SimdVector for F8 {
     }
 
     #[inline(always)]
-    fn over(self, divisor: Self) -> Self {
+    fn div(self, divisor: Self) -> Self {
         // SAFETY: a value of this type exists, so the processor has the instructions. Also applies below.
         Self(unsafe { _mm256_div_ps(self.0, divisor.0) })
     }
@@ -64,7 +64,7 @@ impl SimdVector for F8 {
     }
 
     #[inline(always)]
-    fn signed_by(self, other: Self) -> Self {
+    fn xor_sign(self, other: Self) -> Self {
         // SAFETY: as above.
         Self(unsafe { _mm256_xor_ps(self.0, _mm256_and_ps(other.0, _mm256_set1_ps(-0.0))) })
     }
@@ -88,13 +88,13 @@ impl SimdVector for F8 {
     }
 
     #[inline(always)]
-    fn or_else(self, mask: Mask8, other: Self) -> Self {
+    fn select(self, mask: Mask8, other: Self) -> Self {
         // SAFETY: as above.
         Self(unsafe { _mm256_blendv_ps(other.0, self.0, mask.0) })
     }
 
     #[inline(always)]
-    fn without(mask: Mask8, but: Mask8) -> Mask8 {
+    fn and_not(mask: Mask8, but: Mask8) -> Mask8 {
         // SAFETY: as above.
         Mask8(unsafe { _mm256_andnot_ps(but.0, mask.0) })
     }
@@ -116,17 +116,17 @@ impl SimdVector for F8 {
     }
 
     #[inline(always)]
-    fn greatest(self) -> f32 {
+    fn max_lane(self) -> f32 {
         // SAFETY: as above.
         let (low, high) = unsafe { (_mm256_castps256_ps128(self.0), _mm256_extractf128_ps::<1>(self.0)) };
-        F4(low).max(F4(high)).greatest()
+        F4(low).max(F4(high)).max_lane()
     }
 
     #[inline(always)]
-    fn least(self) -> f32 {
+    fn min_lane(self) -> f32 {
         // SAFETY: as above.
         let (low, high) = unsafe { (_mm256_castps256_ps128(self.0), _mm256_extractf128_ps::<1>(self.0)) };
-        F4(low).min(F4(high)).least()
+        F4(low).min(F4(high)).min_lane()
     }
 }
 
@@ -136,7 +136,7 @@ impl F8 {
     /// # Safety
     /// The processor must support fused multiply-add.
     #[inline(always)]
-    pub unsafe fn times_less(self, factor: Self, less: Self) -> Self {
+    pub unsafe fn mul_sub(self, factor: Self, less: Self) -> Self {
         // SAFETY: a value of this type exists, and the caller guarantees FMA support.
         Self(unsafe { _mm256_fmsub_ps(self.0, factor.0, less.0) })
     }

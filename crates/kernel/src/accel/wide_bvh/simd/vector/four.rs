@@ -40,7 +40,7 @@ impl SimdVector for F4 {
     }
 
     #[inline(always)]
-    fn over(self, divisor: Self) -> Self {
+    fn div(self, divisor: Self) -> Self {
         // SAFETY: a value of this type exists, so the processor has the instructions. Also applies below.
         Self(unsafe { _mm_div_ps(self.0, divisor.0) })
     }
@@ -64,7 +64,7 @@ impl SimdVector for F4 {
     }
 
     #[inline(always)]
-    fn signed_by(self, other: Self) -> Self {
+    fn xor_sign(self, other: Self) -> Self {
         // SAFETY: as above.
         Self(unsafe { _mm_xor_ps(self.0, _mm_and_ps(other.0, _mm_set1_ps(-0.0))) })
     }
@@ -88,13 +88,13 @@ impl SimdVector for F4 {
     }
 
     #[inline(always)]
-    fn or_else(self, mask: Mask4, other: Self) -> Self {
+    fn select(self, mask: Mask4, other: Self) -> Self {
         // SAFETY: as above.
         Self(unsafe { _mm_or_ps(_mm_and_ps(mask.0, self.0), _mm_andnot_ps(mask.0, other.0)) })
     }
 
     #[inline(always)]
-    fn without(mask: Mask4, but: Mask4) -> Mask4 {
+    fn and_not(mask: Mask4, but: Mask4) -> Mask4 {
         // SAFETY: as above.
         Mask4(unsafe { _mm_andnot_ps(but.0, mask.0) })
     }
@@ -115,14 +115,14 @@ impl SimdVector for F4 {
     }
 
     #[inline(always)]
-    fn greatest(self) -> f32 {
+    fn max_lane(self) -> f32 {
         let mut lanes = [0.0_f32; 4];
         self.store(&mut lanes);
         lanes[0].max(lanes[1]).max(lanes[2].max(lanes[3]))
     }
 
     #[inline(always)]
-    fn least(self) -> f32 {
+    fn min_lane(self) -> f32 {
         let mut lanes = [0.0_f32; 4];
         self.store(&mut lanes);
         lanes[0].min(lanes[1]).min(lanes[2].min(lanes[3]))

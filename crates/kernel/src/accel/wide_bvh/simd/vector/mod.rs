@@ -39,7 +39,7 @@ pub trait SimdVector: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Outpu
 
     /// Broadcasts a number to all lanes.
     #[inline(always)]
-    fn like(self, x: f32) -> Self {
+    fn splat_like(self, x: f32) -> Self {
         // SAFETY: a value of this type exists.
         unsafe { Self::splat(x) }
     }
@@ -55,7 +55,7 @@ pub trait SimdVector: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Outpu
     /// Stores the lanes into a slice of at least [`SimdVector::COUNT`] floats.
     fn store(self, to: &mut [f32]);
     /// Divides by `divisor`.
-    fn over(self, divisor: Self) -> Self;
+    fn div(self, divisor: Self) -> Self;
     /// Lane-wise minimum.
     fn min(self, other: Self) -> Self;
     /// Lane-wise maximum.
@@ -63,7 +63,7 @@ pub trait SimdVector: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Outpu
     /// Lane-wise absolute value.
     fn abs(self) -> Self;
     /// Negates the lanes where the sign bit of `other` is set.
-    fn signed_by(self, other: Self) -> Self;
+    fn xor_sign(self, other: Self) -> Self;
     /// self < other.
     fn lt(self, other: Self) -> Self::Mask;
     /// self ≤ other.
@@ -71,17 +71,17 @@ pub trait SimdVector: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Outpu
     /// self = other.
     fn eq(self, other: Self) -> Self::Mask;
     /// Bitwise selection: `self` where the mask is set, `other` elsewhere.
-    fn or_else(self, mask: Self::Mask, other: Self) -> Self;
+    fn select(self, mask: Self::Mask, other: Self) -> Self;
     /// Lanes set in `mask` but not in `but`.
-    fn without(mask: Self::Mask, but: Self::Mask) -> Self::Mask;
+    fn and_not(mask: Self::Mask, but: Self::Mask) -> Self::Mask;
     /// Converts a mask to bits, one per lane.
     fn movemask(mask: Self::Mask) -> u32;
     /// Converts bits to a mask. `like` proves that the processor has the instructions.
     fn mask(bits: u32, like: Self) -> Self::Mask;
     /// Maximum of all lanes.
-    fn greatest(self) -> f32;
+    fn max_lane(self) -> f32;
     /// Minimum of all lanes.
-    fn least(self) -> f32;
+    fn min_lane(self) -> f32;
 }
 
 /// Implements addition, subtraction, and multiplication for a vector type.

@@ -72,8 +72,8 @@ impl<V: SimdVector> SimdVector for VectorPair<V> {
     }
 
     #[inline(always)]
-    fn over(self, divisor: Self) -> Self {
-        Self(self.0.over(divisor.0), self.1.over(divisor.1))
+    fn div(self, divisor: Self) -> Self {
+        Self(self.0.div(divisor.0), self.1.div(divisor.1))
     }
 
     #[inline(always)]
@@ -92,8 +92,8 @@ impl<V: SimdVector> SimdVector for VectorPair<V> {
     }
 
     #[inline(always)]
-    fn signed_by(self, other: Self) -> Self {
-        Self(self.0.signed_by(other.0), self.1.signed_by(other.1))
+    fn xor_sign(self, other: Self) -> Self {
+        Self(self.0.xor_sign(other.0), self.1.xor_sign(other.1))
     }
 
     #[inline(always)]
@@ -112,13 +112,13 @@ impl<V: SimdVector> SimdVector for VectorPair<V> {
     }
 
     #[inline(always)]
-    fn or_else(self, mask: Self::Mask, other: Self) -> Self {
-        Self(self.0.or_else(mask.0, other.0), self.1.or_else(mask.1, other.1))
+    fn select(self, mask: Self::Mask, other: Self) -> Self {
+        Self(self.0.select(mask.0, other.0), self.1.select(mask.1, other.1))
     }
 
     #[inline(always)]
-    fn without(mask: Self::Mask, but: Self::Mask) -> Self::Mask {
-        VectorPair(V::without(mask.0, but.0), V::without(mask.1, but.1))
+    fn and_not(mask: Self::Mask, but: Self::Mask) -> Self::Mask {
+        VectorPair(V::and_not(mask.0, but.0), V::and_not(mask.1, but.1))
     }
 
     #[inline(always)]
@@ -132,12 +132,12 @@ impl<V: SimdVector> SimdVector for VectorPair<V> {
     }
 
     #[inline(always)]
-    fn greatest(self) -> f32 {
-        self.0.max(self.1).greatest()
+    fn max_lane(self) -> f32 {
+        self.0.max(self.1).max_lane()
     }
 
     #[inline(always)]
-    fn least(self) -> f32 {
-        self.0.min(self.1).least()
+    fn min_lane(self) -> f32 {
+        self.0.min(self.1).min_lane()
     }
 }

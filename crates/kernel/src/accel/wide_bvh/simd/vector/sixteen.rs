@@ -55,7 +55,7 @@ impl SimdVector for F16 {
     }
 
     #[inline(always)]
-    fn over(self, divisor: Self) -> Self {
+    fn div(self, divisor: Self) -> Self {
         // SAFETY: a value of this type exists, so the processor has the instructions. Also applies below.
         Self(unsafe { _mm512_div_ps(self.0, divisor.0) })
     }
@@ -79,7 +79,7 @@ impl SimdVector for F16 {
     }
 
     #[inline(always)]
-    fn signed_by(self, other: Self) -> Self {
+    fn xor_sign(self, other: Self) -> Self {
         // SAFETY: as above.
         unsafe {
             let signs = _mm512_and_si512(_mm512_castps_si512(other.0), _mm512_set1_epi32(i32::MIN));
@@ -106,13 +106,13 @@ impl SimdVector for F16 {
     }
 
     #[inline(always)]
-    fn or_else(self, mask: Mask16, other: Self) -> Self {
+    fn select(self, mask: Mask16, other: Self) -> Self {
         // SAFETY: as above.
         Self(unsafe { _mm512_mask_blend_ps(mask.0, other.0, self.0) })
     }
 
     #[inline(always)]
-    fn without(mask: Mask16, but: Mask16) -> Mask16 {
+    fn and_not(mask: Mask16, but: Mask16) -> Mask16 {
         Mask16(mask.0 & !but.0)
     }
 
@@ -127,13 +127,13 @@ impl SimdVector for F16 {
     }
 
     #[inline(always)]
-    fn greatest(self) -> f32 {
+    fn max_lane(self) -> f32 {
         // SAFETY: as above.
         unsafe { _mm512_reduce_max_ps(self.0) }
     }
 
     #[inline(always)]
-    fn least(self) -> f32 {
+    fn min_lane(self) -> f32 {
         // SAFETY: as above.
         unsafe { _mm512_reduce_min_ps(self.0) }
     }
