@@ -272,6 +272,36 @@ fn merge_never_replaces_a_source_file() {
 }
 
 #[test]
+fn merge_never_replaces_an_unread_input() {
+    let dir = room_dir();
+    dir.write("unused.ppm", "P3 1 1 255 9 9 9\n");
+    dir.write("step.mtl", "newmtl a\nKd 1 0 0\n");
+    dir.write("step.obj", &format!("mtllib step.mtl\n{STEP}"));
+    dir.write(
+        "room.toml",
+        &ROOM.replace("[textures.tiles]", "[textures.u]\nfile = \"unused.ppm\"\n[textures.tiles]"),
+    );
+    std::os::unix::fs::symlink("room.toml", dir.path("latest.ppm")).expect("a link");
+    std::os::unix::fs::symlink("step.mtl", dir.path("step.ppm")).expect("a link");
+    // The depth view needs no textures, so the parts do not record them.
+    parts(&dir, 2, "--view depth");
+    let inputs = ["tiles.ppm", "unused.ppm", "room.toml", "step.mtl"];
+    let before = inputs.map(|name| dir.bytes(name));
+    for (name, input) in [
+        ("tiles.ppm", "(tiles.ppm)"),
+        ("unused.ppm", "(unused.ppm)"),
+        ("latest.ppm", "(room.toml)"),
+        ("step.ppm", "(step.mtl)"),
+    ] {
+        for options in ["", "--watch", "--partial"] {
+            let said = dir.expect(&format!("merge {name} 1.part 2.part {options} --progress none"), 2);
+            assert_mentions(&said, &[name, input]);
+        }
+    }
+    assert!(inputs.map(|name| dir.bytes(name)) == before);
+}
+
+#[test]
 fn partial_option_merges_existing_parts() {
     let dir = room_dir();
     dir.expect("room.toml --once --progress none -o one.exr", 0);

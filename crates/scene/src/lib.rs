@@ -196,6 +196,14 @@ fn load_source(source: SceneText, path: &Path, sets: &[String]) -> Result<Loaded
     }
 }
 
+/// The files that a scene file references, even if the scene has errors. Empty for models and unreadable files.
+pub fn named_files(path: &Path) -> Vec<PathBuf> {
+    if is_model(path) {
+        return Vec::new();
+    }
+    read::read_scene_text(path).map_or(Vec::new(), |text| document::named_files(&text, path))
+}
+
 /// Validates the text of a scene file. `path` is used in diagnostics and to resolve relative paths, but the
 /// file is not read. Only the metadata of referenced files is read.
 pub fn parse(text: Arc<str>, path: &Path) -> Outcome {

@@ -1,5 +1,6 @@
 //! `glimt merge`: merges parts into an image.
 
+use std::collections::BTreeSet;
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
@@ -18,6 +19,7 @@ use crate::merge_block::TerminalBlock;
 use crate::output::part::{self, Merged, PartError, PartFile};
 use crate::output::write::{Guard, atomic_guarded};
 use crate::output::{self, DevelopSettings, Format, Losses, OutputError, is_same_file, scene_path};
+use crate::pipeline::scene_inputs;
 use crate::progress::{bar_style, json_line};
 use crate::scene::sanitize::{shortened, visible};
 use crate::signals;
@@ -101,15 +103,31 @@ impl MergeCommand<'_> {
         }
     }
 
-    /// An error message if the parts were rendered from the file at `path`.
+    /// An error message if the file at `path` is an input of the parts or of their scene.
     fn refused_input(&self, parts: &[PartFile], path: &Path) -> Option<String> {
-        let by_content = || part::input_with_content(parts, path).map(|name| (name, "it"));
-        let by_name = || part::input_with_name(parts, path).map(|name| (name, "a file with this name"));
-        let (name, what) = by_content().or_else(by_name)?;
-        let out = self.args.out.display();
-        Some(format!(
-            "cannot write {out}: the parts were rendered from {what} ({name}); choose another output"
-        ))
+        let by_content = || {
+            let name = part::input_with_content(parts, path)?;
+            Some(format!("the parts were rendered from it ({name})"))
+        };
+        let by_name = || {
+            let name = part::input_with_name(parts, path)?;
+            Some(format!("the parts were rendered from a file with this name ({name})"))
+        };
+        let by_scene = || {
+            let input = self.current_input(parts, path)?;
+            let input = input.strip_prefix(".").unwrap_or(&input);
+            Some(format!("the scene of the parts references it ({})", visible(&input.to_string_lossy())))
+        };
+        let why = by_content().or_else(by_name).or_else(by_scene)?;
+        Some(format!("cannot write {}: {why}; choose another output", self.args.out.display()))
+    }
+
+    /// The input of the parts' scene that is the file at `path`. The parts do not name all inputs: a render does
+    /// not read textures that are not visible in its view.
+    fn current_input(&self, parts: &[PartFile], path: &Path) -> Option<PathBuf> {
+        let scenes: BTreeSet<PathBuf> = parts.iter().filter_map(scene_of_part).collect();
+        let inputs = |scene: &PathBuf| self.pool.install(|| scene_inputs(scene));
+        scenes.iter().flat_map(inputs).find(|input| is_same_file(input, path))
     }
 
     /// Opens all parts and reports every invalid one.
@@ -332,12 +350,16 @@ impl MergeCommand<'_> {
 /// each part, then next to the output.
 fn record_scene_path(finish: &mut DevelopSettings, parts: &[PartFile], out: &Path) {
     let Some((_, scene)) = finish.metadata.iter_mut().find(|(name, _)| name == "glimt:scene") else { return };
-    let named = parts.iter().filter(|part| !part.head.scene.is_empty());
-    let named = named.map(|part| part.path.with_file_name(&part.head.scene));
+    let named = parts.iter().filter_map(scene_of_part);
     let found = named.chain([out.with_file_name(scene.as_str())]).find(|path| path.is_file());
     if let Some(path) = found {
         *scene = scene_path::relative(&path, out);
     }
+}
+
+/// Path of the scene that a part was rendered from. `None` if the part does not name it.
+fn scene_of_part(part: &PartFile) -> Option<PathBuf> {
+    (!part.head.scene.is_empty()).then(|| part.path.with_file_name(&part.head.scene))
 }
 
 /// A part that is not yet complete.

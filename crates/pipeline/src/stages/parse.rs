@@ -214,19 +214,31 @@ fn with_new_name_hint(
 /// Returns the files that the scene references without the overrides. Includes files referenced by meshes
 /// that have not been read.
 fn referenced_files(loaded: &scene::Loaded) -> Vec<PathBuf> {
-    let mut named = loaded.named.clone();
     let is_read = |path: &&PathBuf| loaded.scene.mesh_files.iter().any(|file| file.value == **path);
-    // Skip unreadable files.
-    for path in loaded.named.iter().filter(|path| has_material_files(path) && !is_read(path)) {
-        if let Ok(mesh) = load_mesh(path, &ignore_progress, &CancelToken::new()) {
-            named.extend(mesh.companions.into_iter().map(|one| one.path).chain(mesh.pictures));
-        }
-    }
     let textures: BTreeSet<_> = loaded.scene.textures.iter().map(|texture| &texture.file.value).collect();
-    for path in textures.into_iter().chain(&loaded.named).filter(|path| is_gltf(path) && !is_read(path)) {
-        named.extend(gltf::referenced_files(path).unwrap_or_default());
+    let named = loaded.named.iter().filter(|path| !is_read(path));
+    let textures = textures.into_iter().filter(|path| is_gltf(path) && !is_read(path));
+    let referenced: Vec<_> = named.chain(textures).flat_map(|path| companion_files(path)).collect();
+    loaded.named.iter().cloned().chain(referenced).collect()
+}
+
+/// The files that a mesh or glTF file references. Empty for other files and unreadable ones.
+fn companion_files(path: &Path) -> Vec<PathBuf> {
+    if is_gltf(path) {
+        return gltf::referenced_files(path).unwrap_or_default();
     }
-    named
+    let mesh = has_material_files(path).then(|| load_mesh(path, &ignore_progress, &CancelToken::new()));
+    let Some(Ok(mesh)) = mesh else { return Vec::new() };
+    mesh.companions.into_iter().map(|one| one.path).chain(mesh.pictures).collect()
+}
+
+/// A scene or model file and all files that it references, directly or through its meshes. Ignores errors in
+/// the files.
+pub fn scene_inputs(path: &Path) -> Vec<PathBuf> {
+    let named = scene::named_files(path);
+    let referenced: Vec<_> =
+        [path.to_owned()].iter().chain(&named).flat_map(|path| companion_files(path)).collect();
+    [path.to_owned()].into_iter().chain(named).chain(referenced).collect()
 }
 
 fn has_material_files(path: &Path) -> bool {
