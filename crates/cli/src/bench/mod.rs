@@ -1,6 +1,6 @@
 //! Measures error against time for scenes × methods × sample counts × seeds, with two references per scene.
 //!
-//! [`run`] executes a [`BenchRequest`] and returns [`Results`]. [`table`], [`csv`] and [`plot`] present them, and [`baseline`]
+//! [`run()`] executes a [`BenchRequest`] and returns [`Results`]. [`table`], [`csv`] and [`plot`] present them, and [`baseline`]
 //! compares them with an older run. References are stored in a [`cache`].
 
 pub mod baseline;

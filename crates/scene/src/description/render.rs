@@ -111,7 +111,7 @@ pub use __render_keys as render_keys;
 pub enum KeyRange {
     /// Whole numbers.
     Whole(RangeInclusive<u32>),
-    /// Numbers, up to [`LARGEST`](crate::math::limits::LARGEST).
+    /// Numbers, up to [`LARGEST`].
     Number(RangeInclusive<f64>),
     /// One of these names.
     Names(Vec<&'static str>),

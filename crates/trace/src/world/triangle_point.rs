@@ -13,9 +13,9 @@ pub(super) struct TrianglePoint {
     local: DVec3,
     /// The point in world coordinates.
     pub(super) point: Vec3,
-    /// [`SurfacePoint::error`].
+    /// [`SurfacePoint::error`](crate::geometry::SurfacePoint::error).
     pub(super) error: Vec3,
-    /// [`SurfacePoint::normal`].
+    /// [`SurfacePoint::normal`](crate::geometry::SurfacePoint::normal).
     pub(super) normal: Vec3,
     /// Barycentric coordinates.
     pub(super) barycentric: Vec3,

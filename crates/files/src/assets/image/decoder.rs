@@ -83,7 +83,7 @@ pub(super) fn orientation(decoder: &mut dyn ImageDecoder) -> Result<Orientation,
     Ok(without_prefix.and_then(Orientation::from_exif_chunk).unwrap_or(orientation))
 }
 
-/// Size of a texel produced by [`convert::texels`].
+/// Size of a texel produced by [`texels`](super::convert::texels).
 pub(super) fn texel_bytes(color: ColorType, encoding: ImageEncoding, metadata: &ImageMetadata) -> u64 {
     let sample_bytes = color.bytes_per_pixel() / color.channel_count();
     let is_packed = sample_bytes == 1 && encoding.space(metadata).is_default();

@@ -405,7 +405,7 @@ pub fn add_traversal_cost(
 }
 
 /// Adds the values in the lanes set in `bits`, selecting them with bit masks as in
-/// [`take`](crate::math::lanes::take).
+/// [`select`](crate::math::lanes::select).
 #[inline(always)]
 pub fn add_where(bits: u32, values: &Vec3x16, sums: &mut Vec3x16) {
     let of = mask_from_bits(bits);

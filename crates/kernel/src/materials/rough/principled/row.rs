@@ -72,7 +72,7 @@ pub struct PrincipledRow<const THROUGH: bool> {
 struct ViewTerms {
     /// [`PrincipledRow::left`].
     left: Vec3,
-    /// [`PrincipledRow::coat_transmittance`].
+    /// [`PrincipledRow::through_coat`].
     through: f32,
     /// [`PrincipledRow::shares`].
     shares: [f32; 2],

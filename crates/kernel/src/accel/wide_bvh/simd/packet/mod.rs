@@ -17,7 +17,7 @@ use crate::geometry::{Ray, ShapeHit};
 use any::any;
 use closest::closest;
 
-/// [`closest`] with AVX2.
+/// [`closest()`] with AVX2.
 #[target_feature(enable = "avx2")]
 pub fn closest_avx2(tree: &WideBvh, rays: &[Ray], ends: &F32x16, hits: &mut [Option<ShapeHit>]) -> bool {
     // SAFETY: this function is compiled with the required instructions.
@@ -25,7 +25,7 @@ pub fn closest_avx2(tree: &WideBvh, rays: &[Ray], ends: &F32x16, hits: &mut [Opt
     closest(tree, rays, ends, hits, like, like8)
 }
 
-/// [`any`] with AVX2.
+/// [`any()`] with AVX2.
 #[target_feature(enable = "avx2")]
 pub fn any_avx2(tree: &WideBvh, rays: &[Ray], ends: &F32x16, except: &[Option<u32>]) -> Option<u32> {
     // SAFETY: this function is compiled with the required instructions.
@@ -33,7 +33,7 @@ pub fn any_avx2(tree: &WideBvh, rays: &[Ray], ends: &F32x16, except: &[Option<u3
     any(tree, rays, ends, except, like, like8)
 }
 
-/// [`closest`] with AVX-512.
+/// [`closest()`] with AVX-512.
 #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2")]
 pub fn closest_avx512(tree: &WideBvh, rays: &[Ray], ends: &F32x16, hits: &mut [Option<ShapeHit>]) -> bool {
     // SAFETY: this function is compiled with the required instructions.
@@ -41,7 +41,7 @@ pub fn closest_avx512(tree: &WideBvh, rays: &[Ray], ends: &F32x16, hits: &mut [O
     closest(tree, rays, ends, hits, like, like8)
 }
 
-/// [`any`] with AVX-512.
+/// [`any()`] with AVX-512.
 #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2")]
 pub fn any_avx512(tree: &WideBvh, rays: &[Ray], ends: &F32x16, except: &[Option<u32>]) -> Option<u32> {
     // SAFETY: this function is compiled with the required instructions.
