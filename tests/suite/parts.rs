@@ -276,10 +276,10 @@ fn merge_never_replaces_an_unread_input() {
     let dir = room_dir();
     dir.write("unused.ppm", "P3 1 1 255 9 9 9\n");
     dir.write("step.mtl", "newmtl a\nKd 1 0 0\n");
-    dir.write("step.obj", &format!("mtllib step.mtl\n{STEP}"));
+    dir.write("step.obj", format!("mtllib step.mtl\n{STEP}"));
     dir.write(
         "room.toml",
-        &ROOM.replace("[textures.tiles]", "[textures.u]\nfile = \"unused.ppm\"\n[textures.tiles]"),
+        ROOM.replace("[textures.tiles]", "[textures.u]\nfile = \"unused.ppm\"\n[textures.tiles]"),
     );
     std::os::unix::fs::symlink("room.toml", dir.path("latest.ppm")).expect("a link");
     std::os::unix::fs::symlink("step.mtl", dir.path("step.ppm")).expect("a link");
