@@ -3,7 +3,7 @@
 
     python3 assets/pictures/make.py [FILE…] [--glimt BINARY]
 
-By itself all of them, which takes some ten minutes on two cores. `benches/terminal/screen.py` and `benches/terminal/moving.py` make
+Renders all of them by default, which takes about half an hour on two cores. `benches/terminal/screen.py` and `benches/terminal/moving.py` make
 screen.png and save.png; `glimt bench scenes/cornell.toml scenes/cornell_glass.toml --plot` made bench.svg.
 """
 
@@ -17,11 +17,11 @@ ROOT = HERE.parent.parent
 # Each picture has the name of its scene.
 PICTURES = {
     "path.jpg": "--width 320 --height 320 --samples 1024",
-    "photons.jpg": "--width 400 --height 400 --samples 96",
-    "water.jpg": "--width 480 --height 360 --samples 128",
-    "lamps.jpg": "--width 480 --height 300 --samples 64",
+    "photons.jpg": "--width 960 --height 960 --samples 384",
+    "water.jpg": "--width 960 --height 720 --samples 256",
+    "lamps.jpg": "--width 960 --height 600 --samples 256",
     "environment.jpg": "--width 480 --height 300 --samples 128",
-    "metals.jpg": "--width 480 --height 266 --samples 256",
+    "metals.jpg": "--width 960 --height 533 --samples 4096",
     "leaves.jpg": "--width 480 --height 360 --samples 256",
     "textures.png": "--width 320 --height 240 --samples 128",
     "ring.png": "--width 480 --height 320 --samples 64",
