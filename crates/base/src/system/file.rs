@@ -52,6 +52,39 @@ pub fn kind(path: &Path) -> io::Result<(FileKind, Metadata)> {
     Ok((FileKind::of(path, &metadata), metadata))
 }
 
+/// File metadata that changes with every write if there is enough time between writes, and with every
+/// replacement by another file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FileStamp {
+    device: u64,
+    inode: u64,
+    /// Length in bytes.
+    pub len: u64,
+    /// Modification time, in seconds and nanoseconds since 1970.
+    pub modified: (i64, i64),
+    /// Time of the last change of content or metadata, in seconds and nanoseconds since 1970.
+    pub changed: (i64, i64),
+}
+
+impl FileStamp {
+    /// The stamp of a file with this metadata.
+    pub fn new(metadata: &Metadata) -> Self {
+        Self {
+            device: metadata.dev(),
+            inode: metadata.ino(),
+            len: metadata.len(),
+            modified: (metadata.mtime(), metadata.mtime_nsec()),
+            changed: (metadata.ctime(), metadata.ctime_nsec()),
+        }
+    }
+
+    /// The stamp of the file at `path`, following symbolic links. `None` if it does not exist or its metadata
+    /// cannot be read.
+    pub fn of(path: &Path) -> Option<Self> {
+        fs::metadata(path).ok().map(|metadata| Self::new(&metadata))
+    }
+}
+
 /// Maximum size of a Git LFS pointer in bytes (from the Git LFS specification: "pointer files must be less
 /// than 1024 bytes").
 pub const LFS_POINTER_LIMIT: u64 = 1024;

@@ -12,6 +12,7 @@ use std::path::{Path, PathBuf};
 use crate::geometry::mesh::TriangleMesh;
 use crate::materials::PixelValue;
 use crate::math::{DVec2, Vec2, Vec3};
+use crate::system::file::FileStamp;
 
 /// Error for a file that cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -77,6 +78,8 @@ pub struct Companion {
     pub path: PathBuf,
     /// Hash of the decoded bytes. `None` if the file could not be read.
     pub hash: Option<FileHash>,
+    /// Stamp of the file before it was read.
+    pub stamp: Option<FileStamp>,
 }
 
 /// A decoded mesh file.

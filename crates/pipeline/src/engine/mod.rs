@@ -459,6 +459,7 @@ impl Engine {
         // Include textures needed only for the scene's own image, because its film key depends on them.
         let lookups = needed_textures(&plan, own_image_plan.as_ref());
         let (meshes, bodies, textures, needed) = self.load(&parsed, lookups, findings, table, &reading)?;
+        contents.verify(token)?;
         if let Some(path) = contents.changed() {
             return Err(Stop::work(format!("{} changed while it was being read", path.display())));
         }

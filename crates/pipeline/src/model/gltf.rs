@@ -281,7 +281,7 @@ impl super::materials::ExportFiles for Writer<'_> {
             // from its content. A missing file is watched until it appears.
             (ExportNaming::Inside, bytes) => {
                 if let Ok(ImageBytes::File(file)) = bytes {
-                    self.companions.push(Companion { path: file, hash: None });
+                    self.companions.push(Companion { path: file, hash: None, stamp: None });
                 }
                 TextureFile { file: file_name(self.path), image: Some(image) }
             }

@@ -204,7 +204,7 @@ fn image_never_uses_unhashed_bytes() {
             }
             let contents = bench.worker.contents();
             let replacements = || contents.replacements.lock().expect("not poisoned");
-            replacements().insert(bench.path(name), new.clone().into());
+            replacements().insert(bench.path(name), (bench.path(name), new.clone().into()));
             let shown = image(&mut bench);
             assert!(
                 shown == new_image || shown == old_image,
@@ -224,6 +224,23 @@ fn image_never_uses_unhashed_bytes() {
             );
         }
     }
+}
+
+#[test]
+fn files_replaced_while_others_load_are_read_again() {
+    let image = |bench: &mut Bench| {
+        bench.done();
+        bench.picture()
+    };
+    let new = SCENE.replace("position = [0, 1, 4]", "fov = 25\nposition = [0, 1, 4]");
+    let new_image = image(&mut Bench::new(&new));
+    assert!(new_image != image(&mut Bench::new(SCENE)));
+    // Replace the scene after it has been read, while its texture is being read.
+    let mut bench = Bench::new(SCENE);
+    let replacement = (bench.path("scene.toml"), new.into_bytes());
+    let contents = bench.worker.contents();
+    contents.replacements.lock().expect("not poisoned").insert(bench.path("skin.ppm"), replacement);
+    assert!(image(&mut bench) == new_image);
 }
 
 #[test]

@@ -1,9 +1,7 @@
 //! File contents, identified by hashes that are only recomputed if the file may have changed.
 
 use std::collections::HashMap;
-use std::fs::Metadata;
 use std::io::{self, ErrorKind, Read};
-use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, SystemTime};
@@ -12,7 +10,7 @@ use super::outputs::Outputs;
 use crate::assets::{Companion, FileHash};
 use crate::control::{CancelToken, Cancelled};
 use crate::scene::fingerprint::Fingerprint;
-use crate::system::file::{self, FileKind};
+use crate::system::file::{self, FileKind, FileStamp};
 
 /// A file that a request read or tried to read.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
@@ -69,15 +67,23 @@ const CHUNK: usize = 1 << 20;
 /// Cache of file hashes.
 #[derive(Debug, Default)]
 pub struct Contents {
-    known: Mutex<HashMap<PathBuf, (Stamp, Content)>>,
+    known: Mutex<HashMap<PathBuf, (FileStamp, Content)>>,
     /// Files written by glimt.
     pub outputs: Outputs,
     /// Files that have been hashed.
     #[cfg(test)]
     pub(crate) hashed: Mutex<Vec<PathBuf>>,
-    /// Replacement content that is written to each file right after it has been hashed.
+    /// A file and the bytes to write to it, right after the file that is the key has been hashed.
     #[cfg(test)]
-    pub(crate) replacements: Mutex<HashMap<PathBuf, Vec<u8>>>,
+    pub(crate) replacements: Mutex<HashMap<PathBuf, (PathBuf, Vec<u8>)>>,
+}
+
+/// A file as first seen by a request.
+#[derive(Clone, Copy, Debug)]
+struct Seen {
+    content: Content,
+    /// Stamp before the content was read.
+    stamp: Option<FileStamp>,
 }
 
 /// File contents as seen by one request. A file's content must not change during a request. If it does, the
@@ -85,7 +91,7 @@ pub struct Contents {
 #[derive(Debug)]
 pub(crate) struct Snapshot {
     contents: Arc<Contents>,
-    seen: Mutex<HashMap<PathBuf, Content>>,
+    seen: Mutex<HashMap<PathBuf, Seen>>,
     changed: Mutex<Option<PathBuf>>,
 }
 
@@ -102,16 +108,22 @@ impl Snapshot {
         if let Some(content) = self.known(path) {
             return Ok(content);
         }
+        let stamp = FileStamp::of(path);
         let content = self.contents.read(path, token)?;
-        Ok(*self.seen().entry(path.to_owned()).or_insert(content))
+        Ok(self.seen().entry(path.to_owned()).or_insert(Seen { content, stamp }).content)
     }
 
     /// Returns a file's content, given the hash of its decoded bytes. Records a change if the content differs
     /// from what this request has seen before.
     pub(crate) fn decoded(&self, path: &Path, hash: FileHash) -> Content {
+        self.decoded_with_stamp(path, hash, None)
+    }
+
+    /// Like [`Snapshot::decoded`], given the file's stamp before it was read.
+    fn decoded_with_stamp(&self, path: &Path, hash: FileHash, stamp: Option<FileStamp>) -> Content {
         let content = Content::Hash(hash);
-        if *self.seen().entry(path.to_owned()).or_insert(content) != content {
-            *self.changed.lock().unwrap_or_else(PoisonError::into_inner) = Some(path.to_owned());
+        if self.seen().entry(path.to_owned()).or_insert(Seen { content, stamp }).content != content {
+            self.record_change(path);
         }
         content
     }
@@ -122,14 +134,39 @@ impl Snapshot {
     /// [`Cancelled`].
     pub(crate) fn of_companion(
         &self,
-        Companion { path, hash }: &Companion,
+        Companion { path, hash, stamp }: &Companion,
         token: &CancelToken,
     ) -> Result<FileRead, Cancelled> {
         let content = match hash {
-            Some(hash) => self.decoded(path, *hash),
+            Some(hash) => self.decoded_with_stamp(path, *hash, *stamp),
             None => self.read(path, token)?,
         };
         Ok(FileRead { path: path.clone(), content })
+    }
+
+    /// Records a change if a file now has another content than when this request first saw it. Must be called
+    /// after all files are loaded: otherwise, a request could combine files of several versions, each of them
+    /// intact. A file that has been removed since has not changed.
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub(crate) fn verify(&self, token: &CancelToken) -> Result<(), Cancelled> {
+        let seen: Vec<_> = self.seen().iter().map(|(path, seen)| (path.clone(), *seen)).collect();
+        for (path, Seen { content, stamp }) in seen {
+            let now = FileStamp::of(&path);
+            if now.is_none() || now == stamp {
+                continue;
+            }
+            let now = self.contents.read(&path, token)?;
+            if now != Content::Missing && now != content {
+                self.record_change(&path);
+            }
+        }
+        Ok(())
+    }
+
+    fn record_change(&self, path: &Path) {
+        *self.changed.lock().unwrap_or_else(PoisonError::into_inner) = Some(path.to_owned());
     }
 
     /// Returns a file that changed while this request was reading files.
@@ -139,46 +176,24 @@ impl Snapshot {
 
     /// Returns a file's content if this request has seen it.
     pub(crate) fn known(&self, path: &Path) -> Option<Content> {
-        self.seen().get(path).copied()
+        self.seen().get(path).map(|seen| seen.content)
     }
 
-    fn seen(&self) -> MutexGuard<'_, HashMap<PathBuf, Content>> {
+    fn seen(&self) -> MutexGuard<'_, HashMap<PathBuf, Seen>> {
         self.seen.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-/// File metadata that changes with every write if there is enough time between writes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Stamp {
-    device: u64,
-    inode: u64,
-    len: u64,
-    modified: (i64, i64),
-    changed: (i64, i64),
+/// Substitute content for a file that is too long to hash.
+fn content_of_stamp(stamp: &FileStamp) -> Content {
+    Content::Hash(*blake3::hash(format!("{stamp:?}").as_bytes()).as_bytes())
 }
 
-impl Stamp {
-    fn of(metadata: &Metadata) -> Self {
-        Self {
-            device: metadata.dev(),
-            inode: metadata.ino(),
-            len: metadata.len(),
-            modified: (metadata.mtime(), metadata.mtime_nsec()),
-            changed: (metadata.ctime(), metadata.ctime_nsec()),
-        }
-    }
-
-    /// Returns substitute content for a file that is too long to hash.
-    fn content(&self) -> Content {
-        Content::Hash(*blake3::hash(format!("{self:?}").as_bytes()).as_bytes())
-    }
-
-    /// Whether the stamp is guaranteed to differ after any change made after `now`.
-    fn is_settled(&self, now: SystemTime) -> bool {
-        let latest = self.modified.0.max(self.changed.0).max(0).unsigned_abs();
-        let latest = SystemTime::UNIX_EPOCH + Duration::from_secs(latest);
-        now.duration_since(latest).is_ok_and(|age| age > STAMP_RESOLUTION)
-    }
+/// Whether the stamp is guaranteed to differ after any change made after `now`.
+fn is_settled(stamp: &FileStamp, now: SystemTime) -> bool {
+    let latest = stamp.modified.0.max(stamp.changed.0).max(0).unsigned_abs();
+    let latest = SystemTime::UNIX_EPOCH + Duration::from_secs(latest);
+    now.duration_since(latest).is_ok_and(|age| age > STAMP_RESOLUTION)
 }
 
 impl Contents {
@@ -197,13 +212,13 @@ impl Contents {
             Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Content::Missing),
             Err(error) => return Ok(unreadable(&error)),
         };
-        let stamp = Stamp::of(&metadata);
+        let stamp = FileStamp::new(&metadata);
         let known = self.known().get(path).filter(|(known, _)| *known == stamp).map(|(_, content)| *content);
         if let Some(content) = known {
             return Ok(content);
         }
-        let content = if stamp.len > MAX_HASHED { stamp.content() } else { self.hash(path, token)? };
-        if stamp.is_settled(now) {
+        let content = if stamp.len > MAX_HASHED { content_of_stamp(&stamp) } else { self.hash(path, token)? };
+        if is_settled(&stamp, now) {
             self.known().insert(path.to_owned(), (stamp, content));
         } else {
             self.known().remove(path);
@@ -221,13 +236,15 @@ impl Contents {
         self.hashed.lock().unwrap_or_else(PoisonError::into_inner).push(path.to_owned());
         let content = hash(path, token);
         #[cfg(test)]
-        if let Some(bytes) = self.replacements.lock().unwrap_or_else(PoisonError::into_inner).remove(path) {
+        let replacement = self.replacements.lock().unwrap_or_else(PoisonError::into_inner).remove(path);
+        #[cfg(test)]
+        if let Some((path, bytes)) = replacement {
             std::fs::write(path, bytes).expect("replaced");
         }
         content
     }
 
-    fn known(&self) -> MutexGuard<'_, HashMap<PathBuf, (Stamp, Content)>> {
+    fn known(&self) -> MutexGuard<'_, HashMap<PathBuf, (FileStamp, Content)>> {
         self.known.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -317,13 +334,64 @@ mod tests {
     }
 
     #[test]
+    fn files_of_several_versions_are_detected() {
+        let folder = tempfile::tempdir().expect("a scratch folder");
+        let token = CancelToken::new();
+        for version in ["old", "new"] {
+            fs::create_dir(folder.path().join(version)).expect("a folder");
+            for name in ["mesh", "texture", "library"] {
+                fs::write(folder.path().join(version).join(name), format!("{version} {name}"))
+                    .expect("written");
+            }
+            fs::write(folder.path().join(version).join("same"), "same").expect("written");
+        }
+        let current = folder.path().join("current");
+        let show = |version| {
+            let _ = fs::remove_file(&current);
+            std::os::unix::fs::symlink(version, &current).expect("a link");
+        };
+        let [mesh, texture, library, same] =
+            ["mesh", "texture", "library", "same"].map(|name| current.join(name));
+        let hash_of = |path: &Path| *blake3::hash(&fs::read(path).expect("read")).as_bytes();
+        let verified = |snapshot: &Snapshot| {
+            snapshot.verify(&token).expect("not cancelled");
+            snapshot.changed()
+        };
+        for is_decoded in [false, true] {
+            show("old");
+            let snapshot = Snapshot::of(Arc::default());
+            snapshot.read(&same, &token).expect("not cancelled");
+            if is_decoded {
+                let (hash, stamp) = (Some(hash_of(&library)), FileStamp::of(&library));
+                let companion = Companion { path: library.clone(), hash, stamp };
+                show("new");
+                snapshot.of_companion(&companion, &token).expect("not cancelled");
+            } else {
+                snapshot.read(&mesh, &token).expect("not cancelled");
+                assert_eq!(verified(&snapshot), None);
+                show("new");
+            }
+            snapshot.read(&texture, &token).expect("not cancelled");
+            assert_eq!(verified(&snapshot), Some(if is_decoded { library.clone() } else { mesh.clone() }));
+        }
+        // Replacement by the same content and removal are not changes.
+        show("old");
+        let snapshot = Snapshot::of(Arc::default());
+        snapshot.read(&same, &token).expect("not cancelled");
+        show("new");
+        assert_eq!(verified(&snapshot), None);
+        fs::remove_file(&current).expect("removed");
+        assert_eq!(verified(&snapshot), None);
+    }
+
+    #[test]
     fn old_file_is_hashed_once() {
         let folder = tempfile::tempdir().expect("a scratch folder");
         let path = folder.path().join("file");
         fs::write(&path, "a").expect("written");
-        let stamp = Stamp::of(&fs::metadata(&path).expect("metadata"));
-        assert!(!stamp.is_settled(SystemTime::now()));
-        assert!(stamp.is_settled(SystemTime::now() + Duration::from_secs(4)));
+        let stamp = FileStamp::of(&path).expect("metadata");
+        assert!(!is_settled(&stamp, SystemTime::now()));
+        assert!(is_settled(&stamp, SystemTime::now() + Duration::from_secs(4)));
         let contents = Contents::default();
         contents.known().insert(path.clone(), (stamp, Content::Unusable(Obstacle::Special)));
         let read = contents.read(&path, &CancelToken::new());

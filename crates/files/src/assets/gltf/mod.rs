@@ -29,6 +29,7 @@ use super::image::{self, EmbeddedImage, ImageEncoding, ImageLimits};
 use super::read::{self, Monitor};
 use super::{AssetError, Companion, FileHash};
 use crate::control::{CancelToken, Progress, ignore_progress};
+use crate::system::file::FileStamp;
 
 /// Maximum file size, and maximum total size of the buffers.
 const FILE_LIMIT: u64 = 4 << 30;
@@ -552,6 +553,7 @@ fn read_buffers(
             Some(Uri::File(uri)) => {
                 let file = resolve_uri(path, &uri).map_err(wrong)?;
                 let silent = Monitor { progress: &ignore_progress, token: monitor.token };
+                let stamp = FileStamp::of(&file);
                 let bytes = read::bytes(&file, FILE_LIMIT - total, silent).map_err(|error| match error {
                     AssetError::Unreadable { path: missing, reason } => {
                         let name = path.file_name().unwrap_or_default().to_string_lossy();
@@ -559,7 +561,7 @@ fn read_buffers(
                     }
                     other => other,
                 })?;
-                files.push(Companion { path: file, hash: Some(read::hash(&bytes)) });
+                files.push(Companion { path: file, hash: Some(read::hash(&bytes)), stamp });
                 bytes
             }
             None if number == 0 => binary

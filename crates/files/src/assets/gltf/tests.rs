@@ -9,6 +9,7 @@ use super::model::UNKNOWN_CAMERA;
 use super::*;
 use crate::assets::{LoadedMesh, rejection};
 use crate::math::{DVec3, Vec2, Vec3};
+use crate::system::file::FileStamp;
 
 /// A temporary folder with glTF files.
 struct GltfDir(tempfile::TempDir);
@@ -137,7 +138,11 @@ fn parts_do_not_depend_on_buffer_storage() {
     let container = folder.open("c.gltf", external.to_string().as_bytes()).expect("read");
     let loaded = part(&container, 0).expect("a mesh");
     let hash = Some(*blake3::hash(&bytes()).as_bytes());
-    assert_eq!((loaded.mesh, loaded.companions), (embedded.mesh, vec![Companion { path: file, hash }]));
+    let stamp = FileStamp::of(&file);
+    assert_eq!(
+        (loaded.mesh, loaded.companions),
+        (embedded.mesh, vec![Companion { path: file, hash, stamp }])
+    );
 }
 
 #[test]

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use super::super::mtl::{self, MtlLibrary, decoded_paths, without_trailing_comments};
 use super::super::{AssetError, MeshSource};
 use crate::assets::{Companion, FileMaterial};
+use crate::system::file::FileStamp;
 
 /// Loads the libraries referenced by an OBJ file, in order of occurrence.
 pub(super) struct MtlLibraries<'a> {
@@ -71,9 +72,10 @@ impl MtlLibraries<'_> {
     }
 
     fn load_file(&mut self, path: &Path) -> Result<HashMap<String, usize>, AssetError> {
+        let stamp = FileStamp::of(path);
         let library = mtl::load(path, self.source.monitor);
         let hash = library.as_ref().ok().map(|library| library.hash);
-        self.found.files.push(Companion { path: path.to_owned(), hash });
+        self.found.files.push(Companion { path: path.to_owned(), hash, stamp });
         match library {
             Ok(library) => Ok(self.add(path, library)),
             Err(error @ AssetError::Unreadable { .. }) => {
