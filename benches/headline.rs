@@ -28,7 +28,7 @@ struct HeadlineRow {
 fn main() -> Result<(), Box<dyn error::Error>> {
     let folder = tempfile::tempdir()?;
     let path = |name: &str| folder.path().join(name);
-    // Rings, columns and positions. These meshes have 871,200 and 78,804 triangles, the third one 1,700,168.
+    // Arguments: rings, columns, position. The meshes have 871,200, 78,804 and 1,700,168 triangles.
     fs::write(path("large.off"), ball(660, 661, -1.1))?;
     fs::write(path("small.off"), ball(198, 200, 1.1))?;
     fs::write(path("largest.off"), ball(922, 923, 0.0))?;

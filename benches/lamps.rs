@@ -21,7 +21,7 @@ const RUNS: usize = 3;
 /// Target relMSE.
 const GOAL: f64 = 1e-2;
 
-/// Maximum number of samples to try.
+/// Maximum number of samples per pixel to try.
 const MOST_SAMPLES: u32 = 64;
 
 fn main() -> Result<(), Box<dyn error::Error>> {
@@ -58,9 +58,9 @@ fn main() -> Result<(), Box<dyn error::Error>> {
 
 /// Measurements of one render.
 struct RenderFigures {
-    /// Seconds of the lights stage.
+    /// Duration of the lights stage in seconds.
     lights: f64,
-    /// Seconds of the render stage.
+    /// Duration of the render stage in seconds.
     seconds: f64,
     /// Number of shadow rays.
     rays: f64,
@@ -95,7 +95,7 @@ fn render(folder: &Path, options: &[&str]) -> Result<[f64; 3], Box<dyn error::Er
     Ok([stage("lights"), stage("render"), report["counters"]["shadow_rays"].as_f64().unwrap_or(f64::NAN)])
 }
 
-/// The relMSE of the image.
+/// Returns the relMSE of `picture.exr` against the reference.
 fn error_of(folder: &Path) -> Result<f64, Box<dyn error::Error>> {
     let mut command = Command::new(env!("CARGO_BIN_EXE_glimt"));
     let output =

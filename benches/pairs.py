@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Compares the processor time of two glimt binaries on the same scenes, interleaved, with each scene's own settings.
+"""Compares the processor time of two glimt binaries on the same scenes, with interleaved runs and each scene's own settings.
 
     python3 benches/pairs.py BEFORE AFTER SCENE... [--pairs N] [-- OPTION...]
 
-Prints for each scene the median processor seconds of both, as whole processes; the median ratio of the pairs, the ratio of the minima,
-and whether the images have the same pixels; at the end the geometric mean of the medians. Slow scenes get fewer pairs, but at least
+For each scene, prints the median processor seconds of both processes, the median ratio of the pairs, the ratio of the minima, and
+whether the images have the same pixels. Ends with the geometric mean of the median ratios. Slow scenes get fewer pairs, but at least
 three. Options after `--` are passed to both binaries.
 """
 
@@ -17,7 +17,7 @@ import subprocess
 import sys
 import tempfile
 
-# Seconds of one binary on one scene after which no more pairs are run.
+# Seconds per binary and scene after which no more pairs are started.
 BUDGET_SECONDS = 12
 
 
@@ -61,11 +61,11 @@ def main():
                     times[which].append(seconds(binaries[which], scene, pictures[which], options))
             ratio = statistics.median(after / before for before, after in zip(*times))
             ratios.append(ratio)
-            same = "same" if content(pictures[0]) == content(pictures[1]) else "other"
+            same = "same" if content(pictures[0]) == content(pictures[1]) else "different"
             medians = [statistics.median(of) for of in times]
             print(
                 f"{os.path.basename(scene):22} {medians[0]:8.3f} {medians[1]:8.3f}  ratio {ratio:.3f}"
-                f"  of the least {min(times[1]) / min(times[0]):.3f}  {count} pairs, {same} pixels",
+                f"  of the minima {min(times[1]) / min(times[0]):.3f}  {count} pairs, {same} pixels",
                 flush=True,
             )
     print(f"geometric mean {math.exp(statistics.fmean(map(math.log, ratios))):.4f}")

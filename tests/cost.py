@@ -3,7 +3,7 @@
 
     python3 tests/cost.py [PROFILE [COUNT]]      (default: dev, 10)
 
-Each test runs in its own process, one after the other; its processor time includes the programs that it starts.
+Tests run one after the other, each in its own process. Processor times include the programs that a test starts.
 """
 
 import json
@@ -51,7 +51,7 @@ def main():
                 failed.append(costs[-1][2])
     costs.sort(reverse=True)
     print(f"{len(costs)} tests: {sum(cost for cost, *_ in costs):.1f} s of processor time, "
-          f"{sum(waited for _, waited, _ in costs):.1f} s of real time")
+          f"{sum(waited for _, waited, _ in costs):.1f} s of wall-clock time")
     for cost, waited, name in costs[:int(count)]:
         print(f"{cost:8.2f} s  ({waited:6.2f} s)  {name}")
     if failed:

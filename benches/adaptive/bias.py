@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Compares the mean of adaptively sampled images with uniformly sampled ones.
+"""Compares the mean of adaptively sampled images with the mean of uniformly sampled ones.
 
     python3 benches/adaptive/bias.py [SCENE...] [--error E | --time-share P] [--seeds N] [--side PIXELS] [--glimt BINARY]
 
 Renders N images with different seeds that stop at `error = E`, or after the fraction P of the time that 256 samples take. Their mean
-luminance is compared with that of a quarter as many uniformly sampled images, with enough samples to be equally exact. Prints the
-difference of the means in percent, its standard error, and the ratio of both. Defaults: cornell and cornell_glass, E = 0.05, 200 seeds,
+luminance is compared with that of a quarter as many uniformly sampled images, with enough samples to be equally precise. Prints the
+difference of the means in percent, its standard error, and their ratio. Defaults: cornell and cornell_glass, E = 0.05, 200 seeds,
 48 pixels along the longer side. Runs in the environment of ../mitsuba, which is created if it does not exist.
 """
 
@@ -70,7 +70,7 @@ def main():
     asked = arguments()
     how = f"error = {asked.error}" if asked.time_share is None else f"--time, {asked.time_share} of 256 samples"
     print(f"{how}, {asked.side} pixels, {asked.seeds} seeds")
-    print(f"{'':18}{'samples':>9}{'apart %':>10}{'± %':>10}{'ratio':>8}")
+    print(f"{'':18}{'samples':>9}{'bias %':>10}{'± %':>10}{'ratio':>8}")
     for scene in asked.scenes or [ROOT / "scenes" / name for name in ("cornell.toml", "cornell_glass.toml")]:
         with tempfile.TemporaryDirectory() as folder:
             row(asked, scene, Path(folder))

@@ -4,10 +4,10 @@
     python3 benches/adaptive/reported.py [SCENE...] [--seeds N] [--side PIXELS] [--samples N,N] [--integrators A,B] [--glimt BINARY]
 
 Each scene is rendered with N seeds. The spread of these images is the true noise: the RMS over the pixels of the standard deviation of
-their luminance, over its mean. Prints the RMS over the seeds of `image.error` relative to the true noise, with a 95 % bootstrap
+their luminance, divided by its mean. Prints the RMS over the seeds of `image.error` relative to the true noise, with a 95 % bootstrap
 interval over the seeds; then the same for the standard error of the mean luminance in the EXR files, relative to the spread of the means.
-The last lines summarize: the median of all ratios, how many are outside 0.9 to 1.35 (and how many of these have intervals that do not
-reach it), and the pooled ratio of the mean's standard error. Defaults: all bundled scenes, both integrators, 16, 64 and 256 samples,
+The last lines summarize: the median of all ratios, how many are outside 0.9 to 1.35 (and for how many of these the entire
+interval is outside), and the pooled ratio of the mean's standard error. Defaults: all bundled scenes, both integrators, 16, 64 and 256 samples,
 40 seeds, 64 × 64 pixels. Runs in the environment of ../mitsuba, which is created if it does not exist.
 """
 
@@ -85,7 +85,7 @@ def row(asked, scene, integrator, samples, folder):
     random = np.random.default_rng(1)
 
     def drawn():
-        # Draw half of the seeds without replacement, as a seed drawn twice would distort the variance. The spread is the same.
+        # Draw half of the seeds without replacement, as repeated seeds would bias the variance. The spread of the ratio is the same.
         return ratio(random.choice(everyone, size=len(everyone) // 2, replace=False))
 
     low, high = np.quantile([drawn() for _ in range(RESAMPLES)], [0.025, 0.975])
@@ -101,7 +101,7 @@ def row(asked, scene, integrator, samples, folder):
 def main():
     asked = arguments()
     print(f"{asked.seeds} seeds, {asked.side} × {asked.side} pixels")
-    print(f"{'':30}{'ratio':>8}{'by chance':>16}{'mean':>7}")
+    print(f"{'':30}{'ratio':>8}{'95 % interval':>16}{'mean':>7}")
     rows = []
     for scene in asked.scenes or sorted((ROOT / "scenes").glob("*.toml")):
         for integrator in asked.integrators.split(","):
@@ -111,7 +111,7 @@ def main():
     rows = [one for one in rows if one]
     outside = [one for one in rows if not BAND[0] <= one[0] <= BAND[1]]
     surely = [one for one in outside if one[2] < BAND[0] or one[1] > BAND[1]]
-    print(f"median {statistics.median(one[0] for one in rows):.2f}, {len(outside)} of {len(rows)} outside of {BAND[0]} to {BAND[1]}, {len(surely)} surely")
+    print(f"median {statistics.median(one[0] for one in rows):.2f}, {len(outside)} of {len(rows)} outside of {BAND[0]} to {BAND[1]}, {len(surely)} significantly")
     squares = [one[3] for one in rows if one[3] is not None]
     print(f"standard error of the mean luminance, pooled: {statistics.fmean(squares) ** 0.5:.2f}")
 

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Compares adaptive sampling with uniform sampling: seconds to the same relMSE.
+"""Compares adaptive sampling with uniform sampling: time to reach the same relMSE.
 
     python3 benches/adaptive/run.py [SCENE...] [--samples N] [--error E] [--seeds N] [--side PIXELS] [--glimt BINARY]
 
-Renders each scene with N samples everywhere, interleaved with `--time S` for several fractions S of the time that these took, and
-interpolates the time at which it has the same relMSE. With `--error E`, the scene is rendered with that requested error instead, and the
-equivalent number of samples is searched for. A reference with many samples is rendered first. Defaults: all bundled scenes, 256 samples,
+Renders each scene with N samples everywhere, interleaved with adaptive renders of several fractions of that time (`--time`), and
+interpolates the time that adaptive sampling needs for the same relMSE. With `--error E`, renders with that target error instead, and
+searches for the number of uniform samples with the same relMSE. A reference with many samples is rendered first. Defaults: all bundled scenes, 256 samples,
 3 seeds, 256 pixels along the longer side.
 """
 
@@ -37,7 +37,7 @@ def arguments():
 
 
 class Render:
-    """Renders of one scene at one size, and their references."""
+    """Renders one scene at one size and compares the images with a reference."""
 
     def __init__(self, glimt, scene, side, folder):
         with scene.open("rb") as file:
@@ -51,7 +51,7 @@ class Render:
         self.reference = self.folder / "reference.exr"
 
     def run(self, name, options):
-        """Seconds of sampling and the mean number of samples."""
+        """Returns the seconds spent on sampling and the mean number of samples per pixel."""
         report = self.folder / "report.json"
         command = [*self.call, "-o", str(self.folder / name), "--report", str(report), *map(str, options)]
         subprocess.run(command, check=True, stderr=subprocess.DEVNULL)
@@ -73,7 +73,7 @@ class Render:
 
 
 def log_between(x, low, high):
-    """Log-log interpolation of the second number at x between two points."""
+    """Interpolates y at x between two points, linearly in their logarithms."""
     (x0, y0), (x1, y1) = low, high
     if x0 == x1:
         return math.sqrt(y0 * y1)
@@ -84,7 +84,7 @@ PARTS = [0.3, 0.45, 0.65, 0.9, 1.1]
 
 
 def where_equal(fixed, runs):
-    """The fraction of the time, and the samples, at which these runs have the mean relMSE of the uniform ones."""
+    """Returns the time fraction and the samples at which adaptive `runs` reach the mean relMSE of the uniform renders."""
     goal = statistics.fmean(run[1] for run in fixed)
     points = [[statistics.fmean(run[1] for run in runs[part]), *(statistics.median(run[k] for run in runs[part]) for k in (0, 2))] for part in PARTS]
     above = [k for k in range(len(PARTS) - 1) if points[k + 1][0] < goal]
@@ -93,7 +93,8 @@ def where_equal(fixed, runs):
 
 
 def in_time(render, samples, seeds):
-    """Medians of the seconds and samples of both, their ratio, the relMSE that they share, and the jackknife standard error of the ratio."""
+    """Returns the seconds of adaptive and uniform sampling at equal relMSE, their ratio, the samples of both, the relMSE, and the jackknife
+standard error of the ratio."""
     render.run("reference.exr", ["--error", 0, "--samples", REFERENCE_TIMES * samples, "--seed", 999])
     fixed, runs = [], {part: [] for part in PARTS}
     for seed in range(1, seeds + 1):
@@ -114,7 +115,8 @@ def in_time(render, samples, seeds):
 
 
 def compared(render, error, seeds):
-    """Medians of the seconds and samples of both, their ratio, the relMSE that they share, and the error of the ratio."""
+    """Returns the seconds of adaptive and uniform sampling at equal relMSE, their ratio, the samples of both, the relMSE, and the standard
+error of the ratio."""
     _, samples = render.run("picture.exr", ["--error", error, "--samples", MOST])
     render.run("reference.exr", ["--error", 0, "--samples", min(MOST, max(1024, round(REFERENCE_TIMES * samples))), "--seed", 999])
     tried = {}

@@ -5,10 +5,10 @@
         [--integrator I] [--glimt BINARY]
 
 Each scene is rendered with N seeds and `error = E`. The spread of these images is the true noise of each tile: the RMS standard deviation
-of its pixels' luminance, over the larger of its mean and 1 % of the image's. Prints, relative to E: the RMS over all tiles, the RMS over
+of its pixels' luminance, divided by its mean, or by 1 % of the image's mean if that is larger. Prints, relative to E: the RMS over all tiles, the RMS over
 the tiles that needed more than 16 samples, and the largest tile; then the fraction of such tiles, the mean number of samples, the
-reported error over the true error of the whole image, and the remaining time shown at a quarter of the work over the true one (median of
-the seeds that took half a second or more). Defaults: all bundled scenes, E = 0.02, 8 seeds, 192 pixels along the longer side. Runs in the
+reported error over the true error of the whole image, and the ETA shown after a quarter of the work divided by the true remaining time (median
+over the seeds that took half a second or more). Defaults: all bundled scenes, E = 0.02, 8 seeds, 192 pixels along the longer side. Runs in the
 environment of ../mitsuba, which is created if it does not exist.
 """
 
@@ -31,7 +31,7 @@ WEIGHTS = (0.2126, 0.7152, 0.0722)
 
 
 def within_environment(program):
-    """Restarts in an environment with numpy and a reader of float images."""
+    """Restarts the program in an environment with numpy and Mitsuba, which reads float images."""
     sys.path.insert(0, str(HERE.parent / "mitsuba"))
     import run
 
@@ -60,7 +60,7 @@ def tiles(picture):
 
 
 def size_of(scene, side):
-    """Options for a number of pixels along the longer side."""
+    """Options that set the image size, given the number of pixels along the longer side."""
     with scene.open("rb") as file:
         own = tomllib.load(file).get("render", {})
     width, height = own.get("width", 640), own.get("height", 480)
@@ -94,7 +94,7 @@ def rendered(asked, scene, folder):
 
 
 def foretold(lines):
-    """The remaining time shown at a quarter of the render, over the true remaining time."""
+    """The ETA shown after a quarter of the render, divided by the true remaining time."""
     events = [json.loads(line) for line in lines.splitlines()]
     events = [event for event in events if event["event"] == "progress"]
     at = next((event for event in events if event["fraction"] >= 0.25 and event["eta_seconds"] is not None), None)
@@ -131,7 +131,7 @@ def row(asked, scene, folder):
 def main():
     asked = arguments()
     print(f"error = {asked.error}, {asked.side} pixels, {asked.seeds} seeds")
-    print(f"{'':18}{'all':>7}{'needed':>8}{'largest':>8}{'part':>8}{'samples':>9}{'told':>10}{'true':>10}{'ratio':>7}{'to go':>7}")
+    print(f"{'':18}{'all':>7}{'needed':>8}{'largest':>8}{'part':>8}{'samples':>9}{'reported':>10}{'true':>10}{'ratio':>7}{'ETA':>7}")
     for scene in asked.scenes or sorted((ROOT / "scenes").glob("*.toml")):
         with tempfile.TemporaryDirectory() as folder:
             row(asked, scene, Path(folder))

@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
-"""Measures renders in 1, 2, 4 and 8 parts: processor seconds, bytes of a part, seconds of the merge; extrapolates to 10,000 parts.
+"""Measures renders in 1, 2, 4 and 8 parts: processor seconds, bytes per part, merge seconds. Extrapolates to 10,000 parts.
 
     python3 benches/farm/run.py [--program target/release/glimt] [--rounds 3] [--large] [SCENE ...]
 
 Processor seconds are from the report's stages, so that other load on the machine matters little; each is the minimum of several rounds.
-`work` is `photons` and `render`, `set-up` is everything before, `write` is the encoding of the part. `slowest` is the part with the most
-work over the mean. --large measures only 2560 x 1600 pixels in 8 parts.
+`work` is `photons` and `render`, `set-up` is everything before, `write` is the encoding of the part. `slowest` is the largest work of a
+part divided by the mean. --large measures only 2560 x 1600 pixels in 8 parts.
 
-The efficiency of N parts is the processor time of a single run over that of all parts and their merge:
+The efficiency of N parts is the processor time of a single run divided by that of all parts and their merge:
 (set-up + work + write) / (N set-up + work + N write + merge), where the merge has a term proportional to the bytes of the image and one
 proportional to N. Work is distributed evenly over tiles of 32 x 32 pixels, and with photons over blocks of 16 passes: if there are more
 parts than tiles, some are empty; if there are more parts than blocks, several parts trace the photons of each block.
@@ -60,7 +60,7 @@ def part(program, scene, options, index, count, folder):
 
 
 def least(rounds, measure):
-    """The minimum of each figure."""
+    """Repeats a measurement; returns the minimum of each figure."""
     all_rounds = [measure() for _ in range(rounds)]
     return {name: min(figures[name] for figures in all_rounds) for name in all_rounds[0]}
 
@@ -77,7 +77,7 @@ def merged(program, count, rounds, folder):
     seconds = min(measured(command, folder) for _ in range(rounds))
     one = Path(folder) / "one.exr"
     same = not one.exists() or (Path(folder) / "merged.exr").read_bytes() == one.read_bytes()
-    assert same, "the merged image differs from a single run a single run"
+    assert same, "the merged image differs from a single run"
     return seconds
 
 
@@ -110,13 +110,13 @@ def table(scene, options, arguments, counts, folder):
 
 
 def foretell(single, last, opening):
-    """Prints the efficiency of up to 10,000 parts, for this image and for one whose work is a night on two cores. With photons, the
-    longer one has more passes."""
+    """Prints the efficiency of up to 10,000 parts, for this image and for a render with 16 hours of work. With photons, the longer
+    render has more passes."""
     print("\n| parts | efficiency | with 16 hours of work |\n| --- | --- | --- |")
     for count in FORETOLD:
         def of(work):
             alone = single["setup"] + work + single["write"]
-            # A nearly empty part is written in no time, but its set-up remains.
+            # A nearly empty part takes no time to write, but still needs the set-up.
             each = single["setup"] + last["write"] * last["count"] / max(count, last["count"])
             merge = last["merge"] + opening * count if count > 1 else 0.0
             again = max(1.0, count / (single["blocks"] * work / single["work"])) if single["blocks"] else 1.0

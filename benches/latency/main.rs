@@ -30,7 +30,7 @@ type BenchResult<T> = Result<T, Box<dyn Error>>;
 
 const COLUMNS: u16 = 120;
 const ROWS: u16 = 40;
-/// Measurements of each kind.
+/// Number of measurements per edit or key.
 const ROUNDS: usize = 7;
 /// Idle time after a save.
 const PAUSE: Duration = Duration::from_millis(300);

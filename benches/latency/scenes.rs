@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::BenchResult;
 
 /// A bundled scene and its edits. Each has a kind, the text to replace and the replacement, in which `{}`
-/// becomes a different number between 0.1 and 1 each time. An edit without `{}` darkens the texture file of
+/// stands for a new number between 0.1 and 1 each time. An edit without `{}` darkens the texture file of
 /// that name.
 pub struct EditedScene {
     pub name: &'static str,
@@ -141,7 +141,7 @@ impl SceneCopies {
         self.folder.path()
     }
 
-    /// Names of all bundled scenes.
+    /// Paths of the copies of all bundled scenes, sorted.
     pub fn all(&self) -> BenchResult<Vec<PathBuf>> {
         let entries = fs::read_dir(self.folder.path().join("scenes"))?.collect::<Result<Vec<_>, _>>()?;
         let mut paths: Vec<PathBuf> = entries.iter().map(fs::DirEntry::path).collect();

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Compares the means of image regions between glimt and Mitsuba 3, in standard errors and in percent.
+"""Compares the mean colors of image regions in glimt and Mitsuba 3: differences in percent, with standard errors.
 
     python benches/materials/means.py BINARY [SCENE...] [--samples N] [--pictures N] [--side PIXELS]
 

@@ -3,12 +3,12 @@
 
     python benches/materials/plastic.py
 
-Runs in an environment with mitsuba and numpy. E and T are what the coat reflects and transmits (single scattering, by quadrature over
-half vectors), and R is what it reflects from within:
+Runs in an environment with mitsuba and numpy. E and T are the coat's reflectance and transmittance (single scattering, integrated over
+half vectors), and R is its reflectance from inside:
 
 - glimt:   (1 - E(i))(1 - E(o)) kd / (pi eta^2 (1 - kd F)) with F = 1 - (1 - mean E)/eta^2, so that white reflects all light;
 - Mitsuba: T(i) T(o) kd / (pi eta^2 (1 - kd R)), which loses light that the coat scatters twice. Its R comes from a table; the last
-  column solves for the R of Mitsuba's red, and checks it with green and blue.
+column solves for R in Mitsuba's red channel, and checks it with green and blue.
 """
 
 import mitsuba as mi

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Compares metals under a sky and rough glass in front of a light between glimt and Mitsuba: processor seconds x error, and the ratio.
+"""Compares glimt with Mitsuba on metals under a sky and rough glass in front of a light: processor seconds x error, and the ratio.
 
     python3 benches/materials/run.py [SCENE...] [--rounds N] [--seeds N] [--samples N] [--glimt BINARY]...
 
-This is ../rooms/run.py with the scenes of this folder, metals.toml and glass.toml, or the given ones.
+Measures as ../rooms/run.py does, with metals.toml and glass.toml from this folder, or with the given scenes.
 """
 
 import os

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Measures tree construction over triangles that share a vertex, compared with separate ones.
+"""Measures tree construction over triangles that share a vertex, compared with separate triangles.
 
     python3 benches/memory/fans.py [--program target/release/glimt] [--triangles N,N] [--rounds 3]
 
-All triangles of a fan share one vertex, where no plane separates them. A soup has the same number of triangles of the same size at random
+All triangles of a fan share one vertex, so no plane separates them there. A soup has the same number of triangles of the same size at random
 positions. Prints the reported seconds of the tree (the minimum of several interleaved rounds) and the ratio of fan to soup.
 """
 
@@ -59,7 +59,7 @@ def soup(count):
 
 
 def rendered(program, accel, folder):
-    """Seconds of the tree."""
+    """Seconds spent building the tree."""
     report = folder / "report.json"
     command = [program, folder / "scene.toml", "--once", "--progress", "none", "--accel", accel, "--width", "32", "--height", "32",
                "--samples", "1", "-o", folder / "x.png", "--report", report]

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Measures the memory that previews take in large terminals: maximum resident memory, by kind of preview and window size.
+"""Measures the memory that previews use in large terminals: maximum resident memory for each kind of preview and window size.
 
     python3 benches/memory/previews.py [--program target/release/glimt]
 
-The terminal is a pseudo-terminal that answers at once and draws nothing. Half blocks show the memory without pixels.
+The terminal is a pseudo-terminal that answers queries immediately and draws nothing. Half blocks show the memory without pixels.
 """
 
 import argparse
@@ -32,7 +32,7 @@ def most_memory(process):
 
 
 def watched(program, preview, window, folder):
-    """Memory and bytes sent within some seconds of a render."""
+    """Returns the maximum memory, and the bytes sent during the first seconds of a render."""
     columns, rows, width, height = window
     master, slave = pty.openpty()
     fcntl.ioctl(slave, termios.TIOCSWINSZ, struct.pack("HHHH", rows, columns, columns * width, rows * height))

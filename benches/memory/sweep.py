@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Runs the program under limits of its address space, headless and in a pseudo-terminal.
+"""Runs the program with limits on its address space, headless and in a pseudo-terminal.
 
     python3 benches/memory/sweep.py [--program target/release/glimt] [--runs 200] [--csv FILE] [SCENE…]
 
-Every run must end with exit code 0, 1 or 2 (127 if the loader itself has no memory) and a message if the code is not 0, and must restore
+Every run must end with exit code 0, 1 or 2 (127 if the loader itself runs out of memory) and a message if the code is not 0, and must restore
 the terminal: keys are echoed, lines can be edited, the shell's screen is shown.
 """
 
@@ -45,7 +45,7 @@ def headless(program, scene, size, folder):
     if run.returncode not in ALLOWED and run.returncode != 127:
         faults.append(f"exit {run.returncode}")
     if run.returncode in (1, 2) and "error" not in run.stderr:
-        faults.append("no sentence")
+        faults.append("no error message")
     return run.returncode, faults, run.stderr.strip().splitlines()[-1:] or [""]
 
 
@@ -59,7 +59,7 @@ def in_terminal(program, scene, size, folder):
     while child.poll() is None and time.monotonic() - start < SECONDS:
         if select.select([master], [], [], 0.05)[0]:
             seen += os.read(master, 1 << 16)
-        # An image or an error is shown: quit.
+        # By now, an image or an error is shown: quit.
         if not asked and time.monotonic() - start > 2.5:
             os.write(master, b"q")
             asked = True
@@ -74,9 +74,9 @@ def in_terminal(program, scene, size, folder):
     if code not in ALLOWED and code != 127:
         faults.append(f"exit {code}")
     if after[3] & (termios.ECHO | termios.ICANON) != before[3] & (termios.ECHO | termios.ICANON):
-        faults.append("terminal raw")
+        faults.append("terminal left in raw mode")
     if seen.rfind(b"\x1b[?1049h") > seen.rfind(b"\x1b[?1049l"):
-        faults.append("alternate screen")
+        faults.append("alternate screen left on")
     os.close(master)
     os.close(slave)
     return code, faults, [seen[-120:].decode("utf-8", "replace")]

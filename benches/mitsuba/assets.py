@@ -2,12 +2,12 @@
 
 import numpy as np
 
-KNOT = (2048, 32)  # around along the strand, and about it: 131,072 triangles
+KNOT = (2048, 32)  # vertices along the strand and around it: 131,072 triangles
 SKY = (1024, 512)
 
 
 def directory(home):
-    """The folder of the files, which are generated if they do not exist. The names of the environment maps end in the renderer's."""
+    """Returns the folder of the files, which are generated if they do not exist. Environment maps end in the name of their renderer."""
     folder = home / "assets"
     if not folder.exists():
         unfinished = home / "assets.unfinished"
@@ -42,7 +42,7 @@ def knot(file):
     at = lambda i, j: (i % along) * about + j % about
     corners = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j), at(i + 1, j + 1), at(i, j + 1)]
     triangles = np.stack(corners, axis=-1).reshape(-1, 3)
-    # Facing outward, like the normals.
+    # Make the triangles face outward, like the normals.
     a, b, c = (vertices[triangles[:, k], :3] for k in range(3))
     if np.sum(np.cross(b - a, c - a) * vertices[triangles[:, 0], 3:]) < 0:
         triangles = triangles[:, ::-1]
@@ -55,7 +55,7 @@ def knot(file):
 
 
 def write(file, values):
-    """Bytes of sRGB, or linear floats."""
+    """Writes an image of sRGB bytes or linear floats."""
     import mitsuba as mi
 
     mi.Bitmap(np.ascontiguousarray(values)).write(str(file))
@@ -69,7 +69,7 @@ def board(file):
 
 
 def marble(file):
-    """Waves of several lengths that tile."""
+    """A tileable pattern of waves with several wavelengths."""
     y, x = np.mgrid[0:512, 0:512] / 512 * 2 * np.pi
     bent = np.sin(3 * x + 2 * np.sin(2 * y)) + 0.5 * np.sin(7 * y + np.sin(5 * x)) + 0.25 * np.sin(19 * x + 13 * y)
     share = (0.5 + bent / 3.5)[..., None]
@@ -77,7 +77,7 @@ def marble(file):
 
 
 def radiance(direction):
-    """A sky with a hazy sun, and a glowing ground below the horizon."""
+    """Radiance of a sky with a hazy sun and a faintly glowing ground."""
     sun = np.array([0.55, 0.5, 0.67])
     sun /= np.linalg.norm(sun)
     height = direction[..., 1:2]
@@ -98,6 +98,6 @@ def sky(for_mitsuba, for_glimt):
     ]:
         around, down = np.meshgrid(u * 2 * np.pi, v * np.pi)
         across = np.sin(down)
-        # From −z over +x.
+        # Columns start at −z and turn toward +x.
         direction = np.stack([across * np.sin(around), np.cos(down), -across * np.cos(around)], axis=-1)
         write(file, radiance(direction).astype(np.float32))

@@ -36,13 +36,13 @@ def rel_mse(picture, reference):
 
 
 class Mitsuba:
-    """One scene, loaded once."""
+    """A scene loaded into Mitsuba."""
 
     def __init__(self, scene, options):
         self.scene = mi.load_dict(scene.mitsuba(mi, assets.directory(HOME), options))
 
     def render(self, samples, seed):
-        """Seconds and the image; the caller has rendered once before, which compiles the kernel."""
+        """Returns the seconds and the image. The first render also compiles the kernel, so do not measure it."""
         start = time.perf_counter()
         image = mi.render(self.scene, spp=samples, seed=seed)
         dr.eval(image)
@@ -51,7 +51,7 @@ class Mitsuba:
 
 
 def reference(scene, renderer, render):
-    """The mean of many images of one renderer, stored in a file, even while incomplete. Delete the file when the
+    """The mean of many images of one renderer, cached in a file, even while incomplete. Delete the file when the
     renderer's results change."""
     count, samples = DIRECT_REFERENCE if scene.max_depth == 1 else PATH_REFERENCE
     key = hashlib.sha256(scene.toml(count, samples, assets.directory(HOME)).encode()).hexdigest()[:16]
@@ -68,7 +68,7 @@ def reference(scene, renderer, render):
 
 
 def glimt(binary, scene, samples, seed, options=()):
-    """Seconds of the stage `render`, and the image."""
+    """Returns the seconds of the render stage, and the image."""
     folder = HOME / "out"
     folder.mkdir(exist_ok=True)
     file, picture, report = folder / "scene.toml", folder / "picture.exr", folder / "report.json"
@@ -87,7 +87,7 @@ def spread(pictures):
 
 
 def compare(scene, binaries, rounds, by_spread):
-    """Print the rows of a scene."""
+    """Prints the rows of a scene."""
     ways = {"Mitsuba": {}, "only light samples": LIGHT_ALONE} if scene.max_depth == 1 else {"Mitsuba": {}}
     loaded = {name: Mitsuba(scene, options) for name, options in ways.items()}
     by_glimt = lambda binary, *more: lambda samples, seed: glimt(binary, scene, samples, seed, more)
@@ -122,19 +122,19 @@ def compare(scene, binaries, rounds, by_spread):
         if off is None:
             print(f"{scene.name}: no anchor")
         elif abs(off) > 0.1:
-            print(f"{scene.name}: no anchor, Mitsuba's relMSE is {off:+.0%} off {scene.anchor:.1e}")
+            print(f"{scene.name}: Mitsuba's relMSE differs by {off:+.0%} from the anchor {scene.anchor:.1e}")
     # The overall brightness reveals lost or doubled light, which noise hides in single pixels.
     if by_spread:
         own, glimts = np.mean(pictures[0], axis=0), np.mean(pictures[-2], axis=0)
     bias = np.mean(glimts) / np.mean(own) - 1
-    print(f"{scene.name:18}{'references':16}{'':9}{rel_mse(glimts, own):10.2e}  apart, mean {bias:+.3%}", flush=True)
+    print(f"{scene.name:18}{'references':16}{'':9}{rel_mse(glimts, own):10.2e}  difference, mean {bias:+.3%}", flush=True)
 
 
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("names", nargs="*", help="scenes whose name contains one of these")
-    parser.add_argument("--rounds", type=int, default=5, help="0: only make the references")
-    by_spread = "errors from the differences between the rounds' images, without references are apart, without references"
+    parser.add_argument("--rounds", type=int, default=5, help="0: only render the references")
+    by_spread = "compute errors from the differences between the rounds' images, without references"
     parser.add_argument("--spread", action="store_true", help=by_spread)
     parser.add_argument("--glimt", nargs="+", default=[ROOT / "target" / "release" / "glimt"])
     options = parser.parse_args()

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""Compares glimt with Mitsuba 3 (llvm, multijitter): seconds x relMSE of the same scenes, interleaved.
+"""Compares glimt with Mitsuba 3 (llvm, multijitter): seconds x relMSE of the same scenes, with interleaved renders.
 
     python3 benches/mitsuba/run.py [NAME...] [--rounds N] [--spread] [--glimt BINARY...]
 
-Errors are relative to references, which take minutes to make and are kept; `--spread` uses only the images of the rounds.
+Errors are relative to references, which take minutes to render and are cached; `--spread` uses only the images of the rounds.
 
 Creates its own environment in target/mitsuba: Mitsuba from pip, and Debian's LLVM from `apt-get download` unless DRJIT_LIBLLVM_PATH is
-set. glimt is target/release/glimt, which must be built; several binaries are compared.
+set. glimt is target/release/glimt, which must exist; with several binaries, all are measured.
 """
 
 import os

@@ -1,4 +1,4 @@
-"""The scenes, described once and exported to both renderers. Lengths are in scene units, angles in degrees, radiance is linear."""
+"""Scenes that are described once and exported to both renderers. Lengths are in scene units, angles in degrees, radiance is linear."""
 
 from dataclasses import dataclass, field
 
@@ -12,14 +12,14 @@ class Scene:
     """A camera, quads, boxes, spheres, meshes and lights."""
 
     name: str
-    # Mitsuba's relMSE at 256 samples, by which the scene is known to be the one that earlier figures are of; None: there are none
+    # Mitsuba's relMSE at 256 samples, which reveals whether the scene has changed since earlier figures; None if there are none
     anchor: float | None
     position: tuple
     look_at: tuple
     fov: float  # vertical
-    # name -> diffuse reflectance or the name of a picture, or (that, emitted radiance), or {"mirror": reflectance}, {"glass": ior}
+    # name -> diffuse reflectance or the name of a texture, or (that, emitted radiance), or {"mirror": reflectance}, {"glass": ior}
     materials: dict
-    max_depth: int = 1  # scatterings; 1: direct light, by the integrators that find no other
+    max_depth: int = 1  # bounces; 1: direct light, with integrators that compute nothing else
     aperture: float = 0.0  # radius of the lens
     focus: float = 0.0  # distance of the plane in focus
     quads: list = field(default_factory=list)  # corner, u, v, material; the front is along u x v
@@ -27,10 +27,10 @@ class Scene:
     spheres: list = field(default_factory=list)  # center, radius, material
     meshes: list = field(default_factory=list)  # file, scale, degrees about y, translation, material
     points: list = field(default_factory=list)  # position, intensity
-    environment: str | tuple | None = None  # name of a sky, or the same radiance everywhere
+    environment: str | tuple | None = None  # name of a sky map, or a constant radiance
 
     def toml(self, samples, seed, assets):
-        """For glimt."""
+        """The scene file for glimt."""
         integrator = "whitted" if self.max_depth == 1 else "path"
         lines = [
             f"[render]\nwidth = {SIZE}\nheight = {SIZE}\nsamples = {samples}\nseed = {seed}",
@@ -77,7 +77,7 @@ class Scene:
         """The scene for Mitsuba; `options` overrides the defaults of its integrator."""
         t = mi.ScalarTransform4f
         rgb = lambda value: {"type": "rgb", "value": list(value)}
-        # Its depth counts path edges, including the one at the camera.
+        # Mitsuba's depth counts path edges, including the one at the camera.
         integrator = {"type": "direct"} if self.max_depth == 1 else {"type": "path", "max_depth": self.max_depth + 1}
         lens = {"type": "perspective"}
         if self.aperture > 0:
@@ -113,7 +113,7 @@ class Scene:
                     return
             diffuse, emission = lobes(self.materials[material])
             if isinstance(diffuse, str):
-                # Its v = 0 is the top row.
+                # In Mitsuba, v = 0 is the top row.
                 upright = t().scale([1, -1, 1])
                 reflectance = {"type": "bitmap", "filename": str(assets / diffuse), "to_uv": upright}
             else:
@@ -147,7 +147,7 @@ class Scene:
 
 
 def lobes(material):
-    """Diffuse reflectance, or the picture of it, and emitted radiance."""
+    """The diffuse reflectance or the name of its texture, and the emitted radiance."""
     is_lamp = isinstance(material, tuple) and not isinstance(material[0], float)
     return material if is_lamp else (material, (0.0, 0.0, 0.0))
 

@@ -1,4 +1,4 @@
-"""The same with other programs: from a model to an image of 512 × 512 pixels, each run in a new process.
+"""Runs the model benchmark with other programs: a 512 × 512 image of a model, with a new process for each run.
 
     python3 -m venv others && others/bin/pip install f3d bpy
     others/bin/python benches/models/others.py MODEL [f3d] [blender]

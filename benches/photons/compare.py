@@ -4,8 +4,8 @@
 In the caustic scene, the pixels that show the balls are excluded. Mitsuba's path tracer renders the same scene with 256 samples; its
 error is inversely proportional to the samples. `large` is the caustic scene at 1074 x 1051 with 30 bounces and all of its pixels.
 
-References are two independent images a, b with photons of a small radius, made once: the expectation of (x - a)(x - b) is the squared
-error, whatever their noise. The mean is compared with path tracing, which is unbiased.
+References are two independent images a, b with a small photon radius, rendered once: the expectation of (x - a)(x - b) is the squared
+error, regardless of their noise. The mean is compared with path tracing, which is unbiased.
 """
 
 import argparse
@@ -36,7 +36,7 @@ GOAL = 1e-2
 
 
 class Subject:
-    """A scene, the pixels that count, and its references."""
+    """A scene, its references, and the pixels to compare."""
 
     def __init__(self, glimt, scene, size, reference_samples, masked, settings=()):
         self.glimt, self.scene, self.size, self.settings = glimt, scene, size, list(settings)
@@ -51,7 +51,7 @@ class Subject:
             self.used = self.render(1, 0, ["--view", "albedo"])[1].max(axis=2) > 0
 
     def render(self, samples, seed, options=(), sets=()):
-        """Seconds of the stages photons and render, and the image."""
+        """Returns the seconds of the photons and render stages, and the image."""
         file, picture, report = (self.folder / name for name in ("scene.toml", "picture.exr", "report.json"))
         by_photons = "--integrator" not in options
         text = self.scene.toml(samples, seed, "").replace('integrator = "path"', 'integrator = "whitted"')
@@ -66,7 +66,7 @@ class Subject:
         return sum(s["seconds"] for s in stages if s["name"] in ("photons", "render")), image.astype(np.float64)
 
     def kept(self, name, samples, seed, sets):
-        """An image that is made once."""
+        """A cached image, which is rendered if it does not exist."""
         file = self.folder / f"{name}-{samples}.npy"
         if not file.exists():
             np.save(file, self.render(samples, seed, (), sets)[1])
@@ -79,7 +79,7 @@ class Subject:
         return float(squares[self.used].mean())
 
     def brightness(self, picture):
-        """The mean of the pixels that count."""
+        """The mean of the compared pixels."""
         return float(picture[self.used].mean())
 
     def row(self, by, samples, seconds, errors, means, before=None):
@@ -95,7 +95,7 @@ class Subject:
         return error
 
     def noted(self, by, samples, seed, options):
-        """Renders, with a note on stderr, as the last renders take minutes."""
+        """Renders and reports the result on stderr, since the last renders take minutes."""
         seconds, picture = self.render(samples, seed, options)
         of = f"{self.rel_mse(picture):.3e} {self.brightness(picture):.5f}"
         print(f"{self.scene.name} {by} {samples} seed {seed}: {seconds:.2f} {of}", file=sys.stderr, flush=True)
@@ -114,7 +114,7 @@ class Subject:
 
 
 def mitsuba(subject, samples=256):
-    """Prints Mitsuba's path tracer, and the seconds that it needs to reach the goal."""
+    """Prints a row for Mitsuba's path tracer, and the seconds that it needs to reach the goal."""
     scene = mi.load_dict(subject.scene.mitsuba(mi, Path("."), {}))
     seconds, errors, means = [], [], []
     for seed in range(4):
@@ -122,17 +122,17 @@ def mitsuba(subject, samples=256):
         image = mi.render(scene, spp=samples, seed=seed)
         dr.eval(image)
         dr.sync_thread()
-        if seed > 0:  # the first is compiled as well
+        if seed > 0:  # the first render includes compilation
             seconds.append(time.perf_counter() - start)
             picture = np.array(image, dtype=np.float64)
             errors.append(subject.rel_mse(picture))
             means.append(subject.brightness(picture))
     error = subject.row("Mitsuba", samples, seconds, errors, means)
-    print(f"{subject.scene.name:12}Mitsuba needs {statistics.median(seconds) * error / GOAL:.1f} s to {GOAL}", flush=True)
+    print(f"{subject.scene.name:12}Mitsuba needs {statistics.median(seconds) * error / GOAL:.1f} s to reach {GOAL}", flush=True)
 
 
 def last_slope(subject, errors):
-    """The slope of the error over the last decade of passes, as far as rows exist."""
+    """Prints the slope of the error over the last decade of passes, or over fewer if there are fewer rows."""
     last = max(errors)
     first = min(errors, key=lambda passes: abs(math.log(10 * passes / last)))
     if first < last:
@@ -141,7 +141,7 @@ def last_slope(subject, errors):
 
 
 def powers(most):
-    """1, 2, 4, … samples."""
+    """The powers of two up to `most`."""
     return [1 << k for k in range(most.bit_length()) if 1 << k <= most]
 
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Compares photons with paths and Mitsuba: error against passes and seconds, and the mean of the image against path tracing.
+"""Compares photon mapping with path tracing and Mitsuba: error against passes and seconds, and the mean of the image.
 
     python3 benches/photons/run.py [caustic] [box] [large] [--seeds N] [--most SAMPLES | --passes N,N,…] [--side PIXELS]
         [--glimt BINARY]

@@ -26,7 +26,7 @@ const FORMAT_FLOAT3: c_int = 0x9003;
 const SCENE_FLAG_ROBUST: c_int = 1 << 2;
 const RAY_QUERY_FLAG_COHERENT: c_int = 1 << 16;
 
-/// Build quality.
+/// Embree's build quality.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quality {
     /// `RTC_BUILD_QUALITY_MEDIUM`, the default.
@@ -81,7 +81,7 @@ struct Arguments {
 
 type Handle = *mut c_void;
 
-/// Functions called for every ray.
+/// Embree functions called for every ray.
 #[derive(Clone, Copy)]
 struct Queries {
     intersect1: unsafe extern "C" fn(Handle, *mut RayHit, *const Arguments),
@@ -89,7 +89,7 @@ struct Queries {
     intersect16: unsafe extern "C" fn(*const c_int, Handle, *mut RayHit16, *const Arguments),
 }
 
-/// A loaded library.
+/// The loaded Embree library.
 pub struct Embree {
     /// Never unloaded, because Embree's threads outlive its devices.
     library: ManuallyDrop<Library>,
@@ -114,7 +114,7 @@ extern "C" fn count_memory(_user: *mut c_void, bytes: isize, _post: bool) -> boo
 }
 
 impl Embree {
-    /// Loads the library.
+    /// Loads Embree from `path`.
     pub fn load(path: &Path) -> Result<Self, libloading::Error> {
         // SAFETY: the user chose the library, and Embree's initializers have no preconditions.
         let library = unsafe { Library::new(path)? };
@@ -132,7 +132,7 @@ impl Embree {
     /// Looks up an API function.
     ///
     /// # Safety
-    /// `F` must be its type.
+    /// `F` must be the type of the function `name`.
     unsafe fn function<F>(&self, name: &str) -> Symbol<'_, F> {
         // SAFETY: the caller guarantees the type.
         unsafe { self.library.get(name.as_bytes()) }.unwrap_or_else(|error| panic!("{name}: {error}"))

@@ -6,7 +6,7 @@
 //! - `--embree LIB` compares with Embree 4, where `LIB` is the path of `libembree4.so`. Embree builds a
 //!   robust scene at medium quality. `--embree-isa avx512` enables AVX-512, which Embree needs for packets of
 //!   16; its single rays are faster with AVX2.
-//! - `--instructions NAME` only uses this instruction set for traversal.
+//! - `--instructions NAME` uses only this instruction set for traversal.
 //! - `--high` uses spatial splits (`Quality::High`), also in Embree.
 //! - `--build` measures only the build.
 //! - `--closest FILE` and `--any FILE` also time the rays in a file, for the closest or any hit.
@@ -185,8 +185,8 @@ fn measure(name: &str, mesh: &TriangleMesh, embree: Option<&Embree>, options: &B
     }
 }
 
-/// Times the rays in a file on one thread: one by one, and in file order sixteen at a time. Uses Embree's
-/// fastest mode.
+/// Times the rays in a file on one thread: one by one, and in packets of sixteen in file order. For
+/// Embree, the fastest mode counts.
 fn timed(tree: &WideBvh, scene: Option<&EmbreeScene<'_>>, rays: &[Ray], any_hit: bool) {
     let seconds = |rate: f64| rays.len() as f64 / 1e6 / rate;
     let mut single = |rays: &[Ray]| match any_hit {

@@ -16,8 +16,8 @@ use glimt::sampling::{CAMERA_PATH, Dimension, PixelSampler, warp};
 /// Image width and height, for a million rays.
 const SIDE: u32 = 1000;
 
-/// A closed bumpy ball with `rings` rings of `2 * rings` quads. Each quad has two triangles, except at the
-/// poles, where it has one.
+/// A closed bumpy ball of `rings` × `rings` quads, each split into two triangles. At the poles, one of the two
+/// is degenerate.
 pub fn rippled_ball(rings: u32) -> TriangleMesh {
     let columns = rings;
     let point = |ring: u32, column: u32| {
@@ -52,7 +52,7 @@ pub fn load(path: &Path) -> Result<TriangleMesh, String> {
     Ok(loaded.mesh)
 }
 
-/// Little endian: `u32` vertex count, `u32` triangle count, `f32` positions, `u32` indices.
+/// Parses a `.mesh` file in little endian: `u32` vertex count, `u32` triangle count, `f32` positions, `u32` indices.
 fn raw_mesh(bytes: &[u8]) -> io::Result<TriangleMesh> {
     let words: Vec<[u8; 4]> = bytes.as_chunks().0.to_vec();
     let short = || io::Error::new(io::ErrorKind::UnexpectedEof, "file too short for its counts");
@@ -70,7 +70,7 @@ fn raw_mesh(bytes: &[u8]) -> io::Result<TriangleMesh> {
     })
 }
 
-/// Three kinds of rays.
+/// Primary, diffuse and shadow rays.
 pub struct Rays {
     /// Primary rays from outside the mesh, in pixel order.
     pub primary: Vec<Ray>,

@@ -2,13 +2,13 @@
 
 Each round renders the scene with every program, interleaved, with two threads and a different seed for each image.
 
-- seconds: processor time of one image. For glimt, it is the time of the process minus a call that renders one pixel with one path, which
-  covers reading, acceleration structures and writing. For Mitsuba, it is only the render; a render before the first round compiles it.
+- seconds: processor time of one image. For glimt, it is the time of the process minus that of a run with one pixel and one sample, which
+covers reading, acceleration structures and writing. For Mitsuba, it is only the render; a render before the first round compiles it.
 - us/path: microseconds per sample of a pixel (a pass of photons counts as one).
-- error of a round: the variance of luminance between its images, over the reference's square plus 0.01, averaged over the pixels.
+- error of a round: the variance of luminance between its images, divided by the reference's square plus 0.01, averaged over the pixels.
   Photons have errors other than noise, so the mean square distance from the reference is used instead, also for Mitsuba's images; it
   includes the reference's own noise.
-- ratio: seconds x error over Mitsuba's, for all rounds together, and the smallest and largest of the rounds.
+- ratio: seconds x error divided by Mitsuba's, for all rounds together, and the smallest and largest of the rounds.
 - mean: the mean luminance of all images, and its difference from the reference's, with the standard error of the difference.
 """
 
@@ -43,7 +43,7 @@ class Way:
     samples: int
     is_mitsuba: bool = False
     by_reference: bool = False
-    rounds: list = field(default_factory=list)  # of lists of (seconds, luminance)
+    rounds: list = field(default_factory=list)  # for each round, a list of (seconds, luminance)
 
     def render(self, seeds):
         self.rounds.append([self.renderer.render(self.samples, seed) for seed in seeds])
@@ -66,7 +66,7 @@ class Way:
 
 
 def error(pictures, reference, by_reference):
-    """Error of the images, from the reference or from each other: half the mean square of a difference is the variance."""
+    """Error of the images, from the reference, or from the variance between them."""
     if by_reference:
         squares = np.mean([(picture - reference) ** 2 for picture in pictures], axis=0)
     else:
@@ -75,7 +75,7 @@ def error(pictures, reference, by_reference):
 
 
 def ways(scene, asked):
-    """Mitsuba first, then each binary with each integrator."""
+    """Returns the ways to render the scene: Mitsuba first, then each binary with each integrator."""
     found = [Way("Mitsuba path", Mitsuba(scene, asked.samples), asked.samples, is_mitsuba=True)]
     for binary in asked.glimt:
         name = Path(binary).name
@@ -88,7 +88,7 @@ def ways(scene, asked):
 
 
 def row(scene, way, mitsuba):
-    """The line of a way."""
+    """Formats the row of results for one way."""
     reference, by_reference = scene.luminance, way.by_reference
     seconds, spread = way.seconds(), way.error(reference, by_reference)
     paths = scene.width * scene.height * way.samples
@@ -105,7 +105,7 @@ def row(scene, way, mitsuba):
 
 
 def compare(scene, asked):
-    """Print the rows of a scene."""
+    """Prints the rows of a scene."""
     every = ways(scene, asked)
     for number in range(asked.rounds):
         # Every image of a scene has its own seed.
@@ -121,7 +121,7 @@ def compare(scene, asked):
 def at_least(least):
     def read(text):
         if int(text) < least:
-            raise argparse.ArgumentTypeError(f"at least {least}")
+            raise argparse.ArgumentTypeError(f"must be at least {least}")
         return int(text)
 
     return read
@@ -130,21 +130,21 @@ def at_least(least):
 def square(text):
     """Mitsuba's sampler rounds the number of samples up unless they form a grid."""
     if math.isqrt(int(text)) ** 2 != int(text):
-        raise argparse.ArgumentTypeError("a square, such as 16, 64, 256")
+        raise argparse.ArgumentTypeError("must be a square number, such as 16, 64 or 256")
     return int(text)
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("scenes", nargs="+", type=Path, metavar="SCENE")
-    parser.add_argument("--photons", action="store_true", help="also whitted with photons")
+    parser.add_argument("--photons", action="store_true", help="also measure whitted with photons")
     parser.add_argument("--rounds", type=at_least(1), default=5)
     parser.add_argument("--seeds", type=at_least(2), default=2, help="images per round")
-    parser.add_argument("--samples", type=square, default=64, help="of paths")
-    parser.add_argument("--passes", type=at_least(1), default=64, help="of photons")
+    parser.add_argument("--samples", type=square, default=64, help="samples per pixel for path tracing")
+    parser.add_argument("--passes", type=at_least(1), default=64, help="photon passes")
     parser.add_argument("--side", type=at_least(1), default=256, help="pixels along the longer side, for scene files")
     parser.add_argument("--reference", type=at_least(1), default=8192, help="samples of the reference, for scene files")
-    parser.add_argument("--glimt", action="append", help="the program; may be repeated")
+    parser.add_argument("--glimt", action="append", help="glimt binary; may be repeated")
     asked = parser.parse_args()
     asked.glimt = asked.glimt or [ROOT / "target" / "release" / "glimt"]
     dr.set_thread_count(THREADS)
@@ -153,7 +153,7 @@ def main():
         try:
             compare(subject(path, asked, HOME), asked)
         except Unknown as unknown:
-            sys.exit(f"{path}: Mitsuba is not told of {unknown}")
+            sys.exit(f"{path}: cannot convert {unknown}")
 
 
 main()

@@ -1,4 +1,4 @@
-"""Translates a scene file of glimt to Mitsuba's dictionary: diffuse, mirror, glass, panes, metal with `eta` and `k`, plastic, lights,
+"""Translates a glimt scene file to a scene dictionary for Mitsuba: diffuse, mirror, glass, panes, metal with `eta` and `k`, plastic, lights,
 textures, an environment, quads, boxes, spheres, disks, cylinders and meshes. Features without an equivalent, or not supported yet, end
 the translation with an error that names them."""
 
@@ -14,7 +14,7 @@ class Unknown(Exception):
 
 
 def known(table, where, *keys):
-    """The table, if it has only these keys."""
+    """Returns the table if it has only these keys. Otherwise raises `Unknown`."""
     more = sorted(set(table) - set(keys) - {"name"})
     if more:
         raise Unknown(f"{where}: {', '.join(more)}")
@@ -22,7 +22,7 @@ def known(table, where, *keys):
 
 
 def color(value):
-    """A number, three of them, or "#rrggbb", as linear light."""
+    """Converts a number, three numbers or "#rrggbb" to linear RGB."""
     if isinstance(value, str):
         if not value.startswith("#"):
             raise Unknown(f"the color {value}")
@@ -32,7 +32,7 @@ def color(value):
 
 
 def across(axis):
-    """Two directions that make a right-handed frame with this one."""
+    """A right-handed orthonormal frame whose third vector is the direction of `axis`."""
     axis = axis / np.linalg.norm(axis)
     first = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
     first /= np.linalg.norm(first)
@@ -48,7 +48,7 @@ def frame(x, y, z, origin):
 
 
 class Conversion:
-    """A scene file whose paths are relative to `folder`; files for Mitsuba are written to `made`."""
+    """Converts a scene file whose paths are relative to `folder`. Files for Mitsuba are written to `made`."""
 
     def __init__(self, mi, content, folder, size, made):
         known(content, "the scene", "render", "camera", "photons", "textures", "materials", "environment", "light", *SHAPES)
@@ -58,7 +58,7 @@ class Conversion:
         self.parts = {}
 
     def scene(self):
-        """The whole dictionary."""
+        """The dictionary of the scene for Mitsuba."""
         if any(color(self.render.get("background", 0))) and "environment" not in self.content:
             raise Unknown("[render] background, which lights nothing")
         # Mitsuba's depth counts path edges, including the one at the camera.
@@ -105,7 +105,7 @@ class Conversion:
         return {"type": "rgb", "value": color(value)}
 
     def texture(self, name):
-        """An image texture; v = 0 is Mitsuba's top row."""
+        """An image texture. In Mitsuba, v = 0 is the top row."""
         table = known(self.content["textures"][name], f"[textures.{name}]", "file", "filter", "wrap", "repeat", "encoding")
         u, v = table.get("repeat", [1, 1])
         return {
@@ -118,7 +118,7 @@ class Conversion:
         }
 
     def material(self, name):
-        """The BSDF, and the emission."""
+        """The BSDF and the emitter of a material."""
         table = self.content["materials"][name]
         where = f"[materials.{name}]"
         kind = table.get("type", "phong")
@@ -210,7 +210,7 @@ class Conversion:
         if "material" not in table:
             raise Unknown(f"{key}: the materials of {table['file']}")
         file = self.folder / table["file"]
-        # Mitsuba decides with an emitter's smooth normal which side emits, glimt with the triangle's normal.
+        # An emitter's smooth normal determines the emitting side in Mitsuba; in glimt, the triangle's normal does.
         is_lamp = self.material(table["material"])[1] is not None
         scale = table.get("scale", 1)
         scale = scale if isinstance(scale, list) else [scale] * 3
@@ -253,7 +253,7 @@ class Conversion:
     def sky(self, name):
         """Resamples the map at Mitsuba's texels: its rows run from pole to pole, whereas glimt's texels are centered in their cells.
 
-        The resolution is higher, so that each of glimt's texels is one of Mitsuba's and the interpolation in between is the same.
+        The resolution is higher, so that each glimt texel coincides with a Mitsuba texel and the interpolation between them is the same.
         """
         given = np.array(self.mi.Bitmap(str(self.folder / name)).convert(self.mi.Bitmap.PixelFormat.RGB, self.mi.Struct.Type.Float32, False))
         height, width = given.shape[:2]

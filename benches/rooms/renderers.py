@@ -1,4 +1,4 @@
-"""The two programs: each returns the processor seconds of an image, and its luminance."""
+"""Wrappers for both renderers. Each returns the processor seconds of an image, and its luminance."""
 
 import resource
 import statistics
@@ -14,7 +14,7 @@ THREADS = 2
 
 
 def luminance(picture):
-    """Luminance of linear Rec. 709."""
+    """Luminance of linear Rec. 709 colors."""
     return picture.astype(np.float64) @ np.array([0.2126, 0.7152, 0.0722])
 
 
@@ -34,7 +34,7 @@ class Mitsuba:
 
 
 class Glimt:
-    """A binary with options."""
+    """A glimt binary with a scene and options."""
 
     def __init__(self, binary, scene, folder, options):
         folder.mkdir(parents=True, exist_ok=True)
@@ -43,7 +43,7 @@ class Glimt:
         call = [binary, scene.file, "--once", "-o", self.picture, "--progress", "none", "--threads", THREADS, *size]
         self.call = [str(word) for word in call]
         self.options = options
-        # One pixel with one path: everything except rendering.
+        # Render one pixel with one path to measure everything except rendering.
         one = ["--samples", "1", "--crop", "0,0,1,1", "--integrator", "path"]
         self.set_up = statistics.median(self.seconds(one) for _ in range(5))
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Compares glimt with Mitsuba on realistic scenes, interleaved: processor seconds x error, and the ratio.
+"""Compares glimt with Mitsuba on realistic scenes, with interleaved renders: processor seconds x error, and the ratio.
 
     python3 benches/rooms/run.py SCENE... [--photons] [--rounds N] [--seeds N] [--samples N] [--passes N] [--side PIXELS]
         [--glimt BINARY]...

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Prints where the time of a scene goes: microseconds of processor time per path and stage.
+"""Prints the processor time of each rendering stage, in microseconds per path.
 
     cargo build --profile profiling
     python3 benches/rooms/stages.py SCENE... [--glimt target/profiling/glimt] [--samples N] [--side PIXELS]
@@ -15,22 +15,22 @@ import tempfile
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent.parent
-RATE = 2000  # samples a second
+RATE = 2000  # profile samples per second
 
 # Substrings of function names, searched from the innermost frame outward; the first stage with a match counts.
 STAGES = [
-    ("glass", ["crossing", "contact", "isolated", "meeting", "touch_error", "specular", "near_shape", "encloses"]),
+    ("glass", ["crossing", "contact", "isolated", "touch_error", "specular", "near_shape", "encloses"]),
     ("lights: picks", ["pick_flat", "pick_by_cuts", "picks", "single_node_importance", "move_to", "samples_at"]),
     ("lights: samples", ["sample_row", "sample_per_lane", "light_pdf", "inverse_pdf"]),
     ("shadow rays", ["occluded", "any_packet", "any_rows", "any_avx", "any_in_small", "single::any", "packet::any", "pool", "is_hit", "doubtful_hit", "add_unoccluded"]),
-    ("closest hits", ["facets", "closest", "single::nearest", "packet::nearest", "intersect_at_start", "in_f64", "alone", "nearer", "packet::Closest", "merged::rays"]),
-    ("surfaces", ["fill_surfaces", "fill_other_surfaces", "surface", "facet", "set_positions", "set_bsdf", "packet::Meeting"]),
+    ("closest hits", ["facets", "closest", "single::nearest", "packet::nearest", "intersect_at_start", "edge_functions_f64", "alone", "update_nearest", "packet::Closest", "merged::rays"]),
+    ("surfaces", ["fill_surfaces", "fill_other_surfaces", "surface", "facet", "set_positions", "set_smooth_normals", "PacketIntersection"]),
     ("textures", ["lookup", "texture"]),
     ("direct light", ["sample_all", "sample_pick", "SampleAllLights", "SampleLightTree", "contributions", "response"]),
     ("directions", ["scatter", "sample_diffuse", "lobes"]),
     ("random numbers", ["sampler", "scrambled", "pairs", "sobol"]),
     ("camera", ["camera"]),
-    ("queues and film", ["render_tile", "wave", "queues", "film", "lit_queue", "lit_row", "memmove", "memcpy", "memset"]),
+    ("queues and film", ["render_tile", "Wavefront", "queues", "film", "direct::queue", "memmove", "memcpy", "memset"]),
 ]
 # Everything except the render: reading, acceleration structures, writing.
 SETUP = ["glimt_files", "glimt_scene", "build", "png", "deflate", "miniz", "blake3", "ld-linux", "dl_", "page", "clap"]
@@ -82,7 +82,7 @@ def stage(names):
 
 
 def measure(scene, asked):
-    """Print the stages of a scene."""
+    """Prints the stages of a scene."""
     with tempfile.TemporaryDirectory() as folder:
         profile = f"{folder}/profile"
         render = [asked.glimt, scene, "--once", "--integrator", "path", "--threads", "1", "--progress", "none"]
@@ -97,7 +97,7 @@ def measure(scene, asked):
     microseconds = lambda count: 1e6 * count / RATE / paths
     setup = totals.pop("reading, trees, writing", 0)
     whole = sum(totals.values())
-    print(f"{Path(scene).parent.name}/{Path(scene).name}: {microseconds(whole):.3f} us/path, before and after it {setup / RATE:.2f} s")
+    print(f"{Path(scene).parent.name}/{Path(scene).name}: {microseconds(whole):.3f} us/path, setup and writing {setup / RATE:.2f} s")
     for title, count in totals.most_common():
         print(f"  {title:18}{microseconds(count):8.3f} us {count / whole:6.1%}")
 

@@ -1,4 +1,4 @@
-"""The scenes to render: for either program, with size and reference."""
+"""The scenes to render with both programs, with their sizes and references."""
 
 import hashlib
 import importlib.util
@@ -15,7 +15,7 @@ CHUNK = 64
 
 
 def subject(path, asked, home):
-    """A scene file, or a folder with one."""
+    """Returns the subject for a scene file, or for a folder with a scene."""
     return Folder(path) if path.is_dir() else File(path, asked.side, asked.reference, home)
 
 
@@ -38,7 +38,7 @@ class Folder:
 
 
 class File:
-    """A scene file of glimt; Mitsuba renders a translation of it, and the reference."""
+    """A glimt scene file. Mitsuba renders its translation and the reference."""
 
     def __init__(self, path, side, samples, home):
         self.name, self.file = path.stem, path
@@ -56,12 +56,12 @@ class File:
         return Conversion(mi, self.content, self.file.parent, (self.width, self.height), self.folder).scene()
 
     def reference(self, samples):
-        """The mean of many renders by Mitsuba, kept as long as the scene and its files do not change."""
+        """The mean of many renders by Mitsuba, cached until the scene or its files change."""
         import mitsuba as mi
 
         file = self.folder / f"{self.name}-{self.fingerprint()}-{samples}.npy"
         if not file.exists():
-            print(f"{self.name}: the reference, {samples} samples", flush=True)
+            print(f"{self.name}: rendering the reference, {samples} samples", flush=True)
             scene, total = mi.load_dict(self.mitsuba(mi)), 0.0
             count = -(-samples // CHUNK)
             for number in range(count):

@@ -11,10 +11,10 @@
 
 mod pairs;
 #[path = "../stress/row.rs"]
-#[allow(dead_code, reason = "rows are only used by the stress table")]
+#[allow(dead_code, reason = "rows are used only by the stress table")]
 mod row;
 #[path = "../stress/run.rs"]
-#[allow(dead_code, reason = "results are only used by the stress table")]
+#[allow(dead_code, reason = "results are used only by the stress table")]
 mod run;
 
 use std::process::{Command, ExitCode};
@@ -22,7 +22,7 @@ use std::process::{Command, ExitCode};
 use pairs::FeaturePair;
 use row::SceneFiles;
 
-/// Maximum deviation of a ratio from 1.
+/// Maximum deviation of the instruction or time ratio from 1.
 const BOUND: f64 = 0.01;
 
 /// Width, height and samples. A render takes a fifth of a second.
@@ -60,7 +60,7 @@ fn main() -> ExitCode {
     ExitCode::from(u8::from(faulty))
 }
 
-/// Results for one pair.
+/// Results for one pair of scenes.
 struct PairResult {
     /// Minimum seconds without the feature.
     seconds: f64,

@@ -49,7 +49,7 @@ const LAMP: &str = "[materials.lamp]\nemission = 5\n[[quad]]\ncorner = [-0.5, 3,
 
 const PICTURE: &str = "P3 2 2 255 90 120 200 20 30 40 255 250 200 70 70 80";
 
-/// All pairs at this image size.
+/// All pairs, with the given image size and samples per pixel.
 pub(crate) fn pairs([width, height, samples]: [u32; 3]) -> Vec<FeaturePair> {
     let scene = |render: &str, camera: &str, ball: &str, rest: &str| {
         let size = [("WIDTH", width), ("HEIGHT", height), ("SAMPLES", samples)];

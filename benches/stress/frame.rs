@@ -31,12 +31,12 @@ impl Frame {
         format!("[{:?}, {:?}, {:?}]", at_x + x, at_y + y, at_z + z)
     }
 
-    /// The vector from one point to another.
+    /// An edge or offset vector: scaled, but not moved.
     pub(crate) fn way(self, x: f64, y: f64, z: f64) -> String {
         Self { at: [0.0; 3], ..self }.point(x, y, z)
     }
 
-    /// A length.
+    /// A scaled length.
     pub(crate) fn length(self, x: f64) -> String {
         format!("{:?}", x * self.unit)
     }

@@ -1,8 +1,8 @@
 //! Stress tests: compares extreme scenes with plain reference scenes of known result or cost.
 //!
 //! `cargo bench --bench stress` renders all cases, prints the table and writes it to
-//! `benches/stress/table.md`; `-- WORD` only prints the rows that contain the word. The exit code is 1 if a
-//! row exceeds its bound.
+//! `benches/stress/table.md`; `-- WORD` prints only the rows whose name contains the word. The exit code
+//! is 1 if a row exceeds its bound.
 
 #![allow(clippy::print_stdout)]
 

@@ -24,9 +24,9 @@ pub(crate) struct Rendered {
     pub(crate) report: serde_json::Value,
 }
 
-/// Results for one row.
+/// Measured results for one table row.
 pub(crate) struct RowResult {
-    /// The worst value.
+    /// The largest error of all pairs.
     pub(crate) figure: f64,
     pub(crate) non_finite: u64,
     /// Total seconds of the cases and of their references.
@@ -39,7 +39,7 @@ impl RowResult {
         self.figure <= row.bound && self.non_finite == 0
     }
 
-    /// The row's faults.
+    /// The reasons why the row fails.
     pub(crate) fn faults(&self, row: &StressRow) -> Vec<&'static str> {
         let slower = self.seconds[0] / self.seconds[1];
         let faults = [

@@ -74,7 +74,7 @@ const fn mode(
     DisplayMode { name, preview, depth, symbols, colors }
 }
 
-/// Prints a table for the bundled scenes.
+/// Prints the fidelity of every display mode for several bundled scenes.
 pub(crate) fn print() -> Result<(), Box<dyn Error>> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/pictures");
     println!("\nerror in {}×{} cells, sharp and blurred; chafa in parentheses", WINDOW.width, WINDOW.height);

@@ -45,7 +45,7 @@ pub(crate) fn print() -> Result<(), Box<dyn Error>> {
     let socket = format!("glimt-bench-{}", std::process::id());
     let tmux = ["tmux", "-L", &socket, "-f", settings, "new-session"];
     let line = follow(&[&tmux, &render[..], WAYS[0].1].concat(), folder.path());
-    // The server exits with its last session.
+    // Ignore errors: the server exits with its last session.
     let _ = std::process::Command::new("tmux").args(["-L", &socket, "kill-server"]).output();
     println!("{:<14} {}", "through tmux", line?);
     Ok(())

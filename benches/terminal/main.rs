@@ -128,7 +128,7 @@ fn replay(edit: &Edit, columns: u16, rows: u16) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// A terminal to which both glimt and ratatui draw.
+/// A window that both glimt and plain ratatui draw.
 struct Window {
     area: Rect,
     painter: Painter,

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Records an animation of glimt next to an editor: save, see.
+"""Records an animation of glimt next to an editor: each save updates the preview.
 
     python3 benches/terminal/moving.py [-o FILE] [--glimt BINARY] [--frames FOLDER]
 
 The default output is assets/pictures/save.png, an animated PNG. The scene is the one that `glimt new` writes, with 16 samples per pixel.
-vim and glimt run in two panes of tmux; the script types into vim and captures both screens ten times per second. Times after a save are
-the program's own; still periods are cut to 1.6 s, a typed letter to 0.08 s. --frames also writes each frame as a file. Needs tmux, vim,
+vim and glimt run in two panes of tmux; the script types into vim and captures both screens ten times per second. Delays after
+a save are real; unchanged screens are cut to 1.6 s, and typed letters to 0.08 s. --frames also writes each frame as a file. Needs tmux, vim,
 Pillow, and the font DejaVu Sans Mono.
 """
 
@@ -63,7 +63,7 @@ class Stage:
         self.taken.append((time.monotonic(), most, (screens, int(x), int(y))))
 
     def watch(self, seconds, word=None):
-        """Captures screens for a time, and then until glimt shows the text."""
+        """Captures screens for `seconds`, and then until glimt shows `word`."""
         end = time.monotonic() + seconds
         while time.monotonic() < end or word and word not in self.call("capture-pane", "-p", "-t", "0.1"):
             self.take(STILL)
@@ -95,7 +95,7 @@ def play(folder, glimt):
 
 
 def frame(screens, x, y):
-    """Both panes side by side, with the cursor's cell in reverse."""
+    """Draws both panes side by side, with the cursor's cell in reverse video."""
     panes = [drawn(text, columns, ROWS) for text, columns in zip(screens, (EDITOR, PICTURE))]
     place = (x * WIDTH, y * HEIGHT, (x + 1) * WIDTH, (y + 1) * HEIGHT)
     panes[0].paste(ImageChops.invert(panes[0].crop(place)), place)
@@ -107,7 +107,7 @@ def frame(screens, x, y):
 
 
 def told(taken):
-    """Distinct frames, each with its duration in milliseconds."""
+    """Returns the distinct frames and their durations in milliseconds."""
     frames, times = [], []
     for index, (at, most, seen) in enumerate(taken):
         image = frame(*seen)
@@ -125,7 +125,7 @@ def main():
     asked = arguments()
     with tempfile.TemporaryDirectory() as folder:
         frames, times = told(play(folder, asked.glimt))
-    # One palette for all frames, from the first to the last.
+    # Compute one palette for all frames from a dozen of them.
     some = frames[:: max(1, len(frames) // 12)]
     strip = Image.new("RGB", (frames[0].width, frames[0].height * len(some)))
     for index, image in enumerate(some):

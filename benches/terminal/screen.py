@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Draws a screenshot of glimt in a tmux terminal as an image.
+"""Saves a screenshot of glimt in a tmux terminal as an image.
 
     python3 benches/terminal/screen.py [SCENE] [--columns N] [--rows N] [--keys KEYS] [-o FILE] [--glimt BINARY]
 
@@ -39,7 +39,7 @@ def arguments():
 
 
 def shown(asked):
-    """The text of the terminal, with color sequences."""
+    """Returns the text of the terminal, with color sequences."""
     with tempfile.TemporaryDirectory() as folder:
         tmux = ["tmux", "-S", f"{folder}/socket", "-f", "/dev/null"]
 
@@ -71,7 +71,7 @@ def wait(call):
 
 
 def color(words):
-    """The color encoded by a sequence's numbers, and how many numbers it takes."""
+    """Returns the color encoded in an SGR sequence, and how many numbers encode it."""
     if words[1] == 2:
         return tuple(words[2:5]), 5
     index = words[2]
@@ -84,7 +84,7 @@ def color(words):
 
 
 def styled(text):
-    """Characters with their colors, which persist from line to line."""
+    """Yields characters with their colors, which persist from line to line."""
     ink, paper, is_bold, is_turned = *PLAIN, False, False
     for piece in re.split(r"(\x1b\[[0-9;]*m)", text):
         if not piece.startswith("\x1b["):

@@ -122,7 +122,7 @@ fn errors_repeat_and_references_are_cached() {
     assert_eq!(errors(&json(&dir, "c.json")), errors(&a));
     dir.write("box.toml", SCENE.replace("0.6, 0.6, 0.5", "0.6, 0.6, 0.4"));
     bench(&dir, &format!("{line} d.json"), 0);
-    assert!(!is_cached(&json(&dir, "d.json")), "another scene");
+    assert!(!is_cached(&json(&dir, "d.json")), "a changed scene needs another reference");
     assert_eq!(kept().count(), 2);
     bench(&dir, &format!("{line} e.json --no-cache"), 0);
     assert!(

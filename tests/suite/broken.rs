@@ -586,20 +586,20 @@ fn eight_bit_colors_get_a_hex_suggestion() {
         assert!(found.help.as_ref().is_some_and(|help| help.starts_with("write \"#a0a0a0\"")), "{found:?}");
     }
     let text = scene("phong", "emission").replace("[160", "[16");
-    assert!(!text.is_empty() && diagnostics_of(&text).is_empty(), "radiance may be any");
+    assert!(!text.is_empty() && diagnostics_of(&text).is_empty(), "radiance may exceed 1");
     let text = scene("phong", "diffuse").replace("[160, 15, 12]", "[2, 0, 0]");
     let said = diagnostics_of(&text);
     assert!(said.len() == 1 && said[0].severity == Severity::Warning, "{said:?}");
     assert!(!said[0].place.as_ref().is_some_and(|place| place.label.contains("255")));
 }
 
-/// The message, column and help for a value of a key.
 #[test]
 fn lists_in_other_syntax_get_a_suggestion() {
     let open = "`[` opened here is not closed";
     let brackets = "lists use square brackets: write [0, 3, 3]";
     let write = Some("write [0, 3, 3]");
     let close = Some("expected `]`");
+    // Values of `position` with the expected message, column and help.
     for (value, message, column, help) in [
         ("(0, 3, 3)", brackets, 12, None),
         ("(0 3 3) # where", brackets, 12, None),

@@ -23,7 +23,7 @@ const SIZES: [(Rect, PreviewSize); 3] = [
 /// Width and height of the film. Larger images have less noise in their previews.
 const FILM: u32 = 320;
 
-/// Renders scenes one after another.
+/// Renders previews of scenes, one scene after another.
 struct PreviewRenderer {
     handle: Handle,
     preview: PreviewSize,
@@ -37,8 +37,8 @@ impl PreviewRenderer {
         Self { handle, preview, generation: 0, folder: tempfile::tempdir().expect("a temporary folder") }
     }
 
-    /// The last preview of a scene. If `samples` is `None`, the coarse preview with one sample per preview
-    /// pixel.
+    /// Returns the last preview of a scene. If `samples` is `None`, this is the coarse preview with one sample
+    /// per preview pixel.
     fn preview(&mut self, scene: &str, samples: Option<u32>) -> Picture {
         let path: PathBuf = self.folder.path().join("scene.toml");
         std::fs::write(&path, scene).expect("written");
@@ -172,7 +172,7 @@ fn changed(a: &Picture, b: &Picture) -> usize {
     tops.filter(|i| is_off(*i) || is_off(i + width)).count()
 }
 
-/// Shows a whole render on the screen. Returns the number of bytes for the first preview and for all
+/// Shows all previews of a render. Returns the number of bytes for the first preview and for all
 /// previews.
 fn through(screen: &mut PaintedScreen, pictures: &[(Picture, Fidelity)]) -> (usize, usize) {
     let sent: Vec<usize> =

@@ -81,7 +81,10 @@ fn kill_at_any_time(times: u32) {
                 continue;
             }
             // The render finished before the kill, so start over.
-            assert!(dir.bytes("out.exr") == dir.bytes("one.exr"), "{method}: neither");
+            assert!(
+                dir.bytes("out.exr") == dir.bytes("one.exr"),
+                "{method}: neither the old nor the finished image"
+            );
             dir.write("out.exr", "the image before");
             let _ = fs::remove_file(dir.path("out.exr.checkpoint"));
         }
@@ -110,7 +113,7 @@ fn kill_while_it_writes(times: u32) {
     let line = "room.toml --once --progress none -o out.exr --checkpoint 0.000001 --samples 100000 --resume";
     for round in 0..times {
         let child = begin(&dir, line);
-        // On a busy machine, the first checkpoint may take longer than the other kills are apart.
+        // On a busy machine, the first checkpoint may take longer than the time until the kill.
         while round == 0 && !dir.path("out.exr.checkpoint").exists() {
             std::thread::sleep(Duration::from_millis(1));
         }
@@ -314,7 +317,7 @@ fn checkpoints_are_used_only_with_resume() {
     let child = begin(&dir, "room.toml --once --progress none -o other.exr --samples 100000 --checkpoint 0");
     std::thread::sleep(Duration::from_millis(300));
     assert_eq!(end(child, Signal::SIGTERM), Some(143));
-    assert!(!dir.path("other.exr.checkpoint").exists(), "0 is never");
+    assert!(!dir.path("other.exr.checkpoint").exists(), "0 must disable checkpoints");
 }
 
 /// Waits until a file exists.
@@ -368,7 +371,7 @@ fn running_process_keeps_its_checkpoint() {
 #[test]
 fn full_disk_reports_the_checkpoint_once() {
     let dir = room_dir();
-    // In 512-byte blocks. A checkpoint takes 150 kB, the image 8 kB.
+    // `ulimit -f` counts 512-byte blocks. A checkpoint takes 150 kB, the image 8 kB.
     let limited = |blocks: u32, line: &str| {
         let program = dir.glimt("").get_program().to_owned();
         let mut shell = std::process::Command::new("sh");

@@ -7,7 +7,7 @@ use glimt::scene::description::{Camera, Scene};
 use glimt::scene::diagnostic::{Diagnostic, Severity};
 use glimt::scene::{parse, starter};
 
-/// Guarantee about a key.
+/// Whether a key is optional, and whether its example value is the default.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Promise {
     /// Optional. The default is the example value.
@@ -20,7 +20,7 @@ enum Promise {
 
 use Promise::{Default, Other, Required};
 
-/// Key name, example value, and guarantee.
+/// Key name, example value, and whether it is required.
 type KeyContract = (&'static str, &'static str, Promise);
 
 /// All tables with their keys and example values.
@@ -293,7 +293,7 @@ const TABLES: &[(&str, &[KeyContract])] = &[
     ),
 ];
 
-/// Other elements that the materials refer to.
+/// A texture that the materials refer to.
 const BUMPS: &str = "[textures.bumps]\nfile = \"textures/bumps.png\"\n";
 
 /// A directory with every file that the example refers to, and the path of the scene in it.
@@ -549,7 +549,7 @@ fn starter_lines_can_be_uncommented() {
             || text.contains(" = ") && name.chars().all(|c| c.is_ascii_lowercase() || c == '_')
     };
     let uncommented = |line: &str| match line.strip_prefix("# ") {
-        // These keys exclude other keys.
+        // These keys conflict with other keys.
         Some(text) if is_key(text) && !["orbiter", "matrix"].iter().any(|key| text.starts_with(key)) => {
             format!("{text}\n")
         }

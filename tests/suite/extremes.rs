@@ -10,7 +10,7 @@ const MIRROR: &str = "type = \"mirror\"\nreflectance = [1, 1, 1]";
 const GLASS: &str = "type = \"glass\"\nior = 1.5";
 const CAMERA: &str = "position = [0, 1, 4]\nlook_at = [0, 1, 0]";
 const LAMP: &str = "[[light]]\ntype = \"point\"\nposition = [1, 3, 2]\nintensity = [10, 10, 10]\n";
-/// Much longer than any of these scenes takes.
+/// Limit on peak memory, far above the needs of these scenes.
 const MEMORY_BYTES: u64 = 400 << 20;
 
 fn sphere(center: &str, radius: &str) -> String {

@@ -1,4 +1,4 @@
-//! What writing files must preserve: files not written by glimt, and file attributes.
+//! Protection of files that glimt did not write, and of the attributes of files that it replaces.
 
 use std::fs;
 use std::os::unix::fs::{MetadataExt, PermissionsExt};
@@ -206,7 +206,7 @@ fn default_acl_never_widens_permissions() {
     assert_eq!(attribute(&dir.path("a.png"), ACCESS), None);
     assert_eq!(fs::metadata(dir.path("a.png")).expect("a file").mode() & 0o777, 0o640);
     dir.expect("ball.toml --once -o new.png", 0);
-    assert!(attribute(&dir.path("new.png"), ACCESS).is_some(), "a new file has the folder's");
+    assert!(attribute(&dir.path("new.png"), ACCESS).is_some(), "a new file inherits the folder's list");
 }
 
 #[test]

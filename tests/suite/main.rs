@@ -1,4 +1,4 @@
-//! Tests of the whole program, in a single crate that links only once.
+//! Tests of the whole program, in a single crate so that the program is linked only once.
 
 mod architecture;
 mod bench;

@@ -52,7 +52,10 @@ fn tetrahedron_looks_the_same_in_every_format() {
             picture(&dir, &mesh)
         };
         let expected = of("a.off");
-        assert!(expected.iter().any(|value| (value - expected[0]).abs() > 0.1), "it is seen");
+        assert!(
+            expected.iter().any(|value| (value - expected[0]).abs() > 0.1),
+            "the tetrahedron must be visible"
+        );
         for file in ["a.ply", "a.obj", "a.stl", "b.STL"] {
             assert!(of(file) == expected, "{file}, smooth = {smooth}");
         }

@@ -23,7 +23,7 @@ fn own() -> i32 {
     of_thread(&stat).expect("a nice value").1
 }
 
-/// `own` plus `steps`, up to the system's limit.
+/// The inherited nice value plus `steps`, up to the system's limit.
 pub(crate) fn raised(steps: i32) -> i32 {
     (own() + steps).min(19)
 }

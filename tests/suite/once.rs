@@ -33,7 +33,7 @@ fn outputs_resolve_to_scene_or_working_directory() {
     assert!(dir.path("none.png").is_file());
     dir.expect("scenes/own.toml --once -o call.png", 0);
     assert!(dir.path("call.png").is_file());
-    assert_eq!(fs::read_dir(dir.path("scenes")).expect("a folder").count(), 3, "nothing else is beside it");
+    assert_eq!(fs::read_dir(dir.path("scenes")).expect("a folder").count(), 3, "no image next to the scene");
 }
 
 #[test]
@@ -405,7 +405,7 @@ fn signal_during_the_write_keeps_the_render() {
         let leftover = |entry: std::io::Result<fs::DirEntry>| {
             entry.expect("an entry").file_name().to_string_lossy().ends_with(".tmp")
         };
-        assert!(!fs::read_dir(dir.0.path()).expect("a folder").any(leftover), "no temporary file");
+        assert!(!fs::read_dir(dir.0.path()).expect("a folder").any(leftover), "temporary files remain");
         if checkpoint.exists() {
             dir.expect(&render.replace("json", "none --resume"), 0);
         }
@@ -473,7 +473,7 @@ fn signals_set_the_exit_code_and_keep_the_image() {
         assert_eq!(child.wait().expect("it ends").code(), Some(code), "{name}");
         assert_eq!(fs::read(dir.path("ball.png")).expect("there"), b"the old one");
         assert!(dir.path("ball.png.checkpoint").is_file());
-        assert_eq!(fs::read_dir(dir.0.path()).expect("a folder").count(), 3, "no temporary file");
+        assert_eq!(fs::read_dir(dir.0.path()).expect("a folder").count(), 3, "temporary files remain");
     }
 }
 
@@ -549,5 +549,5 @@ fn wait_for(child: &mut std::process::Child, is_it: impl Fn(&str) -> bool + Send
             }
         }
     });
-    said.recv_timeout(Duration::from_secs(30)).expect("it says so");
+    said.recv_timeout(Duration::from_secs(30)).expect("the expected line");
 }

@@ -157,7 +157,7 @@ fn depth_limits_the_rays() {
 }
 
 #[test]
-fn size_samples_and_time() {
+fn size_samples_and_time_are_applied() {
     let dir = room();
     let report = dir.report("room.toml --width 7 --height 5 --samples 9 -o a.png");
     assert_eq!((&report["image"]["width"], &report["image"]["height"]), (&7.into(), &5.into()));
@@ -415,7 +415,7 @@ fn dash_is_standard_output() {
     let (mut ours, theirs) = UnixStream::pair().expect("a socket");
     let mut command = dir.glimt("ball.toml --once --report - --progress none");
     let mut child = command.stdout(OwnedFd::from(theirs)).spawn().expect("it runs");
-    // The command holds the other end open.
+    // Close this process's copy of the other end.
     drop(command);
     let mut report = String::new();
     ours.read_to_string(&mut report).expect("a report");
@@ -449,7 +449,7 @@ fn signal_interrupts_a_blocked_report() {
     while !dir.path("ball.png").exists() {
         std::thread::yield_now();
     }
-    kill(Pid::from_raw(child.id() as i32), Signal::SIGINT).expect("it is there");
+    kill(Pid::from_raw(child.id() as i32), Signal::SIGINT).expect("it runs");
     let output = child.wait_with_output().expect("it ends");
     drop(reader);
     let stderr = String::from_utf8(output.stderr).expect("UTF-8");
@@ -540,7 +540,7 @@ fn help_fits_and_lists_every_option() {
 }
 
 #[test]
-fn progress_and_color_modes() {
+fn progress_and_color_options_take_effect() {
     let dir = room();
     let plain = dir.expect("room.toml --once --progress plain", 0);
     let stages: Vec<&str> = plain.lines().filter_map(|line| line.split_whitespace().next()).collect();
@@ -589,7 +589,7 @@ fn closed_streams_are_tolerated() {
 }
 
 #[test]
-fn image_does_not_depend_on_acceleration() {
+fn image_does_not_depend_on_accel() {
     let dir = TestDir::new();
     for scene in ["mesh", "textures", "orbiter"] {
         let path = format!("{}/scenes/{scene}.toml", env!("CARGO_MANIFEST_DIR"));

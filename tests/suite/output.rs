@@ -53,7 +53,7 @@ fn refused(path: &Path) -> String {
 }
 
 #[test]
-fn new_file_then_replaced() {
+fn file_is_created_and_then_replaced() {
     let directory = scratch();
     let path = directory.path().join("out.png");
     atomic(&path, b"first").expect("written");
@@ -277,7 +277,7 @@ fn concurrent_writers_leave_a_complete_file() {
     assert_eq!(names(directory.path()), ["out.png"]);
 }
 
-/// Two images that a torn write would mix.
+/// Two images whose contents would reveal a torn write.
 fn two_pictures() -> [Vec<u8>; 2] {
     [vec![0xaa; 3_000_000], vec![0x55; 2_000_001]]
 }
@@ -301,7 +301,7 @@ fn kill_leaves_a_whole_file_and_cleans_up() {
         let state = || fs::metadata(&path).map(|file| (file.ino(), file.mtime(), file.mtime_nsec()));
         let before = state().expect("a file");
         while state().expect("a file") == before {
-            assert!(writer.try_wait().expect("a child").is_none(), "the writer ended by itself");
+            assert!(writer.try_wait().expect("a child").is_none(), "the writer exited on its own");
             std::thread::sleep(Duration::from_millis(1));
         }
         std::thread::sleep(Duration::from_micros(round * 7919 % 10_000));

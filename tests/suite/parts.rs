@@ -1,5 +1,5 @@
-//! Parts of an image. Merged parts are bit-identical to a single render. Parts that do not belong together
-//! are rejected, and nothing is written.
+//! Parts of an image. Merged parts are bit-identical to a single render. Mismatched parts are rejected, and
+//! nothing is written.
 
 use std::fs;
 
@@ -326,7 +326,7 @@ fn watching_merge_waits_for_missing_parts() {
     let mut waiting = dir.glimt("merge joined.exr 1.part 2.part --watch --progress none");
     let mut waiting = waiting.spawn().expect("it runs");
     std::thread::sleep(std::time::Duration::from_millis(300));
-    assert!(waiting.try_wait().expect("a child").is_none(), "a part is missing");
+    assert!(waiting.try_wait().expect("a child").is_none(), "merged without the missing part");
     fs::rename(dir.path("later"), dir.path("2.part")).expect("renamed");
     assert!(waiting.wait().expect("a child").success());
     assert!(dir.bytes("joined.exr") == dir.bytes("one.exr"));
@@ -348,7 +348,7 @@ fn watching_merge_waits_for_incomplete_parts() {
         for length in [0, 7, 100, whole.len() / 2, whole.len() - 1] {
             dir.write("2.part", &whole[..length]);
             std::thread::sleep(std::time::Duration::from_millis(600));
-            assert!(waiting.try_wait().expect("a child").is_none(), "{length} bytes are there");
+            assert!(waiting.try_wait().expect("a child").is_none(), "merged with {length} bytes of a part");
         }
         dir.write("2.part", &whole);
         let output = waiting.wait_with_output().expect("a child");

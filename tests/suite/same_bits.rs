@@ -145,7 +145,7 @@ fn known_images_are_bit_identical() {
         tried.contains(&InstructionSet::Portable.max(InstructionSet::Avx512.available())),
         "tried {tried:?}"
     );
-    assert!(wrong.is_empty(), "other bits:\n{}", wrong.join("\n"));
+    assert!(wrong.is_empty(), "different bits:\n{}", wrong.join("\n"));
 }
 
 /// A scene with microfacet materials, bump and normal maps, opacity and panes.
@@ -310,5 +310,5 @@ fn known_photon_image_is_bit_identical() {
             }
         }
     }
-    assert!(wrong.is_empty(), "other bits:\n{}", wrong.join("\n"));
+    assert!(wrong.is_empty(), "different bits:\n{}", wrong.join("\n"));
 }

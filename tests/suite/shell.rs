@@ -127,7 +127,7 @@ fn only_long_help_lists_environment_variables() {
     assert!(!short.contains("SSH_TTY") && short.contains("--help"), "{short}");
 }
 
-/// Names of environment variables read by the source code, in each way that it reads them.
+/// Names of the environment variables that a source file reads.
 fn asked_in(text: &str) -> BTreeSet<String> {
     let code = text.split("#[cfg(test)]").next().unwrap_or_default();
     let is_name = |word: &&str| {
@@ -167,7 +167,7 @@ fn variable_list_matches_source_code() {
     // These are read by libraries for arguments, help and progress bars.
     let of_libraries = ["CLICOLOR", "CLICOLOR_FORCE", "COLUMNS", "LANG"].map(str::to_owned);
     asked.extend(of_libraries);
-    // The only lowercase name.
+    // This name contains lowercase letters.
     asked.insert("ConEmuANSI".to_owned());
     assert_eq!(asked, listed);
 }

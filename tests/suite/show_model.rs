@@ -167,7 +167,7 @@ fn both_uv_sets_are_imported() {
     assert_mentions(&said, &["warning", "b.obj", "\"checks_2\"", "\"material\""]);
 }
 
-/// A cube with an image at the given URI.
+/// A GLB file of a cube with a texture at the given URI.
 fn with_image(uri: &str) -> Vec<u8> {
     let mut glb = Glb::default();
     let mut cube = cube(&mut glb);
@@ -532,7 +532,7 @@ fn model_errors_do_not_quote_generated_scene() {
     assert!(mentions(&said, "nope.png") && !said.contains("a.obj:"), "{said}");
 }
 
-/// The image shows only the ground, so an error or a warning must explain why.
+/// If a model is invisible, the image shows only the ground, so a warning must explain why.
 #[test]
 fn invisible_model_warns() {
     let dir = TestDir::new();
@@ -571,7 +571,7 @@ fn invisible_model_warns() {
             fs::remove_dir_all(dir.path("a_files")).expect("removed");
         }
     }
-    assert!(unseen.iter().all(|picture| *picture == unseen[0]), "only the ground");
+    assert!(unseen.iter().all(|picture| *picture == unseen[0]), "images must show only the ground");
     // A single visible face is enough.
     let faces = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl p\nf 1 2 3\nusemtl q\nf 1 3 2\n";
     dir.write("a.obj", faces);
@@ -624,7 +624,7 @@ fn model_is_shown_without_missing_images() {
         assert_eq!(dir.bytes("kd.png"), b"no picture");
         assert!(dir.expect("check a.obj", 2).contains("kd.png"));
     }
-    // The same for glTF, with image files and embedded images.
+    // Check the same for glTF, with image files and embedded images.
     let plain = |glb: Vec<u8>| {
         dir.write("a.glb", glb);
         picture(&dir, "a.glb")

@@ -34,7 +34,7 @@ position = [1, 3, 2]
 intensity = [10, 10, 10]
 "#;
 
-/// A temporary directory with a scene, in which the program runs.
+/// A temporary working directory for the program, with a scene in it.
 pub(crate) struct TestDir(pub(crate) tempfile::TempDir);
 
 impl TestDir {
@@ -58,7 +58,7 @@ impl TestDir {
     pub(crate) fn program(&self) -> PathBuf {
         let copy = self.path("program");
         let made = Process::new("cp").arg(PROGRAM).arg(&copy).status();
-        assert!(made.expect("cp runs").success(), "a copy");
+        assert!(made.expect("cp runs").success(), "failed to copy the program");
         copy
     }
 

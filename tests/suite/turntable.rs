@@ -45,7 +45,7 @@ fn picture(dir: &TestDir, name: &str) -> Vec<u8> {
 /// Frames of an APNG.
 fn frames(bytes: &[u8]) -> Vec<Vec<u8>> {
     let mut reader = png::Decoder::new(Cursor::new(bytes)).read_info().expect("PNG");
-    let count = reader.info().animation_control().expect("it moves").num_frames;
+    let count = reader.info().animation_control().expect("an animation").num_frames;
     let mut frame = || {
         let mut pixels = vec![0; reader.output_buffer_size().expect("small")];
         reader.next_frame(&mut pixels).expect("a frame");

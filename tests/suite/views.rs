@@ -59,8 +59,8 @@ fn depth_is_metric_only_in_float_files() {
     let dir = TestDir::new();
     dir.expect("ball.toml --once --samples 16 --view depth -o depth.exr -o depth.png", 0);
     let depths: Vec<f32> = floats(&dir, "depth.exr").iter().map(|pixel| pixel[0]).collect();
-    // The ball's front is at a depth of 3.5, and its rim slightly closer than its center at 4. Nothing is
-    // behind it.
+    // The front of the ball is at depth 3.5. The rim is slightly closer than the center, which is at depth 4.
+    // Nothing is behind the ball.
     let middle = depths[12 * 32 + 16];
     assert!((middle - 3.505).abs() < 0.006, "{middle}");
     assert_eq!(depths[0], 0.0);
@@ -95,11 +95,11 @@ fn infinite_floor_keeps_near_depth_contrast() {
     let (near, far) = (range[0].as_f64().expect("near"), range[1].as_f64().expect("far"));
     let depths: Vec<f32> = floats(&dir, "depth.exr").iter().map(|pixel| pixel[0]).collect();
     assert!(near < 2.0 && far > 10.0, "{near} {far}");
-    // Exclude pixels at the horizon, which are arbitrarily far away.
+    // Pixels at the horizon are arbitrarily far away, so some are beyond the range.
     let end = far as f32;
     assert!(depths.iter().any(|&depth| depth > end) && depths.contains(&end));
     assert!(notes(&dir, "depth.png").contains(&("glimt:range".to_owned(), format!("{near} to {far}"))));
-    // On a linear scale, the ball at 3.5 and the floor beside it at 5.7 would differ by 37 shades.
+    // On a linear scale, the ball at 3.5 and the floor next to it at 5.7 would differ by 37 shades.
     let shown = image::open(dir.path("depth.png")).expect("a picture").into_rgb8();
     let at = |x, y| i32::from(shown.get_pixel(x, y).0[0]);
     assert!(at(16, 13) - at(2, 15) > 42, "{} {}", at(16, 13), at(2, 15));

@@ -1,4 +1,4 @@
-//! Scenes that are scaled and moved as a whole, which must not change the image.
+//! Scaled and moved copies of scenes, which must give the same image.
 
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
@@ -96,7 +96,7 @@ fn of_shapes(extent: CaseSet) -> Vec<StressRow> {
     rows
 }
 
-/// Each light alone.
+/// Scenes with a single light, moved and scaled.
 fn of_lights(extent: CaseSet) -> Vec<StressRow> {
     let integrators: &[&str] = if extent == CaseSet::Short { &["whitted"] } else { &["whitted", "path"] };
     let picture = |frame, light: &str, integrator: &str| {

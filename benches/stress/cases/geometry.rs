@@ -72,8 +72,7 @@ fn coplanar(kind: &str) -> StressRow {
     StressRow::alike(format!("16 coplanar {what} vs. one"), vec![(layers(16), layers(1))], 0.0)
 }
 
-/// Needles as long as the scene and a thousandth as thick. Compares one acceleration structure with the
-/// other.
+/// Needles as long as the scene and a thousandth as thick. Compares the two acceleration structures.
 fn needles(accel: &str) -> StressRow {
     let mut random = RandomNumbers(5);
     let (mut points, mut faces) = (Vec::new(), Vec::new());

@@ -1,4 +1,4 @@
-//! All cases.
+//! All stress-test cases.
 
 mod cameras;
 mod frames;

@@ -603,7 +603,7 @@ impl From<Switch> for bool {
     }
 }
 
-/// Parses a choice by name.
+/// Creates a parser for the names of a choice.
 fn one_of<C: Choice>() -> impl TypedValueParser<Value = C> {
     let known = C::ALL.iter().map(|one| PossibleValue::new(one.name()).help(one.meaning()));
     let other = C::UNAVAILABLE.iter().map(|&name| PossibleValue::new(name).help(UNAVAILABLE));
@@ -647,7 +647,7 @@ fn any_whole(text: &str) -> Result<u32, String> {
     whole(text, 0..=u32::MAX)
 }
 
-/// Parses an option that overrides an integer of `[render]`.
+/// Parses an option that overrides an integer key of `[render]`.
 fn whole_of(key: &'static str) -> impl Fn(&str) -> Result<u32, String> + Clone + Send + Sync + 'static {
     move |text| match Render::key(key).map(|key| key.range) {
         Some(KeyRange::Whole(range)) => whole(text, range),
@@ -657,7 +657,7 @@ fn whole_of(key: &'static str) -> impl Fn(&str) -> Result<u32, String> + Clone +
     }
 }
 
-/// Parses an option that overrides a number of `[render]`. `expected` is the error message.
+/// Parses an option that overrides a number key of `[render]`. `expected` is the error message for an invalid value.
 fn number_of(
     key: &'static str,
     expected: &'static str,

@@ -1,5 +1,5 @@
 //! Output to stderr and stdout outside of the terminal UI. Ignores errors when writing to stderr. Errors when
-//! writing to stdout, such as a full disk, determine the exit code. Sanitizes all text.
+//! writing to stdout, such as a full disk, determine the exit code. Sanitizes all text that is not trusted.
 
 use std::cell::RefCell;
 use std::io::{self, IsTerminal, Write};

@@ -1,6 +1,6 @@
 //! The command line: arguments, the headless front end, and the setup of the terminal UI.
 //!
-//! Arguments ([`args`]) are validated and lowered (`lower`) before any work starts.
+//! Arguments ([`args`]) are validated and converted to a request (`lower`) before any work starts.
 
 pub mod args;
 pub mod bench;

@@ -176,7 +176,7 @@ struct WriteLog {
     /// Whether an image was written since the last write command.
     has_written: bool,
     has_left: bool,
-    /// The checkpoint written after the UI exited, or why there is none.
+    /// The checkpoint written after the UI exited, or an error message.
     checkpoint: Option<Result<PathBuf, String>>,
     /// Whether a request is in its last stage.
     is_last_stage: bool,
@@ -257,7 +257,7 @@ impl SharedWriteLog {
         }
     }
 
-    /// The checkpoint written after the UI exited, or why there is none.
+    /// The checkpoint written after the UI exited, or an error message.
     fn checkpoint(&self) -> Option<Result<PathBuf, String>> {
         self.lock_log().checkpoint.clone()
     }
@@ -383,14 +383,14 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let said = |name: &str| {
             let [mut problem] = crate::scene::load(&folder.path().join(name), &[])
-                .expect_err("there is none")
+                .expect_err("the scene is missing")
                 .try_into()
                 .expect("one problem");
             await_scene(&mut problem);
             problem.help.expect("a help text")
         };
         assert_eq!(said("room.toml"), WAITING_FOR_FILE);
-        let mut renamed = *crate::scene::text_now(Path::new("none.toml")).expect_err("there is none");
+        let mut renamed = *crate::scene::text_now(Path::new("none.toml")).expect_err("the scene is missing");
         renamed.help = Some(format!("third.toml {SAME_TEXT}"));
         await_scene(&mut renamed);
         assert!(renamed.help.is_some_and(|help| help.contains("third.toml")));

@@ -173,10 +173,10 @@ mod tests {
 
     #[test]
     fn default_arguments_override_no_settings() {
-        let order = lowered("a.toml").expect("right");
+        let order = lowered("a.toml").expect("valid arguments");
         let checkpoints = Checkpoints { seconds: 60.0, resume: Resume::IfSame, are_kept: false };
         assert_eq!(order.overrides, Overrides { checkpoints, ..Overrides::default() });
-        let once = lowered("a.toml --once").expect("right").overrides.checkpoints;
+        let once = lowered("a.toml --once").expect("valid arguments").overrides.checkpoints;
         assert_eq!(once, Checkpoints { resume: Resume::No, ..checkpoints });
         assert!(!order.is_once && !order.poll);
     }
@@ -189,7 +189,7 @@ mod tests {
              --threads 2 --crop 1,2,3,4 --bit-depth 16 --report r.json --force --progress json --color 256 --poll \
              --nice 3 --notify-after 7 --checkpoint 5 --resume --keep-checkpoint --memory 1.5GiB",
         )
-        .expect("right");
+        .expect("valid arguments");
         let expected = Overrides {
             sets: vec!["a.b=1".into(), "a.c=x".into()],
             outputs: vec!["a.png".into(), "b.exr".into()],
@@ -296,7 +296,8 @@ mod tests {
 
     #[test]
     fn scenes_named_like_commands_need_a_folder() {
-        let parsed = |words: &[&str]| Args::try_parse_from([&["glimt"], words].concat()).expect("right");
+        let parsed =
+            |words: &[&str]| Args::try_parse_from([&["glimt"], words].concat()).expect("valid arguments");
         assert!(matches!(parsed(&["check", "a.toml"]).command, Some(Subcommand::Check { .. })));
         assert_eq!(parsed(&["./check"]).render.scene, Some("./check".into()));
     }
@@ -304,7 +305,7 @@ mod tests {
     #[test]
     fn every_view_has_a_name() {
         for &view in View::ALL {
-            let order = lowered(&format!("a.toml --view {}", view.name())).expect("right");
+            let order = lowered(&format!("a.toml --view {}", view.name())).expect("valid arguments");
             assert_eq!(order.overrides.view, Some(view));
         }
     }

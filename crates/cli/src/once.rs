@@ -137,7 +137,7 @@ struct ImagesWrittenSoFar {
 #[derive(Debug, Default)]
 struct ExitDeadline {
     end: Option<Instant>,
-    /// Whether writing an image was cancelled.
+    /// Whether the write stage was cancelled because it took too long.
     is_write_stopped: bool,
 }
 
@@ -319,7 +319,7 @@ fn report_checkpoint(
     }
 }
 
-/// A warning about the arguments.
+/// Creates a warning about the arguments.
 fn warning(message: &str, help: &str) -> Diagnostic {
     Diagnostic {
         severity: Severity::Warning,

@@ -12,15 +12,15 @@ use crate::pipeline::protocol::{Event, RenderProgress};
 use crate::pipeline::words::format_mean_samples;
 pub(super) use crate::pipeline::words::seconds;
 
-/// Reports progress.
+/// Receives a render's events and reports its progress.
 pub(super) trait Reporter {
     /// Handles an event.
     fn event(&mut self, event: &Event);
 
-    /// Clears temporary output. May be called more than once.
+    /// Clears temporary output. May be called repeatedly.
     fn end(&mut self) {}
 
-    /// Whether written files are reported in text.
+    /// Whether written files and other results are also reported as text.
     fn says_results(&self) -> bool {
         true
     }

@@ -12,7 +12,7 @@ const CRATES: [&str; 6] = ["base", "kernel", "scene", "files", "trace", "pipelin
 fn main() {
     let crates = Path::new("..");
     let mut roots: Vec<_> = CRATES.iter().map(|name| crates.join(name).join("src")).collect();
-    // Dependency versions affect images too.
+    // Dependency versions also affect images.
     roots.push(crates.join("../Cargo.lock"));
     for root in &roots {
         println!("cargo::rerun-if-changed={}", root.display());

@@ -22,9 +22,9 @@ pub struct Section {
     pub left: f64,
     /// Top edge.
     pub top: f64,
-    /// Width.
+    /// Width of the section.
     pub width: f64,
-    /// Height.
+    /// Height of the section.
     pub height: f64,
 }
 
@@ -67,7 +67,7 @@ impl Section {
 /// Object and color at an image position.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picked {
-    /// Column and row.
+    /// Column and row of the pixel.
     pub pixel: [u32; 2],
     /// The visible object. `None` if the ray hits nothing.
     pub thing: Option<PickedObject>,
@@ -103,7 +103,7 @@ pub struct PickedObject {
 /// A camera that the user moved with the keyboard.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MovedCamera {
-    /// The current camera.
+    /// The camera after the move.
     pub camera: Viewpoint,
     /// The scene's camera before the move.
     pub own: Viewpoint,

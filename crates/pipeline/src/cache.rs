@@ -29,7 +29,7 @@ impl<T> Memo<T> {
         self.last.as_ref().map(|(_, value)| value)
     }
 
-    /// Replaces the value.
+    /// Replaces the cached value.
     pub(super) fn set(&mut self, key: Key, value: T) {
         self.last = Some((key, value));
     }
@@ -47,11 +47,11 @@ struct CacheEntry<T> {
     key: Key,
     value: Arc<T>,
     bytes: usize,
-    /// Whether the current request has used it.
+    /// Whether the current request has used the value.
     used: bool,
-    /// Whether the last successful request used it.
+    /// Whether the last successful request used the value.
     proven: bool,
-    /// Number of the most recent request that used it.
+    /// Number of the most recent request that used the value.
     request: u64,
 }
 
@@ -97,15 +97,15 @@ impl<N: Hash + Eq, T> NamedCache<N, T> {
         self.entries.values().filter(|entry| !entry.proven).map(|entry| (entry.request, entry.bytes))
     }
 
-    /// Drops unused values whose last use was before this request.
+    /// Drops unused values that were last used before this request.
     pub(super) fn evict_unused_before(&mut self, request: u64) {
         self.entries.retain(|_, entry| entry.proven || entry.request >= request);
     }
 }
 
-/// Returns the number of the earliest request whose unused values fit into `most_bytes` together with those
-/// of all later requests. All values of a request are evicted together, because half a scene is of little use
-/// and trees keep their meshes alive.
+/// Returns the number of the earliest request whose unused values fit into `most_bytes` together with the
+/// unused values of all later requests. All values of a request are evicted together, because half a scene is
+/// of little use and trees keep their meshes alive.
 pub(super) fn first_request_that_fits(
     eviction_candidates: impl Iterator<Item = EvictionCandidate>,
     most_bytes: usize,
@@ -155,7 +155,7 @@ mod tests {
         pool.insert("y", key("1"), (Arc::new(2), 10));
         end_request(&mut pool, true, 1, NOTHING);
         assert!(pool.get(&"x", key("1")).is_some());
-        assert!(pool.get(&"x", key("2")).is_none(), "another content");
+        assert!(pool.get(&"x", key("2")).is_none(), "different content");
         end_request(&mut pool, true, 2, NOTHING);
         assert!(pool.get(&"y", key("1")).is_none());
         assert!(pool.get(&"x", key("1")).is_some());

@@ -30,7 +30,7 @@ pub struct SceneSummary {
     pub textures: u64,
     /// Non-black point lights, directional lights, environments and emissive objects.
     pub lights: u64,
-    /// Likely mistakes.
+    /// Warnings about likely mistakes.
     pub warnings: Vec<Diagnostic>,
 }
 

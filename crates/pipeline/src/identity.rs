@@ -28,7 +28,7 @@ pub(super) struct ImageDependencies<'a> {
 }
 
 impl ImageDependencies<'_> {
-    /// Returns the names and values.
+    /// Returns the names and values of everything that affects the image.
     pub(super) fn names_and_values(&self) -> Vec<Dependency> {
         let mut traits = vec![Dependency::setting("glimt", BUILD)];
         self.add_settings(&mut traits);

@@ -19,7 +19,7 @@ pub(super) struct Input {
     pub(super) path: PathBuf,
     /// Role of the file in the scene, for messages.
     pub(super) role: String,
-    /// The scene and the span in it that references the file.
+    /// The scene, and the span in the scene file that references this file.
     pub(super) place: Option<(Arc<Loaded>, Range<usize>)>,
 }
 

@@ -16,11 +16,11 @@ use crate::system::memory::{Limit, limit};
 const PROGRAM: u64 = 24 << 20;
 /// Bytes per render thread: stack and buffers. Rough glass needs the most.
 const THREAD: u64 = 640 << 10;
-/// Bytes used in trees per object.
+/// Bytes per object in the acceleration structures.
 const OBJECT: u64 = 250;
 /// Bytes per emitted photon while building the maps of a pass.
 const PHOTON: u64 = 220;
-/// Maximum size of the cached maps in bytes.
+/// Maximum size of the cached photon maps in bytes.
 const KEPT_MAPS: u64 = 128 << 20;
 
 /// Maximum size in bytes of an animation's frames without `--memory`.
@@ -109,7 +109,7 @@ impl MemoryEstimate {
     /// number of bytes left.
     ///
     /// # Errors
-    /// Returns a breakdown and a suggested fix if the render needs more memory than that.
+    /// Returns a breakdown and a suggested fix if the render needs more memory than the limit.
     pub(super) fn check(&self, plan: &Plan) -> Result<u64, Stop> {
         self.check_against(plan, limit)
     }
@@ -209,7 +209,7 @@ mod tests {
     }
 
     #[test]
-    fn every_thread_counts() {
+    fn each_thread_adds_its_memory() {
         let bytes = |threads| {
             let overrides = Overrides { threads: Some(threads), ..Overrides::default() };
             MemoryEstimate::for_image(&planned(&overrides)).bytes()

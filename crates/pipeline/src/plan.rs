@@ -59,7 +59,7 @@ pub(super) struct Plan {
     pub(super) effective: EffectiveSettings,
 }
 
-/// Where the output file names come from.
+/// Source of the output file names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum OutputNameSource {
     /// `-o`.
@@ -155,8 +155,8 @@ fn photons(requested: &Photons, (width, height): (u32, u32)) -> PhotonSettings {
     PhotonSettings { count: count as u32, radius: radius as f32, bounces }
 }
 
-/// Returns the scene with the given acceleration structure. Scenes may be large, so copies it only if
-/// necessary.
+/// Returns the scene with the given acceleration structure. Copies the scene only if necessary, because scenes
+/// may be large.
 fn with_accel(scene: &Arc<Scene>, accel: Accel) -> Arc<Scene> {
     let mut scene = Arc::clone(scene);
     if scene.render.accel != accel {
@@ -400,7 +400,7 @@ mod tests {
             let overrides =
                 Overrides { width: Some(width), height: Some(height), crop, ..Default::default() };
             let text = format!("[photons]\nenabled = true\n{table}");
-            planned(&text, &overrides).settings.photons.expect("they are on").count
+            planned(&text, &overrides).settings.photons.expect("photon settings").count
         };
         let part = Some(Rect { x: 7, y: 9, width: 5, height: 3 });
         for (table, width, height, photons) in [
@@ -452,7 +452,7 @@ mod tests {
         for ending in Format::extensions() {
             assert!(load(ending).is_ok(), "{ending}");
         }
-        let wrong = format!("{:?}", load("xyz").expect_err("no format"));
+        let wrong = format!("{:?}", load("xyz").expect_err("an unknown format"));
         let offered = wrong.split(|c: char| !c.is_alphanumeric()).collect::<std::collections::HashSet<_>>();
         for ending in ["png", "exr", "hdr", "jpg", "jpeg", "ppm", "webp", "tga", "bmp"] {
             assert_eq!(

@@ -90,9 +90,9 @@ pub enum Writing {
 /// Maximum preview size, measured in square pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PreviewSize {
-    /// Columns.
+    /// Maximum width in square pixels.
     pub width: u32,
-    /// Rows.
+    /// Maximum height in square pixels.
     pub height: u32,
     /// Center of a section shown at 1:1, as large as fits. `None` fits the whole image.
     pub around: Option<ImagePosition>,
@@ -114,7 +114,7 @@ pub enum Event {
         stage: StageReport,
     },
     /// Files that the request depends on, including files it failed to read. Each event contains all files
-    /// known so far, and the front end watches those of the latest event.
+    /// known so far, and the front end watches the files of the latest event.
     Files {
         /// Request number.
         generation: u64,
@@ -143,7 +143,7 @@ pub enum Event {
     Settings {
         /// Request number.
         generation: u64,
-        /// The settings.
+        /// Effective settings of the request.
         settings: Box<EffectiveSettings>,
         /// Camera of the scene.
         camera: Viewpoint,
@@ -175,18 +175,18 @@ pub enum Event {
     Written {
         /// Request number.
         generation: u64,
-        /// The file.
+        /// The image file.
         path: PathBuf,
-        /// Size of the file.
+        /// Size of the file in bytes.
         bytes: u64,
-        /// Whether it is the scene's own image, without changes made with keys.
+        /// Whether the image is the scene's own image, without changes made with keys.
         is_own: bool,
     },
     /// State of the scene's own image, for a request that shows another one.
     OwnImage {
         /// Request number.
         generation: u64,
-        /// The state.
+        /// State of the scene's own image.
         state: OwnImageState,
     },
     /// An image or a report could not be written. Rendering continues.
@@ -217,7 +217,7 @@ pub enum Event {
     Checkpoint {
         /// Request number.
         generation: u64,
-        /// The news.
+        /// The update.
         news: CheckpointNews,
     },
     /// [`Command::Write`] is postponed until every pixel has a sample.
@@ -229,7 +229,7 @@ pub enum Event {
     WriteDone {
         /// Request number.
         generation: u64,
-        /// The files.
+        /// The written files.
         paths: Vec<PathBuf>,
     },
     /// Answer to [`Command::KeepCamera`].
@@ -261,14 +261,14 @@ pub enum Event {
         report: Box<Report>,
         /// Warnings, and any remaining conflicts from [`Event::Refused`].
         warnings: Vec<Diagnostic>,
-        /// Whether nothing changed, in which case nothing was rendered and the image is the same.
+        /// Whether the displayed image is unchanged and nothing was rendered or written.
         unchanged: bool,
     },
     /// The request failed. The previous image remains.
     Failed {
         /// Request number.
         generation: u64,
-        /// Why.
+        /// Why the request failed.
         failure: Failure,
     },
     /// The render of the last valid scene ended. That scene was rendered because the request's own scene
@@ -289,14 +289,14 @@ pub enum Event {
 /// State of the scene's own image, which is rendered from the saved scene with the command-line overrides.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OwnImageState {
-    /// It has been written to all its output files.
+    /// The image has been written to all its output files.
     Written,
-    /// Some of its samples have been rendered.
+    /// Some of the image's samples have been rendered.
     Begun {
-        /// Whether the current request adds samples to it, because both images share a film.
+        /// Whether the current request adds samples to the own image, because both images share a film.
         is_rendering: bool,
     },
-    /// None of its samples have been rendered.
+    /// None of the image's samples have been rendered.
     NotBegun,
 }
 
@@ -305,7 +305,7 @@ pub enum OwnImageState {
 pub enum CheckpointNews {
     /// The checkpoint was written.
     Written {
-        /// The file.
+        /// Path of the checkpoint.
         path: PathBuf,
     },
     /// The checkpoint could not be written. The render continues.
@@ -315,41 +315,41 @@ pub enum CheckpointNews {
     },
     /// The render resumes from the checkpoint.
     Resumed {
-        /// The file.
+        /// Path of the checkpoint.
         path: PathBuf,
-        /// Number of samples in each pixel that needs more.
+        /// Lowest sample count among pixels that need more samples.
         samples: u32,
     },
     /// The checkpoint to resume from does not exist, so the render starts from scratch.
     Absent {
-        /// The file.
+        /// Path of the checkpoint.
         path: PathBuf,
     },
     /// A checkpoint of this image exists, but resuming was not requested.
     Ignored {
-        /// The file.
+        /// Path of the checkpoint.
         path: PathBuf,
     },
     /// The render ignores a checkpoint or an incomplete part and starts from scratch.
     Unused {
-        /// The file.
+        /// Path of the checkpoint.
         path: PathBuf,
         /// The reason: it belongs to another image, has more samples than requested, or is damaged.
         why: String,
     },
     /// The output file already contains this part.
     Finished {
-        /// The file.
+        /// The output file.
         path: PathBuf,
     },
     /// The checkpoint of another render was renamed.
     SetAside {
-        /// Its new name.
+        /// New path of the checkpoint.
         path: PathBuf,
     },
 }
 
-/// Why a request failed.
+/// Reasons why a request failed.
 #[derive(Clone, Debug)]
 pub enum Failure {
     /// Errors and warnings for an invalid scene or referenced file (exit code 2).

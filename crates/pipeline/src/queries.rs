@@ -47,7 +47,7 @@ impl Query {
     }
 }
 
-/// The current image.
+/// Scene, world and settings of the current image, used to answer queries.
 #[derive(Clone)]
 pub(super) struct QueryContext {
     pub(super) parsed: Arc<Parsed>,
@@ -135,7 +135,7 @@ impl QueryContext {
         if !has_text(&path, read) {
             return Err(changed.to_owned());
         }
-        // Values not changed with keys come from the old camera, so writing them would overwrite newer ones.
+        // Values not changed with keys come from the old camera, so writing them would overwrite newer values.
         if *own != self.own {
             return Err(CAMERA_CHANGED.to_owned());
         }

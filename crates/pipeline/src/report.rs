@@ -14,7 +14,7 @@ pub struct Report {
     pub glimt: &'static str,
     /// Scene file, as specified by the caller.
     pub scene: String,
-    /// The image.
+    /// Size, samples and files of the image.
     pub image: ImageReport,
     /// Effective settings.
     pub settings: EffectiveSettings,
@@ -24,7 +24,7 @@ pub struct Report {
     pub photons: Option<PhotonsReport>,
     /// All eight stages, in order.
     pub stages: Vec<StageReport>,
-    /// Counters.
+    /// Work counters.
     pub counters: Counters,
     /// Wall-clock time of the request.
     pub seconds: f64,
@@ -61,11 +61,11 @@ pub struct ImageReport {
 /// Statistics of the samples per pixel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct SampleCounts {
-    /// Minimum.
+    /// Minimum samples per pixel.
     pub min: u32,
-    /// Mean.
+    /// Mean samples per pixel.
     pub mean: f64,
-    /// Maximum.
+    /// Maximum samples per pixel.
     pub max: u32,
 }
 
@@ -130,13 +130,13 @@ pub struct Counters {
     pub triangles: u64,
     /// Shapes of all kinds. A mesh instance counts as one.
     pub objects: u64,
-    /// Camera rays.
+    /// Camera rays traced.
     pub camera_rays: u64,
-    /// Shadow rays.
+    /// Shadow rays traced.
     pub shadow_rays: u64,
-    /// Reflected rays.
+    /// Reflected rays traced.
     pub reflected_rays: u64,
-    /// Refracted rays.
+    /// Refracted rays traced.
     pub refracted_rays: u64,
     /// Rays scattered by diffuse and glossy surfaces.
     pub scattered_rays: u64,
@@ -154,8 +154,8 @@ pub struct Counters {
     pub non_finite_samples: u64,
     /// Bytes used by acceleration structures.
     pub accel_memory_bytes: u64,
-    /// Number of films in memory: the current image's and those cached for earlier settings.
+    /// Number of films in memory: the film of the current image and the films cached for earlier settings.
     pub films: u64,
-    /// Bytes used by these films.
+    /// Bytes used by all films in memory.
     pub film_memory_bytes: u64,
 }

@@ -1,4 +1,4 @@
-//! Synchronous in-memory rendering, for measurement programs.
+//! Synchronous in-memory rendering, for benchmarks.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -12,7 +12,7 @@ use super::settings::Overrides;
 use super::sink::Sink;
 use crate::control::CancelToken;
 
-/// An engine and its caches.
+/// Renders images in memory and keeps caches between renders.
 pub struct Session {
     engine: Engine,
     generation: u64,

@@ -27,9 +27,9 @@ macro_rules! overrides {
             pub replaces_foreign: bool,
             /// Time limit in seconds. When it is reached, the render stops and keeps its current samples.
             pub time_seconds: Option<f64>,
-            /// Photon maps.
+            /// Whether to use photon maps.
             pub photons: Option<bool>,
-            /// Depth of field.
+            /// Whether to use depth of field.
             pub dof: Option<bool>,
             /// The view: beauty or an AOV.
             pub view: Option<View>,
@@ -37,7 +37,7 @@ macro_rules! overrides {
             pub from: Option<Side>,
             /// Up axis of a model. Replaces the format's default.
             pub up: Option<UpAxis>,
-            /// Camera changes.
+            /// Changes to the scene's camera.
             pub camera: CameraChange,
             /// Additional layers for EXR files.
             pub layers: Vec<OutputLayer>,
@@ -151,9 +151,9 @@ pub enum Resume {
 /// Scene settings that can be overridden with keys.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct AdjustableSettings {
-    /// Method.
+    /// Integrator.
     pub integrator: Integrator,
-    /// Shadows.
+    /// Kind of shadows.
     pub shadows: Shadows,
     /// Whether photons are on.
     pub photons: bool,
@@ -168,12 +168,12 @@ pub struct EffectiveSettings {
     pub height: u32,
     /// Maximum samples per pixel.
     pub samples: u32,
-    /// Noise target per tile, relative to its brightness. 0 means no target.
+    /// Noise target per tile, relative to the tile's brightness. 0 means no target.
     pub error: f32,
-    /// Method.
+    /// Integrator.
     #[serde(serialize_with = "choice::serialize")]
     pub integrator: Integrator,
-    /// Shadows.
+    /// Kind of shadows.
     #[serde(serialize_with = "choice::serialize")]
     pub shadows: Shadows,
     /// Limit on indirect radiance per bounce, which introduces bias. 0 means no limit.
@@ -194,7 +194,7 @@ pub struct EffectiveSettings {
     pub seed: u32,
     /// Number of render threads.
     pub threads: usize,
-    /// Output files.
+    /// Output files of the image.
     #[serde(serialize_with = "lossy_paths")]
     pub outputs: Vec<PathBuf>,
 }

@@ -20,7 +20,7 @@ pub(super) struct Sink {
     pub(super) generation: u64,
     pub(super) events: Sender<Event>,
     pub(super) previews: PreviewSlot,
-    /// Overall progress fractions at the start and end of the render, if it is only part of the work.
+    /// Overall progress fractions at the start and end of the render, if the render is only part of the work.
     pub(super) within: Option<[f64; 2]>,
 }
 

@@ -7,7 +7,7 @@ use super::stopwatch::Stopwatch;
 use crate::control::CancelToken;
 use crate::system::cpu_time::process_cpu_seconds;
 
-/// Stages of one request.
+/// Runs the stages of one request and records their reports.
 pub(super) struct StageTable<'a> {
     pub(super) sink: &'a Sink,
     /// Token used to pause work. Pauses do not count toward stage times.
@@ -18,7 +18,7 @@ pub(super) struct StageTable<'a> {
 }
 
 impl StageTable<'_> {
-    /// Runs a stage.
+    /// Runs a stage and reports its start and end.
     ///
     /// # Errors
     /// Returns the error from `work`.

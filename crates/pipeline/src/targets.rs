@@ -26,12 +26,12 @@ pub(super) struct OutputTarget<'a> {
 }
 
 impl<'a> OutputTarget<'a> {
-    /// An image of the plan.
+    /// Creates the target for an image of the plan.
     pub(super) fn for_image(plan: &Plan, path: &'a Path) -> Self {
         Self { path, kind: TargetKind::Picture(plan.named_by) }
     }
 
-    /// A report.
+    /// Creates the target for a report.
     pub(super) fn for_report(path: &'a Path) -> Self {
         Self { path, kind: TargetKind::Report }
     }
@@ -43,7 +43,7 @@ enum TargetKind {
     Report,
 }
 
-/// Returns one diagnostic for each of the plan's files that must not be written. This may change later,
+/// Returns one diagnostic for each of the plan's files that must not be written. The result may differ later,
 /// because symbolic links and files can change.
 pub(super) fn conflicts(plan: &Plan, inputs: &Inputs) -> Vec<Diagnostic> {
     let inputs = inputs.index_by_identity();
@@ -82,7 +82,7 @@ fn linked_frames(plan: &Plan) -> Vec<Diagnostic> {
 /// again at the last moment.
 ///
 /// # Errors
-/// The file cannot be written, or [`OutputError::Refused`].
+/// The file cannot be written, or must not be overwritten ([`OutputError::Refused`]).
 pub(super) fn write_guarded<'a, T>(
     plan: &'a Plan,
     inputs: &Inputs,
@@ -126,7 +126,7 @@ fn targets(plan: &Plan) -> impl Iterator<Item = OutputTarget<'_>> {
     current_targets(plan).chain(plan.later_outputs.iter().map(PathBuf::as_path).map(picture))
 }
 
-/// Returns the images and then the report.
+/// Returns the files of this request: the images, then the report.
 fn current_targets(plan: &Plan) -> impl Iterator<Item = OutputTarget<'_>> {
     let picture = |path| OutputTarget::for_image(plan, path);
     let report = plan.report.iter().map(|path| OutputTarget::for_report(path));

@@ -40,7 +40,7 @@ pub(super) struct Tracer<'a> {
     pub(super) token: &'a CancelToken,
     /// Photon maps for all jobs' samples, if photons are gathered.
     pub(super) photons: Option<&'a PhotonMaps>,
-    /// Index in the whole image of the jobs' sample 0.
+    /// Index of the jobs' sample 0 among the samples of the entire image.
     pub(super) first: u32,
 }
 
@@ -61,7 +61,7 @@ pub(super) struct TraceCost {
 }
 
 impl TileJob {
-    /// Number of pixels.
+    /// Returns the number of pixels in the job.
     pub(super) fn pixel_count(&self) -> u64 {
         self.pixels.count() as u64
     }
@@ -76,13 +76,13 @@ impl Tracer<'_> {
         Ok((samples, TraceCost { rays, seconds: thread_cpu_seconds() - begin }))
     }
 
-    /// Renders the jobs. `keep` stores the samples of each finished job. It runs on the thread that rendered
-    /// them, which has them in its cache. `each` is called on the current thread for each finished job, in
-    /// order of completion, and with `None` at least once per [`TICK`]. It returns whether to continue. Jobs
-    /// that have already started are always finished.
+    /// Renders the jobs. `keep` stores the samples of each finished job. It runs on the thread that rendered the
+    /// samples, because they are in that thread's CPU cache. `each` is called on the current thread for each
+    /// finished job, in order of completion, and with `None` at least once per [`TICK`]. It returns whether to
+    /// continue. Jobs that have already started are always finished.
     ///
     /// # Errors
-    /// [`Cancelled`].
+    /// Returns [`Cancelled`] if the token is cancelled.
     pub(super) fn run<K: Send>(
         &self,
         jobs: &[TileJob],
@@ -156,7 +156,7 @@ pub(super) fn next_pass(done: u32, total: u32, pixels: usize) -> u32 {
     done.saturating_add(done.clamp(1, longest)).min(power).min(total)
 }
 
-/// Number of samples in the longest pass.
+/// Returns the number of samples per pixel in the longest pass.
 fn longest_pass(pixels: usize) -> u32 {
     const LONGEST: usize = 32;
     const TILE: usize = (TILE_SIZE * TILE_SIZE) as usize;

@@ -12,7 +12,8 @@ pub enum Eta {
 }
 
 impl Eta {
-    /// Returns `None` while an estimate would be unreliable: in the first 1 % or half second of the render.
+    /// Returns the remaining time. `None` while the estimate is unreliable, in the first 1 % or half second of the
+    /// render.
     pub fn of(progress: &RenderProgress) -> Option<Self> {
         const DAY: f64 = 24.0 * 3600.0;
         let is_early = progress.fraction < 0.01 || progress.elapsed_seconds < 0.5;
@@ -110,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn times_are_short() {
+    fn durations_are_formatted_concisely() {
         for (time, words) in [
             (0.0, "0.00 ms"),
             (0.000_001, "<0.01 ms"),

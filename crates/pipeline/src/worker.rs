@@ -19,8 +19,8 @@ use super::sink::Sink;
 use super::watch::content::Contents;
 use crate::control::CancelToken;
 
-/// Starts a worker thread. On Linux, its render threads have a niceness `nice` higher than the current
-/// thread's, so that the front end and other programs have priority.
+/// Starts a worker thread. On Linux, its render threads have the current thread's niceness plus `nice`, so that
+/// the front end and other programs have priority.
 ///
 /// # Errors
 /// The system cannot start a thread.
@@ -46,7 +46,7 @@ pub(super) fn start_with(config: EngineConfig) -> std::io::Result<Handle> {
 pub struct Handle {
     /// Events from the worker.
     pub events: Receiver<Event>,
-    /// Slot for previews.
+    /// Slot for the latest preview.
     pub previews: PreviewSlot,
     remote: CommandSender,
     contents: Arc<Contents>,

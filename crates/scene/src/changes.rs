@@ -4,7 +4,7 @@ mod keys;
 
 use super::sanitize::shortened;
 
-/// Maximum number of bytes to compare. Larger scenes are not edited by hand.
+/// Maximum size in bytes of a scene to compare. Larger scenes are not edited by hand.
 pub const MOST_COMPARED_BYTES: usize = 4 << 20;
 
 /// Maximum number of characters shown per line.
@@ -12,7 +12,7 @@ const MAX_LINE_CHARS: usize = 40;
 
 /// Lists the changes between two versions of a scene, such as `sphere.ball.radius 0.5 → 0.7`. Keys have the
 /// same syntax as in `--set`. If no key differs or a version is not valid TOML, lists the changed lines
-/// instead. Empty if the versions are equal or too large.
+/// instead. Returns an empty list if the versions are equal or too large.
 pub fn list_changes(before: &str, after: &str) -> Vec<String> {
     if before == after || before.len().max(after.len()) > MOST_COMPARED_BYTES {
         return Vec::new();
@@ -23,7 +23,7 @@ pub fn list_changes(before: &str, after: &str) -> Vec<String> {
     }
 }
 
-/// Describes the changed lines.
+/// Summarizes the changed lines. Returns `None` if all lines are equal.
 fn line_changes(before: &str, after: &str) -> Option<String> {
     let (before, after): (Vec<&str>, Vec<&str>) = (before.lines().collect(), after.lines().collect());
     // Strip the common prefix and suffix.

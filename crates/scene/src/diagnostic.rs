@@ -16,15 +16,15 @@ pub enum Severity {
 /// An error or warning about a scene or a file referenced by a scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Diagnostic {
-    /// Error or warning.
+    /// Whether this is an error or a warning.
     pub severity: Severity,
-    /// One line, starting with a lowercase letter.
+    /// One-line message, starting with a lowercase letter.
     pub message: String,
-    /// The file. Empty for the command line.
+    /// Path of the file. Empty for the command line.
     pub path: PathBuf,
-    /// The span in that file, if known.
+    /// The span in the file, if known.
     pub place: Option<SourceSpan>,
-    /// Expected values, or how to fix the problem.
+    /// Help text: the expected values, or how to fix the problem.
     pub help: Option<String>,
 }
 

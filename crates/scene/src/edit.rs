@@ -11,7 +11,7 @@ use crate::math::DVec3;
 /// Returns a scene's source text with the camera replaced by `wanted`.
 ///
 /// # Errors
-/// The reason why the `[camera]` table cannot be edited.
+/// Returns the reason why the `[camera]` table cannot be edited.
 pub(super) fn with_camera(text: &str, wanted: &Viewpoint) -> Result<String, String> {
     let (document, errors) = toml::parse(text);
     let found = document.root().get("camera").filter(|_| errors.is_empty());
@@ -25,7 +25,7 @@ pub(super) fn with_camera(text: &str, wanted: &Viewpoint) -> Result<String, Stri
     is_right.then_some(new).ok_or_else(|| "glimt cannot edit the [camera] table in this form".to_owned())
 }
 
-/// Pending edits to a table.
+/// Pending edits to the `[camera]` table.
 struct CameraEdits<'t> {
     text: &'t str,
     table: Entries<'t>,
@@ -121,8 +121,8 @@ impl CameraEdits<'_> {
         }
     }
 
-    /// The line ending after this entry. If this is the last line and it is unterminated, the line ending of
-    /// the previous line.
+    /// The line ending after this entry. If the entry is on an unterminated last line, returns the line
+    /// ending of the previous line.
     fn line_end(&self, key: &KeyValue<'_>) -> &'static str {
         let (before, after) = self.text.split_at(key.value.span().end);
         let (line, _) = after.split_once('\n').or_else(|| before.rsplit_once('\n')).unwrap_or_default();

@@ -5,16 +5,17 @@ use std::ops::Range;
 use super::description::{Camera, EmissionSides, Mesh, Object, Scene, Shape, max_projection};
 use crate::math::DVec3;
 
-/// The warning, its label and its help text.
+/// Warning about a quad light that faces away from everything, followed by its label and help text.
 pub(super) const MESSAGE: &str = "this light shines away from everything";
 pub(super) const LABEL: &str = "all shapes are behind it";
 pub(super) const HELP: &str = "swap `u` and `v`: the front faces along u × v";
 
-/// Minimum and maximum corner of a mesh file's bounding box. `None` for a mesh without vertices.
+/// Minimum and maximum corners of a mesh file's bounding box. `None` for a mesh without vertices.
 pub type MeshBounds = Option<[DVec3; 2]>;
 
 /// Minimum ratio of the scene's extent in front of a light to the extent behind the light. Below this ratio,
-/// the light counts as facing away. For example, a lamp may only illuminate the ceiling just above it.
+/// the light counts as facing away. The ratio is small because a light may be meant to illuminate only the
+/// ceiling just above it.
 const MIN_FRONT_RATIO: f64 = 0.02;
 
 /// Spans of one-sided quad lights with shapes behind them and nothing in front of them. Only calls `bounds`

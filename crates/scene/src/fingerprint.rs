@@ -7,11 +7,11 @@ use crate::math::{DVec3, Vec3};
 /// Values that affect the image. Implementations destructure all fields without `..`, so code with a new
 /// field does not compile until the field is added or explicitly ignored.
 pub trait Fingerprinted {
-    /// Adds everything read by later stages.
+    /// Adds all values that later stages read to the fingerprint.
     fn add_to(&self, key: &mut Fingerprint, of: &Referents<'_>);
 }
 
-/// Values referenced by index.
+/// Data that scene items refer to: textures and meshes by index, and the orbiter file.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Referents<'a> {
     /// The scene's textures.
@@ -36,7 +36,7 @@ impl<T: Fingerprinted> Fingerprinted for Option<T> {
 pub struct Key([u8; 32]);
 
 impl std::fmt::Display for Key {
-    /// Lowercase hexadecimal digits.
+    /// Writes the fingerprint as lowercase hexadecimal digits.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         self.0.iter().try_for_each(|byte| write!(f, "{byte:02x}"))
     }

@@ -55,8 +55,8 @@ pub fn is_absence(diagnostic: &Diagnostic) -> bool {
     [SCENE_NOT_FOUND, MODEL_NOT_FOUND].contains(&diagnostic.message.as_str())
 }
 
-/// Maximum number of syntax elements (brackets, `=`, `,` and lines) in a scene file. Each takes far more
-/// space in memory than in the file. A scene with a million spheres has half as many.
+/// Maximum number of syntax elements (brackets, `=`, `,` and lines) in a scene file. Each element takes far
+/// more space in memory than in the file. A scene with a million spheres has half as many elements.
 const MAX_PARTS: usize = 32 << 20;
 
 /// A valid scene, its text and warnings.
@@ -70,10 +70,10 @@ pub struct Loaded {
     pub path: PathBuf,
     /// Likely mistakes, in file order.
     pub warnings: Vec<Diagnostic>,
-    /// Files referenced by the scene file itself. Only filled if there are `--set` values, which may replace
+    /// Files referenced by the scene file itself. Empty unless there are `--set` values, which may replace
     /// these files.
     pub named: Vec<PathBuf>,
-    /// Spans of the settings' values.
+    /// Spans of the values in `[render]` and `[photons]`.
     pub settings: Vec<Setting>,
 }
 
@@ -82,7 +82,7 @@ pub struct Loaded {
 pub struct Setting {
     /// The name of the table: `render` or `photons`.
     pub table: &'static str,
-    /// The key.
+    /// Name of the key.
     pub key: String,
     /// Byte range in the text that includes the `--set` values.
     pub span: Range<usize>,
@@ -91,7 +91,7 @@ pub struct Setting {
 /// Reads the current text of a scene file.
 ///
 /// # Errors
-/// The reason why the file cannot be read.
+/// Returns the reason why the file cannot be read.
 pub fn text_now(path: &Path) -> Result<Arc<str>, Box<Diagnostic>> {
     read::read_scene_text(path)
 }
@@ -101,17 +101,18 @@ impl Loaded {
     /// missing keys. Comments and formatting stay unchanged.
     ///
     /// # Errors
-    /// The reason why the table cannot be edited.
+    /// Returns the reason why the `[camera]` table cannot be edited.
     pub fn text_with_camera(&self, camera: &Viewpoint) -> Result<String, String> {
         edit::with_camera(self.source.text(), camera)
     }
 
-    /// The camera in a scene's text with `--set` values applied. `None` if the text or a value has errors.
+    /// Reads the camera from a scene's text, with `--set` values applied. `None` if the text or a value has
+    /// errors.
     pub fn camera_of(text: &str, sets: &[String]) -> Option<Camera> {
         document::camera_of(&SceneText::with_sets(text.into(), sets).ok()?)
     }
 
-    /// Warnings about lights that shine away from everything, in scenes with mesh files. Only calls `bounds`
+    /// Warnings about lights that shine away from everything, for scenes with mesh files. Only calls `bounds`
     /// if there are candidates. `bounds` returns one item per entry of [`Scene::mesh_files`].
     pub fn lights_facing_away(&self, bounds: impl FnOnce() -> Vec<MeshBounds>) -> Vec<Diagnostic> {
         if self.scene.mesh_files.is_empty() {
@@ -161,15 +162,15 @@ pub struct Outcome {
     pub scene: Option<Scene>,
     /// Errors and warnings, in text order.
     pub diagnostics: Vec<Diagnostic>,
-    /// Spans of the settings' values.
+    /// Spans of the values in `[render]` and `[photons]`.
     pub settings: Vec<Setting>,
 }
 
 /// Reads and validates a scene file. `sets` are overrides of the form `TABLE.KEY=VALUE`.
 ///
 /// # Errors
-/// All errors and warnings, in file order. Anything but a regular file of at most [`MAX_FILE_BYTES`] bytes of UTF-8 is
-/// rejected without blocking.
+/// Returns all errors and warnings, in file order. Rejects anything but a regular UTF-8 file of at most
+/// [`MAX_FILE_BYTES`] bytes, without blocking.
 pub fn load(path: &Path, sets: &[String]) -> Result<Loaded, Vec<Diagnostic>> {
     let text = read::read_scene_text(path).map_err(|problem| vec![*problem])?;
     load_source(SceneText::with_sets(text, sets)?, path, sets)
@@ -196,7 +197,7 @@ fn load_source(source: SceneText, path: &Path, sets: &[String]) -> Result<Loaded
     }
 }
 
-/// The files that a scene file references, even if the scene has errors. Empty for models and unreadable files.
+/// The files referenced by a scene file, even if the scene has errors. Empty for models and unreadable files.
 pub fn named_files(path: &Path) -> Vec<PathBuf> {
     if is_model(path) {
         return Vec::new();

@@ -1,4 +1,5 @@
-//! Recognizes models, images, parts and checkpoints passed instead of a scene, from their first bytes.
+//! Recognizes models, images, image parts and checkpoints that are passed instead of a scene, by their first
+//! bytes.
 
 use std::io::Read;
 use std::path::Path;
@@ -22,12 +23,12 @@ pub(super) enum OtherContent {
     Model { format: &'static str, ending: &'static str },
     /// An image of this format.
     Image(&'static str),
-    /// A part or a checkpoint.
+    /// An image part or a checkpoint.
     Part,
 }
 
-/// Checks whether a file is an image, a part or a checkpoint, regardless of its name, and returns its format
-/// and an error. `None` for other or unreadable files.
+/// Checks whether a file is an image, an image part or a checkpoint, regardless of its name. Returns its
+/// format and an error, or `None` for other or unreadable files.
 pub fn other_content(path: &Path) -> Option<(&'static str, Box<Diagnostic>)> {
     const START: u64 = 1 << 10;
     let (opened, _) = file::open(path).ok()?.ok()?;
@@ -93,7 +94,7 @@ fn image_format(bytes: &[u8]) -> Option<&'static str> {
         [b'P', b'1'..=b'7', b' ' | b'\t' | b'\r' | b'\n', rest @ ..] if !begins_with(rest, b'=') => {
             Some("PPM")
         }
-        // The reserved bytes are 0. Text does not contain 0.
+        // The reserved bytes of a BMP header are 0, which does not occur in text.
         [b'B', b'M', _, _, _, _, 0, 0, 0, 0, ..] => Some("BMP"),
         _ => is_tga(bytes).then_some("TGA"),
     }

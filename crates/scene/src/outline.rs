@@ -31,7 +31,7 @@ pub struct OutlineTable {
 pub struct SpannedName {
     /// The name.
     pub text: String,
-    /// Byte range in the text.
+    /// Byte range of the name in the text.
     pub span: Range<usize>,
 }
 

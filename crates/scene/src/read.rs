@@ -56,7 +56,7 @@ pub(super) fn read_scene_text(path: &Path) -> Result<Arc<str>, Box<Diagnostic>> 
     }
 }
 
-/// Error for a binary file.
+/// Creates the error for a binary file.
 pub(super) fn binary_file_error(path: &Path) -> Box<Diagnostic> {
     Diagnostic::error(
         path,
@@ -66,7 +66,7 @@ pub(super) fn binary_file_error(path: &Path) -> Box<Diagnostic> {
     )
 }
 
-/// Error for a mesh passed instead of a scene.
+/// Creates the error for a mesh passed instead of a scene.
 fn mesh_file_error(path: &Path) -> Box<Diagnostic> {
     let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
     let help = format!(
@@ -194,7 +194,8 @@ fn unreadable_refusal(path: &Path, error: &io::Error) -> Refusal {
 /// Maximum number of files to examine per folder.
 pub(super) const MAX_FOLDER_FILES: usize = 2_000;
 
-/// The file with the most similar name in a missing file's folder, among files accepted by `may_be_meant`.
+/// Finds the file with the most similar name in a missing file's folder. Considers only files accepted by
+/// `may_be_meant`.
 pub(super) fn similar_file(path: &Path, may_be_meant: impl Fn(&Path) -> bool) -> Option<PathBuf> {
     let parent = path.parent()?;
     let listed = if parent.as_os_str().is_empty() { Path::new(".") } else { parent };
@@ -209,7 +210,7 @@ pub(super) fn similar_file(path: &Path, may_be_meant: impl Fn(&Path) -> bool) ->
     Some(parent.join(near))
 }
 
-/// A file with the same text in a missing scene's folder. The scene was probably renamed.
+/// Finds a file with the given text in the folder of a missing scene, which was probably renamed.
 pub fn find_renamed_scene(path: &Path, text: &str) -> Option<PathBuf> {
     let parent = path.parent()?;
     let listed = if parent.as_os_str().is_empty() { Path::new(".") } else { parent };

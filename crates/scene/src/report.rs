@@ -23,12 +23,12 @@ pub use lines::{Piece, ReportLine, Role, lines};
 pub enum Style {
     /// Plain text.
     Plain,
-    /// With ANSI escape sequences.
+    /// Text with ANSI color escape sequences.
     Ansi,
 }
 
-/// Formats diagnostics, sorted by file and position, with a summary line. Empty if there are no diagnostics.
-/// Wraps messages at `width` columns and cuts source lines.
+/// Formats diagnostics, sorted by file and position, with a summary line. Wraps messages at `width` columns
+/// and cuts source lines. Returns an empty string if there are no diagnostics.
 pub fn render(diagnostics: &[Diagnostic], width: usize, style: Style) -> String {
     let renderer = match style {
         Style::Plain => Renderer::plain(),
@@ -133,7 +133,7 @@ fn render_one(diagnostic: &Diagnostic, width: usize, renderer: &Renderer, index:
     if has_origin { rendered } else { without_lines(&rendered, "|") }
 }
 
-/// A rendered line without colors and surrounding whitespace.
+/// A rendered line without color escape sequences and surrounding whitespace.
 fn without_colors(line: &str) -> String {
     let parts = line.split("\u{1b}[").enumerate().map(|(number, part)| match part.split_once('m') {
         Some((_, text)) if number > 0 => text,
@@ -212,12 +212,12 @@ impl LineIndex {
         Self { starts: std::iter::once(0).chain(after).collect() }
     }
 
-    /// The 1-based line of a byte offset.
+    /// The 1-based line number of a byte offset.
     pub(super) fn line(&self, offset: usize) -> usize {
         self.starts.partition_point(|start| *start <= offset)
     }
 
-    /// 1-based line and column. Does not count a byte order mark.
+    /// 1-based line and column of a byte offset. Does not count a byte order mark.
     pub(super) fn locate(&self, source: &str, offset: usize) -> (usize, usize) {
         let offset = floor_char(source, offset);
         let line = self.line(offset);

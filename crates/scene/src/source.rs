@@ -21,7 +21,7 @@ pub struct SceneText {
     is_generated: bool,
 }
 
-/// A `--set` value: its span in the whole text, and the value alone for diagnostics.
+/// A `--set` value: its span in the whole text, and a copy of its text for diagnostics.
 #[derive(Clone, Debug)]
 struct SetValue {
     span: Range<usize>,
@@ -29,16 +29,16 @@ struct SetValue {
 }
 
 impl SceneText {
-    /// The text of a file, without `--set` values.
+    /// Wraps the text of a file, without `--set` values.
     pub fn file(text: Arc<str>) -> Self {
         Self { file: text.len(), all: text, sets: Vec::new(), is_generated: false }
     }
 
-    /// The text of a file with `--set` values of the form `TABLE.KEY=VALUE`. Values that are neither TOML nor
-    /// numbers become strings.
+    /// Combines the text of a file with `--set` values of the form `TABLE.KEY=VALUE`. Values that are neither
+    /// TOML nor numbers become strings.
     ///
     /// # Errors
-    /// One error per malformed value.
+    /// Returns one error per malformed value.
     pub fn with_sets(file: Arc<str>, sets: &[String]) -> Result<Self, Vec<Diagnostic>> {
         if sets.is_empty() {
             return Ok(Self::file(file));
@@ -148,7 +148,7 @@ pub fn toml_string(text: &str) -> String {
     quoted
 }
 
-/// Error message for a malformed `--set` value.
+/// Message of the error for a malformed `--set` value.
 pub(super) const MALFORMED_SET: &str = "malformed value";
 /// Hint for a `--set` value without `=`.
 pub(super) const MISSING_EQUALS_HELP: &str = "add `=` between the key and its value, as in render.samples=3";

@@ -273,7 +273,7 @@ mod properties {
     use super::*;
     use proptest::prelude::*;
 
-    /// Checks that every span is within its text and that every report is safe to print.
+    /// Asserts that every span is within its text and that every report is safe to print.
     fn check(diagnostics: &[Diagnostic]) {
         for place in diagnostics.iter().filter_map(|one| one.place.as_ref()) {
             assert!(place.source.get(place.span.clone()).is_some(), "{:?}", place.span);

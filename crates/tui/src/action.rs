@@ -1,4 +1,4 @@
-//! Key actions.
+//! Actions that keys trigger.
 
 /// An action that the user can trigger.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

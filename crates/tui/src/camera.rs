@@ -10,10 +10,10 @@ use crate::scene::description::Pose;
 const POLE: f64 = 1.0;
 /// Range of the field of view, in degrees.
 const FIELD: (f64, f64) = (1.0, 160.0);
-/// Maximum ratio between the distance and the scene camera's distance, in either direction.
+/// Maximum factor by which the distance to `look_at` may differ from the scene camera's, in either direction.
 pub(super) const REACH: f64 = 1000.0;
 
-/// Orbits around `look_at` by `right` and `up` degrees.
+/// Orbits the camera around `look_at` by `right` and `up` degrees.
 pub(super) fn orbited(pose: &Pose, right: f64, up: f64) -> Pose {
     let axis = pose.up.normalize_or(DVec3::Y);
     let arm = pose.position - pose.look_at;
@@ -44,7 +44,7 @@ pub(super) fn zoomed(view: &Viewpoint, factor: f64) -> f64 {
     rounded((view.fov * factor).clamp(least, most), 0.01)
 }
 
-/// Moves the eye to `look_at + arm`, rounded to 1/100,000 of the arm's length or better.
+/// Moves the eye to `look_at + arm`, rounded to at most 1/10,000 of the arm's length.
 fn with_eye_at(pose: &Pose, arm: DVec3) -> Pose {
     let step = decimal_step(arm.length());
     let position = (pose.look_at + arm).to_array().map(|number| rounded(number, step));

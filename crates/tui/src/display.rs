@@ -24,10 +24,10 @@ pub(super) const ATTRIBUTES: &[u8] = b"\x1b[c";
 pub(super) const STATUS: &[u8] = b"\x1b[5n";
 const BEGIN: &[u8] = b"\x1b[?2026h";
 const END: &[u8] = b"\x1b[?2026l";
-/// Slices smaller than this do not flicker.
+/// Minimum size of a slice that needs synchronized output, in bytes. Smaller slices do not flicker.
 const LARGE: usize = 2_000;
 
-/// Properties of the terminal and its connection, from the environment.
+/// Properties of the terminal and its connection, as detected from environment variables.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct TerminalLink {
     /// Whether glimt runs inside tmux or screen, which reply to queries themselves and delay drawing.
@@ -38,7 +38,7 @@ pub(super) struct TerminalLink {
     pub(super) is_remote: bool,
     /// Whether the terminal supports REP (repeat character).
     pub(super) can_repeat: bool,
-    /// Queries to send.
+    /// Queries to send to the terminal.
     pub(super) ask: TerminalQueries,
 }
 
@@ -56,13 +56,13 @@ pub(super) type TerminalWriter = Box<dyn FnMut(Vec<u8>)>;
 /// The event loop's interface to the terminal's screen.
 pub(super) struct Display {
     painter: Painter,
-    /// The preview, if drawn as pixels.
+    /// The preview, if it is drawn as pixels.
     images: Option<Images>,
     connection: Connection,
     link: TerminalLink,
-    /// Sends bytes to the terminal.
+    /// Writer that sends bytes to the terminal.
     out: TerminalWriter,
-    /// Whether the terminal supports mode 2026.
+    /// Whether the terminal supports synchronized output (mode 2026).
     is_synchronized: bool,
     /// Whether the target has been sent completely.
     is_complete: bool,
@@ -139,14 +139,14 @@ impl Display {
         self.images.is_some()
     }
 
-    /// Places the preview in pixels. `None` if it is drawn using cells.
+    /// Places a preview drawn as pixels. `None` if the preview is drawn as cells.
     pub(super) fn place_pixels(&mut self, wanted: Option<PixelPlacement>, is_still: bool) {
         if let Some(uncovered) = self.images.as_mut().and_then(|images| images.set_target(wanted, is_still)) {
             self.painter.damage(uncovered);
         }
     }
 
-    /// Sets a new target. `is_new` if the preview in it is new.
+    /// Sets a new target. `is_new` if it contains a new preview.
     pub(super) fn set_target(
         &mut self,
         wanted: &Buffer,
@@ -217,8 +217,8 @@ impl Display {
             self.send_slice(self.wrap_synchronized(cells), now);
             return true;
         }
-        // Do not use synchronized output: kitty 0.26 loses image chunks in it. It is not needed, since an
-        // image appears only with its last chunk.
+        // Do not use synchronized output for images: kitty 0.26 loses chunks inside it. It is not needed,
+        // because an image appears only once its last chunk has arrived.
         let rate = self.connection.bytes_per_second();
         let pixels = self.images.as_mut().and_then(|images| images.next_slice(room, rate));
         match pixels {

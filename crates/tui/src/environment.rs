@@ -48,8 +48,8 @@ fn image_protocol(preview: PreviewChoice) -> Option<Protocol> {
     }
 }
 
-/// Queries to send. Most are not sent to multiplexers, which reply on their own behalf or not at all, or to
-/// plain terminals, which may print them as text.
+/// Queries to send to the terminal. Multiplexers, which reply on their own behalf or not at all, and plain
+/// terminals, which may print queries as text, get only a few of them.
 pub(super) fn terminal_queries(
     preview: PreviewChoice,
     color: ColorChoice,

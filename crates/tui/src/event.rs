@@ -49,17 +49,17 @@ pub(super) enum Event {
     Settled,
     /// An output file was modified or restored by another program.
     Output(OutputChange),
-    /// A signal or an equivalent event.
+    /// A signal was received, or the terminal was closed.
     Signal(Signal),
     /// The first bytes of a preview for this request have been sent.
     Shown { generation: u64 },
-    /// Time has passed.
+    /// A timeout of the event loop has expired.
     Tick,
     /// Ctrl-z was pressed, but no shell could continue the process.
     NoShell,
     /// The editor has exited.
     Back,
-    /// The editor could not be run, for this reason.
+    /// The editor could not be run. Contains the reason.
     NoEditor(String),
     /// A source of events has ended.
     Lost(EventSource),
@@ -84,17 +84,17 @@ pub(super) struct KeyPress {
 }
 
 impl KeyPress {
-    /// A character without ctrl or alt.
+    /// A key press of a character without ctrl or alt.
     pub(super) const fn plain(character: char) -> Self {
         Self { code: KeyCode::Char(character), modifiers: KeyModifiers::NONE }
     }
 
-    /// A character with ctrl.
+    /// A key press of a character with ctrl.
     pub(super) const fn ctrl(character: char) -> Self {
         Self { code: KeyCode::Char(character), modifiers: KeyModifiers::CONTROL }
     }
 
-    /// A key that is not a character.
+    /// A key press of a key other than a character.
     pub(super) const fn special(code: KeyCode) -> Self {
         Self { code, modifiers: KeyModifiers::NONE }
     }
@@ -104,9 +104,9 @@ impl KeyPress {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Mouse {
     pub kind: MouseKind,
-    /// Counted from 0.
+    /// Column of the cell, counted from 0.
     pub column: u16,
-    /// Counted from 0.
+    /// Row of the cell, counted from 0.
     pub row: u16,
 }
 
@@ -114,7 +114,7 @@ pub(super) struct Mouse {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum MouseKind {
     Press,
-    /// Moved while the button was down.
+    /// The mouse was moved while the button was down.
     Drag,
     Release,
     WheelUp,
@@ -128,7 +128,7 @@ pub(super) struct Window {
     pub rows: u16,
     /// Height of a cell divided by its width.
     pub cell_aspect: f32,
-    /// Cell size in pixels. A typical size if the terminal does not report it.
+    /// Cell size in pixels, or a typical size if the terminal does not report it.
     pub cell_pixels: (u16, u16),
 }
 
@@ -190,9 +190,9 @@ pub(super) enum Effect {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct FilePosition {
     pub path: PathBuf,
-    /// Counted from 1.
+    /// Line number, counted from 1.
     pub line: usize,
-    /// Counted from 1.
+    /// Column in characters, counted from 1.
     pub column: usize,
 }
 

@@ -8,7 +8,7 @@ use crate::pipeline::settings::{CameraChange, View};
 use crate::pipeline::words::seconds;
 use crate::scene::sanitize::visible;
 
-/// The written files with their samples and times, and what happened after they were written.
+/// Lists the written files with their sample counts and render times, followed by later events.
 pub(super) fn summary_text(state: &State) -> String {
     match &state.saving.write_failed {
         Some(failed) => describe_write_failure(state, failed),
@@ -29,7 +29,7 @@ pub(super) fn unsaved_as_options(state: &State) -> Option<String> {
     (!options.is_empty() && !is_in_file).then(|| format!("not kept: {}", options.join(" ")))
 }
 
-/// File names of the image. `None` until the scene has been read.
+/// Names of the image's output files. `None` until the scene has been read.
 pub(super) fn image_name(state: &State) -> Option<String> {
     let outputs = &state.request.effective.as_ref()?.outputs;
     let names: Vec<_> = outputs.iter().map(|path| visible(&path.to_string_lossy()).into_owned()).collect();
@@ -51,12 +51,12 @@ fn reason_for_no_image(state: &State) -> String {
     }
 }
 
-/// Appended to the written files if the scene has been edited since.
+/// Appended to the list of written files if the scene was edited after they were written.
 const OLDER_THAN_EDIT: &str = " (older than your last edit)";
-/// The render started after the files were written.
+/// Names the render that was started after the files were written.
 const NEXT_RENDER: &str = "the next render";
 
-/// What happened after the files were written.
+/// Describes the events after the files were written.
 fn events_since_writing(state: &State) -> String {
     if is_scene_broken(state) {
         return format!("; {} has errors since", scene_name(state));
@@ -96,7 +96,7 @@ fn scene_name(state: &State) -> String {
     visible(&name).into_owned()
 }
 
-/// The written files and their descriptions, grouped by image.
+/// Lists the written files and their descriptions, grouped by image.
 fn describe_files(written: &[WrittenFile]) -> String {
     let alike = written.chunk_by(|one, next| one.made == next.made && one.shows == next.shows);
     let said: Vec<String> = alike
@@ -115,7 +115,8 @@ fn describe_files(written: &[WrittenFile]) -> String {
     said.join("; ")
 }
 
-/// The image that could not be written and why, followed by other files of this and earlier images.
+/// Names the image that could not be written and the reason, followed by other files of this and earlier
+/// images.
 fn describe_write_failure(state: &State, failed: &WriteFailure) -> String {
     let mut words = format!("not written: {}", visible(&failed.why));
     for written in &state.saving.written {
@@ -131,8 +132,7 @@ fn describe_write_failure(state: &State, failed: &WriteFailure) -> String {
     words
 }
 
-/// Describes an image and its render time. If its samples were reused, the time is that of the original
-/// render.
+/// Describes an image and its render time. If its samples were reused, this is the original render's time.
 pub(super) fn describe_image(report: &Report, shown: View) -> String {
     let image = &report.image;
     let time = seconds(report.seconds.max(image.render_seconds));
@@ -405,7 +405,7 @@ mod tests {
         assert_eq!(summary_text(&ui.state), made);
         ui.press(']');
         assert_eq!(summary_text(&ui.state), made);
-        // Samples for a new version of the image.
+        // A new version of the image is being rendered.
         ui.press('0');
         let generation = ui.state.request.generation;
         ui.worker_event(Event::Started { generation });
@@ -447,7 +447,7 @@ mod tests {
         let made = "wrote cornell.png: 640×480, 64 samples, 1.93 s, with shadows hard";
         assert_eq!(summary_text(&ui.state), made);
         assert!(ui.text().contains("→ cornell.png"), "{}", ui.text());
-        // Back at the scene's own image, which has not been written yet.
+        // Return to the scene's own image, which has not been written yet.
         ui.press('0');
         ui.worker_event(Event::Started { generation: ui.state.request.generation });
         assert!(summary_text(&ui.state).starts_with(&format!("{made}; {NEXT_RENDER}")));

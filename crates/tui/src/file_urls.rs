@@ -15,12 +15,12 @@ pub(super) struct FileUrls {
 impl FileUrls {
     /// URLs of files on this machine.
     pub(super) fn local() -> Self {
-        // Linux only. On other systems the host name is omitted.
+        // This file exists only on Linux. On other systems, the host name is omitted.
         let host = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
         Self { folder: std::env::current_dir().unwrap_or_default(), host: host.trim().to_owned() }
     }
 
-    /// `file://host/path` (RFC 8089).
+    /// The URL of a file, in the form `file://host/path` (RFC 8089).
     pub(super) fn url(&self, path: &Path) -> String {
         let mut address = format!("file://{}", percent_encode(self.host.as_bytes()));
         address += &percent_encode(self.folder.join(path).as_os_str().as_bytes());

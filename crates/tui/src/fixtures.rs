@@ -125,7 +125,7 @@ impl TestUi {
         self.worker_event(protocol::Event::Failed { generation, failure: Failure::Scene(diagnostics) });
     }
 
-    /// Draws the screen.
+    /// Draws the screen into a buffer.
     pub(super) fn draw_screen(&mut self) -> Buffer {
         self.state.dirty = false;
         let mut buffer =
@@ -183,7 +183,7 @@ pub(super) fn effective_settings() -> EffectiveSettings {
     }
 }
 
-/// The scene file's settings.
+/// Settings from the scene file, before any overrides.
 pub(super) fn own_settings() -> AdjustableSettings {
     AdjustableSettings { integrator: Integrator::Whitted, shadows: Shadows::Soft, photons: false }
 }

@@ -13,7 +13,7 @@ use crate::state::ImageOrigin;
 
 /// Memory limit for all images and scene texts, in bytes.
 const MAX_BYTES: usize = 16 << 20;
-/// Maximum width and height of a thumbnail, which octants can just resolve.
+/// Maximum width and height of a thumbnail in pixels. Octants can just resolve this size.
 const SMALL: f32 = 32.0;
 
 /// An image and the request it shows.
@@ -47,11 +47,11 @@ impl ShownImage {
 /// Recent renders, and the one being viewed.
 #[derive(Debug, Default)]
 pub(super) struct History {
-    /// Oldest first.
+    /// Recent renders, oldest first.
     past: VecDeque<HistoryEntry>,
     /// Number of scene edits.
     edits: u64,
-    /// The last edit that left the scene valid and may have changed the image.
+    /// Number of the last edit that left the scene valid and may have changed the image.
     read_edits: u64,
     /// Index of the older render being viewed, and the newest image.
     open: Option<(usize, ShownImage)>,
@@ -62,7 +62,7 @@ struct HistoryEntry {
     shown: ShownImage,
     /// Time when the render last improved the image.
     time: Instant,
-    /// The last edit included in the image.
+    /// Number of the last edit included in the image.
     edits: u64,
     origin: ImageOrigin,
     /// Number of the render that finished the image. `None` if the image is unfinished.
@@ -109,8 +109,8 @@ impl History {
         past.marked_if_stopped(words)
     }
 
-    /// Records that the camera moved with keys since request `since` has been written to the scene. This
-    /// counts as an edit that is included in all entries since then.
+    /// Records that the camera, moved with keys since request `since`, has been written to the scene. This
+    /// counts as an edit that all entries since that request include.
     pub(super) fn record_saved_camera(&mut self, since: u64) {
         self.edits += 1;
         self.read_edits = self.edits;
@@ -119,7 +119,7 @@ impl History {
         }
     }
 
-    /// Moves a request's entry to the next request, which shows the same image differently.
+    /// Reassigns a request's entry to the next request, which shows the same image differently.
     pub(super) fn transfer_to_next(&mut self, generation: u64) {
         for past in self.past.iter_mut().filter(|past| past.shown.generation == generation) {
             past.shown.generation = generation + 1;
@@ -140,7 +140,7 @@ impl History {
                     // Edits since then had no visible effect.
                     self.read_edits = past.edits;
                 }
-                // An image keeps its origin.
+                // If the image is the same, keep its origin.
                 let is_same = known.is_none() || past.shown.shows_same_image(&shown);
                 let origin = if is_same { past.origin.for_same_image(origin) } else { origin };
                 self.replace(at, (shown, time), origin);
@@ -302,14 +302,14 @@ impl History {
         place.is_some_and(|place| place + 1 >= self.past.len())
     }
 
-    /// Opens the last render from before the last edit that changed the image.
+    /// Opens the last render made before the last edit that changed the image.
     pub(super) fn open_before_edit(&mut self, newest: ShownImage) -> Option<ShownImage> {
         let last = self.past.back()?.edits;
         let at = self.past.iter().rposition(|past| past.edits < last)?;
         self.show_entry(at, newest)
     }
 
-    /// Number of entries.
+    /// Number of history entries.
     pub(super) fn len(&self) -> usize {
         self.past.len()
     }
@@ -324,7 +324,7 @@ impl History {
         self.open.as_ref().map(|(at, _)| *at).or_else(|| self.past.len().checked_sub(1))
     }
 
-    /// An entry's thumbnail.
+    /// The thumbnail of a history entry.
     pub(super) fn thumbnail(&self, at: usize) -> Option<&Picture> {
         let past = self.past.get(at)?;
         Some(past.small.get_or_init(|| thumbnail(&past.shown.picture)))
@@ -348,7 +348,7 @@ impl History {
         unfinished.into_iter().chain(words).collect()
     }
 
-    /// Opens an entry.
+    /// Opens a history entry for viewing.
     pub(super) fn open_at(&mut self, at: usize, newest: ShownImage) -> Option<ShownImage> {
         self.show_entry(at, newest)
     }
@@ -372,7 +372,8 @@ impl History {
 }
 
 impl HistoryEntry {
-    /// Whether the entry shows the same image. An image in progress differs from its finished version.
+    /// Whether the entry shows the same image as `shown`. An unfinished image differs from an entry that is
+    /// finished.
     fn is_same_image(&self, shown: &ShownImage, origin: &ImageOrigin) -> bool {
         let is_of_image =
             self.shown.shows_same_image(shown) && (self.origin.is_unfinished || !origin.is_unfinished);
@@ -381,7 +382,7 @@ impl HistoryEntry {
         is_of_image || self.shown.picture == shown.picture && !may_change
     }
 
-    /// Adds a mark to `words` if the render was stopped.
+    /// Prefixes `words` with a label if the render was stopped.
     fn marked_if_stopped(&self, words: String) -> String {
         if self.origin.is_unfinished { format!("{}: {words}", messages::STOPPED) } else { words }
     }
@@ -398,7 +399,7 @@ fn thumbnail(picture: &Picture) -> Picture {
     resized(picture, side(picture.width), side(picture.height))
 }
 
-/// Formats an age.
+/// Formats the age of a render, such as `2 min ago`.
 pub(super) fn age_in_words(time: Duration) -> String {
     match time.as_secs() {
         seconds @ ..120 => format!("{seconds} s ago"),
@@ -520,7 +521,7 @@ mod tests {
         assert_eq!(history.open_before_edit(shown_image(3, 30)).expect("a picture").generation, 1);
     }
 
-    /// An image with all or some of its samples.
+    /// A preview of an image with all or some of its samples, and its origin.
     fn of_image(generation: u64, name: &str, is_finished: bool) -> (ShownImage, ImageOrigin) {
         let source = Some(PreviewSource { image: Fingerprint::new(name).finish(), is_finished });
         // Make every preview different.
@@ -541,7 +542,7 @@ mod tests {
         // Editing a comment does not change the image.
         edit(&mut history);
         assert_eq!(record(&mut history, 2, "first", true), 1);
-        // Render again, interrupt by introducing a typo, then finish with the existing samples.
+        // Render again, interrupt the render with a typo, then finish it from the existing samples.
         assert_eq!(record(&mut history, 3, "first", false), 2);
         assert_eq!(record(&mut history, 4, "first", false), 2);
         assert_eq!(record(&mut history, 5, "first", true), 1);
@@ -598,7 +599,7 @@ mod tests {
         assert_eq!((history.past.len(), history.past[0].shown.picture.width), (1, 20));
     }
 
-    /// A scene with this text and view.
+    /// Origin of an image of a scene with this text, shown in this view.
     fn origin(text: &str, view: Option<View>) -> ImageOrigin {
         let toggles = KeyOverrides { view, ..KeyOverrides::default() };
         ImageOrigin { toggles, text: Some(text.into()), ..ImageOrigin::default() }
@@ -614,7 +615,7 @@ mod tests {
         let (wide, narrow) = ("camera.fov = 40", "camera.fov = 30");
         let seed = "camera.fov = 30\nseed = 1";
         history.record(shown_image(1, 10), Instant::now(), origin(wide, None));
-        // Two saves. Only the second could be read.
+        // Save twice. Only the second version can be read.
         history.record_edit();
         history.record_edit();
         history.record(shown_image(2, 20), Instant::now(), origin(narrow, None));

@@ -6,7 +6,7 @@ use super::action::Action;
 use super::event::KeyPress;
 use super::messages;
 
-/// A row of a key table.
+/// A row of a table of key bindings.
 pub(super) struct Binding<A = Action> {
     /// Keys with this binding.
     pub keys: &'static [KeyPress],
@@ -15,7 +15,7 @@ pub(super) struct Binding<A = Action> {
     pub action: A,
     /// Description in the help. Empty if the previous row covers the key.
     pub help: &'static str,
-    /// A word for the key line. Empty if the line omits the key.
+    /// The word shown in the key line. Empty if the key line omits the key.
     pub hint: &'static str,
 }
 

@@ -81,7 +81,7 @@ fn work(orders: &Receiver<Command>, events: &Sender<Event>, slot: &Mutex<Option<
     }
 }
 
-/// Simulates a two-second render that the next command can stop.
+/// Simulates a two-second render that the next command interrupts.
 fn simulate_render(
     request: &Request,
     orders: &Receiver<Command>,

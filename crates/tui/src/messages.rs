@@ -15,8 +15,8 @@ pub const CLOSEST: &str = "closest zoom reached";
 pub const FARTHEST: &str = "farthest zoom reached";
 /// Shown when `c` was pressed but the camera has not been moved.
 pub const NOTHING_TO_KEEP: &str = "camera unchanged: nothing to keep";
-/// Explains why `c` has to be pressed again. Follows the names of the saved keys.
-pub const CAMERA_CONFLICT: &str = "was saved since you moved the camera: press c again to overwrite it";
+/// Explains why `c` has to be pressed again. Follows the list of saved camera settings.
+pub const CAMERA_CONFLICT: &str = "was saved after you moved the camera: press c again to overwrite it";
 /// Shown when `u` was pressed but no camera has been saved.
 pub const NOTHING_TO_UNDO: &str = "nothing to undo";
 /// Shown when `u` was pressed but `c` only created a new scene file.
@@ -92,7 +92,7 @@ pub const OLDER_RENDER: &str = "can't inspect an older render. b: back to the ne
 pub const HISTORY_KEYS: [&str; 2] = ["n older", "N newer"];
 /// Title of the history panel.
 pub const HISTORY: &str = "History";
-/// Describes a render without a number.
+/// Describes a render that has no number.
 pub fn unnumbered_render(state: &str) -> String {
     format!("{state} render")
 }
@@ -124,16 +124,16 @@ pub fn render_number(number: impl Display) -> String {
 
 /// Label for a render that was stopped.
 pub const STOPPED: &str = "stopped";
-/// Listed as the change of the first render.
+/// Change listed for the first render in the history.
 pub const OPENED: &str = "opened";
-/// Listed as the change if a render differs from the previous one only in noise.
+/// Change listed for a render that differs from the previous one only in noise.
 pub const AGAIN: &str = "rendered again";
 
 /// Shown when depth of field was requested for a camera without a lens.
 pub const PINHOLE: &str = "no depth of field: aperture is 0";
 /// Shown when `f` was pressed and a click is expected.
 pub const CLICK_TO_FOCUS: &str = "click to focus there · f: at the crosshair";
-/// Shown when the background was chosen as focus.
+/// Shown when the user tries to focus on the background.
 pub const NOTHING_TO_FOCUS: &str = "nothing to focus on there";
 /// Shown when `y` was pressed before any click.
 pub const NOTHING_TO_COPY: &str = "nothing to copy: click or press Enter first";
@@ -189,7 +189,7 @@ pub const NOT_WATCHING: &str = "file watching stopped; press r to re-render";
 /// Shown when the image could not be written.
 pub const NOT_WRITTEN: &str = "not written (e: why)";
 /// Shown when writing the image was postponed.
-pub const WRITE_POSTPONED: &str = "the image will be written when every pixel has a sample";
+pub const WRITE_POSTPONED: &str = "the image will be written once every pixel has a sample";
 /// Shown when a render continues from a checkpoint.
 pub const RESUMING: &str = "resuming from";
 
@@ -200,7 +200,7 @@ pub fn only_soft_shadows(integrator: &str, other: &str) -> String {
 
 /// Shown when the integrator does not use photons.
 pub fn photons_unsupported(other: &str) -> String {
-    format!("photons work with {other} only (i switches)")
+    format!("photons work only with {other} (i: switch)")
 }
 
 /// Shown when a view was chosen.
@@ -274,9 +274,9 @@ pub fn noise_target(share: &str) -> String {
     format!("── target: {share} per tile")
 }
 
-/// Help for `?`.
+/// Help text for the `?` key.
 pub const HELP_TOGGLE: &str = "show or hide this help";
-/// Help for stage times.
-pub const HELP_STAGE_TIME: &str = "stage time (difference to the last render)";
-/// Help for the cost of sending a preview.
+/// Help text for stage times.
+pub const HELP_STAGE_TIME: &str = "stage time (difference from the last render)";
+/// Help text for the cost of sending a preview.
 pub const HELP_BYTES: &str = "bytes of this render; round trip to the terminal";

@@ -42,7 +42,7 @@ pub struct Options {
     pub scene: PathBuf,
     /// Overrides from the command line. Keys can make further changes.
     pub overrides: Overrides,
-    /// Choice of colors.
+    /// Which colors to use.
     pub color: ColorChoice,
     /// How to draw the preview.
     pub preview: PreviewChoice,
@@ -90,9 +90,9 @@ pub struct TuiOutcome {
     pub status: ExitStatus,
     /// Whether the user requested an image that has been neither written nor refused yet.
     pub is_write_unanswered: bool,
-    /// The written files with their samples and render times, in one line.
+    /// The written files with their sample counts and render times, in one line.
     pub summary: String,
-    /// Whether a file was written.
+    /// Whether any image file was written.
     pub has_written: bool,
     /// Whether the last attempt to write an image failed or was refused.
     pub is_unwritten: bool,
@@ -106,7 +106,7 @@ pub enum TuiError {
     /// Standard input or output is a file or a pipe.
     #[error("{stream} is not a terminal: use `--once` to render without one")]
     NotATerminal {
-        /// `standard input` or `standard output`.
+        /// The stream: `standard input` or `standard output`.
         stream: &'static str,
     },
     /// The terminal could not be set up or written to.
@@ -114,7 +114,7 @@ pub enum TuiError {
     Terminal {
         /// The operation that failed.
         action: &'static str,
-        /// Why not.
+        /// The underlying error.
         source: std::io::Error,
     },
     /// The worker ended unexpectedly.

@@ -12,17 +12,17 @@ pub(super) const QUERY_ID: u32 = 4211;
 pub(super) const KITTY_QUERY: &[u8] = b"\x1b_Gi=4211,s=1,v=1,a=q,t=d,f=24;AAAA\x1b\\";
 /// Query for the terminal's name and version (XTVERSION).
 const NAME_QUERY: &[u8] = b"\x1b[>q";
-/// Time after which the user is told that a reply is missing.
+/// Time after which a missing reply is reported to the user.
 const REPLY_TIMEOUT: Duration = Duration::from_secs(1);
 
-/// How escape sequences reach the terminal, as far as this affects images.
+/// How escape sequences for images reach the terminal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum ImageRoute {
-    /// Nothing.
+    /// Directly, without a multiplexer.
     Direct,
-    /// tmux, which passes on wrapped escape sequences if `allow-passthrough` is on.
+    /// Through tmux, which passes on wrapped escape sequences if `allow-passthrough` is on.
     Tmux,
-    /// GNU screen, or a console that prints unknown escape sequences. No queries are sent.
+    /// Not at all, in GNU screen and in consoles that print unknown escape sequences. No queries are sent.
     Closed,
 }
 
@@ -49,7 +49,7 @@ impl PixelRequest {
         Self { protocol, route, is_known: protocol == Protocol::Iterm && has_iterm }
     }
 
-    /// The query to send. Empty if it is one of the other queries or cannot be sent.
+    /// The query for the protocol. Empty if other queries cover it or it cannot be sent.
     pub(super) fn query(self) -> Vec<u8> {
         match (self.protocol, self.route) {
             (Protocol::Kitty, ImageRoute::Direct) => KITTY_QUERY.to_vec(),
@@ -61,7 +61,7 @@ impl PixelRequest {
         }
     }
 
-    /// Time at which the user is told that a reply is missing.
+    /// Time at which a missing reply is reported to the user.
     pub(super) fn reply_deadline(self, now: Instant) -> Instant {
         if self.route == ImageRoute::Closed { now } else { now + REPLY_TIMEOUT }
     }

@@ -31,7 +31,7 @@ pub(super) struct Presenter {
     previews: PreviewSlot,
     /// Creates URLs for written files.
     files: FileUrls,
-    /// Earliest time for the next frame, unless it is urgent.
+    /// Earliest time of the next frame, except for urgent frames.
     next_frame: Instant,
     /// The newest request for which a preview has been drawn.
     newest: u64,
@@ -42,17 +42,17 @@ pub(super) struct Presenter {
 struct DrawnPreview {
     picture: Option<Arc<Picture>>,
     generation: u64,
-    /// Mean samples per pixel.
+    /// Mean samples per pixel when the preview was drawn.
     samples: f64,
-    /// Time when it became the target.
+    /// Time when this preview became the display's target.
     at: Option<Instant>,
     /// Whether the slot contains a newer preview of the same request that was not worth sending yet.
     is_old: bool,
-    /// Whether it is the first preview of its request.
+    /// Whether this is the first preview of its request.
     is_first: bool,
-    /// Whether part of it may have been sent.
+    /// Whether part of this preview may have been sent.
     is_shown: bool,
-    /// Whether idle bandwidth is being used to draw it with exact colors.
+    /// Whether idle bandwidth is being used to redraw the preview with exact colors.
     is_refined: bool,
 }
 
@@ -79,8 +79,7 @@ impl Presenter {
         self.take_preview()
     }
 
-    /// Whether the newest preview and the drawn one differ in size, in section or in whether photons are
-    /// missing.
+    /// Whether the newest preview differs from the drawn one in size, section or missing photons.
     fn is_preview_incompatible(&self, state: &State) -> bool {
         let latest = self.previews.lock().unwrap_or_else(PoisonError::into_inner);
         let what = |picture: &Picture| (picture.width, picture.height);
@@ -133,7 +132,7 @@ impl Presenter {
         Some(Event::Picture { generation, picture, range, section, lacks_photons, source })
     }
 
-    /// Delays the next frame because another program is using the screen.
+    /// Schedules the next frame one frame interval after `now`, even if it was urgent.
     pub(super) fn postpone(&mut self, state: &mut State, now: Instant) {
         state.urgent = false;
         self.next_frame = now + FRAME;
@@ -157,7 +156,7 @@ impl Presenter {
             self.display.set_title(title);
         }
         let is_new = self.record_preview(state, now);
-        // It remains the first preview until it is complete on the screen or a newer one is drawn.
+        // A preview counts as the first until it is complete on the screen or a newer one is drawn.
         self.drawn.is_first &= is_new || !self.display.is_complete();
         let area = Layout::for_state(state).preview;
         self.display.place_pixels(view::preview::placement(state, area), is_final_preview(state));
@@ -165,7 +164,7 @@ impl Presenter {
         self.display.set_target(&buffer, area, self.fidelity(state), (is_new, &extras));
     }
 
-    /// Hyperlinks, if the terminal supports them, and text to draw after the preview.
+    /// The frame's hyperlinks, if the terminal supports them, and the text to draw after the preview.
     fn frame_extras(&self, state: &State, drawn: ViewExtras) -> FrameExtras {
         let files = drawn.files.into_iter().filter(|_| state.display.capabilities.links);
         let link = |(cells, path): (Rect, PathBuf)| Hyperlink { cells, address: self.files.url(&path) };
@@ -249,7 +248,7 @@ fn is_final_preview(state: &State) -> bool {
     state.work.paused || !state.work.is_running() && view::status_line::last_good_progress(state).is_none()
 }
 
-/// When the state next needs a frame or a tick.
+/// Time at which the state next needs a frame or a tick.
 fn next_wake(state: &State, next_frame: Instant) -> Option<Instant> {
     let frame = state.dirty.then_some(if state.urgent { state.now } else { next_frame });
     [frame, state.next_tick()].into_iter().flatten().min()

@@ -20,15 +20,15 @@ pub(super) enum PreviewKind {
 }
 
 impl PreviewKind {
-    /// Determines the kind for the user's choice and the color depth.
+    /// Determines the preview kind from the user's choice and the color depth.
     pub(super) fn from_choice(choice: PreviewChoice, depth: ColorDepth) -> Self {
         match choice {
             PreviewChoice::None => Self::None,
-            // Block characters require colors.
             PreviewChoice::Ascii => Self::Ascii,
             PreviewChoice::Kitty => Self::Pixels(Protocol::Kitty),
             PreviewChoice::Sixel => Self::Pixels(Protocol::Sixel),
             PreviewChoice::Iterm2 => Self::Pixels(Protocol::Iterm),
+            // Block characters require colors.
             _ if depth == ColorDepth::None => Self::Ascii,
             PreviewChoice::Auto | PreviewChoice::HalfBlock => Self::HalfBlock,
             PreviewChoice::Quadrant => Self::Quadrant,
@@ -37,7 +37,7 @@ impl PreviewKind {
         }
     }
 
-    /// The initial kind. Pixels are used only if support is known.
+    /// The initial preview kind. Pixels are used only if the terminal is known to support them.
     pub(super) fn initial(choice: PreviewChoice, depth: ColorDepth, pixels: Option<PixelRequest>) -> Self {
         match (Self::from_choice(choice, depth), pixels) {
             (Self::Pixels(_), Some(request)) if !request.is_known => {

@@ -55,7 +55,7 @@ pub struct ProbeReplies {
 }
 
 impl Probe {
-    /// Name of the characters that draw the preview if the choice is automatic.
+    /// Name of the characters that `--preview auto` uses.
     pub fn preview(&self) -> &'static str {
         let name = self.answers.as_ref().and_then(|answers| answers.name.as_deref());
         let terminal = name.filter(|_| !self.is_multiplexed).and_then(TerminalId::from_report);
@@ -68,7 +68,7 @@ impl Probe {
     }
 }
 
-/// Timeout for the replies.
+/// Timeout for the terminal's replies.
 const PATIENCE: Duration = Duration::from_secs(1);
 
 /// Queries the terminal. `None` if stdin or stdout is not a terminal.

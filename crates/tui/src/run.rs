@@ -137,7 +137,7 @@ impl Ui {
         while end.is_none() {
             end = self.draw_and_send().or_else(|| self.wait());
         }
-        // Keep the checkpoint unless the user quit: a signal arrived, or the terminal was closed or failed.
+        // Keep the checkpoint if a signal arrived, or if the terminal was closed or failed.
         if !matches!(&end, Some(LoopEnd::Quit(ExitStatus::QUIT))) {
             (self.commands)(Command::Suspend);
         }
@@ -317,7 +317,8 @@ impl Ui {
     }
 }
 
-/// Treats a terminal that no longer exists as a hangup even if SIGHUP has not arrived.
+/// How the event loop ends after a write error. If the terminal no longer exists, this is a hangup, even if
+/// SIGHUP has not arrived.
 fn write_error_end(error: io::Error) -> LoopEnd {
     if terminal::terminal_exists() {
         LoopEnd::Error(TuiError::Terminal { action: "write to", source: error })

@@ -165,7 +165,7 @@ pub(super) struct ChildSignalGuard(());
 
 impl Drop for ChildSignalGuard {
     fn drop(&mut self) {
-        // If a key press ended the child, this process also received its signal but may not have handled it
+        // If a key press ended the child, this process received the same signal but may not have handled it
         // yet.
         wait_for_pending_signals();
         CHILD_HANDLES_SIGNALS.store(false, Ordering::Release);
@@ -282,8 +282,8 @@ fn end_after_grace(signal: Signal, status: ExitStatus, over: &AtomicBool) {
     low_level::exit(i32::from(status.0));
 }
 
-/// Whether a stopped process could be continued, meaning that a shell runs in the same session. If this is
-/// the first process in its session, there is no shell.
+/// Whether a shell could continue this process after it stops. That shell must be in the same session, so the
+/// first process of a session has none.
 pub(super) fn has_shell() -> bool {
     match (getsid(None), getsid(Some(getppid()))) {
         (Ok(own), Ok(parents)) => own == parents && own != getpid(),

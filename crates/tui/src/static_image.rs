@@ -27,9 +27,9 @@ const MIN_ROWS: u16 = 7;
 /// An image and its caption.
 #[derive(Clone, Debug)]
 pub struct NamedImage {
-    /// Must not contain control characters.
+    /// The caption, which must not contain control characters.
     pub name: String,
-    /// Images printed together must have the same size.
+    /// The image. Images printed together must have the same size.
     pub picture: Picture,
 }
 
@@ -47,7 +47,7 @@ pub fn images_as_text(pictures: &[NamedImage], color: ColorChoice, is_terminal: 
     buffers.iter().map(|buffer| as_text_lines(buffer, depth != ColorDepth::None)).collect()
 }
 
-/// Window size and cell aspect ratio. Some terminals report a size of 0.
+/// Window size and cell aspect ratio, with defaults for terminals that report a size of 0.
 fn window_size(window: &Window) -> ((u16, u16), f32) {
     let size = (window.columns, window.rows);
     let aspect = Some(window.cell_aspect).filter(|aspect| aspect.is_finite());
@@ -73,7 +73,7 @@ fn lay_out_images(
     }
 }
 
-/// Draws images side by side below their captions. Each fits into `room`.
+/// Draws images side by side below their captions, each scaled to fit into `room`.
 fn draw_image_row(pictures: &[NamedImage], inks: PreviewColors<'_>, room: (u16, u16), aspect: f32) -> Buffer {
     let sizes = pictures.iter().map(|one| size_in_cells(&one.picture, inks.depth, room, aspect));
     let (width, height) = sizes.fold((0, 0), |most, size| (most.0.max(size.0), most.1.max(size.1)));

@@ -52,11 +52,12 @@ static OWNER: Mutex<Option<ThreadId>> = Mutex::new(None);
 /// Message of the last panic in another thread.
 static PANIC: Mutex<Option<String>> = Mutex::new(None);
 
-/// Button events and drags, in SGR format. (crossterm's command would enable all mouse movements.)
+/// Enables reports of button events and drags, in SGR format. (crossterm's command would enable all mouse
+/// movements.)
 const MOUSE_ON: &str = "\x1b[?1000h\x1b[?1002h\x1b[?1006h";
 const MOUSE_OFF: &str = "\x1b[?1006l\x1b[?1002l\x1b[?1000l";
 
-/// Focus reports (mode 1004).
+/// Enables focus reports (mode 1004).
 const FOCUS_ON: &str = "\x1b[?1004h";
 const FOCUS_OFF: &str = "\x1b[?1004l";
 
@@ -78,7 +79,7 @@ const DEFAULT_CELL_PIXELS: (u16, u16) = (8, 16);
 /// Timeout for each restoration step if the terminal does not accept output.
 const STUCK: Duration = Duration::from_millis(60);
 
-/// The terminal, while used by the front end.
+/// The terminal while the front end is using it.
 pub(super) struct TerminalSession(());
 
 impl TerminalSession {
@@ -282,8 +283,8 @@ pub(super) fn record_links() {
     HAS_LINKS.store(true, Ordering::Release);
 }
 
-/// Bytes that undo the other changes. Each change is undone only once, except for modes, which are enabled
-/// again when the terminal is set up.
+/// Bytes that undo the changes listed in [`CHANGES`]. Each change is undone only once, except for modes,
+/// which are enabled again when the terminal is set up.
 fn undo_bytes() -> impl Iterator<Item = &'static [u8]> {
     let mut is_first = true;
     CHANGES.iter().flat_map(move |(flag, bytes)| {
@@ -448,7 +449,7 @@ mod tests {
     }
 
     #[test]
-    fn leaving_undoes_entering() {
+    fn restore_undoes_setup() {
         let _alone = exclusive_access();
         let enter = bytes(write_setup);
         let leave = bytes(write_restore);

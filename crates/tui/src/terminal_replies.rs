@@ -7,11 +7,11 @@ use super::terminals::{Brand, TerminalId};
 /// The finest block characters that a terminal draws without using a font.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum BlockGlyphs {
-    /// Not known.
+    /// It is not known which block characters the terminal draws.
     Unknown,
-    /// Unicode 13.
+    /// Sextants (Unicode 13).
     Sextants,
-    /// Unicode 16.
+    /// Octants (Unicode 16).
     Octants,
 }
 
@@ -60,7 +60,7 @@ pub(super) enum TerminalReply {
     Images(Protocol),
     /// A palette color in sRGB (OSC 4).
     Ink { index: u8, rgb: [u8; 3] },
-    /// Any other report.
+    /// Any other report from the terminal.
     Other,
 }
 
@@ -68,22 +68,22 @@ pub(super) enum TerminalReply {
 /// to other queries are ignored.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct TerminalQueries {
-    /// Block characters, deduced from the terminal's name.
+    /// Query the terminal's name to determine which block characters it draws.
     pub(super) blocks: bool,
-    /// Other capabilities, deduced from the terminal's name.
+    /// Query the terminal's name to determine its other capabilities.
     pub(super) name: bool,
-    /// Support for 24-bit color.
+    /// Query support for 24-bit color.
     pub(super) true_color: bool,
-    /// Background color.
+    /// Query the background color.
     pub(super) background: bool,
-    /// The 16 ANSI colors.
+    /// Query the 16 ANSI colors.
     pub(super) palette: bool,
-    /// Image support.
+    /// Query support for images.
     pub(super) pixels: Option<PixelRequest>,
 }
 
 impl TerminalQueries {
-    /// The query bytes to send.
+    /// The escape sequences that send the queries.
     pub(super) fn query_bytes(self) -> Vec<u8> {
         let mut queries = Vec::new();
         let mut ask = |is_asked: bool, bytes: &[u8]| {
@@ -94,7 +94,7 @@ impl TerminalQueries {
         let pixels = self.pixels.map(PixelRequest::query).unwrap_or_default();
         ask(self.blocks || self.name, b"\x1b[>q");
         ask(true, &pixels);
-        // `RGB` and `Tc`, hex-encoded.
+        // The capability names `RGB` and `Tc` are hex-encoded.
         ask(self.true_color, b"\x1bP+q524742\x1b\\\x1bP+q5463\x1b\\");
         ask(self.background, b"\x1b]11;?\x1b\\");
         for index in 0..16 {

@@ -22,7 +22,7 @@ pub(super) enum Brand {
     Xterm,
 }
 
-/// A terminal and its version. `[0, 0]` if unknown.
+/// A terminal and its version, which is `[0, 0]` if unknown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct TerminalId {
     pub(super) brand: Brand,
@@ -32,13 +32,13 @@ pub(super) struct TerminalId {
 /// Desktop notification protocols.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum NotificationProtocol {
-    /// iTerm2's protocol.
+    /// iTerm2's notification protocol (OSC 9).
     Osc9,
-    /// kitty's protocol.
+    /// kitty's notification protocol (OSC 99).
     Osc99,
-    /// rxvt-unicode's protocol, with a title.
+    /// rxvt-unicode's notification protocol (OSC 777), with a title.
     Osc777,
-    /// The bell, which highlights the window in most environments.
+    /// The bell character, which highlights the window in most environments.
     Bell,
 }
 
@@ -148,7 +148,8 @@ impl TerminalId {
             return None;
         }
         let known = |brand: Brand, number: &str| Some(Self { brand, version: parse_version(&get(number)) });
-        // These two variables are overwritten by terminals that run inside other terminals.
+        // Check `TERM_PROGRAM` and `TERM` first, because a terminal that runs inside another one overwrites
+        // them.
         if let Some(brand) = Brand::from_program(&get("TERM_PROGRAM")) {
             return known(brand, "TERM_PROGRAM_VERSION");
         }
@@ -165,7 +166,7 @@ impl TerminalId {
                 Some(Self { brand: Brand::Konsole, version: [number / 10_000, number / 100 % 100] })
             }
             () if is_set("XTERM_VERSION") => known(Brand::Xterm, ""),
-            // iTerm2's is the only name that SSH forwards by default.
+            // SSH usually forwards `LC_*` variables, so this also detects iTerm2 on remote machines.
             () if get("LC_TERMINAL") == "iTerm2" => known(Brand::Iterm2, "LC_TERMINAL_VERSION"),
             () => None,
         }
@@ -191,7 +192,7 @@ impl TerminalId {
             Brand::Ghostty => {
                 Capabilities { notice: Some(NotificationProtocol::Osc777), progress: since([1, 2]), ..all }
             }
-            // Older versions displayed the sequence as a notification.
+            // Older versions display the progress sequence as a notification.
             Brand::WezTerm => Capabilities {
                 notice: Some(NotificationProtocol::Osc777),
                 progress: since([20_250_301, 0]),
@@ -260,7 +261,7 @@ mod tests {
                 Brand::WezTerm,
                 [20_240_203, 110_809],
             ),
-            // VS Code, started from kitty.
+            // VS Code started from kitty.
             (&[xterm, ("TERM_PROGRAM", "vscode"), ("KITTY_WINDOW_ID", "1")], Brand::VsCode, [0, 0]),
         ] {
             assert_eq!(identify(pairs), Some(TerminalId { brand, version }), "{pairs:?}");

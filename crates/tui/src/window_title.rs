@@ -1,6 +1,6 @@
 //! The terminal's window title, progress bar, desktop notifications and clipboard.
 //!
-//! They are sent after the preview, and only to terminals known to support them (see `terminals`).
+//! All of these are sent after the preview, and only to terminals known to support them (see `terminals`).
 
 use std::time::Duration;
 
@@ -10,17 +10,17 @@ use super::terminals::NotificationProtocol;
 use super::view;
 use crate::scene::sanitize::visible;
 
-/// How long a render must have been running to be shown in the title and progress bar, so that they are not
-/// affected by camera movement.
+/// Minimum running time of a render before the title and progress bar show it, so that they do not flicker
+/// while the camera moves.
 const SHORT: Duration = Duration::from_millis(500);
-/// Step between percentages on a slow connection.
+/// Percentage step on slow connections.
 const COARSE: u32 = 10;
 
-/// Saves the window title for [`TITLE_BACK`].
+/// Escape sequence that saves the window title, to be restored with [`TITLE_BACK`].
 pub(super) const KEEP_TITLE: &[u8] = b"\x1b[22;2t";
-/// Restores the saved window title, or the default title if none was saved.
+/// Escape sequence that restores the saved window title, or the default title if none was saved.
 pub(super) const TITLE_BACK: &[u8] = b"\x1b]2;\x1b\\\x1b[23;2t";
-/// Removes the progress bar.
+/// Escape sequence that removes the progress bar.
 pub(super) const PROGRESS_OFF: &[u8] = b"\x1b]9;4;0;0\x1b\\";
 
 /// State of the progress bar.
@@ -28,7 +28,7 @@ pub(super) const PROGRESS_OFF: &[u8] = b"\x1b]9;4;0;0\x1b\\";
 pub(super) enum ProgressBar {
     #[default]
     None,
-    /// Working, with unknown progress.
+    /// A render is running with unknown progress.
     Busy,
     Percent(u32),
     Paused(u32),
@@ -85,7 +85,7 @@ impl WindowTitle {
     }
 }
 
-/// `cornell.toml: rendering 38 % · glimt`.
+/// The window title, such as `cornell.toml: rendering 38 % · glimt`.
 fn title_text(state: &State, percent: Option<u32>) -> String {
     let word = view::activity_word(state);
     let percent = percent.map_or(String::new(), |percent| format!(" {percent} %"));
@@ -107,7 +107,7 @@ fn progress_bar(state: &State, percent: Option<u32>) -> ProgressBar {
     }
 }
 
-/// Bytes that send a notification that a render has ended after `time`.
+/// Escape sequence for a desktop notification that a render ended after `time`.
 pub(super) fn notification_bytes(state: &State, notice: NotificationProtocol, time: Duration) -> Vec<u8> {
     let words = format!(
         "{}: {} after {}",
@@ -123,7 +123,7 @@ pub(super) fn notification_bytes(state: &State, notice: NotificationProtocol, ti
     }
 }
 
-/// Bytes that copy text to the clipboard.
+/// Escape sequence that copies text to the clipboard.
 pub(super) fn clipboard_bytes(text: &str) -> Vec<u8> {
     [b"\x1b]52;c;", &*base64::encoded(text.as_bytes()), b"\x1b\\"].concat()
 }

@@ -39,7 +39,7 @@ impl WriteQueue {
         self.waiting.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Waits for the next slice.
+    /// Waits for the next slice to write and returns it.
     fn wait_for_slice(&self) -> Vec<u8> {
         let mut waiting = self.lock();
         loop {
@@ -95,7 +95,7 @@ pub(super) fn open_output() -> io::Result<File> {
     terminal.or_else(|_| Ok(File::from(stdout.as_fd().try_clone_to_owned()?)))
 }
 
-/// Queues a slice.
+/// Queues a slice for the writer thread.
 pub(super) fn queue_slice(slice: Vec<u8>) {
     let mut waiting = QUEUE.lock();
     waiting.is_given_up = false;

@@ -26,15 +26,15 @@ const PARTS: [[(Vector, f64); 2]; 8] = [
     [([0.0, 0.04, -0.07], 0.022), ([0.0, 0.042, -0.076], 0.022)],
 ];
 
-/// The zero level set of the distance, extracted with surface nets (Gibson, *Constrained Elastic Surface
-/// Nets*, MICCAI 1998): one vertex, moved onto the surface, per cell that the surface crosses, and one quad
-/// per lattice edge that it crosses.
+/// Extracts the zero level set of the distance with surface nets (Gibson, *Constrained Elastic Surface Nets*,
+/// MICCAI 1998). Each cell that the surface crosses has one vertex, which is moved onto the surface. Each
+/// lattice edge that the surface crosses has one quad.
 pub(crate) fn bear() -> Surface {
     let inside = inside_flags();
     let [nx, ny, nz] = CELLS;
     let corner = |[x, y, z]: [usize; 3]| inside[(x * (ny + 1) + y) * (nz + 1) + z];
     let mut surface = Surface::default();
-    // Add a vertex in each cell that has corners on both sides.
+    // Add a vertex in each cell that has corners on both sides of the surface.
     let mut vertices = vec![u32::MAX; nx * ny * nz];
     let cell = |[x, y, z]: [usize; 3]| (x * ny + y) * nz + z;
     for at in lattice_points(CELLS) {

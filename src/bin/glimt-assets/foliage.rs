@@ -39,7 +39,7 @@ fn leaf_half_width(v: f64) -> f64 {
     0.62 * t.sqrt() * (1.0 - t)
 }
 
-/// How much the leaf or its stalk covers a point, with a soft border about a pixel wide.
+/// Coverage of a point by the leaf or its stalk, with a soft border about a pixel wide.
 fn leaf_coverage(u: f64, v: f64) -> f64 {
     let (side, teeth) = ((u - 0.5).abs(), 0.012 * ((v * 26.0).fract() - 0.5));
     let blade = smooth_step(-0.004, 0.004, leaf_half_width(v - 0.01) + teeth - side);
@@ -59,7 +59,7 @@ fn leaf_color(u: f64, v: f64) -> Vector {
     mix(green, [0.60, 0.72, 0.38], 0.6 * vein)
 }
 
-/// Leaves around a ball. Each is a square whose stalk starts at the ball.
+/// Leaves around a ball. Each leaf is a square whose stalk starts at the ball.
 pub(crate) fn shrub() -> Surface {
     let mut surface = Surface::default();
     for number in 0..LEAVES {

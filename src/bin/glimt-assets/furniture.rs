@@ -316,7 +316,7 @@ fn door() -> Surface {
     ])
 }
 
-/// The door frame, in a wall behind the origin that is 0.12 thick.
+/// The door frame, for a wall 0.12 thick behind the origin.
 fn jamb() -> Surface {
     join([
         block([-0.09, 0.0, -0.14], [0.0, 2.06, 0.02], 0.006),

@@ -97,7 +97,7 @@ mod tests {
         let mut total = 0;
         for (name, bytes) in stored_assets() {
             let found = fs::read(folder().join(name)).unwrap_or_else(|error| panic!("{name}: {error}"));
-            assert!(found == bytes, "{name} differs from the output of glimt-assets: run it");
+            assert!(found == bytes, "{name} differs from the output of glimt-assets; run glimt-assets");
             total += bytes.len();
         }
         assert!(total < 5_000_000, "{total} bytes are too many to store");

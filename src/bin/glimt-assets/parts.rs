@@ -70,7 +70,7 @@ pub(crate) fn hexahedron(corners: [Vector; 8]) -> Surface {
     orient_outward(positions, faces, middle)
 }
 
-/// A convex solid whose faces are flipped to face outward.
+/// Creates a convex solid, flipping faces where necessary so that all of them face outward.
 fn orient_outward(positions: Vec<Vector>, mut faces: Vec<Vec<u32>>, middle: Vector) -> Surface {
     for face in &mut faces {
         let [a, b, c] = [0, 1, 2].map(|corner| positions[face[corner] as usize]);

@@ -100,7 +100,7 @@ pub(crate) fn planks() -> Vec<u8> {
         let tint = lattice_random([board as i64, 2, 0], 3);
         let stretched = value_noise([u * 6.0, v * 96.0, board + 0.5], 0, 9);
         let edge = value_noise([0.0, v * 96.0, board + 0.5], 0, 9);
-        // Blend towards the value at the left edge so that the grain tiles.
+        // Blend toward the value at the left edge so that the grain tiles.
         let blend = smooth_step(0.9, 1.0, u);
         let grain = ((stretched * (1.0 - blend) + edge * blend) * 24.0).round() / 24.0;
         let wood = mix([0.46, 0.30, 0.17], [0.70, 0.50, 0.31], 0.6 * tint + 0.4 * grain);
@@ -124,7 +124,7 @@ pub(crate) fn marble() -> Vec<u8> {
     encode_png(SIDE, &pixels)
 }
 
-/// Four by four glazed tiles as a PPM file. It contains a comment, like files written by paint programs.
+/// Four by four glazed tiles as a PPM file. The file contains a comment, like files written by paint programs.
 pub(crate) fn tiles() -> Vec<u8> {
     let side = 64;
     let mut file = format!("P6\n# made by glimt-assets\n{side} {side}\n255\n").into_bytes();

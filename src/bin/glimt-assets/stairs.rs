@@ -48,7 +48,7 @@ fn tread() -> Surface {
     block([0.0, -TREAD, -GO], [WIDTH + 0.03, 0.0, 0.03], 0.008)
 }
 
-/// The steps up to the landing and the landing, solid down to the floor.
+/// The steps up to the landing, and the landing itself, solid down to the floor.
 fn first_flight() -> Surface {
     let step = |index: u32| {
         let (front, top) = (FOOT[2] - f64::from(index) * GO, f64::from(index + 1) * RISE - TREAD);
@@ -120,7 +120,7 @@ fn baluster() -> Surface {
     solid_of_revolution(&outline, 8)
 }
 
-/// A square post with a ball.
+/// A square newel post topped with a ball.
 fn newel() -> Surface {
     join([
         block([-0.05, 0.0, -0.05], [0.05, 1.12, 0.05], 0.008),

@@ -1,4 +1,4 @@
-//! Module dependencies: must match the table in `src/lib.rs` exactly.
+//! Checks that module dependencies match the table in `src/lib.rs` exactly.
 
 mod cycles;
 mod imports;

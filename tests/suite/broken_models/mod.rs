@@ -103,7 +103,7 @@ fn said(folder: &Path, name: &str, content: &[u8]) -> String {
 }
 
 #[test]
-fn mesh_files() {
+fn malformed_meshes_have_expected_errors() {
     let folder = tempfile::tempdir().expect("a folder");
     for (name, cases) in [("a.obj", obj()), ("a.off", off()), ("a.ply", ply()), ("a.stl", stl())] {
         assert!(cases.len() >= 20, "{name}");
@@ -114,7 +114,7 @@ fn mesh_files() {
 }
 
 #[test]
-fn material_files() {
+fn malformed_mtl_files_have_expected_errors() {
     let folder = tempfile::tempdir().expect("a folder");
     let obj = b"mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl m\nf 1/1 2/1 3/1\n";
     let cases = mtl();
@@ -126,7 +126,7 @@ fn material_files() {
 }
 
 #[test]
-fn gltf_files() {
+fn malformed_gltf_has_expected_errors() {
     let folder = tempfile::tempdir().expect("a folder");
     assert_eq!(said(folder.path(), "a.gltf", triangle().to_string().as_bytes()), "");
     for &(place, value, expected) in EDITS {
@@ -161,7 +161,7 @@ fn gltf_files() {
 
 /// GLB files with invalid headers and chunks.
 #[test]
-fn glb_files() {
+fn malformed_glb_has_expected_errors() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut json = triangle();
     json["buffers"][0] = json!({"byteLength": 44});

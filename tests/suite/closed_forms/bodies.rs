@@ -15,7 +15,7 @@ use super::{Random, v};
 /// The glass solids in a built scene.
 fn bodies(build: &Build) -> GlassSolids {
     let meshes: Vec<&LoadedMesh> = build.parts.meshes.iter().map(|mesh| mesh.loaded()).collect();
-    GlassSolids::find(&build.scene, &meshes, &CancelToken::new()).expect("nobody cancels")
+    GlassSolids::find(&build.scene, &meshes, &CancelToken::new()).expect("the token is not cancelled")
 }
 
 /// A prism over a polygon in the plane z = 0, counterclockwise when viewed from +z. Each side is divided into
@@ -53,7 +53,7 @@ fn closed(round: usize) -> TriangleMesh {
     let corner = |x: f64, y: f64| v(x, y, 0.0);
     match round % 4 {
         0 => lat_long_sphere(12, 20, 0.7, v(0.0, 0.0, 0.9)),
-        // An L.
+        // An L-shaped prism.
         1 => prism(
             &[
                 corner(-0.8, -0.8),

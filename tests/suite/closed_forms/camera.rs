@@ -82,7 +82,7 @@ fn circle_of_confusion_diameter_is_exact() {
 
 #[test]
 fn small_light_has_analytic_blur_variance() {
-    // Its image is a convolution, disk ∗ square ∗ pixel. The variance along an axis is D²/16 + s²/12 + 1/12,
+    // The light's image is the convolution disk ∗ square ∗ pixel. The variance along an axis is D²/16 + s²/12 + 1/12,
     // and the sum of all pixels is s².
     for (d, diameter) in [(10.0, 13.187_9), (2.5, 26.375_8)] {
         let s = 3.0 / pixels_per_length(d);

@@ -331,7 +331,7 @@ fn photon_light_is_uniform_up_to_rims() {
 
 #[test]
 fn photon_light_is_uniform_around_a_box() {
-    // In front of the box and beside it, outside its shadow.
+    // In front of the box and next to it, outside its shadow.
     let standing = long_floor().cuboid(v(-1.7, 0.1, 0.0), v(0.2, 0.2, 0.6), DVec3::ZERO, matte(0.5));
     let before = mirrored(standing.clone(), (-1.75, -1.4), (0.0, 0.6));
     let before = strip(before, v(-1.55, 0.0, 0.0), (0.099, 0.4));

@@ -72,7 +72,7 @@ fn point_light_shadow_edge_is_exact() {
 }
 
 #[test]
-fn parallel_squares() {
+fn parallel_square_light_is_exact() {
     // Four times the corner formula for a quarter of the square, with A = B = ½/h. E = π·F·L.
     for (height, exact) in [(1.0, 0.752_274_688_5), (4.0, 0.061_225_761_1), (0.1, 3.042_128)] {
         let a: f64 = 0.5 / height;
@@ -85,7 +85,7 @@ fn parallel_squares() {
 }
 
 #[test]
-fn perpendicular_square_touching_the_plane() {
+fn perpendicular_square_light_is_exact() {
     // F = (atan 1 − atan(1/√2)/√2)/2π if all lengths are 1.
     let exact = 0.5 * (PI / 4.0 - 0.5_f64.sqrt().atan() / 2.0_f64.sqrt());
     assert_close("the formula", exact, 0.175_094_143_9);
@@ -118,7 +118,7 @@ fn rectangle_lights_match_lambert() {
 }
 
 #[test]
-fn parallelogram_and_triangle_lights() {
+fn parallelogram_and_triangle_lights_are_exact() {
     let (corner, u, w) = (v(-0.4, 1.2, -0.3), v(1.0, 0.2, 0.3), v(0.4, -0.1, 1.1));
     let parallelogram = [corner, corner + u, corner + u + w, corner + w];
     let exact = lambert(DVec3::ZERO, DVec3::Y, &parallelogram);
@@ -165,7 +165,7 @@ fn box_light_shines_from_visible_faces() {
 }
 
 #[test]
-fn transformed_and_mirrored_mesh_light() {
+fn transformed_mesh_light_is_exact() {
     // A closed ball of triangles. Every triangle that faces the origin is fully visible, because the ball is
     // convex.
     let ball = lat_long_sphere(6, 8, 0.5, DVec3::ZERO);
@@ -199,7 +199,7 @@ fn mesh_light_occludes_itself() {
 }
 
 #[test]
-fn sphere_lights_at_every_elevation() {
+fn sphere_light_is_exact_at_every_elevation() {
     // With H = 2, E/πL is cos θ/H² if the whole sphere is above the horizon, and otherwise a tabulated
     // integral.
     for (cosine, exact) in
@@ -215,7 +215,7 @@ fn sphere_lights_at_every_elevation() {
 }
 
 #[test]
-fn sphere_lights_near_and_far() {
+fn sphere_light_is_exact_near_and_far() {
     for (h, cosine) in [(1000.0, 0.6), (1e5, 0.6), (1.01, 1.0), (1.0001, 1.0), (1.25, 0.9)] {
         let direction = v((1.0_f64 - cosine * cosine).sqrt(), cosine, 0.0);
         let lit = at_origin().sphere(direction * h, 1.0, emitter(1.0));
@@ -276,7 +276,7 @@ fn shadow_view_shows_visible_fraction() {
 }
 
 #[test]
-fn diffuse_surface_in_uniform_light() {
+fn uniform_light_on_diffuse_gives_its_albedo() {
     // With radiance 1 over the whole hemisphere, E = π and L = ρ, regardless of the surface's position and
     // orientation.
     for (point, size) in [(v(0.0, 0.0, 0.0), 2.0), (v(0.6, -0.7, 0.3), 1.0), (v(0.3, 0.9, -0.2), 1.0)] {

@@ -79,7 +79,7 @@ fn half_opacity_halves_the_light() {
 }
 
 #[test]
-fn two_sided_emission_with_half_opacity() {
+fn half_opacity_halves_two_sided_emission() {
     for (name, material) in materials() {
         for (sides, of_back) in [(EmissionSides::Both, 1.0), (EmissionSides::Front, 0.0)] {
             let emission = EmissionSource { sides, ..EmissionSource::constant(Vec3::splat(2.0)) };

@@ -16,7 +16,7 @@ fn go_on(film: &Film, world: &World, build: &Build, seed: u32, from: u32, to: u3
     for tile in 0..film.tile_count() {
         let rect = film.tile_rect(tile).expect("a tile");
         let done = render_tile(world, &build.settings(seed), rect, from..to, &CancelToken::new());
-        film.add(tile, &done.expect("nobody cancels").0);
+        film.add(tile, &done.expect("the token is not cancelled").0);
     }
 }
 
@@ -100,7 +100,7 @@ fn error_estimate_matches_spread_over_seeds() {
                 films.iter().map(|film| film.relative_error().expect("an estimate") / truth).collect();
             eprintln!("{name}, {samples} samples, {truth:.1e}: {ratios:.2?}");
             let rms = (ratios.iter().map(|ratio| ratio * ratio).sum::<f64>() / count).sqrt();
-            // In such a small image, the last doubling may reduce the error more than predicted from earlier
+            // In an image this small, the last doubling may reduce the error more than predicted from earlier
             // doublings.
             let most = if samples > 256 { 1.5 } else { 1.35 };
             assert!((0.9..=most).contains(&rms), "{name}, {samples} samples: {rms:.2}");

@@ -73,8 +73,8 @@ fn techniques_agree_on_transmitted_light() {
 
 #[test]
 fn every_light_shines_through_rough_glass() {
-    // Compares MIS of light and lobe samples with path tracing, using many lights, of which each vertex
-    // samples only some.
+    // Compares MIS of light and lobe samples with path tracing. There are many lights, and each vertex samples
+    // only some of them.
     for (what, build, at) in boundaries().into_iter().skip(3).take(3) {
         let lamps = |build: Build| {
             (0..12_u32).fold(build, |build, number| {
@@ -346,9 +346,12 @@ fn only_closed_unlit_solids_are_dark_inside() {
     assert_eq!(dark(&through), [false, false]);
     assert_eq!(dark(&rough.environment(1.0)), [true, true]);
     let open = scene().quad(v(-1.0, -1.0, -5.0), v(2.0, 0.0, 0.0), v(0.0, 2.0, 0.0), frosted(1.5, 0.4));
-    assert!(!open.world().is_unlit_glass(0), "an open surface");
+    assert!(!open.world().is_unlit_glass(0), "an open surface has no inside");
     let plane = Shape::Plane { point: DVec3::ZERO, normal: DVec3::Y };
-    assert!(!scene().shape(plane, frosted(1.5, 0.4)).world().is_unlit_glass(0), "an unbounded solid");
+    assert!(
+        !scene().shape(plane, frosted(1.5, 0.4)).world().is_unlit_glass(0),
+        "an unbounded solid may contain lights"
+    );
 }
 
 #[test]

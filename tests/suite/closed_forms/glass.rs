@@ -247,7 +247,7 @@ fn glass_with_surrounding_ior_is_invisible() {
 }
 
 #[test]
-fn nested_glass() {
+fn nested_glass_transmits_exactly() {
     // In a slab with n = 1.5, a ball with the same n has no effect. At depth 4, the path through both
     // transmits (1 − R)².
     let r = reflectance(30.0);
@@ -322,7 +322,7 @@ fn mesh_parts_can_be_nested() {
 fn shading_normals_create_no_light() {
     // Reflection and refraction split radiance/n² without loss, and a random choice between them preserves
     // its expectation. Each path sees the sky at most once, so the value is at most 1, even inside glass.
-    // Rays that the shading normal refracts to the outside but that do not cross the facet must not count as
+    // Rays that are refracted outward about the shading normal but do not cross the facet must not count as
     // outside.
     let mut ball = lat_long_sphere(8, 10, 1.0, DVec3::ZERO);
     ball.normals = ball.positions.iter().map(|p| p.normalize()).collect();

@@ -1,4 +1,4 @@
-//! Hard shadows: visibility is decided by one ray to the light's center. Unoccluded light is the same as
+//! Hard shadows: one ray to the light's center decides the visibility. Unoccluded light is the same as
 //! without shadows and with soft shadows.
 
 use glimt::integrators::render_tile;
@@ -109,7 +109,7 @@ fn center_ray_determines_visibility() {
         lamp(receiver(DVec3::ZERO, 0.8).quad(screen, v(0.4, 0.0, 0.0), v(0.0, 0.0, 0.4), matte(0.0))).value()
     };
     assert!(free > 0.0);
-    // In front of the center, and beside it, where soft shadows would be partial.
+    // In front of the center, and next to it, where soft shadows would be partial.
     assert_eq!(blocked(-0.2), 0.0);
     assert_eq!(blocked(0.05), free);
     assert_eq!(scene().value(), 0.0);
@@ -120,7 +120,7 @@ fn rays(build: &Build) -> u64 {
     let whole = glimt::film::Rect { x: 0, y: 0, width: 1, height: 1 };
     let token = glimt::control::CancelToken::new();
     render_tile(&build.world(), &build.settings(1), whole, 0..1, &token)
-        .expect("nobody cancels")
+        .expect("the token is not cancelled")
         .1
         .shadow_rays
 }

@@ -137,8 +137,8 @@ fn divided_light_matches_whole_light() {
     }
 }
 
-/// Lobe samples find most of the light. Vertices sample each of the thousand lights about once in thirty
-/// times.
+/// Lobe samples find most of the light. At each vertex, a given one of the thousand lights is sampled with a
+/// probability of about 1/30.
 #[test]
 fn divided_light_keeps_sharp_highlight() {
     let floor = phong(0.0, 0.8, 300.0, 0.0);

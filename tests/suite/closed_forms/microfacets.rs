@@ -215,8 +215,7 @@ fn coarse_smooth_meshes_conserve_energy() {
 }
 
 #[test]
-fn lamps_of_metal_shine() {
-    // Emission and reflection add up.
+fn metal_emission_adds_to_its_reflection() {
     let mut lamp = metal(0.9, 0.5, 0.0);
     let dark = mean_and_error(&in_the_open(lamp.clone(), 1).values(256, 16));
     lamp.emission = EmissionSource::constant(Vec3::splat(2.0));

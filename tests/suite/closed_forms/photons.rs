@@ -47,8 +47,8 @@ fn stored_photons_carry_emitted_power() {
         let (world, token) = (build.world(), CancelToken::new());
         let of_photons = PhotonSettings { count, radius: 0.1, bounces: 10_000 };
         let settings = build.photons(count.into(), 0.1).settings(3);
-        let (_, pass) =
-            Photons::new(&world, &settings, of_photons, &ignore_progress, &token).expect("nobody cancels");
+        let (_, pass) = Photons::new(&world, &settings, of_photons, &ignore_progress, &token)
+            .expect("the token is not cancelled");
         let (power, n) = (4.0 * PI, f64::from(count));
         let flux = |map: &PhotonMap| map.photons().map(|photon| f64::from(photon.flux.x)).sum::<f64>();
         let error = (reflectance * (1.0 - reflectance) / n).sqrt();
@@ -68,8 +68,8 @@ fn no_photons_without_mirrors_or_glass() {
     let build = room(|| matte(0.5)).point_light(v(0.2, -0.1, 0.3), 1.0, Falloff::Square).photons(100, 0.1);
     let (world, settings, token) = (build.world(), build.settings(1), CancelToken::new());
     let of_photons = settings.photons.expect("photons are on");
-    let (photons, pass) =
-        Photons::new(&world, &settings, of_photons, &ignore_progress, &token).expect("nobody cancels");
+    let (photons, pass) = Photons::new(&world, &settings, of_photons, &ignore_progress, &token)
+        .expect("the token is not cancelled");
     assert!(!photons.emits_photons());
     assert_eq!((pass.emitted, pass.stored()), (0, 0));
 }
@@ -285,8 +285,8 @@ fn photons_do_not_depend_on_threads_or_tiles() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
         pool.install(|| {
             let (photons, _) = Photons::new(&world, &settings, of_photons, &ignore_progress, &token)
-                .expect("nobody cancels");
-            photons.maps(&world, &settings, 0..4, &token).expect("nobody cancels")
+                .expect("the token is not cancelled");
+            photons.maps(&world, &settings, 0..4, &token).expect("the token is not cancelled")
         })
     };
     let all = maps(1);
@@ -302,7 +302,7 @@ fn photons_do_not_depend_on_threads_or_tiles() {
     }
     let render = |maps: &PhotonMaps, rect: Rect, samples: Range<u32>| {
         let tile = render_tile_with_photons(Some(maps), &world, &settings, rect, samples, &token);
-        tile.expect("nobody cancels").0.radiance
+        tile.expect("the token is not cancelled").0.radiance
     };
     let whole = Rect { x: 0, y: 0, width: 16, height: 16 };
     let at_once = render(&all, whole, 0..4);
@@ -311,8 +311,9 @@ fn photons_do_not_depend_on_threads_or_tiles() {
         for part in cuts.windows(2) {
             let samples = part[0]..part[1];
             let (photons, _) = Photons::new(&world, &settings, of_photons, &ignore_progress, &token)
-                .expect("nobody cancels");
-            let maps = photons.maps(&world, &settings, samples.clone(), &token).expect("nobody cancels");
+                .expect("the token is not cancelled");
+            let maps =
+                photons.maps(&world, &settings, samples.clone(), &token).expect("the token is not cancelled");
             let own: Vec<_> = at_once
                 .chunks(4)
                 .flat_map(|pixel| &pixel[samples.start as usize..samples.end as usize])
@@ -338,7 +339,7 @@ fn photons_are_aimed_at_glass_from_mesh_file() {
         .photons(1000, 0.1);
     let (world, settings, token) = (build.world(), build.settings(1), CancelToken::new());
     let of_photons = settings.photons.expect("photons are on");
-    let (_, pass) =
-        Photons::new(&world, &settings, of_photons, &ignore_progress, &token).expect("nobody cancels");
+    let (_, pass) = Photons::new(&world, &settings, of_photons, &ignore_progress, &token)
+        .expect("the token is not cancelled");
     assert!(pass.caustic.len() > 500, "{} of 1000", pass.caustic.len());
 }

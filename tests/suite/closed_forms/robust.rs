@@ -351,7 +351,7 @@ fn assert_no_split(build: &Build) {
     let (world, settings, token) = (build.world(), build.settings(4), CancelToken::new());
     let render = |x, y, width, height, samples| {
         let rect = Rect { x, y, width, height };
-        let tile = render_tile(&world, &settings, rect, samples, &token).expect("nobody cancels");
+        let tile = render_tile(&world, &settings, rect, samples, &token).expect("the token is not cancelled");
         tile.0.radiance
     };
     let whole = render(0, 0, 24, 20, 0..6);
@@ -368,7 +368,8 @@ fn assert_no_split(build: &Build) {
     let mut other = settings;
     other.render.seed = 5;
     let rect = Rect { x: 0, y: 0, width: 24, height: 20 };
-    let reseeded = render_tile(&world, &other, rect, 0..6, &token).expect("nobody cancels").0.radiance;
+    let reseeded =
+        render_tile(&world, &other, rect, 0..6, &token).expect("the token is not cancelled").0.radiance;
     assert_ne!(whole, reseeded);
 }
 

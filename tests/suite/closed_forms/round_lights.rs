@@ -42,7 +42,7 @@ fn disk(center: DVec3, normal: DVec3, radius: f64) -> Shape {
 }
 
 #[test]
-fn a_disk_on_its_axis() {
+fn disk_light_is_exact_on_its_axis() {
     // E = πL·R²/(R² + h²).
     for (radius, height) in [(1.0, 1.0), (0.5, 3.0), (2.0, 0.7), (1e-3, 10.0)] {
         let exact = PI * radius * radius / (radius * radius + height * height);
@@ -55,7 +55,7 @@ fn a_disk_on_its_axis() {
 }
 
 #[test]
-fn a_parallel_disk_beside() {
+fn disk_light_is_exact_off_its_axis() {
     // F = ½·(1 − (Z − 2R²)/√(Z² − 4R²)), where Z = 1 + H² + R² and lengths are in units of the lateral
     // distance (Howell, *A Catalog of Radiation Heat Transfer Configuration Factors*, B-13).
     let (radius, height, beside): (f64, f64, f64) = (0.8, 1.2, 0.9);

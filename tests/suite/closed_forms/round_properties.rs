@@ -99,7 +99,7 @@ fn signed_zero_direction_does_not_change_hit() {
 }
 
 #[test]
-fn bounds_hold_every_hit() {
+fn bounds_contain_every_hit() {
     let (mut random, mut met) = (Random(61), 0);
     for i in 0..40 {
         let center = random_in(&mut random, DVec3::ZERO, 10.0_f64.powi(i % 5));

@@ -148,7 +148,7 @@ impl Build {
         self.shape(Shape::Triangle { a, b, c }, material)
     }
 
-    /// An instance without smoothing: (scale, rotate, translate).
+    /// Adds a flat-shaded instance of a mesh. `placed` is its scale, rotation and translation.
     pub fn mesh(self, mesh: TriangleMesh, placed: [DVec3; 3], material: Material) -> Self {
         self.loaded(LoadedMesh { mesh, ..LoadedMesh::default() }, placed, material)
     }
@@ -274,7 +274,7 @@ impl Build {
     }
 }
 
-/// Mean of each pixel's samples.
+/// Renders a tile. Returns the mean of each pixel's samples.
 pub fn tile(world: &World, settings: &RenderSettings, rect: Rect, samples: u32) -> Vec<DVec3> {
     tile_by(maps(world, settings, samples).as_ref(), world, settings, rect, samples)
 }
@@ -289,7 +289,7 @@ pub fn maps(world: &World, settings: &RenderSettings, samples: u32) -> Option<Ph
     })
 }
 
-/// [`tile`] with existing photon maps.
+/// Renders a tile like [`tile`], with existing photon maps.
 pub fn tile_by(
     maps: Option<&PhotonMaps>,
     world: &World,

@@ -154,7 +154,7 @@ fn texels_are_half_open_intervals() {
 }
 
 #[test]
-fn sphere_texture_coordinates() {
+fn sphere_uv_is_longitude_and_latitude() {
     // u = ½ + atan2(z, x)/2π, v = ½ + asin(y)/π, so (1, 1, 1)/√3 is at (0.625, 0.6959133).
     let (build, kind) = pictured(TextureFilter::Nearest, Wrap::Repeat, Vec2::ONE);
     let center = v(3.0, -1.0, 2.0);
@@ -240,7 +240,7 @@ fn components_add_up_in_mirrors_and_glass() {
     for (part, name) in parts.iter().zip(["ambient", "diffuse", "specular", "emission"]) {
         assert!(part.iter().any(|color| color.max_element() > 0.01), "{name} must have light");
     }
-    // In mirrors and glass, each component shows the same component of what they reflect or transmit.
+    // In each component view, mirrors and glass show that component of the light they reflect or transmit.
     let through = |at: DVec3, name: &str| {
         let view = View::named(name).unwrap_or_else(|| panic!("unknown view {name}"));
         build.clone().seen(v(0.0, 1.0, 1.0), at).viewed(view).value()

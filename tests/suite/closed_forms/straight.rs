@@ -104,7 +104,7 @@ fn textured_tint_colors_transmitted_light() {
 }
 
 #[test]
-fn a_pane_reflects_the_rest() {
+fn pane_reflectance_is_exact() {
     // The pane at 60° reflects the ray down to the light.
     let seen = sheet(scene(), -2.0, 60.0, pane(0.9)).quad(
         v(-1e3, -500.0, 1e3),

@@ -191,7 +191,7 @@ fn random_box_stacks_match_layers() {
 }
 
 #[test]
-fn a_drink_in_a_glass() {
+fn drink_in_a_glass_matches_layers() {
     let mut random = Random(7);
     for round in 0..6 {
         let turned = if round == 0 { Turned::by(DVec3::ZERO) } else { Turned::any(&mut random) };
@@ -226,7 +226,7 @@ fn a_drink_in_a_glass() {
 }
 
 #[test]
-fn coincident_and_inscribed_balls() {
+fn coincident_and_inscribed_balls_match_layers() {
     let lamp = |build: Build| {
         build.quad(v(-5e3, -3.0, 5e3), v(1e4, 0.0, 0.0), v(0.0, 0.0, -1e4), emitter(1.0)).depth(200)
     };
@@ -294,7 +294,7 @@ fn touching_meshes_match_layers() {
 }
 
 #[test]
-fn glass_on_an_opaque_surface() {
+fn glass_on_an_opaque_surface_is_exact() {
     let mut random = Random(5);
     let r = fresnel(1.0, 1.5, 0.0);
     for round in 0..12 {
@@ -392,7 +392,7 @@ fn camera_inside_glass_finds_its_medium() {
 }
 
 #[test]
-fn white_furnace_of_nested_glass() {
+fn nested_glass_is_invisible_in_a_furnace() {
     let mut random = Random(99);
     for round in 0..6 {
         let turned = if round == 0 { Turned::by(DVec3::ZERO) } else { Turned::any(&mut random) };
@@ -431,7 +431,7 @@ fn white_furnace_of_nested_glass() {
 }
 
 #[test]
-fn ambient_light_in_and_under_glass() {
+fn ambient_light_is_uniform_in_and_under_glass() {
     // Lossless glass on a white floor under ambient light 1 with a white background. The radiance is 1
     // everywhere, inside and outside the glass.
     let mut random = Random(17);

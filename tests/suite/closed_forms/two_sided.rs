@@ -114,7 +114,7 @@ fn open_tube_light_emits_inward() {
 }
 
 #[test]
-fn both_sides_are_seen() {
+fn both_sides_are_visible() {
     let lamp = |u: DVec3, w: DVec3, material| scene().quad(v(-1.0, -1.0, -2.0), u, w, material);
     for (u, w) in [(v(2.0, 0.0, 0.0), v(0.0, 2.0, 0.0)), (v(0.0, 2.0, 0.0), v(2.0, 0.0, 0.0))] {
         assert_close("seen", lamp(u, w, both()).value(), 1.0);

@@ -35,13 +35,13 @@ fn box_edges_are_drawn_at_exact_positions() {
     for (x, y) in [(47, 20), (16, 40), (30, 16), (33, 47)] {
         assert!((share(x, y) - 0.625).abs() < 0.12, "{x}, {y}: {}", share(x, y));
     }
-    // No lines are drawn in front of the ball. Far edges are faint behind the ball and full beside it.
+    // No lines are drawn in front of the ball. Far edges are faint behind the ball and bright next to it.
     assert_eq!(at(&drawn, 32, 32), at(&plain, 32, 32));
-    assert_eq!(at(&drawn, 50, 32), DVec3::ZERO, "beside the box");
+    assert_eq!(at(&drawn, 50, 32), DVec3::ZERO, "outside the box");
     let faint = share(42, 32);
     assert!(faint > 0.1 && faint < 0.35, "behind the ball: {faint}");
     let whole = share(42, 22).max(share(21, 22));
-    assert!(whole > 0.5, "beside the ball: {whole}");
+    assert!(whole > 0.5, "next to the ball: {whole}");
 }
 
 #[test]
@@ -83,7 +83,7 @@ fn bvh_and_kd_tree_show_their_boxes() {
 
 #[test]
 fn cost_counts_boxes_and_shapes() {
-    // The root, its leaf and the ball. Beside the box, the cost is zero.
+    // The cost counts the root, its leaf and the ball. Outside the box, it is zero.
     let cost = framed(ball(), View::Cost);
     assert_eq!((at(&cost, 32, 32).x, at(&cost, 2, 2).x), (3.0, 0.0));
     assert_eq!(at(&cost, 46, 17).x, 3.0, "a ray through the box that misses the ball");

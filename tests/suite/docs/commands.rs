@@ -8,7 +8,7 @@ use std::process::Command;
 use super::{Block, Page, pages, root};
 use crate::test_dir::PROGRAM;
 
-/// Programs used on the pages that this test does not run.
+/// Programs that appear on the pages but are not run by this test.
 const OTHERS: [&str; 3] = ["cargo", "ssh", "tmux"];
 /// Subcommands of glimt.
 const COMMANDS: [&str; 15] = [
@@ -138,7 +138,7 @@ fn bench(words: &[&str]) -> String {
 }
 
 #[test]
-fn calls_are_made_small() {
+fn commands_are_adapted_for_the_test() {
     assert_eq!(call("glimt a.toml"), "glimt check a.toml ");
     assert_eq!(
         call("glimt a.toml --once --samples 4096 -o b.png | cat"),

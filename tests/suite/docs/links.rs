@@ -1,4 +1,4 @@
-//! Links between pages, images, and file names on pages.
+//! Checks links, images and file names on the pages.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -19,7 +19,7 @@ fn anchor(heading: &str) -> String {
 }
 
 #[test]
-fn links_lead_somewhere() {
+fn links_have_targets() {
     for from in pages() {
         let folder = Path::new(&from.name).parent().expect("a folder");
         for target in from.prose().flat_map(targets) {

@@ -7,7 +7,7 @@ use serde_json::Value;
 use super::{codes, page};
 use crate::test_dir::TestDir;
 
-/// The scene has a glass ball, so that photons are emitted.
+/// A directory with a scene. Its glass ball causes photons to be emitted.
 fn dir() -> TestDir {
     let dir = TestDir::new();
     let scene =

@@ -195,7 +195,7 @@ fn cut(bytes: &mut Vec<u8>, _: &[u8], random: &mut FuzzRandom) {
     bytes.truncate(random.below(bytes.len()));
 }
 
-/// The pieces between bytes that satisfy `is_gap`, at least one.
+/// Splits bytes at those that satisfy `is_gap`. Returns at least one piece.
 fn pieces(bytes: &[u8], is_gap: fn(u8) -> bool) -> Vec<Range<usize>> {
     let mut pieces = Vec::new();
     let mut start = 0;

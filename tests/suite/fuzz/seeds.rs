@@ -111,11 +111,12 @@ fn meshes() -> Vec<Seed> {
     ]
 }
 
-/// An image in all formats.
+/// Pseudo-random sample values.
 fn samples(count: usize) -> Vec<u8> {
     (0..count).map(|index| (index * 37 % 251) as u8).collect()
 }
 
+/// A small image in each format.
 fn images() -> Vec<Seed> {
     const SIDE: u32 = 24;
     let folder = tempfile::tempdir().expect("a folder");

@@ -150,7 +150,7 @@ fn worker() {
 
 /// Sends a line to the process that started this worker.
 fn say(text: &str) {
-    writeln!(std::io::stdout(), "\n@ {text}").expect("somebody listens");
+    writeln!(std::io::stdout(), "\n@ {text}").expect("the parent process is listening");
 }
 
 /// The last panic, even if it was caught.

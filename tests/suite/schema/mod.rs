@@ -53,7 +53,7 @@ fn files(folder: &str) -> Vec<PathBuf> {
 fn bundled_schema_is_current() {
     let path = root().join("scenes").join(FILE);
     let there = fs::read_to_string(&path).unwrap_or_default();
-    assert!(there == schema_text(Draft::Four), "glimt schema > scenes/{FILE}");
+    assert!(there == schema_text(Draft::Four), "outdated; run: glimt schema > scenes/{FILE}");
     for scene in files("scenes") {
         let text = fs::read_to_string(&scene).expect("a scene");
         assert!(text.starts_with(LINE), "{}: {LINE}", scene.display());

@@ -21,7 +21,7 @@ fn known_terminal_gets_finest_blocks() {
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     terminal.wait_for_color("red");
-    assert!(!terminal.settled(has_finer_blocks), "the terminal is unknown");
+    assert!(!terminal.settled(has_finer_blocks), "unknown terminals must get half blocks");
     terminal.press("\x1bP>|kitty(0.40.1)\x1b\\");
     terminal.wait("finer blocks", has_finer_blocks);
     terminal.press("q");
@@ -61,7 +61,7 @@ fn pixel_preview_does_not_cover_text() {
         };
         terminal.wait("pixels", |screen| !has_blocks(screen));
         terminal.press("?");
-        terminal.wait("half blocks beside the help", has_blocks);
+        terminal.wait("half blocks next to the help", has_blocks);
         terminal.press("?");
         terminal.wait("pixels again", |screen| !has_blocks(screen));
         terminal.press("q");

@@ -27,7 +27,7 @@ fn kept(folder: &Folder, terminal: &mut Terminal, own: &[u8], keys: &str, key: &
     terminal.wait_for_message(&messages::camera_saved("scene.toml"));
     let kept = numbers(folder, key);
     let expected = folder.once(&[]);
-    assert_ne!(expected, own, "{keys:?} shows");
+    assert_ne!(expected, own, "{keys:?} must change the image");
     let is = |bytes: &[u8]| fs::read(folder.path("scene.png")).is_ok_and(|there| there == bytes);
     terminal.wait("the image from the written camera", |_| is(&expected));
     folder.write("scene.toml", SCENE);

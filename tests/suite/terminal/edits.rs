@@ -5,7 +5,7 @@ use glimt::tui::messages;
 use super::pty::{Folder, SCENE, Terminal};
 use glimt::pipeline::protocol::reasons;
 
-/// A triangle beside the board.
+/// A triangle next to the board.
 const OBJ: &str = "v 1.2 0 0\nv 1.4 0 0\nv 1.2 0.5 0\nf 1 2 3\n";
 
 fn paint(color: &str) -> String {

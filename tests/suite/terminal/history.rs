@@ -49,7 +49,7 @@ fn edited(folder: &Folder, terminal: &Terminal) {
     }
 }
 
-/// First column of the panel beside a 64 × 48 image in a window of 120 × 40 cells.
+/// First column of the panel next to a 64 × 48 image in a window of 120 × 40 cells.
 const PANEL: u16 = 97;
 
 #[test]

@@ -78,7 +78,7 @@ fn focus_moves_to_crosshair_and_is_saved() {
     terminal.wait_for_message(&messages::files_written("scene.png"));
     let expected = folder.once(&["--set", &format!("camera.focus={focus}")]);
     assert_eq!(folder.bytes("scene.png"), expected);
-    assert_ne!(expected, folder.once(&[]), "it shows");
+    assert_ne!(expected, folder.once(&[]), "the focus must change the image");
     terminal.press("c");
     terminal.wait_for_message(&messages::camera_saved("scene.toml"));
     let written = fs::read_to_string(folder.path("scene.toml")).expect("a scene");

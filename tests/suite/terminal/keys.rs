@@ -36,7 +36,7 @@ fn settings_change_and_reset() {
             terminal.press("w");
             let expected = folder.once(&options);
             terminal.wait(words, |_| fs::read(folder.path("scene.png")).is_ok_and(|bytes| bytes == expected));
-            assert!(expected != own, "{words} shows");
+            assert!(expected != own, "{words} must change the image");
             // Restore the original image, which a reset does not write.
             fs::write(folder.path("scene.png"), &own).expect("put back");
         }

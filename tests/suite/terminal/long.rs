@@ -48,7 +48,7 @@ fn ignored_checkpoint_is_reported() {
     folder.write("scene.toml", &scene(3, ""));
     let long = terminal(&folder, &[]);
     is_fine(&long, &[&glimt::pipeline::messages::too_many_samples_message(3)]);
-    assert_eq!(folder.bytes("scene.png"), folder.once(&[]), "nothing of it is in the image");
+    assert_eq!(folder.bytes("scene.png"), folder.once(&[]), "the image must not contain its samples");
     assert!(folder.path("scene.png.checkpoint").exists(), "it has more samples than the image");
     drop(long);
     // The checkpoint belongs to a different image. This is reported once, not after each edit.
@@ -59,7 +59,7 @@ fn ignored_checkpoint_is_reported() {
     other.wait_for_render(2);
     assert!(!other.look(|screen| shows(screen, &ignored())), "{}", other.text());
     drop(other);
-    // Damaged.
+    // The checkpoint is damaged.
     let mut bytes = folder.bytes("scene.png.checkpoint");
     let middle = bytes.len() / 2;
     bytes[middle] ^= 1;

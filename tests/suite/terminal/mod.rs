@@ -107,7 +107,7 @@ fn broken_scene_shows_position_and_last_image() {
     folder.write("scene.toml", SCENE);
     terminal.wait("no error", |screen| !screen.contents().contains("error"));
     terminal.wait_for("done");
-    assert_eq!((folder.bytes("scene.png"), modified(&folder)), before, "nothing changed after all");
+    assert_eq!((folder.bytes("scene.png"), modified(&folder)), before, "the image must not be written again");
 
     folder.write("scene.toml", "[render");
     terminal.wait_for("scene.toml:1:");

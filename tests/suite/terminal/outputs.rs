@@ -1,4 +1,4 @@
-//! In interactive use, glimt also never overwrites inputs. It reports the conflict and keeps rendering.
+//! The terminal UI never overwrites inputs either. It reports the conflict and keeps rendering.
 
 use std::fs;
 use std::os::unix::fs::symlink;
@@ -58,7 +58,11 @@ fn output_that_becomes_an_input_is_kept() {
     folder.write("scene.toml", &textured("scene.png"));
     terminal.wait_for("`paint`");
     wait_a_while();
-    assert_eq!((folder.bytes("scene.png"), folder.bytes("r.json")), (picture, report), "nothing is written");
+    assert_eq!(
+        (folder.bytes("scene.png"), folder.bytes("r.json")),
+        (picture, report),
+        "nothing must be written"
+    );
     folder.write("scene.toml", &SCENE.replace(RED, GREEN));
     terminal.wait_for_color("green");
     terminal.wait("the image on disk", |_| folder.bytes("scene.png") == folder.once(&[]));

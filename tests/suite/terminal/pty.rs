@@ -126,7 +126,7 @@ impl Folder {
         self.thin_line_in(answers, tmux)
     }
 
-    /// [`Self::thin_line`] with the given environment variables.
+    /// Like [`Self::thin_line`], with the given environment variables.
     pub fn thin_line_in(&self, answers: Answers, variables: &[(&str, &str)]) -> Terminal {
         Terminal::open(&[PROGRAM, "scene.toml"], variables, self.0.path(), size(120, 40), Some(answers))
     }
@@ -369,8 +369,8 @@ impl Terminal {
         self.end_saying("")
     }
 
-    /// [`Terminal::end`] that waits until the final screen contains one of the given strings, separated by
-    /// `|`.
+    /// Like [`Terminal::end`], but first waits until the final screen contains one of the given strings,
+    /// separated by `|`.
     #[track_caller]
     pub fn end_saying(mut self, words: &str) -> u32 {
         let code = self.code();

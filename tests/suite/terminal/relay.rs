@@ -167,7 +167,7 @@ fn raise(rising: &Receiver<Due>, input: &Mutex<Box<dyn Write + Send>>, seen: &Mu
 #[derive(Default)]
 struct Scanner {
     last: Vec<u8>,
-    /// Number of bytes so far.
+    /// Number of bytes scanned so far.
     count: usize,
 }
 

@@ -12,16 +12,16 @@ use nix::sys::signal::Signal;
 use super::pty::{Folder, SCENE, Terminal};
 use crate::test_dir::{PROGRAM, assert_mentions, mentions};
 
-/// Sequences in the regular test.
+/// Number of sequences in the regular test.
 const SEQUENCES: u64 = 12;
-/// Sequences in the long test, over all scenes.
+/// Number of sequences in the long test, over all scenes.
 const LONG: u64 = 300;
 /// Bundled scenes for the long test.
 const BUNDLED: [&str; 6] = ["dof", "path", "phong", "photons", "shadows", "textures"];
 /// Keys that change only the preview.
 const LOOKING: [&str; 12] = ["s", "s", "d", "p", "i", "[", "]", "v", "l", "<", "0", "0"];
 
-/// Random numbers.
+/// A random number generator.
 struct Dice(Box<dyn FnMut() -> f32>);
 
 impl Dice {
@@ -243,7 +243,7 @@ fn interrupted_image_resumes_in_the_next_run() {
     let said = terminal.last_lines();
     assert_mentions(&said, &["scene.png", "glimt scene.toml --checkpoint 0.01"]);
     let mut terminal = folder.terminal();
-    terminal.wait("the rest", |_| folder.path("scene.png").exists());
+    terminal.wait("the finished image", |_| folder.path("scene.png").exists());
     terminal.press("q");
     assert_eq!((terminal.end(), folder.bytes("scene.png")), (0, whole));
 }
@@ -259,7 +259,8 @@ fn external_change_to_image_is_reported() {
     terminal.press("w");
     terminal.wait_for_message(&messages::files_written("scene.png"));
     assert_eq!(folder.bytes("scene.png"), image);
-    terminal.wait("it is there", |screen| !screen.contents().contains("was removed"));
+    terminal
+        .wait("no message that the image was removed", |screen| !screen.contents().contains("was removed"));
     // Another glimt process writes the image with other settings.
     let other = folder.once(&["--shadows", "off", "-o", "other.png"]);
     drop(other);

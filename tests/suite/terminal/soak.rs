@@ -20,7 +20,7 @@ const LIMIT: Duration = Duration::from_secs(300);
 /// Maximum memory growth, in KiB, from the middle to the end of the test.
 const SLACK: u64 = 16 << 10;
 
-/// Random numbers.
+/// A random number generator.
 struct Dice(Box<dyn FnMut() -> f32>);
 
 impl Dice {
@@ -248,7 +248,7 @@ fn soak() {
         eprintln!("{}", figures.words(when));
     }
     let most = figures.iter().map(|figures| figures.memory_kib).max().unwrap_or_default();
-    eprintln!("peak of the samples: {:.1} MiB", most as f32 / 1024.0);
+    eprintln!("peak memory: {:.1} MiB", most as f32 / 1024.0);
     lives.press("q");
     assert_eq!(lives.code(), 0);
     drop(falls);
@@ -257,7 +257,7 @@ fn soak() {
         eprintln!("left: {:?}", names.collect::<Vec<_>>());
     }
     assert_eq!(last.temporary, 0);
-    assert!(last.handles <= first.handles + 2, "handles");
-    assert!(last.threads <= first.threads + 2, "threads");
-    assert!(last.memory_kib <= middle.memory_kib + SLACK, "memory");
+    assert!(last.handles <= first.handles + 2, "leaked file descriptors");
+    assert!(last.threads <= first.threads + 2, "leaked threads");
+    assert!(last.memory_kib <= middle.memory_kib + SLACK, "memory growth");
 }

@@ -39,7 +39,7 @@ fn photons_and_integrator_switch_for_this_run() {
         terminal.wait_for_render(number);
         let expected = folder.once(&options);
         let is_own = matches!(words, "p off" | "i whitted");
-        assert_eq!(expected == own, is_own, "{words} shows");
+        assert_eq!(expected == own, is_own, "{words}: image");
         assert!(is_written(&own), "{words}: must not be written");
         if !is_own {
             assert_ne!(setting(&folder, name), value, "the report must describe the image on disk");

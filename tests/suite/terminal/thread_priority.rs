@@ -4,7 +4,7 @@ use super::super::niceness::{of_render_threads, raised};
 use super::pty::Folder;
 
 #[test]
-fn render_threads_have_nice_value_of_option() {
+fn nice_option_applies_to_render_threads() {
     for (option, steps) in [(None, 10), (Some("0"), 0), (Some("3"), 3)] {
         let folder = Folder::new();
         let mut call = vec![folder.program(), "scene.toml", "--threads", "2"];

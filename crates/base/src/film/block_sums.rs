@@ -1,4 +1,4 @@
-//! Allocation and completion of a film's block sums.
+//! Block sums of a film: their allocation, and the completion of blocks.
 
 use super::Rect;
 use super::sum_order::SumOrder;
@@ -6,7 +6,7 @@ use super::sums::{Film, FilmError, Tile, bytes_needed, can_allocate};
 use crate::math::DVec3;
 
 impl Tile {
-    /// Moves a pixel's sum to its block if the block is complete.
+    /// Moves a pixel's running sum to its block sum if the block is complete.
     pub(super) fn close_block(&mut self, pixel: usize, blocks: SumOrder) {
         let Some(block) = blocks.finished_block(self.counts[pixel]) else { return };
         let put = |earlier: &mut [Vec<DVec3>], sums: &mut [DVec3]| {
@@ -25,7 +25,7 @@ impl Film {
     /// Sets the summation order of an empty film.
     ///
     /// # Errors
-    /// There is not enough memory for the block sums.
+    /// [`FilmError::Memory`] if there is not enough memory for the block sums.
     pub fn with_sum_order(mut self, blocks: SumOrder) -> Result<Self, FilmError> {
         let (crop, kept) = (self.crop(), blocks.kept_block_count());
         let more = crop.area() as u64 * (kept * size_of::<DVec3>()) as u64;

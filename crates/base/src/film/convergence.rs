@@ -30,26 +30,26 @@ pub(super) struct SquaredSteps {
     half_way: Vec<f32>,
     /// Squared steps at 2, 4, 8, … samples, for each half of each cell.
     levels: Vec<[[LevelSums; 2]; CELLS]>,
-    /// Last step of each pixel.
+    /// Change of each pixel's luminance when its sample count last doubled.
     recent: Vec<f32>,
 }
 
 /// Sums of squared steps over pixels, at one power-of-two sample count.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct LevelSums {
-    /// Steps of the mean of all samples.
+    /// Squared steps of the mean of all samples.
     outer: f64,
-    /// Steps within the second half of the samples.
+    /// Squared steps of the mean of the second half of the samples.
     inner: f64,
-    /// Sum of the squared `outer` steps, used to detect sums dominated by a few pixels.
+    /// Sum of the squares of the `outer` terms, used to detect sums dominated by a few pixels.
     outer_squares: f64,
-    /// Sum of the `outer` steps, each divided by luminance² + [`RELMSE_EPSILON`].
+    /// Sum of the `outer` terms, each divided by luminance² + [`RELMSE_EPSILON`].
     relative: f64,
-    /// Sum of the `inner` steps, each divided by luminance² + [`RELMSE_EPSILON`].
+    /// Sum of the `inner` terms, each divided by luminance² + [`RELMSE_EPSILON`].
     relative_inner: f64,
 }
 
-/// Squared steps at a power of two, and the steps one doubling earlier.
+/// Squared steps at a power-of-two sample count and one doubling earlier.
 #[derive(Clone, Copy, Debug, Default)]
 struct StepPair {
     last: f64,
@@ -58,7 +58,7 @@ struct StepPair {
 }
 
 impl SquaredSteps {
-    /// Empty steps with memory reserved for `area` pixels. `None` if the allocation fails.
+    /// Reserves memory for the steps of `area` pixels. Returns `None` if the allocation fails.
     pub(super) fn reserved(area: usize) -> Option<Self> {
         let reserved = || {
             let mut values = Vec::new();
@@ -68,7 +68,7 @@ impl SquaredSteps {
         Some(Self { last: reserved()?, half_way: reserved()?, recent: reserved()?, levels: Vec::new() })
     }
 
-    /// Resizes to `area` pixels. Cannot fail if the memory was reserved.
+    /// Resizes the lists to `area` pixels. Cannot fail if the memory was reserved.
     pub(super) fn fill(&mut self, area: usize) {
         for values in [&mut self.last, &mut self.half_way, &mut self.recent] {
             values.resize(area, 0.0);
@@ -119,7 +119,7 @@ impl SquaredSteps {
         Ok(steps)
     }
 
-    /// Square of a pixel's last step.
+    /// Squared change of a pixel's luminance when its sample count last doubled.
     pub(super) fn last_squared_step(&self, pixel: usize) -> f64 {
         self.recent.get(pixel).map_or(0.0, |step| f64::from(*step) * f64::from(*step))
     }
@@ -163,7 +163,7 @@ impl SquaredSteps {
         self.last[pixel] = rounded;
     }
 
-    /// Steps of a half-cell at 2^`level` samples.
+    /// Squared steps of a half-cell at 2^`level` samples and one doubling earlier.
     fn step_pair(&self, level: usize, (cell, half): (usize, usize), is_relative: bool) -> Option<StepPair> {
         let of = |level: usize| self.levels.get(level.checked_sub(1)?).map(|cells| cells[cell][half]);
         let parts = |sums: LevelSums| match is_relative {
@@ -175,7 +175,7 @@ impl SquaredSteps {
         Some(StepPair { last, before })
     }
 
-    /// Steps of a half-cell at 2^`level` samples, followed by the steps one, two and three doublings earlier.
+    /// Squared steps of a half-cell at 2^`level` samples, then one, two and three doublings earlier.
     fn last_four_steps(&self, level: usize, at: (usize, usize), is_relative: bool) -> Option<[f64; 4]> {
         let StepPair { last, before } = self.step_pair(level, at, is_relative)?;
         let earlier = |back: usize| self.step_pair(level.checked_sub(back)?, at, is_relative)?.before;
@@ -266,11 +266,16 @@ const DOUBT: f64 = 2.0;
 /// Trusted fraction of the variance reduction over two steps.
 const CAREFUL: f64 = 0.8;
 
-/// Factor by which quadrupling independent samples reduces the variance, followed by the maximum reduction
-/// attributed to chance, the fraction of the excess that continues, and the maximum rate.
+/// Factor by which quadrupling independent samples reduces the variance.
 const FOURFOLD_RATE: f64 = 4.0;
+
+/// Like [`CHANCE_FALL`], for quadrupled sample counts.
 const FOURFOLD_CHANCE: f64 = 5.2;
+
+/// Like [`LASTING`], for quadrupled sample counts.
 const FOURFOLD_LASTING: f64 = 1.2;
+
+/// Maximum variance reduction expected from quadrupling the sample count.
 const FOURFOLD_MOST: f64 = 40.0;
 
 impl Convergence {
@@ -342,7 +347,8 @@ impl Convergence {
     }
 }
 
-/// Expected rate for a measured variance reduction with this confidence.
+/// Expected variance reduction at the next doubling, given the measured reduction `fall` and the confidence
+/// `trust` in it.
 fn expected_rate(fall: f64, trust: f64) -> f64 {
     INDEPENDENT_RATE + LASTING * (fall - CHANCE_FALL).max(0.0) * trust
 }

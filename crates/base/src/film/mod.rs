@@ -57,13 +57,13 @@ fn is_in_pool() -> bool {
 /// A rectangle of pixels. (0, 0) is the top left pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Rect {
-    /// First column.
+    /// Leftmost column.
     pub x: u32,
-    /// First row.
+    /// Top row.
     pub y: u32,
-    /// Number of columns, at least 1.
+    /// Width in pixels, at least 1.
     pub width: u32,
-    /// Number of rows, at least 1.
+    /// Height in pixels, at least 1.
     pub height: u32,
 }
 
@@ -98,7 +98,7 @@ pub struct TileSamples {
     pub samples: u32,
     /// `pixels.count() · samples` radiances, at positions drawn in proportion to the absolute pixel filter.
     pub radiance: Vec<Vec3>,
-    /// Samples in the filter's negative lobes, or `None` if it has none.
+    /// Samples in the pixel filter's negative lobes, or `None` if the filter has no negative lobes.
     pub negative: Option<NegativeLobes>,
 }
 
@@ -107,18 +107,18 @@ pub struct TileSamples {
 /// regardless of the sample positions.
 #[derive(Clone, Debug)]
 pub struct NegativeLobes {
-    /// −∫min(f, 0)/∫f.
+    /// Weight of the negative lobes: −∫min(f, 0)/∫f for the filter f.
     pub weight: f64,
-    /// Whether each radiance is in a negative lobe.
+    /// Whether each sample is in a negative lobe.
     pub is_negative: Vec<bool>,
 }
 
 /// Linear, unexposed radiance in row-major order from the top.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RadianceImage {
-    /// Columns.
+    /// Width in pixels.
     pub width: u32,
-    /// Rows.
+    /// Height in pixels.
     pub height: u32,
     /// `width·height` pixels.
     pub pixels: Vec<Vec3>,
@@ -153,9 +153,9 @@ impl RadianceImage {
 /// An 8-bit sRGB image for display.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Picture {
-    /// Columns.
+    /// Width in pixels.
     pub width: u32,
-    /// Rows.
+    /// Height in pixels.
     pub height: u32,
     /// `width·height` pixels.
     pub pixels: Vec<[u8; 3]>,
@@ -164,9 +164,9 @@ pub struct Picture {
 /// A 16-bit sRGB image for files.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Picture16 {
-    /// Columns.
+    /// Width in pixels.
     pub width: u32,
-    /// Rows.
+    /// Height in pixels.
     pub height: u32,
     /// `width·height` pixels.
     pub pixels: Vec<[u16; 3]>,

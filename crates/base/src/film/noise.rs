@@ -24,7 +24,7 @@ pub struct CellHalfNoise {
     pub power: f64,
 }
 
-/// Noise of an image.
+/// Noise level of an image and its convergence rate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ImageNoise {
     /// Relative standard error: [`Film::relative_error`].
@@ -65,7 +65,7 @@ impl Film {
         self.noise().map(|noise| noise.relative_error)
     }
 
-    /// [`Film::relative_error`] and the exponent with which it falls.
+    /// Returns [`Film::relative_error`] and its convergence exponent.
     pub fn noise(&self) -> Option<ImageNoise> {
         let sums @ NoiseSums { variance, mean, .. } = self.noise_sums()?;
         let pixels = self.crop().area() as f64;
@@ -111,11 +111,10 @@ impl Film {
         self.map_tiles(of_tile).into_iter().try_fold(NoiseSums::default(), add)
     }
 
-    /// Calls `tell` for every tile and returns the results in tile order. Runs in parallel inside a rayon
-    /// pool.
-    pub fn map_tiles<T: Send>(&self, tell: impl Fn(usize) -> T + Send + Sync) -> Vec<T> {
+    /// Calls `f` for every tile and returns the results in tile order. Runs in parallel inside a rayon pool.
+    pub fn map_tiles<T: Send>(&self, f: impl Fn(usize) -> T + Send + Sync) -> Vec<T> {
         let tiles = 0..self.tile_count();
-        if is_in_pool() { tiles.into_par_iter().map(tell).collect() } else { tiles.map(tell).collect() }
+        if is_in_pool() { tiles.into_par_iter().map(f).collect() } else { tiles.map(f).collect() }
     }
 
     /// Noise in one half of a cell. `None` if the half has no pixels or if a pixel has fewer than two
@@ -168,10 +167,10 @@ impl Film {
         (pixels > 0.0).then_some(CellHalfNoise { variance, mean, samples, power })
     }
 
-    /// Error of a half-cell after the first `count` samples per pixel, where `count` is a power of two: the
-    /// mean of luminance variance / (luminance² + [`RELMSE_EPSILON`](crate::math::color::RELMSE_EPSILON))
-    /// over the pixels, and the exponent with which it falls. `None` if `count` is less than two or more than
-    /// the pixels' sample count, and if the half has no pixels.
+    /// Relative error of a half-cell after the first `count` samples per pixel, and its convergence exponent.
+    /// `count` is a power of two. The error is the mean over the pixels of luminance variance / (luminance² +
+    /// [`RELMSE_EPSILON`](crate::math::color::RELMSE_EPSILON)). `None` if `count` is less than two or exceeds
+    /// the pixels' sample count, or if the half has no pixels.
     pub fn cell_half_error(&self, number: usize, half: usize, count: u32) -> Option<(f64, f64)> {
         let tile = self.tile(number / CELLS);
         let pixels = self.half_pixel_count(number, half);
@@ -179,7 +178,7 @@ impl Film {
         (pixels > 0).then(|| (sum / pixels as f64, libm::log2(rate)))
     }
 
-    /// Assumed convergence of this film's noise.
+    /// Convergence model for this film's noise.
     pub fn convergence(&self) -> Convergence {
         self.convergence
     }

@@ -33,7 +33,7 @@ struct TileContribution {
     /// First column and row.
     x: u32,
     y: u32,
-    /// Columns.
+    /// Number of columns.
     width: u32,
     /// Weighted sums in row-major order.
     cells: Vec<Weighted>,
@@ -140,7 +140,7 @@ impl Previewer {
     }
 }
 
-/// Updates these consecutive tiles, starting at index `first`.
+/// Updates the contributions of consecutive tiles, starting with tile `first`.
 fn refresh(
     shares: &mut [TileContribution],
     first: usize,

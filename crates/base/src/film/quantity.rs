@@ -28,7 +28,7 @@ impl Film {
         self.image(Quantity::Radiance)
     }
 
-    /// Image of a quantity.
+    /// Image of a quantity, such as the sample counts.
     pub fn image(&self, quantity: Quantity) -> RadianceImage {
         let mut image = RadianceImage::black(self.width(), self.height());
         for i in 0..self.tile_count() {
@@ -64,7 +64,7 @@ impl Film {
 }
 
 impl Tile {
-    /// Value of a quantity at a pixel index in a tile with this many columns. `None` if the pixel has no
+    /// Value of a quantity at pixel `index` of a tile that is `columns` wide. `None` if the pixel has no
     /// samples.
     pub(super) fn value(&self, quantity: Quantity, (index, columns): (usize, usize)) -> Option<DVec3> {
         match quantity {
@@ -74,7 +74,7 @@ impl Tile {
         }
     }
 
-    /// Standard error of a pixel, or 0 if it has a single sample, from which the error cannot be estimated.
+    /// Standard error of a pixel's luminance. 0 for a single sample, which does not allow an estimate.
     fn error(&self, index: usize, columns: usize) -> Option<f64> {
         let count = self.count(index);
         let rows = self.counts.len() / columns.max(1);
@@ -123,7 +123,7 @@ mod tests {
             let mean = (errors.iter().map(|error| f64::from(error.x).powi(2)).sum::<f64>() / 400.0).sqrt();
             assert!((0.9..1.15).contains(&(mean / exact)), "{count}: {mean} {exact}");
             let spread = errors.iter().filter(|error| f64::from(error.x) < 0.25 * exact).count();
-            assert!(spread < 20, "{count}: {spread} pixels have a far too small error");
+            assert!(spread < 20, "{count}: the error of {spread} pixels is far too small");
         }
     }
 

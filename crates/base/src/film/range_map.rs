@@ -16,7 +16,7 @@ pub enum RangeMap {
     Resolved(DataKind, DataRange),
 }
 
-/// Meaning of the data values.
+/// Kind of data, which determines how its values map to brightness.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DataKind {
     /// Distances: the nearest is white, the farthest dark, and 0 (nothing hit) black.
@@ -28,9 +28,9 @@ pub enum DataKind {
 /// Range of the values in view.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DataRange {
-    /// Minimum, which is 0 for amounts.
+    /// Smallest distance in view, or 0 for amounts.
     pub least: f32,
-    /// Maximum.
+    /// Largest value in view.
     pub greatest: f32,
     /// Bias b of the curve between `least` and `greatest`; see [`DataRange::fraction_in_range`].
     bias: f32,
@@ -96,7 +96,7 @@ impl DataRange {
         Self { bias: bias.clamp(LEAST_BIAS, 1.0), ..linear }
     }
 
-    /// Minimum and maximum.
+    /// Minimum and maximum of the range.
     pub fn limits(&self) -> [f32; 2] {
         [self.least, self.greatest]
     }
@@ -111,7 +111,7 @@ impl DataRange {
         if self.bias < 1.0 { x / (x + self.bias * (1.0 - x)) } else { x }
     }
 
-    /// Brightness of a distance. A pixel whose distance is below the range is partly empty.
+    /// Brightness of a distance. Distances below the range occur in partly empty pixels.
     fn distance_brightness(&self, distance: f32) -> f32 {
         if distance < self.least {
             return if self.least.is_finite() { distance / self.least } else { distance.min(1.0) };
@@ -179,7 +179,10 @@ mod tests {
         // away.
         let numbers: Vec<f32> = (1..=200).map(|row| 200.0 / row as f32).collect();
         let shown = shown(DataKind::Distances, &numbers);
-        assert!(shown[199] == 1.0 && (shown[0] - 0.1).abs() < 1e-6, "both ends are used");
+        assert!(
+            shown[199] == 1.0 && (shown[0] - 0.1).abs() < 1e-6,
+            "the full brightness range should be used"
+        );
         // Half of the rows are at distances 1 … 2. A linear mapping over 1 … 200 would make all of them
         // white.
         assert!((shown[99] - (1.0 - 0.9 * 0.25)).abs() < 0.01, "{}", shown[99]);

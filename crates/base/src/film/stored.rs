@@ -12,7 +12,7 @@ use crate::math::DVec3;
 #[error("the data is not a valid tile of the image")]
 pub struct Malformed;
 
-/// A deserialized tile. Its blocks can be merged with those of other tiles.
+/// A deserialized tile, whose blocks can be merged with blocks of other tiles.
 #[derive(Debug, Default)]
 pub struct StoredTile {
     tile: Tile,
@@ -85,7 +85,7 @@ impl StoredTile {
     }
 }
 
-/// Sums of a single block.
+/// Pixel sums of a single block, which may be the block in progress.
 fn block_of<'a>(earlier: &'a [Vec<DVec3>], sums: &'a [DVec3], block: usize) -> Option<&'a [DVec3]> {
     match block.cmp(&earlier.len()) {
         std::cmp::Ordering::Less => Some(&earlier[block]),
@@ -148,7 +148,7 @@ impl Film {
         self.tile(cell / CELLS).count((y * tile.width + x) as usize)
     }
 
-    /// Adds restored tiles' non-finite samples to [`Film::non_finite_samples`].
+    /// Adds the number of non-finite samples in restored tiles to [`Film::non_finite_samples`].
     pub fn add_non_finite(&self, samples: u64) {
         self.non_finite_samples.fetch_add(samples, Ordering::Relaxed);
     }
@@ -269,7 +269,7 @@ mod tests {
             for tile in 0..first.tile_count() {
                 let area = first.tile_rect(tile).expect("a tile").area();
                 let read = StoredTile::read(&stored(&first, tile), area).expect("a tile");
-                second.restore(tile, read).expect("films should be identical");
+                second.restore(tile, read).expect("the tile should fit the film");
             }
             assert_eq!((second.cell_half_samples(0, 1), second.cell_half_samples(1, 0)), (21, 21));
             add(&second, 21..37, is_signed);

@@ -37,7 +37,7 @@ impl SumOrder {
         }
     }
 
-    /// Index of the sum to which a block that ends at `count` samples is added, or `None` inside a block.
+    /// Index of the block sum that receives the block ending at `count` samples, or `None` inside a block.
     pub(super) fn finished_block(self, count: u32) -> Option<usize> {
         let is_end = count > 0 && count.is_multiple_of(BLOCK_SIZE);
         match self {

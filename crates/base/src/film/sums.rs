@@ -9,7 +9,7 @@ use super::sum_order::{SumOrder, sum_with_blocks};
 use super::{CELL_SIZE, CELLS, CELLS_ACROSS, Rect, TILE_SIZE, TileSamples};
 use crate::math::{DVec3, Vec3};
 
-/// Errors that can occur when a film is created.
+/// Error from creating a film.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum FilmError {
     /// There is not enough memory.
@@ -19,9 +19,9 @@ pub enum FilmError {
         remedy(*.crop_helps)
     )]
     Memory {
-        /// Columns.
+        /// Width of the image in pixels.
         width: u32,
-        /// Rows.
+        /// Height of the image in pixels.
         height: u32,
         /// Bytes for the sums and the finished image.
         bytes: u64,
@@ -32,9 +32,9 @@ pub enum FilmError {
     /// The image would have no pixels.
     #[error("there are no pixels to render: the crop is outside the {width}×{height} image")]
     Empty {
-        /// Columns.
+        /// Width of the image in pixels.
         width: u32,
-        /// Rows.
+        /// Height of the image in pixels.
         height: u32,
     },
 }
@@ -47,7 +47,7 @@ fn remedy(crop_helps: bool) -> &'static str {
     }
 }
 
-/// Sample counts over all pixels.
+/// Statistics of the samples per pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SampleStats {
     /// Minimum over all pixels.
@@ -58,8 +58,8 @@ pub struct SampleStats {
     pub max: u32,
 }
 
-/// Sums of samples for the pixels of an image or a crop of it. Tiles are numbered in row-major order from the
-/// top left of the crop. Any thread may add to any tile and read the film at any time. A tile's sums have the
+/// Sums of the samples of each pixel in an image or crop. Tiles are numbered in row-major order from the top
+/// left of the crop. Any thread may add to any tile and read the film at any time. A tile's sums have the
 /// same bits for samples added in the same order, regardless of how they are grouped.
 #[derive(Debug)]
 pub struct Film {
@@ -141,7 +141,7 @@ impl Tile {
         }
     }
 
-    /// Resizes to the tile's pixels. Cannot fail because the memory was reserved when the film was created.
+    /// Resizes the sums to `area` pixels. Cannot fail because the film reserved the memory.
     pub(super) fn fill(&mut self, area: usize) {
         self.sums.resize(area, DVec3::ZERO);
         self.earlier.iter_mut().for_each(|sums| sums.resize(area, DVec3::ZERO));
@@ -269,17 +269,17 @@ impl Film {
         Self { convergence, ..self }
     }
 
-    /// Columns of the full image.
+    /// Width of the full image in pixels.
     pub fn width(&self) -> u32 {
         self.width
     }
 
-    /// Rows of the full image.
+    /// Height of the full image in pixels.
     pub fn height(&self) -> u32 {
         self.height
     }
 
-    /// Pixels to render.
+    /// Rectangle of pixels to render.
     pub fn crop(&self) -> Rect {
         self.crop
     }
@@ -343,7 +343,7 @@ impl Film {
         self.non_finite_samples.fetch_add(non_finite, Ordering::Relaxed);
     }
 
-    /// Sample counts over the pixels of the crop.
+    /// Minimum, mean and maximum samples per pixel of the crop.
     pub fn samples(&self) -> SampleStats {
         let (mut min, mut max, mut total) = (u32::MAX, 0, 0_u64);
         for tile in &self.tiles {
@@ -422,7 +422,7 @@ fn tiles_in_rings(crop: Rect) -> Vec<usize> {
     places.into_iter().map(|(_, _, tile)| tile).collect()
 }
 
-/// Bytes per pixel for the sum, count, last two recorded means and last step.
+/// Bytes per pixel for the sum, the count, two recorded means and the change at the last doubling.
 const SUM_BYTES: usize = size_of::<DVec3>() + 3 * size_of::<f32>() + size_of::<u32>();
 
 /// Bytes needed for the crop's sums and for the full image as both radiance and sRGB.

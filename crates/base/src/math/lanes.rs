@@ -1,6 +1,6 @@
 //! Packets of 16 numbers, processed in branch-free array loops that compilers vectorize. Each lane has the
 //! same bits as the result of the scalar computation. Structs that hold packets are aligned to
-//! cache lines, because a load that crosses a line takes twice as long.
+//! cache lines, because a load that crosses a cache-line boundary takes twice as long.
 
 use super::Vec3;
 

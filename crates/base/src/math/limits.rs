@@ -2,10 +2,10 @@
 
 use super::DVec3;
 
-/// Largest allowed magnitude: products of two larger numbers overflow 32-bit floats.
+/// Largest allowed magnitude. Products of larger numbers may overflow 32-bit floats.
 pub const LARGEST: f64 = 1e18;
 
-/// Shortest allowed nonzero length: products of two shorter lengths underflow.
+/// Shortest allowed nonzero length. Products of shorter lengths may underflow 32-bit floats.
 pub const SHORTEST: f64 = 1e-18;
 
 /// Length of a vector, correct even if the squared length underflows or overflows.

@@ -3,16 +3,17 @@
 use super::DVec3;
 use super::float::floor_to_power_of_two;
 
-/// Grid spacing of the origins, in scene sizes. At this distance, the error of single precision is a
-/// millionth of the scene size.
+/// Grid spacing of the origins, in scene sizes. At this distance, the rounding error of single precision is a
+/// few millionths of the scene size.
 const STEP: f64 = 64.0;
 
-/// Keeps typical sizes such as 1, 2 and 5 away from the powers of two at which the grid spacing changes.
+/// Factor that keeps typical sizes such as 1, 2 and 5 away from the powers of two at which the grid spacing
+/// changes.
 const OFF_POWERS: f64 = 1.37;
 
-/// Local origin for a scene of this size around `place`. It is 0 near 0 and otherwise lies on a grid whose
-/// spacing is a power of two. Subtracting the origin is therefore exact, and small changes of `place` do not
-/// change it.
+/// Local origin for a scene of the given size around `place`. Returns 0 if `place` is near 0, and otherwise a
+/// point on a grid whose spacing is a power of two. Subtracting the origin is therefore exact, and small
+/// changes of `place` do not move the origin.
 pub fn origin_near(place: DVec3, size: f64) -> DVec3 {
     let step = STEP * floor_to_power_of_two(size * OFF_POWERS);
     // Adding 0 converts −0 to 0.

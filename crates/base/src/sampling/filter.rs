@@ -45,8 +45,8 @@ impl PixelFilter {
         }
     }
 
-    /// Maps points of the unit square to filter samples in place and passes each sample, with its index, to
-    /// `each`.
+    /// Maps points of the unit square to filter offsets in place. For filters sampled from a table, which may
+    /// have negative lobes, also passes each sample and its index to `each`.
     #[inline(always)]
     pub fn sample_row<const N: usize>(
         self,
@@ -66,7 +66,7 @@ impl PixelFilter {
         }
     }
 
-    /// −∫min(f, 0)/∫f over the plane, or `None` if f is never negative.
+    /// Weight of the negative lobes, −∫min(f, 0)/∫f over the plane, or `None` if f is never negative.
     pub fn negative_weight(self) -> Option<f64> {
         match self {
             Self::Box | Self::Tent | Self::Gaussian => None,

@@ -48,7 +48,7 @@ pub enum Dimension {
 }
 
 impl Dimension {
-    /// Sobol dimension of this decision. `path` distinguishes the paths of one sample.
+    /// Hash that selects the Owen scramble of this decision. `path` distinguishes the paths of one sample.
     #[inline(always)]
     fn hash(self, path: u32) -> u32 {
         let number = match self {
@@ -125,8 +125,8 @@ impl<const N: usize> SamplerPacket<N> {
         Self { seeds, samples: *samples }
     }
 
-    /// Returns two numbers in [0, 1) per sample for one of `of` repetitions of a decision. The numbers are
-    /// well distributed over all repetitions and samples. The scramble changes every 2³² points.
+    /// Returns two numbers in [0, 1) per sample, for a decision that is made `of` times per sample. The
+    /// numbers are well distributed over all repetitions and samples. The scramble changes every 2³² points.
     #[inline(always)]
     pub fn pairs(&self, paths: &[u32; N], decision: Dimension, repetition: u32, of: u32) -> [[f32; N]; 2] {
         let (mut indices, mut seeds) = ([0; N], [0; N]);

@@ -18,7 +18,7 @@ use signal_hook::low_level;
 /// Size in bytes of the last failed allocation, or 0.
 static REFUSED_BYTES: AtomicUsize = AtomicUsize::new(0);
 
-/// Restores the terminal, using only async-signal-safe calls.
+/// Function that restores the terminal using only async-signal-safe calls.
 static RESTORE_TERMINAL: OnceLock<fn()> = OnceLock::new();
 
 /// Exit code for failures.
@@ -67,7 +67,7 @@ unsafe impl GlobalAlloc for Allocator {
 /// Installs the SIGABRT handler, which prints a message to stderr and exits with code 1.
 ///
 /// # Errors
-/// The handler cannot be installed.
+/// Returns an error if the handler cannot be installed.
 pub fn install_abort_handler() -> io::Result<()> {
     // SAFETY: `on_abort` makes only async-signal-safe calls.
     unsafe { low_level::register(SIGABRT, on_abort) }.map(drop)

@@ -46,14 +46,14 @@ impl FileKind {
 /// Returns the file type and metadata of `path`, following symbolic links.
 ///
 /// # Errors
-/// The file does not exist or its metadata cannot be read.
+/// Returns an error if the file does not exist or its metadata cannot be read.
 pub fn kind(path: &Path) -> io::Result<(FileKind, Metadata)> {
     let metadata = fs::metadata(path)?;
     Ok((FileKind::of(path, &metadata), metadata))
 }
 
-/// File metadata that changes with every write if there is enough time between writes, and with every
-/// replacement by another file.
+/// File metadata for detecting changes. It changes if the file is replaced, and at every write unless two
+/// writes have the same timestamp.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FileStamp {
     device: u64,
@@ -108,7 +108,7 @@ pub fn reason_not_to_replace(metadata: &Metadata) -> Option<&'static str> {
 /// concurrently replaced by a pipe.
 ///
 /// # Errors
-/// The file does not exist or cannot be read.
+/// Returns an error if the file does not exist or cannot be read.
 pub fn open(path: &Path) -> io::Result<Result<(File, Metadata), FileKind>> {
     let (kind, _) = kind(path)?;
     if kind != FileKind::Regular {
@@ -156,7 +156,7 @@ mod tests {
     #[test]
     fn only_regular_files_are_opened() {
         let folder = tempfile::tempdir().expect("a folder");
-        let said = |path: &Path| open(path).expect("it is there").err();
+        let said = |path: &Path| open(path).expect("the file should exist").err();
         assert_eq!(said(folder.path()), Some(FileKind::Folder));
         assert_eq!(said(Path::new("/dev/zero")), Some(FileKind::Special));
         let pipe = folder.path().join("pipe");
@@ -175,12 +175,12 @@ mod tests {
         let link = folder.path().join("link");
         std::os::unix::fs::symlink("/proc/kmsg", &link).expect("a link");
         for path in [Path::new("/proc/kmsg"), Path::new("/proc/self/status"), &link] {
-            assert_eq!(open(path).expect("it is there").err(), Some(FileKind::Kernel), "{}", path.display());
+            assert_eq!(open(path).expect("a file").err(), Some(FileKind::Kernel), "{}", path.display());
         }
         // An open file's path in /proc is a link to the file.
         let file = File::create(folder.path().join("file")).expect("a file");
         let number = std::os::fd::AsRawFd::as_raw_fd(&file);
         let same = format!("/proc/self/fd/{number}");
-        assert!(open(Path::new(&same)).expect("it is there").is_ok());
+        assert!(open(Path::new(&same)).expect("a file").is_ok());
     }
 }

@@ -1,5 +1,5 @@
-//! Lists and removes folders. Unlike `std::fs::read_dir` and `remove_dir_all`, these functions do not panic if the system fails to
-//! close a folder.
+//! Lists and removes folders. Unlike `std::fs::read_dir` and `remove_dir_all`, these functions do not panic
+//! if the system fails to close a folder.
 
 use std::ffi::{OsStr, OsString};
 use std::fs::File;
@@ -14,7 +14,7 @@ use rustix::fs::{AtFlags, Dir, Mode, OFlags, openat, unlinkat};
 /// cannot be read.
 ///
 /// # Errors
-/// The folder cannot be opened.
+/// Returns an error if the folder cannot be opened.
 pub fn names(folder: &Path) -> io::Result<impl Iterator<Item = OsString> + use<>> {
     entry_names_in(File::open(folder)?.as_fd())
 }
@@ -28,7 +28,7 @@ fn entry_names_in(folder: BorrowedFd<'_>) -> io::Result<impl Iterator<Item = OsS
 /// Removes a folder and its contents. Symbolic links are removed, not followed.
 ///
 /// # Errors
-/// Something in the folder cannot be removed.
+/// Returns an error if the folder or any of its contents cannot be removed.
 pub fn remove_all(folder: &Path) -> io::Result<()> {
     let parent = folder.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let name = folder.file_name().ok_or(io::ErrorKind::InvalidInput)?;

@@ -51,12 +51,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_local_processes_can_be_known_to_have_ended() {
+    fn only_local_processes_are_known_to_have_ended() {
         let current = ProcessIdentity::current();
         assert!(!current.has_ended());
-        let mut child = Command::new("true").spawn().expect("true starts");
+        let mut child = Command::new("true").spawn().expect("`true` should start");
         let process = child.id();
-        child.wait().expect("it ends");
+        child.wait().expect("`true` should end");
         assert!(ProcessIdentity { process, ..current }.has_ended());
         assert!(!ProcessIdentity { process, machine: current.machine ^ 1 }.has_ended());
         for process in [0, u32::MAX] {

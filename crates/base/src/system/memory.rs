@@ -8,9 +8,9 @@ use nix::sys::resource::{RLIM_INFINITY, Resource, getrlimit};
 /// Maximum amount of memory available to this process.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Limit {
-    /// Bytes.
+    /// Limit in bytes.
     pub bytes: u64,
-    /// Name of the setting, for use after "the … of".
+    /// Name of the setting that imposes the limit, such as `` `ulimit -v` ``.
     pub setting: String,
 }
 
@@ -41,9 +41,9 @@ fn cgroup_limit(root: &Path, groups: &str) -> Option<Limit> {
 }
 
 /// Returns the lowest limit of a group and its ancestors. In a container, the path may be the host's path
-/// although the root is the container's own group.
+/// even though the root is the container's own group.
 fn lowest_ancestor_limit(root: &Path, path: &str, file: &str) -> Option<Limit> {
-    /// Version 1 represents "no limit" by the largest possible number of pages.
+    /// Version 1 represents "no limit" as the largest possible number of pages.
     const NONE: u64 = 1 << 60;
     let group = root.join(path.trim_start_matches('/'));
     let folders = group.ancestors().take_while(|folder| folder.starts_with(root));
@@ -67,7 +67,7 @@ mod tests {
     }
 
     #[test]
-    fn the_lowest_limit_of_all_ancestors_applies() {
+    fn lowest_limit_of_all_ancestors_applies() {
         let root = tempfile::tempdir().expect("a folder");
         let root = root.path();
         let bytes = |groups: &str| cgroup_limit(root, groups).map(|limit| limit.bytes);
@@ -77,7 +77,7 @@ mod tests {
         write(root, "a/memory.max", "4096000\n");
         assert_eq!(bytes("0::/a/b\n"), Some(4_096_000));
         write(root, "a/b/memory.max", "8192000\n");
-        assert_eq!(bytes("0::/a/b\n"), Some(4_096_000), "the group above allows less");
+        assert_eq!(bytes("0::/a/b\n"), Some(4_096_000), "the parent group's limit is lower");
         write(root, "a/b/memory.max", "1024000\n");
         assert_eq!(bytes("0::/a/b\n"), Some(1_024_000));
         let said = cgroup_limit(root, "0::/a/b\n").expect("a limit").setting;

@@ -15,7 +15,7 @@ const STACK_BYTES: u64 = 2 << 20;
 /// has no room for its signal stack.
 ///
 /// # Errors
-/// The system's error for a thread that cannot be started.
+/// Returns the system's error for a thread that cannot be started if the stacks do not fit.
 pub fn check_stack_space(threads: usize) -> Result<(), Error> {
     let Ok((limit, _)) = getrlimit(Resource::RLIMIT_AS) else { return Ok(()) };
     if (threads as u64).saturating_mul(STACK_BYTES) > limit {

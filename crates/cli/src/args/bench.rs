@@ -10,7 +10,7 @@ use crate::scene::description::{Accel, Integrator, Shadows};
 use crate::tui::ColorChoice;
 
 pub(super) const HELP: &str = "\
-Each image is compared with two references with independent noise, by the mean of (x - r1)(x - r2)/(r² + 0.01), so their \
+Each image is compared with two references with independent noise, using the mean of (x - r1)(x - r2)/(r² + 0.01), so their \
 noise does not count as error. The error that images with different seeds have in common is the bias of the method. \
 References are cached in $XDG_CACHE_HOME/glimt/references or ~/.cache/glimt/references, and reused while the scene, its \
 files and the size are unchanged.

@@ -11,7 +11,7 @@ use crate::scene::keys::{color_names, paths, tables};
 use crate::scene::outline::{OutlineTable, outline};
 use crate::scene::{is_mesh, text_now};
 
-/// Words of the command line being completed, for shell scripts that do not pass them as arguments.
+/// Words of the command line being completed, if the shell script does not pass them as arguments.
 static WORDS: OnceLock<Vec<OsString>> = OnceLock::new();
 
 /// Stores the words of the command line for completers that depend on other arguments.
@@ -112,7 +112,7 @@ fn path_candidates(
     fitting.map(|(value, doc)| CompletionCandidate::new(format!("{path}{value}")).help(help(doc))).collect()
 }
 
-/// Named values of a type, for a scene with the tables in `outline`.
+/// Named values for a key of type `kind`: keywords, colors, or names of tables in `outline`.
 fn named_values(kind: ValueKind, outline: &[OutlineTable]) -> Vec<DescribedValue> {
     let plain = |value: &str| (value.to_owned(), "");
     match kind {

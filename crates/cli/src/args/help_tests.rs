@@ -4,7 +4,7 @@ use clap::CommandFactory;
 
 use super::Args;
 
-/// The program's short help and each command's short and long help, `columns` wide.
+/// The program's short help and each command's short and long help, wrapped to `columns`.
 fn helps(columns: usize) -> Vec<(String, String)> {
     let mut all = Args::command().term_width(columns);
     all.build();
@@ -18,7 +18,7 @@ fn helps(columns: usize) -> Vec<(String, String)> {
 }
 
 #[test]
-fn help_fits_its_columns() {
+fn help_fits_the_requested_width() {
     for columns in [80, 100, 140] {
         for (name, help) in helps(columns) {
             // The usage line is not wrapped.
@@ -29,9 +29,9 @@ fn help_fits_its_columns() {
     }
 }
 
-/// Lines only break where the next word does not fit.
+/// Lines break only where the next word does not fit.
 #[test]
-fn help_is_wrapped_once() {
+fn help_lines_break_only_when_full() {
     for columns in [80, 100, 140] {
         for (name, help) in helps(columns) {
             let lines: Vec<&str> = help.lines().collect();

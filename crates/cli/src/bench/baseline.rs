@@ -9,9 +9,9 @@ const FALSE_POSITIVE_RATE: f64 = 0.01;
 /// Change in a method's time or error on a scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MethodChange {
-    /// The scene.
+    /// Name of the scene.
     pub scene: String,
-    /// The method.
+    /// Name of the method.
     pub method: String,
     /// The compared quantity.
     pub quantity: Quantity,
@@ -96,8 +96,8 @@ fn matching_step<'a>(step: &StepResult, then: &'a [StepResult]) -> Option<&'a St
     })
 }
 
-/// Difference between the mean logarithms, its standard error and its degrees of freedom. `None` if there are
-/// too few positive values.
+/// Difference between two steps' mean log times or mean log errors, with its standard error and degrees of
+/// freedom. `None` if a step has fewer than two positive values.
 fn log_difference(then: &StepResult, now: &StepResult, quantity: Quantity) -> Option<(f64, f64, f64)> {
     let of = |step: &StepResult| -> Vec<f64> {
         let values = step.pictures.iter().map(|picture| match quantity {

@@ -15,7 +15,7 @@ pub const FALSE_POSITIVE_RATE: f64 = 0.001;
 /// Minimum number of seeds needed to estimate a bias.
 pub const MIN_SEEDS: usize = 3;
 
-/// An estimated bias.
+/// Estimated squared bias of a method, with its uncertainty.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Bias {
     /// Squared bias, as a contribution to relMSE. May be negative due to noise.
@@ -81,7 +81,7 @@ impl PairwiseErrorProducts {
         sum / count
     }
 
-    /// Variance of the mean if there is no bias, so that the products of different pairs are uncorrelated.
+    /// Variance of the mean, assuming no bias. The products of different pairs are then uncorrelated.
     fn variance_without_bias(&self) -> f64 {
         let (mean, count) = (self.mean(), self.products.len() as f64);
         let squares: f64 =
@@ -157,7 +157,7 @@ mod tests {
             let mut noise = Noise(seeds as u64 * 1000 + u64::from(block));
             let alarms = (0..1000).filter(|_| noise.found(seeds, 0.0, block).is_found()).count();
             // The expected count is 1. A Poisson variable with this mean exceeds 6 with probability 1e-4.
-            assert!(alarms <= 6, "{seeds} seeds, blocks of {block}: {alarms} false alarms of 1000");
+            assert!(alarms <= 6, "{seeds} seeds, blocks of {block}: {alarms} false alarms in 1000 trials");
         }
     }
 
@@ -203,7 +203,8 @@ mod tests {
             noise.picture(0.0, 0.0, 1),
         );
         let references = TwoReferences::new(pair.expect("a pair"));
-        let of = |picture: RadianceImage| estimate_bias(&references, &vec![picture; 3]).expect("enough");
+        let of =
+            |picture: RadianceImage| estimate_bias(&references, &vec![picture; 3]).expect("enough seeds");
         assert!(!of(noise.picture(0.0, 0.0, 1)).is_found());
         assert!(of(noise.picture(0.0, 0.1, 1)).is_found());
         assert_eq!(estimate_bias(&references, &[noise.picture(0.0, 0.0, 1)]), None);

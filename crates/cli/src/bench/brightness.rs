@@ -28,9 +28,9 @@ impl Brightness {
     }
 }
 
-/// Compares the brightness of images rendered with different seeds to the references.
-/// `are_pixels_independent` must be false with photons, which correlate the errors of pixels. Returns `None`
-/// for fewer than [`MIN_SEEDS`] images or for black references.
+/// Compares the mean brightness of images, each rendered with a different seed, to the mean brightness of the
+/// references. `are_pixels_independent` must be false with photons, which correlate the errors of pixels. Returns
+/// `None` for fewer than [`MIN_SEEDS`] images or for black references.
 pub fn compare_brightness(
     references: &TwoReferences,
     pictures: &[RadianceImage],
@@ -111,10 +111,10 @@ mod tests {
             missed += u32::from(!found.is_biased());
             off.push((found.value + 0.01) / found.error);
             let by_relmse = estimate_bias(&references, &pictures).expect("enough seeds");
-            assert!(!by_relmse.is_found(), "seed {seed}: relMSE should be unable to detect the bias");
+            assert!(!by_relmse.is_found(), "seed {seed}: the bias should be undetectable in relMSE");
         }
-        // One percent is 4.7 standard errors, and the threshold is 3.3. This misses 8 % of the seeds: 3.3 of
-        // 40 on average. Allow 8.
+        // One percent is 4.7 standard errors, and the threshold is 3.3. The test therefore misses 8 % of the seeds,
+        // 3.3 of 40 on average. Allow 8.
         assert!(missed <= 8, "{missed}");
         // The normalized errors have mean 0 and standard deviation 1.
         let count = f64::from(SEEDS);
@@ -135,7 +135,7 @@ mod tests {
             });
             // The expected count is 0.2. The probability of 4 or more is 1e-4.
             let alarms = alarms.count();
-            assert!(alarms <= 3, "{noise} {shared}: {alarms} false alarms of 200");
+            assert!(alarms <= 3, "{noise} {shared}: {alarms} false alarms in 200 trials");
         }
     }
 

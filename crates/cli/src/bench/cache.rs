@@ -24,7 +24,7 @@ pub fn cache_folder() -> Option<PathBuf> {
     Some(caches.join("glimt").join("references"))
 }
 
-/// Writes the starter scene to a file in a subfolder and returns its path. Never overwrites files.
+/// Writes the starter scene to a file in a subfolder and returns the file's path. Never overwrites files.
 ///
 /// # Errors
 /// The folder or the file cannot be created, or a different file with this name exists.
@@ -137,7 +137,7 @@ pub(super) fn store(folder: &Path, key: &Key, stored: &CachedReferences) -> Resu
     write::atomic_guarded(&path, &bytes, &guard, &CancelToken::new())
 }
 
-/// Whether a file is missing, empty, or a possibly damaged reference.
+/// Whether a file may be replaced: it is missing, empty, or a cached reference, even a damaged one.
 fn is_replaceable(path: &Path) -> bool {
     const HEAD_BYTES: u64 = 1 << 10;
     let Ok(file) = fs::File::open(path) else { return path.symlink_metadata().is_err() };
@@ -179,7 +179,7 @@ mod tests {
         let why = write_starter_scene(folder.path()).expect_err("edited").to_string();
         assert!(why.contains("starter.toml") && why.contains("--cache"), "{why}");
         assert_eq!(fs::read_to_string(&scene).expect("a scene"), "edited");
-        // References only overwrite references.
+        // References replace only empty files and other references.
         let key = Fingerprint::new("x").finish();
         let path = cache_file_path(folder.path(), &key);
         fs::write(&path, "notes").expect("written");
@@ -201,7 +201,7 @@ mod tests {
         let key = Fingerprint::new("x").finish();
         assert!(load(&folder, &key).is_none());
         store(&folder, &key, &stored()).expect("stored");
-        let back = load(&folder, &key).expect("there");
+        let back = load(&folder, &key).expect("stored references");
         assert_eq!(back.cost, stored().cost);
         assert_eq!((back.pair.a(), back.pair.b()), (stored().pair.a(), stored().pair.b()));
         assert!(load(&folder, &Fingerprint::new("y").finish()).is_none());

@@ -2,7 +2,7 @@
 
 use super::results::Results;
 
-/// The header, including the line ending.
+/// The CSV header line, including the line ending.
 pub const HEAD: &str =
     "scene,width,height,method,step,seed,samples,seconds,setup_seconds,relmse,reference_noise\r\n";
 

@@ -20,7 +20,7 @@ use crate::pipeline::words;
 /// Default ratio of samples between consecutive steps.
 const SAMPLE_RATIO: u32 = 4;
 
-/// What to render in one step.
+/// Sample count or time limit of one step.
 #[derive(Clone, Copy)]
 struct StepTarget {
     index: u32,
@@ -34,7 +34,7 @@ pub(super) struct MethodRun<'a> {
     /// Overrides shared by all images and the references.
     pub(super) common: &'a Overrides,
     pub(super) method: &'a Method,
-    /// Keys of the references.
+    /// Fingerprints of the references.
     pub(super) keys: &'a ReferenceKeys,
     pub(super) two: &'a TwoReferences,
     /// Default maximum number of samples per step.
@@ -223,12 +223,12 @@ fn summarize_step(
     }
 }
 
-/// Seconds of photon mapping and rendering for an image.
+/// Seconds spent on photon mapping and rendering for one image.
 fn rendering_seconds(report: &Report) -> f64 {
     [Stage::Photons, Stage::Render].map(|stage| report.stages[stage as usize].seconds).iter().sum()
 }
 
-/// Seconds of the earlier stages, which run once.
+/// Seconds spent on the stages before photon mapping, which run once for all images.
 fn setup_seconds(report: &Report) -> f64 {
     report.stages[..Stage::Photons as usize].iter().map(|stage| stage.seconds).sum()
 }

@@ -19,7 +19,7 @@ pub struct Toggles {
     pub accels: Vec<Accel>,
 }
 
-/// A rendering method.
+/// A rendering method to benchmark.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Method {
     /// Name shown in tables.
@@ -38,8 +38,8 @@ struct MethodSettings {
     accel: Accel,
 }
 
-/// The methods to measure on a scene. The default is path, whitted with photons, and the scene's settings if
-/// they differ from both.
+/// The methods to measure on a scene. By default, these are path, whitted with photons, and the scene's own
+/// settings if they differ from both.
 pub fn methods_to_measure(scene: &Scene, toggles: &Toggles) -> Vec<Method> {
     let all = if *toggles == Toggles::default() {
         default_settings(scene)

@@ -15,7 +15,7 @@ const PANEL: (u32, u32) = (640, 480);
 /// Panels per row.
 const ACROSS: usize = 2;
 
-/// Draws the plots.
+/// Draws the plots of all scenes as one SVG document.
 ///
 /// # Errors
 /// An error from the plotting library.

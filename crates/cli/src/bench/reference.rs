@@ -64,7 +64,7 @@ pub(super) struct SceneReferences {
     pub(super) two: TwoReferences,
     pub(super) result: ReferenceResult,
     pub(super) warnings: Vec<Diagnostic>,
-    /// Why the references could not be cached.
+    /// Error message if the references could not be cached.
     pub(super) cache_error: Option<String>,
 }
 
@@ -99,7 +99,7 @@ pub(super) struct ReferenceRenderer<'a> {
     pub(super) common: &'a Overrides,
     pub(super) token: &'a CancelToken,
     pub(super) cache: Option<&'a Path>,
-    /// Samples of the references, if requested.
+    /// Requested samples per pixel of each reference.
     pub(super) asked: Option<u32>,
 }
 
@@ -108,7 +108,8 @@ impl ReferenceRenderer<'_> {
         cache_key(BUILD, self.asked, keys)
     }
 
-    /// Renders one sample to get the fingerprints of the references, and to check that all files can be read.
+    /// Renders one sample per pixel to get the fingerprints of the references and to check that all files can be
+    /// read.
     pub(super) fn keys(&self, session: &mut Session) -> Result<ReferenceKeys, BenchError> {
         let [one, two] = SEEDS.map(|seed| {
             self.render(session, seed, ReferenceQuality { samples: 1, seconds: None }).map(|it| it.key)

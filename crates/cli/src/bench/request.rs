@@ -12,7 +12,7 @@ use crate::scene::diagnostic::Diagnostic;
 /// A benchmark request.
 #[derive(Clone, Debug, Default)]
 pub struct BenchRequest {
-    /// The scenes.
+    /// Scene files.
     pub scenes: Vec<PathBuf>,
     /// Overrides for all images and references. Size, samples, seed, time and noise threshold are ignored.
     pub common: Overrides,
@@ -26,7 +26,7 @@ pub struct BenchRequest {
     pub steps: StepSchedule,
     /// Images per step.
     pub seeds: u32,
-    /// The first seed.
+    /// Seed of the first image.
     pub seed: u32,
     /// Source of the references.
     pub reference: ReferenceSource,
@@ -44,9 +44,9 @@ pub enum StepSchedule {
     /// 1, 4, 16, … samples while time remains, up to 1 % of the references' samples.
     #[default]
     Climb,
-    /// These samples per pixel.
+    /// The listed samples per pixel.
     Samples(Vec<u32>),
-    /// These render times in seconds.
+    /// The listed render times in seconds.
     Seconds(Vec<f64>),
 }
 
@@ -56,7 +56,7 @@ pub enum ReferenceSource {
     /// Path traced in the available time, with up to 100 times the largest requested sample count.
     #[default]
     InTime,
-    /// Path traced with this many samples.
+    /// Path traced with the given samples per pixel.
     Samples(u32),
     /// Two image files, which may be the same file.
     Files([PathBuf; 2]),
@@ -92,13 +92,13 @@ pub enum BenchEvent {
 /// A benchmark that ended early, with the results so far.
 #[derive(Clone, Debug)]
 pub struct UnfinishedBenchmark {
-    /// The reason.
+    /// Why the benchmark ended early.
     pub error: BenchError,
     /// Results of the completed scenes.
     pub done: Results,
 }
 
-/// Reasons for ending early.
+/// Reasons why a benchmark ends early.
 #[derive(Clone, Debug)]
 pub enum BenchError {
     /// A scene is invalid, or the work failed.

@@ -26,7 +26,7 @@ pub struct Results {
 /// Results of a scene.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SceneResult {
-    /// The path as given by the caller.
+    /// The scene's path as given by the caller.
     pub scene: String,
     /// Width in pixels.
     pub width: u32,
@@ -45,7 +45,7 @@ pub struct ReferenceResult {
     pub samples: Option<f64>,
     /// relMSE of one reference, estimated from the difference between the two. 0 if both are the same file.
     pub noise: f64,
-    /// Seconds spent rendering both, possibly in an earlier run.
+    /// Seconds spent rendering both references, possibly in an earlier run.
     pub seconds: Option<f64>,
     /// Whether the references were loaded from the cache.
     pub is_cached: bool,
@@ -99,13 +99,13 @@ pub struct StepResult {
 /// Measurement of one image.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ImageResult {
-    /// The seed.
+    /// Random seed of the image.
     pub seed: u32,
     /// Average samples per pixel.
     pub samples: f64,
     /// Time of photon mapping and rendering in seconds.
     pub seconds: f64,
-    /// The error. May be negative if it is below the noise of the references.
+    /// relMSE of the image. May be negative if it is below the noise of the references.
     pub relmse: f64,
 }
 
@@ -137,7 +137,7 @@ pub enum BiasVerdict {
 }
 
 impl BiasVerdict {
-    /// Compares the biases of the last two steps.
+    /// Determines the verdict from the biases of the last two steps.
     pub(super) fn from_steps(steps: &[StepResult]) -> Self {
         let Some(last) = steps.last() else { return Self::Unknown };
         let Some(bias) = last.bias else { return Self::Unknown };
@@ -265,7 +265,7 @@ pub(super) mod tests {
         assert!(matches!(of(&[1e-3]), BiasVerdict::Stays { .. }), "a single step");
         assert!(matches!(of(&[0.0, 0.0]), BiasVerdict::NoneFound { bound } if bound > 0.0));
         assert_eq!(of(&[]), BiasVerdict::Unknown);
-        let BiasVerdict::Stays { size, share } = of(&[0.03]) else { panic!("it stays") };
+        let BiasVerdict::Stays { size, share } = of(&[0.03]) else { panic!("expected a constant bias") };
         assert!((size - 0.03).abs() < 1e-12 && (share - 0.75).abs() < 1e-9, "{size} {share}");
     }
 

@@ -28,7 +28,7 @@ const LONG_SIDE: u32 = 96;
 /// Runs a benchmark. Checks all scenes before measuring the first one.
 ///
 /// # Errors
-/// A scene or the arguments are invalid, the work failed, or it was cancelled. Contains the results of completed scenes.
+/// A scene or the arguments are invalid, or the benchmark failed or was cancelled. The error contains the results of completed scenes.
 pub fn run(
     order: &BenchRequest,
     token: &CancelToken,
@@ -73,7 +73,7 @@ fn check_all(runs: &[SceneRun<'_>]) -> Result<(), BenchError> {
     if wrong.is_empty() { Ok(()) } else { Err(BenchError::Failed(Failure::Scene(wrong))) }
 }
 
-/// The size of a scene's images.
+/// Size of a scene's benchmark images: `asked`, completed with the scene's aspect ratio or a default size.
 pub fn image_size(scene: &Scene, asked: (Option<u32>, Option<u32>)) -> (u32, u32) {
     let (width, height) = (f64::from(scene.render.width), f64::from(scene.render.height));
     let side = |length: f64| length.round().clamp(1.0, 65536.0) as u32;
@@ -314,7 +314,9 @@ mod tests {
             BenchEvent::Point { .. } => std::fs::remove_file(&order.scenes[1]).unwrap_or_default(),
             BenchEvent::Begins { .. } | BenchEvent::Done(_) | BenchEvent::Warnings(_) => {}
         };
-        let Err(unfinished) = run(&order, &CancelToken::new(), &tell) else { panic!("it is gone") };
+        let Err(unfinished) = run(&order, &CancelToken::new(), &tell) else {
+            panic!("expected an error because the scene was removed")
+        };
         assert!(matches!(unfinished.error, BenchError::Failed(_)), "{:?}", unfinished.error);
         let done: Vec<_> = unfinished.done.scenes.iter().map(|scene| scene.methods.len()).collect();
         assert_eq!(done, [3]);
@@ -358,14 +360,14 @@ mod tests {
             | BenchEvent::Done(_)
             | BenchEvent::Warnings(_) => {}
         };
-        let measured = run(&order, &CancelToken::new(), &save).expect("both");
+        let measured = run(&order, &CancelToken::new(), &save).expect("results of both scenes");
         for method in measured.scenes.iter().flat_map(|scene| &scene.methods) {
             assert_eq!(method.steps[0].relmse, 0.0, "{}: measured the old version", method.name);
         }
         // Only the second version of the scene has cached references.
         let again = |color| {
             write(&order.scenes[1], color);
-            let again = run(&order, &CancelToken::new(), &|_| {}).expect("both");
+            let again = run(&order, &CancelToken::new(), &|_| {}).expect("results of both scenes");
             again.scenes[1].reference.is_cached
         };
         assert!(again("3"));
@@ -387,21 +389,21 @@ mod tests {
                 | BenchEvent::Warnings(_) => {}
             };
             let Err(unfinished) = run(&order, &CancelToken::new(), &save) else {
-                panic!("saved at {moment}")
+                panic!("expected an error: saved at {moment}")
             };
             let BenchError::Failed(Failure::Work(message)) = &unfinished.error else { panic!("{moment}") };
             assert_eq!(*message, changed_during_measurement(&order.scenes[1]));
             assert_eq!(unfinished.done.scenes.len(), 1);
             // References rendered from different versions are not cached.
             write(&order.scenes[1], "3");
-            let again = run(&order, &CancelToken::new(), &|_| {}).expect("both");
+            let again = run(&order, &CancelToken::new(), &|_| {}).expect("results of both scenes");
             assert!(!again.scenes[1].reference.is_cached, "{moment}");
             assert_eq!(again.scenes[1].methods[0].steps[0].relmse, 0.0, "{moment}");
         }
     }
 
     #[test]
-    fn saves_during_a_later_method_fail() {
+    fn scenes_saved_during_a_later_method_fail() {
         let folder = tempfile::tempdir().expect("a folder");
         let order = two_scenes(folder.path());
         let text =
@@ -418,7 +420,9 @@ mod tests {
         let Err(unfinished) = run(&order, &CancelToken::new(), &save) else {
             panic!("expected an error because the scene was saved")
         };
-        let BenchError::Failed(Failure::Work(message)) = &unfinished.error else { panic!("of the work") };
+        let BenchError::Failed(Failure::Work(message)) = &unfinished.error else {
+            panic!("expected a work error")
+        };
         assert_eq!(*message, changed_during_measurement(&order.scenes[0]));
     }
 
@@ -428,7 +432,7 @@ mod tests {
         assert!(check_seeds(&order(1)).is_ok());
         assert!(check_seeds(&order(u32::MAX - 6 * 64 - 2)).is_ok());
         let Err(BenchError::Call(message)) = check_seeds(&order(u32::MAX - 6 * 64)) else {
-            panic!("refused")
+            panic!("expected an error")
         };
         assert!(message.contains("--seed"), "{message}");
     }

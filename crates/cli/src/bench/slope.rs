@@ -7,7 +7,7 @@ use super::statistics::mean_and_error;
 /// A slope on log–log axes: −1 for independent samples, 0 if the error does not decrease.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Slope {
-    /// The slope.
+    /// Mean slope of all series.
     pub value: f64,
     /// Standard error across the series.
     pub error: f64,

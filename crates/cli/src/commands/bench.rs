@@ -90,7 +90,7 @@ fn print_results(results: &Results, baseline: Option<&(String, Results)>, consol
 /// The measurement thread.
 type Worker = JoinHandle<Result<Results, Box<UnfinishedBenchmark>>>;
 
-/// Starts the benchmark on a thread and returns its events.
+/// Starts the benchmark on a thread. Returns the receiver of its events and the thread.
 fn spawn_benchmark(
     order: BenchRequest,
     token: CancelToken,
@@ -116,7 +116,7 @@ fn report_events(news: &Receiver<BenchEvent>, progress: &mut BenchProgress) {
     }
 }
 
-/// The result after a panic. The panic has printed its own message.
+/// The result of a benchmark that panicked. The panic handler has already printed a message.
 fn panic_result() -> UnfinishedBenchmark {
     let what = "internal error: the renderer panicked".to_owned();
     UnfinishedBenchmark { error: BenchError::Failed(Failure::Work(what)), done: Results::default() }
@@ -166,7 +166,7 @@ fn format_diagnostic(diagnostic: &Diagnostic) -> String {
     format!("{}: {}", diagnostic.path.display(), diagnostic.message)
 }
 
-/// Lowers the arguments.
+/// Converts the arguments to a benchmark request.
 fn lower_args(args: &BenchArgs, console: &Console) -> Result<BenchRequest, Exit> {
     let folder = if args.no_cache { None } else { args.cache.clone().or_else(cache::cache_folder) };
     let scenes = if args.scenes.is_empty() {
@@ -231,7 +231,7 @@ fn reference_source(args: &BenchArgs, scenes: usize, console: &Console) -> Resul
     }
 }
 
-/// The scene that `glimt new` writes, stored with the cached references.
+/// Writes the scene that `glimt new` writes to the folder of cached references and returns its path.
 fn write_starter(folder: Option<&Path>, console: &Console) -> Result<PathBuf, Exit> {
     match folder.map(cache::write_starter_scene) {
         Some(made) => made.map_err(|error| console.fail(Exit::FAILED, &error.to_string())),

@@ -78,7 +78,7 @@ fn warn_about_same_file(args: &CompareArgs, console: &Console) {
     }
 }
 
-/// The error image.
+/// The error image requested with `--diff`.
 struct ErrorImage<'a> {
     path: &'a Path,
     format: Format,
@@ -136,7 +136,7 @@ impl<'a> ErrorImage<'a> {
     }
 }
 
-/// Checks that the target, which resolves to `real`, is not A or B.
+/// Checks that the target, which resolves to `real`, is neither a compared image nor a part or checkpoint.
 fn check_not_input(path: &Path, real: &Path, args: &CompareArgs) -> Result<(), OutputError> {
     if is_part(real) {
         let reason = format!(
@@ -158,7 +158,7 @@ fn check_not_input(path: &Path, real: &Path, args: &CompareArgs) -> Result<(), O
     }
 }
 
-/// Values in the table and the JSON object.
+/// Measured values, as shown in the table and the JSON object.
 #[derive(Serialize)]
 struct Summary<'a> {
     a: String,
@@ -256,7 +256,7 @@ fn wrap(text: &str, columns: Option<usize>) -> Vec<String> {
     columns.map_or_else(|| vec![text.to_owned()], |columns| wrapped(text, columns))
 }
 
-/// Minimum z-score of a significant bias. Noise alone exceeds it about once in two million comparisons.
+/// Minimum z-score of a significant bias. Without bias, noise exceeds it about once in two million comparisons.
 const SIGNIFICANT_Z: f64 = 5.0;
 
 /// Note on a significant bias.

@@ -1,4 +1,4 @@
-//! `glimt completions`: prints shell completion scripts and answers their calls.
+//! `glimt completions`: prints shell completion scripts and answers their requests.
 //!
 //! The scripts call glimt for every completion, because tables, names and keys depend on the scene on the
 //! command line.

@@ -53,7 +53,7 @@ fn overview() -> String {
     tables().iter().map(line).collect()
 }
 
-/// Describes a path. `None` if it does not exist.
+/// Describes the key, type or table with this path. `None` if there is none.
 fn explain_path(path: &str) -> Option<String> {
     let parts: Vec<&str> = path.split('.').collect();
     let found = |all: Vec<(String, &KeyInfo)>| match all.as_slice() {

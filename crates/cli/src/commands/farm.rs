@@ -46,7 +46,7 @@ fn is_plain_word(word: &str) -> bool {
 /// Parses the render options.
 ///
 /// # Errors
-/// An option is invalid, or must not be the same for all parts.
+/// An option is invalid or cannot be shared by all parts.
 fn check_options(args: &FarmArgs) -> Result<RenderArgs, String> {
     let (program, scene) = ("glimt".to_owned(), format_path_argument(&args.scene));
     let words = [program, scene].into_iter().chain(args.options.iter().cloned());
@@ -82,7 +82,6 @@ const NODE_THREADS: usize = 64;
 fn memory_request(args: &FarmArgs, options: &RenderArgs, console: &Console) -> Option<u64> {
     let mut overrides = options.overrides();
     (overrides.shard, overrides.outputs) = (Some((1, args.shards)), vec![args.output.clone()]);
-    // The nodes may have more processors than this machine.
     overrides.threads = overrides.threads.filter(|count| *count > 0).or(Some(NODE_THREADS));
     let why = match estimate_memory(&args.scene, &overrides) {
         Ok(bytes) => return Some((bytes + bytes / 4).div_ceil(1 << 20)),
@@ -184,7 +183,7 @@ fn parallel_script(args: &FarmArgs) -> String {
         "\
 #!/bin/sh
 # Renders {count} parts, one at a time on each machine, and merges them. Killed parts are retried. If the script is run again,
-# it continues: finished parts are kept, and glimt refuses to replace parts of another scene or with other options.
+# it continues: finished parts are kept, and glimt refuses to replace parts rendered from another scene or with other options.
 set -eu
 seq {count} | while read -r index; do printf '{format}\\n' {render}; done |
     parallel --jobs 1 --retries 3 --halt soon,fail=1{way}{hosts}
@@ -257,7 +256,7 @@ mod tests {
 
     fn args(line: &str) -> FarmArgs {
         let words = shlex::split(&format!("glimt farm {line}")).expect("words");
-        match Args::try_parse_from(words).expect("right").command {
+        match Args::try_parse_from(words).expect("valid arguments").command {
             Some(Subcommand::Farm(args)) => *args,
             other => panic!("{other:?}"),
         }

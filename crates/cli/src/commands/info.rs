@@ -33,7 +33,7 @@ pub(crate) fn run(args: &InfoArgs, console: &Console) -> Exit {
 /// Describes how a file was rendered. Returns only the format for image formats that cannot store settings.
 ///
 /// # Errors
-/// The errors of [`read_info`].
+/// Returns the errors of [`read_info`].
 fn describe(path: &Path) -> Result<ImageInfo, ImageInfoError> {
     read_info(path).or_else(|error| match (&error, other_content(path)) {
         (ImageInfoError::NotAnImage { .. }, Some((format, _))) => {

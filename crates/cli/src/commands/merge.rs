@@ -122,8 +122,8 @@ impl MergeCommand<'_> {
         Some(format!("cannot write {}: {why}; choose another output", self.args.out.display()))
     }
 
-    /// The input of the parts' scene that is the file at `path`. The parts do not name all inputs: a render does
-    /// not read textures that are not visible in its view.
+    /// Finds the input of the parts' scene that is the file at `path`. The parts do not list all inputs, because a
+    /// render does not read textures that are not visible in its view.
     fn current_input(&self, parts: &[PartFile], path: &Path) -> Option<PathBuf> {
         let scenes: BTreeSet<PathBuf> = parts.iter().filter_map(scene_of_part).collect();
         let inputs = |scene: &PathBuf| self.pool.install(|| scene_inputs(scene));
@@ -405,7 +405,7 @@ impl AwaitedPart {
     }
 }
 
-/// Progress of one step.
+/// Progress bar and JSON events for one step of a merge.
 struct StepProgress {
     what: &'static str,
     bar: Option<ProgressBar>,
@@ -422,7 +422,7 @@ impl StepProgress {
     }
 
     fn update(&mut self, done: usize, total: usize) {
-        /// Number of reports.
+        /// Maximum number of progress reports per step.
         const STEPS: usize = 100;
         let step = done * STEPS / total.max(1);
         if step == self.said {

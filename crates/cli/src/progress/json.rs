@@ -6,7 +6,7 @@
 //! | `asset` | `name`, `fraction` |
 //! | `progress` | `stage` (`render`), `fraction`, `elapsed_seconds`, `eta_seconds` (or null), `samples`, `total_samples`, `noise` (or null: `now`, and `next` with `level`, `seconds`, or null) |
 //! | `written` | `path`, `bytes` |
-//! | `checkpoint` | `status` (`written`, `failed`, `resumed`, `absent`, `ignored`, `set_aside`), `path`, `message`, `samples`, or null |
+//! | `checkpoint` | `status` (`written`, `failed`, `resumed`, `absent`, `ignored`, `unused`, `finished`, `set_aside`), `path`, `message`, `samples`, or null |
 //! | `write_failed` | `message`: the report or one of several images could not be written |
 //! | `done` | `unchanged`, `seconds`, `complete`, `diagnostics` |
 //! | `failed` | `kind` (`scene`, `work`), `message`, `diagnostics` |

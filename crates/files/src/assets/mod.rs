@@ -58,7 +58,7 @@ impl AssetError {
     }
 }
 
-/// Line number of an error, and the reason why the file was rejected.
+/// Returns the line number and reason from the error of a rejected file.
 #[cfg(test)]
 pub(crate) fn rejection<T: std::fmt::Debug>(result: Result<T, AssetError>) -> (Option<usize>, String) {
     match result {
@@ -71,14 +71,14 @@ pub(crate) fn rejection<T: std::fmt::Debug>(result: Result<T, AssetError>) -> (O
 /// BLAKE3 hash of a file, computed from the decoded bytes.
 pub type FileHash = [u8; 32];
 
-/// A file referenced by another file.
+/// A file referenced by an asset, such as a material library or a glTF buffer.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Companion {
     /// The file.
     pub path: PathBuf,
     /// Hash of the decoded bytes. `None` if the file could not be read.
     pub hash: Option<FileHash>,
-    /// Stamp of the file before it was read.
+    /// Stamp of the file, taken before it was read.
     pub stamp: Option<FileStamp>,
 }
 
@@ -91,7 +91,7 @@ pub struct LoadedMesh {
     pub mesh: TriangleMesh,
     /// Materials of the file, indexed by [`TriangleMesh::materials`].
     pub materials: Vec<FileMaterial>,
-    /// Counts of skipped faces.
+    /// Number of skipped faces, by reason.
     pub dropped: Dropped,
     /// Other warnings, one line each.
     pub warnings: Vec<String>,
@@ -115,7 +115,7 @@ impl LoadedMesh {
     }
 }
 
-/// Counts of unusable faces.
+/// Number of unusable faces, by reason.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Dropped {
     /// Faces with a NaN or an infinite coordinate.
@@ -124,7 +124,7 @@ pub struct Dropped {
     pub degenerate: u64,
 }
 
-/// A material from an MTL file.
+/// A material from an MTL or glTF file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FileMaterial {
     /// Name in the file.
@@ -155,7 +155,7 @@ pub struct FileMaterial {
     pub normal_texture: Option<FileTexture>,
     /// Scale factor for the normal map's slopes, ≥ 0. Set by the option `-bm`, 1 by default.
     pub normal_strength: f32,
-    /// Parameters of the PBR extension. `None` if the material has none of its statements.
+    /// Parameters of the PBR extension. `None` if the material does not use the extension.
     pub physical: Option<PhysicalMaterial>,
 }
 
@@ -226,7 +226,7 @@ pub struct PhysicalMaterial {
     pub metallic_texture: Option<FileTexture>,
 }
 
-/// A gKit orbiter camera. It orbits around the scene's center.
+/// A gKit orbiter camera, which orbits the scene's center.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OrbiterCamera {
     /// `c`: point at which the camera looks.

@@ -39,7 +39,7 @@ impl Monitor<'_> {
     }
 }
 
-/// Hash of a completely read file.
+/// BLAKE3 hash of a file's content.
 pub(crate) fn hash(bytes: &[u8]) -> FileHash {
     *blake3::hash(bytes).as_bytes()
 }

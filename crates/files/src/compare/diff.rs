@@ -1,4 +1,4 @@
-//! Creates images that show errors.
+//! Creates images of per-pixel errors.
 
 use rayon::prelude::*;
 

@@ -1,7 +1,7 @@
 //! Errors of displayed values (clamped sRGB without quantization): PSNR of the channels and SSIM of the luma.
 //!
 //! SSIM follows Z. Wang et al., *Image Quality Assessment: From Error Visibility to Structural Similarity*
-//! (2004): a Gaussian window of 11 × 11 pixels with σ = 1.5, K₁ = 0.01, K₂ = 0.03, L = 1. It is averaged over
+//! (2004): a Gaussian window of 11 × 11 pixels with σ = 1.5, K₁ = 0.01, K₂ = 0.03, L = 1. SSIM is averaged over
 //! all windows inside the image. If a side has fewer than 11 pixels, windows are clipped and their weights
 //! renormalized.
 
@@ -80,8 +80,8 @@ fn ssim([a, b]: [f64; 2], [aa, bb]: [f64; 2], ab: f64) -> f64 {
     (2.0 * a * b + C1) * (2.0 * covariance + C2) / ((a * a + b * b + C1) * (variances + C2))
 }
 
-/// Returns the sum of squared differences over the tile's channels, and the luma of both images in the tile
-/// and a margin of [`RADIUS`] pixels. The luma outside the image is 0.
+/// Returns the sum of squared differences over the tile's channels, and the luma of both images in the tile,
+/// including a margin of [`RADIUS`] pixels. The luma outside the image is 0.
 fn lumas(pair: &Pair, tile: Rect) -> (f64, [Plane; 2]) {
     let side = |length: u32| length as usize + 2 * RADIUS;
     let mut lumas =
@@ -103,7 +103,7 @@ fn lumas(pair: &Pair, tile: Rect) -> (f64, [Plane; 2]) {
     (square, lumas)
 }
 
-/// Converts a position in the tile (with margin) to a position in the image. `None` if it is outside.
+/// Converts a position in the tile (with margin) to a position in the image. `None` outside the image.
 fn image_position(start: u32, offset: usize, length: usize) -> Option<usize> {
     (start as usize + offset).checked_sub(RADIUS).filter(|&position| position < length)
 }

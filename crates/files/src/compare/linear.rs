@@ -1,4 +1,4 @@
-//! Errors of linear values.
+//! Error metrics of linear values.
 
 use rayon::prelude::*;
 
@@ -6,7 +6,7 @@ use super::Pair;
 use crate::math::color::{LUMINANCE_WEIGHTS, RELMSE_EPSILON};
 use crate::math::{DVec2, Vec3};
 
-/// The trimmed mean excludes one pixel out of this many.
+/// The trimmed mean excludes one in this many pixels.
 const DROPPED_ONE_IN: usize = 1000;
 
 pub(super) struct Linear {
@@ -58,7 +58,7 @@ pub(super) fn measure(pair: &Pair) -> Linear {
     }
 }
 
-/// Applies `row` to each row, in order.
+/// Applies `row` to each row and returns the results in order.
 fn map_rows<T: Send>(pair: &Pair, row: impl Fn(&[Vec3], &[Vec3]) -> T + Sync) -> Vec<T> {
     let a = pair.a().pixels.par_chunks(pair.width());
     a.zip(pair.b().pixels.par_chunks(pair.width())).map(|(a, b)| row(a, b)).collect()

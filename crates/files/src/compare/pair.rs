@@ -27,9 +27,9 @@ pub enum CompareError {
         nan: u64,
         /// Number of infinite values, of either sign.
         infinite: u64,
-        /// Column and row of the first such value.
+        /// Column and row of the first nonfinite value.
         at: [u32; 2],
-        /// Channel of the first such value.
+        /// Channel of the first nonfinite value.
         channel: &'static str,
     },
     /// The images have different sizes.
@@ -40,7 +40,7 @@ pub enum CompareError {
     Sizes {
         /// The files.
         paths: [PathBuf; 2],
-        /// Their widths and heights.
+        /// Widths and heights of the images.
         sizes: [[u32; 2]; 2],
     },
 }
@@ -54,7 +54,7 @@ pub struct Pair {
 }
 
 impl Pair {
-    /// Checks an image and its reference. The names are used in messages.
+    /// Checks an image and its reference, and creates a pair. The names are used in messages.
     ///
     /// # Errors
     /// All errors of both images.
@@ -107,7 +107,7 @@ impl Pair {
         self.a.height as usize
     }
 
-    /// Both pixels at a position.
+    /// Pixels of both images at a position.
     pub(super) fn at(&self, x: usize, y: usize) -> [Vec3; 2] {
         let index = y * self.width() + x;
         [self.a.pixels[index], self.b.pixels[index]]

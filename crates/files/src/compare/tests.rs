@@ -97,7 +97,7 @@ fn assert_measures([a, b]: &[RadianceImage; 2], expected: &Expected) {
 // Expected values were computed with numpy in double precision. SSIM was computed window by window and
 // matches scikit-image 0.26's `structural_similarity` (gaussian_weights, sigma 1.5, no sample covariance) for
 // images that are large enough. FLIP was computed with the 2D kernels from the paper. `published_flip` was
-// computed with flip-evaluator 1.7, by the authors of the paper (LDR, linear input, 67 pixels per degree).
+// computed with flip-evaluator 1.7 by the paper's authors (LDR, linear input, 67 pixels per degree).
 
 #[test]
 fn errors_of_noise_match_numpy() {
@@ -157,7 +157,7 @@ fn errors_of_tiny_images_match_numpy() {
 }
 
 #[test]
-fn flip_of_single_pixels() {
+fn flip_of_single_pixels_matches_numpy() {
     let [a, b] = edges(150, 140);
     let flip = measure(&pair(a, b)).flip;
     assert_near("first", f64::from(flip[0]), 0.792_423_285_289);

@@ -1,6 +1,6 @@
 //! Computes errors against two noisy references. A reference is the ground truth plus noise. If the noise of
-//! the two references is independent, the expected value of (x − r₁)(x − r₂) equals that of (x − truth)²: the
-//! noise of the references does not add its variance.
+//! the two references is independent, (x − r₁)(x − r₂) and (x − truth)² have the same expected value, so the
+//! references' noise does not bias the error.
 
 use super::Pair;
 use crate::film::RadianceImage;
@@ -41,8 +41,8 @@ impl TwoReferences {
         self.cross(x, x)
     }
 
-    /// Mean of (x − r)(y − r), relative to r². For two images rendered by the same method with independent
-    /// noise, this is the squared bias.
+    /// Mean of (x − r)(y − r), relative to r². For two images rendered with the same method and independent
+    /// noise, the expected value is the squared bias.
     pub fn cross(&self, x: &RadianceImage, y: &RadianceImage) -> f64 {
         let pixels = self.weighted_pixels().zip(x.pixels.iter().zip(&y.pixels));
         let sum = pixels.fold(DVec3::ZERO, |sum, ((weight, a, b), (x, y))| {
@@ -52,7 +52,7 @@ impl TwoReferences {
         sum.element_sum()
     }
 
-    /// relMSE of one reference: the error its noise would add if only one reference were used.
+    /// relMSE of one reference: the error that its noise would add if only one reference were used.
     pub fn noise(&self) -> f64 {
         let sum =
             self.weighted_pixels().fold(DVec3::ZERO, |sum, (weight, a, b)| sum + weight * (a - b) * (a - b));
@@ -107,7 +107,7 @@ mod tests {
 
     use super::*;
 
-    /// Uniform in ±1, from a hash of the number.
+    /// Hashes a number to a uniform value in [−1, 1).
     fn uniform(number: u32) -> f32 {
         let mixed = number.wrapping_mul(0x9e37_79b9) ^ (number.wrapping_mul(0x85eb_ca6b) >> 13);
         let mixed = (mixed ^ (mixed >> 15)).wrapping_mul(0x2c1b_3c6d);

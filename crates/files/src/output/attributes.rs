@@ -21,7 +21,7 @@ const OWNER_BITS: u32 = 0o700;
 /// Permissions of everyone except the group.
 const NON_GROUP_BITS: u32 = 0o707;
 
-/// What to do if replacing a file would lose some of its attributes.
+/// Policy for attributes that would be lost by replacing a file.
 #[derive(Clone, Copy)]
 pub enum Losses<'a> {
     /// Replace the file and report the losses in a sentence. The new file never grants additional
@@ -39,7 +39,7 @@ pub(super) struct FileAttributes {
     mode: u32,
     #[cfg(target_os = "linux")]
     flags: Flags,
-    /// Names and values. The access list comes last because it may remove permissions.
+    /// Names and values. The access list is last because it may remove permissions.
     named: Vec<(OsString, io::Result<Vec<u8>>)>,
 }
 
@@ -67,7 +67,7 @@ impl FileAttributes {
     }
 
     /// Applies all attributes except the permissions to a new file. Until the permissions are applied, the
-    /// file must only be accessible to its owner.
+    /// file must be accessible only to its owner.
     pub(super) fn carry_over(&self, new: &File) -> UncopiedAttributes {
         let mut carried = UncopiedAttributes { lost: Vec::new(), mode: self.mode };
         // Set the flags before changing the owner, because only the owner may set them.
@@ -86,10 +86,10 @@ impl FileAttributes {
         if is_same(ids()) || fchown(new, Some(self.uid), Some(self.gid)).is_ok() {
             return;
         }
-        // Changing the group only requires being a member of it.
+        // Users may change a file's group to any group they belong to.
         let _ = fchown(new, None, Some(self.gid));
         let (uid, gid) = ids().unwrap_or((u32::MAX, u32::MAX));
-        // Drop set-user-ID and set-group-ID. They would apply to a different user or group.
+        // Drop the set-user-ID and set-group-ID bits. They would apply to a different user or group.
         carried.mode &= 0o777;
         if uid != self.uid {
             carried.lost.push("its owner".to_owned());
@@ -151,7 +151,7 @@ fn extended_attributes(path: &Path) -> Vec<(OsString, io::Result<Vec<u8>>)> {
     }
 }
 
-/// Sets an attribute. Does nothing if it already has this value, because setting it may need permission.
+/// Sets an attribute unless it already has this value. Setting an attribute may need special permissions.
 fn set_attribute(new: &File, name: &OsStr, value: &[u8]) -> io::Result<()> {
     if new.get_xattr(name).is_ok_and(|now| now.as_deref() == Some(value)) {
         return Ok(());

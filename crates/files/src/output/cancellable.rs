@@ -1,4 +1,4 @@
-//! Tone maps and encodes images in small parts, polling the cancel token in between.
+//! Tone maps and encodes images in small parts, polling the cancel token between parts.
 
 use std::fs::File;
 use std::io::{self, Cursor, ErrorKind, Seek, SeekFrom, Write};
@@ -103,7 +103,7 @@ pub(super) fn write_all(mut to: impl Write, bytes: &[u8], token: &CancelToken) -
     Ok(())
 }
 
-/// Like [`write_all`], for pipes and sockets, whose reader may block indefinitely.
+/// Like [`write_all`], but for pipes and sockets, whose readers may block indefinitely.
 pub(super) fn write_to_pipe(mut to: &File, bytes: &[u8], token: &CancelToken) -> io::Result<()> {
     /// Number of bytes per write. A pipe that is ready has at least this much space, so the write does not
     /// block.
@@ -114,7 +114,7 @@ pub(super) fn write_to_pipe(mut to: &File, bytes: &[u8], token: &CancelToken) ->
         match to.write(&rest[..rest.len().min(PIPE_BYTES)]) {
             Ok(0) => return Err(ErrorKind::WriteZero.into()),
             Ok(taken) => rest = &rest[taken..],
-            // Another process has written to the pipe first.
+            // Another process wrote to the pipe first.
             Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => {}
             Err(error) => return Err(error),
         }

@@ -8,9 +8,9 @@ use crate::film::{Film, Quantity, RadianceImage, SampleStats};
 /// Settings for encoding a film as an image file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DevelopSettings {
-    /// Quantity of the film to show.
+    /// Film quantity that the image shows.
     pub quantity: Quantity,
-    /// Tone mapping whose range has not been resolved for the image yet.
+    /// Tone mapping, before its range is resolved for the image.
     pub tone: ToneMapping,
     /// Bits per channel of PNG and PPM files.
     pub bit_depth: BitDepth,
@@ -26,7 +26,7 @@ impl DevelopSettings {
         film.image(self.quantity)
     }
 
-    /// Metadata with the number of samples inserted after the scene.
+    /// Returns the metadata with the number of samples inserted after the scene.
     pub fn metadata_with_samples(
         &self,
         SampleStats { min, mean, max }: SampleStats,

@@ -1,4 +1,4 @@
-//! Errors from writing images, with advice.
+//! Errors from writing images, with advice for the user.
 
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
@@ -58,7 +58,7 @@ pub enum OutputError {
     /// The target cannot be written.
     #[error("cannot write {}: {why}; {way_out}", path.display())]
     Target {
-        /// The path as given.
+        /// The path as specified by the user.
         path: PathBuf,
         /// The fault.
         why: String,
@@ -68,7 +68,7 @@ pub enum OutputError {
     /// Replacing the existing file is not allowed.
     #[error("{reason}")]
     Refused {
-        /// The file, the reason, and advice.
+        /// Message with the file, the reason and advice.
         reason: String,
     },
     /// The work was cancelled.
@@ -77,7 +77,7 @@ pub enum OutputError {
     /// The operating system reported an error.
     #[error("cannot write {}: {}; {}", path.display(), describe_error(source), way_out(source))]
     File {
-        /// The path as given.
+        /// The path as specified by the user.
         path: PathBuf,
         /// System error.
         source: io::Error,

@@ -24,8 +24,8 @@ use crate::film::RadianceImage;
 /// Name of the attribute (a double) for the standard error of the image's mean luminance.
 const MEAN_LUMINANCE_ERROR: &str = "glimtMeanLuminanceError";
 
-/// Reads the standard error of the mean luminance from an EXR file. Only reads regular files, because a pipe
-/// can only be read once.
+/// Reads the standard error of the mean luminance from an EXR file. Reads only regular files, because a pipe
+/// can be read only once.
 pub fn mean_luminance_error(path: &Path) -> Option<f64> {
     let is_regular = path.metadata().is_ok_and(|found| found.is_file());
     let file = if is_regular { File::open(path).ok()? } else { return None };
@@ -75,8 +75,8 @@ fn channels(image: &RadianceImage, layers: &[LayerImage]) -> AnyChannels<FlatSam
     AnyChannels::sort(channels)
 }
 
-/// Compresses in the caller's thread pool, or on the caller's thread if there is no pool. By default, the
-/// encoder would create its own pool with one thread per core.
+/// Compresses blocks in the caller's thread pool, or on the caller's thread if there is no pool. By default,
+/// the encoder would create its own pool with one thread per core.
 fn compress(
     meta: &MetaData,
     mut blocks: impl Iterator<Item = (usize, UncompressedBlock)>,
@@ -122,7 +122,7 @@ fn attributes(options: &EncodeOptions) -> LayerAttributes {
     LayerAttributes { software_name: Some(text(SOFTWARE)), comments, other, ..Default::default() }
 }
 
-/// Text as UTF-8, like in other programs.
+/// Encodes text as UTF-8, as other programs do.
 fn text(value: &str) -> Text {
     Text::from_slice_unchecked(value.as_bytes())
 }

@@ -133,7 +133,7 @@ impl AnimationFormat {
         Self::EXTENSIONS.iter().map(|(extension, _)| *extension)
     }
 
-    /// Returns the format for a path's extension, ignoring case. `None` for other extensions.
+    /// Returns the format for a path's extension, ignoring case. `None` for unknown extensions.
     pub fn from_path(path: &Path) -> Option<Self> {
         let extension = path.extension()?;
         let known = Self::EXTENSIONS.iter().find(|(known, _)| extension.eq_ignore_ascii_case(known));

@@ -10,7 +10,7 @@ use crate::math::Vec3;
 const COMPRESSED_WIDTHS: std::ops::Range<usize> = 8..32768;
 const LONGEST_RUN: usize = 127;
 const LONGEST_LITERAL: usize = 128;
-/// Minimum length of a run. Shorter runs would not save space over literals.
+/// Minimum length of a run. Shorter runs would not save space compared with literals.
 const SHORTEST_RUN: usize = 4;
 
 pub(super) fn encode(

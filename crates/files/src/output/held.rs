@@ -12,10 +12,10 @@ use super::temporary::TemporaryFile;
 
 /// Extension of the backup name.
 const EXTENSION: &str = ".glimt-saved";
-/// Number of concurrent saves by other programs tolerated during a replacement.
+/// Maximum number of concurrent saves by other programs during a replacement.
 const ATTEMPTS: usize = 16;
 
-/// What happened to a file's backup when the file was opened.
+/// Result of looking for a backup when a file is opened.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Held {
     /// There was no backup, or it had the same content as the file.
@@ -59,7 +59,7 @@ impl<'a> Replacement<'a> {
     /// Moves the new text to the backup name.
     ///
     /// # Errors
-    /// A backup already exists, or a system error.
+    /// A backup already exists, or a system call fails.
     pub(super) fn begin(mut new: TemporaryFile, target: &'a Path, expected: &'a [u8]) -> io::Result<Self> {
         let held = backup_path(target);
         new.move_to_new(&held).map_err(|error| backup_error(&held, error))?;
@@ -96,7 +96,7 @@ impl<'a> Replacement<'a> {
         Ok(None)
     }
 
-    /// Restores the old text, unless another program has saved a newer text in the meantime.
+    /// Restores the old text, unless another program has saved a newer version in the meantime.
     fn restore_old(&self, mut older: Vec<u8>) -> io::Result<()> {
         for _ in 0..ATTEMPTS {
             exchange(&self.held, self.target)?;
@@ -121,7 +121,7 @@ impl<'a> Replacement<'a> {
     }
 }
 
-/// Replacement for file systems that cannot exchange two names. Moves the old text to the backup name, checks
+/// Fallback for file systems that cannot exchange two names. Moves the old text to the backup name, checks
 /// it, and moves the new text to the file's name if that name is still unused.
 pub(super) struct StepwiseReplacement<'a> {
     target: &'a Path,
@@ -133,7 +133,7 @@ impl<'a> StepwiseReplacement<'a> {
     /// Moves the old text to the backup name.
     ///
     /// # Errors
-    /// A backup already exists, or a system error.
+    /// A backup already exists, or a system call fails.
     pub(super) fn begin(target: &'a Path, expected: &'a [u8]) -> io::Result<Self> {
         let held = backup_path(target);
         move_new(target, &held).map_err(|error| backup_error(&held, error))?;
@@ -258,7 +258,7 @@ mod tests {
             fs::rename(other, self.scene()).expect("renamed");
         }
 
-        /// All texts found by the user after a kill, a cleanup and the next start.
+        /// All texts that exist after a kill, a cleanup and the next start.
         fn after_a_kill(&self) -> Vec<String> {
             remove_stale(self.folder.path(), &|_| false);
             recover(&self.scene());

@@ -31,7 +31,7 @@ pub enum FileIdentity {
 }
 
 impl FileIdentity {
-    /// Returns the identity of a path's file. `None` for paths that cannot be a regular file: folders,
+    /// Returns the identity of the file at a path. `None` for paths that cannot be a regular file: folders,
     /// devices, pipes, and unresolvable paths.
     pub fn of(path: &Path) -> Option<Self> {
         match fs::metadata(path) {
@@ -69,7 +69,7 @@ pub struct FileFingerprint {
 }
 
 impl FileFingerprint {
-    /// Returns the fingerprint of a path's file. `None` if there is no such regular file.
+    /// Returns the fingerprint of the file at a path. `None` if there is no regular file at the path.
     pub fn of(path: &Path) -> Option<Self> {
         let found = fs::metadata(path).ok().filter(fs::Metadata::is_file)?;
         let real = path.canonicalize().ok()?;

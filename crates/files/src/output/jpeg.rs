@@ -8,7 +8,7 @@ use super::{EncodeOptions, Format, OutputError, SOFTWARE, one_line};
 use crate::control::CancelToken;
 use crate::film::RadianceImage;
 
-/// Quality (maximum 100). Visually lossless at arm's length. Files are a quarter as large as with quality
+/// JPEG quality (maximum 100). Visually lossless at arm's length. Files are a quarter as large as at quality
 /// 100.
 const QUALITY: u8 = 92;
 
@@ -25,7 +25,7 @@ pub(super) fn encode(
     Ok(insert_comment(&bytes.into_bytes(), &comment(options)))
 }
 
-/// Metadata, one line per item.
+/// Metadata as a comment, one line per item.
 fn comment(options: &EncodeOptions) -> String {
     let mut comment = format!("Software: {SOFTWARE}\n");
     for (name, value) in &options.metadata {

@@ -23,8 +23,8 @@ pub fn file(value: &impl Serialize) -> serde_json::Result<String> {
     serde_json::to_string_pretty(value).map(|text| escape_unsafe(text) + "\n")
 }
 
-/// Escapes unsafe characters, which only occur inside strings. Line feeds are only used between tokens and
-/// are kept.
+/// Escapes unsafe characters, which occur only inside strings. Line feeds occur only between tokens and are
+/// kept.
 fn escape_unsafe(text: String) -> String {
     let is_safe = |c: char| c == '\n' || is_plain(c);
     if text.chars().all(is_safe) {

@@ -49,7 +49,7 @@ use crate::control::CancelToken;
 use crate::film::RadianceImage;
 use crate::film::tone::ToneMapping;
 
-/// Program name and version for files.
+/// Program name and version, written to files.
 const SOFTWARE: &str = concat!("glimt ", env!("CARGO_PKG_VERSION"));
 /// Program name.
 const PROGRAM: &str = "glimt";
@@ -72,8 +72,8 @@ pub struct EncodeOptions {
     pub tone: ToneMapping,
     /// Bit depth of PNG and PPM. Float formats always use 32 bits.
     pub bit_depth: BitDepth,
-    /// Metadata names and values (the scene, the settings), written to PNG text chunks and to comments in
-    /// EXR, HDR and PPM files. The program version is always written.
+    /// Metadata names and values (the scene, the settings), written to PNG text chunks, WebP XMP packets, or
+    /// comments in EXR, HDR, JPEG and PPM files. The program version is always written.
     pub metadata: Vec<(String, String)>,
     /// Standard error of the mean luminance, written as an attribute of EXR files. `None` if unknown.
     pub mean_luminance_error: Option<f64>,
@@ -93,7 +93,7 @@ pub fn encode(
     encode_with((image, &[]), options, format, token)
 }
 
-/// Like [`encode`], with layers. Only EXR files support layers.
+/// Like [`encode`], but with layers. Only EXR files support layers.
 pub(crate) fn encode_with(
     (image, layers): (&RadianceImage, &[LayerImage]),
     options: &EncodeOptions,
@@ -122,8 +122,8 @@ pub(crate) fn encode_with(
     bytes
 }
 
-/// Checks that an image can be written to this path, as far as this is possible before rendering. Leaves no
-/// files behind. Returns the format for the extension.
+/// Checks before rendering whether an image can be written to this path. Leaves no files behind. Returns the
+/// format for the extension.
 ///
 /// # Errors
 /// The extension is unknown, the directory does not exist, files cannot be created there, or the target is a
@@ -144,7 +144,7 @@ pub fn inspect_target(path: &Path) -> Result<Format, OutputError> {
     Ok(format)
 }
 
-/// Like [`inspect_target`], for any type of file.
+/// Like [`inspect_target`], but for any type of file.
 ///
 /// # Errors
 /// Same as [`inspect_target`], except for the extension.
@@ -152,7 +152,7 @@ pub fn inspect_path(path: &Path) -> Result<(), OutputError> {
     resolve_path::resolve(path).map(drop)
 }
 
-/// Checks that a file of any type can be written to this path, as far as this is possible in advance.
+/// Checks in advance whether a file of any type can be written to this path.
 ///
 /// # Errors
 /// Same as [`check_target`], except for the extension.
@@ -165,7 +165,7 @@ fn as_finite(component: f32) -> f32 {
     if component.is_nan() { 0.0 } else { component.clamp(-f32::MAX, f32::MAX) }
 }
 
-/// Replaces control characters, for line-based text headers.
+/// Replaces control characters with spaces, for line-based text headers.
 fn one_line(text: &str) -> String {
     text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
 }

@@ -21,10 +21,10 @@ pub(super) fn move_new(from: &Path, to: &Path) -> io::Result<()> {
     move_by_steps(from, to)
 }
 
-/// [`move_new`] in two system calls. The first one fails if the destination exists.
+/// Implements [`move_new`] with two system calls. The first call fails if the destination exists.
 fn move_by_steps(from: &Path, to: &Path) -> io::Result<()> {
     if from.is_dir() {
-        // The rename can only replace an empty folder, such as this new one.
+        // A rename can replace only an empty folder, such as this new one.
         fs::create_dir(to)?;
         fs::rename(from, to)
     } else {

@@ -1,4 +1,4 @@
-//! Detects from a file's content whether glimt wrote it. glimt only replaces its own files, and only with the
+//! Detects from a file's content whether glimt wrote it. glimt replaces only its own files, and only with the
 //! same type of file.
 
 use std::fs::File;
@@ -16,12 +16,12 @@ const HEADER_BYTES: usize = 1 << 20;
 /// Maximum size of a plot to examine.
 const PLOT_BYTES: u64 = 64 << 20;
 
-/// The file that would be replaced.
+/// Result of checking the file that would be replaced.
 #[derive(Debug)]
 pub enum Replaced {
     /// No file, or a file that may be replaced.
     Own,
-    /// A file not written by glimt. Contains a description of what glimt would write, such as "a report".
+    /// A file not written by glimt. Contains the type of file that glimt would write, such as "a report".
     Foreign(&'static str),
     /// A file that cannot be read.
     Unreadable(io::Error),
@@ -42,7 +42,7 @@ impl Replaced {
         }
     }
 
-    /// Like [`Self::of`], for text files. Empty files may also be replaced.
+    /// Like [`Self::of`], but for text files. Empty files may also be replaced.
     fn of_text(path: &Path, kind: &'static str, is_own: impl Fn(File) -> bool) -> Self {
         let is_empty = |file: &File| file.metadata().is_ok_and(|found| found.len() == 0);
         Self::of(replaced(path), kind, |file| is_empty(&file) || is_own(file))

@@ -10,7 +10,7 @@ use nix::unistd::{Uid, geteuid};
 /// Mode bit for directories in which only owners may replace files.
 const STICKY: u32 = 0o1000;
 
-/// A flag of a file or directory. Not even root can replace the file, or any file in the directory.
+/// A flag that protects a file or directory. Not even root can replace the file, or any file in the directory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Flag {
     /// `chattr +a`
@@ -104,7 +104,7 @@ mod tests {
     impl Drop for Flagged {
         fn drop(&mut self) {
             let cleared = change(&self.0, |flags| flags - IFlags::APPEND - IFlags::IMMUTABLE);
-            cleared.expect("set flags can be cleared");
+            cleared.expect("clearing the flags should succeed");
         }
     }
 
@@ -114,8 +114,8 @@ mod tests {
     }
 
     fn refused(path: &std::path::Path) -> String {
-        let before = check_target(path).expect_err("refused before the work").to_string();
-        let after = write::atomic(path, b"new").expect_err("refused at the end").to_string();
+        let before = check_target(path).expect_err("refused before rendering").to_string();
+        let after = write::atomic(path, b"new").expect_err("refused when writing").to_string();
         assert_eq!(before, after);
         after
     }
@@ -164,7 +164,7 @@ mod tests {
             fs::set_permissions(path, Permissions::from_mode(0o666)).expect("permitted");
         }
         if std::os::unix::fs::chown(&own, Some(NOBODY), Some(NOBODY)).is_err() {
-            eprintln!("skipped: files of another user need root");
+            eprintln!("skipped: creating another user's files requires root");
             return;
         }
         let permit = |mode| {
@@ -193,7 +193,7 @@ mod tests {
         });
         assert_eq!(fs::read(&other).expect("read"), b"old");
         assert_eq!(fs::read_dir(folder.path()).expect("a folder").count(), 3);
-        write::atomic(&own, b"root's").expect("root acts for owners");
+        write::atomic(&own, b"root's").expect("root may replace the file");
         permit(0o777);
         as_nobody(&|| write::atomic(&other, b"new").expect("not sticky"));
     }

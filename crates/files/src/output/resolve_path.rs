@@ -15,7 +15,7 @@ use super::{OutputError, temporary};
 /// Maximum number of links to follow, as in Linux.
 const LINKS: usize = 40;
 
-/// Where to write the bytes for a path.
+/// Destination for the bytes written to a path.
 #[derive(Debug)]
 pub(super) enum WriteTarget {
     /// A regular file, existing or not, to be replaced atomically.
@@ -39,7 +39,7 @@ impl TargetFile {
     }
 }
 
-/// Resolves a path and checks that it can be written, as far as this is possible without writing.
+/// Resolves a path, and checks without writing whether it can be written.
 pub(super) fn resolve(path: &Path) -> Result<WriteTarget, OutputError> {
     if path.file_name().is_none() || path.as_os_str().as_bytes().ends_with(b"/") {
         return Err(is_a_directory(path));
@@ -108,7 +108,7 @@ fn existing(path: &Path, target: PathBuf, metadata: Metadata) -> Result<WriteTar
         return Ok(WriteTarget::InPlace(target));
     }
     check_flags(path, "it", &target)?;
-    // Replacing the file only requires write permission for the directory. Check the file itself anyway,
+    // Replacing the file requires only write permission for the directory. Check the file itself anyway,
     // because it may be read-only on purpose.
     may_write(path, &target, AccessFlags::W_OK)?;
     let directory = check_directory(path, directory_of(&target))?;

@@ -71,7 +71,7 @@ mod tests {
             assert!(is_same(expected, &scene, &at(image)), "{image}");
             assert!(!is_same(expected, &at("c/x"), &at(image)), "{image}");
         }
-        assert_eq!(relative(&scene, &at("none/scene.png")), "scene.toml", "no folder is known");
+        assert_eq!(relative(&scene, &at("none/scene.png")), "scene.toml", "the folder does not exist");
     }
 
     #[test]

@@ -18,7 +18,7 @@ use crate::system::machine::ProcessIdentity;
 
 /// Maximum length of a file name on nearly all file systems.
 const NAME_BYTES: usize = 255;
-/// Number of names to try. More than one name is only needed if another process removes a file before it is
+/// Number of names to try. More than one name is needed only if another process removes a file before it is
 /// locked.
 pub(super) const ATTEMPTS: usize = 64;
 
@@ -68,7 +68,7 @@ impl TemporaryFile {
         Ok(file)
     }
 
-    /// Renames the file without overwriting.
+    /// Renames the file without overwriting an existing file.
     pub(super) fn move_to_new(&mut self, target: &Path) -> io::Result<()> {
         move_new(&self.path, target)?;
         self.kept = true;

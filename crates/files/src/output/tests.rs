@@ -129,7 +129,7 @@ fn exr_declares_primaries_and_attributes() {
 }
 
 #[test]
-fn exr_stores_the_error_of_the_mean_luminance() {
+fn exr_stores_the_mean_luminance_error() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("a.exr");
     let write = |error, format| {

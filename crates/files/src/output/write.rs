@@ -21,14 +21,14 @@ use super::{FileIdentity, Losses, OutputError, cancellable, held};
 use crate::control::CancelToken;
 use crate::system::describe_error;
 
-/// Standard output. The path is not opened, because this would fail for sockets.
+/// Path for standard output. The path is not opened, because this would fail for sockets.
 pub const STDOUT: &str = "/dev/stdout";
 
-/// Writes a file atomically: writes a locked temporary file next to it, synchronizes it, renames it, and
-/// synchronizes the directory. If the process is killed at any time, either the old or the new file exists.
-/// The permissions, access list, attributes and flags are kept. The owner is also kept if this process may
-/// change owners. If the path is a link, the target is replaced. Also removes temporary files in the same
-/// directory left by killed processes on this machine.
+/// Writes a file atomically: writes and synchronizes a locked temporary file in the same directory, renames
+/// the temporary file, and synchronizes the directory. If the process is killed at any time, either the old or
+/// the new file exists. The permissions, access list, attributes and flags are kept. The owner is also kept if
+/// this process may change owners. If the path is a link, the target is replaced. Also removes temporary files
+/// in the same directory left by killed processes on this machine.
 ///
 /// Devices, pipes and open descriptors ([`STDOUT`]) are written in place.
 ///
@@ -55,16 +55,16 @@ pub fn new_file(path: &Path, bytes: &[u8]) -> io::Result<()> {
     written
 }
 
-/// Policy for existing files. Both functions are called just before the replacement, with the resolved path.
+/// Policy for existing files. `may_replace` is called just before the replacement, with the resolved path.
 pub struct Guard<'a> {
     /// Whether to keep a file whose name looks like a temporary file of a killed process.
     pub is_kept: &'a dyn Fn(&Path) -> bool,
     /// Decides whether this file, existing or not, may be replaced or written in place.
     pub may_replace: &'a dyn Fn(&Path) -> Result<(), OutputError>,
-    /// Folders already searched for temporary files of killed processes. If `None`, they are searched for at
-    /// every write.
+    /// Folders already searched for temporary files of killed processes. If `None`, every write searches the
+    /// folder again.
     pub sweep: Option<&'a FolderSweep>,
-    /// What to do if a file's owner, access list or attributes cannot be kept.
+    /// Policy if a file's owner, access list or attributes cannot be kept.
     pub losses: Losses<'a>,
 }
 
@@ -81,7 +81,7 @@ impl FolderSweep {
     }
 }
 
-/// Like [`atomic`], with a guard. Can be cancelled until the new file is complete.
+/// Like [`atomic`], but with a guard. Can be cancelled until the new file is complete.
 ///
 /// # Errors
 /// The errors of [`atomic`] and the guard, and [`OutputError::Cancelled`].
@@ -95,7 +95,7 @@ pub fn atomic_guarded(
         .map(drop)
 }
 
-/// Like [`atomic_guarded`], but only replaces the file if it has the expected content. If the content has
+/// Like [`atomic_guarded`], but replaces the file only if it has the expected content. If the content has
 /// changed, the file is kept and the guard determines the error.
 ///
 /// # Errors
@@ -111,7 +111,7 @@ pub fn atomic_replace(
     replace(path, content, guard, (token, Durability::Power, Some(expected))).map(drop)
 }
 
-/// Which events a renamed file is guaranteed to survive.
+/// Events that a renamed file is guaranteed to survive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Durability {
     /// Termination of the process. The system writes the bytes to disk later.
@@ -120,7 +120,7 @@ pub enum Durability {
     Power,
 }
 
-/// Like [`atomic_guarded`], for generated content. `content` must write all bytes each time it is called.
+/// Like [`atomic_guarded`], but for generated content. `content` must write all bytes each time it is called.
 /// Returns the new file, which stays locked until it is closed. Returns `None` if the target was written in
 /// place.
 ///
@@ -135,7 +135,7 @@ pub fn atomic_with(
     replace(path, content, guard, (token, durability, None))
 }
 
-/// Like [`atomic_with`]. If an expected content is given, only replaces a file with this content.
+/// Like [`atomic_with`], but if `expected` is given, replaces only a file with this content.
 fn replace(
     path: &Path,
     content: &dyn Fn(&mut dyn Write) -> io::Result<()>,
@@ -256,7 +256,7 @@ fn sync_directory(directory: &Path) -> io::Result<()> {
     }
 }
 
-/// Writes in place. Appends, so the content of an open file is kept.
+/// Writes in place. Appends to the target, so the content of an open file is kept.
 fn in_place(path: &Path, bytes: &[u8], token: &CancelToken) -> io::Result<()> {
     if path == Path::new(STDOUT) {
         // Flush earlier output first. Do not hold the lock, because the reader may block.

@@ -1,6 +1,5 @@
-//! Bounding volume hierarchies and kd-trees. [`bvh`] stores only boxes and ids. Shapes are tested by a
-//! closure that receives the id. [`wide_bvh`] and its alternative [`kd_tree`] store triangles in their
-//! leaves.
+//! Bounding volume hierarchies and kd-trees. [`bvh`] stores only boxes and ids, and calls a closure with an
+//! id to test a shape. [`wide_bvh`] and its alternative [`kd_tree`] store triangles in their leaves.
 
 pub mod bvh;
 pub mod kd_tree;
@@ -24,7 +23,7 @@ pub use wide_bvh::{InstructionSet, SimdKernel, WideBvh};
 
 pub use crate::geometry::packet::{F32x16, PACKET_SIZE};
 
-/// Ends of up to [`PACKET_SIZE`] rays.
+/// Ends (`t_max`) of up to [`PACKET_SIZE`] rays, or −1 in lanes without a ray.
 #[inline(always)]
 pub fn ends(rays: &[crate::geometry::Ray]) -> F32x16 {
     let mut ends = [-1.0; PACKET_SIZE];

@@ -7,8 +7,8 @@ use crate::geometry::Aabb;
 use crate::geometry::mesh::TriangleMesh;
 use crate::math::{DVec3, Vec3, Vec4};
 
-/// A SIMD box. The last lanes are unused. The maximum corner is stored negated, so growing a box needs only
-/// minima.
+/// An axis-aligned box in SIMD vectors. The last lane of each corner is not part of the box. The maximum
+/// corner is stored negated, so growing a box needs only minima.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(32))]
 pub struct Bounds {
@@ -19,7 +19,7 @@ pub struct Bounds {
 impl Bounds {
     pub const EMPTY: Self = Self { min: Vec4::INFINITY, minus_max: Vec4::INFINITY };
 
-    /// Box between two corners.
+    /// Box with the given corners.
     #[inline(always)]
     pub fn new(min: Vec4, max: Vec4) -> Self {
         Self { min, minus_max: -max }
@@ -74,8 +74,8 @@ impl Bounds {
     }
 }
 
-/// A bit that is set in ids stored as float bits. Without it, the floats would be denormals, which are slow
-/// on some processors.
+/// A bit that is set in every id stored as float bits. Without it, the floats would be denormals, which are
+/// slow on some processors.
 const NORMAL: u32 = 1 << 29;
 
 const _: () = assert!(TriangleMesh::MOST_TRIANGLES < 1 << 29);
@@ -110,7 +110,7 @@ impl Reference {
     #[inline]
     pub fn new(id: u32, corners: [Vec3; 3]) -> Self {
         let [a, b, c] = corners.map(|corner| corner.extend(0.0));
-        // `min` and `max` ignore NaN, so restore it.
+        // `min` and `max` ignore NaN, so restore NaN coordinates.
         let poison = (a + b + c).truncate().to_array().map(|sum| if sum.is_nan() { f32::NAN } else { 0.0 });
         let mut min = a.min(b).min(c) + Vec3::from(poison).extend(0.0);
         min.w = f32::from_bits(id | NORMAL);
@@ -132,8 +132,8 @@ impl Reference {
     }
 
     /// Splits the reference at a plane through its box. Each new box bounds the part of the triangle on its
-    /// side, rounded outward and clipped to the old box. If this is empty due to rounding, the new box is the
-    /// entire half of the old box.
+    /// side, rounded outward and clipped to the old box. If this part is empty due to rounding, the new box
+    /// is the entire half of the old box.
     #[inline]
     pub fn split(&self, axis: usize, at: f32, corners: [Vec3; 3]) -> [Self; 2] {
         let mut parts = [Bounds::EMPTY; 2];
@@ -160,7 +160,8 @@ impl Reference {
         [self.intersected_with(left, &parts[0]), self.intersected_with(right, &parts[1])]
     }
 
-    /// The reference with the intersection of both boxes, or with `half` if they do not overlap.
+    /// The reference with its box replaced by the intersection of both boxes, or by `half` if they do not
+    /// overlap.
     #[inline(always)]
     fn intersected_with(&self, half: Bounds, part: &Bounds) -> Self {
         let mut both = Bounds { min: half.min.max(part.min), minus_max: half.minus_max.max(part.minus_max) };
@@ -238,8 +239,8 @@ impl Polygon {
         }
     }
 
-    /// Adds a vertex. Clipping a triangle by six planes produces at most nine vertices. Any more would be due
-    /// to rounding and would not extend the polygon.
+    /// Adds a vertex. Clipping a triangle by six planes produces at most nine vertices. Additional vertices
+    /// are due to rounding. They would not extend the polygon and are dropped.
     fn push(&mut self, point: DVec3) {
         if let Some(place) = self.points.get_mut(self.count) {
             *place = point;

@@ -148,7 +148,7 @@ fn no_difference(rays: usize) {
         .map(|scene| (scene, differences(&scenes[scene], scene as u64, rays.div_ceil(scenes.len()))))
         .filter(|(_, (different, _))| *different > 0)
         .collect();
-    assert!(faults.is_empty(), "scene, rays, first: {faults:#?}");
+    assert!(faults.is_empty(), "trees differ from brute force in (scene, (rays, first ray)): {faults:#?}");
 }
 
 #[test]

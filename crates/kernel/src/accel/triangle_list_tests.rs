@@ -1,5 +1,5 @@
-//! Tests of triangle lists. If a packet result is not undecided, it must match the single-ray result on every
-//! instruction set.
+//! Tests of triangle lists. Every decided packet result must match the single-ray result on every instruction
+//! set.
 
 use super::{InstructionSet, SimdKernel};
 use crate::geometry::packet::{HitPacket, PACKET_SIZE, RayPacket};
@@ -40,7 +40,7 @@ fn walls(low: Vec3, high: Vec3) -> Vec<[Vec3; 3]> {
     quads.into_iter().flat_map(each).collect()
 }
 
-/// Rooms with objects inside. Rooms may be rotated, skewed, small, or far from the origin.
+/// A room with objects inside. It may be rotated, skewed, small, or far from the origin.
 fn room(round: usize, next: &mut dyn FnMut() -> f32) -> Vec<[Vec3; 3]> {
     let mut triangles = walls(Vec3::splat(-1.0), Vec3::ONE);
     for _ in 0..round % 3 {
@@ -86,7 +86,7 @@ fn alone(triangles: &[[Vec3; 3]], ray: &Ray, except: u32) -> Option<ShapeHit> {
 fn decided_packets_match_single_rays() {
     let mut next = signed(11);
     // For each kind of ray, count all rays, hits, and undecided rays. Also count rays from surfaces near the
-    // origin, and those that are undecided.
+    // origin, and the undecided ones among them.
     let (mut bounces, mut left) = (0, 0);
     let mut counts = [[0_u32; 3]; 6];
     for round in 0..6000 {

@@ -17,7 +17,7 @@ impl Aabb {
     /// The empty box, the identity element of [`Aabb::union`].
     pub const EMPTY: Self = Self { min: Vec3::INFINITY, max: Vec3::NEG_INFINITY };
 
-    /// Smallest box around some points.
+    /// Smallest box that contains the given points.
     pub fn around(points: impl IntoIterator<Item = Vec3>) -> Self {
         points
             .into_iter()
@@ -33,7 +33,7 @@ impl Aabb {
         Self { min: min.as_vec3().map(f32::next_down), max: max.as_vec3().map(f32::next_up) }
     }
 
-    /// Smallest box around both boxes.
+    /// Smallest box that contains both boxes.
     pub fn union(self, other: Self) -> Self {
         Self { min: self.min.min(other.min), max: self.max.max(other.max) }
     }
@@ -73,18 +73,18 @@ impl Aabb {
 /// Factor on distances that compensates for rounding in [`SlabRay::enter`].
 pub const SLAB_PAD: f32 = 1.0 + 2.0 * gamma(3);
 
-/// Like [`SLAB_PAD`], but multiplied by the inverse direction, which requires one more rounding.
+/// [`SLAB_PAD`] for slab tests that multiply it by the inverse direction, which rounds once more.
 pub const FAR_PAD: f32 = 1.0 + 2.0 * gamma(4);
 
-/// Error of the watertight triangle test perpendicular to a ray, relative to the distance. It is less than 13
-/// units of rounding in the projected coordinates.
+/// Bound on the error of the watertight triangle test perpendicular to a ray, relative to the distance. The
+/// error of the projected coordinates is below 13 unit roundoffs.
 pub const TRIANGLE_ERROR: f32 = 16.0 * f32::EPSILON;
 
 /// A ray preprocessed for the slab test.
 #[derive(Clone, Copy, Debug)]
 pub struct SlabRay {
     origin: Vec3,
-    /// Margin added to each side of a box.
+    /// Margin by which boxes are expanded on every side.
     margin: f32,
     inverse: Vec3,
 }
@@ -95,17 +95,17 @@ impl SlabRay {
         Self { origin, margin: 0.0, inverse: direction.recip() }
     }
 
-    /// Preprocesses a ray for boxes around triangles in `whole`. The ray misses no box containing a triangle
-    /// that the watertight test may hit.
+    /// Preprocesses a ray for the boxes of triangles inside the box `whole`. The slab test then never misses
+    /// a box with a triangle that the watertight test may hit.
     pub fn for_triangles(origin: Vec3, direction: Vec3, whole: &Aabb) -> Self {
         Self { margin: triangle_margin(origin, whole), ..Self::new(origin, direction) }
     }
 
     /// Distance at which the ray enters the box, or `None` if it is outside the box for all t in [0,
     /// `t_max`]. Never misses a box that the exact ray hits: the far distance is padded to account for
-    /// rounding in the slab test (Ize, *Robust BVH Ray Traversal*, JCGT 2013). A ray in the plane of a face
-    /// computes 0·∞ = NaN. Comparisons with NaN keep the current interval, so positive and negative zeros in
-    /// a direction behave the same. The ray's end is also padded to avoid missing a box with a hit exactly at
+    /// rounding in the slab test (Ize, *Robust BVH Ray Traversal*, JCGT 2013). If the ray is in the plane of
+    /// a face, 0·∞ = NaN. Comparisons with NaN keep the current interval, so positive and negative zeros in a
+    /// direction behave the same. The ray's end is also padded to avoid missing a box with a hit exactly at
     /// the end.
     #[inline(always)]
     pub fn enter(&self, min: Vec3, max: Vec3, t_max: f32) -> Option<f32> {
@@ -123,7 +123,7 @@ impl SlabRay {
     }
 }
 
-/// Margin that a ray from `origin` needs around triangles in `whole`.
+/// Margin by which the boxes of triangles inside the box `whole` must be expanded for a ray from `origin`.
 pub fn triangle_margin(origin: Vec3, whole: &Aabb) -> f32 {
     (whole.min - origin).abs().max((whole.max - origin).abs()).max_element() * TRIANGLE_ERROR
 }

@@ -89,8 +89,8 @@ impl Cone {
             return None;
         }
         let q = b + discriminant.max(0.0).sqrt().copysign(b);
-        // A line parallel to the side crosses it once. Put the other root where it is for slightly steeper
-        // lines.
+        // A line parallel to the side crosses it once. Put the other root at infinity, on the same side as
+        // for slightly steeper lines.
         let a = if a == 0.0 { -0.0 } else { a };
         let (s0, s1) = if q == 0.0 { (0.0, 0.0) } else { (c / q, q / a) };
         Some(match (crosses_both, d.z > 0.0) {
@@ -160,7 +160,7 @@ impl Cone {
         DVec2::new(angle_to_u(mirrored(radial_direction(local.truncate()))), 1.0 - along / self.slant)
     }
 
-    /// Mean curvature at a point of a part. On the side, the curvature is in the direction around the axis,
+    /// Mean curvature at a point on a part. On the side, the curvature is in the direction around the axis,
     /// and is unbounded at the tip.
     pub fn curvature(&self, part: u32, point: DVec3) -> f64 {
         let across = self.frame.point_to_local(point).truncate().length();
@@ -171,7 +171,7 @@ impl Cone {
         self.frame.origin.abs().max_element() + self.height + self.radius
     }
 
-    /// Point and unit normal on the side at texture coordinates.
+    /// Point and unit normal on the side at the given texture coordinates.
     pub fn side(&self, u: f64, v: f64) -> (DVec3, DVec3) {
         let out = mirrored(direction_at_u(u));
         let point = (out * self.radius).extend(self.height) * (1.0 - v);
@@ -190,7 +190,7 @@ impl Cone {
         [PI * self.radius * self.slant, cap]
     }
 
-    /// Samples a point of a part uniformly over its area.
+    /// Samples a point on a part uniformly over its area.
     pub fn sample(&self, part: u32, u: Vec2) -> AreaPoint {
         match part {
             0 => {
@@ -249,8 +249,8 @@ impl Cone {
     }
 }
 
-/// Reflects a point, because angles are counted about the axis from base to tip, while the frame's axis
-/// points from tip to base.
+/// Mirrors a point. Angles are measured about the axis from base to tip, but the frame's axis points from tip
+/// to base.
 fn mirrored(p: DVec2) -> DVec2 {
     DVec2::new(p.x, -p.y)
 }
@@ -302,8 +302,9 @@ mod tests {
     }
 
     #[test]
-    fn the_tip_is_sharp() {
-        // Rays that pass the tip at a millionth of the radius are decided as precisely as other rays.
+    fn rays_near_the_tip_are_classified_precisely() {
+        // Hits and misses are classified correctly to 1e-5 of the radius, however close to the tip the ray
+        // passes.
         for below in [1e-3_f64, 1e-6, 1e-9] {
             let radius = below / 2.0;
             for (factor, is_hit) in [(1.0 - 1e-5, true), (1.0 + 1e-5, false)] {

@@ -23,8 +23,8 @@ impl Cuboid {
         Self { center, half: size * 0.5, axes: rotation_xyz(rotate_degrees) }
     }
 
-    /// Finds the nearest hit in the ray's interval, from outside or inside. Faces are numbered −x, +x, −y,
-    /// +y, −z, +z.
+    /// Finds the nearest hit of a ray that starts outside or inside. Faces are numbered −x, +x, −y, +y, −z,
+    /// +z.
     pub fn intersect(&self, ray: &RayF64) -> Option<ShapeHit> {
         let origin = self.axes.transpose() * (ray.origin - self.center);
         let direction = self.axes.transpose() * ray.direction;
@@ -180,7 +180,7 @@ impl Cuboid {
         [y * z, y * z, x * z, x * z, x * y, x * y]
     }
 
-    /// Samples a point of a face uniformly over its area.
+    /// Samples a point on a face uniformly over its area.
     pub fn sample(&self, face: u32, u: Vec2) -> AreaPoint {
         let (corner, a, b) = self.face(face);
         let point = corner + a * f64::from(u.x) + b * f64::from(u.y);

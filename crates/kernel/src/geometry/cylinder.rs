@@ -154,7 +154,7 @@ impl Cylinder {
         self.frame.origin.abs().max_element() + self.half_length + self.radius
     }
 
-    /// Point and unit normal on the side at texture coordinates.
+    /// Point and unit normal on the side at the given texture coordinates.
     pub fn side(&self, u: f64, v: f64) -> (DVec3, DVec3) {
         let (out, z) = (direction_at_u(u), (2.0 * v - 1.0) * self.half_length);
         (
@@ -176,7 +176,7 @@ impl Cylinder {
         [TAU * self.radius * 2.0 * self.half_length, cap, cap]
     }
 
-    /// Samples a point of a part uniformly over its area.
+    /// Samples a point on a part uniformly over its area.
     pub fn sample(&self, part: u32, u: Vec2) -> AreaPoint {
         match part {
             0 => {

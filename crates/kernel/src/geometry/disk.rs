@@ -10,12 +10,12 @@ use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::{DVec2, DVec3, Vec2};
 use crate::sampling::warp;
 
-/// Relative margin of a border. It closes gaps between surfaces that share the border, and is far below the
-/// resolution of `f32` rays.
+/// Margin around a border, relative to the size of the shape. It closes gaps between surfaces that share the
+/// border, and is far below the resolution of `f32` rays.
 pub const BORDER: f64 = 1e-14;
 
-/// A flat disk. Texture coordinates are those of the enclosing square, with (½, ½) at the center. Images are
-/// upright on a vertical disk. On a horizontal disk that faces up, their tops point toward −z.
+/// A flat disk. Texture coordinates span the enclosing square, with (½, ½) at the center. Images are upright
+/// on a vertical disk. On a horizontal disk that faces up, their tops point toward −z.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Disk {
     frame: AxialFrame,
@@ -66,7 +66,8 @@ impl Disk {
         self.surface_near(ray.at(t), self.reach())
     }
 
-    /// Surface point nearest to `point`. `reach` bounds the lengths from which `point` was computed.
+    /// Surface point nearest to `point`. `reach` is an upper bound on the lengths from which `point` was
+    /// computed.
     pub fn surface_near(&self, point: DVec3, reach: f64) -> SurfacePoint {
         let ExactPoint { point: near, normal, .. } = self.exact_near(point, reach);
         let edge = 2.0 * self.radius;
@@ -74,8 +75,8 @@ impl Disk {
         SurfacePoint::exact(near, normal, self.uv_at(point).as_vec2(), across, up, reach)
     }
 
-    /// Point of the disk nearest to `point`, before rounding. `reach` bounds the lengths from which `point`
-    /// was computed.
+    /// Point on the disk nearest to `point`, before rounding. `reach` is an upper bound on the lengths from
+    /// which `point` was computed.
     pub fn exact_near(&self, point: DVec3, reach: f64) -> ExactPoint {
         let (p, _) = self.nearest_in_plane(point);
         ExactPoint { point: self.frame.point_to_world(p.extend(0.0)), normal: self.normal(), reach }
@@ -132,7 +133,7 @@ impl Disk {
         DVec2::new((local.truncate().length() - self.radius).max(0.0), local.z).length()
     }
 
-    /// Geometry of the disk as seen from a point.
+    /// Local geometry of the disk near a point, for density estimation.
     pub fn kernel_domain(&self, point: DVec3) -> KernelDomain {
         let (normal, from) = (self.normal(), point - self.centroid());
         let extent = Extent::Flat(self.radius - from.length());

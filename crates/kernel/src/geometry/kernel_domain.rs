@@ -1,5 +1,5 @@
-//! Local shape geometry near a point: the domain over which a density kernel is integrated. It consists of
-//! flat polygons, or of a surface at a distance.
+//! Local shape geometry near a point, for integrating a density-estimation kernel. It consists of flat
+//! polygons, or of a surface at a known distance.
 
 use arrayvec::ArrayVec;
 
@@ -8,7 +8,7 @@ use crate::math::DVec3;
 /// Corners of a flat polygon, counterclockwise when seen from the front.
 pub type FlatPolygon = ArrayVec<DVec3, 4>;
 
-/// Shape geometry near a point.
+/// Shape geometry near a point, for integrating a density-estimation kernel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum KernelDomain {
     /// Number of flat polygons that form the shape. See [`Shape::polygon`](super::Shape::polygon).
@@ -36,7 +36,7 @@ pub struct SurfaceBelow {
 /// Extent of a surface around a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Extent {
-    /// Flat up to this distance.
+    /// A plane, at least up to this distance.
     Flat(f64),
     /// A sphere of this radius.
     Round(f64),

@@ -6,8 +6,8 @@ use crate::math::{DVec3, Vec2, Vec3};
 /// triangle has coincident corners.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TriangleMesh {
-    /// Origin of the positions, in file coordinates. It is near the mesh if the mesh is far from 0, and 0
-    /// otherwise.
+    /// Origin of the positions, in file coordinates. It is (0, 0, 0), or a point close to the mesh if the
+    /// mesh is far from (0, 0, 0).
     pub origin: DVec3,
     /// Vertex positions relative to `origin`.
     pub positions: Vec<Vec3>,
@@ -15,8 +15,8 @@ pub struct TriangleMesh {
     pub normals: Vec<Vec3>,
     /// Vertex texture coordinates, or empty. v = 0 is the bottom row of an image.
     pub uvs: Vec<Vec2>,
-    /// Which vertices share computed normals. If empty, every vertex has its own normal in the group
-    /// [`NormalGroup::BY_ANGLE`].
+    /// Normal group of each vertex, which determines the vertices that share a computed normal. If empty,
+    /// every vertex has its own normal in the group [`NormalGroup::BY_ANGLE`].
     pub normal_groups: Vec<NormalGroup>,
     /// Second set of vertex texture coordinates, or empty.
     pub second_uvs: Vec<Vec2>,

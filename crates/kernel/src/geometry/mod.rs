@@ -67,7 +67,7 @@ pub enum Shape {
     Torus(Torus),
 }
 
-/// Calls a method on the shape, whatever its type.
+/// Evaluates an expression with `$it` bound to the concrete shape.
 macro_rules! for_shape {
     ($shape:expr, $it:ident => $asked:expr) => {
         match $shape {
@@ -122,7 +122,7 @@ impl Shape {
         }
     }
 
-    /// [`SurfacePacket::fill`]. Returns whether the shape supports SIMD.
+    /// Implements [`SurfacePacket::fill`]. Returns whether the shape supports SIMD.
     #[inline(always)]
     fn fill_surfaces(&self, row: &mut SurfacePacket, rays: &RayPacket, hits: &HitPacket, of: u32) -> bool {
         match self {
@@ -136,7 +136,7 @@ impl Shape {
         true
     }
 
-    /// [`SurfacePacket::fill_uv`]. Returns whether the shape supports SIMD.
+    /// Implements [`SurfacePacket::fill_uv`]. Returns whether the shape supports SIMD.
     #[inline(always)]
     fn fill_uvs(&self, row: &mut SurfacePacket, rays: &RayPacket, hits: &HitPacket, of: u32) -> bool {
         match self {
@@ -159,7 +159,7 @@ impl Shape {
         for_shape!(self, it => it.surface(ray, hit))
     }
 
-    /// The requested parts of the surface point at a hit.
+    /// Surface point at a hit, with at least the requested parts.
     #[inline]
     pub fn requested_surface(&self, ray: &RayF64, hit: &ShapeHit, asked: SurfaceRequest) -> SurfacePoint {
         if asked.uv {
@@ -205,7 +205,7 @@ impl Shape {
         for_shape!(self, it => it.areas().to_vec())
     }
 
-    /// Samples a point of a part uniformly over its area. `u` is uniform in [0, 1)².
+    /// Samples a point on a part uniformly over its area. `u` is uniform in [0, 1)².
     pub fn sample(&self, part: u32, u: Vec2) -> AreaPoint {
         for_shape!(self, it => it.sample(part, u))
     }
@@ -260,7 +260,7 @@ impl Shape {
         for_shape!(self, it => it.uv_at(point))
     }
 
-    /// Mean curvature at a point of a part. Positive if the front is convex.
+    /// Mean curvature at a point on a part. Positive if the front is convex.
     #[inline]
     pub fn curvature(&self, part: u32, point: DVec3) -> f64 {
         match self {
@@ -272,7 +272,7 @@ impl Shape {
         }
     }
 
-    /// Geometry of the shape as seen from a point.
+    /// Local geometry of the shape near a point, for density estimation.
     #[inline]
     pub fn kernel_domain(&self, point: DVec3) -> KernelDomain {
         match self {
@@ -353,7 +353,7 @@ mod tests {
 
     const SIDE: u32 = 400;
 
-    /// Integrates a function over the surface area.
+    /// Integrates a function over the surface.
     fn integral(shape: &Shape, asked: impl Fn(&AreaPoint) -> f64) -> f64 {
         let grid = |i: u32| Vec2::new((i % SIDE) as f32 + 0.5, (i / SIDE) as f32 + 0.5) / SIDE as f32;
         let over_part = |(part, area): (u32, f64)| {
@@ -420,7 +420,7 @@ mod tests {
             let area: f64 = shape.areas().iter().sum();
             for direction in directions {
                 if matches!(shape, Shape::Torus(_)) {
-                    // For a closed surface, the mean over all directions (Cauchy).
+                    // For a torus, only the mean over all directions is computed (Cauchy's formula).
                     assert_eq!(shape.projected_area(direction), area / 4.0);
                 } else {
                     let off = shape.projected_area(direction) - shown(direction);

@@ -16,7 +16,7 @@ pub fn traced(ends: &F32x16, simd: impl Simd) -> u32 {
     simd.movemask(&traced)
 }
 
-/// Indices of the set bits.
+/// Lane indices of the set bits of a mask.
 pub fn lanes(mut bits: u32) -> impl Iterator<Item = usize> {
     std::iter::from_fn(move || {
         let lane = bits.trailing_zeros() as usize;
@@ -27,13 +27,13 @@ pub fn lanes(mut bits: u32) -> impl Iterator<Item = usize> {
     })
 }
 
-/// The rays of a packet. Lanes without a ray are 0.
+/// The rays of a packet in structure-of-arrays layout. Lanes without a ray are 0.
 #[derive(Clone, Debug)]
 #[repr(align(64))]
 pub struct RayPacket {
-    /// Coordinates of the origins.
+    /// Ray origins, with one array per axis.
     pub origin: [F32x16; 3],
-    /// Coordinates of the directions.
+    /// Ray directions, with one array per axis.
     pub direction: [F32x16; 3],
     /// [`Ray::start`] of each ray.
     pub start: [u32; PACKET_SIZE],

@@ -6,8 +6,8 @@ use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::lanes::{Simd, TRUE};
 use crate::math::{DVec2, DVec3, Vec2};
 
-/// Margin of the border relative to the edges. It closes gaps between quads that share an edge, and is far
-/// below the resolution of `f32` rays.
+/// Margin around the border, relative to the edge lengths. It closes gaps between quads that share an edge,
+/// and is far below the resolution of `f32` rays.
 const BORDER: f64 = 1e-14;
 
 /// The points corner + s·u + t·v with s and t in [0, 1]. The front faces along u × v.
@@ -154,7 +154,7 @@ impl UvMapped for Parallelogram {
     }
 }
 
-/// Whether a coordinate is within the border and its margin.
+/// Whether an edge coordinate is in [0, 1], up to the border margin.
 #[inline(always)]
 fn is_in_edge(x: f64) -> bool {
     (-BORDER..=1.0 + BORDER).contains(&x)

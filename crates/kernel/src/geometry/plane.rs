@@ -102,7 +102,7 @@ impl Plane {
         (point - self.point).dot(self.normal).abs()
     }
 
-    /// Geometry of the plane as seen from a point.
+    /// Local geometry of the plane near a point, for density estimation.
     pub fn kernel_domain(&self, point: DVec3) -> KernelDomain {
         let distance = self.distance(point);
         let ground =
@@ -110,7 +110,7 @@ impl Plane {
         KernelDomain::Surface { distance, ground: Some(ground) }
     }
 
-    /// Whether a point is inside. Always false.
+    /// Whether a point is inside. Always false, unlike [`Plane::is_behind`].
     pub fn contains(&self, _: DVec3) -> bool {
         false
     }

@@ -10,7 +10,7 @@ pub struct Ray {
     pub origin: Vec3,
     /// Direction of any nonzero length. t is measured in units of this length.
     pub direction: Vec3,
-    /// Upper end of t; ∞ for a half-line.
+    /// Upper end of the interval of t; ∞ for a half-line.
     pub t_max: f32,
     /// Index of the triangle on which the ray starts, or [`Ray::NO_TRIANGLE`]. A ray that leaves a flat
     /// triangle cannot hit it again, so intersection tests skip this triangle.
@@ -18,7 +18,7 @@ pub struct Ray {
 }
 
 impl Ray {
-    /// An index that no triangle has.
+    /// Value of [`Ray::start`] for rays that do not start on a triangle.
     pub const NO_TRIANGLE: u32 = u32::MAX;
 
     /// Creates a half-line.
@@ -72,7 +72,7 @@ pub struct RayF64 {
     pub origin: DVec3,
     /// Direction.
     pub direction: DVec3,
-    /// Upper end of t.
+    /// Upper end of the interval of t.
     pub t_max: f64,
 }
 
@@ -89,9 +89,9 @@ impl RayF64 {
     }
 }
 
-/// Offsets the origin of a ray that leaves `point` in a direction. If no component of `point` has an error
-/// larger than `error`, the new origin is guaranteed to be on the side of the surface that the ray leaves
-/// toward (Pharr, Jakob, Humphreys, *Physically Based Rendering*, 4th ed., section 6.8.6).
+/// Moves the origin of a ray off the surface at `point`. If `error` bounds the errors of the components of
+/// `point`, the new origin is guaranteed to be on the side of the surface that the direction points to
+/// (Pharr, Jakob, Humphreys, *Physically Based Rendering*, 4th ed., section 6.8.6).
 #[inline(always)]
 pub fn offset_origin(point: Vec3, error: Vec3, normal: Vec3, direction: Vec3) -> Vec3 {
     let distance = normal.abs().dot(error);

@@ -9,7 +9,7 @@ use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::lanes::{Simd, TRUE};
 use crate::math::{DVec2, DVec3, Vec2};
 
-/// All points at the same distance from a center. The front is outside.
+/// All points at a fixed distance, the radius, from a center. The front is outside.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sphere {
     /// Center.
@@ -114,7 +114,7 @@ impl Sphere {
         ((point - self.center).length() - self.radius).abs()
     }
 
-    /// Geometry of the sphere as seen from a point.
+    /// Local geometry of the sphere near a point, for density estimation.
     pub fn kernel_domain(&self, point: DVec3) -> KernelDomain {
         let (distance, out) = (self.distance(point), (point - self.center).normalize_or_zero());
         let ground = SurfaceBelow { normal: out, height: distance, extent: Extent::Round(self.radius) };
@@ -141,7 +141,7 @@ impl ExactSurface for Sphere {
     #[inline(always)]
     fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> ExactPoint {
         let outwards = ray.at(f64::from(hit.t)) - self.center;
-        // At the center, any direction is correct.
+        // At the center, any normal is correct.
         let is_told = outwards.length_squared() > 0.0;
         let n = (if is_told { outwards } else { -ray.direction }).normalize();
         let reach = self.center.abs().max_element() + self.radius;
@@ -175,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn rays_have_two_roots_one_or_none() {
+    fn rays_hit_spheres_twice_once_or_never() {
         let ray = |x: f32| Ray::new(Vec3::new(x, 0.0, -3.0), Vec3::Z).to_f64();
         assert_eq!(unit().intersect(&ray(0.0)).map(|hit| hit.t), Some(2.0));
         assert_eq!(unit().intersect(&ray(1.0)).map(|hit| hit.t), Some(3.0));

@@ -31,8 +31,8 @@ pub struct SurfacePoint {
     pub error: Vec3,
     /// Unit geometric normal of the front.
     pub normal: Vec3,
-    /// Origin of shadow rays on the camera's side, valid if the path from the point to it is unobstructed. It
-    /// is the point itself, or a point above it if flat triangles approximate a convex surface.
+    /// Origin of shadow rays on the camera's side. It is `point` itself, or a point above `point` if flat
+    /// triangles approximate a convex surface. Only valid if the segment from `point` is unobstructed.
     pub shadow_point: Vec3,
     /// Unit interpolated normal on the same side as `normal`.
     pub shading_normal: Vec3,
@@ -57,7 +57,7 @@ pub struct SurfaceRequest {
 }
 
 impl SurfaceRequest {
-    /// Requests everything.
+    /// Requests all optional parts.
     pub const ALL: Self = Self { uv: true, shadow_point: true };
 }
 
@@ -71,9 +71,9 @@ pub struct AreaPoint {
 }
 
 impl SurfacePoint {
-    /// Creates a surface point from a double-precision point, without a separate shading normal. Its error is
-    /// due to rounding to `f32`, plus the double-precision error. `reach` is the largest length from which
-    /// the point and the next hit are computed.
+    /// Creates a surface point from a double-precision point, without a separate shading normal. Its error
+    /// bound accounts for rounding to `f32` and for the double-precision error. `reach` is the largest length
+    /// from which the point and the next hit are computed.
     pub fn exact(point: DVec3, normal: DVec3, uv: Vec2, dpdu: DVec3, dpdv: DVec3, reach: f64) -> Self {
         let normal = normal.normalize().as_vec3();
         let point = point.as_vec3();

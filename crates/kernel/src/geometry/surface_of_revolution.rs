@@ -50,7 +50,8 @@ impl AxialFrame {
         self.axes.z_axis.dot(point - self.origin)
     }
 
-    /// Line through a ray, parametrized from its closest point to the frame's origin.
+    /// The line through a ray in local coordinates, parametrized from its closest point to the frame's
+    /// origin.
     #[inline(always)]
     pub fn line_to_local(&self, ray: &RayF64) -> LocalLine {
         let origin = self.point_to_local(ray.origin);
@@ -76,19 +77,19 @@ impl AxialFrame {
     }
 }
 
-/// A line in local coordinates, parametrized from its closest point to the origin. This limits numbers to the
-/// size of the shape and keeps rays from far away precise.
+/// A line in local coordinates, parametrized from its closest point to the origin. This keeps coordinates as
+/// small as the shape, so rays from far away remain precise.
 #[derive(Clone, Copy, Debug)]
 pub struct LocalLine {
     /// Point on the line closest to the origin.
     pub foot: DVec3,
     /// Direction of the ray.
     pub direction: DVec3,
-    /// The ray's t at the foot.
+    /// The ray's t at `foot`.
     pub start: f64,
 }
 
-/// Interval of a line, relative to its foot. Each end is stored with the index of the part that it is on.
+/// Interval of a line, relative to its foot. Each end is stored with the index of its part.
 #[derive(Clone, Copy, Debug)]
 pub struct LineInterval {
     /// Start of the interval.
@@ -101,7 +102,7 @@ impl LineInterval {
     /// The whole line.
     pub const WHOLE: Self = Self { enter: (f64::NEG_INFINITY, 0), leave: (f64::INFINITY, 0) };
 
-    /// Interval between two points of the side (part 0).
+    /// Interval between two points on the side (part 0).
     pub fn from_side(enter: f64, leave: f64) -> Self {
         Self { enter: (enter, 0), leave: (leave, 0) }
     }
@@ -122,8 +123,8 @@ impl LineInterval {
     }
 }
 
-/// First t at which the ray hits the closed solid, or only its side if it is open. `starts_on` returns
-/// whether the ray starts on a part, within rounding error. The start is not a hit.
+/// First t at which the ray hits a closed solid, or the side of an open one. `starts_on` returns whether the
+/// ray starts on a part, within rounding error. The start is not a hit.
 pub fn first_hit(
     ray: &RayF64,
     line: &LocalLine,
@@ -132,7 +133,7 @@ pub fn first_hit(
     closed: bool,
     starts_on: impl Fn(u32) -> bool,
 ) -> Option<(f64, u32)> {
-    // Of the two intersections with the side, the one closer to the start is the start itself.
+    // The intersection with the side that is closer to the start is the start itself.
     let other_on_side = |along: f64| {
         let other = if along == side.enter.0 { side.leave.0 } else { side.enter.0 };
         (line.start + other).abs()
@@ -161,9 +162,9 @@ pub fn first_hit(
     [enter, leave].into_iter().find_map(accepted)
 }
 
-/// Squared distance between a hit and the ray's origin below which they may be identical, relative to the
-/// squared distance from the shape's origin. At grazing angles, rounding moves the hit by the square root of
-/// a unit in the last place.
+/// Maximum squared distance between a hit and the ray's origin at which they may be the same point, relative
+/// to the squared distance from the shape's origin. At grazing angles, rounding moves the hit by the square
+/// root of a unit in the last place.
 const NEAR_START: f64 = 1e-12;
 
 /// Whether a distance from a surface is within the rounding error of numbers up to `size`.
@@ -194,8 +195,8 @@ pub fn to_shape_hit((t, primitive): (f64, u32)) -> ShapeHit {
     ShapeHit { primitive, ..ShapeHit::at(t as f32) }
 }
 
-/// t of a hit before rounding, computed by intersecting the ray again. If the second intersection finds
-/// another hit, returns the rounded t.
+/// t of a hit before rounding, computed by intersecting the ray again. Returns the rounded t if the second
+/// intersection finds a different hit.
 pub fn exact_t(hit: &ShapeHit, again: Option<(f64, u32)>) -> f64 {
     match again {
         Some((t, part)) if t as f32 == hit.t && part == hit.primitive => t,
@@ -203,8 +204,8 @@ pub fn exact_t(hit: &ShapeHit, again: Option<(f64, u32)>) -> f64 {
     }
 }
 
-/// Point of a hit before rounding. A second intersection is needed unless exactly one of the crossings is at
-/// the hit's distance.
+/// Point of a hit before rounding. Intersects again unless exactly one of the crossings is at the hit's
+/// distance.
 pub fn exact_point(
     (ray, line): (&RayF64, &LocalLine),
     hit: &ShapeHit,
@@ -223,12 +224,12 @@ pub fn exact_point(
     ray.at(fitting.unwrap_or_else(|| exact_t(hit, again())))
 }
 
-/// Unit vector toward a point in the plane, or the x axis for the origin.
+/// Unit vector from the origin of the plane toward a point. The x axis if the point is the origin.
 pub fn radial_direction(p: DVec2) -> DVec2 {
     p.try_normalize().unwrap_or(DVec2::X)
 }
 
-/// ½ + angle/2π of a direction in the plane. In [0, 1].
+/// Texture coordinate u = ½ + angle/2π of a direction in the plane, in [0, 1].
 pub fn angle_to_u(p: DVec2) -> f64 {
     0.5 + libm::atan2(p.y, p.x) / std::f64::consts::TAU
 }
@@ -251,7 +252,7 @@ pub(super) mod tests {
 
     #[test]
     fn rays_do_not_hit_their_start_on_curved_shapes() {
-        // All of these shapes touch the origin from z < 0.
+        // All of these shapes are in z ≥ 0 and touch the origin.
         let cylinder = |a, b, radius| Cylinder::new(a, b, radius, true);
         let mut next = unit(7);
         for _ in 0..2000 {
@@ -280,13 +281,13 @@ pub(super) mod tests {
 
     /// A thin shape around the z axis from −1 to 1, used by [`hits_from_afar`].
     pub trait Thin {
-        /// Creates a shape with this radius.
+        /// Creates a thin shape with the given radius.
         fn thin(radius: f64, capped: bool) -> Self;
 
         /// Nearest hit.
         fn met(&self, ray: &RayF64) -> Option<(f64, u32)>;
 
-        /// Interval of the ray inside the side.
+        /// Interval of the ray inside the unbounded side surface.
         fn within(&self, ray: &RayF64) -> Option<LineInterval>;
 
         /// Hit point before rounding.

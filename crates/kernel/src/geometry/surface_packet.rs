@@ -6,7 +6,7 @@ use super::{RayF64, Shape, ShapeHit, SurfacePoint};
 use crate::math::lanes::{Vec3x16, mask_from_bits, select, set_lane};
 use crate::math::{DVec2, DVec3, Vec2};
 
-/// The parts of a packet of [`SurfacePoint`]s that lighting needs.
+/// A packet of [`SurfacePoint`]s, with only the fields that lighting needs.
 #[derive(Clone, Debug)]
 #[repr(align(64))]
 pub struct SurfacePacket {

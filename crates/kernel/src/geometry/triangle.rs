@@ -6,8 +6,8 @@ use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::{DVec2, DVec3, Vec2};
 use crate::sampling::warp;
 
-/// A triangle is considered huge if the distance of its corners is at least this multiple of the distances of
-/// the ray's origin and the hit.
+/// A triangle is considered huge if its coordinates exceed this multiple of the coordinates of the ray's
+/// origin and the hit.
 const HUGE: f64 = 1024.0;
 
 /// A triangle. The front faces along (b − a) × (c − a).
@@ -74,7 +74,7 @@ impl Triangle {
         Aabb::around_f64([self.a, self.b, self.c])
     }
 
-    /// Normal: the cross product of the edges at the first corner.
+    /// Unnormalized normal: the cross product of the edges at the first corner.
     fn normal(&self) -> DVec3 {
         (self.b - self.a).cross(self.c - self.a)
     }
@@ -137,7 +137,7 @@ mod tests {
     use crate::math::Vec3;
 
     #[test]
-    fn hits_have_the_aimed_barycentrics() {
+    fn hits_have_the_expected_barycentrics() {
         let triangle = Triangle {
             a: DVec3::new(0.1, 0.2, 0.3),
             b: DVec3::new(2.0, 0.0, 1.0),

@@ -5,8 +5,8 @@
 //! facets are intersected in single precision to find each ray's nearest candidate, with conservative bounds
 //! on all errors. Two triangles that form a flat quadrilateral are a single facet. The watertight test is
 //! then run on each ray's nearest candidate. If the hit is not guaranteed to be nearer than the other
-//! candidates, the ray is undecided, which is rare and happens near edges. Results are therefore
-//! bit-identical to tracing the ray alone.
+//! candidates, the ray is undecided, which is rare and happens near edges. Decided results are therefore
+//! bit-identical to tracing each ray separately.
 //!
 //! Notation for the bounds: ε is the unit roundoff, d a ray's direction, n a plane's unit normal, M the
 //! largest coordinate of origins and corners, and R the largest distance along an axis from the ray's origin
@@ -32,7 +32,7 @@ use crate::math::float::UNIT_ROUNDOFF;
 use crate::math::lanes::{Mask, Simd, TRUE, select, select_u32, set_lane};
 use crate::math::{DVec3, Vec3};
 
-/// Maximum number of triangles.
+/// Maximum number of triangles in a [`TriangleList`].
 pub const MOST: usize = 64;
 
 /// Error of the intersection with a plane, relative to the largest coordinate.
@@ -47,10 +47,10 @@ const ACROSS: f32 = 1024.0 * UNIT_ROUNDOFF;
 /// Maximum coordinate error at which a miss can be decided with certainty.
 const BLUNT: f32 = 0.125;
 
-/// Maximum of D/(2A), relative to the size of all triangles.
+/// Maximum of D/(2A), multiplied by the extent of all triangles.
 const MOST_SLENDER: f64 = 1e3;
 
-/// An index that no triangle has.
+/// Triangle index that excludes no triangle.
 const NONE: u32 = u32::MAX;
 
 /// A triangle, or two triangles that form a flat quadrilateral.
@@ -65,14 +65,14 @@ struct Facet {
     /// their minimum and maximum.
     across: [Vec3; 2],
     start: [f32; 2],
-    /// Largest coordinates.
+    /// Largest absolute values of the centered coordinates.
     half: [f32; 2],
     /// Sum of the coordinates on the edge opposite the first corner, and the maximum by which the sum may
     /// exceed this value.
     diagonal: f32,
     beyond: f32,
-    /// Distance of the sum from `diagonal`, in margins, above which it is certain which triangle is hit.
-    /// Negative if there is only one triangle.
+    /// Distance of the sum from `diagonal`, in error margins, above which it is certain which triangle is
+    /// hit. Negative if there is only one triangle.
     split: f32,
     /// Index of the triangle where the sum of the coordinates is below `diagonal`, and index of the other
     /// triangle. Equal if there is only one.
@@ -105,15 +105,16 @@ struct Candidates {
     doubtful: Mask,
 }
 
-/// Error terms of a packet.
+/// Error terms of the rays of a packet.
 struct ErrorTerms {
-    /// [`PLANE`] term of each ray.
+    /// Error term with the factor [`PLANE`] for each ray.
     plane: F32x16,
-    /// R.
+    /// R: largest distance along an axis from the ray's origin to a corner.
     far: F32x16,
-    /// [`PLANE`] and [`ACROSS`] terms of each ray, without the factors for its length and D/(2A).
+    /// Error term with the factors [`PLANE`] and [`ACROSS`] for each ray, without the ray's length and
+    /// D/(2A).
     across: F32x16,
-    /// Bound on the length of the direction.
+    /// Upper bound on the length of the direction.
     length: F32x16,
     /// Upper bound on t of a hit on any triangle.
     end: F32x16,
@@ -348,7 +349,7 @@ impl TriangleList {
     }
 }
 
-/// Results of running the watertight test on the candidates.
+/// Results of the watertight test on each ray's nearest candidate.
 struct CandidateHits {
     /// Rays that are certain to hit their candidate before all others.
     hit: Mask,

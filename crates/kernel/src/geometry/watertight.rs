@@ -8,8 +8,8 @@ use crate::math::{DVec3, Vec3};
 /// Relative error of t above which a triangle is treated as a needle.
 pub const ILL_CONDITIONED: f32 = 1.0 / 32.0;
 
-/// A ray preprocessed for many triangles. Its longest axis becomes z, and a shear aligns the ray with this
-/// axis.
+/// A ray preprocessed for many triangles. The longest axis of its direction becomes z, and a shear aligns the
+/// ray with this axis.
 #[derive(Clone, Copy, Debug)]
 pub struct ShearedRay {
     origin: Vec3,
@@ -198,8 +198,8 @@ mod tests {
         for (width, distance) in
             [(3e-4_f32, 200.0_f32), (1e-4, 200.0), (1e-4, 50.0), (1e-6, 3.0), (2e-7, 1e3)]
         {
-            // A tilted square, split into a narrow strip of this width across the middle and the remaining
-            // two parts.
+            // A tilted square, split into a narrow strip of this width across the middle and two remaining
+            // parts.
             let point = |x: f32, y: f32| Vec3::new(x, y, 0.3 * x - 0.2 * y);
             let [low, high] = [-width, width].map(|w| 0.5 * w);
             let quad = |a: f32, b: f32| {

@@ -10,10 +10,10 @@ use crate::math::lanes::{Mask, Simd, TRUE, Vec3x16, select, select_u32};
 /// The rays of a packet, preprocessed for triangle tests.
 pub struct ShearedPacket<'a> {
     rays: &'a RayPacket,
-    /// Whether a ray's longest axis is x, and whether it is y.
+    /// Masks of the rays with longest axis x, and with longest axis y.
     longest: [Mask; 2],
-    /// Whether the direction along a ray's longest axis is negative. The scalar test then swaps the other two
-    /// axes, which only negates the edge functions.
+    /// Mask of the rays with a negative direction along their longest axis. The scalar test then swaps the
+    /// other two axes, which only negates the edge functions.
     is_down: Mask,
     /// Shears of the two axes after the longest one, and the scale of the longest one.
     shear: Vec3x16,
@@ -22,7 +22,7 @@ pub struct ShearedPacket<'a> {
 /// Hits of a packet, with one triangle per ray.
 pub(super) struct Hits {
     pub(super) hit: Mask,
-    /// Lanes to be decided by the scalar test.
+    /// Lanes that need the scalar test.
     pub(super) doubtful: Mask,
     pub(super) t: F32x16,
     pub(super) u: F32x16,

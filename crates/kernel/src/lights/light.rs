@@ -1,4 +1,4 @@
-//! [`Light`]: an enum of all lights. [`Light::family`] returns the trait object for its kind.
+//! The [`Light`] enum. [`Light::family`] returns a light as a trait object of its family.
 
 use super::area::{AreaLight, EmissionTexture};
 use super::delta::{DeltaLight, PointLight, SpotLight};
@@ -25,7 +25,7 @@ pub enum Light {
     Area(AreaLight),
 }
 
-/// One of three families of lights with common methods.
+/// A light as a member of one of three families with common methods.
 #[derive(Clone, Copy)]
 pub enum LightFamily<'a> {
     /// A light without extent.

@@ -11,8 +11,7 @@
 //! | `set`, `per_lane` | [`Lights`], all lights of a scene; samples for a packet in which each lane has picked a light |
 //! | [`photon_emission`] | photon emission |
 //!
-//! Each row depends only on the rows above it. Lights do not depend on materials, and do not check for
-//! occlusion.
+//! Each row depends only on the rows above it. Lights do not depend on BSDFs, and do not check for occlusion.
 //!
 //! # To add a light
 //!

@@ -35,7 +35,7 @@ pub struct LightObjectPacket {
 }
 
 impl LightObjectPacket {
-    /// Marks a lane without an object, or without a single primitive.
+    /// Marks a lane that has no object, or that refers to an entire object.
     pub const NONE: u32 = u32::MAX;
 
     /// Marks a [`LightObject::SeeThrough`] lane. No primitive has this index.
@@ -48,7 +48,7 @@ impl LightObjectPacket {
         Self { object: [object; PACKET_SIZE], part: [part; PACKET_SIZE], is_any: object != Self::NONE }
     }
 
-    /// Copies a lane of another packet.
+    /// Copies a lane from another packet.
     #[inline(always)]
     pub fn copy(&mut self, lane: usize, other: &Self, from: usize) {
         (self.object[lane], self.part[lane]) = (other.object[from], other.part[from]);

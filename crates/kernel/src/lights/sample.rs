@@ -34,7 +34,7 @@ pub enum LightCenter {
     Towards(Vec3),
 }
 
-/// A light's scene geometry.
+/// The scene geometry that belongs to a light.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LightObject {
     /// No geometry.

@@ -31,16 +31,16 @@ pub struct Lights {
 /// Purpose of the light samples at a vertex.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SamplingMode {
-    /// Direct lighting only. The image has no other noise.
+    /// Direct lighting only, where light sampling is the only source of noise.
     Eye,
-    /// Path vertices. The image has other noise as well.
+    /// Path vertices, where the image also has other noise.
     Paths,
 }
 
-/// The lights from which a vertex picks some to sample.
+/// A set of lights, and how a vertex picks the ones to sample.
 #[derive(Clone, Copy, Debug)]
 pub struct LightSampler<'a> {
-    /// Tree over the lights to pick from.
+    /// Tree over the lights to choose from.
     pub tree: &'a LightTree,
     /// How much work to spend on picking.
     pub picks: LightSamplingEffort,
@@ -54,15 +54,15 @@ pub struct LightSampler<'a> {
 pub struct LightSamplingEffort {
     /// Number of lights to pick for each requested light sample.
     pub count: u32,
-    /// Maximum number of tree nodes to examine for all picks.
+    /// Maximum number of tree nodes to examine for all picks together.
     nodes: usize,
 }
 
 impl LightSamplingEffort {
-    /// For direct lighting. As good as examining each of a thousand lights.
+    /// Effort for direct lighting. As good as examining each of a thousand lights.
     pub const DIRECT: Self = Self { count: MAX_WITHOUT_TREE as u32, nodes: LightTreeCut::MOST };
 
-    /// For paths. Additional shadow rays are not worthwhile because of the other noise.
+    /// Effort for path vertices. More shadow rays are not worthwhile because of the other noise.
     pub const PATHS: Self = Self { count: 1, nodes: 8 };
 
     /// Creates a cut of a tree for this effort.
@@ -129,7 +129,7 @@ impl Lights {
         Ok(Self { all, ..lights })
     }
 
-    /// Maximum number of local lights for path vertices to sample all of them. If there are more, one is
+    /// Maximum number of local lights at which path vertices sample all of them. If there are more, one is
     /// picked. Measured in rooms with 3 to 12 lights.
     const MAX_LOCAL_WITHOUT_TREE: usize = 3;
 
@@ -149,7 +149,8 @@ impl Lights {
         }
     }
 
-    /// Expected number of light samples at a surface point, given only its position and normal.
+    /// Expected number of samples of each light at a surface point, given only the point's position and
+    /// normal.
     #[inline]
     pub fn samples_at(&self, receivers: SamplingMode, point: Vec3, normal: Vec3) -> ExpectedSamples<'_> {
         // Return early because a cut is expensive to copy.

@@ -191,7 +191,7 @@ fn two_sided_samples_cover_the_visible_shape() {
     };
     for shape in shapes().into_iter().chain([open(true), open(false)]) {
         let lights = two_sided(&shape);
-        // Points around the shape and one point inside.
+        // Use points around the shape and one point inside.
         let is_flat = area_light(&shape, Vec3::ONE, 0).is_some_and(|light| light.bounds.cone.cos == 1.0);
         let inner = shape.sample(0, Vec2::splat(0.5));
         let inner = (inner.point - inner.normal * 0.1).as_vec3();
@@ -352,7 +352,7 @@ fn mesh_triangles_map_to_their_lights() {
     assert_eq!(Light::Point(POINT).pdf(Vec3::ONE, Vec3::Z, &light_hit), 0.0);
 }
 
-/// A light with these triangles. Their indices start at 5.
+/// A mesh light with the given triangles. Their primitive indices start at 5.
 fn mesh_light(triangles: &[[DVec3; 3]]) -> AreaLight {
     let numbered = triangles.iter().copied().zip(5..).collect();
     let mesh = MeshEmitter::new(numbered, &CancelToken::new()).expect("nobody cancels").expect("an area");

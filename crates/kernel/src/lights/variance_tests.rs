@@ -48,7 +48,7 @@ fn spread(samples: &[f64]) -> (f64, f64) {
     (mean, variance.sqrt() / mean)
 }
 
-/// Shapes with a size of about 1, at a distance of `gap` above the origin or beside it.
+/// Shapes with a size of about 1, at a distance of `gap` above or next to the origin.
 fn area_lights(gap: f64) -> Vec<(&'static str, Shape)> {
     let at = |x: f64, y: f64| DVec3::new(x, y + gap, 0.0);
     let slant = DVec3::new(0.1, 1.0, 0.05).normalize();
@@ -222,7 +222,7 @@ fn textured_quad_pdf_matches_its_samples() {
 
 #[test]
 fn small_bright_areas_have_low_variance() {
-    // One hundredth of the square is bright. Its irradiance equals that of a square one tenth as wide.
+    // One hundredth of the square is bright. It has the same irradiance as a square one tenth as wide.
     let bright =
         |[x, y]: [f64; 2]| -> f32 { if x > 0.3 && x < 0.4 && y > 0.6 && y < 0.7 { 1.0 } else { 0.0 } };
     for gap in [0.3, 2.0] {
@@ -325,8 +325,8 @@ fn irradiance_matches_closed_forms() {
         let (r2, h2) = (radius * radius, height * height);
         let disk = |center, normal| Shape::Disk(Disk::new(center, normal, radius));
         assert_irradiance(&disk(DVec3::Y * height, DVec3::NEG_Y), PI * r2 / (r2 + h2), error);
-        // Beside a parallel disk (Howell, *A Catalog of Radiation Heat Transfer Configuration Factors*,
-        // B-13).
+        // A point that is not below the center of a parallel disk (Howell, *A Catalog of Radiation Heat
+        // Transfer Configuration Factors*, B-13).
         let beside = 0.8 * radius;
         let (h, r) = (height / beside, radius / beside);
         let z = 1.0 + h * h + r * r;

@@ -60,8 +60,8 @@ pub enum LobeSet {
 pub struct BsdfValues {
     /// f of the shown lobes in sr⁻¹.
     pub f: Vec3x16,
-    /// Two numbers per surface that f, pdf, and the parts of f have in common. Their meaning depends on the
-    /// kind.
+    /// Two intermediate values per surface that f, the pdf, and the parts of f share. Their meaning depends
+    /// on the kind.
     pub(super) shared: [F32x16; 2],
 }
 
@@ -132,22 +132,22 @@ pub trait RoughMaterial {
     /// The material at one point.
     type Point: RoughPoint;
 
-    /// Looks up the textures.
+    /// The material at one point, with its textures looked up. Counts texture lookups in `lookups`.
     fn at(&self, at: &TexturePoint, lookups: &mut u64) -> Self::Point;
 
-    /// The material with white textures.
+    /// The material with all textures replaced by white.
     fn with_white_textures(&self) -> Self::Point;
 
     /// The material's values if it has no textures.
     fn constant(&self) -> Option<Self::Point>;
 
-    /// The main color. Adds to `lookups`.
+    /// The material's main color. Counts texture lookups in `lookups`.
     fn albedo(&self, at: &TexturePoint, lookups: &mut u64) -> Vec3;
 
     /// Reflectance of ambient light.
     fn ambient_at(&self, at: &TexturePoint, lookups: &mut u64) -> Vec3;
 
-    /// Its textures.
+    /// All textures of the material.
     fn textures(&self) -> impl Iterator<Item = &Arc<Texture>>;
 
     /// Whether packets can be filled with the material, with at most a lookup of
@@ -205,7 +205,7 @@ pub trait RoughRow: Clone {
     /// Sets a surface.
     fn put(&mut self, i: usize, bsdf: &Self::Point, shown: ShownLobes, place: &SurfaceDirections);
 
-    /// Copies a surface of another packet.
+    /// Copies a surface from another packet.
     fn copy(&mut self, i: usize, other: &Self, from: usize);
 
     /// Evaluates the shown lobes for the given light directions.
@@ -217,7 +217,7 @@ pub trait RoughRow: Clone {
     /// f of all lobes in sr⁻¹, whether they are shown or not. Uses the largest color components.
     fn max_component(&self, values: &BsdfValues) -> F32x16;
 
-    /// Pdfs in sr⁻¹ of directions sampled from these lobes. Cosine lobes use `normals`.
+    /// Pdfs in sr⁻¹ of directions sampled from the given lobes. Cosine lobes use `normals`.
     fn pdf(&self, lobes: LobeSet, normals: &Vec3x16, directions: &Vec3x16, values: &BsdfValues) -> F32x16;
 
     /// Samples a unit direction for each surface. `choices` selects the lobes, and `u` the directions within
@@ -243,7 +243,8 @@ pub trait RoughRow: Clone {
     /// The narrow lobe of a surface, if it has one.
     fn narrow_lobe(&self, i: usize) -> Option<NarrowLobe>;
 
-    /// Mask of the surfaces in `of` whose narrow lobe is at least as narrow as a cosine to the given power.
+    /// Mask of the surfaces in `of` with a narrow lobe that is at least as narrow as a cosine to the given
+    /// power.
     fn narrower_than(&self, of: u32, exponent: f32) -> u32;
 
     /// f of a surface's shown lobes in sr⁻¹, if it is constant over all directions.
@@ -253,7 +254,8 @@ pub trait RoughRow: Clone {
     fn f_at(&self, i: usize, direction: Vec3) -> Vec3;
 }
 
-/// Packets of surfaces that have this BSDF for light from either side, regardless of their surroundings.
+/// A packet of a kind that is an entire material. The surfaces have this BSDF for light from either side,
+/// regardless of their surroundings.
 pub trait MaterialRow: RoughRow {
     /// The material.
     type Material: RoughMaterial<Point = Self::Point>;

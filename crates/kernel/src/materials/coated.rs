@@ -27,13 +27,13 @@ impl Coated {
         dielectric(cosine, self.ior).0
     }
 
-    /// The factor on the coat's reflection. Adds to `lookups`.
+    /// The factor on the coat's reflection. Counts texture lookups in `lookups`.
     #[inline]
     pub fn specular(&self, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
         self.specular.at(at, lookups)
     }
 
-    /// Its textures.
+    /// All textures of the coat.
     pub fn textures(&self) -> impl Iterator<Item = &Arc<Texture>> {
         self.specular.texture().into_iter()
     }

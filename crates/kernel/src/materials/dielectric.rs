@@ -11,7 +11,7 @@ use crate::math::{DVec3, Vec3};
 pub struct Dielectric {
     /// Index of refraction inside the shape. It is 1 outside.
     pub ior: f32,
-    /// Transmittance per unit length inside the shape, as accurately as `f32` allows.
+    /// Transmittance per unit length inside the shape, rounded to `f32`.
     pub tint: Vec3,
     /// The square root of α. Constant 0 for smooth glass.
     pub roughness: Number,

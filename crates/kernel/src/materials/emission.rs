@@ -60,7 +60,8 @@ impl Emission {
         self.is_emissive() && (is_front || self.is_two_sided())
     }
 
-    /// The radiance at texture coordinates, given the cosine of the direction of emission. Adds to `lookups`.
+    /// The radiance at the given texture coordinates and cosine of the direction of emission. Counts texture
+    /// lookups in `lookups`.
     #[inline]
     pub fn at(&self, at: &TexturePoint, cosine: f32, lookups: &mut u64) -> Vec3 {
         let left = self.coat.as_ref().map_or(1.0, |coat| coat.transmittance(at, cosine, lookups));

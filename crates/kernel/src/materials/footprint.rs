@@ -62,8 +62,8 @@ impl Footprint {
     /// Footprint of a ray cone on a surface, where `width` is the cone's width and `direction` a unit vector
     /// (Akenine-Möller, Crassin, Boksansky, Belcour, Panteleev, Wright, *Improved Shader and Texture Level of
     /// Detail Using Ray Cones*, JCGT 2021, section 5). The ellipse has this width perpendicular to the
-    /// direction, and the width divided by the cosine along it. `tangents` are ∂p/∂u and ∂p/∂v. If they are
-    /// parallel or 0, the footprint is a point.
+    /// direction, and this width divided by the cosine along the direction. `tangents` are ∂p/∂u and ∂p/∂v.
+    /// If they are parallel or 0, the footprint is a point.
     #[inline]
     pub fn of_cone(width: f32, direction: Vec3, normal: Vec3, tangents: [Vec3; 2]) -> Self {
         let cosine = normal.dot(direction);

@@ -33,7 +33,7 @@ pub fn dielectric_either(cos_incident: f32, eta: f32) -> f32 {
     by_root(cos_incident, eta, if squared > 0.0 { squared } else { 0.0 })
 }
 
-/// The reflectance, given η² times the squared cosine of the transmitted direction.
+/// Reflectance of a dielectric boundary, given η² times the squared cosine of the transmitted direction.
 #[inline(always)]
 fn by_root(cos_incident: f32, eta: f32, cos2_t: f32) -> f32 {
     let cos_t = cos2_t.sqrt();
@@ -161,7 +161,7 @@ mod tests {
                 assert!((0.0..=1.0).contains(&found), "{eta} at {step}: {found}");
             }
         }
-        // Gold at normal incidence is ((η − 1)² + k²)/((η + 1)² + k²).
+        // The reflectance of gold at normal incidence is ((η − 1)² + k²)/((η + 1)² + k²).
         assert!((conductor(1.0, 0.108, 3.508) - 0.9681).abs() < 1e-4);
     }
 
@@ -173,7 +173,7 @@ mod tests {
     fn reflectance_at_known_angles() {
         assert!((reflectance(0.0, 1.5) - 0.04).abs() < 1e-7);
         assert!((reflectance(90.0, 1.5) - 1.0).abs() < 1e-5);
-        // At Brewster's angle, half of the perpendicular reflectance.
+        // At Brewster's angle, the reflectance is half of the perpendicular reflectance.
         let brewster = 1.5_f64.atan();
         let expected =
             0.5 * ((brewster.cos() - 1.5 * brewster.sin()) / (brewster.cos() + 1.5 * brewster.sin())).powi(2);

@@ -13,7 +13,7 @@ use crate::math::{DVec3, Vec3};
 /// Number of polynomial terms.
 pub const TERMS: usize = 10;
 
-/// The constant c in t.
+/// The constant c in the definition of t.
 const KNEE: f64 = 0.15;
 
 /// Number of roughness values in a table.
@@ -35,7 +35,8 @@ impl LobeAlbedo {
         evaluate(cosine, |number| self.terms[number])
     }
 
-    /// Computes the albedo of a lobe with an isotropic α. The facet reflectance is a function of the cosine.
+    /// Computes the albedo of a lobe with an isotropic α. `reflectance` maps a cosine to the reflectance of a
+    /// facet.
     pub fn of(alpha: f64, reflectance: impl Fn(f64) -> f64) -> Self {
         Self::fit(|cosine| integrate_albedo::<12, 16>(cosine, alpha, &reflectance))
     }
@@ -231,7 +232,7 @@ struct VisibleFacets {
     /// The stretched direction, followed by the axis of b.
     view: DVec3,
     second: DVec3,
-    /// Λ of the view direction.
+    /// Smith's Λ of the view direction.
     masked: f64,
 }
 

@@ -17,7 +17,7 @@ impl Mipmaps {
     /// Computes each level from the previous one with `halve`.
     ///
     /// # Errors
-    /// Errors from `halve`.
+    /// The first error returned by `halve`.
     pub fn of<E>(texels: &Texels, halve: impl Fn(&Texels) -> Result<Texels, E>) -> Result<Self, E> {
         let mut levels: Vec<Texels> = Vec::new();
         while let last = levels.last().unwrap_or(texels)

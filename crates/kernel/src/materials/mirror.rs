@@ -17,8 +17,8 @@ pub enum Mirror {
 }
 
 impl Mirror {
-    /// Reflectance for a cosine of the angle of incidence, with the color multiplied by `tint`. Adds to
-    /// `lookups`.
+    /// Reflectance for a cosine of the angle of incidence, with the color multiplied by `tint`. Counts
+    /// texture lookups in `lookups`.
     #[inline]
     pub fn reflectance(&self, cosine: f32, tint: Option<Vec3>, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
         match self {
@@ -38,7 +38,7 @@ impl Mirror {
         }
     }
 
-    /// Its textures.
+    /// All textures of the mirror.
     pub fn textures(&self) -> impl Iterator<Item = &Arc<Texture>> {
         let (color, fresnel) = match self {
             Self::Constant(color) => (color.texture(), None),

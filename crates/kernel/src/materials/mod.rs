@@ -76,7 +76,7 @@ impl Material {
     }
 
     /// Fraction of light that passes undeflected, at the given texture coordinates and cosine of the angle of
-    /// incidence. `color` multiplies a pane's transmittance. Adds to `lookups`.
+    /// incidence. `color` multiplies a pane's transmittance. Counts texture lookups in `lookups`.
     pub fn null_transmittance(&self, at: &TexturePoint, color: Vec3, cosine: f32, lookups: &mut u64) -> Vec3 {
         let there = self.opacity.as_ref().map_or(1.0, |opacity| opacity.at(at, lookups));
         let through = match &self.bsdf {
@@ -175,7 +175,7 @@ impl Bsdf {
         }
     }
 
-    /// The main color. Adds to `lookups`.
+    /// The surface's main color. Counts texture lookups in `lookups`.
     #[inline]
     pub fn albedo(&self, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
         match self {

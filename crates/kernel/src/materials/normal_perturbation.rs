@@ -22,7 +22,8 @@ impl NormalPerturbation {
         (normal_map.is_some() || bump.is_some()).then_some(Self { normal_map, bump })
     }
 
-    /// The perturbed shading normal. `dpdu` and `dpdv` are ∂p/∂u and ∂p/∂v. Adds to `lookups`.
+    /// The perturbed shading normal. `dpdu` and `dpdv` are ∂p/∂u and ∂p/∂v. Counts texture lookups in
+    /// `lookups`.
     #[inline]
     pub fn perturb(
         &self,
@@ -43,7 +44,7 @@ impl NormalPerturbation {
         bent
     }
 
-    /// Its textures.
+    /// Textures of both maps.
     pub fn textures(&self) -> impl Iterator<Item = &Arc<Texture>> {
         let of_normals = self.normal_map.as_ref().map(|map| &map.texture);
         of_normals.into_iter().chain(self.bump.as_ref().map(|bump| &bump.texture))
@@ -64,8 +65,8 @@ impl Bump {
     /// Number of texture lookups per perturbed normal.
     const LOOKUPS: u64 = 4;
 
-    /// Perturbs `bent` by the slopes of the heights above the surface with normal `normal`. Returns `bent`
-    /// unchanged if the tangents are degenerate.
+    /// Perturbs the normal `bent` by the slopes of the bump map. `normal` is the surface normal. Returns
+    /// `bent` unchanged if the tangents are degenerate.
     ///
     /// The surface gradient is ∇h = (h_u (p_v × n) + h_v (n × p_u)) / (n · (p_u × p_v)) (Mikkelsen, *Surface
     /// Gradient-Based Bump Mapping Framework*, JCGT 2020, section 2). Slopes of a normal map and a bump map

@@ -9,13 +9,13 @@ pub struct Opacity {
     /// The opacity, clamped to [0, 1].
     pub value: Number,
     /// Threshold for the opacity, or 0 for no threshold. The surface is opaque at and above the threshold,
-    /// and fully transparent below. If there is a threshold, the texture's mip levels contain the fraction of
-    /// opaque texels.
+    /// and fully transparent below it. If there is a threshold, the texture's mip levels contain the fraction
+    /// of opaque texels.
     pub cutoff: f32,
 }
 
 impl Opacity {
-    /// The opacity at texture coordinates, in [0, 1]. Adds to `lookups`.
+    /// The opacity at the given texture coordinates, in [0, 1]. Counts texture lookups in `lookups`.
     #[inline]
     pub fn at(&self, at: &TexturePoint, lookups: &mut u64) -> f32 {
         match &self.value {

@@ -23,7 +23,7 @@ choice! {
 /// The value of a pixel that a scalar texture reads.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum PixelValue {
-    /// Its luminance.
+    /// The luminance of the pixel.
     Luminance,
     /// One channel.
     Channel(Channel),
@@ -63,7 +63,7 @@ impl Number {
         }
     }
 
-    /// The value at texture coordinates. Adds to `lookups`.
+    /// The value at the given texture coordinates. Counts texture lookups in `lookups`.
     #[inline]
     pub fn at(&self, at: &TexturePoint, lookups: &mut u64) -> f32 {
         match self {

@@ -11,7 +11,7 @@ pub struct Texels {
     pub width: u32,
     /// Number of rows. At least 1.
     pub height: u32,
-    /// The texels. There are `width · height` of them.
+    /// The `width · height` texels.
     pub data: TexelData,
     /// Number of texels that are negative or not finite in the file. They are stored as 0.
     pub unusable: u64,
@@ -159,7 +159,7 @@ impl Texels {
         }
     }
 
-    /// Mean of all texels, weighted by alpha if there is any.
+    /// Mean of all texels, weighted by alpha if there is an alpha channel.
     pub fn mean(&self) -> Vec3 {
         if self.is_weighted() {
             let sum: DVec4 = (0..self.len()).map(|place| self.weighted(place).as_dvec4()).sum();

@@ -167,7 +167,7 @@ impl Color {
         }
     }
 
-    /// The color at texture coordinates. Adds to `lookups`.
+    /// The color at the given texture coordinates. Counts texture lookups in `lookups`.
     pub fn at(&self, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
         match self {
             Self::Constant(color) => *color,
@@ -180,15 +180,15 @@ impl Color {
 }
 
 impl Texture {
-    /// The linear value at texture coordinates. v = 0 is the bottom row. Non-finite coordinates are treated
-    /// as 0.
+    /// The linear value at the given texture coordinates. v = 0 is the bottom row. Non-finite coordinates are
+    /// treated as 0.
     pub fn lookup(&self, at: &TexturePoint) -> Vec3 {
         let tiles = self.tiles(at);
         let value = self.lookup_in_tiles(tiles, || self.mip_level(at));
         self.factor.map_or(value, |factor| factor.of(value))
     }
 
-    /// The value at tile coordinates. `level` is called if the filter uses mip levels.
+    /// The value at the given tile coordinates. `level` is called if the filter uses mip levels.
     #[inline]
     fn lookup_in_tiles(&self, tiles: DVec2, level: impl FnOnce() -> f32) -> Vec3 {
         let folded =
@@ -392,8 +392,8 @@ impl Texture {
         Some((of(number), of(number + 1), level - number as f32))
     }
 
-    /// The fraction of the footprint where the red channel is at least `cutoff`. It is 0 or 1 for lookups in
-    /// the original image. The mip levels must be computed from [`Texels::threshold`].
+    /// The fraction of the footprint where the red channel is at least `cutoff`. For lookups in the original
+    /// image, the fraction is 0 or 1. The mip levels must be computed from [`Texels::threshold`].
     pub fn coverage(&self, at: &TexturePoint, cutoff: f32) -> f32 {
         let tiles = self.tiles(at);
         let folded =
@@ -483,13 +483,13 @@ fn texel_indices(
     places
 }
 
-/// Width and height in texels.
+/// Width and height in texels, as integers.
 #[inline(always)]
 fn extent(texels: &Texels) -> [i32; 2] {
     [texels.width as i32, texels.height as i32]
 }
 
-/// Width and height in texels, as a vector.
+/// Width and height in texels, as a float vector.
 fn size(texels: &Texels) -> Vec2 {
     Vec2::new(texels.width as f32, texels.height as f32)
 }
@@ -514,7 +514,7 @@ impl Wrap {
         folded
     }
 
-    /// [`Wrap::index`] of `numbers` + `more`.
+    /// Wraps `numbers` + `more` with [`Wrap::index`].
     #[inline(always)]
     fn index_row(self, numbers: &[i32; PACKET_SIZE], more: i32, size: i32) -> [i32; PACKET_SIZE] {
         let mut indices = [0; PACKET_SIZE];

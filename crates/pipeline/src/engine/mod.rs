@@ -130,7 +130,7 @@ pub(super) struct Engine {
     pool: Option<Arc<ThreadPool>>,
     /// Assets of the last valid scene, which are watched while the scene file is broken.
     assets: Vec<FileRead>,
-    /// All files that must not be written: those of the last valid scene and any referenced since.
+    /// All files that must not be written: the files of the last valid scene and all files referenced since.
     inputs: Inputs,
     /// Whether the current scene file is invalid, in which case its referenced files are unknown.
     is_broken: bool,
@@ -147,7 +147,7 @@ struct Ready {
     parsed: Arc<Parsed>,
     plan: Plan,
     world: KeyedWorld,
-    /// Key of all surfaces and their coordinate origin.
+    /// Key of all surfaces, lights and textures. It does not depend on `origin`.
     surfaces: Key,
     origin: DVec3,
     /// Key of the film.
@@ -212,7 +212,7 @@ impl Engine {
         }
     }
 
-    /// Runs a request.
+    /// Runs a request and returns its outcome.
     fn outcome(
         &mut self,
         request: &Request,

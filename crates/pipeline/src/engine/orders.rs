@@ -9,7 +9,7 @@ use crate::queries::{Query, QueryContext};
 use crate::render::film_state::FilmState;
 use crate::sink::Sink;
 
-/// Why a render is interrupted.
+/// Reasons for interrupting a render.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Interruption {
     /// The user wants another image or none. The render will not be resumed.
@@ -30,7 +30,7 @@ pub(crate) trait Orders {
     fn take_preview(&self) -> Option<Option<PreviewSize>>;
     /// Takes the next query about the current image.
     fn take_query(&self) -> Option<Query>;
-    /// Why the cancelled render is being interrupted.
+    /// Returns why the cancelled render is being interrupted.
     fn interruption(&self) -> Interruption;
 }
 

@@ -26,7 +26,7 @@ pub struct Rendered {
     pub key: Key,
 }
 
-/// Why no image was rendered.
+/// Reasons why no image was rendered.
 #[derive(Clone, Debug)]
 pub enum Unrendered {
     /// The scene is invalid, or the work failed.

@@ -42,7 +42,7 @@ pub(super) struct OwnImage {
 }
 
 impl OwnImage {
-    /// Creates the image. `eye` is the scene's camera. `surfaces` and `meshes` are keys.
+    /// Computes the keys of the scene's own image. `eye` is the scene's camera. `surfaces` and `meshes` are keys.
     pub(super) fn new(
         (parsed, plan, eye): (&Arc<Parsed>, Plan, &RequestCamera),
         (surfaces, meshes): (&Key, &[Key]),
@@ -90,7 +90,7 @@ impl Engine {
     }
 
     /// Checks a request's memory use. If the request shows another image, the film of the scene's own image
-    /// counts too. If the two films do not both fit, the own film may be dropped, provided that its image has
+    /// also counts. If the two films do not both fit, the own film may be dropped, provided that its image has
     /// been written.
     ///
     /// # Errors
@@ -154,7 +154,7 @@ impl Engine {
     /// Writes the scene's own image if the current view is based on its finished film.
     ///
     /// # Errors
-    /// [`Stop::Cancelled`].
+    /// Returns [`Stop::Cancelled`] if the token is cancelled.
     pub(super) fn write_own(&mut self, sink: &Sink, token: &CancelToken) -> Result<StageResult<bool>, Stop> {
         let only_shown = || Ok(StageResult::skipped(false, reasons::PREVIEW_ONLY));
         if self.is_own_written() {
@@ -232,15 +232,15 @@ fn keeps(plan: &Plan) -> bool {
 /// Returns the plan for the scene's own image if the request shows another one.
 ///
 /// # Errors
-/// See [`plan`].
+/// Returns the errors of [`plan`].
 pub(super) fn own_image_plan(request: &Request, parsed: &Parsed) -> Result<Option<Plan>, Stop> {
     let plan = |own: &Overrides| plan(&parsed.loaded.scene, &request.scene, own);
     let own = request.own.as_deref().map(plan).transpose();
     own.map_err(|error| Stop::Failed(Failure::Scene(vec![*error])))
 }
 
-/// Returns which textures a request needs, including those of the scene's own image, because its film key
-/// depends on them.
+/// Returns which textures a request needs. Includes the textures of the scene's own image, because the key of
+/// its film depends on them.
 pub(super) fn needed_textures(plan: &Plan, own: Option<&Plan>) -> TextureNeeds {
     let shown = plan.settings.lookups();
     own.map_or(shown, |own| shown.or(own.settings.lookups()))

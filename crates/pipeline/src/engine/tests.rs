@@ -61,14 +61,9 @@ impl EngineFixture {
         let events = self.send();
         assert!(matches!(events.last(), Some(Event::Done { .. })), "{events:?}");
         let geometry = self.engine.accel.latest().expect("the geometry was built").clone();
-        let mesh = geometry.objects()[1].mesh().expect("the mesh comes second").tree.clone();
+        let mesh = geometry.objects()[1].mesh().expect("the second object is a mesh").tree.clone();
         let lights = self.engine.lights.latest().expect("the lights were collected").clone();
-        CreatedValues {
-            geometry,
-            mesh,
-            lights,
-            world: self.engine.world.latest().expect("it was made").clone(),
-        }
+        CreatedValues { geometry, mesh, lights, world: self.engine.world.latest().expect("a world").clone() }
     }
 
     /// Returns whether an edit kept the geometry, mesh, lights and world. Compares pointers, not values.
@@ -151,7 +146,7 @@ fn unchanged_textures_are_kept() {
         fs::write(fixture.folder.path().join("bark.ppm"), format!("P6\n1 1\n255\n{text}")).expect("written");
     };
     let texels = |fixture: &EngineFixture, name: &str| {
-        fixture.engine.textures.latest(&fixture.folder.path().join(name)).expect("it was read").clone()
+        fixture.engine.textures.latest(&fixture.folder.path().join(name)).expect("a loaded texture").clone()
     };
     write(&fixture, "xyz");
     fixture.request();
@@ -173,7 +168,7 @@ fn error_mentions_the_renamed_scene() {
             Event::Failed { failure: Failure::Scene(errors), .. } => errors.into_iter().next()?.help,
             _ => None,
         };
-        events.into_iter().find_map(of_scene).expect("an error with a way out")
+        events.into_iter().find_map(of_scene).expect("an error with a hint")
     };
     let found = help(fixture.send_unsaved());
     let is_same_text = |help: &str| help.contains(crate::scene::SAME_TEXT);

@@ -21,13 +21,13 @@ use crate::world::{GlassSolids, TextureNeeds};
 /// A valid scene and all files needed for its image.
 #[derive(Clone)]
 pub(super) struct LastValidScene {
-    /// Generation of the request that read it.
+    /// Generation of the request that read the scene.
     pub(super) generation: u64,
     pub(super) parsed: Arc<Parsed>,
     pub(super) meshes: Meshes,
     pub(super) bodies: Arc<GlassSolids>,
     pub(super) textures: Arc<Textures>,
-    /// The textures that were needed.
+    /// Textures that were needed when `textures` was loaded.
     pub(super) needed: NeededTextures,
 }
 
@@ -62,7 +62,7 @@ impl Engine {
         let is_it = |good: &&LastValidScene| good.parsed.loaded.path == newest.scene;
         let Some(good) = self.good.as_ref().filter(is_it).cloned() else { return Ok(None) };
         let request = Request { force: false, ..newest.clone() };
-        // Combine the scene and the request.
+        // Plan the request for the last valid scene.
         let (loaded, path) = (&good.parsed.loaded, &request.scene);
         let Ok(plan) = plan(&loaded.scene, path, &request.overrides) else { return Ok(None) };
         let own = own_image_plan(&request, &good.parsed)?;

@@ -62,7 +62,7 @@ pub(super) fn scene_text(
     let container = containers.open(path, &ignore_progress, token)?;
     let scene = container.scene(token)?;
     let Some(bounds) = scene.bounds else {
-        let reason = "its scene shows no faces".to_owned();
+        let reason = "its scene has no visible faces".to_owned();
         return Err(AssetError::Malformed { path: path.to_owned(), line: None, reason });
     };
     let mut writer = Writer {
@@ -211,7 +211,7 @@ impl Writer<'_> {
         }
     }
 
-    /// Writes `scale` and `translate` if they can represent the placement, or `matrix` otherwise.
+    /// Writes the placement as `scale` and `translate` if possible, and as `matrix` if not.
     fn write_placement(&mut self, linear: &DMat3, translate: DVec3) {
         let scale = DVec3::new(linear.x_axis.x, linear.y_axis.y, linear.z_axis.z);
         if *linear == DMat3::from_diagonal(scale) {

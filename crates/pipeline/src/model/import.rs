@@ -27,7 +27,7 @@ pub struct Imported {
     pub notes: Vec<String>,
 }
 
-/// Why a file cannot be imported.
+/// Reasons why a file cannot be imported.
 #[derive(Debug)]
 pub enum ImportError {
     /// The file or the command line is invalid.
@@ -85,8 +85,8 @@ fn create_thread_pool() -> Result<ThreadPool, String> {
     ThreadPoolBuilder::new().num_threads(core_count()).build().map_err(|error| error.to_string())
 }
 
-/// Rejects a scene that `glimt check` would reject. Checks the text rendered by `glimt MODEL` because the
-/// files it references exist.
+/// Rejects a scene that `glimt check` would reject. Checks the text that `glimt MODEL` renders, because the
+/// files referenced by that text exist.
 fn check_scene(path: &Path, containers: &Containers, token: &CancelToken) -> Result<(), AssetError> {
     let shown =
         super::gltf::scene_text(path, (ModelView::default(), &ExportNaming::Inside), containers, token)?;

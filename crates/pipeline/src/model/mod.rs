@@ -23,7 +23,7 @@ use crate::math::DVec3;
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::fingerprint::Fingerprint;
 
-/// How to show a model.
+/// View of a model, as requested on the command line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ModelView {
     /// Side facing the camera. `None` uses the camera from the file, or [`Side::Iso`] if there is none.
@@ -229,7 +229,7 @@ fn write_ground(toml: &mut Toml, names: &mut UniqueNames, [least, greatest]: [DV
     toml.key("material", format!("\"{name}\""));
 }
 
-/// Set of used names.
+/// Names already used in a generated scene.
 #[derive(Debug, Default)]
 struct UniqueNames(HashSet<String>);
 

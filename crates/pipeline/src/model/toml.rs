@@ -120,7 +120,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_are_short_toml() {
+    fn values_are_formatted_concisely() {
         for (value, text) in [
             (0.0, "0"),
             (-0.0, "0"),
@@ -144,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn comments_stay_comments() {
+    fn comments_are_wrapped_and_sanitized() {
         let mut toml = Toml::default();
         toml.comment(&format!("a\n[camera]\u{7} {}", "word ".repeat(40)));
         let text = toml.finish();

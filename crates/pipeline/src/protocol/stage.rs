@@ -69,7 +69,7 @@ pub enum Status {
 pub struct StageReport {
     /// The stage.
     pub name: Stage,
-    /// Its status.
+    /// Status of the stage.
     pub status: Status,
     /// Wall-clock time of the stage.
     pub seconds: f64,

@@ -10,7 +10,7 @@ const MAX_KEPT_BYTES: u64 = 256 << 20;
 #[derive(Debug)]
 pub(crate) struct FilmCache {
     current: Option<FilmState>,
-    /// Least recently used first.
+    /// Cached films, least recently used first.
     kept: Vec<FilmState>,
     /// Key of the pinned film, which is kept regardless of its size.
     pinned: Option<Key>,
@@ -91,7 +91,7 @@ impl FilmCache {
         Ok(self.current.insert(state))
     }
 
-    /// Returns the number of films.
+    /// Returns the number of films in memory.
     pub(crate) fn count(&self) -> usize {
         self.kept.len() + usize::from(self.current.is_some())
     }
@@ -174,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn least_recently_used_is_dropped_first() {
+    fn least_recently_used_film_is_dropped_first() {
         let room_for_two = 2 * state("a").memory_bytes();
         let mut films = films(&["a", "b", "c"], room_for_two);
         assert_eq!(films.count(), 3);

@@ -342,8 +342,8 @@ impl FilmState {
         seconds + others * if worth > 0.0 { known / worth } else { 1.0 }
     }
 
-    /// Returns the maximum over all pixels of the current and of the expected final sample count. These are
-    /// also the current and final numbers of photon passes.
+    /// Returns the highest current and the highest expected final sample count of any pixel. These are also the
+    /// current and final numbers of photon passes.
     pub(crate) fn photon_passes(&self, most: u32) -> [u32; 2] {
         let most_of = |samples: &dyn Fn(usize, usize) -> u32| {
             self.halves().map(|(cell, half)| samples(cell, half)).max().unwrap_or(0)
@@ -437,7 +437,7 @@ mod tests {
             [state.cpu_seconds(), state.remaining_cpu_seconds(8, in_one)]
                 .map(|seconds| (seconds * 1e6).round() * 1e-6)
         };
-        // The second tile's cost is unknown, so it is assumed to equal the first's.
+        // The second tile's cost is unknown, so it is assumed to equal the first tile's.
         assert_eq!(noted(0, 0..4, 1.0), [1.0, 3.0]);
         assert_eq!(noted(1, 0..2, 10.0), [11.0, 31.0]);
         assert_eq!(noted(1, 2..8, 30.0), [41.0, 1.0]);

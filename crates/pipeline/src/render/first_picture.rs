@@ -88,7 +88,7 @@ impl<'a> FirstPictures<'a> {
     /// would take almost as long as a full pass. Does not change the film. Calls `tick` regularly.
     ///
     /// # Errors
-    /// [`Stop::Cancelled`].
+    /// Returns [`Stop::Cancelled`] if the token is cancelled.
     pub(crate) fn show_without_photons(
         &self,
         screen: PreviewTarget<'_>,

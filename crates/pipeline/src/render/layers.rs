@@ -63,7 +63,7 @@ fn variance(state: &FilmState) -> RadianceImage {
     image
 }
 
-/// Returns the progress fractions at the start and end of a layer. `None` stands for the image, which
+/// Returns the progress fractions at the start and end of a layer. `None` means the image, which
 /// precedes layer 0.
 pub(crate) fn progress_range(layers: &[OutputLayer], number: Option<usize>) -> [f64; 2] {
     let work = |layers: &[OutputLayer]| layers.iter().map(|layer| layer.relative_cost()).sum::<f64>();
@@ -77,7 +77,7 @@ pub(crate) fn progress_range(layers: &[OutputLayer], number: Option<usize>) -> [
 /// Renders the layers of a finished film, in order.
 ///
 /// # Errors
-/// [`Stop::Cancelled`], or there is not enough memory for a film.
+/// The token is cancelled, or there is not enough memory for a film.
 pub(crate) fn render_layers(
     state: &FilmState,
     rendering: &RenderStageInputs<'_>,

@@ -30,7 +30,7 @@ const LEAST_BRIGHTNESS: f64 = 0.01;
 /// Maximum number of samples for both halves of each cell.
 #[derive(Debug)]
 pub(crate) struct Goals {
-    /// The goals. [`u32::MAX`] while undecided.
+    /// Goals of both halves of each cell. [`u32::MAX`] while undecided.
     pub(super) decided: Vec<[u32; 2]>,
     /// Sample count at which each tile was last judged. Tiles are judged only once per sample count.
     pub(super) judged: Vec<u32>,
@@ -140,7 +140,7 @@ impl Goals {
     }
 }
 
-/// Noise on which goals are based.
+/// Noise measurements on which goals are based.
 #[derive(Debug)]
 pub(crate) struct Judgement {
     /// Noise of each tile. `None` for tiles that have goals or a different sample count.
@@ -162,8 +162,8 @@ impl TileNoise {
     fn of(film: &Film, tile: usize) -> Self {
         let noise = |half| {
             let noise = film.tile_noise(tile, half)?;
-            // Use an upper bound of the noise. If it comes from a few bright pixels, others may not have been
-            // sampled yet.
+            // Use an upper bound on the noise. If it comes from a few bright samples, other bright samples may not
+            // have been taken yet.
             Some(CellHalfNoise {
                 variance: noise.variance * (1.0 + film.tile_variance_uncertainty(tile, half)),
                 ..noise
@@ -176,7 +176,7 @@ impl TileNoise {
 /// Noise target and its reference brightness.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct NoiseTarget {
-    /// Noise target.
+    /// Target for the relative noise.
     pub(crate) error: f64,
     /// Mean luminance of the image.
     brightness: f64,
@@ -192,8 +192,8 @@ impl NoiseTarget {
         }
         let part = AIM * self.error / relative;
         let doubled = noise.samples.saturating_mul(2);
-        // Treat samples up to the next power of two as independent. Once the power of two is reached, all of
-        // them reduce the noise more.
+        // Treat samples up to the next power of two as independent. They only reduce the noise faster once the
+        // power of two is reached.
         if 1.0 / (part * part) <= libm::exp2(noise.power) {
             return samples_to_reduce_error(1.0, part, noise.samples).min(doubled);
         }

@@ -110,7 +110,7 @@ impl<'a> Scheduler<'a> {
     /// Renders the film until it reaches the requested number of samples or the noise target.
     ///
     /// # Errors
-    /// [`Stop::Cancelled`]. The film keeps its samples.
+    /// Returns [`Stop::Cancelled`] if the token is cancelled. The film keeps its samples.
     pub(crate) fn run(&mut self) -> Result<(), Stop> {
         self.state.is_kept = false;
         let ran = self.run_passes_to_end();
@@ -134,7 +134,7 @@ impl<'a> Scheduler<'a> {
         self.state.render_seconds + self.clock.seconds(self.rendering.tracer.token.is_paused())
     }
 
-    /// Returns the render time in seconds, including that of an earlier process.
+    /// Returns the render time in seconds, including the time of the process whose checkpoint was resumed.
     pub(crate) fn seconds(&mut self) -> f64 {
         self.seconds_before + self.clock.seconds(self.rendering.tracer.token.is_paused())
     }

@@ -58,7 +58,7 @@ pub(crate) struct AccelResult {
 /// Builds all missing trees, using coordinates relative to `origin`. `scene` includes the overrides.
 ///
 /// # Errors
-/// [`Stop::Cancelled`].
+/// Returns [`Stop::Cancelled`] if the token is cancelled.
 pub(crate) fn accel(
     scene: &Scene,
     (of, origin): (&Referents<'_>, DVec3),

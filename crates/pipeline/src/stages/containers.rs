@@ -22,7 +22,7 @@ pub(crate) struct Containers {
 }
 
 impl Containers {
-    /// Returns an open file. Opens it if necessary.
+    /// Returns a glTF file, opening it if necessary.
     ///
     /// # Errors
     /// See [`Container::open`]. The next call tries again.

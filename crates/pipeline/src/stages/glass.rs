@@ -21,7 +21,7 @@ const LACKS: &str = "glass refracts where a ray enters and leaves it; rays throu
 /// Finds the glass solids, or reuses them if shapes and materials are unchanged. Warns about open solids.
 ///
 /// # Errors
-/// [`Stop::Cancelled`].
+/// Returns [`Stop::Cancelled`] if the token is cancelled.
 pub(crate) fn glass(
     loaded: &Loaded,
     meshes: &Meshes,
@@ -258,7 +258,7 @@ mod tests {
         };
         let text = "[[mesh]]\nname = 'drop'\nfile = 'a.ply'\nmaterial = 'a'";
         assert_eq!(messages(text, "glass", of(&all)), [""; 0]);
-        // The area of the missing face is 1/2, and that of the whole mesh is (3 + √3)/2.
+        // The area of the missing face is 1/2, and the area of the whole mesh is (3 + √3)/2.
         let open = "glass mesh \"drop\" is not closed: 3 edges without a neighbor made of the same glass, 27 % of its surface missing";
         assert_eq!(messages(text, "glass", of(&all[1..])), [open]);
         assert_eq!(messages(text, "phong", of(&all[1..])), [""; 0]);

@@ -14,7 +14,7 @@ use crate::scene::description::{Scene, TextureRole};
 use crate::scene::fingerprint::{Key, Referents};
 use crate::world::{self, Geometry, TextureSource};
 
-/// Importance distribution of the environment map, independent of the map's rotation.
+/// Cache of the environment map's importance distribution, which does not depend on the map's rotation.
 pub(crate) type SkyMemo = Memo<Option<Arc<EnvironmentMap>>>;
 
 /// Collects the lights, or reuses them if they are unchanged.

@@ -44,7 +44,7 @@ pub(crate) type Meshes = Vec<Arc<CachedMesh>>;
 /// Loads the scene's meshes. Tries all files and adds errors to the findings.
 ///
 /// # Errors
-/// [`Stop::Cancelled`], or there is not enough memory.
+/// The token is cancelled, or there is not enough memory.
 pub(crate) fn meshes(
     loaded: &Loaded,
     cache: &mut NamedCache<MeshName, CachedMesh>,
@@ -61,8 +61,7 @@ pub(crate) fn meshes(
             let name = mesh_name(file);
             let content = reading.contents.read(&file.value, reading.token)?;
             if let Some(last) = cache.latest(&name) {
-                // The mesh probably still references the same files as last time. Hash these before they are
-                // read.
+                // The mesh probably still references the same files. Hash those files before they are read.
                 companions(&last.companions, reading)?;
             }
             Ok((content, cache.get(&name, file_key(file, content))))

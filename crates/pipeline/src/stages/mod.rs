@@ -29,7 +29,7 @@ use crate::control::{CancelToken, Cancelled};
 use crate::scene::Loaded;
 use crate::scene::diagnostic::{Diagnostic, Severity};
 
-/// Why a request ended early.
+/// Reasons why a request ended early.
 #[derive(Debug)]
 pub(super) enum Stop {
     Cancelled,

@@ -23,7 +23,7 @@ use crate::scene::fingerprint::{Fingerprint, Key};
 use crate::scene::is_model;
 use crate::scene::sanitize::visible;
 
-/// A valid scene.
+/// A valid scene and the files it references.
 #[derive(Debug)]
 pub(crate) struct Parsed {
     pub(crate) loaded: Arc<scene::Loaded>,
@@ -37,14 +37,14 @@ pub(crate) struct Parsed {
     orbiter_content: Option<Content>,
 }
 
-/// What to parse and how.
+/// Scene to parse: path, overrides, and the view if it is a model.
 #[derive(Clone, Copy)]
 pub(crate) struct SceneSource<'a> {
     /// Path of a scene file or model.
     pub(crate) path: &'a Path,
     /// Overrides of scene keys from the command line.
     pub(crate) sets: &'a [String],
-    /// How to show a model.
+    /// View of a model.
     pub(crate) show: ModelView,
 }
 
@@ -82,7 +82,7 @@ fn scene_error(path: &Path, message: String) -> Stop {
     Stop::Failed(Failure::Scene(vec![file_diagnostic(path, Severity::Error, message)]))
 }
 
-/// Creates a diagnostic about a whole file.
+/// Creates a diagnostic about an entire file.
 fn file_diagnostic(path: &Path, severity: Severity, message: String) -> Diagnostic {
     Diagnostic { severity, message, path: path.to_owned(), place: None, help: None }
 }

@@ -52,7 +52,7 @@ pub(crate) struct PhotonStore {
     photons: Photons,
     /// Cached passes, starting with the first.
     kept: RefCell<Vec<Arc<PhotonPass>>>,
-    /// Counts of the current request.
+    /// Photon counts of the current request.
     sent: Cell<PhotonCounts>,
 }
 
@@ -82,7 +82,7 @@ impl PhotonStore {
         ((MAX_ALIVE_BYTES / size) as u32).clamp(1, MAX_ALIVE)
     }
 
-    /// Average seconds to trace a pass. 0 if none was traced.
+    /// Average seconds to trace a pass. 0 if no pass was traced.
     pub(crate) fn seconds_of_pass(&self) -> f64 {
         let PhotonCounts { passes, seconds, .. } = self.sent.get();
         if self.emits_photons() && passes > 0 { seconds / passes as f64 } else { 0.0 }
@@ -91,7 +91,7 @@ impl PhotonStore {
     /// Returns the maps for the given samples. Calls `tick` regularly.
     ///
     /// # Errors
-    /// [`Cancelled`].
+    /// Returns [`Cancelled`] if the token is cancelled.
     pub(crate) fn maps(
         &self,
         samples: Range<u32>,
@@ -188,7 +188,7 @@ fn run_with_ticks<T: Send>(
 /// from the scene. Calls `tick` regularly, and calls `before` once before tracing any photons.
 ///
 /// # Errors
-/// [`Stop::Cancelled`], or an error from `before`.
+/// The token is cancelled, or `before` fails.
 pub(crate) fn photons(
     (enabled, wanted): (bool, Option<bool>),
     key: impl FnOnce(PhotonSettings) -> Key,

@@ -18,7 +18,7 @@ use crate::scene::fingerprint::Key;
 /// Renders the film with this key until it has the requested number of samples or reaches the noise target.
 ///
 /// # Errors
-/// [`Stop::Cancelled`], or there is not enough memory for the film. The film keeps its samples.
+/// The token is cancelled, or there is not enough memory for the film. The film keeps its samples.
 pub(crate) fn render(
     key: Key,
     films: &mut FilmCache,

@@ -88,7 +88,7 @@ impl TextureCache {
     }
 }
 
-/// The needed textures, except those that failed to load.
+/// The loaded textures of a scene. Excludes textures that failed to load.
 #[derive(Debug, Default)]
 pub(crate) struct Textures {
     pub(crate) images: Images,
@@ -154,7 +154,7 @@ struct CachedTexture {
 /// Loads the needed textures. Tries all files and adds errors to the findings.
 ///
 /// # Errors
-/// [`Stop::Cancelled`], or there is not enough memory.
+/// The token is cancelled, or there is not enough memory.
 pub(crate) fn textures(
     loaded: &Loaded,
     needed: &NeededTextures,
@@ -296,7 +296,7 @@ fn substitute_texture(
     images.insert(one.source.clone(), Image { texels: Arc::new(texels), mipmaps: None });
 }
 
-/// Warns about unusable pixels.
+/// Warns about pixels that are negative, not finite or too large.
 fn warn_about_unusable_pixels(
     loaded: &Loaded,
     image: &TextureRequest<'_>,
@@ -414,8 +414,7 @@ fn images<'a>(
     Ok(images)
 }
 
-/// Loads all images. Returns an error for each image whose size, added to that of the images before it,
-/// exceeds `most_bytes`.
+/// Loads all images. Returns an error for each image that would raise the total size above `most_bytes`.
 fn load_all(
     images: &[TextureRequest<'_>],
     most_bytes: u64,
@@ -465,7 +464,7 @@ fn over_budget(sizes: &[u64], most_bytes: u64) -> Vec<Option<String>> {
     sizes.iter().map(check).collect()
 }
 
-/// Content of an image's file, and the image file referenced if it is a glTF file.
+/// Content of a texture's file, and the image file that it references if it is a glTF file.
 type TextureContents = (Content, Option<FileRead>);
 
 /// An image, its mipmaps, and whether both were cached.

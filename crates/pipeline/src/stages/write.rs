@@ -144,7 +144,7 @@ pub(crate) fn write_if_wanted(
 /// events. Returns whether all files are now up to date.
 ///
 /// # Errors
-/// [`Stop::Cancelled`], or if `is_must`, the last failure to write a file.
+/// Returns [`Stop::Cancelled`] if the token is cancelled. If `is_must`, returns the last failure to write a file.
 fn write(
     state: &FilmState,
     to: Destination<'_>,
@@ -239,7 +239,7 @@ pub(crate) struct TurntableFrames(Vec<(Picture, SampleStats)>);
 /// were written.
 ///
 /// # Errors
-/// [`Stop::Cancelled`], or a file could not be written.
+/// The token is cancelled, or a file could not be written.
 pub(crate) fn write_animation(
     state: &FilmState,
     to: Destination<'_>,

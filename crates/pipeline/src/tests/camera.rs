@@ -6,7 +6,7 @@ use crate::messages;
 use crate::protocol::{CameraEdit, ImagePosition, MovedCamera, Picked, SavedCamera};
 use crate::scene::description::{CameraChange, Pose, Viewpoint};
 
-/// A mirror and photons.
+/// Tables that add a mirror and photons to a scene.
 const PHOTONS: &str = "[[quad]]\ncorner = [-2, 0, -2]\nu = [4, 0, 0]\nv = [0, 4, 0]\nmaterial = \"steel\"\n\
     [materials.steel]\ntype = \"mirror\"\n[photons]\nenabled = true\ncount = 500\n";
 
@@ -223,7 +223,7 @@ fn saving_the_camera_keeps_links_and_permissions() {
     let real = bench.path("real.toml");
     fs::rename(bench.path("scene.toml"), &real).expect("renamed");
     symlink("real.toml", bench.path("scene.toml")).expect("a link");
-    fs::set_permissions(&real, fs::Permissions::from_mode(0o640)).expect("permitted");
+    fs::set_permissions(&real, fs::Permissions::from_mode(0o640)).expect("permissions set");
     bench.overrides.camera = moved();
     let camera = camera(&mut bench);
     assert!(keep(&mut bench, camera).expect("written").is_own);
@@ -256,7 +256,7 @@ fn camera_is_not_saved_if_metadata_would_be_lost() {
         } else {
             let mut permissions = fs::metadata(&path).expect("a file").permissions();
             permissions.set_readonly(true);
-            fs::set_permissions(path, permissions).expect("permitted");
+            fs::set_permissions(path, permissions).expect("permissions set");
         }
         bench.overrides.camera = moved();
         let camera = camera(&mut bench);

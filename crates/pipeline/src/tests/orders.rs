@@ -279,10 +279,10 @@ fn first_region_is_rendered_before_the_rest() {
     bench.preview = Some(PreviewSize { width: 256, height: 256, around: None });
     bench.first = Some(Section { left: 0.0, top: 0.0, width: 0.1, height: 0.1 });
     let of = bench.send();
-    // The corner tile, which usually comes last, must be complete before the middle tile.
+    // The corner tile, which is usually rendered last, must be complete before the middle tile.
     loop {
         let event = bench.next();
-        assert!(!matches!(event, Event::Done { .. }), "not seen");
+        assert!(!matches!(event, Event::Done { .. }), "the corner tile was not rendered first");
         let latest = bench.worker.previews.lock().expect("not poisoned").clone();
         let Some(LatestPreview { picture, range: Some([_, most]), .. }) = latest else { continue };
         let value = |x: usize, y: usize| f32::from(picture.pixels[y * 256 + x][0]) / 255.0 * most;
@@ -562,7 +562,9 @@ fn paused_time_is_not_counted() {
     bench.worker.send(Command::Pause(true));
     std::thread::sleep(Duration::from_secs_f64(HOLD));
     bench.worker.send(Command::Pause(false));
-    let Some(Event::Done { report, .. }) = bench.until_end(of).pop() else { panic!("not finished") };
+    let Some(Event::Done { report, .. }) = bench.until_end(of).pop() else {
+        panic!("expected the render to finish")
+    };
     let most = begin.elapsed().as_secs_f64() - HOLD;
     let render = report.stages[Stage::Render as usize].seconds;
     assert!(render > 0.005 && render <= most && report.seconds <= most, "{render} {} {most}", report.seconds);
@@ -601,7 +603,7 @@ fn continued_render_reports_total_time() {
     bench.edit("samples = ", "samples = 64");
     let of = bench.send();
     let mut events = bench.until_end(of);
-    let Some(Event::Done { report, .. }) = events.pop() else { panic!("not finished") };
+    let Some(Event::Done { report, .. }) = events.pop() else { panic!("expected the render to finish") };
     let stage = report.stages[Stage::Render as usize].seconds;
     let earlier = report.image.render_seconds - stage;
     assert!(earlier > 0.005, "{} {stage}", report.image.render_seconds);

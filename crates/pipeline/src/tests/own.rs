@@ -104,7 +104,7 @@ fn write_command_saves_the_shown_image() {
     let by_hand = |event: &Event| matches!(event, Event::Written { is_own: false, .. });
     assert!(events.iter().any(by_hand), "{events:?}");
     assert_eq!(states(&events).last(), Some(&OwnImageState::Begun { is_rendering: false }));
-    assert!(keys.0.picture() != own, "without shadows");
+    assert!(keys.0.picture() != own, "the image should have no shadows");
     let text = fs::read_to_string(&report).expect("a report");
     assert!(text.contains("\"shadows\": \"off\"") && text.contains("out.ppm"), "{text}");
     let (_, events) = (keys.0.send(), keys.0.until_end(keys.0.generation));

@@ -37,7 +37,10 @@ fn orders_are_handled_during_first_photon_pass() {
     while !matches!(bench.next(), Event::Picked { picked, .. } if picked.thing.is_some()) {}
     bench.worker.send(Command::Pause(false));
     let events = bench.until_end(of);
-    assert!(!events.iter().any(|event| matches!(event, Event::WritePostponed { .. })), "reported once");
+    assert!(
+        !events.iter().any(|event| matches!(event, Event::WritePostponed { .. })),
+        "the postponed write should be reported only once"
+    );
     assert!(events.iter().any(|event| matches!(event, Event::Written { .. })));
 }
 
@@ -134,7 +137,7 @@ fn preview_without_photons_does_not_affect_film() {
 fn maps_are_kept_while_there_is_room() {
     const MAX_BYTES: u64 = 128 << 20;
     let mut bench = Bench::new(&wrapped(1_000_000).replace("samples = 4", "samples = 8"));
-    let report = bench.done().0.photons.expect("they are on");
+    let report = bench.done().0.photons.expect("a photon report");
     assert_eq!(report.passes, 8);
     let of_pass = report.used_memory_bytes;
     assert!(8 * of_pass > MAX_BYTES, "not all passes should fit: {of_pass} bytes per pass");
@@ -142,7 +145,7 @@ fn maps_are_kept_while_there_is_room() {
     assert!(kept <= MAX_BYTES && kept + of_pass > MAX_BYTES, "{kept} bytes kept, {of_pass} per pass");
 }
 
-/// Whether the following kernel has received photons.
+/// Whether the kernel [`black`] has received photons.
 static WITH: AtomicBool = AtomicBool::new(false);
 
 /// Renders all samples black, with or without photons.

@@ -140,7 +140,7 @@ fn preview_and_image_share_the_depth_range() {
     for (width, around) in [(7, None), (40, None), (6, Some(ImagePosition { x: 0.5, y: 0.5 }))] {
         bench.preview = Some(PreviewSize { width, height: 30, around });
         let (report, _) = bench.done();
-        let shown = bench.worker.previews.lock().expect("whole").take().expect("an image");
+        let shown = bench.worker.previews.lock().expect("not poisoned").take().expect("an image");
         assert!(report.image.range.is_some());
         assert_eq!(shown.range, report.image.range, "{width}");
     }

@@ -96,7 +96,7 @@ fn bump_maps_rerun_only_the_render() {
 }
 
 #[test]
-fn change_of_file_referenced_by_mesh_reloads_it() {
+fn companion_file_change_reloads_the_mesh() {
     let mut bench = Bench::new(SCENE);
     bench.write("one.mtl", "newmtl a\nKd 1 0 0\n");
     bench.write("one.obj", &format!("mtllib one.mtl\n{OBJ}"));
@@ -318,7 +318,7 @@ fn photons_are_retraced_only_if_affected() {
     let steel = "[materials.steel]\ntype = \"mirror\"\n";
     let on = "[photons]\nenabled = true\ncount = 500\n";
     let mut bench = Bench::new(&format!("{text}{mirror}{steel}{on}"));
-    let of = |report: &Report| report.photons.expect("they are on");
+    let of = |report: &Report| report.photons.expect("a photon report");
     let report = bench.done().0;
     assert_statuses(&report, "dddddddd");
     assert!(report.settings.photons);
@@ -388,7 +388,7 @@ fn all_broken_assets_are_reported_and_watched() {
     let of = bench.send();
     let mut events = bench.until_end(of);
     let Some(Event::Failed { failure: Failure::Scene(errors), .. }) = events.pop() else {
-        panic!("no failure")
+        panic!("expected a failure")
     };
     for name in ["one.obj", "skin.ppm"] {
         let error = errors
@@ -402,7 +402,7 @@ fn all_broken_assets_are_reported_and_watched() {
         );
         assert_eq!(error.path, bench.path("scene.toml"));
     }
-    let Some(Event::Files { files, .. }) = events.pop() else { panic!("no files") };
+    let Some(Event::Files { files, .. }) = events.pop() else { panic!("expected files") };
     for name in ["scene.toml", "one.obj", "skin.ppm"] {
         assert!(files.iter().any(|file| file.path == bench.path(name)), "{name}");
     }

@@ -50,7 +50,7 @@ fn image_is_shown_despite_conflict() {
         "the conflict should still be reported at the end"
     );
     bench.worker.send(Command::Write);
-    assert!(matches!(bench.next(), Event::Refused { .. }), "a write order should be refused too");
+    assert!(matches!(bench.next(), Event::Refused { .. }), "a write order should also be refused");
     assert!(!good.exists() && !report.exists(), "nothing should be written");
     // An edit resolves the conflict.
     bench.edit("[textures.skin]\nfile = \"skin.ppm\"\n", "");
@@ -143,7 +143,7 @@ fn link_change_during_render_is_detected() {
     symlink("elsewhere.ppm", &link).expect("a link");
     *LINK.lock().expect("not poisoned") = Some(link);
     let before = fs::read(bench.path("skin.ppm")).expect("a texture");
-    let Failure::Scene(errors) = bench.failed() else { panic!("a conflict") };
+    let Failure::Scene(errors) = bench.failed() else { panic!("expected a conflict") };
     assert!(errors[0].message.contains("texture `skin`"), "{errors:?}");
     assert!(IS_LINKED.load(Ordering::SeqCst), "the link should change during the render");
     assert_eq!(fs::read(bench.path("skin.ppm")).expect("a texture"), before);
@@ -163,9 +163,9 @@ fn broken_scene_only_replaces_own_outputs() {
     assert!(matches!(bench.next(), Event::WriteDone { .. }));
     fs::write(&output, "another image").expect("written");
     bench.worker.send(Command::Write);
-    let Event::WriteFailed { message, .. } = bench.next() else { panic!("a refusal") };
+    let Event::WriteFailed { message, .. } = bench.next() else { panic!("expected a refusal") };
     assert!(message.contains("out.ppm") && message.contains(crate::messages::SCENE_HAS_ERRORS), "{message}");
-    assert_eq!(fs::read(&output).expect("there"), b"another image");
+    assert_eq!(fs::read(&output).expect("the output file"), b"another image");
     // A missing file may be written.
     fs::remove_file(&output).expect("removed");
     bench.worker.send(Command::Write);
@@ -198,7 +198,7 @@ fn checkpoint_does_not_replace_finished_part() {
 fn report_cannot_replace_a_checkpoint() {
     let mut bench = Bench::with(SCENE, unused);
     bench.overrides.report = Some(bench.path("out.ppm.checkpoint"));
-    let Failure::Scene(errors) = bench.failed() else { panic!("a conflict") };
+    let Failure::Scene(errors) = bench.failed() else { panic!("expected a conflict") };
     assert!(errors[0].message.contains("out.ppm.checkpoint"), "{errors:?}");
 }
 
@@ -208,11 +208,11 @@ fn unwritable_later_frame_fails_before_rendering() {
     bench.overrides.outputs = vec![bench.path("a_##.ppm")];
     bench.overrides.turn = Some(Turn { number: 0, of: 12 });
     fs::create_dir(bench.path("a_09.ppm")).expect("a folder");
-    let Failure::Work(message) = bench.failed() else { panic!("a target") };
+    let Failure::Work(message) = bench.failed() else { panic!("expected an output error") };
     assert!(message.contains("a_09.ppm") && message.contains("directory"), "{message}");
 }
 
-/// Panics. For tests that must not start rendering.
+/// Panics. Kernel for tests that must not start rendering.
 fn unused(
     _: Option<&PhotonMaps>,
     _: &World,

@@ -86,8 +86,8 @@ impl ChangeTracker {
         self.pending = None;
     }
 
-    /// Whether it is too early to report a change found because of hints. `is_missing` tells whether a file
-    /// is missing or empty, and `moves` whether the previous check found a different change.
+    /// Whether it is too early to report a change that was found because of hints. `is_missing` is true if a file
+    /// is missing or empty, and `moves` is true if the previous check found a different change.
     pub(super) fn is_early(&mut self, is_missing: bool, moves: bool, now: Instant) -> bool {
         let Some(pending) = &mut self.pending else { return false };
         let due = if is_missing {

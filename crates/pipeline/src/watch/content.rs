@@ -17,7 +17,7 @@ use crate::system::file::{self, FileKind, FileStamp};
 pub struct FileRead {
     /// Path of the file.
     pub path: PathBuf,
-    /// The content that was decoded. If the file was not decoded, its content at about that time.
+    /// The content that was decoded, or the content during the request if the file was not decoded.
     pub content: Content,
 }
 
@@ -32,7 +32,7 @@ pub enum Content {
     Hash([u8; 32]),
 }
 
-/// Why a file cannot be read.
+/// Reasons why a file cannot be read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Obstacle {
     /// A directory.
@@ -73,7 +73,7 @@ pub struct Contents {
     /// Files that have been hashed.
     #[cfg(test)]
     pub(crate) hashed: Mutex<Vec<PathBuf>>,
-    /// A file and the bytes to write to it, right after the file that is the key has been hashed.
+    /// For each path, another file and the bytes to write to it right after the file at the path has been hashed.
     #[cfg(test)]
     pub(crate) replacements: Mutex<HashMap<PathBuf, (PathBuf, Vec<u8>)>>,
 }
@@ -103,7 +103,7 @@ impl Snapshot {
     /// Returns a file's content as first seen by this request.
     ///
     /// # Errors
-    /// [`Cancelled`].
+    /// Returns [`Cancelled`] if the token is cancelled.
     pub(crate) fn read(&self, path: &Path, token: &CancelToken) -> Result<Content, Cancelled> {
         if let Some(content) = self.known(path) {
             return Ok(content);
@@ -131,7 +131,7 @@ impl Snapshot {
     /// Returns a file referenced by another file, with the content that was decoded.
     ///
     /// # Errors
-    /// [`Cancelled`].
+    /// Returns [`Cancelled`] if the token is cancelled.
     pub(crate) fn of_companion(
         &self,
         Companion { path, hash, stamp }: &Companion,
@@ -144,12 +144,12 @@ impl Snapshot {
         Ok(FileRead { path: path.clone(), content })
     }
 
-    /// Records a change if a file now has another content than when this request first saw it. Must be called
-    /// after all files are loaded: otherwise, a request could combine files of several versions, each of them
-    /// intact. A file that has been removed since has not changed.
+    /// Records a change if a file's content differs from the content that this request saw first. Must be called
+    /// after all files are loaded. Otherwise, a request could combine different versions of several files. A
+    /// removed file does not count as changed.
     ///
     /// # Errors
-    /// [`Cancelled`].
+    /// Returns [`Cancelled`] if the token is cancelled.
     pub(crate) fn verify(&self, token: &CancelToken) -> Result<(), Cancelled> {
         let seen: Vec<_> = self.seen().iter().map(|(path, seen)| (path.clone(), *seen)).collect();
         for (path, Seen { content, stamp }) in seen {
@@ -200,7 +200,7 @@ impl Contents {
     /// Returns the current content of a file.
     ///
     /// # Errors
-    /// [`Cancelled`], checked once per mebibyte.
+    /// Returns [`Cancelled`] if the token is cancelled. The token is checked once per mebibyte.
     pub fn read(&self, path: &Path, token: &CancelToken) -> Result<Content, Cancelled> {
         token.check()?;
         let now = SystemTime::now();
@@ -334,7 +334,7 @@ mod tests {
     }
 
     #[test]
-    fn files_of_several_versions_are_detected() {
+    fn mixed_file_versions_are_detected() {
         let folder = tempfile::tempdir().expect("a scratch folder");
         let token = CancelToken::new();
         for version in ["old", "new"] {
@@ -374,7 +374,7 @@ mod tests {
             snapshot.read(&texture, &token).expect("not cancelled");
             assert_eq!(verified(&snapshot), Some(if is_decoded { library.clone() } else { mesh.clone() }));
         }
-        // Replacement by the same content and removal are not changes.
+        // Neither replacement with the same content nor removal is a change.
         show("old");
         let snapshot = Snapshot::of(Arc::default());
         snapshot.read(&same, &token).expect("not cancelled");

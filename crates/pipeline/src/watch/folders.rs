@@ -29,7 +29,7 @@ pub(super) struct WatchedFolders {
     /// `None` if notifications are disabled or unavailable.
     watcher: Option<RecommendedWatcher>,
     names: Arc<Mutex<HashSet<OsString>>>,
-    /// Folders to watch, and whether each is on a network file system. Those do not send notifications.
+    /// Folders to watch, and whether each is on a network file system, which sends no notifications.
     wanted: HashMap<PathBuf, bool>,
     /// Watched folders and their identities at the time they were added.
     watched: HashMap<PathBuf, Identity>,
@@ -42,8 +42,8 @@ fn identity(folder: &Path) -> Option<Identity> {
     fs::metadata(folder).ok().map(|metadata| (metadata.dev(), metadata.ino()))
 }
 
-/// Returns the watcher if its thread could be started. If the thread could not be started, it has dropped the
-/// watcher's handler, which shares `names`, and every use of the watcher would panic, even dropping it.
+/// Returns the watcher if its thread could be started. Otherwise, the watcher's handler, which shares `names`,
+/// has been dropped, and any use of the watcher would panic, even dropping it.
 fn if_alive<W>(watcher: W, names: &Arc<Mutex<HashSet<OsString>>>) -> Option<W> {
     if Arc::strong_count(names) > 1 {
         return Some(watcher);
@@ -87,7 +87,7 @@ impl WatchedFolders {
                 add(&canonical);
             }
         }
-        // An event with the folder's own name means that it was removed.
+        // An event with the folder's own name means that the folder was removed.
         let own = folders
             .iter()
             .filter_map(|folder| folder.canonicalize().ok()?.file_name().map(ToOwned::to_owned));
@@ -111,7 +111,7 @@ impl WatchedFolders {
         self.watch_wanted();
     }
 
-    /// Renews all watches. After a missed notification, any of them may be broken.
+    /// Renews all watches. After a missed notification, any watch may be broken.
     pub(super) fn renew(&mut self) {
         self.release(|_| true);
         self.watch_wanted();
@@ -184,7 +184,7 @@ fn is_remote(folder: &Path) -> bool {
         || OTHERS.contains(&(kind.0 as u32))
 }
 
-/// Other systems rely on notifications and the heartbeat.
+/// Always false: other systems rely on notifications and the heartbeat.
 #[cfg(not(target_os = "linux"))]
 fn is_remote(_folder: &Path) -> bool {
     false

@@ -1,14 +1,14 @@
 //! Reports when a file that a scene depends on has changed.
 //!
 //! Editors save files in many ways: in place, by renaming, or by removing and rewriting. The watcher
-//! therefore watches folders (both that of a symbolic link and that of its target) and treats notifications
-//! only as hints. It compares contents and reports only real changes. A file that was closed after writing or
-//! renamed into place is checked immediately. A file that is still being written is checked after a short
-//! pause. Timestamps are also checked every two seconds, or several times per second if there are no
-//! notifications (network file systems, no watches left) or a folder or the working directory is missing.
+//! therefore watches folders (for a symbolic link, also the folder of its target) and treats notifications only
+//! as hints. It compares contents and reports only real changes. A file that was closed after writing or renamed
+//! into place is checked immediately. A file that is still being written is checked after a short pause.
+//! Timestamps are also checked every two seconds, or several times per second if there are no notifications
+//! (network file systems, no watches left) or a folder or the working directory is missing.
 //!
 //! A program may write a file in several steps. [`News::Settled`] follows a change when no further changes
-//! are expected. Errors in a file are reported only then.
+//! are expected. Errors in a file are not reported earlier.
 
 mod change_tracker;
 pub mod content;
@@ -83,7 +83,7 @@ pub enum News {
 /// A change to one or more files.
 #[derive(Clone, Copy, Debug)]
 pub struct Changed {
-    /// Time of the first hint. The measured time from save to screen starts here.
+    /// Time of the first hint, from which the save-to-screen latency is measured.
     pub noticed: Instant,
 }
 
@@ -96,7 +96,7 @@ pub struct Watcher {
 enum Message {
     /// A hint about a watched file.
     Hint(Hint),
-    /// Files to watch: those read after the given time, and those read earlier.
+    /// Files to watch: the files read after the given time, and the files read earlier.
     Files(Vec<FileRead>, Vec<FileRead>, Instant),
     /// The worker has written a file.
     Outputs,
@@ -254,7 +254,7 @@ impl<F: FnMut(News)> WatchThread<F> {
         }
     }
 
-    /// Whether the result of a check should not be reported, or not yet.
+    /// Whether the result of a check should not be reported yet or contains no changes.
     fn is_early(&mut self, found: &[FileRead], now: Instant) -> bool {
         let before = std::mem::take(&mut self.pending);
         if found.is_empty() {
@@ -265,8 +265,8 @@ impl<F: FnMut(News)> WatchThread<F> {
             let moves = !before.is_empty() && before != found;
             self.change_tracker.is_early(is_missing(found), moves, now)
         } else {
-            // A notification was missed or is unavailable. Wait for the next check, because the file may
-            // still be being written.
+            // A notification was missed or is unavailable. Wait for the next check, because the file may be
+            // incomplete.
             self.folders.renew();
             self.change_tracker.hint(Hint::Touched, now);
             true

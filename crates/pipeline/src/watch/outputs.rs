@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use super::content::{Content, Contents};
 use crate::control::CancelToken;
 
-/// What another program did to a file written by glimt.
+/// A change that another program made to a file written by glimt.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ExternalChange {
     /// The file was removed.
@@ -32,7 +32,7 @@ impl ExternalChange {
 pub struct OutputChange {
     /// Path of the file.
     pub path: PathBuf,
-    /// The change. `None` if the content is what glimt wrote.
+    /// The change. `None` if the file has the content that glimt wrote.
     pub lost: Option<ExternalChange>,
 }
 
@@ -78,7 +78,7 @@ impl Outputs {
         self.lock().retain(|path, _| keep(path));
     }
 
-    /// Returns all paths.
+    /// Returns the paths of all files.
     pub(super) fn paths(&self) -> Vec<PathBuf> {
         self.lock().keys().cloned().collect()
     }

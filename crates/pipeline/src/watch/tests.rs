@@ -5,10 +5,10 @@ use std::sync::mpsc::{Receiver, channel};
 
 use super::*;
 
-/// More than the time any change takes to settle.
+/// Delay longer than any change takes to settle.
 const SETTLE: Duration = Duration::from_millis(900);
 
-/// Longer than any test.
+/// Delay longer than any test.
 const NEVER: Duration = Duration::from_secs(3600);
 
 struct Scratch {

@@ -6,7 +6,8 @@ use crate::key_path::{quote_key_part, shortened_key};
 use crate::sanitize::shortened;
 use crate::toml::{self, Elements, Entries, TomlValue, Value};
 
-/// Maximum number of bytes to parse. At this size, parsing delays the new render by a few milliseconds.
+/// Maximum size in bytes of a document to parse. At this size, parsing delays the new render by a few
+/// milliseconds.
 const MOST_BYTES: usize = 256 << 10;
 /// Maximum number of changes listed individually. The others are only counted.
 const MAX_LISTED: usize = 3;
@@ -15,8 +16,8 @@ const MAX_VALUE_CHARS: usize = 48;
 /// Maximum width of a key in columns.
 const MAX_KEY_COLUMNS: usize = 48;
 
-/// Lists the keys whose values differ, with both values. Empty if no key differs or if a document is not
-/// valid TOML.
+/// Lists the keys whose values differ, with both values. Returns an empty list if no key differs or if a
+/// document is not valid TOML.
 pub(super) fn key_changes(before: &str, after: &str) -> Vec<String> {
     if before.len().max(after.len()) > MOST_BYTES {
         return Vec::new();
@@ -30,7 +31,7 @@ pub(super) fn key_changes(before: &str, after: &str) -> Vec<String> {
     differences.finish()
 }
 
-/// Differences found so far.
+/// Key differences found so far.
 struct KeyDifferences<'t> {
     /// The source text before and after the edit.
     texts: [&'t str; 2],

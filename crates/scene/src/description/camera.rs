@@ -1,4 +1,4 @@
-//! `[camera]`.
+//! The `[camera]` table: camera, viewpoint and changes to them.
 
 use std::path::PathBuf;
 
@@ -26,13 +26,13 @@ pub enum Camera {
     },
     /// A gKit orbiter file, resolved against the scene's folder.
     Orbiter {
-        /// The file.
+        /// The orbiter file.
         file: Located<PathBuf>,
         /// Vertical field of view in degrees, in (0, 180). `None` to use the field of view in the file.
         fov: Option<f64>,
         /// Lens radius, ≥ 0.
         aperture: f64,
-        /// Focus distance. `None` for the distance to the center in the file.
+        /// Focus distance. `None` to focus on the orbiter's center.
         focus: Option<f64>,
     },
 }
@@ -114,8 +114,8 @@ impl From<Viewpoint> for Camera {
     }
 }
 
-/// Whether two distances are equal up to rounding by camera steps. A step towards `look_at` is 50 times
-/// larger.
+/// Whether two distances are equal except for the rounding of camera moves. A move towards `look_at` changes
+/// the distance by 50 times this tolerance.
 pub fn is_same_distance(a: f64, b: f64) -> bool {
     const ROUNDING: f64 = 1e-3;
     (a - b).abs() <= ROUNDING * a.abs().max(b.abs())

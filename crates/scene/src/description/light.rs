@@ -1,4 +1,4 @@
-//! `[[light]]`.
+//! Lights without a shape (`[[light]]`), and the `[environment]` table.
 
 use std::path::PathBuf;
 
@@ -21,7 +21,7 @@ pub enum Light {
 /// A point light.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PointLight {
-    /// Position.
+    /// Position of the light.
     pub position: DVec3,
     /// Radiant intensity in W·sr⁻¹. With [`Falloff::None`], irradiance at normal incidence.
     pub intensity: Vec3,
@@ -65,7 +65,7 @@ pub struct Environment {
 }
 
 impl Light {
-    /// Whether the light is not black.
+    /// Whether the light's color is not black.
     pub fn has_emission(&self) -> bool {
         let color = match self {
             Self::Point(light) => light.intensity,
@@ -75,7 +75,7 @@ impl Light {
         color != Vec3::ZERO
     }
 
-    /// Whether the light is a δ distribution, which rays cannot hit.
+    /// Whether the light is a δ light, which rays cannot hit.
     pub fn is_delta(&self) -> bool {
         match self {
             Self::Point(_) | Self::Spot(_) => true,
@@ -83,7 +83,7 @@ impl Light {
         }
     }
 
-    /// Whether the light has no falloff with distance.
+    /// Whether the light is a point light or spotlight with `falloff = "none"`.
     pub fn has_no_falloff(&self) -> bool {
         match self {
             Self::Point(light) => light.falloff == Falloff::None,

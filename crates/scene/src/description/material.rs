@@ -1,4 +1,4 @@
-//! `[textures.*]` and `[materials.*]`.
+//! Textures and materials: the `[textures.*]` and `[materials.*]` tables.
 
 use std::path::PathBuf;
 
@@ -13,13 +13,13 @@ use crate::math::{DVec3, Vec2, Vec3};
 /// An image used by materials.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Texture {
-    /// Name in the scene.
+    /// Name of the texture in the scene file.
     pub name: String,
     /// The image or glTF file, resolved against the scene's folder.
     pub file: Located<PathBuf>,
     /// Index of the image in a glTF file. `None` if the file is an image.
     pub image: Option<u32>,
-    /// Interpolation.
+    /// Interpolation between texels.
     pub filter: TextureFilter,
     /// Addressing mode outside of [0, 1].
     pub wrap: Wrap,
@@ -27,7 +27,7 @@ pub struct Texture {
     pub repeat: Vec2,
     /// Rotation of the repeated coordinates, in degrees from u to v.
     pub rotate: f64,
-    /// Offset of the coordinates, added last.
+    /// Offset of the texture coordinates, added last.
     pub offset: Vec2,
     /// Texture coordinate set.
     pub uv: UvSet,
@@ -73,7 +73,7 @@ pub enum NumberSource {
 }
 
 impl NumberSource {
-    /// The number, if it is constant.
+    /// The number, or `None` if it is a texture.
     pub fn constant(&self) -> Option<f32> {
         match *self {
             Self::Constant(number) => Some(number),
@@ -81,8 +81,8 @@ impl NumberSource {
         }
     }
 
-    /// The texture, and how to compute the number from a pixel: from the channel if one is given, or else as
-    /// `usual`. `None` if constant.
+    /// Index of the texture, and how to compute the number from a pixel: from the specified channel, or as in
+    /// `usual` if no channel is specified. `None` if the number is constant.
     pub fn texture(&self, usual: PixelValue) -> Option<(usize, PixelValue)> {
         match *self {
             Self::Constant(_) => None,
@@ -112,7 +112,7 @@ impl OpacitySource {
         }
     }
 
-    /// The texture, and how to compute the opacity from a pixel. `None` if constant.
+    /// Index of the texture, and how to compute the opacity from a pixel. `None` if the opacity is constant.
     pub fn texture(&self) -> Option<(usize, PixelValue)> {
         self.value.texture(PixelValue::Opacity)
     }
@@ -156,22 +156,22 @@ impl EmissionSource {
 /// A named material.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Material {
-    /// Name in the scene.
+    /// Name of the material in the scene file.
     pub name: String,
     /// Reflection and transmission.
     pub kind: MaterialKind,
     /// Emitted radiance.
     pub emission: EmissionSource,
-    /// The normal map.
+    /// Normal map, if any.
     pub normal_map: Option<NormalMap>,
-    /// The height map, applied after the normal map.
+    /// Height map, if any. Applied after the normal map.
     pub bump: Option<Bump>,
-    /// Opacity.
+    /// Opacity of the surface.
     pub opacity: OpacitySource,
 }
 
 impl MaterialKind {
-    /// Name of the type in scene files.
+    /// Name of the material type in scene files.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Phong { .. } => "phong",
@@ -183,7 +183,7 @@ impl MaterialKind {
         }
     }
 
-    /// Whether the material has a δ lobe, like mirrors, smooth glass and smooth coats.
+    /// Whether the material has a δ lobe, as a mirror, smooth glass and a smooth coat have.
     pub fn has_delta(&self) -> bool {
         match self {
             Self::Phong { .. } | Self::Principled { .. } => false,
@@ -194,7 +194,7 @@ impl MaterialKind {
         }
     }
 
-    /// Whether the material is smooth or rough glass with index 1, which does not refract in air.
+    /// Whether the material is solid glass with an index of refraction of 1, which does not refract in air.
     pub fn is_index_matched_glass(&self) -> bool {
         match self {
             Self::Glass { ior, .. } => *ior == 1.0,
@@ -285,43 +285,43 @@ impl Bump {
 /// Interpretation of a texture's pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum TextureUse {
-    /// Colors.
+    /// Pixels are colors.
     Color,
-    /// Colors of a surface whose opacity is the image's alpha channel.
+    /// Pixels are colors of a surface whose opacity is the image's alpha channel.
     CutOut,
-    /// Normals.
+    /// Pixels are tangent-space normals.
     Normal,
-    /// Numbers.
+    /// Pixels are converted to numbers.
     Number(PixelValue),
 }
 
 /// Role of a texture in a material.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TextureRole {
-    /// kd.
+    /// Diffuse reflectance kd.
     Diffuse,
-    /// ks.
+    /// Specular reflectance ks.
     Specular,
-    /// ka.
+    /// Ambient reflectance ka.
     Ambient,
     /// Reflectance or index of refraction of microfacets.
     Facets,
     /// Roughness and other parameters of microfacets.
     Roughness(PixelValue),
-    /// Radiance.
+    /// Emitted radiance.
     Emission,
     /// Normal map.
     NormalMap,
     /// Height map.
     Bump(PixelValue),
-    /// Opacity.
+    /// Opacity of the surface.
     Opacity(PixelValue),
-    /// Clear coat on an emitter.
+    /// Weight or roughness of the clear coat on an emitter.
     EmissionCoat(PixelValue),
 }
 
 impl TextureRole {
-    /// How the pixels are interpreted.
+    /// How the texture's pixels are interpreted in this role.
     pub fn texture_use(self) -> TextureUse {
         match self {
             Self::Diffuse | Self::Specular | Self::Ambient | Self::Facets | Self::Emission => {
@@ -339,15 +339,15 @@ impl TextureRole {
 /// Reflection and transmission of a material.
 #[derive(Clone, Debug, PartialEq)]
 pub enum MaterialKind {
-    /// Normalized Phong.
+    /// The normalized Phong model.
     Phong {
-        /// kd.
+        /// Diffuse reflectance kd.
         diffuse: ColorSource,
-        /// ks.
+        /// Specular reflectance ks.
         specular: ColorSource,
-        /// α ≥ 0.
+        /// Phong exponent α ≥ 0.
         shininess: f32,
-        /// ka. `None` for the diffuse color.
+        /// Ambient reflectance ka. `None` to use the diffuse color.
         ambient: Option<ColorSource>,
     },
     /// A perfect mirror.
@@ -378,12 +378,12 @@ pub enum MaterialKind {
         fresnel: FresnelSource,
         /// Square root of the GGX α, in [0, 1]; 0 is a mirror.
         roughness: NumberSource,
-        /// How far the highlight is stretched along u, in [−1, 1].
+        /// Stretch of the highlight along u, in [−1, 1].
         anisotropy: NumberSource,
     },
     /// A diffuse base under a dielectric microfacet coat.
     Plastic {
-        /// kd, in [0, 1].
+        /// Diffuse reflectance kd, in [0, 1].
         diffuse: ColorSource,
         /// Scale factor for the coat's reflectance, in [0, 1].
         specular: ColorSource,
@@ -406,8 +406,7 @@ pub enum MaterialKind {
         specular: NumberSource,
         /// Scale factor for the dielectric part's specular reflectance at normal incidence, ≥ 0.
         specular_color: ColorSource,
-        /// Fraction of light not reflected by the specular lobe that is transmitted instead of scattered
-        /// diffusely.
+        /// Fraction of the non-specular light that is transmitted instead of scattered diffusely.
         transmission: NumberSource,
         /// Weight of a clear coat.
         clearcoat: NumberSource,
@@ -417,7 +416,7 @@ pub enum MaterialKind {
 }
 
 impl ColorSource {
-    /// Index of the texture. `None` if constant.
+    /// Index of the texture. `None` if the color is constant.
     fn texture(&self) -> Option<usize> {
         match self {
             Self::Constant(_) => None,
@@ -427,7 +426,7 @@ impl ColorSource {
 }
 
 impl MaterialKind {
-    /// The colors and their roles.
+    /// The color parameters that may be textures, and their roles.
     fn colors(&self) -> Vec<(&ColorSource, TextureRole)> {
         match self {
             Self::Phong { diffuse, specular, shininess: _, ambient } => vec![
@@ -456,7 +455,7 @@ impl MaterialKind {
         }
     }
 
-    /// The numbers that may be textures.
+    /// The number parameters that may be textures.
     fn numbers(&self) -> Vec<NumberSource> {
         match self {
             Self::Metal { fresnel: _, roughness, anisotropy } => vec![*roughness, *anisotropy],

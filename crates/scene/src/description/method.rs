@@ -1,5 +1,5 @@
-//! Properties and supported settings of the integrators. Other code queries these instead of matching on
-//! integrators.
+//! Properties and supported settings of the integrators. Other code queries these properties instead of
+//! matching on the integrator.
 
 use crate::choice;
 

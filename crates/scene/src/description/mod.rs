@@ -26,7 +26,7 @@ pub use render::{
 };
 pub use shape::{LoweredShape, Mesh, Object, Placement, Shape, Sheet, max_projection};
 
-/// A scene.
+/// A validated scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scene {
     /// The `[render]` table.
@@ -63,11 +63,11 @@ pub struct Located<T> {
 /// A mesh file, or one part of a glTF file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MeshFile {
-    /// The file.
+    /// Path of the file.
     pub value: PathBuf,
     /// Byte range of the path in the scene file.
     pub span: Range<usize>,
-    /// Index of the part. `None` for the whole file.
+    /// Index of the glTF part. `None` for the whole file.
     pub part: Option<u32>,
 }
 

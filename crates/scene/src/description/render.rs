@@ -1,4 +1,4 @@
-//! `[render]`.
+//! The `[render]` table: render settings and the definitions of their keys.
 
 use std::ops::RangeInclusive;
 
@@ -90,13 +90,14 @@ macro_rules! __render_keys {
 /// Passes the definitions of all `[render]` keys to a macro, each as `doc name: type = default, range, unit,
 /// change;`. The parser, [`Render`], overrides and command-line options are generated from them.
 ///
-/// The ranges are `whole(MIN, MAX)`, `at_least(MIN)`, `between(MIN, MAX)`, `choice` and `color`. The changes:
+/// The ranges are `whole(MIN, MAX)`, `at_least(MIN)`, `between(MIN, MAX)`, `choice` and `color`. `change`
+/// says what can override the key:
 ///
 /// | | |
 /// | --- | --- |
-/// | `option` | a command-line option overrides the key; its name is the key's, with `-` for `_` |
-/// | `live` | the terminal UI overrides the key |
-/// | `scene` | only the scene sets the key |
+/// | `option` | a command-line option with the key's name, with `-` instead of `_` |
+/// | `live` | the terminal UI |
+/// | `scene` | nothing: only the scene sets the key |
 ///
 /// `render_keys!(callback)` passes all keys, `render_keys!(callback, changed)` passes keys with `option` or
 /// `live`, and `render_keys!(callback, option)` passes keys with `option`.
@@ -111,7 +112,7 @@ pub use __render_keys as render_keys;
 pub enum KeyRange {
     /// Whole numbers.
     Whole(RangeInclusive<u32>),
-    /// Numbers, up to [`LARGEST`].
+    /// Numbers of at most [`LARGEST`].
     Number(RangeInclusive<f64>),
     /// One of these names.
     Names(Vec<&'static str>),
@@ -122,11 +123,11 @@ pub enum KeyRange {
 /// A `[render]` key.
 #[derive(Clone, Debug)]
 pub struct RenderKey {
-    /// The key.
+    /// Name of the key.
     pub name: &'static str,
     /// Description, as one sentence without a period at the end.
     pub doc: &'static str,
-    /// The unit, or an empty string.
+    /// Unit of the value, or an empty string.
     pub unit: &'static str,
     /// Accepted values.
     pub range: KeyRange,

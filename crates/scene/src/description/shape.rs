@@ -1,4 +1,4 @@
-//! Shapes.
+//! Shapes and the placement of meshes.
 
 use std::ops::Range;
 
@@ -23,7 +23,7 @@ pub struct Object {
     pub shape: Shape,
     /// Index into [`Scene::materials`](super::Scene::materials). `None` for the mesh file's own materials.
     pub material: Option<usize>,
-    /// The key `name`.
+    /// Value of the key `name`, if any.
     pub name: Option<Box<str>>,
     /// Byte range of the table header in the file.
     pub span: Range<usize>,
@@ -41,7 +41,7 @@ pub enum Shape {
     },
     /// A parallelogram: corner + s·u + t·v with s and t in [0, 1]. The front faces along u × v ≠ 0.
     Quad {
-        /// Corner.
+        /// The corner at s = t = 0.
         corner: DVec3,
         /// First edge.
         u: DVec3,
@@ -66,11 +66,11 @@ pub enum Shape {
     },
     /// A triangle. The front faces along (b − a) × (c − a) ≠ 0.
     Triangle {
-        /// Corner.
+        /// First corner.
         a: DVec3,
-        /// Corner.
+        /// Second corner.
         b: DVec3,
-        /// Corner.
+        /// Third corner.
         c: DVec3,
     },
     /// A disk.
@@ -177,12 +177,12 @@ pub enum Placement {
         scale: DVec3,
         /// Rotation in degrees about x, then y, then z.
         rotate: DVec3,
-        /// Applied last.
+        /// Translation, applied last.
         translate: DVec3,
     },
     /// An invertible affine map.
     Matrix {
-        /// Images of the axes.
+        /// Images of the coordinate axes.
         linear: [DVec3; 3],
         /// Image of the origin.
         translate: DVec3,
@@ -208,7 +208,7 @@ impl Placement {
 pub enum LoweredShape<'a> {
     /// An analytic shape.
     Shape(geometry::Shape),
-    /// A mesh. Its triangles are in a file.
+    /// A mesh, whose triangles are in a file.
     Mesh(&'a Mesh),
 }
 
@@ -261,7 +261,7 @@ impl Shape {
         if let Self::Mesh(mesh) = self { Some(mesh) } else { None }
     }
 
-    /// The shape as a sheet. `None` for closed shapes, planes and meshes.
+    /// The shape as an open surface. `None` for closed shapes, planes and meshes.
     pub fn sheet(&self) -> Option<Sheet> {
         match *self {
             Self::Quad { corner, u, v } => {

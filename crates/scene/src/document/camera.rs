@@ -1,4 +1,4 @@
-//! `[camera]`.
+//! Reads the `[camera]` table.
 
 use super::super::description::Camera;
 use super::context::Issue;
@@ -6,7 +6,7 @@ use super::limits::Limits;
 use super::table::TableReader;
 use crate::math::DVec3;
 
-/// Default field of view.
+/// Default vertical field of view in degrees.
 pub(crate) const FOV_DEGREES: f64 = 40.0;
 
 /// `up` and the view direction are considered parallel if the sine of the angle between them is below this.

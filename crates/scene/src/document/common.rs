@@ -1,11 +1,11 @@
-//! Keys common to all materials.
+//! Reads the keys common to all materials.
 
 use super::super::description::{Bump, EmissionSource, NormalMap, NumberSource, OpacitySource};
 use super::context::Issue;
 use super::names::DefinedNames;
 use super::table::TableReader;
 
-/// `emission` and `emission_sides`.
+/// Reads `emission` and `emission_sides`.
 pub(super) fn read_emission(table: &TableReader<'_>, textures: &DefinedNames) -> EmissionSource {
     let source = table.optional("emission").emission(textures).unwrap_or(EmissionSource::NONE);
     let sides = table.optional("emission_sides").choice().unwrap_or(source.sides);
@@ -13,7 +13,7 @@ pub(super) fn read_emission(table: &TableReader<'_>, textures: &DefinedNames) ->
     EmissionSource { sides, ..source }
 }
 
-/// `normal_map` and `normal_strength`.
+/// Reads `normal_map` and `normal_strength`.
 pub(super) fn read_normal_map(table: &TableReader<'_>, textures: &DefinedNames) -> Option<NormalMap> {
     let texture = table.optional("normal_map").index_by_name(textures);
     let strength = table.optional("normal_strength").number32(table.limits("normal_strength")).unwrap_or(1.0);
@@ -21,7 +21,7 @@ pub(super) fn read_normal_map(table: &TableReader<'_>, textures: &DefinedNames) 
     texture.map(|texture| NormalMap { texture, strength })
 }
 
-/// `bump` and `bump_scale`.
+/// Reads `bump` and `bump_scale`.
 pub(super) fn read_bump(table: &TableReader<'_>, textures: &DefinedNames) -> Option<Bump> {
     let texture = table.optional("bump").texture_of_numbers(textures);
     let scale = table.optional("bump_scale").number32(table.limits("bump_scale")).unwrap_or(0.01);
@@ -29,7 +29,7 @@ pub(super) fn read_bump(table: &TableReader<'_>, textures: &DefinedNames) -> Opt
     texture.map(|(texture, channel)| Bump { texture, channel, scale })
 }
 
-/// `opacity` and `opacity_cutoff`.
+/// Reads `opacity` and `opacity_cutoff`.
 pub(super) fn read_opacity(table: &TableReader<'_>, textures: &DefinedNames) -> OpacitySource {
     let value = table.optional("opacity").number_or_texture(textures, table.limits("opacity"));
     let cutoff = table.optional("opacity_cutoff").number32(table.limits("opacity_cutoff")).unwrap_or(0.0);

@@ -48,7 +48,7 @@ enum IssueCause {
 }
 
 impl Issue {
-    /// An error at `span`.
+    /// Creates an error at `span`.
     pub(super) fn error(span: Range<usize>, message: impl Into<String>) -> Self {
         let message = message.into();
         Self {
@@ -61,7 +61,7 @@ impl Issue {
         }
     }
 
-    /// A likely mistake at `span`.
+    /// Creates a warning about a likely mistake at `span`.
     pub(super) fn warning(span: Range<usize>, message: impl Into<String>) -> Self {
         Self { severity: Severity::Warning, cause: IssueCause::Absence, ..Self::error(span, message) }
     }
@@ -134,8 +134,9 @@ impl<'a> FileContext<'a> {
         self.source.full_text().get(span.clone()).unwrap_or_default()
     }
 
-    /// Searches a list for a similar name. The cost is linear in the length of the list, so the number of
-    /// searches per file is limited. Files with many wrong names usually repeat the same mistake.
+    /// Searches a list for a similar name with `look`, unless the file's search limit is reached. The cost of
+    /// a search is linear in the length of the list, and files with many wrong names usually repeat the same
+    /// mistake.
     pub(super) fn search_similar_name<T>(
         &self,
         comparisons: usize,
@@ -213,7 +214,7 @@ impl<'a> FileContext<'a> {
     }
 }
 
-/// End of the message with the number of unlisted issues.
+/// End of the message that reports the number of unlisted issues.
 pub(crate) const MORE_LIKE_THESE: &str = "more like these";
 
 /// Maximum number of issues listed.

@@ -1,4 +1,4 @@
-//! `[environment]`.
+//! Reads the `[environment]` table.
 
 use super::super::description::{Environment, Scene};
 use super::super::keys::endings::MAPS;

@@ -51,17 +51,17 @@ impl<'a> TableKey<'a> {
         self.value.map(|value| value.span())
     }
 
-    /// A number, which may be an integer.
+    /// Reads a number, which may be an integer.
     pub(super) fn number(&self, limits: Limits) -> Option<f64> {
         number_within(self.context, self.name, self.value?, limits, "a number")
     }
 
-    /// A number in single precision.
+    /// Reads a number in single precision.
     pub(super) fn number32(&self, limits: Limits) -> Option<f32> {
         self.number(limits).map(|number| number as f32)
     }
 
-    /// An integer. `N` must be able to represent the whole range.
+    /// Reads an integer. `N` must be able to represent the whole range.
     pub(super) fn integer<N: TryFrom<i128>>(&self, range: RangeInclusive<i128>) -> Option<N> {
         let value = self.value?;
         let TomlValue::Integer { digits, radix } = value.item() else {
@@ -78,7 +78,7 @@ impl<'a> TableKey<'a> {
         number.and_then(|number| number.try_into().ok())
     }
 
-    /// `true` or `false`.
+    /// Reads `true` or `false`.
     pub(super) fn boolean(&self) -> Option<bool> {
         let value = self.value?;
         if let TomlValue::Boolean(flag) = value.item() {
@@ -88,12 +88,12 @@ impl<'a> TableKey<'a> {
         None
     }
 
-    /// A string. `expected` describes it in errors.
+    /// Reads a string. `expected` describes the string in errors.
     pub(super) fn text(&self, expected: &str) -> Option<&'a str> {
         self.text_described_by(|| expected.to_owned())
     }
 
-    /// A string, described by `expected` in errors.
+    /// Reads a string. `expected` returns its description for errors.
     fn text_described_by(&self, expected: impl FnOnce() -> String) -> Option<&'a str> {
         let value = self.value?;
         if let TomlValue::String(text) = value.item() {
@@ -103,7 +103,7 @@ impl<'a> TableKey<'a> {
         None
     }
 
-    /// The name of a shape, if any. Reports names that look like numbers.
+    /// Reads the name of a shape, if any. Reports names that look like numbers.
     pub(super) fn shape_name(&self) -> Option<Option<Box<str>>> {
         if !self.is_present() {
             return Some(None);
@@ -123,7 +123,7 @@ impl<'a> TableKey<'a> {
         self.value.is_some_and(|value| matches!(value.item(), TomlValue::Table(_)))
     }
 
-    /// A choice, given by name.
+    /// Reads a choice by its name.
     pub(super) fn choice<C: Choice>(&self) -> Option<C> {
         let list = || {
             let list = C::ALL.iter().map(|one| format!("\"{}\"", one.name())).collect::<Vec<_>>().join(", ");
@@ -148,12 +148,12 @@ impl<'a> TableKey<'a> {
         None
     }
 
-    /// Three numbers.
+    /// Reads three numbers as a vector.
     pub(super) fn vector(&self, limits: Limits) -> Option<DVec3> {
         self.numbers(limits, "three numbers, [x, y, z]").map(DVec3::from_array)
     }
 
-    /// Three numbers, or `default` if the key is absent.
+    /// Reads three numbers as a vector. Returns `default` if the key is absent.
     pub(super) fn vector_or(&self, limits: Limits, default: DVec3) -> Option<DVec3> {
         if self.is_present() { self.vector(limits) } else { Some(default) }
     }
@@ -180,12 +180,12 @@ impl<'a> TableKey<'a> {
         false
     }
 
-    /// Two numbers.
+    /// Reads a pair of numbers.
     pub(super) fn pair(&self, limits: Limits) -> Option<Vec2> {
         self.numbers(limits, "two numbers, [u, v]").map(|[u, v]: [f64; 2]| Vec2::new(u as f32, v as f32))
     }
 
-    /// An array of `N` numbers. Reports every invalid number.
+    /// Reads an array of `N` numbers. Reports every invalid number.
     pub(super) fn numbers<const N: usize>(&self, limits: Limits, expected: &str) -> Option<[f64; N]> {
         let value = self.value?;
         let Some(array) = value.array().filter(|array| array.len() == N) else {
@@ -200,7 +200,7 @@ impl<'a> TableKey<'a> {
         is_whole.then(|| numbers.map(Option::unwrap_or_default))
     }
 
-    /// One number for all three axes, or three numbers.
+    /// Reads scale factors: one number for all three axes, or three numbers.
     pub(super) fn scale(&self, limits: Limits) -> Option<DVec3> {
         if matches!(self.value?.item(), TomlValue::Integer { .. } | TomlValue::Float(_)) {
             return self.number(limits).map(DVec3::splat);
@@ -224,7 +224,7 @@ impl<'a> TableKey<'a> {
         index
     }
 
-    /// The value as an inline table, `{ … }`.
+    /// Reads an inline table, `{ … }`.
     pub(super) fn inline_table(&self) -> Option<TableReader<'a>> {
         TableReader::from_value(self.context, self.value?, TableTitle::Key(self.name))
     }

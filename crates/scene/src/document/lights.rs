@@ -1,4 +1,4 @@
-//! `[[light]]`.
+//! Reads the `[[light]]` tables.
 
 use super::super::description::Light;
 use super::super::description::light::{DirectionalLight, Falloff, PointLight, SpotLight};

@@ -1,4 +1,4 @@
-//! `[materials.*]`.
+//! Reads the `[materials.*]` tables.
 
 use super::super::description::{
     ColorSource, FresnelSource, Material, MaterialKind, NumberSource, OpacitySource,
@@ -12,7 +12,7 @@ use crate::choice;
 use crate::materials::metal::elements::Element;
 use crate::math::{DVec3, Vec3};
 
-/// The materials of a file.
+/// The materials defined in a file.
 pub(super) struct MaterialList {
     /// Material names.
     pub(super) names: DefinedNames,
@@ -105,7 +105,7 @@ fn read_phong(table: &TableReader<'_>, textures: &DefinedNames) -> MaterialKind 
     }
 }
 
-/// Warning about materials that create energy.
+/// Warning message for materials that create energy.
 pub(crate) const ENERGY_GAIN: &str = "this material reflects more light than falls on it";
 
 /// Warns about a material that reflects more light than falls on it.

@@ -80,7 +80,7 @@ fn settings(document: &toml::Document<'_>) -> Vec<Setting> {
     ["render", "photons"].into_iter().flat_map(values).collect()
 }
 
-/// A scene's camera. `None` if there are errors.
+/// Reads only the camera of a scene. Returns `None` if there are errors.
 pub(super) fn camera_of(source: &SceneText) -> Option<Camera> {
     let context = FileContext::new(source.clone(), Path::new(""));
     let (document, errors) = toml::parse(source.text());
@@ -119,7 +119,7 @@ pub(super) fn named_files(text: &str, path: &Path) -> Vec<PathBuf> {
     names.into_iter().map(|name| folder.join(name)).collect()
 }
 
-/// Reads the whole file. Reads definitions of names before references.
+/// Reads the whole scene. Textures and materials are read before the tables that refer to them by name.
 fn scene(root: &TableReader<'_>) -> Option<Scene> {
     let (render, output) = render::read(root);
     let camera = camera::read_camera(root);
@@ -162,7 +162,7 @@ fn scene(root: &TableReader<'_>) -> Option<Scene> {
     Some(scene)
 }
 
-/// Warning for scenes without light.
+/// Warning message for scenes without light.
 pub(super) const UNLIT_SCENE: &str = "nothing lights this scene";
 /// End of error messages about degenerate shapes.
 pub(super) const NO_AREA: &str = "has no area";

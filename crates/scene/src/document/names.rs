@@ -63,7 +63,7 @@ impl DefinedNames {
         }
     }
 
-    /// Warns about every unused name. Only for scenes without errors.
+    /// Warns about every unused name. Must only be called for scenes without errors.
     pub(super) fn warn_about_unused(&self, context: &FileContext<'_>) {
         for entry in self.entries.iter().filter(|entry| !entry.used.get()) {
             let message = format!("the {} \"{}\" is not used", self.kind, shortened(&entry.name, 40));

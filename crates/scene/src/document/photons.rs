@@ -1,4 +1,4 @@
-//! `[photons]`.
+//! Reads the `[photons]` table.
 
 use super::super::description::Photons;
 use super::table::TableReader;

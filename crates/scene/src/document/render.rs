@@ -1,4 +1,4 @@
-//! `[render]`.
+//! Reads the `[render]` table.
 
 use std::path::PathBuf;
 
@@ -78,7 +78,7 @@ mod tests {
     use super::super::super::description::{KeyRange, Render};
     use super::super::super::{Outcome, parse, starter};
 
-    /// Parses a scene with this line in `[render]` and returns its settings, or else the error messages.
+    /// Parses a scene with `line` in `[render]`. Returns its settings, or the error messages.
     fn read(line: &str) -> Result<Render, Vec<String>> {
         let camera = "[camera]\nposition = [0, 0, 4]\nlook_at = [0, 0, 0]\n";
         let Outcome { scene, diagnostics, .. } =

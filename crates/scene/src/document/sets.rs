@@ -7,7 +7,7 @@ use super::super::toml::{Document, KeyError, KeyErrorKind, TopLevelLayout, set};
 use super::context::{FileContext, Issue};
 use super::shapes;
 
-/// Which keys of a scene are groups and lists.
+/// The top-level keys of a scene that are groups and lists of tables.
 const LAYOUT: TopLevelLayout = TopLevelLayout {
     groups: &["materials", "textures"],
     is_list: |name| name == "light" || shapes::is_shape_table(name),

@@ -18,7 +18,7 @@ pub(super) fn report_syntax_errors(
     let lists = ArrayBrackets { text: context.file(), brackets: OnceCell::new() };
     let (mut lines, mut firsts) = (BTreeSet::new(), Vec::new());
     errors.sort_by_key(|error| error.span.start);
-    // Unclosed lists, by line.
+    // Opening brackets of unclosed lists, by line.
     let (mut in_open_array, mut opened) = (false, BTreeMap::new());
     for error in errors {
         let lacks_comma = error.what == MISSING_COMMA;
@@ -37,7 +37,7 @@ pub(super) fn report_syntax_errors(
         }
     }
     // The parser does not report an unclosed list at the end of the file. Skip this check if lists are nested
-    // too deeply, because such a list may be closed.
+    // too deeply, because the list may be closed after all.
     if let Some(open) = open_at_end(context.file()).filter(|_| !firsts.iter().any(is_too_deep)) {
         lines.insert(context.line(open));
         opened.insert(context.line(open), open);
@@ -121,7 +121,7 @@ fn unclosed_list_help(context: &FileContext<'_>, open: usize) -> String {
     }
 }
 
-/// Message about missing commas in a list on one line. `at` is the position of the first missing comma.
+/// Message about missing commas in a single-line list. `at` is the position of the first missing comma.
 fn missing_commas_message(context: &FileContext<'_>, lists: &ArrayBrackets<'_>, at: usize) -> Option<String> {
     let open = lists.open_at(at)?;
     let line_start = context.text(&(0..at)).rfind('\n').map_or(0, |end| end + 1);
@@ -176,7 +176,7 @@ fn format_list(values: &[&str]) -> Option<String> {
     (values.len() > 1 && list.len() <= LONGEST).then_some(list)
 }
 
-/// The end of the lines affected by an error: the next header if the line is a broken header, or else the
+/// The line after the lines affected by an error: the next header if `line` is a broken header, otherwise the
 /// next line.
 fn end_of_broken_lines(context: &FileContext<'_>, line: usize) -> usize {
     let is_header = |line: usize| context.line_text(line).map(|text| text.trim_start().starts_with('['));
@@ -186,7 +186,7 @@ fn end_of_broken_lines(context: &FileContext<'_>, line: usize) -> usize {
     (line + 1..).find(|next| is_header(*next) != Some(false)).unwrap_or(usize::MAX)
 }
 
-/// The number around `span`.
+/// Text of the number that contains `span`.
 fn number_at<'c>(context: &'c FileContext<'_>, span: &Range<usize>) -> &'c str {
     let is_of_number = |text: &str| text.starts_with(|c: char| c.is_ascii_digit() || "+-._eE".contains(c));
     let (mut start, mut end) = (span.start, span.end);

@@ -17,13 +17,13 @@ use super::value::{TomlValue, Value, describe_found};
 /// A table's name in messages.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum TableTitle<'a> {
-    /// The file itself.
+    /// The root table of the file.
     Root,
-    /// `[render]`
+    /// A single table, such as `[render]`.
     Table(&'static str),
-    /// `[[sphere]]`
+    /// A table in a list, such as `[[sphere]]`.
     List(&'static str),
-    /// `[materials.wall]`
+    /// A named table, such as `[materials.wall]`.
     Named(&'static str, &'a str),
     /// An inline table, given by its key.
     Key(&'static str),
@@ -64,7 +64,7 @@ impl<'a> TableReader<'a> {
         Self { context, span, title, entries, known, unavailable, missing }
     }
 
-    /// The file itself.
+    /// Creates a reader of the file's root table.
     pub(super) fn root(context: &'a FileContext<'a>, entries: Entries<'a>) -> Self {
         Self::new(context, entries, 0..0, TableTitle::Root)
     }
@@ -105,7 +105,7 @@ impl<'a> TableReader<'a> {
         )
     }
 
-    /// The range defined for a key, `KEY` or `TYPE.KEY`.
+    /// Returns the range defined for a key, given as `KEY` or `TYPE.KEY`.
     pub(super) fn limits(&self, name: &str) -> Limits {
         match self.value_kind(name) {
             Some(
@@ -131,7 +131,7 @@ impl<'a> TableReader<'a> {
         }
     }
 
-    /// The range defined for an integer key.
+    /// Returns the range defined for an integer key.
     pub(super) fn range(&self, name: &str) -> RangeInclusive<i128> {
         match self.value_kind(name) {
             Some(ValueKind::Whole(least, most)) => least.into()..=most.into(),
@@ -139,7 +139,7 @@ impl<'a> TableReader<'a> {
         }
     }
 
-    /// The type defined for a key. A test compares the definitions with the keys that are read.
+    /// Returns the type defined for a key. A test compares the definitions with the keys that are read.
     fn value_kind(&self, name: &str) -> Option<ValueKind> {
         let info = match self.title {
             TableTitle::Table(table) | TableTitle::List(table) | TableTitle::Named(table, _) => {
@@ -172,13 +172,13 @@ impl<'a> TableReader<'a> {
         }
     }
 
-    /// The `[name]` table.
+    /// Reads the `[name]` table, if present.
     pub(super) fn table(&self, name: &'static str) -> Option<Self> {
         let value = self.optional(name).value?;
         Self::from_value(self.context, value, TableTitle::Table(name))
     }
 
-    /// The `[name.NAME]` tables in file order, with their names and the names' spans.
+    /// Reads the `[name.NAME]` tables in file order, with their names and the names' spans.
     pub(super) fn named_tables(&self, name: &'static str) -> Vec<(String, Range<usize>, Option<Self>)> {
         let Some(group) = self.table(name) else { return Vec::new() };
         let mut entries: Vec<_> = group.entries.iter().collect();
@@ -187,7 +187,7 @@ impl<'a> TableReader<'a> {
         entries.into_iter().map(|one| (one.key.to_owned(), one.span, read(one.key, one.value))).collect()
     }
 
-    /// The `[[name]]` tables.
+    /// Reads the `[[name]]` tables.
     pub(super) fn tables(&self, name: &'static str) -> impl Iterator<Item = Self> + use<'a> {
         let context = self.context;
         let key = self.optional(name);
@@ -225,7 +225,7 @@ impl<'a> TableReader<'a> {
         }
     }
 
-    /// The key probably meant by an unknown key. Prefers keys that are not present.
+    /// Guesses which key was meant by an unknown key. Prefers keys that are not present.
     fn probably_meant_key(&self, key: &str, known: &[&'static str]) -> Option<&'static str> {
         let absent = |name: &&&'static str| self.entries.get(name).is_none();
         let unavailable = self.unavailable.borrow();

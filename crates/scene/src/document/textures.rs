@@ -1,4 +1,4 @@
-//! `[textures.*]`.
+//! Reads the `[textures.*]` tables.
 
 use std::path::PathBuf;
 
@@ -13,7 +13,7 @@ use super::names::DefinedNames;
 use super::table::TableReader;
 use crate::math::{Vec2, Vec3};
 
-/// The textures of a file.
+/// The textures defined in a file.
 pub(super) struct TextureList {
     /// Texture names.
     pub(super) names: DefinedNames,
@@ -56,7 +56,8 @@ fn read_image_reference(table: &TableReader<'_>) -> (Option<Located<PathBuf>>, O
     (key.file(GLTF), number.integer(table.range("image")).map(Some))
 }
 
-/// Reports textures without `encoding` that are used for both colors and numbers. Alpha has no encoding.
+/// Reports textures without `encoding` that are used for both colors and numbers. Ignores uses of the alpha
+/// channel, which has no encoding.
 pub(super) fn check_encodings(context: &FileContext<'_>, textures: &TextureList, materials: &[Material]) {
     let Some(list) = &textures.list else { return };
     let (mut colors, mut numbers) = (vec![false; list.len()], vec![false; list.len()]);

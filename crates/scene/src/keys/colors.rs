@@ -1,4 +1,4 @@
-//! Color strings.
+//! Color strings: CSS color names and `#rrggbb`.
 
 use csscolorparser::NAMED_COLORS;
 

@@ -9,14 +9,14 @@ const READ: [&str; 15] = [
     "gltf",
 ];
 
-/// Files that may be textures: images and image containers.
+/// Extensions of files that may be textures: images and image containers.
 pub const TEXTURES: &[&str] = &READ;
 
-/// Image files, the first part of [`TEXTURES`].
+/// Extensions of image files, the first part of [`TEXTURES`].
 pub const MAPS: &[&str] = READ.split_at(13).0;
 
-/// Containers of numbered images and parts, the rest of [`TEXTURES`].
+/// Extensions of containers with numbered images and parts, the rest of [`TEXTURES`].
 pub const GLTF: &[&str] = READ.split_at(13).1;
 
-/// Mesh formats.
+/// Extensions of mesh formats.
 pub const MESHES: &[&str] = &["obj", "off", "ply", "stl", "glb", "gltf"];

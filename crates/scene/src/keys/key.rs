@@ -1,14 +1,14 @@
-//! Definitions of keys and tables.
+//! Types that define the keys and tables of scene files.
 
 use super::limits::Limits;
 use crate::choice::Choice;
 
-/// A table of a scene file.
+/// Definition of a scene file table.
 #[derive(Clone, Debug)]
 pub struct TableInfo {
-    /// Name in scene files.
+    /// Name of the table in scene files.
     pub name: &'static str,
-    /// Syntax in scene files.
+    /// Syntax of the table in scene files.
     pub form: TableSyntax,
     /// Description, as one sentence without a period at the end.
     pub doc: &'static str,
@@ -29,7 +29,7 @@ pub enum TableSyntax {
     List,
 }
 
-/// A type of material or light.
+/// Definition of a material or light type.
 #[derive(Clone, Debug)]
 pub struct TypeInfo {
     /// The value of `type`.
@@ -40,14 +40,14 @@ pub struct TypeInfo {
     pub keys: &'static [KeyInfo],
 }
 
-/// A key of a table.
+/// Definition of a key.
 #[derive(Clone, Debug)]
 pub struct KeyInfo {
-    /// The key.
+    /// Name of the key.
     pub name: &'static str,
     /// Accepted values.
     pub kind: ValueKind,
-    /// The unit, or an empty string.
+    /// Unit of the value, or an empty string.
     pub unit: &'static str,
     /// Value if the key is absent.
     pub default: Default,
@@ -78,7 +78,7 @@ pub enum ValueKind {
     Emission(Limits),
     /// A number or a texture.
     NumberOrTexture(Limits),
-    /// An array of numbers. Contains its length and the name of the type, such as `point`.
+    /// An array of numbers, with its length and the name of its type, such as `point`.
     Numbers(usize, &'static str, Limits),
     /// A number or an array of three numbers.
     Scale(Limits),
@@ -112,19 +112,19 @@ impl ValueKind {
     }
 }
 
-/// Returns the words of a choice, in display order.
+/// Function that returns the named values of a choice, in display order.
 pub type WordList = fn() -> Vec<Word>;
 
-/// A word of a choice.
+/// A named value of a choice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Word {
-    /// The word.
+    /// The value's name.
     pub name: &'static str,
-    /// Its meaning.
+    /// Description of the value.
     pub meaning: &'static str,
 }
 
-/// The words of a choice.
+/// Returns the named values of a choice.
 pub fn words<C: Choice>() -> Vec<Word> {
     C::ALL.iter().map(|one| Word { name: one.name(), meaning: one.meaning() }).collect()
 }
@@ -134,11 +134,11 @@ pub fn words<C: Choice>() -> Vec<Word> {
 pub enum Default {
     /// The key is required. Contains an example value.
     Required(&'static str),
-    /// This value, in scene file syntax.
+    /// A constant, in scene file syntax.
     Is(&'static str),
     /// Description of a value that depends on other keys.
     By(&'static str),
-    /// No value.
+    /// The key has no default value.
     Absent,
 }
 

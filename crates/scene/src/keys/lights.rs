@@ -1,4 +1,4 @@
-//! `[[light]]`.
+//! Definitions of the `[[light]]` keys.
 
 use super::key::Default::Is;
 use super::key::ValueKind::{Color, Number, Numbers, Words};

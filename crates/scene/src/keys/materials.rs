@@ -1,4 +1,4 @@
-//! `[materials.NAME]`.
+//! Definitions of the `[materials.NAME]` keys.
 
 use super::key::Default::{Absent, By, Is};
 use super::key::ValueKind::{

@@ -1,4 +1,4 @@
-//! `[render]`, generated from `render_keys!`.
+//! Definitions of the `[render]` keys, generated from `render_keys!`.
 
 use std::sync::LazyLock;
 
@@ -8,7 +8,7 @@ use super::limits::Limits;
 use crate::description::{KeyRange, Render, RenderKey};
 use crate::math::limits::LARGEST;
 
-/// The keys, created on first use.
+/// Definitions of the `[render]` keys, created on first use.
 static KEYS: LazyLock<Vec<KeyInfo>> = LazyLock::new(|| {
     let output = key(
         "output",
@@ -20,7 +20,7 @@ static KEYS: LazyLock<Vec<KeyInfo>> = LazyLock::new(|| {
     Render::keys().into_iter().map(render_key_info).chain([output]).collect()
 });
 
-/// The table.
+/// Returns the definition of the `[render]` table.
 pub(super) fn table() -> TableInfo {
     TableInfo {
         name: "render",

@@ -1,4 +1,4 @@
-//! The shapes: `[[sphere]]` and others.
+//! Definitions of the keys of all shapes, such as `[[sphere]]`.
 
 use super::endings::MESHES;
 use super::key::Default::{Absent, By, Is, Required};
@@ -8,7 +8,7 @@ use super::limits::Limits::{Any, Length, NotZero};
 
 macro_rules! shapes {
     ($($name:literal, $doc:literal: [$($own:expr),* $(,)?];)*) => {
-        /// The shapes. Each has its own keys, followed by the common keys.
+        /// Definitions of all shape tables. Each lists its own keys, followed by the common keys.
         pub(super) const SHAPES: &[TableInfo] = &[$(TableInfo {
             name: $name,
             form: TableSyntax::List,

@@ -1,4 +1,4 @@
-//! `[camera]`, `[photons]` and `[environment]`.
+//! Definitions of the `[camera]`, `[photons]` and `[environment]` keys.
 
 use super::endings::MAPS;
 use super::key::Default::{Absent, By, Is, Required};

@@ -1,4 +1,4 @@
-//! `[textures.NAME]`.
+//! Definitions of the `[textures.NAME]` keys.
 
 use super::endings::TEXTURES as FILES;
 use super::key::Default::{Absent, Is, Required};

@@ -12,7 +12,7 @@ pub type ReportLine = Vec<Piece>;
 /// A run of text with the same role.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Piece {
-    /// Determines the color.
+    /// The role of the text, which determines its color.
     pub role: Role,
     /// The text, without control characters.
     pub text: String,

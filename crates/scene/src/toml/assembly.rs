@@ -1,4 +1,5 @@
-//! Builds tables from headers, keys and values. Enforces TOML's rules for extending tables and for duplicate definitions.
+//! Builds tables from headers, keys and values. Enforces TOML's rules for extending tables and for duplicate
+//! definitions.
 
 use std::borrow::Cow;
 
@@ -7,13 +8,13 @@ use toml_parser::{ErrorSink, ParseError};
 use super::error::{BoundedErrors, SyntaxError};
 use super::tree::{Document, Name, NodeKind, Span, StringRef, TableId, TableOrigin, ValueNode};
 
-/// `[path.key]` or `[[path.key]]`.
+/// A table header, `[path.key]` or `[[path.key]]`.
 #[derive(Clone, Debug)]
 pub(super) struct TableHeader<'s> {
     pub(super) path: Vec<Name<'s>>,
-    /// `None` if the header is unusable. The keys below it are then ignored.
+    /// Last part of the name. `None` if the header is unusable, in which case the keys below it are ignored.
     pub(super) key: Option<Name<'s>>,
-    /// Span including the brackets.
+    /// Span of the header, including the brackets.
     pub(super) span: Span,
     /// Whether the header has double brackets.
     pub(super) is_list: bool,
@@ -29,7 +30,7 @@ pub(super) struct DocumentBuilder<'s> {
     header: Option<TableHeader<'s>>,
     /// An unclosed header, which a later expression may close.
     pub(super) open: Option<TableHeader<'s>>,
-    /// Whether the rest of the document is ignored, after a key without a value.
+    /// Whether the rest of the document is ignored because a key has no value.
     pub(super) is_lost: bool,
     pub(super) syntax: BoundedErrors,
     pub(super) meaning: BoundedErrors,

@@ -1,4 +1,4 @@
-//! TOML errors.
+//! TOML syntax errors and a bounded list of them.
 
 use std::ops::Range;
 
@@ -9,7 +9,7 @@ use toml_parser::{Expected, ParseError};
 pub(crate) struct SyntaxError {
     /// Byte range in the text.
     pub(crate) span: Range<usize>,
-    /// Short description.
+    /// Short description of the error.
     pub(crate) what: String,
     /// Expected tokens: a list, or `nothing`.
     pub(crate) expected: Option<String>,
@@ -26,7 +26,7 @@ impl SyntaxError {
         }
     }
 
-    /// An error that is not from the parser.
+    /// Creates an error that is not from the parser.
     pub(super) fn at(span: Range<usize>, what: impl Into<String>) -> Self {
         Self { span, what: what.into(), expected: None }
     }

@@ -57,7 +57,7 @@ fn parse(tokens: &[Token], source: Source<'_>, events: &mut Vec<Event>, errors: 
     parse_document(tokens, &mut receiver, errors);
 }
 
-/// Finds the end of an expression.
+/// Finds the end of a TOML expression.
 ///
 /// `open` is a supersequence of the parser's open brackets, because a bracket is only closed by its own kind.
 /// With mismatched brackets, the parser may finish earlier, but it is never inside a value while `open` is
@@ -79,7 +79,7 @@ enum ExpressionPhase {
     Equals,
     /// Within brackets.
     Value,
-    /// In the rest of the line, which cannot start a value.
+    /// In the rest of the line, where no value can start.
     Rest,
 }
 

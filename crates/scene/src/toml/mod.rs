@@ -44,7 +44,7 @@ const MAX_DEPTH: u32 = 80;
 /// The byte order mark that may precede a text.
 const MARK: &str = "\u{feff}";
 
-/// Whether a text consists of one dotted key and its value.
+/// Whether a text consists of a single dotted key and its value.
 pub(super) fn is_key_value(text: &str) -> bool {
     let (document, errors) = parse(text);
     errors.is_empty() && document.only_value(tree::Document::ROOT).is_some_and(|(keys, _)| keys.len() >= 2)
@@ -54,7 +54,7 @@ pub(super) fn is_key_value(text: &str) -> bool {
 /// the document's text.
 ///
 /// # Errors
-/// The part of the key that cannot be resolved.
+/// Returns the part of the key that cannot be resolved.
 pub(super) fn set<'s>(
     document: Document<'s>,
     source: &'s str,

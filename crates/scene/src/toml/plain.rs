@@ -2,8 +2,8 @@
 //! bare key and a decimal number, a Boolean, a string without escapes, or a flat single-line array of such
 //! values.
 //!
-//! Large scenes consist of such lines, and this parser takes a tenth of the time. All other lines, including
-//! lines with errors, are left to [`super::expression`]. Tests check that both parsers return the same
+//! Large scenes consist of such lines, and this parser takes a tenth of the time of [`super::expression`],
+//! which handles all other lines, including lines with errors. Tests check that both parsers return the same
 //! results.
 
 use std::borrow::Cow;
@@ -51,7 +51,7 @@ pub(super) fn read_plain_line<'s>(
     Some(line.at)
 }
 
-/// A value. An array if `kind` is `None`.
+/// A scanned value. It is an array if `kind` is `None`.
 struct ScannedValue {
     span: Span,
     kind: Option<NodeKind>,

@@ -1,4 +1,4 @@
-//! Sets values in a document.
+//! Sets values in a document by their dotted keys.
 
 use std::ops::Range;
 
@@ -7,13 +7,13 @@ use super::tree::{Document, Name, NodeKind, TableId, TableOrigin, ValueNode};
 /// A key that cannot be set.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct KeyError {
-    /// Byte range of the part that cannot be resolved.
+    /// Byte range of `part`.
     pub(crate) span: Range<usize>,
-    /// The parts before `part`.
+    /// The parts of the key before `part`.
     pub(crate) above: Vec<String>,
-    /// The part that cannot be resolved.
+    /// The part of the key that cannot be resolved.
     pub(crate) part: String,
-    /// The reason.
+    /// Reason why `part` cannot be resolved.
     pub(crate) why: KeyErrorKind,
 }
 
@@ -22,7 +22,7 @@ pub(crate) struct KeyError {
 pub(crate) enum KeyErrorKind {
     /// The table does not exist and must not be created.
     Unknown {
-        /// Keys that exist.
+        /// Names of the existing tables.
         known: Vec<String>,
     },
     /// The list has no such element.
@@ -32,16 +32,16 @@ pub(crate) enum KeyErrorKind {
         /// Names of all named elements.
         names: Vec<String>,
     },
-    /// Several elements have this name.
+    /// Several elements of the list have this name.
     Ambiguous {
-        /// Number of these elements.
+        /// Number of elements with this name.
         count: usize,
     },
     /// The part refers to an element of an array of values.
     Element,
 }
 
-/// The groups and lists at the top level.
+/// The groups and lists at the top level of a document.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TopLevelLayout {
     /// Top-level tables that contain named tables. Named tables are never created.
@@ -132,14 +132,14 @@ impl<'s> Document<'s> {
         Ok(())
     }
 
-    /// Replaces the value of a key with a new table.
+    /// Sets the value of a key to a new, empty table.
     fn create_table(&mut self, parent: TableId, name: &Name<'s>) -> TableId {
         let table = self.add_table(TableOrigin::default());
         self.set_value(parent, name.clone(), ValueNode { span: name.span, kind: NodeKind::Table(table) });
         table
     }
 
-    /// The index of an element, given its 1-based number or the value of its key `name`.
+    /// Finds the index of an element from its 1-based number or the value of its key `name`.
     fn find_element(&self, elements: &[ValueNode], part: &str) -> Result<usize, KeyErrorKind> {
         let number = part.parse::<usize>().ok().and_then(|number| number.checked_sub(1));
         if let Some(index) = number.filter(|index| *index < elements.len()) {

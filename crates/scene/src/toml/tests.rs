@@ -198,7 +198,7 @@ const KEYS: [&str; 14] = [
     "a.\"b.c\"",
 ];
 
-/// Lines that may conflict.
+/// Random lines, which may conflict with each other.
 fn line() -> impl Strategy<Value = String> {
     let value = prop::sample::select(&VALUES[..]);
     let key = prop::sample::select(&KEYS[..]);
@@ -245,7 +245,7 @@ fn single_lines_and_pairs_match_the_crate() {
 
 #[test]
 fn brackets_in_any_order_match_the_crate() {
-    // All sequences of six of these parts, within an expression and followed by another expression.
+    // Insert every sequence of six of these parts into an expression that other expressions follow.
     let parts = ["[", "]", "{", "}", ",", "\n", "b=", "1 "];
     for number in 0..parts.len().pow(6) {
         let mut rest = number;
@@ -297,7 +297,7 @@ fn too_long_keys_are_reported_with_their_span() {
 }
 
 #[test]
-fn spheres_take_200_bytes() {
+fn spheres_take_at_most_200_bytes() {
     let sphere = "\n[[sphere]]\ncenter = [1.5, -2, 3e1] # somewhere\nradius = 0.5\nmaterial = \"red\"\n";
     let text = sphere.repeat(1_000);
     let (document, errors) = parse(&text);

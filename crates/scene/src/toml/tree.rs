@@ -14,7 +14,7 @@ pub(super) struct Span {
 }
 
 impl Span {
-    /// Offsets are below 4 GiB.
+    /// Creates a span from offsets below 4 GiB.
     pub(super) fn new(start: usize, end: usize) -> Self {
         let offset = |at| u32::try_from(at).unwrap_or(u32::MAX);
         Self { start: offset(start), end: offset(end) }
@@ -44,7 +44,7 @@ pub(super) enum Radix {
     Hexadecimal = 16,
 }
 
-/// Index of a table.
+/// Index of a table in the document.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) struct TableId(u32);
 
@@ -64,7 +64,7 @@ pub(super) enum NodeKind {
 }
 
 impl NodeKind {
-    /// The table, if the value is a table.
+    /// The table's ID, or `None` if the value is not a table.
     pub(super) fn table(self) -> Option<TableId> {
         if let Self::Table(table) = self { Some(table) } else { None }
     }
@@ -91,7 +91,7 @@ struct TableEntry {
 /// End of a linked list.
 const NONE: u32 = u32::MAX;
 
-/// Origin of a table. Determines whether keys may be added.
+/// Origin of a table, which determines whether keys may be added.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct TableOrigin {
     /// Whether the table was created by a longer header or key.
@@ -133,7 +133,7 @@ pub(crate) struct Document<'s> {
     arrays: Vec<Span>,
     elements: Vec<ValueNode>,
     lists: Vec<Vec<ValueNode>>,
-    /// Entries of tables with more than [`MAX_LINEAR`] entries.
+    /// Hash index of the entries of tables with more than [`MAX_LINEAR`] entries.
     index: HashMap<(TableId, Cow<'s, str>), u32>,
 }
 
@@ -197,7 +197,7 @@ impl<'s> Document<'s> {
         &mut self.lists[list as usize]
     }
 
-    /// Stores a decoded string with this span.
+    /// Stores the decoded string at `span`.
     pub(super) fn add_text(&mut self, span: Span, text: Cow<'s, str>) -> StringRef {
         let written = self.source.get(span.range()).unwrap_or_default();
         if text == written {
@@ -268,7 +268,7 @@ impl<'s> Document<'s> {
         None
     }
 
-    /// The value of a key.
+    /// Finds the value of a key.
     pub(super) fn find(&self, table: TableId, name: &str) -> Option<ValueNode> {
         self.find_entry(table, name).map(|entry| self.entries[entry as usize].node)
     }
@@ -283,7 +283,7 @@ impl<'s> Document<'s> {
         (entry.key, entry.text, entry.node) = (name.span, text, node);
     }
 
-    /// The only value in a table, and its dotted key. `None` if there are several values or if the value has
+    /// The only value in a table, with its dotted key. `None` if there are several values or if the value has
     /// a header.
     pub(super) fn only_value(&self, table: TableId) -> Option<(Vec<Name<'s>>, ValueNode)> {
         let mut keys = Vec::new();
@@ -307,7 +307,7 @@ impl<'s> Document<'s> {
         Entries { document: self, table }.iter().map(|entry| entry.key.to_owned()).collect()
     }
 
-    /// The value of a key, if it is a string.
+    /// Finds the value of a key. `None` if it is absent or not a string.
     pub(super) fn find_text(&self, table: TableId, name: &str) -> Option<&str> {
         let node = self.find(table, name)?;
         if let NodeKind::String(text) = node.kind { Some(self.text(node.span, text)) } else { None }
@@ -399,7 +399,7 @@ impl<'d> Value<'d> {
         self.node.span.range()
     }
 
-    /// The elements, if the value is an array.
+    /// The elements of an array. `None` if the value is not an array.
     pub(crate) fn array(&self) -> Option<Elements<'d>> {
         if let TomlValue::Array(array) = self.item() { Some(array) } else { None }
     }
@@ -435,7 +435,7 @@ pub(crate) struct Elements<'d> {
 }
 
 impl<'d> Elements<'d> {
-    /// Number of entries.
+    /// Number of elements.
     pub(crate) fn len(&self) -> usize {
         self.nodes.len()
     }
@@ -462,16 +462,16 @@ pub(crate) struct Entries<'d> {
 /// A key and its value.
 #[derive(Clone, Debug)]
 pub(crate) struct KeyValue<'d> {
-    /// The key, decoded.
+    /// The decoded key.
     pub(crate) key: &'d str,
     /// Byte range of the key.
     pub(crate) span: Range<usize>,
-    /// Its value.
+    /// Value of the key.
     pub(crate) value: Value<'d>,
 }
 
 impl<'d> Entries<'d> {
-    /// The entry with this key.
+    /// Finds the entry with the given key.
     pub(crate) fn get(&self, name: &str) -> Option<KeyValue<'d>> {
         self.document.find_entry(self.table, name).map(|entry| self.entry(entry))
     }

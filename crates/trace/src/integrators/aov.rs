@@ -57,7 +57,7 @@ fn count_photons(maps: &PhotonMaps, tile: &TileContext<'_>, slot: u32, vertex: &
     [&pass.caustic, &pass.bounced].map(|map| map.count_near(&look, PortableSimd) as f32).iter().sum()
 }
 
-/// Depth along the view axis.
+/// Depth of a surface point along the view axis.
 fn view_depth(tile: &TileContext<'_>, surface: &SurfacePoint) -> f32 {
     tile.world.camera.depth_of(surface.point.as_dvec3()).max(0.0) as f32
 }

@@ -48,11 +48,11 @@ pub use view::{AovSource, Components, FirstHit, LightAov, View};
 /// Number of camera rays in a batch.
 const BATCH_SIZE: usize = 1024;
 
-/// Renders the samples with the indices `samples` of every pixel of `tile`. The result depends only on the
+/// Renders the samples with the indices `samples` of every pixel in `pixels`. The result depends only on the
 /// arguments, so it does not matter how an image is divided into tiles or its samples into ranges.
 ///
 /// # Errors
-/// [`Cancelled`] if the token is cancelled. The token is checked every few hundred rays.
+/// [`Cancelled`] if the token is canceled. The token is checked every few hundred rays.
 pub fn render_tile(
     world: &World,
     settings: &RenderSettings,
@@ -66,7 +66,7 @@ pub fn render_tile(
 /// Like [`render_tile`], with the samples' photon maps. Without maps, no photons are gathered.
 ///
 /// # Errors
-/// [`Cancelled`].
+/// [`Cancelled`] if the token is canceled.
 pub fn render_tile_with_photons(
     photons: Option<&PhotonMaps>,
     world: &World,
@@ -123,7 +123,7 @@ pub fn render_tile_with_photons(
     Ok((TileSamples { pixels: block.pixels, samples, radiance, negative }, counters))
 }
 
-/// Sets `marked`, for the slots starting at `first`, to the corresponding bits.
+/// Copies the bits of a mask to `marked`, starting at slot `first`.
 fn mark(marked: &mut [bool], first: u32, bits: u32) {
     for (lane, marked) in marked.iter_mut().skip(first as usize).take(PACKET_SIZE).enumerate() {
         *marked = bits & 1 << lane != 0;

@@ -100,7 +100,8 @@ impl View {
 pub enum AovSource {
     /// Light gathered by paths.
     Light(LightAov),
-    /// A quantity at the first hit, without exposure or tone mapping. All except depth are displayed unchanged.
+    /// A quantity at the first hit, without exposure or tone mapping. All quantities except depth are displayed
+    /// unchanged.
     FirstHit(FirstHit),
     /// The beauty image, overlaid with the acceleration structures' bounding boxes.
     Bounds,
@@ -190,7 +191,7 @@ pub struct PathClasses {
 impl PathClasses {
     /// All classes.
     pub const ALL: Self = Self { direct: true, caustic: true, indirect: true };
-    /// No class.
+    /// No classes.
     pub const NONE: Self = Self { direct: false, caustic: false, indirect: false };
 }
 
@@ -211,16 +212,16 @@ impl Components {
 /// A quantity at the first hit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FirstHit {
-    /// [`View::Normal`].
+    /// Shading normal.
     Normal,
-    /// [`View::Depth`].
+    /// Depth along the view axis.
     Depth,
-    /// [`View::Barycentric`].
+    /// Barycentric coordinates.
     Barycentric,
-    /// [`View::Uv`].
+    /// Texture coordinates.
     Uv,
-    /// [`View::Albedo`].
+    /// Diffuse reflectance.
     Albedo,
-    /// [`View::Photons`].
+    /// Number of photons within the kernel.
     Photons,
 }

@@ -141,7 +141,7 @@ impl Camera {
         self.forward + self.right * place.x + self.up * place.y
     }
 
-    /// Width of a pixel's footprint per unit of distance, at the image center, for an image of `rows` pixel rows.
+    /// Width of a pixel's footprint per unit of distance, at the center of an image with `rows` rows.
     pub fn pixel_spread(&self, rows: u32) -> f32 {
         (2.0 * self.tan_half_fov / f64::from(rows)) as f32
     }
@@ -156,7 +156,7 @@ impl Camera {
 /// down.
 const UPRIGHT: f64 = 1e-3;
 
-/// Used if the orbiter file is missing. The pipeline reports the missing file as an error first.
+/// Orbiter used if the orbiter file is missing. The pipeline reports the missing file as an error first.
 const DEFAULT_ORBITER: OrbiterCamera = OrbiterCamera {
     center: [0.0; 3],
     position: [0.0; 2],
@@ -186,7 +186,7 @@ mod tests {
     }
 
     #[test]
-    fn rays_through_image_center_and_edges() {
+    fn rays_pass_through_image_points() {
         let camera = look_at(0.0);
         let direction = |x, y| camera.ray(DVec2::new(x, y), Vec2::ZERO).direction;
         assert!((direction(0.0, 0.0) - Vec3::NEG_Z).length() < 1e-6);

@@ -14,7 +14,7 @@ use crate::math::{DVec3, Vec2, Vec3};
 /// Minimum number of rays to cast.
 const MIN_RAYS: usize = 32;
 
-/// Difference between the numbers of inside and outside rays at which to stop.
+/// Difference between the numbers of inside and outside rays at which voting stops.
 const MAJORITY: i32 = 3;
 
 /// Maximum number of other surfaces that a ray may pass through.

@@ -42,16 +42,16 @@ impl OffsetPoints {
 pub enum CoincidentSurface {
     /// A glass shape that encloses [`OffsetPoints::beyond`].
     Around {
-        /// Its object.
+        /// Index of the shape's object.
         object: u32,
-        /// Its material.
+        /// Material of the shape.
         material: u32,
     },
     /// Any other surface that the segment between the points hits.
     Surface {
         /// The hit along the segment.
         hit: Hit,
-        /// Its material.
+        /// Material of the surface.
         material: u32,
         /// Whether `before` is on the surface's front side or, for glass, outside the solid.
         is_front: bool,
@@ -80,7 +80,7 @@ pub struct ContactQuery<'a> {
     pub lead: f32,
 }
 
-/// The two points, and the point before the surfaces if `lead` is ignored.
+/// The offset points, and the point in front of the surfaces without the `lead` distance.
 #[derive(Clone, Copy)]
 struct ContactProbe {
     sides: OffsetPoints,
@@ -296,8 +296,8 @@ impl Geometry {
     }
 
     /// Collects shapes and triangles that may coincide with the hit point, and returns their error bound per
-    /// axis. Of the shapes that enclose the point but whose surfaces are far away, only the shapes in
-    /// `enclosing` are included for each subtree.
+    /// axis. Shapes that enclose the point but whose surfaces are far away are included only if `enclosing`
+    /// lists them for their subtree.
     pub(super) fn find_candidates(
         &self,
         at: &ContactQuery<'_>,

@@ -1,9 +1,9 @@
 //! Lights coplanar with other surfaces.
 //!
 //! For two surfaces in one plane, rounding determines which surface a ray hits first. Path rays might hit a
-//! coplanar light while shadow rays to the light are blocked, or the reverse, and the two estimates of its
-//! contribution would disagree. Coplanar lights are therefore moved off the plane by a tiny distance, toward
-//! the side to which they emit.
+//! coplanar light while shadow rays to the light are blocked, or the reverse, and the two estimates of the
+//! light's contribution would disagree. Coplanar lights are therefore moved off the plane by a tiny distance,
+//! toward the side to which they emit.
 
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
@@ -35,7 +35,7 @@ const MAX_PAIRS: usize = 1 << 26;
 pub struct CoplanarLight {
     /// The emitting object.
     pub light: usize,
-    /// The other object, which is the same object if both faces belong to one mesh.
+    /// The overlapped object, equal to `light` if both faces belong to one mesh.
     pub surface: usize,
     /// Translation that moves the light off the surface.
     pub lift: DVec3,
@@ -185,8 +185,8 @@ pub fn light_lifts(scene: &Scene, meshes: &[Arc<MeshTree>], origin: DVec3) -> Ve
     lifts
 }
 
-/// Mesh in which emissive triangles coplanar with other faces of the mesh are moved off these faces. `None`
-/// if there are no such triangles.
+/// Returns a copy of the mesh in which emissive triangles coplanar with other faces are moved off these
+/// faces. `None` if there are no such triangles.
 pub fn with_lifted_lights(loaded: &LoadedMesh) -> Option<LoadedMesh> {
     let mesh = &loaded.mesh;
     let emits = |triangle: u32| {

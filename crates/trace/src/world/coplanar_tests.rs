@@ -117,9 +117,9 @@ fn built(scene: &Scene, accel: Accel) -> Geometry {
 /// Geometry of a scene whose mesh files all have this content.
 fn built_of(scene: &Scene, accel: Accel, loaded: LoadedMesh) -> Geometry {
     let (token, loaded) = (CancelToken::new(), Arc::new(loaded));
-    let tree = || Arc::new(MeshTree::build(Arc::clone(&loaded), accel, &token).expect("nobody cancels"));
+    let tree = || Arc::new(MeshTree::build(Arc::clone(&loaded), accel, &token).expect("never canceled"));
     let meshes: Vec<_> = scene.mesh_files.iter().map(|_| tree()).collect();
-    Geometry::of_scene(scene, &meshes, DVec3::ZERO, &token).expect("nobody cancels")
+    Geometry::of_scene(scene, &meshes, DVec3::ZERO, &token).expect("never canceled")
 }
 
 #[test]
@@ -136,7 +136,7 @@ fn lifted_lights_are_hit_only_from_the_front() {
                 for _ in 0..50 {
                     let target = Vec3::new(next() * 0.1, 0.0, next() * 0.1);
                     let from = Vec3::new(next() * 8.0, 0.5 + next().abs() * 9.0, next() * 8.0);
-                    let hit = geometry.closest(&Ray::new(from, target - from)).expect("both");
+                    let hit = geometry.closest(&Ray::new(from, target - from)).expect("a hit");
                     assert_eq!(hit.object, number, "{tables} {from}");
                     // Shadow rays that ignore the light reach it because the surface below does not occlude
                     // it.
@@ -144,7 +144,7 @@ fn lifted_lights_are_hit_only_from_the_front() {
                     assert!(!geometry.occluded(&shadow, LightObject::Object(number)), "{tables} {from}");
                     let is_closed = tables.contains("box") || tables.contains("cylinder");
                     let below = Vec3::new(from.x, -from.y, from.z);
-                    let hit = geometry.closest(&Ray::new(below, target - below)).expect("both");
+                    let hit = geometry.closest(&Ray::new(below, target - below)).expect("a hit");
                     assert!(is_closed || hit.object != number, "{tables} {below}");
                     // Light samples are occluded from the same positions as hits.
                     let lift = geometry.lifts()[number as usize].as_vec3();
@@ -193,7 +193,7 @@ fn lights_in_tilted_and_distant_planes_are_lifted() {
             let target = center + (x * vector().x + y * vector().x) * 0.9;
             let from = target + x.cross(y) * (2.0 + f64::from(round)) + vector() * 2.0;
             let ray = Ray::new(from.as_vec3(), (target - from).as_vec3());
-            assert_eq!(geometry.closest(&ray).expect("both").object, 1, "{tables} {from}");
+            assert_eq!(geometry.closest(&ray).expect("a hit").object, 1, "{tables} {from}");
         }
     }
 }

@@ -48,8 +48,8 @@ pub fn lights(
     let emissive: Vec<EmissiveMaterial> = emissive.collect();
     let environment = scene.environment.as_ref().and_then(|environment| environment_light(environment, sky));
     let mut all: Vec<Light> = points.chain(environment.map(Light::Environment)).collect();
-    for ((id, object), delta_or_directional_light) in objects {
-        let emissive = delta_or_directional_light.material.map(|index| &emissive[index]);
+    for ((id, object), described) in objects {
+        let emissive = described.material.map(|index| &emissive[index]);
         match object {
             Object::Shape(shape) => {
                 let lights = emissive.into_iter().flat_map(|emissive| shape_lights(shape, emissive, id));
@@ -86,7 +86,7 @@ fn environment_light(
     }
 }
 
-/// A non-surface light, in coordinates relative to `origin`.
+/// Converts a light without a shape to coordinates relative to `origin`.
 fn delta_or_directional_light(light: &description::Light, origin: DVec3) -> Light {
     let point = |light: &description::light::PointLight| {
         let description::light::PointLight { position, intensity, falloff } = *light;
@@ -152,7 +152,7 @@ impl EmissiveMaterial {
         self.opacity.as_ref().map_or(bounds, |opacity| bounds.scaled_by(Vec3::splat(opacity.mean())))
     }
 
-    /// Factor that varies with position or direction. `chart` maps points on the emitter to UVs.
+    /// Emission factor that varies with position or direction. `chart` maps points on the emitter to UVs.
     fn texture(&self, chart: UvChart) -> Option<EmissionTexture> {
         let Emission { texture, coat, .. } = &self.emission;
         EmissionTexture::under_coat(texture.as_ref(), self.opacity.as_ref(), coat.as_ref(), chart)
@@ -182,7 +182,7 @@ fn shape_lights(shape: &Shape, emissive: &EmissiveMaterial, object: u32) -> impl
     emissive.sides().iter().filter_map(of_side)
 }
 
-/// Lights of a mesh. If `emissive` is `None`, its triangles have the materials from the mesh file.
+/// Lights of a mesh. If `emissive` is `None`, the triangles have the materials from the mesh file.
 fn mesh_lights(
     object: u32,
     mesh: &MeshInstance,
@@ -272,7 +272,7 @@ mod tests {
         let mesh = TriangleMesh { positions, triangles, ..TriangleMesh::default() };
         let loaded = Arc::new(LoadedMesh { mesh, ..LoadedMesh::default() });
         let token = CancelToken::new();
-        let tree = Arc::new(MeshTree::build(loaded, Accel::Bvh, &token).expect("nobody cancels"));
+        let tree = Arc::new(MeshTree::build(loaded, Accel::Bvh, &token).expect("never canceled"));
         let turned = DVec3::new(30.0, -50.0, 80.0);
         for (scale, at) in [
             (DVec3::ONE, DVec3::ZERO),
@@ -284,11 +284,11 @@ mod tests {
             let mesh = MeshInstance::new(Arc::clone(&tree), transform, false);
             let emissive = EmissiveMaterial::new(Emission::constant(Vec3::ONE), None);
             let lights = mesh_lights(0, &mesh, Some(&emissive), &Images::default(), &CancelToken::new())
-                .expect("nobody cancels");
+                .expect("never canceled");
             let lights = lights.into_iter().map(Light::Area).collect();
-            let lights = Arc::new(Lights::new(lights, &CancelToken::new()).expect("nobody cancels"));
+            let lights = Arc::new(Lights::new(lights, &CancelToken::new()).expect("never canceled"));
             let geometry = Geometry::build(vec![Object::Mesh(Box::new(mesh))], &token);
-            let geometry = geometry.expect("nobody cancels");
+            let geometry = geometry.expect("never canceled");
             let source = photon_source(&geometry, &lights).expect("a photon source");
             let mut next = random::unit(1);
             for _ in 0..20_000 {

@@ -58,7 +58,7 @@ impl Geometry {
     /// Builds the geometry of a scene from its objects and mesh trees, in coordinates relative to `origin`.
     ///
     /// # Errors
-    /// [`Cancelled`].
+    /// [`Cancelled`] if the token is canceled.
     pub fn of_scene(
         scene: &Scene,
         meshes: &[Arc<MeshTree>],
@@ -71,7 +71,7 @@ impl Geometry {
     /// Like [`Self::of_scene`], with translations from [`light_lifts`].
     ///
     /// # Errors
-    /// [`Cancelled`].
+    /// [`Cancelled`] if the token is canceled.
     pub fn with_lifts(
         scene: &Scene,
         meshes: &[Arc<MeshTree>],
@@ -93,7 +93,7 @@ impl Geometry {
     /// Builds the acceleration structures over objects.
     ///
     /// # Errors
-    /// [`Cancelled`].
+    /// [`Cancelled`] if the token is canceled.
     pub fn build(mut objects: Vec<Object>, token: &CancelToken) -> Result<Self, Cancelled> {
         let merged = MergedMeshes::of_objects(&mut objects, token)?;
         number_triangles(&mut objects);
@@ -149,8 +149,8 @@ impl Geometry {
         self.merged.as_ref().map_or(&self.tree, |merged| &merged.over)
     }
 
-    /// Returns the merged meshes if they are represented by `id`, an id from [`Geometry::traced_tree`], and
-    /// `None` if it is an object.
+    /// Returns the merged meshes if `id`, an id from [`Geometry::traced_tree`], represents them. `None` if
+    /// `id` is an object.
     #[inline(always)]
     pub(super) fn merged(&self, id: u32) -> Option<&MergedMeshes> {
         let merged = self.merged.as_ref()?;
@@ -168,7 +168,7 @@ impl Geometry {
         self.merged.as_ref().is_some_and(|merged| merged.meshes.has(object))
     }
 
-    /// Whether a light is an entire merged mesh. Shadow rays to these lights use the per-mesh trees instead.
+    /// Whether a light is an entire merged mesh. Shadow rays to such lights use the per-mesh trees instead.
     #[inline(always)]
     pub(super) fn is_whole_merged(&self, source: LightObject) -> bool {
         match (source, &self.merged) {
@@ -418,7 +418,7 @@ mod tests {
             Object::Mesh(Box::new(MeshInstance::new(Arc::clone(&trees[tree]), transform, false)))
         };
         let objects = [2, 0, 1, 3, 2].into_iter().enumerate().map(placed).collect();
-        Geometry::build(objects, &CancelToken::new()).expect("nobody cancels")
+        Geometry::build(objects, &CancelToken::new()).expect("never canceled")
     }
 
     #[test]

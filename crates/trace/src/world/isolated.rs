@@ -13,7 +13,7 @@ use crate::accel::OverlappingItem;
 use crate::geometry::{Aabb, Shape, SurfacePoint};
 use crate::math::{DVec3, Vec3};
 
-/// State that has not been computed.
+/// State of a triangle or grid cell that has not been computed yet.
 const UNKNOWN: u8 = 0;
 
 /// State of a region in which other surfaces may be near any point.
@@ -23,7 +23,7 @@ const NEVER: u8 = u8::MAX;
 /// STATE_STEPS` are isolated.
 const STATE_STEPS: f32 = 256.0;
 
-/// Maximum triangle state to test.
+/// Largest state that is tested for a triangle.
 const MAX_STATE: f64 = 64.0;
 
 /// Distance from a triangle's edges to its isolated part, in margins. At this distance, neighbors at angles
@@ -97,7 +97,7 @@ impl IsolationTable {
     }
 }
 
-/// A region of a surface.
+/// A surface region to test for isolation.
 enum SurfaceRegion {
     /// A grid cell, expanded by the margin.
     GridCell(Aabb),

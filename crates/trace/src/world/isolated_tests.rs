@@ -49,7 +49,7 @@ impl SceneBuilder {
 
     fn mesh(mut self, mesh: TriangleMesh, [scale, rotate, translate]: [DVec3; 3], material: usize) -> Self {
         let loaded = Arc::new(LoadedMesh { mesh, ..LoadedMesh::default() });
-        let tree = MeshTree::build(loaded, Accel::Bvh, &CancelToken::new()).expect("nobody cancels");
+        let tree = MeshTree::build(loaded, Accel::Bvh, &CancelToken::new()).expect("never canceled");
         self.meshes.push(Arc::new(tree));
         self.scene.mesh_files.push(MeshFile { value: PathBuf::new(), span: 0..0, part: None });
         let file = self.meshes.len() - 1;
@@ -60,8 +60,8 @@ impl SceneBuilder {
     fn world(self) -> World {
         let token = CancelToken::new();
         let geometry = Geometry::of_scene(&self.scene, &self.meshes, DVec3::ZERO, &token);
-        let geometry = Arc::new(geometry.expect("nobody cancels"));
-        let lights = lights(&self.scene, &geometry, &Images::new(), None, &token).expect("nobody cancels");
+        let geometry = Arc::new(geometry.expect("never canceled"));
+        let lights = lights(&self.scene, &geometry, &Images::new(), None, &token).expect("never canceled");
         World::new(
             &self.scene,
             &WorldInputs { meshes: self.meshes, ..WorldInputs::default() },
@@ -261,9 +261,9 @@ fn isolated_regions_match_the_full_search() {
                 normal,
                 lead: hit.shape.t * f32::EPSILON * facing.abs(),
             };
-            let found = |hit_candidate: bool| -> (OffsetPoints, Vec<CoincidentSurface>) {
+            let found = |only_hit: bool| -> (OffsetPoints, Vec<CoincidentSurface>) {
                 let (mut memory, mut near) = (ContactScratch::default(), Vec::new());
-                let error = if hit_candidate {
+                let error = if only_hit {
                     world.geometry.hit_candidate(&at, &mut memory)
                 } else {
                     world.geometry.find_candidates(&at, &mut memory, &world.enclosing_glass)
@@ -322,7 +322,7 @@ fn nested_sphere_search_takes_log_squared_time() {
             // Each level of the tree lists a few spheres.
             let bound = 1.5 * f64::from(count).log2().powi(2);
             assert!(f64::from(found) <= bound, "{found} of {count}");
-            // They include the spheres that determine the medium.
+            // Check that the listed spheres include the spheres that determine the medium.
             let glasses = world.closed_glasses().map(|(object, _)| object);
             let enclosing = glasses.filter(|object| world.encloses(*object, sides.beyond));
             let enclosing: Vec<_> = enclosing.collect();

@@ -111,7 +111,7 @@ fn metal(fresnel: ConductorFresnel, roughness: Number, anisotropy: Number) -> Bs
     Bsdf::Rough(if is_brushed { Rough::BrushedConductor(metal) } else { Rough::Conductor(metal) })
 }
 
-/// Plastic. With roughness 0, the coat becomes a δ lobe over the diffuse base.
+/// Converts plastic. With roughness 0, the coat becomes a δ lobe over the diffuse base.
 fn plastic(diffuse: Color, specular: Color, roughness: Number, ior: f32) -> Bsdf {
     let is_smooth = roughness.constant() == Some(0.0);
     let base = Rough::Plastic(Plastic::new(diffuse, specular.clone(), roughness, ior));
@@ -386,8 +386,8 @@ fn file_texture(images: &Images, texture: &FileTexture, used: TextureUse) -> Opt
     }))
 }
 
-/// Loaded image. Materials without objects may refer to images that were not loaded, which are never looked
-/// up.
+/// Returns a loaded image, or a placeholder if the image was not loaded. Only materials without objects,
+/// which are never looked up, refer to such images.
 fn loaded_image(images: &Images, source: &TextureSource) -> Image {
     images.get(source).cloned().unwrap_or_else(|| {
         let data = TexelData::Linear8(vec![[128, 128, 255]]);

@@ -57,13 +57,13 @@ pub struct MergedMeshes {
 }
 
 impl MergedMeshes {
-    /// Marks an object that is not merged.
+    /// Entry of `first` for an object that is not merged.
     const NOT_HERE: u32 = u32::MAX;
 
     /// Merges the small meshes among `objects`. Returns `None` if merging is not worthwhile.
     ///
     /// # Errors
-    /// [`Cancelled`].
+    /// [`Cancelled`] if the token is canceled.
     pub fn of_objects(objects: &mut [Object], token: &CancelToken) -> Result<Option<Self>, Cancelled> {
         // Choose the smallest meshes first, up to the maximum number of triangles to rebuild after each edit.
         let count = |object: &Object| object.mesh().map_or(0, MeshInstance::triangle_count);
@@ -388,7 +388,7 @@ pub(super) mod tests {
             }
         }
         let loaded = Arc::new(LoadedMesh { mesh, ..LoadedMesh::default() });
-        Arc::new(MeshTree::build(loaded, Accel::Bvh, &CancelToken::new()).expect("nobody cancels"))
+        Arc::new(MeshTree::build(loaded, Accel::Bvh, &CancelToken::new()).expect("never canceled"))
     }
 
     fn objects(of: &[(&Arc<MeshTree>, Transform)]) -> Vec<Object> {
@@ -399,7 +399,7 @@ pub(super) mod tests {
     }
 
     fn geometry(objects: Vec<Object>) -> Geometry {
-        Geometry::build(objects, &CancelToken::new()).expect("nobody cancels")
+        Geometry::build(objects, &CancelToken::new()).expect("never canceled")
     }
 
     fn rays(seed: u64) -> Vec<Ray> {
@@ -419,7 +419,7 @@ pub(super) mod tests {
             TriangleMesh { positions: corners.to_vec(), triangles: vec![[0, 1, 2]], ..Default::default() };
         let loaded = Arc::new(LoadedMesh { mesh: ground, ..LoadedMesh::default() });
         let ground =
-            Arc::new(MeshTree::build(loaded, Accel::Bvh, &CancelToken::new()).expect("nobody cancels"));
+            Arc::new(MeshTree::build(loaded, Accel::Bvh, &CancelToken::new()).expect("never canceled"));
         let small = mesh(7, 100);
         let shift = DVec3::new(0.37, 0.11, -0.21);
         let turned = Transform::scale_rotate_translate(DVec3::ONE, DVec3::new(0.0, 0.0, 17.3), shift);
@@ -495,7 +495,7 @@ pub(super) mod tests {
             mesh.triangles.push([3 * i, 3 * i + 1, 3 * i + 2]);
         }
         let loaded = Arc::new(LoadedMesh { mesh, ..LoadedMesh::default() });
-        Arc::new(MeshTree::build(loaded, Accel::Bvh, &CancelToken::new()).expect("nobody cancels"))
+        Arc::new(MeshTree::build(loaded, Accel::Bvh, &CancelToken::new()).expect("never canceled"))
     }
 
     #[test]
@@ -539,12 +539,12 @@ pub(super) mod tests {
         let far = Transform::scale_rotate_translate(DVec3::splat(1e-4), DVec3::ZERO, DVec3::splat(9.0));
         let members = |of: &[(&Arc<MeshTree>, Transform)]| {
             let mut objects = objects(of);
-            let merged = MergedMeshes::of_objects(&mut objects, &CancelToken::new()).expect("nobody cancels");
+            let merged = MergedMeshes::of_objects(&mut objects, &CancelToken::new()).expect("never canceled");
             merged.map(|merged| (0..of.len() as u32).filter(|&id| merged.has(id)).collect::<Vec<_>>())
         };
         assert_eq!(members(&[(&small, here), (&few, here)]), Some(vec![0, 1]));
         assert_eq!(members(&[(&small, here), (&few, far), (&few, here)]), Some(vec![0, 2]));
-        assert_eq!(members(&[(&small, here)]), None, "alone");
+        assert_eq!(members(&[(&small, here)]), None, "a single mesh");
         // A few triangles are merged without a tree if there are enough of them and there are no slivers.
         assert_eq!(members(&[(&few, here), (&few, here)]), Some(vec![0, 1]));
         assert_eq!(members(&[(&few, here)]), Some(vec![0]));

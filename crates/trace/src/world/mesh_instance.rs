@@ -246,7 +246,7 @@ impl MeshInstance {
         }
     }
 
-    /// UV and tangents. Uses barycentric coordinates if the mesh has no UVs.
+    /// UV and tangents at a point on a triangle. Uses barycentric coordinates if the mesh has no UVs.
     fn parameterization(
         &self,
         uvs: &[Vec2],
@@ -335,7 +335,7 @@ mod tests {
             ..TriangleMesh::default()
         };
         let loaded = Arc::new(LoadedMesh { mesh, ..LoadedMesh::default() });
-        let tree = MeshTree::build(loaded, Accel::Bvh, &CancelToken::new()).expect("nobody cancels");
+        let tree = MeshTree::build(loaded, Accel::Bvh, &CancelToken::new()).expect("never canceled");
         let tree = Arc::new(tree);
         for _ in 0..20 {
             let transform = Transform::scale_rotate_translate(vector(), vector() * 180.0, vector());

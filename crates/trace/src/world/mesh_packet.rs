@@ -240,7 +240,7 @@ mod tests {
         let mut instances = Vec::new();
         for mesh in [mesh, with_uvs, with_both] {
             let loaded = Arc::new(LoadedMesh { mesh, ..LoadedMesh::default() });
-            let tree = MeshTree::build(loaded, Accel::Bvh, &CancelToken::new()).expect("nobody cancels");
+            let tree = MeshTree::build(loaded, Accel::Bvh, &CancelToken::new()).expect("never canceled");
             let tree = Arc::new(tree);
             for transform in
                 [Transform::IDENTITY, placed(DVec3::splat(1.3)), placed(DVec3::new(0.2, -1.0, 3.0))]
@@ -263,7 +263,7 @@ mod tests {
                 ..TriangleMesh::default()
             };
             let loaded = Arc::new(LoadedMesh { mesh, ..LoadedMesh::default() });
-            let tree = MeshTree::build(loaded, Accel::Bvh, &CancelToken::new()).expect("nobody cancels");
+            let tree = MeshTree::build(loaded, Accel::Bvh, &CancelToken::new()).expect("never canceled");
             let tree = Arc::new(tree);
             let turned = Transform::scale_rotate_translate(DVec3::ONE, DVec3::Y * 30.0, DVec3::Y * 0.25);
             for (mesh, height) in [

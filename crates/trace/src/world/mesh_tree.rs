@@ -39,7 +39,7 @@ impl MeshTree {
         &self.tree
     }
 
-    /// The type of tree.
+    /// Type of the tree.
     pub fn accel(&self) -> Accel {
         self.accel
     }

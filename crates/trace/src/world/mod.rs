@@ -83,7 +83,7 @@ pub struct WorldInputs {
     pub images: Images,
     /// Contents of the orbiter file. `None` if the scene file defines the camera itself.
     pub orbiter: Option<OrbiterCamera>,
-    /// Replaces the scene's camera.
+    /// Camera that replaces the scene's camera, if any.
     pub camera: Option<description::Camera>,
     /// Glass solids, if already known.
     pub glass_solids: Option<Arc<GlassSolids>>,
@@ -102,7 +102,7 @@ pub struct World {
     packet_material: Box<[Option<PacketMaterial>]>,
     /// Whether any material's lobes depend on the texture axes.
     has_directions: bool,
-    /// [`Material::is_textured`] of each material.
+    /// Whether each material is textured; see [`Material::is_textured`].
     textured: Box<[bool]>,
     /// For each object, its material or the materials of its mesh file.
     object_materials: Vec<ObjectMaterial>,
@@ -124,7 +124,7 @@ pub struct World {
     enclosing_glass: Box<[contact::EnclosingGlass]>,
     /// Other glass solids that contain the camera, with their materials.
     camera_solids: Vec<(u32, u32)>,
-    /// [`Material::is_mipmapped`] of each material.
+    /// Whether each material is mipmapped; see [`Material::is_mipmapped`].
     mipmapped: Box<[bool]>,
     /// Whether any texture uses a mesh's second UV set.
     has_second_uvs: bool,
@@ -201,13 +201,13 @@ impl World {
         }
     }
 
-    /// [`Material::is_textured`] of a material.
+    /// Whether a material is textured; see [`Material::is_textured`].
     #[inline(always)]
     pub fn is_textured(&self, material: usize) -> bool {
         self.textured[material]
     }
 
-    /// [`Material::is_mipmapped`] of a material.
+    /// Whether a material is mipmapped; see [`Material::is_mipmapped`].
     #[inline(always)]
     pub fn is_mipmapped(&self, material: usize) -> bool {
         self.mipmapped[material]
@@ -276,7 +276,7 @@ impl World {
         self.mipmapped.contains(&true)
     }
 
-    /// Total number of triangles, including those of every mesh instance.
+    /// Total number of triangles, counting every mesh instance.
     pub fn triangle_count(&self) -> u64 {
         self.geometry.objects().iter().map(Object::triangle_count).sum()
     }

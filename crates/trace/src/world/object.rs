@@ -11,7 +11,7 @@ use crate::math::lanes::Simd;
 /// A traceable object.
 #[derive(Clone, Debug)]
 pub enum Object {
-    /// A shape.
+    /// An analytic shape.
     Shape(Shape),
     /// An instance of a mesh.
     Mesh(Box<MeshInstance>),

@@ -69,7 +69,7 @@ impl Geometry {
         (0..PACKET_SIZE).filter(|&lane| is_whole(lane)).fold(0, |bits, lane| bits | 1 << lane)
     }
 
-    /// [`Geometry::closest_rows`], ray by ray.
+    /// Like [`Geometry::closest_rows`], but traces the rays one by one.
     #[cold]
     #[inline(never)]
     fn closest_by_each(
@@ -322,7 +322,7 @@ pub(super) mod tests {
             mesh.triangles.push([0, i + 1, (i + 1) % 40 + 1]);
         }
         let loaded = Arc::new(LoadedMesh { mesh, ..LoadedMesh::default() });
-        let tree = Arc::new(MeshTree::build(loaded, accel, &CancelToken::new()).expect("nobody cancels"));
+        let tree = Arc::new(MeshTree::build(loaded, accel, &CancelToken::new()).expect("never canceled"));
         let floor = Plane::new(DVec3::new(0.0, -2.0, 0.0), DVec3::Y);
         let mut objects = vec![Object::Shape(Shape::Plane(floor))];
         for i in 0..30 {
@@ -341,7 +341,7 @@ pub(super) mod tests {
         for transform in [Transform::IDENTITY, placed(0), placed(1), placed(2)] {
             objects.push(Object::Mesh(Box::new(MeshInstance::new(Arc::clone(&tree), transform, false))));
         }
-        Geometry::build(objects, &CancelToken::new()).expect("nobody cancels")
+        Geometry::build(objects, &CancelToken::new()).expect("never canceled")
     }
 
     #[test]
@@ -354,10 +354,10 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn packet_hits_equal_single_ray_hits_in_nested_spheres() {
+    fn packets_match_single_rays_in_nested_spheres() {
         let sphere = |i: u32| Sphere { center: DVec3::ZERO, radius: 0.5 + f64::from(i) / 64.0 };
         let spheres = (0..200).map(|i| Object::Shape(Shape::Sphere(sphere(i))));
-        let geometry = Geometry::build(spheres.collect(), &CancelToken::new()).expect("nobody cancels");
+        let geometry = Geometry::build(spheres.collect(), &CancelToken::new()).expect("never canceled");
         assert!(geometry.traced_tree().has_shells());
         assert_packets(&geometry);
     }

@@ -21,8 +21,8 @@ pub struct PacketMaterial {
 }
 
 impl PacketMaterial {
-    /// Returns `None` if the material perturbs normals, has textured or coated emission, may be a null
-    /// interaction, or has a BSDF that does not support packets.
+    /// Creates the packet-shading data of a material. Returns `None` if the material perturbs normals, has
+    /// textured or coated emission, may be a null interaction, or has a BSDF that does not support packets.
     pub(super) fn of(material: &Material) -> Option<Self> {
         let Material { bsdf, emission, normal_perturbation, opacity } = material;
         let is_even = emission.texture.is_none() && emission.coat.is_none();

@@ -1,4 +1,4 @@
-//! Tests every shape with packets on every instruction set. Hits must be bit-identical to those of single
+//! Tests every shape with packets on every instruction set. Hits must be bit-identical to the hits of single
 //! rays.
 
 use super::*;
@@ -12,7 +12,7 @@ use crate::geometry::sphere::Sphere;
 use crate::geometry::triangle::Triangle;
 use crate::math::{DVec3, Vec3};
 
-/// Pseudo-random numbers.
+/// Pseudo-random numbers, including adversarial ones.
 struct HostileRandom(u64);
 
 impl HostileRandom {

@@ -1,5 +1,5 @@
 //! Small meshes: every triangle is tested against all rays of a packet, without using the tree. Hits are
-//! bit-identical to those found with the tree.
+//! bit-identical to the hits found with the tree.
 
 use super::MeshInstance;
 use crate::accel::{F32x16, PACKET_SIZE};

@@ -13,9 +13,9 @@ pub(super) struct TrianglePoint {
     local: DVec3,
     /// The point in world coordinates.
     pub(super) point: Vec3,
-    /// [`SurfacePoint::error`](crate::geometry::SurfacePoint::error).
+    /// Error bound of the point; see [`SurfacePoint::error`](crate::geometry::SurfacePoint::error).
     pub(super) error: Vec3,
-    /// [`SurfacePoint::normal`](crate::geometry::SurfacePoint::normal).
+    /// Geometric normal; see [`SurfacePoint::normal`](crate::geometry::SurfacePoint::normal).
     pub(super) normal: Vec3,
     /// Barycentric coordinates.
     pub(super) barycentric: Vec3,
@@ -39,7 +39,7 @@ impl TrianglePoint {
 const COARSE: f64 = 1024.0;
 
 /// Minimum distance from the triangle's edges, in point errors. Rounding the point and offsetting it from the
-/// surface requires two.
+/// surface require two errors.
 pub(super) const EDGE_MARGIN: f64 = 4.0;
 
 /// Whether a point with barycentric coordinate `weight` is near the opposite edge. `bound` is the squared

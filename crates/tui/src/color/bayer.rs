@@ -1,6 +1,6 @@
 //! Ordered dithering.
 
-/// Period of the pattern in columns and rows.
+/// Period of the dither pattern in columns and rows.
 const SIDE: usize = 8;
 
 /// Dither threshold of a pixel, in (0, 1), from Bayer's matrix ("An optimum method for two-level rendition of

@@ -14,7 +14,7 @@ use ratatui::style::Color;
 /// How strongly nearby colors are preferred on 256-color and 16-color terminals.
 const CALM_256: f32 = 3.0;
 const CALM_16: f32 = 3.0;
-/// The same, for cells whose two halves are drawn separately.
+/// How strongly nearby colors are preferred in cells whose two halves are drawn separately.
 const CALM_EDGES: f32 = 200.0;
 /// Squared Oklab distance above which the two halves of a cell are drawn separately. Below it, their mean
 /// color is mixed using shade characters.
@@ -29,7 +29,7 @@ pub(crate) struct DrawnCell {
     pub(crate) pair: [Color; 2],
 }
 
-/// Two of the 16 colors, mixed in one cell.
+/// Two of the 16 ANSI colors, mixed in one cell.
 #[derive(Clone, Copy, Debug)]
 struct ColorPair {
     /// Index of the shade character. `None` if only the first color is used.
@@ -110,7 +110,7 @@ impl ColorMapper {
     }
 }
 
-/// All single colors, and all pairs with each shade character.
+/// All single colors, and all pairs of colors combined with each shade character.
 fn color_pairs(inks: &[Ink]) -> Vec<ColorPair> {
     let alone = (0..inks.len()).map(|color| ColorPair { level: None, colors: [color; 2] });
     let both = (0..inks.len()).flat_map(|a| (0..a).map(move |b| [a, b]));

@@ -1,4 +1,4 @@
-//! Terminal colors, and approximation of other colors by them.
+//! Terminal colors, and the approximation of sRGB colors with them.
 
 mod bayer;
 mod color_mapper;
@@ -19,7 +19,7 @@ use super::terminals::Brand;
 use crate::choice;
 
 choice! {
-    /// Choice of colors.
+    /// Which colors to use.
     pub enum ColorChoice {
         /// As many colors as the terminal supports.
         Auto = "auto",
@@ -98,7 +98,7 @@ pub(super) fn has_light_background(variable: impl Fn(&str) -> Option<String>) ->
     last.is_some_and(|index| index == 7 || (9..16).contains(&index))
 }
 
-/// Names of the 16 colors.
+/// The 16 ANSI colors in palette order.
 const NAMES: [Color; 16] = [
     Color::Black,
     Color::Red,

@@ -1,5 +1,5 @@
-//! Oklab (Björn Ottosson, "A perceptual color space for image processing", 2020), in which distances are
-//! roughly perceptual.
+//! The Oklab color space, where distances approximate perceived differences (Björn Ottosson, "A perceptual
+//! color space for image processing", 2020).
 
 use crate::math::Vec3;
 

@@ -5,9 +5,9 @@ use ratatui::style::Color;
 /// Channel levels of the 6×6×6 cube.
 pub(crate) const CUBE_LEVELS: [u8; 6] = [0, 95, 135, 175, 215, 255];
 
-/// First color that is the same on all terminals (start of the cube).
+/// First palette index whose color is the same on all terminals (the start of the cube).
 pub(crate) const FIRST_FIXED: u8 = 16;
-/// First gray.
+/// First gray in the 256-color palette.
 pub(crate) const FIRST_GRAY: u8 = 232;
 
 /// The 16 ANSI colors in sRGB.
@@ -70,7 +70,8 @@ pub(crate) fn fixed_color(index: u8) -> Option<[u8; 3]> {
     }
 }
 
-/// The sRGB value of a color with xterm's defaults. `None` for the default color.
+/// The sRGB value of a terminal color in xterm's default palette. `None` for the default foreground and
+/// background.
 pub fn xterm_rgb(color: Color) -> Option<[u8; 3]> {
     let ansi = match color {
         Color::Reset => return None,

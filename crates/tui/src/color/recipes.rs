@@ -11,7 +11,7 @@ use super::oklab::{OklabDerivative, oklab};
 use crate::math::Vec3;
 use crate::math::color::srgb8_to_linear;
 
-/// Inks per recipe.
+/// Number of inks in a dithering recipe.
 pub(super) const PARTS: usize = 16;
 /// Number of candidate inks per recipe. The inks nearest to the color are used.
 const NEAREST: usize = 32;
@@ -28,15 +28,15 @@ pub(super) struct Ink {
 }
 
 impl Ink {
-    /// A solid color.
+    /// Creates an ink with a solid color.
     pub(super) fn solid(rgb: [u8; 3]) -> Self {
         let linear = srgb8_to_linear(rgb);
         Self { linear, lab: oklab(linear), texture: 0.0 }
     }
 
-    /// A fine pattern with a fraction `share` of `front` on `back`.
+    /// Creates an ink from a fine pattern: a fraction `share` of `front` on `back`.
     pub(super) fn shaded(front: &Self, back: &Self, share: f32) -> Self {
-        /// Weight of patterns within a cell, which are less visible than patterns of whole cells.
+        /// Texture weight of a pattern within a cell, which is less visible than a pattern of whole cells.
         const FINENESS: f32 = 0.25;
         let linear = front.linear * share + back.linear * (1.0 - share);
         let lab = oklab(linear);
@@ -50,7 +50,7 @@ impl Ink {
 #[derive(Debug, Default)]
 pub(super) struct InkMixer {
     inks: Vec<Ink>,
-    /// Weight of the distance between inks relative to the error of their mean.
+    /// Weight of an ink's distance from the color, relative to the error of the recipe's mean.
     calm: f32,
     recipes: HashMap<[u8; 3], [u16; PARTS]>,
 }

@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 /// Slightly less than 1 Mbit/s (125 kB/s), so the queue of a 1 Mbit/s connection drains.
 pub(super) const RATE: f64 = 100_000.0;
-/// Capacity: 100 ms at 1 Mbit/s.
+/// Capacity in bytes: about 100 ms at 1 Mbit/s.
 const FULL: f64 = 12_000.0;
 
 /// A token bucket; one token is one byte.

@@ -28,9 +28,9 @@ const MAX_WINDOW: usize = 23_800;
 /// Initial and minimum window size in bytes.
 const INITIAL_WINDOW: f64 = 8_000.0;
 const MIN_WINDOW: f64 = 1_500.0;
-/// Maximum queueing delay.
+/// Maximum queueing delay on the connection.
 const MAX_QUEUE: Duration = Duration::from_millis(60);
-/// Timeout for the first reply.
+/// Timeout for the terminal's first reply.
 const REPLY_TIMEOUT: Duration = Duration::from_secs(1);
 /// Outstanding replies are considered lost after this time or `SILENCE_ROUND_TRIPS` round trips, whichever is
 /// longer.
@@ -51,11 +51,11 @@ pub(super) enum QueryKind {
     /// Primary device attributes, sent last in the first batch. Queries still unanswered when this reply
     /// arrives are not supported.
     Attributes,
-    /// A status report.
+    /// A request for a status report (DSR).
     Status,
 }
 
-/// Bytes in flight that end with a query.
+/// A slice of output that ends with a query and awaits its reply.
 #[derive(Clone, Copy, Debug)]
 struct SentSlice {
     question: QueryKind,
@@ -158,7 +158,7 @@ impl Connection {
         self.unwritten = self.unwritten.saturating_sub(bytes);
     }
 
-    /// Records a reply.
+    /// Records a reply from the terminal.
     pub(super) fn handle_reply(&mut self, question: QueryKind, now: Instant) {
         self.replies = ReplyState::Answering;
         self.heard = now;
@@ -278,7 +278,7 @@ impl Connection {
     }
 }
 
-/// Length of a query in bytes.
+/// Length in bytes of the query that ends a slice.
 const QUERY_BYTES: usize = 4;
 
 /// Tracks the minimum of recent round-trip times.

@@ -55,7 +55,7 @@ impl SimulatedTerminal {
         }
     }
 
-    /// Sends continuously for this long.
+    /// Sends continuously for `milliseconds`.
     fn run(&mut self, milliseconds: u64) {
         let end = self.now + Duration::from_millis(milliseconds);
         (self.carried, self.longest) = (0, Duration::ZERO);
@@ -93,7 +93,7 @@ fn full_bandwidth_with_short_queues() {
         terminal.run(10_000);
         let name = format!("{bytes_a_second} B/s, {milliseconds} ms");
         assert!(terminal.most_in_flight <= MAX_WINDOW, "{name}: {}", terminal.most_in_flight);
-        // The minimum window holds more bytes than the slowest connections carry in that time.
+        // The slowest connections take longer than `MAX_QUEUE` to carry the minimum window.
         let longest = MAX_QUEUE.as_secs_f64() * 2.0 + MIN_WINDOW / bytes_a_second;
         assert!(terminal.longest.as_secs_f64() <= longest, "{name}: {:?}", terminal.longest);
         let most = MAX_WINDOW as f64 / (bytes_a_second * milliseconds as f64 / 1e3);

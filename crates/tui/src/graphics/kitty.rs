@@ -8,7 +8,7 @@ use crate::film::Picture;
 
 /// IDs of the two alternating images. Other programs are unlikely to use them.
 const IDS: [u32; 2] = [0x67_6c_69, 0x6d_74_01];
-/// Maximum length of a chunk.
+/// Maximum length of a chunk of base64 data.
 const CHUNK: usize = 4096;
 
 /// The commands that draw an image at the cursor, scaled to cover these cells, and then delete the previous

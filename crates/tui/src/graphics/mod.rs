@@ -1,4 +1,4 @@
-//! Preview drawn as pixels, for terminals with an image protocol.
+//! Previews drawn as pixels, for terminals with an image protocol.
 //!
 //! Each image is a single large update. The next image is encoded only after the previous one has been sent,
 //! so the newest one is always used. Images are sent in pieces that are subject to flow control, and other
@@ -26,9 +26,9 @@ pub use self::pixel_screen::PixelScreen;
 /// Image protocols.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Protocol {
-    /// kitty's protocol: kitty, Ghostty, Konsole, WezTerm.
+    /// kitty's protocol, supported by kitty, Ghostty, Konsole and WezTerm.
     Kitty,
-    /// DEC's sixels: foot, xterm with `-ti vt340`, mlterm, tmux.
+    /// DEC's Sixel format, supported by foot, xterm with `-ti vt340`, mlterm and tmux.
     Sixel,
     /// iTerm2's protocol. See [`Brand`](super::terminals::Brand) for terminals that support it.
     Iterm,
@@ -51,9 +51,9 @@ impl PartialEq for PixelPlacement {
 
 /// Approximate bytes per pixel. Noise hardly compresses.
 const PIXEL_BYTES: f64 = 2.0;
-/// Maximum size of an image in bytes. tmux passes on less than a megabyte.
+/// Maximum size of an image in bytes. tmux does not pass on a megabyte or more.
 const MAX_BYTES: f64 = 600_000.0;
-/// Maximum time to send intermediate and final images.
+/// Maximum time in seconds to send intermediate and final images.
 const MOVING_SECONDS: f64 = 0.4;
 const STILL_SECONDS: f64 = 1.5;
 
@@ -78,7 +78,7 @@ pub(super) struct Images {
 }
 
 impl Images {
-    /// Creates an empty state. `is_wrapped` inside tmux.
+    /// Creates an empty state. `is_wrapped` must be true inside tmux.
     pub(super) fn new(protocol: Protocol, is_wrapped: bool) -> Self {
         // tmux draws Sixel images itself.
         let is_wrapped = is_wrapped && protocol != Protocol::Sixel;
@@ -122,8 +122,8 @@ impl Images {
             && (self.wanted.is_none() || (self.shown == self.wanted && !(self.is_coarse && self.is_still)))
     }
 
-    /// The next bytes. Returns at most `most` bytes unless a single piece is longer. `None` if everything has
-    /// been sent. `rate` is the bandwidth in bytes per second, if known.
+    /// The next bytes to send, at most `most` of them unless a single piece is longer. `None` if everything
+    /// has been sent. `rate` is the bandwidth in bytes per second, if known.
     pub(super) fn next_slice(&mut self, most: usize, rate: Option<f64>) -> Option<Vec<u8>> {
         if self.pieces.is_empty() && !self.is_complete() {
             self.encode(rate);

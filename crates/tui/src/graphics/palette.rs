@@ -106,8 +106,8 @@ impl ColorBox {
     }
 }
 
-/// Splits the box with the largest error until there are enough boxes or all are exact. Returns the mean
-/// color of each box.
+/// Repeatedly splits the box with the largest error until there are `MAX` boxes or all are exact. Returns the
+/// mean color of each box.
 fn split_bins(bins: &mut [Bin]) -> Vec<[u8; 3]> {
     let mut boxes = vec![ColorBox::for_bins(bins, 0..bins.len())];
     while boxes.len() < MAX {

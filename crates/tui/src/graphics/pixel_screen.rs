@@ -56,7 +56,8 @@ impl PixelScreen {
         }
     }
 
-    /// Handles a kitty command. Returns the image if this is its last chunk.
+    /// Handles a kitty command, which contains a chunk of an image. Returns the image if the chunk completes
+    /// it.
     fn handle_kitty_chunk(&mut self, command: &[u8]) -> Option<Picture> {
         let split = command.iter().position(|byte| *byte == b';')?;
         let (keys, data) = (std::str::from_utf8(&command[..split]).ok()?, &command[split + 1..]);

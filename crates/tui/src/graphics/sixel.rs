@@ -9,12 +9,13 @@ use crate::rescale::resized;
 
 /// Register of the first palette color. Lower registers are reserved for the terminal.
 const FIRST: u8 = 16;
-/// Number of registers.
+/// Number of color registers.
 const REGISTERS: usize = 256;
 
 /// Encodes an image to be drawn at the cursor, scaled to cover these cells. `cell` is the size of a cell in
 /// pixels. The palette is reused if it still fits the image and recomputed otherwise. Images with fewer
-/// pixels are enlarged after quantization, so time and memory depend only on the image's own size.
+/// pixels than the cells are enlarged after quantization, so time and memory depend only on the image's own
+/// size.
 pub(super) fn encode(
     picture: &Picture,
     cells: Rect,
@@ -65,7 +66,7 @@ impl SixelBand {
         Self { width, sixels: vec![0; REGISTERS * width], is_used: [false; REGISTERS] }
     }
 
-    /// Sets one of the six rows.
+    /// Sets one of the band's six pixel rows.
     fn set_row(&mut self, y: u32, registers: impl Iterator<Item = u8>) {
         for (x, register) in registers.enumerate() {
             self.is_used[usize::from(register)] = true;

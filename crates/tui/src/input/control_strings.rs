@@ -16,13 +16,13 @@ pub(super) struct ControlString {
 enum ControlStringKind {
     #[default]
     Other,
-    /// Name and version (XTVERSION).
+    /// The terminal's name and version (XTVERSION).
     Name,
-    /// A supported capability (XTGETTCAP).
+    /// A capability that the terminal supports (XTGETTCAP).
     Capability,
 }
 
-/// Maximum length in bytes. Longer strings contain nothing useful.
+/// Maximum number of bytes stored. Useful control strings are shorter.
 const LONGEST: usize = 256;
 
 impl ControlString {
@@ -52,7 +52,7 @@ impl ControlString {
     }
 }
 
-/// Whether a capability is `RGB` or `Tc`. Names are hex-encoded.
+/// Whether the reported capabilities include `RGB` or `Tc`. Their names are hex-encoded.
 fn has_true_color(text: &[u8]) -> bool {
     let names = text.split(|byte| *byte == b';').filter_map(|item| item.split(|byte| *byte == b'=').next());
     names.into_iter().any(|name| name == b"524742" || name == b"5463")

@@ -13,15 +13,15 @@ use super::paste::Paste;
 use crate::event::KeyPress;
 
 const ESCAPE: u8 = 0x1b;
-/// Bytes that can follow the escape character in a terminal's sequences: CSI, OSC, SS3, DCS, SOS, PM, APC,
-/// and the string terminator.
+/// Bytes that can follow the escape character in a terminal sequence: CSI, OSC, SS3, DCS, SOS, PM, APC, and
+/// the string terminator.
 const INTRODUCERS: &[u8] = b"[]OPX^_\\";
 /// Silence after which an escape character is treated as a key press.
 const LONE_ESCAPE: Duration = Duration::from_millis(50);
 /// Timeout between bytes of a sequence, for connections that lose packets.
 const SEQUENCE: Duration = Duration::from_secs(1);
-/// Maximum duration and length of a sequence. For example, alt-`]` looks like the start of a sequence, and no
-/// key press ends it.
+/// Maximum duration and length of a sequence. For example, alt-`]` looks like the start of a sequence that no
+/// key press ends.
 const LONGEST: Duration = Duration::from_secs(2);
 const MAX_BYTES: usize = 4096;
 /// Maximum time between an escape character that was treated as a key press and a `[` that still belongs to
@@ -50,9 +50,9 @@ pub(crate) struct Decoder {
 enum PendingSequence {
     #[default]
     Nothing,
-    /// An escape character.
+    /// An escape character, which may be a key press or start a sequence.
     Escape,
-    /// An escape character that ends a string.
+    /// An escape character that ends a control string.
     StringEnd,
     /// A sequence with its start time and length. `introducer` is the byte that follows the escape character.
     Sequence {
@@ -67,7 +67,7 @@ enum PendingSequence {
 }
 
 impl Decoder {
-    /// Decodes bytes that continue the previous ones.
+    /// Decodes the next bytes of the input.
     pub(crate) fn decode(&mut self, bytes: &[u8], now: Instant) -> Vec<DecodedInput> {
         // An escape character or doubtful bytes do not expire here, because the bytes that follow have
         // arrived, even if late. A paste does not expire either, because its text may have been waiting for a
@@ -95,7 +95,7 @@ impl Decoder {
         }
     }
 
-    /// Handles silence.
+    /// Handles a sequence that has not continued before its [`Decoder::deadline`].
     pub(super) fn expire(&mut self, now: Instant) -> Vec<DecodedInput> {
         self.expire_pending(now);
         std::mem::take(&mut self.meaning.found)
@@ -228,7 +228,7 @@ impl Decoder {
         }
     }
 
-    /// Drops the current sequence.
+    /// Drops the current sequence and returns it.
     fn drop_sequence(&mut self) -> PendingSequence {
         self.meaning.reset();
         self.command.clear();
@@ -245,7 +245,8 @@ impl Decoder {
     }
 }
 
-/// Whether `byte` cannot follow these two in any terminal's sequence, so all three are key presses.
+/// Whether `byte` cannot follow an escape character and `introducer` in any terminal sequence, so that all
+/// three are key presses.
 fn are_three_key_presses(introducer: u8, byte: u8) -> bool {
     match introducer {
         // rxvt uses `a` to `d` for shifted arrows, and reports end with `n` or `t`.

@@ -167,7 +167,7 @@ impl Perform for KeyParser {
             // With two parameters, this is a cursor position report rather than F3.
             ([], 'R') if params.len() > 1 => self.push_reply(TerminalReply::Other),
             ([], 'I' | 'O') => self.push_reply(TerminalReply::Focus { is_here: action == 'I' }),
-            // Window size report.
+            // A window size report.
             ([], 't') => self.push_reply(TerminalReply::Other),
             ([], letter) => {
                 if let Some(code) = letter_key(letter) {

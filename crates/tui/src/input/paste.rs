@@ -29,11 +29,11 @@ pub(super) struct Paste {
 /// Parser state of a control sequence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum ControlSequence {
-    /// Outside a sequence.
+    /// Outside a control sequence.
     Outside,
-    /// After ESC.
+    /// After the escape character.
     Escape,
-    /// After ESC [.
+    /// After the introducer `ESC [`.
     Parameters,
 }
 

@@ -213,7 +213,7 @@ fn escape_and_immediate_key_are_two_keys() {
     assert_eq!(read(b"\x1b[s"), [ESC, plain('['), plain('s')]);
     assert_eq!(read(b"\x1bPp"), [ESC, plain('P'), plain('p')]);
     assert_eq!(read(b"\x1b[As\x1bs"), [special(KeyCode::Up), plain('s'), ESC, plain('s')]);
-    // Incomplete sequences.
+    // Incomplete sequences expire as two key presses.
     for key in ['[', ']', 'P', 'O', 'X', '_'] {
         let mut bench = DecoderBench::new();
         assert_eq!(bench.read(format!("\x1b{key}").as_bytes()), []);
@@ -371,7 +371,7 @@ fn invalid_text_does_not_swallow_keys() {
 }
 
 proptest! {
-    /// The result does not depend on where the input is split.
+    /// The decoded input does not depend on where the bytes are split.
     #[test]
     fn splits_do_not_matter(parts in prop::collection::vec(0..10_usize, 0..40), cuts in prop::collection::vec(1..5_usize, 200)) {
         let words: [&[u8]; 10] =

@@ -1,11 +1,11 @@
-//! Approximates a cell's pixels by two colors and a block character.
+//! Approximates a cell's pixels with two colors and a block character.
 
 use super::tile::{CellDivision, Grid, Tile};
 use crate::color::oklab;
 use crate::math::Vec3;
 use crate::math::color::{linear_to_srgb8, srgb8_to_linear};
 
-/// A cell with two sRGB colors.
+/// A cell's tile and its two sRGB colors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct FittedCell {
     pub(crate) tile: Tile,
@@ -14,7 +14,7 @@ pub(crate) struct FittedCell {
 }
 
 /// A tile other than halves is chosen only if it reduces the mean squared Oklab distance by at least this
-/// much. A smaller improvement would be invisible, flicker with the noise and take more bytes.
+/// much. Smaller improvements are invisible, flicker with the noise and take more bytes.
 const WORTH: f32 = 1e-4;
 
 /// The cell with the smallest squared Oklab distance from its pixels. `pixels` are sRGB colors in row order.
@@ -33,7 +33,7 @@ pub(crate) fn fit_cell(grid: Grid, pixels: &[[u8; 3]]) -> FittedCell {
     FittedCell { tile, pair: [mean(true), mean(false)] }
 }
 
-/// The best division of a cell.
+/// The division of a cell that minimizes the variance within its two parts.
 fn best_division(grid: Grid, pixels: &[Vec3]) -> CellDivision {
     let count = pixels.len() as f32;
     let labs: Vec<Vec3> = pixels.iter().map(|pixel| oklab(*pixel)).collect();
@@ -50,7 +50,7 @@ fn best_division(grid: Grid, pixels: &[Vec3]) -> CellDivision {
             size += sign;
         }
         mask = division.first;
-        // Reduction in variance.
+        // Reduction in variance, up to a constant.
         let gain = sum.length_squared() / size + (all - sum).length_squared() / (count - size).max(1.0);
         let worth = if division.tile == Tile::HALVES { WORTH * count } else { 0.0 };
         if gain + worth > most {

@@ -31,7 +31,8 @@ impl Eq for Tile {}
 impl Tile {
     /// Upper and lower halves.
     pub(crate) const HALVES: Self = Self { first: (1 << GRID_ROWS) - 1, symbols: ['▀', '▄'] };
-    /// A pattern that fills a quarter of the cell with the foreground color. It varies between fonts.
+    /// A pattern that fills a quarter of the cell with the foreground color. The pattern varies between
+    /// fonts.
     pub(crate) const LIGHT: Self = Self { first: 0x21_21_21, symbols: ['░', '▓'] };
 
     /// A fine pattern with equal amounts of both colors.
@@ -42,7 +43,7 @@ impl Tile {
         self.symbols
     }
 
-    /// Number of squares in each part.
+    /// Number of grid squares in each part.
     pub(crate) fn part_sizes(self) -> [u32; 2] {
         let first = self.first.count_ones();
         [first, PLACES - first]
@@ -107,7 +108,7 @@ static TABLE: LazyLock<TileTable> = LazyLock::new(|| {
     let light = Tile::LIGHT.first;
     add('░', light);
     add('▓', ALL & !light);
-    // The inverted mask is different but looks the same.
+    // The inverted checkerboard has a different mask but looks the same.
     for mask in [CHECKS, ALL & !CHECKS] {
         add('▒', mask);
     }
@@ -130,7 +131,7 @@ static TABLE: LazyLock<TileTable> = LazyLock::new(|| {
     table
 });
 
-/// Checkerboard.
+/// Mask of a checkerboard pattern.
 const CHECKS: u32 = 0x99_99_99;
 
 /// Characters indexed by the mask of quadrants they fill, lowest bit first (Unicode, "Block Elements").
@@ -174,7 +175,7 @@ fn octants_as_quadrants(mask: u32) -> Option<u32> {
     (0..16).find(|quadrants| expand_mask(*quadrants, 2) == expand_mask(mask, 4))
 }
 
-/// Grids that divide a cell.
+/// Grids that divide a cell into parts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Grid {
     Halves,
@@ -184,7 +185,7 @@ pub(crate) enum Grid {
     Octants,
 }
 
-/// A division of a cell.
+/// A division of a cell's pixels into two parts, and the tile that draws it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct CellDivision {
     /// Mask of the pixels in the first part, in row order.
@@ -207,8 +208,8 @@ impl Grid {
         }
     }
 
-    /// All divisions of a two-column cell, starting with halves. Most differ from their predecessor by a
-    /// single part.
+    /// All divisions of a two-column cell, starting with halves. Each usually differs from the previous one
+    /// in a single part of the grid.
     pub(super) fn divisions(self) -> &'static [CellDivision] {
         static QUADRANTS: LazyLock<Vec<CellDivision>> = LazyLock::new(|| divisions(2, &[2]));
         static SEXTANTS: LazyLock<Vec<CellDivision>> = LazyLock::new(|| divisions(6, &[2, 3]));

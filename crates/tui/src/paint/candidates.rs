@@ -120,7 +120,7 @@ mod tests {
 
     #[test]
     fn candidates_cover_many_following_cells() {
-        // 21 is close to 20, 21 and 22, but not to 24.
+        // 21 is within the tolerance of 20, 21 and 22, but not of 24.
         let found = candidates(&row(&[20, 21, 22, 24]), CostModel::EXACT);
         assert_eq!(found.first, [TerminalColor::Rgb([21, 50, 99])]);
         assert_eq!(found.second, [TerminalColor::Rgb([0, 0, 0])], "themes may replace color 16");

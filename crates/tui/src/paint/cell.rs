@@ -12,7 +12,7 @@ use crate::mosaic::{PLACES, Tile, from_symbol};
 /// Content of a cell.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum CellContent {
-    /// The content is unknown.
+    /// The content of the cell is unknown.
     Unknown,
     /// A tile with two colors. A blank has two halves of the same color.
     Mosaic(Mosaic),
@@ -56,8 +56,8 @@ impl Mosaic {
         Some(Self::new(tile, if is_second { [bg, fg] } else { [fg, bg] }))
     }
 
-    /// Pairs of colors that overlap when this cell is laid over `other`. Each pair has a weight of twice the
-    /// fraction of the cell in which it overlaps.
+    /// Pairs of colors that overlap when this cell is laid over `other`. The weight of each pair is twice the
+    /// fraction of the cell where the two colors overlap.
     pub(super) fn overlapping_colors(
         self,
         other: Self,
@@ -75,13 +75,13 @@ impl Mosaic {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct TextCell {
     pub(super) symbol: Box<str>,
-    /// 1 or 2.
+    /// Width in columns: 1 or 2.
     pub(super) columns: u16,
     pub(super) pen: Pen,
 }
 
 impl TextCell {
-    /// Whether it is a single code point that is one column wide.
+    /// Whether the character is a single code point that is one column wide.
     pub(super) fn is_plain(&self) -> bool {
         self.columns == 1 && self.symbol.chars().nth(1).is_none()
     }

@@ -6,23 +6,24 @@ use super::terminal_color::TerminalColor;
 /// differences.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct CostModel {
-    /// Error that is acceptable to save one byte.
+    /// Color error that is acceptable for each byte saved.
     pub(super) byte: f32,
-    /// Maximum difference per channel.
+    /// Maximum color difference per channel.
     pub(super) most: u8,
-    /// Half-widths of the ranges within which neighboring colors may be merged. Candidates are tried for
-    /// each.
+    /// Half-widths of the ranges within which neighboring colors may be merged. Candidate colors are tried
+    /// for each.
     pub(super) spans: &'static [u8],
 }
 
 impl CostModel {
-    /// Colors accurate to 1/255.
+    /// Cost model for colors accurate to 1/255 per channel.
     pub(super) const EXACT: Self = Self { byte: 64.0, most: 1, spans: &[1] };
 
-    /// Exact colors.
+    /// Cost model for exact colors.
     pub(super) const ALL: Self = Self { byte: 64.0, most: 0, spans: &[0] };
 
-    /// An error of 14/255 in every channel of half a cell costs about as much as a color change.
+    /// Cost model for intermediate previews. An error of 14/255 in every channel of half a cell costs about
+    /// as much as a color change.
     pub(super) const MOVING: Self = Self { byte: 32.0, most: 255, spans: &[1, 4, 9] };
 
     /// Returns the model with a different cost per byte, but no less than that of [`CostModel::MOVING`].

@@ -9,8 +9,9 @@ pub(super) struct CellPosition {
     pub(super) y: u16,
 }
 
-/// Appends the shortest movement. `from` is `None` if the cursor position is unknown, for example after
-/// writing to the last column. The movement never scrolls, wraps or depends on terminal modes.
+/// Appends the shortest escape sequence that moves the cursor to `to`. `from` is `None` if the cursor
+/// position is unknown, for example after writing to the last column. The movement never scrolls, wraps or
+/// depends on terminal modes.
 pub(super) fn push_shortest_move(from: Option<CellPosition>, to: CellPosition, out: &mut Vec<u8>) {
     let Some(from) = from else { return push_absolute_move(to, out) };
     if from == to {
@@ -41,7 +42,7 @@ pub(super) fn push_shortest_move(from: Option<CellPosition>, to: CellPosition, o
     out.extend_from_slice(&best);
 }
 
-/// Absolute position (CUP).
+/// Appends an absolute cursor movement (CUP).
 fn push_absolute_move(to: CellPosition, out: &mut Vec<u8>) {
     out.extend_from_slice(b"\x1b[");
     if to.y > 0 || to.x > 0 {
@@ -54,8 +55,7 @@ fn push_absolute_move(to: CellPosition, out: &mut Vec<u8>) {
     out.push(b'H');
 }
 
-/// Movement within a row (CUF or CUB). CHA is not used because it is never shorter than both CUP and these
-/// two.
+/// Movement within a row (CUF or CUB). CHA is not used because CUP, CUF or CUB is always at least as short.
 fn horizontal_move(from: u16, to: u16) -> Vec<u8> {
     if to >= from { counted_sequence(to - from, b'C') } else { counted_sequence(from - to, b'D') }
 }

@@ -15,7 +15,7 @@ pub struct FrameTiming {
     pub samples: f64,
     /// Mean samples per pixel of this request's last drawn preview. `None` if there is none.
     pub aimed_samples: Option<f64>,
-    /// Time since that preview became the target.
+    /// Time since the last drawn preview became the target.
     pub since_aim: Duration,
     /// Whether the last drawn preview has been sent and, on a fast terminal, acknowledged.
     pub is_shown: bool,
@@ -32,7 +32,7 @@ pub struct FrameTiming {
 /// What to do with a preview.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PacingAdvice {
-    /// Draw it.
+    /// Draw the preview with this precision.
     Aim(Fidelity),
     /// Wait for a better preview.
     Wait,
@@ -43,7 +43,7 @@ const MOVING_BYTES: f64 = 6.0;
 /// Minimum ratio between the sample counts of successive previews. Noise decreases with the square root of
 /// the sample count.
 const MORE_SAMPLES: f64 = 2.0;
-/// Minimum ratio while the previous preview is still being sent.
+/// Minimum ratio between sample counts while the previous preview is still being sent.
 const MANY_MORE_SAMPLES: f64 = 4.0;
 /// During the first sample per pixel, the preview is redrawn each time this fraction of a sample has been
 /// added.

@@ -10,13 +10,13 @@ const MAX: usize = 1000;
 /// Adjacent cells in a row and the URL they link to.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Hyperlink {
-    /// The cells.
+    /// The linked cells.
     pub cells: Rect,
     /// An ASCII URL without control characters.
     pub address: String,
 }
 
-/// URLs numbered from 1. A URL keeps its number as long as the screen content is known.
+/// URLs linked on the screen, numbered from 1. Numbers never change.
 #[derive(Debug, Default)]
 pub(super) struct Hyperlinks {
     addresses: Vec<String>,

@@ -53,15 +53,15 @@ pub struct Painter {
     depth: ColorDepth,
     /// Whether the terminal supports REP.
     can_repeat: bool,
-    /// `None` if the content is unknown.
+    /// Model of the screen. `None` if the screen content is unknown.
     screen: Option<ScreenModel>,
     memory: StableCells,
     wanted: TargetScreen,
     links: Hyperlinks,
     budget: ByteBudget,
-    /// Remaining steps, in order.
+    /// Remaining drawing steps, in order.
     parts: vec::IntoIter<DrawStep>,
-    /// The step being drawn.
+    /// The drawing step in progress.
     part: Option<DrawStep>,
     strokes: vec::IntoIter<Stroke>,
     /// Progress of drawing the preview, for each row.
@@ -94,7 +94,7 @@ pub struct FrameExtras {
 struct RowProgress {
     /// Number of the last target for which the row was drawn.
     aim: u64,
-    /// Whether the row matches its target.
+    /// Whether the row on the screen matches its target.
     is_done: bool,
 }
 
@@ -123,8 +123,8 @@ impl Painter {
     }
 
     /// Sets a new target and drops whatever remains of the previous one. Cells in `picture` may differ from
-    /// the target as far as `fidelity` permits. All other cells are text and are drawn first. If the buffer
-    /// has a different size, the screen is assumed to have been resized.
+    /// the target by as much as `fidelity` permits. All other cells are text and are drawn first. If the
+    /// buffer has a different size, the screen is assumed to have been resized.
     ///
     /// Drawing of the preview starts with the rows that have waited longest, so every row gets drawn even if
     /// targets change faster than they can be drawn.

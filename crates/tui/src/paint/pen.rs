@@ -17,9 +17,9 @@ pub(super) struct Pen {
 /// Requirements on a pen.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PenRequirements {
-    /// `None` if any color is acceptable.
+    /// Required foreground color. `None` if any color is acceptable.
     pub(super) fg: Option<TerminalColor>,
-    /// `None` if any color is acceptable.
+    /// Required background color. `None` if any color is acceptable.
     pub(super) bg: Option<TerminalColor>,
     /// Required state of the modifiers in `matters`.
     pub(super) modifier: Modifier,

@@ -32,8 +32,8 @@ impl Default for ByteBudget {
 }
 
 impl ByteBudget {
-    /// Plans a row with the smallest error that fits into the budget. After a row that used less than its
-    /// share, the cost per byte is lowered again.
+    /// Plans a row with the smallest error that fits into the budget. If more bytes than one row's share are
+    /// left over, the cost per byte is lowered again.
     fn plan_row_in_budget(&mut self, targets: &[TargetCell], start: RowStart) -> PlannedRow {
         let share = FIRST_BYTES * targets.len() as u32;
         self.bytes += share;

@@ -1,4 +1,4 @@
-//! Terminal capabilities derived from environment variables.
+//! Detects support for REP from environment variables.
 
 use crate::terminals::Brand;
 

@@ -10,18 +10,18 @@ use super::cost_model::CostModel;
 use super::terminal_color::{ColorLayer, TerminalColor, decimal_digits};
 use crate::mosaic::{PLACES, Tile};
 
-/// Paths kept per cell.
+/// Number of paths kept per cell.
 const BEAM: usize = 5;
 /// Upper bound on the bytes needed to change from any pen and cursor position to any other. A path cannot win
-/// if its cost exceeds the best one by more than that.
+/// if its cost exceeds that of the best path by more than the cost of these bytes.
 const MAX_BYTES: f32 = 46.0;
 
-/// A cell in the row.
+/// A cell of the row, with its target and its current content.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct TargetCell {
-    /// `None` if the cell is not part of the preview.
+    /// Target content. `None` if the cell is not part of the preview.
     pub(super) wanted: Option<Mosaic>,
-    /// `None` if the content is unknown and must be drawn.
+    /// Content on the screen. `None` if it is unknown, so that the cell must be drawn.
     pub(super) shown: Option<Mosaic>,
 }
 
@@ -37,7 +37,7 @@ pub(super) struct RowStart {
 /// An operation that draws one cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct DrawOp {
-    /// Relative to the first target cell.
+    /// Column relative to the first target cell.
     pub(super) column: usize,
     pub(super) glyph: Glyph,
     pub(super) mosaic: Mosaic,
@@ -48,7 +48,7 @@ pub(super) struct DrawOp {
 struct DrawPath {
     fg: TerminalColor,
     bg: TerminalColor,
-    /// Both colors packed into one key.
+    /// Both colors of the pen, packed into one key.
     pen: u64,
     gap: CursorGap,
     bytes: u32,
@@ -56,7 +56,7 @@ struct DrawPath {
     cost: f32,
     /// Index of the path to the previous cell.
     parent: usize,
-    /// `None` if the cell was kept.
+    /// The glyph drawn in the cell. `None` if the cell was kept.
     glyph: Option<Glyph>,
 }
 
@@ -156,7 +156,7 @@ fn extend_paths(
     beam.paths
 }
 
-/// The best paths so far.
+/// The best paths found so far for a cell.
 struct Beam {
     paths: Vec<DrawPath>,
     /// Paths whose cost exceeds the best one by more than this are dropped.
@@ -276,14 +276,14 @@ impl ColorChanges {
     }
 }
 
-/// Extends one path by a drawn cell.
+/// Extends one path by drawing the next cell.
 struct PathExtension<'a> {
     parent: usize,
-    /// Number of bytes, including those that move the cursor to the cell.
+    /// Number of bytes so far, including those that move the cursor to the cell.
     bytes: u32,
     /// Error of the cells before this one.
     error: f32,
-    /// Cost per byte.
+    /// Cost per byte of output.
     byte: f32,
     tile: Tile,
     beam: &'a mut Beam,

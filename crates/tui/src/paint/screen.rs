@@ -28,7 +28,7 @@ pub(super) enum Stroke {
 }
 
 impl Stroke {
-    /// The first cell.
+    /// Position of the stroke's first cell.
     pub(super) fn at(&self) -> CellPosition {
         match self {
             Self::Text { at, .. } | Self::Mosaic { at, .. } | Self::Erase { at, .. } => *at,
@@ -73,7 +73,7 @@ pub(super) struct ScreenModel {
     pub(super) rows: u16,
     contents: Vec<CellContent>,
     pub(super) pen: Pen,
-    /// `None` if the position is unknown.
+    /// Position of the cursor. `None` if unknown.
     pub(super) cursor: Option<CellPosition>,
 }
 
@@ -170,7 +170,7 @@ impl ScreenModel {
         match stroke {
             Stroke::Text { at, text } => {
                 self.store_cell(*at, CellContent::Text(text.clone()), text.columns);
-                // Terminals differ in the width of other characters.
+                // Terminals disagree about the width of other characters.
                 self.cursor = if text.is_plain() { self.position_after(*at, 1) } else { None };
             }
             Stroke::Mosaic { at, mosaic, count, .. } => {
@@ -188,7 +188,8 @@ impl ScreenModel {
         }
     }
 
-    /// The cursor position `columns` further right. `None` past the last column, where terminals differ.
+    /// The cursor position `columns` further right. `None` past the last column, where terminals behave
+    /// differently.
     fn position_after(&self, at: CellPosition, columns: u16) -> Option<CellPosition> {
         Some(CellPosition { x: at.x + columns, ..at }).filter(|next| next.x < self.columns)
     }

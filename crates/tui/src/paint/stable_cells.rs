@@ -23,12 +23,12 @@ const MAX_NOISE: u8 = 12;
 pub(super) struct StableCells {
     columns: usize,
     picture: Rect,
-    /// `None` if unknown.
+    /// For each cell, its content in the first preview of the request on the screen. `None` if unknown.
     firsts: Vec<Option<Mosaic>>,
     /// The first preview of the current request. Empty if there was none.
     newest: Vec<Option<Mosaic>>,
-    /// Whether the cell looks the same in the first previews of the current request and of the request on the
-    /// screen.
+    /// For each cell, whether it looks the same in the first previews of the current request and of the
+    /// request on the screen.
     steady: Vec<bool>,
     /// Maximum difference between a stable cell and its target that is considered noise.
     noise: u8,
@@ -155,7 +155,7 @@ fn noise_threshold(median: usize) -> u8 {
     u8::try_from(4 * median + 2).unwrap_or(u8::MAX).min(MAX_NOISE)
 }
 
-/// The largest channel difference. 255 if the colors cannot be compared.
+/// The largest channel difference between two mosaics. 255 if their colors cannot be compared.
 fn color_difference(a: Mosaic, b: Mosaic) -> u8 {
     let one = |a: TerminalColor, b: TerminalColor| match (a.rgb(), b.rgb()) {
         _ if a == b => 0,

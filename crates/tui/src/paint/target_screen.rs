@@ -30,7 +30,7 @@ pub(super) enum ScreenRegion {
 }
 
 impl TargetScreen {
-    /// An empty screen.
+    /// A target screen without cells.
     pub(super) fn empty(depth: ColorDepth) -> Self {
         Self::new(&Buffer::empty(Rect::ZERO), Rect::ZERO, Fidelity::Still, depth)
     }
@@ -121,7 +121,7 @@ impl TargetScreen {
         self.depth == ColorDepth::None
     }
 
-    /// The rows of the preview, from the middle outwards.
+    /// The rows of the preview, from the middle outward.
     pub(super) fn rows_from_the_middle(&self) -> impl Iterator<Item = u16> + use<> {
         let (top, bottom) = (self.picture.top(), self.picture.bottom());
         let middle = top + (bottom - top) / 2;

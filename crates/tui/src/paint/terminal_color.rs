@@ -1,4 +1,4 @@
-//! Cell colors in the form in which terminals store them.
+//! Cell colors as terminals store them.
 
 use ratatui::style::Color;
 
@@ -11,7 +11,7 @@ pub(super) enum TerminalColor {
     DefaultBackground,
     /// The default foreground.
     DefaultForeground,
-    /// A palette entry. The first 16 are chosen by the user. The others are the color cube and the grays.
+    /// A palette entry. The user can change the first 16. The others are the color cube and the grays.
     Palette(u8),
     /// An sRGB color.
     Rgb([u8; 3]),
@@ -81,7 +81,7 @@ impl TerminalColor {
         }
     }
 
-    /// Appends the SGR parameters that set the color. It must fit the layer.
+    /// Appends the SGR parameters that set the color, which must fit the layer.
     pub(super) fn push(self, layer: ColorLayer, out: &mut Vec<u8>) {
         let base = match layer {
             ColorLayer::Foreground => 30,

@@ -69,7 +69,7 @@ impl TestTerminal {
     }
 }
 
-/// `None` if the colors cannot be compared.
+/// The largest channel difference. `None` if the colors cannot be compared.
 fn distance(a: TerminalColor, b: TerminalColor) -> Option<u32> {
     if a == b {
         return Some(0);
@@ -78,7 +78,7 @@ fn distance(a: TerminalColor, b: TerminalColor) -> Option<u32> {
     a.iter().zip(b).map(|(a, b)| u32::from(a.abs_diff(b))).max()
 }
 
-/// The content of a terminal cell. vt100 supports fewer modifiers.
+/// The content of a terminal cell. The vt100 crate supports only some modifiers.
 fn cell_content(cell: &vt100::Cell) -> CellContent {
     if cell.is_wide_continuation() {
         return CellContent::Covered;

@@ -20,19 +20,19 @@ pub(crate) struct DisplayState {
     pub shades: ColorMapper,
     /// The terminal's 16 ANSI colors.
     pub ansi: AnsiColors,
-    /// Queries that have been sent.
+    /// Terminal queries that have been sent.
     pub ask: TerminalQueries,
-    /// Capabilities beyond text.
+    /// Terminal capabilities beyond text.
     pub capabilities: Capabilities,
     /// Minimum duration of a render that triggers a notification when it ends. `None` disables notifications.
     pub notify_after: Option<Duration>,
     /// Whether the window is focused, according to the terminal.
     pub has_focus: bool,
-    /// Whether the background is light.
+    /// Whether the terminal's background is light.
     pub is_light: bool,
     /// The user's request to draw pixels, while the terminal has not confirmed it.
     pub pixels: Option<PixelRequest>,
-    /// Time at which the user is told that a confirmation is missing.
+    /// Time at which the missing confirmation is reported to the user.
     pub pixels_until: Option<Instant>,
     /// Cost of sending the last preview.
     pub frame: Option<FrameReport>,
@@ -60,7 +60,7 @@ impl DisplayState {
 
     /// Preview pixels per cell, horizontally.
     pub(crate) fn pixels_across(&self) -> u32 {
-        /// Further pixels are not worth the bytes.
+        /// Maximum number of pixels. More are not worth the bytes.
         const MAX: u32 = 10;
         /// Maximum number of pixels in the window. Accumulating, developing and encoding a preview takes
         /// about 45 bytes of memory per pixel.
@@ -82,7 +82,7 @@ impl DisplayState {
         }
     }
 
-    /// Whether colors are dithered.
+    /// Whether the preview's colors are dithered.
     pub(crate) fn mixes_colors(&self) -> bool {
         matches!(self.depth, ColorDepth::Indexed256 | ColorDepth::Ansi16)
             || self.kind == PreviewKind::Pixels(Protocol::Sixel)

@@ -26,7 +26,7 @@ use super::terminals::Capabilities;
 use crate::pipeline::settings::Overrides;
 use crate::scene::diagnostic::{Diagnostic, Severity};
 
-/// Initial state values.
+/// Values for the initial state of the front end.
 pub(super) struct InitialState {
     pub scene: PathBuf,
     pub overrides: Overrides,
@@ -35,17 +35,17 @@ pub(super) struct InitialState {
     pub depth: ColorDepth,
     /// Whether the environment indicates a light background.
     pub is_light: bool,
-    /// Assumed ANSI colors.
+    /// The terminal's 16 ANSI colors, as assumed until it reports them.
     pub ansi: AnsiColors,
-    /// Queries that have been sent.
+    /// Terminal queries that have been sent.
     pub ask: TerminalQueries,
-    /// Capabilities beyond text, according to environment variables.
+    /// Terminal capabilities beyond text, according to environment variables.
     pub capabilities: Capabilities,
     /// Minimum duration of a render that triggers a notification when it ends. `None` disables notifications.
     pub notify_after: Option<Duration>,
 }
 
-/// The complete state.
+/// The complete state of the front end.
 pub(super) struct State {
     pub request: RequestState,
     pub work: WorkState,
@@ -125,7 +125,7 @@ impl State {
         self.work.set_paused(paused, self.now);
     }
 
-    /// When the state needs its next tick.
+    /// Time at which the state needs its next tick.
     pub(super) fn next_tick(&self) -> Option<Instant> {
         const CLOCK: Duration = Duration::from_millis(250);
         const AGE: Duration = Duration::from_secs(1);

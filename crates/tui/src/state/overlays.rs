@@ -27,7 +27,7 @@ pub(crate) struct ViewList {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Pane {
     pub open: bool,
-    /// First line shown.
+    /// Index of the first line shown.
     pub scroll: usize,
 }
 
@@ -35,7 +35,7 @@ pub(crate) struct Pane {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Message {
     pub words: String,
-    /// Time when it disappears. `None` for errors and prompts, which remain until a key is pressed.
+    /// Time when the message disappears. `None` for errors and prompts, which remain until a key is pressed.
     pub until: Option<Instant>,
 }
 

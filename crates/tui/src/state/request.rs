@@ -26,8 +26,8 @@ pub(crate) struct KeyOverrides {
 }
 
 impl KeyOverrides {
-    /// The settings formatted as command-line options. `orbiter` is the scene's orbiter camera, if any. It is
-    /// replaced if the camera position is set.
+    /// The settings formatted as command-line options. A camera position replaces the scene's orbiter camera,
+    /// if any, so the field of view and focus of `orbiter` are then listed as well.
     pub(crate) fn options(&self, orbiter: Option<Viewpoint>) -> Vec<String> {
         let on_off = |is_on: bool| if is_on { "on" } else { "off" };
         let vector = |key: &str, DVec3 { x, y, z }: DVec3| format!("--set 'camera.{key}=[{x},{y},{z}]'");
@@ -98,7 +98,7 @@ pub(crate) struct ImageOrigin {
     pub text: Option<Arc<str>>,
     /// Other files used by the scene.
     pub files: Arc<[FileRead]>,
-    /// Whether the render has not finished.
+    /// Whether the image's render has not finished.
     pub is_unfinished: bool,
 }
 
@@ -213,7 +213,8 @@ impl RequestState {
         }
     }
 
-    /// Records the newest request's input files. The scene text is compared separately. Models have no text.
+    /// Records the newest request's input files, without the scene file, whose text is compared separately.
+    /// Models have no text.
     pub(crate) fn record_input_files(&mut self, files: Vec<FileRead>) {
         let is_model = is_mesh(&self.scene);
         self.files = files.into_iter().filter(|file| is_model || file.path != self.scene).collect();
@@ -284,7 +285,7 @@ impl RequestState {
         self.record_moved_parts();
     }
 
-    /// Camera settings that the user saved in the scene after moving the camera with keys. Returns them with
+    /// Camera settings that changed in the scene file after the camera was moved with keys, formatted with
     /// their current values.
     pub(crate) fn saved_since_moved(&self) -> Vec<String> {
         let Some((own, moved)) = self.camera.zip(self.viewpoint()) else { return Vec::new() };
@@ -326,7 +327,7 @@ impl RequestState {
         self.toggles == KeyOverrides::default()
     }
 
-    /// The initial view.
+    /// The initial view, before any key changes it.
     pub(crate) fn base_view(&self) -> View {
         self.command_line.view.unwrap_or(View::Beauty)
     }
@@ -340,7 +341,7 @@ impl RequestState {
         self.command_line.shadows.or(self.own.map(|own| own.shadows))
     }
 
-    /// Current shadows.
+    /// The current kind of shadows.
     pub(crate) fn shadows(&self) -> Shadows {
         self.toggles.shadows.or(self.base_shadows()).unwrap_or(Shadows::Soft)
     }
@@ -361,12 +362,12 @@ impl RequestState {
         self.command_line.integrator.or(self.own.map(|own| own.integrator))
     }
 
-    /// Current integrator.
+    /// The current integrator.
     pub(crate) fn integrator(&self) -> Integrator {
         self.toggles.integrator.or(self.base_integrator()).unwrap_or(Integrator::Whitted)
     }
 
-    /// The image's aspect ratio. A typical value until it is known.
+    /// The image's aspect ratio, or a typical value until it is known.
     pub(crate) fn aspect(&self) -> f32 {
         const USUAL: f32 = 4.0 / 3.0;
         self.effective

@@ -28,9 +28,9 @@ pub(crate) struct OwnImage {
 pub(crate) struct WrittenFile {
     pub path: PathBuf,
     pub bytes: u64,
-    /// Generation of the request that wrote it.
+    /// Generation of the request that wrote the file.
     pub generation: u64,
-    /// Description of the file, if known.
+    /// Description of the written image, if known.
     pub made: String,
     /// Changes made with keys that the file includes. `None` for the scene's own image.
     pub shows: Option<KeyOverrides>,
@@ -44,9 +44,9 @@ pub(crate) struct WrittenFile {
 pub(crate) struct SavingState {
     /// Number of times the scene's files have changed.
     pub edits: u64,
-    /// Request that followed the last edit.
+    /// Generation of the request that followed the last edit.
     pub last_edit: Option<u64>,
-    /// First request that used the last saved files.
+    /// Generation of the first request that used the last saved files.
     pub saved_at: u64,
     pub own: OwnImage,
     /// Whether the scene's files are complete, meaning that no program is writing them.

@@ -9,15 +9,15 @@ use crate::pipeline::protocol::{AssetProgress, RenderProgress, Report, Stage, St
 /// The worker's state for the current generation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Activity {
-    /// Working.
+    /// The worker is processing the request.
     Running { since: Instant },
-    /// Finished.
+    /// The request has finished.
     Done,
-    /// Failed, but the file may be incomplete.
+    /// The request failed, but the scene file may still be incomplete.
     Waiting,
-    /// Failed.
+    /// The request failed.
     Broken,
-    /// Stopped.
+    /// The request was stopped.
     Cancelled,
 }
 
@@ -66,7 +66,7 @@ pub(crate) struct WorkState {
     /// Curves of recent renders, from oldest to newest. They are restored if a later request reproduces an
     /// image.
     curves: Vec<(ImageOrigin, NoiseCurve)>,
-    /// Whether the request had no changes.
+    /// Whether the request left the image unchanged.
     pub unchanged: bool,
     /// Number of finished renders, not counting exposure changes.
     pub renders: u64,
@@ -127,7 +127,7 @@ impl WorkState {
         }
     }
 
-    /// Like [`WorkState::running_time`], plus the time that earlier requests spent on its samples.
+    /// Like [`WorkState::running_time`], plus the time that earlier requests spent on the same samples.
     pub(crate) fn rendering_time(&self, now: Instant) -> Option<Duration> {
         let earlier = self.progress.map_or(0.0, |progress| progress.earlier_seconds);
         let earlier = Duration::try_from_secs_f64(earlier).unwrap_or_default();

@@ -1,4 +1,4 @@
-//! Camera keys: the resulting requests and messages.
+//! Tests of the requests and messages that camera keys cause.
 
 use super::{BLUE, RED};
 use crate::event::{Effect, Event, KeyPress};
@@ -37,7 +37,7 @@ fn moved_camera_is_shown_but_not_written() {
     show(&mut ui);
     let effects = ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
     let edited = request(&effects).expect("a request");
-    assert_eq!(edited.overrides.camera, moved.overrides.camera, "saving a file should not reset it");
+    assert_eq!(edited.overrides.camera, moved.overrides.camera, "saving a file should not reset the camera");
     assert_eq!(edited.write, Writing::No);
     let effects = ui.press('0');
     let own = request(&effects).expect("a request");

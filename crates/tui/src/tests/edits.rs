@@ -1,4 +1,4 @@
-//! Edits and typos: history, numbering and render times.
+//! Tests of edits and typos: history, numbering and render times.
 
 use super::{BLUE, RED, cells_of};
 use crate::Changed;
@@ -167,7 +167,7 @@ fn show_preview(ui: &mut TestUi, name: &str, color: [u8; 3], is_finished: bool) 
     ui.handle_event(Event::Shown { generation });
 }
 
-/// Reports the end of rendering the last valid scene.
+/// Reports that the render of the last valid scene has ended.
 fn last_good(ui: &mut TestUi, end: LastValidSceneEnd) {
     let generation = ui.state.request.generation;
     ui.worker_event(protocol::Event::LastGoodEnded { generation, end });
@@ -322,7 +322,7 @@ fn age_is_measured_from_last_improvement() {
     ui.advance_clock(8000);
     end(&mut ui, false, 8.0, 8.0);
     ui.advance_clock(3000);
-    // Showing it again, for example at a different size, does not change its age.
+    // Showing an image again, for example at a different size, does not change its age.
     show_preview(&mut ui, "bright", GREEN, true);
     save(&mut ui, "shininess = 6");
     read(&mut ui);

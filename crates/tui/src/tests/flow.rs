@@ -1,4 +1,4 @@
-//! Requests, generations, timing and signals.
+//! Tests of requests, generations, timing and signals.
 
 use std::time::Duration;
 
@@ -274,7 +274,7 @@ fn file_saved_in_steps_shows_no_error() {
 fn errors_in_stable_files_are_shown_immediately() {
     let mut ui = TestUi::new();
     ui.fail_render(error_with("first"));
-    assert!(ui.text().contains("error: first"), "no save");
+    assert!(ui.text().contains("error: first"), "without a save, errors should not be deferred");
     ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
     ui.handle_event(Event::Settled);
     ui.fail_render(error_with("late"));

@@ -37,7 +37,7 @@ struct SimulatedConnection {
 
 const FAST: SimulatedConnection =
     SimulatedConnection { bytes_per_second: 2e7, round_trip: Duration::from_millis(1) };
-/// 1 Mbit/s.
+/// A slow connection of 1 Mbit/s.
 const SLOW: SimulatedConnection =
     SimulatedConnection { bytes_per_second: 125e3, round_trip: Duration::from_millis(150) };
 
@@ -53,7 +53,8 @@ struct SimulatedTerminal {
     /// Bytes received, and the number of bytes sent.
     bytes: Vec<u8>,
     sent: usize,
-    /// Number of unacknowledged bytes, and its maximum so far.
+    /// Unacknowledged slices, as reply times and sizes, and the maximum number of unacknowledged bytes so
+    /// far.
     unanswered: VecDeque<(Instant, usize)>,
     most_unanswered: usize,
 }
@@ -194,8 +195,8 @@ impl WatchedRender {
         self.advance(end, true);
     }
 
-    /// Holds down a camera key for the given time. The worker produces a step's first preview soon after its
-    /// request.
+    /// Holds down a camera key for the given time. The worker produces the first preview of each step soon
+    /// after its request.
     fn orbit(&mut self, time: Duration) {
         const REPEAT: Duration = Duration::from_millis(33);
         const FIRST: Duration = Duration::from_millis(12);
@@ -284,7 +285,7 @@ impl WatchedRender {
     fn put_picture(&mut self, samples: f64) {
         let generation = self.ui.state.request.generation;
         let picture = Arc::new(picture(self.size, samples, self.turn));
-        *self.slot.lock().expect("whole") = Some(LatestPreview {
+        *self.slot.lock().expect("a slot") = Some(LatestPreview {
             generation,
             picture,
             range: None,
@@ -303,7 +304,7 @@ impl WatchedRender {
     }
 }
 
-/// A room in muted colors, with the noise of a render with this many samples.
+/// A room in muted colors, with the noise of a render with `samples` samples per pixel.
 fn picture((width, height): (u32, u32), samples: f64, turn: u32) -> Picture {
     /// Noise of a single sample in code values, similar to a Cornell box.
     const NOISE: f64 = 1.2;
@@ -352,22 +353,22 @@ fn assert_followed(preview: PreviewKind, depth: ColorDepth) {
 }
 
 #[test]
-fn fast_terminal_follows_in_half_blocks() {
+fn fast_terminal_follows_render_in_half_blocks() {
     assert_followed(PreviewKind::HalfBlock, ColorDepth::TrueColor);
 }
 
 #[test]
-fn fast_terminal_follows_in_sextants() {
+fn fast_terminal_follows_render_in_sextants() {
     assert_followed(PreviewKind::Sextant, ColorDepth::TrueColor);
 }
 
 #[test]
-fn fast_terminal_follows_in_256_colors() {
+fn fast_terminal_follows_render_in_256_colors() {
     assert_followed(PreviewKind::HalfBlock, ColorDepth::Indexed256);
 }
 
 #[test]
-fn fast_terminal_follows_in_pixels() {
+fn fast_terminal_follows_render_in_pixels() {
     assert_followed(PreviewKind::Pixels(Protocol::Kitty), ColorDepth::TrueColor);
 }
 

@@ -1,4 +1,4 @@
-//! The screen while an older render is being viewed.
+//! Tests of the screen while an older render is being viewed.
 
 use crossterm::event::KeyCode;
 
@@ -50,7 +50,7 @@ fn older_render_cannot_be_inspected() {
 }
 
 #[test]
-fn newest_settings_are_not_shown_for_older() {
+fn older_render_hides_newest_settings() {
     let mut ui = older();
     let keys = line(&mut ui, 39);
     assert!(!line(&mut ui, 0).contains("view normal") && !keys.contains("hard"), "{}", ui.text());
@@ -138,7 +138,7 @@ fn age_is_shown_once_and_updated() {
 }
 
 #[test]
-fn save_time_applies_only_to_its_image() {
+fn save_time_is_cleared_by_the_next_render() {
     let mut ui = TestUi::new();
     ui.finish_render(RED);
     ui.handle_event(Event::Changed(Changed { noticed: ui.now }));

@@ -1,4 +1,4 @@
-//! Effects of the keys, and their help texts.
+//! Tests of the keys' effects and their help texts.
 
 use super::{BLUE, RED, cells_of};
 use crate::action::Action;
@@ -117,7 +117,7 @@ fn check(action: Action, key: KeyPress, ui: &mut TestUi) {
             );
         }
         Action::KeepCamera => {
-            assert!(ui.key(key).is_empty(), "unchanged");
+            assert!(ui.key(key).is_empty(), "an unchanged camera should not be saved");
             ui.press('l');
             let wanted = ui.state.request.viewpoint().expect("a camera");
             assert!(
@@ -228,7 +228,7 @@ fn check(action: Action, key: KeyPress, ui: &mut TestUi) {
     }
 }
 
-/// The key line.
+/// The text of the key line.
 fn bottom(ui: &mut TestUi) -> String {
     ui.text().lines().last().map(str::to_owned).unwrap_or_default()
 }

@@ -1,4 +1,4 @@
-//! The layout: enough space for the image, and no movement during a render.
+//! Tests that the image gets enough space and that nothing moves during a render.
 
 use super::{RED, cells_of};
 use crate::Changed;
@@ -323,8 +323,8 @@ fn pixel_preview_memory_is_bounded() {
         state.display.pixels_across()
     };
     for (protocol, fine, most) in [(Protocol::Kitty, 10, 2_400_000), (Protocol::Sixel, 8, 1_600_000)] {
-        assert_eq!(by(protocol, 80, 24, (8, 16)), 8, "one to one");
-        assert_eq!(by(protocol, 200, 60, (20, 40)), fine, "fine enough");
+        assert_eq!(by(protocol, 80, 24, (8, 16)), 8, "full resolution");
+        assert_eq!(by(protocol, 200, 60, (20, 40)), fine, "limited resolution");
         for (columns, rows) in [(480, 130), (1000, 500), (4000, 2000), (u16::MAX, u16::MAX)] {
             let across = by(protocol, columns, rows, (10, 20));
             let pixels = u64::from(columns) * u64::from(rows) * 2 * u64::from(across * across);

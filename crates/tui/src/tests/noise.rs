@@ -1,4 +1,4 @@
-//! How noise is displayed.
+//! Tests of how noise is displayed.
 
 use super::RED;
 use crate::event::Event;

@@ -1,4 +1,4 @@
-//! Notices expire and do not hide progress or results.
+//! Tests that notices expire and do not hide progress or results.
 
 use super::{BLUE, RED};
 use crate::event::Event;
@@ -9,7 +9,7 @@ use crate::pipeline::protocol;
 const WINDOWS: [(u16, u16); 5] = [(60, 20), (80, 24), (100, 30), (120, 40), (200, 60)];
 const SHORT: &str = "exposure +0.25";
 const LONG: &str = messages::CAMERA_MOVED;
-const LONGER: &str = "camera.position = [0, 1, 4.5], camera.fov = 35, camera.focus = 4.25 was saved since you moved the camera: \
+const LONGER: &str = "camera.position = [0, 1, 4.5], camera.fov = 35, camera.focus = 4.25 was saved after you moved the camera: \
     press c again to overwrite it, or 0 to reset the camera";
 
 /// A UI showing a notice while a render is half done.
@@ -34,7 +34,7 @@ fn notice_expires_after_four_seconds() {
         assert!(ui.text().contains(SHORT), "{}", ui.text());
         ui.advance_clock(3900);
         assert!(ui.text().contains(SHORT), "{}", ui.text());
-        // Since there are no other events, the event loop must wake up to clear it.
+        // Since there are no other events, the event loop must wake up to clear the notice.
         let wake = ui.state.next_tick().expect("a tick");
         assert!(wake <= ui.now + std::time::Duration::from_millis(100));
         ui.state.dirty = false;

@@ -1,4 +1,4 @@
-//! Overlays: help, view list, diagnostics.
+//! Tests of the overlays: help, view list and diagnostics.
 
 use crossterm::event::KeyCode;
 
@@ -109,7 +109,7 @@ fn scroll_keys_are_shown_only_when_needed() {
 }
 
 #[test]
-fn help_leaves_no_partial_words_beside_it() {
+fn help_leaves_no_partial_words_next_to_it() {
     let mut ui = TestUi::with(state(120, 40));
     ui.finish_render(RED);
     ui.press('?');
@@ -313,7 +313,7 @@ fn errors_come_first_and_duplicates_are_merged() {
 }
 
 #[test]
-fn diagnostics_are_beside_the_image_if_possible() {
+fn diagnostics_are_next_to_the_image_if_possible() {
     for (columns, rows, width, is_beside) in
         [(160, 40, 640, true), (80, 60, 640, true), (80, 24, 480, true), (80, 24, 640, false)]
     {

@@ -1,4 +1,4 @@
-//! The mouse: requests, inspected values, and positions opened in the editor.
+//! Tests of the mouse: requests, inspected values, and positions opened in the editor.
 
 use crossterm::event::KeyCode;
 
@@ -72,7 +72,10 @@ fn drag_orbits_and_click_inspects() {
     for (column, row) in [(70, 10), (20, 0), (20, 23)] {
         assert!(click(&mut ui, column, row).is_empty(), "clicks outside the image should be ignored");
     }
-    assert!(mouse(&mut ui, MouseKind::Drag, 30, 10).is_empty(), "started elsewhere");
+    assert!(
+        mouse(&mut ui, MouseKind::Drag, 30, 10).is_empty(),
+        "a drag that started outside the image should be ignored"
+    );
 }
 
 #[test]
@@ -203,7 +206,7 @@ fn undo_can_be_repeated_until_nothing_is_left() {
     assert!(undone(&mut ui, Err("outdated".to_owned())).is_empty());
     assert!(ui.text().contains("error: outdated"), "{}", ui.text());
     assert!(asks(&mut ui, "two"), "a failed undo can be retried");
-    assert!(request(&undone(&mut ui, Ok("a.toml".into()))).is_some(), "the file is rendered");
+    assert!(request(&undone(&mut ui, Ok("a.toml".into()))).is_some(), "the restored file should be rendered");
     assert!(ui.text().contains(&messages::camera_undone("a.toml")), "{}", ui.text());
     assert!(asks(&mut ui, "one"));
     undone(&mut ui, Ok("a.toml".into()));
@@ -239,7 +242,10 @@ fn command_line_camera_overrides_the_file() {
     let base = Overrides { sets, ..Overrides::default() };
     let mut ui = TestUi::with(state_with(80, 24, PreviewKind::HalfBlock, ColorDepth::TrueColor, base));
     ui.finish_render(RED);
-    assert!(matches!(ui.press('c')[..], [Effect::Send(Command::KeepCamera(_))]), "saved without moving it");
+    assert!(
+        matches!(ui.press('c')[..], [Effect::Send(Command::KeepCamera(_))]),
+        "the camera should be saved even if it was not moved"
+    );
     ui.press('>');
     ui.press('c');
     assert!(kept(&mut ui, true, false).is_empty());
@@ -326,7 +332,7 @@ fn small_windows_show_how_to_copy() {
 }
 
 #[test]
-fn drag_after_z_selects_the_first_region() {
+fn drag_after_z_selects_the_region_to_render() {
     let mut ui = ui();
     ui.press('r');
     ui.press('z');
@@ -390,7 +396,10 @@ fn header_marks_an_older_render() {
     ui.press('y');
     let text = ui.text();
     assert!(text.contains("b newest") && text.contains("N newer"), "expected the keys: {text}");
-    assert!(!text.contains("samples") && !text.contains("render  "), "expected no newest values: {text}");
+    assert!(
+        !text.contains("samples") && !text.contains("render  "),
+        "expected no values of the newest render: {text}"
+    );
     ui.handle_event(Event::Resize(window(30, 8)));
     assert!(first(&mut ui).contains("1 of 2"), "{}", ui.text());
     ui.handle_event(Event::Resize(window(80, 24)));
@@ -412,7 +421,7 @@ fn before_and_after_differ_for_a_saved_camera() {
 }
 
 #[test]
-fn escape_closes_gestures_values_and_history() {
+fn escape_cancels_gestures_and_closes_history() {
     let mut ui = ui();
     let escape = |ui: &mut TestUi| ui.handle_event(Event::Key(KeyPress::special(KeyCode::Esc)));
     for (key, waits) in [('z', messages::DRAG_REGION), ('f', messages::CLICK_TO_FOCUS)] {
@@ -461,7 +470,7 @@ fn digit_without_the_view_list_shows_a_hint() {
 }
 
 #[test]
-fn f_needs_an_aperture() {
+fn focusing_requires_an_aperture() {
     let mut ui = ui();
     ui.state.request.camera.as_mut().expect("a camera").aperture = 0.0;
     assert!(ui.press('f').is_empty());

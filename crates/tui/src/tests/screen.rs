@@ -152,7 +152,7 @@ fn asset_bar_disappears_with_its_stage() {
     assert!(ui.text().contains("━━━━━━━━ 100 %") && row(&mut ui, "save cornell.toml") == hint);
     ui.worker_event(of(Stage::Photons, Status::Done));
     assert!(!ui.text().contains("100 %") && row(&mut ui, "save cornell.toml") == hint, "{}", ui.text());
-    // Bars disappear when the render ends.
+    // Progress bars disappear when the render ends.
     ui.worker_event(protocol::Event::Asset { generation: 1, progress: asset_progress("knot.obj", 2, 2) });
     ui.worker_event(done_event(1, Vec::new(), false));
     assert!(!ui.text().contains("knot.obj"), "{}", ui.text());
@@ -419,7 +419,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 300, ..ProptestConfig::default() })]
 
     #[test]
-    fn no_window_and_no_history_panics(
+    fn no_window_size_or_history_panics(
         columns in 1_u16..250,
         rows in 1_u16..80,
         aspect in 1.2_f32..3.5,
@@ -579,7 +579,7 @@ fn reset_is_offered_once_after_a_change() {
 fn preview_cost_is_shown_if_it_fits() {
     let mut ui = TestUi::with(state(120, 40));
     ui.finish_render(RED);
-    // If all stages are listed, there is no space for it.
+    // If all stages are listed, there is no space for the preview cost.
     ui.state.work.stages = Default::default();
     ui.state.saving.edits = 1;
     ui.state.display.frame =
@@ -592,7 +592,7 @@ fn preview_cost_is_shown_if_it_fits() {
 }
 
 #[test]
-fn folder_precedes_the_name() {
+fn folder_is_shown_only_if_it_fits() {
     let mut ui = TestUi::new();
     ui.finish_render(RED);
     assert!(ui.text().contains("/cornell.toml  640×480"), "{}", ui.text());

@@ -1,4 +1,4 @@
-//! The noise curve and history in a wide window, and notifications.
+//! Tests of the noise curve and history in a wide window, and of notifications.
 
 use ratatui::layout::Rect;
 
@@ -53,7 +53,7 @@ fn rendered(ui: &mut TestUi, error: f32) {
     ui.worker_event(event);
 }
 
-/// Saves the scene with each of these texts in turn.
+/// Saves the scene with each of these texts, one after the other.
 fn edited(ui: &mut TestUi, edits: &[(&str, [u8; 3])]) {
     for (text, color) in edits {
         ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
@@ -269,8 +269,8 @@ fn running_render_is_the_newest_entry() {
         "{text}"
     );
     assert!(!text.contains(messages::STOPPED), "the render is still running: {text}");
-    // The next save stops the render. Its entry loses its number, which is reused for the new render as soon
-    // as that has a preview.
+    // The next save stops the render. Its entry loses its number, which the new render gets once it has a
+    // preview.
     start_render(&mut ui, "camera.fov = 20", None);
     let text = panel(&mut ui);
     assert!(text.contains(&format!("▸– {}: camera.fov", messages::STOPPED)) && !text.contains('2'), "{text}");
@@ -468,7 +468,7 @@ fn written_files_are_hyperlinks() {
     }
 }
 
-/// Finishes a render after this many seconds. Returns the bytes sent after the preview.
+/// Finishes a render after `seconds` and returns the notification, if any.
 fn notification(seconds: u64, prepare: impl Fn(&mut TestUi)) -> Option<String> {
     let mut ui = TestUi::new();
     ui.state.display.capabilities = TerminalId { brand: Brand::Kitty, version: [0, 40] }.capabilities();

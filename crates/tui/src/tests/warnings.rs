@@ -1,4 +1,4 @@
-//! Warnings.
+//! Tests of the number of warnings and of the pane that lists them.
 
 use crate::Changed;
 use crate::event::{Event, KeyPress};

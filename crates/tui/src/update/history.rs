@@ -95,7 +95,7 @@ fn newest_image(state: &State) -> Option<crate::history::ShownImage> {
 
 fn show_image(state: &mut State, shown: crate::history::ShownImage) -> Vec<Effect> {
     state.picture.shown = Some(shown);
-    // The header shows the render's number and age.
+    // The header already shows the render's number and age.
     let keys = &messages::HISTORY_KEYS[usize::from(state.picture.history.is_oldest_shown())..];
     let words = [&[&*state.picture.history.reason_of_open()], keys].concat().join(" · ");
     show_until_key(state, words);

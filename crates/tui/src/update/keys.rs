@@ -1,4 +1,4 @@
-//! Handles keys.
+//! Handles key presses.
 
 use crossterm::event::{KeyCode, KeyModifiers};
 

@@ -32,7 +32,7 @@ use crate::pipeline::protocol::{Command, OwnImageState};
 /// How long the window size must be unchanged before a new preview is requested.
 const RESIZE_QUIET: Duration = Duration::from_millis(60);
 
-/// Creates the first request.
+/// Creates the first render request.
 pub(super) fn start(state: &mut State) -> Vec<Effect> {
     request_render(state, false)
 }
@@ -70,8 +70,8 @@ fn handle(state: &mut State, event: Event) -> Vec<Effect> {
             show_image(state, ShownImage { generation, picture, range, section, lacks_photons, source })
         }
         Event::Changed(Changed { noticed }) => {
-            // Keep the message if glimt wrote the camera and thereby caused the change, or refused to write
-            // it because of the change.
+            // Keep the message if glimt caused the change by writing the camera, or refused to write the
+            // camera because of the change.
             const OWN: Duration = Duration::from_secs(1);
             let is_of = |said: Option<Instant>| said.is_some_and(|said| state.now <= said + OWN);
             let (is_own, is_known) = (is_of(state.saving.camera_kept), is_of(state.saving.camera_refused));

@@ -36,7 +36,7 @@ pub(super) fn perform_action(state: &mut State, action: OverlayAction) -> bool {
         OverlayAction::LineDown => scroll(state, |line, _| line + 1),
         OverlayAction::PageUp => scroll(state, |line, page| line.saturating_sub(page)),
         OverlayAction::PageDown => scroll(state, |line, page| line + page),
-        // Used only by the view list.
+        // These actions are used only by the view list.
         OverlayAction::ColumnLeft
         | OverlayAction::ColumnRight
         | OverlayAction::Take
@@ -51,8 +51,8 @@ fn view_of_digit(state: &State, key: KeyPress) -> Option<View> {
     View::ALL.get(digit.to_digit(10)? as usize - 1).copied()
 }
 
-/// Closes or cancels the first of these that is active: a pane, waiting for a click or drag, inspected
-/// values, viewing an older render.
+/// Closes a pane, cancels a pending click or drag, hides the inspected values, or returns to the newest
+/// render, whichever applies first.
 fn close_topmost(state: &mut State) -> bool {
     let is_open = if state.overlays.help.open {
         state.overlays.help.open = false;
@@ -79,7 +79,7 @@ fn close_topmost(state: &mut State) -> bool {
 }
 
 /// Scrolls the help, or the diagnostics pane if its content does not fit. Returns false if nothing scrolls,
-/// in which case the key has its usual function.
+/// so that the key has its usual function.
 fn scroll(state: &mut State, step: impl FnOnce(usize, usize) -> usize) -> bool {
     let (is_help, (page, last)) = match () {
         () if state.overlays.help.open => (true, help::scroll_extent(state)),

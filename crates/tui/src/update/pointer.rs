@@ -100,7 +100,7 @@ pub(super) fn inspect(state: &mut State) -> Vec<Effect> {
     send_pick_query(state, PickPurpose::Inspect)
 }
 
-/// Waits for a click. If already waiting, focuses at the crosshair.
+/// Waits for a click that sets the focus. If already waiting, focuses at the crosshair.
 pub(super) fn focus_on_click(state: &mut State) -> Vec<Effect> {
     if state.picture.history.is_older_open() {
         return notify(state, messages::OLDER_RENDER);
@@ -198,7 +198,7 @@ pub(super) fn copy_values(state: &mut State) -> Vec<Effect> {
     vec![Effect::Aside(window_title::clipboard_bytes(&clicked))]
 }
 
-/// Shape and name, line, material, distance, position, radiance and normal.
+/// Formats the inspected values: shape and name, line, material, distance, position, radiance and normal.
 fn inspected_values(Picked { thing, color, pixel: [x, y] }: &Picked) -> Vec<String> {
     let light = color.map(|color| format!("radiance {}", format_vector(color.map(f64::from))));
     let Some(thing) = thing else {
@@ -209,7 +209,7 @@ fn inspected_values(Picked { thing, color, pixel: [x, y] }: &Picked) -> Vec<Stri
     let file = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
     let back = if *is_front { "" } else { " (back)" };
     let mut facts = vec![format!("{shape}{name}")];
-    // The lines of a generated scene do not exist in a file.
+    // A model's scene is generated, so its lines do not exist in any file.
     facts.extend((!is_mesh(path)).then(|| format!("{}:{line}", visible(&file))));
     facts.extend([
         visible(material).into_owned(),

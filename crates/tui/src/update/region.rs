@@ -10,8 +10,8 @@ use crate::state::State;
 /// Width and height of a region around a position, as fractions of the image.
 const SIDE: f64 = 1.0 / 3.0;
 
-/// Handles the key. The first press waits for a drag, the second selects the region around the crosshair, and
-/// the third clears the region.
+/// Handles the key that selects a region. The first press waits for a drag, the second selects the region
+/// around the crosshair, and the third clears the region.
 pub(super) fn handle_region_key(state: &mut State) -> Vec<Effect> {
     if state.request.first_section.take().is_some() {
         (state.selection.is_marking, state.selection.press) = (false, None);
@@ -26,7 +26,7 @@ pub(super) fn handle_region_key(state: &mut State) -> Vec<Effect> {
     render_section(state, section_around(state.selection.crosshair))
 }
 
-/// Stops waiting for a drag, cancelling any drag in progress.
+/// Stops waiting for a drag and cancels any drag in progress.
 pub(super) fn cancel_selection(state: &mut State) {
     if std::mem::take(&mut state.selection.is_marking) {
         (state.request.first_section, state.selection.press) = (None, None);
@@ -62,7 +62,7 @@ fn render_section(state: &mut State, section: Section) -> Vec<Effect> {
     effects
 }
 
-/// Restarts a running render to change the order of rendering. Samples are kept.
+/// Restarts a running render to change its rendering order. Samples are kept.
 fn restart_render(state: &mut State) -> Vec<Effect> {
     state.dirty = true;
     if state.work.is_running() && !state.work.paused { request_render(state, false) } else { Vec::new() }

@@ -92,7 +92,8 @@ fn check_pixel_support(state: &mut State, answer: TerminalReply) -> Vec<Effect> 
     }
 }
 
-/// Reports once that the terminal does not support pixels. If support is confirmed later, it is still used.
+/// Reports once that the terminal does not support pixels. If support is confirmed later, pixels are still
+/// used.
 pub(super) fn report_missing_pixels(state: &mut State) {
     let asked = state.display.pixels_until.take().and(state.display.pixels);
     if let Some(request) = asked {
@@ -203,7 +204,7 @@ mod tests {
         start(&mut state);
         let before = state.request.preview_size.expect("a size");
         let foot = TerminalReply::Name(TerminalId { brand: Brand::Foot, version: [1, 20] });
-        assert!(handle_reply(&mut state, foot).is_empty(), "not queried");
+        assert!(handle_reply(&mut state, foot).is_empty(), "the name was not queried");
         assert_eq!(state.display.capabilities, Capabilities::default());
         state.display.ask = TerminalQueries { blocks: true, ..TerminalQueries::default() };
         let effects = handle_reply(&mut state, foot);

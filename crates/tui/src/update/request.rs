@@ -57,7 +57,7 @@ pub(super) fn request_render(state: &mut State, force: bool) -> Vec<Effect> {
     effects
 }
 
-/// If the window size has changed, requests a preview of the same image at the new size, without restarting
+/// If the preview size has changed, requests a preview of the same image at the new size, without restarting
 /// the render.
 pub(super) fn request_resized_preview(state: &mut State) -> Vec<Effect> {
     let size = Layout::preview_size(state);

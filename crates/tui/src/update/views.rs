@@ -1,4 +1,4 @@
-//! Keys for the open view list: navigation, search, closing.
+//! Keys for navigating, searching and closing the open view list.
 
 use crossterm::event::{KeyCode, KeyModifiers};
 

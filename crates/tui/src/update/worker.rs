@@ -218,7 +218,7 @@ fn record_stage(state: &mut State, stage: StageReport) {
     }
 }
 
-/// Updates an asset's progress bar. Each name has one bar.
+/// Updates an asset's progress bar. Each asset name has one bar.
 fn update_asset_bar(state: &mut State, progress: AssetProgress) {
     let finished = (progress.done >= progress.total).then_some(state.now);
     let bar = AssetBar { progress, finished };
@@ -426,7 +426,7 @@ fn handle_failure(state: &mut State, failure: Failure) {
     }
 }
 
-/// Handles the end of a render of the last valid scene, which runs while the file is broken.
+/// Handles the end of rendering the last valid scene, which continues while the scene file is broken.
 fn handle_last_valid_end(state: &mut State, end: LastValidSceneEnd) {
     match end {
         LastValidSceneEnd::Finished { unchanged } => {

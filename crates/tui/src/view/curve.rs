@@ -16,7 +16,7 @@ use crate::state::State;
 /// Minimum and maximum height of the chart in rows.
 const MIN_ROWS: u16 = 6;
 const MAX_ROWS: u16 = 12;
-/// Maximum width. More columns would not add detail.
+/// Maximum width of the chart. More columns would not add detail.
 const MAX_COLUMNS: u16 = 60;
 /// Minimum number of points in a curve, and minimum ratio of its last time to its first.
 const MIN_POINTS: usize = 3;
@@ -57,7 +57,7 @@ fn requested_noise(state: &State) -> Option<f64> {
     state.request.effective.as_ref().map(|it| f64::from(it.error)).filter(|error| *error > 0.0)
 }
 
-/// No-break space.
+/// A no-break space, which keeps a number and its unit on one line.
 const UNBROKEN: &str = "\u{a0}";
 
 /// The caption, wrapped into lines. Numbers are not separated from their units.
@@ -111,7 +111,7 @@ fn plot(state: &State, points: &[(f64, f64)], area: Rect, buffer: &mut Buffer) {
         .render(area, buffer);
 }
 
-/// Braille dots, if the terminal is likely to support them.
+/// The chart's marker: Braille dots, if the terminal is likely to support them.
 fn marker(state: &State) -> Marker {
     let is_simple = state.display.kind == PreviewKind::Ascii
         || matches!(state.display.depth, ColorDepth::Ansi16 | ColorDepth::None);

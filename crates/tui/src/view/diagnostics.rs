@@ -124,7 +124,7 @@ fn format_diagnostics(diagnostics: &[Diagnostic], width: usize) -> Vec<StyledLin
     lines.pop();
     if let Some(more @ 1..) = faults.len().checked_sub(MAX) {
         lines.push(StyledLine::new());
-        lines.push(vec![(format!("… {} are not shown", format_count(more, "more fault")), Tone::Plain)]);
+        lines.push(vec![(format!("… {} not shown", format_count(more, "more diagnostic")), Tone::Plain)]);
     }
     lines
 }
@@ -159,7 +159,7 @@ fn format_fault(fault: &[&Diagnostic], width: usize) -> Vec<StyledLine> {
     lines
 }
 
-/// `line:column`.
+/// Formats a diagnostic's position as `line:column`.
 fn format_position(one: &Diagnostic) -> Option<String> {
     let place = one.place.as_ref()?;
     let (line, column) = report::line_and_column(&place.source, place.span.start);

@@ -26,7 +26,7 @@ use crate::state::{Activity, State};
 
 /// Minimum header width for a state block of fixed width.
 const WIDE: u16 = 60;
-/// Minimum width of a shortened name.
+/// Minimum width of a shortened scene name.
 const MIN_NAME: u16 = 6;
 
 pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
@@ -134,7 +134,7 @@ fn view_label(state: &State) -> String {
     format!("  view {}{range}", view.name())
 }
 
-/// Whether light from photons is missing in the current preview.
+/// Whether light from photons is missing from the current preview.
 fn lacks_photons(state: &State) -> bool {
     state
         .picture
@@ -218,9 +218,9 @@ fn newest_render_number(state: &State) -> u64 {
     state.work.renders + u64::from(is_under_way)
 }
 
-/// Remaining time. Empty if the render is paused.
+/// Formats the remaining time. Empty if the render is paused.
 fn format_eta(state: &State, progress: &RenderProgress) -> String {
-    /// Shorter times would round to zero.
+    /// Minimum time shown, in seconds. Shorter times would round to zero.
     const MIN: f64 = 0.05;
     let eta = match Eta::of(progress) {
         None => "…".to_owned(),
@@ -231,7 +231,7 @@ fn format_eta(state: &State, progress: &RenderProgress) -> String {
     if state.work.paused { String::new() } else { format!("  ETA {eta}") }
 }
 
-/// Number of errors and warnings, in words.
+/// Formats the number of errors and warnings.
 pub(super) fn format_error_count(state: &State) -> String {
     let Some(problems) = &state.overlays.problems else { return String::new() };
     let count = |severity| problems.diagnostics.iter().filter(|it| it.severity == severity).count();

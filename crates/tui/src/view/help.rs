@@ -10,7 +10,7 @@ use crate::keymap::{KEYMAP, OVERLAY};
 use crate::messages;
 use crate::state::State;
 
-/// Explanations for other parts of the screen.
+/// Help entries that explain other parts of the screen.
 const NOTES: &[(&str, &str)] = &[
     ("on screen after 9 ms", "from a save to the first changed cell"),
     ("31 kB sent", messages::HELP_BYTES),
@@ -21,7 +21,7 @@ const NOTES: &[(&str, &str)] = &[
     ("render 3", "number of finished renders, as in the history"),
 ];
 
-/// Draws the help at the center of the screen.
+/// Draws the help in the center of the screen.
 pub(super) fn draw(state: &State, buffer: &mut Buffer) {
     let area = help_area(state);
     let inner = inside_border(area);
@@ -61,7 +61,7 @@ pub(super) fn draw(state: &State, buffer: &mut Buffer) {
 /// Number of columns between labels and texts.
 const BESIDE: u16 = 3;
 
-/// Label width for help text of this width.
+/// Width of the label column if the help is `width` columns wide.
 fn label_width(width: u16) -> u16 {
     const MIN: u16 = 9;
     widest_entry(|(label, _)| label).min(MIN.max(width / 3))

@@ -15,7 +15,7 @@ use crate::scene::is_mesh;
 use crate::scene::report::summary;
 use crate::state::{Activity, KeyOverrides, State, ViewList};
 
-/// A key with long and short descriptions.
+/// A hint in the key line: a key with long and short descriptions.
 struct KeyHint {
     key: &'static str,
     words: String,
@@ -100,7 +100,7 @@ fn draw_hint(hint: &KeyHint, area: Rect, is_long: bool, state: &State, buffer: &
     hint.width(is_long)
 }
 
-/// Toggles with their values. Those changed with keys are bold.
+/// Hints for the toggles, with their values. Toggles changed with keys are bold.
 fn toggle_hints(state: &State) -> Vec<KeyHint> {
     // The values belong to the newest render, not to the one being viewed.
     if state.picture.history.is_older_open() {
@@ -221,7 +221,7 @@ fn view_list_hints(views: &ViewList) -> Vec<KeyHint> {
     }
 }
 
-/// Actions shown elsewhere in the line.
+/// Actions shown elsewhere in the key line.
 const ELSEWHERE: [Action; 8] = [
     Action::Quit,
     Action::ToggleHelp,
@@ -238,7 +238,7 @@ fn pause_hint(hint: KeyHint, state: &State) -> KeyHint {
     if is_pause && state.work.paused { KeyHint::new(hint.key, "resume") } else { hint }
 }
 
-/// Number of errors and warnings, if the pane is closed.
+/// Hint with the number of errors and warnings, if the pane is closed.
 fn hidden_diagnostics_hint(state: &State) -> Option<KeyHint> {
     let key = keymap::binding_of(Action::ToggleDiagnostics)?.label;
     let (words, tone) = match &state.overlays.problems {

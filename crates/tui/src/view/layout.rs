@@ -67,7 +67,8 @@ impl Layout {
         })
     }
 
-    /// `shape` is the image's aspect ratio in cells. `None` if no image is shown.
+    /// Computes the layout for a window. `shape` is the image's aspect ratio in cells, or `None` if no image
+    /// is shown.
     fn new(columns: u16, rows: u16, shape: Option<f32>, is_alone: bool) -> Self {
         let mut layout = Self::default();
         let mut rest = Rect::new(0, 0, columns, rows);
@@ -172,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn diagnostics_are_beside_the_image_if_possible() {
+    fn diagnostics_are_next_to_the_image_if_possible() {
         let square = layout(120, 40, 1.0);
         assert_eq!(square.pane, square.panel);
         let tall = layout(80, 60, 4.0 / 3.0);

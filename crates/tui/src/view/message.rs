@@ -19,9 +19,9 @@ const GAP: u16 = 2;
 
 /// Where a message is shown.
 enum MessagePosition {
-    /// On a single line.
+    /// The message is on a single line.
     Line(Rect),
-    /// Over the last rows of this area.
+    /// The message covers the last rows of this area.
     Over(Rect),
 }
 
@@ -47,7 +47,7 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
     }
 }
 
-/// Whether a message replaces a whole line. The status line is shared, not replaced.
+/// Whether a message replaces an entire line. The status line is shared, not replaced.
 pub(super) fn replaces_line(state: &State, layout: &Layout) -> bool {
     message_text(state, layout).is_some()
 }

@@ -26,7 +26,7 @@ pub(super) use self::extras::ViewExtras;
 use self::layout::Layout;
 use super::state::State;
 
-/// The state as a single word.
+/// The worker's state as a single word.
 pub(super) fn activity_word(state: &State) -> &'static str {
     header::work_word(state)
 }

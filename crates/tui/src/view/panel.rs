@@ -19,7 +19,7 @@ use crate::preview_kind::PreviewKind;
 use crate::scene::sanitize::visible;
 use crate::state::{Activity, AssetBar, State};
 
-/// Width of a progress bar.
+/// Width of an asset's progress bar.
 const BAR: u16 = 8;
 /// Width of a result's label.
 const LABEL: usize = 8;
@@ -103,7 +103,7 @@ fn panel_lines(state: &State, (width, column): (u16, u16), is_in_full: bool) -> 
     lines
 }
 
-/// The inspected values.
+/// Lines with the inspected values.
 fn inspected_lines(state: &State, width: u16) -> Vec<StyledLine> {
     let facts = state
         .selection
@@ -139,7 +139,7 @@ fn asset_line(state: &State, asset: &AssetBar, width: u16) -> StyledLine {
     vec![(name, Tone::Plain), (filled_squares, Tone::Working), (empty, Tone::Faint), (percent, Tone::Plain)]
 }
 
-/// The results, with one label and value per line.
+/// Lines with the results, with one label and value per line.
 fn result_lines(state: &State, width: u16) -> Vec<StyledLine> {
     let fact =
         |label: &str, value: String| vec![(format!("{label:<LABEL$} "), Tone::Faint), (value, Tone::Plain)];
@@ -184,7 +184,7 @@ fn result_lines(state: &State, width: u16) -> Vec<StyledLine> {
     lines
 }
 
-/// The limit that ended a render.
+/// A limit that can end a render.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum RenderEnd {
     Time,

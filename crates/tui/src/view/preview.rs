@@ -43,7 +43,7 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
     }
 }
 
-/// Draws a thumbnail.
+/// Draws the thumbnail of a history entry.
 pub(super) fn draw_thumbnail(state: &State, picture: &Picture, area: Rect, buffer: &mut Buffer) {
     let area = area.intersection(buffer.area);
     if !area.is_empty() {
@@ -53,7 +53,7 @@ pub(super) fn draw_thumbnail(state: &State, picture: &Picture, area: Rect, buffe
     }
 }
 
-/// The image position shown by a cell.
+/// The image position shown by a cell of the preview.
 pub(crate) fn image_position_at(state: &State, column: u16, row: u16) -> Option<ImagePosition> {
     let shown = state.picture.shown.as_ref()?;
     let area = Layout::for_state(state).preview;
@@ -86,7 +86,7 @@ fn is_in_pixels(state: &State) -> bool {
         && !message::is_over_picture(state)
 }
 
-/// Placement of the preview in pixels. `None` if it is drawn using cells.
+/// Placement of a preview drawn as pixels. `None` if the preview is drawn as cells.
 pub(crate) fn placement(state: &State, area: Rect) -> Option<PixelPlacement> {
     let shown = state.picture.shown.as_ref().filter(|_| is_in_pixels(state))?;
     let placed = PlacedImage::for_preview(state, shown, area, state.display.kind);
@@ -109,7 +109,7 @@ impl<'a> PreviewColors<'a> {
     }
 }
 
-/// Draws an image into these cells for a dark terminal that has xterm's colors and cells twice as high as
+/// Draws an image into these cells for a dark terminal that has xterm's colors and cells twice as tall as
 /// wide.
 pub fn draw_for_dark_xterm(
     picture: &Picture,

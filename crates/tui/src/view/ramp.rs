@@ -25,7 +25,7 @@ const RAMP: [(char, f32); 15] = [
 ];
 const MAX_INK: f32 = RAMP[RAMP.len() - 1].1;
 
-/// Mapping from brightness to characters.
+/// A mapping from brightness to characters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Ramp {
     /// The sRGB values shown as black and white.
@@ -54,7 +54,7 @@ impl Ramp {
         Self { low: low.max(0.0), high, is_light }
     }
 
-    /// Maps an sRGB brightness to the ramp's range.
+    /// Maps an sRGB brightness from the ramp's range to [0, 1].
     fn stretch(self, brightness: f32) -> f32 {
         ((brightness - self.low) / (self.high - self.low).max(1e-3)).clamp(0.0, 1.0)
     }

@@ -25,7 +25,7 @@ fn is_wide(state: &State) -> bool {
     state.display.window.columns >= WIDE
 }
 
-/// The area left over next to or below the lines.
+/// The area next to or below the lines that remains for the curve and the history.
 fn free_area(state: &State, panel: Rect, lines: u16) -> Rect {
     if !is_wide(state) || state.overlays.views.is_some() {
         return Rect::ZERO;
@@ -46,7 +46,7 @@ fn free_area(state: &State, panel: Rect, lines: u16) -> Rect {
     area
 }
 
-/// Draws the parts that fit. Returns the cells used.
+/// Draws the curve and the history strip if they fit. Returns the cells used.
 pub(super) fn draw(state: &State, panel: Rect, lines: u16, buffer: &mut Buffer) -> Rect {
     let (curve, strip) = divide_curve_and_strip(state, panel, lines);
     curve::draw(state, curve, buffer);

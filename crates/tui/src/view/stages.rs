@@ -13,13 +13,13 @@ pub(super) type StyledLine = Vec<(String, Tone)>;
 
 /// Stages that took less than this fraction of the total time are omitted from the summary line.
 const SMALL: f64 = 0.02;
-/// Width of the name and time, including the gap between them.
+/// Width of a stage's name and time, including the gap between them.
 const TIME_ENDS: u16 = 16;
-/// Minimum width of a shortened reason.
+/// Minimum width of a stage's shortened reason.
 const MIN_WHY: u16 = 12;
 
-/// Symbol, name, time, time difference and reason. If there is no space for the reason, it follows on
-/// separate lines.
+/// A stage's symbol, name, time, time difference and reason. If there is no space for the reason, it follows
+/// on separate lines.
 pub(super) fn stage_lines(state: &State, stage: Stage, room: u16) -> Vec<StyledLine> {
     let mut line = stage_line(state, stage, room);
     let why = stage_reason(state, stage);
@@ -35,7 +35,7 @@ pub(super) fn stage_lines(state: &State, stage: Stage, room: u16) -> Vec<StyledL
     std::iter::once(line).chain(below).collect()
 }
 
-/// Symbol, name, time, time difference and as much of the reason as fits on the same line.
+/// A stage's symbol, name, time, time difference and as much of the reason as fits on the same line.
 pub(super) fn stage_line_with_reason(state: &State, stage: Stage, room: u16) -> Vec<StyledLine> {
     let mut line = stage_line(state, stage, room);
     let (why, room) = (stage_reason(state, stage), reason_columns(&line, room));
@@ -59,7 +59,7 @@ fn stage_reason(state: &State, stage: Stage) -> String {
     visible(report.map_or("", |report| report.why.as_str())).into_owned()
 }
 
-/// Symbol, name, time and, if it fits, the time difference.
+/// A stage's symbol, name, time and, if it fits, the time difference.
 fn stage_line(state: &State, stage: Stage, room: u16) -> StyledLine {
     let report = state.work.stages.get(stage as usize).and_then(Option::as_ref);
     let has_ended = !state.work.is_running();
@@ -90,7 +90,7 @@ fn stage_line(state: &State, stage: Stage, room: u16) -> StyledLine {
     line
 }
 
-/// Bold for stages that were run again after an edit.
+/// Tone of a stage's text, which is bold if the stage was run again after an edit.
 fn tone_of_stage(state: &State, report: Option<&StageReport>) -> Tone {
     let is_again = report.is_some_and(|it| it.status == Status::Done && state.work.renders > 0);
     if is_again && state.saving.edits > 0 { Tone::Strong } else { Tone::Plain }

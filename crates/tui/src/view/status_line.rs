@@ -20,7 +20,7 @@ use crate::scene::is_mesh;
 use crate::scene::sanitize::visible;
 use crate::state::{Activity, OwnImage, State, WrittenFile};
 
-/// Hints for narrow windows.
+/// Save hints for narrow windows.
 const SHORT_HINT: &str = "save it to re-render";
 const SHORT_HINT_OF_MODEL: &str = "re-renders on changes";
 /// Minimum width of a progress bar.
@@ -85,7 +85,7 @@ pub(crate) fn last_good_progress(state: &State) -> Option<&RenderProgress> {
     state.work.progress.as_ref().filter(|progress| is_broken && progress.fraction < 1.0)
 }
 
-/// Fraction and text for the asset being loaded or the render.
+/// Fraction and text of the progress bar, for the asset being loaded or the render.
 fn bar_words(state: &State, layout: &Layout) -> (f64, String) {
     let time = state.work.rendering_time(state.now).map_or(String::new(), format_running_time);
     match (&state.work.progress, state.work.assets.last()) {
@@ -135,8 +135,8 @@ fn draw_progress_bar(state: &State, layout: &Layout, area: Rect, buffer: &mut Bu
     put_text(buffer, area, &pieces, state.display.depth);
 }
 
-/// `noise 2.1 % → 1 % in about 14 s`, and a shorter variant. It is called noise rather than error because a
-/// noise-free image may still be biased.
+/// Formats the noise as `noise 2.1 % → 1 % in about 14 s` and in a shorter variant. It is called noise rather
+/// than error because a noise-free image may still be biased.
 fn noise_words(noise: &NoiseProgress) -> [String; 2] {
     let now = format!("noise {}", two_digit_percent(noise.now));
     let next = noise.next.map(|(level, seconds)| {

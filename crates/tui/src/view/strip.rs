@@ -26,7 +26,7 @@ const WIDE_ROWS: EntryRows = EntryRows { picture: 5, entry: 5, pitch: 6 };
 const WIDE: u16 = 40;
 /// Minimum width of the text next to a thumbnail.
 const MIN_WORDS: u16 = 10;
-/// Width of a column if there is more than one.
+/// Width of a column of the strip if there is more than one.
 const COLUMN: u16 = 44;
 
 /// A history entry and its position in the strip.
@@ -101,8 +101,7 @@ pub(super) fn strip_rows(state: &State, area: Rect) -> u16 {
     top.map_or(0, |top| area.bottom() - top + 1)
 }
 
-/// The entries that fit at the bottom of an area. The newest is first. The one being viewed is always
-/// included.
+/// The entries that fit at the bottom of an area, newest first. The entry being viewed is always included.
 fn visible_entries(state: &State, area: Rect) -> Vec<StripEntry> {
     let count = state.picture.history.len();
     let rows = if area.width >= WIDE { WIDE_ROWS } else { NARROW_ROWS };
@@ -131,7 +130,7 @@ fn visible_entries(state: &State, area: Rect) -> Vec<StripEntry> {
     (0..shown).map(item).collect()
 }
 
-/// The entry at a cell.
+/// Index of the history entry at a cell of the strip.
 pub(super) fn entry_at(state: &State, area: Rect, (column, row): (u16, u16)) -> Option<usize> {
     let is_there = |item: &StripEntry| item.cells.contains((column, row).into());
     visible_entries(state, area).into_iter().find(is_there).map(|item| item.index)

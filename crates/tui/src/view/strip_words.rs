@@ -7,7 +7,7 @@ use crate::scene::{key_parts, shortened_key, split_key};
 
 /// Text of a history entry.
 pub(super) struct EntryText {
-    /// Mark and number, followed by a space.
+    /// The entry's mark and number, followed by a space.
     pub(super) head: String,
     /// Changes since the previous entry.
     pub(super) changes: Vec<String>,

@@ -14,9 +14,9 @@ pub(super) use crate::pipeline::words::seconds;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Tone {
     Plain,
-    /// Finished or less important.
+    /// Text that is less important.
     Faint,
-    /// New, or most important.
+    /// Text that is new or important.
     Strong,
     Working,
     Good,
@@ -108,7 +108,7 @@ pub(crate) fn text_columns(text: &str) -> u16 {
     u16::try_from(text.width()).unwrap_or(u16::MAX)
 }
 
-/// A row of an area, counted from the top. Empty if out of range.
+/// A row of an area, counted from the top. Empty if `index` is out of range.
 pub(super) fn row_of(area: Rect, index: u16) -> Rect {
     if index < area.height { Rect { y: area.y + index, height: 1, ..area } } else { Rect::ZERO }
 }
@@ -239,7 +239,7 @@ pub(super) fn two_digit_percent(part: f64) -> String {
     format!("{text} %")
 }
 
-/// Formats a number with at least three digits.
+/// Formats a number with about three significant digits.
 pub(super) fn format_number(x: f32) -> String {
     let digits = match x.abs() {
         x if x >= 100.0 => 0,
@@ -252,7 +252,7 @@ pub(super) fn format_number(x: f32) -> String {
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }
 
-/// `1 error`, `2 errors`.
+/// Formats a count with its noun, such as `1 error` or `2 errors`.
 pub(super) fn format_count(count: usize, what: &str) -> String {
     format!("{count} {what}{}", if count == 1 { "" } else { "s" })
 }
@@ -272,7 +272,7 @@ mod tests {
     }
 
     #[test]
-    fn shares_have_two_digits() {
+    fn percentages_have_two_digits() {
         let shares = [0.021, 0.01, 0.000_43, 0.5, 1.7, 0.0, 0.0996].map(two_digit_percent);
         assert_eq!(shares, ["2.1 %", "1 %", "0.043 %", "50 %", "170 %", "0 %", "10 %"]);
     }

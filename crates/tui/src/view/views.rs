@@ -10,9 +10,9 @@ use crate::choice::Choice;
 use crate::pipeline::settings::View;
 use crate::state::State;
 
-/// Width of a view and its digit.
+/// Width of a view in the list, including its digit.
 const WIDTH: u16 = 16;
-/// Number of views that have a digit.
+/// Number of views that can be selected with a digit.
 pub(crate) const DIGITS: usize = 9;
 
 pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
@@ -44,7 +44,7 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
     }
 }
 
-/// Number of views per column.
+/// Number of views per column of the view list.
 pub(crate) fn rows_per_column(state: &State) -> usize {
     usize::from(list_area(&Layout::for_state(state)).height).max(1)
 }

@@ -30,7 +30,7 @@ type PanelArea<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 type DrawError<'a> = DrawingAreaErrorKind<<SVGBackend<'a> as DrawingBackend>::ErrorType>;
 type Chart<'c, 'a> = ChartContext<'c, SVGBackend<'a>, Cartesian2d<LogAxis, LogAxis>>;
 
-/// Draws a panel.
+/// Draws the panel of one scene: axes, reference noise, error bars, medians and legend.
 pub(super) fn draw_panel<'a>(scene: &SceneResult, place: &PanelArea<'a>) -> Result<(), DrawError<'a>> {
     let steps = || scene.methods.iter().flat_map(|method| &method.steps);
     let noise = scene.reference.noise;

@@ -19,7 +19,7 @@ const COLORS: [Color; 6] =
     [Color::Blue, Color::Red, Color::Green, Color::Magenta, Color::Yellow, Color::Cyan];
 /// Method markers. The combinations of marker and color repeat after 30 methods.
 const MARKERS: [char; 5] = ['o', 'x', '+', '*', '#'];
-/// Rows of a chart.
+/// Height of a chart in rows.
 const ROWS: u16 = 16;
 /// Maximum width of a chart.
 const MAX_COLUMNS: u16 = 100;
@@ -113,7 +113,7 @@ impl MethodCurve {
     }
 }
 
-/// Draws every scene if stdout is a terminal.
+/// Draws a chart of every scene if stdout is a terminal.
 pub(super) fn print_charts(results: &Results, console: &Console) {
     if !std::io::stdout().is_terminal() {
         return;

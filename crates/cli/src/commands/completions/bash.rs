@@ -1,8 +1,8 @@
 //! Bash completion with quoted candidates.
 //!
 //! Bash inserts candidates as they are, and `clap_complete`'s adapter does not quote them. A name such as
-//! `$(…)` would then be executed with the command. This adapter receives the whole line, splits it into words
-//! like bash but without expansions, and quotes the candidates.
+//! `$(…)` would then be executed when the command runs. This adapter receives the entire line, splits it into
+//! words like bash but without expansions, and quotes the candidates.
 
 use std::ffi::OsString;
 use std::io::{Error, Write};

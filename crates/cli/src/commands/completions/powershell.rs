@@ -10,7 +10,7 @@ use clap_complete::env::EnvCompleter;
 use crate::args::candidates::store_command_line;
 
 /// The script. Unlike `clap_complete`'s script, which executes `$(…)` on completion, it does not evaluate the
-/// line. The last word is prefixed with `+` because some versions do not pass empty arguments.
+/// line. The last word is prefixed with `+` because some PowerShell versions do not pass empty arguments.
 const SCRIPT: &str = r#"Register-ArgumentCompleter -Native -CommandName glimt -ScriptBlock {
     param($wordToComplete, $commandAst, $cursorPosition)
     $words = @()

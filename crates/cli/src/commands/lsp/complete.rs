@@ -50,7 +50,8 @@ fn completion_item(label: &str, kind: CompletionItemKind, doc: &str, insert: Str
     }
 }
 
-/// Table headers. A candidate replaces the partial header, including closing brackets inserted by the editor.
+/// Candidates for table headers. Each replaces the partial header, including closing brackets inserted by the
+/// editor.
 fn header_items(document: &OpenDocument, offset: usize) -> Vec<CompletionItem> {
     let before = &document.text[..offset];
     let line = before.rsplit('\n').next().unwrap_or_default().trim_start();
@@ -72,7 +73,7 @@ fn header_items(document: &OpenDocument, offset: usize) -> Vec<CompletionItem> {
     .collect()
 }
 
-/// Missing keys of a table, with example values unless a `=` follows.
+/// Candidates for a table's missing keys, with example values unless `=` follows the cursor.
 fn missing_key_items(of: Section, given: &[String], is_assigned: bool) -> Vec<CompletionItem> {
     let whole =
         |name: &str, value: &str| if is_assigned { name.to_owned() } else { format!("{name} = {value}") };
@@ -157,7 +158,7 @@ fn word_items(list: &[Word], is_quoted: bool) -> Vec<CompletionItem> {
     list.iter().map(word).collect()
 }
 
-/// Names of tables defined in the document.
+/// Candidates for the names that the document defines in `table`, such as `wall` in `[materials.wall]`.
 fn table_name_items(document: &OpenDocument, table: &str, is_quoted: bool) -> Vec<CompletionItem> {
     let named =
         document.tables.iter().filter(|one| one.info.name == table).filter_map(|one| one.name.as_ref());

@@ -30,7 +30,7 @@ struct CheckQueue {
 /// The pending requests and the running request.
 #[derive(Default)]
 struct CheckRequests {
-    /// At most one per document, in order of arrival.
+    /// Pending requests in order of arrival, at most one per document.
     waiting: VecDeque<(Uri, OpenDocument)>,
     running: Option<(Uri, CancelToken)>,
     is_over: bool,

@@ -51,7 +51,7 @@ pub(super) fn hover(document: &OpenDocument, offset: usize) -> Option<Value> {
     Some(json!(Hover { contents, range: Some(document.span(&key.name.span)) }))
 }
 
-/// Description, unit, range and default, in Markdown.
+/// Describes a key in Markdown: description, unit, range and default.
 pub(super) fn describe_key(key: &KeyInfo) -> String {
     let mut text = format!("{}.", key.doc);
     let mut row = |name: &str, value: String| {

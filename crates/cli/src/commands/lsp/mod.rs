@@ -1,6 +1,6 @@
 //! `glimt lsp`: a language server for scenes, on stdin and stdout.
 //!
-//! The client sends the whole document with every change, and the server parses it immediately. Referenced
+//! The client sends the full document with every change, and the server parses it immediately. Referenced
 //! files are checked on a separate thread when the document is opened or saved.
 
 mod colors;
@@ -40,7 +40,7 @@ use self::wire::{Client, Received};
 use crate::console::Console;
 use crate::exit::Exit;
 
-/// Serves until the client sends `exit` or closes stdin. `exit` without a preceding `shutdown` is a failure,
+/// Runs the server until the client sends `exit` or closes stdin. `exit` without a preceding `shutdown` is a failure,
 /// as the protocol requires.
 pub(crate) fn run(console: &Console) -> Exit {
     match serve(&mut std::io::stdin().lock(), &Client::new(std::io::stdout())) {

@@ -18,7 +18,7 @@ pub(super) enum CursorContext {
     InnerValue { key: String, is_quoted: bool },
 }
 
-/// A table and its type.
+/// The table at the cursor and its type.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Section {
     pub(super) info: &'static TableInfo,
@@ -153,7 +153,8 @@ impl LineEndState {
 /// The table around a byte offset, and whether the offset is in an array.
 #[derive(Debug, Default)]
 struct EnclosingTable<'t> {
-    /// The previous header without its brackets, and the lines of its table. `None` before the first header.
+    /// The last header before the offset, without its brackets, and the lines of its table. `None` before the
+    /// first header.
     table: Option<(&'t str, &'t str)>,
     /// Whether the line continues an array.
     is_in_array: bool,
@@ -203,7 +204,7 @@ fn header_name(line: &str) -> Option<&str> {
     (is_name && (rest.is_empty() || rest.starts_with('#'))).then(|| name.trim())
 }
 
-/// The type from the key `type`, or the default type.
+/// The table's type as set by its key `type`, or the default type.
 fn table_type(info: &'static TableInfo, body: &str) -> Option<&'static TypeInfo> {
     let named = body.split(['\n', ',', '{', '}']).find_map(|item| {
         let (key, value) = item.split_once('=')?;

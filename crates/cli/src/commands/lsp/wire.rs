@@ -1,7 +1,7 @@
 //! The LSP base protocol on stdin and stdout: a header with a length, followed by JSON.
 //!
-//! `lsp_server`'s reader stops at invalid messages and allocates the length in the header. This reader
-//! responds with an error and limits the length.
+//! `lsp_server`'s reader stops at invalid messages and allocates as many bytes as the header claims. This
+//! reader responds with an error and limits the length.
 
 use std::io::{self, BufRead, Read, Write};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -26,7 +26,7 @@ pub(super) enum Received {
 /// Reads the next frame. `None` at the end of the stream.
 ///
 /// # Errors
-/// The stream cannot be read, or its framing is lost.
+/// The stream cannot be read, or a frame is malformed or too long.
 pub(super) fn read_frame(from: &mut impl BufRead) -> Result<Option<Received>, String> {
     let Some(length) = read_content_length(from)? else { return Ok(None) };
     if length > MAX_MESSAGE_BYTES {
@@ -175,11 +175,11 @@ mod tests {
     }
 
     #[test]
-    fn too_long_messages_are_rejected() {
+    fn oversized_messages_are_rejected() {
         let mut far = &b"Content-Length: 1000000000000\r\n\r\n{}"[..];
         assert!(read_frame(&mut far).expect_err("too long").contains("1000000000000 bytes"));
         let mut cut = &b"Content-Length: 500000000\r\n\r\n{}"[..];
-        assert!(read_frame(&mut cut).expect_err("cut").contains("2 of 500000000 bytes"));
+        assert!(read_frame(&mut cut).expect_err("truncated").contains("2 of 500000000 bytes"));
         assert!(read_frame(&mut &b""[..]).expect("the end").is_none());
     }
 }

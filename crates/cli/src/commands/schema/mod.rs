@@ -137,7 +137,7 @@ fn schema_by_type(info: &'static TableInfo) -> Value {
     json!({ "type": "object", "properties": { "type": type_key_schema(info) }, "allOf": conditions })
 }
 
-/// The condition that a table is of a given type. The key `type` is optional for the default type.
+/// The condition that a table has a given type. The key `type` is optional for the default type.
 fn type_condition(info: &TableInfo, kind: &TypeInfo) -> Value {
     let is_default = info.types.first().is_some_and(|first| first.name == kind.name);
     let required: &[&str] = if is_default { &[] } else { &["type"] };
@@ -230,7 +230,7 @@ fn table_key_conditions(table: &str, draft: Draft) -> Vec<(&'static str, Value)>
 /// Conditions on combinations of keys in a type.
 fn type_key_conditions(kind: &str) -> Vec<(&'static str, Value)> {
     match kind {
-        // Exactly one of three groups.
+        // Require exactly one of three groups of keys.
         "metal" => vec![(
             "oneOf",
             json!([{ "required": ["color"] }, { "required": ["eta", "k"] }, { "required": ["element"] }]),

@@ -1,4 +1,4 @@
-//! Schemas of values.
+//! JSON Schemas of key values.
 
 use serde_json::{Value, json};
 

@@ -6,7 +6,7 @@ use super::{Container, GltfError};
 /// Maximum element count of an accessor without a buffer view, whose elements are all zero.
 const MAX_ZEROS: u64 = 1 << 22;
 
-/// Component type.
+/// Type of an accessor's components.
 #[derive(Clone, Copy, PartialEq)]
 enum ComponentType {
     I8,
@@ -38,7 +38,7 @@ impl ComponentType {
         }
     }
 
-    /// Decodes a component. Normalized integers are in [0, 1] or [-1, 1] (3.6.2.2).
+    /// Decodes a component to a float. Normalized integers map to [0, 1] or [-1, 1] (3.6.2.2).
     fn decode_number(self, bytes: &[u8], normalized: bool) -> f32 {
         let word = || [bytes[0], bytes[1]];
         let long = || [bytes[0], bytes[1], bytes[2], bytes[3]];
@@ -84,7 +84,7 @@ struct StridedElements<'a> {
     stride: usize,
 }
 
-/// A checked accessor.
+/// Reads the elements of a validated accessor.
 pub(super) struct AccessorReader<'a> {
     component: ComponentType,
     normalized: bool,
@@ -92,7 +92,7 @@ pub(super) struct AccessorReader<'a> {
     pub(super) width: usize,
     /// Number of elements.
     pub(super) count: usize,
-    /// `None` if all elements are zero.
+    /// Elements in the buffer view. `None` if all elements are zero.
     elements: Option<StridedElements<'a>>,
     /// Sparse values and their sorted indices.
     sparse: Option<(Vec<u32>, StridedElements<'a>)>,
@@ -170,7 +170,7 @@ impl<'a> AccessorReader<'a> {
         })
     }
 
-    /// Bytes of an element. `None` if it is zero.
+    /// Bytes starting at an element. `None` if the element is zero.
     fn element_bytes(&self, index: usize) -> Option<&'a [u8]> {
         if let Some((indices, values)) = &self.sparse
             && let Ok(element) = indices.binary_search(&(index as u32))
@@ -195,7 +195,7 @@ impl<'a> AccessorReader<'a> {
         self.width == 1 && self.component.index(&[0; 4]).is_some()
     }
 
-    /// The index stored as element number `element`, which must exist.
+    /// Reads element number `element` as an index. The element must exist.
     pub(super) fn index(&self, element: usize) -> u32 {
         self.element_bytes(element).and_then(|bytes| self.component.index(bytes)).unwrap_or_default()
     }

@@ -1,13 +1,13 @@
-//! Contents of a glTF file in terms of glimt's scene parameters.
+//! Contents of a glTF file, expressed in glimt's scene parameters.
 
 use crate::math::{DMat3, DVec3, Vec2};
 
-/// The visible contents of a file.
+/// Visible contents of a glTF file.
 #[derive(Debug, Default)]
 pub struct ModelScene {
-    /// Placed parts, in node order.
+    /// Parts placed by nodes, in node order.
     pub instances: Vec<ModelInstance>,
-    /// Materials used by instances.
+    /// Materials used by the instances.
     pub materials: Vec<ModelMaterial>,
     /// Names of the images, possibly empty.
     pub images: Vec<String>,
@@ -26,16 +26,16 @@ pub struct ModelScene {
 /// An affine transform.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AffineMap {
-    /// Linear part.
+    /// Linear part of the transform.
     pub linear: DMat3,
-    /// Translation.
+    /// Translation, applied after the linear part.
     pub translate: DVec3,
 }
 
 impl AffineMap {
     pub(super) const IDENTITY: Self = Self { linear: DMat3::IDENTITY, translate: DVec3::ZERO };
 
-    /// Composition that applies `inner` first.
+    /// Composes two transforms. `inner` is applied first.
     pub(super) fn compose(self, inner: Self) -> Self {
         Self { linear: self.linear * inner.linear, translate: self.point(inner.translate) }
     }
@@ -81,14 +81,14 @@ impl TexturedValue {
     }
 }
 
-/// Wrap mode of a texture outside [0, 1].
+/// Wrap mode for texture coordinates outside [0, 1].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum TextureWrap {
-    /// Periodic.
+    /// Repeats the texture.
     Repeat,
     /// Repeats the edge texels.
     Clamp,
-    /// Repeats the texture. Every other copy is mirrored.
+    /// Repeats the texture, mirroring every other copy.
     Mirror,
 }
 
@@ -99,7 +99,7 @@ pub struct TextureRef {
     pub image: usize,
     /// Whether to use the nearest texel instead of interpolating.
     pub is_nearest: bool,
-    /// Wrap mode outside [0, 1].
+    /// Wrap mode for coordinates outside [0, 1].
     pub wrap: TextureWrap,
     /// Whether the lookup uses the part's second set of texture coordinates.
     pub is_second: bool,
@@ -107,7 +107,7 @@ pub struct TextureRef {
     pub repeat: Vec2,
     /// Rotation angle in degrees, from u to v.
     pub rotate: f64,
-    /// Translation.
+    /// Offset of the coordinates.
     pub offset: Vec2,
 }
 
@@ -134,7 +134,7 @@ pub struct Glass {
     pub tint: DVec3,
 }
 
-/// A material, described by the parameters of `principled`.
+/// A glTF material, converted to `principled` parameters.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModelMaterial {
     /// Name, possibly empty.
@@ -167,7 +167,7 @@ pub struct ModelMaterial {
     pub alpha: Alpha,
     /// Whether both sides are visible and emit.
     pub is_two_sided: bool,
-    /// Solid glass, which replaces everything except the roughness.
+    /// Solid glass, which replaces all other parameters except the roughness.
     pub glass: Option<Glass>,
 }
 
@@ -243,7 +243,7 @@ pub struct ModelCamera {
     pub aspect: Option<f64>,
 }
 
-/// Deduplicated notes.
+/// Deduplicated notes about an import.
 #[derive(Debug, Default)]
 pub(super) struct ImportNotes(pub(super) Vec<String>);
 

@@ -10,7 +10,7 @@ use base64::{DecodeError, Engine};
 use serde::de::{self, Deserializer, IgnoredAny, Visitor};
 use serde::{Deserialize, de::Error};
 
-/// Root object of the file.
+/// Root object of a glTF file.
 #[derive(Debug, Default, Deserialize)]
 #[serde(rename_all = "camelCase", default)]
 pub(super) struct Root {
@@ -37,7 +37,7 @@ pub(super) struct Root {
 #[serde(default)]
 pub(super) struct JsonAsset {
     pub(super) version: String,
-    /// Minimum version that a reader must support. Empty if unspecified.
+    /// Minimum glTF version that a reader must support. Empty if unspecified.
     #[serde(rename = "minVersion")]
     pub(super) min_version: String,
 }
@@ -230,12 +230,12 @@ pub(super) struct JsonImage {
     pub(super) buffer_view: Option<usize>,
 }
 
-/// A URI.
+/// URI of a buffer or image.
 #[derive(Debug)]
 pub(super) enum Uri {
     /// Decoded bytes of a data URI.
     Data(Vec<u8>),
-    /// A file reference, as written.
+    /// URI of a file, as written in the JSON.
     File(String),
 }
 
@@ -415,7 +415,7 @@ impl Default for Pbr {
     }
 }
 
-/// Material extensions: the supported ones, and the names of all others.
+/// Supported material extensions, and the names of all others.
 #[derive(Debug, Default)]
 pub(super) struct MaterialExtensions {
     pub(super) ior: Option<Ior>,
@@ -435,7 +435,7 @@ fn material_extensions<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Mat
         type Value = MaterialExtensions;
 
         fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-            f.write_str("a table of extensions")
+            f.write_str("an object with extensions")
         }
 
         fn visit_map<A: de::MapAccess<'de>>(self, mut map: A) -> Result<MaterialExtensions, A::Error> {

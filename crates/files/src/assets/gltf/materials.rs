@@ -9,7 +9,7 @@ use super::{Container, GltfError, ImageBytes};
 use crate::math::{DVec3, Vec2};
 
 impl JsonMaterial {
-    /// Textures that glimt uses.
+    /// The material's supported textures.
     fn supported_textures(&self) -> Vec<&TextureInfo> {
         let (pbr, extensions) = (&self.pbr_metallic_roughness, &self.extensions);
         let base = [
@@ -34,7 +34,7 @@ impl JsonMaterial {
         base.into_iter().chain(extended).flatten().collect()
     }
 
-    /// Texture coordinate sets of all textures, starting with the base color.
+    /// Texture coordinate sets of all textures, starting with the base color texture.
     pub(super) fn coordinate_sets(&self) -> Vec<usize> {
         self.supported_textures().into_iter().map(TextureInfo::coordinate_set).collect()
     }
@@ -63,7 +63,7 @@ pub(super) fn extension_ignored(name: &str) -> String {
     format!("extension {} is ignored", super::truncate_for_message(name))
 }
 
-/// Converts a material. Adds notes about features without an equivalent.
+/// Converts a material, and adds notes about features that glimt does not support.
 pub(super) fn convert_material(
     container: &Container,
     number: usize,
@@ -119,8 +119,8 @@ impl MaterialReader<'_> {
         }
         // Convert the extensions.
         if let Some(ior) = &extensions.ior {
-            // Converted specular-glossiness materials have an index of refraction of 0, which means full
-            // reflection.
+            // Materials converted from specular-glossiness have an index of refraction of 0, which means
+            // full reflection.
             if ior.ior == 0.0 {
                 self.note("an index of refraction of 0 (full reflection) is replaced by 10");
             }
@@ -166,7 +166,7 @@ impl MaterialReader<'_> {
         Ok(material)
     }
 
-    /// Solid glass. The attenuation color becomes the transmittance per unit of distance.
+    /// Converts a volume to solid glass. The attenuation color becomes the transmittance per unit of distance.
     fn solid_glass(
         &mut self,
         material: &ModelMaterial,
@@ -206,7 +206,7 @@ impl MaterialReader<'_> {
         }
     }
 
-    /// Whether an image may have alpha. Only the first bytes of PNG and JPEG files are checked.
+    /// Whether an image may have alpha. Checks the first bytes of embedded images and the names of image files.
     fn may_have_alpha(&self, image: usize) -> bool {
         const COLOR_TYPE: usize = 25;
         match self.container.image(image) {
@@ -239,7 +239,7 @@ impl MaterialReader<'_> {
         Ok(TexturedValue { factor, texture })
     }
 
-    /// Converts a texture reference. Adds notes about unsupported features.
+    /// Converts a texture reference, and adds notes about unsupported features.
     fn convert_texture(&mut self, info: &TextureInfo) -> Result<Option<TextureRef>, GltfError> {
         let root = &self.container.root;
         let texture = root.textures.get(info.index);
@@ -326,7 +326,7 @@ fn clamp_to_unit(number: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// Applies the extension's formula to points whose v is measured from the bottom.
+    /// Compares the conversion with the formula of `KHR_texture_transform`, whose v is measured from the top.
     #[test]
     fn uv_transforms_match_the_extension() {
         let json =

@@ -1,4 +1,4 @@
-//! Merges a glTF file's scene into one mesh, with the same material type as mesh files.
+//! Merges the scene of a glTF file into one mesh with mesh-file materials.
 
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
@@ -11,7 +11,7 @@ use crate::geometry::mesh::TriangleMesh;
 use crate::math::Vec3;
 use crate::math::origin::origin_near;
 
-/// Maximum number of triangles, summed over all instances.
+/// Maximum number of triangles in a merged scene, counting every instance.
 const MAX_TRIANGLES: usize = 1 << 25;
 
 impl Container {
@@ -19,11 +19,11 @@ impl Container {
     ///
     /// # Errors
     /// Same as [`Container::scene`] and [`Container::part`]. Also fails if the scene has no faces or too
-    /// many.
+    /// many triangles.
     pub fn merged_scene(&self, token: &CancelToken) -> Result<LoadedMesh, AssetError> {
         let scene = self.scene(token)?;
         let Some([min, max]) = scene.bounds else {
-            return Err(self.wrong(GltfError::new("its scene shows no faces")));
+            return Err(self.wrong(GltfError::new("its scene has no visible faces")));
         };
         let origin = origin_near((min + max) * 0.5, (max - min).max_element() * 0.5);
         let (companions, pictures) = (self.companions.clone(), self.pictures());
@@ -32,7 +32,7 @@ impl Container {
         merged.material_warnings = self.material_warnings(&scene);
         merged.warnings = scene.notes;
         merged.materials = scene.materials.iter().map(file_material).collect();
-        // Add all instances. The merged mesh has each attribute for either all vertices or none.
+        // Add all instances. In the merged mesh, either all vertices have an attribute or none do.
         let mut parts: HashMap<usize, TriangleMesh> = HashMap::new();
         for instance in &scene.instances {
             let part = match parts.entry(instance.part) {
@@ -67,7 +67,7 @@ impl Container {
     }
 }
 
-/// Appends a transformed part.
+/// Appends a transformed part to the merged mesh.
 fn append_part(merged: &mut TriangleMesh, part: &TriangleMesh, placed: &AffineMap, material: u32) {
     let first = merged.positions.len() as u32;
     let positions = part.positions.iter().map(|at| at.as_dvec3() + part.origin);
@@ -104,7 +104,7 @@ fn append_part(merged: &mut TriangleMesh, part: &TriangleMesh, placed: &AffineMa
     merged.materials.resize(merged.triangles.len(), material);
 }
 
-/// Appends vertex attributes. The list stays empty until a part has the attribute.
+/// Appends a part's values of a vertex attribute. The list stays empty until a part has the attribute.
 fn append_attribute<T: Copy>(
     all: &mut Vec<T>,
     first: u32,
@@ -121,7 +121,7 @@ fn append_attribute<T: Copy>(
     all.resize(first as usize + count, missing);
 }
 
-/// Converts the properties supported by mesh file materials.
+/// Converts the material properties that mesh files support.
 fn file_material(material: &ModelMaterial) -> FileMaterial {
     let number = |slot: &super::TexturedValue| slot.factor.x as f32;
     FileMaterial {

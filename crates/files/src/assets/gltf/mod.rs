@@ -1,10 +1,11 @@
-//! glTF 2.0 (Khronos, *glTF 2.0 Specification*): reads JSON and GLB files, their meshes, images and scenes.
+//! Reads meshes, images and scenes from glTF 2.0 files, in JSON or GLB format (Khronos, *glTF 2.0
+//! Specification*).
 //!
 //! A part is a primitive. Part numbers start at 0 and continue across meshes.
 //!
 //! `serde_json` parses the JSON into the types of `json`; `base64` decodes data URIs. The crate `gltf` 1.4 is
 //! not used. Without validation, it panics on out-of-range indices; with validation, it rejects every
-//! required extension it does not know. Its types alone (`gltf-json`) would only replace the simple half of
+//! required extension it does not know. Its types (`gltf-json`) would replace only the simple half of
 //! `json`: clear coats, WebP images, Basis images and instancing would still have to be parsed from raw
 //! values. In addition, errors in flattened extensions would lose their line numbers, and data URIs would
 //! stay in memory as text.
@@ -78,7 +79,7 @@ fn uri_paths<'u>(path: &Path, uris: impl Iterator<Item = &'u Option<Uri>>) -> Ve
     uris.filter_map(file).collect()
 }
 
-/// An error in a file: its location in the JSON, and the reason.
+/// An error in a glTF file: the location in the JSON and the reason.
 #[derive(Debug)]
 struct GltfError(String);
 
@@ -87,18 +88,18 @@ impl GltfError {
         Self(reason.into())
     }
 
-    /// An index out of range.
+    /// Error for an out-of-range index into `list`.
     fn index(list: &str, index: usize, length: usize) -> Self {
         Self(format!("{list}[{index}] does not exist: there are {length}"))
     }
 
-    /// Adds the enclosing location.
+    /// Prefixes the error with an enclosing location.
     fn add_location(self, place: impl Into<String>) -> Self {
         Self(format!("{}: {}", place.into(), self.0))
     }
 }
 
-/// Truncates a string from the file for a message.
+/// Truncates text from a file for use in a message.
 fn truncate_for_message(text: &str) -> String {
     text.chars().take(60).collect()
 }
@@ -109,7 +110,7 @@ pub struct Container {
     path: PathBuf,
     root: Root,
     buffers: Vec<Vec<u8>>,
-    /// Buffer files that were read.
+    /// Separate buffer files that were read.
     companions: Vec<Companion>,
     hash: FileHash,
     /// For each part, the first part with the same mesh. Only this first part is built.
@@ -119,14 +120,14 @@ pub struct Container {
 /// Location of an image's bytes.
 #[derive(Debug, PartialEq)]
 pub enum ImageBytes<'a> {
-    /// In the glTF file.
+    /// In the glTF file itself.
     Inside(&'a [u8]),
     /// In a separate file.
     File(PathBuf),
 }
 
 impl Container {
-    /// Opens a file and reads its buffers.
+    /// Opens a glTF file and reads its buffers.
     ///
     /// # Errors
     /// [`AssetError`], with the location in the JSON.
@@ -192,12 +193,12 @@ impl Container {
         Ok(container)
     }
 
-    /// Path of the file.
+    /// Path of the glTF file.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Buffer files.
+    /// Separate buffer files of the glTF file.
     pub fn companions(&self) -> &[Companion] {
         &self.companions
     }
@@ -207,7 +208,7 @@ impl Container {
         self.hash
     }
 
-    /// Image files referenced by the file, used or not.
+    /// Image files referenced by the glTF file, used or not.
     pub fn pictures(&self) -> Vec<PathBuf> {
         uri_paths(&self.path, self.root.images.iter().map(|image| &image.uri))
     }
@@ -220,7 +221,7 @@ impl Container {
         self.image_bytes(number).map_err(|wrong| self.wrong(wrong.add_location(format!("images[{number}]"))))
     }
 
-    /// An image's bytes, read from a separate file if necessary.
+    /// Returns an image's bytes, reading them from a separate file if necessary.
     ///
     /// # Errors
     /// Same as [`Container::image`]. Also fails if the image file cannot be read.
@@ -258,8 +259,8 @@ impl Container {
         self.first_part_with_same_mesh.get(part).copied().unwrap_or(part)
     }
 
-    /// For each part, finds the first part with the same mesh. Rejects files that reuse the same buffer bytes
-    /// in many meshes if the meshes would take many times the file's size in memory.
+    /// Finds the first part with the same mesh for each part. Rejects files whose meshes reuse the same buffer
+    /// bytes so often that they would take many times the file's size in memory.
     fn shared_parts(&self) -> Result<Vec<usize>, GltfError> {
         /// Number of corners allowed regardless of the buffer size.
         const FREE: u64 = 1 << 20;
@@ -387,8 +388,8 @@ fn not_relative(uri: &str) -> String {
 /// An unsupported mesh compression extension.
 const DRACO: &str = "KHR_draco_mesh_compression";
 
-/// Version of a file older than glTF 2.0. `None` for other files. The older JSON has objects instead of
-/// arrays.
+/// Returns the version of a file older than glTF 2.0, whose JSON has objects instead of arrays. `None` for
+/// other files.
 fn pre_2_0_version(text: &[u8]) -> Option<String> {
     #[derive(serde::Deserialize)]
     struct Old {
@@ -487,8 +488,8 @@ fn check_version(root: &Root) -> Result<(), GltfError> {
     }
 }
 
-/// Unsupported extensions that change how meshes or images are stored, with advice for exporting without
-/// them.
+/// Unsupported extensions that change how meshes or images are stored, each with advice on how to export
+/// the file without the extension.
 const MISSING: [(&str, &str); 5] = [
     (DRACO, "export it without Draco compression"),
     ("EXT_meshopt_compression", "export it without meshopt compression"),
@@ -536,7 +537,7 @@ fn check_required_extensions(root: &Root) -> Result<(), GltfError> {
     Ok(())
 }
 
-/// Reads all buffers, and lists the buffer files.
+/// Reads all buffers, and returns them with the list of buffer files.
 fn read_buffers(
     path: &Path,
     root: &mut Root,

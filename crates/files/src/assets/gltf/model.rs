@@ -16,7 +16,7 @@ use crate::control::{CancelToken, ignore_progress};
 use crate::geometry::mesh::TriangleMesh;
 use crate::math::{DMat3, DVec3};
 
-/// Exact bounds are computed for up to this many vertices, summed over all instances.
+/// Maximum number of vertices for exact bounds, summed over all instances.
 const MAX_MEASURED: usize = 20_000_000;
 /// Limit on coordinates, transform entries and light intensities. The limit for scenes is 10¹⁸, and cameras
 /// are placed at a distance of several times the model's size.
@@ -25,7 +25,7 @@ const LIMIT: f64 = 1e15;
 const MAX_INSTANCES: usize = 1 << 20;
 
 impl Container {
-    /// Converts the file's default scene, or else its first scene, or else all nodes.
+    /// Converts the file's default scene. Falls back to the first scene, then to all nodes.
     ///
     /// # Errors
     /// [`AssetError::Malformed`] with the location in the JSON.
@@ -44,8 +44,8 @@ impl Container {
         Ok(scene)
     }
 
-    /// Computes the bounds and outline of the instances. Ignores errors in parts, which are reported when the
-    /// parts are loaded, unless no part is valid.
+    /// Computes the bounds and outline of the instances. Skips invalid parts, whose errors are reported when the
+    /// parts are loaded, unless all parts are invalid.
     fn measure_bounds(&self, scene: &mut ModelScene, token: &CancelToken) -> Result<(), AssetError> {
         let mut parts: HashMap<usize, (TriangleMesh, Vec<DVec3>)> = HashMap::new();
         let (mut vertices, mut first_wrong) = (0, None);
@@ -94,7 +94,7 @@ impl Container {
     }
 }
 
-/// Traversal of the node hierarchy.
+/// Traversal of the node hierarchy, with the results so far.
 struct SceneWalk<'a> {
     container: &'a Container,
     scene: ModelScene,
@@ -263,7 +263,7 @@ impl SceneWalk<'_> {
         }
     }
 
-    /// Returns the index of a material. Converts the material on first use.
+    /// Returns the index of a material, converting the material on first use.
     fn material_index(&mut self, number: Option<usize>, sets: [usize; 2]) -> Result<usize, GltfError> {
         if let Some(known) = self.materials.get(&(number, sets)) {
             return Ok(*known);
@@ -448,7 +448,7 @@ struct WorldTransforms {
     of_node: Vec<Option<AffineMap>>,
 }
 
-/// Whether a matrix is invertible and far enough from singular.
+/// Whether a matrix is neither singular nor nearly singular.
 fn is_invertible(linear: &DMat3) -> bool {
     let [x, y, z] = [linear.x_axis, linear.y_axis, linear.z_axis];
     let (volume, edges) = (x.cross(y).dot(z), x.length() * y.length() * z.length());

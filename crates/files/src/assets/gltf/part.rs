@@ -12,7 +12,7 @@ use crate::control::{CancelToken, Progress};
 use crate::math::color::linear_to_srgb8;
 use crate::math::{DVec3, Vec2, Vec3};
 
-/// Primitive modes with faces, besides [`TRIANGLES`].
+/// Primitive modes with faces, other than [`TRIANGLES`].
 const STRIP: u32 = 5;
 const FAN: u32 = 6;
 
@@ -33,7 +33,7 @@ impl Primitive {
 }
 
 impl Container {
-    /// Primitive of a part, and the primitive's location in the file.
+    /// Returns the location of a part in the file, and the part's primitive.
     pub(super) fn primitive(&self, part: usize) -> Option<(String, &Primitive)> {
         let mut first = 0;
         for (mesh, json) in self.root.meshes.iter().enumerate() {
@@ -45,7 +45,7 @@ impl Container {
         None
     }
 
-    /// Number of parts.
+    /// Number of parts in the file.
     pub fn parts(&self) -> usize {
         self.root.meshes.iter().map(|mesh| mesh.primitives.len()).sum()
     }

@@ -52,7 +52,7 @@ fn error(json: &Value) -> String {
     rejection(all()).1
 }
 
-/// A square: two triangles with four positions, six indices and four texture coordinates.
+/// Buffer of a square: four positions, six indices and four texture coordinates.
 fn bytes() -> Vec<u8> {
     let mut bytes = Vec::new();
     for number in [0.0_f32, 0.0, 0.0, 2.0, 0.0, 0.0, 2.0, 1.0, 0.0, 0.0, 1.0, 0.0] {
@@ -103,7 +103,7 @@ fn square() -> Value {
     })
 }
 
-/// A GLB file with these two chunks.
+/// A GLB file with a JSON chunk and a binary chunk.
 fn glb(json: &Value, binary: &[u8]) -> Vec<u8> {
     let mut text = json.to_string().into_bytes();
     text.resize(text.len().next_multiple_of(4), b' ');
@@ -331,7 +331,7 @@ fn two_used_texture_coordinate_sets_are_kept() {
     let (first, two, second, notes) = read([2, 0, 2]);
     assert_eq!((&first, second, notes), (&zero, [true, false, true], 0));
     assert!(two != zero && two != one);
-    assert_eq!(read([0, 1, 2]), (zero, one, [false, true, false], 1), "three sets should be rejected");
+    assert_eq!(read([0, 1, 2]), (zero, one, [false, true, false], 1), "a third set should be noted");
 }
 
 #[test]
@@ -446,7 +446,7 @@ fn equal_primitives_share_one_part() {
     assert_eq!(parts, [0, 100_000]);
 }
 
-/// Primitives that differ only in ignored attributes are built separately, so their triangles all count
+/// Primitives that differ only in ignored attributes are built separately, so all of their triangles count
 /// toward the limit.
 #[test]
 fn corner_limit_counts_all_built_primitives() {

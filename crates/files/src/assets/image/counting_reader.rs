@@ -1,4 +1,4 @@
-//! A reader that reports its progress and can be stopped.
+//! A reader that reports its progress and can be cancelled.
 
 use std::io::{self, Read, Seek, SeekFrom};
 

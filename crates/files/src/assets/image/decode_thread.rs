@@ -10,7 +10,7 @@ use std::time::Duration;
 use crate::assets::read::Monitor;
 use crate::control::{CancelToken, Cancelled};
 
-/// Time between two polls of the cancel token.
+/// Polling interval for the cancel token.
 const POLL: Duration = Duration::from_millis(2);
 
 /// Maximum number of unread progress reports.

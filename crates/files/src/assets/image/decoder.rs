@@ -74,8 +74,8 @@ pub(super) fn create_decoder<R: BufRead + Seek + 'static>(
     }
 }
 
-/// Orientation of an image. Some programs write the JPEG prefix before the Exif data in other formats as
-/// well, which `image` does not support.
+/// Orientation of an image from its Exif data. Some programs also write JPEG's Exif prefix in other formats,
+/// which `image` does not support.
 pub(super) fn orientation(decoder: &mut dyn ImageDecoder) -> Result<Orientation, ImageError> {
     let orientation = decoder.orientation()?;
     let exif = if orientation == Orientation::NoTransforms { decoder.exif_metadata()? } else { None };
@@ -98,23 +98,23 @@ pub(super) fn texel_bytes(color: ColorType, encoding: ImageEncoding, metadata: &
 
 /// Memory allowed for any image, regardless of its file size.
 const SMALL_BYTES: u64 = 256 << 20;
-/// Maximum ratio of memory to file size for each format, counting the decoded image and its texels.
+/// Maximum ratio of memory to file size for a format. The memory includes the decoded image and its texels.
 pub(super) fn max_expansion(format: Option<ImageFormat>) -> u64 {
     match format {
-        // Eight pixels per byte in a bitmap.
+        // Worst case: eight pixels per byte in a bitmap.
         Some(ImageFormat::Pnm) => 64,
-        // Runs of 128 pixels in two bytes.
+        // Worst case: runs of 128 pixels in two bytes.
         Some(ImageFormat::Tga) => 512,
-        // Runs of 255 pixels in two bytes.
+        // Worst case: runs of 255 pixels in two bytes.
         Some(ImageFormat::Bmp) => 1024,
-        // A single-color EXR compressed with deflate, the worst case.
+        // Worst case: a single-color EXR compressed with deflate.
         _ => 4200,
     }
 }
 
 /// Checks an image's size before memory is allocated, and returns the size of its texels. `held_bytes` is the
-/// size of the file data kept by the decoder. The file in memory (`in_memory`) is freed before the texels are
-/// complete.
+/// size of the file data kept by the decoder. `in_memory` is the size of the file in memory, which is freed
+/// before the texels are complete.
 pub(super) fn check_size(
     decoder: &dyn ImageDecoder,
     texel_bytes: u64,

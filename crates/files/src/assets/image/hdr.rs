@@ -10,14 +10,14 @@ use super::metadata::{ImageMetadata, ImageWarning};
 use super::primaries::Primaries;
 use super::space::ColorSpace;
 
-/// Maximum size of a header, including the line with the resolution. PLY has the same limit.
+/// Maximum size of a header, including the resolution line. PLY headers have the same limit.
 const HEADER_BYTES: u64 = 1 << 20;
 /// Luminous efficacy of white light in lm/W. XYZE values are scaled by it (`WHTEFFICACY` in Radiance).
 const WHITE_EFFICACY: f64 = 179.0;
-/// First bytes of a file, before the program name.
+/// First bytes of an HDR file, followed by a program name.
 pub(super) const MAGIC: &[u8] = b"#?";
 
-/// Decoder of an HDR file.
+/// Decoder for Radiance HDR files.
 pub(super) struct HdrDecoder<R> {
     file: R,
     header: HdrHeader,
@@ -75,7 +75,7 @@ impl<R: BufRead> ImageDecoder for HdrDecoder<R> {
 
 struct HdrHeader {
     scan: ScanOrder,
-    /// Factors for red, green and blue.
+    /// Scale factors for red, green and blue.
     scales: [f64; 3],
     space: ColorSpace,
     warnings: Vec<ImageWarning>,
@@ -104,7 +104,7 @@ impl HdrHeader {
     }
 }
 
-/// Lines of a header, with any line endings.
+/// Reads header lines with any line endings.
 struct HeaderLines<'a, R> {
     file: &'a mut R,
     number: usize,
@@ -124,11 +124,12 @@ impl<R: BufRead> HeaderLines<'_, R> {
     }
 }
 
-/// Header variables that affect the values.
+/// Header variables that affect the pixel values.
 #[derive(Default)]
 struct HeaderVariables {
-    /// Product of all `EXPOSURE` lines, and product of all `COLORCORR` lines.
+    /// Product of all `EXPOSURE` lines.
     exposure: Option<f64>,
+    /// Product of all `COLORCORR` lines.
     correction: Option<[f64; 3]>,
     primaries: Option<Primaries>,
     is_xyz: bool,
@@ -136,7 +137,7 @@ struct HeaderVariables {
 }
 
 impl HeaderVariables {
-    /// Adds a line. Ignores indented lines, which are quoted from other headers.
+    /// Parses a header line. Ignores indented lines, which are quoted from other headers.
     fn add(&mut self, line: &str, number: usize) -> Result<(), String> {
         let Some((name, value)) = line.split_once('=').filter(|_| !line.starts_with(['#', ' ', '\t'])) else {
             return Ok(());

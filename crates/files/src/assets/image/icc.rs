@@ -31,7 +31,7 @@ pub(super) const LOOKUP_TABLES: &str = "lookup tables are not supported";
 pub(super) const UNSUPPORTED_CURVES: &str = "missing or unsupported curves";
 pub(super) const DEGENERATE_PRIMARIES: &str = "degenerate primaries";
 
-/// Warning about an ignored profile of another color space.
+/// Warning about a profile that is ignored because of its color space.
 pub(super) fn wrong_space(found: &str, is_gray: bool) -> String {
     format!("its color space is {found:?}, not {}", if is_gray { "gray" } else { "RGB" })
 }
@@ -52,7 +52,7 @@ impl<'a> IccProfile<'a> {
         self.field(at).map(|bytes| u32::from_be_bytes(*bytes) as usize)
     }
 
-    /// Data of a tag.
+    /// Returns the data of a tag.
     fn tag(&self, name: &[u8; 4]) -> Option<&'a [u8]> {
         const TABLE: usize = 128;
         let count = self.word(TABLE)?.min(self.0.len() / 12);
@@ -85,7 +85,7 @@ impl<'a> IccProfile<'a> {
         Some(DVec3::new(x?, y?, z?))
     }
 
-    /// An s15Fixed16 number.
+    /// Reads an s15Fixed16 number.
     fn s15_fixed_16(&self, at: usize) -> Option<f64> {
         self.field(at).map(|bytes| f64::from(i32::from_be_bytes(*bytes)) / 65536.0)
     }

@@ -6,14 +6,14 @@ use crate::assets::AssetError;
 use crate::assets::read::{self, Monitor};
 use crate::control::{CancelToken, ignore_progress};
 
-/// Checks that the end-of-image marker follows the last start-of-scan marker. Neither can occur within a scan
-/// (ITU-T T.81, B.1.1.5).
+/// Checks that a JPEG's type is supported and that its end-of-image marker follows the last start-of-scan
+/// marker. Neither marker can occur within a scan (ITU-T T.81, B.1.1.5).
 pub(super) fn check_complete(path: &Path, limit: u64, token: &CancelToken) -> Result<(), String> {
     let bytes = read::bytes(path, limit, Monitor { progress: &ignore_progress, token });
     check_bytes(&bytes.map_err(|error: AssetError| error.to_string())?)
 }
 
-/// Checks the JPEG type of a file in memory, and performs the same check as [`check_complete`].
+/// Like [`check_complete`], but for a file in memory.
 pub(super) fn check_bytes(bytes: &[u8]) -> Result<(), String> {
     check_kind(bytes)?;
     let last = |marker: [u8; 2]| bytes.windows(2).rposition(|pair| pair == marker);
@@ -23,7 +23,7 @@ pub(super) fn check_bytes(bytes: &[u8]) -> Result<(), String> {
     }
 }
 
-/// Error message for a file that ends within the image.
+/// Error message for a truncated image.
 pub(super) const TRUNCATED: &str = "the image data is truncated";
 
 /// Rejects JPEG types that the decoder does not support (ITU-T T.81, table B.1). The decoder's own message
@@ -43,8 +43,8 @@ fn check_kind(bytes: &[u8]) -> Result<(), String> {
     Err(format!("it is {kind}; save it as a baseline or progressive JPEG, or as PNG"))
 }
 
-/// Offset of the transform byte of a misleading Adobe segment: it specifies RGB, but the file also has a JFIF
-/// segment, which implies YCbCr and takes precedence in other readers.
+/// Offset of the transform byte of a misleading Adobe segment. The segment is misleading if it specifies RGB
+/// but the file also has a JFIF segment, which implies YCbCr and takes precedence in other readers.
 pub(super) fn misleading_transform_offset(bytes: &[u8]) -> Option<usize> {
     const ADOBE: &[u8] = b"Adobe";
     const TRANSFORM: usize = 11;
@@ -81,7 +81,8 @@ fn segments(bytes: &[u8]) -> impl Iterator<Item = (u8, usize)> {
     })
 }
 
-/// Checks the size in the header. Each block of 8 × 8 pixels takes at least one bit for its mean.
+/// Checks the image size in the header against the file size. Each block of 8 × 8 pixels takes at least one
+/// bit for its mean.
 pub(super) fn check_plausible(width: u32, height: u32, file_bytes: u64) -> Result<(), String> {
     let blocks = u64::from(width.div_ceil(8)) * u64::from(height.div_ceil(8));
     if blocks > file_bytes.saturating_mul(8) {

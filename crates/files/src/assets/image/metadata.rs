@@ -60,7 +60,7 @@ impl ImageMetadata {
     }
 }
 
-/// Warning about an ICC profile.
+/// Warning about an ignored ICC profile.
 pub(super) fn profile_ignored(reason: &str) -> String {
     format!("the color profile is ignored ({reason}); colors are read as sRGB")
 }

@@ -39,10 +39,10 @@ use space::ColorSpace;
 
 /// Maximum size of an image file.
 const FILE_LIMIT: u64 = 4 << 30;
-/// Minimum file size for checking the header before reading the rest.
+/// File size above which the header is checked before the rest of the file is read.
 const CHECKED_FIRST: u64 = 16 << 20;
 
-/// How the samples of an image file are interpreted.
+/// Interpretation of the samples in an image file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum ImageEncoding {
     /// As declared by the file. By default, integers are sRGB and floats are linear.
@@ -53,7 +53,7 @@ pub enum ImageEncoding {
     Linear,
     /// Like [`Self::Color`], but keeps negative and nonfinite floats. Used for comparing images.
     Raw,
-    /// One scalar per pixel, in all channels. Alpha is always linear.
+    /// One scalar per pixel, stored in all channels. Alpha is always linear.
     Number {
         /// Source of the scalar.
         of: PixelValue,
@@ -88,7 +88,7 @@ impl ColorCurve {
 }
 
 impl ImageEncoding {
-    /// A number unique to this encoding.
+    /// Unique index of this encoding.
     pub fn index(self) -> usize {
         match self {
             Self::Color => 0,
@@ -148,7 +148,7 @@ impl Default for ImageLimits {
 }
 
 /// Reads a PNG, JPEG, PNM, PFM, TGA, BMP, HDR, EXR or WebP image. The format is detected from the first
-/// bytes, or else from the file name extension.
+/// bytes. Only TGA, which has no signature, is detected from the file extension.
 ///
 /// Gray becomes RGB, alpha is dropped except for scalars and cutouts, and the EXIF orientation is applied.
 /// Negative and nonfinite texels become 0 (except for [`ImageEncoding::Raw`]). A truncated JPEG is an error.
@@ -242,7 +242,7 @@ pub struct EmbeddedImage<'a> {
     pub bytes: Arc<[u8]>,
 }
 
-/// Like [`load`], for an embedded image.
+/// Like [`load`], but for an embedded image.
 ///
 /// # Errors
 /// Same as [`load`].
@@ -256,7 +256,7 @@ pub fn load_embedded(
     load_source(ImageSource::embedded(image, limits, token)?, encoding, Monitor { progress, token })
 }
 
-/// Like [`size`], for an embedded image.
+/// Like [`size`], but for an embedded image.
 ///
 /// # Errors
 /// Same as [`size`].

@@ -8,13 +8,13 @@ use ::image::{ColorType, ImageDecoder, ImageError, ImageFormat, ImageResult};
 /// Maximum size of the header.
 const HEADER_BYTES: u64 = 1 << 10;
 
-/// Whether these bytes start a PFM file.
+/// Whether a file that starts with these bytes is a PFM file.
 pub(super) fn is_pfm(start: &[u8]) -> bool {
     matches!(start, [b'P', b'F' | b'f', blank, ..] if blank.is_ascii_whitespace())
 }
 
 /// PFM decoder. Rows are stored from bottom to top. Values are multiplied by the absolute value of the scale.
-/// A negative scale means little-endian.
+/// A negative scale means little-endian data.
 pub(super) struct PfmDecoder<R> {
     file: R,
     size: [u32; 2],

@@ -14,13 +14,13 @@ use crate::math::DMat3;
 
 const SIGNATURE: [u8; 8] = *b"\x89PNG\r\n\x1a\n";
 
-/// Maximum size of a color profile, compressed and decompressed.
+/// Maximum size of a color profile, both compressed and decompressed.
 const PROFILE_BYTES: u32 = 16 << 20;
 
-/// Number of bytes to skip between two polls of the cancel token.
+/// Number of bytes to skip between polls of the cancel token.
 const SKIPPED_BYTES: usize = 1 << 16;
 
-/// Reads a PNG into memory, skipping its text chunks. The hash covers the whole file. If the file is not a
+/// Reads a PNG into memory without its text chunks. The hash covers the entire file. If the file is not a
 /// PNG, rewinds it and returns `None`.
 pub(super) fn read_without_text_chunks(
     mut file: impl Read + Seek,
@@ -65,7 +65,7 @@ pub(super) fn read_without_text_chunks(
     }
 }
 
-/// Decoder for the first frame. Ignores text chunks.
+/// PNG decoder for the first frame. Ignores text chunks.
 pub(super) struct PngDecoder<R: BufRead + Seek> {
     reader: png::Reader<R>,
     color_type: ColorType,
@@ -121,7 +121,7 @@ impl<R: BufRead + Seek> PngDecoder<R> {
         metadata
     }
 
-    /// Color space of the chunks `gAMA` and `cHRM`.
+    /// Color space defined by the `gAMA` and `cHRM` chunks.
     fn space_of_gama_and_chrm(&self, metadata: &mut ImageMetadata, is_gray: bool) -> ColorSpace {
         let info = self.reader.info();
         let curve = info.gama_chunk.map_or(Curve::Srgb, |gamma| gamma_curve(gamma.into_scaled()));

@@ -66,7 +66,7 @@ pub(super) fn from_colorants(colorants: DMat3) -> Option<DMat3> {
     Some(rec_709_from_xyz(D50)? * colorants)
 }
 
-/// Whether a matrix is the identity, within rounding.
+/// Whether a matrix is the identity up to rounding.
 pub(super) fn is_identity(matrix: &DMat3) -> bool {
     (*matrix - DMat3::IDENTITY).to_cols_array().iter().all(|entry| entry.abs() <= TOLERANCE)
 }
@@ -89,7 +89,7 @@ fn xyz([x, y]: [f64; 2]) -> DVec3 {
     DVec3::new(x, y, 1.0 - x - y)
 }
 
-/// Inverse of a matrix. `None` if it is nearly singular.
+/// Inverse of a matrix. `None` if the matrix is nearly singular.
 fn inverse(matrix: DMat3) -> Option<DMat3> {
     (matrix.determinant().abs() > 1e-9).then(|| matrix.inverse()).filter(|inverse| inverse.is_finite())
 }

@@ -23,7 +23,7 @@ pub(super) enum Curve {
         e: f64,
         f: f64,
     },
-    /// Equidistant values from 0 to 65535.
+    /// Values from 0 to 65535 at evenly spaced inputs.
     Table(Vec<u16>),
     /// Perceptual quantization (SMPTE ST 2084). 203 cd/m² maps to 1.
     Pq,

@@ -41,7 +41,7 @@ fn warnings_of(name: &str, bytes: &[u8], encoding: ImageEncoding) -> Vec<String>
     loaded.warnings.iter().map(|warning| warning.replace(&folder, "")).collect()
 }
 
-/// Reason why an image is rejected.
+/// Reason for rejecting an image.
 fn error(name: &str, bytes: &[u8]) -> String {
     rejection(load_bytes(name, bytes, ImageEncoding::Color)).1
 }
@@ -253,7 +253,7 @@ fn sides_are_limited_to_65536_pixels() {
 }
 
 #[test]
-fn long_headers_do_not_make_long_errors() {
+fn long_headers_give_short_errors() {
     let header = |line: &str| format!("P7\n{line} {}\n", "x".repeat(100_000));
     for line in ["WIDTH", "FOO", "TUPLTYPE"] {
         let reason = error("a.ppm", header(line).as_bytes());

@@ -9,19 +9,19 @@ use ::image::{ImageError, ImageFormat, ImageResult};
 
 use super::metadata::AlphaUsage;
 
-/// Size of the header.
+/// Size of the TGA header in bytes.
 const HEADER: usize = 18;
-/// Offset of the image descriptor.
+/// Offset of the image descriptor in the header.
 const DESCRIPTOR: usize = 17;
 /// Mask for the number of alpha bits in the descriptor.
 const ALPHA_BITS: u8 = 0xf;
-/// Size of the footer: two offsets and the signature.
+/// Size of the footer in bytes: two offsets and the signature.
 const FOOTER: i64 = 26;
 const SIGNATURE: &[u8] = b"TRUEVISION-XFILE.\0";
 /// Offset of the attribute type in the extension area.
 const ATTRIBUTES: u64 = 494;
 
-/// A file with a corrected header.
+/// A TGA file with a corrected header.
 type Patched<R> = Chain<Cursor<[u8; HEADER]>, R>;
 
 /// Returns a decoder and the meaning of alpha. `image` requires the header to declare exactly as many alpha

@@ -21,7 +21,7 @@ pub(crate) fn assemble(source: &MeshSource<'_>, parsed: ParsedMesh) -> Result<Lo
     assemble_text(source, parsed, |_| None)
 }
 
-/// Like [`assemble`], for text files. `start_of` returns the byte offset of a face, given its index.
+/// Like [`assemble`], but for text files. `start_of` returns the byte offset of a face, given its index.
 pub(super) fn assemble_text(
     source: &MeshSource<'_>,
     mut parsed: ParsedMesh,
@@ -140,7 +140,7 @@ struct Cutter<'a> {
     triangles: Vec<[u32; 3]>,
     triangle_materials: Vec<u32>,
     dropped: Dropped,
-    /// Number of self-intersecting polygons, and the first one.
+    /// Number of self-intersecting polygons, and the index of the first one.
     crossing: (u64, usize),
 }
 

@@ -1,5 +1,5 @@
-//! Mesh files: OBJ with MTL, OFF, PLY and STL. Each parser returns the numbers in the file. `assemble` then
-//! builds a valid [`TriangleMesh`](crate::geometry::mesh::TriangleMesh).
+//! Mesh files: OBJ with MTL, OFF, PLY and STL. Each parser collects vertices and faces. `assemble` then builds
+//! a valid [`TriangleMesh`](crate::geometry::mesh::TriangleMesh).
 
 pub(crate) mod assemble;
 mod coincident;
@@ -88,12 +88,12 @@ impl MeshSource<'_> {
         Ok(self.monitor.tick(self.bytes.len() + at, 2 * self.bytes.len())?)
     }
 
-    /// An error about the whole file.
+    /// Creates an error without a line number.
     fn wrong(&self, reason: impl Into<String>) -> AssetError {
         AssetError::malformed(self.path, None, reason)
     }
 
-    /// An error at byte `at` of a text file.
+    /// Creates an error with the line number of byte `at` in a text file.
     fn wrong_at(&self, at: usize, reason: impl Into<String>) -> AssetError {
         AssetError::malformed(self.path, Some(self.line(at)), reason)
     }
@@ -171,7 +171,7 @@ mod tests {
         }
     }
 
-    /// Text made of mesh file keywords, so parsers get past the first line.
+    /// Text made of mesh file keywords, so that parsers get past the first line.
     fn wordy() -> impl Strategy<Value = String> {
         let words = "OFF COFF STOFF 4OFF ply format ascii binary_little_endian 1.0 element vertex face property \
                      list uchar int float x y z vertex_indices end_header v vt vn f l g o usemtl mtllib \

@@ -11,8 +11,9 @@ use crate::control::{CancelToken, Cancelled};
 use crate::geometry::mesh::{NormalGroup, TriangleMesh};
 use crate::math::{DVec3, Vec3};
 
-/// Minimum cosine between normals to merge. Coincident vertices are merged if their normals differ by at most
-/// 45 degrees, as at a texture seam. Otherwise, they form a sharp edge, as in a box with separate sides.
+/// Minimum cosine between the normals of coincident vertices for merging the normals. Normals that differ by at
+/// most 45 degrees are merged, as at a texture seam. Otherwise, the vertices form a sharp edge, as in a box with
+/// separate sides.
 const SEAM_COSINE: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
 /// Maximum number of coincident vertices whose normals are compared pairwise, which takes quadratic time.
@@ -22,8 +23,8 @@ const COMPARED: usize = 64;
 /// Number of triangles or vertices between two polls of the cancel token.
 const BATCH: usize = 1 << 16;
 
-/// Computes a unit normal for each vertex, which points to the front side of its faces. Each face is weighted
-/// by its angle at the vertex. Coincident vertices share a normal if they are in the same [`NormalGroup`] and
+/// Computes a unit normal for each vertex, pointing to the front side of its faces. Each face is weighted by
+/// its angle at the vertex. Coincident vertices share a normal if they are in the same [`NormalGroup`] and
 /// their normals differ by at most 45 degrees. If the face normals cancel out, the normal of one face is
 /// used. The result does not depend on the number of threads.
 ///
@@ -108,7 +109,7 @@ pub(crate) fn is_faceted(mesh: &TriangleMesh) -> bool {
     total < f64::from(LEAST) * f64::from(vertices)
 }
 
-/// Replaces zero normals.
+/// Replaces zero normals with computed vertex normals.
 pub(super) fn fill_missing_normals(mesh: &mut TriangleMesh, token: &CancelToken) -> Result<(), Cancelled> {
     let made = vertex_normals(mesh, token)?;
     for (normal, made) in mesh.normals.iter_mut().zip(made) {
@@ -231,7 +232,7 @@ mod tests {
     #[test]
     fn normals_do_not_depend_on_the_triangulation() {
         // Three right angles meet at the origin, and one of the three faces is split there. Weighting by area
-        // or by count would pull the normal towards the split face.
+        // or by count would pull the normal toward the split face.
         let corner = mesh(
             &[[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 1., 0.], [0., 0., 1.]],
             &[[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 1]],
@@ -265,7 +266,7 @@ mod tests {
     }
 
     #[test]
-    fn cancelling_faces_use_the_normal_of_one_face() {
+    fn opposite_faces_use_the_normal_of_one_face() {
         let normals = vertex_normals(&mesh(
             &[[0., 0., 0.], [1., 0., 0.], [0., 1., 0.], [9., 9., 9.]],
             &[[0, 1, 2], [0, 2, 1]],

@@ -1,6 +1,6 @@
-//! OFF: a header keyword, counts, one vertex per line, one polygon per line (Geomview manual, section *OFF*).
-//! Many files deviate from this: they have counts directly after the keyword, no edge count, undeclared
-//! columns after coordinates and faces, or comments and blank lines anywhere.
+//! OFF: a header keyword and counts, followed by one vertex per line, then one polygon per line (Geomview
+//! manual, section *OFF*). Many files deviate from this: they have counts directly after the keyword, no edge
+//! count, undeclared columns after coordinates and faces, or comments and blank lines anywhere.
 
 use super::assemble::assemble_text;
 use super::parsed::{ColorRange, FACE_COLORS_IGNORED, ParsedMesh, alpha_ignored};
@@ -52,7 +52,7 @@ impl IgnoredLines {
     }
 }
 
-/// Warning about something ignored on `count` lines.
+/// Warning about ignored values on `count` lines.
 fn ignored_lines(first: usize, count: u64, ignored: &str) -> String {
     match count {
         1 => format!("line {first}: ignored {ignored}"),
@@ -119,7 +119,7 @@ fn short_face(corner: usize, arity: usize) -> String {
 struct OffColors {
     all: Vec<Option<[f64; 3]>>,
     range: ColorRange,
-    /// Minimum alpha, and a byte offset in the same line.
+    /// Minimum alpha, and a byte offset on the same line.
     least_alpha: Option<(f64, usize)>,
 }
 

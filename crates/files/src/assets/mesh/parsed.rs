@@ -40,7 +40,7 @@ impl Faces {
         self.corners.reserve(3 * triangles);
     }
 
-    /// Replaces coincident vertices with the first one.
+    /// Replaces each corner's vertex with the first vertex at the same position.
     pub(super) fn join(&mut self, positions: &[Vec3], token: &CancelToken) -> Result<(), Cancelled> {
         let mut first: Vec<u32> = (0..positions.len() as u32).collect();
         for place in coincident::find_coincident_vertices(positions, token)? {
@@ -124,10 +124,10 @@ pub(crate) fn color_bytes(parts: [f64; 3]) -> [u8; 3] {
     parts.map(|part| (part.clamp(0.0, 1.0) * 255.0 + 0.5) as u8)
 }
 
-/// Warning about a color's alpha below 1.
+/// Warning about colors with an alpha below 1.
 pub(super) const ALPHA_IGNORED: &str = "color alpha is ignored";
 
-/// [`ALPHA_IGNORED`] with a line number.
+/// Like [`ALPHA_IGNORED`], but with a line number.
 pub(super) fn alpha_ignored(line: usize) -> String {
     format!("line {line}: {ALPHA_IGNORED}")
 }

@@ -12,9 +12,9 @@ use super::{AssetError, LoadedMesh, MeshSource};
 use crate::assets::read;
 use crate::math::DVec3;
 
-/// Size of the header of a binary file. The number of facets follows.
+/// Size of a binary file's header. The number of facets follows.
 const HEADER: usize = 80;
-/// Offset of the first facet.
+/// Offset of the first facet in a binary file.
 const START: usize = HEADER + 4;
 /// Size of a facet: a normal and three corners (three floats each), followed by a two-byte attribute.
 const FACET: usize = 50;
@@ -40,14 +40,14 @@ pub(super) fn parse(source: &MeshSource<'_>) -> Result<LoadedMesh, AssetError> {
     }
 }
 
-/// Encoding of a file.
+/// Encoding of an STL file.
 enum StlEncoding {
     Text,
     Binary,
 }
 
 /// Detects the encoding. If the file size matches the number of facets in a binary header, the file is
-/// binary, regardless of what the header contains.
+/// binary, regardless of the header's text.
 fn detect_encoding(bytes: &[u8]) -> StlEncoding {
     let word = bytes.trim_ascii_start().get(..5);
     let says_solid = word.is_some_and(|word| word.eq_ignore_ascii_case(b"solid"));
@@ -68,7 +68,7 @@ fn claimed_facets(bytes: &[u8]) -> Option<u64> {
     Some(u64::from(u32::from_le_bytes(*count)))
 }
 
-/// Reads a binary file.
+/// Reads a binary STL file.
 fn read_binary(source: &MeshSource<'_>) -> Result<ParsedMesh, AssetError> {
     let Some(claimed) = claimed_facets(source.bytes) else {
         return Err(source.wrong(not_stl(source.bytes.trim_ascii_start())));
@@ -135,7 +135,7 @@ fn add(parsed: &mut ParsedMesh, position: DVec3) {
     parsed.positions.push(position);
 }
 
-/// Reads a text file.
+/// Parser for text STL files.
 struct TextReader<'a> {
     source: MeshSource<'a>,
     cursor: Cursor<'a>,
@@ -272,7 +272,7 @@ mod tests {
         rejection(read(bytes))
     }
 
-    /// Corners of a tetrahedron's facets. All facets face outwards.
+    /// Corners of a tetrahedron's facets. All facets face outward.
     const TETRAHEDRON: [[[f32; 3]; 3]; 4] = {
         let [o, x, y, z] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         [[o, y, x], [o, x, z], [o, z, y], [x, y, z]]

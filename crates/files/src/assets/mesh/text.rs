@@ -1,4 +1,4 @@
-//! Tokenizer for text files of numbers. Works on bytes, without requiring UTF-8 or copying.
+//! Tokenizer for text files of numbers. Works on bytes, and neither requires UTF-8 nor copies the text.
 
 use std::borrow::Cow;
 
@@ -26,7 +26,7 @@ pub(super) fn decoded(line: &[u8]) -> Cow<'_, str> {
     }
 }
 
-/// A position in a text.
+/// A cursor in a text file.
 #[derive(Clone, Copy)]
 pub(super) struct Cursor<'a> {
     bytes: &'a [u8],

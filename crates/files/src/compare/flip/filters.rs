@@ -12,13 +12,14 @@ struct SensitivityTerm {
     b: f64,
 }
 
-/// Achromatic, red–green and blue–yellow (table 1 of the paper; second terms of 0 are omitted).
+/// Contrast sensitivity of the achromatic, red–green and blue–yellow channels (table 1 of the paper, without
+/// second terms of 0).
 const SENSITIVITY: [&[SensitivityTerm]; 3] = [
     &[SensitivityTerm { a: 1.0, b: 0.0047 }],
     &[SensitivityTerm { a: 1.0, b: 0.0053 }],
     &[SensitivityTerm { a: 34.1, b: 0.04 }, SensitivityTerm { a: 13.5, b: 0.025 }],
 ];
-/// Width of the widest Gaussian.
+/// Width of the widest Gaussian in square degrees.
 const WIDEST: f64 = 0.04;
 /// Size in degrees of the features that the eye detects best.
 const FEATURE_DEGREES: f64 = 0.082;
@@ -31,7 +32,7 @@ struct WeightedBlur {
     taps: Vec<f64>,
 }
 
-/// All filters for a number of pixels per degree, padded to the same length.
+/// All filters for a given number of pixels per degree, padded to the same length.
 pub(super) struct Filters {
     radius: usize,
     blurs: [Vec<WeightedBlur>; 3],

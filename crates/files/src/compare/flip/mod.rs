@@ -13,15 +13,14 @@ use super::{Pair, tiles};
 use crate::film::Rect;
 use crate::math::Vec3;
 
-/// Pixels per degree of the visual field, for a display with a width of 3840 pixels and 0.7 m viewed from 0.7
-/// m.
+/// Pixels per degree of the visual field, for a display that is 3840 pixels and 0.7 m wide, viewed from 0.7 m.
 pub const PIXELS_PER_DEGREE: f64 = 67.0;
 
-/// Exponent of the color pipeline.
+/// Exponent applied to color differences.
 const QC: f64 = 0.7;
-/// Color differences below this fraction of the maximum …
+/// Fraction of the maximum color difference at which the error reaches [`PT`].
 const PC: f64 = 0.4;
-/// … are mapped to errors below this value.
+/// Error for a color difference of [`PC`] times the maximum.
 const PT: f64 = 0.95;
 
 /// Computes the error of each pixel, in [0, 1].
@@ -49,7 +48,7 @@ fn tile_errors(pair: &Pair, tile: Rect, filters: &Filters, max: f64) -> Vec<f32>
     colors.zip(features).map(|(color, feature)| libm::pow(color, 1.0 - feature) as f32).collect()
 }
 
-/// Perceived colors and features of a tile of one image.
+/// Perceived colors and features of one image in a tile.
 fn tile_features(
     pair: &Pair,
     which: usize,

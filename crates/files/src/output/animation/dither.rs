@@ -1,5 +1,5 @@
 //! Ordered dithering to a palette (T. Knoll, US patent 6,606,166, expired). The result depends only on a
-//! pixel's position and color. Unlike with error diffusion, static parts do not flicker between frames.
+//! pixel's position and color, so unlike with error diffusion, static parts do not flicker between frames.
 
 use std::collections::HashMap;
 
@@ -25,7 +25,7 @@ impl Dither {
         Self { palette: palette.as_chunks().0.iter().map(|color: &[u8; 3]| color.map(i32::from)).collect() }
     }
 
-    /// Palette index of each pixel.
+    /// Dithers an image and returns the palette index of each pixel.
     pub(super) fn palette_indices(
         &self,
         picture: &Picture,

@@ -1,4 +1,4 @@
-//! GIF with one palette for all frames, so static colors do not change between frames.
+//! GIF encoder. All frames share one palette, so static colors do not change between frames.
 
 use ::gif::{AnyExtension, Encoder, EncodingError, Extension, Frame, Repeat};
 use color_quant::NeuQuant;

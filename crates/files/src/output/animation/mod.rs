@@ -1,4 +1,4 @@
-//! Animations: GIF and APNG from 8-bit frames.
+//! Encodes 8-bit frames as GIF or APNG animations.
 
 mod apng;
 mod dither;
@@ -8,7 +8,7 @@ use super::{AnimationFormat, OutputError};
 use crate::control::CancelToken;
 use crate::film::Picture;
 
-/// Duration of a full turn in seconds.
+/// Duration of an animation (a full turn of the camera) in seconds.
 const TURN_SECONDS: f64 = 4.0;
 /// Minimum duration of a frame in seconds. Players show shorter frames for a tenth of a second.
 const SHORTEST_FRAME: f64 = 0.02;

@@ -62,7 +62,7 @@ fn decoded(bytes: &[u8]) -> Vec<Vec<u8>> {
 /// banding.
 #[test]
 fn gif_dithering_preserves_gradients_on_average() {
-    // Slow gradients in many colors, so the palette colors are far apart.
+    // Slow gradients in many colors, so that the palette colors are far apart.
     let smooth = |number: u32| {
         let pixel = |i: u32| {
             let (x, y, k) = (i % 96, i / 96, number % 8);

@@ -1,4 +1,4 @@
-//! Errors for parts and checkpoints, with advice.
+//! Errors for parts and checkpoints, with advice for the user.
 
 use std::io;
 use std::path::PathBuf;
@@ -56,7 +56,7 @@ pub enum PartError {
     Damaged {
         /// The file.
         path: PathBuf,
-        /// What is wrong, and where.
+        /// Description and location of the damage.
         why: String,
     },
     /// The file is a checkpoint instead of a part, or vice versa.
@@ -66,7 +66,7 @@ pub enum PartError {
         path: PathBuf,
         /// Type of the file.
         found: &'static str,
-        /// Requested kind.
+        /// Requested type.
         wanted: &'static str,
     },
     /// The file belongs to a different image.
@@ -74,7 +74,7 @@ pub enum PartError {
     Other {
         /// The file.
         path: PathBuf,
-        /// The file to which it was compared.
+        /// The file it was compared with.
         other: String,
         /// Descriptions of the differences.
         differences: Vec<String>,

@@ -1,4 +1,4 @@
-//! Header of a part: properties of the image, the share of it that the file contains, and the encoding
+//! Header of a part: properties of the image, the share of the image that the file contains, and the encoding
 //! settings.
 
 use std::path::Path;
@@ -18,7 +18,7 @@ pub struct Head {
     pub kind: PartKind,
     /// Everything the image depends on, with user-visible names.
     pub identity: Vec<Dependency>,
-    /// Which part of the image the file contains.
+    /// Share of the image that the file contains.
     pub share: ShareHead,
     /// Properties of the image.
     pub picture: ImageHead,
@@ -34,7 +34,7 @@ pub struct Head {
 pub enum PartKind {
     /// A finished part of an image.
     Part,
-    /// A render that was interrupted or can be continued.
+    /// The current state of a render, for resuming it.
     Checkpoint,
 }
 
@@ -48,7 +48,7 @@ impl PartKind {
     }
 }
 
-/// Something an image depends on.
+/// An input that an image depends on.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Dependency {
     /// A scene key or a file name.
@@ -75,13 +75,13 @@ impl Head {
             && picture.tone.exposure.is_finite()
     }
 
-    /// Returns the name of the image's input file with this hash (hexadecimal). `None` if there is none.
+    /// Returns the name of the image's input file with this hash (hexadecimal). `None` if there is no such file.
     pub(super) fn input_with_hash(&self, hash: &str) -> Option<&str> {
         let matches = |input: &&Dependency| input.name.starts_with(FILE) && input.value == hash;
         self.identity.iter().find(matches).map(|input| name_of(&input.name))
     }
 
-    /// Finds an input file, existing or not, whose name is the end of this path. Returns the name, relative
+    /// Finds an input file, existing or not, whose name matches the end of this path. Returns the name, relative
     /// to the scene's folder.
     pub(super) fn input_matching_path(&self, path: &Path) -> Option<&str> {
         let files = self.identity.iter().filter(|input| input.name.starts_with(FILE));
@@ -89,7 +89,7 @@ impl Head {
     }
 }
 
-/// Which part of an image a file contains.
+/// Share of an image that a part file contains.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ShareHead {
     /// Index of the part, starting at 1.
@@ -138,15 +138,15 @@ pub struct ToneHead {
     pub stretch: Option<String>,
 }
 
-/// Names of the quantities.
+/// Names of the quantities in part files.
 const QUANTITIES: [(Quantity, &str); 3] =
     [(Quantity::Radiance, "radiance"), (Quantity::Samples, "samples"), (Quantity::Error, "error")];
 
-/// Names of the range mappings.
+/// Names of the range mappings in part files.
 const STRETCHES: [(DataKind, &str); 2] = [(DataKind::Distances, "distances"), (DataKind::Amounts, "amounts")];
 
 impl ImageHead {
-    /// Describes a film's image with these settings.
+    /// Describes the image of a film with these settings.
     pub fn new(film: &Film, finish: &DevelopSettings) -> Self {
         let Rect { x, y, width, height } = film.crop();
         let tone = &finish.tone;

@@ -43,7 +43,7 @@ pub fn check(parts: &[PartFile]) -> Result<Vec<u32>, PartError> {
     Ok((1..=count).filter(|index| !found.contains_key(index)).collect())
 }
 
-/// Describes how two headers differ in their image or in its division into parts.
+/// Describes how two headers differ in the image or in its division into parts.
 fn head_differences(a: &Head, b: &Head) -> Vec<String> {
     let mut found = differences(&a.identity, &b.identity, ("here", "there"));
     let counts = (a.share.count, b.share.count);
@@ -73,7 +73,7 @@ fn metadata_differences(a: &[(String, String)], b: &[(String, String)]) -> Vec<S
     names.filter_map(words).collect()
 }
 
-/// Merges parts in any order. Parts may only be missing if `is_partial` is true. In this case, missing tiles
+/// Merges parts in any order. Parts may be missing only if `is_partial` is true. In this case, missing tiles
 /// are black or have fewer samples. `tell` is called with the number of finished tiles and the film.
 ///
 /// # Errors
@@ -128,7 +128,7 @@ fn whole_tile(parts: &[PartFile], tile: usize, area: usize) -> Result<Option<(St
     Ok(found.map(|(stored, _)| (stored, true)))
 }
 
-/// Returns the sum of a tile's blocks, in ascending order, and whether it is complete.
+/// Sums a tile's blocks in ascending order. Also returns whether all blocks are present.
 fn sum_blocks(
     parts: &[PartFile],
     block_count: u32,

@@ -1,4 +1,4 @@
-//! Parts of an image and checkpoints. A film is stored in a file with everything the image depends on.
+//! Part files and checkpoints. Each file contains a film and a description of everything the image depends on.
 //!
 //! | bytes | |
 //! | --- | --- |
@@ -25,10 +25,11 @@ pub use merge::{Merged, check, merge};
 pub use read::{PartFile, input_with_content, input_with_name, is_part};
 pub use save::save;
 
-/// Magic number. As in PNG, text conversions of the file corrupt this number and can be detected.
+/// Magic number. As in PNG, text conversion of the file corrupts the number, which makes the conversion
+/// detectable.
 const MARK: [u8; 12] = crate::system::file::PART_MARK;
 
-/// Version of the format.
+/// Version of the part file format.
 const VERSION: u32 = 1;
 
 /// Index of the footer record.
@@ -49,7 +50,7 @@ fn digest(header_digest: &Digest, parts: &[&[u8]]) -> Digest {
     digest
 }
 
-/// Footer of a file.
+/// Footer of a part file.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 struct Footer {
     /// Number of tiles.

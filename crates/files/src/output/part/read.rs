@@ -1,4 +1,4 @@
-//! Reads parts. The whole file is validated first, then tiles are read one at a time.
+//! Reads part files. The entire file is validated first, then tiles are read one at a time.
 
 use std::fs::File;
 use std::io::{self, BufReader, ErrorKind, Read};
@@ -39,7 +39,7 @@ pub fn is_part(path: &Path) -> bool {
 }
 
 /// Finds an input file of these images with the same content as the file at `path`, and returns its name.
-/// Such a file must not be overwritten, even if the parts were rendered on another machine. `None` if there
+/// Input files must not be overwritten, even if the parts were rendered on another machine. `None` if there
 /// is no such input or the file cannot be read.
 pub fn input_with_content<'a>(parts: &'a [PartFile], path: &Path) -> Option<&'a str> {
     let mut hasher = blake3::Hasher::new();
@@ -48,8 +48,8 @@ pub fn input_with_content<'a>(parts: &'a [PartFile], path: &Path) -> Option<&'a 
     parts.iter().find_map(|part| part.head.input_with_hash(&hash))
 }
 
-/// Finds an input file of these images whose name is the end of `path`, and returns the name. Unlike
-/// comparing content, this also finds files that were missing or have changed since.
+/// Finds an input file of these images whose name matches the end of `path`, and returns the name. Unlike
+/// a comparison of contents, this also finds files that were missing or have changed since.
 pub fn input_with_name<'a>(parts: &'a [PartFile], path: &Path) -> Option<&'a str> {
     let absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
     let real = path.canonicalize().unwrap_or_else(|_| absolute.clone());
@@ -121,7 +121,7 @@ impl PartFile {
         Err(PartError::Kind { path: self.path.clone(), found: found.name(), wanted: wanted.name() })
     }
 
-    /// Indices of the contained tiles.
+    /// Indices of the tiles in the file.
     pub fn tiles(&self) -> impl Iterator<Item = usize> {
         self.tiles.iter().map(|(number, ..)| *number as usize)
     }
@@ -166,7 +166,7 @@ impl PartFile {
     }
 }
 
-/// Opens a regular file. If the process's limit on open files is reached, raises it.
+/// Opens a regular file. If the process has reached its limit on open files, raises the limit.
 fn open(path: &Path) -> io::Result<File> {
     // Reading a pipe or device might never end.
     if !std::fs::metadata(path)?.is_file() {

@@ -14,8 +14,8 @@ use crate::control::CancelToken;
 use crate::film::Film;
 
 /// Writes a film with its header atomically. `state` is opaque data for resuming the render. Other threads
-/// may keep adding samples to the film. Each tile is written in its state at that moment. Returns the file,
-/// like [`atomic_with`].
+/// may keep adding samples to the film. Each tile is written with the samples it has at that moment. Returns
+/// the file, like [`atomic_with`].
 ///
 /// # Errors
 /// The file cannot be written.

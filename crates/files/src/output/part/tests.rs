@@ -229,7 +229,6 @@ fn parts_of_different_builds_do_not_match() {
     assert!(found.len() == 1 && found[0].contains("build 1") && found[0].contains("build 2"), "{found:?}");
 }
 
-/// Removed records must be detected.
 #[test]
 fn removed_records_are_detected() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -1,4 +1,4 @@
-//! Reads GIF comments before the first frame and counts the frames. Existing decoders skip comments.
+//! Reads the comments of a GIF and counts its frames. Existing decoders skip comments.
 
 use std::io::Read;
 
@@ -10,7 +10,7 @@ const FRAME: u8 = 0x2c;
 const END: u8 = 0x3b;
 /// Label of a comment extension.
 const COMMENT: u8 = 0xfe;
-/// Flag of a global or local palette.
+/// Flag for a global or local palette.
 const HAS_PALETTE: u8 = 0x80;
 
 /// Reads a GIF from the start. Returns no frame count if the file is truncated, and `None` if it has no

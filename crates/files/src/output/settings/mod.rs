@@ -141,7 +141,7 @@ fn start(file: &File) -> std::io::Result<Vec<u8>> {
 /// Reads the properties of an image from its first bytes.
 ///
 /// # Errors
-/// What is wrong with the header. `None` if the file has another format.
+/// Description of the damage to the header. `None` if the file has another format.
 fn read_header(bytes: &[u8]) -> Result<ImageInfo, Option<String>> {
     let wrong = |format: &str| Some(format!("the {format} header is damaged or truncated"));
     match bytes {

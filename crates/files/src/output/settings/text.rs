@@ -2,7 +2,7 @@
 
 use super::ImageInfo;
 
-/// Radiance HDR: lines up to an empty line, followed by the resolution.
+/// Reads a Radiance HDR header. The settings end at an empty line. The next line contains the resolution.
 pub(super) fn read_hdr(bytes: &[u8]) -> Option<ImageInfo> {
     let mut info = ImageInfo { format: "HDR".to_owned(), ..ImageInfo::default() };
     let mut lines = bytes.split(|byte| *byte == b'\n').map(String::from_utf8_lossy);
@@ -25,7 +25,7 @@ pub(super) fn read_hdr(bytes: &[u8]) -> Option<ImageInfo> {
     Some(info)
 }
 
-/// PPM: comments between the numbers.
+/// Reads a PPM header, which contains the settings as comments between the numbers.
 pub(super) fn read_ppm(bytes: &[u8]) -> Option<ImageInfo> {
     let mut info = ImageInfo::default();
     let mut numbers = Vec::new();
@@ -46,7 +46,7 @@ pub(super) fn read_ppm(bytes: &[u8]) -> Option<ImageInfo> {
     Some(info)
 }
 
-/// JPEG: segments before the pixels.
+/// Reads the segments of a JPEG before the pixels.
 pub(super) fn read_jpeg(bytes: &[u8]) -> Option<ImageInfo> {
     const COMMENT: u8 = 0xfe;
     let mut info = ImageInfo { format: "JPEG".to_owned(), ..ImageInfo::default() };

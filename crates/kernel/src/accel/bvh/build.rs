@@ -19,7 +19,7 @@ const TRAVERSAL_COST: f32 = 1.0;
 /// Minimum number of nested primitives that makes shells worthwhile.
 const NESTED_SIZE: usize = 64;
 
-/// The boxes may be nested if the best plane costs at least this fraction of the cost of not splitting.
+/// Minimum cost of the best plane, relative to not splitting, for testing whether the boxes are nested.
 const NESTED_COST: f32 = 0.9;
 
 /// Nested boxes are split by size if that costs less than this fraction of the best plane's cost.
@@ -33,7 +33,7 @@ pub(super) struct Reference {
 }
 
 impl Reference {
-    /// Twice the center.
+    /// Twice the center of the box.
     fn centroid(&self) -> Vec3 {
         self.bounds.min + self.bounds.max
     }
@@ -43,7 +43,7 @@ impl Reference {
 struct BuiltSubtree {
     root: ChildRef,
     bounds: Aabb,
-    /// Number of levels of nodes.
+    /// Number of node levels.
     depth: usize,
     /// Whether many boxes are nested.
     is_nested: bool,
@@ -95,15 +95,15 @@ impl Bvh {
 /// Output position of a subtree.
 #[derive(Clone, Copy)]
 struct OutputPosition {
-    /// Index of its first reference in leaf order.
+    /// Index of the subtree's first reference in leaf order.
     place: usize,
-    /// Index of its first node.
+    /// Index of the subtree's first node.
     node: usize,
-    /// Number of ancestors.
+    /// Number of ancestors of the subtree's root.
     depth: usize,
 }
 
-/// Builds a subtree, which has fewer nodes than references.
+/// Builds a subtree over `references`. It has fewer nodes than references.
 fn build_subtree(
     references: &mut [Reference],
     nodes: &mut [BinaryNode],
@@ -178,7 +178,7 @@ fn partition(references: &mut [Reference], bounds: Aabb, start: &OutputPosition)
     }
 }
 
-/// Moves the smaller half of the boxes to the front and returns its length.
+/// Moves the half with the smaller boxes to the front and returns its length.
 fn smaller_half(references: &mut [Reference]) -> usize {
     let middle = references.len() / 2;
     references.select_nth_unstable_by(middle, |a, b| {
@@ -319,8 +319,8 @@ mod tests {
         let grid: Vec<_> =
             (0..20_000).map(|i| unit_box(Vec3::new((i % 40) as f32, (i / 40) as f32, 0.0))).collect();
         built(&grid);
-        // Each box is twice as far away as the previous one, so the surface area heuristic splits them off
-        // one by one.
+        // The distance doubles with every second box, so the surface area heuristic splits the boxes off a
+        // few at a time.
         let geometric: Vec<_> = (0..250).map(|i| unit_box(Vec3::X * 2.0_f32.powi(i / 2))).collect();
         built(&geometric);
     }

@@ -34,9 +34,9 @@ pub struct Bvh {
     /// Box ids in leaf order.
     order: Vec<u32>,
     bounds: Aabb,
-    /// Number of levels of nodes.
+    /// Number of node levels.
     depth: usize,
-    /// Start of packet traversal.
+    /// The upper levels of the tree, flattened for packet traversal.
     top: TopNode,
     /// Whether many boxes are nested.
     is_nested: bool,

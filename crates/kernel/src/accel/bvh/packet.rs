@@ -17,7 +17,7 @@ use crate::math::lanes::{Simd, TRUE};
 
 /// Callback that finds the nearest hits of a packet.
 pub trait ClosestTest {
-    /// Tests a primitive against the rays in `met` and moves the end of each ray that hits it to the hit.
+    /// Tests a primitive against the rays in `met`. If a ray hits the primitive, its end is moved to the hit.
     /// Primitives exactly at a ray's end are still tested because ties are broken by id.
     fn test(&mut self, id: u32, met: u32, ends: &mut F32x16);
 }

@@ -1,6 +1,6 @@
-//! Spherical shells around nested surfaces. A ray that starts between concentric spheres is inside all of
-//! their boxes, so the boxes do not show which spheres the ray hits. The shell between a subtree's smallest
-//! and largest spheres does.
+//! Spherical shells around nested surfaces. The boxes of concentric spheres are nested, so they do not narrow
+//! down which spheres a ray hits if it starts among them. The shell between a subtree's smallest and largest
+//! spheres does.
 
 use arrayvec::ArrayVec;
 
@@ -12,7 +12,7 @@ use crate::math::DVec3;
 /// Relative error bound for distances and hits, with a generous margin.
 const ROUNDING: f64 = 1e-6;
 
-/// Squared distance, relative to the squared outer radius, at which rounding errors make shells useless.
+/// Squared distance, relative to the squared outer radius, beyond which rounding errors make shells useless.
 const FAR: f64 = 1e12;
 
 /// A region between two concentric spheres that contains the surfaces of some primitives.
@@ -127,8 +127,8 @@ impl Bvh {
         Self { shells: Some(shells), ..self }
     }
 
-    /// For each subtree, the last `N` primitives that satisfy `counts`, in descending order. Empty without
-    /// shells.
+    /// For each subtree, the `N` highest primitive ids that satisfy `counts`, in descending order. Empty
+    /// without shells.
     pub fn last_primitives_of_subtrees<const N: usize>(
         &self,
         counts: impl Fn(u32) -> bool,
@@ -153,7 +153,7 @@ impl Bvh {
         join: impl Fn(T, T) -> T,
     ) -> Vec<[T; 2]> {
         let mut values = vec![[empty.clone(), empty.clone()]; self.nodes.len()];
-        // Children come after their parents.
+        // Child nodes follow their parents.
         for (place, node) in self.nodes.iter().enumerate().rev() {
             for side in (0..2).filter(|&side| !node.bounds[side].is_empty()) {
                 let ChildRef { first, count } = node.child[side];
@@ -170,8 +170,8 @@ impl Bvh {
     }
 
     /// Visits every primitive whose surface may intersect a box, until `visit` returns false. A subtree whose
-    /// primitives all enclose the box is visited as a whole. Equivalent to [`Bvh::visit_overlapping`] without
-    /// shells.
+    /// primitives all enclose the box is reported as a single item. Without shells, this is equivalent to
+    /// [`Bvh::visit_overlapping`].
     pub fn visit_overlapping_surfaces(&self, other: &Aabb, mut visit: impl FnMut(OverlappingItem) -> bool) {
         let Some(shells) = &self.shells else {
             let mut goes_on = true;

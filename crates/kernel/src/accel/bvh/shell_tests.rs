@@ -127,6 +127,6 @@ fn nested_sphere_work_is_logarithmic() {
     for count in [500, 1000, 2000, 4000, 8000] {
         let (tests, met) = work(count);
         let bound = 3 * count.ilog2() as usize;
-        assert!(tests <= bound && met <= bound, "{tests} tests, {met} met of {count}");
+        assert!(tests <= bound && met <= bound, "{tests} tests, {met} overlaps for {count} spheres");
     }
 }

@@ -33,7 +33,8 @@ impl TopNode {
         used: 0,
     };
 
-    /// Replaces the largest nodes, then the largest leaves, with their children while slots are free.
+    /// Creates a top node. While slots are free, replaces the largest nodes, then the largest leaves, with
+    /// their children.
     pub(super) fn new(root: (Aabb, ChildRef), nodes: &[BinaryNode], references: &[Reference]) -> Self {
         let mut open = vec![root];
         while let Some(place) = largest_replaceable(&open, |child, room| child.count == 0 && room > 0) {
@@ -135,7 +136,7 @@ pub(super) struct Beam {
 }
 
 impl Beam {
-    /// Bounds the rays in `traced`, which must not be 0.
+    /// Bounds the rays in the mask `traced`, which must not be empty.
     #[inline(always)]
     pub(super) fn around(
         origin: &[F32x16; 3],

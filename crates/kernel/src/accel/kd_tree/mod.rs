@@ -1,5 +1,5 @@
 //! A kd-tree over triangles (J. L. Bentley, *Multidimensional binary search trees used for associative
-//! searching*, 1975). Unlike a BVH, it partitions space, but its hits are bit-identical to those of the BVH.
+//! searching*, 1975). Unlike a BVH, it partitions space. Both trees return bit-identical hits.
 //!
 //! Planes are chosen with the surface area heuristic. A triangle that straddles a plane is in both children,
 //! each time with the bounding box of its clipped part. Traversal never misses a leaf due to rounding. Among
@@ -31,7 +31,7 @@ pub struct KdTree {
 }
 
 impl KdTree {
-    /// Builds a tree over `count` indexed triangles. Triangles with NaN are never hit.
+    /// Builds a tree over `count` indexed triangles. Triangles with NaN coordinates are never hit.
     ///
     /// # Errors
     /// [`Cancelled`] if the build was canceled.
@@ -57,8 +57,8 @@ impl KdTree {
             + size_of_val(self.triangles.as_slice())
     }
 
-    /// Expected number of nodes (including leaves) and triangles visited by a random line through the
-    /// bounding box, from surface areas.
+    /// Expected number of nodes (including leaves) and triangles that a random line through the bounding box
+    /// visits, estimated from surface areas.
     pub fn expected_visits(&self) -> (f64, f64) {
         let whole = f64::from(self.bounds.half_area());
         let mut visits = (0.0, 0.0);
@@ -72,8 +72,8 @@ impl KdTree {
         visits
     }
 
-    /// Visits every triangle that overlaps a box, and possibly some nearby. A triangle in several leaves may
-    /// be visited more than once.
+    /// Visits every triangle that overlaps a box, and possibly some nearby ones. A triangle in several leaves
+    /// may be visited repeatedly.
     pub fn visit_overlapping(&self, other: &Aabb, mut visit: impl FnMut(u32)) {
         self.visit_overlapping_while(other, |triangle| {
             visit(triangle);

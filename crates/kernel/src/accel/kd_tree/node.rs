@@ -5,7 +5,7 @@ use crate::math::Vec3;
 /// Tag of a leaf, stored in place of an inner node's axis.
 const LEAF: u32 = 3;
 
-/// Largest number that fits beside the axis.
+/// Largest child index or reference count that fits into `KdNode::tag`.
 pub const MOST: u32 = u32::MAX >> 2;
 
 /// An encoded node. The left child of an inner node is the next node.

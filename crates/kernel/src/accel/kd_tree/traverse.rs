@@ -12,7 +12,7 @@ use crate::geometry::{Aabb, Ray, ShapeHit};
 /// Displacement of a ray due to rounding, relative to the largest length.
 const PAD: f32 = 32.0 * f32::EPSILON;
 
-/// Stack size: the depth limit for the largest possible number of triangles, plus one.
+/// Stack size. The depth limit is lower even for the largest possible number of triangles.
 pub(super) const STACK_SIZE: usize = 64;
 
 /// A ray preprocessed for plane tests. Its parameter is relative to a scaled direction whose largest
@@ -21,7 +21,7 @@ struct PlaneRay {
     origin: [f32; 3],
     inverse: [f32; 3],
     backward: [bool; 3],
-    /// Maximum displacement of a plane or the ray.
+    /// Maximum displacement of a plane or the ray due to rounding.
     pad: f32,
     /// Scaled ray parameter per unit of `t`.
     steps: f32,
@@ -44,8 +44,9 @@ impl PlaneRay {
         }
     }
 
-    /// Lower and upper bounds on the ray's distance to a plane. They include all distances for a ray within
-    /// the plane, up to rounding. For other parallel rays, both are −∞ or both are ∞. NaN means unbounded.
+    /// Lower and upper bounds on the ray's distance to a plane. If the ray is within the plane, up to
+    /// rounding, they include all distances. For other parallel rays, both are −∞ or both are ∞. NaN means
+    /// unbounded.
     #[inline(always)]
     fn plane_distance(&self, axis: usize, at: f32) -> (f32, f32) {
         let distance = at - self.origin[axis];

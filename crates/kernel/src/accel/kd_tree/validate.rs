@@ -7,7 +7,7 @@ use crate::accel::reference::Polygon;
 use crate::geometry::Aabb;
 use crate::math::{DVec3, Vec3};
 
-/// Traversal state at a node.
+/// A node to be checked.
 struct NodeVisit {
     place: u32,
     cell: Aabb,
@@ -82,7 +82,7 @@ impl KdTree {
     }
 }
 
-/// Checks that a leaf refers to the right triangles.
+/// Checks that a leaf refers to the triangles in its cell.
 fn check_leaf(
     place: u32,
     cell: &Aabb,
@@ -109,7 +109,7 @@ fn overlap(a: &Aabb, b: &Aabb) -> bool {
     a.min.cmple(b.max).all() && b.min.cmple(a.max).all()
 }
 
-/// Whether a triangle extends into a cell, not counting any part that lies in a face of the cell.
+/// Whether a triangle extends into a cell, not counting parts of the triangle in a face of the cell.
 fn reaches_into(cell: &Aabb, corners: [Vec3; 3]) -> bool {
     let (min, max) = Polygon::clipped(corners, cell).extent();
     (0..3).all(|axis| {
@@ -119,7 +119,7 @@ fn reaches_into(cell: &Aabb, corners: [Vec3; 3]) -> bool {
     })
 }
 
-/// Sample points on every triangle. Each point has a flag that is set once a leaf at that point refers to the
+/// Sample points on every triangle. The flag of each point is set once a leaf at that point refers to the
 /// triangle.
 struct SamplePointCoverage {
     points: Vec<(u32, Vec<(DVec3, bool)>)>,

@@ -40,7 +40,7 @@ pub enum Quality {
 }
 
 impl WideBvh {
-    /// Builds a tree over `count` indexed triangles. Triangles with NaN are never hit.
+    /// Builds a tree over `count` indexed triangles. Triangles with NaN coordinates are never hit.
     ///
     /// # Errors
     /// [`Cancelled`] if the build was canceled.
@@ -88,8 +88,8 @@ impl WideBvh {
         size_of_val(self.nodes.as_slice()) + size_of_val(self.packs.as_slice())
     }
 
-    /// Expected number of nodes and triangle packs visited by a random line through the bounding box, from
-    /// surface areas.
+    /// Expected number of nodes and triangle packs that a random line through the bounding box visits,
+    /// estimated from surface areas.
     pub fn expected_visits(&self) -> (f64, f64) {
         let whole = f64::from(self.bounds.half_area());
         let mut visits = (f64::from(!self.nodes.is_empty()), 0.0);
@@ -142,7 +142,7 @@ impl WideBvh {
     }
 
     /// [`WideBvh::closest`] for up to [`PACKET_SIZE`] rays. Faster for rays in similar directions, such as
-    /// those of neighboring pixels.
+    /// camera rays of neighboring pixels.
     pub fn closest_packet(&self, rays: &[Ray], ends: &F32x16, hits: &mut [Option<ShapeHit>]) {
         debug_assert!(rays.len() <= PACKET_SIZE && rays.len() == hits.len());
         hits.fill(None);
@@ -180,8 +180,8 @@ impl WideBvh {
         bits
     }
 
-    /// Visits every triangle that overlaps a box, and possibly some nearby. A split triangle may be visited
-    /// more than once.
+    /// Visits every triangle that overlaps a box, and possibly some nearby ones. A split triangle may be
+    /// visited repeatedly.
     pub fn visit_overlapping(&self, other: &Aabb, mut visit: impl FnMut(u32)) {
         self.visit_overlapping_while(other, |triangle| {
             visit(triangle);
@@ -252,7 +252,8 @@ impl WideBvh {
     }
 }
 
-/// Number of shadow rays below which tracing them one by one is faster.
+/// Minimum number of shadow rays in a group to trace it as a packet. Smaller groups are faster to trace one
+/// by one.
 const SMALL_GROUP: usize = 8;
 
 /// Groups the rays whose directions have the same signs and the same longest axis. Calls `take` with each

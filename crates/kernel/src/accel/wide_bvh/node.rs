@@ -30,8 +30,8 @@ const _: () = assert!(TriangleMesh::MOST_TRIANGLES as u64 * 13 / 10 < 1 << FIRST
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub struct WideNode {
-    /// Minimum x, maximum x, minimum y, maximum y, minimum z, and maximum z of each box. Empty boxes are ∞ …
-    /// −∞, which are never hit unless arithmetic overflows.
+    /// Minimum x, maximum x, minimum y, maximum y, minimum z, and maximum z of each box. Empty boxes range
+    /// from ∞ to −∞, and are never hit unless the arithmetic overflows.
     pub rows: [[f32; WIDTH]; 6],
     /// Encoded children, see [`Child`].
     pub children: [u32; WIDTH],
@@ -74,8 +74,8 @@ impl Child {
 }
 
 impl WideNode {
-    /// A node with eight empty boxes. Arithmetic overflow makes a ray hit all boxes. Empty boxes refer to the
-    /// first pack so that traversal still terminates.
+    /// A node with eight empty boxes. If the arithmetic overflows, a ray hits all boxes. Empty boxes refer to
+    /// the first pack, so traversal still terminates.
     pub const EMPTY: Self = {
         let (least, greatest) = ([f32::INFINITY; WIDTH], [f32::NEG_INFINITY; WIDTH]);
         Self { rows: [least, greatest, least, greatest, least, greatest], children: [LEAF; WIDTH] }
@@ -122,7 +122,7 @@ impl WideNode {
     }
 }
 
-/// Four triangles. Unused lanes are NaN, which rays never hit.
+/// Up to four triangles. Unused lanes are NaN, which rays never hit.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(16))]
 pub struct TrianglePack {

@@ -1,27 +1,29 @@
 //! First intersection of a line and a torus.
 //!
-//! Does not use the quartic's coefficients, since its roots lose half of their digits if the line grazes the
-//! torus, and more if the tube is thin. Instead, let q(s) be the line's distance from the axis, with the
+//! The quartic's coefficients are not used, because its roots lose half of their digits if the line grazes
+//! the torus, and more if the tube is thin. Instead, let q(s) be the line's distance from the axis, with the
 //! circle's radius as the unit of length. Then
 //!
 //! ```text
 //! g(s) = (q − 1)² + z² − tube² = |p|² + 1 − tube² − 2q
 //! ```
 //!
-//! has the sign of the distance from the surface and is computed from that distance. Its second derivative is
-//! 2(1 − w/q³), where w is constant along the line. Therefore, g has at most two inflection points, which
-//! have a closed form, and is convex or concave between them. On each of these intervals, Newton's method
-//! from the correct end converges to the nearest root without overshooting, or shows that there is no root.
+//! has the same sign as the signed distance from the surface, from which it is computed. Its second
+//! derivative is 2(1 − w/q³), where w is constant along the line. Therefore, g has at most two inflection
+//! points, which have a closed form, and is convex or concave between them. On each of these intervals,
+//! Newton's method from the correct end converges to the nearest root without overshooting, or shows that
+//! there is no root.
 
 use crate::math::DVec3;
 
-/// Maximum number of steps. Bisecting the entire line down to its last digit takes fewer steps.
+/// Maximum number of Newton and bisection steps. Bisecting the entire line down to the last digit takes
+/// fewer.
 const MOST_STEPS: u32 = 200;
 
-/// Half the width of the neighborhood of the axis in which the slope changes sign.
+/// Half the width of the neighborhood of the axis where the slope of g changes sign.
 const KINK: f64 = 1e-9;
 
-/// Rounding error of g near 0, relative to the tube. Twice the error of the distance from the circle.
+/// Rounding error of g near 0, relative to the tube radius. Twice the error of the distance from the circle.
 const ROUNDING: f64 = 32.0 * f64::EPSILON;
 
 /// A line near a torus around the z axis. The torus's circle has radius 1.
@@ -43,8 +45,8 @@ struct LineSample {
 }
 
 impl UnitLine {
-    /// Interval of the line inside the torus's bounding ball and bounding planes. Both are expanded by a
-    /// margin in units of the tube.
+    /// Interval of the line inside the torus's bounding ball and bounding planes. Both are expanded by `room`
+    /// times the tube radius.
     pub(super) fn nearby_interval(&self, room: f64) -> Option<(f64, f64)> {
         let height = self.tube * (1.0 + room);
         let ball = 1.0 + height;
@@ -90,8 +92,8 @@ impl UnitLine {
         None
     }
 
-    /// Whether the line moves away from the circle on its outer side: from here on, both components of the
-    /// distance increase.
+    /// Whether the line moves away from the circle on its outer side, so that both components of the distance
+    /// increase after `from`.
     fn moves_away(&self, from: f64) -> bool {
         let p = self.foot + self.direction * from;
         let (across, d) = (p.truncate(), self.direction.truncate());
@@ -101,8 +103,8 @@ impl UnitLine {
     /// Points between `from` and `to` where the line enters the torus. `from` must be outside. There are at
     /// most two such points.
     pub(super) fn entries(&self, from: f64, to: f64) -> [Option<f64>; 2] {
-        /// Step past a crossing that is long enough to change the side despite rounding, unless the line
-        /// grazes the surface.
+        /// Step past a crossing. Long enough to reach the other side despite rounding, unless the line grazes
+        /// the surface.
         const BEYOND: f64 = 1e-10;
         let mut found = [None; 2];
         let mut start = from;
@@ -129,8 +131,8 @@ impl UnitLine {
         }
     }
 
-    /// Ends of the interval where g is concave (q³ < w). A line through the axis has a kink there, so the
-    /// interval is widened to contain it. There are no crossings that close to the axis.
+    /// Ends of the interval where g is concave (q³ < w). If the line passes through the axis, g has a kink
+    /// there, so the interval is widened to contain the kink. There are no crossings that close to the axis.
     fn inflections(&self) -> Option<[f64; 2]> {
         let (p, d) = (self.foot.truncate(), self.direction.truncate());
         let a = d.length_squared();
@@ -142,7 +144,7 @@ impl UnitLine {
         (half >= 0.0).then(|| [middle - half.max(KINK), middle + half.max(KINK)])
     }
 
-    /// First crossing in an interval. `is_inside` is the side at its start.
+    /// First crossing in an interval. `is_inside` says whether the interval starts inside the torus.
     fn crossing_of_piece(
         &self,
         low: LineSample,
@@ -181,7 +183,7 @@ impl UnitLine {
     }
 
     /// First root after `low` in an interval where sign·g is convex and positive at both ends. A Newton step
-    /// on a convex function never passes its root. If the steps pass the minimum, there is no root.
+    /// on a convex function never overshoots the root. If the steps pass the minimum, there is no root.
     fn first_root_of_dip(&self, low: LineSample, high: LineSample, sign: f64) -> Option<f64> {
         if !(high.slope * sign > 0.0) {
             return None;

@@ -13,7 +13,8 @@ use super::{Aabb, AreaPoint, RayF64, ShapeHit};
 use crate::math::{DVec2, DVec3, Vec2};
 use crossing::UnitLine;
 
-/// Margin around a torus in units of its tube. It ensures that a line approaches the torus from outside.
+/// Margin around a torus, relative to the tube radius. It ensures that a line enters the searched interval
+/// outside the torus.
 const ROOM: f64 = 0.01;
 
 /// All points at a fixed distance, the tube radius, from a circle around an axis. The front is outside.
@@ -97,14 +98,14 @@ impl Torus {
         DVec2::new(angle_to_u(out), angle_to_u(from_circle))
     }
 
-    /// Mean curvature at a point of the surface.
+    /// Mean curvature at a point on the surface.
     pub fn curvature(&self, point: DVec3) -> f64 {
         let across = self.circle_directions(point).1.x;
         0.5 * (1.0 / self.tube + across / (self.radius + self.tube * across))
     }
 
-    /// Surface point at a direction from the axis and a direction from the circle in the plane through the
-    /// axis.
+    /// Surface point for a direction from the axis and a direction from the circle, as returned by
+    /// [`Torus::circle_directions`].
     fn surface_at(&self, out: DVec2, from_circle: DVec2) -> SurfacePoint {
         let (across, up) = (from_circle.x, from_circle.y);
         let ring = self.radius + self.tube * across;
@@ -130,7 +131,7 @@ impl Torus {
         }
     }
 
-    /// Point and unit normal at texture coordinates.
+    /// Point and unit normal at the given texture coordinates.
     pub fn at(&self, u: f64, v: f64) -> (DVec3, DVec3) {
         let (out, from_circle) = (direction_at_u(u), direction_at_u(v));
         let normal = (out * from_circle.x).extend(from_circle.y);
@@ -237,7 +238,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_enter_and_leave_equally_often() {
+    fn entries_list_each_entry_in_order() {
         let entries = |origin: Vec3, direction: Vec3| {
             ring().entries(&Ray::new(origin, direction).to_f64()).map(|entry| entry.map(|t| t as f32))
         };
@@ -246,11 +247,11 @@ mod tests {
         assert_eq!(entries(x(0.0), Vec3::X), [Some(1.5), None]);
         assert_eq!(entries(x(-9.0), Vec3::NEG_X), [None; 2]);
         assert_eq!(entries(Vec3::new(2.0, 9.0, 0.0), Vec3::NEG_Y), [Some(8.5), None]);
-        // Rays parallel to the axis: through the tube on both sides of the hole, and only through its outer
-        // part.
+        // Rays along x. One passes through the tube on both sides of the hole, the other only through its
+        // outer part.
         let [first, second] = entries(Vec3::new(-9.0, 0.0, 1.0), Vec3::X);
-        assert!((first.expect("in") - (9.0 - 5.25_f32.sqrt())).abs() < 1e-5);
-        assert!((second.expect("in again") - (9.0 + 1.25_f32.sqrt())).abs() < 1e-5);
+        assert!((first.expect("first entry") - (9.0 - 5.25_f32.sqrt())).abs() < 1e-5);
+        assert!((second.expect("second entry") - (9.0 + 1.25_f32.sqrt())).abs() < 1e-5);
         assert_eq!(entries(Vec3::new(-9.0, 0.0, 1.8), Vec3::X)[1], None);
     }
 

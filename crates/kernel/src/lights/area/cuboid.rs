@@ -1,4 +1,4 @@
-//! Box lights, sampled by the solid angles of their visible faces.
+//! Box lights. The visible faces are sampled by solid angle.
 
 use super::quad::SphericalRectangle;
 use super::sample_point::LightSamplePoint;
@@ -29,7 +29,7 @@ struct BoxView {
 #[derive(Clone, Copy)]
 struct BoxFace {
     rectangle: SphericalRectangle,
-    /// Solid angle in sr. Approximate for small faces, and 0 from behind.
+    /// Solid angle in sr. Approximate for small faces, and 0 if the face is seen from behind.
     solid_angle: f32,
 }
 
@@ -88,7 +88,7 @@ impl ShapeEmitter for BoxEmitter {
 }
 
 impl BoxEmitter {
-    /// The emitter of an entire box.
+    /// Creates an emitter for an entire box.
     pub fn new(cuboid: &Cuboid) -> Self {
         let axes = cuboid.axes();
         Self {

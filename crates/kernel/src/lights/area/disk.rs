@@ -1,4 +1,4 @@
-//! Disk lights, sampled with a density within 20 % of uniform over the solid angle.
+//! Disk lights, sampled with a pdf within 20 % of uniform over the solid angle.
 
 use std::f64::consts::TAU;
 
@@ -34,7 +34,7 @@ pub struct DiskView {
 }
 
 impl ShapeEmitter for DiskEmitter {
-    /// Samples the disk with a density within 20 % of uniform over the solid angle.
+    /// Samples the disk with a pdf within 20 % of uniform over the solid angle.
     #[inline(always)]
     fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
         let view = self.seen_from(point);
@@ -58,7 +58,7 @@ impl ShapeEmitter for DiskEmitter {
 }
 
 impl DiskEmitter {
-    /// The emitter of an entire disk.
+    /// Creates an emitter for an entire disk.
     pub fn new(disk: &Disk) -> Self {
         Self { center: disk.centroid(), normal: disk.normal(), radius: disk.radius() }
     }

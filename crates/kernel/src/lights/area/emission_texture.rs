@@ -2,7 +2,7 @@
 //! because of a clear coat.
 //!
 //! The texture is importance sampled on quads, but not on other shapes. Each sample is multiplied by the
-//! texture value at its point. Pdfs are exactly those of the emitter.
+//! texture value at its point. Pdfs depend only on the emitter.
 
 use std::sync::Arc;
 
@@ -44,7 +44,7 @@ pub struct UvTriangle {
 }
 
 impl EmissionTexture {
-    /// The factor from a texture and an opacity, or `None` if there is neither.
+    /// Creates the factor from a texture and an opacity, or `None` if there is neither.
     pub fn new(texture: Option<&Arc<Texture>>, opacity: Option<&Opacity>, chart: UvChart) -> Option<Self> {
         Self::under_coat(texture, opacity, None, chart)
     }
@@ -67,7 +67,7 @@ impl EmissionTexture {
         self.texture.is_some() || self.opacity.is_some()
     }
 
-    /// The factor at texture coordinates.
+    /// The factor at the given texture coordinates.
     #[inline]
     pub fn lookup(&self, uv: DVec2) -> Vec3 {
         self.lookup_at(&TexturePoint::sharp(uv))
@@ -82,8 +82,8 @@ impl EmissionTexture {
         }
     }
 
-    /// Number of texels per unit of u and v. If there are both a color texture and an opacity texture, this
-    /// is the maximum of their numbers.
+    /// Number of texels per unit of u and v. If there are both a color texture and an opacity texture,
+    /// returns the maximum of both.
     pub fn texels_per_unit(&self) -> [f64; 2] {
         let of_opacity = self.opacity.as_ref().and_then(|opacity| opacity.value.texture());
         let across =
@@ -109,7 +109,7 @@ impl EmissionTexture {
         let Some(coat) = &self.coat else { return 1.0 };
         let (point, direction) = (point.as_dvec3(), direction.as_dvec3());
         let at = self.chart.texture_point(point, primitive);
-        // At a shape's edge, rounding errors may prevent finding a normal.
+        // At a shape's edge, the probe ray may miss the shape because of rounding.
         let normal = self.chart.normal(point, primitive, direction);
         coat.transmittance(&at, normal.map_or(1.0, |normal| normal.dot(direction)) as f32, &mut 0)
     }
@@ -119,8 +119,8 @@ impl EmissionTexture {
 const PROBE: f64 = 1e-3;
 
 impl UvChart {
-    /// The unit normal at a point that is seen along a direction, on either side. `None` if the probe ray
-    /// misses the surface.
+    /// The unit normal at a point, for a viewing direction that may come from either side. `None` if the
+    /// probe ray misses the surface.
     fn normal(&self, point: DVec3, primitive: u32, direction: DVec3) -> Option<DVec3> {
         match self {
             Self::Shape(shape) => {

@@ -42,7 +42,7 @@ impl ShapeEmitter for InsideEmitter {
     }
 }
 
-/// Solid angle of the sphere in sr.
+/// Solid angle of the full sphere of directions, in sr.
 const ALL_AROUND: f32 = 4.0 * PI;
 
 impl InsideEmitter {
@@ -51,7 +51,7 @@ impl InsideEmitter {
         Some(Self { shape: *shape, by_area: Discrete::new(shape.areas())? })
     }
 
-    /// Samples a direction from a point inside.
+    /// Samples a direction uniformly from a point inside the shape.
     fn sample_directions(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
         let cos = 1.0 - 2.0 * u[0];
         let sin = ((1.0 - cos) * (1.0 + cos)).max(0.0).sqrt();
@@ -92,5 +92,5 @@ impl InsideEmitter {
     }
 }
 
-/// Relative tolerance for equal distances.
+/// Relative difference up to which distances are considered equal.
 const SAME_DISTANCE: f32 = 1e-4;

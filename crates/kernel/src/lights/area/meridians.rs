@@ -6,11 +6,11 @@ use crate::math::{DVec3, Vec3};
 /// Number of nodes on each side at which the weight is evaluated.
 const NODES: usize = 9;
 
-/// Distribution of angles around a pole, from minus the reach of a light to its reach. The density is
-/// piecewise linear.
+/// Distribution of angles around a pole, in the interval from −`reach` to `reach`. The density is piecewise
+/// linear.
 #[derive(Clone, Copy, Debug)]
 pub struct MeridianDistribution {
-    /// The largest angle.
+    /// Largest angle at which the light is visible.
     reach: f64,
     share: PiecewiseLinear<NODES>,
 }
@@ -25,10 +25,10 @@ pub struct SinCos {
 }
 
 impl SinCos {
-    /// Sine and cosine of half of an angle in [0, π].
+    /// Sine and cosine of half the angle, which must be in [0, π].
     fn half_angle(self) -> Self {
         let cos = (0.5 * (1.0 + self.cos)).max(0.0).sqrt();
-        // A cosine of 0 corresponds to an angle of π.
+        // Avoid dividing by the cosine if the angle is close to π.
         let sin = if cos > 0.5 { 0.5 * self.sin / cos } else { (0.5 * (1.0 - self.cos)).max(0.0).sqrt() };
         Self { sin, cos }
     }
@@ -48,7 +48,8 @@ impl SinCos {
 }
 
 impl MeridianDistribution {
-    /// A distribution over angles up to `reach` in [0, π], with density proportional to `weight`.
+    /// A distribution over the angles from −`reach` to `reach`, with a density proportional to `weight`.
+    /// `reach` is in [0, π].
     pub fn new(reach: SinCos, weight: impl Fn(SinCos) -> f64) -> Self {
         let step = reach.half_angle().half_angle().half_angle();
         let mut turn = SinCos { sin: 0.0, cos: 1.0 };
@@ -95,7 +96,7 @@ impl PolarFrame {
         Self { pole, front, side: pole.cross(front) }
     }
 
-    /// The direction at given angles from the pole and around it.
+    /// The direction at the given angles from the pole and around it.
     pub fn direction(&self, from_pole: SinCos, around: SinCos) -> DVec3 {
         self.pole * from_pole.cos + (self.front * around.cos + self.side * around.sin) * from_pole.sin
     }

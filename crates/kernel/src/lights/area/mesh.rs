@@ -30,11 +30,11 @@ pub struct MeshEmitter {
 /// How points on a mesh light are sampled.
 #[derive(Clone, Debug, PartialEq)]
 pub enum MeshSampling {
-    /// As a quad.
+    /// Samples points as on a quad light.
     Quad(Box<TrianglePairQuad>),
-    /// Uniformly over the area.
+    /// Samples points uniformly over the area.
     Area(AreaSampledTriangles),
-    /// With a light tree over all triangles, then on the visible part of the chosen triangle.
+    /// Picks a triangle with a light tree, then samples a point on this triangle.
     Tree(LightTree),
 }
 
@@ -115,7 +115,7 @@ impl MeshEmitter {
         self.bounds
     }
 
-    /// How points are sampled.
+    /// How points on the mesh are sampled.
     #[inline(always)]
     pub fn sampling(&self) -> &MeshSampling {
         &self.sampling
@@ -138,7 +138,7 @@ impl MeshEmitter {
         if let MeshSampling::Tree(tree) = &self.sampling { Some(tree) } else { None }
     }
 
-    /// Samples the light for a surface point with this normal.
+    /// Samples the light for a surface point with the given normal.
     #[inline(always)]
     pub fn sample(
         &self,

@@ -70,7 +70,7 @@ pub struct AreaLight {
     pub texture: Option<Box<EmissionTexture>>,
     /// Index of the object.
     pub object: u32,
-    /// Which part of the object emits.
+    /// The part of the object that emits.
     pub part: LightPart,
     /// Bounds of the light's position, directions, and power.
     pub bounds: LightBounds,
@@ -123,7 +123,8 @@ pub enum Emitter {
     Mesh(MeshEmitter),
 }
 
-/// Calls a method on any shape. Meshes need a separate arm because their triangles are separate primitives.
+/// Evaluates an expression with `$it` bound to the concrete emitter. Meshes have a separate arm because their
+/// triangles are separate primitives.
 macro_rules! of_any {
     ($emitter:expr, $it:ident => $asked:expr, $mesh:ident => $of_mesh:expr) => {
         match $emitter {
@@ -144,13 +145,13 @@ macro_rules! of_any {
 }
 
 impl Emitter {
-    /// The sphere. `None` for other shapes.
+    /// The sphere, or `None` for other shapes.
     #[inline(always)]
     pub fn as_sphere(&self) -> Option<&SphereEmitter> {
         if let Self::Sphere(sphere) = self { Some(sphere) } else { None }
     }
 
-    /// The triangles of a mesh. `None` for other shapes.
+    /// The triangles of a mesh, or `None` for other shapes.
     #[inline(always)]
     pub fn as_mesh(&self) -> Option<&MeshEmitter> {
         if let Self::Mesh(mesh) = self { Some(mesh) } else { None }
@@ -166,7 +167,7 @@ impl Emitter {
     }
 }
 
-/// The light on the front of a shape. `None` if the shape is infinite or has no area.
+/// Creates the light on the front of a shape, or returns `None` if the shape is infinite or has no area.
 pub fn area_light(shape: &Shape, radiance: Vec3, object: u32) -> Option<AreaLight> {
     let emitter = match shape {
         Shape::Sphere(sphere) => {
@@ -187,7 +188,8 @@ pub fn area_light(shape: &Shape, radiance: Vec3, object: u32) -> Option<AreaLigh
     Some(AreaLight { shape: emitter, side, radiance, texture, object, part, bounds })
 }
 
-/// The light on one side of a see-through shape. `None` if the shape is infinite or has no area.
+/// Creates the light on one side of a see-through shape, or returns `None` if the shape is infinite or has no
+/// area.
 pub fn see_through_light(shape: &Shape, side: Side, radiance: Vec3, object: u32) -> Option<AreaLight> {
     let hides_itself = match (shape, side) {
         (Shape::Quad(_) | Shape::Triangle(_) | Shape::Disk(_) | Shape::Plane(_), _) => false,
@@ -207,7 +209,7 @@ pub fn see_through_light(shape: &Shape, side: Side, radiance: Vec3, object: u32)
     })
 }
 
-/// The light on the back of a shape. `None` if the shape is infinite or has no area.
+/// Creates the light on the back of a shape, or returns `None` if the shape is infinite or has no area.
 pub fn back_light(shape: &Shape, radiance: Vec3, object: u32) -> Option<AreaLight> {
     let turned = match shape {
         Shape::Quad(quad) => Some(Shape::Quad(Parallelogram::new(quad.corner, quad.v, quad.u))),
@@ -251,7 +253,7 @@ impl AreaLight {
     /// Adds an emission texture. Quads are then importance sampled according to the texture.
     pub fn with_texture(mut self, texture: EmissionTexture) -> Self {
         if let (Emitter::Quad(quad), true) = (&self.shape, texture.varies_with_position()) {
-            // The back has swapped edges.
+            // The edges of the back are swapped.
             let ordered = |[u, v]: [f64; 2]| match self.side {
                 Side::Front => [u, v],
                 Side::Back => [v, u],

@@ -6,7 +6,7 @@ use crate::lights::packet::{LightSamplePacket, packet_of};
 use crate::lights::sample::LightObject;
 use crate::math::lanes::{F32x16, PACKET_SIZE, Vec3x16, lane, set_lane};
 
-/// Area-sampled triangles for a packet, with a separate light for each lane.
+/// Samples triangles by area for a packet, with a separate light for each lane.
 macro_rules! triangle_packet_of {
     ($i:ident => ($facets:expr, $light:expr), $points:expr, $u:expr) => {{
         let mut row = packet_of!(LightObject::Nothing, $i => {

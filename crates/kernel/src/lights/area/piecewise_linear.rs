@@ -1,6 +1,6 @@
 //! Piecewise linear densities.
 
-/// A density on [0, 1] that is proportional to the given values at equidistant nodes and linear in between.
+/// A density on [0, 1] that is proportional to the given values at evenly spaced nodes and linear in between.
 #[derive(Clone, Copy, Debug)]
 pub struct PiecewiseLinear<const NODES: usize>(pub [f64; NODES]);
 

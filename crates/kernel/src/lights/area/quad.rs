@@ -76,7 +76,7 @@ impl QuadEmitter {
         LightSamplePoint { direction, target: point + offset, factor: if is_front { factor } else { 0.0 } }
     }
 
-    /// A quad from a corner and two nonparallel edges.
+    /// Creates a quad from a corner and two nonparallel edges.
     pub fn new(corner: DVec3, u: DVec3, v: DVec3) -> Self {
         let normal = u.cross(v);
         let perpendicular = u.dot(v).abs() <= 1e-6 * u.length() * v.length();
@@ -109,8 +109,8 @@ impl QuadEmitter {
         (offset, self.projected_solid_angle(offset))
     }
 
-    /// Solid angle of the quad if all of it were at this offset from the point. Not positive if the point is
-    /// behind the quad.
+    /// Solid angle of the quad if its entire area were at this offset from the point. Not positive if the
+    /// point is behind the quad.
     #[inline(always)]
     pub(super) fn projected_solid_angle(&self, offset: Vec3) -> f32 {
         let nearness = 1.0 / offset.length_squared().sqrt();
@@ -141,7 +141,7 @@ pub struct SphericalRectangle {
     x: [f32; 2],
     y: [f32; 2],
     z: f32,
-    /// z components of the unit normals of the planes through the lower and upper sides.
+    /// z components of the unit normals of the planes through the view point and the lower and upper sides.
     lower: f32,
     upper: f32,
     /// Start angle of the slices.
@@ -157,13 +157,14 @@ impl PlanarRectangle {
     }
 }
 
-/// In-plane component of the unit vector from a line toward a side. `d2` is the line's squared distance.
+/// Sine of the angle at which a side at coordinate `side` is seen. `d2` is the squared distance perpendicular
+/// to this coordinate.
 #[inline(always)]
 fn in_plane_component(side: f32, d2: f32) -> f32 {
     side / (d2 + side * side).sqrt()
 }
 
-/// Angle between the planes through two sides.
+/// Angle between the planes through the view point and two adjacent sides.
 #[inline(always)]
 fn dihedral_angle(a: f32, b: f32) -> f32 {
     acos((-a * b).max(-1.0).min(1.0))
@@ -224,7 +225,7 @@ impl SphericalRectangle {
         (x, y, -self.z * width * height * (nearness * nearness * nearness))
     }
 
-    /// Whether the solid angle has retained enough digits.
+    /// Whether the solid angle is precise enough for sampling.
     #[inline(always)]
     pub fn is_accurate(&self) -> bool {
         self.solid_angle >= MIN_SOLID_ANGLE

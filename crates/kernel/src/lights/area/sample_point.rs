@@ -2,7 +2,7 @@
 
 use crate::math::Vec3;
 
-/// A sampled point on an area light. The computation is branchless.
+/// A sampled point on an area light, computed without branches.
 #[derive(Clone, Copy, Debug)]
 pub struct LightSamplePoint {
     /// Unit direction to the sampled point.
@@ -14,6 +14,6 @@ pub struct LightSamplePoint {
 }
 
 impl LightSamplePoint {
-    /// No sample: the light is not visible.
+    /// No sample, because the light is not visible.
     pub const NOTHING: Self = Self { direction: Vec3::ZERO, target: Vec3::ZERO, factor: 0.0 };
 }

@@ -33,7 +33,8 @@ pub trait RevolutionSideView {
     /// Largest angle around the pole at which the side is visible.
     fn max_angle(&self) -> SinCos;
 
-    /// Difference between the cosines at the ends of the visible interval, for an angle around the pole.
+    /// Difference between the cosines at the ends of the visible interval, at the given angle around the
+    /// pole.
     fn cosine_extent(&self, around: SinCos) -> f64;
 
     /// The point at a fraction `share` of the interval of cosines. Returns its angle from the pole and its
@@ -120,8 +121,8 @@ pub struct CylinderSide {
     radius: f64,
 }
 
-/// A cylinder seen from a point. The pole is parallel to the cylinder's axis. Angles around the pole are
-/// those of the cross-section circle as seen from the point.
+/// A cylinder seen from a point. The pole is parallel to the cylinder's axis. Angles around the pole are the
+/// angles at which the cross-section circle is seen from the point.
 pub struct CylinderView {
     pole: PolarFrame,
     reach: SinCos,
@@ -135,7 +136,7 @@ pub struct CylinderView {
 }
 
 impl RevolutionEmitter<CylinderSide> {
-    /// The emitter of an entire cylinder.
+    /// Creates an emitter for an entire cylinder.
     pub fn of_cylinder(cylinder: &Cylinder) -> Self {
         let caps = [1, 2].map(|number| cylinder.cap(number));
         let across = caps[1].centroid() - caps[0].centroid();
@@ -235,7 +236,7 @@ pub struct ConeView {
 }
 
 impl RevolutionEmitter<ConeSide> {
-    /// Creates a light from an entire cone.
+    /// Creates an emitter for an entire cone.
     pub fn of_cone(cone: &Cone) -> Self {
         let (base, tip) = (cone.base(), cone.tip());
         let (height, radius) = ((base.centroid() - tip).length(), base.radius());
@@ -277,7 +278,8 @@ impl RevolutionSide for ConeSide {
 }
 
 impl ConeView {
-    /// Angle at the tip between the point and the line on the side in a half plane.
+    /// Angle at the tip between the direction to the point and the line in which a half plane intersects the
+    /// side.
     fn angle_at_tip(&self, around: SinCos) -> SinCos {
         let ((m, sin), c) = (self.off_axis, self.cos_opening);
         let q = sin * around.cos;

@@ -1,4 +1,4 @@
-//! Textured quad lights, sampled according to their emission texture as well as by solid angle.
+//! Textured quad lights, sampled both according to their emission texture and by solid angle.
 
 use super::quad::QuadEmitter;
 use super::sample_point::LightSamplePoint;
@@ -19,7 +19,8 @@ pub struct TexturedQuadEmitter {
     cells: PiecewiseConstant2D,
     /// Fraction of the samples distributed according to the texture.
     share: f32,
-    /// Vectors whose dot products with a point's offset from the corner are its coordinates along the edges.
+    /// Vectors whose dot products with a point's offset from the corner are the point's coordinates along the
+    /// edges.
     along: [Vec3; 2],
 }
 

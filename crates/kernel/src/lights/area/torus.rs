@@ -48,7 +48,7 @@ struct TorusView {
     tube: f64,
     /// √(distance·radius) relative to the point's distance from the surface.
     closeness: f64,
-    /// The largest τ.
+    /// Largest τ of a visible slice.
     reach: f64,
 }
 
@@ -70,7 +70,7 @@ struct TorusSlice {
     sine: f64,
 }
 
-/// Relative tolerance for equal distances.
+/// Relative difference up to which distances are considered equal.
 const SAME_DISTANCE: f64 = 1e-3;
 
 /// A point on a slice's circle.
@@ -131,7 +131,7 @@ impl ShapeEmitter for TorusEmitter {
 }
 
 impl TorusEmitter {
-    /// The emitter of an entire torus.
+    /// Creates an emitter for an entire torus.
     pub fn new(torus: Torus) -> Self {
         Self { torus }
     }
@@ -153,8 +153,8 @@ impl TorusView {
             return None;
         }
         let closeness = ((distance * radius).sqrt() / gap).max(MIN_CLOSENESS);
-        // Outside the ring and between the planes of its top and bottom, the far side of the ring is
-        // invisible. Its near side is visible up to the reach of the circles.
+        // From outside the ring and between the planes of its top and bottom, only the near side of the ring
+        // is visible, up to the angle `widest`.
         let is_beside = height.abs() < tube && beside > 0.0;
         let widest = if is_beside {
             let half = ((tube - height) * (tube + height)).sqrt();
@@ -273,7 +273,7 @@ impl TorusSlice {
         y / (self.gap * self.gap + self.off * self.off + y * y).sqrt() / self.sine
     }
 
-    /// Density over the relative sine, from minimum to maximum.
+    /// Density of the relative sine of the elevation, from its minimum to its maximum.
     fn elevation_density(&self, view: &TorusView) -> PiecewiseLinear<PLACES> {
         let sine = |i: usize| 2.0 * i as f64 / (PLACES - 1) as f64 - 1.0;
         PiecewiseLinear(std::array::from_fn(|i| self.near_point(view, self.tangent(sine(i))).factor))

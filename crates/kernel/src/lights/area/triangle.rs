@@ -68,7 +68,7 @@ impl ShapeEmitter for TriangleEmitter {
 }
 
 impl TriangleEmitter {
-    /// The emitter for an entire triangle. `None` if it has no area.
+    /// Creates an emitter for an entire triangle. `None` if the triangle has no area.
     pub fn new(triangle: &Triangle) -> Option<Self> {
         let Triangle { a, b, c } = *triangle;
         let normal = (b - a).cross(c - a);

@@ -37,7 +37,7 @@ pub trait DeltaLight {
         (direction, weight * self.relative_intensity(-direction))
     }
 
-    /// [`Light::sample`](super::Light::sample). There is only one direction.
+    /// Implements [`Light::sample`](super::Light::sample). There is only one direction.
     fn sample(&self, point: Vec3) -> Option<LightSample> {
         let (direction, weight) = self.direction_and_irradiance(point);
         let end = ShadowRayEnd::At(self.isotropic().position.as_vec3());

@@ -40,7 +40,7 @@ impl DeltaLight for SpotLight {
     }
 
     /// The solid angle of the inner cone with half angle (1 − blend)·H, plus the integral of (H −
-    /// θ)/(blend·H) over the directions between both cones.
+    /// θ)/(blend·H) over the directions between the two cones.
     #[inline]
     fn solid_angle(&self) -> f64 {
         let SpotCone { inner, faded, .. } = self.cones();

@@ -1,4 +1,4 @@
-//! Directional lights, which are a single direction or a disk in the sky.
+//! Directional lights, which shine from a single direction or from a disk in the sky.
 
 use std::f32::consts::PI;
 
@@ -53,8 +53,8 @@ impl DirectionalLight {
         infinite_packet_of!(i => self.direction_and_irradiance([u[0][i], u[1][i]]))
     }
 
-    /// A unit direction to the light, and the radiance divided by the pdf, or the irradiance if the light has
-    /// no extent.
+    /// Samples a unit direction to the light. Also returns the radiance divided by the pdf, or the irradiance
+    /// if the light has no extent.
     #[inline(always)]
     pub fn direction_and_irradiance(&self, u: [f32; 2]) -> (Vec3, Vec3) {
         if self.is_single_direction() {

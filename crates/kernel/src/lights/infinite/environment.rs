@@ -161,7 +161,7 @@ impl InfiniteLight for Environment {
         (self.mean().as_dvec3() * (4.0 * std::f64::consts::PI * area)).as_vec3()
     }
 
-    /// A cone of all directions, with the irradiance on a surface due to the mean radiance.
+    /// Bounds with all directions. The power is the irradiance on a surface due to the mean radiance.
     fn bounds(&self) -> LightBounds {
         let mean = match self {
             Self::Constant(radiance) => mean_channel(*radiance),

@@ -33,9 +33,9 @@ pub struct EnvironmentMap {
 struct TexelPosition {
     column: u32,
     row: u32,
-    /// Fractions from left to right and from top to bottom. The latter is a fraction of the angle.
+    /// Fractions from left to right and from top to bottom. The vertical fraction is measured in angle.
     between: [f32; 2],
-    /// Fractions from left to right and from top to bottom. The latter is a fraction of the height.
+    /// Fractions from left to right and from top to bottom. The vertical fraction is measured in height.
     along: [f32; 2],
 }
 
@@ -68,7 +68,7 @@ impl EnvironmentMap {
             (f64::from(cells.row_probability(row)) / extent) as f32
         };
         let pdfs = (0..=rows).map(density).collect();
-        // Each row of cells has two rows of texels, and the heights range from 1 to −1.
+        // Each row of cells is between two rows of texels, and the heights range from 1 to −1.
         let mean_luminance = sum / (4.0 * columns as f64);
         Some(Self { texels, cells, heights, pdfs, mean_luminance })
     }
@@ -120,7 +120,7 @@ impl EnvironmentMap {
     }
 
     /// Unit direction at the fractions `along` of a cell, in azimuth and height. Also returns the vertical
-    /// fraction in terms of angle.
+    /// fraction, measured in angle.
     #[inline(always)]
     fn direction_in_cell(&self, column: f32, row: usize, along: [f32; 2], turn: f32) -> (Vec3, f32) {
         let extent = self.heights[row + 1] - self.heights[row];
@@ -133,8 +133,8 @@ impl EnvironmentMap {
         )
     }
 
-    /// Unit direction at height `y` in a cell and at a fraction of its azimuth. Also returns the vertical
-    /// fraction in terms of angle.
+    /// Unit direction at height `y` and at the fraction `along` of a cell's azimuth. Also returns the
+    /// vertical fraction, measured in angle.
     #[inline(always)]
     fn direction_at_height(&self, column: f32, row: f32, y: f64, along: f32, turn: f32) -> (Vec3, f32) {
         let across = ((1.0 - y) * (1.0 + y)).max(0.0).sqrt() as f32;
@@ -224,7 +224,7 @@ impl EnvironmentMap {
     /// Column and row of a cell from cell coordinates.
     #[inline(always)]
     fn cell(&self, x: f32, y: f32) -> (u32, u32) {
-        // A number just below 0 may have become equal to the width because of rounding.
+        // A coordinate just below 0 may have been rounded up to the width.
         ((x as u32).min(self.texels.width - 1), (y as u32).min(self.texels.height))
     }
 

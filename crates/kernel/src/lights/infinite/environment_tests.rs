@@ -102,7 +102,7 @@ fn sample_pdfs_equal_direction_pdfs() {
             assert_eq!(lane(&row.weights, 3), sample.weight);
             found += 1;
         }
-        assert!(found > 19_000 && off < 100, "{off} relative to {found}");
+        assert!(found > 19_000 && off < 100, "{off} of {found} samples differ");
     }
 }
 
@@ -157,7 +157,7 @@ fn sample_frequencies_match_the_pdf() {
         let count = 1_000_000;
         let mut counts = vec![0.0; columns * rows];
         for i in 0..count {
-            // Use independent random numbers, since those of a single pixel are stratified.
+            // Use independent random numbers, because the samples of a single pixel are stratified.
             let number = |salt: u32| {
                 let bits = (i * 2 + salt).wrapping_mul(0x9e37_79b9) ^ 0x85eb_ca6b;
                 let bits = (bits ^ bits >> 15).wrapping_mul(0x2c1b_3c6d);

@@ -11,9 +11,9 @@ pub use environment_map::EnvironmentMap;
 use super::tree::LightBounds;
 use crate::math::Vec3;
 
-/// A light at infinity. Sampling for a surface and the radiance along a ray are methods of each type. A
-/// [`DirectionalLight`] is the same everywhere, whereas sampling an [`Environment`] depends on the surface
-/// normal.
+/// A light at infinity. Sampling at a surface and evaluating the radiance along a ray are separate methods of
+/// each type, because sampling an [`Environment`] depends on the surface normal, and sampling a
+/// [`DirectionalLight`] does not.
 pub trait InfiniteLight {
     /// Samples a unit direction to the light, independently of a surface. Returns the direction and the
     /// radiance divided by the pdf, or the irradiance if the light has no extent. `u` is in [0, 1)².

@@ -174,7 +174,7 @@ impl TargetView<'_> {
         let (mut by_cones, mut by_others) = (0.0, 0.0);
         for (number, VisibleTarget { cone, weight }) in self.seen.iter().enumerate() {
             match cone {
-                // At a cone's edge, the result would depend on rounding.
+                // At a cone's edge, the result of `contains` depends on rounding.
                 Some(cone) if made_for == Some(number) || cone.contains(direction) => {
                     by_cones += weight / cone.solid_angle();
                 }
@@ -216,7 +216,7 @@ impl TargetCone {
         TAU * f64::from(self.one_minus_cos)
     }
 
-    /// Whether a direction is inside the cone. Compares chords.
+    /// Whether a direction is inside the cone. Compares chords, which is accurate even for narrow cones.
     fn contains(&self, direction: Vec3) -> bool {
         (direction.as_dvec3() - self.axis).length_squared() <= 2.0 * f64::from(self.one_minus_cos)
     }

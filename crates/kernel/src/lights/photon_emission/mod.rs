@@ -69,7 +69,7 @@ pub enum EmitterGeometry {
 /// Random numbers in [0, 1) for one photon.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PhotonRandomNumbers {
-    /// Chooses the light and a piece of it.
+    /// Chooses the light and a piece of its surface.
     pub light: [f32; 2],
     /// Chooses whether to aim, and the target.
     pub aim: [f32; 2],
@@ -159,7 +159,7 @@ struct PhotonAim {
 }
 
 /// Fraction of aimed photons whose light is chosen by power, as for unaimed photons. Needed because an
-/// estimate of 0 may be wrong.
+/// estimated power of 0 may be wrong.
 const BY_POWER: f64 = 0.1;
 
 impl PhotonSource {
@@ -177,8 +177,8 @@ impl PhotonSource {
         Some(Self { lights: Arc::clone(lights), sources, around, by_power, aim: None })
     }
 
-    /// Aims a fraction `share` in [0, 1] of the photons at targets. If it is 1, all photons hit a target, and
-    /// their mean flux is the power that reaches the targets.
+    /// Aims a fraction `share` in [0, 1] of the photons at targets. If `share` is 1, all photons hit a
+    /// target, and their mean flux is the power that reaches the targets.
     #[must_use]
     pub fn aimed_at(self, targets: &[BoundingSphere], share: f32) -> Self {
         let targets = PhotonTargets::new(targets).filter(|_| share > 0.0);

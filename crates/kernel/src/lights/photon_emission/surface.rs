@@ -48,7 +48,7 @@ pub struct EmissionPoint {
     /// Cosine-weighted integral of the radiance, divided by the pdf of the point. The mean is the power of
     /// the light in W.
     pub flux: Vec3,
-    /// Primitive index (for meshes).
+    /// Primitive index, for meshes.
     pub primitive: u32,
 }
 
@@ -67,8 +67,7 @@ const PIECES: usize = 1024;
 /// Number of texture lookups along each side of a piece.
 const LOOKUPS_PER_SIDE: u32 = 4;
 
-/// Fraction of a piece's weight that is proportional to its area, since there may be more light between the
-/// lookups.
+/// Fraction of a piece's weight that is proportional to its area, because the lookups may miss bright areas.
 const BY_AREA: f64 = 0.05;
 
 impl EmissiveSurface {

@@ -66,7 +66,7 @@ fn sun(degrees: f64) -> DirectionalLight {
     DirectionalLight::new(Vec3::new(-0.6, 0.64, -0.48), COLOR, degrees.to_radians())
 }
 
-/// A light, its shape, and its power relative to its color.
+/// Lights with their shapes and their powers relative to [`COLOR`].
 fn lights() -> Vec<(Light, Option<Shape>, f64)> {
     let disk = PI * SCENE.radius * SCENE.radius;
     let mut all = vec![(Light::Point(point(Falloff::Square)), None, 4.0 * PI)];

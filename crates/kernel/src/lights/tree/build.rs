@@ -161,7 +161,7 @@ impl LeafSums {
         self.count += 1;
         self.power += power;
         (self.min, self.max) = (self.min.min(center - radius), self.max.max(center + radius));
-        // Mean direction of a cone.
+        // Weight the axis with the length of the cone's mean direction.
         self.axes += axis * (power * 0.5 * (1.0 + cos));
     }
 
@@ -173,8 +173,8 @@ impl LeafSums {
         self
     }
 
-    /// Power × area × solid angle (section 4.4, equation 1). The solid angle is that of a cone with the same
-    /// length of the mean direction. The area is replaced by the squared diagonal, which is nonzero even if
+    /// Power × area × solid angle (section 4.4, equation 1). The solid angle is taken from a cone whose mean
+    /// direction has the same length. The area is replaced by the squared diagonal, which is nonzero even if
     /// the lights are in a row.
     fn cost(&self) -> f64 {
         if self.count == 0 {
@@ -185,7 +185,7 @@ impl LeafSums {
     }
 }
 
-/// Maximum number of leaves to sort. More leaves are binned.
+/// Maximum number of leaves to sort. Larger sets of leaves are binned.
 const MAX_SORTED: usize = 1 << 15;
 
 /// Number of bins along the longest axis.
@@ -222,7 +222,7 @@ fn split(leaves: &mut [LightLeaf], unit: usize) -> usize {
     cheapest_split(&parts) * unit
 }
 
-/// Finds the split with the lowest total cost of a sequence of parts. Returns the number of parts in the
+/// Finds the split of a sequence of parts that has the lowest total cost. Returns the number of parts in the
 /// first half. Neither half is empty.
 fn cheapest_split(parts: &[LeafSums]) -> usize {
     let mut right = parts.to_vec();

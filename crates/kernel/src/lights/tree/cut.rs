@@ -104,8 +104,8 @@ impl<'a> LightTreeCut<'a> {
         let inverse = 1.0 / all;
         let (mut index, mut way) = (0, PathCache::NEW);
         let (mut of, mut shares) = (usize::MAX, CumulativeImportance::NONE);
-        // `before` is the sum over the preceding nodes. `scale` corrects for rounding. It is the exact sum
-        // over the children, divided by the node's share of the rounded total.
+        // `before` is the sum over the preceding nodes. `scale`, which corrects for rounding, is the exact
+        // sum over the children divided by the node's share of the rounded total.
         let (mut before, mut scale) = (0.0, 0.0);
         for (place, u) in u.enumerate() {
             let target = scale_to_total(u, all);
@@ -117,7 +117,7 @@ impl<'a> LightTreeCut<'a> {
                 before = if index == 0 { 0.0 } else { self.sums[index - 1] };
                 scale = shares.total() / (self.sums[index] - before);
             }
-            // Stay below the sum over the children. It is positive because the node's share is.
+            // Stay below the sum over the children, which is positive because the node's share is positive.
             let part = clamp_below((target - before) * scale, shares.total());
             let child = shares.find(part);
             let probability = self.share(index, child, inverse);

@@ -211,7 +211,7 @@ impl LobePacket {
 pub struct ExpectedContributions {
     /// Importance in the tree's unit of power. 0 only if the child definitely contributes nothing.
     pub importance: F32x16,
-    /// Squared sines of half the angles that the spheres subtend. 1 for points inside.
+    /// Squared sines of half the angles that the bounding spheres subtend. 1 for points inside a sphere.
     pub nearness: F32x16,
 }
 

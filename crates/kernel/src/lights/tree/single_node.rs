@@ -99,7 +99,7 @@ impl SingleNodeImportance<'_> {
         PacketPicks { children, lights, probabilities: self.shares(&values) }
     }
 
-    /// Probabilities of the given picks under these importances.
+    /// Probabilities of the given picks with these importances.
     #[inline(always)]
     pub fn probabilities(&self, picks: &PacketPicks) -> F32x16 {
         let mut values = [0.0; PACKET_SIZE];
@@ -120,7 +120,7 @@ impl SingleNodeImportance<'_> {
     }
 }
 
-/// The largest number below `total` > 0. Returns 0 for 0.
+/// The largest number below a positive `total`, or 0 if `total` is 0.
 #[inline(always)]
 fn largest_below(total: f64) -> f64 {
     f64::from_bits(total.to_bits().saturating_sub(1))

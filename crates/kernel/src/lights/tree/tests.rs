@@ -152,7 +152,7 @@ proptest! {
 }
 
 #[test]
-fn spotlights_in_columns_are_picked_between_lights() {
+fn spotlights_in_a_column_can_always_be_picked() {
     // The lights form columns with one node each, and all point down. Points below some lights of a column
     // may be above the center of the node.
     let mut next = random::unit(8);
@@ -336,7 +336,7 @@ fn joint_bounds_contain_all_lights() {
 }
 
 #[test]
-fn coincident_and_distant_lights_have_trees() {
+fn coincident_and_distant_lights_build_valid_trees() {
     let point = |position| PointLight { position, intensity: Vec3::ONE, falloff: Falloff::Square };
     let same: Vec<Light> = (0..5000).map(|_| Light::Point(point(DVec3::ONE))).collect();
     // Each light is twice as far away as the previous one.

@@ -4,7 +4,7 @@
 use crate::materials::bsdf::{BsdfValues, LobeSet, RoughRow};
 use crate::math::lanes::{F32x16, Simd, SimdKernel, Vec3x16};
 
-/// The large functions of [`RoughRow`] for all kinds.
+/// Wrappers for the large functions of [`RoughRow`].
 pub(super) trait RoughCalls: RoughRow {
     /// [`RoughRow::f`].
     #[inline(always)]

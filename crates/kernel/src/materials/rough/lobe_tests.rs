@@ -1,4 +1,4 @@
-//! Checks for microfacet lobes, used in the tests of each kind. Compares values with an `f64` reference,
+//! Checks for microfacet lobes, used in the tests of each BSDF kind. Compares values with an `f64` reference,
 //! samples with pdfs, and albedos.
 
 use crate::materials::bsdf::{LobeSet, RoughRow, ShownLobes, SideSamples, SurfaceDirections};
@@ -97,12 +97,12 @@ pub struct Subject<R: RoughRow> {
 }
 
 impl<R: RoughRow> Subject<R> {
-    /// A surface with this material. `alphas` are those of its narrow lobe.
+    /// A surface with the given material. `alphas` are the α values of its narrow lobe.
     pub fn new(point: &R::Point, alphas: [f32; 2], to_eye: DVec3) -> Self {
         Self::lit(point, alphas, to_eye, LitFrom::Mirrored)
     }
 
-    /// [`Subject::new`] with an explicit kind of lighting.
+    /// [`Subject::new`] for the given kind of lighting.
     pub fn lit(point: &R::Point, alphas: [f32; 2], to_eye: DVec3, light: LitFrom) -> Self {
         let mut row = R::EMPTY;
         row.reset();
@@ -400,7 +400,7 @@ pub fn check_neighbors<R: RoughRow>(points: &[R::Point]) {
     check_neighbors_lit::<R>(points, LitFrom::Mirrored);
 }
 
-/// [`check_neighbors`] with an explicit kind of lighting.
+/// [`check_neighbors`] for the given kind of lighting.
 pub fn check_neighbors_lit<R: RoughRow>(points: &[R::Point], lit: LitFrom) {
     check_shown_lobes::<R>(points, lit);
     let normals = [[0.0; PACKET_SIZE], [0.0; PACKET_SIZE], [lit.side() as f32; PACKET_SIZE]];

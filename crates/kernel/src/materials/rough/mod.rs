@@ -32,8 +32,8 @@ use principled::PrincipledRow;
 
 /// Generates enums over all kinds. Their methods dispatch to the trait methods of the same name. `materials`
 /// lists kinds that are entire materials. `parts` lists kinds that other materials use for a part of their
-/// light. `kept` is how a [`BsdfRow`] stores a packet. The most common kind is stored inline. Others are
-/// boxed to keep packets small in scenes without them.
+/// light. `kept` is the type in which a [`BsdfRow`] stores a packet. The most common kind is stored inline.
+/// Others are boxed to keep packets small in scenes without them.
 macro_rules! kinds {
     (
         materials { $($(#[$doc:meta])* $kind:ident($material:ty, $row:ty, kept: $kept:ty)),+ $(,)? }
@@ -66,7 +66,7 @@ macro_rules! kinds {
         pub enum BsdfRow { $($(#[$doc])* $kind($kept),)+ $($(#[$part_doc])* $part(Box<$part_row>)),+ }
 
         impl Rough {
-            /// Its kind.
+            /// The kind of the material.
             #[inline(always)]
             pub fn kind(&self) -> RoughKind {
                 match self { $(Self::$kind(_) => RoughKind::$kind),+ }
@@ -133,7 +133,7 @@ macro_rules! kinds {
         }
 
         impl RoughBsdf {
-            /// Its kind.
+            /// The kind of the BSDF.
             #[inline(always)]
             pub fn kind(&self) -> RoughKind {
                 match self {
@@ -179,7 +179,7 @@ macro_rules! kinds {
         }
 
         impl BsdfRow {
-            /// Its kind.
+            /// The kind of all surfaces in the packet.
             #[inline(always)]
             pub fn kind(&self) -> RoughKind {
                 match self {
@@ -398,7 +398,7 @@ kinds! {
     Principled(Box<Principled>, PrincipledRow<false>, kept: Box<PrincipledRow<false>>),
     }
     parts {
-    /// Reflection by rough glass.
+    /// Reflection at rough glass.
     GlassReflection(GlassRow<false>),
     /// Transmission through rough glass.
     GlassTransmission(GlassRow<true>),

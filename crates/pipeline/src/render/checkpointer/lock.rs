@@ -33,7 +33,7 @@ impl CheckpointLock {
         }
     }
 
-    /// Releases the file.
+    /// Releases the held checkpoint file.
     pub(super) fn release(&mut self) {
         self.held = None;
     }
@@ -50,7 +50,7 @@ impl CheckpointLock {
         !self.is_held_by_this_process(path) && open(path).is_some_and(is_locked)
     }
 
-    /// Records a failure. Returns whether it is the request's first.
+    /// Records a failure. Returns whether it is the first failure of the request.
     pub(super) fn record_first_failure(&mut self, request: u64) -> bool {
         self.failed.replace(request) != Some(request)
     }
@@ -96,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn file_is_news_once() {
+    fn each_file_is_reported_once() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("a.checkpoint");
         std::fs::write(&path, "first").expect("written");

@@ -165,7 +165,8 @@ impl<'a> Checkpointer<'a> {
         Ok(!state.has_samples())
     }
 
-    /// Restores the film from the output file if it already contains this part. Returns whether it does.
+    /// Restores the film from the output file if the file already contains this part. Returns whether the film was
+    /// restored.
     ///
     /// # Errors
     /// The output file is a part of another render.

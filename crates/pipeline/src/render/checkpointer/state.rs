@@ -55,7 +55,7 @@ impl State {
     /// Whether the numbers are plausible. Implausible numbers could overflow sums or keep a render from
     /// ending.
     pub(super) fn is_plausible(&self) -> bool {
-        /// About 30,000 years.
+        /// Maximum plausible time: about 30,000 years.
         const MAX_SECONDS: f64 = 1e12;
         const MAX_RAYS: u64 = 1 << 56;
         let is_time = |seconds: f64| (0.0..=MAX_SECONDS).contains(&seconds);

@@ -54,7 +54,7 @@ pub(crate) struct PixelOverhead {
     /// Sum of the numerators of b, the overhead of a pixel in samples. If a cell takes s' seconds for n'
     /// samples, then s seconds for n > n' samples, s/s' = (n + b)/(n' + b) and b = (s'n − sn')/(s − s').
     of_pixels: f64,
-    /// Sum of the denominators.
+    /// Sum of the denominators of b, as defined at `of_pixels`.
     of_samples: f64,
 }
 
@@ -129,7 +129,7 @@ mod tests {
         let (mut share, mut cell) = (PixelOverhead::default(), CellCost::default());
         cell.record(JobCost { seconds: 1e-6, pixels: 1.0, samples: 1.0 }, &mut share);
         assert!(!cell.is_unknown());
-        // Halves without pixels have jobs too.
+        // Halves without pixels also have jobs.
         for _ in 0..2000 {
             cell.record(JobCost { seconds: 1e-9, pixels: 0.0, samples: 32.0 }, &mut share);
         }

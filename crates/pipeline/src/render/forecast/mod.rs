@@ -171,8 +171,8 @@ impl Forecast {
     }
 }
 
-/// Whether future noise can be predicted from past noise. It cannot with `error`, because fewer and fewer
-/// tiles receive samples, nor with photons, because the radius shrinks from pass to pass.
+/// Whether future noise can be predicted from past noise. This is impossible with `error`, because fewer and
+/// fewer tiles receive samples, and with photons, because the radius shrinks from pass to pass.
 fn can_predict_noise(moment: &RenderSnapshot<'_>) -> bool {
     match moment.state.film.convergence() {
         Convergence::Stratified => !(moment.plan.settings.render.error > 0.0),

@@ -7,7 +7,7 @@ use crate::film::{Film, ImageNoise};
 use crate::protocol::NoiseProgress;
 use crate::render::noise_goals::LEAST;
 
-/// Minimum time before the first measurement and between measurements. Each is a sum over all pixels.
+/// Minimum time before the first measurement and between measurements. Each measurement is a sum over all pixels.
 const INTERVAL: Duration = Duration::from_millis(500);
 /// Minimum ratio of the current noise to the next reported level.
 const STEP: f64 = 1.5;
@@ -47,7 +47,7 @@ impl NoiseForecast {
     /// the seconds until the end. Returns `None` before the first measurement.
     pub(crate) fn progress(&self, work: Work, rate: Option<f64>, left: Option<f64>) -> Option<NoiseProgress> {
         let NoiseMeasurement { noise: ImageNoise { relative_error, power }, done, seconds } = self.told?;
-        // Returns the fraction of the noise that remains with `times` as many samples.
+        // Returns the fraction of the noise that remains with `times` times as many samples.
         let fall = |times: f64| libm::pow(times, -0.5 * power);
         let by_now = if done > 0.0 { relative_error * fall(work.done / done) } else { relative_error };
         let next = rate.zip(left).and_then(|(rate, left)| next_level(by_now, work, rate, power, left));

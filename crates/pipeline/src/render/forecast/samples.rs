@@ -7,7 +7,7 @@ use crate::render::noise_goals::{AIM, Goals, Judgement, LEAST, MOST, TileNoise};
 /// Factor by which the variance is assumed to decrease from two to four samples and from four to eight. This
 /// is the median over all tiles in the bundled scenes.
 const EARLY_FALL: f64 = 4.0;
-/// Minimum and maximum of a measured decrease.
+/// Range to which measured decreases in variance are clamped.
 const FALLS: [f64; 2] = [2.0, 8.0];
 
 /// Expected number of samples for both halves of each cell.
@@ -30,9 +30,9 @@ impl ExpectedSamples {
         size_of_val(self.0.as_slice())
     }
 
-    /// Updates the predictions from the noise in both halves of each tile and its rate of decrease.
-    /// `judgement` has a sample count that is a power of two. `done` is the number of samples in each half.
-    /// Predictions for halves with a goal do not change.
+    /// Updates the predictions from the noise in both halves of each tile and the rate at which it decreases.
+    /// `judgement.samples` is a power of two. `done` is the number of samples in each half. Predictions for
+    /// halves with a goal do not change.
     pub(crate) fn predict(&mut self, judgement: &Judgement, goals: &Goals, done: &[[u32; 2]]) {
         let Judgement { noise, samples, aim } = judgement;
         // Collect the tiles without goals and the overall rate at which their noise decreases.

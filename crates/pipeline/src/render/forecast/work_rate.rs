@@ -1,4 +1,4 @@
-//! Work rate and remaining time.
+//! Estimates the work rate and the remaining time of a render.
 
 /// Time constant for averaging the rate, in seconds.
 const MEMORY_SECONDS: f64 = 3.0;

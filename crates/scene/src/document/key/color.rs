@@ -23,17 +23,17 @@ const EMISSION: &str =
     "a color, [r, g, b], a number, \"#rrggbb\" or a name, or { texture = \"name\", scale = 1.0 }";
 
 impl TableKey<'_> {
-    /// A non-negative color, converted to linear.
+    /// Reads a non-negative color and converts it to linear.
     pub(in super::super) fn color(&self) -> Option<Vec3> {
         self.exact_color(Limits::AtLeast(0.0)).map(DVec3::as_vec3)
     }
 
-    /// A color in double precision, for values that `f32` would round to 0 or 1.
+    /// Reads a color in double precision, for values that `f32` would round to 0 or 1.
     pub(in super::super) fn exact_color(&self, limits: Limits) -> Option<DVec3> {
         self.color_in_limits(limits, COLOR)
     }
 
-    /// A color or a texture.
+    /// Reads a color or a texture.
     pub(in super::super) fn color_or_texture(
         &self,
         textures: &DefinedNames,
@@ -46,7 +46,7 @@ impl TableKey<'_> {
         self.color_in_limits(limits, COLOR_OR_TEXTURE).map(|color| ColorSource::Constant(color.as_vec3()))
     }
 
-    /// The texture in `{ texture = "name" }`.
+    /// Reads the texture in `{ texture = "name" }`.
     fn texture_reference(&self, textures: &DefinedNames) -> Option<usize> {
         let table = self.inline_table()?;
         let texture = table.required("texture", "\"name\"").index_by_name(textures);
@@ -54,7 +54,7 @@ impl TableKey<'_> {
         texture
     }
 
-    /// Emitted radiance: a non-negative color, or a texture with a scale.
+    /// Reads emitted radiance: a non-negative color, or a texture with a scale.
     pub(in super::super) fn emission(&self, textures: &DefinedNames) -> Option<EmissionSource> {
         if self.is_table() {
             let table = self.inline_table()?;
@@ -115,7 +115,7 @@ impl TableKey<'_> {
         true
     }
 
-    /// The string `#rrggbb` for one or three integers up to 255, if any is too large for a linear component.
+    /// Converts one or three integers up to 255 to `#rrggbb` if any is too large for a linear component.
     fn suggested_hex(&self) -> Option<String> {
         let byte = |value: Value<'_>| match value.item() {
             TomlValue::Integer { digits, radix } => u8::try_from(parse_integer(digits, radix)?).ok(),

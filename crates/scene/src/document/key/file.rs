@@ -13,7 +13,8 @@ use crate::system::describe_error;
 use crate::system::file::{self, FileKind};
 
 impl TableKey<'_> {
-    /// An existing file with one of these extensions (any if empty), resolved against the scene's folder.
+    /// Reads the path of an existing file and resolves it against the scene's folder. The file must have one
+    /// of the extensions `endings`, unless the list is empty.
     pub(in super::super) fn file(&self, endings: &[&str]) -> Option<Located<PathBuf>> {
         let text = self.text("the path of a file")?;
         let span = self.span()?;

@@ -11,7 +11,7 @@ const NUMBER_OR_TEXTURE: &str = "a number, or { texture = \"name\" }";
 const NAME_OR_TEXTURE: &str = "the name of a texture, or { texture = \"name\" }";
 
 impl TableKey<'_> {
-    /// A number, or a texture with an optional channel.
+    /// Reads a number, or a texture with an optional channel.
     pub(in super::super) fn number_or_texture(
         &self,
         textures: &DefinedNames,
@@ -35,7 +35,7 @@ impl TableKey<'_> {
         number.map(|number| NumberSource::Constant(number as f32))
     }
 
-    /// The name of a texture, or `{ texture = "name", channel = "r" }`.
+    /// Reads the name of a texture, or `{ texture = "name", channel = "r" }`.
     pub(in super::super) fn texture_of_numbers(
         &self,
         textures: &DefinedNames,
@@ -47,7 +47,7 @@ impl TableKey<'_> {
         Some((self.find(textures, name)?, None))
     }
 
-    /// The texture and the channel in `{ texture = "name", channel = "r" }`.
+    /// Reads the texture and the channel in `{ texture = "name", channel = "r" }`.
     fn texture_with_channel(&self, textures: &DefinedNames) -> Option<(usize, Option<Channel>)> {
         let table = self.inline_table()?;
         let texture = table.required("texture", "\"name\"").index_by_name(textures);

@@ -1,4 +1,4 @@
-//! `[[box]]`.
+//! Reads `[[box]]` tables.
 
 use super::super::super::description::Shape;
 use super::super::limits::Limits;

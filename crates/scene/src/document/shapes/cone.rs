@@ -1,4 +1,4 @@
-//! `[[cone]]`.
+//! Reads `[[cone]]` tables.
 
 use super::super::super::description::Shape;
 use super::super::table::TableReader;

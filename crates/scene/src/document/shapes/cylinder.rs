@@ -1,4 +1,4 @@
-//! `[[cylinder]]`.
+//! Reads `[[cylinder]]` tables.
 
 use super::super::super::description::Shape;
 use super::super::table::TableReader;

@@ -1,4 +1,4 @@
-//! `[[disk]]`.
+//! Reads `[[disk]]` tables.
 
 use super::super::super::description::Shape;
 use super::super::limits::Limits;

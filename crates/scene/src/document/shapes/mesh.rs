@@ -1,4 +1,4 @@
-//! `[[mesh]]`.
+//! Reads `[[mesh]]` tables.
 
 use std::collections::HashMap;
 use std::path::PathBuf;
@@ -56,7 +56,7 @@ fn read_part_index(table: &TableReader<'_>, file: Option<&Located<PathBuf>>) -> 
     number
 }
 
-/// `matrix`, or `scale`, `rotate` and `translate`.
+/// Reads `matrix`, or `scale`, `rotate` and `translate`.
 fn read_placement(table: &TableReader<'_>) -> Option<Placement> {
     let (matrix, steps) =
         (table.optional("matrix"), ["scale", "rotate", "translate"].map(|name| table.optional(name)));

@@ -22,10 +22,10 @@ use super::table::TableReader;
 use crate::math::DVec3;
 use mesh::MeshFiles;
 
-/// Reads a shape's table. Only meshes use the list of files.
+/// Function that reads a shape's table. Only meshes use the list of files.
 type ShapeReader = fn(&TableReader<'_>, &mut MeshFiles) -> Option<Shape>;
 
-/// The kinds of shapes. [`read`] sorts the objects into file order.
+/// Table name and reader of each kind of shape. [`read`] sorts the objects into file order.
 const KINDS: [(&str, ShapeReader); 10] = [
     ("sphere", |table, _| sphere::read(table)),
     ("quad", |table, _| quad::read(table)),
@@ -112,7 +112,7 @@ pub(super) fn read_direction(
     Some(direction)
 }
 
-/// Reads both ends of an axis, by default (0, 0, 0) and (0, 1, 0).
+/// Reads both ends of an axis. The defaults are (0, 0, 0) and (0, 1, 0).
 fn read_axis_ends(table: &TableReader<'_>, names: [&'static str; 2], what: &str) -> Option<[DVec3; 2]> {
     let keys = names.map(|name| table.optional(name));
     let (first, second) =

@@ -1,4 +1,4 @@
-//! `[[plane]]`.
+//! Reads `[[plane]]` tables.
 
 use super::super::super::description::Shape;
 use super::super::limits::Limits;

@@ -1,4 +1,4 @@
-//! `[[quad]]`.
+//! Reads `[[quad]]` tables.
 
 use super::super::super::description::Shape;
 use super::super::NO_AREA;

@@ -1,4 +1,4 @@
-//! `[[sphere]]`.
+//! Reads `[[sphere]]` tables.
 
 use super::super::super::description::Shape;
 use super::super::limits::Limits;

@@ -1,4 +1,4 @@
-//! `[[torus]]`.
+//! Reads `[[torus]]` tables.
 
 use super::super::super::description::Shape;
 use super::super::context::Issue;

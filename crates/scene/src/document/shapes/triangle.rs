@@ -1,4 +1,4 @@
-//! `[[triangle]]`.
+//! Reads `[[triangle]]` tables.
 
 use super::super::super::description::Shape;
 use super::super::NO_AREA;
@@ -9,7 +9,7 @@ use super::super::table::TableReader;
 use super::edges_span_area;
 use crate::math::DVec3;
 
-/// Default corners.
+/// Default corners of a triangle.
 const CORNERS: [DVec3; 3] = [DVec3::ZERO, DVec3::X, DVec3::Y];
 
 pub(super) fn read(table: &TableReader<'_>) -> Option<Shape> {

@@ -23,7 +23,7 @@ pub struct SampleAllLights<'a, const MIS: bool> {
     pub row: &'a VertexBatch,
     pub used: u32,
     pub aov: LightAov,
-    /// Competing technique. Not used without MIS.
+    /// Technique that competes with light samples. Unused if `MIS` is false.
     pub competing: CompetingTechnique,
     /// Media at the vertices. `None` if all vertices are in air.
     pub interior_lists: Option<&'a InteriorLists>,

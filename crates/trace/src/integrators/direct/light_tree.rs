@@ -22,7 +22,7 @@ use crate::world::SimdKernel;
 pub struct SampleLightTree<'a, const MIS: bool> {
     pub lighting: SampleAllLights<'a, MIS>,
     pub selection: LightSampler<'a>,
-    /// Packet index, which identifies its shadow rays in the pool.
+    /// Index of the packet, which identifies the packet's shadow rays in the pool.
     pub number: u32,
     pub pool: &'a mut ShadowRayQueue,
 }
@@ -34,7 +34,7 @@ pub struct SampleLightTree<'a, const MIS: bool> {
 struct LightPicks {
     /// Indices of the lights.
     lights: [u32; PACKET_SIZE],
-    /// Reciprocals of the expected number of samples, or 0 if no light was picked.
+    /// Reciprocal of the expected number of samples of each vertex's light, or 0 if no light was picked.
     shares: F32x16,
     /// Like `shares` but ignoring glossy lobes. Used for MIS weights, because the vertex's lobe is unknown
     /// when a ray hits the light.
@@ -113,7 +113,7 @@ impl LightPicks {
     }
 }
 
-/// Weight of the second random number, whose digits are appended to those of the first.
+/// Weight of the second random number of a pair. Its digits are appended to the digits of the first number.
 const LOW_DIGITS: f64 = 1.0 / (1 << 24) as f64;
 
 impl<const MIS: bool> SampleAllLights<'_, MIS> {

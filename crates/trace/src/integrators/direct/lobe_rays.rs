@@ -61,7 +61,7 @@ impl SimdKernel for LobeRays<'_> {
             }
             let rays = RayPacket::of(row.from, wi).with_start_triangle(row.starts(&wi));
             arrived.rays.scattered += u64::from(sent.count_ones());
-            // Without soft shadows, add the light from every emitter along the rays, even if it is occluded.
+            // Without soft shadows, add the light of every emitter along the rays, even of occluded emitters.
             if tile.settings.render.shadows != Shadows::Soft {
                 // Traversal cost is counted only for the rays to the lights' centers.
                 let lit = if aov == LightAov::TraversalCost { 0 } else { sent };

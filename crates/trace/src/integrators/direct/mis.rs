@@ -15,7 +15,7 @@ use crate::world::{Hit, MAX_NULL_INTERACTIONS};
 /// The technique that competes with light samples.
 #[derive(Clone, Copy)]
 pub enum CompetingTechnique {
-    /// None.
+    /// No competing technique.
     Nothing,
     /// Paths that continue from the vertices.
     Paths,
@@ -26,7 +26,7 @@ pub enum CompetingTechnique {
 }
 
 impl CompetingTechnique {
-    /// Lobe rays at the vertices in `sharp`, or no technique if there are none.
+    /// Lobe rays at the vertices in `sharp`, or no technique if the mask is 0.
     pub fn lobes(sharp: u32) -> Self {
         if sharp == 0 { Self::Nothing } else { Self::Lobes(sharp) }
     }
@@ -106,7 +106,7 @@ fn weight_narrow_part(wide: Vec3, narrow: Vec3, weight: f32) -> Vec3 {
     Vec3::new(part(wide.x, narrow.x), part(wide.y, narrow.y), part(wide.z, narrow.z))
 }
 
-/// Power-heuristic weight of a sample. `ratio` is the other technique's pdf divided by the sample's own.
+/// Power-heuristic weight of a sample. `ratio` is the other technique's pdf divided by the sample's own pdf.
 #[inline(always)]
 pub fn power_heuristic(ratio: f32) -> f32 {
     1.0 / (1.0 + ratio * ratio)
@@ -160,9 +160,9 @@ impl TileContext<'_> {
         self.weighted_infinite_light((number, sky), ray, normal, |of_light| power_heuristic(of_light / pdf))
     }
 
-    /// Weighted radiance of one infinite light, or all of them, along a ray that leaves the scene from a
-    /// surface with this normal, given the environment's radiance and light-sampling pdf. `share` maps each
-    /// light's sampling pdf to its weight.
+    /// Weighted radiance of infinite lights along a ray that leaves the scene from a surface with this
+    /// normal. `only` restricts the result to one light. `sky` contains the environment's radiance and
+    /// light-sampling pdf. `share` maps each light's sampling pdf to its weight.
     fn weighted_infinite_light(
         &self,
         (only, sky): (Option<u32>, Option<(Vec3, f32)>),
@@ -180,8 +180,8 @@ impl TileContext<'_> {
         })
     }
 
-    /// Light-sampling pdf of the direction to a hit, in sr⁻¹ per requested sample, from a surface with this
-    /// normal, or 0 if the hit is not on a light.
+    /// Light-sampling pdf of the direction from a surface point to a hit, in sr⁻¹ per requested sample.
+    /// `normal` is the surface's normal. Returns 0 if the hit is not on a light.
     fn light_pdf(&self, ray: &Ray, normal: Vec3, (hit, of_light): (&Hit, Vec3)) -> f32 {
         let (direction, distance, primitive) = (ray.direction, hit.shape.t, hit.shape.primitive);
         let met = LightHit { direction, distance, normal: of_light, primitive };

@@ -73,7 +73,7 @@ impl DirectLightQueue {
     /// Number of packets at which the queue is processed, while the data is still in the cache.
     const FULL: usize = 64;
 
-    /// Packets with fewer vertices are merged into other packets.
+    /// Minimum number of vertices of a packet. Smaller packets are merged into other packets.
     const MIN_OWN_ROW: u32 = 8;
 
     /// Whether the queued packets should be processed now.
@@ -112,7 +112,7 @@ impl DirectLightQueue {
         accumulator.add_direct_run(first, &self.arrived);
     }
 
-    /// An unused packet, to be filled and then kept with [`DirectLightQueue::keep_spare`] or dropped.
+    /// An unused packet, to be filled and then kept with [`DirectLightQueue::keep_spare`] or discarded.
     pub fn spare_batch(&mut self) -> &mut VertexBatch {
         if self.count == self.rows.len() {
             self.rows.push(VertexBatch::EMPTY);
@@ -145,7 +145,7 @@ impl DirectLightQueue {
         }
     }
 
-    /// Adds a vertex.
+    /// Queues a vertex for direct lighting.
     #[inline(always)]
     pub fn push(
         &mut self,
@@ -192,7 +192,7 @@ impl DirectLightQueue {
     /// Removes all vertices.
     fn clear(&mut self) {
         (self.count, self.open) = (0, Default::default());
-        // A cancelled bounce may not have removed all rays.
+        // A canceled bounce may have left rays in the pool.
         self.pool.clear();
     }
 
@@ -390,7 +390,7 @@ fn shown_vertices(row: &VertexBatch, aov: LightAov) -> u32 {
     !(hidden(row.only_specular_before, direct) | hidden(!row.only_specular_before, indirect))
 }
 
-/// A packet for which to compute direct lighting, and options.
+/// Request to compute direct lighting at a packet of vertices.
 #[derive(Clone, Copy)]
 struct BatchRequest {
     /// The index of the packet.

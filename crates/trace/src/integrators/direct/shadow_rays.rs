@@ -22,7 +22,7 @@ struct QueuedShadowRays {
     values: Vec3x16,
 }
 
-/// Pending shadow rays.
+/// Queue of shadow rays from many vertex packets.
 #[derive(Default)]
 pub struct ShadowRayQueue {
     rows: Vec<QueuedShadowRays>,

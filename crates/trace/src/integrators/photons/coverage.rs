@@ -24,19 +24,19 @@ pub enum KernelCoverage {
     Crowded,
 }
 
-/// Distance above which two planes are considered different, in radii.
+/// Distance above which two planes are considered different, in kernel radii.
 const FLAT: f64 = 4e-3;
 
 /// Minimum cosine between the normals of two pieces of one plane.
 const SAME_PLANE: f64 = 1.0 - 1e-6;
 
-/// Maximum distance between a wall and the border of the piece it stands on, in radii.
+/// Maximum distance between a wall and the border of the piece it stands on, in kernel radii.
 const BORDER: f64 = 2e-3;
 
 /// Maximum cosine between the normals of a wall and the piece it stands on.
 const UPRIGHT: f64 = 0.3;
 
-/// Distance beyond which surfaces are ignored, in radii: √(1 + REACH²) plus a margin.
+/// Distance beyond which surfaces are ignored, in kernel radii: √(1 + REACH²) plus a margin.
 const FAR: f64 = 1.05;
 
 /// Minimum radius of a sphere that is treated as flat around the kernel's center, in kernel radii.
@@ -45,9 +45,13 @@ const WIDE: f64 = 2.0;
 /// Minimum coverage for the closed form. Below it, rounding errors are significant.
 const MIN_COVERAGE: f64 = 1e-3;
 
-/// Maximum numbers of mesh triangles near a kernel, of pieces of the kernel's plane, and of walls.
+/// Maximum number of mesh triangles near a kernel.
 const TRIANGLES: usize = 32;
+
+/// Maximum number of pieces of a kernel's plane.
 const PIECES: usize = 8;
+
+/// Maximum number of walls near a kernel.
 const WALLS: usize = 4;
 
 /// Computes the coverage of a kernel.
@@ -177,7 +181,7 @@ impl KernelNeighborhood {
         is_wide && is_same
     }
 
-    /// Adds the triangles of a mesh.
+    /// Adds the triangles of a mesh and returns whether the coverage still has a closed form.
     fn add_mesh(
         &mut self,
         (world, id): (&World, u32),

@@ -1,10 +1,10 @@
 //! Photon tracing: photons are traced from the lights bounce by bounce, sixteen at a time. They travel via
-//! mirrors and glass to the first other surface, and are scattered from there to the next surface. Photons
-//! interact with surfaces, media and lobes in the same way as camera paths.
+//! mirrors and glass to the first non-specular surface, and are scattered from there to the next surface.
+//! Photons interact with surfaces, media and lobes in the same way as camera paths.
 //!
-//! Photons carry basic flux, Φ/n². At a surface whose shading normal Nₛ differs from its geometric normal N₉,
-//! scattering uses the adjoint of its BSDF: f·|wi·Nₛ|·|wo·N₉|/|wi·N₉| (Veach, *Robust Monte Carlo Methods for Light
-//! Transport Simulation*, 1997, section 5.3).
+//! Photons carry basic flux, Φ/n². At a surface whose shading normal Ns differs from its geometric normal Ng,
+//! scattering uses the adjoint of its BSDF: f·|wi·Ns|·|wo·Ng|/|wi·Ng| (Veach, *Robust Monte Carlo Methods for
+//! Light Transport Simulation*, 1997, section 5.3).
 
 use super::map::Photon;
 use crate::control::Cancelled;
@@ -61,7 +61,7 @@ pub struct PhotonTracing<'a> {
 pub struct PhotonChunk {
     /// Caustic photons, scattered only by mirrors and glass, in emission order within each bounce.
     pub caustic: Vec<Photon>,
-    /// Bounced photons, scattered at a caustic, in the same order.
+    /// Bounced photons, scattered once at a caustic, in the same order.
     pub bounced: Vec<Photon>,
     /// Number of texture lookups.
     pub lookups: u64,
@@ -71,7 +71,7 @@ impl PhotonTracing<'_> {
     /// Traces the photons.
     ///
     /// # Errors
-    /// [`Cancelled`].
+    /// [`Cancelled`] if the token is canceled.
     pub fn trace_photons(&self) -> Result<PhotonChunk, Cancelled> {
         let count = self.tile.block.len() as u32;
         let mut wavefront = PhotonWavefront {
@@ -425,15 +425,15 @@ impl PhotonWavefront<'_> {
         }
     }
 
-    /// Queues a photon after a specular bounce. If there is a shading normal, the photon is weighted by the
-    /// adjoint BSDF (see the module documentation). `eta` is the index of refraction on the far side relative
-    /// to the near side.
+    /// Queues a photon after a specular bounce. If the shading normal differs from the geometric normal, the
+    /// photon is weighted by the adjoint BSDF (see the module documentation). `eta` is the index of
+    /// refraction on the far side relative to the near side.
     fn push(&mut self, path: &PathRay, vertex: &Vertex<'_>, (shading, eta): (Vec3, f32), mut ray: PathRay) {
         let facet = vertex.normal;
         if shading != facet {
             let (wi, wo) = (vertex.wo, ray.ray.direction);
             let along = |direction: Vec3| direction - shading * direction.dot(shading);
-            // Otherwise, the geometric normal was used instead of the shading normal.
+            // Skip this if the geometric normal was used instead of the shading normal.
             if (along(wi) + along(wo) * eta).length_squared() < SAME {
                 let (over, under) = (wi.dot(shading) * wo.dot(facet), wi.dot(facet) * wo.dot(shading));
                 ray.throughput *= if under == 0.0 { 0.0 } else { (over / under).abs() };

@@ -56,8 +56,8 @@ fn angle(from: DVec2, to: DVec2) -> f64 {
     f64::from(atan2(from.perp_dot(to) as f32, from.dot(to) as f32))
 }
 
-/// Maps a uniform point on the unit disk to a point distributed according to the kernel. Within radius ρ lie
-/// 2ρ² − ρ⁴ of the kernel's weight and ρ² of the disk's area.
+/// Maps a uniform point on the unit disk to a point distributed according to the kernel. The disk of radius ρ
+/// contains 2ρ² − ρ⁴ of the kernel's weight and ρ² of the unit disk's area.
 pub fn sample(on_disk: Vec2) -> Vec2 {
     let squared = on_disk.length_squared().min(1.0);
     // ρ² = 1 − √(1 − u), where u is the squared radius on the disk, rewritten to avoid cancellation: ρ²/u =

@@ -12,9 +12,9 @@ use crate::math::lanes::{F32x16, Mask, PACKET_SIZE, Simd, TRUE, Vec3x16, lane, s
 /// A photon stored on a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Photon {
-    /// Position.
+    /// Position on the surface.
     pub point: Vec3,
-    /// Unit direction toward its origin.
+    /// Unit direction toward the photon's origin.
     pub direction: Vec3,
     /// Basic flux in W, Φ/n².
     pub flux: Vec3,
@@ -134,7 +134,7 @@ impl PhotonMap {
     /// Builds a map for kernels of this radius. Photons in one cell keep their order.
     ///
     /// # Errors
-    /// [`Cancelled`].
+    /// [`Cancelled`] if the token is canceled.
     pub fn new(photons: &[Photon], radius: f32, token: &CancelToken) -> Result<Self, Cancelled> {
         // Count the photons in each bucket.
         let cells = 1.0 / (CELL * radius);
@@ -456,7 +456,7 @@ mod tests {
                 };
                 let photons: Vec<Photon> =
                     (0..count).map(|_| place(&mut next)).map(|(p, n)| photon(p, n)).collect();
-                let map = PhotonMap::new(&photons, radius, &CancelToken::new()).expect("nobody cancels");
+                let map = PhotonMap::new(&photons, radius, &CancelToken::new()).expect("never canceled");
                 assert_eq!(map.len(), count);
                 let mut seen = 0;
                 for look in 0..60 {
@@ -488,12 +488,12 @@ mod tests {
                     let mut points: Vec<_> = found.iter().map(|(point, _)| *point).collect();
                     points.sort_by(|a, b| a.partial_cmp(b).expect("numbers"));
                     expected.sort_by(|a, b| a.partial_cmp(b).expect("numbers"));
-                    assert!(points.len().abs_diff(expected.len()) <= 1, "except for rounding at the edge");
+                    assert!(points.len().abs_diff(expected.len()) <= 1, "counts may differ by 1 at the edge");
                     seen += expected.len();
                     let peak = 2.0 / (std::f32::consts::PI * radius * radius);
                     assert!(found.iter().all(|(_, density)| *density >= 0.0 && *density <= peak));
                     points.dedup();
-                    assert_eq!(points.len(), found.len(), "each once");
+                    assert_eq!(points.len(), found.len(), "each photon should be visited once");
                     assert!(points.iter().filter(|point| !expected.contains(point)).count() <= 1);
                 }
                 assert!(seen >= count.min(60) / 8, "found {seen} of {count} photons within {radius}");
@@ -508,7 +508,7 @@ mod tests {
         let at = |i: i32| (i as f32 + 0.3) * step;
         let place = |i: i32| photon(Vec3::new(at(i % 200 - 100), 0.5, at(i / 200 - 100)), Vec3::Y);
         let photons: Vec<Photon> = (0..40_000).map(place).collect();
-        let map = PhotonMap::new(&photons, 0.4, &CancelToken::new()).expect("nobody cancels");
+        let map = PhotonMap::new(&photons, 0.4, &CancelToken::new()).expect("never canceled");
         let sum = |most_depth: u32, normal: Vec3| {
             let mut sum = 0.0;
             let look = GatherPoint { point: Vec3::new(0.1, 0.5, -0.2), normal, most_depth };

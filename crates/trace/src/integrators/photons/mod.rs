@@ -101,7 +101,7 @@ pub struct PhotonPass {
     pub bounced: PhotonMap,
     /// Number of emitted photons.
     pub emitted: u64,
-    /// Texture look-ups.
+    /// Number of texture lookups.
     pub lookups: u64,
 }
 
@@ -120,7 +120,7 @@ impl PhotonPass {
 /// Photon passes for a range of samples.
 #[derive(Clone, Debug)]
 pub struct PhotonMaps {
-    /// The first sample.
+    /// Index of the first sample.
     pub first: u32,
     /// One pass per sample.
     pub passes: Vec<Arc<PhotonPass>>,
@@ -138,7 +138,7 @@ impl Photons {
     /// receives the number of photons traced so far and in total.
     ///
     /// # Errors
-    /// [`Cancelled`].
+    /// [`Cancelled`] if the token is canceled.
     pub fn new(
         world: &World,
         settings: &RenderSettings,
@@ -188,7 +188,7 @@ impl Photons {
     /// Traces a pass. The result depends on the pass number but not on the number of threads.
     ///
     /// # Errors
-    /// [`Cancelled`].
+    /// [`Cancelled`] if the token is canceled.
     pub fn pass(
         &self,
         world: &World,
@@ -215,10 +215,10 @@ impl Photons {
         Ok(PhotonPass { caustic: caustic?, bounced: bounced?, emitted: self.count(), lookups: sent.lookups })
     }
 
-    /// Photon passes for a range of samples.
+    /// Traces the photon passes for a range of samples.
     ///
     /// # Errors
-    /// [`Cancelled`].
+    /// [`Cancelled`] if the token is canceled.
     pub fn maps(
         &self,
         world: &World,
@@ -409,8 +409,8 @@ impl SpecularObjects {
         let mut own = Self { balls: Vec::new(), is_unbounded: false };
         let glasses = GlassObjects::of(world);
         for (id, object) in (0..).zip(world.geometry.objects()) {
-            // Between equal indices of refraction, light passes through rough glass unchanged, but light
-            // samples cannot.
+            // Between equal indices of refraction, light passes through rough glass unchanged, but shadow
+            // rays are blocked.
             let is_specular = |material: &Material| {
                 let is_passed = |glass: &Dielectric| glasses.may_have_no_effect(id, glass.ior);
                 material.bsdf.has_delta() || material.bsdf.glass().is_some_and(is_passed)
@@ -460,7 +460,7 @@ mod tests {
             all.map(place).collect()
         };
         let radius = |side, size| {
-            radius_for_count(&photons(side), 12.0, size, &CancelToken::new()).expect("nobody cancels")
+            radius_for_count(&photons(side), 12.0, size, &CancelToken::new()).expect("never canceled")
         };
         assert_eq!(radius(10, 1.0), 0.05);
         assert!((radius(10, 100.0) / 0.195 - 1.0).abs() < 0.2, "{}", radius(10, 100.0));

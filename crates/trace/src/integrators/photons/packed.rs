@@ -1,5 +1,5 @@
-//! Octahedral encoding of directions in 32 bits, 16 bits per axis (Meyer, Süßmuth, Sußner, Stamminger, Greiner, *On
-//! Floating-Point Normal Vectors*, 2010).
+//! Octahedral encoding of directions in 32 bits, 16 bits per axis (Meyer, Süßmuth, Sußner, Stamminger,
+//! Greiner, *On Floating-Point Normal Vectors*, 2010).
 
 use crate::math::Vec3;
 use crate::math::lanes::{PACKET_SIZE, Vec3x16};
@@ -7,7 +7,7 @@ use crate::math::lanes::{PACKET_SIZE, Vec3x16};
 /// Sixteen encoded directions.
 pub type Packed = [u32; PACKET_SIZE];
 
-/// Half the side length of the square.
+/// Half the side length of the square onto which directions are mapped.
 const SIDE: f32 = 32767.0;
 
 /// Encodes a direction. The result may differ from the nearest code in the last bit.

@@ -10,7 +10,7 @@ const BELOW_ONE: f32 = 1.0 - f32::EPSILON / 2.0;
 /// Position and normal of a photon.
 #[derive(Clone, Copy, Debug)]
 pub struct PhotonPosition {
-    /// The point.
+    /// Position of the photon.
     pub point: Vec3,
     /// Unit geometric normal on the side of the surface that the photon hit.
     pub normal: Vec3,

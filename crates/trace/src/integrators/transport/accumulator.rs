@@ -18,7 +18,7 @@ pub enum LocalTerm {
 pub struct Accumulator<'a> {
     /// The AOV to accumulate.
     pub aov: LightAov,
-    /// Sums by slot.
+    /// Radiance sums, indexed by slot.
     pub radiance: &'a mut [Vec3],
     /// Upper bound on contributions from vertices that the camera does not see, or 0 for no bound.
     pub clamp: f32,

@@ -34,9 +34,9 @@ pub struct VertexBatch {
     /// Surface points, and geometric normals on the viewer's side, in lanes whose bits are set. In other
     /// lanes, `from` and `normal` are used instead.
     pub point: Vec3x16,
-    /// [`VertexBatch::point`].
+    /// Geometric normals on the viewer's side; see [`VertexBatch::point`].
     pub facet: Vec3x16,
-    /// [`VertexBatch::point`].
+    /// Mask of lanes with valid `point` and `facet`.
     pub has_facet: u32,
     /// Mask of vertices that the camera sees, directly or through mirrors and glass.
     pub only_specular_before: u32,
@@ -60,7 +60,7 @@ pub struct VertexBatch {
     pub place: [u32; PACKET_SIZE],
     /// [`PathState::roulette_throughput`](super::ray::PathState::roulette_throughput) of the paths.
     pub roulette_throughput: F32x16,
-    /// Indices of the glass around the vertices.
+    /// Indices of the vertices' interior lists.
     pub interiors: [u32; PACKET_SIZE],
     /// Whether any vertex has a perturbed normal.
     pub is_perturbed: bool,
@@ -70,11 +70,11 @@ pub struct VertexBatch {
     pub has_two_sides: bool,
     /// Ray origins on the other side and indices of the glass around them, if `has_two_sides`.
     pub beyond: Vec3x16,
-    /// [`VertexBatch::beyond`].
+    /// Indices of the interior lists at `beyond`.
     pub interiors_beyond: [u32; PACKET_SIZE],
 }
 
-/// Used instead of the cosine for vertices with two equal normals.
+/// Placeholder for the cosine if the shading normal is not perturbed.
 pub const UNPERTURBED: f32 = -2.0;
 
 impl VertexBatch {
@@ -171,7 +171,7 @@ impl VertexBatch {
         }
     }
 
-    /// Copies a vertex from another packet with the same kind of BSDFs. Neither packet may have two sides.
+    /// Copies a vertex from another packet with the same kind of BSDFs. Neither packet may be two-sided.
     pub fn copy(&mut self, i: usize, other: &Self, from: usize) {
         for (own, other) in [
             (&mut self.from, &other.from),

@@ -122,7 +122,7 @@ impl TileContext<'_> {
     }
 }
 
-/// [`TileContext::camera_packet`].
+/// Kernel that generates several packets of camera rays.
 struct GenerateCameraRays<'a> {
     tile: &'a TileContext<'a>,
     first: u32,

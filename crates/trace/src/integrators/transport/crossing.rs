@@ -60,10 +60,10 @@ impl TileContext<'_> {
 
     /// Media before and beyond the coincident surfaces. The near medium is the medium recorded for the ray.
     /// For closed shapes, the far medium is determined by their geometry. A ray that leaves a solid must have
-    /// been inside it, even if the record differs. Open solids are only considered if they are entered or
+    /// been inside it, even if the record differs. Open solids are considered only if they are entered or
     /// left here, because the ray's path around other open solids is unknown. A ray and its reverse therefore
-    /// see the same media. In the returned pair, the first medium is the one that absorbed light on the way
-    /// here. The pair is `None` if both media match the record.
+    /// see the same media. The returned pair contains the medium that the ray traversed and the medium on the
+    /// near side. It is `None` if both match the record.
     fn crossing_interiors(
         &self,
         known: &InteriorList,

@@ -9,7 +9,7 @@ use crate::materials::mirror::reflect;
 use crate::math::Vec3;
 use crate::world::World;
 
-/// Branch numbers, which distinguish a path's continuations.
+/// Branch numbers of specular reflection and refraction. They distinguish a path's continuations.
 const REFLECTED: u32 = 1;
 const REFRACTED: u32 = 2;
 /// Branch number for scattering by a non-specular lobe.
@@ -47,7 +47,7 @@ pub fn sheet_transmission(world: &World, near: &InteriorList, far: &InteriorList
 
 /// Fresnel reflectance at a glass boundary, and the refracted path.
 pub struct FresnelSplit {
-    /// Reflectance.
+    /// Fresnel reflectance.
     pub reflectance: f32,
     /// The refracted path, not weighted by the transmittance. `None` for total internal reflection.
     pub refracted: Option<PathRay>,

@@ -78,8 +78,7 @@ pub struct PacketHits {
     found: u32,
     /// Number of texture lookups for plain surfaces.
     pub lookups: u64,
-    /// [`Environment::radiance_and_pdf_row`](crate::lights::infinite::Environment::radiance_and_pdf_row), if any ray leaves
-    /// the scene.
+    /// Radiance and light-sampling pdf of the environment along each ray, if any ray leaves the scene.
     sky: (Vec3x16, F32x16),
 }
 
@@ -112,7 +111,7 @@ impl PacketHits {
         })
     }
 
-    /// Path of a lane.
+    /// Returns the path of a lane.
     #[inline(always)]
     pub fn path(&self, tile: &TileContext<'_>, rays: &PacketSource<'_>, lane: usize) -> PathRay {
         match rays {
@@ -149,8 +148,8 @@ impl TileContext<'_> {
         })
     }
 
-    /// Whether surface packets contain everything needed for shading a non-plain material. They have no
-    /// texture coordinates or tangents.
+    /// Whether surface packets contain everything needed for shading a non-plain material. Surface packets
+    /// have no texture coordinates or tangents.
     #[inline(always)]
     fn fits_surface_row(&self, material: usize) -> bool {
         // Ray cones need tangents and curvatures.
@@ -408,7 +407,7 @@ impl TileContext<'_> {
     }
 }
 
-/// Selects the vertices of smooth meshes to lift above their facets.
+/// Choice of the vertices of smooth meshes to lift above their facets.
 #[derive(Clone, Copy)]
 enum LiftMode {
     /// All vertices.

@@ -15,11 +15,11 @@ use crate::world::{PACKET_SIZE, World};
 
 /// Context of a tile: the world, the settings, and the samples to render.
 pub struct TileContext<'a> {
-    /// The scene.
+    /// The world to render.
     pub world: &'a World,
-    /// The settings.
+    /// The render settings.
     pub settings: &'a RenderSettings,
-    /// The samples.
+    /// The samples to render.
     pub block: &'a SampleBlock,
     /// Token that cancels the work.
     pub token: &'a CancelToken,
@@ -69,7 +69,7 @@ impl<'a> TileContext<'a> {
 
 /// The samples of a tile. A slot is the index of a sample. Samples are ordered by pixel.
 pub struct SampleBlock {
-    /// The pixels.
+    /// The pixels of the tile.
     pub pixels: Pixels,
     /// Range of sample indices of each pixel.
     pub samples: Range<u32>,

@@ -18,7 +18,7 @@ use crate::world::{Hit, OffsetPoints};
 pub struct Vertex<'a> {
     /// The surface.
     pub surface: SurfacePoint,
-    /// Its material.
+    /// Material of the surface.
     pub material: &'a Material,
     /// [`Ray::start`] of rays that leave the vertex.
     start: u32,
@@ -237,7 +237,7 @@ impl<'a> Vertex<'a> {
         self.sides.map(|sides| sides.beyond)
     }
 
-    /// Spawns a ray in a direction.
+    /// Spawns a ray from the vertex in a direction.
     pub fn spawn_ray(&self, direction: Vec3) -> Ray {
         let SurfacePoint { point, error, normal, .. } = self.surface;
         match self.sides {
@@ -304,7 +304,7 @@ pub struct ShadowOrigin {
 /// A segment from a facet to a point above it.
 #[derive(Clone, Copy, Debug)]
 pub struct Lift {
-    /// The point.
+    /// The lifted point.
     pub to: Vec3,
     /// The segment's `t_max`: 1 at the point, plus a margin for the error.
     pub end: f32,
@@ -339,10 +339,10 @@ pub struct ShadingVertex<'a> {
     pub interiors: &'a InteriorList,
     /// Index of the path in the bounce's queue.
     pub place: u32,
-    /// The vertex.
+    /// The vertex to shade.
     pub vertex: &'a Vertex<'a>,
     /// Shading normals of the vertex.
     pub shading: Shading,
-    /// Its BSDF.
+    /// BSDF of the vertex.
     pub bsdf: &'a RoughBsdf,
 }

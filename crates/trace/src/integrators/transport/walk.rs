@@ -37,7 +37,7 @@ pub enum Interaction<'v, 'a> {
 pub struct Interface<'v> {
     /// The medium on the far side.
     pub far: &'v InteriorList,
-    /// The rough surface of the boundary. `None` if it is smooth.
+    /// Parameters of a rough boundary. `None` if the boundary is smooth.
     pub rough: Option<GlassPoint>,
 }
 
@@ -233,7 +233,7 @@ pub fn walk<'a, W: PathStepper<'a>>(
     stepper.interact(path, Interaction::Hidden, true);
 }
 
-/// Rough surface between two media with different indices of refraction. `None` if it is smooth.
+/// Rough surface between two media with different indices of refraction. `None` if the surface is smooth.
 #[cold]
 #[inline(never)]
 fn rough_boundary<'a, W: PathStepper<'a>>(

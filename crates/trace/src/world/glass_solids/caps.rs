@@ -43,14 +43,14 @@ pub(super) fn covered_rim_fractions(
     if queries.is_empty() {
         return Ok(vec![0.0; holes.len()]);
     }
-    let evaluate = evaluate(scene, meshes, parts.origin, &queries, token)?;
-    let mut evaluate = evaluate.chunks(QUERIES);
+    let answers = evaluate(scene, meshes, parts.origin, &queries, token)?;
+    let mut answers = answers.chunks(QUERIES);
     let part = |rims: Vec<&RimEdge>| {
         let (mut covered, mut total) = (0.0, 0.0);
-        for (rim, evaluate) in rims.into_iter().zip(&mut evaluate) {
+        for (rim, answers) in rims.into_iter().zip(&mut answers) {
             let length = rim.ends[0].distance(rim.ends[1]);
             total += length;
-            covered += if evaluate[0] || evaluate[1] || evaluate[2] && evaluate[3] { length } else { 0.0 };
+            covered += if answers[0] || answers[1] || answers[2] && answers[3] { length } else { 0.0 };
         }
         covered / total
     };
@@ -99,7 +99,7 @@ impl OpaqueQuery {
         }
     }
 
-    /// Whether a shape satisfies the query. Of three orthogonal segments, at least one is at an angle of at
+    /// Whether a shape satisfies the query. At least one of three orthogonal segments is at an angle of at
     /// least 35° to the surface, so it hits a surface at distance d within √3·d.
     fn meets_shape(&self, shape: &Shape) -> bool {
         match *self {
@@ -125,7 +125,7 @@ fn evaluate(
     let all = bounds.iter().fold(Aabb::EMPTY, |all, own| all.union(*own));
     // Use a tree over the queries because there are many queries and many surfaces.
     let tree = Bvh::build(&bounds, token)?;
-    let mut evaluate = vec![false; queries.len()];
+    let mut answers = vec![false; queries.len()];
     for object in &scene.objects {
         if glass_of(scene, meshes, object) == Some(MeshGlass::All) {
             continue;
@@ -136,7 +136,7 @@ fn evaluate(
                 let around = shape.bounds().unwrap_or(all);
                 tree.visit_overlapping(&around, |id| {
                     let id = id as usize;
-                    evaluate[id] = evaluate[id] || queries[id].meets_shape(&shape);
+                    answers[id] = answers[id] || queries[id].meets_shape(&shape);
                 });
             }
             LoweredShape::Mesh(placed) => {
@@ -145,14 +145,14 @@ fn evaluate(
                     if around.meets(&all) {
                         tree.visit_overlapping(&around, |id| {
                             let id = id as usize;
-                            evaluate[id] = evaluate[id] || queries[id].meets_triangle(corners);
+                            answers[id] = answers[id] || queries[id].meets_triangle(corners);
                         });
                     }
                 }
             }
         }
     }
-    Ok(evaluate)
+    Ok(answers)
 }
 
 /// Returns the triangles of a placed mesh, in coordinates relative to `origin`.

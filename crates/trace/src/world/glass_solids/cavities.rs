@@ -10,7 +10,7 @@ use crate::scene::description::Scene;
 /// A closed solid made of meshes.
 #[derive(Clone, Debug)]
 pub(super) struct ClosedSolid {
-    /// Its objects.
+    /// Indices of the solid's objects.
     pub objects: Vec<u32>,
     /// Enclosed volume. Negative if the front faces inward.
     pub volume: f64,

@@ -13,7 +13,7 @@
 //!
 //! A solid with a hole is open, unless the hole is surrounded by opaque surfaces. It is unknown whether a ray
 //! is inside open glass. The surface of open glass therefore only affects the medium of rays that hit the
-//! surface or leave it (`integrators::crossing`).
+//! surface or leave it (`integrators::transport::crossing`).
 
 mod caps;
 mod cavities;
@@ -66,11 +66,11 @@ struct ObjectRole {
 /// A glass object with a hole in its surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OpenGlass {
-    /// The object.
+    /// Index of the object.
     pub object: u32,
     /// Number of the object's edges that are not closed by another surface.
     pub edges: usize,
-    /// Missing fraction of the solid's surface. Can exceed 1 for surfaces that are mostly hole.
+    /// Missing fraction of the solid's surface. Exceeds 1 if the hole is larger than the surface.
     pub missing: f64,
     /// Whether the object's open edges coincide with edges of surfaces with the opposite orientation.
     pub disagrees: bool,
@@ -82,7 +82,7 @@ impl GlassSolids {
     /// Finds the glass solids of a scene.
     ///
     /// # Errors
-    /// [`Cancelled`].
+    /// [`Cancelled`] if the token is canceled.
     pub fn find(scene: &Scene, meshes: &[&LoadedMesh], token: &CancelToken) -> Result<Self, Cancelled> {
         let parts = GlassParts::of(scene, meshes, token)?;
         if parts.list.is_empty() {
@@ -197,7 +197,7 @@ fn are_holes_covered(
 struct PartGroups {
     /// First part of each part's solid.
     roots: Vec<u32>,
-    /// Whether each part's orientation differs from that of the first part of its solid.
+    /// Whether each part is oriented opposite to the first part of its solid.
     flips: Vec<bool>,
 }
 

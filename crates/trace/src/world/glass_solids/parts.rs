@@ -16,7 +16,7 @@ const CHORDS: usize = 32;
 /// Relative rounding of coordinates in a file, corresponding to single precision or six decimal digits.
 pub(super) const ROUNDING: f64 = 16.0 * f32::EPSILON as f64;
 
-/// A glass object that does not enclose a volume by itself.
+/// A glass object that does not enclose a volume on its own.
 #[derive(Clone, Debug)]
 pub(super) struct GlassPart {
     /// Object id.
@@ -199,7 +199,7 @@ impl GlassParts {
     }
 }
 
-/// Returns a point on a shape.
+/// Returns a point on or inside a shape.
 fn reference_point(shape: &Shape, meshes: &[&LoadedMesh]) -> DVec3 {
     let of_mesh = |placed: &Mesh| {
         let mesh = &meshes[placed.file].mesh;

@@ -49,7 +49,7 @@ impl HalfEdge {
 }
 
 impl SharedEdge {
-    /// The two parts.
+    /// Indices of the two parts.
     pub fn parts(&self) -> [u32; 2] {
         self.rims.map(|(rim, _)| rim.part)
     }
@@ -106,7 +106,7 @@ impl SharedEdges {
 }
 
 /// Returns pairs of edges with glass between them. In the order of angles around the common edge, a surface
-/// whose back faces forward is paired with the next surface if its back faces backward.
+/// whose back faces forward is paired with the next surface if that surface's back faces backward.
 fn pairs_with_glass_between(same: &[HalfEdge]) -> impl Iterator<Item = [usize; 2]> {
     let ends =
         |half: &HalfEdge| if half.is_back { [half.rim.ends[1], half.rim.ends[0]] } else { half.rim.ends };
@@ -190,7 +190,7 @@ impl EdgeEndpoints {
         self.ends[rim]
     }
 
-    /// Splits edges at other edges' endpoints that are on them.
+    /// Splits edges at the endpoints of other edges.
     fn split_at_endpoints(
         &self,
         parts: &[GlassPart],

@@ -52,16 +52,16 @@ fn bytes(samples: &[u8], alpha: usize, curve: ColorCurve) -> TexelData {
     }
 }
 
-/// How samples are converted to alpha-weighted colors.
+/// Settings for converting samples to alpha-weighted colors.
 struct CutoutOptions {
-    /// Index of the alpha sample.
+    /// Index of the alpha sample in a pixel.
     alpha: usize,
     curve: ColorCurve,
     space: ColorSpace,
     is_premultiplied: bool,
 }
 
-/// How straight-alpha colors are linearized.
+/// Linearization of straight-alpha colors.
 enum Linearization {
     /// Colors are already linear.
     Linear,

@@ -40,7 +40,7 @@ use with_samples;
 
 /// Sample type of an image.
 trait Sample: Copy + PartialEq {
-    /// The sample as a float. The largest integer becomes 1.
+    /// Converts the sample to a float. The largest integer becomes 1.
     fn to_unit_float(self) -> f32;
 
     /// Linear values of all integers in this color space. `None` for floats, which are linear.
@@ -48,7 +48,7 @@ trait Sample: Copy + PartialEq {
         None
     }
 
-    /// Index of an integer in a table.
+    /// Table index of an integer sample.
     fn index(self) -> usize {
         0
     }
@@ -107,7 +107,7 @@ fn alpha(image: &DynamicImage, metadata: &ImageMetadata) -> Option<usize> {
     }
 }
 
-/// Whether a sample has this value in all pixels.
+/// Whether channel `index` has the same `value` in all pixels.
 fn is_channel_constant(image: &DynamicImage, index: usize, value: f32) -> bool {
     fn all<T: Sample>(samples: &[T], (channels, index): (usize, usize), value: f32) -> bool {
         samples.chunks_exact(channels).all(|pixel| pixel[index].to_unit_float() == value)

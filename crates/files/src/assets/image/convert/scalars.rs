@@ -9,7 +9,7 @@ use crate::materials::{Channel, PixelValue};
 use crate::math::Vec3;
 use crate::math::color::{luminance, srgb_to_linear};
 
-/// Samples used to compute the scalar.
+/// Samples of a pixel that are used to compute its scalar.
 #[derive(Clone, Copy)]
 enum ScalarSamples {
     /// Index of a sample, and whether it is sRGB.
@@ -20,7 +20,7 @@ enum ScalarSamples {
     One,
 }
 
-/// Selects the samples for a scalar.
+/// Selects the samples from which the scalar is computed.
 fn select_samples(
     image: &DynamicImage,
     (of, is_srgb): (PixelValue, bool),
@@ -94,7 +94,7 @@ pub(super) fn scalar_texels(
     Texels { width, height, data, unusable }
 }
 
-/// Number of pixels with an unusable value among the samples that are used.
+/// Counts the pixels in which a used sample is negative, too large or not finite.
 fn unusable_pixels<T: Sample>(pixels: &[T], channels: usize, samples: ScalarSamples) -> u64 {
     let used = match samples {
         ScalarSamples::Sample(place, _) => place..place + 1,
@@ -107,14 +107,14 @@ fn unusable_pixels<T: Sample>(pixels: &[T], channels: usize, samples: ScalarSamp
     pixels.chunks_exact(channels).filter(is_broken).count() as u64
 }
 
-/// Converts 8-bit samples to texels, given the number of samples per pixel and the index of the sample to
-/// use.
+/// Converts 8-bit samples to texels. `channels` is the number of samples per pixel, and `index` selects the
+/// sample to use.
 fn scalar_texels_from_bytes(samples: &[u8], (channels, index): (usize, usize), is_srgb: bool) -> TexelData {
     let texels = samples.chunks_exact(channels).map(|pixel| [pixel[index]; 3]).collect();
     if is_srgb { TexelData::Srgb8(texels) } else { TexelData::Linear8(texels) }
 }
 
-/// Converts samples of all other types to texels.
+/// Converts samples of any type to texels.
 fn scalar_texels_from_samples<T: Sample>(
     all: &[T],
     channels: usize,

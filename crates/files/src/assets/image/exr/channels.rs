@@ -46,7 +46,7 @@ impl ChosenChannels {
         }
     }
 
-    /// All channels to decode.
+    /// All channels to decode, including chroma.
     pub(super) fn all(self) -> impl Iterator<Item = ChannelIndex> {
         self.component_channels()
             .into_iter()
@@ -62,7 +62,7 @@ struct LayerChannels {
     luminance: Option<ChannelIndex>,
     chroma: [Option<ChannelIndex>; 2],
     alpha: Option<ChannelIndex>,
-    /// Whether the layer has a channel X, in which case Y is a coordinate.
+    /// Whether the layer has an X channel, which means that Y is a coordinate rather than luminance.
     has_x: bool,
 }
 
@@ -103,9 +103,9 @@ impl LayerChannels {
 
 type LayerMap = BTreeMap<String, LayerChannels>;
 
-/// Selects the channels. Unnamed layers are preferred to named ones. Within each of these groups, RGB is
-/// preferred to gray, then layers in a single part to layers across parts, then earlier layers to later
-/// layers. The fallback is a part's only channel, whatever its name.
+/// Selects the channels to decode. Prefers unnamed layers to named ones, then RGB to gray, then layers in a
+/// single part to layers across parts, then earlier layers to later ones. Falls back to a part's only channel,
+/// whatever its name.
 pub(super) fn choose_channels(headers: &[Header]) -> Option<ChosenChannels> {
     let mut parts: Vec<LayerMap> =
         headers.iter().enumerate().map(|(part, header)| layers_by_name(part, header)).collect();
@@ -128,7 +128,7 @@ pub(super) fn choose_channels(headers: &[Header]) -> Option<ChosenChannels> {
     unnamed.or_else(named).or_else(|| sole_channel(headers))
 }
 
-/// Layers of a part by name. The layer name is the channel name up to its last dot.
+/// Layers of a part, keyed by name. The layer name is the channel name up to its last dot.
 fn layers_by_name(part: usize, header: &Header) -> LayerMap {
     let mut layers = LayerMap::new();
     if !header.deep {
@@ -160,7 +160,8 @@ fn single_channel_parts(headers: &[Header]) -> impl Iterator<Item = (usize, &Hea
     headers.filter(|(_, header)| !header.deep && header.channels.list.len() == 1)
 }
 
-/// Channel of the first single-channel part. `None` if such parts are components of a color or vector.
+/// Channel of the first single-channel part. `None` if single-channel parts contain the components of a color
+/// or vector.
 fn sole_channel(headers: &[Header]) -> Option<ChosenChannels> {
     const COMPONENTS: [&str; 7] = ["R", "G", "B", "RY", "BY", "X", "Y"];
     let is_component = |header: &Header| {
@@ -173,7 +174,7 @@ fn sole_channel(headers: &[Header]) -> Option<ChosenChannels> {
     Some(ChosenChannels { color: ColorChannels::Gray(ChannelIndex { part, channel: 0 }), alpha: None })
 }
 
-/// Error message if no channels can be selected.
+/// Error message for a file without usable channels.
 pub(super) fn no_color(headers: &[Header]) -> String {
     const MAX_NAMES: usize = 8;
     if headers.iter().all(|header| header.deep) {

@@ -1,5 +1,5 @@
-//! Converts luminance and chroma to red, green and blue in the same way as OpenEXR's `RgbaInputFile` (Kainz
-//! and Bogart, *Technical Introduction to OpenEXR*, "Luminance/Chroma Images").
+//! Converts luminance and chroma to RGB, as OpenEXR's `RgbaInputFile` does (Kainz and Bogart, *Technical
+//! Introduction to OpenEXR*, "Luminance/Chroma Images").
 
 use ::exr::meta::header::Header;
 use ::exr::prelude::Vec2;
@@ -39,7 +39,7 @@ impl LuminanceChroma {
         samples.saturating_mul(SAMPLE_BYTES as u64)
     }
 
-    /// Adds a row of samples if it belongs to one of the planes.
+    /// Stores a row of samples if the channel is one of the planes.
     pub(super) fn add(&mut self, channel: ChannelIndex, row: usize, line: ChannelRow<'_>) {
         let widths = [self.size, self.size / self.step, self.size / self.step].map(|size| size.width());
         let [ry, by] = &mut self.chroma;

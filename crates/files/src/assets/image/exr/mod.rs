@@ -1,4 +1,5 @@
-//! EXR decoder based on `exr`. `image` only supports channels R, G and B without a layer name.
+//! EXR decoder based on the `exr` crate. The `image` crate supports only R, G and B channels without a layer
+//! name.
 
 pub(super) mod channels;
 mod chroma;
@@ -23,11 +24,11 @@ use channels::{ChannelIndex, ChosenChannels, choose_channels, no_color};
 use chroma::LuminanceChroma;
 use sampling::{BlockDecompressor, ChannelSampling, FullSamplingReader};
 
-/// Size of a decoded sample.
+/// Size of a decoded sample in bytes.
 const SAMPLE_BYTES: usize = 4;
 
-/// Decodes one layer: color or gray, and alpha if present. The image covers the display window at the highest
-/// resolution and is black outside the data window.
+/// Decodes one RGB or gray layer, including alpha if present. The image covers the display window at the
+/// highest resolution and is black outside the data window.
 pub(super) struct ExrDecoder<R> {
     reader: Reader<FullSamplingReader<R>>,
     channels: ChosenChannels,
@@ -55,7 +56,7 @@ impl<R: BufRead + Seek> ExrDecoder<R> {
         Ok(Self { reader, channels, samplings })
     }
 
-    /// Color space and meaning of the samples.
+    /// Color space, alpha usage and warnings.
     pub(super) fn metadata(&self) -> ImageMetadata {
         let mut metadata = ImageMetadata { alpha: AlphaUsage::Premultiplied, ..ImageMetadata::default() };
         if let Some(primaries) = primaries(self.header()) {
@@ -89,7 +90,7 @@ fn primaries(header: &Header) -> Option<Primaries> {
     Some(Primaries { red, green, blue, white })
 }
 
-/// Size of a decompressed block (a tile or several rows), including all channels.
+/// Size in bytes of a decompressed block (a tile or several rows), including all channels.
 fn block_bytes(header: &Header) -> u64 {
     let (width, height) = (header.layer_size.width(), header.layer_size.height());
     let (width, height) = match header.blocks {
@@ -197,8 +198,8 @@ impl PartialImage<'_> {
         }
     }
 
-    /// Copies a row of a channel to the pixel components read from it. `left` and `row` are relative to the
-    /// data window.
+    /// Copies a row of a channel to the pixel components that use the channel. `left` and `row` are relative to
+    /// the data window.
     fn copy_channel_row(
         &self,
         channel: ChannelIndex,
@@ -249,7 +250,7 @@ impl PartialImage<'_> {
     }
 }
 
-/// Size of a decoded pixel.
+/// Size of a decoded pixel in bytes.
 fn pixel_bytes(channels: ChosenChannels) -> usize {
     SAMPLE_BYTES * if channels.alpha.is_some() { 4 } else { 3 }
 }

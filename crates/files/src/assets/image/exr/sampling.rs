@@ -11,20 +11,20 @@ use ::exr::meta::MetaData;
 use ::exr::meta::header::Header;
 use ::exr::prelude::Vec2;
 
-/// Maximum size of the headers.
+/// Maximum size of the EXR headers in bytes.
 const HEADER_BYTES: u64 = 1 << 20;
 /// Offset of the first header, after the magic number and version.
 const START: usize = 8;
 
-/// Sampling of a channel, and the file offset of the two integers that contain it.
+/// Subsampling factors of a channel, and the file offset of the two integers that store them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct ChannelSampling {
     at: u64,
     step: Vec2<usize>,
 }
 
-/// Reads the sampling of all channels of each part. Returns an empty list if no channel is subsampled or the
-/// headers are malformed. `exr` reports malformed headers.
+/// Reads the subsampling factors of all channels in each part. Returns an empty list if no channel is
+/// subsampled or the headers are malformed. `exr` reports malformed headers.
 pub(super) fn read_samplings(file: &mut (impl Read + Seek)) -> io::Result<Vec<Vec<ChannelSampling>>> {
     let mut bytes = Vec::new();
     file.by_ref().take(HEADER_BYTES).read_to_end(&mut bytes)?;
@@ -34,7 +34,7 @@ pub(super) fn read_samplings(file: &mut (impl Read + Seek)) -> io::Result<Vec<Ve
     Ok(if is_full { Vec::new() } else { found })
 }
 
-/// Parser of the headers.
+/// Parser for EXR headers.
 struct HeaderParser<'a> {
     bytes: &'a [u8],
     at: usize,
@@ -92,11 +92,11 @@ impl<'a> HeaderParser<'a> {
     }
 }
 
-/// Wraps a file, and patches its headers when read, so that no channel appears to be subsampled.
+/// Wraps a file and patches its headers while reading, so that no channel appears to be subsampled.
 pub(super) struct FullSamplingReader<R> {
     file: R,
     at: u64,
-    /// Byte offsets of integers that read as 1.
+    /// File offsets of the integers that are replaced with 1.
     ones: Vec<u64>,
 }
 
@@ -130,7 +130,7 @@ impl<R: Seek> Seek for FullSamplingReader<R> {
     }
 }
 
-/// Decompresses blocks with the given sampling.
+/// Decompresses blocks with the actual subsampling factors.
 pub(super) struct BlockDecompressor(MetaData);
 
 impl BlockDecompressor {
@@ -168,7 +168,7 @@ impl BlockDecompressor {
             CompressedBlock::Tile(block) => block.compressed_pixels_le.len(),
             CompressedBlock::DeepScanLine(_) | CompressedBlock::DeepTile(_) => bytes,
         };
-        // `exr` decodes subsampled channels in B44 blocks at the wrong size.
+        // `exr` decodes subsampled channels in B44 blocks with the wrong size.
         if matches!(header.compression, Compression::B44 | Compression::B44A) && packed != bytes {
             let reason = "B44 compression of subsampled channels; save it with ZIP or PIZ";
             return Err(Error::NotSupported(reason.into()));
@@ -182,7 +182,7 @@ fn is_subsampled(header: &Header) -> bool {
     header.channels.list.iter().any(|channel| channel.sampling != Vec2(1, 1))
 }
 
-/// Size of a row of the data window, including all channels.
+/// Size in bytes of a row of pixels, including all channels.
 fn row_bytes(header: &Header, row: usize, width: usize) -> usize {
     let channels = header.channels.list.iter().filter(|channel| row.is_multiple_of(channel.sampling.y()));
     channels.map(|channel| width / channel.sampling.x() * channel.sample_type.bytes_per_sample()).sum()

@@ -104,7 +104,7 @@ fn p3() -> SourceChromaticities {
     SourceChromaticities::new((0.3127, 0.329), (0.68, 0.32), (0.265, 0.69), (0.15, 0.06))
 }
 
-/// Linear Rec. 709 of the pixel as Display P3.
+/// The pixel's color in linear Rec. 709 if it is stored in Display P3.
 const P3: Vec3 = Vec3::new(0.5675, 0.2038, 0.0294);
 
 #[test]
@@ -114,7 +114,7 @@ fn png_gamma_and_primaries_are_applied() {
     assert!(is_near(color(&png(gamma(1.0 / 1.8))), power(1.8)));
     let wide = png(|info| info.source_chromaticities = Some(p3()));
     assert!(is_near(color(&wide), P3), "{}", color(&wide));
-    // The values written in sRGB files do not change any bits.
+    // The usual values of sRGB files do not change the texels.
     let usual = SourceChromaticities::new((0.3127, 0.329), (0.64, 0.33), (0.3, 0.6), (0.15, 0.06));
     assert!(
         is_plain(&png(gamma(0.45455))) && is_plain(&png(|info| info.source_chromaticities = Some(usual)))
@@ -139,7 +139,7 @@ fn color_chunks_have_a_fixed_precedence() {
         info.srgb = Some(SrgbRenderingIntent::Perceptual);
     });
     assert!(is_plain(&srgb));
-    // The encoder writes only an sRGB chunk. Insert a gamma of 1 before it. Each chunk has its own checksum.
+    // The encoder writes only an sRGB chunk. Insert a gAMA chunk, including its checksum, before the sRGB chunk.
     let at = srgb.windows(4).position(|name| name == b"sRGB").expect("a chunk") - 4;
     let other = png(gamma(1.0));
     let from = other.windows(4).position(|name| name == b"gAMA").expect("a chunk") - 4;
@@ -228,7 +228,7 @@ fn code_points_have_the_highest_precedence() {
 const HEADER_END: usize = 33;
 
 #[test]
-fn the_scenes_encoding_overrides_the_file() {
+fn scene_encoding_overrides_the_file() {
     let file = png(|info| {
         gamma(1.0)(info);
         info.source_chromaticities = Some(p3());

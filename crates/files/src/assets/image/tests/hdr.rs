@@ -44,7 +44,7 @@ fn header_variants_are_read() {
     }
 }
 
-/// Pixel indices of a 3 × 2 image in file order, numbered from the top left.
+/// The lists contain the pixel indices of a 3 × 2 image in file order, numbered from the top left.
 #[test]
 fn all_orientations_decode_to_the_same_image() {
     for (size, order) in [

@@ -102,7 +102,7 @@ pub(super) fn parse(line: &str) -> Result<Statement, String> {
     }
     match keyword.to_ascii_lowercase().as_str() {
         "illum" => illumination(rest),
-        // This only affects reflection maps, and these have their own warning.
+        // This affects only reflection maps, which have their own warning.
         "sharpness" => Ok(Statement::Nothing),
         _ => Ok(Statement::Ignored(unknown_statement(keyword))),
     }

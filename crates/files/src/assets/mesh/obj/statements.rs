@@ -16,7 +16,7 @@ pub(super) const NONE: u32 = u32::MAX;
 /// Position, texture coordinate and normal index of a corner, starting at 0.
 pub(super) type CornerIndices = [u32; 3];
 
-/// How faces without normals are smoothed.
+/// Smoothing of faces without normals.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Smoothing {
     /// No `s` statement precedes the face.
@@ -47,7 +47,7 @@ fn lower_case<'a>(word: &'a [u8], lower: &'a mut [u8; LONGEST_KEYWORD]) -> &'a [
     lower
 }
 
-/// Parsed contents of the file.
+/// Parsed contents of an OBJ file.
 #[derive(Default)]
 pub(super) struct Statements {
     pub(super) vertices: Vertices,

@@ -106,7 +106,7 @@ impl Vertices {
         self.least_alpha.filter(|(least, _)| *least < self.range.one()).map(|(_, start)| start)
     }
 
-    /// Color of a position. White if the file does not specify it.
+    /// Color of a position. White if the file does not specify a color.
     pub(super) fn color_of(&self, index: usize) -> [u8; 3] {
         if self.colors.is_empty() {
             return self.painted.get(index).copied().unwrap_or([u8::MAX; 3]);

@@ -31,13 +31,13 @@ pub(super) const END_OF_FILE: &str = "unexpected end of file";
 #[derive(Clone)]
 pub(super) struct Ascii<'a>(pub(super) Cursor<'a>, pub(super) LineEnds);
 
-/// How line ends are interpreted.
+/// Interpretation of line ends in text files.
 #[derive(Clone, Copy)]
 pub(super) enum LineEnds {
     /// As whitespace.
     Blank,
     /// A line end is the end of an item, and extra values on a line are skipped. Contains the number of lines
-    /// with extra values, and the byte offset of the first such line.
+    /// with extra values, and the byte offset of the first of these lines.
     EndItems(u64, Option<usize>),
 }
 

@@ -9,7 +9,7 @@ pub(super) struct PlyColors {
     scalars: [Scalar; 3],
     /// Colors stored as bytes.
     bytes: Vec<[u8; 3]>,
-    /// Colors of all other types.
+    /// Colors of types other than bytes.
     numbers: Vec<[f64; 3]>,
     range: ColorRange,
     /// Minimum alpha, its type, and a byte offset in the same vertex.

@@ -8,13 +8,13 @@ use super::{ErrorContext, checked_vertex_index, list_length, read_items, skip, v
 use crate::assets::AssetError;
 use crate::math::DVec2;
 
-/// How a property of a face is used.
+/// Meaning of a face property.
 #[derive(Clone, Copy, PartialEq)]
 enum PropertyRole {
     Corners,
-    /// List of texture coordinates, either per corner or for the whole face.
+    /// List of texture coordinates, either per corner or for the entire face.
     Uvs,
-    /// List of colors, either per corner or for the whole face.
+    /// List of colors, either per corner or for the entire face.
     Colors,
     /// Scalar value of the face (texture coordinate, color component or texture number), identified by its
     /// index into `FaceReader::values`.

@@ -40,7 +40,7 @@ impl Scalar {
         })
     }
 
-    /// Size in a binary file.
+    /// Size of a value in a binary file, in bytes.
     pub(super) fn size(self) -> usize {
         match self {
             Self::I8 | Self::U8 => 1,
@@ -88,7 +88,7 @@ pub(super) struct Element {
 }
 
 impl Element {
-    /// Minimum size of one item. In text, a number takes at least a digit and a space.
+    /// Minimum size of an item in bytes. In text, a number takes at least a digit and a space.
     pub(super) fn min_item_bytes(&self, encoding: Encoding) -> u64 {
         let least = |property: &Property| match (encoding, property.kind) {
             (Encoding::Ascii, _) => 2,
@@ -110,7 +110,7 @@ pub(super) struct PlyHeader {
     pub(super) body: usize,
 }
 
-/// Keywords of a header.
+/// Keywords of a PLY header.
 const KEYWORDS: [&str; 6] = ["format", "element", "property", "comment", "obj_info", "end_header"];
 
 /// Parses the header.
@@ -135,7 +135,7 @@ pub(super) fn parse(source: &MeshSource<'_>) -> Result<PlyHeader, AssetError> {
     let mut skipped = (0_u32, String::new());
     for (start, end, line) in lines {
         if end == HEADER_LIMIT && !line.ends_with(b"\n") {
-            break; // cut within the line
+            break; // The size limit falls within this line.
         }
         let line = String::from_utf8_lossy(line);
         let words: Vec<&str> = line.split_whitespace().collect();
@@ -186,7 +186,7 @@ pub(super) fn invalid_statement(keyword: &str) -> String {
 }
 
 pub(super) fn invalid_count(found: &str, element: &str) -> String {
-    format!("{} is not a valid number of {element}", shown(found.as_bytes()))
+    format!("{} is not a valid count for element `{element}`", shown(found.as_bytes()))
 }
 
 pub(super) fn unknown_type(found: &str) -> String {

@@ -1,5 +1,5 @@
-//! PLY (Turk, *The PLY Polygon File Format*, 1994): text and binary files in both byte orders, with all types
-//! and with unknown properties and elements.
+//! PLY (Turk, *The PLY Polygon File Format*, 1994). Supports text and both binary byte orders, all scalar types,
+//! and unknown properties and elements.
 
 mod body;
 mod colors;
@@ -61,7 +61,7 @@ struct ErrorContext<'a> {
 }
 
 impl ErrorContext<'_> {
-    /// An error in an item. Includes the line number in text files.
+    /// Creates an error about an item. Includes the line number in text files.
     fn wrong(&self, at: usize, element: &Element, index: u64, reason: &str) -> AssetError {
         let reason = item_error(&element.name, index + 1, reason);
         match self.encoding {
@@ -70,7 +70,7 @@ impl ErrorContext<'_> {
         }
     }
 
-    /// Prefix with the line number for a message. Empty for binary files.
+    /// Line number prefix for a message. Empty for binary files.
     fn line_prefix(&self, at: usize) -> String {
         match self.encoding {
             Encoding::Ascii => format!("line {}: ", self.source.line(at)),
@@ -145,7 +145,7 @@ fn item_error(element: &str, number: u64, reason: &str) -> String {
 }
 
 fn implausible(element: &str, count: u64, remaining: u64) -> String {
-    format!("the header claims {count} of element `{element}`, but only {remaining} bytes follow")
+    format!("the header claims {count} `{element}` elements, but only {remaining} bytes follow")
 }
 
 /// Warning about `count` lines with more values than properties.
@@ -207,11 +207,11 @@ fn list_length(numbers: &mut impl NumberReader, count: Scalar, item: Scalar) -> 
     }
 }
 
-/// Slot of a vertex's alpha.
+/// Slot of a vertex's alpha property.
 const ALPHA: usize = 13;
 
-/// Slot of a vertex property by name: position, normal, texture coordinates, color, second texture
-/// coordinates or alpha. `None` for unknown properties.
+/// Maps the name of a vertex property to its slot: position, normal, texture coordinates, color, second
+/// texture coordinates or alpha. `None` for unknown properties.
 fn vertex_property_slot(name: &str) -> Option<usize> {
     Some(match name {
         "x" => 0,

@@ -298,7 +298,7 @@ fn square(vertex: (&str, [&str; 4]), face: &str, lines: &[&str]) -> String {
 
 const PLAIN: (&str, [&str; 4]) = ("", [""; 4]);
 
-/// The value at each corner of the triangles.
+/// Values at the corners of all triangles.
 fn at_corners<T: Copy>(loaded: &LoadedMesh, values: &[T]) -> Vec<T> {
     loaded
         .mesh

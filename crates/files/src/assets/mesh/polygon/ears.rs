@@ -9,11 +9,11 @@ use crate::math::DVec2;
 
 /// Limit on the number of visited corners and tree nodes: a number of visits per corner, plus a constant.
 /// Simple polygons need about 50 visits per corner. Polygons that wind around the same corners many times may
-/// exceed the limit. Corners are then clipped without testing them.
+/// exceed the limit. Beyond the limit, corners are clipped without testing them.
 const VISITS_PER_CORNER: u64 = 200;
 const EXTRA_VISITS: u64 = 1_000_000;
 
-/// No corner, or a corner that has been clipped.
+/// Marks a clipped corner or the end of a list.
 const NONE: u32 = u32::MAX;
 
 /// Triangulates a counterclockwise polygon. Returns whether all cuts are diagonals, which is false for
@@ -75,7 +75,7 @@ impl<'a, F: FnMut([usize; 3])> Clipper<'a, F> {
                 continue;
             }
             is_simple = false;
-            // Clip any convex corner. If there is none, the rest of the polygon has no positive area.
+            // Clip any convex corner. If no corner is convex, the rest of the polygon has no positive area.
             if !self.clip_first(|_, _| true) {
                 break;
             }
@@ -180,7 +180,7 @@ impl<'a, F: FnMut([usize; 3])> Clipper<'a, F> {
     }
 
     /// Finds a corner at which the outline enters the triangle of a convex corner. If there is one, the
-    /// convex corner is not an ear. Unless `may_touch`, corners on the diagonal also block it, because the
+    /// convex corner is not an ear. Unless `may_touch`, corners on the diagonal also count, because the
     /// triangles on the two sides of the diagonal would not share these vertices.
     fn blocker(&mut self, corner: u32, may_touch: bool) -> Option<u32> {
         if self.visits > self.max_visits {
@@ -211,7 +211,7 @@ impl<'a, F: FnMut([usize; 3])> Clipper<'a, F> {
             return true;
         }
         // If the corner is on one or more sides of the triangle, a neighbor enters the triangle if it is on
-        // the inner side of each of these.
+        // the inner side of each of these sides.
         [self.previous[corner as usize], self.next[corner as usize]].into_iter().any(|neighbor| {
             let sides = self::turns(triangle, self.point(neighbor));
             (0..3).all(|side| turns[side] > 0.0 || sides[side] > 0.0)

@@ -2,7 +2,7 @@ use super::*;
 
 type Points = Vec<(f32, f32)>;
 
-/// Triangulates a polygon in two planes, checks the triangles, and returns those in the plane y = 7.
+/// Triangulates a polygon in two planes, checks both triangulations, and returns the one in the plane y = 7.
 fn cut(points: &[(f32, f32)]) -> Vec<[usize; 3]> {
     let upright: Vec<Vec3> = points.iter().map(|&(x, y)| Vec3::new(x, 7.0, -y)).collect();
     let triangles = covering(&upright, points);

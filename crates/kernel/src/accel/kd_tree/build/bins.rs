@@ -91,6 +91,6 @@ pub fn cheapest(references: &[Reference], cell: &Bounds) -> Option<SplitPlane> {
             &CandidatePlanes { at: four(at), left: counts(left), right: counts(right) },
         );
     }
-    // Keep references within the plane out of the side that should be empty.
+    // At a face of the bounding box, put references within the plane on the nonempty side.
     search.cheapest().map(|plane| SplitPlane { planar_right: plane.at <= around.min[plane.axis], ..plane })
 }

@@ -1,4 +1,4 @@
-//! Expected cost of a split by surface area (MacDonald, Booth, *Heuristics for ray tracing using space
+//! Expected cost of a split, from surface areas (MacDonald, Booth, *Heuristics for ray tracing using space
 //! subdivision*, 1990). Evaluates four planes at a time.
 
 use crate::accel::reference::Bounds;
@@ -25,8 +25,8 @@ pub struct SplitPlane {
     pub planar_right: bool,
 }
 
-/// 4·`N` planes across one axis, with triangle counts on either side of each. Triangles on both sides are
-/// counted twice.
+/// 4·`N` planes perpendicular to one axis, with the triangle counts on both sides of each. Triangles on both
+/// sides are counted twice.
 #[derive(Clone, Copy)]
 pub struct CandidatePlanes<const N: usize> {
     pub at: [Vec4; N],

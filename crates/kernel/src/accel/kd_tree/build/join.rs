@@ -7,7 +7,7 @@ use super::subtree::KdSubtree;
 use crate::accel::kd_tree::node::{KdNode, NodeKind};
 use crate::accel::wide_bvh::pages;
 
-/// A part of the tree: an upper node or a subtree.
+/// A part of the kd-tree: an upper node or a subtree.
 pub enum TreePart {
     /// A plane with the parts below and above it.
     Halves { plane: SplitPlane, size: SubtreeSize, halves: Box<[TreePart; 2]> },
@@ -15,7 +15,7 @@ pub enum TreePart {
     Built(KdSubtree),
 }
 
-/// Number of nodes and number of triangle references.
+/// Number of nodes and triangle references in a subtree.
 #[derive(Clone, Copy)]
 pub struct SubtreeSize {
     nodes: usize,

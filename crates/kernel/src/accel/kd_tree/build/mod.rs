@@ -1,6 +1,6 @@
-//! Top-down construction. Splits each cell at the plane with the lowest expected cost until a leaf costs no
-//! more. Large cells use bins, small cells perfect splits. A triangle that straddles a plane is added to both
-//! sides, each time with the bounding box of its clipped part.
+//! Top-down construction of a kd-tree. Splits each cell at the plane with the lowest expected cost until a
+//! leaf costs no more. Large cells use bins; small cells use perfect splits. A triangle that straddles a
+//! plane is added to both sides, each time with the bounding box of its clipped part.
 //!
 //! The tree does not depend on the number of threads.
 
@@ -30,14 +30,14 @@ use subtree::KdSubtree;
 const TASK_SIZE: usize = 4096;
 
 /// Maximum number of leaves plus references. A tree has fewer than two nodes per leaf, and node indices must
-/// fit.
+/// fit into a [`KdNode`].
 const MOST_ROOM: u64 = node::MOST as u64 / 2;
 
-/// A single leaf must have room for all triangles.
+/// All triangles must fit into a single leaf.
 const _: () = assert!((TriangleMesh::MOST_TRIANGLES as u64) < MOST_ROOM);
 
-/// Maximum number of leaves plus references per triangle. This is several times what typical meshes need, but
-/// a small fraction of what many triangles around a single vertex could use.
+/// Maximum number of leaves plus references per triangle. Typical meshes need only a fraction of this. Many
+/// triangles around a single vertex could produce far more references.
 const MOST_PER_TRIANGLE: u64 = 24;
 
 /// Added to the triangle count to give small meshes enough room.
@@ -46,7 +46,7 @@ const FEW: u64 = 64;
 /// Marks a triangle without an assigned position.
 const NOWHERE: u32 = u32::MAX;
 
-/// Result of construction.
+/// A finished kd-tree.
 pub struct BuiltKdTree {
     pub nodes: Vec<KdNode>,
     /// Indices into `triangles`, leaf by leaf.
@@ -110,18 +110,18 @@ fn order_by_first_use(mut ids: Vec<u32>, count: u32) -> (Vec<u32>, Vec<u32>) {
     (ids, order)
 }
 
-/// A region of space.
+/// A region of space to be covered by a subtree.
 #[derive(Clone, Copy)]
 struct Cell {
     bounds: Bounds,
-    /// Number of levels of planes allowed below.
+    /// Maximum number of levels of planes in the cell.
     levels: u32,
     /// Maximum number of leaves plus references in the cell.
     room: u64,
 }
 
 impl Cell {
-    /// Chooses the splitting plane. `None` makes a leaf.
+    /// Chooses the splitting plane, or `None` for a leaf.
     fn plane(&self, references: &[Reference]) -> Option<SplitPlane> {
         // In the worst case, every triangle straddles the plane.
         let has_room = 2 * leaf_slots(references.len()) <= self.room;
@@ -190,7 +190,7 @@ mod tests {
     }
 
     #[test]
-    fn fans_do_not_exceed_the_room() {
+    fn fans_stay_within_the_size_limit() {
         for count in [500, 20_000] {
             let built = build(count, fan(count), &CancelToken::new()).expect("nobody cancels");
             let size = (built.nodes.len() / 2 + built.references.len()) as u64;
@@ -200,7 +200,7 @@ mod tests {
     }
 
     #[test]
-    fn limited_room_leads_to_early_leaves() {
+    fn size_limit_leads_to_early_leaves() {
         let fan = |id: u32| {
             let angle = id as f32 * 0.1;
             [Vec3::ZERO, Vec3::new(angle.cos(), angle.sin(), 1.0), Vec3::new(angle.sin(), 1.0, angle.cos())]

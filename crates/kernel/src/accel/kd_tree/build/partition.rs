@@ -4,7 +4,7 @@ use super::cost::SplitPlane;
 use crate::accel::reference::{Bounds, Reference};
 use crate::math::Vec3;
 
-/// Reusable memory for partitioning.
+/// Reusable buffers for partitioning.
 #[derive(Default)]
 pub struct Scratch {
     /// References on the left, followed by stale entries.

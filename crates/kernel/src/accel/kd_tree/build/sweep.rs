@@ -44,7 +44,7 @@ fn cheapest_of<const N: usize>(references: &[Reference], cell: &Bounds) -> Optio
     search.cheapest()
 }
 
-/// Evaluates the planes at `at` across an axis.
+/// Adds the candidate planes at `at`, perpendicular to an axis, to the search.
 #[inline(always)]
 fn add_planes_across<const N: usize>(
     axis: usize,
@@ -86,7 +86,8 @@ mod tests {
     use crate::math::Vec3;
     use crate::math::random::signed as random;
 
-    /// Cost of a plane, from the definition. Infinite if the plane does not intersect the cell.
+    /// Cost of a plane, computed directly from the definition. Infinite if the plane does not intersect the
+    /// cell.
     fn cost(references: &[Reference], cell: &Bounds, plane: &SplitPlane) -> f32 {
         let SplitPlane { axis, at, planar_right } = *plane;
         if !(at > cell.min[axis] && at < cell.max()[axis]) {

@@ -8,7 +8,7 @@ use crate::accel::reference::Bounds;
 use crate::accel::wide_bvh::node::{Child, WIDTH, WideNode};
 use crate::accel::wide_bvh::simd::pages;
 
-/// Joins all nodes (root first) and the contents of all packs.
+/// Joins all parts into one list of nodes, starting with the root, and one list of packs.
 pub fn join(root: TreePart) -> (Vec<WideNode>, Vec<Pack>) {
     let mut top = UpperNodes::default();
     match root {

@@ -1,5 +1,5 @@
-//! Construction. Parts are split in two with the binned surface area heuristic, in parallel, until each is
-//! small enough for a single thread to build eight-wide nodes. Finally, all parts are joined.
+//! Construction of a wide BVH. Parts are split in two with the binned surface area heuristic, in parallel,
+//! until each is small enough for a single thread to build eight-wide nodes. Finally, all parts are joined.
 //!
 //! The tree does not depend on the number of threads.
 
@@ -23,7 +23,7 @@ use subtree::WideSubtree;
 /// Maximum number of triangles in a part built by a single thread. The token is polled between such parts.
 const TASK_SIZE: usize = 8192;
 
-/// Result of construction.
+/// A finished wide BVH.
 pub struct BuiltWideBvh {
     pub nodes: Vec<WideNode>,
     pub packs: Vec<TrianglePack>,
@@ -62,7 +62,7 @@ pub fn build(
     Ok(BuiltWideBvh { nodes, packs, bounds })
 }
 
-/// A part of the tree: an upper node or a subtree.
+/// A part of the wide BVH: an upper node or a subtree.
 enum TreePart {
     /// Two halves to be collapsed into a wide node.
     Halves(Box<[(Bounds, TreePart); 2]>),

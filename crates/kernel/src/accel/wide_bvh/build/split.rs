@@ -33,7 +33,7 @@ pub struct Segment {
     pub bounds: Bounds,
     /// Number of splits above this segment.
     level: u32,
-    /// `None` if a leaf costs no more than the best split, even without counting the traversal step.
+    /// `None` if a leaf costs no more than the best split, even without the cost of the traversal step.
     pub split: Option<Split>,
     /// Whether the segment is worth a separate node.
     pub is_node: bool,
@@ -294,7 +294,7 @@ fn partition_along_axis<const AXIS: usize>(
 /// centroids on both sides. Branchless, since data-dependent branches would often be mispredicted: every
 /// reference is swapped with the first one on the right, and then the length of the left side is incremented
 /// by 0 or 1.
-#[allow(clippy::manual_swap)] // `swap` goes through memory, where the next round stalls: half the speed of all building
+#[allow(clippy::manual_swap)] // `swap` goes through memory, so the next iteration stalls, which halves the build speed
 fn partition_by_plane<const AXIS: usize>(
     references: &mut [Reference],
     bin: usize,

@@ -4,7 +4,7 @@ use super::split::{Segment, partition};
 use crate::accel::reference::{Bounds, Reference};
 use crate::accel::wide_bvh::node::{Child, PACK, WIDTH, WideNode};
 
-/// The references of a triangle pack.
+/// A range of references that forms a triangle pack.
 #[derive(Clone, Copy, Debug)]
 pub struct Pack {
     /// Overall index of the first reference.
@@ -23,7 +23,7 @@ pub struct WideSubtree {
 }
 
 impl WideSubtree {
-    /// Builds a subtree over references. `start` is the overall index of the first one.
+    /// Builds a subtree over `references`. `start` is the overall index of the first reference.
     pub fn build(references: &mut [Reference], start: usize, segment: Segment) -> Self {
         let mut own = Self {
             nodes: Vec::with_capacity(references.len() / 6),

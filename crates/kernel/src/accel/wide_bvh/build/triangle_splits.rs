@@ -12,13 +12,13 @@ use crate::math::elementary::exp2;
 /// Maximum number of additional references as a fraction of the number of triangles.
 const MOST_MORE: f64 = 0.3;
 
-/// Number of levels in the grid of planes. The grid has 2 to this power cells along each axis.
+/// Number of levels in the grid of planes. The grid has 2^`LEVELS` cells along each axis.
 const LEVELS: u32 = 20;
 
 /// Number of references processed between polls of the token.
 const CHUNK: usize = 4096;
 
-/// Splits some of the references. The result depends only on the triangles.
+/// Splits the references of large triangles. The result depends only on the triangles.
 ///
 /// # Errors
 /// [`Cancelled`] if the build was canceled.
@@ -48,7 +48,7 @@ pub fn split_large(
     Ok(chunks.map(of_chunk).collect::<Result<Vec<_>, _>>()?.concat())
 }
 
-/// Number of times to cut a triangle.
+/// Number of times to cut a triangle with the given priority.
 fn cut_count(priority: f32, factor: f32) -> u32 {
     (priority * factor) as u32
 }

@@ -5,8 +5,7 @@ use super::InstructionSet;
 use crate::accel::reference::{Bounds, Reference};
 use crate::accel::wide_bvh::build::split::{Bins, Histogram};
 
-/// Adds references to the bins of a histogram. Returns false and does nothing if the processor lacks the
-/// instructions.
+/// Adds references to the bins of a histogram. Returns false and does nothing if the processor lacks AVX2.
 pub fn count<const N: usize>(references: &[Reference], bins: &Bins, into: &mut Histogram<N>) -> bool {
     #[cfg(target_arch = "x86_64")]
     if InstructionSet::best() >= InstructionSet::Avx2 {
@@ -19,7 +18,7 @@ pub fn count<const N: usize>(references: &[Reference], bins: &Bins, into: &mut H
 }
 
 /// Moves the references below a bin to the front. Returns their number and the bounding boxes of the
-/// centroids on both sides. Returns `None` and does nothing if the processor lacks the instructions.
+/// centroids on both sides. Returns `None` and does nothing if the processor lacks AVX2.
 pub fn partition<const AXIS: usize>(
     references: &mut [Reference],
     bin: usize,
@@ -42,7 +41,7 @@ mod avx2 {
     use crate::accel::wide_bvh::build::split::{BINS, Bins, Histogram, ROUND};
     use crate::math::Vec4;
 
-    /// Both corners of a box.
+    /// Loads both corners of a box into one register.
     #[target_feature(enable = "avx2")]
     #[inline]
     fn load(bounds: &Bounds) -> __m256 {

@@ -1,5 +1,6 @@
-//! Recompiles portable loops for several x86-64 instruction sets. Operations are never reordered. They are
-//! fused only where the last bits do not matter, so results are bit-identical.
+//! Recompiles portable loops for several x86-64 instruction sets. Operations are never reordered, and are
+//! fused only where rounding cannot change the final result. Therefore, results are bit-identical on all
+//! instruction sets.
 
 #[cfg(target_arch = "x86_64")]
 use std::arch::x86_64::*;

@@ -1,4 +1,4 @@
-//! Portable traversal. It is the reference for all instruction sets.
+//! Portable traversal, which is the reference for all instruction sets.
 
 use super::super::WideBvh;
 use super::super::node::{Child, PACK, TrianglePack, WIDTH, WideNode};

@@ -21,7 +21,7 @@ pub struct SimdRay {
     /// Origins for near and far planes, offset by the margin and multiplied by the inverse direction.
     from_near: [F8; 3],
     from_far: [F8; 3],
-    /// Row of a node that contains the near planes of each axis.
+    /// For each axis, the row of a node that contains the near planes.
     near: [usize; 3],
     /// Origin permuted to the axes of the sheared ray.
     origin: [F4; 3],
@@ -52,7 +52,7 @@ const AXES: [[i32; 4]; 64] = {
     table
 };
 
-/// Origin and direction. The last lane of each contains the next float in memory.
+/// Loads the origin and the direction of a ray. The last lane of each contains the next float in memory.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
 fn origin_and_direction(ray: &Ray) -> (__m128, __m128) {
@@ -62,7 +62,7 @@ fn origin_and_direction(ray: &Ray) -> (__m128, __m128) {
     unsafe { (_mm_loadu_ps(floats), _mm_loadu_ps(floats.add(3))) }
 }
 
-/// Whether the ray is finite and has a direction.
+/// Whether the ray is finite and its direction is nonzero.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
 pub fn may_hit(ray: &Ray) -> bool {
@@ -77,7 +77,7 @@ pub fn may_hit(ray: &Ray) -> bool {
     _mm_movemask_ps(finite) & 0b111 == 0b111 && _mm_movemask_ps(goes) & 0b111 != 0
 }
 
-/// Both corners. The last lane of each contains an unrelated float.
+/// Loads both corners of a box. The last lane of each contains an unrelated float.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
 fn corners(bounds: &Aabb) -> (__m128, __m128) {
@@ -120,7 +120,7 @@ fn broadcast_to_four(v: __m128) -> [F4; 3] {
 }
 
 impl SimdRay {
-    /// Preprocesses a ray for triangles in `whole`.
+    /// Preprocesses a ray for triangles inside the box `whole`.
     #[target_feature(enable = "avx2,fma")]
     #[inline]
     pub fn new(ray: &Ray, whole: &Aabb) -> Self {
@@ -135,7 +135,7 @@ impl SimdRay {
         let margin = _mm_mul_ps(farthest, _mm_set1_ps(TRIANGLE_ERROR));
         let reach = _mm_add_ps(margin, _mm_mul_ps(_mm_and_ps(origin, unsigned), _mm_set1_ps(f32::EPSILON)));
         // Prepare the box tests. Near-zero direction components are increased slightly, which moves the ray
-        // by less than a margin inside the boxes. This keeps the inverse finite unless the direction is
+        // by less than the margin inside the boxes. This keeps the inverse finite unless the direction is
         // extremely short.
         let size = _mm_and_ps(direction, unsigned);
         let least = _mm_mul_ps(max_of_three(size), _mm_set1_ps(LEAST_PART));

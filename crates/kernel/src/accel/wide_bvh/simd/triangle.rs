@@ -8,7 +8,7 @@ use crate::math::float::gamma;
 /// Corners in the ray's coordinates: sheared x, sheared y, and z.
 pub type Corners<V> = [[V; 3]; 3];
 
-/// Results of intersecting a ray with a pack, or of a packet with a triangle.
+/// Results of testing a ray against a pack, or a packet against a triangle.
 pub struct Hits<V: SimdVector> {
     /// Mask of the lanes with a hit.
     pub hit: u32,
@@ -59,9 +59,9 @@ const UNITS: f32 = 1.05 * 0.5 * f32::EPSILON / ILL_CONDITIONED;
 
 /// Whether a triangle may need the full test. Returns false only if the triangle is not a needle and t is
 /// negative or past the ray's end by more than its error. Let s be the sum of the maxima of |x| and |y|, so
-/// the product of both is at most s²/4, and let d be the maximum of |z|. Then [`distance_error`] is at most
-/// 30·s·(s + d) unit roundoffs of the reach, divided by the determinant. If the inverse of the determinant
-/// may be infinite, the triangle counts as a needle. `along` is t times the determinant.
+/// the product of these maxima is at most s²/4, and let d be the maximum of |z|. Then [`distance_error`] is
+/// at most the reach times 30·s·(s + d) unit roundoffs, divided by the determinant. If the inverse of the
+/// determinant may be infinite, the triangle counts as a needle. `along` is t times the determinant.
 #[inline(always)]
 fn may_be_hit<V: SimdVector>(
     corners: &Corners<V>,

@@ -24,7 +24,7 @@ pub use row::GlassRow;
 pub struct GlassPoint {
     /// Index of refraction on the viewer's side.
     pub near: f32,
-    /// Index of refraction on the other side. Must differ from that on the viewer's side.
+    /// Index of refraction on the other side. Must differ from `near`.
     pub far: f32,
     /// α.
     pub alpha: f32,

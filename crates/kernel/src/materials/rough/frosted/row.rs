@@ -52,7 +52,7 @@ impl<const THROUGH: bool> GlassRow<THROUGH> {
         [eye, SmithTerms::isotropic(lit, direction, self.alpha[i])]
     }
 
-    /// f of the lobe.
+    /// f of the reflected or transmitted lobe in sr⁻¹.
     #[inline(always)]
     fn lobe(&self, i: usize, direction: Vec3) -> f32 {
         let [eye, light] = self.smith_terms(i, direction);
@@ -71,7 +71,7 @@ impl<const THROUGH: bool> GlassRow<THROUGH> {
         let by_facet = cosines[0] * cosines[1] * transmittance(cosines, indices) / half.squared;
         let value = 4.0 * (by_facet * eye.reflected(&light, half.isotropic(self.alpha[i])));
         let value = value * (self.far[i] * self.far[i]);
-        // Nearly equal indices do not have a usable half vector.
+        // The half vector is unusable if the indices are nearly equal.
         if is_through & (value < f32::MAX) { value } else { 0.0 }
     }
 }

@@ -164,7 +164,7 @@ fn two_sided_albedos_match_quadrature() {
         for cosine in COSINES {
             let (reflection, transmission) = parts(&glass(indices, alpha), direction(cosine, 0.3));
             let sampled = [reflection.albedo_by_choices(128).x, transmission.albedo_by_choices(128).x];
-            // Total reflection begins at a ring that needs fine steps.
+            // Use fine steps because the integrand changes abruptly where total reflection begins.
             let exact = [reflection.albedo_by_rings(1000).x, transmission.albedo_by_rings(1000).x];
             let what = format!("α {alpha}, {indices:?} at a cosine of {cosine}: {sampled:?}, {exact:?}");
             let (sum, sum_exact) = (sampled[0] + sampled[1], exact[0] + exact[1]);

@@ -1,4 +1,5 @@
-//! Conductors. Microfacets with exact Fresnel equations, or with Schlick's approximation for a given color.
+//! Conductors: microfacets with the exact Fresnel equations, or with Schlick's approximation for a given
+//! color.
 
 pub mod elements;
 mod row;
@@ -64,7 +65,7 @@ pub struct ConductorPoint {
 }
 
 impl ConductorFresnel {
-    /// Looks up the textures.
+    /// The reflectance at one point, with its textures looked up. Counts texture lookups in `lookups`.
     #[inline]
     pub fn at(&self, at: &TexturePoint, lookups: &mut u64) -> FresnelPoint {
         match self {
@@ -73,7 +74,7 @@ impl ConductorFresnel {
         }
     }
 
-    /// The conductor with white textures.
+    /// The conductor with all textures replaced by white.
     pub fn with_white_textures(&self) -> FresnelPoint {
         let with_white_textures = |color: &Color| color.constant().unwrap_or(Vec3::ONE);
         match self {
@@ -90,7 +91,7 @@ impl ConductorFresnel {
         }
     }
 
-    /// Its textures.
+    /// All textures of the conductor.
     pub fn textures(&self) -> impl Iterator<Item = &Arc<Texture>> {
         let colors = match self {
             Self::Schlick(color) => [Some(color), None],

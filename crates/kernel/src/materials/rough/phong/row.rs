@@ -47,7 +47,7 @@ impl PhongRow {
         Lobes { diffuse: 0.0, specular: 1.0, ..self.lobes(i, normals) }
     }
 
-    /// Sets the lobes of some lanes.
+    /// Sets the lobes of the lanes in the mask `of`.
     #[inline(always)]
     fn set(&mut self, of: u32, shown: ShownLobes, diffuse: &Vec3x16, specular: Vec3, shininess: f32) {
         let white = PhongBsdf { diffuse: Vec3::ONE, specular, shininess, ambient: Vec3::ZERO };

@@ -18,7 +18,7 @@ use crate::materials::texture::{Color, Texture};
 use crate::math::Vec3;
 pub use row::PlasticRow;
 
-/// A diffuse base under a coat. If the coat is smooth, this is only the base, see
+/// A diffuse base under a coat. If the coat is smooth, this is only the base; see
 /// [`crate::materials::Coated`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plastic {

@@ -102,7 +102,7 @@ impl PlasticRow {
         [if alpha > 0.0 { distribution } else { 0.0 }, fresnel]
     }
 
-    /// f of the coat for a factor of 1.
+    /// f of the coat in sr⁻¹, without the factor `specular`.
     #[inline(always)]
     fn coat_f(&self, i: usize, direction: Vec3) -> f32 {
         let [distribution, fresnel] = self.distribution_and_fresnel(i, direction);

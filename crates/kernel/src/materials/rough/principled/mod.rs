@@ -6,8 +6,8 @@
 //! - Diffuse lobe: (1 − metallic)(1 − transmission) · color/π · (1 − E(μᵢ))(1 − E(μₒ))/(1 − Ē), where E is the albedo of the
 //!   dielectric lobe.
 //! - Transmission through a thin sheet: the specular lobe, mirrored to the other side, times (1 − metallic) ·
-//!   transmission · color · (1 − F), where F is that of the dielectric. Transmissive surfaces are represented
-//!   by two vertices, see [`bsdf`](crate::materials::bsdf).
+//!   transmission · color · (1 − F), where F is the reflectance of the dielectric. Transmissive surfaces are
+//!   represented by two vertices, see [`bsdf`](crate::materials::bsdf).
 //! - Clear coat c: a lobe with F0 = 0.04, times c. All other lobes are multiplied by (1 − c·E_c(μ)) for each
 //!   of the two directions.
 
@@ -96,8 +96,8 @@ impl PrincipledPoint {
     }
 }
 
-/// Albedos of two lobes with Schlick's approximation. The facets of one lobe reflect 1 at normal incidence
-/// and 0 at grazing angles. Those of the other lobe do the reverse.
+/// Albedos of two lobes with Schlick's approximation. The reflectance of one lobe's facets is 1 at normal
+/// incidence and 0 at grazing angles. For the other lobe, it is the reverse.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SchlickAlbedo {
     /// Albedo per unit of reflectance at normal incidence.
@@ -133,7 +133,7 @@ impl SchlickAlbedo {
 /// A clear coat over an emitting surface.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EmissionCoat {
-    /// Its weight.
+    /// Weight of the coat.
     weight: Number,
     /// The square root of the coat's α.
     roughness: Number,
@@ -142,7 +142,7 @@ pub struct EmissionCoat {
 }
 
 impl EmissionCoat {
-    /// A coat with this weight and roughness. `None` if the weight is 0.
+    /// A coat with the given weight and roughness. `None` if the weight is 0.
     pub fn new(weight: Number, roughness: Number) -> Option<Self> {
         if weight.constant() == Some(0.0) {
             return None;
@@ -151,7 +151,8 @@ impl EmissionCoat {
         Some(Self { weight, roughness, albedo })
     }
 
-    /// Transmittance for light that leaves the surface with this cosine. Adds to `lookups`.
+    /// Transmittance for light that leaves the surface at the given cosine. Counts texture lookups in
+    /// `lookups`.
     pub fn transmittance(&self, at: &TexturePoint, cosine: f32, lookups: &mut u64) -> f32 {
         let weight = self.weight.at(at, lookups).clamp(0.0, 1.0);
         let between = |roughness: f32| SchlickAlbedo::between(roughness.clamp(0.0, 1.0));
@@ -162,7 +163,7 @@ impl EmissionCoat {
         1.0 - weight * albedo.at(cosine.abs())
     }
 
-    /// Its textures.
+    /// All textures of the coat.
     pub fn textures(&self) -> impl Iterator<Item = &Arc<Texture>> {
         [&self.weight, &self.roughness].into_iter().filter_map(Number::texture)
     }
@@ -179,7 +180,7 @@ fn albedo_tables(roughness: Option<f32>) -> [AlbedoTable; 2] {
     [normal, AlbedoTable::new(roughness, alpha, weight)]
 }
 
-/// The parameters at a point.
+/// The parameters of a principled material at a point.
 #[derive(Clone, Copy)]
 struct PointInputs {
     color: Vec3,
@@ -306,7 +307,7 @@ impl RoughMaterial for Principled {
 
     #[inline]
     fn supports_packets(&self) -> bool {
-        // Packets only have light on one side.
+        // Packets receive light from only one side.
         !self.is_transmissive() && self.textures().next().is_none()
     }
 

@@ -72,7 +72,7 @@ pub struct PrincipledRow<const THROUGH: bool> {
 struct ViewTerms {
     /// [`PrincipledRow::left`].
     left: Vec3,
-    /// [`PrincipledRow::through_coat`].
+    /// [`PrincipledRow::through`].
     through: f32,
     /// [`PrincipledRow::shares`].
     shares: [f32; 2],
@@ -118,7 +118,8 @@ impl<const THROUGH: bool> PrincipledRow<THROUGH> {
         let [normal, grazing] = self.albedos(i, cosine);
         let (reflectance, of_grazing) = (lane(&self.dielectric.0, i), self.dielectric.1[i]);
         let left = Vec3::ONE - reflectance * normal - Vec3::splat(of_grazing * grazing);
-        // If the facets reflect everything, no light passes. Clamp because of rounding.
+        // If the facets reflect everything, no light passes. Clamp because rounding may produce negative
+        // values.
         Vec3::new(nonnegative(left.x), nonnegative(left.y), nonnegative(left.z))
     }
 

@@ -13,7 +13,7 @@ use crate::geometry::Ray;
 use crate::geometry::aabb::SLAB_PAD;
 use crate::geometry::watertight::ShearedRay;
 
-/// [`WideBvh::any_packet`]. `None` if the rays are not coherent.
+/// Implements [`WideBvh::any_packet`]. Returns `None` if the rays are not coherent.
 #[inline(always)]
 pub fn any<V: SimdVector>(
     tree: &WideBvh,

@@ -13,7 +13,7 @@ use crate::accel::wide_bvh::simd::vector::{F8, SimdVector};
 use crate::geometry::aabb::SLAB_PAD;
 use crate::geometry::{Ray, ShapeHit};
 
-/// [`WideBvh::closest_packet`]. Returns false if the rays are not coherent.
+/// Implements [`WideBvh::closest_packet`]. Returns false if the rays are not coherent.
 #[inline(always)]
 pub fn closest<V: SimdVector>(
     tree: &WideBvh,

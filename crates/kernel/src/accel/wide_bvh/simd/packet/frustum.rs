@@ -8,8 +8,8 @@ use crate::geometry::aabb::SLAB_PAD;
 /// Bounds on all rays of a packet, tested against eight boxes at a time. Subtraction and multiplication round
 /// monotonically, so no ray enters a box before the frustum does, or leaves it after the frustum.
 pub struct Frustum {
-    /// The origin coordinate closest to the near plane: the maximum if the rays go in the positive direction,
-    /// the minimum otherwise.
+    /// The origin coordinate closest to the near plane: the maximum for positive directions, the minimum for
+    /// negative ones.
     near_origin: [F8; 3],
     far_origin: [F8; 3],
     inverse: [[F8; 2]; 3],

@@ -1,6 +1,6 @@
 //! Packet traversal for 16 rays in similar directions. A frustum around the rays is used to skip subtrees
-//! that all of them miss (Reshetov, Soupikov, Hurley, *Multi-Level Ray Tracing Algorithm*, 2005). Other boxes
-//! are tested with 16 rays at a time.
+//! that all rays miss (Reshetov, Soupikov, Hurley, *Multi-Level Ray Tracing Algorithm*, 2005). The remaining
+//! boxes are tested against 16 rays at a time.
 
 mod any;
 mod closest;

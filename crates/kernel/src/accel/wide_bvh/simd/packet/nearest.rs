@@ -8,7 +8,7 @@ use crate::accel::wide_bvh::simd::vector::SimdVector;
 use crate::geometry::watertight::ShearedRay;
 use crate::geometry::{Ray, ShapeHit};
 
-/// Nearest hits found so far.
+/// Nearest hit of each ray so far.
 pub struct Nearest<V: SimdVector> {
     pub t: V,
     u: V,
@@ -19,7 +19,7 @@ pub struct Nearest<V: SimdVector> {
 }
 
 impl<V: SimdVector> Nearest<V> {
-    /// Starts with the given ends and no hits.
+    /// No hits yet, for rays with the given ends.
     #[inline(always)]
     pub fn new(ends: V) -> Self {
         Self { t: ends, u: ends, v: ends, id: ends.splat_like(f32::from_bits(u32::MAX)), found: 0 }

@@ -26,13 +26,13 @@ pub struct SimdRayPacket<V: SimdVector> {
     pub near: [usize; 3],
     /// Minimum and maximum of the origins along each axis.
     pub origins: [[f32; 2]; 3],
-    /// Largest box margin that any of the rays needs.
+    /// Largest box margin that any ray needs.
     pub margin: f32,
 }
 
 impl<V: SimdVector> SimdRayPacket<V> {
-    /// Loads a packet, or returns `None` if the rays are not coherent. Their directions must have the same
-    /// signs and the same longest axis.
+    /// Loads a packet, or returns `None` if the rays are not coherent. The directions of coherent rays have
+    /// the same signs and the same longest axis.
     #[inline(always)]
     pub fn new(rows: &RayRows, whole: &Aabb, like: V) -> Option<Self> {
         let axes = ShearedRay::new(rows.first.origin, rows.first.direction).axes();

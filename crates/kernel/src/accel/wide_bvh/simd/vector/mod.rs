@@ -54,7 +54,7 @@ pub trait SimdVector: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Outpu
 
     /// Stores the lanes into a slice of at least [`SimdVector::COUNT`] floats.
     fn store(self, to: &mut [f32]);
-    /// Divides by `divisor`.
+    /// Lane-wise division by `divisor`.
     fn div(self, divisor: Self) -> Self;
     /// Lane-wise minimum.
     fn min(self, other: Self) -> Self;
@@ -64,11 +64,11 @@ pub trait SimdVector: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Outpu
     fn abs(self) -> Self;
     /// Negates the lanes where the sign bit of `other` is set.
     fn xor_sign(self, other: Self) -> Self;
-    /// self < other.
+    /// Lane-wise `self` < `other`.
     fn lt(self, other: Self) -> Self::Mask;
-    /// self ≤ other.
+    /// Lane-wise `self` ≤ `other`.
     fn le(self, other: Self) -> Self::Mask;
-    /// self = other.
+    /// Lane-wise `self` = `other`.
     fn eq(self, other: Self) -> Self::Mask;
     /// Bitwise selection: `self` where the mask is set, `other` elsewhere.
     fn select(self, mask: Self::Mask, other: Self) -> Self;
