@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use glimt::pipeline::protocol::{Command, Event, PreviewSize, Request, Writing};
+use glimt::pipeline::protocol::{Command, Event, PreviewSize, Request, WriteMode};
 use glimt::pipeline::settings::Overrides;
 use glimt::pipeline::{Handle, start};
 
@@ -55,7 +55,7 @@ fn send(worker: &Handle, scene: &Path, generation: &mut u64) {
         scene: scene.to_owned(),
         overrides,
         preview: Some(PreviewSize { width: 118, height: 74, around: None }),
-        write: Writing::No,
+        write: WriteMode::No,
         own: None,
         force: false,
         first: None,

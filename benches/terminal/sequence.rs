@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use glimt::film::Picture;
 use glimt::pipeline::Handle;
-use glimt::pipeline::protocol::{Command, Event, PreviewSize, Request, Writing};
+use glimt::pipeline::protocol::{Command, Event, PreviewSize, Request, WriteMode};
 use glimt::pipeline::settings::Overrides;
 
 /// A preview of an unfinished or finished image.
@@ -32,7 +32,7 @@ pub(crate) fn render(
         scene: scene.to_owned(),
         overrides: Overrides::default(),
         preview: Some(size),
-        write: Writing::No,
+        write: WriteMode::No,
         own: None,
         force: false,
         first: None,

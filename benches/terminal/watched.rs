@@ -9,7 +9,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use glimt::tui::{PixelScreen, filled_squares, xterm_rgb};
+use glimt::tui::{TestImageTerminal, filled_squares, xterm_rgb};
 use portable_pty::{Child, CommandBuilder, MasterPty, PtySize, native_pty_system};
 use ratatui::style::Color;
 
@@ -41,7 +41,7 @@ impl Connection {
 /// Byte counts and the screen at the far end.
 pub(crate) struct FarEnd {
     pub(crate) cells: vt100::Parser,
-    pub(crate) pixels: PixelScreen,
+    pub(crate) pixels: TestImageTerminal,
     /// Number of bytes received.
     pub(crate) came: usize,
     /// Number of bytes sent in total, and before the last answered query.
@@ -116,13 +116,13 @@ impl WatchedTerminal {
         let side = |length| NonZeroU16::new(length).ok_or("the terminal has no cells");
         let far = Arc::new(Mutex::new(FarEnd {
             cells: vt100::Parser::new(side(ROWS)?, side(COLUMNS)?, 0),
-            pixels: PixelScreen::default(),
+            pixels: TestImageTerminal::default(),
             came: 0,
             sent: 0,
             answered: 0,
             most_unanswered: 0,
         }));
-        carry(pair.master.try_clone_reader()?, far.clone(), keys.clone(), line);
+        simulate_connection(pair.master.try_clone_reader()?, far.clone(), keys.clone(), line);
         Ok(Self { _master: pair.master, child, keys, far })
     }
 
@@ -166,7 +166,7 @@ fn lock<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
 type Due = (Instant, Vec<u8>);
 
 /// Simulates the connection: delays output on its way to the far end, and answers on the way back.
-fn carry(
+fn simulate_connection(
     mut output: Box<dyn Read + Send>,
     far: Arc<Mutex<FarEnd>>,
     keys: Arc<Mutex<Box<dyn Write + Send>>>,
@@ -174,7 +174,7 @@ fn carry(
 ) {
     let ((down, arriving), (up, rising)) = (channel::<Due>(), channel::<(Instant, usize, &'static [u8])>());
     let at_end = far.clone();
-    thread::spawn(move || arrive(&arriving, &at_end, &up, line.delay));
+    thread::spawn(move || process_arrivals(&arriving, &at_end, &up, line.delay));
     let at_start = far.clone();
     thread::spawn(move || {
         while let Ok((when, asked, answer)) = rising.recv() {
@@ -204,7 +204,7 @@ fn carry(
     });
 }
 
-fn arrive(
+fn process_arrivals(
     arriving: &Receiver<Due>,
     far: &Mutex<FarEnd>,
     up: &Sender<(Instant, usize, &'static [u8])>,

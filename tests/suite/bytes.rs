@@ -6,7 +6,7 @@ use std::sync::{Arc, PoisonError};
 
 use glimt::film::Picture;
 use glimt::pipeline::Handle;
-use glimt::pipeline::protocol::{Command, Event, PreviewSize, Request, Writing};
+use glimt::pipeline::protocol::{Command, Event, PreviewSize, Request, WriteMode};
 use glimt::pipeline::settings::Overrides;
 use glimt::tui::ColorDepth;
 use glimt::tui::paint::{Fidelity, Painter};
@@ -55,7 +55,7 @@ impl PreviewRenderer {
             scene: path,
             overrides,
             preview: Some(self.preview),
-            write: Writing::No,
+            write: WriteMode::No,
             own: None,
             force: false,
             first: None,

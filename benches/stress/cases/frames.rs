@@ -49,8 +49,8 @@ pub(super) fn rows(extent: CaseSet) -> Vec<StressRow> {
             ));
         }
     }
-    rows.extend(of_shapes(extent));
-    rows.extend(of_lights(extent));
+    rows.extend(shape_rows(extent));
+    rows.extend(light_rows(extent));
     rows.extend(["obj", "off", "ply"].map(georeferenced));
     rows
 }
@@ -60,7 +60,7 @@ const PHOTONS: &str = "PHOTONS";
 
 /// Every shape with every material and both acceleration structures, far from the origin. The long variant
 /// also scales them.
-fn of_shapes(extent: CaseSet) -> Vec<StressRow> {
+fn shape_rows(extent: CaseSet) -> Vec<StressRow> {
     let trees: &[&str] = if extent == CaseSet::Short { &["bvh"] } else { &["bvh", "kdtree"] };
     let one = |shape: &str| {
         // A plane cannot be a light, and its texture repeats once per unit of length at every scale.
@@ -97,7 +97,7 @@ fn of_shapes(extent: CaseSet) -> Vec<StressRow> {
 }
 
 /// Scenes with a single light, moved and scaled.
-fn of_lights(extent: CaseSet) -> Vec<StressRow> {
+fn light_rows(extent: CaseSet) -> Vec<StressRow> {
     let integrators: &[&str] = if extent == CaseSet::Short { &["whitted"] } else { &["whitted", "path"] };
     let picture = |frame, light: &str, integrator: &str| {
         let scene = around(frame, &shape_of("sphere", frame, "gloss")) + &lights_of(frame, &[light]);

@@ -22,7 +22,7 @@ use crate::environment;
 use crate::film::Rect;
 use crate::output::{AnimationFormat, Format};
 use crate::pipeline::settings::{Checkpoints, OutputLayer, Overrides, Resume, Side, UpAxis, View};
-use crate::pipeline::turntable::{self, Turn};
+use crate::pipeline::turntable::{self, TurntableFrame};
 use crate::scene::description::{Accel, Integrator, KeyRange, Render, Shadows, render_keys};
 use crate::tui::{ColorChoice, PreviewChoice};
 
@@ -530,7 +530,7 @@ impl RenderArgs {
             from: self.from,
             up: self.up,
             layers: self.layers.clone().map_or_else(Vec::new, |Layers(layers)| layers),
-            turn: self.turntable.map(|of| Turn { number: 0, of }),
+            turn: self.turntable.map(|of| TurntableFrame { number: 0, of }),
             crop: self.crop,
             threads: self.threads,
             bit_depth: self.bit_depth,

@@ -59,7 +59,7 @@ impl Console {
 
     /// Prints a line to stdout.
     pub(super) fn print_line(&self, text: &str) {
-        self.print_text(&format!("{}\n", visible(text)));
+        self.print_trusted_text(&format!("{}\n", visible(text)));
     }
 
     /// Width of stdout in columns, if it is a terminal.
@@ -68,7 +68,7 @@ impl Console {
     }
 
     /// Prints trusted text to stdout unchanged.
-    pub(super) fn print_text(&self, text: &str) {
+    pub(super) fn print_trusted_text(&self, text: &str) {
         let mut stdout = std::io::stdout().lock();
         self.record_stdout_error(stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()));
     }

@@ -48,7 +48,7 @@ fn forbid_global_pool() {
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> Exit {
     #[cfg(debug_assertions)]
     forbid_global_pool();
-    crate::output::write::prepare_process();
+    crate::output::write::ignore_file_size_signal();
     // Without the handler, an abort ends the process as usual.
     let _ = crate::system::abort::install_abort_handler();
     let arguments: Vec<OsString> = arguments.into_iter().collect();

@@ -9,7 +9,7 @@ use crate::console::Console;
 use crate::exit::Exit;
 use crate::lower::RenderRequest;
 use crate::output::held;
-use crate::pipeline::protocol::{CheckpointNews, Command, Event, Failure, Stage, Status};
+use crate::pipeline::protocol::{CheckpointUpdate, Command, Event, Failure, Stage, Status};
 use crate::pipeline::start;
 use crate::pipeline::watch::{ExternalChange, Watcher, missing_folder};
 use crate::scene::diagnostic::Diagnostic;
@@ -29,7 +29,7 @@ const NOT_WRITTEN: &str = "the image was not written: glimt exited first";
 /// Runs the terminal UI.
 pub(super) fn run(order: RenderRequest, console: &Console) -> Exit {
     // Restore a scene whose replacement was interrupted.
-    held::recover(&order.scene);
+    held::recover_backup(&order.scene);
     if let Some(absent) = missing_scene_error(&order.scene) {
         console.print_diagnostics(&[absent]);
         return Exit::WRONG;
@@ -228,14 +228,14 @@ impl SharedWriteLog {
                 log.is_last_stage = false;
             }
             Event::Checkpoint { news, .. } if has_left => match news {
-                CheckpointNews::Written { path } => log.checkpoint = Some(Ok(path.clone())),
-                CheckpointNews::Failed { message } => log.checkpoint = Some(Err(message.clone())),
-                CheckpointNews::Resumed { .. }
-                | CheckpointNews::Absent { .. }
-                | CheckpointNews::Ignored { .. }
-                | CheckpointNews::Unused { .. }
-                | CheckpointNews::Finished { .. }
-                | CheckpointNews::SetAside { .. } => {}
+                CheckpointUpdate::Written { path } => log.checkpoint = Some(Ok(path.clone())),
+                CheckpointUpdate::Failed { message } => log.checkpoint = Some(Err(message.clone())),
+                CheckpointUpdate::Resumed { .. }
+                | CheckpointUpdate::Absent { .. }
+                | CheckpointUpdate::Ignored { .. }
+                | CheckpointUpdate::Unused { .. }
+                | CheckpointUpdate::Finished { .. }
+                | CheckpointUpdate::SetAside { .. } => {}
             },
             Event::Started { .. }
             | Event::Asset { .. }
@@ -369,7 +369,7 @@ mod tests {
         let removed = "a.png not finished (10 %); a.png was removed since";
         assert_eq!(said(ExitStatus::QUIT, &lost), [removed, not_kept]);
         writes.record_ui_exit();
-        let news = CheckpointNews::Written { path: "a.png.checkpoint".into() };
+        let news = CheckpointUpdate::Written { path: "a.png.checkpoint".into() };
         writes.record_event(&Event::Checkpoint { generation: 1, news });
         let continues = "a.png not finished (10 %); glimt a.toml --seed 1 continues";
         assert_eq!(said(ExitStatus::QUIT, &[]), [continues, not_kept]);

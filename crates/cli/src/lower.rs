@@ -110,7 +110,7 @@ fn check_turntable(args: &RenderArgs) -> Result<(), String> {
             Format::from_path(path)
                 .map_err(|error| format!("{error}; a turntable also accepts .gif and .apng"))?;
         }
-        turntable::check_name(path)?;
+        turntable::check_frame_pattern(path)?;
         check_once(path, &mut known)?;
     }
     if let Some(twin) = turntable::first_repeated_file(&args.outputs, args.turntable.unwrap_or(1)) {
@@ -118,7 +118,7 @@ fn check_turntable(args: &RenderArgs) -> Result<(), String> {
         return Err(format!("{name} would be written twice: choose distinct file names"));
     }
     match &args.report {
-        Some(path) if path != Path::new(STDOUT_NAME) && !turntable::has_number(path) => {
+        Some(path) if path != Path::new(STDOUT_NAME) && !turntable::has_frame_placeholder(path) => {
             let name = turntable::with_placeholder(path);
             Err(format!("a turntable has one report per frame: use --report {}", name.display()))
         }

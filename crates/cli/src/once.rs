@@ -10,10 +10,10 @@ use crate::exit::Exit;
 use crate::lower::RenderRequest;
 use crate::output::AnimationFormat;
 use crate::pipeline::protocol::{
-    CheckpointNews, Command, Event, Failure, Report, Request, Stage, StageReport, Status, Writing,
+    CheckpointUpdate, Command, Event, Failure, Report, Request, Stage, StageReport, Status, WriteMode,
 };
 use crate::pipeline::settings::{EffectiveSettings, Overrides};
-use crate::pipeline::turntable::{Turn, leftover_frames};
+use crate::pipeline::turntable::{TurntableFrame, leftover_frames};
 use crate::pipeline::{Handle, start};
 use crate::progress::{self, Reporter};
 use crate::scene::diagnostic::{Diagnostic, Severity};
@@ -38,7 +38,7 @@ pub(super) fn run(order: &RenderRequest, console: &Console) -> Exit {
     };
     let remote = worker.remote();
     let is_again = AtomicBool::new(false);
-    let ended = match signals::catch(move || {
+    let ended = match signals::install_signal_handlers(move || {
         // Stop rendering and save a checkpoint. Finish a file that is being written unless a second signal
         // arrives.
         remote.send(Command::Suspend);
@@ -47,7 +47,7 @@ pub(super) fn run(order: &RenderRequest, console: &Console) -> Exit {
         }
     }) {
         Ok(ended) => ended,
-        Err(error) => return console.fail(Exit::FAILED, &signals::describe_catch_failure(&error)),
+        Err(error) => return console.fail(Exit::FAILED, &signals::describe_handler_failure(&error)),
     };
     let mut deadline = ExitDeadline::default();
     let mut written = ImagesWrittenSoFar::default();
@@ -56,7 +56,7 @@ pub(super) fn run(order: &RenderRequest, console: &Console) -> Exit {
         let now = Instant::now();
         // Without checkpoints, the image being written would be lost.
         let is_lost = is_writing && !has_checkpoints;
-        if ended.signal_number().is_some() && !is_lost && deadline.stops_writing(now, is_writing) {
+        if ended.signal_number().is_some() && !is_lost && deadline.takes_write_timeout(now, is_writing) {
             worker.send(Command::Cancel);
         }
         ended.signal_number().is_some() && deadline.is_over(now)
@@ -67,7 +67,7 @@ pub(super) fn run(order: &RenderRequest, console: &Console) -> Exit {
     let mut image_reporter = reporter();
     for overrides in render_requests(&order.overrides) {
         let turn = overrides.turn;
-        if let Some(Turn { number, of }) = turn.filter(|_| image_reporter.says_results()) {
+        if let Some(TurntableFrame { number, of }) = turn.filter(|_| image_reporter.says_results()) {
             console.print_message(&format!("frame {} of {of}", number + 1));
         }
         worker.send(Command::Render(Box::new(Request {
@@ -75,7 +75,7 @@ pub(super) fn run(order: &RenderRequest, console: &Console) -> Exit {
             scene: order.scene.clone(),
             overrides,
             preview: None,
-            write: Writing::Must,
+            write: WriteMode::Must,
             own: None,
             force: false,
             first: None,
@@ -84,7 +84,7 @@ pub(super) fn run(order: &RenderRequest, console: &Console) -> Exit {
         let reporter = &mut *image_reporter;
         exit = handle_events(&worker, (order, turn), console, reporter, &mut written, &mut is_over);
         reporter.end();
-        is_whole = exit == Exit::DONE && turn.is_none_or(Turn::is_last);
+        is_whole = exit == Exit::DONE && turn.is_none_or(TurntableFrame::is_last);
         if exit != Exit::DONE || ended.signal_number().is_some() {
             break;
         }
@@ -103,7 +103,7 @@ pub(super) fn run(order: &RenderRequest, console: &Console) -> Exit {
 fn render_requests(overrides: &Overrides) -> impl Iterator<Item = Overrides> {
     let count = overrides.turn.map_or(1, |turn| turn.of);
     (0..count).map(|number| {
-        let turn = overrides.turn.map(|turn| Turn { number, ..turn });
+        let turn = overrides.turn.map(|turn| TurntableFrame { number, ..turn });
         Overrides { turn, ..overrides.clone() }
     })
 }
@@ -148,7 +148,7 @@ impl ExitDeadline {
 
     /// Returns true the first time it is called after writing has taken too long. If an image was being
     /// written, extends the deadline so that a checkpoint can be written.
-    fn stops_writing(&mut self, now: Instant, is_image: bool) -> bool {
+    fn takes_write_timeout(&mut self, now: Instant, is_image: bool) -> bool {
         let end = *self.end.get_or_insert(now + EXIT_TIMEOUT);
         if self.is_write_stopped || now + EXIT_TIMEOUT < end + WRITE_TIMEOUT {
             return false;
@@ -169,7 +169,7 @@ impl ExitDeadline {
 /// Handles events until the request is finished or aborted by a signal.
 fn handle_events(
     worker: &Handle,
-    (order, turn): (&RenderRequest, Option<Turn>),
+    (order, turn): (&RenderRequest, Option<TurntableFrame>),
     console: &Console,
     reporter: &mut dyn Reporter,
     written: &mut ImagesWrittenSoFar,
@@ -217,7 +217,7 @@ fn handle_events(
         reporter.event(&event);
         match event {
             Event::Written { path, .. } => written.images.push(path),
-            Event::Checkpoint { news: CheckpointNews::Written { path }, .. } => {
+            Event::Checkpoint { news: CheckpointUpdate::Written { path }, .. } => {
                 written.checkpoint = Some(path);
             }
             // The report or one of several images could not be written. If no image can be written, the
@@ -275,7 +275,7 @@ fn rereads_changed_file(stage: &StageReport) -> bool {
 
 /// Reports checkpoint news and warnings immediately, while the user can still react.
 fn report_checkpoint(
-    news: &CheckpointNews,
+    news: &CheckpointUpdate,
     call_warnings: &mut Vec<Diagnostic>,
     reporter: &dyn Reporter,
     console: &Console,
@@ -293,27 +293,27 @@ fn report_checkpoint(
         }
     };
     match news {
-        CheckpointNews::Written { .. } => {}
-        CheckpointNews::Failed { message } => {
+        CheckpointUpdate::Written { .. } => {}
+        CheckpointUpdate::Failed { message } => {
             warn(message, "use --checkpoint 0 to render without checkpoints");
         }
-        CheckpointNews::Resumed { path, samples } => {
+        CheckpointUpdate::Resumed { path, samples } => {
             say(format!("Resuming from {} at {samples} samples", path.display()));
         }
-        CheckpointNews::Absent { path } => {
+        CheckpointUpdate::Absent { path } => {
             say(format!("No checkpoint {}; starting from the beginning", path.display()));
         }
-        CheckpointNews::Ignored { path } => {
+        CheckpointUpdate::Ignored { path } => {
             let message = format!("ignoring {}, a checkpoint of this image", path.display());
             warn(&message, "use --resume to continue from it");
         }
-        CheckpointNews::Unused { path, why } => {
+        CheckpointUpdate::Unused { path, why } => {
             say(format!("Ignoring {}: {why}; starting from the beginning", path.display()));
         }
-        CheckpointNews::Finished { path } => {
+        CheckpointUpdate::Finished { path } => {
             say(format!("{} is already finished", path.display()));
         }
-        CheckpointNews::SetAside { path } => {
+        CheckpointUpdate::SetAside { path } => {
             say(format!("Saved the checkpoint of another render as {}", path.display()));
         }
     }
@@ -345,7 +345,7 @@ fn ineffective_option_warnings(asked: &Overrides, settings: &EffectiveSettings) 
 
 fn report_done(
     report: &Report,
-    (written, turn): (&[PathBuf], Option<Turn>),
+    (written, turn): (&[PathBuf], Option<TurntableFrame>),
     unwritten: &[String],
     console: &Console,
     reporter: &dyn Reporter,
@@ -366,7 +366,7 @@ fn report_done(
 }
 
 /// A warning about files left over from an earlier, longer turntable. `None` if there are no such files.
-fn left_over_warning(last: &Path, turn: Turn) -> Option<String> {
+fn left_over_warning(last: &Path, turn: TurntableFrame) -> Option<String> {
     let left = leftover_frames(last, turn);
     let (first, more) = (left.first()?.display(), left.len() - 1);
     let more = if more == 0 { String::new() } else { format!(" and {more} more") };
@@ -389,7 +389,7 @@ fn exit_code(failure: &Failure) -> Exit {
 }
 
 /// Describes a written image, as in `wrote cornell.png (640×480, 64 samples, 1.93 s)`.
-fn describe_written_image(path: &Path, report: &Report, turn: Option<Turn>) -> String {
+fn describe_written_image(path: &Path, report: &Report, turn: Option<TurntableFrame>) -> String {
     let image = &report.image;
     if let Some(turn) = turn.filter(|_| AnimationFormat::from_path(path).is_some()) {
         return format!("wrote {} ({}×{}, {} frames)", path.display(), image.width, image.height, turn.of);
@@ -424,7 +424,7 @@ mod tests {
         let signal = Instant::now();
         for (is_image, end) in [(true, WRITE_TIMEOUT + EXIT_TIMEOUT), (false, EXIT_TIMEOUT)] {
             let mut deadline = ExitDeadline::default();
-            let mut stops = |after| deadline.stops_writing(signal + after, is_image);
+            let mut stops = |after| deadline.takes_write_timeout(signal + after, is_image);
             assert!(!stops(Duration::ZERO) && !stops(WRITE_TIMEOUT / 2));
             assert!(stops(WRITE_TIMEOUT) && !stops(EXIT_TIMEOUT), "once");
             assert!(!deadline.is_over(signal + end - TICK) && deadline.is_over(signal + end));

@@ -27,8 +27,8 @@ pub(super) fn signal_name(number: i32) -> Option<&'static str> {
     }
 }
 
-/// Explains why [`catch`] failed and what to do.
-pub(super) fn describe_catch_failure(error: &std::io::Error) -> String {
+/// Explains why [`install_signal_handlers`] failed and what to do.
+pub(super) fn describe_handler_failure(error: &std::io::Error) -> String {
     format!(
         "cannot listen to signals: {}; raise the limits on open files and on processes (ulimit -n, ulimit -u)",
         describe_error(error)
@@ -39,7 +39,9 @@ pub(super) fn describe_catch_failure(error: &std::io::Error) -> String {
 ///
 /// # Errors
 /// The handlers could not be set up.
-pub(super) fn catch(on_signal: impl Fn() + Send + 'static) -> std::io::Result<ReceivedSignal> {
+pub(super) fn install_signal_handlers(
+    on_signal: impl Fn() + Send + 'static,
+) -> std::io::Result<ReceivedSignal> {
     let mut signals = Signals::new([SIGINT, SIGTERM, SIGHUP])?;
     let received = ReceivedSignal::default();
     let recorder = received.clone();

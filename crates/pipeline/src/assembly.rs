@@ -6,12 +6,12 @@ use super::cache::Memo;
 use super::keys;
 use super::stages::accel::AccelResult;
 use super::stages::textures::Textures;
-use super::turntable::Turn;
+use super::turntable::TurntableFrame;
 use crate::assets::OrbiterCamera;
 use crate::lights::Lights;
 use crate::math::DVec3;
 use crate::scene::description::{Camera, CameraChange, Scene, Viewpoint};
-use crate::scene::fingerprint::{Key, Referents};
+use crate::scene::fingerprint::{FingerprintContext, Key};
 use crate::world::{self, GlassSolids, World, WorldInputs};
 
 /// A world and its key. The key covers everything that affects the world's images.
@@ -36,10 +36,10 @@ impl RequestCamera {
     }
 
     /// Rotates the camera for a turntable frame. Without a turntable, returns it unchanged.
-    pub(super) fn turned(self, turn: Option<Turn>) -> Self {
+    pub(super) fn turned(self, turn: Option<TurntableFrame>) -> Self {
         match turn {
             // The first frame uses the scene's camera unchanged.
-            None | Some(Turn { number: 0, .. }) => self,
+            None | Some(TurntableFrame { number: 0, .. }) => self,
             Some(turn) => {
                 let view = self.viewpoint();
                 let change = CameraChange { pose: Some(turn.pose(&view.pose)), ..CameraChange::default() };
@@ -61,7 +61,7 @@ impl RequestCamera {
 /// Assembles the world, or reuses the previous one if the key is unchanged.
 pub(super) fn world(
     scene: &Scene,
-    (surfaces, of): (&Key, &Referents<'_>),
+    (surfaces, of): (&Key, &FingerprintContext<'_>),
     (built, lights, bodies): (AccelResult, Arc<Lights>, Arc<GlassSolids>),
     textures: &Textures,
     eye: &RequestCamera,

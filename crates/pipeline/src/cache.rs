@@ -125,10 +125,10 @@ pub(super) fn first_request_that_fits(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::fingerprint::Fingerprint;
+    use crate::scene::fingerprint::FingerprintHasher;
 
     fn key(name: &str) -> Key {
-        Fingerprint::new(name).finish()
+        FingerprintHasher::new(name).finish()
     }
 
     #[test]

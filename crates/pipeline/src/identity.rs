@@ -13,7 +13,7 @@ use crate::choice::Choice;
 use crate::integrators::{PhotonSettings, RenderSettings};
 use crate::output::part::Dependency;
 use crate::scene::description::{CameraChange, Scene};
-use crate::scene::fingerprint::{Fingerprint, Key};
+use crate::scene::fingerprint::{FingerprintHasher, Key};
 
 /// Everything that affects an image.
 pub(super) struct ImageDependencies<'a> {
@@ -119,7 +119,7 @@ impl ImageDependencies<'_> {
 }
 
 fn key(content: &str, part: Option<u32>) -> Key {
-    let mut key = Fingerprint::new("content");
+    let mut key = FingerprintHasher::new("content");
     key.text(content);
     if let Some(part) = part {
         key.index(part as usize);

@@ -11,7 +11,7 @@ use super::watch::content::FileRead;
 use crate::assets::gltf::is_gltf;
 use crate::output::{FileFingerprint, FileIdentity};
 use crate::scene::description::Camera;
-use crate::scene::{Loaded, is_model};
+use crate::scene::{LoadedScene, is_model};
 
 /// A file that must not be written.
 #[derive(Clone, Debug)]
@@ -20,7 +20,7 @@ pub(super) struct Input {
     /// Role of the file in the scene, for messages.
     pub(super) role: String,
     /// The scene, and the span in the scene file that references this file.
-    pub(super) place: Option<(Arc<Loaded>, Range<usize>)>,
+    pub(super) place: Option<(Arc<LoadedScene>, Range<usize>)>,
 }
 
 /// All files that must not be written.
@@ -62,7 +62,7 @@ impl Inputs {
     }
 
     /// Adds the material libraries and images used by mesh files, and the files referenced by glTF files.
-    pub(super) fn add_meshes(&mut self, loaded: &Arc<Loaded>, meshes: &Meshes) {
+    pub(super) fn add_meshes(&mut self, loaded: &Arc<LoadedScene>, meshes: &Meshes) {
         for (file, kept) in loaded.scene.mesh_files.iter().zip(meshes) {
             let name = file.value.file_name().unwrap_or_default().to_string_lossy();
             let mut add = |path: &PathBuf, role: String| {

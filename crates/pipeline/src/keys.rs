@@ -6,22 +6,30 @@ use crate::integrators::{PhotonSettings, RenderSettings};
 use crate::math::DVec3;
 use crate::plan::Plan;
 use crate::scene::description::{Accel, Camera, Object, Render, Scene, Shape};
-use crate::scene::fingerprint::{Fingerprint, Key, Referents};
+use crate::scene::fingerprint::{FingerprintContext, FingerprintHasher, Key};
 
 /// Returns the textures, meshes and orbiter that descriptions refer to by index.
-pub(crate) fn referents<'a>(scene: &'a Scene, meshes: &'a [Key], orbiter: Option<&'a str>) -> Referents<'a> {
-    Referents { textures: &scene.textures, meshes, orbiter }
+pub(crate) fn referents<'a>(
+    scene: &'a Scene,
+    meshes: &'a [Key],
+    orbiter: Option<&'a str>,
+) -> FingerprintContext<'a> {
+    FingerprintContext { textures: &scene.textures, meshes, orbiter }
 }
 
 /// Returns the key of a mesh's tree.
 pub(crate) fn tree(mesh: &Key, accel: Accel) -> Key {
-    Fingerprint::new("tree").key(mesh).choice(accel).finish()
+    FingerprintHasher::new("tree").key(mesh).choice(accel).finish()
 }
 
 /// Returns the key of all trees, with each object offset by its lift. `lifts` is empty if no object is
 /// offset.
-pub(crate) fn geometry(scene: &Scene, of: &Referents<'_>, (origin, lifts): (DVec3, &[DVec3])) -> Key {
-    let mut key = Fingerprint::new("lifted");
+pub(crate) fn geometry(
+    scene: &Scene,
+    of: &FingerprintContext<'_>,
+    (origin, lifts): (DVec3, &[DVec3]),
+) -> Key {
+    let mut key = FingerprintHasher::new("lifted");
     key.key(&from(&shapes(scene, of), origin));
     for lift in lifts {
         key.dvec3(*lift);
@@ -31,8 +39,8 @@ pub(crate) fn geometry(scene: &Scene, of: &Referents<'_>, (origin, lifts): (DVec
 
 /// Returns the key of the shapes and their emitting sides, which determine the lights that are moved off
 /// coplanar surfaces.
-pub(crate) fn coplanar(scene: &Scene, of: &Referents<'_>) -> Key {
-    let mut key = Fingerprint::new("coplanar");
+pub(crate) fn coplanar(scene: &Scene, of: &FingerprintContext<'_>) -> Key {
+    let mut key = FingerprintHasher::new("coplanar");
     key.key(&shapes(scene, of));
     let is_round = |object: &&Object| matches!(object.shape, Shape::Sphere { .. } | Shape::Torus { .. });
     for object in scene.objects.iter().filter(|object| !is_round(object)) {
@@ -48,16 +56,16 @@ pub(crate) fn coplanar(scene: &Scene, of: &Referents<'_>) -> Key {
 
 /// Combines a key with a coordinate origin.
 pub(crate) fn from(of: &Key, origin: DVec3) -> Key {
-    Fingerprint::new("from").key(of).dvec3(origin).finish()
+    FingerprintHasher::new("from").key(of).dvec3(origin).finish()
 }
 
 /// Combines a geometry key with the kind of tree.
 pub(crate) fn with_tree_kind(of: &Key, accel: Accel) -> Key {
-    Fingerprint::new("in trees").key(of).choice(accel).finish()
+    FingerprintHasher::new("in trees").key(of).choice(accel).finish()
 }
 
-fn shapes(scene: &Scene, of: &Referents<'_>) -> Key {
-    let mut key = Fingerprint::new("shapes");
+fn shapes(scene: &Scene, of: &FingerprintContext<'_>) -> Key {
+    let mut key = FingerprintHasher::new("shapes");
     for object in &scene.objects {
         key.add(&object.shape, of);
     }
@@ -65,11 +73,11 @@ fn shapes(scene: &Scene, of: &Referents<'_>) -> Key {
 }
 
 /// Returns the key of the shapes and their glass materials.
-pub(crate) fn glass(scene: &Scene, of: &Referents<'_>) -> Key {
-    let mut key = Fingerprint::new("glass");
+pub(crate) fn glass(scene: &Scene, of: &FingerprintContext<'_>) -> Key {
+    let mut key = FingerprintHasher::new("glass");
     key.key(&shapes(scene, of));
     for object in &scene.objects {
-        let substance = object.material.and_then(|index| scene.materials[index].kind.glass_medium_bits());
+        let substance = object.material.and_then(|index| scene.materials[index].kind.glass_medium_key());
         key.flag(object.material.is_some()).flag(substance.is_some());
         for part in substance.into_iter().flatten() {
             key.u64(part);
@@ -82,11 +90,11 @@ pub(crate) fn glass(scene: &Scene, of: &Referents<'_>) -> Key {
 /// `patterns` are the keys of emission textures.
 pub(crate) fn lights(
     scene: &Scene,
-    of: &Referents<'_>,
+    of: &FingerprintContext<'_>,
     (origin, lifts): (DVec3, &[DVec3]),
     (sky, patterns): (Option<&Key>, &[&Key]),
 ) -> Key {
-    let mut key = Fingerprint::new("lights");
+    let mut key = FingerprintHasher::new("lights");
     key.key(&from(&described_lights(scene, of), origin)).flag(sky.is_some());
     for lift in lifts {
         key.dvec3(*lift);
@@ -100,8 +108,8 @@ pub(crate) fn lights(
     key.finish()
 }
 
-fn described_lights(scene: &Scene, of: &Referents<'_>) -> Key {
-    let mut key = Fingerprint::new("described lights");
+fn described_lights(scene: &Scene, of: &FingerprintContext<'_>) -> Key {
+    let mut key = FingerprintHasher::new("described lights");
     key.add(&scene.environment, of);
     for light in &scene.lights {
         key.add(light, of);
@@ -129,21 +137,21 @@ fn described_lights(scene: &Scene, of: &Referents<'_>) -> Key {
 
 /// Returns the key of a world. It excludes the kind of tree, because all kinds produce the same hits. Views
 /// that visualize trees include the kind in their own keys.
-pub(crate) fn world(surfaces: &Key, camera: &Camera, of: &Referents<'_>) -> Key {
-    Fingerprint::new("world").key(surfaces).add(camera, of).finish()
+pub(crate) fn world(surfaces: &Key, camera: &Camera, of: &FingerprintContext<'_>) -> Key {
+    FingerprintHasher::new("world").key(surfaces).add(camera, of).finish()
 }
 
 /// Returns the key of photons: surfaces relative to `origin`, emission and maximum depth.
 pub(crate) fn photons(surfaces: &Key, origin: DVec3, render: &Render, photons: PhotonSettings) -> Key {
     let PhotonSettings { count, radius, bounces } = photons;
-    let mut key = Fingerprint::new("photons");
+    let mut key = FingerprintHasher::new("photons");
     key.key(&from(surfaces, origin)).u64(count.into()).f32(radius).u64(bounces.into());
     key.u64(render.max_depth.into()).u64(render.seed.into()).finish()
 }
 
 /// Returns the key of all surfaces, lights and textures.
-pub(crate) fn surfaces(scene: &Scene, of: &Referents<'_>, textures: &[Key]) -> Key {
-    let mut key = Fingerprint::new("surfaces");
+pub(crate) fn surfaces(scene: &Scene, of: &FingerprintContext<'_>, textures: &[Key]) -> Key {
+    let mut key = FingerprintHasher::new("surfaces");
     key.key(&shapes(scene, of)).key(&described_lights(scene, of));
     for object in &scene.objects {
         match object.material {
@@ -160,8 +168,8 @@ pub(crate) fn surfaces(scene: &Scene, of: &Referents<'_>, textures: &[Key]) -> K
 
 /// Returns the key of everything that affects a film's sums, except the number of samples.
 pub(crate) fn render(world: Key, settings: &RenderSettings, crop: Option<Rect>) -> Key {
-    let mut key = Fingerprint::new("render");
-    key.key(&world).add(settings, &Referents::default());
+    let mut key = FingerprintHasher::new("render");
+    key.key(&world).add(settings, &FingerprintContext::default());
     if let Some(rect) = crop {
         key.u64(rect.x.into()).u64(rect.y.into()).u64(rect.width.into()).u64(rect.height.into());
     }
@@ -172,7 +180,7 @@ pub(crate) fn render(world: Key, settings: &RenderSettings, crop: Option<Rect>) 
 /// key includes `film_number`.
 pub(crate) fn image(film: Key, plan: &Plan, film_number: u64) -> Key {
     let Render { samples, error, .. } = plan.settings.render;
-    let mut key = Fingerprint::new("image");
+    let mut key = FingerprintHasher::new("image");
     key.key(&film).u64(samples.into()).f32(error);
     key.choice(plan.settings.view).f32(plan.tone.exposure_stops).choice(plan.tone.curve);
     if let Some(seconds) = plan.time_seconds {
@@ -265,7 +273,7 @@ mod tests {
         let scene = loaded_of(BALL).scene;
         let plan = crate::plan::plan(&scene, std::path::Path::new("a.toml"), &Default::default());
         let settings = plan.expect("a plan").settings;
-        let of = |settings: &RenderSettings| render(Fingerprint::new("w").finish(), settings, None);
+        let of = |settings: &RenderSettings| render(FingerprintHasher::new("w").finish(), settings, None);
         let render_settings = settings.render;
         // No `..` here: adding a field must cause a compile error until it is tested below.
         let RenderSettings { render: _, dof, view, photons } = settings;
@@ -345,7 +353,7 @@ mod tests {
         assert_eq!(of(&with(Render { clamp: 1.0, ..render_settings })), of(&settings));
         let mut keys: Vec<Key> = others.iter().chain([&settings]).map(of).collect();
         let crop = Rect { x: 0, y: 0, width: 1, height: 1 };
-        keys.push(render(Fingerprint::new("w").finish(), &settings, Some(crop)));
+        keys.push(render(FingerprintHasher::new("w").finish(), &settings, Some(crop)));
         for (i, key) in keys.iter().enumerate() {
             assert!(!keys[..i].contains(key), "key {i} is not unique");
         }

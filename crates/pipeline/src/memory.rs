@@ -4,13 +4,13 @@
 //! sizes are conservative estimates based on measured peak memory per triangle and per emitted photon.
 
 use super::plan::Plan;
-use super::render::share::Share;
+use super::render::share::Shard;
 use super::stages::Stop;
 use super::stages::meshes::Meshes;
 use crate::film::{Film, Rect, SumOrder};
 use crate::integrators::PhotonSettings;
 use crate::scene::description::{Accel, Scene};
-use crate::system::memory::{Limit, limit};
+use crate::system::memory::{MemoryLimit, limit};
 
 /// Bytes used by the program itself.
 const PROGRAM: u64 = 24 << 20;
@@ -115,7 +115,7 @@ impl MemoryEstimate {
     }
 
     /// Like [`Self::check`], with the system's limit as a parameter.
-    fn check_against(&self, plan: &Plan, limit: impl FnOnce() -> Option<Limit>) -> Result<u64, Stop> {
+    fn check_against(&self, plan: &Plan, limit: impl FnOnce() -> Option<MemoryLimit>) -> Result<u64, Stop> {
         let all = self.bytes();
         let frames = self.0.iter().find(|(name, bytes)| *name == FRAMES && *bytes > MAX_FRAMES);
         if let (Some((_, bytes)), None) = (frames, plan.memory) {
@@ -127,8 +127,9 @@ impl MemoryEstimate {
             )));
         }
         // A command-line limit replaces the system limit, because the estimate is conservative.
-        let limit = plan.memory.map(|bytes| Limit { bytes, setting: "--memory".to_owned() }).or_else(limit);
-        let Some(Limit { bytes: most, setting }) = limit else { return Ok(u64::MAX) };
+        let limit =
+            plan.memory.map(|bytes| MemoryLimit { bytes, setting: "--memory".to_owned() }).or_else(limit);
+        let Some(MemoryLimit { bytes: most, setting }) = limit else { return Ok(u64::MAX) };
         if all <= most {
             return Ok(most - all);
         }
@@ -170,7 +171,7 @@ impl MemoryEstimate {
 fn sum_order(plan: &Plan) -> SumOrder {
     let gathers = plan.settings.gathers_photons();
     match plan.shard {
-        Some(shard) => Share::new(shard, gathers, plan.settings.render.samples).sums(),
+        Some(shard) => Shard::new(shard, gathers, plan.settings.render.samples).sums(),
         None if gathers => SumOrder::Blocked,
         None => SumOrder::Sequential,
     }
@@ -251,7 +252,7 @@ mod tests {
 
     #[test]
     fn system_limit_applies_without_memory_option() {
-        let limit = || Some(Limit { bytes: 8 << 20, setting: "the control group (x)".to_owned() });
+        let limit = || Some(MemoryLimit { bytes: 8 << 20, setting: "the control group (x)".to_owned() });
         let check = |overrides: &Overrides| {
             let plan = planned(overrides);
             MemoryEstimate::for_image(&plan).check_against(&plan, limit)

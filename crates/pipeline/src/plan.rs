@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::settings::{Checkpoints, EffectiveSettings, OutputLayer, Overrides, Side, UpAxis, View};
-use super::turntable::{self, Turn};
+use super::turntable::{self, TurntableFrame};
 use crate::choice::Choice;
 use crate::film::range_map::{DataKind, RangeMap};
 use crate::film::tone::ToneMapping;
@@ -37,7 +37,7 @@ pub(super) struct Plan {
     /// Animation files that contain this image as a frame.
     pub(super) moving: Vec<PathBuf>,
     /// The turntable frame. `None` for a still image.
-    pub(super) turn: Option<Turn>,
+    pub(super) turn: Option<TurntableFrame>,
     /// Additional layers for EXR files.
     pub(super) layers: Vec<OutputLayer>,
     /// For a model, the side facing the camera and the up axis, if set on the command line.
@@ -206,7 +206,7 @@ struct OutputFiles {
 }
 
 impl OutputFiles {
-    fn of(paths: Vec<PathBuf>, turn: Option<Turn>) -> Self {
+    fn of(paths: Vec<PathBuf>, turn: Option<TurntableFrame>) -> Self {
         let (mut moving, mut later_outputs) = (Vec::new(), Vec::new());
         let Some(turn) = turn else { return Self { outputs: paths, moving, later_outputs } };
         let mut outputs = Vec::new();
@@ -218,7 +218,7 @@ impl OutputFiles {
             // For the first frame, also list the files of later frames, so that conflicts are detected before
             // hours of rendering.
             let others = (turn.number + 1..turn.of).filter(|_| turn.number == 0);
-            let of = |number| turntable::frame_path(&path, Turn { number, ..turn });
+            let of = |number| turntable::frame_path(&path, TurntableFrame { number, ..turn });
             later_outputs.extend(others.filter_map(of));
             outputs.push(of(turn.number).unwrap_or(path));
         }

@@ -65,7 +65,7 @@ pub struct Request {
     /// Maximum size of previews, which keep the image's aspect ratio. `None` disables previews.
     pub preview: Option<PreviewSize>,
     /// Whether to write the finished image.
-    pub write: Writing,
+    pub write: WriteMode,
     /// Overrides for the scene's own image if this request shows another one. The own image's film and
     /// checkpoint are kept. `None` if this request is for the scene's own image.
     pub own: Option<Box<Overrides>>,
@@ -77,7 +77,7 @@ pub struct Request {
 
 /// Whether to write the finished image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Writing {
+pub enum WriteMode {
     /// Do not write the image.
     No,
     /// Try to write the image. It is rendered and shown even if writing fails. [`Event::WriteFailed`] and
@@ -218,7 +218,7 @@ pub enum Event {
         /// Request number.
         generation: u64,
         /// The update.
-        news: CheckpointNews,
+        news: CheckpointUpdate,
     },
     /// [`Command::Write`] is postponed until every pixel has a sample.
     WritePostponed {
@@ -277,7 +277,7 @@ pub enum Event {
         /// Request number.
         generation: u64,
         /// How the render ended.
-        end: LastValidSceneEnd,
+        end: LastValidSceneOutcome,
     },
     /// The request was cancelled by a newer one or by [`Command::Cancel`].
     Cancelled {
@@ -302,7 +302,7 @@ pub enum OwnImageState {
 
 /// An update about a checkpoint.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum CheckpointNews {
+pub enum CheckpointUpdate {
     /// The checkpoint was written.
     Written {
         /// Path of the checkpoint.
@@ -360,7 +360,7 @@ pub enum Failure {
 
 /// How the render of the last valid scene ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LastValidSceneEnd {
+pub enum LastValidSceneOutcome {
     /// The image is finished.
     Finished {
         /// Whether the image had already been finished, so nothing was rendered or written.

@@ -18,8 +18,8 @@ use crate::math::DVec2;
 use crate::messages::{
     ALREADY_EXISTS, CAMERA_CHANGED, MODEL_MISSING, NOT_UNDONE, SCENE_FILE_CHANGED, SCENE_FILE_MISSING,
 };
-use crate::output::{Losses, OutputError, write};
-use crate::scene::{Loaded, is_mesh, is_model, text_now};
+use crate::output::{AttributeLossPolicy, OutputError, write};
+use crate::scene::{LoadedScene, is_mesh, is_model, text_now};
 use crate::system::{describe_error, file};
 use crate::world::World;
 
@@ -146,7 +146,7 @@ impl QueryContext {
             replace_scene_text(&path, (read, &text), inputs, (changed, "camera not saved"))?;
             Some(CameraEdit { path: path.clone(), before: read.into(), after: text.as_str().into() })
         };
-        let is_own = Loaded::camera_of(&text, &self.sets).is_some_and(|own| own.is_nearly(camera));
+        let is_own = LoadedScene::camera_of(&text, &self.sets).is_some_and(|own| own.is_nearly(camera));
         Ok(SavedCamera { path, is_new: edit.is_some(), is_own, of_model: false, edit })
     }
 }
@@ -189,11 +189,11 @@ fn replace_scene_text(
     }
     let refused = || OutputError::Refused { reason: changed.to_owned() };
     let may_replace = |_: &Path| has_text(path, old).then_some(()).ok_or_else(refused);
-    let guard = write::Guard {
+    let guard = write::WritePolicy {
         is_kept: &|path| inputs.contain(path),
         may_replace: &may_replace,
         sweep: None,
-        losses: Losses::Refuse,
+        losses: AttributeLossPolicy::Refuse,
     };
     write::atomic_replace(path, (old.as_bytes(), new.as_bytes()), &guard, &CancelToken::new())
         .map_err(|error| error.to_string())
@@ -201,7 +201,7 @@ fn replace_scene_text(
 
 /// Writes the scene generated for a model to a file next to the model, using the given camera. Never replaces
 /// a file.
-fn write_scene_of_model(loaded: &Loaded, camera: &Viewpoint) -> Result<SavedCamera, String> {
+fn write_scene_of_model(loaded: &LoadedScene, camera: &Viewpoint) -> Result<SavedCamera, String> {
     let path = loaded.path.with_extension("toml");
     let shown = path.display();
     if path.symlink_metadata().is_ok() {
@@ -222,7 +222,7 @@ mod tests {
 
     #[test]
     fn unwritable_model_scene_is_reported() {
-        let loaded = Loaded { path: "gone/a.obj".into(), ..loaded_of("[environment]\ncolor = 1\n") };
+        let loaded = LoadedScene { path: "gone/a.obj".into(), ..loaded_of("[environment]\ncolor = 1\n") };
         let pose = Pose { position: DVec3::Z, look_at: DVec3::ZERO, up: DVec3::Y };
         let camera = Viewpoint { pose, fov: 40.0, aperture: 0.0, focus: 1.0 };
         let said = write_scene_of_model(&loaded, &camera).expect_err("no folder");

@@ -3,7 +3,7 @@
 pub(super) mod finish;
 mod marks;
 
-pub(super) use self::marks::ReportMarks;
+pub(super) use self::marks::ReportSignature;
 use super::protocol::StageReport;
 use super::settings::EffectiveSettings;
 

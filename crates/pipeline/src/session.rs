@@ -4,9 +4,9 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::mpsc;
 
-use super::engine::{Engine, EngineConfig, Interruption, Orders, RequestContext};
+use super::engine::{Engine, EngineConfig, Interruption, PendingOrders, RequestContext};
 pub use super::engine::{Rendered, Unrendered};
-use super::protocol::{PreviewSize, PreviewSlot, Request, Writing};
+use super::protocol::{PreviewSize, PreviewSlot, Request, WriteMode};
 use super::queries::Query;
 use super::settings::Overrides;
 use super::sink::Sink;
@@ -42,7 +42,7 @@ impl Session {
             overrides: overrides.clone(),
             preview: None,
             first: None,
-            write: Writing::No,
+            write: WriteMode::No,
             own: None,
             force: true,
         };
@@ -63,7 +63,7 @@ impl Session {
 /// Orders for a request without a front end.
 pub(super) struct NoOrders;
 
-impl Orders for NoOrders {
+impl PendingOrders for NoOrders {
     fn wants_write(&self) -> bool {
         false
     }

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::turntable::Turn;
+use super::turntable::TurntableFrame;
 use crate::choice;
 use crate::film::Rect;
 use crate::integrators::RenderSettings;
@@ -42,7 +42,7 @@ macro_rules! overrides {
             /// Additional layers for EXR files.
             pub layers: Vec<OutputLayer>,
             /// Turntable frame. `None` for a still image.
-            pub turn: Option<Turn>,
+            pub turn: Option<TurntableFrame>,
             /// Pixels to render. The rest of the image stays black.
             pub crop: Option<Rect>,
             /// Number of threads. `None` or 0 means one per core.

@@ -7,7 +7,7 @@ use std::sync::{Arc, PoisonError};
 use std::time::Instant;
 
 use super::protocol::{
-    AssetProgress, CheckpointNews, Event, LatestPreview, OwnImageState, PreviewSlot, PreviewSource,
+    AssetProgress, CheckpointUpdate, Event, LatestPreview, OwnImageState, PreviewSlot, PreviewSource,
     RenderProgress, Section, StageReport,
 };
 use super::watch::content::FileRead;
@@ -72,7 +72,7 @@ impl Sink {
         self.send(Event::NotKept { generation: self.generation, message });
     }
 
-    pub(super) fn checkpoint(&self, news: CheckpointNews) {
+    pub(super) fn checkpoint(&self, news: CheckpointUpdate) {
         self.send(Event::Checkpoint { generation: self.generation, news });
     }
 

@@ -7,13 +7,13 @@ use std::path::{Path, PathBuf};
 use super::inputs::{Input, InputIndex, Inputs};
 use super::plan::{OutputNameSource, Plan};
 use super::render::checkpointer::checkpoint_path;
-use super::report::ReportMarks;
+use super::report::ReportSignature;
 use super::sink::Sink;
 use crate::output::part::{self, PartFile};
-use crate::output::write::{FolderSweep, Guard};
+use crate::output::write::{SweptFolders, WritePolicy};
 use crate::output::{
-    FileIdentity, Losses, OutputError, Replaced, may_replace_image, may_replace_json, scene_of_image,
-    scene_path,
+    AttributeLossPolicy, FileIdentity, OutputError, Replaced, may_replace_image, may_replace_json,
+    scene_of_image, scene_path,
 };
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::is_mesh;
@@ -86,9 +86,9 @@ fn linked_frames(plan: &Plan) -> Vec<Diagnostic> {
 pub(super) fn write_guarded<'a, T>(
     plan: &'a Plan,
     inputs: &Inputs,
-    (target, sweep): (OutputTarget<'a>, Option<&FolderSweep>),
+    (target, sweep): (OutputTarget<'a>, Option<&SweptFolders>),
     sink: &Sink,
-    write: impl FnOnce(&Guard<'_>) -> Result<T, OutputError>,
+    write: impl FnOnce(&WritePolicy<'_>) -> Result<T, OutputError>,
 ) -> Result<T, OutputError> {
     let may_replace = |real: &Path| {
         let inputs = inputs.index_by_identity();
@@ -106,11 +106,11 @@ pub(super) fn write_guarded<'a, T>(
             None => Ok(()),
         }
     };
-    write(&Guard {
+    write(&WritePolicy {
         is_kept: &|path| inputs.contain(path),
         may_replace: &may_replace,
         sweep,
-        losses: Losses::Report(&|what| sink.metadata_lost(what)),
+        losses: AttributeLossPolicy::Report(&|what| sink.metadata_lost(what)),
     })
 }
 
@@ -202,7 +202,7 @@ fn foreign_file_error(plan: &Plan, target: OutputTarget<'_>, at: &Path) -> Optio
             (replaced, help)
         }
         TargetKind::Report => {
-            let replaced = may_replace_json(at, "a report", ReportMarks::have_all_stages);
+            let replaced = may_replace_json(at, "a report", ReportSignature::have_all_stages);
             (replaced, format!("{remedy}; --force replaces it"))
         }
         TargetKind::Picture(OutputNameSource::CommandLine | OutputNameSource::Scene) => {

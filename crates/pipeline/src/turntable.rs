@@ -19,14 +19,14 @@ const DIGIT: u8 = b'#';
 
 /// One frame of a turntable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Turn {
+pub struct TurntableFrame {
     /// 0-based frame index.
     pub number: u32,
     /// Number of frames, at least 1.
     pub of: u32,
 }
 
-impl Turn {
+impl TurntableFrame {
     /// Whether this is the last frame.
     pub fn is_last(self) -> bool {
         self.number + 1 == self.of
@@ -57,7 +57,7 @@ impl Turn {
 ///
 /// # Errors
 /// Returns a message with a suggestion.
-pub fn check_name(path: &Path) -> Result<(), String> {
+pub fn check_frame_pattern(path: &Path) -> Result<(), String> {
     if AnimationFormat::from_path(path).is_some() || split_placeholder(path).is_some() {
         return Ok(());
     }
@@ -70,7 +70,7 @@ pub fn check_name(path: &Path) -> Result<(), String> {
 }
 
 /// Whether a file name contains a placeholder for the frame number.
-pub fn has_number(path: &Path) -> bool {
+pub fn has_frame_placeholder(path: &Path) -> bool {
     split_placeholder(path).is_some()
 }
 
@@ -87,7 +87,7 @@ pub fn with_placeholder(path: &Path) -> PathBuf {
 
 /// Returns the file name for a frame. Replaces the last run of `#` with the 1-based frame number. Returns
 /// `None` if there is no `#`.
-pub(super) fn frame_path(path: &Path, turn: Turn) -> Option<PathBuf> {
+pub(super) fn frame_path(path: &Path, turn: TurntableFrame) -> Option<PathBuf> {
     let (before, digits, after) = split_placeholder(path)?;
     Some(path.with_file_name(with_number(before, (turn.number + 1, digits), after)))
 }
@@ -103,12 +103,12 @@ fn with_number(before: &[u8], (number, digits): (u32, usize), after: &[u8]) -> O
 /// Returns the first file to which two frames would be written. `None` if each frame has its own file.
 pub fn first_repeated_file(outputs: &[PathBuf], of: u32) -> Option<PathBuf> {
     let mut seen = HashSet::new();
-    let all = |number| outputs.iter().filter_map(move |path| frame_path(path, Turn { number, of }));
+    let all = |number| outputs.iter().filter_map(move |path| frame_path(path, TurntableFrame { number, of }));
     (0..of).flat_map(all).find(|path| !seen.insert(path.clone()))
 }
 
 /// Returns existing files with numbers after the last frame, which are left over from a longer turntable.
-pub fn leftover_frames(last: &Path, turn: Turn) -> Vec<PathBuf> {
+pub fn leftover_frames(last: &Path, turn: TurntableFrame) -> Vec<PathBuf> {
     let name = last.file_name().unwrap_or_default().as_bytes();
     // Find the frame number, which is the last run of digits with this value.
     let ends_run = |at: usize| at + 1 == name.len() || !name[at + 1].is_ascii_digit();
@@ -143,7 +143,7 @@ mod tests {
         for name in ["w_3.png", "a2_003.png", "a2_004.png", "a2_006.png", "v1_2_2.png", "v1_3_2.png"] {
             std::fs::write(path(name), "").expect("written");
         }
-        let last = Turn { number: 1, of: 2 };
+        let last = TurntableFrame { number: 1, of: 2 };
         let found = |name: &str| leftover_frames(&path(name), last);
         assert_eq!(found("a2_002.png"), [path("a2_003.png"), path("a2_004.png")]);
         assert_eq!(found("w_2.png"), [path("w_3.png")]);
@@ -160,7 +160,7 @@ mod tests {
             look_at: DVec3::new(1.0, 1.0, 0.0),
             up: DVec3::new(0.0, 2.0, 0.0),
         };
-        let at = |number| Turn { number, of: 4 }.pose(&first);
+        let at = |number| TurntableFrame { number, of: 4 }.pose(&first);
         assert_eq!(at(0), first);
         for (number, expected) in [(1, [5.0, 3.0, 0.0]), (2, [1.0, 3.0, -4.0]), (3, [-3.0, 3.0, 0.0])] {
             let pose = at(number);
@@ -171,7 +171,7 @@ mod tests {
 
     #[test]
     fn files_are_numbered_by_frame() {
-        let name = |path: &str, number| frame_path(Path::new(path), Turn { number, of: 100 });
+        let name = |path: &str, number| frame_path(Path::new(path), TurntableFrame { number, of: 100 });
         assert_eq!(name("out/a_####.png", 6), Some("out/a_0007.png".into()));
         assert_eq!(
             name("a#.exr", 99),
@@ -181,13 +181,14 @@ mod tests {
         assert_eq!(name("#1_##_b.png", 0), Some("#1_01_b.png".into()));
         assert_eq!(name("##/a.png", 0), None, "folders are ignored");
         assert_eq!(name("##a##_###", 4), Some("##a##_005".into()));
-        let endless = frame_path(Path::new(&"#".repeat(65_536)), Turn { number: 6, of: 9 }).expect("a name");
+        let endless =
+            frame_path(Path::new(&"#".repeat(65_536)), TurntableFrame { number: 6, of: 9 }).expect("a name");
         let endless = endless.into_os_string().into_string().expect("digits");
         assert!(endless.len() == 65_536 && endless.ends_with("007"));
         let raw = |bytes: &[u8]| PathBuf::from(OsString::from_vec(bytes.to_vec()));
-        let of_raw = frame_path(&raw(b"\xff_##\xfe.png"), Turn { number: 6, of: 9 });
+        let of_raw = frame_path(&raw(b"\xff_##\xfe.png"), TurntableFrame { number: 6, of: 9 });
         assert_eq!(of_raw, Some(raw(b"\xff_07\xfe.png")), "non-UTF-8 names should be supported");
-        assert_eq!(check_name(&raw(b"\xff_##\xfe.png")), Ok(()));
+        assert_eq!(check_frame_pattern(&raw(b"\xff_##\xfe.png")), Ok(()));
         assert_eq!(with_placeholder(Path::new("x/a.b.png")), Path::new("x/a.b_####.png"));
     }
 
@@ -203,10 +204,10 @@ mod tests {
 
     #[test]
     fn still_image_file_is_rejected_with_suggestion() {
-        let message = check_name(Path::new("x/a.png")).expect_err("one file");
+        let message = check_frame_pattern(Path::new("x/a.png")).expect_err("one file");
         assert!(message.contains("x/a_####.png"), "{message}");
         for right in ["a_####.png", "a.gif", "a.APNG", "a#.exr"] {
-            assert_eq!(check_name(Path::new(right)), Ok(()), "{right}");
+            assert_eq!(check_frame_pattern(Path::new(right)), Ok(()), "{right}");
         }
     }
 }

@@ -9,7 +9,7 @@ use crate::integrators::RenderSettings;
 use crate::messages::{CLAMP_EFFECT, CLAMP_EFFECT_ON_MODELS};
 use crate::scene::description::{MaterialKind, Scene};
 use crate::scene::diagnostic::{Diagnostic, Severity};
-use crate::scene::{Loaded, is_model};
+use crate::scene::{LoadedScene, is_model};
 
 /// The setting that caused a warning.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,7 +23,7 @@ enum Cause {
 
 /// Returns warnings about a scene's effective settings, which include `overrides`.
 pub(super) fn settings_warnings(
-    loaded: &Loaded,
+    loaded: &LoadedScene,
     scene: &Scene,
     settings: &RenderSettings,
     overrides: &Overrides,
@@ -33,7 +33,7 @@ pub(super) fn settings_warnings(
 }
 
 /// Adds the location of the setting that caused a warning.
-fn locate_setting(cause: Cause, message: String, loaded: &Loaded, overrides: &Overrides) -> Diagnostic {
+fn locate_setting(cause: Cause, message: String, loaded: &LoadedScene, overrides: &Overrides) -> Diagnostic {
     let severity = Severity::Warning;
     if let Some(option) = cause.option(overrides) {
         let help = Some(format!("caused by `{option}`, not by the scene"));
@@ -96,7 +96,7 @@ fn find_warnings(scene: &Scene, settings: &RenderSettings) -> Vec<(Cause, String
     }
     if photons.is_some()
         && has(&is_specular)
-        && scene.lights.iter().any(|light| light.has_emission() && light.has_no_falloff())
+        && scene.lights.iter().any(|light| light.has_emission() && light.has_constant_falloff())
     {
         let message = "photons ignore lights with `falloff = \"none\"`: mirrors and glass reflect none of their light onto surfaces";
         warnings.push((Cause::Photons, message.to_owned()));

@@ -11,8 +11,8 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use super::engine::{Engine, EngineConfig, Interruption, Orders, RequestContext};
-use super::protocol::{Command, Event, Failure, PreviewSize, PreviewSlot, Request, Writing};
+use super::engine::{Engine, EngineConfig, Interruption, PendingOrders, RequestContext};
+use super::protocol::{Command, Event, Failure, PreviewSize, PreviewSlot, Request, WriteMode};
 use super::queries::Query;
 use super::settings::Overrides;
 use super::sink::Sink;
@@ -204,7 +204,7 @@ impl CommandSender {
         }
         mailbox.newest = request.generation;
         mailbox.token.cancel();
-        if request.write != Writing::No {
+        if request.write != WriteMode::No {
             mailbox.writing.cancel();
         }
         (mailbox.paused, mailbox.preview) = (false, None);
@@ -268,7 +268,7 @@ impl CommandSender {
     }
 }
 
-impl Orders for CommandSender {
+impl PendingOrders for CommandSender {
     fn wants_write(&self) -> bool {
         let mailbox = self.lock();
         mailbox.write && !mailbox.is_write_of_waiting
@@ -319,13 +319,13 @@ impl Worker {
         loop {
             let outcome = match self.remote.next() {
                 Task::Quit => {
-                    engine.keep_own(&sink, self.remote.interruption());
+                    engine.save_own_checkpoint(&sink, self.remote.interruption());
                     break;
                 }
                 Task::Write if self.remote.postpone_write(engine.can_write()) => continue,
                 Task::Write => catch_unwind(AssertUnwindSafe(|| engine.write_now(&sink))),
                 Task::Preview(size, token) => {
-                    catch_unwind(AssertUnwindSafe(|| engine.show_now(size, &sink, &token)))
+                    catch_unwind(AssertUnwindSafe(|| engine.show_preview_now(size, &sink, &token)))
                 }
                 Task::Query(query) => catch_unwind(AssertUnwindSafe(|| engine.query(&query, &sink))),
                 Task::Render(request, token, writing) => {
@@ -375,7 +375,7 @@ mod tests {
             scene: "a.toml".into(),
             overrides: Default::default(),
             preview: None,
-            write: Writing::No,
+            write: WriteMode::No,
             own: None,
             force: false,
             first: None,
@@ -454,7 +454,7 @@ mod tests {
             "a request without output should not cancel writing"
         );
         let Command::Render(request) = render(3) else { panic!("a request") };
-        remote.send(Command::Render(Box::new(Request { write: Writing::Try, ..*request })));
+        remote.send(Command::Render(Box::new(Request { write: WriteMode::Try, ..*request })));
         assert!(writing.is_cancelled());
         let (token, writing) = begin(4);
         remote.send(Command::Quit);

@@ -8,12 +8,12 @@ use crate::math::{DVec3, Vec3};
 /// field does not compile until the field is added or explicitly ignored.
 pub trait Fingerprinted {
     /// Adds all values that later stages read to the fingerprint.
-    fn add_to(&self, key: &mut Fingerprint, of: &Referents<'_>);
+    fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>);
 }
 
 /// Data that scene items refer to: textures and meshes by index, and the orbiter file.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Referents<'a> {
+pub struct FingerprintContext<'a> {
     /// The scene's textures.
     pub textures: &'a [Texture],
     /// Content hashes of the scene's mesh files.
@@ -23,7 +23,7 @@ pub struct Referents<'a> {
 }
 
 impl<T: Fingerprinted> Fingerprinted for Option<T> {
-    fn add_to(&self, key: &mut Fingerprint, of: &Referents<'_>) {
+    fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         key.flag(self.is_some());
         if let Some(some) = self {
             some.add_to(key, of);
@@ -44,9 +44,9 @@ impl std::fmt::Display for Key {
 
 /// Fingerprint builder. Hashes inputs in order, and numbers by their bits.
 #[derive(Debug)]
-pub struct Fingerprint(blake3::Hasher);
+pub struct FingerprintHasher(blake3::Hasher);
 
-impl Fingerprint {
+impl FingerprintHasher {
     /// Starts a fingerprint. `domain` separates the stages.
     pub fn new(domain: &str) -> Self {
         let mut new = Self(blake3::Hasher::new());
@@ -78,7 +78,7 @@ impl Fingerprint {
     }
 
     /// Adds a value and everything it refers to.
-    pub fn add(&mut self, part: &impl Fingerprinted, of: &Referents<'_>) -> &mut Self {
+    pub fn add(&mut self, part: &impl Fingerprinted, of: &FingerprintContext<'_>) -> &mut Self {
         part.add_to(self, of);
         self
     }
@@ -136,15 +136,15 @@ mod tests {
 
     #[test]
     fn adjacent_strings_do_not_merge() {
-        let one = Fingerprint::new("x").text("ab").text("c").finish();
-        let other = Fingerprint::new("x").text("a").text("bc").finish();
+        let one = FingerprintHasher::new("x").text("ab").text("c").finish();
+        let other = FingerprintHasher::new("x").text("a").text("bc").finish();
         assert_ne!(one, other);
-        assert_ne!(Fingerprint::new("x").finish(), Fingerprint::new("y").finish());
+        assert_ne!(FingerprintHasher::new("x").finish(), FingerprintHasher::new("y").finish());
     }
 
     #[test]
     fn numbers_are_hashed_by_bits() {
-        let of = |value: f32| Fingerprint::new("x").f32(value).finish();
+        let of = |value: f32| FingerprintHasher::new("x").f32(value).finish();
         assert_ne!(of(0.0), of(-0.0));
         assert_eq!(of(f32::NAN), of(f32::NAN));
         assert_ne!(of(1.0), of(f32::from_bits(1.0_f32.to_bits() + 1)));

@@ -61,7 +61,7 @@ const MAX_PARTS: usize = 32 << 20;
 
 /// A valid scene, its text and warnings.
 #[derive(Clone, Debug)]
-pub struct Loaded {
+pub struct LoadedScene {
     /// The scene description.
     pub scene: Arc<Scene>,
     /// The file's text followed by the `--set` values. All spans in [`Self::scene`] index into it.
@@ -74,12 +74,12 @@ pub struct Loaded {
     /// these files.
     pub named: Vec<PathBuf>,
     /// Spans of the values in `[render]` and `[photons]`.
-    pub settings: Vec<Setting>,
+    pub settings: Vec<SettingSpan>,
 }
 
 /// A value in `[render]` or `[photons]` and its span.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Setting {
+pub struct SettingSpan {
     /// The name of the table: `render` or `photons`.
     pub table: &'static str,
     /// Name of the key.
@@ -96,7 +96,7 @@ pub fn text_now(path: &Path) -> Result<Arc<str>, Box<Diagnostic>> {
     read::read_scene_text(path)
 }
 
-impl Loaded {
+impl LoadedScene {
     /// Returns the file's text with `camera` written to `[camera]`. Replaces numbers in place and adds
     /// missing keys. Comments and formatting stay unchanged.
     ///
@@ -137,7 +137,7 @@ impl Loaded {
 
     /// The span of a setting's value, in the file or in a `--set` argument. `None` if neither sets it.
     pub fn setting(&self, table: &str, key: &str) -> Option<Range<usize>> {
-        let is_it = |setting: &&Setting| setting.table == table && setting.key == key;
+        let is_it = |setting: &&SettingSpan| setting.table == table && setting.key == key;
         self.settings.iter().find(is_it).map(|setting| setting.span.clone())
     }
 
@@ -163,7 +163,7 @@ pub struct Outcome {
     /// Errors and warnings, in text order.
     pub diagnostics: Vec<Diagnostic>,
     /// Spans of the values in `[render]` and `[photons]`.
-    pub settings: Vec<Setting>,
+    pub settings: Vec<SettingSpan>,
 }
 
 /// Reads and validates a scene file. `sets` are overrides of the form `TABLE.KEY=VALUE`.
@@ -171,7 +171,7 @@ pub struct Outcome {
 /// # Errors
 /// Returns all errors and warnings, in file order. Rejects anything but a regular UTF-8 file of at most
 /// [`MAX_FILE_BYTES`] bytes, without blocking.
-pub fn load(path: &Path, sets: &[String]) -> Result<Loaded, Vec<Diagnostic>> {
+pub fn load(path: &Path, sets: &[String]) -> Result<LoadedScene, Vec<Diagnostic>> {
     let text = read::read_scene_text(path).map_err(|problem| vec![*problem])?;
     load_source(SceneText::with_sets(text, sets)?, path, sets)
 }
@@ -181,17 +181,17 @@ pub fn load(path: &Path, sets: &[String]) -> Result<Loaded, Vec<Diagnostic>> {
 ///
 /// # Errors
 /// Same as [`load`].
-pub fn load_generated(text: Arc<str>, path: &Path, sets: &[String]) -> Result<Loaded, Vec<Diagnostic>> {
+pub fn load_generated(text: Arc<str>, path: &Path, sets: &[String]) -> Result<LoadedScene, Vec<Diagnostic>> {
     load_source(SceneText::with_sets(text, sets)?.mark_generated(), path, sets)
 }
 
-fn load_source(source: SceneText, path: &Path, sets: &[String]) -> Result<Loaded, Vec<Diagnostic>> {
+fn load_source(source: SceneText, path: &Path, sets: &[String]) -> Result<LoadedScene, Vec<Diagnostic>> {
     let Outcome { scene, diagnostics, settings } = document::lower(&source, path);
     match scene {
         Some(scene) => {
             let named = if sets.is_empty() { Vec::new() } else { document::named_files(source.text(), path) };
             let (scene, path) = (Arc::new(scene), path.to_owned());
-            Ok(Loaded { scene, source, path, warnings: diagnostics, named, settings })
+            Ok(LoadedScene { scene, source, path, warnings: diagnostics, named, settings })
         }
         None => Err(diagnostics),
     }

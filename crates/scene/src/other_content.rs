@@ -6,7 +6,7 @@ use std::path::Path;
 
 use super::diagnostic::Diagnostic;
 use super::sanitize::visible;
-use crate::system::file::{self, PART_MARK};
+use crate::system::file::{self, PART_MAGIC};
 
 /// Hint for errors about files that are not scenes.
 pub(super) const NEW_SCENE_HELP: &str = "`glimt new FILE` writes a scene to start from";
@@ -44,7 +44,7 @@ pub fn other_content(path: &Path) -> Option<(&'static str, Box<Diagnostic>)> {
 impl OtherContent {
     /// Detects the type of contents from the first bytes. `None` if the file may be a scene.
     pub(super) fn detect(bytes: &[u8]) -> Option<Self> {
-        if bytes.starts_with(&PART_MARK) {
+        if bytes.starts_with(&PART_MAGIC) {
             return Some(Self::Part);
         }
         image_format(bytes).map(Self::Image).or_else(|| detect_model(bytes))
@@ -179,7 +179,7 @@ mod tests {
     fn parts_and_large_images_are_recognized() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("a.toml");
-        std::fs::write(&path, PART_MARK).expect("written");
+        std::fs::write(&path, PART_MAGIC).expect("written");
         let part = super::super::text_now(&path).expect_err("an error");
         assert_eq!(part, OtherContent::Part.to_diagnostic(&path));
         assert_eq!(other_content(&path), Some(("part", part)));

@@ -16,7 +16,7 @@ use annotate_snippets::{AnnotationKind, Group, Level, Origin, Renderer, Snippet}
 use super::diagnostic::{Diagnostic, Severity};
 use super::sanitize::visible;
 
-pub use lines::{Piece, ReportLine, Role, lines};
+pub use lines::{ReportLine, SpanRole, StyledSpan, lines};
 
 /// Report style.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -147,7 +147,7 @@ fn mesh_files_are_listed_once() {
         .objects
         .iter()
         .map(|object| match object.shape {
-            Shape::Mesh(Mesh { file, placed: Placement::Steps { scale, .. }, smooth, .. }) => {
+            Shape::Mesh(Mesh { file, placed: MeshTransform::Steps { scale, .. }, smooth, .. }) => {
                 (file, scale, smooth, object.material)
             }
             _ => panic!("not a mesh"),

@@ -39,7 +39,7 @@ pub(super) fn dollied(pose: &Pose, factor: f64, own: f64) -> Pose {
 }
 
 /// Multiplies the field of view by `factor`, within limits.
-pub(super) fn zoomed(view: &Viewpoint, factor: f64) -> f64 {
+pub(super) fn zoomed_fov(view: &Viewpoint, factor: f64) -> f64 {
     let (least, most) = (FIELD.0.min(view.fov), FIELD.1.max(view.fov));
     rounded((view.fov * factor).clamp(least, most), 0.01)
 }
@@ -98,10 +98,10 @@ mod tests {
         let far = Pose { position: DVec3::new(0.0, 1.0, 1e6), ..POSE };
         assert_eq!(dollied(&far, 2.0, 4.0), far, "a camera that starts farther away stays there");
         let view = Viewpoint { pose: POSE, fov: 40.0, aperture: 0.0, focus: 4.0 };
-        assert_eq!(zoomed(&view, 1.1), 44.0);
-        assert_eq!(zoomed(&view, 100.0), 160.0);
+        assert_eq!(zoomed_fov(&view, 1.1), 44.0);
+        assert_eq!(zoomed_fov(&view, 100.0), 160.0);
         assert_eq!(
-            zoomed(&Viewpoint { fov: 170.0, ..view }, 1.1),
+            zoomed_fov(&Viewpoint { fov: 170.0, ..view }, 1.1),
             170.0,
             "zooming should not narrow a wider field of view"
         );

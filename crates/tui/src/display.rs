@@ -29,7 +29,7 @@ const LARGE: usize = 2_000;
 
 /// Properties of the terminal and its connection, as detected from environment variables.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct TerminalLink {
+pub(super) struct TerminalEnvironment {
     /// Whether glimt runs inside tmux or screen, which reply to queries themselves and delay drawing.
     pub(super) is_multiplexed: bool,
     /// Whether glimt runs inside tmux.
@@ -42,7 +42,7 @@ pub(super) struct TerminalLink {
     pub(super) ask: TerminalQueries,
 }
 
-impl TerminalLink {
+impl TerminalEnvironment {
     /// Creates a connection of unknown speed. A local multiplexer's replies do not reflect the network behind
     /// it.
     fn connection(self, now: Instant) -> Connection {
@@ -59,7 +59,7 @@ pub(super) struct Display {
     /// The preview, if it is drawn as pixels.
     images: Option<Images>,
     connection: Connection,
-    link: TerminalLink,
+    link: TerminalEnvironment,
     /// Writer that sends bytes to the terminal.
     out: TerminalWriter,
     /// Whether the terminal supports synchronized output (mode 2026).
@@ -84,7 +84,7 @@ impl Display {
     /// Creates a display whose content is unknown.
     pub(super) fn new(
         depth: ColorDepth,
-        link: TerminalLink,
+        link: TerminalEnvironment,
         images: Option<Images>,
         out: TerminalWriter,
         now: Instant,
@@ -223,7 +223,7 @@ impl Display {
         let pixels = self.images.as_mut().and_then(|images| images.next_slice(room, rate));
         match pixels {
             Some(pixels) => self.send_slice(pixels, now),
-            None => self.mark_complete(),
+            None => self.finish_target(),
         }
         !self.is_complete
     }
@@ -237,7 +237,7 @@ impl Display {
         cells
     }
 
-    fn mark_complete(&mut self) {
+    fn finish_target(&mut self) {
         self.is_complete = true;
         if std::mem::take(&mut self.is_picture_due) {
             self.report = Some(FrameReport { bytes: self.sent, round_trip: self.connection.round_trip() });
@@ -345,7 +345,7 @@ mod tests {
         let all = Rc::new(Cell::new(0));
         let count = all.clone();
         let out: TerminalWriter = Box::new(move |bytes: Vec<u8>| count.set(count.get() + bytes.len()));
-        let mut display = Display::new(ColorDepth::TrueColor, TerminalLink::default(), None, out, now);
+        let mut display = Display::new(ColorDepth::TrueColor, TerminalEnvironment::default(), None, out, now);
         let area = Rect::new(0, 0, 40, 20);
         let mut buffer = Buffer::empty(area);
         for (number, cell) in (0_u32..).zip(&mut buffer.content) {

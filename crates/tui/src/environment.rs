@@ -1,19 +1,19 @@
 //! Detects the terminal and its connection from environment variables.
 
 use super::color::{ColorChoice, ColorDepth};
-use super::display::TerminalLink;
-use super::graphics::Protocol;
+use super::display::TerminalEnvironment;
+use super::graphics::ImageProtocol;
 use super::options::PreviewChoice;
 use super::paint::can_repeat;
-use super::pixel_request::PixelRequest;
+use super::pixel_request::ImageProtocolRequest;
 use super::preview_kind::PreviewKind;
 use super::terminal_replies::TerminalQueries;
 
 /// The terminal and its connection, as detected from environment variables.
-pub(super) fn terminal_link(variable: impl Fn(&str) -> Option<String>) -> TerminalLink {
+pub(super) fn detect_terminal_environment(variable: impl Fn(&str) -> Option<String>) -> TerminalEnvironment {
     let is_set = |name: &str| variable(name).is_some_and(|value| !value.is_empty());
     let term = variable("TERM").unwrap_or_default();
-    TerminalLink {
+    TerminalEnvironment {
         is_multiplexed: is_set("TMUX")
             || is_set("STY")
             || term.starts_with("tmux")
@@ -33,11 +33,11 @@ pub(super) fn is_plain_terminal(variable: impl Fn(&str) -> Option<String>) -> bo
 }
 
 /// The image protocol for a preview choice.
-fn image_protocol(preview: PreviewChoice) -> Option<Protocol> {
+fn image_protocol(preview: PreviewChoice) -> Option<ImageProtocol> {
     match preview {
-        PreviewChoice::Kitty => Some(Protocol::Kitty),
-        PreviewChoice::Sixel => Some(Protocol::Sixel),
-        PreviewChoice::Iterm2 => Some(Protocol::Iterm),
+        PreviewChoice::Kitty => Some(ImageProtocol::Kitty),
+        PreviewChoice::Sixel => Some(ImageProtocol::Sixel),
+        PreviewChoice::Iterm2 => Some(ImageProtocol::Iterm),
         PreviewChoice::Auto
         | PreviewChoice::HalfBlock
         | PreviewChoice::Quadrant
@@ -58,7 +58,7 @@ pub(super) fn terminal_queries(
 ) -> TerminalQueries {
     let get = |name: &str| variable(name).unwrap_or_default();
     let term = get("TERM");
-    let is_outermost = !terminal_link(&variable).is_multiplexed;
+    let is_outermost = !detect_terminal_environment(&variable).is_multiplexed;
     let is_plain = is_plain_terminal(&variable);
     let has_palette = matches!(depth, ColorDepth::Indexed256 | ColorDepth::Ansi16);
     let is_ramp = PreviewKind::from_choice(preview, depth) == PreviewKind::Ascii;
@@ -68,7 +68,8 @@ pub(super) fn terminal_queries(
         true_color: color == ColorChoice::Auto && has_palette && is_outermost && !is_plain,
         background: is_ramp && get("STY").is_empty() && !term.starts_with("linux") && term != "dumb",
         palette: depth == ColorDepth::Ansi16 && is_outermost && !is_plain,
-        pixels: image_protocol(preview).map(|protocol| PixelRequest::new(protocol, &variable, is_plain)),
+        pixels: image_protocol(preview)
+            .map(|protocol| ImageProtocolRequest::new(protocol, &variable, is_plain)),
     }
 }
 
@@ -79,7 +80,7 @@ mod tests {
     #[test]
     fn multiplexers_and_networks_are_detected() {
         let link = |pairs: &[(&str, &str)]| {
-            terminal_link(|name| {
+            detect_terminal_environment(|name| {
                 pairs.iter().find(|(key, _)| *key == name).map(|(_, value)| (*value).to_owned())
             })
         };

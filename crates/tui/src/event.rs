@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use crossterm::event::{KeyCode, KeyModifiers};
 
-use super::options::{Changed, News, OutputChange};
+use super::options::{Changed, OutputChange, WatchUpdate};
 use super::terminal_replies::TerminalReply;
 use crate::film::Picture;
 use crate::pipeline::protocol::{self, PreviewSource, Section};
@@ -67,11 +67,11 @@ pub(super) enum Event {
 
 impl Event {
     /// Wraps a file watcher event.
-    pub(super) fn from_watcher(news: News) -> Self {
+    pub(super) fn from_watcher(news: WatchUpdate) -> Self {
         match news {
-            News::Changed(changed) => Self::Changed(changed),
-            News::Settled => Self::Settled,
-            News::Output(change) => Self::Output(change),
+            WatchUpdate::Changed(changed) => Self::Changed(changed),
+            WatchUpdate::Settled => Self::Settled,
+            WatchUpdate::Output(change) => Self::Output(change),
         }
     }
 }
@@ -103,7 +103,7 @@ impl KeyPress {
 /// A mouse event over a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Mouse {
-    pub kind: MouseKind,
+    pub kind: MouseEventKind,
     /// Column of the cell, counted from 0.
     pub column: u16,
     /// Row of the cell, counted from 0.
@@ -112,7 +112,7 @@ pub(super) struct Mouse {
 
 /// Kinds of mouse events, for the left button and the wheel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum MouseKind {
+pub(super) enum MouseEventKind {
     Press,
     /// The mouse was moved while the button was down.
     Drag,

@@ -1,7 +1,7 @@
 //! The summary printed after the terminal is restored.
 
 use super::event::WriteFailure;
-use super::state::{Activity, KeyOverrides, OwnImage, State, WrittenFile};
+use super::state::{KeyOverrides, OwnImage, State, WorkerActivity, WrittenFile};
 use crate::choice::Choice;
 use crate::pipeline::protocol::{OwnImageState, Report};
 use crate::pipeline::settings::{CameraChange, View};
@@ -79,16 +79,16 @@ fn events_since_writing(state: &State) -> String {
     let is_after = written.iter().any(|written| written.generation != state.request.generation);
     let next = if is_after { NEXT_RENDER } else { "the render" };
     match (state.work.activity, &state.work.progress) {
-        (Activity::Running { .. } | Activity::Cancelled, Some(progress)) => {
+        (WorkerActivity::Running { .. } | WorkerActivity::Cancelled, Some(progress)) => {
             format!("; {next} was stopped at {:.0} %", (progress.fraction * 100.0).floor())
         }
-        (Activity::Running { .. } | Activity::Cancelled, None) => format!("; {next} was stopped"),
-        (Activity::Done | Activity::Waiting | Activity::Broken, _) => String::new(),
+        (WorkerActivity::Running { .. } | WorkerActivity::Cancelled, None) => format!("; {next} was stopped"),
+        (WorkerActivity::Done | WorkerActivity::Waiting | WorkerActivity::Broken, _) => String::new(),
     }
 }
 
 fn is_scene_broken(state: &State) -> bool {
-    matches!(state.work.activity, Activity::Waiting | Activity::Broken)
+    matches!(state.work.activity, WorkerActivity::Waiting | WorkerActivity::Broken)
 }
 
 fn scene_name(state: &State) -> String {
@@ -384,7 +384,7 @@ mod tests {
         let words = unsaved_as_options(&ui.state).expect("moved");
         let sets = words.split("--set ").skip(1).map(|set| set.trim().replace('\'', ""));
         let sets: Vec<String> = sets.collect();
-        let camera = crate::scene::Loaded::camera_of(text, &sets);
+        let camera = crate::scene::LoadedScene::camera_of(text, &sets);
         let Some(Camera::LookAt { position, look_at, fov, focus, .. }) = camera else { panic!("{words}") };
         assert_eq!((position, look_at), (moved.pose.position, moved.pose.look_at));
         assert_eq!((fov, focus), (moved.fov, moved.focus));

@@ -91,14 +91,14 @@ impl History {
     }
 
     /// Changes in files between the render being viewed and the newest one.
-    pub(super) fn edits_since_open(&self) -> String {
+    pub(super) fn edits_since_viewed(&self) -> String {
         let open = self.open.as_ref().and_then(|(at, _)| self.past.get(*at));
         let edits = open.zip(self.past.back()).map(|(open, newest)| newest.origin.edits(&open.origin));
         edits.unwrap_or_default().join("; ")
     }
 
     /// Why the render being viewed differs from the previous one, in one line.
-    pub(super) fn reason_of_open(&self) -> String {
+    pub(super) fn viewed_changes_text(&self) -> String {
         let Some((at, _)) = &self.open else { return String::new() };
         let Some(past) = self.past.get(*at) else { return String::new() };
         let words = match past.changes.as_ref().map(|changes| changes.concat()) {
@@ -106,7 +106,7 @@ impl History {
             Some(changes) if changes.is_empty() => messages::AGAIN.to_owned(),
             Some(changes) => changes.join("; "),
         };
-        past.marked_if_stopped(words)
+        past.with_stopped_label(words)
     }
 
     /// Records that the camera, moved with keys since request `since`, has been written to the scene. This
@@ -120,7 +120,7 @@ impl History {
     }
 
     /// Reassigns a request's entry to the next request, which shows the same image differently.
-    pub(super) fn transfer_to_next(&mut self, generation: u64) {
+    pub(super) fn reassign_to_next_request(&mut self, generation: u64) {
         for past in self.past.iter_mut().filter(|past| past.shown.generation == generation) {
             past.shown.generation = generation + 1;
         }
@@ -142,7 +142,7 @@ impl History {
                 }
                 // If the image is the same, keep its origin.
                 let is_same = known.is_none() || past.shown.shows_same_image(&shown);
-                let origin = if is_same { past.origin.for_same_image(origin) } else { origin };
+                let origin = if is_same { past.origin.merged_with_later(origin) } else { origin };
                 self.replace(at, (shown, time), origin);
                 self.merge_with_previous(at);
             }
@@ -185,7 +185,7 @@ impl History {
             return;
         }
         let (edits, run) = (earlier.edits, past.run.or(earlier.run));
-        let origin = earlier.origin.for_same_image(past.origin.clone());
+        let origin = earlier.origin.merged_with_later(past.origin.clone());
         self.remove(before);
         if let Some(past) = self.past.get_mut(before) {
             (past.edits, past.run, past.origin) = (edits, run, origin);
@@ -261,32 +261,32 @@ impl History {
     }
 
     /// Scene and settings of the older render being viewed. `None` for the newest one.
-    pub(super) fn origin_of_open(&self) -> Option<&ImageOrigin> {
+    pub(super) fn viewed_origin(&self) -> Option<&ImageOrigin> {
         let (at, _) = self.open.as_ref()?;
         self.past.get(*at).map(|past| &past.origin)
     }
 
     /// Whether the oldest render is being viewed.
-    pub(super) fn is_oldest_shown(&self) -> bool {
+    pub(super) fn is_viewing_oldest(&self) -> bool {
         self.open.as_ref().is_some_and(|(at, _)| *at == 0)
     }
 
     /// Whether an older render is being viewed.
-    pub(super) fn is_older_open(&self) -> bool {
+    pub(super) fn is_viewing_older(&self) -> bool {
         self.open.is_some()
     }
 
     /// The newest image, if an older one is being viewed.
-    pub(super) fn newest_behind_open(&self) -> Option<ShownImage> {
+    pub(super) fn newest_while_viewing_older(&self) -> Option<ShownImage> {
         self.open.as_ref().map(|(_, newest)| newest.clone())
     }
 
     /// Stores a new image. Returns whether it stays hidden because an older one is being viewed.
-    pub(super) fn store_behind_open(&mut self, shown: &ShownImage) -> bool {
+    pub(super) fn update_newest_while_viewing_older(&mut self, shown: &ShownImage) -> bool {
         if let Some((_, newest)) = &mut self.open {
             *newest = shown.clone();
         }
-        self.is_older_open()
+        self.is_viewing_older()
     }
 
     /// Moves back by `back` entries, or forward if `back` is negative.
@@ -365,7 +365,7 @@ impl History {
     }
 
     /// Render number of the older entry being viewed, and the time when its image last improved.
-    pub(super) fn run_and_time_of_open(&self) -> Option<(Option<u64>, Instant)> {
+    pub(super) fn viewed_render_number_and_time(&self) -> Option<(Option<u64>, Instant)> {
         let (at, _) = self.open.as_ref()?;
         self.past.get(*at).map(|past| (past.run, past.time))
     }
@@ -383,7 +383,7 @@ impl HistoryEntry {
     }
 
     /// Prefixes `words` with a label if the render was stopped.
-    fn marked_if_stopped(&self, words: String) -> String {
+    fn with_stopped_label(&self, words: String) -> String {
         if self.origin.is_unfinished { format!("{}: {words}", messages::STOPPED) } else { words }
     }
 
@@ -414,7 +414,7 @@ mod tests {
     use crate::fixtures::uniform_picture;
     use crate::pipeline::settings::{CameraChange, View};
     use crate::pipeline::{Content, FileRead};
-    use crate::scene::fingerprint::Fingerprint;
+    use crate::scene::fingerprint::FingerprintHasher;
     use crate::state::KeyOverrides;
 
     fn shown_image(generation: u64, side: u32) -> ShownImage {
@@ -523,7 +523,7 @@ mod tests {
 
     /// A preview of an image with all or some of its samples, and its origin.
     fn of_image(generation: u64, name: &str, is_finished: bool) -> (ShownImage, ImageOrigin) {
-        let source = Some(PreviewSource { image: Fingerprint::new(name).finish(), is_finished });
+        let source = Some(PreviewSource { image: FingerprintHasher::new(name).finish(), is_finished });
         // Make every preview different.
         let picture = uniform_picture(10, 10, [generation as u8, u8::from(is_finished), 0]);
         let origin = ImageOrigin { is_unfinished: !is_finished, ..ImageOrigin::default() };

@@ -194,7 +194,7 @@ pub(super) fn action_for(key: KeyPress) -> Option<Action> {
 }
 
 /// The table row for an action. Every action has one.
-pub(super) fn binding_of(action: Action) -> Option<&'static Binding> {
+pub(super) fn binding_for(action: Action) -> Option<&'static Binding> {
     KEYMAP.iter().find(|binding| binding.action == action)
 }
 

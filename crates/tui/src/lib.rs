@@ -55,9 +55,9 @@ use glimt_scene as scene;
 
 pub use color::{ColorChoice, ColorDepth, xterm_rgb};
 pub use editor::editor;
-pub use graphics::PixelScreen;
+pub use graphics::TestImageTerminal;
 pub use mosaic::filled_squares;
-pub use options::{Changed, ExitStatus, News, Options, PreviewChoice, TuiError, TuiOutcome};
+pub use options::{Changed, ExitStatus, Options, PreviewChoice, TuiError, TuiOutcome, WatchUpdate};
 pub use probe::{Probe, ProbeReplies, probe};
 pub use run::run;
 pub use static_image::{NamedImage, images_as_text};

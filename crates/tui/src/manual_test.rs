@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 use super::fixtures::{
     asset_progress, camera, diagnostic, done_event, effective_settings, own_settings, stage_report,
 };
-use super::{Changed, ColorChoice, News, Options, PreviewChoice, run};
+use super::{Changed, ColorChoice, Options, PreviewChoice, WatchUpdate, run};
 use crate::film::Picture;
 use crate::pipeline::protocol::{
     Command, Event, Failure, LatestPreview, PreviewSlot, RenderProgress, Request, Stage, Status,
@@ -55,15 +55,15 @@ fn interactive_session() {
     }
 }
 
-fn watch(scene: &PathBuf, news: &Sender<News>) {
+fn watch(scene: &PathBuf, news: &Sender<WatchUpdate>) {
     let mut last = std::fs::read(scene).ok();
     loop {
         thread::sleep(Duration::from_millis(30));
         let now = std::fs::read(scene).ok();
         if now != last {
             last = now;
-            let changed = News::Changed(Changed { noticed: Instant::now() });
-            if [changed, News::Settled].into_iter().any(|said| news.send(said).is_err()) {
+            let changed = WatchUpdate::Changed(Changed { noticed: Instant::now() });
+            if [changed, WatchUpdate::Settled].into_iter().any(|said| news.send(said).is_err()) {
                 return;
             }
         }

@@ -8,7 +8,7 @@ use super::color::ColorChoice;
 use crate::choice;
 use crate::pipeline::protocol::{Command, Event, PreviewSlot};
 use crate::pipeline::settings::Overrides;
-pub use crate::pipeline::watch::{Changed, ExternalChange, News, OutputChange};
+pub use crate::pipeline::watch::{Changed, ExternalChange, OutputChange, WatchUpdate};
 
 choice! {
     /// How to draw the preview.
@@ -58,7 +58,7 @@ pub struct Options {
     /// Slot for previews from the worker.
     pub previews: PreviewSlot,
     /// Events from the file watcher. If the channel closes, a message is shown.
-    pub news: Receiver<News>,
+    pub news: Receiver<WatchUpdate>,
 }
 
 /// The program's exit code.

@@ -3,7 +3,7 @@
 
 use std::time::{Duration, Instant};
 
-use super::graphics::{Protocol, tmux_passthrough};
+use super::graphics::{ImageProtocol, tmux_passthrough};
 use super::terminals::TerminalId;
 
 /// Image ID used in the query for kitty's protocol.
@@ -28,15 +28,19 @@ pub(super) enum ImageRoute {
 
 /// A request to draw pixels that the terminal has not confirmed yet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct PixelRequest {
-    pub(super) protocol: Protocol,
+pub(super) struct ImageProtocolRequest {
+    pub(super) protocol: ImageProtocol,
     pub(super) route: ImageRoute,
     /// Whether environment variables identify a terminal that supports the protocol.
     pub(super) is_known: bool,
 }
 
-impl PixelRequest {
-    pub(super) fn new(protocol: Protocol, variable: impl Fn(&str) -> Option<String>, is_plain: bool) -> Self {
+impl ImageProtocolRequest {
+    pub(super) fn new(
+        protocol: ImageProtocol,
+        variable: impl Fn(&str) -> Option<String>,
+        is_plain: bool,
+    ) -> Self {
         let is_set = |name: &str| variable(name).is_some_and(|value| !value.is_empty());
         let term = variable("TERM").unwrap_or_default();
         let route = match () {
@@ -46,18 +50,18 @@ impl PixelRequest {
         };
         let terminal = TerminalId::from_environment(variable);
         let has_iterm = terminal.is_some_and(|terminal| terminal.brand.has_iterm_images());
-        Self { protocol, route, is_known: protocol == Protocol::Iterm && has_iterm }
+        Self { protocol, route, is_known: protocol == ImageProtocol::Iterm && has_iterm }
     }
 
     /// The query for the protocol. Empty if other queries cover it or it cannot be sent.
     pub(super) fn query(self) -> Vec<u8> {
         match (self.protocol, self.route) {
-            (Protocol::Kitty, ImageRoute::Direct) => KITTY_QUERY.to_vec(),
-            (Protocol::Kitty, ImageRoute::Tmux) => tmux_passthrough(KITTY_QUERY),
-            (Protocol::Iterm, ImageRoute::Tmux) => tmux_passthrough(NAME_QUERY),
-            (Protocol::Iterm, ImageRoute::Direct) => NAME_QUERY.to_vec(),
+            (ImageProtocol::Kitty, ImageRoute::Direct) => KITTY_QUERY.to_vec(),
+            (ImageProtocol::Kitty, ImageRoute::Tmux) => tmux_passthrough(KITTY_QUERY),
+            (ImageProtocol::Iterm, ImageRoute::Tmux) => tmux_passthrough(NAME_QUERY),
+            (ImageProtocol::Iterm, ImageRoute::Direct) => NAME_QUERY.to_vec(),
             // Device attributes are always queried, and tmux draws Sixel images itself.
-            (Protocol::Sixel, _) | (_, ImageRoute::Closed) => Vec::new(),
+            (ImageProtocol::Sixel, _) | (_, ImageRoute::Closed) => Vec::new(),
         }
     }
 
@@ -68,26 +72,26 @@ impl PixelRequest {
 
     /// Whether the device attributes arrive after all other replies. tmux answers that query itself before
     /// passing on other queries.
-    pub(super) fn ends_with_attributes(self) -> bool {
+    pub(super) fn is_decided_by_attributes(self) -> bool {
         match (self.protocol, self.route) {
-            (Protocol::Sixel, _) | (_, ImageRoute::Direct) => true,
-            (Protocol::Kitty | Protocol::Iterm, ImageRoute::Tmux | ImageRoute::Closed) => false,
+            (ImageProtocol::Sixel, _) | (_, ImageRoute::Direct) => true,
+            (ImageProtocol::Kitty | ImageProtocol::Iterm, ImageRoute::Tmux | ImageRoute::Closed) => false,
         }
     }
 
     /// Explains that the terminal does not support the protocol, and lists terminals that do.
-    pub(super) fn refusal_message(self) -> String {
+    pub(super) fn unsupported_message(self) -> String {
         let (name, terminals) = match self.protocol {
-            Protocol::Kitty => ("kitty", "kitty, Ghostty, WezTerm or Konsole"),
-            Protocol::Sixel => ("sixel", "foot, xterm -ti vt340, mlterm, or tmux built with sixels"),
-            Protocol::Iterm => ("iTerm2", "iTerm2, WezTerm or VS Code"),
+            ImageProtocol::Kitty => ("kitty", "kitty, Ghostty, WezTerm or Konsole"),
+            ImageProtocol::Sixel => ("sixel", "foot, xterm -ti vt340, mlterm, or tmux built with sixels"),
+            ImageProtocol::Iterm => ("iTerm2", "iTerm2, WezTerm or VS Code"),
         };
         let instead = "half blocks are shown instead";
         match (self.protocol, self.route) {
-            (Protocol::Kitty | Protocol::Iterm, ImageRoute::Tmux) => format!(
+            (ImageProtocol::Kitty | ImageProtocol::Iterm, ImageRoute::Tmux) => format!(
                 "no {name} images through tmux: {instead}; `tmux set -g allow-passthrough on` enables them if tmux runs in {terminals}"
             ),
-            (Protocol::Sixel, _) | (_, ImageRoute::Direct | ImageRoute::Closed) => {
+            (ImageProtocol::Sixel, _) | (_, ImageRoute::Direct | ImageRoute::Closed) => {
                 format!("this terminal does not support {name} images: {instead}; use {terminals}")
             }
         }
@@ -98,38 +102,45 @@ impl PixelRequest {
 mod tests {
     use super::*;
 
-    fn request(protocol: Protocol, pairs: &[(&str, &str)], is_plain: bool) -> PixelRequest {
+    fn request(protocol: ImageProtocol, pairs: &[(&str, &str)], is_plain: bool) -> ImageProtocolRequest {
         let variable =
             |name: &str| pairs.iter().find(|(key, _)| *key == name).map(|(_, value)| (*value).to_owned());
-        PixelRequest::new(protocol, variable, is_plain)
+        ImageProtocolRequest::new(protocol, variable, is_plain)
     }
 
     #[test]
     fn environment_determines_the_query() {
         let xterm = ("TERM", "xterm-256color");
-        let direct = request(Protocol::Kitty, &[xterm], false);
+        let direct = request(ImageProtocol::Kitty, &[xterm], false);
         assert_eq!((direct.route, direct.query()), (ImageRoute::Direct, KITTY_QUERY.to_vec()));
-        let tmux = request(Protocol::Kitty, &[("TERM", "tmux-256color"), ("TMUX", "/tmp/tmux,1,0")], false);
+        let tmux =
+            request(ImageProtocol::Kitty, &[("TERM", "tmux-256color"), ("TMUX", "/tmp/tmux,1,0")], false);
         assert_eq!(tmux.route, ImageRoute::Tmux);
         assert!(tmux.query().starts_with(b"\x1bPtmux;\x1b\x1b_G"));
-        let screen = request(Protocol::Kitty, &[("TERM", "screen"), ("STY", "1.a")], false);
+        let screen = request(ImageProtocol::Kitty, &[("TERM", "screen"), ("STY", "1.a")], false);
         assert_eq!((screen.route, screen.query()), (ImageRoute::Closed, Vec::new()));
-        assert_eq!(request(Protocol::Iterm, &[xterm], true).route, ImageRoute::Closed);
-        assert!(request(Protocol::Iterm, &[xterm, ("TERM_PROGRAM", "iTerm.app")], false).is_known);
-        assert!(!request(Protocol::Iterm, &[xterm], false).is_known);
-        assert!(!request(Protocol::Kitty, &[xterm, ("TERM_PROGRAM", "iTerm.app")], false).is_known);
+        assert_eq!(request(ImageProtocol::Iterm, &[xterm], true).route, ImageRoute::Closed);
+        assert!(request(ImageProtocol::Iterm, &[xterm, ("TERM_PROGRAM", "iTerm.app")], false).is_known);
+        assert!(!request(ImageProtocol::Iterm, &[xterm], false).is_known);
+        assert!(!request(ImageProtocol::Kitty, &[xterm, ("TERM_PROGRAM", "iTerm.app")], false).is_known);
         let number = String::from_utf8_lossy(KITTY_QUERY).contains(&format!("i={QUERY_ID},"));
         assert!(number, "the reply should contain the query's ID");
     }
 
     #[test]
     fn tmux_answers_attribute_queries_itself() {
-        for protocol in [Protocol::Kitty, Protocol::Iterm] {
+        for protocol in [ImageProtocol::Kitty, ImageProtocol::Iterm] {
             let tmux = request(protocol, &[("TMUX", "/tmp/tmux,1,0")], false);
-            assert!(!tmux.ends_with_attributes());
-            assert!(tmux.refusal_message().contains("allow-passthrough"), "{}", tmux.refusal_message());
-            assert!(request(protocol, &[], false).ends_with_attributes());
+            assert!(!tmux.is_decided_by_attributes());
+            assert!(
+                tmux.unsupported_message().contains("allow-passthrough"),
+                "{}",
+                tmux.unsupported_message()
+            );
+            assert!(request(protocol, &[], false).is_decided_by_attributes());
         }
-        assert!(request(Protocol::Sixel, &[("TMUX", "/tmp/tmux,1,0")], false).ends_with_attributes());
+        assert!(
+            request(ImageProtocol::Sixel, &[("TMUX", "/tmp/tmux,1,0")], false).is_decided_by_attributes()
+        );
     }
 }

@@ -267,7 +267,7 @@ mod tests {
         assert_eq!(next_wake(&state, now), Some(now));
         state.dirty = false;
         assert!(next_wake(&state, now).is_some(), "expected a wakeup to update the elapsed time");
-        state.work.activity = crate::state::Activity::Done;
+        state.work.activity = crate::state::WorkerActivity::Done;
         assert_eq!(next_wake(&state, now), None);
     }
 }

@@ -1,10 +1,10 @@
 //! Ways of drawing the preview, chosen by the user and limited by the terminal.
 
 use super::color::ColorDepth;
-use super::graphics::Protocol;
+use super::graphics::ImageProtocol;
 use super::mosaic::Grid;
 use super::options::PreviewChoice;
-use super::pixel_request::PixelRequest;
+use super::pixel_request::ImageProtocolRequest;
 
 /// How the preview is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -15,7 +15,7 @@ pub(super) enum PreviewKind {
     Octant,
     Ascii,
     /// Pixels, or half blocks while the preview is covered by text.
-    Pixels(Protocol),
+    Pixels(ImageProtocol),
     None,
 }
 
@@ -25,9 +25,9 @@ impl PreviewKind {
         match choice {
             PreviewChoice::None => Self::None,
             PreviewChoice::Ascii => Self::Ascii,
-            PreviewChoice::Kitty => Self::Pixels(Protocol::Kitty),
-            PreviewChoice::Sixel => Self::Pixels(Protocol::Sixel),
-            PreviewChoice::Iterm2 => Self::Pixels(Protocol::Iterm),
+            PreviewChoice::Kitty => Self::Pixels(ImageProtocol::Kitty),
+            PreviewChoice::Sixel => Self::Pixels(ImageProtocol::Sixel),
+            PreviewChoice::Iterm2 => Self::Pixels(ImageProtocol::Iterm),
             // Block characters require colors.
             _ if depth == ColorDepth::None => Self::Ascii,
             PreviewChoice::Auto | PreviewChoice::HalfBlock => Self::HalfBlock,
@@ -38,7 +38,11 @@ impl PreviewKind {
     }
 
     /// The initial preview kind. Pixels are used only if the terminal is known to support them.
-    pub(super) fn initial(choice: PreviewChoice, depth: ColorDepth, pixels: Option<PixelRequest>) -> Self {
+    pub(super) fn initial(
+        choice: PreviewChoice,
+        depth: ColorDepth,
+        pixels: Option<ImageProtocolRequest>,
+    ) -> Self {
         match (Self::from_choice(choice, depth), pixels) {
             (Self::Pixels(_), Some(request)) if !request.is_known => {
                 Self::from_choice(PreviewChoice::HalfBlock, depth)

@@ -9,12 +9,12 @@ use nix::sys::termios::{FlushArg, SetArg, cfmakeraw, tcgetattr, tcsetattr};
 
 use super::color::{self, ColorChoice, ColorDepth};
 use super::display::{ATTRIBUTES, STATUS, SYNCHRONIZED};
-use super::environment::{is_plain_terminal, terminal_link};
+use super::environment::{detect_terminal_environment, is_plain_terminal};
 use super::input::{DecodedInput, Decoder};
 use super::pixel_request::KITTY_QUERY;
 use super::terminal;
 use super::terminal_replies::{BlockGlyphs, TerminalQueries, TerminalReply};
-use super::terminals::{Brand, TerminalId};
+use super::terminals::{TerminalBrand, TerminalId};
 
 /// Terminal properties from replies and environment variables.
 #[derive(Clone, Debug)]
@@ -80,7 +80,7 @@ pub fn probe() -> Option<Probe> {
         return None;
     }
     let variable = |name: &str| std::env::var(name).ok();
-    let (window, link) = (terminal::query_window(None), terminal_link(variable));
+    let (window, link) = (terminal::query_window(None), detect_terminal_environment(variable));
     let questions = if is_plain_terminal(variable) || link.is_multiplexed {
         Vec::new()
     } else {
@@ -96,14 +96,14 @@ pub fn probe() -> Option<Probe> {
     };
     let is_dumb = variable("TERM").is_some_and(|term| term == "dumb");
     let answers = if is_dumb { None } else { query_in_raw_mode(&questions).ok().flatten() };
-    let brand = variable("TERM_PROGRAM").and_then(|program| Brand::from_program(&program));
+    let brand = variable("TERM_PROGRAM").and_then(|program| TerminalBrand::from_program(&program));
     Some(Probe {
         cells: (window.columns, window.rows),
         cell_pixels: window.cell_pixels,
         depth: color::resolve_depth(ColorChoice::Auto, variable),
         is_multiplexed: link.is_multiplexed,
         is_remote: link.is_remote,
-        has_iterm: brand.is_some_and(Brand::has_iterm_images),
+        has_iterm: brand.is_some_and(TerminalBrand::has_iterm_images),
         answers,
     })
 }
@@ -115,14 +115,14 @@ fn query_in_raw_mode(questions: &[u8]) -> io::Result<Option<ProbeReplies>> {
     let mut raw = before.clone();
     cfmakeraw(&mut raw);
     tcsetattr(&stdin, SetArg::TCSANOW, &raw)?;
-    let answers = exchange_messages(questions);
+    let answers = query_and_read_replies(questions);
     // Prevent late replies from reaching the shell.
     let _ = nix::sys::termios::tcflush(&stdin, FlushArg::TCIFLUSH);
     tcsetattr(&stdin, SetArg::TCSANOW, &before)?;
     answers
 }
 
-fn exchange_messages(questions: &[u8]) -> io::Result<Option<ProbeReplies>> {
+fn query_and_read_replies(questions: &[u8]) -> io::Result<Option<ProbeReplies>> {
     let (begin, mut heard) = (Instant::now(), ReceivedReplies::default());
     send(STATUS)?;
     if !read_replies(&mut heard, begin, |heard| heard.has_received(TerminalReply::Ready))? {

@@ -7,9 +7,9 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use super::color::{self, ColorDepth};
-use super::display::{Display, TerminalLink};
+use super::display::{Display, TerminalEnvironment};
 use super::editor;
-use super::environment::{terminal_link, terminal_queries};
+use super::environment::{detect_terminal_environment, terminal_queries};
 use super::event::FilePosition;
 use super::event::{Effect, Event, EventSource};
 use super::exit_summary;
@@ -48,9 +48,9 @@ pub fn run(options: Options) -> Result<TuiOutcome, TuiError> {
         terminal::enable_focus_reports();
     }
     let screen = TerminalSession::open()?;
-    let link = TerminalLink {
+    let link = TerminalEnvironment {
         ask: terminal_queries(options.preview, options.color, depth, variable),
-        ..terminal_link(variable)
+        ..detect_terminal_environment(variable)
     };
     let setup = InitialState {
         scene: options.scene,
@@ -71,7 +71,7 @@ pub fn run(options: Options) -> Result<TuiOutcome, TuiError> {
 
     let now = Instant::now();
     let display = Display::new(depth, link, None, Box::new(writer::queue_slice), now);
-    let ui = Ui {
+    let ui = EventLoop {
         screen,
         presenter: Presenter::new(display, options.previews, now),
         events,
@@ -113,7 +113,7 @@ fn forward_channel<T: Send + 'static>(
     Ok(())
 }
 
-struct Ui {
+struct EventLoop {
     screen: TerminalSession,
     presenter: Presenter,
     events: Receiver<Event>,
@@ -130,7 +130,7 @@ enum LoopEnd {
     Error(TuiError),
 }
 
-impl Ui {
+impl EventLoop {
     fn run(mut self) -> Result<TuiOutcome, TuiError> {
         let effects = start(&mut self.state);
         let mut end = self.perform(effects);
@@ -219,7 +219,7 @@ impl Ui {
                 return self.apply(event);
             }
             Event::Written { bytes } => self.presenter.display.record_written(bytes),
-            Event::Unwritable(kind) => return Some(write_error_end(kind.into())),
+            Event::Unwritable(kind) => return Some(end_for_write_error(kind.into())),
             Event::Key(_) | Event::Mouse(_) => {
                 let end = self.apply(event);
                 // A camera step is drawn together with its first preview, which arrives immediately and needs
@@ -279,14 +279,14 @@ impl Ui {
     /// Lets the editor use the terminal until it exits.
     fn run_editor(&mut self, place: &FilePosition) -> Option<LoopEnd> {
         self.leave();
-        input::set_held(true);
+        input::set_input_paused(true);
         self.screen.suspend();
         // Outside raw mode, keys send signals.
         let child_signals = signals::leave_signals_to_child();
         terminal::save_modes();
         let outcome = editor::run(&editor::editor_command(|name| std::env::var(name).ok()), place);
         terminal::restore_modes();
-        input::set_held(false);
+        input::set_input_paused(false);
         let end = self.apply(Event::Back).or_else(|| self.redraw());
         drop(child_signals);
         end.or_else(|| outcome.err().and_then(|why| self.apply(Event::NoEditor(why))))
@@ -294,7 +294,7 @@ impl Ui {
 
     fn redraw(&mut self) -> Option<LoopEnd> {
         if let Err(error) = self.screen.resume() {
-            return Some(write_error_end(error));
+            return Some(end_for_write_error(error));
         }
         self.presenter.display.restart(Instant::now());
         self.update_window_size()
@@ -319,7 +319,7 @@ impl Ui {
 
 /// How the event loop ends after a write error. If the terminal no longer exists, this is a hangup, even if
 /// SIGHUP has not arrived.
-fn write_error_end(error: io::Error) -> LoopEnd {
+fn end_for_write_error(error: io::Error) -> LoopEnd {
     if terminal::terminal_exists() {
         LoopEnd::Error(TuiError::Terminal { action: "write to", source: error })
     } else {

@@ -137,7 +137,7 @@ pub(super) fn set_child(id: Option<Pid>) {
 
 /// Forwards a terminating signal to the child. Only the first one is forwarded, because this process also
 /// receives the signals that it sends to its job.
-fn end_child(number: Number) {
+fn forward_termination(number: Number) {
     let mut child = lock_child();
     if child.ending.replace(number).is_none()
         && let Some(id) = child.id
@@ -232,10 +232,10 @@ impl SignalThread {
         }
         if let Some(status) = exit_status_for(signal) {
             if let Ok(number) = Number::try_from(signal_number(signal)) {
-                end_child(number);
+                forward_termination(number);
             }
             let over = Arc::clone(&self.over);
-            thread::spawn(move || end_after_grace(signal, status, &over));
+            thread::spawn(move || exit_after_grace_period(signal, status, &over));
         }
         // If the channel is closed, the event loop has ended and does not need the signal.
         let _ = self.events.send(Event::Signal(signal));
@@ -269,7 +269,7 @@ fn exit_status_for(signal: Signal) -> Option<ExitStatus> {
 
 /// Ends the process if the event loop has not ended. Restores the terminal first, except after a hangup, when
 /// it no longer exists. The saved modes are always restored, because a running child may have changed them.
-fn end_after_grace(signal: Signal, status: ExitStatus, over: &AtomicBool) {
+fn exit_after_grace_period(signal: Signal, status: ExitStatus, over: &AtomicBool) {
     thread::sleep(GRACE);
     if signal != Signal::Hangup {
         if over.load(Ordering::Acquire) {

@@ -85,9 +85,9 @@ pub(super) struct TerminalSession(());
 impl TerminalSession {
     /// Sets up the terminal: raw mode, alternate screen, hidden cursor.
     pub(super) fn open() -> Result<Self, TuiError> {
-        chain_panic_hook();
+        install_panic_hook();
         prepare_abort();
-        take_terminal().map_err(|source| TuiError::Terminal { action: "set up", source })?;
+        set_up_terminal().map_err(|source| TuiError::Terminal { action: "set up", source })?;
         Ok(Self(()))
     }
 
@@ -113,7 +113,7 @@ impl TerminalSession {
         if RAW.swap(false, Ordering::AcqRel) {
             disable_raw_mode()?;
         }
-        take_terminal()
+        set_up_terminal()
     }
 
     /// Enables or disables mouse reports.
@@ -157,7 +157,7 @@ pub(super) fn restore_modes() {
     }
 }
 
-fn take_terminal() -> io::Result<()> {
+fn set_up_terminal() -> io::Result<()> {
     enable_raw_mode()?;
     RAW.store(true, Ordering::Release);
     TAKEN.store(true, Ordering::Release);
@@ -341,7 +341,7 @@ fn write_frame_end_and_leave(out: &mut impl Write) -> io::Result<()> {
 /// Installs the panic hook. If the terminal's owner panics while using it, the terminal is restored before
 /// the panic is reported. A panic message from another thread would be lost on the alternate screen, so it is
 /// stored for [`last_panic`].
-fn chain_panic_hook() {
+fn install_panic_hook() {
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {
         let previous = std::panic::take_hook();

@@ -1,8 +1,8 @@
 //! Terminal queries and replies.
 
-use super::graphics::Protocol;
-use super::pixel_request::PixelRequest;
-use super::terminals::{Brand, TerminalId};
+use super::graphics::ImageProtocol;
+use super::pixel_request::ImageProtocolRequest;
+use super::terminals::{TerminalBrand, TerminalId};
 
 /// The finest block characters that a terminal draws without using a font.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -20,20 +20,20 @@ impl BlockGlyphs {
     /// for a long time.
     pub(super) fn supported_by(terminal: TerminalId) -> Self {
         let octants_since = match terminal.brand {
-            Brand::Kitty => [0, 40],
-            Brand::Foot => [1, 20],
-            Brand::Ghostty => [1, 2],
-            Brand::Vte => [7800, 0],
-            Brand::WezTerm | Brand::Contour => return Self::Sextants,
-            Brand::Konsole
-            | Brand::Iterm2
-            | Brand::WindowsTerminal
-            | Brand::ConEmu
-            | Brand::Mintty
-            | Brand::Alacritty
-            | Brand::VsCode
-            | Brand::AppleTerminal
-            | Brand::Xterm => return Self::Unknown,
+            TerminalBrand::Kitty => [0, 40],
+            TerminalBrand::Foot => [1, 20],
+            TerminalBrand::Ghostty => [1, 2],
+            TerminalBrand::Vte => [7800, 0],
+            TerminalBrand::WezTerm | TerminalBrand::Contour => return Self::Sextants,
+            TerminalBrand::Konsole
+            | TerminalBrand::Iterm2
+            | TerminalBrand::WindowsTerminal
+            | TerminalBrand::ConEmu
+            | TerminalBrand::Mintty
+            | TerminalBrand::Alacritty
+            | TerminalBrand::VsCode
+            | TerminalBrand::AppleTerminal
+            | TerminalBrand::Xterm => return Self::Unknown,
         };
         if terminal.version >= octants_since { Self::Octants } else { Self::Sextants }
     }
@@ -57,7 +57,7 @@ pub(super) enum TerminalReply {
     /// Background color in sRGB (OSC 11).
     Background([u8; 3]),
     /// Images can be drawn with this protocol.
-    Images(Protocol),
+    Images(ImageProtocol),
     /// A palette color in sRGB (OSC 4).
     Ink { index: u8, rgb: [u8; 3] },
     /// Any other report from the terminal.
@@ -79,7 +79,7 @@ pub(super) struct TerminalQueries {
     /// Query the 16 ANSI colors.
     pub(super) palette: bool,
     /// Query support for images.
-    pub(super) pixels: Option<PixelRequest>,
+    pub(super) pixels: Option<ImageProtocolRequest>,
 }
 
 impl TerminalQueries {
@@ -91,7 +91,7 @@ impl TerminalQueries {
                 queries.extend_from_slice(bytes);
             }
         };
-        let pixels = self.pixels.map(PixelRequest::query).unwrap_or_default();
+        let pixels = self.pixels.map(ImageProtocolRequest::query).unwrap_or_default();
         ask(self.blocks || self.name, b"\x1b[>q");
         ask(true, &pixels);
         // The capability names `RGB` and `Tc` are hex-encoded.

@@ -3,7 +3,7 @@
 
 /// Terminals that glimt recognizes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Brand {
+pub(super) enum TerminalBrand {
     Kitty,
     Foot,
     Ghostty,
@@ -25,7 +25,7 @@ pub(super) enum Brand {
 /// A terminal and its version, which is `[0, 0]` if unknown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct TerminalId {
-    pub(super) brand: Brand,
+    pub(super) brand: TerminalBrand,
     pub(super) version: [u32; 2],
 }
 
@@ -58,22 +58,22 @@ pub(super) struct Capabilities {
     pub(super) clipboard: bool,
 }
 
-impl Brand {
+impl TerminalBrand {
     /// The terminal that sets `TERM_PROGRAM` to this value. `None` if unknown.
     pub(super) fn from_program(name: &str) -> Option<Self> {
-        const PROGRAMS: [(&str, Brand); 6] = [
-            ("ghostty", Brand::Ghostty),
-            ("WezTerm", Brand::WezTerm),
-            ("iTerm.app", Brand::Iterm2),
-            ("mintty", Brand::Mintty),
-            ("vscode", Brand::VsCode),
-            ("Apple_Terminal", Brand::AppleTerminal),
+        const PROGRAMS: [(&str, TerminalBrand); 6] = [
+            ("ghostty", TerminalBrand::Ghostty),
+            ("WezTerm", TerminalBrand::WezTerm),
+            ("iTerm.app", TerminalBrand::Iterm2),
+            ("mintty", TerminalBrand::Mintty),
+            ("vscode", TerminalBrand::VsCode),
+            ("Apple_Terminal", TerminalBrand::AppleTerminal),
         ];
         PROGRAMS.iter().find(|(known, _)| *known == name).map(|(_, brand)| *brand)
     }
 
     /// Whether this terminal, identified by `TERM_PROGRAM`, supports 24-bit color and REP.
-    pub(super) fn has_colors_and_repeats(self) -> bool {
+    pub(super) fn supports_true_color_and_rep(self) -> bool {
         match self {
             Self::Ghostty | Self::WezTerm | Self::Iterm2 | Self::VsCode => true,
             Self::Kitty
@@ -113,17 +113,17 @@ impl Brand {
 impl TerminalId {
     /// Parses an XTVERSION report, such as `foot(1.20.2)` or `ghostty 1.2.0`.
     pub(super) fn from_report(report: &str) -> Option<Self> {
-        const NAMES: [(&str, Brand); 10] = [
-            ("kitty", Brand::Kitty),
-            ("foot", Brand::Foot),
-            ("ghostty", Brand::Ghostty),
-            ("WezTerm", Brand::WezTerm),
-            ("contour", Brand::Contour),
-            ("vte", Brand::Vte),
-            ("Konsole", Brand::Konsole),
-            ("iTerm2", Brand::Iterm2),
-            ("mintty", Brand::Mintty),
-            ("XTerm", Brand::Xterm),
+        const NAMES: [(&str, TerminalBrand); 10] = [
+            ("kitty", TerminalBrand::Kitty),
+            ("foot", TerminalBrand::Foot),
+            ("ghostty", TerminalBrand::Ghostty),
+            ("WezTerm", TerminalBrand::WezTerm),
+            ("contour", TerminalBrand::Contour),
+            ("vte", TerminalBrand::Vte),
+            ("Konsole", TerminalBrand::Konsole),
+            ("iTerm2", TerminalBrand::Iterm2),
+            ("mintty", TerminalBrand::Mintty),
+            ("XTerm", TerminalBrand::Xterm),
         ];
         let (name, rest) = report.split_at(report.find(['(', ' ']).unwrap_or(report.len()));
         let (_, brand) = NAMES.iter().find(|(known, _)| name.eq_ignore_ascii_case(known))?;
@@ -133,13 +133,13 @@ impl TerminalId {
     /// Detects the terminal from environment variables. `None` if it is unknown, and inside tmux or screen,
     /// because these do not pass on the escape sequences.
     pub(super) fn from_environment(variable: impl Fn(&str) -> Option<String>) -> Option<Self> {
-        const TERMS: [(&str, Brand); 6] = [
-            ("xterm-kitty", Brand::Kitty),
-            ("foot", Brand::Foot),
-            ("xterm-ghostty", Brand::Ghostty),
-            ("wezterm", Brand::WezTerm),
-            ("contour", Brand::Contour),
-            ("alacritty", Brand::Alacritty),
+        const TERMS: [(&str, TerminalBrand); 6] = [
+            ("xterm-kitty", TerminalBrand::Kitty),
+            ("foot", TerminalBrand::Foot),
+            ("xterm-ghostty", TerminalBrand::Ghostty),
+            ("wezterm", TerminalBrand::WezTerm),
+            ("contour", TerminalBrand::Contour),
+            ("alacritty", TerminalBrand::Alacritty),
         ];
         let get = |name: &str| variable(name).unwrap_or_default();
         let is_set = |name: &str| !get(name).is_empty();
@@ -147,27 +147,28 @@ impl TerminalId {
         if is_set("TMUX") || is_set("STY") || is_without_extras(&term) {
             return None;
         }
-        let known = |brand: Brand, number: &str| Some(Self { brand, version: parse_version(&get(number)) });
+        let known =
+            |brand: TerminalBrand, number: &str| Some(Self { brand, version: parse_version(&get(number)) });
         // Check `TERM_PROGRAM` and `TERM` first, because a terminal that runs inside another one overwrites
         // them.
-        if let Some(brand) = Brand::from_program(&get("TERM_PROGRAM")) {
+        if let Some(brand) = TerminalBrand::from_program(&get("TERM_PROGRAM")) {
             return known(brand, "TERM_PROGRAM_VERSION");
         }
         if let Some((_, brand)) = TERMS.iter().find(|(name, _)| term.starts_with(name)) {
             return known(*brand, "TERM_PROGRAM_VERSION").filter(|_| !is_set("TERM_PROGRAM"));
         }
         match () {
-            () if is_set("WT_SESSION") => known(Brand::WindowsTerminal, ""),
-            () if get("ConEmuANSI") == "ON" => known(Brand::ConEmu, ""),
-            () if is_set("VTE_VERSION") => known(Brand::Vte, "VTE_VERSION"),
+            () if is_set("WT_SESSION") => known(TerminalBrand::WindowsTerminal, ""),
+            () if get("ConEmuANSI") == "ON" => known(TerminalBrand::ConEmu, ""),
+            () if is_set("VTE_VERSION") => known(TerminalBrand::Vte, "VTE_VERSION"),
             () if is_set("KONSOLE_VERSION") => {
                 // 250402 means version 25.04.2.
                 let number: u32 = get("KONSOLE_VERSION").parse().unwrap_or(0);
-                Some(Self { brand: Brand::Konsole, version: [number / 10_000, number / 100 % 100] })
+                Some(Self { brand: TerminalBrand::Konsole, version: [number / 10_000, number / 100 % 100] })
             }
-            () if is_set("XTERM_VERSION") => known(Brand::Xterm, ""),
+            () if is_set("XTERM_VERSION") => known(TerminalBrand::Xterm, ""),
             // SSH usually forwards `LC_*` variables, so this also detects iTerm2 on remote machines.
-            () if get("LC_TERMINAL") == "iTerm2" => known(Brand::Iterm2, "LC_TERMINAL_VERSION"),
+            () if get("LC_TERMINAL") == "iTerm2" => known(TerminalBrand::Iterm2, "LC_TERMINAL_VERSION"),
             () => None,
         }
     }
@@ -185,34 +186,34 @@ impl TerminalId {
         };
         let since = |least: [u32; 2]| version >= least;
         match brand {
-            Brand::Kitty => Capabilities { notice: Some(NotificationProtocol::Osc99), ..all },
-            Brand::Foot | Brand::Contour => {
+            TerminalBrand::Kitty => Capabilities { notice: Some(NotificationProtocol::Osc99), ..all },
+            TerminalBrand::Foot | TerminalBrand::Contour => {
                 Capabilities { notice: Some(NotificationProtocol::Osc777), ..all }
             }
-            Brand::Ghostty => {
+            TerminalBrand::Ghostty => {
                 Capabilities { notice: Some(NotificationProtocol::Osc777), progress: since([1, 2]), ..all }
             }
             // Older versions display the progress sequence as a notification.
-            Brand::WezTerm => Capabilities {
+            TerminalBrand::WezTerm => Capabilities {
                 notice: Some(NotificationProtocol::Osc777),
                 progress: since([20_250_301, 0]),
                 ..all
             },
-            Brand::Iterm2 => {
+            TerminalBrand::Iterm2 => {
                 Capabilities { notice: Some(NotificationProtocol::Osc9), progress: since([3, 7]), ..all }
             }
-            Brand::WindowsTerminal => Capabilities { progress: true, ..all },
-            Brand::VsCode => Capabilities { progress: since([1, 97]), ..all },
-            Brand::Mintty => Capabilities { progress: since([3, 5]), ..all },
-            Brand::Alacritty => all,
-            Brand::Konsole => Capabilities { progress: since([25, 4]), clipboard: false, ..all },
-            Brand::Vte => {
+            TerminalBrand::WindowsTerminal => Capabilities { progress: true, ..all },
+            TerminalBrand::VsCode => Capabilities { progress: since([1, 97]), ..all },
+            TerminalBrand::Mintty => Capabilities { progress: since([3, 5]), ..all },
+            TerminalBrand::Alacritty => all,
+            TerminalBrand::Konsole => Capabilities { progress: since([25, 4]), clipboard: false, ..all },
+            TerminalBrand::Vte => {
                 Capabilities { progress: since([8000, 0]), links: since([5000, 0]), clipboard: false, ..all }
             }
             // xterm denies clipboard access by default.
-            Brand::Xterm => Capabilities { links: false, clipboard: false, ..all },
-            Brand::ConEmu => Capabilities { title: true, progress: true, ..Capabilities::default() },
-            Brand::AppleTerminal => {
+            TerminalBrand::Xterm => Capabilities { links: false, clipboard: false, ..all },
+            TerminalBrand::ConEmu => Capabilities { title: true, progress: true, ..Capabilities::default() },
+            TerminalBrand::AppleTerminal => {
                 Capabilities { links: false, clipboard: false, focus: false, notice: None, ..all }
             }
         }
@@ -245,24 +246,28 @@ mod tests {
     fn terminals_are_detected_from_environment() {
         let xterm = ("TERM", "xterm-256color");
         for (pairs, brand, version) in [
-            (&[("TERM", "xterm-kitty")][..], Brand::Kitty, [0, 0]),
-            (&[("TERM", "foot-extra")], Brand::Foot, [0, 0]),
+            (&[("TERM", "xterm-kitty")][..], TerminalBrand::Kitty, [0, 0]),
+            (&[("TERM", "foot-extra")], TerminalBrand::Foot, [0, 0]),
             (
                 &[xterm, ("TERM_PROGRAM", "iTerm.app"), ("TERM_PROGRAM_VERSION", "3.6.6")],
-                Brand::Iterm2,
+                TerminalBrand::Iterm2,
                 [3, 6],
             ),
-            (&[xterm, ("LC_TERMINAL", "iTerm2"), ("LC_TERMINAL_VERSION", "3.5.1")], Brand::Iterm2, [3, 5]),
-            (&[xterm, ("WT_SESSION", "1-2-3")], Brand::WindowsTerminal, [0, 0]),
-            (&[xterm, ("VTE_VERSION", "8002")], Brand::Vte, [8002, 0]),
-            (&[xterm, ("KONSOLE_VERSION", "250402")], Brand::Konsole, [25, 4]),
+            (
+                &[xterm, ("LC_TERMINAL", "iTerm2"), ("LC_TERMINAL_VERSION", "3.5.1")],
+                TerminalBrand::Iterm2,
+                [3, 5],
+            ),
+            (&[xterm, ("WT_SESSION", "1-2-3")], TerminalBrand::WindowsTerminal, [0, 0]),
+            (&[xterm, ("VTE_VERSION", "8002")], TerminalBrand::Vte, [8002, 0]),
+            (&[xterm, ("KONSOLE_VERSION", "250402")], TerminalBrand::Konsole, [25, 4]),
             (
                 &[xterm, ("TERM_PROGRAM", "WezTerm"), ("TERM_PROGRAM_VERSION", "20240203-110809-5046fc22")],
-                Brand::WezTerm,
+                TerminalBrand::WezTerm,
                 [20_240_203, 110_809],
             ),
             // VS Code started from kitty.
-            (&[xterm, ("TERM_PROGRAM", "vscode"), ("KITTY_WINDOW_ID", "1")], Brand::VsCode, [0, 0]),
+            (&[xterm, ("TERM_PROGRAM", "vscode"), ("KITTY_WINDOW_ID", "1")], TerminalBrand::VsCode, [0, 0]),
         ] {
             assert_eq!(identify(pairs), Some(TerminalId { brand, version }), "{pairs:?}");
         }

@@ -5,7 +5,7 @@
 use std::time::Duration;
 
 use super::graphics::base64;
-use super::state::{Activity, State};
+use super::state::{State, WorkerActivity};
 use super::terminals::NotificationProtocol;
 use super::view;
 use crate::scene::sanitize::visible;
@@ -100,10 +100,10 @@ fn scene_file_name(state: &State) -> String {
 
 fn progress_bar(state: &State, percent: Option<u32>) -> ProgressBar {
     match state.work.activity {
-        Activity::Running { .. } if state.work.paused => ProgressBar::Paused(percent.unwrap_or(0)),
-        Activity::Running { .. } => percent.map_or(ProgressBar::Busy, ProgressBar::Percent),
-        Activity::Broken => ProgressBar::Broken,
-        Activity::Done | Activity::Waiting | Activity::Cancelled => ProgressBar::None,
+        WorkerActivity::Running { .. } if state.work.paused => ProgressBar::Paused(percent.unwrap_or(0)),
+        WorkerActivity::Running { .. } => percent.map_or(ProgressBar::Busy, ProgressBar::Percent),
+        WorkerActivity::Broken => ProgressBar::Broken,
+        WorkerActivity::Done | WorkerActivity::Waiting | WorkerActivity::Cancelled => ProgressBar::None,
     }
 }
 
@@ -133,11 +133,12 @@ mod tests {
     use super::*;
     use crate::fixtures::{TestUi, render_progress};
     use crate::pipeline::protocol::Event;
-    use crate::terminals::{Brand, Capabilities, TerminalId};
+    use crate::terminals::{Capabilities, TerminalBrand, TerminalId};
 
     fn ui() -> TestUi {
         let mut ui = TestUi::new();
-        ui.state.display.capabilities = TerminalId { brand: Brand::Ghostty, version: [1, 2] }.capabilities();
+        ui.state.display.capabilities =
+            TerminalId { brand: TerminalBrand::Ghostty, version: [1, 2] }.capabilities();
         ui
     }
 

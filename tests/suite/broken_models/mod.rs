@@ -6,7 +6,7 @@ mod cases;
 use std::fs;
 use std::path::Path;
 
-use glimt::assets::gltf::Container;
+use glimt::assets::gltf::GltfFile;
 use glimt::assets::mesh::load;
 use glimt::control::{CancelToken, ignore_progress};
 use serde_json::{Value, json};
@@ -93,9 +93,7 @@ fn said(folder: &Path, name: &str, content: &[u8]) -> String {
     let (path, token) = (folder.join(name), CancelToken::new());
     fs::write(&path, content).expect("written");
     let read = match name.ends_with("gltf") || name.ends_with("glb") {
-        true => {
-            Container::open(&path, &ignore_progress, &token).and_then(|file| file.scene(&token)).map(drop)
-        }
+        true => GltfFile::open(&path, &ignore_progress, &token).and_then(|file| file.scene(&token)).map(drop),
         false => load(&path, &ignore_progress, &token).map(drop),
     };
     let message = read.map_or_else(|error| error.to_string(), |()| String::new());

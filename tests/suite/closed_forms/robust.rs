@@ -7,7 +7,7 @@ use glimt::geometry::mesh::TriangleMesh;
 use glimt::geometry::ray::offset_origin;
 use glimt::geometry::{Ray, SurfacePoint};
 use glimt::integrators::render_tile;
-use glimt::lights::LightObject;
+use glimt::lights::LightGeometry;
 use glimt::materials::fresnel::dielectric;
 use glimt::math::transform::Transform;
 use glimt::math::{DVec3, Vec3};
@@ -265,7 +265,7 @@ fn closed_mesh_has_no_leaks() {
             let origin = (center + random.direction() * random.unit()).as_vec3();
             let ray = Ray::new(origin, (target - origin.as_dvec3()).as_vec3());
             leaks += u32::from(world.geometry.closest(&ray).is_none());
-            leaks += u32::from(!world.geometry.occluded(&ray, LightObject::Nothing));
+            leaks += u32::from(!world.geometry.occluded(&ray, LightGeometry::Nothing));
         }
         assert_eq!(leaks, 0, "at {center}");
     }
@@ -385,7 +385,7 @@ fn invalid_rays_hit_nothing() {
             direction.direction[axis] = bad;
             for ray in [origin, direction] {
                 assert_eq!(world.geometry.closest(&ray), None, "{ray:?}");
-                assert!(!world.geometry.occluded(&ray, LightObject::Nothing), "{ray:?}");
+                assert!(!world.geometry.occluded(&ray, LightGeometry::Nothing), "{ray:?}");
             }
         }
     }
@@ -423,7 +423,7 @@ fn tree_finds_the_same_hit_as_brute_force() {
         let nearest = one_by_one.min_by(|a, b| a.shape.t.total_cmp(&b.shape.t).then(a.object.cmp(&b.object)));
         found += u32::from(nearest.is_some());
         assert_eq!(world.geometry.closest(&ray), nearest, "{ray:?}");
-        assert_eq!(world.geometry.occluded(&ray, LightObject::Nothing), nearest.is_some());
+        assert_eq!(world.geometry.occluded(&ray, LightGeometry::Nothing), nearest.is_some());
     }
     assert!(found > 20_000);
 }

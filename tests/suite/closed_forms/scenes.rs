@@ -14,8 +14,8 @@ use glimt::math::{DVec3, Vec2, Vec3};
 use glimt::scene::description::light::{Falloff, PointLight};
 use glimt::scene::description::{
     Accel, Camera, ColorSource, EmissionSource, Encoding, Environment, FresnelSource, Integrator, Light,
-    Located, Material, MaterialKind, Mesh, MeshFile, NumberSource, Object, OpacitySource, Photons,
-    PixelFilter, Placement, Render, Scene, Shadows, Shape, Texture, TextureFilter, Tonemap, UvSet, Wrap,
+    Located, Material, MaterialKind, Mesh, MeshFile, MeshTransform, NumberSource, Object, OpacitySource,
+    Photons, PixelFilter, Render, Scene, Shadows, Shape, Texture, TextureFilter, Tonemap, UvSet, Wrap,
 };
 use glimt::world::{
     Geometry, Image, MeshTree, TextureNeeds, World, WorldInputs, lights, origin, sky_map, textures_needed,
@@ -161,7 +161,7 @@ impl Build {
         self.scene.mesh_files.push(MeshFile { value: PathBuf::new(), span: 0..0, part: None });
         let [scale, rotate, translate] = placed;
         let file = self.parts.meshes.len() - 1;
-        let placed = Placement::Steps { scale, rotate, translate };
+        let placed = MeshTransform::Steps { scale, rotate, translate };
         self.shape(Shape::Mesh(Mesh { file, placed, smooth: false, vertex_colors: false }), material)
     }
 

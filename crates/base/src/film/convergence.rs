@@ -281,7 +281,7 @@ const FOURFOLD_MOST: f64 = 40.0;
 impl Convergence {
     /// Typical long-term exponent of the variance's decrease with the sample count, regardless of the latest
     /// steps.
-    pub fn usual_power(self) -> f64 {
+    pub fn typical_exponent(self) -> f64 {
         match self {
             Self::Stratified => 1.432_959_407_276_106_2,
             Self::Photons => 1.0,

@@ -163,7 +163,7 @@ pub struct Picture {
 
 /// A 16-bit sRGB image for files.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Picture16 {
+pub struct Srgb16Image {
     /// Width in pixels.
     pub width: u32,
     /// Height in pixels.

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::range_map::RangeMap;
-use super::{Picture, Picture16, RadianceImage, curves, is_in_pool, linear_to_srgb8};
+use super::{Picture, RadianceImage, Srgb16Image, curves, is_in_pool, linear_to_srgb8};
 use crate::choice;
 use crate::math::Vec3;
 use crate::math::color::linear_to_srgb;
@@ -102,7 +102,7 @@ pub fn develop(image: &RadianceImage, tone: &ToneMapping) -> Picture {
 }
 
 /// Converts an image to 16 bits per channel.
-pub fn develop16(image: &RadianceImage, tone: &ToneMapping) -> Picture16 {
+pub fn develop16(image: &RadianceImage, tone: &ToneMapping) -> Srgb16Image {
     let quantise = |x: f32| (x * 65535.0 + 0.5) as u16;
     let pixels = match tone.transfer {
         Transfer::Srgb => {
@@ -110,7 +110,7 @@ pub fn develop16(image: &RadianceImage, tone: &ToneMapping) -> Picture16 {
         }
         Transfer::Identity => map_pixels(image, tone, |color| color.to_array().map(quantise)),
     };
-    Picture16 { width: image.width, height: image.height, pixels }
+    Srgb16Image { width: image.width, height: image.height, pixels }
 }
 
 fn map_pixels<T: Send>(

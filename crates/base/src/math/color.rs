@@ -43,11 +43,11 @@ pub fn linear_to_srgb8(linear: f32) -> u8 {
 /// Decodes an sRGB byte triple to a linear color.
 #[inline]
 pub fn srgb8_to_linear(bytes: [u8; 3]) -> Vec3 {
-    Vec3::from_array(bytes.map(|byte| LINEAR_OF_SRGB8[usize::from(byte)]))
+    Vec3::from_array(bytes.map(|byte| SRGB8_TO_LINEAR[usize::from(byte)]))
 }
 
 /// Lookup table of [`srgb_to_linear`] for every byte.
-pub static LINEAR_OF_SRGB8: LazyLock<[f32; 256]> =
+pub static SRGB8_TO_LINEAR: LazyLock<[f32; 256]> =
     LazyLock::new(|| std::array::from_fn(|byte| srgb_to_linear(byte as f32 / 255.0)));
 
 #[cfg(test)]

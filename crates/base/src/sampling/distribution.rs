@@ -2,12 +2,12 @@
 
 /// Samples an index in proportion to its weight.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Discrete {
+pub struct DiscreteDistribution {
     /// Inclusive cumulative sums of the weights.
     sums: Vec<f64>,
 }
 
-impl Discrete {
+impl DiscreteDistribution {
     /// Creates a distribution from weights ≥ 0, or `None` if their sum is 0 or not finite.
     pub fn new(weights: impl IntoIterator<Item = f64>) -> Option<Self> {
         let sums: Vec<f64> = weights
@@ -49,7 +49,7 @@ mod tests {
 
     #[test]
     fn indices_are_sampled_in_proportion_to_weights() {
-        let distribution = Discrete::new([1.0, 0.0, 3.0, 0.0]).expect("some weight");
+        let distribution = DiscreteDistribution::new([1.0, 0.0, 3.0, 0.0]).expect("some weight");
         let mut counts = [0; 4];
         let mut rests = 0.0;
         for i in 0..1000 {
@@ -61,7 +61,7 @@ mod tests {
         assert_eq!([0, 1, 2, 3].map(|index| distribution.probability(index)), [0.25, 0.0, 0.75, 0.0]);
         assert!((rests / 1000.0 - 0.5).abs() < 0.01);
         assert_eq!(distribution.sample(1.0_f32.next_down()).0, 2);
-        assert_eq!(Discrete::new([0.0]), None);
-        assert_eq!(Discrete::new([]), None);
+        assert_eq!(DiscreteDistribution::new([0.0]), None);
+        assert_eq!(DiscreteDistribution::new([]), None);
     }
 }

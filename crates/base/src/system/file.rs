@@ -6,7 +6,7 @@ use std::os::unix::fs::MetadataExt;
 use std::path::Path;
 
 /// Magic bytes of image parts and checkpoints, also recognized by readers of other file types.
-pub const PART_MARK: [u8; 12] = *b"\x89GLIMT\r\n\x1a\n\0\0";
+pub const PART_MAGIC: [u8; 12] = *b"\x89GLIMT\r\n\x1a\n\0\0";
 
 /// File type of a path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

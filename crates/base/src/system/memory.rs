@@ -7,7 +7,7 @@ use nix::sys::resource::{RLIM_INFINITY, Resource, getrlimit};
 
 /// Maximum amount of memory available to this process.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Limit {
+pub struct MemoryLimit {
     /// Limit in bytes.
     pub bytes: u64,
     /// Name of the setting that imposes the limit, such as `` `ulimit -v` ``.
@@ -15,17 +15,17 @@ pub struct Limit {
 }
 
 /// Lowest limit imposed on the address space or by a control group. `None` if memory is unlimited.
-pub fn limit() -> Option<Limit> {
+pub fn limit() -> Option<MemoryLimit> {
     let of_space =
         getrlimit(Resource::RLIMIT_AS).ok().map(|(bytes, _)| bytes).filter(|bytes| *bytes < RLIM_INFINITY);
-    let of_space = of_space.map(|bytes| Limit { bytes, setting: "`ulimit -v`".to_owned() });
+    let of_space = of_space.map(|bytes| MemoryLimit { bytes, setting: "`ulimit -v`".to_owned() });
     let groups = fs::read_to_string("/proc/self/cgroup").unwrap_or_default();
     let of_group = cgroup_limit(Path::new("/sys/fs/cgroup"), &groups);
     of_space.into_iter().chain(of_group).min_by_key(|limit| limit.bytes)
 }
 
 /// Lowest limit of the control groups (version 1 or 2) listed in `/proc/self/cgroup` and their ancestors.
-fn cgroup_limit(root: &Path, groups: &str) -> Option<Limit> {
+fn cgroup_limit(root: &Path, groups: &str) -> Option<MemoryLimit> {
     let of_line = |line: &str| {
         let [_, controllers, path] = <[&str; 3]>::try_from(line.splitn(3, ':').collect::<Vec<_>>()).ok()?;
         let (root, file) = match controllers {
@@ -42,7 +42,7 @@ fn cgroup_limit(root: &Path, groups: &str) -> Option<Limit> {
 
 /// Returns the lowest limit of a group and its ancestors. In a container, the path may be the host's path
 /// even though the root is the container's own group.
-fn lowest_ancestor_limit(root: &Path, path: &str, file: &str) -> Option<Limit> {
+fn lowest_ancestor_limit(root: &Path, path: &str, file: &str) -> Option<MemoryLimit> {
     /// Version 1 represents "no limit" as the largest possible number of pages.
     const NONE: u64 = 1 << 60;
     let group = root.join(path.trim_start_matches('/'));
@@ -53,7 +53,7 @@ fn lowest_ancestor_limit(root: &Path, path: &str, file: &str) -> Option<Limit> {
         (bytes < NONE).then_some((bytes, file))
     };
     let (bytes, file) = folders.filter_map(read).min_by_key(|(bytes, _)| *bytes)?;
-    Some(Limit { bytes, setting: format!("the control group ({})", file.display()) })
+    Some(MemoryLimit { bytes, setting: format!("the control group ({})", file.display()) })
 }
 
 #[cfg(test)]

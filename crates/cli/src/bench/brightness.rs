@@ -51,7 +51,7 @@ pub fn compare_brightness(
     } else {
         (by_seeds, seeds)
     };
-    let of_references = references.brightness_uncertainty();
+    let of_references = references.relative_bias_standard_error();
     let error = (of_pictures * of_pictures + of_references * of_references).sqrt();
     let by_chance = match error > 0.0 {
         true => 2.0 * student_t_tail(value.abs() / error, freedom),

@@ -13,9 +13,9 @@ use crate::compare::Pair;
 use crate::control::CancelToken;
 use crate::film::RadianceImage;
 use crate::math::Vec3;
-use crate::output::write::Guard;
-use crate::output::{Losses, OutputError, staged, write};
-use crate::scene::fingerprint::{Fingerprint, Key};
+use crate::output::write::WritePolicy;
+use crate::output::{AttributeLossPolicy, OutputError, staged, write};
+use crate::scene::fingerprint::{FingerprintHasher, Key};
 
 /// The cache folder for references, inside `XDG_CACHE_HOME` or `~/.cache`. `None` if neither is set.
 pub fn cache_folder() -> Option<PathBuf> {
@@ -31,15 +31,17 @@ pub fn cache_folder() -> Option<PathBuf> {
 pub fn write_starter_scene(folder: &Path) -> Result<PathBuf, OutputError> {
     let text = crate::scene::starter().as_bytes();
     // Use one folder per version of the scene, because a scene next to the references may belong to the user.
-    let folder = folder
-        .join(format!("starter-{}", &Fingerprint::new("starter").bytes(text).finish().to_string()[..16]));
+    let folder = folder.join(format!(
+        "starter-{}",
+        &FingerprintHasher::new("starter").bytes(text).finish().to_string()[..16]
+    ));
     create_folder(&folder)?;
     let path = folder.join("starter.toml");
     let is_there = || fs::read(&path).is_ok_and(|found| found == text);
     if is_there() {
         return Ok(path);
     }
-    match staged::new_files(&folder, &[("starter.toml".into(), text)], &CancelToken::new()) {
+    match staged::create_files_atomically(&folder, &[("starter.toml".into(), text)], &CancelToken::new()) {
         // Another process may have written the file in the meantime.
         Err(_) if is_there() => Ok(path),
         Err(_) if path.symlink_metadata().is_ok() => Err(foreign_file_error(&path, "the starter scene")),
@@ -128,11 +130,11 @@ pub(super) fn store(folder: &Path, key: &Key, stored: &CachedReferences) -> Resu
     let may_replace = |real: &Path| {
         if is_replaceable(real) { Ok(()) } else { Err(foreign_file_error(&path, "a reference")) }
     };
-    let guard = Guard {
+    let guard = WritePolicy {
         is_kept: &|_| false,
         may_replace: &may_replace,
         sweep: None,
-        losses: Losses::Report(&|_| ()),
+        losses: AttributeLossPolicy::Report(&|_| ()),
     };
     write::atomic_guarded(&path, &bytes, &guard, &CancelToken::new())
 }
@@ -148,7 +150,7 @@ fn is_replaceable(path: &Path) -> bool {
 }
 
 fn content_checksum(content: &[u8]) -> String {
-    Fingerprint::new("references").bytes(content).finish().to_string()
+    FingerprintHasher::new("references").bytes(content).finish().to_string()
 }
 
 fn cache_file_path(folder: &Path, key: &Key) -> PathBuf {
@@ -180,7 +182,7 @@ mod tests {
         assert!(why.contains("starter.toml") && why.contains("--cache"), "{why}");
         assert_eq!(fs::read_to_string(&scene).expect("a scene"), "edited");
         // References replace only empty files and other references.
-        let key = Fingerprint::new("x").finish();
+        let key = FingerprintHasher::new("x").finish();
         let path = cache_file_path(folder.path(), &key);
         fs::write(&path, "notes").expect("written");
         assert!(store(folder.path(), &key, &stored()).is_err());
@@ -198,19 +200,19 @@ mod tests {
     fn stored_references_are_restored_exactly() {
         let folder = tempfile::tempdir().expect("a folder");
         let folder = folder.path().join("not/there/yet");
-        let key = Fingerprint::new("x").finish();
+        let key = FingerprintHasher::new("x").finish();
         assert!(load(&folder, &key).is_none());
         store(&folder, &key, &stored()).expect("stored");
         let back = load(&folder, &key).expect("stored references");
         assert_eq!(back.cost, stored().cost);
         assert_eq!((back.pair.a(), back.pair.b()), (stored().pair.a(), stored().pair.b()));
-        assert!(load(&folder, &Fingerprint::new("y").finish()).is_none());
+        assert!(load(&folder, &FingerprintHasher::new("y").finish()).is_none());
     }
 
     #[test]
     fn damaged_files_are_ignored() {
         let folder = tempfile::tempdir().expect("a folder");
-        let key = Fingerprint::new("x").finish();
+        let key = FingerprintHasher::new("x").finish();
         store(folder.path(), &key, &stored()).expect("stored");
         let path = cache_file_path(folder.path(), &key);
         let whole = fs::read(&path).expect("bytes");

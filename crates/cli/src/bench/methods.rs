@@ -6,7 +6,7 @@ use crate::scene::description::{Accel, Integrator, Scene, Shadows};
 
 /// Values to measure for each setting, in all combinations. An empty list keeps the scene's value.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Toggles {
+pub struct MethodSweep {
     /// Integrators.
     pub integrators: Vec<Integrator>,
     /// Photon mapping, in whitted.
@@ -40,8 +40,8 @@ struct MethodSettings {
 
 /// The methods to measure on a scene. By default, these are path, whitted with photons, and the scene's own
 /// settings if they differ from both.
-pub fn methods_to_measure(scene: &Scene, toggles: &Toggles) -> Vec<Method> {
-    let all = if *toggles == Toggles::default() {
+pub fn methods_to_measure(scene: &Scene, toggles: &MethodSweep) -> Vec<Method> {
+    let all = if *toggles == MethodSweep::default() {
         default_settings(scene)
     } else {
         requested_settings(scene, toggles)
@@ -59,19 +59,19 @@ fn default_settings(scene: &Scene) -> Vec<MethodSettings> {
     let own = (scene.render.integrator, scene.photons.enabled);
     let ways = [(Integrator::Path, false), (Integrator::Whitted, true), own];
     let of = |(integrator, photons)| {
-        all_combinations(integrator, photons, scene.render.shadows, scene.render.clamp, scene.render.accel)
+        method_settings(integrator, photons, scene.render.shadows, scene.render.clamp, scene.render.accel)
     };
     ways.into_iter().map(of).collect()
 }
 
-fn requested_settings(scene: &Scene, toggles: &Toggles) -> Vec<MethodSettings> {
+fn requested_settings(scene: &Scene, toggles: &MethodSweep) -> Vec<MethodSettings> {
     let mut ways = Vec::new();
     for integrator in or_scene_value(&toggles.integrators, scene.render.integrator) {
         for photons in or_scene_value(&toggles.photons, scene.photons.enabled) {
             for shadows in or_scene_value(&toggles.shadows, scene.render.shadows) {
                 for clamp in or_scene_value(&toggles.clamps, scene.render.clamp) {
                     for accel in or_scene_value(&toggles.accels, scene.render.accel) {
-                        ways.push(all_combinations(integrator, photons, shadows, clamp, accel));
+                        ways.push(method_settings(integrator, photons, shadows, clamp, accel));
                     }
                 }
             }
@@ -84,7 +84,7 @@ fn or_scene_value<T: Copy>(asked: &[T], own: T) -> Vec<T> {
     if asked.is_empty() { vec![own] } else { asked.to_vec() }
 }
 
-fn all_combinations(
+fn method_settings(
     integrator: Integrator,
     photons: bool,
     shadows: Shadows,
@@ -97,7 +97,7 @@ fn all_combinations(
 }
 
 /// Creates a method, named after the requested settings.
-fn name_method(settings: MethodSettings, toggles: &Toggles) -> Method {
+fn name_method(settings: MethodSettings, toggles: &MethodSweep) -> Method {
     let mut words = vec![settings.integrator.name().to_owned()];
     if let Some((photons, shadows)) = settings.of_whitted {
         if photons {
@@ -136,13 +136,13 @@ mod tests {
         crate::scene::load(&path, &[]).expect("a scene").scene
     }
 
-    fn names(text: &str, toggles: &Toggles) -> Vec<String> {
+    fn names(text: &str, toggles: &MethodSweep) -> Vec<String> {
         methods_to_measure(&scene(text), toggles).into_iter().map(|method| method.name).collect()
     }
 
     #[test]
     fn default_methods_include_the_scene_settings() {
-        let none = Toggles::default();
+        let none = MethodSweep::default();
         assert_eq!(names("", &none), ["path", "whitted photons", "whitted"]);
         assert_eq!(names("[photons]\nenabled = true\n", &none), ["path", "whitted photons"]);
         assert_eq!(names("[render]\nintegrator = \"path\"\n", &none), ["path", "whitted photons"]);
@@ -150,11 +150,11 @@ mod tests {
 
     #[test]
     fn all_distinct_combinations_are_measured() {
-        let toggles = Toggles {
+        let toggles = MethodSweep {
             integrators: vec![Integrator::Path, Integrator::Whitted],
             photons: vec![true, false],
             shadows: vec![Shadows::Soft, Shadows::Hard],
-            ..Toggles::default()
+            ..MethodSweep::default()
         };
         let names = names("", &toggles);
         assert_eq!(
@@ -167,14 +167,17 @@ mod tests {
                 "whitted shadows hard"
             ]
         );
-        let accels =
-            Toggles { accels: vec![Accel::Bvh, Accel::KdTree], clamps: vec![2.5], ..Toggles::default() };
+        let accels = MethodSweep {
+            accels: vec![Accel::Bvh, Accel::KdTree],
+            clamps: vec![2.5],
+            ..MethodSweep::default()
+        };
         assert_eq!(self::names("", &accels), ["whitted clamp 2.5 bvh", "whitted clamp 2.5 kdtree"]);
     }
 
     #[test]
     fn methods_override_scene_settings() {
-        let toggles = Toggles { integrators: vec![Integrator::Whitted], ..Toggles::default() };
+        let toggles = MethodSweep { integrators: vec![Integrator::Whitted], ..MethodSweep::default() };
         let method = methods_to_measure(&scene("[render]\nclamp = 3\n[photons]\nenabled = true\n"), &toggles)
             .remove(0);
         let overrides = &method.overrides;

@@ -22,7 +22,7 @@ mod time_budget;
 
 pub use bias::{Bias, MIN_SEEDS};
 pub use brightness::Brightness;
-pub use methods::{Method, Toggles, methods_to_measure};
+pub use methods::{Method, MethodSweep, methods_to_measure};
 pub use request::{BenchError, BenchEvent, BenchRequest, ReferenceSource, StepSchedule, UnfinishedBenchmark};
 pub use results::{
     BiasVerdict, ImageResult, MethodResult, ReferenceResult, Results, SceneResult, StepResult,

@@ -12,7 +12,7 @@ use crate::pipeline::session::{Rendered, Session};
 use crate::pipeline::settings::Overrides;
 use crate::scene::description::Integrator;
 use crate::scene::diagnostic::Diagnostic;
-use crate::scene::fingerprint::{Fingerprint, Key};
+use crate::scene::fingerprint::{FingerprintHasher, Key};
 
 /// Seeds of the references, never used for measured images.
 pub(super) const SEEDS: [u32; 2] = [u32::MAX - 1, u32::MAX];
@@ -180,7 +180,7 @@ impl ReferenceRenderer<'_> {
 /// The cache key of the references. It depends on the build, because builds may render differently, and on
 /// whether the references are limited by samples or by time.
 fn cache_key(build: &str, asked: Option<u32>, ReferenceKeys(keys): &ReferenceKeys) -> Key {
-    let mut key = Fingerprint::new("references");
+    let mut key = FingerprintHasher::new("references");
     key.text(build).u64(asked.unwrap_or(0).into());
     keys.iter().for_each(|one| {
         key.key(one);
@@ -212,7 +212,7 @@ mod tests {
 
     #[test]
     fn builds_do_not_share_references() {
-        let keys = || ReferenceKeys(["a", "b"].map(|name| Fingerprint::new(name).finish()));
+        let keys = || ReferenceKeys(["a", "b"].map(|name| FingerprintHasher::new(name).finish()));
         let (common, token) = (Overrides::default(), CancelToken::new());
         let renderer = ReferenceRenderer {
             scene: Path::new("a.toml"),

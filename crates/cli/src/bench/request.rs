@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::methods::Toggles;
+use super::methods::MethodSweep;
 use super::results::Results;
 use crate::pipeline::protocol::Failure;
 use crate::pipeline::session::Unrendered;
@@ -21,7 +21,7 @@ pub struct BenchRequest {
     /// Height in pixels. The default is computed from the width and the scene's aspect ratio.
     pub height: Option<u32>,
     /// Settings that define the methods.
-    pub toggles: Toggles,
+    pub toggles: MethodSweep,
     /// Samples or times to measure at.
     pub steps: StepSchedule,
     /// Images per step.

@@ -15,7 +15,7 @@ use crate::args::BenchArgs;
 use crate::bench::baseline::{compare_runs, format_changes};
 use crate::bench::table::format_results;
 use crate::bench::{
-    self, BenchError, BenchEvent, BenchRequest, ReferenceSource, Results, StepSchedule, Toggles,
+    self, BenchError, BenchEvent, BenchRequest, MethodSweep, ReferenceSource, Results, StepSchedule,
     UnfinishedBenchmark, cache,
 };
 use crate::console::Console;
@@ -38,15 +38,15 @@ pub(crate) fn run(args: &BenchArgs, console: &Console) -> Exit {
 /// Runs the benchmark and reports errors. `Err` contains the exit code.
 fn try_run(args: &BenchArgs, console: &Console) -> Result<Exit, Exit> {
     priority::lower_priority(args.nice);
-    let order = lower_args(args, console)?;
+    let order = bench_request(args, console)?;
     let scenes = order.scenes.len();
     let outputs = BenchOutputs::check_args(args, &order.scenes, console)?;
     let baseline = outputs.read_baseline(console)?;
     // The first signal stops measuring, the second stops writing results.
     let (token, writing) = (CancelToken::new(), CancelToken::new());
     let stop = [token.clone(), writing.clone()];
-    let ended = signals::catch(move || stop[usize::from(stop[0].is_cancelled())].cancel())
-        .map_err(|error| console.fail(Exit::FAILED, &signals::describe_catch_failure(&error)))?;
+    let ended = signals::install_signal_handlers(move || stop[usize::from(stop[0].is_cancelled())].cancel())
+        .map_err(|error| console.fail(Exit::FAILED, &signals::describe_handler_failure(&error)))?;
     let mut progress = BenchProgress::new(args.progress, console);
     let (news, work) = spawn_benchmark(order, token.clone())
         .map_err(|error| console.fail(Exit::FAILED, &describe_start_failure("a thread", false, &error)))?;
@@ -167,7 +167,7 @@ fn format_diagnostic(diagnostic: &Diagnostic) -> String {
 }
 
 /// Converts the arguments to a benchmark request.
-fn lower_args(args: &BenchArgs, console: &Console) -> Result<BenchRequest, Exit> {
+fn bench_request(args: &BenchArgs, console: &Console) -> Result<BenchRequest, Exit> {
     let folder = if args.no_cache { None } else { args.cache.clone().or_else(cache::cache_folder) };
     let scenes = if args.scenes.is_empty() {
         vec![write_starter(folder.as_deref(), console)?]
@@ -190,7 +190,7 @@ fn lower_args(args: &BenchArgs, console: &Console) -> Result<BenchRequest, Exit>
         },
         width: args.width,
         height: args.height,
-        toggles: Toggles {
+        toggles: MethodSweep {
             integrators: args.integrator.clone(),
             photons: args.photons.iter().copied().map(bool::from).collect(),
             shadows: args.shadows.clone(),

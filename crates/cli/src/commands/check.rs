@@ -46,7 +46,7 @@ fn check_as_json(scene: &Path, sets: &[String], console: &Console) -> Exit {
     let scene = scene.to_string_lossy();
     let report = json!({ "scene": scene, "ok": exit == Exit::DONE, "diagnostics": all });
     match to_line(&report) {
-        Ok(line) => console.print_text(&format!("{line}\n")),
+        Ok(line) => console.print_trusted_text(&format!("{line}\n")),
         Err(error) => return console.fail(Exit::FAILED, &format!("cannot write JSON: {error}")),
     }
     exit

@@ -15,8 +15,10 @@ use crate::control::CancelToken;
 use crate::exit::Exit;
 use crate::film::RadianceImage;
 use crate::output::part::is_part;
-use crate::output::write::{self, Guard};
-use crate::output::{self, EncodeOptions, FileIdentity, Format, Losses, OutputError, is_same_file};
+use crate::output::write::{self, WritePolicy};
+use crate::output::{
+    self, AttributeLossPolicy, EncodeOptions, FileIdentity, Format, OutputError, is_same_file,
+};
 use crate::system::threads::describe_start_failure;
 use crate::tui::wrapped;
 
@@ -129,8 +131,8 @@ impl<'a> ErrorImage<'a> {
         let may_replace = |real: &Path| check_not_input(self.path, real, args);
         let is_kept = |path: &Path| check_not_input(path, path, args).is_err();
         let lost = RefCell::new(None);
-        let losses = Losses::Report(&|what| drop(lost.replace(Some(what))));
-        let guard = Guard { is_kept: &is_kept, may_replace: &may_replace, sweep: None, losses };
+        let losses = AttributeLossPolicy::Report(&|what| drop(lost.replace(Some(what))));
+        let guard = WritePolicy { is_kept: &is_kept, may_replace: &may_replace, sweep: None, losses };
         write::atomic_guarded(self.path, &bytes, &guard, &token)?;
         Ok(lost.into_inner())
     }

@@ -55,7 +55,7 @@ pub(crate) fn run(shell: Shell, console: &Console) -> Exit {
     let completer: &dyn EnvCompleter = match shell {
         Shell::Bash => &BashCompleter,
         Shell::Zsh => {
-            console.print_text(ZSH);
+            console.print_trusted_text(ZSH);
             return Exit::DONE;
         }
         Shell::Fish => &Fish,
@@ -65,7 +65,7 @@ pub(crate) fn run(shell: Shell, console: &Console) -> Exit {
     let mut script = Vec::new();
     match completer.write_registration(VARIABLE, "glimt", "glimt", "glimt", &mut script) {
         Ok(()) => {
-            console.print_text(&String::from_utf8_lossy(&script));
+            console.print_trusted_text(&String::from_utf8_lossy(&script));
             Exit::DONE
         }
         Err(error) => console.fail(Exit::FAILED, &format!("cannot create the script: {error}")),

@@ -16,7 +16,7 @@ pub(crate) fn run(path: Option<&str>, console: &Console) -> Exit {
     };
     match text {
         Some(text) => {
-            console.print_text(&wrap_indented(&text, answer_columns()));
+            console.print_trusted_text(&wrap_indented(&text, answer_columns()));
             Exit::DONE
         }
         None => console.fail(Exit::WRONG, &unknown_path_message(path.unwrap_or_default())),

@@ -30,7 +30,7 @@ pub(crate) fn run(args: &FarmArgs, console: &Console) -> Exit {
         Ok(options) => options,
         Err(message) => return console.fail(Exit::WRONG, &format!("after `--`: {message}")),
     };
-    console.print_text(&match args.engine {
+    console.print_trusted_text(&match args.engine {
         Scheduler::Slurm => slurm_script(args),
         Scheduler::Parallel => parallel_script(args),
         Scheduler::Kubernetes => kubernetes_manifest(args, memory_request(args, &options, console)),

@@ -8,7 +8,7 @@ use crate::console::Console;
 use crate::control::CancelToken;
 use crate::exit::Exit;
 use crate::output::OutputError;
-use crate::output::staged::new_files;
+use crate::output::staged::create_files_atomically;
 use crate::pipeline::{ImportError, Imported, import};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::signals;
@@ -16,9 +16,9 @@ use crate::signals;
 pub(crate) fn run(args: &ImportArgs, console: &Console) -> Exit {
     let token = CancelToken::new();
     let cancel = token.clone();
-    let ended = match signals::catch(move || cancel.cancel()) {
+    let ended = match signals::install_signal_handlers(move || cancel.cancel()) {
         Ok(ended) => ended,
-        Err(error) => return console.fail(Exit::FAILED, &signals::describe_catch_failure(&error)),
+        Err(error) => return console.fail(Exit::FAILED, &signals::describe_handler_failure(&error)),
     };
     let exit = convert(args, console, &token);
     let Some(number) = ended.signal_number() else { return exit };
@@ -92,5 +92,5 @@ fn write_all(scene: &Path, imported: &Imported, token: &CancelToken) -> Result<(
     let name = PathBuf::from(scene.file_name().unwrap_or_default());
     let others = imported.files.iter().map(|(name, bytes)| (name.clone(), bytes.as_slice()));
     let files: Vec<_> = others.chain([(name, imported.text.as_bytes())]).collect();
-    new_files(scene.parent().unwrap_or(Path::new("")), &files, token)
+    create_files_atomically(scene.parent().unwrap_or(Path::new("")), &files, token)
 }

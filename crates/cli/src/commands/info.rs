@@ -21,11 +21,11 @@ pub(crate) fn run(args: &InfoArgs, console: &Console) -> Exit {
     };
     if args.json {
         match file(&as_json(&args.image, &info)) {
-            Ok(text) => console.print_text(&text),
+            Ok(text) => console.print_trusted_text(&text),
             Err(error) => return console.fail(Exit::FAILED, &error.to_string()),
         }
     } else {
-        console.print_text(&as_text(&args.image, &info));
+        console.print_trusted_text(&as_text(&args.image, &info));
     }
     if info.is_own() { Exit::DONE } else { Exit::FAILED }
 }

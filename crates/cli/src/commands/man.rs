@@ -29,7 +29,7 @@ pub(crate) fn run(command: Option<&str>, console: &Console) -> Exit {
     };
     match render_page(found, command.is_none()) {
         Ok(text) => {
-            console.print_text(&text);
+            console.print_trusted_text(&text);
             Exit::DONE
         }
         Err(error) => console.fail(Exit::FAILED, &format!("cannot create the manual page: {error}")),

@@ -16,9 +16,11 @@ use crate::exit::Exit;
 use crate::film::Film;
 use crate::film::tone::develop;
 use crate::merge_block::TerminalBlock;
-use crate::output::part::{self, Merged, PartError, PartFile};
-use crate::output::write::{Guard, atomic_guarded};
-use crate::output::{self, DevelopSettings, Format, Losses, OutputError, is_same_file, scene_path};
+use crate::output::part::{self, MergedParts, PartError, PartFile};
+use crate::output::write::{WritePolicy, atomic_guarded};
+use crate::output::{
+    self, AttributeLossPolicy, DevelopSettings, Format, OutputError, is_same_file, scene_path,
+};
 use crate::pipeline::scene_inputs;
 use crate::progress::{bar_style, json_line};
 use crate::scene::sanitize::{shortened, visible};
@@ -36,9 +38,9 @@ pub(crate) fn run(args: &MergeArgs, console: &Console) -> Exit {
     };
     let token = CancelToken::new();
     let cancel = token.clone();
-    let ended = match signals::catch(move || cancel.cancel()) {
+    let ended = match signals::install_signal_handlers(move || cancel.cancel()) {
         Ok(ended) => ended,
-        Err(error) => return console.fail(Exit::FAILED, &signals::describe_catch_failure(&error)),
+        Err(error) => return console.fail(Exit::FAILED, &signals::describe_handler_failure(&error)),
     };
     let exit = MergeCommand { args, console, token: &token, pool: &pool }.run();
     ended.signal_number().map_or(exit, |number| report_signal(number, console))
@@ -272,11 +274,16 @@ impl MergeCommand<'_> {
         };
         // Narrow terminals do not show an image.
         let lines = if lines.is_empty() { format!("{}\n", shortened(&words, columns)) } else { lines };
-        self.console.print_text(&block.redraw(&lines, columns));
+        self.console.print_trusted_text(&block.redraw(&lines, columns));
         Ok(())
     }
 
-    fn merge_parts(&self, parts: &[PartFile], is_partial: bool, what: &'static str) -> Result<Merged, Exit> {
+    fn merge_parts(
+        &self,
+        parts: &[PartFile],
+        is_partial: bool,
+        what: &'static str,
+    ) -> Result<MergedParts, Exit> {
         let mut bar = StepProgress::new(self.args.progress, self.console, what);
         let tell = |tile: usize, film: &Film| bar.update(tile, film.tile_count());
         let merged = part::merge(parts, is_partial, self.token, tell);
@@ -304,7 +311,7 @@ impl MergeCommand<'_> {
         &self,
         format: Format,
         mut finish: DevelopSettings,
-        merged: &Merged,
+        merged: &MergedParts,
         parts: &[PartFile],
     ) -> Result<(), Exit> {
         let (out, token) = (&self.args.out, self.token);
@@ -319,11 +326,11 @@ impl MergeCommand<'_> {
         };
         let is_kept = |path: &Path| self.args.parts.iter().any(|part| is_same_file(part, path));
         let tell = |what: String| self.console.print_message(&format!("warning: {what}"));
-        let guard = Guard {
+        let guard = WritePolicy {
             is_kept: &is_kept,
             may_replace: &may_replace,
             sweep: None,
-            losses: Losses::Report(&tell),
+            losses: AttributeLossPolicy::Report(&tell),
         };
         let bytes = self.pool.install(|| finish.encode(film, (&finish.image(film), &[]), format, token));
         let written = bytes.and_then(|bytes| atomic_guarded(out, &bytes, &guard, token));
@@ -338,7 +345,7 @@ impl MergeCommand<'_> {
         Ok(())
     }
 
-    fn report_missing_parts(&self, merged: &Merged) {
+    fn report_missing_parts(&self, merged: &MergedParts) {
         if !merged.missing.is_empty() {
             let missing = part::missing_parts(&merged.missing, merged.count);
             self.console.print_message(&format!("warning: {missing}; merged the others"));

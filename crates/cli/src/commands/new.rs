@@ -20,7 +20,7 @@ pub(crate) fn run(file: &Path, with_schema: bool, console: &Console) -> Exit {
             console
                 .print_message(&format!("note: write {name} next to the scene with: glimt schema > {name}"));
         }
-        console.print_text(&text);
+        console.print_trusted_text(&text);
         return Exit::DONE;
     }
     if let Some(message) = wrong_extension_error(file) {

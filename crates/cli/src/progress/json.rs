@@ -22,7 +22,7 @@ use serde_json::{Value, json};
 use super::Reporter;
 use crate::diagnostic_json::diagnostic_to_json;
 use crate::output::json::to_line;
-use crate::pipeline::protocol::{CheckpointNews, Event, Failure};
+use crate::pipeline::protocol::{CheckpointUpdate, Event, Failure};
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::report::Locator;
 
@@ -111,16 +111,16 @@ fn event_to_json(event: &Event) -> Option<Value> {
     })
 }
 
-fn checkpoint_to_json(news: &CheckpointNews) -> Value {
+fn checkpoint_to_json(news: &CheckpointUpdate) -> Value {
     let (status, path, message, samples) = match news {
-        CheckpointNews::Written { path } => ("written", Some(path), None, None),
-        CheckpointNews::Failed { message } => ("failed", None, Some(message), None),
-        CheckpointNews::Resumed { path, samples } => ("resumed", Some(path), None, Some(samples)),
-        CheckpointNews::Absent { path } => ("absent", Some(path), None, None),
-        CheckpointNews::Ignored { path } => ("ignored", Some(path), None, None),
-        CheckpointNews::Unused { path, why } => ("unused", Some(path), Some(why), None),
-        CheckpointNews::Finished { path } => ("finished", Some(path), None, None),
-        CheckpointNews::SetAside { path } => ("set_aside", Some(path), None, None),
+        CheckpointUpdate::Written { path } => ("written", Some(path), None, None),
+        CheckpointUpdate::Failed { message } => ("failed", None, Some(message), None),
+        CheckpointUpdate::Resumed { path, samples } => ("resumed", Some(path), None, Some(samples)),
+        CheckpointUpdate::Absent { path } => ("absent", Some(path), None, None),
+        CheckpointUpdate::Ignored { path } => ("ignored", Some(path), None, None),
+        CheckpointUpdate::Unused { path, why } => ("unused", Some(path), Some(why), None),
+        CheckpointUpdate::Finished { path } => ("finished", Some(path), None, None),
+        CheckpointUpdate::SetAside { path } => ("set_aside", Some(path), None, None),
     };
     let path = path.map(|path| path.to_string_lossy());
     json!({ "event": "checkpoint", "status": status, "path": path, "message": message, "samples": samples })

@@ -89,7 +89,7 @@ impl TwoReferences {
     }
 
     /// Standard error of [`Self::brightness`] due to the references' noise, assuming independent pixels.
-    pub fn brightness_uncertainty(&self) -> f64 {
+    pub fn relative_bias_standard_error(&self) -> f64 {
         let square = |x: f64| x * x;
         let squares = self.weighted_pixels().map(|(_, a, b)| square(luminance((a - b) / 2.0)));
         squares.sum::<f64>().sqrt() / self.weights.len() as f64 / self.mean_luminance()

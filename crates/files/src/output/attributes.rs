@@ -23,7 +23,7 @@ const NON_GROUP_BITS: u32 = 0o707;
 
 /// Policy for attributes that would be lost by replacing a file.
 #[derive(Clone, Copy)]
-pub enum Losses<'a> {
+pub enum AttributeLossPolicy<'a> {
     /// Replace the file and report the losses in a sentence. The new file never grants additional
     /// permissions.
     Report(&'a dyn Fn(String)),
@@ -106,14 +106,14 @@ impl FileAttributes {
         for (name, value) in &self.named {
             let is_kept = value.as_ref().is_ok_and(|value| set_attribute(new, name, value).is_ok());
             if !is_kept {
-                carried.lose(name);
+                carried.mark_lost(name);
             }
         }
         // New files may inherit an access list from their folder. Remove it if the old file had none.
         let has_list = self.named.iter().any(|(name, _)| name == ACCESS_LIST);
         let is_inherited = || matches!(new.get_xattr(ACCESS_LIST), Ok(Some(_)));
         if !has_list && is_inherited() && new.remove_xattr(ACCESS_LIST).is_err() {
-            carried.lose(OsStr::new(ACCESS_LIST));
+            carried.mark_lost(OsStr::new(ACCESS_LIST));
         }
     }
 }
@@ -124,7 +124,7 @@ impl UncopiedAttributes {
         new.set_permissions(fs::Permissions::from_mode(self.mode))
     }
 
-    fn lose(&mut self, name: &OsStr) {
+    fn mark_lost(&mut self, name: &OsStr) {
         if name == ACCESS_LIST {
             // The group bits are the mask of the access list. Without the list, they would grant permissions
             // to the group.

@@ -17,7 +17,7 @@ const ATTEMPTS: usize = 16;
 
 /// Result of looking for a backup when a file is opened.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Held {
+pub enum BackupRecovery {
     /// There was no backup, or it had the same content as the file.
     None,
     /// The file was missing and has been restored from the backup.
@@ -27,18 +27,18 @@ pub enum Held {
 }
 
 /// Looks for a backup left by an interrupted replacement, and restores it if the file is missing.
-pub fn recover(path: &Path) -> Held {
-    let Ok((target, existing)) = resolve_path::follow_links(path) else { return Held::None };
+pub fn recover_backup(path: &Path) -> BackupRecovery {
+    let Ok((target, existing)) = resolve_path::follow_links(path) else { return BackupRecovery::None };
     let held = backup_path(&target);
-    let Ok(text) = fs::read(&held) else { return Held::None };
+    let Ok(text) = fs::read(&held) else { return BackupRecovery::None };
     if existing.is_none() && move_new(&held, &target).is_ok() {
-        return Held::Restored;
+        return BackupRecovery::Restored;
     }
     if fs::read(&target).is_ok_and(|current| current == text) {
         // If the backup cannot be removed, report it.
-        return fs::remove_file(&held).map_or(Held::Differs(held), |()| Held::None);
+        return fs::remove_file(&held).map_or(BackupRecovery::Differs(held), |()| BackupRecovery::None);
     }
-    Held::Differs(held)
+    BackupRecovery::Differs(held)
 }
 
 fn backup_path(target: &Path) -> PathBuf {
@@ -261,7 +261,7 @@ mod tests {
         /// All texts that exist after a kill, a cleanup and the next start.
         fn after_a_kill(&self) -> Vec<String> {
             remove_stale(self.folder.path(), &|_| false);
-            recover(&self.scene());
+            recover_backup(&self.scene());
             let entries = fs::read_dir(self.folder.path()).expect("a folder");
             let names = entries.map(|entry| entry.expect("an entry").path());
             let texts = names.filter(|path| path.extension().is_none_or(|extension| extension != "tmp"));
@@ -324,8 +324,12 @@ mod tests {
                 assert!(!is_lost, "{steps} {saves:?}: {newest:?} is not in {found:?}");
                 assert!(scene.exists() && found.len() <= 2, "{steps} {saves:?}: {found:?}");
                 // If there are two texts, every start reports them until the user removes one.
-                let held = recover(&scene);
-                assert_eq!(matches!(held, Held::Differs(_)), found.len() == 2, "{steps} {saves:?}: {held:?}");
+                let held = recover_backup(&scene);
+                assert_eq!(
+                    matches!(held, BackupRecovery::Differs(_)),
+                    found.len() == 2,
+                    "{steps} {saves:?}: {held:?}"
+                );
                 let again = replace(folder.new_text(), &scene, newest.as_bytes());
                 assert_eq!(again.is_err(), found.len() == 2, "the backup should be kept: {again:?}");
             }
@@ -352,14 +356,14 @@ mod tests {
         let scene = folder.scene();
         std::mem::forget(StepwiseReplacement::begin(&scene, OLD.as_bytes()).expect("taken"));
         assert!(!scene.exists());
-        assert_eq!(recover(&scene), Held::Restored);
+        assert_eq!(recover_backup(&scene), BackupRecovery::Restored);
         assert!(folder.has(OLD));
         // Repeat through a symbolic link.
         let link = folder.folder.path().join("link.toml");
         std::os::unix::fs::symlink(&scene, &link).expect("a link");
         std::mem::forget(StepwiseReplacement::begin(&scene, OLD.as_bytes()).expect("taken"));
-        assert_eq!(recover(&link), Held::Restored);
-        assert_eq!(recover(&link), Held::None);
+        assert_eq!(recover_backup(&link), BackupRecovery::Restored);
+        assert_eq!(recover_backup(&link), BackupRecovery::None);
         // An editor saves while the old text is the backup.
         let steps = StepwiseReplacement::begin(&scene, OLD.as_bytes()).expect("taken");
         folder.save(NEWER);

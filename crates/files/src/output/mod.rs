@@ -34,7 +34,7 @@ pub mod write;
 
 use std::path::Path;
 
-pub use attributes::Losses;
+pub use attributes::AttributeLossPolicy;
 pub use develop::DevelopSettings;
 pub use error::OutputError;
 pub use exr::mean_luminance_error;
@@ -138,16 +138,16 @@ pub fn check_target(path: &Path) -> Result<Format, OutputError> {
 ///
 /// # Errors
 /// Same as [`check_target`], but does not detect directories that reject new files despite their permissions.
-pub fn inspect_target(path: &Path) -> Result<Format, OutputError> {
+pub fn check_target_read_only(path: &Path) -> Result<Format, OutputError> {
     let format = Format::from_path(path)?;
     inspect_path(path)?;
     Ok(format)
 }
 
-/// Like [`inspect_target`], but for any type of file.
+/// Like [`check_target_read_only`], but for any type of file.
 ///
 /// # Errors
-/// Same as [`inspect_target`], except for the extension.
+/// Same as [`check_target_read_only`], except for the extension.
 pub fn inspect_path(path: &Path) -> Result<(), OutputError> {
     resolve_path::resolve(path).map(drop)
 }

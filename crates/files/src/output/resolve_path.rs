@@ -104,13 +104,13 @@ fn existing(path: &Path, target: PathBuf, metadata: Metadata) -> Result<WriteTar
         return Err(OutputError::Target { path: path.to_owned(), why, way_out: "name a file" });
     }
     if !kind.is_file() {
-        may_write(path, &target, AccessFlags::W_OK)?;
+        check_access(path, &target, AccessFlags::W_OK)?;
         return Ok(WriteTarget::InPlace(target));
     }
     check_flags(path, "it", &target)?;
     // Replacing the file requires only write permission for the directory. Check the file itself anyway,
     // because it may be read-only on purpose.
-    may_write(path, &target, AccessFlags::W_OK)?;
+    check_access(path, &target, AccessFlags::W_OK)?;
     let directory = check_directory(path, directory_of(&target))?;
     if protection::is_protected_by_sticky_bit(&directory, &metadata) {
         let directory = directory_of(&target).display();
@@ -129,7 +129,7 @@ fn check_directory(path: &Path, directory: &Path) -> Result<Metadata, OutputErro
     match fs::metadata(directory) {
         Ok(metadata) if metadata.is_dir() => {
             check_flags(path, &format!("the directory {}", directory.display()), directory)?;
-            may_write(path, directory, AccessFlags::W_OK | AccessFlags::X_OK)?;
+            check_access(path, directory, AccessFlags::W_OK | AccessFlags::X_OK)?;
             Ok(metadata)
         }
         Ok(_) => Err(OutputError::file(path, io::Error::from(Errno::ENOTDIR))),
@@ -150,7 +150,7 @@ fn check_flags(path: &Path, name: &str, what: &Path) -> Result<(), OutputError> 
     Err(OutputError::Target { path: path.to_owned(), why, way_out: flag.removal_advice() })
 }
 
-fn may_write(path: &Path, what: &Path, how: AccessFlags) -> Result<(), OutputError> {
+fn check_access(path: &Path, what: &Path, how: AccessFlags) -> Result<(), OutputError> {
     access(what, how).map_err(|errno| OutputError::file(path, errno))
 }
 

@@ -19,8 +19,12 @@ use crate::system::folder::remove_all;
 /// # Errors
 /// A path cannot be written, for example because it exists ([`ErrorKind::AlreadyExists`]), or the operation
 /// is cancelled.
-pub fn new_files(folder: &Path, files: &[(PathBuf, &[u8])], token: &CancelToken) -> Result<(), OutputError> {
-    super::write::prepare_process();
+pub fn create_files_atomically(
+    folder: &Path,
+    files: &[(PathBuf, &[u8])],
+    token: &CancelToken,
+) -> Result<(), OutputError> {
+    super::write::ignore_file_size_signal();
     let at = |name: &Path| {
         let path = folder.join(name);
         move |error: io::Error| OutputError::file(&path, error)
@@ -124,12 +128,12 @@ mod tests {
             (PathBuf::from("a_files/y.ply"), b"y"),
             (PathBuf::from("a.toml"), b"text"),
         ];
-        new_files(at, &files, &CancelToken::new()).expect("written");
+        create_files_atomically(at, &files, &CancelToken::new()).expect("written");
         assert_eq!(names(at), ["a.toml", "a_files"]);
         assert_eq!(names(&at.join("a_files")), ["x.ply", "y.ply"]);
         // Existing files and folders are kept, even empty folders.
         fs::remove_dir_all(at.join("a_files")).expect("removed");
-        let taken = new_files(at, &files, &CancelToken::new()).expect_err("taken");
+        let taken = create_files_atomically(at, &files, &CancelToken::new()).expect_err("taken");
         assert!(matches!(&taken, OutputError::File { path, .. } if path.ends_with("a.toml")), "{taken}");
         assert_eq!(
             (names(at), fs::read(at.join("a.toml")).expect("a file")),
@@ -137,13 +141,13 @@ mod tests {
         );
         fs::remove_file(at.join("a.toml")).expect("removed");
         fs::create_dir(at.join("a_files")).expect("a folder");
-        assert!(new_files(at, &files, &CancelToken::new()).is_err());
+        assert!(create_files_atomically(at, &files, &CancelToken::new()).is_err());
         assert_eq!((names(at), names(&at.join("a_files"))), (vec!["a_files".to_owned()], Vec::new()));
         // A cancelled operation leaves no files behind.
         fs::remove_dir(at.join("a_files")).expect("removed");
         let token = CancelToken::new();
         token.cancel();
-        assert!(matches!(new_files(at, &files, &token), Err(OutputError::Cancelled(_))));
+        assert!(matches!(create_files_atomically(at, &files, &token), Err(OutputError::Cancelled(_))));
         assert_eq!(names(at), [""; 0]);
     }
 
@@ -157,7 +161,8 @@ mod tests {
         for folder in [&stale, &foreign, &other] {
             fs::create_dir_all(folder.join("a_files")).expect("a folder");
         }
-        new_files(at, &[(PathBuf::from("b.toml"), b"text")], &CancelToken::new()).expect("written");
+        create_files_atomically(at, &[(PathBuf::from("b.toml"), b"text")], &CancelToken::new())
+            .expect("written");
         assert!(living.path.exists() && other.exists() && foreign.exists() && !stale.exists());
     }
 }

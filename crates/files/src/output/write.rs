@@ -17,7 +17,7 @@ use nix::fcntl::{FcntlArg, OFlag, fcntl};
 use super::attributes::{FileAttributes, UncopiedAttributes};
 use super::resolve_path::{self, TargetFile, WriteTarget};
 use super::temporary::{self, TemporaryFile};
-use super::{FileIdentity, Losses, OutputError, cancellable, held};
+use super::{AttributeLossPolicy, FileIdentity, OutputError, cancellable, held};
 use crate::control::CancelToken;
 use crate::system::describe_error;
 
@@ -36,8 +36,8 @@ pub const STDOUT: &str = "/dev/stdout";
 /// The file cannot be written. The error contains the path, the system's message and advice. The old file is
 /// unchanged, and the temporary file is removed.
 pub fn atomic(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
-    let losses = Losses::Report(&|_| ());
-    let guard = Guard { is_kept: &|_| false, may_replace: &|_| Ok(()), sweep: None, losses };
+    let losses = AttributeLossPolicy::Report(&|_| ());
+    let guard = WritePolicy { is_kept: &|_| false, may_replace: &|_| Ok(()), sweep: None, losses };
     atomic_guarded(path, bytes, &guard, &CancelToken::new())
 }
 
@@ -56,24 +56,24 @@ pub fn new_file(path: &Path, bytes: &[u8]) -> io::Result<()> {
 }
 
 /// Policy for existing files. `may_replace` is called just before the replacement, with the resolved path.
-pub struct Guard<'a> {
+pub struct WritePolicy<'a> {
     /// Whether to keep a file whose name looks like a temporary file of a killed process.
     pub is_kept: &'a dyn Fn(&Path) -> bool,
     /// Decides whether this file, existing or not, may be replaced or written in place.
     pub may_replace: &'a dyn Fn(&Path) -> Result<(), OutputError>,
     /// Folders already searched for temporary files of killed processes. If `None`, every write searches the
     /// folder again.
-    pub sweep: Option<&'a FolderSweep>,
+    pub sweep: Option<&'a SweptFolders>,
     /// Policy if a file's owner, access list or attributes cannot be kept.
-    pub losses: Losses<'a>,
+    pub losses: AttributeLossPolicy<'a>,
 }
 
 /// Folders already searched for temporary files of killed processes. Avoids searching a folder again at every
 /// write.
 #[derive(Debug, Default)]
-pub struct FolderSweep(RefCell<HashSet<PathBuf>>);
+pub struct SweptFolders(RefCell<HashSet<PathBuf>>);
 
-impl FolderSweep {
+impl SweptFolders {
     /// Returns true if the folder has not been searched yet, and marks it as searched.
     fn mark_searched(&self, folder: &Path) -> bool {
         let mut searched = self.0.borrow_mut();
@@ -88,7 +88,7 @@ impl FolderSweep {
 pub fn atomic_guarded(
     path: &Path,
     bytes: &[u8],
-    guard: &Guard<'_>,
+    guard: &WritePolicy<'_>,
     token: &CancelToken,
 ) -> Result<(), OutputError> {
     atomic_with(path, &|file| cancellable::write_all(file, bytes, token), guard, (token, Durability::Power))
@@ -103,7 +103,7 @@ pub fn atomic_guarded(
 pub fn atomic_replace(
     path: &Path,
     (expected, bytes): (&[u8], &[u8]),
-    guard: &Guard<'_>,
+    guard: &WritePolicy<'_>,
     token: &CancelToken,
 ) -> Result<(), OutputError> {
     let content: &dyn Fn(&mut dyn Write) -> io::Result<()> =
@@ -129,7 +129,7 @@ pub enum Durability {
 pub fn atomic_with(
     path: &Path,
     content: &dyn Fn(&mut dyn Write) -> io::Result<()>,
-    guard: &Guard<'_>,
+    guard: &WritePolicy<'_>,
     (token, durability): (&CancelToken, Durability),
 ) -> Result<Option<File>, OutputError> {
     replace(path, content, guard, (token, durability, None))
@@ -139,16 +139,16 @@ pub fn atomic_with(
 fn replace(
     path: &Path,
     content: &dyn Fn(&mut dyn Write) -> io::Result<()>,
-    guard: &Guard<'_>,
+    guard: &WritePolicy<'_>,
     (token, durability, expected): (&CancelToken, Durability, Option<&[u8]>),
 ) -> Result<Option<File>, OutputError> {
-    prepare_process();
+    ignore_file_size_signal();
     let named = |error| OutputError::file(path, error);
     match resolve_path::resolve(path)? {
         WriteTarget::File(target) => {
             let (new, carried) = create_temporary(&target, guard).map_err(named)?;
             let lost = carried.as_ref().map_or(&[][..], |carried| &carried.lost);
-            if let (Losses::Refuse, false) = (guard.losses, lost.is_empty()) {
+            if let (AttributeLossPolicy::Refuse, false) = (guard.losses, lost.is_empty()) {
                 let why = format!("{} cannot be kept", lost.join(" and "));
                 return Err(OutputError::Target {
                     path: path.to_owned(),
@@ -172,7 +172,7 @@ fn replace(
                 Durability::Process => Ok(()),
                 Durability::Power => sync_directory(target.directory()),
             };
-            if let (Err(error), Losses::Report(report)) = (synced, &guard.losses) {
+            if let (Err(error), AttributeLossPolicy::Report(report)) = (synced, &guard.losses) {
                 // The file has been renamed. Only a power failure could undo this.
                 report(format!(
                     "{}: written, but its folder could not be synchronized: {}",
@@ -180,7 +180,7 @@ fn replace(
                     describe_error(&error)
                 ));
             }
-            if let (Losses::Report(report), false) = (guard.losses, lost.is_empty()) {
+            if let (AttributeLossPolicy::Report(report), false) = (guard.losses, lost.is_empty()) {
                 report(lost_attributes_report(path, lost));
             }
             Ok(Some(file))
@@ -189,7 +189,7 @@ fn replace(
             (guard.may_replace)(&device)?;
             let mut bytes = Vec::new();
             cancellable::or_cancelled(content(&mut bytes), named)?;
-            cancellable::or_cancelled(in_place(&device, &bytes, token), named)?;
+            cancellable::or_cancelled(write_in_place(&device, &bytes, token), named)?;
             Ok(None)
         }
     }
@@ -202,7 +202,7 @@ pub(super) fn lost_attributes_report(path: &Path, lost: &[String]) -> String {
 
 /// Makes exceeding `ulimit -f` an error instead of a fatal signal (SIGXFSZ). [`atomic`] calls this function.
 /// Call it once before writing files in other ways.
-pub fn prepare_process() {
+pub fn ignore_file_size_signal() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
         // Without a signal handler, the signal terminates the process. With any handler, the write fails
@@ -216,7 +216,7 @@ pub fn prepare_process() {
 /// only the owner and users on its access list can read the temporary file until it is complete.
 fn create_temporary(
     target: &TargetFile,
-    guard: &Guard<'_>,
+    guard: &WritePolicy<'_>,
 ) -> io::Result<(TemporaryFile, Option<UncopiedAttributes>)> {
     let directory = target.directory();
     if guard.sweep.is_none_or(|sweep| sweep.mark_searched(directory)) {
@@ -257,7 +257,7 @@ fn sync_directory(directory: &Path) -> io::Result<()> {
 }
 
 /// Writes in place. Appends to the target, so the content of an open file is kept.
-fn in_place(path: &Path, bytes: &[u8], token: &CancelToken) -> io::Result<()> {
+fn write_in_place(path: &Path, bytes: &[u8], token: &CancelToken) -> io::Result<()> {
     if path == Path::new(STDOUT) {
         // Flush earlier output first. Do not hold the lock, because the reader may block.
         io::stdout().flush()?;

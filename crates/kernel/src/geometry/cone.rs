@@ -7,7 +7,7 @@ use super::surface_of_revolution::{
     self, AxialFrame, LineInterval, LocalLine, angle_to_u, direction_at_u, is_rounding, radial_direction,
     ring_projected_area, sine_from_cosine,
 };
-use super::surface_packet::{ExactPoint, ExactSurface};
+use super::surface_packet::{SurfaceF64, SurfacePointF64};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::{DVec2, DVec3, Vec2};
 
@@ -27,8 +27,8 @@ pub struct Cone {
     capped: bool,
 }
 
-impl ExactSurface for Cone {
-    fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> ExactPoint {
+impl SurfaceF64 for Cone {
+    fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePointF64 {
         let point = self.exact_point(ray, hit);
         if hit.primitive > 0 {
             return self.base().exact_near(point, self.reach());
@@ -120,7 +120,7 @@ impl Cone {
         let out = radial_direction(local.truncate());
         let (down, along) = self.side_direction(local);
         let around = out.perp() * (-TAU * down.x * along);
-        let ExactPoint { point, normal, reach } = self.exact_side(out, (down, along));
+        let SurfacePointF64 { point, normal, reach } = self.exact_side(out, (down, along));
         SurfacePoint::exact(
             point,
             normal,
@@ -133,8 +133,8 @@ impl Cone {
 
     /// Point on the side, from a direction perpendicular to the axis and the result of
     /// [`Cone::side_direction`].
-    fn exact_side(&self, out: DVec2, (down, along): (DVec2, f64)) -> ExactPoint {
-        ExactPoint {
+    fn exact_side(&self, out: DVec2, (down, along): (DVec2, f64)) -> SurfacePointF64 {
+        SurfacePointF64 {
             point: self.frame.point_to_world((out * (down.x * along)).extend(down.y * along)),
             normal: self.frame.vector_to_world((out * down.y).extend(-down.x)),
             reach: self.reach(),

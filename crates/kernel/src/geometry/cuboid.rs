@@ -1,8 +1,8 @@
 //! Oriented boxes in double precision.
 
 use super::packet::{F32x16, HitPacket, RayPacket, accept};
-use super::surface::flat_axes;
-use super::surface_packet::{ExactPoint, ExactSurface};
+use super::surface::planar_tangents;
+use super::surface_packet::{SurfaceF64, SurfacePointF64};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::transform::rotation_xyz;
 use crate::math::{DMat3, DVec2, DVec3, Vec2};
@@ -91,7 +91,7 @@ impl Cuboid {
 
     /// Surface point at a hit, projected onto the face.
     pub fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
-        let ExactPoint { point, normal: outwards, reach } = self.exact(ray, hit);
+        let SurfacePointF64 { point, normal: outwards, reach } = self.exact(ray, hit);
         let chart = self.face_mapping(hit.primitive);
         let uv = chart.uv(self.local(ray, hit));
         let FaceMapping { u, v, width, height } = chart;
@@ -109,7 +109,7 @@ impl Cuboid {
     }
 
     fn face_mapping(&self, face: u32) -> FaceMapping {
-        let (u, v) = flat_axes(face_normal(face).1);
+        let (u, v) = planar_tangents(face_normal(face).1);
         FaceMapping { u, v, width: 2.0 * self.half.dot(u.abs()), height: 2.0 * self.half.dot(v.abs()) }
     }
 
@@ -155,7 +155,7 @@ impl Cuboid {
     /// A face as a parallelogram (corner, u, v) whose front faces outward.
     pub fn face(&self, face: u32) -> (DVec3, DVec3, DVec3) {
         let (_, normal) = face_normal(face);
-        let (u, v) = flat_axes(normal);
+        let (u, v) = planar_tangents(normal);
         let corner = (normal - u - v) * self.half;
         (
             self.center + self.axes * corner,
@@ -227,13 +227,13 @@ fn face_normal(face: u32) -> (usize, DVec3) {
     (axis, normal)
 }
 
-impl ExactSurface for Cuboid {
+impl SurfaceF64 for Cuboid {
     #[inline(always)]
-    fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> ExactPoint {
+    fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePointF64 {
         let (local, n) = (self.local(ray, hit), branchless_face_normal(hit.primitive));
         let out_of = |v: DVec3| self.axes.x_axis * v.x + self.axes.y_axis * v.y + self.axes.z_axis * v.z;
         let reach = self.center.abs().max_element() + self.half.length();
-        ExactPoint { point: self.center + out_of(local), normal: out_of(n), reach }
+        SurfacePointF64 { point: self.center + out_of(local), normal: out_of(n), reach }
     }
 }
 

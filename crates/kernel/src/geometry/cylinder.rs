@@ -7,7 +7,7 @@ use super::surface_of_revolution::{
     self, AxialFrame, LineInterval, LocalLine, angle_to_u, direction_at_u, is_rounding, radial_direction,
     ring_projected_area, sine_from_cosine,
 };
-use super::surface_packet::{ExactPoint, ExactSurface};
+use super::surface_packet::{SurfaceF64, SurfacePointF64};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::{DVec2, DVec3, Vec2};
 
@@ -25,8 +25,8 @@ pub struct Cylinder {
     capped: bool,
 }
 
-impl ExactSurface for Cylinder {
-    fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> ExactPoint {
+impl SurfaceF64 for Cylinder {
+    fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePointF64 {
         let point = self.exact_point(ray, hit);
         if hit.primitive > 0 {
             return self.cap(hit.primitive).exact_near(point, self.reach());
@@ -104,7 +104,7 @@ impl Cylinder {
             return self.cap(hit.primitive).surface_near(point, self.reach());
         }
         let (out, z) = self.closest_on_side(point);
-        let ExactPoint { point, normal, reach } = self.exact_side(out, z);
+        let SurfacePointF64 { point, normal, reach } = self.exact_side(out, z);
         SurfacePoint::exact(
             point,
             normal,
@@ -122,8 +122,8 @@ impl Cylinder {
     }
 
     /// Point on the side, from a direction perpendicular to the axis and a height.
-    fn exact_side(&self, out: DVec2, z: f64) -> ExactPoint {
-        ExactPoint {
+    fn exact_side(&self, out: DVec2, z: f64) -> SurfacePointF64 {
+        SurfacePointF64 {
             point: self.frame.point_to_world((out * self.radius).extend(z)),
             normal: self.frame.vector_to_world(out.extend(0.0)),
             reach: self.reach(),

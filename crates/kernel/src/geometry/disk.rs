@@ -2,10 +2,10 @@
 
 use std::f64::consts::PI;
 
-use super::kernel_domain::{Extent, KernelDomain, SurfaceBelow};
+use super::kernel_domain::{Extent, LocalGeometry, NearestSurface};
 use super::packet::{F32x16, HitPacket, RayPacket, accept};
 use super::surface_of_revolution::{AxialFrame, exact_t, to_shape_hit};
-use super::surface_packet::{ExactPoint, ExactSurface};
+use super::surface_packet::{SurfaceF64, SurfacePointF64};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::{DVec2, DVec3, Vec2};
 use crate::sampling::warp;
@@ -22,8 +22,8 @@ pub struct Disk {
     radius: f64,
 }
 
-impl ExactSurface for Disk {
-    fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> ExactPoint {
+impl SurfaceF64 for Disk {
+    fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePointF64 {
         self.exact_near(ray.at(exact_t(hit, self.nearest(ray))), self.reach())
     }
 }
@@ -69,7 +69,7 @@ impl Disk {
     /// Surface point nearest to `point`. `reach` is an upper bound on the lengths from which `point` was
     /// computed.
     pub fn surface_near(&self, point: DVec3, reach: f64) -> SurfacePoint {
-        let ExactPoint { point: near, normal, .. } = self.exact_near(point, reach);
+        let SurfacePointF64 { point: near, normal, .. } = self.exact_near(point, reach);
         let edge = 2.0 * self.radius;
         let [across, up] = [DVec3::X, DVec3::Y].map(|axis| self.frame.vector_to_world(axis * edge));
         SurfacePoint::exact(near, normal, self.uv_at(point).as_vec2(), across, up, reach)
@@ -77,9 +77,9 @@ impl Disk {
 
     /// Point on the disk nearest to `point`, before rounding. `reach` is an upper bound on the lengths from
     /// which `point` was computed.
-    pub fn exact_near(&self, point: DVec3, reach: f64) -> ExactPoint {
+    pub fn exact_near(&self, point: DVec3, reach: f64) -> SurfacePointF64 {
         let (p, _) = self.nearest_in_plane(point);
-        ExactPoint { point: self.frame.point_to_world(p.extend(0.0)), normal: self.normal(), reach }
+        SurfacePointF64 { point: self.frame.point_to_world(p.extend(0.0)), normal: self.normal(), reach }
     }
 
     fn reach(&self) -> f64 {
@@ -134,11 +134,11 @@ impl Disk {
     }
 
     /// Local geometry of the disk near a point, for density estimation.
-    pub fn kernel_domain(&self, point: DVec3) -> KernelDomain {
+    pub fn kernel_domain(&self, point: DVec3) -> LocalGeometry {
         let (normal, from) = (self.normal(), point - self.centroid());
         let extent = Extent::Flat(self.radius - from.length());
-        let ground = SurfaceBelow { normal, height: from.dot(normal).abs(), extent };
-        KernelDomain::Surface { distance: self.distance(point), ground: Some(ground) }
+        let ground = NearestSurface { normal, height: from.dot(normal).abs(), extent };
+        LocalGeometry::Surface { distance: self.distance(point), ground: Some(ground) }
     }
 
     /// Whether a point is inside. Always false because a disk has no volume.

@@ -10,7 +10,7 @@ pub type FlatPolygon = ArrayVec<DVec3, 4>;
 
 /// Shape geometry near a point, for integrating a density-estimation kernel.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum KernelDomain {
+pub enum LocalGeometry {
     /// Number of flat polygons that form the shape. See [`Shape::polygon`](super::Shape::polygon).
     Polygons(u32),
     /// A non-polygonal surface.
@@ -18,13 +18,13 @@ pub enum KernelDomain {
         /// Distance from the point to the surface.
         distance: f64,
         /// The surface below the point. Only for planes, disks, and spheres.
-        ground: Option<SurfaceBelow>,
+        ground: Option<NearestSurface>,
     },
 }
 
 /// Surface geometry below a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SurfaceBelow {
+pub struct NearestSurface {
     /// Unit normal at the surface point closest to the point.
     pub normal: DVec3,
     /// Height of the point above or below the surface.
@@ -48,7 +48,7 @@ pub(super) fn parallelogram((c, u, v): (DVec3, DVec3, DVec3)) -> FlatPolygon {
     FlatPolygon::from([c, c + u, c + u + v, c + v])
 }
 
-impl KernelDomain {
+impl LocalGeometry {
     /// A curved surface. Only its distance is known.
     pub(super) fn curved(distance: f64) -> Self {
         Self::Surface { distance, ground: None }

@@ -25,7 +25,7 @@ pub mod watertight;
 pub mod watertight_packet;
 
 pub use aabb::Aabb;
-pub use kernel_domain::KernelDomain;
+pub use kernel_domain::LocalGeometry;
 pub use ray::{Ray, RayF64};
 pub use surface::{AreaPoint, ShapeHit, SurfacePoint, SurfaceRequest};
 
@@ -40,7 +40,7 @@ use packet::{F32x16, HitPacket, RayPacket};
 use parallelogram::Parallelogram;
 use plane::Plane;
 use sphere::Sphere;
-use surface_packet::{ExactSurface as _, SurfacePacket};
+use surface_packet::{SurfaceF64 as _, SurfacePacket};
 use torus::Torus;
 use triangle::Triangle;
 
@@ -234,12 +234,12 @@ impl Shape {
     /// Whether a point is inside, or behind a plane. `None` if the shape encloses no volume.
     #[inline]
     pub fn encloses(&self, point: DVec3) -> Option<bool> {
-        self.encloses_each([point]).map(|[is_inside]| is_inside)
+        self.encloses_points([point]).map(|[is_inside]| is_inside)
     }
 
     /// [`Shape::encloses`] for several points.
     #[inline]
-    pub fn encloses_each<const COUNT: usize>(&self, points: [DVec3; COUNT]) -> Option<[bool; COUNT]> {
+    pub fn encloses_points<const COUNT: usize>(&self, points: [DVec3; COUNT]) -> Option<[bool; COUNT]> {
         match self {
             Self::Plane(plane) => Some(points.map(|point| plane.is_behind(point))),
             Self::Sphere(_)
@@ -274,16 +274,16 @@ impl Shape {
 
     /// Local geometry of the shape near a point, for density estimation.
     #[inline]
-    pub fn kernel_domain(&self, point: DVec3) -> KernelDomain {
+    pub fn kernel_domain(&self, point: DVec3) -> LocalGeometry {
         match self {
-            Self::Quad(_) | Self::Triangle(_) => KernelDomain::Polygons(1),
-            Self::Box(_) => KernelDomain::Polygons(6),
+            Self::Quad(_) | Self::Triangle(_) => LocalGeometry::Polygons(1),
+            Self::Box(_) => LocalGeometry::Polygons(6),
             Self::Sphere(sphere) => sphere.kernel_domain(point),
             Self::Plane(plane) => plane.kernel_domain(point),
             Self::Disk(disk) => disk.kernel_domain(point),
-            Self::Cylinder(cylinder) => KernelDomain::curved(cylinder.distance(point)),
-            Self::Cone(cone) => KernelDomain::curved(cone.distance(point)),
-            Self::Torus(torus) => KernelDomain::curved(torus.distance(point)),
+            Self::Cylinder(cylinder) => LocalGeometry::curved(cylinder.distance(point)),
+            Self::Cone(cone) => LocalGeometry::curved(cone.distance(point)),
+            Self::Torus(torus) => LocalGeometry::curved(torus.distance(point)),
         }
     }
 
@@ -309,7 +309,7 @@ impl Shape {
     /// Whether a ray that crosses the surface at a point must travel farther than `distance` before it can
     /// hit another side. False if unknown.
     #[inline]
-    pub fn is_far_side_beyond(&self, point: DVec3, distance: f64) -> bool {
+    pub fn is_thicker_than(&self, point: DVec3, distance: f64) -> bool {
         match self {
             Self::Sphere(sphere) => sphere.radius > distance,
             Self::Box(cuboid) => cuboid.is_on_one_face(point, distance),
@@ -444,8 +444,8 @@ mod tests {
     #[test]
     fn distance_is_to_the_nearest_point() {
         let distance = |shape: &Shape, point: DVec3| match shape.kernel_domain(point) {
-            KernelDomain::Surface { distance, .. } => Some(distance),
-            KernelDomain::Polygons(_) => None,
+            LocalGeometry::Surface { distance, .. } => Some(distance),
+            LocalGeometry::Polygons(_) => None,
         };
         for shape in shapes() {
             let parts = (0_u32..).zip(shape.areas()).filter(|(_, area)| *area > 0.0);

@@ -1,7 +1,7 @@
 //! Quads (squares and other parallelograms) in double precision.
 
 use super::packet::{F32x16, HitPacket, PACKET_SIZE, RayPacket, accept, may_accept};
-use super::surface_packet::{ExactPoint, ExactSurface, UvMapped};
+use super::surface_packet::{SurfaceF64, SurfacePointF64, UvMapped};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::lanes::{Simd, TRUE};
 use crate::math::{DVec2, DVec3, Vec2};
@@ -77,7 +77,7 @@ impl Parallelogram {
 
     /// Surface point at a hit.
     pub fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
-        let ExactPoint { point, normal, reach } = self.exact(ray, hit);
+        let SurfacePointF64 { point, normal, reach } = self.exact(ray, hit);
         SurfacePoint::exact(point, normal, self.uv(ray, hit).as_vec2(), self.u, self.v, reach)
     }
 
@@ -137,12 +137,12 @@ impl Parallelogram {
     }
 }
 
-impl ExactSurface for Parallelogram {
+impl SurfaceF64 for Parallelogram {
     #[inline(always)]
-    fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> ExactPoint {
+    fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePointF64 {
         let [s, t] = self.coordinates(ray, hit);
         let reach = (self.corner.abs() + self.u.abs() + self.v.abs()).max_element();
-        ExactPoint { point: self.corner + self.u * s + self.v * t, normal: self.normal, reach }
+        SurfacePointF64 { point: self.corner + self.u * s + self.v * t, normal: self.normal, reach }
     }
 }
 

@@ -1,9 +1,9 @@
 //! Infinite planes in double precision.
 
-use super::kernel_domain::{Extent, KernelDomain, SurfaceBelow};
+use super::kernel_domain::{Extent, LocalGeometry, NearestSurface};
 use super::packet::{F32x16, HitPacket, PACKET_SIZE, RayPacket, accept, may_accept};
-use super::surface::flat_axes;
-use super::surface_packet::{ExactPoint, ExactSurface, UvMapped};
+use super::surface::planar_tangents;
+use super::surface_packet::{SurfaceF64, SurfacePointF64, UvMapped};
 use super::{AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::lanes::{Simd, TRUE};
 use crate::math::{DVec2, DVec3, Vec2};
@@ -23,7 +23,7 @@ impl Plane {
     /// Creates a plane from a point and a nonzero normal.
     pub fn new(point: DVec3, normal: DVec3) -> Self {
         let normal = normal.normalize();
-        let (u, v) = flat_axes(normal);
+        let (u, v) = planar_tangents(normal);
         Self { point, normal, u, v }
     }
 
@@ -55,7 +55,7 @@ impl Plane {
 
     /// Surface point at a hit. Each texture tile has an edge length of 1.
     pub fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
-        let ExactPoint { point, normal, reach } = self.exact(ray, hit);
+        let SurfacePointF64 { point, normal, reach } = self.exact(ray, hit);
         let uv = self.uv(ray, hit);
         SurfacePoint { uv, ..SurfacePoint::exact(point, normal, uv.as_vec2(), self.u, self.v, reach) }
     }
@@ -103,11 +103,11 @@ impl Plane {
     }
 
     /// Local geometry of the plane near a point, for density estimation.
-    pub fn kernel_domain(&self, point: DVec3) -> KernelDomain {
+    pub fn kernel_domain(&self, point: DVec3) -> LocalGeometry {
         let distance = self.distance(point);
         let ground =
-            SurfaceBelow { normal: self.normal, height: distance, extent: Extent::Flat(f64::INFINITY) };
-        KernelDomain::Surface { distance, ground: Some(ground) }
+            NearestSurface { normal: self.normal, height: distance, extent: Extent::Flat(f64::INFINITY) };
+        LocalGeometry::Surface { distance, ground: Some(ground) }
     }
 
     /// Whether a point is inside. Always false, unlike [`Plane::is_behind`].
@@ -126,12 +126,12 @@ impl Plane {
     }
 }
 
-impl ExactSurface for Plane {
+impl SurfaceF64 for Plane {
     #[inline(always)]
-    fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> ExactPoint {
+    fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePointF64 {
         let [s, t] = self.coordinates(ray, hit);
         let reach = self.point.abs().max_element() + s.abs() + t.abs();
-        ExactPoint { point: self.point + self.u * s + self.v * t, normal: self.normal, reach }
+        SurfacePointF64 { point: self.point + self.u * s + self.v * t, normal: self.normal, reach }
     }
 }
 

@@ -2,9 +2,9 @@
 
 use std::f64::consts::PI;
 
-use super::kernel_domain::{Extent, KernelDomain, SurfaceBelow};
+use super::kernel_domain::{Extent, LocalGeometry, NearestSurface};
 use super::packet::{F32x16, HitPacket, PACKET_SIZE, RayPacket, accept};
-use super::surface_packet::{ExactPoint, ExactSurface};
+use super::surface_packet::{SurfaceF64, SurfacePointF64};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::lanes::{Simd, TRUE};
 use crate::math::{DVec2, DVec3, Vec2};
@@ -74,14 +74,14 @@ impl Sphere {
 
     /// Surface point at a hit.
     pub fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
-        let ExactPoint { point, normal, reach } = self.exact(ray, hit);
-        let (uv, dpdu, dpdv) = sphere_parametrisation(normal);
+        let SurfacePointF64 { point, normal, reach } = self.exact(ray, hit);
+        let (uv, dpdu, dpdv) = sphere_parametrization(normal);
         SurfacePoint::exact(point, normal, uv, dpdu * self.radius, dpdv * self.radius, reach)
     }
 
     /// Texture coordinates of a point on the surface.
     pub fn uv_at(&self, point: DVec3) -> DVec2 {
-        sphere_parametrisation((point - self.center).normalize_or(DVec3::Y)).0.as_dvec2()
+        sphere_parametrization((point - self.center).normalize_or(DVec3::Y)).0.as_dvec2()
     }
 
     /// Bounding box.
@@ -115,10 +115,10 @@ impl Sphere {
     }
 
     /// Local geometry of the sphere near a point, for density estimation.
-    pub fn kernel_domain(&self, point: DVec3) -> KernelDomain {
+    pub fn kernel_domain(&self, point: DVec3) -> LocalGeometry {
         let (distance, out) = (self.distance(point), (point - self.center).normalize_or_zero());
-        let ground = SurfaceBelow { normal: out, height: distance, extent: Extent::Round(self.radius) };
-        KernelDomain::Surface { distance, ground: Some(ground) }
+        let ground = NearestSurface { normal: out, height: distance, extent: Extent::Round(self.radius) };
+        LocalGeometry::Surface { distance, ground: Some(ground) }
     }
 
     /// Whether a point is inside.
@@ -137,21 +137,21 @@ impl Sphere {
     }
 }
 
-impl ExactSurface for Sphere {
+impl SurfaceF64 for Sphere {
     #[inline(always)]
-    fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> ExactPoint {
+    fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePointF64 {
         let outwards = ray.at(f64::from(hit.t)) - self.center;
         // At the center, any normal is correct.
         let is_told = outwards.length_squared() > 0.0;
         let n = (if is_told { outwards } else { -ray.direction }).normalize();
         let reach = self.center.abs().max_element() + self.radius;
-        ExactPoint { point: self.center + n * self.radius, normal: n, reach }
+        SurfacePointF64 { point: self.center + n * self.radius, normal: n, reach }
     }
 }
 
 /// Texture coordinates u = ½ + atan2(z, x)/2π and v = ½ + asin(y)/π of a unit normal, and the derivatives of
 /// the normal. At the poles, the tangents are an arbitrary perpendicular pair.
-fn sphere_parametrisation(n: DVec3) -> (Vec2, DVec3, DVec3) {
+fn sphere_parametrization(n: DVec3) -> (Vec2, DVec3, DVec3) {
     let u = 0.5 + libm::atan2(n.z, n.x) / (2.0 * PI);
     let v = 0.5 + libm::asin(n.y.clamp(-1.0, 1.0)) / PI;
     let ring = (n.x * n.x + n.z * n.z).sqrt();
@@ -211,10 +211,10 @@ mod tests {
 
     #[test]
     fn texture_coordinates_have_known_values() {
-        let (uv, ..) = sphere_parametrisation(DVec3::ONE.normalize());
+        let (uv, ..) = sphere_parametrization(DVec3::ONE.normalize());
         assert!((uv.x - 0.625).abs() < 1e-6 && (uv.y - 0.695_913_3).abs() < 1e-6);
         for pole in [DVec3::Y, DVec3::NEG_Y] {
-            let (uv, _, north) = sphere_parametrisation(pole);
+            let (uv, _, north) = sphere_parametrization(pole);
             assert!(uv.is_finite() && north.length() > 1.0);
         }
     }
@@ -226,7 +226,7 @@ mod tests {
             DVec3::new(height.cos() * azimuth.cos(), height.sin(), height.cos() * azimuth.sin())
         };
         let (u, v, h) = (0.3, 0.7, 1e-6);
-        let (uv, dpdu, dpdv) = sphere_parametrisation(point(u, v));
+        let (uv, dpdu, dpdv) = sphere_parametrization(point(u, v));
         assert!((uv - Vec2::new(0.3, 0.7)).length() < 1e-6);
         assert!(((point(u + h, v) - point(u - h, v)) / (2.0 * h) - dpdu).length() < 1e-6);
         assert!(((point(u, v + h) - point(u, v - h)) / (2.0 * h) - dpdv).length() < 1e-6);

@@ -95,13 +95,13 @@ impl SurfacePoint {
 /// test from there. `reach` is the largest length involved.
 #[inline(always)]
 pub fn error(point: Vec3, reach: f64) -> Vec3 {
-    rounding_error(point) + Vec3::splat(double_error(reach))
+    rounding_error(point) + Vec3::splat(f64_error_bound(reach))
 }
 
 /// Bound on the error of `f64` arithmetic for a hit, its surface point, and the next intersection test from
 /// there. `reach` is the largest length involved.
 #[inline(always)]
-pub fn double_error(reach: f64) -> f32 {
+pub fn f64_error_bound(reach: f64) -> f32 {
     (reach * (32.0 * f64::EPSILON)) as f32
 }
 
@@ -113,7 +113,7 @@ pub fn rounding_error(point: Vec3) -> Vec3 {
 
 /// Tangents (u, v) of a flat surface with unit normal `n`, such that u × v = n. v points up on vertical
 /// surfaces, and toward −z on horizontal surfaces that face up.
-pub fn flat_axes(n: DVec3) -> (DVec3, DVec3) {
+pub fn planar_tangents(n: DVec3) -> (DVec3, DVec3) {
     let across = DVec3::Y.cross(n);
     let u = if across.length_squared() > 1e-12 { across } else { DVec3::X - n * n.x };
     let u = u.normalize();
@@ -128,11 +128,11 @@ mod tests {
     fn tangents_are_perpendicular_near_vertical() {
         for tilt in [0.0, 1e-9, 9e-7, 1.1e-6, 0.3, 1.0] {
             for n in [DVec3::new(tilt, 1.0, 0.0), DVec3::new(-tilt, -1.0, tilt)].map(DVec3::normalize) {
-                let (u, v) = flat_axes(n);
+                let (u, v) = planar_tangents(n);
                 let off = [u.dot(n), v.dot(n), u.dot(v), u.length() - 1.0, u.cross(v).dot(n) - 1.0];
                 assert!(off.iter().all(|off| off.abs() < 1e-15), "{n}: {off:?}");
             }
         }
-        assert_eq!(flat_axes(DVec3::Y), (DVec3::X, DVec3::NEG_Z));
+        assert_eq!(planar_tangents(DVec3::Y), (DVec3::X, DVec3::NEG_Z));
     }
 }

@@ -27,7 +27,7 @@ pub struct SurfacePacket {
 }
 
 /// A surface point before rounding to `f32`.
-pub struct ExactPoint {
+pub struct SurfacePointF64 {
     /// The point in world coordinates.
     pub point: DVec3,
     /// Normal of the front, not necessarily of unit length.
@@ -36,7 +36,7 @@ pub struct ExactPoint {
     pub reach: f64,
 }
 
-impl ExactPoint {
+impl SurfacePointF64 {
     /// Surface point without texture coordinates and tangents.
     pub fn without_uv(&self) -> SurfacePoint {
         SurfacePoint::exact(self.point, self.normal, Vec2::ZERO, DVec3::ZERO, DVec3::ZERO, self.reach)
@@ -44,9 +44,9 @@ impl ExactPoint {
 }
 
 /// A shape that computes surface points in double precision.
-pub trait ExactSurface {
+pub trait SurfaceF64 {
     /// Surface point at a hit.
-    fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> ExactPoint;
+    fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePointF64;
 }
 
 /// A shape with a branchless texture coordinate computation.
@@ -112,13 +112,7 @@ impl SurfacePacket {
 
     /// [`SurfacePacket::fill`] for a shape with a SIMD loop.
     #[inline(always)]
-    pub(super) fn fill_from(
-        &mut self,
-        shape: &impl ExactSurface,
-        rays: &RayPacket,
-        hits: &HitPacket,
-        of: u32,
-    ) {
+    pub(super) fn fill_from(&mut self, shape: &impl SurfaceF64, rays: &RayPacket, hits: &HitPacket, of: u32) {
         let mut found = Self::EMPTY;
         for lane in 0..PACKET_SIZE {
             let hit = ShapeHit {
@@ -127,7 +121,7 @@ impl SurfacePacket {
                 u: hits.u[lane],
                 v: hits.v[lane],
             };
-            let ExactPoint { point, normal, reach } = shape.exact(&rays.ray_f64(lane), &hit);
+            let SurfacePointF64 { point, normal, reach } = shape.exact(&rays.ray_f64(lane), &hit);
             let point = point.as_vec3();
             set_lane(&mut found.point, lane, point);
             set_lane(&mut found.error, lane, error(point, reach));

@@ -1,7 +1,7 @@
 //! Single triangles in double precision.
 
 use super::packet::{F32x16, HitPacket, RayPacket, accept};
-use super::surface_packet::{ExactPoint, ExactSurface};
+use super::surface_packet::{SurfaceF64, SurfacePointF64};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::{DVec2, DVec3, Vec2};
 use crate::sampling::warp;
@@ -60,7 +60,7 @@ impl Triangle {
 
     /// Surface point at a hit. The texture coordinates at the corners are (0, 0), (1, 0), and (0, 1).
     pub fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
-        let ExactPoint { point, normal, reach } = self.exact(ray, hit);
+        let SurfacePointF64 { point, normal, reach } = self.exact(ray, hit);
         SurfacePoint::exact(point, normal, Vec2::new(hit.u, hit.v), self.b - self.a, self.c - self.a, reach)
     }
 
@@ -115,9 +115,9 @@ pub fn barycentric_weights([a, b, c]: [DVec3; 3], point: DVec3) -> DVec2 {
     DVec2::new(of(ap.cross(ac)), of(ab.cross(ap)))
 }
 
-impl ExactSurface for Triangle {
+impl SurfaceF64 for Triangle {
     #[inline(always)]
-    fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> ExactPoint {
+    fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePointF64 {
         let (u, v) = (f64::from(hit.u), f64::from(hit.v));
         let (ab, ac) = (self.b - self.a, self.c - self.a);
         let reach = (self.a.abs() + ab.abs() + ac.abs()).max_element();
@@ -126,7 +126,7 @@ impl ExactSurface for Triangle {
         // coordinates.
         let by_ray = ray.at((self.a - ray.origin).dot(normal) / ray.direction.dot(normal));
         let is_huge = ray.origin.abs().max(by_ray.abs()).max_element() * HUGE < reach;
-        ExactPoint { point: if is_huge { by_ray } else { by_weights }, normal, reach }
+        SurfacePointF64 { point: if is_huge { by_ray } else { by_weights }, normal, reach }
     }
 }
 

@@ -4,7 +4,7 @@ use super::area::{AreaLight, EmissionTexture};
 use super::delta::{DeltaLight, PointLight, SpotLight};
 use super::infinite::{DirectionalLight, Environment, InfiniteLight};
 use super::packet::LightSamplePacket;
-use super::sample::{LightCenter, LightHit, LightObject, LightSample};
+use super::sample::{LightCenter, LightGeometry, LightHit, LightSample};
 use super::tree::LightBounds;
 use crate::math::Vec3;
 use crate::math::lanes::{F32x16, PACKET_SIZE, Vec3x16, lane};
@@ -164,12 +164,12 @@ impl Light {
 
     /// The light's center, and the light's own geometry, which rays toward the center must ignore. `None` for
     /// an environment.
-    pub fn center(&self) -> Option<(LightCenter, LightObject)> {
+    pub fn center(&self) -> Option<(LightCenter, LightGeometry)> {
         Some(match self.family() {
             LightFamily::Delta(light) => {
-                (LightCenter::At(light.isotropic().position.as_vec3()), LightObject::Nothing)
+                (LightCenter::At(light.isotropic().position.as_vec3()), LightGeometry::Nothing)
             }
-            LightFamily::Infinite(light) => (LightCenter::Towards(light.center()?), LightObject::Nothing),
+            LightFamily::Infinite(light) => (LightCenter::Towards(light.center()?), LightGeometry::Nothing),
             LightFamily::Area(light) => (LightCenter::At(light.center().as_vec3()), light.source()),
         })
     }

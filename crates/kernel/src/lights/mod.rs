@@ -53,7 +53,7 @@ pub use packet::{LightObjectPacket, LightSamplePacket};
 pub use photon_emission::{
     BoundingSphere, EmittedPhoton, EmitterGeometry, PhotonOrigin, PhotonRandomNumbers, PhotonSource,
 };
-pub use sample::{LightCenter, LightHit, LightObject, LightSample, ShadowRayEnd};
+pub use sample::{LightCenter, LightGeometry, LightHit, LightSample, ShadowRayEnd};
 pub use set::{ExpectedSamples, LightSampler, LightSamplingEffort, Lights, SamplingMode};
 pub use tree::{LightBounds, LightPick, LightTree, LightTreeCut, Receiver, ReceiverLobe, ReceiverPacket};
 

@@ -1,6 +1,6 @@
 //! Samples of one light for a packet of points.
 
-use super::sample::{LightObject, LightSample, ShadowRayEnd};
+use super::sample::{LightGeometry, LightSample, ShadowRayEnd};
 use crate::math::Vec3;
 use crate::math::lanes::{F32x16, PACKET_SIZE, Vec3x16, lane, mask_from_bits, select, select_u32, set_lane};
 
@@ -22,7 +22,7 @@ pub struct LightSamplePacket {
     pub(super) environment_inverse_pdfs: F32x16,
 }
 
-/// A packet of [`LightObject`]s.
+/// A packet of [`LightGeometry`]s.
 #[derive(Clone, Debug)]
 #[repr(align(64))]
 pub struct LightObjectPacket {
@@ -38,12 +38,12 @@ impl LightObjectPacket {
     /// Marks a lane that has no object, or that refers to an entire object.
     pub const NONE: u32 = u32::MAX;
 
-    /// Marks a [`LightObject::SeeThrough`] lane. No primitive has this index.
+    /// Marks a [`LightGeometry::SeeThrough`] lane. No primitive has this index.
     const SEE_THROUGH: u32 = u32::MAX - 1;
 
     /// A packet with the same source in all lanes.
     #[inline(always)]
-    pub fn of(source: LightObject) -> Self {
+    pub fn of(source: LightGeometry) -> Self {
         let (object, part) = object_and_part(source);
         Self { object: [object; PACKET_SIZE], part: [part; PACKET_SIZE], is_any: object != Self::NONE }
     }
@@ -57,30 +57,30 @@ impl LightObjectPacket {
 
     /// Returns the source of a lane.
     #[inline]
-    pub fn source(&self, lane: usize) -> LightObject {
+    pub fn source(&self, lane: usize) -> LightGeometry {
         match (self.object[lane], self.part[lane]) {
-            (Self::NONE, _) => LightObject::Nothing,
-            (object, Self::NONE) => LightObject::Object(object),
-            (object, Self::SEE_THROUGH) => LightObject::SeeThrough(object),
-            (object, part) => LightObject::Primitive(object, part),
+            (Self::NONE, _) => LightGeometry::Nothing,
+            (object, Self::NONE) => LightGeometry::Object(object),
+            (object, Self::SEE_THROUGH) => LightGeometry::SeeThrough(object),
+            (object, part) => LightGeometry::Primitive(object, part),
         }
     }
 
     /// Sets the source of a lane.
     #[inline(always)]
-    pub fn set(&mut self, lane: usize, source: LightObject) {
+    pub fn set(&mut self, lane: usize, source: LightGeometry) {
         (self.object[lane], self.part[lane]) = object_and_part(source);
         self.is_any |= self.object[lane] != Self::NONE;
     }
 }
 
 #[inline(always)]
-fn object_and_part(source: LightObject) -> (u32, u32) {
+fn object_and_part(source: LightGeometry) -> (u32, u32) {
     match source {
-        LightObject::Nothing => (LightObjectPacket::NONE, LightObjectPacket::NONE),
-        LightObject::Object(object) => (object, LightObjectPacket::NONE),
-        LightObject::SeeThrough(object) => (object, LightObjectPacket::SEE_THROUGH),
-        LightObject::Primitive(object, part) => (object, part),
+        LightGeometry::Nothing => (LightObjectPacket::NONE, LightObjectPacket::NONE),
+        LightGeometry::Object(object) => (object, LightObjectPacket::NONE),
+        LightGeometry::SeeThrough(object) => (object, LightObjectPacket::SEE_THROUGH),
+        LightGeometry::Primitive(object, part) => (object, part),
     }
 }
 
@@ -104,7 +104,7 @@ pub(super) use packet_of;
 /// [`packet_of`] for lights at infinity.
 macro_rules! infinite_packet_of {
     ($i:ident => $sample:expr) => {{
-        let row = $crate::lights::packet::packet_of!($crate::lights::sample::LightObject::Nothing, $i => {
+        let row = $crate::lights::packet::packet_of!($crate::lights::sample::LightGeometry::Nothing, $i => {
             let (direction, weight) = $sample;
             (direction, $crate::math::Vec3::ZERO, weight)
         });
@@ -117,7 +117,7 @@ pub(super) use infinite_packet_of;
 impl LightSamplePacket {
     /// Copies the lanes in the mask `bits` from another packet.
     #[inline(always)]
-    pub(super) fn take_lanes(&mut self, bits: u32, other: &Self) {
+    pub(super) fn copy_lanes(&mut self, bits: u32, other: &Self) {
         let of = mask_from_bits(bits);
         for axis in 0..3 {
             select(&of, &other.directions[axis], &mut self.directions[axis]);
@@ -131,7 +131,7 @@ impl LightSamplePacket {
     }
 
     #[inline(always)]
-    pub(super) fn without_light(source: LightObject) -> Self {
+    pub(super) fn without_light(source: LightGeometry) -> Self {
         Self {
             directions: [[0.0; PACKET_SIZE]; 3],
             targets: [[0.0; PACKET_SIZE]; 3],
@@ -158,7 +158,7 @@ impl LightSamplePacket {
         used: u32,
         sample: impl Fn(usize, Vec3) -> Option<LightSample>,
     ) -> Self {
-        let mut row = Self::without_light(LightObject::Nothing);
+        let mut row = Self::without_light(LightGeometry::Nothing);
         for i in (0..PACKET_SIZE).filter(|i| used & 1 << i != 0) {
             if let Some(sample) = sample(i, lane(points, i)) {
                 row.put(i, &sample);

@@ -7,7 +7,7 @@ use super::area::sphere::SphereEmitter;
 use super::area::{AreaLight, LightSamplePoint, ShapeEmitter};
 use super::delta::DeltaLight;
 use super::packet::{LightSamplePacket, packet_of};
-use super::sample::LightObject;
+use super::sample::LightGeometry;
 use super::{Light, Lights};
 use crate::geometry::packet::lanes;
 use crate::math::Vec3;
@@ -16,14 +16,14 @@ use crate::math::lanes::{F32x16, PACKET_SIZE, Vec3x16, lane, set_lane};
 /// Samples convex emitters for a packet, with one emitter per lane.
 macro_rules! convex_packet_of {
     ($i:ident => $all:expr, $points:expr, $u:expr) => {{
-        let mut row = packet_of!(LightObject::Nothing, $i => {
+        let mut row = packet_of!(LightGeometry::Nothing, $i => {
             let (emitter, light) = $all[$i];
             let LightSamplePoint { direction, target, factor } =
                 emitter.sample(lane($points, $i), [$u[0][$i], $u[1][$i]]);
             (direction, target, light.radiance * factor)
         });
         for $i in 0..PACKET_SIZE {
-            row.sources.set($i, LightObject::Object($all[$i].1.object));
+            row.sources.set($i, LightGeometry::Object($all[$i].1.object));
         }
         row
     }};
@@ -44,7 +44,7 @@ impl Lights {
         for i in 1..PACKET_SIZE {
             lights[i] = self.get(picked[i]);
         }
-        let mut row = LightSamplePacket::without_light(LightObject::Nothing);
+        let mut row = LightSamplePacket::without_light(LightGeometry::Nothing);
         let mut left = used;
         // Sample all lights of the same kind together. Other lanes get a copy of one of these lights, and
         // their results are discarded.
@@ -53,7 +53,7 @@ impl Lights {
             let mut of = 0;
             let found = if let Some(filler) = lights[first].as_point() {
                 let lights = lights_of_kind((&lights, left), &mut of, Light::as_point, filler);
-                packet_of!(LightObject::Nothing, i => {
+                packet_of!(LightGeometry::Nothing, i => {
                     let (direction, weight) = lights[i].direction_and_irradiance(lane(points, i));
                     (direction, lights[i].position.as_vec3(), weight)
                 })
@@ -83,7 +83,7 @@ impl Lights {
             if of == used {
                 row = found;
             } else {
-                row.take_lanes(of, &found);
+                row.copy_lanes(of, &found);
             }
             left &= !of;
         }

@@ -23,19 +23,19 @@ pub fn dielectric(cos_incident: f32, eta: f32) -> (f32, Option<f32>) {
 /// [`dielectric`] from outside (`eta` ≥ 1), in `f32` for packets.
 #[inline(always)]
 pub fn dielectric_outside(cos_incident: f32, eta: f32) -> f32 {
-    by_root(cos_incident, eta, (eta - 1.0) * (eta + 1.0) + cos_incident * cos_incident)
+    dielectric_from_cos2(cos_incident, eta, (eta - 1.0) * (eta + 1.0) + cos_incident * cos_incident)
 }
 
 /// [`dielectric`] from either side, in `f32` for packets. 1 for total internal reflection.
 #[inline(always)]
 pub fn dielectric_either(cos_incident: f32, eta: f32) -> f32 {
     let squared = (eta - 1.0) * (eta + 1.0) + cos_incident * cos_incident;
-    by_root(cos_incident, eta, if squared > 0.0 { squared } else { 0.0 })
+    dielectric_from_cos2(cos_incident, eta, if squared > 0.0 { squared } else { 0.0 })
 }
 
 /// Reflectance of a dielectric boundary, given η² times the squared cosine of the transmitted direction.
 #[inline(always)]
-fn by_root(cos_incident: f32, eta: f32, cos2_t: f32) -> f32 {
+fn dielectric_from_cos2(cos_incident: f32, eta: f32, cos2_t: f32) -> f32 {
     let cos_t = cos2_t.sqrt();
     let squared = eta * eta;
     // Both cosines are multiplied by η. The `max` avoids 0/0 at grazing angles for η = 1.

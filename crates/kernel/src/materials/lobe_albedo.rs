@@ -298,7 +298,7 @@ fn last_true(mut from: f64, mut to: f64, holds: impl Fn(f64) -> bool) -> f64 {
 }
 
 /// Nodes in (0, 1) and weights, for functions that vary quickly near both ends.
-fn dense_at_ends(count: usize) -> Vec<(f64, f64)> {
+fn quadrature_dense_at_ends(count: usize) -> Vec<(f64, f64)> {
     gauss_legendre(count).map(|(t, weight)| (t * t * (3.0 - 2.0 * t), weight * 6.0 * t * (1.0 - t))).collect()
 }
 
@@ -313,9 +313,9 @@ fn integrate_albedo<const ACROSS: usize, const ALONG: usize>(
     let facets = VisibleFacets::new(cosine, alpha);
     // Half of the disk is enough because the integrand is symmetric.
     let widest = last_true(0.0, 0.25 * TAU, |turn| facets.lit_point(libm::sin(turn)).is_some());
-    let along = dense_at_ends(ALONG);
+    let along = quadrature_dense_at_ends(ALONG);
     let mut sum = 0.0;
-    for (turn, by_turn) in dense_at_ends(ACROSS) {
+    for (turn, by_turn) in quadrature_dense_at_ends(ACROSS) {
         let (x, chord) = libm::sincos(widest * turn);
         let Some(lit) = facets.lit_point(x) else { continue };
         let [from, to] = facets.ends(x, lit);

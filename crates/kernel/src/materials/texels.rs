@@ -1,6 +1,6 @@
 //! Image texels, stored as compactly as in the file.
 
-use crate::math::color::{LINEAR_OF_SRGB8, srgb8_to_linear};
+use crate::math::color::{SRGB8_TO_LINEAR, srgb8_to_linear};
 use crate::math::lanes::{PACKET_SIZE, Vec3x16, set_lane};
 use crate::math::{DVec3, DVec4, Vec3, Vec4};
 
@@ -49,7 +49,7 @@ impl Texels {
             TexelData::Linear8(bytes) => linear_from_bytes(bytes[place]),
             TexelData::Float(floats) => floats[place],
             TexelData::SrgbAlpha8(_) | TexelData::LinearAlpha8(_) | TexelData::FloatAlpha(_) => {
-                self.without_weight(place)
+                self.unpremultiplied(place)
             }
         }
     }
@@ -65,7 +65,7 @@ impl Texels {
 
     /// Linear color at a texel index, not premultiplied by alpha.
     #[cold]
-    fn without_weight(&self, place: usize) -> Vec3 {
+    fn unpremultiplied(&self, place: usize) -> Vec3 {
         match &self.data {
             TexelData::SrgbAlpha8(bytes) => {
                 let [red, green, blue, _] = bytes[place];
@@ -121,7 +121,7 @@ impl Texels {
     fn decode<const N: usize>(&self, places: &[usize; N], mut put: impl FnMut(usize, Vec3)) {
         match &self.data {
             TexelData::Srgb8(bytes) => {
-                let table = &*LINEAR_OF_SRGB8;
+                let table = &*SRGB8_TO_LINEAR;
                 for i in 0..N {
                     let [r, g, b] = bytes[places[i]];
                     let decoded = |byte: u8| table[usize::from(byte)];
@@ -140,7 +140,7 @@ impl Texels {
             }
             TexelData::SrgbAlpha8(_) | TexelData::LinearAlpha8(_) | TexelData::FloatAlpha(_) => {
                 for i in 0..N {
-                    put(i, self.without_weight(places[i]));
+                    put(i, self.unpremultiplied(places[i]));
                 }
             }
         }

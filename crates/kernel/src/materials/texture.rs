@@ -249,7 +249,7 @@ impl Texture {
             return slopes;
         }
         let tiles = self.tiles(at);
-        slopes * Vec2::from([tiles.x, tiles.y].map(|tile| mirrored_tile(tile) as f32))
+        slopes * Vec2::from([tiles.x, tiles.y].map(|tile| mirror_sign(tile) as f32))
     }
 
     /// Tangents along the texture's repeated and transformed coordinates. Only the directions matter.
@@ -564,7 +564,7 @@ impl Wrap {
 }
 
 /// −1 in tiles that [`Wrap::Mirror`] mirrors, 1 in all other tiles.
-fn mirrored_tile(x: f64) -> f64 {
+fn mirror_sign(x: f64) -> f64 {
     let x = finite_or_zero(x);
     if x - 2.0 * (x * 0.5).floor() > 1.0 { -1.0 } else { 1.0 }
 }

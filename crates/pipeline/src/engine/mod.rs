@@ -18,7 +18,7 @@ use std::sync::Arc;
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-pub(super) use self::orders::{Interruption, Orders, RequestContext};
+pub(super) use self::orders::{Interruption, PendingOrders, RequestContext};
 use self::outcome::Outcome;
 pub use self::outcome::{Rendered, Unrendered};
 use self::outputs::remove_outdated_report;
@@ -31,16 +31,16 @@ use super::keys;
 use super::memory::MemoryEstimate;
 use super::model::ModelView;
 use super::plan::{OutputNameSource, Plan, core_count, plan, thread_count};
-use super::protocol::{Event, Failure, PreviewSize, Report, Request, Stage, Status, Writing};
+use super::protocol::{Event, Failure, PreviewSize, Report, Request, Stage, Status, WriteMode};
 use super::queries::{Query, QueryContext};
 use super::render::checkpointer::CheckpointLock;
 use super::render::film_cache::FilmCache;
 use super::render::film_state::FilmState;
-use super::render::first_picture::FirstPictures;
+use super::render::first_picture::CoarseImages;
 use super::render::layers;
 use super::render::preview::PreviewTarget;
 use super::render::scheduler::RenderStageInputs;
-use super::render::share::Share;
+use super::render::share::Shard;
 use super::report::finish::{RequestResults, make_report};
 use super::settings::{AdjustableSettings, Overrides, View};
 use super::sink::Sink;
@@ -55,7 +55,7 @@ use super::stages::photons::{PhotonCache, PhotonContext, PhotonStore, photons};
 use super::stages::render::render;
 use super::stages::textures::{NeededTextures, TextureCache, Textures, add_declared, needed, textures};
 use super::stages::write::{Destination, TurntableFrames, WrittenImages, check_targets, write_on_request};
-use super::stages::{Findings, Reading, StageResult, Stop};
+use super::stages::{FileReadContext, Findings, StageResult, Stop};
 use super::stopwatch::Stopwatch;
 use super::table::StageTable;
 use super::targets::conflicts;
@@ -155,7 +155,7 @@ struct Ready {
     texels_loaded: u64,
     texture_memory_bytes: u64,
     /// Share of the image that this process renders. `None` for the whole image.
-    share: Option<Share>,
+    share: Option<Shard>,
 }
 
 impl Engine {
@@ -258,7 +258,7 @@ impl Engine {
     }
 
     /// Sends a preview of the current image at another size, outside of a request.
-    pub(super) fn show_now(&mut self, bounds: Option<PreviewSize>, sink: &Sink, token: &CancelToken) {
+    pub(super) fn show_preview_now(&mut self, bounds: Option<PreviewSize>, sink: &Sink, token: &CancelToken) {
         if let (Some(state), Some(plan), Some(pool)) = (self.films.current_mut(), &self.plan, &self.pool) {
             PreviewTarget { bounds, plan, sink }.show(state, pool, token);
         }
@@ -293,8 +293,8 @@ impl Engine {
             ready.plan.settings.render.samples = share.samples_per_pixel();
         }
         ready.share = share;
-        self.share_own(request, &ready);
-        self.say_own(request, ready.film, sink);
+        self.record_own_share(request, &ready);
+        self.report_own_image(request, ready.film, sink);
         let rays = table.run(Stage::Render, || self.render(request, &ready, photons, sink, context))?;
         // Symbolic links and files may have changed during the render.
         self.check_conflicts(request, &ready.plan, findings, sink)?;
@@ -303,7 +303,7 @@ impl Engine {
             self.run_write_stage(request, &ready.plan, findings, sink, context.writing)
         });
         let is_written = written.as_ref().is_ok_and(|is_written| *is_written);
-        self.say_own(request, ready.film, sink);
+        self.report_own_image(request, ready.film, sink);
         let film = own::should_write_own_image(request).then_some(ready.film);
         let interruption = || context.orders.interruption();
         self.with_checkpointer(film, sink, &interruption, |checkpointer, engine| {
@@ -368,7 +368,7 @@ impl Engine {
         };
         // Show the scene while the first photons are traced.
         let is_new = request.force || self.films.get(ready.film).is_none();
-        let coarse = FirstPictures {
+        let coarse = CoarseImages {
             tracer: make_tracer(self.config.kernel, &pool, ready, context.token),
             plan,
             is_moved: request.overrides.camera.has_changes(),
@@ -455,7 +455,8 @@ impl Engine {
             check_targets(request.write, &plan, table.sink)?;
         }
         let pool = self.thread_pool(plan.threads)?;
-        let reading = Reading { sink: table.sink, token, contents, pool: &pool, containers: &containers };
+        let reading =
+            FileReadContext { sink: table.sink, token, contents, pool: &pool, containers: &containers };
         // Include textures needed only for the scene's own image, because its film key depends on them.
         let lookups = needed_textures(&plan, own_image_plan.as_ref());
         let (meshes, bodies, textures, needed) = self.load(&parsed, lookups, findings, table, &reading)?;
@@ -482,7 +483,7 @@ impl Engine {
         good: &LastValidScene,
         (plan, own): (Plan, Option<Plan>),
         table: &mut StageTable<'_>,
-        reading: &Reading<'_>,
+        reading: &FileReadContext<'_>,
     ) -> Result<Ready, Stop> {
         let LastValidScene { parsed, meshes, bodies, textures, .. } = good;
         let scene = &plan.scene;
@@ -521,10 +522,10 @@ impl Engine {
     }
 
     /// Returns the share of the image that this process renders. `None` for the whole image.
-    fn share(&self, plan: &Plan, photons: Option<Key>) -> Option<Share> {
+    fn share(&self, plan: &Plan, photons: Option<Key>) -> Option<Shard> {
         let emits_photons =
             photons.and_then(|key| self.photons.get(key)).is_some_and(PhotonStore::emits_photons);
-        plan.shard.map(|shard| Share::new(shard, emits_photons, plan.settings.render.samples))
+        plan.shard.map(|shard| Shard::new(shard, emits_photons, plan.settings.render.samples))
     }
 
     /// Loads all files that the scene references. Tries every file before returning an error.
@@ -534,7 +535,7 @@ impl Engine {
         lookups: TextureNeeds,
         findings: &mut Findings,
         table: &mut StageTable<'_>,
-        reading: &Reading<'_>,
+        reading: &FileReadContext<'_>,
     ) -> Result<(Meshes, Arc<GlassSolids>, Textures, NeededTextures), Stop> {
         let loaded = &parsed.loaded;
         let (cache, mesh_cache) = (&mut self.textures, &mut self.meshes);
@@ -606,7 +607,7 @@ impl Engine {
                 checkpointer,
             };
             let rendered = render(key, &mut films, &rendering)?;
-            if let Some(state) = films.current().filter(|_| request.write != Writing::No) {
+            if let Some(state) = films.current().filter(|_| request.write != WriteMode::No) {
                 let made = layers::render_layers(state, &rendering, wanted);
                 if let (Err(_), Some(checkpointer)) = (&made, checkpointer) {
                     checkpointer.finish(state, state.traced, false);
@@ -671,7 +672,7 @@ impl Engine {
             let pool = self.thread_pool(core_count())?;
             let read = || parse(origin, (contents, &containers), &mut self.parsed, &mut findings, token);
             let parsed = pool.install(read)?.value;
-            let reading = Reading { sink, token, contents, pool: &pool, containers: &containers };
+            let reading = FileReadContext { sink, token, contents, pool: &pool, containers: &containers };
             let loaded = &parsed.loaded;
             let found = meshes(loaded, &mut self.meshes, &mut findings, &reading)?.value;
             let mut wanted = needed(loaded, &found, TextureNeeds::ALL, &self.textures);

@@ -21,7 +21,7 @@ pub(crate) enum Interruption {
 }
 
 /// Orders that arrive during a request.
-pub(crate) trait Orders {
+pub(crate) trait PendingOrders {
     /// Whether the current image should be written.
     fn wants_write(&self) -> bool;
     /// Like [`Self::wants_write`], but clears the order.
@@ -39,13 +39,17 @@ pub(crate) struct RequestContext<'a> {
     pub(crate) token: &'a CancelToken,
     /// Cancels the write stage, which runs last.
     pub(crate) writing: &'a CancelToken,
-    pub(crate) orders: &'a dyn Orders,
+    pub(crate) orders: &'a dyn PendingOrders,
     /// Whether the front end has been told that its write order is postponed.
     is_postponed: Cell<bool>,
 }
 
 impl<'a> RequestContext<'a> {
-    pub(crate) fn new(token: &'a CancelToken, writing: &'a CancelToken, orders: &'a dyn Orders) -> Self {
+    pub(crate) fn new(
+        token: &'a CancelToken,
+        writing: &'a CancelToken,
+        orders: &'a dyn PendingOrders,
+    ) -> Self {
         Self { token, writing, orders, is_postponed: Cell::new(false) }
     }
 

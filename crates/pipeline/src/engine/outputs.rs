@@ -2,7 +2,7 @@
 
 use super::super::inputs::Inputs;
 use super::super::plan::Plan;
-use super::super::protocol::{ImageReport, Report, Request, Writing};
+use super::super::protocol::{ImageReport, Report, Request, WriteMode};
 use super::super::render::film_state::FilmState;
 use super::super::report::finish::{remove_report, write_report};
 use super::super::sink::Sink;
@@ -59,7 +59,7 @@ impl Engine {
         let written = &mut self.written;
         let is_written = pool.install(|| write_on_request(state, to, written));
         let is_finished = state.is_finished(plan);
-        self.note_written(is_written && is_finished && self.is_own);
+        self.record_own_image_written(is_written && is_finished && self.is_own);
         if is_written {
             self.report_written_image(sink);
         }
@@ -82,7 +82,7 @@ impl Engine {
             findings.conflicts = found;
             return Ok(());
         }
-        if request.write == Writing::Must {
+        if request.write == WriteMode::Must {
             findings.errors.extend(found);
             return Err(Stop::Failed(findings.take_failure()));
         }
@@ -129,7 +129,7 @@ impl Engine {
             return Ok(StageResult::skipped(false, conflict.message.clone()));
         }
         if request.own.is_some() {
-            return self.write_own(sink, token);
+            return self.write_own_image(sink, token);
         }
         let pool = self.thread_pool(plan.threads)?;
         let Some(state) = self.films.current() else { return Err(Stop::work("the film is missing")) };

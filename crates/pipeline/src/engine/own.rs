@@ -12,12 +12,12 @@ use crate::keys;
 use crate::memory::MemoryEstimate;
 use crate::output::part::Dependency;
 use crate::plan::{Plan, plan};
-use crate::protocol::{Failure, OwnImageState, Request, Status, Writing, reasons};
+use crate::protocol::{Failure, OwnImageState, Request, Status, WriteMode, reasons};
 use crate::render::checkpointer::{CheckpointContext, Checkpointer};
 use crate::render::film_state::FilmState;
-use crate::render::share::Share;
+use crate::render::share::Shard;
 use crate::scene::description::CameraChange;
-use crate::scene::fingerprint::{Fingerprint, Key};
+use crate::scene::fingerprint::{FingerprintHasher, Key};
 use crate::settings::{Checkpoints, Overrides, Resume};
 use crate::sink::Sink;
 use crate::stages::parse::Parsed;
@@ -38,7 +38,7 @@ pub(super) struct OwnImage {
     /// Files that affect the image.
     files: Vec<FileRead>,
     /// Share of the image that this process renders. `None` for the whole image.
-    pub(super) share: Option<Share>,
+    pub(super) share: Option<Shard>,
 }
 
 impl OwnImage {
@@ -66,7 +66,7 @@ impl OwnImage {
 
 /// Returns the key of a finished image and its output files.
 fn image_key(film: Key, plan: &Plan) -> Key {
-    let mut key = Fingerprint::new("own image");
+    let mut key = FingerprintHasher::new("own image");
     key.key(&keys::image(film, plan, 0)).u64(plan.bit_depth.into());
     plan.layers.iter().for_each(|layer| {
         key.choice(*layer);
@@ -124,14 +124,14 @@ impl Engine {
 
     /// Records which share of the scene's own image this process renders, if that is the image being
     /// rendered.
-    pub(super) fn share_own(&mut self, request: &Request, ready: &Ready) {
+    pub(super) fn record_own_share(&mut self, request: &Request, ready: &Ready) {
         if let Some(own) = self.own.as_mut().filter(|_| request.own.is_none()) {
             own.share.clone_from(&ready.share);
         }
     }
 
     /// Reports the state of the scene's own image while another one is shown.
-    pub(super) fn say_own(&self, request: &Request, film: Key, sink: &Sink) {
+    pub(super) fn report_own_image(&self, request: &Request, film: Key, sink: &Sink) {
         let Some(own) = self.own.as_ref().filter(|_| request.own.is_some()) else { return };
         sink.own_image(match self.films.get(own.film) {
             _ if self.is_own_written() => OwnImageState::Written,
@@ -146,7 +146,7 @@ impl Engine {
     }
 
     /// Records whether the current plan's output files contain the finished image.
-    pub(super) fn note_written(&mut self, is_written: bool) {
+    pub(super) fn record_own_image_written(&mut self, is_written: bool) {
         let own = self.own.as_ref().filter(|_| is_written && self.is_own);
         self.written.own = own.map(|own| own.image);
     }
@@ -155,7 +155,11 @@ impl Engine {
     ///
     /// # Errors
     /// Returns [`Stop::Cancelled`] if the token is cancelled.
-    pub(super) fn write_own(&mut self, sink: &Sink, token: &CancelToken) -> Result<StageResult<bool>, Stop> {
+    pub(super) fn write_own_image(
+        &mut self,
+        sink: &Sink,
+        token: &CancelToken,
+    ) -> Result<StageResult<bool>, Stop> {
         let only_shown = || Ok(StageResult::skipped(false, reasons::PREVIEW_ONLY));
         if self.is_own_written() {
             return only_shown();
@@ -176,7 +180,7 @@ impl Engine {
             sink,
         };
         let written = &mut self.written;
-        let wrote = pool.install(|| write_if_wanted(Writing::Try, state, to, written, token))?;
+        let wrote = pool.install(|| write_if_wanted(WriteMode::Try, state, to, written, token))?;
         written.own = wrote.value.then_some(own.image);
         Ok(StageResult { value: false, status: Status::Skipped, why: reasons::PREVIEW_ONLY.to_owned() })
     }
@@ -190,7 +194,7 @@ impl Engine {
         interruption: &dyn Fn() -> Interruption,
         work: impl FnOnce(Option<&Checkpointer<'_>>, &Self) -> T,
     ) -> T {
-        let own = self.own.as_ref().filter(|own| film == Some(own.film) && keeps(&own.plan));
+        let own = self.own.as_ref().filter(|own| film == Some(own.film) && uses_checkpoints(&own.plan));
         let Some((own, output)) = own.and_then(|own| Some((own, own.plan.outputs.first()?))) else {
             return work(None, self);
         };
@@ -208,7 +212,7 @@ impl Engine {
     }
 
     /// Saves a checkpoint of the scene's own image if the worker stops while showing another one.
-    pub(crate) fn keep_own(&self, sink: &Sink, interruption: Interruption) {
+    pub(crate) fn save_own_checkpoint(&self, sink: &Sink, interruption: Interruption) {
         let Some(own) = self.own.as_ref().filter(|_| !self.is_own_written()) else { return };
         let Some(state) = self.films.get(own.film).filter(|state| !state.is_kept) else { return };
         self.with_checkpointer(Some(own.film), sink, &|| interruption, |checkpointer, _| {
@@ -222,7 +226,7 @@ impl Engine {
 
 /// Whether a plan's render uses checkpoints. The output must be a regular file, and checkpoints must be
 /// enabled or the render must resume from one.
-fn keeps(plan: &Plan) -> bool {
+fn uses_checkpoints(plan: &Plan) -> bool {
     let is_file =
         plan.outputs.first().is_some_and(|path| path.metadata().map_or(true, |found| found.is_file()));
     let Checkpoints { seconds, resume, .. } = plan.checkpoints;
@@ -253,5 +257,5 @@ pub(super) fn own_image_overrides(request: &Request) -> &Overrides {
 
 /// Whether the scene's own image should be written.
 pub(super) fn should_write_own_image(request: &Request) -> bool {
-    request.own.is_some() || request.write != Writing::No
+    request.own.is_some() || request.write != WriteMode::No
 }

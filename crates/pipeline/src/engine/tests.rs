@@ -4,7 +4,7 @@ use std::fs;
 use std::sync::mpsc;
 
 use super::*;
-use crate::protocol::{PreviewSlot, Writing};
+use crate::protocol::{PreviewSlot, WriteMode};
 use crate::session::NoOrders;
 use crate::tests::{OBJ, SCENE};
 use crate::world::{Geometry, MeshTree};
@@ -47,7 +47,7 @@ impl EngineFixture {
             scene,
             overrides: Default::default(),
             preview: None,
-            write: Writing::No,
+            write: WriteMode::No,
             own: None,
             force: false,
             first: None,

@@ -7,13 +7,13 @@ use super::own::{needed_textures, own_image_plan};
 use super::{Engine, RequestContext};
 use crate::memory::MemoryEstimate;
 use crate::plan::plan;
-use crate::protocol::{Event, LastValidSceneEnd, Request, Status};
+use crate::protocol::{Event, LastValidSceneOutcome, Request, Status};
 use crate::sink::Sink;
 use crate::stages::containers::Containers;
 use crate::stages::meshes::Meshes;
 use crate::stages::parse::Parsed;
 use crate::stages::textures::{NeededTextures, Textures, needed, textures};
-use crate::stages::{Findings, Reading, Stop};
+use crate::stages::{FileReadContext, Findings, Stop};
 use crate::table::StageTable;
 use crate::watch::content::Snapshot;
 use crate::world::{GlassSolids, TextureNeeds};
@@ -44,9 +44,9 @@ impl Engine {
         // The failed request has already reported its errors, so errors from this render are dropped.
         let end = match self.render_last_valid_scene(newest, sink, context) {
             Ok(Some(is_reused)) => {
-                LastValidSceneEnd::Finished { unchanged: is_reused && self.shown_image() == before }
+                LastValidSceneOutcome::Finished { unchanged: is_reused && self.shown_image() == before }
             }
-            Ok(None) | Err(_) => LastValidSceneEnd::Stopped,
+            Ok(None) | Err(_) => LastValidSceneOutcome::Stopped,
         };
         sink.send(Event::LastGoodEnded { generation: newest.generation, end });
     }
@@ -71,7 +71,8 @@ impl Engine {
         let snapshot = Snapshot::of(Arc::clone(&self.contents));
         let containers = Containers::default();
         let token = context.token;
-        let reading = Reading { sink, token, contents: &snapshot, pool: &pool, containers: &containers };
+        let reading =
+            FileReadContext { sink, token, contents: &snapshot, pool: &pool, containers: &containers };
         let lookups = needed_textures(&plan, own.as_ref());
         let good = self.load_missing_textures(good, lookups, &reading)?;
         let (meshes, texture_bytes) = (&good.meshes, good.textures.memory_bytes);
@@ -102,7 +103,7 @@ impl Engine {
         &mut self,
         good: LastValidScene,
         lookups: TextureNeeds,
-        reading: &Reading<'_>,
+        reading: &FileReadContext<'_>,
     ) -> Result<LastValidScene, Stop> {
         let loaded = &good.parsed.loaded;
         let needed = needed(loaded, &good.meshes, lookups, &self.textures);

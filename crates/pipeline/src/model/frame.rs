@@ -3,7 +3,7 @@
 use super::toml::round_significant;
 use crate::math::DVec3;
 use crate::settings::Side;
-use crate::turntable::Turn;
+use crate::turntable::TurntableFrame;
 
 /// Vertical field of view in degrees.
 pub(super) const FOV: f64 = 30.0;
@@ -53,7 +53,7 @@ pub(super) fn frame_model(
     // Move the camera back until every point is inside the frame.
     let half = (greatest - least) * 0.5;
     let mut distance = 0.0_f64;
-    for back in Turn::camera_offsets(turns.min(MAX_MEASURED), back, up) {
+    for back in TurntableFrame::camera_offsets(turns.min(MAX_MEASURED), back, up) {
         let right = up.cross(back).normalize_or(DVec3::X);
         let above = back.cross(right);
         for point in points {

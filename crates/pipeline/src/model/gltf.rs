@@ -6,13 +6,13 @@ use std::path::Path;
 
 use super::frame::{frame_model, round_to_step};
 use super::materials::{MaterialWriter, TextureFile};
-use super::toml::{Toml, format_color, format_list, format_number, format_vector};
+use super::toml::{TomlWriter, format_color, format_list, format_number, format_vector};
 use super::{
     CameraPose, FOV, Lighting, ModelText, ModelView, ROUGH, SIZE, UniqueNames, file_name, render,
     write_camera, write_ground, write_lights,
 };
 use crate::assets::gltf::{
-    Alpha, Container, ImageBytes, ModelCamera, ModelInstance, ModelLight, ModelLightKind, ModelMaterial,
+    Alpha, GltfFile, ImageBytes, ModelCamera, ModelInstance, ModelLight, ModelLightKind, ModelMaterial,
     ModelScene, TexturedValue,
 };
 use crate::assets::{AssetError, Companion};
@@ -69,7 +69,7 @@ pub(super) fn scene_text(
         container: &container,
         path,
         naming,
-        toml: Toml::default(),
+        toml: TomlWriter::default(),
         files: UniqueNames::default(),
         assets: Vec::new(),
         names: HashMap::new(),
@@ -92,10 +92,10 @@ pub(super) fn scene_text(
 }
 
 struct Writer<'a> {
-    container: &'a Container,
+    container: &'a GltfFile,
     path: &'a Path,
     naming: &'a ExportNaming,
-    toml: Toml,
+    toml: TomlWriter,
     /// File names already used in the folder.
     files: UniqueNames,
     assets: Vec<ExportedFile>,
@@ -253,7 +253,7 @@ impl Writer<'_> {
 }
 
 impl super::materials::ExportFiles for Writer<'_> {
-    fn toml(&mut self) -> &mut Toml {
+    fn toml(&mut self) -> &mut TomlWriter {
         &mut self.toml
     }
 

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use super::UniqueNames;
-use super::toml::{Toml, format_color, format_key, format_number, format_pair};
+use super::toml::{TomlWriter, format_color, format_key, format_number, format_pair};
 use crate::assets::gltf::{Alpha, ModelMaterial, ModelScene, TextureRef, TextureWrap, TexturedValue};
 use crate::math::{DVec3, Vec2};
 use crate::scene::toml_string;
@@ -11,7 +11,7 @@ use crate::scene::toml_string;
 /// The scene text and image files, as needed for writing materials.
 pub(super) trait ExportFiles {
     /// The scene text.
-    fn toml(&mut self) -> &mut Toml;
+    fn toml(&mut self) -> &mut TomlWriter;
     /// Name of an image, without an extension.
     fn image_name(&self, image: usize) -> String;
     /// The file that contains an image.

@@ -13,7 +13,7 @@ use std::path::Path;
 
 use self::frame::{CameraPose, FOV, KEY, SKY, ground_reflectance, key_light_direction};
 use self::gltf::{ExportNaming, ExportedFile};
-use self::toml::{Toml, format_exact_vector, format_number, format_vector, round_significant};
+use self::toml::{TomlWriter, format_exact_vector, format_number, format_vector, round_significant};
 use super::settings::{Overrides, Side, UpAxis};
 use super::stages::containers::Containers;
 use crate::assets::gltf::is_gltf;
@@ -21,7 +21,7 @@ use crate::assets::{AssetError, Companion, FileHash};
 use crate::control::CancelToken;
 use crate::math::DVec3;
 use crate::scene::diagnostic::Diagnostic;
-use crate::scene::fingerprint::Fingerprint;
+use crate::scene::fingerprint::FingerprintHasher;
 
 /// View of a model, as requested on the command line.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -64,7 +64,7 @@ impl ModelView {
     }
 
     /// Adds all fields to a fingerprint.
-    pub(crate) fn add_to(self, key: &mut Fingerprint) {
+    pub(crate) fn add_to(self, key: &mut FingerprintHasher) {
         key.flag(self.from.is_some());
         if let Some(from) = self.from {
             key.choice(from);
@@ -171,7 +171,7 @@ impl Lighting {
 }
 
 /// Writes the `[render]` table.
-fn render(toml: &mut Toml, size: Option<[u32; 2]>, light: Lighting) {
+fn render(toml: &mut TomlWriter, size: Option<[u32; 2]>, light: Lighting) {
     toml.table("[render]");
     if let Some([width, height]) = size {
         toml.key("width", width.to_string());
@@ -189,7 +189,7 @@ fn render(toml: &mut Toml, size: Option<[u32; 2]>, light: Lighting) {
 }
 
 /// Writes the `[camera]` table.
-fn write_camera(toml: &mut Toml, eye: &CameraPose, fov: f64) {
+fn write_camera(toml: &mut TomlWriter, eye: &CameraPose, fov: f64) {
     toml.table("[camera]");
     toml.key("position", format_exact_vector(eye.position));
     toml.key("look_at", format_exact_vector(eye.look_at));
@@ -202,7 +202,7 @@ fn write_camera(toml: &mut Toml, eye: &CameraPose, fov: f64) {
 }
 
 /// Writes a sky, plus a key light if the model has no lights.
-fn write_lights(toml: &mut Toml, eye: &CameraPose, light: Lighting) {
+fn write_lights(toml: &mut TomlWriter, eye: &CameraPose, light: Lighting) {
     toml.table("[environment]");
     toml.key("color", format_number(light.sky()));
     if matches!(light, Lighting::Default { .. }) {
@@ -215,7 +215,12 @@ fn write_lights(toml: &mut Toml, eye: &CameraPose, light: Lighting) {
 }
 
 /// Writes a ground plane below the model, unless the camera is below it.
-fn write_ground(toml: &mut Toml, names: &mut UniqueNames, [least, greatest]: [DVec3; 2], eye: &CameraPose) {
+fn write_ground(
+    toml: &mut TomlWriter,
+    names: &mut UniqueNames,
+    [least, greatest]: [DVec3; 2],
+    eye: &CameraPose,
+) {
     let size = (greatest - least).length();
     let height = least.y - size * 1e-4;
     if eye.position.y <= height {

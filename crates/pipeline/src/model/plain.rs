@@ -5,7 +5,7 @@ use std::io::Read;
 use std::path::Path;
 
 use super::frame::frame_model;
-use super::toml::Toml;
+use super::toml::TomlWriter;
 use super::{
     FOV, Lighting, ModelText, ModelView, NARROW, ROUGH, SIZE, UniqueNames, file_name, render, write_camera,
     write_ground, write_lights,
@@ -117,7 +117,7 @@ pub(super) fn scene_text(
         );
         return Err(AssetError::Malformed { path: path.to_owned(), line: None, reason });
     }
-    let (mut toml, mut names) = (Toml::default(), UniqueNames::default());
+    let (mut toml, mut names) = (TomlWriter::default(), UniqueNames::default());
     toml.comment(&format!("{}, as glimt shows it.", file_name(path)));
     let lighting = Lighting::Default { is_polished: loaded.materials.iter().any(is_polished) };
     render(&mut toml, None, lighting);

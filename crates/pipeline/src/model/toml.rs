@@ -5,9 +5,9 @@ use crate::scene::toml_string;
 
 /// TOML text under construction.
 #[derive(Debug, Default)]
-pub(super) struct Toml(String);
+pub(super) struct TomlWriter(String);
 
-impl Toml {
+impl TomlWriter {
     /// Adds a comment, wrapped to several lines if necessary.
     pub(super) fn comment(&mut self, text: &str) {
         const WIDTH: usize = 110;
@@ -145,7 +145,7 @@ mod tests {
 
     #[test]
     fn comments_are_wrapped_and_sanitized() {
-        let mut toml = Toml::default();
+        let mut toml = TomlWriter::default();
         toml.comment(&format!("a\n[camera]\u{7} {}", "word ".repeat(40)));
         let text = toml.finish();
         assert!(

@@ -142,11 +142,11 @@ mod tests {
     use super::*;
     use crate::film::Convergence;
     use crate::plan::plan;
-    use crate::scene::fingerprint::Fingerprint;
+    use crate::scene::fingerprint::FingerprintHasher;
     use crate::tests::loaded_of;
 
     fn key(name: &str) -> Key {
-        Fingerprint::new(name).finish()
+        FingerprintHasher::new(name).finish()
     }
 
     /// Creates a film of 64×32 pixels that has samples.

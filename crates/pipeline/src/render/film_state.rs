@@ -12,8 +12,8 @@ use crate::film::{
 use crate::integrators::RayCounters;
 use crate::output::part::Dependency;
 use crate::plan::Plan;
-use crate::render::noise_goals::Goals;
-use crate::render::share::Share;
+use crate::render::noise_goals::SampleGoals;
+use crate::render::share::Shard;
 use crate::scene::fingerprint::Key;
 use crate::trace::{TileJob, TraceCost};
 
@@ -35,7 +35,7 @@ pub(crate) struct FilmState {
     /// Per-pixel overhead of a job, excluding its samples.
     pixel_share: PixelOverhead,
     /// Maximum number of samples for both halves of each cell.
-    pub(crate) goals: Goals,
+    pub(crate) goals: SampleGoals,
     /// Expected number of samples for halves without a goal.
     expected: ExpectedSamples,
     /// First image at preview size, shown where pixels have no samples.
@@ -49,7 +49,7 @@ pub(crate) struct FilmState {
     /// Total render time of all requests in seconds.
     pub(crate) render_seconds: f64,
     /// Share of the image to render. `None` for the whole image.
-    pub(crate) share: Option<Share>,
+    pub(crate) share: Option<Shard>,
     /// Whether each tile belongs to the share. `None` if all tiles do.
     own: Option<Vec<bool>>,
     /// Work done by the process whose checkpoint this render resumed from.
@@ -83,7 +83,7 @@ impl FilmState {
         plan: &Plan,
         most_bytes: u64,
         convergence: Convergence,
-        share: Option<Share>,
+        share: Option<Shard>,
     ) -> Result<Self, FilmError> {
         let blocks = match (&share, convergence) {
             (Some(share), _) => share.sums(),
@@ -99,7 +99,7 @@ impl FilmState {
         .with_convergence(convergence)
         .with_sum_order(blocks)?;
         let film_cells = film.cell_count();
-        let goals = Goals::none(film_cells);
+        let goals = SampleGoals::none(film_cells);
         let own = share.as_ref().map(|share| share.tiles(film.tile_count()));
         let is_own = |cell: usize| own.as_ref().is_none_or(|own| own[cell / CELLS]);
         let none = |cell| if film.cell_rect(cell).is_some() && is_own(cell) { [0; 2] } else { [u32::MAX; 2] };
@@ -145,8 +145,8 @@ impl FilmState {
     }
 
     /// Returns goals equal to the film's current sample counts.
-    pub(super) fn goals_at_current_samples(&self) -> Goals {
-        Goals { decided: self.done.clone(), ..Goals::none(self.done.len()) }
+    pub(super) fn goals_at_current_samples(&self) -> SampleGoals {
+        SampleGoals { decided: self.done.clone(), ..SampleGoals::none(self.done.len()) }
     }
 
     /// Updates the sample counts from the film.
@@ -383,14 +383,14 @@ mod tests {
     use super::*;
     use crate::film::TileSamples;
     use crate::math::Vec3;
-    use crate::scene::fingerprint::Fingerprint;
+    use crate::scene::fingerprint::FingerprintHasher;
 
     /// Creates a film with two tiles.
     fn state() -> FilmState {
         let film = Film::new(64, 32, None).expect("a film");
         let cells = film.cell_count();
         FilmState {
-            key: Fingerprint::new("test").finish(),
+            key: FingerprintHasher::new("test").finish(),
             number: 0,
             film: Arc::new(film),
             done: vec![[0; 2]; cells],
@@ -398,7 +398,7 @@ mod tests {
             seconds: 0.0,
             costs: vec![CellCost::default(); cells],
             pixel_share: PixelOverhead::default(),
-            goals: Goals::none(cells),
+            goals: SampleGoals::none(cells),
             expected: ExpectedSamples::unknown(cells),
             base: None,
             previewer: None,

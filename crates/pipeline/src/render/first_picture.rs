@@ -13,11 +13,11 @@ use crate::stages::Stop;
 use crate::trace::{TileJob, Tracer};
 
 /// Time budget for the first image while the camera is moving.
-const HASTE: Duration = Duration::from_millis(6);
+const MOVING_TIME_BUDGET: Duration = Duration::from_millis(6);
 
 /// Inputs needed to render first images.
 #[derive(Clone, Copy)]
-pub(crate) struct FirstPictures<'a> {
+pub(crate) struct CoarseImages<'a> {
     pub(crate) tracer: Tracer<'a>,
     pub(crate) plan: &'a Plan,
     /// Whether the camera is being moved.
@@ -26,19 +26,19 @@ pub(crate) struct FirstPictures<'a> {
     pub(crate) rate: &'a Cell<Option<f64>>,
 }
 
-impl<'a> FirstPictures<'a> {
+impl<'a> CoarseImages<'a> {
     /// Returns the sizes of the first images: about the preview's size, preceded by a smaller size if the
     /// camera is being moved. Excludes sizes that take almost as long as a full pass.
     pub(crate) fn sizes(&self, shown: (u32, u32)) -> Vec<(u32, u32)> {
-        let usual = self.usual_size(shown);
+        let usual = self.default_size(shown);
         let rate = self.rate.get().filter(|_| self.is_moved);
-        let hasty = rate.and_then(|rate| quick_size(usual, rate));
+        let hasty = rate.and_then(|rate| size_within_budget(usual, rate));
         hasty.into_iter().chain([usual]).filter(|size| self.is_less_work(*size)).collect()
     }
 
     /// Returns the preview's size, or a size with half as many pixels if the trees do not fit in the CPU
     /// caches, because tracing rays is then slow.
-    fn usual_size(&self, (width, height): (u32, u32)) -> (u32, u32) {
+    fn default_size(&self, (width, height): (u32, u32)) -> (u32, u32) {
         /// Trees with this many triangles take up tens of megabytes.
         const LARGE: u64 = 250_000;
         let side =
@@ -106,12 +106,12 @@ impl<'a> FirstPictures<'a> {
     }
 }
 
-/// Returns the size of an image that takes [`HASTE`] to render at `rate` pixels per second. `None` if the
+/// Returns the size of an image that takes [`MOVING_TIME_BUDGET`] to render at `rate` pixels per second. `None` if the
 /// usual size is about as fast.
-fn quick_size((width, height): (u32, u32), rate: f64) -> Option<(u32, u32)> {
+fn size_within_budget((width, height): (u32, u32), rate: f64) -> Option<(u32, u32)> {
     /// Minimum width in pixels.
     const LEAST: f64 = 16.0;
-    let share = (rate * HASTE.as_secs_f64() / (f64::from(width) * f64::from(height))).sqrt();
+    let share = (rate * MOVING_TIME_BUDGET.as_secs_f64() / (f64::from(width) * f64::from(height))).sqrt();
     let side =
         |length: u32| ((f64::from(length) * share.max(LEAST / f64::from(width))).round() as u32).max(1);
     (share < 0.8).then(|| (side(width).min(width), side(height).min(height)))
@@ -165,11 +165,11 @@ mod tests {
 
     #[test]
     fn hasty_image_fits_its_time_budget() {
-        let pixels_of = |rate: f64| quick_size((120, 80), rate / HASTE.as_secs_f64());
+        let pixels_of = |rate: f64| size_within_budget((120, 80), rate / MOVING_TIME_BUDGET.as_secs_f64());
         assert_eq!(pixels_of(9600.0), None, "the usual size should be fast enough");
         assert_eq!(pixels_of(2400.0), Some((60, 40)));
         assert_eq!(pixels_of(1.0), Some((16, 11)), "the size should not fall below the minimum");
-        assert_eq!(quick_size((10, 5), 0.0), Some((10, 5)));
+        assert_eq!(size_within_budget((10, 5), 0.0), Some((10, 5)));
     }
 
     #[test]

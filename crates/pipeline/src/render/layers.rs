@@ -11,7 +11,7 @@ use crate::integrators::View;
 use crate::keys;
 use crate::math::Vec3;
 use crate::output::LayerImage;
-use crate::scene::fingerprint::Fingerprint;
+use crate::scene::fingerprint::FingerprintHasher;
 use crate::settings::OutputLayer;
 use crate::stages::Stop;
 use crate::stages::photons::PhotonStore;
@@ -115,7 +115,8 @@ fn render_view(
         true => Convergence::Photons,
         false => Convergence::Stratified,
     };
-    let key = keys::render(Fingerprint::new("layer").key(&picture.key).finish(), &plan.settings, plan.crop);
+    let key =
+        keys::render(FingerprintHasher::new("layer").key(&picture.key).finish(), &plan.settings, plan.crop);
     let mut state =
         FilmState::new(key, &plan, rendering.most_film_bytes, convergence, None).map_err(Stop::work)?;
     state.goals = picture.goals_at_current_samples();

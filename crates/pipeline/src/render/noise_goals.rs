@@ -29,7 +29,7 @@ const LEAST_BRIGHTNESS: f64 = 0.01;
 
 /// Maximum number of samples for both halves of each cell.
 #[derive(Debug)]
-pub(crate) struct Goals {
+pub(crate) struct SampleGoals {
     /// Goals of both halves of each cell. [`u32::MAX`] while undecided.
     pub(super) decided: Vec<[u32; 2]>,
     /// Sample count at which each tile was last judged. Tiles are judged only once per sample count.
@@ -38,7 +38,7 @@ pub(crate) struct Goals {
     pub(super) brightness: Option<f64>,
 }
 
-impl Goals {
+impl SampleGoals {
     /// Creates undecided goals for `cells` cells.
     pub(crate) fn none(cells: usize) -> Self {
         Self { decided: vec![[u32::MAX; 2]; cells], judged: vec![0; cells.div_ceil(CELLS)], brightness: None }
@@ -68,7 +68,7 @@ impl Goals {
         done: &[[u32; 2]],
         samples: u32,
         error: f64,
-    ) -> Option<Judgement> {
+    ) -> Option<NoiseMeasurements> {
         let is_time = samples >= LEAST && !self.needs_min_samples(done);
         if is_time && self.brightness.is_none() {
             self.brightness = Prepass::new(film.crop()).film_mean(film);
@@ -82,7 +82,7 @@ impl Goals {
             let judged = self.judged.iter_mut().zip(&noise).filter(|(_, noise)| noise.is_some());
             judged.for_each(|(judged, _)| *judged = samples);
         }
-        Some(Judgement { noise, samples, aim })
+        Some(NoiseMeasurements { noise, samples, aim })
     }
 
     /// Returns the number of tiles whose noise exceeds [`TOO_MUCH`] times the target although they reached
@@ -142,7 +142,7 @@ impl Goals {
 
 /// Noise measurements on which goals are based.
 #[derive(Debug)]
-pub(crate) struct Judgement {
+pub(crate) struct NoiseMeasurements {
     /// Noise of each tile. `None` for tiles that have goals or a different sample count.
     pub(crate) noise: Vec<Option<TileNoise>>,
     /// Sample count of the judged tiles.
@@ -197,7 +197,7 @@ impl NoiseTarget {
         if 1.0 / (part * part) <= libm::exp2(noise.power) {
             return samples_to_reduce_error(1.0, part, noise.samples).min(doubled);
         }
-        let power = noise.power.min(self.convergence.usual_power());
+        let power = noise.power.min(self.convergence.typical_exponent());
         samples_to_reduce_error(power, part, noise.samples).max(doubled.saturating_add(1)).min(MOST)
     }
 
@@ -228,8 +228,8 @@ pub(crate) mod tests {
         film
     }
 
-    fn judged(halves: [(f32, f32); 2], samples: u32, error: f64) -> Goals {
-        let mut goals = Goals::none(1);
+    fn judged(halves: [(f32, f32); 2], samples: u32, error: f64) -> SampleGoals {
+        let mut goals = SampleGoals::none(1);
         goals.decide_goals(&film(halves, samples), &[[samples; 2]], samples, error);
         goals
     }
@@ -286,7 +286,7 @@ pub(crate) mod tests {
                 &TileSamples { pixels: rect.into(), samples: 16, radiance, negative: None },
             );
         }
-        let mut goals = Goals::none(2 * CELLS);
+        let mut goals = SampleGoals::none(2 * CELLS);
         goals.decide_goals(&film, &[[16; 2]; 2 * CELLS], 16, 0.01);
         assert_eq!((goals.of(0, 0), goals.of(CELLS, 0)), (u32::MAX, 16));
     }
@@ -296,7 +296,7 @@ pub(crate) mod tests {
     fn stopped(next: &mut impl FnMut() -> f32, by_own: bool) -> f64 {
         const MOST: u32 = 256;
         let film = Film::new(4, 4, None).expect("a film");
-        let (mut goals, mut done) = (Goals::none(1), [[0; 2]]);
+        let (mut goals, mut done) = (SampleGoals::none(1), [[0; 2]]);
         for target in [16, 32, 64, 128, MOST] {
             for half in 0..2 {
                 let goal = goals.of(0, if by_own { 1 - half } else { half }).min(target);

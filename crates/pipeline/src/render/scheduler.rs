@@ -7,11 +7,11 @@ use std::time::{Duration, Instant};
 
 use super::checkpointer::Checkpointer;
 use super::film_state::{EarlierWork, FilmState};
-use super::first_picture::FirstPictures;
+use super::first_picture::CoarseImages;
 use super::forecast::{Forecast, RenderSnapshot};
 use super::noise_goals::LEAST;
 use super::preview::PreviewTarget;
-use super::share::Share;
+use super::share::Shard;
 use super::time_budget::next_round;
 use crate::film::{PREPASS_SAMPLES, Prepass, Rect, TILE_SIZE, TileSamples};
 use crate::integrators::{PhotonMaps, RayCounters};
@@ -55,7 +55,7 @@ pub(crate) struct RenderStageInputs<'a> {
     /// Pixels per second measured for the most recent first image.
     pub(crate) coarse_rate: &'a Cell<Option<f64>>,
     /// Share of the image to render. `None` for the whole image.
-    pub(crate) share: Option<Share>,
+    pub(crate) share: Option<Shard>,
     /// Checkpointer, if the render uses checkpoints.
     pub(crate) checkpointer: Option<&'a Checkpointer<'a>>,
 }
@@ -381,9 +381,9 @@ impl<'a> Scheduler<'a> {
         sink.progress(self.forecast.progress(&moment));
     }
 
-    fn first_pictures(&self) -> FirstPictures<'a> {
+    fn first_pictures(&self) -> CoarseImages<'a> {
         let RenderStageInputs { tracer, plan, is_moved, coarse_rate: rate, .. } = *self.rendering;
-        FirstPictures { tracer, plan, is_moved, rate }
+        CoarseImages { tracer, plan, is_moved, rate }
     }
 
     /// Traces first images with one sample per pixel, unless they take almost as long as a full pass.

@@ -12,7 +12,7 @@ use crate::math::random::hash;
 
 /// A share of an image.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Share {
+pub(crate) struct Shard {
     /// 1-based index of the share.
     pub(crate) index: u32,
     /// Number of shares.
@@ -25,7 +25,7 @@ pub(crate) struct Share {
     of_tiles: (u32, u32),
 }
 
-impl Share {
+impl Shard {
     /// Creates share `index` of `count` for an image with `samples` samples per pixel. If `has_photons`,
     /// divides the image by photon passes.
     pub(crate) fn new((index, count): (u32, u32), has_photons: bool, samples: u32) -> Self {
@@ -119,7 +119,7 @@ mod tests {
                 for has_photons in [false, true] {
                     let mut seen = HashSet::new();
                     for index in 1..=count {
-                        let share = Share::new((index, count), has_photons, samples);
+                        let share = Shard::new((index, count), has_photons, samples);
                         let own = share.tiles(tiles);
                         for tile in (0..tiles).filter(|tile| own[*tile]) {
                             let mut done = 0;
@@ -142,11 +142,11 @@ mod tests {
 
     #[test]
     fn blocks_of_a_share_are_spread_out() {
-        let share = Share::new((1, 2), true, 4096);
+        let share = Shard::new((1, 2), true, 4096);
         let first = share.blocks().iter().filter(|block| **block < 128).count();
         assert!((44..=84).contains(&first), "{first} of 128 in the first half");
         assert_eq!(share.sums(), SumOrder::SeparateBlocks(128));
-        assert_eq!(Share::new((1, 1), true, 40).sums(), SumOrder::SeparateBlocks(2));
-        assert_eq!(Share::new((1, 1), true, 40).block_count(), 3);
+        assert_eq!(Shard::new((1, 1), true, 40).sums(), SumOrder::SeparateBlocks(2));
+        assert_eq!(Shard::new((1, 1), true, 40).block_count(), 3);
     }
 }

@@ -33,7 +33,8 @@ pub(crate) fn next_round(film: &Film, done: &[[u32; 2]], rays: &[u64], most: u32
     let pixels: f64 = halves.iter().map(|half| half.pixels).sum();
     let mean = halves.iter().map(|half| half.pixels * f64::from(half.samples)).sum::<f64>() / pixels;
     let work: f64 = halves.iter().map(|half| half.work(half.samples)).sum();
-    let mut order: Vec<(f64, &HalfCell)> = halves.iter().map(|half| (half.urgency(mean), half)).collect();
+    let mut order: Vec<(f64, &HalfCell)> =
+        halves.iter().map(|half| (half.error_reduction_per_cost(mean), half)).collect();
     order.sort_by(|(a, _), (b, _)| b.total_cmp(a));
     let (mut goals, mut to_do) = (done.to_vec(), 0.0);
     for (_, half) in order.into_iter().filter(|(_, half)| half.goal > half.samples) {
@@ -68,7 +69,7 @@ impl HalfCell {
     }
 
     /// Returns the decrease in squared error per unit of cost. `mean` is the average number of samples.
-    fn urgency(&self, mean: f64) -> f64 {
+    fn error_reduction_per_cost(&self, mean: f64) -> f64 {
         if f64::from(self.samples) < SHARE * mean {
             return f64::INFINITY;
         }

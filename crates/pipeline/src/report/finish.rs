@@ -7,7 +7,7 @@ use crate::control::CancelToken;
 use crate::film::range_map::RangeMap;
 use crate::inputs::Inputs;
 use crate::integrators::{RayCounters, light_sampling_mode};
-use crate::output::write::{Guard, atomic_guarded};
+use crate::output::write::{WritePolicy, atomic_guarded};
 use crate::output::{OutputError, json};
 use crate::plan::Plan;
 use crate::protocol::StageReport;
@@ -74,7 +74,7 @@ pub(crate) fn write_report(
 pub(crate) fn remove_report(plan: &Plan, inputs: &Inputs, sink: &Sink) -> Result<(), OutputError> {
     let Some(path) = plan.report.as_ref().filter(|path| path.is_file()) else { return Ok(()) };
     let failed = |source| OutputError::File { path: path.clone(), source };
-    let remove = |guard: &Guard<'_>| {
+    let remove = |guard: &WritePolicy<'_>| {
         let real = std::fs::canonicalize(path).map_err(failed)?;
         (guard.may_replace)(&real)?;
         std::fs::remove_file(&real).map_err(failed)

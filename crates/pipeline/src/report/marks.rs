@@ -7,7 +7,7 @@ use crate::protocol::Stage;
 
 /// Keys shared by reports of all versions. No other JSON file is expected to contain all of them.
 #[derive(Deserialize)]
-pub(crate) struct ReportMarks {
+pub(crate) struct ReportSignature {
     #[serde(rename = "glimt")]
     _version: String,
     #[serde(rename = "scene")]
@@ -30,7 +30,7 @@ struct StageMark {
     name: String,
 }
 
-impl ReportMarks {
+impl ReportSignature {
     /// Whether the report contains all render stages.
     pub(crate) fn have_all_stages(&self) -> bool {
         self.stages.iter().map(|stage| stage.name.as_str()).eq(Stage::ALL.map(Stage::name))

@@ -7,11 +7,11 @@ use super::super::cache::{EvictionCandidate, Memo, NamedCache};
 use super::super::keys;
 use super::super::protocol::reasons;
 use super::meshes::Meshes;
-use super::{Reading, StageResult, Stop};
+use super::{FileReadContext, StageResult, Stop};
 use crate::math::DVec3;
 use crate::scene::description::Scene;
-use crate::scene::fingerprint::{Key, Referents};
-use crate::world::{Geometry, MeshTree, light_lifts, with_lifted_lights};
+use crate::scene::fingerprint::{FingerprintContext, Key};
+use crate::world::{Geometry, MeshTree, light_lifts, with_offset_lights};
 
 /// Cache of the accel stage.
 #[derive(Debug, Default)]
@@ -61,10 +61,10 @@ pub(crate) struct AccelResult {
 /// Returns [`Stop::Cancelled`] if the token is cancelled.
 pub(crate) fn accel(
     scene: &Scene,
-    (of, origin): (&Referents<'_>, DVec3),
+    (of, origin): (&FingerprintContext<'_>, DVec3),
     meshes: &Meshes,
     cache: &mut AccelCache,
-    reading: &Reading<'_>,
+    reading: &FileReadContext<'_>,
 ) -> Result<StageResult<AccelResult>, Stop> {
     let (meshes, kept) = trees(scene, meshes, cache, reading)?;
     let lights_key = keys::from(&keys::coplanar(scene, of), origin);
@@ -97,7 +97,7 @@ fn trees(
     scene: &Scene,
     meshes: &Meshes,
     cache: &mut AccelCache,
-    reading: &Reading<'_>,
+    reading: &FileReadContext<'_>,
 ) -> Result<(Vec<Arc<MeshTree>>, usize), Stop> {
     let mut kept = 0;
     let accel = scene.render.accel;
@@ -110,7 +110,7 @@ fn trees(
                 tree
             }
             None => {
-                let loaded = with_lifted_lights(&mesh.mesh).map_or_else(|| mesh.mesh.clone(), Arc::new);
+                let loaded = with_offset_lights(&mesh.mesh).map_or_else(|| mesh.mesh.clone(), Arc::new);
                 let build = || MeshTree::build(loaded, accel, reading.token);
                 let tree = Arc::new(reading.pool.install(build)?);
                 // The tree keeps its mesh alive even if the file is reloaded.

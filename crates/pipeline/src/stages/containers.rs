@@ -5,18 +5,18 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use crate::assets::gltf::{Container, ImageBytes, is_gltf};
+use crate::assets::gltf::{GltfFile, ImageBytes, is_gltf};
 use crate::assets::mesh::load;
 use crate::assets::{AssetError, FileHash, LoadedMesh};
 use crate::control::{CancelToken, Progress, ignore_progress};
 
 /// Slot for a file, filled by its first user.
-type Slot = Arc<Mutex<Option<Arc<Container>>>>;
+type SharedContainer = Arc<Mutex<Option<Arc<GltfFile>>>>;
 
 /// Open glTF files and preloaded meshes.
 #[derive(Debug, Default)]
 pub(crate) struct Containers {
-    gltf: Mutex<HashMap<PathBuf, Slot>>,
+    gltf: Mutex<HashMap<PathBuf, SharedContainer>>,
     /// Meshes loaded before the meshes stage. Each can be taken only once.
     ahead: Mutex<HashMap<PathBuf, LoadedMesh>>,
 }
@@ -25,13 +25,13 @@ impl Containers {
     /// Returns a glTF file, opening it if necessary.
     ///
     /// # Errors
-    /// See [`Container::open`]. The next call tries again.
+    /// See [`GltfFile::open`]. The next call tries again.
     pub(crate) fn open(
         &self,
         path: &Path,
         progress: Progress<'_>,
         token: &CancelToken,
-    ) -> Result<Arc<Container>, AssetError> {
+    ) -> Result<Arc<GltfFile>, AssetError> {
         let slot = {
             let mut files = self.gltf.lock().unwrap_or_else(PoisonError::into_inner);
             Arc::clone(files.entry(path.to_owned()).or_default())
@@ -40,7 +40,7 @@ impl Containers {
         if let Some(container) = &*slot {
             return Ok(Arc::clone(container));
         }
-        let container = Arc::new(Container::open(path, progress, token)?);
+        let container = Arc::new(GltfFile::open(path, progress, token)?);
         *slot = Some(Arc::clone(&container));
         Ok(container)
     }

@@ -6,7 +6,7 @@ use super::Findings;
 use super::meshes::Meshes;
 use crate::assets::LoadedMesh;
 use crate::math::DVec3;
-use crate::scene::Loaded;
+use crate::scene::LoadedScene;
 use crate::scene::description::Object;
 use crate::scene::diagnostic::Severity;
 use crate::scene::fingerprint::Key;
@@ -18,7 +18,7 @@ const MAX_WARNINGS: usize = 10;
 /// Warns about lights that are moved off the plane of another surface. Reuses the previous search result if
 /// shapes and lights are unchanged.
 pub(crate) fn warn_about_coplanar_lights(
-    loaded: &Loaded,
+    loaded: &LoadedScene,
     meshes: &Meshes,
     memo: &mut Memo<Vec<CoplanarLight>>,
     findings: &mut Findings,

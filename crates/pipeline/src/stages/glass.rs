@@ -8,7 +8,7 @@ use super::meshes::Meshes;
 use super::{Findings, Stop};
 use crate::assets::LoadedMesh;
 use crate::control::CancelToken;
-use crate::scene::Loaded;
+use crate::scene::LoadedScene;
 use crate::scene::description::Sheet;
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::fingerprint::Key;
@@ -23,7 +23,7 @@ const LACKS: &str = "glass refracts where a ray enters and leaves it; rays throu
 /// # Errors
 /// Returns [`Stop::Cancelled`] if the token is cancelled.
 pub(crate) fn glass(
-    loaded: &Loaded,
+    loaded: &LoadedScene,
     meshes: &Meshes,
     memo: &mut Memo<Arc<GlassSolids>>,
     findings: &mut Findings,
@@ -60,7 +60,7 @@ const MAX_NAMES: usize = 5;
 
 /// Returns one warning per flaw, located at the first affected object. Ignores glass whose holes are covered
 /// by opaque surfaces.
-fn open_glass_warnings(loaded: &Loaded, open: &[OpenGlass]) -> Vec<Diagnostic> {
+fn open_glass_warnings(loaded: &LoadedScene, open: &[OpenGlass]) -> Vec<Diagnostic> {
     let mut groups: Vec<(GlassFlaw, Vec<&OpenGlass>)> = Vec::new();
     for open in open.iter().filter(|open| !open.is_covered) {
         let Some(flaw) = flaw(loaded, open) else { continue };
@@ -73,7 +73,7 @@ fn open_glass_warnings(loaded: &Loaded, open: &[OpenGlass]) -> Vec<Diagnostic> {
 }
 
 /// Returns the flaw of an object that is not closed.
-fn flaw(loaded: &Loaded, open: &OpenGlass) -> Option<GlassFlaw> {
+fn flaw(loaded: &LoadedScene, open: &OpenGlass) -> Option<GlassFlaw> {
     let shape = &loaded.scene.objects[open.object as usize].shape;
     if shape.mesh().is_some() {
         return Some(if open.disagrees { GlassFlaw::Fronts } else { GlassFlaw::Hole });
@@ -99,7 +99,7 @@ fn flaw(loaded: &Loaded, open: &OpenGlass) -> Option<GlassFlaw> {
 }
 
 /// Returns a single warning about all objects with a flaw. `members` must not be empty.
-fn warning(loaded: &Loaded, flaw: GlassFlaw, members: &[&OpenGlass]) -> Diagnostic {
+fn warning(loaded: &LoadedScene, flaw: GlassFlaw, members: &[&OpenGlass]) -> Diagnostic {
     let first = &loaded.scene.objects[members[0].object as usize];
     let edges: usize = members.iter().map(|open| open.edges).sum();
     let edges = if edges == 1 { "1 edge".to_owned() } else { format!("{edges} edges") };
@@ -137,7 +137,7 @@ fn warning(loaded: &Loaded, flaw: GlassFlaw, members: &[&OpenGlass]) -> Diagnost
 }
 
 /// Lists the first objects by name, or by line if they are unnamed: `"pane", line 12 and 3 more`.
-fn names(loaded: &Loaded, members: &[&OpenGlass]) -> String {
+fn names(loaded: &LoadedScene, members: &[&OpenGlass]) -> String {
     let name = |open: &&OpenGlass| {
         let object = &loaded.scene.objects[open.object as usize];
         let line = || format!("line {}", loaded.line(&object.span));
@@ -154,7 +154,7 @@ fn names(loaded: &Loaded, members: &[&OpenGlass]) -> String {
 }
 
 /// Returns the warning about a closed mesh that encloses no volume.
-fn flat_glass_warning(loaded: &Loaded, object: u32) -> Diagnostic {
+fn flat_glass_warning(loaded: &LoadedScene, object: u32) -> Diagnostic {
     let object = &loaded.scene.objects[object as usize];
     let name = object.name.as_deref().map(|name| format!(" \"{name}\"")).unwrap_or_default();
     let message =
@@ -179,7 +179,7 @@ fn percent(part: f64) -> String {
 mod tests {
     use super::*;
     use crate::math::Vec3;
-    use crate::scene::fingerprint::Fingerprint;
+    use crate::scene::fingerprint::FingerprintHasher;
     use crate::stages::meshes::CachedMesh;
 
     /// Returns the warnings for a scene, substituting `mesh` for its mesh file.
@@ -197,7 +197,7 @@ mod tests {
         let meshes: Meshes = mesh
             .into_iter()
             .map(|mesh| {
-                let key = Fingerprint::new("test").finish();
+                let key = FingerprintHasher::new("test").finish();
                 Arc::new(CachedMesh::new(Arc::new(mesh), key, Vec::new()))
             })
             .collect();

@@ -11,7 +11,7 @@ use crate::control::{CancelToken, Cancelled};
 use crate::lights::infinite::EnvironmentMap;
 use crate::lights::{Lights, SamplingMode};
 use crate::scene::description::{Scene, TextureRole};
-use crate::scene::fingerprint::{Key, Referents};
+use crate::scene::fingerprint::{FingerprintContext, Key};
 use crate::world::{self, Geometry, TextureSource};
 
 /// Cache of the environment map's importance distribution, which does not depend on the map's rotation.
@@ -20,7 +20,7 @@ pub(crate) type SkyMemo = Memo<Option<Arc<EnvironmentMap>>>;
 /// Collects the lights, or reuses them if they are unchanged.
 pub(crate) fn lights(
     scene: &Scene,
-    of: &Referents<'_>,
+    of: &FingerprintContext<'_>,
     geometry: &Geometry,
     textures: &Textures,
     (memo, skies): (&mut Memo<Arc<Lights>>, &mut SkyMemo),

@@ -10,12 +10,12 @@ use super::super::cache::NamedCache;
 use super::super::protocol::reasons;
 use super::super::watch::content::{Content, FileRead};
 use super::containers::canonical;
-use super::{FileCounts, Findings, LoadedAsset, Reading, StageResult, Stop, loading_result};
+use super::{FileCounts, FileReadContext, Findings, LoadedAsset, StageResult, Stop, loading_result};
 use crate::assets::{AssetError, Companion, Dropped, LoadedMesh};
 use crate::control::{CancelToken, Cancelled, Progress};
 use crate::scene::description::{MeshFile, Scene, UvSet};
-use crate::scene::fingerprint::{Fingerprint, Key};
-use crate::scene::{Loaded, MeshBounds};
+use crate::scene::fingerprint::{FingerprintHasher, Key};
+use crate::scene::{LoadedScene, MeshBounds};
 
 /// A mesh file and the other files it references.
 #[derive(Debug)]
@@ -46,10 +46,10 @@ pub(crate) type Meshes = Vec<Arc<CachedMesh>>;
 /// # Errors
 /// The token is cancelled, or there is not enough memory.
 pub(crate) fn meshes(
-    loaded: &Loaded,
+    loaded: &LoadedScene,
     cache: &mut NamedCache<MeshName, CachedMesh>,
     findings: &mut Findings,
-    reading: &Reading<'_>,
+    reading: &FileReadContext<'_>,
 ) -> Result<StageResult<Meshes>, Stop> {
     let files = &loaded.scene.mesh_files;
     if files.is_empty() {
@@ -127,7 +127,7 @@ pub(crate) fn meshes(
 
 /// Warns about objects that need data that their mesh files lack. Skips files that could not be read.
 fn warn_about_missing_parts(
-    loaded: &Loaded,
+    loaded: &LoadedScene,
     files: &[MeshFile],
     meshes: &[Arc<CachedMesh>],
     findings: &mut Findings,
@@ -186,7 +186,7 @@ fn load_one(
     file: &MeshFile,
     content: Content,
     kept: Option<Arc<CachedMesh>>,
-    reading: &Reading<'_>,
+    reading: &FileReadContext<'_>,
     load: impl Fn(&Path, Progress<'_>, &CancelToken) -> Result<LoadedMesh, AssetError>,
 ) -> Result<LoadedAsset<CachedMesh>, Cancelled> {
     let path = &file.value;
@@ -209,10 +209,10 @@ fn load_one(
         Ok(mesh) => {
             let content = reading.contents.decoded(path, mesh.hash);
             files[0].content = content;
-            let read = |companion| reading.contents.of_companion(companion, reading.token);
+            let read = |companion| reading.contents.read_companion(companion, reading.token);
             let companions = mesh.companions.iter().map(read).collect::<Result<Vec<_>, _>>()?;
             files.extend(companions.iter().cloned());
-            let mut key = Fingerprint::new("mesh");
+            let mut key = FingerprintHasher::new("mesh");
             key.key(&file_key(file, content));
             for file in &companions {
                 file.content.add_to(key.path(&file.path));
@@ -225,7 +225,10 @@ fn load_one(
 }
 
 /// Whether a file that was missing when the mesh was loaded now exists and has not been seen by this request.
-fn has_companion_appeared(companions: &[Companion], reading: &Reading<'_>) -> Result<bool, Cancelled> {
+fn has_companion_appeared(
+    companions: &[Companion],
+    reading: &FileReadContext<'_>,
+) -> Result<bool, Cancelled> {
     for companion in companions.iter().filter(|companion| companion.hash.is_none()) {
         let is_new = reading.contents.known(&companion.path).is_none();
         let content = reading.contents.read(&companion.path, reading.token)?;
@@ -237,7 +240,7 @@ fn has_companion_appeared(companions: &[Companion], reading: &Reading<'_>) -> Re
 }
 
 /// Returns the files with their current contents.
-fn companions(files: &[FileRead], reading: &Reading<'_>) -> Result<Vec<FileRead>, Cancelled> {
+fn companions(files: &[FileRead], reading: &FileReadContext<'_>) -> Result<Vec<FileRead>, Cancelled> {
     let now = |file: &FileRead| {
         let content = reading.contents.read(&file.path, reading.token)?;
         Ok(FileRead { path: file.path.clone(), content })
@@ -246,7 +249,7 @@ fn companions(files: &[FileRead], reading: &Reading<'_>) -> Result<Vec<FileRead>
 }
 
 fn file_key(file: &MeshFile, content: Content) -> Key {
-    let mut key = Fingerprint::new("file");
+    let mut key = FingerprintHasher::new("file");
     content.add_to(key.path(&file.value).index(file.part.map_or(0, |part| part as usize + 1)));
     key.finish()
 }
@@ -318,7 +321,7 @@ impl<'a> MeshWarnings<'a> {
 /// Maximum number of warnings about all mesh files.
 const MAX_WARNINGS: usize = 100;
 
-fn add_warnings(loaded: &Loaded, warnings: Vec<(&MeshFile, String)>, findings: &mut Findings) {
+fn add_warnings(loaded: &LoadedScene, warnings: Vec<(&MeshFile, String)>, findings: &mut Findings) {
     let unsaid = warnings.len().saturating_sub(MAX_WARNINGS);
     let last = warnings.last().map(|(file, _)| file.span.clone());
     for (file, message) in warnings.into_iter().take(MAX_WARNINGS) {
@@ -399,7 +402,7 @@ mod tests {
             self.write("scene.toml", &format!("{tables}{camera}"));
             let loaded = crate::scene::load(&self.folder.path().join("scene.toml"), &[]).expect("a scene");
             let token = CancelToken::new();
-            let reading = Reading {
+            let reading = FileReadContext {
                 sink: &self.sink,
                 token: &token,
                 contents,
@@ -505,7 +508,7 @@ mod tests {
         let file = MeshFile { value: path, span: 0..0, part: None };
         let snapshot = fixture.snapshot();
         let token = CancelToken::new();
-        let reading = Reading {
+        let reading = FileReadContext {
             sink: &fixture.sink,
             token: &token,
             contents: &snapshot,
@@ -532,7 +535,7 @@ mod tests {
         let file = MeshFile { value: path, span: 0..0, part: None };
         let snapshot = fixture.snapshot();
         let token = CancelToken::new();
-        let reading = Reading {
+        let reading = FileReadContext {
             sink: &fixture.sink,
             token: &token,
             contents: &snapshot,

@@ -26,7 +26,7 @@ use super::sink::Sink;
 use super::watch::content::{Contents, FileRead, Snapshot};
 use crate::assets::AssetError;
 use crate::control::{CancelToken, Cancelled};
-use crate::scene::Loaded;
+use crate::scene::LoadedScene;
 use crate::scene::diagnostic::{Diagnostic, Severity};
 
 /// Reasons why a request ended early.
@@ -79,7 +79,7 @@ impl<T> StageResult<T> {
 }
 
 /// Inputs shared by the stages that read files.
-pub(super) struct Reading<'a> {
+pub(super) struct FileReadContext<'a> {
     pub(super) sink: &'a Sink,
     pub(super) token: &'a CancelToken,
     pub(super) contents: &'a Snapshot,
@@ -156,16 +156,22 @@ impl Findings {
     }
 
     /// Adds an error about an asset, located where the scene references it.
-    pub(super) fn add_asset_error(&mut self, loaded: &Loaded, span: Range<usize>, error: &AssetError) {
+    pub(super) fn add_asset_error(&mut self, loaded: &LoadedScene, span: Range<usize>, error: &AssetError) {
         self.errors.push(diagnostic_at_span(loaded, span, Severity::Error, error.to_string()));
     }
 
     /// Adds an error about a mismatch between the scene and its assets.
-    pub(super) fn add_error(&mut self, loaded: &Loaded, span: Range<usize>, message: String, help: &str) {
+    pub(super) fn add_error(
+        &mut self,
+        loaded: &LoadedScene,
+        span: Range<usize>,
+        message: String,
+        help: &str,
+    ) {
         self.errors.push(loaded.diagnostic_at(span, Severity::Error, message, Some(help.to_owned())));
     }
 
-    pub(super) fn add_warning(&mut self, loaded: &Loaded, span: Range<usize>, message: String) {
+    pub(super) fn add_warning(&mut self, loaded: &LoadedScene, span: Range<usize>, message: String) {
         self.warnings.push(diagnostic_at_span(loaded, span, Severity::Warning, message));
     }
 
@@ -179,7 +185,7 @@ impl Findings {
 
 /// Creates a diagnostic without help at a span of the scene file.
 fn diagnostic_at_span(
-    loaded: &Loaded,
+    loaded: &LoadedScene,
     span: Range<usize>,
     severity: Severity,
     message: String,

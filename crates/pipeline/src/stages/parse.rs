@@ -15,18 +15,18 @@ use crate::assets::mesh::load as load_mesh;
 use crate::assets::orbiter::load as load_orbiter;
 use crate::assets::{AssetError, OrbiterCamera};
 use crate::control::{CancelToken, Cancelled, ignore_progress};
-use crate::output::held::{self, Held};
+use crate::output::held::{self, BackupRecovery};
 use crate::scene;
 use crate::scene::description::Camera;
 use crate::scene::diagnostic::{Diagnostic, Severity};
-use crate::scene::fingerprint::{Fingerprint, Key};
+use crate::scene::fingerprint::{FingerprintHasher, Key};
 use crate::scene::is_model;
 use crate::scene::sanitize::visible;
 
 /// A valid scene and the files it references.
 #[derive(Debug)]
 pub(crate) struct Parsed {
-    pub(crate) loaded: Arc<scene::Loaded>,
+    pub(crate) loaded: Arc<scene::LoadedScene>,
     pub(crate) orbiter: Option<OrbiterCamera>,
     /// Files that the scene references without the overrides, and files that these files reference.
     pub(crate) named: Vec<PathBuf>,
@@ -54,7 +54,7 @@ fn model_scene(
     (contents, containers): (&Snapshot, &Containers),
     findings: &mut Findings,
     token: &CancelToken,
-) -> Result<(scene::Loaded, ModelText), Stop> {
+) -> Result<(scene::LoadedScene, ModelText), Stop> {
     let made = model::scene_text(path, show, containers, token).map_err(|error| match error {
         AssetError::Cancelled(_) => Stop::Cancelled,
         AssetError::OutOfMemory { .. } => Stop::work(error),
@@ -99,7 +99,7 @@ pub(crate) fn parse(
     token: &CancelToken,
 ) -> Result<StageResult<Arc<Parsed>>, Stop> {
     let SceneSource { path, show, .. } = origin;
-    if let Held::Differs(held) = held::recover(path) {
+    if let BackupRecovery::Differs(held) = held::recover_backup(path) {
         let help =
             Some("compare both files, save the one you need as the scene, and remove the other".to_owned());
         findings.warnings.push(Diagnostic {
@@ -155,7 +155,7 @@ pub(crate) fn parse(
 }
 
 /// A scene, the content of its file, the other files it depends on, and the approximations made.
-type ReadScene = (Arc<scene::Loaded>, Content, Vec<FileRead>, Vec<Diagnostic>);
+type ReadScene = (Arc<scene::LoadedScene>, Content, Vec<FileRead>, Vec<Diagnostic>);
 
 fn read_scene(
     origin: SceneSource<'_>,
@@ -173,7 +173,7 @@ fn read_scene(
     }
     let (loaded, made) = model_scene(origin, (contents, containers), findings, token)?;
     let content = contents.decoded(path, made.hash);
-    let companions = made.companions.iter().map(|companion| contents.of_companion(companion, token));
+    let companions = made.companions.iter().map(|companion| contents.read_companion(companion, token));
     let companions = companions.collect::<Result<_, Cancelled>>()?;
     let notes = made.notes.into_iter().map(|note| file_diagnostic(path, Severity::Warning, note)).collect();
     Ok((Arc::new(loaded), content, companions, notes))
@@ -181,7 +181,7 @@ fn read_scene(
 
 /// Returns the key of a scene, given the content of its file.
 fn scene_key(SceneSource { path, sets, show }: SceneSource<'_>, content: Content, is_model: bool) -> Key {
-    let mut key = Fingerprint::new("parse");
+    let mut key = FingerprintHasher::new("parse");
     content.add_to(key.path(path));
     sets.iter().for_each(|set| {
         key.text(set);
@@ -213,7 +213,7 @@ fn with_new_name_hint(
 
 /// Returns the files that the scene references without the overrides. Includes files referenced by meshes
 /// that have not been read.
-fn referenced_files(loaded: &scene::Loaded) -> Vec<PathBuf> {
+fn referenced_files(loaded: &scene::LoadedScene) -> Vec<PathBuf> {
     let is_read = |path: &&PathBuf| loaded.scene.mesh_files.iter().any(|file| file.value == **path);
     let textures: BTreeSet<_> = loaded.scene.textures.iter().map(|texture| &texture.file.value).collect();
     let named = loaded.named.iter().filter(|path| !is_read(path));
@@ -249,7 +249,7 @@ type Orbiter = (Option<OrbiterCamera>, Option<Content>);
 
 /// Reads the camera's orbiter file, if any. Adds errors to the findings.
 fn orbiter(
-    loaded: &scene::Loaded,
+    loaded: &scene::LoadedScene,
     known: Option<&Parsed>,
     contents: &Snapshot,
     findings: &mut Findings,

@@ -13,7 +13,7 @@ use super::super::protocol::reasons;
 use super::super::watch::content::{Content, FileRead};
 use super::containers::{ImageInput, canonical};
 use super::meshes::Meshes;
-use super::{FileCounts, Findings, Reading, StageResult, Stop, loading_result};
+use super::{FileCounts, FileReadContext, Findings, StageResult, Stop, loading_result};
 use crate::assets::AssetError;
 use crate::assets::image::{
     ColorCurve, EmbeddedImage, ImageEncoding, ImageLimits, LoadedImage, coverage, load_embedded, load_hashed,
@@ -25,8 +25,8 @@ use crate::materials::texels::{TexelData, Texels};
 use crate::math::Vec3;
 use crate::scene::description::{Channel, Encoding, PixelValue, Scene, TextureRole};
 use crate::scene::diagnostic::Severity;
-use crate::scene::fingerprint::{Fingerprint, Key};
-use crate::scene::{Loaded, is_model};
+use crate::scene::fingerprint::{FingerprintHasher, Key};
+use crate::scene::{LoadedScene, is_model};
 use crate::world::{
     CutoffBits, Image, Images, NeededTexture, TextureNeeds, TextureSource, environment_source,
     textures_needed,
@@ -119,7 +119,7 @@ pub(crate) struct NeededTextures {
 /// Returns the textures that visible materials need for this view. If all of the scene's textures are cached,
 /// returns all of them, so that the lights and trees that depend on them can be reused.
 pub(crate) fn needed(
-    loaded: &Loaded,
+    loaded: &LoadedScene,
     meshes: &Meshes,
     lookups: TextureNeeds,
     cache: &TextureCache,
@@ -156,11 +156,11 @@ struct CachedTexture {
 /// # Errors
 /// The token is cancelled, or there is not enough memory.
 pub(crate) fn textures(
-    loaded: &Loaded,
+    loaded: &LoadedScene,
     needed: &NeededTextures,
     cache: &mut TextureCache,
     findings: &mut Findings,
-    reading: &Reading<'_>,
+    reading: &FileReadContext<'_>,
 ) -> Result<StageResult<Textures>, Stop> {
     let mut textures = Textures::default();
     let NeededTextures { textures: needed, left_out, are_required } = needed;
@@ -253,7 +253,7 @@ pub(crate) fn textures(
 /// preserved, except that emission is dropped. Materials from mesh files provide their own values for use
 /// without a texture.
 fn substitute_texture(
-    loaded: &Loaded,
+    loaded: &LoadedScene,
     one: &NeededTexture,
     error: &AssetError,
     images: &mut Images,
@@ -298,7 +298,7 @@ fn substitute_texture(
 
 /// Warns about pixels that are negative, not finite or too large.
 fn warn_about_unusable_pixels(
-    loaded: &Loaded,
+    loaded: &LoadedScene,
     image: &TextureRequest<'_>,
     texels: &Texels,
     findings: &mut Findings,
@@ -317,7 +317,7 @@ fn warn_about_unusable_pixels(
 /// Warns about a gray normal map, which probably contains heights. A gray normal map from a mesh file has no
 /// effect.
 fn warn_about_gray_normal_map(
-    loaded: &Loaded,
+    loaded: &LoadedScene,
     image: &TextureRequest<'_>,
     texels: &Texels,
     findings: &mut Findings,
@@ -336,7 +336,7 @@ fn warn_about_gray_normal_map(
 
 /// Warns about an image used with `channel = "a"` whose alpha is 1 everywhere.
 fn warn_about_opaque_alpha(
-    loaded: &Loaded,
+    loaded: &LoadedScene,
     image: &TextureRequest<'_>,
     texels: &Texels,
     findings: &mut Findings,
@@ -368,7 +368,7 @@ impl TextureRequest<'_> {
 
     fn key(&self) -> Key {
         let (path, image, encoding, coverage) = &self.name;
-        let mut key = Fingerprint::new("texture");
+        let mut key = FingerprintHasher::new("texture");
         key.path(path).index(encoding.index()).index(image.map_or(0, |image| image as usize + 1));
         if let Some(cutoff) = coverage {
             key.f32(cutoff.value());
@@ -385,7 +385,7 @@ impl TextureRequest<'_> {
 fn images<'a>(
     needed: &'a [NeededTexture],
     cache: &mut TextureCache,
-    reading: &Reading<'_>,
+    reading: &FileReadContext<'_>,
 ) -> Result<Vec<TextureRequest<'a>>, Cancelled> {
     let mut images: Vec<TextureRequest<'a>> = Vec::new();
     let mut known = HashMap::new();
@@ -418,7 +418,7 @@ fn images<'a>(
 fn load_all(
     images: &[TextureRequest<'_>],
     most_bytes: u64,
-    reading: &Reading<'_>,
+    reading: &FileReadContext<'_>,
 ) -> Vec<(TextureContents, Result<LoadedTexture, AssetError>)> {
     let size = |image: &TextureRequest<'_>| {
         let (width, height, bytes) = match image.kept.texels.as_deref() {
@@ -432,7 +432,7 @@ fn load_all(
         bytes + if image.has_mipmaps() { Mipmaps::memory_bytes_of(width, height, is_weighted) } else { 0 }
     };
     let sizes: Vec<u64> = reading.pool.install(|| images.par_iter().map(size).collect());
-    let over = over_budget(&sizes, most_bytes);
+    let over = memory_limit_errors(&sizes, most_bytes);
     let load = |(image, over): (&TextureRequest<'_>, Option<String>)| {
         let mut contents = (image.content, image.linked.clone());
         let result = match over {
@@ -445,7 +445,7 @@ fn load_all(
 }
 
 /// Returns an error message for each image that exceeds the total limit.
-fn over_budget(sizes: &[u64], most_bytes: u64) -> Vec<Option<String>> {
+fn memory_limit_errors(sizes: &[u64], most_bytes: u64) -> Vec<Option<String>> {
     let mib = |bytes: u64| bytes.div_ceil(1 << 20);
     let mut before = 0;
     let check = |&size: &u64| {
@@ -474,7 +474,7 @@ type LoadedTexture = (Arc<DecodedTexture>, Option<Arc<Mipmaps>>, bool);
 fn load_one(
     image: &TextureRequest<'_>,
     contents: &mut TextureContents,
-    reading: &Reading<'_>,
+    reading: &FileReadContext<'_>,
 ) -> Result<LoadedTexture, AssetError> {
     let mut was_kept = true;
     let decoded = match &image.kept.texels {
@@ -503,7 +503,7 @@ fn load_one(
 fn decode(
     image: &TextureRequest<'_>,
     contents: &mut TextureContents,
-    reading: &Reading<'_>,
+    reading: &FileReadContext<'_>,
 ) -> Result<LoadedImage, AssetError> {
     let (one, limits) = (image.asked_by[0], ImageLimits::default());
     let (encoding, token) = (one.source.encoding, reading.token);
@@ -539,7 +539,7 @@ fn decode(
 }
 
 /// Returns where an image's bytes are stored.
-fn input(source: &TextureSource, reading: &Reading<'_>) -> Result<ImageInput, AssetError> {
+fn input(source: &TextureSource, reading: &FileReadContext<'_>) -> Result<ImageInput, AssetError> {
     match source.image {
         None => Ok(ImageInput::File(source.path.clone())),
         Some(image) => reading.containers.image((&source.path, image), reading.token).map(|(input, _)| input),
@@ -547,7 +547,7 @@ fn input(source: &TextureSource, reading: &Reading<'_>) -> Result<ImageInput, As
 }
 
 /// Returns the width, height and memory size of an image.
-fn size_of(source: &TextureSource, reading: &Reading<'_>) -> Result<(u32, u32, u64), AssetError> {
+fn size_of(source: &TextureSource, reading: &FileReadContext<'_>) -> Result<(u32, u32, u64), AssetError> {
     let (limits, encoding) = (ImageLimits::default(), source.encoding);
     match input(source, reading)? {
         ImageInput::File(path) => size(&path, encoding, limits, reading.token),
@@ -558,7 +558,7 @@ fn size_of(source: &TextureSource, reading: &Reading<'_>) -> Result<(u32, u32, u
 }
 
 /// Adds textures that only `check` loads: unused textures from the scene file, and a black environment map.
-pub(crate) fn add_declared(loaded: &Loaded, wanted: &mut Vec<NeededTexture>) {
+pub(crate) fn add_declared(loaded: &LoadedScene, wanted: &mut Vec<NeededTexture>) {
     let name = |path: &Path, image: Option<u32>| (path.to_owned(), image);
     let mut known: HashSet<_> = wanted.iter().map(|one| name(&one.source.path, one.source.image)).collect();
     for (index, texture) in loaded.scene.textures.iter().enumerate() {
@@ -590,7 +590,7 @@ pub(crate) fn add_declared(loaded: &Loaded, wanted: &mut Vec<NeededTexture>) {
 }
 
 /// Returns the span that references a texture: its own table, or the mesh whose materials use it.
-fn reference_span(loaded: &Loaded, one: &NeededTexture) -> Range<usize> {
+fn reference_span(loaded: &LoadedScene, one: &NeededTexture) -> Range<usize> {
     let scene = &loaded.scene;
     let declared = one.declared.map(|index| scene.textures[index].file.span.clone());
     let mesh = || one.mesh_file.map(|index| scene.mesh_files[index].span.clone());
@@ -608,7 +608,7 @@ mod tests {
 
     #[test]
     fn memory_limit_applies_to_all_images_together() {
-        let over = over_budget(&[600, 400, 0, 25, 1], 1001);
+        let over = memory_limit_errors(&[600, 400, 0, 25, 1], 1001);
         assert_eq!(over.iter().map(Option::is_some).collect::<Vec<_>>(), [false, false, false, true, false]);
         // Three run-length encoded images whose headers specify 15999 × 15999 pixels (732.3 MiB each) but
         // which contain few pixels.

@@ -7,12 +7,12 @@ use serde_json::Value;
 
 use super::super::inputs::Inputs;
 use super::super::plan::Plan;
-use super::super::protocol::{Writing, reasons};
+use super::super::protocol::{WriteMode, reasons};
 use super::super::render::checkpointer::create_header;
 use super::super::render::film_state::FilmState;
 use super::super::sink::Sink;
 use super::super::targets::{OutputTarget, conflicts, write_guarded};
-use super::super::turntable::Turn;
+use super::super::turntable::TurntableFrame;
 use super::super::watch::content::{Content, Contents};
 use super::{StageResult, Stop};
 use crate::choice::Choice;
@@ -21,10 +21,10 @@ use crate::film::tone::develop;
 use crate::film::{Picture, RadianceImage, Rect, SampleStats};
 use crate::integrators::{AovSource, LightAov};
 use crate::output::part::{self, Head, PartKind};
-use crate::output::write::{Durability, FolderSweep, Guard};
+use crate::output::write::{Durability, SweptFolders, WritePolicy};
 use crate::output::{self, BitDepth, DevelopSettings, Format, LayerImage, OutputError, scene_path};
 use crate::output::{AnimationFormat, animation};
-use crate::scene::fingerprint::{Fingerprint, Key};
+use crate::scene::fingerprint::{FingerprintHasher, Key};
 
 /// Metadata key for the scene file.
 const SCENE: &str = "glimt:scene";
@@ -38,7 +38,7 @@ pub(crate) struct WrittenImages {
     pub(crate) own: Option<Key>,
     /// Folders from which this write or turntable has already removed the temporary files of killed
     /// processes.
-    sweep: FolderSweep,
+    sweep: SweptFolders,
 }
 
 impl WrittenImages {
@@ -85,14 +85,17 @@ pub(crate) struct Destination<'a> {
 /// Checks all output files before starting to render.
 ///
 /// # Errors
-/// With [`Writing::Must`], returns an error for the first file that cannot be written. Otherwise, reports
+/// With [`WriteMode::Must`], returns an error for the first file that cannot be written. Otherwise, reports
 /// failures as events.
-pub(crate) fn check_targets(writing: Writing, plan: &Plan, sink: &Sink) -> Result<(), Stop> {
+pub(crate) fn check_targets(writing: WriteMode, plan: &Plan, sink: &Sink) -> Result<(), Stop> {
     match writing {
-        Writing::No => Ok(()),
-        Writing::Must => find_targets(plan, output::check_target, output::check_path).map_err(Stop::work),
-        Writing::Try => {
-            if let Err(error) = find_targets(plan, output::inspect_target, output::inspect_path) {
+        WriteMode::No => Ok(()),
+        WriteMode::Must => {
+            check_each_target(plan, output::check_target, output::check_path).map_err(Stop::work)
+        }
+        WriteMode::Try => {
+            if let Err(error) = check_each_target(plan, output::check_target_read_only, output::inspect_path)
+            {
                 sink.write_failed(None, error.to_string());
             }
             Ok(())
@@ -100,7 +103,7 @@ pub(crate) fn check_targets(writing: Writing, plan: &Plan, sink: &Sink) -> Resul
     }
 }
 
-fn find_targets(
+fn check_each_target(
     plan: &Plan,
     target: impl Fn(&Path) -> Result<Format, OutputError>,
     place: impl Fn(&Path) -> Result<(), OutputError>,
@@ -126,17 +129,17 @@ fn find_targets(
 /// Runs the last stage of a request. Returns whether the image is on disk.
 ///
 /// # Errors
-/// With [`Writing::Must`], returns an error if the image could not be written.
+/// With [`WriteMode::Must`], returns an error if the image could not be written.
 pub(crate) fn write_if_wanted(
-    writing: Writing,
+    writing: WriteMode,
     state: &FilmState,
     to: Destination<'_>,
     written: &mut WrittenImages,
     token: &CancelToken,
 ) -> Result<StageResult<bool>, Stop> {
     match writing {
-        Writing::No => Ok(StageResult::skipped(false, reasons::PREVIEW_ONLY)),
-        Writing::Try | Writing::Must => write(state, to, written, token, writing == Writing::Must),
+        WriteMode::No => Ok(StageResult::skipped(false, reasons::PREVIEW_ONLY)),
+        WriteMode::Try | WriteMode::Must => write(state, to, written, token, writing == WriteMode::Must),
     }
 }
 
@@ -154,7 +157,7 @@ fn write(
 ) -> Result<StageResult<bool>, Stop> {
     let Destination { plan, contents, is_own, sink, .. } = to;
     if plan.turn.is_none_or(|turn| turn.number == 0) {
-        written.sweep = FolderSweep::default();
+        written.sweep = SweptFolders::default();
     }
     let mut radiance: Option<RadianceImage> = None;
     let (mut count, mut errors) = (0, Vec::new());
@@ -243,7 +246,7 @@ pub(crate) struct TurntableFrames(Vec<(Picture, SampleStats)>);
 pub(crate) fn write_animation(
     state: &FilmState,
     to: Destination<'_>,
-    (turn, frames): (Turn, &mut TurntableFrames),
+    (turn, frames): (TurntableFrame, &mut TurntableFrames),
     token: &CancelToken,
 ) -> Result<StageResult<bool>, Stop> {
     let Destination { plan, inputs, sink, .. } = to;
@@ -265,7 +268,7 @@ pub(crate) fn write_animation(
         let write = || {
             let metadata = develop_settings_for(plan, path).metadata_with_samples(samples);
             let bytes = animation::encode(&frames, &metadata, format, token)?;
-            let write = |guard: &Guard<'_>| output::write::atomic_guarded(path, &bytes, guard, token);
+            let write = |guard: &WritePolicy<'_>| output::write::atomic_guarded(path, &bytes, guard, token);
             write_guarded(plan, inputs, (OutputTarget::for_image(plan, path), None), sink, write)?;
             Ok(bytes.len() as u64)
         };
@@ -282,7 +285,7 @@ fn write_one(
     image: &RadianceImage,
     state: &FilmState,
     Destination { plan, layers, inputs, sink, .. }: Destination<'_>,
-    (path, sweep): (&Path, &FolderSweep),
+    (path, sweep): (&Path, &SweptFolders),
     token: &CancelToken,
 ) -> Result<u64, OutputError> {
     let mut finish = develop_settings_for(plan, path);
@@ -302,13 +305,13 @@ fn write_one(
 fn write_part(
     state: &FilmState,
     Destination { plan, inputs, sink, .. }: Destination<'_>,
-    (path, sweep): (&Path, &FolderSweep),
+    (path, sweep): (&Path, &SweptFolders),
     token: &CancelToken,
 ) -> Result<u64, OutputError> {
     let identity = state.identity.clone().unwrap_or_default();
     let scene = scene_path::relative(&plan.path, path);
     let head = Head { scene, ..create_header(PartKind::Part, state, identity, &develop_settings(plan)) };
-    let save = |guard: &Guard<'_>| {
+    let save = |guard: &WritePolicy<'_>| {
         part::save(path, &head, &state.film, &Value::Null, guard, (token, Durability::Power)).map(drop)
     };
     write_guarded(plan, inputs, (OutputTarget::for_image(plan, path), Some(sweep)), sink, save)?;
@@ -369,7 +372,7 @@ fn metadata(plan: &Plan) -> Vec<(String, String)> {
         let names: Vec<_> = plan.layers.iter().map(|layer| layer.name()).collect();
         add("layers", names.join(","));
     }
-    if let Some(Turn { number, of }) = plan.turn {
+    if let Some(TurntableFrame { number, of }) = plan.turn {
         let which = if plan.moving.is_empty() { format!("{} of {of}", number + 1) } else { of.to_string() };
         add("turntable", which);
     }
@@ -378,7 +381,7 @@ fn metadata(plan: &Plan) -> Vec<(String, String)> {
 
 fn image_file_key(state: &FilmState, plan: &Plan, path: &Path) -> Key {
     let SampleStats { min, mean, max } = state.film.samples();
-    let mut key = Fingerprint::new("write");
+    let mut key = FingerprintHasher::new("write");
     key.key(&state.key).u64(min.into()).f64(mean).u64(max.into());
     key.choice(plan.settings.view).f32(plan.tone.exposure_stops).index(plan.tone.curve as usize);
     key.index(plan.tone.transfer as usize).u64(plan.bit_depth.into());

@@ -33,13 +33,13 @@ fn moving_camera_reuses_trees_lights_and_photons() {
     bench.done();
     let own = bench.picture();
     bench.overrides.camera = moved();
-    bench.writing = Writing::No;
+    bench.writing = WriteMode::No;
     let (report, _) = bench.done();
     assert_statuses(&report, "rrrrrrds");
     assert_eq!(report.counters.photons_emitted, 0);
     assert_eq!(bench.picture(), own, "the image should not be written");
     bench.overrides.camera = CameraChange::default();
-    bench.writing = Writing::Must;
+    bench.writing = WriteMode::Must;
     assert_statuses(&bench.done().0, "rrrrrrrr");
 }
 

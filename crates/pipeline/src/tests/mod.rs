@@ -18,9 +18,9 @@ use std::time::Duration;
 use crate::engine::EngineConfig;
 use crate::protocol::{
     Command, Event, Failure, ImagePosition, LatestPreview, PreviewSize, Report, Request, Section, Stage,
-    Status, Writing, reasons,
+    Status, WriteMode, reasons,
 };
-use crate::scene::Loaded;
+use crate::scene::LoadedScene;
 use crate::scene::description::Viewpoint;
 use crate::scene::diagnostic::Diagnostic;
 use crate::settings::Overrides;
@@ -28,7 +28,7 @@ use crate::trace::Kernel;
 use crate::worker::{Handle, start_with};
 
 /// Loads a scene from text, with a default camera.
-pub(crate) fn loaded_of(text: &str) -> Loaded {
+pub(crate) fn loaded_of(text: &str) -> LoadedScene {
     let place = "position = [0, 1, 4]\nlook_at = [0, 1, 0]\n";
     let text = if text.contains("[camera]\n") {
         text.replace("[camera]\n", &format!("[camera]\n{place}"))
@@ -86,7 +86,7 @@ pub(crate) struct Bench {
     pub(super) preview: Option<PreviewSize>,
     pub(super) force: bool,
     pub(super) first: Option<Section>,
-    pub(super) writing: Writing,
+    pub(super) writing: WriteMode,
     /// The scene's camera, as last reported by the worker.
     pub(super) own: Cell<Option<Viewpoint>>,
 }
@@ -114,7 +114,7 @@ impl Bench {
             preview: None,
             force: false,
             first: None,
-            writing: Writing::Must,
+            writing: WriteMode::Must,
             own: Cell::new(None),
         };
         bench.write("scene.toml", scene);

@@ -10,7 +10,7 @@ use crate::engine::EngineConfig;
 use crate::film::{Pixels, Rect, TileSamples};
 use crate::integrators::{PhotonMaps, RayCounters, RenderSettings};
 use crate::messages::{INCOMPLETE_IMAGE, NEWEST_IMAGE_NOT_WRITTEN};
-use crate::protocol::LastValidSceneEnd;
+use crate::protocol::LastValidSceneOutcome;
 use crate::scene::description::{Integrator, Shadows};
 use crate::settings::View;
 use crate::world::World;
@@ -144,7 +144,7 @@ pub(super) fn slow(
 }
 
 /// Waits until the render of the last valid scene ends, for a request whose own scene is invalid.
-fn last_good_end(bench: &Bench, of: u64) -> LastValidSceneEnd {
+fn last_good_end(bench: &Bench, of: u64) -> LastValidSceneOutcome {
     loop {
         match bench.next() {
             Event::LastGoodEnded { generation, end } if generation == of => return end,
@@ -157,16 +157,16 @@ fn last_good_end(bench: &Bench, of: u64) -> LastValidSceneEnd {
 #[test]
 fn nothing_is_rendered_without_a_valid_scene() {
     let mut bench = Bench::new(&SCENE.replace("width = 40", "width = = 40"));
-    bench.writing = Writing::Try;
+    bench.writing = WriteMode::Try;
     assert!(matches!(bench.failed(), Failure::Scene(_)));
-    assert_eq!(last_good_end(&bench, 1), LastValidSceneEnd::Stopped);
+    assert_eq!(last_good_end(&bench, 1), LastValidSceneOutcome::Stopped);
 }
 
 #[test]
 fn broken_scene_file_does_not_stop_a_render() {
     let mut bench = Bench::with(&SCENE.replace("samples = 4", "samples = 10000"), slow);
     (bench.writing, bench.preview) =
-        (Writing::Try, Some(PreviewSize { width: 12, height: 12, around: None }));
+        (WriteMode::Try, Some(PreviewSize { width: 12, height: 12, around: None }));
     let first = bench.send();
     while !matches!(bench.next(), Event::Progress { progress, .. } if progress.samples > 0) {}
     bench.edit("width = 40", "width = = 40");
@@ -187,7 +187,7 @@ fn broken_scene_file_does_not_stop_a_render() {
         }
     }
     assert!(is_seen && samples_on_disk(&bench).starts_with("10000"), "{}", samples_on_disk(&bench));
-    let finished = |unchanged| LastValidSceneEnd::Finished { unchanged };
+    let finished = |unchanged| LastValidSceneOutcome::Finished { unchanged };
     assert_eq!(last_good_end(&bench, broken), finished(false));
     // After a second typo, the image is still finished.
     bench.edit("width = = 40", "width = = = 40");
@@ -227,7 +227,7 @@ fn last_valid_scene_applies_new_overrides() {
     for (fault, fix) in faults {
         for change in changes {
             let mut bench = Bench::new(SCENE);
-            bench.writing = Writing::Try;
+            bench.writing = WriteMode::Try;
             bench.preview = Some(PreviewSize { width: 12, height: 12, around: None });
             bench.done();
             fault(&bench);
@@ -361,7 +361,7 @@ fn next_request_carries_out_postponed_write() {
     while !matches!(bench.next(), Event::Progress { .. }) {}
     bench.worker.send(Command::Write);
     while !matches!(bench.next(), Event::WritePostponed { .. }) {}
-    bench.writing = Writing::No;
+    bench.writing = WriteMode::No;
     bench.overrides.samples = Some(2);
     let of = bench.send();
     let events = bench.until_end(of);
@@ -467,7 +467,7 @@ fn image_is_shown_despite_unwritable_output() {
     let mut bench = Bench::new(SCENE);
     bench.overrides.outputs = vec![bench.path("nowhere/out.png")];
     bench.preview = Some(PreviewSize { width: 12, height: 12, around: None });
-    bench.writing = Writing::Try;
+    bench.writing = WriteMode::Try;
     let of = bench.send();
     let events = bench.until_end(of);
     let failed =

@@ -9,9 +9,9 @@ use crate::control::{CancelToken, Cancelled};
 use crate::film::{Pixels, TileSamples};
 use crate::integrators::{PhotonMaps, RayCounters, RenderSettings};
 use crate::output::FileIdentity;
-use crate::protocol::CheckpointNews;
+use crate::protocol::CheckpointUpdate;
 use crate::settings::Checkpoints;
-use crate::turntable::Turn;
+use crate::turntable::TurntableFrame;
 use crate::world::World;
 
 /// Returns the first reported conflicts and the request's final event.
@@ -30,7 +30,7 @@ fn image_is_shown_despite_conflict() {
     bench.overrides.outputs = vec![good.clone(), bench.path("skin.ppm")];
     bench.overrides.report = Some(report.clone());
     bench.preview = Some(PreviewSize { width: 12, height: 12, around: None });
-    bench.writing = Writing::Try;
+    bench.writing = WriteMode::Try;
     let of = bench.send();
     let events = bench.until_end(of);
     let (conflicts, end) = conflicts_and_end(&events);
@@ -188,7 +188,7 @@ fn checkpoint_does_not_replace_finished_part() {
     assert_eq!(fs::read(&part).expect("a part"), before);
     assert!(matches!(events.last(), Some(Event::Done { .. })) && out.exists());
     let failed = events.iter().find_map(|event| match event {
-        Event::Checkpoint { news: CheckpointNews::Failed { message }, .. } => Some(message),
+        Event::Checkpoint { news: CheckpointUpdate::Failed { message }, .. } => Some(message),
         _ => None,
     });
     assert!(failed.is_some_and(|message| message.contains("out.checkpoint")), "{failed:?}");
@@ -206,7 +206,7 @@ fn report_cannot_replace_a_checkpoint() {
 fn unwritable_later_frame_fails_before_rendering() {
     let mut bench = Bench::with(SCENE, unused);
     bench.overrides.outputs = vec![bench.path("a_##.ppm")];
-    bench.overrides.turn = Some(Turn { number: 0, of: 12 });
+    bench.overrides.turn = Some(TurntableFrame { number: 0, of: 12 });
     fs::create_dir(bench.path("a_09.ppm")).expect("a folder");
     let Failure::Work(message) = bench.failed() else { panic!("expected an output error") };
     assert!(message.contains("a_09.ppm") && message.contains("directory"), "{message}");

@@ -9,7 +9,7 @@ use std::time::{Duration, SystemTime};
 use super::outputs::Outputs;
 use crate::assets::{Companion, FileHash};
 use crate::control::{CancelToken, Cancelled};
-use crate::scene::fingerprint::Fingerprint;
+use crate::scene::fingerprint::FingerprintHasher;
 use crate::system::file::{self, FileKind, FileStamp};
 
 /// A file that a request read or tried to read.
@@ -47,7 +47,7 @@ pub enum Obstacle {
 
 impl Content {
     /// Adds the content to a stage's fingerprint.
-    pub(crate) fn add_to(self, key: &mut Fingerprint) {
+    pub(crate) fn add_to(self, key: &mut FingerprintHasher) {
         match self {
             Self::Missing => key.u64(0),
             Self::Unusable(_) => key.u64(1),
@@ -132,7 +132,7 @@ impl Snapshot {
     ///
     /// # Errors
     /// Returns [`Cancelled`] if the token is cancelled.
-    pub(crate) fn of_companion(
+    pub(crate) fn read_companion(
         &self,
         Companion { path, hash, stamp }: &Companion,
         token: &CancelToken,
@@ -365,7 +365,7 @@ mod tests {
                 let (hash, stamp) = (Some(hash_of(&library)), FileStamp::of(&library));
                 let companion = Companion { path: library.clone(), hash, stamp };
                 show("new");
-                snapshot.of_companion(&companion, &token).expect("not cancelled");
+                snapshot.read_companion(&companion, &token).expect("not cancelled");
             } else {
                 snapshot.read(&mesh, &token).expect("not cancelled");
                 assert_eq!(verified(&snapshot), None);

@@ -7,7 +7,7 @@
 //! Timestamps are also checked every two seconds, or several times per second if there are no notifications
 //! (network file systems, no watches left) or a folder or the working directory is missing.
 //!
-//! A program may write a file in several steps. [`News::Settled`] follows a change when no further changes
+//! A program may write a file in several steps. [`WatchUpdate::Settled`] follows a change when no further changes
 //! are expected. Errors in a file are not reported earlier.
 
 mod change_tracker;
@@ -71,7 +71,7 @@ impl Default for WatchDelays {
 
 /// An update from a watcher.
 #[derive(Clone, Debug)]
-pub enum News {
+pub enum WatchUpdate {
     /// A file's content changed, and the save appears complete.
     Changed(Changed),
     /// The changed files appear to be complete.
@@ -112,7 +112,7 @@ impl Watcher {
     pub fn start(
         poll: bool,
         contents: Arc<Contents>,
-        say: impl FnMut(News) + Send + 'static,
+        say: impl FnMut(WatchUpdate) + Send + 'static,
     ) -> std::io::Result<Self> {
         Self::start_with(poll, contents, WatchDelays::default(), say)
     }
@@ -121,7 +121,7 @@ impl Watcher {
         poll: bool,
         contents: Arc<Contents>,
         delays: WatchDelays,
-        say: impl FnMut(News) + Send + 'static,
+        say: impl FnMut(WatchUpdate) + Send + 'static,
     ) -> std::io::Result<Self> {
         working_folder::remember();
         let (orders, received) = mpsc::channel();
@@ -184,7 +184,7 @@ struct WatchThread<F> {
     say: F,
 }
 
-impl<F: FnMut(News)> WatchThread<F> {
+impl<F: FnMut(WatchUpdate)> WatchThread<F> {
     fn run(mut self, orders: &Receiver<Message>) {
         loop {
             let pause = self.next_check().saturating_duration_since(Instant::now());
@@ -238,7 +238,7 @@ impl<F: FnMut(News)> WatchThread<F> {
         self.has_working_folder = working_folder::has_working_folder();
         self.folders.renew_lost();
         for change in self.suspects.check(&self.contents, self.quiet, now) {
-            (self.say)(News::Output(change));
+            (self.say)(WatchUpdate::Output(change));
         }
         let found = self.differences();
         let is_said = !self.is_early(&found, now);
@@ -247,10 +247,10 @@ impl<F: FnMut(News)> WatchThread<F> {
                 self.files.insert(path, (content, now));
             }
             let noticed = self.change_tracker.mark_reported(now);
-            (self.say)(News::Changed(Changed { noticed }));
+            (self.say)(WatchUpdate::Changed(Changed { noticed }));
         }
         if self.change_tracker.take_settled(now) {
-            (self.say)(News::Settled);
+            (self.say)(WatchUpdate::Settled);
         }
     }
 

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::super::fingerprint::{Fingerprint, Fingerprinted, Referents};
+use super::super::fingerprint::{FingerprintContext, FingerprintHasher, Fingerprinted};
 use super::Located;
 use crate::math::DVec3;
 
@@ -141,7 +141,7 @@ impl Camera {
 }
 
 impl Fingerprinted for Camera {
-    fn add_to(&self, key: &mut Fingerprint, of: &Referents<'_>) {
+    fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         match self {
             Self::LookAt { position, look_at, up, fov, aperture, focus } => {
                 key.index(0).dvec3(*position).dvec3(*look_at).dvec3(*up).f64(*fov).f64(*aperture).f64(*focus);

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::super::fingerprint::{Fingerprint, Fingerprinted, Referents};
+use super::super::fingerprint::{FingerprintContext, FingerprintHasher, Fingerprinted};
 use super::Located;
 pub use crate::lights::delta::Falloff;
 use crate::math::{DVec3, Vec3};
@@ -84,7 +84,7 @@ impl Light {
     }
 
     /// Whether the light is a point light or spotlight with `falloff = "none"`.
-    pub fn has_no_falloff(&self) -> bool {
+    pub fn has_constant_falloff(&self) -> bool {
         match self {
             Self::Point(light) => light.falloff == Falloff::None,
             Self::Spot(light) => light.point.falloff == Falloff::None,
@@ -101,7 +101,7 @@ impl Environment {
 }
 
 impl Fingerprinted for Light {
-    fn add_to(&self, key: &mut Fingerprint, of: &Referents<'_>) {
+    fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         match self {
             Self::Point(light) => light.add_to(key.text("point"), of),
             Self::Spot(SpotLight { point, look_at, angle, blend }) => {
@@ -116,7 +116,7 @@ impl Fingerprinted for Light {
 }
 
 impl Fingerprinted for PointLight {
-    fn add_to(&self, key: &mut Fingerprint, _: &Referents<'_>) {
+    fn add_to(&self, key: &mut FingerprintHasher, _: &FingerprintContext<'_>) {
         let Self { position, intensity, falloff } = *self;
         key.dvec3(position).vec3(intensity).choice(falloff);
     }
@@ -124,7 +124,7 @@ impl Fingerprinted for PointLight {
 
 /// Fingerprint of the lookup parameters. Texels have a separate fingerprint.
 impl Fingerprinted for Environment {
-    fn add_to(&self, key: &mut Fingerprint, _: &Referents<'_>) {
+    fn add_to(&self, key: &mut FingerprintHasher, _: &FingerprintContext<'_>) {
         let Self { color, file, rotate } = self;
         key.vec3(*color).f64(*rotate).flag(file.is_some());
         if let Some(file) = file {

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::super::fingerprint::{Fingerprint, Fingerprinted, Referents};
+use super::super::fingerprint::{FingerprintContext, FingerprintHasher, Fingerprinted};
 use super::Located;
 use crate::choice;
 pub use crate::materials::UvSet;
@@ -235,12 +235,12 @@ impl MaterialKind {
 
     /// Whether the material is solid glass.
     pub fn is_glass(&self) -> bool {
-        self.glass_medium_bits().is_some()
+        self.glass_medium_key().is_some()
     }
 
     /// Bits of the index of refraction and the transmittance of solid glass, independent of roughness. `None`
     /// for other materials.
-    pub fn glass_medium_bits(&self) -> Option<[u64; 4]> {
+    pub fn glass_medium_key(&self) -> Option<[u64; 4]> {
         match *self {
             Self::Glass { ior, tint, roughness: _ } => {
                 Some([f64::from(ior), tint.x, tint.y, tint.z].map(f64::to_bits))
@@ -516,7 +516,7 @@ impl Material {
 
 /// Fingerprint of the lookup parameters. Texels have separate fingerprints.
 impl Fingerprinted for Texture {
-    fn add_to(&self, key: &mut Fingerprint, _: &Referents<'_>) {
+    fn add_to(&self, key: &mut FingerprintHasher, _: &FingerprintContext<'_>) {
         let Self { name: _, file, image, filter, wrap, repeat, rotate, offset, uv, encoding, factor } = self;
         key.path(&file.value).choice(*filter).choice(*wrap).choice(*encoding).f32(repeat.x).f32(repeat.y);
         key.f64(*rotate).f32(offset.x).f32(offset.y).vec3(*factor).flag(*uv == UvSet::Second);
@@ -525,7 +525,7 @@ impl Fingerprinted for Texture {
 }
 
 impl Fingerprinted for ColorSource {
-    fn add_to(&self, key: &mut Fingerprint, of: &Referents<'_>) {
+    fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         match self {
             Self::Constant(color) => {
                 key.index(0).vec3(*color);
@@ -538,14 +538,14 @@ impl Fingerprinted for ColorSource {
 }
 
 impl Fingerprinted for OpacitySource {
-    fn add_to(&self, key: &mut Fingerprint, of: &Referents<'_>) {
+    fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         let Self { value, cutoff } = self;
         key.f32(*cutoff).add(value, of);
     }
 }
 
 impl Fingerprinted for NumberSource {
-    fn add_to(&self, key: &mut Fingerprint, of: &Referents<'_>) {
+    fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         match *self {
             Self::Constant(value) => {
                 key.index(0).f32(value);
@@ -562,7 +562,7 @@ impl Fingerprinted for NumberSource {
 }
 
 impl Fingerprinted for FresnelSource {
-    fn add_to(&self, key: &mut Fingerprint, of: &Referents<'_>) {
+    fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         match self {
             Self::Schlick(color) => {
                 key.index(0).add(color, of);
@@ -575,7 +575,7 @@ impl Fingerprinted for FresnelSource {
 }
 
 impl Fingerprinted for EmissionSource {
-    fn add_to(&self, key: &mut Fingerprint, of: &Referents<'_>) {
+    fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         let Self { scale, texture, sides } = *self;
         key.vec3(scale).choice(sides).flag(texture.is_some());
         if let Some(texture) = texture {
@@ -585,21 +585,21 @@ impl Fingerprinted for EmissionSource {
 }
 
 impl Fingerprinted for NormalMap {
-    fn add_to(&self, key: &mut Fingerprint, of: &Referents<'_>) {
+    fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         let Self { texture, strength } = *self;
         of.textures[texture].add_to(key.f32(strength), of);
     }
 }
 
 impl Fingerprinted for Bump {
-    fn add_to(&self, key: &mut Fingerprint, of: &Referents<'_>) {
+    fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         let Self { texture, channel, scale } = *self;
         key.f32(scale).add(&NumberSource::Texture { texture, channel }, of);
     }
 }
 
 impl Fingerprinted for MaterialKind {
-    fn add_to(&self, key: &mut Fingerprint, of: &Referents<'_>) {
+    fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         match self {
             Self::Phong { diffuse, specular, shininess, ambient } => {
                 key.index(0).f32(*shininess).add(diffuse, of).add(specular, of).add(ambient, of);
@@ -639,7 +639,7 @@ impl Fingerprinted for MaterialKind {
 }
 
 impl Fingerprinted for Material {
-    fn add_to(&self, key: &mut Fingerprint, of: &Referents<'_>) {
+    fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         let Self { name: _, kind, emission, normal_map, bump, opacity } = self;
         key.add(kind, of).add(emission, of).add(normal_map, of).add(bump, of).add(opacity, of);
     }

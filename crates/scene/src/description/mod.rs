@@ -24,7 +24,7 @@ pub use method::{Integrator, Method};
 pub use render::{
     Accel, KeyRange, MAX_BOUNCES, PixelFilter, Render, RenderKey, Shadows, Tonemap, render_keys,
 };
-pub use shape::{LoweredShape, Mesh, Object, Placement, Shape, Sheet, max_projection};
+pub use shape::{LoweredShape, Mesh, MeshTransform, Object, Shape, Sheet, max_projection};
 
 /// A validated scene.
 #[derive(Clone, Debug, PartialEq)]

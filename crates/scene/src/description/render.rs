@@ -2,8 +2,8 @@
 
 use std::ops::RangeInclusive;
 
-use super::super::fingerprint::{Fingerprint, Fingerprinted, Referents};
-use super::super::keys::key::{WordList, words};
+use super::super::fingerprint::{FingerprintContext, FingerprintHasher, Fingerprinted};
+use super::super::keys::key::{ChoiceValues, words};
 use super::method::Integrator;
 use crate::choice;
 use crate::choice::Choice;
@@ -132,7 +132,7 @@ pub struct RenderKey {
     /// Accepted values.
     pub range: KeyRange,
     /// Returns the accepted names and their meanings. Empty for other types.
-    pub words: WordList,
+    pub words: ChoiceValues,
     /// The default, in scene file syntax.
     pub default: String,
     /// Whether a command-line option overrides the key.
@@ -254,7 +254,7 @@ impl Render {
 
 /// Fingerprint of all settings that affect the samples.
 impl Fingerprinted for Render {
-    fn add_to(&self, key: &mut Fingerprint, _: &Referents<'_>) {
+    fn add_to(&self, key: &mut FingerprintHasher, _: &FingerprintContext<'_>) {
         let Self {
             width,
             height,

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::super::fingerprint::{Fingerprint, Fingerprinted, Referents};
+use super::super::fingerprint::{FingerprintContext, FingerprintHasher, Fingerprinted};
 use crate::geometry;
 use crate::geometry::cone::Cone;
 use crate::geometry::cuboid::Cuboid;
@@ -161,7 +161,7 @@ pub struct Mesh {
     /// Index into [`Scene::mesh_files`](super::Scene::mesh_files).
     pub file: usize,
     /// Transform from file coordinates to scene coordinates.
-    pub placed: Placement,
+    pub placed: MeshTransform,
     /// Whether vertex normals are interpolated.
     pub smooth: bool,
     /// Whether vertex colors multiply the material's color.
@@ -170,7 +170,7 @@ pub struct Mesh {
 
 /// Transform from a mesh file's coordinates to scene coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Placement {
+pub enum MeshTransform {
     /// Scale, rotation and translation.
     Steps {
         /// Scale factors, applied first. No component is 0.
@@ -189,7 +189,7 @@ pub enum Placement {
     },
 }
 
-impl Placement {
+impl MeshTransform {
     /// Returns the transform.
     pub fn transform(&self) -> Transform {
         match *self {
@@ -339,7 +339,7 @@ pub fn max_projection(direction: DVec3, points: &[DVec3]) -> f64 {
 }
 
 impl Fingerprinted for Shape {
-    fn add_to(&self, key: &mut Fingerprint, of: &Referents<'_>) {
+    fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         match self {
             Self::Sphere { center, radius } => key.index(0).dvec3(*center).f64(*radius),
             Self::Quad { corner, u, v } => key.index(1).dvec3(*corner).dvec3(*u).dvec3(*v),
@@ -362,15 +362,15 @@ impl Fingerprinted for Shape {
 }
 
 impl Fingerprinted for Mesh {
-    fn add_to(&self, key: &mut Fingerprint, of: &Referents<'_>) {
+    fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         // Vertex colors do not affect the geometry.
         let Self { file, placed, smooth, vertex_colors: _ } = *self;
         key.key(&of.meshes[file]).flag(smooth);
         match placed {
-            Placement::Steps { scale, rotate, translate } => {
+            MeshTransform::Steps { scale, rotate, translate } => {
                 key.index(0).dvec3(scale).dvec3(rotate).dvec3(translate);
             }
-            Placement::Matrix { linear: [x, y, z], translate } => {
+            MeshTransform::Matrix { linear: [x, y, z], translate } => {
                 key.index(1).dvec3(x).dvec3(y).dvec3(z).dvec3(translate);
             }
         }

@@ -235,7 +235,7 @@ fn read_glass(table: &TableReader<'_>, textures: &DefinedNames) -> Option<Materi
     let roughness = read_number(table, textures, "glass.roughness", 0.0);
     // If `thin` is invalid, the user probably wants a pane.
     if !thin.boolean().unwrap_or(thin.is_present()) {
-        let tint = tint.exact_color(table.limits("glass.tint")).unwrap_or(DVec3::ONE);
+        let tint = tint.color_f64(table.limits("glass.tint")).unwrap_or(DVec3::ONE);
         return Some(MaterialKind::Glass { ior, tint, roughness });
     }
     if roughness != NumberSource::Constant(0.0) {

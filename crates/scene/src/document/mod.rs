@@ -24,7 +24,7 @@ use super::description::{Camera, Environment, Light, Scene};
 use super::keys::limits;
 use super::other_content::NEW_SCENE_HELP;
 use super::source::SceneText;
-use super::{MAX_FILE_BYTES, Outcome, Setting, facing, toml};
+use super::{MAX_FILE_BYTES, Outcome, SettingSpan, facing, toml};
 use crate::math::Vec3;
 use context::{FileContext, Issue};
 use table::TableReader;
@@ -62,7 +62,7 @@ pub(super) fn lower(source: &SceneText, path: &Path) -> Outcome {
 }
 
 /// The spans of the values in `[render]` and `[photons]`.
-fn settings(document: &toml::Document<'_>) -> Vec<Setting> {
+fn settings(document: &toml::Document<'_>) -> Vec<SettingSpan> {
     let values = |table: &'static str| {
         let entries = document.root().get(table).and_then(|found| match found.value.item() {
             toml::TomlValue::Table(entries) => Some(entries),
@@ -73,8 +73,11 @@ fn settings(document: &toml::Document<'_>) -> Vec<Setting> {
             | toml::TomlValue::Datetime
             | toml::TomlValue::Array(_) => None,
         });
-        let of =
-            move |one: toml::KeyValue<'_>| Setting { table, key: one.key.to_owned(), span: one.value.span() };
+        let of = move |one: toml::KeyValue<'_>| SettingSpan {
+            table,
+            key: one.key.to_owned(),
+            span: one.value.span(),
+        };
         entries.into_iter().flat_map(move |entries| entries.iter().map(of).collect::<Vec<_>>())
     };
     ["render", "photons"].into_iter().flat_map(values).collect()

@@ -65,7 +65,7 @@ pub enum ValueKind {
     /// `true` or `false`.
     Flag,
     /// One of these words.
-    Words(WordList),
+    Words(ChoiceValues),
     /// Any text.
     Text,
     /// The path of a file with one of these extensions. If empty, any file is allowed.
@@ -113,11 +113,11 @@ impl ValueKind {
 }
 
 /// Function that returns the named values of a choice, in display order.
-pub type WordList = fn() -> Vec<Word>;
+pub type ChoiceValues = fn() -> Vec<ChoiceValue>;
 
 /// A named value of a choice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Word {
+pub struct ChoiceValue {
     /// The value's name.
     pub name: &'static str,
     /// Description of the value.
@@ -125,8 +125,8 @@ pub struct Word {
 }
 
 /// Returns the named values of a choice.
-pub fn words<C: Choice>() -> Vec<Word> {
-    C::ALL.iter().map(|one| Word { name: one.name(), meaning: one.meaning() }).collect()
+pub fn words<C: Choice>() -> Vec<ChoiceValue> {
+    C::ALL.iter().map(|one| ChoiceValue { name: one.name(), meaning: one.meaning() }).collect()
 }
 
 /// Default of a key.

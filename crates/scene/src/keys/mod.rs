@@ -18,7 +18,9 @@ use std::sync::LazyLock;
 
 pub(super) use colors::hex_digits;
 pub use colors::{color_bytes, color_names};
-pub use key::{Default, KeyInfo, TableInfo, TableSyntax, TypeInfo, ValueKind, Word, WordList, words};
+pub use key::{
+    ChoiceValue, ChoiceValues, Default, KeyInfo, TableInfo, TableSyntax, TypeInfo, ValueKind, words,
+};
 
 /// All tables, in the order of the documentation.
 pub fn tables() -> &'static [TableInfo] {

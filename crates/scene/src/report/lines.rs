@@ -7,20 +7,20 @@ use super::super::diagnostic::Diagnostic;
 use super::render_with;
 
 /// A line of a report.
-pub type ReportLine = Vec<Piece>;
+pub type ReportLine = Vec<StyledSpan>;
 
 /// A run of text with the same role.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Piece {
+pub struct StyledSpan {
     /// The role of the text, which determines its color.
-    pub role: Role,
+    pub role: SpanRole,
     /// The text, without control characters.
     pub text: String,
 }
 
 /// Role of a piece of text. Front ends choose the colors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Role {
+pub enum SpanRole {
     /// Source text and paths.
     Text,
     /// The word `error`, and underlines and labels for errors.
@@ -47,7 +47,7 @@ pub fn lines(diagnostics: &[Diagnostic], width: usize) -> Vec<ReportLine> {
 /// sanitized.
 fn pieces(line: &str) -> ReportLine {
     let mut pieces = ReportLine::new();
-    let mut role = Role::Text;
+    let mut role = SpanRole::Text;
     for (number, part) in line.split("\u{1b}[").enumerate() {
         let text = match part.split_once('m') {
             Some((codes, text)) if number > 0 => {
@@ -57,19 +57,19 @@ fn pieces(line: &str) -> ReportLine {
             _ => part,
         };
         if !text.is_empty() {
-            pieces.push(Piece { role, text: text.to_owned() });
+            pieces.push(StyledSpan { role, text: text.to_owned() });
         }
     }
     pieces
 }
 
 /// The role for a color code used in [`lines`].
-fn role_of(codes: &str) -> Role {
+fn role_of(codes: &str) -> SpanRole {
     match codes {
-        "31" => Role::Error,
-        "33" => Role::Warning,
-        "34" => Role::Frame,
-        "1" => Role::Message,
-        _ => Role::Text,
+        "31" => SpanRole::Error,
+        "33" => SpanRole::Warning,
+        "34" => SpanRole::Frame,
+        "1" => SpanRole::Message,
+        _ => SpanRole::Text,
     }
 }

@@ -108,11 +108,11 @@ fn lines_match_the_plain_report() {
     assert_eq!(joined.join("\n") + "\n", render(&diagnostics, 80, Style::Plain));
     let role =
         |text: &str| lines.iter().flatten().find(|piece| piece.text.contains(text)).map(|piece| piece.role);
-    assert_eq!(role("error"), Some(Role::Error));
-    assert_eq!(role("found"), Some(Role::Error));
-    assert_eq!(role("greater"), Some(Role::Message));
-    assert_eq!(role("a.toml:1:10"), Some(Role::Text));
-    assert_eq!(role("-->"), Some(Role::Frame));
+    assert_eq!(role("error"), Some(SpanRole::Error));
+    assert_eq!(role("found"), Some(SpanRole::Error));
+    assert_eq!(role("greater"), Some(SpanRole::Message));
+    assert_eq!(role("a.toml:1:10"), Some(SpanRole::Text));
+    assert_eq!(role("-->"), Some(SpanRole::Frame));
     assert!(render(&diagnostics, 80, Style::Ansi).contains("\u{1b}["));
 }
 

@@ -83,7 +83,7 @@ pub fn trace_camera_paths(
     }
     // Compute direct lighting at their vertices, and add it to the accumulator.
     wavefront.add_direct_light()?;
-    wavefront.direct.flush_run(slots.start, &mut wavefront.accumulator);
+    wavefront.direct.flush_consecutive(slots.start, &mut wavefront.accumulator);
     wavefront.next_bounce(rays);
     // Trace the remaining bounces.
     while !rays.is_empty() {
@@ -282,7 +282,7 @@ impl CameraWavefront<'_, '_> {
         }
         // Queue the vertices of plain surfaces for direct lighting.
         if are_lit {
-            self.direct.keep_spare();
+            self.direct.commit_spare_batch();
             if tile.pixel_spread > 0.0 {
                 for (lane, hit) in lanes(packet.plain).filter_map(|lane| Some((lane, packet.hit(lane)?))) {
                     let cone = packet.path(tile, &rays, lane).cone.at_distance(hit.shape.t);

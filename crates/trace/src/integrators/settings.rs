@@ -3,7 +3,7 @@
 use super::{AovSource, FirstHit, LightAov, View};
 use crate::math::{DVec2, Vec3};
 use crate::scene::description::Render;
-use crate::scene::fingerprint::{Fingerprint, Fingerprinted, Referents};
+use crate::scene::fingerprint::{FingerprintContext, FingerprintHasher, Fingerprinted};
 use crate::world::TextureNeeds;
 
 /// Settings for rendering a world.
@@ -93,7 +93,7 @@ impl RenderSettings {
 }
 
 impl Fingerprinted for RenderSettings {
-    fn add_to(&self, key: &mut Fingerprint, of: &Referents<'_>) {
+    fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         let Self { render, dof, view, photons } = self.effective();
         key.add(&render, of).flag(dof).choice(view.sampled());
         // All acceleration structures return the same hits, but these two views show the structures

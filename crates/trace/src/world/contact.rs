@@ -60,7 +60,7 @@ pub enum CoincidentSurface {
 
 /// Reusable buffers for candidate surfaces.
 #[derive(Debug, Default)]
-pub struct ContactScratch {
+pub struct CoincidenceScratch {
     objects: Vec<u32>,
     /// Pairs of object and triangle indices.
     triangles: Vec<(u32, u32)>,
@@ -68,7 +68,7 @@ pub struct ContactScratch {
 
 /// A query for coincident surfaces at a hit.
 #[derive(Clone, Copy, Debug)]
-pub struct ContactQuery<'a> {
+pub struct CoincidenceQuery<'a> {
     /// A hit on one of the surfaces.
     pub hit: &'a Hit,
     /// The surface at the hit.
@@ -82,12 +82,12 @@ pub struct ContactQuery<'a> {
 
 /// The offset points, and the point in front of the surfaces without the `lead` distance.
 #[derive(Clone, Copy)]
-struct ContactProbe {
+struct CoincidenceProbe {
     sides: OffsetPoints,
     close: Vec3,
 }
 
-impl ContactProbe {
+impl CoincidenceProbe {
     /// Value of t at `close` along the segment.
     fn lead_end(&self) -> f32 {
         let way = self.sides.ray().direction;
@@ -99,10 +99,10 @@ impl World {
     /// Finds all coincident surfaces at a hit and one point on either side of them. `visit` is called in an
     /// order that depends only on the scene.
     #[inline]
-    pub fn find_contact(
+    pub fn find_coincident_surfaces(
         &self,
-        at: &ContactQuery<'_>,
-        memory: &mut ContactScratch,
+        at: &CoincidenceQuery<'_>,
+        memory: &mut CoincidenceScratch,
         visit: impl FnMut(CoincidentSurface),
     ) -> OffsetPoints {
         let margin = self.geometry.margin(at);
@@ -118,10 +118,10 @@ impl World {
     }
 
     /// Whether the hit is on a glass shape whose far side is not close to the hit point.
-    fn is_far_side_away(&self, at: &ContactQuery<'_>, margin: Vec3) -> bool {
+    fn is_far_side_away(&self, at: &CoincidenceQuery<'_>, margin: Vec3) -> bool {
         let far = 8.0 * f64::from(margin.max_element());
         let is_away = match &self.geometry.objects()[at.hit.object as usize] {
-            Object::Shape(shape) => shape.is_far_side_beyond(at.surface.point.as_dvec3(), far),
+            Object::Shape(shape) => shape.is_thicker_than(at.surface.point.as_dvec3(), far),
             Object::Mesh(_) => false,
         };
         is_away && self.is_glass(self.material_index(at.hit) as u32)
@@ -131,7 +131,7 @@ impl World {
     /// nearby. In this case, only the incoming ray's side matters.
     fn single_sided_contact(
         &self,
-        at: &ContactQuery<'_>,
+        at: &CoincidenceQuery<'_>,
         mut visit: impl FnMut(CoincidentSurface),
     ) -> OffsetPoints {
         let SurfacePoint { point, error, normal, .. } = *at.surface;
@@ -149,8 +149,8 @@ impl World {
     /// error is at most `error`.
     pub(super) fn classify_candidates(
         &self,
-        at: &ContactQuery<'_>,
-        (memory, error): (&ContactScratch, Vec3),
+        at: &CoincidenceQuery<'_>,
+        (memory, error): (&CoincidenceScratch, Vec3),
         mut visit: impl FnMut(CoincidentSurface),
     ) -> OffsetPoints {
         let geometry = &self.geometry;
@@ -159,7 +159,7 @@ impl World {
             before: offset_origin(point, error + normal.abs() * at.lead, normal, normal),
             beyond: offset_origin(point, error, normal, -normal),
         };
-        let probe = ContactProbe { sides, close: offset_origin(point, error, normal, normal) };
+        let probe = CoincidenceProbe { sides, close: offset_origin(point, error, normal, normal) };
         let lead_end = probe.lead_end();
         let mut is_led = false;
         let mut found = |near: CoincidentSurface| {
@@ -173,7 +173,7 @@ impl World {
         for &id in &memory.objects {
             if let Object::Shape(shape) = &geometry.objects()[id as usize] {
                 let points = [sides.before, probe.close, sides.beyond].map(|point| point.as_dvec3());
-                let inside = shape.encloses_each(points);
+                let inside = shape.encloses_points(points);
                 closed_lead |= inside.is_some_and(|[before, close, _]| before != close);
                 let is_around = inside.map(|[_, _, beyond]| beyond);
                 self.near_shape(shape, id, (&sides, is_around)).into_iter().for_each(&mut found);
@@ -274,12 +274,12 @@ impl Geometry {
     const REACH: f32 = 16.0;
 
     /// Search distance for coincident surfaces along each axis.
-    pub(super) fn margin(&self, at: &ContactQuery<'_>) -> Vec3 {
+    pub(super) fn margin(&self, at: &CoincidenceQuery<'_>) -> Vec3 {
         (at.surface.error * Self::REACH).max(Vec3::splat(self.mesh_rounding() + 2.0 * at.lead))
     }
 
     /// Makes the hit itself the only candidate. Returns its error bound per axis.
-    pub(super) fn hit_candidate(&self, at: &ContactQuery<'_>, memory: &mut ContactScratch) -> Vec3 {
+    pub(super) fn hit_candidate(&self, at: &CoincidenceQuery<'_>, memory: &mut CoincidenceScratch) -> Vec3 {
         let Hit { shape, object } = *at.hit;
         memory.objects.clear();
         memory.triangles.clear();
@@ -300,11 +300,11 @@ impl Geometry {
     /// lists them for their subtree.
     pub(super) fn find_candidates(
         &self,
-        at: &ContactQuery<'_>,
-        memory: &mut ContactScratch,
+        at: &CoincidenceQuery<'_>,
+        memory: &mut CoincidenceScratch,
         enclosing: &[EnclosingGlass],
     ) -> Vec3 {
-        let ContactScratch { objects, triangles } = memory;
+        let CoincidenceScratch { objects, triangles } = memory;
         objects.clear();
         triangles.clear();
         let point = at.surface.point;

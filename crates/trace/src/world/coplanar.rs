@@ -187,7 +187,7 @@ pub fn light_lifts(scene: &Scene, meshes: &[Arc<MeshTree>], origin: DVec3) -> Ve
 
 /// Returns a copy of the mesh in which emissive triangles coplanar with other faces are moved off these
 /// faces. `None` if there are no such triangles.
-pub fn with_lifted_lights(loaded: &LoadedMesh) -> Option<LoadedMesh> {
+pub fn with_offset_lights(loaded: &LoadedMesh) -> Option<LoadedMesh> {
     let mesh = &loaded.mesh;
     let emits = |triangle: u32| {
         let material =

@@ -6,7 +6,7 @@ use crate::accel::InstructionSet;
 use crate::control::CancelToken;
 use crate::geometry::Ray;
 use crate::geometry::mesh::TriangleMesh;
-use crate::lights::LightObject;
+use crate::lights::LightGeometry;
 use crate::math::Vec3;
 use crate::math::random::signed as random;
 use crate::scene::description::Accel;
@@ -141,7 +141,7 @@ fn lifted_lights_are_hit_only_from_the_front() {
                     // Shadow rays that ignore the light reach it because the surface below does not occlude
                     // it.
                     let shadow = Ray::segment(from, target);
-                    assert!(!geometry.occluded(&shadow, LightObject::Object(number)), "{tables} {from}");
+                    assert!(!geometry.occluded(&shadow, LightGeometry::Object(number)), "{tables} {from}");
                     let is_closed = tables.contains("box") || tables.contains("cylinder");
                     let below = Vec3::new(from.x, -from.y, from.z);
                     let hit = geometry.closest(&Ray::new(below, target - below)).expect("a hit");
@@ -149,7 +149,7 @@ fn lifted_lights_are_hit_only_from_the_front() {
                     // Light samples are occluded from the same positions as hits.
                     let lift = geometry.lifts()[number as usize].as_vec3();
                     let hidden = Ray::segment(below, target + lift);
-                    assert!(geometry.occluded(&hidden, LightObject::Object(number)), "{tables} {below}");
+                    assert!(geometry.occluded(&hidden, LightGeometry::Object(number)), "{tables} {below}");
                 }
             }
         }
@@ -229,7 +229,7 @@ fn mesh_file_lights_are_lifted_off_other_faces() {
         physical: None,
     };
     let loaded = LoadedMesh { mesh, materials: vec![material(0.0), material(1.0)], ..LoadedMesh::default() };
-    let lifted = with_lifted_lights(&loaded).expect("a coplanar light").mesh;
+    let lifted = with_offset_lights(&loaded).expect("a coplanar light").mesh;
     assert_eq!(lifted.triangles[..2], loaded.mesh.triangles[..2]);
     assert_eq!((lifted.positions.len(), lifted.normals.len(), lifted.uvs.len()), (12, 12, 12));
     let down = (lifted.positions[1] - lifted.positions[0]).cross(lifted.positions[2] - lifted.positions[0]).y;
@@ -244,8 +244,8 @@ fn mesh_file_lights_are_lifted_off_other_faces() {
     }
     // Meshes without coplanar lights are unchanged.
     let dark = LoadedMesh { materials: vec![material(0.0), material(0.0)], ..loaded.clone() };
-    assert!(with_lifted_lights(&dark).is_none());
+    assert!(with_offset_lights(&dark).is_none());
     let mut below = loaded;
     below.mesh.positions[4..].iter_mut().for_each(|position| position.y = 1.9);
-    assert!(with_lifted_lights(&below).is_none());
+    assert!(with_offset_lights(&below).is_none());
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::accel::{Bvh, InstructionSet, Shell};
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::{Aabb, Ray, Shape, ShapeHit, SurfacePoint, SurfaceRequest};
-use crate::lights::LightObject;
+use crate::lights::LightGeometry;
 use crate::math::color::srgb8_to_linear;
 use crate::math::{DVec3, Vec2, Vec3};
 use crate::scene::description::{self, LoweredShape, Scene};
@@ -170,14 +170,14 @@ impl Geometry {
 
     /// Whether a light is an entire merged mesh. Shadow rays to such lights use the per-mesh trees instead.
     #[inline(always)]
-    pub(super) fn is_whole_merged(&self, source: LightObject) -> bool {
+    pub(super) fn is_merged_mesh_light(&self, source: LightGeometry) -> bool {
         match (source, &self.merged) {
-            (LightObject::Object(object), Some(merged)) => merged.meshes.has(object),
+            (LightGeometry::Object(object), Some(merged)) => merged.meshes.has(object),
             (
-                LightObject::Nothing
-                | LightObject::Object(_)
-                | LightObject::SeeThrough(_)
-                | LightObject::Primitive(..),
+                LightGeometry::Nothing
+                | LightGeometry::Object(_)
+                | LightGeometry::SeeThrough(_)
+                | LightGeometry::Primitive(..),
                 _,
             ) => false,
         }
@@ -267,22 +267,23 @@ impl Geometry {
     }
 
     /// Whether anything other than the light itself blocks a shadow ray.
-    pub fn occluded(&self, ray: &Ray, source: LightObject) -> bool {
+    pub fn occluded(&self, ray: &Ray, source: LightGeometry) -> bool {
         let ray_f64 = ray.to_f64();
         let any = |id: u32, except: Option<u32>| self.objects[id as usize].any(ray, &ray_f64, except);
         let of_object = |id: u32| match source {
-            LightObject::Nothing => any(id, None),
-            LightObject::Object(own) | LightObject::SeeThrough(own) => own != id && any(id, None),
-            LightObject::Primitive(own, part) => any(id, (own == id).then_some(part)),
+            LightGeometry::Nothing => any(id, None),
+            LightGeometry::Object(own) | LightGeometry::SeeThrough(own) => own != id && any(id, None),
+            LightGeometry::Primitive(own, part) => any(id, (own == id).then_some(part)),
         };
         let test = |id: u32| match (self.merged(id), source) {
-            (Some(merged), LightObject::Nothing | LightObject::Object(_) | LightObject::SeeThrough(_)) => {
-                merged.any(ray, None)
-            }
-            (Some(merged), LightObject::Primitive(own, part)) => merged.any(ray, merged.number(own, part)),
+            (
+                Some(merged),
+                LightGeometry::Nothing | LightGeometry::Object(_) | LightGeometry::SeeThrough(_),
+            ) => merged.any(ray, None),
+            (Some(merged), LightGeometry::Primitive(own, part)) => merged.any(ray, merged.number(own, part)),
             (None, _) => of_object(id),
         };
-        if self.is_whole_merged(source) {
+        if self.is_merged_mesh_light(source) {
             return self.unbounded.iter().any(|&id| of_object(id)) || self.tree.any(ray, of_object);
         }
         self.unbounded.iter().any(|&id| test(id)) || self.traced_tree().any(ray, test)

@@ -1,14 +1,14 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::super::contact::{CoincidentSurface, ContactQuery, ContactScratch, OffsetPoints};
+use super::super::contact::{CoincidenceQuery, CoincidenceScratch, CoincidentSurface, OffsetPoints};
 use super::super::{Geometry, Hit, Images, MAX_INTERIORS, MeshTree, World, WorldInputs, lights};
 use crate::assets::LoadedMesh;
 use crate::control::CancelToken;
 use crate::geometry::mesh::TriangleMesh;
 use crate::geometry::{Ray, SurfaceRequest};
 use crate::math::{DVec3, Vec3};
-use crate::scene::description::{Accel, Mesh, MeshFile, Object, Placement, Scene, Shape};
+use crate::scene::description::{Accel, Mesh, MeshFile, MeshTransform, Object, Scene, Shape};
 
 fn v(x: f64, y: f64, z: f64) -> DVec3 {
     DVec3::new(x, y, z)
@@ -53,7 +53,7 @@ impl SceneBuilder {
         self.meshes.push(Arc::new(tree));
         self.scene.mesh_files.push(MeshFile { value: PathBuf::new(), span: 0..0, part: None });
         let file = self.meshes.len() - 1;
-        let placed = Placement::Steps { scale, rotate, translate };
+        let placed = MeshTransform::Steps { scale, rotate, translate };
         self.shape(Shape::Mesh(Mesh { file, placed, smooth: false, vertex_colors: false }), material)
     }
 
@@ -255,14 +255,14 @@ fn isolated_regions_match_the_full_search() {
             let surface = world.geometry.requested_surface(&ray, &hit, SurfaceRequest::ALL);
             let facing = surface.normal.dot(ray.direction);
             let normal = if facing > 0.0 { -surface.normal } else { surface.normal };
-            let at = ContactQuery {
+            let at = CoincidenceQuery {
                 hit: &hit,
                 surface: &surface,
                 normal,
                 lead: hit.shape.t * f32::EPSILON * facing.abs(),
             };
             let found = |only_hit: bool| -> (OffsetPoints, Vec<CoincidentSurface>) {
-                let (mut memory, mut near) = (ContactScratch::default(), Vec::new());
+                let (mut memory, mut near) = (CoincidenceScratch::default(), Vec::new());
                 let error = if only_hit {
                     world.geometry.hit_candidate(&at, &mut memory)
                 } else {
@@ -276,7 +276,8 @@ fn isolated_regions_match_the_full_search() {
                 assert_eq!(found(true), searched, "scene {number}, ray {round}: {ray:?}, {hit:?}");
             }
             let mut near = Vec::new();
-            let sides = world.find_contact(&at, &mut ContactScratch::default(), |one| near.push(one));
+            let sides =
+                world.find_coincident_surfaces(&at, &mut CoincidenceScratch::default(), |one| near.push(one));
             assert_eq!((sides, near), searched, "scene {number}, ray {round}: {ray:?}, {hit:?}");
             let is_other = |near: &CoincidentSurface| match near {
                 CoincidentSurface::Around { object, .. }
@@ -301,7 +302,7 @@ fn nested_sphere_search_takes_log_squared_time() {
         let scene = (0..count).fold(SceneBuilder::new(), |scene, i| scene.shape(globe(i), material(i)));
         let world = scene.world();
         let mut random = SceneRandom(3);
-        let mut memory = ContactScratch::default();
+        let mut memory = CoincidenceScratch::default();
         for _ in 0..200 {
             let from = (v(0.1, 0.2, 0.3) + random.place() * 1.5).as_vec3();
             let ray = Ray::new(from, random.place().normalize().as_vec3());
@@ -310,10 +311,10 @@ fn nested_sphere_search_takes_log_squared_time() {
             let facing = surface.normal.dot(ray.direction);
             let normal = if facing > 0.0 { -surface.normal } else { surface.normal };
             let lead = hit.shape.t * f32::EPSILON * facing.abs();
-            let at = ContactQuery { hit: &hit, surface: &surface, normal, lead };
+            let at = CoincidenceQuery { hit: &hit, surface: &surface, normal, lead };
             let mut around = Vec::new();
             let mut found = 0_u32;
-            let sides = world.find_contact(&at, &mut memory, |near| {
+            let sides = world.find_coincident_surfaces(&at, &mut memory, |near| {
                 found += 1;
                 if let CoincidentSurface::Around { object, .. } = near {
                     around.push(object);

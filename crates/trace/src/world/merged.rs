@@ -219,7 +219,7 @@ impl MergedMeshes {
         let size = self.bounds().extent();
         match by.run(AnyFacet { facets, size, rows, met, ends, except: own }) {
             Some([hit, 0]) => hit,
-            Some([hit, undecided]) => hit | self.any_of_each(rows, undecided, ends, own),
+            Some([hit, undecided]) => hit | self.any_hit_one_by_one(rows, undecided, ends, own),
             None => self.any_by_tree(rows, met, ends, except),
         }
     }
@@ -227,7 +227,13 @@ impl MergedMeshes {
     /// Traces the rays in `these` one by one. See [`MergedMeshes::any_rows`].
     #[cold]
     #[inline(never)]
-    fn any_of_each(&self, rows: &RayPacket, these: u32, ends: &F32x16, except: &[u32; PACKET_SIZE]) -> u32 {
+    fn any_hit_one_by_one(
+        &self,
+        rows: &RayPacket,
+        these: u32,
+        ends: &F32x16,
+        except: &[u32; PACKET_SIZE],
+    ) -> u32 {
         let is_hit = |&lane: &usize| {
             let own = (except[lane] != Self::NO_TRIANGLE).then_some(except[lane]);
             self.tree.any(&Ray { t_max: ends[lane], ..rows.ray(lane) }, own)
@@ -367,7 +373,7 @@ pub(super) mod tests {
     use crate::assets::LoadedMesh;
     use crate::geometry::mesh::TriangleMesh;
     use crate::geometry::ray::offset_origin;
-    use crate::lights::LightObject;
+    use crate::lights::LightGeometry;
     use crate::math::DVec3;
     use crate::math::random::signed as random;
     use crate::math::transform::Transform;
@@ -464,16 +470,16 @@ pub(super) mod tests {
             let nothing = Hit { shape: ShapeHit::at(0.0), object: 3 };
             let Hit { shape, object } = found.unwrap_or(nothing);
             for source in [
-                LightObject::Nothing,
-                LightObject::Object(object),
-                LightObject::Primitive(object, shape.primitive),
+                LightGeometry::Nothing,
+                LightGeometry::Object(object),
+                LightGeometry::Primitive(object, shape.primitive),
             ] {
                 let any = (0_u32..).zip(&alone).any(|(id, own)| match source {
-                    LightObject::Nothing => own.any(&ray, &ray.to_f64(), None),
-                    LightObject::Object(except) | LightObject::SeeThrough(except) => {
+                    LightGeometry::Nothing => own.any(&ray, &ray.to_f64(), None),
+                    LightGeometry::Object(except) | LightGeometry::SeeThrough(except) => {
                         id != except && own.any(&ray, &ray.to_f64(), None)
                     }
-                    LightObject::Primitive(of, part) => {
+                    LightGeometry::Primitive(of, part) => {
                         own.any(&ray, &ray.to_f64(), (id == of).then_some(part))
                     }
                 });

@@ -7,11 +7,11 @@
 
 use super::packet::Occluders;
 use super::{Geometry, Hit, PACKET_SIZE, SimdKernel, World};
-use crate::accel::{AnyTest, F32x16};
+use crate::accel::{AnyHitCallback, F32x16};
 use crate::geometry::packet::{RayPacket, lanes};
 use crate::geometry::ray::offset_origin;
 use crate::geometry::{Ray, SurfaceRequest};
-use crate::lights::{LightObject, LightObjectPacket};
+use crate::lights::{LightGeometry, LightObjectPacket};
 use crate::materials::{Footprint, Material};
 use crate::math::Vec3;
 use crate::math::lanes::{Simd, Vec3x16, set_lane};
@@ -93,16 +93,16 @@ impl World {
     }
 
     /// Whether a shadow ray's transmittance is zero.
-    pub fn is_fully_occluded(&self, ray: &Ray, source: LightObject) -> bool {
+    pub fn is_fully_occluded(&self, ray: &Ray, source: LightGeometry) -> bool {
         self.transmittance(ray, source, &mut 0) == Vec3::ZERO
     }
 
     /// Transmittance along a shadow ray to its light.
-    pub fn transmittance(&self, ray: &Ray, source: LightObject, lookups: &mut u64) -> Vec3 {
+    pub fn transmittance(&self, ray: &Ray, source: LightGeometry, lookups: &mut u64) -> Vec3 {
         let Some(see_through) = &self.see_through else {
             return if self.geometry.occluded(ray, source) { Vec3::ZERO } else { Vec3::ONE };
         };
-        let is_own = |object: u32| source == LightObject::Object(object);
+        let is_own = |object: u32| source == LightGeometry::Object(object);
         let stops = |object: u32| !see_through.has(object) && !is_own(object);
         if self.geometry.closest_of(ray, stops).is_some() {
             return Vec3::ZERO;
@@ -131,23 +131,23 @@ impl World {
         &self,
         see_through: &SeeThroughObjects,
         ray: &Ray,
-        source: LightObject,
+        source: LightGeometry,
         lookups: &mut u64,
     ) -> Vec3 {
         let (mut left, mut ray, mut count) = (Vec3::ONE, *ray, 0);
-        let is_own = |object: u32| source == LightObject::Object(object);
+        let is_own = |object: u32| source == LightGeometry::Object(object);
         // The sampled point may be at the end of the ray, up to rounding.
         let end = SAME_DISTANCE * ray.t_max;
         while let Some(hit) =
             self.geometry.closest_of(&ray, |object| see_through.has(object) && !is_own(object))
         {
-            if source == LightObject::SeeThrough(hit.object) && hit.shape.t >= ray.t_max - end {
+            if source == LightGeometry::SeeThrough(hit.object) && hit.shape.t >= ray.t_max - end {
                 break;
             }
             let (part, beyond) = self.continue_past(&ray, &hit, lookups);
             ray = beyond;
             // A light does not occlude itself.
-            if source == LightObject::Primitive(hit.object, hit.shape.primitive) {
+            if source == LightGeometry::Primitive(hit.object, hit.shape.primitive) {
                 continue;
             }
             (left, count) = (left * part, count + 1);
@@ -181,7 +181,8 @@ impl SimdKernel for TransmittanceKernel<'_> {
         let Some(see_through) = &world.see_through else { return transmittance };
         // Find the rays not blocked by opaque objects.
         let geometry: &Geometry = &world.geometry;
-        let each_mesh = see_through.is_any_merged || traced & geometry.to_whole_merged(sources) != 0;
+        let each_mesh =
+            see_through.is_any_merged || traced & geometry.rays_to_merged_mesh_lights(sources) != 0;
         let tree = if each_mesh { geometry.tree() } else { geometry.traced_tree() };
         if tree.has_shells() {
             for lane in lanes(traced) {
@@ -217,7 +218,7 @@ struct OpaqueOccluders<'a, F> {
     near: u32,
 }
 
-impl<F: Simd> AnyTest for OpaqueOccluders<'_, F> {
+impl<F: Simd> AnyHitCallback for OpaqueOccluders<'_, F> {
     #[inline(always)]
     fn test(&mut self, id: u32, met: u32, ends: &F32x16) -> u32 {
         if self.see_through.has(id) {

@@ -2,10 +2,10 @@
 
 use super::merged::MergedMeshes;
 use super::{Geometry, Hit};
-use crate::accel::{AnyTest, ClosestTest, F32x16, PACKET_SIZE, SimdKernel};
+use crate::accel::{AnyHitCallback, ClosestHitCallback, F32x16, PACKET_SIZE, SimdKernel};
 use crate::geometry::Ray;
 use crate::geometry::packet::{HitPacket, RayPacket, lanes, traced};
-use crate::lights::{LightObject, LightObjectPacket};
+use crate::lights::{LightGeometry, LightObjectPacket};
 use crate::math::lanes::{Simd, TRUE, select, select_u32};
 
 impl Geometry {
@@ -43,7 +43,7 @@ impl Geometry {
     /// Like [`Geometry::occluded`], for a packet of shadow rays. Returns the mask of occluded rays. `traced`
     /// is the mask of rays to trace. Must be called inside a SIMD kernel.
     #[inline(always)]
-    pub fn occluded_rows(
+    pub fn occluded_ray_packet(
         &self,
         rows: &RayPacket,
         ends: &F32x16,
@@ -58,13 +58,13 @@ impl Geometry {
 impl Geometry {
     /// Mask of rays whose light is an entire merged mesh.
     #[inline(always)]
-    pub(super) fn to_whole_merged(&self, sources: &LightObjectPacket) -> u32 {
+    pub(super) fn rays_to_merged_mesh_lights(&self, sources: &LightObjectPacket) -> u32 {
         if !sources.is_any || !self.has_merged() {
             return 0;
         }
         let is_whole = |lane: usize| {
             sources.part[lane] == LightObjectPacket::NONE
-                && self.is_whole_merged(LightObject::Object(sources.object[lane]))
+                && self.is_merged_mesh_light(LightGeometry::Object(sources.object[lane]))
         };
         (0..PACKET_SIZE).filter(|&lane| is_whole(lane)).fold(0, |bits, lane| bits | 1 << lane)
     }
@@ -104,7 +104,7 @@ impl Geometry {
     }
 }
 
-/// Kernel of [`Geometry::occluded_rows`].
+/// Kernel of [`Geometry::occluded_ray_packet`].
 struct OcclusionKernel<'a> {
     geometry: &'a Geometry,
     rows: &'a RayPacket,
@@ -119,7 +119,7 @@ impl SimdKernel for OcclusionKernel<'_> {
     #[inline(always)]
     fn run(self, simd: impl Simd) -> u32 {
         let Self { geometry, rows, ends, traced, sources } = self;
-        if geometry.traced_tree().has_shells() || traced & geometry.to_whole_merged(sources) != 0 {
+        if geometry.traced_tree().has_shells() || traced & geometry.rays_to_merged_mesh_lights(sources) != 0 {
             return geometry.occluded_by_each(rows, ends, traced, sources);
         }
         let mut occluders = Occluders::new(geometry, rows, sources, simd);
@@ -160,7 +160,7 @@ struct ClosestObject<'a, F> {
     simd: F,
 }
 
-impl<F: Simd> ClosestTest for ClosestObject<'_, F> {
+impl<F: Simd> ClosestHitCallback for ClosestObject<'_, F> {
     #[inline(always)]
     fn test(&mut self, id: u32, met: u32, ends: &mut F32x16) {
         let mut found = HitPacket::none();
@@ -227,7 +227,7 @@ impl<'a, F: Simd> Occluders<'a, F> {
     }
 }
 
-impl<F: Simd> AnyTest for Occluders<'_, F> {
+impl<F: Simd> AnyHitCallback for Occluders<'_, F> {
     #[inline(always)]
     fn test(&mut self, id: u32, met: u32, ends: &F32x16) -> u32 {
         if let Some(merged) = self.geometry.merged(id) {
@@ -304,7 +304,7 @@ pub(super) mod tests {
     use crate::geometry::parallelogram::Parallelogram;
     use crate::geometry::plane::Plane;
     use crate::geometry::sphere::Sphere;
-    use crate::lights::LightObject;
+    use crate::lights::LightGeometry;
     use crate::math::random::signed as random;
     use crate::math::transform::Transform;
     use crate::math::{DVec3, Vec3};
@@ -374,7 +374,7 @@ pub(super) mod tests {
         #[inline(always)]
         fn run(self, simd: impl Simd) -> u32 {
             let (rows, ends) = RayPacket::new(self.rays);
-            self.geometry.occluded_rows(&rows, &ends, traced(&ends, simd), self.sources, simd)
+            self.geometry.occluded_ray_packet(&rows, &ends, traced(&ends, simd), self.sources, simd)
         }
     }
 
@@ -401,12 +401,12 @@ pub(super) mod tests {
             let alone: Vec<_> = rays.iter().map(|ray| geometry.closest(ray)).collect();
             assert_eq!(found, alone, "{rays:?}");
             let source = |lane: usize| match alone[lane] {
-                Some(hit) if lane.is_multiple_of(3) => LightObject::Object(hit.object),
-                Some(hit) if lane % 3 == 1 => LightObject::Primitive(hit.object, hit.shape.primitive),
-                _ => LightObject::Object(u32::MAX),
+                Some(hit) if lane.is_multiple_of(3) => LightGeometry::Object(hit.object),
+                Some(hit) if lane % 3 == 1 => LightGeometry::Primitive(hit.object, hit.shape.primitive),
+                _ => LightGeometry::Object(u32::MAX),
             };
             let sources: Vec<_> = (0..rays.len()).map(source).collect();
-            let mut row = LightObjectPacket::of(LightObject::Nothing);
+            let mut row = LightObjectPacket::of(LightGeometry::Nothing);
             sources.iter().enumerate().for_each(|(lane, source)| row.set(lane, *source));
             let occluded = geometry.instructions().run(Occluded { geometry, rays: &rays, sources: &row });
             for (lane, (ray, source)) in rays.iter().zip(&sources).enumerate() {

@@ -240,7 +240,7 @@ pub fn material_source(
     material: &Material,
     (texture, role): (usize, TextureRole),
 ) -> TextureSource {
-    let source = declared_source(scene, texture, texture_use(scene, material, (texture, role)));
+    let source = scene_texture_source(scene, texture, texture_use(scene, material, (texture, role)));
     match role {
         TextureRole::Opacity(_) => {
             TextureSource { coverage: coverage_cutoff(scene, texture, material.opacity.cutoff), ..source }
@@ -301,7 +301,7 @@ fn is_same_image(scene: &Scene, a: usize, b: usize) -> bool {
 }
 
 /// Image file and encoding of a scene texture for this use.
-pub fn declared_source(scene: &Scene, texture: usize, used: TextureUse) -> TextureSource {
+pub fn scene_texture_source(scene: &Scene, texture: usize, used: TextureUse) -> TextureSource {
     let texture = &scene.textures[texture];
     let encoding = match (texture.encoding, used) {
         (Encoding::Srgb, TextureUse::Color | TextureUse::Normal) => ImageEncoding::Srgb,

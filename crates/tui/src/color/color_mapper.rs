@@ -5,7 +5,7 @@ use std::cell::RefCell;
 use super::bayer::threshold;
 use super::oklab::oklab;
 use super::palette::{self, AnsiColors};
-use super::recipes::{Ink, InkMixer};
+use super::recipes::{Ink, PatternDither};
 use super::{ColorDepth, NAMES};
 use crate::math::color::srgb8_to_linear;
 use crate::mosaic::{FittedCell, Tile};
@@ -24,7 +24,7 @@ const LEVELS: [f32; 3] = [0.25, 0.5, 0.75];
 
 /// A cell to draw: a tile and the colors of its two parts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct DrawnCell {
+pub(crate) struct MappedCell {
     pub(crate) tile: Tile,
     pub(crate) pair: [Color; 2],
 }
@@ -41,22 +41,22 @@ struct ColorPair {
 #[derive(Debug)]
 pub(crate) struct ColorMapper {
     depth: ColorDepth,
-    plain: RefCell<InkMixer>,
+    plain: RefCell<PatternDither>,
     /// Ink mixer for cells with shade characters, on 16-color terminals.
-    mixed: RefCell<InkMixer>,
+    mixed: RefCell<PatternDither>,
     pairs: Vec<ColorPair>,
 }
 
 impl ColorMapper {
     /// Creates a mapper for a terminal with this color depth and `ansi` as its 16 colors.
     pub(crate) fn new(depth: ColorDepth, ansi: &AnsiColors) -> Self {
-        let none = || RefCell::new(InkMixer::default());
+        let none = || RefCell::new(PatternDither::default());
         let mut shades = Self { depth, plain: none(), mixed: none(), pairs: Vec::new() };
         match depth {
             ColorDepth::TrueColor | ColorDepth::None => {}
             ColorDepth::Indexed256 => {
                 let inks = (palette::FIRST_FIXED..=u8::MAX).filter_map(palette::fixed_color).map(Ink::solid);
-                shades.plain = RefCell::new(InkMixer::new(inks.collect(), CALM_256));
+                shades.plain = RefCell::new(PatternDither::new(inks.collect(), CALM_256));
             }
             ColorDepth::Ansi16 => {
                 let inks: Vec<Ink> = ansi.iter().copied().map(Ink::solid).collect();
@@ -65,8 +65,8 @@ impl ColorMapper {
                     let [front, back] = pair.colors.map(|color| &inks[color]);
                     pair.level.map_or(*front, |level| Ink::shaded(front, back, LEVELS[level]))
                 });
-                shades.mixed = RefCell::new(InkMixer::new(mixed.collect(), CALM_16));
-                shades.plain = RefCell::new(InkMixer::new(inks, CALM_EDGES));
+                shades.mixed = RefCell::new(PatternDither::new(mixed.collect(), CALM_16));
+                shades.plain = RefCell::new(PatternDither::new(inks, CALM_EDGES));
             }
         }
         shades
@@ -84,7 +84,7 @@ impl ColorMapper {
     }
 
     /// The cell to draw at this column and row of the preview.
-    pub(crate) fn map_cell(&self, fitted: FittedCell, x: usize, y: usize) -> DrawnCell {
+    pub(crate) fn map_cell(&self, fitted: FittedCell, x: usize, y: usize) -> MappedCell {
         let [first, second] = fitted.pair;
         if self.depth == ColorDepth::Ansi16 {
             let labs = fitted.pair.map(|rgb| oklab(srgb8_to_linear(rgb)));
@@ -93,19 +93,19 @@ impl ColorMapper {
             }
         }
         let pair = [self.map_color(first, x, 2 * y), self.map_color(second, x, 2 * y + 1)];
-        DrawnCell { tile: fitted.tile, pair }
+        MappedCell { tile: fitted.tile, pair }
     }
 
-    fn dithered_cell(&self, rgb: [u8; 3], x: usize, y: usize) -> DrawnCell {
+    fn dithered_cell(&self, rgb: [u8; 3], x: usize, y: usize) -> MappedCell {
         let index = self.mixed.borrow_mut().ink_index(rgb, threshold(x, y));
         let ColorPair { level, colors } =
             self.pairs.get(index).copied().unwrap_or(ColorPair { level: None, colors: [0; 2] });
         let [front, back] = colors.map(|color| NAMES[color]);
         match level {
-            None => DrawnCell { tile: Tile::HALVES, pair: [front; 2] },
-            Some(0) => DrawnCell { tile: Tile::LIGHT, pair: [front, back] },
-            Some(1) => DrawnCell { tile: Tile::MEDIUM, pair: [front, back] },
-            Some(_) => DrawnCell { tile: Tile::LIGHT, pair: [back, front] },
+            None => MappedCell { tile: Tile::HALVES, pair: [front; 2] },
+            Some(0) => MappedCell { tile: Tile::LIGHT, pair: [front, back] },
+            Some(1) => MappedCell { tile: Tile::MEDIUM, pair: [front, back] },
+            Some(_) => MappedCell { tile: Tile::LIGHT, pair: [back, front] },
         }
     }
 }
@@ -130,7 +130,7 @@ mod tests {
     use super::*;
     use crate::color::XTERM;
 
-    fn cell(shades: &ColorMapper, rgb: [u8; 3], x: usize, y: usize) -> DrawnCell {
+    fn cell(shades: &ColorMapper, rgb: [u8; 3], x: usize, y: usize) -> MappedCell {
         shades.map_cell(FittedCell { tile: Tile::HALVES, pair: [rgb; 2] }, x, y)
     }
 
@@ -162,7 +162,7 @@ mod tests {
     fn gray_between_ansi_colors_is_mixed_from_grays() {
         let shades = ColorMapper::new(ColorDepth::Ansi16, &XTERM);
         for place in 0..64 {
-            let DrawnCell { pair, .. } = cell(&shades, [70; 3], place % 8, place / 8);
+            let MappedCell { pair, .. } = cell(&shades, [70; 3], place % 8, place / 8);
             assert!(pair.iter().all(|color| [Color::Black, Color::DarkGray].contains(color)), "{pair:?}");
         }
     }
@@ -176,7 +176,7 @@ mod tests {
         let edge = FittedCell { tile: Tile::HALVES, pair: [[255; 3], [0; 3]] };
         assert_eq!(
             shades.map_cell(edge, 1, 1),
-            DrawnCell { tile: Tile::HALVES, pair: [Color::White, Color::Black] }
+            MappedCell { tile: Tile::HALVES, pair: [Color::White, Color::Black] }
         );
     }
 }

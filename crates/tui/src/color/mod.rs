@@ -15,7 +15,7 @@ pub(super) use self::oklab::oklab;
 pub use self::palette::xterm_rgb;
 pub(super) use self::palette::{AnsiColors, XTERM, assumed_ansi_colors, fixed_color, nearest_256};
 pub(super) use self::palette_dither::PaletteDither;
-use super::terminals::Brand;
+use super::terminals::TerminalBrand;
 use crate::choice;
 
 choice! {
@@ -89,7 +89,7 @@ fn is_true_color(term: &str, program: &str) -> bool {
     // Inside tmux, TERM_PROGRAM is `tmux`, so the outer terminal's name does not affect the result.
     term.ends_with("-direct")
         || TERMS.iter().any(|name| term.contains(name))
-        || Brand::from_program(program).is_some_and(Brand::has_colors_and_repeats)
+        || TerminalBrand::from_program(program).is_some_and(TerminalBrand::supports_true_color_and_rep)
 }
 
 /// Whether `COLORFGBG` (set by rxvt and some others) indicates a light background.

@@ -1,23 +1,23 @@
 //! Dithering with an arbitrary palette.
 
 use super::bayer::threshold;
-use super::recipes::{Ink, InkMixer};
+use super::recipes::{Ink, PatternDither};
 
 /// How strongly nearby colors are preferred in a palette computed from the image.
 const CALM: f32 = 1.0;
 
 /// A ditherer for one palette.
 #[derive(Debug)]
-pub(crate) struct PaletteDither(InkMixer);
+pub(crate) struct PaletteDither(PatternDither);
 
 impl PaletteDither {
     /// Creates a ditherer for these colors.
     pub(crate) fn new(colors: &[[u8; 3]]) -> Self {
-        Self(InkMixer::new(colors.iter().copied().map(Ink::solid).collect(), CALM))
+        Self(PatternDither::new(colors.iter().copied().map(Ink::solid).collect(), CALM))
     }
 
     /// Index of the palette color to use for `rgb` at this pixel.
-    pub(crate) fn dithered_index(&mut self, rgb: [u8; 3], x: usize, y: usize) -> usize {
+    pub(crate) fn index_at(&mut self, rgb: [u8; 3], x: usize, y: usize) -> usize {
         self.0.ink_index(rgb, threshold(x, y))
     }
 }

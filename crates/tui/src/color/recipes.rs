@@ -48,14 +48,14 @@ impl Ink {
 
 /// Cached dithering recipes for a set of inks.
 #[derive(Debug, Default)]
-pub(super) struct InkMixer {
+pub(super) struct PatternDither {
     inks: Vec<Ink>,
     /// Weight of an ink's distance from the color, relative to the error of the recipe's mean.
     calm: f32,
     recipes: HashMap<[u8; 3], [u16; PARTS]>,
 }
 
-impl InkMixer {
+impl PatternDither {
     /// Creates a mixer for these inks. With `calm` = 0, only the mean matters. Larger values favor inks near
     /// the color.
     pub(super) fn new(inks: Vec<Ink>, calm: f32) -> Self {
@@ -119,8 +119,8 @@ mod tests {
     use super::*;
     use crate::color::palette;
 
-    fn cube() -> InkMixer {
-        InkMixer::new((16..=255).filter_map(palette::fixed_color).map(Ink::solid).collect(), 0.1)
+    fn cube() -> PatternDither {
+        PatternDither::new((16..=255).filter_map(palette::fixed_color).map(Ink::solid).collect(), 0.1)
     }
 
     #[test]

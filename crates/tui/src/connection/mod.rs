@@ -183,7 +183,7 @@ impl Connection {
         let filled = self.bucket.available_at(MIN_SLICE + QUERY_BYTES, now);
         match self.replies {
             ReplyState::Answering => {
-                let lost = (!self.flight.is_empty()).then_some(self.heard + self.silence());
+                let lost = (!self.flight.is_empty()).then_some(self.heard + self.lost_reply_timeout());
                 let filled = self.is_multiplexed.then_some(filled).filter(|filled| *filled > now);
                 [lost, filled].into_iter().flatten().min()
             }
@@ -243,7 +243,7 @@ impl Connection {
                 self.replies = ReplyState::Silent;
                 self.clear_in_flight();
             }
-            ReplyState::Answering if self.awaits_reply() && now >= self.heard + self.silence() => {
+            ReplyState::Answering if self.awaits_reply() && now >= self.heard + self.lost_reply_timeout() => {
                 // The connection is stalled or a reply was lost. Send little until the next reply.
                 self.clear_in_flight();
                 self.window = MIN_WINDOW;
@@ -253,7 +253,7 @@ impl Connection {
     }
 
     /// Time after which missing replies are considered lost.
-    fn silence(&self) -> Duration {
+    fn lost_reply_timeout(&self) -> Duration {
         SILENCE.max(self.round_trips.minimum().unwrap_or_default() * SILENCE_ROUND_TRIPS)
     }
 

@@ -21,16 +21,16 @@ use self::palette::Palette;
 use crate::film::Picture;
 
 pub(super) use self::kitty::delete_all;
-pub use self::pixel_screen::PixelScreen;
+pub use self::pixel_screen::TestImageTerminal;
 
 /// Image protocols.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Protocol {
+pub(super) enum ImageProtocol {
     /// kitty's protocol, supported by kitty, Ghostty, Konsole and WezTerm.
     Kitty,
     /// DEC's Sixel format, supported by foot, xterm with `-ti vt340`, mlterm and tmux.
     Sixel,
-    /// iTerm2's protocol. See [`Brand`](super::terminals::Brand) for terminals that support it.
+    /// iTerm2's protocol. See [`TerminalBrand`](super::terminals::Brand) for terminals that support it.
     Iterm,
 }
 
@@ -60,7 +60,7 @@ const STILL_SECONDS: f64 = 1.5;
 /// The images on the screen and in flight.
 #[derive(Debug)]
 pub(super) struct Images {
-    protocol: Protocol,
+    protocol: ImageProtocol,
     /// Whether escape sequences are wrapped for tmux.
     is_wrapped: bool,
     wanted: Option<PixelPlacement>,
@@ -79,9 +79,9 @@ pub(super) struct Images {
 
 impl Images {
     /// Creates an empty state. `is_wrapped` must be true inside tmux.
-    pub(super) fn new(protocol: Protocol, is_wrapped: bool) -> Self {
+    pub(super) fn new(protocol: ImageProtocol, is_wrapped: bool) -> Self {
         // tmux draws Sixel images itself.
-        let is_wrapped = is_wrapped && protocol != Protocol::Sixel;
+        let is_wrapped = is_wrapped && protocol != ImageProtocol::Sixel;
         Self {
             protocol,
             is_wrapped,
@@ -105,8 +105,8 @@ impl Images {
         }
         self.shown = None;
         match self.protocol {
-            Protocol::Kitty => self.pieces.push_back(self.wrap_for_tmux(kitty::delete_all())),
-            Protocol::Sixel | Protocol::Iterm => {}
+            ImageProtocol::Kitty => self.pieces.push_back(self.wrap_for_tmux(kitty::delete_all())),
+            ImageProtocol::Sixel | ImageProtocol::Iterm => {}
         }
         Some(shown)
     }
@@ -143,20 +143,22 @@ impl Images {
         let scale = (most / (PIXEL_BYTES * pixels).max(1.0)).sqrt().min(1.0);
         let side = |length: u32| ((f64::from(length) * scale) as u32).max(1);
         let picture = match self.protocol {
-            Protocol::Sixel => wanted.picture.clone(),
-            Protocol::Kitty | Protocol::Iterm => {
+            ImageProtocol::Sixel => wanted.picture.clone(),
+            ImageProtocol::Kitty | ImageProtocol::Iterm => {
                 let (width, height) = (side(wanted.picture.width), side(wanted.picture.height));
                 Arc::new(super::rescale::resized(&wanted.picture, width, height))
             }
         };
         self.is_coarse = scale < 1.0 && !self.is_still;
         let bodies = match self.protocol {
-            Protocol::Kitty => {
+            ImageProtocol::Kitty => {
                 self.turn = !self.turn;
                 kitty::encode(&picture, wanted.cells, self.turn)
             }
-            Protocol::Sixel => vec![sixel::encode(&picture, wanted.cells, wanted.cell, &mut self.palette)],
-            Protocol::Iterm => vec![iterm::encode(&picture, wanted.cells)],
+            ImageProtocol::Sixel => {
+                vec![sixel::encode(&picture, wanted.cells, wanted.cell, &mut self.palette)]
+            }
+            ImageProtocol::Iterm => vec![iterm::encode(&picture, wanted.cells)],
         };
         let last = bodies.len().saturating_sub(1);
         for (i, body) in bodies.into_iter().enumerate() {

@@ -30,7 +30,7 @@ impl Palette {
     /// Returns the palette for an image, reusing the previous one if it still fits.
     pub(super) fn for_picture(picture: &Picture, before: Option<Self>) -> Self {
         let mut bins = histogram(picture);
-        let colors = split_bins(&mut bins);
+        let colors = split_into_boxes(&mut bins);
         let fits = |palette: &Self| {
             palette_error(&bins, &palette.colors) <= WORSE * palette_error(&bins, &colors) + ALLOWED
         };
@@ -46,7 +46,7 @@ impl Palette {
         let width = picture.width.max(1) as usize;
         let mut index = |(i, rgb): (usize, &[u8; 3])| {
             let (x, y) = (i % width, i / width);
-            self.dither.dithered_index(dithered_to_6_bits(*rgb, x, y), x, y) as u8
+            self.dither.index_at(dithered_to_6_bits(*rgb, x, y), x, y) as u8
         };
         picture.pixels.iter().enumerate().map(&mut index).collect()
     }
@@ -108,7 +108,7 @@ impl ColorBox {
 
 /// Repeatedly splits the box with the largest error until there are `MAX` boxes or all are exact. Returns the
 /// mean color of each box.
-fn split_bins(bins: &mut [Bin]) -> Vec<[u8; 3]> {
+fn split_into_boxes(bins: &mut [Bin]) -> Vec<[u8; 3]> {
     let mut boxes = vec![ColorBox::for_bins(bins, 0..bins.len())];
     while boxes.len() < MAX {
         let worst = (0..boxes.len()).max_by(|a, b| boxes[*a].error.total_cmp(&boxes[*b].error));

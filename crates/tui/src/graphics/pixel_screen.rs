@@ -5,7 +5,7 @@ use crate::film::Picture;
 
 /// A terminal that understands only kitty graphics and Sixel, and shows the last complete image.
 #[derive(Debug, Default)]
-pub struct PixelScreen {
+pub struct TestImageTerminal {
     /// The control string being received, including its introducer.
     string: Option<Vec<u8>>,
     is_escaped: bool,
@@ -15,7 +15,7 @@ pub struct PixelScreen {
     count: usize,
 }
 
-impl PixelScreen {
+impl TestImageTerminal {
     /// Processes terminal output, which may be split at any byte.
     pub fn take(&mut self, bytes: &[u8]) {
         for byte in bytes {

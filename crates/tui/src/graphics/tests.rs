@@ -18,7 +18,7 @@ fn all(images: &mut Images) -> String {
 
 #[test]
 fn newest_image_replaces_pending_ones() {
-    let mut images = Images::new(Protocol::Kitty, false);
+    let mut images = Images::new(ImageProtocol::Kitty, false);
     assert!(images.is_complete() && images.next_slice(5000, None).is_none());
     let (first, second, third) = (placement(1, 2), placement(2, 2), placement(3, 2));
     images.set_target(Some(first), false);
@@ -37,7 +37,7 @@ fn newest_image_replaces_pending_ones() {
 
 #[test]
 fn kitty_chunks_are_short_and_images_alternate() {
-    let mut images = Images::new(Protocol::Kitty, false);
+    let mut images = Images::new(ImageProtocol::Kitty, false);
     images.set_target(Some(placement(1, 2)), true);
     let first = all(&mut images);
     for command in first.split("\x1b\\").filter(|command| command.contains(';') && command.contains("_G")) {
@@ -52,7 +52,7 @@ fn kitty_chunks_are_short_and_images_alternate() {
 
 #[test]
 fn moving_an_image_uncovers_its_old_cells() {
-    for protocol in [Protocol::Kitty, Protocol::Sixel, Protocol::Iterm] {
+    for protocol in [ImageProtocol::Kitty, ImageProtocol::Sixel, ImageProtocol::Iterm] {
         let mut images = Images::new(protocol, false);
         assert_eq!(images.set_target(Some(placement(1, 2)), true), None);
         all(&mut images);
@@ -61,14 +61,14 @@ fn moving_an_image_uncovers_its_old_cells() {
         assert_eq!(images.set_target(Some(placement(2, 3)), true), Some(Rect::new(2, 1, 8, 3)));
         all(&mut images);
         assert_eq!(images.set_target(None, true), Some(Rect::new(3, 1, 8, 3)));
-        assert_eq!(all(&mut images).contains("a=d"), protocol == Protocol::Kitty);
+        assert_eq!(all(&mut images).contains("a=d"), protocol == ImageProtocol::Kitty);
         assert!(images.is_complete());
     }
 }
 
 #[test]
 fn slow_connections_get_coarser_images() {
-    let mut images = Images::new(Protocol::Iterm, false);
+    let mut images = Images::new(ImageProtocol::Iterm, false);
     let picture = placement(1, 2);
     images.set_target(Some(picture.clone()), false);
     let coarse = images.next_slice(5000, Some(1000.0)).expect("a picture").len();
@@ -83,7 +83,7 @@ fn slow_connections_get_coarser_images() {
 #[test]
 fn tmux_sequences_are_wrapped() {
     assert_eq!(tmux_passthrough(b"\x1b_Gx\x1b\\"), b"\x1bPtmux;\x1b\x1b_Gx\x1b\x1b\\\x1b\\");
-    let mut images = Images::new(Protocol::Iterm, true);
+    let mut images = Images::new(ImageProtocol::Iterm, true);
     images.set_target(Some(placement(1, 2)), true);
     let bytes = all(&mut images);
     assert!(
@@ -98,7 +98,7 @@ fn sixel_size_and_colors_match_the_image() {
     let mut placed = placement(0, 0);
     let pixels = (0..64 * 48).map(|i| if i % 64 < 32 { [255, 0, 0] } else { [0, 0, 255] }).collect();
     placed.picture = Arc::new(Picture { width: 64, height: 48, pixels });
-    let mut images = Images::new(Protocol::Sixel, true);
+    let mut images = Images::new(ImageProtocol::Sixel, true);
     images.set_target(Some(placed), true);
     let bytes = all(&mut images);
     assert!(bytes.contains("\x1bP0;1;0q\"1;1;64;48#16;2;100;0;0#17;2;0;0;100"), "{bytes}");
@@ -116,9 +116,9 @@ fn sixel_images_are_resized_to_their_cells() {
         let pixels = (0..width * height).map(|i| color(i % width * 4 / width, i / width * 3 / height));
         let mut placed = placement(0, 0);
         placed.picture = Arc::new(Picture { width, height, pixels: pixels.collect() });
-        let mut images = Images::new(Protocol::Sixel, false);
+        let mut images = Images::new(ImageProtocol::Sixel, false);
         images.set_target(Some(placed), true);
-        let mut screen = PixelScreen::default();
+        let mut screen = TestImageTerminal::default();
         screen.take(all(&mut images).as_bytes());
         let shown = screen.shown().expect("a picture");
         assert_eq!((shown.width, shown.height), (64, 48));

@@ -1,6 +1,6 @@
 //! Terminal replies sent as control strings: name, colors and capabilities.
 
-use crate::graphics::Protocol;
+use crate::graphics::ImageProtocol;
 use crate::pixel_request::QUERY_ID;
 use crate::terminal_replies::TerminalReply;
 use crate::terminals::TerminalId;
@@ -74,7 +74,11 @@ pub(super) fn parse_osc(params: &[&[u8]]) -> TerminalReply {
 /// Parses an application program command (APC) that contains kitty's reply to the image query.
 pub(super) fn parse_apc(text: &[u8]) -> TerminalReply {
     let of_query = format!("Gi={QUERY_ID};OK");
-    if text == of_query.as_bytes() { TerminalReply::Images(Protocol::Kitty) } else { TerminalReply::Other }
+    if text == of_query.as_bytes() {
+        TerminalReply::Images(ImageProtocol::Kitty)
+    } else {
+        TerminalReply::Other
+    }
 }
 
 fn parse_decimal(text: &[u8]) -> Option<u8> {

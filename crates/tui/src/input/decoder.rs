@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use crossterm::event::KeyCode;
 
 use super::decoded::DecodedInput;
-use super::keys::KeyParser;
+use super::keys::InputPerformer;
 use super::paste::Paste;
 use crate::event::KeyPress;
 
@@ -35,7 +35,7 @@ const MAX_DOUBTFUL_BYTES: usize = 32;
 #[derive(Default)]
 pub(crate) struct Decoder {
     parser: vte::Parser,
-    meaning: KeyParser,
+    meaning: InputPerformer,
     held: PendingSequence,
     /// Time when the last byte arrived.
     last: Option<Instant>,

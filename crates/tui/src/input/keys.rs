@@ -5,13 +5,13 @@ use vte::{Params, Perform};
 
 use super::control_strings::{self, ControlString};
 use super::decoded::DecodedInput;
-use crate::event::{KeyPress, Mouse, MouseKind};
-use crate::graphics::Protocol;
+use crate::event::{KeyPress, Mouse, MouseEventKind};
+use crate::graphics::ImageProtocol;
 use crate::terminal_replies::TerminalReply;
 
 /// Parser callbacks that collect the decoded input.
 #[derive(Debug, Default)]
-pub(super) struct KeyParser {
+pub(super) struct InputPerformer {
     /// Decoded input, in order.
     pub found: Vec<DecodedInput>,
     /// Whether a sequence, recognized or not, has ended.
@@ -35,7 +35,7 @@ enum NextCharacter {
     Mouse(u8),
 }
 
-impl KeyParser {
+impl InputPerformer {
     /// Drops the current sequence.
     pub(super) fn reset(&mut self) {
         self.next = NextCharacter::Character;
@@ -56,11 +56,11 @@ impl KeyParser {
     fn push_mouse(&mut self, code: u16, (column, row): (u16, u16), is_pressed: bool) {
         const MODIFIERS: u16 = 4 | 8 | 16;
         let kind = match (code & !MODIFIERS, is_pressed) {
-            (0, true) => MouseKind::Press,
-            (0 | 32, false) => MouseKind::Release,
-            (32, true) => MouseKind::Drag,
-            (64, true) => MouseKind::WheelUp,
-            (65, true) => MouseKind::WheelDown,
+            (0, true) => MouseEventKind::Press,
+            (0 | 32, false) => MouseEventKind::Release,
+            (32, true) => MouseEventKind::Drag,
+            (64, true) => MouseEventKind::WheelUp,
+            (65, true) => MouseEventKind::WheelDown,
             // Other buttons are ignored.
             _ => return self.push_reply(TerminalReply::Other),
         };
@@ -73,7 +73,7 @@ impl KeyParser {
     }
 }
 
-impl Perform for KeyParser {
+impl Perform for InputPerformer {
     fn print(&mut self, character: char) {
         self.has_ended = true;
         match std::mem::take(&mut self.next) {
@@ -139,7 +139,7 @@ impl Perform for KeyParser {
             (b"<", 'M' | 'm') => self.push_mouse(first, (second, number(2)), action == 'M'),
             (b"?", 'c') => {
                 if params.iter().any(|param| param == [4]) {
-                    self.push_reply(TerminalReply::Images(Protocol::Sixel));
+                    self.push_reply(TerminalReply::Images(ImageProtocol::Sixel));
                 }
                 self.push_reply(TerminalReply::Attributes);
             }

@@ -50,7 +50,7 @@ pub(super) fn start_reader(events: &Sender<Event>) -> io::Result<()> {
 static HELD: (Mutex<bool>, Condvar) = (Mutex::new(false), Condvar::new());
 
 /// Lets another program read the input, or resumes reading it.
-pub(super) fn set_held(is_held: bool) {
+pub(super) fn set_input_paused(is_held: bool) {
     *HELD.0.lock().unwrap_or_else(PoisonError::into_inner) = is_held;
     HELD.1.notify_all();
 }

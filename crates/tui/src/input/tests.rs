@@ -4,10 +4,10 @@ use crossterm::event::{KeyCode, KeyModifiers};
 use proptest::prelude::*;
 
 use super::*;
-use crate::event::{Mouse, MouseKind};
-use crate::graphics::Protocol;
+use crate::event::{Mouse, MouseEventKind};
+use crate::graphics::ImageProtocol;
 use crate::terminal_replies::TerminalReply;
-use crate::terminals::{Brand, TerminalId};
+use crate::terminals::{TerminalBrand, TerminalId};
 
 /// A decoder with a simulated clock.
 struct DecoderBench {
@@ -109,7 +109,7 @@ fn replies_are_not_keys() {
         (b"\x1bP0+r524742\x1b\\", TerminalReply::Other),
         (
             b"\x1bP>|foot(1.20.2)\x1b\\",
-            TerminalReply::Name(TerminalId { brand: Brand::Foot, version: [1, 20] }),
+            TerminalReply::Name(TerminalId { brand: TerminalBrand::Foot, version: [1, 20] }),
         ),
         (b"\x1bP>|tmux 3.4\x1b\\", TerminalReply::Other),
         (b"\x1b[I", TerminalReply::Focus { is_here: true }),
@@ -117,7 +117,7 @@ fn replies_are_not_keys() {
         (b"\x1b[<2;10;20M", TerminalReply::Other),
         (b"\x1b[<35;10;20M", TerminalReply::Other),
         (b"\x1b[?997;1n", TerminalReply::Other),
-        (b"\x1b_Gi=4211;OK\x1b\\", TerminalReply::Images(Protocol::Kitty)),
+        (b"\x1b_Gi=4211;OK\x1b\\", TerminalReply::Images(ImageProtocol::Kitty)),
         (b"\x1b_Gi=4211;ENOTSUPPORTED\x1b\\", TerminalReply::Other),
         (b"\x1b_Gi=31;OK\x1b\\", TerminalReply::Other),
     ] {
@@ -135,7 +135,7 @@ fn replies_are_not_keys() {
 
 #[test]
 fn left_button_and_wheel_are_decoded() {
-    use MouseKind::{Drag, Press, Release, WheelDown, WheelUp};
+    use MouseEventKind::{Drag, Press, Release, WheelDown, WheelUp};
     for (bytes, kind) in [
         (&b"\x1b[<0;10;20M"[..], Press),
         (b"\x1b[<20;10;20M", Press),
@@ -171,8 +171,8 @@ fn lone_escape_is_a_key() {
 
 #[test]
 fn sixel_support_is_read_from_attributes() {
-    let answers =
-        [TerminalReply::Images(Protocol::Sixel), TerminalReply::Attributes].map(DecodedInput::TerminalReply);
+    let answers = [TerminalReply::Images(ImageProtocol::Sixel), TerminalReply::Attributes]
+        .map(DecodedInput::TerminalReply);
     assert_eq!(read(b"\x1b[?62;4;22c"), answers);
     assert_eq!(read(b"\x1b[?1;2;4c"), answers);
     assert_eq!(read(b"\x1b[?44;14c"), [DecodedInput::TerminalReply(TerminalReply::Attributes)]);
@@ -183,13 +183,13 @@ fn image_replies_do_not_swallow_keys() {
     let keys = b"q\x1b_Gi=4211;OK\x1b\\s";
     assert_eq!(
         read(keys),
-        [plain('q'), DecodedInput::TerminalReply(TerminalReply::Images(Protocol::Kitty)), plain('s')]
+        [plain('q'), DecodedInput::TerminalReply(TerminalReply::Images(ImageProtocol::Kitty)), plain('s')]
     );
     // The end of the reply arrives late.
     let mut bench = DecoderBench::new();
     assert_eq!(
         bench.read(b"\x1b_Gi=4211;OK\x1b"),
-        [DecodedInput::TerminalReply(TerminalReply::Images(Protocol::Kitty))]
+        [DecodedInput::TerminalReply(TerminalReply::Images(ImageProtocol::Kitty))]
     );
     assert_eq!(bench.wait(300), []);
     assert_eq!(bench.read(b"\\s"), [plain('s')]);

@@ -89,13 +89,13 @@ fn from_mask(mask: u32) -> Option<(Tile, bool)> {
 }
 
 /// Characters and the grid squares they fill.
-struct TileTable {
+struct BlockPatternTable {
     masks: HashMap<char, u32>,
     symbols: HashMap<u32, char>,
 }
 
-static TABLE: LazyLock<TileTable> = LazyLock::new(|| {
-    let mut table = TileTable { masks: HashMap::new(), symbols: HashMap::new() };
+static TABLE: LazyLock<BlockPatternTable> = LazyLock::new(|| {
+    let mut table = BlockPatternTable { masks: HashMap::new(), symbols: HashMap::new() };
     let mut add = |symbol: char, mask: u32| {
         table.masks.entry(symbol).or_insert(mask);
         table.symbols.entry(mask).or_insert(symbol);

@@ -1,7 +1,7 @@
 //! Candidate colors for a cell.
 
 use super::cell::Mosaic;
-use super::cost_model::CostModel;
+use super::cost_model::RateDistortion;
 use super::terminal_color::{TerminalColor, decimal_digits};
 use crate::color::nearest_256;
 
@@ -23,7 +23,7 @@ pub(super) struct CandidateColors {
 }
 
 /// Candidates for the first of `cells`. Each candidate also fits as many of the following cells as possible.
-pub(super) fn candidates(cells: &[Option<Mosaic>], model: CostModel) -> CandidateColors {
+pub(super) fn candidates(cells: &[Option<Mosaic>], model: RateDistortion) -> CandidateColors {
     let column = |part: usize| cells.iter().map_while(move |cell| cell.map(|mosaic| mosaic.pair[part]));
     let both = cells.iter().map_while(|cell| cell.map(|mosaic| mosaic.pair)).flatten();
     CandidateColors {
@@ -35,7 +35,7 @@ pub(super) fn candidates(cells: &[Option<Mosaic>], model: CostModel) -> Candidat
 
 fn candidate_colors(
     wanted: &(impl Iterator<Item = TerminalColor> + Clone),
-    model: CostModel,
+    model: RateDistortion,
 ) -> Vec<TerminalColor> {
     let mut shades = Vec::with_capacity(MAX);
     let Some(first) = wanted.clone().next() else { return shades };
@@ -121,13 +121,13 @@ mod tests {
     #[test]
     fn candidates_cover_many_following_cells() {
         // 21 is within the tolerance of 20, 21 and 22, but not of 24.
-        let found = candidates(&row(&[20, 21, 22, 24]), CostModel::EXACT);
+        let found = candidates(&row(&[20, 21, 22, 24]), RateDistortion::EXACT);
         assert_eq!(found.first, [TerminalColor::Rgb([21, 50, 99])]);
         assert_eq!(found.second, [TerminalColor::Rgb([0, 0, 0])], "themes may replace color 16");
         assert_eq!(found.both.len(), 1, "no color fits both halves");
         let grays = [Some(Mosaic::uniform(TerminalColor::Rgb([8, 8, 8])))];
         assert_eq!(
-            candidates(&grays, CostModel::EXACT).first,
+            candidates(&grays, RateDistortion::EXACT).first,
             [TerminalColor::Rgb([8, 8, 8]), TerminalColor::Palette(232)]
         );
     }
@@ -136,12 +136,12 @@ mod tests {
     fn palette_colors_are_kept_unchanged() {
         let cells =
             [Some(Mosaic::halves([TerminalColor::DefaultBackground, TerminalColor::Palette(3)])), None];
-        let found = candidates(&cells, CostModel::MOVING);
+        let found = candidates(&cells, RateDistortion::MOVING);
         assert_eq!(
             (found.first, found.second),
             (vec![TerminalColor::DefaultBackground], vec![TerminalColor::Palette(3)])
         );
-        let found = candidates(&[None], CostModel::MOVING);
+        let found = candidates(&[None], RateDistortion::MOVING);
         assert!(found.first.is_empty() && found.both.is_empty());
     }
 }

@@ -89,7 +89,7 @@ impl TextCell {
 
 /// The four ways to fill a cell's two parts with the pen's two colors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Glyph {
+pub(super) enum CellFill {
     Blank,
     First,
     Second,
@@ -103,7 +103,7 @@ const ON_BLANKS: Modifier = Modifier::REVERSED
     .union(Modifier::RAPID_BLINK)
     .union(Modifier::CROSSED_OUT);
 
-impl Glyph {
+impl CellFill {
     pub(super) const ALL: [Self; 4] = [Self::Blank, Self::First, Self::Second, Self::Full];
 
     /// The character that draws this tile.

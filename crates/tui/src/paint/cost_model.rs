@@ -5,7 +5,7 @@ use super::terminal_color::TerminalColor;
 /// Relative weight of bytes and color error. The error of half a cell is the sum of its squared channel
 /// differences.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct CostModel {
+pub(super) struct RateDistortion {
     /// Color error that is acceptable for each byte saved.
     pub(super) byte: f32,
     /// Maximum color difference per channel.
@@ -15,7 +15,7 @@ pub(super) struct CostModel {
     pub(super) spans: &'static [u8],
 }
 
-impl CostModel {
+impl RateDistortion {
     /// Cost model for colors accurate to 1/255 per channel.
     pub(super) const EXACT: Self = Self { byte: 64.0, most: 1, spans: &[1] };
 
@@ -26,7 +26,7 @@ impl CostModel {
     /// as much as a color change.
     pub(super) const MOVING: Self = Self { byte: 32.0, most: 255, spans: &[1, 4, 9] };
 
-    /// Returns the model with a different cost per byte, but no less than that of [`CostModel::MOVING`].
+    /// Returns the model with a different cost per byte, but no less than that of [`RateDistortion::MOVING`].
     pub(super) fn with_byte_cost(self, byte: f32) -> Self {
         let byte = byte.max(Self::MOVING.byte);
         let spans: &[u8] = match byte {
@@ -59,16 +59,19 @@ mod tests {
     #[test]
     fn error_is_a_bounded_sum_of_squares() {
         let (a, b) = (TerminalColor::Rgb([10, 20, 30]), TerminalColor::Rgb([11, 20, 32]));
-        assert_eq!(CostModel::MOVING.error(a, b), 5.0);
-        assert_eq!(CostModel::EXACT.error(a, b), f32::INFINITY);
-        assert_eq!(CostModel::EXACT.error(a, TerminalColor::Rgb([9, 21, 30])), 2.0);
-        assert_eq!(CostModel::MOVING.error(TerminalColor::Palette(16), TerminalColor::Rgb([1, 1, 0])), 2.0);
+        assert_eq!(RateDistortion::MOVING.error(a, b), 5.0);
+        assert_eq!(RateDistortion::EXACT.error(a, b), f32::INFINITY);
+        assert_eq!(RateDistortion::EXACT.error(a, TerminalColor::Rgb([9, 21, 30])), 2.0);
         assert_eq!(
-            CostModel::MOVING.error(TerminalColor::DefaultBackground, TerminalColor::Palette(0)),
+            RateDistortion::MOVING.error(TerminalColor::Palette(16), TerminalColor::Rgb([1, 1, 0])),
+            2.0
+        );
+        assert_eq!(
+            RateDistortion::MOVING.error(TerminalColor::DefaultBackground, TerminalColor::Palette(0)),
             f32::INFINITY
         );
         assert_eq!(
-            CostModel::MOVING.error(TerminalColor::DefaultBackground, TerminalColor::DefaultBackground),
+            RateDistortion::MOVING.error(TerminalColor::DefaultBackground, TerminalColor::DefaultBackground),
             0.0
         );
     }

@@ -161,10 +161,10 @@ impl Painter {
         self.memory.set_target(&wanted, self.screen.as_ref());
         self.wanted = wanted;
         self.aim += 1;
-        self.start_over();
+        self.restart_drawing();
     }
 
-    fn start_over(&mut self) {
+    fn restart_drawing(&mut self) {
         let mut rows: Vec<u16> = self.wanted.rows_from_the_middle().collect();
         rows.sort_by_key(|y| self.rows[usize::from(*y)].aim);
         let words = (0..self.wanted.rows).map(DrawStep::Words);
@@ -250,7 +250,7 @@ impl Painter {
     pub fn damage(&mut self, cells: Rect) {
         if let Some(screen) = &mut self.screen {
             screen.damage(cells);
-            self.start_over();
+            self.restart_drawing();
         }
     }
 
@@ -259,6 +259,6 @@ impl Painter {
         self.screen = None;
         self.memory.invalidate();
         self.rows.fill(RowProgress::default());
-        self.start_over();
+        self.restart_drawing();
     }
 }

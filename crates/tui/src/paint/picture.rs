@@ -1,7 +1,7 @@
 //! Draws the preview as close to its target as the byte budget allows.
 
 use super::cell::CellContent;
-use super::cost_model::CostModel;
+use super::cost_model::RateDistortion;
 use super::cursor_moves::CellPosition;
 use super::fidelity::Fidelity;
 use super::row_optimizer::{DrawOp, PlannedRow, RowStart, TargetCell, plan_row};
@@ -22,12 +22,12 @@ const DEAREST: f32 = 4000.0;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ByteBudget {
     bytes: u32,
-    model: CostModel,
+    model: RateDistortion,
 }
 
 impl Default for ByteBudget {
     fn default() -> Self {
-        Self { bytes: 0, model: CostModel::MOVING }
+        Self { bytes: 0, model: RateDistortion::MOVING }
     }
 }
 
@@ -70,9 +70,9 @@ pub(super) fn plan_preview_row(
         is_at_start: screen.cursor == Some(CellPosition { x: columns.start, y }),
     };
     let row = match wanted.fidelity {
-        Fidelity::Still => plan_row(&targets, start, CostModel::EXACT),
-        Fidelity::Following => plan_row(&targets, start, CostModel::ALL),
-        Fidelity::Moving => plan_row(&targets, start, CostModel::MOVING),
+        Fidelity::Still => plan_row(&targets, start, RateDistortion::EXACT),
+        Fidelity::Following => plan_row(&targets, start, RateDistortion::ALL),
+        Fidelity::Moving => plan_row(&targets, start, RateDistortion::MOVING),
         Fidelity::First => budget.plan_row_in_budget(&targets, start),
     };
     let stroke = |op: DrawOp| Stroke::Mosaic {

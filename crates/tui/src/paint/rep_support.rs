@@ -1,6 +1,6 @@
 //! Detects support for REP from environment variables.
 
-use crate::terminals::Brand;
+use crate::terminals::TerminalBrand;
 
 /// Whether the terminal supports REP (ECMA-48 8.3.103, repeat the preceding character), judging from
 /// environment variables. Many terminals set `TERM` to `xterm-256color`, but not all of them support REP.
@@ -11,7 +11,7 @@ pub fn can_repeat(variable: impl Fn(&str) -> Option<String>) -> bool {
     let (term, program) = (get("TERM"), get("TERM_PROGRAM"));
     TERMS.iter().any(|name| term.starts_with(name))
         || (get("TMUX").is_empty()
-            && Brand::from_program(&program).is_some_and(Brand::has_colors_and_repeats))
+            && TerminalBrand::from_program(&program).is_some_and(TerminalBrand::supports_true_color_and_rep))
 }
 
 #[cfg(test)]

@@ -5,8 +5,8 @@
 //! a few pens (Viterbi algorithm with beam search) and traces the path back from the cheapest end.
 
 use super::candidates::{CandidateColors, candidates};
-use super::cell::{Glyph, Mosaic};
-use super::cost_model::CostModel;
+use super::cell::{CellFill, Mosaic};
+use super::cost_model::RateDistortion;
 use super::terminal_color::{ColorLayer, TerminalColor, decimal_digits};
 use crate::mosaic::{PLACES, Tile};
 
@@ -39,7 +39,7 @@ pub(super) struct RowStart {
 pub(super) struct DrawOp {
     /// Column relative to the first target cell.
     pub(super) column: usize,
-    pub(super) glyph: Glyph,
+    pub(super) glyph: CellFill,
     pub(super) mosaic: Mosaic,
 }
 
@@ -57,7 +57,7 @@ struct DrawPath {
     /// Index of the path to the previous cell.
     parent: usize,
     /// The glyph drawn in the cell. `None` if the cell was kept.
-    glyph: Option<Glyph>,
+    glyph: Option<CellFill>,
 }
 
 /// Packs two colors into one key.
@@ -83,7 +83,7 @@ impl CursorGap {
         }
     }
 
-    fn widened_by_cell(self) -> Self {
+    fn plus_one_cell(self) -> Self {
         match self {
             Self::Far => Self::Far,
             Self::Cells(count) => Self::Cells(count.saturating_add(1)),
@@ -99,7 +99,7 @@ pub(super) struct PlannedRow {
 }
 
 /// Finds the cheapest path through a row of cells.
-pub(super) fn plan_row(targets: &[TargetCell], start: RowStart, model: CostModel) -> PlannedRow {
+pub(super) fn plan_row(targets: &[TargetCell], start: RowStart, model: RateDistortion) -> PlannedRow {
     let gap = if start.is_at_start { CursorGap::Cells(0) } else { CursorGap::Far };
     let RowStart { fg, bg, .. } = start;
     let first = DrawPath { fg, bg, pen: pen_key(fg, bg), gap, bytes: 0, cost: 0.0, parent: 0, glyph: None };
@@ -117,7 +117,7 @@ fn extend_paths(
     last: &[DrawPath],
     target: TargetCell,
     wanted: &[Option<Mosaic>],
-    model: CostModel,
+    model: RateDistortion,
 ) -> Vec<DrawPath> {
     let mut beam = Beam { paths: Vec::with_capacity(BEAM), limit: MAX_BYTES * model.byte };
     let leave = match (target.wanted, target.shown) {
@@ -131,7 +131,7 @@ fn extend_paths(
     if leave.is_finite() {
         for (parent, path) in last.iter().enumerate() {
             beam.add(DrawPath {
-                gap: path.gap.widened_by_cell(),
+                gap: path.gap.plus_one_cell(),
                 cost: path.cost + leave,
                 parent,
                 glyph: None,
@@ -202,7 +202,7 @@ struct ColorChange {
 /// Color changes to try for a cell.
 struct ColorChanges {
     mosaic: Mosaic,
-    model: CostModel,
+    model: RateDistortion,
     all: Vec<ColorChange>,
     /// End index of the colors for the first part. Colors for the second part follow, up to `second`.
     first: usize,
@@ -210,7 +210,7 @@ struct ColorChanges {
 }
 
 impl ColorChanges {
-    fn new(candidates: &CandidateColors, mosaic: Mosaic, model: CostModel) -> Self {
+    fn new(candidates: &CandidateColors, mosaic: Mosaic, model: RateDistortion) -> Self {
         let CandidateColors { first, second, both } = candidates;
         let mut changes =
             Self { mosaic, model, all: Vec::new(), first: first.len(), second: first.len() + second.len() };
@@ -241,15 +241,15 @@ impl ColorChanges {
         }
         let (fg_errors, bg_errors) = (self.errors(path.fg), self.errors(path.bg));
         let pen = PenErrors { fg: path.fg, fg_errors, bg: path.bg, bg_errors };
-        for glyph in Glyph::ALL {
+        for glyph in CellFill::ALL {
             ends.add(pen, 0, glyph);
         }
         for (index, change) in self.all.iter().enumerate() {
             let bytes = change.bytes + 3;
             let (as_fg, as_bg) = match index {
-                _ if index < self.first => (Glyph::First, Glyph::Second),
-                _ if index < self.second => (Glyph::Second, Glyph::First),
-                _ => (Glyph::Full, Glyph::Blank),
+                _ if index < self.first => (CellFill::First, CellFill::Second),
+                _ if index < self.second => (CellFill::Second, CellFill::First),
+                _ => (CellFill::Full, CellFill::Blank),
             };
             if change.shade.fits(ColorLayer::Foreground) {
                 ends.add(pen.with_fg(change), bytes, as_fg);
@@ -266,7 +266,7 @@ impl ColorChanges {
         for first in &self.all[..self.first] {
             for second in &self.all[self.first..self.second] {
                 let bytes = first.bytes + second.bytes + 4;
-                for (fg, bg, glyph) in [(first, second, Glyph::First), (second, first, Glyph::Second)] {
+                for (fg, bg, glyph) in [(first, second, CellFill::First), (second, first, CellFill::Second)] {
                     if fg.shade.fits(ColorLayer::Foreground) && bg.shade.fits(ColorLayer::Background) {
                         ends.add(PenErrors::from_changes(fg, bg), bytes, glyph);
                     }
@@ -305,9 +305,9 @@ impl<'a> PathExtension<'a> {
         (self.bytes + 1) as f32 * self.byte + self.error < self.bound
     }
 
-    fn add(&mut self, ends: PenErrors, sgr: u32, glyph: Glyph) {
+    fn add(&mut self, ends: PenErrors, sgr: u32, glyph: CellFill) {
         // Inverting the medium shade yields a different pattern but the same character.
-        if glyph == Glyph::Second && self.tile == Tile::MEDIUM {
+        if glyph == CellFill::Second && self.tile == Tile::MEDIUM {
             return;
         }
         let bytes = self.bytes + sgr + glyph.symbol(self.tile).len_utf8() as u32;
@@ -344,7 +344,7 @@ impl PenErrors {
         Self { bg: change.shade, bg_errors: change.errors, ..self }
     }
 
-    fn error(&self, glyph: Glyph) -> f32 {
+    fn error(&self, glyph: CellFill) -> f32 {
         let of = |part: usize| match glyph.layers()[part] {
             ColorLayer::Foreground => self.fg_errors[part],
             ColorLayer::Background => self.bg_errors[part],
@@ -403,10 +403,10 @@ mod tests {
         let found = plan_row(
             &wanted(&[[RED, RED], [RED, RED], [BLACK, RED]]),
             start(BLACK, TerminalColor::DefaultBackground),
-            CostModel::EXACT,
+            RateDistortion::EXACT,
         );
-        let glyphs: Vec<Glyph> = found.ops.iter().map(|op| op.glyph).collect();
-        assert_eq!(glyphs, [Glyph::Blank, Glyph::Blank, Glyph::First]);
+        let glyphs: Vec<CellFill> = found.ops.iter().map(|op| op.glyph).collect();
+        assert_eq!(glyphs, [CellFill::Blank, CellFill::Blank, CellFill::First]);
         // ESC [ 48;2;200;0;0 m, followed by the glyphs.
         assert_eq!(found.bytes, 3 + 12 + 1 + 1 + 3);
     }
@@ -417,12 +417,12 @@ mod tests {
         for target in &mut targets[1..8] {
             target.shown = Some(Mosaic::halves([RED, TerminalColor::Rgb([1, 1, 1])]));
         }
-        let found = plan_row(&targets, start(RED, BLACK), CostModel::EXACT);
+        let found = plan_row(&targets, start(RED, BLACK), RateDistortion::EXACT);
         let columns: Vec<usize> = found.ops.iter().map(|op| op.column).collect();
         assert_eq!((columns, found.bytes), (vec![0, 8], 3 + 4 + 3));
         // A gap of one cell is redrawn, because this takes no more bytes than moving the cursor and is more
         // accurate.
-        let found = plan_row(&[targets[0], targets[1], targets[8]], start(RED, BLACK), CostModel::EXACT);
+        let found = plan_row(&[targets[0], targets[1], targets[8]], start(RED, BLACK), RateDistortion::EXACT);
         assert_eq!((found.ops.len(), found.bytes), (3, 9));
     }
 
@@ -435,7 +435,7 @@ mod tests {
             [TerminalColor::DefaultForeground; 2],
         ] {
             let targets = [TargetCell { wanted: Some(Mosaic::halves(halves)), shown: None }];
-            let found = plan_row(&targets, start(BLACK, BLACK), CostModel::MOVING);
+            let found = plan_row(&targets, start(BLACK, BLACK), RateDistortion::MOVING);
             assert_eq!(found.ops.first().map(|op| op.mosaic.pair), Some(halves));
         }
     }
@@ -472,7 +472,7 @@ mod tests {
             is_exact in any::<bool>(),
         ) {
             let targets: Vec<TargetCell> = cells.iter().map(|(wanted, shown)| TargetCell { wanted: *wanted, shown: *shown }).collect();
-            let model = if is_exact { CostModel::EXACT } else { CostModel::MOVING };
+            let model = if is_exact { RateDistortion::EXACT } else { RateDistortion::MOVING };
             let found = plan_row(&targets, start(TerminalColor::DefaultForeground, TerminalColor::DefaultBackground), model);
             let mut screen: Vec<Option<Mosaic>> = targets.iter().map(|target| target.shown).collect();
             for op in &found.ops {
@@ -485,7 +485,7 @@ mod tests {
                 let shown = shown.expect("unknown cells should be drawn");
                 for (shown, wanted, part) in shown.overlapping_colors(wanted) {
                     // Larger errors in a single channel should be avoided at any cost.
-                    let most = if is_exact { 3.0 } else { CostModel::MOVING.byte * 120.0 };
+                    let most = if is_exact { 3.0 } else { RateDistortion::MOVING.byte * 120.0 };
                     prop_assert!(part * model.error(shown, wanted) <= most);
                 }
             }

@@ -2,7 +2,7 @@
 
 use ratatui::layout::Rect;
 
-use super::cell::{CellContent, Glyph, Mosaic, TextCell};
+use super::cell::{CellContent, CellFill, Mosaic, TextCell};
 use super::cursor_moves::{self, CellPosition};
 use super::hyperlinks::{Hyperlinks, LINK_OFF};
 use super::pen::Pen;
@@ -22,7 +22,7 @@ pub(super) enum Stroke {
     /// A character.
     Text { at: CellPosition, text: TextCell },
     /// Two colors drawn with the same glyph in `count` cells, using REP for more than one cell.
-    Mosaic { at: CellPosition, glyph: Glyph, mosaic: Mosaic, count: u16 },
+    Mosaic { at: CellPosition, glyph: CellFill, mosaic: Mosaic, count: u16 },
     /// `count` blanks in the terminal's default background, or up to the end of the row if `None`.
     Erase { at: CellPosition, count: Option<u16> },
 }
@@ -41,10 +41,10 @@ impl Stroke {
         let mut shorter: Vec<Self> = Vec::with_capacity(strokes.len());
         for run in strokes.chunk_by(Self::is_repeated_by) {
             let count = run.len() as u16;
-            if let [Self::Mosaic { at, glyph: Glyph::Blank, mosaic, .. }, _, ..] = run
+            if let [Self::Mosaic { at, glyph: CellFill::Blank, mosaic, .. }, _, ..] = run
                 && run.len() > 1 + cursor_moves::counted_sequence(count - 1, b'b').len()
             {
-                shorter.push(Self::Mosaic { at: *at, glyph: Glyph::Blank, mosaic: *mosaic, count });
+                shorter.push(Self::Mosaic { at: *at, glyph: CellFill::Blank, mosaic: *mosaic, count });
             } else {
                 shorter.extend_from_slice(run);
             }
@@ -140,7 +140,7 @@ impl ScreenModel {
             Stroke::Text { at, text } => (at, text.pen.exact_requirements()),
             Stroke::Mosaic { at, glyph, mosaic, .. } => (at, glyph.requirements(mosaic.pair)),
             Stroke::Erase { at, .. } => {
-                (at, Glyph::Blank.requirements([TerminalColor::DefaultBackground; 2]))
+                (at, CellFill::Blank.requirements([TerminalColor::DefaultBackground; 2]))
             }
         };
         cursor_moves::push_shortest_move(self.cursor, *at, bytes);

@@ -1,6 +1,6 @@
 //! Plans the drawing of text, which is always exact.
 
-use super::cell::{CellContent, Glyph};
+use super::cell::{CellContent, CellFill};
 use super::cursor_moves::{self, CellPosition};
 use super::screen::{ScreenModel, Stroke};
 use super::target_screen::{ScreenRegion, TargetScreen};
@@ -37,7 +37,7 @@ fn stroke_for_cell(at: CellPosition, look: &CellContent) -> Option<Stroke> {
     match look {
         CellContent::Text(text) => Some(Stroke::Text { at, text: text.clone() }),
         CellContent::Mosaic(mosaic) => {
-            let glyph = Glyph::ALL.into_iter().find(|glyph| glyph.shows(mosaic.pair))?;
+            let glyph = CellFill::ALL.into_iter().find(|glyph| glyph.shows(mosaic.pair))?;
             Some(Stroke::Mosaic { at, glyph, mosaic: *mosaic, count: 1 })
         }
         CellContent::Unknown | CellContent::Covered => None,
@@ -61,7 +61,7 @@ fn bridge_gap(screen: &ScreenModel, strokes: &mut Vec<Stroke>, to: CellPosition)
                 if mosaic.pair == [text.pen.bg; 2] && text.pen.modifier.is_empty() =>
             {
                 bytes += 1;
-                between.push(Stroke::Mosaic { at, glyph: Glyph::Blank, mosaic: *mosaic, count: 1 });
+                between.push(Stroke::Mosaic { at, glyph: CellFill::Blank, mosaic: *mosaic, count: 1 });
             }
             CellContent::Text(_) | CellContent::Mosaic(_) | CellContent::Unknown | CellContent::Covered => {
                 return;

@@ -5,9 +5,9 @@ use std::time::{Duration, Instant};
 use super::InitialState;
 use crate::color::{AnsiColors, ColorDepth, ColorMapper};
 use crate::event::{FrameReport, Window};
-use crate::graphics::Protocol;
+use crate::graphics::ImageProtocol;
 use crate::mosaic::Grid;
-use crate::pixel_request::PixelRequest;
+use crate::pixel_request::ImageProtocolRequest;
 use crate::preview_kind::PreviewKind;
 use crate::terminal_replies::TerminalQueries;
 use crate::terminals::Capabilities;
@@ -31,7 +31,7 @@ pub(crate) struct DisplayState {
     /// Whether the terminal's background is light.
     pub is_light: bool,
     /// The user's request to draw pixels, while the terminal has not confirmed it.
-    pub pixels: Option<PixelRequest>,
+    pub pixels: Option<ImageProtocolRequest>,
     /// Time at which the missing confirmation is reported to the user.
     pub pixels_until: Option<Instant>,
     /// Cost of sending the last preview.
@@ -70,8 +70,8 @@ impl DisplayState {
         match self.kind {
             PreviewKind::Pixels(protocol) => {
                 let most = match protocol {
-                    Protocol::Sixel => MAX_IN_SIXELS,
-                    Protocol::Kitty | Protocol::Iterm => MAX_PIXELS,
+                    ImageProtocol::Sixel => MAX_IN_SIXELS,
+                    ImageProtocol::Kitty | ImageProtocol::Iterm => MAX_PIXELS,
                 };
                 let window = &self.window;
                 let squares = f32::from(window.columns) * f32::from(window.rows) * window.cell_aspect;
@@ -85,6 +85,6 @@ impl DisplayState {
     /// Whether the preview's colors are dithered.
     pub(crate) fn mixes_colors(&self) -> bool {
         matches!(self.depth, ColorDepth::Indexed256 | ColorDepth::Ansi16)
-            || self.kind == PreviewKind::Pixels(Protocol::Sixel)
+            || self.kind == PreviewKind::Pixels(ImageProtocol::Sixel)
     }
 }

@@ -17,7 +17,7 @@ pub(super) use self::picture::PictureState;
 pub(super) use self::request::{CameraStep, ImageOrigin, KeyOverrides, RequestState, format_stops};
 pub(super) use self::saving::{OwnImage, PendingChange, SavingState, WrittenFile};
 pub(super) use self::selection::{MousePress, PickPurpose, SelectionState};
-pub(super) use self::work::{Activity, AssetBar, Rendering, WorkState};
+pub(super) use self::work::{AssetBar, RenderState, WorkState, WorkerActivity};
 use super::color::{AnsiColors, ColorDepth};
 use super::event::Window;
 use super::preview_kind::PreviewKind;
@@ -86,9 +86,11 @@ impl State {
         let is_shown = picture.shown.as_ref().is_some_and(|shown| shown.generation == request.generation);
         // While the scene is broken, the last valid one is being rendered.
         let is_at_work = match work.activity {
-            Activity::Running { .. } => true,
-            Activity::Waiting | Activity::Broken => request.camera.is_some() && self.is_scene_broken(),
-            Activity::Done | Activity::Cancelled => false,
+            WorkerActivity::Running { .. } => true,
+            WorkerActivity::Waiting | WorkerActivity::Broken => {
+                request.camera.is_some() && self.is_scene_broken()
+            }
+            WorkerActivity::Done | WorkerActivity::Cancelled => false,
         };
         let is_newest = request.camera_step.generation == Some(request.generation);
         is_newest && is_at_work && request.preview_size.is_some() && !is_shown
@@ -134,7 +136,7 @@ impl State {
         let views = self.overlays.views.as_ref().map(|views| views.until);
         let notice = self.overlays.message.as_ref().and_then(|message| message.until);
         // The displayed age of an older render changes.
-        let age = self.picture.history.is_older_open().then(|| self.now + AGE);
+        let age = self.picture.history.is_viewing_older().then(|| self.now + AGE);
         let pixels = self.display.pixels_until;
         [clock, age, self.request.resize_due, bars, views, notice, pixels].into_iter().flatten().min()
     }

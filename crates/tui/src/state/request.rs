@@ -110,7 +110,7 @@ impl ImageOrigin {
 
     /// Origin of an image that a later request reproduced. Returns `self` because the later changes had no
     /// effect, or `later` if the camera moved with keys has since been written to the scene.
-    pub(crate) fn for_same_image(&self, later: Self) -> Self {
+    pub(crate) fn merged_with_later(&self, later: Self) -> Self {
         if self.toggles.camera.has_changes() && !later.toggles.camera.has_changes() {
             return later;
         }
@@ -287,7 +287,7 @@ impl RequestState {
 
     /// Camera settings that changed in the scene file after the camera was moved with keys, formatted with
     /// their current values.
-    pub(crate) fn saved_since_moved(&self) -> Vec<String> {
+    pub(crate) fn conflicting_camera_saves(&self) -> Vec<String> {
         let Some((own, moved)) = self.camera.zip(self.viewpoint()) else { return Vec::new() };
         let from = &self.moved_from;
         let of_pose = |key: &str, of: fn(&Pose) -> DVec3| {

@@ -8,7 +8,7 @@ use crate::pipeline::protocol::{AssetProgress, RenderProgress, Report, Stage, St
 
 /// The worker's state for the current generation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Activity {
+pub(crate) enum WorkerActivity {
     /// The worker is processing the request.
     Running { since: Instant },
     /// The request has finished.
@@ -23,7 +23,7 @@ pub(crate) enum Activity {
 
 /// State of the newest request's render. While the scene is broken, this is a render of the last valid scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Rendering {
+pub(crate) enum RenderState {
     UnderWay,
     Finished,
     Stopped,
@@ -48,8 +48,8 @@ impl AssetBar {
 
 /// Progress and result of the newest request.
 pub(crate) struct WorkState {
-    pub activity: Activity,
-    pub rendering: Rendering,
+    pub activity: WorkerActivity,
+    pub rendering: RenderState,
     pub paused: bool,
     /// Time when the request was paused.
     pub paused_at: Option<Instant>,
@@ -75,8 +75,8 @@ pub(crate) struct WorkState {
 impl WorkState {
     pub(super) fn new(now: Instant) -> Self {
         Self {
-            activity: Activity::Running { since: now },
-            rendering: Rendering::UnderWay,
+            activity: WorkerActivity::Running { since: now },
+            rendering: RenderState::UnderWay,
             paused: false,
             paused_at: None,
             stages: Default::default(),
@@ -110,20 +110,23 @@ impl WorkState {
 
     /// Whether a render is running. It may be a render of the last valid scene.
     pub(crate) fn is_under_way(&self) -> bool {
-        self.rendering == Rendering::UnderWay
+        self.rendering == RenderState::UnderWay
     }
 
     pub(crate) fn is_running(&self) -> bool {
-        matches!(self.activity, Activity::Running { .. })
+        matches!(self.activity, WorkerActivity::Running { .. })
     }
 
     /// How long the current request has been running, not counting pauses.
     pub(crate) fn running_time(&self, now: Instant) -> Option<Duration> {
         match self.activity {
-            Activity::Running { since } => {
+            WorkerActivity::Running { since } => {
                 Some(self.paused_at.unwrap_or(now).saturating_duration_since(since))
             }
-            Activity::Done | Activity::Waiting | Activity::Broken | Activity::Cancelled => None,
+            WorkerActivity::Done
+            | WorkerActivity::Waiting
+            | WorkerActivity::Broken
+            | WorkerActivity::Cancelled => None,
         }
     }
 
@@ -140,7 +143,7 @@ impl WorkState {
         if paused {
             self.paused_at = Some(now);
         } else if let Some(held) = self.paused_at.take()
-            && let Activity::Running { since } = &mut self.activity
+            && let WorkerActivity::Running { since } = &mut self.activity
         {
             *since += now.saturating_duration_since(held);
         }

@@ -4,7 +4,7 @@ use super::{BLUE, RED};
 use crate::event::{Effect, Event, KeyPress};
 use crate::fixtures::*;
 use crate::messages;
-use crate::pipeline::protocol::{self, Command, Viewpoint, Writing};
+use crate::pipeline::protocol::{self, Command, Viewpoint, WriteMode};
 use crate::pipeline::settings::Overrides;
 use crate::preview_kind::PreviewKind;
 use crate::scene::description::Pose;
@@ -30,7 +30,7 @@ fn moved_camera_is_shown_but_not_written() {
     ui.finish_render(RED);
     let effects = ui.press('l');
     let moved = request(&effects).expect("a request");
-    assert_eq!((moved.write, moved.force), (Writing::No, false));
+    assert_eq!((moved.write, moved.force), (WriteMode::No, false));
     let text = ui.text();
     assert!(text.contains(messages::CAMERA_MOVED), "{text}");
     assert!(text.lines().last().is_some_and(|line| line.contains("reset camera")), "{text}");
@@ -38,10 +38,10 @@ fn moved_camera_is_shown_but_not_written() {
     let effects = ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
     let edited = request(&effects).expect("a request");
     assert_eq!(edited.overrides.camera, moved.overrides.camera, "saving a file should not reset the camera");
-    assert_eq!(edited.write, Writing::No);
+    assert_eq!(edited.write, WriteMode::No);
     let effects = ui.press('0');
     let own = request(&effects).expect("a request");
-    assert_eq!((own.write, own.overrides.camera.has_changes()), (Writing::Try, false));
+    assert_eq!((own.write, own.overrides.camera.has_changes()), (WriteMode::Try, false));
     assert!(!ui.text().contains(messages::CAMERA_MOVED));
 }
 
@@ -163,7 +163,7 @@ fn reverted_changes_are_not_sent() {
         assert_eq!(last.overrides == Overrides::default(), is_back, "{keys}: {:?}", last.overrides);
         assert_eq!(
             (last.write, last.own.is_none()),
-            if is_back { (Writing::Try, true) } else { (Writing::No, false) }
+            if is_back { (WriteMode::Try, true) } else { (WriteMode::No, false) }
         );
         let line = ui.text().lines().last().map(str::to_owned).unwrap_or_default();
         assert_eq!(!line.contains("0 "), is_back, "{keys}: {line}");

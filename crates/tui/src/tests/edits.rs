@@ -5,10 +5,10 @@ use crate::Changed;
 use crate::event::{Event, FrameReport};
 use crate::fixtures::*;
 use crate::messages;
-use crate::pipeline::protocol::{self, LastValidSceneEnd, PreviewSource, SavedCamera, Stage, Status};
+use crate::pipeline::protocol::{self, LastValidSceneOutcome, PreviewSource, SavedCamera, Stage, Status};
 use crate::pipeline::settings::EffectiveSettings;
 use crate::scene::diagnostic::{Diagnostic, Severity};
-use crate::scene::fingerprint::Fingerprint;
+use crate::scene::fingerprint::FingerprintHasher;
 
 const GREEN: [u8; 3] = [10, 200, 20];
 
@@ -29,7 +29,7 @@ fn save_broken_scene(ui: &mut TestUi) {
 /// A preview of an image with all or some of its samples.
 fn preview(ui: &mut TestUi, name: &str, color: [u8; 3], is_finished: bool) {
     let generation = ui.state.request.generation;
-    let source = Some(PreviewSource { image: Fingerprint::new(name).finish(), is_finished });
+    let source = Some(PreviewSource { image: FingerprintHasher::new(name).finish(), is_finished });
     let picture = uniform_picture(50, 38, color);
     let (range, section, lacks_photons) = (None, None, false);
     ui.handle_event(Event::Picture { generation, picture, range, section, lacks_photons, source });
@@ -168,12 +168,12 @@ fn show_preview(ui: &mut TestUi, name: &str, color: [u8; 3], is_finished: bool) 
 }
 
 /// Reports that the render of the last valid scene has ended.
-fn last_good(ui: &mut TestUi, end: LastValidSceneEnd) {
+fn last_good(ui: &mut TestUi, end: LastValidSceneOutcome) {
     let generation = ui.state.request.generation;
     ui.worker_event(protocol::Event::LastGoodEnded { generation, end });
 }
 
-const FINISHED: LastValidSceneEnd = LastValidSceneEnd::Finished { unchanged: false };
+const FINISHED: LastValidSceneOutcome = LastValidSceneOutcome::Finished { unchanged: false };
 
 /// A finished render, followed by an edit and by a typo while the edit is being rendered.
 fn typo_during_a_render() -> TestUi {
@@ -226,7 +226,7 @@ fn render_of_last_valid_scene_is_counted_once() {
 #[test]
 fn stopped_render_of_last_valid_scene_is_marked() {
     let mut ui = typo_during_a_render();
-    last_good(&mut ui, LastValidSceneEnd::Stopped);
+    last_good(&mut ui, LastValidSceneOutcome::Stopped);
     assert!(ui.text().contains(&format!("▸– {}:", messages::STOPPED)), "{}", ui.text());
     assert_eq!(ui.state.work.renders, 1);
 }
@@ -240,7 +240,7 @@ fn render_of_last_valid_scene_is_numbered() {
     end(&mut ui, false, 1.0, 1.0);
     save_broken_scene(&mut ui);
     show_preview(&mut ui, "bright", RED, true);
-    last_good(&mut ui, LastValidSceneEnd::Finished { unchanged: true });
+    last_good(&mut ui, LastValidSceneOutcome::Finished { unchanged: true });
     assert_eq!((ui.state.picture.history.len(), ui.state.work.renders), (1, 1));
     for (run, name, words) in [(2, "hard", "shadows"), (3, "off", "shadows off")] {
         ui.press('s');

@@ -6,9 +6,9 @@ use super::{BLUE, RED, cells_of};
 use crate::event::{Effect, Event, EventSource, KeyPress, Signal};
 use crate::fixtures::*;
 use crate::messages;
-use crate::pipeline::protocol::{self, Command, Failure, PreviewSize, Writing};
+use crate::pipeline::protocol::{self, Command, Failure, PreviewSize, WriteMode};
 use crate::scene::diagnostic::{Diagnostic, Severity};
-use crate::state::Activity;
+use crate::state::WorkerActivity;
 use crate::{Changed, ExitStatus};
 
 #[test]
@@ -17,7 +17,7 @@ fn first_request_includes_the_preview_size() {
     let effects = crate::update::start(&mut state);
     let request = request(&effects).expect("a request");
     assert_eq!(request.preview, Some(PreviewSize { width: 56, height: 42, around: None }));
-    assert_eq!((request.generation, request.write, request.force), (1, Writing::Try, false));
+    assert_eq!((request.generation, request.write, request.force), (1, WriteMode::Try, false));
 }
 
 #[test]
@@ -203,7 +203,7 @@ fn lost_event_sources_are_handled() {
 fn cancelled_render_is_reported() {
     let mut ui = TestUi::new();
     ui.worker_event(protocol::Event::Cancelled { generation: 1 });
-    assert_eq!(ui.state.work.activity, Activity::Cancelled);
+    assert_eq!(ui.state.work.activity, WorkerActivity::Cancelled);
     assert!(ui.text().contains("stopped"));
 }
 

@@ -6,8 +6,8 @@ use std::rc::Rc;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use super::super::display::{Display, TerminalLink};
-use super::super::graphics::{Images, PixelScreen, Protocol};
+use super::super::display::{Display, TerminalEnvironment};
+use super::super::graphics::{ImageProtocol, Images, TestImageTerminal};
 use super::super::presenter::Presenter;
 use super::super::terminal_replies::TerminalReply;
 use crate::color::{ColorDepth, xterm_rgb};
@@ -49,7 +49,7 @@ struct SimulatedTerminal {
     arriving: VecDeque<(Instant, Vec<u8>)>,
     answers: VecDeque<(Instant, TerminalReply)>,
     cells: vt100::Parser,
-    pixels: PixelScreen,
+    pixels: TestImageTerminal,
     /// Bytes received, and the number of bytes sent.
     bytes: Vec<u8>,
     sent: usize,
@@ -68,7 +68,7 @@ impl SimulatedTerminal {
             arriving: VecDeque::new(),
             answers: VecDeque::new(),
             cells: vt100::Parser::new(side(ROWS), side(COLUMNS), 0),
-            pixels: PixelScreen::default(),
+            pixels: TestImageTerminal::default(),
             bytes: Vec::new(),
             sent: 0,
             unanswered: VecDeque::new(),
@@ -174,7 +174,7 @@ impl WatchedRender {
         };
         let taken = Rc::clone(&outbox);
         let out = Box::new(move |bytes| taken.borrow_mut().push(bytes));
-        let display = Display::new(depth, TerminalLink::default(), images, out, begin);
+        let display = Display::new(depth, TerminalEnvironment::default(), images, out, begin);
         Self {
             presenter: Presenter::new(display, slot.clone(), begin),
             ui,
@@ -369,7 +369,7 @@ fn fast_terminal_follows_render_in_256_colors() {
 
 #[test]
 fn fast_terminal_follows_render_in_pixels() {
-    assert_followed(PreviewKind::Pixels(Protocol::Kitty), ColorDepth::TrueColor);
+    assert_followed(PreviewKind::Pixels(ImageProtocol::Kitty), ColorDepth::TrueColor);
 }
 
 #[test]
@@ -403,7 +403,7 @@ fn held_key_uses_most_of_a_slow_connection() {
 fn only_cells_use_synchronized_output() {
     let (begin, end) = ("\x1b[?2026h", "\x1b[?2026l");
     for (preview, is_marked) in
-        [(PreviewKind::HalfBlock, true), (PreviewKind::Pixels(Protocol::Kitty), false)]
+        [(PreviewKind::HalfBlock, true), (PreviewKind::Pixels(ImageProtocol::Kitty), false)]
     {
         let mut watch = WatchedRender::new(FAST, preview, ColorDepth::TrueColor);
         watch.presenter.display.handle_reply(TerminalReply::Synchronized { is_known: true }, watch.begin);

@@ -4,7 +4,7 @@ use crossterm::event::KeyCode;
 
 use super::{BLUE, RED};
 use crate::Changed;
-use crate::event::{Effect, Event, KeyPress, Mouse, MouseKind};
+use crate::event::{Effect, Event, KeyPress, Mouse, MouseEventKind};
 use crate::fixtures::*;
 use crate::messages;
 use crate::pipeline::protocol::{Command, Event as WorkerEvent, Picked, SavedCamera};
@@ -38,8 +38,8 @@ fn older_render_cannot_be_inspected() {
         assert!(!asks(&effects), "{keys:?}");
         assert!(ui.text().contains(messages::OLDER_RENDER), "{}", ui.text());
     }
-    ui.handle_event(mouse(MouseKind::Press));
-    assert!(!asks(&ui.handle_event(mouse(MouseKind::Release))));
+    ui.handle_event(mouse(MouseEventKind::Press));
+    assert!(!asks(&ui.handle_event(mouse(MouseEventKind::Release))));
     assert!(ui.text().contains(messages::OLDER_RENDER), "{}", ui.text());
     // A reply that arrives late is not shown for the older render.
     let picked = Picked { pixel: [3, 4], thing: None, color: None };

@@ -9,7 +9,7 @@ use crate::fixtures::*;
 use crate::keymap::{self, KEYMAP};
 use crate::math::DVec3;
 use crate::messages;
-use crate::pipeline::protocol::{self, CameraEdit, Command, ImagePosition, Writing};
+use crate::pipeline::protocol::{self, CameraEdit, Command, ImagePosition, WriteMode};
 use crate::pipeline::settings::{AdjustableSettings, EffectiveSettings, Overrides, View};
 use crate::preview_kind::PreviewKind;
 use crate::scene::description::{Integrator, Pose, Shadows};
@@ -80,7 +80,7 @@ fn check(action: Action, key: KeyPress, ui: &mut TestUi) {
             let effects = ui.key(key);
             let wanted = if action == Action::NextView { View::Normal } else { View::Error };
             let request = request(&effects).expect("a request");
-            assert_eq!((request.overrides.view, request.write), (Some(wanted), Writing::No));
+            assert_eq!((request.overrides.view, request.write), (Some(wanted), WriteMode::No));
             assert!(ui.text().contains(&messages::view_chosen(wanted.name())));
         }
         Action::OrbitLeft | Action::OrbitRight | Action::OrbitUp | Action::OrbitDown => {
@@ -108,7 +108,7 @@ fn check(action: Action, key: KeyPress, ui: &mut TestUi) {
             let effects = ui.key(key);
             assert_eq!(
                 request(&effects).map(|it| (it.overrides.exposure, it.write)),
-                Some((Some(stops), Writing::No))
+                Some((Some(stops), WriteMode::No))
             );
             assert!(
                 ui.text().contains(&messages::exposure_changed(&crate::state::format_stops(stops))),
@@ -215,7 +215,7 @@ fn check(action: Action, key: KeyPress, ui: &mut TestUi) {
             assert_eq!(cells_of(ui, RED), cells);
         }
         Action::ToggleHelp => {
-            let help = keymap::binding_of(action).expect("a binding").help;
+            let help = keymap::binding_for(action).expect("a binding").help;
             ui.key(key);
             assert!(ui.text().contains(help));
             ui.key(key);
@@ -312,10 +312,10 @@ fn toggles_start_from_the_command_line() {
     assert!(bottom(&mut ui).starts_with("s off  p off") && bottom(&mut ui).contains("v depth"));
     let effects = ui.press('s');
     let soft = request(&effects).expect("a request");
-    assert_eq!((soft.overrides.shadows, soft.write), (Some(Shadows::Soft), Writing::No));
+    assert_eq!((soft.overrides.shadows, soft.write), (Some(Shadows::Soft), WriteMode::No));
     assert_eq!(soft.own.as_deref(), Some(&base), "the scene's own image should continue");
     let effects = ui.press('V');
-    assert_eq!(request(&effects).expect("a request").write, Writing::No);
+    assert_eq!(request(&effects).expect("a request").write, WriteMode::No);
     let effects = ui.press('0');
     assert_eq!(request(&effects).map(|it| it.overrides.clone()), Some(base));
 }

@@ -5,7 +5,7 @@ use crate::Changed;
 use crate::color::ColorDepth;
 use crate::event::{Effect, Event};
 use crate::fixtures::*;
-use crate::graphics::Protocol;
+use crate::graphics::ImageProtocol;
 use crate::messages;
 use crate::pipeline::protocol::{self, Command, PreviewSize, Stage, Status};
 use crate::pipeline::settings::{EffectiveSettings, Overrides};
@@ -322,7 +322,9 @@ fn pixel_preview_memory_is_bounded() {
         state.display.window.cell_pixels = cell_pixels;
         state.display.pixels_across()
     };
-    for (protocol, fine, most) in [(Protocol::Kitty, 10, 2_400_000), (Protocol::Sixel, 8, 1_600_000)] {
+    for (protocol, fine, most) in
+        [(ImageProtocol::Kitty, 10, 2_400_000), (ImageProtocol::Sixel, 8, 1_600_000)]
+    {
         assert_eq!(by(protocol, 80, 24, (8, 16)), 8, "full resolution");
         assert_eq!(by(protocol, 200, 60, (20, 40)), fine, "limited resolution");
         for (columns, rows) in [(480, 130), (1000, 500), (4000, 2000), (u16::MAX, u16::MAX)] {

@@ -5,16 +5,16 @@ use crossterm::event::KeyCode;
 use super::{BLUE, RED};
 use crate::Changed;
 use crate::color::ColorDepth;
-use crate::event::{Effect, Event, KeyPress, Mouse, MouseKind};
+use crate::event::{Effect, Event, KeyPress, Mouse, MouseEventKind};
 use crate::fixtures::*;
 use crate::messages;
 use crate::pipeline::protocol::{
-    self, CameraEdit, Command, ImagePosition, Picked, PickedObject, SavedCamera, Section, Writing,
+    self, CameraEdit, Command, ImagePosition, Picked, PickedObject, SavedCamera, Section, WriteMode,
 };
 use crate::pipeline::settings::Overrides;
 use crate::preview_kind::PreviewKind;
 use crate::scene::diagnostic::Severity;
-use crate::terminals::{Brand, TerminalId};
+use crate::terminals::{TerminalBrand, TerminalId};
 
 /// An 80×24 UI with an image in 55×21 cells at (0, 1).
 fn ui() -> TestUi {
@@ -23,13 +23,13 @@ fn ui() -> TestUi {
     ui
 }
 
-fn mouse(ui: &mut TestUi, kind: MouseKind, column: u16, row: u16) -> Vec<Effect> {
+fn mouse(ui: &mut TestUi, kind: MouseEventKind, column: u16, row: u16) -> Vec<Effect> {
     ui.handle_event(Event::Mouse(Mouse { kind, column, row }))
 }
 
 fn click(ui: &mut TestUi, column: u16, row: u16) -> Vec<Effect> {
-    mouse(ui, MouseKind::Press, column, row);
-    mouse(ui, MouseKind::Release, column, row)
+    mouse(ui, MouseEventKind::Press, column, row);
+    mouse(ui, MouseEventKind::Release, column, row)
 }
 
 fn asked(effects: &[Effect]) -> ImagePosition {
@@ -62,18 +62,21 @@ fn answer(ui: &mut TestUi, thing: Option<PickedObject>) -> Vec<Effect> {
 #[test]
 fn drag_orbits_and_click_inspects() {
     let mut ui = ui();
-    mouse(&mut ui, MouseKind::Press, 20, 10);
-    let effects = mouse(&mut ui, MouseKind::Drag, 30, 10);
+    mouse(&mut ui, MouseEventKind::Press, 20, 10);
+    let effects = mouse(&mut ui, MouseEventKind::Drag, 30, 10);
     let pose = request(&effects).expect("a request").overrides.camera.pose.expect("a pose");
     assert!(pose.position.x < -1.0, "the scene should follow the mouse: {pose:?}");
-    assert!(mouse(&mut ui, MouseKind::Release, 30, 10).is_empty(), "a drag should not be treated as a click");
+    assert!(
+        mouse(&mut ui, MouseEventKind::Release, 30, 10).is_empty(),
+        "a drag should not be treated as a click"
+    );
     let spot = asked(&click(&mut ui, 12, 10));
     assert!((spot.x - 12.5 / 55.0).abs() < 1e-9 && (spot.y - 9.5 / 21.0).abs() < 1e-9, "{spot:?}");
     for (column, row) in [(70, 10), (20, 0), (20, 23)] {
         assert!(click(&mut ui, column, row).is_empty(), "clicks outside the image should be ignored");
     }
     assert!(
-        mouse(&mut ui, MouseKind::Drag, 30, 10).is_empty(),
+        mouse(&mut ui, MouseEventKind::Drag, 30, 10).is_empty(),
         "a drag that started outside the image should be ignored"
     );
 }
@@ -81,12 +84,12 @@ fn drag_orbits_and_click_inspects() {
 #[test]
 fn wheel_zooms_and_scrolls_diagnostics() {
     let mut ui = ui();
-    let effects = mouse(&mut ui, MouseKind::WheelUp, 20, 10);
+    let effects = mouse(&mut ui, MouseEventKind::WheelUp, 20, 10);
     assert!(request(&effects).expect("a request").overrides.camera.pose.expect("a pose").distance() < 4.0);
     ui.fail_render((0..9).map(|i| diagnostic(Severity::Error, &format!("wrong {i}"))).collect());
-    assert!(mouse(&mut ui, MouseKind::WheelDown, 20, 15).is_empty());
+    assert!(mouse(&mut ui, MouseEventKind::WheelDown, 20, 15).is_empty());
     assert!(ui.state.overlays.diagnostics.scroll > 0);
-    mouse(&mut ui, MouseKind::WheelUp, 20, 15);
+    mouse(&mut ui, MouseEventKind::WheelUp, 20, 15);
     assert_eq!(ui.state.overlays.diagnostics.scroll, 0);
 }
 
@@ -124,7 +127,7 @@ fn click_after_f_sets_the_focus() {
     click(&mut ui, 12, 10);
     let effects = answer(&mut ui, Some(thing()));
     let focused = request(&effects).expect("a request");
-    assert_eq!((focused.overrides.camera.focus, focused.write), (Some(3.8167), Writing::No));
+    assert_eq!((focused.overrides.camera.focus, focused.write), (Some(3.8167), WriteMode::No));
     assert!(ui.text().contains(&messages::focus_moved(3.8167)[..40]), "{}", ui.text());
     // Any other key cancels the pending click.
     ui.press('f');
@@ -156,7 +159,7 @@ fn saved_camera_becomes_the_scene_camera() {
     ui.press('c');
     let effects = kept(&mut ui, true, true);
     let own = request(&effects).expect("a request");
-    assert_eq!((own.overrides.camera.has_changes(), own.write), (false, Writing::Try));
+    assert_eq!((own.overrides.camera.has_changes(), own.write), (false, WriteMode::Try));
     let text = ui.text();
     assert!(
         text.contains(&messages::camera_saved("scenes/cornell.toml"))
@@ -224,7 +227,8 @@ fn y_copies_if_the_terminal_supports_it() {
     let text: String = ui.text().split_whitespace().collect::<Vec<_>>().join(" ");
     assert!(text.contains(&format!("{} sphere", messages::SELECT_TO_COPY)), "{text}");
     assert!(text.contains("normal (0, 1, 0) · pixel 1, 2"), "{text}");
-    ui.state.display.capabilities = TerminalId { brand: Brand::Kitty, version: [0, 40] }.capabilities();
+    ui.state.display.capabilities =
+        TerminalId { brand: TerminalBrand::Kitty, version: [0, 40] }.capabilities();
     let effects = ui.press('y');
     let words = "sphere \"ball\" · cornell.toml:47 · glass crystal · distance 3.9 · position (0.2, 0.5, -0.3) · \
                  radiance (0.5, 0.5, 0.5) · normal (0, 1, 0) · pixel 1, 2";
@@ -282,7 +286,7 @@ fn older_render_is_shown_until_the_next_render() {
     assert!(super::cells_of(&mut ui, RED) > 0, "the older render should stay visible");
     ui.press('N');
     assert!(
-        !ui.state.picture.history.is_older_open() && ui.text().contains(messages::NEWEST_RENDER),
+        !ui.state.picture.history.is_viewing_older() && ui.text().contains(messages::NEWEST_RENDER),
         "{}",
         ui.text()
     );
@@ -337,11 +341,11 @@ fn drag_after_z_selects_the_region_to_render() {
     ui.press('r');
     ui.press('z');
     assert!(ui.text().contains(messages::DRAG_REGION), "{}", ui.text());
-    mouse(&mut ui, MouseKind::Press, 10, 5);
-    assert!(mouse(&mut ui, MouseKind::Drag, 30, 12).is_empty(), "the camera should not move");
+    mouse(&mut ui, MouseEventKind::Press, 10, 5);
+    assert!(mouse(&mut ui, MouseEventKind::Drag, 30, 12).is_empty(), "the camera should not move");
     assert_eq!(ui.draw_screen()[(10, 5)].symbol(), "┌");
     assert_eq!(ui.draw_screen()[(30, 12)].symbol(), "┘");
-    let effects = mouse(&mut ui, MouseKind::Release, 30, 12);
+    let effects = mouse(&mut ui, MouseEventKind::Release, 30, 12);
     let marked = request(&effects).expect("a request");
     let section = marked.first.expect("a region");
     assert!((section.left - 10.5 / 55.0).abs() < 1e-9 && (section.width - 20.0 / 55.0).abs() < 1e-9);
@@ -351,8 +355,8 @@ fn drag_after_z_selects_the_region_to_render() {
     assert_eq!(request(&ui.press('z')).expect("a request").first, None);
     ui.finish_render(BLUE);
     ui.press('z');
-    mouse(&mut ui, MouseKind::Press, 30, 12);
-    assert!(mouse(&mut ui, MouseKind::Release, 30, 12).is_empty(), "no render is running");
+    mouse(&mut ui, MouseEventKind::Press, 30, 12);
+    assert!(mouse(&mut ui, MouseEventKind::Release, 30, 12).is_empty(), "no render is running");
     assert!(ui.text().contains(messages::REGION_NEXT), "{}", ui.text());
     assert!(request(&ui.press('r')).expect("a request").first.is_some());
 }
@@ -437,10 +441,10 @@ fn escape_cancels_gestures_and_closes_history() {
     ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
     ui.finish_render(BLUE);
     ui.press('b');
-    assert!(ui.state.picture.history.is_older_open());
+    assert!(ui.state.picture.history.is_viewing_older());
     escape(&mut ui);
     assert!(
-        !ui.state.picture.history.is_older_open() && ui.text().contains(messages::NEWEST_RENDER),
+        !ui.state.picture.history.is_viewing_older() && ui.text().contains(messages::NEWEST_RENDER),
         "{}",
         ui.text()
     );
@@ -451,13 +455,16 @@ fn cancelled_region_drag_has_no_effect() {
     for key in [KeyCode::Esc, KeyCode::Char('v'), KeyCode::Char('z')] {
         let mut ui = ui();
         ui.press('z');
-        mouse(&mut ui, MouseKind::Press, 12, 10);
-        mouse(&mut ui, MouseKind::Drag, 20, 14);
+        mouse(&mut ui, MouseEventKind::Press, 12, 10);
+        mouse(&mut ui, MouseEventKind::Drag, 20, 14);
         assert!(ui.state.request.first_section.is_some());
         ui.key(KeyPress::special(key));
         assert!(ui.state.request.first_section.is_none() && !ui.state.selection.is_marking, "{key:?}");
-        assert!(mouse(&mut ui, MouseKind::Drag, 30, 16).is_empty(), "{key:?}: the camera should not move");
-        assert!(mouse(&mut ui, MouseKind::Release, 30, 16).is_empty(), "{key:?}: not a click");
+        assert!(
+            mouse(&mut ui, MouseEventKind::Drag, 30, 16).is_empty(),
+            "{key:?}: the camera should not move"
+        );
+        assert!(mouse(&mut ui, MouseEventKind::Release, 30, 16).is_empty(), "{key:?}: not a click");
     }
 }
 

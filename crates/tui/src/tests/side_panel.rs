@@ -5,15 +5,15 @@ use ratatui::layout::Rect;
 use super::{BLUE, RED, cells_of};
 use crate::Changed;
 use crate::color::ColorDepth;
-use crate::event::{Effect, Event, KeyPress, Mouse, MouseKind};
+use crate::event::{Effect, Event, KeyPress, Mouse, MouseEventKind};
 use crate::fixtures::*;
-use crate::graphics::Protocol;
+use crate::graphics::ImageProtocol;
 use crate::messages;
 use crate::pipeline::protocol::{self, NoiseProgress, RenderProgress};
 use crate::pipeline::settings::{EffectiveSettings, Overrides};
 use crate::preview_kind::PreviewKind;
 use crate::terminal_replies::TerminalReply;
-use crate::terminals::{Brand, TerminalId};
+use crate::terminals::{TerminalBrand, TerminalId};
 use crate::view;
 use crate::view::layout::Layout;
 
@@ -138,9 +138,9 @@ fn history_lists_changes_and_opens_on_click() {
     let blue = ratatui::style::Color::Rgb(BLUE[0], BLUE[1], BLUE[2]);
     let places = buffer.area.positions();
     let place = places.into_iter().find(|place| buffer[*place].fg == blue).expect("a thumbnail");
-    let mouse = Mouse { kind: MouseKind::Press, column: place.x, row: place.y };
+    let mouse = Mouse { kind: MouseEventKind::Press, column: place.x, row: place.y };
     ui.handle_event(Event::Mouse(mouse));
-    ui.handle_event(Event::Mouse(Mouse { kind: MouseKind::Release, ..mouse }));
+    ui.handle_event(Event::Mouse(Mouse { kind: MouseEventKind::Release, ..mouse }));
     assert!(cells_of(&mut ui, BLUE) > 500, "{}", ui.text());
     assert!(
         ui.text().contains(&messages::render_position(2, 3)) && panel(&mut ui).contains("▸2"),
@@ -401,7 +401,7 @@ fn side_panel_fits_every_window_size() {
         (PreviewKind::HalfBlock, ColorDepth::TrueColor),
         (PreviewKind::Octant, ColorDepth::Indexed256),
         (PreviewKind::Ascii, ColorDepth::None),
-        (PreviewKind::Pixels(Protocol::Kitty), ColorDepth::TrueColor),
+        (PreviewKind::Pixels(ImageProtocol::Kitty), ColorDepth::TrueColor),
         (PreviewKind::None, ColorDepth::Ansi16),
     ];
     let edits = [
@@ -471,7 +471,8 @@ fn written_files_are_hyperlinks() {
 /// Finishes a render after `seconds` and returns the notification, if any.
 fn notification(seconds: u64, prepare: impl Fn(&mut TestUi)) -> Option<String> {
     let mut ui = TestUi::new();
-    ui.state.display.capabilities = TerminalId { brand: Brand::Kitty, version: [0, 40] }.capabilities();
+    ui.state.display.capabilities =
+        TerminalId { brand: TerminalBrand::Kitty, version: [0, 40] }.capabilities();
     prepare(&mut ui);
     ui.advance_clock(1000 * seconds);
     let effects = ui.worker_event(done_event(1, Vec::new(), false));

@@ -8,7 +8,7 @@ use crate::event::{Event, KeyPress};
 use crate::exit_summary;
 use crate::fixtures::*;
 use crate::messages;
-use crate::pipeline::protocol::{self, CheckpointNews, Picked, Stage, Status};
+use crate::pipeline::protocol::{self, CheckpointUpdate, Picked, Stage, Status};
 use crate::pipeline::settings::Overrides;
 use crate::preview_kind::PreviewKind;
 use crate::scene::diagnostic::Severity;
@@ -69,7 +69,7 @@ fn image_keys_are_hidden_without_a_preview() {
 #[test]
 fn resume_message_disappears_after_the_render() {
     let mut ui = TestUi::new();
-    let news = CheckpointNews::Resumed { path: "cornell.png.checkpoint".into(), samples: 16 };
+    let news = CheckpointUpdate::Resumed { path: "cornell.png.checkpoint".into(), samples: 16 };
     ui.worker_event(protocol::Event::Checkpoint { generation: 1, news });
     assert!(ui.text().contains(messages::RESUMING), "{}", ui.text());
     ui.finish_render(RED);

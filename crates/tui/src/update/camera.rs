@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use super::notices::{notify, prompt, show_notice};
 use super::request::request_render;
-use crate::camera::{dollied, orbited, zoomed};
+use crate::camera::{dollied, orbited, zoomed_fov};
 use crate::event::Effect;
 use crate::messages;
 use crate::pipeline::protocol::{Command, MovedCamera, SavedCamera};
@@ -54,7 +54,7 @@ pub(super) fn dolly(state: &mut State, steps: f64) -> Vec<Effect> {
 /// Widens the field of view by a number of steps.
 pub(super) fn zoom(state: &mut State, steps: f64) -> Vec<Effect> {
     let Some(view) = state.request.viewpoint() else { return report_unknown_camera(state) };
-    let fov = zoomed(&view, libm::pow(WIDER, steps));
+    let fov = zoomed_fov(&view, libm::pow(WIDER, steps));
     if fov == view.fov {
         return notify(state, &messages::field_limit(fov));
     }
@@ -121,7 +121,7 @@ pub(super) fn save_camera(state: &mut State) -> Vec<Effect> {
     if !state.request.toggles.camera.has_changes() && !is_set && !is_mesh(&state.request.scene) {
         return notify(state, messages::NOTHING_TO_KEEP);
     }
-    let saved = state.request.saved_since_moved();
+    let saved = state.request.conflicting_camera_saves();
     // Models do not contain a camera that could be overwritten.
     if !saved.is_empty() && !is_mesh(&state.request.scene) {
         // The message below lists the saved values, so they no longer cause a conflict.
@@ -129,7 +129,7 @@ pub(super) fn save_camera(state: &mut State) -> Vec<Effect> {
         let saved = saved.join(", ");
         return prompt(state, &format!("error: {saved} {}", messages::CAMERA_CONFLICT));
     }
-    state.saving.is_camera_of_newest = state.picture.history.is_older_open();
+    state.saving.is_camera_of_newest = state.picture.history.is_viewing_older();
     vec![Effect::Send(Command::KeepCamera(MovedCamera { camera, own }))]
 }
 

@@ -5,12 +5,12 @@ use std::sync::Arc;
 use super::notices::{notify, show_notice, show_until_key};
 use crate::event::Effect;
 use crate::messages;
-use crate::state::{Rendering, State};
+use crate::state::{RenderState, State};
 
 /// Adds the current image to the history.
 pub(super) fn record_image(state: &mut State) {
     if let Some(shown) = newest_image(state).filter(|shown| shown.generation == state.request.generation) {
-        let is_finished = state.work.rendering == Rendering::Finished || shown.is_finished();
+        let is_finished = state.work.rendering == RenderState::Finished || shown.is_finished();
         let origin = state.request.origin(!is_finished);
         state.picture.history.record(shown, state.now, origin);
     }
@@ -58,8 +58,8 @@ pub(super) fn open_at(state: &mut State, at: usize) -> Vec<Effect> {
 }
 
 /// Toggles between the render before the last edit and the newest one.
-pub(super) fn toggle_before_edit(state: &mut State) -> Vec<Effect> {
-    if state.picture.history.is_older_open() {
+pub(super) fn toggle_render_before_edit(state: &mut State) -> Vec<Effect> {
+    if state.picture.history.is_viewing_older() {
         return return_to_newest(state, messages::AFTER_EDIT);
     }
     record_image(state);
@@ -67,7 +67,7 @@ pub(super) fn toggle_before_edit(state: &mut State) -> Vec<Effect> {
     match state.picture.history.open_before_edit(newest) {
         Some(shown) => {
             let effects = show_image(state, shown);
-            let edits = state.picture.history.edits_since_open();
+            let edits = state.picture.history.edits_since_viewed();
             let edits = if edits.is_empty() { edits } else { format!(", {edits}") };
             show_until_key(state, format!("{}{edits}", messages::BEFORE_EDIT));
             effects
@@ -86,8 +86,8 @@ pub(super) fn return_to_newest(state: &mut State, words: &str) -> Vec<Effect> {
 }
 
 fn newest_image(state: &State) -> Option<crate::history::ShownImage> {
-    if state.picture.history.is_older_open() {
-        state.picture.history.newest_behind_open()
+    if state.picture.history.is_viewing_older() {
+        state.picture.history.newest_while_viewing_older()
     } else {
         state.picture.shown.clone()
     }
@@ -96,8 +96,8 @@ fn newest_image(state: &State) -> Option<crate::history::ShownImage> {
 fn show_image(state: &mut State, shown: crate::history::ShownImage) -> Vec<Effect> {
     state.picture.shown = Some(shown);
     // The header already shows the render's number and age.
-    let keys = &messages::HISTORY_KEYS[usize::from(state.picture.history.is_oldest_shown())..];
-    let words = [&[&*state.picture.history.reason_of_open()], keys].concat().join(" · ");
+    let keys = &messages::HISTORY_KEYS[usize::from(state.picture.history.is_viewing_oldest())..];
+    let words = [&[&*state.picture.history.viewed_changes_text()], keys].concat().join(" · ");
     show_until_key(state, words);
     Vec::new()
 }

@@ -62,17 +62,17 @@ pub(super) fn perform_action(state: &mut State, action: Action) -> Vec<Effect> {
         Action::Inspect => pointer::inspect(state),
         Action::Copy => pointer::copy_values(state),
         Action::Focus => pointer::focus_on_click(state),
-        Action::ActualPixels => toggle_close_up(state),
+        Action::ActualPixels => toggle_actual_pixels(state),
         Action::RenderRegionFirst => region::handle_region_key(state),
         Action::ToggleMouse => pointer::toggle_mouse(state),
         Action::Edit if is_mesh(&state.request.scene) => notify(state, messages::NO_EDITOR_FOR_MODELS),
         Action::Edit => vec![Effect::Edit(edit_position::position_to_edit(state))],
-        Action::CompareLastEdit => history::toggle_before_edit(state),
+        Action::CompareLastEdit => history::toggle_render_before_edit(state),
         Action::OlderRender => history::browse(state, 1),
         Action::NewerRender => history::browse(state, -1),
         Action::ResetSettings => reset_to_scene_settings(state),
         Action::ToggleDiagnostics => toggle_diagnostics(state),
-        Action::ToggleHelp => change_and_render(state, |state| {
+        Action::ToggleHelp => change_and_redraw(state, |state| {
             state.overlays.help = Pane { open: !state.overlays.help.open, ..Pane::default() }
         }),
         Action::ShowImageOnly => show_image_only(state),
@@ -83,7 +83,7 @@ pub(super) fn perform_action(state: &mut State, action: Action) -> Vec<Effect> {
     }
 }
 
-fn change_and_render(state: &mut State, how: impl FnOnce(&mut State)) -> Vec<Effect> {
+fn change_and_redraw(state: &mut State, how: impl FnOnce(&mut State)) -> Vec<Effect> {
     how(state);
     state.dirty = true;
     Vec::new()
@@ -171,7 +171,7 @@ fn show_image_only(state: &mut State) -> Vec<Effect> {
 }
 
 /// Toggles between actual pixels around the crosshair and the whole image.
-fn toggle_close_up(state: &mut State) -> Vec<Effect> {
+fn toggle_actual_pixels(state: &mut State) -> Vec<Effect> {
     if state.request.preview_size.is_none() {
         return notify(state, messages::NO_PREVIEW);
     }
@@ -196,7 +196,7 @@ fn toggle_pause(state: &mut State) -> Vec<Effect> {
 }
 
 fn write_image_now(state: &mut State) -> Vec<Effect> {
-    let is_open = state.picture.history.is_older_open();
+    let is_open = state.picture.history.is_viewing_older();
     show_notice(state, if is_open { messages::WRITING_NEWEST } else { messages::WRITING });
     (state.saving.is_write_requested, state.saving.write_shows) = (true, state.request.sent_toggles);
     vec![Effect::Send(Command::Write)]
@@ -217,7 +217,7 @@ fn toggle_diagnostics(state: &mut State) -> Vec<Effect> {
         let is_read = state.overlays.are_warnings_known || !state.work.is_running();
         return notify(state, if is_read { messages::NO_DIAGNOSTICS } else { messages::STILL_READING });
     }
-    change_and_render(state, |state| {
+    change_and_redraw(state, |state| {
         state.overlays.diagnostics.open = !state.overlays.diagnostics.open;
         state.overlays.diagnostics.scroll = 0;
     })

@@ -127,7 +127,7 @@ fn show_image(state: &mut State, shown: ShownImage) -> Vec<Effect> {
         && is_whole(&shown.picture)
         && state.display.kind != PreviewKind::None
     {
-        if state.picture.history.store_behind_open(&shown) {
+        if state.picture.history.update_newest_while_viewing_older(&shown) {
             history::record_newest(state);
             return Vec::new();
         }
@@ -135,7 +135,7 @@ fn show_image(state: &mut State, shown: ShownImage) -> Vec<Effect> {
         let is_its = |last: &ShownImage| last.generation == shown.generation || last.shows_same_image(&shown);
         let last = state.picture.shown.take().filter(is_its);
         state.picture.shown = Some(match last {
-            Some(last) if state.display.mixes_colors() => with_stable_colors(shown, &last),
+            Some(last) if state.display.mixes_colors() => keep_unchanged_pixels(shown, &last),
             Some(_) | None => shown,
         });
         state.dirty = true;
@@ -145,7 +145,7 @@ fn show_image(state: &mut State, shown: ShownImage) -> Vec<Effect> {
 
 /// Keeps the old colors of pixels that differ from the last preview by no more than one code value, since
 /// even such a small difference could change the dither pattern.
-fn with_stable_colors(mut shown: ShownImage, last: &ShownImage) -> ShownImage {
+fn keep_unchanged_pixels(mut shown: ShownImage, last: &ShownImage) -> ShownImage {
     const MAX_DIFFERENCE: u8 = 1;
     let what = |shown: &ShownImage| (shown.picture.width, shown.picture.height, shown.section);
     if what(&shown) == what(last) {
@@ -184,7 +184,7 @@ fn resize(state: &mut State, window: Window) -> Vec<Effect> {
 }
 
 fn tick(state: &mut State) -> Vec<Effect> {
-    state.dirty |= state.work.is_running() && !state.work.paused || state.picture.history.is_older_open();
+    state.dirty |= state.work.is_running() && !state.work.paused || state.picture.history.is_viewing_older();
     let (now, bars) = (state.now, state.work.assets.len());
     state.work.assets.retain(|asset| asset.disappears_at().is_none_or(|end| now < end));
     state.dirty |= state.work.assets.len() != bars;

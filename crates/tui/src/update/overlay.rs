@@ -68,7 +68,7 @@ fn close_topmost(state: &mut State) -> bool {
         true
     } else if state.selection.facts.take().is_some() {
         true
-    } else if state.picture.history.is_older_open() {
+    } else if state.picture.history.is_viewing_older() {
         history::return_to_newest(state, messages::NEWEST_RENDER);
         true
     } else {

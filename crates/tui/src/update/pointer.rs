@@ -3,7 +3,7 @@
 use super::notices::{notify, prompt, show_notice};
 use super::{camera, history, overlay, region};
 use crate::event::FilePosition;
-use crate::event::{Effect, Mouse, MouseKind};
+use crate::event::{Effect, Mouse, MouseEventKind};
 use crate::keymap::OverlayAction;
 use crate::math::decimal::{decimal_step, rounded};
 use crate::messages;
@@ -22,7 +22,7 @@ const TURN_ACROSS: f64 = 180.0;
 /// Handles a mouse event.
 pub(super) fn handle_mouse(state: &mut State, mouse: Mouse) -> Vec<Effect> {
     match mouse.kind {
-        MouseKind::Press => {
+        MouseEventKind::Press => {
             let is_on_picture = Layout::for_state(state).preview.contains((mouse.column, mouse.row).into());
             let Mouse { column, row, .. } = mouse;
             if let Some(at) = view::history_entry_at(state, column, row) {
@@ -33,17 +33,17 @@ pub(super) fn handle_mouse(state: &mut State, mouse: Mouse) -> Vec<Effect> {
                 is_on_picture.then_some(MousePress { column, row, has_moved: false, from });
             Vec::new()
         }
-        MouseKind::Drag => drag_to_orbit(state, mouse),
-        MouseKind::Release if state.selection.is_marking && state.selection.press.take().is_some() => {
+        MouseEventKind::Drag => drag_to_orbit(state, mouse),
+        MouseEventKind::Release if state.selection.is_marking && state.selection.press.take().is_some() => {
             let spot = image_position_at(state, mouse.column, mouse.row);
             region::end_drag(state, spot)
         }
-        MouseKind::Release => match state.selection.press.take() {
+        MouseEventKind::Release => match state.selection.press.take() {
             Some(press) if !press.has_moved => handle_click(state, mouse),
             Some(_) | None => Vec::new(),
         },
-        MouseKind::WheelUp | MouseKind::WheelDown if is_on_pane(state, mouse) => {
-            let line = if mouse.kind == MouseKind::WheelUp {
+        MouseEventKind::WheelUp | MouseEventKind::WheelDown if is_on_pane(state, mouse) => {
+            let line = if mouse.kind == MouseEventKind::WheelUp {
                 OverlayAction::LineUp
             } else {
                 OverlayAction::LineDown
@@ -51,8 +51,8 @@ pub(super) fn handle_mouse(state: &mut State, mouse: Mouse) -> Vec<Effect> {
             overlay::perform_action(state, line);
             Vec::new()
         }
-        MouseKind::WheelUp => camera::dolly(state, 1.0),
-        MouseKind::WheelDown => camera::dolly(state, -1.0),
+        MouseEventKind::WheelUp => camera::dolly(state, 1.0),
+        MouseEventKind::WheelDown => camera::dolly(state, -1.0),
     }
 }
 
@@ -82,7 +82,7 @@ fn drag_to_orbit(state: &mut State, mouse: Mouse) -> Vec<Effect> {
 }
 
 fn handle_click(state: &mut State, mouse: Mouse) -> Vec<Effect> {
-    if state.picture.history.is_older_open() {
+    if state.picture.history.is_viewing_older() {
         return notify(state, messages::OLDER_RENDER);
     }
     let Some(spot) = image_position_at(state, mouse.column, mouse.row) else { return Vec::new() };
@@ -102,7 +102,7 @@ pub(super) fn inspect(state: &mut State) -> Vec<Effect> {
 
 /// Waits for a click that sets the focus. If already waiting, focuses at the crosshair.
 pub(super) fn focus_on_click(state: &mut State) -> Vec<Effect> {
-    if state.picture.history.is_older_open() {
+    if state.picture.history.is_viewing_older() {
         return notify(state, messages::OLDER_RENDER);
     }
     if state.request.viewpoint().is_some_and(|view| view.aperture == 0.0) {
@@ -118,7 +118,7 @@ pub(super) fn focus_on_click(state: &mut State) -> Vec<Effect> {
 }
 
 fn send_pick_query(state: &mut State, purpose: PickPurpose) -> Vec<Effect> {
-    if state.picture.history.is_older_open() {
+    if state.picture.history.is_viewing_older() {
         return notify(state, messages::OLDER_RENDER);
     }
     if state.request.camera.is_none() {
@@ -139,7 +139,7 @@ pub(super) fn toggle_mouse(state: &mut State) -> Vec<Effect> {
 /// Handles the reply to a pick query.
 pub(super) fn handle_pick(state: &mut State, picked: &Picked) -> Vec<Effect> {
     // An older render was opened after the click.
-    if state.picture.history.is_older_open() {
+    if state.picture.history.is_viewing_older() {
         return Vec::new();
     }
     let in_text = picked.thing.as_ref().filter(|thing| !is_mesh(&thing.path));
@@ -184,7 +184,7 @@ fn values_with_pixel(Picked { thing, pixel: [x, y], .. }: &Picked, facts: &[Stri
 
 /// Copies the inspected values if the terminal supports it.
 pub(super) fn copy_values(state: &mut State) -> Vec<Effect> {
-    if state.picture.history.is_older_open() {
+    if state.picture.history.is_viewing_older() {
         return notify(state, messages::OLDER_RENDER);
     }
     let Some(clicked) = state.selection.clicked.clone() else {

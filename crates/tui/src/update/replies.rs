@@ -4,8 +4,8 @@ use super::notices::show_until_key;
 use super::request::request_resized_preview;
 use crate::color::{ColorDepth, ColorMapper};
 use crate::event::Effect;
-use crate::graphics::Protocol;
-use crate::pixel_request::PixelRequest;
+use crate::graphics::ImageProtocol;
+use crate::pixel_request::ImageProtocolRequest;
 use crate::preview_kind::PreviewKind;
 use crate::state::State;
 use crate::terminal_replies::BlockGlyphs;
@@ -51,15 +51,15 @@ enum PixelSupport {
     Lacks,
 }
 
-fn pixel_support(request: PixelRequest, answer: TerminalReply) -> PixelSupport {
+fn pixel_support(request: ImageProtocolRequest, answer: TerminalReply) -> PixelSupport {
     match answer {
         TerminalReply::Images(protocol) if protocol == request.protocol => PixelSupport::Has,
         TerminalReply::Name(terminal)
-            if request.protocol == Protocol::Iterm && terminal.brand.has_iterm_images() =>
+            if request.protocol == ImageProtocol::Iterm && terminal.brand.has_iterm_images() =>
         {
             PixelSupport::Has
         }
-        TerminalReply::Attributes if request.ends_with_attributes() => PixelSupport::Lacks,
+        TerminalReply::Attributes if request.is_decided_by_attributes() => PixelSupport::Lacks,
         TerminalReply::Images(_)
         | TerminalReply::Name(_)
         | TerminalReply::Attributes
@@ -84,7 +84,7 @@ fn check_pixel_support(state: &mut State, answer: TerminalReply) -> Vec<Effect> 
         }
         PixelSupport::Has => {
             (state.display.pixels, state.display.pixels_until) = (None, None);
-            state.overlays.message.take_if(|message| message.words == request.refusal_message());
+            state.overlays.message.take_if(|message| message.words == request.unsupported_message());
             state.display.kind = PreviewKind::Pixels(request.protocol);
             state.dirty = true;
             request_resized_preview(state)
@@ -97,7 +97,7 @@ fn check_pixel_support(state: &mut State, answer: TerminalReply) -> Vec<Effect> 
 pub(super) fn report_missing_pixels(state: &mut State) {
     let asked = state.display.pixels_until.take().and(state.display.pixels);
     if let Some(request) = asked {
-        show_until_key(state, request.refusal_message());
+        show_until_key(state, request.unsupported_message());
     }
 }
 
@@ -117,12 +117,12 @@ fn handle_terminal_name(state: &mut State, terminal: TerminalId) -> Vec<Effect> 
         state.dirty = true;
     }
     if ask.blocks {
-        effects.extend(use_blocks(state, BlockGlyphs::supported_by(terminal)));
+        effects.extend(use_block_glyphs(state, BlockGlyphs::supported_by(terminal)));
     }
     effects
 }
 
-fn use_blocks(state: &mut State, blocks: BlockGlyphs) -> Vec<Effect> {
+fn use_block_glyphs(state: &mut State, blocks: BlockGlyphs) -> Vec<Effect> {
     let kind = match blocks {
         BlockGlyphs::Unknown => return Vec::new(),
         BlockGlyphs::Sextants => PreviewKind::Sextant,
@@ -146,13 +146,13 @@ mod tests {
     use crate::pipeline::protocol::Command;
     use crate::pixel_request::ImageRoute;
     use crate::terminal_replies::TerminalQueries;
-    use crate::terminals::{Brand, Capabilities};
+    use crate::terminals::{Capabilities, TerminalBrand};
     use crate::update::start;
 
     /// A UI whose user has requested kitty images.
     fn ui_requesting_pixels(route: ImageRoute) -> TestUi {
         let mut state = state(80, 24);
-        let request = PixelRequest { protocol: Protocol::Kitty, route, is_known: false };
+        let request = ImageProtocolRequest { protocol: ImageProtocol::Kitty, route, is_known: false };
         state.display.pixels = Some(request);
         state.display.pixels_until = Some(request.reply_deadline(state.now));
         TestUi::with(state)
@@ -162,11 +162,11 @@ mod tests {
     fn pixels_are_drawn_once_confirmed() {
         let mut ui = ui_requesting_pixels(ImageRoute::Direct);
         assert_eq!(ui.state.display.kind, PreviewKind::HalfBlock);
-        let effects = ui.handle_event(Event::TerminalReply(TerminalReply::Images(Protocol::Kitty)));
+        let effects = ui.handle_event(Event::TerminalReply(TerminalReply::Images(ImageProtocol::Kitty)));
         assert!(matches!(&effects[..], [Effect::Send(Command::Preview(Some(_)))]), "{effects:?}");
         ui.handle_event(Event::TerminalReply(TerminalReply::Attributes));
         ui.advance_clock(2000);
-        assert_eq!(ui.state.display.kind, PreviewKind::Pixels(Protocol::Kitty));
+        assert_eq!(ui.state.display.kind, PreviewKind::Pixels(ImageProtocol::Kitty));
         assert_eq!(ui.state.overlays.message, None);
     }
 
@@ -175,7 +175,7 @@ mod tests {
         let mut ui = ui_requesting_pixels(ImageRoute::Direct);
         ui.handle_event(Event::TerminalReply(TerminalReply::Attributes));
         assert!(ui.text().contains("kitty images"), "{}", ui.text());
-        let refusal = ui.state.display.pixels.map(PixelRequest::refusal_message);
+        let refusal = ui.state.display.pixels.map(ImageProtocolRequest::unsupported_message);
         assert_eq!(ui.state.overlays.message.as_ref().map(|message| message.words.clone()), refusal);
         assert_eq!(ui.state.display.kind, PreviewKind::HalfBlock);
         ui.press('s');
@@ -193,8 +193,8 @@ mod tests {
         assert!(ui.state.next_tick().is_some_and(|tick| tick <= ui.now + Duration::from_millis(100)));
         ui.advance_clock(100);
         assert!(ui.text().contains("allow-passthrough on"), "{}", ui.text());
-        ui.handle_event(Event::TerminalReply(TerminalReply::Images(Protocol::Kitty)));
-        assert_eq!(ui.state.display.kind, PreviewKind::Pixels(Protocol::Kitty));
+        ui.handle_event(Event::TerminalReply(TerminalReply::Images(ImageProtocol::Kitty)));
+        assert_eq!(ui.state.display.kind, PreviewKind::Pixels(ImageProtocol::Kitty));
         assert!(!ui.text().contains("allow-passthrough"), "{}", ui.text());
     }
 
@@ -203,7 +203,7 @@ mod tests {
         let mut state = state(80, 24);
         start(&mut state);
         let before = state.request.preview_size.expect("a size");
-        let foot = TerminalReply::Name(TerminalId { brand: Brand::Foot, version: [1, 20] });
+        let foot = TerminalReply::Name(TerminalId { brand: TerminalBrand::Foot, version: [1, 20] });
         assert!(handle_reply(&mut state, foot).is_empty(), "the name was not queried");
         assert_eq!(state.display.capabilities, Capabilities::default());
         state.display.ask = TerminalQueries { blocks: true, ..TerminalQueries::default() };
@@ -217,7 +217,7 @@ mod tests {
     fn terminal_name_determines_capabilities() {
         let mut state = state(80, 24);
         state.display.ask = TerminalQueries { name: true, ..TerminalQueries::default() };
-        let ghostty = TerminalId { brand: Brand::Ghostty, version: [1, 2] };
+        let ghostty = TerminalId { brand: TerminalBrand::Ghostty, version: [1, 2] };
         assert!(matches!(handle_reply(&mut state, TerminalReply::Name(ghostty))[..], [Effect::ReportFocus]));
         assert_eq!(state.display.capabilities, ghostty.capabilities());
         assert!(

@@ -2,8 +2,8 @@
 
 use super::history;
 use crate::event::Effect;
-use crate::pipeline::protocol::{Command, Request, Writing};
-use crate::state::{Activity, CameraStep, KeyOverrides, Rendering, State};
+use crate::pipeline::protocol::{Command, Request, WriteMode};
+use crate::state::{CameraStep, KeyOverrides, RenderState, State, WorkerActivity};
 use crate::view::layout::Layout;
 
 /// Creates a request with the current settings. The stage table is unchanged until the worker starts on the
@@ -21,7 +21,7 @@ pub(super) fn request_render(state: &mut State, force: bool) -> Vec<Effect> {
     state.request.is_exposure_only = before == now && before != state.request.toggles;
     if state.request.is_exposure_only {
         // Exposure only affects how the image is displayed.
-        state.picture.history.transfer_to_next(state.request.generation);
+        state.picture.history.reassign_to_next_request(state.request.generation);
     }
     state.request.generation += 1;
     let is_moved = state.request.toggles.camera.has_changes();
@@ -41,7 +41,7 @@ pub(super) fn request_render(state: &mut State, force: bool) -> Vec<Effect> {
         scene: state.request.scene.clone(),
         overrides: state.request.overrides(),
         preview: state.request.preview_size,
-        write: if state.request.is_own_image() { Writing::Try } else { Writing::No },
+        write: if state.request.is_own_image() { WriteMode::Try } else { WriteMode::No },
         own: state.request.own_image_overrides(),
         force,
         first: state.request.first_section,
@@ -51,8 +51,8 @@ pub(super) fn request_render(state: &mut State, force: bool) -> Vec<Effect> {
         state.set_paused(false);
         effects.push(Effect::Send(Command::Pause(false)));
     }
-    state.work.activity = Activity::Running { since: state.now };
-    state.work.rendering = Rendering::UnderWay;
+    state.work.activity = WorkerActivity::Running { since: state.now };
+    state.work.rendering = RenderState::UnderWay;
     effects.push(Effect::Send(Command::Render(Box::new(request))));
     effects
 }

@@ -12,13 +12,15 @@ use crate::messages;
 use crate::noise_curve::NoiseCurve;
 use crate::options::OutputChange;
 use crate::pipeline::protocol::{
-    AssetProgress, CheckpointNews, Event, Failure, LastValidSceneEnd, OwnImageState, Report, Stage,
+    AssetProgress, CheckpointUpdate, Event, Failure, LastValidSceneOutcome, OwnImageState, Report, Stage,
     StageReport, Status,
 };
 use crate::scene::MOST_COMPARED_BYTES;
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::sanitize::visible;
-use crate::state::{Activity, AssetBar, BlockingErrors, OwnImage, Pane, Rendering, State, WrittenFile};
+use crate::state::{
+    AssetBar, BlockingErrors, OwnImage, Pane, RenderState, State, WorkerActivity, WrittenFile,
+};
 use crate::window_title;
 
 pub(super) fn handle_worker_event(state: &mut State, event: Event) -> Vec<Effect> {
@@ -93,7 +95,7 @@ pub(super) fn handle_worker_event(state: &mut State, event: Event) -> Vec<Effect
         Event::WriteFailed { path, message, .. } => {
             let is_by_hand = std::mem::take(&mut state.saving.is_write_requested);
             // A failed write requested during the render does not affect the final image.
-            if !is_by_hand || state.work.activity == Activity::Done {
+            if !is_by_hand || state.work.activity == WorkerActivity::Done {
                 state.saving.unwritten = Some(messages::NOT_WRITTEN.to_owned());
             }
             let is_it = |written: &&mut WrittenFile| Some(&written.path) == path.as_ref();
@@ -104,23 +106,23 @@ pub(super) fn handle_worker_event(state: &mut State, event: Event) -> Vec<Effect
         }
         Event::NotKept { message, .. } => show_until_key(state, format!("warning: {}", visible(&message))),
         Event::Checkpoint { news, .. } => match news {
-            CheckpointNews::Failed { message } => {
+            CheckpointUpdate::Failed { message } => {
                 show_until_key(state, format!("warning: {}", visible(&message)));
             }
-            CheckpointNews::Resumed { path, .. } => {
+            CheckpointUpdate::Resumed { path, .. } => {
                 show_notice(state, format!("{} {}", messages::RESUMING, visible(&path.to_string_lossy())));
             }
-            CheckpointNews::SetAside { path } => {
+            CheckpointUpdate::SetAside { path } => {
                 show_until_key(state, messages::checkpoint_kept(&visible(&path.to_string_lossy())));
             }
-            CheckpointNews::Unused { path, why } => {
+            CheckpointUpdate::Unused { path, why } => {
                 let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
                 show_until_key(state, messages::checkpoint_ignored(&visible(&name), &visible(&why)));
             }
-            CheckpointNews::Written { .. }
-            | CheckpointNews::Finished { .. }
-            | CheckpointNews::Absent { .. }
-            | CheckpointNews::Ignored { .. } => {}
+            CheckpointUpdate::Written { .. }
+            | CheckpointUpdate::Finished { .. }
+            | CheckpointUpdate::Absent { .. }
+            | CheckpointUpdate::Ignored { .. } => {}
         },
         Event::Refused { conflicts, .. } => report_conflicts(state, conflicts),
         Event::Text { text, .. } => state.request.text = (text.len() <= MOST_COMPARED_BYTES).then_some(text),
@@ -139,7 +141,7 @@ pub(super) fn handle_worker_event(state: &mut State, event: Event) -> Vec<Effect
         }
         Event::LastGoodEnded { end, .. } => handle_last_valid_end(state, end),
         Event::Cancelled { .. } => {
-            (state.work.activity, state.work.rendering) = (Activity::Cancelled, Rendering::Stopped);
+            (state.work.activity, state.work.rendering) = (WorkerActivity::Cancelled, RenderState::Stopped);
             state.set_paused(false);
             state.work.assets.clear();
         }
@@ -150,7 +152,7 @@ pub(super) fn handle_worker_event(state: &mut State, event: Event) -> Vec<Effect
 /// Sends a notification that a long render has ended, if the user is in another window and the terminal
 /// supports notifications.
 fn notify_render_ended(state: &State, time: Option<Duration>) -> Vec<Effect> {
-    let is_over = matches!(state.work.activity, Activity::Done | Activity::Broken);
+    let is_over = matches!(state.work.activity, WorkerActivity::Done | WorkerActivity::Broken);
     let is_long = |time: &Duration| state.display.notify_after.is_some_and(|least| *time > least);
     let time = time.filter(is_long).filter(|_| is_over && !state.display.has_focus);
     let notice = time.zip(state.display.capabilities.notice);
@@ -231,7 +233,7 @@ fn update_asset_bar(state: &mut State, progress: AssetProgress) {
 /// Reports the files written at the user's request.
 fn report_written(state: &mut State, paths: &[PathBuf]) {
     state.saving.is_write_requested = false;
-    let is_open = state.picture.history.is_older_open();
+    let is_open = state.picture.history.is_viewing_older();
     let which = if is_open { messages::WROTE_NEWEST } else { "" };
     let names: Vec<String> = paths.iter().map(|path| visible(&path.to_string_lossy()).into_owned()).collect();
     show_notice(state, messages::files_written(&names.join(", ")) + which);
@@ -240,7 +242,7 @@ fn report_written(state: &mut State, paths: &[PathBuf]) {
 /// Records a written file. It is listed next to the image because a message would cover the keys.
 fn record_own_written(state: &mut State, path: PathBuf, bytes: u64, (generation, is_own): (u64, bool)) {
     // If the render is still running, writing another output may have failed.
-    let is_by_hand = state.work.activity == Activity::Done;
+    let is_by_hand = state.work.activity == WorkerActivity::Done;
     if is_by_hand {
         (state.saving.unwritten, state.saving.write_failed) = (None, None);
         close_empty_pane(state);
@@ -323,7 +325,7 @@ fn handle_done(state: &mut State, mut report: Box<Report>, warnings: Vec<Diagnos
         record_stage(state, stage.clone());
     }
     state.request.effective = Some(report.settings.clone());
-    (state.work.activity, state.work.rendering) = (Activity::Done, Rendering::Finished);
+    (state.work.activity, state.work.rendering) = (WorkerActivity::Done, RenderState::Finished);
     state.set_paused(false);
     state.work.assets.clear();
     // This request's image has been written, so earlier write failures no longer matter.
@@ -412,11 +414,11 @@ fn handle_failure(state: &mut State, failure: Failure) {
     match failure {
         // The last valid scene is being rendered.
         Failure::Scene(_) => state.picture.history.record_invalid_scene(),
-        Failure::Work(_) => state.work.rendering = Rendering::Stopped,
+        Failure::Work(_) => state.work.rendering = RenderState::Stopped,
     }
     match failure {
         Failure::Scene(diagnostics) if !state.saving.is_settled => {
-            state.work.activity = Activity::Waiting;
+            state.work.activity = WorkerActivity::Waiting;
             state.overlays.unconfirmed = Some(diagnostics);
         }
         Failure::Scene(diagnostics) => show_errors(state, BlockingErrors { diagnostics, work: None }),
@@ -427,20 +429,20 @@ fn handle_failure(state: &mut State, failure: Failure) {
 }
 
 /// Handles the end of rendering the last valid scene, which continues while the scene file is broken.
-fn handle_last_valid_end(state: &mut State, end: LastValidSceneEnd) {
+fn handle_last_valid_end(state: &mut State, end: LastValidSceneOutcome) {
     match end {
-        LastValidSceneEnd::Finished { unchanged } => {
-            state.work.rendering = Rendering::Finished;
+        LastValidSceneOutcome::Finished { unchanged } => {
+            state.work.rendering = RenderState::Finished;
             history::record_image(state);
             count_render(state, unchanged);
         }
-        LastValidSceneEnd::Stopped => state.work.rendering = Rendering::Stopped,
+        LastValidSceneOutcome::Stopped => state.work.rendering = RenderState::Stopped,
     }
 }
 
 /// Shows new errors. If the user has closed the pane, only new errors reopen it.
 fn show_errors(state: &mut State, problems: BlockingErrors) {
-    state.work.activity = Activity::Broken;
+    state.work.activity = WorkerActivity::Broken;
     if state.overlays.problems.as_ref() != Some(&problems) {
         state.overlays.problems = Some(problems);
         state.overlays.diagnostics = Pane { open: true, scroll: 0 };

@@ -10,7 +10,7 @@ use super::layout::Layout;
 use super::stages::StyledLine;
 use super::text::{Tone, format_count, put_text, put_text_right, row_of, wrapped};
 use crate::scene::diagnostic::{Diagnostic, Severity};
-use crate::scene::report::{self, Role};
+use crate::scene::report::{self, SpanRole};
 use crate::scene::sanitize::visible;
 use crate::state::State;
 
@@ -132,11 +132,11 @@ fn format_diagnostics(diagnostics: &[Diagnostic], width: usize) -> Vec<StyledLin
 /// Formats the first position in full and the others as line and column, followed by an empty line.
 fn format_fault(fault: &[&Diagnostic], width: usize) -> Vec<StyledLine> {
     let tone = |role| match role {
-        Role::Text => Tone::Plain,
-        Role::Error => Tone::Error,
-        Role::Warning => Tone::Warning,
-        Role::Frame => Tone::Faint,
-        Role::Message => Tone::Strong,
+        SpanRole::Text => Tone::Plain,
+        SpanRole::Error => Tone::Error,
+        SpanRole::Warning => Tone::Warning,
+        SpanRole::Frame => Tone::Faint,
+        SpanRole::Message => Tone::Strong,
     };
     let line =
         |line: report::ReportLine| line.into_iter().map(|piece| (piece.text, tone(piece.role))).collect();

@@ -22,7 +22,7 @@ use crate::pipeline::settings::View;
 use crate::pipeline::words::Eta;
 use crate::scene::diagnostic::Severity;
 use crate::scene::sanitize::visible;
-use crate::state::{Activity, State};
+use crate::state::{State, WorkerActivity};
 
 /// Minimum header width for a state block of fixed width.
 const WIDE: u16 = 60;
@@ -38,7 +38,7 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
         return;
     }
     if state.picture.is_alone {
-        let back = keymap::binding_of(Action::ShowImageOnly)
+        let back = keymap::binding_for(Action::ShowImageOnly)
             .map_or(String::new(), |it| format!("  {} back", it.label));
         room.width -= put_text_right(buffer, room, &back, Tone::Faint, state.display.depth);
     }
@@ -73,19 +73,19 @@ fn draw_activity_block(state: &State, area: Rect, buffer: &mut Buffer) -> u16 {
 
 /// Symbol, word and color for the state. Each identifies the state on its own.
 pub(super) fn activity_label(state: &State) -> (&'static str, &'static str, Tone) {
-    if state.picture.history.is_older_open() { ("◂", "older", Tone::Warning) } else { work_label(state) }
+    if state.picture.history.is_viewing_older() { ("◂", "older", Tone::Warning) } else { work_label(state) }
 }
 
 fn work_label(state: &State) -> (&'static str, &'static str, Tone) {
     match state.work.activity {
         _ if state.work.paused => ("‖", "paused", Tone::Warning),
-        Activity::Running { .. } => ("●", "rendering", Tone::Working),
-        Activity::Done if state.saving.unwritten.is_some() => ("!", "unwritten", Tone::Error),
-        Activity::Done => ("✓", "done", Tone::Good),
-        Activity::Waiting => ("…", "waiting", Tone::Warning),
-        Activity::Broken if state.overlays.is_scene_missing() => ("✗", "missing", Tone::Error),
-        Activity::Broken => ("✗", "broken", Tone::Error),
-        Activity::Cancelled => ("■", "stopped", Tone::Warning),
+        WorkerActivity::Running { .. } => ("●", "rendering", Tone::Working),
+        WorkerActivity::Done if state.saving.unwritten.is_some() => ("!", "unwritten", Tone::Error),
+        WorkerActivity::Done => ("✓", "done", Tone::Good),
+        WorkerActivity::Waiting => ("…", "waiting", Tone::Warning),
+        WorkerActivity::Broken if state.overlays.is_scene_missing() => ("✗", "missing", Tone::Error),
+        WorkerActivity::Broken => ("✗", "broken", Tone::Error),
+        WorkerActivity::Cancelled => ("■", "stopped", Tone::Warning),
     }
 }
 
@@ -100,7 +100,7 @@ fn draw_scene_info(state: &State, area: Rect, buffer: &mut Buffer) {
     let (folder, file) = path.rsplit_once('/').map_or(("", &*path), |(folder, file)| (folder, file));
     let (folder, file) = (visible(folder), visible(file));
     // The image size of older renders is unknown.
-    let effective = state.request.effective.as_ref().filter(|_| !state.picture.history.is_older_open());
+    let effective = state.request.effective.as_ref().filter(|_| !state.picture.history.is_viewing_older());
     let size = effective.map_or(String::new(), |it| format!("  {}×{}", it.width, it.height));
     let folder = if folder.is_empty() { String::new() } else { format!("{folder}/") };
     let view = close_up_label(state) + &view_label(state);
@@ -119,7 +119,7 @@ fn draw_scene_info(state: &State, area: Rect, buffer: &mut Buffer) {
 
 /// The view and its range of values, or nothing for the beauty view.
 fn view_label(state: &State) -> String {
-    let open = state.picture.history.origin_of_open();
+    let open = state.picture.history.viewed_origin();
     let of_open = open.map(|origin| origin.toggles.view.unwrap_or_else(|| state.request.base_view()));
     let view = of_open.unwrap_or_else(|| state.request.view());
     if view == View::Beauty {
@@ -151,8 +151,8 @@ fn close_up_label(state: &State) -> String {
 
 /// Progress or result, in variants from long to short.
 fn progress_or_result(state: &State) -> Vec<String> {
-    if let Some((run, time)) = state.picture.history.run_and_time_of_open() {
-        let is_unfinished = state.picture.history.origin_of_open().is_some_and(|origin| origin.is_unfinished);
+    if let Some((run, time)) = state.picture.history.viewed_render_number_and_time() {
+        let is_unfinished = state.picture.history.viewed_origin().is_some_and(|origin| origin.is_unfinished);
         let (place, words) = match run {
             Some(run) => {
                 let place = format!("{run} of {}", newest_render_number(state));
@@ -183,29 +183,29 @@ fn progress_or_result(state: &State) -> Vec<String> {
         return [messages::WITHOUT_PHOTONS, "no photons yet"].map(str::to_owned).to_vec();
     }
     match (state.work.activity, &state.work.report, &state.work.progress) {
-        (Activity::Running { .. }, _, Some(progress)) => {
+        (WorkerActivity::Running { .. }, _, Some(progress)) => {
             let done = format!("{} %", floor_percent(progress.fraction));
             vec![format!("{done}{}", format_eta(state, progress)), done]
         }
-        (Activity::Running { .. }, _, None) => {
+        (WorkerActivity::Running { .. }, _, None) => {
             running_stage(state).map(|name| format!("{name}…")).into_iter().collect()
         }
-        (Activity::Done, _, _) if state.work.unchanged => {
+        (WorkerActivity::Done, _, _) if state.work.unchanged => {
             vec![
                 format!("unchanged · {}", messages::render_number(state.work.renders)),
                 "unchanged".to_owned(),
             ]
         }
-        (Activity::Done, Some(report), _) => {
+        (WorkerActivity::Done, Some(report), _) => {
             let time = seconds(report.seconds);
             vec![format!("{time} · {}", messages::render_number(state.work.renders)), time]
         }
-        (Activity::Waiting, _, _) => vec![messages::INCOMPLETE_FILE.to_owned()],
-        (Activity::Broken, _, _) if state.overlays.is_scene_missing() => {
+        (WorkerActivity::Waiting, _, _) => vec![messages::INCOMPLETE_FILE.to_owned()],
+        (WorkerActivity::Broken, _, _) if state.overlays.is_scene_missing() => {
             vec![messages::WAITING_FOR_FILE.to_owned()]
         }
-        (Activity::Broken, _, _) => vec![format_error_count(state)],
-        (Activity::Done | Activity::Cancelled, _, _) => Vec::new(),
+        (WorkerActivity::Broken, _, _) => vec![format_error_count(state)],
+        (WorkerActivity::Done | WorkerActivity::Cancelled, _, _) => Vec::new(),
     }
 }
 

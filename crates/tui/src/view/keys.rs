@@ -13,7 +13,7 @@ use crate::keymap::{self, Binding, KEYMAP, OVERLAY, OverlayAction};
 use crate::preview_kind::PreviewKind;
 use crate::scene::is_mesh;
 use crate::scene::report::summary;
-use crate::state::{Activity, KeyOverrides, State, ViewList};
+use crate::state::{KeyOverrides, State, ViewList, WorkerActivity};
 
 /// A hint in the key line: a key with long and short descriptions.
 struct KeyHint {
@@ -30,7 +30,7 @@ impl KeyHint {
     }
 
     fn for_action(action: Action) -> Option<Self> {
-        keymap::binding_of(action).map(|it| Self::new(it.label, it.hint))
+        keymap::binding_for(action).map(|it| Self::new(it.label, it.hint))
     }
 
     fn width(&self, is_long: bool) -> u16 {
@@ -103,7 +103,7 @@ fn draw_hint(hint: &KeyHint, area: Rect, is_long: bool, state: &State, buffer: &
 /// Hints for the toggles, with their values. Toggles changed with keys are bold.
 fn toggle_hints(state: &State) -> Vec<KeyHint> {
     // The values belong to the newest render, not to the one being viewed.
-    if state.picture.history.is_older_open() {
+    if state.picture.history.is_viewing_older() {
         return Vec::new();
     }
     let honors_shadows = state.request.integrator().method().honors_shadows;
@@ -124,7 +124,7 @@ fn toggle_hints(state: &State) -> Vec<KeyHint> {
         ),
     ];
     let hint = |(action, name, value, is_changed): (Action, &str, String, bool)| {
-        let key = keymap::binding_of(action)?.label.split(' ').next()?;
+        let key = keymap::binding_for(action)?.label.split(' ').next()?;
         let words = format!("{name} {value}").trim_start().to_owned();
         Some(KeyHint { key, words, short: value, tone: if is_changed { Tone::Strong } else { Tone::Faint } })
     };
@@ -153,14 +153,14 @@ fn current_hints(state: &State) -> (Vec<KeyHint>, Vec<KeyHint>) {
         urgent.extend(scrolling(last, &[OverlayAction::LineDown]).into_iter().chain(closing()));
     }
     urgent.extend(hidden_diagnostics_hint(state));
-    let named = |action, words| keymap::binding_of(action).map(|it| KeyHint::new(it.label, words));
+    let named = |action, words| keymap::binding_for(action).map(|it| KeyHint::new(it.label, words));
     let has_place = state.overlays.problems.is_some() || state.selection.picked.is_some();
     if has_place && !is_mesh(&state.request.scene) {
         urgent.extend(named(Action::Edit, "edit"));
     }
-    if state.picture.history.is_older_open() {
+    if state.picture.history.is_viewing_older() {
         urgent.extend(named(Action::CompareLastEdit, "newest"));
-        let both = if state.picture.history.is_oldest_shown() {
+        let both = if state.picture.history.is_viewing_oldest() {
             named(Action::NewerRender, "newer")
         } else {
             named(Action::OlderRender, "older, newer")
@@ -179,14 +179,17 @@ fn current_hints(state: &State) -> (Vec<KeyHint>, Vec<KeyHint>) {
         let first = named(Action::RenderRegionFirst, "region first");
         urgent.extend(first.map(|hint| KeyHint { tone: Tone::Strong, ..hint }));
     }
-    let reset = keymap::binding_of(Action::ResetSettings).map_or("", |it| it.label);
+    let reset = keymap::binding_for(Action::ResetSettings).map_or("", |it| it.label);
     let changed = |words| KeyHint { tone: Tone::Strong, ..KeyHint::new(reset, words) };
     let changes = state.request.key_changes().join(", ");
     urgent.extend((!changes.is_empty()).then(|| changed(format!("reset {changes}"))));
     let now: &[Action] = match state.work.activity {
         _ if state.work.paused => &[Action::TogglePause, Action::WriteImage],
-        Activity::Running { .. } => &[Action::TogglePause],
-        Activity::Done | Activity::Waiting | Activity::Broken | Activity::Cancelled => &[],
+        WorkerActivity::Running { .. } => &[Action::TogglePause],
+        WorkerActivity::Done
+        | WorkerActivity::Waiting
+        | WorkerActivity::Broken
+        | WorkerActivity::Cancelled => &[],
     };
     let first =
         now.iter().filter_map(|action| KeyHint::for_action(*action)).map(|hint| pause_hint(hint, state));
@@ -234,13 +237,13 @@ const ELSEWHERE: [Action; 8] = [
 ];
 
 fn pause_hint(hint: KeyHint, state: &State) -> KeyHint {
-    let is_pause = keymap::binding_of(Action::TogglePause).is_some_and(|it| it.label == hint.key);
+    let is_pause = keymap::binding_for(Action::TogglePause).is_some_and(|it| it.label == hint.key);
     if is_pause && state.work.paused { KeyHint::new(hint.key, "resume") } else { hint }
 }
 
 /// Hint with the number of errors and warnings, if the pane is closed.
 fn hidden_diagnostics_hint(state: &State) -> Option<KeyHint> {
-    let key = keymap::binding_of(Action::ToggleDiagnostics)?.label;
+    let key = keymap::binding_for(Action::ToggleDiagnostics)?.label;
     let (words, tone) = match &state.overlays.problems {
         _ if state.overlays.diagnostics.open => return None,
         Some(_) => (super::header::format_error_count(state), activity_label(state).2),

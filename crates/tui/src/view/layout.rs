@@ -99,20 +99,20 @@ fn divide_image_and_panel(rest: Rect, shape: f32) -> (Rect, Rect) {
         let (width, height) = fit_image(area, shape);
         u32::from(width) * u32::from(height)
     };
-    let panels = [stacked(rest, shape), side_by_side(rest, shape)].into_iter().flatten();
+    let panels = [panel_below_image(rest, shape), panel_next_to_image(rest, shape)].into_iter().flatten();
     let best = panels.max_by_key(|(preview, _)| cells(*preview));
     let is_kept = |(preview, _): &(Rect, Rect)| cells(*preview) as f32 >= KEPT * cells(rest) as f32;
     best.filter(is_kept).unwrap_or((rest, Rect::ZERO))
 }
 
-fn side_by_side(rest: Rect, shape: f32) -> Option<(Rect, Rect)> {
+fn panel_next_to_image(rest: Rect, shape: f32) -> Option<(Rect, Rect)> {
     let room = Rect { width: rest.width.checked_sub(SIDE_WIDTH + 1)?, ..rest };
     let (width, _) = fit_image(room, shape);
     let panel = Rect { x: rest.x + width + 1, width: rest.width - width - 1, ..rest };
     (rest.height >= SIDE_HEIGHT).then_some((Rect { width, ..rest }, panel))
 }
 
-fn stacked(rest: Rect, shape: f32) -> Option<(Rect, Rect)> {
+fn panel_below_image(rest: Rect, shape: f32) -> Option<(Rect, Rect)> {
     let columns = usize::from(rest.width / ENTRY_WIDTH);
     // Rows for the stages and one line of results.
     let rows = u16::try_from(Stage::ALL.len().div_ceil(columns.max(1)) + 1).unwrap_or(u16::MAX);

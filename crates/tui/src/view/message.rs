@@ -64,7 +64,7 @@ pub(super) fn status_line_rest(state: &State, layout: &Layout) -> Rect {
 }
 
 /// Whether the message covers the image.
-pub(super) fn is_over_picture(state: &State) -> bool {
+pub(super) fn covers_preview(state: &State) -> bool {
     let layout = Layout::for_state(state);
     message_text(state, &layout).is_some_and(|(words, _)| {
         matches!(message_position(state, &layout, &words), MessagePosition::Over(_))
@@ -107,7 +107,7 @@ fn message_position(state: &State, layout: &Layout, words: &str) -> MessagePosit
             MessagePosition::Over(with_rows_above(layout, line))
         };
     }
-    let needed = match status_line::min_columns(state, layout) {
+    let needed = match status_line::reserved_columns(state, layout) {
         0 => 0,
         needed => needed + GAP,
     };

@@ -59,7 +59,7 @@ pub(super) fn draw(state: &State, buffer: &mut Buffer) -> ViewExtras {
     }
     // Covered text is neither linked nor delayed.
     let is_covered =
-        state.overlays.help.open || state.overlays.views.is_some() || message::is_over_picture(state);
+        state.overlays.help.open || state.overlays.views.is_some() || message::covers_preview(state);
     if is_covered || state.overlays.diagnostics.open && layout.pane == layout.panel {
         ViewExtras::default()
     } else {

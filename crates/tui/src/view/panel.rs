@@ -17,7 +17,7 @@ use super::text::{
 use crate::pipeline::protocol::Stage;
 use crate::preview_kind::PreviewKind;
 use crate::scene::sanitize::visible;
-use crate::state::{Activity, AssetBar, State};
+use crate::state::{AssetBar, State, WorkerActivity};
 
 /// Width of an asset's progress bar.
 const BAR: u16 = 8;
@@ -59,7 +59,7 @@ struct PanelLayout {
 }
 
 fn panel_layout(state: &State, area: Rect) -> PanelLayout {
-    let room = Rect { width: side_panel::columns_of_lines(state, area), ..area };
+    let room = Rect { width: side_panel::lines_width(state, area), ..area };
     let is_one_column = |lines: &[StyledLine]| lines.len() <= usize::from(room.height);
     let mut lines = panel_lines(state, (room.width, room.width), true);
     if !is_one_column(&lines) {
@@ -83,10 +83,10 @@ fn rows_used(lines: &[StyledLine], columns: u16, room: Rect) -> u16 {
 /// The panel's lines for this width. Hints are wrapped to the column width. Stage reasons are shown in full,
 /// or shortened to fit next to the stages.
 fn panel_lines(state: &State, (width, column): (u16, u16), is_in_full: bool) -> Vec<StyledLine> {
-    let is_done = matches!(state.work.activity, Activity::Done);
+    let is_done = matches!(state.work.activity, WorkerActivity::Done);
     let mut lines = inspected_lines(state, width);
     // Stages and results describe the newest render.
-    if state.picture.history.is_older_open() {
+    if state.picture.history.is_viewing_older() {
         return lines;
     }
     // If the scene is broken, its stages have no visible result.
@@ -122,8 +122,8 @@ fn inspected_lines(state: &State, width: u16) -> Vec<StyledLine> {
 /// Whether the current scene is invalid.
 fn is_scene_broken(state: &State) -> bool {
     let is_at_rest = match state.work.activity {
-        Activity::Waiting | Activity::Broken => true,
-        Activity::Running { .. } | Activity::Done | Activity::Cancelled => false,
+        WorkerActivity::Waiting | WorkerActivity::Broken => true,
+        WorkerActivity::Running { .. } | WorkerActivity::Done | WorkerActivity::Cancelled => false,
     };
     is_at_rest && state.overlays.problems.as_ref().is_none_or(|problems| problems.work.is_none())
 }
@@ -149,7 +149,7 @@ fn result_lines(state: &State, width: u16) -> Vec<StyledLine> {
         lines.extend(wrapped(words, usize::from(width)).into_iter().map(|line| vec![(line, tone)]));
     };
     status_line::unsaved_messages(state).iter().for_each(|words| add(words, Tone::Faint));
-    status_line::lost_file_messages(state).for_each(|words| add(&words, Tone::Warning));
+    status_line::changed_file_messages(state).for_each(|words| add(&words, Tone::Warning));
     for written in status_line::current_image_files(state) {
         let name = visible(&written.path.to_string_lossy()).into_owned();
         lines.push(vec![("→ ".to_owned(), Tone::Good), (name, Tone::File)]);

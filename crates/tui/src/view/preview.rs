@@ -7,7 +7,7 @@ use ratatui::style::{Color, Style};
 use super::layout::Layout;
 use super::marks;
 use super::message;
-use super::ramp::Ramp;
+use super::ramp::AsciiRamp;
 use super::text::{Tone, put_text};
 use crate::color::{ColorDepth, ColorMapper, XTERM};
 use crate::film::Picture;
@@ -27,7 +27,7 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
     match &state.picture.shown {
         Some(_) if is_in_pixels(state) => {}
         Some(shown) => {
-            let kind = kind_in_cells(state.display.kind, state.display.depth);
+            let kind = cell_based_kind(state.display.kind, state.display.depth);
             let placed = PlacedImage::for_preview(state, shown, area, kind);
             placed.draw(&shown.picture, kind, PreviewColors::for_state(state), buffer);
             marks::draw_marks(state, placed.cells, buffer);
@@ -47,7 +47,7 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
 pub(super) fn draw_thumbnail(state: &State, picture: &Picture, area: Rect, buffer: &mut Buffer) {
     let area = area.intersection(buffer.area);
     if !area.is_empty() {
-        let kind = kind_in_cells(state.display.kind, state.display.depth);
+        let kind = cell_based_kind(state.display.kind, state.display.depth);
         let placed = PlacedImage::fit(picture, area, kind, state.display.window.cell_aspect, f32::INFINITY);
         placed.draw(picture, kind, PreviewColors::for_state(state), buffer);
     }
@@ -57,9 +57,13 @@ pub(super) fn draw_thumbnail(state: &State, picture: &Picture, area: Rect, buffe
 pub(crate) fn image_position_at(state: &State, column: u16, row: u16) -> Option<ImagePosition> {
     let shown = state.picture.shown.as_ref()?;
     let area = Layout::for_state(state).preview;
-    let cells =
-        PlacedImage::for_preview(state, shown, area, kind_in_cells(state.display.kind, state.display.depth))
-            .cells;
+    let cells = PlacedImage::for_preview(
+        state,
+        shown,
+        area,
+        cell_based_kind(state.display.kind, state.display.depth),
+    )
+    .cells;
     let share = |at: u16, start: u16, length: u16| (f64::from(at - start) + 0.5) / f64::from(length);
     let spot = || {
         let spot =
@@ -70,7 +74,7 @@ pub(crate) fn image_position_at(state: &State, column: u16, row: u16) -> Option<
 }
 
 /// The kind of preview to use if it must be drawn with cells.
-fn kind_in_cells(kind: PreviewKind, depth: ColorDepth) -> PreviewKind {
+fn cell_based_kind(kind: PreviewKind, depth: ColorDepth) -> PreviewKind {
     match kind {
         PreviewKind::Pixels(_) => PreviewKind::from_choice(PreviewChoice::Auto, depth),
         kind => kind,
@@ -83,7 +87,7 @@ fn is_in_pixels(state: &State) -> bool {
         && !state.overlays.help.open
         && !state.overlays.diagnostics.open
         && state.overlays.views.is_none()
-        && !message::is_over_picture(state)
+        && !message::covers_preview(state)
 }
 
 /// Placement of a preview drawn as pixels. `None` if the preview is drawn as cells.
@@ -130,7 +134,7 @@ pub(crate) fn draw_image(
     (area, cell_aspect): (Rect, f32),
 ) -> Buffer {
     let mut buffer = Buffer::empty(area);
-    let kind = kind_in_cells(PreviewKind::from_choice(choice, inks.depth), inks.depth);
+    let kind = cell_based_kind(PreviewKind::from_choice(choice, inks.depth), inks.depth);
     PlacedImage::fit(picture, area, kind, cell_aspect, f32::INFINITY).draw(picture, kind, inks, &mut buffer);
     buffer
 }
@@ -203,7 +207,7 @@ impl PlacedImage {
             Some(grid) => each(&|x, y, cell| draw_mosaic_cell(&scaled, grid, inks.shades, (x, y), cell)),
             None if kind == PreviewKind::None => {}
             None => {
-                let ramp = Ramp::for_picture(picture, inks.is_light);
+                let ramp = AsciiRamp::for_picture(picture, inks.is_light);
                 each(&|x, y, cell| draw_character_cell(&scaled, ramp, inks, (x, y), cell));
             }
         }
@@ -250,7 +254,7 @@ fn draw_mosaic_cell(
 /// Draws a cell as a character.
 fn draw_character_cell(
     scaled: &ScaledImage<'_>,
-    ramp: Ramp,
+    ramp: AsciiRamp,
     inks: PreviewColors<'_>,
     (x, y): (usize, usize),
     cell: &mut Cell,

@@ -27,7 +27,7 @@ const MAX_INK: f32 = RAMP[RAMP.len() - 1].1;
 
 /// A mapping from brightness to characters.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Ramp {
+pub(super) struct AsciiRamp {
     /// The sRGB values shown as black and white.
     low: f32,
     high: f32,
@@ -35,7 +35,7 @@ pub(super) struct Ramp {
     is_light: bool,
 }
 
-impl Ramp {
+impl AsciiRamp {
     /// Creates a ramp from an image's darkest to its brightest values, ignoring a thirtieth of the pixels at
     /// each end. The limits are quantized to keep most characters stable under noise. Contrast is increased
     /// by no more than a factor of four.
@@ -48,8 +48,8 @@ impl Ramp {
             counts[usize::from(level)] += 1;
         }
         let beyond = picture.pixels.len() / 30;
-        let low = (level_after(&counts, 0..256, beyond) * STEPS).floor() / STEPS;
-        let high = (level_after(&counts, (0..256).rev(), beyond) * STEPS).ceil() / STEPS;
+        let low = (quantile_level(&counts, 0..256, beyond) * STEPS).floor() / STEPS;
+        let high = (quantile_level(&counts, (0..256).rev(), beyond) * STEPS).ceil() / STEPS;
         let (low, high) = if high - low < MIN { (high.min(1.0) - MIN, high.min(1.0)) } else { (low, high) };
         Self { low: low.max(0.0), high, is_light }
     }
@@ -92,7 +92,7 @@ impl Ramp {
 }
 
 /// The first level at which more than `beyond` pixels have been counted.
-fn level_after(counts: &[usize; 256], mut levels: impl Iterator<Item = usize>, beyond: usize) -> f32 {
+fn quantile_level(counts: &[usize; 256], mut levels: impl Iterator<Item = usize>, beyond: usize) -> f32 {
     let mut seen = 0;
     let level = levels.find(|level| {
         seen += counts[*level];
@@ -118,7 +118,7 @@ pub(crate) fn is_light(rgb: [u8; 3]) -> bool {
 mod tests {
     use super::*;
 
-    const FULL: Ramp = Ramp { low: 0.0, high: 1.0, is_light: false };
+    const FULL: AsciiRamp = AsciiRamp { low: 0.0, high: 1.0, is_light: false };
 
     fn rank(symbol: char) -> usize {
         RAMP.iter().position(|(other, _)| *other == symbol).expect("a ramp character")
@@ -126,7 +126,7 @@ mod tests {
 
     #[test]
     fn ink_depends_on_brightness_and_background() {
-        let light = Ramp { is_light: true, ..FULL };
+        let light = AsciiRamp { is_light: true, ..FULL };
         assert_eq!((FULL.glyph([0; 3]), FULL.glyph([255; 3])), (' ', '@'));
         assert_eq!((light.glyph([0; 3]), light.glyph([255; 3])), ('@', ' '));
         for level in 0..255 {
@@ -143,10 +143,11 @@ mod tests {
             let pixels = (0..1000).map(|i| [80 + (i % 60) as u8 + noise * (i % 2) as u8; 3]).collect();
             Picture { width: 100, height: 10, pixels }
         };
-        let ramp = Ramp::for_picture(&dull(0), false);
+        let ramp = AsciiRamp::for_picture(&dull(0), false);
         assert!(rank(ramp.glyph([80; 3])) < 3 && rank(ramp.glyph([139; 3])) > 11, "{ramp:?}");
-        assert_eq!(ramp, Ramp::for_picture(&dull(2), false));
-        let flat = Ramp::for_picture(&Picture { width: 10, height: 1, pixels: vec![[128; 3]; 10] }, false);
+        assert_eq!(ramp, AsciiRamp::for_picture(&dull(2), false));
+        let flat =
+            AsciiRamp::for_picture(&Picture { width: 10, height: 1, pixels: vec![[128; 3]; 10] }, false);
         assert!((flat.high - flat.low - 0.25).abs() < 1e-6);
     }
 
@@ -154,7 +155,7 @@ mod tests {
     fn ink_and_character_reproduce_the_color() {
         assert_eq!(FULL.tinted_glyph([128, 0, 0]).1, [255, 0, 0]);
         assert!(rank(FULL.tinted_glyph([128, 0, 0]).0) < rank(FULL.tinted_glyph([255, 0, 0]).0));
-        let light = Ramp { is_light: true, ..FULL };
+        let light = AsciiRamp { is_light: true, ..FULL };
         // Pale red is drawn as a sparse character in pure red.
         let (symbol, ink) = light.tinted_glyph([255, 200, 200]);
         assert_eq!(ink, [255, 0, 0]);

@@ -5,7 +5,7 @@ use ratatui::layout::Rect;
 
 use super::layout::ENTRY_WIDTH;
 use super::{curve, diagnostics, strip};
-use crate::state::{Activity, State};
+use crate::state::{State, WorkerActivity};
 
 /// Minimum window width for the curve and the history.
 const WIDE: u16 = 120;
@@ -16,7 +16,7 @@ const DIVIDED: u16 = 3 * ENTRY_WIDTH;
 
 /// Number of columns available for the panel's lines. The remaining columns are used for the curve and the
 /// history.
-pub(super) fn columns_of_lines(state: &State, panel: Rect) -> u16 {
+pub(super) fn lines_width(state: &State, panel: Rect) -> u16 {
     let is_divided = is_wide(state) && panel.width >= DIVIDED;
     if is_divided { COLUMN } else { panel.width }
 }
@@ -30,7 +30,7 @@ fn free_area(state: &State, panel: Rect, lines: u16) -> Rect {
     if !is_wide(state) || state.overlays.views.is_some() {
         return Rect::ZERO;
     }
-    let used = columns_of_lines(state, panel);
+    let used = lines_width(state, panel);
     let area = if used < panel.width {
         super::text::right_part(panel, used + 2)
     } else {
@@ -65,7 +65,7 @@ pub(super) fn history_entry_at(state: &State, panel: Rect, lines: u16, place: (u
 /// move when the results change.
 fn divide_curve_and_strip(state: &State, panel: Rect, lines: u16) -> (Rect, Rect) {
     let area = free_area(state, panel, lines);
-    let is_over = state.work.activity == Activity::Done && !state.picture.history.is_older_open();
+    let is_over = state.work.activity == WorkerActivity::Done && !state.picture.history.is_viewing_older();
     let wants_curve = |area| is_over && curve::chart_rows(state, area).is_some();
     if area.width >= DIVIDED {
         // Place them side by side.

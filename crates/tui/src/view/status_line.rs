@@ -18,7 +18,7 @@ use crate::pipeline::words::format_mean_samples;
 use crate::preview_kind::PreviewKind;
 use crate::scene::is_mesh;
 use crate::scene::sanitize::visible;
-use crate::state::{Activity, OwnImage, State, WrittenFile};
+use crate::state::{OwnImage, State, WorkerActivity, WrittenFile};
 
 /// Save hints for narrow windows.
 const SHORT_HINT: &str = "save it to re-render";
@@ -48,30 +48,28 @@ enum StatusContent {
 
 fn status_content(state: &State) -> StatusContent {
     // The results are those of the newest render.
-    if state.picture.history.is_older_open() && !state.work.is_running() {
+    if state.picture.history.is_viewing_older() && !state.work.is_running() {
         return StatusContent::Nothing;
     }
     match state.work.activity {
-        Activity::Running { .. } => StatusContent::ProgressBar,
-        Activity::Done => StatusContent::Summary,
-        Activity::Waiting | Activity::Cancelled => StatusContent::Nothing,
-        Activity::Broken if let Some(progress) = last_good_progress(state) => StatusContent::Words(format!(
-            "{}: {} %",
-            messages::LAST_GOOD_SCENE,
-            floor_percent(progress.fraction)
-        )),
-        Activity::Broken if state.picture.shown.is_some() => {
+        WorkerActivity::Running { .. } => StatusContent::ProgressBar,
+        WorkerActivity::Done => StatusContent::Summary,
+        WorkerActivity::Waiting | WorkerActivity::Cancelled => StatusContent::Nothing,
+        WorkerActivity::Broken if let Some(progress) = last_good_progress(state) => StatusContent::Words(
+            format!("{}: {} %", messages::LAST_GOOD_SCENE, floor_percent(progress.fraction)),
+        ),
+        WorkerActivity::Broken if state.picture.shown.is_some() => {
             StatusContent::Words(messages::LAST_GOOD_RENDER.to_owned())
         }
-        Activity::Broken => StatusContent::Words(save_hint(state)),
+        WorkerActivity::Broken => StatusContent::Words(save_hint(state)),
     }
 }
 
 /// Number of columns of the status line that a message must not use.
-pub(super) fn min_columns(state: &State, layout: &Layout) -> u16 {
+pub(super) fn reserved_columns(state: &State, layout: &Layout) -> u16 {
     match status_content(state) {
         StatusContent::Nothing => 0,
-        StatusContent::ProgressBar => text_columns(&bar_words(state, layout).1),
+        StatusContent::ProgressBar => text_columns(&progress_text(state, layout).1),
         StatusContent::Summary => {
             file_pieces(state, layout).iter().flatten().map(|(text, _)| text_columns(text)).sum()
         }
@@ -81,12 +79,12 @@ pub(super) fn min_columns(state: &State, layout: &Layout) -> u16 {
 
 /// Progress of rendering the last valid scene, which continues while the file is broken.
 pub(crate) fn last_good_progress(state: &State) -> Option<&RenderProgress> {
-    let is_broken = matches!(state.work.activity, Activity::Broken | Activity::Waiting);
+    let is_broken = matches!(state.work.activity, WorkerActivity::Broken | WorkerActivity::Waiting);
     state.work.progress.as_ref().filter(|progress| is_broken && progress.fraction < 1.0)
 }
 
 /// Fraction and text of the progress bar, for the asset being loaded or the render.
-fn bar_words(state: &State, layout: &Layout) -> (f64, String) {
+fn progress_text(state: &State, layout: &Layout) -> (f64, String) {
     let time = state.work.rendering_time(state.now).map_or(String::new(), format_running_time);
     match (&state.work.progress, state.work.assets.last()) {
         (Some(progress), _) => {
@@ -108,13 +106,13 @@ fn bar_words(state: &State, layout: &Layout) -> (f64, String) {
 /// Draws the progress bar for the asset being loaded or the render.
 fn draw_progress_bar(state: &State, layout: &Layout, area: Rect, buffer: &mut Buffer) {
     let name = running_stage(state).unwrap_or_default();
-    let (fraction, words) = bar_words(state, layout);
+    let (fraction, words) = progress_text(state, layout);
     let room = area.width.saturating_sub(text_columns(name) + text_columns(&words) + 2);
     let noise = state.work.progress.and_then(|progress| progress.noise);
     // While paused, the remaining time is unknown.
     let noise = noise.map(|noise| NoiseProgress { next: noise.next.filter(|_| !state.work.paused), ..noise });
     let fits = |noise: &String| room >= text_columns(noise) + 3 + MIN_BAR;
-    let noise = noise.and_then(|noise| noise_words(&noise).into_iter().find(fits));
+    let noise = noise.and_then(|noise| noise_texts(&noise).into_iter().find(fits));
     let words = noise.map_or(words.clone(), |noise| format!("{noise} · {words}"));
     let room = area.width.saturating_sub(text_columns(name) + text_columns(&words) + 2);
     if room < MIN_BAR {
@@ -137,7 +135,7 @@ fn draw_progress_bar(state: &State, layout: &Layout, area: Rect, buffer: &mut Bu
 
 /// Formats the noise as `noise 2.1 % → 1 % in about 14 s` and in a shorter variant. It is called noise rather
 /// than error because a noise-free image may still be biased.
-fn noise_words(noise: &NoiseProgress) -> [String; 2] {
+fn noise_texts(noise: &NoiseProgress) -> [String; 2] {
     let now = format!("noise {}", two_digit_percent(noise.now));
     let next = noise.next.map(|(level, seconds)| {
         format!("{now} → {} in {}", two_digit_percent(level), approximate_time(seconds))
@@ -149,7 +147,7 @@ fn noise_words(noise: &NoiseProgress) -> [String; 2] {
 fn draw_summary(state: &State, layout: &Layout, area: Rect, buffer: &mut Buffer, drawn: &mut ViewExtras) {
     let of_files = file_pieces(state, layout);
     // Files take precedence if there is not enough space.
-    let room = area.width.saturating_sub(min_columns(state, layout));
+    let room = area.width.saturating_sub(reserved_columns(state, layout));
     let mut pieces = stages::summary_line(state, room);
     let comma = if pieces.is_empty() { "" } else { ", " };
     let mut is_room = |more: Vec<(String, Tone)>| {
@@ -166,7 +164,7 @@ fn draw_summary(state: &State, layout: &Layout, area: Rect, buffer: &mut Buffer,
         }
     }
     if layout.panel.is_empty() {
-        for words in lost_file_messages(state) {
+        for words in changed_file_messages(state) {
             is_room(vec![(format!(" {words}"), Tone::Warning)]);
         }
     }
@@ -236,7 +234,7 @@ pub(crate) fn unsaved_messages(state: &State) -> Vec<String> {
 }
 
 /// A message about each written file that another program has changed.
-pub(super) fn lost_file_messages(state: &State) -> impl Iterator<Item = String> {
+pub(super) fn changed_file_messages(state: &State) -> impl Iterator<Item = String> {
     let words = |written: &WrittenFile| {
         let name = visible(&written.path.to_string_lossy()).into_owned();
         written.lost.map(|lost| messages::output_changed(&name, lost.words()))

@@ -43,7 +43,7 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
     let Some(top) = items.iter().map(|item| item.cells.y).min() else { return };
     let depth = state.display.depth;
     let keys =
-        keymap::binding_of(Action::OlderRender).map_or("", |binding| binding.label).replace(' ', " / ");
+        keymap::binding_for(Action::OlderRender).map_or("", |binding| binding.label).replace(' ', " / ");
     let title = Rect { y: top - 1, height: 1, ..area };
     put_text(
         buffer,

@@ -37,7 +37,7 @@ pub(super) fn fit_text(words: &EntryText, width: usize, rows: [usize; 2]) -> Vec
     let fewer = (1..count).rev().map(ChangeForm::First).chain([ChangeForm::Cut]);
     let in_few = all.map(|form| (form, few));
     let in_most = all.into_iter().chain(fewer).map(|form| (form, most));
-    let lines = |form| fill_lines(&words.head, &all_pieces(words, form, width), width);
+    let lines = |form| fill_lines(&words.head, &shown_pieces(words, form, width), width);
     let is_lone =
         |lines: &[String]| lines.first().is_some_and(|line| line.trim_end() == words.head.trim_end());
     let fits = |(form, rows): (ChangeForm, usize)| {
@@ -55,7 +55,7 @@ pub(super) fn fit_text(words: &EntryText, width: usize, rows: [usize; 2]) -> Vec
 }
 
 /// The pieces of all changes that are shown.
-fn all_pieces(words: &EntryText, form: ChangeForm, width: usize) -> Vec<ChangePiece> {
+fn shown_pieces(words: &EntryText, form: ChangeForm, width: usize) -> Vec<ChangePiece> {
     let changes = &words.changes;
     let told = match form {
         ChangeForm::Full | ChangeForm::New | ChangeForm::Short => changes.len(),

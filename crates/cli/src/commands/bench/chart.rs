@@ -122,7 +122,7 @@ pub(super) fn print_charts(results: &Results, console: &Console) {
         crossterm::terminal::size().map_or(80, |(columns, _)| columns.clamp(MIN_SIZE.0, MAX_COLUMNS));
     for scene in &results.scenes {
         console.print_line(&format!("{}: relMSE over seconds (log–log)", scene.scene));
-        console.print_text(&as_text_lines(
+        console.print_trusted_text(&as_text_lines(
             &ConvergenceChart::from_scene(scene).draw((columns, ROWS)),
             console.is_colored(),
         ));

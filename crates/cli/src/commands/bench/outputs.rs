@@ -10,9 +10,9 @@ use crate::console::Console;
 use crate::control::CancelToken;
 use crate::exit::Exit;
 use crate::lower::STDOUT_NAME;
-use crate::output::write::{self, Guard};
+use crate::output::write::{self, WritePolicy};
 use crate::output::{
-    self, FileIdentity, Losses, OutputError, is_same_file, may_replace_json, may_replace_plot,
+    self, AttributeLossPolicy, FileIdentity, OutputError, is_same_file, may_replace_json, may_replace_plot,
     may_replace_table,
 };
 use crate::system::{describe_error, file};
@@ -162,8 +162,8 @@ impl BenchOutputs {
             .map_err(|why| format!("cannot write {}: {why}", path.display()))?;
         let may_replace = |real: &Path| self.check_replaceable(index, real);
         let is_kept = |path: &Path| self.inputs.iter().any(|(_, input)| input == path);
-        let losses = Losses::Report(&|what| progress.report_warning(&what));
-        let guard = Guard { is_kept: &is_kept, may_replace: &may_replace, sweep: None, losses };
+        let losses = AttributeLossPolicy::Report(&|what| progress.report_warning(&what));
+        let guard = WritePolicy { is_kept: &is_kept, may_replace: &may_replace, sweep: None, losses };
         let written = write::atomic_guarded(path, &bytes, &guard, token);
         written.map(|()| bytes.len()).map_err(|error| error.to_string())
     }

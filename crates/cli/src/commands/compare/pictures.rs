@@ -37,7 +37,7 @@ pub(super) fn render_images(args: &CompareArgs, pair: &Pair, measured: &PairMeas
 
 pub(super) fn print_images(lines: &str, console: &Console) {
     if !lines.is_empty() {
-        console.print_text(&format!("{lines}\n"));
+        console.print_trusted_text(&format!("{lines}\n"));
     }
 }
 

@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use super::document::OpenDocument;
 use super::look::{describe_key, texture_keys};
 use super::place::{CursorContext, Section, cursor_context};
-use crate::scene::keys::key::{KeyInfo, TableSyntax, ValueKind, Word};
+use crate::scene::keys::key::{ChoiceValue, KeyInfo, TableSyntax, ValueKind};
 use crate::scene::keys::{color_names, tables};
 
 /// The candidates at a byte offset. `None` if nothing can be completed there.
@@ -103,8 +103,8 @@ fn missing_key_items(of: Section, given: &[String], is_assigned: bool) -> Vec<Co
 }
 
 fn type_items(of: Section, is_quoted: bool) -> Vec<CompletionItem> {
-    let list: Vec<Word> =
-        of.info.types.iter().map(|kind| Word { name: kind.name, meaning: kind.doc }).collect();
+    let list: Vec<ChoiceValue> =
+        of.info.types.iter().map(|kind| ChoiceValue { name: kind.name, meaning: kind.doc }).collect();
     word_items(&list, is_quoted)
 }
 
@@ -146,8 +146,8 @@ fn value_items(document: &OpenDocument, kind: ValueKind, is_quoted: bool) -> Vec
     }
 }
 
-fn word_items(list: &[Word], is_quoted: bool) -> Vec<CompletionItem> {
-    let word = |word: &Word| {
+fn word_items(list: &[ChoiceValue], is_quoted: bool) -> Vec<CompletionItem> {
+    let word = |word: &ChoiceValue| {
         completion_item(
             word.name,
             CompletionItemKind::ENUM_MEMBER,

@@ -23,7 +23,7 @@ pub const LINE: &str = "#:schema glimt.schema.json\n";
 
 /// Prints the schema.
 pub(crate) fn run(draft: Draft, console: &Console) -> Exit {
-    console.print_text(&schema_text(draft));
+    console.print_trusted_text(&schema_text(draft));
     Exit::DONE
 }
 

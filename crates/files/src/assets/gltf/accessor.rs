@@ -1,7 +1,7 @@
 //! Accessors: typed views of buffers, with strides, normalized integers and sparse values (glTF 2.0, 3.6.2).
 
 use super::json::{Accessor, BufferView};
-use super::{Container, GltfError};
+use super::{GltfError, GltfFile};
 
 /// Maximum element count of an accessor without a buffer view, whose elements are all zero.
 const MAX_ZEROS: u64 = 1 << 22;
@@ -100,14 +100,14 @@ pub(super) struct AccessorReader<'a> {
 
 impl<'a> AccessorReader<'a> {
     /// Opens an accessor by its index.
-    pub(super) fn open(container: &'a Container, number: usize) -> Result<Self, GltfError> {
+    pub(super) fn open(container: &'a GltfFile, number: usize) -> Result<Self, GltfError> {
         let accessor = container.root.accessors.get(number);
         let accessor =
             accessor.ok_or_else(|| GltfError::index("accessors", number, container.root.accessors.len()))?;
         Self::new(container, accessor).map_err(|wrong| wrong.add_location(format!("accessors[{number}]")))
     }
 
-    fn new(container: &'a Container, accessor: &Accessor) -> Result<Self, GltfError> {
+    fn new(container: &'a GltfFile, accessor: &Accessor) -> Result<Self, GltfError> {
         let component = ComponentType::from_number(accessor.component_type)
             .ok_or_else(|| GltfError::new(format!("unknown component type {}", accessor.component_type)))?;
         let width = component_count(&accessor.kind).ok_or_else(|| {
@@ -203,7 +203,7 @@ impl<'a> AccessorReader<'a> {
 
 /// Locates `count` elements of `size` bytes each in a buffer view.
 fn locate_elements<'a>(
-    container: &'a Container,
+    container: &'a GltfFile,
     view: usize,
     offset: u64,
     size: usize,
@@ -228,7 +228,7 @@ fn locate_elements<'a>(
 }
 
 /// Bytes of a buffer view.
-pub(super) fn view_bytes<'a>(container: &'a Container, view: &BufferView) -> Result<&'a [u8], GltfError> {
+pub(super) fn view_bytes<'a>(container: &'a GltfFile, view: &BufferView) -> Result<&'a [u8], GltfError> {
     let buffers = &container.buffers;
     let buffer =
         buffers.get(view.buffer).ok_or_else(|| GltfError::index("buffers", view.buffer, buffers.len()))?;

@@ -5,7 +5,7 @@ use super::description::{Alpha, Glass, ImportNotes, ModelMaterial, TextureRef, T
 use super::json::{
     CLAMP, InfoExtensions, JsonMaterial, MIRROR, NEAREST, REPEAT, TextureInfo, TextureTransform,
 };
-use super::{Container, GltfError, ImageBytes};
+use super::{GltfError, GltfFile, ImageBytes};
 use crate::math::{DVec3, Vec2};
 
 impl JsonMaterial {
@@ -65,7 +65,7 @@ pub(super) fn extension_ignored(name: &str) -> String {
 
 /// Converts a material, and adds notes about features that glimt does not support.
 pub(super) fn convert_material(
-    container: &Container,
+    container: &GltfFile,
     number: usize,
     sets: [usize; 2],
     notes: &mut ImportNotes,
@@ -76,7 +76,7 @@ pub(super) fn convert_material(
 }
 
 struct MaterialReader<'a> {
-    container: &'a Container,
+    container: &'a GltfFile,
     place: String,
     /// Texture coordinate sets of the mesh.
     sets: [usize; 2],

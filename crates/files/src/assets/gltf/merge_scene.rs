@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 
 use super::description::{AffineMap, Alpha, ModelMaterial};
-use super::{Container, GltfError, ModelScene};
+use super::{GltfError, GltfFile, ModelScene};
 use crate::assets::{AssetError, FileMaterial, LoadedMesh, PhysicalMaterial};
 use crate::control::{CancelToken, ignore_progress};
 use crate::geometry::mesh::TriangleMesh;
@@ -14,11 +14,11 @@ use crate::math::origin::origin_near;
 /// Maximum number of triangles in a merged scene, counting every instance.
 const MAX_TRIANGLES: usize = 1 << 25;
 
-impl Container {
+impl GltfFile {
     /// Merges the file's scene into one mesh.
     ///
     /// # Errors
-    /// Same as [`Container::scene`] and [`Container::part`]. Also fails if the scene has no faces or too
+    /// Same as [`GltfFile::scene`] and [`GltfFile::part`]. Also fails if the scene has no faces or too
     /// many triangles.
     pub fn merged_scene(&self, token: &CancelToken) -> Result<LoadedMesh, AssetError> {
         let scene = self.scene(token)?;

@@ -106,7 +106,7 @@ fn truncate_for_message(text: &str) -> String {
 
 /// An open glTF file with its buffers.
 #[derive(Debug)]
-pub struct Container {
+pub struct GltfFile {
     path: PathBuf,
     root: Root,
     buffers: Vec<Vec<u8>>,
@@ -126,7 +126,7 @@ pub enum ImageBytes<'a> {
     File(PathBuf),
 }
 
-impl Container {
+impl GltfFile {
     /// Opens a glTF file and reads its buffers.
     ///
     /// # Errors
@@ -188,7 +188,7 @@ impl Container {
             companions,
             first_part_with_same_mesh: Vec::new(),
         };
-        container.first_part_with_same_mesh = container.shared_parts().map_err(wrong)?;
+        container.first_part_with_same_mesh = container.deduplicate_parts().map_err(wrong)?;
         monitor.tick(2 * length, 2 * length)?;
         Ok(container)
     }
@@ -224,7 +224,7 @@ impl Container {
     /// Returns an image's bytes, reading them from a separate file if necessary.
     ///
     /// # Errors
-    /// Same as [`Container::image`]. Also fails if the image file cannot be read.
+    /// Same as [`GltfFile::image`]. Also fails if the image file cannot be read.
     pub fn image_content(&self, number: usize, token: &CancelToken) -> Result<Vec<u8>, AssetError> {
         match self.image(number)? {
             ImageBytes::Inside(bytes) => Ok(bytes.to_vec()),
@@ -261,7 +261,7 @@ impl Container {
 
     /// Finds the first part with the same mesh for each part. Rejects files whose meshes reuse the same buffer
     /// bytes so often that they would take many times the file's size in memory.
-    fn shared_parts(&self) -> Result<Vec<usize>, GltfError> {
+    fn deduplicate_parts(&self) -> Result<Vec<usize>, GltfError> {
         /// Number of corners allowed regardless of the buffer size.
         const FREE: u64 = 1 << 20;
         let mut first = HashMap::new();
@@ -321,7 +321,7 @@ impl Container {
     /// Checks that an image can be decoded.
     ///
     /// # Errors
-    /// Same as [`Container::check_image_header`].
+    /// Same as [`GltfFile::check_image_header`].
     pub fn check_image(&self, number: usize, token: &CancelToken) -> Result<(), AssetError> {
         let (limits, encoding) = (ImageLimits::default(), ImageEncoding::Color);
         let texels = match self.image(number)? {

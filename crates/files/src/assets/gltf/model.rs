@@ -10,7 +10,7 @@ use super::description::{
 };
 use super::json::{JsonCamera, JsonLight, JsonNode, Primitive};
 use super::materials::convert_material;
-use super::{Container, GltfError};
+use super::{GltfError, GltfFile};
 use crate::assets::AssetError;
 use crate::control::{CancelToken, ignore_progress};
 use crate::geometry::mesh::TriangleMesh;
@@ -24,7 +24,7 @@ const LIMIT: f64 = 1e15;
 /// Maximum number of instances per file.
 const MAX_INSTANCES: usize = 1 << 20;
 
-impl Container {
+impl GltfFile {
     /// Converts the file's default scene. Falls back to the first scene, then to all nodes.
     ///
     /// # Errors
@@ -96,7 +96,7 @@ impl Container {
 
 /// Traversal of the node hierarchy, with the results so far.
 struct SceneWalk<'a> {
-    container: &'a Container,
+    container: &'a GltfFile,
     scene: ModelScene,
     notes: ImportNotes,
     /// Maps a material's index in the file and its texture coordinate sets to the index of the converted

@@ -2,7 +2,7 @@
 
 use super::accessor::AccessorReader;
 use super::json::{Primitive, TRIANGLES};
-use super::{Container, GltfError};
+use super::{GltfError, GltfFile};
 use crate::assets::mesh::assemble::assemble;
 use crate::assets::mesh::parsed::{Faces, ParsedMesh};
 use crate::assets::mesh::{MeshSource, vertex_out_of_range};
@@ -32,7 +32,7 @@ impl Primitive {
     }
 }
 
-impl Container {
+impl GltfFile {
     /// Returns the location of a part in the file, and the part's primitive.
     pub(super) fn primitive(&self, part: usize) -> Option<(String, &Primitive)> {
         let mut first = 0;

@@ -25,20 +25,20 @@ impl GltfDir {
         path
     }
 
-    fn open(&self, name: &str, bytes: &[u8]) -> Result<Container, AssetError> {
-        Container::open(&self.write(name, bytes), &ignore_progress, &CancelToken::new())
+    fn open(&self, name: &str, bytes: &[u8]) -> Result<GltfFile, AssetError> {
+        GltfFile::open(&self.write(name, bytes), &ignore_progress, &CancelToken::new())
     }
 }
 
-fn open_json(json: &Value) -> Result<Container, AssetError> {
+fn open_json(json: &Value) -> Result<GltfFile, AssetError> {
     GltfDir::new().open("a.gltf", json.to_string().as_bytes())
 }
 
-fn part(container: &Container, number: usize) -> Result<LoadedMesh, AssetError> {
+fn part(container: &GltfFile, number: usize) -> Result<LoadedMesh, AssetError> {
     container.part(number, &ignore_progress, &CancelToken::new())
 }
 
-fn scene(container: &Container) -> Result<ModelScene, AssetError> {
+fn scene(container: &GltfFile) -> Result<ModelScene, AssetError> {
     container.scene(&CancelToken::new())
 }
 

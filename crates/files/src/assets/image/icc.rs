@@ -1,7 +1,7 @@
 //! ICC profiles with a matrix and curves, or with a single gray curve (ICC.1:2022). Profiles with lookup
 //! tables are not supported.
 
-use super::primaries::from_colorants;
+use super::primaries::colorants_to_rec_709;
 use super::space::{ColorSpace, Curve};
 use crate::math::{DMat3, DVec3};
 
@@ -74,7 +74,7 @@ impl<'a> IccProfile<'a> {
         if colorants.determinant().abs() < 1e-6 {
             return Err(DEGENERATE_PRIMARIES.to_owned());
         }
-        let matrix = from_colorants(colorants).ok_or(DEGENERATE_PRIMARIES)?;
+        let matrix = colorants_to_rec_709(colorants).ok_or(DEGENERATE_PRIMARIES)?;
         Ok(ColorSpace::new(Some([r, g, b]), matrix))
     }
 

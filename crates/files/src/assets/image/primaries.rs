@@ -62,7 +62,7 @@ impl Primaries {
 }
 
 /// Matrix to linear Rec. 709 from the colorants of an ICC profile, given in XYZ relative to D50.
-pub(super) fn from_colorants(colorants: DMat3) -> Option<DMat3> {
+pub(super) fn colorants_to_rec_709(colorants: DMat3) -> Option<DMat3> {
     Some(rec_709_from_xyz(D50)? * colorants)
 }
 
@@ -139,6 +139,6 @@ mod tests {
         let colorants = DMat3::from_cols_array(&[
             0.43607, 0.22249, 0.01392, 0.38515, 0.71687, 0.09708, 0.14307, 0.06061, 0.71410,
         ]);
-        assert!(is_identity(&from_colorants(colorants).expect("colors")));
+        assert!(is_identity(&colorants_to_rec_709(colorants).expect("colors")));
     }
 }

@@ -51,9 +51,9 @@ pub(super) fn assemble_text(
         faces.join(&positions, source.monitor.token)?;
     }
     let most_triangles = TriangleMesh::MOST_TRIANGLES as usize;
-    let mut cutter = Cutter::new(&positions, &face_materials, most_triangles);
+    let mut cutter = FaceTriangulator::new(&positions, &face_materials, most_triangles);
     cutter.add_all_faces(source, &faces)?;
-    let Cutter { triangles, triangle_materials, dropped, crossing, .. } = cutter;
+    let FaceTriangulator { triangles, triangle_materials, dropped, crossing, .. } = cutter;
     let line_of = |face: usize| start_of(face).map(|start| source.line(start));
     warnings.extend(self_intersection_warning(crossing, line_of));
     if triangles.is_empty() {
@@ -133,7 +133,7 @@ fn self_intersection_warning(
     }
 }
 
-struct Cutter<'a> {
+struct FaceTriangulator<'a> {
     positions: &'a [Vec3],
     materials: &'a [u32],
     most_triangles: usize,
@@ -144,7 +144,7 @@ struct Cutter<'a> {
     crossing: (u64, usize),
 }
 
-impl<'a> Cutter<'a> {
+impl<'a> FaceTriangulator<'a> {
     fn new(positions: &'a [Vec3], materials: &'a [u32], most_triangles: usize) -> Self {
         let (triangles, triangle_materials) = Default::default();
         Self {
@@ -379,8 +379,8 @@ mod tests {
         let monitor = Monitor { progress: &ignore_progress, token: &token };
         let source = MeshSource { path: Path::new("a.off"), bytes: &[], monitor };
         for list in [&[&[0, 1, 2][..], &[0, 2, 3]][..], &[&[0, 1, 2, 3]]] {
-            assert!(Cutter::new(&SQUARE, &[], 2).add_all_faces(&source, &faces(list)).is_ok());
-            let result = Cutter::new(&SQUARE, &[], 1).add_all_faces(&source, &faces(list));
+            assert!(FaceTriangulator::new(&SQUARE, &[], 2).add_all_faces(&source, &faces(list)).is_ok());
+            let result = FaceTriangulator::new(&SQUARE, &[], 1).add_all_faces(&source, &faces(list));
             assert_eq!(rejection(result), (None, super::too_many_triangles(1)));
         }
     }

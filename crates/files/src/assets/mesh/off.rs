@@ -275,11 +275,11 @@ impl OffReader<'_> {
             if !self.cursor.skip_to_word() {
                 return self.wrong(truncated(index, count, "vertices"));
             }
-            let position = self.triple("a coordinate")?;
+            let position = self.read_vec3("a coordinate")?;
             let divisor = if header.homogeneous { self.float("a coordinate")? } else { 1.0 };
             parsed.positions.push(position / divisor);
             if header.normals {
-                parsed.normals.push(self.triple("a normal")?.as_vec3());
+                parsed.normals.push(self.read_vec3("a normal")?.as_vec3());
             }
             if header.colors {
                 let rest = self.rest_of_line()?;
@@ -313,7 +313,7 @@ impl OffReader<'_> {
         }
     }
 
-    fn triple(&mut self, what: &str) -> Result<DVec3, AssetError> {
+    fn read_vec3(&mut self, what: &str) -> Result<DVec3, AssetError> {
         Ok(DVec3::new(self.float(what)?, self.float(what)?, self.float(what)?))
     }
 

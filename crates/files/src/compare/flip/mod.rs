@@ -55,7 +55,7 @@ fn tile_features(
     tile: Rect,
     filters: &Filters,
 ) -> (Vec<PerceivedColor>, Features) {
-    let planes = opponents(pair, which, tile, filters.radius());
+    let planes = opponent_planes(pair, which, tile, filters.radius());
     let features = filters.detect_features(&planes[0]);
     let [y, cx, cz] = filters.blurred(&planes);
     let blurred = y.values.iter().zip(&cx.values).zip(&cz.values);
@@ -64,7 +64,7 @@ fn tile_features(
 }
 
 /// YCxCz of a tile and its margin.
-fn opponents(pair: &Pair, which: usize, tile: Rect, margin: usize) -> [Plane; 3] {
+fn opponent_planes(pair: &Pair, which: usize, tile: Rect, margin: usize) -> [Plane; 3] {
     let (width, height) = (tile.width as usize + 2 * margin, tile.height as usize + 2 * margin);
     let mut planes = [0; 3].map(|_| Plane::zero(width, height));
     let position = |start: u32, offset: usize, length: usize| {

@@ -19,9 +19,9 @@ pub struct Head {
     /// Everything the image depends on, with user-visible names.
     pub identity: Vec<Dependency>,
     /// Share of the image that the file contains.
-    pub share: ShareHead,
+    pub share: PartShare,
     /// Properties of the image.
-    pub picture: ImageHead,
+    pub picture: ImageHeader,
     /// Path of the scene, relative to the part. It may differ between the parts of an image. Empty if
     /// unknown.
     #[serde(default)]
@@ -91,7 +91,7 @@ impl Head {
 
 /// Share of an image that a part file contains.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct ShareHead {
+pub struct PartShare {
     /// Index of the part, starting at 1.
     pub index: u32,
     /// Number of parts.
@@ -104,7 +104,7 @@ pub struct ShareHead {
 
 /// Properties of the image to which a part belongs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct ImageHead {
+pub struct ImageHeader {
     /// Width of the full image.
     pub width: u32,
     /// Height of the full image.
@@ -116,7 +116,7 @@ pub struct ImageHead {
     /// Displayed quantity: `radiance`, `samples` or `error`.
     pub quantity: String,
     /// Tone mapping.
-    pub tone: ToneHead,
+    pub tone: ToneHeader,
     /// Bits per channel of PNG and PPM files, 8 or 16.
     pub bit_depth: u8,
     /// Metadata names and values for the image file.
@@ -127,7 +127,7 @@ pub struct ImageHead {
 
 /// Tone mapping.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct ToneHead {
+pub struct ToneHeader {
     /// Exposure in stops.
     pub exposure: f32,
     /// Name of the tone curve.
@@ -145,7 +145,7 @@ const QUANTITIES: [(Quantity, &str); 3] =
 /// Names of the range mappings in part files.
 const STRETCHES: [(DataKind, &str); 2] = [(DataKind::Distances, "distances"), (DataKind::Amounts, "amounts")];
 
-impl ImageHead {
+impl ImageHeader {
     /// Describes the image of a film with these settings.
     pub fn new(film: &Film, finish: &DevelopSettings) -> Self {
         let Rect { x, y, width, height } = film.crop();
@@ -163,7 +163,7 @@ impl ImageHead {
             crop: [x, y, width, height],
             is_by_photons: film.convergence() == Convergence::Photons,
             quantity: quantity.map_or("radiance", |(_, word)| *word).to_owned(),
-            tone: ToneHead {
+            tone: ToneHeader {
                 exposure: tone.exposure_stops,
                 curve: tone.curve.name().to_owned(),
                 is_data: tone.transfer == Transfer::Identity,

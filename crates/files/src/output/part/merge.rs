@@ -9,7 +9,7 @@ use crate::film::{Film, StoredTile};
 
 /// The result of merging parts.
 #[derive(Debug)]
-pub struct Merged {
+pub struct MergedParts {
     /// Sum of all parts.
     pub film: Film,
     /// Indices of the missing parts.
@@ -83,7 +83,7 @@ pub fn merge(
     is_partial: bool,
     token: &CancelToken,
     mut tell: impl FnMut(usize, &Film),
-) -> Result<Merged, PartError> {
+) -> Result<MergedParts, PartError> {
     let missing = check(parts)?;
     let Some(first) = parts.first() else { return Err(PartError::Missing { missing, count: 0 }) };
     let count = first.head.share.count;
@@ -111,7 +111,7 @@ pub fn merge(
         tell(tile + 1, &film);
     }
     film.add_non_finite(parts.iter().map(|part| part.non_finite).sum());
-    Ok(Merged { film, missing, count })
+    Ok(MergedParts { film, missing, count })
 }
 
 /// Returns a tile contained in a single part, and whether it has all samples.

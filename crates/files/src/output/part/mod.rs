@@ -20,14 +20,14 @@ mod read;
 mod save;
 
 pub use error::{PartError, PartIndex, missing_parts};
-pub use head::{Dependency, Head, ImageHead, PartKind, ShareHead, ToneHead, differences};
-pub use merge::{Merged, check, merge};
+pub use head::{Dependency, Head, ImageHeader, PartKind, PartShare, ToneHeader, differences};
+pub use merge::{MergedParts, check, merge};
 pub use read::{PartFile, input_with_content, input_with_name, is_part};
 pub use save::save;
 
 /// Magic number. As in PNG, text conversion of the file corrupts the number, which makes the conversion
 /// detectable.
-const MARK: [u8; 12] = crate::system::file::PART_MARK;
+const MARK: [u8; 12] = crate::system::file::PART_MAGIC;
 
 /// Version of the part file format.
 const VERSION: u32 = 1;

@@ -8,7 +8,7 @@ use std::sync::mpsc::{self, SyncSender};
 use serde_json::Value;
 
 use super::super::OutputError;
-use super::super::write::{Durability, Guard, atomic_with};
+use super::super::write::{Durability, WritePolicy, atomic_with};
 use super::{Digest, FOOTER, Footer, Head, MARK, VERSION, digest};
 use crate::control::CancelToken;
 use crate::film::Film;
@@ -24,7 +24,7 @@ pub fn save(
     head: &Head,
     film: &Film,
     state: &Value,
-    guard: &Guard<'_>,
+    guard: &WritePolicy<'_>,
     (token, durability): (&CancelToken, Durability),
 ) -> Result<Option<File>, OutputError> {
     atomic_with(path, &|file| write(file, head, film, state, token), guard, (token, durability))
@@ -45,7 +45,13 @@ fn write(
     std::thread::scope(|scope| {
         let named = std::thread::Builder::new().name("glimt-part".to_owned());
         let make_chunks = move || {
-            make(&mut Chunks { sender, bytes: Vec::with_capacity(CHUNK_BYTES) }, head, film, state, token)
+            make(
+                &mut ChunkSender { sender, bytes: Vec::with_capacity(CHUNK_BYTES) },
+                head,
+                film,
+                state,
+                token,
+            )
         };
         let Ok(making) = named.spawn_scoped(scope, make_chunks) else {
             // Encode on this thread. This is slower, but avoids losing hours of work.
@@ -60,12 +66,12 @@ fn write(
 }
 
 /// Collects bytes in chunks and sends them to the writing thread.
-struct Chunks {
+struct ChunkSender {
     sender: SyncSender<Vec<u8>>,
     bytes: Vec<u8>,
 }
 
-impl Write for Chunks {
+impl Write for ChunkSender {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         self.bytes.extend_from_slice(bytes);
         if self.bytes.len() >= CHUNK_BYTES {

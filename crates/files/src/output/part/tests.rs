@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 use proptest::prelude::*;
 use serde_json::json;
 
-use super::super::write::{Durability, Guard};
-use super::super::{BitDepth, DevelopSettings, Losses};
+use super::super::write::{Durability, WritePolicy};
+use super::super::{AttributeLossPolicy, BitDepth, DevelopSettings};
 use super::*;
 use crate::control::CancelToken;
 use crate::film::tone::ToneMapping;
@@ -41,14 +41,18 @@ fn head(index: u32, count: u32, film: &Film) -> Head {
             Dependency::file("knot.obj", "12ab"),
             Dependency::everything("ff"),
         ],
-        share: ShareHead { index, count, block_count: 0, blocks: Vec::new() },
-        picture: ImageHead::new(film, &finish()),
+        share: PartShare { index, count, block_count: 0, blocks: Vec::new() },
+        picture: ImageHeader::new(film, &finish()),
         scene: String::new(),
     }
 }
 
-const OPEN: Guard<'static> =
-    Guard { is_kept: &|_| false, may_replace: &|_| Ok(()), sweep: None, losses: Losses::Refuse };
+const OPEN: WritePolicy<'static> = WritePolicy {
+    is_kept: &|_| false,
+    may_replace: &|_| Ok(()),
+    sweep: None,
+    losses: AttributeLossPolicy::Refuse,
+};
 
 fn put(folder: &Path, name: &str, head: &Head, film: &Film) -> PathBuf {
     let path = folder.join(name);
@@ -70,7 +74,7 @@ fn parts(folder: &Path, count: u32) -> Vec<PathBuf> {
     (1..=count).map(part).collect()
 }
 
-fn merged(paths: &[PathBuf]) -> Result<Merged, PartError> {
+fn merged(paths: &[PathBuf]) -> Result<MergedParts, PartError> {
     let parts = paths.iter().map(|path| opened(path)).collect::<Result<Vec<_>, _>>()?;
     merge(&parts, false, &CancelToken::new(), |_, _| ())
 }

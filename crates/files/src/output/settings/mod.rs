@@ -13,7 +13,7 @@ use ::exr::meta::MetaData;
 use super::part::{PartFile, PartKind};
 use super::{PROGRAM, SOFTWARE};
 use crate::system::describe_error;
-use crate::system::file::{self, PART_MARK};
+use crate::system::file::{self, PART_MAGIC};
 
 /// Number of bytes at the start of a file to search for settings.
 const START_BYTES: u64 = 4 << 20;
@@ -107,7 +107,7 @@ pub fn read_info(path: &Path) -> Result<ImageInfo, ImageInfoError> {
         Err(error) => return Err(unreadable(describe_error(&error))),
     };
     let start = start(&opened).map_err(|error| unreadable(describe_error(&error)))?;
-    if start.starts_with(&PART_MARK) {
+    if start.starts_with(&PART_MAGIC) {
         // `read_part` opens the file again. Use only one descriptor at a time.
         drop(opened);
         return read_part(path).map_err(unreadable);

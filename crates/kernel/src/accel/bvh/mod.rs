@@ -8,7 +8,7 @@ mod traverse;
 
 use crate::geometry::Aabb;
 
-pub use packet::{AnyTest, ClosestTest};
+pub use packet::{AnyHitCallback, ClosestHitCallback};
 pub use shell::{OverlappingItem, Shell};
 use top_node::TopNode;
 

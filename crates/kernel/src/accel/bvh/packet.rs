@@ -16,14 +16,14 @@ use crate::geometry::packet::{RayPacket, lanes};
 use crate::math::lanes::{Simd, TRUE};
 
 /// Callback that finds the nearest hits of a packet.
-pub trait ClosestTest {
+pub trait ClosestHitCallback {
     /// Tests a primitive against the rays in `met`. If a ray hits the primitive, its end is moved to the hit.
     /// Primitives exactly at a ray's end are still tested because ties are broken by id.
     fn test(&mut self, id: u32, met: u32, ends: &mut F32x16);
 }
 
 /// Callback that tests a packet for any hit.
-pub trait AnyTest {
+pub trait AnyHitCallback {
     /// Returns the mask of the rays in `met` that hit a primitive.
     fn test(&mut self, id: u32, met: u32, ends: &F32x16) -> u32;
 }
@@ -166,7 +166,7 @@ impl Bvh {
         ends: &mut F32x16,
         traced: u32,
         outside: &[u32],
-        closest: &mut impl ClosestTest,
+        closest: &mut impl ClosestHitCallback,
         simd: impl Simd,
     ) {
         let slabs = SlabPacket::new(rays, simd);
@@ -228,7 +228,7 @@ impl Bvh {
         ends: &F32x16,
         traced: u32,
         outside: &[u32],
-        any: &mut impl AnyTest,
+        any: &mut impl AnyHitCallback,
         simd: impl Simd,
     ) -> u32 {
         let slabs = SlabPacket::new(rays, simd);

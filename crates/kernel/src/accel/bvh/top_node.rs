@@ -163,7 +163,7 @@ impl Bvh {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::accel::{AnyTest, ClosestTest};
+    use crate::accel::{AnyHitCallback, ClosestHitCallback};
     use crate::control::CancelToken;
     use crate::geometry::Ray;
     use crate::geometry::aabb::SlabRay;
@@ -173,13 +173,13 @@ mod tests {
     /// Records which primitives are tested for which rays.
     struct TestLog(Vec<u32>);
 
-    impl ClosestTest for TestLog {
+    impl ClosestHitCallback for TestLog {
         fn test(&mut self, id: u32, met: u32, _: &mut F32x16) {
             self.0[id as usize] |= met;
         }
     }
 
-    impl AnyTest for TestLog {
+    impl AnyHitCallback for TestLog {
         fn test(&mut self, id: u32, met: u32, _: &F32x16) -> u32 {
             self.0[id as usize] |= met;
             0

@@ -8,7 +8,7 @@ use super::surface::SurfacePoint;
 use super::surface_of_revolution::{
     self, AxialFrame, LocalLine, angle_to_u, direction_at_u, exact_t, radial_direction,
 };
-use super::surface_packet::{ExactPoint, ExactSurface};
+use super::surface_packet::{SurfaceF64, SurfacePointF64};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit};
 use crate::math::{DVec2, DVec3, Vec2};
 use crossing::UnitLine;
@@ -28,8 +28,8 @@ pub struct Torus {
     tube: f64,
 }
 
-impl ExactSurface for Torus {
-    fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> ExactPoint {
+impl SurfaceF64 for Torus {
+    fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePointF64 {
         let (out, from_circle) = self.circle_directions(ray.at(exact_t(hit, self.nearest(ray))));
         self.exact_at(out, from_circle)
     }
@@ -109,7 +109,7 @@ impl Torus {
     fn surface_at(&self, out: DVec2, from_circle: DVec2) -> SurfacePoint {
         let (across, up) = (from_circle.x, from_circle.y);
         let ring = self.radius + self.tube * across;
-        let ExactPoint { point, normal, reach } = self.exact_at(out, from_circle);
+        let SurfacePointF64 { point, normal, reach } = self.exact_at(out, from_circle);
         SurfacePoint::exact(
             point,
             normal,
@@ -121,10 +121,10 @@ impl Torus {
     }
 
     /// [`Torus::surface_at`] without texture coordinates and tangents.
-    fn exact_at(&self, out: DVec2, from_circle: DVec2) -> ExactPoint {
+    fn exact_at(&self, out: DVec2, from_circle: DVec2) -> SurfacePointF64 {
         let (across, up) = (from_circle.x, from_circle.y);
         let ring = self.radius + self.tube * across;
-        ExactPoint {
+        SurfacePointF64 {
             point: self.frame.point_to_world((out * ring).extend(self.tube * up)),
             normal: self.frame.vector_to_world((out * across).extend(up)),
             reach: self.reach(),
@@ -203,7 +203,7 @@ impl Torus {
 
     /// Bounding box.
     pub fn bounds(&self) -> Aabb {
-        self.frame.ball_bounds(0.0, self.radius, self.tube)
+        self.frame.swept_sphere_bounds(0.0, self.radius, self.tube)
     }
 }
 

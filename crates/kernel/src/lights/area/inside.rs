@@ -7,14 +7,14 @@ use super::{LightHit, ShapeEmitter};
 use crate::geometry::{AreaPoint, RayF64, Shape};
 use crate::math::elementary::sin_cos;
 use crate::math::{DVec3, Vec2, Vec3};
-use crate::sampling::distribution::Discrete;
+use crate::sampling::distribution::DiscreteDistribution;
 
 /// The inside of a shape. If the shape is closed, its inside is sampled uniformly over all directions from
 /// points inside, and is invisible from outside. If it is open, its inside is sampled by area.
 #[derive(Clone, Debug, PartialEq)]
 pub struct InsideEmitter {
     shape: Shape,
-    by_area: Discrete,
+    by_area: DiscreteDistribution,
 }
 
 impl ShapeEmitter for InsideEmitter {
@@ -48,7 +48,7 @@ const ALL_AROUND: f32 = 4.0 * PI;
 impl InsideEmitter {
     /// Creates an emitter for a shape's inside. `None` if the shape has no area.
     pub fn new(shape: &Shape) -> Option<Self> {
-        Some(Self { shape: *shape, by_area: Discrete::new(shape.areas())? })
+        Some(Self { shape: *shape, by_area: DiscreteDistribution::new(shape.areas())? })
     }
 
     /// Samples a direction uniformly from a point inside the shape.

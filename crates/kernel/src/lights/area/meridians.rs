@@ -9,7 +9,7 @@ const NODES: usize = 9;
 /// Distribution of angles around a pole, in the interval from −`reach` to `reach`. The density is piecewise
 /// linear.
 #[derive(Clone, Copy, Debug)]
-pub struct MeridianDistribution {
+pub struct AzimuthDistribution {
     /// Largest angle at which the light is visible.
     reach: f64,
     share: PiecewiseLinear<NODES>,
@@ -47,7 +47,7 @@ impl SinCos {
     }
 }
 
-impl MeridianDistribution {
+impl AzimuthDistribution {
     /// A distribution over the angles from −`reach` to `reach`, with a density proportional to `weight`.
     /// `reach` is in [0, π].
     pub fn new(reach: SinCos, weight: impl Fn(SinCos) -> f64) -> Self {

@@ -8,10 +8,10 @@ use super::{LightHit, ShapeEmitter};
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::AreaPoint;
 use crate::geometry::triangle::Triangle;
-use crate::lights::sample::{LightObject, LightSample, ShadowRayEnd};
+use crate::lights::sample::{LightGeometry, LightSample, ShadowRayEnd};
 use crate::lights::tree::{LightBounds, LightTree, MAX_WITHOUT_TREE, Receiver};
 use crate::math::{DVec3, Vec2, Vec3};
-use crate::sampling::distribution::Discrete;
+use crate::sampling::distribution::DiscreteDistribution;
 use crate::sampling::warp;
 
 /// Triangles that emit toward the side of (b − a) × (c − a).
@@ -19,7 +19,7 @@ use crate::sampling::warp;
 pub struct MeshEmitter {
     /// For each triangle, the corners in world coordinates and the primitive index in its object.
     triangles: Vec<([DVec3; 3], u32)>,
-    by_area: Discrete,
+    by_area: DiscreteDistribution,
     /// Centroid of the area.
     center: DVec3,
     /// Bounds of the triangles' positions and emission, for a radiance of 1.
@@ -53,7 +53,7 @@ pub struct TrianglePairQuad {
 #[derive(Clone, Debug, PartialEq)]
 pub struct AreaSampledTriangles {
     all: Vec<EmissiveTriangle>,
-    by_area: Discrete,
+    by_area: DiscreteDistribution,
     area: f32,
 }
 
@@ -78,7 +78,7 @@ impl MeshEmitter {
     pub fn new(triangles: Vec<([DVec3; 3], u32)>, token: &CancelToken) -> Result<Option<Self>, Cancelled> {
         let vector_area_of = |[a, b, c]: &[DVec3; 3]| (*b - *a).cross(*c - *a) * 0.5;
         let areas = triangles.iter().map(|(corners, _)| vector_area_of(corners).length());
-        let Some(by_area) = Discrete::new(areas) else { return Ok(None) };
+        let Some(by_area) = DiscreteDistribution::new(areas) else { return Ok(None) };
         let center = triangles.iter().map(|(corners, _)| {
             (corners[0] + corners[1] + corners[2]) / 3.0 * vector_area_of(corners).length()
         });
@@ -169,7 +169,7 @@ impl MeshEmitter {
             end: ShadowRayEnd::At(arrival.target),
             direction: arrival.direction,
             weight: radiance * arrival.factor,
-            source: LightObject::Primitive(object, primitive),
+            source: LightGeometry::Primitive(object, primitive),
         })
     }
 
@@ -221,7 +221,7 @@ impl TrianglePairQuad {
             return None;
         }
         let quad = QuadEmitter::new(p, u, v);
-        let [along_u, along_v] = quad.coordinate_vectors();
+        let [along_u, along_v] = quad.dual_edges();
         Some(Self { quad, across: along_u + along_v, primitives: [*one, *two] })
     }
 
@@ -234,13 +234,13 @@ impl TrianglePairQuad {
     /// Primitive index of the triangle that contains the sampled `target`.
     #[inline(always)]
     pub fn part(&self, point: Vec3, target: Vec3) -> u32 {
-        let offset = (target - point) - self.quad.corner_from(point);
+        let offset = (target - point) - self.quad.offset_to_corner(point);
         if offset.dot(self.across) < 1.0 { self.primitives[0] } else { self.primitives[1] }
     }
 }
 
 impl AreaSampledTriangles {
-    fn new(triangles: &[([DVec3; 3], u32)], by_area: &Discrete) -> Self {
+    fn new(triangles: &[([DVec3; 3], u32)], by_area: &DiscreteDistribution) -> Self {
         let facet = |&([a, b, c], primitive): &([DVec3; 3], u32)| {
             let (ab, ac) = (b - a, c - a);
             let normal = ab.cross(ac).normalize_or_zero().as_vec3();

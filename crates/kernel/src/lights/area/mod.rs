@@ -25,7 +25,7 @@ pub use emission_texture::{EmissionTexture, UvChart, UvTriangle};
 pub use mesh::MeshEmitter;
 pub use sample_point::LightSamplePoint;
 
-use super::sample::{LightHit, LightObject, LightSample, ShadowRayEnd};
+use super::sample::{LightGeometry, LightHit, LightSample, ShadowRayEnd};
 use super::tree::bounds::{EmissionCone, LightBounds, mean_channel};
 use crate::geometry::Shape;
 use crate::geometry::disk::Disk;
@@ -243,7 +243,7 @@ fn bounds(shape: &Shape, radiance: Vec3) -> Option<LightBounds> {
     };
     let area: f64 = shape.areas().iter().sum();
     let (shown, cone) = match normal.map(DVec3::normalize) {
-        Some(normal) => (area, EmissionCone::of_front(normal)),
+        Some(normal) => (area, EmissionCone::lambertian(normal)),
         None => (0.25 * area, EmissionCone::ALL),
     };
     Some(LightBounds::in_box(shape.bounds()?, mean_channel(radiance) * shown, cone))
@@ -275,8 +275,8 @@ impl AreaLight {
             return Some(sample);
         };
         let primitive = match sample.source {
-            LightObject::Primitive(_, primitive) => primitive,
-            LightObject::Object(_) | LightObject::SeeThrough(_) | LightObject::Nothing => 0,
+            LightGeometry::Primitive(_, primitive) => primitive,
+            LightGeometry::Object(_) | LightGeometry::SeeThrough(_) | LightGeometry::Nothing => 0,
         };
         Some(LightSample {
             weight: sample.weight * texture.at(target, primitive, sample.direction),
@@ -298,9 +298,9 @@ impl AreaLight {
     }
 
     /// The light's geometry.
-    pub(super) fn source(&self) -> LightObject {
+    pub(super) fn source(&self) -> LightGeometry {
         let is_sheer = matches!(self.shape, Emitter::SeeThrough(_));
-        if is_sheer { LightObject::SeeThrough(self.object) } else { LightObject::Object(self.object) }
+        if is_sheer { LightGeometry::SeeThrough(self.object) } else { LightGeometry::Object(self.object) }
     }
 
     /// [`Light::pdf`](super::Light::pdf).

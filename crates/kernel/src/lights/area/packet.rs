@@ -3,18 +3,18 @@
 use super::sample_point::LightSamplePoint;
 use super::{AreaLight, Emitter, MeshEmitter, ShapeEmitter};
 use crate::lights::packet::{LightSamplePacket, packet_of};
-use crate::lights::sample::LightObject;
+use crate::lights::sample::LightGeometry;
 use crate::math::lanes::{F32x16, PACKET_SIZE, Vec3x16, lane, set_lane};
 
 /// Samples triangles by area for a packet, with a separate light for each lane.
 macro_rules! triangle_packet_of {
     ($i:ident => ($facets:expr, $light:expr), $points:expr, $u:expr) => {{
-        let mut row = packet_of!(LightObject::Nothing, $i => {
+        let mut row = packet_of!(LightGeometry::Nothing, $i => {
             let sample: LightSamplePoint = $facets.sample(lane($points, $i), [$u[0][$i], $u[1][$i]]);
             (sample.direction, sample.target, $light.radiance * sample.factor)
         });
         for $i in 0..PACKET_SIZE {
-            let source = LightObject::Primitive($light.object, $facets.part($u[0][$i]));
+            let source = LightGeometry::Primitive($light.object, $facets.part($u[0][$i]));
             row.sources.set($i, source);
         }
         row
@@ -48,7 +48,7 @@ impl AreaLight {
             // would also compute everything else only eight lanes at a time.
             let mut offsets = [[0.0; PACKET_SIZE]; 3];
             for i in 0..PACKET_SIZE {
-                set_lane(&mut offsets, i, quad.corner_from(lane(points, i)));
+                set_lane(&mut offsets, i, quad.offset_to_corner(lane(points, i)));
             }
             let mut row = packet_of!(source, i => {
                 let sample = quad.sample_from(lane(points, i), lane(&offsets, i), [u[0][i], u[1][i]]);

@@ -37,11 +37,11 @@ impl ShapeEmitter for QuadEmitter {
     /// Samples rectangles by solid angle and other parallelograms by area.
     #[inline(always)]
     fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
-        self.sample_from(point, self.corner_from(point), u)
+        self.sample_from(point, self.offset_to_corner(point), u)
     }
 
     fn pdf(&self, from: Vec3, met: &LightHit) -> f32 {
-        let to_corner = self.corner_from(from);
+        let to_corner = self.offset_to_corner(from);
         if !(to_corner.dot(self.normal) < 0.0) {
             return 0.0;
         }
@@ -98,7 +98,7 @@ impl QuadEmitter {
 
     /// Offset from a point to the corner.
     #[inline(always)]
-    pub(super) fn corner_from(&self, point: Vec3) -> Vec3 {
+    pub(super) fn offset_to_corner(&self, point: Vec3) -> Vec3 {
         (self.corner - point.as_dvec3()).as_vec3()
     }
 
@@ -106,13 +106,13 @@ impl QuadEmitter {
     #[inline(always)]
     pub(super) fn sample_by_area(&self, to_corner: Vec3, u: [f32; 2]) -> (Vec3, f32) {
         let offset = to_corner + self.u * u[0] + self.v * u[1];
-        (offset, self.projected_solid_angle(offset))
+        (offset, self.inverse_area_pdf(offset))
     }
 
     /// Solid angle of the quad if its entire area were at this offset from the point. Not positive if the
     /// point is behind the quad.
     #[inline(always)]
-    pub(super) fn projected_solid_angle(&self, offset: Vec3) -> f32 {
+    pub(super) fn inverse_area_pdf(&self, offset: Vec3) -> f32 {
         let nearness = 1.0 / offset.length_squared().sqrt();
         let height = -offset.dot(self.normal) * self.area;
         height * nearness * nearness * nearness
@@ -127,7 +127,7 @@ impl QuadEmitter {
     }
 
     /// Vectors whose dot products with an offset from the corner are the coordinates along the edges.
-    pub(super) fn coordinate_vectors(&self) -> [Vec3; 2] {
+    pub(super) fn dual_edges(&self) -> [Vec3; 2] {
         let (u, v, n) = (self.u.as_dvec3(), self.v.as_dvec3(), self.normal.as_dvec3());
         let (across_v, across_u) = (v.cross(n), n.cross(u));
         [(across_v / across_v.dot(u)).as_vec3(), (across_u / across_u.dot(v)).as_vec3()]
@@ -160,7 +160,7 @@ impl PlanarRectangle {
 /// Sine of the angle at which a side at coordinate `side` is seen. `d2` is the squared distance perpendicular
 /// to this coordinate.
 #[inline(always)]
-fn in_plane_component(side: f32, d2: f32) -> f32 {
+fn side_sine(side: f32, d2: f32) -> f32 {
     side / (d2 + side * side).sqrt()
 }
 
@@ -175,8 +175,8 @@ impl SphericalRectangle {
     #[inline(always)]
     pub fn new([x0, x1]: [f32; 2], [y0, y1]: [f32; 2], z: f32) -> Self {
         let z2 = z * z;
-        let (lower, right) = (-in_plane_component(y0, z2), in_plane_component(x1, z2));
-        let (upper, left) = (in_plane_component(y1, z2), -in_plane_component(x0, z2));
+        let (lower, right) = (-side_sine(y0, z2), side_sine(x1, z2));
+        let (upper, left) = (side_sine(y1, z2), -side_sine(x0, z2));
         let (g0, g1) = (dihedral_angle(lower, right), dihedral_angle(right, upper));
         let (g2, g3) = (dihedral_angle(upper, left), dihedral_angle(left, lower));
         Self {
@@ -245,7 +245,7 @@ impl SphericalRectangle {
         let x = (-self.z * sin / root).max(self.x[0]).min(self.x[1]);
         // For this x, heights on the unit circle are uniformly distributed.
         let d2 = x * x + self.z * self.z;
-        let (h0, h1) = (in_plane_component(self.y[0], d2), in_plane_component(self.y[1], d2));
+        let (h0, h1) = (side_sine(self.y[0], d2), side_sine(self.y[1], d2));
         let h = h0 + u[1] * (h1 - h0);
         let rest = (1.0 - h * h).max(f32::MIN_POSITIVE);
         let y = (h * (d2 / rest).sqrt()).max(self.y[0]).min(self.y[1]);

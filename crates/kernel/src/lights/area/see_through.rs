@@ -4,13 +4,13 @@ use super::sample_point::LightSamplePoint;
 use super::{LightHit, ShapeEmitter, Side};
 use crate::geometry::{AreaPoint, Shape};
 use crate::math::{DVec3, Vec2, Vec3};
-use crate::sampling::distribution::Discrete;
+use crate::sampling::distribution::DiscreteDistribution;
 
 /// One side of a shape, sampled by area. Shadow rays account for other parts of the shape in between.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SeeThroughEmitter {
     shape: Shape,
-    by_area: Discrete,
+    by_area: DiscreteDistribution,
     /// 1 for the front, −1 for the back.
     outwards: f64,
 }
@@ -22,7 +22,7 @@ impl SeeThroughEmitter {
             Side::Front => 1.0,
             Side::Back => -1.0,
         };
-        Some(Self { shape: *shape, by_area: Discrete::new(shape.areas())?, outwards })
+        Some(Self { shape: *shape, by_area: DiscreteDistribution::new(shape.areas())?, outwards })
     }
 }
 

@@ -1,7 +1,7 @@
 //! Cylinder and cone lights: a curved side and caps.
 
 use super::disk::{DiskEmitter, perpendicular};
-use super::meridians::{MeridianDistribution, PolarFrame, SinCos};
+use super::meridians::{AzimuthDistribution, PolarFrame, SinCos};
 use super::sample_point::LightSamplePoint;
 use super::{LightHit, ShapeEmitter};
 use crate::geometry::cone::Cone;
@@ -44,7 +44,7 @@ pub trait RevolutionSideView {
 
 /// The visible part of a light.
 struct RevolutionView<V> {
-    side: Option<(V, MeridianDistribution)>,
+    side: Option<(V, AzimuthDistribution)>,
     cap: Option<(super::disk::DiskView, DVec3)>,
     /// Fraction of samples on the side.
     share: f64,
@@ -98,7 +98,7 @@ impl<S: RevolutionSide> ShapeEmitter for RevolutionEmitter<S> {
 impl<S: RevolutionSide> RevolutionEmitter<S> {
     fn view(&self, point: Vec3) -> RevolutionView<S::RevolutionView> {
         let side = self.side.seen_from(point).map(|view| {
-            let meridians = MeridianDistribution::new(view.max_angle(), |turn| view.cosine_extent(turn));
+            let meridians = AzimuthDistribution::new(view.max_angle(), |turn| view.cosine_extent(turn));
             (view, meridians)
         });
         let side = side.filter(|(_, meridians)| meridians.total() > 0.0);

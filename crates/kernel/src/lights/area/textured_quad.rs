@@ -43,12 +43,12 @@ impl ShapeEmitter for TexturedQuadEmitter {
         let rest = (u[0] - before) / share;
         const LAST: f32 = 1.0_f32.next_down();
         let u = [if rest < LAST { rest } else { LAST }, u[1]];
-        let to_corner = self.quad.corner_from(point);
+        let to_corner = self.quad.offset_to_corner(point);
         let GridSample { column, row, rest } = self.cells.sample(u);
         let at =
             [(column as f32 + rest[0]) / self.size[0] as f32, (row as f32 + rest[1]) / self.size[1] as f32];
         let (offset, by_area) = self.quad.sample_by_area(to_corner, at);
-        let cell_factor = self.cell_density(column, row);
+        let cell_factor = self.cell_pdf_ratio(column, row);
         let own = self.quad.sample(point, u);
         if by_texture {
             let direction = offset * (1.0 / offset.length_squared().sqrt());
@@ -65,7 +65,7 @@ impl ShapeEmitter for TexturedQuadEmitter {
     }
 
     fn pdf(&self, from: Vec3, met: &LightHit) -> f32 {
-        let to_corner = self.quad.corner_from(from);
+        let to_corner = self.quad.offset_to_corner(from);
         let quad_pdf = self.quad.pdf(from, met);
         if quad_pdf > 0.0 { self.density(met.direction * met.distance, to_corner, quad_pdf) } else { 0.0 }
     }
@@ -103,7 +103,7 @@ impl TexturedQuadEmitter {
         let share = (MAX_TEXTURE_SHARE * contrast) as f32;
         let cells =
             PiecewiseConstant2D::new(size[0], rows.into_iter()).filter(|_| share > MIN_TEXTURE_SHARE)?;
-        Some(Self { along: quad.coordinate_vectors(), quad, size, cells, share })
+        Some(Self { along: quad.dual_edges(), quad, size, cells, share })
     }
 
     /// Pdf in sr⁻¹ at an offset from the point, given the untextured quad's pdf.
@@ -114,13 +114,13 @@ impl TexturedQuadEmitter {
             let place = self.along[axis].dot(on_quad) * self.size[axis] as f32;
             (if place > 0.0 { place as usize } else { 0 }).min(self.size[axis] - 1)
         };
-        let cell_factor = self.cell_density(cell(0), cell(1));
-        self.share * cell_factor / self.quad.projected_solid_angle(offset) + (1.0 - self.share) * quad_pdf
+        let cell_factor = self.cell_pdf_ratio(cell(0), cell(1));
+        self.share * cell_factor / self.quad.inverse_area_pdf(offset) + (1.0 - self.share) * quad_pdf
     }
 
     /// Area density of a cell, relative to a constant texture.
     #[inline(always)]
-    fn cell_density(&self, column: usize, row: usize) -> f32 {
+    fn cell_pdf_ratio(&self, column: usize, row: usize) -> f32 {
         let probability = self.cells.row_probability(row) * self.cells.column_probability(row, column);
         probability * (self.size[0] * self.size[1]) as f32
     }

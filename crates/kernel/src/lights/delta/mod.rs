@@ -7,7 +7,7 @@ pub use point::{Falloff, PointLight};
 pub use spot::SpotLight;
 
 use super::packet::{LightSamplePacket, packet_of};
-use super::sample::{LightObject, LightSample, ShadowRayEnd};
+use super::sample::{LightGeometry, LightSample, ShadowRayEnd};
 use super::tree::LightBounds;
 use crate::math::Vec3;
 use crate::math::lanes::{Vec3x16, lane};
@@ -41,14 +41,19 @@ pub trait DeltaLight {
     fn sample(&self, point: Vec3) -> Option<LightSample> {
         let (direction, weight) = self.direction_and_irradiance(point);
         let end = ShadowRayEnd::At(self.isotropic().position.as_vec3());
-        (weight != Vec3::ZERO).then_some(LightSample { end, direction, weight, source: LightObject::Nothing })
+        (weight != Vec3::ZERO).then_some(LightSample {
+            end,
+            direction,
+            weight,
+            source: LightGeometry::Nothing,
+        })
     }
 
     /// [`DeltaLight::sample`] for a packet of points.
     #[inline(always)]
     fn sample_row(&self, points: &Vec3x16) -> LightSamplePacket {
         let target = self.isotropic().position.as_vec3();
-        packet_of!(LightObject::Nothing, i => {
+        packet_of!(LightGeometry::Nothing, i => {
             let (direction, weight) = self.direction_and_irradiance(lane(points, i));
             (direction, target, weight)
         })

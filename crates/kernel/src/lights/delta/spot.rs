@@ -64,7 +64,7 @@ impl DeltaLight for SpotLight {
     }
 
     fn bounds(&self) -> LightBounds {
-        let cone = EmissionCone::into_cone(self.axis.as_dvec3(), f64::from(self.half_angle));
+        let cone = EmissionCone::from_half_angle(self.axis.as_dvec3(), f64::from(self.half_angle));
         LightBounds { cone, ..self.point.bounds() }
     }
 }

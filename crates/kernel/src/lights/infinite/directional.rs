@@ -4,7 +4,7 @@ use std::f32::consts::PI;
 
 use super::InfiniteLight;
 use crate::lights::packet::{LightSamplePacket, infinite_packet_of};
-use crate::lights::sample::{LightObject, LightSample, ShadowRayEnd};
+use crate::lights::sample::{LightGeometry, LightSample, ShadowRayEnd};
 use crate::lights::tree::bounds::{DistanceFalloff, EmissionCone, LightBounds, mean_channel};
 use crate::math::Vec3;
 use crate::math::frame::Frame;
@@ -43,7 +43,7 @@ impl DirectionalLight {
             end: ShadowRayEnd::Beyond,
             direction,
             weight,
-            source: LightObject::Nothing,
+            source: LightGeometry::Nothing,
         })
     }
 

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::InfiniteLight;
 use super::environment_map::EnvironmentMap;
 use crate::lights::packet::LightSamplePacket;
-use crate::lights::sample::{LightObject, LightSample, ShadowRayEnd};
+use crate::lights::sample::{LightGeometry, LightSample, ShadowRayEnd};
 use crate::lights::tree::bounds::{DistanceFalloff, EmissionCone, LightBounds, mean_channel};
 use crate::math::frame::Frame;
 use crate::math::lanes::{F32x16, PACKET_SIZE, Vec3x16, lane, set_lane};
@@ -53,7 +53,7 @@ impl Environment {
 
     /// [`Environment::radiance_and_pdf`] for a packet of directions.
     #[inline(always)]
-    pub fn radiance_and_pdf_row(&self, directions: &Vec3x16) -> (Vec3x16, F32x16) {
+    pub fn radiance_and_pdf_packet(&self, directions: &Vec3x16) -> (Vec3x16, F32x16) {
         match self {
             Self::Constant(Vec3 { x, y, z }) => {
                 ([[*x; PACKET_SIZE], [*y; PACKET_SIZE], [*z; PACKET_SIZE]], [HEMISPHERE_PDF; PACKET_SIZE])
@@ -79,7 +79,7 @@ impl Environment {
                     let frame = Frame::from_normal(lane(normals, i));
                     set_lane(&mut directions, i, frame.to_world(warp::cone([u[0][i], u[1][i]], 1.0)));
                 }
-                let (radiance, pdfs) = self.radiance_and_pdf_row(&directions);
+                let (radiance, pdfs) = self.radiance_and_pdf_packet(&directions);
                 (directions, radiance, pdfs)
             }
             Self::Map { sky, factor, turn } => {
@@ -98,7 +98,7 @@ impl Environment {
             let weight = lane(&weights, i) * inverse_pdfs[i];
             set_lane(&mut weights, i, weight);
         }
-        let dark = LightSamplePacket::without_light(LightObject::Nothing);
+        let dark = LightSamplePacket::without_light(LightGeometry::Nothing);
         LightSamplePacket {
             directions,
             weights,
@@ -140,7 +140,7 @@ impl Environment {
             end: ShadowRayEnd::Beyond,
             direction,
             weight,
-            source: LightObject::Nothing,
+            source: LightGeometry::Nothing,
         })
     }
 }

@@ -160,7 +160,7 @@ impl EnvironmentMap {
             extents[i] = self.heights[at.row + 1] - tops[i];
             pdfs[i] = self.density(at.column as u32, at.row as u32);
         }
-        let corners = self.corner_rows(&columns, &rows);
+        let corners = self.corner_packets(&columns, &rows);
         let [mut directions, mut colors] = [[[0.0; PACKET_SIZE]; 3]; 2];
         for i in 0..PACKET_SIZE {
             let corners = [0, 1, 2, 3].map(|corner| lane(&corners[corner], i));
@@ -187,7 +187,7 @@ impl EnvironmentMap {
             between[i] = x - columns[i] as i32 as f32;
             angles[i] = y - rows[i] as i32 as f32;
         }
-        let corners = self.corner_rows(&columns, &rows);
+        let corners = self.corner_packets(&columns, &rows);
         let (mut heights, mut pdfs) = ([0.0; PACKET_SIZE], [0.0; PACKET_SIZE]);
         for i in 0..PACKET_SIZE {
             pdfs[i] = self.density(columns[i], rows[i]);
@@ -255,7 +255,7 @@ impl EnvironmentMap {
 
     /// The texels around a packet of cells. Separate loops let cache misses overlap.
     #[inline(always)]
-    fn corner_rows(&self, columns: &[u32; PACKET_SIZE], rows: &[u32; PACKET_SIZE]) -> [Vec3x16; 4] {
+    fn corner_packets(&self, columns: &[u32; PACKET_SIZE], rows: &[u32; PACKET_SIZE]) -> [Vec3x16; 4] {
         let mut places = [[0; PACKET_SIZE]; 4];
         for i in 0..PACKET_SIZE {
             let own = self.corner_indices(columns[i], rows[i]);

@@ -9,7 +9,7 @@ use crate::lights::area::sphere::one_minus_cos;
 use crate::lights::delta::DeltaLight;
 use crate::math::frame::Frame;
 use crate::math::{DVec3, Vec3};
-use crate::sampling::distribution::Discrete;
+use crate::sampling::distribution::DiscreteDistribution;
 use crate::sampling::warp;
 
 /// Spheres that photons are aimed at. A sphere is chosen proportionally to the expected light that reaches
@@ -18,7 +18,7 @@ use crate::sampling::warp;
 pub struct PhotonTargets {
     balls: Vec<BoundingSphere>,
     /// Distribution of the spheres by squared radius.
-    pick_by_disk: Discrete,
+    pick_by_disk: DiscreteDistribution,
 }
 
 /// Maximum number of targets. If there are more, some are merged.
@@ -80,7 +80,7 @@ impl PhotonTargets {
     pub fn new(balls: &[BoundingSphere]) -> Option<Self> {
         let balls: Vec<BoundingSphere> = balls.iter().copied().filter(|ball| ball.radius > 0.0).collect();
         let balls = merged(balls);
-        let pick_by_disk = Discrete::new(balls.iter().map(|ball| ball.radius * ball.radius))?;
+        let pick_by_disk = DiscreteDistribution::new(balls.iter().map(|ball| ball.radius * ball.radius))?;
         Some(Self { balls, pick_by_disk })
     }
 
@@ -102,7 +102,7 @@ impl PhotonTargets {
 
     /// Area density at a point if points are sampled uniformly on the disks of
     /// [`PhotonTargets::pick_by_disk`]. `is_on` returns whether the point is on a disk.
-    pub fn disk_density(&self, is_on: impl Fn(&BoundingSphere) -> bool) -> f64 {
+    pub fn cross_section_pdf(&self, is_on: impl Fn(&BoundingSphere) -> bool) -> f64 {
         // Disks are chosen proportionally to their area, so each one contributes the same density.
         self.balls.iter().filter(|ball| is_on(ball)).count() as f64 / self.disk_area()
     }

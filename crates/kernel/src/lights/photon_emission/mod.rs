@@ -26,7 +26,7 @@ use crate::geometry::ray::offset_origin;
 use crate::geometry::{Ray, Shape};
 use crate::math::frame::Frame;
 use crate::math::{DVec3, Vec2, Vec3};
-use crate::sampling::distribution::Discrete;
+use crate::sampling::distribution::DiscreteDistribution;
 use crate::sampling::warp;
 
 use aim::{EmissionProfile, PhotonTargets};
@@ -133,7 +133,7 @@ pub struct PhotonSource {
     sources: Vec<LightEmission>,
     /// Bounding sphere of all finite objects. Light from infinity is emitted toward it.
     around: BoundingSphere,
-    by_power: Discrete,
+    by_power: DiscreteDistribution,
     aim: Option<PhotonAim>,
 }
 
@@ -155,7 +155,7 @@ struct PhotonAim {
     /// Fraction of photons to aim.
     share: f32,
     /// Distribution of the lights, weighted by their estimated power toward the targets.
-    by_light: Discrete,
+    by_light: DiscreteDistribution,
 }
 
 /// Fraction of aimed photons whose light is chosen by power, as for unaimed photons. Needed because an
@@ -173,7 +173,7 @@ impl PhotonSource {
     ) -> Option<Self> {
         let source = |(_, light): (u32, &Light)| LightEmission::new(light, &emitter_geometry, around);
         let sources: Vec<LightEmission> = lights.iter().map(source).collect();
-        let by_power = Discrete::new(sources.iter().map(|source| mean_channel(source.power)))?;
+        let by_power = DiscreteDistribution::new(sources.iter().map(|source| mean_channel(source.power)))?;
         Some(Self { lights: Arc::clone(lights), sources, around, by_power, aim: None })
     }
 
@@ -190,7 +190,7 @@ impl PhotonSource {
                 let estimate = if sum > 0.0 { (1.0 - BY_POWER) * power_toward / sum } else { 0.0 };
                 estimate + BY_POWER * mean_channel(self.sources[number].power) / total
             };
-            let by_light = Discrete::new(power_toward.iter().enumerate().map(weight))?;
+            let by_light = DiscreteDistribution::new(power_toward.iter().enumerate().map(weight))?;
             Some(PhotonAim { targets, share: share.min(1.0), by_light })
         });
         Self { aim, ..self }
@@ -225,7 +225,8 @@ impl PhotonSource {
         let sample_photon = self
             .sample_photon(number, targets, u)
             .filter(|sample_photon| sample_photon.flux != Vec3::ZERO)?;
-        let (all, of_light) = (f64::from(self.aimed_share()), |by: &Discrete| by.probability(number));
+        let (all, of_light) =
+            (f64::from(self.aimed_share()), |by: &DiscreteDistribution| by.probability(number));
         let aimed = self.aim.as_ref().map_or(0.0, |aim| all * of_light(&aim.by_light) * sample_photon.ratio);
         let density = (1.0 - all) * of_light(&self.by_power) + aimed;
         let flux = (sample_photon.flux.as_dvec3() / density).as_vec3();
@@ -342,7 +343,7 @@ impl PhotonSource {
                 let (x, y) = (x - middle.dot(s), y - middle.dot(t));
                 x * x + y * y <= ball.radius * ball.radius
             };
-            aim.targets.disk_density(is_on) * (PI * radius * radius)
+            aim.targets.cross_section_pdf(is_on) * (PI * radius * radius)
         });
         let start = PhotonOrigin::Beyond((center + s * x + t * y + n * radius).as_vec3());
         let flux = (irradiance.as_dvec3() * (PI * radius * radius)).as_vec3();

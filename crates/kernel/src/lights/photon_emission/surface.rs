@@ -8,12 +8,12 @@ use crate::geometry::{AreaPoint, Shape};
 use crate::lights::area::{AreaLight, Side};
 use crate::lights::tree::bounds::mean_channel;
 use crate::math::{DVec3, Vec2, Vec3};
-use crate::sampling::distribution::Discrete;
+use crate::sampling::distribution::DiscreteDistribution;
 
 /// A light's surface, divided into pieces that are chosen by power.
 #[derive(Clone, Debug)]
 pub struct EmissiveSurface {
-    pieces: Discrete,
+    pieces: DiscreteDistribution,
     on: PieceGeometry,
     /// Power in W.
     power: Vec3,
@@ -108,7 +108,7 @@ impl EmissiveSurface {
         let by_power = if total > 0.0 { (1.0 - BY_AREA) / total } else { 0.0 };
         let weight =
             |(own, power): &(f64, DVec3)| BY_AREA * own / area + by_power * power.element_sum() / 3.0;
-        let pieces = Discrete::new(all.iter().map(weight))?;
+        let pieces = DiscreteDistribution::new(all.iter().map(weight))?;
         Some(Self { pieces, on, power: power.as_vec3() })
     }
 

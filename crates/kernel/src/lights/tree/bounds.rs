@@ -57,12 +57,12 @@ impl EmissionCone {
     pub const ALL: Self = Self { axis: DVec3::Z, cos: -1.0, edge: ConeEdge::Sharp };
 
     /// Emission from the front of a flat surface.
-    pub fn of_front(normal: DVec3) -> Self {
+    pub fn lambertian(normal: DVec3) -> Self {
         Self { axis: normal, cos: 1.0, edge: ConeEdge::Cosine }
     }
 
     /// Emission into a cone with a half angle of up to π.
-    pub fn into_cone(axis: DVec3, half_angle: f64) -> Self {
+    pub fn from_half_angle(axis: DVec3, half_angle: f64) -> Self {
         Self { axis, cos: libm::cos(half_angle), edge: ConeEdge::Sharp }
     }
 
@@ -71,11 +71,11 @@ impl EmissionCone {
         let edge = cones.clone().map(|cone| cone.edge).max().unwrap_or(ConeEdge::Sharp);
         let sum: DVec3 = cones.clone().map(|cone| cone.axis).sum();
         let Some(axis) = sum.try_normalize() else { return Self { edge, ..Self::ALL } };
-        Self { axis, cos: cones.map(|cone| cone.widest_from(axis)).fold(1.0, f64::min), edge }
+        Self { axis, cos: cones.map(|cone| cone.cos_max_angle(axis)).fold(1.0, f64::min), edge }
     }
 
     /// Cosine of the largest angle between `axis` and any direction in the cone.
-    fn widest_from(&self, axis: DVec3) -> f64 {
+    fn cos_max_angle(&self, axis: DVec3) -> f64 {
         let cos = self.axis.dot(axis).clamp(-1.0, 1.0);
         let (sin, own_sin) = (sine_from_cosine(cos), sine_from_cosine(self.cos));
         // The sum of the angles exceeds 180°.
@@ -106,7 +106,7 @@ impl LightBounds {
         let [a, b, c] = *corners;
         let vector_area = (b - a).cross(c - a) * 0.5;
         let normal = vector_area.try_normalize()?;
-        Some(Self::in_box(Aabb::around_f64(*corners), vector_area.length(), EmissionCone::of_front(normal)))
+        Some(Self::in_box(Aabb::around_f64(*corners), vector_area.length(), EmissionCone::lambertian(normal)))
     }
 
     /// Bounds that contain all given bounds, which must have the same falloff. `None` if there are none.

@@ -7,7 +7,7 @@ use arrayvec::ArrayVec;
 
 use super::node::{ExpectedContributions, NodeChild, Receiver};
 use super::{
-    CumulativeImportance, LightPick, LightTree, NOT_IN_TREE, PathCache, ROOT, clamp_below, scale_to_total,
+    CumulativeImportance, DescentCache, LightPick, LightTree, NOT_IN_TREE, ROOT, clamp_below, scale_to_total,
 };
 use crate::math::Vec3;
 use crate::math::lanes::F32x16;
@@ -102,7 +102,7 @@ impl<'a> LightTreeCut<'a> {
             return;
         }
         let inverse = 1.0 / all;
-        let (mut index, mut way) = (0, PathCache::NEW);
+        let (mut index, mut way) = (0, DescentCache::NEW);
         let (mut of, mut shares) = (usize::MAX, CumulativeImportance::NONE);
         // `before` is the sum over the preceding nodes. `scale`, which corrects for rounding, is the exact
         // sum over the children divided by the node's share of the rounded total.

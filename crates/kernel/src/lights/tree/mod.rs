@@ -50,7 +50,7 @@ impl LightTree {
     /// Picks a light for a surface point. `u` is in [0, 1). `None` if no light reaches the point.
     #[inline(always)]
     pub fn pick(&self, receiver: &Receiver, u: f64) -> Option<LightPick> {
-        let mut way = PathCache::NEW;
+        let mut way = DescentCache::NEW;
         self.pick_below(ROOT, receiver, LightPick { light: 0, probability: 1.0, rest: u }, &mut way)
     }
 
@@ -70,7 +70,7 @@ impl LightTree {
         mut node: u32,
         receiver: &Receiver,
         mut pick: LightPick,
-        way: &mut PathCache,
+        way: &mut DescentCache,
     ) -> Option<LightPick> {
         let mut level = 0;
         loop {
@@ -137,12 +137,12 @@ const LEVELS: usize = 3;
 
 /// The nodes on the previous pick's path, and the importance of their children. Successive picks for the same
 /// point often share part of the path.
-struct PathCache {
+struct DescentCache {
     nodes: [u32; LEVELS],
     shares: [CumulativeImportance; LEVELS],
 }
 
-impl PathCache {
+impl DescentCache {
     const NEW: Self = Self { nodes: [u32::MAX; LEVELS], shares: [CumulativeImportance::NONE; LEVELS] };
 }
 

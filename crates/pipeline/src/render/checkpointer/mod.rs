@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 pub(crate) use self::lock::CheckpointLock;
 use self::state::State;
 use super::film_state::FilmState;
-use super::share::Share;
+use super::share::Shard;
 use crate::control::CancelToken;
 use crate::engine::Interruption;
 use crate::film::Film;
@@ -18,11 +18,11 @@ use crate::inputs::Inputs;
 use crate::integrators::RayCounters;
 use crate::messages;
 use crate::output::part::{
-    self, Dependency, Head, ImageHead, PartError, PartFile, PartKind, ShareHead, differences,
+    self, Dependency, Head, ImageHeader, PartError, PartFile, PartKind, PartShare, differences,
 };
-use crate::output::write::{Durability, Guard};
-use crate::output::{DevelopSettings, Losses, OutputError};
-use crate::protocol::CheckpointNews;
+use crate::output::write::{Durability, WritePolicy};
+use crate::output::{AttributeLossPolicy, DevelopSettings, OutputError};
+use crate::protocol::CheckpointUpdate;
 use crate::settings::{Checkpoints, Resume};
 use crate::sink::Sink;
 use crate::stages::Stop;
@@ -41,18 +41,18 @@ pub(crate) fn create_header(
     finish: &DevelopSettings,
 ) -> Head {
     let share = share_head(state.share.as_ref());
-    Head { kind, identity, share, picture: ImageHead::new(&state.film, finish), scene: String::new() }
+    Head { kind, identity, share, picture: ImageHeader::new(&state.film, finish), scene: String::new() }
 }
 
-fn share_head(share: Option<&Share>) -> ShareHead {
+fn share_head(share: Option<&Shard>) -> PartShare {
     match share {
-        Some(share) => ShareHead {
+        Some(share) => PartShare {
             index: share.index,
             count: share.count,
             block_count: share.block_count(),
             blocks: share.blocks().to_vec(),
         },
-        None => ShareHead { index: 1, count: 1, block_count: 0, blocks: Vec::new() },
+        None => PartShare { index: 1, count: 1, block_count: 0, blocks: Vec::new() },
     }
 }
 
@@ -126,7 +126,7 @@ impl<'a> Checkpointer<'a> {
         match resume {
             Resume::No | Resume::IfSame if !is_there => return Ok(true),
             Resume::Asked if !is_there => {
-                self.send_update(CheckpointNews::Absent { path: self.path.clone() });
+                self.send_update(CheckpointUpdate::Absent { path: self.path.clone() });
                 return Ok(true);
             }
             Resume::No | Resume::Asked | Resume::IfSame => {}
@@ -139,7 +139,7 @@ impl<'a> Checkpointer<'a> {
             let is_same =
                 PartFile::head(&self.path).is_ok_and(|head| self.differences_from(&head, state).is_empty());
             if is_same {
-                self.send_update(CheckpointNews::Ignored { path: self.path.clone() });
+                self.send_update(CheckpointUpdate::Ignored { path: self.path.clone() });
             }
             return Ok(true);
         }
@@ -147,7 +147,7 @@ impl<'a> Checkpointer<'a> {
             self.around.lock.borrow_mut().lock_abandoned(&self.path);
             self.is_own.set(true);
             let (path, samples) = (self.path.clone(), state.samples(samples));
-            self.send_update(CheckpointNews::Resumed { path, samples });
+            self.send_update(CheckpointUpdate::Resumed { path, samples });
             return Ok(true);
         };
         if resume == Resume::Asked {
@@ -157,7 +157,7 @@ impl<'a> Checkpointer<'a> {
             ));
         }
         if self.around.lock.borrow_mut().mark_reported(&self.path) {
-            self.send_update(CheckpointNews::Unused {
+            self.send_update(CheckpointUpdate::Unused {
                 path: self.path.clone(),
                 why: rejection_reason(&error),
             });
@@ -180,7 +180,7 @@ impl<'a> Checkpointer<'a> {
             // Earlier checks ensure that a part never replaces a checkpoint.
             Ok(_) => return Ok(false),
             Err(error) => {
-                self.send_update(CheckpointNews::Unused { path, why: rejection_reason(&error) });
+                self.send_update(CheckpointUpdate::Unused { path, why: rejection_reason(&error) });
                 return Ok(false);
             }
         };
@@ -201,7 +201,7 @@ impl<'a> Checkpointer<'a> {
         }
         state.recount_samples();
         state.is_finished_part = true;
-        self.send_update(CheckpointNews::Finished { path });
+        self.send_update(CheckpointUpdate::Finished { path });
         Ok(true)
     }
 
@@ -210,7 +210,7 @@ impl<'a> Checkpointer<'a> {
     ///
     /// # Errors
     /// Returns why it cannot be moved, for example because another process holds it.
-    fn set_other_aside(&self, state: &FilmState, rays: RayCounters) -> Result<(), String> {
+    fn move_other_checkpoint_aside(&self, state: &FilmState, rays: RayCounters) -> Result<(), String> {
         let is_held = self.around.lock.borrow().is_held_by_this_process(&self.path);
         if is_held && self.is_own.get() {
             return Ok(());
@@ -265,7 +265,7 @@ impl<'a> Checkpointer<'a> {
             ));
         }
         std::fs::rename(&self.path, &aside).map_err(|error| format!("{}: {error}", self.path.display()))?;
-        self.send_update(CheckpointNews::SetAside { path: aside });
+        self.send_update(CheckpointUpdate::SetAside { path: aside });
         Ok(())
     }
 
@@ -312,7 +312,7 @@ impl<'a> Checkpointer<'a> {
     fn differences_from(&self, head: &Head, state: &FilmState) -> Vec<String> {
         let mut unlike = differences(&head.identity, self.identity(), ("there", "here"));
         let share = share_head(state.share.as_ref());
-        let name = |share: &ShareHead| match share.count {
+        let name = |share: &PartShare| match share.count {
             1 => "the whole image".to_owned(),
             count => format!("part {}/{count}", share.index),
         };
@@ -392,7 +392,7 @@ impl<'a> Checkpointer<'a> {
         if self.settings.seconds <= 0.0 {
             return false;
         }
-        if let Err(why) = self.set_other_aside(state, rays) {
+        if let Err(why) = self.move_other_checkpoint_aside(state, rays) {
             self.report_failure(&why);
             return false;
         }
@@ -403,7 +403,7 @@ impl<'a> Checkpointer<'a> {
         match &written {
             Ok(()) => {
                 self.is_own.set(true);
-                self.send_update(CheckpointNews::Written { path: self.path.clone() });
+                self.send_update(CheckpointUpdate::Written { path: self.path.clone() });
             }
             Err(error) => self.report_failure(&error.to_string()),
         }
@@ -437,11 +437,11 @@ impl<'a> Checkpointer<'a> {
                 Ok(_) | Err(_) => Ok(()),
             }
         };
-        let guard = Guard {
+        let guard = WritePolicy {
             is_kept: &|path| inputs.contain(path),
             may_replace: &may_replace,
             sweep: None,
-            losses: Losses::Report(&|_| ()),
+            losses: AttributeLossPolicy::Report(&|_| ()),
         };
         // This write is short and never cancelled, because it may have been triggered by a signal.
         let file = part::save(path, head, film, state, &guard, (&CancelToken::new(), durability))?;
@@ -452,11 +452,11 @@ impl<'a> Checkpointer<'a> {
     fn report_failure(&self, why: &str) {
         let CheckpointContext { sink, lock, .. } = self.around;
         if lock.borrow_mut().record_first_failure(sink.generation) {
-            self.send_update(CheckpointNews::Failed { message: format!("no checkpoint: {why}") });
+            self.send_update(CheckpointUpdate::Failed { message: format!("no checkpoint: {why}") });
         }
     }
 
-    fn send_update(&self, news: CheckpointNews) {
+    fn send_update(&self, news: CheckpointUpdate) {
         self.around.sink.checkpoint(news);
     }
 }

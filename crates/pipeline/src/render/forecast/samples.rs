@@ -2,7 +2,7 @@
 //! decided.
 
 use crate::film::{CELLS, Convergence, samples_to_reduce_error};
-use crate::render::noise_goals::{AIM, Goals, Judgement, LEAST, MOST, TileNoise};
+use crate::render::noise_goals::{AIM, LEAST, MOST, NoiseMeasurements, SampleGoals, TileNoise};
 
 /// Factor by which the variance is assumed to decrease from two to four samples and from four to eight. This
 /// is the median over all tiles in the bundled scenes.
@@ -33,8 +33,8 @@ impl ExpectedSamples {
     /// Updates the predictions from the noise in both halves of each tile and the rate at which it decreases.
     /// `judgement.samples` is a power of two. `done` is the number of samples in each half. Predictions for
     /// halves with a goal do not change.
-    pub(crate) fn predict(&mut self, judgement: &Judgement, goals: &Goals, done: &[[u32; 2]]) {
-        let Judgement { noise, samples, aim } = judgement;
+    pub(crate) fn predict(&mut self, judgement: &NoiseMeasurements, goals: &SampleGoals, done: &[[u32; 2]]) {
+        let NoiseMeasurements { noise, samples, aim } = judgement;
         // Collect the tiles without goals and the overall rate at which their noise decreases.
         let open = |(tile, noise): (usize, &Option<TileNoise>)| {
             noise.filter(|_| goals.is_undecided(tile, done, *samples)).map(|noise| (tile, noise))
@@ -88,17 +88,22 @@ impl NoiseDecay {
             return Self {
                 samples,
                 doublings,
-                fall: Some(libm::exp2(convergence.usual_power())),
-                power: convergence.usual_power(),
+                fall: Some(libm::exp2(convergence.typical_exponent())),
+                power: convergence.typical_exponent(),
             };
         }
         if samples < LEAST {
-            return Self { samples, doublings, fall: None, power: convergence.usual_power() };
+            return Self { samples, doublings, fall: None, power: convergence.typical_exponent() };
         }
         falls.sort_by(f64::total_cmp);
-        let usual = libm::exp2(convergence.usual_power());
+        let usual = libm::exp2(convergence.typical_exponent());
         let fall = falls.get(falls.len() / 2).map_or(usual, |fall| fall.clamp(FALLS[0], FALLS[1]));
-        Self { samples, doublings, fall: Some(fall), power: libm::log2(fall).min(convergence.usual_power()) }
+        Self {
+            samples,
+            doublings,
+            fall: Some(fall),
+            power: libm::log2(fall).min(convergence.typical_exponent()),
+        }
     }
 
     /// Returns the number of samples that a tile needs for its noise to reach `bound`. `fall` is the tile's
@@ -126,8 +131,8 @@ mod tests {
     use super::*;
     use crate::render::noise_goals::tests::film;
 
-    fn judged(halves: [(f32, f32); 2], samples: u32, error: f64) -> (Goals, ExpectedSamples) {
-        let (mut goals, mut expected) = (Goals::none(1), ExpectedSamples::unknown(1));
+    fn judged(halves: [(f32, f32); 2], samples: u32, error: f64) -> (SampleGoals, ExpectedSamples) {
+        let (mut goals, mut expected) = (SampleGoals::none(1), ExpectedSamples::unknown(1));
         let done = [[samples; 2]];
         let judgement = goals.decide_goals(&film(halves, samples), &done, samples, error).expect("samples");
         expected.predict(&judgement, &goals, &done);
@@ -157,7 +162,7 @@ mod tests {
 
     #[test]
     fn recent_noise_decrease_is_extrapolated() {
-        let (stratified, usual) = (Convergence::Stratified, Convergence::Stratified.usual_power());
+        let (stratified, usual) = (Convergence::Stratified, Convergence::Stratified.typical_exponent());
         let of = |falls: &[f64]| NoiseDecay::of(stratified, falls.to_vec(), 64);
         for (falls, fall, power) in [
             (vec![], libm::exp2(usual), usual),

@@ -25,11 +25,11 @@ const EMISSION: &str =
 impl TableKey<'_> {
     /// Reads a non-negative color and converts it to linear.
     pub(in super::super) fn color(&self) -> Option<Vec3> {
-        self.exact_color(Limits::AtLeast(0.0)).map(DVec3::as_vec3)
+        self.color_f64(Limits::AtLeast(0.0)).map(DVec3::as_vec3)
     }
 
     /// Reads a color in double precision, for values that `f32` would round to 0 or 1.
-    pub(in super::super) fn exact_color(&self, limits: Limits) -> Option<DVec3> {
+    pub(in super::super) fn color_f64(&self, limits: Limits) -> Option<DVec3> {
         self.color_in_limits(limits, COLOR)
     }
 

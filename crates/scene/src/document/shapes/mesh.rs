@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::path::PathBuf;
 
-use super::super::super::description::{Located, Mesh, MeshFile, Placement, Shape};
+use super::super::super::description::{Located, Mesh, MeshFile, MeshTransform, Shape};
 use super::super::super::keys::endings::{GLTF, MESHES};
 use super::super::context::Issue;
 use super::super::key::TableKey;
@@ -57,7 +57,7 @@ fn read_part_index(table: &TableReader<'_>, file: Option<&Located<PathBuf>>) -> 
 }
 
 /// Reads `matrix`, or `scale`, `rotate` and `translate`.
-fn read_placement(table: &TableReader<'_>) -> Option<Placement> {
+fn read_placement(table: &TableReader<'_>) -> Option<MeshTransform> {
     let (matrix, steps) =
         (table.optional("matrix"), ["scale", "rotate", "translate"].map(|name| table.optional(name)));
     if matrix.is_present() {
@@ -70,7 +70,7 @@ fn read_placement(table: &TableReader<'_>) -> Option<Placement> {
         return read_affine_matrix(&matrix);
     }
     let [scale, rotate, translate] = steps;
-    Some(Placement::Steps {
+    Some(MeshTransform::Steps {
         scale: scale.scale(table.limits("scale")).unwrap_or(DVec3::ONE),
         rotate: rotate.vector(Limits::Any).unwrap_or(DVec3::ZERO),
         translate: translate.vector(Limits::Any).unwrap_or(DVec3::ZERO),
@@ -82,7 +82,7 @@ fn read_placement(table: &TableReader<'_>) -> Option<Placement> {
 const MIN_VOLUME_RATIO: f64 = 1e-12;
 
 /// Reads an invertible affine transform in row-major order.
-fn read_affine_matrix(key: &TableKey<'_>) -> Option<Placement> {
+fn read_affine_matrix(key: &TableKey<'_>) -> Option<MeshTransform> {
     let numbers: [f64; 16] = key.numbers(Limits::Any, "16 numbers, row by row")?;
     let [x, y, z, translate] =
         std::array::from_fn(|column| DVec3::from_array(std::array::from_fn(|row| numbers[4 * row + column])));
@@ -104,5 +104,5 @@ fn read_affine_matrix(key: &TableKey<'_>) -> Option<Placement> {
             format!("its columns must be more than {SHORTEST:e} long"),
         );
     }
-    Some(Placement::Matrix { linear: [x, y, z], translate })
+    Some(MeshTransform::Matrix { linear: [x, y, z], translate })
 }

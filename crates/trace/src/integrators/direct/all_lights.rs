@@ -7,7 +7,9 @@ use crate::integrators::transport::batch::{BsdfResponse, VertexBatch};
 use crate::integrators::transport::interiors::{InteriorLists, medium_transmittance};
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::view::LightAov;
-use crate::lights::{EmissionTexture, Light, LightCenter, LightObject, LightObjectPacket, LightSamplePacket};
+use crate::lights::{
+    EmissionTexture, Light, LightCenter, LightGeometry, LightObjectPacket, LightSamplePacket,
+};
 use crate::materials::bsdf::BsdfValues;
 use crate::math::Vec3;
 use crate::math::color::luminance;
@@ -148,7 +150,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
                 // Apply the MIS weight, unless the light has no extent and is found only by light samples.
                 if MIS && !is_single {
                     let leaves_gloss = self.tile.lobes_find_sky && light.is_environment();
-                    let of_light = if leaves_gloss && self.competing.are_lobes() {
+                    let of_light = if leaves_gloss && self.competing.is_lobe_rays() {
                         // Use a light-sampling pdf close to 0 so that lobe rays account for all of the light.
                         [f32::MAX; PACKET_SIZE]
                     } else {
@@ -257,7 +259,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
     #[inline(always)]
     fn add_pending(
         &self,
-        middle: Option<(LightCenter, LightObject)>,
+        middle: Option<(LightCenter, LightGeometry)>,
         pending: &PendingLight,
         sums: &mut LightSums,
         simd: impl Simd,
@@ -313,7 +315,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         if self.tile.world.has_see_through() {
             return self.add_attenuated((rays, ends, traced), sources, values, sums);
         }
-        let occluded = self.tile.world.geometry.occluded_rows(rays, ends, traced, sources, simd);
+        let occluded = self.tile.world.geometry.occluded_ray_packet(rays, ends, traced, sources, simd);
         add_where(traced & !occluded, values, &mut sums.light);
     }
 

@@ -153,7 +153,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         if tree.is_single_node() {
             self.pick_flat(tree, &numbers, &mut picks, simd);
         } else {
-            self.pick_by_cuts(tree, way, &numbers, &mut picks);
+            self.pick_with_tree_cuts(tree, way, &numbers, &mut picks);
         }
         for row in &mut picks {
             row.invert_probabilities(count as f32, MIS);
@@ -204,7 +204,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
 
     /// Picks lights from a tree of any size, one vertex at a time.
     #[inline(always)]
-    fn pick_by_cuts(
+    fn pick_with_tree_cuts(
         &self,
         tree: &LightTree,
         way: LightSamplingEffort,

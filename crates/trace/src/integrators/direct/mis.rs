@@ -5,7 +5,7 @@ use crate::geometry::{Ray, ShapeHit};
 use crate::integrators::transport::batch::{BsdfResponse, VertexBatch};
 use crate::integrators::transport::ray::PathRay;
 use crate::integrators::transport::tile::TileContext;
-use crate::lights::{LightHit, LightObject, LightSamplePacket, Side};
+use crate::lights::{LightGeometry, LightHit, LightSamplePacket, Side};
 use crate::materials::Footprint;
 use crate::materials::bsdf::LobeSet;
 use crate::math::Vec3;
@@ -32,7 +32,7 @@ impl CompetingTechnique {
     }
 
     /// Whether the technique consists of rays in glossy lobes.
-    pub fn are_lobes(self) -> bool {
+    pub fn is_lobe_rays(self) -> bool {
         match self {
             Self::Nothing | Self::Paths | Self::NarrowPaths => false,
             Self::Lobes(_) => true,
@@ -265,7 +265,7 @@ impl TileContext<'_> {
     pub fn touching_emitter_weight(&self, path: &PathRay, hit: &Hit) -> f32 {
         let Ray { origin, direction, .. } = path.ray;
         let shadow = Ray::segment(origin, origin + direction * hit.shape.t);
-        if path.state.pdf > 0.0 && !self.world.is_fully_occluded(&shadow, LightObject::Object(hit.object)) {
+        if path.state.pdf > 0.0 && !self.world.is_fully_occluded(&shadow, LightGeometry::Object(hit.object)) {
             self.emitter_weight(path, hit)
         } else {
             1.0

@@ -19,7 +19,7 @@ use crate::integrators::transport::scatter::{Continuation, SampleBsdf};
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::transport::vertex::ShadingVertex;
 use crate::integrators::view::{LightAov, PathClasses};
-use crate::lights::{LightObject, LightObjectPacket};
+use crate::lights::{LightGeometry, LightObjectPacket};
 use crate::materials::RoughKind;
 use crate::materials::bsdf::LobeSet;
 use crate::math::Vec3;
@@ -108,11 +108,11 @@ impl DirectLightQueue {
     }
 
     /// Like [`DirectLightQueue::flush`], for paths with consecutive slots.
-    pub fn flush_run(&mut self, first: u32, accumulator: &mut Accumulator<'_>) {
-        accumulator.add_direct_run(first, &self.arrived);
+    pub fn flush_consecutive(&mut self, first: u32, accumulator: &mut Accumulator<'_>) {
+        accumulator.add_direct_consecutive(first, &self.arrived);
     }
 
-    /// An unused packet, to be filled and then kept with [`DirectLightQueue::keep_spare`] or discarded.
+    /// An unused packet, to be filled and then kept with [`DirectLightQueue::commit_spare_batch`] or discarded.
     pub fn spare_batch(&mut self) -> &mut VertexBatch {
         if self.count == self.rows.len() {
             self.rows.push(VertexBatch::EMPTY);
@@ -121,7 +121,7 @@ impl DirectLightQueue {
     }
 
     /// Keeps the vertices of the spare packet.
-    pub fn keep_spare(&mut self) {
+    pub fn commit_spare_batch(&mut self) {
         let (kept, spare) = self.rows.split_at_mut(self.count);
         let Some(row) = spare.first_mut().filter(|row| row.used != 0) else { return };
         row.retain_lanes(row.used);
@@ -230,8 +230,11 @@ impl DirectLightQueue {
                         .instructions()
                         .run(LiftOrigins { geometry: &tile.world.geometry, row });
                 }
-                let request =
-                    BatchRequest { number, used: row.used & shown_vertices(row, aov), shares_with_paths };
+                let request = DirectLightRequest {
+                    number,
+                    used: row.used & shown_vertices(row, aov),
+                    shares_with_paths,
+                };
                 let sums = self.sample_lights(request, tile, aov, group.len() as u32);
                 group.push(sums);
                 if self.pool.is_full() {
@@ -243,8 +246,11 @@ impl DirectLightQueue {
             // Add light from lobe rays and photons, and store the result.
             for (number, sums) in (first..end).zip(group.drain(..)) {
                 let row = &self.rows[number];
-                let request =
-                    BatchRequest { number, used: row.used & shown_vertices(row, aov), shares_with_paths };
+                let request = DirectLightRequest {
+                    number,
+                    used: row.used & shown_vertices(row, aov),
+                    shares_with_paths,
+                };
                 let mut arrived = self.add_lobe_rays(request, tile, aov, sums);
                 if let Some(gathered) = gather(row) {
                     add_where(row.used, &gathered, &mut arrived.light);
@@ -270,7 +276,7 @@ impl DirectLightQueue {
     /// The technique that competes with light samples at a packet.
     fn competing_technique(
         &self,
-        request: BatchRequest,
+        request: DirectLightRequest,
         tile: &TileContext<'_>,
         aov: LightAov,
     ) -> CompetingTechnique {
@@ -296,7 +302,7 @@ impl DirectLightQueue {
     /// Samples lights at a packet. Shadow rays to picked lights are pooled under index `number`.
     fn sample_lights(
         &mut self,
-        request: BatchRequest,
+        request: DirectLightRequest,
         tile: &TileContext<'_>,
         aov: LightAov,
         number: u32,
@@ -338,7 +344,7 @@ impl DirectLightQueue {
     /// Reflected light, including the light found by lobe rays.
     fn add_lobe_rays(
         &self,
-        request: BatchRequest,
+        request: DirectLightRequest,
         tile: &TileContext<'_>,
         aov: LightAov,
         sums: LightSums,
@@ -392,7 +398,7 @@ fn shown_vertices(row: &VertexBatch, aov: LightAov) -> u32 {
 
 /// Request to compute direct lighting at a packet of vertices.
 #[derive(Clone, Copy)]
-struct BatchRequest {
+struct DirectLightRequest {
     /// The index of the packet.
     number: usize,
     /// Mask of vertices for which to compute direct lighting.
@@ -427,8 +433,8 @@ impl SimdKernel for LiftOrigins<'_> {
         let rays = RayPacket::of(row.from, direction).with_start_triangle(row.start);
         // Find the occluded rays.
         let blocked = {
-            let (traced, nothing) = (traced(&ends, simd), LightObjectPacket::of(LightObject::Nothing));
-            geometry.occluded_rows(&rays, &ends, traced, &nothing, simd)
+            let (traced, nothing) = (traced(&ends, simd), LightObjectPacket::of(LightGeometry::Nothing));
+            geometry.occluded_ray_packet(&rays, &ends, traced, &nothing, simd)
         };
         // Move the origins of the unoccluded rays.
         let lifted = row.may_lift & !blocked;

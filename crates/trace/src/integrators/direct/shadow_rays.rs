@@ -5,7 +5,7 @@ use super::all_lights::{LightSums, add_where, null_transmittance};
 use crate::geometry::packet::{F32x16, RayPacket, lanes};
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::view::LightAov;
-use crate::lights::{LightObject, LightObjectPacket};
+use crate::lights::{LightGeometry, LightObjectPacket};
 use crate::math::lanes::{PACKET_SIZE, Simd, Vec3x16, lane, set_lane};
 use crate::world::{SimdKernel, World};
 
@@ -128,7 +128,7 @@ impl SimdKernel for TraceShadowRays<'_> {
         for rays in rays.chunks(PACKET_SIZE) {
             let mut packet = RayPacket::of([[0.0; PACKET_SIZE]; 3], [[0.0; PACKET_SIZE]; 3]);
             let mut ends = [-1.0; PACKET_SIZE];
-            let mut sources = LightObjectPacket::of(LightObject::Nothing);
+            let mut sources = LightObjectPacket::of(LightGeometry::Nothing);
             for (to, &ray) in rays.iter().enumerate() {
                 let (row, from) = (&rows[ray as usize / PACKET_SIZE], ray as usize % PACKET_SIZE);
                 for axis in 0..3 {
@@ -143,7 +143,7 @@ impl SimdKernel for TraceShadowRays<'_> {
             let occluded = if world.has_see_through() {
                 attenuate(world, aov, (&packet, &ends, traced), &sources, (rows, rays))
             } else {
-                world.geometry.occluded_rows(&packet, &ends, traced, &sources, simd)
+                world.geometry.occluded_ray_packet(&packet, &ends, traced, &sources, simd)
             };
             for to in lanes(occluded) {
                 let ray = rays[to] as usize;

@@ -5,7 +5,7 @@
 use crate::geometry::{Ray, ShapeHit};
 use crate::integrators::transport::batch::VertexBatch;
 use crate::integrators::transport::tile::TileContext;
-use crate::lights::{Light, LightCenter, LightObject, Side};
+use crate::lights::{Light, LightCenter, LightGeometry, Side};
 use crate::math::Vec3;
 use crate::math::lanes::lane;
 use crate::scene::description::Shadows;
@@ -70,7 +70,7 @@ impl UnshadowedLobeRay<'_> {
         let (segment, source) = match light.center() {
             Some((LightCenter::At(middle), source)) => (Ray::segment(self.ray.origin, middle), source),
             Some((LightCenter::Towards(direction), source)) => (Ray::new(self.ray.origin, direction), source),
-            None => (self.ray, LightObject::Nothing),
+            None => (self.ray, LightGeometry::Nothing),
         };
         if self.row.is_below_horizon(self.lane, segment.direction) {
             return Vec3::ZERO;

@@ -6,8 +6,8 @@ use arrayvec::ArrayVec;
 
 use super::kernel::polygon_weight;
 use super::map::{GatherPoint, MIN_COSINE, REACH};
-use crate::geometry::kernel_domain::{Extent, FlatPolygon, SurfaceBelow};
-use crate::geometry::{Aabb, KernelDomain, Shape, ShapeHit};
+use crate::geometry::kernel_domain::{Extent, FlatPolygon, NearestSurface};
+use crate::geometry::{Aabb, LocalGeometry, Shape, ShapeHit};
 use crate::materials::{Material, Rough};
 use crate::math::frame::Frame;
 use crate::math::{DVec2, DVec3};
@@ -159,10 +159,10 @@ impl KernelNeighborhood {
     /// Adds a shape and returns whether the coverage still has a closed form.
     fn add_shape(&mut self, shape: &Shape, receives: impl Fn() -> bool) -> bool {
         match shape.kernel_domain(self.point) {
-            KernelDomain::Polygons(count) => (0..count)
+            LocalGeometry::Polygons(count) => (0..count)
                 .filter_map(|number| shape.polygon(number))
                 .all(|piece| self.add_piece(&piece, &receives)),
-            KernelDomain::Surface { distance, ground } => {
+            LocalGeometry::Surface { distance, ground } => {
                 distance > FAR * self.radius
                     || ground.is_some_and(|ground| self.add_ground(&ground, receives))
             }
@@ -171,7 +171,7 @@ impl KernelNeighborhood {
 
     /// Adds a surface if it extends over the whole kernel and has the kernel's normal. Otherwise, returns
     /// false.
-    fn add_ground(&mut self, ground: &SurfaceBelow, receives: impl Fn() -> bool) -> bool {
+    fn add_ground(&mut self, ground: &NearestSurface, receives: impl Fn() -> bool) -> bool {
         let is_wide = match ground.extent {
             Extent::Flat(reach) => reach > FAR * self.radius,
             Extent::Round(radius) => radius > WIDE * self.radius,

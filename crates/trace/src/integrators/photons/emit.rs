@@ -25,7 +25,7 @@ use crate::integrators::transport::scatter::{Continuation, SampleBsdf};
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::transport::vertex::{ShadingVertex, Vertex};
 use crate::integrators::transport::walk::{
-    Interaction, Interface, MAX_HIDDEN, NullInteraction, OpaqueHit, PathStepper, opacity_at, walk,
+    Interaction, Interface, MAX_PASSED_SURFACES, NullInteraction, OpaqueHit, PathStepper, opacity_at, walk,
 };
 use crate::integrators::view::LightAov;
 use crate::integrators::{PACKET_SIZE, RayCounters};
@@ -112,7 +112,7 @@ impl PhotonTracing<'_> {
     fn skip_planes(&self, ray: Ray) -> Option<Ray> {
         let world = self.tile.world;
         let mut start = ray.origin;
-        for _ in 0..MAX_HIDDEN {
+        for _ in 0..MAX_PASSED_SURFACES {
             let back = Ray::new(start, -ray.direction);
             let Some(hit) = world.geometry.closest(&back) else {
                 return Some(Ray::new(start, ray.direction));

@@ -151,7 +151,7 @@ impl Photons {
         let emission = photon_source(&world.geometry, &world.lights).filter(|_| specular.is_present());
         let aimed = AIMED[usize::from(specular.is_unbounded)];
         let emission = emission.map(|emission| emission.aimed_at(&specular.balls, aimed));
-        let (glasses, bodies) = glasses_at_lights(world);
+        let (glasses, bodies) = glass_that_may_contain_lights(world);
         let most_depth = photons.bounces.min(settings.render.max_depth.saturating_sub(1));
         let radii = [photons.radius; 2];
         let mut own = Self { settings: photons, most_depth, emission, glasses, bodies, radii };
@@ -350,7 +350,7 @@ fn radius_for_count(
 }
 
 /// Closed glass shapes and other glass solids that may contain lights.
-fn glasses_at_lights(world: &World) -> (Vec<u32>, Vec<CompoundSolid>) {
+fn glass_that_may_contain_lights(world: &World) -> (Vec<u32>, Vec<CompoundSolid>) {
     let lamps = world.light_boxes();
     let may_hold_light = |object: &u32| {
         let bounds = world.geometry.objects()[*object as usize].bounds();

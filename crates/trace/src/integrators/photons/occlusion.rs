@@ -3,7 +3,7 @@
 use super::map::GatherPoint;
 use super::reservoir::PhotonPosition;
 use crate::geometry::Ray;
-use crate::lights::LightObject;
+use crate::lights::LightGeometry;
 use crate::world::Geometry;
 
 /// Height of the test segment above the surface, in kernel radii, chosen to clear the surface's own
@@ -26,7 +26,7 @@ pub fn is_occluded(geometry: &Geometry, look: &GatherPoint, photon: &PhotonPosit
         let above = lift * radius;
         [look.point + above * look.normal, photon.point + above * photon.normal]
     };
-    let is_blocked = |from, to| geometry.occluded(&Ray::segment(from, to), LightObject::Nothing);
+    let is_blocked = |from, to| geometry.occluded(&Ray::segment(from, to), LightGeometry::Nothing);
     let [from, to] = lifted(ABOVE);
     if !is_blocked(from, to) {
         return false;

@@ -40,13 +40,13 @@ pub fn inverse_coverage(
     match clip {
         KernelCoverage::Fraction(part) => 1.0 / part,
         KernelCoverage::Clipped => mean_trials_per_success(&mut succeeds),
-        KernelCoverage::Crowded => mean_after_first(succeeds),
+        KernelCoverage::Crowded => reciprocal_estimate_if_first_fails(succeeds),
     }
 }
 
 /// Returns 1 if the first trial succeeds, which has probability p, and otherwise a value with expectation 1 +
 /// 1/p. The overall expectation is p + (1 − p)·(1 + 1/p) = 1/p.
-fn mean_after_first(mut succeeds: impl FnMut(u32) -> bool) -> f32 {
+fn reciprocal_estimate_if_first_fails(mut succeeds: impl FnMut(u32) -> bool) -> f32 {
     if succeeds(0) { 1.0 } else { 1.0 + mean_trials_per_success(|number| succeeds(number + 1)) }
 }
 
@@ -113,7 +113,7 @@ mod tests {
                 let mut value = || {
                     let succeeds = |_: u32| next() < chance;
                     f64::from(if is_crowded {
-                        mean_after_first(succeeds)
+                        reciprocal_estimate_if_first_fails(succeeds)
                     } else {
                         mean_trials_per_success(succeeds)
                     })

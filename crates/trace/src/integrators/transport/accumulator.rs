@@ -90,7 +90,7 @@ impl Accumulator<'_> {
     }
 
     /// Adds direct light at the vertices of consecutive slots, all visible to the camera.
-    pub fn add_direct_run(&mut self, first: u32, contributions: &[Vec3]) {
+    pub fn add_direct_consecutive(&mut self, first: u32, contributions: &[Vec3]) {
         for (sum, contribution) in self.radiance[first as usize..].iter_mut().zip(contributions) {
             *sum += *contribution;
         }

@@ -110,7 +110,8 @@ impl VertexBatch {
         for i in 0..PACKET_SIZE {
             is_run &= slots[i] == slots[0] + i as u32;
         }
-        let (xs, ys, samples) = if is_run { block.samples_from(slots[0]) } else { block.samples_of(slots) };
+        let (xs, ys, samples) =
+            if is_run { block.samples_of_consecutive_slots(slots[0]) } else { block.samples_of(slots) };
         SamplerPacket::new(tile.settings.render.seed, &xs, &ys, &samples)
     }
 

@@ -86,7 +86,7 @@ impl TileContext<'_> {
     fn camera_packet(&self, first: u32) -> CameraRayPacket {
         let paths = [CAMERA_PATH; PACKET_SIZE];
         let (settings, camera) = (self.settings, &self.world.camera);
-        let (xs, ys, samples) = self.block.samples_from(first);
+        let (xs, ys, samples) = self.block.samples_of_consecutive_slots(first);
         let sampler = SamplerPacket::new(settings.render.seed, &xs, &ys, &samples);
         // Sample positions in the pixels.
         let mut in_pixel = sampler.pairs(&paths, Dimension::Pixel, 0, 1);
@@ -164,7 +164,7 @@ mod tests {
         for samples in [3..4, 0..5, 100..116, 7..40] {
             let block = SampleBlock { pixels: tile.into(), samples };
             for first in [0, 1, 2, 15, 33] {
-                let (xs, ys, samples) = block.samples_from(first);
+                let (xs, ys, samples) = block.samples_of_consecutive_slots(first);
                 for lane in 0..PACKET_SIZE {
                     let place = block.sample_of(first + lane as u32);
                     assert_eq!((xs[lane], ys[lane], samples[lane]), place, "{first} + {lane}");

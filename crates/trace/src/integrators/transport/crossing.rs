@@ -5,7 +5,7 @@ use super::interiors::{Interior, InteriorList};
 use super::ray::PathRay;
 use super::tile::TileContext;
 use super::vertex::Vertex;
-use crate::world::{CoincidentSurface, ContactQuery, ContactScratch, Hit, OffsetPoints};
+use crate::world::{CoincidenceQuery, CoincidenceScratch, CoincidentSurface, Hit, OffsetPoints};
 
 /// Surfaces and media crossed by a ray at a hit on glass.
 pub struct Crossing {
@@ -34,7 +34,7 @@ pub struct GlassBoundary {
 /// Buffers for the search for coincident surfaces.
 #[derive(Default)]
 pub struct CrossingMemory {
-    around: ContactScratch,
+    around: CoincidenceScratch,
     near: Vec<CoincidentSurface>,
 }
 
@@ -50,8 +50,8 @@ impl TileContext<'_> {
         let CrossingMemory { around, near: found } = memory;
         found.clear();
         let lead = hit.shape.t * f32::EPSILON * path.ray.direction.dot(vertex.normal).abs();
-        let meeting = ContactQuery { hit, surface: &vertex.surface, normal: vertex.normal, lead };
-        let sides = self.world.find_contact(&meeting, around, |near| found.push(near));
+        let meeting = CoincidenceQuery { hit, surface: &vertex.surface, normal: vertex.normal, lead };
+        let sides = self.world.find_coincident_surfaces(&meeting, around, |near| found.push(near));
         let (before, far) = self.crossing_interiors(&path.interiors, found);
         let opaque = found.iter().filter_map(|near| self.opaque(near));
         let opaque = opaque.min_by(|a, b| a.shape.t.total_cmp(&b.shape.t).then(a.object.cmp(&b.object)));

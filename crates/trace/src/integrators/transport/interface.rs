@@ -29,7 +29,7 @@ pub fn reflected_path(path: &PathRay, vertex: &Vertex<'_>, shading: &Shading, re
     PathRay {
         ray: vertex.spawn_ray(direction.normalize()),
         throughput: path.throughput * reflectance,
-        path: path.next_path(REFLECTED),
+        path: path.continuation_path_number(REFLECTED),
         state: path.state.after_specular(reflectance.max_element()),
         cone: vertex.cone_after(SpecularEvent::Reflected),
         ..*path
@@ -66,7 +66,7 @@ pub fn fresnel_split(
     // Path throughput applies to basic radiance, L/n², which refraction does not change.
     let refracted = direction.map(|direction| PathRay {
         ray: vertex.spawn_ray(direction),
-        path: path.next_path(REFRACTED),
+        path: path.continuation_path_number(REFRACTED),
         interiors: *far,
         state: path.state.after_specular(1.0),
         cone: vertex.cone_after(SpecularEvent::Refracted(eta)),

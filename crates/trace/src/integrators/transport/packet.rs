@@ -151,7 +151,7 @@ impl TileContext<'_> {
     /// Whether surface packets contain everything needed for shading a non-plain material. Surface packets
     /// have no texture coordinates or tangents.
     #[inline(always)]
-    fn fits_surface_row(&self, material: usize) -> bool {
+    fn supports_surface_packet(&self, material: usize) -> bool {
         // Ray cones need tangents and curvatures.
         self.pixel_spread == 0.0 && !self.world.is_textured(material)
     }
@@ -254,7 +254,7 @@ impl SimdKernel for PacketIntersection<'_> {
         let found = tile.fill_other_surfaces(self.surface, rows, (&hits, &object), any & !plain.all, simd);
         let all = ((1_u64 << rays.count()) - 1) as u32;
         let sky = match world.lights.environment() {
-            Some(environment) if any & all != all => environment.radiance_and_pdf_row(&rows.direction),
+            Some(environment) if any & all != all => environment.radiance_and_pdf_packet(&rows.direction),
             Some(_) | None => ([[0.0; PACKET_SIZE]; 3], [0.0; PACKET_SIZE]),
         };
         let (shining, lookups) = (plain.shining & (front | plain.two_sided), plain.lookups);
@@ -389,7 +389,7 @@ impl TileContext<'_> {
             while waiting != 0 {
                 let (material, alike) = first_group(&materials, waiting, simd);
                 waiting &= !alike;
-                of |= if self.fits_surface_row(material as usize) { alike } else { 0 };
+                of |= if self.supports_surface_packet(material as usize) { alike } else { 0 };
             }
             if of == 0 {
                 continue;

@@ -82,7 +82,7 @@ impl PathState {
 
 impl PathRay {
     /// Path number of a continuation of this path. Each continuation has a different `branch`.
-    pub fn next_path(&self, branch: u32) -> u32 {
+    pub fn continuation_path_number(&self, branch: u32) -> u32 {
         // With XOR, the path number 1 would remain 1 after each reflection, and all random choices along the
         // path would be the same.
         self.path.wrapping_add(branch).wrapping_mul(0x9e37_79b1).rotate_left(15).wrapping_add(branch)
@@ -115,14 +115,17 @@ mod tests {
         // always refracted.
         let (mut round, mut visited) = (vec![CAMERA_PATH + 1], HashSet::from([CAMERA_PATH, CAMERA_PATH + 1]));
         for _ in 0..12 {
-            round = round.iter().flat_map(|&path| [1, 2].map(|way| numbered(path).next_path(way))).collect();
+            round = round
+                .iter()
+                .flat_map(|&path| [1, 2].map(|way| numbered(path).continuation_path_number(way)))
+                .collect();
             assert!(round.iter().all(|&path| visited.insert(path)));
         }
         for way in [1, 2] {
             let (mut path, mut visited) = (CAMERA_PATH + 1, HashSet::from([CAMERA_PATH]));
             for length in 0..10_000 {
                 assert!(visited.insert(path), "branch {way} repeats after {length} bounces");
-                path = numbered(path).next_path(way);
+                path = numbered(path).continuation_path_number(way);
             }
         }
     }

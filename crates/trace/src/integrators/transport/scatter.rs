@@ -127,7 +127,7 @@ impl SampleBsdf<'_> {
                 },
                 cone: cones.get(row.place[i] as usize).map_or(RayCone::default(), of_lobe(scattered.pdfs[i])),
             };
-            path.path = path.next_path(SCATTERED);
+            path.path = path.continuation_path_number(SCATTERED);
             path
         }));
     }

@@ -121,7 +121,10 @@ impl SampleBlock {
 
     /// Columns, rows and sample indices of the slots starting at `first`, even past the last slot.
     #[inline(always)]
-    pub fn samples_from(&self, first: u32) -> ([u32; PACKET_SIZE], [u32; PACKET_SIZE], [u32; PACKET_SIZE]) {
+    pub fn samples_of_consecutive_slots(
+        &self,
+        first: u32,
+    ) -> ([u32; PACKET_SIZE], [u32; PACKET_SIZE], [u32; PACKET_SIZE]) {
         let [mut xs, mut ys, mut samples] = [[0; PACKET_SIZE]; 3];
         let (mut x, mut y, mut sample) = self.sample_of(first);
         if self.samples.end - sample >= PACKET_SIZE as u32 {

@@ -18,7 +18,7 @@ use crate::sampling::Dimension;
 use crate::world::{Hit, MAX_NULL_INTERACTIONS, OffsetPoints};
 
 /// Maximum number of surfaces without a change of medium that a ray can pass in one walk.
-pub const MAX_HIDDEN: usize = 64;
+pub const MAX_PASSED_SURFACES: usize = 64;
 
 /// The interaction at which a walk ends.
 pub enum Interaction<'v, 'a> {
@@ -28,7 +28,7 @@ pub enum Interaction<'v, 'a> {
     Glass(&'v Vertex<'a>, Hit, Interface<'v>),
     /// The ray leaves the scene.
     Nothing,
-    /// The ray has passed [`MAX_HIDDEN`] surfaces without a change of medium.
+    /// The ray has passed [`MAX_PASSED_SURFACES`] surfaces without a change of medium.
     Hidden,
 }
 
@@ -105,7 +105,7 @@ impl Segment {
     /// Moves the ray origin back to the path's last vertex, and returns the hit with the distance from that
     /// vertex.
     #[inline(always)]
-    fn straighten(&self, path: &mut PathRay, mut hit: Hit) -> Hit {
+    fn measure_from_last_vertex(&self, path: &mut PathRay, mut hit: Hit) -> Hit {
         if self.count > 0 {
             path.ray.origin = self.origin;
             hit.shape.t += self.distance;
@@ -133,7 +133,7 @@ pub fn walk<'a, W: PathStepper<'a>>(
 ) {
     let tile = stepper.tile();
     let (mut way, mut hidden) = (Segment::DIRECT, 0);
-    while hidden < MAX_HIDDEN {
+    while hidden < MAX_PASSED_SURFACES {
         let has_passed = hidden > 0;
         let mut vertex = match surface.take() {
             Some(surface) => Vertex::with_surface(tile, path, &hit, surface),
@@ -178,7 +178,7 @@ pub fn walk<'a, W: PathStepper<'a>>(
                 far = crossing.far;
                 vertex.set_sides(crossing.sides);
             }
-            let hit = way.straighten(path, hit);
+            let hit = way.measure_from_last_vertex(path, hit);
             return stepper.interact(
                 path,
                 Interaction::Opaque(&vertex, OpaqueHit::Direct(hit), &far),
@@ -194,13 +194,15 @@ pub fn walk<'a, W: PathStepper<'a>>(
         }
         if let Some(touching) = opaque {
             let vertex = Vertex::at_coincident_surface(tile, path, (sides, &touching), hit.shape.t);
-            if !vertex.material.has_null_interaction() || stops_at_touching(stepper, path, &vertex) {
+            if !vertex.material.has_null_interaction()
+                || has_opaque_coincident_surface(stepper, path, &vertex)
+            {
                 let touched = Hit { shape: ShapeHit { t: hit.shape.t, ..touching.shape }, ..touching };
-                let touched = way.straighten(path, touched);
+                let touched = way.measure_from_last_vertex(path, touched);
                 let reached = Interaction::Opaque(&vertex, OpaqueHit::Touching(touched), &far);
                 return stepper.interact(path, reached, has_passed);
             }
-            path.path = path.next_path(PASSED);
+            path.path = path.continuation_path_number(PASSED);
         }
         // Stop at a boundary between media with different indices of refraction.
         let near = &path.interiors;
@@ -211,7 +213,7 @@ pub fn walk<'a, W: PathStepper<'a>>(
             } else {
                 None
             };
-            let hit = way.straighten(path, hit);
+            let hit = way.measure_from_last_vertex(path, hit);
             return stepper.interact(
                 path,
                 Interaction::Glass(&vertex, hit, Interface { far: &far, rough }),
@@ -270,7 +272,7 @@ fn null_interaction<'a, W: PathStepper<'a>>(
     match &vertex.material.bsdf {
         Bsdf::ThinDielectric(pane) => {
             let mut whole = *path;
-            let hit = way.straighten(&mut whole, hit);
+            let hit = way.measure_from_last_vertex(&mut whole, hit);
             whole.interiors = stepper.tile().without_open_glass(whole.interiors);
             stepper.hit_pane(&whole, vertex, OpaqueHit::Direct(hit), pane)
         }
@@ -282,7 +284,11 @@ fn null_interaction<'a, W: PathStepper<'a>>(
 /// glass.
 #[cold]
 #[inline(never)]
-fn stops_at_touching<'a, W: PathStepper<'a>>(stepper: &mut W, path: &PathRay, vertex: &Vertex<'a>) -> bool {
+fn has_opaque_coincident_surface<'a, W: PathStepper<'a>>(
+    stepper: &mut W,
+    path: &PathRay,
+    vertex: &Vertex<'a>,
+) -> bool {
     match &vertex.material.bsdf {
         Bsdf::ThinDielectric(_) => false,
         Bsdf::Rough(_) | Bsdf::Mirror(_) | Bsdf::Dielectric(_) | Bsdf::Coated(_) => {
@@ -311,7 +317,7 @@ fn path_past_surface(path: PathRay, vertex: &Vertex<'_>, part: Vec3) -> PathRay 
     PathRay {
         ray: vertex.spawn_ray(path.ray.direction),
         throughput: path.throughput * part,
-        path: path.next_path(PASSED),
+        path: path.continuation_path_number(PASSED),
         state: path.state.after_null_interaction(part.max_element()),
         cone: vertex.cone,
         ..path

@@ -232,10 +232,10 @@ pub(super) fn glass_of(scene: &Scene, meshes: &[&LoadedMesh], object: &Object) -
 /// Type of glass of an object.
 fn glass_id_of(scene: &Scene, meshes: &[&LoadedMesh], object: &Object) -> GlassId {
     match (object.material, object.shape.mesh()) {
-        (Some(index), _) => scene.materials[index].kind.glass_medium_bits(),
+        (Some(index), _) => scene.materials[index].kind.glass_medium_key(),
         (None, Some(mesh)) => {
             let roughness = NumberSource::Constant(0.0);
-            let of = |(ior, tint)| MaterialKind::Glass { ior, tint, roughness }.glass_medium_bits();
+            let of = |(ior, tint)| MaterialKind::Glass { ior, tint, roughness }.glass_medium_key();
             let mut each = meshes[mesh.file].materials.iter().filter_map(file_glass).filter_map(of);
             let first = each.next()?;
             each.all(|other| other == first).then_some(first)

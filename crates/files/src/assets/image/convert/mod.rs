@@ -116,7 +116,7 @@ fn is_channel_constant(image: &DynamicImage, index: usize, value: f32) -> bool {
 }
 
 /// Warning about a constant alpha channel that is used as opacity.
-pub(super) fn constant_alpha(
+pub(super) fn constant_alpha_warning(
     image: &DynamicImage,
     encoding: ImageEncoding,
     metadata: &ImageMetadata,

@@ -22,7 +22,7 @@ use super::primaries::Primaries;
 use super::space::ColorSpace;
 use channels::{ChannelIndex, ChosenChannels, choose_channels, no_color};
 use chroma::LuminanceChroma;
-use sampling::{BlockDecompressor, ChannelSampling, FullSamplingReader};
+use sampling::{BlockDecompressor, ChannelSampling, SubsamplingHidingReader};
 
 /// Size of a decoded sample in bytes.
 const SAMPLE_BYTES: usize = 4;
@@ -30,7 +30,7 @@ const SAMPLE_BYTES: usize = 4;
 /// Decodes one RGB or gray layer, including alpha if present. The image covers the display window at the
 /// highest resolution and is black outside the data window.
 pub(super) struct ExrDecoder<R> {
-    reader: Reader<FullSamplingReader<R>>,
+    reader: Reader<SubsamplingHidingReader<R>>,
     channels: ChosenChannels,
     samplings: Vec<Vec<ChannelSampling>>,
 }
@@ -39,7 +39,7 @@ impl<R: BufRead + Seek> ExrDecoder<R> {
     /// Creates a decoder that allocates at most `memory_bytes` in addition to the pixels.
     pub(super) fn new(mut file: R, memory_bytes: u64) -> ImageResult<Self> {
         let samplings = sampling::read_samplings(&mut file).map_err(ImageError::IoError)?;
-        let file = FullSamplingReader::new(file, &samplings);
+        let file = SubsamplingHidingReader::new(file, &samplings);
         let reader = ::exr::block::read(file, false).map_err(image_error)?;
         let Some(channels) = choose_channels(reader.headers()) else {
             return Err(decoding_error(no_color(reader.headers())));

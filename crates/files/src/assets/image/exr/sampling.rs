@@ -93,21 +93,21 @@ impl<'a> HeaderParser<'a> {
 }
 
 /// Wraps a file and patches its headers while reading, so that no channel appears to be subsampled.
-pub(super) struct FullSamplingReader<R> {
+pub(super) struct SubsamplingHidingReader<R> {
     file: R,
     at: u64,
     /// File offsets of the integers that are replaced with 1.
     ones: Vec<u64>,
 }
 
-impl<R> FullSamplingReader<R> {
+impl<R> SubsamplingHidingReader<R> {
     pub(super) fn new(file: R, samplings: &[Vec<ChannelSampling>]) -> Self {
         let offsets = samplings.iter().flatten().flat_map(|sampling| [sampling.at, sampling.at + 4]);
         Self { file, at: 0, ones: offsets.collect() }
     }
 }
 
-impl<R: Read> Read for FullSamplingReader<R> {
+impl<R: Read> Read for SubsamplingHidingReader<R> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         let got = self.file.read(buffer)?;
         for &offset in &self.ones {
@@ -123,7 +123,7 @@ impl<R: Read> Read for FullSamplingReader<R> {
     }
 }
 
-impl<R: Seek> Seek for FullSamplingReader<R> {
+impl<R: Seek> Seek for SubsamplingHidingReader<R> {
     fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
         self.at = self.file.seek(to)?;
         Ok(self.at)

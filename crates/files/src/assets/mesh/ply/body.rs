@@ -29,11 +29,11 @@ pub(super) const END_OF_FILE: &str = "unexpected end of file";
 
 /// Numbers separated by whitespace.
 #[derive(Clone)]
-pub(super) struct Ascii<'a>(pub(super) Cursor<'a>, pub(super) LineEnds);
+pub(super) struct Ascii<'a>(pub(super) Cursor<'a>, pub(super) LineEndMode);
 
 /// Interpretation of line ends in text files.
 #[derive(Clone, Copy)]
-pub(super) enum LineEnds {
+pub(super) enum LineEndMode {
     /// As whitespace.
     Blank,
     /// A line end is the end of an item, and extra values on a line are skipped. Contains the number of lines
@@ -68,12 +68,12 @@ impl NumberReader for Ascii<'_> {
 
     fn end_item(&mut self) {
         match &mut self.1 {
-            LineEnds::EndItems(count, first) if self.0.skip_to_word_in_line() => {
+            LineEndMode::EndItems(count, first) if self.0.skip_to_word_in_line() => {
                 *count += 1;
                 first.get_or_insert(self.0.at());
                 self.0.end_line();
             }
-            LineEnds::EndItems(..) | LineEnds::Blank => {}
+            LineEndMode::EndItems(..) | LineEndMode::Blank => {}
         }
     }
 

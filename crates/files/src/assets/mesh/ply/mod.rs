@@ -12,7 +12,7 @@ use super::parsed::{ALPHA_IGNORED, ParsedMesh};
 use super::text::Cursor;
 use super::{AssetError, LoadedMesh, MeshSource, vertex_out_of_range};
 use crate::math::{DVec2, DVec3};
-use body::{Ascii, Binary, LineEnds, NumberReader};
+use body::{Ascii, Binary, LineEndMode, NumberReader};
 use colors::PlyColors;
 use header::{Element, Encoding, PlyHeader, PropertyType, Scalar};
 
@@ -34,23 +34,23 @@ pub(super) fn parse(source: &MeshSource<'_>) -> Result<LoadedMesh, AssetError> {
 /// values, so the file is read again with one item per line.
 fn read_text(source: &MeshSource<'_>, header: &PlyHeader) -> Result<LoadedMesh, AssetError> {
     let cursor = Cursor::new(source.bytes, header.body);
-    let mut words = Ascii(cursor, LineEnds::Blank);
+    let mut words = Ascii(cursor, LineEndMode::Blank);
     let by_words = read(source, header, &mut words);
     source.monitor.token.check()?;
     if by_words.is_ok() && !words.0.skip_to_word() {
         return by_words;
     }
-    let mut lines = Ascii(cursor, LineEnds::EndItems(0, None));
+    let mut lines = Ascii(cursor, LineEndMode::EndItems(0, None));
     let by_lines = read(source, header, &mut lines);
     match (by_lines, lines.1) {
-        (Ok(mut loaded), LineEnds::EndItems(count, Some(first))) => {
+        (Ok(mut loaded), LineEndMode::EndItems(count, Some(first))) => {
             let line = source.line(first);
             loaded.warnings.push(undeclared_values(line, count));
             Ok(loaded)
         }
         // Return the error from the second pass. The first pass misreads files with undeclared values.
-        (Err(error), LineEnds::EndItems(_, Some(_))) => Err(error),
-        (Ok(_) | Err(_), LineEnds::EndItems(_, None) | LineEnds::Blank) => by_words,
+        (Err(error), LineEndMode::EndItems(_, Some(_))) => Err(error),
+        (Ok(_) | Err(_), LineEndMode::EndItems(_, None) | LineEndMode::Blank) => by_words,
     }
 }
 

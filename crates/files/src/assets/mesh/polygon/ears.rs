@@ -192,7 +192,7 @@ impl<'a, F: FnMut([usize; 3])> Clipper<'a, F> {
         let found = self.tree.find(triangle, &mut visits, |other| {
             self.next[other as usize] != NONE
                 && !around.contains(&other)
-                && self.is_entered(triangle, other, may_touch)
+                && self.outline_enters(triangle, other, may_touch)
         });
         self.visits = visits;
         found
@@ -200,7 +200,7 @@ impl<'a, F: FnMut([usize; 3])> Clipper<'a, F> {
 
     /// Whether the outline enters the interior of a triangle at this corner, or (unless `may_touch`) the
     /// corner lies on the diagonal.
-    fn is_entered(&self, triangle: [DVec2; 3], corner: u32, may_touch: bool) -> bool {
+    fn outline_enters(&self, triangle: [DVec2; 3], corner: u32, may_touch: bool) -> bool {
         let [a, _, c] = triangle;
         let point = self.point(corner);
         let turns = turns(triangle, point);

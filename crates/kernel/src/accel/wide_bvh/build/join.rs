@@ -3,13 +3,13 @@
 use rayon::prelude::*;
 
 use super::TreePart;
-use super::subtree::{Pack, WideSubtree};
+use super::subtree::{PackRange, WideSubtree};
 use crate::accel::reference::Bounds;
 use crate::accel::wide_bvh::node::{Child, WIDTH, WideNode};
 use crate::accel::wide_bvh::simd::pages;
 
 /// Joins all parts into one list of nodes, starting with the root, and one list of packs.
-pub fn join(root: TreePart) -> (Vec<WideNode>, Vec<Pack>) {
+pub fn join(root: TreePart) -> (Vec<WideNode>, Vec<PackRange>) {
     let mut top = UpperNodes::default();
     match root {
         TreePart::BuiltWideBvh(subtree) if matches!(subtree.root, Child::Inner(0)) => {
@@ -78,7 +78,7 @@ impl UpperNodes {
         place
     }
 
-    fn finish(self) -> (Vec<WideNode>, Vec<Pack>) {
+    fn finish(self) -> (Vec<WideNode>, Vec<PackRange>) {
         let starts = self.subtree_starts();
         let nodes_of_top: Vec<WideNode> =
             self.nodes.iter().map(|children| self.top_node(children, &starts)).collect();

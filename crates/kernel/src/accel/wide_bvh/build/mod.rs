@@ -53,7 +53,7 @@ pub fn build(
     token.check()?;
     let (nodes, leaves) = join::join(part);
     token.check()?;
-    let pack = |leaf: &subtree::Pack| {
+    let pack = |leaf: &subtree::PackRange| {
         let members = &references[leaf.first as usize..][..leaf.count as usize];
         TrianglePack::new(members.iter().map(|member| (member.id(), corners(member.id()))))
     };

@@ -6,7 +6,7 @@ use crate::accel::wide_bvh::node::{Child, PACK, WIDTH, WideNode};
 
 /// A range of references that forms a triangle pack.
 #[derive(Clone, Copy, Debug)]
-pub struct Pack {
+pub struct PackRange {
     /// Overall index of the first reference.
     pub first: u32,
     /// Number of references, from one to four.
@@ -17,7 +17,7 @@ pub struct Pack {
 #[derive(Debug)]
 pub struct WideSubtree {
     pub nodes: Vec<WideNode>,
-    pub packs: Vec<Pack>,
+    pub packs: Vec<PackRange>,
     pub root: Child,
     pub bounds: Bounds,
 }
@@ -46,7 +46,7 @@ impl WideSubtree {
     fn leaf(&mut self, start: usize, count: usize) -> Child {
         let first = self.packs.len() as u32;
         for at in (0..count).step_by(PACK) {
-            self.packs.push(Pack { first: (start + at) as u32, count: PACK.min(count - at) as u32 });
+            self.packs.push(PackRange { first: (start + at) as u32, count: PACK.min(count - at) as u32 });
         }
         Child::Leaf { first, count: self.packs.len() as u32 - first }
     }

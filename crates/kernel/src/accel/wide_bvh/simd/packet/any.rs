@@ -2,7 +2,7 @@
 
 use super::frustum::Frustum;
 use super::rays::SimdRayPacket;
-use super::rows::RayRows;
+use super::rows::RaySoa;
 use crate::accel::wide_bvh::WideBvh;
 use crate::accel::wide_bvh::node::{Child, PACK, TrianglePack};
 use crate::accel::wide_bvh::simd::single::prefetch;
@@ -23,7 +23,7 @@ pub fn any<V: SimdVector>(
     like: V,
     like8: F8,
 ) -> Option<u32> {
-    let Some(rows) = RayRows::new(rays, ends) else { return Some(0) };
+    let Some(rows) = RaySoa::new(rays, ends) else { return Some(0) };
     let packet = SimdRayPacket::new(&rows, &tree.bounds, like)?;
     let frustum = Frustum::new(&packet, like8);
     let mut t_max = like.gather(&rows.ends);

@@ -3,7 +3,7 @@
 use super::frustum::Frustum;
 use super::nearest::Nearest;
 use super::rays::SimdRayPacket;
-use super::rows::RayRows;
+use super::rows::RaySoa;
 use crate::accel::F32x16;
 use crate::accel::wide_bvh::WideBvh;
 use crate::accel::wide_bvh::node::{Child, PACK, WideNode};
@@ -23,7 +23,7 @@ pub fn closest<V: SimdVector>(
     like: V,
     like8: F8,
 ) -> bool {
-    let Some(rows) = RayRows::new(rays, ends) else { return true };
+    let Some(rows) = RaySoa::new(rays, ends) else { return true };
     let Some(packet) = SimdRayPacket::new(&rows, &tree.bounds, like) else { return false };
     let frustum = Frustum::new(&packet, like8);
     let t_max = like.gather(&rows.ends);

@@ -1,6 +1,6 @@
 //! The rays of a packet in registers, tested against one box or triangle at a time.
 
-use super::rows::RayRows;
+use super::rows::RaySoa;
 use crate::accel::wide_bvh::node::{TrianglePack, WideNode};
 use crate::accel::wide_bvh::simd::triangle;
 use crate::accel::wide_bvh::simd::vector::SimdVector;
@@ -34,7 +34,7 @@ impl<V: SimdVector> SimdRayPacket<V> {
     /// Loads a packet, or returns `None` if the rays are not coherent. The directions of coherent rays have
     /// the same signs and the same longest axis.
     #[inline(always)]
-    pub fn new(rows: &RayRows, whole: &Aabb, like: V) -> Option<Self> {
+    pub fn new(rows: &RaySoa, whole: &Aabb, like: V) -> Option<Self> {
         let axes = ShearedRay::new(rows.first.origin, rows.first.direction).axes();
         let mut own = Self {
             near_origin: [like; 3],

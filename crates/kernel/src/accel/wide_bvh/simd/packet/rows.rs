@@ -5,7 +5,7 @@ use crate::geometry::Ray;
 
 /// Rays in structure-of-arrays layout.
 #[repr(align(64))]
-pub struct RayRows {
+pub struct RaySoa {
     pub origin: [F32x16; 3],
     pub direction: [F32x16; 3],
     pub ends: F32x16,
@@ -20,7 +20,7 @@ pub struct RayRows {
 /// Mask of all lanes.
 const ALL: u32 = (1 << SIZE) - 1;
 
-impl RayRows {
+impl RaySoa {
     #[inline(always)]
     fn set(&mut self, lane: usize, ray: &Ray) {
         for axis in 0..3 {
