@@ -9,6 +9,7 @@ pub mod lanes;
 pub mod limits;
 pub mod origin;
 pub mod random;
+pub mod soa;
 pub mod transform;
 
 pub use glam::{DMat3, DVec2, DVec3, DVec4, UVec2, Vec2, Vec3, Vec4};
