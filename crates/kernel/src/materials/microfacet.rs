@@ -13,7 +13,6 @@ use std::f32::consts::{FRAC_1_PI, PI};
 use crate::math::Vec3;
 use crate::math::elementary::sin_cos;
 use crate::math::frame::Frame;
-use crate::math::lanes::{Mask, PACKET_SIZE, Vec3x16, lane, select, set_lane};
 
 /// Minimum α. Narrower lobes cannot be resolved by `f32` directions.
 pub const MIN_ALPHA: f32 = 1e-3;
@@ -48,33 +47,6 @@ pub fn rotate_toward_viewer(normal: Vec3, to_eye: Vec3) -> Vec3 {
 #[inline(always)]
 pub fn rotate_single_toward_viewer(normal: Vec3, to_eye: Vec3) -> Vec3 {
     if normal.dot(to_eye) < MIN_FACING_COSINE { rotate_toward_viewer(normal, to_eye) } else { normal }
-}
-
-/// Implements [`MaterialRow::orient`](super::bsdf::MaterialRow::orient) for microfacet lobes. Sets the
-/// directions to the viewer from the incoming ray directions, and rotates the normals with
-/// [`rotate_toward_viewer`]. The normals are stored for the surfaces in `of`, or for all surfaces.
-#[inline(always)]
-pub fn orient_to_viewers(
-    of: Option<&Mask>,
-    normals: &mut Vec3x16,
-    directions: &Vec3x16,
-    own_normals: &mut Vec3x16,
-    to_eyes: &mut Vec3x16,
-) {
-    for i in 0..PACKET_SIZE {
-        let to_eye = -lane(directions, i);
-        set_lane(to_eyes, i, to_eye);
-        let turned = rotate_toward_viewer(lane(normals, i), to_eye);
-        set_lane(normals, i, turned);
-    }
-    match of {
-        Some(of) => {
-            for axis in 0..3 {
-                select(of, &normals[axis], &mut own_normals[axis]);
-            }
-        }
-        None => *own_normals = *normals,
-    }
 }
 
 /// The unnormalized half vector of two unit directions.

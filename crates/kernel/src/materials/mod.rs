@@ -1,6 +1,8 @@
 //! Materials: reflection, transmission, and emission of surfaces.
 
 pub mod bsdf;
+pub mod bxdf;
+pub mod bxdf_packet;
 pub mod coated;
 pub mod dielectric;
 pub mod emission;

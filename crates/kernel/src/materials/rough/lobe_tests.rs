@@ -1,7 +1,9 @@
 //! Checks for microfacet lobes, used in the tests of each BSDF kind. Compares values with an `f64` reference,
 //! samples with pdfs, and albedos.
 
-use crate::materials::bsdf::{LobeSet, RoughRow, ShownLobes, SideSamples, SurfaceDirections};
+use crate::materials::bsdf::{LobeSet, ShownLobes, SideSamples};
+use crate::materials::bxdf::{Bxdf, SurfaceDirections};
+use crate::materials::bxdf_packet::BxdfPacket;
 use crate::math::lanes::{F32x16, PACKET_SIZE, Vec3x16, lane, set_lane};
 use crate::math::random::unit as random;
 use crate::math::{DVec3, Vec3};
@@ -89,26 +91,26 @@ pub struct SideSample {
 }
 
 /// A surface around z that is seen from a direction.
-pub struct Subject<R: RoughRow> {
-    row: R,
+pub struct Subject<B: Bxdf> {
+    row: BxdfPacket<B>,
     to_eye: DVec3,
     alphas: [f64; 2],
     light: LitFrom,
 }
 
-impl<R: RoughRow> Subject<R> {
+impl<B: Bxdf> Subject<B> {
     /// A surface with the given material. `alphas` are the α values of its narrow lobe.
-    pub fn new(point: &R::Point, alphas: [f32; 2], to_eye: DVec3) -> Self {
+    pub fn new(point: &B::Point, alphas: [f32; 2], to_eye: DVec3) -> Self {
         Self::lit(point, alphas, to_eye, LitFrom::Mirrored)
     }
 
     /// [`Subject::new`] for the given kind of lighting.
-    pub fn lit(point: &R::Point, alphas: [f32; 2], to_eye: DVec3, light: LitFrom) -> Self {
-        let mut row = R::EMPTY;
+    pub fn lit(point: &B::Point, alphas: [f32; 2], to_eye: DVec3, light: LitFrom) -> Self {
+        let mut row = BxdfPacket::<B>::default();
         row.reset();
         for i in 0..PACKET_SIZE {
             let normal = Vec3::Z * light.side() as f32;
-            let place = SurfaceDirections { normal, to_eye: to_eye.as_vec3(), tangent: TANGENT };
+            let place = SurfaceDirections { normal, wo: to_eye.as_vec3(), tangent: TANGENT };
             row.put(i, point, ShownLobes::ALL, &place);
         }
         Self { row, to_eye, alphas: alphas.map(f64::from), light }
@@ -134,15 +136,16 @@ impl<R: RoughRow> Subject<R> {
             }
             let values = self.row.f(&rows);
             let pdf = self.row.pdf(lobes, &self.normals(), &rows, &values);
-            let [wide, narrow] = self.row.wide_and_narrow(&rows, &values);
             for i in 0..some.len() {
-                let (wide, narrow) = (lane(&wide, i).as_dvec3(), lane(&narrow, i).as_dvec3());
-                let f = lane(&values.f, i).as_dvec3();
+                let (wide, narrow) = (lane(&values.wide, i).as_dvec3(), lane(&values.narrow, i).as_dvec3());
+                let f = lane(&values.f(), i).as_dvec3();
                 assert!(
                     (wide + narrow - f).abs().max_element() <= 2e-6 * f.max_element(),
                     "the parts should add up to {f}"
                 );
-                let alone = self.row.f_at(i, some[i].as_vec3()).as_dvec3();
+                let [alone, of_all_lobes] = self.row.f_at(i, some[i].as_vec3());
+                assert_eq!(alone, of_all_lobes);
+                let alone = alone.as_dvec3();
                 assert!((alone - f).abs().max_element() <= 1e-5 * f.max_element(), "{alone} instead of {f}");
                 all.push((f, wide, f64::from(pdf[i])));
             }
@@ -163,7 +166,7 @@ impl<R: RoughRow> Subject<R> {
     pub fn side_samples(
         &self,
         side: u32,
-        sample: impl Fn(&R, &F32x16, &[F32x16; 2]) -> SideSamples,
+        sample: impl Fn(&BxdfPacket<B>, &F32x16, &[F32x16; 2]) -> SideSamples,
     ) -> Vec<SideSample> {
         let rows = grid(side).map(|(choices, u)| sample(&self.row, &choices, &u));
         let one = |row: &SideSamples, i: usize| SideSample {
@@ -360,9 +363,9 @@ impl<R: RoughRow> Subject<R> {
 }
 
 /// Checks reciprocity and compares f with a reference, for directions near the peak and elsewhere.
-pub fn check_values<R: RoughRow>(
+pub fn check_values<B: Bxdf>(
     what: &str,
-    point: &R::Point,
+    point: &B::Point,
     alphas: [f32; 2],
     reference: impl Fn(DVec3, DVec3) -> DVec3,
 ) {
@@ -371,7 +374,7 @@ pub fn check_values<R: RoughRow>(
     let (reciprocity, error) = if least >= 0.05 { (1e-5, 2e-5) } else { (1e-3, 5e-3) };
     for _ in 0..300 {
         let to_eye = direction(f64::from(0.05 + 0.95 * next()), f64::from(next()) * TAU).as_vec3().as_dvec3();
-        let there = Subject::<R>::new(point, alphas, to_eye);
+        let there = Subject::<B>::new(point, alphas, to_eye);
         let far = direction(f64::from(0.05 + 0.95 * next()), f64::from(next()) * TAU);
         let near = there.at_half_vector(f64::from(0.98 * next()), f64::from(next()) * TAU);
         let near = near.map_or(far, |(near, _)| near);
@@ -380,7 +383,7 @@ pub fn check_values<R: RoughRow>(
                 continue;
             }
             let (f, _, _) = there.values(LobeSet::All, &[light])[0];
-            let (back, _, _) = Subject::<R>::new(point, alphas, light).values(LobeSet::All, &[to_eye])[0];
+            let (back, _, _) = Subject::<B>::new(point, alphas, light).values(LobeSet::All, &[to_eye])[0];
             let size = f.max_element();
             assert!(
                 (f - back).abs().max_element() <= reciprocity * size,
@@ -396,13 +399,13 @@ pub fn check_values<R: RoughRow>(
 }
 
 /// Checks that values, pdfs, and samples of a surface do not depend on the other lanes.
-pub fn check_neighbors<R: RoughRow>(points: &[R::Point]) {
-    check_neighbors_lit::<R>(points, LitFrom::Mirrored);
+pub fn check_neighbors<B: Bxdf>(points: &[B::Point]) {
+    check_neighbors_lit::<B>(points, LitFrom::Mirrored);
 }
 
 /// [`check_neighbors`] for the given kind of lighting.
-pub fn check_neighbors_lit<R: RoughRow>(points: &[R::Point], lit: LitFrom) {
-    check_shown_lobes::<R>(points, lit);
+pub fn check_neighbors_lit<B: Bxdf>(points: &[B::Point], lit: LitFrom) {
+    check_shown_lobes::<B>(points, lit);
     let normals = [[0.0; PACKET_SIZE], [0.0; PACKET_SIZE], [lit.side() as f32; PACKET_SIZE]];
     let mut next = random(31);
     for first in 0..points.len() {
@@ -417,21 +420,21 @@ pub fn check_neighbors_lit<R: RoughRow>(points: &[R::Point], lit: LitFrom) {
         let (choices, u) =
             (std::array::from_fn(|_| next()), [(); 2].map(|()| std::array::from_fn(|_| next())));
         let row = |of: &dyn Fn(usize) -> bool| {
-            let mut row = R::EMPTY;
+            let mut row = BxdfPacket::<B>::default();
             row.reset();
             for i in (0..PACKET_SIZE).filter(|i| of(*i)) {
                 let place = SurfaceDirections {
                     normal: Vec3::Z * lit.side() as f32,
-                    to_eye: to_eye[i],
+                    wo: to_eye[i],
                     tangent: TANGENT,
                 };
                 row.put(i, &points[(first + i) % points.len()], ShownLobes::ALL, &place);
             }
             row
         };
-        let numbers = |row: &R, i: usize| {
+        let numbers = |row: &BxdfPacket<B>, i: usize| {
             let values = row.f(&light);
-            let mut bits: Vec<u32> = lane(&values.f, i).to_array().map(f32::to_bits).to_vec();
+            let mut bits: Vec<u32> = lane(&values.f(), i).to_array().map(f32::to_bits).to_vec();
             for lobes in [LobeSet::All, LobeSet::Narrow] {
                 bits.push(row.pdf(lobes, &normals, &light, &values)[i].to_bits());
                 let sample = lane(&row.sample(lobes, &normals, &choices, &u), i);
@@ -440,7 +443,7 @@ pub fn check_neighbors_lit<R: RoughRow>(points: &[R::Point], lit: LitFrom) {
                     bits.extend(sample.to_array().map(f32::to_bits));
                 }
             }
-            bits.push(row.max_component(&values)[i].to_bits());
+            bits.push(values.max[i].to_bits());
             bits
         };
         let all = row(&|_| true);
@@ -458,7 +461,7 @@ pub fn check_neighbors_lit<R: RoughRow>(points: &[R::Point], lit: LitFrom) {
 /// Checks that each lobe is bit-identical whether or not the other lobes are shown, and that the lobes add up
 /// to f. If they did not, the sum of the AOVs would differ from the beauty image, because rays in narrow
 /// lobes divide by small pdfs.
-pub fn check_shown_lobes<R: RoughRow>(points: &[R::Point], lit: LitFrom) {
+pub fn check_shown_lobes<B: Bxdf>(points: &[B::Point], lit: LitFrom) {
     let mut next = random(7);
     for point in points {
         for round in 0..400 {
@@ -470,18 +473,17 @@ pub fn check_shown_lobes<R: RoughRow>(points: &[R::Point], lit: LitFrom) {
             let way = DVec3::new(way.x, way.y, way.z * lit.side()).as_vec3();
             let place = SurfaceDirections {
                 normal: Vec3::Z * lit.side() as f32,
-                to_eye: to_eye.as_vec3(),
+                wo: to_eye.as_vec3(),
                 tangent: TANGENT,
             };
             let shown = |diffuse: bool, specular: bool| {
-                let mut row = R::EMPTY;
+                let mut row = BxdfPacket::<B>::default();
                 row.reset();
                 row.put(0, point, ShownLobes::Of { diffuse, specular }, &place);
                 let mut light = [[0.0; PACKET_SIZE], [0.0; PACKET_SIZE], [1.0; PACKET_SIZE]];
                 set_lane(&mut light, 0, way);
                 let values = row.f(&light);
-                let [wide, narrow] = row.wide_and_narrow(&light, &values);
-                [lane(&values.f, 0), lane(&wide, 0), lane(&narrow, 0)]
+                [lane(&values.f(), 0), lane(&values.wide, 0), lane(&values.narrow, 0)]
             };
             let ([f, wide, narrow], of_wide, of_narrow) =
                 (shown(true, true), shown(true, false), shown(false, true));

@@ -1,6 +1,5 @@
 //! The table of non-specular BSDFs, and enums over all of them for materials, points, and packets.
 
-mod calls;
 pub mod frosted;
 #[cfg(test)]
 mod lobe_tests;
@@ -16,19 +15,19 @@ pub use plastic::Plastic;
 pub use principled::{EmissionCoat, Principled, PrincipledInputs};
 
 use crate::materials::bsdf::{
-    BsdfValues, LobeSet, MaterialRow, NarrowLobe, RoughMaterial, RoughPoint, RoughRow, ShownLobes,
-    SideSamples, SurfaceDirections, UvRow,
+    BsdfValues, LobeSet, NarrowLobe, RoughMaterial, RoughPoint, ShownLobes, SideSamples, UvRow,
 };
+use crate::materials::bxdf::{Bxdf, SurfaceDirections, facing_normal};
+use crate::materials::bxdf_packet::BxdfPacket;
 use crate::materials::footprint::TexturePoint;
 use crate::materials::texture::Texture;
 use crate::math::Vec3;
 use crate::math::lanes::{F32x16, Mask, Simd, Vec3x16};
-use calls::RoughCalls;
-use frosted::GlassRow;
-use metal::{BrushedConductorRow, IsotropicConductorRow};
-use phong::PhongRow;
-use plastic::PlasticRow;
-use principled::PrincipledRow;
+use frosted::DielectricBxdf;
+use metal::ConductorBxdf;
+use phong::PhongBxdf;
+use plastic::PlasticBxdf;
+use principled::PrincipledBxdf;
 
 /// Generates enums over all kinds. Their methods dispatch to the trait methods of the same name. `materials`
 /// lists kinds that are entire materials. `parts` lists kinds that other materials use for a part of their
@@ -36,8 +35,8 @@ use principled::PrincipledRow;
 /// Others are boxed to keep packets small in scenes without them.
 macro_rules! kinds {
     (
-        materials { $($(#[$doc:meta])* $kind:ident($material:ty, $row:ty, kept: $kept:ty)),+ $(,)? }
-        parts { $($(#[$part_doc:meta])* $part:ident($part_row:ty)),+ $(,)? }
+        materials { $($(#[$doc:meta])* $kind:ident($material:ty, $bxdf:ty, kept: $kept:ty)),+ $(,)? }
+        parts { $($(#[$part_doc:meta])* $part:ident($part_bxdf:ty)),+ $(,)? }
     ) => {
         /// The kind of a non-specular BSDF.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -55,15 +54,15 @@ macro_rules! kinds {
         /// A non-specular material of any kind at one point.
         #[derive(Clone, Copy, Debug, PartialEq)]
         pub enum RoughBsdf {
-            $($(#[$doc])* $kind(<$row as RoughRow>::Point),)+
-            $($(#[$part_doc])* $part(<$part_row as RoughRow>::Point)),+
+            $($(#[$doc])* $kind(<$bxdf as Bxdf>::Point),)+
+            $($(#[$part_doc])* $part(<$part_bxdf as Bxdf>::Point)),+
         }
 
         /// A packet of non-specular surfaces of one kind. Phong packets are stored inline because boxing them
         /// would slow down every scene.
         #[allow(clippy::large_enum_variant)]
         #[derive(Clone, Debug)]
-        pub enum BsdfRow { $($(#[$doc])* $kind($kept),)+ $($(#[$part_doc])* $part(Box<$part_row>)),+ }
+        pub enum BsdfRow { $($(#[$doc])* $kind($kept),)+ $($(#[$part_doc])* $part(Box<BxdfPacket<$part_bxdf>>)),+ }
 
         impl Rough {
             /// The kind of the material.
@@ -142,12 +141,12 @@ macro_rules! kinds {
                 }
             }
 
-            /// [`RoughRow::normal_facing_viewer`].
+            /// [`facing_normal`].
             #[inline(always)]
-            pub fn normal_facing_viewer(&self, normal: Vec3, to_eye: Vec3) -> Vec3 {
+            pub fn facing_normal(&self, normal: Vec3, wo: Vec3) -> Vec3 {
                 match self {
-                    $(Self::$kind(_) => <$row as RoughRow>::normal_facing_viewer(normal, to_eye),)+
-                    $(Self::$part(_) => <$part_row as RoughRow>::normal_facing_viewer(normal, to_eye)),+
+                    $(Self::$kind(_) => facing_normal::<$bxdf>(normal, wo),)+
+                    $(Self::$part(_) => facing_normal::<$part_bxdf>(normal, wo)),+
                 }
             }
 
@@ -188,12 +187,12 @@ macro_rules! kinds {
                 }
             }
 
-            /// [`RoughRow::SENDS_RAYS`].
+            /// [`Bxdf::SENDS_RAYS`].
             #[inline(always)]
             pub fn sends_rays(&self) -> bool {
                 match self {
-                    $(Self::$kind(_) => <$row as RoughRow>::SENDS_RAYS,)+
-                    $(Self::$part(_) => <$part_row as RoughRow>::SENDS_RAYS),+
+                    $(Self::$kind(_) => <$bxdf as Bxdf>::SENDS_RAYS,)+
+                    $(Self::$part(_) => <$part_bxdf as Bxdf>::SENDS_RAYS),+
                 }
             }
 
@@ -202,13 +201,13 @@ macro_rules! kinds {
             pub fn prepare(&mut self, kind: RoughKind) {
                 if self.kind() != kind {
                     *self = match kind {
-                        $(RoughKind::$kind => Self::$kind(<$kept>::from(<$row as RoughRow>::EMPTY)),)+
-                        $(RoughKind::$part => Self::$part(Box::new(<$part_row as RoughRow>::EMPTY))),+
+                        $(RoughKind::$kind => Self::$kind(<$kept>::default()),)+
+                        $(RoughKind::$part => Self::$part(Box::default())),+
                     };
                 }
             }
 
-            /// [`RoughRow::reset`].
+            /// [`BxdfPacket::reset`].
             #[inline(always)]
             pub fn reset(&mut self) {
                 match self {
@@ -217,18 +216,24 @@ macro_rules! kinds {
                 }
             }
 
-            /// [`RoughRow::put`] for a BSDF of the same kind as the packet.
+            /// [`BxdfPacket::put`] for a BSDF of the same kind as the packet.
             #[inline(always)]
-            pub fn put(&mut self, i: usize, bsdf: &RoughBsdf, shown: ShownLobes, place: &SurfaceDirections) {
+            pub fn put(
+                &mut self,
+                i: usize,
+                bsdf: &RoughBsdf,
+                shown: ShownLobes,
+                directions: &SurfaceDirections,
+            ) {
                 $(if let (Self::$kind(row), RoughBsdf::$kind(bsdf)) = (&mut *self, bsdf) {
-                    row.put(i, bsdf, shown, place);
+                    row.put(i, bsdf, shown, directions);
                 })+
                 $(if let (Self::$part(row), RoughBsdf::$part(bsdf)) = (&mut *self, bsdf) {
-                    row.put(i, bsdf, shown, place);
+                    row.put(i, bsdf, shown, directions);
                 })+
             }
 
-            /// [`MaterialRow::fill`] for a material of the same kind as the packet.
+            /// [`BxdfPacket::fill`] for a material of the same kind as the packet.
             #[inline(always)]
             pub fn fill(
                 &mut self,
@@ -238,12 +243,13 @@ macro_rules! kinds {
                 simd: impl Simd,
             ) -> u32 {
                 $(if let (Self::$kind(row), Rough::$kind(material)) = (&mut *self, material) {
-                    return row.fill(material, uv, shown, simd);
+                    let point = material.constant().unwrap_or_else(|| material.with_white_textures());
+                    return row.fill(&point, material.row_texture().zip(uv), shown, simd);
                 })+
                 0
             }
 
-            /// [`MaterialRow::orient`].
+            /// [`BxdfPacket::orient`].
             #[inline(always)]
             pub fn orient(&mut self, of: Option<&Mask>, normals: &mut Vec3x16, directions: &Vec3x16) {
                 match self {
@@ -252,7 +258,7 @@ macro_rules! kinds {
                 }
             }
 
-            /// [`RoughRow::copy`] from a packet of the same kind.
+            /// [`BxdfPacket::copy`] from a packet of the same kind.
             #[inline(always)]
             pub fn copy(&mut self, i: usize, other: &Self, from: usize) {
                 $(if let (Self::$kind(row), Self::$kind(other)) = (&mut *self, other) {
@@ -263,55 +269,32 @@ macro_rules! kinds {
                 })+
             }
 
-            /// [`RoughRow::f`].
+            /// [`BxdfPacket::f`].
             #[inline(always)]
-            pub fn f(&self, directions: &Vec3x16, simd: impl Simd) -> BsdfValues {
+            pub fn f(&self, wi: &Vec3x16, simd: impl Simd) -> BsdfValues {
                 match self {
-                    $(Self::$kind(row) => row.call_f(directions, simd),)+
-                    $(Self::$part(row) => row.call_f(directions, simd)),+
+                    $(Self::$kind(row) => row.call_f(wi, simd),)+
+                    $(Self::$part(row) => row.call_f(wi, simd)),+
                 }
             }
 
-            /// [`RoughRow::wide_and_narrow`].
-            #[inline(always)]
-            pub fn wide_and_narrow(
-                &self,
-                directions: &Vec3x16,
-                values: &BsdfValues,
-                simd: impl Simd,
-            ) -> [Vec3x16; 2] {
-                match self {
-                    $(Self::$kind(row) => row.call_wide_and_narrow(directions, values, simd),)+
-                    $(Self::$part(row) => row.call_wide_and_narrow(directions, values, simd)),+
-                }
-            }
-
-            /// [`RoughRow::max_component`].
-            #[inline(always)]
-            pub fn max_component(&self, values: &BsdfValues) -> F32x16 {
-                match self {
-                    $(Self::$kind(row) => row.max_component(values),)+
-                    $(Self::$part(row) => row.max_component(values)),+
-                }
-            }
-
-            /// [`RoughRow::pdf`].
+            /// [`BxdfPacket::pdf`].
             #[inline(always)]
             pub fn pdf(
                 &self,
                 lobes: LobeSet,
                 normals: &Vec3x16,
-                directions: &Vec3x16,
+                wi: &Vec3x16,
                 values: &BsdfValues,
                 simd: impl Simd,
             ) -> F32x16 {
                 match self {
-                    $(Self::$kind(row) => row.call_pdf(lobes, normals, directions, values, simd),)+
-                    $(Self::$part(row) => row.call_pdf(lobes, normals, directions, values, simd)),+
+                    $(Self::$kind(row) => row.call_pdf(lobes, normals, wi, values, simd),)+
+                    $(Self::$part(row) => row.call_pdf(lobes, normals, wi, values, simd)),+
                 }
             }
 
-            /// [`RoughRow::sample`].
+            /// [`BxdfPacket::sample`].
             #[inline(always)]
             pub fn sample(
                 &self,
@@ -327,7 +310,7 @@ macro_rules! kinds {
                 }
             }
 
-            /// [`RoughRow::has_narrow_lobes`].
+            /// [`BxdfPacket::has_narrow_lobes`].
             #[inline(always)]
             pub fn has_narrow_lobes(&self) -> bool {
                 match self {
@@ -336,7 +319,7 @@ macro_rules! kinds {
                 }
             }
 
-            /// [`RoughRow::narrow_lobes`].
+            /// [`BxdfPacket::narrow_lobes`].
             #[inline(always)]
             pub fn narrow_lobes(&self) -> u32 {
                 match self {
@@ -345,7 +328,7 @@ macro_rules! kinds {
                 }
             }
 
-            /// [`RoughRow::narrow_lobe`].
+            /// [`BxdfPacket::narrow_lobe`].
             #[inline(always)]
             pub fn narrow_lobe(&self, i: usize) -> Option<NarrowLobe> {
                 match self {
@@ -354,7 +337,7 @@ macro_rules! kinds {
                 }
             }
 
-            /// [`RoughRow::narrower_than`].
+            /// [`BxdfPacket::narrower_than`].
             #[inline(always)]
             pub fn narrower_than(&self, of: u32, exponent: f32) -> u32 {
                 match self {
@@ -363,7 +346,7 @@ macro_rules! kinds {
                 }
             }
 
-            /// [`RoughRow::constant_f`].
+            /// [`BxdfPacket::constant_f`].
             #[inline(always)]
             pub fn constant_f(&self, i: usize) -> Option<Vec3> {
                 match self {
@@ -372,12 +355,12 @@ macro_rules! kinds {
                 }
             }
 
-            /// [`RoughRow::f_at`].
+            /// [`BxdfPacket::f_at`].
             #[inline(always)]
-            pub fn f_at(&self, i: usize, direction: Vec3) -> Vec3 {
+            pub fn f_at(&self, i: usize, wi: Vec3) -> [Vec3; 2] {
                 match self {
-                    $(Self::$kind(row) => row.f_at(i, direction),)+
-                    $(Self::$part(row) => row.f_at(i, direction)),+
+                    $(Self::$kind(row) => row.f_at(i, wi),)+
+                    $(Self::$part(row) => row.f_at(i, wi)),+
                 }
             }
         }
@@ -387,23 +370,23 @@ macro_rules! kinds {
 kinds! {
     materials {
     /// The normalized Phong model.
-    Phong(Phong, PhongRow, kept: PhongRow),
+    Phong(Phong, PhongBxdf, kept: BxdfPacket<PhongBxdf>),
     /// An isotropic microfacet conductor.
-    Conductor(Conductor, IsotropicConductorRow, kept: Box<IsotropicConductorRow>),
+    Conductor(Conductor, ConductorBxdf<false>, kept: Box<BxdfPacket<ConductorBxdf<false>>>),
     /// A microfacet conductor whose lobe is stretched along u or v.
-    BrushedConductor(Conductor, BrushedConductorRow, kept: Box<BrushedConductorRow>),
+    BrushedConductor(Conductor, ConductorBxdf<true>, kept: Box<BxdfPacket<ConductorBxdf<true>>>),
     /// A diffuse base under a microfacet coat.
-    Plastic(Plastic, PlasticRow, kept: Box<PlasticRow>),
+    Plastic(Plastic, PlasticBxdf, kept: Box<BxdfPacket<PlasticBxdf>>),
     /// A material with the parameters of glTF.
-    Principled(Box<Principled>, PrincipledRow<false>, kept: Box<PrincipledRow<false>>),
+    Principled(Box<Principled>, PrincipledBxdf<false>, kept: Box<BxdfPacket<PrincipledBxdf<false>>>),
     }
     parts {
     /// Reflection at rough glass.
-    GlassReflection(GlassRow<false>),
+    GlassReflection(DielectricBxdf<false>),
     /// Transmission through rough glass.
-    GlassTransmission(GlassRow<true>),
+    GlassTransmission(DielectricBxdf<true>),
     /// Transmission through a principled material.
-    PrincipledTransmission(PrincipledRow<true>),
+    PrincipledTransmission(PrincipledBxdf<true>),
     }
 }
 
@@ -434,17 +417,20 @@ impl RoughBsdf {
     }
 }
 
-impl BsdfRow {
-    /// A packet with unspecified contents.
-    pub const EMPTY: Self = Self::Phong(PhongRow::EMPTY);
+impl Default for BsdfRow {
+    fn default() -> Self {
+        Self::Phong(BxdfPacket::default())
+    }
+}
 
+impl BsdfRow {
     /// Samples a direction for each surface, on either side, with the same random numbers as
-    /// [`RoughRow::sample`]. `None` for kinds that do not support this.
+    /// [`BxdfPacket::sample`]. `None` for kinds that do not support this.
     #[inline(always)]
     pub fn sample_sides(&self, choices: &F32x16, u: &[F32x16; 2], simd: impl Simd) -> Option<SideSamples> {
         match self {
-            Self::GlassReflection(row) => Some(row.call_sides(choices, u, simd)),
-            Self::GlassTransmission(row) => Some(row.call_sides(choices, u, simd)),
+            Self::GlassReflection(row) => Some(row.call_sample_sides(choices, u, simd)),
+            Self::GlassTransmission(row) => Some(row.call_sample_sides(choices, u, simd)),
             Self::Phong(_)
             | Self::Conductor(_)
             | Self::BrushedConductor(_)

@@ -10,7 +10,6 @@ use crate::integrators::view::LightAov;
 use crate::lights::{
     EmissionTexture, Light, LightCenter, LightGeometry, LightObjectPacket, LightSamplePacket,
 };
-use crate::materials::bsdf::BsdfValues;
 use crate::math::Vec3;
 use crate::math::color::luminance;
 use crate::math::lanes::{PACKET_SIZE, Simd, TRUE, Vec3x16, lane, mask_from_bits, set_lane};
@@ -351,7 +350,8 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         simd: impl Simd,
     ) -> (Vec3x16, u32, BsdfResponse) {
         let response = self.row.response(&samples.directions, simd);
-        let BsdfResponse { bsdf: BsdfValues { f, .. }, cosines } = &response;
+        let BsdfResponse { bsdf, cosines } = &response;
+        let f = bsdf.f();
         let mut arriving = samples.weights;
         if self.aov == LightAov::LitFraction {
             for i in 0..PACKET_SIZE {
@@ -359,9 +359,9 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
                 set_lane(&mut arriving, i, light);
             }
         }
-        let (mut values, mut active) = (*f, [0; PACKET_SIZE]);
+        let (mut values, mut active) = (f, [0; PACKET_SIZE]);
         for i in 0..PACKET_SIZE {
-            let value = lane(f, i) * lane(&arriving, i) * (cosines[i] * share);
+            let value = lane(&f, i) * lane(&arriving, i) * (cosines[i] * share);
             set_lane(&mut values, i, value);
             let brings = (cosines[i] > 0.0) & ((value.x != 0.0) | (value.y != 0.0) | (value.z != 0.0));
             active[i] = if brings { TRUE } else { 0 };

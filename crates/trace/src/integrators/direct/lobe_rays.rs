@@ -50,7 +50,7 @@ impl SimdKernel for LobeRays<'_> {
             let wi = row.bsdf.sample(LobeSet::Narrow, &row.normal, &choices, &u, simd);
             let BsdfResponse { bsdf, cosines } = row.response(&wi, simd);
             let pdfs = row.bsdf.pdf(LobeSet::Narrow, &row.normal, &wi, &bsdf, simd);
-            let [_, narrow] = row.bsdf.wide_and_narrow(&wi, &bsdf, simd);
+            let narrow = &bsdf.narrow;
             // Select the rays above the horizon.
             let mut sent = sharp & !row.below_horizon(&wi, simd);
             let mut ends = [-1.0; PACKET_SIZE];
@@ -68,7 +68,7 @@ impl SimdKernel for LobeRays<'_> {
                 for i in lanes(lit) {
                     let found = UnshadowedLobeRay { tile, row, lane: i, ray: rays.ray(i), pdf: pdfs[i] };
                     let radiance = found.radiance(|distance| transmittance(i, distance), &mut arrived.rays);
-                    let value = lane(&narrow, i) * radiance * (cosines[i] / (pdfs[i] * count as f32));
+                    let value = lane(narrow, i) * radiance * (cosines[i] / (pdfs[i] * count as f32));
                     let sum = lane(&arrived.light, i) + value;
                     set_lane(&mut arrived.light, i, sum);
                 }
@@ -105,7 +105,7 @@ impl SimdKernel for LobeRays<'_> {
                         radiance * transmittance(i, f32::MAX)
                     }
                 };
-                let f = lane(&narrow, i);
+                let f = lane(narrow, i);
                 let value = f * radiance * (cosines[i] / (pdf * count as f32));
                 let sum = lane(&arrived.light, i) + value;
                 set_lane(&mut arrived.light, i, sum);

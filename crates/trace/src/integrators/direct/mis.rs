@@ -7,7 +7,7 @@ use crate::integrators::transport::ray::PathRay;
 use crate::integrators::transport::tile::TileContext;
 use crate::lights::{LightGeometry, LightHit, LightSamplePacket, Side};
 use crate::materials::Footprint;
-use crate::materials::bsdf::LobeSet;
+use crate::materials::bsdf::{BsdfValues, LobeSet};
 use crate::math::Vec3;
 use crate::math::lanes::{F32x16, PACKET_SIZE, Simd, Vec3x16, lane, set_lane};
 use crate::world::{Hit, MAX_NULL_INTERACTIONS};
@@ -83,9 +83,9 @@ impl CompetingTechnique {
                 }
             }
             LobeSet::Narrow => {
-                let [wide, narrow] = row.bsdf.wide_and_narrow(&samples.directions, &response.bsdf, simd);
+                let BsdfValues { wide, narrow, .. } = &response.bsdf;
                 for i in 0..PACKET_SIZE {
-                    let left = weight_narrow_part(lane(&wide, i), lane(&narrow, i), weights[i]);
+                    let left = weight_narrow_part(lane(wide, i), lane(narrow, i), weights[i]);
                     let value = lane(&values, i) * left;
                     set_lane(&mut values, i, value);
                 }

@@ -115,7 +115,7 @@ impl DirectLightQueue {
     /// An unused packet, to be filled and then kept with [`DirectLightQueue::commit_spare_batch`] or discarded.
     pub fn spare_batch(&mut self) -> &mut VertexBatch {
         if self.count == self.rows.len() {
-            self.rows.push(VertexBatch::EMPTY);
+            self.rows.push(VertexBatch::empty());
         }
         &mut self.rows[self.count]
     }
@@ -156,16 +156,20 @@ impl DirectLightQueue {
     ) {
         self.store_cone(lit.place, lit.vertex.cone);
         let interiors = self.interior_lists.insert(lit.interiors);
-        let (row, lane) = match sides {
-            ShadingSides::OneSide { is_dark } => self.open_packet(lit.bsdf.kind(), (is_dark, false)),
-            ShadingSides::TwoSides { is_dark, beyond, interiors } => {
-                let interiors = self.interior_lists.insert(interiors);
-                let (row, lane) = self.open_packet(lit.bsdf.kind(), (is_dark, true));
-                row.set_far_side(lane, beyond, interiors);
-                (row, lane)
+        let far_side = match sides {
+            ShadingSides::OneSide { .. } => None,
+            ShadingSides::TwoSides { beyond, interiors, .. } => {
+                Some((beyond, self.interior_lists.insert(interiors)))
             }
         };
+        let (row, lane) = match sides {
+            ShadingSides::OneSide { is_dark } => self.open_packet(lit.bsdf.kind(), (is_dark, false)),
+            ShadingSides::TwoSides { is_dark, .. } => self.open_packet(lit.bsdf.kind(), (is_dark, true)),
+        };
         row.put(lane, tile, lit, aov, interiors);
+        if let Some((beyond, interiors)) = far_side {
+            row.set_far_side(lane, beyond, interiors);
+        }
     }
 
     /// Returns a packet with a free lane for this kind of BSDF, and the lane. `which` specifies whether the

@@ -79,8 +79,8 @@ impl PhotonTracing<'_> {
             depth: 0,
             references: vec![0.0; count as usize],
             next: Vec::new(),
-            open: VertexBatch::EMPTY,
-            open_behind: VertexBatch::EMPTY,
+            open: VertexBatch::empty(),
+            open_behind: VertexBatch::empty(),
             interior_lists: InteriorLists::default(),
             crossing: CrossingMemory::default(),
             stored: PhotonChunk::default(),
@@ -89,7 +89,7 @@ impl PhotonTracing<'_> {
         // Emit the photons, then trace them bounce by bounce.
         let mut rays = Vec::new();
         wavefront.emit(count, &mut rays);
-        let (mut row, mut surfaces) = (VertexBatch::EMPTY, SurfacePacket::EMPTY);
+        let (mut row, mut surfaces) = (VertexBatch::empty(), SurfacePacket::EMPTY);
         while !rays.is_empty() {
             for packet in rays.chunks(PACKET_SIZE) {
                 self.tile.token.check()?;
@@ -445,12 +445,12 @@ impl PhotonWavefront<'_> {
 
     /// Scatters photons at the individually queued vertices.
     fn scatter_queued_vertices(&mut self) {
-        let mut open = std::mem::replace(&mut self.open, VertexBatch::EMPTY);
+        let mut open = std::mem::replace(&mut self.open, VertexBatch::empty());
         self.scatter(&mut open);
         open.reset();
         self.open = open;
         if self.open_behind.used != 0 {
-            let mut open = std::mem::replace(&mut self.open_behind, VertexBatch::EMPTY);
+            let mut open = std::mem::replace(&mut self.open_behind, VertexBatch::empty());
             self.scatter(&mut open);
             open.reset();
             self.open_behind = open;

@@ -145,10 +145,10 @@ fn reflected_kernel_sum(
 ) -> (Vec3, Option<PhotonPosition>) {
     let (mut sum, mut total, mut left, mut chosen) = (Vec3::ZERO, 0.0, random[0], None);
     map.visit_photons(look, simd, |photon, density| {
-        let f = row.bsdf.f_at(i, photon.direction);
-        let light = f * photon.flux * (density * row.photon_weight(i, photon.direction));
-        sum += light;
-        let weight = light.element_sum();
+        let [shown, _] = row.bsdf.f_at(i, photon.direction);
+        let scale = density * row.photon_weight(i, photon.direction);
+        sum += shown * photon.flux * scale;
+        let weight = (shown * photon.flux * scale).element_sum();
         total += weight;
         // Choose a photon by reservoir sampling, as in `LaneReservoirs`.
         let part = if weight > 0.0 { weight / total } else { 0.0 };

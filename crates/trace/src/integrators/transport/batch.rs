@@ -1,77 +1,79 @@
 //! Packets of sixteen vertices that await direct lighting, as a struct of arrays.
 
 use super::tile::TileContext;
-use super::vertex::{Lift, ShadingVertex};
+use super::vertex::ShadingVertex;
 use crate::geometry::Ray;
 use crate::geometry::packet::lanes;
 use crate::integrators::view::{Components, LightAov};
-use crate::materials::bsdf::{BsdfValues, SurfaceDirections};
+use crate::materials::bsdf::BsdfValues;
+use crate::materials::bxdf::SurfaceDirections;
 use crate::materials::{BsdfRow, RoughKind};
 use crate::math::Vec3;
 use crate::math::lanes::{F32x16, PACKET_SIZE, Simd, TRUE, Vec3x16, lane, mask_from_bits, set_lane};
+use crate::math::soa::Soa;
 use crate::sampling::SamplerPacket;
 use crate::scene::description::Shadows;
+use glimt_base::soa;
 
-/// A packet of vertices for direct lighting.
-#[derive(Clone)]
-#[repr(align(64))]
-pub struct VertexBatch {
-    /// Mask of lanes with a vertex.
-    pub used: u32,
-    /// Origins of light samples and shadow rays.
-    pub from: Vec3x16,
-    /// Triangles at the origins; see [`VertexBatch::starts`].
-    pub start: [u32; PACKET_SIZE],
-    /// Horizon normals. In lanes whose bits are set, directions behind the horizon normal are occluded.
-    pub horizon: Vec3x16,
-    pub has_horizon: u32,
-    /// Origins lifted above the facets, and `t_max` of the rays from the facets to these origins. Lights in
-    /// all directions are visible from a lifted origin. Only valid in lanes whose bits are set and whose rays
-    /// are unoccluded.
-    pub lifted: Vec3x16,
-    pub lift_end: F32x16,
-    pub may_lift: u32,
-    /// Surface points, and geometric normals on the viewer's side, in lanes whose bits are set. In other
-    /// lanes, `from` and `normal` are used instead.
-    pub point: Vec3x16,
-    /// Geometric normals on the viewer's side; see [`VertexBatch::point`].
-    pub facet: Vec3x16,
-    /// Mask of lanes with valid `point` and `facet`.
-    pub has_facet: u32,
-    /// Mask of vertices that the camera sees, directly or through mirrors and glass.
-    pub only_specular_before: u32,
-    /// Mask of vertices whose path comes from a surface with a glossy lobe.
-    pub after_gloss: u32,
-    /// Shading normals.
-    pub normal: Vec3x16,
-    /// Interpolated normals before perturbation, and their cosines with the perturbed normals, or
-    /// [`UNPERTURBED`] if both normals are equal.
-    pub smooth_normal: Vec3x16,
-    pub shading_normal_cosine: F32x16,
-    /// BSDFs, all of the same kind.
-    pub bsdf: BsdfRow,
-    /// Path throughputs.
-    pub throughput: Vec3x16,
-    /// Sample slots.
-    pub slot: [u32; PACKET_SIZE],
-    /// Path numbers.
-    pub path: [u32; PACKET_SIZE],
-    /// Path indices in the bounce's queue.
-    pub place: [u32; PACKET_SIZE],
-    /// [`PathState::roulette_throughput`](super::ray::PathState::roulette_throughput) of the paths.
-    pub roulette_throughput: F32x16,
-    /// Indices of the vertices' interior lists.
-    pub interiors: [u32; PACKET_SIZE],
-    /// Whether any vertex has a perturbed normal.
-    pub is_perturbed: bool,
-    /// Whether no light samples are visible from any of the vertices.
-    pub is_dark: bool,
-    /// Whether the vertices represent both sides of their surfaces.
-    pub has_two_sides: bool,
-    /// Ray origins on the other side and indices of the glass around them, if `has_two_sides`.
-    pub beyond: Vec3x16,
-    /// Indices of the interior lists at `beyond`.
-    pub interiors_beyond: [u32; PACKET_SIZE],
+soa! {
+    /// A vertex that awaits direct lighting.
+    pub struct BatchVertex in VertexBatch {
+        /// Origin of light samples and shadow rays.
+        pub from: Vec3 = Vec3::ZERO,
+        /// Triangle at the origin; see [`VertexBatch::starts`].
+        pub start: u32 = Ray::NO_TRIANGLE,
+        /// Normal of the horizon, if `has_horizon`. Light from behind it is occluded.
+        pub horizon: Vec3 = Vec3::ZERO,
+        pub has_horizon: bool = false,
+        /// Origin lifted above the facet, from which lights in all directions are visible, and `t_max` of the
+        /// ray from the facet to it. Only valid if `may_lift` and if this ray is unoccluded.
+        pub lifted: Vec3 = Vec3::ZERO,
+        pub lift_end: f32 = 0.0,
+        pub may_lift: bool = false,
+        /// Surface point, and geometric normal on the viewer's side, if `has_facet`. Otherwise, `from` and
+        /// `normal` are used instead.
+        pub point: Vec3 = Vec3::ZERO,
+        pub facet: Vec3 = Vec3::ZERO,
+        pub has_facet: bool = false,
+        /// Whether the camera sees the vertex, directly or through mirrors and glass.
+        pub only_specular_before: bool = false,
+        /// Whether the path comes from a surface with a glossy lobe.
+        pub after_gloss: bool = false,
+        /// Shading normal.
+        pub normal: Vec3 = Vec3::ZERO,
+        /// Interpolated normal before perturbation, and its cosine with the perturbed normal, or
+        /// [`UNPERTURBED`] if both normals are equal.
+        pub smooth_normal: Vec3 = Vec3::ZERO,
+        pub shading_normal_cosine: f32 = UNPERTURBED,
+        /// Path throughput.
+        pub throughput: Vec3 = Vec3::ZERO,
+        /// Sample slot.
+        pub slot: u32 = 0,
+        /// Path number.
+        pub path: u32 = 0,
+        /// Path index in the bounce's queue.
+        pub place: u32 = 0,
+        /// [`PathState::roulette_throughput`](super::ray::PathState::roulette_throughput) of the path.
+        pub roulette_throughput: f32 = 0.0,
+        /// Index of the vertex's interior list.
+        pub interiors: u32 = 0,
+        /// Ray origin on the other side, if the batch has two sides.
+        pub beyond: Vec3 = Vec3::ZERO,
+        /// Index of the interior list at `beyond`.
+        pub interiors_beyond: u32 = 0,
+    }
+    with {
+        /// Mask of lanes with a vertex.
+        pub used: u32 = 0,
+        /// BSDFs, all of the same kind.
+        pub bsdf: BsdfRow = BsdfRow::default(),
+        /// Whether any vertex has a perturbed normal.
+        pub is_perturbed: bool = false,
+        /// Whether no light samples are visible from any of the vertices.
+        pub is_dark: bool = false,
+        /// Whether the vertices represent both sides of their surfaces.
+        pub has_two_sides: bool = false,
+    }
 }
 
 /// Placeholder for the cosine if the shading normal is not perturbed.
@@ -115,37 +117,10 @@ impl VertexBatch {
         SamplerPacket::new(tile.settings.render.seed, &xs, &ys, &samples)
     }
 
-    /// A packet without vertices.
-    pub const EMPTY: Self = Self {
-        used: 0,
-        from: [[0.0; PACKET_SIZE]; 3],
-        start: [Ray::NO_TRIANGLE; PACKET_SIZE],
-        horizon: [[0.0; PACKET_SIZE]; 3],
-        has_horizon: 0,
-        lifted: [[0.0; PACKET_SIZE]; 3],
-        lift_end: [0.0; PACKET_SIZE],
-        may_lift: 0,
-        point: [[0.0; PACKET_SIZE]; 3],
-        facet: [[0.0; PACKET_SIZE]; 3],
-        has_facet: 0,
-        only_specular_before: 0,
-        after_gloss: 0,
-        normal: [[0.0; PACKET_SIZE]; 3],
-        smooth_normal: [[0.0; PACKET_SIZE]; 3],
-        shading_normal_cosine: [UNPERTURBED; PACKET_SIZE],
-        bsdf: BsdfRow::EMPTY,
-        throughput: [[0.0; PACKET_SIZE]; 3],
-        slot: [0; PACKET_SIZE],
-        path: [0; PACKET_SIZE],
-        place: [0; PACKET_SIZE],
-        roulette_throughput: [0.0; PACKET_SIZE],
-        interiors: [0; PACKET_SIZE],
-        is_perturbed: false,
-        is_dark: false,
-        has_two_sides: false,
-        beyond: [[0.0; PACKET_SIZE]; 3],
-        interiors_beyond: [0; PACKET_SIZE],
-    };
+    /// Creates a packet without vertices.
+    pub fn empty() -> Self {
+        BatchVertex::default().splat()
+    }
 
     /// Empties the packet and marks all normals as unperturbed.
     #[inline(always)]
@@ -174,31 +149,9 @@ impl VertexBatch {
 
     /// Copies a vertex from another packet with the same kind of BSDFs. Neither packet may be two-sided.
     pub fn copy(&mut self, i: usize, other: &Self, from: usize) {
-        for (own, other) in [
-            (&mut self.from, &other.from),
-            (&mut self.horizon, &other.horizon),
-            (&mut self.lifted, &other.lifted),
-            (&mut self.point, &other.point),
-            (&mut self.facet, &other.facet),
-            (&mut self.normal, &other.normal),
-            (&mut self.smooth_normal, &other.smooth_normal),
-            (&mut self.throughput, &other.throughput),
-        ] {
-            set_lane(own, i, lane(other, from));
-        }
+        BatchVertex::get(other, from).set(self, i);
         self.bsdf.copy(i, &other.bsdf, from);
-        self.shading_normal_cosine[i] = other.shading_normal_cosine[from];
-        (self.roulette_throughput[i], self.interiors[i]) =
-            (other.roulette_throughput[from], other.interiors[from]);
-        (self.slot[i], self.path[i], self.place[i]) = (other.slot[from], other.path[from], other.place[from]);
-        self.start[i] = other.start[from];
         self.is_perturbed |= other.is_perturbed;
-        self.has_horizon |= (other.has_horizon >> from & 1) << i;
-        self.lift_end[i] = other.lift_end[from];
-        self.may_lift |= (other.may_lift >> from & 1) << i;
-        self.has_facet |= (other.has_facet >> from & 1) << i;
-        self.only_specular_before |= (other.only_specular_before >> from & 1) << i;
-        self.after_gloss |= (other.after_gloss >> from & 1) << i;
         self.used |= 1 << i;
     }
 
@@ -212,34 +165,35 @@ impl VertexBatch {
         interiors: u32,
     ) {
         let ShadingVertex { path, place, vertex, shading, bsdf, .. } = lit;
-        // Set the origin of shadow rays.
-        let shadow_origin = vertex.shadow_origin(tile, path.state.only_specular_before);
-        set_lane(&mut self.from, i, shadow_origin.point);
-        self.start[i] = shadow_origin.start;
-        set_lane(&mut self.horizon, i, shadow_origin.horizon.unwrap_or(Vec3::ZERO));
-        self.has_horizon |= u32::from(shadow_origin.horizon.is_some()) << i;
-        if let Some(Lift { to, end }) = shadow_origin.lift {
-            set_lane(&mut self.lifted, i, to);
-            self.lift_end[i] = end;
-            self.may_lift |= 1 << i;
+        let origin = vertex.shadow_origin(tile, path.state.only_specular_before);
+        let normal = bsdf.facing_normal(shading.normal, vertex.wo);
+        BatchVertex {
+            from: origin.point,
+            start: origin.start,
+            horizon: origin.horizon.unwrap_or(Vec3::ZERO),
+            has_horizon: origin.horizon.is_some(),
+            lifted: origin.lift.map_or(Vec3::ZERO, |lift| lift.to),
+            lift_end: origin.lift.map_or(0.0, |lift| lift.end),
+            may_lift: origin.lift.is_some(),
+            point: vertex.surface.point,
+            facet: vertex.normal,
+            has_facet: true,
+            only_specular_before: path.state.only_specular_before,
+            after_gloss: path.state.is_after_gloss,
+            normal,
+            smooth_normal: shading.smooth_normal,
+            shading_normal_cosine: shading.shading_normal_cosine.unwrap_or(UNPERTURBED),
+            throughput: path.throughput,
+            slot: path.slot,
+            path: path.path,
+            place: *place,
+            roulette_throughput: path.state.roulette_throughput,
+            interiors,
+            ..BatchVertex::default()
         }
-        // Set the surface and its normals.
-        set_lane(&mut self.point, i, vertex.surface.point);
-        set_lane(&mut self.facet, i, vertex.normal);
-        self.has_facet |= 1 << i;
-        self.only_specular_before |= u32::from(path.state.only_specular_before) << i;
-        self.after_gloss |= u32::from(path.state.is_after_gloss) << i;
-        let normal = bsdf.normal_facing_viewer(shading.normal, vertex.wo);
-        set_lane(&mut self.normal, i, normal);
-        set_lane(&mut self.smooth_normal, i, shading.smooth_normal);
-        self.shading_normal_cosine[i] = shading.shading_normal_cosine.unwrap_or(UNPERTURBED);
-        // Set the BSDF.
-        let frame = SurfaceDirections { normal, to_eye: vertex.wo, tangent: vertex.tangent() };
-        self.bsdf.put(i, bsdf, aov.lobes(), &frame);
-        // Copy the path state.
-        (self.roulette_throughput[i], self.interiors[i]) = (path.state.roulette_throughput, interiors);
-        set_lane(&mut self.throughput, i, path.throughput);
-        (self.slot[i], self.path[i], self.place[i]) = (path.slot, path.path, *place);
+        .set(self, i);
+        let directions = SurfaceDirections { normal, wo: vertex.wo, tangent: vertex.tangent() };
+        self.bsdf.put(i, bsdf, aov.lobes(), &directions);
         self.is_perturbed |= shading.shading_normal_cosine.is_some();
         self.used |= 1 << i;
     }
@@ -421,13 +375,13 @@ mod tests {
             has_facet: ALL,
             only_specular_before: ALL,
             after_gloss: ALL,
-            ..VertexBatch::EMPTY
+            ..VertexBatch::empty()
         };
-        let plain = VertexBatch { used: ALL, ..VertexBatch::EMPTY };
+        let plain = VertexBatch { used: ALL, ..VertexBatch::empty() };
         let mut row = noisy;
         row.retain_lanes(0b11);
         row.copy(2, &plain, 7);
-        row.copy(3, &VertexBatch { only_specular_before: 1 << 9, ..plain }, 9);
+        row.copy(3, &VertexBatch { only_specular_before: 1 << 9, ..plain.clone() }, 9);
         let bits = [
             row.used,
             row.has_horizon,

@@ -179,17 +179,16 @@ impl SampleBsdf<'_> {
         // Evaluate the BSDF and the pdf.
         let BsdfResponse { bsdf, cosines } = row.response(&wi, simd);
         let pdfs = row.bsdf.pdf(continuation.lobes, &row.normal, &wi, &bsdf, simd);
-        let gray = row.bsdf.max_component(&bsdf);
         let mut roulette_throughput = [0.0; PACKET_SIZE];
         let f = match continuation.lobes {
-            LobeSet::All => bsdf.f,
-            LobeSet::Narrow => row.bsdf.wide_and_narrow(&wi, &bsdf, simd)[1],
+            LobeSet::All => bsdf.f(),
+            LobeSet::Narrow => bsdf.narrow,
         };
         let mut factors = f;
         let mut alive = 0_u32;
         for i in 0..PACKET_SIZE {
             let share = cosines[i] / pdfs[i];
-            roulette_throughput[i] = row.roulette_throughput[i] * gray[i] * share;
+            roulette_throughput[i] = row.roulette_throughput[i] * bsdf.max[i] * share;
             let factor = lane(&f, i) * share;
             set_lane(&mut factors, i, factor);
             let brings = (factor.x > 0.0) | (factor.y > 0.0) | (factor.z > 0.0);

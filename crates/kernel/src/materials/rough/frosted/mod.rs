@@ -13,11 +13,11 @@
 //! facet, and choose reflection with probability F, refraction otherwise. Therefore, f·cosθᵢ divided by the
 //! pdf is G/G₁ for both.
 
-mod row;
+mod bxdf;
 
 use crate::materials::bsdf::RoughPoint;
 use crate::math::Vec3;
-pub use row::GlassRow;
+pub use bxdf::DielectricBxdf;
 
 /// Rough glass at one point.
 #[derive(Clone, Copy, Debug, PartialEq)]

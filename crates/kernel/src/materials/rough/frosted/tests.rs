@@ -1,7 +1,9 @@
 //! Tests of rough glass. Compares values with `f64` formulas, samples with pdfs, and albedos with quadrature.
 
 use super::*;
-use crate::materials::bsdf::{LobeSet, RoughRow};
+use crate::materials::bsdf::LobeSet;
+use crate::materials::bxdf::Bxdf;
+use crate::materials::bxdf_packet::BxdfPacket;
 use crate::materials::fresnel::dielectric;
 use crate::materials::rough::lobe_tests::{
     ALPHAS, COSINES, LitFrom, SideSample, Subject, check_neighbors, check_neighbors_lit, direction, reference,
@@ -19,7 +21,10 @@ fn glass([near, far]: [f32; 2], alpha: f32) -> GlassPoint {
 }
 
 /// The reflection and the transmission of a surface seen from a direction.
-fn parts(point: &GlassPoint, to_eye: DVec3) -> (Subject<GlassRow<false>>, Subject<GlassRow<true>>) {
+fn parts(
+    point: &GlassPoint,
+    to_eye: DVec3,
+) -> (Subject<DielectricBxdf<false>>, Subject<DielectricBxdf<true>>) {
     let (alphas, eta) = ([point.alpha; 2], f64::from(point.far) / f64::from(point.near));
     let reflection = Subject::new(point, alphas, to_eye);
     (reflection, Subject::lit(point, alphas, to_eye, LitFrom::Refracted(eta)))
@@ -64,7 +69,8 @@ fn ways(next: &mut impl FnMut() -> f32, point: &GlassPoint, is_near: bool) -> (D
     let (y, turn) = (f64::from(0.98 * next()), f64::from(next()) * TAU);
     if is_near {
         let eta = f64::from(point.far) / f64::from(point.near);
-        let there = Subject::<GlassRow<true>>::lit(point, [point.alpha; 2], to_eye, LitFrom::Refracted(eta));
+        let there =
+            Subject::<DielectricBxdf<true>>::lit(point, [point.alpha; 2], to_eye, LitFrom::Refracted(eta));
         (to_eye, there.at_half_vector(y, turn).map(|(way, _)| way.as_vec3().as_dvec3()))
     } else {
         let way = direction(f64::from(0.05 + 0.95 * next()), turn);
@@ -88,7 +94,7 @@ fn transmission_matches_the_formulas() {
             }
             let eta = f64::from(indices[1]) / f64::from(indices[0]);
             let subject = |point: &GlassPoint, eye: DVec3, eta: f64| {
-                Subject::<GlassRow<true>>::lit(point, [alpha; 2], eye, LitFrom::Refracted(eta))
+                Subject::<DielectricBxdf<true>>::lit(point, [alpha; 2], eye, LitFrom::Refracted(eta))
             };
             let value = |point: &GlassPoint, eye: DVec3, light: DVec3, eta: f64| {
                 subject(point, eye, eta).values(LobeSet::All, &[light])[0].0.x
@@ -121,12 +127,12 @@ fn reflection_matches_the_formulas() {
                 direction(f64::from(0.05 + 0.95 * next()), f64::from(next()) * TAU).as_vec3().as_dvec3()
             };
             let to_eye = place(&mut next);
-            let subject = Subject::<GlassRow<false>>::new(&point, [alpha; 2], to_eye);
+            let subject = Subject::<DielectricBxdf<false>>::new(&point, [alpha; 2], to_eye);
             let (y, turn) = (f64::from(0.98 * next()), f64::from(next()) * TAU);
             let near = subject.at_half_vector(y, turn).map(|(way, _)| way.as_vec3().as_dvec3());
             for light in [Some(place(&mut next)), near].into_iter().flatten().filter(|one| one.z > 0.02) {
                 let there = subject.values(LobeSet::All, &[light])[0].0.x;
-                let back = Subject::<GlassRow<false>>::new(&point, [alpha; 2], light);
+                let back = Subject::<DielectricBxdf<false>>::new(&point, [alpha; 2], light);
                 let back = back.values(LobeSet::All, &[to_eye])[0].0.x;
                 let what = format!("α {alpha}, {indices:?}, from {light} to {to_eye}");
                 assert!((there - back).abs() <= reciprocity * there, "{what}: {there}, reversed {back}");
@@ -217,8 +223,8 @@ fn two_sided_samples_match_one_sided_samples() {
             let (reflection, transmission) = parts(&point, direction(cosine, 0.3));
             let alone = [reflection.samples(LobeSet::All, 16), transmission.samples(LobeSet::All, 16)];
             let rows: [Vec<SideSample>; 2] = [
-                reflection.side_samples(16, GlassRow::sample_sides),
-                transmission.side_samples(16, GlassRow::sample_sides),
+                reflection.side_samples(16, BxdfPacket::sample_sides),
+                transmission.side_samples(16, BxdfPacket::sample_sides),
             ];
             let directions: Vec<DVec3> = rows[0].iter().map(|sample| sample.direction).collect();
             let by_directions = [
@@ -265,7 +271,7 @@ fn two_sided_samples_match_one_sided_samples() {
 fn lanes_are_independent() {
     let points: Vec<GlassPoint> =
         INDICES.into_iter().flat_map(|one| [0.001, 0.2, 1.0].map(|alpha| glass(one, alpha))).collect();
-    check_neighbors::<GlassRow<false>>(&points);
-    check_neighbors_lit::<GlassRow<true>>(&points, LitFrom::Through);
-    const { assert!(GlassRow::<true>::SENDS_RAYS) };
+    check_neighbors::<DielectricBxdf<false>>(&points);
+    check_neighbors_lit::<DielectricBxdf<true>>(&points, LitFrom::Through);
+    const { assert!(<DielectricBxdf<true> as Bxdf>::SENDS_RAYS) };
 }

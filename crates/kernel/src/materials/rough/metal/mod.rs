@@ -1,8 +1,8 @@
 //! Conductors: microfacets with the exact Fresnel equations, or with Schlick's approximation for a given
 //! color.
 
+mod bxdf;
 pub mod elements;
-mod row;
 
 use std::sync::Arc;
 
@@ -13,13 +13,7 @@ use crate::materials::microfacet;
 use crate::materials::scalar::Number;
 use crate::materials::texture::{Color, Texture};
 use crate::math::Vec3;
-pub use row::ConductorRow;
-
-/// A packet of isotropic conductors.
-pub type IsotropicConductorRow = ConductorRow<false>;
-
-/// A packet of brushed conductors.
-pub type BrushedConductorRow = ConductorRow<true>;
+pub use bxdf::ConductorBxdf;
 
 /// A rough conductor with a single lobe.
 #[derive(Clone, Debug, PartialEq)]

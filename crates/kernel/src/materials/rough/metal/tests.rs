@@ -30,7 +30,7 @@ fn values_match_the_formulas_and_are_reciprocal() {
         let wide = alphas.map(f64::from);
         let cosine = |o: DVec3, i: DVec3| (o + i).length() * 0.5;
         let first = DVec3::new(1.0, 0.78, 0.34);
-        check_values::<BrushedConductorRow>(
+        check_values::<ConductorBxdf<true>>(
             &format!("Schlick {alphas:?}"),
             &schlick(alphas),
             alphas,
@@ -40,7 +40,7 @@ fn values_match_the_formulas_and_are_reciprocal() {
             },
         );
         let copper = of_element(Element::Copper, alphas);
-        check_values::<BrushedConductorRow>(&format!("copper {alphas:?}"), &copper, alphas, |o, i| {
+        check_values::<ConductorBxdf<true>>(&format!("copper {alphas:?}"), &copper, alphas, |o, i| {
             let fresnel = copper.fresnel.reflectance(cosine(o, i) as f32).as_dvec3();
             fresnel * reference(o, i, wide)
         });
@@ -51,22 +51,22 @@ fn values_match_the_formulas_and_are_reciprocal() {
 fn lanes_are_independent() {
     let points =
         ALPHAS.into_iter().flat_map(|alpha| [schlick([alpha; 2]), of_element(Element::Iron, [alpha; 2])]);
-    check_neighbors::<IsotropicConductorRow>(&points.collect::<Vec<_>>());
+    check_neighbors::<ConductorBxdf<false>>(&points.collect::<Vec<_>>());
     let points = ALPHAS.into_iter().flat_map(shapes).map(|alphas| of_element(Element::Iron, alphas));
-    check_neighbors::<BrushedConductorRow>(&points.collect::<Vec<_>>());
+    check_neighbors::<ConductorBxdf<true>>(&points.collect::<Vec<_>>());
 }
 
 #[test]
 fn isotropic_packets_match_brushed_packets() {
     for alpha in ALPHAS {
         let (point, at) = (schlick([alpha; 2]), direction(0.6, 0.3));
-        let round = Subject::<IsotropicConductorRow>::new(&point, [alpha; 2], at);
-        let brushed = Subject::<BrushedConductorRow>::new(&point, [alpha; 2], at);
+        let round = Subject::<ConductorBxdf<false>>::new(&point, [alpha; 2], at);
+        let brushed = Subject::<ConductorBxdf<true>>::new(&point, [alpha; 2], at);
         let (one, other) = (round.sampled_albedo(64), brushed.sampled_albedo(64));
         assert!((one - other).abs().max_element() < 1e-3, "α {alpha}: {one} and {other}");
         round.check_samples(&format!("α {alpha}"), LobeSet::All);
         let wide = [f64::from(alpha); 2];
-        check_values::<IsotropicConductorRow>(&format!("α {alpha}"), &point, [alpha; 2], |o, i| {
+        check_values::<ConductorBxdf<false>>(&format!("α {alpha}"), &point, [alpha; 2], |o, i| {
             let first = DVec3::new(1.0, 0.78, 0.34);
             (first + (DVec3::ONE - first) * (1.0 - (o + i).length() * 0.5).powi(5)) * reference(o, i, wide)
         });
@@ -79,7 +79,7 @@ fn samples_follow_the_pdf() {
     for alphas in ALPHAS.into_iter().flat_map(shapes) {
         for cosine in COSINES {
             let subject =
-                Subject::<BrushedConductorRow>::new(&schlick(alphas), alphas, direction(cosine, 0.7));
+                Subject::<ConductorBxdf<true>>::new(&schlick(alphas), alphas, direction(cosine, 0.7));
             subject.check_samples(&format!("α {alphas:?} at a cosine of {cosine}"), LobeSet::All);
         }
     }
@@ -90,7 +90,7 @@ fn sampled_albedos_match_quadrature() {
     for alphas in ALPHAS.into_iter().flat_map(shapes) {
         for cosine in COSINES {
             for point in [schlick(alphas), of_element(Element::Gold, alphas)] {
-                let subject = Subject::<BrushedConductorRow>::new(&point, alphas, direction(cosine, 0.3));
+                let subject = Subject::<ConductorBxdf<true>>::new(&point, alphas, direction(cosine, 0.3));
                 let (sampled, exact) = (subject.sampled_albedo(192), subject.albedo());
                 let what = format!("α {alphas:?} at a cosine of {cosine}: {sampled} instead of {exact}");
                 assert!((sampled - exact).abs().max_element() < 1e-3, "{what}");
@@ -105,7 +105,7 @@ fn narrow_lobes_approach_a_mirror() {
     for element in Element::ALL {
         for cosine in [0.3, 0.7, 1.0] {
             let point = of_element(*element, [0.001; 2]);
-            let albedo = Subject::<BrushedConductorRow>::new(&point, [0.001; 2], direction(cosine, 0.0))
+            let albedo = Subject::<ConductorBxdf<true>>::new(&point, [0.001; 2], direction(cosine, 0.0))
                 .sampled_albedo(64);
             let mirror = point.fresnel.reflectance(cosine as f32).as_dvec3();
             assert!((albedo - mirror).abs().max_element() < 1e-3, "{element:?}: {albedo}, not {mirror}");

@@ -1,8 +1,8 @@
 //! The normalized Phong material: f = kd/π + ks·(α+2)/(2π)·max(0, R·V)^α (Lafortune and Willems, *Using the
 //! Modified Phong Reflectance Model for Physically Based Rendering*, 1994).
 
+mod bxdf;
 pub mod lobes;
-mod row;
 
 use std::f32::consts::{FRAC_1_PI, PI};
 use std::sync::Arc;
@@ -11,8 +11,8 @@ use crate::materials::bsdf::{RoughMaterial, RoughPoint};
 use crate::materials::footprint::TexturePoint;
 use crate::materials::texture::{Color, Texture};
 use crate::math::Vec3;
+pub use bxdf::PhongBxdf;
 use lobes::{Lobes, gloss};
-pub use row::PhongRow;
 
 /// A material with diffuse and glossy reflection on both sides.
 #[derive(Clone, Debug, PartialEq)]
@@ -161,7 +161,7 @@ mod tests {
         let (diffuse, specular) = (Vec3::new(0.4, 0.2, 0.1), Vec3::splat(0.5));
         let points = [0.0, 1.0, 40.0, 1e4, 1e6];
         let points = points.map(|shininess| PhongBsdf { diffuse, specular, shininess, ambient: Vec3::ZERO });
-        check_shown_lobes::<PhongRow>(&points, LitFrom::Mirrored);
+        check_shown_lobes::<PhongBxdf>(&points, LitFrom::Mirrored);
     }
 
     fn reflected(shininess: f32, to_eye: Vec3, to_light: Vec3) -> f32 {

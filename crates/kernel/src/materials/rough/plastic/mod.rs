@@ -4,7 +4,7 @@
 //! to the base. White plastic reflects all light (Kulla and Conty, *Revisiting Physically Based Shading at
 //! Imageworks*, SIGGRAPH 2017 course, without the multiple scattering).
 
-mod row;
+mod bxdf;
 
 use std::f32::consts::FRAC_1_PI;
 use std::sync::Arc;
@@ -16,7 +16,7 @@ use crate::materials::microfacet;
 use crate::materials::scalar::Number;
 use crate::materials::texture::{Color, Texture};
 use crate::math::Vec3;
-pub use row::PlasticRow;
+pub use bxdf::PlasticBxdf;
 
 /// A diffuse base under a coat. If the coat is smooth, this is only the base; see
 /// [`crate::materials::Coated`].

@@ -26,7 +26,7 @@ fn values_match_the_formulas_and_are_reciprocal() {
         let mean = f64::from(point.albedo.mean);
         let returned = 1.0 - (1.0 - mean) / (eta * eta);
         let left = |cosine: f64| 1.0 - f64::from(point.albedo.at(cosine as f32));
-        check_values::<PlasticRow>(&format!("α {alpha}, η {ior}"), &point, [alpha; 2], |o, i| {
+        check_values::<PlasticBxdf>(&format!("α {alpha}, η {ior}"), &point, [alpha; 2], |o, i| {
             let fresnel = dielectric((o + i).length() * 0.5, eta);
             let kd = RED.as_dvec3();
             let base = kd / (DVec3::ONE - kd * returned) / (std::f64::consts::PI * eta * eta);
@@ -42,13 +42,13 @@ fn lanes_are_independent() {
         .flat_map(|alpha| [plastic(RED, 1.0, 1.5, alpha), plastic(Vec3::ZERO, 0.8, 1.3, alpha)])
         .map(|one| point(&one))
         .collect();
-    check_neighbors::<PlasticRow>(&points);
+    check_neighbors::<PlasticBxdf>(&points);
 }
 
 #[test]
 fn samples_follow_the_pdf() {
     for (alpha, cosine) in ALPHAS.into_iter().flat_map(|alpha| COSINES.map(|cosine| (alpha, cosine))) {
-        let subject = Subject::<PlasticRow>::new(
+        let subject = Subject::<PlasticBxdf>::new(
             &point(&plastic(RED, 1.0, 1.5, alpha)),
             [alpha; 2],
             direction(cosine, 0.7),
@@ -67,11 +67,11 @@ fn white_furnace_and_albedos_match_quadrature() {
         for cosine in COSINES {
             let what = format!("α {alpha}, η {ior} at a cosine of {cosine}");
             let white = point(&plastic(Vec3::ONE, 1.0, ior, alpha));
-            let subject = Subject::<PlasticRow>::new(&white, [alpha; 2], direction(cosine, 0.3));
+            let subject = Subject::<PlasticBxdf>::new(&white, [alpha; 2], direction(cosine, 0.3));
             let furnace = subject.sampled_albedo(192).x;
             assert!((-2e-3..5e-4).contains(&(furnace - 1.0)), "{what}: white plastic reflects {furnace}");
             let red = point(&plastic(RED, 1.0, ior, alpha));
-            let subject = Subject::<PlasticRow>::new(&red, [alpha; 2], direction(cosine, 0.3));
+            let subject = Subject::<PlasticBxdf>::new(&red, [alpha; 2], direction(cosine, 0.3));
             let (sampled, exact) = (subject.sampled_albedo(192), subject.albedo());
             assert!((sampled - exact).abs().max_element() < 1e-3, "{what}: {sampled} instead of {exact}");
         }
@@ -83,7 +83,7 @@ fn base_under_smooth_coat_gets_one_minus_fresnel() {
     for ior in [1.0, 1.3, 1.5, 3.0] {
         for cosine in COSINES {
             let base = point(&plastic(Vec3::ONE, 1.0, ior, 0.0));
-            let subject = Subject::<PlasticRow>::new(&base, [1.0; 2], direction(cosine, 0.3));
+            let subject = Subject::<PlasticBxdf>::new(&base, [1.0; 2], direction(cosine, 0.3));
             let (albedo, fresnel) = (subject.sampled_albedo(192).x, dielectric(cosine, ior.into()));
             assert!((albedo + fresnel - 1.0).abs() < 1e-3, "η {ior}: {albedo} and {fresnel}");
         }

@@ -11,7 +11,7 @@
 //! - Clear coat c: a lobe with F0 = 0.04, times c. All other lobes are multiplied by (1 − c·E_c(μ)) for each
 //!   of the two directions.
 
-mod row;
+mod bxdf;
 
 use std::f32::consts::FRAC_1_PI;
 use std::sync::{Arc, LazyLock};
@@ -23,7 +23,7 @@ use crate::materials::microfacet;
 use crate::materials::scalar::Number;
 use crate::materials::texture::{Color, Texture};
 use crate::math::Vec3;
-pub use row::PrincipledRow;
+pub use bxdf::PrincipledBxdf;
 
 /// Reflectance of the clear coat at normal incidence, for an index of refraction of 1.5.
 const COAT_REFLECTANCE: f32 = 0.04;

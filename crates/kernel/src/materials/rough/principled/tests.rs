@@ -59,7 +59,7 @@ fn values_match_the_formulas_and_are_reciprocal() {
             + DVec3::splat(0.8 * f64::from(point.albedo.grazing.mean));
         let c = f64::from(coat[0]);
         let through = |cosine: f64| 1.0 - c * f64::from(point.coat_albedo.at(cosine as f32));
-        check_values::<PrincipledRow<false>>(
+        check_values::<PrincipledBxdf<false>>(
             &format!("α {alpha}, metallic {metallic}"),
             &point,
             [alpha; 2],
@@ -88,7 +88,7 @@ fn lanes_are_independent() {
         })
         .map(|one| point(&one))
         .collect();
-    check_neighbors::<PrincipledRow<false>>(&points);
+    check_neighbors::<PrincipledBxdf<false>>(&points);
 }
 
 #[test]
@@ -96,7 +96,7 @@ fn samples_follow_the_pdf() {
     for (alpha, metallic, coat) in subjects() {
         for cosine in COSINES {
             let point = point(&principled(RED, metallic, alpha, coat));
-            let subject = Subject::<PrincipledRow<false>>::new(&point, [alpha; 2], direction(cosine, 0.7));
+            let subject = Subject::<PrincipledBxdf<false>>::new(&point, [alpha; 2], direction(cosine, 0.7));
             let what = format!("α {alpha}, metallic {metallic} at a cosine of {cosine}");
             subject.check_samples(&what, LobeSet::Narrow);
             if alpha >= 0.2 {
@@ -113,7 +113,7 @@ fn albedos_match_quadrature_and_stay_below_1() {
             for color in [RED, Vec3::ONE] {
                 let point = point(&principled(color, metallic, alpha, coat));
                 let subject =
-                    Subject::<PrincipledRow<false>>::new(&point, [alpha; 2], direction(cosine, 0.3));
+                    Subject::<PrincipledBxdf<false>>::new(&point, [alpha; 2], direction(cosine, 0.3));
                 let (sampled, exact) = (subject.sampled_albedo(192), subject.albedo());
                 let what = format!(
                     "α {alpha}, metallic {metallic} at a cosine of {cosine}: {sampled} instead of {exact}"
@@ -142,7 +142,7 @@ fn fully_reflective_facets_have_bounded_weights() {
         });
         for cosine in [0.01, 0.05, 0.3, 1.0] {
             let subject =
-                Subject::<PrincipledRow<false>>::new(&point(&white), [alpha; 2], direction(cosine, 0.7));
+                Subject::<PrincipledBxdf<false>>::new(&point(&white), [alpha; 2], direction(cosine, 0.7));
             let (largest, mean) = (subject.largest_weight(128), subject.sampled_albedo(128).x);
             assert!(largest < 60.0, "α {alpha} at a cosine of {cosine}: a sample has weight {largest}");
             assert!(mean < 1.0 + 3e-3, "α {alpha} at a cosine of {cosine}: {mean}");
@@ -165,7 +165,7 @@ fn transmission_is_the_mirrored_specular_lobe() {
         let (part, m) = (f64::from(transmission), f64::from(metallic));
         for (number, cosine) in COSINES.into_iter().enumerate() {
             let to_eye = direction(cosine, 0.7).as_vec3().as_dvec3();
-            let subject = Subject::<PrincipledRow<true>>::lit(&point, [alpha; 2], to_eye, LitFrom::Through);
+            let subject = Subject::<PrincipledBxdf<true>>::lit(&point, [alpha; 2], to_eye, LitFrom::Through);
             for trial in 0..40_u32 {
                 let (y, turn) = (f64::from(trial) / 41.0, f64::from(trial) * 2.4 + number as f64);
                 let Some((light, _)) = subject.at_half_vector(y, turn) else { continue };
@@ -193,8 +193,8 @@ fn samples_on_both_sides_follow_the_pdf() {
         for cosine in COSINES {
             let point = point(&transmitting(RED, metallic, 0.6, alpha, coat));
             let at = direction(cosine, 0.7);
-            let behind = Subject::<PrincipledRow<true>>::lit(&point, [alpha; 2], at, LitFrom::Through);
-            let front = Subject::<PrincipledRow<false>>::new(&point, [alpha; 2], at);
+            let behind = Subject::<PrincipledBxdf<true>>::lit(&point, [alpha; 2], at, LitFrom::Through);
+            let front = Subject::<PrincipledBxdf<false>>::new(&point, [alpha; 2], at);
             let what = format!("α {alpha}, metallic {metallic} at a cosine of {cosine}");
             for lobes in [LobeSet::Narrow, LobeSet::All] {
                 behind.check_samples(&format!("other side, {lobes:?}, {what}"), lobes);
@@ -214,8 +214,8 @@ fn two_sided_albedos_match_quadrature() {
         for cosine in COSINES {
             let point = point(&transmitting(Vec3::ONE, metallic, transmission, alpha, coat));
             let at = direction(cosine, 0.3);
-            let behind = Subject::<PrincipledRow<true>>::lit(&point, [alpha; 2], at, LitFrom::Through);
-            let front = Subject::<PrincipledRow<false>>::new(&point, [alpha; 2], at);
+            let behind = Subject::<PrincipledBxdf<true>>::lit(&point, [alpha; 2], at, LitFrom::Through);
+            let front = Subject::<PrincipledBxdf<false>>::new(&point, [alpha; 2], at);
             let sampled = front.sampled_albedo(192) + behind.sampled_albedo(192);
             let exact = front.albedo() + behind.albedo();
             let what =
@@ -234,6 +234,6 @@ fn transmissive_lanes_are_independent() {
         })
         .map(|one| point(&one))
         .collect();
-    check_neighbors::<PrincipledRow<false>>(&points);
-    check_neighbors_lit::<PrincipledRow<true>>(&points, LitFrom::Through);
+    check_neighbors::<PrincipledBxdf<false>>(&points);
+    check_neighbors_lit::<PrincipledBxdf<true>>(&points, LitFrom::Through);
 }

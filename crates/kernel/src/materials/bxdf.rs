@@ -1,0 +1,194 @@
+//! The interface of non-specular BSDFs. Each one is written once, for a single point and direction; packets
+//! ([`BxdfPacket`](super::BxdfPacket)) evaluate it lane by lane, in loops that compile to vector instructions.
+//! All functions must therefore be branch-free and `#[inline(always)]`, and must not call closures.
+//!
+//! A BSDF is the sum of wide lobes, which are sampled like a diffuse surface, and narrow lobes, for which
+//! light samples are inefficient. It receives light from one side. A surface that also transmits light is
+//! represented by two vertices with BSDFs of different kinds. One is lit from the viewer's side, and the
+//! other from behind, with its shading normal on that side. Both vertices use the same random numbers, so
+//! [`Bxdf::sample`] continues the path at exactly one of them. The pdfs include the directions on both
+//! sides.
+
+use super::bsdf::{LobeSet, NarrowLobe, RoughPoint};
+use crate::math::Vec3;
+use crate::math::soa::Soa;
+
+/// Properties of a BSDF, or of any BSDF in a packet. The bits from [`BxdfFlags::FIRST_OWN`] up belong to the
+/// kind.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct BxdfFlags(pub u32);
+
+impl BxdfFlags {
+    /// Has wide lobes.
+    pub const WIDE: Self = Self(1);
+
+    /// Has narrow lobes.
+    pub const NARROW: Self = Self(2);
+
+    /// The first bit for properties that only concern one kind of BSDF.
+    pub const FIRST_OWN: u32 = 2;
+
+    /// Whether all given flags are set.
+    #[inline(always)]
+    pub const fn contains(self, other: Self) -> bool {
+        self.0 & other.0 == other.0
+    }
+
+    /// These flags if the condition holds, and otherwise none.
+    #[inline(always)]
+    pub const fn when(self, condition: bool) -> Self {
+        Self(if condition { self.0 } else { 0 })
+    }
+
+    /// All flags of both.
+    #[inline(always)]
+    pub const fn union(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+
+    /// These flags except the others.
+    #[inline(always)]
+    pub const fn without(self, other: Self) -> Self {
+        Self(self.0 & !other.0)
+    }
+}
+
+/// Value of one or more lobes for a light direction.
+#[derive(Clone, Copy, Debug)]
+pub struct LobeValue {
+    /// f in sr⁻¹.
+    pub f: Vec3,
+    /// The largest component of f, computed from the largest components of colors.
+    pub max: f32,
+    /// A number that [`Bxdf::pdf`] has in common with f, such as f for a reflectance of 1.
+    pub shape: f32,
+}
+
+impl LobeValue {
+    /// No light.
+    pub const ZERO: Self = Self { f: Vec3::ZERO, max: 0.0, shape: 0.0 };
+}
+
+/// Directions at a surface.
+#[derive(Clone, Copy, Debug)]
+pub struct SurfaceDirections {
+    /// Unit shading normal on the lit side, rotated by [`facing_normal`]. Except for transmitted light, this
+    /// is the side of the viewer.
+    pub normal: Vec3,
+    /// Unit direction to the viewer.
+    pub wo: Vec3,
+    /// ∂p/∂u, or zero without texture coordinates.
+    pub tangent: Vec3,
+}
+
+/// A non-specular BSDF at one point, without the values that depend on the view direction.
+pub trait Bxdf: Soa + Default {
+    /// The material's parameters at one point.
+    type Point: RoughPoint;
+
+    /// Values that depend on the view direction.
+    type View: Soa + Default;
+
+    /// Whether shading normals are rotated to face the viewer, see
+    /// [`rotate_toward_viewer`](super::microfacet::rotate_toward_viewer).
+    const TURNS_NORMALS: bool = true;
+
+    /// Whether the BSDF is for light from behind the surface.
+    const IS_TRANSMISSION: bool = false;
+
+    /// Whether rays in the narrow lobe continue beyond the point where other paths end, to show reflections.
+    const SENDS_RAYS: bool = true;
+
+    /// Whether the wide lobes are constant over all directions, even behind the surface.
+    const HAS_CONSTANT_WIDE: bool = false;
+
+    /// Whether functions are inlined into every caller. Other kinds have one copy per instruction set,
+    /// because calls cost little compared with their work, and additional copies would bloat the program.
+    const IS_INLINED: bool = false;
+
+    /// Flags of all BSDFs of this kind.
+    const ALWAYS: BxdfFlags;
+
+    /// A flag for which [`Bxdf::narrow`] is compiled to two loops, one with the flag and one without it.
+    const SPLITS_NARROW: BxdfFlags = BxdfFlags(0);
+
+    /// Creates the BSDF. `tangent` is ∂p/∂u, or zero without texture coordinates.
+    fn new(point: &Self::Point, tangent: Vec3) -> Self;
+
+    /// Replaces the color that [`RoughMaterial::row_texture`](super::bsdf::RoughMaterial::row_texture) looks
+    /// up. Not called for materials without such a texture.
+    #[inline(always)]
+    fn set_color(&mut self, _point: &Self::Point, _color: Vec3) {}
+
+    /// Properties of the BSDF, in addition to [`Bxdf::ALWAYS`].
+    fn flags(&self) -> BxdfFlags;
+
+    /// Whether the surface reflects nothing.
+    fn is_black(&self) -> bool {
+        false
+    }
+
+    /// Computes the values that depend on the view direction. `any` are the flags of the packet.
+    fn view(&self, directions: &SurfaceDirections, any: BxdfFlags) -> Self::View;
+
+    /// Value of the wide lobes.
+    #[inline(always)]
+    fn wide(&self, _view: &Self::View, _wi: Vec3, _any: BxdfFlags) -> LobeValue {
+        LobeValue::ZERO
+    }
+
+    /// Value of the narrow lobes.
+    fn narrow(&self, view: &Self::View, wi: Vec3, any: BxdfFlags) -> LobeValue;
+
+    /// Pdf in sr⁻¹ of a direction sampled from these lobes. Cosine lobes are around `normal`. `shape` is the
+    /// narrow lobes' [`LobeValue::shape`].
+    fn pdf(
+        &self,
+        view: &Self::View,
+        lobes: LobeSet,
+        normal: Vec3,
+        wi: Vec3,
+        shape: f32,
+        any: BxdfFlags,
+    ) -> f32;
+
+    /// Samples a unit direction. Cosine lobes are around `normal`. `choice` selects the lobe, and `u` the
+    /// direction within it. All random numbers are in [0, 1).
+    fn sample(
+        &self,
+        view: &Self::View,
+        lobes: LobeSet,
+        normal: Vec3,
+        choice: f32,
+        u: [f32; 2],
+        any: BxdfFlags,
+    ) -> Vec3;
+
+    /// Shape of the narrow lobe for light selection, if the flags say that there is one.
+    fn narrow_lobe(&self, view: &Self::View) -> Option<NarrowLobe>;
+
+    /// Exponent of the narrow lobe as a power of a cosine, if light samples are inefficient for lobes with
+    /// large exponents. 0 for kinds whose narrow lobes send rays.
+    #[inline(always)]
+    fn exponent(&self) -> f32 {
+        0.0
+    }
+}
+
+/// Chooses between two vectors, without a branch.
+#[inline(always)]
+pub(super) fn choose(condition: bool, yes: Vec3, no: Vec3) -> Vec3 {
+    let pick = |yes: f32, no: f32| if condition { yes } else { no };
+    Vec3::new(pick(yes.x, no.x), pick(yes.y, no.y), pick(yes.z, no.z))
+}
+
+/// The shading normal for the lobes, given a normal on the lit side and the direction to the viewer.
+#[inline(always)]
+pub fn facing_normal<B: Bxdf>(normal: Vec3, wo: Vec3) -> Vec3 {
+    use super::microfacet::rotate_single_toward_viewer as turn;
+    match (B::TURNS_NORMALS, B::IS_TRANSMISSION) {
+        (false, _) => normal,
+        (true, false) => turn(normal, wo),
+        (true, true) => -turn(-normal, wo),
+    }
+}

@@ -1,0 +1,473 @@
+//! Packets of 16 non-specular BSDFs of the same kind. All functions must be called inside a SIMD kernel.
+
+use super::bsdf::{BsdfValues, LobeSet, NarrowLobe, ShownLobes, SideSamples, UvRow};
+use super::bxdf::{Bxdf, BxdfFlags, SurfaceDirections};
+use super::frosted::DielectricBxdf;
+use super::microfacet::rotate_toward_viewer;
+use super::texture::Texture;
+use crate::math::Vec3;
+use crate::math::lanes::{
+    F32x16, Mask, PACKET_SIZE, Simd, SimdKernel, TRUE, Vec3x16, lane, mask_from_bits, set_lane,
+};
+use crate::math::soa::Soa;
+use glimt_base::soa;
+
+soa! {
+    /// Factors on the lobes, for the lobes that an image shows.
+    pub struct LobeFactors in LobeFactorsPacket {
+        /// Factor on the wide lobes.
+        wide: f32 = 0.0,
+        /// Factor on the narrow lobes.
+        narrow: f32 = 0.0,
+        /// f in sr⁻¹ to show instead of the lobes.
+        unit: f32 = 0.0,
+    }
+}
+
+impl From<ShownLobes> for LobeFactors {
+    #[inline(always)]
+    fn from(shown: ShownLobes) -> Self {
+        let factor = |is_shown: bool| if is_shown { 1.0 } else { 0.0 };
+        match shown {
+            ShownLobes::Of { diffuse, specular } => {
+                Self { wide: factor(diffuse), narrow: factor(specular), unit: 0.0 }
+            }
+            ShownLobes::Unit => Self { wide: 0.0, narrow: 0.0, unit: 1.0 },
+        }
+    }
+}
+
+/// A packet of BSDFs.
+#[derive(Clone, Debug)]
+#[repr(align(64))]
+pub struct BxdfPacket<B: Bxdf> {
+    bsdf: B::Packet,
+    view: <B::View as Soa>::Packet,
+    shown: LobeFactorsPacket,
+    /// Flags of any of the BSDFs.
+    any: BxdfFlags,
+    /// Whether all lobes of all BSDFs are shown.
+    shows_all: bool,
+}
+
+impl<B: Bxdf> Default for BxdfPacket<B> {
+    fn default() -> Self {
+        Self {
+            bsdf: B::default().splat(),
+            view: B::View::default().splat(),
+            shown: LobeFactors::default().splat(),
+            any: B::ALWAYS,
+            shows_all: true,
+        }
+    }
+}
+
+/// Flags with a known value of [`BxdfFlags::NARROW`], which compilers use to remove code from loops.
+#[inline(always)]
+fn with_narrow<const NARROW: bool>(any: BxdfFlags) -> BxdfFlags {
+    if NARROW { any.union(BxdfFlags::NARROW) } else { any.without(BxdfFlags::NARROW) }
+}
+
+impl<B: Bxdf> BxdfPacket<B> {
+    /// Prepares the packet for reuse with other surfaces.
+    #[inline(always)]
+    pub fn reset(&mut self) {
+        (self.any, self.shows_all) = (B::ALWAYS, true);
+    }
+
+    /// Sets a surface.
+    #[inline(always)]
+    pub fn put(&mut self, i: usize, point: &B::Point, shown: ShownLobes, directions: &SurfaceDirections) {
+        let bsdf = B::new(point, directions.tangent);
+        self.any = self.any.union(bsdf.flags());
+        self.shows_all &= shown == ShownLobes::ALL;
+        bsdf.view(directions, self.any).set(&mut self.view, i);
+        bsdf.set(&mut self.bsdf, i);
+        LobeFactors::from(shown).set(&mut self.shown, i);
+    }
+
+    /// Copies a surface of another packet.
+    #[inline(always)]
+    pub fn copy(&mut self, i: usize, other: &Self, from: usize) {
+        B::get(&other.bsdf, from).set(&mut self.bsdf, i);
+        B::View::get(&other.view, from).set(&mut self.view, i);
+        LobeFactors::get(&other.shown, from).set(&mut self.shown, i);
+        self.any = self.any.union(other.any);
+        self.shows_all &= other.shows_all;
+    }
+
+    /// Sets the surfaces of some lanes to a material with these values, and its color to a texture at the given
+    /// coordinates, if any. Later entries of `shown` override earlier ones. Returns a mask of surfaces that
+    /// reflect nothing.
+    #[inline(always)]
+    pub fn fill(
+        &mut self,
+        point: &B::Point,
+        color: Option<(&Texture, &UvRow)>,
+        shown: &[(u32, ShownLobes)],
+        simd: impl Simd,
+    ) -> u32 {
+        let bsdf = B::new(point, Vec3::X);
+        let mut filled = bsdf.splat();
+        if let Some((texture, uv)) = color {
+            let colors = texture.lookup_row(uv);
+            for i in 0..PACKET_SIZE {
+                let mut bsdf = bsdf;
+                bsdf.set_color(point, lane(&colors, i));
+                bsdf.set(&mut filled, i);
+            }
+        }
+        for &(of, shown) in shown {
+            let of = mask_from_bits(of);
+            B::select(&of, &filled, &mut self.bsdf);
+            LobeFactors::select(&of, &LobeFactors::from(shown).splat(), &mut self.shown);
+            self.shows_all &= shown == ShownLobes::ALL;
+        }
+        self.any = self.any.union(bsdf.flags());
+        let mut black = [0; PACKET_SIZE];
+        for i in 0..PACKET_SIZE {
+            black[i] = if B::get(&filled, i).is_black() { TRUE } else { 0 };
+        }
+        simd.movemask(&black)
+    }
+
+    /// Sets the shading normals on the viewer's side and the incoming ray directions of the lanes in `of`, or
+    /// of all lanes. Replaces `normals` with the normals rotated by
+    /// [`facing_normal`](super::bxdf::facing_normal).
+    #[inline(always)]
+    pub fn orient(&mut self, of: Option<&Mask>, normals: &mut Vec3x16, directions: &Vec3x16) {
+        if B::TURNS_NORMALS {
+            for i in 0..PACKET_SIZE {
+                let turned = rotate_toward_viewer(lane(normals, i), -lane(directions, i));
+                set_lane(normals, i, turned);
+            }
+        }
+        // Write to a separate packet, because the loop is not vectorized if it writes to what it reads.
+        let mut view = B::View::default().splat();
+        for i in 0..PACKET_SIZE {
+            let (normal, wo) = (lane(normals, i), -lane(directions, i));
+            let directions = SurfaceDirections { normal, wo, tangent: Vec3::X };
+            B::get(&self.bsdf, i).view(&directions, self.any).set(&mut view, i);
+        }
+        match of {
+            Some(of) => B::View::select(of, &view, &mut self.view),
+            None => self.view = view,
+        }
+    }
+
+    /// Whether any surface may have a narrow lobe. If not, [`BxdfPacket::sample`] ignores `choices`.
+    #[inline(always)]
+    pub fn has_narrow_lobes(&self) -> bool {
+        B::ALWAYS.contains(BxdfFlags::NARROW) || self.any.contains(BxdfFlags::NARROW)
+    }
+
+    #[inline(always)]
+    fn has_wide_lobes(&self) -> bool {
+        B::ALWAYS.contains(BxdfFlags::WIDE) || self.any.contains(BxdfFlags::WIDE)
+    }
+
+    /// Evaluates the lobes for light from the directions `wi`.
+    #[inline(always)]
+    pub fn f(&self, wi: &Vec3x16) -> BsdfValues {
+        let mut values = BsdfValues::ZERO;
+        if self.has_wide_lobes() {
+            for i in 0..PACKET_SIZE {
+                let bsdf = B::get(&self.bsdf, i);
+                let value = bsdf.wide(&B::View::get(&self.view, i), lane(wi, i), self.any);
+                set_lane(&mut values.wide, i, value.f);
+                values.max[i] = value.max;
+            }
+        }
+        if self.has_narrow_lobes() {
+            if self.any.contains(B::SPLITS_NARROW) {
+                self.add_narrow(wi, &mut values, self.any.union(B::SPLITS_NARROW));
+            } else {
+                self.add_narrow(wi, &mut values, self.any.without(B::SPLITS_NARROW));
+            }
+        }
+        if !self.shows_all {
+            for i in 0..PACKET_SIZE {
+                let shown = LobeFactors::get(&self.shown, i);
+                let wide = lane(&values.wide, i) * shown.wide + Vec3::splat(shown.unit);
+                let narrow = lane(&values.narrow, i) * shown.narrow;
+                set_lane(&mut values.wide, i, wide);
+                set_lane(&mut values.narrow, i, narrow);
+            }
+        }
+        values
+    }
+
+    /// Adds the narrow lobes to `values`.
+    #[inline(always)]
+    fn add_narrow(&self, wi: &Vec3x16, values: &mut BsdfValues, any: BxdfFlags) {
+        for i in 0..PACKET_SIZE {
+            let bsdf = B::get(&self.bsdf, i);
+            let value = bsdf.narrow(&B::View::get(&self.view, i), lane(wi, i), any);
+            set_lane(&mut values.narrow, i, value.f);
+            values.max[i] += value.max;
+            values.shape[i] = value.shape;
+        }
+    }
+
+    /// Pdfs in sr⁻¹ of directions sampled from these lobes. Cosine lobes are around `normals`. `values` are
+    /// those of [`BxdfPacket::f`].
+    #[inline(always)]
+    pub fn pdf(&self, lobes: LobeSet, normals: &Vec3x16, wi: &Vec3x16, values: &BsdfValues) -> F32x16 {
+        if self.has_narrow_lobes() {
+            self.pdf_lanes::<true>(lobes, normals, wi, values)
+        } else {
+            self.pdf_lanes::<false>(lobes, normals, wi, values)
+        }
+    }
+
+    #[inline(always)]
+    fn pdf_lanes<const NARROW: bool>(
+        &self,
+        lobes: LobeSet,
+        normals: &Vec3x16,
+        wi: &Vec3x16,
+        values: &BsdfValues,
+    ) -> F32x16 {
+        let any = with_narrow::<NARROW>(self.any);
+        let mut pdfs = [0.0; PACKET_SIZE];
+        for i in 0..PACKET_SIZE {
+            let bsdf = B::get(&self.bsdf, i);
+            let view = B::View::get(&self.view, i);
+            pdfs[i] = bsdf.pdf(&view, lobes, lane(normals, i), lane(wi, i), values.shape[i], any);
+        }
+        pdfs
+    }
+
+    /// Samples a unit direction for each surface. Cosine lobes are around `normals`. `choices` selects the
+    /// lobes, and `u` the directions within them. All random numbers are in [0, 1).
+    #[inline(always)]
+    pub fn sample(&self, lobes: LobeSet, normals: &Vec3x16, choices: &F32x16, u: &[F32x16; 2]) -> Vec3x16 {
+        if self.has_narrow_lobes() {
+            self.sample_lanes::<true>(lobes, normals, choices, u)
+        } else {
+            self.sample_lanes::<false>(lobes, normals, choices, u)
+        }
+    }
+
+    #[inline(always)]
+    fn sample_lanes<const NARROW: bool>(
+        &self,
+        lobes: LobeSet,
+        normals: &Vec3x16,
+        choices: &F32x16,
+        u: &[F32x16; 2],
+    ) -> Vec3x16 {
+        let any = with_narrow::<NARROW>(self.any);
+        let mut wi = [[0.0; PACKET_SIZE]; 3];
+        for i in 0..PACKET_SIZE {
+            let bsdf = B::get(&self.bsdf, i);
+            let view = B::View::get(&self.view, i);
+            let u = [u[0][i], u[1][i]];
+            set_lane(&mut wi, i, bsdf.sample(&view, lobes, lane(normals, i), choices[i], u, any));
+        }
+        wi
+    }
+
+    /// Flags of one surface.
+    #[inline(always)]
+    fn flags(&self, i: usize) -> BxdfFlags {
+        B::get(&self.bsdf, i).flags().union(B::ALWAYS)
+    }
+
+    /// Mask of surfaces that have a narrow lobe, even if it is not shown.
+    #[inline(always)]
+    pub fn narrow_lobes(&self) -> u32 {
+        let mut narrow = 0;
+        for i in 0..PACKET_SIZE {
+            narrow |= u32::from(self.flags(i).contains(BxdfFlags::NARROW)) << i;
+        }
+        narrow
+    }
+
+    /// The narrow lobe of a surface, if it has one.
+    #[inline(always)]
+    pub fn narrow_lobe(&self, i: usize) -> Option<NarrowLobe> {
+        if !self.flags(i).contains(BxdfFlags::NARROW) {
+            return None;
+        }
+        B::get(&self.bsdf, i).narrow_lobe(&B::View::get(&self.view, i))
+    }
+
+    /// Mask of the surfaces in `of` whose narrow lobe is at least as narrow as a cosine to the given power.
+    #[inline(always)]
+    pub fn narrower_than(&self, of: u32, exponent: f32) -> u32 {
+        let mut narrow = 0;
+        for i in 0..PACKET_SIZE {
+            narrow |= u32::from(B::get(&self.bsdf, i).exponent() >= exponent) << i;
+        }
+        narrow & self.narrow_lobes() & of
+    }
+
+    /// f of a surface's shown lobes in sr⁻¹, if f of all its lobes is constant over all directions.
+    #[inline(always)]
+    pub fn constant_f(&self, i: usize) -> Option<Vec3> {
+        let is_constant = B::HAS_CONSTANT_WIDE && !self.flags(i).contains(BxdfFlags::NARROW);
+        is_constant.then(|| self.f_at(i, Vec3::Z)[0])
+    }
+
+    /// f of a surface in sr⁻¹ for light from a direction: of its shown lobes, and of all lobes.
+    #[inline]
+    pub fn f_at(&self, i: usize, wi: Vec3) -> [Vec3; 2] {
+        let (bsdf, view) = (B::get(&self.bsdf, i), B::View::get(&self.view, i));
+        let (shown, flags) = (LobeFactors::get(&self.shown, i), self.flags(i));
+        let (mut f, mut all) = (Vec3::splat(shown.unit), Vec3::ZERO);
+        if flags.contains(BxdfFlags::WIDE) {
+            let wide = bsdf.wide(&view, wi, self.any).f;
+            f += wide * shown.wide;
+            all += wide;
+        }
+        if flags.contains(BxdfFlags::NARROW) {
+            let narrow = bsdf.narrow(&view, wi, self.any).f;
+            f += narrow * shown.narrow;
+            all += narrow;
+        }
+        [f, all]
+    }
+}
+
+impl<const THROUGH: bool> BxdfPacket<DielectricBxdf<THROUGH>> {
+    /// Samples a direction on either side of each surface.
+    #[inline(always)]
+    pub fn sample_sides(&self, choices: &F32x16, u: &[F32x16; 2]) -> SideSamples {
+        let (mut wi, mut beyond) = ([[0.0; PACKET_SIZE]; 3], [0; PACKET_SIZE]);
+        let (mut pdfs, mut weights) = ([0.0; PACKET_SIZE], [0.0; PACKET_SIZE]);
+        for i in 0..PACKET_SIZE {
+            let bsdf = DielectricBxdf::<THROUGH>::get(&self.bsdf, i);
+            let view = Soa::get(&self.view, i);
+            let sample = bsdf.sample_side(&view, choices[i], [u[0][i], u[1][i]]);
+            set_lane(&mut wi, i, sample.wi);
+            (pdfs[i], weights[i]) = (sample.pdf, sample.weight);
+            beyond[i] = if sample.is_beyond { TRUE } else { 0 };
+        }
+        SideSamples { directions: wi, densities: pdfs, shares: weights, shown: self.shown.narrow, beyond }
+    }
+}
+
+/// Calls of the large functions. Depending on [`Bxdf::IS_INLINED`], they are inlined or call one copy per
+/// instruction set.
+impl<B: Bxdf> BxdfPacket<B> {
+    /// [`BxdfPacket::f`].
+    #[inline(always)]
+    pub(super) fn call_f(&self, wi: &Vec3x16, simd: impl Simd) -> BsdfValues {
+        if B::IS_INLINED { self.f(wi) } else { simd.call(EvaluationKernel { packet: self, wi }) }
+    }
+
+    /// [`BxdfPacket::pdf`].
+    #[inline(always)]
+    pub(super) fn call_pdf(
+        &self,
+        lobes: LobeSet,
+        normals: &Vec3x16,
+        wi: &Vec3x16,
+        values: &BsdfValues,
+        simd: impl Simd,
+    ) -> F32x16 {
+        if B::IS_INLINED {
+            self.pdf(lobes, normals, wi, values)
+        } else {
+            simd.call(PdfKernel { packet: self, lobes, normals, wi, values })
+        }
+    }
+
+    /// [`BxdfPacket::sample`].
+    #[inline(always)]
+    pub(super) fn call_sample(
+        &self,
+        lobes: LobeSet,
+        normals: &Vec3x16,
+        choices: &F32x16,
+        u: &[F32x16; 2],
+        simd: impl Simd,
+    ) -> Vec3x16 {
+        if B::IS_INLINED {
+            self.sample(lobes, normals, choices, u)
+        } else {
+            simd.call(SamplingKernel { packet: self, lobes, normals, choices, u })
+        }
+    }
+}
+
+impl<const THROUGH: bool> BxdfPacket<DielectricBxdf<THROUGH>> {
+    /// [`BxdfPacket::sample_sides`].
+    #[inline(always)]
+    pub(super) fn call_sample_sides(
+        &self,
+        choices: &F32x16,
+        u: &[F32x16; 2],
+        simd: impl Simd,
+    ) -> SideSamples {
+        simd.call(SideSamplingKernel { packet: self, choices, u })
+    }
+}
+
+/// Kernel of [`BxdfPacket::f`].
+struct EvaluationKernel<'a, B: Bxdf> {
+    packet: &'a BxdfPacket<B>,
+    wi: &'a Vec3x16,
+}
+
+impl<B: Bxdf> SimdKernel for EvaluationKernel<'_, B> {
+    type Output = BsdfValues;
+
+    #[inline(always)]
+    fn run(self, _: impl Simd) -> BsdfValues {
+        self.packet.f(self.wi)
+    }
+}
+
+/// Kernel of [`BxdfPacket::pdf`].
+struct PdfKernel<'a, B: Bxdf> {
+    packet: &'a BxdfPacket<B>,
+    lobes: LobeSet,
+    normals: &'a Vec3x16,
+    wi: &'a Vec3x16,
+    values: &'a BsdfValues,
+}
+
+impl<B: Bxdf> SimdKernel for PdfKernel<'_, B> {
+    type Output = F32x16;
+
+    #[inline(always)]
+    fn run(self, _: impl Simd) -> F32x16 {
+        self.packet.pdf(self.lobes, self.normals, self.wi, self.values)
+    }
+}
+
+/// Kernel of [`BxdfPacket::sample`].
+struct SamplingKernel<'a, B: Bxdf> {
+    packet: &'a BxdfPacket<B>,
+    lobes: LobeSet,
+    normals: &'a Vec3x16,
+    choices: &'a F32x16,
+    u: &'a [F32x16; 2],
+}
+
+impl<B: Bxdf> SimdKernel for SamplingKernel<'_, B> {
+    type Output = Vec3x16;
+
+    #[inline(always)]
+    fn run(self, _: impl Simd) -> Vec3x16 {
+        self.packet.sample(self.lobes, self.normals, self.choices, self.u)
+    }
+}
+
+/// Kernel of [`BxdfPacket::sample_sides`].
+struct SideSamplingKernel<'a, const THROUGH: bool> {
+    packet: &'a BxdfPacket<DielectricBxdf<THROUGH>>,
+    choices: &'a F32x16,
+    u: &'a [F32x16; 2],
+}
+
+impl<const THROUGH: bool> SimdKernel for SideSamplingKernel<'_, THROUGH> {
+    type Output = SideSamples;
+
+    #[inline(always)]
+    fn run(self, _: impl Simd) -> SideSamples {
+        self.packet.sample_sides(self.choices, self.u)
+    }
+}

@@ -1,0 +1,198 @@
+//! The lobes of rough glass.
+
+use super::GlassPoint;
+use crate::materials::bsdf::{LobeSet, NarrowLobe};
+use crate::materials::bxdf::{Bxdf, BxdfFlags, LobeValue, SurfaceDirections, choose};
+use crate::materials::fresnel::{dielectric_either, transmittance};
+use crate::materials::microfacet::{HalfVector, SmithTerms, reflect_at, refract_at, sample_visible_normal};
+use crate::math::Vec3;
+use crate::math::frame::Frame;
+use glimt_base::soa;
+
+soa! {
+    /// Reflection by rough glass or transmission through it.
+    pub struct DielectricBxdf<const THROUGH: bool> in DielectricPacket {
+        /// [`GlassPoint::near`].
+        near: f32 = 1.0,
+        /// [`GlassPoint::far`].
+        far: f32 = 1.5,
+        /// [`GlassPoint::alpha`].
+        alpha: f32 = 1.0,
+    }
+}
+
+soa! {
+    /// View-dependent values of rough glass.
+    pub struct DielectricView in DielectricViewPacket {
+        /// Unit normal that faces the viewer.
+        normal: Vec3 = Vec3::Z,
+        /// Unit direction to the viewer.
+        wo: Vec3 = Vec3::Z,
+    }
+}
+
+/// Minimum cosine between a facet's normal and a direction.
+const MIN_COSINE: f32 = 1e-6;
+
+/// A sampled direction on either side of rough glass.
+#[derive(Clone, Copy, Debug)]
+pub struct SideSample {
+    /// Unit direction.
+    pub wi: Vec3,
+    /// Pdf of the direction in sr⁻¹. 0 if no light arrives from there.
+    pub pdf: f32,
+    /// f·cosθ of the lobe divided by the pdf.
+    pub weight: f32,
+    /// Whether the direction is on the opposite side from the light of the BSDF.
+    pub is_beyond: bool,
+}
+
+impl<const THROUGH: bool> DielectricBxdf<THROUGH> {
+    /// Smith terms of the directions to the viewer and to the light, each with the normal on its side.
+    #[inline(always)]
+    fn smith_terms(&self, view: &DielectricView, wi: Vec3) -> [SmithTerms; 2] {
+        let lit = if THROUGH { -view.normal } else { view.normal };
+        [SmithTerms::isotropic(view.normal, view.wo, self.alpha), SmithTerms::isotropic(lit, wi, self.alpha)]
+    }
+
+    /// Samples the normal of a visible facet.
+    #[inline(always)]
+    fn sample_facet(&self, view: &DielectricView, u: [f32; 2]) -> Vec3 {
+        sample_visible_normal(&Frame::from_normal(view.normal), view.wo, [self.alpha; 2], u)
+    }
+
+    /// f of the lobe.
+    #[inline(always)]
+    fn f(&self, view: &DielectricView, wi: Vec3) -> f32 {
+        let [eye, light] = self.smith_terms(view, wi);
+        if !THROUGH {
+            let half = HalfVector::between(view.normal, view.wo, wi);
+            let reflectance = dielectric_either(half.cosine(), self.far / self.near);
+            return reflectance * eye.reflected(&light, half.isotropic(self.alpha));
+        }
+        let indices = [self.near, self.far];
+        let (half, sum) = HalfVector::refracted(view.normal, [view.wo, wi], indices);
+        // The facet must face the viewer if the surface does, and light must come from behind both.
+        let scale = if half.along > 0.0 { 1.0 } else { -1.0 } / half.squared.sqrt();
+        let cosines = [scale * view.wo.dot(sum), -scale * wi.dot(sum)];
+        let is_through = (cosines[0] > MIN_COSINE) & (cosines[1] > MIN_COSINE);
+        let by_facet = cosines[0] * cosines[1] * transmittance(cosines, indices) / half.squared;
+        let value = 4.0 * (by_facet * eye.reflected(&light, half.isotropic(self.alpha)));
+        let value = value * (self.far * self.far);
+        // Nearly equal indices do not have a usable half vector.
+        if is_through & (value < f32::MAX) { value } else { 0.0 }
+    }
+
+    /// Samples a facet, and randomly chooses reflection or refraction. All formulas use the facet's normal,
+    /// which is the half vector in both cases.
+    #[inline(always)]
+    pub fn sample_side(&self, view: &DielectricView, choice: f32, u: [f32; 2]) -> SideSample {
+        let &DielectricView { normal, wo } = view;
+        let half = self.sample_facet(view, u);
+        let indices = [self.near, self.far];
+        let eta = indices[1] / indices[0];
+        let cosine = half.dot(wo);
+        let reflectance = dielectric_either(cosine, eta);
+        let is_reflected = choice < reflectance;
+        let refracted = refract_at(half, wo, eta);
+        let wi = choose(is_reflected, reflect_at(half, wo), refracted);
+        // Compute the facet's scattering per solid angle.
+        let behind = -half.dot(refracted);
+        let sum = indices[0] * cosine - indices[1] * behind;
+        let through = 4.0 * (cosine * behind * transmittance([cosine, behind], indices) / (sum * sum));
+        let by_facet = if is_reflected { reflectance } else { through * (indices[1] * indices[1]) };
+        let is_through = (cosine > MIN_COSINE) & (behind > MIN_COSINE);
+        // Light on the wrong side of the surface does not contribute.
+        let eye = SmithTerms::isotropic(normal, wo, self.alpha);
+        let side = if is_reflected { 1.0 } else { -1.0 };
+        let light = SmithTerms::isotropic(normal * side, wi, self.alpha);
+        let along = normal.dot(half);
+        let half = HalfVector { squared: 1.0, along, across: half - normal * along };
+        let pdf = by_facet * eye.pdf(half.isotropic(self.alpha));
+        let is_seen = light.is_above_surface()
+            & eye.is_above_surface()
+            & (is_reflected | is_through)
+            & (pdf < f32::MAX);
+        let weight =
+            light.cosine * (eye.cosine + eye.slope) / (eye.cosine * light.slope + light.cosine * eye.slope);
+        SideSample {
+            wi,
+            pdf: if is_seen { pdf } else { 0.0 },
+            weight: if is_seen { weight } else { 0.0 },
+            is_beyond: is_reflected == THROUGH,
+        }
+    }
+}
+
+impl<const THROUGH: bool> Bxdf for DielectricBxdf<THROUGH> {
+    type Point = GlassPoint;
+    type View = DielectricView;
+
+    const IS_TRANSMISSION: bool = THROUGH;
+    const ALWAYS: BxdfFlags = BxdfFlags::NARROW;
+
+    #[inline(always)]
+    fn new(point: &GlassPoint, _: Vec3) -> Self {
+        let &GlassPoint { near, far, alpha } = point;
+        Self { near, far, alpha }
+    }
+
+    #[inline(always)]
+    fn flags(&self) -> BxdfFlags {
+        BxdfFlags::default()
+    }
+
+    #[inline(always)]
+    fn view(&self, directions: &SurfaceDirections, _: BxdfFlags) -> DielectricView {
+        let &SurfaceDirections { normal, wo, .. } = directions;
+        DielectricView { normal: if THROUGH { -normal } else { normal }, wo }
+    }
+
+    #[inline(always)]
+    fn narrow(&self, view: &DielectricView, wi: Vec3, _: BxdfFlags) -> LobeValue {
+        let f = self.f(view, wi);
+        LobeValue { f: Vec3::splat(f), max: f, shape: f }
+    }
+
+    #[inline(always)]
+    fn pdf(&self, view: &DielectricView, _: LobeSet, _: Vec3, wi: Vec3, shape: f32, _: BxdfFlags) -> f32 {
+        let [eye, light] = self.smith_terms(view, wi);
+        eye.pdf_from_reflected(&light, shape)
+    }
+
+    #[inline(always)]
+    fn sample(
+        &self,
+        view: &DielectricView,
+        _: LobeSet,
+        _: Vec3,
+        choice: f32,
+        u: [f32; 2],
+        _: BxdfFlags,
+    ) -> Vec3 {
+        let half = self.sample_facet(view, u);
+        let eta = self.far / self.near;
+        let is_reflected = choice < dielectric_either(half.dot(view.wo), eta);
+        let wi = if THROUGH { refract_at(half, view.wo, eta) } else { reflect_at(half, view.wo) };
+        // If the other side is chosen, the path continues at that side's vertex, and this direction is not
+        // used.
+        let unused = if THROUGH { view.normal } else { -view.normal };
+        choose(is_reflected == THROUGH, unused, wi)
+    }
+
+    #[inline(always)]
+    fn narrow_lobe(&self, view: &DielectricView) -> Option<NarrowLobe> {
+        let &DielectricView { normal, wo } = view;
+        let eta = self.far / self.near;
+        let reflectance = dielectric_either(normal.dot(wo), eta);
+        if !THROUGH {
+            return Some(NarrowLobe::of_microfacets(normal, wo, self.alpha, reflectance, 0.0));
+        }
+        // Rotating a facet at normal incidence rotates the refracted direction by 1 − 1/η times the facet's
+        // angle, whereas a reflected direction rotates by twice this angle.
+        let alpha = 0.5 * (1.0 - 1.0 / eta).abs() * self.alpha;
+        let axis = refract_at(normal, wo, eta);
+        let lobe = NarrowLobe { axis, ..NarrowLobe::of_microfacets(normal, wo, alpha, 1.0, 0.0) };
+        (reflectance < 1.0).then_some(lobe)
+    }
+}

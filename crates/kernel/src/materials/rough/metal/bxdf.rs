@@ -1,0 +1,134 @@
+//! The lobe of a conductor.
+
+use super::{ConductorPoint, FresnelPoint, reflectance};
+use crate::materials::bsdf::{LobeSet, NarrowLobe};
+use crate::materials::bxdf::{Bxdf, BxdfFlags, LobeValue, SurfaceDirections};
+use crate::materials::fresnel::schlick_weight;
+use crate::materials::microfacet::{HalfVector, SmithTerms, frame_along, sample_reflection};
+use crate::math::Vec3;
+use crate::math::frame::Frame;
+use glimt_base::soa;
+
+soa! {
+    /// A conductor, either isotropic or brushed along u.
+    pub struct ConductorBxdf<const BRUSHED: bool> in ConductorPacket {
+        /// α along u and along v.
+        alphas: [f32; 2] = [1.0; 2],
+        /// [`FresnelPoint::first`].
+        first: Vec3 = Vec3::ZERO,
+        /// [`FresnelPoint::second`].
+        second: Vec3 = Vec3::NEG_ONE,
+    }
+}
+
+soa! {
+    /// View-dependent values of a conductor.
+    pub struct ConductorView in ConductorViewPacket {
+        /// Unit normal that faces the viewer.
+        normal: Vec3 = Vec3::Z,
+        /// Unit direction to the viewer.
+        wo: Vec3 = Vec3::Z,
+        /// Direction along u. Arbitrary for isotropic surfaces.
+        tangent: Vec3 = Vec3::X,
+    }
+}
+
+/// Has an index of refraction instead of a color.
+const INDEX: BxdfFlags = BxdfFlags(1 << BxdfFlags::FIRST_OWN);
+
+impl<const BRUSHED: bool> ConductorBxdf<BRUSHED> {
+    #[inline(always)]
+    fn frame(view: &ConductorView) -> Frame {
+        if BRUSHED { frame_along(view.normal, view.tangent) } else { Frame::from_normal(view.normal) }
+    }
+
+    /// Smith terms of the directions to the viewer and to the light.
+    #[inline(always)]
+    fn smith_terms(&self, view: &ConductorView, wi: Vec3) -> [SmithTerms; 2] {
+        if BRUSHED {
+            let frame = Self::frame(view);
+            [
+                SmithTerms::anisotropic(&frame, view.wo, self.alphas),
+                SmithTerms::anisotropic(&frame, wi, self.alphas),
+            ]
+        } else {
+            let alpha = self.alphas[0];
+            [
+                SmithTerms::isotropic(view.normal, view.wo, alpha),
+                SmithTerms::isotropic(view.normal, wi, alpha),
+            ]
+        }
+    }
+}
+
+impl<const BRUSHED: bool> Bxdf for ConductorBxdf<BRUSHED> {
+    type Point = ConductorPoint;
+    type View = ConductorView;
+
+    const ALWAYS: BxdfFlags = BxdfFlags::NARROW;
+    const SPLITS_NARROW: BxdfFlags = INDEX;
+
+    #[inline(always)]
+    fn new(point: &ConductorPoint, tangent: Vec3) -> Self {
+        // Without texture coordinates, the surface is isotropic. Its α is the geometric mean of the two α
+        // values.
+        let [u, v] = point.alphas;
+        let mean = (u * v).sqrt();
+        let alphas = if tangent == Vec3::ZERO { [mean; 2] } else { [u, v] };
+        let FresnelPoint { first, second } = point.fresnel;
+        Self { alphas, first, second }
+    }
+
+    #[inline(always)]
+    fn flags(&self) -> BxdfFlags {
+        INDEX.when(self.second.x >= 0.0)
+    }
+
+    #[inline(always)]
+    fn view(&self, directions: &SurfaceDirections, _: BxdfFlags) -> ConductorView {
+        let &SurfaceDirections { normal, wo, tangent } = directions;
+        ConductorView { normal, wo, tangent }
+    }
+
+    #[inline(always)]
+    fn narrow(&self, view: &ConductorView, wi: Vec3, any: BxdfFlags) -> LobeValue {
+        let half = HalfVector::between(view.normal, view.wo, wi);
+        let distribution = if BRUSHED {
+            half.anisotropic(&Self::frame(view), self.alphas)
+        } else {
+            half.isotropic(self.alphas[0])
+        };
+        let [eye, light] = self.smith_terms(view, wi);
+        let white = eye.reflected(&light, distribution);
+        let cosine = half.cosine();
+        let weight = schlick_weight(cosine);
+        let f = if any.contains(INDEX) {
+            let (first, second) = (self.first, self.second);
+            Vec3::new(
+                white * reflectance(first.x, second.x, cosine, weight),
+                white * reflectance(first.y, second.y, cosine, weight),
+                white * reflectance(first.z, second.z, cosine, weight),
+            )
+        } else {
+            (self.first + (Vec3::ONE - self.first) * weight) * white
+        };
+        LobeValue { f, max: f.max_element(), shape: white }
+    }
+
+    #[inline(always)]
+    fn pdf(&self, view: &ConductorView, _: LobeSet, _: Vec3, wi: Vec3, shape: f32, _: BxdfFlags) -> f32 {
+        let [eye, light] = self.smith_terms(view, wi);
+        eye.pdf_from_reflected(&light, shape)
+    }
+
+    #[inline(always)]
+    fn sample(&self, view: &ConductorView, _: LobeSet, _: Vec3, _: f32, u: [f32; 2], _: BxdfFlags) -> Vec3 {
+        sample_reflection(&Self::frame(view), view.wo, self.alphas, u)
+    }
+
+    #[inline(always)]
+    fn narrow_lobe(&self, view: &ConductorView) -> Option<NarrowLobe> {
+        let alpha = self.alphas[0].max(self.alphas[1]);
+        Some(NarrowLobe::of_microfacets(view.normal, view.wo, alpha, 1.0, 0.0))
+    }
+}

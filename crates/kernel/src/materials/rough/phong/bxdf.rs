@@ -1,0 +1,131 @@
+//! The lobes of a Phong surface.
+
+use std::f32::consts::FRAC_1_PI;
+
+use super::PhongBsdf;
+use super::lobes::{Lobes, gloss};
+use crate::materials::bsdf::{LobeSet, NarrowLobe};
+use crate::materials::bxdf::{Bxdf, BxdfFlags, LobeValue, SurfaceDirections};
+use crate::math::Vec3;
+use glimt_base::soa;
+
+soa! {
+    /// The lobes of a Phong surface.
+    pub struct PhongBxdf in PhongPacket {
+        /// f of the diffuse lobe in sr⁻¹.
+        diffuse: Vec3 = Vec3::ZERO,
+        /// f at the peak of the glossy lobe in sr⁻¹.
+        specular: Vec3 = Vec3::ZERO,
+        /// Exponent of the glossy lobe.
+        shininess: f32 = 0.0,
+        /// The largest components of kd and ks.
+        albedos: [f32; 2] = [0.0; 2],
+    }
+}
+
+soa! {
+    /// View-dependent values of a Phong surface.
+    pub struct PhongView in PhongViewPacket {
+        /// The view direction reflected at the normal. Its cosine with a light direction equals the cosine
+        /// between the reflected light direction and the view direction: (2(n·l)n − l)·v = (2(n·v)n − v)·l.
+        reflected: Vec3 = Vec3::ZERO,
+    }
+}
+
+impl PhongBxdf {
+    #[inline(always)]
+    fn lobes(&self, view: &PhongView, lobes: LobeSet, normal: Vec3) -> Lobes {
+        let [diffuse, specular] = match lobes {
+            LobeSet::All => self.albedos,
+            LobeSet::Narrow => [0.0, 1.0],
+        };
+        Lobes { normal, mirrored_eye: view.reflected, diffuse, specular, shininess: self.shininess }
+    }
+}
+
+impl Bxdf for PhongBxdf {
+    type Point = PhongBsdf;
+    type View = PhongView;
+
+    const TURNS_NORMALS: bool = false;
+    const SENDS_RAYS: bool = false;
+    const HAS_CONSTANT_WIDE: bool = true;
+    const IS_INLINED: bool = true;
+    const ALWAYS: BxdfFlags = BxdfFlags::WIDE;
+
+    #[inline(always)]
+    fn new(point: &PhongBsdf, _: Vec3) -> Self {
+        Self {
+            diffuse: point.diffuse_value(),
+            specular: point.specular_peak(),
+            shininess: point.shininess,
+            albedos: [point.diffuse.max_element(), point.specular.max_element()],
+        }
+    }
+
+    #[inline(always)]
+    fn set_color(&mut self, _: &PhongBsdf, color: Vec3) {
+        self.diffuse = color * FRAC_1_PI;
+        self.albedos[0] = color.max_element();
+    }
+
+    #[inline(always)]
+    fn flags(&self) -> BxdfFlags {
+        BxdfFlags::NARROW.when(self.albedos[1] > 0.0)
+    }
+
+    #[inline(always)]
+    fn is_black(&self) -> bool {
+        (self.albedos[0] == 0.0) & (self.albedos[1] == 0.0)
+    }
+
+    #[inline(always)]
+    fn view(&self, directions: &SurfaceDirections, _: BxdfFlags) -> PhongView {
+        let &SurfaceDirections { normal, wo, .. } = directions;
+        PhongView { reflected: normal * (2.0 * normal.dot(wo)) - wo }
+    }
+
+    #[inline(always)]
+    fn wide(&self, _: &PhongView, _: Vec3, _: BxdfFlags) -> LobeValue {
+        LobeValue { f: self.diffuse, max: self.albedos[0] * FRAC_1_PI, shape: 0.0 }
+    }
+
+    #[inline(always)]
+    fn narrow(&self, view: &PhongView, wi: Vec3, _: BxdfFlags) -> LobeValue {
+        let gloss = gloss(view.reflected, wi, self.shininess);
+        let peak = self.albedos[1] * ((self.shininess + 2.0) * (0.5 * FRAC_1_PI));
+        LobeValue { f: self.specular * gloss, max: peak * gloss, shape: gloss }
+    }
+
+    #[inline(always)]
+    fn pdf(&self, view: &PhongView, lobes: LobeSet, normal: Vec3, wi: Vec3, shape: f32, _: BxdfFlags) -> f32 {
+        self.lobes(view, lobes, normal).density(wi, shape)
+    }
+
+    #[inline(always)]
+    fn sample(
+        &self,
+        view: &PhongView,
+        lobes: LobeSet,
+        normal: Vec3,
+        choice: f32,
+        u: [f32; 2],
+        any: BxdfFlags,
+    ) -> Vec3 {
+        let lobes = self.lobes(view, lobes, normal);
+        if any.contains(BxdfFlags::NARROW) { lobes.sample(choice, u) } else { lobes.sample_diffuse(u) }
+    }
+
+    #[inline(always)]
+    fn narrow_lobe(&self, view: &PhongView) -> Option<NarrowLobe> {
+        // The normal is not used here.
+        let lobes = self.lobes(view, LobeSet::All, Vec3::Z);
+        let (axis, exponent) = (view.reflected, self.shininess);
+        Some(NarrowLobe { axis, exponent, peak: lobes.value(1.0) - lobes.value(0.0), wide: lobes.value(0.0) })
+    }
+
+    #[inline(always)]
+    fn exponent(&self) -> f32 {
+        self.shininess
+    }
+}

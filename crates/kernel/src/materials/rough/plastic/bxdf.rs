@@ -1,0 +1,189 @@
+//! The lobes of plastic.
+
+use std::f32::consts::{FRAC_1_PI, PI};
+
+use super::{PlasticPoint, base};
+use crate::materials::bsdf::{LobeSet, NarrowLobe};
+use crate::materials::bxdf::{Bxdf, BxdfFlags, LobeValue, SurfaceDirections, choose};
+use crate::materials::fresnel::dielectric_outside;
+use crate::materials::lobe_albedo::{TERMS, evaluate};
+use crate::materials::microfacet::{HalfVector, SmithTerms, sample_reflection};
+use crate::materials::phong::lobes::direction_about_axis;
+use crate::math::Vec3;
+use crate::math::frame::Frame;
+use glimt_base::soa;
+
+soa! {
+    /// A diffuse base under a microfacet coat.
+    pub struct PlasticBxdf in PlasticPacket {
+        /// [`PlasticPoint::base`].
+        base: Vec3 = Vec3::ZERO,
+        /// [`PlasticPoint::specular`].
+        specular: Vec3 = Vec3::ZERO,
+        /// [`PlasticPoint::ior`].
+        ior: f32 = 1.5,
+        /// [`PlasticPoint::alpha`].
+        alpha: f32 = 1.0,
+        /// Terms of the coat's albedo.
+        terms: [f32; TERMS] = [0.0; TERMS],
+        /// Mean albedo of the coat.
+        mean: f32 = 0.0,
+    }
+}
+
+soa! {
+    /// View-dependent values of plastic.
+    pub struct PlasticView in PlasticViewPacket {
+        /// Unit normal that faces the viewer.
+        normal: Vec3 = Vec3::Z,
+        /// Unit direction to the viewer.
+        wo: Vec3 = Vec3::Z,
+        /// Fraction of light that the coat transmits toward the viewer.
+        transmittance: f32 = 1.0,
+        /// Probability of choosing the coat's lobe.
+        coat_share: f32 = 0.0,
+    }
+}
+
+/// Has a smooth coat.
+const SMOOTH: BxdfFlags = BxdfFlags(1 << BxdfFlags::FIRST_OWN);
+
+impl PlasticBxdf {
+    /// Albedo of the coat at a cosine ≥ 0.
+    #[inline(always)]
+    fn albedo(&self, cosine: f32, any: BxdfFlags) -> f32 {
+        let rough = evaluate(cosine, |number| self.terms[number]);
+        if any.contains(SMOOTH) {
+            let smooth = dielectric_outside(cosine, self.ior);
+            if self.alpha == 0.0 { smooth } else { rough }
+        } else {
+            rough
+        }
+    }
+
+    /// The coat's transmittance in both directions. 0 for light from behind.
+    #[inline(always)]
+    fn transmittance(&self, view: &PlasticView, wi: Vec3, any: BxdfFlags) -> f32 {
+        let cosine = view.normal.dot(wi);
+        let is_ahead = cosine > 0.0;
+        let entering = 1.0 - self.albedo(if is_ahead { cosine } else { 0.0 }, any);
+        if is_ahead { view.transmittance * entering } else { 0.0 }
+    }
+
+    /// Smith terms of the directions to the viewer and to the light.
+    #[inline(always)]
+    fn smith_terms(&self, view: &PlasticView, wi: Vec3) -> [SmithTerms; 2] {
+        let of = |direction| SmithTerms::isotropic(view.normal, direction, self.alpha);
+        [of(view.wo), of(wi)]
+    }
+
+    /// D of the coat for a direction, and the reflectance of the coat's facets.
+    #[inline(always)]
+    fn distribution_and_fresnel(&self, view: &PlasticView, wi: Vec3) -> [f32; 2] {
+        let half = HalfVector::between(view.normal, view.wo, wi);
+        let distribution = half.isotropic(if self.alpha > 0.0 { self.alpha } else { 1.0 });
+        let fresnel = dielectric_outside(half.cosine(), self.ior);
+        [if self.alpha > 0.0 { distribution } else { 0.0 }, fresnel]
+    }
+}
+
+impl Bxdf for PlasticBxdf {
+    type Point = PlasticPoint;
+    type View = PlasticView;
+
+    const ALWAYS: BxdfFlags = BxdfFlags::WIDE;
+
+    #[inline(always)]
+    fn new(point: &PlasticPoint, _: Vec3) -> Self {
+        let &PlasticPoint { base, specular, ior, alpha, albedo, .. } = point;
+        Self { base, specular, ior, alpha, terms: albedo.terms, mean: albedo.mean }
+    }
+
+    #[inline(always)]
+    fn set_color(&mut self, point: &PlasticPoint, color: Vec3) {
+        self.base = base(color.min(Vec3::ONE), point.ior, &point.albedo);
+    }
+
+    #[inline(always)]
+    fn flags(&self) -> BxdfFlags {
+        BxdfFlags::NARROW.when(self.alpha > 0.0).union(SMOOTH.when(self.alpha == 0.0))
+    }
+
+    #[inline(always)]
+    fn is_black(&self) -> bool {
+        (self.base == Vec3::ZERO) & (self.specular == Vec3::ZERO)
+    }
+
+    #[inline(always)]
+    fn view(&self, directions: &SurfaceDirections, any: BxdfFlags) -> PlasticView {
+        let &SurfaceDirections { normal, wo, .. } = directions;
+        let cosine = normal.dot(wo);
+        let albedo = self.albedo(if cosine > 0.0 { cosine } else { 0.0 }, any);
+        let diffuse = (1.0 - albedo) * (1.0 - self.mean) * PI * self.base.max_element();
+        let coat = albedo * self.specular.max_element();
+        let coat_share = coat / (coat + diffuse).max(f32::MIN_POSITIVE);
+        PlasticView { normal, wo, transmittance: 1.0 - albedo, coat_share }
+    }
+
+    #[inline(always)]
+    fn wide(&self, view: &PlasticView, wi: Vec3, any: BxdfFlags) -> LobeValue {
+        let transmittance = self.transmittance(view, wi, any);
+        let max = self.base.max_element() * transmittance;
+        LobeValue { f: self.base * transmittance, max, shape: 0.0 }
+    }
+
+    #[inline(always)]
+    fn narrow(&self, view: &PlasticView, wi: Vec3, _: BxdfFlags) -> LobeValue {
+        let [distribution, fresnel] = self.distribution_and_fresnel(view, wi);
+        let [eye, light] = self.smith_terms(view, wi);
+        let coat = fresnel * eye.reflected(&light, distribution);
+        LobeValue { f: self.specular * coat, max: self.specular.max_element() * coat, shape: 0.0 }
+    }
+
+    #[inline(always)]
+    fn pdf(&self, view: &PlasticView, lobes: LobeSet, normal: Vec3, wi: Vec3, _: f32, any: BxdfFlags) -> f32 {
+        let mut coat = 0.0;
+        if any.contains(BxdfFlags::NARROW) {
+            let [distribution, _] = self.distribution_and_fresnel(view, wi);
+            let [eye, light] = self.smith_terms(view, wi);
+            let pdf = eye.pdf(distribution);
+            coat = if light.is_above_surface() { pdf } else { 0.0 };
+        }
+        let cosine = normal.dot(wi);
+        let diffuse = if cosine > 0.0 { cosine * FRAC_1_PI } else { 0.0 };
+        match lobes {
+            LobeSet::All => view.coat_share * coat + (1.0 - view.coat_share) * diffuse,
+            LobeSet::Narrow => coat,
+        }
+    }
+
+    #[inline(always)]
+    fn sample(
+        &self,
+        view: &PlasticView,
+        lobes: LobeSet,
+        normal: Vec3,
+        choice: f32,
+        u: [f32; 2],
+        any: BxdfFlags,
+    ) -> Vec3 {
+        let diffuse = direction_about_axis(normal, u[0].sqrt(), (1.0 - u[0]).sqrt(), u[1]);
+        if !any.contains(BxdfFlags::NARROW) {
+            return diffuse;
+        }
+        let coat = sample_reflection(&Frame::from_normal(view.normal), view.wo, [self.alpha; 2], u);
+        let is_coat = match lobes {
+            LobeSet::All => choice < view.coat_share,
+            LobeSet::Narrow => self.alpha > 0.0,
+        };
+        choose(is_coat, coat, diffuse)
+    }
+
+    #[inline(always)]
+    fn narrow_lobe(&self, view: &PlasticView) -> Option<NarrowLobe> {
+        let cosine = view.normal.dot(view.wo);
+        let reflectance = dielectric_outside(cosine, self.ior) * self.specular.max_element();
+        let wide = view.transmittance * self.base.max_element() * (1.0 - self.mean);
+        Some(NarrowLobe::of_microfacets(view.normal, view.wo, self.alpha, reflectance, wide))
+    }
+}

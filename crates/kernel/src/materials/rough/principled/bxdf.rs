@@ -1,0 +1,310 @@
+//! The lobes of a principled material.
+
+use std::f32::consts::FRAC_1_PI;
+
+use super::{COAT_REFLECTANCE, PrincipledPoint};
+use crate::materials::bsdf::{LobeSet, NarrowLobe};
+use crate::materials::bxdf::{Bxdf, BxdfFlags, LobeValue, SurfaceDirections, choose};
+use crate::materials::fresnel::schlick_weight;
+use crate::materials::lobe_albedo::{TERMS, evaluate};
+use crate::materials::microfacet::{HalfVector, SmithTerms, sample_reflection};
+use crate::materials::phong::lobes::direction_about_axis;
+use crate::math::Vec3;
+use crate::math::frame::Frame;
+use glimt_base::soa;
+
+soa! {
+    /// A principled BSDF, for either reflected or transmitted light.
+    pub struct PrincipledBxdf<const THROUGH: bool> in PrincipledPacket {
+        /// [`PrincipledPoint::base`].
+        base: Vec3 = Vec3::ZERO,
+        /// The largest component of the diffuse lobe's albedo, not including the lobes above it.
+        diffuse: f32 = 0.0,
+        /// [`PrincipledPoint::facets`].
+        facets: Vec3 = Vec3::ZERO,
+        /// [`PrincipledPoint::grazing`].
+        grazing: f32 = 1.0,
+        /// Reflectance of the dielectric at normal incidence.
+        dielectric: Vec3 = Vec3::ZERO,
+        /// Reflectance of the dielectric at grazing angles.
+        dielectric_grazing: f32 = 0.0,
+        /// [`PrincipledPoint::transmission`].
+        transmission: Vec3 = Vec3::ZERO,
+        /// [`PrincipledPoint::alpha`].
+        alpha: f32 = 1.0,
+        /// Terms of [`PrincipledPoint::albedo`] at normal incidence.
+        terms: [f32; TERMS] = [0.0; TERMS],
+        /// Terms of [`PrincipledPoint::albedo`] at grazing angles.
+        grazing_terms: [f32; TERMS] = [0.0; TERMS],
+        /// [`PrincipledPoint::coat`].
+        coat: f32 = 0.0,
+        /// [`PrincipledPoint::coat_alpha`].
+        coat_alpha: f32 = 1.0,
+        /// Terms of [`PrincipledPoint::coat_albedo`].
+        coat_terms: [f32; TERMS] = [0.0; TERMS],
+    }
+}
+
+soa! {
+    /// View-dependent values of a principled material.
+    pub struct PrincipledView in PrincipledViewPacket {
+        /// Unit normal that faces the viewer. For transmitted light, it is on the other side.
+        normal: Vec3 = Vec3::Z,
+        /// Unit direction to the viewer. For transmitted light, it is mirrored to the other side.
+        wo: Vec3 = Vec3::Z,
+        /// Fraction of light that passes through the specular lobe between the diffuse lobe and the viewer.
+        transmittance: Vec3 = Vec3::ONE,
+        /// Fraction of light that the coat transmits toward the viewer.
+        coat_transmittance: f32 = 1.0,
+        /// Probability of choosing the specular lobe.
+        specular_share: f32 = 1.0,
+        /// Probability of choosing the coat's lobe.
+        coat_share: f32 = 0.0,
+        /// Probability of choosing transmission.
+        transmission_share: f32 = 0.0,
+    }
+}
+
+/// Has a clear coat.
+const COATED: BxdfFlags = BxdfFlags(1 << BxdfFlags::FIRST_OWN);
+
+/// Transmits light.
+const TRANSMITS: BxdfFlags = BxdfFlags(2 << BxdfFlags::FIRST_OWN);
+
+/// Limits a cosine to at least 0.
+#[inline(always)]
+fn nonnegative(cosine: f32) -> f32 {
+    if cosine > 0.0 { cosine } else { 0.0 }
+}
+
+impl<const THROUGH: bool> PrincipledBxdf<THROUGH> {
+    /// Albedo of the coat at a cosine ≥ 0, including the coat's weight.
+    #[inline(always)]
+    fn coat_albedo(&self, cosine: f32) -> f32 {
+        self.coat * evaluate(cosine, |number| self.coat_terms[number])
+    }
+
+    /// Albedos of the specular lobe at a cosine ≥ 0, per unit of reflectance at normal incidence and at
+    /// grazing angles.
+    #[inline(always)]
+    fn albedos(&self, cosine: f32) -> [f32; 2] {
+        [evaluate(cosine, |number| self.terms[number]), evaluate(cosine, |number| self.grazing_terms[number])]
+    }
+
+    /// Fraction of light that passes through the dielectric's specular lobe at a cosine ≥ 0.
+    #[inline(always)]
+    fn specular_transmittance(&self, cosine: f32) -> Vec3 {
+        let [normal, grazing] = self.albedos(cosine);
+        let rest = Vec3::ONE - self.dielectric * normal - Vec3::splat(self.dielectric_grazing * grazing);
+        // If the facets reflect everything, no light passes. Clamp because of rounding.
+        Vec3::new(nonnegative(rest.x), nonnegative(rest.y), nonnegative(rest.z))
+    }
+
+    /// Smith terms of the directions to the viewer and to the light.
+    #[inline(always)]
+    fn smith_terms(view: &PrincipledView, wi: Vec3, alpha: f32) -> [SmithTerms; 2] {
+        [SmithTerms::isotropic(view.normal, view.wo, alpha), SmithTerms::isotropic(view.normal, wi, alpha)]
+    }
+
+    /// The coat's transmittance in both directions.
+    #[inline(always)]
+    fn coat_transmittance(&self, view: &PrincipledView, cosine: f32, any: BxdfFlags) -> f32 {
+        if any.contains(COATED) {
+            view.coat_transmittance * (1.0 - self.coat_albedo(nonnegative(cosine)))
+        } else {
+            1.0
+        }
+    }
+
+    /// f of the specular lobe and of the coat. 0 for light from behind.
+    #[inline(always)]
+    fn reflected(&self, view: &PrincipledView, wi: Vec3, any: BxdfFlags) -> Vec3 {
+        let half = HalfVector::between(view.normal, view.wo, wi);
+        let weight = schlick_weight(half.cosine());
+        let [eye, light] = Self::smith_terms(view, wi, self.alpha);
+        let reflectance = self.facets + (Vec3::splat(self.grazing) - self.facets) * weight;
+        let white = eye.reflected(&light, half.isotropic(self.alpha));
+        let specular = reflectance * (white * self.coat_transmittance(view, light.cosine, any));
+        if any.contains(COATED) {
+            let [eye, light] = Self::smith_terms(view, wi, self.coat_alpha);
+            let white = eye.reflected(&light, half.isotropic(self.coat_alpha));
+            let reflectance = COAT_REFLECTANCE + (1.0 - COAT_REFLECTANCE) * weight;
+            specular + Vec3::splat(self.coat * reflectance * white)
+        } else {
+            specular
+        }
+    }
+
+    /// f of transmitted light.
+    #[inline(always)]
+    fn transmitted(&self, view: &PrincipledView, wi: Vec3, any: BxdfFlags) -> Vec3 {
+        let half = HalfVector::between(view.normal, view.wo, wi);
+        let weight = schlick_weight(half.cosine());
+        let [eye, light] = Self::smith_terms(view, wi, self.alpha);
+        let (facets, grazing) = (self.dielectric, self.dielectric_grazing);
+        let rest = Vec3::ONE - (facets + (Vec3::splat(grazing) - facets) * weight);
+        let white = eye.reflected(&light, half.isotropic(self.alpha));
+        self.transmission * rest * (white * self.coat_transmittance(view, light.cosine, any))
+    }
+
+    /// Pdf of a direction for a lobe with this α.
+    #[inline(always)]
+    fn lobe_pdf(view: &PrincipledView, wi: Vec3, alpha: f32) -> f32 {
+        let half = HalfVector::between(view.normal, view.wo, wi);
+        let [eye, light] = Self::smith_terms(view, wi, alpha);
+        let pdf = eye.pdf(half.isotropic(alpha));
+        if light.is_above_surface() { pdf } else { 0.0 }
+    }
+}
+
+impl<const THROUGH: bool> Bxdf for PrincipledBxdf<THROUGH> {
+    type Point = PrincipledPoint;
+    type View = PrincipledView;
+
+    const IS_TRANSMISSION: bool = THROUGH;
+    const ALWAYS: BxdfFlags = BxdfFlags::NARROW;
+
+    #[inline(always)]
+    fn new(point: &PrincipledPoint, _: Vec3) -> Self {
+        let &PrincipledPoint { base, facets, grazing, transmission, alpha, coat, coat_alpha, .. } = point;
+        Self {
+            base,
+            diffuse: point.ambient.max_element(),
+            facets,
+            grazing,
+            dielectric: point.dielectric.0,
+            dielectric_grazing: point.dielectric.1,
+            transmission,
+            alpha,
+            terms: point.albedo.normal.terms,
+            grazing_terms: point.albedo.grazing.terms,
+            coat,
+            coat_alpha,
+            coat_terms: point.coat_albedo.terms,
+        }
+    }
+
+    #[inline(always)]
+    fn flags(&self) -> BxdfFlags {
+        let is_diffuse = !THROUGH && self.base != Vec3::ZERO;
+        let of_lobes = BxdfFlags::WIDE.when(is_diffuse).union(COATED.when(self.coat > 0.0));
+        of_lobes.union(TRANSMITS.when(self.transmission != Vec3::ZERO))
+    }
+
+    #[inline(always)]
+    fn view(&self, directions: &SurfaceDirections, any: BxdfFlags) -> PrincipledView {
+        let &SurfaceDirections { normal, wo, .. } = directions;
+        let mirrored = wo - normal * (2.0 * normal.dot(wo));
+        let wo = if THROUGH { mirrored } else { wo };
+        let cosine = nonnegative(normal.dot(wo));
+        let coat = self.coat_albedo(cosine);
+        let transmittance = self.specular_transmittance(cosine);
+        let [at_normal, at_grazing] = self.albedos(cosine);
+        let specular = self.facets.max_element() * at_normal + self.grazing * at_grazing;
+        let diffuse = self.diffuse * transmittance.max_element();
+        let mut all = specular + diffuse;
+        let mut transmission = 0.0;
+        if any.contains(TRANSMITS) {
+            let rest = transmittance + Vec3::splat(at_normal + at_grazing - 1.0);
+            transmission = nonnegative((self.transmission * rest).max_element());
+            all += transmission;
+        }
+        let below = (1.0 - coat) / all.max(f32::MIN_POSITIVE);
+        PrincipledView {
+            normal,
+            wo,
+            transmittance,
+            coat_transmittance: 1.0 - coat,
+            specular_share: below * specular,
+            // The probability of the coat is at least its fraction of the light. The rest is split among the
+            // other lobes.
+            coat_share: if self.coat > 0.0 { 1.0 - below * all } else { 0.0 },
+            transmission_share: below * transmission,
+        }
+    }
+
+    #[inline(always)]
+    fn wide(&self, view: &PrincipledView, wi: Vec3, any: BxdfFlags) -> LobeValue {
+        let cosine = view.normal.dot(wi);
+        let transmittance = self.specular_transmittance(nonnegative(cosine)) * view.transmittance;
+        let coat = if cosine > 0.0 { self.coat_transmittance(view, cosine, any) } else { 0.0 };
+        let f = self.base * transmittance * coat;
+        LobeValue { f, max: f.max_element(), shape: 0.0 }
+    }
+
+    #[inline(always)]
+    fn narrow(&self, view: &PrincipledView, wi: Vec3, any: BxdfFlags) -> LobeValue {
+        let f = if THROUGH { self.transmitted(view, wi, any) } else { self.reflected(view, wi, any) };
+        LobeValue { f, max: f.max_element(), shape: 0.0 }
+    }
+
+    #[inline(always)]
+    fn pdf(
+        &self,
+        view: &PrincipledView,
+        lobes: LobeSet,
+        normal: Vec3,
+        wi: Vec3,
+        _: f32,
+        any: BxdfFlags,
+    ) -> f32 {
+        let PrincipledView { specular_share, coat_share, transmission_share, .. } = *view;
+        let specular = Self::lobe_pdf(view, wi, self.alpha);
+        let coat = if any.contains(COATED) { Self::lobe_pdf(view, wi, self.coat_alpha) } else { 0.0 };
+        let narrow = if THROUGH {
+            transmission_share * specular
+        } else {
+            specular_share * specular + coat_share * coat
+        };
+        match lobes {
+            LobeSet::All if THROUGH => narrow,
+            LobeSet::All => {
+                let diffuse_share = 1.0 - specular_share - coat_share - transmission_share;
+                narrow + diffuse_share * nonnegative(normal.dot(wi)) * FRAC_1_PI
+            }
+            LobeSet::Narrow => {
+                narrow / (specular_share + coat_share + transmission_share).max(f32::MIN_POSITIVE)
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn sample(
+        &self,
+        view: &PrincipledView,
+        lobes: LobeSet,
+        normal: Vec3,
+        choice: f32,
+        u: [f32; 2],
+        _: BxdfFlags,
+    ) -> Vec3 {
+        let PrincipledView { specular_share, coat_share, transmission_share, .. } = *view;
+        let choice = match lobes {
+            LobeSet::All => choice,
+            LobeSet::Narrow => choice * (specular_share + coat_share + transmission_share),
+        };
+        // The order of lobes is coat, specular, diffuse, transmission.
+        let last = match lobes {
+            LobeSet::All => 1.0 - transmission_share,
+            LobeSet::Narrow => specular_share + coat_share,
+        };
+        let is_through = (transmission_share > 0.0) & (choice >= last);
+        let alpha = if (choice < coat_share) & !THROUGH { self.coat_alpha } else { self.alpha };
+        let is_wide = match lobes {
+            LobeSet::All => choice >= coat_share + specular_share,
+            LobeSet::Narrow => false,
+        };
+        let is_wide = is_wide & !THROUGH;
+        let narrow = sample_reflection(&Frame::from_normal(view.normal), view.wo, [alpha; 2], u);
+        let wide = direction_about_axis(normal, u[0].sqrt(), (1.0 - u[0]).sqrt(), u[1]);
+        // If the path continues on the other side, this direction is not used.
+        choose(is_through == THROUGH, choose(is_wide, wide, narrow), -view.normal)
+    }
+
+    #[inline(always)]
+    fn narrow_lobe(&self, view: &PrincipledView) -> Option<NarrowLobe> {
+        let reflectance = self.facets.max_element();
+        let wide = if THROUGH { 0.0 } else { (self.base * view.transmittance).max_element() };
+        Some(NarrowLobe::of_microfacets(view.normal, view.wo, self.alpha, reflectance, wide))
+    }
+}
