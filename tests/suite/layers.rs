@@ -17,9 +17,18 @@ const ROOM: &str = "[camera]\nposition = [0, 1, 5]\nlook_at = [0, 0.6, 0]\n[envi
     [[sphere]]\ncenter = [-0.9, 0.5, 0]\nradius = 0.5\nmaterial = \"mirror\"\n\
     [[sphere]]\ncenter = [0, 2.5, 1]\nradius = 0.3\nmaterial = \"lamp\"\n";
 
+/// A mirror that touches a glossy floor, where photons are tested for occlusion.
+const CONTACT: &str = "[camera]\nposition = [0, 1.6, 6]\nlook_at = [0, 0.9, 0]\n[photons]\nenabled = true\n\
+    [materials.floor]\ndiffuse = 0.4\nspecular = 0.3\nshininess = 40\n[materials.mirror]\ntype = \"mirror\"\n\
+    [materials.lamp]\ndiffuse = 0.0\nemission = 6.0\n\
+    [[plane]]\nmaterial = \"floor\"\n\
+    [[quad]]\ncorner = [-3, 0, 1]\nu = [2.5, 0, 0]\nv = [0, 1.2, 0.1]\nmaterial = \"mirror\"\n\
+    [[quad]]\ncorner = [-1, 4, -1]\nu = [2, 0, 0]\nv = [0, 0, 2]\nmaterial = \"lamp\"\n";
+
 fn dir() -> TestDir {
     let dir = TestDir::new();
     dir.write("room.toml", ROOM);
+    dir.write("contact.toml", CONTACT);
     dir
 }
 
@@ -41,11 +50,12 @@ fn picture(dir: &TestDir, options: &str) -> Vec<f32> {
 fn components_add_up_to_beauty_layer() {
     let dir = dir();
     for options in [
-        "--integrator path --samples 64 --error 0.2",
-        "--integrator whitted --photons on --samples 5",
-        "--integrator whitted --samples 4 --time 0.2",
+        "room.toml --integrator path --samples 64 --error 0.2",
+        "room.toml --integrator whitted --photons on --samples 5",
+        "room.toml --integrator whitted --samples 4 --time 0.2",
+        "contact.toml --samples 4",
     ] {
-        dir.expect(&format!("room.toml {SMALL} {options} -o a.exr --layers all"), 0);
+        dir.expect(&format!("{options} {SMALL} -o a.exr --layers all"), 0);
         let all = channels(&dir, "a.exr");
         for channel in ["R", "G", "B"] {
             let parts =

@@ -145,10 +145,11 @@ fn reflected_kernel_sum(
 ) -> (Vec3, Option<PhotonPosition>) {
     let (mut sum, mut total, mut left, mut chosen) = (Vec3::ZERO, 0.0, random[0], None);
     map.visit_photons(look, simd, |photon, density| {
-        let [shown, _] = row.bsdf.f_at(i, photon.direction);
+        let [shown, all] = row.bsdf.f_at(i, photon.direction);
         let scale = density * row.photon_weight(i, photon.direction);
         sum += shown * photon.flux * scale;
-        let weight = (shown * photon.flux * scale).element_sum();
+        // Choose the same photon whichever lobes are shown, so that the AOVs sum to the beauty image.
+        let weight = (all * photon.flux * scale).element_sum();
         total += weight;
         // Choose a photon by reservoir sampling, as in `LaneReservoirs`.
         let part = if weight > 0.0 { weight / total } else { 0.0 };
