@@ -23,6 +23,7 @@ pub(super) fn request_render(state: &mut State, force: bool) -> Vec<Effect> {
         // Exposure only affects how the image is displayed.
         state.picture.history.transfer_to_next(state.request.generation);
     }
+    state.work.is_counted &= state.request.is_exposure_only;
     state.request.generation += 1;
     let is_moved = state.request.toggles.camera.has_changes();
     state.request.moved_since =

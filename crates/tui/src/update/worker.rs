@@ -360,7 +360,8 @@ fn add_earlier_seconds(report: &mut Report) {
 
 /// Counts a finished render, unless it did not change the newest image.
 fn count_render(state: &mut State, unchanged: bool) {
-    let is_new = !unchanged && !state.request.is_exposure_only;
+    let is_counted = std::mem::replace(&mut state.work.is_counted, true);
+    let is_new = !unchanged && !is_counted || state.work.renders == 0;
     let is_shown = state.picture.history.is_newest(state.request.generation);
     if is_new || is_shown && state.picture.history.is_newest_unfinished() {
         state.work.renders += 1;
