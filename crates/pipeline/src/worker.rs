@@ -377,6 +377,7 @@ mod tests {
             preview: None,
             write: Writing::No,
             own: None,
+            saves: 0,
             force: false,
             first: None,
         }))

@@ -268,6 +268,11 @@ pub(super) fn done_event(generation: u64, warnings: Vec<Diagnostic>, unchanged: 
     protocol::Event::Done { generation, report: Box::new(report), warnings, unchanged }
 }
 
+/// Event for a finished image written to a file.
+pub(super) fn written_event(generation: u64, path: &str, is_own: bool) -> protocol::Event {
+    protocol::Event::Written { generation, path: path.into(), bytes: 1, is_own, unfinished: None }
+}
+
 /// A diagnostic for the third line of a scene.
 pub(super) fn diagnostic(severity: Severity, message: &str) -> Diagnostic {
     let source: Arc<str> = Arc::from("[render]\nwidth = 4\nheigth = 4\n");

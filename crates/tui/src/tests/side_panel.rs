@@ -427,6 +427,7 @@ fn written_files_are_hyperlinks() {
             path: "cornell.png".into(),
             bytes: 107_000,
             is_own: true,
+            unfinished: None,
         });
         ui.finish_render(RED);
         let mut buffer = ui.draw_screen();

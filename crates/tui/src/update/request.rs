@@ -44,6 +44,7 @@ pub(super) fn request_render(state: &mut State, force: bool) -> Vec<Effect> {
         preview: state.request.preview_size,
         write: if state.request.is_own_image() { Writing::Try } else { Writing::No },
         own: state.request.own_image_overrides(),
+        saves: state.saving.edits,
         force,
         first: state.request.first_section,
     };
