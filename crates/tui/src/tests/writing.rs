@@ -2,11 +2,11 @@
 
 use super::{BLUE, RED};
 use crate::Changed;
-use crate::event::{Event, KeyPress};
+use crate::event::{Effect, Event, KeyPress};
 use crate::exit_summary::summary_text;
 use crate::fixtures::*;
 use crate::messages;
-use crate::pipeline::protocol::{self, OwnImageState, SampleCounts, Stage, Status};
+use crate::pipeline::protocol::{self, Command, OwnImageState, SampleCounts, Stage, Status};
 
 /// A UI that has begun the scene's own image.
 fn begun(columns: u16, rows: u16) -> TestUi {
@@ -51,6 +51,19 @@ fn assert_shows(ui: &mut TestUi, words: &str) {
     let text: String = ui.text().chars().filter(|it| *it != '▀' && !it.is_whitespace()).collect();
     let words: String = words.chars().filter(|it| !it.is_whitespace()).collect();
     assert!(text.contains(&words), "{words}: {}", ui.text());
+}
+
+#[test]
+fn w_writes_the_newest_step() {
+    let mut ui = begun(80, 24);
+    ui.press(']');
+    assert!(ui.press(']').is_empty(), "the step waits for a preview of the first one");
+    let effects = ui.press('w');
+    assert_eq!(request(&effects).expect("the waiting step").overrides.exposure, Some(0.5));
+    assert!(matches!(effects.last(), Some(Effect::Send(Command::Write))), "{effects:?}");
+    let generation = ui.state.request.generation;
+    ui.worker_event(written_event(generation, "cornell.png", false));
+    assert!(summary_text(&ui.state).ends_with("with exposure +0.5"), "{}", summary_text(&ui.state));
 }
 
 const PART: SampleCounts = SampleCounts { min: 16, mean: 20.0, max: 32 };
