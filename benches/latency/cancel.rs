@@ -57,6 +57,7 @@ fn send(worker: &Handle, scene: &Path, generation: &mut u64) {
         preview: Some(PreviewSize { width: 118, height: 74, around: None }),
         write: WriteMode::No,
         own: None,
+        saves: 0,
         force: false,
         first: None,
     })));

@@ -34,6 +34,7 @@ pub(crate) fn render(
         preview: Some(size),
         write: WriteMode::No,
         own: None,
+        saves: 0,
         force: false,
         first: None,
     };

@@ -57,6 +57,7 @@ impl PreviewRenderer {
             preview: Some(self.preview),
             write: WriteMode::No,
             own: None,
+            saves: 0,
             force: false,
             first: None,
         };

@@ -335,8 +335,12 @@ mod tests {
             is_unwritten: false,
             not_kept: None,
         };
+        let written = |generation| {
+            let path = "a.png".into();
+            Event::Written { generation, path, bytes: 1, is_own: true, unfinished: None }
+        };
         let writes = SharedWriteLog::default();
-        writes.record_event(&Event::Written { generation: 1, path: "a.png".into(), bytes: 1, is_own: true });
+        writes.record_event(&written(1));
         writes.record_write_command();
         writes.record_ui_exit();
         let message = "the latest image is not written".to_owned();
@@ -345,7 +349,7 @@ mod tests {
         let said = |ended: TuiOutcome| closing_lines(&writes, &ended, (true, &[], "glimt a.toml"));
         assert_eq!(said(ended(true)), [error, summary]);
         assert_eq!(said(ended(false)), [error]);
-        writes.record_event(&Event::Written { generation: 2, path: "a.png".into(), bytes: 1, is_own: true });
+        writes.record_event(&written(2));
         assert_eq!(said(ended(true)), [error, "wrote a.png"]);
     }
 

@@ -77,6 +77,7 @@ pub(super) fn run(order: &RenderRequest, console: &Console) -> Exit {
             preview: None,
             write: WriteMode::Must,
             own: None,
+            saves: 0,
             force: false,
             first: None,
         })));

@@ -69,6 +69,9 @@ pub struct Request {
     /// Overrides for the scene's own image if this request shows another one. The own image's film and
     /// checkpoint are kept. `None` if this request is for the scene's own image.
     pub own: Option<Box<Overrides>>,
+    /// Number of times the scene's files have been saved. An image that [`Command::Write`] wrote with changes
+    /// made with keys is kept until a request with another number reads a valid scene.
+    pub saves: u64,
     /// Render again even if nothing has changed.
     pub force: bool,
     /// Region to render first. Does not affect the final image.
@@ -181,6 +184,8 @@ pub enum Event {
         bytes: u64,
         /// Whether the image is the scene's own image, without changes made with keys.
         is_own: bool,
+        /// Sample counts of an image written before its render finished. `None` for a finished image.
+        unfinished: Option<SampleCounts>,
     },
     /// State of the scene's own image, for a request that shows another one.
     OwnImage {

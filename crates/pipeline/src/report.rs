@@ -6,6 +6,7 @@ mod marks;
 pub(super) use self::marks::ReportSignature;
 use super::protocol::StageReport;
 use super::settings::EffectiveSettings;
+use crate::film::SampleStats;
 
 /// Report of a finished request, written as JSON with `--report`.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
@@ -67,6 +68,12 @@ pub struct SampleCounts {
     pub mean: f64,
     /// Maximum samples per pixel.
     pub max: u32,
+}
+
+impl From<SampleStats> for SampleCounts {
+    fn from(SampleStats { min, mean, max }: SampleStats) -> Self {
+        Self { min, mean, max }
+    }
 }
 
 /// The lights in a report.

@@ -44,6 +44,7 @@ impl Session {
             first: None,
             write: WriteMode::No,
             own: None,
+            saves: 0,
             force: true,
         };
         // Events are not needed, because the result is returned.

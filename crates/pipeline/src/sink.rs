@@ -8,7 +8,7 @@ use std::time::Instant;
 
 use super::protocol::{
     AssetProgress, CheckpointUpdate, Event, LatestPreview, OwnImageState, PreviewSlot, PreviewSource,
-    RenderProgress, Section, StageReport,
+    RenderProgress, SampleCounts, Section, StageReport,
 };
 use super::watch::content::FileRead;
 use crate::film::Picture;
@@ -51,8 +51,15 @@ impl Sink {
         self.send(Event::Files { generation: self.generation, files, read, since });
     }
 
-    pub(super) fn image_written(&self, path: &Path, bytes: u64, is_own: bool) {
-        self.send(Event::Written { generation: self.generation, path: path.to_owned(), bytes, is_own });
+    pub(super) fn image_written(
+        &self,
+        path: &Path,
+        bytes: u64,
+        is_own: bool,
+        unfinished: Option<SampleCounts>,
+    ) {
+        let (generation, path) = (self.generation, path.to_owned());
+        self.send(Event::Written { generation, path, bytes, is_own, unfinished });
     }
 
     pub(super) fn own_image(&self, state: OwnImageState) {

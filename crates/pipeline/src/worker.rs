@@ -377,16 +377,15 @@ mod tests {
             preview: None,
             write: WriteMode::No,
             own: None,
+            saves: 0,
             force: false,
             first: None,
         }))
     }
 
     fn token(remote: &CommandSender) -> CancelToken {
-        match remote.next() {
-            Task::Render(_, token, _) => token,
-            _ => panic!("expected a pending request"),
-        }
+        let Task::Render(_, token, _) = remote.next() else { panic!("expected a pending request") };
+        token
     }
 
     #[test]
@@ -440,10 +439,8 @@ mod tests {
         let remote = CommandSender { mailbox: Arc::default(), events: mpsc::channel().0 };
         let begin = |number| {
             remote.send(render(number));
-            match remote.next() {
-                Task::Render(_, token, writing) => (token, writing),
-                _ => panic!("expected a pending request"),
-            }
+            let Task::Render(_, token, writing) = remote.next() else { panic!("expected a pending request") };
+            (token, writing)
         };
         let (token, writing) = begin(1);
         remote.send(Command::Pause(true));

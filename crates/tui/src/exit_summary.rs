@@ -3,7 +3,7 @@
 use super::event::WriteFailure;
 use super::state::{KeyOverrides, OwnImage, State, WorkerActivity, WrittenFile};
 use crate::choice::Choice;
-use crate::pipeline::protocol::{OwnImageState, Report};
+use crate::pipeline::protocol::{OwnImageState, Report, SampleCounts};
 use crate::pipeline::settings::{CameraChange, View};
 use crate::pipeline::words::seconds;
 use crate::scene::sanitize::visible;
@@ -62,14 +62,13 @@ fn events_since_writing(state: &State) -> String {
         return format!("; {} has errors since", scene_name(state));
     }
     let written = &state.saving.written;
-    let is_older = written.iter().all(|written| written.generation < state.saving.saved_at);
     if state.saving.own.state == OwnImageState::Written {
         return String::new();
     }
     if !state.request.is_own_image() {
         let is_by_hand = written.iter().any(|written| written.shows.is_some());
         return match state.saving.own {
-            OwnImage { .. } if is_older => OLDER_THAN_EDIT.to_owned(),
+            OwnImage { .. } if state.saving.is_older_than_edit() => OLDER_THAN_EDIT.to_owned(),
             OwnImage { .. } if is_by_hand => String::new(),
             OwnImage { fraction, .. } => {
                 format!("; {NEXT_RENDER} is not finished ({:.0} %)", (fraction * 100.0).floor())
@@ -101,8 +100,7 @@ fn describe_files(written: &[WrittenFile]) -> String {
     let alike = written.chunk_by(|one, next| one.made == next.made && one.shows == next.shows);
     let said: Vec<String> = alike
         .map(|files| {
-            let names: Vec<_> =
-                files.iter().map(|it| visible(&it.path.to_string_lossy()).into_owned()).collect();
+            let names: Vec<_> = files.iter().map(WrittenFile::name).collect();
             let made = files.first().map_or("", |it| &it.made);
             let colon = if made.is_empty() { "" } else { ": " };
             let shows = files.first().and_then(|it| it.shows).unwrap_or_default();
@@ -120,14 +118,13 @@ fn describe_files(written: &[WrittenFile]) -> String {
 fn describe_write_failure(state: &State, failed: &WriteFailure) -> String {
     let mut words = format!("not written: {}", visible(&failed.why));
     for written in &state.saving.written {
-        let name = visible(&written.path.to_string_lossy()).into_owned();
         let is_new = written.generation >= failed.generation;
         words += match (is_new, written.is_stale) {
             (true, false) => "; wrote ",
             (true, true) => "; before that, wrote ",
             (false, _) => "; wrote an earlier image to ",
         };
-        words += &name;
+        words += &written.name();
     }
     words
 }
@@ -136,14 +133,23 @@ fn describe_write_failure(state: &State, failed: &WriteFailure) -> String {
 pub(super) fn describe_image(report: &Report, shown: View) -> String {
     let image = &report.image;
     let time = seconds(report.seconds.max(image.render_seconds));
-    let view = view_label(shown);
-    let comma = if view.is_empty() { "" } else { ", " };
-    let samples = if image.samples.min == image.samples.max {
-        image.samples.max.to_string()
-    } else {
-        format!("{} to {}", image.samples.min, image.samples.max)
-    };
-    format!("{view}{comma}{}×{}, {samples} samples, {time}", image.width, image.height)
+    let samples = sample_words(image.samples);
+    format!("{}{}×{}, {samples}, {time}", view_prefix(shown), image.width, image.height)
+}
+
+/// Describes an image that was written before its render finished.
+pub(super) fn describe_unfinished(samples: SampleCounts, shown: View) -> String {
+    format!("{}unfinished ({})", view_prefix(shown), sample_words(samples))
+}
+
+/// `64 samples`, or `16 to 32 samples`.
+fn sample_words(SampleCounts { min, max, .. }: SampleCounts) -> String {
+    if min == max { format!("{max} samples") } else { format!("{min} to {max} samples") }
+}
+
+fn view_prefix(view: View) -> String {
+    let view = view_label(view);
+    if view.is_empty() { view } else { format!("{view}, ") }
 }
 
 /// The name of the view, or nothing for the beauty view.
@@ -155,7 +161,7 @@ pub(super) fn view_label(view: View) -> String {
 mod tests {
     use super::*;
     use crate::Changed;
-    use crate::fixtures::{TestUi, diagnostic, done_event, render_progress};
+    use crate::fixtures::{TestUi, diagnostic, done_event, render_progress, written_event};
     use crate::messages;
     use crate::pipeline::protocol::{Event, Stage, Status};
     use crate::scene::description::Camera;
@@ -180,7 +186,7 @@ mod tests {
         ui.worker_event(Event::Started { generation: begun });
         ui.worker_event(Event::Progress { generation: begun, progress: render_progress(0.5, None) });
         ui.press('l');
-        ui.worker_event(Event::Written { generation: begun, path: "big.png".into(), bytes: 1, is_own: true });
+        ui.worker_event(written_event(begun, "big.png", true));
         assert!(
             summary_text(&ui.state).starts_with(&format!("wrote big.png; {NEXT_RENDER}")),
             "{}",
@@ -199,7 +205,7 @@ mod tests {
         let write = |ui: &mut TestUi, seconds: f64, rendered: f64| {
             let generation = ui.state.request.generation;
             ui.worker_event(Event::Started { generation });
-            ui.worker_event(Event::Written { generation, path: "dof.png".into(), bytes: 1, is_own: true });
+            ui.worker_event(written_event(generation, "dof.png", true));
             ui.worker_event(done_with(generation, |report| {
                 (report.seconds, report.image.render_seconds) = (seconds, rendered);
             }));
@@ -215,7 +221,7 @@ mod tests {
     #[test]
     fn written_view_is_named() {
         let mut ui = TestUi::new();
-        ui.worker_event(Event::Written { generation: 1, path: "a.png".into(), bytes: 1, is_own: true });
+        ui.worker_event(written_event(1, "a.png", true));
         ui.finish_render([200, 30, 30]);
         let own = summary_text(&ui.state);
         ui.press('v');
@@ -228,7 +234,7 @@ mod tests {
         }));
         assert_eq!(summary_text(&ui.state), own, "the file was not written again");
         ui.press('w');
-        ui.worker_event(Event::Written { generation, path: "a.png".into(), bytes: 1, is_own: false });
+        ui.worker_event(written_event(generation, "a.png", false));
         assert_eq!(summary_text(&ui.state), "wrote a.png: view normal, 640×480, 64 samples, 500 ms");
     }
 
@@ -237,7 +243,7 @@ mod tests {
         let made = "wrote a.png: 640×480, 64 samples, 1.93 s";
         for key in ['v', 'l'] {
             let mut ui = TestUi::new();
-            ui.worker_event(Event::Written { generation: 1, path: "a.png".into(), bytes: 1, is_own: true });
+            ui.worker_event(written_event(1, "a.png", true));
             ui.finish_render([200, 30, 30]);
             ui.press(key);
             ui.finish_render([200, 30, 30]);
@@ -309,13 +315,11 @@ mod tests {
     fn summary_lists_written_and_missing_images() {
         let mut ui = TestUi::new();
         assert_eq!(summary_text(&ui.state), "no image written");
-        let settings = Box::new(crate::fixtures::effective_settings());
-        let (camera, own) = (crate::fixtures::camera(), crate::fixtures::own_settings());
-        ui.worker_event(Event::Settings { generation: 1, settings, camera, exposure: 0.0, own });
+        ui.read_scene();
         assert_eq!(summary_text(&ui.state), "cornell.png not finished");
         ui.worker_event(Event::Progress { generation: 1, progress: render_progress(0.388, None) });
         assert_eq!(summary_text(&ui.state), "cornell.png not finished (38 %)");
-        ui.worker_event(Event::Written { generation: 1, path: "cornell.png".into(), bytes: 1, is_own: true });
+        ui.worker_event(written_event(1, "cornell.png", true));
         ui.worker_event(done_event(1, Vec::new(), false));
         let made = "wrote cornell.png: 640×480, 64 samples, 1.93 s";
         assert_eq!(summary_text(&ui.state), made);
@@ -332,14 +336,14 @@ mod tests {
             path: None,
             message: "cannot write b.exr: no space".to_owned(),
         });
-        ui.worker_event(Event::Written { generation: 3, path: "a.png".into(), bytes: 1, is_own: true });
+        ui.worker_event(written_event(3, "a.png", true));
         ui.worker_event(done_event(3, Vec::new(), false));
         let failed =
             "not written: cannot write b.exr: no space; wrote an earlier image to cornell.png; wrote a.png";
         assert_eq!(summary_text(&ui.state), failed);
         ui.press('r');
         ui.worker_event(Event::Started { generation: 4 });
-        ui.worker_event(Event::Written { generation: 4, path: "a.png".into(), bytes: 1, is_own: true });
+        ui.worker_event(written_event(4, "a.png", true));
         ui.worker_event(done_event(4, Vec::new(), false));
         let made = "wrote cornell.png, a.png: 640×480, 64 samples, 1.93 s";
         assert_eq!(summary_text(&ui.state), made);
@@ -361,7 +365,7 @@ mod tests {
         assert_eq!(unsaved_as_options(&ui.state).as_deref(), Some(options));
         ui.press('w');
         let generation = ui.state.request.generation;
-        ui.worker_event(Event::Written { generation, path: "a.png".into(), bytes: 1, is_own: false });
+        ui.worker_event(written_event(generation, "a.png", false));
         assert_eq!(unsaved_as_options(&ui.state), None, "the written image includes the changes");
         ui.key(crate::event::KeyPress::special(crossterm::event::KeyCode::Esc));
         ui.press('l');
@@ -395,7 +399,7 @@ mod tests {
         let made = "wrote cornell.png: 640×480, 64 samples, 1.93 s";
         let mut ui = TestUi::new();
         ui.worker_event(Event::Started { generation: 1 });
-        ui.worker_event(Event::Written { generation: 1, path: "cornell.png".into(), bytes: 1, is_own: true });
+        ui.worker_event(written_event(1, "cornell.png", true));
         ui.finish_render([200, 30, 30]);
         ui.press('s');
         ui.finish_render([30, 200, 30]);
@@ -422,16 +426,7 @@ mod tests {
             let generation = ui.state.request.generation;
             ui.worker_event(Event::OwnImage { generation, state });
         };
-        ui.worker_event(Event::Started { generation: 1 });
-        let settings = Box::new(crate::fixtures::effective_settings());
-        let (camera, own_settings) = (crate::fixtures::camera(), crate::fixtures::own_settings());
-        ui.worker_event(Event::Settings {
-            generation: 1,
-            settings,
-            camera,
-            exposure: 0.0,
-            own: own_settings,
-        });
+        ui.read_scene();
         ui.worker_event(Event::Progress { generation: 1, progress: render_progress(0.108, None) });
         ui.press('s');
         own(&mut ui, OwnImageState::Begun { is_rendering: false });
@@ -443,7 +438,7 @@ mod tests {
         // `w` writes the displayed image.
         ui.press('w');
         let generation = ui.state.request.generation;
-        ui.worker_event(Event::Written { generation, path: "cornell.png".into(), bytes: 1, is_own: false });
+        ui.worker_event(written_event(generation, "cornell.png", false));
         let made = "wrote cornell.png: 640×480, 64 samples, 1.93 s, with shadows hard";
         assert_eq!(summary_text(&ui.state), made);
         assert!(ui.text().contains("→ cornell.png"), "{}", ui.text());
@@ -452,7 +447,7 @@ mod tests {
         ui.worker_event(Event::Started { generation: ui.state.request.generation });
         assert!(summary_text(&ui.state).starts_with(&format!("{made}; {NEXT_RENDER}")));
         let generation = ui.state.request.generation;
-        ui.worker_event(Event::Written { generation, path: "cornell.png".into(), bytes: 1, is_own: true });
+        ui.worker_event(written_event(generation, "cornell.png", true));
         ui.finish_render([30, 200, 30]);
         assert_eq!(summary_text(&ui.state), "wrote cornell.png: 640×480, 64 samples, 1.93 s");
         ui.press('s');

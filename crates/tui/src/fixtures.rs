@@ -9,6 +9,7 @@ use ratatui::layout::Rect;
 
 use super::color::{ColorDepth, XTERM};
 use super::event::{Effect, Event, KeyPress, Window};
+use super::options::Changed;
 use super::preview_kind::PreviewKind;
 use super::state::{InitialState, State};
 use super::terminal_replies::TerminalQueries;
@@ -97,8 +98,15 @@ impl TestUi {
         self.handle_event(Event::Tick)
     }
 
-    /// Simulates a complete render of a uniform image.
-    pub(super) fn finish_render(&mut self, color: [u8; 3]) {
+    /// Saves a scene with this text, which the worker loads.
+    pub(super) fn save_scene(&mut self, text: &str) {
+        self.handle_event(Event::Changed(Changed { noticed: self.now }));
+        let generation = self.state.request.generation;
+        self.worker_event(protocol::Event::Text { generation, text: text.into() });
+    }
+
+    /// Starts the current request, and reports that its scene is valid.
+    pub(super) fn read_scene(&mut self) {
         let generation = self.state.request.generation;
         self.worker_event(protocol::Event::Started { generation });
         self.worker_event(protocol::Event::Settings {
@@ -108,15 +116,25 @@ impl TestUi {
             exposure: 0.0,
             own: own_settings(),
         });
+    }
+
+    /// Delivers a preview of the current request.
+    pub(super) fn show_preview(&mut self, color: [u8; 3]) {
         self.handle_event(Event::Picture {
-            generation,
+            generation: self.state.request.generation,
             picture: uniform_picture(50, 38, color),
             range: None,
             section: None,
             lacks_photons: false,
             source: None,
         });
-        self.worker_event(done_event(generation, Vec::new(), false));
+    }
+
+    /// Simulates a complete render of a uniform image.
+    pub(super) fn finish_render(&mut self, color: [u8; 3]) {
+        self.read_scene();
+        self.show_preview(color);
+        self.worker_event(done_event(self.state.request.generation, Vec::new(), false));
     }
 
     pub(super) fn fail_render(&mut self, diagnostics: Vec<Diagnostic>) {
@@ -248,6 +266,11 @@ pub(super) fn done_event(generation: u64, warnings: Vec<Diagnostic>, unchanged: 
         peak_memory_bytes: 0,
     };
     protocol::Event::Done { generation, report: Box::new(report), warnings, unchanged }
+}
+
+/// Event for a finished image written to a file.
+pub(super) fn written_event(generation: u64, path: &str, is_own: bool) -> protocol::Event {
+    protocol::Event::Written { generation, path: path.into(), bytes: 1, is_own, unfinished: None }
 }
 
 /// A diagnostic for the third line of a scene.

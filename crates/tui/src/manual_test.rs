@@ -139,7 +139,13 @@ fn simulate_render(
             return Some(command);
         }
     }
-    say(Event::Written { generation, path: "cornell.png".into(), bytes: 210_400, is_own: true });
+    say(Event::Written {
+        generation,
+        path: "cornell.png".into(),
+        bytes: 210_400,
+        is_own: true,
+        unfinished: None,
+    });
     say(done_event(generation, vec![diagnostic(Severity::Warning, "texture `b` is not used")], false));
     None
 }

@@ -228,6 +228,21 @@ pub fn output_changed(file: &str, how: &str) -> String {
 
 /// Shown when the displayed image is not saved in a file.
 pub const NOT_SAVED: &str = "not saved · w saves it";
+/// Shown when `w` wrote the displayed image before its render finished.
+pub fn unfinished_image(file: &str) -> String {
+    format!("{file} is unfinished · w writes it again")
+}
+
+/// Shown when `w` wrote an image with these changes, and another one is displayed.
+pub fn image_with(file: &str, changes: &str) -> String {
+    format!("{file} was written with {changes}")
+}
+
+/// Shown when `w` wrote an image with these changes, and the scene's own image is displayed.
+pub fn other_image_with(file: &str, changes: &str) -> String {
+    format!("{} · w writes this image", image_with(file, changes))
+}
+
 /// Shown when the scene is invalid, so the last valid render is shown.
 pub const LAST_GOOD_RENDER: &str = "showing the last good render";
 /// Shown when photon light is missing from the preview.

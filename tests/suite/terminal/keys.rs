@@ -102,9 +102,12 @@ fn views_are_shown_and_saved_on_request() {
     terminal.press("vv");
     terminal.wait_for("v beauty");
     terminal.wait_for("done");
-    terminal.wait("the image on disk again", |_| {
-        fs::read(folder.path("scene.png")).is_ok_and(|bytes| bytes == beauty)
-    });
+    // Looking at the scene's own image does not replace the written one.
+    terminal.wait_for_message(&messages::other_image_with("scene.png", "view normal"));
+    assert_eq!(folder.bytes("scene.png"), folder.once(&["--view", "normal"]));
+    terminal.press("w");
+    terminal.wait_for_message(&messages::files_written("scene.png"));
+    assert_eq!(folder.bytes("scene.png"), beauty);
 }
 
 #[test]

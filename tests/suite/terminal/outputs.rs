@@ -7,6 +7,7 @@ use std::time::Duration;
 use glimt::tui::messages;
 
 use super::pty::{Folder, GREEN, RED, SCENE};
+use crate::test_dir::assert_mentions;
 
 /// An image with one red texel.
 const PAINT: &str = "P3\n1 1\n255\n230 20 20\n";
@@ -99,6 +100,46 @@ fn link_changed_while_rendering_is_detected() {
     terminal.press("w");
     terminal.wait_for("`paint`");
     assert_eq!(folder.bytes("paint.ppm"), PAINT.as_bytes());
+}
+
+#[test]
+fn own_render_keeps_an_image_written_on_request() {
+    let folder = Folder::new();
+    let text = SCENE.replace("samples = 4", "samples = 3000");
+    folder.write("scene.toml", &text);
+    for (keys, changes) in [("]]", "exposure +0.5"), ("s", "shadows hard")] {
+        let mut terminal = folder.terminal_with(&[folder.program(), "scene.toml", "-o", "a.png"], &[]);
+        terminal.wait_for_coverage();
+        terminal.press(keys);
+        terminal.press("w");
+        terminal.wait_for_message(&messages::files_written("a.png"));
+        let written = folder.bytes("a.png");
+        terminal.wait_for_render(1);
+        assert_eq!(folder.bytes("a.png"), written, "the render must not replace the image");
+        terminal.press("0");
+        terminal.wait_for(messages::RESET);
+        terminal.wait("the scene's own image", |screen| {
+            let text = screen.contents();
+            text.contains("✓ done") && text.contains(changes)
+        });
+        assert_eq!(folder.bytes("a.png"), written, "a reset must not replace the image");
+        terminal.press("q");
+        assert_eq!(terminal.code(), 0);
+        assert_mentions(&terminal.last_lines(), &["a.png", "unfinished", changes]);
+        assert_eq!(folder.bytes("a.png"), written);
+    }
+}
+
+#[test]
+fn save_replaces_an_image_written_on_request() {
+    let folder = Folder::new();
+    let mut terminal = folder.terminal();
+    terminal.wait_for_render(1);
+    let own = folder.bytes("scene.png");
+    terminal.press("]w");
+    terminal.wait("the brighter image", |_| folder.bytes("scene.png") != own);
+    folder.write("scene.toml", &format!("{SCENE}# saved"));
+    terminal.wait("the image of the save", |_| folder.bytes("scene.png") == own);
 }
 
 #[test]

@@ -173,6 +173,7 @@ fn check(run: &RandomSession<'_>, said: &str, known: &mut HashMap<String, Vec<u8
     } else if first.starts_with("wrote ")
         && first.contains("samples")
         && !first.contains(", with ")
+        && !first.contains("unfinished")
         && !first.contains("view ")
     {
         let was_seen = run.saved.iter().rev().take(2).any(|text| image == Some(run.once(known, text, &[])));

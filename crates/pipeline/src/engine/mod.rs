@@ -110,6 +110,8 @@ pub(super) struct Engine {
     films: FilmCache,
     written: WrittenImages,
     own: Option<OwnImage>,
+    /// Number of saves before the newest request with a valid scene.
+    saves: u64,
     /// Whether the film of the scene's own image is kept while other images are rendered.
     pins_own: bool,
     /// Whether the current film belongs to the scene's own image.
@@ -177,6 +179,7 @@ impl Engine {
             films: FilmCache::default(),
             written: WrittenImages::default(),
             own: None,
+            saves: 0,
             pins_own: true,
             is_own: true,
             report: None,
@@ -236,7 +239,8 @@ impl Engine {
         }
         if let Ok(report) = &outcome {
             self.report = Some(report.clone());
-            if request.own.is_none() && findings.conflicts.is_empty() {
+            let is_by_hand = self.written.have_image_by_hand(&self.contents);
+            if request.own.is_none() && findings.conflicts.is_empty() && !is_by_hand {
                 self.write_report(report, sink, context.writing);
             }
         }
@@ -472,6 +476,7 @@ impl Engine {
         let good =
             LastValidScene { generation, parsed, meshes, bodies, textures: Arc::new(textures), needed };
         let ready = self.build(request, &good, (plan, own_image_plan), table, &reading)?;
+        self.note_saves(request.saves);
         self.good = Some(good);
         Ok(ready)
     }

@@ -2,7 +2,7 @@
 
 use super::super::inputs::Inputs;
 use super::super::plan::Plan;
-use super::super::protocol::{ImageReport, Report, Request, WriteMode};
+use super::super::protocol::{ImageReport, Report, Request, WriteMode, reasons};
 use super::super::render::film_state::FilmState;
 use super::super::report::finish::{remove_report, write_report};
 use super::super::sink::Sink;
@@ -62,6 +62,9 @@ impl Engine {
         self.record_own_image_written(is_written && is_finished && self.is_own);
         if is_written {
             self.report_written_image(sink);
+        }
+        if self.is_own_written() {
+            self.remove_own_checkpoint(sink);
         }
     }
 
@@ -130,6 +133,9 @@ impl Engine {
         }
         if request.own.is_some() {
             return self.write_own_image(sink, token);
+        }
+        if self.written.have_image_by_hand(&self.contents) {
+            return Ok(StageResult::skipped(false, reasons::OTHER_IMAGE_WRITTEN));
         }
         let pool = self.thread_pool(plan.threads)?;
         let Some(state) = self.films.current() else { return Err(Stop::work("the film is missing")) };

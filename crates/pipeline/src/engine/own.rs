@@ -122,6 +122,13 @@ impl Engine {
         state.map_or(0, FilmState::memory_bytes)
     }
 
+    /// Lets the scene's own image replace one with changes made with keys if the scene was saved in between.
+    pub(super) fn note_saves(&mut self, saves: u64) {
+        if std::mem::replace(&mut self.saves, saves) != saves {
+            self.written.release();
+        }
+    }
+
     /// Records which share of the scene's own image this process renders, if that is the image being
     /// rendered.
     pub(super) fn record_own_share(&mut self, request: &Request, ready: &Ready) {
@@ -161,7 +168,7 @@ impl Engine {
         token: &CancelToken,
     ) -> Result<StageResult<bool>, Stop> {
         let only_shown = || Ok(StageResult::skipped(false, reasons::PREVIEW_ONLY));
-        if self.is_own_written() {
+        if self.is_own_written() || self.written.have_image_by_hand(&self.contents) {
             return only_shown();
         }
         let (Some(own), Some(state), Some(pool)) = (&self.own, self.films.current(), &self.pool) else {
@@ -209,6 +216,17 @@ impl Engine {
             lock: &self.checkpoint_lock,
         };
         work(Some(&Checkpointer::new(output, own.plan.checkpoints, around)), self)
+    }
+
+    /// Removes the checkpoint of the scene's own image, which has been written.
+    pub(super) fn remove_own_checkpoint(&self, sink: &Sink) {
+        let Some(state) = self.own.as_ref().and_then(|own| self.films.get(own.film)) else { return };
+        self.with_checkpointer(Some(state.key), sink, &|| Interruption::Replaced, |checkpointer, _| {
+            if let Some(checkpointer) = checkpointer {
+                checkpointer.check_already_saved(state);
+                checkpointer.finish(state, state.traced, true);
+            }
+        });
     }
 
     /// Saves a checkpoint of the scene's own image if the worker stops while showing another one.

@@ -49,6 +49,7 @@ impl EngineFixture {
             preview: None,
             write: WriteMode::No,
             own: None,
+            saves: 0,
             force: false,
             first: None,
         };

@@ -36,6 +36,8 @@ pub const NOISE_TARGET_REACHED: &str = "noise target reached in some tiles";
 pub const ALREADY_WRITTEN: &str = "already written";
 /// The request's image will not be written.
 pub const PREVIEW_ONLY: &str = "preview only";
+/// The output files contain an image with changes made with keys, which the user wrote with a key.
+pub const OTHER_IMAGE_WRITTEN: &str = "w wrote another image";
 
 /// Prefix of the reason for a render that continued from existing samples.
 pub const RESUMED: &str = "resumed after ";

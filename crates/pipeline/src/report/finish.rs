@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{Counters, ImageReport, LightsReport, LightsSampled, PhotonsReport, Report, SampleCounts};
+use super::{Counters, ImageReport, LightsReport, LightsSampled, PhotonsReport, Report};
 use crate::control::CancelToken;
 use crate::film::range_map::RangeMap;
 use crate::inputs::Inputs;
@@ -92,7 +92,7 @@ fn image_report(finished: &RequestResults<'_>) -> ImageReport {
         paths,
         width: plan.settings.render.width,
         height: plan.settings.render.height,
-        samples: SampleCounts { min: samples.min, mean: samples.mean, max: samples.max },
+        samples: samples.into(),
         error: finished.state.film.relative_error(),
         render_seconds: finished.state.render_seconds,
         complete: finished.state.is_complete(plan.settings.render.samples),

@@ -32,8 +32,10 @@ const SCENE: &str = "glimt:scene";
 /// Images written by glimt.
 #[derive(Debug, Default)]
 pub(crate) struct WrittenImages {
-    /// Image key and file content after the write, for each file.
-    files: HashMap<PathBuf, (Key, Content)>,
+    /// Image key and file content after the write, for each file. Files without a key are written again.
+    files: HashMap<PathBuf, (Option<Key>, Content)>,
+    /// Whether the files contain an image with changes made with keys.
+    is_by_hand: bool,
     /// Key of the scene's own image, if all of its output files are up to date.
     pub(crate) own: Option<Key>,
     /// Folders from which this write or turntable has already removed the temporary files of killed
@@ -48,11 +50,8 @@ impl WrittenImages {
         paths: &'a [PathBuf],
         contents: &Contents,
     ) -> Option<&'a Path> {
-        let holds = |path: &Path, known: &Content| {
-            // Use a token that is never cancelled.
-            contents.read(path, &CancelToken::new()).is_ok_and(|content| content == *known)
-        };
-        let is_ours = |path: &Path| self.files.get(path).is_some_and(|(_, known)| holds(path, known));
+        let is_ours =
+            |path: &Path| self.files.get(path).is_some_and(|(_, known)| has_content(path, *known, contents));
         let is_there = |path: &Path| path.symlink_metadata().is_ok();
         paths.iter().map(PathBuf::as_path).find(|path| is_there(path) && !is_ours(path))
     }
@@ -62,11 +61,28 @@ impl WrittenImages {
         self.files.is_empty()
     }
 
-    /// Forgets all files, so that the next write stage writes them again.
+    /// Whether a file on disk contains an image that the user wrote with changes made with keys. Only a save
+    /// or the user replaces it.
+    pub(crate) fn have_image_by_hand(&self, contents: &Contents) -> bool {
+        self.is_by_hand && self.files.iter().any(|(path, (_, known))| has_content(path, *known, contents))
+    }
+
+    /// Allows the scene's own image to replace any other.
+    pub(crate) fn release(&mut self) {
+        self.is_by_hand = false;
+    }
+
+    /// Forgets which images the files contain, so that the next write stage writes them again.
     fn forget(&mut self) {
-        self.files.clear();
+        self.files.values_mut().for_each(|(key, _)| *key = None);
         self.own = None;
     }
+}
+
+/// Whether a file has the given content.
+fn has_content(path: &Path, known: Content, contents: &Contents) -> bool {
+    // Use a token that is never cancelled.
+    contents.read(path, &CancelToken::new()).is_ok_and(|content| content == known)
 }
 
 /// An image's output files, and files that must not be overwritten.
@@ -159,12 +175,13 @@ fn write(
     if plan.turn.is_none_or(|turn| turn.number == 0) {
         written.sweep = SweptFolders::default();
     }
+    let unfinished = (!state.is_finished(plan)).then(|| state.film.samples().into());
     let mut radiance: Option<RadianceImage> = None;
     let (mut count, mut errors) = (0, Vec::new());
     for path in &plan.outputs {
         let key = image_file_key(state, plan, path);
         if let Some((known, content)) = written.files.get(path)
-            && *known == key
+            && *known == Some(key)
             && contents.read(path, token)? == *content
         {
             continue;
@@ -187,8 +204,9 @@ fn write(
                 // programs, which may change the file.
                 let content = contents.read(path, &CancelToken::new())?;
                 contents.outputs.end(path, Some(content));
-                written.files.insert(path.clone(), (key, content));
-                sink.image_written(path, bytes, is_own);
+                written.files.insert(path.clone(), (Some(key), content));
+                written.is_by_hand = !is_own;
+                sink.image_written(path, bytes, is_own, unfinished);
             }
             Err(error) => {
                 contents.outputs.end(path, None);
@@ -273,7 +291,7 @@ pub(crate) fn write_animation(
             Ok(bytes.len() as u64)
         };
         match write() {
-            Ok(bytes) => sink.image_written(path, bytes, true),
+            Ok(bytes) => sink.image_written(path, bytes, true, None),
             Err(OutputError::Cancelled(_)) => return Err(Stop::Cancelled),
             Err(error) => return Err(Stop::work(error)),
         }

@@ -87,6 +87,8 @@ pub(crate) struct Bench {
     pub(super) force: bool,
     pub(super) first: Option<Section>,
     pub(super) writing: WriteMode,
+    /// Number of files written so far.
+    pub(super) saves: Cell<u64>,
     /// The scene's camera, as last reported by the worker.
     pub(super) own: Cell<Option<Viewpoint>>,
 }
@@ -115,6 +117,7 @@ impl Bench {
             force: false,
             first: None,
             writing: WriteMode::Must,
+            saves: Cell::new(0),
             own: Cell::new(None),
         };
         bench.write("scene.toml", scene);
@@ -129,6 +132,7 @@ impl Bench {
 
     pub(super) fn write(&self, name: &str, text: &str) {
         fs::write(self.path(name), text).expect("written");
+        self.saves.set(self.saves.get() + 1);
     }
 
     pub(super) fn edit(&self, from: &str, to: &str) {
@@ -146,6 +150,7 @@ impl Bench {
             preview: self.preview,
             write: self.writing,
             own: None,
+            saves: self.saves.get(),
             force: self.force,
             first: self.first,
         })));

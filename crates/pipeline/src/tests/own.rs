@@ -34,6 +34,7 @@ impl ToggledBench {
             overrides: shown,
             preview: None,
             write: WriteMode::No,
+            saves: self.0.saves.get(),
             force: false,
             first: None,
         })));
@@ -104,13 +105,145 @@ fn write_command_saves_the_shown_image() {
     let by_hand = |event: &Event| matches!(event, Event::Written { is_own: false, .. });
     assert!(events.iter().any(by_hand), "{events:?}");
     assert_eq!(states(&events).last(), Some(&OwnImageState::Begun { is_rendering: false }));
-    assert!(keys.0.picture() != own, "the image should have no shadows");
-    let text = fs::read_to_string(&report).expect("a report");
-    assert!(text.contains("\"shadows\": \"off\"") && text.contains("out.ppm"), "{text}");
-    let (_, events) = (keys.0.send(), keys.0.until_end(keys.0.generation));
+    assert!(keys.0.picture() != own, "without shadows");
+    let shadows = || {
+        let report = fs::read_to_string(&report).expect("a report");
+        let report: serde_json::Value = serde_json::from_str(&report).expect("JSON");
+        (report["settings"]["shadows"].clone(), report["image"]["path"].is_string())
+    };
+    assert_eq!(shadows(), ("off".into(), true));
+    // Returning to the scene's settings only changes the preview.
+    let written = keys.0.picture();
+    assert_statuses(&keys.0.done().0, "rrrrrsrs");
+    assert!(keys.0.picture() == written);
+    assert_eq!(shadows(), ("off".into(), true));
+    let events = write_now(&mut keys);
     assert!(events.iter().any(|event| matches!(event, Event::Written { is_own: true, .. })));
     assert!(keys.0.picture() == own);
-    assert!(fs::read_to_string(&report).expect("a report").contains("\"shadows\": \"soft\""));
+    // The next request starts after the report has been written.
+    assert_statuses(&keys.0.done().0, "rrrrrsrr");
+    assert_eq!(shadows(), ("soft".into(), true));
+}
+
+/// Sends a write command for the finished image. Returns its events.
+fn write_now(keys: &mut ToggledBench) -> Vec<Event> {
+    keys.0.worker.send(Command::Write);
+    let mut events = vec![keys.0.next()];
+    while !matches!(events.last(), Some(Event::WriteDone { .. } | Event::WriteFailed { .. })) {
+        events.push(keys.0.next());
+    }
+    events
+}
+
+/// Begins the scene's own image, then writes it with another exposure. Returns the request and the written
+/// image.
+fn write_brighter(keys: &mut ToggledBench) -> (u64, Vec<u8>) {
+    begin(keys);
+    let of = keys.show(|overrides| overrides.exposure = Some(2.0));
+    keys.0.worker.send(Command::Write);
+    while !matches!(keys.0.next(), Event::WriteDone { .. }) {}
+    (of, keys.0.picture())
+}
+
+#[test]
+fn own_render_keeps_an_image_written_on_request() {
+    let changes: [fn(&mut Overrides); 4] = [
+        |overrides| overrides.exposure = Some(2.0),
+        |overrides| overrides.view = Some(View::Samples),
+        |overrides| overrides.view = Some(View::Normal),
+        no_shadows,
+    ];
+    for change in changes {
+        let mut keys = ToggledBench::with(slow);
+        begin(&mut keys);
+        let of = keys.show(change);
+        keys.0.worker.send(Command::Write);
+        while !matches!(keys.0.next(), Event::WriteDone { .. }) {}
+        let written = keys.0.picture();
+        let events = keys.0.until_end(of);
+        assert!(!events.iter().any(|event| matches!(event, Event::Written { .. })), "{events:?}");
+        assert!(matches!(states(&events).last(), Some(OwnImageState::Begun { .. })), "{events:?}");
+        let (report, _) = keys.0.done();
+        assert_eq!(report.image.path, None);
+        assert_eq!(report.stages[Stage::Write as usize].why, reasons::OTHER_IMAGE_WRITTEN);
+        assert!(keys.0.picture() == written);
+        assert!(
+            write_now(&mut keys).iter().any(|event| matches!(event, Event::Written { is_own: true, .. }))
+        );
+        assert!(keys.0.picture() != written);
+        assert_statuses(&keys.0.done().0, "rrrrrsrr");
+    }
+}
+
+#[test]
+fn save_replaces_an_image_written_on_request() {
+    let mut keys = ToggledBench::with(slow);
+    let (of, written) = write_brighter(&mut keys);
+    keys.0.until_end(of);
+    // A scene that cannot be read is not a new version.
+    keys.0.edit("[camera]", "[camera");
+    keys.0.send();
+    while !matches!(keys.0.next(), Event::LastGoodEnded { .. }) {}
+    assert!(keys.0.picture() == written);
+    // The own image shares its film with the preview.
+    keys.0.edit("[camera", "[camera] # saved");
+    let events = keys.shown(|overrides| overrides.exposure = Some(2.0));
+    assert_eq!(states(&events).last(), Some(&OwnImageState::Written));
+    let own = keys.0.picture();
+    assert!(own != written);
+    // Without a shared film, the save is written when the user returns to the scene's settings.
+    keys.shown(no_shadows);
+    write_now(&mut keys);
+    assert!(keys.0.picture() != own);
+    keys.0.edit("# saved", "# saved again");
+    keys.shown(no_shadows);
+    assert!(keys.0.picture() != own);
+    keys.0.done();
+    assert!(keys.0.picture() == own);
+}
+
+#[test]
+fn removed_image_written_on_request_is_not_kept() {
+    let mut keys = ToggledBench::with(slow);
+    let (of, written) = write_brighter(&mut keys);
+    fs::rename(keys.0.path("out.ppm"), keys.0.path("bright.ppm")).expect("moved");
+    let events = keys.0.until_end(of);
+    assert_eq!(states(&events).last(), Some(&OwnImageState::Written));
+    assert!(keys.0.picture() != written);
+}
+
+#[test]
+fn failed_write_keeps_the_image_written_before() {
+    let mut keys = ToggledBench::with(slow);
+    let image = keys.0.path("images/out.ppm");
+    fs::create_dir(keys.0.path("images")).expect("a folder");
+    keys.0.overrides.outputs = vec![image.clone()];
+    begin(&mut keys);
+    let of = keys.show(no_shadows);
+    keys.0.worker.send(Command::Write);
+    keys.0.until_end(of);
+    let written = fs::read(&image).expect("an image");
+    fs::rename(keys.0.path("images"), keys.0.path("away")).expect("moved");
+    assert!(write_now(&mut keys).iter().any(|event| matches!(event, Event::WriteFailed { .. })));
+    fs::rename(keys.0.path("away"), keys.0.path("images")).expect("moved back");
+    keys.0.done();
+    assert!(fs::read(&image).expect("an image") == written);
+}
+
+#[test]
+fn checkpoint_remains_until_own_image_is_written() {
+    let mut keys = ToggledBench::with(slow);
+    keys.0.overrides.checkpoints = Checkpoints { seconds: 0.01, resume: Resume::IfSame, are_kept: false };
+    let (of, _) = write_brighter(&mut keys);
+    keys.0.until_end(of);
+    let path = keys.0.path("out.ppm.checkpoint");
+    assert!(path.exists());
+    keys.0.done();
+    assert!(path.exists());
+    write_now(&mut keys);
+    // The next request starts after the write command has been handled.
+    keys.0.done();
+    assert!(!path.exists());
 }
 
 #[test]

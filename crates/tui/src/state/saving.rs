@@ -7,6 +7,7 @@ use super::request::KeyOverrides;
 use crate::event::WriteFailure;
 use crate::options::ExternalChange;
 use crate::pipeline::protocol::{CameraEdit, OwnImageState, Viewpoint};
+use crate::scene::sanitize::visible;
 
 /// A saved change that is not on the screen yet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,10 +35,24 @@ pub(crate) struct WrittenFile {
     pub made: String,
     /// Changes made with keys that the file includes. `None` for the scene's own image.
     pub shows: Option<KeyOverrides>,
+    /// Whether the image was written before its render finished.
+    pub is_unfinished: bool,
     /// Whether writing a later image to this file failed, so its content is unknown.
     pub is_stale: bool,
     /// How another program changed the file.
     pub lost: Option<ExternalChange>,
+}
+
+impl WrittenFile {
+    /// The file's path, safe to display.
+    pub(crate) fn name(&self) -> String {
+        visible(&self.path.to_string_lossy()).into_owned()
+    }
+
+    /// Describes the changes made with keys that the file includes.
+    pub(crate) fn changes(&self) -> Vec<String> {
+        self.shows.unwrap_or_default().differences(&KeyOverrides::default(), false)
+    }
 }
 
 /// State of saved scene files and written images.
@@ -83,6 +98,19 @@ pub(crate) struct SavingState {
 }
 
 impl SavingState {
+    /// The file in which the user wrote an image with changes made with keys, if any. The scene's own image
+    /// does not replace it until the scene is saved or the user writes another image.
+    pub(crate) fn image_by_hand(&self) -> Option<&WrittenFile> {
+        let is_there = |written: &&WrittenFile| !written.is_stale && written.lost.is_none();
+        let is_newer = |written: &&WrittenFile| written.generation >= self.saved_at;
+        self.written.iter().filter(is_there).filter(is_newer).find(|written| written.shows.is_some())
+    }
+
+    /// Whether all files were written before the scene was last saved.
+    pub(crate) fn is_older_than_edit(&self) -> bool {
+        self.written.iter().all(|written| written.generation < self.saved_at)
+    }
+
     pub(super) fn new() -> Self {
         Self {
             edits: 0,

@@ -70,6 +70,8 @@ pub(crate) struct WorkState {
     pub unchanged: bool,
     /// Number of finished renders, not counting exposure changes.
     pub renders: u64,
+    /// Whether the newest render, at any exposure, was counted.
+    pub is_counted: bool,
 }
 
 impl WorkState {
@@ -89,6 +91,7 @@ impl WorkState {
             curves: Vec::new(),
             unchanged: false,
             renders: 0,
+            is_counted: false,
         }
     }
 

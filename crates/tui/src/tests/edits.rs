@@ -12,13 +12,6 @@ use crate::scene::fingerprint::FingerprintHasher;
 
 const GREEN: [u8; 3] = [10, 200, 20];
 
-/// Saves a scene with this text. The worker starts reading it.
-fn save(ui: &mut TestUi, text: &str) {
-    ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
-    let generation = ui.state.request.generation;
-    ui.worker_event(protocol::Event::Text { generation, text: text.into() });
-}
-
 /// Saves a scene that contains an error.
 fn save_broken_scene(ui: &mut TestUi) {
     ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
@@ -33,20 +26,6 @@ fn preview(ui: &mut TestUi, name: &str, color: [u8; 3], is_finished: bool) {
     let picture = uniform_picture(50, 38, color);
     let (range, section, lacks_photons) = (None, None, false);
     ui.handle_event(Event::Picture { generation, picture, range, section, lacks_photons, source });
-}
-
-/// Reports that the scene is valid.
-fn read(ui: &mut TestUi) {
-    let generation = ui.state.request.generation;
-    ui.worker_event(protocol::Event::Started { generation });
-    let (settings, camera) = (Box::new(effective_settings()), camera());
-    ui.worker_event(protocol::Event::Settings {
-        generation,
-        settings,
-        camera,
-        exposure: 0.0,
-        own: own_settings(),
-    });
 }
 
 /// Finishes a request whose render stage took `seconds`. Rendering the image took `of_image` seconds in
@@ -65,17 +44,17 @@ fn end(ui: &mut TestUi, unchanged: bool, seconds: f64, of_image: f64) {
 #[test]
 fn fixing_a_typo_is_not_an_edit() {
     let mut ui = TestUi::with(state(120, 40));
-    save(&mut ui, "shininess = 60");
+    ui.save_scene("shininess = 60");
     ui.finish_render(RED);
-    save(&mut ui, "shininess = 6");
-    read(&mut ui);
+    ui.save_scene("shininess = 6");
+    ui.read_scene();
     preview(&mut ui, "dull", BLUE, true);
     end(&mut ui, false, 1.0, 1.0);
     save_broken_scene(&mut ui);
     // The last valid scene is shown again, possibly with different dithering.
     preview(&mut ui, "dull", GREEN, true);
-    save(&mut ui, "shininess = 6");
-    read(&mut ui);
+    ui.save_scene("shininess = 6");
+    ui.read_scene();
     preview(&mut ui, "dull", GREEN, true);
     end(&mut ui, true, 0.0, 1.0);
     assert!(ui.text().contains("unchanged · render 2"), "{}", ui.text());
@@ -91,12 +70,12 @@ fn fixing_a_typo_is_not_an_edit() {
 #[test]
 fn editing_a_comment_adds_no_entry() {
     let mut ui = TestUi::with(state(120, 40));
-    save(&mut ui, "a = 1 # one");
-    read(&mut ui);
+    ui.save_scene("a = 1 # one");
+    ui.read_scene();
     preview(&mut ui, "first", RED, true);
     end(&mut ui, false, 1.0, 1.0);
-    save(&mut ui, "a = 1 # two");
-    read(&mut ui);
+    ui.save_scene("a = 1 # two");
+    ui.read_scene();
     preview(&mut ui, "first", BLUE, true);
     end(&mut ui, true, 0.0, 1.0);
     assert_eq!((ui.state.picture.history.len(), ui.state.work.renders), (1, 1));
@@ -107,16 +86,16 @@ fn editing_a_comment_adds_no_entry() {
 #[test]
 fn editing_the_output_path_adds_no_entry() {
     let mut ui = TestUi::with(state(120, 40));
-    save(&mut ui, "camera.fov = 40");
-    read(&mut ui);
+    ui.save_scene("camera.fov = 40");
+    ui.read_scene();
     show_preview(&mut ui, "narrow", RED, true);
     end(&mut ui, false, 1.0, 1.0);
-    save(&mut ui, "camera.fov = 44");
-    read(&mut ui);
+    ui.save_scene("camera.fov = 44");
+    ui.read_scene();
     show_preview(&mut ui, "wide", BLUE, true);
     end(&mut ui, false, 1.0, 1.0);
-    save(&mut ui, "camera.fov = 44\nrender.output = \"other.png\"");
-    read(&mut ui);
+    ui.save_scene("camera.fov = 44\nrender.output = \"other.png\"");
+    ui.read_scene();
     show_preview(&mut ui, "wide", BLUE, true);
     let generation = ui.state.request.generation;
     let mut event = done_event(generation, Vec::new(), false);
@@ -136,17 +115,17 @@ fn editing_the_output_path_adds_no_entry() {
 #[test]
 fn resumed_render_time_is_cumulative() {
     let mut ui = TestUi::with(state(120, 40));
-    save(&mut ui, "a = 1");
-    read(&mut ui);
+    ui.save_scene("a = 1");
+    ui.read_scene();
     preview(&mut ui, "first", RED, true);
     end(&mut ui, false, 5.8, 5.8);
     ui.press('r');
-    read(&mut ui);
+    ui.read_scene();
     preview(&mut ui, "first", BLUE, false);
     save_broken_scene(&mut ui);
     preview(&mut ui, "first", GREEN, false);
-    save(&mut ui, "a = 1");
-    read(&mut ui);
+    ui.save_scene("a = 1");
+    ui.read_scene();
     preview(&mut ui, "first", GREEN, false);
     let generation = ui.state.request.generation;
     let progress = protocol::RenderProgress { earlier_seconds: 4.5, ..render_progress(0.5, None) };
@@ -178,10 +157,10 @@ const FINISHED: LastValidSceneOutcome = LastValidSceneOutcome::Finished { unchan
 /// A finished render, followed by an edit and by a typo while the edit is being rendered.
 fn typo_during_a_render() -> TestUi {
     let mut ui = TestUi::with(state(120, 40));
-    save(&mut ui, "shininess = 60");
+    ui.save_scene("shininess = 60");
     ui.finish_render(RED);
-    save(&mut ui, "shininess = 6");
-    read(&mut ui);
+    ui.save_scene("shininess = 6");
+    ui.read_scene();
     show_preview(&mut ui, "dull", BLUE, false);
     save_broken_scene(&mut ui);
     show_preview(&mut ui, "dull", GREEN, false);
@@ -209,14 +188,14 @@ fn render_of_last_valid_scene_is_counted_once() {
         ui.press(key);
     }
     newest(&mut ui);
-    save(&mut ui, "shininess = 6");
-    read(&mut ui);
+    ui.save_scene("shininess = 6");
+    ui.read_scene();
     show_preview(&mut ui, "dull", BLUE, true);
     end(&mut ui, true, 0.0, 1.0);
     newest(&mut ui);
     assert!(ui.text().contains("unchanged · render 2"), "{}", ui.text());
-    save(&mut ui, "shininess = 5");
-    read(&mut ui);
+    ui.save_scene("shininess = 5");
+    ui.read_scene();
     show_preview(&mut ui, "duller", RED, true);
     end(&mut ui, false, 1.0, 1.0);
     ui.press('n');
@@ -234,8 +213,8 @@ fn stopped_render_of_last_valid_scene_is_marked() {
 #[test]
 fn render_of_last_valid_scene_is_numbered() {
     let mut ui = TestUi::with(state(120, 40));
-    save(&mut ui, "shininess = 60");
-    read(&mut ui);
+    ui.save_scene("shininess = 60");
+    ui.read_scene();
     show_preview(&mut ui, "bright", RED, true);
     end(&mut ui, false, 1.0, 1.0);
     save_broken_scene(&mut ui);
@@ -263,7 +242,7 @@ fn complete_image_is_not_listed_as_stopped() {
     let mut ui = TestUi::with(state(120, 40));
     ui.finish_render(RED);
     ui.press('s');
-    read(&mut ui);
+    ui.read_scene();
     // All samples are rendered, but a key is pressed before the request is done.
     show_preview(&mut ui, "hard", GREEN, true);
     ui.press('s');
@@ -283,7 +262,7 @@ fn entries_are_numbered_by_render() {
     ui.finish_render(RED);
     // Stopped renders are not counted.
     ui.press('s');
-    read(&mut ui);
+    ui.read_scene();
     preview(&mut ui, "hard", GREEN, false);
     ui.press('s');
     ui.finish_render(BLUE);
@@ -316,16 +295,16 @@ fn entries_are_numbered_by_render() {
 #[test]
 fn age_is_measured_from_last_improvement() {
     let mut ui = TestUi::with(state(120, 40));
-    save(&mut ui, "shininess = 60");
-    read(&mut ui);
+    ui.save_scene("shininess = 60");
+    ui.read_scene();
     show_preview(&mut ui, "bright", RED, false);
     ui.advance_clock(8000);
     end(&mut ui, false, 8.0, 8.0);
     ui.advance_clock(3000);
     // Showing an image again, for example at a different size, does not change its age.
     show_preview(&mut ui, "bright", GREEN, true);
-    save(&mut ui, "shininess = 6");
-    read(&mut ui);
+    ui.save_scene("shininess = 6");
+    ui.read_scene();
     show_preview(&mut ui, "dull", BLUE, false);
     ui.advance_clock(2000);
     ui.press('n');
@@ -365,8 +344,8 @@ fn reset_settings_are_listed_together() {
 fn pinhole_is_reported_for_both_keys() {
     for text in ["[camera]\nfov = 40", "[camera]\naperture = 0.0"] {
         let mut ui = TestUi::new();
-        save(&mut ui, text);
-        read(&mut ui);
+        ui.save_scene(text);
+        ui.read_scene();
         ui.state.request.effective = Some(EffectiveSettings { dof: false, ..effective_settings() });
         ui.state.request.camera.as_mut().expect("a camera").aperture = 0.0;
         ui.press('d');

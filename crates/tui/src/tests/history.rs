@@ -4,10 +4,13 @@ use crossterm::event::KeyCode;
 
 use super::{BLUE, RED};
 use crate::Changed;
+use crate::color::ColorDepth;
 use crate::event::{Effect, Event, KeyPress, Mouse, MouseEventKind};
 use crate::fixtures::*;
 use crate::messages;
 use crate::pipeline::protocol::{Command, Event as WorkerEvent, Picked, SavedCamera};
+use crate::pipeline::settings::Overrides;
+use crate::preview_kind::PreviewKind;
 
 /// A UI with two renders: the beauty view, then the normal view with hard shadows. The older one is being
 /// viewed.
@@ -149,4 +152,53 @@ fn save_time_is_cleared_by_the_next_render() {
     ui.press('s');
     ui.finish_render(RED);
     assert!(ui.state.saving.first_change.is_none(), "not rendered after a save: {}", ui.text());
+}
+
+/// Kinds with and without a preview.
+const KINDS: [PreviewKind; 2] = [PreviewKind::HalfBlock, PreviewKind::None];
+
+fn ui_with(kind: PreviewKind) -> TestUi {
+    TestUi::with(state_with(80, 24, kind, ColorDepth::TrueColor, Overrides::default()))
+}
+
+#[test]
+fn interrupted_render_is_counted_once() {
+    for kind in KINDS {
+        let mut ui = ui_with(kind);
+        ui.read_scene();
+        // A key interrupts the first render, later ones find it finished. The next render is interrupted, too.
+        for (keys, number) in [("]", 1), ("]", 1), ("s]", 2), ("]", 2), ("s", 3)] {
+            keys.chars().for_each(|key| drop(ui.press(key)));
+            ui.finish_render(RED);
+            assert!(ui.text().contains(&messages::render_number(number)), "{kind:?} {keys}: {}", ui.text());
+        }
+    }
+}
+
+#[test]
+fn first_render_is_counted_even_if_unchanged() {
+    let mut ui = ui_with(PreviewKind::None);
+    ui.read_scene();
+    // The key arrives when the image is complete but the request has not ended.
+    ui.press(']');
+    ui.read_scene();
+    ui.worker_event(done_event(ui.state.request.generation, Vec::new(), true));
+    assert!(ui.text().contains(&messages::render_number(1)), "{}", ui.text());
+}
+
+#[test]
+fn history_needs_a_preview() {
+    let keys =
+        [('n', messages::OLDEST_RENDER), ('N', messages::NEWEST_RENDER), ('b', messages::NO_EARLIER_RENDER)];
+    for (kind, (key, words)) in KINDS.into_iter().flat_map(|kind| keys.map(|it| (kind, it))) {
+        let mut ui = ui_with(kind);
+        let has_preview = kind != PreviewKind::None;
+        ui.press(key);
+        let early = if has_preview { messages::NO_IMAGE } else { messages::NO_PREVIEW };
+        assert!(ui.text().contains(early), "{kind:?} {key}: {}", ui.text());
+        ui.finish_render(RED);
+        ui.press(key);
+        let late = if has_preview { words } else { messages::NO_PREVIEW };
+        assert!(ui.text().contains(late), "{kind:?} {key}: {}", ui.text());
+    }
 }

@@ -105,12 +105,7 @@ fn layout_is_stable_during_a_render() {
                 }),
                 3 => ui.press(' '),
                 4 => ui.press('0'),
-                5 => ui.worker_event(protocol::Event::Written {
-                    generation,
-                    path: "cornell.png".into(),
-                    bytes: 1,
-                    is_own: true,
-                }),
+                5 => ui.worker_event(written_event(generation, "cornell.png", true)),
                 6 => ui.worker_event(done_event(
                     generation,
                     vec![diagnostic(Severity::Warning, "unused")],
@@ -264,6 +259,7 @@ fn status_line_lists_only_current_files() {
         path: "dof.png".into(),
         bytes: 63_000,
         is_own: true,
+        unfinished: None,
     });
     assert!(
         Layout::for_state(&ui.state).panel.is_empty() && ui.text().contains("→ dof.png 63.0 kB"),
@@ -283,6 +279,7 @@ fn status_line_lists_only_current_files() {
         path: "dof.png".into(),
         bytes: 64_000,
         is_own: false,
+        unfinished: None,
     });
     ui.press('?');
     ui.press('?');

@@ -16,6 +16,7 @@ mod screen;
 mod side_panel;
 mod warnings;
 mod words;
+mod writing;
 
 use ratatui::style::Color;
 

@@ -84,6 +84,7 @@ fn notice_does_not_hide_the_written_file() {
                 path: "cornell.png".into(),
                 bytes: 90_200,
                 is_own: true,
+                unfinished: None,
             });
             ui.finish_render(RED);
             crate::update::show_notice(&mut ui.state, notice);

@@ -202,6 +202,7 @@ fn written_file_is_shown_with_its_size() {
         path: "out/cornell.png".into(),
         bytes: 210_400,
         is_own: true,
+        unfinished: None,
     });
     let text = ui.text();
     for words in ["→ out/cornell.png", "  210.4 kB, 640×480"] {
@@ -214,8 +215,7 @@ fn written_file_is_shown_with_its_size() {
 fn write_is_confirmed_after_all_files() {
     let mut ui = TestUi::new();
     ui.finish_render(RED);
-    let written =
-        |path: &str| protocol::Event::Written { generation: 1, path: path.into(), bytes: 1, is_own: true };
+    let written = |path: &str| written_event(1, path, true);
     let done = || protocol::Event::WriteDone { generation: 1, paths: vec!["a.png".into(), "b.ppm".into()] };
     ui.press('w');
     ui.worker_event(written("a.png"));
@@ -400,7 +400,7 @@ fn escape_sequences_in_names_are_harmless() {
         generation: 1,
         stage: stage_report(Stage::Parse, Status::Done, 0.1, evil),
     });
-    ui.worker_event(protocol::Event::Written { generation: 1, path: evil.into(), bytes: 1, is_own: true });
+    ui.worker_event(written_event(1, evil, true));
     let harmless = |text: &str| {
         assert!(text.contains('␛'), "{text}");
         assert!(text.chars().all(|c| c == '\n' || !(c.is_control() || c == '\u{202e}')), "{text:?}");
@@ -485,7 +485,7 @@ fn unwritten_image_is_not_shown_as_done() {
     assert!(ui.text().contains("─ 1 error ─") && ui.text().contains("error: a.png"));
     ui.press('e');
     assert!(!ui.text().contains("disk full"), "{}", ui.text());
-    ui.worker_event(protocol::Event::Written { generation, path: "a.png".into(), bytes: 1, is_own: true });
+    ui.worker_event(written_event(generation, "a.png", true));
     assert!(first(&mut ui).contains("✓ done"), "{}", ui.text());
 }
 
@@ -500,12 +500,7 @@ fn text_below_header(ui: &mut TestUi) -> String {
 fn files_of_other_images_are_not_listed() {
     for (columns, rows) in [(80, 24), (120, 40), (100, 20)] {
         let mut ui = TestUi::with(state(columns, rows));
-        let written = |generation| protocol::Event::Written {
-            generation,
-            path: "a.png".into(),
-            bytes: 1,
-            is_own: true,
-        };
+        let written = |generation| written_event(generation, "a.png", true);
         let failed = |generation, message: &str| protocol::Event::WriteFailed {
             generation,
             path: Some("a.png".into()),
@@ -554,7 +549,7 @@ fn write_failure_is_cleared_by_a_later_write() {
     ui.press('w');
     let message = "cannot write a.png: full".to_owned();
     ui.worker_event(protocol::Event::WriteFailed { generation: 1, path: Some("a.png".into()), message });
-    ui.worker_event(protocol::Event::Written { generation: 1, path: "a.png".into(), bytes: 1, is_own: true });
+    ui.worker_event(written_event(1, "a.png", true));
     ui.finish_render(super::RED);
     ui.key(KeyPress::special(crossterm::event::KeyCode::Esc));
     assert!(ui.text().contains("✓ done") && text_below_header(&mut ui).contains("→ a.png"), "{}", ui.text());

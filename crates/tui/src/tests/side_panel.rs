@@ -56,9 +56,7 @@ fn rendered(ui: &mut TestUi, error: f32) {
 /// Saves the scene with each of these texts, one after the other.
 fn edited(ui: &mut TestUi, edits: &[(&str, [u8; 3])]) {
     for (text, color) in edits {
-        ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
-        let generation = ui.state.request.generation;
-        ui.worker_event(protocol::Event::Text { generation, text: (*text).into() });
+        ui.save_scene(text);
         ui.finish_render(*color);
     }
 }
@@ -153,35 +151,16 @@ fn history_lists_changes_and_opens_on_click() {
 
 /// Saves the scene and starts its render. If a color is given, shows a preview in that color.
 fn start_render(ui: &mut TestUi, text: &str, color: Option<[u8; 3]>) {
-    ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
-    let generation = ui.state.request.generation;
-    ui.worker_event(protocol::Event::Started { generation });
-    ui.worker_event(protocol::Event::Text { generation, text: text.into() });
-    let (settings, camera) = (Box::new(effective_settings()), camera());
-    ui.worker_event(protocol::Event::Settings {
-        generation,
-        settings,
-        camera,
-        exposure: 0.0,
-        own: own_settings(),
-    });
+    ui.save_scene(text);
+    ui.read_scene();
     color.into_iter().for_each(|color| show(ui, color));
 }
 
 /// Shows a preview of the current request on the terminal.
 fn show(ui: &mut TestUi, color: [u8; 3]) {
-    let (generation, picture) = (ui.state.request.generation, uniform_picture(50, 38, color));
-    let picture = Event::Picture {
-        generation,
-        picture,
-        range: None,
-        section: None,
-        lacks_photons: false,
-        source: None,
-    };
-    ui.handle_event(picture);
+    ui.show_preview(color);
     // The preview's first bytes have been sent.
-    ui.handle_event(Event::Shown { generation });
+    ui.handle_event(Event::Shown { generation: ui.state.request.generation });
 }
 
 #[test]
@@ -190,15 +169,7 @@ fn preview_does_not_wait_for_the_history() {
     edited(&mut ui, &[("camera.fov = 40", RED)]);
     start_render(&mut ui, "camera.fov = 30", None);
     let (generation, before) = (ui.state.request.generation, ui.state.picture.history.len());
-    let picture = uniform_picture(50, 38, BLUE);
-    ui.handle_event(Event::Picture {
-        generation,
-        picture,
-        range: None,
-        section: None,
-        lacks_photons: false,
-        source: None,
-    });
+    ui.show_preview(BLUE);
     assert!(ui.state.dirty && ui.state.urgent);
     assert_eq!(ui.state.picture.history.len(), before);
     ui.state.dirty = false;
@@ -456,6 +427,7 @@ fn written_files_are_hyperlinks() {
             path: "cornell.png".into(),
             bytes: 107_000,
             is_own: true,
+            unfinished: None,
         });
         ui.finish_render(RED);
         let mut buffer = ui.draw_screen();

@@ -203,9 +203,18 @@ fn render_or_delay_step(state: &mut State) -> Vec<Effect> {
         state.request.camera_step.is_waiting = true;
         return Vec::new();
     }
+    render_step(state)
+}
+
+fn render_step(state: &mut State) -> Vec<Effect> {
     let effects = request_render(state, false);
     state.request.camera_step.generation = Some(state.request.generation);
     effects
+}
+
+/// Renders the waiting step, if any, even if the previous one has no preview.
+pub(super) fn render_waiting_step_now(state: &mut State) -> Vec<Effect> {
+    if state.request.camera_step.is_waiting { render_step(state) } else { Vec::new() }
 }
 
 /// Renders the waiting step if the previous one has a preview.

@@ -197,9 +197,11 @@ fn toggle_pause(state: &mut State) -> Vec<Effect> {
 
 fn write_image_now(state: &mut State) -> Vec<Effect> {
     let is_open = state.picture.history.is_viewing_older();
+    let mut effects = camera::render_waiting_step_now(state);
     show_notice(state, if is_open { messages::WRITING_NEWEST } else { messages::WRITING });
     (state.saving.is_write_requested, state.saving.write_shows) = (true, state.request.sent_toggles);
-    vec![Effect::Send(Command::Write)]
+    effects.push(Effect::Send(Command::Write));
+    effects
 }
 
 fn reset_to_scene_settings(state: &mut State) -> Vec<Effect> {

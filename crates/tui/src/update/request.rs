@@ -23,6 +23,7 @@ pub(super) fn request_render(state: &mut State, force: bool) -> Vec<Effect> {
         // Exposure only affects how the image is displayed.
         state.picture.history.reassign_to_next_request(state.request.generation);
     }
+    state.work.is_counted &= state.request.is_exposure_only;
     state.request.generation += 1;
     let is_moved = state.request.toggles.camera.has_changes();
     state.request.moved_since =
@@ -43,6 +44,7 @@ pub(super) fn request_render(state: &mut State, force: bool) -> Vec<Effect> {
         preview: state.request.preview_size,
         write: if state.request.is_own_image() { WriteMode::Try } else { WriteMode::No },
         own: state.request.own_image_overrides(),
+        saves: state.saving.edits,
         force,
         first: state.request.first_section,
     };

@@ -12,8 +12,8 @@ use crate::messages;
 use crate::noise_curve::NoiseCurve;
 use crate::options::OutputChange;
 use crate::pipeline::protocol::{
-    AssetProgress, CheckpointUpdate, Event, Failure, LastValidSceneOutcome, OwnImageState, Report, Stage,
-    StageReport, Status,
+    AssetProgress, CheckpointUpdate, Event, Failure, LastValidSceneOutcome, OwnImageState, Report,
+    SampleCounts, Stage, StageReport, Status,
 };
 use crate::scene::MOST_COMPARED_BYTES;
 use crate::scene::diagnostic::{Diagnostic, Severity};
@@ -34,8 +34,10 @@ pub(super) fn handle_worker_event(state: &mut State, event: Event) -> Vec<Effect
             return Vec::new();
         }
         // Images of earlier requests may be written after a new request has started.
-        Event::Written { path, bytes, generation, is_own } if generation != state.request.generation => {
-            record_file(state, path, bytes, (generation, is_own));
+        Event::Written { path, bytes, generation, is_own, unfinished }
+            if generation != state.request.generation =>
+        {
+            record_file(state, path, bytes, (generation, is_own), unfinished);
             return Vec::new();
         }
         Event::Done { generation, report, .. } if generation != state.request.generation => {
@@ -88,8 +90,8 @@ pub(super) fn handle_worker_event(state: &mut State, event: Event) -> Vec<Effect
         | Event::CameraKept { .. }
         | Event::CameraUndone { .. }
         | Event::Picked { .. } => {}
-        Event::Written { path, bytes, generation, is_own } => {
-            record_own_written(state, path, bytes, (generation, is_own));
+        Event::Written { path, bytes, generation, is_own, unfinished } => {
+            record_own_written(state, path, bytes, (generation, is_own), unfinished);
         }
         Event::OwnImage { state: own, .. } => state.saving.own.state = own,
         Event::WriteFailed { path, message, .. } => {
@@ -240,42 +242,64 @@ fn report_written(state: &mut State, paths: &[PathBuf]) {
 }
 
 /// Records a written file. It is listed next to the image because a message would cover the keys.
-fn record_own_written(state: &mut State, path: PathBuf, bytes: u64, (generation, is_own): (u64, bool)) {
+fn record_own_written(
+    state: &mut State,
+    path: PathBuf,
+    bytes: u64,
+    (generation, is_own): (u64, bool),
+    unfinished: Option<SampleCounts>,
+) {
     // If the render is still running, writing another output may have failed.
     let is_by_hand = state.work.activity == WorkerActivity::Done;
     if is_by_hand {
         (state.saving.unwritten, state.saving.write_failed) = (None, None);
         close_empty_pane(state);
     }
-    record_file(state, path, bytes, (generation, is_own));
+    record_file(state, path, bytes, (generation, is_own), unfinished);
 }
 
 /// Records that an image has been written. Its render may still be running. If there is a report, it belongs
 /// to the same image.
-fn record_file(state: &mut State, path: PathBuf, bytes: u64, (generation, is_own): (u64, bool)) {
-    let view = if is_own { state.request.base_view() } else { state.request.view() };
-    let made = match &state.work.report {
-        Some(report) => exit_summary::describe_image(report, view),
-        None if generation == state.request.generation => exit_summary::view_label(view),
-        None => String::new(),
+fn record_file(
+    state: &mut State,
+    path: PathBuf,
+    bytes: u64,
+    (generation, is_own): (u64, bool),
+    unfinished: Option<SampleCounts>,
+) {
+    let shows = (!is_own).then_some(state.saving.write_shows);
+    let view = shows.and_then(|shows| shows.view).unwrap_or(state.request.base_view());
+    let made = match (unfinished, &state.work.report) {
+        (Some(samples), _) => exit_summary::describe_unfinished(samples, view),
+        (None, Some(report)) => exit_summary::describe_image(report, view),
+        (None, None) if generation == state.request.generation => exit_summary::view_label(view),
+        (None, None) => String::new(),
     };
     state.saving.written.retain(|other| other.path != path);
-    let shows = (!is_own).then_some(state.saving.write_shows);
     if !is_own && state.saving.own.state == OwnImageState::Written {
         state.saving.own.state = OwnImageState::Begun { is_rendering: false };
     }
-    let written = WrittenFile { path, bytes, generation, made, shows, is_stale: false, lost: None };
-    state.saving.written.push(written);
+    let is_unfinished = unfinished.is_some();
+    let (is_stale, lost) = (false, None);
+    state.saving.written.push(WrittenFile {
+        path,
+        bytes,
+        generation,
+        made,
+        shows,
+        is_unfinished,
+        is_stale,
+        lost,
+    });
 }
 
-/// Adds a description to the files of a finished request.
+/// Adds a description to the files that contain a finished request's image.
 fn describe_files(state: &mut State, generation: u64, report: &Report) {
-    let (is_written, base) = (report.image.path.is_some(), state.request.base_view());
-    for written in state.saving.written.iter_mut().filter(|written| written.generation == generation) {
-        if is_written || written.shows.is_none() {
-            let view = if written.shows.is_none() { base } else { report.settings.view };
-            written.made = exit_summary::describe_image(report, view);
-        }
+    let base = state.request.base_view();
+    let has_image = |written: &&mut WrittenFile| written.generation == generation && !written.is_unfinished;
+    for written in state.saving.written.iter_mut().filter(has_image) {
+        let view = written.shows.and_then(|shows| shows.view).unwrap_or(base);
+        written.made = exit_summary::describe_image(report, view);
     }
 }
 
@@ -362,7 +386,8 @@ fn add_earlier_seconds(report: &mut Report) {
 
 /// Counts a finished render, unless it did not change the newest image.
 fn count_render(state: &mut State, unchanged: bool) {
-    let is_new = !unchanged && !state.request.is_exposure_only;
+    let is_counted = std::mem::replace(&mut state.work.is_counted, true);
+    let is_new = !unchanged && !is_counted || state.work.renders == 0;
     let is_shown = state.picture.history.is_newest(state.request.generation);
     if is_new || is_shown && state.picture.history.is_newest_unfinished() {
         state.work.renders += 1;

@@ -151,8 +151,7 @@ fn result_lines(state: &State, width: u16) -> Vec<StyledLine> {
     status_line::unsaved_messages(state).iter().for_each(|words| add(words, Tone::Faint));
     status_line::changed_file_messages(state).for_each(|words| add(&words, Tone::Warning));
     for written in status_line::current_image_files(state) {
-        let name = visible(&written.path.to_string_lossy()).into_owned();
-        lines.push(vec![("→ ".to_owned(), Tone::Good), (name, Tone::File)]);
+        lines.push(vec![("→ ".to_owned(), Tone::Good), (written.name(), Tone::File)]);
         let size = state.request.effective.as_ref().map(|it| format!(", {}×{}", it.width, it.height));
         lines.push(vec![(
             format!("  {}{}", format_bytes(written.bytes), size.unwrap_or_default()),

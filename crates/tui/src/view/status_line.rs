@@ -190,7 +190,7 @@ fn draw_summary(state: &State, layout: &Layout, area: Rect, buffer: &mut Buffer,
 /// Name and size of each written file. Empty if the panel lists the files.
 fn file_pieces(state: &State, layout: &Layout) -> Vec<Vec<(String, Tone)>> {
     let pieces = |written: &WrittenFile| {
-        let name = visible(&written.path.to_string_lossy()).into_owned();
+        let name = written.name();
         let size = format!(" {}", format_bytes(written.bytes));
         vec![(" → ".to_owned(), Tone::Faint), (name, Tone::File), (size, Tone::Faint)]
     };
@@ -206,38 +206,45 @@ pub(super) fn current_image_files(state: &State) -> impl Iterator<Item = &Writte
         .saving
         .written
         .iter()
-        .filter(|written| !written.is_stale && written.lost.is_none())
+        .filter(|written| !written.is_stale && written.lost.is_none() && !written.is_unfinished)
         .filter(move |written| written.shows.is_none() == is_own)
         .filter(move |written| of_any_request || written.generation == state.request.generation)
 }
 
-/// Messages about an unsaved image and the state of the scene's own image.
+/// Messages about an image that is not in its files, and about the images that are.
 pub(crate) fn unsaved_messages(state: &State) -> Vec<String> {
-    if state.request.is_own_image() || current_image_files(state).next().is_some() {
+    let saving = &state.saving;
+    if current_image_files(state).next().is_some() {
         return Vec::new();
     }
-    let mut words = vec![messages::NOT_SAVED.to_owned()];
-    if let Some(name) = exit_summary::image_name(state) {
-        let OwnImage { state: own, fraction } = state.saving.own;
-        match own {
-            OwnImageState::Written => {}
-            OwnImageState::Begun { .. }
-                if state.saving.written.iter().any(|written| written.shows.is_some()) => {}
-            OwnImageState::Begun { .. } => {
-                words.push(messages::own_image_unfinished(&name, floor_percent(fraction)));
-            }
-            OwnImageState::NotBegun if state.saving.written.is_empty() => {}
-            OwnImageState::NotBegun => words.push(messages::own_image_outdated(&name)),
-        }
+    let by_hand = saving.image_by_hand();
+    if state.request.is_own_image() {
+        let by_hand = by_hand.filter(|_| saving.unwritten.is_none());
+        let words = |file: &WrittenFile| messages::other_image_with(&file.name(), &file.changes().join(", "));
+        return by_hand.map(words).into_iter().collect();
     }
-    words
+    if let Some(file) = by_hand.filter(|file| file.generation == state.request.generation) {
+        return vec![messages::unfinished_image(&file.name())];
+    }
+    let image_name = exit_summary::image_name(state);
+    let other = match (saving.own, by_hand, image_name) {
+        (_, Some(file), _) => Some(messages::image_with(&file.name(), &file.changes().join(", "))),
+        (OwnImage { state: OwnImageState::Written, .. }, None, _) | (_, None, None) => None,
+        (OwnImage { state: OwnImageState::Begun { .. }, fraction }, None, Some(name)) => {
+            Some(messages::own_image_unfinished(&name, floor_percent(fraction)))
+        }
+        (OwnImage { state: OwnImageState::NotBegun, .. }, None, Some(name)) => {
+            let is_older = !saving.written.is_empty() && saving.is_older_than_edit();
+            is_older.then(|| messages::own_image_outdated(&name))
+        }
+    };
+    [messages::NOT_SAVED.to_owned()].into_iter().chain(other).collect()
 }
 
 /// A message about each written file that another program has changed.
 pub(super) fn changed_file_messages(state: &State) -> impl Iterator<Item = String> {
     let words = |written: &WrittenFile| {
-        let name = visible(&written.path.to_string_lossy()).into_owned();
-        written.lost.map(|lost| messages::output_changed(&name, lost.words()))
+        written.lost.map(|lost| messages::output_changed(&written.name(), lost.words()))
     };
     state.saving.written.iter().filter_map(words)
 }

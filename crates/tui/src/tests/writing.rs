@@ -1,0 +1,131 @@
+//! Images written with `w`: the lines on the screen and after `q`.
+
+use super::{BLUE, RED};
+use crate::Changed;
+use crate::event::{Effect, Event, KeyPress};
+use crate::exit_summary::summary_text;
+use crate::fixtures::*;
+use crate::messages;
+use crate::pipeline::protocol::{self, Command, OwnImageState, SampleCounts, Stage, Status};
+
+/// A UI that has begun the scene's own image.
+fn begun(columns: u16, rows: u16) -> TestUi {
+    let mut ui = TestUi::with(state(columns, rows));
+    ui.read_scene();
+    ui.worker_event(protocol::Event::Progress { generation: 1, progress: render_progress(0.1, None) });
+    ui
+}
+
+fn own_image(ui: &mut TestUi, state: OwnImageState) {
+    let generation = ui.state.request.generation;
+    ui.worker_event(protocol::Event::OwnImage { generation, state });
+}
+
+/// Finishes the current request without writing its image.
+fn finish_unwritten(ui: &mut TestUi, color: [u8; 3]) {
+    let generation = ui.state.request.generation;
+    ui.read_scene();
+    ui.show_preview(color);
+    let mut done = done_event(generation, Vec::new(), false);
+    if let protocol::Event::Done { report, .. } = &mut done {
+        (report.image.path, report.image.paths) = (None, Vec::new());
+        report.stages[Stage::Write as usize].status = Status::Skipped;
+    }
+    ui.worker_event(done);
+    ui.key(KeyPress::special(crossterm::event::KeyCode::Esc));
+}
+
+/// Presses `w`, which writes an image with all samples or with these.
+fn write(ui: &mut TestUi, is_own: bool, unfinished: Option<SampleCounts>) {
+    ui.press('w');
+    let generation = ui.state.request.generation;
+    let path = "cornell.png".into();
+    ui.worker_event(protocol::Event::Written { generation, path, bytes: 1, is_own, unfinished });
+    ui.worker_event(protocol::Event::WriteDone { generation, paths: vec!["cornell.png".into()] });
+    ui.key(KeyPress::special(crossterm::event::KeyCode::Esc));
+}
+
+#[track_caller]
+fn assert_shows(ui: &mut TestUi, words: &str) {
+    // A side panel wraps its lines, with the preview between them.
+    let text: String = ui.text().chars().filter(|it| *it != '▀' && !it.is_whitespace()).collect();
+    let words: String = words.chars().filter(|it| !it.is_whitespace()).collect();
+    assert!(text.contains(&words), "{words}: {}", ui.text());
+}
+
+#[test]
+fn w_writes_the_newest_step() {
+    let mut ui = begun(80, 24);
+    ui.press(']');
+    assert!(ui.press(']').is_empty(), "the step waits for a preview of the first one");
+    let effects = ui.press('w');
+    assert_eq!(request(&effects).expect("the waiting step").overrides.exposure, Some(0.5));
+    assert!(matches!(effects.last(), Some(Effect::Send(Command::Write))), "{effects:?}");
+    let generation = ui.state.request.generation;
+    ui.worker_event(written_event(generation, "cornell.png", false));
+    assert!(summary_text(&ui.state).ends_with("with exposure +0.5"), "{}", summary_text(&ui.state));
+}
+
+const PART: SampleCounts = SampleCounts { min: 16, mean: 20.0, max: 32 };
+
+#[test]
+fn image_written_on_request_is_named_until_replaced() {
+    let with = "written with exposure +0.25";
+    for (columns, rows) in [(80, 24), (120, 40), (100, 20)] {
+        let mut ui = begun(columns, rows);
+        ui.press(']');
+        own_image(&mut ui, OwnImageState::Begun { is_rendering: true });
+        write(&mut ui, false, Some(PART));
+        let part = "wrote cornell.png: unfinished (16 to 32 samples), with exposure +0.25";
+        assert_eq!(summary_text(&ui.state), part);
+        finish_unwritten(&mut ui, BLUE);
+        assert_eq!(summary_text(&ui.state), part);
+        assert_shows(&mut ui, &messages::unfinished_image("cornell.png"));
+        assert!(!ui.text().contains("→ cornell.png"), "it has fewer samples: {}", ui.text());
+        // Another image is shown, then the scene's own image, which does not replace the written one.
+        ui.press('s');
+        own_image(&mut ui, OwnImageState::Begun { is_rendering: false });
+        finish_unwritten(&mut ui, RED);
+        assert_shows(&mut ui, messages::NOT_SAVED);
+        assert_shows(&mut ui, &messages::image_with("cornell.png", "exposure +0.25"));
+        ui.press('0');
+        finish_unwritten(&mut ui, RED);
+        assert_eq!(summary_text(&ui.state), part);
+        assert_shows(&mut ui, &messages::other_image_with("cornell.png", "exposure +0.25"));
+        assert!(!ui.text().contains("→ cornell.png"), "it shows something else: {}", ui.text());
+        write(&mut ui, true, None);
+        assert_eq!(summary_text(&ui.state), "wrote cornell.png: 640×480, 64 samples, 1.93 s");
+        assert_shows(&mut ui, "→ cornell.png");
+        assert!(!ui.text().contains(with), "{}", ui.text());
+    }
+}
+
+#[test]
+fn finished_image_written_before_the_end_is_described() {
+    let mut ui = begun(80, 24);
+    ui.press('v');
+    write(&mut ui, false, None);
+    finish_unwritten(&mut ui, BLUE);
+    assert_eq!(summary_text(&ui.state), "wrote cornell.png: view normal, 640×480, 64 samples, 1.93 s");
+    assert_shows(&mut ui, "→ cornell.png");
+}
+
+#[test]
+fn written_image_is_outdated_only_after_a_save() {
+    let mut ui = begun(80, 24);
+    ui.press('s');
+    own_image(&mut ui, OwnImageState::NotBegun);
+    finish_unwritten(&mut ui, BLUE);
+    write(&mut ui, false, None);
+    ui.press(']');
+    own_image(&mut ui, OwnImageState::NotBegun);
+    finish_unwritten(&mut ui, BLUE);
+    assert_shows(&mut ui, &messages::image_with("cornell.png", "shadows hard"));
+    assert!(!ui.screen_words().contains("older than your last"), "{}", ui.text());
+    ui.handle_event(Event::Changed(Changed { noticed: ui.now }));
+    own_image(&mut ui, OwnImageState::NotBegun);
+    finish_unwritten(&mut ui, RED);
+    assert_shows(&mut ui, &messages::own_image_outdated("cornell.png"));
+    assert!(!ui.text().contains("written with"), "{}", ui.text());
+    assert!(summary_text(&ui.state).ends_with("(older than your last edit)"), "{}", summary_text(&ui.state));
+}
