@@ -250,7 +250,7 @@ pub(super) fn done_event(generation: u64, warnings: Vec<Diagnostic>, unchanged: 
     protocol::Event::Done { generation, report: Box::new(report), warnings, unchanged }
 }
 
-/// A diagnostic for the third line of a scene.
+/// A diagnostic located in the third line of a scene.
 pub(super) fn diagnostic(severity: Severity, message: &str) -> Diagnostic {
     let source: Arc<str> = Arc::from("[render]\nwidth = 4\nheigth = 4\n");
     Diagnostic {

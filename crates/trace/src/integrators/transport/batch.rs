@@ -1,4 +1,4 @@
-//! Packets of sixteen vertices that await direct lighting, as a struct of arrays.
+//! Packets of sixteen vertices that await direct lighting, stored as a struct of arrays.
 
 use super::tile::TileContext;
 use super::vertex::{Lift, ShadingVertex};
@@ -40,7 +40,7 @@ pub struct VertexBatch {
     pub has_facet: u32,
     /// Mask of vertices that the camera sees, directly or through mirrors and glass.
     pub only_specular_before: u32,
-    /// Mask of vertices whose path comes from a surface with a glossy lobe.
+    /// Mask of vertices whose path's previous surface has a glossy lobe.
     pub after_gloss: u32,
     /// Shading normals.
     pub normal: Vec3x16,
@@ -68,7 +68,7 @@ pub struct VertexBatch {
     pub is_dark: bool,
     /// Whether the vertices represent both sides of their surfaces.
     pub has_two_sides: bool,
-    /// Ray origins on the other side and indices of the glass around them, if `has_two_sides`.
+    /// Ray origins on the other sides of the surfaces. Only valid if `has_two_sides`.
     pub beyond: Vec3x16,
     /// Indices of the interior lists at `beyond`.
     pub interiors_beyond: [u32; PACKET_SIZE],
@@ -78,13 +78,13 @@ pub struct VertexBatch {
 pub const UNPERTURBED: f32 = -2.0;
 
 impl VertexBatch {
-    /// Minimum exponent α for which lobe rays are worth tracing under any light.
+    /// Minimum exponent α at which lobe rays are worth tracing for lights of any size.
     const MIN_SHARP_EXPONENT: f32 = 100.0;
 
     /// Lobe rays are also worth tracing if infinite lights are at least this many times as wide as the lobe.
     const MIN_WIDTH_RATIO: f32 = 1.5;
 
-    /// Mask of vertices whose highlights are too narrow to be sampled reliably by light samples.
+    /// Mask of vertices whose highlights are too narrow for reliable light sampling.
     pub fn sharp_lobes(&self, tile: &TileContext<'_>, aov: LightAov) -> u32 {
         let shows = match aov {
             LightAov::Radiance(Components { specular, .. }) => specular,
@@ -102,7 +102,7 @@ impl VertexBatch {
         self.bsdf.narrower_than(self.used, least)
     }
 
-    /// Returns the samplers of the vertices.
+    /// Returns the vertices' samplers.
     #[inline(always)]
     pub fn sampler(&self, tile: &TileContext<'_>) -> SamplerPacket<PACKET_SIZE> {
         let (block, slots) = (tile.block, &self.slot);
@@ -157,7 +157,7 @@ impl VertexBatch {
         self.shading_normal_cosine = [UNPERTURBED; PACKET_SIZE];
     }
 
-    /// Whether the packet is for vertices with this kind of BSDF and these values of `is_dark` and
+    /// Whether the packet accepts vertices with this kind of BSDF and these values of `is_dark` and
     /// `has_two_sides`.
     #[inline(always)]
     pub fn accepts(&self, kind: RoughKind, (is_dark, has_two_sides): (bool, bool)) -> bool {
@@ -172,7 +172,7 @@ impl VertexBatch {
         }
     }
 
-    /// Copies a vertex from another packet with the same kind of BSDFs. Neither packet may be two-sided.
+    /// Copies a vertex from another packet with the same kind of BSDF. Neither packet may be two-sided.
     pub fn copy(&mut self, i: usize, other: &Self, from: usize) {
         for (own, other) in [
             (&mut self.from, &other.from),
@@ -283,8 +283,8 @@ impl VertexBatch {
         left
     }
 
-    /// [`Ray::start`] of rays from the vertices in the directions `wi`, or [`Ray::NO_TRIANGLE`] for rays
-    /// behind their facet.
+    /// [`Ray::start`] of rays from the vertices in the directions `wi`, or [`Ray::NO_TRIANGLE`] for rays that
+    /// leave behind their facet.
     #[inline(always)]
     pub fn starts(&self, wi: &Vec3x16) -> [u32; PACKET_SIZE] {
         // Vertices on analytic shapes are not on triangles.
@@ -367,7 +367,7 @@ impl VertexBatch {
         lanes(self.used).any(|i| self.interiors[i] != 0)
     }
 
-    /// Mask of vertices whose direction is below their horizon.
+    /// Mask of lanes whose direction is below the vertex's horizon.
     #[inline(always)]
     pub fn below_horizon(&self, wi: &Vec3x16, simd: impl Simd) -> u32 {
         let mut hidden = [0; PACKET_SIZE];

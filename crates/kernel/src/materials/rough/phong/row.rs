@@ -270,7 +270,7 @@ impl MaterialRow for PhongRow {
         simd: impl Simd,
     ) -> u32 {
         let diffuse = match (material.diffuse.texture(), uv) {
-            (Some(texture), Some(uv)) => texture.lookup_row(uv),
+            (Some(texture), Some(uv)) => texture.lookup_packet(uv),
             (Some(_) | None, _) => {
                 let Vec3 { x, y, z } = material.diffuse.constant().unwrap_or(Vec3::ONE);
                 [[x; PACKET_SIZE], [y; PACKET_SIZE], [z; PACKET_SIZE]]

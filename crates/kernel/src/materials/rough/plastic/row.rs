@@ -356,7 +356,7 @@ impl MaterialRow for PlasticRow {
         let mut bases =
             [[point.base.x; PACKET_SIZE], [point.base.y; PACKET_SIZE], [point.base.z; PACKET_SIZE]];
         if let (Some(texture), Some(uv)) = (material.row_texture(), uv) {
-            let diffuse = texture.lookup_row(uv);
+            let diffuse = texture.lookup_packet(uv);
             let squared = point.ior * point.ior;
             let returned = 1.0 - (1.0 - point.albedo.mean) / squared;
             for i in 0..PACKET_SIZE {
