@@ -162,7 +162,7 @@ FAULTS = [
     ("a light's probability off by a tenth", "lights/tree/mod.rs", "if total > 0.0 { ⟦((self.0[child] - before) / total) as f32⟧ }",
      "1.1 * ((self.0[child] - before) / total) as f32", "lights::tree::tests::pick_probabilities_are_exact_and_sum_to_one"),
     ("lights sampled below the horizon", "lights/tree/node.rs", "let sum = ⟦straight + sin[i]⟧;",
-     "1.0", "lights::tree::tests::lights_without_contribution_are_not_picked"),
+     "1.0", "lights::tree::tests::noncontributing_lights_are_not_picked"),
     ("light bounds treated as points", "lights/tree/node.rs", "else { beyond }) + ⟦sin[i]⟧;",
      "0.0", "lights::tree::tests::spotlights_in_a_column_can_always_be_picked"),
     ("path weights as if all lights were sampled", "integrators/direct/mis.rs",

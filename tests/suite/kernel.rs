@@ -4,7 +4,7 @@
 use std::collections::HashMap;
 
 use glimt::accel::wide_bvh::InstructionSet;
-use glimt::accel::{KdTree, PACKET_SIZE, WideBvh, ends};
+use glimt::accel::{KdTree, PACKET_SIZE, WideBvh, packet_t_max};
 use glimt::control::CancelToken;
 use glimt::geometry::Ray;
 use glimt::geometry::mesh::TriangleMesh;
@@ -101,9 +101,10 @@ fn leaks(mesh: &TriangleMesh, scale: f32, offset: Vec3, rays: usize, instruction
         });
         if i % 2 == 0 {
             let mut hits = [None; PACKET_SIZE];
-            tree.closest_packet(&packet, &ends(&packet), &mut hits);
+            tree.closest_packet(&packet, &packet_t_max(&packet), &mut hits);
             leaks += hits.iter().filter(|hit| hit.is_none()).count();
-            leaks += PACKET_SIZE - tree.any_packet(&packet, &ends(&packet), &[]).count_ones() as usize;
+            leaks +=
+                PACKET_SIZE - tree.any_packet(&packet, &packet_t_max(&packet), &[]).count_ones() as usize;
         } else {
             leaks += packet.iter().filter(|ray| tree.closest(ray).is_none() || !tree.any(ray, None)).count();
         }
@@ -188,8 +189,8 @@ fn first_box(ray: &Ray, side: u32) -> f64 {
                 }
                 continue;
             }
-            let ends = [at[axis], at[axis] + 1.0].map(|plane| (plane - origin[axis]) / direction[axis]);
-            (near, far) = (ends[0].min(ends[1]).max(near), ends[0].max(ends[1]).min(far));
+            let planes = [at[axis], at[axis] + 1.0].map(|plane| (plane - origin[axis]) / direction[axis]);
+            (near, far) = (planes[0].min(planes[1]).max(near), planes[0].max(planes[1]).min(far));
         }
         if near <= far { near } else { f64::INFINITY }
     };
@@ -325,8 +326,8 @@ fn hits_close_to_the_ray_origin_are_found() {
         let (rays, mut hits) = ([ray; PACKET_SIZE], [None; PACKET_SIZE]);
         let mut answers = vec![planes.any(&ray, None), planes.closest(&ray).is_some()];
         for tree in &trees {
-            tree.closest_packet(&rays, &ends(&rays), &mut hits);
-            let any = tree.any_packet(&rays, &ends(&rays), &[]) != 0;
+            tree.closest_packet(&rays, &packet_t_max(&rays), &mut hits);
+            let any = tree.any_packet(&rays, &packet_t_max(&rays), &[]) != 0;
             answers.extend([tree.any(&ray, None), tree.closest(&ray).is_some(), any, hits[3].is_some()]);
         }
         missed += u32::from(is_hit && answers.contains(&false));

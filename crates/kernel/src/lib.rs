@@ -17,5 +17,5 @@ pub mod geometry;
 pub mod lights;
 pub mod materials;
 
-// Modules of lower-level crates, under the names used throughout the workspace.
+// Modules from lower-level crates, under the names used throughout the workspace.
 use glimt_base::{choice, control, math, sampling};

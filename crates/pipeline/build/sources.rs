@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Hashes the content and relative path of every file in the given folders, plus the given files. Ignores
+/// Hashes the content and relative path of every file in `roots`, which are folders or single files. Ignores
 /// tests and line endings. A missing root counts as empty, so that a crate can be built outside the
 /// workspace.
 pub fn source_hash(roots: &[PathBuf]) -> u64 {

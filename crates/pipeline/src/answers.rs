@@ -35,7 +35,7 @@ impl Section {
         Self { left, top, width: (a.x - b.x).abs(), height: (a.y - b.y).abs() }
     }
 
-    /// Converts a pixel rectangle in an image with the given number of columns and rows.
+    /// Converts a pixel rectangle to a section. `columns` and `rows` are the image's size.
     pub(super) fn from_pixels(rect: Rect, (columns, rows): (u32, u32)) -> Self {
         let share = |pixels: u32, side: u32| f64::from(pixels) / f64::from(side);
         Self {
@@ -46,7 +46,7 @@ impl Section {
         }
     }
 
-    /// Returns the pixels that overlap the section, for an image with the given number of columns and rows.
+    /// Returns the pixels that overlap the section. `columns` and `rows` are the image's size.
     pub(super) fn pixels(self, (columns, rows): (u32, u32)) -> Rect {
         let along = |start: f64, length: f64, side: u32| {
             let at = |share: f64| share.clamp(0.0, 1.0) * f64::from(side);
@@ -120,7 +120,7 @@ pub struct SavedCamera {
     pub is_own: bool,
     /// Whether a new scene file was created next to a model. The model remains open.
     pub of_model: bool,
-    /// The edit, for undoing with the `u` key. `None` if nothing was written or the file is new.
+    /// The edit that the `u` key undoes. `None` if nothing was written or the file is new.
     pub edit: Option<CameraEdit>,
 }
 

@@ -24,7 +24,7 @@ impl<T> Memo<T> {
         self.last.as_ref().filter(|(of, _)| *of == key).map(|(_, value)| value)
     }
 
-    /// Returns the value, whatever its key.
+    /// Returns the value, regardless of its key.
     pub(super) fn latest(&self) -> Option<&T> {
         self.last.as_ref().map(|(_, value)| value)
     }
@@ -72,7 +72,7 @@ impl<N: Hash + Eq, T> NamedCache<N, T> {
         Some(entry.value.clone())
     }
 
-    /// Returns the value with this name, whatever its key.
+    /// Returns the value with this name, regardless of its key.
     pub(super) fn latest(&self, name: &N) -> Option<&Arc<T>> {
         self.entries.get(name).map(|entry| &entry.value)
     }
@@ -103,9 +103,9 @@ impl<N: Hash + Eq, T> NamedCache<N, T> {
     }
 }
 
-/// Returns the number of the earliest request whose unused values fit into `most_bytes` together with the
-/// unused values of all later requests. All values of a request are evicted together, because half a scene is
-/// of little use and trees keep their meshes alive.
+/// Returns the number of the earliest request whose unused values, together with the unused values of all
+/// later requests, fit into `most_bytes`. All values of a request are evicted together, because half a scene
+/// is of little use and trees keep their meshes alive.
 pub(super) fn first_request_that_fits(
     eviction_candidates: impl Iterator<Item = EvictionCandidate>,
     most_bytes: usize,

@@ -22,8 +22,8 @@ pub(super) struct ImageDependencies<'a> {
     pub(super) camera: &'a CameraChange,
     /// Files that were read, including the scene file.
     pub(super) files: &'a [FileRead],
-    /// Sample count of the whole image if it is rendered in parts. All parts must use the same sample count
-    /// and output settings.
+    /// The whole image's sample count if the image is rendered in parts. All parts must use the same sample
+    /// count and output settings.
     pub(super) divided: Option<u32>,
 }
 

@@ -1,4 +1,4 @@
-//! Keys of the scene data used by later stages. They exclude names and positions in the file, so that
+//! Keys for the scene data used by later stages. They exclude names and positions in the file, so that
 //! comments, key order and unused tables do not affect them.
 
 use crate::film::Rect;
@@ -59,7 +59,7 @@ pub(crate) fn from(of: &Key, origin: DVec3) -> Key {
     FingerprintHasher::new("from").key(of).dvec3(origin).finish()
 }
 
-/// Combines a geometry key with the kind of tree.
+/// Combines a geometry key with the tree type.
 pub(crate) fn with_tree_kind(of: &Key, accel: Accel) -> Key {
     FingerprintHasher::new("in trees").key(of).choice(accel).finish()
 }
@@ -135,8 +135,8 @@ fn described_lights(scene: &Scene, of: &FingerprintContext<'_>) -> Key {
     key.finish()
 }
 
-/// Returns the key of a world. It excludes the kind of tree, because all kinds produce the same hits. Views
-/// that visualize trees include the kind in their own keys.
+/// Returns the key of a world. It excludes the tree type, because all types produce the same hits. Views that
+/// visualize trees include the type in their own keys.
 pub(crate) fn world(surfaces: &Key, camera: &Camera, of: &FingerprintContext<'_>) -> Key {
     FingerprintHasher::new("world").key(surfaces).add(camera, of).finish()
 }
@@ -330,7 +330,7 @@ mod tests {
         let lit = Render { ambient: ambient + Vec3::ONE, ..render_settings };
         assert_eq!(of(&RenderSettings { render: lit, ..gathering }), of(&gathering));
         assert_eq!(of(&RenderSettings { render: path, ..gathering }), of(&with(path)));
-        // These settings do not change the samples taken: sample count, display settings and kind of tree.
+        // These settings do not change the samples taken: sample count, display settings and tree type.
         for same in [
             Render { samples: samples + 1, ..render_settings },
             Render { exposure: exposure + 1.0, ..render_settings },
@@ -339,7 +339,7 @@ mod tests {
         ] {
             assert_eq!(of(&with(same)), of(&settings), "{same:?}");
         }
-        // Views that visualize trees depend on the kind of tree.
+        // Views that visualize trees depend on the tree type.
         for view in [View::Bounds, View::Cost] {
             let by = |accel| RenderSettings { view, ..with(Render { accel, ..render_settings }) };
             assert_ne!(of(&by(Accel::Bvh)), of(&by(Accel::KdTree)), "{view:?}");

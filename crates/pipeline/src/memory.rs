@@ -18,16 +18,16 @@ const PROGRAM: u64 = 24 << 20;
 const THREAD: u64 = 640 << 10;
 /// Bytes per object in the acceleration structures.
 const OBJECT: u64 = 250;
-/// Bytes per emitted photon while building the maps of a pass.
+/// Bytes per emitted photon while a pass's maps are being built.
 const PHOTON: u64 = 220;
 /// Maximum size of the cached photon maps in bytes.
 const KEPT_MAPS: u64 = 128 << 20;
 
 /// Maximum size in bytes of an animation's frames without `--memory`.
 const MAX_FRAMES: u64 = 4 << 30;
-/// Name of the item for animation frames.
+/// Name of the memory item for animation frames.
 const FRAMES: &str = "the frames";
-/// Name of the item for the film of the scene's own image.
+/// Name of the memory item for the film of the scene's own image.
 const OWN_FILM: &str = "the unfinished film of the scene's own image";
 
 /// Suggested fix if the film or the image is the largest item.
@@ -114,13 +114,13 @@ impl MemoryEstimate {
         self.check_against(plan, limit)
     }
 
-    /// Like [`Self::check`], with the system's limit as a parameter.
+    /// Like [`Self::check`], but takes the system's limit as a parameter.
     fn check_against(&self, plan: &Plan, limit: impl FnOnce() -> Option<MemoryLimit>) -> Result<u64, Stop> {
         let all = self.bytes();
         let frames = self.0.iter().find(|(name, bytes)| *name == FRAMES && *bytes > MAX_FRAMES);
         if let (Some((_, bytes)), None) = (frames, plan.memory) {
             return Err(Stop::work(format!(
-                "the frames of the animation need {} of memory until it is written; render fewer or smaller frames, or \
+                "the frames need {} of memory until the animation is written; render fewer or smaller frames, or \
                  numbered files such as a_####.png; --memory {} allows it",
                 format_bytes(*bytes),
                 format_memory_option(all)
@@ -166,7 +166,7 @@ impl MemoryEstimate {
     }
 }
 
-/// Returns the order in which samples are summed. Assumes that photons are emitted if they are enabled,
+/// Returns the order in which samples are summed. If photons are enabled, assumes that some are emitted,
 /// because this is not known yet.
 fn sum_order(plan: &Plan) -> SumOrder {
     let gathers = plan.settings.gathers_photons();

@@ -20,15 +20,15 @@ pub const INVISIBLE_MODEL: &str = "the model is invisible: its faces have an opa
 /// Effect of `clamp`.
 pub const CLAMP_EFFECT: &str =
     "limits indirect light: fewer fireflies, but a biased image that is slightly too dark";
-/// Effect of the default `clamp` of models.
+/// Effect of the default `clamp` value for models.
 pub const CLAMP_EFFECT_ON_MODELS: &str = "limits light from shiny surfaces (fewer fireflies, slightly dark)";
 
 /// The file at a checkpoint's path has another format.
 pub const NOT_A_CHECKPOINT: &str = "is not a checkpoint";
 /// A file is damaged.
 pub const DAMAGED: &str = "damaged";
-/// The camera of the scene file was not restored.
-pub const NOT_UNDONE: &str = "has changed since c: not undone";
+/// The scene file's camera was not restored.
+pub const NOT_UNDONE: &str = "has changed since you pressed c: not undone";
 /// A model was removed.
 pub const MODEL_MISSING: &str = "does not exist: its scene was not written";
 /// A new file would replace an existing one.

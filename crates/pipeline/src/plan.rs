@@ -40,7 +40,7 @@ pub(super) struct Plan {
     pub(super) turn: Option<TurntableFrame>,
     /// Additional layers for EXR files.
     pub(super) layers: Vec<OutputLayer>,
-    /// For a model, the side facing the camera and the up axis, if set on the command line.
+    /// For a model, the side facing the camera, and the up axis. `None` if not set on the command line.
     pub(super) from: Option<Side>,
     pub(super) up: Option<UpAxis>,
     /// Output files for later turntable frames.
@@ -62,9 +62,9 @@ pub(super) struct Plan {
 /// Source of the output file names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum OutputNameSource {
-    /// `-o`.
+    /// The `-o` option.
     CommandLine,
-    /// `output` in `[render]`.
+    /// The `output` key in `[render]`.
     Scene,
     /// The scene's name with the extension `.png`.
     Default,
@@ -144,7 +144,7 @@ pub(super) const MAX_PHOTONS: u64 = 4_000_000;
 /// first image.
 const PHOTONS_BY_PIXELS: RangeInclusive<u64> = 8192..=200_000;
 
-/// Returns the photon settings for the given image size.
+/// Returns the photon settings for this image size.
 fn photons(requested: &Photons, (width, height): (u32, u32)) -> PhotonSettings {
     let Photons { enabled: _, count, radius, bounces } = *requested;
     let by_pixels = || {
@@ -155,7 +155,7 @@ fn photons(requested: &Photons, (width, height): (u32, u32)) -> PhotonSettings {
     PhotonSettings { count: count as u32, radius: radius as f32, bounces }
 }
 
-/// Returns the scene with the given acceleration structure. Copies the scene only if necessary, because scenes
+/// Returns the scene with acceleration structure `accel`. Copies the scene only if necessary, because scenes
 /// may be large.
 fn with_accel(scene: &Arc<Scene>, accel: Accel) -> Arc<Scene> {
     let mut scene = Arc::clone(scene);
@@ -165,8 +165,8 @@ fn with_accel(scene: &Arc<Scene>, accel: Accel) -> Arc<Scene> {
     scene
 }
 
-/// Returns the output files given on the command line or, failing that, in the scene. The default is a `.png`
-/// file in the working directory with the scene's name.
+/// Returns the output files specified on the command line or, failing that, in the scene. The default is a
+/// `.png` file in the working directory with the scene's name.
 fn output_paths(
     of_scene: Option<&PathBuf>,
     path: &Path,
@@ -198,7 +198,7 @@ fn report_path(overrides: &Overrides) -> Option<PathBuf> {
     Some(numbered.unwrap_or_else(|| path.clone()))
 }
 
-/// A request's output files by kind.
+/// A request's output files, grouped by kind.
 struct OutputFiles {
     outputs: Vec<PathBuf>,
     moving: Vec<PathBuf>,

@@ -56,7 +56,7 @@ pub enum Command {
 /// A request to render an image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Request {
-    /// Must be greater than in all earlier requests.
+    /// Number of the request. Must be greater than the numbers of all earlier requests.
     pub generation: u64,
     /// The scene file.
     pub scene: PathBuf,
@@ -66,8 +66,8 @@ pub struct Request {
     pub preview: Option<PreviewSize>,
     /// Whether to write the finished image.
     pub write: WriteMode,
-    /// Overrides for the scene's own image if this request shows another one. The own image's film and
-    /// checkpoint are kept. `None` if this request is for the scene's own image.
+    /// Overrides for the scene's own image if this request shows another one. The film and checkpoint of the
+    /// scene's own image are kept. `None` if this request is for the scene's own image.
     pub own: Option<Box<Overrides>>,
     /// Number of times the scene's files have been saved. An image that [`Command::Write`] wrote with changes
     /// made with keys is kept until a request with another number reads a valid scene.
@@ -90,14 +90,14 @@ pub enum WriteMode {
     Must,
 }
 
-/// Maximum preview size, measured in square pixels.
+/// Maximum preview size, assuming square pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PreviewSize {
-    /// Maximum width in square pixels.
+    /// Maximum width in pixels.
     pub width: u32,
-    /// Maximum height in square pixels.
+    /// Maximum height in pixels.
     pub height: u32,
-    /// Center of a section shown at 1:1, as large as fits. `None` fits the whole image.
+    /// Center of a section to show at 1:1, as large as fits. `None` shows the whole image.
     pub around: Option<ImagePosition>,
 }
 
@@ -116,8 +116,8 @@ pub enum Event {
         /// The stage and its status.
         stage: StageReport,
     },
-    /// Files that the request depends on, including files it failed to read. Each event contains all files
-    /// known so far, and the front end watches the files of the latest event.
+    /// Files that the request depends on, including files it failed to read. Each event lists all files found
+    /// so far, and the front end watches the files in the latest event.
     Files {
         /// Request number.
         generation: u64,
@@ -125,10 +125,10 @@ pub enum Event {
         files: Vec<FileRead>,
         /// This request read the first `read` files in the list. The others were read by earlier requests.
         read: usize,
-        /// Point in time before the first read.
+        /// A time before the first read.
         since: Instant,
     },
-    /// All warnings, which are known before the image is rendered.
+    /// All warnings. Sent before the image is rendered.
     Warnings {
         /// Request number.
         generation: u64,
@@ -148,9 +148,9 @@ pub enum Event {
         generation: u64,
         /// Effective settings of the request.
         settings: Box<EffectiveSettings>,
-        /// Camera of the scene.
+        /// The scene's camera.
         camera: Viewpoint,
-        /// Exposure of the scene, in stops.
+        /// The scene's exposure in stops.
         exposure: f32,
         /// The scene's values for other settings that can be changed with keys.
         own: AdjustableSettings,
@@ -159,7 +159,7 @@ pub enum Event {
     Text {
         /// Request number.
         generation: u64,
-        /// Text of the scene file, or of the scene generated for a model.
+        /// Text of the scene file, or the scene text generated for a model.
         text: Arc<str>,
     },
     /// The render made progress.
@@ -298,7 +298,7 @@ pub enum OwnImageState {
     Written,
     /// Some of the image's samples have been rendered.
     Begun {
-        /// Whether the current request adds samples to the own image, because both images share a film.
+        /// Whether the current request adds samples to this image, because both images share a film.
         is_rendering: bool,
     },
     /// None of the image's samples have been rendered.

@@ -1,4 +1,4 @@
-//! Queries about the current image, and edits of the scene file's camera. Both can run during and between
+//! Queries about the current image, and edits to the scene file's camera. Both can run during and between
 //! requests.
 
 use std::path::{Path, PathBuf};
@@ -51,11 +51,11 @@ impl Query {
 #[derive(Clone)]
 pub(super) struct QueryContext {
     pub(super) parsed: Arc<Parsed>,
-    /// Overrides of scene keys from the command line.
+    /// Scene key overrides from the command line.
     pub(super) sets: Vec<String>,
     pub(super) world: Arc<World>,
     pub(super) settings: RenderSettings,
-    /// Camera of the scene.
+    /// The scene's camera.
     pub(super) own: Viewpoint,
 }
 
@@ -199,8 +199,8 @@ fn replace_scene_text(
         .map_err(|error| error.to_string())
 }
 
-/// Writes the scene generated for a model to a file next to the model, using the given camera. Never replaces
-/// a file.
+/// Writes the scene generated for a model, with this camera, to a file next to the model. Never replaces a
+/// file.
 fn write_scene_of_model(loaded: &LoadedScene, camera: &Viewpoint) -> Result<SavedCamera, String> {
     let path = loaded.path.with_extension("toml");
     let shown = path.display();

@@ -8,7 +8,7 @@ use super::protocol::StageReport;
 use super::settings::EffectiveSettings;
 use crate::film::SampleStats;
 
-/// Report of a finished request, written as JSON with `--report`.
+/// Report of a finished request. `--report` writes it as JSON.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Report {
     /// The glimt version.
@@ -50,7 +50,7 @@ pub struct ImageReport {
     /// [`Film::relative_error`](crate::film::Film::relative_error). `None` with fewer than two samples per
     /// pixel.
     pub error: Option<f64>,
-    /// Render time in seconds, including earlier requests continued by this one.
+    /// Render time in seconds, including earlier requests that this one continued.
     pub render_seconds: f64,
     /// Whether every pixel has the requested number of samples.
     pub complete: bool,
@@ -83,8 +83,8 @@ pub struct LightsReport {
     pub count: u64,
     /// Which lights are sampled at each vertex.
     pub sampled: LightsSampled,
-    /// Number of lights sampled from the tree per vertex: 32 × `shadow_samples` for `whitted`, or 4 ×
-    /// `shadow_samples` for `path`. 0 without a tree.
+    /// Number of lights sampled from the light tree at each vertex: 32 × `shadow_samples` for `whitted`, or 4
+    /// × `shadow_samples` for `path`. 0 without a tree.
     pub picks: u64,
     /// Number of nodes in the light tree.
     pub tree_nodes: u64,
@@ -106,7 +106,7 @@ pub struct PhotonsReport {
     /// Texture lookups by photons.
     #[serde(skip)]
     pub lookups: u64,
-    /// Seconds spent on emitting and storing photons.
+    /// Seconds spent emitting and storing photons.
     pub seconds: f64,
     /// Photons emitted per second.
     pub per_second: f64,
@@ -116,7 +116,7 @@ pub struct PhotonsReport {
     pub bounced_radius: f32,
     /// Bytes used by cached maps.
     pub kept_memory_bytes: u64,
-    /// Peak number of bytes used by maps at the same time.
+    /// Peak memory use of all maps, in bytes.
     pub used_memory_bytes: u64,
 }
 

@@ -23,7 +23,7 @@ macro_rules! overrides {
             pub outputs: Vec<PathBuf>,
             /// JSON file for the report of each finished request.
             pub report: Option<PathBuf>,
-            /// Whether the report and default-named images may replace files not written by glimt.
+            /// Whether the report, and images with default names, may replace files not written by glimt.
             pub replaces_foreign: bool,
             /// Time limit in seconds. When it is reached, the render stops and keeps its current samples.
             pub time_seconds: Option<f64>,
@@ -80,11 +80,11 @@ choice! {
         Left = "left",
         /// The right side in the front view.
         Right = "right",
-        /// From above.
+        /// The view from above.
         Top = "top",
-        /// From below, without a ground plane.
+        /// The view from below, without a ground plane.
         Bottom = "bottom",
-        /// From the front, top and right.
+        /// The view from the front, top and right.
         Iso = "iso",
     }
 }
@@ -153,7 +153,7 @@ pub enum Resume {
 pub struct AdjustableSettings {
     /// Integrator.
     pub integrator: Integrator,
-    /// Kind of shadows.
+    /// Shadow type.
     pub shadows: Shadows,
     /// Whether photons are on.
     pub photons: bool,
@@ -173,7 +173,7 @@ pub struct EffectiveSettings {
     /// Integrator.
     #[serde(serialize_with = "choice::serialize")]
     pub integrator: Integrator,
-    /// Kind of shadows.
+    /// Shadow type.
     #[serde(serialize_with = "choice::serialize")]
     pub shadows: Shadows,
     /// Limit on indirect radiance per bounce, which introduces bias. 0 means no limit.

@@ -33,7 +33,8 @@ impl Sink {
         self.send(Event::Stage { generation: self.generation, stage });
     }
 
-    /// Returns a sink for one part of the work, given the overall progress fractions at its start and end.
+    /// Returns a sink for one part of the work. `ends` contains the overall progress fractions at its start
+    /// and end.
     pub(super) fn for_progress_range(&self, ends: [f64; 2]) -> Self {
         Self { within: Some(ends), ..self.clone() }
     }
@@ -105,7 +106,7 @@ impl Sink {
         });
     }
 
-    /// Sends a preview that lacks the light from photons, before they are traced.
+    /// Sends a preview without the light from photons, before the photons are traced.
     pub(super) fn preview_without_photons(&self, picture: Picture) {
         let (generation, picture) = (self.generation, Arc::new(picture));
         let (range, section, source) = (None, None, None);
@@ -151,7 +152,7 @@ impl Sink {
     }
 }
 
-/// Maximum number of progress steps of an asset.
+/// Number of progress steps into which loading an asset is divided.
 const PARTS: u64 = 100;
 
 #[cfg(test)]

@@ -239,7 +239,7 @@ fn other_part_error(plan: &Plan, target: OutputTarget<'_>, at: &Path) -> Option<
 fn conflict_help(plan: &Plan, kind: TargetKind) -> &'static str {
     match kind {
         TargetKind::Picture(OutputNameSource::Default) if plan.turn.is_some() => {
-            "name others with -o 'NAME_####.png'"
+            "choose other names with -o 'NAME_####.png'"
         }
         TargetKind::Picture(OutputNameSource::Default) if is_mesh(Path::new(&plan.name)) => {
             "name a file with -o FILE"

@@ -40,7 +40,7 @@ pub(super) struct Tracer<'a> {
     pub(super) token: &'a CancelToken,
     /// Photon maps for all jobs' samples, if photons are gathered.
     pub(super) photons: Option<&'a PhotonMaps>,
-    /// Index of the jobs' sample 0 among the samples of the entire image.
+    /// Index of the jobs' first sample among the samples of the entire image.
     pub(super) first: u32,
 }
 

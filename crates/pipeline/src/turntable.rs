@@ -107,7 +107,7 @@ pub fn first_repeated_file(outputs: &[PathBuf], of: u32) -> Option<PathBuf> {
     (0..of).flat_map(all).find(|path| !seen.insert(path.clone()))
 }
 
-/// Returns existing files with numbers after the last frame, which are left over from a longer turntable.
+/// Returns existing files numbered beyond the last frame, which are left over from a longer turntable.
 pub fn leftover_frames(last: &Path, turn: TurntableFrame) -> Vec<PathBuf> {
     let name = last.file_name().unwrap_or_default().as_bytes();
     // Find the frame number, which is the last run of digits with this value.

@@ -90,7 +90,7 @@ fn find_warnings(scene: &Scene, settings: &RenderSettings) -> Vec<(Cause, String
     let mut warnings = Vec::new();
     let is_sharp_any = scene.lights.iter().any(|light| light.has_emission() && light.is_delta());
     if finds_all_light && is_sharp_any && has(&keeps_direction) {
-        let message = "path does not find light from a [[light]] without size through mirrors or glass: their caustics \
+        let message = "path does not find light from a [[light]] of zero size through mirrors or glass: the caustics \
                        are missing";
         warnings.push((Cause::Integrator, message.to_owned()));
     }

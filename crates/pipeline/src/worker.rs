@@ -28,7 +28,7 @@ pub fn start(nice: u8) -> std::io::Result<Handle> {
     start_with(EngineConfig { nice, ..EngineConfig::default() })
 }
 
-/// Starts a worker with the given configuration.
+/// Starts a worker with this configuration.
 pub(super) fn start_with(config: EngineConfig) -> std::io::Result<Handle> {
     let (sender, events) = mpsc::channel();
     let remote = CommandSender { mailbox: Arc::default(), events: sender };
@@ -64,7 +64,7 @@ impl Handle {
         self.remote.clone()
     }
 
-    /// Returns the worker's file contents, to be shared with a watcher of the same files.
+    /// Returns the worker's file contents, which a watcher of the same files can share.
     pub fn contents(&self) -> Arc<Contents> {
         Arc::clone(&self.contents)
     }
@@ -121,7 +121,7 @@ struct Mailbox {
     is_write_of_waiting: bool,
     /// The current request's settings that the user can change with keys.
     shown: Overrides,
-    /// Pending change of the preview size.
+    /// Pending preview size change.
     preview: Option<Option<PreviewSize>>,
     queries: VecDeque<Query>,
     /// Whether the newest request is paused.

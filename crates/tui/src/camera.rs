@@ -10,7 +10,8 @@ use crate::scene::description::Pose;
 const POLE: f64 = 1.0;
 /// Range of the field of view, in degrees.
 const FIELD: (f64, f64) = (1.0, 160.0);
-/// Maximum factor by which the distance to `look_at` may differ from the scene camera's, in either direction.
+/// Maximum factor by which the camera's distance to `look_at` may exceed or fall below its distance in the
+/// scene.
 pub(super) const REACH: f64 = 1000.0;
 
 /// Orbits the camera around `look_at` by `right` and `up` degrees.
@@ -29,8 +30,8 @@ pub(super) fn orbited(pose: &Pose, right: f64, up: f64) -> Pose {
     with_eye_at(pose, (level * sine + axis * cosine) * distance)
 }
 
-/// Multiplies the distance to `look_at` by `factor`, keeping it within a factor of [`REACH`] of the scene
-/// camera's distance `own`.
+/// Multiplies the distance to `look_at` by `factor`, keeping it within a factor of [`REACH`] of `own`, the
+/// scene camera's distance.
 pub(super) fn dollied(pose: &Pose, factor: f64, own: f64) -> Pose {
     let arm = pose.position - pose.look_at;
     let distance = arm.length();
@@ -44,7 +45,7 @@ pub(super) fn zoomed_fov(view: &Viewpoint, factor: f64) -> f64 {
     rounded((view.fov * factor).clamp(least, most), 0.01)
 }
 
-/// Moves the eye to `look_at + arm`, rounded to at most 1/10,000 of the arm's length.
+/// Moves the eye to `look_at + arm`. Rounds its position by at most 1/10,000 of the arm's length.
 fn with_eye_at(pose: &Pose, arm: DVec3) -> Pose {
     let step = decimal_step(arm.length());
     let position = (pose.look_at + arm).to_array().map(|number| rounded(number, step));

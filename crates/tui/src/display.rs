@@ -30,9 +30,9 @@ const LARGE: usize = 2_000;
 /// Properties of the terminal and its connection, as detected from environment variables.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct TerminalEnvironment {
-    /// Whether glimt runs inside tmux or screen, which reply to queries themselves and delay drawing.
+    /// Whether glimt is running inside tmux or screen, which reply to queries themselves and delay drawing.
     pub(super) is_multiplexed: bool,
-    /// Whether glimt runs inside tmux.
+    /// Whether glimt is running inside tmux.
     pub(super) is_in_tmux: bool,
     /// Whether the terminal is reached over a network.
     pub(super) is_remote: bool,
@@ -43,8 +43,8 @@ pub(super) struct TerminalEnvironment {
 }
 
 impl TerminalEnvironment {
-    /// Creates a connection of unknown speed. A local multiplexer's replies do not reflect the network behind
-    /// it.
+    /// Creates a connection whose speed is unknown. A local multiplexer's replies do not reflect the network
+    /// behind it.
     fn connection(self, now: Instant) -> Connection {
         Connection::new(self.is_multiplexed && self.is_remote, now)
     }
@@ -200,7 +200,7 @@ impl Display {
         }
     }
 
-    /// Sends one slice, which ends early once `is_late` returns true. Returns whether anything was sent.
+    /// Sends one slice, ending it early if `is_late` returns true. Returns whether anything was sent.
     pub(super) fn send_next_slice(&mut self, now: Instant, is_late: impl Fn() -> bool) -> bool {
         let is_idle = self.is_complete && !self.has_queued_bytes();
         let room = if is_idle { 0 } else { self.connection.max_slice(now) };
@@ -319,7 +319,7 @@ impl Display {
         (!std::mem::replace(&mut self.is_reported, true)).then_some(*report)
     }
 
-    /// How long to wait for pending replies before exiting. Otherwise, the shell would receive them as input.
+    /// How long to wait for pending replies before exiting, so that the shell does not receive them as input.
     /// `None` if no replies are pending.
     pub(super) fn reply_timeout(&self) -> Option<Duration> {
         const MIN: Duration = Duration::from_millis(200);

@@ -31,8 +31,8 @@ pub fn editor(variable: impl Fn(&str) -> Option<String>) -> (String, Option<&'st
     set("VISUAL").or_else(|| set("EDITOR")).unwrap_or_else(|| (DEFAULT.to_owned(), None))
 }
 
-/// Opens a file in the editor at the given position and waits for the editor to exit. If the editor is
-/// stopped, this process stops with it until both are continued. Terminating signals are forwarded.
+/// Opens a file in the editor at a position and waits for the editor to exit. If the editor is stopped, this
+/// process stops with it until both are continued. Terminating signals are forwarded.
 ///
 /// # Errors
 /// The editor could not be started or failed.
@@ -49,9 +49,11 @@ pub(super) fn run(editor: &str, place: &FilePosition) -> Result<(), String> {
     match end {
         // Signals from the keyboard are a normal way to quit an editor.
         Ok(WaitStatus::Exited(_, 0) | WaitStatus::Signaled(_, Signal::SIGINT | Signal::SIGQUIT, _)) => Ok(()),
-        Ok(WaitStatus::Exited(_, 127)) => Err(format!("there is no editor `{editor}`: set VISUAL or EDITOR")),
-        Ok(WaitStatus::Exited(_, code)) => Err(format!("the editor `{editor}` ended with code {code}")),
-        Ok(WaitStatus::Signaled(_, signal, _)) => Err(format!("the editor `{editor}` ended with {signal}")),
+        Ok(WaitStatus::Exited(_, 127)) => Err(format!("editor `{editor}` not found: set VISUAL or EDITOR")),
+        Ok(WaitStatus::Exited(_, code)) => Err(format!("the editor `{editor}` exited with code {code}")),
+        Ok(WaitStatus::Signaled(_, signal, _)) => {
+            Err(format!("the editor `{editor}` was killed by {signal}"))
+        }
         Ok(_) => Ok(()),
         Err(error) => Err(failed(error.into())),
     }

@@ -34,7 +34,7 @@ pub(super) enum Event {
     /// A message from the worker. Previews arrive as [`Event::Picture`].
     Worker(protocol::Event),
     /// A new preview. `range` is the range of displayed values if the view maps values to colors. `section`
-    /// is the part of the image that is shown at actual pixels.
+    /// is the part of the image shown at 1:1 scale, if any.
     Picture {
         generation: u64,
         picture: Arc<Picture>,
@@ -84,17 +84,17 @@ pub(super) struct KeyPress {
 }
 
 impl KeyPress {
-    /// A key press of a character without ctrl or alt.
+    /// Creates a key press for a character without ctrl or alt.
     pub(super) const fn plain(character: char) -> Self {
         Self { code: KeyCode::Char(character), modifiers: KeyModifiers::NONE }
     }
 
-    /// A key press of a character with ctrl.
+    /// Creates a key press for a character with ctrl.
     pub(super) const fn ctrl(character: char) -> Self {
         Self { code: KeyCode::Char(character), modifiers: KeyModifiers::CONTROL }
     }
 
-    /// A key press of a key other than a character.
+    /// Creates a key press for a key that is not a character.
     pub(super) const fn special(code: KeyCode) -> Self {
         Self { code, modifiers: KeyModifiers::NONE }
     }

@@ -17,7 +17,7 @@ pub(super) fn summary_text(state: &State) -> String {
     }
 }
 
-/// Key changes that were saved neither in the scene nor in an image, formatted as command-line options.
+/// Changes made with keys but saved neither in the scene nor in an image, formatted as command-line options.
 pub(super) fn unsaved_as_options(state: &State) -> Option<String> {
     let shown = state.request.toggles;
     let is_in_file = state.saving.written.iter().any(|written| written.shows == Some(shown));
@@ -53,7 +53,7 @@ fn reason_for_no_image(state: &State) -> String {
 
 /// Appended to the list of written files if the scene was edited after they were written.
 const OLDER_THAN_EDIT: &str = " (older than your last edit)";
-/// Names the render that was started after the files were written.
+/// Refers to the render that started after the files were written.
 const NEXT_RENDER: &str = "the next render";
 
 /// Describes the events after the files were written.
@@ -113,8 +113,7 @@ fn describe_files(written: &[WrittenFile]) -> String {
     said.join("; ")
 }
 
-/// Names the image that could not be written and the reason, followed by other files of this and earlier
-/// images.
+/// Explains why an image could not be written, and lists other files written for this and earlier images.
 fn describe_write_failure(state: &State, failed: &WriteFailure) -> String {
     let mut words = format!("not written: {}", visible(&failed.why));
     for written in &state.saving.written {
@@ -129,7 +128,7 @@ fn describe_write_failure(state: &State, failed: &WriteFailure) -> String {
     words
 }
 
-/// Describes an image and its render time. If its samples were reused, this is the original render's time.
+/// Describes an image and its render time. If the samples were reused, the time is the original render's.
 pub(super) fn describe_image(report: &Report, shown: View) -> String {
     let image = &report.image;
     let time = seconds(report.seconds.max(image.render_seconds));
@@ -167,7 +166,7 @@ mod tests {
     use crate::scene::description::Camera;
     use crate::scene::diagnostic::Severity;
 
-    /// Event for a finished request, with a modified report.
+    /// Creates the event for a finished request with a modified report.
     fn done_with(generation: u64, change: impl FnOnce(&mut Report)) -> Event {
         let Event::Done { mut report, warnings, unchanged, .. } = done_event(generation, Vec::new(), false)
         else {

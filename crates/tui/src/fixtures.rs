@@ -273,7 +273,7 @@ pub(super) fn written_event(generation: u64, path: &str, is_own: bool) -> protoc
     protocol::Event::Written { generation, path: path.into(), bytes: 1, is_own, unfinished: None }
 }
 
-/// A diagnostic for the third line of a scene.
+/// A diagnostic located in the third line of a scene.
 pub(super) fn diagnostic(severity: Severity, message: &str) -> Diagnostic {
     let source: Arc<str> = Arc::from("[render]\nwidth = 4\nheigth = 4\n");
     Diagnostic {

@@ -1,4 +1,4 @@
-//! History of recent renders, with bounded memory.
+//! History of recent renders. Its memory use is bounded.
 
 use std::cell::OnceCell;
 use std::collections::{HashMap, VecDeque};
@@ -16,16 +16,16 @@ const MAX_BYTES: usize = 16 << 20;
 /// Maximum width and height of a thumbnail in pixels. Octants can just resolve this size.
 const SMALL: f32 = 32.0;
 
-/// An image and the request it shows.
+/// A displayed image and its request.
 #[derive(Clone, Debug)]
 pub(crate) struct ShownImage {
     pub generation: u64,
     pub picture: Arc<Picture>,
     /// Range of values shown, if the view maps values to colors.
     pub range: Option<[f32; 2]>,
-    /// The image section that is shown at actual pixels. `None` if the whole image is shown.
+    /// The section of the image shown at 1:1 scale. `None` if the whole image is shown.
     pub section: Option<Section>,
-    /// Whether light from photons that are still being traced is missing.
+    /// Whether the image lacks the light from photons that are still being traced.
     pub lacks_photons: bool,
     /// The image that the preview belongs to. `None` if unknown.
     pub source: Option<PreviewSource>,
@@ -44,12 +44,12 @@ impl ShownImage {
     }
 }
 
-/// Recent renders, and the one being viewed.
+/// Recent renders, including the one being viewed.
 #[derive(Debug, Default)]
 pub(super) struct History {
     /// Recent renders, oldest first.
     past: VecDeque<HistoryEntry>,
-    /// Number of scene edits.
+    /// Number of scene edits so far.
     edits: u64,
     /// Number of the last edit that left the scene valid and may have changed the image.
     read_edits: u64,
@@ -97,7 +97,7 @@ impl History {
         edits.unwrap_or_default().join("; ")
     }
 
-    /// Why the render being viewed differs from the previous one, in one line.
+    /// One-line explanation of how the render being viewed differs from the previous one.
     pub(super) fn viewed_changes_text(&self) -> String {
         let Some((at, _)) = &self.open else { return String::new() };
         let Some(past) = self.past.get(*at) else { return String::new() };
@@ -239,7 +239,7 @@ impl History {
         self.past.get(at)?.run
     }
 
-    /// Memory used by images and scene texts, in bytes. Entries with the same scene share its text.
+    /// Memory used by images and scene texts, in bytes. Entries with the same scene share the text.
     fn bytes(&self) -> usize {
         let pictures: usize = self.past.iter().map(HistoryEntry::bytes).sum();
         let texts = self.past.iter().filter_map(|past| past.origin.text.as_ref());
@@ -372,8 +372,8 @@ impl History {
 }
 
 impl HistoryEntry {
-    /// Whether the entry shows the same image as `shown`. An unfinished image differs from an entry that is
-    /// finished.
+    /// Whether the entry shows the same image as `shown`. An unfinished image is not considered the same as a
+    /// finished one.
     fn is_same_image(&self, shown: &ShownImage, origin: &ImageOrigin) -> bool {
         let is_of_image =
             self.shown.shows_same_image(shown) && (self.origin.is_unfinished || !origin.is_unfinished);
@@ -521,7 +521,7 @@ mod tests {
         assert_eq!(history.open_before_edit(shown_image(3, 30)).expect("a picture").generation, 1);
     }
 
-    /// A preview of an image with all or some of its samples, and its origin.
+    /// A preview of a finished or unfinished image, and the image's origin.
     fn of_image(generation: u64, name: &str, is_finished: bool) -> (ShownImage, ImageOrigin) {
         let source = Some(PreviewSource { image: FingerprintHasher::new(name).finish(), is_finished });
         // Make every preview different.
@@ -599,7 +599,7 @@ mod tests {
         assert_eq!((history.past.len(), history.past[0].shown.picture.width), (1, 20));
     }
 
-    /// Origin of an image of a scene with this text, shown in this view.
+    /// Origin of an image, given the text of its scene and its view.
     fn origin(text: &str, view: Option<View>) -> ImageOrigin {
         let toggles = KeyOverrides { view, ..KeyOverrides::default() };
         ImageOrigin { toggles, text: Some(text.into()), ..ImageOrigin::default() }

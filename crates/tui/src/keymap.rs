@@ -6,9 +6,9 @@ use super::action::Action;
 use super::event::KeyPress;
 use super::messages;
 
-/// A row of a table of key bindings.
+/// A row in a table of key bindings.
 pub(super) struct Binding<A = Action> {
-    /// Keys with this binding.
+    /// Keys that trigger the action.
     pub keys: &'static [KeyPress],
     /// Label in the help. Empty if the previous row covers the key.
     pub label: &'static str,
@@ -34,7 +34,7 @@ const RIGHT: KeyPress = KeyPress::special(KeyCode::Right);
 const UP: KeyPress = KeyPress::special(KeyCode::Up);
 const DOWN: KeyPress = KeyPress::special(KeyCode::Down);
 
-/// All key bindings, in the order of the help.
+/// All key bindings, in the order in which the help lists them.
 pub(super) const KEYMAP: &[Binding] = &[
     binding(&[KeyPress::plain('?')], "?", Action::ToggleHelp, messages::HELP_TOGGLE, "help"),
     binding(&[KeyPress::plain('q')], "q", Action::Quit, "quit", "quit"),
@@ -87,7 +87,7 @@ pub(super) const KEYMAP: &[Binding] = &[
     binding(&[KeyPress::plain('>')], "", Action::WidenField, "", ""),
     binding(&[KeyPress::plain('[')], "[ ]", Action::Darken, "darker / brighter exposure", ""),
     binding(&[KeyPress::plain(']')], "", Action::Brighten, "", ""),
-    binding(&[KeyPress::plain('f')], "f", Action::Focus, "focus at a click; f again: at the crosshair", ""),
+    binding(&[KeyPress::plain('f')], "f", Action::Focus, "focus where you click; f again: at crosshair", ""),
     binding(&[KeyPress::plain('c')], "c", Action::KeepCamera, "write the camera into the scene file", ""),
     binding(&[KeyPress::plain('u')], "u", Action::UndoCamera, "undo the last c", ""),
     binding(

@@ -63,7 +63,7 @@ pub fn camera_already_in_scene(file: &str) -> String {
 
 /// Shown when `c` wrote a scene file for a model.
 pub fn model_scene_written(file: &str) -> String {
-    format!("wrote {file}, a scene of this model with this camera")
+    format!("wrote {file}, a scene with this model and camera")
 }
 
 /// Shown when `u` undid the last `c`.
@@ -97,27 +97,27 @@ pub fn unnumbered_render(state: &str) -> String {
     format!("{state} render")
 }
 
-/// State of a render that finished before the newest one.
+/// Label for a render that is older than the newest one.
 pub const OLDER: &str = "older";
 
-/// Position of the displayed render among the finished ones.
+/// Text with the displayed render's position among the finished renders.
 pub fn render_position(number: u64, count: u64) -> String {
     format!("render {number} of {count}")
 }
 
 /// Label for the number of stages that were not run again.
 pub const CACHED: &str = "cached";
-/// Number of stages that were not run again, in words.
+/// Text with the number of stages that were not run again.
 pub fn cached_stages(stages: &str) -> String {
     format!("{stages} {CACHED}")
 }
 
-/// Time between saving the file and drawing the first changed cell.
+/// Text with the time between saving the file and drawing the first changed cell.
 pub fn save_to_screen_time(time: &str) -> String {
     format!("on screen after {time}")
 }
 
-/// Number of the finished render being shown.
+/// Label for a finished render, with its number.
 pub fn render_number(number: impl Display) -> String {
     format!("render {number}")
 }
@@ -213,7 +213,7 @@ pub const VIEW_WITHOUT_PHOTONS: &str = "view photons: photons are off (p: on)";
 
 /// Shown when another render's checkpoint was renamed.
 pub fn checkpoint_kept(file: &str) -> String {
-    format!("kept the checkpoint of another render as {file}")
+    format!("kept another render's checkpoint as {file}")
 }
 
 /// Shown when a checkpoint cannot be resumed.
@@ -223,14 +223,14 @@ pub fn checkpoint_ignored(file: &str, why: &str) -> String {
 
 /// Shown when another program modified an output file.
 pub fn output_changed(file: &str, how: &str) -> String {
-    format!("{file} {how} · w writes it again")
+    format!("{file} {how} · w: write it again")
 }
 
 /// Shown when the displayed image is not saved in a file.
-pub const NOT_SAVED: &str = "not saved · w saves it";
+pub const NOT_SAVED: &str = "not saved · w: save it";
 /// Shown when `w` wrote the displayed image before its render finished.
 pub fn unfinished_image(file: &str) -> String {
-    format!("{file} is unfinished · w writes it again")
+    format!("{file} is unfinished · w: write it again")
 }
 
 /// Shown when `w` wrote an image with these changes, and another one is displayed.
@@ -240,26 +240,26 @@ pub fn image_with(file: &str, changes: &str) -> String {
 
 /// Shown when `w` wrote an image with these changes, and the scene's own image is displayed.
 pub fn other_image_with(file: &str, changes: &str) -> String {
-    format!("{} · w writes this image", image_with(file, changes))
+    format!("{} · w: write this image", image_with(file, changes))
 }
 
 /// Shown when the scene is invalid, so the last valid render is shown.
 pub const LAST_GOOD_RENDER: &str = "showing the last good render";
-/// Shown when photon light is missing from the preview.
+/// Shown when the preview lacks the light from photons.
 pub const WITHOUT_PHOTONS: &str = "preview without photons";
-/// Shown when the scene file may be incomplete.
+/// Follows the word "waiting" while the scene file may be incomplete.
 pub const INCOMPLETE_FILE: &str = "for a complete file";
 /// Shown when the scene file does not exist.
 pub const WAITING_FOR_FILE: &str = "waiting for it to appear";
 
-/// Shown when rendering the scene's own image was interrupted.
+/// Shown when the render of the scene's own image was interrupted.
 pub fn own_image_unfinished(file: &str, percent: u32) -> String {
-    format!("{file} at {percent} %: 0 continues it")
+    format!("{file} at {percent} %: press 0 to continue")
 }
 
 /// Shown when the scene was edited after its own image was rendered.
 pub fn own_image_outdated(file: &str) -> String {
-    format!("{file} is older than your last edit: 0 renders it")
+    format!("{file} is older than your last edit: press 0 to render it")
 }
 
 /// Shown when the last valid scene is rendering while the scene file is invalid. Followed by the progress.
@@ -275,7 +275,7 @@ pub fn renders_on_changes(file: &str) -> String {
     format!("re-renders when {file} changes")
 }
 
-/// Cost of sending the last preview.
+/// Text about the cost of sending the last preview.
 pub fn preview_cost(kilobytes: usize, round_trip_ms: Option<u128>) -> String {
     let round_trip = round_trip_ms.map_or(String::new(), |time| format!(" · {time} ms round trip"));
     format!("{kilobytes} kB sent{round_trip}")
@@ -294,4 +294,4 @@ pub const HELP_TOGGLE: &str = "show or hide this help";
 /// Help text for stage times.
 pub const HELP_STAGE_TIME: &str = "stage time (difference from the last render)";
 /// Help text for the cost of sending a preview.
-pub const HELP_BYTES: &str = "bytes of this render; round trip to the terminal";
+pub const HELP_BYTES: &str = "bytes sent for this render; terminal round trip";

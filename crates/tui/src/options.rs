@@ -46,10 +46,11 @@ pub struct Options {
     pub color: ColorChoice,
     /// How to draw the preview.
     pub preview: PreviewChoice,
-    /// Height of a cell divided by its width. If `None`, the terminal is queried, with 2 as the fallback.
+    /// Height of a cell divided by its width. If `None`, the terminal is queried, and 2 is used if it does
+    /// not reply.
     pub cell_aspect: Option<f32>,
-    /// Renders that take longer than this send a notification when they end, unless the terminal is focused.
-    /// `None` disables notifications.
+    /// Minimum duration of a render that triggers a notification when it ends, unless the terminal is
+    /// focused. `None` disables notifications.
     pub notify_after: Option<Duration>,
     /// Sends commands to the worker. Must not block.
     pub commands: Box<dyn FnMut(Command)>,
@@ -83,20 +84,21 @@ impl ExitStatus {
     }
 }
 
-/// Result of the front end.
+/// Result of running the front end.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TuiOutcome {
     /// The program's exit code.
     pub status: ExitStatus,
     /// Whether the user requested an image that has been neither written nor refused yet.
     pub is_write_unanswered: bool,
-    /// The written files with their sample counts and render times, in one line.
+    /// One line that lists the written files with their sample counts and render times.
     pub summary: String,
     /// Whether any image file was written.
     pub has_written: bool,
     /// Whether the last attempt to write an image failed or was refused.
     pub is_unwritten: bool,
-    /// Key changes that were saved neither in the scene nor in an image, formatted as command-line options.
+    /// Changes made with keys but saved neither in the scene nor in an image, formatted as command-line
+    /// options.
     pub not_kept: Option<String>,
 }
 

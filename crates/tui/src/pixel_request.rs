@@ -83,13 +83,13 @@ impl ImageProtocolRequest {
     pub(super) fn unsupported_message(self) -> String {
         let (name, terminals) = match self.protocol {
             ImageProtocol::Kitty => ("kitty", "kitty, Ghostty, WezTerm or Konsole"),
-            ImageProtocol::Sixel => ("sixel", "foot, xterm -ti vt340, mlterm, or tmux built with sixels"),
+            ImageProtocol::Sixel => ("sixel", "foot, xterm -ti vt340, mlterm, or tmux built with Sixel"),
             ImageProtocol::Iterm => ("iTerm2", "iTerm2, WezTerm or VS Code"),
         };
         let instead = "half blocks are shown instead";
         match (self.protocol, self.route) {
             (ImageProtocol::Kitty | ImageProtocol::Iterm, ImageRoute::Tmux) => format!(
-                "no {name} images through tmux: {instead}; `tmux set -g allow-passthrough on` enables them if tmux runs in {terminals}"
+                "no {name} images through tmux: {instead}; `tmux set -g allow-passthrough on` enables them if tmux is running in {terminals}"
             ),
             (ImageProtocol::Sixel, _) | (_, ImageRoute::Direct | ImageRoute::Closed) => {
                 format!("this terminal does not support {name} images: {instead}; use {terminals}")

@@ -132,7 +132,7 @@ impl Presenter {
         Some(Event::Picture { generation, picture, range, section, lacks_photons, source })
     }
 
-    /// Schedules the next frame one frame interval after `now`, even if it was urgent.
+    /// Delays the next frame, even an urgent one, until one frame interval after `now`.
     pub(super) fn postpone(&mut self, state: &mut State, now: Instant) {
         state.urgent = false;
         self.next_frame = now + FRAME;

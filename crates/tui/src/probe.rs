@@ -16,7 +16,7 @@ use super::terminal;
 use super::terminal_replies::{BlockGlyphs, TerminalQueries, TerminalReply};
 use super::terminals::{TerminalBrand, TerminalId};
 
-/// Terminal properties from replies and environment variables.
+/// Terminal properties determined from replies and environment variables.
 #[derive(Clone, Debug)]
 pub struct Probe {
     /// Number of columns and rows.
@@ -25,7 +25,7 @@ pub struct Probe {
     pub cell_pixels: (u16, u16),
     /// Color depth according to environment variables.
     pub depth: ColorDepth,
-    /// Whether glimt runs inside tmux or screen.
+    /// Whether glimt is running inside tmux or screen.
     pub is_multiplexed: bool,
     /// Whether the terminal is reached over a network.
     pub is_remote: bool,
@@ -55,7 +55,7 @@ pub struct ProbeReplies {
 }
 
 impl Probe {
-    /// Name of the characters that `--preview auto` uses.
+    /// Name of the character set that `--preview auto` uses.
     pub fn preview(&self) -> &'static str {
         let name = self.answers.as_ref().and_then(|answers| answers.name.as_deref());
         let terminal = name.filter(|_| !self.is_multiplexed).and_then(TerminalId::from_report);

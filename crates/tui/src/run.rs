@@ -28,8 +28,8 @@ use crate::pipeline::protocol::{self, Command};
 /// Maximum time to spend planning a slice before it is sent and keys are handled.
 const TURN: Duration = Duration::from_millis(3);
 
-/// Runs the front end until it is ended by a key or signal, then restores the terminal and sends
-/// [`Command::Quit`] to the worker. Must not be called more than once per process.
+/// Runs the front end until a key or signal ends it, then restores the terminal and sends [`Command::Quit`]
+/// to the worker. Must not be called more than once per process.
 ///
 /// # Errors
 /// Returns a [`TuiError`] if there is no terminal, if writing to it fails, or if the worker has ended.

@@ -53,7 +53,7 @@ fn linux_signals() -> impl Iterator<Item = i32> {
 /// A signal used to wake the signal thread. No other program sends it, and it is ignored by default.
 const MARK: i32 = SIGURG;
 
-/// Handles signals. When it is dropped, signals have their default effects again.
+/// Signal handler. Dropping it restores the signals' default effects.
 pub(super) struct SignalListener {
     over: Arc<AtomicBool>,
 }
@@ -282,8 +282,8 @@ fn exit_after_grace_period(signal: Signal, status: ExitStatus, over: &AtomicBool
     low_level::exit(i32::from(status.0));
 }
 
-/// Whether a shell could continue this process after it stops. That shell must be in the same session, so the
-/// first process of a session has none.
+/// Whether a shell could continue this process after it stops. The shell must be in the same session, so a
+/// session leader has no such shell.
 pub(super) fn has_shell() -> bool {
     match (getsid(None), getsid(Some(getppid()))) {
         (Ok(own), Ok(parents)) => own == parents && own != getpid(),

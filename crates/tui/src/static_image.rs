@@ -33,9 +33,9 @@ pub struct NamedImage {
     pub picture: Picture,
 }
 
-/// Draws images as text lines, side by side or, in a narrow terminal, below each other. Uses the terminal's
-/// colors, or ASCII characters without color support. Returns an empty string if the terminal has fewer than
-/// 30 columns. If the output is not a terminal, its size is assumed to be 80×24.
+/// Draws images as lines of text, side by side or, in a narrow terminal, below each other. Uses the
+/// terminal's colors, or ASCII characters without color support. Returns an empty string if the terminal has
+/// fewer than 30 columns. If the output is not a terminal, its size is assumed to be 80×24.
 pub fn images_as_text(pictures: &[NamedImage], color: ColorChoice, is_terminal: bool) -> String {
     let variable = |name: &str| std::env::var(name).ok();
     let depth = color::resolve_depth(color, variable);

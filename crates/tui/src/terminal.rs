@@ -49,7 +49,7 @@ static HAS_LINKS: AtomicBool = AtomicBool::new(false);
 static HAS_IMAGES: AtomicBool = AtomicBool::new(false);
 /// The thread whose panics restore the terminal. Panic messages from other threads are stored in [`PANIC`].
 static OWNER: Mutex<Option<ThreadId>> = Mutex::new(None);
-/// Message of the last panic in another thread.
+/// Message from the last panic in another thread.
 static PANIC: Mutex<Option<String>> = Mutex::new(None);
 
 /// Enables reports of button events and drags, in SGR format. (crossterm's command would enable all mouse
@@ -72,7 +72,7 @@ static CHANGES: [(&AtomicBool, &[u8]); 4] = [
 /// text as part of the string.
 const STRING_END: &[u8] = b"\x1b\\";
 
-/// Height-to-width ratio of cells for which half blocks are square.
+/// Height-to-width ratio of a cell whose half blocks are square.
 const DEFAULT_CELL_ASPECT: f32 = 2.0;
 /// Typical cell size in pixels.
 const DEFAULT_CELL_PIXELS: (u16, u16) = (8, 16);
@@ -192,8 +192,8 @@ fn leave_screen() {
         .and_then(|mut out| writer::write_all(&mut out, &bytes, is_late));
 }
 
-/// Restores the terminal from another thread in case its owner is blocked. Does not block: if the terminal
-/// does not accept output, a spawned thread waits for it.
+/// Restores the terminal from another thread, since the thread that owns it may be blocked. Does not block:
+/// if the terminal does not accept output, a spawned thread waits for it.
 pub(super) fn restore_from_other_thread() {
     if RAW.swap(false, Ordering::AcqRel) {
         let _ = disable_raw_mode();
@@ -357,7 +357,7 @@ fn install_panic_hook() {
     });
 }
 
-/// Message of the last panic in another thread.
+/// Message from the last panic in another thread.
 pub(super) fn last_panic() -> Option<String> {
     PANIC.lock().unwrap_or_else(PoisonError::into_inner).clone()
 }
@@ -378,8 +378,8 @@ pub(super) fn terminal_exists() -> bool {
     require_terminal().is_ok()
 }
 
-/// Window size and cell aspect ratio. The aspect ratio is `cell_aspect` if given. Otherwise it is derived
-/// from the window size in pixels. It is 2 if that size is unknown.
+/// Window size and cell aspect ratio. If `cell_aspect` is `None`, the aspect ratio is derived from the window
+/// size in pixels, or is 2 if that size is unknown.
 pub(super) fn query_window(cell_aspect: Option<f32>) -> Window {
     match terminal::window_size() {
         Ok(size) => limit_window(Window {
@@ -407,7 +407,7 @@ const MAX_COLUMNS: u16 = 4096;
 /// 65,535 columns and rows.
 const MAX_CELLS: u32 = 1 << 20;
 
-/// Limits a window to the size that is drawn.
+/// Limits a window to the maximum size that is drawn.
 fn limit_window(window: Window) -> Window {
     let columns = window.columns.min(MAX_COLUMNS);
     let most_rows = MAX_CELLS / u32::from(columns.max(1));

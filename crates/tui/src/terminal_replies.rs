@@ -56,7 +56,7 @@ pub(super) enum TerminalReply {
     TrueColor,
     /// Background color in sRGB (OSC 11).
     Background([u8; 3]),
-    /// Images can be drawn with this protocol.
+    /// The terminal supports images in this protocol.
     Images(ImageProtocol),
     /// A palette color in sRGB (OSC 4).
     Ink { index: u8, rgb: [u8; 3] },
@@ -64,8 +64,8 @@ pub(super) enum TerminalReply {
     Other,
 }
 
-/// Which queries to send. A query is sent only if it is useful and answered by the terminal itself. Replies
-/// to other queries are ignored.
+/// Which queries to send. A query is sent only if it is useful and the terminal itself answers it. Replies to
+/// other queries are ignored.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct TerminalQueries {
     /// Query the terminal's name to determine which block characters it draws.

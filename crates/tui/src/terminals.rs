@@ -22,7 +22,7 @@ pub(super) enum TerminalBrand {
     Xterm,
 }
 
-/// A terminal and its version, which is `[0, 0]` if unknown.
+/// A terminal and its version number. `[0, 0]` means that the version is unknown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct TerminalId {
     pub(super) brand: TerminalBrand,
@@ -130,8 +130,8 @@ impl TerminalId {
         Some(Self { brand: *brand, version: parse_version(rest.get(1..).unwrap_or_default()) })
     }
 
-    /// Detects the terminal from environment variables. `None` if it is unknown, and inside tmux or screen,
-    /// because these do not pass on the escape sequences.
+    /// Detects the terminal from environment variables. Returns `None` for unknown terminals, and inside tmux
+    /// or screen, which do not pass on the escape sequences.
     pub(super) fn from_environment(variable: impl Fn(&str) -> Option<String>) -> Option<Self> {
         const TERMS: [(&str, TerminalBrand); 6] = [
             ("xterm-kitty", TerminalBrand::Kitty),

@@ -10,8 +10,8 @@ use super::terminals::NotificationProtocol;
 use super::view;
 use crate::scene::sanitize::visible;
 
-/// Minimum running time of a render before the title and progress bar show it, so that they do not flicker
-/// while the camera moves.
+/// How long a render must run before the title and progress bar show it. The delay prevents flicker while the
+/// camera moves.
 const SHORT: Duration = Duration::from_millis(500);
 /// Percentage step on slow connections.
 const COARSE: u32 = 10;
@@ -56,8 +56,8 @@ pub(super) struct WindowTitle {
 }
 
 impl WindowTitle {
-    /// Title and progress bar for the state, with larger percentage steps if the connection `is_slow`. `None`
-    /// to leave both unchanged.
+    /// Title and progress bar for the state, with larger percentage steps if `is_slow`. `None` to leave both
+    /// unchanged.
     pub(super) fn for_state(state: &State, is_slow: bool) -> Option<Self> {
         let capabilities = state.display.capabilities;
         if state.work.running_time(state.now).is_some_and(|time| time < SHORT) && !state.work.paused {
@@ -107,7 +107,7 @@ fn progress_bar(state: &State, percent: Option<u32>) -> ProgressBar {
     }
 }
 
-/// Escape sequence for a desktop notification that a render ended after `time`.
+/// Escape sequence for a desktop notification about a render that ended after `time`.
 pub(super) fn notification_bytes(state: &State, notice: NotificationProtocol, time: Duration) -> Vec<u8> {
     let words = format!(
         "{}: {} after {}",

@@ -1,17 +1,17 @@
 //! Enums with named values, used by scene files, the command line and reports.
 
-/// A closed set of named values, implemented by [`choice!`](crate::choice!).
+/// A fixed set of named values. Use [`choice!`](crate::choice!) to implement it.
 pub trait Choice: Copy + PartialEq + Send + Sync + 'static {
     /// All values, in display order.
     const ALL: &'static [Self];
 
-    /// Names used by other versions, rejected with a dedicated error message.
+    /// Names that exist only in other versions. They are rejected with a dedicated error message.
     const UNAVAILABLE: &'static [&'static str];
 
     /// Name of the value.
     fn name(self) -> &'static str;
 
-    /// Short description of the value.
+    /// A short description of this value.
     fn meaning(self) -> &'static str;
 
     /// Finds the value called `name`.
@@ -23,7 +23,7 @@ pub trait Choice: Copy + PartialEq + Send + Sync + 'static {
 /// Serializes a choice as its name.
 ///
 /// # Errors
-/// The serializer's errors.
+/// Returns the serializer's errors.
 pub fn serialize<C: Choice, S: serde::Serializer>(choice: &C, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.serialize_str(choice.name())
 }

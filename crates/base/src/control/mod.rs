@@ -28,7 +28,7 @@ struct Shared {
     changed: Condvar,
 }
 
-/// Total length of earlier pauses and the start of the current one.
+/// Total duration of past pauses, and the start time of the current pause.
 #[derive(Debug, Default)]
 struct PauseTime {
     before: Duration,

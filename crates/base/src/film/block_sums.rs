@@ -1,4 +1,4 @@
-//! Block sums of a film: their allocation, and the completion of blocks.
+//! Allocates a film's block sums and closes complete blocks.
 
 use super::Rect;
 use super::sum_order::SumOrder;
@@ -22,7 +22,7 @@ impl Tile {
 }
 
 impl Film {
-    /// Sets the summation order of an empty film.
+    /// Sets the summation order for an empty film.
     ///
     /// # Errors
     /// [`FilmError::Memory`] if there is not enough memory for the block sums.
@@ -48,7 +48,7 @@ impl Film {
         Ok(self)
     }
 
-    /// Bytes needed for a crop's sums with this summation order, and for the full-size finished image.
+    /// Memory in bytes for a crop's sums in this summation order plus the full-size finished image.
     pub fn memory_for((width, height): (u32, u32), crop: Rect, blocks: SumOrder) -> (u64, u64) {
         let more = crop.area() as u64 * (blocks.kept_block_count() * size_of::<DVec3>()) as u64;
         let picture = bytes_needed(width, height, Rect { width: 0, height: 0, ..crop });

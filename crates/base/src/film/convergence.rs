@@ -37,9 +37,9 @@ pub(super) struct SquaredSteps {
 /// Sums of squared steps over pixels, at one power-of-two sample count.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct LevelSums {
-    /// Squared steps of the mean of all samples.
+    /// Sum of the squared steps in the mean of all samples.
     outer: f64,
-    /// Squared steps of the mean of the second half of the samples.
+    /// Sum of the squared steps in the mean of the second half of the samples.
     inner: f64,
     /// Sum of the squares of the `outer` terms, used to detect sums dominated by a few pixels.
     outer_squares: f64,
@@ -53,7 +53,7 @@ struct LevelSums {
 #[derive(Clone, Copy, Debug, Default)]
 struct StepPair {
     last: f64,
-    /// Mean of the steps in both halves of the samples. `None` for two samples.
+    /// Mean of the steps in the two halves of the samples. `None` for two samples.
     before: Option<f64>,
 }
 
@@ -259,11 +259,11 @@ const CHANCE_FALL: f64 = 2.3;
 /// a tile converge first, and the rest converges more slowly.
 const LASTING: f64 = 0.65;
 
-/// Penalty for a variance reduction measured from few pixels: the factor of the squared
+/// Penalty for a variance reduction measured from few pixels: the coefficient of the squared
 /// [`SquaredSteps::variance_uncertainty`].
 const DOUBT: f64 = 2.0;
 
-/// Trusted fraction of the variance reduction over two steps.
+/// Fraction of the variance reduction over two steps that is trusted.
 const CAREFUL: f64 = 0.8;
 
 /// Factor by which quadrupling independent samples reduces the variance.
@@ -279,8 +279,8 @@ const FOURFOLD_LASTING: f64 = 1.2;
 const FOURFOLD_MOST: f64 = 40.0;
 
 impl Convergence {
-    /// Typical long-term exponent of the variance's decrease with the sample count, regardless of the latest
-    /// steps.
+    /// Typical long-term exponent with which the variance falls as the sample count grows, regardless of the
+    /// latest steps.
     pub fn typical_exponent(self) -> f64 {
         match self {
             Self::Stratified => 1.432_959_407_276_106_2,

@@ -22,8 +22,8 @@ pub(super) fn aces(color: Vec3) -> Vec3 {
 
 /// T. Sobotka's AgX (2022) with its default look: an inset matrix, a sigmoid over 16.5 stops around middle
 /// gray, and an outset matrix. The matrices are B. Wrensch's for Rec. 709 ("Minimal AgX Implementation",
-/// 2023). The sigmoid is exact instead of using his polynomial fit. The result is linearized with a display
-/// gamma of 2.2.
+/// 2023). This implementation evaluates the exact sigmoid instead of his polynomial fit. The result is
+/// linearized with a display gamma of 2.2.
 pub(super) fn agx(color: Vec3) -> Vec3 {
     let inset = apply_color_matrix(&AGX_INSET, color);
     let encoded = Vec3::from_array(inset.to_array().map(agx_sigmoid_of_stops));

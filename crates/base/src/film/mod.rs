@@ -1,4 +1,4 @@
-//! Sums of samples, tone mapping and finished images.
+//! Films (sums of samples), tone mapping and finished images.
 //!
 //! Integrators produce [`TileSamples`], which a [`Film`] sums in f64. Image files contain [`Film::radiance`].
 //! [`Previewer`] scales the film to screen size during rendering. [`tone::develop`] converts the radiance or
@@ -130,8 +130,8 @@ impl RadianceImage {
         Self { width, height, pixels: vec![Vec3::ZERO; width as usize * height as usize] }
     }
 
-    /// Replaces the pixels of a rectangle, given in row-major order. Non-finite pixels become black, as in a
-    /// [`Film`].
+    /// Replaces the pixels in a rectangle with `pixels`, which are in row-major order. Non-finite values
+    /// become black, as in a [`Film`].
     pub fn put(&mut self, rect: Rect, pixels: &[Vec3]) {
         let width = self.width as usize;
         let rows = self.pixels.chunks_exact_mut(width).skip(rect.y as usize);

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::convergence::{Convergence, luminance};
 use super::{CELLS, Film, PixelSubset, Pixels, is_in_pool};
 
-/// Sample count at which the standard error is `part` times the error at `count` samples, if the variance
+/// Sample count that reduces the standard error at `count` samples to a fraction `part`, if the variance
 /// falls with this power of the sample count.
 pub fn samples_to_reduce_error(power: f64, part: f64, count: u32) -> u32 {
     (f64::from(count) * libm::pow(part, -2.0 / power)).ceil() as u32
@@ -33,7 +33,7 @@ pub struct ImageNoise {
     pub power: f64,
 }
 
-/// Sums over pixels from which an image's noise is computed.
+/// Sums over pixels for computing an image's noise.
 #[derive(Clone, Copy, Debug, Default)]
 struct NoiseSums {
     variance: f64,
@@ -43,7 +43,7 @@ struct NoiseSums {
 }
 
 impl NoiseSums {
-    /// Expected exponent for the next doubling, or the exponent of independent samples if there is no noise.
+    /// Expected exponent for the next doubling, or the exponent for independent samples if there is no noise.
     fn power(self) -> f64 {
         if self.left > 0.0 { libm::log2(self.variance / self.left) } else { 1.0 }
     }
@@ -57,8 +57,8 @@ impl NoiseSums {
 
 impl Film {
     /// Estimates the error of the current image relative to its brightness: the root mean square of the
-    /// pixels' standard errors of luminance, divided by the image's mean luminance. The estimate is based on
-    /// the changes caused by the latest samples.
+    /// pixels' luminance standard errors, divided by the image's mean luminance. The estimate is based on the
+    /// changes caused by the latest samples.
     ///
     /// About 0 if all samples of each pixel are equal. `None` if a pixel has fewer than two samples.
     pub fn relative_error(&self) -> Option<f64> {
@@ -151,7 +151,7 @@ impl Film {
         tile.steps.variance_uncertainty(tile.steps.level_count(), &[half])
     }
 
-    /// Noise in one half of all cells of a tile. `None` in the same cases as [`Film::cell_half_noise`].
+    /// Noise in one half of every cell in a tile. `None` in the same cases as [`Film::cell_half_noise`].
     pub fn tile_noise(&self, tile: usize, half: usize) -> Option<CellHalfNoise> {
         let (mut pixels, mut samples, mut sums) = (0.0, u32::MAX, NoiseSums::default());
         for cell in CELLS * tile..CELLS * (tile + 1) {
@@ -256,7 +256,7 @@ mod tests {
     }
 
     #[test]
-    fn spread_is_large_for_few_pixels() {
+    fn uncertainty_is_large_for_few_pixels() {
         let one: &[f32] = &[0.0, 8.0];
         let none: &[f32] = &[1.0, 1.0];
         // Pixels in a row alternate between the halves.
@@ -298,8 +298,8 @@ mod tests {
         }
     }
 
-    /// A film of 64 × 64 pixels, and the true root-mean-square error of the pixel means. `sample` returns a
-    /// sample given its index and the pixel's random bits. `truth` is the expected value.
+    /// A 64 × 64 pixel film and the true root-mean-square error of its pixel means. `sample` returns a sample
+    /// given its index and the pixel's random bits. `truth` is the expected value.
     fn square(count: u32, truth: f64, mut sample: impl FnMut(u32, u32) -> f32) -> (Film, f64) {
         const SIDE: u32 = 64;
         let film = Film::new(SIDE, SIDE, None).expect("a film");

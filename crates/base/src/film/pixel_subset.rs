@@ -1,5 +1,5 @@
-//! Division of cells into statistically similar halves, so that noise measured in one half also applies to
-//! the other.
+//! Divides cells into statistically similar halves, so that noise measured in one half also applies to the
+//! other.
 
 use super::Rect;
 
@@ -63,7 +63,7 @@ impl PixelSubset {
         }
     }
 
-    /// Half that contains the pixel at `index` in a rectangle.
+    /// The half of a rectangle that contains the pixel at `index`.
     pub fn half_containing(index: u32, rect: Rect) -> usize {
         let area = rect.area() as u32;
         let is_alone = index + 1 == area && area % 2 == 1;

@@ -85,7 +85,7 @@ mod tests {
     }
 
     #[test]
-    fn film_and_single_pixels_have_equal_brightness() {
+    fn film_and_prepass_brightness_are_equal() {
         let crop = Rect { x: 0, y: 0, width: 40, height: 3 };
         let film = Film::new(40, 3, None).expect("a film");
         let value =

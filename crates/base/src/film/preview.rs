@@ -45,7 +45,7 @@ type Weighted = (Vec3, f32);
 /// Like [`Weighted`], in double precision for summation.
 type Sum = (DVec3, f64);
 
-/// Number of rows summed at a time, which avoids a second copy of the whole preview.
+/// Number of rows summed at a time. Summing in bands avoids a second copy of the whole preview.
 const BAND_ROWS: u32 = 32;
 
 /// Number of tiles per thread between deadline checks: less than a millisecond of work.
@@ -309,7 +309,7 @@ mod tests {
         assert_eq!(picture(&second), preview(&second, 9, 5, None));
     }
 
-    /// 46 × 46 tiles, each with its index as its radiance.
+    /// A film of 46 × 46 tiles. Each tile's radiance is its index.
     fn tiled() -> Film {
         let film = Film::new(32 * 46, 32 * 46, None).expect("a film");
         for tile in 0..film.tile_count() {

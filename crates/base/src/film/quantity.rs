@@ -5,7 +5,7 @@ use super::sums::{Tile, tile_grid, tile_rect};
 use super::{Film, RadianceImage, Rect, TILE_SIZE};
 use crate::math::{DVec3, Vec3};
 
-/// A displayable quantity of a film.
+/// A film quantity that can be displayed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Quantity {
     /// Mean radiance: the image itself.

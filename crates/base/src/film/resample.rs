@@ -38,7 +38,7 @@ pub(super) fn resized(image: &RadianceImage, width: u32, height: u32) -> Radianc
         return image.clone();
     }
     let (width, height) = (width.max(1), height.max(1));
-    // Gather the old pixels that each new pixel covers, using the inverse mapping. The overlaps are the same.
+    // Use the inverse mapping to gather the old pixels that each new pixel covers. The overlaps are the same.
     let columns = Axis::new(image.width, width).inverse();
     let rows = Axis::new(image.height, height).inverse();
     let pixel = |i: usize| {

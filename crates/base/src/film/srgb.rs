@@ -1,5 +1,5 @@
-//! Table-based sRGB encoding to bytes. Matches the formula exactly without calling a power function per
-//! channel.
+//! Table-based sRGB encoding to bytes. Matches the formula exactly, but does not call a power function for
+//! each channel.
 
 use std::sync::LazyLock;
 

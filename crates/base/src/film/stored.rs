@@ -7,12 +7,12 @@ use super::sums::{NegativeLobeSums, Tile};
 use super::{CELLS, Film, PixelSubset};
 use crate::math::DVec3;
 
-/// Error for bytes that do not represent a tile of the film.
+/// Error for bytes that are not a valid tile of the film.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the data is not a valid tile of the image")]
 pub struct Malformed;
 
-/// A deserialized tile, whose blocks can be merged with blocks of other tiles.
+/// A deserialized tile. Its blocks can be merged with blocks from other tiles.
 #[derive(Debug, Default)]
 pub struct StoredTile {
     tile: Tile,
@@ -43,12 +43,12 @@ impl StoredTile {
         if from.0.is_empty() { Ok(Self { tile }) } else { Err(Malformed) }
     }
 
-    /// Number of block sums, including the one in progress, which may be empty.
+    /// Number of block sums, including the sum in progress, which may be empty.
     pub fn block_count(&self) -> usize {
         self.tile.earlier.len() + 1
     }
 
-    /// Adds one block of another tile to this tile, which accumulates blocks.
+    /// Adds one block from another tile to the blocks accumulated in this tile.
     ///
     /// # Errors
     /// [`Malformed`] if the tiles differ in size or the block does not exist.
@@ -76,7 +76,7 @@ impl StoredTile {
         Ok(())
     }
 
-    /// Adds the sample counts of a tile whose blocks have been added.
+    /// Adds the sample counts of a tile after its blocks have been added.
     pub fn add_counts(&mut self, of: &Self) {
         self.tile.counts.iter_mut().zip(&of.tile.counts).for_each(|(own, other)| *own += other);
         if let (Some(own), Some(other)) = (&mut self.tile.negative, &of.tile.negative) {

@@ -6,7 +6,7 @@ use crate::math::DVec3;
 /// Samples per block.
 pub const BLOCK_SIZE: u32 = 16;
 
-/// Summation order of a pixel's samples.
+/// Summation order for a pixel's samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum SumOrder {
     /// Adds all samples in sequence.
@@ -14,8 +14,7 @@ pub enum SumOrder {
     Sequential,
     /// Sums blocks of [`BLOCK_SIZE`] samples and adds the block sums in sequence.
     Blocked,
-    /// Sums blocks of [`BLOCK_SIZE`] samples and keeps the block sums separate, for at most this many
-    /// finished blocks.
+    /// Keeps a separate sum for each block of [`BLOCK_SIZE`] samples, for up to this many finished blocks.
     SeparateBlocks(usize),
 }
 

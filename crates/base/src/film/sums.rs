@@ -58,9 +58,9 @@ pub struct SampleStats {
     pub max: u32,
 }
 
-/// Sums of the samples of each pixel in an image or crop. Tiles are numbered in row-major order from the top
-/// left of the crop. Any thread may add to any tile and read the film at any time. A tile's sums have the
-/// same bits for samples added in the same order, regardless of how they are grouped.
+/// Per-pixel sums of the samples in an image or crop. Tiles are numbered in row-major order from the top left
+/// of the crop. Any thread may add to any tile and read the film at any time. A tile's sums have the same
+/// bits for samples added in the same order, regardless of how they are grouped.
 #[derive(Debug)]
 pub struct Film {
     width: u32,
@@ -343,7 +343,7 @@ impl Film {
         self.non_finite_samples.fetch_add(non_finite, Ordering::Relaxed);
     }
 
-    /// Minimum, mean and maximum samples per pixel of the crop.
+    /// Minimum, mean and maximum number of samples per pixel in the crop.
     pub fn samples(&self) -> SampleStats {
         let (mut min, mut max, mut total) = (u32::MAX, 0, 0_u64);
         for tile in &self.tiles {

@@ -4,7 +4,7 @@ use std::sync::atomic::AtomicBool;
 
 use super::*;
 
-/// Samples `first..first + count` of every pixel. Their magnitudes vary widely so that summation order
+/// Samples `first..first + count` for every pixel. Their magnitudes vary widely so that summation order
 /// matters.
 fn samples(rect: Rect, first: u32, count: u32) -> TileSamples {
     let value = |x: u32, y: u32, sample: u32| {

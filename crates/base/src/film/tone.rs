@@ -40,12 +40,12 @@ pub enum Transfer {
     Identity,
 }
 
-/// Mapping of radiance to display values.
+/// Maps radiance to display values.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ToneMapping {
     /// Exposure in stops: radiance is multiplied by 2 to this power.
     pub exposure_stops: f32,
-    /// Tone curve, applied after exposure, with results in [0, 1].
+    /// Tone curve, which is applied after exposure and returns values in [0, 1].
     pub curve: Tonemap,
     /// Encoding of the result.
     pub transfer: Transfer,

@@ -46,7 +46,7 @@ pub fn srgb8_to_linear(bytes: [u8; 3]) -> Vec3 {
     Vec3::from_array(bytes.map(|byte| SRGB8_TO_LINEAR[usize::from(byte)]))
 }
 
-/// Lookup table of [`srgb_to_linear`] for every byte.
+/// Lookup table for [`srgb_to_linear`], indexed by sRGB byte.
 pub static SRGB8_TO_LINEAR: LazyLock<[f32; 256]> =
     LazyLock::new(|| std::array::from_fn(|byte| srgb_to_linear(byte as f32 / 255.0)));
 

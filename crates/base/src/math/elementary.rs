@@ -132,7 +132,7 @@ pub fn sin_cos(angle: f32) -> (f32, f32) {
 mod tests {
     use super::*;
 
-    /// Error of `value` in units in the last place of the exact result.
+    /// Error of `value` in ulps of the exact result.
     fn ulps(value: f32, exact: f64) -> f64 {
         let near = exact as f32;
         let ulp = f64::from((near.abs().next_up() - near.abs()).max(f32::MIN_POSITIVE * f32::EPSILON));

@@ -1,6 +1,6 @@
-//! Packets of 16 numbers, processed in branch-free array loops that compilers vectorize. Each lane has the
-//! same bits as the result of the scalar computation. Structs that hold packets are aligned to
-//! cache lines, because a load that crosses a cache-line boundary takes twice as long.
+//! Packets of 16 numbers, processed in branch-free array loops that compilers vectorize. The result in each
+//! lane is bit-identical to the scalar result. Structs that hold packets are aligned to cache lines, because
+//! a load that crosses a cache-line boundary takes twice as long.
 
 use super::Vec3;
 
@@ -10,7 +10,7 @@ pub const PACKET_SIZE: usize = 16;
 /// One `f32` per lane.
 pub type F32x16 = [f32; PACKET_SIZE];
 
-/// One vector per lane, as one array per coordinate.
+/// One vector per lane, stored as one array per coordinate.
 pub type Vec3x16 = [F32x16; 3];
 
 /// Returns the vector in lane `i`.
@@ -42,8 +42,8 @@ pub trait SimdKernel {
     fn run(self, simd: impl Simd) -> Self::Output;
 }
 
-/// Token for an instruction set, with its cross-lane operations. Tokens for optional instruction sets can
-/// only be created on processors that support them.
+/// Token that provides the cross-lane operations of an instruction set. Tokens for optional instruction sets
+/// can only be created on processors that support them.
 pub trait Simd: Copy {
     /// Packs a mask into bits, one per lane.
     fn movemask(self, mask: &Mask) -> u32;
@@ -52,7 +52,7 @@ pub trait Simd: Copy {
     /// on the lane order but is the same on every instruction set.
     fn min_max(self, row: &F32x16, lanes: u32) -> [f32; 2];
 
-    /// Reciprocal of every lane. Compilers may turn a plain loop into divisions of two lanes at a time.
+    /// Reciprocal of every lane. In a plain loop, compilers may divide only two lanes at a time.
     fn reciprocals(self, row: &F32x16) -> F32x16;
 
     /// `a · b + c`, rounded once if the processor has a fused multiply-add and twice otherwise. Use only for

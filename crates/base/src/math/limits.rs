@@ -1,4 +1,4 @@
-//! Limits on the numbers in a scene, regardless of the file format.
+//! Limits on the numbers in a scene. They do not depend on the file format.
 
 use super::DVec3;
 

@@ -3,8 +3,8 @@
 use super::DVec3;
 use super::float::floor_to_power_of_two;
 
-/// Grid spacing of the origins, in scene sizes. At this distance, the rounding error of single precision is a
-/// few millionths of the scene size.
+/// Spacing of the origin grid, in units of the scene size. At this distance, the rounding error of single
+/// precision is a few millionths of the scene size.
 const STEP: f64 = 64.0;
 
 /// Factor that keeps typical sizes such as 1, 2 and 5 away from the powers of two at which the grid spacing

@@ -1,4 +1,4 @@
-//! Simple pseudo-random numbers for tests and fixed sampling patterns.
+//! A simple pseudo-random number generator for tests and fixed sampling patterns.
 
 /// Hashes `number` to 64 well-mixed bits, identically on every machine (`MurmurHash3` finalizer).
 pub fn hash(number: u64) -> u64 {

@@ -31,8 +31,8 @@ impl DiscreteDistribution {
         (self.sums[index] - before) / self.total()
     }
 
-    /// Samples an index with `u` in [0, 1). Also returns the relative position of `u` within that index's
-    /// interval, in [0, 1).
+    /// Samples an index with `u` in [0, 1). Also returns the relative position, in [0, 1), of `u` within that
+    /// index's interval.
     pub fn sample(&self, u: f32) -> (usize, f32) {
         let target = f64::from(u) * self.total();
         let index = self.sums.partition_point(|&sum| sum <= target).min(self.sums.len() - 1);

@@ -20,8 +20,7 @@ choice! {
     }
 }
 
-/// A position drawn in proportion to |f|, in pixels relative to the pixel center, and the sign of f at this
-/// position.
+/// A sample drawn in proportion to |f|: its offset from the pixel center in pixels, and the sign of f there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FilterSample {
     /// Offset from the pixel center.
@@ -32,7 +31,7 @@ pub struct FilterSample {
 }
 
 impl PixelFilter {
-    /// Maps a point of the unit square to a filter sample.
+    /// Maps a point in the unit square to a filter sample.
     #[inline]
     pub fn sample(self, u: Vec2) -> FilterSample {
         match self {
@@ -45,7 +44,7 @@ impl PixelFilter {
         }
     }
 
-    /// Maps points of the unit square to filter offsets in place. For filters sampled from a table, which may
+    /// Replaces points in the unit square with filter offsets. For filters sampled from a table, which may
     /// have negative lobes, also passes each sample and its index to `each`.
     #[inline(always)]
     pub fn sample_row<const N: usize>(

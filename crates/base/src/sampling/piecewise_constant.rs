@@ -6,11 +6,11 @@
 #[derive(Clone, Debug, PartialEq)]
 pub struct PiecewiseConstant2D {
     columns: usize,
-    /// Cumulative probability of the rows before each row, followed by 1.
+    /// For each row, the cumulative probability of all previous rows. Followed by 1.
     rows: Vec<f32>,
     /// Cumulative column probabilities within each row, `columns + 1` values per row.
     in_row: Vec<f32>,
-    /// Guide tables for finding a row, and a column within each row; see [`guide_table`].
+    /// Guide tables for finding a row, and for finding a column within each row; see [`guide_table`].
     row_guide: Vec<u32>,
     column_guide: Vec<u32>,
 }
@@ -22,7 +22,7 @@ pub struct GridSample {
     pub column: usize,
     /// The cell's row.
     pub row: usize,
-    /// Position in the cell, along the row and across it, in [0, 1).
+    /// Position within the cell, along the row and across it, in [0, 1).
     pub rest: [f32; 2],
 }
 
@@ -102,8 +102,8 @@ fn guide_table(sums: &[f32]) -> impl Iterator<Item = u32> {
     })
 }
 
-/// Last interval, searching from `place` onward, that starts at or before `u`. This is usually `place` or the
-/// next interval, so the first two steps avoid unpredictable branches.
+/// Finds the last interval that starts at or before `u`, searching forward from `place`. It is usually
+/// `place` or the next interval, so the first two steps avoid unpredictable branches.
 #[inline(always)]
 fn last_interval_from(sums: &[f32], mut place: usize, u: f32) -> usize {
     for _ in 0..2 {
@@ -119,7 +119,7 @@ fn last_interval_from(sums: &[f32], mut place: usize, u: f32) -> usize {
 /// Finds the interval that contains `u` in [0, 1), and the relative position of `u` within it, in [0, 1).
 #[inline(always)]
 fn find_interval(sums: &[f32], guide: &[u32], u: f32) -> (usize, f32) {
-    // Rounding may select the part after the one that contains `u`, so start one part earlier.
+    // Rounding may select the part after the correct part, so start one part earlier.
     let part = ((u * guide.len() as f32) as usize).saturating_sub(1);
     let first = last_interval_from(sums, guide[part] as usize, u);
     let rest = (u - sums[first]) / (sums[first + 1] - sums[first]);

@@ -18,7 +18,7 @@ pub enum Dimension {
     LightChoice,
     /// Position on the chosen light.
     ChosenLight,
-    /// Choice of which selected lights are tested with shadow rays.
+    /// Choice of the selected lights that are tested with shadow rays.
     ShadowRayChoice,
     /// Choice between reflection and refraction.
     Fresnel,
@@ -37,9 +37,9 @@ pub enum Dimension {
     Gather,
     /// Position in a density kernel, for the surface search trial with this index.
     Trial(u32),
-    /// Choice of a photon's light and the part of the light that emits it.
+    /// Choice of the light that emits a photon, and of the emitting part of the light.
     PhotonLight,
-    /// Whether to aim a photon, and at which target.
+    /// Whether a photon is aimed, and at which target.
     PhotonTarget,
     /// Starting position of a photon on its light.
     PhotonPosition,
@@ -48,7 +48,7 @@ pub enum Dimension {
 }
 
 impl Dimension {
-    /// Hash that selects the Owen scramble of this decision. `path` distinguishes the paths of one sample.
+    /// Hash that selects the Owen scramble for this decision. `path` distinguishes the paths of one sample.
     #[inline(always)]
     fn hash(self, path: u32) -> u32 {
         let number = match self {
@@ -78,7 +78,7 @@ impl Dimension {
 /// Path number for decisions made in the camera.
 pub const CAMERA_PATH: u32 = 0;
 
-/// Random numbers for one sample of a pixel.
+/// Random numbers for one sample in a pixel.
 #[derive(Clone, Copy, Debug)]
 pub struct PixelSampler {
     seed: u32,
@@ -92,7 +92,7 @@ fn pixel_seed(seed: u32, x: u32, y: u32) -> u32 {
 }
 
 impl PixelSampler {
-    /// Creates the sampler for sample `sample` of pixel (x, y) of the full image.
+    /// Creates the sampler for sample `sample` of pixel (x, y) in the full image.
     #[inline]
     pub fn new(seed: u32, x: u32, y: u32, sample: u32) -> Self {
         Self { seed: pixel_seed(seed, x, y), sample }
@@ -115,7 +115,7 @@ pub struct SamplerPacket<const N: usize> {
 }
 
 impl<const N: usize> SamplerPacket<N> {
-    /// Creates the samplers for samples of pixels (x, y) of the full image.
+    /// Creates samplers for the given samples of pixels (x, y) in the full image.
     #[inline(always)]
     pub fn new(seed: u32, x: &[u32; N], y: &[u32; N], samples: &[u32; N]) -> Self {
         let mut seeds = [0; N];

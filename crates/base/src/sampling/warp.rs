@@ -49,8 +49,9 @@ pub fn cosine(u: [f32; 2]) -> Vec3 {
     at.extend((1.0 - at.length_squared()).max(0.0).sqrt())
 }
 
-/// Samples a point in the unit square with a bilinear pdf, given by values ≥ 0 (not all 0) at the corners (0,
-/// 0), (1, 0), (0, 1), (1, 1) (Pharr, Jakob, Humphreys, *Physically Based Rendering*, 4th edition, A.5.1).
+/// Samples a point in the unit square with a bilinear pdf, specified by values ≥ 0 (not all 0) at the corners
+/// (0, 0), (1, 0), (0, 1), (1, 1) (Pharr, Jakob, Humphreys, *Physically Based Rendering*, 4th edition,
+/// A.5.1).
 #[inline(always)]
 pub fn bilinear(u: [f32; 2], corners: &[f32; 4]) -> [f32; 2] {
     let [a, b, c, d] = *corners;
@@ -58,7 +59,7 @@ pub fn bilinear(u: [f32; 2], corners: &[f32; 4]) -> [f32; 2] {
     [linear(u[0], a + (c - a) * y, b + (d - b) * y), y]
 }
 
-/// Samples a number in [0, 1] with a linear pdf, given by values ≥ 0 at both ends.
+/// Samples a number in [0, 1] with a linear pdf, specified by values ≥ 0 at both ends.
 #[inline(always)]
 fn linear(u: f32, first: f32, last: f32) -> f32 {
     let sum = first + last;

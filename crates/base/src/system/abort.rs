@@ -18,7 +18,7 @@ use signal_hook::low_level;
 /// Size in bytes of the last failed allocation, or 0.
 static REFUSED_BYTES: AtomicUsize = AtomicUsize::new(0);
 
-/// Function that restores the terminal using only async-signal-safe calls.
+/// Function that restores the terminal and makes only async-signal-safe calls.
 static RESTORE_TERMINAL: OnceLock<fn()> = OnceLock::new();
 
 /// Exit code for failures.

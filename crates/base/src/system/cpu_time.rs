@@ -1,4 +1,4 @@
-//! CPU time of threads and processes.
+//! CPU time used by threads and processes.
 
 use nix::time::{ClockId, clock_gettime};
 

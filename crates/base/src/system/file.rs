@@ -62,12 +62,12 @@ pub struct FileStamp {
     pub len: u64,
     /// Modification time, in seconds and nanoseconds since 1970.
     pub modified: (i64, i64),
-    /// Time of the last change of content or metadata, in seconds and nanoseconds since 1970.
+    /// Time of the last change to the content or metadata, in seconds and nanoseconds since 1970.
     pub changed: (i64, i64),
 }
 
 impl FileStamp {
-    /// The stamp of a file with this metadata.
+    /// Creates the stamp for a file with this metadata.
     pub fn new(metadata: &Metadata) -> Self {
         Self {
             device: metadata.dev(),
@@ -78,8 +78,8 @@ impl FileStamp {
         }
     }
 
-    /// The stamp of the file at `path`, following symbolic links. `None` if it does not exist or its metadata
-    /// cannot be read.
+    /// Returns the stamp for the file at `path`, following symbolic links. `None` if it does not exist or its
+    /// metadata cannot be read.
     pub fn of(path: &Path) -> Option<Self> {
         fs::metadata(path).ok().map(|metadata| Self::new(&metadata))
     }
@@ -89,13 +89,14 @@ impl FileStamp {
 /// than 1024 bytes").
 pub const LFS_POINTER_LIMIT: u64 = 1024;
 
-/// Whether these bytes are a Git LFS pointer instead of a file's content.
+/// Whether these bytes are a Git LFS pointer instead of the file's actual content.
 pub fn is_lfs_pointer(bytes: &[u8]) -> bool {
     let starts = ["version https://git-lfs.github.com/spec/", "version https://hawser.github.com/spec/"];
     (bytes.len() as u64) < LFS_POINTER_LIMIT && starts.iter().any(|start| bytes.starts_with(start.as_bytes()))
 }
 
-/// Reason not to replace this file with another one, if any. Read-only files are not replaced even by root.
+/// Returns the reason not to replace this file, or `None` if it may be replaced. Read-only files are not
+/// replaced even by root.
 pub fn reason_not_to_replace(metadata: &Metadata) -> Option<&'static str> {
     match () {
         () if metadata.nlink() > 1 => Some("has other hard links, which would keep the old text"),

@@ -1,4 +1,4 @@
-//! Machine and process identities, used for files in folders shared by several machines.
+//! Machine and process identities, for files in folders that several machines share.
 
 use std::fs;
 use std::hash::{DefaultHasher, Hash, Hasher};

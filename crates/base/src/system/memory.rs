@@ -14,7 +14,7 @@ pub struct MemoryLimit {
     pub setting: String,
 }
 
-/// Lowest limit imposed on the address space or by a control group. `None` if memory is unlimited.
+/// Lowest memory limit set by `ulimit -v` or a control group. `None` if memory is unlimited.
 pub fn limit() -> Option<MemoryLimit> {
     let of_space =
         getrlimit(Resource::RLIMIT_AS).ok().map(|(bytes, _)| bytes).filter(|bytes| *bytes < RLIM_INFINITY);
@@ -24,7 +24,7 @@ pub fn limit() -> Option<MemoryLimit> {
     of_space.into_iter().chain(of_group).min_by_key(|limit| limit.bytes)
 }
 
-/// Lowest limit of the control groups (version 1 or 2) listed in `/proc/self/cgroup` and their ancestors.
+/// Lowest limit among the control groups (version 1 or 2) listed in `/proc/self/cgroup` and their ancestors.
 fn cgroup_limit(root: &Path, groups: &str) -> Option<MemoryLimit> {
     let of_line = |line: &str| {
         let [_, controllers, path] = <[&str; 3]>::try_from(line.splitn(3, ':').collect::<Vec<_>>()).ok()?;
@@ -40,7 +40,7 @@ fn cgroup_limit(root: &Path, groups: &str) -> Option<MemoryLimit> {
     groups.lines().filter_map(of_line).min_by_key(|limit| limit.bytes)
 }
 
-/// Returns the lowest limit of a group and its ancestors. In a container, the path may be the host's path
+/// Returns the lowest limit among a group and its ancestors. In a container, the path may be the host's path
 /// even though the root is the container's own group.
 fn lowest_ancestor_limit(root: &Path, path: &str, file: &str) -> Option<MemoryLimit> {
     /// Version 1 represents "no limit" as the largest possible number of pages.

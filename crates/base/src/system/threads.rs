@@ -7,7 +7,7 @@ use nix::sys::resource::{Resource, getrlimit};
 
 use super::describe_error;
 
-/// Address space of a thread's stack (the standard library's default).
+/// Address space per thread stack in bytes (the standard library's default).
 const STACK_BYTES: u64 = 2 << 20;
 
 /// Checks that the stacks of `threads` threads fit within the process's address-space limit. Must be called
@@ -15,7 +15,7 @@ const STACK_BYTES: u64 = 2 << 20;
 /// has no room for its signal stack.
 ///
 /// # Errors
-/// Returns the system's error for a thread that cannot be started if the stacks do not fit.
+/// If the stacks do not fit, returns the error that the system reports when it cannot start a thread.
 pub fn check_stack_space(threads: usize) -> Result<(), Error> {
     let Ok((limit, _)) = getrlimit(Resource::RLIMIT_AS) else { return Ok(()) };
     if (threads as u64).saturating_mul(STACK_BYTES) > limit {

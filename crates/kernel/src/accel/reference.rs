@@ -11,12 +11,12 @@ use crate::math::{DVec3, Vec3, Vec4};
 /// corner is stored negated, so growing a box needs only minima.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(32))]
-pub struct Bounds {
+pub struct SimdBounds {
     pub min: Vec4,
     pub minus_max: Vec4,
 }
 
-impl Bounds {
+impl SimdBounds {
     pub const EMPTY: Self = Self { min: Vec4::INFINITY, minus_max: Vec4::INFINITY };
 
     /// Box with the given corners.
@@ -27,7 +27,7 @@ impl Bounds {
 
     /// Bounding box of a slice of references.
     #[inline]
-    pub fn around(references: &[Reference]) -> Self {
+    pub fn around(references: &[TriangleReference]) -> Self {
         references.iter().fold(Self::EMPTY, |mut all, reference| {
             all.grow(&reference.bounds);
             all
@@ -82,17 +82,17 @@ const _: () = assert!(TriangleMesh::MOST_TRIANGLES < 1 << 29);
 
 /// A triangle id and the bounding box of the triangle clipped to a cell.
 #[derive(Clone, Copy, Debug)]
-pub struct Reference {
-    /// Bounds, with the bits of the id in the last lane of `min`.
-    pub bounds: Bounds,
+pub struct TriangleReference {
+    /// Bounds. The last lane of `min` contains the bits of the id.
+    pub bounds: SimdBounds,
 }
 
-impl Reference {
+impl TriangleReference {
     /// References to all triangles in order. Skips triangles that cannot be hit or have non-finite boxes.
     ///
     /// # Errors
     /// [`Cancelled`] if the build was canceled.
-    pub fn usable(
+    pub fn collect_finite(
         count: u32,
         corners: &(impl Fn(u32) -> [Vec3; 3] + Sync),
         token: &CancelToken,
@@ -114,7 +114,7 @@ impl Reference {
         let poison = (a + b + c).truncate().to_array().map(|sum| if sum.is_nan() { f32::NAN } else { 0.0 });
         let mut min = a.min(b).min(c) + Vec3::from(poison).extend(0.0);
         min.w = f32::from_bits(id | NORMAL);
-        Self { bounds: Bounds::new(min, a.max(b).max(c)) }
+        Self { bounds: SimdBounds::new(min, a.max(b).max(c)) }
     }
 
     #[inline(always)]
@@ -136,7 +136,7 @@ impl Reference {
     /// is the entire half of the old box.
     #[inline]
     pub fn split(&self, axis: usize, at: f32, corners: [Vec3; 3]) -> [Self; 2] {
-        let mut parts = [Bounds::EMPTY; 2];
+        let mut parts = [SimdBounds::EMPTY; 2];
         let mut before = corners[2];
         for corner in corners {
             let (from, to) = (before.to_array()[axis], corner.to_array()[axis]);
@@ -147,7 +147,7 @@ impl Reference {
                 parts[0].grow(&crossing);
                 parts[1].grow(&crossing);
             }
-            let own = Bounds::new(corner.extend(0.0), corner.extend(0.0));
+            let own = SimdBounds::new(corner.extend(0.0), corner.extend(0.0));
             if to <= at {
                 parts[0].grow(&own);
             }
@@ -160,11 +160,11 @@ impl Reference {
         [self.intersected_with(left, &parts[0]), self.intersected_with(right, &parts[1])]
     }
 
-    /// The reference with its box replaced by the intersection of both boxes, or by `half` if they do not
-    /// overlap.
+    /// Replaces the reference's box with the intersection of both boxes, or by `half` if they do not overlap.
     #[inline(always)]
-    fn intersected_with(&self, half: Bounds, part: &Bounds) -> Self {
-        let mut both = Bounds { min: half.min.max(part.min), minus_max: half.minus_max.max(part.minus_max) };
+    fn intersected_with(&self, half: SimdBounds, part: &SimdBounds) -> Self {
+        let mut both =
+            SimdBounds { min: half.min.max(part.min), minus_max: half.minus_max.max(part.minus_max) };
         both = if both.extent().truncate().cmpge(Vec3::ZERO).all() { both } else { half };
         both.min.w = self.bounds.min.w;
         Self { bounds: both }
@@ -173,7 +173,7 @@ impl Reference {
 
 /// `f32` box around a double-precision point, rounded outward.
 #[inline(always)]
-fn around_rounded(exact: DVec3) -> Bounds {
+fn around_rounded(exact: DVec3) -> SimdBounds {
     let near = exact.as_vec3();
     let off = exact - near.as_dvec3();
     let [mut min, mut max] = [near; 2];
@@ -184,18 +184,18 @@ fn around_rounded(exact: DVec3) -> Bounds {
             max[axis] = near[axis].next_up();
         }
     }
-    Bounds::new(min.extend(0.0), max.extend(0.0))
+    SimdBounds::new(min.extend(0.0), max.extend(0.0))
 }
 
 /// A triangle clipped by up to six planes in double precision (Sutherland, Hodgman, *Reentrant Polygon
 /// Clipping*, 1974).
 #[derive(Clone, Copy)]
-pub struct Polygon {
+pub struct ClippedTriangle {
     points: [DVec3; 9],
     count: usize,
 }
 
-impl Polygon {
+impl ClippedTriangle {
     const NOTHING: Self = Self { points: [DVec3::ZERO; 9], count: 0 };
 
     /// Clips a triangle to a box, including its faces.
@@ -267,7 +267,7 @@ mod tests {
     #[test]
     fn clipped_triangles_have_tight_bounds() {
         let corners = [Vec3::ZERO, Vec3::new(4.0, 0.0, 0.0), Vec3::new(0.0, 4.0, 4.0)];
-        let whole = Reference::new(7, corners);
+        let whole = TriangleReference::new(7, corners);
         let [left, right] = whole.split(0, 3.0, corners);
         assert_eq!((left.id(), right.id()), (7, 7));
         assert_eq!(
@@ -280,7 +280,7 @@ mod tests {
     #[test]
     fn bounds_are_rounded_outward() {
         let corners = [Vec3::ZERO, Vec3::new(3.0, 1.0, 0.1), Vec3::new(3.0, 1.0, 0.7)];
-        let [left, right] = Reference::new(0, corners).split(0, 1.0, corners);
+        let [left, right] = TriangleReference::new(0, corners).split(0, 1.0, corners);
         for (low, exact, high) in [
             (right.bounds.min.y, 1.0 / 3.0, left.bounds.max().y),
             (right.bounds.min.z, f64::from(0.1_f32) / 3.0, f32::INFINITY),

@@ -14,12 +14,12 @@ type TriangleSoup = Vec<[Vec3; 3]>;
 
 fn kd_tree(mesh: &[[Vec3; 3]]) -> KdTree {
     let tree = KdTree::build(mesh.len() as u32, |id| mesh[id as usize], &CancelToken::new());
-    tree.expect("nobody cancels")
+    tree.expect("never canceled")
 }
 
 fn wide_bvh(mesh: &[[Vec3; 3]]) -> WideBvh {
     let tree = WideBvh::build(mesh.len() as u32, |id| mesh[id as usize], &CancelToken::new());
-    tree.expect("nobody cancels")
+    tree.expect("never canceled")
 }
 
 /// A closed box with `squares` squares along each edge.
@@ -110,7 +110,7 @@ fn aimed(mesh: &[[Vec3; 3]], bounds: &Aabb, kind: usize, next: &mut impl FnMut()
     Ray { t_max, ..Ray::new(origin, direction) }
 }
 
-/// Number of rays for which a tree disagrees with brute force, and a description of the first such ray.
+/// Number of rays for which any tree disagrees with brute force, and a description of the first such ray.
 fn differences(mesh: &[[Vec3; 3]], seed: u64, count: usize) -> (usize, Option<String>) {
     let (planes, boxes) = (kd_tree(mesh), wide_bvh(mesh));
     let mut next = random(seed);

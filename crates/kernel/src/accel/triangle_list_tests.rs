@@ -24,7 +24,7 @@ impl SimdKernel for FacetQueries<'_> {
     #[inline(always)]
     fn run(self, simd: impl Simd) -> Self::Output {
         let (rows, ends) = RayPacket::new(self.rays);
-        let (met, mut found) = (((1_u64 << self.rays.len()) - 1) as u32, HitPacket::none());
+        let (met, mut found) = (((1_u64 << self.rays.len()) - 1) as u32, HitPacket::without_hits());
         let open = self.facets.closest(&rows, (met, &ends), &mut found, simd);
         let [any, open_any] = self.facets.any(&rows, (met, &ends), self.except, simd);
         (found, [open, any, open_any])

@@ -20,7 +20,7 @@ impl SimdKernel for Tested<'_> {
     #[inline(always)]
     fn run(self, simd: impl Simd) -> (HitPacket, u32) {
         let (rows, ends) = RayPacket::new(self.rays);
-        let (rays, mut found, mut any) = (ShearedPacket::new(&rows), HitPacket::none(), 0);
+        let (rays, mut found, mut any) = (ShearedPacket::new(&rows), HitPacket::without_hits(), 0);
         let (met, mut nearest) = ((1 << self.rays.len()) - 1, ends);
         for (number, corners) in (0..).zip(self.triangles) {
             any |= rays.any((number, corners), met, &ends, simd);

@@ -18,14 +18,14 @@ impl Aabb {
     pub const EMPTY: Self = Self { min: Vec3::INFINITY, max: Vec3::NEG_INFINITY };
 
     /// Smallest box that contains the given points.
-    pub fn around(points: impl IntoIterator<Item = Vec3>) -> Self {
+    pub fn from_points(points: impl IntoIterator<Item = Vec3>) -> Self {
         points
             .into_iter()
             .fold(Self::EMPTY, |bounds, p| Self { min: bounds.min.min(p), max: bounds.max.max(p) })
     }
 
     /// Smallest `f32` box around double-precision points, rounded outward.
-    pub fn around_f64(points: impl IntoIterator<Item = DVec3>) -> Self {
+    pub fn from_points_f64(points: impl IntoIterator<Item = DVec3>) -> Self {
         let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         for p in points {
             (min, max) = (min.min(p), max.max(p));
@@ -44,12 +44,12 @@ impl Aabb {
     }
 
     /// Whether the two boxes overlap or touch.
-    pub fn meets(&self, other: &Self) -> bool {
+    pub fn overlaps(&self, other: &Self) -> bool {
         self.min.cmple(other.max).all() && other.min.cmple(self.max).all()
     }
 
     /// Expands the box by `margin` on every side.
-    pub fn grown(self, margin: Vec3) -> Self {
+    pub fn expanded(self, margin: Vec3) -> Self {
         Self { min: self.min - margin, max: self.max + margin }
     }
 
@@ -70,14 +70,14 @@ impl Aabb {
     }
 }
 
-/// Factor on distances that compensates for rounding in [`SlabRay::enter`].
+/// Factor applied to distances to compensate for rounding in [`SlabRay::enter`].
 pub const SLAB_PAD: f32 = 1.0 + 2.0 * gamma(3);
 
 /// [`SLAB_PAD`] for slab tests that multiply it by the inverse direction, which rounds once more.
 pub const FAR_PAD: f32 = 1.0 + 2.0 * gamma(4);
 
-/// Bound on the error of the watertight triangle test perpendicular to a ray, relative to the distance. The
-/// error of the projected coordinates is below 13 unit roundoffs.
+/// Bound on the watertight triangle test's error perpendicular to a ray, relative to the distance. The error
+/// of the projected coordinates is below 13 unit roundoffs.
 pub const TRIANGLE_ERROR: f32 = 16.0 * f32::EPSILON;
 
 /// A ray preprocessed for the slab test.
@@ -108,7 +108,7 @@ impl SlabRay {
     /// direction behave the same. The ray's end is also padded to avoid missing a box with a hit exactly at
     /// the end.
     #[inline(always)]
-    pub fn enter(&self, min: Vec3, max: Vec3, t_max: f32) -> Option<f32> {
+    pub fn entry_distance(&self, min: Vec3, max: Vec3, t_max: f32) -> Option<f32> {
         let a = (min - (self.origin + self.margin)) * self.inverse;
         let b = (max - (self.origin - self.margin)) * self.inverse;
         let mut near = 0.0_f32;
@@ -133,7 +133,7 @@ mod tests {
     use super::*;
 
     fn enters(origin: Vec3, direction: Vec3, min: Vec3, max: Vec3) -> Option<f32> {
-        SlabRay::new(origin, direction).enter(min, max, f32::INFINITY)
+        SlabRay::new(origin, direction).entry_distance(min, max, f32::INFINITY)
     }
 
     /// A small random number generator for aimed rays.

@@ -4,8 +4,8 @@ use std::f64::consts::{PI, TAU};
 
 use super::disk::{BORDER, Disk};
 use super::surface_of_revolution::{
-    self, AxialFrame, LineInterval, LocalLine, angle_to_u, direction_at_u, is_rounding, radial_direction,
-    ring_projected_area, sine_from_cosine,
+    self, AxialFrame, LineInterval, LocalLine, angle_to_u, direction_at_u, is_within_rounding_error,
+    radial_direction, ring_projected_area, sine_from_cosine,
 };
 use super::surface_packet::{SurfaceF64, SurfacePointF64};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
@@ -22,7 +22,7 @@ pub struct Cone {
     frame: AxialFrame,
     height: f64,
     radius: f64,
-    /// Length of the side from the tip to the rim of the base.
+    /// Length of the side from the tip to the base's rim.
     slant: f64,
     capped: bool,
 }
@@ -31,7 +31,7 @@ impl SurfaceF64 for Cone {
     fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePointF64 {
         let point = self.exact_point(ray, hit);
         if hit.primitive > 0 {
-            return self.base().exact_near(point, self.reach());
+            return self.base().closest_point_f64(point, self.reach());
         }
         let local = self.frame.point_to_local(point);
         self.exact_side(radial_direction(local.truncate()), self.side_direction(local))
@@ -39,8 +39,8 @@ impl SurfaceF64 for Cone {
 }
 
 impl Cone {
-    /// Creates a cone from the center of its base, a different point as the tip, and the radius of the base,
-    /// which must be positive.
+    /// Creates a cone from its base center, its tip, and its base radius. The tip must not be the base
+    /// center, and the radius must be positive.
     pub fn new(base: DVec3, tip: DVec3, radius: f64, capped: bool) -> Self {
         let height = (base - tip).length();
         let slant = libm::hypot(height, radius);
@@ -55,7 +55,7 @@ impl Cone {
     fn nearest(&self, ray: &RayF64) -> Option<(f64, u32)> {
         let line = self.frame.line_to_local(ray);
         let base = if self.capped { self.height } else { self.height * (1.0 + BORDER) };
-        let ends = LineInterval::between(&line, (0.0, 0), (base, 1))?;
+        let ends = LineInterval::between_heights(&line, (0.0, 0), (base, 1))?;
         let starts_on = |part| self.starts_on(ray, part);
         surface_of_revolution::first_hit(ray, &line, self.side_interval(&line)?, ends, self.capped, starts_on)
     }
@@ -67,7 +67,7 @@ impl Cone {
             0 => (local.truncate().length() * self.height - local.z * self.radius) / self.slant,
             _ => local.z - self.height,
         };
-        is_rounding(distance, self.reach())
+        is_within_rounding_error(distance, self.reach())
     }
 
     /// Interval in which the line is inside the double cone |p| ≤ k|z|, which extends past the base and the
@@ -105,16 +105,16 @@ impl Cone {
         let line = self.frame.line_to_local(ray);
         let crossings = match hit.primitive {
             0 => self.side_interval(&line),
-            cap => LineInterval::between(&line, (self.height, cap), (self.height, cap)),
+            cap => LineInterval::between_heights(&line, (self.height, cap), (self.height, cap)),
         };
-        surface_of_revolution::exact_point((ray, &line), hit, crossings, || self.nearest(ray))
+        surface_of_revolution::unrounded_hit_point((ray, &line), hit, crossings, || self.nearest(ray))
     }
 
     /// Surface point at a hit.
     pub fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
         let point = self.exact_point(ray, hit);
         if hit.primitive > 0 {
-            return self.base().surface_near(point, self.reach());
+            return self.base().closest_surface_point(point, self.reach());
         }
         let local = self.frame.point_to_local(point);
         let out = radial_direction(local.truncate());
@@ -124,14 +124,14 @@ impl Cone {
         SurfacePoint::exact(
             point,
             normal,
-            Vec2::new(angle_to_u(mirrored(out)) as f32, (1.0 - along / self.slant) as f32),
+            Vec2::new(angle_to_u(mirror_y(out)) as f32, (1.0 - along / self.slant) as f32),
             self.frame.vector_to_world(around.extend(0.0)),
             self.frame.vector_to_world((out * -self.radius).extend(-self.height)),
             reach,
         )
     }
 
-    /// Point on the side, from a direction perpendicular to the axis and the result of
+    /// Computes the point on the side from a direction perpendicular to the axis and the result of
     /// [`Cone::side_direction`].
     fn exact_side(&self, out: DVec2, (down, along): (DVec2, f64)) -> SurfacePointF64 {
         SurfacePointF64 {
@@ -157,7 +157,7 @@ impl Cone {
             return self.base().uv_at(point);
         }
         let (_, along) = self.side_direction(local);
-        DVec2::new(angle_to_u(mirrored(radial_direction(local.truncate()))), 1.0 - along / self.slant)
+        DVec2::new(angle_to_u(mirror_y(radial_direction(local.truncate()))), 1.0 - along / self.slant)
     }
 
     /// Mean curvature at a point on a part. On the side, the curvature is in the direction around the axis,
@@ -173,7 +173,7 @@ impl Cone {
 
     /// Point and unit normal on the side at the given texture coordinates.
     pub fn side(&self, u: f64, v: f64) -> (DVec3, DVec3) {
-        let out = mirrored(direction_at_u(u));
+        let out = mirror_y(direction_at_u(u));
         let point = (out * self.radius).extend(self.height) * (1.0 - v);
         let normal = (out * self.height).extend(-self.radius) / self.slant;
         (self.frame.point_to_world(point), self.frame.vector_to_world(normal))
@@ -190,7 +190,7 @@ impl Cone {
         [PI * self.radius * self.slant, cap]
     }
 
-    /// Samples a point on a part uniformly over its area.
+    /// Samples a point uniformly over the area of a part.
     pub fn sample(&self, part: u32, u: Vec2) -> AreaPoint {
         match part {
             0 => {
@@ -226,7 +226,7 @@ impl Cone {
         self.capped
     }
 
-    /// Distance of a point from the surface.
+    /// Distance from a point to the surface.
     pub fn distance(&self, point: DVec3) -> f64 {
         let local = self.frame.point_to_local(point);
         let point = DVec2::new(local.truncate().length(), local.z);
@@ -251,7 +251,7 @@ impl Cone {
 
 /// Mirrors a point. Angles are measured about the axis from base to tip, but the frame's axis points from tip
 /// to base.
-fn mirrored(p: DVec2) -> DVec2 {
+fn mirror_y(p: DVec2) -> DVec2 {
     DVec2::new(p.x, -p.y)
 }
 

@@ -23,7 +23,7 @@ impl Cuboid {
         Self { center, half: size * 0.5, axes: rotation_xyz(rotate_degrees) }
     }
 
-    /// Finds the nearest hit of a ray that starts outside or inside. Faces are numbered −x, +x, −y, +y, −z,
+    /// Finds the nearest hit of a ray that starts outside or inside. The face order is −x, +x, −y, +y, −z,
     /// +z.
     pub fn intersect(&self, ray: &RayF64) -> Option<ShapeHit> {
         let origin = self.axes.transpose() * (ray.origin - self.center);
@@ -149,7 +149,7 @@ impl Cuboid {
             self.axes.row(1).abs().dot(self.half),
             self.axes.row(2).abs().dot(self.half),
         );
-        Aabb::around_f64([self.center - reach, self.center + reach])
+        Aabb::from_points_f64([self.center - reach, self.center + reach])
     }
 
     /// A face as a parallelogram (corner, u, v) whose front faces outward.
@@ -180,7 +180,7 @@ impl Cuboid {
         [y * z, y * z, x * z, x * z, x * y, x * y]
     }
 
-    /// Samples a point on a face uniformly over its area.
+    /// Samples a point uniformly over the area of a face.
     pub fn sample(&self, face: u32, u: Vec2) -> AreaPoint {
         let (corner, a, b) = self.face(face);
         let point = corner + a * f64::from(u.x) + b * f64::from(u.y);

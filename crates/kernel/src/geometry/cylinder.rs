@@ -4,8 +4,8 @@ use std::f64::consts::{PI, TAU};
 
 use super::disk::{BORDER, Disk};
 use super::surface_of_revolution::{
-    self, AxialFrame, LineInterval, LocalLine, angle_to_u, direction_at_u, is_rounding, radial_direction,
-    ring_projected_area, sine_from_cosine,
+    self, AxialFrame, LineInterval, LocalLine, angle_to_u, direction_at_u, is_within_rounding_error,
+    radial_direction, ring_projected_area, sine_from_cosine,
 };
 use super::surface_packet::{SurfaceF64, SurfacePointF64};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
@@ -29,7 +29,7 @@ impl SurfaceF64 for Cylinder {
     fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePointF64 {
         let point = self.exact_point(ray, hit);
         if hit.primitive > 0 {
-            return self.cap(hit.primitive).exact_near(point, self.reach());
+            return self.cap(hit.primitive).closest_point_f64(point, self.reach());
         }
         let (out, z) = self.closest_on_side(point);
         self.exact_side(out, z)
@@ -37,7 +37,7 @@ impl SurfaceF64 for Cylinder {
 }
 
 impl Cylinder {
-    /// Creates a cylinder from two different end points and a positive radius.
+    /// Creates a cylinder from two end points, which must differ, and a positive radius.
     pub fn new(a: DVec3, b: DVec3, radius: f64, capped: bool) -> Self {
         let frame = AxialFrame::new((a + b) * 0.5, b - a);
         Self { frame, half_length: (b - a).length() * 0.5, radius, capped }
@@ -51,7 +51,7 @@ impl Cylinder {
     fn nearest(&self, ray: &RayF64) -> Option<(f64, u32)> {
         let line = self.frame.line_to_local(ray);
         let end = if self.capped { self.half_length } else { self.half_length * (1.0 + BORDER) };
-        let ends = LineInterval::between(&line, (-end, 1), (end, 2))?;
+        let ends = LineInterval::between_heights(&line, (-end, 1), (end, 2))?;
         let starts_on = |part| self.starts_on(ray, part);
         surface_of_revolution::first_hit(ray, &line, self.side_interval(&line)?, ends, self.capped, starts_on)
     }
@@ -63,7 +63,7 @@ impl Cylinder {
             0 => local.truncate().length() - self.radius,
             _ => local.z.abs() - self.half_length,
         };
-        is_rounding(distance, self.reach())
+        is_within_rounding_error(distance, self.reach())
     }
 
     /// Interval in which the line is inside the infinite cylinder. Uses the distance of the projected line
@@ -92,16 +92,16 @@ impl Cylinder {
         let height = if hit.primitive == 1 { -self.half_length } else { self.half_length };
         let crossings = match hit.primitive {
             0 => self.side_interval(&line),
-            cap => LineInterval::between(&line, (height, cap), (height, cap)),
+            cap => LineInterval::between_heights(&line, (height, cap), (height, cap)),
         };
-        surface_of_revolution::exact_point((ray, &line), hit, crossings, || self.nearest(ray))
+        surface_of_revolution::unrounded_hit_point((ray, &line), hit, crossings, || self.nearest(ray))
     }
 
     /// Surface point at a hit.
     pub fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
         let point = self.exact_point(ray, hit);
         if hit.primitive > 0 {
-            return self.cap(hit.primitive).surface_near(point, self.reach());
+            return self.cap(hit.primitive).closest_surface_point(point, self.reach());
         }
         let (out, z) = self.closest_on_side(point);
         let SurfacePointF64 { point, normal, reach } = self.exact_side(out, z);
@@ -121,7 +121,7 @@ impl Cylinder {
         (radial_direction(local.truncate()), local.z.clamp(-self.half_length, self.half_length))
     }
 
-    /// Point on the side, from a direction perpendicular to the axis and a height.
+    /// Computes the point on the side from a height and a direction perpendicular to the axis.
     fn exact_side(&self, out: DVec2, z: f64) -> SurfacePointF64 {
         SurfacePointF64 {
             point: self.frame.point_to_world((out * self.radius).extend(z)),
@@ -130,7 +130,7 @@ impl Cylinder {
         }
     }
 
-    /// Texture coordinate v of a point on the side.
+    /// Texture coordinate v for a point on the side.
     fn height(&self, z: f64) -> f64 {
         0.5 + z / (2.0 * self.half_length)
     }
@@ -176,7 +176,7 @@ impl Cylinder {
         [TAU * self.radius * 2.0 * self.half_length, cap, cap]
     }
 
-    /// Samples a point on a part uniformly over its area.
+    /// Samples a point uniformly over the area of a part.
     pub fn sample(&self, part: u32, u: Vec2) -> AreaPoint {
         match part {
             0 => {
@@ -204,7 +204,7 @@ impl Cylinder {
         self.capped
     }
 
-    /// Distance of a point from the surface.
+    /// Distance from a point to the surface.
     pub fn distance(&self, point: DVec3) -> f64 {
         let local = self.frame.point_to_local(point);
         let (across, along) = (local.truncate().length(), local.z.abs());

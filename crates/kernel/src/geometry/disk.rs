@@ -2,9 +2,9 @@
 
 use std::f64::consts::PI;
 
-use super::kernel_domain::{Extent, LocalGeometry, NearestSurface};
+use super::local_geometry::{Extent, LocalGeometry, NearestSurface};
 use super::packet::{F32x16, HitPacket, RayPacket, accept};
-use super::surface_of_revolution::{AxialFrame, exact_t, to_shape_hit};
+use super::surface_of_revolution::{AxialFrame, to_shape_hit, unrounded_t};
 use super::surface_packet::{SurfaceF64, SurfacePointF64};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::{DVec2, DVec3, Vec2};
@@ -24,7 +24,7 @@ pub struct Disk {
 
 impl SurfaceF64 for Disk {
     fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePointF64 {
-        self.exact_near(ray.at(exact_t(hit, self.nearest(ray))), self.reach())
+        self.closest_point_f64(ray.at(unrounded_t(hit, self.nearest(ray))), self.reach())
     }
 }
 
@@ -62,22 +62,22 @@ impl Disk {
 
     /// Surface point at a hit.
     pub fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
-        let t = exact_t(hit, self.nearest(ray));
-        self.surface_near(ray.at(t), self.reach())
+        let t = unrounded_t(hit, self.nearest(ray));
+        self.closest_surface_point(ray.at(t), self.reach())
     }
 
-    /// Surface point nearest to `point`. `reach` is an upper bound on the lengths from which `point` was
-    /// computed.
-    pub fn surface_near(&self, point: DVec3, reach: f64) -> SurfacePoint {
-        let SurfacePointF64 { point: near, normal, .. } = self.exact_near(point, reach);
+    /// Surface point nearest to `point`. `reach` is an upper bound on the magnitudes of the lengths used to
+    /// compute `point`.
+    pub fn closest_surface_point(&self, point: DVec3, reach: f64) -> SurfacePoint {
+        let SurfacePointF64 { point: near, normal, .. } = self.closest_point_f64(point, reach);
         let edge = 2.0 * self.radius;
         let [across, up] = [DVec3::X, DVec3::Y].map(|axis| self.frame.vector_to_world(axis * edge));
         SurfacePoint::exact(near, normal, self.uv_at(point).as_vec2(), across, up, reach)
     }
 
-    /// Point on the disk nearest to `point`, before rounding. `reach` is an upper bound on the lengths from
-    /// which `point` was computed.
-    pub fn exact_near(&self, point: DVec3, reach: f64) -> SurfacePointF64 {
+    /// Point on the disk nearest to `point`, before rounding. `reach` is an upper bound on the magnitudes of
+    /// the lengths used to compute `point`.
+    pub fn closest_point_f64(&self, point: DVec3, reach: f64) -> SurfacePointF64 {
         let (p, _) = self.nearest_in_plane(point);
         SurfacePointF64 { point: self.frame.point_to_world(p.extend(0.0)), normal: self.normal(), reach }
     }
@@ -127,14 +127,14 @@ impl Disk {
         AreaPoint { point: self.point(warp::disk(u).as_dvec2()), normal: self.normal() }
     }
 
-    /// Distance of a point from the disk.
+    /// Distance from a point to the disk.
     pub fn distance(&self, point: DVec3) -> f64 {
         let local = self.frame.point_to_local(point);
         DVec2::new((local.truncate().length() - self.radius).max(0.0), local.z).length()
     }
 
     /// Local geometry of the disk near a point, for density estimation.
-    pub fn kernel_domain(&self, point: DVec3) -> LocalGeometry {
+    pub fn local_geometry(&self, point: DVec3) -> LocalGeometry {
         let (normal, from) = (self.normal(), point - self.centroid());
         let extent = Extent::Flat(self.radius - from.length());
         let ground = NearestSurface { normal, height: from.dot(normal).abs(), extent };

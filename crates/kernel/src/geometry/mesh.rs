@@ -15,7 +15,7 @@ pub struct TriangleMesh {
     pub normals: Vec<Vec3>,
     /// Vertex texture coordinates, or empty. v = 0 is the bottom row of an image.
     pub uvs: Vec<Vec2>,
-    /// Normal group of each vertex, which determines the vertices that share a computed normal. If empty,
+    /// Normal group of each vertex. The groups determine which vertices share a computed normal. If empty,
     /// every vertex has its own normal in the group [`NormalGroup::BY_ANGLE`].
     pub normal_groups: Vec<NormalGroup>,
     /// Second set of vertex texture coordinates, or empty.

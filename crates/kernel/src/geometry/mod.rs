@@ -8,7 +8,7 @@ pub mod cone;
 pub mod cuboid;
 pub mod cylinder;
 pub mod disk;
-pub mod kernel_domain;
+pub mod local_geometry;
 pub mod mesh;
 pub mod packet;
 pub mod parallelogram;
@@ -25,7 +25,7 @@ pub mod watertight;
 pub mod watertight_packet;
 
 pub use aabb::Aabb;
-pub use kernel_domain::LocalGeometry;
+pub use local_geometry::LocalGeometry;
 pub use ray::{Ray, RayF64};
 pub use surface::{AreaPoint, ShapeHit, SurfacePoint, SurfaceRequest};
 
@@ -35,7 +35,7 @@ use cone::Cone;
 use cuboid::Cuboid;
 use cylinder::Cylinder;
 use disk::Disk;
-use kernel_domain::{FlatPolygon, parallelogram};
+use local_geometry::{FlatPolygon, parallelogram};
 use packet::{F32x16, HitPacket, RayPacket};
 use parallelogram::Parallelogram;
 use plane::Plane;
@@ -117,7 +117,7 @@ impl Shape {
     fn intersect_each(&self, rays: &RayPacket, met: u32, ends: &F32x16, found: &mut HitPacket) {
         for lane in packet::lanes(met) {
             if let Some(hit) = self.intersect(&Ray { t_max: ends[lane], ..rays.ray(lane) }.to_f64()) {
-                found.put(lane, &hit);
+                found.set(lane, &hit);
             }
         }
     }
@@ -159,7 +159,7 @@ impl Shape {
         for_shape!(self, it => it.surface(ray, hit))
     }
 
-    /// Surface point at a hit, with at least the requested parts.
+    /// Surface point at a hit, including at least the requested parts.
     #[inline]
     pub fn requested_surface(&self, ray: &RayF64, hit: &ShapeHit, asked: SurfaceRequest) -> SurfacePoint {
         if asked.uv {
@@ -205,7 +205,7 @@ impl Shape {
         for_shape!(self, it => it.areas().to_vec())
     }
 
-    /// Samples a point on a part uniformly over its area. `u` is uniform in [0, 1)².
+    /// Samples a point uniformly over the area of a part. `u` is uniform in [0, 1)².
     pub fn sample(&self, part: u32, u: Vec2) -> AreaPoint {
         for_shape!(self, it => it.sample(part, u))
     }
@@ -274,13 +274,13 @@ impl Shape {
 
     /// Local geometry of the shape near a point, for density estimation.
     #[inline]
-    pub fn kernel_domain(&self, point: DVec3) -> LocalGeometry {
+    pub fn local_geometry(&self, point: DVec3) -> LocalGeometry {
         match self {
             Self::Quad(_) | Self::Triangle(_) => LocalGeometry::Polygons(1),
             Self::Box(_) => LocalGeometry::Polygons(6),
-            Self::Sphere(sphere) => sphere.kernel_domain(point),
-            Self::Plane(plane) => plane.kernel_domain(point),
-            Self::Disk(disk) => disk.kernel_domain(point),
+            Self::Sphere(sphere) => sphere.local_geometry(point),
+            Self::Plane(plane) => plane.local_geometry(point),
+            Self::Disk(disk) => disk.local_geometry(point),
             Self::Cylinder(cylinder) => LocalGeometry::curved(cylinder.distance(point)),
             Self::Cone(cone) => LocalGeometry::curved(cone.distance(point)),
             Self::Torus(torus) => LocalGeometry::curved(torus.distance(point)),
@@ -443,7 +443,7 @@ mod tests {
 
     #[test]
     fn distance_is_to_the_nearest_point() {
-        let distance = |shape: &Shape, point: DVec3| match shape.kernel_domain(point) {
+        let distance = |shape: &Shape, point: DVec3| match shape.local_geometry(point) {
             LocalGeometry::Surface { distance, .. } => Some(distance),
             LocalGeometry::Polygons(_) => None,
         };

@@ -8,7 +8,7 @@ use crate::math::{DVec3, Vec3};
 
 /// Mask of the lanes with a nonnegative end.
 #[inline(always)]
-pub fn traced(ends: &F32x16, simd: impl Simd) -> u32 {
+pub fn active_lanes(ends: &F32x16, simd: impl Simd) -> u32 {
     let mut traced = [0; PACKET_SIZE];
     for lane in 0..PACKET_SIZE {
         traced[lane] = if ends[lane] >= 0.0 { TRUE } else { 0 };
@@ -16,7 +16,7 @@ pub fn traced(ends: &F32x16, simd: impl Simd) -> u32 {
     simd.movemask(&traced)
 }
 
-/// Lane indices of the set bits of a mask.
+/// Lane indices of a mask's set bits.
 pub fn lanes(mut bits: u32) -> impl Iterator<Item = usize> {
     std::iter::from_fn(move || {
         let lane = bits.trailing_zeros() as usize;
@@ -27,13 +27,13 @@ pub fn lanes(mut bits: u32) -> impl Iterator<Item = usize> {
     })
 }
 
-/// The rays of a packet in structure-of-arrays layout. Lanes without a ray are 0.
+/// A packet of rays in structure-of-arrays layout. Lanes without a ray are 0.
 #[derive(Clone, Debug)]
 #[repr(align(64))]
 pub struct RayPacket {
-    /// Ray origins, with one array per axis.
+    /// Ray origins, stored as one array per axis.
     pub origin: [F32x16; 3],
-    /// Ray directions, with one array per axis.
+    /// Ray directions, stored as one array per axis.
     pub direction: [F32x16; 3],
     /// [`Ray::start`] of each ray.
     pub start: [u32; PACKET_SIZE],
@@ -42,17 +42,17 @@ pub struct RayPacket {
 impl RayPacket {
     /// Creates a packet of rays that do not start on triangles.
     #[inline(always)]
-    pub fn of(origin: [F32x16; 3], direction: [F32x16; 3]) -> Self {
+    pub fn from_soa(origin: [F32x16; 3], direction: [F32x16; 3]) -> Self {
         Self { origin, direction, start: [Ray::NO_TRIANGLE; PACKET_SIZE] }
     }
 
-    /// Sets the start triangles of the rays.
+    /// Sets the rays' start triangles.
     #[inline(always)]
     pub fn with_start_triangle(self, start: [u32; PACKET_SIZE]) -> Self {
         Self { start, ..self }
     }
 
-    /// Returns the ray in a lane, with an infinite end.
+    /// Returns the ray in a lane. Its end is infinite.
     #[inline(always)]
     pub fn ray(&self, lane: usize) -> Ray {
         let of = |rows: &[F32x16; 3]| Vec3::new(rows[0][lane], rows[1][lane], rows[2][lane]);
@@ -62,7 +62,7 @@ impl RayPacket {
     /// Packs up to [`PACKET_SIZE`] rays and their ends.
     #[inline(always)]
     pub fn new(rays: &[Ray]) -> (Self, F32x16) {
-        let mut rows = Self::of([[0.0; PACKET_SIZE]; 3], [[0.0; PACKET_SIZE]; 3]);
+        let mut rows = Self::from_soa([[0.0; PACKET_SIZE]; 3], [[0.0; PACKET_SIZE]; 3]);
         let mut ends = [-1.0; PACKET_SIZE];
         // Compile full packets separately because a constant length makes their loop faster.
         match <&[Ray; PACKET_SIZE]>::try_from(rays) {
@@ -84,7 +84,7 @@ impl RayPacket {
         }
     }
 
-    /// Returns the ray in a lane in double precision, with an infinite end.
+    /// Returns the ray in a lane in double precision. Its end is infinite.
     #[inline(always)]
     pub(super) fn ray_f64(&self, lane: usize) -> RayF64 {
         let [ox, oy, oz] = &self.origin;
@@ -97,7 +97,7 @@ impl RayPacket {
     }
 }
 
-/// Hits of a packet ([`ShapeHit`]s in structure-of-arrays layout).
+/// Hits for a packet of rays: [`ShapeHit`]s in structure-of-arrays layout.
 #[derive(Clone, Debug)]
 #[repr(align(64))]
 pub struct HitPacket {
@@ -114,7 +114,7 @@ pub struct HitPacket {
 impl HitPacket {
     /// A packet without hits.
     #[inline(always)]
-    pub fn none() -> Self {
+    pub fn without_hits() -> Self {
         Self {
             t: [f32::NAN; PACKET_SIZE],
             primitive: [0; PACKET_SIZE],
@@ -125,7 +125,7 @@ impl HitPacket {
 
     /// Mask of the rays with a hit.
     #[inline(always)]
-    pub fn any(&self, simd: impl Simd) -> u32 {
+    pub fn hit_mask(&self, simd: impl Simd) -> u32 {
         let mut any = [0; PACKET_SIZE];
         for lane in 0..PACKET_SIZE {
             any[lane] = if self.t[lane].is_nan() { 0 } else { TRUE };
@@ -134,13 +134,13 @@ impl HitPacket {
     }
 
     /// Stores a hit.
-    pub fn put(&mut self, lane: usize, hit: &ShapeHit) {
+    pub fn set(&mut self, lane: usize, hit: &ShapeHit) {
         self.t[lane] = hit.t;
         self.primitive[lane] = hit.primitive;
         (self.u[lane], self.v[lane]) = (hit.u, hit.v);
     }
 
-    /// Returns the hit of the ray in a lane.
+    /// Returns the hit for the ray in a lane.
     #[inline(always)]
     pub fn get(&self, lane: usize) -> Option<ShapeHit> {
         let hit =

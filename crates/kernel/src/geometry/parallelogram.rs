@@ -101,7 +101,7 @@ impl Parallelogram {
     /// Bounding box.
     pub fn bounds(&self) -> Aabb {
         let c = self.corner;
-        Aabb::around_f64([c, c + self.u, c + self.v, c + self.u + self.v])
+        Aabb::from_points_f64([c, c + self.u, c + self.v, c + self.u + self.v])
     }
 
     /// Area of the quad.

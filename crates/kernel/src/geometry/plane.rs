@@ -1,6 +1,6 @@
 //! Infinite planes in double precision.
 
-use super::kernel_domain::{Extent, LocalGeometry, NearestSurface};
+use super::local_geometry::{Extent, LocalGeometry, NearestSurface};
 use super::packet::{F32x16, HitPacket, PACKET_SIZE, RayPacket, accept, may_accept};
 use super::surface::planar_tangents;
 use super::surface_packet::{SurfaceF64, SurfacePointF64, UvMapped};
@@ -97,13 +97,13 @@ impl Plane {
         self.normal
     }
 
-    /// Distance of a point from the plane.
+    /// Distance from a point to the plane.
     pub fn distance(&self, point: DVec3) -> f64 {
         (point - self.point).dot(self.normal).abs()
     }
 
     /// Local geometry of the plane near a point, for density estimation.
-    pub fn kernel_domain(&self, point: DVec3) -> LocalGeometry {
+    pub fn local_geometry(&self, point: DVec3) -> LocalGeometry {
         let distance = self.distance(point);
         let ground =
             NearestSurface { normal: self.normal, height: distance, extent: Extent::Flat(f64::INFINITY) };

@@ -10,7 +10,7 @@ pub struct Ray {
     pub origin: Vec3,
     /// Direction of any nonzero length. t is measured in units of this length.
     pub direction: Vec3,
-    /// Upper end of the interval of t; ∞ for a half-line.
+    /// Upper end of the t interval; ∞ for a half-line.
     pub t_max: f32,
     /// Index of the triangle on which the ray starts, or [`Ray::NO_TRIANGLE`]. A ray that leaves a flat
     /// triangle cannot hit it again, so intersection tests skip this triangle.
@@ -33,7 +33,7 @@ impl Ray {
     }
 
     /// Creates a segment that ends just before `to`. It is shortened by the rounding errors of both ends so
-    /// that it does not hit a surface through `to`. t = 1 is `to` itself.
+    /// that it does not hit a surface that contains `to`. t = 1 is `to` itself.
     #[inline(always)]
     pub fn segment(from: Vec3, to: Vec3) -> Self {
         let direction = to - from;
@@ -72,7 +72,7 @@ pub struct RayF64 {
     pub origin: DVec3,
     /// Direction.
     pub direction: DVec3,
-    /// Upper end of the interval of t.
+    /// Upper end of the t interval.
     pub t_max: f64,
 }
 
@@ -82,7 +82,7 @@ impl RayF64 {
         self.origin + self.direction * t
     }
 
-    /// `t` rounded to `f32`, or `None` if the result is not finite or not within the ray's interval.
+    /// `t` rounded to `f32`, or `None` if the result is not finite or is outside the ray's interval.
     pub fn accept(&self, t: f64) -> Option<f32> {
         let single = t as f32;
         (single > 0.0 && single < f32::INFINITY && f64::from(single) <= self.t_max).then_some(single)

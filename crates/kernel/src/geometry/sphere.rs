@@ -2,14 +2,14 @@
 
 use std::f64::consts::PI;
 
-use super::kernel_domain::{Extent, LocalGeometry, NearestSurface};
+use super::local_geometry::{Extent, LocalGeometry, NearestSurface};
 use super::packet::{F32x16, HitPacket, PACKET_SIZE, RayPacket, accept};
 use super::surface_packet::{SurfaceF64, SurfacePointF64};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::lanes::{Simd, TRUE};
 use crate::math::{DVec2, DVec3, Vec2};
 
-/// All points at a fixed distance, the radius, from a center. The front is outside.
+/// All points whose distance from a center equals the radius. The front is outside.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sphere {
     /// Center.
@@ -86,7 +86,10 @@ impl Sphere {
 
     /// Bounding box.
     pub fn bounds(&self) -> Aabb {
-        Aabb::around_f64([self.center - DVec3::splat(self.radius), self.center + DVec3::splat(self.radius)])
+        Aabb::from_points_f64([
+            self.center - DVec3::splat(self.radius),
+            self.center + DVec3::splat(self.radius),
+        ])
     }
 
     /// Area of each part.
@@ -109,13 +112,13 @@ impl Sphere {
         self.center
     }
 
-    /// Distance of a point from the surface.
+    /// Distance from a point to the surface.
     pub fn distance(&self, point: DVec3) -> f64 {
         ((point - self.center).length() - self.radius).abs()
     }
 
     /// Local geometry of the sphere near a point, for density estimation.
-    pub fn kernel_domain(&self, point: DVec3) -> LocalGeometry {
+    pub fn local_geometry(&self, point: DVec3) -> LocalGeometry {
         let (distance, out) = (self.distance(point), (point - self.center).normalize_or_zero());
         let ground = NearestSurface { normal: out, height: distance, extent: Extent::Round(self.radius) };
         LocalGeometry::Surface { distance, ground: Some(ground) }

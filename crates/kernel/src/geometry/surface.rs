@@ -72,15 +72,15 @@ pub struct AreaPoint {
 
 impl SurfacePoint {
     /// Creates a surface point from a double-precision point, without a separate shading normal. Its error
-    /// bound accounts for rounding to `f32` and for the double-precision error. `reach` is the largest length
-    /// from which the point and the next hit are computed.
+    /// bound accounts for rounding to `f32` and for the double-precision error. `reach` is the largest
+    /// magnitude among the lengths used to compute the point and the next hit.
     pub fn exact(point: DVec3, normal: DVec3, uv: Vec2, dpdu: DVec3, dpdv: DVec3, reach: f64) -> Self {
         let normal = normal.normalize().as_vec3();
         let point = point.as_vec3();
         Self {
             point,
             shadow_point: point,
-            error: error(point, reach),
+            error: point_error_bound(point, reach),
             normal,
             shading_normal: normal,
             uv: uv.as_dvec2(),
@@ -92,14 +92,14 @@ impl SurfacePoint {
 }
 
 /// Error bound for each component of a point computed in double precision, including the next intersection
-/// test from there. `reach` is the largest length involved.
+/// test from there. `reach` is the largest magnitude among the lengths in these computations.
 #[inline(always)]
-pub fn error(point: Vec3, reach: f64) -> Vec3 {
+pub fn point_error_bound(point: Vec3, reach: f64) -> Vec3 {
     rounding_error(point) + Vec3::splat(f64_error_bound(reach))
 }
 
 /// Bound on the error of `f64` arithmetic for a hit, its surface point, and the next intersection test from
-/// there. `reach` is the largest length involved.
+/// there. `reach` is the largest magnitude among the lengths in these computations.
 #[inline(always)]
 pub fn f64_error_bound(reach: f64) -> f32 {
     (reach * (32.0 * f64::EPSILON)) as f32

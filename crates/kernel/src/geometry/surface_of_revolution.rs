@@ -1,4 +1,4 @@
-//! Surfaces of revolution: local frames, lines in these frames, and intersections with the parts of a shape.
+//! Surfaces of revolution: local frames, lines in these frames, and intersections with a shape's parts.
 
 use std::f64::consts::PI;
 
@@ -73,7 +73,7 @@ impl AxialFrame {
         let extent = DVec3::new(across(0), across(1), across(2));
         let rounding = self.origin.abs() + extent + DVec3::splat(height.abs());
         let extent = extent + rounding * (4.0 * f64::EPSILON);
-        Aabb::around_f64([center - extent, center + extent])
+        Aabb::from_points_f64([center - extent, center + extent])
     }
 }
 
@@ -89,7 +89,7 @@ pub struct LocalLine {
     pub start: f64,
 }
 
-/// Interval of a line, relative to its foot. Each end is stored with the index of its part.
+/// Interval on a line, relative to the line's foot. Each end is stored with the index of its part.
 #[derive(Clone, Copy, Debug)]
 pub struct LineInterval {
     /// Start of the interval.
@@ -108,7 +108,7 @@ impl LineInterval {
     }
 
     /// Interval between two heights, each with its part index.
-    pub fn between(line: &LocalLine, low: (f64, u32), high: (f64, u32)) -> Option<Self> {
+    pub fn between_heights(line: &LocalLine, low: (f64, u32), high: (f64, u32)) -> Option<Self> {
         let (z, dz) = (line.foot.z, line.direction.z);
         if dz == 0.0 {
             return (low.0..=high.0).contains(&z).then_some(Self::WHOLE);
@@ -123,8 +123,8 @@ impl LineInterval {
     }
 }
 
-/// First t at which the ray hits a closed solid, or the side of an open one. `starts_on` returns whether the
-/// ray starts on a part, within rounding error. The start is not a hit.
+/// First t at which the ray hits a closed solid, or the side of an open shape. `starts_on` returns whether
+/// the ray starts on a part, within rounding error. The start is not a hit.
 pub fn first_hit(
     ray: &RayF64,
     line: &LocalLine,
@@ -168,7 +168,7 @@ pub fn first_hit(
 const NEAR_START: f64 = 1e-12;
 
 /// Whether a distance from a surface is within the rounding error of numbers up to `size`.
-pub fn is_rounding(distance: f64, size: f64) -> bool {
+pub fn is_within_rounding_error(distance: f64, size: f64) -> bool {
     distance.abs() <= 8.0 * f64::EPSILON * size
 }
 
@@ -195,18 +195,18 @@ pub fn to_shape_hit((t, primitive): (f64, u32)) -> ShapeHit {
     ShapeHit { primitive, ..ShapeHit::at(t as f32) }
 }
 
-/// t of a hit before rounding, computed by intersecting the ray again. Returns the rounded t if the second
+/// The unrounded t of a hit, computed by intersecting the ray again. Returns the rounded t if the second
 /// intersection finds a different hit.
-pub fn exact_t(hit: &ShapeHit, again: Option<(f64, u32)>) -> f64 {
+pub fn unrounded_t(hit: &ShapeHit, again: Option<(f64, u32)>) -> f64 {
     match again {
         Some((t, part)) if t as f32 == hit.t && part == hit.primitive => t,
         _ => f64::from(hit.t),
     }
 }
 
-/// Point of a hit before rounding. Intersects again unless exactly one of the crossings is at the hit's
+/// The unrounded hit point. Intersects the ray again unless exactly one of the crossings is at the hit's
 /// distance.
-pub fn exact_point(
+pub fn unrounded_hit_point(
     (ray, line): (&RayF64, &LocalLine),
     hit: &ShapeHit,
     crossings: Option<LineInterval>,
@@ -221,7 +221,7 @@ pub fn exact_point(
             [false, false] => None,
         }
     });
-    ray.at(fitting.unwrap_or_else(|| exact_t(hit, again())))
+    ray.at(fitting.unwrap_or_else(|| unrounded_t(hit, again())))
 }
 
 /// Unit vector from the origin of the plane toward a point. The x axis if the point is the origin.
@@ -251,7 +251,7 @@ pub(super) mod tests {
     use crate::math::random::unit;
 
     #[test]
-    fn rays_do_not_hit_their_start_on_curved_shapes() {
+    fn rays_do_not_rehit_curved_shapes_at_origin() {
         // All of these shapes are in z ≥ 0 and touch the origin.
         let cylinder = |a, b, radius| Cylinder::new(a, b, radius, true);
         let mut next = unit(7);

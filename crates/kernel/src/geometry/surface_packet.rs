@@ -1,12 +1,12 @@
 //! Packets of surface points, with SIMD loops for the most common shapes.
 
 use super::packet::{HitPacket, PACKET_SIZE, RayPacket, lanes};
-use super::surface::error;
+use super::surface::point_error_bound;
 use super::{RayF64, Shape, ShapeHit, SurfacePoint};
 use crate::math::lanes::{Vec3x16, mask_from_bits, select, set_lane};
 use crate::math::{DVec2, DVec3, Vec2};
 
-/// A packet of [`SurfacePoint`]s, with only the fields that lighting needs.
+/// A packet of [`SurfacePoint`]s that contains only the fields needed for lighting.
 #[derive(Clone, Debug)]
 #[repr(align(64))]
 pub struct SurfacePacket {
@@ -32,7 +32,7 @@ pub struct SurfacePointF64 {
     pub point: DVec3,
     /// Normal of the front, not necessarily of unit length.
     pub normal: DVec3,
-    /// Largest length from which the point is computed.
+    /// Largest magnitude among the lengths used to compute the point.
     pub reach: f64,
 }
 
@@ -124,7 +124,7 @@ impl SurfacePacket {
             let SurfacePointF64 { point, normal, reach } = shape.exact(&rays.ray_f64(lane), &hit);
             let point = point.as_vec3();
             set_lane(&mut found.point, lane, point);
-            set_lane(&mut found.error, lane, error(point, reach));
+            set_lane(&mut found.error, lane, point_error_bound(point, reach));
             set_lane(&mut found.normal, lane, normal.normalize().as_vec3());
         }
         self.copy_points(of, &found);

@@ -71,7 +71,7 @@ impl Triangle {
 
     /// Bounding box.
     pub fn bounds(&self) -> Aabb {
-        Aabb::around_f64([self.a, self.b, self.c])
+        Aabb::from_points_f64([self.a, self.b, self.c])
     }
 
     /// Unnormalized normal: the cross product of the edges at the first corner.

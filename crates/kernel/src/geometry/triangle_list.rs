@@ -50,7 +50,7 @@ const BLUNT: f32 = 0.125;
 /// Maximum of D/(2A), multiplied by the extent of all triangles.
 const MOST_SLENDER: f64 = 1e3;
 
-/// Triangle index that excludes no triangle.
+/// Placeholder index that excludes no triangle.
 const NONE: u32 = u32::MAX;
 
 /// A triangle, or two triangles that form a flat quadrilateral.
@@ -93,7 +93,7 @@ pub struct TriangleList {
     high: Vec3,
 }
 
-/// Nearest candidates of the rays of a packet.
+/// Nearest candidate for each ray in a packet.
 struct Candidates {
     /// Lower bound on t of the nearest candidate; ∞ if there is none.
     near: F32x16,
@@ -105,7 +105,7 @@ struct Candidates {
     doubtful: Mask,
 }
 
-/// Error terms of the rays of a packet.
+/// Error terms for the rays in a packet.
 struct ErrorTerms {
     /// Error term with the factor [`PLANE`] for each ray.
     plane: F32x16,
@@ -250,7 +250,7 @@ impl TriangleList {
                     x,
                     simd.mul_add_relaxed(second.y, y, simd.mul_add_relaxed(second.z, z, start[1])),
                 );
-                // Bound the errors.
+                // Compute bounds on the errors.
                 let size = inverse.abs();
                 let distance =
                     simd.mul_add_relaxed(far[i], simd.mul_add_relaxed(far[i], along[0], along[1]), plane[i]);
@@ -317,7 +317,7 @@ impl TriangleList {
         CandidateHits { hit, undecided: simd.movemask(&undecided) & met, hits }
     }
 
-    /// Computes the error terms of the rays.
+    /// Computes the error terms for the rays.
     #[inline(always)]
     fn errors(&self, rays: &RayPacket) -> ErrorTerms {
         let none = [0.0; PACKET_SIZE];
@@ -351,7 +351,7 @@ impl TriangleList {
 
 /// Results of the watertight test on each ray's nearest candidate.
 struct CandidateHits {
-    /// Rays that are certain to hit their candidate before all others.
+    /// Rays that are certain to hit their candidate before any other candidate.
     hit: Mask,
     /// Mask of the undecided rays.
     undecided: u32,

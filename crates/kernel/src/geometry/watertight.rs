@@ -92,9 +92,9 @@ impl ShearedRay {
         (t > 0.0 && t <= t_max).then_some(ShapeHit { t, primitive: 0, u: wb * inverse, v: wc * inverse })
     }
 
-    /// Finds the hit on a needle: a triangle so thin, for its distance, that t is uncertain in single
-    /// precision. The ray is already known to hit the triangle, which prevents gaps between neighbors. If the
-    /// ray misses the triangle in double precision, the nearest point on an edge is used.
+    /// Finds the hit on a needle: a triangle so thin and so far away that t is uncertain in single precision.
+    /// The ray is already known to hit the triangle, which prevents gaps between neighbors. If the ray misses
+    /// the triangle in double precision, the nearest point on an edge is used.
     #[cold]
     fn intersect_needle(&self, corners: &[Vec3; 3], t_max: f32) -> Option<ShapeHit> {
         let ([a, b, c], [wa, wb, wc]) = self.edge_functions_f64(corners);
@@ -138,8 +138,9 @@ impl ShearedRay {
         ([a, b, c], [cross(c, b), cross(a, c), cross(b, a)])
     }
 
-    /// Bound on the absolute error of t, and the largest t of a corner. The errors of sheared x and y are
-    /// lengths, while the error of z is in units of t. The units differ unless the direction has unit length.
+    /// Bound on the absolute error of t, and the largest t among the corners. The errors of sheared x and y
+    /// are lengths, while the error of z is in units of t. The units differ unless the direction has unit
+    /// length.
     fn distance_error(&self, corners: &[(f32, f32, f32); 3], inverse_determinant: f32) -> (f32, f32) {
         let greatest = |of: fn(&(f32, f32, f32)) -> f32| corners.iter().map(of).fold(0.0, f32::max);
         let x = greatest(|corner| corner.0.abs());

@@ -7,19 +7,19 @@ use crate::math::Vec3;
 use crate::math::float::gamma;
 use crate::math::lanes::{Mask, Simd, TRUE, Vec3x16, select, select_u32};
 
-/// The rays of a packet, preprocessed for triangle tests.
+/// A packet of rays, preprocessed for triangle tests.
 pub struct ShearedPacket<'a> {
     rays: &'a RayPacket,
-    /// Masks of the rays with longest axis x, and with longest axis y.
+    /// Mask of the rays whose longest axis is x, and mask of the rays whose longest axis is y.
     longest: [Mask; 2],
     /// Mask of the rays with a negative direction along their longest axis. The scalar test then swaps the
     /// other two axes, which only negates the edge functions.
     is_down: Mask,
-    /// Shears of the two axes after the longest one, and the scale of the longest one.
+    /// Shears of the two axes that follow the longest axis, and scale of the longest axis.
     shear: Vec3x16,
 }
 
-/// Hits of a packet, with one triangle per ray.
+/// Results of testing each ray in a packet against one triangle.
 pub(super) struct Hits {
     pub(super) hit: Mask,
     /// Lanes that need the scalar test.
@@ -142,7 +142,7 @@ impl<'a> ShearedPacket<'a> {
         for i in lanes(these) {
             let Some(hit) = self.intersect_lane(i, corners, ends[i]) else { continue };
             if found.t[i].is_nan() || hit.t < found.t[i] {
-                found.put(i, &super::ShapeHit { primitive: number, ..hit });
+                found.set(i, &super::ShapeHit { primitive: number, ..hit });
                 ends[i] = hit.t;
             }
         }
@@ -197,8 +197,8 @@ impl<'a> ShearedPacket<'a> {
         seen
     }
 
-    /// [`ShearedRay::intersect`] for a packet, with one triangle per ray. Rays that start on their triangle
-    /// do not hit it.
+    /// [`ShearedRay::intersect`] for a packet in which each ray has its own triangle. Rays that start on
+    /// their triangle do not hit it.
     #[inline(always)]
     pub(super) fn hits(
         &self,

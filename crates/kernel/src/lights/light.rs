@@ -1,4 +1,4 @@
-//! The [`Light`] enum. [`Light::family`] returns a light as a trait object of its family.
+//! The [`Light`] enum. [`Light::family`] returns a light as its family's trait object.
 
 use super::area::{AreaLight, EmissionTexture};
 use super::delta::{DeltaLight, PointLight, SpotLight};
@@ -25,7 +25,7 @@ pub enum Light {
     Area(AreaLight),
 }
 
-/// A light as a member of one of three families with common methods.
+/// A light as a member of one of three families. The lights in a family have common methods.
 #[derive(Clone, Copy)]
 pub enum LightFamily<'a> {
     /// A light without extent.
@@ -62,7 +62,7 @@ impl Light {
 
     /// [`Light::sample`] for the points in the mask `used`, without an emission texture.
     #[inline(always)]
-    pub fn sample_row(
+    pub fn sample_packet(
         &self,
         points: &Vec3x16,
         normals: &Vec3x16,
@@ -70,11 +70,11 @@ impl Light {
         u: &[F32x16; 2],
     ) -> LightSamplePacket {
         match self {
-            Self::Point(light) => light.sample_row(points),
-            Self::Spot(light) => light.sample_row(points),
-            Self::Directional(light) => light.sample_row(u),
-            Self::Environment(light) => light.sample_row(normals, u),
-            Self::Area(light) => light.sample_row(points, normals, used, u),
+            Self::Point(light) => light.sample_packet(points),
+            Self::Spot(light) => light.sample_packet(points),
+            Self::Directional(light) => light.sample_packet(u),
+            Self::Environment(light) => light.sample_packet(normals, u),
+            Self::Area(light) => light.sample_packet(points, normals, used, u),
         }
     }
 
@@ -126,7 +126,7 @@ impl Light {
         self.as_area().map_or(0.0, |light| light.pdf(from, normal, met))
     }
 
-    /// Bounds of the light's position and emission, for a [`LightTree`](super::LightTree). `None` if the
+    /// Bounds on the light's position and emission, for a [`LightTree`](super::LightTree). `None` if the
     /// light emits nothing.
     pub fn bounds(&self) -> Option<LightBounds> {
         let bounds = match self.family() {
@@ -137,7 +137,7 @@ impl Light {
         Some(bounds).filter(|bounds| bounds.power > 0.0)
     }
 
-    /// The emission texture that modulates the light's radiance, if any.
+    /// The emission texture that modulates the light's radiance. `None` for an untextured light.
     #[inline(always)]
     pub fn emission_texture(&self) -> Option<&EmissionTexture> {
         self.as_area().and_then(|light| light.texture.as_deref())
@@ -154,7 +154,7 @@ impl Light {
     }
 
     /// Whether light arrives from a single direction.
-    pub fn is_single(&self) -> bool {
+    pub fn is_single_direction(&self) -> bool {
         match self.family() {
             LightFamily::Delta(_) => true,
             LightFamily::Infinite(light) => light.is_single_direction(),

@@ -55,7 +55,7 @@ impl LightObjectPacket {
         self.is_any |= other.is_any;
     }
 
-    /// Returns the source of a lane.
+    /// Returns a lane's light source geometry.
     #[inline]
     pub fn source(&self, lane: usize) -> LightGeometry {
         match (self.object[lane], self.part[lane]) {
@@ -66,7 +66,7 @@ impl LightObjectPacket {
         }
     }
 
-    /// Sets the source of a lane.
+    /// Sets a lane's light source geometry.
     #[inline(always)]
     pub fn set(&mut self, lane: usize, source: LightGeometry) {
         (self.object[lane], self.part[lane]) = object_and_part(source);
@@ -88,7 +88,7 @@ fn object_and_part(source: LightGeometry) -> (u32, u32) {
 /// with a closure is not always inlined, and would then not be compiled with the caller's instruction set.
 macro_rules! packet_of {
     ($source:expr, $i:ident => $sample:expr) => {{
-        let mut row = $crate::lights::packet::LightSamplePacket::without_light($source);
+        let mut row = $crate::lights::packet::LightSamplePacket::black($source);
         for $i in 0..$crate::math::lanes::PACKET_SIZE {
             let (direction, target, weight) = $sample;
             $crate::math::lanes::set_lane(&mut row.directions, $i, direction);
@@ -131,7 +131,7 @@ impl LightSamplePacket {
     }
 
     #[inline(always)]
-    pub(super) fn without_light(source: LightGeometry) -> Self {
+    pub(super) fn black(source: LightGeometry) -> Self {
         Self {
             directions: [[0.0; PACKET_SIZE]; 3],
             targets: [[0.0; PACKET_SIZE]; 3],
@@ -158,7 +158,7 @@ impl LightSamplePacket {
         used: u32,
         sample: impl Fn(usize, Vec3) -> Option<LightSample>,
     ) -> Self {
-        let mut row = Self::without_light(LightGeometry::Nothing);
+        let mut row = Self::black(LightGeometry::Nothing);
         for i in (0..PACKET_SIZE).filter(|i| used & 1 << i != 0) {
             if let Some(sample) = sample(i, lane(points, i)) {
                 row.put(i, &sample);

@@ -1,4 +1,4 @@
-//! Light samples for a packet of points with a different light per point.
+//! Light samples for a packet of points, where each point has its own light.
 
 use super::area::mesh::{AreaSampledTriangles, MeshEmitter};
 use super::area::packet::triangle_packet_of;
@@ -13,7 +13,7 @@ use crate::geometry::packet::lanes;
 use crate::math::Vec3;
 use crate::math::lanes::{F32x16, PACKET_SIZE, Vec3x16, lane, set_lane};
 
-/// Samples convex emitters for a packet, with one emitter per lane.
+/// Samples convex emitters for a packet in which each lane has its own emitter.
 macro_rules! convex_packet_of {
     ($i:ident => $all:expr, $points:expr, $u:expr) => {{
         let mut row = packet_of!(LightGeometry::Nothing, $i => {
@@ -30,8 +30,8 @@ macro_rules! convex_packet_of {
 }
 
 impl Lights {
-    /// [`Light::sample`] for the points in the mask `used`, with one light per lane. Returns the samples, the
-    /// inverse pdfs in sr (as in [`Light::inverse_pdfs`]), and the number of texture lookups.
+    /// [`Light::sample`] for the points in the mask `used`, where each lane has its own light. Returns the
+    /// samples, the inverse pdfs in sr (as in [`Light::inverse_pdfs`]), and the number of texture lookups.
     #[inline(always)]
     pub fn sample_per_lane(
         &self,
@@ -44,7 +44,7 @@ impl Lights {
         for i in 1..PACKET_SIZE {
             lights[i] = self.get(picked[i]);
         }
-        let mut row = LightSamplePacket::without_light(LightGeometry::Nothing);
+        let mut row = LightSamplePacket::black(LightGeometry::Nothing);
         let mut left = used;
         // Sample all lights of the same kind together. Other lanes get a copy of one of these lights, and
         // their results are discarded.
@@ -65,7 +65,7 @@ impl Lights {
                 let mut row = convex_packet_of!(i => quads, points, u);
                 for i in 0..PACKET_SIZE {
                     if let Some((_, Some(two))) = quads[i].1.shape.as_quad() {
-                        row.sources.part[i] = two.part(lane(points, i), lane(&row.targets, i));
+                        row.sources.part[i] = two.primitive_at(lane(points, i), lane(&row.targets, i));
                     }
                 }
                 row
@@ -124,7 +124,8 @@ fn area_sampled(light: &Light) -> Option<(&AreaSampledTriangles, &AreaLight)> {
     light.shape.as_mesh().and_then(MeshEmitter::area_sampled).map(|facets| (facets, light))
 }
 
-/// The lights of one kind. Adds the lanes that have such a light to `of`. The other lanes get `filler`.
+/// Returns the lights of one kind. Adds the lanes that have such a light to `of`. The other lanes get
+/// `filler`.
 #[inline(always)]
 fn lights_of_kind<'a, T: Copy>(
     (lights, left): (&[&'a Light; PACKET_SIZE], u32),

@@ -37,7 +37,7 @@ pub enum SamplingMode {
     Paths,
 }
 
-/// A set of lights, and how a vertex picks the ones to sample.
+/// A set of lights, and how a vertex picks lights from it.
 #[derive(Clone, Copy, Debug)]
 pub struct LightSampler<'a> {
     /// Tree over the lights to choose from.
@@ -59,7 +59,7 @@ pub struct LightSamplingEffort {
 }
 
 impl LightSamplingEffort {
-    /// Effort for direct lighting. As good as examining each of a thousand lights.
+    /// Effort for direct lighting. Gives results as good as examining each of a thousand lights.
     pub const DIRECT: Self = Self { count: MAX_WITHOUT_TREE as u32, nodes: LightTreeCut::MOST };
 
     /// Effort for path vertices. More shadow rays are not worthwhile because of the other noise.
@@ -72,11 +72,11 @@ impl LightSamplingEffort {
     }
 }
 
-/// Expected number of samples of each light at a vertex, per requested sample.
+/// Expected number of samples for each light at a vertex, per requested sample.
 pub struct ExpectedSamples<'a>(Option<(LightSampler<'a>, LightTreeCut<'a>)>);
 
 impl ExpectedSamples<'_> {
-    /// Expected number of samples of a light.
+    /// Expected number of samples for a light.
     #[inline]
     pub fn of(&self, number: u32) -> f32 {
         self.0.as_ref().map_or(1.0, |(sampler, cut)| {
@@ -94,7 +94,7 @@ impl ExpectedSamples<'_> {
 enum ObjectLights {
     /// A single light.
     Whole(u32),
-    /// The light on each primitive, if any.
+    /// The light on each primitive. `None` for primitives without a light.
     Primitives(Vec<Option<u32>>),
 }
 
@@ -129,8 +129,8 @@ impl Lights {
         Ok(Self { all, ..lights })
     }
 
-    /// Maximum number of local lights at which path vertices sample all of them. If there are more, one is
-    /// picked. Measured in rooms with 3 to 12 lights.
+    /// Path vertices sample all local lights if there are at most this many, and otherwise pick one. Measured
+    /// in rooms with 3 to 12 lights.
     const MAX_LOCAL_WITHOUT_TREE: usize = 3;
 
     /// How vertices pick lights. `None` if they sample all lights.
@@ -149,14 +149,14 @@ impl Lights {
         }
     }
 
-    /// Expected number of samples of each light at a surface point, given only the point's position and
+    /// Expected number of samples for each light at a surface point, given only the point's position and
     /// normal.
     #[inline]
     pub fn samples_at(&self, receivers: SamplingMode, point: Vec3, normal: Vec3) -> ExpectedSamples<'_> {
         // Return early because a cut is expensive to copy.
         let Some(sampler) = self.sampler(receivers) else { return ExpectedSamples(None) };
         let mut cut = sampler.picks.cut(sampler.tree);
-        cut.move_to(&Receiver::plain(point, normal));
+        cut.move_to(&Receiver::without_lobe(point, normal));
         ExpectedSamples(Some((sampler, cut)))
     }
 

@@ -40,13 +40,13 @@ const OBJECT: u32 = 7;
 fn lights_of(shape: &Shape) -> Lights {
     let lights = area_light(shape, Vec3::ONE, OBJECT).map(Light::Area);
     Lights::new(std::iter::once(Light::Point(POINT)).chain(lights).collect(), &CancelToken::new())
-        .expect("nobody cancels")
+        .expect("never canceled")
 }
 
 const POINT: PointLight =
     PointLight { position: DVec3::ZERO, intensity: Vec3::ONE, falloff: Falloff::Square };
 
-/// The hit of a ray on a shape.
+/// A ray's hit on a shape.
 pub fn light_hit(shape: &Shape, from: Vec3, direction: Vec3) -> Option<(LightHit, ShapeHit)> {
     let ray = Ray::new(from, direction).to_f64();
     let hit = shape.intersect(&ray)?;
@@ -77,7 +77,7 @@ fn packet_samples_match_single_samples() {
             let points: Vec3x16 = std::array::from_fn(|_| std::array::from_fn(|_| next() * 6.0 - 3.0));
             let normals: Vec3x16 = [[0.0; PACKET_SIZE], [1.0; PACKET_SIZE], [0.0; PACKET_SIZE]];
             let u: [F32x16; 2] = std::array::from_fn(|_| std::array::from_fn(|_| next()));
-            let row = light.sample_row(&points, &normals, u32::MAX, &u);
+            let row = light.sample_packet(&points, &normals, u32::MAX, &u);
             for i in 0..PACKET_SIZE {
                 let alone = light.sample(lane(&points, i), lane(&normals, i), [u[0][i], u[1][i]]);
                 let weight = lane(&row.weights, i);
@@ -106,7 +106,7 @@ fn per_lane_lights_match_single_samples() {
         shapes().into_iter().filter_map(|shape| area_light(&shape, Vec3::new(1.0, 2.0, 0.5), OBJECT));
     let areas = shapes.chain([quad(0.0), facets, quad(-2.0)]);
     let all: Vec<Light> = std::iter::once(Light::Point(POINT)).chain(areas.map(Light::Area)).collect();
-    let lights = Lights::new(all.clone(), &CancelToken::new()).expect("nobody cancels");
+    let lights = Lights::new(all.clone(), &CancelToken::new()).expect("never canceled");
     let mut seen = 0;
     for round in 0..200_u32 {
         let at = |i: usize, decision| PixelSampler::new(5, round, i as u32, 0).pair(1, decision);
@@ -177,7 +177,7 @@ fn sample_pdf_equals_pdf_of_its_hit() {
 fn two_sided(shape: &Shape) -> Lights {
     let both = [area_light(shape, Vec3::ONE, OBJECT), back_light(shape, Vec3::ONE, OBJECT)];
     let all = both.into_iter().flatten().map(Light::Area).collect();
-    Lights::new(all, &CancelToken::new()).expect("nobody cancels")
+    Lights::new(all, &CancelToken::new()).expect("never canceled")
 }
 
 #[test]
@@ -318,7 +318,7 @@ fn mesh_triangles_map_to_their_lights() {
     let light = |numbers: &[u32], radiance: f32| {
         let triangles = numbers.iter().map(|&number| (corners(f64::from(number)), number)).collect();
         let mesh =
-            MeshEmitter::new(triangles, &CancelToken::new()).expect("nobody cancels").expect("an area");
+            MeshEmitter::new(triangles, &CancelToken::new()).expect("never canceled").expect("an area");
         let bounds = mesh.bounds().scaled_by(Vec3::splat(radiance));
         Light::Area(AreaLight {
             bounds,
@@ -332,7 +332,7 @@ fn mesh_triangles_map_to_their_lights() {
     };
     let lights =
         Lights::new(vec![light(&[0, 4], 1.0), Light::Point(POINT), light(&[2], 2.0)], &CancelToken::new())
-            .expect("nobody cancels");
+            .expect("never canceled");
     let light_at =
         |object, primitive| lights.light_at(object, primitive, Side::Front).map(|(number, _)| number);
     assert_eq!(
@@ -355,7 +355,7 @@ fn mesh_triangles_map_to_their_lights() {
 /// A mesh light with the given triangles. Their primitive indices start at 5.
 fn mesh_light(triangles: &[[DVec3; 3]]) -> AreaLight {
     let numbered = triangles.iter().copied().zip(5..).collect();
-    let mesh = MeshEmitter::new(numbered, &CancelToken::new()).expect("nobody cancels").expect("an area");
+    let mesh = MeshEmitter::new(numbered, &CancelToken::new()).expect("never canceled").expect("an area");
     let bounds = mesh.bounds();
     let (shape, radiance) = (Emitter::Mesh(mesh), Vec3::ONE);
     let (side, part) = (Side::Front, LightPart::Listed);

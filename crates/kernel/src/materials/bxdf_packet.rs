@@ -110,7 +110,7 @@ impl<B: Bxdf> BxdfPacket<B> {
         let bsdf = B::new(point, Vec3::X);
         let mut filled = bsdf.splat();
         if let Some((texture, uv)) = color {
-            let colors = texture.lookup_row(uv);
+            let colors = texture.lookup_packet(uv);
             for i in 0..PACKET_SIZE {
                 let mut bsdf = bsdf;
                 bsdf.set_color(point, lane(&colors, i));

@@ -11,7 +11,7 @@ use crate::math::Vec3;
 /// A smooth dielectric coat over a base. The base's lobes already account for the coat's transmittance.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Coated {
-    /// Factor on the coat's reflection.
+    /// Factor applied to the coat's reflection.
     pub specular: Color,
     /// Index of refraction of the coat. At least 1.
     pub ior: f32,
@@ -27,7 +27,7 @@ impl Coated {
         dielectric(cosine, self.ior).0
     }
 
-    /// The factor on the coat's reflection. Counts texture lookups in `lookups`.
+    /// The factor applied to the coat's reflection. Counts texture lookups in `lookups`.
     #[inline]
     pub fn specular(&self, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
         self.specular.at(at, lookups)

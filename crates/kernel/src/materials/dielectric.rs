@@ -1,4 +1,4 @@
-//! Dielectrics that fill the inside of a closed shape.
+//! Dielectrics that fill closed shapes.
 
 use super::footprint::TexturePoint;
 use super::microfacet;
@@ -6,7 +6,7 @@ use super::scalar::Number;
 use crate::math::elementary::exp2;
 use crate::math::{DVec3, Vec3};
 
-/// A smooth or rough dielectric that fills the inside of its shape.
+/// A smooth or rough dielectric that fills its shape.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Dielectric {
     /// Index of refraction inside the shape. It is 1 outside.

@@ -21,13 +21,13 @@ choice! {
 /// Emitted radiance of a surface.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Emission {
-    /// Radiance, or a factor on the texture if there is one.
+    /// Radiance, or a factor applied to the texture if there is one.
     pub scale: Vec3,
     /// Texture that modulates the radiance.
     pub texture: Option<Arc<Texture>>,
     /// Which sides emit.
     pub sides: EmissionSides,
-    /// Clear coat that attenuates the radiance depending on direction, if any.
+    /// Clear coat that attenuates the radiance depending on direction. `None` without a coat.
     pub coat: Option<Arc<EmissionCoat>>,
 }
 
@@ -60,7 +60,7 @@ impl Emission {
         self.is_emissive() && (is_front || self.is_two_sided())
     }
 
-    /// The radiance at the given texture coordinates and cosine of the direction of emission. Counts texture
+    /// The radiance at the given texture coordinates, in a direction with the given cosine. Counts texture
     /// lookups in `lookups`.
     #[inline]
     pub fn at(&self, at: &TexturePoint, cosine: f32, lookups: &mut u64) -> Vec3 {

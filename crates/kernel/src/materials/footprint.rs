@@ -1,4 +1,4 @@
-//! Footprints: the texture areas that single lookups cover.
+//! Footprints: the texture areas covered by single lookups.
 
 use crate::math::{DVec2, Vec2, Vec3};
 
@@ -12,7 +12,7 @@ pub enum UvSet {
     Second,
 }
 
-/// A point in texture space, with the footprint of the lookup.
+/// A point in texture space, and the footprint of the lookup there.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TexturePoint {
     /// Texture coordinates.
@@ -49,7 +49,7 @@ impl TexturePoint {
     }
 }
 
-/// An ellipse in texture space, given by its axes. Both axes are 0 for a point.
+/// An ellipse in texture space, defined by its axes. Both axes are 0 for a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Footprint {
     axes: [Vec2; 2],
@@ -86,13 +86,13 @@ impl Footprint {
     const MIN_COSINE: f32 = 1e-4;
 
     /// Length of the longer axis in texels, given the texels per unit of u and v.
-    pub fn texels(&self, per_unit: Vec2) -> f32 {
-        self.longest(|axis| axis * per_unit)
+    pub fn major_axis_texels(&self, per_unit: Vec2) -> f32 {
+        self.major_axis_length(|axis| axis * per_unit)
     }
 
     /// Length of the longer axis after a linear map.
     #[inline]
-    pub fn longest(&self, map: impl Fn(Vec2) -> Vec2) -> f32 {
+    pub fn major_axis_length(&self, map: impl Fn(Vec2) -> Vec2) -> f32 {
         let lengths = self.axes.map(|axis| map(axis).length());
         lengths[0].max(lengths[1])
     }
@@ -107,11 +107,11 @@ mod tests {
         let tangents = [Vec3::X * 2.0, Vec3::Y * 4.0];
         let straight = Footprint::of_cone(0.5, Vec3::NEG_Z, Vec3::Z, tangents);
         // 0.5 units are a quarter of u and an eighth of v.
-        assert!((straight.texels(Vec2::new(100.0, 0.0)) - 25.0).abs() < 1e-4);
-        assert!((straight.texels(Vec2::new(0.0, 100.0)) - 12.5).abs() < 1e-4);
+        assert!((straight.major_axis_texels(Vec2::new(100.0, 0.0)) - 25.0).abs() < 1e-4);
+        assert!((straight.major_axis_texels(Vec2::new(0.0, 100.0)) - 12.5).abs() < 1e-4);
         let steep = Footprint::of_cone(0.5, Vec3::new(0.0, 0.8, -0.6), Vec3::Z, tangents);
-        assert!((steep.texels(Vec2::new(0.0, 60.0)) - 12.5).abs() < 1e-4);
-        assert!((steep.texels(Vec2::new(100.0, 0.0)) - 25.0).abs() < 1e-4);
+        assert!((steep.major_axis_texels(Vec2::new(0.0, 60.0)) - 12.5).abs() < 1e-4);
+        assert!((steep.major_axis_texels(Vec2::new(100.0, 0.0)) - 25.0).abs() < 1e-4);
     }
 
     #[test]
@@ -119,8 +119,8 @@ mod tests {
         let tangents = [Vec3::X, Vec3::new(1.0, 1.0, 0.0)];
         let seen = Footprint::of_cone(1.0, Vec3::new(0.6, 0.0, -0.8), Vec3::Z, tangents);
         // Along x, only u changes, by 1/0.8. Along y, v increases by one and u decreases by one.
-        assert!((seen.texels(Vec2::X) - 1.25).abs() < 1e-6);
-        assert!((seen.texels(Vec2::Y) - 1.0).abs() < 1e-6);
+        assert!((seen.major_axis_texels(Vec2::X) - 1.25).abs() < 1e-6);
+        assert!((seen.major_axis_texels(Vec2::Y) - 1.0).abs() < 1e-6);
     }
 
     #[test]

@@ -41,13 +41,13 @@ impl LobeAlbedo {
         Self::fit(|cosine| integrate_albedo::<12, 16>(cosine, alpha, &reflectance))
     }
 
-    /// Fits a known albedo and stores its exact mean.
+    /// Fits an albedo function and stores its exact mean.
     pub fn fit_with_exact_mean(albedo: impl Fn(f64) -> f64) -> Self {
         Self { mean: cosine_weighted_mean(&albedo) as f32, ..Self::fit(albedo) }
     }
 
-    /// Fits a polynomial. Stores the mean of the polynomial, so the light that reaches the base is consistent
-    /// with the fit.
+    /// Fits a polynomial. Also stores the polynomial's mean, so that the light that reaches the base is
+    /// consistent with the fit.
     fn fit(albedo: impl Fn(f64) -> f64) -> Self {
         const NODES: usize = 32;
         // Evaluate the albedo at nodes that are denser at grazing angles.
@@ -206,7 +206,7 @@ fn to_power_basis(terms: &[f64; TERMS]) -> [f64; TERMS] {
     sums
 }
 
-/// Gauss–Legendre nodes in (0, 1) and weights, computed with Newton's method.
+/// Gauss–Legendre nodes in (0, 1) and their weights, computed with Newton's method.
 fn gauss_legendre(count: usize) -> impl Iterator<Item = (f64, f64)> {
     (0..count).map(move |i| {
         let mut x = libm::cos(std::f64::consts::PI * (i as f64 + 0.75) / (count as f64 + 0.5));
@@ -246,7 +246,7 @@ impl VisibleFacets {
 
     /// Cosine between a facet and the view direction, and cosine between the reflected direction and the
     /// surface normal.
-    fn mirrored(&self, x: f64, b: f64) -> [f64; 2] {
+    fn reflection_cosines(&self, x: f64, b: f64) -> [f64; 2] {
         let Self { alpha, to_eye, view, second, .. } = self;
         let part = 0.5 * (1.0 + view.z);
         let y = (1.0 - part) * (1.0 - x * x).sqrt() + part * b;
@@ -260,7 +260,7 @@ impl VisibleFacets {
     /// Height of the reflected direction at a point on the chord at x. The point is given relative to the
     /// chord's center, in units of half its length.
     fn height(&self, x: f64, part: f64) -> f64 {
-        self.mirrored(x, (1.0 - x * x).sqrt() * part)[1]
+        self.reflection_cosines(x, (1.0 - x * x).sqrt() * part)[1]
     }
 
     /// A point on the chord for which light is reflected above the surface, if there is one.
@@ -284,8 +284,8 @@ fn lambda(cosine: f64, alpha: f64) -> f64 {
     0.5 * ((1.0 + alpha * alpha * tangent2).sqrt() - 1.0)
 }
 
-/// The last position from `from` toward `to` where a predicate is true, found by bisection. It must be true
-/// at `from`.
+/// The last position from `from` toward `to` where a predicate is true, found by bisection. The predicate
+/// must be true at `from`.
 fn last_true(mut from: f64, mut to: f64, holds: impl Fn(f64) -> bool) -> f64 {
     if holds(to) {
         return to;
@@ -297,7 +297,7 @@ fn last_true(mut from: f64, mut to: f64, holds: impl Fn(f64) -> bool) -> f64 {
     from
 }
 
-/// Nodes in (0, 1) and weights, for functions that vary quickly near both ends.
+/// Quadrature nodes in (0, 1) and their weights, for functions that vary quickly near both ends.
 fn quadrature_dense_at_ends(count: usize) -> Vec<(f64, f64)> {
     gauss_legendre(count).map(|(t, weight)| (t * t * (3.0 - 2.0 * t), weight * 6.0 * t * (1.0 - t))).collect()
 }
@@ -320,7 +320,7 @@ fn integrate_albedo<const ACROSS: usize, const ALONG: usize>(
         let Some(lit) = facets.lit_point(x) else { continue };
         let [from, to] = facets.ends(x, lit);
         for &(part, by_part) in &along {
-            let [between, mirrored] = facets.mirrored(x, chord * (from + (to - from) * part));
+            let [between, mirrored] = facets.reflection_cosines(x, chord * (from + (to - from) * part));
             let left = (1.0 + facets.masked) / (1.0 + facets.masked + lambda(mirrored.max(1e-12), alpha));
             let area = widest * by_turn * chord * chord * (to - from) * by_part;
             sum += area * reflectance(between) * left;
@@ -378,7 +378,7 @@ mod tests {
         for i in 0..STEPS * STEPS {
             let (radius, turn) = (place(i / STEPS).sqrt(), TAU * place(i % STEPS));
             let (sin, cos) = libm::sincos(turn);
-            let [between, mirrored] = facets.mirrored(radius * cos, radius * sin);
+            let [between, mirrored] = facets.reflection_cosines(radius * cos, radius * sin);
             if mirrored > 0.0 {
                 let left = (1.0 + facets.masked) / (1.0 + facets.masked + lambda(mirrored, alpha));
                 sum += reflectance(between) * left;

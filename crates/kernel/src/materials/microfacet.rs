@@ -91,7 +91,7 @@ impl HalfVector {
         self.distribution(self.across.length_squared() / squared, squared)
     }
 
-    /// Anisotropic D in sr⁻¹, with the tangents of a frame.
+    /// Anisotropic D in sr⁻¹, along the tangents of a frame.
     #[inline(always)]
     pub fn anisotropic(&self, frame: &Frame, [u, v]: [f32; 2]) -> f32 {
         let (x, y) = (self.across.dot(frame.s) / u, self.across.dot(frame.t) / v);
@@ -125,7 +125,7 @@ impl SmithTerms {
         Self { cosine, slope }
     }
 
-    /// Anisotropic terms of a direction, with the tangents of a frame.
+    /// Anisotropic terms of a direction, along the tangents of a frame.
     #[inline(always)]
     pub fn anisotropic(frame: &Frame, direction: Vec3, [u, v]: [f32; 2]) -> Self {
         let cosine = frame.n.dot(direction);
@@ -165,7 +165,7 @@ impl SmithTerms {
     }
 }
 
-/// A frame around a normal, with the first tangent along a vector.
+/// A frame around a normal whose first tangent is along a vector.
 #[inline(always)]
 pub fn frame_along(normal: Vec3, tangent: Vec3) -> Frame {
     let plain = Frame::from_normal(normal);

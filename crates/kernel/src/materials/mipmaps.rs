@@ -43,7 +43,8 @@ impl Mipmaps {
         self.levels.iter().map(Texels::memory_bytes).sum()
     }
 
-    /// Memory used by the levels of an image with this size, with or without alpha, in bytes.
+    /// Memory in bytes for the mip levels of an image with this size. `is_weighted` is true for images with
+    /// alpha.
     pub fn memory_bytes_of(width: u32, height: u32, is_weighted: bool) -> u64 {
         let texel_bytes = if is_weighted { size_of::<Vec4>() } else { size_of::<Vec3>() };
         let (mut width, mut height, mut bytes) = (u64::from(width), u64::from(height), 0);
@@ -73,10 +74,10 @@ impl<'a> ImageHalver<'a> {
         self.height
     }
 
-    /// Empty storage for the rows of the smaller image.
+    /// Creates empty storage for the smaller image's rows.
     pub fn start(&self) -> TexelData {
         let count = self.width as usize * self.height as usize;
-        if self.of.is_weighted() {
+        if self.of.has_alpha() {
             TexelData::FloatAlpha(Vec::with_capacity(count))
         } else {
             TexelData::Float(Vec::with_capacity(count))
@@ -91,8 +92,9 @@ impl<'a> ImageHalver<'a> {
             let columns = CoveredTexels::new(x, self.width, self.of.width);
             match to {
                 TexelData::FloatAlpha(texels) => {
-                    let texel =
-                        |x: u32, y: u32| self.of.weighted(y as usize * self.of.width as usize + x as usize);
+                    let texel = |x: u32, y: u32| {
+                        self.of.premultiplied(y as usize * self.of.width as usize + x as usize)
+                    };
                     texels.push(rows.mean(|y| columns.mean(|x| texel(x, y))));
                 }
                 TexelData::Float(texels) => texels.push(rows.mean(|y| columns.mean(|x| self.of.get(x, y)))),

@@ -17,7 +17,7 @@ pub enum Mirror {
 }
 
 impl Mirror {
-    /// Reflectance for a cosine of the angle of incidence, with the color multiplied by `tint`. Counts
+    /// Reflectance at the given cosine of the incident angle, with the color multiplied by `tint`. Counts
     /// texture lookups in `lookups`.
     #[inline]
     pub fn reflectance(&self, cosine: f32, tint: Option<Vec3>, at: &TexturePoint, lookups: &mut u64) -> Vec3 {

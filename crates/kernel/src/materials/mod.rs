@@ -77,8 +77,8 @@ impl Material {
         is_pane || self.opacity.is_some()
     }
 
-    /// Fraction of light that passes undeflected, at the given texture coordinates and cosine of the angle of
-    /// incidence. `color` multiplies a pane's transmittance. Counts texture lookups in `lookups`.
+    /// Fraction of light that passes undeflected, at the given texture coordinates and cosine of the incident
+    /// angle. `color` multiplies a pane's transmittance. Counts texture lookups in `lookups`.
     pub fn null_transmittance(&self, at: &TexturePoint, color: Vec3, cosine: f32, lookups: &mut u64) -> Vec3 {
         let there = self.opacity.as_ref().map_or(1.0, |opacity| opacity.at(at, lookups));
         let through = match &self.bsdf {
@@ -145,13 +145,13 @@ impl Bsdf {
         self.rough().is_some()
     }
 
-    /// Whether the lobes depend on the directions of the texture axes.
+    /// Whether the lobes depend on the texture axes' directions.
     #[inline]
     pub fn has_direction(&self) -> bool {
         self.rough().is_some_and(Rough::has_direction)
     }
 
-    /// The non-δ lobes, if there are any.
+    /// The non-δ lobes. `None` if there are none.
     #[inline]
     pub fn rough(&self) -> Option<&Rough> {
         match self {

@@ -7,12 +7,12 @@ use super::texture::Texture;
 use crate::math::Vec3;
 use crate::math::frame::Frame;
 
-/// A tangent-space normal map. Its linear values are (n + 1)/2, with z pointing away from the surface.
+/// A tangent-space normal map. Its linear values are (n + 1)/2, where z points away from the surface.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NormalMap {
     /// The normals.
     pub texture: Arc<Texture>,
-    /// Factor on the slopes. 0 makes the surface smooth.
+    /// Factor applied to the slopes. 0 makes the surface smooth.
     pub strength: f32,
 }
 

@@ -51,7 +51,7 @@ impl NormalPerturbation {
     }
 }
 
-/// A bump map, with heights in the red channel of a texture (Blinn, *Simulation of Wrinkled Surfaces*,
+/// A bump map. The heights are in the red channel of a texture (Blinn, *Simulation of Wrinkled Surfaces*,
 /// SIGGRAPH 1978).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bump {

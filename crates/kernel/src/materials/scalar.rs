@@ -20,7 +20,7 @@ choice! {
     }
 }
 
-/// The value of a pixel that a scalar texture reads.
+/// The value that a scalar texture reads from a pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum PixelValue {
     /// The luminance of the pixel.
@@ -29,7 +29,7 @@ pub enum PixelValue {
     Channel(Channel),
     /// The alpha, or the luminance for images without an alpha channel.
     Opacity,
-    /// [`PixelValue::Opacity`] for an image that is not also a color of the material. If alpha is 1
+    /// [`PixelValue::Opacity`] for an image that the material does not also use as a color. If alpha is 1
     /// everywhere and all pixels are gray, the luminance is used as the opacity.
     Mask {
         /// Whether the luminance is also used if some pixels are not gray.

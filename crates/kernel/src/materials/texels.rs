@@ -4,7 +4,7 @@ use crate::math::color::{SRGB8_TO_LINEAR, srgb8_to_linear};
 use crate::math::lanes::{PACKET_SIZE, Vec3x16, set_lane};
 use crate::math::{DVec3, DVec4, Vec3, Vec4};
 
-/// An RGB image in memory, with rows from top to bottom.
+/// An RGB image in memory. Rows are stored from top to bottom.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Texels {
     /// Number of columns. At least 1.
@@ -13,7 +13,7 @@ pub struct Texels {
     pub height: u32,
     /// The `width · height` texels.
     pub data: TexelData,
-    /// Number of texels that are negative or not finite in the file. They are stored as 0.
+    /// Number of texels that are negative or not finite in the file. Such texels are stored as 0.
     pub unusable: u64,
 }
 
@@ -56,7 +56,7 @@ impl Texels {
 
     /// Whether the texels have an alpha channel. If so, colors are weighted by alpha.
     #[inline(always)]
-    pub fn is_weighted(&self) -> bool {
+    pub fn has_alpha(&self) -> bool {
         match &self.data {
             TexelData::Srgb8(_) | TexelData::Linear8(_) | TexelData::Float(_) => false,
             TexelData::SrgbAlpha8(_) | TexelData::LinearAlpha8(_) | TexelData::FloatAlpha(_) => true,
@@ -81,7 +81,7 @@ impl Texels {
     }
 
     /// Linear color premultiplied by alpha, and alpha, at a texel index.
-    pub fn weighted(&self, place: usize) -> Vec4 {
+    pub fn premultiplied(&self, place: usize) -> Vec4 {
         let weight = match &self.data {
             TexelData::Srgb8(_) | TexelData::Linear8(_) | TexelData::Float(_) => 1.0,
             TexelData::SrgbAlpha8(bytes) | TexelData::LinearAlpha8(bytes) => {
@@ -92,7 +92,7 @@ impl Texels {
         (self.at(place) * weight).extend(weight)
     }
 
-    /// Thresholds the red channel. The result is 1 where it is at least `least`, otherwise 0.
+    /// Thresholds the red channel. The result is 1 where the channel is at least `least`, otherwise 0.
     pub fn threshold(&self, least: f32) -> Self {
         let texel = |place: usize| [if self.at(place).x >= least { u8::MAX } else { 0 }; 3];
         let data = TexelData::Linear8((0..self.len()).map(texel).collect());
@@ -148,7 +148,7 @@ impl Texels {
 
     /// Linear values of all texels.
     pub fn into_linear(self) -> Vec<Vec3> {
-        if self.is_weighted() {
+        if self.has_alpha() {
             return (0..self.len()).map(|place| self.at(place)).collect();
         }
         match self.data {
@@ -161,8 +161,8 @@ impl Texels {
 
     /// Mean of all texels, weighted by alpha if there is an alpha channel.
     pub fn mean(&self) -> Vec3 {
-        if self.is_weighted() {
-            let sum: DVec4 = (0..self.len()).map(|place| self.weighted(place).as_dvec4()).sum();
+        if self.has_alpha() {
+            let sum: DVec4 = (0..self.len()).map(|place| self.premultiplied(place).as_dvec4()).sum();
             return unpremultiply((sum / self.len() as f64).as_vec4());
         }
         let rows = (0..self.height).flat_map(|y| (0..self.width).map(move |x| (x, y)));

@@ -50,12 +50,12 @@ pub struct Texture {
     pub repeat: Vec2,
     /// Transform after repetition. `None` for the identity on the first UV set.
     pub moved: Option<Box<UvTransform>>,
-    /// Scale and offset of looked-up values. `None` for the identity. Does not affect heights and their
-    /// slopes.
+    /// Scale and offset applied to looked-up values. `None` for the identity. Does not affect heights and
+    /// their slopes.
     pub factor: Option<ScaleAndOffset>,
 }
 
-/// Scale and offset of looked-up values.
+/// Scale and offset applied to looked-up values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ScaleAndOffset {
     /// The scale.
@@ -77,12 +77,12 @@ impl ScaleAndOffset {
 
     /// The scaled value plus the offset.
     #[inline]
-    fn of(&self, value: Vec3) -> Vec3 {
+    fn apply(&self, value: Vec3) -> Vec3 {
         value * self.gain + self.base
     }
 }
 
-/// A choice of a UV set, and a transform that rotates, then translates.
+/// A UV set, and a transform that rotates and then translates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UvTransform {
     /// Sine and cosine of the rotation angle, from u to v.
@@ -131,7 +131,7 @@ impl UvTransform {
     }
 
     /// Repeats and transforms a packet of coordinates.
-    fn transform_row(&self, uv: &[[f64; PACKET_SIZE]; 2], repeat: DVec2) -> [[f64; PACKET_SIZE]; 2] {
+    fn transform_packet(&self, uv: &[[f64; PACKET_SIZE]; 2], repeat: DVec2) -> [[f64; PACKET_SIZE]; 2] {
         let mut row = *uv;
         for i in 0..PACKET_SIZE {
             let moved = self.point(DVec2::new(uv[0][i], uv[1][i]) * repeat);
@@ -183,9 +183,9 @@ impl Texture {
     /// The linear value at the given texture coordinates. v = 0 is the bottom row. Non-finite coordinates are
     /// treated as 0.
     pub fn lookup(&self, at: &TexturePoint) -> Vec3 {
-        let tiles = self.tiles(at);
+        let tiles = self.tile_coordinates(at);
         let value = self.lookup_in_tiles(tiles, || self.mip_level(at));
-        self.factor.map_or(value, |factor| factor.of(value))
+        self.factor.map_or(value, |factor| factor.apply(value))
     }
 
     /// The value at the given tile coordinates. `level` is called if the filter uses mip levels.
@@ -202,7 +202,7 @@ impl Texture {
 
     /// Repeated and transformed coordinates, in units of the image size.
     #[inline]
-    fn tiles(&self, at: &TexturePoint) -> DVec2 {
+    fn tile_coordinates(&self, at: &TexturePoint) -> DVec2 {
         let repeat = self.repeat.as_dvec2();
         let Some(moved) = &self.moved else { return at.uv * repeat };
         moved.point(moved.second_uv_point(at).map_or(at.uv, |second| second.uv) * repeat)
@@ -225,7 +225,7 @@ impl Texture {
     /// Slopes of the red channel along u and v. Computed as central differences over one texel of the image,
     /// or of the mip level chosen by the footprint.
     pub fn slopes(&self, at: &TexturePoint) -> Vec2 {
-        let tiles = self.tiles(at);
+        let tiles = self.tile_coordinates(at);
         let level = match (self.filter, &self.mipmaps) {
             (TextureFilter::Mipmap, Some(mipmaps)) => self.mip_level(at).min(mipmaps.count() as f32),
             (TextureFilter::Mipmap | TextureFilter::Nearest | TextureFilter::Bilinear, _) => 0.0,
@@ -248,7 +248,7 @@ impl Texture {
         if self.wrap != Wrap::Mirror {
             return slopes;
         }
-        let tiles = self.tiles(at);
+        let tiles = self.tile_coordinates(at);
         slopes * Vec2::from([tiles.x, tiles.y].map(|tile| mirror_sign(tile) as f32))
     }
 
@@ -272,10 +272,10 @@ impl Texture {
 
     /// [`Texture::lookup`] for a packet, for textures without mip levels.
     #[inline(always)]
-    pub fn lookup_row(&self, uv: &[[f64; PACKET_SIZE]; 2]) -> Vec3x16 {
+    pub fn lookup_packet(&self, uv: &[[f64; PACKET_SIZE]; 2]) -> Vec3x16 {
         let mut row = match &self.moved {
-            None => self.repeated_row(uv, self.repeat.as_dvec2()),
-            Some(moved) => self.transformed_row(moved, uv),
+            None => self.repeated_packet(uv, self.repeat.as_dvec2()),
+            Some(moved) => self.transformed_packet(moved, uv),
         };
         if let Some(factor) = self.factor {
             let (gain, base) = (factor.gain.to_array(), factor.base.to_array());
@@ -289,21 +289,21 @@ impl Texture {
     /// [`Texture::lookup_row`] for textures that have a transform.
     #[cold]
     #[inline(never)]
-    fn transformed_row(&self, moved: &UvTransform, uv: &[[f64; PACKET_SIZE]; 2]) -> Vec3x16 {
-        self.repeated_row(&moved.transform_row(uv, self.repeat.as_dvec2()), DVec2::ONE)
+    fn transformed_packet(&self, moved: &UvTransform, uv: &[[f64; PACKET_SIZE]; 2]) -> Vec3x16 {
+        self.repeated_packet(&moved.transform_packet(uv, self.repeat.as_dvec2()), DVec2::ONE)
     }
 
     /// [`Texture::lookup_row`] at coordinates scaled by `repeat`.
     #[inline(always)]
-    fn repeated_row(&self, uv: &[[f64; PACKET_SIZE]; 2], repeat: DVec2) -> Vec3x16 {
+    fn repeated_packet(&self, uv: &[[f64; PACKET_SIZE]; 2], repeat: DVec2) -> Vec3x16 {
         let (texels, size) = (&*self.texels, size(&self.texels));
-        let folded = [self.wrap.fold_row(&uv[0], repeat.x), self.wrap.fold_row(&uv[1], repeat.y)];
+        let folded = [self.wrap.fold_packet(&uv[0], repeat.x), self.wrap.fold_packet(&uv[1], repeat.y)];
         let extent = extent(texels);
         let (mut first, mut part) = ([[0; PACKET_SIZE]; 2], [[0.0; PACKET_SIZE]; 2]);
         let (shift, count) = match self.filter {
             TextureFilter::Nearest => (0.0, 1),
-            TextureFilter::Bilinear | TextureFilter::Mipmap if texels.is_weighted() => {
-                return self.weighted_row(&folded);
+            TextureFilter::Bilinear | TextureFilter::Mipmap if texels.has_alpha() => {
+                return self.weighted_packet(&folded);
             }
             TextureFilter::Bilinear | TextureFilter::Mipmap => (0.5, 4),
         };
@@ -314,12 +314,12 @@ impl Texture {
                 part[axis][i] = x - x.floor();
             }
         }
-        let columns = self.wrap.index_row(&first[0], 0, extent[0]);
-        let rows = self.wrap.index_row(&first[1], 0, extent[1]);
+        let columns = self.wrap.index_packet(&first[0], 0, extent[0]);
+        let rows = self.wrap.index_packet(&first[1], 0, extent[1]);
         let mut around = [texel_indices(&columns, &rows, extent); 4];
         if count == 4 {
-            let right = self.wrap.index_row(&first[0], 1, extent[0]);
-            let upper = self.wrap.index_row(&first[1], 1, extent[1]);
+            let right = self.wrap.index_packet(&first[0], 1, extent[0]);
+            let upper = self.wrap.index_packet(&first[1], 1, extent[1]);
             around[1] = texel_indices(&right, &rows, extent);
             around[2] = texel_indices(&columns, &upper, extent);
             around[3] = texel_indices(&right, &upper, extent);
@@ -343,17 +343,18 @@ impl Texture {
     pub fn mean(&self) -> Vec3 {
         let last = self.mipmaps.as_ref().and_then(|mipmaps| mipmaps.level(mipmaps.count()));
         let mean = last.map_or_else(|| self.texels.mean(), |last| last.get(0, 0));
-        self.factor.map_or(mean, |factor| factor.of(mean))
+        self.factor.map_or(mean, |factor| factor.apply(mean))
     }
 
     /// The (fractional, nonnegative) mip level at which the footprint is one texel wide.
     fn mip_level(&self, at: &TexturePoint) -> f32 {
         let texels = match &self.moved {
-            None => at.footprint.texels(size(&self.texels) * self.repeat),
+            None => at.footprint.major_axis_texels(size(&self.texels) * self.repeat),
             Some(moved) => {
                 let size = size(&self.texels);
                 let footprint = moved.second_uv_point(at).map_or(&at.footprint, |second| &second.footprint);
-                footprint.longest(|axis| moved.vector((axis * self.repeat).as_dvec2()).as_vec2() * size)
+                footprint
+                    .major_axis_length(|axis| moved.vector((axis * self.repeat).as_dvec2()).as_vec2() * size)
             }
         };
         if texels > 1.0 { log2(texels) } else { 0.0 }
@@ -361,8 +362,8 @@ impl Texture {
 
     fn nearest(&self, [u, v]: [f32; 2]) -> Vec3 {
         let (size, extent) = (size(&self.texels), extent(&self.texels));
-        let column = self.wrap.index(floor(u * size.x), extent[0]);
-        let row = self.wrap.index(floor(v * size.y), extent[1]);
+        let column = self.wrap.wrap_index(floor(u * size.x), extent[0]);
+        let row = self.wrap.wrap_index(floor(v * size.y), extent[1]);
         self.texels.at(texel_index(column, row, extent))
     }
 
@@ -371,8 +372,8 @@ impl Texture {
         let Some((near, far, part)) = self.adjacent_levels(level) else {
             return self.bilinear(&self.texels, folded);
         };
-        if self.texels.is_weighted() {
-            let [near, far] = [near, far].map(|texels| self.weighted(texels, folded));
+        if self.texels.has_alpha() {
+            let [near, far] = [near, far].map(|texels| self.bilinear_premultiplied(texels, folded));
             return unpremultiply(near.lerp(far, part));
         }
         self.bilinear(near, folded).lerp(self.bilinear(far, folded), part)
@@ -395,7 +396,7 @@ impl Texture {
     /// The fraction of the footprint where the red channel is at least `cutoff`. For lookups in the original
     /// image, the fraction is 0 or 1. The mip levels must be computed from [`Texels::threshold`].
     pub fn coverage(&self, at: &TexturePoint, cutoff: f32) -> f32 {
-        let tiles = self.tiles(at);
+        let tiles = self.tile_coordinates(at);
         let folded =
             [self.wrap.fold(finite_or_zero(tiles.x)) as f32, self.wrap.fold(finite_or_zero(tiles.y)) as f32];
         let cut = |value: f32| f32::from(u8::from(value >= cutoff));
@@ -413,7 +414,7 @@ impl Texture {
     /// Bilinear lookups for a packet in texels with alpha.
     #[cold]
     #[inline(never)]
-    fn weighted_row(&self, folded: &[F32x16; 2]) -> Vec3x16 {
+    fn weighted_packet(&self, folded: &[F32x16; 2]) -> Vec3x16 {
         let mut colors = [[0.0; PACKET_SIZE]; 3];
         for i in 0..PACKET_SIZE {
             let color = self.bilinear(&self.texels, [folded[0][i], folded[1][i]]);
@@ -425,15 +426,15 @@ impl Texture {
     /// Bilinear interpolation of premultiplied texels and their alpha.
     #[cold]
     #[inline(never)]
-    fn weighted(&self, texels: &Texels, folded: [f32; 2]) -> Vec4 {
+    fn bilinear_premultiplied(&self, texels: &Texels, folded: [f32; 2]) -> Vec4 {
         let (places, [fx, fy]) = self.corners(texels, folded);
-        let corners = places.map(|place| texels.weighted(place));
+        let corners = places.map(|place| texels.premultiplied(place));
         corners[0].lerp(corners[1], fx).lerp(corners[2].lerp(corners[3], fx), fy)
     }
 
     fn bilinear(&self, texels: &Texels, folded: [f32; 2]) -> Vec3 {
-        if texels.is_weighted() {
-            return unpremultiply(self.weighted(texels, folded));
+        if texels.has_alpha() {
+            return unpremultiply(self.bilinear_premultiplied(texels, folded));
         }
         let (places, [fx, fy]) = self.corners(texels, folded);
         let corners = texels.gather(&places);
@@ -497,7 +498,7 @@ fn size(texels: &Texels) -> Vec2 {
 impl Wrap {
     /// Multiplies coordinates by `repeat` and folds them into [0, 1].
     #[inline(always)]
-    fn fold_row(self, x: &[f64; PACKET_SIZE], repeat: f64) -> F32x16 {
+    fn fold_packet(self, x: &[f64; PACKET_SIZE], repeat: f64) -> F32x16 {
         let mut folded = [0.0; PACKET_SIZE];
         macro_rules! by {
             ($wrap:expr) => {
@@ -516,12 +517,12 @@ impl Wrap {
 
     /// Wraps `numbers` + `more` with [`Wrap::index`].
     #[inline(always)]
-    fn index_row(self, numbers: &[i32; PACKET_SIZE], more: i32, size: i32) -> [i32; PACKET_SIZE] {
+    fn index_packet(self, numbers: &[i32; PACKET_SIZE], more: i32, size: i32) -> [i32; PACKET_SIZE] {
         let mut indices = [0; PACKET_SIZE];
         macro_rules! by {
             ($wrap:expr) => {
                 for i in 0..PACKET_SIZE {
-                    indices[i] = $wrap.index(numbers[i] + more, size);
+                    indices[i] = $wrap.wrap_index(numbers[i] + more, size);
                 }
             };
         }
@@ -549,12 +550,12 @@ impl Wrap {
     /// An index and its successor, both wrapped.
     #[inline(always)]
     fn neighbor_indices(self, first: i32, size: i32) -> [i32; 2] {
-        [self.index(first, size), self.index(first + 1, size)]
+        [self.wrap_index(first, size), self.wrap_index(first + 1, size)]
     }
 
     /// Wraps an index in the range −1 to `size`.
     #[inline(always)]
-    fn index(self, i: i32, size: i32) -> i32 {
+    fn wrap_index(self, i: i32, size: i32) -> i32 {
         match self {
             Self::Repeat => i + if i < 0 { size } else { 0 } - if i >= size { size } else { 0 },
             // Mirroring also repeats the border texel.
@@ -665,7 +666,7 @@ mod tests {
         assert_eq!(texture.lookup(&at), plain.lookup(&at) * factor);
         assert_eq!((texture.mean(), texture.slopes(&at)), (plain.mean() * factor, plain.slopes(&at)));
         let uv = [[0.3; PACKET_SIZE], [0.6; PACKET_SIZE]];
-        let [row, before] = [&texture, &plain].map(|one| lane(&one.lookup_row(&uv), 3));
+        let [row, before] = [&texture, &plain].map(|one| lane(&one.lookup_packet(&uv), 3));
         assert_eq!(row, before * factor);
     }
 
@@ -738,7 +739,7 @@ mod tests {
                         for first in 0..60 {
                             let u = std::array::from_fn(|i| number(first + i));
                             let v = std::array::from_fn(|i| number(first + 5 * i));
-                            let row = texture.lookup_row(&[u, v]);
+                            let row = texture.lookup_packet(&[u, v]);
                             for i in 0..PACKET_SIZE {
                                 let alone = texture.lookup(&TexturePoint::sharp(DVec2::new(u[i], v[i])));
                                 assert_eq!(lane(&row, i), alone, "{filter:?} {wrap:?} {} {}", u[i], v[i]);
@@ -750,7 +751,7 @@ mod tests {
         }
     }
 
-    /// Creates the mip levels of an image.
+    /// Creates an image's mip levels.
     fn levels(image: &Texels) -> Option<Arc<Mipmaps>> {
         let halved = |level: &Texels| -> Result<Texels, ()> {
             let halving = ImageHalver::new(level);
@@ -789,7 +790,7 @@ mod tests {
             }
             let texture = Texture { mipmaps: None, ..row(2, data, TextureFilter::Bilinear) };
             let uv = [std::array::from_fn(|i| i as f64 / 15.0), [0.5; PACKET_SIZE]];
-            let lanes = texture.lookup_row(&uv);
+            let lanes = texture.lookup_packet(&uv);
             for i in 0..PACKET_SIZE {
                 let alone = texture.lookup(&TexturePoint::sharp(DVec2::new(uv[0][i], 0.5)));
                 assert_eq!(lane(&lanes, i), alone, "{i}");

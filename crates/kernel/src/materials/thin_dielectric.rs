@@ -13,7 +13,7 @@ pub struct ThinDielectric {
 }
 
 impl ThinDielectric {
-    /// Reflectance for a cosine of the angle of incidence. It is 2R/(1 + R), where R is the reflectance of
+    /// Reflectance at the given cosine of the incident angle. It is 2R/(1 + R), where R is the reflectance of
     /// one side. This includes all reflections between the two sides.
     #[inline]
     pub fn reflectance(&self, cosine: f32) -> f32 {

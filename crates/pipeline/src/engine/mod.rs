@@ -127,7 +127,7 @@ pub(super) struct Engine {
     query_context: Option<QueryContext>,
     /// The last valid scene, with the files it references.
     good: Option<LastValidScene>,
-    /// Pixels per second measured for the most recent first image.
+    /// Rendering rate of the most recent first image, in pixels per second.
     coarse_rate: Cell<Option<f64>>,
     pool: Option<Arc<ThreadPool>>,
     /// Assets of the last valid scene, which are watched while the scene file is broken.
@@ -140,7 +140,7 @@ pub(super) struct Engine {
     checkpoint_lock: RefCell<CheckpointLock>,
 }
 
-/// Maximum number of attempts to read all of the scene's files before any of them changes.
+/// Maximum number of attempts to read all of the scene's files without any of them changing meanwhile.
 const MAX_READS: usize = 16;
 
 /// A scene that is ready to be rendered.
@@ -152,11 +152,11 @@ struct Ready {
     /// Key of all surfaces, lights and textures. It does not depend on `origin`.
     surfaces: Key,
     origin: DVec3,
-    /// Key of the film.
+    /// The film's key.
     film: Key,
     texels_loaded: u64,
     texture_memory_bytes: u64,
-    /// Share of the image that this process renders. `None` for the whole image.
+    /// The part of the image that this process renders. `None` for the whole image.
     share: Option<Shard>,
 }
 
@@ -635,7 +635,7 @@ impl Engine {
         rendered
     }
 
-    /// Returns a pool with the given number of threads, reusing the current pool if it has that many.
+    /// Returns a pool with `threads` threads, reusing the current pool if it has that many.
     fn thread_pool(&mut self, threads: usize) -> Result<Arc<ThreadPool>, Stop> {
         if let Some(pool) = self.pool.as_ref().filter(|pool| pool.current_num_threads() == threads) {
             return Ok(pool.clone());

@@ -26,11 +26,11 @@ pub(crate) trait PendingOrders {
     fn wants_write(&self) -> bool;
     /// Like [`Self::wants_write`], but clears the order.
     fn take_write(&self) -> bool;
-    /// Takes the pending change of the preview size.
+    /// Takes the pending preview size change.
     fn take_preview(&self) -> Option<Option<PreviewSize>>;
     /// Takes the next query about the current image.
     fn take_query(&self) -> Option<Query>;
-    /// Returns why the cancelled render is being interrupted.
+    /// Returns the reason for interrupting the render.
     fn interruption(&self) -> Interruption;
 }
 

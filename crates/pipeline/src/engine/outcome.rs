@@ -22,7 +22,7 @@ pub struct Rendered {
     pub report: Box<Report>,
     /// Likely mistakes in the scene.
     pub warnings: Vec<Diagnostic>,
-    /// Key covering everything that affects the image, except the number of samples.
+    /// Key that covers everything that affects the image except the number of samples.
     pub key: Key,
 }
 

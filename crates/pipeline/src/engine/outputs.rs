@@ -96,8 +96,8 @@ impl Engine {
         Ok(())
     }
 
-    /// Writes the report after an image has been written because the user pressed a key. If the render is
-    /// unfinished, removes the outdated report instead.
+    /// Writes the report for an image that was written at the user's request. If the render is unfinished,
+    /// removes the outdated report instead.
     fn report_written_image(&self, sink: &Sink) {
         let Some(plan) = &self.plan else { return };
         let Some(report) = &self.report else { return remove_outdated_report(plan, &self.inputs, sink) };

@@ -1,5 +1,5 @@
-//! The scene's own image: the saved scene with the command-line overrides. While the user views other images
-//! by changing settings with keys, the own image's film, checkpoint and files are kept.
+//! The scene's own image, which is the saved scene rendered with the command-line overrides. While the user
+//! views other images by changing settings with keys, the film, checkpoint and files of this image are kept.
 
 use std::sync::Arc;
 
@@ -90,8 +90,8 @@ impl Engine {
     }
 
     /// Checks a request's memory use. If the request shows another image, the film of the scene's own image
-    /// also counts. If the two films do not both fit, the own film may be dropped, provided that its image has
-    /// been written.
+    /// also counts. If the two films do not fit together, the film of the scene's own image may be dropped,
+    /// provided that this image has been written.
     ///
     /// # Errors
     /// The request needs more memory than is available.

@@ -28,7 +28,7 @@ use crate::stages::containers::Containers;
 /// Where the generated scene's meshes and images are stored.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum ExportNaming {
-    /// In the glTF file and the files referenced by it.
+    /// In the glTF file and the files it references.
     Inside,
     /// In separate files in this folder, next to the scene.
     Folder(String),

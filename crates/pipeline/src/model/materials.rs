@@ -8,7 +8,7 @@ use crate::assets::gltf::{Alpha, ModelMaterial, ModelScene, TextureRef, TextureW
 use crate::math::{DVec3, Vec2};
 use crate::scene::toml_string;
 
-/// The scene text and image files, as needed for writing materials.
+/// Access to the scene text and image files while materials are being written.
 pub(super) trait ExportFiles {
     /// The scene text.
     fn toml(&mut self) -> &mut TomlWriter;

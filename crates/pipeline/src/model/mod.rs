@@ -26,13 +26,14 @@ use crate::scene::fingerprint::FingerprintHasher;
 /// View of a model, as requested on the command line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ModelView {
-    /// Side facing the camera. `None` uses the camera from the file, or [`Side::Iso`] if there is none.
+    /// Side facing the camera. `None` uses the camera from the file, or [`Side::Iso`] if the file has no
+    /// camera.
     pub(crate) from: Option<Side>,
     /// Aspect ratio of the image. `None` if the command line sets neither width nor height.
     pub(crate) aspect: Option<f64>,
     /// Up axis of a mesh file. `None` uses the format's default.
     pub(crate) up: Option<UpAxis>,
-    /// Number of turntable frames. The model must fit in all of them. It is 1 for a still image.
+    /// Number of turntable frames, or 1 for a still image. The model must fit in all of them.
     pub(crate) turns: u32,
 }
 
@@ -86,7 +87,7 @@ pub(crate) struct ModelText {
     pub(crate) hash: FileHash,
     /// Other files that affect the text.
     pub(crate) companions: Vec<Companion>,
-    /// Approximations, one message each.
+    /// Messages about approximations.
     pub(crate) notes: Vec<String>,
     /// Files referenced by the text that do not exist yet.
     pub(crate) assets: Vec<ExportedFile>,
@@ -131,7 +132,7 @@ const CLAMP: &str = "2";
 /// Roughness above which surfaces do not cause fireflies. At 64 samples, clamping changes the error by a
 /// quarter for roughness 0.4, but by a factor of ten for 0.2.
 const ROUGH: f64 = 0.3;
-/// Phong exponent whose highlight is as narrow as a GGX lobe with roughness [`ROUGH`]: 2/α² − 2 with α =
+/// Phong exponent with a highlight as narrow as a GGX lobe of roughness [`ROUGH`]: 2/α² − 2 with α =
 /// roughness².
 const NARROW: f32 = 245.0;
 
@@ -151,7 +152,7 @@ enum Lighting {
 }
 
 impl Lighting {
-    /// Lighting that uses the lights from the file, given their irradiance on the model.
+    /// Lighting with the lights from the file. `irradiance` is their irradiance on the model.
     fn from_file(irradiance: f64) -> Self {
         // With this irradiance, a white surface is as bright as with the default lights.
         const USUAL: f64 = 3.0;

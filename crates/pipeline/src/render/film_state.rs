@@ -24,7 +24,7 @@ pub(crate) struct FilmState {
     /// Serial number, assigned by the film cache.
     pub(crate) number: u64,
     pub(crate) film: Arc<Film>,
-    /// Samples taken in both halves of each cell. [`u32::MAX`] for cells that are not rendered.
+    /// Number of samples taken in each half of each cell. [`u32::MAX`] for cells that are not rendered.
     pub(crate) done: Vec<[u32; 2]>,
     /// Number of rays traced in each cell.
     pub(crate) rays: Vec<u64>,
@@ -32,9 +32,9 @@ pub(crate) struct FilmState {
     pub(super) seconds: f64,
     /// Recent sample cost in each cell.
     costs: Vec<CellCost>,
-    /// Per-pixel overhead of a job, excluding its samples.
+    /// Per-pixel overhead of a job, in addition to the cost of its samples.
     pixel_share: PixelOverhead,
-    /// Maximum number of samples for both halves of each cell.
+    /// Maximum number of samples for each half of each cell.
     pub(crate) goals: SampleGoals,
     /// Expected number of samples for halves without a goal.
     expected: ExpectedSamples,
@@ -267,7 +267,7 @@ impl FilmState {
         jobs
     }
 
-    /// Records a finished job and its cost. Returns the job's number of pixels times samples.
+    /// Records a finished job and its cost. Returns the number of pixels times samples in the job.
     pub(crate) fn record_job(&mut self, job: &TileJob, cost: &TraceCost) -> u64 {
         let (rays, seconds) = (cost.rays.all(), cost.seconds / job.pixels.rect.area() as f64);
         for cell in CELLS * job.tile..CELLS * (job.tile + 1) {
@@ -287,7 +287,7 @@ impl FilmState {
         job.pixel_count() * job.samples.len() as u64
     }
 
-    /// Decides which of the tiles with `samples` samples, a power of two, have enough.
+    /// Decides which tiles with `samples` samples (a power of two) need no more.
     pub(crate) fn decide_goals(&mut self, samples: u32, error: f64) {
         if let Some(judgement) = self.goals.decide_goals(&self.film, &self.done, samples, error) {
             self.expected.predict(&judgement, &self.goals, &self.done);

@@ -22,7 +22,7 @@ pub(crate) struct CoarseImages<'a> {
     pub(crate) plan: &'a Plan,
     /// Whether the camera is being moved.
     pub(crate) is_moved: bool,
-    /// Pixels per second measured for the most recent first image.
+    /// Rendering rate of the most recent first image, in pixels per second.
     pub(crate) rate: &'a Cell<Option<f64>>,
 }
 
@@ -164,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn hasty_image_fits_its_time_budget() {
+    fn first_image_fits_its_time_budget() {
         let pixels_of = |rate: f64| size_within_budget((120, 80), rate / MOVING_TIME_BUDGET.as_secs_f64());
         assert_eq!(pixels_of(9600.0), None, "the usual size should be fast enough");
         assert_eq!(pixels_of(2400.0), Some((60, 40)));

@@ -1,4 +1,4 @@
-//! Decides from the noise when each part of an image has enough samples.
+//! Decides, based on noise, when each part of an image has enough samples.
 //!
 //! If a tile's own samples decided when to stop, the image would be too dark: sampling would stop early in
 //! tiles that missed rare bright samples, and continue in tiles that found them. Each half of a tile (every
@@ -21,16 +21,16 @@ pub(crate) const AIM: f64 = 0.85;
 /// measurement error.
 const TOO_MUCH: f64 = 1.5;
 
-/// Maximum number of expected samples. [`u32::MAX`] means unknown.
+/// Upper limit for the expected number of samples. [`u32::MAX`] means unknown.
 pub(crate) const MOST: u32 = u32::MAX - 1;
 
 /// Minimum reference brightness for relative noise, as a fraction of the image's mean luminance.
 const LEAST_BRIGHTNESS: f64 = 0.01;
 
-/// Maximum number of samples for both halves of each cell.
+/// Maximum number of samples for each half of each cell.
 #[derive(Debug)]
 pub(crate) struct SampleGoals {
-    /// Goals of both halves of each cell. [`u32::MAX`] while undecided.
+    /// Goal of each half of each cell. [`u32::MAX`] while undecided.
     pub(super) decided: Vec<[u32; 2]>,
     /// Sample count at which each tile was last judged. Tiles are judged only once per sample count.
     pub(super) judged: Vec<u32>,
@@ -59,7 +59,7 @@ impl SampleGoals {
         self.decided.as_flattened().iter().any(|goal| *goal < samples)
     }
 
-    /// Decides the goals of undecided halves with `samples` samples, a power of two, based on the noise in
+    /// Decides the goals of undecided halves with `samples` samples (a power of two), based on the noise in
     /// the other half. `done` is the number of samples in each half. Decides nothing until all halves have
     /// enough samples to estimate the image's brightness. Runs in parallel within a thread pool.
     pub(crate) fn decide_goals(
@@ -214,7 +214,7 @@ pub(crate) mod tests {
     use crate::math::Vec3;
     use crate::math::random::unit;
 
-    /// Creates a one-tile film. Each half's samples have a given mean and spread.
+    /// Creates a one-tile film. `halves` contains the mean and spread of each half's samples.
     pub(crate) fn film(halves: [(f32, f32); 2], samples: u32) -> Film {
         const COLUMNS: u32 = 32;
         let film = Film::new(COLUMNS, 2, None).expect("a film");

@@ -45,14 +45,14 @@ pub(crate) struct RenderStageInputs<'a> {
     /// Section to render first.
     pub(crate) first: Option<Section>,
     pub(crate) sink: &'a Sink,
-    /// Handles orders during the render. Called often, with the current film and whether every pixel has a
-    /// sample.
+    /// Handles orders during the render. Called often. The arguments are the current film and whether every
+    /// pixel has a sample.
     pub(crate) pulse: &'a dyn Fn(&FilmState, bool),
     /// Takes a pending order to change the preview size.
     pub(crate) take_preview: &'a dyn Fn() -> Option<Option<PreviewSize>>,
     /// Whether the camera is being moved. If so, the first image must appear quickly, even if it is small.
     pub(crate) is_moved: bool,
-    /// Pixels per second measured for the most recent first image.
+    /// Rendering rate of the most recent first image, in pixels per second.
     pub(crate) coarse_rate: &'a Cell<Option<f64>>,
     /// Share of the image to render. `None` for the whole image.
     pub(crate) share: Option<Shard>,
@@ -267,7 +267,7 @@ impl<'a> Scheduler<'a> {
         Ok(())
     }
 
-    /// Traces photons for the given samples while handling orders.
+    /// Traces photons for these samples while handling orders.
     fn trace_photons(&mut self, photons: &PhotonStore, samples: Range<u32>) -> Result<PhotonMaps, Stop> {
         let RenderStageInputs { plan, sink, tracer, .. } = *self.rendering;
         let Tracer { pool, world, token, .. } = tracer;

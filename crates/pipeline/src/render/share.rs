@@ -21,7 +21,7 @@ pub(crate) struct Shard {
     pub(crate) samples: u32,
     /// Sample blocks in this share. `None` if the share has all samples of its tiles.
     blocks: Option<Vec<u32>>,
-    /// This share's index among the shares that divide the tiles, and the number of these shares.
+    /// Shard index and shard count for dividing tiles, among the shards with the same sample blocks.
     of_tiles: (u32, u32),
 }
 

@@ -14,7 +14,8 @@ use crate::film::Film;
 /// Minimum number of samples for noise estimates.
 const LEAST: u32 = 16;
 
-/// Minimum number of samples per pixel, as a fraction of the mean. Each pixel's noise is estimated from them.
+/// Minimum number of samples per pixel, as a fraction of the mean. Each pixel's noise is estimated from these
+/// samples.
 const SHARE: f64 = 1.0 / 8.0;
 
 /// Work done in a round, relative to all earlier work. Noise is measured again before the next round.
@@ -53,7 +54,7 @@ struct HalfCell {
     half: usize,
     pixels: f64,
     samples: u32,
-    /// Next number of samples.
+    /// Number of samples after the next round.
     goal: u32,
     /// Sum of the pixels' squared errors with one sample each.
     error: f64,
@@ -126,7 +127,7 @@ mod tests {
         film.add(cell / CELLS, &TileSamples { pixels, samples, radiance, negative: None });
     }
 
-    /// Creates a row of cells. The samples of each half are around 1, with a given spread.
+    /// Creates a row of cells. Each half's samples have a mean of about 1 and a spread from `spreads`.
     fn film(spreads: &[[f32; 2]], samples: u32) -> (Film, Vec<[u32; 2]>) {
         let film = Film::new(SIDE * spreads.len() as u32, SIDE, None).expect("a film");
         let mut next = unit(7);

@@ -50,7 +50,7 @@ pub(crate) fn lights(
     })
 }
 
-/// Describes the light tree of a scene with too many lights to sample all of them.
+/// Describes the light tree for a scene with too many lights to sample all of them.
 fn describe_light_tree(which: &str, lights: &Lights) -> String {
     format!(", {which}; light tree {} kB", lights.memory_bytes().div_ceil(1000))
 }

@@ -21,7 +21,7 @@ use crate::scene::{LoadedScene, MeshBounds};
 #[derive(Debug)]
 pub(crate) struct CachedMesh {
     pub(crate) mesh: Arc<LoadedMesh>,
-    /// Key of the contents of all files that the mesh depends on.
+    /// Key that covers the contents of all files that the mesh depends on.
     pub(crate) key: Key,
     companions: Vec<FileRead>,
     /// Bounds of the mesh, computed on demand.
@@ -224,7 +224,7 @@ fn load_one(
     Ok(LoadedAsset { files, result })
 }
 
-/// Whether a file that was missing when the mesh was loaded now exists and has not been seen by this request.
+/// Whether a file that was missing when the mesh was loaded now exists but has not been seen by this request.
 fn has_companion_appeared(
     companions: &[Companion],
     reading: &FileReadContext<'_>,
@@ -396,7 +396,7 @@ mod tests {
             (meshes[0].clone(), findings.files)
         }
 
-        /// Loads the meshes of a scene that contains the given tables.
+        /// Loads the meshes of a scene that contains `tables`.
         fn find(&mut self, tables: &str, contents: &Snapshot) -> (Meshes, Findings) {
             let camera = "[camera]\nposition = [0, 0, 4]\nlook_at = [0, 0, 0]\n";
             self.write("scene.toml", &format!("{tables}{camera}"));

@@ -90,7 +90,7 @@ pub(super) struct FileReadContext<'a> {
 /// Files, errors and warnings found by a request.
 #[derive(Debug)]
 pub(super) struct Findings {
-    /// Point in time before the first read.
+    /// A time before the first read.
     pub(super) begun: Instant,
     /// All files that the request tried to read, without duplicates.
     pub(super) files: Vec<FileRead>,

@@ -42,7 +42,7 @@ pub(crate) struct Parsed {
 pub(crate) struct SceneSource<'a> {
     /// Path of a scene file or model.
     pub(crate) path: &'a Path,
-    /// Overrides of scene keys from the command line.
+    /// Scene key overrides from the command line.
     pub(crate) sets: &'a [String],
     /// View of a model.
     pub(crate) show: ModelView,
@@ -179,7 +179,7 @@ fn read_scene(
     Ok((Arc::new(loaded), content, companions, notes))
 }
 
-/// Returns the key of a scene, given the content of its file.
+/// Returns the key of a scene whose file has this content.
 fn scene_key(SceneSource { path, sets, show }: SceneSource<'_>, content: Content, is_model: bool) -> Key {
     let mut key = FingerprintHasher::new("parse");
     content.add_to(key.path(path));
@@ -247,7 +247,7 @@ fn has_material_files(path: &Path) -> bool {
 
 type Orbiter = (Option<OrbiterCamera>, Option<Content>);
 
-/// Reads the camera's orbiter file, if any. Adds errors to the findings.
+/// Reads the camera's orbiter file, if it has one. Adds errors to the findings.
 fn orbiter(
     loaded: &scene::LoadedScene,
     known: Option<&Parsed>,

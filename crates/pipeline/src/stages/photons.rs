@@ -88,7 +88,7 @@ impl PhotonStore {
         if self.emits_photons() && passes > 0 { seconds / passes as f64 } else { 0.0 }
     }
 
-    /// Returns the maps for the given samples. Calls `tick` regularly.
+    /// Returns the maps for these samples. Calls `tick` regularly.
     ///
     /// # Errors
     /// Returns [`Cancelled`] if the token is cancelled.

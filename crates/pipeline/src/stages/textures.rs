@@ -249,7 +249,7 @@ pub(crate) fn textures(
     Ok(loading_result(textures, FileCounts { left_out: *left_out, ..counts }))
 }
 
-/// Warns about an unreadable image of a model and replaces it with a constant. The material's factors are
+/// Warns about an unreadable image in a model and replaces it with a constant. The material's factors are
 /// preserved, except that emission is dropped. Materials from mesh files provide their own values for use
 /// without a texture.
 fn substitute_texture(
@@ -464,7 +464,7 @@ fn memory_limit_errors(sizes: &[u64], most_bytes: u64) -> Vec<Option<String>> {
     sizes.iter().map(check).collect()
 }
 
-/// Content of a texture's file, and the image file that it references if it is a glTF file.
+/// Content of a texture's file. If this is a glTF file, also contains the image file that it references.
 type TextureContents = (Content, Option<FileRead>);
 
 /// An image, its mipmaps, and whether both were cached.

@@ -166,7 +166,7 @@ impl Bench {
         event
     }
 
-    /// Receives all events until the given generation ends.
+    /// Receives all events until generation `of` ends.
     pub(super) fn until_end(&self, of: u64) -> Vec<Event> {
         let mut events = Vec::new();
         loop {

@@ -276,7 +276,7 @@ fn toggled_image_is_not_written_if_scene_is_broken() {
     assert!(keys.0.picture() == own);
 }
 
-/// Renders later samples slowly enough to send another request meanwhile.
+/// Renders later samples so slowly that another request can be sent in the meantime.
 fn slow(
     photons: Option<&crate::integrators::PhotonMaps>,
     world: &crate::world::World,
@@ -412,7 +412,7 @@ fn last_valid_image_removes_outdated_report() {
     assert!(bench.picture() != earlier && !report.exists());
 }
 
-/// Returns the memory in bytes needed to render the scene with the given overrides.
+/// Returns the memory, in bytes, needed to render the scene with these overrides.
 fn estimate_memory(keys: &ToggledBench, overrides: &Overrides) -> u64 {
     crate::check::estimate_memory(&keys.0.path("scene.toml"), overrides).expect("a scene")
 }

@@ -435,7 +435,7 @@ fn broken_scene_keeps_its_assets() {
 }
 
 #[test]
-fn file_missing_from_broken_scene_is_watched() {
+fn missing_file_of_broken_scene_is_watched() {
     let mut bench = Bench::new(&SCENE.replace("one.obj", "later.obj"));
     let of = bench.send();
     let files: Vec<PathBuf> = bench

@@ -69,7 +69,7 @@ const BUMPY: &str = "[textures.bumps]\nfile = \"bumps.ppm\"\n[textures.glow]\nfi
 
 const AMBIENT: &str = "\nambient = [0.1, 0.1, 0.1]";
 
-/// Creates a bench with the files used by [`BUMPY`] and the given view.
+/// Creates a bench for this view with the files used by [`BUMPY`].
 fn bumpy(scene: &str, view: View) -> Bench {
     let mut bench = Bench::new(scene);
     bench.write("bumps.ppm", "P6\n2 1\n255\n\x7f\x7f\x7f\x7f\x7f\x7f");

@@ -113,13 +113,13 @@ impl Snapshot {
         Ok(self.seen().entry(path.to_owned()).or_insert(Seen { content, stamp }).content)
     }
 
-    /// Returns a file's content, given the hash of its decoded bytes. Records a change if the content differs
-    /// from what this request has seen before.
+    /// Returns the content of a file whose decoded bytes have this hash. Records a change if the content
+    /// differs from what this request has seen before.
     pub(crate) fn decoded(&self, path: &Path, hash: FileHash) -> Content {
         self.decoded_with_stamp(path, hash, None)
     }
 
-    /// Like [`Snapshot::decoded`], given the file's stamp before it was read.
+    /// Like [`Snapshot::decoded`], but takes the file's stamp from before it was read.
     fn decoded_with_stamp(&self, path: &Path, hash: FileHash, stamp: Option<FileStamp>) -> Content {
         let content = Content::Hash(hash);
         if self.seen().entry(path.to_owned()).or_insert(Seen { content, stamp }).content != content {

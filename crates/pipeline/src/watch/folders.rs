@@ -35,7 +35,7 @@ pub(super) struct WatchedFolders {
     watched: HashMap<PathBuf, Identity>,
 }
 
-/// A folder's device and inode, which differ if another folder takes its name.
+/// A folder's device and inode, which change if another folder takes its name.
 type Identity = (u64, u64);
 
 fn identity(folder: &Path) -> Option<Identity> {
@@ -72,7 +72,7 @@ impl WatchedFolders {
         self.watcher.is_some() && self.watched.len() == self.wanted.len()
     }
 
-    /// Watches the folders of the given files and of symbolic link targets.
+    /// Watches the folders that contain the files or the targets of symbolic links.
     pub(super) fn set<'a>(&mut self, files: impl Iterator<Item = &'a PathBuf>) {
         let mut folders = HashSet::new();
         let mut names = HashSet::new();

@@ -45,7 +45,7 @@ pub(super) struct WatchDelays {
     quiet: Duration,
     /// Like `quiet`, but for a missing or empty file, which is probably being replaced.
     quiet_missing: Duration,
-    /// Maximum time by which a check may be delayed.
+    /// Maximum time between a hint and the resulting check.
     longest: Duration,
     /// Time without hints after which files count as settled. Programs that write a file in two steps take
     /// only a fraction of this time.
@@ -149,7 +149,7 @@ impl Watcher {
     }
 
     /// Sets the files to watch: `read`, which were read after `since`, and `before`, which were read earlier.
-    /// A file counts as changed if its content differs from the given content, unless a change has been
+    /// A file counts as changed if its content differs from the specified content, unless a change has been
     /// reported since the file was read.
     pub fn set_files(&self, read: Vec<FileRead>, before: Vec<FileRead>, since: Instant) {
         let _ = self.orders.send(Message::Files(read, before, since));

@@ -27,7 +27,7 @@ impl ExternalChange {
     }
 }
 
-/// A change to a file written by glimt, or the restoration of such a file.
+/// A change to a file written by glimt, or the restoration of its original content.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct OutputChange {
     /// Path of the file.

@@ -18,7 +18,7 @@ struct Scratch {
 }
 
 impl Scratch {
-    /// Creates and watches `a.toml` with the content `0`.
+    /// Creates `a.toml` with the content `0` and watches it.
     fn new(poll: bool) -> Self {
         Self::with(poll, WatchDelays::default())
     }

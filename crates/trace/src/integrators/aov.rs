@@ -49,7 +49,7 @@ pub fn shade_aov(
     Ok(())
 }
 
-/// Number of photons within the kernels around a vertex, in a sample's photon pass.
+/// Counts the photons within the kernels around a vertex, using the sample's photon pass.
 fn count_photons(maps: &PhotonMaps, tile: &TileContext<'_>, slot: u32, vertex: &Vertex<'_>) -> f32 {
     let look = GatherPoint { point: vertex.surface.point, normal: vertex.normal, most_depth: u32::MAX };
     let (_, _, sample) = tile.block.sample_of(slot);

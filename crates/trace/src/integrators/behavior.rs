@@ -15,15 +15,15 @@ pub struct PathBehavior {
     pub scatters: bool,
     /// Whether paths continue in microfacet lobes but end at other non-specular surfaces.
     pub mirrors: bool,
-    /// Whether photons are gathered at non-specular surfaces. If so, paths ignore lights that they hit via
-    /// mirrors and glass.
+    /// Whether photons are gathered at non-specular surfaces. If so, a path that hits a light via mirrors or
+    /// glass ignores this light.
     pub gathers: bool,
     /// How lights are sampled.
     pub receivers: SamplingMode,
 }
 
 impl PathBehavior {
-    /// The behavior for these settings, with or without photon maps.
+    /// Derives the path behavior from the settings and from whether there are photon maps.
     pub fn of(settings: &RenderSettings, has_photons: bool) -> Self {
         let Method { splits, scatters, gathers, .. } = settings.render.integrator.method();
         let gathers = gathers && has_photons;
@@ -45,7 +45,7 @@ impl PathBehavior {
     }
 }
 
-/// How lights are sampled with these settings, with or without photons.
+/// Returns how lights are sampled, given the settings and whether photons are gathered.
 pub fn light_sampling_mode(settings: &RenderSettings, are_gathered: bool) -> SamplingMode {
     PathBehavior::of(settings, are_gathered).receivers
 }

@@ -1,4 +1,4 @@
-//! Overlay of the acceleration structures' bounding boxes, drawn as lines.
+//! Overlay that draws the acceleration structures' bounding boxes as lines.
 
 use super::transport::scratch::TraceBuffers;
 use super::transport::tile::TileContext;
@@ -55,8 +55,8 @@ pub fn draw_box_edges(
     Ok(())
 }
 
-/// The box edge to draw for a ray. Edges in front of the surface at `end` take priority over edges behind it,
-/// and then larger boxes over smaller boxes.
+/// The box edge to draw for a ray. Edges in front of the surface at `end` take priority over edges behind it.
+/// Otherwise, larger boxes take priority over smaller boxes.
 fn nearest_edge(tile: &TileContext<'_>, ray: &Ray, end: f32, spread: f32) -> Option<BoxEdge> {
     let mut best: Option<BoxEdge> = None;
     tile.world.geometry.visit_nodes(ray, |local, TreeNode { bounds, depth, .. }, stretch| {

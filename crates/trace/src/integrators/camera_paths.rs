@@ -38,7 +38,8 @@ use crate::math::lanes::lane as lane_of;
 use crate::scene::description::Shadows;
 use crate::world::{Hit, PACKET_SIZE};
 
-/// Minimum contribution of the weaker branch for a path to split. Below it, one branch is chosen at random.
+/// A path splits only if its weaker branch contributes at least this much. Otherwise, one branch is chosen at
+/// random.
 const MIN_SPLIT: f32 = 0.01;
 
 /// Number of rays between checks of the cancel token.
@@ -124,7 +125,7 @@ struct CameraWavefront<'a, 's> {
     /// How paths continue at diffuse and glossy surfaces. `None` if they end at these surfaces.
     continuation: Option<Continuation>,
     tile: &'a TileContext<'a>,
-    /// Photon maps of the samples. `None` if no photons are gathered.
+    /// Photon maps for the samples. `None` if no photons are gathered.
     maps: Option<&'a PhotonMaps>,
     /// This bounce's vertices that await direct lighting.
     direct: &'a mut DirectLightQueue,
@@ -290,7 +291,8 @@ impl CameraWavefront<'_, '_> {
                 }
             }
         }
-        // Select the rays that hit a light or escape to one, and the rays that must be shaded one by one.
+        // Select the rays that hit a light or escape to an infinite light, and the rays that must be shaded
+        // one by one.
         let render = &tile.settings.render;
         let all = ((1_u64 << rays.count()) - 1) as u32;
         let plain = if render.ambient == Vec3::ZERO { packet.shining } else { packet.plain };
@@ -353,7 +355,7 @@ impl CameraWavefront<'_, '_> {
         }
     }
 
-    /// Adds the emission and ambient light of a plain surface.
+    /// Adds a plain surface's emission and ambient light.
     fn add_local_light(&mut self, path: &PathRay, hit: &Hit, is_shining: bool) {
         let index = self.tile.world.material_index(hit);
         let Some((material, _)) = self.tile.plain_material(index) else { return };
@@ -367,7 +369,8 @@ impl CameraWavefront<'_, '_> {
         }
     }
 
-    /// Adds the emission that a path hits, multiplied by its MIS weight. Light samples contribute the rest.
+    /// Adds the emission found by a path, multiplied by the path's MIS weight. Light samples contribute the
+    /// rest.
     fn add_emitted(&mut self, path: &PathRay, radiance: Vec3, weight: f32) {
         if self.is_light_counted_elsewhere(path) {
             return;
@@ -379,7 +382,7 @@ impl CameraWavefront<'_, '_> {
         }
     }
 
-    /// Whether another technique accounts for the light that a path hits: photons for light via mirrors and
+    /// Whether another technique accounts for the emission found by a path: photons for light via mirrors and
     /// glass, or light samples for hard shadows.
     fn is_light_counted_elsewhere(&self, path: &PathRay) -> bool {
         let PathBehavior { gathers, mirrors, .. } = self.tile.behavior;
@@ -392,8 +395,8 @@ impl CameraWavefront<'_, '_> {
         self.add_infinite_light(path, self.tile.infinite_light(path));
     }
 
-    /// Adds the light from infinite lights along a path that leaves the scene. The background is visible but
-    /// does not illuminate anything.
+    /// Adds light from infinite lights to a path that leaves the scene. The background is visible but does
+    /// not illuminate anything.
     fn add_infinite_light(&mut self, path: &PathRay, beyond: Vec3) {
         if path.state.only_specular_before {
             let background = self.tile.settings.render.background;
@@ -448,7 +451,7 @@ impl CameraWavefront<'_, '_> {
         self.queue_rough(path, vertex, &bsdf, far);
     }
 
-    /// Queues the vertices of a non-specular surface for direct lighting. `far` is the medium behind the
+    /// Queues the vertices on a non-specular surface for direct lighting. `far` is the medium behind the
     /// surface.
     #[inline(always)]
     fn queue_rough(&mut self, path: &PathRay, vertex: &Vertex<'_>, bsdf: &RoughBsdf, far: &InteriorList) {
@@ -468,7 +471,7 @@ impl CameraWavefront<'_, '_> {
         }
     }
 
-    /// Queues the vertices of rough glass: one for each side, or a single vertex if light samples cannot
+    /// Queues the vertices for rough glass: one for each side, or a single vertex if light samples cannot
     /// reach one of the sides.
     fn shade_rough_glass(
         &mut self,

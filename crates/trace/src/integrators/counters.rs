@@ -1,6 +1,6 @@
 //! Ray and texture lookup counters.
 
-/// Number of rays and texture lookups in one tile.
+/// Ray and texture lookup counts for one tile.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RayCounters {
     /// Camera rays.

@@ -5,7 +5,7 @@ use std::cell::RefCell;
 use super::direct::queue::DirectLightQueue;
 use super::transport::scratch::TraceBuffers;
 
-/// Buffers shared by all batches of a thread.
+/// Buffers that a thread reuses for all of its batches.
 #[derive(Default)]
 pub struct ThreadMemory {
     /// Queues of rays and hits.

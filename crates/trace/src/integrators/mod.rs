@@ -48,8 +48,8 @@ pub use view::{AovSource, Components, FirstHit, LightAov, View};
 /// Number of camera rays in a batch.
 const BATCH_SIZE: usize = 1024;
 
-/// Renders the samples with the indices `samples` of every pixel in `pixels`. The result depends only on the
-/// arguments, so it does not matter how an image is divided into tiles or its samples into ranges.
+/// Renders sample indices `samples` for every pixel in `pixels`. The result depends only on the arguments, so
+/// it does not matter how an image is divided into tiles or its samples into ranges.
 ///
 /// # Errors
 /// [`Cancelled`] if the token is canceled. The token is checked every few hundred rays.
@@ -63,7 +63,7 @@ pub fn render_tile(
     render_tile_with_photons(None, world, settings, pixels, samples, token)
 }
 
-/// Like [`render_tile`], with the samples' photon maps. Without maps, no photons are gathered.
+/// Like [`render_tile`], but also gathers photons from the samples' photon maps, if there are any.
 ///
 /// # Errors
 /// [`Cancelled`] if the token is canceled.

@@ -31,7 +31,7 @@ pub struct PhotonSettings {
 }
 
 impl RenderSettings {
-    /// Returns the effective settings, with settings that have no effect reset to their defaults.
+    /// Returns the effective settings. Settings that have no effect are reset to their defaults.
     pub fn effective(&self) -> Self {
         let mut render = self.render.effective();
         let photons = self.photons.filter(|_| render.integrator.method().gathers);
@@ -41,8 +41,8 @@ impl RenderSettings {
         Self { render, photons, ..*self }
     }
 
-    /// Whether images with these settings show any light from photons. Light from photons has scattered at
-    /// least twice: at the mirror or glass that the photon hit, and at the point where the photon is
+    /// Whether light from photons is visible in images with these settings. Light from photons has scattered
+    /// at least twice: at the mirror or glass that the photon hit, and at the point where the photon is
     /// gathered.
     pub fn gathers_photons(&self) -> bool {
         let shows = match self.view.source() {

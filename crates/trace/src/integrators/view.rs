@@ -103,7 +103,7 @@ pub enum AovSource {
     /// A quantity at the first hit, without exposure or tone mapping. All quantities except depth are displayed
     /// unchanged.
     FirstHit(FirstHit),
-    /// The beauty image, overlaid with the acceleration structures' bounding boxes.
+    /// The beauty image with the acceleration structures' bounding boxes drawn over it.
     Bounds,
     /// A statistic of the beauty image's samples.
     Film(Quantity),
@@ -119,7 +119,7 @@ impl AovSource {
     }
 }
 
-/// Quantity accumulated by paths in a sample.
+/// Quantity that a sample's paths accumulate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LightAov {
     /// Radiance of these components.

@@ -115,8 +115,8 @@ impl Camera {
         }
     }
 
-    /// Returns the camera ray, with a normalized direction, through an image point and a point on the unit
-    /// lens disk. `place` is measured from the image center to the right and up, in units of half the image
+    /// Returns the camera ray through an image point and a point on the unit lens disk. Its direction is
+    /// normalized. `place` is measured from the image center to the right and up, in units of half the image
     /// height.
     #[inline(always)]
     pub fn ray(&self, place: DVec2, lens: Vec2) -> Ray {
@@ -127,7 +127,7 @@ impl Camera {
         Ray::new((self.position + offset).as_vec3(), aimed.normalize().as_vec3())
     }
 
-    /// Like [`Camera::ray`], through the center of the lens.
+    /// Like [`Camera::ray`], but through the lens center.
     #[inline(always)]
     pub fn pinhole_ray(&self, place: DVec2) -> Ray {
         Ray::new(self.position.as_vec3(), self.direction(place).normalize().as_vec3())

@@ -14,7 +14,7 @@ use crate::math::{DVec3, Vec2, Vec3};
 /// Minimum number of rays to cast.
 const MIN_RAYS: usize = 32;
 
-/// Difference between the numbers of inside and outside rays at which voting stops.
+/// Voting stops when the numbers of inside and outside rays differ by this much.
 const MAJORITY: i32 = 3;
 
 /// Maximum number of other surfaces that a ray may pass through.
@@ -34,7 +34,7 @@ pub struct CompoundSolid {
 
 impl World {
     /// Glass around a point on the lens: closed shapes that contain the point, and other solids that contain
-    /// the camera, with their materials.
+    /// the camera. Each has its material.
     pub fn glass_around(&self, point: Vec3) -> impl Iterator<Item = (u32, u32)> {
         let is_inside = move |&(object, _): &(u32, u32)| match &self.geometry.objects()[object as usize] {
             Object::Shape(shape) => shape.encloses(point.as_dvec3()) == Some(true),
@@ -49,25 +49,25 @@ impl World {
         self.lens_glass.is_empty() && self.camera_solids.is_empty()
     }
 
-    /// Closed glass shapes whose bounding boxes overlap the lens, with their materials.
+    /// Closed glass shapes whose bounding boxes overlap the lens, and the materials of these shapes.
     pub(super) fn find_lens_glass(&self) -> Vec<(u32, u32)> {
         let (eye, lens) = (self.camera.position.as_vec3(), Vec3::splat(self.camera.aperture as f32));
-        let lens = Aabb { min: eye, max: eye }.grown(lens + eye.abs() * f32::EPSILON);
+        let lens = Aabb { min: eye, max: eye }.expanded(lens + eye.abs() * f32::EPSILON);
         let objects = (0_u32..).zip(self.geometry.objects());
         let near = objects.filter_map(|(id, object)| {
             let material = self.material_index(&Hit { shape: ShapeHit::at(0.0), object: id }) as u32;
-            let is_near = object.bounds().is_none_or(|bounds| bounds.meets(&lens));
+            let is_near = object.bounds().is_none_or(|bounds| bounds.overlaps(&lens));
             (is_near && self.is_closed(id) && self.is_glass(material)).then_some((id, material))
         });
         near.collect()
     }
 
-    /// Other glass solids that contain the camera, with the material at the camera.
+    /// Other glass solids that contain the camera, and the material of each at the camera.
     pub(super) fn find_camera_solids(&self) -> Vec<(u32, u32)> {
         let eye = self.camera.position.as_vec3();
         let at = Aabb { min: eye, max: eye };
         let near =
-            self.compound_solids().into_iter().filter(|body| body.is_covered || body.bounds.meets(&at));
+            self.compound_solids().into_iter().filter(|body| body.is_covered || body.bounds.overlaps(&at));
         near.filter_map(|body| Some((body.body, self.material_around(&body, eye, None)?))).collect()
     }
 
@@ -98,9 +98,9 @@ impl World {
         solids.into_iter().map(in_parts).collect()
     }
 
-    /// Glass material around a point, determined by a majority of rays from the point to the solid. `None` if
-    /// the point is outside or no ray hits the solid. If the point is on object `of`, this object does not
-    /// block the rays.
+    /// Glass material around a point, determined by the majority of rays cast from the point toward the
+    /// solid. `None` if the point is outside or no ray hits the solid. If the point is on object `of`, this
+    /// object does not block the rays.
     pub fn material_around(&self, body: &CompoundSolid, point: Vec3, of: Option<u32>) -> Option<u32> {
         let (objects, mut votes, mut material) = (&body.objects, 0_i32, None);
         for ray in 0..MIN_RAYS.max(objects.len()) {
@@ -119,7 +119,7 @@ impl World {
     }
 
     /// Casts a ray toward `target`. Returns whether the ray hits the solid from behind, and the material at
-    /// the hit. `None` if it misses or leaves through an opaque surface that closes the solid.
+    /// the hit. `None` if the ray misses the solid or leaves through an opaque surface that closes it.
     fn hit_side(
         &self,
         body: &CompoundSolid,

@@ -17,11 +17,11 @@ use crate::math::{DVec3, Vec3};
 /// Maximum number of recorded solids around a ray. The last solids in file order are recorded.
 pub const MAX_INTERIORS: usize = 4;
 
-/// The last closed glass shapes of a subtree, in descending order. Other shapes of the subtree that enclose
+/// The last closed glass shapes in a subtree, in descending order. Other shapes in the subtree that enclose
 /// the same point have no effect at this point.
 pub(super) type EnclosingGlass = ArrayVec<u32, MAX_INTERIORS>;
 
-/// Two points, one on either side of coincident surfaces.
+/// Two points, one on each side of coincident surfaces.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OffsetPoints {
     /// The point on the incoming ray's side.
@@ -37,7 +37,7 @@ impl OffsetPoints {
     }
 }
 
-/// A surface or shape around or between the two points.
+/// A shape around the far point, or a surface between the two points.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum CoincidentSurface {
     /// A glass shape that encloses [`OffsetPoints::beyond`].
@@ -96,7 +96,7 @@ impl CoincidenceProbe {
 }
 
 impl World {
-    /// Finds all coincident surfaces at a hit and one point on either side of them. `visit` is called in an
+    /// Finds all coincident surfaces at a hit, and one point on each side of them. `visit` is called in an
     /// order that depends only on the scene.
     #[inline]
     pub fn find_coincident_surfaces(
@@ -127,8 +127,8 @@ impl World {
         is_away && self.is_glass(self.material_index(at.hit) as u32)
     }
 
-    /// Fast path of [`World::classify_candidates`] if [`World::is_far_side_away`] is true and nothing else is
-    /// nearby. In this case, only the incoming ray's side matters.
+    /// Fast path for [`World::classify_candidates`] if [`World::is_far_side_away`] is true and nothing else
+    /// is nearby. In this case, only the incoming ray's side matters.
     fn single_sided_contact(
         &self,
         at: &CoincidenceQuery<'_>,
@@ -190,7 +190,7 @@ impl World {
         if is_led || closed_lead { sides } else { OffsetPoints { before: probe.close, ..sides } }
     }
 
-    /// Returns the shape if it is between the points, or if it is glass and encloses
+    /// Returns the shape if its surface is between the points, or if it is glass and encloses
     /// [`OffsetPoints::beyond`]. `is_around` is `None` for open shapes.
     fn near_shape(
         &self,
@@ -243,7 +243,7 @@ impl World {
         }
     }
 
-    /// Closed glass shapes, with their materials.
+    /// Closed glass shapes and their materials.
     pub fn closed_glasses(&self) -> impl Iterator<Item = (u32, u32)> {
         (0..self.geometry.objects().len() as u32).filter_map(|id| {
             let material = self.material_index(&Hit { shape: ShapeHit::at(0.0), object: id }) as u32;
@@ -308,7 +308,7 @@ impl Geometry {
         objects.clear();
         triangles.clear();
         let point = at.surface.point;
-        let near = Aabb { min: point, max: point }.grown(self.margin(at));
+        let near = Aabb { min: point, max: point }.expanded(self.margin(at));
         objects.extend(self.unbounded());
         self.tree().visit_overlapping_surfaces(&near, |met| {
             match met {
@@ -337,16 +337,17 @@ impl Geometry {
 }
 
 impl MeshInstance {
-    /// Bounding box, in mesh coordinates, of a world-space box.
+    /// Converts a world-space box to its bounding box in mesh coordinates.
     pub(super) fn local_box(&self, bounds: &Aabb) -> Aabb {
         let corner = |i: usize| {
             let pick = |axis: usize| if i & (1 << axis) == 0 { bounds.min[axis] } else { bounds.max[axis] };
             self.transform.inverse_point(Vec3::new(pick(0), pick(1), pick(2)).as_dvec3())
         };
-        Aabb::around_f64((0..8).map(corner))
+        Aabb::from_points_f64((0..8).map(corner))
     }
 
-    /// Error of a triangle near a point, caused by rounding of its corners in the file and in the ray test.
+    /// Position error of a triangle near a point, caused by rounding its corners in the file and in the ray
+    /// test.
     fn touch_error(&self, triangle: u32, point: Vec3) -> Vec3 {
         let corners = self.tree.loaded().mesh.corners(triangle).map(|corner| corner.as_dvec3());
         let reach = corners.iter().fold(DVec3::ZERO, |reach, corner| reach.max(corner.abs()));

@@ -1,4 +1,4 @@
-//! Lights coplanar with other surfaces.
+//! Handles lights that are coplanar with other surfaces.
 //!
 //! For two surfaces in one plane, rounding determines which surface a ray hits first. Path rays might hit a
 //! coplanar light while shadow rays to the light are blocked, or the reverse, and the two estimates of the
@@ -71,7 +71,7 @@ impl FlatFace {
         self.bounds().map_or(f64::INFINITY, |[least, greatest]| (greatest - least).max_element())
     }
 
-    /// Whether the face emits on the side facing along this normal.
+    /// Whether the face emits on the side toward which this normal points.
     fn emits_along(&self, normal: DVec3) -> bool {
         match self.emits {
             None => false,
@@ -104,7 +104,7 @@ impl EmissiveFaces {
         Some(Self { faces, bounds, widest, region: [least - margin, greatest + margin] })
     }
 
-    /// Whether there cannot be any lights near a box.
+    /// Whether no light can be near a box.
     fn are_apart_from(&self, bounds: [DVec3; 2]) -> bool {
         are_boxes_apart(bounds, self.region)
     }

@@ -20,14 +20,14 @@ use crate::materials::{Emission, EmissionSides, Opacity};
 use crate::math::{DVec3, Vec3};
 use crate::scene::description::{self, Scene};
 
-/// Sampling tables of the environment map. `None` if the image is black.
+/// Sampling tables for the environment map. `None` if the image is black.
 pub fn sky_map(texels: &Arc<Texels>) -> Option<Arc<EnvironmentMap>> {
     EnvironmentMap::new(Arc::clone(texels)).map(Arc::new)
 }
 
 /// Builds all lights: delta and directional lights first, then the environment, then emitting objects. A mesh
 /// becomes one light per emitting material. Two-sided emission becomes two lights. `sky` is the environment
-/// map, if any.
+/// map. `None` if there is no map.
 ///
 /// # Errors
 /// [`Cancelled`] if the token is canceled.
@@ -63,7 +63,7 @@ pub fn lights(
     Ok(Arc::new(Lights::new(all, token)?))
 }
 
-/// Photon source for a scene. `None` if no light emits photons.
+/// Creates a scene's photon source. `None` if no light emits photons.
 pub fn photon_source(geometry: &Geometry, lights: &Arc<Lights>) -> Option<PhotonSource> {
     let emitter_geometry =
         |object: u32| geometry.objects().get(object as usize).map(Object::emitter_geometry);
@@ -164,7 +164,7 @@ impl EmissiveMaterial {
     }
 }
 
-/// Lights of an emitting shape, one per side.
+/// Creates the lights for an emitting shape, one per emitting side.
 fn shape_lights(shape: &Shape, emissive: &EmissiveMaterial, object: u32) -> impl Iterator<Item = AreaLight> {
     let of_side = move |side: &Side| {
         let radiance = emissive.emission.scale;
@@ -182,7 +182,7 @@ fn shape_lights(shape: &Shape, emissive: &EmissiveMaterial, object: u32) -> impl
     emissive.sides().iter().filter_map(of_side)
 }
 
-/// Lights of a mesh. If `emissive` is `None`, the triangles have the materials from the mesh file.
+/// Creates the lights for a mesh. If `emissive` is `None`, the triangles use the mesh file's materials.
 fn mesh_lights(
     object: u32,
     mesh: &MeshInstance,

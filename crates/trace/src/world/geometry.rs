@@ -68,7 +68,7 @@ impl Geometry {
         Self::with_lifts(scene, meshes, (origin, light_lifts(scene, meshes, origin)), token)
     }
 
-    /// Like [`Self::of_scene`], with translations from [`light_lifts`].
+    /// Like [`Self::of_scene`], but also applies translations from [`light_lifts`].
     ///
     /// # Errors
     /// [`Cancelled`] if the token is canceled.
@@ -203,7 +203,7 @@ impl Geometry {
         &self.isolated
     }
 
-    /// Returns the same geometry, traced with another instruction set.
+    /// Sets the instruction set used to trace packets.
     #[cfg(test)]
     pub(super) fn with(mut self, instructions: InstructionSet) -> Self {
         self.instructions = instructions;
@@ -409,7 +409,7 @@ mod tests {
     use crate::math::transform::Transform;
     use crate::world::merged::tests::mesh;
 
-    /// Merged meshes, tiny meshes, and large meshes with separate trees. Some are transformed.
+    /// Merged meshes, tiny meshes, and large meshes that have separate trees. Some meshes are transformed.
     fn geometry() -> Geometry {
         let trees = [mesh(1, 70), mesh(2, 8), mesh(3, 17_000), mesh(4, 40)];
         let placed = |(place, tree): (usize, usize)| {
@@ -454,6 +454,6 @@ mod tests {
             started += 1;
             hits[hit.object as usize] += u32::from(found.is_some());
         }
-        assert!(hits.iter().all(|&hits| hits > 10), "{hits:?} hits of rays starting on each object");
+        assert!(hits.iter().all(|&hits| hits > 10), "{hits:?} hits by rays starting on each object");
     }
 }

@@ -129,7 +129,7 @@ impl Geometry {
                 let cell = table.cell(surface.point);
                 let find = || {
                     let all = shape.bounds().unwrap_or(Aabb::EMPTY);
-                    let around = cell.bounds(&all).grown(Vec3::splat(table.margin));
+                    let around = cell.bounds(&all).expanded(Vec3::splat(table.margin));
                     if self.has_no_neighbors(&around, &SurfaceRegion::GridCell(around), hit.object) {
                         1
                     } else {
@@ -161,7 +161,7 @@ impl Geometry {
         }
     }
 
-    /// Computes the state of a triangle.
+    /// Computes a triangle's state.
     fn triangle_state(&self, object: u32, mesh: &MeshInstance, triangle: u32, margin: f32) -> u8 {
         let corners = mesh.world_corners(triangle);
         let own_corners = mesh.local_corners(triangle);
@@ -186,7 +186,7 @@ impl Geometry {
             }
             let inner = smaller(corners, parts);
             let region = SurfaceRegion::Triangle { corners: inner, apart };
-            let around = Aabb::around_f64(inner).grown(Vec3::splat(2.0 * margin));
+            let around = Aabb::from_points_f64(inner).expanded(Vec3::splat(2.0 * margin));
             if self.has_no_neighbors(&around, &region, object) {
                 return parts as u8;
             }
@@ -222,7 +222,7 @@ impl Geometry {
 /// Whether all other triangles of the mesh are at least `apart` from a part of one triangle, in mesh
 /// coordinates. This is checked first because most nearby triangles are neighbors in the same mesh.
 fn is_apart_from_own_mesh(mesh: &MeshInstance, triangle: u32, part: [DVec3; 3], apart: f64) -> bool {
-    let around = Aabb::around_f64(part).grown(Vec3::splat((1.1 * apart) as f32));
+    let around = Aabb::from_points_f64(part).expanded(Vec3::splat((1.1 * apart) as f32));
     mesh.tree.triangles().visit_overlapping_while(&around, |other| {
         other == triangle || are_triangles_apart(part, mesh.local_corners(other), apart)
     })
@@ -230,7 +230,7 @@ fn is_apart_from_own_mesh(mesh: &MeshInstance, triangle: u32, part: [DVec3; 3], 
 
 /// Whether a shape may intersect a region or enclose it.
 fn shape_is_near(shape: &Shape, around: &Aabb, region: &SurfaceRegion) -> bool {
-    if shape.bounds().is_some_and(|bounds| !bounds.meets(around)) {
+    if shape.bounds().is_some_and(|bounds| !bounds.overlaps(around)) {
         return false;
     }
     if let Shape::Plane(plane) = shape {
@@ -260,7 +260,8 @@ impl SurfaceRegion {
         match self {
             Self::GridCell(cell) => triangle_meets_box(triangle, cell),
             Self::Triangle { corners, apart } => {
-                Aabb::around_f64(triangle).meets(around) && !are_triangles_apart(*corners, triangle, *apart)
+                Aabb::from_points_f64(triangle).overlaps(around)
+                    && !are_triangles_apart(*corners, triangle, *apart)
             }
         }
     }
@@ -279,14 +280,14 @@ impl GridCell {
     fn bounds(&self, all: &Aabb) -> Aabb {
         let side = all.extent() / CELLS as f32;
         let min = all.min + Vec3::from(self.0.map(|along| along as f32)) * side;
-        Aabb { min, max: min + side }.grown(side * 1e-3)
+        Aabb { min, max: min + side }.expanded(side * 1e-3)
     }
 }
 
 /// Whether a triangle intersects a box, up to rounding (Akenine-Möller, *Fast 3D Triangle-Box Overlap
 /// Testing*, 2001).
 pub(super) fn triangle_meets_box(corners: [DVec3; 3], bounds: &Aabb) -> bool {
-    if !Aabb::around_f64(corners).meets(bounds) {
+    if !Aabb::from_points_f64(corners).overlaps(bounds) {
         return false;
     }
     let (min, max) = (bounds.min.as_dvec3(), bounds.max.as_dvec3());

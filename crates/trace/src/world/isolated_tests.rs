@@ -160,7 +160,7 @@ fn scenes(random: &mut SceneRandom) -> Vec<(World, Vec<DVec3>)> {
                 .shape(cube(-1.7, 1.4), 1),
             corners(1.0),
         ),
-        // A rotated box, a thin box, and a small box in a corner of the first.
+        // A rotated box, a thin box, and a small box in a corner of the rotated box.
         (
             SceneBuilder::new()
                 .shape(Shape::Box { center: DVec3::ZERO, size: v(1.2, 0.8, 1.0), rotate: turned }, 1)

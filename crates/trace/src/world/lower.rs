@@ -237,7 +237,7 @@ pub fn file_material(images: &Images, own: &FileMaterial) -> Material {
     Material { bsdf, emission: Emission::NONE, normal_perturbation: None, opacity: file_opacity(images, own) }
 }
 
-/// Non-specular material from a mesh file, with emission and normal map.
+/// Non-specular material from a mesh file, including its emission and normal map.
 fn file_surface(images: &Images, own: &FileMaterial, rough: Rough) -> Material {
     let normals = own.normal_texture.as_ref().and_then(|texture| {
         let texture = file_texture(images, texture, TextureUse::Normal)?;
@@ -303,7 +303,7 @@ fn file_principled(images: &Images, own: &FileMaterial, physical: &PhysicalMater
     })))
 }
 
-/// Material of triangles for which the mesh file does not specify a material.
+/// Material for triangles to which the mesh file does not assign a material.
 pub fn fallback_material() -> Material {
     let phong = Phong {
         diffuse: Color::Constant(Vec3::splat(0.7)),

@@ -48,7 +48,7 @@ pub struct MergedTriangle {
 #[derive(Debug)]
 pub struct MergedMeshes {
     tree: TriangleTree,
-    /// Triangles that packets test without the tree. `None` if there are too many.
+    /// The triangles, if packets test them without the tree. `None` if there are too many.
     facets: Option<TriangleList>,
     /// Triangles sorted by object, so that at equal distances the lowest object id wins.
     triangles: Vec<MergedTriangle>,
@@ -188,7 +188,7 @@ impl MergedMeshes {
     fn closest_of_each(&self, rows: &RayPacket, these: u32, ends: &F32x16, found: &mut HitPacket) {
         for lane in lanes(these) {
             if let Some(hit) = self.tree.closest(&Ray { t_max: ends[lane], ..rows.ray(lane) }) {
-                found.put(lane, &hit);
+                found.set(lane, &hit);
             }
         }
     }
@@ -199,7 +199,7 @@ impl MergedMeshes {
         self.tree.closest_packet(&rays(rows, met), ends, &mut hits);
         for (lane, hit) in hits.iter().enumerate() {
             if let Some(hit) = hit {
-                found.put(lane, hit);
+                found.set(lane, hit);
             }
         }
     }
@@ -262,8 +262,8 @@ impl MergedMeshes {
     }
 }
 
-/// Whether the rays in `met` start close together, relative to `size`, and have similar directions. These
-/// rays are faster with the tree than without.
+/// Whether the rays in `met` start close together, relative to `size`, and have similar directions. Such rays
+/// are faster with the tree than without it.
 #[inline(always)]
 fn are_coherent(rows: &RayPacket, met: u32, size: Vec3, simd: impl Simd) -> bool {
     let first = met.trailing_zeros() as usize % PACKET_SIZE;
@@ -535,7 +535,7 @@ pub(super) mod tests {
             }
         }
         assert!(started > 5000, "{started} rays");
-        assert_eq!(again, 0, "of {started} rays hit the triangle they started on");
+        assert_eq!(again, 0, "none of the {started} rays should hit its starting triangle");
     }
 
     #[test]

@@ -90,7 +90,7 @@ impl MeshInstance {
             let pick = |axis: usize| if i & (1 << axis) == 0 { local.min[axis] } else { local.max[axis] };
             self.transform.point(Vec3::new(pick(0), pick(1), pick(2)).as_dvec3())
         };
-        Aabb::around_f64((0..8).map(corner))
+        Aabb::from_points_f64((0..8).map(corner))
     }
 
     /// Corners of a triangle in world coordinates, ordered so that the front side faces along (b − a) × (c −
@@ -124,7 +124,7 @@ impl MeshInstance {
         corners.map(|corner| self.transform.point(corner.as_dvec3()).as_vec3())
     }
 
-    /// Vertex UVs of a set. Falls back to the first set if there is no second set.
+    /// Vertex UVs in the given set. Falls back to the first set if there is no second set.
     #[inline(always)]
     pub(super) fn uvs(&self, set: UvSet) -> &[Vec2] {
         let mesh = &self.tree.loaded().mesh;
@@ -277,7 +277,7 @@ impl MeshInstance {
         self.tree.triangles().closest_packet(&self.local_rays(rows, met), ends, &mut hits);
         for (lane, hit) in hits.iter().enumerate() {
             if let Some(hit) = hit {
-                found.put(lane, hit);
+                found.set(lane, hit);
             }
         }
     }

@@ -162,7 +162,7 @@ pub(super) fn uv_between([a, b, c]: [Vec2; 3], barycentric: Vec3) -> Vec2 {
     a * barycentric.x + b * barycentric.y + c * barycentric.z
 }
 
-/// Attributes of the triangles' first, second and third vertices.
+/// Gathers the vertex attributes for the triangles' first, second and third corners.
 #[inline(always)]
 fn gather_vertex_attributes(vertices: &[[u32; 3]; PACKET_SIZE], all: &[Vec3]) -> [Vec3x16; 3] {
     let mut each = [[[0.0; PACKET_SIZE]; 3]; 3];
@@ -278,10 +278,10 @@ mod tests {
                     Ray::new(Vec3::new(x, 1.0 + height, z), Vec3::new(next() * 0.5, -1.0, next() * 0.5))
                 };
                 let rays: Vec<Ray> = (0..PACKET_SIZE).map(ray).collect();
-                let mut hits = HitPacket::none();
+                let mut hits = HitPacket::without_hits();
                 for (i, ray) in rays.iter().enumerate() {
                     let hit = mesh.tree.triangles().closest(&mesh.local_ray(ray)).expect("the ground");
-                    hits.put(i, &hit);
+                    hits.set(i, &hit);
                 }
                 let (of, set) = (u32::MAX >> (32 - PACKET_SIZE), UvSet::First);
                 let filling = FillMesh { mesh: &mesh, rays: &rays, hits: &hits, of, set };
@@ -310,12 +310,12 @@ mod tests {
                 let rays: Vec<Ray> = (0..PACKET_SIZE)
                     .map(|_| Ray::new(Vec3::splat(9.0), Vec3::new(next(), next(), next()).normalize()))
                     .collect();
-                let mut hits = HitPacket::none();
+                let mut hits = HitPacket::without_hits();
                 for i in 0..PACKET_SIZE {
                     let (u, v) = (number(next()), number(next()));
                     let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
                     let primitive = (number(next()) * 20.0) as u32;
-                    hits.put(i, &ShapeHit { t: 1.0, primitive, u, v });
+                    hits.set(i, &ShapeHit { t: 1.0, primitive, u, v });
                 }
                 let of = round.wrapping_mul(0x9e37_79b9) >> 16 | 1 << (round % 16);
                 for (instructions, set) in InstructionSet::ALL

@@ -83,9 +83,9 @@ pub struct WorldInputs {
     pub images: Images,
     /// Contents of the orbiter file. `None` if the scene file defines the camera itself.
     pub orbiter: Option<OrbiterCamera>,
-    /// Camera that replaces the scene's camera, if any.
+    /// Camera that overrides the scene's camera. `None` to use the scene's camera.
     pub camera: Option<description::Camera>,
-    /// Glass solids, if already known.
+    /// Glass solids, if they have already been found.
     pub glass_solids: Option<Arc<GlassSolids>>,
 }
 
@@ -118,11 +118,11 @@ pub struct World {
     has_rough_glass: bool,
     /// Whether each object represents a closed glass solid that contains no light. Empty without rough glass.
     unlit_glass: Box<[bool]>,
-    /// Closed glass shapes that may contain points on the lens, with their materials.
+    /// Closed glass shapes that may contain points on the lens, and the materials of these shapes.
     lens_glass: Vec<(u32, u32)>,
     /// Relevant enclosing glass shapes in each subtree of nested objects. Empty if few objects are nested.
     enclosing_glass: Box<[contact::EnclosingGlass]>,
-    /// Other glass solids that contain the camera, with their materials.
+    /// Other glass solids that contain the camera, and the materials of these solids.
     camera_solids: Vec<(u32, u32)>,
     /// Whether each material is mipmapped; see [`Material::is_mipmapped`].
     mipmapped: Box<[bool]>,
@@ -225,7 +225,7 @@ impl World {
         self.is_colored(hit.object).then(|| self.geometry.vertex_color(hit)).flatten()
     }
 
-    /// Texture coordinates at a hit, with a footprint computed from the tangents by `footprint`.
+    /// Texture coordinates at a hit. `footprint` computes their footprint from the tangents.
     #[inline]
     pub fn texture_point(
         &self,
@@ -237,7 +237,7 @@ impl World {
         TexturePoint { uv: surface.uv, footprint: footprint([surface.dpdu, surface.dpdv]), second }
     }
 
-    /// Part of [`World::texture_point`] for the second UV set. `None` if the mesh has no second set.
+    /// The second UV set's part of [`World::texture_point`]. `None` if the mesh has no second set.
     #[cold]
     #[inline(never)]
     fn second_point(

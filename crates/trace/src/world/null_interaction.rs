@@ -52,7 +52,7 @@ impl SeeThroughObjects {
     }
 }
 
-/// Transmittance along the shadow rays of a packet.
+/// Transmittance along the shadow rays in a packet.
 #[repr(align(64))]
 pub struct Transmittance {
     /// Mask of rays with zero transmittance.
@@ -64,7 +64,7 @@ pub struct Transmittance {
 }
 
 impl Transmittance {
-    /// Sets the transmittance along the ray of a lane.
+    /// Sets the transmittance along a lane's ray.
     fn set(&mut self, lane: usize, left: Vec3) {
         set_lane(&mut self.left, lane, left);
         self.occluded |= u32::from(left == Vec3::ZERO) << lane;
@@ -78,8 +78,8 @@ impl World {
         self.see_through.is_some()
     }
 
-    /// Transmittance along a packet of shadow rays, each with a corresponding light. `traced` is the mask of
-    /// rays to trace.
+    /// Transmittance along each shadow ray in a packet. `sources` contains the light of each ray, and
+    /// `traced` is the mask of rays to trace.
     #[cold]
     #[inline(never)]
     pub fn transmittance_packet(

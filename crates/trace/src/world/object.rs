@@ -68,9 +68,9 @@ impl Object {
             Self::Mesh(mesh) if mesh.is_small() => return mesh.any_in_small(rows, met, ends, except, simd),
             Self::Mesh(mesh) => return mesh.any_rows(rows, met, ends, except),
         };
-        let mut found = HitPacket::none();
+        let mut found = HitPacket::without_hits();
         shape.intersect_packet(rows, met, ends, &mut found, simd);
-        let mut hit = found.any(simd);
+        let mut hit = found.hit_mask(simd);
         if let Some((own, parts)) = except {
             for (lane, &part) in parts.iter().enumerate() {
                 let bit = own & 1 << lane;

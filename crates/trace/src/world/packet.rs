@@ -4,7 +4,7 @@ use super::merged::MergedMeshes;
 use super::{Geometry, Hit};
 use crate::accel::{AnyHitCallback, ClosestHitCallback, F32x16, PACKET_SIZE, SimdKernel};
 use crate::geometry::Ray;
-use crate::geometry::packet::{HitPacket, RayPacket, lanes, traced};
+use crate::geometry::packet::{HitPacket, RayPacket, active_lanes, lanes};
 use crate::lights::{LightGeometry, LightObjectPacket};
 use crate::math::lanes::{Simd, TRUE, select, select_u32};
 
@@ -32,7 +32,7 @@ impl Geometry {
         let mut nearest = ClosestObject {
             geometry: self,
             rows,
-            hits: HitPacket::none(),
+            hits: HitPacket::without_hits(),
             object: [NONE; PACKET_SIZE],
             simd,
         };
@@ -78,10 +78,10 @@ impl Geometry {
         ends: &mut F32x16,
         traced: u32,
     ) -> (HitPacket, [u32; PACKET_SIZE]) {
-        let (mut hits, mut objects) = (HitPacket::none(), [NONE; PACKET_SIZE]);
+        let (mut hits, mut objects) = (HitPacket::without_hits(), [NONE; PACKET_SIZE]);
         for lane in lanes(traced) {
             if let Some(hit) = self.closest(&Ray { t_max: ends[lane], ..rows.ray(lane) }) {
-                hits.put(lane, &hit.shape);
+                hits.set(lane, &hit.shape);
                 (objects[lane], ends[lane]) = (hit.object, hit.shape.t);
             }
         }
@@ -140,7 +140,7 @@ impl SimdKernel for ClosestKernel<'_> {
     #[inline(always)]
     fn run(self, simd: impl Simd) {
         let (rows, mut ends) = RayPacket::new(self.rays);
-        let traced = traced(&ends, simd);
+        let traced = active_lanes(&ends, simd);
         let (hits, object) = self.geometry.closest_rows(&rows, &mut ends, traced, simd);
         for (lane, hit) in self.hits.iter_mut().enumerate().take(PACKET_SIZE) {
             *hit = hits.get(lane).map(|shape| Hit { shape, object: object[lane] });
@@ -163,7 +163,7 @@ struct ClosestObject<'a, F> {
 impl<F: Simd> ClosestHitCallback for ClosestObject<'_, F> {
     #[inline(always)]
     fn test(&mut self, id: u32, met: u32, ends: &mut F32x16) {
-        let mut found = HitPacket::none();
+        let mut found = HitPacket::without_hits();
         let (these, mut objects) = (masked_ends(met, ends), [id; PACKET_SIZE]);
         match self.geometry.merged(id) {
             Some(merged) => {
@@ -215,7 +215,7 @@ pub(super) struct Occluders<'a, F> {
 }
 
 impl<'a, F: Simd> Occluders<'a, F> {
-    /// Creates the test for a packet of shadow rays, each with a corresponding light.
+    /// Creates the test for a packet of shadow rays, given the light of each ray.
     #[inline(always)]
     pub(super) fn new(
         geometry: &'a Geometry,
@@ -374,7 +374,7 @@ pub(super) mod tests {
         #[inline(always)]
         fn run(self, simd: impl Simd) -> u32 {
             let (rows, ends) = RayPacket::new(self.rays);
-            self.geometry.occluded_ray_packet(&rows, &ends, traced(&ends, simd), self.sources, simd)
+            self.geometry.occluded_ray_packet(&rows, &ends, active_lanes(&ends, simd), self.sources, simd)
         }
     }
 

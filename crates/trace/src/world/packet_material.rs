@@ -1,16 +1,16 @@
-//! Plain materials, whose hits are shaded as a whole packet instead of one by one.
+//! Plain materials: hits on them are shaded in packets instead of one by one.
 
 use super::World;
 use crate::materials::texture::Texture;
 use crate::materials::{Bsdf, Material, Rough, RoughKind, UvSet};
 use crate::math::Vec3;
 
-/// Packet-shading data of a plain material.
+/// Data for shading a plain material in packets.
 #[derive(Clone, Copy, Debug)]
 pub struct PacketMaterial {
     /// Kind of BSDF.
     pub kind: RoughKind,
-    /// UV set of the BSDF texture looked up in packet shading. `None` without a texture.
+    /// UV set for the BSDF texture used in packet shading. `None` without a texture.
     pub row_texture: Option<UvSet>,
     /// Ambient reflectance, if the BSDF is constant over the surface.
     pub ambient: Option<Vec3>,
@@ -21,7 +21,7 @@ pub struct PacketMaterial {
 }
 
 impl PacketMaterial {
-    /// Creates the packet-shading data of a material. Returns `None` if the material perturbs normals, has
+    /// Creates the packet-shading data for a material. Returns `None` if the material perturbs normals, has
     /// textured or coated emission, may be a null interaction, or has a BSDF that does not support packets.
     pub(super) fn of(material: &Material) -> Option<Self> {
         let Material { bsdf, emission, normal_perturbation, opacity } = material;

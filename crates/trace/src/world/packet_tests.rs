@@ -58,7 +58,7 @@ impl HostileRandom {
     }
 }
 
-/// Shapes of a given size: an axis-aligned and a tilted shape of each kind.
+/// Shapes of the given size: one axis-aligned and one tilted shape of each kind.
 fn shapes(scale: f64) -> Vec<Object> {
     let (center, askew) = (DVec3::new(0.3, -0.2, 0.1) * scale, DVec3::new(0.3, -0.7, 0.5));
     let quad = |corner: DVec3, u: DVec3, v: DVec3| {
@@ -84,7 +84,7 @@ fn shapes(scale: f64) -> Vec<Object> {
     shapes.map(Object::Shape).to_vec()
 }
 
-/// Closest hits of a packet, and any-hit masks with and without ignored primitives.
+/// A packet's closest hits, and its any-hit masks with and without ignored primitives.
 struct PacketHits<'a> {
     object: &'a Object,
     rays: &'a [Ray],
@@ -102,7 +102,7 @@ impl SimdKernel for PacketHits<'_> {
         for (lane, end) in ends.iter_mut().enumerate() {
             *end = if met & 1 << lane != 0 { *end } else { -1.0 };
         }
-        let mut found = HitPacket::none();
+        let mut found = HitPacket::without_hits();
         object.closest_rows(&rows, met, &ends, &mut found, simd);
         let any_part = object.any_rows(&rows, met, &ends, None, simd);
         (found, any_part, object.any_rows(&rows, met, &ends, Some(except), simd))

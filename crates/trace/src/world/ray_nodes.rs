@@ -5,7 +5,7 @@ use crate::accel::{RayInterval, TreeNode};
 use crate::geometry::Ray;
 
 impl Geometry {
-    /// Visits the nodes of all trees whose boxes a ray intersects. `visit` receives the ray in the
+    /// Visits every node, in any tree, whose box the ray intersects. `visit` receives the ray in the
     /// coordinates of the node's tree, with t unchanged, and returns whether to descend. Depth is counted
     /// across both levels: a mesh's root is one below the leaf that contains the mesh.
     pub fn visit_nodes(&self, ray: &Ray, mut visit: impl FnMut(&Ray, &TreeNode, &RayInterval) -> bool) {

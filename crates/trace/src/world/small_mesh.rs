@@ -77,6 +77,6 @@ impl MeshInstance {
         for start in &mut start {
             *start = self.mesh_triangle_number(*start);
         }
-        RayPacket::of(origin, direction).with_start_triangle(start)
+        RayPacket::from_soa(origin, direction).with_start_triangle(start)
     }
 }

@@ -54,7 +54,7 @@ pub struct NeededTexture {
     pub mesh_file: Option<usize>,
     /// Name of the mesh file's material that refers to the image. `None` for other textures.
     pub material: Option<String>,
-    /// Name of a material that uses the image as a normal map, if any.
+    /// Name of a material that uses the image as a normal map. `None` if there is no such material.
     pub normals_of: Option<String>,
     /// Whether the image is the environment map.
     pub is_environment: bool,
@@ -123,7 +123,7 @@ impl TextureNeeds {
         }
     }
 
-    /// Whether textures with this role are needed, in a material with or without δ lobes.
+    /// Whether textures with this role are needed. `is_delta` is true for materials with δ lobes.
     fn has(self, role: TextureRole, is_delta: bool) -> bool {
         match role {
             TextureRole::Diffuse => self.diffuse,
@@ -205,7 +205,7 @@ fn has_mipmaps(scene: &Scene, texture: usize) -> bool {
     }
 }
 
-/// File of the environment map. `None` without a map, or if its color factor is black.
+/// The environment map's file. `None` if there is no map or if the map's color factor is black.
 pub fn environment_source(scene: &Scene) -> Option<TextureSource> {
     environment_file(scene).map(environment_map)
 }
@@ -411,7 +411,7 @@ mod tests {
     }
 
     #[test]
-    fn color_with_alpha_from_one_image_is_a_cut_out() {
+    fn color_and_alpha_from_one_image_form_a_cut_out() {
         const MASK: TextureUse = TextureUse::Number(PixelValue::Mask { of_any_color: false });
         const ALPHA: TextureUse = TextureUse::Number(PixelValue::Channel(Channel::Alpha));
         const OPACITY: TextureUse = TextureUse::Number(PixelValue::Opacity);

@@ -5,7 +5,7 @@ use crate::geometry::RayF64;
 use crate::geometry::surface::f64_error_bound;
 use crate::math::{DVec3, Vec3};
 
-/// A point on a triangle of a mesh instance.
+/// A point on a triangle in a mesh instance.
 pub(super) struct TrianglePoint {
     /// The triangle's corners, in mesh coordinates.
     pub(super) corners: [DVec3; 3],
@@ -34,8 +34,8 @@ impl TrianglePoint {
     }
 }
 
-/// If the triangle's corners are this many times farther away than the point and the ray origin, `f32`
-/// barycentric coordinates are too imprecise, and the point is computed from the ray.
+/// The point is computed from the ray if the triangle's corners are this many times farther away than the
+/// point and the ray origin, because `f32` barycentric coordinates are then too imprecise.
 const COARSE: f64 = 1024.0;
 
 /// Minimum distance from the triangle's edges, in point errors. Rounding the point and offsetting it from the
@@ -52,7 +52,7 @@ fn is_near(weight: f64, edge: DVec3, bound: f64) -> bool {
 /// Maximum distance to move a point away from an edge, as a fraction of the triangle's height.
 const MAX_EDGE_MARGIN: f64 = 0.125;
 
-/// A mesh placement, with the data needed to compute surface points.
+/// A mesh placement and the data needed to compute surface points.
 #[derive(Clone, Copy)]
 pub(super) struct PlacedMesh<P> {
     /// The mesh-to-world transform.

@@ -8,7 +8,7 @@ use crate::math::Vec3;
 /// Margin for rounding around lights, relative to their distance from the origin.
 const ROUNDING: f32 = 1e-5;
 
-/// Two bounding boxes of a light. The light is inside both of them.
+/// Two bounding boxes for a light. The light is inside both boxes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LightBox {
     /// Bounding box of the light's bounding sphere.
@@ -22,7 +22,7 @@ pub struct LightBox {
 impl LightBox {
     /// Whether the light may intersect a box.
     pub fn meets(&self, bounds: &Aabb) -> bool {
-        self.of_ball.meets(bounds) && self.of_object.is_none_or(|own| own.meets(bounds))
+        self.of_ball.overlaps(bounds) && self.of_object.is_none_or(|own| own.overlaps(bounds))
     }
 
     /// Center and corners of the smaller box.
@@ -44,7 +44,7 @@ impl World {
             return Box::default();
         }
         let (objects, lamps) = (self.geometry.objects(), self.light_boxes());
-        let everywhere = Aabb::around([Vec3::NEG_INFINITY, Vec3::INFINITY]);
+        let everywhere = Aabb::from_points([Vec3::NEG_INFINITY, Vec3::INFINITY]);
         // Compute the bounding box of each solid.
         let mut boxes: Vec<Option<Aabb>> = vec![None; objects.len()];
         for (id, object) in (0_u32..).zip(objects) {
@@ -70,15 +70,15 @@ impl World {
             let (center, radius) = (bounds.center.as_vec3(), bounds.radius as f32);
             let room = ROUNDING * (radius + center.abs().max_element());
             let around = Vec3::splat(radius + room);
-            let of_ball = Aabb::around([center - around, center + around]);
+            let of_ball = Aabb::from_points([center - around, center + around]);
             let object = light.as_area().map(|area| area.object);
             let bounds = object.and_then(|object| self.geometry.objects()[object as usize].bounds());
-            Some(LightBox { of_ball, of_object: bounds.map(|own| own.grown(Vec3::splat(room))), object })
+            Some(LightBox { of_ball, of_object: bounds.map(|own| own.expanded(Vec3::splat(room))), object })
         });
         boxes.collect()
     }
 
-    /// Whether light samples from inside a glass solid are always occluded.
+    /// Whether light samples taken from inside a glass solid are always occluded.
     #[inline]
     pub fn is_unlit_glass(&self, body: u32) -> bool {
         self.unlit_glass.get(body as usize).copied().unwrap_or(false)

@@ -1,10 +1,11 @@
 //! Ordered dithering.
 
-/// Period of the dither pattern in columns and rows.
+/// Width and height of the repeating dither pattern, in pixels.
 const SIDE: usize = 8;
 
-/// Dither threshold of a pixel, in (0, 1), from Bayer's matrix ("An optimum method for two-level rendition of
-/// continuous-tone pictures", 1973). It depends only on the position, so static content does not flicker.
+/// Dither threshold in (0, 1) for a pixel, taken from Bayer's matrix ("An optimum method for two-level
+/// rendition of continuous-tone pictures", 1973). It depends only on the position, so static content does not
+/// flicker.
 pub(super) fn threshold(x: usize, y: usize) -> f32 {
     let (x, y) = (x % SIDE, y % SIDE);
     let mixed = x ^ y;

@@ -11,10 +11,10 @@ use crate::math::color::srgb8_to_linear;
 use crate::mosaic::{FittedCell, Tile};
 use ratatui::style::Color;
 
-/// How strongly nearby colors are preferred on 256-color and 16-color terminals.
+/// How strongly dithering favors inks near the wanted color on 256-color and 16-color terminals.
 const CALM_256: f32 = 3.0;
 const CALM_16: f32 = 3.0;
-/// How strongly nearby colors are preferred in cells whose two halves are drawn separately.
+/// How strongly dithering favors inks near the wanted color in cells whose two halves are drawn separately.
 const CALM_EDGES: f32 = 200.0;
 /// Squared Oklab distance above which the two halves of a cell are drawn separately. Below it, their mean
 /// color is mixed using shade characters.
@@ -42,13 +42,13 @@ struct ColorPair {
 pub(crate) struct ColorMapper {
     depth: ColorDepth,
     plain: RefCell<PatternDither>,
-    /// Ink mixer for cells with shade characters, on 16-color terminals.
+    /// Ditherer for cells drawn with shade characters on 16-color terminals.
     mixed: RefCell<PatternDither>,
     pairs: Vec<ColorPair>,
 }
 
 impl ColorMapper {
-    /// Creates a mapper for a terminal with this color depth and `ansi` as its 16 colors.
+    /// Creates a mapper for this color depth. `ansi` are the terminal's 16 ANSI colors.
     pub(crate) fn new(depth: ColorDepth, ansi: &AnsiColors) -> Self {
         let none = || RefCell::new(PatternDither::default());
         let mut shades = Self { depth, plain: none(), mixed: none(), pairs: Vec::new() };
@@ -110,7 +110,7 @@ impl ColorMapper {
     }
 }
 
-/// All single colors, and all pairs of colors combined with each shade character.
+/// All single colors, followed by all pairs of colors combined with each shade character.
 fn color_pairs(inks: &[Ink]) -> Vec<ColorPair> {
     let alone = (0..inks.len()).map(|color| ColorPair { level: None, colors: [color; 2] });
     let both = (0..inks.len()).flat_map(|a| (0..a).map(move |b| [a, b]));

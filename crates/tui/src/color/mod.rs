@@ -1,4 +1,4 @@
-//! Terminal colors, and the approximation of sRGB colors with them.
+//! Terminal colors, and how they approximate sRGB colors.
 
 mod bayer;
 mod color_mapper;
@@ -27,7 +27,7 @@ choice! {
         TrueColor = "truecolor",
         /// The 256-color palette: xterm's 6×6×6 cube and grays.
         Indexed256 = "256",
-        /// The 16-color palette of xterm.
+        /// xterm's 16-color palette.
         Ansi16 = "16",
         /// No colors.
         None = "none",
@@ -41,7 +41,7 @@ pub enum ColorDepth {
     TrueColor,
     /// xterm's 6×6×6 cube and grays.
     Indexed256,
-    /// The 16 colors of xterm.
+    /// xterm's 16 colors.
     Ansi16,
     /// No colors.
     None,

@@ -3,13 +3,13 @@
 
 use crate::math::Vec3;
 
-/// Cone responses to linear Rec. 709 RGB.
+/// Matrix from linear Rec. 709 RGB to cone responses.
 const CONES: [Vec3; 3] = [
     Vec3::new(0.412_221_46, 0.536_332_55, 0.051_445_995),
     Vec3::new(0.211_903_5, 0.680_699_5, 0.107_396_96),
     Vec3::new(0.088_302_46, 0.281_718_85, 0.629_978_7),
 ];
-/// Lightness, green–red and blue–yellow from the cube roots of the cone responses.
+/// Matrix from the cube roots of the cone responses to lightness, green–red and blue–yellow.
 const LAB: [Vec3; 3] = [
     Vec3::new(0.210_454_26, 0.793_617_8, -0.004_072_047),
     Vec3::new(1.977_998_5, -2.428_592_2, 0.450_593_7),

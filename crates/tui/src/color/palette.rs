@@ -53,7 +53,7 @@ const VGA: AnsiColors = [
     [255, 255, 255],
 ];
 
-/// Assumed ANSI colors of a terminal that has not reported them.
+/// ANSI colors assumed for a terminal that has not reported its own.
 pub(crate) fn assumed_ansi_colors(term: &str) -> &'static AnsiColors {
     if term.starts_with("linux") { &VGA } else { &XTERM }
 }

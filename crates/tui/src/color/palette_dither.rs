@@ -3,7 +3,8 @@
 use super::bayer::threshold;
 use super::recipes::{Ink, PatternDither};
 
-/// How strongly nearby colors are preferred in a palette computed from the image.
+/// How strongly dithering favors palette colors near the wanted color if the palette is computed from the
+/// image.
 const CALM: f32 = 1.0;
 
 /// A ditherer for one palette.

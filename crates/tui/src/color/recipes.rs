@@ -34,7 +34,7 @@ impl Ink {
         Self { linear, lab: oklab(linear), texture: 0.0 }
     }
 
-    /// Creates an ink from a fine pattern: a fraction `share` of `front` on `back`.
+    /// Creates an ink from a fine pattern in which `front` covers a fraction `share` of `back`.
     pub(super) fn shaded(front: &Self, back: &Self, share: f32) -> Self {
         /// Texture weight of a pattern within a cell, which is less visible than a pattern of whole cells.
         const FINENESS: f32 = 0.25;
@@ -56,13 +56,13 @@ pub(super) struct PatternDither {
 }
 
 impl PatternDither {
-    /// Creates a mixer for these inks. With `calm` = 0, only the mean matters. Larger values favor inks near
-    /// the color.
+    /// Creates a ditherer for these inks. With `calm` = 0, only the mean matters. Larger values favor inks
+    /// near the color.
     pub(super) fn new(inks: Vec<Ink>, calm: f32) -> Self {
         Self { inks, calm, recipes: HashMap::new() }
     }
 
-    /// Index of the ink to use for a color at a dither threshold in (0, 1).
+    /// Index of the ink to use for a color, depending on a dither threshold in (0, 1).
     pub(super) fn ink_index(&mut self, rgb: [u8; 3], threshold: f32) -> usize {
         let part = ((threshold * PARTS as f32) as usize).min(PARTS - 1);
         let recipe = match self.recipes.get(&rgb) {

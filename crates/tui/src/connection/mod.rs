@@ -1,11 +1,11 @@
 //! Flow control: how many bytes may be sent to the terminal now.
 //!
-//! Buffers between glimt and the screen could hold seconds of outdated previews. To prevent this, every slice
-//! ends with a status report request, and the number of bytes in flight is limited to what the connection
-//! carries in one round trip plus [`MAX_QUEUE`], up to [`MAX_WINDOW`]. This bounds the delay between a key
-//! press and its effect on the screen. The window is adjusted using round-trip times, as in TCP Vegas (Brakmo
-//! and Peterson, 1995): the minimum is taken as the latency of the idle connection, and anything above it as
-//! queueing delay.
+//! Buffers between glimt and the screen could hold several seconds' worth of outdated previews. To prevent
+//! this, every slice ends with a status report request, and the number of bytes in flight is limited to what
+//! the connection carries in one round trip plus [`MAX_QUEUE`], up to [`MAX_WINDOW`]. This bounds the delay
+//! between a key press and its effect on the screen. The window is adjusted using round-trip times, as in TCP
+//! Vegas (Brakmo and Peterson, 1995): the minimum is taken as the latency of the idle connection, and
+//! anything above it as queueing delay.
 //!
 //! If the terminal does not reply within [`REPLY_TIMEOUT`], output is paced by time. The same applies behind
 //! a multiplexer, which replies itself regardless of the outer connection.
@@ -39,9 +39,9 @@ const SILENCE_ROUND_TRIPS: u32 = 4;
 /// A terminal is fast if it replied to most of the last `RECENT_SLICES` slices within this time.
 const FAST_REPLY: Duration = Duration::from_millis(20);
 const RECENT_SLICES: usize = 8;
-/// The minimum round-trip time is taken over the last one or two periods of this length.
+/// Length of a period. The minimum round-trip time is taken over the last one or two periods.
 const ROUND_TRIP_AGE: Duration = Duration::from_secs(15);
-/// Maximum and minimum size of a slice.
+/// Maximum and minimum slice size in bytes.
 const MAX_SLICE: usize = 8_000;
 const MIN_SLICE: usize = 400;
 
@@ -84,11 +84,11 @@ pub(super) struct Connection {
     in_flight: usize,
     /// Maximum number of bytes in flight.
     window: f64,
-    /// Time at which the window last shrank. Slices sent before then are ignored when shrinking it again.
+    /// Time at which the window last shrank. Slices sent earlier do not shrink it again.
     shrunk: Option<Instant>,
     round_trips: RoundTrips,
-    /// Round-trip times of the last slices. Small slices are included because after a slowdown, only small
-    /// ones are sent, and they must be able to show that the connection is fast again.
+    /// Round-trip times of the last slices. Small slices are included because only small slices are sent
+    /// after a slowdown, and their replies must be able to show that the connection is fast again.
     recent: VecDeque<Duration>,
     /// Time of the last reply or, if later, when the oldest pending query was sent.
     heard: Instant,
@@ -98,8 +98,8 @@ pub(super) struct Connection {
 }
 
 impl Connection {
-    /// Creates a connection of unknown speed. `is_multiplexed` if a multiplexer replies instead of the
-    /// terminal.
+    /// Creates a connection whose speed is unknown. `is_multiplexed` means that a multiplexer replies instead
+    /// of the terminal.
     pub(super) fn new(is_multiplexed: bool, now: Instant) -> Self {
         Self {
             replies: ReplyState::Asked { until: now + REPLY_TIMEOUT },

@@ -77,7 +77,7 @@ impl SimulatedTerminal {
         }
     }
 
-    /// Fraction of the bandwidth used in the last run.
+    /// Fraction of the bandwidth that the last run used.
     fn bandwidth_share(&self, milliseconds: u64) -> f64 {
         self.carried as f64 / (self.bytes_a_second * milliseconds as f64 / 1e3)
     }

@@ -6,7 +6,7 @@ use super::base64::encoded;
 use super::png::encode_png;
 use crate::film::Picture;
 
-/// IDs of the two alternating images. Other programs are unlikely to use them.
+/// IDs of the two alternating images, chosen to be unlikely in other programs.
 const IDS: [u32; 2] = [0x67_6c_69, 0x6d_74_01];
 /// Maximum length of a chunk of base64 data.
 const CHUNK: usize = 4096;

@@ -49,11 +49,11 @@ impl PartialEq for PixelPlacement {
     }
 }
 
-/// Approximate bytes per pixel. Noise hardly compresses.
+/// Approximate encoded bytes per pixel. Noise is hardly compressible.
 const PIXEL_BYTES: f64 = 2.0;
-/// Maximum size of an image in bytes. tmux does not pass on a megabyte or more.
+/// Maximum image size in bytes. tmux does not pass on images of a megabyte or more.
 const MAX_BYTES: f64 = 600_000.0;
-/// Maximum time in seconds to send intermediate and final images.
+/// Maximum time in seconds for sending an intermediate image, and for sending a final image.
 const MOVING_SECONDS: f64 = 0.4;
 const STILL_SECONDS: f64 = 1.5;
 

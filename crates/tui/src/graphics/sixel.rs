@@ -13,9 +13,8 @@ const FIRST: u8 = 16;
 const REGISTERS: usize = 256;
 
 /// Encodes an image to be drawn at the cursor, scaled to cover these cells. `cell` is the size of a cell in
-/// pixels. The palette is reused if it still fits the image and recomputed otherwise. Images with fewer
-/// pixels than the cells are enlarged after quantization, so time and memory depend only on the image's own
-/// size.
+/// pixels. The palette is reused if it still fits the image and recomputed otherwise. Images smaller than the
+/// covered area are enlarged after quantization, so time and memory depend only on the image's own size.
 pub(super) fn encode(
     picture: &Picture,
     cells: Rect,
@@ -74,7 +73,8 @@ impl SixelBand {
         }
     }
 
-    /// Appends the sixels of each color followed by a carriage return, then a line feed, and clears the band.
+    /// Appends each color's sixels followed by a carriage return, then appends a line feed and clears the
+    /// band.
     fn push_sixels(&mut self, bytes: &mut Vec<u8>) {
         for register in (0..REGISTERS).filter(|register| std::mem::take(&mut self.is_used[*register])) {
             bytes.extend(format!("#{register}").into_bytes());

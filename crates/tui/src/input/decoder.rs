@@ -20,8 +20,8 @@ const INTRODUCERS: &[u8] = b"[]OPX^_\\";
 const LONE_ESCAPE: Duration = Duration::from_millis(50);
 /// Timeout between bytes of a sequence, for connections that lose packets.
 const SEQUENCE: Duration = Duration::from_secs(1);
-/// Maximum duration and length of a sequence. For example, alt-`]` looks like the start of a sequence that no
-/// key press ends.
+/// Maximum duration and length of a sequence. Without these limits, a key press such as alt-`]`, which looks
+/// like the start of a sequence, would block all further input.
 const LONGEST: Duration = Duration::from_secs(2);
 const MAX_BYTES: usize = 4096;
 /// Maximum time between an escape character that was treated as a key press and a `[` that still belongs to

@@ -31,7 +31,7 @@ enum NextCharacter {
     SingleShift,
     /// Last byte of a Linux console function key (`ESC [ [`).
     Console,
-    /// Number of remaining bytes of a mouse report in the original format.
+    /// Number of bytes remaining in a mouse report in the original format.
     Mouse(u8),
 }
 
@@ -51,8 +51,8 @@ impl InputPerformer {
         self.push_reply(control_strings::parse_apc(text));
     }
 
-    /// Handles a mouse report in SGR format (mode 1006): the button with modifier bits, and the cell, counted
-    /// from 1.
+    /// Handles a mouse report in SGR format (mode 1006). It contains the button with modifier bits, and the
+    /// cell, counted from 1.
     fn push_mouse(&mut self, code: u16, (column, row): (u16, u16), is_pressed: bool) {
         const MODIFIERS: u16 = 4 | 8 | 16;
         let kind = match (code & !MODIFIERS, is_pressed) {

@@ -2,7 +2,7 @@
 //!
 //! A single thread polls the terminal and reads whatever is available, so it never blocks waiting for the
 //! rest of a sequence. [`Decoder`] converts bytes to [`DecodedInput`] and is the only code that depends on
-//! the encoding of keys.
+//! key encodings.
 
 mod control_strings;
 mod decoded;
@@ -63,7 +63,7 @@ fn wait_while_held() -> bool {
     was_held
 }
 
-/// Reads and decodes input. Empty after a timeout; `None` if the terminal was closed.
+/// Reads and decodes input. Returns an empty list after a timeout, or `None` if the terminal was closed.
 fn next(decoder: &mut Decoder) -> Option<Vec<DecodedInput>> {
     let mut bytes = [0; 4096];
     let waited = wait_for_input(decoder.deadline());

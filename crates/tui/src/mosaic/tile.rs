@@ -4,8 +4,8 @@
 use std::collections::HashMap;
 use std::sync::LazyLock;
 
-/// Number of rows of the two-column grid that describes parts of a cell. Divisible into halves, thirds and
-/// quarters.
+/// Number of rows in the two-column grid that describes parts of a cell. The rows can be divided into halves,
+/// thirds and quarters.
 pub(crate) const GRID_ROWS: u32 = 12;
 /// Number of squares in the grid.
 pub(crate) const PLACES: u32 = 2 * GRID_ROWS;
@@ -208,8 +208,8 @@ impl Grid {
         }
     }
 
-    /// All divisions of a two-column cell, starting with halves. Each usually differs from the previous one
-    /// in a single part of the grid.
+    /// All divisions of a two-column cell, starting with halves. Successive divisions usually differ in only
+    /// one part of the grid.
     pub(super) fn divisions(self) -> &'static [CellDivision] {
         static QUADRANTS: LazyLock<Vec<CellDivision>> = LazyLock::new(|| divisions(2, &[2]));
         static SEXTANTS: LazyLock<Vec<CellDivision>> = LazyLock::new(|| divisions(6, &[2, 3]));
@@ -223,7 +223,8 @@ impl Grid {
     }
 }
 
-/// All divisions based on two-column grids with `part_rows` rows, for a cell of `pixel_rows` pixel rows.
+/// All divisions along two-column grids, for a cell with `pixel_rows` rows of pixels. `part_rows` lists the
+/// number of rows in each grid.
 fn divisions(pixel_rows: u32, part_rows: &[u32]) -> Vec<CellDivision> {
     let mut divisions = vec![CellDivision { first: (1 << pixel_rows) - 1, tile: Tile::HALVES }];
     for rows in part_rows {

@@ -18,7 +18,7 @@ const FIRST_UNTOUCHED: u8 = 22;
 pub(super) struct CandidateColors {
     pub(super) first: Vec<TerminalColor>,
     pub(super) second: Vec<TerminalColor>,
-    /// Colors for both parts together.
+    /// Candidates for filling both parts with the same color.
     pub(super) both: Vec<TerminalColor>,
 }
 
@@ -68,7 +68,7 @@ struct CommonColors {
     count: u32,
 }
 
-/// The range of colors within `span` of each wanted color, for as many leading colors as possible.
+/// Intersects the ranges within `span` of the wanted colors, for as many leading colors as possible.
 fn common_colors(wanted: impl Iterator<Item = TerminalColor>, span: u8) -> CommonColors {
     let mut common = CommonColors { low: [0; 3], high: [255; 3], sum: [0; 3], count: 0 };
     for shade in wanted.take(LONGEST) {

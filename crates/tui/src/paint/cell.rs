@@ -148,7 +148,7 @@ impl CellFill {
 }
 
 impl CellContent {
-    /// A blank in the terminal's default background.
+    /// A blank with the terminal's default background.
     pub(super) const BLANK: Self =
         Self::Mosaic(Mosaic { tile: Tile::HALVES, pair: [TerminalColor::DefaultBackground; 2] });
 

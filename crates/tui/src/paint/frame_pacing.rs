@@ -11,9 +11,9 @@ pub struct FrameTiming {
     pub bytes_per_second: Option<f64>,
     /// Number of cells in the preview.
     pub cells: u32,
-    /// Mean samples per pixel of the new preview. 0 for a coarse one.
+    /// Mean samples per pixel in the new preview. 0 for a coarse preview.
     pub samples: f64,
-    /// Mean samples per pixel of this request's last drawn preview. `None` if there is none.
+    /// Mean samples per pixel in this request's last drawn preview. `None` if no preview has been drawn.
     pub aimed_samples: Option<f64>,
     /// Time since the last drawn preview became the target.
     pub since_aim: Duration,
@@ -97,7 +97,7 @@ impl FrameTiming {
         (self.is_fast && self.is_shown).then(|| aimed + self.min_interval())
     }
 
-    /// Time to send an intermediate preview.
+    /// Time needed to send an intermediate preview.
     fn frame_send_time(&self) -> Duration {
         let bytes = f64::from(self.cells) * MOVING_BYTES;
         self.bytes_per_second.map_or(Duration::ZERO, |rate| {
@@ -112,7 +112,7 @@ impl FrameTiming {
 mod tests {
     use super::*;
 
-    /// Timing one second after a preview with one sample was drawn.
+    /// Timing one second after a preview with one sample per pixel was drawn.
     const MOMENT: FrameTiming = FrameTiming {
         bytes_per_second: None,
         cells: 2500,

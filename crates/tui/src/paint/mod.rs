@@ -3,8 +3,8 @@
 //! A [`Painter`] keeps track of the screen content. Given a target buffer, it returns the bytes that turn the
 //! current content into the target, slice by slice. A new target replaces any unfinished one. Cells are
 //! compared by the colors of their two parts, no matter how they are drawn: the same halves can often be
-//! drawn using several of `▀ ▄ █` and the space. The painter picks the one that needs the fewest bytes after
-//! the previously drawn cell.
+//! drawn with any of several characters (`▀`, `▄`, `█` or a space). The painter picks the one that needs the
+//! fewest bytes after the previously drawn cell.
 //!
 //! Text is always exact. Intermediate previews trade precision for size (except on a fast terminal, where
 //! they are exact), and cells unaffected by an edit are not redrawn. The final preview is accurate to 1/255.
@@ -80,7 +80,7 @@ enum DrawStep {
     Later(u16),
 }
 
-/// Content of a frame other than its cells.
+/// Hyperlinks and drawing hints for a frame.
 #[derive(Clone, Debug, Default)]
 pub struct FrameExtras {
     /// Cells whose text is drawn after the preview.

@@ -14,7 +14,7 @@ pub(super) struct Pen {
     pub(super) link: u16,
 }
 
-/// Requirements on a pen.
+/// Requirements that a pen must meet.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PenRequirements {
     /// Required foreground color. `None` if any color is acceptable.

@@ -16,7 +16,7 @@ const BEAM: usize = 5;
 /// if its cost exceeds that of the best path by more than the cost of these bytes.
 const MAX_BYTES: f32 = 46.0;
 
-/// A cell of the row, with its target and its current content.
+/// A cell in the row, with its target and its current content.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct TargetCell {
     /// Target content. `None` if the cell is not part of the preview.
@@ -43,7 +43,7 @@ pub(super) struct DrawOp {
     pub(super) mosaic: Mosaic,
 }
 
-/// A path through the row, up to a given cell.
+/// A path through the row up to some cell.
 #[derive(Clone, Copy, Debug)]
 struct DrawPath {
     fg: TerminalColor,
@@ -232,8 +232,8 @@ impl ColorChanges {
         })
     }
 
-    /// Extends a path, using the current pen and each single color change. A color chosen for one part is
-    /// used only there.
+    /// Extends a path by drawing with the current pen, and with each single color change. A color chosen for
+    /// one part is used only there.
     fn change_one(&self, parent: usize, path: &DrawPath, beam: &mut Beam) {
         let mut ends = PathExtension::new(self, parent, path, beam);
         if !ends.is_near() {
@@ -260,7 +260,7 @@ impl ColorChanges {
         }
     }
 
-    /// Extends a path, changing both colors.
+    /// Extends a path by changing both colors of the pen.
     fn change_both(&self, parent: usize, path: &DrawPath, beam: &mut Beam) {
         let mut ends = PathExtension::new(self, parent, path, beam);
         for first in &self.all[..self.first] {
@@ -281,7 +281,7 @@ struct PathExtension<'a> {
     parent: usize,
     /// Number of bytes so far, including those that move the cursor to the cell.
     bytes: u32,
-    /// Error of the cells before this one.
+    /// Total error of all cells before this one.
     error: f32,
     /// Cost per byte of output.
     byte: f32,
@@ -300,7 +300,7 @@ impl<'a> PathExtension<'a> {
         Self { parent, bytes: path.bytes + path.gap.bytes(), error, byte, tile, beam, bound }
     }
 
-    /// Whether any glyph drawn here could enter the beam.
+    /// Whether any glyph drawn here could be cheap enough to enter the beam.
     fn is_near(&self) -> bool {
         (self.bytes + 1) as f32 * self.byte + self.error < self.bound
     }
@@ -420,7 +420,7 @@ mod tests {
         let found = plan_row(&targets, start(RED, BLACK), RateDistortion::EXACT);
         let columns: Vec<usize> = found.ops.iter().map(|op| op.column).collect();
         assert_eq!((columns, found.bytes), (vec![0, 8], 3 + 4 + 3));
-        // A gap of one cell is redrawn, because this takes no more bytes than moving the cursor and is more
+        // A one-cell gap is redrawn, because this takes no more bytes than moving the cursor and is more
         // accurate.
         let found = plan_row(&[targets[0], targets[1], targets[8]], start(RED, BLACK), RateDistortion::EXACT);
         assert_eq!((found.ops.len(), found.bytes), (3, 9));

@@ -23,7 +23,8 @@ pub(super) enum Stroke {
     Text { at: CellPosition, text: TextCell },
     /// Two colors drawn with the same glyph in `count` cells, using REP for more than one cell.
     Mosaic { at: CellPosition, glyph: CellFill, mosaic: Mosaic, count: u16 },
-    /// `count` blanks in the terminal's default background, or up to the end of the row if `None`.
+    /// `count` blanks with the terminal's default background. If `count` is `None`, erases to the end of the
+    /// row.
     Erase { at: CellPosition, count: Option<u16> },
 }
 

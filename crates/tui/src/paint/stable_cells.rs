@@ -13,9 +13,9 @@ use super::screen::ScreenModel;
 use super::target_screen::TargetScreen;
 use super::terminal_color::TerminalColor;
 
-/// Maximum channel difference for first previews to be considered equal.
+/// Maximum channel difference between first previews that are considered equal.
 const ALIKE: u8 = 2;
-/// Upper limit of the noise threshold below which cells are not redrawn.
+/// Upper limit for the noise threshold. Cells are not redrawn for smaller differences.
 const MAX_NOISE: u8 = 12;
 
 /// Stores, for each cell, the first preview of the request whose result is on the screen.
@@ -27,10 +27,10 @@ pub(super) struct StableCells {
     firsts: Vec<Option<Mosaic>>,
     /// The first preview of the current request. Empty if there was none.
     newest: Vec<Option<Mosaic>>,
-    /// For each cell, whether it looks the same in the first previews of the current request and of the
-    /// request on the screen.
+    /// For each cell, whether the current request's first preview matches the first preview of the request on
+    /// the screen.
     steady: Vec<bool>,
-    /// Maximum difference between a stable cell and its target that is considered noise.
+    /// Noise threshold: larger differences between a stable cell and its target cause a redraw.
     noise: u8,
 }
 

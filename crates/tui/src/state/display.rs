@@ -18,7 +18,7 @@ pub(crate) struct DisplayState {
     pub kind: PreviewKind,
     pub depth: ColorDepth,
     pub shades: ColorMapper,
-    /// The terminal's 16 ANSI colors.
+    /// The terminal's 16 ANSI colors, as reported or assumed.
     pub ansi: AnsiColors,
     /// Terminal queries that have been sent.
     pub ask: TerminalQueries,
@@ -60,12 +60,12 @@ impl DisplayState {
 
     /// Preview pixels per cell, horizontally.
     pub(crate) fn pixels_across(&self) -> u32 {
-        /// Maximum number of pixels. More are not worth the bytes.
+        /// Maximum preview pixels across a cell. A higher resolution is not worth the bytes.
         const MAX: u32 = 10;
         /// Maximum number of pixels in the window. Accumulating, developing and encoding a preview takes
         /// about 45 bytes of memory per pixel.
         const MAX_PIXELS: f32 = 2_400_000.0;
-        /// Maximum number of pixels for Sixel, which doubles the memory.
+        /// Maximum number of pixels in the window for Sixel, which needs twice as much memory.
         const MAX_IN_SIXELS: f32 = 1_600_000.0;
         match self.kind {
             PreviewKind::Pixels(protocol) => {

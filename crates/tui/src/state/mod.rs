@@ -96,7 +96,7 @@ impl State {
         is_newest && is_at_work && request.preview_size.is_some() && !is_shown
     }
 
-    /// Diagnostics of a valid scene, and why its image could not be written.
+    /// Diagnostics for a valid scene, including the reason why its image could not be written.
     pub(super) fn reported_diagnostics(&self) -> Vec<Diagnostic> {
         let warnings = &self.overlays.warnings;
         let failed = self.saving.write_failed.as_ref();
@@ -111,7 +111,7 @@ impl State {
         unwritten.into_iter().chain(warnings.iter().cloned()).collect()
     }
 
-    /// Whether the scene, rather than the render, failed.
+    /// Whether the failure is in the scene, not in the render.
     fn is_scene_broken(&self) -> bool {
         self.overlays.problems.as_ref().is_none_or(|problems| problems.work.is_none())
     }
@@ -127,7 +127,7 @@ impl State {
         self.work.set_paused(paused, self.now);
     }
 
-    /// Time at which the state needs its next tick.
+    /// Time of the next tick that the state needs.
     pub(super) fn next_tick(&self) -> Option<Instant> {
         const CLOCK: Duration = Duration::from_millis(250);
         const AGE: Duration = Duration::from_secs(1);

@@ -27,7 +27,7 @@ pub(crate) struct KeyOverrides {
 
 impl KeyOverrides {
     /// The settings formatted as command-line options. A camera position replaces the scene's orbiter camera,
-    /// if any, so the field of view and focus of `orbiter` are then listed as well.
+    /// so the field of view and focus of `orbiter` are also listed in that case.
     pub(crate) fn options(&self, orbiter: Option<Viewpoint>) -> Vec<String> {
         let on_off = |is_on: bool| if is_on { "on" } else { "off" };
         let vector = |key: &str, DVec3 { x, y, z }: DVec3| format!("--set 'camera.{key}=[{x},{y},{z}]'");
@@ -108,8 +108,8 @@ impl ImageOrigin {
         Self { toggles: KeyOverrides { exposure: None, ..self.toggles }, ..self }
     }
 
-    /// Origin of an image that a later request reproduced. Returns `self` because the later changes had no
-    /// effect, or `later` if the camera moved with keys has since been written to the scene.
+    /// Origin of an image that a later request reproduced. Normally returns `self`, because the later changes
+    /// had no effect. Returns `later` if a camera moved with keys has since been written to the scene.
     pub(crate) fn merged_with_later(&self, later: Self) -> Self {
         if self.toggles.camera.has_changes() && !later.toggles.camera.has_changes() {
             return later;
@@ -213,8 +213,8 @@ impl RequestState {
         }
     }
 
-    /// Records the newest request's input files, without the scene file, whose text is compared separately.
-    /// Models have no text.
+    /// Records the newest request's input files. Excludes a scene file, because its text is compared
+    /// separately, but includes a model.
     pub(crate) fn record_input_files(&mut self, files: Vec<FileRead>) {
         let is_model = is_mesh(&self.scene);
         self.files = files.into_iter().filter(|file| is_model || file.path != self.scene).collect();
@@ -230,7 +230,7 @@ impl RequestState {
         }
     }
 
-    /// Combined overrides from the command line and keys.
+    /// Overrides from the command line combined with changes made with keys.
     pub(crate) fn overrides(&self) -> Overrides {
         let mut overrides = self.command_line.clone();
         overrides.shadows = self.toggles.shadows.or(overrides.shadows);
@@ -311,7 +311,7 @@ impl RequestState {
         all.into_iter().flatten().collect()
     }
 
-    /// Describes changes made with keys that are not obvious from the image.
+    /// Describes camera, focus and exposure changes made with keys, which may not be obvious from the image.
     pub(crate) fn key_changes(&self) -> Vec<String> {
         let CameraChange { pose, fov, focus } = self.toggles.camera;
         let is_moved = pose.is_some() || fov.is_some();
@@ -321,7 +321,7 @@ impl RequestState {
         moved.into_iter().chain(focused).chain(exposed).collect()
     }
 
-    /// Whether this is the scene's own image, with no changes made with keys. Only this image is written
+    /// Whether this is the scene's own image, without changes made with keys. Only this image is written
     /// automatically.
     pub(crate) fn is_own_image(&self) -> bool {
         self.toggles == KeyOverrides::default()
@@ -341,7 +341,7 @@ impl RequestState {
         self.command_line.shadows.or(self.own.map(|own| own.shadows))
     }
 
-    /// The current kind of shadows.
+    /// The current shadow type.
     pub(crate) fn shadows(&self) -> Shadows {
         self.toggles.shadows.or(self.base_shadows()).unwrap_or(Shadows::Soft)
     }

@@ -1,4 +1,4 @@
-//! State of saved files: scene files saved by the user, and images and cameras written by glimt.
+//! State of files saved by the user (scenes) or written by glimt (images and cameras).
 
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -31,9 +31,9 @@ pub(crate) struct WrittenFile {
     pub bytes: u64,
     /// Generation of the request that wrote the file.
     pub generation: u64,
-    /// Description of the written image, if known.
+    /// Description of the written image. Empty if not known yet.
     pub made: String,
-    /// Changes made with keys that the file includes. `None` for the scene's own image.
+    /// Changes made with keys and included in the file. `None` for the scene's own image.
     pub shows: Option<KeyOverrides>,
     /// Whether the image was written before its render finished.
     pub is_unfinished: bool,
@@ -70,14 +70,14 @@ pub(crate) struct SavingState {
     pub change: Option<PendingChange>,
     /// Time when the editor last exited.
     pub editor_closed: Option<Instant>,
-    /// Time between the last save and its first changed cell on the screen, excluding time spent in the
-    /// editor.
+    /// Time from the last save until its first changed cell appeared on the screen, excluding time spent in
+    /// the editor.
     pub first_change: Option<Duration>,
     /// Time when glimt wrote the camera into the scene file.
     pub camera_kept: Option<Instant>,
     /// Whether an older render was displayed when the camera was last saved.
     pub is_camera_of_newest: bool,
-    /// Cameras written into the scene file that can be undone, from oldest to newest.
+    /// Camera edits in the scene file that can be undone, from oldest to newest.
     pub camera_edits: Vec<CameraEdit>,
     /// Whether there is a scene file next to the model. `c` does not overwrite it.
     pub has_scene_of_model: bool,
@@ -88,7 +88,7 @@ pub(crate) struct SavingState {
 
     /// Whether the next image to be written was requested with a key.
     pub is_write_requested: bool,
-    /// Key changes in effect when a write was last requested.
+    /// Changes made with keys that were in effect when a write was last requested.
     pub write_shows: KeyOverrides,
     /// Why the current image was not written, if it should have been.
     pub unwritten: Option<String>,

@@ -37,7 +37,7 @@ pub(crate) struct SelectionState {
     pub purpose: PickPurpose,
     /// Information about the inspected object, until a key is pressed.
     pub facts: Option<Vec<String>>,
-    /// Values inspected with the last click, in one line.
+    /// One-line text with the values inspected by the last click.
     pub clicked: Option<String>,
     /// Where the inspected object is defined in the scene file.
     pub picked: Option<FilePosition>,

@@ -54,7 +54,7 @@ pub(crate) struct WorkState {
     /// Time when the request was paused.
     pub paused_at: Option<Instant>,
     pub stages: [Option<StageReport>; Stage::ALL.len()],
-    /// Duration of each stage the last time it ran before this request.
+    /// Duration of each stage's most recent run before this request.
     pub last_seconds: [Option<f64>; Stage::ALL.len()],
     pub assets: Vec<AssetBar>,
     pub progress: Option<RenderProgress>,
@@ -133,7 +133,8 @@ impl WorkState {
         }
     }
 
-    /// Like [`WorkState::running_time`], plus the time that earlier requests spent on the same samples.
+    /// Like [`WorkState::running_time`], but includes the time that earlier requests spent on the same
+    /// samples.
     pub(crate) fn rendering_time(&self, now: Instant) -> Option<Duration> {
         let earlier = self.progress.map_or(0.0, |progress| progress.earlier_seconds);
         let earlier = Duration::try_from_secs_f64(earlier).unwrap_or_default();

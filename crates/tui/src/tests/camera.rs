@@ -1,4 +1,4 @@
-//! Tests of the requests and messages that camera keys cause.
+//! Tests of the requests and messages triggered by camera keys.
 
 use super::{BLUE, RED};
 use crate::event::{Effect, Event, KeyPress};
@@ -227,7 +227,7 @@ fn save(ui: &mut TestUi, camera: Viewpoint) {
     show(ui);
 }
 
-/// The camera that pressing `c` asks the worker to write. `None` if nothing is written.
+/// Presses `c` and returns the camera that the worker is asked to write. `None` if nothing is written.
 fn kept(ui: &mut TestUi) -> Option<Viewpoint> {
     let is_order = |effect: Effect| match effect {
         Effect::Send(Command::KeepCamera(moved)) => Some(moved.camera),

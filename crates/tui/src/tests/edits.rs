@@ -19,7 +19,7 @@ fn save_broken_scene(ui: &mut TestUi) {
     ui.handle_event(Event::Settled);
 }
 
-/// A preview of an image with all or some of its samples.
+/// Sends a preview of a finished or unfinished image.
 fn preview(ui: &mut TestUi, name: &str, color: [u8; 3], is_finished: bool) {
     let generation = ui.state.request.generation;
     let source = Some(PreviewSource { image: FingerprintHasher::new(name).finish(), is_finished });
@@ -341,7 +341,7 @@ fn reset_settings_are_listed_together() {
 }
 
 #[test]
-fn pinhole_is_reported_for_both_keys() {
+fn d_and_f_report_a_pinhole_camera() {
     for text in ["[camera]\nfov = 40", "[camera]\naperture = 0.0"] {
         let mut ui = TestUi::new();
         ui.save_scene(text);

@@ -71,7 +71,7 @@ fn first_change_is_measured_from_the_save() {
 }
 
 #[test]
-fn only_a_requests_first_preview_is_urgent() {
+fn only_the_first_preview_is_urgent() {
     let mut ui = TestUi::new();
     let picture = |ui: &mut TestUi, generation| {
         ui.state.urgent = false;

@@ -37,11 +37,11 @@ struct SimulatedConnection {
 
 const FAST: SimulatedConnection =
     SimulatedConnection { bytes_per_second: 2e7, round_trip: Duration::from_millis(1) };
-/// A slow connection of 1 Mbit/s.
+/// A slow 1 Mbit/s connection.
 const SLOW: SimulatedConnection =
     SimulatedConnection { bytes_per_second: 125e3, round_trip: Duration::from_millis(150) };
 
-/// A terminal with its screen content and pending replies.
+/// A simulated terminal with its screen content and pending replies.
 struct SimulatedTerminal {
     line: SimulatedConnection,
     /// Time when the connection becomes idle.
@@ -50,10 +50,10 @@ struct SimulatedTerminal {
     answers: VecDeque<(Instant, TerminalReply)>,
     cells: vt100::Parser,
     pixels: TestImageTerminal,
-    /// Bytes received, and the number of bytes sent.
+    /// Bytes that have arrived, and the number of bytes sent.
     bytes: Vec<u8>,
     sent: usize,
-    /// Unacknowledged slices, as reply times and sizes, and the maximum number of unacknowledged bytes so
+    /// Reply time and size of each unacknowledged slice, and the maximum number of unacknowledged bytes so
     /// far.
     unanswered: VecDeque<(Instant, usize)>,
     most_unanswered: usize,
@@ -189,14 +189,14 @@ impl WatchedRender {
         }
     }
 
-    /// Runs until the given fraction of the render is done.
+    /// Runs until `fraction` of the render is done.
     fn until(&mut self, fraction: f64) {
         let end = self.begin + Duration::from_secs_f64(SECONDS * fraction);
         self.advance(end, true);
     }
 
-    /// Holds down a camera key for the given time. The worker produces the first preview of each step soon
-    /// after its request.
+    /// Holds down a camera key for `time`. The worker produces each step's first preview soon after the step
+    /// is requested.
     fn orbit(&mut self, time: Duration) {
         const REPEAT: Duration = Duration::from_millis(33);
         const FIRST: Duration = Duration::from_millis(12);
@@ -304,7 +304,7 @@ impl WatchedRender {
     }
 }
 
-/// A room in muted colors, with the noise of a render with `samples` samples per pixel.
+/// A room in muted colors, as noisy as a render with `samples` samples per pixel.
 fn picture((width, height): (u32, u32), samples: f64, turn: u32) -> Picture {
     /// Noise of a single sample in code values, similar to a Cornell box.
     const NOISE: f64 = 1.2;

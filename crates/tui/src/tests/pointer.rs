@@ -368,7 +368,7 @@ fn clicks_in_a_close_up_select_the_right_pixel() {
     ui.press('x');
     let around = ui.state.request.preview_size.expect("a size").around;
     assert_eq!(around, Some(spot));
-    // 20 × 10 image pixels, fewer than would fit.
+    // The section has 20 × 10 image pixels, and more would fit.
     let section = Some(Section { left: 0.2, top: 0.4, width: 0.1, height: 0.2 });
     let generation = ui.state.request.generation;
     let picture = uniform_picture(20, 10, BLUE);

@@ -17,7 +17,7 @@ use crate::terminals::{TerminalBrand, TerminalId};
 use crate::view;
 use crate::view::layout::Layout;
 
-/// Simulates a render with the target `error`, whose noise falls from 10 % after one second.
+/// Simulates a render with the target `error`. Its noise is 10 % after one second and keeps falling.
 fn rendered(ui: &mut TestUi, error: f32) {
     let generation = ui.state.request.generation;
     ui.worker_event(protocol::Event::Started { generation });
@@ -131,7 +131,7 @@ fn history_lists_changes_and_opens_on_click() {
     assert!(panel(&mut ui).contains("▸3 shadows hard"), "{}", ui.text());
     let all = cells_of(&mut ui, BLUE);
     assert!(all > 5 && all < 100, "expected a thumbnail: {all}");
-    // Find a cell of the blue thumbnail.
+    // Find a cell in the blue thumbnail.
     let buffer = ui.draw_screen();
     let blue = ratatui::style::Color::Rgb(BLUE[0], BLUE[1], BLUE[2]);
     let places = buffer.area.positions();
@@ -149,7 +149,7 @@ fn history_lists_changes_and_opens_on_click() {
     assert!(panel(&mut ui).contains("▸3") && cells_of(&mut ui, RED) > 500);
 }
 
-/// Saves the scene and starts its render. If a color is given, shows a preview in that color.
+/// Saves the scene and starts its render. If `color` is set, shows a preview in that color.
 fn start_render(ui: &mut TestUi, text: &str, color: Option<[u8; 3]>) {
     ui.save_scene(text);
     ui.read_scene();
@@ -185,7 +185,7 @@ fn small_color(ui: &TestUi) -> [u8; 3] {
 }
 
 #[test]
-fn entry_shows_a_preview_drawn_after_the_end() {
+fn entry_shows_preview_drawn_after_render_ends() {
     let mut ui = TestUi::with(state(120, 40));
     edited(&mut ui, &[("camera.fov = 40", RED)]);
     start_render(&mut ui, "camera.fov = 30", Some([0, 0, 0]));
@@ -204,7 +204,7 @@ fn entry_shows_a_preview_drawn_after_the_end() {
 }
 
 #[test]
-fn hidden_entry_shows_preview_drawn_after_end() {
+fn hidden_entry_gets_preview_drawn_after_end() {
     let mut ui = TestUi::with(state(120, 40));
     edited(&mut ui, &[("camera.fov = 40", RED)]);
     start_render(&mut ui, "camera.fov = 30", Some([0, 0, 0]));

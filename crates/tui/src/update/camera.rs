@@ -21,20 +21,20 @@ const TURN: f64 = 3.0;
 const NEARER: f64 = 0.95;
 /// Factor by which a zoom step changes the field of view.
 const WIDER: f64 = 1.05;
-/// A field of view that differs from the original by no more than this is considered equal, because each step
-/// is rounded. Steps are larger than this.
+/// Two fields of view that differ by at most this are considered equal, because each step is rounded. Steps
+/// are larger than this.
 const ROUNDING: f64 = 0.015;
 /// Size of an exposure step in stops.
 const STOPS: f32 = 0.25;
 /// Limit of the exposure in stops, in either direction.
 const MAX_STOPS: f32 = 20.0;
 
-/// Orbits the camera to the right and up, by the given numbers of steps.
+/// Orbits the camera by `right` steps to the right and `up` steps upward.
 pub(super) fn orbit(state: &mut State, right: f64, up: f64) -> Vec<Effect> {
     orbit_by(state, right * TURN, up * TURN)
 }
 
-/// Orbits the camera to the right and up, by angles in degrees.
+/// Orbits the camera by `right` degrees to the right and `up` degrees upward.
 pub(super) fn orbit_by(state: &mut State, right: f64, up: f64) -> Vec<Effect> {
     move_camera(state, |pose| orbited(pose, right, up))
 }
@@ -169,7 +169,7 @@ pub(super) fn handle_saved_camera(state: &mut State, outcome: Result<SavedCamera
     effects
 }
 
-/// Asks the worker to undo the last camera written into the scene file.
+/// Asks the worker to undo the last camera edit in the scene file.
 pub(super) fn undo_saved_camera(state: &mut State) -> Vec<Effect> {
     match state.saving.camera_edits.last() {
         Some(edit) => vec![Effect::Send(Command::UndoCamera(edit.clone()))],
@@ -178,7 +178,7 @@ pub(super) fn undo_saved_camera(state: &mut State) -> Vec<Effect> {
     }
 }
 
-/// Handles the result of undoing a written camera.
+/// Handles the result of undoing a camera edit.
 pub(super) fn handle_undone_camera(state: &mut State, outcome: Result<PathBuf, String>) -> Vec<Effect> {
     let path = match outcome {
         Ok(path) => path,

@@ -16,7 +16,7 @@ pub(super) fn record_image(state: &mut State) {
     }
 }
 
-/// Records a new image of the newest request, even if an older one is being viewed. The last image often
+/// Records a new image for the newest request, even if an older render is being viewed. The last image often
 /// arrives after the render has ended. A section shown 1:1 never replaces a finished image.
 pub(super) fn record_newest(state: &mut State) {
     let is_over = !state.work.is_under_way();

@@ -89,7 +89,7 @@ fn change_and_redraw(state: &mut State, how: impl FnOnce(&mut State)) -> Vec<Eff
     Vec::new()
 }
 
-/// Whether a setting differs from `base`, its value before any key changed it.
+/// Whether a setting differs from `base`, the value it had before any key changed it.
 fn differs_from_base<T: PartialEq>(next: &T, base: Option<T>) -> bool {
     base.is_none_or(|base| *next != base)
 }

@@ -29,7 +29,7 @@ use super::view::layout::Layout;
 use crate::film::Picture;
 use crate::pipeline::protocol::{Command, OwnImageState};
 
-/// How long the window size must be unchanged before a new preview is requested.
+/// How long the window size must stay the same before a new preview is requested.
 const RESIZE_QUIET: Duration = Duration::from_millis(60);
 
 /// Creates the first render request.

@@ -225,7 +225,7 @@ fn format_vector(all: [f64; 3]) -> String {
     format!("({})", all.map(format_number).join(", "))
 }
 
-/// Formats a number with three significant digits, or with all digits before the decimal point.
+/// Formats a number with three significant digits, or more if it has more digits before the decimal point.
 fn format_number(number: f64) -> String {
     let digits = if number == 0.0 { 0.0 } else { 2.0 - libm::floor(libm::log10(number.abs())) };
     rounded(number, libm::pow(10.0, -digits.clamp(0.0, 3.0))).to_string()

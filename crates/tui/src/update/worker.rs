@@ -397,8 +397,8 @@ fn count_render(state: &mut State, unchanged: bool) {
     }
 }
 
-/// Completes the noise curve with the final measurement. If the image is unchanged or only its exposure
-/// differs, its curve is kept.
+/// Completes the noise curve with the final measurement. Keeps the existing curve if the image is unchanged
+/// or differs only in exposure.
 fn complete_noise_curve(state: &mut State, report: &Report, unchanged: bool) {
     let render = &report.stages[Stage::Render as usize];
     let origin = state.request.origin(false).without_exposure();

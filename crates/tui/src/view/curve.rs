@@ -1,4 +1,4 @@
-//! A small log-log chart of noise over time, with a line at the requested `error`.
+//! A small log-log chart that shows noise over time and a line at the requested `error`.
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;

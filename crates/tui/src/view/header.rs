@@ -24,7 +24,7 @@ use crate::scene::diagnostic::Severity;
 use crate::scene::sanitize::visible;
 use crate::state::{State, WorkerActivity};
 
-/// Minimum header width for a state block of fixed width.
+/// Minimum header width at which the state block has a fixed width.
 const WIDE: u16 = 60;
 /// Minimum width of a shortened scene name.
 const MIN_NAME: u16 = 6;

@@ -131,7 +131,7 @@ fn toggle_hints(state: &State) -> Vec<KeyHint> {
     all.into_iter().filter_map(hint).collect()
 }
 
-/// Currently useful hints: the urgent ones, and the others.
+/// Currently useful hints, divided into urgent hints and other hints.
 fn current_hints(state: &State) -> (Vec<KeyHint>, Vec<KeyHint>) {
     let overlay = |wanted: &[OverlayAction]| -> Vec<KeyHint> {
         let of = OVERLAY.iter().filter(|it| wanted.contains(&it.action) && !it.hint.is_empty());

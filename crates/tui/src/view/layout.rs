@@ -32,9 +32,9 @@ pub(super) const BLOCK: usize = 13;
 const TWO_LINES: u16 = 6;
 /// Windows with fewer rows than this have two lines of text.
 const THREE_LINES: u16 = 14;
-/// Width of a stage with its time and the time difference.
+/// Width of a stage's name, time and time difference.
 const SIDE_WIDTH: u16 = 23;
-/// Width of a stage, including the gap between stages.
+/// Width of a stage entry, including the gap between stages.
 pub(super) const ENTRY_WIDTH: u16 = 26;
 /// Minimum height of a panel next to the image, enough for half of the stages.
 const SIDE_HEIGHT: u16 = 4;
@@ -54,7 +54,7 @@ impl Layout {
         Self::new(state.display.window.columns, state.display.window.rows, shape, state.picture.is_alone)
     }
 
-    /// The size of the preview that fits into the window, in square pixels.
+    /// Size of the largest preview that fits into the window, assuming square pixels.
     pub(crate) fn preview_size(state: &State) -> Option<PreviewSize> {
         let area = Self::for_state(state).preview;
         let across = state.display.pixels_across();

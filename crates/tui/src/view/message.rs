@@ -119,7 +119,7 @@ fn message_position(state: &State, layout: &Layout, words: &str) -> MessagePosit
     MessagePosition::Over(if needed == 0 || above.is_empty() { room } else { above })
 }
 
-/// A line and the rows above it that may be covered by a long message.
+/// A line and, above it, the rows that a long message may cover.
 fn with_rows_above(layout: &Layout, line: Rect) -> Rect {
     // Skip empty areas, since their origin would extend the union.
     let areas = [layout.preview, layout.panel].into_iter().filter(|area| !area.is_empty());

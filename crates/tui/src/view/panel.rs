@@ -45,7 +45,7 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) -> ViewExtras
     drawn
 }
 
-/// The history entry at a cell of the history strip.
+/// Index of the history entry shown at a cell in the history strip.
 pub(super) fn history_entry_at(state: &State, area: Rect, place: (u16, u16)) -> Option<usize> {
     let PanelLayout { lines, columns, room } = panel_layout(state, area);
     side_panel::history_entry_at(state, area, rows_used(&lines, columns, room), place)
@@ -139,7 +139,7 @@ fn asset_line(state: &State, asset: &AssetBar, width: u16) -> StyledLine {
     vec![(name, Tone::Plain), (filled_squares, Tone::Working), (empty, Tone::Faint), (percent, Tone::Plain)]
 }
 
-/// Lines with the results, with one label and value per line.
+/// The results, as lines with one label and value each.
 fn result_lines(state: &State, width: u16) -> Vec<StyledLine> {
     let fact =
         |label: &str, value: String| vec![(format!("{label:<LABEL$} "), Tone::Faint), (value, Tone::Plain)];

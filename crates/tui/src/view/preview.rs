@@ -73,7 +73,7 @@ pub(crate) fn image_position_at(state: &State, column: u16, row: u16) -> Option<
     cells.contains((column, row).into()).then(spot)
 }
 
-/// The kind of preview to use if it must be drawn with cells.
+/// The preview kind to use if the preview must be drawn with cells.
 fn cell_based_kind(kind: PreviewKind, depth: ColorDepth) -> PreviewKind {
     match kind {
         PreviewKind::Pixels(_) => PreviewKind::from_choice(PreviewChoice::Auto, depth),
@@ -113,8 +113,8 @@ impl<'a> PreviewColors<'a> {
     }
 }
 
-/// Draws an image into these cells for a dark terminal that has xterm's colors and cells twice as tall as
-/// wide.
+/// Draws an image into these cells for a terminal with a dark background, xterm's colors, and cells twice as
+/// tall as wide.
 pub fn draw_for_dark_xterm(
     picture: &Picture,
     choice: PreviewChoice,
@@ -126,7 +126,7 @@ pub fn draw_for_dark_xterm(
     draw_image(picture, choice, inks, (area, 2.0))
 }
 
-/// Draws an image with the given color settings and cell aspect ratio.
+/// Draws an image with these color settings and this cell aspect ratio.
 pub(crate) fn draw_image(
     picture: &Picture,
     choice: PreviewChoice,
@@ -314,8 +314,7 @@ mod tests {
                         let placed = fit(width, height, (columns, rows), kind, aspect);
                         let shown_height = placed.height as f32 * aspect / per_cell;
                         let shown_width = placed.width as f32 / across;
-                        // Rounding adds up to half a pixel per side, or up to one cell if a cell has several
-                        // pixels.
+                        // Rounding can add half a pixel per side, or one cell if a cell has several pixels.
                         let is_fine = across > 1.0;
                         let (off_x, off_y) =
                             if is_fine { (1.0, aspect) } else { (0.5, 0.5 * aspect / per_cell) };

@@ -64,8 +64,8 @@ impl AsciiRamp {
         self.nearest_glyph(self.stretch(linear_to_srgb(luminance(srgb8_to_linear(rgb)).clamp(0.0, 1.0))))
     }
 
-    /// The character for a color and the color of its ink. The ink is as saturated as possible, which
-    /// maximizes the area covered by the character.
+    /// The character that shows a color, and the character's ink color. The ink is as saturated as possible,
+    /// which maximizes the area covered by the character.
     pub(super) fn tinted_glyph(self, rgb: [u8; 3]) -> (char, [u8; 3]) {
         let linear = srgb8_to_linear(rgb);
         if self.is_light {

@@ -55,7 +55,7 @@ pub(super) fn draw(state: &State, panel: Rect, lines: u16, buffer: &mut Buffer) 
     [curve, strip].into_iter().filter(|area| !area.is_empty()).reduce(Rect::union).unwrap_or_default()
 }
 
-/// The history entry at a cell of the history strip.
+/// Index of the history entry shown at a cell in the history strip.
 pub(super) fn history_entry_at(state: &State, panel: Rect, lines: u16, place: (u16, u16)) -> Option<usize> {
     let (_, strip) = divide_curve_and_strip(state, panel, lines);
     strip::entry_at(state, strip, place)

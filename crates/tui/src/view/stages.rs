@@ -1,4 +1,4 @@
-//! The stages, with one line per stage during a render and a single line for all of them afterwards.
+//! The stages. Each stage has its own line during a render, and all share a single line afterwards.
 
 use super::text::{
     Tone, format_count, format_time_difference, seconds, text_columns, truncated_text, wrapped,
@@ -13,7 +13,7 @@ pub(super) type StyledLine = Vec<(String, Tone)>;
 
 /// Stages that took less than this fraction of the total time are omitted from the summary line.
 const SMALL: f64 = 0.02;
-/// Width of a stage's name and time, including the gap between them.
+/// Combined width of a stage's name and time, including the gap between them.
 const TIME_ENDS: u16 = 16;
 /// Minimum width of a stage's shortened reason.
 const MIN_WHY: u16 = 12;

@@ -65,7 +65,7 @@ fn status_content(state: &State) -> StatusContent {
     }
 }
 
-/// Number of columns of the status line that a message must not use.
+/// Number of columns in the status line that a message must not use.
 pub(super) fn reserved_columns(state: &State, layout: &Layout) -> u16 {
     match status_content(state) {
         StatusContent::Nothing => 0,
@@ -277,8 +277,8 @@ fn is_unreadable(state: &State) -> bool {
     diagnostics.is_some_and(|all| all.iter().all(|one| one.place.is_none()))
 }
 
-/// Cost of sending the last preview in two variants: the number of bytes with the round-trip time, and
-/// without it.
+/// Two texts about the cost of sending the last preview: the number of bytes with and without the round-trip
+/// time.
 fn preview_cost_variants(state: &State) -> Vec<String> {
     let Some(frame) = state.display.frame else { return Vec::new() };
     let cost = |time| messages::preview_cost(frame.bytes.div_ceil(1000), time);

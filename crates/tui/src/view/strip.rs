@@ -11,7 +11,8 @@ use crate::state::State;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-/// Height of an entry's thumbnail, height of the whole entry, and distance between entries, in rows.
+/// Row counts in the strip: height of a thumbnail, height of an entry, and distance from one entry's top to
+/// the next.
 #[derive(Clone, Copy)]
 struct EntryRows {
     picture: u16,
@@ -26,7 +27,7 @@ const WIDE_ROWS: EntryRows = EntryRows { picture: 5, entry: 5, pitch: 6 };
 const WIDE: u16 = 40;
 /// Minimum width of the text next to a thumbnail.
 const MIN_WORDS: u16 = 10;
-/// Width of a column of the strip if there is more than one.
+/// Column width in a strip with several columns.
 const COLUMN: u16 = 44;
 
 /// A history entry and its position in the strip.
@@ -76,7 +77,7 @@ fn draw_entry(state: &State, StripEntry { index, cells, rows }: &StripEntry, buf
     }
 }
 
-/// Number of the render that produced an entry, or a dash if it was stopped.
+/// Number of the render that produced an entry, or a dash if the render was stopped.
 fn render_label(state: &State, index: usize) -> String {
     let under_way = is_under_way(state, index).then_some(state.work.renders + 1);
     state.picture.history.run(index).or(under_way).map_or("–".to_owned(), |run| run.to_string())
@@ -87,7 +88,7 @@ fn is_under_way(state: &State, index: usize) -> bool {
     state.work.is_under_way() && state.picture.history.belongs_to_request(index, state.request.generation)
 }
 
-/// Width of a thumbnail with this height, limited to leave space for text.
+/// Width of a thumbnail, given its height. Limited to leave space for text.
 fn thumbnail_width(state: &State, picture: &Picture, cells: Rect) -> u16 {
     let shape = picture.width as f32 / picture.height.max(1) as f32 * state.display.window.cell_aspect;
     let width = (f32::from(cells.height) * shape).round() as u16;
@@ -130,7 +131,7 @@ fn visible_entries(state: &State, area: Rect) -> Vec<StripEntry> {
     (0..shown).map(item).collect()
 }
 
-/// Index of the history entry at a cell of the strip.
+/// Index of the history entry shown at a cell in the strip.
 pub(super) fn entry_at(state: &State, area: Rect, (column, row): (u16, u16)) -> Option<usize> {
     let is_there = |item: &StripEntry| item.cells.contains((column, row).into());
     visible_entries(state, area).into_iter().find(is_there).map(|item| item.index)

@@ -1,4 +1,4 @@
-//! The text of a history entry. Shows as many changes as fit, and always the new value.
+//! The text of a history entry. It shows as many changes as fit. New values are always complete.
 
 use unicode_width::UnicodeWidthStr;
 
@@ -20,16 +20,16 @@ enum ChangeForm {
     Full,
     /// The key with its new value.
     New,
-    /// The last parts of the key, which identify an object and its property, and the new value.
+    /// The new value, and only the last parts of the key, which identify an object and its property.
     Short,
-    /// Like `Short`, but with only the given number of changes.
+    /// Like `Short`, but with only this many changes.
     First(usize),
     /// The first change, with the property shortened to one line.
     Cut,
 }
 
-/// Formats the text as lines of `width` columns. Tries to fit it into the first number of rows, then into the
-/// second. If it fits neither, the excess is appended to the last line.
+/// Formats the text as lines of `width` columns. Tries to fit it into `rows[0]` rows, then into `rows[1]`. If
+/// it fits neither, the excess is appended to the last line.
 pub(super) fn fit_text(words: &EntryText, width: usize, rows: [usize; 2]) -> Vec<String> {
     let [few, most] = rows;
     let all = [ChangeForm::Full, ChangeForm::New, ChangeForm::Short];

@@ -10,7 +10,8 @@ use unicode_width::{UnicodeWidthChar, UnicodeWidthStr};
 use crate::color::ColorDepth;
 pub(super) use crate::pipeline::words::seconds;
 
-/// Role of a piece of text. Its color is one of the 16 ANSI colors, so it matches the terminal's theme.
+/// Role of a piece of text. Each role's color is one of the 16 ANSI colors, so it matches the terminal's
+/// theme.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Tone {
     Plain,
@@ -103,7 +104,7 @@ pub(super) fn put_text_right(
     put_text(buffer, Rect { x: area.right() - width, width, ..area }, &[(text, tone)], depth)
 }
 
-/// Width of a text in columns.
+/// Width of a string in columns.
 pub(crate) fn text_columns(text: &str) -> u16 {
     u16::try_from(text.width()).unwrap_or(u16::MAX)
 }
@@ -217,7 +218,7 @@ pub(super) fn format_time_difference(seconds: f64, before: Option<f64>) -> Strin
     }
 }
 
-/// A thin progress bar, `columns` wide, as its filled and empty parts.
+/// Filled and empty parts of a thin progress bar that is `columns` wide.
 pub(super) fn progress_bar_parts(fraction: f64, columns: u16, ascii: bool) -> (String, String) {
     let (full, empty) = if ascii { ("#", "-") } else { ("━", "─") };
     let columns = usize::from(columns);

@@ -67,8 +67,8 @@ fn draw_view_line(
     put_text(buffer, place, &pieces, state.display.depth);
 }
 
-/// The area of the list. It has one column if the panel is tall enough, and otherwise as many columns as
-/// necessary.
+/// The area for the list, which has one column if the panel is tall enough and as many columns as necessary
+/// otherwise.
 fn list_area(layout: &Layout) -> Rect {
     let all = View::ALL.len() as u16;
     let panel = layout.panel;

@@ -1,4 +1,4 @@
-//! Construction with the binned surface area heuristic (Wald, *On fast Construction of SAH-based Bounding
+//! BVH construction with the binned surface area heuristic (Wald, *On fast Construction of SAH-based Bounding
 //! Volume Hierarchies*, 2007). Both halves of a large node are built in parallel. The tree does not depend on
 //! the number of threads.
 
@@ -16,10 +16,10 @@ const PARALLEL_SIZE: usize = 4096;
 /// Cost of a traversal step relative to a primitive test.
 const TRAVERSAL_COST: f32 = 1.0;
 
-/// Minimum number of nested primitives that makes shells worthwhile.
+/// Minimum number of primitives for which splitting by size and shells are worthwhile.
 const NESTED_SIZE: usize = 64;
 
-/// Minimum cost of the best plane, relative to not splitting, for testing whether the boxes are nested.
+/// The boxes are tested for nesting only if the best plane costs at least this fraction of not splitting.
 const NESTED_COST: f32 = 0.9;
 
 /// Nested boxes are split by size if that costs less than this fraction of the best plane's cost.
@@ -27,12 +27,12 @@ const SIZE_SPLIT_COST: f32 = 0.9;
 
 /// A box and its id during construction.
 #[derive(Clone, Copy)]
-pub(super) struct Reference {
+pub(super) struct PrimitiveReference {
     pub(super) bounds: Aabb,
     id: u32,
 }
 
-impl Reference {
+impl PrimitiveReference {
     /// Twice the center of the box.
     fn centroid(&self) -> Vec3 {
         self.bounds.min + self.bounds.max
@@ -55,11 +55,11 @@ impl Bvh {
     /// # Errors
     /// [`Cancelled`] if the build was canceled.
     pub fn build(boxes: &[Aabb], token: &CancelToken) -> Result<Self, Cancelled> {
-        let mut references: Vec<Reference> = boxes
+        let mut references: Vec<PrimitiveReference> = boxes
             .iter()
             .enumerate()
             .filter(|(_, bounds)| !bounds.is_empty() && bounds.extent().is_finite())
-            .map(|(id, &bounds)| Reference { bounds, id: id as u32 })
+            .map(|(id, &bounds)| PrimitiveReference { bounds, id: id as u32 })
             .collect();
         if references.is_empty() {
             let (nodes, order) = (Vec::new(), Vec::new());
@@ -105,7 +105,7 @@ struct OutputPosition {
 
 /// Builds a subtree over `references`. It has fewer nodes than references.
 fn build_subtree(
-    references: &mut [Reference],
+    references: &mut [PrimitiveReference],
     nodes: &mut [BinaryNode],
     start: OutputPosition,
     token: &CancelToken,
@@ -145,12 +145,16 @@ fn build_subtree(
 
 /// Partitions the references into two halves. Returns the size of the first half and whether the split was by
 /// size, or `None` if a leaf is cheaper.
-fn partition(references: &mut [Reference], bounds: Aabb, start: &OutputPosition) -> Option<(usize, bool)> {
+fn partition(
+    references: &mut [PrimitiveReference],
+    bounds: Aabb,
+    start: &OutputPosition,
+) -> Option<(usize, bool)> {
     let count = references.len();
     if count == 1 {
         return None;
     }
-    let centroids = Aabb::around(references.iter().map(Reference::centroid));
+    let centroids = Aabb::from_points(references.iter().map(PrimitiveReference::centroid));
     let split = (start.depth < SURFACE_AREA_LEVELS).then(|| best_split(references, centroids)).flatten();
     let is_above_median = start.depth < SURFACE_AREA_LEVELS;
     match split {
@@ -179,7 +183,7 @@ fn partition(references: &mut [Reference], bounds: Aabb, start: &OutputPosition)
 }
 
 /// Moves the half with the smaller boxes to the front and returns its length.
-fn smaller_half(references: &mut [Reference]) -> usize {
+fn smaller_half(references: &mut [PrimitiveReference]) -> usize {
     let middle = references.len() / 2;
     references.select_nth_unstable_by(middle, |a, b| {
         a.bounds.half_area().total_cmp(&b.bounds.half_area()).then(a.id.cmp(&b.id))
@@ -187,9 +191,9 @@ fn smaller_half(references: &mut [Reference]) -> usize {
     middle
 }
 
-/// Whether splitting by size is much cheaper than the best plane. If boxes are nested, any plane leaves boxes
-/// of nearly full size on both sides.
-fn is_nested(references: &mut [Reference], bounds: Aabb, split: &Split) -> bool {
+/// Whether splitting by size is much cheaper than splitting at the best plane. If boxes are nested, any plane
+/// leaves boxes of nearly full size on both sides.
+fn is_nested(references: &mut [PrimitiveReference], bounds: Aabb, split: &Split) -> bool {
     let count = references.len() as f32;
     if split.cost < NESTED_COST * bounds.half_area() * count {
         return false;
@@ -200,19 +204,19 @@ fn is_nested(references: &mut [Reference], bounds: Aabb, split: &Split) -> bool 
     cost < SIZE_SPLIT_COST * split.cost
 }
 
-/// A plane between two bins of an axis.
+/// A plane between two bins on an axis.
 struct Split {
     axis: usize,
     start: f32,
     bins_per_length: f32,
     /// Bins below this one are on the left.
     bin: usize,
-    /// Sum of primitive count × surface area over both sides.
+    /// Sum over both sides of primitive count times surface area.
     cost: f32,
 }
 
 impl Split {
-    fn is_left(&self, reference: &Reference) -> bool {
+    fn is_left(&self, reference: &PrimitiveReference) -> bool {
         bin_of(reference.centroid()[self.axis], self.start, self.bins_per_length) < self.bin
     }
 }
@@ -222,7 +226,7 @@ fn bin_of(centroid: f32, start: f32, bins_per_length: f32) -> usize {
 }
 
 /// Finds the cheapest plane between bins. `None` if all centroids coincide.
-fn best_split(references: &[Reference], centroids: Aabb) -> Option<Split> {
+fn best_split(references: &[PrimitiveReference], centroids: Aabb) -> Option<Split> {
     let extent = centroids.extent();
     let bins_per_length = extent.map(|length| BINS as f32 / length);
     let mut bounds = [[Aabb::EMPTY; BINS]; 3];
@@ -250,7 +254,7 @@ fn best_split(references: &[Reference], centroids: Aabb) -> Option<Split> {
         .min_by(|a, b| a.cost.total_cmp(&b.cost))
 }
 
-/// Finds the cheapest plane by sweeping over the bins of an axis from both ends.
+/// Finds the cheapest plane by sweeping over the bins on an axis from both ends.
 fn cheapest_plane(bounds: &[Aabb; BINS], counts: &[u32; BINS]) -> Option<(usize, f32)> {
     let mut right_cost = [0.0_f32; BINS];
     let (mut box_so_far, mut count) = (Aabb::EMPTY, 0);
@@ -273,7 +277,10 @@ fn cheapest_plane(bounds: &[Aabb; BINS], counts: &[u32; BINS]) -> Option<(usize,
 }
 
 /// Moves the references that satisfy `is_left` to the front and returns their number.
-fn partition_by(references: &mut [Reference], is_left: impl Fn(&Reference) -> bool) -> usize {
+fn partition_by(
+    references: &mut [PrimitiveReference],
+    is_left: impl Fn(&PrimitiveReference) -> bool,
+) -> usize {
     let (mut start, mut end) = (0, references.len());
     while start < end {
         if is_left(&references[start]) {
@@ -301,7 +308,7 @@ mod tests {
     use super::*;
 
     fn built(boxes: &[Aabb]) -> Bvh {
-        let tree = Bvh::build(boxes, &CancelToken::new()).expect("nobody cancels");
+        let tree = Bvh::build(boxes, &CancelToken::new()).expect("never canceled");
         tree.validate(boxes).expect("a valid tree");
         tree
     }

@@ -7,7 +7,7 @@
 use arrayvec::ArrayVec;
 use glimt_base::reduce;
 
-use super::top_node::Beam;
+use super::top_node::PacketBounds;
 use super::{Bvh, ChildRef, DEEP_STACK};
 use crate::accel::{F32x16, PACKET_SIZE};
 use crate::geometry::Aabb;
@@ -15,10 +15,10 @@ use crate::geometry::aabb::SLAB_PAD;
 use crate::geometry::packet::{RayPacket, lanes};
 use crate::math::lanes::{Simd, TRUE};
 
-/// Callback that finds the nearest hits of a packet.
+/// Callback that finds the nearest hits for a packet.
 pub trait ClosestHitCallback {
-    /// Tests a primitive against the rays in `met`. If a ray hits the primitive, its end is moved to the hit.
-    /// Primitives exactly at a ray's end are still tested because ties are broken by id.
+    /// Tests a primitive against the rays in `met`. If a ray hits the primitive, the ray's end is moved to
+    /// the hit. Primitives exactly at a ray's end are still tested because ties are broken by id.
     fn test(&mut self, id: u32, met: u32, ends: &mut F32x16);
 }
 
@@ -50,7 +50,7 @@ impl<'a> SlabPacket<'a> {
     }
 
     #[inline(always)]
-    fn enter(&self, bounds: &Aabb, ends: &F32x16) -> SlabIntervals {
+    fn entry_intervals(&self, bounds: &Aabb, ends: &F32x16) -> SlabIntervals {
         let (min, max) = (bounds.min.to_array(), bounds.max.to_array());
         let mut stretches = SlabIntervals { near: [0.0; PACKET_SIZE], far: [0.0; PACKET_SIZE] };
         for (lane, &end) in ends.iter().enumerate() {
@@ -72,7 +72,7 @@ impl<'a> SlabPacket<'a> {
 }
 
 impl SlabIntervals {
-    /// Smallest distance at which a ray that hits the box enters it. Compares bit patterns, which order
+    /// Smallest entry distance among the rays that hit the box. Compares bit patterns, which order
     /// nonnegative floats correctly and ignore NaN.
     #[inline(always)]
     fn nearest_entry(&self) -> f32 {
@@ -95,7 +95,7 @@ fn hit_mask(stretches: &SlabIntervals, simd: impl Simd) -> u32 {
     simd.movemask(&met)
 }
 
-/// Largest end of all rays; negative if no ray is traced. Compares bits as in
+/// Largest end among all rays; negative if no ray is traced. Compares bits as in
 /// [`SlabIntervals::nearest_entry`].
 #[inline(always)]
 fn largest_end(ends: &F32x16) -> f32 {
@@ -110,7 +110,7 @@ fn largest_end(ends: &F32x16) -> f32 {
 /// child.
 type PacketStack = ArrayVec<(f32, u32, ChildRef), DEEP_STACK>;
 
-/// Subtrees of the top node that have not been visited yet, nearest last.
+/// Unvisited subtrees of the top node, nearest last.
 struct PendingSubtrees {
     entry: F32x16,
     order: [u8; PACKET_SIZE],
@@ -142,7 +142,7 @@ impl PendingSubtrees {
 }
 
 impl Bvh {
-    /// Mask of the top node's subtrees that the packet may hit, with lower bounds on their entry distances.
+    /// Mask of the top node's subtrees that the packet may hit, and lower bounds on their entry distances.
     #[inline(always)]
     fn hit_top_subtrees(
         &self,
@@ -154,10 +154,10 @@ impl Bvh {
         if traced == 0 {
             return (0, [0.0; PACKET_SIZE]);
         }
-        self.top.hit_subtrees(&Beam::around(slabs.origin, &slabs.inverse, (ends, traced), simd), simd)
+        self.top.hit_subtrees(&PacketBounds::around(slabs.origin, &slabs.inverse, (ends, traced), simd), simd)
     }
 
-    /// Tests the primitives outside the tree, then visits the leaves that any ray of the packet may hit,
+    /// Tests the primitives outside the tree, then visits the leaves that any ray in the packet may hit,
     /// roughly front to back. `traced` is the mask of active rays.
     #[inline(always)]
     pub fn closest_packet(
@@ -190,7 +190,7 @@ impl Bvh {
                             return;
                         }
                         let (bounds, child) = self.top.subtree(i);
-                        (entry, hit_mask(&slabs.enter(&bounds, ends), simd), child)
+                        (entry, hit_mask(&slabs.entry_intervals(&bounds, ends), simd), child)
                     }
                 };
                 if entry > end || in_it == 0 {
@@ -202,7 +202,10 @@ impl Bvh {
                     break;
                 }
                 let node = &self.nodes[child.first as usize];
-                let (left, right) = (slabs.enter(&node.bounds[0], ends), slabs.enter(&node.bounds[1], ends));
+                let (left, right) = (
+                    slabs.entry_intervals(&node.bounds[0], ends),
+                    slabs.entry_intervals(&node.bounds[1], ends),
+                );
                 let (left_met, right_met) = (hit_mask(&left, simd), hit_mask(&right, simd));
                 if left_met == 0 || right_met == 0 {
                     let side = usize::from(left_met == 0);
@@ -254,7 +257,7 @@ impl Bvh {
                         let (bounds, child) =
                             self.top.subtree(subtrees.trailing_zeros() as usize % PACKET_SIZE);
                         subtrees &= subtrees - 1;
-                        (hit_mask(&slabs.enter(&bounds, ends), simd), child)
+                        (hit_mask(&slabs.entry_intervals(&bounds, ends), simd), child)
                     }
                 };
                 if in_it & free == 0 {
@@ -267,7 +270,7 @@ impl Bvh {
                 }
                 let node = &self.nodes[child.first as usize];
                 for (bounds, child) in node.bounds.iter().zip(node.child) {
-                    let met = hit_mask(&slabs.enter(bounds, ends), simd);
+                    let met = hit_mask(&slabs.entry_intervals(bounds, ends), simd);
                     if met & free != 0 {
                         stack.push((0.0, met, child));
                     }

@@ -106,12 +106,14 @@ impl Shell {
 pub enum OverlappingItem {
     /// A primitive whose surface may intersect the box.
     Primitive(u32),
-    /// A subtree whose primitives all enclose the box, as an index into [`Bvh::last_primitives_of_subtrees`].
+    /// A subtree in which every primitive encloses the box, identified by its index in
+    /// [`Bvh::last_primitives_of_subtrees`].
     Enclosing(usize),
 }
 
 impl Bvh {
-    /// Whether the tree has shells. Single rays use them; packets visit the boxes and are slow in such trees.
+    /// Whether the tree has shells. Single rays use the shells. Packets use only the boxes, and are slow in
+    /// such trees.
     #[inline(always)]
     pub fn has_shells(&self) -> bool {
         self.shells.is_some()
@@ -189,7 +191,7 @@ impl Bvh {
                 continue;
             }
             let (node, shells) = (&self.nodes[first as usize], &shells[first as usize]);
-            for side in (0..2).filter(|&side| node.bounds[side].meets(other)) {
+            for side in (0..2).filter(|&side| node.bounds[side].overlaps(other)) {
                 match shells[side].box_position(other) {
                     ShellPosition::Outside => {}
                     ShellPosition::Near => stack.push(node.child[side]),
@@ -276,7 +278,7 @@ impl NestedRay {
 
     /// Lower bound on the distance at which the ray hits a surface. `None` if it misses the box or the shell.
     fn entry_distance(&self, bounds: &Aabb, shell: &Shell, t_max: f32) -> Option<f32> {
-        let of_box = self.slabs.enter(bounds.min, bounds.max, t_max)?;
+        let of_box = self.slabs.entry_distance(bounds.min, bounds.max, t_max)?;
         let of_shell = shell.entry_distance(&self.line)?;
         let entry = if of_shell > of_box { of_shell } else { of_box };
         (entry <= t_max * SLAB_PAD).then_some(entry)

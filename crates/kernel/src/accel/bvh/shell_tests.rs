@@ -4,8 +4,8 @@ use crate::geometry::sphere::Sphere;
 use crate::math::Vec3;
 use crate::math::random::signed as random;
 
-/// `count` nested spheres in shuffled order of size, with centers up to `spread` apart, and as many small
-/// spheres around them.
+/// `count` nested spheres in shuffled order, whose centers are up to `spread` apart, and the same number of
+/// small spheres around them.
 fn spheres(count: u32, spread: f32) -> Vec<Sphere> {
     let mut next = random(5);
     let mut vector = |size: f32| (Vec3::new(next(), next(), next()) * size).as_dvec3();
@@ -19,7 +19,7 @@ fn spheres(count: u32, spread: f32) -> Vec<Sphere> {
 
 fn tree(spheres: &[Sphere]) -> Bvh {
     let boxes: Vec<_> = spheres.iter().map(Sphere::bounds).collect();
-    let tree = Bvh::build(&boxes, &CancelToken::new()).expect("nobody cancels");
+    let tree = Bvh::build(&boxes, &CancelToken::new()).expect("never canceled");
     tree.validate(&boxes).expect("a valid tree");
     tree.with_shells(|id| Shell::sphere(spheres[id as usize].center, spheres[id as usize].radius))
 }
@@ -78,7 +78,7 @@ fn nested_box_queries_match_brute_force() {
         let mut next = random(3);
         for i in 0..500 {
             let at = Vec3::X + Vec3::new(next(), next(), next()) * 2.0;
-            let near = Aabb { min: at, max: at }.grown(Vec3::splat([1e-5, 0.1][i % 2]));
+            let near = Aabb { min: at, max: at }.expanded(Vec3::splat([1e-5, 0.1][i % 2]));
             let (mut visited, mut enclosing) = (Vec::new(), Vec::new());
             tree.visit_overlapping_surfaces(&near, |met| {
                 match met {

@@ -5,7 +5,7 @@
 //!
 //! [`SlabRay::enter`]: crate::geometry::aabb::SlabRay::enter
 
-use super::build::Reference;
+use super::build::PrimitiveReference;
 use super::{BinaryNode, Bvh, ChildRef};
 use crate::accel::{F32x16, PACKET_SIZE};
 use crate::geometry::Aabb;
@@ -35,7 +35,11 @@ impl TopNode {
 
     /// Creates a top node. While slots are free, replaces the largest nodes, then the largest leaves, with
     /// their children.
-    pub(super) fn new(root: (Aabb, ChildRef), nodes: &[BinaryNode], references: &[Reference]) -> Self {
+    pub(super) fn new(
+        root: (Aabb, ChildRef),
+        nodes: &[BinaryNode],
+        references: &[PrimitiveReference],
+    ) -> Self {
         let mut open = vec![root];
         while let Some(place) = largest_replaceable(&open, |child, room| child.count == 0 && room > 0) {
             let node = &nodes[open.swap_remove(place).1.first as usize];
@@ -81,9 +85,9 @@ impl TopNode {
         PortableSimd.movemask(&met) & self.used
     }
 
-    /// Mask of the subtrees that the rays of a beam may hit, with lower bounds on the entry distances.
+    /// Mask of the subtrees that the rays in a beam may hit, and lower bounds on the entry distances.
     #[inline(always)]
-    pub(super) fn hit_subtrees(&self, beam: &Beam, simd: impl Simd) -> (u32, F32x16) {
+    pub(super) fn hit_subtrees(&self, beam: &PacketBounds, simd: impl Simd) -> (u32, F32x16) {
         let (mut near, mut far) = ([0.0_f32; PACKET_SIZE], [beam.end * SLAB_PAD; PACKET_SIZE]);
         for axis in 0..3 {
             let [low, high] = beam.inverse[axis];
@@ -126,16 +130,16 @@ fn largest_replaceable(
 }
 
 /// Intervals that contain the coordinates of several rays.
-pub(super) struct Beam {
+pub(super) struct PacketBounds {
     /// Minimum and maximum coordinates of the origins.
     origin: [[f32; 2]; 3],
     /// Minimum and maximum coordinates of the inverse directions.
     inverse: [[f32; 2]; 3],
-    /// Largest end of all rays.
+    /// Largest end among all rays.
     end: f32,
 }
 
-impl Beam {
+impl PacketBounds {
     /// Bounds the rays in the mask `traced`, which must not be empty.
     #[inline(always)]
     pub(super) fn around(
@@ -167,7 +171,7 @@ mod tests {
     use crate::control::CancelToken;
     use crate::geometry::Ray;
     use crate::geometry::aabb::SlabRay;
-    use crate::geometry::packet::{RayPacket, lanes, traced};
+    use crate::geometry::packet::{RayPacket, active_lanes, lanes};
     use crate::math::random::signed as random;
 
     /// Records which primitives are tested for which rays.
@@ -198,7 +202,7 @@ mod tests {
                 Aabb { min: middle - half, max: middle + half }
             };
             let boxes: Vec<Aabb> = (0..count).map(|_| cell(&mut next)).collect();
-            let tree = Bvh::build(&boxes, &CancelToken::new()).expect("nobody cancels");
+            let tree = Bvh::build(&boxes, &CancelToken::new()).expect("never canceled");
             assert_eq!(tree.is_flat(), count <= PACKET_SIZE, "{count}");
             let (mut tested, mut met) = (0, 0);
             for round in 0..600 {
@@ -220,13 +224,13 @@ mod tests {
                     ends[lane] = -1.0;
                 }
                 let (mut closest, mut any) = (TestLog(vec![0; count]), TestLog(vec![0; count]));
-                let traced = traced(&ends, PortableSimd);
+                let traced = active_lanes(&ends, PortableSimd);
                 tree.closest_packet(&rows, &mut ends, traced, &[], &mut closest, PortableSimd);
                 tree.any_packet(&rows, &ends, traced, &[], &mut any, PortableSimd);
                 for (id, bounds) in boxes.iter().enumerate() {
                     for lane in lanes((1 << rays.len()) - 1).filter(|&lane| ends[lane] >= 0.0) {
                         let slabs = SlabRay::new(rays[lane].origin, rays[lane].direction);
-                        let is_met = slabs.enter(bounds.min, bounds.max, ends[lane]).is_some();
+                        let is_met = slabs.entry_distance(bounds.min, bounds.max, ends[lane]).is_some();
                         let seen = [closest.0[id], any.0[id]].map(|seen| seen & 1 << lane != 0);
                         assert!(!is_met || seen == [true; 2], "{lane} of {rays:?}: {bounds:?} {seen:?}");
                         met += u32::from(is_met);

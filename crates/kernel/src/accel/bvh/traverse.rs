@@ -46,7 +46,8 @@ impl Bvh {
                 }
             } else {
                 let node = &self.nodes[current.first as usize];
-                let enter = |side: usize| slabs.enter(node.bounds[side].min, node.bounds[side].max, t_max);
+                let enter =
+                    |side: usize| slabs.entry_distance(node.bounds[side].min, node.bounds[side].max, t_max);
                 let (left, right) = (enter(0), enter(1));
                 match (left, right) {
                     (Some(left), Some(right)) => {
@@ -132,7 +133,7 @@ impl Bvh {
                 }
                 let node = &self.nodes[current.first as usize];
                 let both = node.bounds.iter().zip(node.child);
-                stack.extend(both.filter(|(bounds, _)| bounds.meets(other)).map(|(_, child)| child));
+                stack.extend(both.filter(|(bounds, _)| bounds.overlaps(other)).map(|(_, child)| child));
             }
         }
     }
@@ -158,7 +159,7 @@ impl Bvh {
             let node = &self.nodes[current.first as usize];
             for side in 0..2 {
                 let bounds = &node.bounds[side];
-                if slabs.enter(bounds.min, bounds.max, ray.t_max).is_some() {
+                if slabs.entry_distance(bounds.min, bounds.max, ray.t_max).is_some() {
                     stack[size] = node.child[side];
                     size += 1;
                 }
@@ -178,8 +179,10 @@ mod tests {
     /// Brute-force nearest hit that treats each box as a solid.
     fn brute(boxes: &[Aabb], ray: &Ray) -> Option<(f32, u32)> {
         let slabs = SlabRay::new(ray.origin, ray.direction);
-        let hits =
-            boxes.iter().zip(0_u32..).filter_map(|(b, id)| Some((slabs.enter(b.min, b.max, ray.t_max)?, id)));
+        let hits = boxes
+            .iter()
+            .zip(0_u32..)
+            .filter_map(|(b, id)| Some((slabs.entry_distance(b.min, b.max, ray.t_max)?, id)));
         hits.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))
     }
 
@@ -193,33 +196,33 @@ mod tests {
                 Aabb { min: at, max: at + Vec3::ONE }
             })
             .collect();
-        let tree = Bvh::build(&boxes, &CancelToken::new()).expect("nobody cancels");
+        let tree = Bvh::build(&boxes, &CancelToken::new()).expect("never canceled");
         for _ in 0..5000 {
             let origin = Vec3::new(next(), next(), next()) * 20.0;
             let ray = Ray::new(origin, Vec3::new(next(), next(), next()) * 8.0 - origin);
             let slabs = SlabRay::new(ray.origin, ray.direction);
             let mut best: Option<(f32, u32)> = None;
             tree.closest(&ray, |id, t_max| {
-                let t = slabs.enter(boxes[id as usize].min, boxes[id as usize].max, t_max)?;
+                let t = slabs.entry_distance(boxes[id as usize].min, boxes[id as usize].max, t_max)?;
                 let better = best.is_none_or(|(least, least_id)| (t, id) < (least, least_id));
                 better.then(|| best = Some((t, id)))?;
                 Some(t)
             });
             assert_eq!(best, brute(&boxes, &ray));
             let any = tree.any(&ray, |id| {
-                slabs.enter(boxes[id as usize].min, boxes[id as usize].max, ray.t_max).is_some()
+                slabs.entry_distance(boxes[id as usize].min, boxes[id as usize].max, ray.t_max).is_some()
             });
             assert_eq!(any, best.is_some());
         }
         for center in boxes.iter().map(|own| own.min + Vec3::splat(0.25)) {
-            let other = Aabb { min: center, max: center }.grown(Vec3::new(0.1, 0.8, 0.5));
+            let other = Aabb { min: center, max: center }.expanded(Vec3::new(0.1, 0.8, 0.5));
             let mut found = vec![0; boxes.len()];
             tree.visit_overlapping(&other, |id| found[id as usize] += 1);
             assert!(
                 found
                     .iter()
                     .zip(&boxes)
-                    .all(|(&times, own)| times <= 1 && (!own.meets(&other) || times == 1))
+                    .all(|(&times, own)| times <= 1 && (!own.overlaps(&other) || times == 1))
             );
             assert!(found.iter().sum::<i32>() < 100, "{found:?}");
         }
@@ -230,7 +233,7 @@ mod tests {
         for count in 1..4 {
             let at = |i: usize| Vec3::splat(i as f32 * 3.0);
             let boxes: Vec<_> = (0..count).map(|i| Aabb { min: at(i), max: at(i) + Vec3::ONE }).collect();
-            let tree = Bvh::build(&boxes, &CancelToken::new()).expect("nobody cancels");
+            let tree = Bvh::build(&boxes, &CancelToken::new()).expect("never canceled");
             let nan = Ray { t_max: f32::NAN, ..Ray::new(Vec3::NAN, Vec3::NAN) };
             for ray in [nan, Ray { t_max: f32::INFINITY, ..nan }, Ray::new(Vec3::ZERO, Vec3::NAN)] {
                 let mut tests = 0;

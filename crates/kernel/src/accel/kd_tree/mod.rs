@@ -85,7 +85,7 @@ impl KdTree {
     /// triangles were visited.
     pub fn visit_overlapping_while(&self, other: &Aabb, mut visit: impl FnMut(u32) -> bool) -> bool {
         let mut pending = [0_u32; traverse::STACK_SIZE];
-        let mut size = usize::from(!self.nodes.is_empty() && self.bounds.meets(other));
+        let mut size = usize::from(!self.nodes.is_empty() && self.bounds.overlaps(other));
         while size > 0 {
             size -= 1;
             let mut place = pending[size];

@@ -65,7 +65,7 @@ impl KdNode {
         }
     }
 
-    /// The node with its indices offset by the given numbers of preceding nodes and references.
+    /// Offsets the node's indices by the numbers of preceding nodes and references.
     pub fn offset_indices(self, nodes: u32, references: u32) -> Self {
         Self::new(match self.kind() {
             NodeKind::Inner { axis, at, right } => NodeKind::Inner { axis, at, right: right + nodes },

@@ -30,7 +30,7 @@ struct PlaneRay {
 impl PlaneRay {
     fn new(ray: &Ray, bounds: &Aabb) -> Self {
         let greatest = ray.direction.abs().max_element();
-        // The next lower power of two, from the exponent bits. Scaling by a power of two is exact.
+        // Compute the next lower power of two from the exponent bits. Scaling by a power of two is exact.
         let steps = f32::from_bits(greatest.to_bits() & 0x7f80_0000)
             .clamp(f32::MIN_POSITIVE, 1.0 / f32::MIN_POSITIVE);
         let inverse = (ray.direction * (1.0 / steps)).recip();

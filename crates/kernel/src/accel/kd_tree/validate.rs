@@ -3,7 +3,7 @@
 use super::build::depth_limit;
 use super::node::NodeKind;
 use super::{KdTree, halves};
-use crate::accel::reference::Polygon;
+use crate::accel::reference::ClippedTriangle;
 use crate::geometry::Aabb;
 use crate::math::{DVec3, Vec3};
 
@@ -26,7 +26,7 @@ impl KdTree {
     /// A description of the first error found.
     pub fn validate(&self, count: u32, corners: impl Fn(u32) -> [Vec3; 3]) -> Result<(), String> {
         let usable = |id: &u32| {
-            let bounds = Aabb::around(corners(*id));
+            let bounds = Aabb::from_points(corners(*id));
             corners(*id).iter().all(|corner| corner.is_finite()) && bounds.extent().is_finite()
         };
         let all: Vec<u32> = (0..count).filter(usable).collect();
@@ -37,7 +37,7 @@ impl KdTree {
                 Err("the tree has triangles but no nodes".to_owned())
             };
         }
-        if Aabb::around(all.iter().flat_map(|&id| corners(id))) != self.bounds {
+        if Aabb::from_points(all.iter().flat_map(|&id| corners(id))) != self.bounds {
             return Err("the bounding box does not match the triangles".to_owned());
         }
         let limit = depth_limit(all.len());
@@ -59,7 +59,8 @@ impl KdTree {
                     }
                     let [below, above] = halves(cell, axis, at);
                     for (place, cell) in [(right, above), (place + 1, below)] {
-                        let touches = |id: &&u32| !Polygon::clipped(corners(**id), &cell).points().is_empty();
+                        let touches =
+                            |id: &&u32| !ClippedTriangle::clipped(corners(**id), &cell).points().is_empty();
                         let inside = inside.iter().filter(touches).copied().collect();
                         pending.push(NodeVisit { place, cell, depth: depth + 1, inside });
                     }
@@ -95,7 +96,7 @@ fn check_leaf(
     if sorted.windows(2).any(|pair| pair[0] == pair[1]) {
         return Err(format!("leaf {place} refers to a triangle twice"));
     }
-    if let Some(id) = sorted.iter().find(|&&id| !overlap(cell, &Aabb::around(corners(id)))) {
+    if let Some(id) = sorted.iter().find(|&&id| !overlap(cell, &Aabb::from_points(corners(id)))) {
         return Err(format!("leaf {place} refers to triangle {id}, which is outside its cell"));
     }
     let must = |id: &&u32| reaches_into(cell, corners(**id));
@@ -111,7 +112,7 @@ fn overlap(a: &Aabb, b: &Aabb) -> bool {
 
 /// Whether a triangle extends into a cell, not counting parts of the triangle in a face of the cell.
 fn reaches_into(cell: &Aabb, corners: [Vec3; 3]) -> bool {
-    let (min, max) = Polygon::clipped(corners, cell).extent();
+    let (min, max) = ClippedTriangle::clipped(corners, cell).extent();
     (0..3).all(|axis| {
         let (low, high) = (f64::from(cell.min[axis]), f64::from(cell.max[axis]));
         let rounding = 1e-12 * low.abs().max(high.abs());
@@ -119,7 +120,7 @@ fn reaches_into(cell: &Aabb, corners: [Vec3; 3]) -> bool {
     })
 }
 
-/// Sample points on every triangle. The flag of each point is set once a leaf at that point refers to the
+/// Sample points on every triangle. Each point's flag is set once a leaf at that point refers to the
 /// triangle.
 struct SamplePointCoverage {
     points: Vec<(u32, Vec<(DVec3, bool)>)>,

@@ -142,7 +142,7 @@ impl WideBvh {
     }
 
     /// [`WideBvh::closest`] for up to [`PACKET_SIZE`] rays. Faster for rays in similar directions, such as
-    /// camera rays of neighboring pixels.
+    /// camera rays through neighboring pixels.
     pub fn closest_packet(&self, rays: &[Ray], ends: &F32x16, hits: &mut [Option<ShapeHit>]) {
         debug_assert!(rays.len() <= PACKET_SIZE && rays.len() == hits.len());
         hits.fill(None);
@@ -227,7 +227,7 @@ impl WideBvh {
                     node::Child::Leaf { first, count } => {
                         for pack in &self.packs[first as usize..(first + count) as usize] {
                             for id in pack.ids() {
-                                if !in_pieces && Aabb::around(corners(id)).union(bounds) != bounds {
+                                if !in_pieces && Aabb::from_points(corners(id)).union(bounds) != bounds {
                                     return Err(format!("triangle {id} extends outside its leaf"));
                                 }
                                 if !in_pieces && !leaves[id as usize].is_empty() {
@@ -241,7 +241,7 @@ impl WideBvh {
             }
         }
         let in_a_leaf = |id: u32, point: Vec3| {
-            leaves[id as usize].iter().any(|leaf| leaf.union(Aabb::around([point])) == *leaf)
+            leaves[id as usize].iter().any(|leaf| leaf.union(Aabb::from_points([point])) == *leaf)
         };
         let lost = |id: &u32| {
             let [a, b, c] = corners(*id);
@@ -252,8 +252,8 @@ impl WideBvh {
     }
 }
 
-/// Minimum number of shadow rays in a group to trace it as a packet. Smaller groups are faster to trace one
-/// by one.
+/// Groups with at least this many shadow rays are traced as packets. In smaller groups, tracing the rays one
+/// by one is faster.
 const SMALL_GROUP: usize = 8;
 
 /// Groups the rays whose directions have the same signs and the same longest axis. Calls `take` with each
@@ -288,7 +288,7 @@ fn for_each_coherent_group(rays: &[Ray], ends: &F32x16, mut take: impl FnMut(&F3
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::accel::ends;
+    use crate::accel::packet_t_max;
     use crate::accel::pathological::{bits, closest_by_brute_force, difficult_meshes, rays};
     use crate::geometry::watertight::ShearedRay;
     use crate::math::random::signed as random;
@@ -300,7 +300,7 @@ mod tests {
     fn built_with(quality: Quality, mesh: &[[Vec3; 3]]) -> WideBvh {
         let tree =
             WideBvh::build_with(quality, mesh.len() as u32, |id| mesh[id as usize], &CancelToken::new());
-        let tree = tree.expect("nobody cancels");
+        let tree = tree.expect("never canceled");
         tree.validate(mesh.len() as u32, |id| mesh[id as usize]).expect("a valid tree");
         tree
     }
@@ -356,7 +356,7 @@ mod tests {
                 tree = tree.with(instructions);
                 for rays in packets(mesh) {
                     let mut found = vec![None; rays.len()];
-                    tree.closest_packet(&rays, &ends(&rays), &mut found);
+                    tree.closest_packet(&rays, &packet_t_max(&rays), &mut found);
                     let expected: Vec<_> = rays.iter().map(|ray| closest_by_brute_force(mesh, ray)).collect();
                     let bits = |hits: &[Option<ShapeHit>]| -> Vec<_> {
                         let bits = |hit: &ShapeHit| {
@@ -368,7 +368,7 @@ mod tests {
                     let except: Vec<_> = (0..rays.len())
                         .map(|i| expected[i].filter(|_| i % 3 == 0).map(|hit| hit.primitive))
                         .collect();
-                    let any = tree.any_packet(&rays, &ends(&rays), &except);
+                    let any = tree.any_packet(&rays, &packet_t_max(&rays), &except);
                     for (i, ray) in rays.iter().enumerate() {
                         let is_left_out = |id: u32| Some(id) == except[i] || id == ray.start;
                         let others = mesh.iter().zip(0..).filter(|&(_, id)| !is_left_out(id));
@@ -400,15 +400,18 @@ mod tests {
             let are_vectors = tree.instructions() != InstructionSet::Portable;
             let mut hits = [None; PACKET_SIZE];
             assert_eq!(
-                simd::closest_packet(&tree, &rays, &ends(&rays), &mut hits),
+                simd::closest_packet(&tree, &rays, &packet_t_max(&rays), &mut hits),
                 are_vectors,
                 "{instructions:?}"
             );
             assert_eq!(hits.iter().flatten().count(), if are_vectors { PACKET_SIZE } else { 0 });
             let all = (1 << PACKET_SIZE) - 1;
-            assert_eq!(simd::any_packet(&tree, &rays, &ends(&rays), &[]), are_vectors.then_some(all));
-            assert!(!simd::closest_packet(&tree, &apart, &ends(&apart), &mut hits[..2]), "{instructions:?}");
-            assert_eq!(simd::any_packet(&tree, &apart, &ends(&apart), &[]), None, "{instructions:?}");
+            assert_eq!(simd::any_packet(&tree, &rays, &packet_t_max(&rays), &[]), are_vectors.then_some(all));
+            assert!(
+                !simd::closest_packet(&tree, &apart, &packet_t_max(&apart), &mut hits[..2]),
+                "{instructions:?}"
+            );
+            assert_eq!(simd::any_packet(&tree, &apart, &packet_t_max(&apart), &[]), None, "{instructions:?}");
         }
     }
 

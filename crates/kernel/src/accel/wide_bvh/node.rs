@@ -19,7 +19,7 @@ const LEAF: u32 = 1 << 31;
 
 const FIRST_BITS: u32 = 28;
 
-/// All bits of an encoded leaf except those for the index of its first pack.
+/// All bits of an encoded leaf except the bits for its first pack's index.
 pub const LEAF_BITS: u32 = !((1 << FIRST_BITS) - 1);
 
 /// A mesh has at most 1.3 references per triangle after splitting. Every pack and every node needs at least
@@ -81,7 +81,7 @@ impl WideNode {
         Self { rows: [least, greatest, least, greatest, least, greatest], children: [LEAF; WIDTH] }
     };
 
-    /// Sets the box and child of a slot.
+    /// Sets a slot's box and child.
     pub fn set(&mut self, slot: usize, bounds: Aabb, child: Child) {
         for axis in 0..3 {
             self.rows[2 * axis][slot] = bounds.min[axis];
@@ -90,7 +90,7 @@ impl WideNode {
         self.set_child(slot, child);
     }
 
-    /// Replaces the child of a slot.
+    /// Replaces a slot's child.
     pub fn set_child(&mut self, slot: usize, child: Child) {
         self.children[slot] = child.encode();
     }

@@ -36,7 +36,7 @@ pub(super) struct UnitLine {
     pub(super) tube: f64,
 }
 
-/// Value and derivative of g at a point of the line.
+/// Value and derivative of g at a point on the line.
 #[derive(Clone, Copy)]
 struct LineSample {
     s: f64,

@@ -6,7 +6,7 @@ use std::f64::consts::{PI, TAU};
 
 use super::surface::SurfacePoint;
 use super::surface_of_revolution::{
-    self, AxialFrame, LocalLine, angle_to_u, direction_at_u, exact_t, radial_direction,
+    self, AxialFrame, LocalLine, angle_to_u, direction_at_u, radial_direction, unrounded_t,
 };
 use super::surface_packet::{SurfaceF64, SurfacePointF64};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit};
@@ -17,7 +17,7 @@ use crossing::UnitLine;
 /// outside the torus.
 const ROOM: f64 = 0.01;
 
-/// All points at a fixed distance, the tube radius, from a circle around an axis. The front is outside.
+/// All points whose distance from a circle around an axis equals the tube radius. The front is outside.
 ///
 /// Texture coordinate u wraps once around the axis, and v once around the tube. On the outermost circle, v is
 /// ½ and increases along the axis, so images are not mirrored.
@@ -30,7 +30,7 @@ pub struct Torus {
 
 impl SurfaceF64 for Torus {
     fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePointF64 {
-        let (out, from_circle) = self.circle_directions(ray.at(exact_t(hit, self.nearest(ray))));
+        let (out, from_circle) = self.circle_directions(ray.at(unrounded_t(hit, self.nearest(ray))));
         self.exact_at(out, from_circle)
     }
 }
@@ -81,7 +81,7 @@ impl Torus {
 
     /// Surface point at a hit.
     pub fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
-        let (out, from_circle) = self.circle_directions(ray.at(exact_t(hit, self.nearest(ray))));
+        let (out, from_circle) = self.circle_directions(ray.at(unrounded_t(hit, self.nearest(ray))));
         self.surface_at(out, from_circle)
     }
 
@@ -157,7 +157,7 @@ impl Torus {
         AreaPoint { point, normal }
     }
 
-    /// Distance from the surface, negative inside.
+    /// Signed distance to the surface. Negative inside.
     pub fn signed_distance(&self, point: DVec3) -> f64 {
         let p = self.frame.point_to_local(point);
         DVec2::new(p.truncate().length() - self.radius, p.z).length() - self.tube
@@ -178,7 +178,7 @@ impl Torus {
         self.frame.origin
     }
 
-    /// Distance of a point from the surface.
+    /// Distance from a point to the surface.
     pub fn distance(&self, point: DVec3) -> f64 {
         let local = self.frame.point_to_local(point);
         let from_circle = DVec2::new(local.truncate().length() - self.radius, local.z).length();
@@ -265,7 +265,7 @@ mod tests {
     }
 
     #[test]
-    fn rays_do_not_hit_their_start() {
+    fn rays_do_not_rehit_their_origin() {
         assert_eq!(met([2.5, 0.0, 0.0], Vec3::X), None);
         assert_eq!(met([2.5, 0.0, 0.0], Vec3::NEG_X).map(|hit| hit.0), Some(1.0));
         assert_eq!(met([1.5, 0.0, 0.0], Vec3::NEG_X).map(|hit| hit.0), Some(3.0));

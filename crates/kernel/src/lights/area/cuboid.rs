@@ -111,8 +111,8 @@ impl BoxEmitter {
 }
 
 impl BoxFace {
-    /// A face with the given coordinate ranges relative to the point. z is negative if the point is in front
-    /// of the face.
+    /// Creates a face from its coordinate ranges relative to the point. z is negative if the point is in
+    /// front of the face.
     #[inline(always)]
     fn new(x: [f32; 2], y: [f32; 2], z: f32) -> Self {
         let rectangle = SphericalRectangle::new(x, y, z);

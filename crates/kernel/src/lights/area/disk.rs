@@ -21,7 +21,7 @@ pub struct DiskEmitter {
 pub struct DiskView {
     /// Axis of the cone, followed by the directions of the ellipse's axes.
     axes: [DVec3; 3],
-    /// Tangents of the half angles of the ellipse's axes.
+    /// Tangents of the cone's half angles along the ellipse's axes.
     a: f64,
     b: f64,
     /// Coefficients of the unnormalized density 1/(p·cos² + q·sin²) of the angle around the axis.

@@ -12,7 +12,7 @@ use crate::materials::texture::Texture;
 use crate::materials::{EmissionCoat, Footprint, Opacity, SecondUvPoint, TexturePoint};
 use crate::math::{DVec2, DVec3, Vec2, Vec3};
 
-/// A factor on a light's radiance that varies with position and direction.
+/// A factor that is applied to a light's radiance and varies with position and direction.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EmissionTexture {
     texture: Option<Arc<Texture>>,
@@ -39,12 +39,12 @@ pub struct UvTriangle {
     pub corners: [DVec3; 3],
     /// UVs of the corners.
     pub uvs: [Vec2; 3],
-    /// Second set of UVs of the corners, if any.
+    /// UVs of the corners in the second set. `None` if there is no second set.
     pub second_uvs: Option<[Vec2; 3]>,
 }
 
 impl EmissionTexture {
-    /// Creates the factor from a texture and an opacity, or `None` if there is neither.
+    /// Creates the factor from a texture and an opacity. Returns `None` if there is neither.
     pub fn new(texture: Option<&Arc<Texture>>, opacity: Option<&Opacity>, chart: UvChart) -> Option<Self> {
         Self::under_coat(texture, opacity, None, chart)
     }
@@ -115,7 +115,7 @@ impl EmissionTexture {
     }
 }
 
-/// Length of the probe ray for finding the normal at a point, relative to the size of the light.
+/// Length of the probe ray that finds the normal at a point, relative to the light's size.
 const PROBE: f64 = 1e-3;
 
 impl UvChart {

@@ -1,4 +1,4 @@
-//! The inner sides of round shapes and boxes that emit from both sides.
+//! The inner sides of round shapes and boxes that emit on both sides.
 
 use std::f32::consts::{PI, TAU};
 

@@ -48,7 +48,7 @@ impl SinCos {
 }
 
 impl AzimuthDistribution {
-    /// A distribution over the angles from −`reach` to `reach`, with a density proportional to `weight`.
+    /// A distribution over the angles from −`reach` to `reach` whose density is proportional to `weight`.
     /// `reach` is in [0, π].
     pub fn new(reach: SinCos, weight: impl Fn(SinCos) -> f64) -> Self {
         let step = reach.half_angle().half_angle().half_angle();

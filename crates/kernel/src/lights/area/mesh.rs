@@ -22,7 +22,7 @@ pub struct MeshEmitter {
     by_area: DiscreteDistribution,
     /// Centroid of the area.
     center: DVec3,
-    /// Bounds of the triangles' positions and emission, for a radiance of 1.
+    /// Bounds on the triangles' positions and emission, for a radiance of 1.
     bounds: LightBounds,
     sampling: MeshSampling,
 }
@@ -110,7 +110,7 @@ impl MeshEmitter {
         (AreaPoint { point, normal: vector_area / area }, area, *primitive)
     }
 
-    /// Bounds of the triangles' positions and emission, for a radiance of 1.
+    /// Bounds on the triangles' positions and emission, for a radiance of 1.
     pub fn bounds(&self) -> LightBounds {
         self.bounds
     }
@@ -150,14 +150,14 @@ impl MeshEmitter {
         let (arrival, primitive) = match &self.sampling {
             MeshSampling::Quad(quad) => {
                 let arrival = quad.quad.sample(point, u);
-                (arrival, quad.part(point, arrival.target))
+                (arrival, quad.primitive_at(point, arrival.target))
             }
             MeshSampling::Area(facets) => {
                 let arrival = facets.sample(point, u);
-                (arrival, facets.part(u[0]))
+                (arrival, facets.sampled_primitive(u[0]))
             }
             MeshSampling::Tree(tree) => {
-                let pick = tree.pick(&Receiver::plain(point, normal), f64::from(u[0]))?;
+                let pick = tree.pick(&Receiver::without_lobe(point, normal), f64::from(u[0]))?;
                 let (corners, primitive) = &self.triangles[pick.light as usize];
                 let rest = (pick.rest as f32).min(1.0_f32.next_down());
                 let LightSamplePoint { direction, target, factor } =
@@ -183,7 +183,7 @@ impl MeshEmitter {
         let index = self.triangles.binary_search_by_key(&met.primitive, |(_, primitive)| *primitive);
         let own = index.ok().and_then(|index| Some((index, emitter(&self.triangles[index].0)?)));
         own.map_or(0.0, |(index, own)| {
-            tree.probability(&Receiver::plain(from, normal), index as u32) * own.pdf(from, met)
+            tree.probability(&Receiver::without_lobe(from, normal), index as u32) * own.pdf(from, met)
         })
     }
 
@@ -233,7 +233,7 @@ impl TrianglePairQuad {
 
     /// Primitive index of the triangle that contains the sampled `target`.
     #[inline(always)]
-    pub fn part(&self, point: Vec3, target: Vec3) -> u32 {
+    pub fn primitive_at(&self, point: Vec3, target: Vec3) -> u32 {
         let offset = (target - point) - self.quad.offset_to_corner(point);
         if offset.dot(self.across) < 1.0 { self.primitives[0] } else { self.primitives[1] }
     }
@@ -266,7 +266,7 @@ impl AreaSampledTriangles {
 
     /// Primitive index of the sampled triangle, given the sample's first random number.
     #[inline(always)]
-    pub fn part(&self, u: f32) -> u32 {
+    pub fn sampled_primitive(&self, u: f32) -> u32 {
         self.all[self.by_area.sample(u).0].primitive
     }
 }

@@ -1,7 +1,7 @@
 //! Emitting shapes, one file each.
 //!
 //! Each shape implements its light sampling in a [`ShapeEmitter`]. To add a shape, add its file, a variant of
-//! [`Emitter`], and arms in `of_any` and [`area_light`]. If the shape is flat, also add the bounds of its
+//! [`Emitter`], and arms in `of_any` and [`area_light`]. If the shape is flat, also add the bounds on its
 //! emission. Shapes without a loop in `packet` are sampled point by point.
 
 pub mod cuboid;
@@ -64,7 +64,7 @@ pub struct AreaLight {
     pub shape: Emitter,
     /// The side of the object that emits.
     pub side: Side,
-    /// Radiance, or a factor on the texture if there is one.
+    /// Radiance, or a factor applied to the texture if there is one.
     pub radiance: Vec3,
     /// Texture that modulates the radiance.
     pub texture: Option<Box<EmissionTexture>>,
@@ -72,7 +72,7 @@ pub struct AreaLight {
     pub object: u32,
     /// The part of the object that emits.
     pub part: LightPart,
-    /// Bounds of the light's position, directions, and power.
+    /// Bounds on the light's position, directions, and power.
     pub bounds: LightBounds,
 }
 
@@ -226,7 +226,7 @@ pub fn back_light(shape: &Shape, radiance: Vec3, object: u32) -> Option<AreaLigh
     Some(AreaLight { shape: emitter, side: Side::Back, ..light })
 }
 
-/// Bounds of a shape's emission. `None` if the shape is infinite. The emission of flat shapes has a cosine
+/// Bounds on a shape's emission. `None` if the shape is infinite. The emission of flat shapes has a cosine
 /// falloff. Other shapes are assumed to emit a quarter of their area times the radiance in every direction,
 /// which is the mean over all directions for convex shapes (Cauchy).
 fn bounds(shape: &Shape, radiance: Vec3) -> Option<LightBounds> {
@@ -253,7 +253,7 @@ impl AreaLight {
     /// Adds an emission texture. Quads are then importance sampled according to the texture.
     pub fn with_texture(mut self, texture: EmissionTexture) -> Self {
         if let (Emitter::Quad(quad), true) = (&self.shape, texture.varies_with_position()) {
-            // The edges of the back are swapped.
+            // The two edges are swapped on the back.
             let ordered = |[u, v]: [f64; 2]| match self.side {
                 Side::Front => [u, v],
                 Side::Back => [v, u],

@@ -6,7 +6,7 @@ use crate::lights::packet::{LightSamplePacket, packet_of};
 use crate::lights::sample::LightGeometry;
 use crate::math::lanes::{F32x16, PACKET_SIZE, Vec3x16, lane, set_lane};
 
-/// Samples triangles by area for a packet, with a separate light for each lane.
+/// Samples triangles by area for a packet in which each lane has its own light.
 macro_rules! triangle_packet_of {
     ($i:ident => ($facets:expr, $light:expr), $points:expr, $u:expr) => {{
         let mut row = packet_of!(LightGeometry::Nothing, $i => {
@@ -14,7 +14,7 @@ macro_rules! triangle_packet_of {
             (sample.direction, sample.target, $light.radiance * sample.factor)
         });
         for $i in 0..PACKET_SIZE {
-            let source = LightGeometry::Primitive($light.object, $facets.part($u[0][$i]));
+            let source = LightGeometry::Primitive($light.object, $facets.sampled_primitive($u[0][$i]));
             row.sources.set($i, source);
         }
         row
@@ -26,7 +26,7 @@ pub(crate) use triangle_packet_of;
 impl AreaLight {
     /// [`AreaLight::sample_untextured`] for the points in the mask `used`.
     #[inline(always)]
-    pub fn sample_row(
+    pub fn sample_packet(
         &self,
         points: &Vec3x16,
         normals: &Vec3x16,
@@ -56,7 +56,7 @@ impl AreaLight {
             });
             if let Some(two) = of_two {
                 for i in 0..PACKET_SIZE {
-                    row.sources.part[i] = two.part(lane(points, i), lane(&row.targets, i));
+                    row.sources.part[i] = two.primitive_at(lane(points, i), lane(&row.targets, i));
                 }
             }
             return row;

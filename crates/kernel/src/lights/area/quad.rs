@@ -45,7 +45,7 @@ impl ShapeEmitter for QuadEmitter {
         if !(to_corner.dot(self.normal) < 0.0) {
             return 0.0;
         }
-        self.density(to_corner).unwrap_or_else(|| met.pdf_by_area(f64::from(self.area)))
+        self.solid_angle_pdf(to_corner).unwrap_or_else(|| met.pdf_by_area(f64::from(self.area)))
     }
 
     fn center(&self) -> DVec3 {
@@ -121,7 +121,7 @@ impl QuadEmitter {
     /// Pdf of solid-angle sampling in sr⁻¹, for points in front of the quad. `None` if the quad is sampled by
     /// area.
     #[inline(always)]
-    pub(super) fn density(&self, to_corner: Vec3) -> Option<f32> {
+    pub(super) fn solid_angle_pdf(&self, to_corner: Vec3) -> Option<f32> {
         let spherical = self.rectangle.as_ref().map(|rectangle| rectangle.seen_from(to_corner, self.normal));
         spherical.filter(SphericalRectangle::is_accurate).map(|spherical| 1.0 / spherical.solid_angle)
     }
@@ -141,7 +141,8 @@ pub struct SphericalRectangle {
     x: [f32; 2],
     y: [f32; 2],
     z: f32,
-    /// z components of the unit normals of the planes through the view point and the lower and upper sides.
+    /// For the planes through the view point and the lower and upper sides, the z components of the unit
+    /// normals.
     lower: f32,
     upper: f32,
     /// Start angle of the slices.

@@ -16,13 +16,13 @@ pub struct RevolutionEmitter<S> {
     middle: DVec3,
 }
 
-/// The curved side of a light. It intersects every half plane around a pole in a single interval.
+/// A light's curved side. It intersects every half plane around a pole in a single interval.
 pub trait RevolutionSide {
     /// The side seen from a point.
-    type RevolutionView: RevolutionSideView;
+    type View: RevolutionSideView;
 
     /// The side seen from a point. `None` if the point is behind the side.
-    fn seen_from(&self, point: Vec3) -> Option<Self::RevolutionView>;
+    fn seen_from(&self, point: Vec3) -> Option<Self::View>;
 }
 
 /// A curved side seen from a point.
@@ -37,7 +37,7 @@ pub trait RevolutionSideView {
     /// pole.
     fn cosine_extent(&self, around: SinCos) -> f64;
 
-    /// The point at a fraction `share` of the interval of cosines. Returns its angle from the pole and its
+    /// The point at a fraction `share` of the cosine interval. Returns its angle from the pole and its
     /// distance.
     fn point_at(&self, around: SinCos, share: f64) -> (SinCos, f64);
 }
@@ -96,7 +96,7 @@ impl<S: RevolutionSide> ShapeEmitter for RevolutionEmitter<S> {
 }
 
 impl<S: RevolutionSide> RevolutionEmitter<S> {
-    fn view(&self, point: Vec3) -> RevolutionView<S::RevolutionView> {
+    fn view(&self, point: Vec3) -> RevolutionView<S::View> {
         let side = self.side.seen_from(point).map(|view| {
             let meridians = AzimuthDistribution::new(view.max_angle(), |turn| view.cosine_extent(turn));
             (view, meridians)
@@ -152,7 +152,7 @@ impl RevolutionEmitter<CylinderSide> {
 }
 
 impl RevolutionSide for CylinderSide {
-    type RevolutionView = CylinderView;
+    type View = CylinderView;
 
     fn seen_from(&self, point: Vec3) -> Option<CylinderView> {
         let to_middle = self.middle - point.as_dvec3();
@@ -217,7 +217,7 @@ pub struct ConeSide {
     axis: DVec3,
     /// Sine and cosine of the half angle at the tip.
     opening: (f64, f64),
-    /// Distance from the tip to the rim of the base.
+    /// Distance from the tip to the base's rim.
     slant: f64,
 }
 
@@ -248,7 +248,7 @@ impl RevolutionEmitter<ConeSide> {
 }
 
 impl RevolutionSide for ConeSide {
-    type RevolutionView = ConeView;
+    type View = ConeView;
 
     fn seen_from(&self, point: Vec3) -> Option<ConeView> {
         let to_tip = self.tip - point.as_dvec3();

@@ -1,4 +1,5 @@
-//! Textured quad lights, sampled both according to their emission texture and by solid angle.
+//! Textured quad lights. Some samples follow the emission texture, and the others are uniform over the solid
+//! angle.
 
 use super::quad::QuadEmitter;
 use super::sample_point::LightSamplePoint;
@@ -52,7 +53,7 @@ impl ShapeEmitter for TexturedQuadEmitter {
         let own = self.quad.sample(point, u);
         if by_texture {
             let direction = offset * (1.0 / offset.length_squared().sqrt());
-            let quad_pdf = self.quad.density(to_corner).unwrap_or(1.0 / by_area);
+            let quad_pdf = self.quad.solid_angle_pdf(to_corner).unwrap_or(1.0 / by_area);
             let density = self.share * cell_factor / by_area + (1.0 - self.share) * quad_pdf;
             let factor = if by_area > 0.0 { 1.0 / density } else { 0.0 };
             return LightSamplePoint { direction, target: point + offset, factor };
@@ -60,14 +61,14 @@ impl ShapeEmitter for TexturedQuadEmitter {
         if !(own.factor > 0.0) {
             return LightSamplePoint { factor: 0.0, ..own };
         }
-        let density = self.density(own.target - point, to_corner, 1.0 / own.factor);
+        let density = self.mixture_pdf(own.target - point, to_corner, 1.0 / own.factor);
         LightSamplePoint { factor: 1.0 / density, ..own }
     }
 
     fn pdf(&self, from: Vec3, met: &LightHit) -> f32 {
         let to_corner = self.quad.offset_to_corner(from);
         let quad_pdf = self.quad.pdf(from, met);
-        if quad_pdf > 0.0 { self.density(met.direction * met.distance, to_corner, quad_pdf) } else { 0.0 }
+        if quad_pdf > 0.0 { self.mixture_pdf(met.direction * met.distance, to_corner, quad_pdf) } else { 0.0 }
     }
 
     fn center(&self) -> DVec3 {
@@ -108,7 +109,7 @@ impl TexturedQuadEmitter {
 
     /// Pdf in sr⁻¹ at an offset from the point, given the untextured quad's pdf.
     #[inline(always)]
-    fn density(&self, offset: Vec3, to_corner: Vec3, quad_pdf: f32) -> f32 {
+    fn mixture_pdf(&self, offset: Vec3, to_corner: Vec3, quad_pdf: f32) -> f32 {
         let on_quad = offset - to_corner;
         let cell = |axis: usize| {
             let place = self.along[axis].dot(on_quad) * self.size[axis] as f32;

@@ -103,7 +103,7 @@ impl ShapeEmitter for TorusEmitter {
         }
         let offset = view.offset(&slice, &place);
         let direction = offset.normalize();
-        let (densities, first) = view.densities(&self.torus, &slices, direction);
+        let (densities, first) = view.pdfs_at_entries(&self.torus, &slices, direction);
         // A grazing ray may miss the torus because of rounding.
         let (density, distance) =
             first.map_or((own, offset.length()), |first| (densities.max(0.5 * own), first));
@@ -118,7 +118,7 @@ impl ShapeEmitter for TorusEmitter {
     fn pdf(&self, from: Vec3, met: &LightHit) -> f32 {
         TorusView::new(&self.torus, from).map_or(0.0, |view| {
             let slices = view.slice_density();
-            let (density, first) = view.densities(&self.torus, &slices, met.direction.as_dvec3());
+            let (density, first) = view.pdfs_at_entries(&self.torus, &slices, met.direction.as_dvec3());
             // A ray may continue through the first surface and hit another one, which is never sampled.
             let is_later = first.is_some_and(|first| f64::from(met.distance) > first * (1.0 + SAME_DISTANCE));
             if is_later { 0.0 } else { density as f32 }
@@ -177,7 +177,7 @@ impl TorusView {
         })
     }
 
-    /// Density of the slices on one side over τ, relative to its maximum.
+    /// Density over τ of the slices on one side, relative to its maximum.
     fn slice_density(&self) -> PiecewiseLinear<SLICES> {
         // Compute sinh and cosh from powers of e^step.
         let step = libm::exp(self.reach / (SLICES - 1) as f64);
@@ -226,7 +226,7 @@ impl TorusView {
 
     /// Sum of the pdfs in sr⁻¹ at all points where the ray enters the torus, and the distance to the first
     /// one.
-    fn densities(
+    fn pdfs_at_entries(
         &self,
         torus: &Torus,
         slices: &PiecewiseLinear<SLICES>,
@@ -260,14 +260,14 @@ impl TorusView {
 }
 
 impl TorusSlice {
-    /// Tangent of the angle to the circle's center, from the relative sine of the elevation.
+    /// Computes the tangent of the angle to the circle's center from the elevation's relative sine.
     fn tangent(&self, sine: f64) -> f64 {
         let sine = sine * self.sine;
         let distance = (self.gap * self.gap + self.off * self.off).sqrt();
         distance * sine / ((1.0 - sine) * (1.0 + sine)).sqrt() / self.gap
     }
 
-    /// Relative sine of the elevation, from the tangent of the angle to the circle's center.
+    /// Computes the elevation's relative sine from the tangent of the angle to the circle's center.
     fn sine_of(&self, tangent: f64) -> f64 {
         let y = self.gap * tangent;
         y / (self.gap * self.gap + self.off * self.off + y * y).sqrt() / self.sine

@@ -26,7 +26,7 @@ pub trait DeltaLight {
     /// Samples a unit direction away from the light, proportionally to the intensity. `u` is in [0, 1)².
     fn sample_direction(&self, u: [f32; 2]) -> Vec3;
 
-    /// Bounds of the light's position and emission. Nothing is emitted outside the cone.
+    /// Bounds on the light's position and emission. Nothing is emitted outside the cone.
     fn bounds(&self) -> LightBounds;
 
     /// Unit direction from a point to the light, and irradiance at normal incidence (0 at the light's
@@ -51,7 +51,7 @@ pub trait DeltaLight {
 
     /// [`DeltaLight::sample`] for a packet of points.
     #[inline(always)]
-    fn sample_row(&self, points: &Vec3x16) -> LightSamplePacket {
+    fn sample_packet(&self, points: &Vec3x16) -> LightSamplePacket {
         let target = self.isotropic().position.as_vec3();
         packet_of!(LightGeometry::Nothing, i => {
             let (direction, weight) = self.direction_and_irradiance(lane(points, i));

@@ -12,7 +12,7 @@ use crate::sampling::warp;
 /// A point light that emits into a cone.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SpotLight {
-    /// The same light without the restriction to a cone.
+    /// The same light, not restricted to a cone.
     pub point: PointLight,
     /// Unit vector along the cone's axis, away from the light.
     pub axis: Vec3,

@@ -49,7 +49,7 @@ impl DirectionalLight {
 
     /// [`DirectionalLight::sample`] for a packet.
     #[inline(always)]
-    pub fn sample_row(&self, u: &[F32x16; 2]) -> LightSamplePacket {
+    pub fn sample_packet(&self, u: &[F32x16; 2]) -> LightSamplePacket {
         infinite_packet_of!(i => self.direction_and_irradiance([u[0][i], u[1][i]]))
     }
 

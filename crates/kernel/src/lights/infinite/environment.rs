@@ -59,7 +59,7 @@ impl Environment {
                 ([[*x; PACKET_SIZE], [*y; PACKET_SIZE], [*z; PACKET_SIZE]], [HEMISPHERE_PDF; PACKET_SIZE])
             }
             Self::Map { sky, factor, turn } => {
-                let (mut colors, pdfs) = sky.lookup_row(directions, *turn);
+                let (mut colors, pdfs) = sky.lookup_packet(directions, *turn);
                 for i in 0..PACKET_SIZE {
                     let color = lane(&colors, i) * *factor;
                     set_lane(&mut colors, i, color);
@@ -71,7 +71,7 @@ impl Environment {
 
     /// Samples the environment for a packet of surface normals.
     #[inline(always)]
-    pub fn sample_row(&self, normals: &Vec3x16, u: &[F32x16; 2]) -> LightSamplePacket {
+    pub fn sample_packet(&self, normals: &Vec3x16, u: &[F32x16; 2]) -> LightSamplePacket {
         let (directions, mut weights, pdfs) = match self {
             Self::Constant(_) => {
                 let mut directions = [[0.0; PACKET_SIZE]; 3];
@@ -83,7 +83,7 @@ impl Environment {
                 (directions, radiance, pdfs)
             }
             Self::Map { sky, factor, turn } => {
-                let (directions, mut colors, pdfs) = sky.sample_row(u, *turn);
+                let (directions, mut colors, pdfs) = sky.sample_packet(u, *turn);
                 for i in 0..PACKET_SIZE {
                     let color = lane(&colors, i) * *factor;
                     set_lane(&mut colors, i, color);
@@ -98,7 +98,7 @@ impl Environment {
             let weight = lane(&weights, i) * inverse_pdfs[i];
             set_lane(&mut weights, i, weight);
         }
-        let dark = LightSamplePacket::without_light(LightGeometry::Nothing);
+        let dark = LightSamplePacket::black(LightGeometry::Nothing);
         LightSamplePacket {
             directions,
             weights,
@@ -161,7 +161,7 @@ impl InfiniteLight for Environment {
         (self.mean().as_dvec3() * (4.0 * std::f64::consts::PI * area)).as_vec3()
     }
 
-    /// Bounds with all directions. The power is the irradiance on a surface due to the mean radiance.
+    /// Bounds that include all directions. The power is the irradiance on a surface due to the mean radiance.
     fn bounds(&self) -> LightBounds {
         let mean = match self {
             Self::Constant(radiance) => mean_channel(*radiance),

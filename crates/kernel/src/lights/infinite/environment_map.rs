@@ -22,7 +22,7 @@ pub struct EnvironmentMap {
     cells: PiecewiseConstant2D,
     /// Cosines of the polar angles at the tops of the rows of cells, followed by −1.
     heights: Vec<f64>,
-    /// Pdf of each row in sr⁻¹, if the row were uniform.
+    /// Pdf in sr⁻¹ that each row would have if it were uniform.
     pdfs: Vec<f32>,
     /// Mean luminance over all directions.
     mean_luminance: f64,
@@ -102,7 +102,7 @@ impl EnvironmentMap {
     pub fn lookup(&self, direction: Vec3, turn: f32) -> (Vec3, f32) {
         let place = self.texel_position(direction, turn);
         let corners = self.corners(place.column, place.row);
-        let density = self.density(place.column, place.row);
+        let density = self.cell_pdf(place.column, place.row);
         (color(&corners, place.between), density * relative_pdf(&luminances(&corners), place.along))
     }
 
@@ -115,7 +115,7 @@ impl EnvironmentMap {
         let luminances = luminances(&corners);
         let along = warp::bilinear(rest, &luminances);
         let (direction, down) = self.direction_in_cell(column as f32, row, along, turn);
-        let density = self.density(column as u32, row as u32);
+        let density = self.cell_pdf(column as u32, row as u32);
         (direction, color(&corners, [along[0], down]), density * relative_pdf(&luminances, along))
     }
 
@@ -148,7 +148,7 @@ impl EnvironmentMap {
     /// [`EnvironmentMap::sample`] for a packet. Returns unit directions, colors, and pdfs. Memory lookups
     /// alternate with branchless loops.
     #[inline(always)]
-    pub fn sample_row(&self, u: &[F32x16; 2], turn: f32) -> (Vec3x16, Vec3x16, F32x16) {
+    pub fn sample_packet(&self, u: &[F32x16; 2], turn: f32) -> (Vec3x16, Vec3x16, F32x16) {
         let (mut columns, mut rows, mut rest) = ([0; PACKET_SIZE], [0; PACKET_SIZE], [[0.0; PACKET_SIZE]; 2]);
         let (mut tops, mut extents) = ([0.0; PACKET_SIZE], [0.0; PACKET_SIZE]);
         let mut pdfs = [0.0; PACKET_SIZE];
@@ -158,7 +158,7 @@ impl EnvironmentMap {
             (rest[0][i], rest[1][i]) = (at.rest[0], at.rest[1]);
             tops[i] = self.heights[at.row];
             extents[i] = self.heights[at.row + 1] - tops[i];
-            pdfs[i] = self.density(at.column as u32, at.row as u32);
+            pdfs[i] = self.cell_pdf(at.column as u32, at.row as u32);
         }
         let corners = self.corner_packets(&columns, &rows);
         let [mut directions, mut colors] = [[[0.0; PACKET_SIZE]; 3]; 2];
@@ -178,7 +178,7 @@ impl EnvironmentMap {
 
     /// [`EnvironmentMap::lookup`] for a packet.
     #[inline(always)]
-    pub fn lookup_row(&self, directions: &Vec3x16, turn: f32) -> (Vec3x16, F32x16) {
+    pub fn lookup_packet(&self, directions: &Vec3x16, turn: f32) -> (Vec3x16, F32x16) {
         let (mut columns, mut rows) = ([0; PACKET_SIZE], [0; PACKET_SIZE]);
         let (mut between, mut angles) = ([0.0; PACKET_SIZE], [0.0; PACKET_SIZE]);
         for i in 0..PACKET_SIZE {
@@ -190,7 +190,7 @@ impl EnvironmentMap {
         let corners = self.corner_packets(&columns, &rows);
         let (mut heights, mut pdfs) = ([0.0; PACKET_SIZE], [0.0; PACKET_SIZE]);
         for i in 0..PACKET_SIZE {
-            pdfs[i] = self.density(columns[i], rows[i]);
+            pdfs[i] = self.cell_pdf(columns[i], rows[i]);
             heights[i] = self.height_fraction(rows[i], directions[1][i]);
         }
         let mut colors = [[0.0; PACKET_SIZE]; 3];
@@ -270,7 +270,7 @@ impl EnvironmentMap {
 
     /// Mean pdf of a cell in sr⁻¹.
     #[inline(always)]
-    fn density(&self, column: u32, row: u32) -> f32 {
+    fn cell_pdf(&self, column: u32, row: u32) -> f32 {
         self.pdfs[row as usize] * self.cells.column_probability(row as usize, column as usize)
     }
 }

@@ -97,7 +97,8 @@ fn sample_pdfs_equal_direction_pdfs() {
             let expected = radiance * (1.0 / density);
             off += u32::from(!((sample.weight - expected).length() <= 2e-3 * expected.length()));
             assert!((sample.direction.length() - 1.0).abs() < 1e-6);
-            let row = environment.sample_row(&[[0.0; PACKET_SIZE]; 3], &random(i).map(|u| [u; PACKET_SIZE]));
+            let row =
+                environment.sample_packet(&[[0.0; PACKET_SIZE]; 3], &random(i).map(|u| [u; PACKET_SIZE]));
             assert_eq!(lane(&row.directions, 3), sample.direction);
             assert_eq!(lane(&row.weights, 3), sample.weight);
             found += 1;

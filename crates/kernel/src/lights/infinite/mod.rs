@@ -23,7 +23,7 @@ pub trait InfiniteLight {
     /// of [`InfiniteLight::sample_direction`] times the area.
     fn power_through(&self, area: f64) -> Vec3;
 
-    /// Bounds of the light's directions and irradiance.
+    /// Bounds on the light's directions and irradiance.
     fn bounds(&self) -> LightBounds;
 
     /// Unit direction to the light's center. `None` if the light surrounds the scene.

@@ -12,19 +12,19 @@ use crate::math::{DVec3, Vec3};
 use crate::sampling::distribution::DiscreteDistribution;
 use crate::sampling::warp;
 
-/// Spheres that photons are aimed at. A sphere is chosen proportionally to the expected light that reaches
+/// Spheres at which photons are aimed. A sphere is chosen proportionally to the expected light that reaches
 /// it. Then a direction or a point is sampled uniformly over its visible part.
 #[derive(Clone, Debug)]
 pub struct PhotonTargets {
     balls: Vec<BoundingSphere>,
-    /// Distribution of the spheres by squared radius.
+    /// Distribution over the spheres, weighted by squared radius.
     pick_by_disk: DiscreteDistribution,
 }
 
 /// Maximum number of targets. If there are more, some are merged.
 pub const MAX_TARGETS: usize = 32;
 
-/// Directional distribution of the light emitted from a point.
+/// Directional distribution of light emitted from a point.
 pub enum EmissionProfile<'a> {
     /// A delta light's distribution.
     Light {
@@ -91,7 +91,7 @@ impl PhotonTargets {
     }
 
     /// Chooses a target for photons from infinity.
-    pub fn pick_by_disk(&self, u: f32) -> &BoundingSphere {
+    pub fn pick_by_cross_section(&self, u: f32) -> &BoundingSphere {
         &self.balls[self.pick_by_disk.sample(u).0]
     }
 
@@ -149,8 +149,8 @@ impl TargetView<'_> {
     }
 
     /// Samples a direction uniformly over a target's cone. Returns the direction and the index of the target,
-    /// or `None` if the point is inside the target or there is no target. An unaimed direction is used
-    /// instead in that case.
+    /// or `None` if the point is inside the target or there is no target. In that case, the caller uses an
+    /// unaimed direction.
     pub fn sample(&self, u: f32, direction: [f32; 2]) -> Option<(Vec3, usize)> {
         let goal = f64::from(u) * self.total;
         let (mut sum, mut target) = (0.0, 0);
@@ -166,7 +166,8 @@ impl TargetView<'_> {
     }
 
     /// Pdf of aimed directions divided by the pdf of emitted directions. ∞ if emission never generates
-    /// `direction`. `made_for` is the target that the direction was generated for, if any.
+    /// `direction`. `made_for` is the target at which the direction was aimed, or `None` for an unaimed
+    /// direction.
     pub fn ratio(&self, direction: Vec3, made_for: Option<usize>) -> f64 {
         if !(self.total > 0.0) {
             return 1.0;

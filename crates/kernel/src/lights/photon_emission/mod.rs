@@ -69,9 +69,9 @@ pub enum EmitterGeometry {
 /// Random numbers in [0, 1) for one photon.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PhotonRandomNumbers {
-    /// Chooses the light and a piece of its surface.
+    /// Picks the light and a piece of its surface.
     pub light: [f32; 2],
-    /// Chooses whether to aim, and the target.
+    /// Decides whether to aim, and picks the target.
     pub aim: [f32; 2],
     /// Position on the light. For light from infinity, position on the disk that it passes through.
     pub position: [f32; 2],
@@ -88,13 +88,13 @@ pub struct EmittedPhoton {
     pub start: PhotonOrigin,
     /// Unit direction of travel.
     pub direction: Vec3,
-    /// Power in W divided by the photon's pdf. The mean over photons is the total power of the lights.
+    /// Power in W divided by the photon's pdf. The mean over all photons is the lights' total power.
     pub flux: Vec3,
     /// Whether the photon was aimed at a target.
     pub is_aimed: bool,
 }
 
-/// Starting point of a photon.
+/// A photon's starting point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum PhotonOrigin {
     /// On a delta light.
@@ -315,7 +315,7 @@ impl PhotonSource {
         }
     }
 
-    /// A photon from a direction at infinity with a given irradiance at normal incidence.
+    /// Creates a photon that arrives from a direction at infinity, given the irradiance at normal incidence.
     fn photon_from_infinity(
         &self,
         to_light: Vec3,
@@ -333,7 +333,7 @@ impl PhotonSource {
             [middle.dot(s) + at.x, middle.dot(t) + at.y]
         };
         let [x, y] = match targets {
-            Some(targets) => through(targets.pick_by_disk(u.aim[1])),
+            Some(targets) => through(targets.pick_by_cross_section(u.aim[1])),
             None => through(&self.around),
         };
         let is_inside = targets.is_none() || x * x + y * y <= radius * radius;

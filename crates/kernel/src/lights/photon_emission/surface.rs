@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use super::EmitterGeometry;
-use crate::geometry::surface::error;
+use crate::geometry::surface::point_error_bound;
 use crate::geometry::{AreaPoint, Shape};
 use crate::lights::area::{AreaLight, Side};
 use crate::lights::tree::bounds::mean_channel;
@@ -28,7 +28,7 @@ enum PieceGeometry {
         side: u32,
         /// Areas of the parts.
         areas: Vec<f64>,
-        /// The largest length from which points are computed.
+        /// Upper bound on the magnitudes of the lengths used to compute points.
         reach: f64,
     },
     /// The triangles of a mesh.
@@ -45,8 +45,8 @@ pub struct EmissionPoint {
     pub normal: DVec3,
     /// Error bound of each component of `point`.
     pub error: Vec3,
-    /// Cosine-weighted integral of the radiance, divided by the pdf of the point. The mean is the power of
-    /// the light in W.
+    /// Cosine-weighted integral of the radiance, divided by the pdf of the point. The mean is the light's
+    /// power in W.
     pub flux: Vec3,
     /// Primitive index, for meshes.
     pub primitive: u32,
@@ -61,10 +61,10 @@ struct PiecePoint {
     primitive: u32,
 }
 
-/// Maximum number of pieces of a textured light.
+/// Maximum number of pieces for a textured light.
 const PIECES: usize = 1024;
 
-/// Number of texture lookups along each side of a piece.
+/// Number of texture lookups per side of a piece.
 const LOOKUPS_PER_SIDE: u32 = 4;
 
 /// Fraction of a piece's weight that is proportional to its area, because the lookups may miss bright areas.
@@ -80,7 +80,12 @@ impl EmissiveSurface {
                 let side = most.isqrt().max(1);
                 let count = areas.len() * side * side;
                 (
-                    PieceGeometry::Shape { shape: *shape, side: side as u32, areas, reach: reach(shape)? },
+                    PieceGeometry::Shape {
+                        shape: *shape,
+                        side: side as u32,
+                        areas,
+                        reach: coordinate_bound(shape)?,
+                    },
                     count,
                 )
             }
@@ -95,7 +100,7 @@ impl EmissiveSurface {
             let mut area = 0.0;
             for i in 0..per_side * per_side {
                 let u = Vec2::new((i % per_side) as f32 + 0.5, (i / per_side) as f32 + 0.5) / per_side as f32;
-                let place = on.at(light, index, u);
+                let place = on.point_on_piece(light, index, u);
                 area = place.area;
                 sum += radiance(light, &place).as_dvec3();
             }
@@ -120,14 +125,14 @@ impl EmissiveSurface {
     /// Samples a point from random numbers in [0, 1).
     pub fn sample_point(&self, light: &AreaLight, piece: f32, u: Vec2) -> EmissionPoint {
         let (index, _) = self.pieces.sample(piece);
-        let place = self.on.at(light, index, u);
+        let place = self.on.point_on_piece(light, index, u);
         let PiecePoint { point, normal, area, .. } = place;
         let factor = PI * area / self.pieces.probability(index);
         let flux = (radiance(light, &place).as_dvec3() * factor).as_vec3();
         let rounded = point.as_vec3();
         let error = match self.on {
-            PieceGeometry::Shape { reach, .. } => error(rounded, reach),
-            PieceGeometry::Mesh { rounding } => error(rounded, 0.0) + Vec3::splat(rounding),
+            PieceGeometry::Shape { reach, .. } => point_error_bound(rounded, reach),
+            PieceGeometry::Mesh { rounding } => point_error_bound(rounded, 0.0) + Vec3::splat(rounding),
         };
         EmissionPoint { point: rounded, from: point, normal, error, flux, primitive: place.primitive }
     }
@@ -135,7 +140,7 @@ impl EmissiveSurface {
 
 impl PieceGeometry {
     /// A uniformly distributed point on a piece.
-    fn at(&self, light: &AreaLight, index: usize, u: Vec2) -> PiecePoint {
+    fn point_on_piece(&self, light: &AreaLight, index: usize, u: Vec2) -> PiecePoint {
         match (self, light.shape.as_mesh()) {
             (Self::Shape { shape, side, areas, .. }, _) => {
                 let all = *side as usize;
@@ -167,8 +172,9 @@ fn radiance(light: &AreaLight, place: &PiecePoint) -> Vec3 {
         * texture.map_or(Vec3::ONE, |texture| texture.at_position(place.point.as_vec3(), place.primitive))
 }
 
-/// Upper bound on the lengths from which points on the shape are computed. `None` if the shape is infinite.
-fn reach(shape: &Shape) -> Option<f64> {
+/// Upper bound on the magnitudes of the lengths used to compute points on the shape. `None` if the shape is
+/// infinite.
+fn coordinate_bound(shape: &Shape) -> Option<f64> {
     let bounds = shape.bounds()?;
     let greatest = bounds.min.abs().max(bounds.max.abs()).as_dvec3().max_element();
     Some(greatest + 2.0 * bounds.extent().as_dvec3().length())

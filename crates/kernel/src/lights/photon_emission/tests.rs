@@ -96,7 +96,7 @@ fn lights() -> Vec<(Light, Option<Shape>, f64)> {
 }
 
 fn source_of(light: Light, shape: Option<Shape>) -> PhotonSource {
-    let lights = Arc::new(Lights::new(vec![light], &CancelToken::new()).expect("nobody cancels"));
+    let lights = Arc::new(Lights::new(vec![light], &CancelToken::new()).expect("never canceled"));
     PhotonSource::new(&lights, |_| shape.map(EmitterGeometry::Shape), SCENE).expect("power")
 }
 
@@ -369,7 +369,8 @@ fn aimed_pdfs_integrate_to_one() {
             let targets = PhotonTargets::new(balls).expect("targets");
             let view = targets.seen_from(from, &sends);
             // Integrate the aimed pdf (the ratio times the emission pdf) over all directions. The integral
-            // lacks directions without emission, so estimate their fraction among aimed photons by sampling.
+            // excludes directions without emission, so estimate their fraction among aimed photons by
+            // sampling.
             let n = 1_000_000;
             let mut whole = 0.0;
             for i in 0..n {
@@ -405,7 +406,7 @@ fn lights_are_chosen_by_power() {
         Light::Point(PointLight { position, intensity, falloff: Falloff::Square })
     };
     let lights =
-        Arc::new(Lights::new((0..10_000).map(lamp).collect(), &CancelToken::new()).expect("nobody cancels"));
+        Arc::new(Lights::new((0..10_000).map(lamp).collect(), &CancelToken::new()).expect("never canceled"));
     let source = PhotonSource::new(&lights, |_| None, SCENE).expect("power");
     let (mut next, mut counts) = (numbers(random::unit(8)), [0.0; 7]);
     let power = source.power();
@@ -432,7 +433,7 @@ fn lights_are_chosen_by_power() {
 
 #[test]
 fn lights_without_falloff_emit_no_photons() {
-    let lights = |last: Vec<Light>| Arc::new(Lights::new(last, &CancelToken::new()).expect("nobody cancels"));
+    let lights = |last: Vec<Light>| Arc::new(Lights::new(last, &CancelToken::new()).expect("never canceled"));
     let none = vec![Light::Point(point(Falloff::None))];
     assert!(PhotonSource::new(&lights(none), |_| None, SCENE).is_none());
     let both = vec![Light::Point(point(Falloff::None)), Light::Point(point(Falloff::Square))];

@@ -1,11 +1,11 @@
-//! Bounds of lights: position, power, and emission directions.
+//! Bounds on lights: position, power, and emission directions.
 
 use crate::geometry::Aabb;
 use crate::math::{DVec3, Vec3};
 
-/// Bounds of one or more lights. Used to estimate the contribution of the lights without examining each of
-/// them (Conty Estevez and Kulla, *Importance Sampling of Many Lights with Adaptive Tree Splitting*, 2018,
-/// section 4).
+/// Bounds on one or more lights. Used to estimate the lights' contribution without examining each light
+/// (Conty Estevez and Kulla, *Importance Sampling of Many Lights with Adaptive Tree Splitting*, 2018, section
+/// 4).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LightBounds {
     /// How distance affects the light.
@@ -35,7 +35,7 @@ pub enum DistanceFalloff {
 /// Bounds the directions of emission.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EmissionCone {
-    /// Axis of a cone that contains the emission axes of the lights.
+    /// Axis of a cone that contains the lights' emission axes.
     pub axis: DVec3,
     /// Cosine of the cone's half angle.
     pub cos: f64,
@@ -93,23 +93,27 @@ impl LightBounds {
         Self { power: self.power * mean_channel(color), ..self }
     }
 
-    /// Bounds of a light in a box, with inverse-square falloff.
+    /// Bounds on a light with inverse-square falloff inside a box.
     pub fn in_box(bounds: Aabb, power: f64, cone: EmissionCone) -> Self {
         let (min, max) = (bounds.min.as_dvec3(), bounds.max.as_dvec3());
         let radius = (max - min).length() * 0.5;
         Self { space: DistanceFalloff::InverseSquare, center: (min + max) * 0.5, radius, power, cone }
     }
 
-    /// Bounds of a triangle with a radiance of 1 whose front faces along (b − a) × (c − a). `None` if it has
-    /// no area.
+    /// Bounds on the emission of a triangle that faces along (b − a) × (c − a), for a radiance of 1. `None`
+    /// if it has no area.
     pub fn of_triangle(corners: &[DVec3; 3]) -> Option<Self> {
         let [a, b, c] = *corners;
         let vector_area = (b - a).cross(c - a) * 0.5;
         let normal = vector_area.try_normalize()?;
-        Some(Self::in_box(Aabb::around_f64(*corners), vector_area.length(), EmissionCone::lambertian(normal)))
+        Some(Self::in_box(
+            Aabb::from_points_f64(*corners),
+            vector_area.length(),
+            EmissionCone::lambertian(normal),
+        ))
     }
 
-    /// Bounds that contain all given bounds, which must have the same falloff. `None` if there are none.
+    /// Bounds that contain all bounds in `all`, which must have the same falloff. `None` if `all` is empty.
     pub fn around<'a>(all: impl Iterator<Item = &'a Self> + Clone) -> Option<Self> {
         let space = all.clone().next()?.space;
         let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);

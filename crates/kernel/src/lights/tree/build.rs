@@ -1,5 +1,5 @@
 //! Top-down construction of light trees. Nearby lights with similar emission directions share a node (Conty
-//! Estevez and Kulla, 2018, section 4.4, with binning).
+//! Estevez and Kulla, 2018, section 4.4). Large groups of lights are binned.
 
 use super::bounds::{EmissionCone, LightBounds};
 use super::node::{LightTreeNode, NodeChild};
@@ -222,7 +222,7 @@ fn split(leaves: &mut [LightLeaf], unit: usize) -> usize {
     cheapest_split(&parts) * unit
 }
 
-/// Finds the split of a sequence of parts that has the lowest total cost. Returns the number of parts in the
+/// Finds the split with the lowest total cost for a sequence of parts. Returns the number of parts in the
 /// first half. Neither half is empty.
 fn cheapest_split(parts: &[LeafSums]) -> usize {
     let mut right = parts.to_vec();

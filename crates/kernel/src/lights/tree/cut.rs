@@ -1,7 +1,7 @@
-//! Cuts through a light tree. A cut is a set of nodes, and a point picks from the children of these nodes. If
-//! there are few lights, the cut consists of all nodes whose children are lights. Otherwise, nodes too close
-//! to the point for tight bounds are replaced by their children, up to a maximum number of nodes. All picks
-//! for a point use the same cut.
+//! Cuts through a light tree. A cut is a set of nodes. A point picks lights from the children of these nodes.
+//! If there are few lights, the cut consists of all nodes whose children are lights. Otherwise, nodes too
+//! close to the point for tight bounds are replaced by their children, up to a maximum number of nodes. All
+//! picks for a point use the same cut.
 
 use arrayvec::ArrayVec;
 
@@ -20,7 +20,7 @@ pub struct LightTreeCut<'a> {
     receiver: Receiver,
     /// Indices of the nodes.
     nodes: ArrayVec<u32, { LightTreeCut::MOST }>,
-    /// Importance of the children of each node. 0 for children that are in the cut themselves.
+    /// Importance of each node's children. 0 for children that are also in the cut.
     importance: ArrayVec<F32x16, { LightTreeCut::MOST }>,
     /// Cumulative importance up to and including each node.
     sums: ArrayVec<f64, { LightTreeCut::MOST }>,
@@ -37,7 +37,7 @@ impl<'a> LightTreeCut<'a> {
     /// Creates a cut with at most `room` nodes. [`LightTreeCut::move_to`] must be called before picking.
     #[inline(always)]
     pub fn new(tree: &'a LightTree, room: usize) -> Self {
-        let receiver = Receiver::plain(Vec3::ZERO, Vec3::ZERO);
+        let receiver = Receiver::without_lobe(Vec3::ZERO, Vec3::ZERO);
         let room = room.clamp(1, Self::MOST);
         Self {
             tree,
@@ -60,14 +60,14 @@ impl<'a> LightTreeCut<'a> {
         if tree.over_lights.len() <= self.room {
             for &node in &tree.over_lights {
                 self.nodes.push(node);
-                self.importance.push(tree.nodes[node as usize].expected(receiver).importance);
+                self.importance.push(tree.nodes[node as usize].child_importance(receiver).importance);
             }
         } else {
             self.nodes.push(ROOT);
         }
         while self.importance.len() < self.nodes.len() {
             let node = &tree.nodes[self.nodes[self.importance.len()] as usize];
-            let ExpectedContributions { mut importance, nearness } = node.expected(receiver);
+            let ExpectedContributions { mut importance, nearness } = node.child_importance(receiver);
             for i in 0..node.count as usize {
                 if let NodeChild::LightTreeNode(below) = node.children[i]
                     && importance[i] > 0.0
@@ -124,7 +124,7 @@ impl<'a> LightTreeCut<'a> {
             match self.tree.nodes[self.nodes[index] as usize].children[child] {
                 NodeChild::Light(light) => picked(place, light, probability),
                 NodeChild::LightTreeNode(node) => {
-                    let so_far = LightPick { light: 0, probability, rest: shares.rest(part, child) };
+                    let so_far = LightPick { light: 0, probability, rest: shares.remap(part, child) };
                     if let Some(pick) = self.tree.pick_below(node, &self.receiver, so_far, &mut way) {
                         picked(place, pick.light, pick.probability);
                     }
@@ -133,7 +133,7 @@ impl<'a> LightTreeCut<'a> {
         }
     }
 
-    /// Probability of picking a node's child, given the inverse of the total importance.
+    /// Probability of picking a node's child, given the reciprocal of the total importance.
     #[inline(always)]
     fn share(&self, index: usize, child: usize, inverse: f64) -> f32 {
         (f64::from(self.importance[index][child]) * inverse) as f32

@@ -22,11 +22,11 @@ pub struct LightTree {
     nodes: Vec<LightTreeNode>,
     /// Nodes whose children are lights, in tree order. Other nodes have only nodes as children.
     over_lights: Vec<u32>,
-    /// Position of each light in tree order, or [`NOT_IN_TREE`] for lights that emit nothing.
+    /// Each light's position in tree order, or [`NOT_IN_TREE`] if the light emits nothing.
     positions: Vec<u32>,
 }
 
-/// Maximum number of lights (or triangles of a light) for sampling all of them without a tree.
+/// Maximum number of lights (or triangles in a light) that are sampled without a tree.
 pub const MAX_WITHOUT_TREE: usize = 32;
 
 /// Marks a light that is not in the tree.
@@ -77,7 +77,7 @@ impl LightTree {
             let one = &self.nodes[node as usize];
             if way.nodes[level] != node {
                 way.nodes[level] = node;
-                way.shares[level] = CumulativeImportance::new(&one.expected(receiver).importance);
+                way.shares[level] = CumulativeImportance::new(&one.child_importance(receiver).importance);
             }
             let shares = &way.shares[level];
             let total = shares.total();
@@ -86,8 +86,8 @@ impl LightTree {
             }
             let target = scale_to_total(pick.rest, total);
             let child = shares.find(target);
-            pick.probability *= shares.share(child);
-            pick.rest = shares.rest(target, child);
+            pick.probability *= shares.probability(child);
+            pick.rest = shares.remap(target, child);
             match one.children[child] {
                 NodeChild::Light(light) => return Some(LightPick { light, ..pick }),
                 NodeChild::LightTreeNode(below) => node = below,
@@ -101,7 +101,8 @@ impl LightTree {
         loop {
             let one = &self.nodes[node as usize];
             let child = one.child_containing(place);
-            probability *= CumulativeImportance::new(&one.expected(receiver).importance).share(child);
+            probability *=
+                CumulativeImportance::new(&one.child_importance(receiver).importance).probability(child);
             match one.children[child] {
                 NodeChild::LightTreeNode(below) if probability > 0.0 => node = below,
                 NodeChild::LightTreeNode(_) | NodeChild::Light(_) => return probability,
@@ -132,7 +133,7 @@ impl LightTree {
     }
 }
 
-/// Number of cached levels of the previous path.
+/// Number of levels of the previous path that are cached.
 const LEVELS: usize = 3;
 
 /// The nodes on the previous pick's path, and the importance of their children. Successive picks for the same
@@ -153,7 +154,7 @@ struct CumulativeImportance([f64; PACKET_SIZE]);
 impl CumulativeImportance {
     const NONE: Self = Self([0.0; PACKET_SIZE]);
 
-    /// Computes prefix sums for all children at once, by adding sums from 1, 2, 4, and 8 places before.
+    /// Computes prefix sums for all children at once, by adding the sums from 1, 2, 4, and 8 places earlier.
     #[inline(always)]
     fn new(importance: &F32x16) -> Self {
         let mut sums = [0.0; PACKET_SIZE];
@@ -168,7 +169,7 @@ impl CumulativeImportance {
 
     /// Probability of a child.
     #[inline(always)]
-    fn share(&self, child: usize) -> f32 {
+    fn probability(&self, child: usize) -> f32 {
         let (before, total) = (if child == 0 { 0.0 } else { self.0[child - 1] }, self.0[PACKET_SIZE - 1]);
         if total > 0.0 { ((self.0[child] - before) / total) as f32 } else { 0.0 }
     }
@@ -191,7 +192,7 @@ impl CumulativeImportance {
 
     /// Position of `target` within a child's interval, in [0, 1).
     #[inline(always)]
-    fn rest(&self, target: f64, child: usize) -> f64 {
+    fn remap(&self, target: f64, child: usize) -> f64 {
         let before = if child == 0 { 0.0 } else { self.0[child - 1] };
         rest(target - before, self.0[child] - before)
     }

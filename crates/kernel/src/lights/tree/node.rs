@@ -1,4 +1,4 @@
-//! Light tree nodes, with the bounds of 16 children in SIMD form.
+//! Light tree nodes, which store the bounds on 16 children in SIMD form.
 
 use super::bounds::{ConeEdge, DistanceFalloff, LightBounds};
 use crate::math::Vec3;
@@ -14,7 +14,8 @@ pub struct LightTreeNode {
     is_plain: bool,
     /// The children.
     pub children: [NodeChild; PACKET_SIZE],
-    /// Number of leaves before each child in tree order. For unused children, number of leaves in the tree.
+    /// Number of leaves before each child in tree order. For unused children, the number of leaves in the
+    /// tree.
     pub first: [u32; PACKET_SIZE],
     /// Number of children.
     pub count: u32,
@@ -125,9 +126,9 @@ pub struct ReceiverLobe {
 }
 
 impl Receiver {
-    /// A receiver with a known position and normal but unknown glossy lobe.
+    /// A receiver with a known position and normal but an unknown glossy lobe.
     #[inline(always)]
-    pub fn plain(point: Vec3, normal: Vec3) -> Self {
+    pub fn without_lobe(point: Vec3, normal: Vec3) -> Self {
         Self { point, normal, lobe: None }
     }
 }
@@ -156,11 +157,11 @@ struct LobePacket {
 impl ReceiverPacket {
     /// Receivers with known positions and normals but unknown glossy lobes.
     #[inline(always)]
-    pub fn plain(point: &Vec3x16, normal: &Vec3x16) -> Self {
+    pub fn without_lobe(point: &Vec3x16, normal: &Vec3x16) -> Self {
         Self { point: *point, normal: *normal, lobes: LobePacket::NONE }
     }
 
-    /// Sets the glossy lobe of a lane.
+    /// Sets a lane's glossy lobe.
     #[inline(always)]
     pub fn set_lobe(&mut self, i: usize, lobe: &ReceiverLobe) {
         let LobePacket { axis, shininess, peak, diffuse } = &mut self.lobes;
@@ -171,7 +172,7 @@ impl ReceiverPacket {
     /// A packet with the same receiver in all lanes.
     #[inline(always)]
     fn splat(receiver: &Receiver) -> Self {
-        let mut row = Self::plain(&splat3(receiver.point), &splat3(receiver.normal));
+        let mut row = Self::without_lobe(&splat3(receiver.point), &splat3(receiver.normal));
         if let Some(ReceiverLobe { axis, shininess, peak, diffuse }) = receiver.lobe {
             row.lobes = LobePacket {
                 axis: splat3(axis),
@@ -255,14 +256,14 @@ impl LightTreeNode {
     /// × cosine of the smallest angle between the emission cone and a direction from the child (section 4.2,
     /// with bounds on cosines) × the lobe's response. Never 0 if light from the child may reach the point.
     #[inline(always)]
-    pub fn expected(&self, receiver: &Receiver) -> ExpectedContributions {
+    pub fn child_importance(&self, receiver: &Receiver) -> ExpectedContributions {
         let receivers = ReceiverPacket::splat(receiver);
         expected(&self.bounds, &receivers, self.is_plain, receiver.lobe.is_some())
     }
 
-    /// [`LightTreeNode::expected`] of one child for a packet of surface points.
+    /// [`LightTreeNode::child_importance`] of one child for a packet of surface points.
     #[inline(always)]
-    pub fn expected_for_child(&self, child: usize, receivers: &ReceiverPacket, has_lobes: bool) -> F32x16 {
+    pub fn importance_of_child(&self, child: usize, receivers: &ReceiverPacket, has_lobes: bool) -> F32x16 {
         expected(&self.bounds.splat(child), receivers, self.is_plain, has_lobes).importance
     }
 

@@ -4,7 +4,7 @@ use super::node::{LightTreeNode, NodeChild, ReceiverPacket};
 use super::{LightTree, ROOT};
 use crate::math::lanes::{F32x16, PACKET_SIZE, Simd, SimdKernel};
 
-/// Importance of each light of a single-node tree, for a packet of points.
+/// Importance of each light in a single-node tree, for a packet of points.
 pub struct SingleNodeImportance<'a> {
     node: &'a LightTreeNode,
     /// Importance, indexed by child, then by point.
@@ -13,7 +13,7 @@ pub struct SingleNodeImportance<'a> {
     totals: [f64; PACKET_SIZE],
 }
 
-/// The lights picked by a packet of points.
+/// The lights picked for a packet of points.
 #[repr(align(64))]
 pub struct PacketPicks {
     /// Index of the picked child for each point.
@@ -61,7 +61,7 @@ impl<'a> SimdKernel for ImportanceKernel<'a, '_> {
         let Self { node, receivers, has_lobes } = self;
         let (mut importance, mut totals) = ([[0.0; PACKET_SIZE]; PACKET_SIZE], [0.0; PACKET_SIZE]);
         for child in 0..node.count as usize % (PACKET_SIZE + 1) {
-            importance[child] = node.expected_for_child(child, receivers, has_lobes);
+            importance[child] = node.importance_of_child(child, receivers, has_lobes);
             for i in 0..PACKET_SIZE {
                 totals[i] += f64::from(importance[child][i]);
             }
@@ -99,7 +99,7 @@ impl SingleNodeImportance<'_> {
         PacketPicks { children, lights, probabilities: self.shares(&values) }
     }
 
-    /// Probabilities of the given picks with these importances.
+    /// Probabilities of `picks`, given these importances.
     #[inline(always)]
     pub fn probabilities(&self, picks: &PacketPicks) -> F32x16 {
         let mut values = [0.0; PACKET_SIZE];

@@ -51,7 +51,7 @@ fn lights_of(count: u32, next: &mut impl FnMut() -> f32) -> Vec<Light> {
 
 fn tree_of(lights: &[Light]) -> LightTree {
     LightTree::new(&lights.iter().map(Light::bounds).collect::<Vec<_>>(), &CancelToken::new())
-        .expect("nobody cancels")
+        .expect("never canceled")
         .expect("some light")
 }
 
@@ -68,8 +68,8 @@ const NODES: usize = 12;
 fn cut_for(tree: &LightTree, point: Vec3, normal: Vec3, nodes: usize) -> LightTreeCut<'_> {
     let mut cut = LightTreeCut::new(tree, nodes);
     // Visit another point first, which should not affect the result.
-    cut.move_to(&Receiver::plain(normal, point));
-    cut.move_to(&Receiver::plain(point, normal));
+    cut.move_to(&Receiver::without_lobe(normal, point));
+    cut.move_to(&Receiver::without_lobe(point, normal));
     cut
 }
 
@@ -98,9 +98,9 @@ proptest! {
             let cut = cut_for(&tree, point, normal, NODES);
             let mut dark = [0.0; 2];
             for (k, u) in evenly_spaced::<512>().into_iter().enumerate() {
-                let alone = tree.pick(&Receiver::plain(point, normal), u);
+                let alone = tree.pick(&Receiver::without_lobe(point, normal), u);
                 if let Some(pick) = alone {
-                    prop_assert_eq!(pick.probability, tree.probability(&Receiver::plain(point, normal), pick.light));
+                    prop_assert_eq!(pick.probability, tree.probability(&Receiver::without_lobe(point, normal), pick.light));
                     prop_assert!(pick.probability > 0.0 && (0.0..1.0).contains(&pick.rest));
                 } else {
                     dark[0] += 1.0 / 512.0;
@@ -118,7 +118,7 @@ proptest! {
             }
             // The missing probability belongs to nodes whose bounds predict light although their children
             // contribute none.
-            let alone: f32 = (0..count).map(|light| tree.probability(&Receiver::plain(point, normal), light)).sum();
+            let alone: f32 = (0..count).map(|light| tree.probability(&Receiver::without_lobe(point, normal), light)).sum();
             let cut: f32 = (0..count).map(|light| cut.probability(light)).sum();
             prop_assert!((alone + dark[0] - 1.0).abs() < 0.02, "{} {}", alone, dark[0]);
             prop_assert!((cut + dark[1] - 1.0).abs() < 0.02, "{} {}", cut, dark[1]);
@@ -143,7 +143,7 @@ proptest! {
                     sample.is_some_and(|sample| sample.direction.dot(normal) > 0.0 && sample.weight.element_sum() > 0.0)
                 });
                 if arrives {
-                    prop_assert!(tree.probability(&Receiver::plain(point, normal), number) > 0.0, "{:?} from {}, {}", light, point, normal);
+                    prop_assert!(tree.probability(&Receiver::without_lobe(point, normal), number) > 0.0, "{:?} from {}, {}", light, point, normal);
                     prop_assert!(cut.probability(number) > 0.0, "{:?} from {}, {}", light, point, normal);
                 }
             }
@@ -166,7 +166,7 @@ fn spotlights_in_a_column_can_always_be_picked() {
     let mut arrived = 0;
     for _ in 0..2000 {
         let point = Vec3::new(16.0 * next(), 3.0 * next(), 0.2 * next() - 0.1);
-        let receiver = Receiver::plain(point, Vec3::Y);
+        let receiver = Receiver::without_lobe(point, Vec3::Y);
         let cut = cut_for(&tree, point, Vec3::Y, 8);
         for (number, light) in (0..).zip(&lights) {
             let sample = light.sample(point, Vec3::Y, [0.5; 2]);
@@ -193,7 +193,7 @@ fn pick_frequencies_match_probabilities() {
         for _ in 0..N / 20 {
             let mut u: [f64; 20] =
                 std::array::from_fn(|_| f64::from(next()) + f64::from(next()) / f64::from(1 << 24));
-            for pick in u.iter().filter_map(|&u| tree.pick(&Receiver::plain(point, normal), u)) {
+            for pick in u.iter().filter_map(|&u| tree.pick(&Receiver::without_lobe(point, normal), u)) {
                 counts[pick.light as usize][0] += 1.0;
             }
             u.sort_by(f64::total_cmp);
@@ -210,7 +210,7 @@ fn pick_frequencies_match_probabilities() {
             };
             for (number, counts) in (0..).zip(&counts) {
                 let probability = if way == 0 {
-                    tree.probability(&Receiver::plain(point, normal), number)
+                    tree.probability(&Receiver::without_lobe(point, normal), number)
                 } else {
                     cut.probability(number)
                 };
@@ -236,7 +236,7 @@ fn pick_frequencies_match_probabilities() {
 }
 
 #[test]
-fn lights_without_contribution_are_not_picked() {
+fn noncontributing_lights_are_not_picked() {
     // Lights below the floor, lights that face away, and spotlights that point away.
     let (point, normal) = (Vec3::ZERO, Vec3::Y);
     let at = |x: f64, y: f64| DVec3::new(x, y, 0.5);
@@ -262,7 +262,7 @@ fn lights_without_contribution_are_not_picked() {
     for (number, _) in (0..).zip(&lights) {
         let probability = cut.probability(number);
         assert!((probability > 0.0) == (number % 5 > 2), "{number}: {probability}");
-        assert!(number % 5 > 2 || tree.probability(&Receiver::plain(point, normal), number) == 0.0);
+        assert!(number % 5 > 2 || tree.probability(&Receiver::without_lobe(point, normal), number) == 0.0);
         sum += probability;
     }
     // Nodes without contributing lights should have almost no probability.
@@ -324,7 +324,7 @@ fn joint_bounds_contain_all_lights() {
             for one in &own {
                 let reach = (one.center - all.center).length() + one.radius;
                 assert!(reach <= all.radius * (1.0 + 1e-12), "{one:?} {all:?}");
-                // The joint cone must contain every direction of the cone.
+                // The joint cone must contain every direction in the light's cone.
                 let turned = one.cone.axis.dot(all.cone.axis).clamp(-1.0, 1.0).acos() + one.cone.cos.acos();
                 assert!(turned.min(std::f64::consts::PI).cos() >= all.cone.cos - 1e-9, "{one:?} {all:?}");
                 assert!(all.cone.edge >= one.cone.edge);
@@ -345,7 +345,7 @@ fn coincident_and_distant_lights_build_valid_trees() {
     for lights in [same, apart] {
         let tree = tree_of(&lights);
         let sum: f32 = (0..lights.len() as u32)
-            .map(|i| tree.probability(&Receiver::plain(Vec3::NEG_ONE, Vec3::ONE), i))
+            .map(|i| tree.probability(&Receiver::without_lobe(Vec3::NEG_ONE, Vec3::ONE), i))
             .sum();
         assert!((sum - 1.0).abs() < 1e-3, "{sum}");
     }
@@ -383,7 +383,7 @@ fn packet_picks_match_single_picks() {
                 let vectors = receivers.each_ref().map(|receiver| of(receiver).to_array());
                 [0, 1, 2].map(|axis| vectors.map(|vector| vector[axis]))
             };
-            let mut row = ReceiverPacket::plain(&column(&|one| one.point), &column(&|one| one.normal));
+            let mut row = ReceiverPacket::without_lobe(&column(&|one| one.point), &column(&|one| one.normal));
             for (i, receiver) in receivers.iter().enumerate() {
                 receiver.lobe.iter().for_each(|lobe| row.set_lobe(i, lobe));
             }
@@ -425,7 +425,7 @@ fn uneven_mesh(count: u32) -> MeshEmitter {
         let (place, size) = (corner(2.0), 0.02 * 1.5_f64.powi((i % 12) as i32));
         ([place, place + corner(size), place + corner(size)], 2 * i)
     });
-    MeshEmitter::new(triangles.collect(), &CancelToken::new()).expect("nobody cancels").expect("an area")
+    MeshEmitter::new(triangles.collect(), &CancelToken::new()).expect("never canceled").expect("an area")
 }
 
 #[test]

@@ -48,13 +48,13 @@ impl CellCost {
     }
 }
 
-/// Per-pixel overhead of a job, excluding its samples.
+/// Per-pixel overhead of a job, in addition to the cost of its samples.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct PixelOverhead {
     /// Sum of the numerators of b, the overhead of a pixel in samples. If a cell takes s' seconds for n'
     /// samples, then s seconds for n > n' samples, s/s' = (n + b)/(n' + b) and b = (s'n − sn')/(s − s').
     of_pixels: f64,
-    /// Sum of the denominators of b, as defined at `of_pixels`.
+    /// Sum of the denominators of b. See `of_pixels` for its definition.
     of_samples: f64,
 }
 

@@ -58,7 +58,7 @@ pub(crate) struct Forecast {
     photons_since: Option<f64>,
 }
 
-/// State of a render at some point in time.
+/// Snapshot of a render's state.
 pub(crate) struct RenderSnapshot<'a> {
     pub(crate) state: &'a FilmState,
     pub(crate) plan: &'a Plan,

@@ -1,5 +1,5 @@
-//! Predicts how many samples each part of the image needs to reach the noise target, until its goal is
-//! decided.
+//! Predicts how many samples each part of the image needs to reach the noise target. Predictions are needed
+//! only until a part's goal is decided.
 
 use crate::film::{CELLS, Convergence, samples_to_reduce_error};
 use crate::render::noise_goals::{AIM, LEAST, MOST, NoiseMeasurements, SampleGoals, TileNoise};
@@ -10,7 +10,7 @@ const EARLY_FALL: f64 = 4.0;
 /// Range to which measured decreases in variance are clamped.
 const FALLS: [f64; 2] = [2.0, 8.0];
 
-/// Expected number of samples for both halves of each cell.
+/// Expected number of samples for each half of each cell.
 #[derive(Debug)]
 pub(crate) struct ExpectedSamples(Vec<[u32; 2]>);
 
@@ -176,8 +176,9 @@ mod tests {
                 "{falls:?}"
             );
         }
-        // Predict half or a quarter of the noise of 64 samples. Per doubling, the variance decreases by a
-        // factor of 4 and then 2.7, or as with independent samples.
+        // Predict the sample counts at which noise is half or a quarter of its value at 64 samples. The
+        // variance decreases by a factor of 4 in the first doubling and 2.7 in later ones, or as with
+        // independent samples.
         let near = |samples: u32, of: f64| (f64::from(samples) / of - 1.0).abs() < 0.02;
         assert!(near(of(&[4.0]).samples_to_reach(0.5, 1.0, None), 128.0));
         assert!(near(of(&[4.0]).samples_to_reach(0.25, 1.0, None), 128.0 * libm::pow(4.0, 1.0 / usual)));

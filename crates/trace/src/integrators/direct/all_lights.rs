@@ -1,4 +1,4 @@
-//! Next-event estimation that samples every light at each vertex of a packet.
+//! Next-event estimation that samples every light at each vertex in a packet.
 
 use super::mis::CompetingTechnique;
 use crate::geometry::Ray;
@@ -32,7 +32,7 @@ pub struct SampleAllLights<'a, const MIS: bool> {
     pub only_infinite: bool,
 }
 
-/// Numbers of rays and texture lookups for direct lighting.
+/// Ray and texture lookup counts for direct lighting.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct LightRayCounts {
     /// Shadow rays.
@@ -126,8 +126,8 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
                 Shadows::Hard => light.center().is_some(),
                 Shadows::Off => true,
             };
-            // Take the only possible sample, or the requested number of samples.
-            let is_single = light.is_single();
+            // Take one sample if only one is possible, and otherwise the requested number of samples.
+            let is_single = light.is_single_direction();
             let count = if is_single { 1 } else { render.shadow_samples };
             if !is_single && sampler.is_none() {
                 sampler = Some(self.row.sampler(self.tile));
@@ -139,7 +139,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
                     }
                     Some(_) | None => [[0.0; PACKET_SIZE]; 2],
                 };
-                let samples = light.sample_row(&self.row.from, &self.row.normal, self.used, &u);
+                let samples = light.sample_packet(&self.row.from, &self.row.normal, self.used, &u);
                 let (mut values, active, response) = self.contributions(&samples, 1.0 / count as f32, simd);
                 // Multiply by the emission texture.
                 if let Some(pattern) = light.emission_texture() {
@@ -173,7 +173,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
                     simd,
                 );
             }
-            // Trace the single ray to the center of the light.
+            // Trace the single ray to the light's center.
             if pending.active != 0 {
                 self.add_pending(light.center(), &pending, sums, simd);
             }
@@ -225,7 +225,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         values
     }
 
-    /// Adds the contributions of samples of one light. With `pending`, defers them until the light's shadow
+    /// Adds the contributions of one light's samples. With `pending`, defers them until the light's shadow
     /// ray is traced.
     #[inline(always)]
     fn add_light_samples(
@@ -254,7 +254,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         }
     }
 
-    /// Adds deferred light after tracing one shadow ray to the center of the light.
+    /// Adds deferred light after tracing one shadow ray to the light's center.
     #[inline(always)]
     fn add_pending(
         &self,
@@ -271,7 +271,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         let Some((middle, source)) = middle.filter(|_| !is_untraced) else {
             return add_where(pending.active, &pending.light, &mut sums.light);
         };
-        // Aim a ray at the center of the light.
+        // Aim a ray at the light's center.
         let (mut direction, mut ends) = ([[0.0; PACKET_SIZE]; 3], [-1.0; PACKET_SIZE]);
         for i in 0..PACKET_SIZE {
             let from = lane(&self.row.from, i);
@@ -286,7 +286,8 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         for i in 0..PACKET_SIZE {
             ends[i] = if traced & 1 << i != 0 { ends[i] } else { -1.0 };
         }
-        let rays = RayPacket::of(self.row.from, direction).with_start_triangle(self.row.starts(&direction));
+        let rays =
+            RayPacket::from_soa(self.row.from, direction).with_start_triangle(self.row.starts(&direction));
         self.add_unoccluded(
             (&rays, &ends, traced),
             &LightObjectPacket::of(source),
@@ -296,8 +297,8 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         );
     }
 
-    /// Traces the shadow rays in `traced` and adds the light of the unoccluded rays. Rays that are not traced
-    /// have a `t_max` below 0.
+    /// Traces the shadow rays in `traced` and adds the light that arrives along the unoccluded rays. Rays
+    /// that are not traced have a `t_max` below 0.
     #[inline(always)]
     pub fn add_unoccluded(
         &self,
@@ -341,7 +342,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
     }
 
     /// Returns the unoccluded contribution of each sample, the mask of nonzero contributions, and the
-    /// responses of the vertices.
+    /// vertices' BSDF responses.
     #[inline(always)]
     pub fn contributions(
         &self,
@@ -385,7 +386,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
             set_lane(&mut direction, i, lane(&samples.directions, i));
             ends[i] = f32::INFINITY;
         }
-        (RayPacket::of(self.row.from, direction).with_start_triangle(self.row.starts(&direction)), ends)
+        (RayPacket::from_soa(self.row.from, direction).with_start_triangle(self.row.starts(&direction)), ends)
     }
 }
 

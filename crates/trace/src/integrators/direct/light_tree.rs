@@ -27,14 +27,14 @@ pub struct SampleLightTree<'a, const MIS: bool> {
     pub pool: &'a mut ShadowRayQueue,
 }
 
-/// One picked light per vertex of a packet. The picks of one sample are in tree order so that the shadow rays
-/// in a packet are aimed at nearby lights.
+/// One picked light per vertex in a packet. The picks for one sample are in tree order so that the shadow
+/// rays in a packet are aimed at nearby lights.
 #[derive(Clone)]
 #[repr(align(64))]
 struct LightPicks {
     /// Indices of the lights.
     lights: [u32; PACKET_SIZE],
-    /// Reciprocal of the expected number of samples of each vertex's light, or 0 if no light was picked.
+    /// Reciprocal of the expected sample count for each vertex's light, or 0 if no light was picked.
     shares: F32x16,
     /// Like `shares` but ignoring glossy lobes. Used for MIS weights, because the vertex's lobe is unknown
     /// when a ray hits the light.
@@ -73,7 +73,7 @@ impl<const MIS: bool> SimdKernel for SampleLightTree<'_, MIS> {
     }
 }
 
-/// Destination of the sampled light or the corresponding shadow rays.
+/// Destination for the sampled light or the pending shadow rays.
 struct PickSink<'a> {
     tree: &'a LightTree,
     row: u32,
@@ -86,7 +86,8 @@ impl LightPicks {
     const EMPTY: Self =
         Self { lights: [0; PACKET_SIZE], shares: [0.0; PACKET_SIZE], weighed: [0.0; PACKET_SIZE] };
 
-    /// Replaces probabilities with the reciprocals of expected sample counts, or 0 for a probability of 0.
+    /// Replaces each probability with the reciprocal of the expected sample count, or with 0 if the
+    /// probability is 0.
     #[inline(always)]
     fn invert_probabilities(&mut self, count: f32, is_weighed: bool) {
         for i in 0..PACKET_SIZE {
@@ -113,7 +114,8 @@ impl LightPicks {
     }
 }
 
-/// Weight of the second random number of a pair. Its digits are appended to the digits of the first number.
+/// Scale factor for the second random number in a pair. It appends the second number's digits to the first
+/// number's digits.
 const LOW_DIGITS: f64 = 1.0 / (1 << 24) as f64;
 
 impl<const MIS: bool> SampleAllLights<'_, MIS> {
@@ -130,14 +132,14 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         let count = self.tile.settings.render.shadow_samples * way.count;
         let group = way.count as usize;
         let (first, end) = (samples.start * way.count, samples.end * way.count);
-        // Sort the random numbers of each group of picks.
+        // Sort the random numbers for each group of picks.
         let mut numbers = vec![[0.0; PACKET_SIZE]; (end - first) as usize];
         for k in first..end {
             let u = sampler.pairs(&row.path, Dimension::LightChoice, k, count);
             let place = (k - first) as usize / group * group;
             // Each part of [0, 1) contains one pick per group, so a bucket sort is sufficient. The digits of
-            // both numbers of a pair are combined into one number because the probability of a light among
-            // many is small.
+            // both numbers in a pair are combined into one number because each of many lights has a small
+            // probability.
             let (mut parts, mut digits) = ([0; PACKET_SIZE], [0.0; PACKET_SIZE]);
             for i in 0..PACKET_SIZE {
                 let part = (u[0][i] * way.count as f32) as i32 as u32;
@@ -172,14 +174,14 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
     ) {
         let row = self.row;
         // Estimate the light from each source at each vertex, including glossy lobes.
-        let plain = ReceiverPacket::plain(&row.from, &row.normal);
+        let plain = ReceiverPacket::without_lobe(&row.from, &row.normal);
         let mut glossy = plain.clone();
         for i in lanes(if row.bsdf.has_narrow_lobes() { self.used } else { 0 }) {
             if let Some(lobe) = self.receiver_lobe(i) {
                 glossy.set_lobe(i, &lobe);
             }
         }
-        // Normalize the estimates.
+        // Normalize the estimates of each vertex.
         let Some(shares) = tree.single_node_importance(&glossy, row.bsdf.has_narrow_lobes(), simd) else {
             return;
         };
@@ -214,7 +216,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         let (row, group) = (self.row, way.count as usize);
         let (mut cut, mut without) = (way.cut(tree), MIS.then(|| way.cut(tree)));
         for i in lanes(self.used) {
-            let plain = Receiver::plain(lane(&row.from, i), lane(&row.normal, i));
+            let plain = Receiver::without_lobe(lane(&row.from, i), lane(&row.normal, i));
             let lobe = self.receiver_lobe(i);
             cut.move_to(&Receiver { lobe, ..plain });
             let without = without.as_mut().filter(|_| lobe.is_some()).map(|without| {

@@ -59,9 +59,10 @@ impl SimdKernel for LobeRays<'_> {
                 sent &= if (cosines[i] > 0.0) & (pdfs[i] > 0.0) { !0 } else { !bit };
                 ends[i] = if sent & bit != 0 { f32::INFINITY } else { -1.0 };
             }
-            let rays = RayPacket::of(row.from, wi).with_start_triangle(row.starts(&wi));
+            let rays = RayPacket::from_soa(row.from, wi).with_start_triangle(row.starts(&wi));
             arrived.rays.scattered += u64::from(sent.count_ones());
-            // Without soft shadows, add the light of every emitter along the rays, even of occluded emitters.
+            // Without soft shadows, add the light from every emitter along the rays, even if the emitter is
+            // occluded.
             if tile.settings.render.shadows != Shadows::Soft {
                 // Traversal cost is counted only for the rays to the lights' centers.
                 let lit = if aov == LightAov::TraversalCost { 0 } else { sent };

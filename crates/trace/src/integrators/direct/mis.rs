@@ -151,7 +151,7 @@ impl TileContext<'_> {
         self.infinite_radiance_of(None, ray, normal, pdf)
     }
 
-    /// Like [`TileContext::infinite_radiance`], restricted to the light `number` unless it is `None`.
+    /// Like [`TileContext::infinite_radiance`], but restricted to light `number` if it is not `None`.
     pub fn infinite_radiance_of(&self, number: Option<u32>, ray: &Ray, normal: Vec3, pdf: f32) -> Vec3 {
         let sky =
             self.world.lights.environment().map(|environment| environment.radiance_and_pdf(ray.direction));
@@ -193,8 +193,8 @@ impl TileContext<'_> {
         })
     }
 
-    /// Radiance of the emitter hit by a lobe ray, with the MIS weight for an equal number of light samples
-    /// and lobe rays.
+    /// Radiance of the emitter hit by a lobe ray, multiplied by the MIS weight for equal numbers of light
+    /// samples and lobe rays.
     pub fn emitter_radiance(
         &self,
         ray: &Ray,

@@ -9,7 +9,7 @@ use super::mis::CompetingTechnique;
 use super::shadow_rays::ShadowRayQueue;
 use crate::control::Cancelled;
 use crate::geometry::Ray;
-use crate::geometry::packet::{RayPacket, lanes, traced};
+use crate::geometry::packet::{RayPacket, active_lanes, lanes};
 use crate::integrators::transport::accumulator::Accumulator;
 use crate::integrators::transport::batch::{ALL, VertexBatch};
 use crate::integrators::transport::cone::RayCone;
@@ -70,10 +70,10 @@ pub enum ShadingSides<'m> {
 const ROWS: usize = 64;
 
 impl DirectLightQueue {
-    /// Number of packets at which the queue is processed, while the data is still in the cache.
+    /// The queue is processed when it contains this many packets, while their data is still in the cache.
     const FULL: usize = 64;
 
-    /// Minimum number of vertices of a packet. Smaller packets are merged into other packets.
+    /// Minimum number of vertices in a packet. Smaller packets are merged into other packets.
     const MIN_OWN_ROW: u32 = 8;
 
     /// Whether the queued packets should be processed now.
@@ -81,7 +81,7 @@ impl DirectLightQueue {
         self.count >= Self::FULL
     }
 
-    /// Begins a bounce with `paths` paths, with or without ray cones.
+    /// Begins a bounce with `paths` paths. If `has_cones`, also allocates ray cones for them.
     pub fn begin_bounce(&mut self, paths: usize, has_cones: bool) {
         self.clear();
         self.cones.clear();
@@ -112,7 +112,8 @@ impl DirectLightQueue {
         accumulator.add_direct_consecutive(first, &self.arrived);
     }
 
-    /// An unused packet, to be filled and then kept with [`DirectLightQueue::commit_spare_batch`] or discarded.
+    /// Returns an unused packet. The caller fills it, and then keeps it with
+    /// [`DirectLightQueue::commit_spare_batch`] or discards it.
     pub fn spare_batch(&mut self) -> &mut VertexBatch {
         if self.count == self.rows.len() {
             self.rows.push(VertexBatch::empty());
@@ -120,7 +121,7 @@ impl DirectLightQueue {
         &mut self.rows[self.count]
     }
 
-    /// Keeps the vertices of the spare packet.
+    /// Keeps the vertices in the spare packet.
     pub fn commit_spare_batch(&mut self) {
         let (kept, spare) = self.rows.split_at_mut(self.count);
         let Some(row) = spare.first_mut().filter(|row| row.used != 0) else { return };
@@ -172,8 +173,8 @@ impl DirectLightQueue {
         }
     }
 
-    /// Returns a packet with a free lane for this kind of BSDF, and the lane. `which` specifies whether the
-    /// vertex is dark and whether it is two-sided.
+    /// Returns a packet for this kind of BSDF and the index of a free lane in the packet. `which` specifies
+    /// whether the vertex is dark and whether it is two-sided.
     fn open_packet(&mut self, kind: RoughKind, which: (bool, bool)) -> (&mut VertexBatch, usize) {
         let (is_dark, has_two_sides) = which;
         let table = usize::from(is_dark) + 2 * usize::from(has_two_sides);
@@ -201,8 +202,9 @@ impl DirectLightQueue {
     }
 
     /// Computes direct lighting at all queued vertices, removes the vertices, and returns the number of rays
-    /// traced. `gather` returns light from another technique at a packet. Rays of continuing paths are added
-    /// to `next`, either with the given continuation or in microfacet lobes after `depth` bounces.
+    /// traced. `gather` returns the light that another technique adds at a packet. Rays of continuing paths
+    /// are added to `next`. `continuation` determines how paths continue. Without it, they continue only in
+    /// microfacet lobes. `depth` is the number of bounces so far.
     pub fn compute_direct_light(
         &mut self,
         tile: &TileContext<'_>,
@@ -390,7 +392,7 @@ impl DirectLightQueue {
     }
 }
 
-/// Mask of vertices whose direct light is shown by the view and may be nonzero.
+/// Mask of vertices whose direct light is visible in the view and may be nonzero.
 fn shown_vertices(row: &VertexBatch, aov: LightAov) -> u32 {
     if row.is_dark {
         return 0;
@@ -434,10 +436,11 @@ impl SimdKernel for LiftOrigins<'_> {
         for i in 0..PACKET_SIZE {
             ends[i] = if row.may_lift & 1 << i != 0 { row.lift_end[i] } else { -1.0 };
         }
-        let rays = RayPacket::of(row.from, direction).with_start_triangle(row.start);
+        let rays = RayPacket::from_soa(row.from, direction).with_start_triangle(row.start);
         // Find the occluded rays.
         let blocked = {
-            let (traced, nothing) = (traced(&ends, simd), LightObjectPacket::of(LightGeometry::Nothing));
+            let (traced, nothing) =
+                (active_lanes(&ends, simd), LightObjectPacket::of(LightGeometry::Nothing));
             geometry.occluded_ray_packet(&rays, &ends, traced, &nothing, simd)
         };
         // Move the origins of the unoccluded rays.

@@ -1,4 +1,4 @@
-//! Shadow rays of many packets of vertices, regrouped by light. Rays to nearby lights visit the same bounding
+//! Shadow rays from many vertex packets, regrouped by light. Rays to nearby lights visit the same bounding
 //! boxes, whereas the rays of one packet diverge.
 
 use super::all_lights::{LightSums, add_where, null_transmittance};
@@ -9,10 +9,10 @@ use crate::lights::{LightGeometry, LightObjectPacket};
 use crate::math::lanes::{PACKET_SIZE, Simd, Vec3x16, lane, set_lane};
 use crate::world::{SimdKernel, World};
 
-/// Shadow rays of a packet of vertices, and their contributions.
+/// Shadow rays from one vertex packet, and their contributions.
 #[repr(align(64))]
 struct QueuedShadowRays {
-    /// Index of the packet of vertices.
+    /// Index of the vertex packet.
     row: u32,
     rays: RayPacket,
     ends: F32x16,
@@ -26,7 +26,7 @@ struct QueuedShadowRays {
 #[derive(Default)]
 pub struct ShadowRayQueue {
     rows: Vec<QueuedShadowRays>,
-    /// The light of each ray, given by its position in the tree, and the ray's row and lane.
+    /// For each ray, the tree position of its light, and the ray's row and lane.
     order: Vec<(u32, u32)>,
     /// Rows and lanes of the rays, grouped by light.
     sorted: Vec<u32>,
@@ -37,7 +37,7 @@ const MAX_GROUPS: usize = 1 << GROUP_BITS;
 const GROUP_BITS: u32 = 11;
 
 impl ShadowRayQueue {
-    /// Number of packets at which the queued rays are traced, while they are still in the cache.
+    /// The queued rays are traced when they come from this many packets, while they are still in the cache.
     const FULL: usize = 512;
 
     /// Whether the queued rays should be traced now.
@@ -45,8 +45,7 @@ impl ShadowRayQueue {
         self.rows.len() >= Self::FULL
     }
 
-    /// Queues the rays of a vertex packet that are selected by `traced`, with the tree positions of their
-    /// lights.
+    /// Queues a vertex packet's rays selected by `traced`, along with the tree positions of their lights.
     #[inline(always)]
     pub fn push(
         &mut self,
@@ -126,7 +125,7 @@ impl SimdKernel for TraceShadowRays<'_> {
     fn run(self, simd: impl Simd) {
         let Self { world, aov, rows, rays } = self;
         for rays in rays.chunks(PACKET_SIZE) {
-            let mut packet = RayPacket::of([[0.0; PACKET_SIZE]; 3], [[0.0; PACKET_SIZE]; 3]);
+            let mut packet = RayPacket::from_soa([[0.0; PACKET_SIZE]; 3], [[0.0; PACKET_SIZE]; 3]);
             let mut ends = [-1.0; PACKET_SIZE];
             let mut sources = LightObjectPacket::of(LightGeometry::Nothing);
             for (to, &ray) in rays.iter().enumerate() {

@@ -24,7 +24,7 @@ pub struct UnshadowedLobeRay<'a> {
 }
 
 impl UnshadowedLobeRay<'_> {
-    /// Radiance of the lights along the ray, with MIS weights for an equal number of light samples and lobe
+    /// Radiance from the lights along the ray, with MIS weights for equal numbers of light samples and lobe
     /// rays. `transmittance` returns the medium's transmittance up to a distance.
     #[cold]
     #[inline(never)]
@@ -60,7 +60,7 @@ impl UnshadowedLobeRay<'_> {
         sum
     }
 
-    /// Unoccluded fraction of a light.
+    /// The fraction of a light that is not occluded.
     fn unoccluded_fraction(&self, light: &Light, rays: &mut LightRayCounts) -> Vec3 {
         match self.tile.settings.render.shadows {
             Shadows::Off => return Vec3::ONE,

@@ -6,7 +6,7 @@ use arrayvec::ArrayVec;
 
 use super::kernel::polygon_weight;
 use super::map::{GatherPoint, MIN_COSINE, REACH};
-use crate::geometry::kernel_domain::{Extent, FlatPolygon, NearestSurface};
+use crate::geometry::local_geometry::{Extent, FlatPolygon, NearestSurface};
 use crate::geometry::{Aabb, LocalGeometry, Shape, ShapeHit};
 use crate::materials::{Material, Rough};
 use crate::math::frame::Frame;
@@ -27,7 +27,7 @@ pub enum KernelCoverage {
 /// Distance above which two planes are considered different, in kernel radii.
 const FLAT: f64 = 4e-3;
 
-/// Minimum cosine between the normals of two pieces of one plane.
+/// Pieces whose normals have at least this cosine may be in the same plane.
 const SAME_PLANE: f64 = 1.0 - 1e-6;
 
 /// Maximum distance between a wall and the border of the piece it stands on, in kernel radii.
@@ -48,13 +48,13 @@ const MIN_COVERAGE: f64 = 1e-3;
 /// Maximum number of mesh triangles near a kernel.
 const TRIANGLES: usize = 32;
 
-/// Maximum number of pieces of a kernel's plane.
+/// Maximum number of pieces in a kernel's plane.
 const PIECES: usize = 8;
 
 /// Maximum number of walls near a kernel.
 const WALLS: usize = 4;
 
-/// Computes the coverage of a kernel.
+/// Computes a kernel's coverage.
 pub fn kernel_coverage(world: &World, look: &GatherPoint, radius: f32) -> KernelCoverage {
     let mut around = KernelNeighborhood::new(look, radius);
     let mut is_crowded = false;
@@ -99,7 +99,7 @@ impl Wall {
     }
 }
 
-/// Surfaces around the center of a kernel.
+/// Surfaces near a kernel's center.
 struct KernelNeighborhood {
     point: DVec3,
     normal: DVec3,
@@ -108,7 +108,7 @@ struct KernelNeighborhood {
     tangents: [DVec3; 2],
     /// Pieces of the kernel's plane that receive photons.
     pieces: ArrayVec<FlatPolygon, PIECES>,
-    /// Number of surfaces that cover the whole kernel.
+    /// Number of surfaces that each cover the whole kernel.
     whole: u32,
     walls: ArrayVec<Wall, WALLS>,
 }
@@ -128,13 +128,13 @@ impl KernelNeighborhood {
         }
     }
 
-    /// Projects a vector onto the plane, in radii.
+    /// Projects a vector onto the plane, in units of the radius.
     #[inline]
     fn project(&self, vector: DVec3) -> DVec2 {
         DVec2::new(self.tangents[0].dot(vector), self.tangents[1].dot(vector))
     }
 
-    /// A piece's corners relative to the center, projected onto the plane, in radii.
+    /// A piece's corners, projected onto the plane relative to the center, in units of the radius.
     fn project_piece(&self, piece: &FlatPolygon) -> ArrayVec<DVec2, 4> {
         piece.iter().map(|&corner| self.project(corner - self.point)).collect()
     }
@@ -158,7 +158,7 @@ impl KernelNeighborhood {
 
     /// Adds a shape and returns whether the coverage still has a closed form.
     fn add_shape(&mut self, shape: &Shape, receives: impl Fn() -> bool) -> bool {
-        match shape.kernel_domain(self.point) {
+        match shape.local_geometry(self.point) {
             LocalGeometry::Polygons(count) => (0..count)
                 .filter_map(|number| shape.polygon(number))
                 .all(|piece| self.add_piece(&piece, &receives)),
@@ -195,7 +195,7 @@ impl KernelNeighborhood {
         let is_exact = mesh.visit_box(bounds, |triangle| {
             let is_known = near.contains(&triangle);
             is_known
-                || !Aabb::around_f64(mesh.world_corners(triangle)).meets(bounds)
+                || !Aabb::from_points_f64(mesh.world_corners(triangle)).overlaps(bounds)
                 || near.try_push(triangle).is_ok()
         });
         if !is_exact {

@@ -40,13 +40,13 @@ use crate::world::{CompoundSolid, Hit, SimdKernel, World};
 /// Squared difference below which directions are considered equal.
 const SAME: f32 = 1e-8;
 
-/// Context shared by all photons in a chunk of a pass.
+/// Context shared by all photons in one chunk of a pass.
 pub struct PhotonTracing<'a> {
     /// Tile context. Photons are numbered as samples of a single pixel, with slots starting at 0.
     pub tile: &'a TileContext<'a>,
     /// Photon source, which represents all lights.
     pub emission: &'a PhotonSource,
-    /// Closed glass shapes that may contain lights, with their materials.
+    /// Closed glass shapes that may contain lights, and the materials of these shapes.
     pub glasses: &'a [Interior],
     /// Other glass solids that may contain lights.
     pub bodies: &'a [CompoundSolid],
@@ -107,7 +107,7 @@ impl PhotonTracing<'_> {
         Ok(wavefront.stored)
     }
 
-    /// Ray of a photon from an infinite light, with the origin moved back past any transmissive infinite
+    /// Ray for a photon from an infinite light. Its origin is moved back past any transmissive infinite
     /// planes. `None` if an opaque surface blocks the ray.
     fn skip_planes(&self, ray: Ray) -> Option<Ray> {
         let world = self.tile.world;
@@ -153,9 +153,9 @@ struct PhotonWavefront<'a> {
     /// Largest component of each photon's initial flux, indexed by slot.
     references: Vec<f32>,
     next: Vec<PathRay>,
-    /// Packet of individually queued vertices.
+    /// Packet for individually queued vertices.
     open: VertexBatch,
-    /// Packet of vertices of transmitted photons.
+    /// Vertex packet for transmitted photons.
     open_behind: VertexBatch,
     /// Media at the individually queued vertices.
     interior_lists: InteriorLists,
@@ -338,8 +338,8 @@ impl PhotonWavefront<'_> {
         }
     }
 
-    /// Stores a photon at a non-specular surface with the medium `far` behind it. If `scattered` is a number,
-    /// a caustic photon is also scattered, with its flux multiplied by this number.
+    /// Stores a photon at a non-specular surface with the medium `far` behind it. If `scattered` is `Some`, a
+    /// caustic photon is also scattered, with its flux multiplied by this number.
     fn shade_rough(
         &mut self,
         path: &PathRay,

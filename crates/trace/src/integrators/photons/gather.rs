@@ -87,8 +87,8 @@ impl SimdKernel for GatherPhotons<'_> {
     }
 }
 
-/// Factor for a kernel's light, given one of the kernel's photons. If the coverage p is known, the factor is
-/// 1/p. Otherwise, it is 0 if the photon is occluded and an estimate of 1/p if not.
+/// Factor for the light in a kernel, given one of the kernel's photons. If the coverage p is known, the
+/// factor is 1/p. Otherwise, it is 0 if the photon is occluded and an estimate of 1/p if not.
 #[inline(never)]
 fn coverage_factor(
     tile: &TileContext<'_>,
@@ -113,7 +113,7 @@ fn coverage_factor(
     }
 }
 
-/// Light from a map's photons reflected by a vertex toward the viewer, and one of the photons.
+/// Light that a vertex reflects from a map's photons toward the viewer, and one of these photons.
 #[inline(always)]
 fn kernel_sum(
     (row, i): (&VertexBatch, usize),
@@ -135,7 +135,7 @@ fn kernel_sum(
     }
 }
 
-/// Like [`kernel_sum`], with the BSDF evaluated for each photon's direction.
+/// Like [`kernel_sum`], but evaluates the BSDF for each photon's direction.
 #[inline(always)]
 fn reflected_kernel_sum(
     (row, i): (&VertexBatch, usize),

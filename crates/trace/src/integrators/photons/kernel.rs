@@ -5,8 +5,8 @@ use std::f64::consts::FRAC_2_PI;
 use crate::math::elementary::atan2;
 use crate::math::{DVec2, Vec2};
 
-/// Integral of the kernel (2/π)·(1 − ρ²) over a convex polygon with the given corners in order. It is 1 if
-/// the polygon contains the disk.
+/// Integral of the kernel (2/π)·(1 − ρ²) over a convex polygon, given its corners in order. It is 1 if the
+/// polygon contains the disk.
 pub fn polygon_weight(corners: &[DVec2]) -> f64 {
     let edges = || corners.iter().zip(corners.iter().cycle().skip(1)).map(|(&a, &b)| (a, b));
     let turn = edges().map(|(a, b)| a.perp_dot(b)).sum::<f64>().signum();

@@ -37,7 +37,7 @@ struct PhotonBlock {
     flux: Vec3x16,
 }
 
-/// A block without photons, with all positions at infinity.
+/// A block without photons: all positions are at infinity.
 const EMPTY: PhotonBlock = PhotonBlock {
     point: [[f32::INFINITY; PACKET_SIZE]; 3],
     normal: [0; PACKET_SIZE],
@@ -51,7 +51,7 @@ pub struct PhotonMap {
     radius: f32,
     /// Number of cells per unit of length.
     cells: f32,
-    /// Number of buckets, a power of two, minus one.
+    /// Number of buckets minus 1. The number of buckets is a power of two.
     mask: u32,
     /// Index of the first photon in each bucket, followed by the number of photons.
     starts: Vec<u32>,
@@ -79,7 +79,7 @@ pub struct GatherPoint {
     pub point: Vec3,
     /// Geometric normal on the queried side.
     pub normal: Vec3,
-    /// Maximum number of bounces of the photons.
+    /// Maximum number of bounces per photon.
     pub most_depth: u32,
 }
 
@@ -90,7 +90,7 @@ impl GatherPoint {
         Aabb { min: self.point - half, max: self.point + half }
     }
 
-    /// Half the extents of the bounding box of a kernel with radius 1.
+    /// Half extents of the bounding box of a unit-radius kernel.
     #[inline(always)]
     fn half_extents(&self) -> Vec3 {
         let own = self.normal.abs();
@@ -221,8 +221,8 @@ impl PhotonMap {
         size_of_val(&*self.blocks) + size_of_val(&*self.depths) + size_of_val(&*self.starts)
     }
 
-    /// Irradiance from the photons around a point in W·m⁻², and one of the photons, chosen with two random
-    /// numbers in proportion to its contribution.
+    /// Irradiance in W·m⁻² from the photons around a point, and one of these photons. The photon is chosen
+    /// with two random numbers, in proportion to its contribution.
     #[inline(always)]
     pub fn irradiance(
         &self,
@@ -427,7 +427,7 @@ fn cell_of(point: Vec3, cells: f32) -> [i32; 3] {
     [below(point.x * cells), below(point.y * cells), below(point.z * cells)]
 }
 
-/// Bucket of a cell. The cells of a column have consecutive buckets.
+/// The bucket that contains a cell. Cells in a column have consecutive buckets.
 #[inline(always)]
 fn bucket(x: i32, y: i32, z: i32, mask: u32) -> u32 {
     let hash = (y as u32).wrapping_mul(0x9e37_79b1) ^ (z as u32).wrapping_mul(0x85eb_ca77).rotate_left(16);

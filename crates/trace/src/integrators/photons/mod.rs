@@ -63,13 +63,13 @@ use emit::{PhotonChunk, PhotonTracing};
 pub(super) use map::GatherPoint;
 pub use map::{Photon, PhotonMap};
 
-/// Number of photons that a thread emits together.
+/// Number of photons that a thread emits at a time.
 const CHUNK: u32 = 2048;
 
 /// α, the fraction of a pass's photons kept by the shrinking kernel.
 const ALPHA: f64 = 2.0 / 3.0;
 
-/// Median number of photons that the first pass's kernels should contain, for caustic and bounced photons.
+/// Target median photon count in the first pass's kernels, for caustic and bounced photons.
 const WANTED: [f32; 2] = [12.0, 8.0];
 
 /// Fractions of photons aimed at mirrors and glass: the first if all of these objects are bounded, the second
@@ -92,7 +92,7 @@ pub struct Photons {
     radii: [f32; 2],
 }
 
-/// The photon maps of one pass.
+/// The photon maps from one pass.
 #[derive(Debug)]
 pub struct PhotonPass {
     /// Caustic photons, scattered only by mirrors and glass.
@@ -135,7 +135,7 @@ impl PhotonMaps {
 
 impl Photons {
     /// Prepares photon emission for a world and traces pass 0, whose photons determine the radii. `progress`
-    /// receives the number of photons traced so far and in total.
+    /// receives the number of photons traced so far and the total number.
     ///
     /// # Errors
     /// [`Cancelled`] if the token is canceled.
@@ -180,7 +180,7 @@ impl Photons {
         if self.emits_photons() { self.settings.count.into() } else { 0 }
     }
 
-    /// Whether photons are emitted. True if the scene has mirrors or glass and lights that illuminate them.
+    /// Whether photons are emitted, which requires mirrors or glass and a light that illuminates them.
     pub fn emits_photons(&self) -> bool {
         self.emission.is_some() && self.most_depth > 0
     }
@@ -200,7 +200,7 @@ impl Photons {
         self.build_maps(&sent, number, token)
     }
 
-    /// Builds the photon maps of a pass.
+    /// Builds the photon maps for a pass.
     fn build_maps(
         &self,
         sent: &StoredPhotons,
@@ -381,11 +381,11 @@ impl GlassObjects {
         Self(each.collect())
     }
 
-    /// Whether an object's surface may have no effect on light. True if its index of refraction is 1, or if
-    /// it may touch or overlap glass with the same index.
+    /// Whether an object's surface may leave light unchanged. True if its index of refraction is 1, or if it
+    /// may touch or overlap glass with the same index.
     fn may_have_no_effect(&self, id: u32, ior: f32) -> bool {
         let own = self.0.iter().find(|(other, ..)| *other == id).and_then(|(_, bounds, _)| *bounds);
-        let meets = |other: &Aabb| own.is_none_or(|own| own.grown(own.extent() * NEAR).meets(other));
+        let meets = |other: &Aabb| own.is_none_or(|own| own.expanded(own.extent() * NEAR).overlaps(other));
         let is_met = |(other, bounds, index): &(u32, Option<Aabb>, f32)| {
             *other != id && *index == ior && bounds.as_ref().is_none_or(meets)
         };
@@ -396,7 +396,7 @@ impl GlassObjects {
 /// Distance below which the shapes in two boxes may touch, relative to the size of one box.
 const NEAR: f32 = 1e-3;
 
-/// The mirrors and glass objects of a scene.
+/// The mirrors and glass objects in a scene.
 struct SpecularObjects {
     /// Bounding spheres of the bounded objects.
     balls: Vec<BoundingSphere>,

@@ -12,7 +12,7 @@ use crate::math::{Vec2, Vec3};
 use crate::sampling::warp;
 use crate::world::World;
 
-/// Number of successes after which the trials end.
+/// The trials end after this many successes.
 const SUCCESSES: u32 = 4;
 
 /// Maximum number of trials. At most the fraction (1 − p)⁶⁵ of the kernel's light is lost, which is
@@ -50,7 +50,7 @@ fn reciprocal_estimate_if_first_fails(mut succeeds: impl FnMut(u32) -> bool) -> 
     if succeeds(0) { 1.0 } else { 1.0 + mean_trials_per_success(|number| succeeds(number + 1)) }
 }
 
-/// Mean number of trials per success until `SUCCESSES` trials have succeeded, with expectation 1/p. If
+/// Mean number of trials per success until `SUCCESSES` trials have succeeded. Its expectation is 1/p. If
 /// `MAX_TRIALS` is reached first, the numbers of trials and successes are both increased by one. Over both
 /// outcomes, the expectation is (1 − (1 − p)^(MAX_TRIALS + 1))/p. With m = SUCCESSES, the first outcome
 /// contributes Σ C(n, m)·pᵐ(1 − p)ⁿ⁻ᵐ and the second Σ C(MAX_TRIALS + 1, s + 1)·pˢ(1 − p)^(MAX_TRIALS − s).
@@ -67,8 +67,8 @@ fn mean_trials_per_success(mut succeeds: impl FnMut(u32) -> bool) -> f32 {
     (MAX_TRIALS + 1) as f32 / (successes + 1) as f32
 }
 
-/// Whether there is an unoccluded surface, above or below a position in the tangent plane, that can receive
-/// photons of the kernel.
+/// Whether an unoccluded surface above or below a position in the tangent plane can receive the kernel's
+/// photons.
 fn receives_photons(world: &World, look: &GatherPoint, place: Vec3, radius: f32) -> bool {
     let above = REACH * radius * look.normal;
     let end = place - above;

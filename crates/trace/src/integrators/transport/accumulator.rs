@@ -1,4 +1,4 @@
-//! Accumulates the light components shown by the view.
+//! Accumulates the light components visible in the view.
 
 use super::ray::PathRay;
 use crate::integrators::view::{Components, LightAov};
@@ -13,7 +13,7 @@ pub enum LocalTerm {
     Ambient,
 }
 
-/// Accumulates each slot's radiance, limited to the components shown by the view. In each bounce, emission
+/// Accumulates each slot's radiance, limited to the components visible in the view. In each bounce, emission
 /// and ambient light are added first, followed by reflected light, in path order.
 pub struct Accumulator<'a> {
     /// The AOV to accumulate.
@@ -37,7 +37,7 @@ impl Accumulator<'_> {
         }
     }
 
-    /// Adds the light of a source that a path hits after its first diffuse or glossy surface.
+    /// Adds light from a source that a path hits after its first diffuse or glossy surface.
     pub fn add_hit_light(&mut self, path: &PathRay, radiance: Vec3) {
         match self.aov {
             LightAov::Radiance(parts) if path.state.contributes(parts.paths) => {
@@ -89,7 +89,7 @@ impl Accumulator<'_> {
         }
     }
 
-    /// Adds direct light at the vertices of consecutive slots, all visible to the camera.
+    /// Adds direct light at vertices with consecutive slots. The camera must see all of these vertices.
     pub fn add_direct_consecutive(&mut self, first: u32, contributions: &[Vec3]) {
         for (sum, contribution) in self.radiance[first as usize..].iter_mut().zip(contributions) {
             *sum += *contribution;

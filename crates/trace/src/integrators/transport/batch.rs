@@ -1,4 +1,4 @@
-//! Packets of sixteen vertices that await direct lighting, as a struct of arrays.
+//! Packets of sixteen vertices that await direct lighting, stored as a struct of arrays.
 
 use super::tile::TileContext;
 use super::vertex::ShadingVertex;
@@ -37,7 +37,7 @@ soa! {
         pub has_facet: bool = false,
         /// Whether the camera sees the vertex, directly or through mirrors and glass.
         pub only_specular_before: bool = false,
-        /// Whether the path comes from a surface with a glossy lobe.
+        /// Whether the path's previous surface has a glossy lobe.
         pub after_gloss: bool = false,
         /// Shading normal.
         pub normal: Vec3 = Vec3::ZERO,
@@ -57,7 +57,7 @@ soa! {
         pub roulette_throughput: f32 = 0.0,
         /// Index of the vertex's interior list.
         pub interiors: u32 = 0,
-        /// Ray origin on the other side, if the batch has two sides.
+        /// Ray origin on the other side of the surface. Only valid if `has_two_sides`.
         pub beyond: Vec3 = Vec3::ZERO,
         /// Index of the interior list at `beyond`.
         pub interiors_beyond: u32 = 0,
@@ -80,13 +80,13 @@ soa! {
 pub const UNPERTURBED: f32 = -2.0;
 
 impl VertexBatch {
-    /// Minimum exponent α for which lobe rays are worth tracing under any light.
+    /// Minimum exponent α at which lobe rays are worth tracing for lights of any size.
     const MIN_SHARP_EXPONENT: f32 = 100.0;
 
     /// Lobe rays are also worth tracing if infinite lights are at least this many times as wide as the lobe.
     const MIN_WIDTH_RATIO: f32 = 1.5;
 
-    /// Mask of vertices whose highlights are too narrow to be sampled reliably by light samples.
+    /// Mask of vertices whose highlights are too narrow for reliable light sampling.
     pub fn sharp_lobes(&self, tile: &TileContext<'_>, aov: LightAov) -> u32 {
         let shows = match aov {
             LightAov::Radiance(Components { specular, .. }) => specular,
@@ -104,7 +104,7 @@ impl VertexBatch {
         self.bsdf.narrower_than(self.used, least)
     }
 
-    /// Returns the samplers of the vertices.
+    /// Returns the vertices' samplers.
     #[inline(always)]
     pub fn sampler(&self, tile: &TileContext<'_>) -> SamplerPacket<PACKET_SIZE> {
         let (block, slots) = (tile.block, &self.slot);
@@ -132,7 +132,7 @@ impl VertexBatch {
         self.shading_normal_cosine = [UNPERTURBED; PACKET_SIZE];
     }
 
-    /// Whether the packet is for vertices with this kind of BSDF and these values of `is_dark` and
+    /// Whether the packet accepts vertices with this kind of BSDF and these values of `is_dark` and
     /// `has_two_sides`.
     #[inline(always)]
     pub fn accepts(&self, kind: RoughKind, (is_dark, has_two_sides): (bool, bool)) -> bool {
@@ -147,7 +147,7 @@ impl VertexBatch {
         }
     }
 
-    /// Copies a vertex from another packet with the same kind of BSDFs. Neither packet may be two-sided.
+    /// Copies a vertex from another packet with the same kind of BSDF. Neither packet may be two-sided.
     pub fn copy(&mut self, i: usize, other: &Self, from: usize) {
         BatchVertex::get(other, from).set(self, i);
         self.bsdf.copy(i, &other.bsdf, from);
@@ -237,8 +237,8 @@ impl VertexBatch {
         left
     }
 
-    /// [`Ray::start`] of rays from the vertices in the directions `wi`, or [`Ray::NO_TRIANGLE`] for rays
-    /// behind their facet.
+    /// [`Ray::start`] of rays from the vertices in the directions `wi`, or [`Ray::NO_TRIANGLE`] for rays that
+    /// leave behind their facet.
     #[inline(always)]
     pub fn starts(&self, wi: &Vec3x16) -> [u32; PACKET_SIZE] {
         // Vertices on analytic shapes are not on triangles.
@@ -321,7 +321,7 @@ impl VertexBatch {
         lanes(self.used).any(|i| self.interiors[i] != 0)
     }
 
-    /// Mask of vertices whose direction is below their horizon.
+    /// Mask of lanes whose direction is below the vertex's horizon.
     #[inline(always)]
     pub fn below_horizon(&self, wi: &Vec3x16, simd: impl Simd) -> u32 {
         let mut hidden = [0; PACKET_SIZE];

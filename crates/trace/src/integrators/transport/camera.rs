@@ -14,7 +14,7 @@ use crate::sampling::filter::FilterSample;
 use crate::sampling::{CAMERA_PATH, Dimension, SamplerPacket, warp};
 use crate::world::{PACKET_SIZE, SimdKernel};
 
-/// Number of camera-ray packets generated together, which hides the latency of random number generation.
+/// Number of camera-ray packets generated together to hide the latency of random number generation.
 pub const CAMERA_ROWS: usize = 8;
 
 /// A packet of camera rays.
@@ -72,7 +72,7 @@ impl TileContext<'_> {
         PathRay { ray, throughput: Vec3::ONE, slot, path: CAMERA_PATH + 1, interiors, state, cone }
     }
 
-    /// Glass around a point on the lens.
+    /// The glass solids around a point on the lens.
     #[cold]
     #[inline(never)]
     fn camera_interiors(&self, point: Vec3) -> InteriorList {
@@ -80,8 +80,8 @@ impl TileContext<'_> {
         around.fold(InteriorList::default(), InteriorList::entered)
     }
 
-    /// Rays of the sixteen slots starting at `first`, even past the last slot. Must be called inside a kernel
-    /// that is compiled for each instruction set.
+    /// Rays for the sixteen slots starting at `first`, even if some are past the last slot. Must be called
+    /// inside a kernel that is compiled for each instruction set.
     #[inline(always)]
     fn camera_packet(&self, first: u32) -> CameraRayPacket {
         let paths = [CAMERA_PATH; PACKET_SIZE];
@@ -118,7 +118,7 @@ impl TileContext<'_> {
                 set_lane(&mut direction, lane, ray.direction);
             }
         }
-        CameraRayPacket { rays: RayPacket::of(origin, direction), negative }
+        CameraRayPacket { rays: RayPacket::from_soa(origin, direction), negative }
     }
 }
 

@@ -1,20 +1,20 @@
 //! Ray cones, which track the width of the beam around a ray to choose the mip level of texture lookups
 //! (Akenine-Möller, Crassin, Boksansky, Belcour, Panteleev, Wright, *Improved Shader and Texture Level of
-//! Detail Using Ray Cones*, JCGT 2021). Without mip levels, the cones stay 0.
+//! Detail Using Ray Cones*, JCGT 2021). Without mip levels, all cones are 0.
 
 /// A beam around a ray. A negative width means that the beam is past its focus.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RayCone {
     /// Width at the origin of the ray.
     pub width: f32,
-    /// Increase of the width per unit of distance.
+    /// Width increase per unit distance.
     pub spread: f32,
 }
 
 /// Fraction of a lobe's radius covered by one path's cone, as if a hundred paths shared the lobe.
 const SHARE: f32 = 0.1;
 
-/// A specular bounce, which changes a beam's spread depending on its width.
+/// A specular bounce. Its effect on a beam's spread depends on the beam's width.
 #[derive(Clone, Copy, Debug)]
 pub enum SpecularEvent {
     /// Reflection.

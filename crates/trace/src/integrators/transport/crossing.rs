@@ -1,5 +1,4 @@
-//! Crossing of coincident surfaces at glass: all surfaces that touch at a hit are crossed together, from one
-//! medium to another.
+//! Crosses all coincident surfaces at a hit on glass in one step, from one medium to another.
 
 use super::interiors::{Interior, InteriorList};
 use super::ray::PathRay;
@@ -11,8 +10,8 @@ use crate::world::{CoincidenceQuery, CoincidenceScratch, CoincidentSurface, Hit,
 pub struct Crossing {
     /// Origins for rays leaving on either side.
     pub sides: OffsetPoints,
-    /// Medium traversed by the ray, and medium on the near side. `None` if both are the ray's recorded
-    /// medium.
+    /// The medium traversed by the ray, and the medium on the near side. `None` if both are the ray's
+    /// recorded medium.
     pub before: Option<[InteriorList; 2]>,
     /// The medium on the far side.
     pub far: InteriorList,
@@ -60,10 +59,10 @@ impl TileContext<'_> {
 
     /// Media before and beyond the coincident surfaces. The near medium is the medium recorded for the ray.
     /// For closed shapes, the far medium is determined by their geometry. A ray that leaves a solid must have
-    /// been inside it, even if the record differs. Open solids are considered only if they are entered or
-    /// left here, because the ray's path around other open solids is unknown. A ray and its reverse therefore
-    /// see the same media. The returned pair contains the medium that the ray traversed and the medium on the
-    /// near side. It is `None` if both match the record.
+    /// been inside it, even if the record differs. Open solids are considered only if the ray enters or
+    /// leaves them here, because it is unknown whether the ray is inside other open solids. A ray and its
+    /// reverse therefore see the same media. The returned pair contains the medium that the ray traversed and
+    /// the medium on the near side. It is `None` if both match the record.
     fn crossing_interiors(
         &self,
         known: &InteriorList,
@@ -114,8 +113,8 @@ impl TileContext<'_> {
         (Some([arrived, near]), far)
     }
 
-    /// The surface that separates two media at a hit, after [`TileContext::crossing`]. `None` if both media
-    /// are air.
+    /// The surface that separates two media at a hit. Requires the result of [`TileContext::crossing`].
+    /// `None` if both media are air.
     pub fn boundary(
         &self,
         hit: &Hit,

@@ -9,7 +9,7 @@ use crate::materials::mirror::reflect;
 use crate::math::Vec3;
 use crate::world::World;
 
-/// Branch numbers of specular reflection and refraction. They distinguish a path's continuations.
+/// Branch numbers for specular reflection and refraction. They distinguish a path's continuations.
 const REFLECTED: u32 = 1;
 const REFRACTED: u32 = 2;
 /// Branch number for scattering by a non-specular lobe.
@@ -75,9 +75,9 @@ pub fn fresnel_split(
     FresnelSplit { reflectance, refracted }
 }
 
-/// Reflectance and refracted direction, using the shading normal. If this normal faces away from the ray or
-/// would refract the ray to the incident side, the geometric normal is used, because the ray must be inside
-/// its medium.
+/// Computes the reflectance and refracted direction with the shading normal. If this normal faces away from
+/// the ray or would refract the ray to the incident side, the geometric normal is used, because the ray must
+/// be inside its medium.
 fn refract_at(vertex: &Vertex<'_>, shading: &Shading, incident: Vec3, eta: f32) -> (f32, Option<Vec3>) {
     let (shading, geometric) = (shading.normal, vertex.normal);
     let crosses = |direction: &Vec3| direction.dot(geometric) < 0.0;

@@ -58,8 +58,8 @@ impl InteriorList {
     }
 
     /// Returns the list after leaving a solid, or `None` if the ray was not recorded as inside it. A surface
-    /// made of several glasses may be entered through one glass and left through another. In that case, the
-    /// solid's last entry is removed.
+    /// made of several types of glass may be entered through one type and left through another. In that case,
+    /// the solid's last entry is removed.
     pub fn exited(self, glass: Interior) -> Option<Self> {
         let same = self.solids().iter().rposition(|&own| own == glass);
         same.or_else(|| self.solids().iter().rposition(|own| own.body == glass.body))
@@ -73,7 +73,7 @@ impl InteriorList {
         self
     }
 
-    /// Keeps only the solids for which `holds` is true.
+    /// Keeps only the solids for which `holds` returns true.
     pub fn retained(self, holds: impl Fn(Interior) -> bool) -> Self {
         let mut left = Self::default();
         for &glass in self.solids() {

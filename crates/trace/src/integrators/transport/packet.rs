@@ -26,9 +26,9 @@ use crate::world::{Hit, Object, PACKET_SIZE, PacketMaterial, SimdKernel};
 pub enum PacketSource<'a> {
     /// Camera rays: the packet, its first slot, the number of rays, and the queue index of the first ray.
     Camera(&'a CameraRayPacket, u32, usize, u32),
-    /// Rays of a queue, and the queue index of the first ray.
+    /// Consecutive rays in a queue, and the queue index of the first ray.
     Paths(&'a [PathRay], u32),
-    /// Rays at the given queue indices, with known hits.
+    /// Rays at the given queue indices whose hits have already been found.
     Traced(&'a [PathRay], &'a [Option<Hit>], &'a [u32]),
 }
 
@@ -51,7 +51,7 @@ impl PacketSource<'_> {
         }
     }
 
-    /// Queued path of a lane. `None` for camera rays.
+    /// A lane's queued path. `None` for camera rays.
     #[inline(always)]
     pub fn queued_path(&self, lane: usize) -> Option<&PathRay> {
         match self {
@@ -74,7 +74,7 @@ pub struct PacketHits {
     pub plain: u32,
     /// Mask of plain surfaces that emit toward the ray's origin.
     pub shining: u32,
-    /// Mask of other surfaces in the surface packet.
+    /// Mask of non-plain surfaces stored in the surface packet.
     found: u32,
     /// Number of texture lookups for plain surfaces.
     pub lookups: u64,
@@ -83,7 +83,7 @@ pub struct PacketHits {
 }
 
 impl PacketHits {
-    /// Hit of a lane's ray.
+    /// The hit of a lane's ray.
     pub fn hit(&self, lane: usize) -> Option<Hit> {
         self.hits.get(lane).map(|shape| Hit { shape, object: self.object[lane] })
     }
@@ -111,7 +111,7 @@ impl PacketHits {
         })
     }
 
-    /// Returns the path of a lane.
+    /// Returns a lane's path.
     #[inline(always)]
     pub fn path(&self, tile: &TileContext<'_>, rays: &PacketSource<'_>, lane: usize) -> PathRay {
         match rays {
@@ -156,7 +156,7 @@ impl TileContext<'_> {
         self.pixel_spread == 0.0 && !self.world.is_textured(material)
     }
 
-    /// Material and non-specular BSDF of plain surfaces. `None` if the material's surfaces are not plain.
+    /// Packet-shading data and non-specular BSDF of a plain material. `None` if the material is not plain.
     #[inline(always)]
     pub fn plain_material(&self, material: usize) -> Option<(&PacketMaterial, &Rough)> {
         let (plain, rough) = self.world.packet_material(material)?;
@@ -213,12 +213,12 @@ impl SimdKernel for PacketIntersection<'_> {
                     set_lane(&mut direction, lane, path.ray.direction);
                     (start[lane], ends[lane]) = (path.ray.start, path.ray.t_max);
                 }
-                traced = packet::traced(&ends, simd);
-                of_paths = RayPacket::of(origin, direction).with_start_triangle(start);
+                traced = packet::active_lanes(&ends, simd);
+                of_paths = RayPacket::from_soa(origin, direction).with_start_triangle(start);
                 &of_paths
             }
         };
-        // Intersect the rays, or use the known hits.
+        // Intersect the rays, or use the hits found earlier.
         let (hits, object) = match rays {
             PacketSource::Camera(..) | PacketSource::Paths(..) => {
                 world.geometry.closest_rows(rows, &mut ends, traced, simd)
@@ -227,7 +227,7 @@ impl SimdKernel for PacketIntersection<'_> {
         };
         // Select the rays in air, whose surfaces may be plain.
         *self.surface = SurfacePacket::EMPTY;
-        let any = hits.any(simd);
+        let any = hits.hit_mask(simd);
         let (mut in_air, mut only_specular_before, mut after_gloss) = (any, !0, 0);
         match rays {
             PacketSource::Camera(..) => in_air = if world.is_camera_in_air() { any } else { 0 },
@@ -340,7 +340,8 @@ impl PacketIntersection<'_> {
     }
 }
 
-/// Returns the index in the first lane of `left`, and the mask of lanes in `left` with the same index.
+/// Returns the index stored in the first lane in `left`, and the mask of lanes in `left` that have the same
+/// index.
 #[inline(always)]
 fn first_group(indices: &[u32; PACKET_SIZE], left: u32, simd: impl Simd) -> (u32, u32) {
     let index = indices[left.trailing_zeros() as usize % PACKET_SIZE];
@@ -351,13 +352,13 @@ fn first_group(indices: &[u32; PACKET_SIZE], left: u32, simd: impl Simd) -> (u32
     (index, simd.movemask(&of) & left)
 }
 
-/// Gathers the known hits at the given queue indices into a packet.
+/// Gathers previously found hits at the given queue indices into a packet.
 #[inline(always)]
 fn known_hits(known: &[Option<Hit>], places: &[u32]) -> (HitPacket, [u32; PACKET_SIZE]) {
-    let (mut hits, mut object) = (HitPacket::none(), [u32::MAX; PACKET_SIZE]);
+    let (mut hits, mut object) = (HitPacket::without_hits(), [u32::MAX; PACKET_SIZE]);
     for (lane, &place) in places.iter().enumerate().take(PACKET_SIZE) {
         if let Some(hit) = &known[place as usize] {
-            hits.put(lane, &hit.shape);
+            hits.set(lane, &hit.shape);
             object[lane] = hit.object;
         }
     }
@@ -407,7 +408,7 @@ impl TileContext<'_> {
     }
 }
 
-/// Choice of the vertices of smooth meshes to lift above their facets.
+/// Selects the vertices on smooth meshes to lift above their facets.
 #[derive(Clone, Copy)]
 enum LiftMode {
     /// All vertices.

@@ -1,4 +1,4 @@
-//! A path's ray, and the path state that determines the weight of light found by the ray.
+//! A path's ray, and the path state that determines the weight of any light the ray finds.
 
 use super::cone::RayCone;
 use super::interiors::InteriorList;
@@ -74,14 +74,15 @@ impl PathState {
         }
     }
 
-    /// Returns the state after a surface inside glass that does not change the ray but blocks light samples.
+    /// Returns the state after passing a surface inside glass. Such a surface does not change the ray, but
+    /// blocks light samples.
     pub fn hidden_from_lights(self) -> Self {
         self.after_specular(1.0)
     }
 }
 
 impl PathRay {
-    /// Path number of a continuation of this path. Each continuation has a different `branch`.
+    /// Path number for a continuation of this path. Each continuation has a different `branch`.
     pub fn continuation_path_number(&self, branch: u32) -> u32 {
         // With XOR, the path number 1 would remain 1 after each reflection, and all random choices along the
         // path would be the same.

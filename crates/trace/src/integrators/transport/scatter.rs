@@ -31,7 +31,7 @@ impl Continuation {
     /// Reciprocal of the throughput below which Russian roulette may end a path.
     const GAIN: f32 = 2.5;
 
-    /// Determines how paths continue after `depth` bounces, in these lobes.
+    /// Determines how paths continue in these lobes after `depth` bounces.
     pub fn new(tile: &TileContext<'_>, depth: u32, lobes: LobeSet) -> Self {
         let emits = || tile.world.materials.iter().any(|material| material.emission.is_emissive());
         let max_depth = tile.settings.render.max_depth;
@@ -100,7 +100,7 @@ impl SampleBsdf<'_> {
     /// Adds the rays of the next bounce to `next`. `interior_lists` contains the media of the vertices.
     /// `cones` is empty or contains the ray cones at the vertices, indexed by queue index.
     pub fn scatter(self, interior_lists: &InteriorLists, cones: &[RayCone], next: &mut Vec<PathRay>) {
-        // Sample all vertices of the packet.
+        // Sample the BSDFs of all vertices in the packet.
         let row = self.row;
         let scattered = self.tile.world.geometry.instructions().run(self);
         let of_lobe = |pdf: f32| move |cone: &RayCone| cone.scattered(pdf);
@@ -207,7 +207,7 @@ impl SampleBsdf<'_> {
     fn sample_both_sides(&self, samples: &SideSamples, simd: impl Simd) -> ScatteredDirections {
         let row = self.row;
         let SideSamples { directions: wi, densities: pdfs, shares, shown, beyond } = samples;
-        // Apply the terminator factors of perturbed normals, on the side of each direction.
+        // Apply the terminator factors for perturbed normals, each on its direction's side.
         let mut sides = [1.0; PACKET_SIZE];
         for i in 0..PACKET_SIZE {
             sides[i] = if beyond[i] == 0 { 1.0 } else { -1.0 };
@@ -222,8 +222,8 @@ impl SampleBsdf<'_> {
             set_lane(&mut factors, i, Vec3::splat(factor));
             alive |= if (pdfs[i] > 0.0) & (factor > 0.0) { 1 << i } else { 0 };
         }
-        // Drop directions behind the facets. Rays with an offset origin on both sides do not start on a
-        // triangle.
+        // Drop directions behind the facets. Two-sided vertices have an offset origin on each side, so their
+        // rays do not start on a triangle.
         let mut hidden = [0; PACKET_SIZE];
         for i in 0..PACKET_SIZE {
             let cosine = lane(&row.horizon, i).dot(lane(wi, i)) * sides[i];

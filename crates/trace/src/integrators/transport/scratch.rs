@@ -17,7 +17,7 @@ pub struct TraceBuffers {
     pub camera: Vec<CameraRayPacket>,
     /// Surfaces at the hits of a packet.
     pub surfaces: SurfacePacket,
-    /// Hits of the rays of this bounce.
+    /// Hits of this bounce's rays.
     pub hits: Vec<Option<Hit>>,
     /// Queue indices of the rays, ordered by the object hit.
     pub object_order: ObjectOrder,
@@ -35,7 +35,8 @@ impl ObjectOrder {
     /// Number of groups. The low bits of an object's index select its group.
     const GROUPS: usize = 64;
 
-    /// Groups the indices of these hits. Rays without a hit are last. Each group keeps the queue order.
+    /// Groups the queue indices by the object hit. Rays without a hit are last. Each group keeps the queue
+    /// order.
     pub fn sort(&mut self, hits: &[Option<Hit>]) {
         let kind = |hit: &Option<Hit>| hit.map_or(Self::GROUPS, |hit| hit.object as usize % Self::GROUPS);
         let mut starts = [0_u32; Self::GROUPS + 2];

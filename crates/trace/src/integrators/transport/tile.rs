@@ -67,11 +67,11 @@ impl<'a> TileContext<'a> {
     }
 }
 
-/// The samples of a tile. A slot is the index of a sample. Samples are ordered by pixel.
+/// The samples in a tile. A slot is a sample's index. Samples are ordered by pixel.
 pub struct SampleBlock {
     /// The pixels of the tile.
     pub pixels: Pixels,
-    /// Range of sample indices of each pixel.
+    /// Range of sample indices for each pixel.
     pub samples: Range<u32>,
 }
 
@@ -81,7 +81,7 @@ impl SampleBlock {
         self.pixels.count() * self.samples.len()
     }
 
-    /// Column, row and sample index of a slot.
+    /// Returns a slot's column, row and sample index.
     pub fn sample_of(&self, slot: u32) -> (u32, u32, u32) {
         let samples = self.samples.len() as u32;
         let (pixel, sample) = (slot / samples, slot % samples);

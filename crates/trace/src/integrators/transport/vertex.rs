@@ -22,7 +22,8 @@ pub struct Vertex<'a> {
     pub material: &'a Material,
     /// [`Ray::start`] of rays that leave the vertex.
     start: u32,
-    /// Origins for rays on either side, if known more precisely than from the surface's error bound.
+    /// Origins for rays on either side. `None` if they are not known more precisely than the surface's error
+    /// bound.
     sides: Option<OffsetPoints>,
     /// Whether the path hits the front face.
     pub is_front: bool,
@@ -32,7 +33,7 @@ pub struct Vertex<'a> {
     pub wo: Vec3,
     /// Geometric normal on the viewer's side.
     pub normal: Vec3,
-    /// −1 if the viewer is on the back side, and otherwise 1.
+    /// −1 if the viewer is on the back side, 1 otherwise.
     side: f32,
     /// Point for texture lookups.
     pub texture_point: TexturePoint,
@@ -126,8 +127,8 @@ impl<'a> Vertex<'a> {
         self.material.emission.emits_from(self.is_front)
     }
 
-    /// Radiance emitted toward the path. If light samples compete with the path, textures are looked up
-    /// without filtering, as in light samples.
+    /// Radiance emitted toward the path. If light samples compete with the path, texture lookups are
+    /// unfiltered, as in light samples.
     pub fn emitted_radiance(&self, path: &PathRay, counters: &mut RayCounters) -> Vec3 {
         let is_shared = path.state.pdf > 0.0;
         let at = self.lookup_point(is_shared);
@@ -291,7 +292,7 @@ const MIN_LIFT: f32 = 8.0;
 pub struct ShadowOrigin {
     /// The point from which lights are sampled and shadow rays start.
     pub point: Vec3,
-    /// [`Ray::start`] of rays in front of the facet.
+    /// [`Ray::start`] for rays in front of the facet.
     pub start: u32,
     /// Horizon normal. Directions behind it are occluded. `None` if the cosines or the shadow rays account
     /// for this.

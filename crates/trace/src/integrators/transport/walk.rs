@@ -17,7 +17,7 @@ use crate::math::Vec3;
 use crate::sampling::Dimension;
 use crate::world::{Hit, MAX_NULL_INTERACTIONS, OffsetPoints};
 
-/// Maximum number of surfaces without a change of medium that a ray can pass in one walk.
+/// Maximum number of surfaces that a ray can cross in one walk without a change of medium.
 pub const MAX_PASSED_SURFACES: usize = 64;
 
 /// The interaction at which a walk ends.
@@ -28,7 +28,7 @@ pub enum Interaction<'v, 'a> {
     Glass(&'v Vertex<'a>, Hit, Interface<'v>),
     /// The ray leaves the scene.
     Nothing,
-    /// The ray has passed [`MAX_PASSED_SURFACES`] surfaces without a change of medium.
+    /// The ray has crossed [`MAX_PASSED_SURFACES`] surfaces without a change of medium.
     Hidden,
 }
 
@@ -70,10 +70,10 @@ pub trait PathStepper<'a> {
     ) -> NullInteraction;
 }
 
-/// Result of reaching a surface that light may pass without changing direction.
+/// Outcome at a surface that light may pass through without changing direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum NullInteraction {
-    /// The path passes, and its throughput is multiplied by this factor.
+    /// The path passes through, and its throughput is multiplied by this factor.
     Passed(Vec3),
     /// The surface is opaque at this point.
     Opaque,
@@ -81,22 +81,22 @@ pub enum NullInteraction {
     Ended,
 }
 
-/// The straight segment of a path since its last vertex, across null interactions.
+/// The straight segment from a path's last vertex, across any null interactions.
 #[derive(Clone, Copy)]
 struct Segment {
-    /// The last vertex, if any surface was passed.
+    /// Position of the last vertex. Only valid if `count` > 0.
     origin: Vec3,
     /// Distance from the last vertex to the origin of the path's current ray.
     distance: f32,
-    /// Number of surfaces passed.
+    /// Number of surfaces crossed so far.
     count: u32,
 }
 
 impl Segment {
-    /// The segment of a path that has not passed any surface.
+    /// The initial segment, before the path has crossed any surface.
     const DIRECT: Self = Self { origin: Vec3::ZERO, distance: 0.0, count: 0 };
 
-    /// Extends the segment past another surface, which the path hits at this distance.
+    /// Extends the segment across another surface, which the path hits at this distance.
     fn extended(self, path: &PathRay, distance: f32) -> Self {
         let origin = if self.count == 0 { path.ray.origin } else { self.origin };
         Self { origin, distance: self.distance + distance, count: self.count + 1 }
@@ -257,7 +257,7 @@ fn rough_boundary<'a, W: PathStepper<'a>>(
     Some(GlassPoint { near: indices[0], far: indices[1], alpha })
 }
 
-/// Determines whether a path passes a surface that light may pass without changing direction.
+/// Determines whether a path passes straight through a surface that may be a null interaction.
 #[cold]
 #[inline(never)]
 fn null_interaction<'a, W: PathStepper<'a>>(

@@ -86,8 +86,8 @@ fn queries<'a>(parts: &'a GlassParts, rims: &'a [&RimEdge]) -> impl Iterator<Ite
 impl OpaqueQuery {
     fn bounds(&self) -> Aabb {
         match *self {
-            Self::Way(way) => Aabb::around_f64([way.origin, way.at(way.t_max)]),
-            Self::Point(point, reach) => Aabb::around_f64([point - reach, point + reach]),
+            Self::Way(way) => Aabb::from_points_f64([way.origin, way.at(way.t_max)]),
+            Self::Point(point, reach) => Aabb::from_points_f64([point - reach, point + reach]),
         }
     }
 
@@ -141,8 +141,8 @@ fn evaluate(
             }
             LoweredShape::Mesh(placed) => {
                 for corners in triangles(placed, meshes[placed.file], origin) {
-                    let around = Aabb::around_f64(corners);
-                    if around.meets(&all) {
+                    let around = Aabb::from_points_f64(corners);
+                    if around.overlaps(&all) {
                         tree.visit_overlapping(&around, |id| {
                             let id = id as usize;
                             answers[id] = answers[id] || queries[id].meets_triangle(corners);

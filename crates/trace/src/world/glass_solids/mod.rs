@@ -2,7 +2,7 @@
 //!
 //! A ray that enters glass through one object and leaves through another was inside one solid only if both
 //! objects bound the same solid. Glass objects that do not enclose a volume individually (meshes, quads,
-//! triangles, disks, tubes) form one solid if they close each other. This means that their rims coincide up
+//! triangles, disks, tubes) form one solid if they share their edges. This means that their rims coincide up
 //! to rounding, possibly after splitting at the ends of other rims, and that the surface continues from front
 //! to front. They must have the same index of refraction and tint, so that the interior does not depend on
 //! where a ray entered. A part is flipped if its orientation differs from its neighbors', and so is a solid
@@ -31,17 +31,17 @@ use crate::control::{CancelToken, Cancelled};
 use crate::math::DVec3;
 use crate::scene::description::Scene;
 
-/// Maximum missing fraction of the surface of a solid that is considered closed.
+/// A solid is considered closed if at most this fraction of its surface is missing.
 const SMALL_HOLE: f64 = 1e-3;
 
-/// Maximum missing fraction of a solid's surface at which a hole is attributed to rounding.
+/// A hole is attributed to rounding if at most this fraction of the solid's surface is missing.
 const NO_HOLE: f64 = 1e-7;
 
-/// Volume below which a solid is considered to enclose no volume, relative to a cube of about the same
-/// surface area.
+/// A solid is considered to enclose no volume if its volume, relative to a cube of about the same surface
+/// area, is below this value.
 const NO_VOLUME: f64 = 1e-9;
 
-/// Minimum fraction of a rim that must be covered by opaque surfaces to close it.
+/// A rim is closed if opaque surfaces cover at least this fraction of it.
 const COVERED: f64 = 0.95;
 
 /// Glass solids of a scene.
@@ -51,7 +51,7 @@ pub struct GlassSolids {
     parts: Vec<ObjectRole>,
     /// Glass objects with open rims.
     open: Vec<OpenGlass>,
-    /// One object of each closed solid that encloses no volume.
+    /// One object from each closed solid that encloses no volume.
     flat: Vec<u32>,
 }
 
@@ -68,7 +68,7 @@ struct ObjectRole {
 pub struct OpenGlass {
     /// Index of the object.
     pub object: u32,
-    /// Number of the object's edges that are not closed by another surface.
+    /// Number of the object's edges that no other surface shares.
     pub edges: usize,
     /// Missing fraction of the solid's surface. Exceeds 1 if the hole is larger than the surface.
     pub missing: f64,
@@ -79,7 +79,7 @@ pub struct OpenGlass {
 }
 
 impl GlassSolids {
-    /// Finds the glass solids of a scene.
+    /// Finds the glass solids in a scene.
     ///
     /// # Errors
     /// [`Cancelled`] if the token is canceled.
@@ -90,7 +90,8 @@ impl GlassSolids {
         }
         let mut shared_edges = SharedEdges::between(&parts.list, &parts.rims, token)?;
         let groups = PartGroups::of(&parts, &shared_edges);
-        // Reopen edges where the orientations of two parts differ from the rest of their common border.
+        // Reopen edges where the relative orientation of two parts differs from the rest of their common
+        // border.
         let is_odd = |seam: &&SharedEdge| groups.have_opposite_orientations(seam.parts()) != seam.disagrees;
         let odd: Vec<OpenEdge> =
             shared_edges.joined.iter().filter(is_odd).flat_map(|seam| seam.rims).collect();
@@ -146,7 +147,7 @@ impl GlassSolids {
         }
     }
 
-    /// Object that identifies an object's solid.
+    /// Returns the object that identifies the solid to which `object` belongs.
     pub fn solid_id(&self, object: u32) -> u32 {
         self.parts.get(object as usize).map_or(object, |part| part.place)
     }
@@ -248,7 +249,7 @@ impl PartGroups {
         self.flips[one as usize] != self.flips[other as usize]
     }
 
-    /// Volume and area of a solid, with its parts oriented like the first part.
+    /// Volume and area of a solid whose parts are all oriented like the first part.
     fn volume(&self, parts: &GlassParts, members: &[u32]) -> (f64, f64) {
         let (mut volume, mut area) = (0.0, 0.0);
         for &part in members {
@@ -303,7 +304,7 @@ impl PartGroups {
 /// Missing part of a solid's surface.
 struct Hole {
     rims: Vec<RimEdge>,
-    /// Whether each edge coincides with another edge of the solid in the same direction.
+    /// For each edge, whether another edge of the solid coincides with it and has the same direction.
     disagree: Vec<bool>,
     /// Missing fraction of the surface.
     part: f64,
@@ -327,7 +328,7 @@ impl Hole {
         all.iter().map(hole).collect()
     }
 
-    /// Returns the hole of a solid with these open edges.
+    /// Returns the hole formed by a solid's open edges.
     fn of(parts: &GlassParts, groups: &PartGroups, members: &[u32], mut own: Vec<OpenEdge>) -> Self {
         if own.is_empty() {
             return Self { rims: Vec::new(), disagree: Vec::new(), part: 0.0 };
@@ -364,8 +365,8 @@ impl Hole {
         Self { rims: own.into_iter().map(|(rim, _)| rim).collect(), disagree, part: missing / area }
     }
 
-    /// Describes the hole at one part. `None` if the part does not border the hole, or if the hole is
-    /// attributed to rounding.
+    /// Describes the hole where it borders one part. `None` if the part does not border the hole, or if the
+    /// hole is attributed to rounding.
     fn at(&self, part: u32, object: u32, is_covered: bool) -> Option<OpenGlass> {
         let own = || self.rims.iter().zip(&self.disagree).filter(|(rim, _)| rim.part == part);
         let edges = own().count();

@@ -13,7 +13,7 @@ use crate::scene::description::{MaterialKind, Mesh, NumberSource, Object, Scene,
 /// Chords per circular rim. All rims on one circle use the same points.
 const CHORDS: usize = 32;
 
-/// Relative rounding of coordinates in a file, corresponding to single precision or six decimal digits.
+/// Relative rounding error of coordinates in a file with single precision or six decimal digits.
 pub(super) const ROUNDING: f64 = 16.0 * f32::EPSILON as f64;
 
 /// A glass object that does not enclose a volume on its own.
@@ -47,7 +47,7 @@ pub(super) struct RimEdge {
     pub inner: DVec3,
 }
 
-/// All parts of a scene, in coordinates relative to a point near them.
+/// All glass parts in a scene, in coordinates relative to a point near them.
 #[derive(Debug, Default)]
 pub(super) struct GlassParts {
     pub list: Vec<GlassPart>,
@@ -209,7 +209,7 @@ fn reference_point(shape: &Shape, meshes: &[&LoadedMesh]) -> DVec3 {
     shape.point().or_else(|| shape.mesh().map(of_mesh)).unwrap_or(DVec3::ZERO)
 }
 
-/// Which of a mesh's triangles are glass.
+/// The set of an object's triangles that are glass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum MeshGlass {
     /// All triangles, or the whole object if it is not a mesh.
@@ -218,7 +218,7 @@ pub(super) enum MeshGlass {
     Some,
 }
 
-/// Returns which part of an object is glass, if any.
+/// Returns which triangles of an object are glass, or `None` if the object contains no glass.
 pub(super) fn glass_of(scene: &Scene, meshes: &[&LoadedMesh], object: &Object) -> Option<MeshGlass> {
     match (object.material, object.shape.mesh()) {
         (Some(index), _) => scene.materials[index].kind.is_glass().then_some(MeshGlass::All),
@@ -229,7 +229,7 @@ pub(super) fn glass_of(scene: &Scene, meshes: &[&LoadedMesh], object: &Object) -
     }
 }
 
-/// Type of glass of an object.
+/// The type of glass that an object is made of.
 fn glass_id_of(scene: &Scene, meshes: &[&LoadedMesh], object: &Object) -> GlassId {
     match (object.material, object.shape.mesh()) {
         (Some(index), _) => scene.materials[index].kind.glass_medium_key(),
@@ -244,8 +244,8 @@ fn glass_id_of(scene: &Scene, meshes: &[&LoadedMesh], object: &Object) -> GlassI
     }
 }
 
-/// Returns the edges not closed by another triangle of the mesh, as pairs of triangle and edge number. Edges
-/// with equal endpoints close each other in pairs of opposite direction.
+/// Returns the mesh's open edges as pairs of triangle and edge number. Two edges with equal endpoints and
+/// opposite directions close each other.
 fn open_edges(mesh: &TriangleMesh) -> Vec<[u32; 2]> {
     let all = (0..mesh.triangles.len() as u32).flat_map(|triangle| (0..3).map(move |edge| [triangle, edge]));
     let open = unmatched_edges(mesh, all, |vertex| vertex);
@@ -272,8 +272,8 @@ fn open_edges(mesh: &TriangleMesh) -> Vec<[u32; 2]> {
     unmatched_edges(mesh, open.into_iter(), |vertex| first.get(&vertex).copied().unwrap_or(vertex))
 }
 
-/// Returns the edges in `edges` that are not closed by another edge. `place` maps coincident vertices to one
-/// representative.
+/// Returns the edges in `edges` that have no matching edge in the opposite direction. `place` maps coincident
+/// vertices to one representative.
 fn unmatched_edges(
     mesh: &TriangleMesh,
     edges: impl Iterator<Item = [u32; 2]> + Clone,

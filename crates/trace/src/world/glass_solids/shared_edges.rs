@@ -1,5 +1,5 @@
-//! Shared edges: pairs of rim edges of the same glass that close each other because they have the same
-//! endpoints and opposite directions.
+//! Shared edges: pairs of rim edges that belong to the same glass and have the same endpoints but opposite
+//! directions.
 
 use super::parts::{GlassId, GlassPart, RimEdge};
 use crate::accel::Bvh;
@@ -13,10 +13,10 @@ const SAME_ANGLE: f64 = 1e-3;
 /// A rim edge with the ids of its endpoints.
 pub(super) type OpenEdge = (RimEdge, [u32; 2]);
 
-/// Two parts that close each other along an edge.
+/// An edge shared by two parts, where the surface continues from one part to the other.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SharedEdge {
-    /// Both edges, with the ids of their endpoints.
+    /// Both edges, and the ids of their endpoints.
     pub rims: [OpenEdge; 2],
     /// Whether the parts have opposite orientations.
     pub disagrees: bool,
@@ -26,7 +26,7 @@ pub(super) struct SharedEdge {
 #[derive(Debug, Default)]
 pub(super) struct SharedEdges {
     pub joined: Vec<SharedEdge>,
-    /// Open edges, with the ids of their endpoints.
+    /// Open edges, and the ids of their endpoints.
     pub open: Vec<OpenEdge>,
 }
 
@@ -56,12 +56,12 @@ impl SharedEdge {
 }
 
 impl SharedEdges {
-    /// Matches rim edges. If more than two surfaces share an edge, surfaces with glass between them close
-    /// each other.
+    /// Matches rim edges. If more than two surfaces share an edge, surfaces with glass between them are
+    /// paired.
     pub fn between(parts: &[GlassPart], rims: &[RimEdge], token: &CancelToken) -> Result<Self, Cancelled> {
         let mut edges = Self::default();
         let sites = EdgeEndpoints::of(parts, rims, token)?;
-        // Match edges with both endpoints in common.
+        // Match edges that have both endpoints in common.
         let halves = rims.iter().enumerate().map(|(i, rim)| (*rim, sites.of_rim(i)));
         let open = edges.join(parts, halves.collect());
         token.check()?;
@@ -105,8 +105,8 @@ impl SharedEdges {
     }
 }
 
-/// Returns pairs of edges with glass between them. In the order of angles around the common edge, a surface
-/// whose back faces forward is paired with the next surface if that surface's back faces backward.
+/// Returns pairs of edges with glass between them. In angular order around the common edge, a surface whose
+/// back faces forward is paired with the next surface if that surface's back faces backward.
 fn pairs_with_glass_between(same: &[HalfEdge]) -> impl Iterator<Item = [usize; 2]> {
     let ends =
         |half: &HalfEdge| if half.is_back { [half.rim.ends[1], half.rim.ends[0]] } else { half.rim.ends };
@@ -210,7 +210,7 @@ impl EdgeEndpoints {
             let way = to - from;
             let mut cuts = Vec::new();
             tree.visit_overlapping(
-                &Aabb::around_f64([from, to]).grown(crate::math::Vec3::splat(tolerance as f32)),
+                &Aabb::from_points_f64([from, to]).expanded(crate::math::Vec3::splat(tolerance as f32)),
                 |i| {
                     let (site, point) = (ends[i as usize], points[i as usize]);
                     let along = (point - from).dot(way) / way.length_squared();
@@ -238,7 +238,7 @@ fn endpoint_boxes(points: &[DVec3], tolerances: &[f64]) -> Vec<Aabb> {
 }
 
 fn around_point(point: DVec3, tolerance: f64) -> Aabb {
-    Aabb::around_f64([point - tolerance, point + tolerance])
+    Aabb::from_points_f64([point - tolerance, point + tolerance])
 }
 
 /// Finds the lowest number in a set of joined items, using union-find with path halving.

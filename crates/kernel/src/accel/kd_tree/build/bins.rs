@@ -8,16 +8,16 @@ use std::array;
 use rayon::prelude::*;
 
 use super::cost::{CandidatePlanes, PlaneSearch, SplitPlane};
-use crate::accel::reference::{Bounds, Reference};
+use crate::accel::reference::{SimdBounds, TriangleReference};
 use crate::math::Vec4;
 
 /// Number of bins along an axis.
 const BINS: usize = 31;
 
-/// Number of planes: one between each pair of bins, one before the first, and one after the last.
+/// Number of planes: one between each pair of adjacent bins, one before the first, and one after the last.
 const PLANES: usize = BINS + 1;
 
-/// Number of references above which counting is parallel.
+/// Number of references above which counting is parallelized.
 const PARALLEL_SIZE: usize = 1 << 16;
 
 /// For each axis and bin, the number of boxes that start and end in it.
@@ -30,7 +30,7 @@ struct Histogram {
 const ROUND: f32 = 12_582_912.0;
 
 impl Histogram {
-    fn of(references: &[Reference], start: Vec4, per_length: Vec4) -> Self {
+    fn of(references: &[TriangleReference], start: Vec4, per_length: Vec4) -> Self {
         let mut own = Self { starts: [[0; PLANES]; 3], ends: [[0; PLANES]; 3] };
         // Subtract ½ to turn rounding to nearest into rounding down.
         let bins = |at: Vec4| {
@@ -58,8 +58,8 @@ impl Histogram {
 }
 
 /// Finds the cheapest plane. Returns `None` if a leaf costs no more.
-pub fn cheapest(references: &[Reference], cell: &Bounds) -> Option<SplitPlane> {
-    let around = Bounds::around(references);
+pub fn cheapest(references: &[TriangleReference], cell: &SimdBounds) -> Option<SplitPlane> {
+    let around = SimdBounds::around(references);
     let extent = around.extent();
     let scale = |length: f32| {
         let per_length = BINS as f32 / length;

@@ -1,13 +1,13 @@
 //! Expected cost of a split, from surface areas (MacDonald, Booth, *Heuristics for ray tracing using space
 //! subdivision*, 1990). Evaluates four planes at a time.
 
-use crate::accel::reference::Bounds;
+use crate::accel::reference::SimdBounds;
 use crate::math::{Vec3, Vec4};
 
 /// Cost of a traversal step relative to a triangle test.
 const TRAVERSAL_COST: f32 = 1.0;
 
-/// Cost factor of a split that cuts off empty space.
+/// Cost factor for a split that cuts off empty space.
 const EMPTY_FACTOR: f32 = 0.8;
 
 /// Tag of a leaf, in place of an axis.
@@ -25,8 +25,8 @@ pub struct SplitPlane {
     pub planar_right: bool,
 }
 
-/// 4·`N` planes perpendicular to one axis, with the triangle counts on both sides of each. Triangles on both
-/// sides are counted twice.
+/// 4·`N` planes perpendicular to one axis, and the triangle counts on both sides of each plane. Triangles on
+/// both sides are counted twice.
 #[derive(Clone, Copy)]
 pub struct CandidatePlanes<const N: usize> {
     pub at: [Vec4; N],
@@ -50,7 +50,7 @@ pub struct PlaneSearch<const N: usize> {
 impl<const N: usize> PlaneSearch<N> {
     /// Starts a search for planes that are cheaper than a leaf with `count` triangles.
     #[inline(always)]
-    pub fn new(cell: &Bounds, count: usize) -> Self {
+    pub fn new(cell: &SimdBounds, count: usize) -> Self {
         let extent = cell.extent().truncate();
         let extent = extent.max(Vec3::splat(extent.max_element() * 1e-4)).to_array();
         let [x, y, z] = extent;
@@ -86,7 +86,7 @@ impl<const N: usize> PlaneSearch<N> {
         }
     }
 
-    /// Updates the lanes that improve on their best cost so far.
+    /// Updates the lanes in which a plane improves on the best cost so far.
     #[inline(always)]
     fn update_lanes(&mut self, i: usize, cost: Vec4, at: Vec4, tag: Vec4) {
         let is_cheaper = cost.cmplt(self.cost[i]);

@@ -9,7 +9,7 @@ use crate::accel::wide_bvh::pages;
 
 /// A part of the kd-tree: an upper node or a subtree.
 pub enum TreePart {
-    /// A plane with the parts below and above it.
+    /// A plane, and the parts below and above it.
     Halves { plane: SplitPlane, size: SubtreeSize, halves: Box<[TreePart; 2]> },
     /// A subtree built by a single thread.
     Built(KdSubtree),
@@ -37,7 +37,8 @@ impl TreePart {
         }
     }
 
-    /// Joins all parts into one subtree, with nodes before their children and left before right.
+    /// Joins all parts into one subtree. Nodes precede their children, and left children precede right
+    /// children.
     pub fn join(self) -> KdSubtree {
         let size = self.size();
         let mut all =

@@ -20,10 +20,10 @@ use crate::geometry::mesh::TriangleMesh;
 use crate::math::Vec3;
 use crate::math::elementary::log2;
 
-use crate::accel::reference::{Bounds, Reference};
+use crate::accel::reference::{SimdBounds, TriangleReference};
 use cost::SplitPlane;
 use join::TreePart;
-use partition::Scratch;
+use partition::PartitionBuffers;
 use subtree::KdSubtree;
 
 /// Maximum number of references in a cell built by a single thread. The token is polled between such cells.
@@ -55,7 +55,7 @@ pub struct BuiltKdTree {
     pub bounds: Aabb,
 }
 
-/// Maximum number of planes above a leaf for `count` triangles (Havran's 8 + 1.3·log₂ n).
+/// Maximum number of planes above any leaf in a tree over `count` triangles (Havran's 8 + 1.3·log₂ n).
 pub fn depth_limit(count: usize) -> u32 {
     8 + (1.3 * log2(count.max(1) as f32)) as u32
 }
@@ -80,12 +80,12 @@ fn build_within(
     corners: impl Fn(u32) -> [Vec3; 3] + Sync,
     token: &CancelToken,
 ) -> Result<BuiltKdTree, Cancelled> {
-    let references = Reference::usable(count, &corners, token)?;
+    let references = TriangleReference::collect_finite(count, &corners, token)?;
     if references.is_empty() {
         let (nodes, references, triangles) = Default::default();
         return Ok(BuiltKdTree { nodes, references, triangles, bounds: Aabb::EMPTY });
     }
-    let bounds = Bounds::around(&references);
+    let bounds = SimdBounds::around(&references);
     let levels = depth_limit(references.len());
     let part = build_part(&Cell { bounds, levels, room }, references, &corners, token)?;
     let all = part.join();
@@ -113,8 +113,8 @@ fn order_by_first_use(mut ids: Vec<u32>, count: u32) -> (Vec<u32>, Vec<u32>) {
 /// A region of space to be covered by a subtree.
 #[derive(Clone, Copy)]
 struct Cell {
-    bounds: Bounds,
-    /// Maximum number of levels of planes in the cell.
+    bounds: SimdBounds,
+    /// Maximum number of levels in the cell's subtree.
     levels: u32,
     /// Maximum number of leaves plus references in the cell.
     room: u64,
@@ -122,9 +122,9 @@ struct Cell {
 
 impl Cell {
     /// Chooses the splitting plane, or `None` for a leaf.
-    fn plane(&self, references: &[Reference]) -> Option<SplitPlane> {
+    fn choose_split(&self, references: &[TriangleReference]) -> Option<SplitPlane> {
         // In the worst case, every triangle straddles the plane.
-        let has_room = 2 * leaf_slots(references.len()) <= self.room;
+        let has_room = 2 * leaf_room(references.len()) <= self.room;
         if self.levels == 0 || references.is_empty() || !has_room {
             None
         } else if references.len() <= sweep::SWEPT {
@@ -136,7 +136,7 @@ impl Cell {
 
     /// The two halves of the cell, given the number of references in each.
     fn halves(&self, plane: &SplitPlane, counts: [usize; 2]) -> [Self; 2] {
-        let [left, right] = counts.map(leaf_slots);
+        let [left, right] = counts.map(leaf_room);
         // Divide the room proportionally. If there is enough room for both halves together, each half gets
         // enough.
         let room = self.room * left / (left + right);
@@ -147,23 +147,23 @@ impl Cell {
 }
 
 /// Room needed by a leaf with `count` references.
-fn leaf_slots(count: usize) -> u64 {
+fn leaf_room(count: usize) -> u64 {
     count as u64 + 1
 }
 
 /// Splits cells in parallel until they are small enough for a single thread.
 fn build_part(
     cell: &Cell,
-    mut references: Vec<Reference>,
+    mut references: Vec<TriangleReference>,
     corners: &(impl Fn(u32) -> [Vec3; 3] + Sync),
     token: &CancelToken,
 ) -> Result<TreePart, Cancelled> {
     token.check()?;
-    let plane = if references.len() > TASK_SIZE { cell.plane(&references) } else { None };
+    let plane = if references.len() > TASK_SIZE { cell.choose_split(&references) } else { None };
     let Some(plane) = plane else {
         return Ok(TreePart::Built(KdSubtree::build(cell, references, corners, token)?));
     };
-    let left = Scratch::default().partition(&mut references, 0, &plane, corners).to_vec();
+    let left = PartitionBuffers::default().partition(&mut references, 0, &plane, corners).to_vec();
     references.shrink_to_fit();
     let [left_cell, right_cell] = cell.halves(&plane, [left.len(), references.len()]);
     let (left, right) = rayon::join(
@@ -192,7 +192,7 @@ mod tests {
     #[test]
     fn fans_stay_within_the_size_limit() {
         for count in [500, 20_000] {
-            let built = build(count, fan(count), &CancelToken::new()).expect("nobody cancels");
+            let built = build(count, fan(count), &CancelToken::new()).expect("never canceled");
             let size = (built.nodes.len() / 2 + built.references.len()) as u64;
             assert!(size <= MOST_PER_TRIANGLE * (u64::from(count) + FEW), "{size} for {count}");
             assert!(size > 4 * u64::from(count), "{size} for {count}: most of the room is unused");
@@ -206,7 +206,7 @@ mod tests {
             [Vec3::ZERO, Vec3::new(angle.cos(), angle.sin(), 1.0), Vec3::new(angle.sin(), 1.0, angle.cos())]
         };
         let size = |room| {
-            let built = build_within(room, 6000, fan, &CancelToken::new()).expect("nobody cancels");
+            let built = build_within(room, 6000, fan, &CancelToken::new()).expect("never canceled");
             let leaf = |node: &&KdNode| matches!(node.kind(), NodeKind::Leaf { .. });
             assert_eq!(built.triangles.len(), 6000);
             (built.nodes.iter().filter(leaf).count() + built.references.len()) as u64

@@ -1,32 +1,32 @@
 //! Partitioning of a cell's references at a plane.
 
 use super::cost::SplitPlane;
-use crate::accel::reference::{Bounds, Reference};
+use crate::accel::reference::{SimdBounds, TriangleReference};
 use crate::math::Vec3;
 
 /// Reusable buffers for partitioning.
 #[derive(Default)]
-pub struct Scratch {
+pub struct PartitionBuffers {
     /// References on the left, followed by stale entries.
-    left: Vec<Reference>,
-    /// Left and right indices of references on both sides.
+    left: Vec<TriangleReference>,
+    /// Left and right indices of the references that are on both sides.
     on_both: Vec<[u32; 2]>,
 }
 
-impl Scratch {
+impl PartitionBuffers {
     /// Partitions the references from index `first` on. Keeps the references on the right in place and
-    /// returns the ones on the left. The bounding box of a straddling reference is clipped to each side. A
-    /// reference that only touches the plane stays on its side. Preserves the order.
+    /// returns the references on the left. The bounding box of a straddling reference is clipped to each
+    /// side. A reference that only touches the plane stays on its side. Preserves the order.
     ///
     /// Branchless, since data-dependent branches would often be mispredicted: every reference is written to
     /// both sides, and then each side's length is incremented by 0 or 1.
     pub fn partition(
         &mut self,
-        references: &mut Vec<Reference>,
+        references: &mut Vec<TriangleReference>,
         first: usize,
         plane: &SplitPlane,
         corners: &impl Fn(u32) -> [Vec3; 3],
-    ) -> &[Reference] {
+    ) -> &[TriangleReference] {
         match plane.axis {
             0 => self.partition_along::<0>(references, first, plane, corners),
             1 => self.partition_along::<1>(references, first, plane, corners),
@@ -36,14 +36,14 @@ impl Scratch {
 
     fn partition_along<const AXIS: usize>(
         &mut self,
-        references: &mut Vec<Reference>,
+        references: &mut Vec<TriangleReference>,
         first: usize,
         plane: &SplitPlane,
         corners: &impl Fn(u32) -> [Vec3; 3],
-    ) -> &[Reference] {
+    ) -> &[TriangleReference] {
         let own = &mut references[first..];
         if self.left.len() < own.len() {
-            self.left.resize(own.len(), Reference { bounds: Bounds::EMPTY });
+            self.left.resize(own.len(), TriangleReference { bounds: SimdBounds::EMPTY });
             self.on_both.resize(own.len(), [0; 2]);
         }
         let at = plane.at;
@@ -90,21 +90,24 @@ mod tests {
             })
             .collect();
         let corners = |id: u32| mesh[id as usize];
-        let all: Vec<Reference> = (0..200).map(|id| Reference::new(id, corners(id))).collect();
-        let mut scratch = Scratch::default();
+        let all: Vec<TriangleReference> =
+            (0..200).map(|id| TriangleReference::new(id, corners(id))).collect();
+        let mut scratch = PartitionBuffers::default();
         for axis in 0..3 {
             for planar_right in [false, true] {
                 let plane = SplitPlane { axis, at: 1.0, planar_right };
                 let mut own = all.clone();
                 let left = scratch.partition(&mut own, 50, &plane, &corners).to_vec();
                 let expected = |is_there: &dyn Fn(f32, f32) -> bool| -> Vec<u32> {
-                    let reaches = |one: &&Reference| is_there(one.bounds.min[axis], one.bounds.max()[axis]);
-                    all[50..].iter().filter(reaches).map(Reference::id).collect()
+                    let reaches =
+                        |one: &&TriangleReference| is_there(one.bounds.min[axis], one.bounds.max()[axis]);
+                    all[50..].iter().filter(reaches).map(TriangleReference::id).collect()
                 };
                 let planar = |min: f32, max: f32| min == 1.0 && max == 1.0;
                 let on_left = expected(&|min, max| min < 1.0 || (planar(min, max) && !planar_right));
                 let on_right = expected(&|min, max| max > 1.0 || (planar(min, max) && planar_right));
-                let ids = |side: &[Reference]| side.iter().map(Reference::id).collect::<Vec<_>>();
+                let ids =
+                    |side: &[TriangleReference]| side.iter().map(TriangleReference::id).collect::<Vec<_>>();
                 assert_eq!((ids(&left), ids(&own[50..])), (on_left, on_right), "{plane:?}");
                 assert_eq!(ids(&own[..50]), ids(&all[..50]), "references of other cells should not change");
                 assert!(left.iter().all(|one| one.bounds.max()[axis] <= 1.0), "{plane:?}");

@@ -1,13 +1,13 @@
 //! Subtrees built by a single thread.
 
 use super::Cell;
-use super::partition::Scratch;
+use super::partition::PartitionBuffers;
 use crate::accel::kd_tree::node::{KdNode, NodeKind};
-use crate::accel::reference::Reference;
+use crate::accel::reference::TriangleReference;
 use crate::control::{CancelToken, Cancelled};
 use crate::math::Vec3;
 
-/// Nodes and references, with indices relative to the subtree.
+/// Nodes and references. Their indices are relative to the subtree.
 #[derive(Default)]
 pub struct KdSubtree {
     pub nodes: Vec<KdNode>,
@@ -15,20 +15,20 @@ pub struct KdSubtree {
 }
 
 impl KdSubtree {
-    /// Builds the subtree of a cell and its references.
+    /// Builds the subtree for a cell and its references.
     ///
     /// # Errors
     /// [`Cancelled`] if the build was canceled.
     pub fn build(
         cell: &Cell,
-        references: Vec<Reference>,
+        references: Vec<TriangleReference>,
         corners: &impl Fn(u32) -> [Vec3; 3],
         token: &CancelToken,
     ) -> Result<Self, Cancelled> {
         let mut builder = KdSubtreeBuilder {
             built: Self::default(),
             references,
-            scratch: Scratch::default(),
+            scratch: PartitionBuffers::default(),
             corners,
             token,
         };
@@ -40,9 +40,9 @@ impl KdSubtree {
 /// Builds a subtree, reusing the same buffers for all cells.
 struct KdSubtreeBuilder<'a, C> {
     built: KdSubtree,
-    /// References of all pending cells, with the next cell's references last.
-    references: Vec<Reference>,
-    scratch: Scratch,
+    /// References of all pending cells. The next cell's references are last.
+    references: Vec<TriangleReference>,
+    scratch: PartitionBuffers,
     corners: &'a C,
     token: &'a CancelToken,
 }
@@ -55,8 +55,8 @@ impl<C: Fn(u32) -> [Vec3; 3]> KdSubtreeBuilder<'_, C> {
         let own = &self.references[first..];
         let leaf = NodeKind::Leaf { first: self.built.ids.len() as u32, count: own.len() as u32 };
         self.built.nodes.push(KdNode::new(leaf));
-        let Some(plane) = cell.plane(own) else {
-            self.built.ids.extend(own.iter().map(Reference::id));
+        let Some(plane) = cell.choose_split(own) else {
+            self.built.ids.extend(own.iter().map(TriangleReference::id));
             self.references.truncate(first);
             return Ok(());
         };

@@ -3,14 +3,14 @@
 //! triangles, counting both sides of every plane with SIMD is faster than keeping the faces sorted.
 
 use super::cost::{CandidatePlanes, PlaneSearch, SplitPlane};
-use crate::accel::reference::{Bounds, Reference};
+use crate::accel::reference::{SimdBounds, TriangleReference};
 use crate::math::Vec4;
 
-/// Maximum number of references for sweeping a cell.
+/// Cells with at most this many references are swept.
 pub const SWEPT: usize = 24;
 
 /// Finds the cheapest plane. Returns `None` if a leaf costs no more.
-pub fn cheapest(references: &[Reference], cell: &Bounds) -> Option<SplitPlane> {
+pub fn cheapest(references: &[TriangleReference], cell: &SimdBounds) -> Option<SplitPlane> {
     match references.len() {
         0..=4 => cheapest_of::<1>(references, cell),
         5..=8 => cheapest_of::<2>(references, cell),
@@ -23,7 +23,7 @@ pub fn cheapest(references: &[Reference], cell: &Bounds) -> Option<SplitPlane> {
 type Values<const N: usize> = [[f32; 4]; N];
 
 /// [`cheapest`] for at most 4·`N` references.
-fn cheapest_of<const N: usize>(references: &[Reference], cell: &Bounds) -> Option<SplitPlane> {
+fn cheapest_of<const N: usize>(references: &[TriangleReference], cell: &SimdBounds) -> Option<SplitPlane> {
     let mut search = PlaneSearch::<N>::new(cell, references.len());
     // Starts and ends of the boxes along each axis. Unused lanes start above every plane and end below it.
     let (mut starts, mut ends) = ([[[f32::INFINITY; 4]; N]; 3], [[[f32::NEG_INFINITY; 4]; N]; 3]);
@@ -88,12 +88,12 @@ mod tests {
 
     /// Cost of a plane, computed directly from the definition. Infinite if the plane does not intersect the
     /// cell.
-    fn cost(references: &[Reference], cell: &Bounds, plane: &SplitPlane) -> f32 {
+    fn cost(references: &[TriangleReference], cell: &SimdBounds, plane: &SplitPlane) -> f32 {
         let SplitPlane { axis, at, planar_right } = *plane;
         if !(at > cell.min[axis] && at < cell.max()[axis]) {
             return f32::INFINITY;
         }
-        let goes = |reference: &Reference, right: bool| {
+        let goes = |reference: &TriangleReference, right: bool| {
             let (min, max) = (reference.bounds.min[axis], reference.bounds.max()[axis]);
             let is_planar = min == at && max == at;
             if is_planar { right == planar_right } else { if right { max > at } else { min < at } }
@@ -112,17 +112,17 @@ mod tests {
             let count = 1 + round % SWEPT;
             // Put the boxes on a grid so that they touch and share planes. Some reach the cell's faces.
             let mut step = |size: f32| Vec3::new(next(), next(), next()).map(|x| (x * size).round() / 8.0);
-            let references: Vec<Reference> = (0..count as u32)
+            let references: Vec<TriangleReference> = (0..count as u32)
                 .map(|id| {
                     let from = step(10.0);
                     let along = step(8.0)
                         * Vec3::from(std::array::from_fn(|axis| {
                             f32::from(u8::from(id as usize % 5 != axis))
                         }));
-                    Reference::new(id, [from, from + along, from + along * 0.5])
+                    TriangleReference::new(id, [from, from + along, from + along * 0.5])
                 })
                 .collect();
-            let cell = Bounds::around(&references);
+            let cell = SimdBounds::around(&references);
             if cell.half_area() == 0.0 || cell.extent().truncate().min_element() == 0.0 {
                 continue;
             }

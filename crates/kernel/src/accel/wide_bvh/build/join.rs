@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::TreePart;
 use super::subtree::{PackRange, WideSubtree};
-use crate::accel::reference::Bounds;
+use crate::accel::reference::SimdBounds;
 use crate::accel::wide_bvh::node::{Child, WIDTH, WideNode};
 use crate::accel::wide_bvh::simd::pages;
 
@@ -12,7 +12,7 @@ use crate::accel::wide_bvh::simd::pages;
 pub fn join(root: TreePart) -> (Vec<WideNode>, Vec<PackRange>) {
     let mut top = UpperNodes::default();
     match root {
-        TreePart::BuiltWideBvh(subtree) if matches!(subtree.root, Child::Inner(0)) => {
+        TreePart::Built(subtree) if matches!(subtree.root, Child::Inner(0)) => {
             top.subtrees.push(subtree);
         }
         root => {
@@ -24,9 +24,9 @@ pub fn join(root: TreePart) -> (Vec<WideNode>, Vec<PackRange>) {
 }
 
 impl TreePart {
-    fn bounds(&self) -> Bounds {
+    fn bounds(&self) -> SimdBounds {
         match self {
-            Self::BuiltWideBvh(subtree) => subtree.bounds,
+            Self::Built(subtree) => subtree.bounds,
             Self::Halves(halves) => {
                 let mut bounds = halves[0].0;
                 bounds.grow(&halves[1].0);
@@ -46,13 +46,13 @@ enum UpperChild {
 /// The nodes above the subtrees.
 #[derive(Default)]
 struct UpperNodes {
-    nodes: Vec<Vec<(Bounds, UpperChild)>>,
+    nodes: Vec<Vec<(SimdBounds, UpperChild)>>,
     subtrees: Vec<WideSubtree>,
 }
 
 impl UpperNodes {
-    /// Creates the node of a part and all nodes below it. Returns its index.
-    fn add_part(&mut self, bounds: Bounds, part: TreePart) -> usize {
+    /// Creates the node for a part, and all nodes below it. Returns its index.
+    fn add_part(&mut self, bounds: SimdBounds, part: TreePart) -> usize {
         let place = self.nodes.len();
         self.nodes.push(Vec::new());
         let mut children = vec![(bounds, part)];
@@ -67,7 +67,7 @@ impl UpperNodes {
         }
         for (bounds, part) in children {
             let below = match part {
-                TreePart::BuiltWideBvh(subtree) => {
+                TreePart::Built(subtree) => {
                     self.subtrees.push(subtree);
                     UpperChild::Subtree(self.subtrees.len() - 1)
                 }
@@ -96,7 +96,7 @@ impl UpperNodes {
         (nodes, self.subtrees.iter().flat_map(|subtree| subtree.packs.iter().copied()).collect())
     }
 
-    /// Start of each subtree, followed by the end of the last one.
+    /// Start of each subtree, followed by the end of the last subtree.
     fn subtree_starts(&self) -> Vec<SubtreeStart> {
         let mut start = SubtreeStart { node: self.nodes.len() as u32, pack: 0 };
         let mut starts = vec![start];
@@ -108,7 +108,7 @@ impl UpperNodes {
         starts
     }
 
-    fn top_node(&self, children: &[(Bounds, UpperChild)], starts: &[SubtreeStart]) -> WideNode {
+    fn top_node(&self, children: &[(SimdBounds, UpperChild)], starts: &[SubtreeStart]) -> WideNode {
         let mut node = WideNode::EMPTY;
         for (slot, &(bounds, below)) in children.iter().enumerate() {
             let child = match below {

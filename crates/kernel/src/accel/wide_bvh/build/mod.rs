@@ -12,12 +12,12 @@ use rayon::prelude::*;
 
 use super::Quality;
 use super::node::{TrianglePack, WideNode};
-use crate::accel::reference::{Bounds, Reference};
+use crate::accel::reference::{SimdBounds, TriangleReference};
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::Aabb;
 use crate::math::Vec3;
 
-use split::{Segment, partition};
+use split::{ReferenceRange, partition};
 use subtree::WideSubtree;
 
 /// Maximum number of triangles in a part built by a single thread. The token is polled between such parts.
@@ -40,14 +40,14 @@ pub fn build(
     quality: Quality,
     token: &CancelToken,
 ) -> Result<BuiltWideBvh, Cancelled> {
-    let mut references = Reference::usable(count, &corners, token)?;
+    let mut references = TriangleReference::collect_finite(count, &corners, token)?;
     if references.is_empty() {
         return Ok(BuiltWideBvh { nodes: Vec::new(), packs: Vec::new(), bounds: Aabb::EMPTY });
     }
     if quality == Quality::High {
         references = triangle_splits::split_large(&references, &corners, token)?;
     }
-    let whole = Segment::whole(&references);
+    let whole = ReferenceRange::whole(&references);
     let bounds = whole.bounds.aabb();
     let part = build_part(&mut references, 0, whole, token)?;
     token.check()?;
@@ -65,22 +65,22 @@ pub fn build(
 /// A part of the wide BVH: an upper node or a subtree.
 enum TreePart {
     /// Two halves to be collapsed into a wide node.
-    Halves(Box<[(Bounds, TreePart); 2]>),
+    Halves(Box<[(SimdBounds, TreePart); 2]>),
     /// A subtree built by a single thread.
-    BuiltWideBvh(WideSubtree),
+    Built(WideSubtree),
 }
 
 /// Splits parts in parallel until they are small enough for a single thread. `start` is the overall index of
 /// the part's first reference.
 fn build_part(
-    references: &mut [Reference],
+    references: &mut [TriangleReference],
     start: usize,
-    segment: Segment,
+    segment: ReferenceRange,
     token: &CancelToken,
 ) -> Result<TreePart, Cancelled> {
     token.check()?;
     let Some(split) = segment.split.as_ref().filter(|_| segment.count > TASK_SIZE) else {
-        return Ok(TreePart::BuiltWideBvh(WideSubtree::build(references, start, segment)));
+        return Ok(TreePart::Built(WideSubtree::build(references, start, segment)));
     };
     let (left, right) = partition(references, &segment, split);
     let (left_bounds, right_bounds) = (left.bounds, right.bounds);

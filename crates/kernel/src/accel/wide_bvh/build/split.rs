@@ -3,7 +3,7 @@
 
 use rayon::prelude::*;
 
-use crate::accel::reference::{Bounds, Reference};
+use crate::accel::reference::{SimdBounds, TriangleReference};
 use crate::accel::wide_bvh::node::{MOST_PACKS, PACK};
 use crate::accel::wide_bvh::simd;
 use crate::math::Vec4;
@@ -28,9 +28,9 @@ const SURFACE_AREA_LEVELS: u32 = 56;
 
 /// A range of references and how to split it.
 #[derive(Clone, Debug)]
-pub struct Segment {
+pub struct ReferenceRange {
     pub count: usize,
-    pub bounds: Bounds,
+    pub bounds: SimdBounds,
     /// Number of splits above this segment.
     level: u32,
     /// `None` if a leaf costs no more than the best split, even without the cost of the traversal step.
@@ -44,19 +44,19 @@ pub struct Segment {
 pub enum Split {
     /// At a plane. References below `bin` on `axis` go to the left. `sides` are the bounding boxes of both
     /// sides.
-    Plane { axis: usize, bin: usize, bins: Bins, sides: [Bounds; 2] },
+    Plane { axis: usize, bin: usize, bins: Bins, sides: [SimdBounds; 2] },
     /// In the middle of the references in their current order.
     Middle,
 }
 
-impl Segment {
-    /// The segment of all references.
-    pub fn whole(references: &[Reference]) -> Self {
+impl ReferenceRange {
+    /// The segment that contains all references.
+    pub fn whole(references: &[TriangleReference]) -> Self {
         let chunks = references.par_chunks(PARALLEL_SIZE / 4).map(SegmentBounds::around);
         Self::new(references, chunks.reduce(|| SegmentBounds::EMPTY, SegmentBounds::union), 0)
     }
 
-    fn new(references: &[Reference], boxes: SegmentBounds, level: u32) -> Self {
+    fn new(references: &[TriangleReference], boxes: SegmentBounds, level: u32) -> Self {
         let count = references.len();
         let (split, is_node) =
             if count <= PACK { (None, false) } else { choose_split(references, &boxes, level) };
@@ -67,14 +67,14 @@ impl Segment {
 /// Bounding boxes of some references and of their centroids.
 #[derive(Clone, Copy)]
 struct SegmentBounds {
-    bounds: Bounds,
-    centroids: Bounds,
+    bounds: SimdBounds,
+    centroids: SimdBounds,
 }
 
 impl SegmentBounds {
-    const EMPTY: Self = Self { bounds: Bounds::EMPTY, centroids: Bounds::EMPTY };
+    const EMPTY: Self = Self { bounds: SimdBounds::EMPTY, centroids: SimdBounds::EMPTY };
 
-    fn around(references: &[Reference]) -> Self {
+    fn around(references: &[TriangleReference]) -> Self {
         let mut own = Self::EMPTY;
         for reference in references {
             own.grow(reference, reference.centroid());
@@ -83,9 +83,9 @@ impl SegmentBounds {
     }
 
     #[inline(always)]
-    fn grow(&mut self, reference: &Reference, centroid: Vec4) {
+    fn grow(&mut self, reference: &TriangleReference, centroid: Vec4) {
         self.bounds.grow(&reference.bounds);
-        self.centroids.grow(&Bounds::new(centroid, centroid));
+        self.centroids.grow(&SimdBounds::new(centroid, centroid));
     }
 
     fn union(mut self, other: Self) -> Self {
@@ -96,7 +96,11 @@ impl SegmentBounds {
 }
 
 /// Chooses the best split of a segment, and whether the segment is worth a separate node.
-fn choose_split(references: &[Reference], boxes: &SegmentBounds, level: u32) -> (Option<Split>, bool) {
+fn choose_split(
+    references: &[TriangleReference],
+    boxes: &SegmentBounds,
+    level: u32,
+) -> (Option<Split>, bool) {
     let count = references.len();
     let must = count > PACK * MOST_PACKS as usize;
     let SegmentBounds { bounds, centroids } = boxes;
@@ -127,7 +131,7 @@ fn pack_count(count: u32) -> u32 {
     count.div_ceil(PACK as u32)
 }
 
-/// Mapping of centroids to bins.
+/// Maps centroids to bins.
 #[derive(Clone, Copy, Debug)]
 pub struct Bins {
     /// Lower end of the first bin.
@@ -141,7 +145,7 @@ pub struct Bins {
 pub const ROUND: f32 = 12_582_912.0;
 
 impl Bins {
-    fn new(centroids: &Bounds, references: usize) -> Self {
+    fn new(centroids: &SimdBounds, references: usize) -> Self {
         let count = BINS.min(4 + references / 8).max(if references > FEW { FEW_BINS } else { 0 });
         let extent = centroids.extent();
         let scale = |length: f32| {
@@ -160,15 +164,15 @@ impl Bins {
     }
 
     #[inline(always)]
-    fn of(&self, reference: &Reference) -> [usize; 3] {
+    fn of(&self, reference: &TriangleReference) -> [usize; 3] {
         let [x, y, z, _] = self.bin_coordinates(reference.centroid()).to_array();
         [x, y, z].map(|place| place.to_bits() as usize & (BINS - 1))
     }
 }
 
-/// Boxes and counts of the bins along three axes.
+/// Bounding box and reference count of each bin, along all three axes.
 pub struct Histogram<const N: usize> {
-    pub bounds: [[Bounds; 3]; N],
+    pub bounds: [[SimdBounds; 3]; N],
     pub counts: [[u32; 3]; N],
 }
 
@@ -177,15 +181,15 @@ struct CheapestBinSplit {
     axis: usize,
     /// First bin on the right.
     bin: usize,
-    /// Sum of pack count × surface area over both sides.
+    /// Sum over both sides of pack count times surface area.
     cost: f32,
-    sides: [Bounds; 2],
+    sides: [SimdBounds; 2],
 }
 
 impl<const N: usize> Histogram<N> {
-    const EMPTY: Self = Self { bounds: [[Bounds::EMPTY; 3]; N], counts: [[0; 3]; N] };
+    const EMPTY: Self = Self { bounds: [[SimdBounds::EMPTY; 3]; N], counts: [[0; 3]; N] };
 
-    fn of(references: &[Reference], bins: &Bins) -> Self {
+    fn of(references: &[TriangleReference], bins: &Bins) -> Self {
         let mut own = Self::EMPTY;
         if !simd::binning::count(references, bins, &mut own) {
             own.count(references, bins);
@@ -193,7 +197,7 @@ impl<const N: usize> Histogram<N> {
         own
     }
 
-    fn count(&mut self, references: &[Reference], bins: &Bins) {
+    fn count(&mut self, references: &[TriangleReference], bins: &Bins) {
         for reference in references {
             for (axis, bin) in bins.of(reference).into_iter().enumerate() {
                 self.bounds[bin % N][axis].grow(&reference.bounds);
@@ -202,7 +206,7 @@ impl<const N: usize> Histogram<N> {
         }
     }
 
-    fn in_parallel(references: &[Reference], bins: &Bins) -> Self {
+    fn in_parallel(references: &[TriangleReference], bins: &Bins) -> Self {
         let chunks = references.par_chunks(PARALLEL_SIZE / 4).map(|references| Self::of(references, bins));
         chunks.reduce(|| Self::of(&[], bins), |all, one| all.add(&one))
     }
@@ -223,7 +227,7 @@ impl<const N: usize> Histogram<N> {
         let count = bins.count.min(N);
         for axis in (0..3).filter(|&axis| bins.per_length[axis] > 0.0) {
             let mut right_cost = [f32::INFINITY; N];
-            let (mut bounds, mut members) = (Bounds::EMPTY, 0);
+            let (mut bounds, mut members) = (SimdBounds::EMPTY, 0);
             for bin in (1..count).rev() {
                 let own = &self.bounds[bin][axis];
                 bounds.grow(own);
@@ -232,7 +236,7 @@ impl<const N: usize> Histogram<N> {
                     right_cost[bin] = bounds.half_area() * pack_count(members) as f32;
                 }
             }
-            (bounds, members) = (Bounds::EMPTY, 0);
+            (bounds, members) = (SimdBounds::EMPTY, 0);
             for (bin, right_cost) in right_cost.into_iter().enumerate().take(count).skip(1) {
                 let own = &self.bounds[bin - 1][axis];
                 bounds.grow(own);
@@ -244,8 +248,8 @@ impl<const N: usize> Histogram<N> {
             }
         }
         let (axis, bin, cost) = best?;
-        let around = |bins: &[[Bounds; 3]]| {
-            bins.iter().fold(Bounds::EMPTY, |mut all, bin| {
+        let around = |bins: &[[SimdBounds; 3]]| {
+            bins.iter().fold(SimdBounds::EMPTY, |mut all, bin| {
                 all.grow(&bin[axis]);
                 all
             })
@@ -256,7 +260,11 @@ impl<const N: usize> Histogram<N> {
 }
 
 /// Reorders the references according to the split and returns the two nonempty segments.
-pub fn partition(references: &mut [Reference], segment: &Segment, split: &Split) -> (Segment, Segment) {
+pub fn partition(
+    references: &mut [TriangleReference],
+    segment: &ReferenceRange,
+    split: &Split,
+) -> (ReferenceRange, ReferenceRange) {
     let (middle, left, right) = match split {
         Split::Plane { axis, bin, bins, sides } => {
             let (middle, [left, right]) = match axis {
@@ -275,15 +283,15 @@ pub fn partition(references: &mut [Reference], segment: &Segment, split: &Split)
     };
     let level = segment.level + 1;
     let (left_references, right_references) = references.split_at(middle);
-    let left = Segment::new(left_references, left, level);
-    (left, Segment::new(right_references, right, level))
+    let left = ReferenceRange::new(left_references, left, level);
+    (left, ReferenceRange::new(right_references, right, level))
 }
 
 fn partition_along_axis<const AXIS: usize>(
-    references: &mut [Reference],
+    references: &mut [TriangleReference],
     bin: usize,
     bins: &Bins,
-) -> (usize, [Bounds; 2]) {
+) -> (usize, [SimdBounds; 2]) {
     match simd::binning::partition::<AXIS>(references, bin, bins) {
         Some(done) => done,
         None => partition_by_plane::<AXIS>(references, bin, bins),
@@ -296,13 +304,13 @@ fn partition_along_axis<const AXIS: usize>(
 /// by 0 or 1.
 #[allow(clippy::manual_swap)] // `swap` goes through memory, so the next iteration stalls, which halves the build speed
 fn partition_by_plane<const AXIS: usize>(
-    references: &mut [Reference],
+    references: &mut [TriangleReference],
     bin: usize,
     bins: &Bins,
-) -> (usize, [Bounds; 2]) {
+) -> (usize, [SimdBounds; 2]) {
     let (start, per_length) = (Vec4::splat(bins.start[AXIS]), Vec4::splat(bins.per_length[AXIS]));
     let first_right = Vec4::splat(ROUND + bin as f32);
-    let (mut left, mut right) = (Bounds::EMPTY, Bounds::EMPTY);
+    let (mut left, mut right) = (SimdBounds::EMPTY, SimdBounds::EMPTY);
     let mut middle = 0;
     for i in 0..references.len() {
         let reference = references[i];
@@ -313,8 +321,8 @@ fn partition_by_plane<const AXIS: usize>(
             (Vec4::splat(centroid[AXIS]) - start) * per_length - Vec4::splat(0.5) + Vec4::splat(ROUND);
         let is_left = place.cmplt(first_right);
         let on = |mask, centroid| Vec4::select(mask, centroid, Vec4::INFINITY);
-        left.grow(&Bounds { min: on(is_left, centroid), minus_max: on(is_left, -centroid) });
-        right.grow(&Bounds { min: on(!is_left, centroid), minus_max: on(!is_left, -centroid) });
+        left.grow(&SimdBounds { min: on(is_left, centroid), minus_max: on(is_left, -centroid) });
+        right.grow(&SimdBounds { min: on(!is_left, centroid), minus_max: on(!is_left, -centroid) });
         middle += usize::from(is_left.test(0));
     }
     (middle, [left, right])
@@ -326,22 +334,26 @@ mod tests {
     use crate::math::Vec3;
     use crate::math::random::signed as random;
 
-    fn references(count: u32) -> Vec<Reference> {
+    fn references(count: u32) -> Vec<TriangleReference> {
         let mut next = random(5);
         let mut point = |size: f32| Vec3::new(next(), next(), next()) * size;
         let corners = |id: u32| {
             let from = if id.is_multiple_of(7) { Vec3::ZERO } else { point(10.0) };
             [from, from + point(0.3), from + point(0.1)]
         };
-        (0..count).map(corners).enumerate().map(|(id, corners)| Reference::new(id as u32, corners)).collect()
+        (0..count)
+            .map(corners)
+            .enumerate()
+            .map(|(id, corners)| TriangleReference::new(id as u32, corners))
+            .collect()
     }
 
-    fn bits(bounds: &Bounds) -> [u32; 6] {
+    fn bits(bounds: &SimdBounds) -> [u32; 6] {
         let (min, max) = (bounds.min + Vec4::ZERO, bounds.max() + Vec4::ZERO);
         [min.x, min.y, min.z, max.x, max.y, max.z].map(f32::to_bits)
     }
 
-    type Partition = fn(&mut [Reference], usize, &Bins) -> (usize, [Bounds; 2]);
+    type Partition = fn(&mut [TriangleReference], usize, &Bins) -> (usize, [SimdBounds; 2]);
 
     /// SIMD and scalar partition functions for each axis.
     const PARTITIONS: [[Partition; 2]; 3] = [
@@ -352,7 +364,7 @@ mod tests {
 
     #[test]
     fn simd_histograms_match_scalar_histograms() {
-        fn counts<const N: usize>(references: &[Reference], bins: &Bins) {
+        fn counts<const N: usize>(references: &[TriangleReference], bins: &Bins) {
             let mut plain = Histogram::<N>::EMPTY;
             plain.count(references, bins);
             let own = Histogram::<N>::of(references, bins);
@@ -362,10 +374,10 @@ mod tests {
                 assert_eq!(counted as usize, references.len(), "the bins should contain all references");
                 // Each bin contains exactly the references that map to it.
                 for (bin, (bounds, counts)) in own.bounds.iter().zip(&own.counts).enumerate() {
-                    let inside = |one: &&Reference| bins.of(one)[axis] == bin;
-                    let inside: Vec<Reference> = references.iter().filter(inside).copied().collect();
+                    let inside = |one: &&TriangleReference| bins.of(one)[axis] == bin;
+                    let inside: Vec<TriangleReference> = references.iter().filter(inside).copied().collect();
                     assert_eq!(counts[axis] as usize, inside.len());
-                    assert_eq!(bits(&bounds[axis]), bits(&Bounds::around(&inside)));
+                    assert_eq!(bits(&bounds[axis]), bits(&SimdBounds::around(&inside)));
                 }
             }
             for (own, plain) in own.bounds.iter().flatten().zip(plain.bounds.iter().flatten()) {
@@ -394,16 +406,17 @@ mod tests {
                     let (middle, sides) = by_vectors(&mut own, bin, &bins);
                     let (plain_middle, plain_sides) = plainly(&mut plain, bin, &bins);
                     assert_eq!(middle, plain_middle);
-                    let ids =
-                        |references: &[Reference]| references.iter().map(Reference::id).collect::<Vec<_>>();
+                    let ids = |references: &[TriangleReference]| {
+                        references.iter().map(TriangleReference::id).collect::<Vec<_>>()
+                    };
                     assert_eq!(ids(&own), ids(&plain));
                     assert_eq!(sides.each_ref().map(bits), plain_sides.each_ref().map(bits));
-                    let is_left = |one: &Reference| bins.of(one)[axis] < bin;
+                    let is_left = |one: &TriangleReference| bins.of(one)[axis] < bin;
                     assert!(
                         own[..middle].iter().all(is_left) && !own[middle..].iter().any(is_left),
                         "{axis}"
                     );
-                    let around = |side: &[Reference]| bits(&SegmentBounds::around(side).centroids);
+                    let around = |side: &[TriangleReference]| bits(&SegmentBounds::around(side).centroids);
                     assert_eq!(sides.each_ref().map(bits), [around(&own[..middle]), around(&own[middle..])]);
                 }
             }

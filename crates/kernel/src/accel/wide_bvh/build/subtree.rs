@@ -1,7 +1,7 @@
 //! Subtrees built by a single thread.
 
-use super::split::{Segment, partition};
-use crate::accel::reference::{Bounds, Reference};
+use super::split::{ReferenceRange, partition};
+use crate::accel::reference::{SimdBounds, TriangleReference};
 use crate::accel::wide_bvh::node::{Child, PACK, WIDTH, WideNode};
 
 /// A range of references that forms a triangle pack.
@@ -13,18 +13,18 @@ pub struct PackRange {
     pub count: u32,
 }
 
-/// Nodes and packs, with indices relative to the subtree.
+/// Nodes and packs. Their indices are relative to the subtree.
 #[derive(Debug)]
 pub struct WideSubtree {
     pub nodes: Vec<WideNode>,
     pub packs: Vec<PackRange>,
     pub root: Child,
-    pub bounds: Bounds,
+    pub bounds: SimdBounds,
 }
 
 impl WideSubtree {
     /// Builds a subtree over `references`. `start` is the overall index of the first reference.
-    pub fn build(references: &mut [Reference], start: usize, segment: Segment) -> Self {
+    pub fn build(references: &mut [TriangleReference], start: usize, segment: ReferenceRange) -> Self {
         let mut own = Self {
             nodes: Vec::with_capacity(references.len() / 6),
             packs: Vec::with_capacity(references.len() / 3),
@@ -35,7 +35,12 @@ impl WideSubtree {
         own
     }
 
-    fn child(&mut self, references: &mut [Reference], start: usize, segment: Segment) -> Child {
+    fn child(
+        &mut self,
+        references: &mut [TriangleReference],
+        start: usize,
+        segment: ReferenceRange,
+    ) -> Child {
         if segment.is_node {
             Child::Inner(self.node(references, start, segment))
         } else {
@@ -53,10 +58,10 @@ impl WideSubtree {
 
     /// Builds a node. Repeatedly splits the child with the largest box until there are eight (Wald, Benthin,
     /// Boulos, *Getting Rid of Packets*, 2008).
-    fn node(&mut self, references: &mut [Reference], start: usize, segment: Segment) -> u32 {
+    fn node(&mut self, references: &mut [TriangleReference], start: usize, segment: ReferenceRange) -> u32 {
         let place = self.nodes.len();
         self.nodes.push(WideNode::EMPTY);
-        let mut children: [Option<(usize, Segment)>; WIDTH] = [const { None }; WIDTH];
+        let mut children: [Option<(usize, ReferenceRange)>; WIDTH] = [const { None }; WIDTH];
         children[0] = Some((0, segment));
         let mut count = 1;
         while count < WIDTH {
@@ -66,7 +71,7 @@ impl WideSubtree {
             });
             let next = inner.max_by(|a, b| a.1.cmp(&b.1).then(a.2.total_cmp(&b.2)));
             let Some((slot, ..)) = next else { break };
-            let Some((from, Segment { split: Some(split), .. })) = &children[slot] else { break };
+            let Some((from, ReferenceRange { split: Some(split), .. })) = &children[slot] else { break };
             let (from, split) = (*from, *split);
             let Some((_, parent)) = &children[slot] else { break };
             let (left, right) = partition(&mut references[from..from + parent.count], parent, &split);

@@ -4,7 +4,7 @@
 
 use rayon::prelude::*;
 
-use crate::accel::reference::{Bounds, Reference};
+use crate::accel::reference::{SimdBounds, TriangleReference};
 use crate::control::{CancelToken, Cancelled};
 use crate::math::Vec3;
 use crate::math::elementary::exp2;
@@ -23,15 +23,15 @@ const CHUNK: usize = 4096;
 /// # Errors
 /// [`Cancelled`] if the build was canceled.
 pub fn split_large(
-    references: &[Reference],
+    references: &[TriangleReference],
     corners: &(impl Fn(u32) -> [Vec3; 3] + Sync),
     token: &CancelToken,
-) -> Result<Vec<Reference>, Cancelled> {
+) -> Result<Vec<TriangleReference>, Cancelled> {
     let grid = Grid::around(references);
-    let priority = |reference: &Reference| grid.priority(reference, corners(reference.id()));
+    let priority = |reference: &TriangleReference| grid.priority(reference, corners(reference.id()));
     let priorities: Vec<f32> = references.par_iter().map(priority).collect();
     let factor = largest_factor(&priorities, (references.len() as f64 * MOST_MORE) as u64);
-    let of_chunk = |(references, priorities): (&[Reference], &[f32])| {
+    let of_chunk = |(references, priorities): (&[TriangleReference], &[f32])| {
         token.check()?;
         let mut pieces = Vec::new();
         for (reference, &priority) in references.iter().zip(priorities) {
@@ -87,13 +87,13 @@ struct GridPlane {
 }
 
 impl Grid {
-    fn around(references: &[Reference]) -> Self {
-        let all = Bounds::around(references);
+    fn around(references: &[TriangleReference]) -> Self {
+        let all = SimdBounds::around(references);
         Self { start: all.min.truncate(), extent: all.extent().truncate() }
     }
 
     /// The coarsest plane that intersects a box.
-    fn plane(&self, bounds: &Bounds) -> Option<GridPlane> {
+    fn plane(&self, bounds: &SimdBounds) -> Option<GridPlane> {
         let cells = (1_u32 << LEVELS) as f32;
         let on_axis = |axis: usize| {
             let place = |x: f32| (x - self.start[axis]) / self.extent[axis] * cells;
@@ -108,8 +108,8 @@ impl Grid {
         (0..3).filter_map(on_axis).max_by(|a, b| a.level.cmp(&b.level).then(length(a).total_cmp(&length(b))))
     }
 
-    /// Priority for cutting a triangle: the excess area of its box, weighted less for finer planes.
-    fn priority(&self, reference: &Reference, [a, b, c]: [Vec3; 3]) -> f32 {
+    /// Priority for cutting a triangle: the excess area of its box, with a lower weight for finer planes.
+    fn priority(&self, reference: &TriangleReference, [a, b, c]: [Vec3; 3]) -> f32 {
         let Some(plane) = self.plane(&reference.bounds) else { return 0.0 };
         let normal = (b - a).cross(c - a).abs();
         let too_much = reference.bounds.half_area() - (normal.x + normal.y + normal.z);
@@ -121,10 +121,10 @@ impl Grid {
     /// Cuts a triangle `cuts` times. Larger parts are cut more often.
     fn cut_into_pieces(
         &self,
-        reference: Reference,
+        reference: TriangleReference,
         cuts: u32,
         corners: [Vec3; 3],
-        pieces: &mut Vec<Reference>,
+        pieces: &mut Vec<TriangleReference>,
     ) {
         let plane = if cuts == 0 { None } else { self.plane(&reference.bounds) };
         let Some(GridPlane { axis, at, .. }) = plane else { return pieces.push(reference) };
@@ -153,9 +153,9 @@ mod tests {
             })
             .collect();
         let references: Vec<_> =
-            mesh.iter().zip(0..).map(|(&corners, id)| Reference::new(id, corners)).collect();
+            mesh.iter().zip(0..).map(|(&corners, id)| TriangleReference::new(id, corners)).collect();
         let pieces =
-            split_large(&references, &|id| mesh[id as usize], &CancelToken::new()).expect("nobody cancels");
+            split_large(&references, &|id| mesh[id as usize], &CancelToken::new()).expect("never canceled");
         let of = |id: u32| pieces.iter().filter(move |piece| piece.id() == id);
         assert!(of(7).count() > 10 && pieces.len() <= 130, "{} of {}", of(7).count(), pieces.len());
         assert!((0..100).all(|id| id == 7 || of(id).count() == 1));

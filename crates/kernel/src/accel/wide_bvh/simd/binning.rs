@@ -1,12 +1,12 @@
-//! SIMD inner loops for construction, with an entire box per register. They compute the same numbers as the
-//! scalar code in `build::split`.
+//! SIMD inner loops for construction. Each register contains an entire box. They compute the same numbers as
+//! the scalar code in `build::split`.
 
 use super::InstructionSet;
-use crate::accel::reference::{Bounds, Reference};
+use crate::accel::reference::{SimdBounds, TriangleReference};
 use crate::accel::wide_bvh::build::split::{Bins, Histogram};
 
-/// Adds references to the bins of a histogram. Returns false and does nothing if the processor lacks AVX2.
-pub fn count<const N: usize>(references: &[Reference], bins: &Bins, into: &mut Histogram<N>) -> bool {
+/// Adds references to a histogram's bins. Returns false and does nothing if the processor lacks AVX2.
+pub fn count<const N: usize>(references: &[TriangleReference], bins: &Bins, into: &mut Histogram<N>) -> bool {
     #[cfg(target_arch = "x86_64")]
     if InstructionSet::best() >= InstructionSet::Avx2 {
         // SAFETY: the processor has AVX2.
@@ -20,10 +20,10 @@ pub fn count<const N: usize>(references: &[Reference], bins: &Bins, into: &mut H
 /// Moves the references below a bin to the front. Returns their number and the bounding boxes of the
 /// centroids on both sides. Returns `None` and does nothing if the processor lacks AVX2.
 pub fn partition<const AXIS: usize>(
-    references: &mut [Reference],
+    references: &mut [TriangleReference],
     bin: usize,
     bins: &Bins,
-) -> Option<(usize, [Bounds; 2])> {
+) -> Option<(usize, [SimdBounds; 2])> {
     #[cfg(target_arch = "x86_64")]
     if InstructionSet::best() >= InstructionSet::Avx2 {
         // SAFETY: the processor has AVX2.
@@ -37,26 +37,26 @@ pub fn partition<const AXIS: usize>(
 mod avx2 {
     use std::arch::x86_64::*;
 
-    use crate::accel::reference::{Bounds, Reference};
+    use crate::accel::reference::{SimdBounds, TriangleReference};
     use crate::accel::wide_bvh::build::split::{BINS, Bins, Histogram, ROUND};
     use crate::math::Vec4;
 
     /// Loads both corners of a box into one register.
     #[target_feature(enable = "avx2")]
     #[inline]
-    fn load(bounds: &Bounds) -> __m256 {
+    fn load(bounds: &SimdBounds) -> __m256 {
         // SAFETY: a box is eight floats with sufficient alignment.
         unsafe { _mm256_load_ps(std::ptr::from_ref(bounds).cast()) }
     }
 
     #[target_feature(enable = "avx2")]
     #[inline]
-    fn store(bounds: __m256, to: &mut Bounds) {
+    fn store(bounds: __m256, to: &mut SimdBounds) {
         // SAFETY: a box has space for eight floats with sufficient alignment.
         unsafe { _mm256_store_ps(std::ptr::from_mut(to).cast(), bounds) }
     }
 
-    /// SIMD version of [`Reference::centroid`].
+    /// SIMD version of [`TriangleReference::centroid`].
     #[target_feature(enable = "avx2")]
     #[inline]
     fn centroid(bounds: __m256) -> __m128 {
@@ -73,7 +73,7 @@ mod avx2 {
     }
 
     #[target_feature(enable = "avx2")]
-    pub fn count<const N: usize>(references: &[Reference], bins: &Bins, into: &mut Histogram<N>) {
+    pub fn count<const N: usize>(references: &[TriangleReference], bins: &Bins, into: &mut Histogram<N>) {
         let (start, per_length) = (__m128::from(bins.start), __m128::from(bins.per_length));
         for reference in references {
             let bounds = load(&reference.bounds);
@@ -97,10 +97,10 @@ mod avx2 {
     /// 1.
     #[target_feature(enable = "avx2")]
     pub fn partition<const AXIS: usize>(
-        references: &mut [Reference],
+        references: &mut [TriangleReference],
         bin: usize,
         bins: &Bins,
-    ) -> (usize, [Bounds; 2]) {
+    ) -> (usize, [SimdBounds; 2]) {
         let start = _mm_set1_ps(bins.start[AXIS]);
         let per_length = _mm_set1_ps(bins.per_length[AXIS]);
         let first_right = _mm_set1_ps(ROUND + bin as f32);
@@ -126,7 +126,7 @@ mod avx2 {
             right = _mm256_min_ps(_mm256_blendv_ps(both, nothing, on_left), right);
             middle += (_mm_movemask_ps(is_left) & 1) as usize;
         }
-        let corners = |sides: __m256| Bounds {
+        let corners = |sides: __m256| SimdBounds {
             min: Vec4::from(_mm256_castps256_ps128(sides)),
             minus_max: Vec4::from(_mm256_extractf128_ps::<1>(sides)),
         };

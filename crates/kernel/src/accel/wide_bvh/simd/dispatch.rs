@@ -136,7 +136,7 @@ fn avx512_movemask(mask: &Mask) -> u32 {
     u32::from(_mm512_movepi32_mask(row))
 }
 
-/// [`Simd::min_max`] of two halves, combined in the same order as the portable implementation.
+/// [`Simd::min_max`] for two halves, combined in the same order as the portable implementation.
 #[cfg(target_arch = "x86_64")]
 #[inline]
 #[target_feature(enable = "avx2")]

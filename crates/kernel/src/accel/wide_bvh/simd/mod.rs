@@ -1,4 +1,4 @@
-//! Traversal with SIMD instructions selected at run time. All `unsafe` code of the tree is in this module.
+//! Traversal with SIMD instructions selected at run time. All of the tree's `unsafe` code is in this module.
 //!
 //! Results on all instruction sets are bit-identical to [`portable`], which is plain Rust.
 

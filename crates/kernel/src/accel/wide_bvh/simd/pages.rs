@@ -1,4 +1,4 @@
-//! Huge pages for large randomly accessed arrays, if the system supports them.
+//! Huge pages for large, randomly accessed arrays, if the system supports them.
 
 /// Minimum allocation size in bytes for using huge pages.
 const LARGE: usize = 1 << 21;

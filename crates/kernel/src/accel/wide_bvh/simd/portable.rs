@@ -81,13 +81,13 @@ pub fn any(tree: &WideBvh, ray: &Ray, except: Option<u32>) -> bool {
     false
 }
 
-/// Children that the ray hits, with their entry distances.
+/// Children that the ray hits, and their entry distances.
 fn hit_children(node: &WideNode, slabs: &SlabRay, t_max: f32) -> impl Iterator<Item = (f32, Child)> {
     (0..WIDTH).filter_map(move |slot| {
         let corner = |side: usize| {
             Vec3::new(node.rows[side][slot], node.rows[2 + side][slot], node.rows[4 + side][slot])
         };
-        slabs.enter(corner(0), corner(1), t_max).map(|entry| (entry, node.child(slot)))
+        slabs.entry_distance(corner(0), corner(1), t_max).map(|entry| (entry, node.child(slot)))
     })
 }
 

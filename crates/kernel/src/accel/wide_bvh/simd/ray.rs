@@ -4,7 +4,7 @@
 use std::arch::x86_64::*;
 
 use super::triangle::{self, Hits};
-use super::vector::{F4, F8, SimdVector};
+use super::vector::{SimdF32x4, SimdF32x8, SimdVector};
 use crate::accel::wide_bvh::node::{TrianglePack, WideNode};
 use crate::geometry::aabb::{FAR_PAD, TRIANGLE_ERROR};
 use crate::geometry::{Aabb, Ray};
@@ -15,17 +15,17 @@ const LEAST_PART: f32 = 1.0 / (1_u64 << 40) as f32;
 /// A ray preprocessed for the boxes of nodes and the triangles of packs.
 pub struct SimdRay {
     /// Inverse direction.
-    to_near: [F8; 3],
+    to_near: [SimdF32x8; 3],
     /// Inverse direction, padded so that no distance to a far plane is too short.
-    to_far: [F8; 3],
+    to_far: [SimdF32x8; 3],
     /// Origins for near and far planes, offset by the margin and multiplied by the inverse direction.
-    from_near: [F8; 3],
-    from_far: [F8; 3],
+    from_near: [SimdF32x8; 3],
+    from_far: [SimdF32x8; 3],
     /// For each axis, the row of a node that contains the near planes.
     near: [usize; 3],
     /// Origin permuted to the axes of the sheared ray.
-    origin: [F4; 3],
-    shear: [F4; 3],
+    origin: [SimdF32x4; 3],
+    shear: [SimdF32x4; 3],
     axes: [usize; 3],
     /// [`Ray::start`].
     start: u32,
@@ -107,16 +107,24 @@ fn max_of_three(v: __m128) -> __m128 {
 /// Broadcasts each of the first three lanes to eight lanes.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
-fn broadcast_to_eight(v: __m128) -> [F8; 3] {
+fn broadcast_to_eight(v: __m128) -> [SimdF32x8; 3] {
     let [x, y, z] = broadcast_to_four(v);
-    [F8(_mm256_broadcastss_ps(x.0)), F8(_mm256_broadcastss_ps(y.0)), F8(_mm256_broadcastss_ps(z.0))]
+    [
+        SimdF32x8(_mm256_broadcastss_ps(x.0)),
+        SimdF32x8(_mm256_broadcastss_ps(y.0)),
+        SimdF32x8(_mm256_broadcastss_ps(z.0)),
+    ]
 }
 
 /// Broadcasts each of the first three lanes to four lanes.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
-fn broadcast_to_four(v: __m128) -> [F4; 3] {
-    [F4(_mm_permute_ps::<0x00>(v)), F4(_mm_permute_ps::<0x55>(v)), F4(_mm_permute_ps::<0xaa>(v))]
+fn broadcast_to_four(v: __m128) -> [SimdF32x4; 3] {
+    [
+        SimdF32x4(_mm_permute_ps::<0x00>(v)),
+        SimdF32x4(_mm_permute_ps::<0x55>(v)),
+        SimdF32x4(_mm_permute_ps::<0xaa>(v)),
+    ]
 }
 
 impl SimdRay {
@@ -165,7 +173,7 @@ impl SimdRay {
             to_far: broadcast_to_eight(padded),
             near: [downs & 1, 2 + (downs >> 1 & 1), 4 + (downs >> 2 & 1)],
             origin: broadcast_to_four(_mm_permutevar_ps(origin, places)),
-            shear: [shear_x, shear_y, F4(scale)],
+            shear: [shear_x, shear_y, SimdF32x4(scale)],
             axes: [axes[0] as usize, axes[1] as usize, axes[2] as usize],
             start: ray.start,
         }
@@ -174,7 +182,7 @@ impl SimdRay {
     /// Distances at which the ray enters the eight boxes, and the mask of the boxes that it hits before
     /// `end`. NaN distances do not affect the interval, as in `SlabRay::enter`.
     #[inline(always)]
-    pub fn enter(&self, node: &WideNode, end: F8) -> (F8, u32) {
+    pub fn box_entries(&self, node: &WideNode, end: SimdF32x8) -> (SimdF32x8, u32) {
         let (mut near, mut far) = (end.splat_like(0.0), end);
         for axis in 0..3 {
             // SAFETY: values of this type exist, so the processor has the instructions. Both rows exist: they
@@ -183,19 +191,19 @@ impl SimdRay {
                 let row = node.rows.as_ptr().add(self.near[axis]);
                 let other = node.rows.as_ptr().add(self.near[axis] ^ 1);
                 (
-                    F8::load(row.cast()).mul_sub(self.to_near[axis], self.from_near[axis]),
-                    F8::load(other.cast()).mul_sub(self.to_far[axis], self.from_far[axis]),
+                    SimdF32x8::load(row.cast()).mul_sub(self.to_near[axis], self.from_near[axis]),
+                    SimdF32x8::load(other.cast()).mul_sub(self.to_far[axis], self.from_far[axis]),
                 )
             };
             near = to_near.max(near);
             far = to_far.min(far);
         }
-        (near, F8::movemask(near.le(far)))
+        (near, SimdF32x8::movemask(near.le(far)))
     }
 
     /// Tests the triangles of a pack, except the ray's start triangle.
     #[inline(always)]
-    pub fn hits(&self, pack: &TrianglePack, t_max: f32) -> Hits<F4> {
+    pub fn hits(&self, pack: &TrianglePack, t_max: f32) -> Hits<SimdF32x4> {
         let corners = [self.corner(pack, 0), self.corner(pack, 3), self.corner(pack, 6)];
         let hits = triangle::hits(&corners, self.shear[2], self.shear[2].splat_like(t_max), true);
         let others = !self.start_triangle_lane(pack);
@@ -205,7 +213,7 @@ impl SimdRay {
     /// Mask of the lane that contains the ray's start triangle.
     #[inline(always)]
     fn start_triangle_lane(&self, pack: &TrianglePack) -> u32 {
-        // SAFETY: values of `F4` exist, so the processor has the instructions. Reads four numbers.
+        // SAFETY: values of `SimdF32x4` exist, so the processor has the instructions. Reads four numbers.
         unsafe {
             let ids = _mm_loadu_si128(pack.ids.as_ptr().cast());
             let is_own = _mm_cmpeq_epi32(ids, _mm_set1_epi32(self.start.cast_signed()));
@@ -215,16 +223,16 @@ impl SimdRay {
 
     /// Corners of all lanes in the ray's coordinates. `row` is their first row.
     #[inline(always)]
-    fn corner(&self, pack: &TrianglePack, row: usize) -> [F4; 3] {
+    fn corner(&self, pack: &TrianglePack, row: usize) -> [SimdF32x4; 3] {
         let z = self.row(pack, row, 2);
         [self.row(pack, row, 0) - self.shear[0] * z, self.row(pack, row, 1) - self.shear[1] * z, z]
     }
 
     #[inline(always)]
-    fn row(&self, pack: &TrianglePack, row: usize, axis: usize) -> F4 {
+    fn row(&self, pack: &TrianglePack, row: usize, axis: usize) -> SimdF32x4 {
         // SAFETY: values of this type exist, so the processor has the instructions. There are nine rows,
         // `row` is 0, 3, or 6, and axes are less than 3.
-        let row = unsafe { F4::load(pack.rows.as_ptr().add(row + self.axes[axis]).cast()) };
+        let row = unsafe { SimdF32x4::load(pack.rows.as_ptr().add(row + self.axes[axis]).cast()) };
         row - self.origin[axis]
     }
 }

@@ -4,9 +4,9 @@ use std::arch::x86_64::*;
 
 use super::portable::update_nearest;
 use super::ray::{SimdRay, may_hit};
-use super::stack::{Stack, entry, key};
+use super::stack::{Stack, entry_distance, sort_key};
 use super::triangle::Hits;
-use super::vector::{F4, F8, SimdVector};
+use super::vector::{SimdF32x4, SimdF32x8, SimdVector};
 use crate::accel::wide_bvh::WideBvh;
 use crate::accel::wide_bvh::node::{Child, LEAF_BITS, PACK, TrianglePack, WideNode};
 use crate::geometry::aabb::SLAB_PAD;
@@ -20,7 +20,7 @@ pub fn closest(tree: &WideBvh, ray: &Ray) -> Option<ShapeHit> {
         return None;
     }
     // SAFETY: this function is compiled with the required instructions.
-    let like8 = unsafe { F8::splat(0.0) };
+    let like8 = unsafe { SimdF32x8::splat(0.0) };
     let lines = SimdRay::new(ray, &tree.bounds);
     let mut best: Option<ShapeHit> = None;
     let mut t_max = ray.t_max;
@@ -31,7 +31,7 @@ pub fn closest(tree: &WideBvh, ray: &Ray) -> Option<ShapeHit> {
         match Child::decode(code) {
             Child::Inner(index) => {
                 let node = &tree.nodes[index as usize];
-                let (near, met) = lines.enter(node, end);
+                let (near, met) = lines.box_entries(node, end);
                 if let Some(next) = push_ordered(tree, node, near, met, &mut stack) {
                     code = next;
                     continue;
@@ -50,7 +50,7 @@ pub fn closest(tree: &WideBvh, ray: &Ray) -> Option<ShapeHit> {
         }
         loop {
             let Some(next) = stack.pop() else { return best };
-            if entry(next) <= t_max * SLAB_PAD {
+            if entry_distance(next) <= t_max * SLAB_PAD {
                 code = next as u32;
                 break;
             }
@@ -63,7 +63,7 @@ pub fn closest(tree: &WideBvh, ray: &Ray) -> Option<ShapeHit> {
 #[inline]
 fn update_nearest_of_pack(
     pack: &TrianglePack,
-    hits: &Hits<F4>,
+    hits: &Hits<SimdF32x4>,
     ray: &Ray,
     best: &mut Option<ShapeHit>,
     t_max: f32,
@@ -90,7 +90,7 @@ fn update_nearest_of_pack(
     }
 }
 
-/// [`update_nearest`] as an outlined call, since it is rarely needed.
+/// Non-inlined version of [`update_nearest`], which is rarely needed.
 #[cold]
 #[inline(never)]
 fn update_nearest_uninlined(
@@ -106,7 +106,13 @@ fn update_nearest_uninlined(
 /// Pushes the children that the ray hits, farthest first, except for the nearest. Returns the nearest.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
-fn push_ordered(tree: &WideBvh, node: &WideNode, near: F8, met: u32, stack: &mut Stack<u64>) -> Option<u32> {
+fn push_ordered(
+    tree: &WideBvh,
+    node: &WideNode,
+    near: SimdF32x8,
+    met: u32,
+    stack: &mut Stack<u64>,
+) -> Option<u32> {
     if met == 0 {
         return None;
     }
@@ -117,13 +123,13 @@ fn push_ordered(tree: &WideBvh, node: &WideNode, near: F8, met: u32, stack: &mut
     }
     let mut entries = [0.0_f32; 8];
     near.store(&mut entries);
-    let mut nearest = key(entries[first], node.children[first]);
+    let mut nearest = sort_key(entries[first], node.children[first]);
     prefetch(tree, nearest as u32);
     let mut pushed = 0;
     loop {
         let slot = rest.trailing_zeros() as usize % 8;
         rest &= rest - 1;
-        let other = key(entries[slot], node.children[slot]);
+        let other = sort_key(entries[slot], node.children[slot]);
         prefetch(tree, other as u32);
         stack.insert(nearest.max(other), pushed);
         nearest = nearest.min(other);
@@ -161,7 +167,7 @@ pub fn any(tree: &WideBvh, ray: &Ray, except: Option<u32>) -> bool {
         return false;
     }
     // SAFETY: this function is compiled with the required instructions.
-    let like8 = unsafe { F8::splat(0.0) };
+    let like8 = unsafe { SimdF32x8::splat(0.0) };
     let lines = SimdRay::new(ray, &tree.bounds);
     let end = like8.splat_like(ray.t_max * SLAB_PAD);
     let mut stack: Stack<u32> = Stack::new();
@@ -170,7 +176,7 @@ pub fn any(tree: &WideBvh, ray: &Ray, except: Option<u32>) -> bool {
         match Child::decode(code) {
             Child::Inner(index) => {
                 let node = &tree.nodes[index as usize];
-                let (_, mut met) = lines.enter(node, end);
+                let (_, mut met) = lines.box_entries(node, end);
                 while met != 0 {
                     let child = node.children[met.trailing_zeros() as usize % 8];
                     prefetch(tree, child);

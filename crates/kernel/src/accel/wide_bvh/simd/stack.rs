@@ -52,13 +52,13 @@ impl<T: Copy> Stack<T> {
 /// Sort key of a child: the bits of its entry distance, followed by the encoded child. Bits of nonnegative
 /// floats sort like their values.
 #[inline(always)]
-pub fn key(entry: f32, code: u32) -> u64 {
+pub fn sort_key(entry: f32, code: u32) -> u64 {
     u64::from(entry.to_bits()) << 32 | u64::from(code)
 }
 
 /// Entry distance stored in a key.
 #[inline(always)]
-pub fn entry(key: u64) -> f32 {
+pub fn entry_distance(key: u64) -> f32 {
     f32::from_bits((key >> 32) as u32)
 }
 

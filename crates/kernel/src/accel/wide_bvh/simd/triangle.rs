@@ -105,15 +105,15 @@ fn max_abs_corner<V: SimdVector>(corners: &Corners<V>, axis: usize) -> V {
 #[allow(unsafe_code)]
 mod tests {
     use super::*;
-    use crate::accel::wide_bvh::simd::vector::F4;
+    use crate::accel::wide_bvh::simd::vector::SimdF32x4;
     use crate::math::random::signed as random;
 
-    /// Tests triangles near the filter's limits of thinness and distance from the origin, on both sides of
-    /// the limits.
+    /// Tests triangles slightly within and slightly beyond the filter's limits on thinness and distance from
+    /// the origin.
     #[test]
     fn filter_rejects_only_clear_misses() {
         // SAFETY: every x86-64 processor supports four-float vectors.
-        let like = unsafe { F4::splat(0.0) };
+        let like = unsafe { SimdF32x4::splat(0.0) };
         let mut next = random(31);
         let (mut needles, mut starts, mut passed, mut clear, mut beyond) = (0, 0, 0, 0, 0);
         for round in 0..400_000 {
@@ -131,7 +131,7 @@ mod tests {
                 [at(0, next()), at(1, next()), z]
             };
             let scalar = [corner(1.0, 1.0), corner(-1.0, -1.0), corner(0.0, 0.0)];
-            let corners: Corners<F4> = scalar.map(|corner| corner.map(|x| like.splat_like(x)));
+            let corners: Corners<SimdF32x4> = scalar.map(|corner| corner.map(|x| like.splat_like(x)));
             let [[ax, ay, az], [bx, by, bz], [cx, cy, cz]] = corners;
             let (wa, wb, wc) = (cx * by - cy * bx, ax * cy - ay * cx, bx * ay - by * ax);
             let determinant = wa + wb + wc;
@@ -140,16 +140,16 @@ mod tests {
             let along = (wa * az + wb * bz + wc * cz) * shear_z;
             let t = along * inverse;
             let (error, reach) = distance_error(&corners, shear_z, inverse);
-            let is_needle = F4::movemask((reach * like.splat_like(ILL_CONDITIONED)).lt(error)) != 0;
-            let is_at_start = F4::movemask(t.abs().le(error)) != 0;
+            let is_needle = SimdF32x4::movemask((reach * like.splat_like(ILL_CONDITIONED)).lt(error)) != 0;
+            let is_at_start = SimdF32x4::movemask(t.abs().le(error)) != 0;
             // End the ray in front of the triangle, on it, behind it, or at infinity.
             let mut distance = [0.0; 4];
             t.store(&mut distance);
             let part = [0.5, 1.0, 1.0 + f32::EPSILON, 2.0, f32::INFINITY][round % 5];
             let end = like.splat_like((distance[0] * part).max(0.0));
-            let passes = F4::movemask(may_be_hit(&corners, determinant, shear_z, along, end)) != 0;
-            let is_ahead = F4::movemask(like.lt(t) & t.le(end)) != 0;
-            let is_beyond = F4::movemask(end.lt(t)) != 0;
+            let passes = SimdF32x4::movemask(may_be_hit(&corners, determinant, shear_z, along, end)) != 0;
+            let is_ahead = SimdF32x4::movemask(like.lt(t) & t.le(end)) != 0;
+            let is_beyond = SimdF32x4::movemask(end.lt(t)) != 0;
             assert!(passes || !(is_ahead || is_needle || is_at_start), "{scalar:?}");
             beyond += u32::from(is_beyond && !passes);
             if is_beyond {

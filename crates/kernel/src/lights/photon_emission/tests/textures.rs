@@ -92,7 +92,7 @@ fn mesh_emission_matches_light_sampling() {
             patches.iter().map(|patch| (patch.corners, patch.primitive)).collect(),
             &CancelToken::new(),
         )
-        .expect("nobody cancels");
+        .expect("never canceled");
         let mesh = mesh.expect("an area");
         let bounds = mesh.bounds();
         let light = AreaLight {
@@ -112,7 +112,7 @@ fn mesh_emission_matches_light_sampling() {
         } else {
             Light::Area(light)
         };
-        let lights = Arc::new(Lights::new(vec![light.clone()], &CancelToken::new()).expect("nobody cancels"));
+        let lights = Arc::new(Lights::new(vec![light.clone()], &CancelToken::new()).expect("never canceled"));
         let source = PhotonSource::new(&lights, |_| Some(EmitterGeometry::Mesh { rounding: 1e-6 }), SCENE);
         let source = source.expect("power");
         assert_same_irradiance(&format!("mesh {side} {is_textured}"), &light, &source, None);

@@ -7,7 +7,7 @@ use crate::accel::wide_bvh::WideBvh;
 use crate::accel::wide_bvh::node::{Child, PACK, TrianglePack};
 use crate::accel::wide_bvh::simd::single::prefetch;
 use crate::accel::wide_bvh::simd::stack::Stack;
-use crate::accel::wide_bvh::simd::vector::{F8, SimdVector};
+use crate::accel::wide_bvh::simd::vector::{SimdF32x8, SimdVector};
 use crate::accel::{F32x16, PACKET_SIZE as SIZE};
 use crate::geometry::Ray;
 use crate::geometry::aabb::SLAB_PAD;
@@ -21,7 +21,7 @@ pub fn any<V: SimdVector>(
     ends: &F32x16,
     except: &[Option<u32>],
     like: V,
-    like8: F8,
+    like8: SimdF32x8,
 ) -> Option<u32> {
     let Some(rows) = RaySoa::new(rays, ends) else { return Some(0) };
     let packet = SimdRayPacket::new(&rows, &tree.bounds, like)?;
@@ -37,12 +37,12 @@ pub fn any<V: SimdVector>(
         match Child::decode(code) {
             Child::Inner(index) => {
                 let node = &tree.nodes[index as usize];
-                let (_, mut met) = frustum.enter(node, like8.splat_like(end));
+                let (_, mut met) = frustum.box_entries(node, like8.splat_like(end));
                 while met != 0 {
                     let slot = met.trailing_zeros() as usize % 8;
                     met &= met - 1;
                     prefetch(tree, node.children[slot]);
-                    stack.push_if(node.children[slot], packet.meets(node, slot, t_max * pad));
+                    stack.push_if(node.children[slot], packet.any_ray_hits_box(node, slot, t_max * pad));
                 }
             }
             Child::Leaf { first, count } => {

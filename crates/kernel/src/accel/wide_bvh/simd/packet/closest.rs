@@ -1,15 +1,15 @@
 //! Closest-hit packet traversal. Visits near children first.
 
 use super::frustum::Frustum;
-use super::nearest::Nearest;
+use super::nearest::NearestHits;
 use super::rays::SimdRayPacket;
 use super::rows::RaySoa;
 use crate::accel::F32x16;
 use crate::accel::wide_bvh::WideBvh;
 use crate::accel::wide_bvh::node::{Child, PACK, WideNode};
 use crate::accel::wide_bvh::simd::single::prefetch;
-use crate::accel::wide_bvh::simd::stack::{Stack, entry, key};
-use crate::accel::wide_bvh::simd::vector::{F8, SimdVector};
+use crate::accel::wide_bvh::simd::stack::{Stack, entry_distance, sort_key};
+use crate::accel::wide_bvh::simd::vector::{SimdF32x8, SimdVector};
 use crate::geometry::aabb::SLAB_PAD;
 use crate::geometry::{Ray, ShapeHit};
 
@@ -21,25 +21,25 @@ pub fn closest<V: SimdVector>(
     ends: &F32x16,
     hits: &mut [Option<ShapeHit>],
     like: V,
-    like8: F8,
+    like8: SimdF32x8,
 ) -> bool {
     let Some(rows) = RaySoa::new(rays, ends) else { return true };
     let Some(packet) = SimdRayPacket::new(&rows, &tree.bounds, like) else { return false };
     let frustum = Frustum::new(&packet, like8);
     let t_max = like.gather(&rows.ends);
     let pad = like.splat_like(SLAB_PAD);
-    let mut best = Nearest::new(t_max);
+    let mut best = NearestHits::new(t_max);
     let mut end = t_max.max_lane() * SLAB_PAD;
     let mut stack: Stack<u64> = Stack::new();
-    stack.push(key(0.0, 0));
+    stack.push(sort_key(0.0, 0));
     while let Some(key) = stack.pop() {
-        if entry(key) > end {
+        if entry_distance(key) > end {
             continue;
         }
         match Child::decode(key as u32) {
             Child::Inner(index) => {
                 let node = &tree.nodes[index as usize];
-                let (near, met) = frustum.enter(node, like8.splat_like(end));
+                let (near, met) = frustum.box_entries(node, like8.splat_like(end));
                 push_ordered(tree, node, near, met, &mut stack, &packet, best.t * pad);
             }
             Child::Leaf { first, count } => {
@@ -67,7 +67,7 @@ pub fn closest<V: SimdVector>(
 fn push_ordered<V: SimdVector>(
     tree: &WideBvh,
     node: &WideNode,
-    near: F8,
+    near: SimdF32x8,
     met: u32,
     stack: &mut Stack<u64>,
     packet: &SimdRayPacket<V>,
@@ -79,11 +79,11 @@ fn push_ordered<V: SimdVector>(
     while rest != 0 {
         let slot = rest.trailing_zeros() as usize % 8;
         rest &= rest - 1;
-        if !packet.meets(node, slot, end) {
+        if !packet.any_ray_hits_box(node, slot, end) {
             continue;
         }
         prefetch(tree, node.children[slot]);
-        stack.insert(key(entries[slot], node.children[slot]), pushed);
+        stack.insert(sort_key(entries[slot], node.children[slot]), pushed);
         pushed += 1;
     }
 }

@@ -1,24 +1,24 @@
-//! A frustum around the rays of a packet.
+//! A frustum around a packet's rays.
 
 use super::rays::SimdRayPacket;
 use crate::accel::wide_bvh::node::WideNode;
-use crate::accel::wide_bvh::simd::vector::{F8, SimdVector};
+use crate::accel::wide_bvh::simd::vector::{SimdF32x8, SimdVector};
 use crate::geometry::aabb::SLAB_PAD;
 
-/// Bounds on all rays of a packet, tested against eight boxes at a time. Subtraction and multiplication round
+/// Bounds on all rays in a packet, tested against eight boxes at a time. Subtraction and multiplication round
 /// monotonically, so no ray enters a box before the frustum does, or leaves it after the frustum.
 pub struct Frustum {
     /// The origin coordinate closest to the near plane: the maximum for positive directions, the minimum for
     /// negative ones.
-    near_origin: [F8; 3],
-    far_origin: [F8; 3],
-    inverse: [[F8; 2]; 3],
+    near_origin: [SimdF32x8; 3],
+    far_origin: [SimdF32x8; 3],
+    inverse: [[SimdF32x8; 2]; 3],
     near: [usize; 3],
 }
 
 impl Frustum {
     #[inline(always)]
-    pub fn new<V: SimdVector>(packet: &SimdRayPacket<V>, like: F8) -> Self {
+    pub fn new<V: SimdVector>(packet: &SimdRayPacket<V>, like: SimdF32x8) -> Self {
         let (mut near_origin, mut far_origin) = ([like; 3], [like; 3]);
         let mut inverse = [[like; 2]; 3];
         for axis in 0..3 {
@@ -33,10 +33,10 @@ impl Frustum {
         Self { near_origin, far_origin, inverse, near: packet.near }
     }
 
-    /// Lower bounds on the distances at which a ray enters each box, and the mask of the boxes that a ray may
-    /// hit before `end`.
+    /// Lower bounds on the distances at which any ray enters each box, and the mask of the boxes that any ray
+    /// may hit before `end`.
     #[inline(always)]
-    pub fn enter(&self, node: &WideNode, end: F8) -> (F8, u32) {
+    pub fn box_entries(&self, node: &WideNode, end: SimdF32x8) -> (SimdF32x8, u32) {
         let pad = end.splat_like(SLAB_PAD);
         let (mut near, mut far) = (end.splat_like(0.0), end);
         for axis in 0..3 {
@@ -46,6 +46,6 @@ impl Frustum {
             near = (to_near * least).min(to_near * greatest).max(near);
             far = ((to_far * least).max(to_far * greatest) * pad).min(far);
         }
-        (near, F8::movemask(near.le(far)))
+        (near, SimdF32x8::movemask(near.le(far)))
     }
 }

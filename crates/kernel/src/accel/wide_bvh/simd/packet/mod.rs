@@ -9,7 +9,7 @@ mod nearest;
 mod rays;
 mod rows;
 
-use super::vector::{F8, F16, SimdVector, VectorPair};
+use super::vector::{SimdF32x8, SimdF32x16, SimdVector, VectorPair};
 use crate::accel::F32x16;
 use crate::accel::wide_bvh::WideBvh;
 use crate::geometry::{Ray, ShapeHit};
@@ -21,7 +21,7 @@ use closest::closest;
 #[target_feature(enable = "avx2")]
 pub fn closest_avx2(tree: &WideBvh, rays: &[Ray], ends: &F32x16, hits: &mut [Option<ShapeHit>]) -> bool {
     // SAFETY: this function is compiled with the required instructions.
-    let (like, like8) = unsafe { (VectorPair::<F8>::splat(0.0), F8::splat(0.0)) };
+    let (like, like8) = unsafe { (VectorPair::<SimdF32x8>::splat(0.0), SimdF32x8::splat(0.0)) };
     closest(tree, rays, ends, hits, like, like8)
 }
 
@@ -29,7 +29,7 @@ pub fn closest_avx2(tree: &WideBvh, rays: &[Ray], ends: &F32x16, hits: &mut [Opt
 #[target_feature(enable = "avx2")]
 pub fn any_avx2(tree: &WideBvh, rays: &[Ray], ends: &F32x16, except: &[Option<u32>]) -> Option<u32> {
     // SAFETY: this function is compiled with the required instructions.
-    let (like, like8) = unsafe { (VectorPair::<F8>::splat(0.0), F8::splat(0.0)) };
+    let (like, like8) = unsafe { (VectorPair::<SimdF32x8>::splat(0.0), SimdF32x8::splat(0.0)) };
     any(tree, rays, ends, except, like, like8)
 }
 
@@ -37,7 +37,7 @@ pub fn any_avx2(tree: &WideBvh, rays: &[Ray], ends: &F32x16, except: &[Option<u3
 #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2")]
 pub fn closest_avx512(tree: &WideBvh, rays: &[Ray], ends: &F32x16, hits: &mut [Option<ShapeHit>]) -> bool {
     // SAFETY: this function is compiled with the required instructions.
-    let (like, like8) = unsafe { (F16::splat(0.0), F8::splat(0.0)) };
+    let (like, like8) = unsafe { (SimdF32x16::splat(0.0), SimdF32x8::splat(0.0)) };
     closest(tree, rays, ends, hits, like, like8)
 }
 
@@ -45,6 +45,6 @@ pub fn closest_avx512(tree: &WideBvh, rays: &[Ray], ends: &F32x16, hits: &mut [O
 #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2")]
 pub fn any_avx512(tree: &WideBvh, rays: &[Ray], ends: &F32x16, except: &[Option<u32>]) -> Option<u32> {
     // SAFETY: this function is compiled with the required instructions.
-    let (like, like8) = unsafe { (F16::splat(0.0), F8::splat(0.0)) };
+    let (like, like8) = unsafe { (SimdF32x16::splat(0.0), SimdF32x8::splat(0.0)) };
     any(tree, rays, ends, except, like, like8)
 }

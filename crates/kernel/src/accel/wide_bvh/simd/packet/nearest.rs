@@ -1,4 +1,4 @@
-//! Nearest hits of a packet.
+//! Nearest hits for a packet of rays.
 
 use super::rays::SimdRayPacket;
 use crate::accel::PACKET_SIZE as SIZE;
@@ -9,7 +9,7 @@ use crate::geometry::watertight::ShearedRay;
 use crate::geometry::{Ray, ShapeHit};
 
 /// Nearest hit of each ray so far.
-pub struct Nearest<V: SimdVector> {
+pub struct NearestHits<V: SimdVector> {
     pub t: V,
     u: V,
     v: V,
@@ -18,7 +18,7 @@ pub struct Nearest<V: SimdVector> {
     found: u32,
 }
 
-impl<V: SimdVector> Nearest<V> {
+impl<V: SimdVector> NearestHits<V> {
     /// No hits yet, for rays with the given ends.
     #[inline(always)]
     pub fn new(ends: V) -> Self {
@@ -72,7 +72,7 @@ impl<V: SimdVector> Nearest<V> {
         taken
     }
 
-    /// [`Nearest::test_triangle`] for one ray, with the scalar test.
+    /// [`Nearest::test_triangle`] for one ray, using the scalar test.
     #[cold]
     #[inline(never)]
     fn update_ray(&mut self, ray: usize, pack: &TrianglePack, lane: usize, rays: &[Ray]) -> u32 {

@@ -1,4 +1,4 @@
-//! The rays of a packet in registers, tested against one box or triangle at a time.
+//! A packet's rays in registers, tested against one box or triangle at a time.
 
 use super::rows::RaySoa;
 use crate::accel::wide_bvh::node::{TrianglePack, WideNode};
@@ -97,7 +97,7 @@ impl<V: SimdVector> SimdRayPacket<V> {
 
     /// Whether any ray hits the box in a slot before its end. SIMD version of `SlabRay::enter`.
     #[inline(always)]
-    pub fn meets(&self, node: &WideNode, slot: usize, end: V) -> bool {
+    pub fn any_ray_hits_box(&self, node: &WideNode, slot: usize, end: V) -> bool {
         let pad = end.splat_like(SLAB_PAD);
         let (mut near, mut far) = (end.splat_like(0.0), end);
         for axis in 0..3 {

@@ -1,4 +1,4 @@
-//! Structure-of-arrays storage for the rays of a packet.
+//! Structure-of-arrays storage for a packet's rays.
 
 use crate::accel::{F32x16, PACKET_SIZE as SIZE};
 use crate::geometry::Ray;

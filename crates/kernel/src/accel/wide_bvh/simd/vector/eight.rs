@@ -3,20 +3,20 @@
 use std::arch::x86_64::*;
 use std::ops::{Add, BitAnd, BitOr, Mul, Sub};
 
-use super::{F4, SimdVector, operators, wide_mask};
+use super::{SimdF32x4, SimdVector, operators, wide_mask};
 
 /// Vector of eight floats.
 #[derive(Clone, Copy)]
-pub struct F8(pub(in crate::accel::wide_bvh::simd) __m256);
+pub struct SimdF32x8(pub(in crate::accel::wide_bvh::simd) __m256);
 
 /// Mask of eight lanes.
 #[derive(Clone, Copy)]
 pub struct Mask8(__m256);
 
-operators!(F8, _mm256_add_ps, _mm256_sub_ps, _mm256_mul_ps);
+operators!(SimdF32x8, _mm256_add_ps, _mm256_sub_ps, _mm256_mul_ps);
 wide_mask!(Mask8, _mm256_and_ps, _mm256_or_ps);
 
-impl SimdVector for F8 {
+impl SimdVector for SimdF32x8 {
     const COUNT: usize = 8;
     type Mask = Mask8;
 
@@ -119,18 +119,18 @@ impl SimdVector for F8 {
     fn max_lane(self) -> f32 {
         // SAFETY: as above.
         let (low, high) = unsafe { (_mm256_castps256_ps128(self.0), _mm256_extractf128_ps::<1>(self.0)) };
-        F4(low).max(F4(high)).max_lane()
+        SimdF32x4(low).max(SimdF32x4(high)).max_lane()
     }
 
     #[inline(always)]
     fn min_lane(self) -> f32 {
         // SAFETY: as above.
         let (low, high) = unsafe { (_mm256_castps256_ps128(self.0), _mm256_extractf128_ps::<1>(self.0)) };
-        F4(low).min(F4(high)).min_lane()
+        SimdF32x4(low).min(SimdF32x4(high)).min_lane()
     }
 }
 
-impl F8 {
+impl SimdF32x8 {
     /// Computes self · factor − less with a single rounding.
     ///
     /// # Safety

@@ -7,16 +7,16 @@ use super::{SimdVector, operators, wide_mask};
 
 /// Vector of four floats.
 #[derive(Clone, Copy)]
-pub struct F4(pub(in crate::accel::wide_bvh::simd) __m128);
+pub struct SimdF32x4(pub(in crate::accel::wide_bvh::simd) __m128);
 
 /// Mask of four lanes.
 #[derive(Clone, Copy)]
 pub struct Mask4(__m128);
 
-operators!(F4, _mm_add_ps, _mm_sub_ps, _mm_mul_ps);
+operators!(SimdF32x4, _mm_add_ps, _mm_sub_ps, _mm_mul_ps);
 wide_mask!(Mask4, _mm_and_ps, _mm_or_ps);
 
-impl SimdVector for F4 {
+impl SimdVector for SimdF32x4 {
     const COUNT: usize = 4;
     type Mask = Mask4;
 

@@ -11,10 +11,10 @@ mod sixteen;
 
 use std::ops::{Add, BitAnd, BitOr, Mul, Sub};
 
-pub use eight::F8;
-pub use four::F4;
+pub use eight::SimdF32x8;
+pub use four::SimdF32x4;
 pub use pair::VectorPair;
-pub use sixteen::F16;
+pub use sixteen::SimdF32x16;
 
 /// A SIMD vector of floats. Comparisons with NaN are false. `min` and `max` return their argument if either
 /// operand is NaN.

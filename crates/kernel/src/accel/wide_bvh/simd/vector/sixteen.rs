@@ -7,13 +7,13 @@ use super::{SimdVector, operators};
 
 /// Vector of 16 floats.
 #[derive(Clone, Copy)]
-pub struct F16(pub(in crate::accel::wide_bvh::simd) __m512);
+pub struct SimdF32x16(pub(in crate::accel::wide_bvh::simd) __m512);
 
 /// Mask of 16 lanes with one bit each.
 #[derive(Clone, Copy)]
 pub struct Mask16(u16);
 
-operators!(F16, _mm512_add_ps, _mm512_sub_ps, _mm512_mul_ps);
+operators!(SimdF32x16, _mm512_add_ps, _mm512_sub_ps, _mm512_mul_ps);
 
 impl BitAnd for Mask16 {
     type Output = Self;
@@ -31,7 +31,7 @@ impl BitOr for Mask16 {
     }
 }
 
-impl SimdVector for F16 {
+impl SimdVector for SimdF32x16 {
     const COUNT: usize = 16;
     type Mask = Mask16;
 
