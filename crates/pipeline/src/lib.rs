@@ -19,6 +19,7 @@ mod memory;
 pub mod messages;
 mod model;
 mod plan;
+mod protected;
 pub mod protocol;
 mod queries;
 mod render;

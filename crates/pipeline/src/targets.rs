@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::inputs::{Input, InputIndex, Inputs};
 use super::plan::{OutputNameSource, Plan};
+use super::protected::{Protection, other_scene};
 use super::render::checkpointer::checkpoint_path;
 use super::report::ReportSignature;
 use super::sink::Sink;
@@ -13,7 +14,6 @@ use crate::output::part::{self, PartFile};
 use crate::output::write::{SweptFolders, WritePolicy};
 use crate::output::{
     AttributeLossPolicy, FileIdentity, OutputError, Replaced, may_replace_image, may_replace_json,
-    scene_of_image, scene_path,
 };
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::is_mesh;
@@ -41,6 +41,15 @@ impl<'a> OutputTarget<'a> {
 enum TargetKind {
     Picture(OutputNameSource),
     Report,
+}
+
+/// Returns which existing files the plan's image keeps.
+pub(super) fn protection(plan: &Plan) -> Protection {
+    match plan.named_by {
+        _ if plan.replaces_foreign => Protection::Nothing,
+        OutputNameSource::Default => Protection::OtherImages(plan.path.clone()),
+        OutputNameSource::CommandLine | OutputNameSource::Scene => Protection::Parts,
+    }
 }
 
 /// Returns one diagnostic for each of the plan's files that must not be written. The result may differ later,
@@ -195,7 +204,7 @@ fn foreign_file_error(plan: &Plan, target: OutputTarget<'_>, at: &Path) -> Optio
             };
             let help = format!("{remedy}; -o {own} or --force replaces it");
             let replaced = may_replace_image(at);
-            if let (Replaced::Own, Some(other)) = (&replaced, other_scene(plan, at)) {
+            if let (Replaced::Own, Some(other)) = (&replaced, other_scene(&plan.path, at)) {
                 let message = format!("cannot write {name}: it is the image of another scene, {other}");
                 return Some(call_error(message, Some(help)));
             }
@@ -210,11 +219,6 @@ fn foreign_file_error(plan: &Plan, target: OutputTarget<'_>, at: &Path) -> Optio
         }
     };
     Some(call_error(format!("cannot write {name}: {}", replaced.reason_to_keep()?), Some(help)))
-}
-
-/// Returns the scene of an image written by glimt, unless it is the plan's scene.
-fn other_scene(plan: &Plan, at: &Path) -> Option<String> {
-    scene_of_image(at).filter(|named| !scene_path::is_same(named, &plan.path, at))
 }
 
 /// Returns an error if the file is a checkpoint or another part of the same render, which may contain hours

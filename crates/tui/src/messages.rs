@@ -226,8 +226,17 @@ pub fn output_changed(file: &str, how: &str) -> String {
     format!("{file} {how} · w: write it again")
 }
 
+/// Shown when another program modified an output file so that `w` does not replace it.
+pub fn output_kept(file: &str, how: &str) -> String {
+    format!("{file} {how} · name another file with -o")
+}
+
 /// Shown when the displayed image is not saved in a file.
 pub const NOT_SAVED: &str = "not saved · w: save it";
+/// Shown when the displayed image is not saved in a file, and `w` cannot save it.
+pub const NOT_SAVED_WITH_CONFLICT: &str = "not saved";
+/// Part of messages about changes made with keys. Omitted when `w` cannot write the image.
+pub const WRITE_HINT: &str = "w: save image · ";
 /// Shown when `w` wrote the displayed image before its render finished.
 pub fn unfinished_image(file: &str) -> String {
     format!("{file} is unfinished · w: write it again")

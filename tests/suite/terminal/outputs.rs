@@ -4,6 +4,7 @@ use std::fs;
 use std::os::unix::fs::symlink;
 use std::time::Duration;
 
+use glimt::pipeline::watch::ExternalChange;
 use glimt::tui::messages;
 
 use super::pty::{Folder, GREEN, RED, SCENE};
@@ -80,6 +81,27 @@ fn unrelated_image_is_not_replaced() {
     terminal.wait_for("-o FILE");
     terminal.wait_for_render(2);
     assert_eq!(folder.bytes("scene.png"), photograph);
+}
+
+#[test]
+fn w_is_not_offered_for_another_scenes_image() {
+    let folder = Folder::new();
+    let mut terminal = folder.terminal();
+    terminal.wait_for_render(1);
+    fs::create_dir(folder.path("other")).expect("a folder");
+    folder.write("other/scene.toml", &SCENE.replace(RED, GREEN));
+    let mut other = std::process::Command::new(folder.program());
+    other.current_dir(folder.path("")).args(["other/scene.toml", "--once", "--force"]);
+    assert!(other.output().expect("it runs").status.success());
+    let image = folder.bytes("scene.png");
+    let lost = ExternalChange::ReplacedByOtherScene;
+    terminal.wait_for(&messages::output_kept("scene.png", lost.words()));
+    terminal.press("w");
+    terminal.wait_for("other/scene.toml");
+    assert_eq!(folder.bytes("scene.png"), image);
+    terminal.press("q");
+    terminal.code();
+    assert_mentions(&terminal.last_lines(), &["scene.png", "other/scene.toml", "another scene's image"]);
 }
 
 #[test]

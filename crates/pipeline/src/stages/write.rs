@@ -11,7 +11,7 @@ use super::super::protocol::{WriteMode, reasons};
 use super::super::render::checkpointer::create_header;
 use super::super::render::film_state::FilmState;
 use super::super::sink::Sink;
-use super::super::targets::{OutputTarget, conflicts, write_guarded};
+use super::super::targets::{OutputTarget, conflicts, protection, write_guarded};
 use super::super::turntable::TurntableFrame;
 use super::super::watch::content::{Content, Contents};
 use super::{StageResult, Stop};
@@ -186,7 +186,7 @@ fn write(
         {
             continue;
         }
-        contents.outputs.begin(path);
+        contents.outputs.begin(path, protection(plan));
         let wrote = match state.share {
             Some(_) => write_part(state, to, (path, &written.sweep), token),
             None => {

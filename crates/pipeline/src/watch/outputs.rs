@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 
 use super::content::{Content, Contents};
 use crate::control::CancelToken;
+use crate::protected::{ProtectedFile, Protection};
 
 /// A change that another program made to a file written by glimt.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -15,6 +16,10 @@ pub enum ExternalChange {
     Removed,
     /// The file has different content.
     Replaced,
+    /// The file is now the image of another scene, which this scene's image does not replace.
+    ReplacedByOtherScene,
+    /// The file is now another file that the image does not replace.
+    ReplacedByForeign,
 }
 
 impl ExternalChange {
@@ -22,7 +27,16 @@ impl ExternalChange {
     pub fn words(self) -> &'static str {
         match self {
             Self::Removed => "was removed",
-            Self::Replaced => "was replaced by another program",
+            Self::Replaced | Self::ReplacedByForeign => "was replaced by another program",
+            Self::ReplacedByOtherScene => "was replaced by another scene's image",
+        }
+    }
+
+    /// Whether glimt does not replace the file.
+    pub fn is_kept(self) -> bool {
+        match self {
+            Self::Removed | Self::Replaced => false,
+            Self::ReplacedByOtherScene | Self::ReplacedByForeign => true,
         }
     }
 }
@@ -40,24 +54,32 @@ pub struct OutputChange {
 #[derive(Debug, Default)]
 pub struct Outputs(Mutex<HashMap<PathBuf, Output>>);
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 struct Output {
     /// The content written by glimt.
     content: Content,
     /// Number of writes started so far.
     writes: u64,
     is_being_written: bool,
+    protection: Protection,
     /// The last reported change.
     reported: Option<ExternalChange>,
 }
 
 impl Outputs {
-    /// Records that a file is about to be written. Its content is ignored until [`Self::end`].
-    pub(crate) fn begin(&self, path: &Path) {
+    /// Records that a file is about to be written. Its content is ignored until [`Self::end`]. `protection`
+    /// decides whether the image would replace the content that another program writes there.
+    pub(crate) fn begin(&self, path: &Path, protection: Protection) {
         let mut known = self.lock();
-        let new = Output { content: Content::Missing, writes: 0, is_being_written: true, reported: None };
-        let output = known.entry(path.to_owned()).or_insert(new);
+        let output = known.entry(path.to_owned()).or_insert(Output {
+            content: Content::Missing,
+            writes: 0,
+            is_being_written: true,
+            protection: Protection::Nothing,
+            reported: None,
+        });
         (output.writes, output.is_being_written) = (output.writes + 1, true);
+        output.protection = protection;
     }
 
     /// Records a written file's content, or `None` if the write failed. Special files are not watched.
@@ -100,7 +122,7 @@ impl Outputs {
         let before: Vec<(PathBuf, Output)> = {
             let known = self.lock();
             let idle = known.iter().filter(|(_, output)| !output.is_being_written);
-            idle.map(|(path, output)| (path.clone(), *output)).collect()
+            idle.map(|(path, output)| (path.clone(), output.clone())).collect()
         };
         let state = |(path, output): (PathBuf, Output)| {
             // Use a token that is never cancelled.
@@ -108,7 +130,11 @@ impl Outputs {
             let lost = match now {
                 now if now == output.content => None,
                 Content::Missing => Some(ExternalChange::Removed),
-                Content::Hash(_) | Content::Unusable(_) => Some(ExternalChange::Replaced),
+                Content::Hash(_) | Content::Unusable(_) => Some(match output.protection.applies_to(&path) {
+                    None => ExternalChange::Replaced,
+                    Some(ProtectedFile::OtherScene) => ExternalChange::ReplacedByOtherScene,
+                    Some(ProtectedFile::Foreign) => ExternalChange::ReplacedByForeign,
+                }),
             };
             // Ignore the content if another write has started since.
             let is_current = self.lock().get(&path).is_some_and(|now| now.writes == output.writes);
@@ -167,7 +193,7 @@ mod tests {
     const QUIET: Duration = Duration::from_millis(250);
 
     fn write(contents: &Contents, path: &Path, text: &str) {
-        contents.outputs.begin(path);
+        contents.outputs.begin(path, Protection::Parts);
         fs::write(path, text).expect("written");
         let content = contents.read(path, &CancelToken::new()).expect("not cancelled");
         contents.outputs.end(path, Some(content));
@@ -186,7 +212,7 @@ mod tests {
         write(&contents, &path, "one");
         assert_eq!(look(&contents, 0), []);
         // glimt's own writes are not reported, either during or after the write.
-        contents.outputs.begin(&path);
+        contents.outputs.begin(&path, Protection::Parts);
         fs::write(&path, "two").expect("written");
         assert_eq!((look(&contents, 1000), look(&contents, 2000)), (vec![], vec![]));
         write(&contents, &path, "two");
@@ -227,15 +253,34 @@ mod tests {
         let path = folder.path().join("a.png");
         let contents = Contents::default();
         write(&contents, &path, "one");
-        contents.outputs.begin(&path);
+        contents.outputs.begin(&path, Protection::Parts);
         contents.outputs.end(&path, None);
         assert_eq!(contents.outputs.changed_externally(&contents), []);
         fs::remove_file(&path).expect("removed");
         assert_eq!(contents.outputs.changed_externally(&contents), [(path, ExternalChange::Removed)]);
         // A file that was never written is not watched.
         let other = folder.path().join("b.png");
-        contents.outputs.begin(&other);
+        contents.outputs.begin(&other, Protection::Parts);
         contents.outputs.end(&other, None);
         assert_eq!(contents.outputs.paths().len(), 1);
+    }
+
+    #[test]
+    fn replacement_that_the_image_keeps_is_reported() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a.png");
+        let contents = Contents::default();
+        let scene = folder.path().join("a.toml");
+        for (protection, change) in [
+            (Protection::OtherImages(scene), ExternalChange::ReplacedByForeign),
+            (Protection::Parts, ExternalChange::Replaced),
+            (Protection::Nothing, ExternalChange::Replaced),
+        ] {
+            write(&contents, &path, "one");
+            contents.outputs.begin(&path, protection);
+            contents.outputs.end(&path, None);
+            fs::write(&path, "of another").expect("written");
+            assert_eq!(contents.outputs.changed_externally(&contents), [(path.clone(), change)]);
+        }
     }
 }

@@ -20,6 +20,7 @@ pub(super) use self::selection::{MousePress, PickPurpose, SelectionState};
 pub(super) use self::work::{AssetBar, RenderState, WorkState, WorkerActivity};
 use super::color::{AnsiColors, ColorDepth};
 use super::event::Window;
+use super::options::ExternalChange;
 use super::preview_kind::PreviewKind;
 use super::terminal_replies::TerminalQueries;
 use super::terminals::Capabilities;
@@ -96,7 +97,14 @@ impl State {
         is_newest && is_at_work && request.preview_size.is_some() && !is_shown
     }
 
-    /// Diagnostics for a valid scene, including the reason why its image could not be written.
+    /// Whether `w` can replace the output files, as far as is known.
+    pub(super) fn can_write(&self) -> bool {
+        let is_conflict = |found: &Diagnostic| found.severity == Severity::Error;
+        let is_kept = |written: &WrittenFile| written.lost.is_some_and(ExternalChange::is_kept);
+        !self.overlays.warnings.iter().any(is_conflict) && !self.saving.written.iter().any(is_kept)
+    }
+
+    /// Diagnostics of a valid scene, and why its image could not be written.
     pub(super) fn reported_diagnostics(&self) -> Vec<Diagnostic> {
         let warnings = &self.overlays.warnings;
         let failed = self.saving.write_failed.as_ref();

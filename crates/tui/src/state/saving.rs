@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use super::request::KeyOverrides;
 use crate::event::WriteFailure;
+use crate::messages;
 use crate::options::ExternalChange;
 use crate::pipeline::protocol::{CameraEdit, OwnImageState, Viewpoint};
 use crate::scene::sanitize::visible;
@@ -47,6 +48,14 @@ impl WrittenFile {
     /// The file's path, safe to display.
     pub(crate) fn name(&self) -> String {
         visible(&self.path.to_string_lossy()).into_owned()
+    }
+
+    /// Describes how another program changed the file, and how to write the image anyway.
+    pub(crate) fn loss(&self) -> Option<String> {
+        let describe = |lost: ExternalChange| {
+            if lost.is_kept() { messages::output_kept } else { messages::output_changed }
+        };
+        self.lost.map(|lost| describe(lost)(&self.name(), lost.words()))
     }
 
     /// Describes the changes made with keys that the file includes.

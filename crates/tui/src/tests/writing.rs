@@ -6,7 +6,9 @@ use crate::event::{Effect, Event, KeyPress};
 use crate::exit_summary::summary_text;
 use crate::fixtures::*;
 use crate::messages;
+use crate::options::{ExternalChange, OutputChange};
 use crate::pipeline::protocol::{self, Command, OwnImageState, SampleCounts, Stage, Status};
+use crate::scene::diagnostic::Severity;
 
 /// A UI that has begun the scene's own image.
 fn begun(columns: u16, rows: u16) -> TestUi {
@@ -26,7 +28,7 @@ fn finish_unwritten(ui: &mut TestUi, color: [u8; 3]) {
     let generation = ui.state.request.generation;
     ui.read_scene();
     ui.show_preview(color);
-    let mut done = done_event(generation, Vec::new(), false);
+    let mut done = done_event(generation, ui.state.overlays.warnings.clone(), false);
     if let protocol::Event::Done { report, .. } = &mut done {
         (report.image.path, report.image.paths) = (None, Vec::new());
         report.stages[Stage::Write as usize].status = Status::Skipped;
@@ -128,4 +130,50 @@ fn written_image_is_outdated_only_after_a_save() {
     assert_shows(&mut ui, &messages::own_image_outdated("cornell.png"));
     assert!(!ui.text().contains("written with"), "{}", ui.text());
     assert!(summary_text(&ui.state).ends_with("(older than your last edit)"), "{}", summary_text(&ui.state));
+}
+
+/// A conflict with an existing file.
+fn refuse(ui: &mut TestUi) {
+    let conflicts = vec![diagnostic(Severity::Error, "cannot write cornell.png: it is another image")];
+    ui.worker_event(protocol::Event::Refused { generation: ui.state.request.generation, conflicts });
+}
+
+#[test]
+fn w_is_not_offered_for_a_file_that_it_keeps() {
+    for (lost, is_kept) in [
+        (ExternalChange::Removed, false),
+        (ExternalChange::Replaced, false),
+        (ExternalChange::ReplacedByOtherScene, true),
+        (ExternalChange::ReplacedByForeign, true),
+    ] {
+        let mut ui = TestUi::with(state(120, 40));
+        ui.worker_event(written_event(1, "cornell.png", true));
+        ui.finish_render(RED);
+        ui.handle_event(Event::Output(OutputChange { path: "cornell.png".into(), lost: Some(lost) }));
+        let words = if is_kept { messages::output_kept } else { messages::output_changed };
+        assert_shows(&mut ui, &words("cornell.png", lost.words()));
+        ui.press(']');
+        finish_unwritten(&mut ui, BLUE);
+        assert_shows(&mut ui, &words("cornell.png", lost.words()));
+        assert_eq!(ui.text().contains(messages::NOT_SAVED), !is_kept, "{lost:?}: {}", ui.text());
+    }
+}
+
+#[test]
+fn conflict_hides_hints_that_w_would_save() {
+    let mut ui = TestUi::with(state(120, 40));
+    refuse(&mut ui);
+    finish_unwritten(&mut ui, RED);
+    for key in ['l', 'v'] {
+        ui.press(key);
+        assert!(ui.text().contains("preview only") && !ui.text().contains("w: save"), "{}", ui.text());
+        own_image(&mut ui, OwnImageState::Begun { is_rendering: false });
+        ui.worker_event(protocol::Event::Started { generation: ui.state.request.generation });
+        refuse(&mut ui);
+        finish_unwritten(&mut ui, BLUE);
+        assert_shows(&mut ui, messages::NOT_SAVED_WITH_CONFLICT);
+        for words in [messages::NOT_SAVED, "continues it", "renders it"] {
+            assert!(!ui.text().contains(words), "{words}: {}", ui.text());
+        }
+    }
 }

@@ -3,7 +3,7 @@
 
 use std::path::PathBuf;
 
-use super::notices::{notify, prompt, show_notice};
+use super::notices::{notify, prompt, show_change, show_notice};
 use super::request::request_render;
 use crate::camera::{dollied, orbited, zoomed_fov};
 use crate::event::Effect;
@@ -90,7 +90,7 @@ fn report_unknown_camera(state: &mut State) -> Vec<Effect> {
 pub(super) fn handle_camera_step(state: &mut State) -> Vec<Effect> {
     drop_restored_values(state);
     let effects = render_or_delay_step(state);
-    show_notice(
+    show_change(
         state,
         if state.request.toggles.camera.has_changes() {
             messages::CAMERA_MOVED

@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use crate::event::Effect;
+use crate::messages;
 use crate::state::{Message, State};
 
 /// How long a notice is shown.
@@ -12,6 +13,13 @@ const NOTICE: Duration = Duration::from_secs(4);
 pub(crate) fn show_notice(state: &mut State, words: impl Into<String>) {
     let until = Some(state.now + NOTICE);
     set_message(state, Message { words: words.into(), until });
+}
+
+/// Shows a notice about a change made with keys. Does not offer to write the image if that would fail.
+pub(super) fn show_change(state: &mut State, words: impl Into<String>) {
+    let words = words.into();
+    let words = if state.can_write() { words } else { words.replace(messages::WRITE_HINT, "") };
+    show_notice(state, words);
 }
 
 /// Shows an error or prompt until a key is pressed.

@@ -1,6 +1,6 @@
 //! The mouse, and queries about image positions.
 
-use super::notices::{notify, prompt, show_notice};
+use super::notices::{notify, prompt, show_change, show_notice};
 use super::{camera, history, overlay, region};
 use crate::event::FilePosition;
 use crate::event::{Effect, Mouse, MouseEventKind};
@@ -171,7 +171,7 @@ fn focus_at(state: &mut State, depth: f64) -> Vec<Effect> {
     state.request.toggles.camera.focus = Some(distance);
     let effects = camera::handle_camera_step(state);
     if state.request.toggles.camera.focus.is_some() {
-        show_notice(state, messages::focus_moved(distance));
+        show_change(state, messages::focus_moved(distance));
     }
     effects
 }

@@ -2,7 +2,7 @@
 
 use crossterm::event::{KeyCode, KeyModifiers};
 
-use super::notices::show_notice;
+use super::notices::show_change;
 use super::request::request_render;
 use crate::choice::Choice;
 use crate::event::{Effect, KeyPress};
@@ -71,7 +71,7 @@ pub(super) fn choose_view(state: &mut State, view: View) -> Vec<Effect> {
         } else {
             messages::view_chosen(view.name())
         };
-        show_notice(state, words);
+        show_change(state, words);
     }
     effects
 }

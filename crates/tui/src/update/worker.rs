@@ -312,9 +312,8 @@ pub(super) fn handle_output_change(
         return Vec::new();
     };
     (written.lost, state.dirty) = (*lost, true);
-    if let Some(lost) = lost {
-        let name = visible(&path.to_string_lossy()).into_owned();
-        show_until_key(state, messages::output_changed(&name, lost.words()));
+    if let Some(words) = written.loss() {
+        show_until_key(state, words);
     }
     Vec::new()
 }

@@ -226,6 +226,9 @@ pub(crate) fn unsaved_messages(state: &State) -> Vec<String> {
     if let Some(file) = by_hand.filter(|file| file.generation == state.request.generation) {
         return vec![messages::unfinished_image(&file.name())];
     }
+    if !state.can_write() {
+        return vec![messages::NOT_SAVED_WITH_CONFLICT.to_owned()];
+    }
     let image_name = exit_summary::image_name(state);
     let other = match (saving.own, by_hand, image_name) {
         (_, Some(file), _) => Some(messages::image_with(&file.name(), &file.changes().join(", "))),
@@ -243,10 +246,7 @@ pub(crate) fn unsaved_messages(state: &State) -> Vec<String> {
 
 /// A message about each written file that another program has changed.
 pub(super) fn changed_file_messages(state: &State) -> impl Iterator<Item = String> {
-    let words = |written: &WrittenFile| {
-        written.lost.map(|lost| messages::output_changed(&written.name(), lost.words()))
-    };
-    state.saving.written.iter().filter_map(words)
+    state.saving.written.iter().filter_map(WrittenFile::loss)
 }
 
 /// Time between saving the file and drawing the first changed cell.
