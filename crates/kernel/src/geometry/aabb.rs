@@ -70,7 +70,7 @@ impl Aabb {
     }
 }
 
-/// Factor applied to distances to compensate for rounding in [`SlabRay::enter`].
+/// Factor applied to distances to compensate for rounding in [`SlabRay::entry_distance`].
 pub const SLAB_PAD: f32 = 1.0 + 2.0 * gamma(3);
 
 /// [`SLAB_PAD`] for slab tests that multiply it by the inverse direction, which rounds once more.

@@ -43,10 +43,10 @@ impl Mipmaps {
         self.levels.iter().map(Texels::memory_bytes).sum()
     }
 
-    /// Memory in bytes for the mip levels of an image with this size. `is_weighted` is true for images with
+    /// Memory in bytes for the mip levels of an image with this size. `has_alpha` is true for images with
     /// alpha.
-    pub fn memory_bytes_of(width: u32, height: u32, is_weighted: bool) -> u64 {
-        let texel_bytes = if is_weighted { size_of::<Vec4>() } else { size_of::<Vec3>() };
+    pub fn memory_bytes_of(width: u32, height: u32, has_alpha: bool) -> u64 {
+        let texel_bytes = if has_alpha { size_of::<Vec4>() } else { size_of::<Vec3>() };
         let (mut width, mut height, mut bytes) = (u64::from(width), u64::from(height), 0);
         while width * height > 1 {
             (width, height) = ((width / 2).max(1), (height / 2).max(1));

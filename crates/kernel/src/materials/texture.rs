@@ -286,14 +286,14 @@ impl Texture {
         row
     }
 
-    /// [`Texture::lookup_row`] for textures that have a transform.
+    /// [`Texture::lookup_packet`] for textures that have a transform.
     #[cold]
     #[inline(never)]
     fn transformed_packet(&self, moved: &UvTransform, uv: &[[f64; PACKET_SIZE]; 2]) -> Vec3x16 {
         self.repeated_packet(&moved.transform_packet(uv, self.repeat.as_dvec2()), DVec2::ONE)
     }
 
-    /// [`Texture::lookup_row`] at coordinates scaled by `repeat`.
+    /// [`Texture::lookup_packet`] at coordinates scaled by `repeat`.
     #[inline(always)]
     fn repeated_packet(&self, uv: &[[f64; PACKET_SIZE]; 2], repeat: DVec2) -> Vec3x16 {
         let (texels, size) = (&*self.texels, size(&self.texels));
@@ -515,7 +515,7 @@ impl Wrap {
         folded
     }
 
-    /// Wraps `numbers` + `more` with [`Wrap::index`].
+    /// Wraps `numbers` + `more` with [`Wrap::wrap_index`].
     #[inline(always)]
     fn index_packet(self, numbers: &[i32; PACKET_SIZE], more: i32, size: i32) -> [i32; PACKET_SIZE] {
         let mut indices = [0; PACKET_SIZE];

@@ -1,8 +1,8 @@
 //! Packet traversal with up to 16 rays. A node is visited if any ray hits its box. The arithmetic matches
-//! [`SlabRay::enter`] but uses plain arrays. All functions are inlined so that they use the caller's
+//! [`SlabRay::entry_distance`] but uses plain arrays. All functions are inlined so that they use the caller's
 //! instruction set.
 //!
-//! [`SlabRay::enter`]: crate::geometry::aabb::SlabRay::enter
+//! [`SlabRay::entry_distance`]: crate::geometry::aabb::SlabRay::entry_distance
 
 use arrayvec::ArrayVec;
 use glimt_base::reduce;

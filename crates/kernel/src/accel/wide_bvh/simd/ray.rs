@@ -180,7 +180,7 @@ impl SimdRay {
     }
 
     /// Distances at which the ray enters the eight boxes, and the mask of the boxes that it hits before
-    /// `end`. NaN distances do not affect the interval, as in `SlabRay::enter`.
+    /// `end`. NaN distances do not affect the interval, as in `SlabRay::entry_distance`.
     #[inline(always)]
     pub fn box_entries(&self, node: &WideNode, end: SimdF32x8) -> (SimdF32x8, u32) {
         let (mut near, mut far) = (end.splat_like(0.0), end);

@@ -72,7 +72,7 @@ impl<V: SimdVector> NearestHits<V> {
         taken
     }
 
-    /// [`Nearest::test_triangle`] for one ray, using the scalar test.
+    /// [`NearestHits::test_triangle`] for one ray, using the scalar test.
     #[cold]
     #[inline(never)]
     fn update_ray(&mut self, ray: usize, pack: &TrianglePack, lane: usize, rays: &[Ray]) -> u32 {

@@ -95,7 +95,7 @@ impl<V: SimdVector> SimdRayPacket<V> {
         Some(own)
     }
 
-    /// Whether any ray hits the box in a slot before its end. SIMD version of `SlabRay::enter`.
+    /// Whether any ray hits the box in a slot before its end. SIMD version of `SlabRay::entry_distance`.
     #[inline(always)]
     pub fn any_ray_hits_box(&self, node: &WideNode, slot: usize, end: V) -> bool {
         let pad = end.splat_like(SLAB_PAD);
