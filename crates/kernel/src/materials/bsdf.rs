@@ -161,7 +161,7 @@ pub trait RoughMaterial {
     /// The texture that packets look up, if any.
     fn row_texture(&self) -> Option<&Texture>;
 
-    /// Whether the material depends on [`SurfaceDirections::tangent`].
+    /// Whether the material depends on [`SurfaceDirections::tangent`](super::bxdf::SurfaceDirections::tangent).
     #[inline]
     fn has_direction(&self) -> bool {
         false

@@ -1,5 +1,5 @@
 //! The interface of non-specular BSDFs. Each one is written once, for a single point and direction; packets
-//! ([`BxdfPacket`](super::BxdfPacket)) evaluate it lane by lane, in loops that compile to vector instructions.
+//! ([`BxdfPacket`](super::bxdf_packet::BxdfPacket)) evaluate it lane by lane, in loops that compile to vector instructions.
 //! All functions must therefore be branch-free and `#[inline(always)]`, and must not call closures.
 //!
 //! A BSDF is the sum of wide lobes, which are sampled like a diffuse surface, and narrow lobes, for which
