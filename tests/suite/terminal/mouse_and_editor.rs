@@ -150,7 +150,7 @@ fn echo_is_restored_after_killed_editor() {
     let mut terminal = folder.terminal_with(&[folder.program(), "scene.toml"], &variables);
     terminal.wait_for_render(1);
     terminal.press("o");
-    terminal.wait_for("ended with");
+    terminal.wait_for("killed by");
     terminal.press("q");
     assert_eq!(terminal.end(), 0);
 }
