@@ -244,6 +244,21 @@ fn files_replaced_while_others_load_are_read_again() {
 }
 
 #[test]
+fn files_replaced_before_an_error_are_read_again() {
+    // Both scenes are valid with their own files, but the first scene's texture is removed with it.
+    let new = SCENE.replace("skin.ppm", "new.ppm");
+    let mut bench = Bench::new(SCENE);
+    std::fs::rename(bench.path("skin.ppm"), bench.path("new.ppm")).expect("renamed");
+    let replacement = (bench.path("scene.toml"), new.into_bytes());
+    let contents = bench.worker.contents();
+    contents.replacements.lock().expect("not poisoned").insert(bench.path("one.obj"), replacement);
+    bench.done();
+    // An error in unchanged files is reported.
+    std::fs::remove_file(bench.path("new.ppm")).expect("removed");
+    assert!(matches!(bench.failed(), Failure::Scene(_)));
+}
+
+#[test]
 fn each_file_is_hashed_once_per_request() {
     let textures = "[textures.skin]\nfile = \"skin.ppm\"\n";
     let twice = format!("{textures}[textures.bumps]\nfile = \"skin.ppm\"\nencoding = \"linear\"\n");
