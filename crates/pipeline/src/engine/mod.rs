@@ -410,7 +410,7 @@ impl Engine {
         for _ in 0..MAX_READS {
             let contents = Snapshot::of(Arc::clone(&self.contents));
             let result = read(self, &contents, findings);
-            if false && result.is_err() && !token.is_cancelled() {
+            if result.is_err() && !token.is_cancelled() {
                 contents.verify(token)?;
             }
             if token.is_cancelled() || contents.changed().is_none() {
@@ -689,6 +689,7 @@ impl Engine {
             add_declared(loaded, &mut wanted.textures);
             wanted.are_required = true;
             let texels = textures(loaded, &wanted, &mut engine.textures, findings, &reading)?.value;
+            verify(contents, token)?;
             glass(loaded, &found, &mut engine.bodies, findings, token)?;
             warn_about_coplanar_lights(loaded, &found, &mut engine.coplanar, findings);
             let overrides = Overrides::default();

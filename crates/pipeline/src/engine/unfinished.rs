@@ -131,7 +131,7 @@ impl Engine {
         if needed.textures.iter().all(is_there) {
             return Ok(Some(good));
         }
-        if false && good.has_changed(reading)? {
+        if good.has_changed(reading)? {
             return Ok(None);
         }
         let mut findings = Findings::default();

@@ -156,7 +156,7 @@ impl Snapshot {
         let seen: Vec<_> = self.seen().iter().map(|(path, seen)| (path.clone(), *seen)).collect();
         for (path, Seen { content, stamp }) in seen {
             let Some(now) = FileStamp::of(&path) else { continue };
-            if Some(now) == stamp {
+            if Some(now) == stamp && is_settled(&now, self.begun) {
                 continue;
             }
             let now = self.contents.read(&path, token)?;
