@@ -187,9 +187,10 @@ fn checked_files_have_one_version() {
         let at = |name: &str| fixture.folder.path().join(name);
         let scene = at("scene.toml");
         fs::write(&scene, SCENE).expect("written");
-        // The scene is replaced while a mesh is read. If the texture has moved, the first scene is invalid.
+        // The scene is replaced while its mesh is read. If the texture has moved, the old one is invalid.
         if is_moved {
             fs::rename(at("skin.ppm"), at("new.ppm")).expect("renamed");
+            fs::write(at("skin.ppm"), "P6\n").expect("written");
         }
         let replacement = (scene.clone(), renamed.clone().into_bytes());
         fixture.engine.contents.replacements.lock().expect("not poisoned").insert(at("one.obj"), replacement);

@@ -245,16 +245,17 @@ fn files_replaced_while_others_load_are_read_again() {
 
 #[test]
 fn files_replaced_before_an_error_are_read_again() {
-    // Both scenes are valid with their own files, but the first scene's texture is removed with it.
+    // The scene is replaced while its mesh is read. Its old texture is no longer valid.
     let new = SCENE.replace("skin.ppm", "new.ppm");
     let mut bench = Bench::new(SCENE);
     std::fs::rename(bench.path("skin.ppm"), bench.path("new.ppm")).expect("renamed");
+    bench.write("skin.ppm", "P6\n");
     let replacement = (bench.path("scene.toml"), new.into_bytes());
     let contents = bench.worker.contents();
     contents.replacements.lock().expect("not poisoned").insert(bench.path("one.obj"), replacement);
     bench.done();
     // An error in unchanged files is reported.
-    std::fs::remove_file(bench.path("new.ppm")).expect("removed");
+    bench.write("new.ppm", "P6\n");
     assert!(matches!(bench.failed(), Failure::Scene(_)));
 }
 
