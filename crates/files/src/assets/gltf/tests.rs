@@ -628,11 +628,11 @@ fn listing_references_reads_only_the_json() {
     json["buffers"][0]["byteLength"] = serde_json::json!(-1);
     json["images"][1]["uri"] = serde_json::Value::Null;
     assert_eq!(files("c.gltf", json.to_string().as_bytes()), expected);
-    assert_eq!(files("d.gltf", b"{"), [PathBuf::new(); 0]);
+    assert_eq!(files("d.gltf", b"{"), Vec::<PathBuf>::new());
     let none = folder.0.path().join("none.glb");
     assert_eq!(
         super::referenced_files(&none, &CancelToken::new()).expect("not cancelled"),
-        [PathBuf::new(); 0]
+        Vec::<PathBuf>::new()
     );
     let token = CancelToken::new();
     token.cancel();
