@@ -112,10 +112,10 @@ fn kill_while_it_writes(times: u32) {
     let mut next = random(5);
     let line = "room.toml --once --progress none -o out.exr --checkpoint 0.000001 --samples 100000 --resume";
     for round in 0..times {
-        let child = begin(&dir, line);
-        // On a busy machine, the first checkpoint may take longer than the time until the kill.
-        while round == 0 && !dir.path("out.exr.checkpoint").exists() {
-            std::thread::sleep(Duration::from_millis(1));
+        let mut child = begin(&dir, line);
+        if round == 0 {
+            // On a busy machine, the first checkpoint may take longer than the time until the kill.
+            dir.await_file("out.exr.checkpoint", &mut child);
         }
         std::thread::sleep(Duration::from_secs_f64(0.02 + 0.1 * next()));
         end(child, Signal::SIGKILL);
@@ -320,16 +320,6 @@ fn checkpoints_are_used_only_with_resume() {
     assert!(!dir.path("other.exr.checkpoint").exists(), "0 must disable checkpoints");
 }
 
-/// Waits until a file exists.
-#[track_caller]
-fn await_file(dir: &TestDir, name: &str) {
-    let deadline = Instant::now() + Duration::from_secs(60);
-    while !dir.path(name).exists() {
-        assert!(Instant::now() < deadline, "{name} was not written");
-        std::thread::sleep(Duration::from_millis(5));
-    }
-}
-
 #[test]
 fn running_process_keeps_its_checkpoint() {
     let dir = room_dir();
@@ -338,8 +328,8 @@ fn running_process_keeps_its_checkpoint() {
         let said = self::said(&dir, "room.toml --once -o out.exr --seed 9 --resume", 2);
         assert_mentions(&said, &["seed", &seed.to_string(), "9"]);
     };
-    let first = begin(&dir, &format!("{line} --seed 1"));
-    await_file(&dir, "out.exr.checkpoint");
+    let mut first = begin(&dir, &format!("{line} --seed 1"));
+    dir.await_file("out.exr.checkpoint", &mut first);
     // A second process that renders to the same file, even with the same settings, writes no checkpoint and
     // reports this once.
     for options in ["--seed 2", "--seed 1 --resume"] {
@@ -361,9 +351,9 @@ fn running_process_keeps_its_checkpoint() {
     assert!(!dir.path("out.exr.checkpoint.before").exists());
     // After the process has ended, its checkpoint can be replaced.
     end(first, Signal::SIGKILL);
-    let child = begin(&dir, &format!("{line} --seed 2"));
-    await_file(&dir, "out.exr.checkpoint.before");
-    await_file(&dir, "out.exr.checkpoint");
+    let mut child = begin(&dir, &format!("{line} --seed 2"));
+    dir.await_file("out.exr.checkpoint.before", &mut child);
+    dir.await_file("out.exr.checkpoint", &mut child);
     end(child, Signal::SIGTERM);
     seed_is(2);
 }
@@ -428,8 +418,8 @@ fn newer_checkpoint_is_moved_not_replaced() {
     let mut newer = dir.bytes("out.exr.checkpoint");
     newer[12] = 2;
     dir.write("out.exr.checkpoint", &newer);
-    let child = begin(&dir, "room.toml --once -o out.exr --samples 1000000 --checkpoint 0.05");
-    await_file(&dir, "out.exr.checkpoint.before");
+    let mut child = begin(&dir, "room.toml --once -o out.exr --samples 1000000 --checkpoint 0.05");
+    dir.await_file("out.exr.checkpoint.before", &mut child);
     end(child, Signal::SIGKILL);
     assert!(dir.bytes("out.exr.checkpoint.before") == newer);
 }

@@ -444,11 +444,9 @@ fn signal_interrupts_a_blocked_report() {
     while writer.write(&[0; 4096]).is_ok() {}
     fcntl(&writer, FcntlArg::F_SETFL(OFlag::empty())).expect("set");
     let mut command = dir.glimt("ball.toml --once --report - --progress none");
-    let child = command.stdout(writer).stderr(Stdio::piped()).spawn().expect("it runs");
+    let mut child = command.stdout(writer).stderr(Stdio::piped()).spawn().expect("it runs");
     // The image is written before the report.
-    while !dir.path("ball.png").exists() {
-        std::thread::yield_now();
-    }
+    dir.await_file("ball.png", &mut child);
     kill(Pid::from_raw(child.id() as i32), Signal::SIGINT).expect("it runs");
     let output = child.wait_with_output().expect("it ends");
     drop(reader);

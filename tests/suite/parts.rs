@@ -301,6 +301,68 @@ fn merge_never_replaces_an_unread_input() {
     assert!(inputs.map(|name| dir.bytes(name)) == before);
 }
 
+/// Files referenced only by an option, and the files of a mesh that does not parse.
+#[test]
+fn merge_never_replaces_an_unread_input_of_an_option() {
+    let dir = room_dir();
+    fs::create_dir_all(dir.path("shared")).expect("a folder");
+    let image = "P3 1 1 255 9 9 9\n";
+    for name in ["other.ppm", "shared/far.ppm"] {
+        dir.write(name, image);
+    }
+    dir.write(
+        "room.toml",
+        ROOM.replace("[textures.tiles]", "[textures.u]\nfile = \"tiles.ppm\"\n[textures.tiles]"),
+    );
+    for (file, out) in [("other.ppm", "other.ppm"), ("shared/../shared/far.ppm", "shared/far.ppm")] {
+        parts(&dir, 2, &format!("--view depth --set textures.u.file=\"{file}\" --force"));
+        let said = dir.expect(&format!("merge {out} 1.part 2.part --progress none"), 2);
+        assert_mentions(&said, &[out]);
+        assert_eq!(dir.bytes(out), image.as_bytes());
+        dir.expect("merge free.ppm 1.part 2.part --progress none", 0);
+    }
+}
+
+#[test]
+fn merge_of_moved_parts_never_replaces_an_input() {
+    let dir = room_dir();
+    for folder in ["elsewhere", "q"] {
+        fs::create_dir(dir.path(folder)).expect("a folder");
+    }
+    dir.write("new.ppm", TILES);
+    parts(&dir, 2, "--view depth");
+    for part in ["1.part", "2.part"] {
+        fs::rename(dir.path(part), dir.path("elsewhere").join(part)).expect("moved");
+    }
+    // The scene references this texture only since the parts were rendered.
+    dir.write(
+        "room.toml",
+        ROOM.replace("[textures.tiles]", "[textures.u]\nfile = \"new.ppm\"\n[textures.tiles]"),
+    );
+    for name in ["tiles.ppm", "new.ppm"] {
+        for out in [name.to_owned(), format!("q/../{name}")] {
+            let said =
+                dir.expect(&format!("merge {out} elsewhere/1.part elsewhere/2.part --progress none"), 2);
+            assert_mentions(&said, &[&out, &format!("({name})")]);
+            assert_eq!(dir.bytes(name), TILES.as_bytes());
+        }
+    }
+}
+
+#[test]
+fn merge_protects_textures_of_a_mesh_with_errors() {
+    let dir = room_dir();
+    let image = "P3 1 1 255 9 9 9\n";
+    dir.write("late.ppm", image);
+    parts(&dir, 2, "--view depth");
+    // The mesh references the texture only since the parts were rendered.
+    dir.write("step.mtl", "newmtl a\nKd one\nmap_Kd late.ppm\n");
+    dir.write("step.obj", format!("mtllib step.mtl\n{STEP}f 1 2 9\n"));
+    let said = dir.expect("merge late.ppm 1.part 2.part --progress none", 2);
+    assert_mentions(&said, &["late.ppm", "(late.ppm)"]);
+    assert_eq!(dir.bytes("late.ppm"), image.as_bytes());
+}
+
 #[test]
 fn partial_option_merges_existing_parts() {
     let dir = room_dir();

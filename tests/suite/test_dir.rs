@@ -2,7 +2,8 @@
 
 use std::fs;
 use std::path::PathBuf;
-use std::process::{Command as Process, Output, Stdio};
+use std::process::{Child, Command as Process, Output, Stdio};
+use std::time::{Duration, Instant};
 
 use nix::errno::Errno;
 
@@ -90,6 +91,22 @@ impl TestDir {
         self.expect(&format!("{line} --once --report report.json"), 0);
         let text = fs::read_to_string(self.path("report.json")).expect("a report");
         serde_json::from_str(&text).expect("JSON")
+    }
+
+    /// Waits until `child` creates a file. Fails if the child ends first.
+    #[track_caller]
+    pub(crate) fn await_file(&self, name: &str, child: &mut Child) {
+        let deadline = Instant::now() + Duration::from_secs(60);
+        while !self.path(name).exists() {
+            let ended = child.try_wait().expect("a child");
+            // The child may have created the file just before it ended.
+            assert!(ended.is_none() || self.path(name).exists(), "ended without {name}: {ended:?}");
+            if Instant::now() > deadline {
+                child.kill().expect("a running child");
+                panic!("{name} was not written");
+            }
+            std::thread::sleep(Duration::from_millis(1));
+        }
     }
 
     #[track_caller]

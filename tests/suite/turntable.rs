@@ -2,7 +2,6 @@
 
 use std::io::Cursor;
 use std::process::Stdio;
-use std::time::Duration;
 
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
@@ -180,11 +179,7 @@ fn interrupted_turntable_leaves_whole_files() {
     let dir = around();
     let line = "around.toml --once --width 64 --height 48 --samples 1000 --error 0 --turntable 5000 -o a_#.png -o a.gif";
     let mut process = dir.glimt(line).stderr(Stdio::piped()).spawn().expect("it runs");
-    let begin = std::time::Instant::now();
-    while !dir.path("a_2.png").exists() {
-        assert!(begin.elapsed() < Duration::from_secs(60), "no second picture");
-        std::thread::sleep(Duration::from_millis(10));
-    }
+    dir.await_file("a_2.png", &mut process);
     kill(Pid::from_raw(process.id() as i32), Signal::SIGTERM).expect("it runs");
     assert_eq!(process.wait().expect("it ends").code(), Some(143));
     let names: Vec<String> = std::fs::read_dir(dir.path("."))
@@ -201,12 +196,8 @@ fn changed_scene_ends_the_turntable() {
     let dir = around();
     let line =
         "around.toml --once --width 64 --height 48 --samples 200 --error 0 --turntable 5000 -o a_#.png";
-    let process = dir.glimt(line).stderr(Stdio::piped()).spawn().expect("it runs");
-    let begin = std::time::Instant::now();
-    while !dir.path("a_1.png").exists() {
-        assert!(begin.elapsed() < Duration::from_secs(60), "no picture");
-        std::thread::sleep(Duration::from_millis(10));
-    }
+    let mut process = dir.glimt(line).stderr(Stdio::piped()).spawn().expect("it runs");
+    dir.await_file("a_1.png", &mut process);
     let text = std::fs::read_to_string(dir.path("around.toml")).expect("a scene");
     dir.write("around.toml", text.replace("radius = 0.8", "radius = 0.7"));
     let output = process.wait_with_output().expect("it ends");

@@ -128,7 +128,7 @@ fn key(content: &str, part: Option<u32>) -> Key {
 }
 
 /// Returns the path relative to the scene's folder, or just the file name if it is outside that folder.
-fn relative_path(path: &Path, scene: &Path) -> String {
+pub(super) fn relative_path(path: &Path, scene: &Path) -> String {
     let folder = scene.parent().unwrap_or(Path::new(""));
     let inside = path.strip_prefix(folder).ok().map(Path::to_owned);
     let name = || path.file_name().map(PathBuf::from).unwrap_or_default();

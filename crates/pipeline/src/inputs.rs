@@ -1,10 +1,11 @@
 //! The files that a scene reads or references. Every write is checked against this list.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeSet, HashMap, HashSet};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use super::identity::relative_path;
 use super::stages::meshes::Meshes;
 use super::stages::parse::Parsed;
 use super::watch::content::FileRead;
@@ -92,6 +93,13 @@ impl Inputs {
     pub(super) fn add(&mut self, others: Self) {
         let known: HashSet<PathBuf> = self.0.iter().map(|input| input.path.clone()).collect();
         self.0.extend(others.0.into_iter().filter(|other| !known.contains(&other.path)));
+    }
+
+    /// Paths of the files relative to the scene's folder, sorted. Excludes the scene.
+    pub(super) fn relative_paths(&self, scene: &Path) -> Vec<String> {
+        let others = self.0.iter().filter(|input| input.path != scene);
+        let paths: BTreeSet<_> = others.map(|input| relative_path(&input.path, scene)).collect();
+        paths.into_iter().collect()
     }
 
     /// Indexes the files by their current state on disk.

@@ -51,6 +51,6 @@ use glimt_trace::{integrators, world};
 pub use build::BUILD;
 pub use check::{IncrementalChecker, SceneSummary, check, estimate_memory};
 pub use model::import::{ImportError, Imported, import};
-pub use stages::parse::scene_inputs;
+pub use stages::parse::companion_files;
 pub use watch::content::{Content, FileRead};
 pub use worker::{CommandSender, Handle, start};

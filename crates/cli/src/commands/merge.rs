@@ -1,6 +1,7 @@
 //! `glimt merge`: merges parts into an image.
 
-use std::collections::BTreeSet;
+mod inputs;
+
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
@@ -9,9 +10,10 @@ use indicatif::ProgressBar;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use serde_json::json;
 
+use self::inputs::{MergeInputs, scene_paths};
 use crate::args::{MergeArgs, Progress};
 use crate::console::{Console, answer_columns};
-use crate::control::CancelToken;
+use crate::control::{CancelToken, Cancelled};
 use crate::exit::Exit;
 use crate::film::Film;
 use crate::film::tone::develop;
@@ -21,7 +23,6 @@ use crate::output::write::{WritePolicy, atomic_guarded};
 use crate::output::{
     self, AttributeLossPolicy, DevelopSettings, Format, OutputError, is_same_file, scene_path,
 };
-use crate::pipeline::scene_inputs;
 use crate::progress::{bar_style, json_line};
 use crate::scene::sanitize::{shortened, visible};
 use crate::signals;
@@ -69,12 +70,13 @@ impl MergeCommand<'_> {
     fn try_run(&self) -> Result<Exit, Exit> {
         let format = self.check_output()?;
         let parts = if self.args.watch { self.wait_for_parts()? } else { self.open_parts()? };
-        self.check_inputs(&parts)?;
+        let inputs = MergeInputs::new(&parts, &self.args.out, self.token);
+        self.check_inputs(&inputs)?;
         let merged = self.merge_parts(&parts, self.args.partial, "merge")?;
         let Some(finish) = parts.first().and_then(|part| part.head.picture.finish()) else {
             return Err(self.console.fail(Exit::WRONG, "the parts contain no output settings"));
         };
-        self.write(format, finish, &merged, &parts)?;
+        self.write(format, finish, &merged, (&parts, &inputs))?;
         self.report_missing_parts(&merged);
         Ok(Exit::DONE)
     }
@@ -98,38 +100,18 @@ impl MergeCommand<'_> {
     }
 
     /// Checks that the output does not replace an input of the render.
-    fn check_inputs(&self, parts: &[PartFile]) -> Result<(), Exit> {
-        match self.refused_input(parts, &self.args.out) {
-            Some(message) => Err(self.console.fail(Exit::WRONG, &message)),
-            None => Ok(()),
+    fn check_inputs(&self, inputs: &MergeInputs<'_>) -> Result<(), Exit> {
+        match self.refused_input(inputs, &self.args.out) {
+            Ok(None) => Ok(()),
+            Ok(Some(message)) => Err(self.console.fail(Exit::WRONG, &message)),
+            Err(Cancelled) => Err(Exit::FAILED),
         }
     }
 
     /// An error message if the file at `path` is an input of the parts or of their scene.
-    fn refused_input(&self, parts: &[PartFile], path: &Path) -> Option<String> {
-        let by_content = || {
-            let name = part::input_with_content(parts, path)?;
-            Some(format!("the parts were rendered from it ({name})"))
-        };
-        let by_name = || {
-            let name = part::input_with_name(parts, path)?;
-            Some(format!("the parts were rendered from a file with this name ({name})"))
-        };
-        let by_scene = || {
-            let input = self.current_input(parts, path)?;
-            let input = input.strip_prefix(".").unwrap_or(&input);
-            Some(format!("the scene of the parts references it ({})", visible(&input.to_string_lossy())))
-        };
-        let why = by_content().or_else(by_name).or_else(by_scene)?;
-        Some(format!("cannot write {}: {why}; choose another output", self.args.out.display()))
-    }
-
-    /// Finds the input of the parts' scene that is the file at `path`. The parts do not list all inputs, because a
-    /// render does not read textures that are not visible in its view.
-    fn current_input(&self, parts: &[PartFile], path: &Path) -> Option<PathBuf> {
-        let scenes: BTreeSet<PathBuf> = parts.iter().filter_map(scene_of_part).collect();
-        let inputs = |scene: &PathBuf| self.pool.install(|| scene_inputs(scene));
-        scenes.iter().flat_map(inputs).find(|input| is_same_file(input, path))
+    fn refused_input(&self, inputs: &MergeInputs<'_>, path: &Path) -> Result<Option<String>, Cancelled> {
+        let why = inputs.reason_to_keep(path)?;
+        Ok(why.map(|why| format!("cannot write {}: {why}; choose another output", self.args.out.display())))
     }
 
     /// Opens all parts and reports every invalid one.
@@ -312,7 +294,7 @@ impl MergeCommand<'_> {
         format: Format,
         mut finish: DevelopSettings,
         merged: &MergedParts,
-        parts: &[PartFile],
+        (parts, inputs): (&[PartFile], &MergeInputs<'_>),
     ) -> Result<(), Exit> {
         let (out, token) = (&self.args.out, self.token);
         record_scene_path(&mut finish, parts, out);
@@ -321,7 +303,7 @@ impl MergeCommand<'_> {
             let is_given = self.args.parts.iter().any(|part| is_same_file(part, real));
             let is_part = is_given || part::is_part(real);
             let why = is_part.then(|| format!("cannot write {}: it is a part", out.display()));
-            let why = why.or_else(|| self.refused_input(parts, real));
+            let why = why.map_or_else(|| self.refused_input(inputs, real), |why| Ok(Some(why)))?;
             why.map_or(Ok(()), |reason| Err(OutputError::Refused { reason }))
         };
         let is_kept = |path: &Path| self.args.parts.iter().any(|part| is_same_file(part, path));
@@ -353,20 +335,12 @@ impl MergeCommand<'_> {
     }
 }
 
-/// Records the scene's path relative to the output, as a single render does. Looks for the scene relative to
-/// each part, then next to the output.
+/// Records the scene's path relative to the output, as a single render does.
 fn record_scene_path(finish: &mut DevelopSettings, parts: &[PartFile], out: &Path) {
     let Some((_, scene)) = finish.metadata.iter_mut().find(|(name, _)| name == "glimt:scene") else { return };
-    let named = parts.iter().filter_map(scene_of_part);
-    let found = named.chain([out.with_file_name(scene.as_str())]).find(|path| path.is_file());
-    if let Some(path) = found {
+    if let Some(path) = scene_paths(parts, out).find(|path| path.is_file()) {
         *scene = scene_path::relative(&path, out);
     }
-}
-
-/// Path of the scene that a part was rendered from. `None` if the part does not name it.
-fn scene_of_part(part: &PartFile) -> Option<PathBuf> {
-    (!part.head.scene.is_empty()).then(|| part.path.with_file_name(&part.head.scene))
 }
 
 /// A part that is not yet complete.

@@ -84,14 +84,6 @@ pub(crate) fn text_or_binary(path: &Path, limit: u64, monitor: Monitor<'_>) -> R
     })
 }
 
-/// Reads at most `limit` bytes from the start of a regular file.
-pub(crate) fn start(path: &Path, limit: u64) -> Result<Vec<u8>, AssetError> {
-    let (file, _) = open(path, u64::MAX)?;
-    let mut bytes = Vec::new();
-    let read = file.take(limit).read_to_end(&mut bytes);
-    read.map(|_| bytes).map_err(|error| AssetError::unreadable(path, describe_error(&error)))
-}
-
 /// Reads a text or binary file. Rejects files that start with [`START`] zeros.
 pub(crate) fn not_all_zero(path: &Path, limit: u64, monitor: Monitor<'_>) -> Result<Vec<u8>, AssetError> {
     read_accepted(path, limit, monitor, |start| {

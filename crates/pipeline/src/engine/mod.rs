@@ -389,8 +389,7 @@ impl Engine {
         Ok(photons_key)
     }
 
-    /// Runs [`Self::prepare`]. If a file changes in the meantime, runs it again, so that an image never mixes
-    /// two versions of a file.
+    /// Runs [`Self::prepare`] with one version of all files.
     fn prepare_consistent(
         &mut self,
         request: &Request,
@@ -398,17 +397,33 @@ impl Engine {
         token: &CancelToken,
         findings: &mut Findings,
     ) -> Result<Ready, Stop> {
+        self.read_consistently(token, findings, |engine, contents, findings| {
+            table.stages.clear();
+            engine.prepare(request, table, (contents, token), findings)
+        })
+    }
+
+    /// Calls `read`. If a file changes in the meantime, calls it again, so that neither an image nor an error
+    /// results from a mix of two versions of the files. `read` must verify the files that it loads.
+    fn read_consistently<T>(
+        &mut self,
+        token: &CancelToken,
+        findings: &mut Findings,
+        mut read: impl FnMut(&mut Self, &Snapshot, &mut Findings) -> Result<T, Stop>,
+    ) -> Result<T, Stop> {
         for _ in 0..MAX_READS {
-            let snapshot = Snapshot::of(Arc::clone(&self.contents));
-            let ready = self.prepare(request, table, (&snapshot, token), findings);
-            if token.is_cancelled() || snapshot.changed().is_none() {
-                return ready;
+            let contents = Snapshot::of(Arc::clone(&self.contents));
+            let result = read(self, &contents, findings);
+            if result.is_err() && !token.is_cancelled() {
+                contents.verify(token)?;
+            }
+            if token.is_cancelled() || contents.changed().is_none() {
+                return result;
             }
             findings.reset();
-            table.stages.clear();
         }
         Err(Stop::work(
-            "the scene's files keep changing while they are being read; render again once they are complete",
+            "the scene's files keep changing while they are being read; try again once they are complete",
         ))
     }
 
@@ -464,17 +479,13 @@ impl Engine {
         // Include textures needed only for the scene's own image, because its film key depends on them.
         let lookups = needed_textures(&plan, own_image_plan.as_ref());
         let (meshes, bodies, textures, needed) = self.load(&parsed, lookups, findings, table, &reading)?;
-        contents.verify(token)?;
-        if let Some(path) = contents.changed() {
-            return Err(Stop::work(format!("{} changed while it was being read", path.display())));
-        }
+        verify(contents, token)?;
         let estimate = MemoryEstimate::of_scene(&plan, &plan.scene, &meshes, textures.memory_bytes);
         self.check_memory(&estimate, request, (&plan, own_image_plan.as_ref()))?;
         self.inputs = collect_inputs(&parsed, &meshes, findings);
         self.check_conflicts(request, &plan, findings, table.sink)?;
-        let generation = request.generation;
-        let good =
-            LastValidScene { generation, parsed, meshes, bodies, textures: Arc::new(textures), needed };
+        let (generation, textures, files) = (request.generation, Arc::new(textures), findings.files.clone());
+        let good = LastValidScene { generation, parsed, meshes, bodies, textures, needed, files };
         let ready = self.build(request, &good, (plan, own_image_plan), table, &reading)?;
         self.note_saves(request.saves);
         self.good = Some(good);
@@ -670,33 +681,32 @@ impl Engine {
         token: &CancelToken,
     ) -> Result<(Arc<Parsed>, Meshes, Textures, Vec<Diagnostic>), Failure> {
         let mut findings = Findings::default();
-        let mut all = || {
-            let contents = &Snapshot::of(Arc::clone(&self.contents));
+        let all = self.read_consistently(token, &mut findings, |engine, contents, findings| {
             let containers = Containers::default();
             let origin = SceneSource { path, sets, show: ModelView::default() };
-            let pool = self.thread_pool(core_count())?;
-            let read = || parse(origin, (contents, &containers), &mut self.parsed, &mut findings, token);
+            let pool = engine.thread_pool(core_count())?;
+            let read = || parse(origin, (contents, &containers), &mut engine.parsed, findings, token);
             let parsed = pool.install(read)?.value;
             let reading = FileReadContext { sink, token, contents, pool: &pool, containers: &containers };
             let loaded = &parsed.loaded;
-            let found = meshes(loaded, &mut self.meshes, &mut findings, &reading)?.value;
-            let mut wanted = needed(loaded, &found, TextureNeeds::ALL, &self.textures);
+            let found = meshes(loaded, &mut engine.meshes, findings, &reading)?.value;
+            let mut wanted = needed(loaded, &found, TextureNeeds::ALL, &engine.textures);
             add_declared(loaded, &mut wanted.textures);
             wanted.are_required = true;
-            let texels = textures(loaded, &wanted, &mut self.textures, &mut findings, &reading)?.value;
-            glass(loaded, &found, &mut self.bodies, &mut findings, token)?;
-            warn_about_coplanar_lights(loaded, &found, &mut self.coplanar, &mut findings);
+            let texels = textures(loaded, &wanted, &mut engine.textures, findings, &reading)?.value;
+            verify(contents, token)?;
+            glass(loaded, &found, &mut engine.bodies, findings, token)?;
+            warn_about_coplanar_lights(loaded, &found, &mut engine.coplanar, findings);
             let overrides = Overrides::default();
             let plan = plan(&loaded.scene, path, &overrides)
                 .map_err(|error| Stop::Failed(Failure::Scene(vec![*error])))?;
             findings.warnings.extend(settings_warnings(loaded, &plan.scene, &plan.settings, &overrides));
             if plan.named_by == OutputNameSource::Scene {
-                let inputs = collect_inputs(&parsed, &found, &findings);
+                let inputs = collect_inputs(&parsed, &found, findings);
                 findings.errors.extend(conflicts(&plan, &inputs));
             }
             Ok((parsed, found, texels))
-        };
-        let all = all();
+        });
         self.end_request(all.is_ok());
         match all {
             Ok((parsed, found, texels)) if findings.errors.is_empty() => {
@@ -707,6 +717,17 @@ impl Engine {
             Err(Stop::Cancelled) => Err(Failure::Work("cancelled".to_owned())),
         }
     }
+}
+
+/// Checks that no file has changed since the request first saw it.
+///
+/// # Errors
+/// A file has changed, or the token is cancelled.
+fn verify(contents: &Snapshot, token: &CancelToken) -> Result<(), Stop> {
+    contents.verify(token)?;
+    let changed =
+        contents.changed().map(|path| format!("{} changed while it was being read", path.display()));
+    changed.map_or(Ok(()), |message| Err(Stop::work(message)))
 }
 
 /// Creates a tracer for a scene, without photons.

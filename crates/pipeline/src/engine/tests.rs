@@ -178,3 +178,27 @@ fn error_mentions_the_renamed_scene() {
     let other = help(fixture.send_unsaved());
     assert!(!is_same_text(&other), "{other}");
 }
+
+#[test]
+fn checked_files_have_one_version() {
+    for (renamed, is_moved) in
+        [(SCENE.replace("radius = 0.5", "radius = 0.6"), false), (SCENE.replace("skin.ppm", "new.ppm"), true)]
+    {
+        let mut fixture = EngineFixture::new(SCENE);
+        let at = |name: &str| fixture.folder.path().join(name);
+        let scene = at("scene.toml");
+        fs::write(&scene, SCENE).expect("written");
+        // The scene is replaced while its mesh is read. If the texture has moved, the old one is invalid.
+        if is_moved {
+            fs::rename(at("skin.ppm"), at("new.ppm")).expect("renamed");
+            fs::write(at("skin.ppm"), "P6\n").expect("written");
+        }
+        let replacement = (scene.clone(), renamed.clone().into_bytes());
+        fixture.engine.contents.replacements.lock().expect("not poisoned").insert(at("one.obj"), replacement);
+        let events = mpsc::channel().0;
+        let sink = Sink { generation: 1, events, previews: PreviewSlot::default(), within: None };
+        let read = fixture.engine.read_all(&scene, &[], &sink, &CancelToken::new());
+        let (parsed, ..) = read.expect("a valid scene");
+        assert_eq!(parsed.loaded.source.text(), renamed);
+    }
+}

@@ -1,10 +1,12 @@
 //! Renders the last valid scene while the scene file is broken.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::outputs::remove_outdated_report;
 use super::own::{needed_textures, own_image_plan};
 use super::{Engine, RequestContext};
+use crate::control::Cancelled;
 use crate::memory::MemoryEstimate;
 use crate::plan::plan;
 use crate::protocol::{Event, LastValidSceneOutcome, Request, Status};
@@ -15,7 +17,7 @@ use crate::stages::parse::Parsed;
 use crate::stages::textures::{NeededTextures, Textures, needed, textures};
 use crate::stages::{FileReadContext, Findings, Stop};
 use crate::table::StageTable;
-use crate::watch::content::Snapshot;
+use crate::watch::content::{FileRead, Snapshot};
 use crate::world::{GlassSolids, TextureNeeds};
 
 /// A valid scene and all files needed for its image.
@@ -29,6 +31,23 @@ pub(super) struct LastValidScene {
     pub(super) textures: Arc<Textures>,
     /// Textures that were needed when `textures` was loaded.
     pub(super) needed: NeededTextures,
+    /// All files that were read for the scene, with their contents.
+    pub(super) files: Vec<FileRead>,
+}
+
+impl LastValidScene {
+    /// Whether a file other than the scene file has changed since it was read.
+    fn has_changed(&self, reading: &FileReadContext<'_>) -> Result<bool, Cancelled> {
+        let loaded = &self.parsed.loaded;
+        let is_mesh = |path: &PathBuf| loaded.scene.mesh_files.iter().any(|file| file.value == *path);
+        for FileRead { path, content } in &self.files {
+            let is_scene_file = *path == loaded.path && !is_mesh(path);
+            if !is_scene_file && reading.contents.read(path, reading.token)? != *content {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
 }
 
 impl Engine {
@@ -52,7 +71,7 @@ impl Engine {
     }
 
     /// Renders and writes the last valid scene. Returns whether the existing image and files were reused, or
-    /// `None` if there is no valid scene.
+    /// `None` if there is no valid scene or its files have changed.
     fn render_last_valid_scene(
         &mut self,
         newest: &Request,
@@ -74,7 +93,7 @@ impl Engine {
         let reading =
             FileReadContext { sink, token, contents: &snapshot, pool: &pool, containers: &containers };
         let lookups = needed_textures(&plan, own.as_ref());
-        let good = self.load_missing_textures(good, lookups, &reading)?;
+        let Some(good) = self.load_missing_textures(good, lookups, &reading)? else { return Ok(None) };
         let (meshes, texture_bytes) = (&good.meshes, good.textures.memory_bytes);
         let estimate = MemoryEstimate::of_scene(&plan, &plan.scene, meshes, texture_bytes);
         self.check_memory(&estimate, &request, (&plan, own.as_ref()))?;
@@ -98,24 +117,33 @@ impl Engine {
         Ok(Some(rendered.status == Status::Reused && !is_written_now))
     }
 
-    /// Loads any additional textures that this view needs.
+    /// Loads any additional textures that this view needs. `None` if the scene's files have changed: they may no
+    /// longer match the files in memory.
     fn load_missing_textures(
         &mut self,
         good: LastValidScene,
         lookups: TextureNeeds,
         reading: &FileReadContext<'_>,
-    ) -> Result<LastValidScene, Stop> {
+    ) -> Result<Option<LastValidScene>, Stop> {
         let loaded = &good.parsed.loaded;
         let needed = needed(loaded, &good.meshes, lookups, &self.textures);
         let is_there = |one| good.needed.textures.contains(one);
         if needed.textures.iter().all(is_there) {
-            return Ok(good);
+            return Ok(Some(good));
+        }
+        if good.has_changed(reading)? {
+            return Ok(None);
         }
         let mut findings = Findings::default();
         let found = textures(loaded, &needed, &mut self.textures, &mut findings, reading)?;
+        reading.contents.verify(reading.token)?;
+        if reading.contents.changed().is_some() {
+            return Ok(None);
+        }
         // A texture is missing if its file has since become invalid.
-        let good = LastValidScene { textures: Arc::new(found.value), needed, ..good };
+        let files = [good.files, findings.files].concat();
+        let good = LastValidScene { textures: Arc::new(found.value), needed, files, ..good };
         self.good = Some(good.clone());
-        Ok(good)
+        Ok(Some(good))
     }
 }

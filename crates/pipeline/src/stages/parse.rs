@@ -11,10 +11,10 @@ use super::super::watch::content::{Content, FileRead, Snapshot};
 use super::containers::Containers;
 use super::{Findings, StageResult, Stop};
 use crate::assets::gltf::{self, is_gltf};
-use crate::assets::mesh::load as load_mesh;
+use crate::assets::mesh;
 use crate::assets::orbiter::load as load_orbiter;
 use crate::assets::{AssetError, OrbiterCamera};
-use crate::control::{CancelToken, Cancelled, ignore_progress};
+use crate::control::{CancelToken, Cancelled};
 use crate::output::held::{self, BackupRecovery};
 use crate::scene;
 use crate::scene::description::Camera;
@@ -145,7 +145,7 @@ pub(crate) fn parse(
     if let Some(parsed) = known.filter(|parsed| parsed.orbiter_content == orbiter_content) {
         return Ok(StageResult::reused(parsed, reasons::UNCHANGED));
     }
-    let named = referenced_files(&loaded);
+    let named = referenced_files(&loaded, token)?;
     let parsed = Arc::new(Parsed { loaded, orbiter, named, companions, notes, orbiter_content });
     // Do not cache a scene whose orbiter file could not be read, so that the next request tries again.
     if parsed.orbiter.is_some() == orbiter_content.is_some() {
@@ -213,36 +213,30 @@ fn with_new_name_hint(
 
 /// Returns the files that the scene references without the overrides. Includes files referenced by meshes
 /// that have not been read.
-fn referenced_files(loaded: &scene::LoadedScene) -> Vec<PathBuf> {
+fn referenced_files(loaded: &scene::LoadedScene, token: &CancelToken) -> Result<Vec<PathBuf>, Cancelled> {
     let is_read = |path: &&PathBuf| loaded.scene.mesh_files.iter().any(|file| file.value == **path);
     let textures: BTreeSet<_> = loaded.scene.textures.iter().map(|texture| &texture.file.value).collect();
     let named = loaded.named.iter().filter(|path| !is_read(path));
     let textures = textures.into_iter().filter(|path| is_gltf(path) && !is_read(path));
-    let referenced: Vec<_> = named.chain(textures).flat_map(|path| companion_files(path)).collect();
-    loaded.named.iter().cloned().chain(referenced).collect()
+    let referenced = companion_files(named.chain(textures), token)?;
+    Ok(loaded.named.iter().cloned().chain(referenced).collect())
 }
 
-/// The files that a mesh or glTF file references. Empty for other files and unreadable ones.
-fn companion_files(path: &Path) -> Vec<PathBuf> {
-    if is_gltf(path) {
-        return gltf::referenced_files(path).unwrap_or_default();
+/// Lists the files that mesh and glTF files reference, without loading the files. Ignores other files, and
+/// errors in the files.
+///
+/// # Errors
+/// Returns [`Cancelled`] if the token is cancelled.
+pub fn companion_files<'a>(
+    files: impl Iterator<Item = &'a PathBuf>,
+    token: &CancelToken,
+) -> Result<BTreeSet<PathBuf>, Cancelled> {
+    let mut companions = BTreeSet::new();
+    for path in files.collect::<BTreeSet<_>>() {
+        let referenced = if is_gltf(path) { gltf::referenced_files } else { mesh::referenced_files };
+        companions.extend(referenced(path, token)?);
     }
-    let mesh = has_material_files(path).then(|| load_mesh(path, &ignore_progress, &CancelToken::new()));
-    let Some(Ok(mesh)) = mesh else { return Vec::new() };
-    mesh.companions.into_iter().map(|one| one.path).chain(mesh.pictures).collect()
-}
-
-/// A scene or model file and all files that it references, directly or through its meshes. Ignores errors in
-/// the files.
-pub fn scene_inputs(path: &Path) -> Vec<PathBuf> {
-    let named = scene::named_files(path);
-    let referenced: Vec<_> =
-        [path.to_owned()].iter().chain(&named).flat_map(|path| companion_files(path)).collect();
-    [path.to_owned()].into_iter().chain(named).chain(referenced).collect()
-}
-
-fn has_material_files(path: &Path) -> bool {
-    path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("obj"))
+    Ok(companions)
 }
 
 type Orbiter = (Option<OrbiterCamera>, Option<Content>);

@@ -328,7 +328,9 @@ fn write_part(
 ) -> Result<u64, OutputError> {
     let identity = state.identity.clone().unwrap_or_default();
     let scene = scene_path::relative(&plan.path, path);
-    let head = Head { scene, ..create_header(PartKind::Part, state, identity, &develop_settings(plan)) };
+    let references = inputs.relative_paths(&plan.path);
+    let head = create_header(PartKind::Part, state, identity, &develop_settings(plan));
+    let head = Head { scene, references, ..head };
     let save = |guard: &WritePolicy<'_>| {
         part::save(path, &head, &state.film, &Value::Null, guard, (token, Durability::Power)).map(drop)
     };

@@ -258,6 +258,37 @@ fn last_valid_scene_applies_new_overrides() {
     }
 }
 
+#[test]
+fn last_valid_scene_never_mixes_file_versions() {
+    for is_changed in [false, true] {
+        let mut bench = Bench::new(SCENE);
+        bench.writing = WriteMode::Try;
+        // This view needs no textures.
+        bench.overrides.view = Some(View::Depth);
+        bench.done();
+        let depth = bench.picture();
+        bench.edit("width = 40", "width = = 40");
+        if is_changed {
+            bench.write("one.obj", &OBJ.replace("v 1 0 0", "v 2 0 0"));
+        }
+        bench.write("skin.ppm", "P6\n1 1\n255\nxyz");
+        bench.overrides.view = None;
+        assert!(matches!(bench.failed(), Failure::Scene(_)));
+        let end = loop {
+            if let Event::LastGoodEnded { end, .. } = bench.next() {
+                break end;
+            }
+        };
+        if is_changed {
+            assert_eq!(end, LastValidSceneOutcome::Stopped);
+            assert_eq!(bench.picture(), depth);
+        } else {
+            let expected = picture_by(SCENE, |bench| bench.write("skin.ppm", "P6\n1 1\n255\nxyz"));
+            assert_eq!(bench.picture(), expected);
+        }
+    }
+}
+
 /// Returns a scene with enough tiles for orders to arrive during the first pass.
 fn wide() -> String {
     SCENE.replace("width = 40", "width = 640").replace("height = 30", "height = 640")

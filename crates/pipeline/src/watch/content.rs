@@ -91,13 +91,15 @@ struct Seen {
 #[derive(Debug)]
 pub(crate) struct Snapshot {
     contents: Arc<Contents>,
+    /// Time before the first read.
+    begun: SystemTime,
     seen: Mutex<HashMap<PathBuf, Seen>>,
     changed: Mutex<Option<PathBuf>>,
 }
 
 impl Snapshot {
     pub(crate) fn of(contents: Arc<Contents>) -> Self {
-        Self { contents, seen: Mutex::default(), changed: Mutex::default() }
+        Self { contents, begun: SystemTime::now(), seen: Mutex::default(), changed: Mutex::default() }
     }
 
     /// Returns a file's content as first seen by this request.
@@ -153,8 +155,8 @@ impl Snapshot {
     pub(crate) fn verify(&self, token: &CancelToken) -> Result<(), Cancelled> {
         let seen: Vec<_> = self.seen().iter().map(|(path, seen)| (path.clone(), *seen)).collect();
         for (path, Seen { content, stamp }) in seen {
-            let now = FileStamp::of(&path);
-            if now.is_none() || now == stamp {
+            let Some(now) = FileStamp::of(&path) else { continue };
+            if Some(now) == stamp && is_settled(&now, self.begun) {
                 continue;
             }
             let now = self.contents.read(&path, token)?;
@@ -382,6 +384,25 @@ mod tests {
         assert_eq!(verified(&snapshot), None);
         fs::remove_file(&current).expect("removed");
         assert_eq!(verified(&snapshot), None);
+    }
+
+    #[test]
+    fn change_within_the_stamp_resolution_is_detected() {
+        let folder = tempfile::tempdir().expect("a scratch folder");
+        let path = folder.path().join("file");
+        fs::write(&path, "new").expect("written");
+        let (old, stamp) = (*blake3::hash(b"old").as_bytes(), FileStamp::of(&path));
+        let token = CancelToken::new();
+        for is_settled in [false, true] {
+            let mut snapshot = Snapshot::of(Arc::default());
+            if is_settled {
+                snapshot.begun += Duration::from_secs(4);
+            }
+            snapshot.decoded_with_stamp(&path, old, stamp);
+            snapshot.verify(&token).expect("not cancelled");
+            // A file with a settled stamp is not read again.
+            assert_eq!(snapshot.changed(), (!is_settled).then(|| path.clone()));
+        }
     }
 
     #[test]

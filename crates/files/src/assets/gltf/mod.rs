@@ -17,6 +17,7 @@ mod materials;
 mod merge_scene;
 mod model;
 mod part;
+mod references;
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -25,7 +26,8 @@ pub use self::description::{
     AffineMap, Alpha, Glass, ModelCamera, ModelInstance, ModelLight, ModelLightKind, ModelMaterial,
     ModelScene, TextureRef, TextureWrap, TexturedValue,
 };
-use self::json::{Root, Uri};
+use self::json::{JsonImage, Root, Uri};
+pub use self::references::referenced_files;
 use super::image::{self, EmbeddedImage, ImageEncoding, ImageLimits};
 use super::read::{self, Monitor};
 use super::{AssetError, Companion, FileHash};
@@ -44,39 +46,6 @@ const BOM: &[u8] = b"\xef\xbb\xbf";
 pub fn is_gltf(path: &Path) -> bool {
     let extension = path.extension().unwrap_or_default();
     extension.eq_ignore_ascii_case("glb") || extension.eq_ignore_ascii_case("gltf")
-}
-
-/// Lists the buffer and image files referenced by a glTF file, used or not. Reads only the JSON.
-///
-/// # Errors
-/// The file cannot be read or is not glTF.
-pub fn referenced_files(path: &Path) -> Result<Vec<PathBuf>, AssetError> {
-    /// Number of bytes before the JSON in a GLB file (4.4.2): the file header and the first chunk's length
-    /// and type.
-    const BEFORE_JSON: usize = 20;
-    let header = read::start(path, BEFORE_JSON as u64)?;
-    let (before, length) = match header[..] {
-        [b'g', b'l', b'T', b'F', _, _, _, _, _, _, _, _, a, b, c, d, ..] => {
-            (BEFORE_JSON, u32::from_le_bytes([a, b, c, d]) as usize)
-        }
-        _ => (0, JSON_LIMIT),
-    };
-    let bytes = read::start(path, (before + length.min(JSON_LIMIT)) as u64)?;
-    let text = bytes.get(before..).unwrap_or_default();
-    let root: Root = serde_json::from_slice(text.strip_prefix(BOM).unwrap_or(text))
-        .map_err(|error| AssetError::malformed(path, Some(error.line()), "not a glTF file"))?;
-    let mut files = uri_paths(path, root.buffers.iter().map(|buffer| &buffer.uri));
-    files.extend(uri_paths(path, root.images.iter().map(|image| &image.uri)));
-    Ok(files)
-}
-
-/// Paths of the files referenced by URIs.
-fn uri_paths<'u>(path: &Path, uris: impl Iterator<Item = &'u Option<Uri>>) -> Vec<PathBuf> {
-    let file = |uri: &Option<Uri>| match uri {
-        Some(Uri::File(uri)) => resolve_uri(path, uri).ok(),
-        Some(Uri::Data(_)) | None => None,
-    };
-    uris.filter_map(file).collect()
 }
 
 /// An error in a glTF file: the location in the JSON and the reason.
@@ -210,7 +179,11 @@ impl GltfFile {
 
     /// Image files referenced by the glTF file, used or not.
     pub fn pictures(&self) -> Vec<PathBuf> {
-        uri_paths(&self.path, self.root.images.iter().map(|image| &image.uri))
+        let file = |image: &JsonImage| match &image.uri {
+            Some(Uri::File(uri)) => resolve_uri(&self.path, uri).ok(),
+            Some(Uri::Data(_)) | None => None,
+        };
+        self.root.images.iter().filter_map(file).collect()
     }
 
     /// Locates an image's bytes.

@@ -614,7 +614,7 @@ fn listing_references_reads_only_the_json() {
         assert!(folder.open(name, bytes).is_err());
         let path = folder.0.path().join(name);
         let folder = path.parent().expect("a folder").to_owned();
-        let files = super::referenced_files(&path).expect("glTF").into_iter();
+        let files = super::referenced_files(&path, &CancelToken::new()).expect("not cancelled").into_iter();
         files.map(|file| file.strip_prefix(&folder).expect("in the folder").to_owned()).collect::<Vec<_>>()
     };
     let expected = [std::path::PathBuf::from("deep/a.bin"), "a b.png".into()];
@@ -623,7 +623,20 @@ fn listing_references_reads_only_the_json() {
     // A truncated binary chunk is not read.
     let complete = glb(&json, &bytes());
     assert_eq!(files("a.glb", &complete[..complete.len() - 3]), expected);
-    assert!(super::referenced_files(&folder.0.path().join("none.glb")).is_err());
+    // Errors outside the URIs do not matter.
+    json["nodes"] = serde_json::json!([{"matrix": "none"}]);
+    json["buffers"][0]["byteLength"] = serde_json::json!(-1);
+    json["images"][1]["uri"] = serde_json::Value::Null;
+    assert_eq!(files("c.gltf", json.to_string().as_bytes()), expected);
+    assert_eq!(files("d.gltf", b"{"), Vec::<PathBuf>::new());
+    let none = folder.0.path().join("none.glb");
+    assert_eq!(
+        super::referenced_files(&none, &CancelToken::new()).expect("not cancelled"),
+        Vec::<PathBuf>::new()
+    );
+    let token = CancelToken::new();
+    token.cancel();
+    assert!(super::referenced_files(&folder.0.path().join("a.gltf"), &token).is_err());
 }
 
 #[test]

@@ -14,11 +14,11 @@ mod polygon;
 mod stl;
 mod text;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::read::{self, Monitor};
 use super::{AssetError, LoadedMesh};
-use crate::control::{CancelToken, Progress};
+use crate::control::{CancelToken, Cancelled, Progress};
 
 pub use normals::vertex_normals;
 
@@ -59,6 +59,17 @@ pub fn load(path: &Path, progress: Progress<'_>, token: &CancelToken) -> Result<
     let loaded = LoadedMesh { hash: read::hash(&bytes), ..parse(&source)? };
     monitor.tick(2 * bytes.len(), 2 * bytes.len())?;
     Ok(loaded)
+}
+
+/// Lists the material libraries that an OBJ file references, and the images that the libraries reference, used
+/// or not. Reads only the statements with file names, also from files with errors, in bounded memory. Empty for
+/// other formats and unreadable files.
+///
+/// # Errors
+/// Returns [`Cancelled`] if the token is cancelled.
+pub fn referenced_files(path: &Path, token: &CancelToken) -> Result<Vec<PathBuf>, Cancelled> {
+    let is_obj = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("obj"));
+    if is_obj { obj::referenced_files(path, token) } else { Ok(Vec::new()) }
 }
 
 const UNKNOWN_FORMAT: &str = "unknown mesh format; the extension must be .obj, .off, .ply or .stl";

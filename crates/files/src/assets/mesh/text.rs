@@ -1,8 +1,15 @@
 //! Tokenizer for text files of numbers. Works on bytes, and neither requires UTF-8 nor copies the text.
 
 use std::borrow::Cow;
+use std::fs::File;
+use std::io::{BufRead, BufReader, Read};
+use std::path::Path;
 
 use fast_float2::parse_partial;
+
+use crate::assets::AssetError;
+use crate::assets::read;
+use crate::control::{CancelToken, Cancelled};
 
 /// Replaces carriage returns with line feeds if there are no line feeds (classic Mac OS).
 pub(super) fn with_line_feeds(bytes: &[u8]) -> Cow<'_, [u8]> {
@@ -23,6 +30,61 @@ pub(super) fn decoded(line: &[u8]) -> Cow<'_, str> {
     match std::str::from_utf8(line) {
         Ok(text) => Cow::Borrowed(text),
         Err(_) => Cow::Owned(line.iter().copied().map(char::from).collect()),
+    }
+}
+
+/// Lines of a text file, read one at a time. A file that can no longer be read ends early.
+pub(super) struct Lines {
+    reader: BufReader<File>,
+    /// Last byte of each line: a line feed, or a carriage return in classic Mac OS files.
+    end: u8,
+    line: Vec<u8>,
+}
+
+impl Lines {
+    /// Number of buffered bytes.
+    const BUFFER: usize = 1 << 16;
+    /// Maximum length of a line. Longer lines are split.
+    const MAX_LENGTH: usize = 1 << 20;
+
+    /// Opens a file of at most `limit` bytes and skips the byte order mark.
+    pub(super) fn open(path: &Path, limit: u64) -> Result<Self, AssetError> {
+        let (file, _) = read::open(path, limit)?;
+        let mut reader = BufReader::with_capacity(Self::BUFFER, file);
+        let unreadable = |error| AssetError::unreadable(path, read::describe_error(&error));
+        let start = reader.fill_buf().map_err(unreadable)?;
+        let end = if matches!(with_line_feeds(start), Cow::Owned(_)) { b'\r' } else { b'\n' };
+        let mark = start.len() - strip_byte_order_mark(start).len();
+        reader.consume(mark);
+        Ok(Self { reader, end, line: Vec::new() })
+    }
+
+    /// Reads the next line, including its end.
+    pub(super) fn next(&mut self, token: &CancelToken) -> Result<Option<&[u8]>, Cancelled> {
+        self.line.clear();
+        Ok(self.append(token)?.then_some(&self.line))
+    }
+
+    /// Skips buffered lines that do not contain `letter` in either case. This is much faster than reading them.
+    pub(super) fn skip_lines_without(&mut self, letter: u8) {
+        let Ok(buffer) = self.reader.fill_buf() else { return };
+        let (lower, upper) = (letter.to_ascii_lowercase(), letter.to_ascii_uppercase());
+        let found = memchr::memchr2(lower, upper, buffer).unwrap_or(buffer.len());
+        let skipped = memchr::memrchr(self.end, &buffer[..found]).map_or(0, |end| end + 1);
+        self.reader.consume(skipped);
+    }
+
+    /// Appends the following lines while the current one ends with a backslash, and returns all of them.
+    pub(super) fn join_continuation_lines(&mut self, token: &CancelToken) -> Result<&[u8], Cancelled> {
+        let is_continued = |line: &[u8]| line.trim_ascii_end().ends_with(b"\\");
+        while is_continued(&self.line) && self.line.len() < Self::MAX_LENGTH && self.append(token)? {}
+        Ok(&self.line)
+    }
+
+    fn append(&mut self, token: &CancelToken) -> Result<bool, Cancelled> {
+        token.check()?;
+        let mut rest = (&mut self.reader).take(Self::MAX_LENGTH as u64);
+        Ok(rest.read_until(self.end, &mut self.line).is_ok_and(|length| length > 0))
     }
 }
 

@@ -1,7 +1,7 @@
 //! Header of a part: properties of the image, the share of the image that the file contains, and the encoding
 //! settings.
 
-use std::path::Path;
+use std::path::{Component, Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
@@ -26,6 +26,10 @@ pub struct Head {
     /// unknown.
     #[serde(default)]
     pub scene: String,
+    /// Files that the scene references, used or not, relative to the scene's folder, or only their names if
+    /// they are outside that folder. They do not affect the image.
+    #[serde(default)]
+    pub references: Vec<String>,
 }
 
 /// Type of a part file.
@@ -81,12 +85,26 @@ impl Head {
         self.identity.iter().find(matches).map(|input| name_of(&input.name))
     }
 
-    /// Finds an input file, existing or not, whose name matches the end of this path. Returns the name, relative
-    /// to the scene's folder.
+    /// Finds an input file or another file that the scene references, existing or not, whose name matches the
+    /// end of this path. Returns the name, relative to the scene's folder.
     pub(super) fn input_matching_path(&self, path: &Path) -> Option<&str> {
-        let files = self.identity.iter().filter(|input| input.name.starts_with(FILE));
-        files.map(|input| name_of(&input.name)).find(|name| !name.is_empty() && path.ends_with(name))
+        let inputs = self.identity.iter().filter(|input| input.name.starts_with(FILE));
+        let references = self.references.iter().map(String::as_str);
+        inputs.map(|input| name_of(&input.name)).chain(references).find(|name| is_end_of_path(name, path))
     }
+}
+
+/// Whether a path ends with a name, apart from the name's components up to the last `..`.
+fn is_end_of_path(name: &str, path: &Path) -> bool {
+    let mut end = PathBuf::new();
+    for component in Path::new(name).components() {
+        match component {
+            Component::ParentDir => end = PathBuf::new(),
+            Component::Normal(name) => end.push(name),
+            Component::CurDir | Component::RootDir | Component::Prefix(_) => {}
+        }
+    }
+    !end.as_os_str().is_empty() && path.ends_with(end)
 }
 
 /// Share of an image that a part file contains.

@@ -44,6 +44,7 @@ fn head(index: u32, count: u32, film: &Film) -> Head {
         share: PartShare { index, count, block_count: 0, blocks: Vec::new() },
         picture: ImageHeader::new(film, &finish()),
         scene: String::new(),
+        references: Vec::new(),
     }
 }
 
@@ -262,5 +263,24 @@ proptest! {
         }
         fs::write(&path, bytes).expect("written");
         prop_assert!(opened(&path).is_err());
+    }
+}
+
+#[test]
+fn inputs_match_the_end_of_a_path() {
+    let film = film(1, 1);
+    let names = ["maps/a.png", "../b.png", "maps/../../c/d.png", "..", ""];
+    let head = Head { references: names.map(str::to_owned).into(), ..head(1, 1, &film) };
+    for (path, expected) in [
+        ("/scenes/knot.obj", Some("knot.obj")),
+        ("/scenes/maps/a.png", Some("maps/a.png")),
+        ("/scenes/a.png", None),
+        ("/b.png", Some("../b.png")),
+        ("/ab.png", None),
+        ("/c/d.png", Some("maps/../../c/d.png")),
+        ("/d.png", None),
+        ("/scenes", None),
+    ] {
+        assert_eq!(head.input_matching_path(Path::new(path)), expected, "{path}");
     }
 }

@@ -41,7 +41,8 @@ pub(crate) fn create_header(
     finish: &DevelopSettings,
 ) -> Head {
     let share = share_head(state.share.as_ref());
-    Head { kind, identity, share, picture: ImageHeader::new(&state.film, finish), scene: String::new() }
+    let (picture, scene) = (ImageHeader::new(&state.film, finish), String::new());
+    Head { kind, identity, share, picture, scene, references: Vec::new() }
 }
 
 fn share_head(share: Option<&Shard>) -> PartShare {
@@ -185,7 +186,8 @@ impl<'a> Checkpointer<'a> {
             }
         };
         let mut differences = self.differences_from(&file.head, state);
-        let head = Head { scene: file.head.scene.clone(), ..self.create_header(PartKind::Part, state) };
+        let Head { scene, references, .. } = file.head.clone();
+        let head = Head { scene, references, ..self.create_header(PartKind::Part, state) };
         if differences.is_empty() && file.head != head {
             differences.push("the output settings differ".to_owned());
         }

@@ -16,7 +16,7 @@ pub(super) use material::material;
 use statements::{MtlColor, MtlNumber, Statement};
 
 /// Maximum size of an MTL file.
-const FILE_LIMIT: u64 = 64 << 20;
+pub(super) const FILE_LIMIT: u64 = 64 << 20;
 
 /// Contents of an MTL file.
 pub(super) struct MtlLibrary {
@@ -86,6 +86,24 @@ pub(super) fn load(path: &Path, monitor: Monitor<'_>) -> Result<MtlLibrary, Asse
     }
     library.add_duplicates();
     Ok(library)
+}
+
+/// Candidate paths of the image in a line of the MTL file at `path`. Empty for all other statements, and for
+/// invalid ones.
+pub(super) fn image_candidates(path: &Path, line: &[u8]) -> Vec<PathBuf> {
+    let folder = path.parent().unwrap_or(Path::new(""));
+    match statements::parse(&decoded(line)) {
+        Ok(Statement::Map(_, map)) => map.candidate_paths().map(|file| folder.join(file)).collect(),
+        Ok(
+            Statement::Nothing
+            | Statement::New(_)
+            | Statement::Color(..)
+            | Statement::Number(..)
+            | Statement::Illumination(_)
+            | Statement::Ignored(_),
+        )
+        | Err(_) => Vec::new(),
+    }
 }
 
 impl MtlLibrary {

@@ -33,24 +33,8 @@ impl MtlLibraries<'_> {
     /// Loads the libraries in a statement and returns the material index of each used name they define.
     /// Missing files only cause warnings.
     pub(super) fn load(&mut self, statement: &str) -> Result<HashMap<String, usize>, AssetError> {
-        let folder = self.source.path.parent().unwrap_or(Path::new(""));
-        let readings =
-            without_trailing_comments(statement).flat_map(|name| [name.to_owned(), name.replace('\\', "/")]);
-        let readings = readings.flat_map(|name| decoded_paths(&name));
-        let single = readings.map(|name| folder.join(name)).find(|path| path.exists());
-        let names = single.map_or_else(
-            || {
-                let names =
-                    without_trailing_comments(statement).last().unwrap_or(statement).replace('\\', "/");
-                names
-                    .split_whitespace()
-                    .filter_map(|name| mtl::first_existing(folder, decoded_paths(name)))
-                    .collect()
-            },
-            |path| vec![path],
-        );
         let mut indices = HashMap::new();
-        for path in names {
+        for path in library_paths(self.source.path, statement) {
             indices.extend(self.load_file(&path)?);
         }
         self.found.resolved.extend(indices.keys().cloned());
@@ -99,6 +83,21 @@ impl MtlLibraries<'_> {
         found.materials.extend(materials.iter().map(|material| mtl::material(material, folder)));
         indices.into_iter().map(|(name, index)| (name, first + index)).collect()
     }
+}
+
+/// Returns the libraries in an `mtllib` statement of the OBJ file at `obj`. The names may contain blanks, and
+/// comments may follow.
+pub(super) fn library_paths(obj: &Path, statement: &str) -> Vec<PathBuf> {
+    let folder = obj.parent().unwrap_or(Path::new(""));
+    let readings =
+        without_trailing_comments(statement).flat_map(|name| [name.to_owned(), name.replace('\\', "/")]);
+    let readings = readings.flat_map(|name| decoded_paths(&name));
+    let single = readings.map(|name| folder.join(name)).find(|path| path.exists());
+    if let Some(path) = single {
+        return vec![path];
+    }
+    let names = without_trailing_comments(statement).last().unwrap_or(statement).replace('\\', "/");
+    names.split_whitespace().filter_map(|name| mtl::first_existing(folder, decoded_paths(name))).collect()
 }
 
 /// Warning about a library that cannot be read.

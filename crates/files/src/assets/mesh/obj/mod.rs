@@ -3,6 +3,7 @@
 
 mod build;
 mod libraries;
+mod references;
 mod statements;
 mod vertex;
 mod words;
@@ -16,6 +17,7 @@ use super::{AssetError, LoadedMesh, MeshSource};
 use crate::assets::FileMaterial;
 use build::{FaceRun, build};
 use libraries::{LibraryContents, MtlLibraries};
+pub(super) use references::referenced_files;
 use statements::{CornerIndices, NONE, Smoothing, StateChange, Statements, face_start};
 
 pub(super) fn parse(source: &MeshSource<'_>) -> Result<LoadedMesh, AssetError> {

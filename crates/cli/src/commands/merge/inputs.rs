@@ -1,0 +1,80 @@
+//! The files that a merge must not replace: the inputs of the render that wrote the parts.
+
+use std::cell::OnceCell;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use crate::control::{CancelToken, Cancelled};
+use crate::output::part::{self, PartFile};
+use crate::output::{is_same_file, scene_path};
+use crate::pipeline::companion_files;
+use crate::scene::named_files;
+use crate::scene::sanitize::visible;
+
+/// Inputs of the parts and of their scenes.
+pub(super) struct MergeInputs<'a> {
+    parts: &'a [PartFile],
+    token: &'a CancelToken,
+    /// Scenes of the parts, and the files that they name.
+    named: BTreeSet<PathBuf>,
+    /// Files referenced by the named ones, listed on demand.
+    companions: OnceCell<BTreeSet<PathBuf>>,
+}
+
+impl<'a> MergeInputs<'a> {
+    /// Collects the inputs for a merge into `out`.
+    pub(super) fn new(parts: &'a [PartFile], out: &Path, token: &'a CancelToken) -> Self {
+        // The output may be a link into the scene's folder.
+        let target = out.canonicalize().ok();
+        let outs = [Some(out), target.as_deref()].into_iter().flatten();
+        let scenes: BTreeSet<PathBuf> = outs.flat_map(|out| scene_paths(parts, out)).collect();
+        let named = scenes.iter().flat_map(|scene| named_files(scene)).collect::<Vec<_>>();
+        Self { parts, token, named: scenes.into_iter().chain(named).collect(), companions: OnceCell::new() }
+    }
+
+    /// Returns the reason if the file at `path` is an input. Lists the files that meshes reference last,
+    /// because that requires reading the meshes.
+    ///
+    /// # Errors
+    /// Returns [`Cancelled`] if the token is cancelled.
+    pub(super) fn reason_to_keep(&self, path: &Path) -> Result<Option<String>, Cancelled> {
+        let find = |files: &BTreeSet<PathBuf>| {
+            let input = files.iter().find(|input| is_same_file(input, path))?;
+            // Relative to the working directory.
+            let name = scene_path::relative(input, Path::new(""));
+            let name = visible(name.strip_prefix("./").unwrap_or(&name)).into_owned();
+            Some(format!("the scene of the parts references it ({name})"))
+        };
+        let by_name = || {
+            let name = part::input_with_name(self.parts, path)?;
+            Some(format!("the scene of the parts references a file with this name ({name})"))
+        };
+        let by_content = || {
+            let name = part::input_with_content(self.parts, path)?;
+            Some(format!("the parts were rendered from it ({name})"))
+        };
+        match by_name().or_else(|| find(&self.named)).or_else(by_content) {
+            None => Ok(find(self.companions()?)),
+            reason => Ok(reason),
+        }
+    }
+
+    fn companions(&self) -> Result<&BTreeSet<PathBuf>, Cancelled> {
+        match self.companions.get() {
+            Some(companions) => Ok(companions),
+            None => {
+                let companions = companion_files(self.named.iter(), self.token)?;
+                Ok(self.companions.get_or_init(|| companions))
+            }
+        }
+    }
+}
+
+/// Possible paths of the parts' scenes, existing or not: relative to each part, then next to the output.
+pub(super) fn scene_paths(parts: &[PartFile], out: &Path) -> impl Iterator<Item = PathBuf> {
+    let named = parts.iter().filter(|part| !part.head.scene.is_empty());
+    let named = named.map(|part| part.path.with_file_name(&part.head.scene));
+    let metadata = parts.iter().flat_map(|part| &part.head.picture.metadata);
+    let names = metadata.filter(|(name, _)| name == "glimt:scene");
+    named.chain(names.map(|(_, scene)| out.with_file_name(scene)))
+}

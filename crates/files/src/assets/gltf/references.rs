@@ -1,0 +1,98 @@
+//! Lists the files that a glTF file references without loading it.
+
+use std::fmt;
+use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+use serde::de::{Deserializer, Error, Visitor};
+
+use super::{BOM, JSON_LIMIT, resolve_uri};
+use crate::assets::read;
+use crate::control::{CancelToken, Cancelled};
+
+/// The parts of a glTF file with URIs. Ignores everything else, valid or not.
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+struct References {
+    buffers: Vec<Reference>,
+    images: Vec<Reference>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+struct Reference {
+    uri: Option<FileUri>,
+}
+
+/// The URI of a file. `None` for data URIs, which are not copied.
+#[derive(Debug)]
+struct FileUri(Option<String>);
+
+impl<'de> Deserialize<'de> for FileUri {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct UriVisitor;
+        impl Visitor<'_> for UriVisitor {
+            type Value = FileUri;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a URI")
+            }
+
+            fn visit_str<E: Error>(self, text: &str) -> Result<FileUri, E> {
+                Ok(FileUri((!text.starts_with("data:")).then(|| text.to_owned())))
+            }
+        }
+        deserializer.deserialize_str(UriVisitor)
+    }
+}
+
+/// A reader that fails once the token is cancelled.
+struct CancellableReader<'a, R> {
+    reader: R,
+    token: &'a CancelToken,
+}
+
+impl<R: Read> Read for CancellableReader<'_, R> {
+    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
+        self.token.check().map_err(io::Error::other)?;
+        self.reader.read(bytes)
+    }
+}
+
+/// Lists the buffer and image files that a glTF file references, used or not. Reads only the JSON, without
+/// keeping it in memory. Empty for unreadable files and invalid JSON.
+///
+/// # Errors
+/// Returns [`Cancelled`] if the token is cancelled.
+pub fn referenced_files(path: &Path, token: &CancelToken) -> Result<Vec<PathBuf>, Cancelled> {
+    let references = json_reader(path, token).ok().and_then(|json| serde_json::from_reader(json).ok());
+    token.check()?;
+    let References { buffers, images } = references.unwrap_or_default();
+    let uris = buffers.into_iter().chain(images).filter_map(|reference| reference.uri?.0);
+    Ok(uris.filter_map(|uri| resolve_uri(path, &uri).ok()).collect())
+}
+
+/// Opens the JSON of a glTF file.
+fn json_reader<'a>(path: &Path, token: &'a CancelToken) -> io::Result<impl Read + use<'a>> {
+    /// Number of bytes before the JSON in a GLB file (4.4.2): the file header and the first chunk's length
+    /// and type.
+    const BEFORE_JSON: u64 = 20;
+    const BUFFER: usize = 1 << 16;
+    let (mut file, _) = read::open(path, u64::MAX).map_err(io::Error::other)?;
+    let mut header = Vec::new();
+    (&mut file).take(BEFORE_JSON).read_to_end(&mut header)?;
+    let (before, length) = match header[..] {
+        [b'g', b'l', b'T', b'F', _, _, _, _, _, _, _, _, a, b, c, d, ..] => {
+            (BEFORE_JSON, u32::from_le_bytes([a, b, c, d]) as usize)
+        }
+        _ => (0, JSON_LIMIT),
+    };
+    file.seek(SeekFrom::Start(before))?;
+    let json = CancellableReader { reader: file.take(length.min(JSON_LIMIT) as u64), token };
+    let mut json = BufReader::with_capacity(BUFFER, json);
+    if json.fill_buf()?.starts_with(BOM) {
+        json.consume(BOM.len());
+    }
+    Ok(json)
+}
