@@ -549,7 +549,7 @@ impl Engine {
         let texels = table.run(Stage::Textures, || textures(loaded, &needed, cache, findings, reading))?;
         self.assets = findings.files.clone();
         let bodies = glass(loaded, &found, &mut self.bodies, findings, reading.token)?;
-        warn_about_coplanar_lights(loaded, &found, &mut self.coplanar, findings);
+        warn_about_coplanar_lights(parsed, &found, &mut self.coplanar, findings);
         if findings.errors.is_empty() {
             self.report_files(findings, table.sink);
             let warnings = [findings.conflicts.as_slice(), &findings.warnings].concat();
@@ -685,7 +685,7 @@ impl Engine {
             wanted.are_required = true;
             let texels = textures(loaded, &wanted, &mut self.textures, &mut findings, &reading)?.value;
             glass(loaded, &found, &mut self.bodies, &mut findings, token)?;
-            warn_about_coplanar_lights(loaded, &found, &mut self.coplanar, &mut findings);
+            warn_about_coplanar_lights(&parsed, &found, &mut self.coplanar, &mut findings);
             let overrides = Overrides::default();
             let plan = plan(&loaded.scene, path, &overrides)
                 .map_err(|error| Stop::Failed(Failure::Scene(vec![*error])))?;
