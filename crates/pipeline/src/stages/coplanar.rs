@@ -51,7 +51,8 @@ pub(crate) fn warn_about_coplanar_lights(
         let other = if surface == light { "other faces of its mesh".to_owned() } else { named(surface) };
         format!("this light is in the plane of {other}{more}")
     };
-    let help = "glimt renders it slightly in front of the plane; move it off the plane to choose the distance";
+    let help =
+        "glimt renders it slightly in front of the plane; move it off the plane to choose the distance";
     warn(&lifted, &in_plane, help);
     let overlap = |light, surface, more: &str| {
         let both = if surface == light { "faces of ".to_owned() } else { "this light and ".to_owned() };
