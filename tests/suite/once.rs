@@ -318,6 +318,44 @@ fn check_warns_about_unlit_meshes() {
 }
 
 #[test]
+fn check_names_lights_counted_twice() {
+    let dir = TestDir::new();
+    let vertices = "v 0 2 0\nv 1 2 0\nv 1 2 1\nv 0 2 1\n";
+    let scene = "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n[materials.lamp]\nemission = 1\n";
+    let quad =
+        "[[quad]]\nname = \"panel\"\ncorner = [0, 2, 0]\nu = [1, 0, 0]\nv = [0, 0, 1]\nmaterial = \"lamp\"\n";
+    let mesh = "[[mesh]]\nname = \"tube\"\nfile = \"a.obj\"\nmaterial = \"lamp\"\n";
+    let said = |faces: &str, objects: &[&str]| {
+        dir.write("a.obj", format!("{vertices}{faces}"));
+        // Names are unique.
+        let name = |(i, object): (usize, &&str)| {
+            object.replace("panel", &format!("panel {i}")).replace("tube", &format!("tube {i}"))
+        };
+        let objects: Vec<String> = objects.iter().enumerate().map(name).collect();
+        dir.write("a.toml", format!("{scene}{}", objects.concat()));
+        String::from_utf8_lossy(&dir.run("check a.toml").stderr).into_owned()
+    };
+    let once = "f 1 2 3 4\n";
+    assert!(!mentions(&said(once, &[mesh]), "twice"));
+    // The same faces again, starting at another corner, emit once.
+    assert!(!mentions(&said("f 1 2 3\nf 1 3 4\nf 2 3 1\nf 3 4 1\n", &[mesh]), "twice"));
+    // The other diagonal.
+    assert_mentions(
+        &said("f 1 2 3 4\nf 2 3 4 1\n", &[mesh]),
+        &["tube 0", "line 6", "twice", "a.toml:6", "help"],
+    );
+    // Two objects in one place.
+    for (objects, other, line) in [
+        ([quad, quad], "panel 0", "a.toml:12"),
+        ([quad, mesh], "panel 0", "a.toml:12"),
+        ([mesh, quad], "tube 0", "a.toml:10"),
+        ([mesh, mesh], "tube 0", "a.toml:10"),
+    ] {
+        assert_mentions(&said(once, &objects), &[other, "line 6", "twice", line, "help"]);
+    }
+}
+
+#[test]
 fn check_handles_200000_shapes() {
     use std::fmt::Write;
     const COUNT: u32 = 200_000;

@@ -7,6 +7,7 @@ use crate::math::DVec3;
 use crate::plan::Plan;
 use crate::scene::description::{Accel, Camera, Object, Render, Scene, Shape};
 use crate::scene::fingerprint::{FingerprintContext, FingerprintHasher, Key};
+use crate::world::emissive_meshes;
 
 /// Returns the textures, meshes and orbiter that descriptions refer to by index.
 pub(crate) fn referents<'a>(
@@ -17,9 +18,9 @@ pub(crate) fn referents<'a>(
     FingerprintContext { textures: &scene.textures, meshes, orbiter }
 }
 
-/// Returns the key of a mesh's tree.
-pub(crate) fn tree(mesh: &Key, accel: Accel) -> Key {
-    FingerprintHasher::new("tree").key(mesh).choice(accel).finish()
+/// Returns the key of a mesh's tree. `is_emissive` states whether an object's material makes all of it emit.
+pub(crate) fn tree(mesh: &Key, (accel, is_emissive): (Accel, bool)) -> Key {
+    FingerprintHasher::new("tree").key(mesh).choice(accel).flag(is_emissive).finish()
 }
 
 /// Returns the key of all trees, with each object offset by its lift. `lifts` is empty if no object is
@@ -33,6 +34,9 @@ pub(crate) fn geometry(
     key.key(&from(&shapes(scene, of), origin));
     for lift in lifts {
         key.dvec3(*lift);
+    }
+    for is_emissive in emissive_meshes(scene) {
+        key.flag(is_emissive);
     }
     with_tree_kind(&key.finish(), scene.render.accel)
 }

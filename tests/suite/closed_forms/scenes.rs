@@ -19,6 +19,7 @@ use glimt::scene::description::{
 };
 use glimt::world::{
     Geometry, Image, MeshTree, TextureNeeds, World, WorldInputs, lights, origin, sky_map, textures_needed,
+    with_distinct_lights,
 };
 
 use super::v;
@@ -155,6 +156,7 @@ impl Build {
 
     /// Adds an instance of a mesh that was read from a file.
     pub fn loaded(mut self, loaded: LoadedMesh, placed: [DVec3; 3], material: Material) -> Self {
+        let loaded = with_distinct_lights(&loaded, material.emits()).unwrap_or(loaded);
         let tree = MeshTree::build(Arc::new(loaded), self.scene.render.accel, &CancelToken::new())
             .expect("not cancelled");
         self.parts.meshes.push(Arc::new(tree));
@@ -179,6 +181,7 @@ impl Build {
         let mut build = self.mesh(mesh, AS_IT_IS, matte(0.5));
         let file = build.parts.meshes.len() - 1;
         let loaded = LoadedMesh { materials, ..build.parts.meshes[file].loaded().clone() };
+        let loaded = with_distinct_lights(&loaded, false).unwrap_or(loaded);
         let tree = MeshTree::build(Arc::new(loaded), Accel::Bvh, &CancelToken::new()).expect("not cancelled");
         build.parts.meshes[file] = Arc::new(tree);
         build.with(|scene| scene.objects.last_mut().expect("the mesh").material = None)

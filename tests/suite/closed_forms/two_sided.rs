@@ -11,19 +11,19 @@ use super::scenes::{AS_IT_IS, Build, emitter, lat_long_sphere, mirror, receiver,
 use super::{assert_close, assert_mean, lambert, mean_and_error, v};
 
 /// A light with radiance 1 on both sides.
-fn both() -> Material {
+pub fn both() -> Material {
     let mut material = emitter(1.0);
     material.emission.sides = EmissionSides::Both;
     material
 }
 
-fn at_origin() -> Build {
+pub fn at_origin() -> Build {
     receiver(DVec3::ZERO, 0.7)
 }
 
 /// Checks the irradiance with light samples and with path tracing.
 #[track_caller]
-fn assert_lit(what: &str, lit: &Build, irradiance: f64) {
+pub fn assert_lit(what: &str, lit: &Build, irradiance: f64) {
     assert_irradiance(what, lit, irradiance);
     let paths = lit.clone().with(|scene| scene.render.integrator = Integrator::Path);
     assert_mean(&format!("{what}, path"), &paths.values(256, 256), 0.7 * irradiance / PI);

@@ -560,7 +560,7 @@ impl Engine {
         let texels = table.run(Stage::Textures, || textures(loaded, &needed, cache, findings, reading))?;
         self.assets = findings.files.clone();
         let bodies = glass(loaded, &found, &mut self.bodies, findings, reading.token)?;
-        warn_about_coplanar_lights(loaded, &found, &mut self.coplanar, findings);
+        warn_about_coplanar_lights(parsed, &found, &mut self.coplanar, findings);
         if findings.errors.is_empty() {
             self.report_files(findings, table.sink);
             let warnings = [findings.conflicts.as_slice(), &findings.warnings].concat();
@@ -696,7 +696,7 @@ impl Engine {
             let texels = textures(loaded, &wanted, &mut engine.textures, findings, &reading)?.value;
             verify(contents, token)?;
             glass(loaded, &found, &mut engine.bodies, findings, token)?;
-            warn_about_coplanar_lights(loaded, &found, &mut engine.coplanar, findings);
+            warn_about_coplanar_lights(&parsed, &found, &mut engine.coplanar, findings);
             let overrides = Overrides::default();
             let plan = plan(&loaded.scene, path, &overrides)
                 .map_err(|error| Stop::Failed(Failure::Scene(vec![*error])))?;

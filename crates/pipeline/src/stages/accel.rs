@@ -11,7 +11,7 @@ use super::{FileReadContext, StageResult, Stop};
 use crate::math::DVec3;
 use crate::scene::description::Scene;
 use crate::scene::fingerprint::{FingerprintContext, Key};
-use crate::world::{Geometry, MeshTree, light_lifts, with_offset_lights};
+use crate::world::{Geometry, MeshTree, emissive_meshes, light_lifts, with_distinct_lights};
 
 /// Cache of the accel stage.
 #[derive(Debug, Default)]
@@ -102,15 +102,16 @@ fn trees(
     let mut kept = 0;
     let accel = scene.render.accel;
     let mut trees = Vec::with_capacity(meshes.len());
-    for mesh in meshes {
-        let key = keys::tree(&mesh.key, accel);
+    for (mesh, is_emissive) in meshes.iter().zip(emissive_meshes(scene)) {
+        let key = keys::tree(&mesh.key, (accel, is_emissive));
         let tree = match cache.trees.get(&key, key) {
             Some(tree) => {
                 kept += 1;
                 tree
             }
             None => {
-                let loaded = with_offset_lights(&mesh.mesh).map_or_else(|| mesh.mesh.clone(), Arc::new);
+                let distinct = with_distinct_lights(&mesh.mesh, is_emissive);
+                let loaded = distinct.map_or_else(|| mesh.mesh.clone(), Arc::new);
                 let build = || MeshTree::build(loaded, accel, reading.token);
                 let tree = Arc::new(reading.pool.install(build)?);
                 // The tree keeps its mesh alive even if the file is reloaded.

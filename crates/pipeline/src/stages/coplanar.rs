@@ -1,49 +1,64 @@
-//! Warnings about lights that are coplanar with other surfaces.
+//! Warnings about lights that are coplanar with other surfaces or overlap other lights.
 
 use super::super::cache::Memo;
 use super::super::keys;
 use super::Findings;
 use super::meshes::Meshes;
+use super::parse::Parsed;
 use crate::assets::LoadedMesh;
-use crate::math::DVec3;
-use crate::scene::LoadedScene;
 use crate::scene::description::Object;
 use crate::scene::diagnostic::Severity;
 use crate::scene::fingerprint::Key;
-use crate::world::{CoplanarLight, coplanar_lights};
+use crate::world::{self, CoplanarLight, coplanar_lights};
 
-/// Maximum number of lights to warn about.
+/// Maximum number of lights to warn about, for each kind of overlap.
 const MAX_WARNINGS: usize = 10;
 
-/// Warns about lights that are moved off the plane of another surface. Reuses the previous search result if
-/// shapes and lights are unchanged.
+/// Warns about lights that are moved off the plane of another surface, and about lights that overlap. Reuses
+/// the previous search result if shapes and lights are unchanged.
 pub(crate) fn warn_about_coplanar_lights(
-    loaded: &LoadedScene,
+    parsed: &Parsed,
     meshes: &Meshes,
     memo: &mut Memo<Vec<CoplanarLight>>,
     findings: &mut Findings,
 ) {
+    let loaded = &parsed.loaded;
     let scene = &loaded.scene;
+    let origin = world::origin(&scene.camera, parsed.orbiter.as_ref());
     let mesh_keys: Vec<Key> = meshes.iter().map(|mesh| mesh.key).collect();
-    let key = keys::coplanar(scene, &keys::referents(scene, &mesh_keys, None));
+    let key = keys::from(&keys::coplanar(scene, &keys::referents(scene, &mesh_keys, None)), origin);
     let found = memo.get(key).cloned().unwrap_or_else(|| {
         let files: Vec<&LoadedMesh> = meshes.iter().map(|mesh| &*mesh.mesh).collect();
-        coplanar_lights(scene, &files, DVec3::ZERO)
+        coplanar_lights(scene, &files, origin)
     });
     let named = |number: usize| {
         let Object { shape, name, span, .. } = &scene.objects[number];
         let name = name.as_deref().map(|name| format!(" \"{name}\"")).unwrap_or_default();
         format!("the {}{name} on line {}", shape.kind(), loaded.line(span))
     };
-    for of_light in found.chunk_by(|a, b| a.light == b.light).take(MAX_WARNINGS) {
-        let [CoplanarLight { light, surface, .. }, others @ ..] = of_light else { continue };
-        let more = if others.is_empty() { String::new() } else { format!(" and {} more", others.len()) };
-        let other = if surface == light { "other faces of its mesh".to_owned() } else { named(*surface) };
-        let message = format!("this light is in the plane of {other}{more}");
-        let help =
-            "glimt renders it slightly in front of the plane; move it off the plane to choose the distance";
-        let span = scene.objects[*light].span.clone();
-        findings.warnings.push(loaded.diagnostic_at(span, Severity::Warning, message, Some(help.to_owned())));
-    }
+    let (lifted, doubled): (Vec<_>, Vec<_>) = found.iter().partition(|pair| pair.lift.is_some());
+    let mut warn = |pairs: &[&CoplanarLight], describe: &dyn Fn(usize, usize, &str) -> String, help: &str| {
+        for of_light in pairs.chunk_by(|a, b| a.light == b.light).take(MAX_WARNINGS) {
+            let [CoplanarLight { light, surface, .. }, others @ ..] = of_light else { continue };
+            let more = if others.is_empty() { String::new() } else { format!(" and {} more", others.len()) };
+            let message = describe(*light, *surface, &more);
+            let span = scene.objects[*light].span.clone();
+            let warning = loaded.diagnostic_at(span, Severity::Warning, message, Some(help.to_owned()));
+            findings.warnings.push(warning);
+        }
+    };
+    let in_plane = |light, surface, more: &str| {
+        let other = if surface == light { "other faces of its mesh".to_owned() } else { named(surface) };
+        format!("this light is in the plane of {other}{more}")
+    };
+    let help =
+        "glimt renders it slightly in front of the plane; move it off the plane to choose the distance";
+    warn(&lifted, &in_plane, help);
+    let overlap = |light, surface, more: &str| {
+        let both = if surface == light { "faces of ".to_owned() } else { "this light and ".to_owned() };
+        let both = both + &named(surface) + more;
+        format!("{both} overlap: there, the light counts twice, but only one of them is visible")
+    };
+    warn(&doubled, &overlap, "remove the duplicate, or move one off the plane of the other");
     memo.set(key, found);
 }

@@ -5,14 +5,13 @@
 //! light's contribution would disagree. Coplanar lights are therefore moved off the plane by a tiny distance,
 //! toward the side to which they emit.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::MeshTree;
 use super::lower::file_emits;
 use crate::assets::LoadedMesh;
 use crate::geometry::cuboid::Cuboid;
-use crate::geometry::mesh::TriangleMesh;
 use crate::materials::EmissionSides;
 use crate::math::{DVec3, Vec2, Vec3};
 use crate::scene::description::{Scene, Shape};
@@ -22,42 +21,48 @@ use crate::scene::description::{Scene, Shape};
 const COINCIDENT: f64 = 1.0 / (1 << 20) as f64;
 /// Lift relative to the size of the light and its surroundings: well above `f32` rounding errors, but too
 /// small to be visible.
-const LIFT: f64 = 1.0 / (1 << 16) as f64;
-/// Maximum sine of the angle between the normals of coplanar faces.
-const PARALLEL: f64 = 1e-5;
+pub(super) const LIFT: f64 = 1.0 / (1 << 16) as f64;
+/// Error of the plane of a mesh face, relative to its coordinates: several times the `f32` rounding error of
+/// the corners.
+pub(super) const ROUNDING: f64 = 1.0 / (1 << 22) as f64;
+/// Maximum deviation of the cosine between lifts in the same direction from 1.
+const SAME_DIRECTION: f64 = 1e-5;
 /// Maximum size of a light's surroundings, relative to the light's size.
-const SURROUNDINGS: f64 = 16.0;
+pub(super) const SURROUNDINGS: f64 = 16.0;
 /// Maximum number of light/face pairs to compare. Further pairs are ignored.
-const MAX_PAIRS: usize = 1 << 26;
+pub(super) const MAX_PAIRS: usize = 1 << 26;
 
-/// A light that overlaps a coplanar surface.
+/// A light that overlaps a coplanar surface or another light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CoplanarLight {
     /// The emitting object.
     pub light: usize,
     /// The overlapped object, equal to `light` if both faces belong to one mesh.
     pub surface: usize,
-    /// Translation that moves the light off the surface.
-    pub lift: DVec3,
+    /// Translation that moves the light off the surface. `None` if the surface emits toward the same side:
+    /// the overlap stays, and both emit there.
+    pub lift: Option<DVec3>,
 }
 
 /// A flat, convex part of an object.
 #[derive(Clone, Debug)]
-struct FlatFace {
-    object: usize,
+pub(super) struct FlatFace {
+    pub(super) object: usize,
     /// Corners in counterclockwise order as seen from the front. Empty for an infinite plane.
-    corners: Vec<DVec3>,
+    pub(super) corners: Vec<DVec3>,
     point: DVec3,
     /// Unit normal on the front side.
-    normal: DVec3,
+    pub(super) normal: DVec3,
     emits: Option<EmissionSides>,
+    /// Bound on the distance of the traced face from its plane.
+    pub(super) rounding: f64,
 }
 
 impl FlatFace {
-    fn new(corners: Vec<DVec3>) -> Option<Self> {
+    pub(super) fn new(corners: Vec<DVec3>) -> Option<Self> {
         let [a, b, c] = *corners.first_chunk()?;
         let normal = (b - a).cross(c - a).try_normalize()?;
-        Some(Self { object: 0, corners, point: a, normal, emits: None })
+        Some(Self { object: 0, corners, point: a, normal, emits: None, rounding: 0.0 })
     }
 
     /// Bounding box of the corners. `None` for an infinite plane.
@@ -67,8 +72,21 @@ impl FlatFace {
         Some(self.corners.iter().fold([first; 2], grow))
     }
 
-    fn size(&self) -> f64 {
+    pub(super) fn size(&self) -> f64 {
         self.bounds().map_or(f64::INFINITY, |[least, greatest]| (greatest - least).max_element())
+    }
+
+    /// Whether two faces are one face, or repeated in a mesh. Repeated faces emit once; see
+    /// [`with_distinct_lights`](super::with_distinct_lights).
+    fn is_same(&self, other: &Self) -> bool {
+        self.object == other.object
+            && self.corners.iter().all(|corner| other.corners.contains(corner))
+            && !self.faces_against(other)
+    }
+
+    /// Whether the fronts of two coplanar faces are on opposite sides.
+    pub(super) fn faces_against(&self, other: &Self) -> bool {
+        self.normal.dot(other.normal) < 0.0
     }
 
     /// Whether the face emits on the side toward which this normal points.
@@ -82,26 +100,29 @@ impl FlatFace {
 }
 
 /// Emissive faces, sorted by minimum x.
-struct EmissiveFaces {
-    faces: Vec<FlatFace>,
+pub(super) struct EmissiveFaces {
+    pub(super) faces: Vec<FlatFace>,
     bounds: Vec<[DVec3; 2]>,
-    /// Maximum extent along x, plus a margin.
+    /// Maximum extent along x.
     widest: f64,
-    /// Bounding box of all faces, plus a margin.
+    /// Bounding box of all faces, plus the margin.
     region: [DVec3; 2],
+    /// Distance at which boxes are considered to touch.
+    margin: f64,
 }
 
 impl EmissiveFaces {
     /// Sorts the faces. `None` if there are no faces.
-    fn new(mut faces: Vec<FlatFace>) -> Option<Self> {
+    pub(super) fn new(mut faces: Vec<FlatFace>) -> Option<Self> {
         let least_x = |face: &FlatFace| face.bounds().map_or(f64::NEG_INFINITY, |[least, _]| least.x);
         faces.sort_by(|a, b| least_x(a).total_cmp(&least_x(b)));
         let bounds: Vec<[DVec3; 2]> = faces.iter().filter_map(FlatFace::bounds).collect();
         let joined = |a: [DVec3; 2], b: &[DVec3; 2]| [a[0].min(b[0]), a[1].max(b[1])];
         let [least, greatest] = bounds.iter().fold(*bounds.first()?, joined);
-        let margin = (greatest - least).max_element() * COINCIDENT;
-        let widest = bounds.iter().map(|[least, greatest]| greatest.x - least.x).fold(0.0, f64::max) + margin;
-        Some(Self { faces, bounds, widest, region: [least - margin, greatest + margin] })
+        let rounding = faces.iter().map(|face| face.rounding).fold(0.0, f64::max);
+        let margin = (greatest - least).max_element() * COINCIDENT + rounding;
+        let widest = bounds.iter().map(|[least, greatest]| greatest.x - least.x).fold(0.0, f64::max);
+        Some(Self { faces, bounds, widest, region: [least - margin, greatest + margin], margin })
     }
 
     /// Whether no light can be near a box.
@@ -111,9 +132,13 @@ impl EmissiveFaces {
 
     /// Returns the lights whose bounding boxes touch a face's bounding box. Increases `pairs` by the number
     /// of compared lights.
-    fn near<'a>(&'a self, face: &FlatFace, pairs: &mut usize) -> impl Iterator<Item = &'a FlatFace> {
+    pub(super) fn near<'a>(
+        &'a self,
+        face: &FlatFace,
+        pairs: &mut usize,
+    ) -> impl Iterator<Item = &'a FlatFace> {
         let [least, greatest] = face.bounds().unwrap_or(self.region);
-        let margin = (self.region[1] - self.region[0]).max_element() * COINCIDENT;
+        let margin = self.margin + face.rounding;
         let bounds = [least - margin, greatest + margin];
         let start = self.bounds.partition_point(|light| light[0].x < bounds[0].x - self.widest);
         let end = self.bounds.partition_point(|light| light[0].x <= bounds[1].x);
@@ -125,8 +150,8 @@ impl EmissiveFaces {
     }
 }
 
-/// Finds lights that overlap a coplanar surface. Coordinates are relative to `origin`. `meshes` contains the
-/// scene's loaded mesh files.
+/// Finds lights that overlap a coplanar surface or another light. Coordinates are relative to `origin`.
+/// `meshes` contains the scene's loaded mesh files.
 pub fn coplanar_lights(scene: &Scene, meshes: &[&LoadedMesh], origin: DVec3) -> Vec<CoplanarLight> {
     let mut faces = Vec::new();
     for object in (0..scene.objects.len()).filter(|object| may_emit(scene, meshes, *object)) {
@@ -150,8 +175,12 @@ pub fn coplanar_lights(scene: &Scene, meshes: &[&LoadedMesh], origin: DVec3) -> 
                 return;
             }
             for light in lights.near(face, &mut pairs) {
-                if must_lift(light, face) && are_coplanar_and_overlap(light, face) {
-                    add_coplanar_pair(&mut found, light, face);
+                let is_lifted = must_lift(light, face);
+                // Report lights that are counted twice only once.
+                let is_reported = is_lifted
+                    || face.object <= light.object && !must_lift(face, light) && !light.is_same(face);
+                if is_reported && are_coplanar_and_overlap(light, face) {
+                    add_coplanar_pair(&mut found, (light, face), is_lifted);
                 }
             }
         });
@@ -167,17 +196,19 @@ fn are_boxes_apart(a: [DVec3; 2], b: [DVec3; 2]) -> bool {
 /// Translation of each object, which moves lights off coplanar surfaces. Empty if no lights need to be moved.
 pub fn light_lifts(scene: &Scene, meshes: &[Arc<MeshTree>], origin: DVec3) -> Vec<DVec3> {
     let loaded: Vec<_> = meshes.iter().map(|mesh| mesh.loaded()).collect();
-    let found = coplanar_lights(scene, &loaded, origin);
-    if found.is_empty() {
+    let found = coplanar_lights(scene, &loaded, origin).into_iter();
+    let lifted = found.filter(|pair| pair.light != pair.surface);
+    let lifted: Vec<_> = lifted.filter_map(|pair| Some((pair.light, pair.lift?))).collect();
+    if lifted.is_empty() {
         return Vec::new();
     }
     let mut lifts = vec![DVec3::ZERO; scene.objects.len()];
     let mut directions: Vec<(usize, DVec3)> = Vec::new();
-    for CoplanarLight { light, lift, .. } in found.into_iter().filter(|pair| pair.light != pair.surface) {
+    for (light, lift) in lifted {
         // Lift a light only once if it is coplanar with several surfaces.
         let direction = lift.normalize_or_zero();
         directions.retain(|(other, _)| *other == light);
-        if !directions.iter().any(|(_, known)| known.dot(direction) > 1.0 - PARALLEL) {
+        if !directions.iter().any(|(_, known)| known.dot(direction) > 1.0 - SAME_DIRECTION) {
             directions.push((light, direction));
             lifts[light] += lift;
         }
@@ -185,96 +216,44 @@ pub fn light_lifts(scene: &Scene, meshes: &[Arc<MeshTree>], origin: DVec3) -> Ve
     lifts
 }
 
-/// Returns a copy of the mesh in which emissive triangles coplanar with other faces are moved off these
-/// faces. `None` if there are no such triangles.
-pub fn with_offset_lights(loaded: &LoadedMesh) -> Option<LoadedMesh> {
-    let mesh = &loaded.mesh;
-    let emits = |triangle: u32| {
-        let material =
-            mesh.materials.get(triangle as usize).and_then(|own| loaded.materials.get(*own as usize));
-        material.is_some_and(file_emits)
-    };
-    if !loaded.materials.iter().any(file_emits) {
-        return None;
-    }
-    // Find the triangles to lift.
-    let face = |triangle: u32| {
-        let face = FlatFace::new(mesh.corners(triangle).map(|corner| corner.as_dvec3()).to_vec())?;
-        Some(FlatFace { object: triangle as usize, ..face })
-    };
-    let all = 0..mesh.triangles.len() as u32;
-    let lights = EmissiveFaces::new(all.clone().filter(|id| emits(*id)).filter_map(face).collect())?;
-    let (mut found, mut pairs) = (BTreeMap::new(), 0);
-    for other in all.filter(|id| !emits(*id)).filter_map(face) {
-        if pairs > MAX_PAIRS {
-            break;
-        }
-        let near = lights.near(&other, &mut pairs).filter(|light| are_coplanar_and_overlap(light, &other));
-        found.extend(near.map(|light| (light.object, light.normal)));
-    }
-    let greatest =
-        |face: &FlatFace| face.corners.iter().fold(face.size(), |most, at| most.max(at.abs().max_element()));
-    let height = LIFT * lights.faces.iter().map(greatest).fold(0.0, f64::max);
-    // Give the lifted triangles separate vertices.
-    let mut lifted = loaded.clone();
-    let mut known = HashMap::new();
-    for (triangle, normal) in &found {
-        let direction = (*normal * 1e4).round().to_array().map(|part| part as i32);
-        let corners = mesh.triangles[*triangle].map(|corner| {
-            *known.entry((corner, direction)).or_insert_with(|| {
-                let at = mesh.positions[corner as usize].as_dvec3() + *normal * height;
-                copy_vertex(&mut lifted.mesh, corner as usize, at.as_vec3())
-            })
-        });
-        lifted.mesh.triangles[*triangle] = corners;
-    }
-    (!found.is_empty()).then_some(lifted)
-}
-
-/// Adds a copy of a vertex at position `at`.
-fn copy_vertex(mesh: &mut TriangleMesh, vertex: usize, at: Vec3) -> u32 {
-    fn copy<T: Copy>(values: &mut Vec<T>, vertex: usize) {
-        values.extend(values.get(vertex).copied());
-    }
-    mesh.positions.push(at);
-    copy(&mut mesh.normals, vertex);
-    copy(&mut mesh.normal_groups, vertex);
-    copy(&mut mesh.uvs, vertex);
-    copy(&mut mesh.second_uvs, vertex);
-    copy(&mut mesh.colors, vertex);
-    (mesh.positions.len() - 1) as u32
-}
-
 /// Adds a light and the surface that it overlaps. If the pair exists, updates its lift in this direction to
-/// the maximum over all faces.
+/// the maximum over all faces. The lift is above the rounding error of both faces.
 fn add_coplanar_pair(
     found: &mut BTreeMap<(usize, usize), Vec<CoplanarLight>>,
-    light: &FlatFace,
-    face: &FlatFace,
+    (light, face): (&FlatFace, &FlatFace),
+    is_lifted: bool,
 ) {
     let size = light.size();
     let around = face.size().max(light.point.abs().max_element()).min(SURROUNDINGS * size);
-    let lift = light.normal * (LIFT * size.max(around));
+    let height = (LIFT * size.max(around)).max(2.0 * (light.rounding + face.rounding));
+    let lift = is_lifted.then(|| light.normal * height);
+    let is_same = |known: &&mut CoplanarLight| match (known.lift, lift) {
+        (Some(known), Some(lift)) => known.dot(lift) > 0.0,
+        (known, lift) => known == lift,
+    };
+    let length = |lift: Option<DVec3>| lift.map_or(0.0, DVec3::length_squared);
     let of_pair = found.entry((light.object, face.object)).or_default();
-    match of_pair.iter_mut().find(|known| known.lift.dot(lift) > 0.0) {
-        Some(known) if known.lift.length_squared() < lift.length_squared() => known.lift = lift,
+    match of_pair.iter_mut().find(is_same) {
+        Some(known) if length(known.lift) < length(lift) => known.lift = lift,
         Some(_) => {}
         None => of_pair.push(CoplanarLight { light: light.object, surface: face.object, lift }),
     }
 }
 
 /// Whether to lift the light off the face along the light's normal. This hides the back of a two-sided light.
-/// The light is not lifted if the face also emits on that side.
+/// The light is not lifted if the face also emits on that side, unless it is the reverse of the light in the
+/// same mesh: there, each face emits on its own side.
 fn must_lift(light: &FlatFace, face: &FlatFace) -> bool {
-    !face.emits_along(light.normal)
+    !face.emits_along(light.normal) || light.object == face.object && light.faces_against(face)
 }
 
 /// Whether two faces are coplanar and overlap.
-fn are_coplanar_and_overlap(light: &FlatFace, face: &FlatFace) -> bool {
-    let apart = light.size().min(face.size()) * COINCIDENT;
-    let is_on_plane = |corner: &DVec3| (*corner - face.point).dot(face.normal).abs() <= apart;
-    let sine = light.normal.cross(face.normal).length_squared();
-    if sine > PARALLEL * PARALLEL || !light.corners.iter().all(is_on_plane) {
+pub(super) fn are_coplanar_and_overlap(light: &FlatFace, face: &FlatFace) -> bool {
+    let apart = light.size().min(face.size()) * COINCIDENT + light.rounding + face.rounding;
+    // The larger face determines the plane because rounding tilts it less.
+    let (small, large) = if light.size() <= face.size() { (light, face) } else { (face, light) };
+    let is_on_plane = |corner: &DVec3| (*corner - large.point).dot(large.normal).abs() <= apart;
+    if !small.corners.iter().all(is_on_plane) {
         return false;
     }
     // Convex polygons overlap if no edge separates them.
@@ -343,7 +322,14 @@ fn each_flat_face(
         }
         Shape::Plane { point, normal } => {
             let normal = normal.normalize_or_zero();
-            let face = FlatFace { object: number, corners: Vec::new(), point: point - origin, normal, emits };
+            let face = FlatFace {
+                object: number,
+                corners: Vec::new(),
+                point: point - origin,
+                normal,
+                emits,
+                rounding: 0.0,
+            };
             visit(Some(face), emits);
         }
         Shape::Mesh(ref mesh) => {
@@ -355,13 +341,18 @@ fn each_flat_face(
             };
             for triangle in 0..loaded.mesh.triangles.len() {
                 let corners = loaded.mesh.corners(triangle as u32);
+                let local = corners.iter().fold(Vec3::ZERO, |most, at| most.max(at.abs()));
+                let local = transform.abs_bound(local.as_dvec3()).max_element();
                 let [a, b, c] = corners.map(|at| transform.point(at.as_dvec3() + loaded.mesh.origin));
-                let bounds = [a.min(b).min(c) - origin, a.max(b).max(c) - origin];
+                let [least, greatest] = [a.min(b).min(c) - origin, a.max(b).max(c) - origin];
+                let rounding = ROUNDING * local.max(least.abs().max(greatest.abs()).max_element());
+                let bounds = [least - rounding, greatest + rounding];
                 if near.is_some_and(|lights| lights.are_apart_from(bounds)) {
                     continue;
                 }
                 let corners = if transform.flips_handedness() { vec![a, c, b] } else { vec![a, b, c] };
-                visit(polygon(corners), if material.is_some() { emits } else { own(triangle) });
+                let face = polygon(corners).map(|face| FlatFace { rounding, ..face });
+                visit(face, if material.is_some() { emits } else { own(triangle) });
             }
         }
         Shape::Sphere { .. } | Shape::Torus { .. } | Shape::Cylinder { .. } | Shape::Cone { .. } => {}

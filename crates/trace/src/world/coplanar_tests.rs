@@ -8,10 +8,11 @@ use crate::geometry::Ray;
 use crate::geometry::mesh::TriangleMesh;
 use crate::lights::LightGeometry;
 use crate::math::Vec3;
+use crate::math::origin::origin_near;
 use crate::math::random::signed as random;
 use crate::scene::description::Accel;
 use crate::world::packet::tests::assert_packets;
-use crate::world::{Geometry, MeshTree};
+use crate::world::{Geometry, MeshTree, with_distinct_lights};
 
 /// A square mesh, centered at the origin and facing up.
 fn square() -> TriangleMesh {
@@ -38,10 +39,21 @@ fn loaded() -> LoadedMesh {
     LoadedMesh { mesh: square(), ..LoadedMesh::default() }
 }
 
+/// Lights that are lifted off a surface, and the surface.
 fn pairs(scene: &Scene) -> Vec<(usize, usize)> {
+    found(scene, true)
+}
+
+/// Lights that overlap another light, and the other light.
+fn doubled(scene: &Scene) -> Vec<(usize, usize)> {
+    found(scene, false)
+}
+
+fn found(scene: &Scene, are_lifted: bool) -> Vec<(usize, usize)> {
     let mesh = loaded();
     let meshes = vec![&mesh; scene.mesh_files.len()];
-    coplanar_lights(scene, &meshes, DVec3::ZERO).into_iter().map(|pair| (pair.light, pair.surface)).collect()
+    let found = coplanar_lights(scene, &meshes, DVec3::ZERO).into_iter();
+    found.filter(|pair| pair.lift.is_some() == are_lifted).map(|pair| (pair.light, pair.surface)).collect()
 }
 
 /// Lights in the plane y = 0, at the origin and facing up.
@@ -107,6 +119,149 @@ fn lights_are_compared_only_with_nearby_faces() {
         assert_eq!(near, [face.point.x]);
     }
     assert!(pairs < 3 * all.len(), "{pairs} pairs");
+}
+
+#[test]
+fn overlapping_lights_are_reported_once() {
+    let both = LIGHTS.map(|light| light.replace("'l'", "'both'"));
+    for first in LIGHTS {
+        assert!(doubled(&scene(first)).is_empty(), "{first}");
+        for second in LIGHTS.map(str::to_owned).iter().chain(&both) {
+            assert_eq!(doubled(&scene(&format!("{first}{second}"))), [(1, 0)], "{first}{second}");
+        }
+        assert!(doubled(&scene(&format!("{first}{}", SURFACES[0]))).is_empty(), "{first}");
+    }
+    // Lights that touch, and lights that face away from each other.
+    for second in [
+        "corner = [0.5, 0, 0.5]\nu = [1, 0, 0]\nv = [0, 0, -1]",
+        "corner = [0, 0, 0]\nu = [0, 0, -1]\nv = [1, 0, 0]",
+    ] {
+        let scene = scene(&format!("{}[[quad]]\n{second}\nmaterial = 'l'\n", LIGHTS[0]));
+        assert!(doubled(&scene).is_empty(), "{second}");
+    }
+}
+
+#[test]
+fn overlapping_faces_of_one_light_are_reported() {
+    let light = scene(LIGHTS[4]);
+    let reported = |triangles: &[[u32; 3]]| {
+        let mesh = TriangleMesh { triangles: triangles.to_vec(), ..square() };
+        let loaded = LoadedMesh { mesh, ..LoadedMesh::default() };
+        let found = coplanar_lights(&light, &[&loaded], DVec3::ZERO);
+        found
+            .iter()
+            .filter(|pair| pair.lift.is_none())
+            .map(|pair| (pair.light, pair.surface))
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(reported(&[[0, 1, 2], [0, 2, 3]]), []);
+    // The other diagonal, and one more triangle.
+    assert_eq!(reported(&[[0, 1, 2], [0, 2, 3], [1, 2, 3], [1, 3, 0]]), [(0, 0)]);
+    assert_eq!(reported(&[[0, 1, 2], [0, 2, 3], [1, 2, 3]]), [(0, 0)]);
+    // Repeated faces emit once, and reversed faces are moved apart.
+    assert_eq!(reported(&[[0, 1, 2], [0, 2, 3], [1, 2, 0], [3, 0, 2]]), []);
+    assert_eq!(reported(&[[0, 1, 2], [0, 2, 3], [2, 1, 0], [3, 2, 0]]), []);
+}
+
+#[test]
+fn repeated_faces_are_hit_as_the_first() {
+    let mut next = random(13);
+    for triangles in
+        [vec![[0, 1, 2], [0, 2, 3], [1, 2, 0], [3, 0, 2]], vec![[0, 1, 2], [0, 2, 3], [6, 4, 5], [6, 7, 4]]]
+    {
+        let mut vertex = || Vec3::new(next(), next(), next());
+        let mut positions: Vec<Vec3> = (0..4).map(|_| vertex()).collect();
+        positions.extend(positions.clone());
+        let mesh = TriangleMesh { positions, triangles, ..TriangleMesh::default() };
+        let loaded = LoadedMesh { mesh, ..LoadedMesh::default() };
+        assert!(with_distinct_lights(&loaded, false).is_none());
+        let distinct = with_distinct_lights(&loaded, true).expect("repeated faces");
+        let geometry = built_of(&scene(LIGHTS[4]), Accel::Bvh, distinct.clone());
+        let mut hits = 0;
+        for _ in 0..4000 {
+            let from = vertex() * 9.0;
+            let Some(hit) = geometry.closest(&Ray::new(from, vertex() * 0.5 - from)) else { continue };
+            assert!(hit.shape.primitive < 2, "{hit:?} {distinct:?}");
+            hits += 1;
+        }
+        assert!(hits > 100, "{hits}");
+    }
+}
+
+#[test]
+fn faces_of_both_directions_are_hit_from_their_front() {
+    let mut next = random(14);
+    // Reversed triangles, and reversed triangles with the other diagonal.
+    for reversed in [[[2, 1, 0], [3, 2, 0]], [[3, 2, 1], [3, 1, 0]]] {
+        for _ in 0..100 {
+            let mut vector = || DVec3::new(next().into(), next().into(), next().into());
+            let (x, y) = (vector().normalize(), vector());
+            let (center, y) = (vector() * 5.0, (y - x * x.dot(y)).normalize());
+            let corner = |[u, v]: [f64; 2]| (center + x * u + y * v).as_vec3();
+            let positions = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(corner).to_vec();
+            let triangles = [[[0, 1, 2], [0, 2, 3]], reversed].concat();
+            let mesh = TriangleMesh { positions, triangles, ..TriangleMesh::default() };
+            let loaded = LoadedMesh { mesh, ..LoadedMesh::default() };
+            let distinct = with_distinct_lights(&loaded, true).expect("reversed faces");
+            let geometry = built_of(&scene(LIGHTS[4]), Accel::Bvh, distinct);
+            for round in 0..100 {
+                let target = corner([0.5, 0.5]).as_dvec3() + (x * vector().x + y * vector().x) * 0.45;
+                let from = target + vector().normalize() * f64::from(1 + round);
+                if (from - target).normalize().dot(x.cross(y)).abs() < 0.05 {
+                    continue;
+                }
+                let ray = Ray::new(from.as_vec3(), (target - from).as_vec3());
+                let hit = geometry.closest(&ray).expect("a hit");
+                let is_front = hit.shape.primitive < 2;
+                assert_eq!(is_front, (from - target).dot(x.cross(y)) > 0.0, "{hit:?} {from} {target}");
+            }
+        }
+    }
+}
+
+#[test]
+fn lights_far_from_the_origin_are_lifted() {
+    let mut next = random(15);
+    for round in 0..400 {
+        let mut vector = || DVec3::new(next().into(), next().into(), next().into());
+        let at = vector() * [1e2, 1e3, 1e4, 1e6][round % 4];
+        let (x, y) = (vector().normalize(), vector());
+        let y = (y - x * x.dot(y)).normalize();
+        let (x, y) = if round % 3 == 0 { (DVec3::X, DVec3::NEG_Z) } else { (x, y) };
+        // A grid of `cells` × `cells` quads.
+        let grid = |half: f64, shift: [f64; 2], cells: u32| {
+            let corner = |i: u32| {
+                let [u, v] =
+                    [i % (cells + 1), i / (cells + 1)].map(|i| f64::from(i) / f64::from(cells) * 2.0 - 1.0);
+                let place = at + x * (shift[0] + u * half) + y * (shift[1] + v * half);
+                // Files usually have few decimals.
+                (place * 1e6).round() * 1e-6
+            };
+            let corners: Vec<DVec3> = (0..(cells + 1) * (cells + 1)).map(corner).collect();
+            let quads = (0..cells * cells).map(|i| i / cells * (cells + 1) + i % cells);
+            let triangles =
+                quads.flat_map(|a| [[a, a + 1, a + cells + 2], [a, a + cells + 2, a + cells + 1]]);
+            let mesh = TriangleMesh { triangles: triangles.collect(), ..TriangleMesh::default() };
+            let origin = origin_near(at + x * shift[0] + y * shift[1], half);
+            let positions = corners.iter().map(|corner| (*corner - origin).as_vec3()).collect();
+            Arc::new(LoadedMesh { mesh: TriangleMesh { origin, positions, ..mesh }, ..LoadedMesh::default() })
+        };
+        let cells = [1, 7][round / 4 % 2];
+        let [ceiling, light] = [grid(3.0, [0.4, 0.7], cells), grid(0.5, [0.0, 0.0], 1)];
+        let scene = scene(
+            "[[mesh]]\nfile = '../../assets/gem.off'\nmaterial = 'w'\n[[mesh]]\nfile = '../../assets/vase.obj'\nmaterial = 'l'\n",
+        );
+        let token = CancelToken::new();
+        let tree = |mesh| Arc::new(MeshTree::build(mesh, Accel::Bvh, &token).expect("never canceled"));
+        let (meshes, origin) = ([ceiling, light].map(tree), origin_near(at, 5.0));
+        let geometry = Geometry::of_scene(&scene, &meshes, origin, &token).expect("never canceled");
+        for _ in 0..50 {
+            let target = at + (x * vector().x + y * vector().x) * 0.45;
+            let from = target + x.cross(y) * 2.0 + vector();
+            let ray = Ray::new((from - origin).as_vec3(), (target - from).as_vec3());
+            assert_eq!(geometry.closest(&ray).expect("a hit").object, 1, "{round} {at} {from}");
+        }
+    }
 }
 
 /// Geometry of a scene whose mesh files are all [`square`].
@@ -229,7 +384,7 @@ fn mesh_file_lights_are_lifted_off_other_faces() {
         physical: None,
     };
     let loaded = LoadedMesh { mesh, materials: vec![material(0.0), material(1.0)], ..LoadedMesh::default() };
-    let lifted = with_offset_lights(&loaded).expect("a coplanar light").mesh;
+    let lifted = with_distinct_lights(&loaded, false).expect("a coplanar light").mesh;
     assert_eq!(lifted.triangles[..2], loaded.mesh.triangles[..2]);
     assert_eq!((lifted.positions.len(), lifted.normals.len(), lifted.uvs.len()), (12, 12, 12));
     let down = (lifted.positions[1] - lifted.positions[0]).cross(lifted.positions[2] - lifted.positions[0]).y;
@@ -244,8 +399,8 @@ fn mesh_file_lights_are_lifted_off_other_faces() {
     }
     // Meshes without coplanar lights are unchanged.
     let dark = LoadedMesh { materials: vec![material(0.0), material(0.0)], ..loaded.clone() };
-    assert!(with_offset_lights(&dark).is_none());
+    assert!(with_distinct_lights(&dark, false).is_none());
     let mut below = loaded;
     below.mesh.positions[4..].iter_mut().for_each(|position| position.y = 1.9);
-    assert!(with_offset_lights(&below).is_none());
+    assert!(with_distinct_lights(&below, false).is_none());
 }

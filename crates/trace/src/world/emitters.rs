@@ -3,6 +3,7 @@
 use std::collections::HashSet;
 use std::sync::Arc;
 
+use super::distinct_lights::repeated_triangles;
 use super::lower::{emission, file_emission, file_opacity, opacity};
 use super::{Geometry, Images, MeshInstance, Object};
 use crate::control::{CancelToken, Cancelled};
@@ -203,13 +204,25 @@ fn mesh_lights(
             (0..).zip(&loaded.materials).map(|(own, material)| (Some(own), of_file(material))).collect()
         }
     };
+    // A repeated face emits only once, like the first, which rays hit.
+    let emits = |id: u32| {
+        let own = |index: &u32| all.get(*index as usize).is_some_and(|(_, own)| !own.sides().is_empty());
+        if emissive.is_some() { true } else { loaded.mesh.materials.get(id as usize).is_some_and(own) }
+    };
+    let is_lit = all.iter().any(|(_, emissive)| !emissive.sides().is_empty());
+    let repeated: HashSet<u32> = if is_lit {
+        repeated_triangles(&loaded.mesh, emits).map(|(id, _)| id).collect()
+    } else {
+        HashSet::new()
+    };
     let light =
         |(own, emissive, side): (Option<u32>, &EmissiveMaterial, Side)| -> Result<Option<AreaLight>, Cancelled> {
             let corners = |id| match (mesh.world_corners(id), side) {
                 (corners, Side::Front) => corners,
                 ([a, b, c], Side::Back) => [a, c, b],
             };
-            let triangles = distinct_triangles(mesh, own).map(|id| (corners(id), id)).collect();
+            let distinct = triangles_of(mesh, own).filter(|id| !repeated.contains(id));
+            let triangles = distinct.map(|id| (corners(id), id)).collect();
             let Some(emitter) = MeshEmitter::new(triangles, token)? else { return Ok(None) };
             let radiance = emissive.emission.scale;
             let bounds = emissive.scaled_by_mean(emitter.bounds().scaled_by(radiance));
@@ -237,20 +250,6 @@ fn triangles_of(mesh: &MeshInstance, own: Option<u32>) -> impl Iterator<Item = u
     let mesh = &mesh.tree.loaded().mesh;
     let is_meant = move |id: &u32| own.is_none() || mesh.materials.get(*id as usize).copied() == own;
     (0..mesh.triangles.len() as u32).filter(is_meant)
-}
-
-/// Like [`triangles_of`], without duplicates, so that a repeated face in a file emits only once. Duplicates
-/// have the same corners in the same order.
-fn distinct_triangles(mesh: &MeshInstance, own: Option<u32>) -> impl Iterator<Item = u32> {
-    let mut known = HashSet::new();
-    triangles_of(mesh, own).filter(move |id| {
-        // Adding 0 converts −0 to 0.
-        let place = |corner: Vec3| (corner + Vec3::ZERO).to_array().map(f32::to_bits);
-        let mut corners = mesh.tree.loaded().mesh.corners(*id).map(place);
-        let first = (0..3).min_by_key(|index| corners[*index]).unwrap_or(0);
-        corners.rotate_left(first);
-        known.insert(corners)
-    })
 }
 
 #[cfg(test)]

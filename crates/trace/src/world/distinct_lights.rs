@@ -1,0 +1,129 @@
+//! Faces of a mesh light that coincide with each other or with other faces of the mesh.
+//!
+//! Repeated faces emit once: they are given the same corners in the same order, so that rays always hit the
+//! first. Emissive faces in the plane of a face that does not emit or that faces the other way are moved off
+//! the plane.
+
+use std::borrow::Cow;
+use std::collections::{BTreeMap, HashMap};
+
+use super::coplanar::{
+    EmissiveFaces, FlatFace, LIFT, MAX_PAIRS, ROUNDING, SURROUNDINGS, are_coplanar_and_overlap,
+};
+use super::lower::file_emits;
+use crate::assets::LoadedMesh;
+use crate::geometry::mesh::TriangleMesh;
+use crate::math::{DVec3, Vec3};
+use crate::scene::description::Scene;
+
+/// Whether an object gives an emissive material to each mesh file.
+pub fn emissive_meshes(scene: &Scene) -> Vec<bool> {
+    let mut emissive = vec![false; scene.mesh_files.len()];
+    for object in &scene.objects {
+        if let (Some(mesh), Some(own)) = (object.shape.mesh(), object.material) {
+            emissive[mesh.file] |= scene.materials[own].emits();
+        }
+    }
+    emissive
+}
+
+/// Returns a copy of the mesh in which rays hit, see and sample coincident emissive triangles alike. `None` if
+/// there are no such triangles. If `all_emit` is false, the file's materials determine the emissive triangles.
+pub fn with_distinct_lights(loaded: &LoadedMesh, all_emit: bool) -> Option<LoadedMesh> {
+    if !all_emit && !loaded.materials.iter().any(file_emits) {
+        return None;
+    }
+    let emits = |triangle: u32| {
+        let material = loaded.mesh.materials.get(triangle as usize);
+        all_emit || material.and_then(|own| loaded.materials.get(*own as usize)).is_some_and(file_emits)
+    };
+    let mut mesh = Cow::Borrowed(&loaded.mesh);
+    let repeated = repeated_triangles(&loaded.mesh, emits);
+    for (triangle, rotation) in repeated.filter(|(_, rotation)| *rotation != 0) {
+        mesh.to_mut().triangles[triangle as usize].rotate_left(rotation);
+    }
+    let (lifts, height) = lifted_triangles(&mesh, emits);
+    if !lifts.is_empty() {
+        lift(mesh.to_mut(), &lifts, height);
+    }
+    match mesh {
+        Cow::Borrowed(_) => None,
+        Cow::Owned(mesh) => Some(LoadedMesh { mesh, ..loaded.clone() }),
+    }
+}
+
+/// Emissive triangles with the same corners and orientation as an earlier one, and the rotation that gives
+/// their corners the same order.
+pub(super) fn repeated_triangles(
+    mesh: &TriangleMesh,
+    emits: impl Fn(u32) -> bool,
+) -> impl Iterator<Item = (u32, usize)> {
+    let mut known = HashMap::new();
+    (0..mesh.triangles.len() as u32).filter(move |id| emits(*id)).filter_map(move |id| {
+        // Adding 0 converts −0 to 0.
+        let place = |corner: Vec3| (corner + Vec3::ZERO).to_array().map(f32::to_bits);
+        let mut corners = mesh.corners(id).map(place);
+        let start = (0..3).min_by_key(|index| corners[*index]).unwrap_or(0);
+        corners.rotate_left(start);
+        let (first, first_start) = *known.entry(corners).or_insert((id, start));
+        (first != id).then_some((id, (start + 3 - first_start) % 3))
+    })
+}
+
+/// Emissive triangles to move off the plane of other faces, with their normals, and the distance.
+fn lifted_triangles(mesh: &TriangleMesh, emits: impl Fn(u32) -> bool) -> (BTreeMap<usize, DVec3>, f64) {
+    let reach =
+        |face: &FlatFace| face.corners.iter().fold(0.0, |most: f64, at| most.max(at.abs().max_element()));
+    let face = |triangle: u32| {
+        let mut face = FlatFace::new(mesh.corners(triangle).map(|corner| corner.as_dvec3()).to_vec())?;
+        (face.object, face.rounding) = (triangle as usize, ROUNDING * reach(&face));
+        Some(face)
+    };
+    let all = 0..mesh.triangles.len() as u32;
+    let (mut found, mut pairs, mut sizes) = (BTreeMap::new(), 0, 1.0);
+    let emissive = all.clone().filter(|id| emits(*id)).filter_map(face).collect();
+    let Some(lights) = EmissiveFaces::new(emissive) else { return (found, 0.0) };
+    for (other, is_light) in all.filter_map(|id| Some((face(id)?, emits(id)))) {
+        if pairs > MAX_PAIRS {
+            break;
+        }
+        for light in lights.near(&other, &mut pairs) {
+            if (!is_light || light.faces_against(&other)) && are_coplanar_and_overlap(light, &other) {
+                found.insert(light.object, light.normal);
+                // A light that consists of two sheets is seen from far away, relative to its size.
+                sizes = if is_light { SURROUNDINGS } else { sizes };
+            }
+        }
+    }
+    let greatest = lights.faces.iter().map(|face| reach(face).max(sizes * face.size())).fold(0.0, f64::max);
+    (found, LIFT * greatest)
+}
+
+/// Moves triangles along the given directions. Gives them separate vertices.
+fn lift(mesh: &mut TriangleMesh, lifts: &BTreeMap<usize, DVec3>, height: f64) {
+    let mut known = HashMap::new();
+    for (triangle, normal) in lifts {
+        let direction = (*normal * 1e4).round().to_array().map(|part| part as i32);
+        let corners = mesh.triangles[*triangle].map(|corner| {
+            *known.entry((corner, direction)).or_insert_with(|| {
+                let at = mesh.positions[corner as usize].as_dvec3() + *normal * height;
+                copy_vertex(mesh, corner as usize, at.as_vec3())
+            })
+        });
+        mesh.triangles[*triangle] = corners;
+    }
+}
+
+/// Adds a copy of a vertex at position `at`.
+fn copy_vertex(mesh: &mut TriangleMesh, vertex: usize, at: Vec3) -> u32 {
+    fn copy<T: Copy>(values: &mut Vec<T>, vertex: usize) {
+        values.extend(values.get(vertex).copied());
+    }
+    mesh.positions.push(at);
+    copy(&mut mesh.normals, vertex);
+    copy(&mut mesh.normal_groups, vertex);
+    copy(&mut mesh.uvs, vertex);
+    copy(&mut mesh.second_uvs, vertex);
+    copy(&mut mesh.colors, vertex);
+    (mesh.positions.len() - 1) as u32
+}
