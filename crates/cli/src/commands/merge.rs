@@ -289,6 +289,7 @@ impl MergeCommand<'_> {
             PartError::Cancelled(_) => Exit::FAILED,
             PartError::Film(_) => self.console.fail(Exit::FAILED, &error.to_string()),
             PartError::Unreadable { .. }
+            | PartError::NotRegular { .. }
             | PartError::Foreign { .. }
             | PartError::Version { .. }
             | PartError::Unfinished { .. }
