@@ -9,8 +9,7 @@ use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 
 use super::MeshTree;
-use super::lower::file_emits;
-use crate::assets::LoadedMesh;
+use crate::assets::{FileMaterial, LoadedMesh};
 use crate::geometry::cuboid::Cuboid;
 use crate::geometry::mesh::TriangleMesh;
 use crate::materials::EmissionSides;
@@ -192,9 +191,9 @@ pub fn with_lifted_lights(loaded: &LoadedMesh) -> Option<LoadedMesh> {
     let emits = |triangle: u32| {
         let material =
             mesh.materials.get(triangle as usize).and_then(|own| loaded.materials.get(*own as usize));
-        material.is_some_and(file_emits)
+        material.is_some_and(FileMaterial::emits)
     };
-    if !loaded.materials.iter().any(file_emits) {
+    if !loaded.materials.iter().any(FileMaterial::emits) {
         return None;
     }
     // Find the triangles to lift.
@@ -294,7 +293,7 @@ fn may_emit(scene: &Scene, meshes: &[&LoadedMesh], object: usize) -> bool {
     let object = &scene.objects[object];
     match (object.material, object.shape.mesh()) {
         (Some(material), _) => scene.materials[material].emits(),
-        (None, Some(mesh)) => meshes[mesh.file].materials.iter().any(file_emits),
+        (None, Some(mesh)) => meshes[mesh.file].materials.iter().any(FileMaterial::emits),
         (None, None) => false,
     }
 }
@@ -351,7 +350,7 @@ fn each_flat_face(
             let transform = mesh.placed.transform();
             let own = |triangle: usize| {
                 let material = *loaded.mesh.materials.get(triangle)? as usize;
-                loaded.materials.get(material).filter(|own| file_emits(own)).map(|_| EmissionSides::Front)
+                loaded.materials.get(material).filter(|own| own.emits()).map(|_| EmissionSides::Front)
             };
             for triangle in 0..loaded.mesh.triangles.len() {
                 let corners = loaded.mesh.corners(triangle as u32);

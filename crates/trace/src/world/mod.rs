@@ -39,7 +39,6 @@ pub use coplanar::{CoplanarLight, coplanar_lights, light_lifts, with_lifted_ligh
 pub use emitters::{lights, photon_source, sky_map};
 pub use geometry::{Geometry, Hit};
 pub use glass_solids::{GlassSolids, OpenGlass};
-pub use lower::{file_emits, file_is_glass};
 pub use merged::MergedMeshes;
 pub use mesh_instance::MeshInstance;
 pub use mesh_tree::MeshTree;

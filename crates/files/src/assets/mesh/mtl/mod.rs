@@ -54,7 +54,11 @@ impl MtlMaterial {
     }
 
     fn number(&self, number: MtlNumber) -> Option<f64> {
-        self.numbers[number as usize].map(|number| number.value)
+        self.number_at(number).map(|number| number.value)
+    }
+
+    fn number_at(&self, number: MtlNumber) -> Option<WithLine<f64>> {
+        self.numbers[number as usize]
     }
 
     /// The last map of this kind.
@@ -80,16 +84,18 @@ pub(super) fn load(path: &Path, monitor: Monitor<'_>) -> Result<MtlLibrary, Asse
     let mut library = MtlLibrary { materials: Vec::new(), ignored: Vec::new(), hash };
     for (index, line) in bytes.split(|byte| *byte == b'\n').enumerate() {
         let line = decoded(line);
-        let statement = statements::parse(&line)
+        let mut warnings = Vec::new();
+        let statement = statements::parse(&line, &mut warnings)
             .map_err(|reason| AssetError::malformed(path, Some(index + 1), reason))?;
-        library.add(statement, index + 1);
+        library.add(statement, index + 1, warnings);
     }
     library.add_duplicates();
     Ok(library)
 }
 
 impl MtlLibrary {
-    fn add(&mut self, statement: Statement, line: usize) {
+    /// Adds a statement and the warnings about it.
+    fn add(&mut self, statement: Statement, line: usize, warnings: Vec<String>) {
         if let Statement::New(name) = statement {
             self.materials.push(MtlMaterial { name, line, ..MtlMaterial::default() });
             return;
@@ -102,8 +108,9 @@ impl MtlLibrary {
             }
             return;
         };
+        material.ignored.extend(warnings.into_iter().map(|words| IgnoredStatement { line, words }));
         match statement {
-            Statement::New(_) | Statement::Nothing => {}
+            Statement::New(_) | Statement::Nothing | Statement::Ignored => {}
             Statement::Color(color, value) => {
                 material.colors[color as usize] = Some(WithLine { value, line });
             }
@@ -115,7 +122,6 @@ impl MtlLibrary {
                 map.line = line;
                 material.maps.push((kind, map));
             }
-            Statement::Ignored(words) => material.ignored.push(IgnoredStatement { line, words }),
         }
     }
 
