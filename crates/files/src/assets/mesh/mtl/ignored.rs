@@ -60,7 +60,7 @@ pub(super) const UNSHADED: &str = "`illum 0` (unshaded color) is rendered as a m
 pub(super) const SHADOW_CATCHER: &str = "`illum 10` (shadow catcher) is rendered as an ordinary surface";
 pub(super) const UNKNOWN_MODEL: &str = "unknown illumination model; `illum 2` is used";
 pub(super) const INVISIBLE_GLASS: &str = "glass without an index of refraction `Ni` above 1 is invisible";
-pub(super) const BRIGHT_GLASS: &str = "`Ni` is clamped to 10";
+pub(super) const IOR_CLAMPED: &str = "`Ni` is clamped to 10";
 const OPAQUE_TR: &str = "`Tr 1` without `d` is rendered as opaque; use `d 0` for an invisible surface";
 const TR_IGNORED: &str = "`Tr` is ignored because `d` has priority";
 const OPACITY_MAP: &str = "the opacity map replaces `d`";
@@ -123,7 +123,7 @@ fn warn_about_illumination(
         FileMaterialKind::Glass | FileMaterialKind::Principled(_)
             if converted.ior > FileMaterial::MAX_IOR =>
         {
-            add(line(ior), BRIGHT_GLASS);
+            add(line(ior), IOR_CLAMPED);
         }
         FileMaterialKind::Principled(_) if ior.is_some() && converted.ior <= 1.0 => add(line(ior), LOW_IOR),
         FileMaterialKind::Principled(_)

@@ -4,7 +4,6 @@ use std::ffi::OsStr;
 use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
 
-use super::statements::option_ignored;
 use crate::assets::{FileLine, FileTexture};
 use crate::materials::{Channel, PixelValue};
 use crate::math::limits::{LARGEST, is_too_short};
@@ -245,6 +244,10 @@ fn is_zero(scale: f64) -> bool {
 fn is_like_option(word: &str) -> bool {
     word.strip_prefix('-')
         .is_some_and(|name| !name.is_empty() && name.chars().all(|c| c.is_ascii_alphabetic()))
+}
+
+pub(super) fn option_ignored(option: &str) -> String {
+    format!("option `{option}` is ignored")
 }
 
 pub(super) fn not_an_option(word: &str) -> String {

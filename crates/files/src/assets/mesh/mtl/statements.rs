@@ -1,6 +1,6 @@
 //! Parses lines of an MTL file. Keywords are case-insensitive.
 
-use super::map::{Map, MapKind};
+use super::map::{Map, MapKind, option_ignored};
 use crate::math::limits::LARGEST;
 
 /// A color statement.
@@ -134,10 +134,6 @@ pub(super) fn expected_after(keyword: &str, expected: &str) -> String {
 pub(super) const THREE_NUMBERS: &str = "three finite numbers";
 pub(super) const ONE_NUMBER: &str = "a finite number";
 pub(super) const INTEGER: &str = "an integer";
-
-pub(super) fn option_ignored(option: &str) -> String {
-    format!("option `{option}` is ignored")
-}
 
 pub(super) fn unknown_statement(keyword: &str) -> String {
     format!("unknown statement `{}` is ignored", truncate_word(keyword))

@@ -4,9 +4,9 @@ use super::ignored::{
     AMBIENT_MAP, BRIGHT_MIRROR, DIFFUSE_UNDER_MIRROR, FILTER_IGNORED, GAINS_ENERGY, INVISIBLE_GLASS,
     SHADOW_CATCHER, UNKNOWN_MODEL, UNSHADED, map_unsupported, statement_ignored,
 };
+use super::map::option_ignored;
 use super::statements::{
-    INTEGER, ONE_NUMBER, THREE_NUMBERS, expected_after, option_ignored, spectrum_unsupported,
-    unknown_statement,
+    INTEGER, ONE_NUMBER, THREE_NUMBERS, expected_after, spectrum_unsupported, unknown_statement,
 };
 use super::*;
 use crate::assets::{FileLine, FileMaterial, FileTexture, PhysicalMaterial, rejection};
